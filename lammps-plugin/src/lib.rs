@@ -1,0 +1,1 @@
+//! LAMMPS pair styles.

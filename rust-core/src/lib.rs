@@ -1,0 +1,2 @@
+//! Many-body dissipative particle dynamics from excess free energies.
+pub mod model;

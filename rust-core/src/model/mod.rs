@@ -1,0 +1,2 @@
+//! The model file: one fluid, every host.
+pub mod expression;

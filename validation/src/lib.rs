@@ -1,0 +1,4 @@
+//! psidpd: native runner and cross-code validator.
+pub mod lammps;
+pub mod observe;
+pub mod report;

@@ -1,0 +1,2 @@
+//! The `psidpd` program.
+fn main() {}

@@ -1,0 +1,1 @@
+//! Observables: read, never drive.
