@@ -1,1 +1,50 @@
 //! Formulas with exact derivatives.
+//!
+//! A model file writes its excess free energies as text. Text becomes an [`Ast`], an [`Ast`] with
+//! the values of its constants and the places of its variables becomes a [`Formula`], and a
+//! formula can be differentiated as often as needed, symbolically, so forces are gradients to
+//! rounding error. For evaluation, formulas are compiled together into one [`Program`], which
+//! shares what they have in common and works on blocks of particles at a time.
+//!
+//! ```
+//! use psidpd_core::model::expression::{Ast, Formula, Program, Variables};
+//!
+//! // Warren's many-body term, ψ(n) = π r_d⁴ B n² / 30, and its slope.
+//! let ast = Ast::parse("pi/30 * rd^4 * B * n^2")?;
+//! let constants = [("rd".into(), 0.75), ("B".into(), 25.0)].into();
+//! let variables = Variables { count: 1, names: [("n".into(), vec![0])].into() };
+//! let psi = Formula::compile(&ast, &constants, &variables)?;
+//! let slope = psi.derivative(0)?;
+//!
+//! let program = Program::new(&[&psi, &slope]);
+//! let (mut out, mut work) = ([0.0; 2], Vec::new());
+//! program.eval(&[6.0], &mut out, &mut work);
+//! assert!((out[1] - 2.0 * out[0] / 6.0).abs() < 1e-12);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Nothing here recurses on the shape of a formula: neither a long text nor a deep one can
+//! overflow the stack.
+
+mod ast;
+mod compile;
+mod derivative;
+mod display;
+mod error;
+mod formula;
+mod function;
+mod graph;
+mod lexer;
+mod lower;
+mod parser;
+mod program;
+mod simplify;
+mod suggest;
+
+pub use ast::{Ast, MAX_DEPTH, MAX_LENGTH};
+pub use compile::Variables;
+pub use display::Named;
+pub use error::{ErrorKind, ExpressionError, TooLarge};
+pub use formula::Formula;
+pub use graph::MAX_NODES;
+pub use program::Program;

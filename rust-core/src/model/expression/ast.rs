@@ -1,0 +1,73 @@
+//! A parsed expression, names not yet resolved.
+
+use super::error::{ExpressionError, Span};
+use super::function::Function;
+use super::parser;
+
+/// The longest text that is parsed, in bytes.
+pub const MAX_LENGTH: usize = 4096;
+
+/// The deepest nesting of parentheses, signs and powers that is parsed.
+pub const MAX_DEPTH: usize = 64;
+
+/// The syntax of an expression.
+///
+/// | | |
+/// |---|---|
+/// | numbers | `2`, `0.5`, `.5`, `1e-3` |
+/// | names | a letter or `_`, then letters, digits and `_`; `pi` is π |
+/// | operators, loosest first | `+ -`, then `* /`, then signs, then `^` |
+/// | functions | `ln` (or `log`), `exp`, `sqrt`, `sin`, `cos`, `tanh`, `abs`, `min(a, b)`, `max(a, b)` |
+///
+/// `^` groups to the right and binds tighter than a sign on its left: `-x^2` is −(x²), `2^-1` is ½.
+/// There is no implied multiplication.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ast {
+    /// In postfix order: every operation directly follows its operands. A tree that is a list
+    /// needs no recursion, however deep it is.
+    pub(super) steps: Vec<Step>,
+}
+
+/// One operation and the text it came from, operands included.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Step {
+    pub action: Action,
+    pub span: Span,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Action {
+    Number(f64),
+    Name(String),
+    Negate,
+    Binary(Binary),
+    Call(Function),
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Binary {
+    Add,
+    Subtract,
+    Multiply,
+    Divide,
+    Power,
+}
+
+impl Ast {
+    /// Parses `text`.
+    ///
+    /// Any text at all may be given: longer than [`MAX_LENGTH`] or nested deeper than
+    /// [`MAX_DEPTH`] is an error like any other.
+    pub fn parse(text: &str) -> Result<Self, ExpressionError> {
+        parser::parse(text).map(|steps| Self { steps })
+    }
+
+    /// The names that need a value, in the order of the text and as often as they occur, each
+    /// with the byte at which it starts. Functions and `pi` are not among them.
+    pub fn names(&self) -> impl Iterator<Item = (&str, usize)> {
+        self.steps.iter().filter_map(|step| match &step.action {
+            Action::Name(name) => Some((name.as_str(), step.span.offset)),
+            _ => None,
+        })
+    }
+}

@@ -1,0 +1,258 @@
+//! One scalar function of several variables.
+
+use std::sync::Arc;
+
+use super::error::TooLarge;
+use super::function::{integer_power, select};
+use super::graph::{Bits, Graph, Node, as_quotient};
+
+/// An immutable scalar function of variables, which go by their index.
+///
+/// Equal parts are stored once and constants are folded; cloning is cheap. At most
+/// [`MAX_NODES`](super::MAX_NODES) operations.
+///
+/// Where a function is not smooth a derivative is still defined:
+///
+/// - abs' is −1, 0 or 1, and 0 at the kink;
+/// - min and max have the derivative of the argument they return, and of the first where the two
+///   are equal.
+///
+/// Outside its domain a formula evaluates to an infinity or NaN, which is for the caller to see.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Formula {
+    /// Operands before operations, the whole formula last; never empty.
+    nodes: Arc<[Node]>,
+}
+
+impl Formula {
+    /// The formula that is `value` everywhere.
+    pub fn constant(value: f64) -> Self {
+        Self::from_nodes(vec![Node::Constant(Bits::new(value))])
+    }
+
+    /// The formula that is variable `i`.
+    pub fn variable(i: usize) -> Self {
+        // No slice of numbers is long enough to have an element beyond this.
+        let index = u32::try_from(i).unwrap_or(u32::MAX);
+        Self::from_nodes(vec![Node::Variable(index)])
+    }
+
+    pub(super) fn from_nodes(nodes: Vec<Node>) -> Self {
+        Self {
+            nodes: nodes.into(),
+        }
+    }
+
+    pub(super) fn nodes(&self) -> &[Node] {
+        &self.nodes
+    }
+
+    /// The value, if it is a finite number that depends on nothing.
+    pub fn is_constant(&self) -> Option<f64> {
+        match *self.nodes {
+            [Node::Constant(bits)] => Some(bits.value()),
+            _ => None,
+        }
+    }
+
+    /// Whether variable `i` occurs in the formula, after simplification.
+    pub fn depends_on(&self, i: usize) -> bool {
+        self.nodes
+            .iter()
+            .any(|node| matches!(*node, Node::Variable(v) if v as usize == i))
+    }
+
+    /// The exact derivative ∂/∂xᵢ.
+    ///
+    /// Fails only for formulas that are already near the limit of operations.
+    pub fn derivative(&self, i: usize) -> Result<Self, TooLarge> {
+        let Ok(variable) = u32::try_from(i) else {
+            return Ok(Self::constant(0.0));
+        };
+        let mut graph = Graph::new();
+        let places = graph.import(&self.nodes)?;
+        let root = graph.differentiate(places[places.len() - 1], variable)?;
+        Ok(Self::from_nodes(graph.extract(root)))
+    }
+
+    /// The formula with variable `i` held at `value`; the other variables keep their indices.
+    pub fn substitute(&self, i: usize, value: f64) -> Self {
+        self.try_substitute(i, value)
+            // The graph below has no limit to exceed.
+            .unwrap_or_else(|TooLarge| self.clone())
+    }
+
+    fn try_substitute(&self, i: usize, value: f64) -> Result<Self, TooLarge> {
+        let mut graph = Graph::with_limit(usize::MAX);
+        let mut places = Vec::with_capacity(self.nodes.len());
+        for &node in self.nodes.iter() {
+            let at = |id: super::graph::Id| places[id.index()];
+            let id = match node {
+                Node::Variable(v) if v as usize == i => graph.constant(value)?,
+                Node::Constant(_) | Node::Variable(_) => graph.add_node(node)?,
+                Node::Add(a, b) => graph.add(at(a), at(b))?,
+                Node::Subtract(a, b) => graph.subtract(at(a), at(b))?,
+                Node::Multiply(a, b) => graph.multiply(at(a), at(b))?,
+                Node::Divide(a, b) => graph.divide(at(a), at(b))?,
+                Node::Negate(a) => graph.negate(at(a))?,
+                Node::IntegerPower(a, n) => graph.integer_power(at(a), n)?,
+                Node::Power(a, b) => graph.power(at(a), at(b))?,
+                Node::Unary(function, a) => graph.unary(function, at(a))?,
+                Node::Select {
+                    left,
+                    right,
+                    then,
+                    otherwise,
+                } => graph.select(at(left), at(right), at(then), at(otherwise))?,
+            };
+            places.push(id);
+        }
+        Ok(Self::from_nodes(graph.extract(places[places.len() - 1])))
+    }
+
+    /// The value at a point, for the occasional use; a [`Program`](super::Program) gives the same
+    /// bits faster.
+    ///
+    /// # Panics
+    ///
+    /// If the formula depends on a variable that `at` does not have.
+    pub fn value(&self, at: &[f64]) -> f64 {
+        let mut values: Vec<f64> = Vec::with_capacity(self.nodes.len());
+        for &node in self.nodes.iter() {
+            let v = |id: super::graph::Id| values[id.index()];
+            let value = match node {
+                Node::Constant(bits) => bits.value(),
+                Node::Variable(index) => at[index as usize],
+                Node::Add(a, b) => v(a) + v(b),
+                Node::Subtract(a, b) => v(a) - v(b),
+                Node::Multiply(a, b) => match as_quotient(&self.nodes, node) {
+                    Some((c, base, n)) => c / integer_power(v(base), n),
+                    None => v(a) * v(b),
+                },
+                Node::Divide(a, b) => v(a) / v(b),
+                Node::Negate(a) => -v(a),
+                Node::IntegerPower(a, n) => integer_power(v(a), n),
+                Node::Power(a, b) => v(a).powf(v(b)),
+                Node::Unary(function, a) => function.apply(v(a)),
+                Node::Select {
+                    left,
+                    right,
+                    then,
+                    otherwise,
+                } => select(v(left), v(right), v(then), v(otherwise)),
+            };
+            values.push(value);
+        }
+        values[values.len() - 1]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Ast, Variables};
+    use super::*;
+
+    fn formula(text: &str) -> Formula {
+        let variables = Variables {
+            count: 2,
+            names: [("x".to_owned(), vec![0]), ("y".to_owned(), vec![1])].into(),
+        };
+        Formula::compile(&Ast::parse(text).unwrap(), &Default::default(), &variables).unwrap()
+    }
+
+    fn slope(text: &str) -> String {
+        let slope = formula(text).derivative(0).unwrap();
+        slope.with_names(&["x", "y"]).to_string()
+    }
+
+    #[test]
+    fn derivatives_are_what_one_would_write() {
+        for (text, expected) in [
+            ("3", "0"),
+            ("y", "0"),
+            ("x", "1"),
+            ("3*x + y", "3"),
+            ("x^2", "2 * x"),
+            ("x^3*y", "3 * y * x^2"),
+            ("1/x", "-1 / x^2"),
+            ("y/x", "-y / x / x"),
+            ("x^0.3", "0.3 * x^-0.7"),
+            ("x^40", "40 * x^39"),
+            ("2^x", "0.6931471805599453 * 2^x"),
+            ("x^y", "y * x^(y - 1)"),
+            ("ln(x)", "1 / x"),
+            ("ln(3*x)", "1 / x"),
+            ("exp(2*x)", "2 * exp(2 * x)"),
+            ("sqrt(x)", "0.5 / sqrt(x)"),
+            ("sin(x)", "cos(x)"),
+            ("cos(x)", "-sin(x)"),
+            ("tanh(x)", "1 - tanh(x)^2"),
+            ("abs(x)", "sign(x)"),
+            ("min(x, y)", "if(x <= y, 1, 0)"),
+            ("max(2*x, x^2)", "if(x^2 <= 2 * x, 2, 2 * x)"),
+        ] {
+            assert_eq!(slope(text), expected, "{text}");
+        }
+    }
+
+    #[test]
+    fn kinks_have_the_documented_slope() {
+        let at_tie = |text: &str| formula(text).derivative(0).unwrap().value(&[1.0, 1.0]);
+        assert_eq!(at_tie("abs(x - y)"), 0.0);
+        assert_eq!(at_tie("min(x, y)"), 1.0);
+        assert_eq!(at_tie("min(y, x)"), 0.0);
+        assert_eq!(at_tie("max(x, y)"), 1.0);
+        assert_eq!(at_tie("max(y, x)"), 0.0);
+    }
+
+    #[test]
+    fn repeated_derivatives_stay_small() {
+        let text = "exp(-x^2)*ln(1 + x*y)/(1 + tanh(x)*sin(x*y))";
+        let mut f = formula(text);
+        for _ in 0..3 {
+            f = f.derivative(0).unwrap();
+        }
+        assert!(f.nodes().len() < 600, "{}", f.nodes().len());
+    }
+
+    #[test]
+    fn a_derivative_that_explodes_is_an_error() {
+        let text = vec!["sin(x+exp(x*sin(y)))"; 140].join("*x^y^x/");
+        let mut f = formula(&text);
+        let outcome = (0..12).try_for_each(|_| {
+            f = f.derivative(0)?;
+            Ok(())
+        });
+        assert_eq!(outcome, Err(TooLarge));
+    }
+
+    #[test]
+    fn substitution_folds() {
+        let f = formula("ln(1 + x)*y + x^2");
+        assert_eq!(f.substitute(0, 0.0), Formula::constant(0.0));
+        assert!(!f.substitute(0, 2.0).depends_on(0));
+        assert_eq!(
+            f.substitute(0, 2.0).value(&[f64::NAN, 3.0]),
+            f.value(&[2.0, 3.0])
+        );
+        // Undefined, but not an error: the value says so.
+        let undefined = f.substitute(0, -2.0);
+        assert_eq!(undefined.is_constant(), None);
+        assert!(undefined.value(&[0.0, 1.0]).is_nan());
+    }
+
+    #[test]
+    fn leaves() {
+        assert_eq!(Formula::constant(2.5).is_constant(), Some(2.5));
+        assert_eq!(Formula::variable(3).is_constant(), None);
+        assert!(Formula::variable(3).depends_on(3));
+        assert!(!Formula::variable(3).depends_on(2));
+        assert_eq!(Formula::variable(1).value(&[4.0, 5.0]), 5.0);
+        assert_eq!(
+            Formula::variable(usize::MAX)
+                .derivative(usize::MAX)
+                .unwrap(),
+            Formula::constant(0.0)
+        );
+    }
+}

@@ -1,0 +1,218 @@
+//! Formulas as directed acyclic graphs in which equal parts exist once.
+
+use std::collections::HashMap;
+
+use super::error::TooLarge;
+use super::function::Unary;
+
+/// The most operations a formula may have, and a derivative may need on the way.
+pub const MAX_NODES: usize = 50_000;
+
+/// A node's place in its graph.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(super) struct Id(u32);
+
+impl Id {
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// An operation on earlier nodes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) enum Node {
+    Constant(Bits),
+    Variable(u32),
+    Add(Id, Id),
+    Subtract(Id, Id),
+    Multiply(Id, Id),
+    Divide(Id, Id),
+    Negate(Id),
+    /// A power that is worked out by multiplication.
+    IntegerPower(Id, i32),
+    Power(Id, Id),
+    Unary(Unary, Id),
+    /// `then` if `left <= right`, else `otherwise`: min, max and their derivatives.
+    Select {
+        left: Id,
+        right: Id,
+        then: Id,
+        otherwise: Id,
+    },
+}
+
+/// A constant, equal to another when it has the same bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) struct Bits(u64);
+
+impl Bits {
+    pub fn new(value: f64) -> Self {
+        // There is one zero.
+        Self((value + 0.0).to_bits())
+    }
+
+    pub fn value(self) -> f64 {
+        f64::from_bits(self.0)
+    }
+}
+
+impl Node {
+    /// The nodes it works on.
+    pub fn operands(self) -> impl Iterator<Item = Id> {
+        let operands = match self {
+            Node::Constant(_) | Node::Variable(_) => [None; 4],
+            Node::Negate(a) | Node::IntegerPower(a, _) | Node::Unary(_, a) => {
+                [Some(a), None, None, None]
+            }
+            Node::Add(a, b)
+            | Node::Subtract(a, b)
+            | Node::Multiply(a, b)
+            | Node::Divide(a, b)
+            | Node::Power(a, b) => [Some(a), Some(b), None, None],
+            Node::Select {
+                left,
+                right,
+                then,
+                otherwise,
+            } => [Some(left), Some(right), Some(then), Some(otherwise)],
+        };
+        operands.into_iter().flatten()
+    }
+
+    /// The same operation on other nodes.
+    pub fn with_operands(self, mut to: impl FnMut(Id) -> Id) -> Self {
+        match self {
+            Node::Constant(_) | Node::Variable(_) => self,
+            Node::Negate(a) => Node::Negate(to(a)),
+            Node::IntegerPower(a, n) => Node::IntegerPower(to(a), n),
+            Node::Unary(function, a) => Node::Unary(function, to(a)),
+            Node::Add(a, b) => Node::Add(to(a), to(b)),
+            Node::Subtract(a, b) => Node::Subtract(to(a), to(b)),
+            Node::Multiply(a, b) => Node::Multiply(to(a), to(b)),
+            Node::Divide(a, b) => Node::Divide(to(a), to(b)),
+            Node::Power(a, b) => Node::Power(to(a), to(b)),
+            Node::Select {
+                left,
+                right,
+                then,
+                otherwise,
+            } => Node::Select {
+                left: to(left),
+                right: to(right),
+                then: to(then),
+                otherwise: to(otherwise),
+            },
+        }
+    }
+}
+
+/// `c · x⁻ⁿ`, which costs one division instead of a division and a product.
+///
+/// Returns c, x and n. Everything that evaluates or prints a graph asks here, so all of it agrees.
+pub(super) fn as_quotient(nodes: &[Node], node: Node) -> Option<(f64, Id, i32)> {
+    let Node::Multiply(factor, power) = node else {
+        return None;
+    };
+    match (nodes[factor.index()], nodes[power.index()]) {
+        (Node::Constant(c), Node::IntegerPower(base, n)) if n < 0 => Some((c.value(), base, -n)),
+        _ => None,
+    }
+}
+
+/// A graph that grows: operands always come before the nodes that use them.
+#[derive(Debug)]
+pub(super) struct Graph {
+    nodes: Vec<Node>,
+    places: HashMap<Node, Id>,
+    limit: usize,
+}
+
+impl Graph {
+    /// An empty graph that may grow to [`MAX_NODES`].
+    pub fn new() -> Self {
+        Self::with_limit(MAX_NODES)
+    }
+
+    /// An empty graph for work that can add only so much to what was within bounds.
+    pub fn with_limit(limit: usize) -> Self {
+        Self {
+            nodes: Vec::new(),
+            places: HashMap::new(),
+            limit,
+        }
+    }
+
+    pub fn nodes(&self) -> &[Node] {
+        &self.nodes
+    }
+
+    pub fn node(&self, id: Id) -> Node {
+        self.nodes[id.index()]
+    }
+
+    /// The place of `node`, as it is; the arithmetic that simplifies is in `simplify`.
+    pub fn add_node(&mut self, node: Node) -> Result<Id, TooLarge> {
+        let node = self.in_order(node);
+        if let Some(&id) = self.places.get(&node) {
+            return Ok(id);
+        }
+        if self.nodes.len() >= self.limit {
+            return Err(TooLarge);
+        }
+        let id = Id(u32::try_from(self.nodes.len()).map_err(|_| TooLarge)?);
+        self.nodes.push(node);
+        self.places.insert(node, id);
+        Ok(id)
+    }
+
+    /// Copies a list of nodes in as they are; returns where each has gone.
+    pub fn import(&mut self, nodes: &[Node]) -> Result<Vec<Id>, TooLarge> {
+        let mut places: Vec<Id> = Vec::with_capacity(nodes.len());
+        for node in nodes {
+            let id = self.add_node(node.with_operands(|id| places[id.index()]))?;
+            places.push(id);
+        }
+        Ok(places)
+    }
+
+    /// What `root` is made of, `root` last and nothing else.
+    pub fn extract(&self, root: Id) -> Vec<Node> {
+        let mut needed = vec![false; root.index() + 1];
+        needed[root.index()] = true;
+        for index in (0..needed.len()).rev() {
+            if needed[index] {
+                self.nodes[index]
+                    .operands()
+                    .for_each(|id| needed[id.index()] = true);
+            }
+        }
+        let mut places = vec![Id(0); needed.len()];
+        let mut kept = Vec::new();
+        for (index, node) in self.nodes[..needed.len()].iter().enumerate() {
+            if needed[index] {
+                places[index] = Id(kept.len() as u32);
+                kept.push(node.with_operands(|id| places[id.index()]));
+            }
+        }
+        kept
+    }
+
+    /// a + b and b + a are one node, constants first.
+    fn in_order(&self, node: Node) -> Node {
+        let sorted = |a: Id, b: Id| {
+            let key = |id: Id| (!matches!(self.node(id), Node::Constant(_)), id);
+            if key(b) < key(a) { (b, a) } else { (a, b) }
+        };
+        match node {
+            Node::Add(a, b) => {
+                let (a, b) = sorted(a, b);
+                Node::Add(a, b)
+            }
+            Node::Multiply(a, b) => {
+                let (a, b) = sorted(a, b);
+                Node::Multiply(a, b)
+            }
+            _ => node,
+        }
+    }
+}
