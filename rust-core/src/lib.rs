@@ -1,2 +1,19 @@
-//! Many-body dissipative particle dynamics from excess free energies.
+//! Many-body dissipative particle dynamics from excess free energies: the model file, and the engine
+//! that both hosts, LAMMPS and the native runner, get their forces from.
+//!
+//! The Hamiltonian is
+//!
+//! ```text
+//! U = Σ_i ψ_c(i)(ñ_i) + Σ_{i<j} φ_c(i)c(j)(r_ij)
+//! ```
+//!
+//! with `ñ` the weighted (and, if the model says so, corrected) local densities. Forces, energy and
+//! virial all come from it; see [`engine::reference`] for the plain evaluation that everything faster
+//! is tested against.
+//!
+//! Data flow: model file → [`model::Model`] → [`model::Fluid`] (at one kT) → [`engine::Plan`] →
+//! [`engine::Engine`].
+
+pub mod document;
+pub mod engine;
 pub mod model;

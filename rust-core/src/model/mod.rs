@@ -1,2 +1,23 @@
 //! The model file: one fluid, every host.
+//!
+//! A [`Model`] is a file that has been read and checked; [`Model::at`] puts in the temperature and
+//! gives a [`Fluid`], which is all numbers and compiled formulas and is what the engine, the theory
+//! and the exports work from.
+//!
+//! # Units and signs
+//!
+//! Reduced units throughout: lengths in r_c, masses in m, energies in whatever makes kT what the host
+//! says. Densities are number densities. `r_ij = r_i − r_j`, `ê_ij = r_ij / r_ij`, and a positive force
+//! along `ê_ij` on `i` is repulsive. Per-species indices run in the order of `species`.
+
 pub mod expression;
+pub mod kernel;
+pub mod pair;
+
+mod file;
+mod fluid;
+mod presets;
+
+pub use file::{KNOWN_FUNCTIONS, Model};
+pub use fluid::{ExcessFreeEnergy, Fluid, PairTerm, Polynomial, Thermostat, WeightedDensity};
+pub use presets::{ForceLaw, PresetError, WarrenPair, warren_ab, warren_ab_text};

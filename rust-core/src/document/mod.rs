@@ -1,0 +1,103 @@
+//! Reading TOML files strictly, with errors that name file, line and key.
+//!
+//! Model files and scene files go through here. A [`Section`] hands out each key at most once and
+//! remembers it, so that [`Section::finish`] can name the keys that nobody asked for.
+
+mod error;
+mod section;
+
+pub use error::{FileError, FileErrorKind, Source};
+pub use section::{Located, Section, Value};
+
+use std::path::Path;
+use std::sync::Arc;
+
+/// A TOML document read but not yet interpreted.
+#[derive(Debug, Clone)]
+pub struct Document {
+    source: Arc<Source>,
+    root: toml::de::DeTable<'static>,
+}
+
+/// The largest file that is read: far above any real one, far below trouble.
+const LARGEST: u64 = 16 << 20;
+
+/// How deeply brackets may nest; the TOML reader recurses.
+const DEEPEST: usize = 64;
+
+impl Document {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// The file cannot be read, is too large, is not UTF-8 or not TOML.
+    pub fn open(path: &Path) -> Result<Document, FileError> {
+        let name = path.display().to_string();
+        let unreadable = |message: String| FileError::new(
+            &Arc::new(Source::new(&name, "")),
+            0..0,
+            "",
+            FileErrorKind::Unreadable(message),
+        );
+        let size = std::fs::metadata(path)
+            .map_err(|e| unreadable(e.to_string()))?
+            .len();
+        if size > LARGEST {
+            return Err(unreadable(format!("{size} bytes, more than {LARGEST}")));
+        }
+        let text = std::fs::read_to_string(path).map_err(|e| unreadable(e.to_string()))?;
+        Document::parse(&name, &text)
+    }
+
+    /// Reads a text; `name` stands for the file in messages.
+    ///
+    /// # Errors
+    /// The text is not TOML or nests too deeply.
+    pub fn parse(name: &str, text: &str) -> Result<Document, FileError> {
+        let source = Arc::new(Source::new(name, text));
+        if let Some(at) = too_deep(text) {
+            return Err(FileError::new(&source, at..at + 1, "", FileErrorKind::TooDeep(DEEPEST)));
+        }
+        match toml::de::DeTable::parse(text) {
+            Ok(table) => {
+                let mut root = table.into_inner();
+                root.make_owned();
+                Ok(Document { source, root })
+            }
+            Err(error) => Err(FileError::new(
+                &source,
+                error.span().unwrap_or(0..0),
+                "",
+                FileErrorKind::Syntax(error.message().to_owned()),
+            )),
+        }
+    }
+
+    /// The file's name and text.
+    pub fn source(&self) -> &Arc<Source> {
+        &self.source
+    }
+
+    /// The top level.
+    pub fn root(&self) -> Section<'_> {
+        Section::new(&self.source, String::new(), 0..0, &self.root)
+    }
+}
+
+/// Where brackets or dotted keys first nest deeper than allowed, strings and comments included: a
+/// bound on what the TOML reader will recurse into, not a grammar.
+fn too_deep(text: &str) -> Option<usize> {
+    let (mut depth, mut dots) = (0usize, 0usize);
+    for (at, byte) in text.bytes().enumerate() {
+        match byte {
+            b'[' | b'{' => depth += 1,
+            b']' | b'}' => depth = depth.saturating_sub(1),
+            b'\n' => dots = 0,
+            b'.' => dots += 1,
+            _ => {}
+        }
+        if depth > DEEPEST || dots > 4 * DEEPEST {
+            return Some(at);
+        }
+    }
+    None
+}

@@ -1,0 +1,278 @@
+use super::{FileError, FileErrorKind, Source};
+use std::cell::RefCell;
+use std::ops::Range;
+use std::sync::Arc;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// A value with the place it was written at.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Located<T> {
+    /// The value.
+    pub value: T,
+    /// Its bytes in the file.
+    pub span: Range<usize>,
+    /// Its dotted key.
+    pub key: String,
+}
+
+impl<T> Located<T> {
+    /// An error about this value.
+    pub fn error(&self, source: &Arc<Source>, kind: FileErrorKind) -> FileError {
+        FileError::new(source, self.span.clone(), &self.key, kind)
+    }
+
+    /// The same place with another value.
+    pub fn map<U>(self, f: impl FnOnce(T) -> U) -> Located<U> {
+        Located { value: f(self.value), span: self.span, key: self.key }
+    }
+}
+
+/// A table of a document, whose keys are asked for one by one.
+#[derive(Debug)]
+pub struct Section<'a> {
+    source: &'a Arc<Source>,
+    path: String,
+    span: Range<usize>,
+    table: &'a DeTable<'static>,
+    asked: RefCell<Vec<String>>,
+}
+
+/// A value of a document, not yet interpreted.
+#[derive(Debug, Clone)]
+pub struct Value<'a> {
+    source: &'a Arc<Source>,
+    key: String,
+    value: &'a Spanned<DeValue<'static>>,
+}
+
+impl<'a> Section<'a> {
+    pub(super) fn new(
+        source: &'a Arc<Source>,
+        path: String,
+        span: Range<usize>,
+        table: &'a DeTable<'static>,
+    ) -> Section<'a> {
+        Section { source, path, span, table, asked: RefCell::default() }
+    }
+
+    /// The file this is a part of.
+    pub fn source(&self) -> &'a Arc<Source> {
+        self.source
+    }
+
+    /// The dotted path of a key of this section.
+    pub fn path_of(&self, key: &str) -> String {
+        match (self.path.is_empty(), key.is_empty()) {
+            (true, _) => key.to_owned(),
+            (_, true) => self.path.clone(),
+            _ => format!("{}.{key}", self.path),
+        }
+    }
+
+    /// An error about this section as a whole.
+    pub fn error(&self, kind: FileErrorKind) -> FileError {
+        FileError::new(self.source, self.span.clone(), &self.path, kind)
+    }
+
+    /// The value of an optional key.
+    pub fn get(&self, key: &str) -> Option<Value<'a>> {
+        self.asked.borrow_mut().push(key.to_owned());
+        let (_, value) = self.table.iter().find(|(k, _)| k.get_ref() == key)?;
+        Some(Value { source: self.source, key: self.path_of(key), value })
+    }
+
+    /// The value of a key that must be there.
+    pub fn require(&self, key: &str) -> Result<Value<'a>, FileError> {
+        self.get(key).ok_or_else(|| {
+            FileError::new(
+                self.source,
+                self.span.clone(),
+                &self.path_of(key),
+                FileErrorKind::Missing,
+            )
+        })
+    }
+
+    /// Every key with its value, in the order of the file: for tables whose keys are names.
+    pub fn entries(&self) -> Vec<(Located<String>, Value<'a>)> {
+        let mut entries: Vec<_> = self
+            .table
+            .iter()
+            .map(|(key, value)| {
+                let name = key.get_ref().to_string();
+                self.asked.borrow_mut().push(name.clone());
+                let path = self.path_of(&name);
+                let located = Located { value: name, span: key.span(), key: path.clone() };
+                (located, Value { source: self.source, key: path, value })
+            })
+            .collect();
+        entries.sort_by_key(|(key, _)| key.span.start);
+        entries
+    }
+
+    /// An error if the section has a key that nobody asked for.
+    pub fn finish(self) -> Result<(), FileError> {
+        let asked = self.asked.borrow();
+        let mut strangers: Vec<_> = self
+            .table
+            .keys()
+            .filter(|k| !asked.iter().any(|a| a == k.get_ref()))
+            .collect();
+        strangers.sort_by_key(|k| k.span().start);
+        match strangers.first() {
+            None => Ok(()),
+            Some(key) => {
+                let mut known: Vec<&str> = asked.iter().map(String::as_str).collect();
+                known.sort_unstable();
+                known.dedup();
+                Err(FileError::new(
+                    self.source,
+                    key.span(),
+                    &self.path_of(key.get_ref()),
+                    FileErrorKind::UnknownKey { known: known.join(", ") },
+                ))
+            }
+        }
+    }
+}
+
+impl<'a> Value<'a> {
+    /// The value's dotted key.
+    pub fn key(&self) -> &str {
+        &self.key
+    }
+
+    /// The value's bytes in the file.
+    pub fn span(&self) -> Range<usize> {
+        self.value.span()
+    }
+
+    /// An error about this value.
+    pub fn error(&self, kind: FileErrorKind) -> FileError {
+        FileError::new(self.source, self.span(), &self.key, kind)
+    }
+
+    fn wrong(&self, expected: &'static str) -> FileError {
+        self.error(FileErrorKind::WrongType { expected, found: self.value.get_ref().type_str() })
+    }
+
+    fn located<T>(&self, value: T) -> Located<T> {
+        Located { value, span: self.span(), key: self.key.clone() }
+    }
+
+    /// A number; integers count.
+    pub fn number(&self) -> Result<Located<f64>, FileError> {
+        match self.as_number() {
+            Some(Ok(value)) => Ok(self.located(value)),
+            Some(Err(error)) => Err(error),
+            None => Err(self.wrong("a number")),
+        }
+    }
+
+    /// The number if this is one; an error if it is one that is not finite.
+    pub fn as_number(&self) -> Option<Result<f64, FileError>> {
+        let number = match self.value.get_ref() {
+            DeValue::Integer(i) => i64::from_str_radix(i.as_str(), i.radix()).ok().map(|i| i as f64),
+            DeValue::Float(x) => x.as_str().parse().ok(),
+            _ => return None,
+        };
+        Some(match number {
+            Some(x) if f64::is_finite(x) => Ok(x),
+            _ => Err(self.error(FileErrorKind::Value("is not a finite number".into()))),
+        })
+    }
+
+    /// A whole number from 0.
+    pub fn count(&self) -> Result<Located<u64>, FileError> {
+        match self.value.get_ref() {
+            DeValue::Integer(i) => match u64::from_str_radix(i.as_str(), i.radix()) {
+                Ok(value) => Ok(self.located(value)),
+                Err(_) => Err(self.error(FileErrorKind::Value("must be a whole number from 0".into()))),
+            },
+            _ => Err(self.wrong("a whole number")),
+        }
+    }
+
+    /// True or false.
+    pub fn boolean(&self) -> Result<Located<bool>, FileError> {
+        match self.value.get_ref() {
+            DeValue::Boolean(b) => Ok(self.located(*b)),
+            _ => Err(self.wrong("true or false")),
+        }
+    }
+
+    /// A string.
+    pub fn string(&self) -> Result<Located<String>, FileError> {
+        match self.as_str() {
+            Some(s) => Ok(self.located(s.to_owned())),
+            None => Err(self.wrong("a string")),
+        }
+    }
+
+    /// The string if this is one.
+    pub fn as_str(&self) -> Option<&'a str> {
+        self.value.get_ref().as_str()
+    }
+
+    /// One of a list of names.
+    pub fn one_of<T: Copy>(
+        &self,
+        what: &'static str,
+        choices: &[(&str, T)],
+    ) -> Result<Located<T>, FileError> {
+        let name = self.string()?;
+        match choices.iter().find(|(n, _)| *n == name.value) {
+            Some((_, choice)) => Ok(self.located(*choice)),
+            None => Err(self.error(FileErrorKind::UnknownName {
+                what,
+                name: name.value,
+                known: choices.iter().map(|(n, _)| *n).collect::<Vec<_>>().join(", "),
+            })),
+        }
+    }
+
+    /// The elements of an array.
+    pub fn array(&self) -> Result<Vec<Value<'a>>, FileError> {
+        self.as_array().ok_or_else(|| self.wrong("an array"))
+    }
+
+    /// The elements if this is an array.
+    pub fn as_array(&self) -> Option<Vec<Value<'a>>> {
+        let items = self.value.get_ref().as_array()?;
+        Some(
+            items
+                .iter()
+                .enumerate()
+                .map(|(k, value)| Value {
+                    source: self.source,
+                    key: format!("{}[{}]", self.key, k + 1),
+                    value,
+                })
+                .collect(),
+        )
+    }
+
+    /// A table.
+    pub fn section(&self) -> Result<Section<'a>, FileError> {
+        self.as_section().ok_or_else(|| self.wrong("a table"))
+    }
+
+    /// The table if this is one.
+    pub fn as_section(&self) -> Option<Section<'a>> {
+        let table = self.value.get_ref().as_table()?;
+        Some(Section::new(self.source, self.key.clone(), self.span(), table))
+    }
+
+    /// An array of `N` numbers.
+    pub fn numbers<const N: usize>(&self, expected: &'static str) -> Result<[f64; N], FileError> {
+        let items = self.array()?;
+        let numbers: Vec<f64> = items
+            .iter()
+            .map(|v| v.number().map(|x| x.value))
+            .collect::<Result<_, _>>()?;
+        <[f64; N]>::try_from(numbers).map_err(|_| {
+            self.error(FileErrorKind::Value(format!("expected {expected}, found {} values", items.len())))
+        })
+    }
+}

@@ -1,0 +1,148 @@
+use nalgebra::{Matrix3, Vector3};
+
+/// A box with its three edge vectors, each direction periodic or open.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PeriodicBox {
+    origin: Vector3<f64>,
+    edges: Matrix3<f64>,
+    inverse: Matrix3<f64>,
+    periodic: [bool; 3],
+}
+
+/// A box that is none.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum DomainError {
+    /// An edge or the origin is not finite, or the edges span no volume.
+    #[error("the box has edges that span no volume, or are not finite")]
+    Degenerate,
+}
+
+impl PeriodicBox {
+    /// A box from `origin` with the columns of `edges` as edge vectors.
+    ///
+    /// # Errors
+    /// Edges that are not finite, or span no positive volume.
+    pub fn new(origin: [f64; 3], edges: Matrix3<f64>, periodic: [bool; 3]) -> Result<PeriodicBox, DomainError> {
+        let origin = Vector3::from(origin);
+        let finite = origin.iter().chain(edges.iter()).all(|x| x.is_finite());
+        let inverse = edges.try_inverse().filter(|m| m.iter().all(|x| x.is_finite()));
+        match inverse {
+            Some(inverse) if finite && edges.determinant() > 0.0 => {
+                Ok(PeriodicBox { origin, edges, inverse, periodic })
+            }
+            _ => Err(DomainError::Degenerate),
+        }
+    }
+
+    /// A box with edges along the axes.
+    ///
+    /// # Errors
+    /// A length that is not positive and finite.
+    pub fn orthogonal(origin: [f64; 3], lengths: [f64; 3], periodic: [bool; 3]) -> Result<PeriodicBox, DomainError> {
+        if lengths.iter().any(|l| *l <= 0.0) {
+            return Err(DomainError::Degenerate);
+        }
+        PeriodicBox::new(origin, Matrix3::from_diagonal(&Vector3::from(lengths)), periodic)
+    }
+
+    /// The corner that fractional coordinates start at.
+    pub fn origin(&self) -> [f64; 3] {
+        self.origin.into()
+    }
+
+    /// Edge vector `k`.
+    pub fn edge(&self, k: usize) -> [f64; 3] {
+        self.edges.column(k).into_owned().into()
+    }
+
+    /// The lengths of the edges.
+    pub fn lengths(&self) -> [f64; 3] {
+        std::array::from_fn(|k| self.edges.column(k).norm())
+    }
+
+    /// Which directions are periodic.
+    pub fn periodic(&self) -> [bool; 3] {
+        self.periodic
+    }
+
+    /// The volume; in two dimensions the area, taking the third edge for a unit.
+    pub fn volume(&self, dimensions: usize) -> f64 {
+        match dimensions {
+            2 => self.edges.column(0).cross(&self.edges.column(1)).norm(),
+            _ => self.edges.determinant(),
+        }
+    }
+
+    /// Distance between the two faces that edge `k` connects.
+    pub fn height(&self, k: usize) -> f64 {
+        1.0 / self.inverse.row(k).norm()
+    }
+
+    /// Fractional coordinates.
+    pub fn fraction(&self, x: [f64; 3]) -> [f64; 3] {
+        (self.inverse * (Vector3::from(x) - self.origin)).into()
+    }
+
+    /// The point of fractional coordinates `s`.
+    pub fn point(&self, s: [f64; 3]) -> [f64; 3] {
+        (self.origin + self.edges * Vector3::from(s)).into()
+    }
+
+    /// Puts `x` into the box along its periodic directions and counts the boxes crossed in `image`.
+    pub fn wrap(&self, x: &mut [f64; 3], image: &mut [i32; 3]) {
+        let s = self.fraction(*x);
+        for k in 0..3 {
+            if self.periodic[k] && !(0.0..1.0).contains(&s[k]) {
+                let boxes = s[k].floor();
+                for (x, e) in x.iter_mut().zip(self.edge(k)) {
+                    *x -= boxes * e;
+                }
+                image[k] = image[k].saturating_add(boxes as i32);
+            }
+        }
+    }
+
+    /// The shortest vector from `b` to `a` among images, for boxes that are not too skew.
+    pub fn minimum_image(&self, a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+        let mut s = self.inverse * (Vector3::from(a) - Vector3::from(b));
+        for k in 0..3 {
+            if self.periodic[k] {
+                s[k] -= s[k].round();
+            }
+        }
+        (self.edges * s).into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wrap_and_fraction_agree_in_a_skew_box() {
+        let edges = Matrix3::new(4.0, 1.0, 0.5, 0.0, 5.0, -1.0, 0.0, 0.0, 6.0);
+        let domain = PeriodicBox::new([1.0, 2.0, 3.0], edges, [true; 3]).unwrap();
+        assert!((domain.volume(3) - 120.0).abs() < 1e-12);
+        assert!((domain.height(2) - 6.0).abs() < 1e-12);
+        let start = [17.0, -9.0, 30.0];
+        let (mut x, mut image) = (start, [0; 3]);
+        domain.wrap(&mut x, &mut image);
+        assert!(domain.fraction(x).iter().all(|s| (0.0..1.0).contains(s)));
+        for c in 0..3 {
+            let back: f64 = x[c] + (0..3).map(|k| image[k] as f64 * domain.edge(k)[c]).sum::<f64>();
+            assert!((back - start[c]).abs() < 1e-12);
+        }
+        let d = domain.minimum_image(start, x);
+        assert!(d.iter().all(|c| c.abs() < 1e-12));
+    }
+
+    #[test]
+    fn flat_and_infinite_boxes_are_refused() {
+        assert_eq!(PeriodicBox::orthogonal([0.0; 3], [1.0, 0.0, 1.0], [true; 3]), Err(DomainError::Degenerate));
+        assert_eq!(
+            PeriodicBox::orthogonal([0.0; 3], [1.0, f64::INFINITY, 1.0], [true; 3]),
+            Err(DomainError::Degenerate)
+        );
+        assert_eq!(PeriodicBox::orthogonal([f64::NAN; 3], [1.0; 3], [true; 3]), Err(DomainError::Degenerate));
+    }
+}

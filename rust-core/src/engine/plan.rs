@@ -1,0 +1,273 @@
+//! What a fluid needs computed, worked out once.
+
+use crate::model::expression::{ExpressionError, Formula, Program};
+use crate::model::kernel::Kernel;
+use crate::model::{ExcessFreeEnergy, Fluid, PairTerm, WeightedDensity};
+use std::fmt;
+
+/// The passes, kernels and ranges of one fluid.
+///
+/// A density in which every ψ is linear is no many-body term: its force is a pair force
+/// `−(c_αβ + c_βα) w′(r)`, `c_αβ = ∂ψ_α/∂n_β`, and needs no density pass.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    pub(super) species: Vec<String>,
+    pub(super) dimensions: usize,
+    pub(super) cutoff: f64,
+    pub(super) densities: Vec<WeightedDensity>,
+    /// Densities that some ψ is not linear in; their order is that of the variables of `excess`.
+    pub(super) passes: Vec<usize>,
+    pub(super) linear: Vec<LinearTerm>,
+    pub(super) excess: Vec<ExcessPlan>,
+    pub(super) pairs: Vec<PairTerm>,
+    pub(super) thermostat: Option<ThermostatPlan>,
+    title: String,
+    conservative: bool,
+}
+
+/// A density that acts as a pair potential.
+#[derive(Debug, Clone)]
+pub struct LinearTerm {
+    pub density: usize,
+    pub kernel: Kernel,
+    pub force_kernel: Kernel,
+    /// `c_αβ`, row-major.
+    pub coefficients: Vec<f64>,
+}
+
+/// `ψ_α` of the densities that need a pass.
+#[derive(Debug, Clone)]
+pub struct ExcessPlan {
+    /// ψ, then ∂ψ/∂ñ for each variable of the passes.
+    pub program: Program,
+    /// The value if ψ has no variables left.
+    pub constant: Option<f64>,
+    pub formula: Formula,
+}
+
+/// Coefficients of dissipative and random forces, row-major in species.
+#[derive(Debug, Clone)]
+pub struct ThermostatPlan {
+    pub gamma: Vec<f64>,
+    /// `√(2γkT)`.
+    pub sigma: Vec<f64>,
+    pub range: Vec<f64>,
+    pub exponent: Vec<f64>,
+    pub longest: f64,
+}
+
+impl Plan {
+    /// Works out the plan of a fluid.
+    ///
+    /// # Errors
+    /// A derivative of ψ grows beyond the limits of the formula engine.
+    pub fn new(fluid: &Fluid) -> Result<Plan, ExpressionError> {
+        let count = fluid.species.len();
+        let slopes = slopes(fluid)?;
+        let mut passes = Vec::new();
+        let mut linear = Vec::new();
+        for d in 0..fluid.densities.len() {
+            match linear_coefficients(fluid, &slopes, d) {
+                None => passes.push(d),
+                Some(coefficients) if coefficients.iter().all(|c| *c == 0.0) => {}
+                Some(coefficients) => linear.push(LinearTerm {
+                    density: d,
+                    kernel: fluid.densities[d].kernel,
+                    force_kernel: fluid.densities[d].force_kernel,
+                    coefficients,
+                }),
+            }
+        }
+        let excess = (0..count)
+            .map(|alpha| plan_excess(fluid, alpha, &passes))
+            .collect::<Result<Vec<_>, _>>()?;
+        Ok(Plan {
+            species: fluid.species.clone(),
+            dimensions: fluid.dimensions,
+            cutoff: fluid.cutoff(),
+            densities: fluid.densities.clone(),
+            passes,
+            linear,
+            excess,
+            pairs: fluid.pairs.clone(),
+            thermostat: ThermostatPlan::new(fluid),
+            title: fluid.title.clone(),
+            conservative: fluid.is_conservative(),
+        })
+    }
+
+    /// Longest range of any force; particles further apart do not see each other.
+    pub fn cutoff(&self) -> f64 {
+        self.cutoff
+    }
+
+    /// 2 or 3.
+    pub fn dimensions(&self) -> usize {
+        self.dimensions
+    }
+
+    /// The names of the species.
+    pub fn species(&self) -> &[String] {
+        &self.species
+    }
+
+    /// The names of the local densities.
+    pub fn densities(&self) -> impl Iterator<Item = &str> {
+        self.densities.iter().map(|d| d.name.as_str())
+    }
+
+    /// How many numbers a host forwards from each owned particle to its ghosts.
+    pub fn slope_width(&self) -> usize {
+        self.passes.len() * self.species.len()
+    }
+
+    /// Range of the random force if there is one: boxes must be at least twice as long, or two images
+    /// of a pair would share their noise.
+    pub fn noise_range(&self) -> Option<f64> {
+        self.thermostat.as_ref().map(|t| t.longest)
+    }
+
+    /// Whether ghosts need velocities.
+    pub fn needs_velocities(&self) -> bool {
+        self.thermostat.is_some()
+    }
+
+    /// Whether the forces have a potential.
+    pub fn is_conservative(&self) -> bool {
+        self.conservative
+    }
+}
+
+/// `∂ψ_α/∂ñ_v` for every species and variable.
+fn slopes(fluid: &Fluid) -> Result<Vec<Vec<Formula>>, ExpressionError> {
+    fluid
+        .excess
+        .iter()
+        .map(|excess| {
+            let ExcessFreeEnergy::Formula(psi) = excess;
+            (0..fluid.variables()).map(|v| psi.derivative(v)).collect()
+        })
+        .collect()
+}
+
+/// `c_αβ` of density `d`, in uncorrected densities, if every ψ is linear in it.
+fn linear_coefficients(fluid: &Fluid, slopes: &[Vec<Formula>], d: usize) -> Option<Vec<f64>> {
+    let count = fluid.species.len();
+    let mut coefficients = vec![0.0; count * count];
+    for alpha in 0..count {
+        for beta in 0..count {
+            let slope = slopes[alpha][d * count + beta].is_constant()?;
+            if slope != 0.0 {
+                let correction = &fluid.densities[d].correction[alpha * count + beta];
+                coefficients[alpha * count + beta] = slope * correction.constant_slope()?;
+            }
+        }
+    }
+    Some(coefficients)
+}
+
+/// ψ_α as a function of the densities that need a pass: the others are put at n = 0, where their
+/// linear terms, which are pair terms now, vanish.
+fn plan_excess(fluid: &Fluid, alpha: usize, passes: &[usize]) -> Result<ExcessPlan, ExpressionError> {
+    let count = fluid.species.len();
+    let ExcessFreeEnergy::Formula(psi) = &fluid.excess[alpha];
+    let mut psi = psi.clone();
+    for (d, density) in fluid.densities.iter().enumerate() {
+        if passes.contains(&d) {
+            continue;
+        }
+        for beta in 0..count {
+            let own = if density.includes_self && alpha == beta { density.kernel.value(0.0) } else { 0.0 };
+            let at_zero = density.correction[alpha * count + beta].at(own).0;
+            psi = psi.substitute(d * count + beta, at_zero)?;
+        }
+    }
+    let variables: Vec<usize> = passes.iter().flat_map(|d| (0..count).map(move |s| d * count + s)).collect();
+    let mut outputs = vec![psi.clone()];
+    for v in &variables {
+        outputs.push(psi.derivative(*v)?);
+    }
+    Ok(ExcessPlan {
+        program: Program::new(&outputs.iter().collect::<Vec<_>>()),
+        constant: psi.is_constant(),
+        formula: psi,
+    })
+}
+
+impl ThermostatPlan {
+    /// `None` if nothing drags: no noise is drawn then.
+    fn new(fluid: &Fluid) -> Option<ThermostatPlan> {
+        let entry = |f: fn(&crate::model::Thermostat) -> f64, default: f64| -> Vec<f64> {
+            fluid.thermostats.iter().map(|t| t.as_ref().map_or(default, f)).collect()
+        };
+        let gamma = entry(|t| t.gamma, 0.0);
+        if gamma.iter().all(|g| *g == 0.0) {
+            return None;
+        }
+        let range = entry(|t| if t.gamma > 0.0 { t.range } else { 0.0 }, 0.0);
+        Some(ThermostatPlan {
+            sigma: gamma.iter().map(|g| (2.0 * g * fluid.kt).sqrt()).collect(),
+            longest: range.iter().copied().fold(0.0, f64::max),
+            exponent: entry(|t| t.exponent, 1.0),
+            gamma,
+            range,
+        })
+    }
+}
+
+/// What `psidpd check` and the LAMMPS log print.
+impl fmt::Display for Plan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let count = self.species.len();
+        writeln!(f, "fluid         {} ({}-D; species {})", self.title, self.dimensions, self.species.join(", "))?;
+        writeln!(f, "cut-off       {}", self.cutoff)?;
+        for &d in &self.passes {
+            let density = &self.densities[d];
+            write!(
+                f,
+                "density pass  {}: {} kernel, range {}",
+                density.name,
+                density.kernel.kind().name(),
+                density.kernel.range()
+            )?;
+            if density.force_kernel != density.kernel {
+                write!(f, "; force by the {} kernel: NOT CONSERVATIVE", density.force_kernel.kind().name())?;
+            }
+            writeln!(f)?;
+        }
+        for term in &self.linear {
+            let density = &self.densities[term.density];
+            writeln!(
+                f,
+                "pair term     psi is linear in {}: {} kernel, range {}, no density pass",
+                density.name,
+                density.kernel.kind().name(),
+                density.kernel.range()
+            )?;
+        }
+        for term in &self.pairs {
+            use crate::model::pair::PairForm;
+            let [a, b] = term.between.map(|s| &self.species[s]);
+            writeln!(f, "pair term     {a}-{b}: {}, range {}", term.potential.name(), term.potential.range())?;
+        }
+        for (name, excess) in self.species.iter().zip(&self.excess) {
+            match excess.constant {
+                Some(0.0) => {}
+                Some(value) => writeln!(f, "psi of {name:<6} constant {value}")?,
+                None => writeln!(f, "psi of {name:<6} {}", excess.formula)?,
+            }
+        }
+        match &self.thermostat {
+            None => write!(f, "thermostat    none: no noise is drawn"),
+            Some(t) => {
+                write!(f, "thermostat    gamma")?;
+                for a in 0..count {
+                    for b in a..count {
+                        write!(f, " {}-{} {}", self.species[a], self.species[b], t.gamma[a * count + b])?;
+                    }
+                }
+                write!(f, ", range {}", t.longest)
+            }
+        }
+    }
+}

@@ -1,0 +1,61 @@
+use std::ops::AddAssign;
+
+/// What a step asks for beside forces. Nothing that is not asked for is computed.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Want {
+    /// The potential energy.
+    pub energy: bool,
+    /// The virial.
+    pub virial: bool,
+    /// Energy of each particle: its ψ and half of its pair energies.
+    pub particle_energy: bool,
+    /// Virial of each particle: half of its pairs'.
+    pub particle_virial: bool,
+}
+
+impl Want {
+    /// Forces alone.
+    pub const FORCES: Want = Want { energy: false, virial: false, particle_energy: false, particle_virial: false };
+    /// Energy and virial of the whole.
+    pub const TOTALS: Want = Want { energy: true, virial: true, particle_energy: false, particle_virial: false };
+    /// Everything.
+    pub const ALL: Want = Want { energy: true, virial: true, particle_energy: true, particle_virial: true };
+}
+
+/// Sums over the particles and pairs of one host or rank; the sums of all ranks add up.
+///
+/// Virials are `Σ r_ij ⊗ F_ij` in the order xx, yy, zz, xy, xz, yz, so that `p = ρkT + tr W/(dV)`.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Tally {
+    /// `Σ_i ψ`.
+    pub excess: f64,
+    /// `Σ_{i<j} φ`.
+    pub pair: f64,
+    /// Virial of the conservative forces.
+    pub virial: [f64; 6],
+    /// Virial of the dissipative and random forces.
+    pub thermostat_virial: [f64; 6],
+}
+
+impl Tally {
+    /// The potential energy `U`.
+    pub fn energy(&self) -> f64 {
+        self.excess + self.pair
+    }
+
+    /// The virial of all forces.
+    pub fn total_virial(&self) -> [f64; 6] {
+        std::array::from_fn(|k| self.virial[k] + self.thermostat_virial[k])
+    }
+}
+
+impl AddAssign for Tally {
+    fn add_assign(&mut self, other: Tally) {
+        self.excess += other.excess;
+        self.pair += other.pair;
+        for k in 0..6 {
+            self.virial[k] += other.virial[k];
+            self.thermostat_virial[k] += other.thermostat_virial[k];
+        }
+    }
+}

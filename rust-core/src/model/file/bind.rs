@@ -1,0 +1,177 @@
+//! Puts the temperature in: from entries of the file to a [`Fluid`].
+
+use super::Model;
+use super::density::DensityEntry;
+use super::excess::ExcessEntry;
+use super::interaction::{PairEntry, PairFormEntry, ThermostatEntry};
+use super::number::formula_error;
+use crate::document::{FileError, FileErrorKind, Source};
+use crate::model::expression::{Formula, Variables};
+use crate::model::fluid::{ExcessFreeEnergy, Fluid, PairTerm, Polynomial, Thermostat, WeightedDensity};
+use crate::model::kernel::Kernel;
+use crate::model::pair::{ExpressionPair, PairPotential, Soft, SplineAttractive};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Everything a formula may refer to.
+struct Context<'a> {
+    source: &'a Arc<Source>,
+    constants: BTreeMap<String, f64>,
+    species: usize,
+}
+
+pub fn bind(model: &Model, kt: f64) -> Result<Fluid, FileError> {
+    let source = &model.source;
+    if !(kt > 0.0 && kt.is_finite()) {
+        let message = format!("the temperature must be a positive number, is {kt}");
+        return Err(FileError::new(source, 0..0, "kT", FileErrorKind::Value(message)));
+    }
+    let mut constants = model.parameters.clone();
+    constants.insert("kT".into(), kt);
+    let context = Context { source, constants, species: model.species.len() };
+    let densities = model
+        .densities
+        .iter()
+        .map(|entry| bind_density(entry, &context, model.dimensions))
+        .collect::<Result<Vec<_>, _>>()?;
+    let variables = variables(model);
+    let excess = model
+        .excess
+        .iter()
+        .map(|entry| match entry {
+            ExcessEntry::None => Ok(ExcessFreeEnergy::Formula(Formula::constant(0.0))),
+            ExcessEntry::Formula(ast) => Formula::compile(&ast.value, &context.constants, &variables)
+                .map(ExcessFreeEnergy::Formula)
+                .map_err(|e| formula_error(source, ast, e)),
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    let pairs = model
+        .pairs
+        .iter()
+        .map(|entry| bind_pair(entry, &context))
+        .collect::<Result<Vec<_>, _>>()?;
+    Ok(Fluid {
+        title: model.title.clone(),
+        reference: model.reference.clone(),
+        dimensions: model.dimensions,
+        kt,
+        species: model.species.clone(),
+        densities,
+        excess,
+        pairs,
+        thermostats: bind_thermostats(&model.thermostats, &context)?,
+    })
+}
+
+/// The variables of ψ: for a density `n` of species A, B the names n_A, n_B and n = n_A + n_B.
+fn variables(model: &Model) -> Variables {
+    let count = model.species.len();
+    let mut names = BTreeMap::new();
+    for (d, density) in model.densities.iter().enumerate() {
+        names.insert(density.name.clone(), (0..count).map(|s| d * count + s).collect());
+        for (s, species) in model.species.iter().enumerate() {
+            names.insert(format!("{}_{species}", density.name), vec![d * count + s]);
+        }
+    }
+    Variables { count: model.densities.len() * count, names }
+}
+
+fn bind_density(entry: &DensityEntry, context: &Context, dimensions: usize) -> Result<WeightedDensity, FileError> {
+    let (constants, source) = (&context.constants, context.source);
+    let range = entry.range.positive(constants, source)?;
+    let correction = entry
+        .correction
+        .iter()
+        .map(|coefficients| {
+            if coefficients.is_empty() {
+                return Ok(Polynomial::identity());
+            }
+            let values: Result<Vec<f64>, FileError> = coefficients
+                .iter()
+                .map(|c| c.evaluate(constants, source).map(|x| x.value))
+                .collect();
+            values.map(Polynomial)
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    debug_assert_eq!(correction.len(), context.species * context.species);
+    let bounds = match &entry.bounds {
+        None => None,
+        Some([low, high]) => {
+            let low = low.evaluate(constants, source)?;
+            let high = high.evaluate(constants, source)?;
+            if low.value >= high.value {
+                return Err(low.error(
+                    source,
+                    FileErrorKind::Value(format!("the lower bound {} is not below the upper {}", low.value, high.value)),
+                ));
+            }
+            Some([low.value, high.value])
+        }
+    };
+    Ok(WeightedDensity {
+        name: entry.name.clone(),
+        kernel: Kernel::new(entry.kernel, range, dimensions),
+        force_kernel: Kernel::new(entry.force_kernel, range, dimensions),
+        includes_self: entry.includes_self,
+        correction,
+        bounds,
+    })
+}
+
+fn bind_pair(entry: &PairEntry, context: &Context) -> Result<PairTerm, FileError> {
+    let (constants, source) = (&context.constants, context.source);
+    let value = |n: &super::Number| n.evaluate(constants, source).map(|x| x.value);
+    let potential = match &entry.form {
+        PairFormEntry::Soft { strength, range } => {
+            PairPotential::Soft(Soft::new(value(strength)?, range.positive(constants, source)?))
+        }
+        PairFormEntry::Spline { strength, repulsion, attraction, range_a, range_b } => {
+            PairPotential::Spline(SplineAttractive::new(
+                value(strength)?,
+                value(repulsion)?,
+                value(attraction)?,
+                range_a.positive(constants, source)?,
+                range_b.positive(constants, source)?,
+            ))
+        }
+        PairFormEntry::Expression { phi, range } => {
+            let variables = Variables { count: 1, names: BTreeMap::from([("r".to_owned(), vec![0])]) };
+            let range = range.positive(constants, source)?;
+            Formula::compile(&phi.value, constants, &variables)
+                .and_then(|formula| ExpressionPair::new(&formula, range))
+                .map(PairPotential::Expression)
+                .map_err(|e| formula_error(source, phi, e))?
+        }
+    };
+    Ok(PairTerm { between: entry.between, potential })
+}
+
+fn bind_thermostats(entries: &[ThermostatEntry], context: &Context) -> Result<Vec<Option<Thermostat>>, FileError> {
+    let (constants, source) = (&context.constants, context.source);
+    let count = context.species;
+    let mut all = vec![None; count * count];
+    // The entry for every pair first, so that particular ones replace it.
+    let ordered = entries
+        .iter()
+        .filter(|e| e.between.is_none())
+        .chain(entries.iter().filter(|e| e.between.is_some()));
+    for entry in ordered {
+        let gamma = entry.gamma.evaluate(constants, source)?;
+        if gamma.value < 0.0 {
+            return Err(gamma.error(source, FileErrorKind::Value(format!("must not be negative, is {}", gamma.value))));
+        }
+        let exponent = match &entry.exponent {
+            Some(number) => number.positive(constants, source)?,
+            None => 1.0,
+        };
+        let thermostat = Thermostat { gamma: gamma.value, range: entry.range.positive(constants, source)?, exponent };
+        match entry.between {
+            None => all.fill(Some(thermostat)),
+            Some([a, b]) => {
+                all[a * count + b] = Some(thermostat);
+                all[b * count + a] = Some(thermostat);
+            }
+        }
+    }
+    Ok(all)
+}

@@ -1,0 +1,150 @@
+//! From the text of a model file to a checked [`Model`].
+
+mod bind;
+mod density;
+mod excess;
+mod interaction;
+mod names;
+mod number;
+
+use super::fluid::Fluid;
+use crate::document::{Document, FileError, FileErrorKind, Located, Section, Source};
+use density::DensityEntry;
+use excess::ExcessEntry;
+use interaction::{PairEntry, ThermostatEntry};
+pub use names::KNOWN_FUNCTIONS;
+use number::Number;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+/// A model file, read and checked. The temperature is the host's: see [`Model::at`].
+#[derive(Debug, Clone)]
+pub struct Model {
+    source: Arc<Source>,
+    title: String,
+    reference: Option<String>,
+    dimensions: usize,
+    species: Vec<String>,
+    parameters: BTreeMap<String, f64>,
+    densities: Vec<DensityEntry>,
+    excess: Vec<ExcessEntry>,
+    pairs: Vec<PairEntry>,
+    thermostats: Vec<ThermostatEntry>,
+}
+
+/// A temperature for checking formulas at load time; no file is likely to be singular just here.
+const CHECK_KT: f64 = 0.918_273_645;
+
+impl Model {
+    /// Reads a model file.
+    ///
+    /// # Errors
+    /// Anything wrong in the file, with its line and key.
+    pub fn open(path: &Path) -> Result<Model, FileError> {
+        Model::read(&Document::open(path)?)
+    }
+
+    /// Reads a model from a text; `name` stands for the file in messages.
+    ///
+    /// # Errors
+    /// As [`Model::open`].
+    pub fn parse(name: &str, text: &str) -> Result<Model, FileError> {
+        Model::read(&Document::parse(name, text)?)
+    }
+
+    fn read(document: &Document) -> Result<Model, FileError> {
+        let root = document.root();
+        let title = root.require("title")?.string()?.value;
+        let reference = root.get("reference").map(|v| v.string()).transpose()?.map(|l| l.value);
+        let dimensions = read_dimensions(&root)?;
+        let species = names::read_species(&root)?;
+        let parameters = number::read_parameters(&root)?;
+        let densities = density::read(&root, &species.value, &parameters)?;
+        let excess = excess::read(&root, &species)?;
+        let pairs = interaction::read_pairs(&root, &species.value)?;
+        let thermostats = interaction::read_thermostats(&root, &species.value)?;
+        root.finish()?;
+        let model = Model {
+            source: Arc::clone(document.source()),
+            title,
+            reference,
+            dimensions,
+            species: species.value,
+            parameters,
+            densities,
+            excess,
+            pairs,
+            thermostats,
+        };
+        // Every name and number is checked now, not when the host comes with its temperature.
+        let fluid = model.at(CHECK_KT)?;
+        interaction::check_coverage(&model.source, &fluid)?;
+        Ok(model)
+    }
+
+    /// What the file calls itself.
+    pub fn title(&self) -> &str {
+        &self.title
+    }
+
+    /// Where the model comes from.
+    pub fn reference(&self) -> Option<&str> {
+        self.reference.as_deref()
+    }
+
+    /// 2 or 3.
+    pub fn dimensions(&self) -> usize {
+        self.dimensions
+    }
+
+    /// The names of the species.
+    pub fn species(&self) -> &[String] {
+        &self.species
+    }
+
+    /// The constants of the file.
+    pub fn parameters(&self) -> &BTreeMap<String, f64> {
+        &self.parameters
+    }
+
+    /// The file's name and text.
+    pub fn source(&self) -> &Source {
+        &self.source
+    }
+
+    /// The fluid at temperature `kt` (energy units of the file).
+    ///
+    /// # Errors
+    /// `kt` is not a positive number, or a formula or number is not finite at this temperature.
+    pub fn at(&self, kt: f64) -> Result<Fluid, FileError> {
+        bind::bind(self, kt)
+    }
+}
+
+fn read_dimensions(root: &Section) -> Result<usize, FileError> {
+    let Some(value) = root.get("dimensions") else {
+        return Ok(3);
+    };
+    match value.count()?.value {
+        d @ (2 | 3) => Ok(d as usize),
+        _ => Err(value.error(FileErrorKind::Value("must be 2 or 3".into()))),
+    }
+}
+
+/// The index of a species by its name.
+fn species_index(species: &[String], name: &Located<String>, source: &Arc<Source>) -> Result<usize, FileError> {
+    species.iter().position(|s| *s == name.value).ok_or_else(|| {
+        name.error(
+            source,
+            FileErrorKind::UnknownName {
+                what: "species",
+                name: name.value.clone(),
+                known: species.join(", "),
+            },
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests;

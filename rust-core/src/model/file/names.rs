@@ -1,0 +1,55 @@
+use crate::document::{FileError, FileErrorKind, Located, Section};
+
+/// The functions of formulas; no parameter, density or species may take such a name.
+pub const KNOWN_FUNCTIONS: &[&str] = &[
+    "ln", "log", "exp", "sqrt", "sin", "cos", "tanh", "abs", "min", "max",
+];
+
+/// Most species a model may have: every pair of them is stored.
+const MOST_SPECIES: usize = 64;
+
+/// The species of a model: at least one, names like `A`, `W2`, `oil`.
+pub fn read_species(root: &Section) -> Result<Located<Vec<String>>, FileError> {
+    let value = root.require("species")?;
+    let items = value.array()?;
+    if items.is_empty() || items.len() > MOST_SPECIES {
+        return Err(value.error(FileErrorKind::Value(format!("must name 1 to {MOST_SPECIES} species"))));
+    }
+    let mut names: Vec<String> = Vec::new();
+    for item in items {
+        let name = item.string()?.value;
+        let fits = !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+        if !fits {
+            return Err(item.error(FileErrorKind::Value(format!(
+                "\"{name}\" is not a species name: letters, digits and underscores only"
+            ))));
+        }
+        if name == "NULL" {
+            return Err(item.error(FileErrorKind::Value(
+                "NULL is what pair_coeff calls a type without species".into(),
+            )));
+        }
+        if names.contains(&name) {
+            return Err(item.error(FileErrorKind::Value(format!("\"{name}\" is named twice"))));
+        }
+        names.push(name);
+    }
+    Ok(Located { value: names, span: value.span(), key: value.key().to_owned() })
+}
+
+/// Checks that a parameter or density has a name that formulas can use.
+pub fn check_identifier(name: &Located<String>, section: &Section) -> Result<(), FileError> {
+    let mut chars = name.value.chars();
+    let starts = chars.next().is_some_and(|c| c.is_ascii_alphabetic() || c == '_');
+    let goes_on = chars.all(|c| c.is_ascii_alphanumeric() || c == '_');
+    let problem = if !starts || !goes_on {
+        "is not a name: a letter or underscore, then letters, digits and underscores"
+    } else if name.value == "kT" {
+        "kT is the host's: it is not set in a model file"
+    } else if name.value == "pi" || KNOWN_FUNCTIONS.contains(&name.value.as_str()) {
+        "is the name of a constant or function of formulas"
+    } else {
+        return Ok(());
+    };
+    Err(name.error(section.source(), FileErrorKind::Value(problem.into())))
+}

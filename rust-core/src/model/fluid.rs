@@ -1,0 +1,138 @@
+use super::expression::Formula;
+use super::kernel::Kernel;
+use super::pair::PairPotential;
+
+/// A model at one temperature: numbers and compiled formulas only.
+#[derive(Debug, Clone)]
+pub struct Fluid {
+    /// What the model file calls itself.
+    pub title: String,
+    /// Where the model comes from.
+    pub reference: Option<String>,
+    /// 2 or 3.
+    pub dimensions: usize,
+    /// kT, energy.
+    pub kt: f64,
+    /// The names of the species; their order is the order of every per-species index.
+    pub species: Vec<String>,
+    /// The weighted local densities.
+    pub densities: Vec<WeightedDensity>,
+    /// `ψ_α`, one for each species.
+    pub excess: Vec<ExcessFreeEnergy>,
+    /// The pair potentials.
+    pub pairs: Vec<PairTerm>,
+    /// The thermostat of each pair of species, row-major and symmetric.
+    pub thermostats: Vec<Option<Thermostat>>,
+}
+
+impl Fluid {
+    /// How many variables ψ has: one for each density and species, density-major.
+    pub fn variables(&self) -> usize {
+        self.densities.len() * self.species.len()
+    }
+
+    /// The longest range of anything in the fluid; 0 for an ideal gas without thermostat.
+    pub fn cutoff(&self) -> f64 {
+        use super::pair::PairForm;
+        let densities = self.densities.iter().map(|d| d.kernel.range().max(d.force_kernel.range()));
+        let pairs = self.pairs.iter().map(|p| p.potential.range());
+        let thermostats = self.thermostats.iter().flatten().map(|t| t.range);
+        densities.chain(pairs).chain(thermostats).fold(0.0, f64::max)
+    }
+
+    /// Whether the force of every density is the gradient of its own kernel, so that a potential
+    /// exists (Warren eq. 10).
+    pub fn is_conservative(&self) -> bool {
+        self.densities.iter().all(|d| d.force_kernel == d.kernel)
+    }
+}
+
+/// A weighted local density `n_β,i = Σ_{j≠i, c(j)=β} w(r_ij)`.
+#[derive(Debug, Clone)]
+pub struct WeightedDensity {
+    /// Its name in the model file.
+    pub name: String,
+    /// `w`.
+    pub kernel: Kernel,
+    /// The kernel whose slope is the force law: `kernel` itself, unless the model file asks for a
+    /// law that has no potential, as LAMMPS's `mdpd` does.
+    pub force_kernel: Kernel,
+    /// Whether `w(0)` counts in a particle's density of its own species.
+    pub includes_self: bool,
+    /// `ρ̃(n)` of Trofimov et al. for (species that feels, species whose density it is), row-major.
+    pub correction: Vec<Polynomial>,
+    /// Outside these values of the corrected density ψ′ goes on linearly.
+    pub bounds: Option<[f64; 2]>,
+}
+
+/// A polynomial by its coefficients in ascending powers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Polynomial(pub Vec<f64>);
+
+impl Polynomial {
+    /// `x`.
+    pub fn identity() -> Polynomial {
+        Polynomial(vec![0.0, 1.0])
+    }
+
+    /// Value and slope at `x`.
+    pub fn at(&self, x: f64) -> (f64, f64) {
+        self.0.iter().rev().fold((0.0, 0.0), |(value, slope), c| {
+            (value * x + c, slope * x + value)
+        })
+    }
+
+    /// The slope if the polynomial is linear.
+    pub fn constant_slope(&self) -> Option<f64> {
+        match self.0.get(2..) {
+            Some(rest) if rest.iter().any(|c| *c != 0.0) => None,
+            _ => Some(self.0.get(1).copied().unwrap_or(0.0)),
+        }
+    }
+}
+
+/// The excess free energy per particle of one species.
+#[derive(Debug, Clone)]
+pub enum ExcessFreeEnergy {
+    /// A formula of the [`Fluid::variables`] corrected densities.
+    Formula(Formula),
+}
+
+/// A pair potential and the species it acts between.
+#[derive(Debug, Clone)]
+pub struct PairTerm {
+    /// The two species.
+    pub between: [usize; 2],
+    /// `φ`.
+    pub potential: PairPotential,
+}
+
+/// Dissipative and random force of one pair of species:
+/// `F^D = −γ w_R² (ê·v_ij) ê`, `F^R = σ w_R ξ dt^{-1/2} ê`, `σ² = 2γkT`,
+/// `w_R = (1 − r/range)^exponent`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Thermostat {
+    /// γ, mass over time.
+    pub gamma: f64,
+    /// Range of `w_R`.
+    pub range: f64,
+    /// Exponent of `w_R`.
+    pub exponent: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn polynomial_value_and_slope() {
+        let p = Polynomial(vec![1.54, 1.047, 0.5]);
+        let (value, slope) = p.at(2.0);
+        assert!((value - (1.54 + 2.094 + 2.0)).abs() < 1e-14);
+        assert!((slope - (1.047 + 2.0)).abs() < 1e-14);
+        assert_eq!(p.constant_slope(), None);
+        assert_eq!(Polynomial::identity().constant_slope(), Some(1.0));
+        assert_eq!(Polynomial(vec![3.0]).constant_slope(), Some(0.0));
+        assert_eq!(Polynomial(vec![1.0, 2.0, 0.0]).constant_slope(), Some(2.0));
+    }
+}

@@ -1,0 +1,22 @@
+use super::Shape;
+use std::f64::consts::PI;
+
+/// `W = 2s³ − 3s² + 1`, the w₂ that Trofimov et al. reject: flat at the centre, it lets particles sit
+/// on each other, and lattices form at high pressure.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Bell;
+
+impl Shape for Bell {
+    const NAME: &'static str = "bell";
+    const FACTORS: [f64; 2] = [10.0 / (3.0 * PI), 15.0 / (4.0 * PI)];
+
+    #[inline(always)]
+    fn value(s: f64) -> f64 {
+        1.0 + s * s * (2.0 * s - 3.0)
+    }
+
+    #[inline(always)]
+    fn slope(s: f64) -> f64 {
+        6.0 * s * (s - 1.0)
+    }
+}

@@ -1,0 +1,22 @@
+use super::Shape;
+use std::f64::consts::PI;
+
+/// `W = 1 − s`. Its force jumps at the range: Pagonabarraga and Frenkel, Figs 3–5, compare it on
+/// purpose.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Linear;
+
+impl Shape for Linear {
+    const NAME: &'static str = "linear";
+    const FACTORS: [f64; 2] = [3.0 / PI, 3.0 / PI];
+
+    #[inline(always)]
+    fn value(s: f64) -> f64 {
+        1.0 - s
+    }
+
+    #[inline(always)]
+    fn slope(_s: f64) -> f64 {
+        -1.0
+    }
+}

@@ -1,0 +1,23 @@
+use super::Shape;
+use std::f64::consts::PI;
+
+/// `W = (1 − s)²`, of Warren and of Trofimov et al. Its slope is the force law of standard DPD, so a
+/// ψ linear in the density is standard DPD exactly (Warren eq. 10).
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Quadratic;
+
+impl Shape for Quadratic {
+    const NAME: &'static str = "quadratic";
+    const FACTORS: [f64; 2] = [6.0 / PI, 15.0 / (2.0 * PI)];
+
+    #[inline(always)]
+    fn value(s: f64) -> f64 {
+        let t = 1.0 - s;
+        t * t
+    }
+
+    #[inline(always)]
+    fn slope(s: f64) -> f64 {
+        -2.0 * (1.0 - s)
+    }
+}

@@ -1,0 +1,37 @@
+use super::PairForm;
+
+/// The soft potential of standard DPD, `φ = ½ a R (1 − r/R)²`: a force `a (1 − r/R)`.
+///
+/// Groot and Warren; Warren eq. (3)–(4), with the range written out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Soft {
+    strength: f64,
+    range: f64,
+}
+
+impl Soft {
+    /// Strength `a` (energy over length; negative attracts) and range `R > 0`.
+    pub fn new(strength: f64, range: f64) -> Soft {
+        Soft { strength, range }
+    }
+
+    /// `a`: the force at contact.
+    pub fn strength(&self) -> f64 {
+        self.strength
+    }
+}
+
+impl PairForm for Soft {
+    fn range(&self) -> f64 {
+        self.range
+    }
+
+    #[inline(always)]
+    fn at(&self, r: f64) -> (f64, f64) {
+        let t = 1.0 - r / self.range;
+        (
+            0.5 * self.strength * self.range * t * t,
+            -self.strength * t,
+        )
+    }
+}
