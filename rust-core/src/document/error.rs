@@ -96,13 +96,7 @@ pub struct FileError {
 impl FileError {
     /// An error at the bytes `span` of `source`, about `key` (dotted, may be empty).
     pub fn new(source: &Arc<Source>, span: Range<usize>, key: &str, kind: FileErrorKind) -> FileError {
-        FileError {
-            source: Arc::clone(source),
-            span,
-            key: key.to_owned(),
-            kind: Box::new(kind),
-            help: None,
-        }
+        FileError { source: Arc::clone(source), span, key: key.to_owned(), kind: Box::new(kind), help: None }
     }
 
     /// The same error with advice.

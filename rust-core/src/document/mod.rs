@@ -4,6 +4,7 @@
 //! remembers it, so that [`Section::finish`] can name the keys that nobody asked for.
 
 mod error;
+mod node;
 mod section;
 
 pub use error::{FileError, FileErrorKind, Source};
@@ -16,7 +17,7 @@ use std::sync::Arc;
 #[derive(Debug, Clone)]
 pub struct Document {
     source: Arc<Source>,
-    root: toml::de::DeTable<'static>,
+    root: node::Table,
 }
 
 /// The largest file that is read: far above any real one, far below trouble.
@@ -32,15 +33,10 @@ impl Document {
     /// The file cannot be read, is too large, is not UTF-8 or not TOML.
     pub fn open(path: &Path) -> Result<Document, FileError> {
         let name = path.display().to_string();
-        let unreadable = |message: String| FileError::new(
-            &Arc::new(Source::new(&name, "")),
-            0..0,
-            "",
-            FileErrorKind::Unreadable(message),
-        );
-        let size = std::fs::metadata(path)
-            .map_err(|e| unreadable(e.to_string()))?
-            .len();
+        let unreadable = |message: String| {
+            FileError::new(&Arc::new(Source::new(&name, "")), 0..0, "", FileErrorKind::Unreadable(message))
+        };
+        let size = std::fs::metadata(path).map_err(|e| unreadable(e.to_string()))?.len();
         if size > LARGEST {
             return Err(unreadable(format!("{size} bytes, more than {LARGEST}")));
         }
@@ -58,11 +54,7 @@ impl Document {
             return Err(FileError::new(&source, at..at + 1, "", FileErrorKind::TooDeep(DEEPEST)));
         }
         match toml::de::DeTable::parse(text) {
-            Ok(table) => {
-                let mut root = table.into_inner();
-                root.make_owned();
-                Ok(Document { source, root })
-            }
+            Ok(table) => Ok(Document { source, root: node::Table::new(table.into_inner()) }),
             Err(error) => Err(FileError::new(
                 &source,
                 error.span().unwrap_or(0..0),

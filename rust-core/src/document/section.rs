@@ -1,9 +1,8 @@
+use super::node::{Content, Node, Table};
 use super::{FileError, FileErrorKind, Source};
 use std::cell::RefCell;
 use std::ops::Range;
 use std::sync::Arc;
-use toml::Spanned;
-use toml::de::{DeTable, DeValue};
 
 /// A value with the place it was written at.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,7 +33,7 @@ pub struct Section<'a> {
     source: &'a Arc<Source>,
     path: String,
     span: Range<usize>,
-    table: &'a DeTable<'static>,
+    table: &'a Table,
     asked: RefCell<Vec<String>>,
 }
 
@@ -43,7 +42,7 @@ pub struct Section<'a> {
 pub struct Value<'a> {
     source: &'a Arc<Source>,
     key: String,
-    value: &'a Spanned<DeValue<'static>>,
+    value: &'a Node,
 }
 
 impl<'a> Section<'a> {
@@ -51,7 +50,7 @@ impl<'a> Section<'a> {
         source: &'a Arc<Source>,
         path: String,
         span: Range<usize>,
-        table: &'a DeTable<'static>,
+        table: &'a Table,
     ) -> Section<'a> {
         Section { source, path, span, table, asked: RefCell::default() }
     }
@@ -78,58 +77,46 @@ impl<'a> Section<'a> {
     /// The value of an optional key.
     pub fn get(&self, key: &str) -> Option<Value<'a>> {
         self.asked.borrow_mut().push(key.to_owned());
-        let (_, value) = self.table.iter().find(|(k, _)| k.get_ref() == key)?;
+        let value = self.table.get(key)?;
         Some(Value { source: self.source, key: self.path_of(key), value })
     }
 
     /// The value of a key that must be there.
     pub fn require(&self, key: &str) -> Result<Value<'a>, FileError> {
         self.get(key).ok_or_else(|| {
-            FileError::new(
-                self.source,
-                self.span.clone(),
-                &self.path_of(key),
-                FileErrorKind::Missing,
-            )
+            FileError::new(self.source, self.span.clone(), &self.path_of(key), FileErrorKind::Missing)
         })
     }
 
     /// Every key with its value, in the order of the file: for tables whose keys are names.
     pub fn entries(&self) -> Vec<(Located<String>, Value<'a>)> {
-        let mut entries: Vec<_> = self
-            .table
+        self.table
+            .entries
             .iter()
-            .map(|(key, value)| {
-                let name = key.get_ref().to_string();
+            .map(|entry| {
+                let name = entry.key.clone();
                 self.asked.borrow_mut().push(name.clone());
-                let path = self.path_of(&name);
-                let located = Located { value: name, span: key.span(), key: path.clone() };
-                (located, Value { source: self.source, key: path, value })
+                let key = self.path_of(&name);
+                let located = Located { value: name, span: entry.key_span.clone(), key: key.clone() };
+                (located, Value { source: self.source, key, value: &entry.value })
             })
-            .collect();
-        entries.sort_by_key(|(key, _)| key.span.start);
-        entries
+            .collect()
     }
 
     /// An error if the section has a key that nobody asked for.
     pub fn finish(self) -> Result<(), FileError> {
         let asked = self.asked.borrow();
-        let mut strangers: Vec<_> = self
-            .table
-            .keys()
-            .filter(|k| !asked.iter().any(|a| a == k.get_ref()))
-            .collect();
-        strangers.sort_by_key(|k| k.span().start);
-        match strangers.first() {
+        let stranger = self.table.entries.iter().find(|e| !asked.contains(&e.key));
+        match stranger {
             None => Ok(()),
-            Some(key) => {
+            Some(entry) => {
                 let mut known: Vec<&str> = asked.iter().map(String::as_str).collect();
                 known.sort_unstable();
                 known.dedup();
                 Err(FileError::new(
                     self.source,
-                    key.span(),
-                    &self.path_of(key.get_ref()),
+                    entry.key_span.clone(),
+                    &self.path_of(&entry.key),
                     FileErrorKind::UnknownKey { known: known.join(", ") },
                 ))
             }
@@ -145,7 +132,7 @@ impl<'a> Value<'a> {
 
     /// The value's bytes in the file.
     pub fn span(&self) -> Range<usize> {
-        self.value.span()
+        self.value.span.clone()
     }
 
     /// An error about this value.
@@ -154,7 +141,7 @@ impl<'a> Value<'a> {
     }
 
     fn wrong(&self, expected: &'static str) -> FileError {
-        self.error(FileErrorKind::WrongType { expected, found: self.value.get_ref().type_str() })
+        self.error(FileErrorKind::WrongType { expected, found: self.value.type_name() })
     }
 
     fn located<T>(&self, value: T) -> Located<T> {
@@ -172,9 +159,9 @@ impl<'a> Value<'a> {
 
     /// The number if this is one; an error if it is one that is not finite.
     pub fn as_number(&self) -> Option<Result<f64, FileError>> {
-        let number = match self.value.get_ref() {
-            DeValue::Integer(i) => i64::from_str_radix(i.as_str(), i.radix()).ok().map(|i| i as f64),
-            DeValue::Float(x) => x.as_str().parse().ok(),
+        let number = match &self.value.content {
+            Content::Integer(digits, radix) => i64::from_str_radix(digits, *radix).ok().map(|i| i as f64),
+            Content::Float(x) => x.parse().ok(),
             _ => return None,
         };
         Some(match number {
@@ -185,8 +172,8 @@ impl<'a> Value<'a> {
 
     /// A whole number from 0.
     pub fn count(&self) -> Result<Located<u64>, FileError> {
-        match self.value.get_ref() {
-            DeValue::Integer(i) => match u64::from_str_radix(i.as_str(), i.radix()) {
+        match &self.value.content {
+            Content::Integer(digits, radix) => match u64::from_str_radix(digits, *radix) {
                 Ok(value) => Ok(self.located(value)),
                 Err(_) => Err(self.error(FileErrorKind::Value("must be a whole number from 0".into()))),
             },
@@ -196,8 +183,8 @@ impl<'a> Value<'a> {
 
     /// True or false.
     pub fn boolean(&self) -> Result<Located<bool>, FileError> {
-        match self.value.get_ref() {
-            DeValue::Boolean(b) => Ok(self.located(*b)),
+        match &self.value.content {
+            Content::Boolean(b) => Ok(self.located(*b)),
             _ => Err(self.wrong("true or false")),
         }
     }
@@ -212,7 +199,10 @@ impl<'a> Value<'a> {
 
     /// The string if this is one.
     pub fn as_str(&self) -> Option<&'a str> {
-        self.value.get_ref().as_str()
+        match &self.value.content {
+            Content::Text(text) => Some(text),
+            _ => None,
+        }
     }
 
     /// One of a list of names.
@@ -239,7 +229,7 @@ impl<'a> Value<'a> {
 
     /// The elements if this is an array.
     pub fn as_array(&self) -> Option<Vec<Value<'a>>> {
-        let items = self.value.get_ref().as_array()?;
+        let Content::Array(items) = &self.value.content else { return None };
         Some(
             items
                 .iter()
@@ -260,17 +250,15 @@ impl<'a> Value<'a> {
 
     /// The table if this is one.
     pub fn as_section(&self) -> Option<Section<'a>> {
-        let table = self.value.get_ref().as_table()?;
+        let Content::Table(table) = &self.value.content else { return None };
         Some(Section::new(self.source, self.key.clone(), self.span(), table))
     }
 
     /// An array of `N` numbers.
     pub fn numbers<const N: usize>(&self, expected: &'static str) -> Result<[f64; N], FileError> {
         let items = self.array()?;
-        let numbers: Vec<f64> = items
-            .iter()
-            .map(|v| v.number().map(|x| x.value))
-            .collect::<Result<_, _>>()?;
+        let numbers: Vec<f64> =
+            items.iter().map(|v| v.number().map(|x| x.value)).collect::<Result<_, _>>()?;
         <[f64; N]>::try_from(numbers).map_err(|_| {
             self.error(FileErrorKind::Value(format!("expected {expected}, found {} values", items.len())))
         })

@@ -22,7 +22,11 @@ impl PeriodicBox {
     ///
     /// # Errors
     /// Edges that are not finite, or span no positive volume.
-    pub fn new(origin: [f64; 3], edges: Matrix3<f64>, periodic: [bool; 3]) -> Result<PeriodicBox, DomainError> {
+    pub fn new(
+        origin: [f64; 3],
+        edges: Matrix3<f64>,
+        periodic: [bool; 3],
+    ) -> Result<PeriodicBox, DomainError> {
         let origin = Vector3::from(origin);
         let finite = origin.iter().chain(edges.iter()).all(|x| x.is_finite());
         let inverse = edges.try_inverse().filter(|m| m.iter().all(|x| x.is_finite()));
@@ -38,7 +42,11 @@ impl PeriodicBox {
     ///
     /// # Errors
     /// A length that is not positive and finite.
-    pub fn orthogonal(origin: [f64; 3], lengths: [f64; 3], periodic: [bool; 3]) -> Result<PeriodicBox, DomainError> {
+    pub fn orthogonal(
+        origin: [f64; 3],
+        lengths: [f64; 3],
+        periodic: [bool; 3],
+    ) -> Result<PeriodicBox, DomainError> {
         if lengths.iter().any(|l| *l <= 0.0) {
             return Err(DomainError::Degenerate);
         }
@@ -138,7 +146,10 @@ mod tests {
 
     #[test]
     fn flat_and_infinite_boxes_are_refused() {
-        assert_eq!(PeriodicBox::orthogonal([0.0; 3], [1.0, 0.0, 1.0], [true; 3]), Err(DomainError::Degenerate));
+        assert_eq!(
+            PeriodicBox::orthogonal([0.0; 3], [1.0, 0.0, 1.0], [true; 3]),
+            Err(DomainError::Degenerate)
+        );
         assert_eq!(
             PeriodicBox::orthogonal([0.0; 3], [1.0, f64::INFINITY, 1.0], [true; 3]),
             Err(DomainError::Degenerate)

@@ -3,7 +3,9 @@
 #[non_exhaustive]
 pub enum EngineError {
     /// A position is NaN or infinite.
-    #[error("the position of particle {tag} is not finite: the time step is likely too large for these forces")]
+    #[error(
+        "the position of particle {tag} is not finite: the time step is likely too large for these forces"
+    )]
     Position {
         /// Which particle.
         tag: i32,
@@ -22,7 +24,9 @@ pub enum EngineError {
         densities: String,
     },
     /// A force is NaN or infinite.
-    #[error("the force on particle {tag} is not finite: particles overlap too much for this model or time step")]
+    #[error(
+        "the force on particle {tag} is not finite: particles overlap too much for this model or time step"
+    )]
     Force {
         /// Which particle.
         tag: i32,

@@ -7,7 +7,7 @@ use super::plan::Plan;
 use super::search::CellSearch;
 use super::tally::{Tally, Want};
 use crate::model::Fluid;
-use crate::model::expression::ExpressionError;
+use crate::model::expression::TooLarge;
 
 /// The host's particles: owned ones first, then ghosts. All slices have one length.
 #[derive(Debug, Clone, Copy)]
@@ -91,7 +91,7 @@ impl Engine {
     ///
     /// # Errors
     /// As [`Plan::new`].
-    pub fn new(fluid: &Fluid) -> Result<Engine, ExpressionError> {
+    pub fn new(fluid: &Fluid) -> Result<Engine, TooLarge> {
         let plan = Plan::new(fluid)?;
         let kinds = (0..plan.species.len() as i32).collect();
         Ok(Engine {

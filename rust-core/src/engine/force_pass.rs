@@ -73,7 +73,14 @@ pub fn add_forces(input: &ForceInput, output: &mut ForceOutput) {
         }
         for (k, density) in input.plan.passes.iter().enumerate() {
             let kernel = &input.plan.densities[*density].force_kernel;
-            kernel.kind().visit(ManyBody { input, kernel, offset: k, begin, end, out: &mut block.conservative });
+            kernel.kind().visit(ManyBody {
+                input,
+                kernel,
+                offset: k,
+                begin,
+                end,
+                out: &mut block.conservative,
+            });
         }
         for term in &input.plan.linear {
             term.kernel.kind().visit(Linear { input, term, energies, begin, end, block: &mut block });
@@ -171,7 +178,14 @@ impl ShapeVisitor for Linear<'_, '_> {
 }
 
 /// `−φ′(r)`.
-fn add_pair_term(input: &ForceInput, term: &PairTerm, begin: usize, end: usize, energies: bool, block: &mut Block) {
+fn add_pair_term(
+    input: &ForceInput,
+    term: &PairTerm,
+    begin: usize,
+    end: usize,
+    energies: bool,
+    block: &mut Block,
+) {
     let list = input.list;
     let [a, b] = term.between.map(|s| s as u8);
     let range = term.potential.range();

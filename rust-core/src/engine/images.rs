@@ -17,7 +17,14 @@ impl Images {
     /// Positions must lie in the box along its periodic directions ([`PeriodicBox::wrap`]). Boxes
     /// narrower than the cut-off get as many shells of images as they need. In two dimensions the
     /// third direction has none.
-    pub fn build(&mut self, domain: &PeriodicBox, dimensions: usize, cutoff: f64, owned: usize, x: &mut Vec<[f64; 3]>) {
+    pub fn build(
+        &mut self,
+        domain: &PeriodicBox,
+        dimensions: usize,
+        cutoff: f64,
+        owned: usize,
+        x: &mut Vec<[f64; 3]>,
+    ) {
         x.truncate(owned);
         self.owned = owned;
         self.owner.clear();

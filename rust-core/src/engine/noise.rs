@@ -22,9 +22,7 @@ pub fn threefry2x32<const ROUNDS: usize>(counter: [u32; 2], key: [u32; 2]) -> [u
         if round % 4 == 3 {
             let injection = round / 4 + 1;
             x0 = x0.wrapping_add(schedule[injection % 3]);
-            x1 = x1
-                .wrapping_add(schedule[(injection + 1) % 3])
-                .wrapping_add(injection as u32);
+            x1 = x1.wrapping_add(schedule[(injection + 1) % 3]).wrapping_add(injection as u32);
         }
     }
     [x0, x1]
@@ -40,9 +38,7 @@ impl PairNoise {
     /// The noise of step `step` under `seed`.
     pub fn new(seed: u64, step: u64) -> PairNoise {
         let split = |x: u64| [x as u32, (x >> 32) as u32];
-        PairNoise {
-            key: threefry2x32::<20>(split(step), split(seed)),
-        }
+        PairNoise { key: threefry2x32::<20>(split(step), split(seed)) }
     }
 
     /// `ξ_ij = ξ_ji`: zero mean, unit variance, uniform on (−√3, √3).

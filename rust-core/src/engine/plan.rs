@@ -1,6 +1,6 @@
 //! What a fluid needs computed, worked out once.
 
-use crate::model::expression::{ExpressionError, Formula, Program};
+use crate::model::expression::{Formula, Program, TooLarge};
 use crate::model::kernel::Kernel;
 use crate::model::{ExcessFreeEnergy, Fluid, PairTerm, WeightedDensity};
 use std::fmt;
@@ -61,7 +61,7 @@ impl Plan {
     ///
     /// # Errors
     /// A derivative of ψ grows beyond the limits of the formula engine.
-    pub fn new(fluid: &Fluid) -> Result<Plan, ExpressionError> {
+    pub fn new(fluid: &Fluid) -> Result<Plan, TooLarge> {
         let count = fluid.species.len();
         let slopes = slopes(fluid)?;
         let mut passes = Vec::new();
@@ -78,9 +78,8 @@ impl Plan {
                 }),
             }
         }
-        let excess = (0..count)
-            .map(|alpha| plan_excess(fluid, alpha, &passes))
-            .collect::<Result<Vec<_>, _>>()?;
+        let excess =
+            (0..count).map(|alpha| plan_excess(fluid, alpha, &passes)).collect::<Result<Vec<_>, _>>()?;
         Ok(Plan {
             species: fluid.species.clone(),
             dimensions: fluid.dimensions,
@@ -139,7 +138,7 @@ impl Plan {
 }
 
 /// `∂ψ_α/∂ñ_v` for every species and variable.
-fn slopes(fluid: &Fluid) -> Result<Vec<Vec<Formula>>, ExpressionError> {
+fn slopes(fluid: &Fluid) -> Result<Vec<Vec<Formula>>, TooLarge> {
     fluid
         .excess
         .iter()
@@ -168,7 +167,7 @@ fn linear_coefficients(fluid: &Fluid, slopes: &[Vec<Formula>], d: usize) -> Opti
 
 /// ψ_α as a function of the densities that need a pass: the others are put at n = 0, where their
 /// linear terms, which are pair terms now, vanish.
-fn plan_excess(fluid: &Fluid, alpha: usize, passes: &[usize]) -> Result<ExcessPlan, ExpressionError> {
+fn plan_excess(fluid: &Fluid, alpha: usize, passes: &[usize]) -> Result<ExcessPlan, TooLarge> {
     let count = fluid.species.len();
     let ExcessFreeEnergy::Formula(psi) = &fluid.excess[alpha];
     let mut psi = psi.clone();
@@ -179,7 +178,7 @@ fn plan_excess(fluid: &Fluid, alpha: usize, passes: &[usize]) -> Result<ExcessPl
         for beta in 0..count {
             let own = if density.includes_self && alpha == beta { density.kernel.value(0.0) } else { 0.0 };
             let at_zero = density.correction[alpha * count + beta].at(own).0;
-            psi = psi.substitute(d * count + beta, at_zero)?;
+            psi = psi.substitute(d * count + beta, at_zero);
         }
     }
     let variables: Vec<usize> = passes.iter().flat_map(|d| (0..count).map(move |s| d * count + s)).collect();
@@ -219,7 +218,13 @@ impl ThermostatPlan {
 impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let count = self.species.len();
-        writeln!(f, "fluid         {} ({}-D; species {})", self.title, self.dimensions, self.species.join(", "))?;
+        writeln!(
+            f,
+            "fluid         {} ({}-D; species {})",
+            self.title,
+            self.dimensions,
+            self.species.join(", ")
+        )?;
         writeln!(f, "cut-off       {}", self.cutoff)?;
         for &d in &self.passes {
             let density = &self.densities[d];
@@ -248,7 +253,12 @@ impl fmt::Display for Plan {
         for term in &self.pairs {
             use crate::model::pair::PairForm;
             let [a, b] = term.between.map(|s| &self.species[s]);
-            writeln!(f, "pair term     {a}-{b}: {}, range {}", term.potential.name(), term.potential.range())?;
+            writeln!(
+                f,
+                "pair term     {a}-{b}: {}, range {}",
+                term.potential.name(),
+                term.potential.range()
+            )?;
         }
         for (name, excess) in self.species.iter().zip(&self.excess) {
             match excess.constant {

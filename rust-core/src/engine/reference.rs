@@ -4,7 +4,7 @@
 use super::domain::PeriodicBox;
 use super::evaluator::Step;
 use super::noise::PairNoise;
-use crate::model::expression::{ExpressionError, Formula};
+use crate::model::expression::{Formula, TooLarge};
 use crate::model::pair::PairForm;
 use crate::model::{ExcessFreeEnergy, Fluid};
 
@@ -71,7 +71,7 @@ pub fn evaluate(
     x: &[[f64; 3]],
     species: &[usize],
     domain: &PeriodicBox,
-) -> Result<Evaluation, ExpressionError> {
+) -> Result<Evaluation, TooLarge> {
     let count = fluid.species.len();
     let pairs = pairs(x, domain, fluid.dimensions, fluid.cutoff());
 

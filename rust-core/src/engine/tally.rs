@@ -15,9 +15,11 @@ pub struct Want {
 
 impl Want {
     /// Forces alone.
-    pub const FORCES: Want = Want { energy: false, virial: false, particle_energy: false, particle_virial: false };
+    pub const FORCES: Want =
+        Want { energy: false, virial: false, particle_energy: false, particle_virial: false };
     /// Energy and virial of the whole.
-    pub const TOTALS: Want = Want { energy: true, virial: true, particle_energy: false, particle_virial: false };
+    pub const TOTALS: Want =
+        Want { energy: true, virial: true, particle_energy: false, particle_virial: false };
     /// Everything.
     pub const ALL: Want = Want { energy: true, virial: true, particle_energy: true, particle_virial: true };
 }

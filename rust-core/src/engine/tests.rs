@@ -300,7 +300,10 @@ fn five_point(f: impl Fn(f64) -> f64) -> f64 {
 #[test]
 fn one_species_equals_identical_species() {
     let one = configuration(300, [3.1, 4.0, 3.5], 1, 3);
-    let three = Configuration { species: (0..300).map(|k| k % 3).collect(), ..configuration(300, [3.1, 4.0, 3.5], 1, 3) };
+    let three = Configuration {
+        species: (0..300).map(|k| k % 3).collect(),
+        ..configuration(300, [3.1, 4.0, 3.5], 1, 3)
+    };
     let step = Some(Step { seed: 3, number: 5, dt: 0.02 });
     let a = run_engine(&warren(1, ForceLaw::Conservative), &one, Newton::On, step);
     let b = run_engine(&warren(3, ForceLaw::Conservative), &three, Newton::On, step);
@@ -407,7 +410,8 @@ fn linear_psi_is_standard_dpd_and_needs_no_density_pass() {
     let psi = format!(
         "{head}[density.n]\nkernel = \"quadratic\"\nrange = 1\n[excess_free_energy]\nA = \"pi/30*25*n\"\n"
     );
-    let soft = format!("{head}[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\nstrength = 25\nrange = 1\n");
+    let soft =
+        format!("{head}[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\nstrength = 25\nrange = 1\n");
     let psi = Model::parse("psi", &psi).unwrap().at(1.0).unwrap();
     let soft = Model::parse("soft", &soft).unwrap().at(1.0).unwrap();
     let c = configuration(200, [4.0, 4.0, 4.0], 1, 3);

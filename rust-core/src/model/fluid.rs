@@ -77,9 +77,7 @@ impl Polynomial {
 
     /// Value and slope at `x`.
     pub fn at(&self, x: f64) -> (f64, f64) {
-        self.0.iter().rev().fold((0.0, 0.0), |(value, slope), c| {
-            (value * x + c, slope * x + value)
-        })
+        self.0.iter().rev().fold((0.0, 0.0), |(value, slope), c| (value * x + c, slope * x + value))
     }
 
     /// The slope if the polynomial is linear.

@@ -28,11 +28,7 @@ impl Formula {
         constants: &BTreeMap<String, f64>,
         variables: &Variables,
     ) -> Result<Self, ExpressionError> {
-        let mut compiler = Compiler {
-            graph: Graph::new(),
-            constants,
-            variables,
-        };
+        let mut compiler = Compiler { graph: Graph::new(), constants, variables };
         let mut operands: Vec<Id> = Vec::new();
         for step in &ast.steps {
             let arguments = match &step.action {
@@ -72,8 +68,8 @@ impl Compiler<'_> {
             // A constant operation that was not carried out has no finite value.
             None => !operands.is_empty() && operands.iter().all(|id| value(id).is_some()),
         };
-        let by_zero = step.action == Action::Binary(Binary::Divide)
-            && operands.last().and_then(value) == Some(0.0);
+        let by_zero =
+            step.action == Action::Binary(Binary::Divide) && operands.last().and_then(value) == Some(0.0);
         if undefined || by_zero {
             return Err(step.span.error(ErrorKind::NonFinite));
         }
@@ -142,24 +138,12 @@ mod tests {
 
     fn compile(text: &str) -> Result<Formula, ExpressionError> {
         let constants = [("kT", 1.5), ("b", 0.1), ("big", 1e300), ("bad", f64::NAN)];
-        let names = [
-            ("n", vec![0, 1]),
-            ("n_A", vec![0]),
-            ("n_B", vec![1]),
-            ("none", vec![]),
-            ("far", vec![2]),
-        ];
+        let names =
+            [("n", vec![0, 1]), ("n_A", vec![0]), ("n_B", vec![1]), ("none", vec![]), ("far", vec![2])];
         Formula::compile(
             &Ast::parse(text)?,
-            &constants
-                .map(|(name, value)| (name.to_owned(), value))
-                .into(),
-            &Variables {
-                count: 2,
-                names: names
-                    .map(|(name, indices)| (name.to_owned(), indices))
-                    .into(),
-            },
+            &constants.map(|(name, value)| (name.to_owned(), value)).into(),
+            &Variables { count: 2, names: names.map(|(name, indices)| (name.to_owned(), indices)).into() },
         )
     }
 
@@ -177,18 +161,8 @@ mod tests {
     fn errors_point_at_the_byte() {
         for (text, offset, length, message) in [
             ("1 + KT*n", 4, 2, "unknown name `KT`, did you mean `kT`?"),
-            (
-                "n + zzz",
-                4,
-                3,
-                "known: b, bad, big, far, kT, n, n_A, n_B, none",
-            ),
-            (
-                "n + far",
-                4,
-                3,
-                "`far` stands for variable 2, but there are only 2",
-            ),
+            ("n + zzz", 4, 3, "known: b, bad, big, far, kT, n, n_A, n_B, none"),
+            ("n + far", 4, 3, "`far` stands for variable 2, but there are only 2"),
             ("n + 1/0", 4, 3, "no finite value"),
             ("n + 1/(2 - 2)*3", 4, 9, "no finite value"),
             ("n/(b - b)", 0, 9, "no finite value"),

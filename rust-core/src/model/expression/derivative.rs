@@ -57,12 +57,7 @@ impl Graph {
                 let outer = self.slope_of(function, a)?;
                 self.multiply(outer, d(a))
             }
-            Node::Select {
-                left,
-                right,
-                then,
-                otherwise,
-            } => self.select(left, right, d(then), d(otherwise)),
+            Node::Select { left, right, then, otherwise } => self.select(left, right, d(then), d(otherwise)),
         }
     }
 

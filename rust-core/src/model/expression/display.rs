@@ -18,10 +18,7 @@ pub struct Named<'a> {
 impl Formula {
     /// The formula for printing, variable `i` as `names[i]`, or `x{i}` beyond the names.
     pub fn with_names<'a>(&'a self, names: &'a [&'a str]) -> Named<'a> {
-        Named {
-            formula: self,
-            names,
-        }
+        Named { formula: self, names }
     }
 }
 
@@ -148,15 +145,9 @@ fn pieces(nodes: &[Node], node: Node) -> (Strength, Vec<Piece>) {
             let is_coefficient = constant(a).is_some()
                 && !matches!(nodes[b.index()], Node::Multiply(c, _) if constant(c).is_some());
             let right = if is_coefficient { Product } else { Factor };
-            (
-                Product,
-                vec![Operand(a, Product), Text(" * "), Operand(b, right)],
-            )
+            (Product, vec![Operand(a, Product), Text(" * "), Operand(b, right)])
         }
-        Node::Divide(a, b) => (
-            Product,
-            vec![Operand(a, Product), Text(" / "), Operand(b, Factor)],
-        ),
+        Node::Divide(a, b) => (Product, vec![Operand(a, Product), Text(" / "), Operand(b, Factor)]),
         Node::Negate(a) => (Product, vec![Text("-"), Operand(a, Product)]),
         Node::IntegerPower(base, n @ ..0) => {
             let mut text = vec![Text("1 / ")];
@@ -166,40 +157,20 @@ fn pieces(nodes: &[Node], node: Node) -> (Strength, Vec<Piece>) {
         Node::IntegerPower(base, n) => (Factor, power(base, n)),
         Node::Power(a, b) => match constant(b) {
             Some(exponent) => (Factor, vec![Operand(a, Atom), Text("^"), Number(exponent)]),
-            None => (
-                Factor,
-                vec![Operand(a, Atom), Text("^"), Operand(b, Factor)],
-            ),
+            None => (Factor, vec![Operand(a, Atom), Text("^"), Operand(b, Factor)]),
         },
-        Node::Unary(function, a) => (
-            Atom,
-            vec![Text(function.name()), Text("("), Operand(a, Sum), Text(")")],
-        ),
-        Node::Select {
-            left,
-            right,
-            then,
-            otherwise,
-        } => {
+        Node::Unary(function, a) => {
+            (Atom, vec![Text(function.name()), Text("("), Operand(a, Sum), Text(")")])
+        }
+        Node::Select { left, right, then, otherwise } => {
             let mut text = if (left, right) == (then, otherwise) {
                 vec![Text("min(")]
             } else if (right, left) == (then, otherwise) {
                 vec![Text("max(")]
             } else {
-                vec![
-                    Text("if("),
-                    Operand(left, Sum),
-                    Text(" <= "),
-                    Operand(right, Sum),
-                    Text(", "),
-                ]
+                vec![Text("if("), Operand(left, Sum), Text(" <= "), Operand(right, Sum), Text(", ")]
             };
-            text.extend([
-                Operand(then, Sum),
-                Text(", "),
-                Operand(otherwise, Sum),
-                Text(")"),
-            ]);
+            text.extend([Operand(then, Sum), Text(", "), Operand(otherwise, Sum), Text(")")]);
             (Atom, text)
         }
     }
@@ -239,10 +210,8 @@ mod tests {
     use super::*;
 
     fn formula(text: &str) -> Formula {
-        let variables = Variables {
-            count: 2,
-            names: [("x0".to_owned(), vec![0]), ("x1".to_owned(), vec![1])].into(),
-        };
+        let variables =
+            Variables { count: 2, names: [("x0".to_owned(), vec![0]), ("x1".to_owned(), vec![1])].into() };
         Formula::compile(&Ast::parse(text).unwrap(), &Default::default(), &variables).unwrap()
     }
 

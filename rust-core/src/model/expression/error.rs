@@ -23,11 +23,7 @@ impl Span {
     }
 
     pub fn error(self, kind: ErrorKind) -> ExpressionError {
-        ExpressionError {
-            kind,
-            offset: self.offset,
-            length: self.length,
-        }
+        ExpressionError { kind, offset: self.offset, length: self.length }
     }
 }
 

@@ -38,9 +38,7 @@ impl Formula {
     }
 
     pub(super) fn from_nodes(nodes: Vec<Node>) -> Self {
-        Self {
-            nodes: nodes.into(),
-        }
+        Self { nodes: nodes.into() }
     }
 
     pub(super) fn nodes(&self) -> &[Node] {
@@ -57,9 +55,7 @@ impl Formula {
 
     /// Whether variable `i` occurs in the formula, after simplification.
     pub fn depends_on(&self, i: usize) -> bool {
-        self.nodes
-            .iter()
-            .any(|node| matches!(*node, Node::Variable(v) if v as usize == i))
+        self.nodes.iter().any(|node| matches!(*node, Node::Variable(v) if v as usize == i))
     }
 
     /// The exact derivative ∂/∂xᵢ.
@@ -98,12 +94,9 @@ impl Formula {
                 Node::IntegerPower(a, n) => graph.integer_power(at(a), n)?,
                 Node::Power(a, b) => graph.power(at(a), at(b))?,
                 Node::Unary(function, a) => graph.unary(function, at(a))?,
-                Node::Select {
-                    left,
-                    right,
-                    then,
-                    otherwise,
-                } => graph.select(at(left), at(right), at(then), at(otherwise))?,
+                Node::Select { left, right, then, otherwise } => {
+                    graph.select(at(left), at(right), at(then), at(otherwise))?
+                }
             };
             places.push(id);
         }
@@ -134,12 +127,9 @@ impl Formula {
                 Node::IntegerPower(a, n) => integer_power(v(a), n),
                 Node::Power(a, b) => v(a).powf(v(b)),
                 Node::Unary(function, a) => function.apply(v(a)),
-                Node::Select {
-                    left,
-                    right,
-                    then,
-                    otherwise,
-                } => select(v(left), v(right), v(then), v(otherwise)),
+                Node::Select { left, right, then, otherwise } => {
+                    select(v(left), v(right), v(then), v(otherwise))
+                }
             };
             values.push(value);
         }
@@ -153,10 +143,8 @@ mod tests {
     use super::*;
 
     fn formula(text: &str) -> Formula {
-        let variables = Variables {
-            count: 2,
-            names: [("x".to_owned(), vec![0]), ("y".to_owned(), vec![1])].into(),
-        };
+        let variables =
+            Variables { count: 2, names: [("x".to_owned(), vec![0]), ("y".to_owned(), vec![1])].into() };
         Formula::compile(&Ast::parse(text).unwrap(), &Default::default(), &variables).unwrap()
     }
 
@@ -231,10 +219,7 @@ mod tests {
         let f = formula("ln(1 + x)*y + x^2");
         assert_eq!(f.substitute(0, 0.0), Formula::constant(0.0));
         assert!(!f.substitute(0, 2.0).depends_on(0));
-        assert_eq!(
-            f.substitute(0, 2.0).value(&[f64::NAN, 3.0]),
-            f.value(&[2.0, 3.0])
-        );
+        assert_eq!(f.substitute(0, 2.0).value(&[f64::NAN, 3.0]), f.value(&[2.0, 3.0]));
         // Undefined, but not an error: the value says so.
         let undefined = f.substitute(0, -2.0);
         assert_eq!(undefined.is_constant(), None);
@@ -248,11 +233,6 @@ mod tests {
         assert!(Formula::variable(3).depends_on(3));
         assert!(!Formula::variable(3).depends_on(2));
         assert_eq!(Formula::variable(1).value(&[4.0, 5.0]), 5.0);
-        assert_eq!(
-            Formula::variable(usize::MAX)
-                .derivative(usize::MAX)
-                .unwrap(),
-            Formula::constant(0.0)
-        );
+        assert_eq!(Formula::variable(usize::MAX).derivative(usize::MAX).unwrap(), Formula::constant(0.0));
     }
 }

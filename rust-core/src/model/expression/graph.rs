@@ -61,20 +61,15 @@ impl Node {
     pub fn operands(self) -> impl Iterator<Item = Id> {
         let operands = match self {
             Node::Constant(_) | Node::Variable(_) => [None; 4],
-            Node::Negate(a) | Node::IntegerPower(a, _) | Node::Unary(_, a) => {
-                [Some(a), None, None, None]
-            }
+            Node::Negate(a) | Node::IntegerPower(a, _) | Node::Unary(_, a) => [Some(a), None, None, None],
             Node::Add(a, b)
             | Node::Subtract(a, b)
             | Node::Multiply(a, b)
             | Node::Divide(a, b)
             | Node::Power(a, b) => [Some(a), Some(b), None, None],
-            Node::Select {
-                left,
-                right,
-                then,
-                otherwise,
-            } => [Some(left), Some(right), Some(then), Some(otherwise)],
+            Node::Select { left, right, then, otherwise } => {
+                [Some(left), Some(right), Some(then), Some(otherwise)]
+            }
         };
         operands.into_iter().flatten()
     }
@@ -91,17 +86,9 @@ impl Node {
             Node::Multiply(a, b) => Node::Multiply(to(a), to(b)),
             Node::Divide(a, b) => Node::Divide(to(a), to(b)),
             Node::Power(a, b) => Node::Power(to(a), to(b)),
-            Node::Select {
-                left,
-                right,
-                then,
-                otherwise,
-            } => Node::Select {
-                left: to(left),
-                right: to(right),
-                then: to(then),
-                otherwise: to(otherwise),
-            },
+            Node::Select { left, right, then, otherwise } => {
+                Node::Select { left: to(left), right: to(right), then: to(then), otherwise: to(otherwise) }
+            }
         }
     }
 }
@@ -135,11 +122,7 @@ impl Graph {
 
     /// An empty graph for work that can add only so much to what was within bounds.
     pub fn with_limit(limit: usize) -> Self {
-        Self {
-            nodes: Vec::new(),
-            places: HashMap::new(),
-            limit,
-        }
+        Self { nodes: Vec::new(), places: HashMap::new(), limit }
     }
 
     pub fn nodes(&self) -> &[Node] {
@@ -181,9 +164,7 @@ impl Graph {
         needed[root.index()] = true;
         for index in (0..needed.len()).rev() {
             if needed[index] {
-                self.nodes[index]
-                    .operands()
-                    .for_each(|id| needed[id.index()] = true);
+                self.nodes[index].operands().for_each(|id| needed[id.index()] = true);
             }
         }
         let mut places = vec![Id(0); needed.len()];

@@ -98,21 +98,14 @@ impl<'a> Values<'a> {
                 None => self.of(Power, &[a, b]),
             },
             Node::Unary(function, a) => self.of(Unary(function), &[a]),
-            Node::Select {
-                left,
-                right,
-                then,
-                otherwise,
-            } => self.of(Select, &[left, right, then, otherwise]),
+            Node::Select { left, right, then, otherwise } => self.of(Select, &[left, right, then, otherwise]),
         };
         Some(place)
     }
 
     fn integer_power(&mut self, base: Id, n: u32) -> usize {
         let base = self.place(base);
-        multiply_up(base, n, |a, b| {
-            self.emit(Operation::Multiply, 0.0, &[a.min(b), a.max(b)])
-        })
+        multiply_up(base, n, |a, b| self.emit(Operation::Multiply, 0.0, &[a.min(b), a.max(b)]))
     }
 
     fn of(&mut self, operation: Operation, operands: &[Id]) -> usize {
@@ -146,12 +139,7 @@ impl<'a> Values<'a> {
         let key = (operation, constant.to_bits(), from);
         let place = *self.known.entry(key).or_insert(next);
         if place == next {
-            self.code.push(Instruction {
-                operation,
-                constant,
-                from,
-                to: next,
-            });
+            self.code.push(Instruction { operation, constant, from, to: next });
         }
         place
     }
@@ -208,21 +196,12 @@ fn allocate(variables: usize, code: &[Instruction], mut outputs: Vec<Output>) ->
             }
         }
         moved[instruction.to] = variables + to;
-        kept.push(Instruction {
-            from,
-            to,
-            ..*instruction
-        });
+        kept.push(Instruction { from, to, ..*instruction });
     }
     for output in &mut outputs {
         if let Output::Place(place) = output {
             *place = moved[*place];
         }
     }
-    Program {
-        variables,
-        registers,
-        code: kept,
-        outputs,
-    }
+    Program { variables, registers, code: kept, outputs }
 }

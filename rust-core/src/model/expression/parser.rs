@@ -16,22 +16,13 @@ pub(super) fn parse(text: &str) -> Result<Vec<Step>, ExpressionError> {
         }
         return Err(Span::new(offset, text.len() - offset).error(ErrorKind::TooLong));
     }
-    let mut parser = Parser {
-        text,
-        steps: Vec::new(),
-        operands: Vec::new(),
-        waiting: Vec::new(),
-        depth: 0,
-    };
+    let mut parser = Parser { text, steps: Vec::new(), operands: Vec::new(), waiting: Vec::new(), depth: 0 };
     let mut lexer = Lexer::new(text);
     // An expression alternates: an operand (after signs and openings), then an operator.
     let mut wants_operand = true;
     while let Some((token, span)) = lexer.next()? {
-        wants_operand = if wants_operand {
-            parser.operand(token, span)?
-        } else {
-            parser.operator(token, span)?
-        };
+        wants_operand =
+            if wants_operand { parser.operand(token, span)? } else { parser.operator(token, span)? };
     }
     if wants_operand {
         return Err(Span::new(text.len(), 0).error(ErrorKind::UnexpectedEnd));
@@ -143,10 +134,7 @@ impl Parser<'_> {
             Token::Symbol(',') => {
                 self.settle(1);
                 match self.waiting.last_mut() {
-                    Some(Waiting::Open {
-                        call: Some((_, _, commas)),
-                        ..
-                    }) => *commas += 1,
+                    Some(Waiting::Open { call: Some((_, _, commas)), .. }) => *commas += 1,
                     _ => return Err(self.unexpected(span, "an operator")),
                 }
                 return Ok(true);
@@ -179,8 +167,7 @@ impl Parser<'_> {
                 if commas + 1 != function.arguments() {
                     return Err(wrong_count(function, commas + 1, span));
                 }
-                self.operands
-                    .truncate(self.operands.len() - function.arguments());
+                self.operands.truncate(self.operands.len() - function.arguments());
                 self.leaf(Action::Call(function), span);
             }
         }
@@ -257,11 +244,7 @@ fn unknown(name: &str, span: Span) -> ExpressionError {
 }
 
 fn wrong_count(function: Function, found: usize, span: Span) -> ExpressionError {
-    span.error(ErrorKind::ArgumentCount {
-        function: function.name(),
-        expected: function.arguments(),
-        found,
-    })
+    span.error(ErrorKind::ArgumentCount { function: function.name(), expected: function.arguments(), found })
 }
 
 #[cfg(test)]
@@ -338,12 +321,7 @@ mod tests {
             ("a)", 1, 1, "unexpected `)`"),
             ("a*()", 3, 1, "unexpected `)`"),
             ("ln + 1", 0, 2, "unexpected `ln`"),
-            (
-                "a + lm(b)",
-                4,
-                2,
-                "unknown function `lm`, did you mean `ln`?",
-            ),
+            ("a + lm(b)", 4, 2, "unknown function `lm`, did you mean `ln`?"),
             ("a, b", 1, 1, "unexpected `,`"),
             ("(a, b)", 2, 1, "unexpected `,`"),
             ("1 + ln()", 4, 4, "`ln` takes 1 argument(s), not 0"),
@@ -364,13 +342,7 @@ mod tests {
     #[test]
     fn depth_is_limited() {
         let nested = |open: &str, close: &str, n| open.repeat(n) + "x" + &close.repeat(n);
-        for (open, close) in [
-            ("(", ")"),
-            ("-", ""),
-            ("x^", ""),
-            ("exp(", ")"),
-            ("2*(1+", ")"),
-        ] {
+        for (open, close) in [("(", ")"), ("-", ""), ("x^", ""), ("exp(", ")"), ("2*(1+", ")")] {
             assert!(parse(&nested(open, close, MAX_DEPTH)).is_ok(), "{open}");
             for n in [MAX_DEPTH + 1, 500] {
                 let error = parse(&nested(open, close, n)).unwrap_err();

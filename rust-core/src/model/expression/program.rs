@@ -151,9 +151,7 @@ impl Program {
                 let place = instruction.from[operand];
                 match place.checked_sub(self.variables) {
                     None => &at[place * lanes..][..lanes],
-                    Some(register) if register < instruction.to => {
-                        &before[register * lanes..][..lanes]
-                    }
+                    Some(register) if register < instruction.to => &before[register * lanes..][..lanes],
                     Some(register) => &after[(register - instruction.to - 1) * lanes..][..lanes],
                 }
             };
@@ -162,12 +160,10 @@ impl Program {
         for (out, output) in out.chunks_exact_mut(lanes).zip(&self.outputs) {
             match *output {
                 Output::Constant(value) => out.fill(value),
-                Output::Place(place) => {
-                    out.copy_from_slice(match place.checked_sub(self.variables) {
-                        None => &at[place * lanes..][..lanes],
-                        Some(register) => &work[register * lanes..][..lanes],
-                    })
-                }
+                Output::Place(place) => out.copy_from_slice(match place.checked_sub(self.variables) {
+                    None => &at[place * lanes..][..lanes],
+                    Some(register) => &work[register * lanes..][..lanes],
+                }),
             }
         }
     }
@@ -226,10 +222,8 @@ mod tests {
     use super::*;
 
     fn formula(text: &str) -> Formula {
-        let variables = Variables {
-            count: 2,
-            names: [("x".to_owned(), vec![0]), ("y".to_owned(), vec![1])].into(),
-        };
+        let variables =
+            Variables { count: 2, names: [("x".to_owned(), vec![0]), ("y".to_owned(), vec![1])].into() };
         Formula::compile(&Ast::parse(text).unwrap(), &Default::default(), &variables).unwrap()
     }
 

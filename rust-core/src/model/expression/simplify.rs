@@ -157,12 +157,7 @@ impl Graph {
                 _ => {}
             }
         }
-        self.add_node(Node::Select {
-            left,
-            right,
-            then,
-            otherwise,
-        })
+        self.add_node(Node::Select { left, right, then, otherwise })
     }
 
     pub fn min(&mut self, a: Id, b: Id) -> Built {
@@ -239,10 +234,8 @@ mod tests {
 
     fn simplified(text: &str) -> String {
         let names = ["x", "y", "z"].map(str::to_owned);
-        let variables = Variables {
-            count: 3,
-            names: names.into_iter().zip([vec![0], vec![1], vec![2]]).collect(),
-        };
+        let variables =
+            Variables { count: 3, names: names.into_iter().zip([vec![0], vec![1], vec![2]]).collect() };
         let ast = Ast::parse(text).unwrap();
         let formula = Formula::compile(&ast, &Default::default(), &variables).unwrap();
         formula.with_names(&["x", "y", "z"]).to_string()

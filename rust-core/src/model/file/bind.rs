@@ -6,7 +6,7 @@ use super::excess::ExcessEntry;
 use super::interaction::{PairEntry, PairFormEntry, ThermostatEntry};
 use super::number::formula_error;
 use crate::document::{FileError, FileErrorKind, Source};
-use crate::model::expression::{Formula, Variables};
+use crate::model::expression::{ErrorKind, ExpressionError, Formula, Variables};
 use crate::model::fluid::{ExcessFreeEnergy, Fluid, PairTerm, Polynomial, Thermostat, WeightedDensity};
 use crate::model::kernel::Kernel;
 use crate::model::pair::{ExpressionPair, PairPotential, Soft, SplineAttractive};
@@ -45,11 +45,7 @@ pub fn bind(model: &Model, kt: f64) -> Result<Fluid, FileError> {
                 .map_err(|e| formula_error(source, ast, e)),
         })
         .collect::<Result<Vec<_>, _>>()?;
-    let pairs = model
-        .pairs
-        .iter()
-        .map(|entry| bind_pair(entry, &context))
-        .collect::<Result<Vec<_>, _>>()?;
+    let pairs = model.pairs.iter().map(|entry| bind_pair(entry, &context)).collect::<Result<Vec<_>, _>>()?;
     Ok(Fluid {
         title: model.title.clone(),
         reference: model.reference.clone(),
@@ -76,7 +72,11 @@ fn variables(model: &Model) -> Variables {
     Variables { count: model.densities.len() * count, names }
 }
 
-fn bind_density(entry: &DensityEntry, context: &Context, dimensions: usize) -> Result<WeightedDensity, FileError> {
+fn bind_density(
+    entry: &DensityEntry,
+    context: &Context,
+    dimensions: usize,
+) -> Result<WeightedDensity, FileError> {
     let (constants, source) = (&context.constants, context.source);
     let range = entry.range.positive(constants, source)?;
     let correction = entry
@@ -86,10 +86,8 @@ fn bind_density(entry: &DensityEntry, context: &Context, dimensions: usize) -> R
             if coefficients.is_empty() {
                 return Ok(Polynomial::identity());
             }
-            let values: Result<Vec<f64>, FileError> = coefficients
-                .iter()
-                .map(|c| c.evaluate(constants, source).map(|x| x.value))
-                .collect();
+            let values: Result<Vec<f64>, FileError> =
+                coefficients.iter().map(|c| c.evaluate(constants, source).map(|x| x.value)).collect();
             values.map(Polynomial)
         })
         .collect::<Result<Vec<_>, _>>()?;
@@ -102,7 +100,10 @@ fn bind_density(entry: &DensityEntry, context: &Context, dimensions: usize) -> R
             if low.value >= high.value {
                 return Err(low.error(
                     source,
-                    FileErrorKind::Value(format!("the lower bound {} is not below the upper {}", low.value, high.value)),
+                    FileErrorKind::Value(format!(
+                        "the lower bound {} is not below the upper {}",
+                        low.value, high.value
+                    )),
                 ));
             }
             Some([low.value, high.value])
@@ -138,7 +139,10 @@ fn bind_pair(entry: &PairEntry, context: &Context) -> Result<PairTerm, FileError
             let variables = Variables { count: 1, names: BTreeMap::from([("r".to_owned(), vec![0])]) };
             let range = range.positive(constants, source)?;
             Formula::compile(&phi.value, constants, &variables)
-                .and_then(|formula| ExpressionPair::new(&formula, range))
+                .and_then(|formula| {
+                    let whole = |e| ExpressionError { kind: ErrorKind::TooLarge(e), offset: 0, length: 0 };
+                    ExpressionPair::new(&formula, range).map_err(whole)
+                })
                 .map(PairPotential::Expression)
                 .map_err(|e| formula_error(source, phi, e))?
         }
@@ -146,25 +150,28 @@ fn bind_pair(entry: &PairEntry, context: &Context) -> Result<PairTerm, FileError
     Ok(PairTerm { between: entry.between, potential })
 }
 
-fn bind_thermostats(entries: &[ThermostatEntry], context: &Context) -> Result<Vec<Option<Thermostat>>, FileError> {
+fn bind_thermostats(
+    entries: &[ThermostatEntry],
+    context: &Context,
+) -> Result<Vec<Option<Thermostat>>, FileError> {
     let (constants, source) = (&context.constants, context.source);
     let count = context.species;
     let mut all = vec![None; count * count];
     // The entry for every pair first, so that particular ones replace it.
-    let ordered = entries
-        .iter()
-        .filter(|e| e.between.is_none())
-        .chain(entries.iter().filter(|e| e.between.is_some()));
+    let ordered =
+        entries.iter().filter(|e| e.between.is_none()).chain(entries.iter().filter(|e| e.between.is_some()));
     for entry in ordered {
         let gamma = entry.gamma.evaluate(constants, source)?;
         if gamma.value < 0.0 {
-            return Err(gamma.error(source, FileErrorKind::Value(format!("must not be negative, is {}", gamma.value))));
+            return Err(gamma
+                .error(source, FileErrorKind::Value(format!("must not be negative, is {}", gamma.value))));
         }
         let exponent = match &entry.exponent {
             Some(number) => number.positive(constants, source)?,
             None => 1.0,
         };
-        let thermostat = Thermostat { gamma: gamma.value, range: entry.range.positive(constants, source)?, exponent };
+        let thermostat =
+            Thermostat { gamma: gamma.value, range: entry.range.positive(constants, source)?, exponent };
         match entry.between {
             None => all.fill(Some(thermostat)),
             Some([a, b]) => {

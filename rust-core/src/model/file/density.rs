@@ -74,13 +74,17 @@ fn read_one(name: Located<String>, table: &Section, species: &[String]) -> Resul
 }
 
 /// One polynomial for all pairs of species, or a table of `"A|B"`: the density of A felt by B.
-fn read_correction(value: &Value, table: &Section, species: &[String]) -> Result<Vec<Vec<Number>>, FileError> {
+fn read_correction(
+    value: &Value,
+    table: &Section,
+    species: &[String],
+) -> Result<Vec<Vec<Number>>, FileError> {
     let coefficients = |value: &Value| -> Result<Vec<Number>, FileError> {
         let items = value.array()?;
         if items.is_empty() || items.len() > 16 {
-            return Err(value.error(FileErrorKind::Value(
-                "expected 1 to 16 coefficients in ascending powers".into(),
-            )));
+            return Err(
+                value.error(FileErrorKind::Value("expected 1 to 16 coefficients in ascending powers".into()))
+            );
         }
         items.iter().map(|item| Number::read(item, table.source())).collect()
     };
@@ -102,7 +106,8 @@ fn read_correction(value: &Value, table: &Section, species: &[String]) -> Result
                 FileErrorKind::Value("expected \"A|B\", the density of A felt by B".into()),
             ));
         };
-        let index = |name: &str| species_index(species, &key.clone().map(|_| name.trim().to_owned()), table.source());
+        let index =
+            |name: &str| species_index(species, &key.clone().map(|_| name.trim().to_owned()), table.source());
         all[index(by)? * count + index(of)?] = coefficients(&value)?;
     }
     Ok(all)
@@ -131,7 +136,9 @@ fn check_clashes(
         None => Ok(()),
         Some(taken) => Err(name.error(
             section.source(),
-            FileErrorKind::Value(format!("its variable {taken} has the name of another variable or parameter")),
+            FileErrorKind::Value(format!(
+                "its variable {taken} has the name of another variable or parameter"
+            )),
         )),
     }
 }

@@ -26,10 +26,7 @@ pub fn read(root: &Section, species: &Located<Vec<String>>) -> Result<Vec<Excess
     match all.iter().position(|e| matches!(e, ExcessEntry::None)) {
         None => Ok(all),
         Some(missing) => Err(section
-            .error(FileErrorKind::Value(format!(
-                "species {} has no entry",
-                species.value[missing]
-            )))
+            .error(FileErrorKind::Value(format!("species {} has no entry", species.value[missing])))
             .with_help(format!("write {} = \"0\" if it has none", species.value[missing]))),
     }
 }

@@ -35,10 +35,7 @@ fn read_between(value: &Value, species: &[String], source: &Arc<Source>) -> Resu
     let [a, b] = items.as_slice() else {
         return Err(value.error(FileErrorKind::Value("expected two species".into())));
     };
-    Ok([
-        species_index(species, &a.string()?, source)?,
-        species_index(species, &b.string()?, source)?,
-    ])
+    Ok([species_index(species, &a.string()?, source)?, species_index(species, &b.string()?, source)?])
 }
 
 /// Reads every `[[pair]]`.
@@ -103,7 +100,9 @@ pub fn read_thermostats(root: &Section, species: &[String]) -> Result<Vec<Thermo
             _ => false,
         });
         if twice {
-            return Err(table.error(FileErrorKind::Value("this pair of species has a thermostat already".into())));
+            return Err(
+                table.error(FileErrorKind::Value("this pair of species has a thermostat already".into()))
+            );
         }
         entries.push(ThermostatEntry {
             between,
@@ -140,7 +139,8 @@ pub fn check_coverage(source: &Arc<Source>, fluid: &Fluid) -> Result<(), FileErr
         }
     }
     let nothing = coupled.iter().all(|c| !c);
-    let missing = |table: &[bool]| (0..count).find_map(|a| (a..count).find(|b| !table[a * count + b]).map(|b| (a, b)));
+    let missing =
+        |table: &[bool]| (0..count).find_map(|a| (a..count).find(|b| !table[a * count + b]).map(|b| (a, b)));
     let whole = |key: &str, message: String, help: String| {
         Err(FileError::new(source, 0..0, key, FileErrorKind::Value(message)).with_help(help))
     };

@@ -133,7 +133,11 @@ fn read_dimensions(root: &Section) -> Result<usize, FileError> {
 }
 
 /// The index of a species by its name.
-fn species_index(species: &[String], name: &Located<String>, source: &Arc<Source>) -> Result<usize, FileError> {
+fn species_index(
+    species: &[String],
+    name: &Located<String>,
+    source: &Arc<Source>,
+) -> Result<usize, FileError> {
     species.iter().position(|s| *s == name.value).ok_or_else(|| {
         name.error(
             source,

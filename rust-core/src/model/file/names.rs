@@ -1,9 +1,7 @@
 use crate::document::{FileError, FileErrorKind, Located, Section};
 
 /// The functions of formulas; no parameter, density or species may take such a name.
-pub const KNOWN_FUNCTIONS: &[&str] = &[
-    "ln", "log", "exp", "sqrt", "sin", "cos", "tanh", "abs", "min", "max",
-];
+pub const KNOWN_FUNCTIONS: &[&str] = &["ln", "log", "exp", "sqrt", "sin", "cos", "tanh", "abs", "min", "max"];
 
 /// Most species a model may have: every pair of them is stored.
 const MOST_SPECIES: usize = 64;
@@ -25,9 +23,8 @@ pub fn read_species(root: &Section) -> Result<Located<Vec<String>>, FileError> {
             ))));
         }
         if name == "NULL" {
-            return Err(item.error(FileErrorKind::Value(
-                "NULL is what pair_coeff calls a type without species".into(),
-            )));
+            return Err(item
+                .error(FileErrorKind::Value("NULL is what pair_coeff calls a type without species".into())));
         }
         if names.contains(&name) {
             return Err(item.error(FileErrorKind::Value(format!("\"{name}\" is named twice"))));

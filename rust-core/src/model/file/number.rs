@@ -34,7 +34,11 @@ impl Number {
     }
 
     /// Its value with the constants put in.
-    pub fn evaluate(&self, constants: &BTreeMap<String, f64>, source: &Arc<Source>) -> Result<Located<f64>, FileError> {
+    pub fn evaluate(
+        &self,
+        constants: &BTreeMap<String, f64>,
+        source: &Arc<Source>,
+    ) -> Result<Located<f64>, FileError> {
         match self {
             Number::Value(value) => Ok(value.clone()),
             Number::Formula(ast) => {
@@ -43,7 +47,9 @@ impl Number {
                 // Without variables a formula always folds to a number.
                 let value = formula.value(&[]);
                 if !value.is_finite() {
-                    return Err(ast.error(source, FileErrorKind::Value(format!("is {value}, not a finite number"))));
+                    return Err(
+                        ast.error(source, FileErrorKind::Value(format!("is {value}, not a finite number")))
+                    );
                 }
                 Ok(Located { value, span: ast.span.clone(), key: ast.key.clone() })
             }
@@ -51,7 +57,11 @@ impl Number {
     }
 
     /// Its value, which must be positive.
-    pub fn positive(&self, constants: &BTreeMap<String, f64>, source: &Arc<Source>) -> Result<f64, FileError> {
+    pub fn positive(
+        &self,
+        constants: &BTreeMap<String, f64>,
+        source: &Arc<Source>,
+    ) -> Result<f64, FileError> {
         let number = self.evaluate(constants, source)?;
         if number.value > 0.0 {
             Ok(number.value)
@@ -126,11 +136,9 @@ pub fn read_parameters(root: &Section) -> Result<BTreeMap<String, f64>, FileErro
         for (name, number) in waiting {
             let ready = match &number {
                 Number::Value(_) => true,
-                Number::Formula(ast) => ast
-                    .value
-                    .names()
-                    .iter()
-                    .all(|(n, _)| known.contains_key(*n) || !names.iter().any(|m| m == n)),
+                Number::Formula(ast) => {
+                    ast.value.names().all(|(n, _)| known.contains_key(n) || !names.iter().any(|m| m == n))
+                }
             };
             if ready {
                 let value = number.evaluate(&known, source)?.value;

@@ -102,12 +102,7 @@ impl Kernel {
         }
         debug_assert!(dimensions == 2 || dimensions == 3);
         let factor = kind.visit(Factor(dimensions)) / range.powi(dimensions as i32);
-        Kernel {
-            kind,
-            range,
-            value_factor: factor,
-            slope_factor: factor / range,
-        }
+        Kernel { kind, range, value_factor: factor, slope_factor: factor / range }
     }
 
     /// Which shape.
@@ -139,11 +134,7 @@ impl Kernel {
                 S::value(self.0)
             }
         }
-        if r < self.range {
-            self.value_factor * self.kind.visit(At(r / self.range))
-        } else {
-            0.0
-        }
+        if r < self.range { self.value_factor * self.kind.visit(At(r / self.range)) } else { 0.0 }
     }
 
     /// `w'(r)`, never positive for the kernels here.
@@ -155,11 +146,7 @@ impl Kernel {
                 S::slope(self.0)
             }
         }
-        if r < self.range {
-            self.slope_factor * self.kind.visit(At(r / self.range))
-        } else {
-            0.0
-        }
+        if r < self.range { self.slope_factor * self.kind.visit(At(r / self.range)) } else { 0.0 }
     }
 }
 
@@ -220,11 +207,7 @@ mod tests {
                 }
                 let h = 1e-6;
                 let numeric = (w.value(r + h) - w.value(r - h)) / (2.0 * h);
-                assert!(
-                    (numeric - w.slope(r)).abs() < 1e-7 * w.slope_factor(),
-                    "{} at {r}",
-                    kind.name()
-                );
+                assert!((numeric - w.slope(r)).abs() < 1e-7 * w.slope_factor(), "{} at {r}", kind.name());
             }
         }
     }

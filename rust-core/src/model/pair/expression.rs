@@ -1,5 +1,5 @@
 use super::PairForm;
-use crate::model::expression::{ExpressionError, Formula, Program};
+use crate::model::expression::{Formula, Program, TooLarge};
 
 /// A potential written as a formula of `r`; not shifted, so it should vanish at its range.
 #[derive(Debug, Clone)]
@@ -14,12 +14,9 @@ const LANES: usize = 64;
 
 impl ExpressionPair {
     /// `φ` as a formula whose variable 0 is `r`, cut at `range`.
-    pub fn new(phi: &Formula, range: f64) -> Result<ExpressionPair, ExpressionError> {
+    pub fn new(phi: &Formula, range: f64) -> Result<ExpressionPair, TooLarge> {
         let slope = phi.derivative(0)?;
-        Ok(ExpressionPair {
-            program: Program::new(&[phi, &slope]),
-            range,
-        })
+        Ok(ExpressionPair { program: Program::new(&[phi, &slope]), range })
     }
 }
 
@@ -37,11 +34,7 @@ impl PairForm for ExpressionPair {
     fn block(&self, r: &[f64], phi: &mut [f64], slope: &mut [f64]) {
         let mut work = Vec::new();
         let mut out = [0.0; 2 * LANES];
-        for ((r, phi), slope) in r
-            .chunks(LANES)
-            .zip(phi.chunks_mut(LANES))
-            .zip(slope.chunks_mut(LANES))
-        {
+        for ((r, phi), slope) in r.chunks(LANES).zip(phi.chunks_mut(LANES)).zip(slope.chunks_mut(LANES)) {
             let lanes = r.len();
             let out = &mut out[..2 * lanes];
             self.program.eval_block(lanes, r, out, &mut work);

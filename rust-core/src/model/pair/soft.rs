@@ -29,9 +29,6 @@ impl PairForm for Soft {
     #[inline(always)]
     fn at(&self, r: f64) -> (f64, f64) {
         let t = 1.0 - r / self.range;
-        (
-            0.5 * self.strength * self.range * t * t,
-            -self.strength * t,
-        )
+        (0.5 * self.strength * self.range * t * t, -self.strength * t)
     }
 }

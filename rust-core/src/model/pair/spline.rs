@@ -16,11 +16,7 @@ pub struct SplineAttractive {
 #[inline(always)]
 pub fn spline_shape(r: f64, range: f64) -> (f64, f64) {
     let s = r / range;
-    if s < 1.0 {
-        (CubicSpline::value(s), CubicSpline::slope(s) / range)
-    } else {
-        (0.0, 0.0)
-    }
+    if s < 1.0 { (CubicSpline::value(s), CubicSpline::slope(s) / range) } else { (0.0, 0.0) }
 }
 
 impl SplineAttractive {
@@ -50,9 +46,6 @@ impl PairForm for SplineAttractive {
     fn at(&self, r: f64) -> (f64, f64) {
         let (wa, da) = spline_shape(r, self.repulsion_range);
         let (wb, db) = spline_shape(r, self.attraction_range);
-        (
-            self.repulsion * wa - self.attraction * wb,
-            self.repulsion * da - self.attraction * db,
-        )
+        (self.repulsion * wa - self.attraction * wb, self.repulsion * da - self.attraction * db)
     }
 }
