@@ -1,1 +1,14 @@
-//! LAMMPS pair styles.
+//! psidpd pair styles for LAMMPS: `dpd/psi` and `mdpd/psi`, loaded with `plugin load`.
+//!
+//! - [`style`]: what a pair style asks of the engine, in safe Rust;
+//! - [`bridge`]: the same for C++, by cxx: slices, strings and exceptions, checked at compile time;
+//! - `cpp/`: the pair styles that LAMMPS sees, compiled against the headers of one LAMMPS;
+//! - `entry`: `lammpsplugin_init`, which compares that LAMMPS with the one that loads the plugin.
+//!
+//! The styles need no neighbour list: the engine keeps its own cells.
+
+pub mod bridge;
+pub mod style;
+
+#[cfg(lammps_host)]
+mod entry;

@@ -1,0 +1,41 @@
+//! Compiles the C++ pair styles against one LAMMPS.
+//!
+//! Without `PSIDPD_LAMMPS_INCLUDE` no LAMMPS is at hand: only the Rust side is built, so that the
+//! workspace builds and tests anywhere, and the library has no `lammpsplugin_init`.
+
+use std::env;
+use std::path::PathBuf;
+
+fn main() {
+    println!("cargo::rustc-check-cfg=cfg(lammps_host)");
+    for name in ["PSIDPD_LAMMPS_INCLUDE", "PSIDPD_MPI_INCLUDE", "PSIDPD_LAMMPS_VERSION"] {
+        println!("cargo::rerun-if-env-changed={name}");
+    }
+    println!("cargo::rerun-if-changed=cpp");
+    let Some(lammps) = env::var_os("PSIDPD_LAMMPS_INCLUDE").map(PathBuf::from) else {
+        return;
+    };
+    let version = env::var("PSIDPD_LAMMPS_VERSION")
+        .ok()
+        .filter(|v| v.parse::<u32>().is_ok())
+        .expect("PSIDPD_LAMMPS_VERSION: the number that lammps_version() of the host returns, like 20250722");
+    println!("cargo::rustc-cfg=lammps_host");
+    println!("cargo::rustc-env=PSIDPD_LAMMPS_VERSION={version}");
+    // LAMMPS really unloads plugins, and a Rust library must not be.
+    println!("cargo::rustc-link-arg-cdylib=-Wl,-z,nodelete");
+
+    let mut build = cxx_build::bridge("src/bridge.rs");
+    build
+        .files(["cpp/pair_psi.cpp", "cpp/pair_dpd_psi.cpp", "cpp/pair_mdpd_psi.cpp"])
+        .include("cpp")
+        .std("c++17")
+        .define("LAMMPS_SMALLBIG", None)
+        .define("MPICH_SKIP_MPICXX", None)
+        .define("OMPI_SKIP_MPICXX", None);
+    // The host's headers are not ours to warn about.
+    build.flag("-isystem").flag(lammps.as_os_str());
+    if let Some(mpi) = env::var_os("PSIDPD_MPI_INCLUDE") {
+        build.flag("-isystem").flag(&mpi);
+    }
+    build.compile("psidpd_lammps_styles");
+}

@@ -1,0 +1,230 @@
+//! One pair style's engine, and the mapping from LAMMPS's types to species.
+
+use psidpd_core::engine::{Engine, EngineError, Newton, Particles, Step, Tally, Want};
+use psidpd_core::model::{ForceLaw, Model, WarrenPair, warren_ab};
+use std::fmt::Write;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+
+/// What goes wrong, as the text that LAMMPS prints.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{0}")]
+pub struct StyleError(String);
+
+impl From<EngineError> for StyleError {
+    fn from(error: EngineError) -> StyleError {
+        StyleError(error.to_string())
+    }
+}
+
+/// A model at the style's temperature, ready to compute.
+#[derive(Debug)]
+pub struct Style {
+    engine: Engine,
+    title: String,
+    reference: Option<String>,
+    source: String,
+}
+
+/// Runs `work` and turns a panic into an error: nothing may unwind into LAMMPS.
+fn guard<T>(work: impl FnOnce() -> Result<T, StyleError>) -> Result<T, StyleError> {
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
+        let text = panic
+            .downcast_ref::<String>()
+            .cloned()
+            .or_else(|| panic.downcast_ref::<&str>().map(|s| (*s).to_owned()))
+            .unwrap_or_else(|| "unknown cause".to_owned());
+        Err(StyleError(format!("internal error, please report it: {text}")))
+    })
+}
+
+/// Three numbers per particle, as LAMMPS stores them.
+fn triples(flat: &[f64]) -> &[[f64; 3]] {
+    flat.as_chunks::<3>().0
+}
+
+impl Style {
+    /// Reads a model file. `names` has the species of each LAMMPS type, in order, or `NULL` for types
+    /// that another style of a hybrid computes.
+    ///
+    /// # Errors
+    /// Anything wrong in the file, its dimensions, or the names.
+    pub fn from_file(path: &str, kt: f64, names: &[String], dimensions: usize) -> Result<Style, StyleError> {
+        guard(|| {
+            let model = Model::open(Path::new(path)).map_err(|e| StyleError(e.to_string()))?;
+            Style::new(&model, kt, names, dimensions)
+        })
+    }
+
+    /// Warren's A/B model of the coefficients of LAMMPS's `mdpd`; `pairs` is a row-major table over
+    /// types of which the upper triangle is read.
+    ///
+    /// # Errors
+    /// Coefficients that make no model.
+    pub fn from_coefficients(
+        kt: f64,
+        pairs: &[Option<WarrenPair>],
+        types: usize,
+        dimensions: usize,
+        law: ForceLaw,
+    ) -> Result<Style, StyleError> {
+        guard(|| {
+            let names: Vec<String> = (1..=types).map(|t| format!("T{t}")).collect();
+            let model = warren_ab(&names, pairs, dimensions, law).map_err(|e| StyleError(e.to_string()))?;
+            Style::new(&model, kt, &names, dimensions)
+        })
+    }
+
+    fn new(model: &Model, kt: f64, names: &[String], dimensions: usize) -> Result<Style, StyleError> {
+        if model.dimensions() != dimensions {
+            return Err(StyleError(format!(
+                "{}: the model has dimensions = {}, the simulation has {dimensions}",
+                model.source().name(),
+                model.dimensions()
+            )));
+        }
+        // LAMMPS counts types from 1.
+        let mut kinds = vec![-1];
+        for name in names {
+            let species = model.species().iter().position(|s| s == name);
+            match species {
+                Some(index) => kinds.push(index as i32),
+                None if name == "NULL" => kinds.push(-1),
+                None => {
+                    return Err(StyleError(format!(
+                        "{}: no species \"{name}\"; the model has {}",
+                        model.source().name(),
+                        model.species().join(", ")
+                    )));
+                }
+            }
+        }
+        let fluid = model.at(kt).map_err(|e| StyleError(e.to_string()))?;
+        let mut engine = Engine::new(&fluid).map_err(|e| StyleError(e.to_string()))?;
+        engine.map_kinds(&kinds)?;
+        Ok(Style {
+            engine,
+            title: model.title().to_owned(),
+            reference: model.reference().map(str::to_owned),
+            source: model.source().name().to_owned(),
+        })
+    }
+
+    /// The engine.
+    pub fn engine(&self) -> &Engine {
+        &self.engine
+    }
+
+    /// For the log: what is computed, and what its letters mean.
+    pub fn description(&self) -> String {
+        let mut text = String::new();
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "psidpd: {} ({})", self.title, self.source);
+        if let Some(reference) = &self.reference {
+            let _ = writeln!(text, "  reference     {reference}");
+        }
+        for line in self.engine.plan().to_string().lines() {
+            let _ = writeln!(text, "  {line}");
+        }
+        if !self.engine.plan().is_conservative() {
+            text.push_str(
+                "  WARNING       this force law has no potential: it does work around closed loops and heats \
+                 the fluid; the energy printed is not that of the forces\n",
+            );
+        }
+        text.push_str(
+            "  conventions   number densities, [w] = 1, no self term unless the model says so; \
+             F = -dU/dr with U = sum psi + sum phi; drag sees the half-step velocity\n\
+             \x20 search        own cell list every step; no neighbor list is requested\n",
+        );
+        text
+    }
+
+    /// Densities, ψ and slopes of the `owned` first particles of arrays as LAMMPS has them.
+    ///
+    /// # Errors
+    /// As [`Engine::densities`].
+    pub fn densities(
+        &mut self,
+        owned: usize,
+        x: &[f64],
+        tag: &[i32],
+        kind: &[i32],
+        newton: bool,
+    ) -> Result<(), StyleError> {
+        guard(|| {
+            let newton = if newton { Newton::On } else { Newton::Off };
+            let particles = Particles { owned, x: triples(x), tag, kind };
+            Ok(self.engine.densities(&particles, newton)?)
+        })
+    }
+
+    /// `∂ψ/∂n` of owned particles, then room for ghosts.
+    pub fn slopes_mut(&mut self) -> &mut [f64] {
+        self.engine.slopes_mut()
+    }
+
+    /// Adds forces to `f`.
+    ///
+    /// # Errors
+    /// As [`Engine::forces`].
+    #[allow(clippy::too_many_arguments)]
+    pub fn forces(
+        &mut self,
+        owned: usize,
+        x: &[f64],
+        v: &[f64],
+        tag: &[i32],
+        kind: &[i32],
+        step: Option<Step>,
+        want: Want,
+        f: &mut [f64],
+    ) -> Result<Tally, StyleError> {
+        guard(|| {
+            let particles = Particles { owned, x: triples(x), tag, kind };
+            let force = f.as_chunks_mut::<3>().0;
+            Ok(self.engine.forces(&particles, triples(v), step, want, force)?)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MODEL: &str = "title = \"t\"\nspecies = [\"A\", \"B\"]\n[[pair]]\nbetween = [\"A\", \"B\"]\n\
+        form = \"soft\"\nstrength = 25\nrange = 1\n[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\n\
+        strength = 25\nrange = 1\n[[pair]]\nbetween = [\"B\", \"B\"]\nform = \"soft\"\nstrength = 25\nrange = 1\n";
+
+    fn style(names: &[&str], dimensions: usize) -> Result<Style, StyleError> {
+        let names: Vec<String> = names.iter().map(|s| (*s).to_owned()).collect();
+        Style::new(&Model::parse("m.toml", MODEL).unwrap(), 1.0, &names, dimensions)
+    }
+
+    #[test]
+    fn types_map_to_species_by_name() {
+        let mut s = style(&["B", "NULL", "A"], 3).unwrap();
+        let x = [0.0, 0.0, 0.0, 0.5, 0.0, 0.0];
+        let mut f = [0.0; 6];
+        s.densities(2, &x, &[1, 2], &[1, 2], true).unwrap();
+        s.forces(2, &x, &[], &[1, 2], &[1, 2], None, Want::FORCES, &mut f).unwrap();
+        assert_eq!(f, [0.0; 6]);
+        s.densities(2, &x, &[1, 2], &[1, 3], true).unwrap();
+        s.forces(2, &x, &[], &[1, 2], &[1, 3], None, Want::FORCES, &mut f).unwrap();
+        assert_eq!(f, [-12.5, 0.0, 0.0, 12.5, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn mistakes_are_named() {
+        assert!(style(&["C"], 3).unwrap_err().to_string().contains("no species \"C\"; the model has A, B"));
+        assert!(style(&["A"], 2).unwrap_err().to_string().contains("dimensions = 3, the simulation has 2"));
+        let missing = Style::from_file("nowhere.toml", 1.0, &[], 3).unwrap_err();
+        assert!(missing.to_string().contains("nowhere.toml: cannot be read"), "{missing}");
+    }
+
+    #[test]
+    fn panics_become_errors() {
+        let error = guard::<()>(|| panic!("lost {}", 7)).unwrap_err();
+        assert!(error.to_string().contains("internal error, please report it: lost 7"));
+    }
+}
