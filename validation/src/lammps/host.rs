@@ -1,5 +1,6 @@
 //! Where the parts of an installed LAMMPS are, and running it as a program.
 
+use std::collections::HashSet;
 use std::ffi::OsString;
 use std::fs;
 use std::io::Read;
@@ -9,7 +10,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::{Duration, Instant};
 
-use rustix::process::{Pid, Signal, kill_process_group};
+use rustix::process::{Pid, Signal, kill_process, kill_process_group};
 
 use super::error::{LammpsError, tail};
 use super::install;
@@ -272,8 +273,11 @@ fn run_limited(command: &mut Command, limit: Duration) -> Result<Limited, Lammps
     })
 }
 
-/// Stops a process group: first asks (an MPI launcher then stops its ranks), then insists.
+/// Stops a process and all it has started: first asks (an MPI launcher then stops its ranks), then insists.
 fn stop(child: &mut Child) {
+    // The ranks of an MPI run have process groups of their own, so the group of the launcher is not all.
+    let family = descendants(child.id());
+    let shared: HashSet<PathBuf> = family.iter().flat_map(|p| shared_memory(p.id)).collect();
     let group = i32::try_from(child.id()).ok().and_then(Pid::from_raw);
     let send = |signal| {
         if let Some(group) = group {
@@ -289,7 +293,68 @@ fn stop(child: &mut Child) {
         std::thread::sleep(Duration::from_millis(20));
     }
     send(Signal::KILL);
+    for process in &family {
+        // The number may belong to another process by now.
+        let same = Process::read(process.id).is_some_and(|now| now.started == process.started);
+        if let (true, Some(pid)) = (same, Pid::from_raw(process.id as i32)) {
+            let _ = kill_process(pid, Signal::KILL);
+        }
+    }
     let _ = child.wait();
+    // What MPICH removes when a run ends by itself.
+    for path in shared {
+        let _ = fs::remove_file(path);
+    }
+}
+
+/// A process as /proc shows it.
+struct Process {
+    id: u32,
+    parent: u32,
+    started: u64,
+}
+
+impl Process {
+    fn read(id: u32) -> Option<Process> {
+        let stat = fs::read_to_string(format!("/proc/{id}/stat")).ok()?;
+        // The name, in parentheses, may hold anything.
+        let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
+        Some(Process {
+            id,
+            parent: fields.get(1)?.parse().ok()?,
+            started: fields.get(19)?.parse().ok()?,
+        })
+    }
+}
+
+/// A process and all that it has started, directly or not.
+fn descendants(root: u32) -> Vec<Process> {
+    let Ok(entries) = fs::read_dir("/proc") else {
+        return Vec::new();
+    };
+    let ids = entries.filter_map(|e| e.ok()?.file_name().to_str()?.parse().ok());
+    let mut others: Vec<Process> = ids.filter_map(Process::read).collect();
+    let mut family = Vec::new();
+    let mut parents = HashSet::from([root]);
+    loop {
+        let is_new = |p: &mut Process| p.id == root || parents.contains(&p.parent);
+        let found: Vec<Process> = others.extract_if(.., is_new).collect();
+        if found.is_empty() {
+            return family;
+        }
+        parents.extend(found.iter().map(|p| p.id));
+        family.extend(found);
+    }
+}
+
+/// Files of MPICH's shared memory that a process uses.
+fn shared_memory(id: u32) -> HashSet<PathBuf> {
+    let maps = fs::read_to_string(format!("/proc/{id}/maps")).unwrap_or_default();
+    maps.lines()
+        .filter_map(|line| line.find("/dev/shm/mpich_shm_").map(|at| &line[at..]))
+        .filter(|path| !path.contains(' '))
+        .map(PathBuf::from)
+        .collect()
 }
 
 /// LAMMPS's error messages in its output, each once; the end of the output if there are none.
@@ -402,10 +467,12 @@ mod tests {
     fn a_run_that_takes_too_long_is_stopped_with_its_children() {
         let start = Instant::now();
         let mut command = Command::new("sh");
-        command.args(["-c", "echo begun; sleep 60 & wait"]);
+        // Deaf to the request, with a child in a session of its own.
+        let script = "trap '' TERM; echo begun; setsid sh -c \"trap '' TERM; sleep 60\"; sleep 60";
+        command.args(["-c", script]);
         let run = run_limited(&mut command, Duration::from_millis(300)).unwrap();
         assert!(run.status.is_none() && run.stdout == "begun\n");
-        assert!(start.elapsed() < Duration::from_secs(4));
+        assert!(start.elapsed() < Duration::from_secs(6));
     }
 
     #[test]
