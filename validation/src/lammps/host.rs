@@ -258,6 +258,10 @@ fn run_limited(command: &mut Command, limit: Duration) -> Result<Limited, Lammps
         pause = (pause * 2).min(Duration::from_millis(20));
     };
     let elapsed = start.elapsed();
+    if status.is_some_and(|s| !s.success()) {
+        // What MPICH leaves behind when a program on one rank aborts; under a launcher it cleans up itself.
+        let _ = fs::remove_file(format!("/dev/shm/mpich_shm_{:x}_0", child.id()));
+    }
     // Both pipes end with the processes; a stray process that keeps one open shall not keep us.
     for _ in 0..2 {
         let _ = ended.recv_timeout(Duration::from_secs(5));
