@@ -55,10 +55,7 @@ pub struct Drift {
 /// [`estimate`] refuses.
 pub fn drift(times: &[f64], values: &[f64]) -> Result<Drift, DriftError> {
     if times.len() != values.len() {
-        return Err(DriftError::Lengths {
-            times: times.len(),
-            values: values.len(),
-        });
+        return Err(DriftError::Lengths { times: times.len(), values: values.len() });
     }
     let mean = estimate(values)?.mean;
     let mut before = f64::NEG_INFINITY;
@@ -77,11 +74,8 @@ pub fn drift(times: &[f64], values: &[f64]) -> Result<Drift, DriftError> {
         tx += (t - middle) * (x - mean);
     }
     let slope = tx / tt;
-    let residuals: Vec<f64> = times
-        .iter()
-        .zip(values)
-        .map(|(t, x)| (x - mean) - slope * (t - middle))
-        .collect();
+    let residuals: Vec<f64> =
+        times.iter().zip(values).map(|(t, x)| (x - mean) - slope * (t - middle)).collect();
     if !(tt.is_finite() && slope.is_finite() && residuals.iter().all(|r| r.is_finite())) {
         return Err(StatisticsError::Overflow.into());
     }
@@ -139,21 +133,9 @@ mod tests {
     #[test]
     fn bad_series_are_refused() {
         let times: Vec<f64> = (0..10).map(f64::from).collect();
-        assert_eq!(
-            drift(&times, &[0.0; 9]),
-            Err(DriftError::Lengths {
-                times: 10,
-                values: 9
-            })
-        );
-        assert_eq!(
-            drift(&[0.0; 10], &[0.0; 10]),
-            Err(DriftError::Times { index: 1 })
-        );
-        assert!(matches!(
-            drift(&times, &[f64::NAN; 10]),
-            Err(DriftError::Values(_))
-        ));
+        assert_eq!(drift(&times, &[0.0; 9]), Err(DriftError::Lengths { times: 10, values: 9 }));
+        assert_eq!(drift(&[0.0; 10], &[0.0; 10]), Err(DriftError::Times { index: 1 }));
+        assert!(matches!(drift(&times, &[f64::NAN; 10]), Err(DriftError::Values(_))));
         assert!(drift(&[], &[]).is_err());
         let huge: Vec<f64> = times.iter().map(|t| t * 1e200).collect();
         assert!(drift(&huge, &times).is_err());

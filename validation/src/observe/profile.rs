@@ -88,12 +88,7 @@ impl ProfileAccumulator {
         if bins == 0 || bins > MAXIMUM_BINS {
             return Err(ProfileError::Bins(bins));
         }
-        Ok(Self {
-            length,
-            bins,
-            area,
-            frames: Vec::new(),
-        })
+        Ok(Self { length, bins, area, frames: Vec::new() })
     }
 
     /// Adds a frame, the `z` (r_c) of all its particles, wrapped or not.
@@ -174,11 +169,7 @@ impl ProfileAccumulator {
     /// L/2 counts as L/2; one that is not positive gives no densities.
     #[must_use]
     pub fn liquid_density(&self, half_width: f64) -> Vec<f64> {
-        if half_width > 0.0 {
-            self.densities(0.0, half_width)
-        } else {
-            Vec::new()
-        }
+        if half_width > 0.0 { self.densities(0.0, half_width) } else { Vec::new() }
     }
 
     /// Number density (r_c⁻³) of each frame farther than `distance` (r_c) from
@@ -189,11 +180,7 @@ impl ProfileAccumulator {
     /// densities.
     #[must_use]
     pub fn vapour_density(&self, distance: f64) -> Vec<f64> {
-        if distance < 0.5 * self.length {
-            self.densities(distance, 0.5 * self.length)
-        } else {
-            Vec::new()
-        }
+        if distance < 0.5 * self.length { self.densities(distance, 0.5 * self.length) } else { Vec::new() }
     }
 
     /// Density of each frame at inner < |z| < outer.
@@ -228,11 +215,7 @@ fn mean_and_error(counts: &[f64]) -> Result<(f64, f64), StatisticsError> {
     }
     let mean = counts.iter().sum::<f64>() / frames;
     let squares: f64 = counts.iter().map(|n| (n - mean) * (n - mean)).sum();
-    let error = if counts.len() > 1 {
-        (squares / (frames * (frames - 1.0))).sqrt()
-    } else {
-        mean.sqrt()
-    };
+    let error = if counts.len() > 1 { (squares / (frames * (frames - 1.0))).sqrt() } else { mean.sqrt() };
     Ok((mean, error))
 }
 
@@ -291,10 +274,7 @@ fn flank_width(points: &[(f64, f64)], height: f64) -> Option<f64> {
     if scale == 0.0 {
         return None;
     }
-    let scaled: Vec<(f64, f64)> = points
-        .iter()
-        .map(|(s, rho)| (s / height, rho / scale))
-        .collect();
+    let scaled: Vec<(f64, f64)> = points.iter().map(|(s, rho)| (s / height, rho / scale)).collect();
     let extent = extent / height;
     let fit = fit_flank(&scaled, extent)?;
     let width = 2.0 * fit[3].exp();
@@ -360,12 +340,7 @@ fn linearise(points: &[(f64, f64)], p: &Vector4<f64>) -> (Matrix4<f64>, Vector4<
         let by_place = a.tanh() - b.tanh();
         let by_width = d * (rise - b * b.tanh() + a * a.tanh());
         let half = 0.5 * (p[0] - p[1]);
-        let row = Vector4::new(
-            0.5 * (1.0 - mean),
-            0.5 * (1.0 + mean),
-            -half * by_place,
-            -half * by_width,
-        );
+        let row = Vector4::new(0.5 * (1.0 - mean), 0.5 * (1.0 + mean), -half * by_place, -half * by_width);
         let residual = rho - (0.5 * (p[0] + p[1]) - half * mean);
         normal += row * row.transpose();
         gradient += row * residual;
@@ -434,23 +409,16 @@ mod tests {
     fn width_of_an_exact_profile() {
         for bins in [60, 101, 400] {
             let height = LENGTH / f64::from(bins);
-            let centres: Vec<f64> = (0..bins)
-                .map(|i| (f64::from(i) + 0.5) * height - 0.5 * LENGTH)
-                .collect();
+            let centres: Vec<f64> = (0..bins).map(|i| (f64::from(i) + 0.5) * height - 0.5 * LENGTH).collect();
             let rho = |z: f64| 3.0 - 2.9 * ((z.abs() - 5.2) / 0.7).tanh();
             let density = centres
                 .iter()
                 .map(|z| {
-                    let fine =
-                        (0..100).map(|k| rho(z + ((f64::from(k) + 0.5) / 100.0 - 0.5) * height));
+                    let fine = (0..100).map(|k| rho(z + ((f64::from(k) + 0.5) / 100.0 - 0.5) * height));
                     fine.sum::<f64>() / 100.0
                 })
                 .collect();
-            let profile = DensityProfile {
-                error: vec![0.0; centres.len()],
-                centres,
-                density,
-            };
+            let profile = DensityProfile { error: vec![0.0; centres.len()], centres, density };
             let width = interface_width(&profile).unwrap();
             assert!((width - 1.4).abs() < 1e-3, "{bins}: {width}");
         }
@@ -490,18 +458,12 @@ mod tests {
     fn bad_input_is_refused() {
         assert!(ProfileAccumulator::new(0.0, 10, 1.0).is_err());
         assert!(ProfileAccumulator::new(1.0, 10, f64::NAN).is_err());
-        assert_eq!(
-            ProfileAccumulator::new(1.0, 0, 1.0).err(),
-            Some(ProfileError::Bins(0))
-        );
+        assert_eq!(ProfileAccumulator::new(1.0, 0, 1.0).err(), Some(ProfileError::Bins(0)));
         let mut accumulator = ProfileAccumulator::new(4.0, 8, 1.0).unwrap();
         assert_eq!(accumulator.finish(), Err(ProfileError::NoFrames));
         assert_eq!(accumulator.add(&[]), Err(ProfileError::NoSlab));
         assert_eq!(accumulator.add(&[0.0, 2.0]), Err(ProfileError::NoSlab));
-        assert_eq!(
-            accumulator.add(&[0.0, f64::INFINITY]),
-            Err(ProfileError::NonFinite { index: 1 })
-        );
+        assert_eq!(accumulator.add(&[0.0, f64::INFINITY]), Err(ProfileError::NonFinite { index: 1 }));
         assert_eq!(accumulator.frames(), 0);
         accumulator.add(&[1e300, -1e300, 0.3, 0.4]).unwrap();
         assert!(accumulator.liquid_density(0.0).is_empty());

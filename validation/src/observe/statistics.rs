@@ -89,17 +89,8 @@ pub fn estimate(series: &[f64]) -> Result<Estimate, StatisticsError> {
     if !(error.is_finite() && variance.is_finite()) {
         return Err(StatisticsError::Overflow);
     }
-    let tau = if variance > 0.0 {
-        (0.5 * n * error * error / variance).max(0.5)
-    } else {
-        0.5
-    };
-    Ok(Estimate {
-        mean: deviations.mean,
-        error,
-        samples: series.len(),
-        tau,
-    })
+    let tau = if variance > 0.0 { (0.5 * n * error * error / variance).max(0.5) } else { 0.5 };
+    Ok(Estimate { mean: deviations.mean, error, samples: series.len(), tau })
 }
 
 /// Error of the mean from the integrated autocorrelation time,
@@ -167,11 +158,7 @@ impl Comparison {
 pub fn difference(a: &Estimate, b: &Estimate) -> Comparison {
     let delta = a.mean - b.mean;
     let error = a.error.hypot(b.error);
-    let z = if delta == 0.0 && error == 0.0 {
-        0.0
-    } else {
-        delta / error
-    };
+    let z = if delta == 0.0 && error == 0.0 { 0.0 } else { delta / error };
     let p_value = if z.is_nan() {
         f64::NAN
     } else if z == 0.0 {
@@ -185,12 +172,7 @@ pub fn difference(a: &Estimate, b: &Estimate) -> Comparison {
         let degrees = 1.0 / (share_a * share_a / free(a) + share_b * share_b / free(b));
         two_sided(z.abs(), degrees)
     };
-    Comparison {
-        delta,
-        error,
-        z,
-        p_value,
-    }
+    Comparison { delta, error, z, p_value }
 }
 
 /// The limit on |z| (dimensionless) for `checks` comparisons of which any at
@@ -218,9 +200,7 @@ struct Deviations {
 impl Deviations {
     fn of(series: &[f64]) -> Result<Self, StatisticsError> {
         if series.len() < MINIMUM_SAMPLES {
-            return Err(StatisticsError::TooFew {
-                found: series.len(),
-            });
+            return Err(StatisticsError::TooFew { found: series.len() });
         }
         if let Some(index) = series.iter().position(|x| !x.is_finite()) {
             return Err(StatisticsError::NonFinite { index });
@@ -235,19 +215,12 @@ impl Deviations {
         for value in &mut values {
             *value -= shift;
         }
-        Ok(Self {
-            mean: origin + shift,
-            values,
-        })
+        Ok(Self { mean: origin + shift, values })
     }
 }
 
 fn finite(error: f64) -> Result<f64, StatisticsError> {
-    if error.is_finite() {
-        Ok(error)
-    } else {
-        Err(StatisticsError::Overflow)
-    }
+    if error.is_finite() { Ok(error) } else { Err(StatisticsError::Overflow) }
 }
 
 fn sum_of_squares(x: &[f64]) -> f64 {
@@ -256,9 +229,7 @@ fn sum_of_squares(x: &[f64]) -> f64 {
 
 /// Averages of consecutive pairs; an odd last sample is left out.
 fn halved(x: &[f64]) -> Vec<f64> {
-    x.chunks_exact(2)
-        .map(|pair| 0.5 * (pair[0] + pair[1]))
-        .collect()
+    x.chunks_exact(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect()
 }
 
 fn autocorrelation(deviations: &[f64]) -> f64 {
@@ -362,15 +333,8 @@ mod tests {
                 taus += e.tau / 300.0;
             }
             assert!(covered >= 272, "phi {phi}: {covered} of 300");
-            assert!(
-                (0.97..1.15).contains(&(errors / exact)),
-                "phi {phi}: {}",
-                errors / exact
-            );
-            assert!(
-                (0.95..1.35).contains(&(taus / tau)),
-                "phi {phi}: tau {taus}, not {tau}"
-            );
+            assert!((0.97..1.15).contains(&(errors / exact)), "phi {phi}: {}", errors / exact);
+            assert!((0.95..1.35).contains(&(taus / tau)), "phi {phi}: tau {taus}, not {tau}");
         }
     }
 
@@ -419,24 +383,13 @@ mod tests {
 
     #[test]
     fn bad_series_are_refused() {
-        assert_eq!(
-            estimate(&[1.0; 7]),
-            Err(StatisticsError::TooFew { found: 7 })
-        );
+        assert_eq!(estimate(&[1.0; 7]), Err(StatisticsError::TooFew { found: 7 }));
         let mut series = [1.0; 20];
         series[3] = f64::NAN;
-        assert_eq!(
-            estimate(&series),
-            Err(StatisticsError::NonFinite { index: 3 })
-        );
+        assert_eq!(estimate(&series), Err(StatisticsError::NonFinite { index: 3 }));
         series[3] = f64::MAX;
         assert_eq!(estimate(&series), Err(StatisticsError::Overflow));
-        let poisoned = Estimate {
-            mean: f64::NAN,
-            error: 1.0,
-            samples: 0,
-            tau: f64::NAN,
-        };
+        let poisoned = Estimate { mean: f64::NAN, error: 1.0, samples: 0, tau: f64::NAN };
         let comparison = difference(&poisoned, &poisoned);
         assert!(comparison.p_value.is_nan() && comparison.exceeds(1, 0.05));
     }
@@ -485,19 +438,12 @@ mod tests {
     fn extremes_of_the_tails() {
         for z in [f64::MIN_POSITIVE, 1e-300, 1.0, 40.0, 1e200, f64::MAX] {
             for degrees in [1.0, 1.5, 30.0, 9e4, 1e300] {
-                assert!(
-                    (0.0..=1.0).contains(&two_sided(z, degrees)),
-                    "{z} {degrees}"
-                );
+                assert!((0.0..=1.0).contains(&two_sided(z, degrees)), "{z} {degrees}");
             }
         }
         for alarm in [f64::MIN_POSITIVE, 1e-300, 1e-30, 1e-12, 0.999] {
             assert!(threshold(1, alarm) > 0.0, "{alarm}");
         }
-        assert!(
-            (threshold(1, 1e-12) - 7.1305).abs() < 1e-3,
-            "{}",
-            threshold(1, 1e-12)
-        );
+        assert!((threshold(1, 1e-12) - 7.1305).abs() < 1e-3, "{}", threshold(1, 1e-12));
     }
 }

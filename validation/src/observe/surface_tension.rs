@@ -29,28 +29,14 @@ pub enum TensionError {
 /// # Errors
 ///
 /// Components of different lengths, or an `lz` that is not a positive number.
-pub fn tension_series(
-    lz: f64,
-    pxx: &[f64],
-    pyy: &[f64],
-    pzz: &[f64],
-) -> Result<Vec<f64>, TensionError> {
+pub fn tension_series(lz: f64, pxx: &[f64], pyy: &[f64], pzz: &[f64]) -> Result<Vec<f64>, TensionError> {
     if !(lz.is_finite() && lz > 0.0) {
         return Err(TensionError::BoxLength(lz));
     }
     if pxx.len() != pyy.len() || pyy.len() != pzz.len() {
-        return Err(TensionError::Lengths {
-            xx: pxx.len(),
-            yy: pyy.len(),
-            zz: pzz.len(),
-        });
+        return Err(TensionError::Lengths { xx: pxx.len(), yy: pyy.len(), zz: pzz.len() });
     }
-    Ok(pxx
-        .iter()
-        .zip(pyy)
-        .zip(pzz)
-        .map(|((xx, yy), zz)| 0.5 * lz * (zz - 0.5 * (xx + yy)))
-        .collect())
+    Ok(pxx.iter().zip(pyy).zip(pzz).map(|((xx, yy), zz)| 0.5 * lz * (zz - 0.5 * (xx + yy))).collect())
 }
 
 #[cfg(test)]
@@ -68,16 +54,9 @@ mod tests {
     fn bad_records_are_refused() {
         assert_eq!(
             tension_series(1.0, &[0.0], &[], &[0.0]),
-            Err(TensionError::Lengths {
-                xx: 1,
-                yy: 0,
-                zz: 1
-            })
+            Err(TensionError::Lengths { xx: 1, yy: 0, zz: 1 })
         );
-        assert_eq!(
-            tension_series(0.0, &[], &[], &[]),
-            Err(TensionError::BoxLength(0.0))
-        );
+        assert_eq!(tension_series(0.0, &[], &[], &[]), Err(TensionError::BoxLength(0.0)));
         assert!(tension_series(f64::NAN, &[], &[], &[]).is_err());
     }
 }

