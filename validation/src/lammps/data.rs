@@ -80,15 +80,28 @@ impl DataFile {
 
     /// Writes a file.
     pub fn write(&self, path: &Path) -> Result<(), LammpsError> {
+        self.save(path, Style::Atomic)
+    }
+
+    /// Writes a file of `atom_style mdpd`, with densities of zero, which that style computes anew.
+    pub fn write_mdpd(&self, path: &Path) -> Result<(), LammpsError> {
+        self.save(path, Style::Mdpd)
+    }
+
+    fn save(&self, path: &Path, style: Style) -> Result<(), LammpsError> {
         let file = std::fs::File::create(path).map_err(LammpsError::io("write", path))?;
         let mut out = io::BufWriter::new(file);
-        self.write_to(&mut out).and_then(|()| out.flush()).map_err(LammpsError::io("write", path))
+        self.print(&mut out, style).and_then(|()| out.flush()).map_err(LammpsError::io("write", path))
     }
 
     /// Writes a data file of `atom_style atomic` with 17 significant digits, so that reading it gives the same bits.
     ///
     /// A line break in the title becomes a space. What LAMMPS could not read is an error of kind `InvalidInput`.
     pub fn write_to(&self, out: &mut impl Write) -> io::Result<()> {
+        self.print(out, Style::Atomic)
+    }
+
+    fn print(&self, out: &mut impl Write, style: Style) -> io::Result<()> {
         self.check().map_err(|e| io::Error::new(io::ErrorKind::InvalidInput, e))?;
         writeln!(out, "{}\n", self.title.replace(['\n', '\r'], " "))?;
         writeln!(out, "{} atoms\n{} atom types\n", self.atoms.len(), self.types)?;
@@ -105,11 +118,13 @@ impl DataFile {
             }
         }
         if !self.atoms.is_empty() {
-            writeln!(out, "\nAtoms # atomic\n")?;
+            let name = if style == Style::Mdpd { "mdpd" } else { "atomic" };
+            writeln!(out, "\nAtoms # {name}\n")?;
         }
+        let rho = if style == Style::Mdpd { "0 " } else { "" };
         for a in &self.atoms {
             let ([x, y, z], [i, j, k]) = (a.x, a.image);
-            writeln!(out, "{} {} {x:.16e} {y:.16e} {z:.16e} {i} {j} {k}", a.id, a.kind)?;
+            writeln!(out, "{} {} {rho}{x:.16e} {y:.16e} {z:.16e} {i} {j} {k}", a.id, a.kind)?;
         }
         if let Some(velocities) = self.velocities.as_ref().filter(|v| !v.is_empty()) {
             writeln!(out, "\nVelocities\n")?;

@@ -1,1 +1,24 @@
-//! Reports.
+//! Reports: checks and their results, tables, plots, a self-contained HTML
+//! page, and progress bars.
+//!
+//! Nothing here panics on any input: what cannot be shown (a NaN, a control
+//! character) is left out or replaced, and what can fail returns a
+//! [`ReportError`].
+
+mod axis;
+mod error;
+pub mod files;
+pub mod html;
+pub mod plot;
+pub mod progress;
+pub mod results;
+pub mod table;
+mod text;
+
+pub use error::ReportError;
+pub use files::write_atomically;
+pub use html::{Item, Report, Section};
+pub use plot::{Plot, Series, Style};
+pub use progress::{Bar, Progress};
+pub use results::{Check, Results};
+pub use table::{Align, Table};

@@ -1,0 +1,272 @@
+//! Checks and the machine-readable results file.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Deserializer, Serialize};
+use serde_json::Value;
+
+use super::ReportError;
+
+/// One check: a number held against a limit.
+///
+/// JSON has no NaN or infinity. A non-finite float is written as `null`; read
+/// back, a `null` in `value` or `limit` becomes NaN, and in `error` or
+/// `expected` it becomes `None`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Check {
+    /// Short name, unique within the results.
+    pub id: String,
+    /// Heading under which the check is reported.
+    pub section: String,
+    /// What is checked, in words.
+    pub description: String,
+    /// What was found.
+    #[serde(deserialize_with = "float_or_null")]
+    pub value: f64,
+    /// Standard error of `value`, if it has one.
+    pub error: Option<f64>,
+    /// What `value` should be, if that is known.
+    pub expected: Option<f64>,
+    /// The bound on `value`.
+    #[serde(deserialize_with = "float_or_null")]
+    pub limit: f64,
+    /// The verdict.
+    pub passed: bool,
+    /// Anything the reader should know.
+    pub note: String,
+}
+
+impl Check {
+    /// Passes if `|value| <= limit`. A non-finite value or limit fails.
+    pub fn at_most(
+        id: impl Into<String>,
+        section: impl Into<String>,
+        description: impl Into<String>,
+        value: f64,
+        limit: f64,
+    ) -> Self {
+        let passed = value.is_finite() && limit.is_finite() && value.abs() <= limit;
+        Self::judged(id.into(), section.into(), description.into(), value, limit, passed)
+    }
+
+    /// Passes if `value >= limit`, signs included. A non-finite value or limit
+    /// fails.
+    pub fn at_least(
+        id: impl Into<String>,
+        section: impl Into<String>,
+        description: impl Into<String>,
+        value: f64,
+        limit: f64,
+    ) -> Self {
+        let passed = value.is_finite() && limit.is_finite() && value >= limit;
+        Self::judged(id.into(), section.into(), description.into(), value, limit, passed)
+    }
+
+    /// Passes if a difference is within `z_limit` standard errors of zero:
+    /// `|delta| <= z_limit * error`.
+    ///
+    /// `value` is the difference, `expected` is 0 and `limit` is the product
+    /// `z_limit * error`, in the units of the difference. Anything non-finite,
+    /// and a negative error, fails.
+    pub fn agreement(
+        id: impl Into<String>,
+        section: impl Into<String>,
+        description: impl Into<String>,
+        delta: f64,
+        error: f64,
+        z_limit: f64,
+        note: impl Into<String>,
+    ) -> Self {
+        let limit = z_limit * error;
+        let mut check = Self::at_most(id, section, description, delta, limit);
+        check.passed &= error >= 0.0 && error.is_finite();
+        check.error = Some(error);
+        check.expected = Some(0.0);
+        check.note = note.into();
+        check
+    }
+
+    /// The same check with a standard error to show; the verdict stays.
+    #[must_use]
+    pub fn with_error(mut self, error: f64) -> Self {
+        self.error = Some(error);
+        self
+    }
+
+    /// The same check with an expected value to show; the verdict stays.
+    #[must_use]
+    pub fn with_expected(mut self, expected: f64) -> Self {
+        self.expected = Some(expected);
+        self
+    }
+
+    /// The same check with a note.
+    #[must_use]
+    pub fn with_note(mut self, note: impl Into<String>) -> Self {
+        self.note = note.into();
+        self
+    }
+
+    fn judged(
+        id: String,
+        section: String,
+        description: String,
+        value: f64,
+        limit: f64,
+        passed: bool,
+    ) -> Self {
+        Self {
+            id,
+            section,
+            description,
+            value,
+            error: None,
+            expected: None,
+            limit,
+            passed,
+            note: String::new(),
+        }
+    }
+}
+
+/// Everything a run found out.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Results {
+    /// What was run.
+    pub title: String,
+    /// Version of the program.
+    pub version: String,
+    /// Circumstances: machine, versions, settings.
+    pub facts: BTreeMap<String, String>,
+    /// Seeds of the random numbers.
+    pub seeds: Vec<u64>,
+    /// The checks, in the order they were made.
+    pub checks: Vec<Check>,
+    /// Other findings, by name.
+    pub values: BTreeMap<String, Value>,
+    /// Whether there are checks and all passed; [`Results::push`] keeps it so.
+    pub passed: bool,
+}
+
+impl Results {
+    /// Results without checks, which therefore have not passed.
+    pub fn new(title: impl Into<String>, version: impl Into<String>) -> Self {
+        Self {
+            title: title.into(),
+            version: version.into(),
+            facts: BTreeMap::new(),
+            seeds: Vec::new(),
+            checks: Vec::new(),
+            values: BTreeMap::new(),
+            passed: false,
+        }
+    }
+
+    /// Adds a check and updates the verdict.
+    pub fn push(&mut self, check: Check) {
+        self.checks.push(check);
+        self.passed = self.failed_count() == 0;
+    }
+
+    /// Records a finding under a name. Non-finite floats become `null`.
+    pub fn record(&mut self, name: impl Into<String>, value: impl Serialize) -> Result<(), ReportError> {
+        self.values.insert(name.into(), serde_json::to_value(value)?);
+        Ok(())
+    }
+
+    /// How many checks passed.
+    pub fn passed_count(&self) -> usize {
+        self.checks.iter().filter(|c| c.passed).count()
+    }
+
+    /// How many checks failed.
+    pub fn failed_count(&self) -> usize {
+        self.checks.len() - self.passed_count()
+    }
+
+    /// Pretty-printed JSON with a final newline. Non-finite floats become
+    /// `null`; all others read back to the same bits.
+    pub fn to_json(&self) -> Result<String, ReportError> {
+        Ok(serde_json::to_string_pretty(self)? + "\n")
+    }
+
+    /// Reads what [`Results::to_json`] wrote.
+    pub fn from_json(text: &str) -> Result<Self, ReportError> {
+        Ok(serde_json::from_str(text)?)
+    }
+}
+
+fn float_or_null<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    Ok(Option::<f64>::deserialize(from)?.unwrap_or(f64::NAN))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn limits() {
+        let most = |v, l| Check::at_most("a", "b", "c", v, l).passed;
+        assert!(most(-1.0, 1.0) && !most(-1.1, 1.0));
+        assert!(!most(f64::NAN, 1.0) && !most(1.0, f64::NAN));
+        assert!(!most(f64::INFINITY, f64::INFINITY) && !most(0.0, -1.0));
+        let least = |v, l| Check::at_least("a", "b", "c", v, l).passed;
+        assert!(least(1.0, 1.0) && !least(-2.0, 1.0) && least(-1.0, -2.0));
+        assert!(!least(f64::NAN, 1.0) && !least(f64::INFINITY, 1.0));
+    }
+
+    #[test]
+    fn agreement() {
+        let agree = |d, e, z| Check::agreement("a", "b", "c", d, e, z, "").passed;
+        assert!(agree(-2.9, 1.0, 3.0) && !agree(3.1, 1.0, 3.0) && agree(0.0, 0.0, 3.0));
+        assert!(!agree(f64::NAN, 1.0, 3.0) && !agree(0.0, f64::NAN, 3.0));
+        assert!(!agree(0.0, f64::INFINITY, 3.0) && !agree(0.0, -1.0, -3.0));
+        assert_eq!(Check::agreement("a", "b", "c", 1.0, 0.5, 3.0, "n").limit, 1.5);
+    }
+
+    #[test]
+    fn nothing_checked_is_not_passed() {
+        let mut results = Results::new("t", "v");
+        assert!(!results.passed);
+        results.push(Check::at_most("a", "b", "c", 0.0, 1.0));
+        assert!(results.passed);
+        results.push(Check::at_most("d", "b", "c", 2.0, 1.0));
+        assert!(!results.passed);
+        assert_eq!((results.passed_count(), results.failed_count()), (1, 1));
+    }
+
+    #[test]
+    fn non_finite_floats_become_null() {
+        let mut results = Results::new("t", "v");
+        results.push(Check::at_most("a", "b", "c", f64::NAN, f64::INFINITY).with_error(f64::NAN));
+        results.record("x", [1.0, f64::NAN]).unwrap();
+        let json = results.to_json().unwrap();
+        assert!(json.contains("\"value\": null") && json.contains("\"limit\": null"));
+        let back = Results::from_json(&json).unwrap();
+        assert!(back.checks[0].value.is_nan() && back.checks[0].error.is_none());
+        assert_eq!(back.values["x"], serde_json::json!([1.0, null]));
+    }
+
+    proptest! {
+        #[test]
+        fn json_round_trip(
+            value in prop::num::f64::NORMAL | prop::num::f64::SUBNORMAL | prop::num::f64::ZERO,
+            note in ".*",
+            seeds in prop::collection::vec(any::<u64>(), 0..4),
+        ) {
+            let mut results = Results::new("title", "1.2.3");
+            results.facts.insert("machine".into(), note.clone());
+            results.seeds = seeds;
+            results.push(
+                Check::at_least("id", "section", "text", value, 0.5)
+                    .with_error(0.1)
+                    .with_expected(value)
+                    .with_note(note),
+            );
+            results.record("curve", vec![(1.0, value)]).unwrap();
+            let json = results.to_json().unwrap();
+            prop_assert_eq!(Results::from_json(&json).unwrap(), results);
+        }
+    }
+}

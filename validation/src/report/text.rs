@@ -1,0 +1,101 @@
+//! Text helpers shared by plots, tables and pages.
+
+use unicode_width::UnicodeWidthStr;
+
+/// Whether XML 1.0 allows the character in a document.
+fn allowed(c: char) -> bool {
+    matches!(c, '\t' | '\n' | '\r') || (c >= ' ' && !matches!(c, '\u{FFFE}' | '\u{FFFF}'))
+}
+
+/// Replaces the characters that XML forbids.
+pub(super) fn xml_safe(text: &str) -> String {
+    text.chars().map(|c| if allowed(c) { c } else { char::REPLACEMENT_CHARACTER }).collect()
+}
+
+/// One line without control characters: white space collapses to spaces.
+pub(super) fn one_line(text: &str) -> String {
+    text.chars()
+        .map(|c| match c {
+            c if c.is_whitespace() => ' ',
+            c if c.is_control() || !allowed(c) => char::REPLACEMENT_CHARACTER,
+            c => c,
+        })
+        .collect()
+}
+
+/// Escapes text for use between tags.
+pub(super) fn escape(text: &str) -> String {
+    xml_safe(text).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+/// Columns that the text takes in a terminal.
+pub(super) fn columns(text: &str) -> usize {
+    UnicodeWidthStr::width(text)
+}
+
+/// Rough width of text in a proportional font, in units of `size`.
+pub(super) fn width(text: &str, size: f64) -> f64 {
+    0.56 * size * columns(text) as f64
+}
+
+/// Shortens one line with an ellipsis so that it fits in `room`.
+pub(super) fn fit(text: &str, size: f64, room: f64) -> String {
+    let line = one_line(text);
+    if width(&line, size) <= room {
+        return line;
+    }
+    let mut kept = String::new();
+    for c in line.chars() {
+        kept.push(c);
+        if width(&kept, size) > room - size {
+            kept.pop();
+            break;
+        }
+    }
+    kept.push('…');
+    kept
+}
+
+/// An integer as a superscript.
+pub(super) fn superscript(n: i32) -> String {
+    n.to_string()
+        .chars()
+        .map(|c| match c {
+            '-' => '⁻',
+            '1' => '¹',
+            '2' => '²',
+            '3' => '³',
+            '4' => '⁴',
+            '5' => '⁵',
+            '6' => '⁶',
+            '7' => '⁷',
+            '8' => '⁸',
+            '9' => '⁹',
+            _ => '⁰',
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn forbidden_characters_are_replaced() {
+        assert_eq!(xml_safe("a\0b\tc\u{FFFF}"), "a\u{FFFD}b\tc\u{FFFD}");
+        assert_eq!(one_line("a\nb\u{1b}[1m"), "a b\u{FFFD}[1m");
+    }
+
+    #[test]
+    fn long_text_is_shortened() {
+        let short = fit(&"word ".repeat(100), 10.0, 100.0);
+        assert!(short.ends_with('…'));
+        assert!(width(&short, 10.0) <= 100.0);
+        assert_eq!(fit("short", 10.0, 100.0), "short");
+    }
+
+    #[test]
+    fn superscripts() {
+        assert_eq!(superscript(-120), "⁻¹²⁰");
+    }
+}
