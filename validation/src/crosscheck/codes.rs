@@ -1,0 +1,164 @@
+//! The codes, and how each is told about the fluid.
+
+use super::fluids::{A, RC, RD, WarrenSet};
+use super::start::data_file;
+use super::{Context, ValidateError};
+use crate::lammps::setfl::{Element, Setfl};
+use crate::run::State;
+use psidpd_core::model::pair::PairForm;
+use psidpd_core::model::{ExcessFreeEnergy, ForceLaw};
+use std::fmt::Write;
+use std::path::Path;
+
+/// Who computes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Code {
+    /// The native runner.
+    Native,
+    /// The plugin's `dpd/psi` with a model file.
+    Psi,
+    /// The plugin's `mdpd/psi` with the built-in's coefficients.
+    MdpdPsi,
+    /// LAMMPS's `mdpd`; its law is [`ForceLaw::LucyLammps`] whatever is asked.
+    BuiltIn,
+    /// LAMMPS's `eam/alloy` with tables of ψ, w and φ, and `dpd/tstat`.
+    Eam,
+}
+
+impl Code {
+    /// For tables and plots.
+    pub fn label(self) -> &'static str {
+        match self {
+            Code::Native => "native",
+            Code::Psi => "plugin dpd/psi",
+            Code::MdpdPsi => "plugin mdpd/psi",
+            Code::BuiltIn => "LAMMPS mdpd",
+            Code::Eam => "LAMMPS eam/alloy",
+        }
+    }
+
+    /// For file names.
+    pub fn slug(self) -> &'static str {
+        match self {
+            Code::Native => "native",
+            Code::Psi => "dpd-psi",
+            Code::MdpdPsi => "mdpd-psi",
+            Code::BuiltIn => "mdpd",
+            Code::Eam => "eam",
+        }
+    }
+}
+
+/// What a LAMMPS code is to compute.
+#[derive(Debug, Clone, Copy)]
+pub struct Setup<'a> {
+    /// Who computes.
+    pub code: Code,
+    /// Which fluid.
+    pub set: &'a WarrenSet,
+    /// Which force law.
+    pub law: ForceLaw,
+    /// Friction; 0 leaves drag and noise out.
+    pub gamma: f64,
+    /// Seed of the noise.
+    pub seed: u64,
+    /// `newton on`?
+    pub newton: bool,
+}
+
+impl Setup<'_> {
+    /// Writes data, model or tables into `folder` and returns the commands up to the pair style. Paths
+    /// in them are relative to `folder` unless `absolute`.
+    pub fn prepare(&self, context: &Context, state: &State, folder: &Path, absolute: bool) -> Result<String, ValidateError> {
+        std::fs::create_dir_all(folder).map_err(ValidateError::io(folder))?;
+        let place = |name: &str| {
+            if absolute { folder.join(name).display().to_string() } else { name.to_owned() }
+        };
+        let data = data_file(state);
+        let atom_style = match self.code {
+            Code::BuiltIn => {
+                data.write_mdpd(&folder.join("start.data"))?;
+                "mdpd"
+            }
+            _ => {
+                data.write(&folder.join("start.data"))?;
+                "atomic"
+            }
+        };
+        let mut deck = format!(
+            "units lj\natom_style {atom_style}\natom_modify map array\nnewton {}\ncomm_modify vel yes\n\
+             read_data \"{}\"\nneighbor 0.3 bin\nneigh_modify delay 0 every 1 check yes\n",
+            if self.newton { "on" } else { "off" },
+            place("start.data"),
+        );
+        let (b, gamma, seed) = (self.set.b, self.gamma, self.seed);
+        if matches!(self.code, Code::Psi | Code::MdpdPsi) {
+            // Writing to a String cannot fail.
+            let _ = writeln!(deck, "plugin load \"{}\"", context.plugin.display());
+        }
+        let pair = match self.code {
+            Code::Native => String::new(),
+            Code::Psi => {
+                let text = self.set.model_text(self.law, gamma)?;
+                let path = folder.join("model.toml");
+                std::fs::write(&path, text).map_err(ValidateError::io(&path))?;
+                format!("pair_style dpd/psi 1.0 {seed}\npair_coeff * * \"{}\" F\n", place("model.toml"))
+            }
+            Code::MdpdPsi => {
+                let law = if self.law == ForceLaw::LucyLammps { " law lucy" } else { "" };
+                format!(
+                    "pair_style mdpd/psi 1.0 {RC} {seed}{law}\npair_coeff 1 1 {A} {b} {gamma} {RC} {RD}\n"
+                )
+            }
+            Code::BuiltIn => format!(
+                "pair_style hybrid/overlay mdpd/rhosum mdpd 1.0 {RC} {seed}\n\
+                 pair_coeff 1 1 mdpd/rhosum {RD}\npair_coeff 1 1 mdpd {A} {b} {gamma} {RC} {RD}\n"
+            ),
+            Code::Eam => {
+                write_tables(self.set, &folder.join("fluid.eam.alloy"))?;
+                let table = place("fluid.eam.alloy");
+                if gamma > 0.0 {
+                    format!(
+                        "pair_style hybrid/overlay eam/alloy dpd/tstat 1.0 1.0 {RC} {seed}\n\
+                         pair_coeff * * eam/alloy \"{table}\" F\npair_coeff 1 1 dpd/tstat {gamma}\n"
+                    )
+                } else {
+                    format!("pair_style eam/alloy\npair_coeff * * \"{table}\" F\n")
+                }
+            }
+        };
+        deck.push_str(&pair);
+        Ok(deck)
+    }
+}
+
+/// Spacing of the tables in r. A spline is exact up to the kink of the second derivative of w at r_d,
+/// where its error is proportional to the spacing.
+const DR: f64 = 1e-5;
+/// Largest density in the tables, far above any that occurs.
+const LARGEST_DENSITY: f64 = 60.0;
+
+/// ψ as embedding function, w as density and φ as pair potential of `eam/alloy`: LAMMPS's own route to
+/// the same conservative forces.
+fn write_tables(set: &WarrenSet, path: &Path) -> Result<(), ValidateError> {
+    let fluid = set.model(ForceLaw::Conservative, 0.0)?.at(1.0)?;
+    let density = &fluid.densities[0];
+    let points = (RC / DR).round() as usize + 6;
+    let nrho = 6001;
+    let table = Setfl {
+        title: "psidpd: Warren A/B model",
+        elements: &[Element { name: "F".into(), mass: 1.0 }],
+        nrho,
+        drho: LARGEST_DENSITY / (nrho - 1) as f64,
+        nr: points,
+        dr: DR,
+        cutoff: RC,
+        embedding: &|_, n| {
+            let ExcessFreeEnergy::Formula(psi) = &fluid.excess[0];
+            psi.value(&[n])
+        },
+        density: &|_, r| density.kernel.value(r),
+        pair: &|_, _, r| fluid.pairs.iter().filter(|p| r < p.potential.range()).map(|p| p.potential.at(r).0).sum(),
+    };
+    Ok(table.write(path)?)
+}

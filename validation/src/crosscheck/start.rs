@@ -1,0 +1,85 @@
+//! Configurations that the codes start from, made by the native runner.
+
+use super::ValidateError;
+use super::fluids::WarrenSet;
+use crate::lammps::DataFile;
+use crate::lammps::data::Atom;
+use crate::run::{Integrator, Simulation, State};
+use psidpd_core::engine::{PeriodicBox, Want};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// A box and how much of it is filled along z.
+#[derive(Debug, Clone, Copy)]
+pub struct Filling {
+    /// Edges.
+    pub lengths: [f64; 3],
+    /// Height of the filled part, centred.
+    pub thickness: f64,
+    /// Number density there.
+    pub density: f64,
+}
+
+/// Random particles in the filled part at kT = 1, brought to equilibrium over `steps` steps of 0.01 with
+/// the thermostat on, from random positions by shorter steps.
+pub fn equilibrated(set: &WarrenSet, filling: Filling, steps: u64, seed: u64) -> Result<State, ValidateError> {
+    let [lx, ly, lz] = filling.lengths;
+    let count = (lx * ly * filling.thickness * filling.density).round() as usize;
+    let domain = PeriodicBox::orthogonal([0.0; 3], filling.lengths, [true; 3])
+        .map_err(|e| ValidateError::Run(crate::run::RunError::State(e.to_string())))?;
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let low = 0.5 * (lz - filling.thickness);
+    let x: Vec<[f64; 3]> = (0..count)
+        .map(|_| {
+            let mut u = || random.random::<f64>();
+            [lx * u(), ly * u(), low + filling.thickness * u()]
+        })
+        .collect();
+    let mut v: Vec<[f64; 3]> =
+        (0..count).map(|_| std::array::from_fn(|_| StandardNormal.sample(&mut random))).collect();
+    for k in 0..3 {
+        let drift = v.iter().map(|v| v[k]).sum::<f64>() / count as f64;
+        v.iter_mut().for_each(|v| v[k] -= drift);
+    }
+    let state = State {
+        domain,
+        mass: vec![1.0],
+        species: vec![0; count],
+        tag: (1..=count as i32).collect(),
+        image: vec![[0; 3]; count],
+        x,
+        v,
+    };
+    let mut simulation = Simulation::new(&set.shipped()?, 1.0, state, seed)?;
+    for (dt, steps) in [(0.001, 100), (0.01, steps)] {
+        simulation.prepare(dt, Want::FORCES)?;
+        for _ in 0..steps {
+            simulation.step(dt, Integrator::VelocityVerlet, Want::FORCES)?;
+        }
+    }
+    Ok(simulation.state())
+}
+
+/// A state as a LAMMPS data file; the box must have edges along the axes.
+pub fn data_file(state: &State) -> DataFile {
+    let low = state.domain.origin();
+    let lengths = state.domain.lengths();
+    DataFile {
+        title: "psidpd".into(),
+        boxlo: low,
+        boxhi: std::array::from_fn(|k| low[k] + lengths[k]),
+        tilt: None,
+        types: state.mass.len(),
+        masses: state.mass.clone(),
+        atoms: (0..state.len())
+            .map(|k| Atom {
+                id: state.tag[k] as u32,
+                kind: state.species[k] as u32 + 1,
+                x: state.x[k],
+                image: state.image[k],
+            })
+            .collect(),
+        velocities: Some(state.v.clone()),
+    }
+}

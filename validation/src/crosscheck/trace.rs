@@ -1,0 +1,168 @@
+//! One run of any code, as series of what is compared.
+
+use super::codes::{Code, Setup};
+use super::{Context, ValidateError};
+use crate::lammps::dump;
+use crate::run::{Integrator, Simulation, State};
+use psidpd_core::engine::Want;
+use std::path::Path;
+use std::time::Duration;
+
+/// How long a run is and what is kept of it.
+#[derive(Debug, Clone, Copy)]
+pub struct Length {
+    /// Δt.
+    pub dt: f64,
+    /// Steps.
+    pub steps: u64,
+    /// Steps between samples of temperature, energy and pressure.
+    pub sample: u64,
+    /// Steps between frames of positions; 0 for none.
+    pub frame: u64,
+}
+
+/// Series of a run, sampled every [`Length::sample`] steps from step 0.
+#[derive(Debug, Clone, Default)]
+pub struct Trace {
+    /// Time.
+    pub time: Vec<f64>,
+    /// Kinetic temperature.
+    pub temperature: Vec<f64>,
+    /// Kinetic energy.
+    pub kinetic: Vec<f64>,
+    /// Potential energy, as the code reports it.
+    pub potential: Vec<f64>,
+    /// Pressure tensor xx, yy, zz, xy, xz, yz.
+    pub pressure: [Vec<f64>; 6],
+    /// z of every particle, for each frame.
+    pub frames: Vec<Vec<f64>>,
+    /// How many particles.
+    pub particles: usize,
+}
+
+impl Trace {
+    fn push(&mut self, time: f64, temperature: f64, kinetic: f64, potential: f64, pressure: [f64; 6]) {
+        self.time.push(time);
+        self.temperature.push(temperature);
+        self.kinetic.push(kinetic);
+        self.potential.push(potential);
+        for (series, p) in self.pressure.iter_mut().zip(pressure) {
+            series.push(p);
+        }
+    }
+
+    /// A third of the trace of the pressure tensor.
+    pub fn scalar_pressure(&self) -> Vec<f64> {
+        let [xx, yy, zz, ..] = &self.pressure;
+        (0..xx.len()).map(|k| (xx[k] + yy[k] + zz[k]) / 3.0).collect()
+    }
+
+    /// Total energy per particle.
+    pub fn energy_per_particle(&self) -> Vec<f64> {
+        self.kinetic.iter().zip(&self.potential).map(|(k, u)| (k + u) / self.particles as f64).collect()
+    }
+}
+
+/// Runs one code from `state`. `advance` is called with steps made.
+pub fn run(
+    context: &Context,
+    setup: &Setup,
+    state: &State,
+    length: Length,
+    name: &str,
+    advance: &(dyn Fn(u64) + Sync),
+) -> Result<Trace, ValidateError> {
+    match setup.code {
+        Code::Native => native(setup, state, length, advance),
+        _ => lammps(context, setup, state, length, &context.work.join(name)),
+    }
+}
+
+fn native(setup: &Setup, state: &State, length: Length, advance: &(dyn Fn(u64) + Sync)) -> Result<Trace, ValidateError> {
+    let model = setup.set.model(setup.law, setup.gamma)?;
+    let mut simulation = Simulation::new(&model, 1.0, state.clone(), setup.seed)?;
+    let mut trace = Trace { particles: state.len(), ..Trace::default() };
+    simulation.prepare(length.dt, Want::TOTALS)?;
+    for step in 0..=length.steps {
+        let sample = step % length.sample == 0;
+        if step > 0 {
+            let want = if sample { Want::TOTALS } else { Want::FORCES };
+            simulation.step(length.dt, Integrator::VelocityVerlet, want)?;
+        }
+        if sample {
+            trace.push(
+                step as f64 * length.dt,
+                simulation.temperature(),
+                simulation.kinetic_energy(),
+                simulation.potential_energy(),
+                simulation.pressure_tensor(),
+            );
+            advance(step);
+        }
+        if length.frame > 0 && step % length.frame == 0 {
+            trace.frames.push(simulation.positions().iter().map(|x| x[2]).collect());
+        }
+    }
+    Ok(trace)
+}
+
+/// LAMMPS's own `fix nve` and output around the pair style.
+fn lammps(context: &Context, setup: &Setup, state: &State, length: Length, folder: &Path) -> Result<Trace, ValidateError> {
+    let mut deck = setup.prepare(context, state, folder, false)?;
+    deck.push_str(&format!(
+        "fix move all nve\ntimestep {}\nthermo_modify norm no\nvariable kinetic equal ke\n\
+         variable potential equal pe\nfix series all ave/time {s} 1 {s} c_thermo_temp v_kinetic v_potential \
+         c_thermo_press[1] c_thermo_press[2] c_thermo_press[3] c_thermo_press[4] c_thermo_press[5] \
+         c_thermo_press[6] file series.txt format \" %.16g\"\n",
+        length.dt,
+        s = length.sample,
+    ));
+    if length.frame > 0 {
+        deck.push_str(&format!(
+            "dump frames all custom {} frames.txt id z\ndump_modify frames format float %.10g\n",
+            length.frame
+        ));
+    }
+    deck.push_str(&format!("thermo {}\nrun {}\n", length.steps, length.steps));
+    let script = folder.join("in.lammps");
+    std::fs::write(&script, deck).map_err(ValidateError::io(&script))?;
+    let limit = Duration::from_secs(if context.full { 6 * 3600 } else { 1200 });
+    context.host.run_script(1, folder, &script, &["-log", "log.lammps"], limit)?;
+    let mut trace = Trace { particles: state.len(), ..Trace::default() };
+    read_series(&folder.join("series.txt"), length, &mut trace)?;
+    if length.frame > 0 {
+        let path = folder.join("frames.txt");
+        for frame in dump::read(&path)? {
+            let z = frame.get("z").ok_or_else(|| ValidateError::Output {
+                path: path.clone(),
+                problem: "a frame has no column z".into(),
+            })?;
+            trace.frames.push(z);
+        }
+    }
+    Ok(trace)
+}
+
+/// The file of `fix ave/time`: comments, then step and nine numbers.
+fn read_series(path: &Path, length: Length, trace: &mut Trace) -> Result<(), ValidateError> {
+    let text = std::fs::read_to_string(path).map_err(ValidateError::io(path))?;
+    for line in text.lines().filter(|l| !l.starts_with('#')) {
+        let numbers: Vec<f64> = line.split_whitespace().filter_map(|w| w.parse().ok()).collect();
+        let [step, t, k, u, pressure @ ..] = numbers.as_slice() else {
+            return Err(ValidateError::Output { path: path.into(), problem: format!("unexpected line: {line}") });
+        };
+        let pressure = <[f64; 6]>::try_from(pressure).map_err(|_| ValidateError::Output {
+            path: path.into(),
+            problem: format!("unexpected line: {line}"),
+        })?;
+        trace.push(step * length.dt, *t, *k, *u, pressure);
+    }
+    let expected = (length.steps / length.sample + 1) as usize;
+    if trace.time.len() != expected {
+        return Err(ValidateError::Output {
+            path: path.into(),
+            problem: format!("{} samples, expected {expected}", trace.time.len()),
+        });
+    }
+    Ok(())
+}
