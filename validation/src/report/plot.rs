@@ -205,7 +205,7 @@ impl Layout {
             .levels
             .iter()
             .filter(|(level, _)| y.fraction(*level).is_some());
-        let room = levels.map(|(_, text)| width(&fit(text, SMALL, LEVEL_ROOM), SMALL) + 14.0);
+        let room = levels.map(|(_, text)| width(&fit(text, SMALL, LEVEL_ROOM), SMALL) + 26.0);
         let right = WIDTH - room.fold(RIGHT, f64::max);
         let (legend, below) = legend(plot, left, below);
         Self {
