@@ -8,6 +8,10 @@ use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressFinish, 
 
 use super::text::one_line;
 
+const BAR: &str = "{prefix:24!} {bar:32.cyan/dim} {percent:>3}% {human_pos}/{human_len} \
+                   {elapsed_precise:.dim} {eta:.dim} left";
+const SPINNER: &str = "{prefix} {spinner:.cyan} {elapsed_precise:.dim}";
+
 /// A group of bars on standard error; silent if that is not a terminal.
 #[derive(Debug, Clone)]
 pub struct Progress {
@@ -33,17 +37,26 @@ impl Progress {
 
     /// Adds a bar that counts up to `total`.
     pub fn bar(&self, name: &str, total: u64) -> Bar {
+<<<<<<< HEAD
         let style = style(
             "{prefix:24!} {bar:32.cyan/dim} {percent:>3}% {human_pos}/{human_len} \
              {elapsed_precise:.dim} {eta:.dim} left",
         )
         .progress_chars("━╸─");
         self.add(ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden()), name, style)
+=======
+        let style = style(BAR).progress_chars("━╸─");
+        self.add(
+            ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden()),
+            name,
+            style,
+        )
+>>>>>>> html
     }
 
     /// Adds a spinner, for work of unknown length.
     pub fn spinner(&self, name: &str) -> Bar {
-        let style = style("{prefix} {spinner:.cyan} {elapsed_precise:.dim}");
+        let style = style(SPINNER);
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden());
         self.add(bar, name, style)
     }
@@ -118,8 +131,14 @@ mod tests {
 
     #[test]
     fn templates_are_valid() {
+<<<<<<< HEAD
         assert!(
             ProgressStyle::with_template("{prefix:24!} {bar:32.cyan/dim} {elapsed_precise:.dim}").is_ok()
         );
+=======
+        for template in [BAR, SPINNER] {
+            ProgressStyle::with_template(template).unwrap();
+        }
+>>>>>>> html
     }
 }
