@@ -2,3 +2,5 @@
 pub mod lammps;
 pub mod observe;
 pub mod report;
+pub mod run;
+pub mod scene;

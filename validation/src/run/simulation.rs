@@ -1,0 +1,400 @@
+use super::error::RunError;
+use super::integrator::{Before, Integrator, Motion};
+use super::state::State;
+use psidpd_core::engine::{
+    Engine, Images, Newton, Particles, PassCounts, PeriodicBox, Plan, Step, Tally, Want,
+};
+use psidpd_core::model::Model;
+
+/// Particles, their periodic images, and the forces of one fluid on them.
+///
+/// Arrays that the engine reads hold the owned particles first and their images behind; every buffer
+/// is kept from step to step.
+///
+/// Pair noise is keyed by the number of the step whose forces it is in: the forces before the first
+/// step are those of step 0, and step `n` ends with forces of number `n`, as in LAMMPS.
+#[derive(Debug, Clone)]
+pub struct Simulation {
+    model: Model,
+    kt: f64,
+    seed: u64,
+    number: u64,
+    thermostat: bool,
+    dimensions: usize,
+    domain: PeriodicBox,
+    mass: Vec<f64>,
+    owned: usize,
+    x: Vec<[f64; 3]>,
+    v: Vec<[f64; 3]>,
+    force: Vec<[f64; 3]>,
+    species: Vec<i32>,
+    tag: Vec<i32>,
+    image: Vec<[i32; 3]>,
+    engine: Engine,
+    images: Images,
+    tally: Tally,
+    before: Before,
+    /// Square of the longest way that a particle may go in one step.
+    longest_move: f64,
+}
+
+impl Simulation {
+    /// A simulation of `model` at temperature `kt` from `state`, at step 0. Positions outside the box
+    /// are wrapped into it.
+    ///
+    /// # Errors
+    /// The model does not hold at `kt`, or `state` is no state of it.
+    pub fn new(model: &Model, kt: f64, state: State, seed: u64) -> Result<Simulation, RunError> {
+        let fluid = model.at(kt)?;
+        if let Some(fault) = state.fault(fluid.species.len(), fluid.dimensions) {
+            return Err(RunError::State(fault));
+        }
+        let engine = Engine::new(&fluid)?;
+        let State { domain, mass, mut x, v, species, tag, mut image } = state;
+        for (x, image) in x.iter_mut().zip(&mut image) {
+            domain.wrap(x, image);
+        }
+        Ok(Simulation {
+            model: model.clone(),
+            kt,
+            seed,
+            number: 0,
+            thermostat: true,
+            dimensions: fluid.dimensions,
+            mass,
+            owned: x.len(),
+            force: vec![[0.0; 3]; x.len()],
+            x,
+            v,
+            species,
+            tag,
+            image,
+            engine,
+            images: Images::default(),
+            tally: Tally::default(),
+            before: Before::default(),
+            longest_move: domain.lengths().iter().map(|l| l * l).sum(),
+            domain,
+        })
+    }
+
+    /// Another temperature for the thermostat and for every formula with kT.
+    ///
+    /// # Errors
+    /// The model does not hold at `kt`.
+    pub fn set_temperature(&mut self, kt: f64) -> Result<(), RunError> {
+        if kt != self.kt {
+            self.engine = Engine::new(&self.model.at(kt)?)?;
+            self.kt = kt;
+        }
+        Ok(())
+    }
+
+    /// Switches dissipative and random forces off, or on again.
+    pub fn set_thermostat(&mut self, on: bool) {
+        self.thermostat = on;
+    }
+
+    /// The number that the next forces are keyed by: for a run that goes on from step `number`.
+    pub fn set_step_number(&mut self, number: u64) {
+        self.number = number;
+    }
+
+    /// Computes the forces of the present step at the present velocities, as a run or a stage needs
+    /// before its first step.
+    ///
+    /// # Errors
+    /// As [`Simulation::step`].
+    pub fn prepare(&mut self, dt: f64, want: Want) -> Result<(), RunError> {
+        let step = Step { seed: self.seed, number: self.number, dt };
+        self.compute(want, self.thermostat.then_some(step))
+    }
+
+    /// Computes forces, with noise and drag of `step`, or conservative ones only.
+    ///
+    /// # Errors
+    /// The box is too narrow for the noise, or a position, ψ or force is not finite.
+    pub fn compute(&mut self, want: Want, step: Option<Step>) -> Result<(), RunError> {
+        if let Some(step) = step {
+            if !(step.dt > 0.0 && step.dt.is_finite()) {
+                return Err(RunError::TimeStep(step.dt));
+            }
+            check_width(&self.domain, self.engine.plan())?;
+        }
+        let step = step.filter(|_| self.engine.plan().needs_velocities());
+        let number = self.number;
+        let failed = |source| RunError::Engine { step: number, source };
+        let Simulation { images, engine, x, v, tag, species, force, owned, .. } = self;
+        images.build(&self.domain, self.dimensions, engine.plan().cutoff(), *owned, x);
+        images.forward(1, tag);
+        images.forward(1, species);
+        if step.is_some() {
+            images.forward(1, v);
+        }
+        let particles = Particles { owned: *owned, x, tag, kind: species };
+        engine.densities(&particles, Newton::On).map_err(failed)?;
+        let width = engine.slope_width();
+        engine.slopes_mut().truncate(*owned * width);
+        images.forward(width, engine.slopes_mut());
+        force.clear();
+        force.resize(x.len(), [0.0; 3]);
+        self.tally = engine.forces(&particles, v, step, want, force).map_err(failed)?;
+        images.reverse(force);
+        Ok(())
+    }
+
+    /// One step of `dt`. The forces of the step before must be there: see [`Simulation::prepare`].
+    ///
+    /// # Errors
+    /// A position, velocity or force that is not finite, ψ singular, or a particle that moved further
+    /// than across the box.
+    pub fn step(&mut self, dt: f64, integrator: Integrator, want: Want) -> Result<(), RunError> {
+        if !(dt > 0.0 && dt.is_finite()) {
+            return Err(RunError::TimeStep(dt));
+        }
+        self.number += 1;
+        integrator.before_forces(self.motion(), dt);
+        self.check_velocities(Some(dt))?;
+        for (x, image) in self.x[..self.owned].iter_mut().zip(&mut self.image) {
+            self.domain.wrap(x, image);
+        }
+        let step = Step { seed: self.seed, number: self.number, dt };
+        self.compute(want, self.thermostat.then_some(step))?;
+        integrator.after_forces(self.motion(), dt);
+        self.check_velocities(None)
+    }
+
+    fn motion(&mut self) -> Motion<'_> {
+        let n = self.owned;
+        Motion {
+            x: &mut self.x[..n],
+            v: &mut self.v[..n],
+            f: &self.force[..n],
+            species: &self.species[..n],
+            mass: &self.mass,
+            before: &mut self.before,
+        }
+    }
+
+    /// Velocities must be finite, and within a step of `dt` lead nowhere beyond the box.
+    fn check_velocities(&self, dt: Option<f64>) -> Result<(), RunError> {
+        let limit = dt.map_or(f64::MAX, |dt| self.longest_move / (dt * dt));
+        // A comparison that NaN fails; one look back only if something is wrong.
+        let too_fast = |v: &[f64; 3]| {
+            let speed = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+            !(speed <= limit)
+        };
+        let Some(k) = self.v[..self.owned].iter().position(too_fast) else {
+            return Ok(());
+        };
+        let (step, tag, v) = (self.number, self.tag[k], self.v[k]);
+        let speed = v[0].hypot(v[1]).hypot(v[2]);
+        match dt {
+            Some(dt) if speed.is_finite() => Err(RunError::Runaway { step, tag, distance: speed * dt }),
+            _ => Err(RunError::Velocity { step, tag }),
+        }
+    }
+
+    /// The model.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// The plan of the engine.
+    pub fn plan(&self) -> &Plan {
+        self.engine.plan()
+    }
+
+    /// How often each pass of the engine has run.
+    pub fn counts(&self) -> PassCounts {
+        self.engine.counts()
+    }
+
+    /// Local densities of the particles, as [`Engine::local_densities`].
+    pub fn local_densities(&self) -> &[f64] {
+        self.engine.local_densities()
+    }
+
+    /// Whether every density of the model is summed, or only those that forces need.
+    pub fn sum_all_densities(&mut self, all: bool) {
+        self.engine.sum_all_densities(all);
+    }
+
+    /// kT.
+    pub fn kt(&self) -> f64 {
+        self.kt
+    }
+
+    /// The number of the present step.
+    pub fn step_number(&self) -> u64 {
+        self.number
+    }
+
+    /// 2 or 3.
+    pub fn dimensions(&self) -> usize {
+        self.dimensions
+    }
+
+    /// How many particles there are.
+    pub fn len(&self) -> usize {
+        self.owned
+    }
+
+    /// Whether there are none: never.
+    pub fn is_empty(&self) -> bool {
+        self.owned == 0
+    }
+
+    /// The box.
+    pub fn domain(&self) -> &PeriodicBox {
+        &self.domain
+    }
+
+    /// Positions, in the box.
+    pub fn positions(&self) -> &[[f64; 3]] {
+        &self.x[..self.owned]
+    }
+
+    /// Velocities.
+    pub fn velocities(&self) -> &[[f64; 3]] {
+        &self.v[..self.owned]
+    }
+
+    /// Forces of the last evaluation.
+    pub fn forces(&self) -> &[[f64; 3]] {
+        &self.force[..self.owned]
+    }
+
+    /// Species.
+    pub fn species(&self) -> &[i32] {
+        &self.species[..self.owned]
+    }
+
+    /// Tags.
+    pub fn tags(&self) -> &[i32] {
+        &self.tag[..self.owned]
+    }
+
+    /// Boxes travelled.
+    pub fn image_flags(&self) -> &[[i32; 3]] {
+        &self.image
+    }
+
+    /// Mass of each species.
+    pub fn masses(&self) -> &[f64] {
+        &self.mass
+    }
+
+    /// Energies and virials of the last evaluation, as far as they were wanted.
+    pub fn tally(&self) -> &Tally {
+        &self.tally
+    }
+
+    /// A copy of the particles.
+    pub fn state(&self) -> State {
+        let mut state = State {
+            domain: self.domain.clone(),
+            mass: self.mass.clone(),
+            x: Vec::new(),
+            v: Vec::new(),
+            species: Vec::new(),
+            tag: Vec::new(),
+            image: Vec::new(),
+        };
+        self.copy_state(&mut state);
+        state
+    }
+
+    /// Copies the particles into `state`, which keeps its memory.
+    pub fn copy_state(&self, state: &mut State) {
+        fn copy<T: Copy>(to: &mut Vec<T>, from: &[T]) {
+            to.clear();
+            to.extend_from_slice(from);
+        }
+        state.domain.clone_from(&self.domain);
+        copy(&mut state.mass, &self.mass);
+        copy(&mut state.x, self.positions());
+        copy(&mut state.v, self.velocities());
+        copy(&mut state.species, self.species());
+        copy(&mut state.tag, self.tags());
+        copy(&mut state.image, &self.image);
+    }
+
+    /// `U` of the last evaluation that wanted energies.
+    pub fn potential_energy(&self) -> f64 {
+        self.tally.energy()
+    }
+
+    /// `½ Σ m v²`.
+    pub fn kinetic_energy(&self) -> f64 {
+        let k = self.momentum_flux();
+        0.5 * (k[0] + k[1] + k[2])
+    }
+
+    /// `kT` from the kinetic energy with `d(N − 1)` degrees of freedom, as LAMMPS's `compute temp`;
+    /// 0 for one particle.
+    pub fn temperature(&self) -> f64 {
+        match self.dimensions * (self.owned - 1) {
+            0 => 0.0,
+            freedom => 2.0 * self.kinetic_energy() / freedom as f64,
+        }
+    }
+
+    /// `Σ m v`.
+    pub fn momentum(&self) -> [f64; 3] {
+        let mut sum = [0.0; 3];
+        for (v, s) in self.velocities().iter().zip(&self.species) {
+            for c in 0..3 {
+                sum[c] += self.mass[*s as usize] * v[c];
+            }
+        }
+        sum
+    }
+
+    /// `Σ m v v`, in the order xx, yy, zz, xy, xz, yz.
+    fn momentum_flux(&self) -> [f64; 6] {
+        let mut sum = [0.0; 6];
+        for (v, s) in self.velocities().iter().zip(&self.species) {
+            let m = self.mass[*s as usize];
+            for (k, (a, b)) in [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)].into_iter().enumerate() {
+                sum[k] += m * v[a] * v[b];
+            }
+        }
+        sum
+    }
+
+    fn over_volume(&self, virial: [f64; 6]) -> [f64; 6] {
+        let volume = self.domain.volume(self.dimensions);
+        let flux = self.momentum_flux();
+        std::array::from_fn(|k| (flux[k] + virial[k]) / volume)
+    }
+
+    /// `(Σ m v v + W)/V` with the virial of all forces, thermostat included, as LAMMPS's
+    /// `compute pressure`; order xx, yy, zz, xy, xz, yz. Needs a virial.
+    pub fn pressure_tensor(&self) -> [f64; 6] {
+        self.over_volume(self.tally.total_virial())
+    }
+
+    /// The same with the virial of conservative forces alone: the same mean at small time steps,
+    /// with less noise.
+    pub fn conservative_pressure_tensor(&self) -> [f64; 6] {
+        self.over_volume(self.tally.virial)
+    }
+
+    /// The trace of a pressure tensor over the number of dimensions.
+    pub fn scalar_pressure(&self, tensor: [f64; 6]) -> f64 {
+        tensor[..self.dimensions].iter().sum::<f64>() / self.dimensions as f64
+    }
+}
+
+/// Refuses boxes in which a particle meets two images of one neighbour within the range of the noise.
+fn check_width(domain: &PeriodicBox, plan: &Plan) -> Result<(), RunError> {
+    let Some(range) = plan.noise_range() else { return Ok(()) };
+    let periodic = domain.periodic();
+    let height = (0..plan.dimensions())
+        .filter(|k| periodic[*k])
+        .map(|k| domain.height(k))
+        .fold(f64::INFINITY, f64::min);
+    // Widths come from an inverse matrix: leave room for its rounding.
+    if height < 2.0 * range * (1.0 - 1e-12) { Err(RunError::BoxTooNarrow { height, range }) } else { Ok(()) }
+}

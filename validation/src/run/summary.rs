@@ -1,0 +1,60 @@
+use super::error::RunError;
+use super::thermo::Thermo;
+use serde::Serialize;
+use std::path::Path;
+
+/// What a run came to; also `summary.json`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    /// Title of the scene.
+    pub title: String,
+    /// How many particles.
+    pub particles: usize,
+    /// Steps made, over all stages.
+    pub steps: u64,
+    /// Wall time of the steps, output included, in seconds.
+    pub wall_seconds: f64,
+    /// Particles times steps over that time.
+    pub particle_steps_per_second: f64,
+    /// Totals after the last step.
+    pub last: Thermo,
+    /// Plain means over the thermo rows of the last stage, without error bars; `None` without rows.
+    pub means: Option<Means>,
+}
+
+/// Plain means over thermo rows.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Means {
+    /// How many rows.
+    pub rows: u64,
+    /// Of kT.
+    pub temperature: f64,
+    /// Of the potential energy.
+    pub potential: f64,
+    /// Of the pressure.
+    pub pressure: f64,
+    /// Of the pressure of conservative forces.
+    pub conservative_pressure: f64,
+}
+
+impl Means {
+    /// The means of `rows`.
+    pub(super) fn of(rows: &[Thermo]) -> Option<Means> {
+        let count = rows.len() as f64;
+        let mean = |f: fn(&Thermo) -> f64| rows.iter().map(f).sum::<f64>() / count;
+        (!rows.is_empty()).then(|| Means {
+            rows: rows.len() as u64,
+            temperature: mean(|t| t.temperature),
+            potential: mean(|t| t.potential),
+            pressure: mean(|t| t.pressure),
+            conservative_pressure: mean(|t| t.conservative_pressure),
+        })
+    }
+}
+
+impl Summary {
+    pub(super) fn write(&self, path: &Path) -> Result<(), RunError> {
+        let text = serde_json::to_string_pretty(self).map_err(std::io::Error::from);
+        text.and_then(|text| std::fs::write(path, text + "\n")).map_err(RunError::output(path))
+    }
+}

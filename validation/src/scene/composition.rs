@@ -1,0 +1,78 @@
+//! `composition` of `[initial]`.
+
+use super::masses::unknown_species;
+use psidpd_core::document::{FileError, FileErrorKind, Section};
+
+/// Number fractions of the species; they add up to 1.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Composition(pub(super) Vec<f64>);
+
+impl Composition {
+    /// Reads the fractions, equal ones if the file gives none; species that are not named have none.
+    pub(super) fn read(initial: &Section, species: &[String]) -> Result<Composition, FileError> {
+        let count = species.len();
+        let Some(value) = initial.get("composition") else {
+            return Ok(Composition(vec![1.0 / count as f64; count]));
+        };
+        let section = value.section()?;
+        let mut fractions = vec![0.0; count];
+        for (name, value) in section.entries() {
+            let Some(index) = species.iter().position(|s| *s == name.value) else {
+                return Err(name.error(section.source(), unknown_species(&name.value, species)));
+            };
+            let fraction = value.number()?.value;
+            if !(0.0..=1.0).contains(&fraction) {
+                return Err(value.error(FileErrorKind::Value(format!("must be from 0 to 1, is {fraction}"))));
+            }
+            fractions[index] = fraction;
+        }
+        let sum: f64 = fractions.iter().sum();
+        if (sum - 1.0).abs() > 1e-6 {
+            let message = format!("the fractions add up to {sum}, not to 1");
+            return Err(value.error(FileErrorKind::Value(message)));
+        }
+        Ok(Composition(fractions))
+    }
+
+    /// The fractions, in the order of the model's species.
+    pub fn fractions(&self) -> &[f64] {
+        &self.0
+    }
+
+    /// `count` particles shared out: whole numbers that add up to `count`, each less than one from its
+    /// share.
+    pub fn share(&self, count: usize) -> Vec<usize> {
+        let exact: Vec<f64> = self.0.iter().map(|f| f * count as f64).collect();
+        let mut shares: Vec<usize> = exact.iter().map(|e| *e as usize).collect();
+        let mut order: Vec<usize> = (0..shares.len()).collect();
+        let rest = |k: &usize| exact[*k] - exact[*k].floor();
+        order.sort_by(|a, b| rest(b).total_cmp(&rest(a)));
+        // Rounding of the fractions can leave the sum off by a few in either direction.
+        let mut turn = order.iter().cycle().filter(|k| self.0[**k] > 0.0);
+        while shares.iter().sum::<usize>() < count {
+            if let Some(k) = turn.next() {
+                shares[*k] += 1;
+            }
+        }
+        while shares.iter().sum::<usize>() > count {
+            if let Some(largest) = shares.iter_mut().max() {
+                *largest -= 1;
+            }
+        }
+        shares
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_add_up() {
+        let third = Composition(vec![1.0 / 3.0; 3]);
+        assert_eq!(third.share(10), [4, 3, 3]);
+        assert_eq!(Composition(vec![0.25, 0.0, 0.75]).share(6), [2, 0, 4]);
+        assert_eq!(Composition(vec![1.0]).share(7), [7]);
+        assert_eq!(Composition(vec![0.0, 1.0 + 1e-7]).share(100_000_000), [0, 100_000_000]);
+    }
+}

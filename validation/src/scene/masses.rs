@@ -1,0 +1,24 @@
+//! `[masses]`.
+
+use super::positive;
+use psidpd_core::document::{FileError, FileErrorKind, Section};
+
+/// Reads the mass of each species, 1 if the file gives none.
+pub fn read(root: &Section, species: &[String]) -> Result<Vec<f64>, FileError> {
+    let mut mass = vec![1.0; species.len()];
+    let Some(value) = root.get("masses") else { return Ok(mass) };
+    let section = value.section()?;
+    for (name, value) in section.entries() {
+        let Some(index) = species.iter().position(|s| *s == name.value) else {
+            let kind = unknown_species(&name.value, species);
+            return Err(name.error(section.source(), kind));
+        };
+        mass[index] = positive(&value)?;
+    }
+    Ok(mass)
+}
+
+/// A name that is not one of the model's species.
+pub fn unknown_species(name: &str, species: &[String]) -> FileErrorKind {
+    FileErrorKind::UnknownName { what: "species", name: name.to_owned(), known: species.join(", ") }
+}

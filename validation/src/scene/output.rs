@@ -1,0 +1,32 @@
+//! `[output]`.
+
+use psidpd_core::document::{FileError, Section};
+
+/// What a run writes beside its final state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Output {
+    /// Steps between rows of `thermo.csv`; 0 for none.
+    pub thermo: u64,
+    /// Steps between frames of `dump.lammpstrj`; 0 for none.
+    pub dump: u64,
+}
+
+impl Default for Output {
+    fn default() -> Output {
+        Output { thermo: 100, dump: 0 }
+    }
+}
+
+/// Reads what is written.
+pub fn read(root: &Section) -> Result<Output, FileError> {
+    let mut output = Output::default();
+    let Some(value) = root.get("output") else { return Ok(output) };
+    let section = value.section()?;
+    for (key, interval) in [("thermo", &mut output.thermo), ("dump", &mut output.dump)] {
+        if let Some(value) = section.get(key) {
+            *interval = value.count()?.value;
+        }
+    }
+    section.finish()?;
+    Ok(output)
+}
