@@ -69,7 +69,13 @@ pub struct Setup<'a> {
 impl Setup<'_> {
     /// Writes data, model or tables into `folder` and returns the commands up to the pair style. Paths
     /// in them are relative to `folder` unless `absolute`.
-    pub fn prepare(&self, context: &Context, state: &State, folder: &Path, absolute: bool) -> Result<String, ValidateError> {
+    pub fn prepare(
+        &self,
+        context: &Context,
+        state: &State,
+        folder: &Path,
+        absolute: bool,
+    ) -> Result<String, ValidateError> {
         std::fs::create_dir_all(folder).map_err(ValidateError::io(folder))?;
         let place = |name: &str| {
             if absolute { folder.join(name).display().to_string() } else { name.to_owned() }
@@ -158,7 +164,9 @@ fn write_tables(set: &WarrenSet, path: &Path) -> Result<(), ValidateError> {
             psi.value(&[n])
         },
         density: &|_, r| density.kernel.value(r),
-        pair: &|_, _, r| fluid.pairs.iter().filter(|p| r < p.potential.range()).map(|p| p.potential.at(r).0).sum(),
+        pair: &|_, _, r| {
+            fluid.pairs.iter().filter(|p| r < p.potential.range()).map(|p| p.potential.at(r).0).sum()
+        },
     };
     Ok(table.write(path)?)
 }

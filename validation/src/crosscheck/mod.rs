@@ -7,19 +7,13 @@
 //! - [`trajectory`]: the same trajectory in both hosts, noise on, on one rank and on two.
 
 pub mod codes;
-pub mod energy;
-pub mod equilibrium;
 mod error;
 pub mod fluids;
-pub mod forces;
 pub mod jobs;
 pub mod start;
 pub mod trace;
-pub mod trajectory;
-mod validate;
 
 pub use error::ValidateError;
-pub use validate::{Options, Outcome, validate};
 
 use crate::lammps::Host;
 use crate::report::Progress;

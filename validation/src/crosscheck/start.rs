@@ -23,7 +23,12 @@ pub struct Filling {
 
 /// Random particles in the filled part at kT = 1, brought to equilibrium over `steps` steps of 0.01 with
 /// the thermostat on, from random positions by shorter steps.
-pub fn equilibrated(set: &WarrenSet, filling: Filling, steps: u64, seed: u64) -> Result<State, ValidateError> {
+pub fn equilibrated(
+    set: &WarrenSet,
+    filling: Filling,
+    steps: u64,
+    seed: u64,
+) -> Result<State, ValidateError> {
     let [lx, ly, lz] = filling.lengths;
     let count = (lx * ly * filling.thickness * filling.density).round() as usize;
     let domain = PeriodicBox::orthogonal([0.0; 3], filling.lengths, [true; 3])

@@ -78,7 +78,12 @@ pub fn run(
     }
 }
 
-fn native(setup: &Setup, state: &State, length: Length, advance: &(dyn Fn(u64) + Sync)) -> Result<Trace, ValidateError> {
+fn native(
+    setup: &Setup,
+    state: &State,
+    length: Length,
+    advance: &(dyn Fn(u64) + Sync),
+) -> Result<Trace, ValidateError> {
     let model = setup.set.model(setup.law, setup.gamma)?;
     let mut simulation = Simulation::new(&model, 1.0, state.clone(), setup.seed)?;
     let mut trace = Trace { particles: state.len(), ..Trace::default() };
@@ -107,7 +112,13 @@ fn native(setup: &Setup, state: &State, length: Length, advance: &(dyn Fn(u64) +
 }
 
 /// LAMMPS's own `fix nve` and output around the pair style.
-fn lammps(context: &Context, setup: &Setup, state: &State, length: Length, folder: &Path) -> Result<Trace, ValidateError> {
+fn lammps(
+    context: &Context,
+    setup: &Setup,
+    state: &State,
+    length: Length,
+    folder: &Path,
+) -> Result<Trace, ValidateError> {
     let mut deck = setup.prepare(context, state, folder, false)?;
     deck.push_str(&format!(
         "fix move all nve\ntimestep {}\nthermo_modify norm no\nvariable kinetic equal ke\n\
@@ -149,7 +160,10 @@ fn read_series(path: &Path, length: Length, trace: &mut Trace) -> Result<(), Val
     for line in text.lines().filter(|l| !l.starts_with('#')) {
         let numbers: Vec<f64> = line.split_whitespace().filter_map(|w| w.parse().ok()).collect();
         let [step, t, k, u, pressure @ ..] = numbers.as_slice() else {
-            return Err(ValidateError::Output { path: path.into(), problem: format!("unexpected line: {line}") });
+            return Err(ValidateError::Output {
+                path: path.into(),
+                problem: format!("unexpected line: {line}"),
+            });
         };
         let pressure = <[f64; 6]>::try_from(pressure).map_err(|_| ValidateError::Output {
             path: path.into(),

@@ -187,16 +187,8 @@ impl Layout {
         } else if x.factor.is_some() {
             below += 16.0;
         }
-<<<<<<< HEAD
         let levels = plot.levels.iter().filter(|(level, _)| y.fraction(*level).is_some());
-        let room = levels.map(|(_, text)| width(&fit(text, SMALL, LEVEL_ROOM), SMALL) + 14.0);
-=======
-        let levels = plot
-            .levels
-            .iter()
-            .filter(|(level, _)| y.fraction(*level).is_some());
         let room = levels.map(|(_, text)| width(&fit(text, SMALL, LEVEL_ROOM), SMALL) + 26.0);
->>>>>>> html
         let right = WIDTH - room.fold(RIGHT, f64::max);
         let (legend, below) = legend(plot, left, below);
         Self { x, y, left, right, top, total: (below + 12.0).ceil(), legend }

@@ -37,21 +37,8 @@ impl Progress {
 
     /// Adds a bar that counts up to `total`.
     pub fn bar(&self, name: &str, total: u64) -> Bar {
-<<<<<<< HEAD
-        let style = style(
-            "{prefix:24!} {bar:32.cyan/dim} {percent:>3}% {human_pos}/{human_len} \
-             {elapsed_precise:.dim} {eta:.dim} left",
-        )
-        .progress_chars("━╸─");
-        self.add(ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden()), name, style)
-=======
         let style = style(BAR).progress_chars("━╸─");
-        self.add(
-            ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden()),
-            name,
-            style,
-        )
->>>>>>> html
+        self.add(ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden()), name, style)
     }
 
     /// Adds a spinner, for work of unknown length.
@@ -131,14 +118,8 @@ mod tests {
 
     #[test]
     fn templates_are_valid() {
-<<<<<<< HEAD
-        assert!(
-            ProgressStyle::with_template("{prefix:24!} {bar:32.cyan/dim} {elapsed_precise:.dim}").is_ok()
-        );
-=======
         for template in [BAR, SPINNER] {
             ProgressStyle::with_template(template).unwrap();
         }
->>>>>>> html
     }
 }
