@@ -6,14 +6,21 @@
 //! - [`equilibrium`]: temperature, pressure, density and energy of a slab in equilibrium;
 //! - [`trajectory`]: the same trajectory in both hosts, noise on, on one rank and on two.
 
+pub mod closed_loop;
 pub mod codes;
+pub mod energy;
+pub mod equilibrium;
 mod error;
 pub mod fluids;
+pub mod forces;
 pub mod jobs;
 pub mod start;
 pub mod trace;
+pub mod trajectory;
+mod validate;
 
 pub use error::ValidateError;
+pub use validate::{Options, Outcome, check_table, validate};
 
 use crate::lammps::Host;
 use crate::report::Progress;

@@ -1,0 +1,256 @@
+//! A slab in equilibrium: temperature, pressure, liquid density, energy and surface tension, with error
+//! bars, in every code.
+
+use super::codes::{Code, Setup};
+use super::fluids::{GAMMA, SET5, SET6, WarrenSet};
+use super::jobs::{self, Job};
+use super::start::{Filling, equilibrated};
+use super::trace::{Length, Trace, run as run_code};
+use super::{Context, Part, ValidateError};
+use crate::observe::{Estimate, ProfileAccumulator, difference, estimate, interface_width, tension_series};
+use crate::report::{Check, Item, Plot, Section, Series, Style, Table};
+use psidpd_core::model::ForceLaw;
+use serde_json::json;
+
+/// Seeds of start and noise; every run has its own noise.
+pub const SEED: u64 = 20_020_922;
+
+/// Chance that any of the comparisons of equal fluids fails although nothing is wrong.
+pub const FALSE_ALARM: f64 = 1e-3;
+/// How far from the published liquid density a run may be, relative: his figures come from steps of 0.05,
+/// ours from 0.01.
+const PUBLISHED: f64 = 0.015;
+
+/// A code, its law, and the run it is compared with.
+const RUNS: [(Code, ForceLaw, Option<usize>); 5] = [
+    (Code::Native, ForceLaw::Conservative, None),
+    (Code::Psi, ForceLaw::Conservative, Some(0)),
+    (Code::Eam, ForceLaw::Conservative, Some(0)),
+    (Code::MdpdPsi, ForceLaw::LucyLammps, None),
+    (Code::BuiltIn, ForceLaw::LucyLammps, Some(3)),
+];
+
+/// What is compared, with error bars.
+struct Measured {
+    temperature: Estimate,
+    pressure: Estimate,
+    energy: Estimate,
+    liquid: Estimate,
+    tension: Estimate,
+    width: Option<f64>,
+    profile: Vec<(f64, f64)>,
+}
+
+fn name(code: Code, law: ForceLaw) -> String {
+    match (code, law) {
+        (Code::BuiltIn, _) => "LAMMPS mdpd".into(),
+        (code, ForceLaw::Conservative) => code.label().into(),
+        (code, ForceLaw::LucyLammps) => format!("{}, law lucy", code.label()),
+    }
+}
+
+/// Runs the comparison.
+pub fn run(context: &Context) -> Result<Part, ValidateError> {
+    let sets = [SET5, SET6];
+    let (edge, height, steps) = if context.full { (10.0, 24.0, 100_000) } else { (5.0, 14.0, 10_000) };
+    let length = Length { dt: 0.01, steps, sample: 10, frame: 25 };
+    let mut starts = Vec::new();
+    for set in &sets {
+        let filling = Filling { lengths: [edge, edge, height], thickness: 0.5 * height, density: set.liquid };
+        starts.push(equilibrated(set, filling, 1000, SEED)?);
+    }
+    let mut jobs: Vec<Job<Result<Trace, ValidateError>>> = Vec::new();
+    for (k, set) in sets.iter().enumerate() {
+        for (n, (code, law, _)) in RUNS.into_iter().enumerate() {
+            let state = &starts[k];
+            let bar = context.progress.bar(&format!("NVT {}: {}", set.name, name(code, law)), steps);
+            jobs.push(Box::new(move || {
+                let seed = SEED + (10 * k + n) as u64;
+                let setup = Setup { code, set, law, gamma: GAMMA, seed, newton: true };
+                let folder = format!("nvt-{}-{}-{n}", set.name.replace(' ', ""), code.slug());
+                let trace = run_code(context, &setup, state, length, &folder, &|s| bar.set(s));
+                bar.finish();
+                trace
+            }));
+        }
+    }
+    let traces = jobs::run(jobs).into_iter().collect::<Result<Vec<_>, _>>()?;
+    let mut part = Part {
+        section: Section {
+            heading: "A slab of liquid in equilibrium".into(),
+            items: vec![Item::Prose(format!(
+                "A slab of liquid with its vapour at kT = 1, γ = {GAMMA}, {edge} × {edge} × {height}, {steps} steps of \
+                 {} of which the first fifth is left out; seeds from {SEED}. Error bars are standard errors from the \
+                 autocorrelation of each series. Runs of equal law must agree: over all comparisons the chance of a \
+                 false alarm is {FALSE_ALARM}.",
+                length.dt
+            ))],
+        },
+        ..Part::default()
+    };
+    let comparisons = sets.len() * RUNS.iter().filter(|r| r.2.is_some()).count() * QUANTITIES.len();
+    for (k, set) in sets.iter().enumerate() {
+        let measured = traces[k * RUNS.len()..(k + 1) * RUNS.len()]
+            .iter()
+            .map(|t| measure(t, edge, height))
+            .collect::<Result<Vec<_>, _>>()?;
+        report_set(&mut part, set, &measured, comparisons)?;
+    }
+    Ok(part)
+}
+
+/// The quantities that equal fluids must agree in.
+const QUANTITIES: [(&str, fn(&Measured) -> &Estimate); 5] = [
+    ("temperature", |m| &m.temperature),
+    ("pressure", |m| &m.pressure),
+    ("energy", |m| &m.energy),
+    ("liquid density", |m| &m.liquid),
+    ("surface tension", |m| &m.tension),
+];
+
+fn measure(trace: &Trace, edge: f64, height: f64) -> Result<Measured, ValidateError> {
+    let of = |what: &str, series: &[f64]| {
+        let kept = &series[series.len() / 5..];
+        estimate(kept).map_err(|source| ValidateError::Statistics { what: what.to_owned(), source })
+    };
+    let bins = (height / 0.1).round() as usize;
+    let mut profile = ProfileAccumulator::new(height, bins, edge * edge)?;
+    for frame in &trace.frames[trace.frames.len() / 5..] {
+        profile.add(frame)?;
+    }
+    let liquid = profile.liquid_density(0.5 * (0.5 * height) - 2.0);
+    let shape = profile.finish()?;
+    let [xx, yy, zz, ..] = &trace.pressure;
+    let per_particle: Vec<f64> = trace.potential.iter().map(|u| u / trace.particles as f64).collect();
+    Ok(Measured {
+        temperature: of("temperature", &trace.temperature)?,
+        pressure: of("pressure", &trace.scalar_pressure())?,
+        energy: of("energy", &per_particle)?,
+        liquid: estimate(&liquid)
+            .map_err(|source| ValidateError::Statistics { what: "liquid density".into(), source })?,
+        tension: of("surface tension", &tension_series(height, xx, yy, zz)?)?,
+        width: interface_width(&shape),
+        profile: shape.centres.iter().copied().zip(shape.density.iter().copied()).collect(),
+    })
+}
+
+fn shown(e: &Estimate) -> String {
+    // Two digits of the error decide how many are worth showing.
+    let digits = (1.0 - e.error.log10().floor()).clamp(0.0, 8.0);
+    let digits = if digits.is_finite() { digits as usize } else { 4 };
+    format!("{:.*} ± {:.*}", digits, e.mean, digits, e.error)
+}
+
+fn report_set(
+    part: &mut Part,
+    set: &WarrenSet,
+    measured: &[Measured],
+    comparisons: usize,
+) -> Result<(), ValidateError> {
+    let slug = set.name.replace(' ', "");
+    let mut table = Table::new([
+        "code",
+        "temperature",
+        "pressure",
+        "energy",
+        "liquid density",
+        "surface tension",
+        "width",
+    ]);
+    let mut plot = Plot {
+        title: format!("Density profile, {}", set.name),
+        x_label: "z, from the middle of the slab".into(),
+        y_label: "number density".into(),
+        levels: vec![(set.liquid, format!("Warren: {}", set.liquid))],
+        ..Plot::default()
+    };
+    for ((code, law, _), m) in RUNS.iter().zip(measured) {
+        let mut row = vec![name(*code, *law)];
+        row.extend(QUANTITIES.iter().map(|(_, get)| shown(get(m))));
+        row.push(m.width.map_or_else(|| "–".into(), |w| format!("{w:.2}")));
+        table.push(row);
+        plot.series.push(Series {
+            name: name(*code, *law),
+            points: m.profile.clone(),
+            errors: None,
+            style: if *law == ForceLaw::Conservative { Style::Line } else { Style::Dashed },
+        });
+        for (what, get) in QUANTITIES {
+            let id = format!("nvt.{slug}.{}-{}.{}", code.slug(), law_slug(*law), what.replace(' ', "-"));
+            part.values.push((id, json!(get(m))));
+        }
+    }
+    table.push([
+        "Warren, Table 2".to_owned(),
+        String::new(),
+        String::new(),
+        String::new(),
+        format!("{}", set.liquid),
+        format!("{} ± {}", set.tension.0, set.tension.1),
+        String::new(),
+    ]);
+    for ((code, law, other), m) in RUNS.iter().zip(measured) {
+        let Some(other) = other else { continue };
+        let (reference_code, reference_law, _) = RUNS[*other];
+        for (what, get) in QUANTITIES {
+            let comparison = difference(get(m), get(&measured[*other]));
+            let mut check = Check::agreement(
+                format!("nvt.{slug}.{}.{}", code.slug(), what.replace(' ', "-")),
+                "equilibrium",
+                format!(
+                    "{}: {what} of {} equals that of {}",
+                    set.name,
+                    name(*code, *law),
+                    name(reference_code, reference_law)
+                ),
+                comparison.delta,
+                comparison.error,
+                crate::observe::threshold(comparisons, FALSE_ALARM),
+                format!("z = {:.2}, p = {:.2}", comparison.z, comparison.p_value),
+            );
+            check.passed = !comparison.exceeds(comparisons, FALSE_ALARM) && comparison.error > 0.0;
+            part.checks.push(check);
+        }
+    }
+    let native = &measured[0];
+    part.checks.push(
+        Check::at_most(
+            format!("nvt.{slug}.published.density"),
+            "equilibrium",
+            format!("{}: liquid density of native against Warren's Table 2, relative", set.name),
+            native.liquid.mean / set.liquid - 1.0,
+            PUBLISHED,
+        )
+        .with_error(native.liquid.error / set.liquid),
+    );
+    let built_in = &measured[4];
+    part.checks.push(
+        Check::at_least(
+            format!("nvt.{slug}.mdpd.shift"),
+            "equilibrium",
+            format!(
+                "{}: the built-in's law shifts the liquid density (another fluid than Warren's): by",
+                set.name
+            ),
+            built_in.liquid.mean - native.liquid.mean,
+            0.1,
+        )
+        .with_error(difference(&built_in.liquid, &native.liquid).error),
+    );
+    part.section.items.push(Item::Table(table));
+    part.section.items.push(Item::Figure {
+        svg: plot.render()?,
+        caption: format!(
+            "{}: full lines are the conservative law, dashed lines the built-in's law, in the plugin and in mdpd.",
+            set.name
+        ),
+    });
+    Ok(())
+}
+
+fn law_slug(law: ForceLaw) -> &'static str {
+    match law {
+        ForceLaw::Conservative => "conservative",
+        ForceLaw::LucyLammps => "lucy",
+    }
+}
