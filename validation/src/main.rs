@@ -1,2 +1,7 @@
 //! The `psidpd` program.
-fn main() {}
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    psidpd::cli::main()
+}

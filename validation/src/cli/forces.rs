@@ -1,0 +1,64 @@
+use super::{Failure, Verdict, write_json};
+use crate::lammps::DataFile;
+use crate::report::Table;
+use crate::run::{Simulation, State};
+use psidpd_core::engine::Want;
+use psidpd_core::model::Model;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Conservative energy, virial, densities and forces of one configuration, by atom id.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// The model file.
+    #[arg(long, value_name = "FILE")]
+    model: PathBuf,
+    /// A LAMMPS data file, atom_style atomic; type k is the model's k-th species.
+    #[arg(long, value_name = "FILE")]
+    data: PathBuf,
+    /// kT.
+    #[arg(long = "kT", value_name = "T", allow_negative_numbers = true)]
+    kt: f64,
+}
+
+/// The contents of the file of `--json`.
+#[derive(Debug, Serialize)]
+struct Forces {
+    energy: f64,
+    /// xx, yy, zz, xy, xz, yz.
+    virial: [f64; 6],
+    /// For each atom, in the order of the ids, each density of each species, density-major.
+    density: Vec<Vec<f64>>,
+    forces: Vec<[f64; 3]>,
+}
+
+pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
+    let model = Model::open(&arguments.model).map_err(Failure::new)?;
+    let mut data = DataFile::read(&arguments.data).map_err(Failure::new)?;
+    data.sort_by_id();
+    let state = State::from_data(&data, &model).map_err(Failure::new)?;
+    let mut simulation = Simulation::new(&model, arguments.kt, state, 1).map_err(Failure::new)?;
+    simulation.sum_all_densities(true);
+    simulation.compute(Want::TOTALS, None).map_err(Failure::new)?;
+    let width = simulation.local_densities().len() / simulation.len().max(1);
+    let forces = Forces {
+        energy: simulation.potential_energy(),
+        virial: simulation.tally().virial,
+        density: match width {
+            0 => vec![Vec::new(); simulation.len()],
+            _ => simulation.local_densities().chunks_exact(width).map(<[f64]>::to_vec).collect(),
+        },
+        forces: simulation.forces().to_vec(),
+    };
+    let size = forces.forces.iter().flatten().map(|c| c * c).sum::<f64>() / forces.forces.len() as f64;
+    let mut table = Table::new(["quantity", "value"]);
+    table.push(["particles".to_owned(), forces.forces.len().to_string()]);
+    table.push(["energy".to_owned(), format!("{:.12e}", forces.energy)]);
+    for (name, w) in ["xx", "yy", "zz", "xy", "xz", "yz"].iter().zip(forces.virial) {
+        table.push([format!("virial {name}"), format!("{w:.12e}")]);
+    }
+    table.push(["root mean square force".to_owned(), format!("{:.12e}", size.sqrt())]);
+    println!("{}", table.to_text());
+    write_json(json, &forces)?;
+    Ok(Verdict::Good)
+}

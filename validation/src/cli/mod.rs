@@ -1,0 +1,76 @@
+//! The command line: one file for each verb.
+//!
+//! Exit codes: 0 on success, 1 when a check fails or a run stops, 2 on bad input or when something that
+//! is needed is missing.
+
+mod diagnostic;
+mod forces;
+mod lammps;
+mod run;
+mod validate;
+
+use clap::{Parser, Subcommand};
+use diagnostic::Failure;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Many-body dissipative particle dynamics: native runner and cross-code validator.
+#[derive(Debug, Parser)]
+#[command(name = "psidpd", version, propagate_version = true)]
+struct Arguments {
+    #[command(subcommand)]
+    verb: Verb,
+    /// Write machine-readable results to a file.
+    #[arg(long, global = true, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    /// Compare the native runner, the LAMMPS plugin, LAMMPS's mdpd and eam/alloy in one fluid.
+    Validate(validate::Arguments),
+    /// Run a scene natively.
+    Run(run::Arguments),
+    /// Energy, virial, densities and forces of one configuration.
+    Forces(forces::Arguments),
+    /// Install LAMMPS into a local environment, or build the plugin for it.
+    #[command(subcommand)]
+    Lammps(lammps::Verb),
+}
+
+/// What a verb that could be carried out says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Verdict {
+    Good,
+    CheckFailed,
+}
+
+/// Runs the program.
+pub fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let json = arguments.json.as_deref();
+    let outcome = match &arguments.verb {
+        Verb::Validate(a) => validate::run(a, json),
+        Verb::Run(a) => run::run(a, json),
+        Verb::Forces(a) => forces::run(a, json),
+        Verb::Lammps(a) => lammps::run(a, json),
+    };
+    match outcome {
+        Ok(Verdict::Good) => ExitCode::SUCCESS,
+        Ok(Verdict::CheckFailed) => ExitCode::from(1),
+        Err(failure) => {
+            let code = failure.exit_code();
+            eprintln!("{:?}", miette::Report::new(failure));
+            ExitCode::from(code)
+        }
+    }
+}
+
+/// Writes `value` to the file of `--json`, if there is one.
+fn write_json(json: Option<&Path>, value: &impl Serialize) -> Result<(), Failure> {
+    let Some(path) = json else { return Ok(()) };
+    let mut text = serde_json::to_string_pretty(value).map_err(Failure::new)?;
+    text.push('\n');
+    crate::report::write_atomically(path, text.as_bytes()).map_err(Failure::new)
+}

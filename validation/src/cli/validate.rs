@@ -1,0 +1,31 @@
+use super::{Failure, Verdict, write_json};
+use crate::crosscheck::{Options, check_table, validate};
+use crate::report::Progress;
+use std::path::{Path, PathBuf};
+
+/// Compare the codes; a few minutes on two cores.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Larger systems and longer runs: hours.
+    #[arg(long)]
+    full: bool,
+    /// Folder for report.html, results.json and the runs.
+    #[arg(long, value_name = "DIR", default_value = "target/validate")]
+    out: PathBuf,
+}
+
+pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
+    let progress = Progress::new();
+    let options = Options { full: arguments.full, out: arguments.out.clone() };
+    let outcome = validate(&options, &progress).map_err(Failure::new)?;
+    let results = &outcome.results;
+    println!("{}", check_table(results).to_text());
+    println!(
+        "\n{} passed, {} failed\nreport: {}",
+        results.passed_count(),
+        results.failed_count(),
+        outcome.report.display()
+    );
+    write_json(json, results)?;
+    Ok(if results.passed { Verdict::Good } else { Verdict::CheckFailed })
+}
