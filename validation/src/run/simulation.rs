@@ -20,6 +20,7 @@ pub struct Simulation {
     seed: u64,
     number: u64,
     thermostat: bool,
+    all_densities: bool,
     dimensions: usize,
     domain: PeriodicBox,
     mass: Vec<f64>,
@@ -60,6 +61,7 @@ impl Simulation {
             seed,
             number: 0,
             thermostat: true,
+            all_densities: false,
             dimensions: fluid.dimensions,
             mass,
             owned: x.len(),
@@ -85,6 +87,7 @@ impl Simulation {
     pub fn set_temperature(&mut self, kt: f64) -> Result<(), RunError> {
         if kt != self.kt {
             self.engine = Engine::new(&self.model.at(kt)?)?;
+            self.engine.sum_all_densities(self.all_densities);
             self.kt = kt;
         }
         Ok(())
@@ -205,7 +208,7 @@ impl Simulation {
         self.engine.plan()
     }
 
-    /// How often each pass of the engine has run.
+    /// How often each pass of the engine has run, since the temperature was last changed.
     pub fn counts(&self) -> PassCounts {
         self.engine.counts()
     }
@@ -217,6 +220,7 @@ impl Simulation {
 
     /// Whether every density of the model is summed, or only those that forces need.
     pub fn sum_all_densities(&mut self, all: bool) {
+        self.all_densities = all;
         self.engine.sum_all_densities(all);
     }
 
