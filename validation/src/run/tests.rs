@@ -122,8 +122,8 @@ fn difference(a: &Simulation, b: &Simulation) -> f64 {
     for (k, tag) in a.tags().iter().enumerate() {
         let other = at[*tag as usize];
         let d = a.domain().minimum_image(a.positions()[k], b.positions()[other]);
-        for c in 0..3 {
-            largest = largest.max(d[c].abs()).max((a.velocities()[k][c] - b.velocities()[other][c]).abs());
+        for (d, (v, w)) in d.iter().zip(a.velocities()[k].iter().zip(&b.velocities()[other])) {
+            largest = largest.max(d.abs()).max((v - w).abs());
         }
     }
     largest
