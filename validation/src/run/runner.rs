@@ -8,7 +8,7 @@ use super::thermo::{Thermo, ThermoFile};
 use crate::scene::{Scene, Stage};
 use psidpd_core::engine::Want;
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -179,6 +179,16 @@ struct Output {
 
 impl Output {
     fn create(scene: &Scene, folder: &Path) -> Result<Output, RunError> {
+        // What an earlier run left at its end is not of this one.
+        for name in ["final.data", "last-good.data", "summary.json"] {
+            let path = folder.join(name);
+            match std::fs::remove_file(&path) {
+                Err(error) if error.kind() != ErrorKind::NotFound => {
+                    return Err(RunError::output(&path)(error));
+                }
+                _ => {}
+            }
+        }
         let thermo = match scene.output.thermo {
             0 => None,
             _ => Some(ThermoFile::create(&folder.join("thermo.csv"))?),

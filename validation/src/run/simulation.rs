@@ -20,6 +20,7 @@ pub struct Simulation {
     seed: u64,
     number: u64,
     thermostat: bool,
+    all_densities: bool,
     dimensions: usize,
     domain: PeriodicBox,
     mass: Vec<f64>,
@@ -60,6 +61,7 @@ impl Simulation {
             seed,
             number: 0,
             thermostat: true,
+            all_densities: false,
             dimensions: fluid.dimensions,
             mass,
             owned: x.len(),
@@ -85,6 +87,7 @@ impl Simulation {
     pub fn set_temperature(&mut self, kt: f64) -> Result<(), RunError> {
         if kt != self.kt {
             self.engine = Engine::new(&self.model.at(kt)?)?;
+            self.engine.sum_all_densities(self.all_densities);
             self.kt = kt;
         }
         Ok(())
@@ -179,10 +182,9 @@ impl Simulation {
     /// Velocities must be finite, and within a step of `dt` lead nowhere beyond the box.
     fn check_velocities(&self, dt: Option<f64>) -> Result<(), RunError> {
         let limit = dt.map_or(f64::MAX, |dt| self.longest_move / (dt * dt));
-        // A comparison that NaN fails; one look back only if something is wrong.
         let too_fast = |v: &[f64; 3]| {
             let speed = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
-            !(speed <= limit)
+            speed.is_nan() || speed > limit
         };
         let Some(k) = self.v[..self.owned].iter().position(too_fast) else {
             return Ok(());
@@ -205,7 +207,7 @@ impl Simulation {
         self.engine.plan()
     }
 
-    /// How often each pass of the engine has run.
+    /// How often each pass of the engine has run, since the temperature was last changed.
     pub fn counts(&self) -> PassCounts {
         self.engine.counts()
     }
@@ -217,6 +219,7 @@ impl Simulation {
 
     /// Whether every density of the model is summed, or only those that forces need.
     pub fn sum_all_densities(&mut self, all: bool) {
+        self.all_densities = all;
         self.engine.sum_all_densities(all);
     }
 
@@ -375,8 +378,10 @@ impl Simulation {
         self.over_volume(self.tally.total_virial())
     }
 
-    /// The same with the virial of conservative forces alone: the same mean at small time steps,
-    /// with less noise.
+    /// The same with the virial of conservative forces alone, which has less noise.
+    ///
+    /// The two means differ by a term of order Δt: the drag of velocity Verlet sees the velocity that
+    /// brought particles to where they are, which is correlated with their distance.
     pub fn conservative_pressure_tensor(&self) -> [f64; 6] {
         self.over_volume(self.tally.virial)
     }
