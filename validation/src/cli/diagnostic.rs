@@ -18,9 +18,9 @@ impl Failure {
     /// Bad input, or something missing.
     pub fn new(error: impl std::error::Error + Send + Sync + 'static) -> Failure {
         let error: Box<dyn std::error::Error + Send + Sync> = Box::new(error);
-        let source = file_error(&*error).filter(|e| !e.file().text().is_empty()).map(|e| {
-            NamedSource::new(e.file().name(), e.file().text().to_owned()).with_language("toml")
-        });
+        let source = file_error(&*error)
+            .filter(|e| !e.file().text().is_empty())
+            .map(|e| NamedSource::new(e.file().name(), e.file().text().to_owned()).with_language("toml"));
         let stopped = matches!(run_error(&*error), Some(e) if e.is_stop());
         Failure { error, source, stopped }
     }

@@ -1,7 +1,6 @@
 //! The codes, and how each is told about the fluid.
 
 use super::fluids::{A, RC, RD, WarrenSet};
-use super::start::data_file;
 use super::{Context, ValidateError};
 use crate::lammps::setfl::{Element, Setfl};
 use crate::run::State;
@@ -80,7 +79,7 @@ impl Setup<'_> {
         let place = |name: &str| {
             if absolute { folder.join(name).display().to_string() } else { name.to_owned() }
         };
-        let data = data_file(state);
+        let data = state.to_data("psidpd");
         let atom_style = match self.code {
             Code::BuiltIn => {
                 data.write_mdpd(&folder.join("start.data"))?;

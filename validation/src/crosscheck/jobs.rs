@@ -35,7 +35,7 @@ mod tests {
 
     #[test]
     fn results_keep_the_order_of_jobs() {
-        let jobs: Vec<Job<usize>> = (0..20).map(|k| Box::new(move || k * k) as Job<usize>).collect();
+        let jobs: Vec<Job<usize>> = (0..20usize).map(|k| Box::new(move || k * k) as Job<usize>).collect();
         assert_eq!(run(jobs), (0..20).map(|k| k * k).collect::<Vec<_>>());
         assert!(run(Vec::<Job<u8>>::new()).is_empty());
     }

@@ -2,8 +2,6 @@
 
 use super::ValidateError;
 use super::fluids::WarrenSet;
-use crate::lammps::DataFile;
-use crate::lammps::data::Atom;
 use crate::run::{Integrator, Simulation, State};
 use psidpd_core::engine::{PeriodicBox, Want};
 use rand::{RngExt, SeedableRng};
@@ -64,27 +62,4 @@ pub fn equilibrated(
         }
     }
     Ok(simulation.state())
-}
-
-/// A state as a LAMMPS data file; the box must have edges along the axes.
-pub fn data_file(state: &State) -> DataFile {
-    let low = state.domain.origin();
-    let lengths = state.domain.lengths();
-    DataFile {
-        title: "psidpd".into(),
-        boxlo: low,
-        boxhi: std::array::from_fn(|k| low[k] + lengths[k]),
-        tilt: None,
-        types: state.mass.len(),
-        masses: state.mass.clone(),
-        atoms: (0..state.len())
-            .map(|k| Atom {
-                id: state.tag[k] as u32,
-                kind: state.species[k] as u32 + 1,
-                x: state.x[k],
-                image: state.image[k],
-            })
-            .collect(),
-        velocities: Some(state.v.clone()),
-    }
 }

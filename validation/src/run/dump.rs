@@ -1,4 +1,5 @@
 use super::simulation::Simulation;
+use crate::lammps::dump::{Digits, DumpWriter, Snapshot};
 use std::io::{self, Write};
 
 /// Writes the present step as a frame of a LAMMPS custom dump, `id type x y z vx vy vz`; types are
@@ -9,20 +10,16 @@ use std::io::{self, Write};
 pub fn write_frame(simulation: &Simulation, to: &mut impl Write) -> io::Result<()> {
     let domain = simulation.domain();
     let (origin, lengths) = (domain.origin(), domain.lengths());
-    writeln!(to, "ITEM: TIMESTEP\n{}", simulation.step_number())?;
-    writeln!(to, "ITEM: NUMBER OF ATOMS\n{}", simulation.len())?;
-    writeln!(to, "ITEM: BOX BOUNDS pp pp pp")?;
-    for k in 0..3 {
-        writeln!(to, "{:?} {:?}", origin[k], origin[k] + lengths[k])?;
-    }
-    writeln!(to, "ITEM: ATOMS id type x y z vx vy vz")?;
-    let (x, v) = (simulation.positions(), simulation.velocities());
-    for (k, tag) in simulation.tags().iter().enumerate() {
-        write!(to, "{tag} {}", simulation.species()[k] + 1)?;
-        for c in x[k].iter().chain(&v[k]) {
-            write!(to, " {c:?}")?;
-        }
-        writeln!(to)?;
-    }
-    Ok(())
+    let ids: Vec<u32> = simulation.tags().iter().map(|t| *t as u32).collect();
+    let kinds: Vec<u32> = simulation.species().iter().map(|s| *s as u32 + 1).collect();
+    DumpWriter::new(to, Digits::All).write(&Snapshot {
+        step: simulation.step_number() as i64,
+        boxlo: origin,
+        boxhi: std::array::from_fn(|k| origin[k] + lengths[k]),
+        periodic: [true, true, simulation.dimensions() == 3],
+        ids: &ids,
+        kinds: &kinds,
+        x: simulation.positions(),
+        v: simulation.velocities(),
+    })
 }

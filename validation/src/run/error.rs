@@ -76,6 +76,9 @@ pub enum RunError {
         /// Where it is.
         saved: PathBuf,
     },
+    /// A data file cannot be written.
+    #[error(transparent)]
+    Lammps(#[from] crate::lammps::LammpsError),
     /// A file or folder cannot be written.
     #[error("{} cannot be written: {source}", path.display())]
     Output {
@@ -87,6 +90,17 @@ pub enum RunError {
 }
 
 impl RunError {
+    /// Whether a run stopped on its way, rather than could not start.
+    pub fn is_stop(&self) -> bool {
+        matches!(
+            self,
+            RunError::Stopped { .. }
+                | RunError::Engine { .. }
+                | RunError::Velocity { .. }
+                | RunError::Runaway { .. }
+        )
+    }
+
     pub(super) fn output(path: &Path) -> impl FnOnce(std::io::Error) -> RunError + '_ {
         move |source| RunError::Output { path: path.to_owned(), source }
     }

@@ -1,52 +1,94 @@
-//! A state as a LAMMPS data file, to go on from, in either code.
+//! States as LAMMPS data files, to go on from, in either code.
 
 use super::error::RunError;
 use super::state::State;
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use crate::lammps::data::{Atom, DataFile};
+use nalgebra::{Matrix3, Vector3};
+use psidpd_core::engine::PeriodicBox;
+use psidpd_core::model::Model;
 use std::path::Path;
 
-/// Writes `state` as a LAMMPS data file of atom style `atomic`, every number with the seventeen digits
-/// that bring it back unchanged. Types are species from 1; `title` becomes the first line.
+impl State {
+    /// The state as a data file of atom style `atomic`: types are species from 1; `title` becomes the
+    /// first line.
+    pub fn to_data(&self, title: &str) -> DataFile {
+        let origin = self.domain.origin();
+        let edges = [0, 1, 2].map(|k| self.domain.edge(k));
+        let tilt = [edges[1][0], edges[2][0], edges[2][1]];
+        DataFile {
+            title: title.to_owned(),
+            boxlo: origin,
+            boxhi: std::array::from_fn(|k| origin[k] + edges[k][k]),
+            tilt: (tilt != [0.0; 3]).then_some(tilt),
+            types: self.mass.len(),
+            masses: self.mass.clone(),
+            atoms: (0..self.len())
+                .map(|k| Atom {
+                    id: self.tag[k] as u32,
+                    kind: self.species[k] as u32 + 1,
+                    x: self.x[k],
+                    image: self.image[k],
+                })
+                .collect(),
+            velocities: Some(self.v.clone()),
+        }
+    }
+
+    /// The state of a data file, in a box periodic in every direction of the model; particles outside
+    /// are put inside. Types are species from 1. Masses not given are 1, velocities not given are 0.
+    ///
+    /// # Errors
+    /// A type that the model has no species for, a tag beyond what LAMMPS counts, a box without volume.
+    pub fn from_data(data: &DataFile, model: &Model) -> Result<State, RunError> {
+        let species = model.species().len();
+        let [xy, xz, yz] = data.tilt.unwrap_or([0.0; 3]);
+        let [lx, ly, lz]: [f64; 3] = std::array::from_fn(|k| data.boxhi[k] - data.boxlo[k]);
+        let edges = Matrix3::from_columns(&[
+            Vector3::new(lx, 0.0, 0.0),
+            Vector3::new(xy, ly, 0.0),
+            Vector3::new(xz, yz, lz),
+        ]);
+        let periodic = [true, true, model.dimensions() == 3];
+        let domain =
+            PeriodicBox::new(data.boxlo, edges, periodic).map_err(|e| RunError::State(e.to_string()))?;
+        let mut state = State {
+            domain,
+            mass: vec![1.0; species],
+            x: Vec::new(),
+            v: data.velocities.clone().unwrap_or_else(|| vec![[0.0; 3]; data.atoms.len()]),
+            species: Vec::new(),
+            tag: Vec::new(),
+            image: Vec::new(),
+        };
+        for (mass, given) in state.mass.iter_mut().zip(&data.masses) {
+            *mass = *given;
+        }
+        for atom in &data.atoms {
+            let kind = atom.kind as usize;
+            if kind > species {
+                return Err(RunError::State(format!(
+                    "atom {} has type {kind}, the model has {species} species: {}",
+                    atom.id,
+                    model.species().join(", ")
+                )));
+            }
+            let tag = i32::try_from(atom.id)
+                .map_err(|_| RunError::State(format!("atom id {} is beyond what tags can count", atom.id)))?;
+            let (mut x, mut image) = (atom.x, atom.image);
+            state.domain.wrap(&mut x, &mut image);
+            state.x.push(x);
+            state.image.push(image);
+            state.species.push(kind as i32 - 1);
+            state.tag.push(tag);
+        }
+        Ok(state)
+    }
+}
+
+/// Writes `state` as a data file, every number with the seventeen digits that bring it back unchanged.
 ///
 /// # Errors
 /// The file cannot be written.
 pub fn write_data(path: &Path, title: &str, state: &State) -> Result<(), RunError> {
-    File::create(path)
-        .and_then(|file| {
-            let mut to = BufWriter::new(file);
-            write(&mut to, title, state)?;
-            to.flush()
-        })
-        .map_err(RunError::output(path))
-}
-
-fn write(to: &mut impl Write, title: &str, state: &State) -> io::Result<()> {
-    writeln!(to, "{}\n", title.lines().next().unwrap_or(""))?;
-    writeln!(to, "{} atoms\n{} atom types\n", state.len(), state.mass.len())?;
-    let domain = &state.domain;
-    let origin = domain.origin();
-    let edges = [0, 1, 2].map(|k| domain.edge(k));
-    for (k, name) in ["x", "y", "z"].into_iter().enumerate() {
-        writeln!(to, "{:.16e} {:.16e} {name}lo {name}hi", origin[k], origin[k] + edges[k][k])?;
-    }
-    let tilt = [edges[1][0], edges[2][0], edges[2][1]];
-    if tilt != [0.0; 3] {
-        writeln!(to, "{:.16e} {:.16e} {:.16e} xy xz yz", tilt[0], tilt[1], tilt[2])?;
-    }
-    writeln!(to, "\nMasses\n")?;
-    for (k, mass) in state.mass.iter().enumerate() {
-        writeln!(to, "{} {mass:.16e}", k + 1)?;
-    }
-    writeln!(to, "\nAtoms # atomic\n")?;
-    for (k, x) in state.x.iter().enumerate() {
-        let [a, b, c] = state.image[k];
-        let kind = state.species[k] + 1;
-        writeln!(to, "{} {kind} {:.16e} {:.16e} {:.16e} {a} {b} {c}", state.tag[k], x[0], x[1], x[2])?;
-    }
-    writeln!(to, "\nVelocities\n")?;
-    for (tag, v) in state.tag.iter().zip(&state.v) {
-        writeln!(to, "{tag} {:.16e} {:.16e} {:.16e}", v[0], v[1], v[2])?;
-    }
-    Ok(())
+    state.to_data(title).write(path).map_err(RunError::Lammps)
 }

@@ -58,3 +58,27 @@ impl Summary {
         text.and_then(|text| std::fs::write(path, text + "\n")).map_err(RunError::output(path))
     }
 }
+
+/// For the end of a run in a terminal.
+impl std::fmt::Display for Summary {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        writeln!(
+            f,
+            "{}: {} particles, {} steps in {:.1} s",
+            self.title, self.particles, self.steps, self.wall_seconds
+        )?;
+        write!(f, "{:.3e} particle-steps per second", self.particle_steps_per_second)?;
+        if let Some(m) = &self.means {
+            let n = self.particles as f64;
+            write!(
+                f,
+                "\nmeans of {} rows: temperature {:.4}, potential energy per particle {:.4}, pressure {:.4}",
+                m.rows,
+                m.temperature,
+                m.potential / n,
+                m.pressure
+            )?;
+        }
+        Ok(())
+    }
+}
