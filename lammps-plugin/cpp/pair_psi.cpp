@@ -122,7 +122,8 @@ void PairPsi::check_host()
     for (int k = 1; k < 4; k++)
       if (force->special_lj[k] != 1.0)
         stop("computes all pairs, bonded or not: use 'special_bonds lj 1 1 1'");
-  if (neighbor->exclude)
+  // neighbor->exclude is set only later, by neighbor->init().
+  if (neighbor->nex_type + neighbor->nex_group + neighbor->nex_mol > 0)
     stop("computes all pairs: 'neigh_modify exclude' has no effect on it; remove it, or map types to NULL");
 }
 
