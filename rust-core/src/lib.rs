@@ -14,6 +14,8 @@
 //! Data flow: model file → [`model::Model`] → [`model::Fluid`] (at one kT) → [`engine::Plan`] →
 //! [`engine::Engine`].
 
+#[cfg(feature = "c-api")]
+pub mod c_api;
 pub mod document;
 pub mod engine;
 pub mod model;

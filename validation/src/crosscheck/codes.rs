@@ -63,9 +63,22 @@ pub struct Setup<'a> {
     pub seed: u64,
     /// `newton on`?
     pub newton: bool,
+    /// Spacing in r of the tables of [`Code::Eam`].
+    pub spacing: f64,
 }
 
-impl Setup<'_> {
+/// Spacing of tables for runs: small enough to sit in a cache.
+const COARSE: f64 = 5e-5;
+/// Spacing of tables for comparing forces. A spline is exact but near the kink of w′ at r_d, where its
+/// error is proportional to the spacing.
+pub const FINE: f64 = 1e-6;
+
+impl<'a> Setup<'a> {
+    /// No drag, no noise, `newton on`.
+    pub fn new(code: Code, set: &'a WarrenSet, law: ForceLaw) -> Setup<'a> {
+        Setup { code, set, law, gamma: 0.0, seed: 1, newton: true, spacing: COARSE }
+    }
+
     /// Writes data, model or tables into `folder` and returns the commands up to the pair style. Paths
     /// in them are relative to `folder` unless `absolute`.
     pub fn prepare(
@@ -120,7 +133,7 @@ impl Setup<'_> {
                  pair_coeff 1 1 mdpd/rhosum {RD}\npair_coeff 1 1 mdpd {A} {b} {gamma} {RC} {RD}\n"
             ),
             Code::Eam => {
-                write_tables(self.set, &folder.join("fluid.eam.alloy"))?;
+                write_tables(self.set, self.spacing, &folder.join("fluid.eam.alloy"))?;
                 let table = place("fluid.eam.alloy");
                 if gamma > 0.0 {
                     format!(
@@ -137,18 +150,15 @@ impl Setup<'_> {
     }
 }
 
-/// Spacing of the tables in r. A spline is exact up to the kink of the second derivative of w at r_d,
-/// where its error is proportional to the spacing.
-const DR: f64 = 1e-5;
 /// Largest density in the tables, far above any that occurs.
 const LARGEST_DENSITY: f64 = 60.0;
 
 /// ψ as embedding function, w as density and φ as pair potential of `eam/alloy`: LAMMPS's own route to
 /// the same conservative forces.
-fn write_tables(set: &WarrenSet, path: &Path) -> Result<(), ValidateError> {
+fn write_tables(set: &WarrenSet, spacing: f64, path: &Path) -> Result<(), ValidateError> {
     let fluid = set.model(ForceLaw::Conservative, 0.0)?.at(1.0)?;
     let density = &fluid.densities[0];
-    let points = (RC / DR).round() as usize + 6;
+    let points = (RC / spacing).round() as usize + 6;
     let nrho = 6001;
     let table = Setfl {
         title: "psidpd: Warren A/B model",
@@ -156,7 +166,7 @@ fn write_tables(set: &WarrenSet, path: &Path) -> Result<(), ValidateError> {
         nrho,
         drho: LARGEST_DENSITY / (nrho - 1) as f64,
         nr: points,
-        dr: DR,
+        dr: spacing,
         cutoff: RC,
         embedding: &|_, n| {
             let ExcessFreeEnergy::Formula(psi) = &fluid.excess[0];

@@ -34,7 +34,7 @@ pub fn run(context: &Context) -> Result<Part, ValidateError> {
             let bar = context.progress.bar(&format!("NVE: {}", code.label()), length.steps);
             let job = move || {
                 let law = if code == Code::BuiltIn { ForceLaw::LucyLammps } else { ForceLaw::Conservative };
-                let setup = Setup { code, set: &SET6, law, gamma: 0.0, seed: SEED, newton: true };
+                let setup = Setup::new(code, &SET6, law);
                 let trace = run_code(context, &setup, state, length, &format!("nve-{}", code.slug()), &|s| {
                     bar.set(s)
                 });

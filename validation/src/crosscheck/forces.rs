@@ -1,7 +1,7 @@
 //! One configuration, liquid and interface, in every code: forces, energy, virial.
 
-use super::codes::{Code, Setup};
-use super::fluids::{RC, RD, SET6, WarrenSet};
+use super::codes::{Code, FINE, Setup};
+use super::fluids::{RC, RD, SET6};
 use super::start::{Filling, equilibrated};
 use super::{Context, Part, ValidateError};
 use crate::lammps::Lammps;
@@ -140,7 +140,13 @@ pub fn run(context: &Context) -> Result<Part, ValidateError> {
             ));
             Ok::<(), ValidateError>(())
         };
-    let setup = |code, law, gamma, newton| Setup { code, set: &SET6, law, gamma, seed: SEED, newton };
+    let setup = |code, law, gamma, newton| Setup {
+        gamma,
+        seed: SEED,
+        newton,
+        spacing: FINE,
+        ..Setup::new(code, &SET6, law)
+    };
 
     use ForceLaw::{Conservative, LucyLammps};
     let truth = native(&SET6.model(Conservative, 0.0)?, &state, None)?;
@@ -217,14 +223,7 @@ fn heading(particles: usize) -> Section {
 fn gradient(context: &Context) -> Result<Check, ValidateError> {
     let filling = Filling { lengths: [4.0, 4.0, 6.0], thickness: 3.5, density: SET6.liquid };
     let state = equilibrated(&SET6, filling, 300, SEED)?;
-    let setup = Setup {
-        code: Code::Psi,
-        set: &SET6 as &WarrenSet,
-        law: ForceLaw::Conservative,
-        gamma: 0.0,
-        seed: SEED,
-        newton: true,
-    };
+    let setup = Setup::new(Code::Psi, &SET6, ForceLaw::Conservative);
     let lammps = open(context, &setup, &state, "forces-gradient")?;
     let truth = point(&lammps, state.domain.volume(3))?;
     let rms = (truth.forces.iter().flatten().map(|c| c * c).sum::<f64>() / truth.forces.len() as f64).sqrt();

@@ -97,7 +97,7 @@ fn lammps(
     newton: bool,
 ) -> Result<Vec<[f64; 3]>, ValidateError> {
     let folder = context.work.join(format!("trajectory-{}-{ranks}-{newton}", code.slug()));
-    let setup = Setup { code, set: &SET6, law: ForceLaw::Conservative, gamma: GAMMA, seed: SEED, newton };
+    let setup = Setup { gamma: GAMMA, seed: SEED, newton, ..Setup::new(code, &SET6, ForceLaw::Conservative) };
     let mut deck = setup.prepare(context, state, &folder, false)?;
     deck.push_str(&format!(
         "fix move all nve\ntimestep {DT}\nthermo {STEPS}\nrun {STEPS}\n\

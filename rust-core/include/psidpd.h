@@ -1,0 +1,518 @@
+/* psidpd: forces of many-body dissipative particle dynamics from model files.
+ *
+ * SPDX-License-Identifier: GPL-2.0-or-later
+ *
+ * Made from rust-core/src/c_api/ by cbindgen; change it there, then run
+ *     PSIDPD_UPDATE_HEADER=1 cargo test -p psidpd-core header
+ *
+ * Reduced units: lengths in r_c, masses in m, energies in the unit of the model file. r_ij = r_i - r_j.
+ *
+ * For each step: psidpd_engine_densities; copy the owners' numbers in psidpd_engine_slopes to their
+ * ghosts; psidpd_engine_forces; add forces on ghosts to their owners.
+ *
+ * If a function returns anything but PSIDPD_STATUS_OK, psidpd_last_error has the reason, and the places
+ * for results are left alone. Under "Safety" is what no function can check.
+ */
+
+
+#ifndef PSIDPD_H
+#define PSIDPD_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+/**
+ * The version of this interface. It goes up when a function or structure changes its meaning or
+ * layout or goes away, not when one is added.
+ */
+#define PSIDPD_ABI_VERSION 1
+
+/**
+ * For psidpd_engine_forces: compute the potential energy.
+ */
+#define PSIDPD_WANT_ENERGY 1
+
+/**
+ * For psidpd_engine_forces: compute the virials.
+ */
+#define PSIDPD_WANT_VIRIAL 2
+
+/**
+ * For psidpd_engine_forces: compute the energy of each particle.
+ */
+#define PSIDPD_WANT_PARTICLE_ENERGY 4
+
+/**
+ * For psidpd_engine_forces: compute the virial of each particle.
+ */
+#define PSIDPD_WANT_PARTICLE_VIRIAL 8
+
+/**
+ * What a call came to. The values keep their meaning in every version; later versions may add some.
+ */
+enum psidpd_status
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /**
+   * Done.
+   */
+  PSIDPD_STATUS_OK = 0,
+  /**
+   * An argument out of its domain: a length, an index, a flag, a text that is not UTF-8.
+   */
+  PSIDPD_STATUS_INVALID_ARGUMENT = 1,
+  /**
+   * A pointer that must not be null is.
+   */
+  PSIDPD_STATUS_NULL_POINTER = 2,
+  /**
+   * A file cannot be read.
+   */
+  PSIDPD_STATUS_FILE = 3,
+  /**
+   * A model file says something that makes no model, or none at this temperature.
+   */
+  PSIDPD_STATUS_MODEL = 4,
+  /**
+   * Forces cannot be computed for these particles: a position, a tag, a type, psi or a force is not
+   * what it must be. The message names the particle.
+   */
+  PSIDPD_STATUS_ENGINE = 5,
+  /**
+   * A call that must come after another one that has not been made, or has failed.
+   */
+  PSIDPD_STATUS_CALL_ORDER = 6,
+  /**
+   * A fault in this library. An engine can be used again after psidpd_engine_densities.
+   */
+  PSIDPD_STATUS_PANIC = 255,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum psidpd_status psidpd_status;
+#else
+typedef int32_t psidpd_status;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * The forces of one model at one temperature. One thread at a time may use an engine; different
+ * threads may use different ones.
+ */
+typedef struct psidpd_engine psidpd_engine;
+
+/**
+ * A model file, read and checked. Threads may share one.
+ */
+typedef struct psidpd_model psidpd_model;
+
+/**
+ * Particles of one host or rank: owned ones first, then ghosts.
+ */
+typedef struct psidpd_particles {
+  /**
+   * How many are owned.
+   */
+  size_t owned;
+  /**
+   * How many there are, ghosts included.
+   */
+  size_t all;
+  /**
+   * Positions, `3 * all`: x, y, z of the first, of the second, ... Ghosts are where their image is.
+   */
+  const double *x;
+  /**
+   * Numbers that stay with the particles, from 1, `all` of them; images share their owner's.
+   */
+  const int32_t *tag;
+  /**
+   * Types, `all` of them: species indices from 0, unless psidpd_engine_map_kinds says otherwise.
+   */
+  const int32_t *kind;
+} psidpd_particles;
+
+/**
+ * What the thermostat of a step is keyed and scaled by.
+ */
+typedef struct psidpd_step {
+  /**
+   * Seed of the pair noise.
+   */
+  uint64_t seed;
+  /**
+   * Number of the step.
+   */
+  uint64_t number;
+  /**
+   * Time step, positive.
+   */
+  double dt;
+} psidpd_step;
+
+/**
+ * Sums over the particles and pairs of one host or rank; the sums of all ranks add up.
+ *
+ * Virials are sums of r_ij (x) F_ij: xx, yy, zz, xy, xz, yz. What was not asked for means nothing.
+ */
+typedef struct psidpd_tally {
+  /**
+   * Sum of psi over particles. The potential energy is `excess + pair`.
+   */
+  double excess;
+  /**
+   * Sum of phi over pairs.
+   */
+  double pair;
+  /**
+   * Virial of the conservative forces.
+   */
+  double virial[6];
+  /**
+   * Virial of the dissipative and random forces.
+   */
+  double thermostat_virial[6];
+} psidpd_tally;
+
+#ifdef __cplusplus
+extern "C" {
+#endif // __cplusplus
+
+/**
+ * The PSIDPD_ABI_VERSION that the library was built with. A program must refuse to go on if it
+ * differs from the one in its header.
+ */
+uint32_t psidpd_abi_version(void);
+
+/**
+ * The version of the library, as "1.2.3"; valid for ever.
+ */
+const char *psidpd_version(void);
+
+/**
+ * The message of the last call on this thread that failed, empty if none has. UTF-8.
+ *
+ * Valid until the next call on this thread that fails, and until the thread ends. Calls that succeed
+ * leave it alone, so look at the status first.
+ */
+const char *psidpd_last_error(void);
+
+/**
+ * Reads the model file at `path` and puts a new model in `*model`, to be freed with
+ * psidpd_model_free. If it fails, `*model` is left alone.
+ *
+ * # Errors
+ * PSIDPD_STATUS_FILE if the file cannot be read, PSIDPD_STATUS_MODEL if something in it is
+ * wrong; the message has line and key. PSIDPD_STATUS_NULL_POINTER.
+ *
+ * # Safety
+ * `path` ends with a zero byte; `model` can be written to.
+ */
+psidpd_status psidpd_model_open(const char *path, struct psidpd_model **model);
+
+/**
+ * Reads a model from `text`, UTF-8; `name` stands for the file in messages. Puts a new model in
+ * `*model`, to be freed with psidpd_model_free. If it fails, `*model` is left alone.
+ *
+ * # Errors
+ * PSIDPD_STATUS_MODEL if something in the text is wrong; the message has line and key.
+ * PSIDPD_STATUS_INVALID_ARGUMENT if `name` or `text` is not UTF-8. PSIDPD_STATUS_NULL_POINTER.
+ *
+ * # Safety
+ * `name` and `text` end with a zero byte; `model` can be written to.
+ */
+psidpd_status psidpd_model_parse(const char *name, const char *text, struct psidpd_model **model);
+
+/**
+ * Frees a model, and with it the texts that it has given out; NULL is ignored. Engines made from the
+ * model live on.
+ *
+ * # Safety
+ * `model` is NULL or a model that has not been freed, and no other thread is using it.
+ */
+void psidpd_model_free(struct psidpd_model *model);
+
+/**
+ * Puts in `*title` what the model calls itself; valid until the model is freed.
+ *
+ * # Errors
+ * PSIDPD_STATUS_NULL_POINTER.
+ *
+ * # Safety
+ * `model` is NULL or a model that has not been freed; `title` can be written to.
+ */
+psidpd_status psidpd_model_title(const struct psidpd_model *model, const char **title);
+
+/**
+ * Puts in `*dimensions` the number of dimensions of space, 2 or 3.
+ *
+ * # Errors
+ * PSIDPD_STATUS_NULL_POINTER.
+ *
+ * # Safety
+ * `model` is NULL or a model that has not been freed; `dimensions` can be written to.
+ */
+psidpd_status psidpd_model_dimensions(const struct psidpd_model *model, size_t *dimensions);
+
+/**
+ * Puts in `*count` the number of species.
+ *
+ * # Errors
+ * PSIDPD_STATUS_NULL_POINTER.
+ *
+ * # Safety
+ * `model` is NULL or a model that has not been freed; `count` can be written to.
+ */
+psidpd_status psidpd_model_species_count(const struct psidpd_model *model, size_t *count);
+
+/**
+ * Puts in `*name` the name of species `index`, from 0; valid until the model is freed.
+ *
+ * # Errors
+ * PSIDPD_STATUS_INVALID_ARGUMENT if there is no such species. PSIDPD_STATUS_NULL_POINTER.
+ *
+ * # Safety
+ * `model` is NULL or a model that has not been freed; `name` can be written to.
+ */
+psidpd_status psidpd_model_species_name(const struct psidpd_model *model,
+                                        size_t index,
+                                        const char **name);
+
+/**
+ * Makes an engine for `model` at temperature `kt`, in the energy unit of the model, and puts it in
+ * `*engine`, to be freed with psidpd_engine_free. If it fails, `*engine` is left alone. The engine
+ * does not need the model any more.
+ *
+ * # Errors
+ * PSIDPD_STATUS_MODEL if `kt` is not a positive number, or the model is not finite at it.
+ * PSIDPD_STATUS_NULL_POINTER.
+ *
+ * # Safety
+ * `model` is NULL or a model that has not been freed; `engine` can be written to.
+ */
+psidpd_status psidpd_engine_new(const struct psidpd_model *model,
+                                double kt,
+                                struct psidpd_engine **engine);
+
+/**
+ * Frees an engine, and with it all that it has given out; NULL is ignored.
+ *
+ * # Safety
+ * `engine` is NULL or an engine that has not been freed, and no other thread is using it.
+ */
+void psidpd_engine_free(struct psidpd_engine *engine);
+
+/**
+ * Puts in `*cutoff` the longest range of any force: ghosts are needed this far from owned particles.
+ *
+ * # Errors
+ * PSIDPD_STATUS_NULL_POINTER.
+ *
+ * # Safety
+ * `engine` is NULL or an engine that has not been freed; `cutoff` can be written to.
+ */
+psidpd_status psidpd_engine_cutoff(const struct psidpd_engine *engine,
+                                   double *cutoff);
+
+/**
+ * Puts in `*width` how many numbers per particle psidpd_engine_slopes has, to be forwarded to ghosts;
+ * zero if there is nothing to forward.
+ *
+ * # Errors
+ * PSIDPD_STATUS_NULL_POINTER.
+ *
+ * # Safety
+ * `engine` is NULL or an engine that has not been freed; `width` can be written to.
+ */
+psidpd_status psidpd_engine_slope_width(const struct psidpd_engine *engine,
+                                        size_t *width);
+
+/**
+ * Puts in `*needs` 1 if there is a thermostat, so that psidpd_engine_forces with a step needs
+ * velocities, of ghosts too; 0 if not.
+ *
+ * # Errors
+ * PSIDPD_STATUS_NULL_POINTER.
+ *
+ * # Safety
+ * `engine` is NULL or an engine that has not been freed; `needs` can be written to.
+ */
+psidpd_status psidpd_engine_needs_velocities(const struct psidpd_engine *engine, int32_t *needs);
+
+/**
+ * Puts in `*range` the range of the random force, zero if there is none. Periodic boxes must be at
+ * least twice as long, or two images of a pair would share their noise.
+ *
+ * # Errors
+ * PSIDPD_STATUS_NULL_POINTER.
+ *
+ * # Safety
+ * `engine` is NULL or an engine that has not been freed; `range` can be written to.
+ */
+psidpd_status psidpd_engine_noise_range(const struct psidpd_engine *engine, double *range);
+
+/**
+ * Puts in `*text` what the engine computes, for people, in lines; valid until the engine is freed.
+ *
+ * # Errors
+ * PSIDPD_STATUS_NULL_POINTER.
+ *
+ * # Safety
+ * `engine` is NULL or an engine that has not been freed; `text` can be written to.
+ */
+psidpd_status psidpd_engine_plan_text(const struct psidpd_engine *engine, const char **text);
+
+/**
+ * Maps the host's types to species, from the next psidpd_engine_densities on: `species[kind]` is the
+ * species index of type `kind`, negative for particles that take no part. `species` is copied.
+ *
+ * # Errors
+ * PSIDPD_STATUS_INVALID_ARGUMENT if the model has no such species. PSIDPD_STATUS_NULL_POINTER.
+ *
+ * # Safety
+ * `engine` is NULL or an engine that has not been freed; `species` has `length` entries.
+ */
+psidpd_status psidpd_engine_map_kinds(struct psidpd_engine *engine,
+                                      const int32_t *species,
+                                      size_t length);
+
+/**
+ * Whether psidpd_engine_densities sums every density of the model (1) or only those that forces need
+ * (0, and so at first).
+ *
+ * # Errors
+ * PSIDPD_STATUS_INVALID_ARGUMENT if `all` is neither. PSIDPD_STATUS_NULL_POINTER.
+ *
+ * # Safety
+ * `engine` is NULL or an engine that has not been freed.
+ */
+psidpd_status psidpd_engine_sum_all_densities(struct psidpd_engine *engine,
+                                              int32_t all);
+
+/**
+ * First half of an evaluation: finds pairs, sums local densities, evaluates psi and its slopes for
+ * owned particles.
+ *
+ * With `newton` 1, each pair is computed once over all ranks and images, and the host adds forces on
+ * ghosts back to their owners; with 0, pairs with ghosts are computed on both sides and ghosts get no
+ * forces.
+ *
+ * # Errors
+ * PSIDPD_STATUS_ENGINE for a position or psi that is not finite, a tag below 1, a type that is not
+ * mapped. PSIDPD_STATUS_INVALID_ARGUMENT for numbers of particles that cannot be or another `newton`.
+ * PSIDPD_STATUS_NULL_POINTER; arrays may be NULL if there are no particles. After an error there are
+ * no densities and slopes.
+ *
+ * # Safety
+ * `engine` is NULL or an engine that has not been freed; `particles` is NULL or at a structure whose
+ * arrays are as long as it says. Nothing is kept of them.
+ */
+psidpd_status psidpd_engine_densities(struct psidpd_engine *engine,
+                                      const struct psidpd_particles *particles,
+                                      int32_t newton);
+
+/**
+ * Puts in `*slopes` the place of the derivatives of psi, and in `*length` how many there are: of each
+ * owned particle psidpd_engine_slope_width numbers, then as many of each ghost. Those of ghosts are
+ * zero; the host must fill them in with their owners' before psidpd_engine_forces.
+ *
+ * Valid until the next psidpd_engine_densities with this engine, and until the engine is freed.
+ *
+ * # Errors
+ * PSIDPD_STATUS_CALL_ORDER without psidpd_engine_densities. PSIDPD_STATUS_NULL_POINTER.
+ *
+ * # Safety
+ * `engine` is NULL or an engine that has not been freed; `slopes` and `length` can be written to.
+ */
+psidpd_status psidpd_engine_slopes(struct psidpd_engine *engine,
+                                   double **slopes,
+                                   size_t *length);
+
+/**
+ * Second half of an evaluation: adds to `force`, `3 * all` numbers, the forces on `particles`, the
+ * same as in psidpd_engine_densities, and puts in `*tally` the sums that `want` asks for, which is 0
+ * or PSIDPD_WANT_... joined by `|`.
+ *
+ * `v` has the velocities, `3 * all`, and `step` what the thermostat needs. With `step` NULL only
+ * conservative forces are computed, and `v` may be NULL; so it may if there is no thermostat (see
+ * psidpd_engine_needs_velocities). `tally` may be NULL.
+ *
+ * # Errors
+ * PSIDPD_STATUS_ENGINE for a force that is not finite; `force` has been added to nevertheless.
+ * PSIDPD_STATUS_CALL_ORDER without psidpd_engine_densities. PSIDPD_STATUS_INVALID_ARGUMENT for other
+ * numbers of particles than there, unknown bits in `want`, a `dt` that is not positive, or if `force`
+ * overlaps `x` or `v`. PSIDPD_STATUS_NULL_POINTER.
+ *
+ * # Safety
+ * `engine` is NULL or an engine that has not been freed; `particles` is NULL or at a structure whose
+ * arrays are as long as it says; `v` is NULL or has `3 * all` numbers, and so has `force`, which must
+ * overlap none of the others, nor what the engine has given out; `step` is NULL or a step; `tally` is
+ * NULL or can be written to. Nothing is kept of them.
+ */
+psidpd_status psidpd_engine_forces(struct psidpd_engine *engine,
+                                   const struct psidpd_particles *particles,
+                                   const double *v,
+                                   const struct psidpd_step *step,
+                                   uint32_t want,
+                                   double *force,
+                                   struct psidpd_tally *tally);
+
+/**
+ * Puts in `*densities` the place of the local densities of owned particles, and in `*length` how many
+ * numbers that is: of each particle those of the first density, one for each species, then those of
+ * the second ... Not corrected. Those that forces do not need are zero unless
+ * psidpd_engine_sum_all_densities.
+ *
+ * Valid until the next psidpd_engine_densities with this engine, and until the engine is freed.
+ *
+ * # Errors
+ * PSIDPD_STATUS_CALL_ORDER without psidpd_engine_densities. PSIDPD_STATUS_NULL_POINTER.
+ *
+ * # Safety
+ * `engine` is NULL or an engine that has not been freed; `densities` and `length` can be written to.
+ */
+psidpd_status psidpd_engine_local_densities(const struct psidpd_engine *engine,
+                                            const double **densities,
+                                            size_t *length);
+
+/**
+ * Puts in `*energies` the place of the energies of particles and ghosts, and in `*length` how many
+ * there are: none unless the last psidpd_engine_forces was asked for PSIDPD_WANT_PARTICLE_ENERGY.
+ * With `newton` 1 those of ghosts belong to their owners.
+ *
+ * Valid until the next psidpd_engine_forces with this engine, and until the engine is freed.
+ *
+ * # Errors
+ * PSIDPD_STATUS_CALL_ORDER without psidpd_engine_densities. PSIDPD_STATUS_NULL_POINTER.
+ *
+ * # Safety
+ * `engine` is NULL or an engine that has not been freed; `energies` and `length` can be written to.
+ */
+psidpd_status psidpd_engine_particle_energy(const struct psidpd_engine *engine,
+                                            const double **energies,
+                                            size_t *length);
+
+/**
+ * Puts in `*virials` the place of the virials of particles and ghosts, and in `*length` how many
+ * numbers that is, six each: none unless the last psidpd_engine_forces was asked for
+ * PSIDPD_WANT_PARTICLE_VIRIAL. With `newton` 1 those of ghosts belong to their owners.
+ *
+ * Valid until the next psidpd_engine_forces with this engine, and until the engine is freed.
+ *
+ * # Errors
+ * PSIDPD_STATUS_CALL_ORDER without psidpd_engine_densities. PSIDPD_STATUS_NULL_POINTER.
+ *
+ * # Safety
+ * `engine` is NULL or an engine that has not been freed; `virials` and `length` can be written to.
+ */
+psidpd_status psidpd_engine_particle_virial(const struct psidpd_engine *engine,
+                                            const double **virials,
+                                            size_t *length);
+
+#ifdef __cplusplus
+}  // extern "C"
+#endif  // __cplusplus
+
+#endif  /* PSIDPD_H */

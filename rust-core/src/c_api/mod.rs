@@ -1,0 +1,19 @@
+//! The C interface, declared in `include/psidpd.h`: models and engines behind opaque handles.
+//!
+//! Every function that can fail returns a [`Status`] and leaves a message in [`psidpd_last_error`];
+//! no panic leaves this module. What the functions do is in [`crate::model`] and [`crate::engine`];
+//! here are only checks and conversions.
+
+mod arguments;
+mod engine;
+mod model;
+mod status;
+mod version;
+
+pub use engine::*;
+pub use model::*;
+pub use status::{Status, psidpd_last_error};
+pub use version::*;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,386 @@
+/* A program in C, and in C++, that uses psidpd.h as a host would: periodic images as ghosts, slopes
+ * forwarded to them, forces brought home. It checks what it can by itself and prints the rest. */
+
+#include "psidpd.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define OWNED 12
+#define MOST (27 * OWNED)
+
+static const double box[3] = {2.3, 2.6, 2.1};
+
+static const char *const model_text =
+    "title = \"Warren 2003, set 6\"\n"
+    "species = [\"F\"]\n"
+    "[parameters]\n"
+    "A = -40.0\n"
+    "B = 25.0\n"
+    "rd = 0.75\n"
+    "[density.n]\n"
+    "kernel = \"quadratic\"\n"
+    "range = \"rd\"\n"
+    "[excess_free_energy]\n"
+    "F = \"pi/30 * rd^4 * B * n^2\"\n"
+    "[[pair]]\n"
+    "between = [\"F\", \"F\"]\n"
+    "form = \"soft\"\n"
+    "strength = \"A\"\n"
+    "range = 1.0\n"
+    "[[thermostat]]\n"
+    "gamma = 4.5\n"
+    "range = 1.0\n";
+
+static void fail(int line, const char *what)
+{
+    fprintf(stderr, "line %d: %s; last error: %s\n", line, what, psidpd_last_error());
+    exit(1);
+}
+
+#define CHECK(condition)                                                                           \
+    do {                                                                                           \
+        if (!(condition)) fail(__LINE__, #condition);                                              \
+    } while (0)
+#define OK(call) CHECK((call) == PSIDPD_STATUS_OK)
+#define FAILS(call, status, text)                                                                  \
+    do {                                                                                           \
+        CHECK((call) == (status));                                                                 \
+        CHECK(strstr(psidpd_last_error(), (text)) != NULL);                                        \
+    } while (0)
+
+/* Particles and their images. */
+struct host {
+    size_t all;
+    size_t owner[MOST];
+    double x[3 * MOST];
+    double v[3 * MOST];
+    int32_t tag[MOST];
+    int32_t kind[MOST];
+    double force[3 * MOST];
+    psidpd_tally tally;
+};
+
+static double uniform(void)
+{
+    static uint32_t state = 2003;
+    state = state * UINT32_C(1664525) + UINT32_C(1013904223);
+    return state / 4294967296.0;
+}
+
+static void add_images(struct host *host, double cutoff)
+{
+    size_t i, all = OWNED;
+    int a, b, c, k;
+    /* Finite differences push particles out a little. */
+    const double margin = cutoff + 0.01;
+    for (i = 0; i < OWNED; i++) {
+        for (a = -1; a <= 1; a++) {
+            for (b = -1; b <= 1; b++) {
+                for (c = -1; c <= 1; c++) {
+                    const int shift[3] = {a, b, c};
+                    int near = a != 0 || b != 0 || c != 0;
+                    for (k = 0; k < 3; k++) {
+                        const double y = host->x[3 * i + k] + shift[k] * box[k];
+                        near = near && y > -margin && y < box[k] + margin;
+                        host->x[3 * all + k] = y;
+                        host->v[3 * all + k] = host->v[3 * i + k];
+                    }
+                    if (near) {
+                        host->owner[all] = i;
+                        host->tag[all] = host->tag[i];
+                        host->kind[all] = host->kind[i];
+                        all++;
+                    }
+                }
+            }
+        }
+    }
+    host->all = all;
+}
+
+/* Energy, virial and forces on owned particles. */
+static void evaluate(psidpd_engine *engine, struct host *host, int newton, const psidpd_step *step)
+{
+    psidpd_particles particles;
+    double cutoff, *slopes;
+    size_t width, length, g, k;
+    OK(psidpd_engine_cutoff(engine, &cutoff));
+    OK(psidpd_engine_slope_width(engine, &width));
+    add_images(host, cutoff);
+    particles.owned = OWNED;
+    particles.all = host->all;
+    particles.x = host->x;
+    particles.tag = host->tag;
+    particles.kind = host->kind;
+    OK(psidpd_engine_densities(engine, &particles, newton));
+    OK(psidpd_engine_slopes(engine, &slopes, &length));
+    CHECK(length == host->all * width);
+    for (g = OWNED; g < host->all; g++) {
+        for (k = 0; k < width; k++) {
+            slopes[g * width + k] = slopes[host->owner[g] * width + k];
+        }
+    }
+    memset(host->force, 0, sizeof host->force);
+    OK(psidpd_engine_forces(engine, &particles, step != NULL ? host->v : NULL, step,
+                            PSIDPD_WANT_ENERGY | PSIDPD_WANT_VIRIAL | PSIDPD_WANT_PARTICLE_ENERGY |
+                                PSIDPD_WANT_PARTICLE_VIRIAL,
+                            host->force, &host->tally));
+    for (g = OWNED; g < host->all; g++) {
+        for (k = 0; k < 3; k++) {
+            host->force[3 * host->owner[g] + k] += host->force[3 * g + k];
+            CHECK(newton || host->force[3 * g + k] == 0.0);
+        }
+    }
+}
+
+static void print_outcome(const char *name, const struct host *host)
+{
+    size_t i;
+    int k;
+    printf("%s.energy %.17g\n", name, host->tally.excess + host->tally.pair);
+    printf("%s.virial", name);
+    for (k = 0; k < 6; k++) printf(" %.17g", host->tally.virial[k]);
+    printf("\n%s.thermostat_virial", name);
+    for (k = 0; k < 6; k++) printf(" %.17g", host->tally.thermostat_virial[k]);
+    printf("\n%s.force", name);
+    for (i = 0; i < 3 * OWNED; i++) printf(" %.17g", host->force[i]);
+    printf("\n");
+}
+
+static void check_particle_sums(const psidpd_engine *engine, const struct host *host)
+{
+    const double *energy, *virial, *density;
+    double sum = 0.0, trace = 0.0;
+    const double u = host->tally.excess + host->tally.pair;
+    size_t i, energies, virials, densities;
+    OK(psidpd_engine_particle_energy(engine, &energy, &energies));
+    OK(psidpd_engine_particle_virial(engine, &virial, &virials));
+    CHECK(energies == host->all && virials == 6 * host->all);
+    for (i = 0; i < host->all; i++) {
+        sum += energy[i];
+        trace += virial[6 * i] + virial[6 * i + 1] + virial[6 * i + 2];
+    }
+    CHECK(fabs(sum - u) < 1e-10 * (1.0 + fabs(u)));
+    sum = host->tally.virial[0] + host->tally.virial[1] + host->tally.virial[2];
+    CHECK(fabs(trace - sum) < 1e-10 * (1.0 + fabs(sum)));
+    OK(psidpd_engine_local_densities(engine, &density, &densities));
+    CHECK(densities == OWNED);
+    printf("density");
+    for (i = 0; i < densities; i++) printf(" %.17g", density[i]);
+    printf("\n");
+}
+
+/* Force = -dU/dx. */
+static void check_gradient(psidpd_engine *engine, const struct host *start)
+{
+    static struct host here, moved;
+    const double h = 1e-5;
+    double worst = 0.0, largest = 0.0;
+    size_t i;
+    here = *start;
+    evaluate(engine, &here, 1, NULL);
+    for (i = 0; i < 3 * OWNED; i++) {
+        double u[2], difference;
+        int side;
+        for (side = 0; side < 2; side++) {
+            moved = *start;
+            moved.x[i] += side == 0 ? -h : h;
+            evaluate(engine, &moved, 1, NULL);
+            u[side] = moved.tally.excess + moved.tally.pair;
+        }
+        difference = fabs(here.force[i] + (u[1] - u[0]) / (2.0 * h));
+        if (difference > worst) worst = difference;
+        if (fabs(here.force[i]) > largest) largest = fabs(here.force[i]);
+    }
+    printf("gradient %.3g %.3g\n", worst, largest);
+    CHECK(largest > 1.0);
+    CHECK(worst < 1e-7 * largest);
+}
+
+static void check_model_errors(const psidpd_model *model, const char *missing_path)
+{
+    psidpd_model *none = NULL;
+    psidpd_engine *engine = NULL;
+    const char *text = NULL;
+    size_t count = 77;
+    FAILS(psidpd_model_open(missing_path, &none), PSIDPD_STATUS_FILE, missing_path);
+    FAILS(psidpd_model_open(NULL, &none), PSIDPD_STATUS_NULL_POINTER, "path is NULL");
+    FAILS(psidpd_model_open(missing_path, NULL), PSIDPD_STATUS_NULL_POINTER, "model is NULL");
+    FAILS(psidpd_model_parse("bad.toml", "title = \"t\"\nspecies = [\"A\"]\nspeceis = 3\n", &none),
+          PSIDPD_STATUS_MODEL, "bad.toml:3: speceis: unknown key");
+    FAILS(psidpd_model_parse("bad.toml", "\xff", &none), PSIDPD_STATUS_INVALID_ARGUMENT, "UTF-8");
+    FAILS(psidpd_model_parse("bad.toml", NULL, &none), PSIDPD_STATUS_NULL_POINTER, "text is NULL");
+    CHECK(none == NULL);
+    FAILS(psidpd_model_species_name(model, 1, &text), PSIDPD_STATUS_INVALID_ARGUMENT, "species 1");
+    FAILS(psidpd_model_species_count(NULL, &count), PSIDPD_STATUS_NULL_POINTER, "model is NULL");
+    FAILS(psidpd_model_species_count(model, NULL), PSIDPD_STATUS_NULL_POINTER, "count is NULL");
+    FAILS(psidpd_model_dimensions(NULL, &count), PSIDPD_STATUS_NULL_POINTER, "model is NULL");
+    FAILS(psidpd_model_title(NULL, &text), PSIDPD_STATUS_NULL_POINTER, "model is NULL");
+    CHECK(text == NULL && count == 77);
+    FAILS(psidpd_engine_new(NULL, 1.0, &engine), PSIDPD_STATUS_NULL_POINTER, "model is NULL");
+    FAILS(psidpd_engine_new(model, 1.0, NULL), PSIDPD_STATUS_NULL_POINTER, "engine is NULL");
+    FAILS(psidpd_engine_new(model, -1.0, &engine), PSIDPD_STATUS_MODEL, "kT");
+    CHECK(engine == NULL);
+    psidpd_model_free(NULL);
+    psidpd_engine_free(NULL);
+}
+
+static void check_engine_errors(const psidpd_model *model, const struct host *start)
+{
+    static struct host host;
+    psidpd_engine *engine;
+    psidpd_particles particles;
+    psidpd_step step = {1, 2, 0.01};
+    const int32_t too_high[1] = {1}, only_second[2] = {-1, 0};
+    const double *values;
+    double number, *slopes;
+    size_t length;
+    host = *start;
+    particles.owned = 2;
+    particles.all = 2;
+    particles.x = host.x;
+    particles.tag = host.tag;
+    particles.kind = host.kind;
+    OK(psidpd_engine_new(model, 1.0, &engine));
+#define FORCES(v, step, want, force)                                                               \
+    psidpd_engine_forces(engine, &particles, (v), (step), (want), (force), NULL)
+
+    FAILS(psidpd_engine_cutoff(NULL, &number), PSIDPD_STATUS_NULL_POINTER, "engine is NULL");
+    FAILS(psidpd_engine_cutoff(engine, NULL), PSIDPD_STATUS_NULL_POINTER, "cutoff is NULL");
+    FAILS(psidpd_engine_sum_all_densities(engine, 2), PSIDPD_STATUS_INVALID_ARGUMENT, "all is 2");
+    FAILS(psidpd_engine_map_kinds(engine, too_high, 1), PSIDPD_STATUS_INVALID_ARGUMENT, "species");
+    FAILS(psidpd_engine_map_kinds(engine, NULL, 1), PSIDPD_STATUS_NULL_POINTER, "species is NULL");
+
+    /* Out of order. */
+    FAILS(FORCES(NULL, NULL, 0, host.force), PSIDPD_STATUS_CALL_ORDER, "psidpd_engine_densities");
+    FAILS(psidpd_engine_slopes(engine, &slopes, &length), PSIDPD_STATUS_CALL_ORDER, "densities");
+    FAILS(psidpd_engine_local_densities(engine, &values, &length), PSIDPD_STATUS_CALL_ORDER,
+          "psidpd_engine_densities");
+
+    FAILS(psidpd_engine_densities(NULL, &particles, 1), PSIDPD_STATUS_NULL_POINTER, "engine");
+    FAILS(psidpd_engine_densities(engine, NULL, 1), PSIDPD_STATUS_NULL_POINTER, "particles is");
+    FAILS(psidpd_engine_densities(engine, &particles, 7), PSIDPD_STATUS_INVALID_ARGUMENT, "newton");
+    particles.x = NULL;
+    FAILS(psidpd_engine_densities(engine, &particles, 1), PSIDPD_STATUS_NULL_POINTER,
+          "particles.x is NULL");
+    particles.x = host.x;
+    particles.owned = 3;
+    FAILS(psidpd_engine_densities(engine, &particles, 1), PSIDPD_STATUS_INVALID_ARGUMENT,
+          "3 are owned");
+    particles.owned = 2;
+    host.kind[1] = 4;
+    FAILS(psidpd_engine_densities(engine, &particles, 1), PSIDPD_STATUS_ENGINE, "type 4");
+    host.kind[1] = 0;
+    host.tag[0] = 0;
+    FAILS(psidpd_engine_densities(engine, &particles, 1), PSIDPD_STATUS_ENGINE, "tags");
+    host.tag[0] = 1;
+
+    OK(psidpd_engine_densities(engine, &particles, 1));
+    FAILS(FORCES(NULL, NULL, 0, NULL), PSIDPD_STATUS_NULL_POINTER, "force is NULL");
+    FAILS(FORCES(NULL, NULL, 1u << 9, host.force), PSIDPD_STATUS_INVALID_ARGUMENT, "0x200");
+    FAILS(FORCES(NULL, &step, 0, host.force), PSIDPD_STATUS_NULL_POINTER, "v is NULL");
+    FAILS(FORCES(host.force, &step, 0, host.force), PSIDPD_STATUS_INVALID_ARGUMENT, "overlap");
+    step.dt = 0.0;
+    FAILS(FORCES(host.v, &step, 0, host.force), PSIDPD_STATUS_INVALID_ARGUMENT, "step.dt");
+    particles.all = 3;
+    FAILS(FORCES(NULL, NULL, 0, host.force), PSIDPD_STATUS_INVALID_ARGUMENT, "changed");
+    particles.all = 2;
+    OK(FORCES(NULL, NULL, 0, host.force));
+    OK(psidpd_engine_particle_energy(engine, &values, &length));
+    CHECK(length == 0);
+
+    /* A message outlives successes, and types that are not mapped take no part. */
+    CHECK(strstr(psidpd_last_error(), "changed") != NULL);
+    OK(psidpd_engine_map_kinds(engine, only_second, 2));
+    memset(host.force, 0, sizeof host.force);
+    OK(psidpd_engine_densities(engine, &particles, 1));
+    OK(FORCES(NULL, NULL, 0, host.force));
+    CHECK(host.force[0] == 0.0);
+#undef FORCES
+    psidpd_engine_free(engine);
+}
+
+int main(int count, char **arguments)
+{
+    static struct host start, host;
+    psidpd_model *model = NULL, *opened = NULL;
+    psidpd_engine *engine = NULL;
+    psidpd_step step;
+    const char *text = NULL;
+    double range;
+    size_t number, i;
+    int32_t needs;
+
+    CHECK(count == 3);
+    CHECK(psidpd_abi_version() == PSIDPD_ABI_VERSION);
+    CHECK(strlen(psidpd_last_error()) == 0);
+    printf("version %s\n", psidpd_version());
+
+    OK(psidpd_model_parse("set-6", model_text, &model));
+    OK(psidpd_model_title(model, &text));
+    CHECK(strcmp(text, "Warren 2003, set 6") == 0);
+    OK(psidpd_model_dimensions(model, &number));
+    CHECK(number == 3);
+    OK(psidpd_model_species_count(model, &number));
+    CHECK(number == 1);
+    OK(psidpd_model_species_name(model, 0, &text));
+    CHECK(strcmp(text, "F") == 0);
+
+    /* The same from a file. */
+    {
+        FILE *file = fopen(arguments[1], "wb");
+        CHECK(file != NULL && fputs(model_text, file) >= 0 && fclose(file) == 0);
+        OK(psidpd_model_open(arguments[1], &opened));
+        psidpd_model_free(model);
+        model = opened;
+    }
+    check_model_errors(model, arguments[2]);
+
+    OK(psidpd_engine_new(model, 1.0, &engine));
+    OK(psidpd_engine_noise_range(engine, &range));
+    CHECK(range == 1.0);
+    OK(psidpd_engine_needs_velocities(engine, &needs));
+    CHECK(needs == 1);
+    OK(psidpd_engine_plan_text(engine, &text));
+    CHECK(strstr(text, "density pass  n") != NULL);
+    OK(psidpd_engine_sum_all_densities(engine, 1));
+
+    for (i = 0; i < OWNED; i++) {
+        int k;
+        for (k = 0; k < 3; k++) {
+            start.x[3 * i + k] = box[k] * uniform();
+            start.v[3 * i + k] = uniform() - 0.5;
+        }
+        start.tag[i] = (int32_t)i + 1;
+        start.kind[i] = 0;
+    }
+    printf("box %.17g %.17g %.17g\nx", box[0], box[1], box[2]);
+    for (i = 0; i < 3 * OWNED; i++) printf(" %.17g", start.x[i]);
+    printf("\nv");
+    for (i = 0; i < 3 * OWNED; i++) printf(" %.17g", start.v[i]);
+    printf("\n");
+
+    check_engine_errors(model, &start);
+    /* The engine needs the model no more. */
+    psidpd_model_free(model);
+
+    host = start;
+    evaluate(engine, &host, 0, NULL);
+    print_outcome("newton_off", &host);
+    host = start;
+    evaluate(engine, &host, 1, NULL);
+    print_outcome("newton_on", &host);
+    check_particle_sums(engine, &host);
+    step.seed = UINT64_C(1) << 40;
+    step.number = 77;
+    step.dt = 0.01;
+    host = start;
+    evaluate(engine, &host, 1, &step);
+    print_outcome("thermal", &host);
+    check_gradient(engine, &start);
+    psidpd_engine_free(engine);
+    return 0;
+}

@@ -1,0 +1,127 @@
+//! Builds the static library, compiles a program against `psidpd.h` as C and as C++, and compares what
+//! it prints with the plain reference.
+
+#![cfg(unix)]
+
+use psidpd_core::engine::{PeriodicBox, Step, reference};
+use psidpd_core::model::{ForceLaw, WarrenPair, warren_ab};
+use std::collections::BTreeMap;
+use std::env;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_owned()
+}
+
+/// Fails with all that the command has to say.
+fn run(command: &mut Command) -> Output {
+    let output = command.output().unwrap_or_else(|error| panic!("{command:?}: {error}"));
+    assert!(
+        output.status.success(),
+        "{command:?}: {}\n{}{}",
+        output.status,
+        String::from_utf8_lossy(&output.stdout),
+        String::from_utf8_lossy(&output.stderr)
+    );
+    output
+}
+
+/// The static library, and the native libraries that it needs.
+fn build_library() -> (PathBuf, Vec<String>) {
+    // A directory of its own: the other is locked while tests are built.
+    let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join("c_consumer");
+    let output = run(Command::new(env::var_os("CARGO").unwrap_or("cargo".into()))
+        .current_dir(root())
+        .args(["rustc", "--locked", "--package", "psidpd-core", "--lib", "--crate-type", "staticlib"])
+        .arg("--target-dir")
+        .arg(&target)
+        .args(["--", "--print", "native-static-libs"])
+        .env("CARGO_TERM_COLOR", "never")
+        .env_remove("CARGO_BUILD_TARGET"));
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    let native = told.lines().find_map(|line| line.split_once("native-static-libs:"));
+    let (_, native) = native.unwrap_or_else(|| panic!("no native libraries in: {told}"));
+    (target.join("debug/libpsidpd_core.a"), native.split_whitespace().map(str::to_owned).collect())
+}
+
+/// Numbers by the name in front of them.
+fn parse(text: &str) -> BTreeMap<String, Vec<f64>> {
+    text.lines()
+        .filter_map(|line| {
+            let mut words = line.split_whitespace();
+            let name = words.next()?.to_owned();
+            Some((name, words.map(str::parse).collect::<Result<_, _>>().ok()?))
+        })
+        .collect()
+}
+
+fn vectors(flat: &[f64]) -> Vec<[f64; 3]> {
+    flat.chunks_exact(3).map(|v| [v[0], v[1], v[2]]).collect()
+}
+
+fn assert_close(found: &[f64], expected: impl IntoIterator<Item = f64>, what: &str) {
+    let expected: Vec<f64> = expected.into_iter().collect();
+    assert_eq!(found.len(), expected.len(), "{what}");
+    let scale = expected.iter().fold(1.0f64, |most, e| most.max(e.abs()));
+    for (f, e) in found.iter().zip(&expected) {
+        assert!((f - e).abs() <= 1e-12 * scale, "{what}: {f} against {e}");
+    }
+}
+
+fn check_against_reference(printed: &BTreeMap<String, Vec<f64>>) {
+    let pair = WarrenPair { a: -40.0, b: 25.0, gamma: 4.5, rc: 1.0, rd: 0.75 };
+    let model = warren_ab(&["F".to_owned()], &[Some(pair)], 3, ForceLaw::Conservative).unwrap();
+    let fluid = model.at(1.0).unwrap();
+    let lengths = [printed["box"][0], printed["box"][1], printed["box"][2]];
+    let domain = PeriodicBox::orthogonal([0.0; 3], lengths, [true; 3]).unwrap();
+    let (x, v) = (vectors(&printed["x"]), vectors(&printed["v"]));
+    let species = vec![0; x.len()];
+    let tag: Vec<i32> = (1..=x.len() as i32).collect();
+    let step = Step { seed: 1 << 40, number: 77, dt: 0.01 };
+    let truth = reference::evaluate(&fluid, &x, &species, &domain).unwrap();
+    let (thermal, thermal_virial) = reference::thermostat(&fluid, &x, &v, &tag, &species, &domain, step);
+
+    assert_close(&printed["density"], truth.densities.iter().flatten().copied(), "densities");
+    for run in ["newton_off", "newton_on", "thermal"] {
+        let noisy = run == "thermal";
+        let forces = truth.forces.iter().flatten().zip(thermal.iter().flatten());
+        let forces = forces.map(|(f, t)| if noisy { f + t } else { *f });
+        assert_close(&printed[&format!("{run}.force")], forces, run);
+        assert_close(&printed[&format!("{run}.energy")], [truth.energy], run);
+        assert_close(&printed[&format!("{run}.virial")], truth.virial, run);
+        let expected = thermal_virial.map(|w| if noisy { w } else { 0.0 });
+        assert_close(&printed[&format!("{run}.thermostat_virial")], expected, run);
+    }
+}
+
+#[test]
+fn a_program_in_c_and_in_cpp_gets_the_forces_of_the_reference() {
+    let (library, native) = build_library();
+    let scratch = tempfile::tempdir().unwrap();
+    let compilers = [
+        ("CC", "cc", vec!["-std=c99"], "c"),
+        ("CXX", "c++", vec!["-std=c++11", "-x", "c++"], "c++ 2011"),
+        ("CXX", "c++", vec!["-std=c++17", "-x", "c++"], "c++ 2017"),
+    ];
+    for (variable, default, flags, name) in compilers {
+        let program = scratch.path().join(name);
+        run(Command::new(env::var_os(variable).unwrap_or(default.into()))
+            .args(flags)
+            .args(["-Wall", "-Wextra", "-Werror", "-pedantic", "-I"])
+            .arg(root().join("rust-core/include"))
+            .arg(root().join("tests/c/consumer.c"))
+            .args(["-x", "none"])
+            .arg(&library)
+            .args(&native)
+            .arg("-lm")
+            .arg("-o")
+            .arg(&program));
+        let output = run(Command::new(&program)
+            .arg(scratch.path().join("set 6 é.toml"))
+            .arg(scratch.path().join("no such file.toml")));
+        let text = String::from_utf8(output.stdout).unwrap();
+        assert!(text.starts_with(&format!("version {}\n", env!("CARGO_PKG_VERSION"))), "{name}: {text}");
+        check_against_reference(&parse(&text));
+    }
+}
