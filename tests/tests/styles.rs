@@ -1,0 +1,180 @@
+//! The pair styles inside LAMMPS: what they do, and what they say when something is wrong.
+
+use psidpd::lammps::{HostVersion, plugin};
+use psidpd_tests::{lammps, root};
+use std::path::Path;
+use std::time::Duration;
+
+const LIMIT: Duration = Duration::from_secs(120);
+
+/// A script that runs; tests change one thing in it.
+fn script(plugin: &Path) -> String {
+    let model = root().join("validation/models/warren2003-set6.toml");
+    format!(
+        "units lj\natom_style atomic\ncomm_modify vel yes\nregion b block 0 5 0 5 0 5\ncreate_box 1 b\n\
+         create_atoms 1 random 600 4711 NULL overlap 0.3 maxtry 100\nmass 1 1\n\
+         velocity all create 1.0 87 loop geom\nplugin load {}\npair_style dpd/psi 1.0 5\n\
+         pair_coeff * * {} F\nfix 1 all nve\ntimestep 0.005\nthermo 10\nrun 10\n",
+        plugin.display(),
+        model.display()
+    )
+}
+
+/// Runs a script and returns LAMMPS's own words, or its error.
+fn outcome(text: &str, ranks: usize) -> Result<String, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("in.lammps");
+    std::fs::write(&path, text).unwrap();
+    match lammps().0.run_script(ranks, folder.path(), &path, &[], LIMIT) {
+        Ok(run) => Ok(run.stdout),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+#[test]
+fn a_script_runs_and_says_what_is_computed() {
+    for ranks in [1, 2] {
+        let said = outcome(&script(&lammps().1), ranks).unwrap();
+        for part in [
+            "Warren 2003, set 6",
+            "density pass  n: quadratic kernel",
+            "conventions",
+            "no neighbor list is requested",
+        ] {
+            assert!(said.contains(part), "{part} is missing from\n{said}");
+        }
+        assert!(said.contains("Loop time"), "{said}");
+    }
+}
+
+/// What is replaced, by what, and a part of the message that must follow. Each is one line.
+#[test]
+fn mistakes_stop_with_one_clear_line() {
+    let base = script(&lammps().1);
+    let style = "pair_style dpd/psi 1.0 5";
+    let coeff = base.lines().find(|l| l.starts_with("pair_coeff")).unwrap().to_owned();
+    let folder = tempfile::tempdir().unwrap();
+    let bad = folder.path().join("bad.toml");
+    std::fs::write(&bad, "title = \"t\"\nspecies = [\"F\"]\nspeceis = 1\n").unwrap();
+    let flat = folder.path().join("flat.toml");
+    std::fs::write(&flat, "title = \"t\"\ndimensions = 2\nspecies = [\"F\"]\n").unwrap();
+    let singular = folder.path().join("singular.toml");
+    std::fs::write(
+        &singular,
+        "title = \"t\"\nspecies = [\"F\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n\
+         [excess_free_energy]\nF = \"-ln(1 - n)\"\n",
+    )
+    .unwrap();
+    let mdpd = |style: &str, coeff: &str| format!("{style}\n{coeff}");
+    let warren = "pair_coeff 1 1 -40 25 18 1.0 0.75";
+    let cases: Vec<(&str, String, &str)> = vec![
+        (style, "pair_style dpd/psi 0.0 5".into(), "the temperature must be positive, found 0.0"),
+        (style, "pair_style dpd/psi -1 5".into(), "the temperature must be positive"),
+        (style, "pair_style dpd/psi 1.0 0".into(), "the seed must be a positive whole number"),
+        (style, "pair_style dpd/psi 1.0".into(), "expected 'pair_style dpd/psi T seed', found 1 arguments"),
+        (style, "pair_style dpd/psi 1.0 5 6".into(), "found 3 arguments"),
+        (&coeff, "pair_coeff * * nowhere.toml F".into(), "nowhere.toml: cannot be read"),
+        (&coeff, format!("pair_coeff * * {} F", bad.display()), "bad.toml:3: speceis: unknown key"),
+        (&coeff, format!("pair_coeff * * {} F", flat.display()), "dimensions = 2, the simulation has 3"),
+        (&coeff, coeff.replace(" F", " G"), "no species \"G\"; the model has F"),
+        (&coeff, format!("{coeff} F"), "a species (or NULL) for each of 1 atom types, found 5 arguments"),
+        (&coeff, coeff.replace("* *", "1 1"), "pair_coeff must begin with '* *'"),
+        // LAMMPS checks itself that coefficients were given at all.
+        (&coeff, String::new(), "ERROR"),
+        (&coeff, format!("pair_coeff * * {} F", singular.display()), "is not finite at local densities"),
+        ("comm_modify vel yes", String::new(), "add 'comm_modify vel yes'"),
+        ("units lj", "units real".into(), "use 'units lj'"),
+        ("0 5 0 5 0 5", "0 5 0 5 0 1.9".into(), "less than twice the range of the thermostat"),
+        (
+            "fix 1 all nve",
+            "group g id 1:10\nneigh_modify exclude group g g\nfix 1 all nve".into(),
+            "neigh_modify exclude",
+        ),
+        (
+            &coeff,
+            mdpd("pair_style mdpd/psi 1.0 1.0 5", "pair_coeff 1 1 -40 25 18 1.0"),
+            "expected 'pair_coeff I J A B gamma rc rd'",
+        ),
+        (
+            &coeff,
+            mdpd("pair_style mdpd/psi 1.0 1.0 5", "pair_coeff 1 1 -40 25 18 1.2 0.75"),
+            "must not exceed the cut-off",
+        ),
+        (
+            &coeff,
+            mdpd("pair_style mdpd/psi 1.0 1.0 5", "pair_coeff 1 1 -40 25 -3 1.0 0.75"),
+            "must not be negative",
+        ),
+        (&coeff, mdpd("pair_style mdpd/psi 1.0 1.0", warren), "expected 'pair_style mdpd/psi T cutoff seed'"),
+        (&coeff, mdpd("pair_style mdpd/psi 1.0 1.0 5 law hard", warren), "unknown law 'hard'"),
+        (&coeff, mdpd("pair_style mdpd/psi 1.0 1.0 5 low lucy", warren), "unknown keyword 'low'"),
+        (&coeff, mdpd("pair_style mdpd/psi 1.0 1.0 5 law lucy\nmass 1 2", warren), "masses of 1 only"),
+    ];
+    for (from, to, message) in cases {
+        assert!(base.contains(from), "{from}");
+        let text = base.replacen(from, &to, 1);
+        let error = outcome(&text, 1).expect_err(&format!("{to} should be refused"));
+        assert!(error.contains(message), "{to}\nexpected: {message}\nfound: {error}");
+    }
+}
+
+/// One rank's trouble stops all of them, without a hang.
+#[test]
+fn trouble_on_one_rank_stops_two() {
+    let text = script(&lammps().1).replace("run 10", "set atom 1 x NULL\nrun 10");
+    let lost = text.replace("set atom 1 x NULL", "variable nan equal 0/0\nset atom 1 vx 1e300");
+    let error = outcome(&lost, 2).expect_err("an infinite velocity should stop the run");
+    assert!(error.contains("ERROR"), "{error}");
+}
+
+/// Different B for different pairs of types have no potential: refused, with the reason.
+#[test]
+fn b_by_type_pair_is_refused_with_the_reason() {
+    let text = script(&lammps().1)
+        .replace("create_box 1 b", "create_box 2 b")
+        .replace("mass 1 1", "mass * 1")
+        .lines()
+        .filter(|l| !l.starts_with("pair_coeff"))
+        .collect::<Vec<_>>()
+        .join("\n")
+        .replace(
+            "pair_style dpd/psi 1.0 5",
+            "pair_style mdpd/psi 1.0 1.0 5\npair_coeff 1 1 -40 25 18 1 0.75\npair_coeff 1 2 -30 20 18 1 0.75\n\
+             pair_coeff 2 2 -40 25 18 1 0.75",
+        );
+    let error = outcome(&format!("{text}\n"), 1).unwrap_err();
+    assert!(error.contains("B differs between type pairs"), "{error}");
+    assert!(error.contains("partial densities"), "{error}");
+    let missing = text.replace("pair_coeff 1 2 -30 20 18 1 0.75\n", "");
+    assert!(outcome(&format!("{missing}\n"), 1).unwrap_err().contains("no coefficients for types 1 and 2"));
+    let same = text.replace("-30 20", "-30 25");
+    assert!(outcome(&format!("{same}\n"), 1).is_ok());
+}
+
+/// The potential energy and pressure that LAMMPS prints are those of the native engine, which
+/// `validate` shows for the interior; here: hybrid, two runs, unload and reload do not disturb it.
+#[test]
+fn styles_survive_clear_and_reload() {
+    let text = script(&lammps().1);
+    let load = text.lines().find(|l| l.starts_with("plugin load")).unwrap().to_owned();
+    let again = format!("{text}clear\n{load}\n{}", text.replace(&format!("{load}\n"), ""));
+    let said = outcome(&again, 1).unwrap();
+    assert_eq!(said.matches("Loop time").count(), 2, "{said}");
+}
+
+/// A plugin built for another LAMMPS says so and stops the script, before any of its code runs.
+#[test]
+fn a_plugin_for_another_lammps_is_refused() {
+    let (host, ours) = lammps();
+    let mut other = host.version().unwrap();
+    other.number = 20_240_829;
+    let base = root().join("target/lammps/other-version");
+    let stranger = plugin::build_for(host, &other, &base, &|_| {}).unwrap();
+    let error = outcome(&script(&stranger), 1).unwrap_err();
+    assert!(error.contains("was built for LAMMPS 20240829, this is LAMMPS"), "{error}");
+    assert!(error.contains("psidpd lammps plugin"), "{error}");
+    let refused = plugin::check(host, &stranger).unwrap_err().to_string();
+    assert!(refused.contains("20240829"), "{refused}");
+    let _: HostVersion = other;
+    plugin::check(host, ours).unwrap();
+}
