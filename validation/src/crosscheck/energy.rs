@@ -134,11 +134,13 @@ pub fn run(context: &Context) -> Result<Part, ValidateError> {
             Item::Table(table),
             Item::Figure {
                 svg: heat.render()?,
-                caption: "The built-in heats at a rate that does not depend on the time step; the other codes compute \
-                          the gradient of an energy and keep it."
+                caption: "The built-in heats; the other codes compute the gradient of an energy and keep it."
                     .into(),
             },
-            Item::Figure { svg: energy.render()?, caption: "What is left is the error of the integrator.".into() },
+            Item::Figure {
+                svg: energy.render()?,
+                caption: "What is left is the error of the integrator.".into(),
+            },
         ],
     };
     add_loop(context, &mut part)?;

@@ -33,7 +33,10 @@ pub fn check_width(
     let Some(length) = lengths[..dimensions].iter().find(|l| **l < 2.0 * range) else {
         return Ok(());
     };
-    let value = root.require("box")?.section()?.require("lengths")?;
+    let value = match root.get("box") {
+        Some(value) => value.section()?.require("lengths")?,
+        None => root.require("initial")?.section()?.require("file")?,
+    };
     let message = format!(
         "a length of {length} is less than twice the range {range} of the thermostat: two images of a \
          particle would be in reach of one neighbour, and both pairs would share their noise"

@@ -1,18 +1,38 @@
 //! `[initial]`.
 
 use super::composition::Composition;
+use super::domain;
 use super::positive;
 use super::velocities::Velocities;
+use crate::lammps::DataFile;
+use crate::run::State;
 use psidpd_core::document::{FileError, FileErrorKind, Section};
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::model::Model;
+use std::path::{Path, PathBuf};
 
 /// Most particles that a scene may ask for.
 const MOST_PARTICLES: f64 = 1e8;
 
-/// How the box is filled.
+/// Where a scene starts from.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Initial {
+pub enum Initial {
+    /// A box filled by description.
+    Filling(Filling),
+    /// A data file: particles and box. Velocities are drawn anew unless they are kept.
+    File {
+        /// Where it is.
+        path: PathBuf,
+        /// What it holds.
+        state: State,
+        /// `None` keeps those of the file.
+        velocities: Option<Velocities>,
+    },
+}
+
+/// How a box is filled.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Filling {
     /// Where particles are put.
     pub placement: Placement,
     /// How many.
@@ -40,35 +60,67 @@ pub enum Placement {
     },
 }
 
-/// Reads the initial state.
-pub fn read(root: &Section, model: &Model, domain: &PeriodicBox) -> Result<Initial, FileError> {
-    #[derive(Clone, Copy)]
+/// Reads the initial state, and the box: from `[box]`, or from the data file.
+pub fn read(root: &Section, model: &Model, base: &Path) -> Result<(Initial, PeriodicBox), FileError> {
+    #[derive(Clone, Copy, PartialEq)]
     enum Kind {
         Random,
         Lattice,
         Slab,
+        Data,
     }
     let section = root.require("initial")?.section()?;
-    let kinds = [("random", Kind::Random), ("lattice", Kind::Lattice), ("slab", Kind::Slab)];
+    let kinds =
+        [("random", Kind::Random), ("lattice", Kind::Lattice), ("slab", Kind::Slab), ("data", Kind::Data)];
+    let kind = section.require("kind")?.one_of("kind", &kinds)?.value;
+    if kind == Kind::Data {
+        let initial = read_file(root, &section, model, base)?;
+        section.finish()?;
+        return Ok(initial);
+    }
     let dimensions = model.dimensions();
+    let domain = domain::read(root, dimensions)?;
     let mut volume = domain.volume(dimensions);
-    let placement = match section.require("kind")?.one_of("kind", &kinds)?.value {
-        Kind::Random => Placement::Random,
+    let placement = match kind {
+        Kind::Random | Kind::Data => Placement::Random,
         Kind::Lattice => Placement::Lattice,
         Kind::Slab => {
-            let (axis, thickness) = read_slab(&section, dimensions, domain)?;
+            let (axis, thickness) = read_slab(&section, dimensions, &domain)?;
             volume *= thickness / domain.lengths()[axis];
             Placement::Slab { axis, thickness }
         }
     };
-    let initial = Initial {
+    let filling = Filling {
         placement,
         count: read_count(&section, volume)?,
         composition: Composition::read(&section, model.species())?,
         velocities: Velocities::read(&section)?,
     };
     section.finish()?;
-    Ok(initial)
+    Ok((Initial::Filling(filling), domain))
+}
+
+fn read_file(
+    root: &Section,
+    section: &Section,
+    model: &Model,
+    base: &Path,
+) -> Result<(Initial, PeriodicBox), FileError> {
+    if let Some(value) = root.get("box") {
+        let message = "the box is that of the data file: leave [box] out".to_owned();
+        return Err(value.error(FileErrorKind::Value(message)));
+    }
+    let value = section.require("file")?;
+    let path = base.join(value.string()?.value);
+    let state = DataFile::read(&path)
+        .map_err(|e| e.to_string())
+        .and_then(|data| State::from_data(&data, model).map_err(|e| e.to_string()))
+        .map_err(|why| {
+            value.error(FileErrorKind::Value(why)).with_help("the path is relative to the scene file")
+        })?;
+    let velocities = Velocities::read_or_keep(section)?;
+    let domain = state.domain.clone();
+    Ok((Initial::File { path, state, velocities }, domain))
 }
 
 fn read_slab(section: &Section, dimensions: usize, domain: &PeriodicBox) -> Result<(usize, f64), FileError> {

@@ -13,12 +13,13 @@
 //! F = 1.0
 //!
 //! [initial]
-//! kind    = "random"                         # random | lattice | slab
+//! kind    = "random"                         # random | lattice | slab | data
 //! density = 6.05                             # of the filled part; or count = 6050
 //! # composition = { A = 0.5, B = 0.5 }       # number fractions; equal shares if not given
 //! # axis = "z"                               # slab: its normal; the last direction if not given
 //! # thickness = 10.0                         # slab: centred
-//! # velocities = "thermal"                   # thermal | zero
+//! # file = "start.data"                      # data: a LAMMPS data file, which has the box: no [box]
+//! # velocities = "thermal"                   # thermal | zero | keep (data only)
 //!
 //! [[stage]]
 //! name  = "produce"
@@ -43,7 +44,7 @@ mod stage;
 mod velocities;
 
 pub use composition::Composition;
-pub use initial::{Initial, Placement};
+pub use initial::{Filling, Initial, Placement};
 pub use output::Output;
 pub use stage::Stage;
 pub use velocities::Velocities;
@@ -104,9 +105,8 @@ impl Scene {
         let (model_path, model) = read_model(&root.require("model")?, base)?;
         let kt = positive(&root.require("kT")?)?;
         let seed = root.require("seed")?.count()?.value;
-        let domain = domain::read(&root, model.dimensions())?;
-        let mass = masses::read(&root, model.species())?;
-        let initial = initial::read(&root, &model, &domain)?;
+        let (initial, domain) = initial::read(&root, &model, base)?;
+        let mass = masses::read(&root, model.species(), &initial)?;
         let stages = stage::read(&root, kt)?;
         let output = output::read(&root)?;
         let scene = Scene { title, model_path, model, kt, seed, domain, mass, initial, stages, output };

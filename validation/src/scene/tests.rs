@@ -58,8 +58,9 @@ fn parse(text: &str) -> Result<Scene, FileError> {
 #[test]
 fn reads_the_schema() {
     let scene = parse(SCENE).unwrap();
-    assert_eq!(scene.initial.count, 630);
-    assert_eq!(scene.initial.composition.fractions(), [0.25, 0.75]);
+    let Initial::Filling(filling) = &scene.initial else { panic!("not a file") };
+    assert_eq!(filling.count, 630);
+    assert_eq!(filling.composition.fractions(), [0.25, 0.75]);
     assert_eq!(scene.output, Output { thermo: 100, dump: 7 });
     assert_eq!(scene.mass, [1.0, 1.0]);
     let [one, two] = scene.stages.as_slice() else { panic!("two stages") };

@@ -24,6 +24,16 @@ impl Velocities {
         }
     }
 
+    /// The same for a data file, whose velocities may be kept: `None`.
+    pub(super) fn read_or_keep(initial: &Section) -> Result<Option<Velocities>, FileError> {
+        let names =
+            [("thermal", Some(Velocities::Thermal)), ("zero", Some(Velocities::Zero)), ("keep", None)];
+        match initial.get("velocities") {
+            Some(value) => Ok(value.one_of("velocities", &names)?.value),
+            None => Ok(Some(Velocities::default())),
+        }
+    }
+
     /// Velocities of particles of the masses `mass`.
     pub(super) fn draw(
         self,

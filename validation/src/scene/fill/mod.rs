@@ -3,7 +3,7 @@
 mod lattice;
 mod random;
 
-use super::{Placement, Scene};
+use super::{Filling, Initial, Placement, Scene};
 use crate::run::State;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
@@ -12,13 +12,26 @@ use rand_chacha::ChaCha8Rng;
 /// The initial state of a scene. The generator's stream is fixed by its algorithm, not by the machine.
 pub fn fill(scene: &Scene) -> State {
     let mut random = ChaCha8Rng::seed_from_u64(scene.seed);
-    let initial = &scene.initial;
+    match &scene.initial {
+        Initial::Filling(filling) => place(scene, filling, &mut random),
+        Initial::File { state, velocities, .. } => {
+            let mut state = State { mass: scene.mass.clone(), ..state.clone() };
+            if let Some(velocities) = velocities {
+                let mass = state.species.iter().map(|s| scene.mass[*s as usize]);
+                state.v = velocities.draw(mass, scene.kt, scene.model.dimensions(), &mut random);
+            }
+            state
+        }
+    }
+}
+
+fn place(scene: &Scene, initial: &Filling, random: &mut ChaCha8Rng) -> State {
     let (count, dimensions) = (initial.count, scene.model.dimensions());
     let mut species: Vec<i32> = Vec::with_capacity(count);
     for (kind, share) in initial.composition.share(count).into_iter().enumerate() {
         species.resize(species.len() + share, kind as i32);
     }
-    species.shuffle(&mut random);
+    species.shuffle(random);
     // In fractions of the box.
     let mut low = [0.0; 3];
     let mut high = [1.0; 3];
@@ -27,7 +40,7 @@ pub fn fill(scene: &Scene) -> State {
         (low[axis], high[axis]) = (0.5 - half, 0.5 + half);
     }
     let fractions = match initial.placement {
-        Placement::Random | Placement::Slab { .. } => random::fractions(count, low, high, &mut random),
+        Placement::Random | Placement::Slab { .. } => random::fractions(count, low, high, random),
         Placement::Lattice => lattice::fractions(count, scene.domain.lengths(), dimensions),
     };
     let mut x: Vec<[f64; 3]> = Vec::with_capacity(count);
@@ -38,7 +51,7 @@ pub fn fill(scene: &Scene) -> State {
         x.push(scene.domain.point(s));
     }
     let mass = species.iter().map(|s| scene.mass[*s as usize]);
-    let v = initial.velocities.draw(mass, scene.kt, dimensions, &mut random);
+    let v = initial.velocities.draw(mass, scene.kt, dimensions, random);
     State {
         domain: scene.domain.clone(),
         mass: scene.mass.clone(),
