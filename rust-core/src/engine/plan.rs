@@ -1,8 +1,9 @@
 //! What a fluid needs computed, worked out once.
 
-use crate::model::expression::{Formula, Program, TooLarge};
+use super::excess::ExcessPlan;
+use crate::model::expression::{Formula, TooLarge};
 use crate::model::kernel::Kernel;
-use crate::model::{ExcessFreeEnergy, Fluid, PairTerm, WeightedDensity};
+use crate::model::{Continuation, ExcessFreeEnergy, Fluid, PairTerm, WeightedDensity};
 use std::fmt;
 
 /// The passes, kernels and ranges of one fluid.
@@ -33,16 +34,6 @@ pub struct LinearTerm {
     pub force_kernel: Kernel,
     /// `c_αβ`, row-major.
     pub coefficients: Vec<f64>,
-}
-
-/// `ψ_α` of the densities that need a pass.
-#[derive(Debug, Clone)]
-pub struct ExcessPlan {
-    /// ψ, then ∂ψ/∂ñ for each variable of the passes.
-    pub program: Program,
-    /// The value if ψ has no variables left.
-    pub constant: Option<f64>,
-    pub formula: Formula,
 }
 
 /// Coefficients of dissipative and random forces, row-major in species.
@@ -182,15 +173,7 @@ fn plan_excess(fluid: &Fluid, alpha: usize, passes: &[usize]) -> Result<ExcessPl
         }
     }
     let variables: Vec<usize> = passes.iter().flat_map(|d| (0..count).map(move |s| d * count + s)).collect();
-    let mut outputs = vec![psi.clone()];
-    for v in &variables {
-        outputs.push(psi.derivative(*v)?);
-    }
-    Ok(ExcessPlan {
-        program: Program::new(&outputs.iter().collect::<Vec<_>>()),
-        constant: psi.is_constant(),
-        formula: psi,
-    })
+    ExcessPlan::of_formula(fluid, psi, &variables)
 }
 
 impl ThermostatPlan {
@@ -238,6 +221,12 @@ impl fmt::Display for Plan {
             if density.force_kernel != density.kernel {
                 write!(f, "; force by the {} kernel: NOT CONSERVATIVE", density.force_kernel.kind().name())?;
             }
+            if let Some(bounds) = density.bounds {
+                write!(f, "; psi continued outside [{}, {}]", bounds.low, bounds.high)?;
+                if bounds.below == Continuation::Constant {
+                    write!(f, ", psi' constant below")?;
+                }
+            }
             writeln!(f)?;
         }
         for term in &self.linear {
@@ -261,10 +250,10 @@ impl fmt::Display for Plan {
             )?;
         }
         for (name, excess) in self.species.iter().zip(&self.excess) {
-            match excess.constant {
-                Some(0.0) => {}
-                Some(value) => writeln!(f, "psi of {name:<6} constant {value}")?,
-                None => writeln!(f, "psi of {name:<6} {}", excess.formula)?,
+            match excess {
+                ExcessPlan::Constant(0.0) => {}
+                ExcessPlan::Constant(value) => writeln!(f, "psi of {name:<6} constant {value}")?,
+                ExcessPlan::Formula(plan) => writeln!(f, "psi of {name:<6} {}", plan.formula)?,
             }
         }
         match &self.thermostat {

@@ -19,5 +19,7 @@ mod fluid;
 mod presets;
 
 pub use file::{KNOWN_FUNCTIONS, Model};
-pub use fluid::{ExcessFreeEnergy, Fluid, PairTerm, Polynomial, Thermostat, WeightedDensity};
+pub use fluid::{
+    Bounds, Continuation, ExcessFreeEnergy, Fluid, PairTerm, Polynomial, Thermostat, WeightedDensity,
+};
 pub use presets::{ForceLaw, PresetError, WarrenPair, warren_ab, warren_ab_text};

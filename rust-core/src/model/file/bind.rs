@@ -6,8 +6,10 @@ use super::excess::ExcessEntry;
 use super::interaction::{PairEntry, PairFormEntry, ThermostatEntry};
 use super::number::formula_error;
 use crate::document::{FileError, FileErrorKind, Source};
-use crate::model::expression::{ErrorKind, ExpressionError, Formula, Variables};
-use crate::model::fluid::{ExcessFreeEnergy, Fluid, PairTerm, Polynomial, Thermostat, WeightedDensity};
+use crate::model::expression::{ErrorKind, Expansion, ExpressionError, Formula, Variables};
+use crate::model::fluid::{
+    Bounds, ExcessFreeEnergy, Fluid, PairTerm, Polynomial, Thermostat, WeightedDensity,
+};
 use crate::model::kernel::Kernel;
 use crate::model::pair::{ExpressionPair, PairPotential, Soft, SplineAttractive};
 use std::collections::BTreeMap;
@@ -45,6 +47,7 @@ pub fn bind(model: &Model, kt: f64) -> Result<Fluid, FileError> {
                 .map_err(|e| formula_error(source, ast, e)),
         })
         .collect::<Result<Vec<_>, _>>()?;
+    check_bounded(model, &densities, &excess)?;
     let pairs = model.pairs.iter().map(|entry| bind_pair(entry, &context)).collect::<Result<Vec<_>, _>>()?;
     Ok(Fluid {
         title: model.title.clone(),
@@ -57,6 +60,29 @@ pub fn bind(model: &Model, kt: f64) -> Result<Fluid, FileError> {
         pairs,
         thermostats: bind_thermostats(&model.thermostats, &context)?,
     })
+}
+
+/// The continuation of ψ has three to the number of bounded variables terms.
+fn check_bounded(
+    model: &Model,
+    densities: &[WeightedDensity],
+    excess: &[ExcessFreeEnergy],
+) -> Result<(), FileError> {
+    let count = model.species.len();
+    for (entry, excess) in model.excess.iter().zip(excess) {
+        let (ExcessEntry::Formula(ast), ExcessFreeEnergy::Formula(psi)) = (entry, excess) else { continue };
+        let bounded = (0..densities.len() * count)
+            .filter(|v| densities[v / count].bounds.is_some() && psi.depends_on(*v))
+            .count();
+        if bounded > Expansion::MOST {
+            let message =
+                format!("depends on {bounded} partial densities with bounds, at most {}", Expansion::MOST);
+            return Err(ast
+                .error(&model.source, FileErrorKind::Value(message))
+                .with_help("leave the bounds out, or limit the densities in the formula with min and max"));
+        }
+    }
+    Ok(())
 }
 
 /// The variables of ψ: for a density `n` of species A, B the names n_A, n_B and n = n_A + n_B.
@@ -106,7 +132,7 @@ fn bind_density(
                     )),
                 ));
             }
-            Some([low.value, high.value])
+            Some(Bounds { low: low.value, high: high.value, below: entry.below })
         }
     };
     Ok(WeightedDensity {
