@@ -1,5 +1,6 @@
 //! ψ and its slopes for blocks of particles of one species.
 
+use crate::model::curve::{Curve, CurveBlock};
 use crate::model::expression::{Expansion, Formula, Program, TooLarge};
 use crate::model::{Bounds, Continuation, Fluid};
 
@@ -10,6 +11,18 @@ pub enum ExcessPlan {
     Constant(f64),
     /// A formula of several variables.
     Formula(FormulaPlan),
+    /// A function of the total of one density.
+    Curve(CurvePlan),
+}
+
+/// A curve and the variables it sums.
+#[derive(Debug, Clone)]
+pub struct CurvePlan {
+    pub curve: Curve,
+    species: usize,
+    /// Its density's place among the passes: where its slopes go.
+    pass: usize,
+    bounds: Option<Bounds>,
 }
 
 /// A formula with its slopes.
@@ -42,6 +55,9 @@ pub struct ExcessWork {
     outside: Vec<Outside>,
     /// Lanes and bounded variables, lane by lane, that are out of bounds.
     strays: Vec<Stray>,
+    totals: Vec<f64>,
+    beyond: Vec<f64>,
+    curve: CurveBlock,
 }
 
 /// One bounded variable of one lane, out of its bounds by `beyond`.
@@ -96,6 +112,16 @@ impl ExcessPlan {
         }))
     }
 
+    /// The plan of a curve, whose density is one of `passes`.
+    pub fn of_curve(fluid: &Fluid, curve: Curve, passes: &[usize]) -> ExcessPlan {
+        ExcessPlan::Curve(CurvePlan {
+            species: fluid.species.len(),
+            pass: passes.iter().position(|d| *d == curve.density).unwrap_or(0),
+            bounds: fluid.densities[curve.density].bounds,
+            curve,
+        })
+    }
+
     /// Writes ψ and its slopes for every lane: output `o` of lane `l` is `out[o * lanes + l]`, as
     /// variable `v` is `at[v * lanes + l]`; variables out of bounds are moved to them. Returns how many
     /// lanes had a variable below its bounds and how many one above.
@@ -107,7 +133,49 @@ impl ExcessPlan {
                 [0; 2]
             }
             ExcessPlan::Formula(plan) => plan.evaluate(lanes, at, out, work),
+            ExcessPlan::Curve(plan) => plan.evaluate(lanes, at, out, work),
         }
+    }
+}
+
+impl CurvePlan {
+    fn evaluate(&self, lanes: usize, at: &[f64], out: &mut [f64], work: &mut ExcessWork) -> [u64; 2] {
+        let ExcessWork { totals, beyond, curve, .. } = work;
+        totals.clear();
+        totals.resize(lanes, 0.0);
+        let first = self.curve.density * self.species;
+        for values in at[first * lanes..][..self.species * lanes].chunks_exact(lanes) {
+            totals.iter_mut().zip(values).for_each(|(total, value)| *total += value);
+        }
+        let mut count = [0; 2];
+        if let Some(bounds) = self.bounds {
+            beyond.clear();
+            for total in totals.iter_mut() {
+                let delta = bounds.beyond(*total);
+                count[0] += (delta < 0.0) as u64;
+                count[1] += (delta > 0.0) as u64;
+                *total = bounds.clamp(*total);
+                beyond.push(delta);
+            }
+        }
+        self.curve.block(totals, curve);
+        if let Some(bounds) = self.bounds.filter(|_| count != [0; 2]) {
+            for (lane, delta) in beyond.iter().enumerate().filter(|(_, delta)| **delta != 0.0) {
+                let curvature = if bounds.order(*delta) == 2 { curve.curvature[lane] } else { 0.0 };
+                curve.psi[lane] += delta * (curve.slope[lane] + 0.5 * delta * curvature);
+                curve.slope[lane] += delta * curvature;
+            }
+        }
+        let (psi, slopes) = out.split_at_mut(lanes);
+        psi.copy_from_slice(&curve.psi);
+        for (k, slope) in slopes.chunks_exact_mut(lanes).enumerate() {
+            if k / self.species == self.pass {
+                slope.copy_from_slice(&curve.slope);
+            } else {
+                slope.fill(0.0);
+            }
+        }
+        count
     }
 }
 

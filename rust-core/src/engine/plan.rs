@@ -128,25 +128,30 @@ impl Plan {
     }
 }
 
-/// `∂ψ_α/∂ñ_v` for every species and variable.
-fn slopes(fluid: &Fluid) -> Result<Vec<Vec<Formula>>, TooLarge> {
+/// `∂ψ_α/∂ñ_v` for every species and variable; `None` for that of a curve, which no formula is.
+fn slopes(fluid: &Fluid) -> Result<Vec<Vec<Option<Formula>>>, TooLarge> {
     fluid
         .excess
         .iter()
-        .map(|excess| {
-            let ExcessFreeEnergy::Formula(psi) = excess;
-            (0..fluid.variables()).map(|v| psi.derivative(v)).collect()
+        .map(|excess| match excess {
+            ExcessFreeEnergy::Formula(psi) => {
+                (0..fluid.variables()).map(|v| psi.derivative(v).map(Some)).collect()
+            }
+            ExcessFreeEnergy::Curve(curve) => {
+                let zero = |v| (v / fluid.species.len() != curve.density).then(|| Formula::constant(0.0));
+                Ok((0..fluid.variables()).map(zero).collect())
+            }
         })
         .collect()
 }
 
 /// `c_αβ` of density `d`, in uncorrected densities, if every ψ is linear in it.
-fn linear_coefficients(fluid: &Fluid, slopes: &[Vec<Formula>], d: usize) -> Option<Vec<f64>> {
+fn linear_coefficients(fluid: &Fluid, slopes: &[Vec<Option<Formula>>], d: usize) -> Option<Vec<f64>> {
     let count = fluid.species.len();
     let mut coefficients = vec![0.0; count * count];
     for alpha in 0..count {
         for beta in 0..count {
-            let slope = slopes[alpha][d * count + beta].is_constant()?;
+            let slope = slopes[alpha][d * count + beta].as_ref()?.is_constant()?;
             if slope != 0.0 {
                 let correction = &fluid.densities[d].correction[alpha * count + beta];
                 coefficients[alpha * count + beta] = slope * correction.constant_slope()?;
@@ -160,8 +165,11 @@ fn linear_coefficients(fluid: &Fluid, slopes: &[Vec<Formula>], d: usize) -> Opti
 /// linear terms, which are pair terms now, vanish.
 fn plan_excess(fluid: &Fluid, alpha: usize, passes: &[usize]) -> Result<ExcessPlan, TooLarge> {
     let count = fluid.species.len();
-    let ExcessFreeEnergy::Formula(psi) = &fluid.excess[alpha];
-    let mut psi = psi.clone();
+    let mut psi = match &fluid.excess[alpha] {
+        ExcessFreeEnergy::Formula(psi) => psi.clone(),
+        // Its density has a pass, and it depends on no other.
+        ExcessFreeEnergy::Curve(curve) => return Ok(ExcessPlan::of_curve(fluid, curve.clone(), passes)),
+    };
     for (d, density) in fluid.densities.iter().enumerate() {
         if passes.contains(&d) {
             continue;
@@ -254,6 +262,7 @@ impl fmt::Display for Plan {
                 ExcessPlan::Constant(0.0) => {}
                 ExcessPlan::Constant(value) => writeln!(f, "psi of {name:<6} constant {value}")?,
                 ExcessPlan::Formula(plan) => writeln!(f, "psi of {name:<6} {}", plan.formula)?,
+                ExcessPlan::Curve(plan) => writeln!(f, "psi of {name:<6} {}", plan.curve.describe())?,
             }
         }
         match &self.thermostat {

@@ -4,6 +4,7 @@
 use super::domain::PeriodicBox;
 use super::evaluator::Step;
 use super::noise::PairNoise;
+use crate::model::curve::Curve;
 use crate::model::expression::{Formula, TooLarge};
 use crate::model::pair::PairForm;
 use crate::model::{Continuation, ExcessFreeEnergy, Fluid};
@@ -63,6 +64,23 @@ fn pairs(x: &[[f64; 3]], domain: &PeriodicBox, dimensions: usize, cutoff: f64) -
     found
 }
 
+/// ψ and ψ′ of a curve, at the total of its density, continued outside its bounds.
+fn curve_at(curve: &Curve, fluid: &Fluid, at: &[f64]) -> (f64, f64) {
+    let count = fluid.species.len();
+    let total: f64 = (0..count).map(|beta| at[curve.density * count + beta]).sum();
+    let Some(bounds) = fluid.densities[curve.density].bounds else {
+        let [psi, slope, _] = curve.at(total);
+        return (psi, slope);
+    };
+    let edge = total.max(bounds.low).min(bounds.high);
+    let [psi, slope, mut curvature] = curve.at(edge);
+    let delta = total - edge;
+    if delta < 0.0 && bounds.below == Continuation::Constant {
+        curvature = 0.0;
+    }
+    (psi + delta * slope + 0.5 * delta * delta * curvature, slope + delta * curvature)
+}
+
 /// A formula ψ, continued outside the bounds of its variables, by the definition.
 struct Extended<'a> {
     fluid: &'a Fluid,
@@ -72,8 +90,11 @@ struct Extended<'a> {
 
 impl<'a> Extended<'a> {
     fn new(fluid: &'a Fluid, alpha: usize) -> Extended<'a> {
-        let ExcessFreeEnergy::Formula(formula) = &fluid.excess[alpha];
-        let derivatives = BTreeMap::from([(vec![0; fluid.variables()], formula.clone())]);
+        let formula = match &fluid.excess[alpha] {
+            ExcessFreeEnergy::Formula(formula) => formula.clone(),
+            ExcessFreeEnergy::Curve(_) => Formula::constant(0.0),
+        };
+        let derivatives = BTreeMap::from([(vec![0; fluid.variables()], formula)]);
         Extended { fluid, derivatives }
     }
 
@@ -176,6 +197,15 @@ pub fn evaluate(
             .map(|v| fluid.densities[v / count].correction[alpha * count + v % count].at(n[i][v]))
             .collect();
         let at: Vec<f64> = corrected.iter().map(|c| c.0).collect();
+        if let ExcessFreeEnergy::Curve(curve) = &fluid.excess[alpha] {
+            let (psi, slope) = curve_at(curve, fluid, &at);
+            energy += psi;
+            for beta in 0..count {
+                let v = curve.density * count + beta;
+                slopes[i][v] = slope * corrected[v].1;
+            }
+            continue;
+        }
         energy += excess[alpha].value(&at)?;
         for v in 0..fluid.variables() {
             slopes[i][v] = excess[alpha].slope(v, &at)? * corrected[v].1;

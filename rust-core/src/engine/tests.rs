@@ -416,7 +416,7 @@ fn invariances() {
     }
 
     let turn = |p: [f64; 3]| [-p[1], p[0], p[2]];
-    let corner = [-1.0 * (0.5 + 4.0), -1.0, 2.0];
+    let corner = [-(0.5 + 4.0), -1.0, 2.0];
     let turned = Configuration {
         domain: PeriodicBox::orthogonal(corner, [4.0, 3.1, 3.5], [true; 3]).unwrap(),
         x: c.x.iter().map(|x| turn(*x)).collect(),

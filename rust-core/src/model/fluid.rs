@@ -1,3 +1,4 @@
+use super::curve::Curve;
 use super::expression::Formula;
 use super::kernel::Kernel;
 use super::pair::PairPotential;
@@ -146,6 +147,8 @@ impl Polynomial {
 pub enum ExcessFreeEnergy {
     /// A formula of the [`Fluid::variables`] corrected densities.
     Formula(Formula),
+    /// A function of the total corrected density `Σ_β ñ_β` of one of the densities.
+    Curve(Curve),
 }
 
 /// A pair potential and the species it acts between.

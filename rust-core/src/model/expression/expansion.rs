@@ -154,7 +154,7 @@ impl Algebra<'_> {
         // ε_k occurs up to the second power, so that many factors of a's other terms can survive.
         let occurs = |k: u32| {
             let place = 3usize.pow(k);
-            a.iter().enumerate().any(|(index, c)| index / place % 3 > 0 && *c != 0.0)
+            a.iter().enumerate().any(|(index, c)| !(index / place).is_multiple_of(3) && *c != 0.0)
         };
         let order = 2 * (0..self.variables as u32).filter(|k| occurs(*k)).count();
         let mut t = [0.0; 2 * Expansion::MOST + 1];
