@@ -1,5 +1,6 @@
 use super::density_pass::add_density;
 use super::error::EngineError;
+use super::excess::{ExcessPlan, ExcessWork};
 use super::force_pass::{ForceInput, ForceOutput, add_forces};
 use super::noise::PairNoise;
 use super::pairs::{Newton, Pairs};
@@ -73,6 +74,7 @@ pub struct Engine {
     particle_virial: Vec<[f64; 6]>,
     lanes: Lanes,
     counts: PassCounts,
+    out_of_bounds: [u64; 2],
     owned: usize,
 }
 
@@ -83,7 +85,7 @@ struct Lanes {
     at: Vec<f64>,
     correction: Vec<f64>,
     out: Vec<f64>,
-    work: Vec<f64>,
+    work: ExcessWork,
 }
 
 impl Engine {
@@ -108,6 +110,7 @@ impl Engine {
             particle_virial: Vec::new(),
             lanes: Lanes::default(),
             counts: PassCounts::default(),
+            out_of_bounds: [0; 2],
             owned: 0,
         })
     }
@@ -120,6 +123,12 @@ impl Engine {
     /// How often each pass has run.
     pub fn counts(&self) -> PassCounts {
         self.counts
+    }
+
+    /// How many evaluations of ψ had a density below its bounds, and how many one above, since the
+    /// engine was made. Only densities count that the particle's ψ depends on, not linearly.
+    pub fn out_of_bounds(&self) -> [u64; 2] {
+        self.out_of_bounds
     }
 
     /// Maps the host's types to species: entry `kind` is the species of type `kind`, negative for
@@ -206,7 +215,7 @@ impl Engine {
         self.slopes.clear();
         self.slopes.resize(self.species.len() * slope_width, 0.0);
         for alpha in 0..self.plan.species.len() {
-            if let Some(value) = self.plan.excess[alpha].constant {
+            if let ExcessPlan::Constant(value) = self.plan.excess[alpha] {
                 if value != 0.0 {
                     for (excess, species) in self.excess.iter_mut().zip(&self.species) {
                         if *species == alpha as i32 {
@@ -253,7 +262,9 @@ impl Engine {
                 (at[v * lanes + lane], correction[v * lanes + lane]) = polynomial.at(n);
             }
         }
-        self.plan.excess[alpha].program.eval_block(lanes, at, out, work);
+        let [low, high] = self.plan.excess[alpha].evaluate(lanes, at, out, work);
+        self.out_of_bounds[0] += low;
+        self.out_of_bounds[1] += high;
         for (lane, member) in members.iter().enumerate() {
             let i = *member as usize;
             let mut finite = out[lane].is_finite();

@@ -15,6 +15,7 @@ mod density_pass;
 mod domain;
 mod error;
 mod evaluator;
+mod excess;
 mod force_pass;
 mod images;
 pub mod noise;
