@@ -76,6 +76,8 @@ pub struct Engine {
     counts: PassCounts,
     out_of_bounds: [u64; 2],
     owned: usize,
+    /// Whether pairs, densities and slopes are those of one configuration.
+    ready: bool,
 }
 
 /// Scratch for evaluating ψ in lanes.
@@ -112,6 +114,7 @@ impl Engine {
             counts: PassCounts::default(),
             out_of_bounds: [0; 2],
             owned: 0,
+            ready: false,
         })
     }
 
@@ -155,13 +158,16 @@ impl Engine {
     /// # Errors
     /// A position or ψ that is not finite, a tag or type out of range, arrays of different lengths.
     pub fn densities(&mut self, particles: &Particles, newton: Newton) -> Result<(), EngineError> {
+        self.ready = false;
         self.take_species(particles)?;
         self.owned = particles.owned;
         let cutoff = self.plan.cutoff;
         self.search.find(particles, &self.species, self.plan.dimensions, cutoff, newton, &mut self.pairs)?;
         self.counts.search += 1;
         self.sum_densities();
-        self.evaluate_excess(particles.tag)
+        self.evaluate_excess(particles.tag)?;
+        self.ready = true;
+        Ok(())
     }
 
     fn take_species(&mut self, particles: &Particles) -> Result<(), EngineError> {
@@ -336,6 +342,12 @@ impl Engine {
             .map(|s| (PairNoise::new(s.seed, s.number), 1.0 / s.dt.sqrt()));
         let newton = self.pairs.newton();
         let needed = if newton == Newton::On { all } else { self.owned };
+        if !self.ready {
+            return Err(EngineError::Host("forces without densities of the same configuration"));
+        }
+        if self.slopes.len() != all * self.plan.slope_width() {
+            return Err(EngineError::Host("slopes were not forwarded to every ghost"));
+        }
         if particles.x.len() != all || particles.owned != self.owned || particles.tag.len() != all {
             return Err(EngineError::Host("particles changed between densities and forces"));
         }
@@ -373,7 +385,7 @@ impl Engine {
         };
         add_forces(&input, &mut output);
         let mut tally = output.tally;
-        if want.energy {
+        if want.energy || want.particle_energy {
             tally.excess += self.excess.iter().sum::<f64>();
         }
         if want.particle_energy {
