@@ -111,6 +111,21 @@ impl Plan {
         self.passes.len() * self.species.len()
     }
 
+    /// Indices of the densities that need a pass: some ψ is not linear in them.
+    pub fn density_passes(&self) -> &[usize] {
+        &self.passes
+    }
+
+    /// The potential energy of a pair of species `a` and `b` at `r` from densities that every ψ is linear
+    /// in.
+    pub fn linear_pair_energy(&self, a: usize, b: usize, r: f64) -> f64 {
+        let count = self.species.len();
+        self.linear
+            .iter()
+            .map(|t| (t.coefficients[a * count + b] + t.coefficients[b * count + a]) * t.kernel.value(r))
+            .sum()
+    }
+
     /// Range of the random force if there is one: boxes must be at least twice as long, or two images
     /// of a pair would share their noise.
     pub fn noise_range(&self) -> Option<f64> {
