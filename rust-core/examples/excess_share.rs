@@ -109,7 +109,7 @@ fn measure(name: &str, text: &str, rho: f64) {
         .map(|k| {
             let cell = [k % side, k / side % side, k / side / side];
             std::array::from_fn(|c| {
-                (length / side as f64) * (cell[c] as f64 + 0.2 + 0.6 * uniform(3 * k + c))
+                (length / side as f64) * (cell[c] as f64 + 0.3 + 0.4 * uniform(3 * k + c))
             })
         })
         .collect();
@@ -153,6 +153,6 @@ fn main() {
     measure("Warren, psi from a table", &warren("{ table = \"psi.csv\" }", ""), 6.0);
     let pressure = "{ pressure = \"rho*kT + 1.656*rho^3\" }";
     measure("Warren, psi from a pressure", &warren(pressure, ""), 6.0);
-    measure("Huggins", &huggins(""), 16.0);
-    measure("Huggins, bounds met", &huggins("bounds = [7, 9]"), 16.0);
+    measure("Huggins", &huggins(""), 14.0);
+    measure("Huggins, bounds met", &huggins("bounds = [6.5, 7.5]"), 14.0);
 }
