@@ -13,6 +13,7 @@
 pub mod curve;
 pub mod expression;
 pub mod kernel;
+pub mod keys;
 pub mod pair;
 
 mod file;

@@ -45,7 +45,7 @@ const ACCURACY: f64 = 3e-14;
 const ROUNDING: f64 = 8.0 * f64::EPSILON / ACCURACY;
 
 /// The most panels on either side.
-const MOST_PANELS: usize = 2000;
+const MOST_PANELS: usize = 1000;
 
 impl Pressure {
     /// From the pressure as a formula of the variable 0, ρ. The first density at which ψ′ is finite

@@ -1,3 +1,5 @@
+use std::cmp::Ordering;
+
 /// A cubic spline through given points: twice continuously differentiable, third derivative
 /// continuous across the second and the last but one point ("not a knot"; C. de Boor, A Practical
 /// Guide to Splines, ch. IV). Beyond the ends it goes on with a constant second derivative.
@@ -39,8 +41,8 @@ impl Spline {
         x.truncate(count);
         y.truncate(count);
         let rising = x[1] > x[0];
-        // Not a number is neither.
-        if let Some(at) = (1..count).find(|&k| if rising { !(x[k] > x[k - 1]) } else { !(x[k] < x[k - 1]) }) {
+        let order = Some(if rising { Ordering::Less } else { Ordering::Greater });
+        if let Some(at) = (1..count).find(|&k| x[k - 1].partial_cmp(&x[k]) != order) {
             return Err(SplineError::NotMonotone(at));
         }
         if !rising {

@@ -62,8 +62,9 @@ impl Formula {
     ///
     /// Fails only for formulas that are already near the limit of operations.
     pub fn derivative(&self, i: usize) -> Result<Self, TooLarge> {
-        let Ok(variable) = u32::try_from(i) else {
-            return Ok(Self::constant(0.0));
+        let variable = match u32::try_from(i) {
+            Ok(variable) if self.depends_on(i) => variable,
+            _ => return Ok(Self::constant(0.0)),
         };
         let mut graph = Graph::new();
         let places = graph.import(&self.nodes)?;

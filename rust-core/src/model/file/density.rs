@@ -20,6 +20,9 @@ pub struct DensityEntry {
     pub below: Continuation,
 }
 
+/// Most densities of a model.
+const MOST_DENSITIES: usize = 16;
+
 /// Reads every `[density.*]`, in the order of the file.
 pub fn read(
     root: &Section,
@@ -31,7 +34,12 @@ pub fn read(
     };
     let section = value.section()?;
     let mut densities: Vec<DensityEntry> = Vec::new();
-    for (name, value) in section.entries() {
+    let entries = section.entries();
+    if entries.len() > MOST_DENSITIES {
+        let message = format!("{} densities, more than {MOST_DENSITIES}", entries.len());
+        return Err(value.error(FileErrorKind::Value(message)));
+    }
+    for (name, value) in entries {
         check_identifier(&name, &section)?;
         let Some(table) = value.as_section() else {
             return Err(value

@@ -1,7 +1,7 @@
 //! Pair potentials `φ(r)`, added to the many-body terms.
 //!
 //! To add a form: write one file with a type that implements [`PairForm`] and name it once in
-//! [`pair_table!`]; the model file's reader then needs its keys.
+//! `pair_table!`; the model file's reader then needs its keys.
 
 mod expression;
 mod soft;
