@@ -17,3 +17,4 @@
 pub mod document;
 pub mod engine;
 pub mod model;
+pub mod theory;
