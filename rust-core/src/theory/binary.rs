@@ -40,7 +40,13 @@ enum Held {
 pub struct CompositionLine<'a> {
     theory: &'a MeanField,
     held: Held,
+    /// At fixed pressure, the logarithm of the total density at the points of the grid.
+    followed: Vec<f64>,
 }
+
+/// The grid: the logarithm of the ratio of the two species.
+const REACH: f64 = 30.0;
+const STEPS: usize = 1200;
 
 fn fractions(u: f64) -> [f64; 2] {
     [1.0 / (1.0 + (-u).exp()), 1.0 / (1.0 + u.exp())]
@@ -48,7 +54,56 @@ fn fractions(u: f64) -> [f64; 2] {
 
 impl<'a> CompositionLine<'a> {
     pub fn at_density(theory: &'a MeanField, density: f64) -> CompositionLine<'a> {
-        CompositionLine { theory, held: Held::Density(density) }
+        CompositionLine { theory, held: Held::Density(density), followed: Vec::new() }
+    }
+
+    /// Follows the density from the equimolar mixture, where it is the densest there is, to both sides.
+    pub fn at_pressure(theory: &'a MeanField, pressure: f64) -> CompositionLine<'a> {
+        let held = Held::Pressure(pressure);
+        let mut line = CompositionLine { theory, held, followed: vec![f64::NAN; STEPS + 1] };
+        let grid = line.grid();
+        let densest =
+            |u: f64| theory.densities_at_pressure(&fractions(u), pressure).pop().map_or(f64::NAN, f64::ln);
+        let middle = STEPS / 2;
+        line.followed[middle] = densest(grid[middle]);
+        let towards = |from: usize, i: usize, line: &CompositionLine| {
+            let near = line.solve_density(grid[i], line.followed[from], pressure);
+            near.unwrap_or_else(|| densest(grid[i]))
+        };
+        for i in middle + 1..=STEPS {
+            line.followed[i] = towards(i - 1, i, &line);
+        }
+        for i in (0..middle).rev() {
+            line.followed[i] = towards(i + 1, i, &line);
+        }
+        line
+    }
+
+    fn new(theory: &'a MeanField, held: Held) -> CompositionLine<'a> {
+        match held {
+            Held::Density(density) => CompositionLine::at_density(theory, density),
+            Held::Pressure(pressure) => CompositionLine::at_pressure(theory, pressure),
+        }
+    }
+
+    /// `ln ρ` at which the pressure is as given, by Newton's method from a neighbour.
+    fn solve_density(&self, u: f64, from: f64, pressure: f64) -> Option<f64> {
+        let x = fractions(u);
+        let mut log = from;
+        for _ in 0..30 {
+            let rho = x.map(|x| x * log.exp());
+            let slope = log.exp() * self.theory.pressure_slope(&rho);
+            let step = (pressure - self.theory.pressure(&rho)) / slope;
+            // NaN, a step off the branch, or a branch that ended.
+            if slope.is_nan() || slope <= 0.0 || step.is_nan() || step.abs() > 1.0 {
+                return None;
+            }
+            log += step;
+            if step.abs() < 1e-14 {
+                return Some(log);
+            }
+        }
+        Some(log).filter(|_| log.is_finite())
     }
 
     /// Both densities.
@@ -56,7 +111,11 @@ impl<'a> CompositionLine<'a> {
         let x = fractions(u);
         let total = match self.held {
             Held::Density(rho) => rho,
-            Held::Pressure(p) => self.theory.densities_at_pressure(&x, p).pop().unwrap_or(f64::NAN),
+            Held::Pressure(pressure) => {
+                let at = ((u + REACH) / (2.0 * REACH) * STEPS as f64).clamp(0.0, STEPS as f64);
+                let near = self.followed[at.round() as usize];
+                self.solve_density(u, near, pressure).map_or(f64::NAN, f64::exp)
+            }
         };
         x.map(|x| x * total)
     }
@@ -120,7 +179,7 @@ impl Line for CompositionLine<'_> {
     }
 
     fn grid(&self) -> Vec<f64> {
-        spaced(-30.0, 30.0, 1200)
+        spaced(-REACH, REACH, STEPS)
     }
 
     fn limits(&self) -> [f64; 2] {
@@ -155,7 +214,7 @@ impl MeanField {
         self.spinodal_of(Held::Density(density))
     }
 
-    /// The same at fixed pressure, on the densest branch: `det f_αβ < 0` with `∂p/∂ρ > 0`, the full
+    /// The same at fixed pressure, on the branch that is densest in the equimolar mixture: `det f_αβ < 0` with `∂p/∂ρ > 0`, the full
     /// condition for a compressible mixture.
     ///
     /// # Errors
@@ -176,7 +235,8 @@ impl MeanField {
     }
 
     /// Two phases of a binary mixture that have the pressure `pressure` and both chemical potentials in
-    /// common: the common tangent of the Gibbs free energy per particle, on the densest branch.
+    /// common: the common tangent of the Gibbs free energy per particle, on the branch that is densest in the
+    /// equimolar mixture.
     ///
     /// # Errors
     /// Not two species; [`TheoryError::NoCoexistence`].
@@ -186,13 +246,13 @@ impl MeanField {
 
     fn spinodal_of(&self, held: Held) -> Result<Vec<[f64; 2]>, TheoryError> {
         self.require_species(2)?;
-        let line = CompositionLine { theory: self, held };
+        let line = CompositionLine::new(self, held);
         Ok(unstable(&line).into_iter().map(|[a, b]| [line.x(a), line.x(b)]).collect())
     }
 
     fn binodal_of(&self, held: Held) -> Result<CompositionBinodal, TheoryError> {
         self.require_species(2)?;
-        let line = CompositionLine { theory: self, held };
+        let line = CompositionLine::new(self, held);
         let phases = self.phases(&line)?;
         Ok(line.two_phases(phases))
     }

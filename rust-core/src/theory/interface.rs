@@ -117,7 +117,7 @@ impl MeanField {
 }
 
 /// The planar interface of `½κ x′² = W`. The curvature of the line times `energy / spread(x)` is `f″`, and
-/// `spread(x)` is also how far `f″` stays what it is.
+/// `spread(x)` is `dx/du`.
 fn planar(
     line: &dyn Line,
     kappa: &dyn Fn(f64) -> f64,
@@ -128,6 +128,7 @@ fn planar(
 ) -> Result<Interface, TheoryError> {
     let (x1, x2) = (line.x(u1), line.x(u2));
     let half = 0.5 * (x2 - x1);
+    let rule = gauss_legendre(8);
     let (slope, intercept) = (line.slope(u1), line.intercept(u1));
     let second = |u: f64| line.curvature(u) * energy / spread(line.x(u));
     let curvatures = [second(u1), second(u2)];
@@ -143,15 +144,17 @@ fn planar(
             return Err(TheoryError::GradientNotPositive { at, coefficient });
         }
     }
-    // W from the double tangent, or from its parabola where that is all rounding error.
+    // W from the double tangent, or by integrating f″ twice where that is a difference of large numbers.
     let height = |theta: f64| {
         let x = place(theta);
         let u = line.u(x);
-        let below = (x * (line.slope(u) - slope) - (line.intercept(u) - intercept)).max(0.0);
+        let (own_slope, own_intercept) = (line.slope(u), line.intercept(u));
+        let below = x * (own_slope - slope) - (own_intercept - intercept);
+        if below > 1e-6 * ((x * own_slope).abs() + own_intercept.abs()) {
+            return below;
+        }
         let near = usize::from(theta > 0.5 * PI);
-        let away = distance(theta)[near];
-        let parabola = away < 1e-4 * spread([x1, x2][near]).min(half);
-        if parabola { 0.5 * curvatures[near] * away * away } else { below }
+        energy * twice_integrated(line, [u1, u2][near], u, distance(theta)[near], &rule).max(0.0)
     };
     // dx/dz = √(2W/κ), and dz/dθ = half sin θ / (dx/dz).
     let steepness = |theta: f64| (2.0 * height(theta) / kappa(place(theta))).sqrt();
@@ -165,7 +168,6 @@ fn planar(
     let ts = spaced(-ends, ends, count - 1);
     let theta = |t: f64| 2.0 * t.exp().atan();
     let rate = |t: f64| half * theta(t).sin().powi(2) / steepness(theta(t));
-    let rule = gauss_legendre(8);
     let mut z = vec![0.0; count];
     for i in 1..count {
         let (a, b) = (ts[i - 1], ts[i]);
@@ -184,4 +186,25 @@ fn planar(
         .fold(0.0, f64::max);
     let decay = [0, 1].map(|i| (kappa([x1, x2][i]) / curvatures[i]).sqrt());
     Ok(Interface { phases: [x1, x2], tension, width: 2.0 * half / steepest, decay, profile })
+}
+
+/// `∫ (x − x(v)) f″ dx` from a phase at `end` to `u`, in units of the line's energy: there
+/// `f″ dx = curvature dv`. `away` is the distance of `x` from the phase. Panels double away from `u`.
+fn twice_integrated(line: &dyn Line, end: f64, u: f64, away: f64, rule: &[(f64, f64)]) -> f64 {
+    let start = line.x(end);
+    let sign = (u - end).signum();
+    let (mut from, mut width, mut total) = (u, 0.25, 0.0);
+    while from != end {
+        let mut to = from - sign * width;
+        if sign * (to - end) <= 0.0 {
+            to = end;
+        }
+        for (t, w) in rule {
+            let v = 0.5 * (from + to) + 0.5 * (from - to) * t;
+            let lever = sign * away - (line.x(v) - start);
+            total += 0.5 * (from - to) * w * lever * line.curvature(v);
+        }
+        (from, width) = (to, 2.0 * width);
+    }
+    total
 }

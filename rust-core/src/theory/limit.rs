@@ -73,6 +73,14 @@ pub fn thermodynamic_limit(fluid: &Fluid) -> Result<Result<(), NoLimit>, TheoryE
     Ok(search.run().map_or(Ok(()), Err))
 }
 
+impl NoLimit {
+    /// Whether the uniform fluid collapses, which happens at once. Collapse onto a lattice only may have
+    /// to be nucleated at a density that no simulation of the fluid ever comes near.
+    pub fn is_uniform(&self) -> bool {
+        self.structure == Structure::Uniform
+    }
+}
+
 struct Search<'a> {
     fluid: &'a Fluid,
     theory: &'a MeanField,

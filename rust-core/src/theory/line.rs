@@ -110,6 +110,9 @@ pub fn coexistence(line: &dyn Line, regions: &[[f64; 2]], which: usize) -> Optio
 
 /// From `start` in `direction` up to `end`: where `reached` becomes true.
 fn reach(start: f64, end: f64, direction: f64, reached: impl Fn(f64) -> bool) -> Option<f64> {
+    if reached(start) {
+        return Some(start);
+    }
     let (mut before, mut step) = (start, 0.01);
     loop {
         let at = start + direction * step;

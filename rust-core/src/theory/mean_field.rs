@@ -116,12 +116,18 @@ impl MeanField {
         &self.pair_integrals
     }
 
-    /// `ψ_α` and its derivatives in the bulk.
+    /// `ψ_α` and its derivatives in the bulk; NaN outside its domain.
     pub(super) fn psi(&self, alpha: usize, densities: &[f64]) -> Psi {
         let count = self.species.len();
         let at: Vec<f64> =
             self.shift[alpha].iter().enumerate().map(|(v, shift)| densities[v % count] + shift).collect();
-        self.free_energy.at(alpha, &at)
+        let mut psi = self.free_energy.at(alpha, &at);
+        if !psi.value.is_finite() {
+            // The derivatives of a logarithm go on where it does not.
+            psi.gradient.fill(f64::NAN);
+            psi.hessian.fill(f64::NAN);
+        }
+        psi
     }
 
     /// Excess free energy density `f_ex = Σ_α ρ_α ψ_α(ρ) + ½ Σ_αβ [φ_αβ] ρ_α ρ_β`

@@ -28,13 +28,18 @@ pub fn gauss_legendre(count: usize) -> Vec<(f64, f64)> {
         .collect()
 }
 
+/// More panels than any integrand needs that is not noise.
+const MAX_PANELS: usize = 20_000;
+
 /// `∫_a^b f` by adaptive bisection of panels; `nodes` receives abscissae and weights of the panels that
-/// were accepted. `None` if a panel cannot be resolved.
+/// were accepted; `relative` is the error of one panel, compared to `∫|f|`. `None` if a panel cannot be
+/// resolved.
 fn adaptive(
     f: &dyn Fn(f64) -> f64,
     breaks: &[f64],
     nodes: &mut Vec<(f64, f64)>,
     depth_limit: usize,
+    relative: f64,
 ) -> Option<f64> {
     let rule = gauss_legendre(16);
     let panel = |a: f64, b: f64| -> (f64, f64) {
@@ -48,14 +53,18 @@ fn adaptive(
     if !scale.is_finite() {
         return None;
     }
-    let mut total = 0.0;
+    let (mut total, mut panels) = (0.0, 0);
     let mut waiting: Vec<(f64, f64, usize)> = breaks.windows(2).rev().map(|p| (p[0], p[1], 0)).collect();
     while let Some((a, b, depth)) = waiting.pop() {
+        panels += 1;
+        if panels > MAX_PANELS {
+            return None;
+        }
         let middle = 0.5 * (a + b);
         let whole = panel(a, b).0;
         let halves = panel(a, middle).0 + panel(middle, b).0;
         let error = (whole - halves).abs();
-        let tolerance = 1e-15 * scale + 1e-15 * whole.abs();
+        let tolerance = relative * scale;
         if error <= tolerance || (depth == depth_limit && error <= 1e-10 * scale) {
             total += whole;
             let half = 0.5 * (b - a);
@@ -70,9 +79,9 @@ fn adaptive(
     Some(total)
 }
 
-/// `∫ f` over the panels between `breaks`, adaptive; the best there is where it does not converge.
+/// `∫ f` over the panels between `breaks`, to about ten digits; NaN if it does not converge.
 pub fn integral(f: &dyn Fn(f64) -> f64, breaks: &[f64]) -> f64 {
-    adaptive(f, breaks, &mut Vec::new(), 24).unwrap_or(f64::NAN)
+    adaptive(f, breaks, &mut Vec::new(), 30, 1e-11).unwrap_or(f64::NAN)
 }
 
 /// A function of the distance in two or three dimensions, tabulated for integration over space.
@@ -90,7 +99,7 @@ impl Radial {
         let measure = |r: f64| if dimensions == 2 { 2.0 * PI * r } else { 4.0 * PI * r * r };
         let breaks = super::search::spaced(0.0, range, 16);
         let mut nodes = Vec::new();
-        adaptive(&|r| f(r) * measure(r), &breaks, &mut nodes, 40)?;
+        adaptive(&|r| f(r) * measure(r), &breaks, &mut nodes, 40, 1e-14)?;
         for (r, weight) in &mut nodes {
             *weight *= f(*r) * measure(*r);
         }
