@@ -140,7 +140,7 @@ fn planar(
     };
     for theta in spaced(0.0, PI, 400) {
         let (at, coefficient) = (place(theta), kappa(place(theta)));
-        if !(coefficient > 0.0) {
+        if coefficient.is_nan() || coefficient <= 0.0 {
             return Err(TheoryError::GradientNotPositive { at, coefficient });
         }
     }

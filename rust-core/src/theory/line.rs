@@ -80,7 +80,7 @@ pub fn coexistence(line: &dyn Line, regions: &[[f64; 2]], which: usize) -> Optio
     let high_end = regions.get(which + 1).map_or(limits[1], |next| next[0]);
     let (top, bottom) = (line.slope(a), line.slope(b));
     // Undefined, or rounding made the two ends one: no interval to speak of.
-    if !(top > bottom) {
+    if top.is_nan() || bottom.is_nan() || top <= bottom {
         return None;
     }
     let low = |slope: f64| -> Option<f64> { reach(a, low_end, -1.0, |u| line.slope(u) <= slope) };
@@ -94,7 +94,7 @@ pub fn coexistence(line: &dyn Line, regions: &[[f64; 2]], which: usize) -> Optio
         Some(_) => top,
         None => line.slope(high_end),
     };
-    if !(from < to) {
+    if from.is_nan() || to.is_nan() || from >= to {
         return None;
     }
     let difference =

@@ -159,8 +159,8 @@ impl MeanField {
         for alpha in 0..count {
             let psi = self.psi(alpha, densities);
             mu[alpha] += psi.value;
-            for beta in 0..count {
-                mu[alpha] += self.pair_integrals[alpha * count + beta] * densities[beta];
+            for (beta, rho) in densities.iter().enumerate() {
+                mu[alpha] += self.pair_integrals[alpha * count + beta] * rho;
             }
             if densities[alpha] != 0.0 {
                 for (v, slope) in psi.gradient.iter().enumerate() {

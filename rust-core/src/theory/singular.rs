@@ -81,13 +81,17 @@ fn along(theory: &MeanField, alpha: usize, composition: &[f64], grid: &[f64]) ->
                 }
                 all.push(found(edge, if pole { SingularityKind::Pole } else { SingularityKind::Edge }));
             }
-            (true, true) if i + 1 < grid.len() && values[i + 1].is_finite() => {
-                // A peak of the steepness that grows without bound when looked at closer.
-                if values[i] >= values[i - 1] && values[i] >= values[i + 1] && values[i] > 0.0 {
-                    let (place, value) = minimum(grid[i - 1], grid[i + 1], |rho| -steepness(rho));
-                    if -value > 1e5 * values[i - 1].min(values[i + 1]).max(f64::MIN_POSITIVE) {
-                        all.push(found(place, SingularityKind::Pole));
-                    }
+            // A peak of the steepness that grows without bound when looked at closer.
+            (true, true)
+                if i + 1 < grid.len()
+                    && values[i + 1].is_finite()
+                    && values[i] > 0.0
+                    && values[i] >= values[i - 1]
+                    && values[i] >= values[i + 1] =>
+            {
+                let (place, value) = minimum(grid[i - 1], grid[i + 1], |rho| -steepness(rho));
+                if -value > 1e5 * values[i - 1].min(values[i + 1]).max(f64::MIN_POSITIVE) {
+                    all.push(found(place, SingularityKind::Pole));
                 }
             }
             _ => {}

@@ -111,7 +111,7 @@ impl MeanField {
         }
         Stability {
             stable: smallest > 0.0 && zero > 0.0,
-            spinodal: !(zero > 0.0),
+            spinodal: zero.is_nan() || zero <= 0.0,
             k_star: (k_star > 0.0).then_some(k_star),
             min_inverse_s: smallest,
         }
