@@ -24,7 +24,7 @@ pub enum Initial {
         /// Where it is.
         path: PathBuf,
         /// What it holds.
-        state: State,
+        state: Box<State>,
         /// `None` keeps those of the file.
         velocities: Option<Velocities>,
     },
@@ -120,7 +120,7 @@ fn read_file(
         })?;
     let velocities = Velocities::read_or_keep(section)?;
     let domain = state.domain.clone();
-    Ok((Initial::File { path, state, velocities }, domain))
+    Ok((Initial::File { path, state: Box::new(state), velocities }, domain))
 }
 
 fn read_slab(section: &Section, dimensions: usize, domain: &PeriodicBox) -> Result<(usize, f64), FileError> {
