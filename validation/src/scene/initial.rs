@@ -43,6 +43,17 @@ pub struct Filling {
     pub velocities: Velocities,
 }
 
+impl Filling {
+    /// The volume of the filled part.
+    pub fn volume(&self, domain: &PeriodicBox, dimensions: usize) -> f64 {
+        let part = match self.placement {
+            Placement::Slab { axis, thickness } => thickness / domain.lengths()[axis],
+            Placement::Random | Placement::Lattice => 1.0,
+        };
+        part * domain.volume(dimensions)
+    }
+}
+
 /// Where particles are put.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Placement {
