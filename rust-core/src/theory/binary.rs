@@ -1,4 +1,4 @@
-use super::line::{Line, coexistence, least_stable, unstable};
+use super::line::{Line, coexisting, least_stable, unstable};
 use super::one_component::change_of_sign;
 use super::search::{spaced, turning_point};
 use super::{MeanField, TheoryError};
@@ -259,10 +259,7 @@ impl MeanField {
 
     /// The two phases as parameters of the line.
     pub(super) fn phases(&self, line: &dyn Line) -> Result<[f64; 2], TheoryError> {
-        let regions = unstable(line);
-        (0..regions.len())
-            .find_map(|which| coexistence(line, &regions, which))
-            .ok_or(TheoryError::NoCoexistence)
+        coexisting(line).ok_or(TheoryError::NoCoexistence)
     }
 }
 

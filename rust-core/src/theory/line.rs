@@ -66,18 +66,37 @@ pub fn least_stable(line: &dyn Line) -> (f64, f64) {
     if refined.1 <= values[best] { refined } else { (grid[best], values[best]) }
 }
 
-/// The two phases on either side of unstable interval `which` of `regions`.
+/// Two coexisting phases: the first double tangent, in order of `x`, with nothing of `g` below it between
+/// the two phases. A phase that is stable by itself may lie in between and be left out.
+pub fn coexisting(line: &dyn Line) -> Option<[f64; 2]> {
+    let regions = unstable(line);
+    let grid = line.grid();
+    let supported = |[a, b]: [f64; 2]| {
+        let (slope, intercept) = (line.slope(a), line.intercept(a));
+        grid.iter().filter(|u| a < **u && **u < b).all(|u| {
+            let (own_slope, own_intercept, x) = (line.slope(*u), line.intercept(*u), line.x(*u));
+            let above = x * (own_slope - slope) - (own_intercept - intercept);
+            above.is_nan() || above > -1e-9 * ((x * own_slope).abs() + own_intercept.abs())
+        })
+    };
+    (0..regions.len()).find_map(|first| {
+        let partners = (first..regions.len()).rev();
+        partners.filter_map(|last| coexistence(line, &regions, first, last)).find(|pair| supported(*pair))
+    })
+}
+
+/// The two phases below unstable interval `first` and above unstable interval `last` of `regions`.
 ///
-/// The slope is monotonic on the two stable branches next to the interval, so both phases follow from a
+/// The slope is monotonic on the two stable branches next to these intervals, so both phases follow from a
 /// common slope by bisection; the difference of their intercepts is monotonic in that slope in turn.
-pub fn coexistence(line: &dyn Line, regions: &[[f64; 2]], which: usize) -> Option<[f64; 2]> {
-    let [a, b] = regions[which];
+fn coexistence(line: &dyn Line, regions: &[[f64; 2]], first: usize, last: usize) -> Option<[f64; 2]> {
+    let (a, b) = (regions[first][0], regions[last][1]);
     if !a.is_finite() || !b.is_finite() {
         return None;
     }
     let limits = line.limits();
-    let low_end = if which == 0 { limits[0] } else { regions[which - 1][1] };
-    let high_end = regions.get(which + 1).map_or(limits[1], |next| next[0]);
+    let low_end = if first == 0 { limits[0] } else { regions[first - 1][1] };
+    let high_end = regions.get(last + 1).map_or(limits[1], |next| next[0]);
     let (top, bottom) = (line.slope(a), line.slope(b));
     // Undefined, or rounding made the two ends one: no interval to speak of.
     if top.is_nan() || bottom.is_nan() || top <= bottom {

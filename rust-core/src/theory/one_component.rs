@@ -1,4 +1,4 @@
-use super::line::{Line, coexistence, least_stable, unstable};
+use super::line::{Line, least_stable, unstable};
 use super::{MeanField, TheoryError};
 use crate::model::{Fluid, Model};
 
@@ -93,10 +93,7 @@ impl MeanField {
     pub fn binodal(&self) -> Result<Binodal, TheoryError> {
         self.require_species(1)?;
         let line = DensityLine::new(self);
-        let regions = unstable(&line);
-        let [a, b] = (0..regions.len())
-            .find_map(|which| coexistence(&line, &regions, which))
-            .ok_or(TheoryError::NoCoexistence)?;
+        let [a, b] = self.phases(&line)?;
         Ok(Binodal {
             vapour: a.exp(),
             liquid: b.exp(),

@@ -11,11 +11,12 @@ pub struct Stability {
     pub stable: bool,
     /// Not positive as `k → 0`: inside the spinodal, the fluid separates into phases.
     pub spinodal: bool,
-    /// Where it is smallest, if that is not `k = 0`. In a stable fluid this is the main peak of the
+    /// Where it is smallest, if that is not `k = 0` and it is below 1, its value for an ideal gas and at
+    /// `k → ∞`. In a stable fluid this is the main peak of the
     /// structure factor; in an unstable one it is the wavelength `2π/k*` at which the fluid clusters or
     /// freezes.
     pub k_star: Option<f64>,
-    /// Its smallest value over `k`.
+    /// Its smallest value over `k`; the limit 1 at `k → ∞` counts.
     pub min_inverse_s: f64,
 }
 
@@ -99,7 +100,8 @@ impl MeanField {
         let ks = spaced(0.0, high, count);
         let values: Vec<f64> = ks.iter().map(|k| value(*k)).collect();
         let zero = values[0];
-        let (mut k_star, mut smallest) = (0.0, zero);
+        // As k → ∞ there are no interactions, and the value is 1.
+        let (mut k_star, mut smallest) = (0.0, zero.min(1.0));
         for i in 1..count {
             if values[i] <= values[i - 1] && values[i] <= values[i + 1] {
                 let (k, refined) = minimum(ks[i - 1], ks[i + 1], value);

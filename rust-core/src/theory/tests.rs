@@ -186,7 +186,8 @@ fn quadratic_kernel_and_soft_potential_are_one_fluid() {
     close(kappa[0], kappa[1], 1e-12);
     assert!(kappa[0] < 0.0);
     let stability = by_pairs.stability(&[3.0]);
-    assert!(stability.stable && !stability.spinodal && stability.min_inverse_s > 0.0);
+    assert!(stability.stable && !stability.spinodal && stability.k_star.is_none());
+    assert_eq!(stability.min_inverse_s, 1.0);
 }
 
 #[test]
@@ -353,6 +354,29 @@ fn huggins_fluid() {
     // ln((1−c)/c) = (3/2) ε n0 Nm ρ (1 − 2c)
     let c = phases.composition[0];
     close(((1.0 - c) / c).ln(), 1.5 * 1.9 * 0.8 * (1.0 - 2.0 * c), 1e-10);
+    // The mixture is symmetric, so fixed density and fixed pressure agree, also where the equimolar
+    // mixture is locally stable at that pressure (ε_AA = 2.2).
+    for epsilon in [1.8, 2.0, 2.2] {
+        let mf = theory(&huggins(epsilon), 1.0);
+        let phases = mf.composition_binodal(16.0).unwrap();
+        let same = mf.composition_binodal_at_pressure(phases.pressure[0]).unwrap();
+        close(same.composition[0], phases.composition[0], 1e-9);
+        close(same.density[1], 16.0, 1e-9);
+    }
+    // At ε_AA = 2.3 a thinner mixed phase of the same pressure comes between the two.
+    let mf = theory(&huggins(2.3), 1.0);
+    let symmetric = mf.composition_binodal(16.0).unwrap();
+    let phases = mf.composition_binodal_at_pressure(symmetric.pressure[0]).unwrap();
+    assert!(phases.composition[1] < 0.6 && phases.density[1] < 12.0, "{phases:?}");
+    close(phases.pressure[1], symmetric.pressure[0], 1e-10);
+    let mu = [0, 1].map(|i| {
+        let (c, rho) = (phases.composition[i], phases.density[i]);
+        mf.chemical_potentials(&[c * rho, (1.0 - c) * rho])
+    });
+    close(mu[0][0], mu[1][0], 1e-10);
+    close(mu[0][1], mu[1][1], 1e-10);
+    let (c, rho) = (symmetric.composition[0], symmetric.density[0]);
+    assert!(mu[0][0] < mf.chemical_potentials(&[c * rho, (1.0 - c) * rho])[0]);
 }
 
 #[test]
