@@ -272,11 +272,24 @@ impl fmt::Display for Plan {
                 term.potential.range()
             )?;
         }
+        // One species: n is its density. Several: n_A, n_B …
+        let names: Vec<String> = self
+            .densities
+            .iter()
+            .flat_map(|d| {
+                self.species
+                    .iter()
+                    .map(|s| if count == 1 { d.name.clone() } else { format!("{}_{s}", d.name) })
+            })
+            .collect();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
         for (name, excess) in self.species.iter().zip(&self.excess) {
             match excess {
                 ExcessPlan::Constant(0.0) => {}
                 ExcessPlan::Constant(value) => writeln!(f, "psi of {name:<6} constant {value}")?,
-                ExcessPlan::Formula(plan) => writeln!(f, "psi of {name:<6} {}", plan.formula)?,
+                ExcessPlan::Formula(plan) => {
+                    writeln!(f, "psi of {name:<6} {}", plan.formula.with_names(&names))?;
+                }
                 ExcessPlan::Curve(plan) => writeln!(f, "psi of {name:<6} {}", plan.curve.describe())?,
             }
         }

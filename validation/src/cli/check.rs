@@ -75,9 +75,13 @@ fn print(findings: &Findings, species: &[String]) {
         println!("mean field    pressure {p:.6}, dp/drho {slope:.6}");
     }
     if let Some(s) = &findings.stability {
-        let place = s.k_star.map_or("k = 0".to_owned(), |k| format!("k* = {k:.4}"));
         let verdict = if s.stable { "stable" } else { "unstable" };
-        println!("stability     {verdict}: smallest 1/S(k) is {:.5} at {place}", s.min_inverse_s);
+        let place = match s.k_star {
+            Some(k) => format!("at k* = {k:.4}"),
+            None if s.spinodal => "at k = 0".to_owned(),
+            None => "(S(k) has no peak)".to_owned(),
+        };
+        println!("stability     {verdict}: smallest 1/S(k) is {:.5} {place}", s.min_inverse_s);
     } else {
         println!("stability     give --density to have pressure and stability");
     }
