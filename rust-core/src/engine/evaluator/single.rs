@@ -31,7 +31,8 @@ impl Engine {
             }
         }
         let width = plan.slope_width();
-        if let Some(particles) = particles.filter(|p| p.iter().all(|i| (i + 1) * width <= self.slopes.len())) {
+        if let Some(particles) = particles.filter(|p| p.iter().all(|i| (i + 1) * width <= self.slopes.len()))
+        {
             let [i, j] = particles.map(|i| i * width);
             for (k, d) in plan.passes.iter().enumerate() {
                 let slope = self.slopes[i + k * count + b] + self.slopes[j + k * count + a];
