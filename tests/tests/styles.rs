@@ -86,11 +86,6 @@ fn mistakes_stop_with_one_clear_line() {
         ("units lj", "units real".into(), "use 'units lj'"),
         ("0 5 0 5 0 5", "0 5 0 5 0 1.9".into(), "less than twice the range of the thermostat"),
         (
-            "fix 1 all nve",
-            "group g id 1:10\nneigh_modify exclude group g g\nfix 1 all nve".into(),
-            "neigh_modify exclude",
-        ),
-        (
             &coeff,
             mdpd("pair_style mdpd/psi 1.0 1.0 5", "pair_coeff 1 1 -40 25 18 1.0"),
             "expected 'pair_coeff I J A B gamma rc rd'",
