@@ -48,11 +48,11 @@ impl BuiltFor {
 /// Quick when nothing has changed, and safe to call from several processes at once.
 pub fn build(host: &Host, progress: &dyn Fn(&str)) -> Result<PathBuf, LammpsError> {
     let version = host.version()?;
+    let name = format!("{}-{}", version.number, version.abi.replace(' ', "-"));
     let base = match host.kind {
         HostKind::Environment => base_dir(),
-        HostKind::Prefix | HostKind::Source => {
-            base_dir().join(format!("{}-{}", version.number, version.abi.replace(' ', "-")))
-        }
+        HostKind::Prefix => base_dir().join(name),
+        HostKind::Source => base_dir().join(name + "-source"),
     };
     build_for(host, &version, &base, progress)
 }
