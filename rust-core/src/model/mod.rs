@@ -25,6 +25,5 @@ pub use file::{KNOWN_FUNCTIONS, Model};
 pub use fluid::{
     Bounds, Continuation, ExcessFreeEnergy, Fluid, PairTerm, Polynomial, Thermostat, WeightedDensity,
 };
-pub use fluid::{ExcessFreeEnergy, Fluid, PairTerm, Polynomial, Thermostat, WeightedDensity};
 pub use preset_spline::{SplinePair, spline_dpd, spline_dpd_text};
 pub use presets::{ForceLaw, PresetError, WarrenPair, warren_ab, warren_ab_text};
