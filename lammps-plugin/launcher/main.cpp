@@ -14,7 +14,6 @@
 #include <exception>
 #include <map>
 #include <mpi.h>
-#include <string>
 #include <typeinfo>
 
 using namespace LAMMPS_NS;

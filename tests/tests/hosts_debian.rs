@@ -1,7 +1,7 @@
 //! The LAMMPS of the distribution, which loads no plugins: the launcher, under its mpirun too, and Python.
 
-use psidpd::lammps::{DataFile, Host, HostKind, dump, plugin};
-use psidpd_tests::{psidpd, root, said};
+use psidpd::lammps::{DataFile, Host, HostKind, HostVersion, dump, plugin};
+use psidpd_tests::{lammps, psidpd, root, said};
 use std::io::Write;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
@@ -23,11 +23,11 @@ struct Debian {
 fn debian() -> Option<&'static Debian> {
     static DEBIAN: OnceLock<Option<Debian>> = OnceLock::new();
     let found = DEBIAN.get_or_init(|| {
-        let installed = |package: &&str| {
+        let installed = |package: &str| {
             let out = Command::new("dpkg").args(["-s", package]).output();
             out.is_ok_and(|o| String::from_utf8_lossy(&o.stdout).contains("Status: install ok installed"))
         };
-        if !PACKAGES.iter().all(|p| installed(&p)) {
+        if !PACKAGES.into_iter().all(installed) {
             return None;
         }
         let host = Host::system().expect("Debian's LAMMPS is found");
@@ -43,7 +43,10 @@ fn debian() -> Option<&'static Debian> {
             "not run: Debian LAMMPS is not installed (apt install {})",
             PACKAGES.join(" ")
         );
-        assert!(std::env::var_os("CI").is_none(), "Debian's LAMMPS must be installed in CI");
+        assert!(
+            std::env::var_os("CI").is_none_or(|ci| ci != "true"),
+            "Debian's LAMMPS must be installed in CI"
+        );
     }
     found.as_ref()
 }
@@ -220,17 +223,32 @@ fn python_registers_the_styles() {
                 import psidpd_lammps\n\
                 psidpd_lammps.register(L, plugin)\n\
                 L.file('in.lammps')\n";
-    let out = Command::new("/usr/bin/python3")
+    let out = python(code, &debian.plugin, folder.path());
+    assert!(out.status.success(), "{}", said(&out));
+    assert_eq!(said(&out).matches("Loop time").count(), 2, "{}", said(&out));
+}
+
+/// What Debian's Python says when a plugin is to be registered in its LAMMPS.
+fn register_in_python(plugin: &Path) -> Output {
+    let code = "import sys, lammps\n\
+                sys.path.append(sys.argv[2])\n\
+                import psidpd_lammps\n\
+                L = lammps.lammps(cmdargs=['-nocite', '-log', 'none'])\n\
+                psidpd_lammps.register(L, sys.argv[1])\n";
+    python(code, plugin, &std::env::temp_dir())
+}
+
+/// Debian's Python, with the plugin and the folder of the Python package as arguments.
+fn python(code: &str, plugin: &Path, folder: &Path) -> Output {
+    Command::new("/usr/bin/python3")
         .args(["-c", code])
-        .arg(&debian.plugin)
+        .arg(plugin)
         .arg(root().join("lammps-plugin/python"))
         .env("OMP_NUM_THREADS", "1")
         .env("PYTHONDONTWRITEBYTECODE", "1")
-        .current_dir(folder.path())
+        .current_dir(folder)
         .output()
-        .expect("Python starts");
-    assert!(out.status.success(), "{}", said(&out));
-    assert_eq!(said(&out).matches("Loop time").count(), 2, "{}", said(&out));
+        .expect("Python starts")
 }
 
 /// Built for another version: a message and a failure, from the launcher and from Python, before any of its code looks
@@ -252,24 +270,45 @@ fn a_plugin_for_another_lammps_is_refused() {
         assert_eq!(said(&out).matches(expected).count(), 1, "{}", said(&out));
         assert!(!said(&out).contains("Loop time"), "{}", said(&out));
     }
-    let code = "import sys, lammps\n\
-                sys.path.append(sys.argv[2])\n\
-                import psidpd_lammps\n\
-                L = lammps.lammps(cmdargs=['-nocite', '-log', 'none'])\n\
-                psidpd_lammps.register(L, sys.argv[1])\n";
-    let out = Command::new("/usr/bin/python3")
-        .args(["-c", code])
-        .arg(&stranger)
-        .arg(root().join("lammps-plugin/python"))
-        .env("PYTHONDONTWRITEBYTECODE", "1")
-        .current_dir(folder.path())
-        .output()
-        .unwrap();
+    let out = register_in_python(&stranger);
     assert_eq!(out.status.code(), Some(1), "{}", said(&out));
     assert!(said(&out).contains(&format!("RuntimeError: The psidpd plugin {expected}")), "{}", said(&out));
     let refused = plugin::check(&debian.host, &stranger).unwrap_err().to_string();
     assert!(refused.contains("20240829"), "{refused}");
     plugin::check(&debian.host, &debian.plugin).unwrap();
+}
+
+/// The right version, compiled with the headers of another MPI: LAMMPS's objects would not be where it looks.
+#[test]
+fn a_plugin_for_another_mpi_is_refused() {
+    let Some(debian) = debian() else { return };
+    let mixed = Host { mpi_include: lammps().0.mpi_include.clone(), ..debian.host.clone() };
+    // No launcher: it could not be linked to that MPI.
+    let version = HostVersion { plugins: true, ..debian.host.version().unwrap() };
+    let base = debian.plugin.parent().unwrap().join("other-mpi");
+    let stranger = plugin::build_for(&mixed, &version, &base, &|_| {}).unwrap();
+    let out = register_in_python(&stranger);
+    assert_eq!(out.status.code(), Some(1), "{}", said(&out));
+    assert!(said(&out).contains("built for another MPI than this LAMMPS uses"), "{}", said(&out));
+}
+
+#[test]
+fn the_program_builds_for_the_system_and_says_how_to_use_it() {
+    let Some(debian) = debian() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    for place in ["system", "/usr"] {
+        let out = psidpd(folder.path(), &["lammps", "plugin", "--lammps", place, "--json", "built.json"]);
+        assert!(out.status.success(), "{}", said(&out));
+        let command = format!("{} -in SCRIPT", debian.launcher.display());
+        assert!(said(&out).contains(&command), "{}", said(&out));
+        let built = std::fs::read_to_string(folder.path().join("built.json")).unwrap();
+        let built: serde_json::Value = serde_json::from_str(&built).unwrap();
+        assert_eq!(built["launcher"].as_str().map(Path::new), Some(debian.launcher.as_path()));
+        assert_eq!(built["lammps_version"], debian.host.version().unwrap().number);
+    }
+    let out = psidpd(folder.path(), &["lammps", "plugin", "--lammps", "nowhere"]);
+    assert_eq!(out.status.code(), Some(2), "{}", said(&out));
+    assert!(said(&out).contains("no LAMMPS at nowhere"), "{}", said(&out));
 }
 
 /// A source tree, here of links to the parts of the installed LAMMPS.

@@ -37,7 +37,7 @@ impl Flavour {
 
     /// Whether a folder has its `mpi.h`.
     fn has_header(self, folder: &Path) -> bool {
-        // In Fortran-era installations the text is not all UTF-8.
+        // Not every mpi.h is UTF-8.
         let text = fs::read(folder.join("mpi.h")).unwrap_or_default();
         let text = String::from_utf8_lossy(&text);
         match self {
