@@ -26,21 +26,19 @@ auto forward_slopes(Comm *comm, LAMMPS_NS::Pair *pair, long) -> decltype(comm->f
   comm->forward_comm_pair(pair);
 }
 
-// add_request(Pair *, flags), flag 1 for a full list, was request(Pair *, instance) before 2022.
+// add_request(Pair *, flags), flag 1 for a full list, came in 2022. What older versions need for one, the
+// inside of a request, is not in their installed headers. Returns whether a list was requested.
 template <class Neighbor>
-auto request_full_list(Neighbor *neighbor, LAMMPS_NS::Pair *pair, int, int)
-    -> decltype(neighbor->add_request(pair, 1), void())
+auto request_full_list(Neighbor *neighbor, LAMMPS_NS::Pair *pair, int)
+    -> decltype(neighbor->add_request(pair, 1), bool())
 {
   neighbor->add_request(pair, 1);
+  return true;
 }
 
-template <class Neighbor>
-auto request_full_list(Neighbor *neighbor, LAMMPS_NS::Pair *pair, int instance, long)
-    -> decltype(neighbor->request(pair, instance), void())
+template <class Neighbor> bool request_full_list(Neighbor *, LAMMPS_NS::Pair *, long)
 {
-  const int k = neighbor->request(pair, instance);
-  neighbor->requests[k]->half = 0;
-  neighbor->requests[k]->full = 1;
+  return false;
 }
 
 }    // namespace psidpd

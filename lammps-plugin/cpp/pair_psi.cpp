@@ -167,7 +167,8 @@ void PairPsi::init_style()
     why_listed += why_listed.empty() ? "neigh_modify exclude" : " and neigh_modify exclude";
   if (neighbor->includegroup)
     why_listed += why_listed.empty() ? "neigh_modify include" : " and neigh_modify include";
-  if (!why_listed.empty()) request_full_list(neighbor, this, instance_me, 0);
+  if (!why_listed.empty() && !request_full_list(neighbor, this, 0))
+    stop(why_listed + " needs a LAMMPS of 2022 or newer: without them this style computes all pairs");
 
   if (!described && comm->me == 0) utils::logmesg(lmp, std::string((*style)->description(search())));
   described = true;

@@ -28,7 +28,8 @@ class PairPsi : public LAMMPS_NS::Pair {
   double single(int i, int j, int itype, int jtype, double rsq, double factor_coul, double factor_lj,
                 double &fforce) override;
   void *extract(const char *what, int &dim) override;
-  void *extract_peratom(const char *what, int &columns) override;
+  // Virtual in Pair since 2022 only, so not marked as overriding.
+  void *extract_peratom(const char *what, int &columns);
 
   void write_restart(FILE *fp) override;
   void read_restart(FILE *fp) override;
