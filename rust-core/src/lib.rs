@@ -19,3 +19,4 @@ pub mod c_api;
 pub mod document;
 pub mod engine;
 pub mod model;
+pub mod theory;

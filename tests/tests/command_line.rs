@@ -84,7 +84,7 @@ fn bad_input_is_named_with_file_line_and_key() {
     let good = scene("");
     let bad_model = write(here, "bad.toml", &std::fs::read_to_string(model()).unwrap().replace("n^2", "m^2"));
     let scenes = [
-        (good.replace("seed = 3", "seeed = 3"), "unknown key"),
+        (good.replace("dump = 25", "dump = 25\nthermos = 1"), "unknown key"),
         (good.replace("kT = 1.0", "kT = 0"), "kT"),
         (good.replace("steps = 50", "steps = -5"), "stage"),
         (good.replace("dt = 0.01", "dt = 0"), "dt"),

@@ -1,6 +1,8 @@
 //! psidpd: native runner and cross-code validator.
+pub mod check;
 pub mod cli;
 pub mod crosscheck;
+pub mod export;
 pub mod lammps;
 pub mod observe;
 pub mod report;

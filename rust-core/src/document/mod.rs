@@ -3,20 +3,23 @@
 //! Model files and scene files go through here. A [`Section`] hands out each key at most once and
 //! remembers it, so that [`Section::finish`] can name the keys that nobody asked for.
 
+mod columns;
 mod error;
 mod node;
 mod section;
 
+pub use columns::Columns;
 pub use error::{FileError, FileErrorKind, Source};
 pub use section::{Located, Section, Value};
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// A TOML document read but not yet interpreted.
 #[derive(Debug, Clone)]
 pub struct Document {
     source: Arc<Source>,
+    directory: PathBuf,
     root: node::Table,
 }
 
@@ -36,15 +39,13 @@ impl Document {
         let unreadable = |message: String| {
             FileError::new(&Arc::new(Source::new(&name, "")), 0..0, "", FileErrorKind::Unreadable(message))
         };
-        let size = std::fs::metadata(path).map_err(|e| unreadable(e.to_string()))?.len();
-        if size > LARGEST {
-            return Err(unreadable(format!("{size} bytes, more than {LARGEST}")));
-        }
-        let text = std::fs::read_to_string(path).map_err(|e| unreadable(e.to_string()))?;
-        Document::parse(&name, &text)
+        let text = columns::read_text(path, LARGEST).map_err(unreadable)?;
+        let mut document = Document::parse(&name, &text)?;
+        document.directory = path.parent().unwrap_or(Path::new("")).to_owned();
+        Ok(document)
     }
 
-    /// Reads a text; `name` stands for the file in messages.
+    /// Reads a text; `name` stands for the file in messages, and other files are looked for beside it.
     ///
     /// # Errors
     /// The text is not TOML or nests too deeply.
@@ -54,7 +55,10 @@ impl Document {
             return Err(FileError::new(&source, at..at + 1, "", FileErrorKind::TooDeep(DEEPEST)));
         }
         match toml::de::DeTable::parse(text) {
-            Ok(table) => Ok(Document { source, root: node::Table::new(table.into_inner()) }),
+            Ok(table) => {
+                let directory = Path::new(name).parent().unwrap_or(Path::new("")).to_owned();
+                Ok(Document { source, directory, root: node::Table::new(table.into_inner()) })
+            }
             Err(error) => Err(FileError::new(
                 &source,
                 error.span().unwrap_or(0..0),
@@ -67,6 +71,11 @@ impl Document {
     /// The file's name and text.
     pub fn source(&self) -> &Arc<Source> {
         &self.source
+    }
+
+    /// What file names in the document are relative to: the directory it was read from.
+    pub fn directory(&self) -> &Path {
+        &self.directory
     }
 
     /// The top level.

@@ -6,6 +6,7 @@ pub use listed::PairsOfHost;
 
 use super::density_pass::add_density;
 use super::error::EngineError;
+use super::excess::{ExcessPlan, ExcessWork};
 use super::force_pass::{ForceInput, ForceOutput, add_forces};
 use super::noise::PairNoise;
 use super::pairs::{Newton, Pairs};
@@ -79,7 +80,10 @@ pub struct Engine {
     particle_virial: Vec<[f64; 6]>,
     lanes: Lanes,
     counts: PassCounts,
+    out_of_bounds: [u64; 2],
     owned: usize,
+    /// Whether pairs, densities and slopes are those of one configuration.
+    ready: bool,
 }
 
 /// Scratch for evaluating ψ in lanes.
@@ -89,7 +93,7 @@ struct Lanes {
     at: Vec<f64>,
     correction: Vec<f64>,
     out: Vec<f64>,
-    work: Vec<f64>,
+    work: ExcessWork,
 }
 
 impl Engine {
@@ -114,7 +118,9 @@ impl Engine {
             particle_virial: Vec::new(),
             lanes: Lanes::default(),
             counts: PassCounts::default(),
+            out_of_bounds: [0; 2],
             owned: 0,
+            ready: false,
         })
     }
 
@@ -126,6 +132,12 @@ impl Engine {
     /// How often each pass has run.
     pub fn counts(&self) -> PassCounts {
         self.counts
+    }
+
+    /// How many evaluations of ψ had a density below its bounds, and how many one above, since the
+    /// engine was made. Only densities count that the particle's ψ depends on, not linearly.
+    pub fn out_of_bounds(&self) -> [u64; 2] {
+        self.out_of_bounds
     }
 
     /// Maps the host's types to species: entry `kind` is the species of type `kind`, negative for
@@ -152,13 +164,16 @@ impl Engine {
     /// # Errors
     /// A position or ψ that is not finite, a tag or type out of range, arrays of different lengths.
     pub fn densities(&mut self, particles: &Particles, newton: Newton) -> Result<(), EngineError> {
+        self.ready = false;
         self.take_species(particles)?;
         self.owned = particles.owned;
         let cutoff = self.plan.cutoff;
         self.search.find(particles, &self.species, self.plan.dimensions, cutoff, newton, &mut self.pairs)?;
         self.counts.search += 1;
         self.sum_densities();
-        self.evaluate_excess(particles.tag)
+        self.evaluate_excess(particles.tag)?;
+        self.ready = true;
+        Ok(())
     }
 
     fn take_species(&mut self, particles: &Particles) -> Result<(), EngineError> {
@@ -212,7 +227,7 @@ impl Engine {
         self.slopes.clear();
         self.slopes.resize(self.species.len() * slope_width, 0.0);
         for alpha in 0..self.plan.species.len() {
-            if let Some(value) = self.plan.excess[alpha].constant {
+            if let ExcessPlan::Constant(value) = self.plan.excess[alpha] {
                 if value != 0.0 {
                     for (excess, species) in self.excess.iter_mut().zip(&self.species) {
                         if *species == alpha as i32 {
@@ -259,7 +274,9 @@ impl Engine {
                 (at[v * lanes + lane], correction[v * lanes + lane]) = polynomial.at(n);
             }
         }
-        self.plan.excess[alpha].program.eval_block(lanes, at, out, work);
+        let [low, high] = self.plan.excess[alpha].evaluate(lanes, at, out, work);
+        self.out_of_bounds[0] += low;
+        self.out_of_bounds[1] += high;
         for (lane, member) in members.iter().enumerate() {
             let i = *member as usize;
             let mut finite = out[lane].is_finite();
@@ -331,6 +348,12 @@ impl Engine {
             .map(|s| (PairNoise::new(s.seed, s.number), 1.0 / s.dt.sqrt()));
         let newton = self.pairs.newton();
         let needed = if newton == Newton::On { all } else { self.owned };
+        if !self.ready {
+            return Err(EngineError::Host("forces without densities of the same configuration"));
+        }
+        if self.slopes.len() != all * self.plan.slope_width() {
+            return Err(EngineError::Host("slopes were not forwarded to every ghost"));
+        }
         if particles.x.len() != all || particles.owned != self.owned || particles.tag.len() != all {
             return Err(EngineError::Host("particles changed between densities and forces"));
         }
@@ -368,7 +391,7 @@ impl Engine {
         };
         add_forces(&input, &mut output);
         let mut tally = output.tally;
-        if want.energy {
+        if want.energy || want.particle_energy {
             tally.excess += self.excess.iter().sum::<f64>();
         }
         if want.particle_energy {

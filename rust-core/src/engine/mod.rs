@@ -9,12 +9,13 @@
 //!    (nothing, if every ψ is linear);
 //! 3. [`Engine::forces`]: conservative, dissipative and random forces, energy and virial.
 //!
-//! [`reference`] evaluates the same Hamiltonian with none of this machinery.
+//! [`mod@reference`] evaluates the same Hamiltonian with none of this machinery.
 
 mod density_pass;
 mod domain;
 mod error;
 mod evaluator;
+mod excess;
 mod force_pass;
 mod images;
 pub mod noise;

@@ -1,8 +1,9 @@
 //! What a fluid needs computed, worked out once.
 
-use crate::model::expression::{Formula, Program, TooLarge};
+use super::excess::ExcessPlan;
+use crate::model::expression::{Formula, TooLarge};
 use crate::model::kernel::Kernel;
-use crate::model::{ExcessFreeEnergy, Fluid, PairTerm, WeightedDensity};
+use crate::model::{Continuation, ExcessFreeEnergy, Fluid, PairTerm, WeightedDensity};
 use std::fmt;
 
 /// The passes, kernels and ranges of one fluid.
@@ -33,16 +34,6 @@ pub struct LinearTerm {
     pub force_kernel: Kernel,
     /// `c_αβ`, row-major.
     pub coefficients: Vec<f64>,
-}
-
-/// `ψ_α` of the densities that need a pass.
-#[derive(Debug, Clone)]
-pub struct ExcessPlan {
-    /// ψ, then ∂ψ/∂ñ for each variable of the passes.
-    pub program: Program,
-    /// The value if ψ has no variables left.
-    pub constant: Option<f64>,
-    pub formula: Formula,
 }
 
 /// Coefficients of dissipative and random forces, row-major in species.
@@ -120,6 +111,21 @@ impl Plan {
         self.passes.len() * self.species.len()
     }
 
+    /// Indices of the densities that need a pass: some ψ is not linear in them.
+    pub fn density_passes(&self) -> &[usize] {
+        &self.passes
+    }
+
+    /// The potential energy of a pair of species `a` and `b` at `r` from densities that every ψ is linear
+    /// in.
+    pub fn linear_pair_energy(&self, a: usize, b: usize, r: f64) -> f64 {
+        let count = self.species.len();
+        self.linear
+            .iter()
+            .map(|t| (t.coefficients[a * count + b] + t.coefficients[b * count + a]) * t.kernel.value(r))
+            .sum()
+    }
+
     /// Range of the random force if there is one: boxes must be at least twice as long, or two images
     /// of a pair would share their noise.
     pub fn noise_range(&self) -> Option<f64> {
@@ -137,25 +143,30 @@ impl Plan {
     }
 }
 
-/// `∂ψ_α/∂ñ_v` for every species and variable.
-fn slopes(fluid: &Fluid) -> Result<Vec<Vec<Formula>>, TooLarge> {
+/// `∂ψ_α/∂ñ_v` for every species and variable; `None` for that of a curve, which no formula is.
+fn slopes(fluid: &Fluid) -> Result<Vec<Vec<Option<Formula>>>, TooLarge> {
     fluid
         .excess
         .iter()
-        .map(|excess| {
-            let ExcessFreeEnergy::Formula(psi) = excess;
-            (0..fluid.variables()).map(|v| psi.derivative(v)).collect()
+        .map(|excess| match excess {
+            ExcessFreeEnergy::Formula(psi) => {
+                (0..fluid.variables()).map(|v| psi.derivative(v).map(Some)).collect()
+            }
+            ExcessFreeEnergy::Curve(curve) => {
+                let zero = |v| (v / fluid.species.len() != curve.density).then(|| Formula::constant(0.0));
+                Ok((0..fluid.variables()).map(zero).collect())
+            }
         })
         .collect()
 }
 
 /// `c_αβ` of density `d`, in uncorrected densities, if every ψ is linear in it.
-fn linear_coefficients(fluid: &Fluid, slopes: &[Vec<Formula>], d: usize) -> Option<Vec<f64>> {
+fn linear_coefficients(fluid: &Fluid, slopes: &[Vec<Option<Formula>>], d: usize) -> Option<Vec<f64>> {
     let count = fluid.species.len();
     let mut coefficients = vec![0.0; count * count];
     for alpha in 0..count {
         for beta in 0..count {
-            let slope = slopes[alpha][d * count + beta].is_constant()?;
+            let slope = slopes[alpha][d * count + beta].as_ref()?.is_constant()?;
             if slope != 0.0 {
                 let correction = &fluid.densities[d].correction[alpha * count + beta];
                 coefficients[alpha * count + beta] = slope * correction.constant_slope()?;
@@ -169,8 +180,11 @@ fn linear_coefficients(fluid: &Fluid, slopes: &[Vec<Formula>], d: usize) -> Opti
 /// linear terms, which are pair terms now, vanish.
 fn plan_excess(fluid: &Fluid, alpha: usize, passes: &[usize]) -> Result<ExcessPlan, TooLarge> {
     let count = fluid.species.len();
-    let ExcessFreeEnergy::Formula(psi) = &fluid.excess[alpha];
-    let mut psi = psi.clone();
+    let mut psi = match &fluid.excess[alpha] {
+        ExcessFreeEnergy::Formula(psi) => psi.clone(),
+        // Its density has a pass, and it depends on no other.
+        ExcessFreeEnergy::Curve(curve) => return Ok(ExcessPlan::of_curve(fluid, curve.clone(), passes)),
+    };
     for (d, density) in fluid.densities.iter().enumerate() {
         if passes.contains(&d) {
             continue;
@@ -182,15 +196,7 @@ fn plan_excess(fluid: &Fluid, alpha: usize, passes: &[usize]) -> Result<ExcessPl
         }
     }
     let variables: Vec<usize> = passes.iter().flat_map(|d| (0..count).map(move |s| d * count + s)).collect();
-    let mut outputs = vec![psi.clone()];
-    for v in &variables {
-        outputs.push(psi.derivative(*v)?);
-    }
-    Ok(ExcessPlan {
-        program: Program::new(&outputs.iter().collect::<Vec<_>>()),
-        constant: psi.is_constant(),
-        formula: psi,
-    })
+    ExcessPlan::of_formula(fluid, psi, &variables)
 }
 
 impl ThermostatPlan {
@@ -238,6 +244,12 @@ impl fmt::Display for Plan {
             if density.force_kernel != density.kernel {
                 write!(f, "; force by the {} kernel: NOT CONSERVATIVE", density.force_kernel.kind().name())?;
             }
+            if let Some(bounds) = density.bounds {
+                write!(f, "; psi continued outside [{}, {}]", bounds.low, bounds.high)?;
+                if bounds.below == Continuation::Constant {
+                    write!(f, ", psi' constant below")?;
+                }
+            }
             writeln!(f)?;
         }
         for term in &self.linear {
@@ -260,11 +272,25 @@ impl fmt::Display for Plan {
                 term.potential.range()
             )?;
         }
+        // One species: n is its density. Several: n_A, n_B …
+        let names: Vec<String> = self
+            .densities
+            .iter()
+            .flat_map(|d| {
+                self.species
+                    .iter()
+                    .map(|s| if count == 1 { d.name.clone() } else { format!("{}_{s}", d.name) })
+            })
+            .collect();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
         for (name, excess) in self.species.iter().zip(&self.excess) {
-            match excess.constant {
-                Some(0.0) => {}
-                Some(value) => writeln!(f, "psi of {name:<6} constant {value}")?,
-                None => writeln!(f, "psi of {name:<6} {}", excess.formula)?,
+            match excess {
+                ExcessPlan::Constant(0.0) => {}
+                ExcessPlan::Constant(value) => writeln!(f, "psi of {name:<6} constant {value}")?,
+                ExcessPlan::Formula(plan) => {
+                    writeln!(f, "psi of {name:<6} {}", plan.formula.with_names(&names))?;
+                }
+                ExcessPlan::Curve(plan) => writeln!(f, "psi of {name:<6} {}", plan.curve.describe())?,
             }
         }
         match &self.thermostat {

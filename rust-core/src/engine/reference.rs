@@ -4,9 +4,11 @@
 use super::domain::PeriodicBox;
 use super::evaluator::Step;
 use super::noise::PairNoise;
+use crate::model::curve::Curve;
 use crate::model::expression::{Formula, TooLarge};
 use crate::model::pair::PairForm;
-use crate::model::{ExcessFreeEnergy, Fluid};
+use crate::model::{Continuation, ExcessFreeEnergy, Fluid};
+use std::collections::BTreeMap;
 
 /// Energy, densities, forces and virial of one configuration.
 #[derive(Debug, Clone, Default)]
@@ -62,6 +64,102 @@ fn pairs(x: &[[f64; 3]], domain: &PeriodicBox, dimensions: usize, cutoff: f64) -
     found
 }
 
+/// ψ and ψ′ of a curve, at the total of its density, continued outside its bounds.
+fn curve_at(curve: &Curve, fluid: &Fluid, at: &[f64]) -> (f64, f64) {
+    let count = fluid.species.len();
+    let total: f64 = (0..count).map(|beta| at[curve.density * count + beta]).sum();
+    let Some(bounds) = fluid.densities[curve.density].bounds else {
+        let [psi, slope, _] = curve.at(total);
+        return (psi, slope);
+    };
+    let edge = total.max(bounds.low).min(bounds.high);
+    let [psi, slope, mut curvature] = curve.at(edge);
+    let delta = total - edge;
+    if delta < 0.0 && bounds.below == Continuation::Constant {
+        curvature = 0.0;
+    }
+    (psi + delta * slope + 0.5 * delta * delta * curvature, slope + delta * curvature)
+}
+
+/// A formula ψ, continued outside the bounds of its variables, by the definition.
+struct Extended<'a> {
+    fluid: &'a Fluid,
+    /// Derivatives of ψ by how often each variable was differentiated by: they are asked for often.
+    derivatives: BTreeMap<Vec<u8>, Formula>,
+}
+
+impl<'a> Extended<'a> {
+    fn new(fluid: &'a Fluid, alpha: usize) -> Extended<'a> {
+        let formula = match &fluid.excess[alpha] {
+            ExcessFreeEnergy::Formula(formula) => formula.clone(),
+            ExcessFreeEnergy::Curve(_) => Formula::constant(0.0),
+        };
+        let derivatives = BTreeMap::from([(vec![0; fluid.variables()], formula)]);
+        Extended { fluid, derivatives }
+    }
+
+    fn value(&mut self, at: &[f64]) -> Result<f64, TooLarge> {
+        self.continued(&vec![0; at.len()], at, 0)
+    }
+
+    /// `∂ψ/∂x_v`: beyond a bound `ψ_v + δ ψ_vv` there, within them that of ψ as it is.
+    fn slope(&mut self, v: usize, at: &[f64]) -> Result<f64, TooLarge> {
+        let (edge, delta, curved) = self.nearest(v, at);
+        let mut order = vec![0; at.len()];
+        order[v] = 1;
+        let first = self.continued(&order, &edge, 0)?;
+        if !curved {
+            return Ok(first);
+        }
+        order[v] = 2;
+        Ok(first + delta * self.continued(&order, &edge, 0)?)
+    }
+
+    /// The derivative of order `order`, continued in the variables from `v` on: in variable `v` as
+    /// `f + δ f_v + ½ δ² f_vv` at its bound, each of these continued in the others.
+    fn continued(&mut self, order: &[u8], at: &[f64], v: usize) -> Result<f64, TooLarge> {
+        if v == at.len() {
+            return Ok(self.derivative(order)?.value(at));
+        }
+        let (edge, delta, curved) = self.nearest(v, at);
+        let mut sum = self.continued(order, &edge, v + 1)?;
+        if delta != 0.0 {
+            let mut order = order.to_vec();
+            order[v] += 1;
+            sum += delta * self.continued(&order, &edge, v + 1)?;
+            if curved {
+                order[v] += 1;
+                sum += 0.5 * delta * delta * self.continued(&order, &edge, v + 1)?;
+            }
+        }
+        Ok(sum)
+    }
+
+    /// The point with variable `v` within its bounds, how far it was outside, and whether ψ′ goes on
+    /// linearly there.
+    fn nearest(&self, v: usize, at: &[f64]) -> (Vec<f64>, f64, bool) {
+        let mut edge = at.to_vec();
+        let Some(bounds) = self.fluid.densities[v / self.fluid.species.len()].bounds else {
+            return (edge, 0.0, false);
+        };
+        edge[v] = at[v].max(bounds.low).min(bounds.high);
+        let delta = at[v] - edge[v];
+        (edge, delta, delta > 0.0 || (delta < 0.0 && bounds.below == Continuation::Linear))
+    }
+
+    fn derivative(&mut self, order: &[u8]) -> Result<Formula, TooLarge> {
+        if let Some(known) = self.derivatives.get(order) {
+            return Ok(known.clone());
+        }
+        let mut less = order.to_vec();
+        let v = less.iter().rposition(|m| *m > 0).unwrap_or(0);
+        less[v] -= 1;
+        let derivative = self.derivative(&less)?.derivative(v)?;
+        self.derivatives.insert(order.to_vec(), derivative.clone());
+        Ok(derivative)
+    }
+}
+
 /// Evaluates `U` and its gradient for particles at `x`, inside `domain` along its periodic directions.
 ///
 /// # Errors
@@ -93,20 +191,24 @@ pub fn evaluate(
     // Σ_i ψ(ñ_i), and ∂ψ_i/∂n_β = ∂ψ/∂ñ_β ρ̃′
     let mut energy = 0.0;
     let mut slopes = vec![vec![0.0; fluid.variables()]; x.len()];
-    let gradients: Vec<Vec<Formula>> = fluid
-        .excess
-        .iter()
-        .map(|ExcessFreeEnergy::Formula(psi)| (0..fluid.variables()).map(|v| psi.derivative(v)).collect())
-        .collect::<Result<_, _>>()?;
+    let mut excess: Vec<Extended> = (0..count).map(|alpha| Extended::new(fluid, alpha)).collect();
     for (i, alpha) in species.iter().copied().enumerate() {
         let corrected: Vec<(f64, f64)> = (0..fluid.variables())
             .map(|v| fluid.densities[v / count].correction[alpha * count + v % count].at(n[i][v]))
             .collect();
         let at: Vec<f64> = corrected.iter().map(|c| c.0).collect();
-        let ExcessFreeEnergy::Formula(psi) = &fluid.excess[alpha];
-        energy += psi.value(&at);
+        if let ExcessFreeEnergy::Curve(curve) = &fluid.excess[alpha] {
+            let (psi, slope) = curve_at(curve, fluid, &at);
+            energy += psi;
+            for beta in 0..count {
+                let v = curve.density * count + beta;
+                slopes[i][v] = slope * corrected[v].1;
+            }
+            continue;
+        }
+        energy += excess[alpha].value(&at)?;
         for v in 0..fluid.variables() {
-            slopes[i][v] = gradients[alpha][v].value(&at) * corrected[v].1;
+            slopes[i][v] = excess[alpha].slope(v, &at)? * corrected[v].1;
         }
     }
 

@@ -51,6 +51,7 @@ struct Outcome {
     energy: Vec<f64>,
     virial: Vec<[f64; 6]>,
     counts: PassCounts,
+    out_of_bounds: [u64; 2],
 }
 
 fn run_engine(fluid: &Fluid, c: &Configuration, newton: Newton, step: Option<Step>) -> Outcome {
@@ -95,6 +96,7 @@ fn run_engine(fluid: &Fluid, c: &Configuration, newton: Newton, step: Option<Ste
         energy,
         virial,
         counts: engine.counts(),
+        out_of_bounds: engine.out_of_bounds(),
     }
 }
 
@@ -241,15 +243,79 @@ range = 1.0
     assert_matches_reference(&fluid, &configuration(200, [5.0, 4.0, 1.0], 1, 2));
 }
 
+/// The same mixture with bounds that most particles are outside of, in two densities, both ways.
+fn bounded_mixture(below: &str) -> Fluid {
+    let text = MIXTURE
+        .replace("range = 0.8\ncorr", "range = 0.8\nbounds = [1.7, 3.5]\ncorr")
+        .replace("self = true", &format!("self = true\nbounds = [2.4, 4.2]\nbelow = \"{below}\""));
+    Model::parse("bounded", &text).unwrap().at(1.3).unwrap()
+}
+
+#[test]
+fn engine_equals_reference_out_of_bounds() {
+    for below in ["linear", "constant"] {
+        let fluid = bounded_mixture(below);
+        let c = configuration(250, [3.1, 4.0, 3.5], 2, 3);
+        assert_matches_reference(&fluid, &c);
+        let [low, high] = run_engine(&fluid, &c, Newton::On, None).out_of_bounds;
+        assert!(low > 100 && high > 100 && low <= 250 && high <= 250, "{low} {high}");
+    }
+    assert_eq!(
+        run_engine(&warren(1, ForceLaw::Conservative), &configuration(50, [3.0; 3], 1, 3), Newton::On, None)
+            .out_of_bounds,
+        [0; 2]
+    );
+}
+
+/// With every density below bounds and ψ′ constant there, what is left is a pair force.
+#[test]
+fn constant_continuation_is_plain_dpd_in_thin_regions() {
+    let text = r#"
+title = "thin"
+species = ["A"]
+[density.n]
+kernel = "quadratic"
+range = 1.0
+bounds = [1e3, 1e4]
+below = "constant"
+[excess_free_energy]
+A = "ln(n)"
+"#;
+    let thin = Model::parse("thin", text).unwrap().at(1.0).unwrap();
+    let pair = r#"
+title = "pair"
+species = ["A"]
+[[pair]]
+between = ["A", "A"]
+form = "soft"
+strength = "1e-3*30/pi"
+range = 1.0
+"#;
+    let pair = Model::parse("pair", pair).unwrap().at(1.0).unwrap();
+    let c = configuration(200, [4.0, 4.0, 4.0], 1, 3);
+    let a = run_engine(&thin, &c, Newton::On, None);
+    let b = run_engine(&pair, &c, Newton::On, None);
+    for (f, g) in a.forces.iter().flatten().zip(b.forces.iter().flatten()) {
+        close(*f, *g, 1.0, "force");
+    }
+    assert_eq!(a.out_of_bounds, [200, 0]);
+}
+
 /// Forces against central differences of the energy, and the virial against those of a strain.
 #[test]
 fn forces_and_virial_are_gradients_of_the_energy() {
-    let fluid = Model::parse("mixture", MIXTURE).unwrap().at(1.3).unwrap();
+    let free = Model::parse("mixture", MIXTURE).unwrap().at(1.3).unwrap();
+    for fluid in [free, bounded_mixture("linear"), bounded_mixture("constant")] {
+        are_gradients(&fluid);
+    }
+}
+
+fn are_gradients(fluid: &Fluid) {
     let c = configuration(60, [2.3, 2.1, 2.5], 2, 3);
     let energy = |x: &[[f64; 3]], domain: &PeriodicBox| {
-        reference::evaluate(&fluid, x, &c.species, domain).unwrap().energy
+        reference::evaluate(fluid, x, &c.species, domain).unwrap().energy
     };
-    let here = run_engine(&fluid, &c, Newton::On, None);
+    let here = run_engine(fluid, &c, Newton::On, None);
     let scale = here.forces.iter().flatten().map(|f| f.abs()).fold(0.0, f64::max);
     for i in [0, 7, 31] {
         for k in 0..3 {
@@ -350,7 +416,7 @@ fn invariances() {
     }
 
     let turn = |p: [f64; 3]| [-p[1], p[0], p[2]];
-    let corner = [-1.0 * (0.5 + 4.0), -1.0, 2.0];
+    let corner = [-(0.5 + 4.0), -1.0, 2.0];
     let turned = Configuration {
         domain: PeriodicBox::orthogonal(corner, [4.0, 3.1, 3.5], [true; 3]).unwrap(),
         x: c.x.iter().map(|x| turn(*x)).collect(),

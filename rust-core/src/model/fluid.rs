@@ -1,3 +1,4 @@
+use super::curve::Curve;
 use super::expression::Formula;
 use super::kernel::Kernel;
 use super::pair::PairPotential;
@@ -61,8 +62,60 @@ pub struct WeightedDensity {
     pub includes_self: bool,
     /// `ρ̃(n)` of Trofimov et al. for (species that feels, species whose density it is), row-major.
     pub correction: Vec<Polynomial>,
-    /// Outside these values of the corrected density ψ′ goes on linearly.
-    pub bounds: Option<[f64; 2]>,
+    /// Outside these values of the corrected density ψ is continued.
+    pub bounds: Option<Bounds>,
+}
+
+/// Where ψ is used as written, and how it goes on outside.
+///
+/// For a variable `x` out of `[low, high]`, with `x_c` the nearer bound and `δ = x − x_c`,
+///
+/// ```text
+/// ψ(x) = ψ(x_c) + δ ∂ψ/∂x(x_c) + ½ δ² ∂²ψ/∂x²(x_c)
+/// ```
+///
+/// so ψ′ goes on linearly; below `low` the last term is left out if ψ′ is to stay constant. With
+/// several variables out of bounds the rule is applied to each in turn, in any order. A table or an
+/// equation of state is bounded in the total density it depends on, a formula in each partial density.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bounds {
+    /// The lowest value at which ψ is used as written.
+    pub low: f64,
+    /// The highest.
+    pub high: f64,
+    /// How ψ′ goes on below `low`.
+    pub below: Continuation,
+}
+
+/// How ψ′ goes on below the lower bound of a density.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Continuation {
+    /// With its slope at the bound.
+    #[default]
+    Linear,
+    /// As it is at the bound: particles in thin regions push each other as in standard DPD, by a pair
+    /// force `−(ψ_i′ + ψ_j′) w′` that no longer depends on the density. The way out that Trofimov,
+    /// Nies and Michels, J. Chem. Phys. 117, 9383 (2002), sections IV A and V, suggest where ψ is
+    /// singular at low density.
+    Constant,
+}
+
+impl Bounds {
+    /// The nearest value within the bounds.
+    pub fn clamp(&self, x: f64) -> f64 {
+        x.clamp(self.low, self.high)
+    }
+
+    /// `δ = x − x_c`: negative below, positive above, 0 within.
+    pub fn beyond(&self, x: f64) -> f64 {
+        if x < self.low {
+            x - self.low
+        } else if x > self.high {
+            x - self.high
+        } else {
+            0.0
+        }
+    }
 }
 
 /// A polynomial by its coefficients in ascending powers.
@@ -94,6 +147,8 @@ impl Polynomial {
 pub enum ExcessFreeEnergy {
     /// A formula of the [`Fluid::variables`] corrected densities.
     Formula(Formula),
+    /// A function of the total corrected density `Σ_β ñ_β` of one of the densities.
+    Curve(Curve),
 }
 
 /// A pair potential and the species it acts between.

@@ -10,8 +10,10 @@
 //! says. Densities are number densities. `r_ij = r_i − r_j`, `ê_ij = r_ij / r_ij`, and a positive force
 //! along `ê_ij` on `i` is repulsive. Per-species indices run in the order of `species`.
 
+pub mod curve;
 pub mod expression;
 pub mod kernel;
+pub mod keys;
 pub mod pair;
 
 mod file;
@@ -20,6 +22,8 @@ mod preset_spline;
 mod presets;
 
 pub use file::{KNOWN_FUNCTIONS, Model};
-pub use fluid::{ExcessFreeEnergy, Fluid, PairTerm, Polynomial, Thermostat, WeightedDensity};
+pub use fluid::{
+    Bounds, Continuation, ExcessFreeEnergy, Fluid, PairTerm, Polynomial, Thermostat, WeightedDensity,
+};
 pub use preset_spline::{SplinePair, spline_dpd, spline_dpd_text};
 pub use presets::{ForceLaw, PresetError, WarrenPair, warren_ab, warren_ab_text};

@@ -39,9 +39,8 @@ fn file_error<'a>(error: &'a (dyn std::error::Error + 'static)) -> Option<&'a Fi
             return Some(found);
         }
         // Transparent errors report the source of what they wrap, not the wrapped error itself.
-        match error.downcast_ref::<RunError>() {
-            Some(RunError::File(found)) => return Some(found),
-            _ => {}
+        if let Some(RunError::File(found)) = error.downcast_ref::<RunError>() {
+            return Some(found);
         }
         if let Some(ValidateError::File(found)) = error.downcast_ref::<ValidateError>() {
             return Some(found);

@@ -3,10 +3,13 @@
 //! Exit codes: 0 on success, 1 when a check fails or a run stops, 2 on bad input or when something that
 //! is needed is missing.
 
+mod check;
 mod diagnostic;
+mod export;
 mod forces;
 mod lammps;
 mod run;
+mod theory;
 mod validate;
 
 use clap::{Parser, Subcommand};
@@ -30,10 +33,17 @@ struct Arguments {
 enum Verb {
     /// Compare the native runner, the LAMMPS plugin, LAMMPS's mdpd and eam/alloy in one fluid.
     Validate(validate::Arguments),
+    /// What a model or scene will compute, and what cannot work.
+    Check(check::Arguments),
+    /// Mean field: equation of state, critical point, spinodal, binodal, surface tension.
+    Theory(theory::Arguments),
     /// Run a scene natively.
     Run(run::Arguments),
     /// Energy, virial, densities and forces of one configuration.
     Forces(forces::Arguments),
+    /// Write a fluid for another code.
+    #[command(subcommand)]
+    Export(export::Verb),
     /// Install LAMMPS into a local environment, or build the plugin for it.
     #[command(subcommand)]
     Lammps(lammps::Verb),
@@ -52,6 +62,9 @@ pub fn main() -> ExitCode {
     let json = arguments.json.as_deref();
     let outcome = match &arguments.verb {
         Verb::Validate(a) => validate::run(a, json),
+        Verb::Check(a) => check::run(a, json),
+        Verb::Theory(a) => theory::run(a, json),
+        Verb::Export(a) => export::run(a, json),
         Verb::Run(a) => run::run(a, json),
         Verb::Forces(a) => forces::run(a, json),
         Verb::Lammps(a) => lammps::run(a, json),

@@ -2,10 +2,9 @@
 
 use super::fluids::{A, RC, RD, WarrenSet};
 use super::{Context, ValidateError};
-use crate::lammps::setfl::{Element, Setfl};
+use crate::export::eam::{self, Grid};
 use crate::run::State;
-use psidpd_core::model::pair::PairForm;
-use psidpd_core::model::{ExcessFreeEnergy, ForceLaw};
+use psidpd_core::model::ForceLaw;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -150,32 +149,10 @@ impl<'a> Setup<'a> {
     }
 }
 
-/// Largest density in the tables, far above any that occurs.
-const LARGEST_DENSITY: f64 = 60.0;
-
 /// ψ as embedding function, w as density and φ as pair potential of `eam/alloy`: LAMMPS's own route to
 /// the same conservative forces.
 fn write_tables(set: &WarrenSet, spacing: f64, path: &Path) -> Result<(), ValidateError> {
     let fluid = set.model(ForceLaw::Conservative, 0.0)?.at(1.0)?;
-    let density = &fluid.densities[0];
-    let points = (RC / spacing).round() as usize + 6;
-    let nrho = 6001;
-    let table = Setfl {
-        title: "psidpd: Warren A/B model",
-        elements: &[Element { name: "F".into(), mass: 1.0 }],
-        nrho,
-        drho: LARGEST_DENSITY / (nrho - 1) as f64,
-        nr: points,
-        dr: spacing,
-        cutoff: RC,
-        embedding: &|_, n| {
-            let ExcessFreeEnergy::Formula(psi) = &fluid.excess[0];
-            psi.value(&[n])
-        },
-        density: &|_, r| density.kernel.value(r),
-        pair: &|_, _, r| {
-            fluid.pairs.iter().filter(|p| r < p.potential.range()).map(|p| p.potential.at(r).0).sum()
-        },
-    };
-    Ok(table.write(path)?)
+    let grid = Grid { spacing, largest_density: 60.0, densities: 6001 };
+    Ok(eam::write(&fluid, &[1.0], grid, path)?)
 }

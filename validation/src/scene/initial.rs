@@ -24,7 +24,7 @@ pub enum Initial {
         /// Where it is.
         path: PathBuf,
         /// What it holds.
-        state: State,
+        state: Box<State>,
         /// `None` keeps those of the file.
         velocities: Option<Velocities>,
     },
@@ -41,6 +41,17 @@ pub struct Filling {
     pub composition: Composition,
     /// How they move.
     pub velocities: Velocities,
+}
+
+impl Filling {
+    /// The volume of the filled part.
+    pub fn volume(&self, domain: &PeriodicBox, dimensions: usize) -> f64 {
+        let part = match self.placement {
+            Placement::Slab { axis, thickness } => thickness / domain.lengths()[axis],
+            Placement::Random | Placement::Lattice => 1.0,
+        };
+        part * domain.volume(dimensions)
+    }
 }
 
 /// Where particles are put.
@@ -120,7 +131,7 @@ fn read_file(
         })?;
     let velocities = Velocities::read_or_keep(section)?;
     let domain = state.domain.clone();
-    Ok((Initial::File { path, state, velocities }, domain))
+    Ok((Initial::File { path, state: Box::new(state), velocities }, domain))
 }
 
 fn read_slab(section: &Section, dimensions: usize, domain: &PeriodicBox) -> Result<(usize, f64), FileError> {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::error::TooLarge;
 use super::function::{integer_power, select};
-use super::graph::{Bits, Graph, Node, as_quotient};
+use super::graph::{Bits, Graph, Id, Node, as_quotient};
 
 /// An immutable scalar function of variables, which go by their index.
 ///
@@ -62,12 +62,52 @@ impl Formula {
     ///
     /// Fails only for formulas that are already near the limit of operations.
     pub fn derivative(&self, i: usize) -> Result<Self, TooLarge> {
-        let Ok(variable) = u32::try_from(i) else {
-            return Ok(Self::constant(0.0));
+        let variable = match u32::try_from(i) {
+            Ok(variable) if self.depends_on(i) => variable,
+            _ => return Ok(Self::constant(0.0)),
         };
         let mut graph = Graph::new();
         let places = graph.import(&self.nodes)?;
         let root = graph.differentiate(places[places.len() - 1], variable)?;
+        Ok(Self::from_nodes(graph.extract(root)))
+    }
+
+    /// `self − other`.
+    ///
+    /// Like all arithmetic on formulas, fails only beyond the limit of operations.
+    pub fn minus(&self, other: &Self) -> Result<Self, TooLarge> {
+        self.with(other, Graph::subtract)
+    }
+
+    /// `self · other`.
+    pub fn times(&self, other: &Self) -> Result<Self, TooLarge> {
+        self.with(other, Graph::multiply)
+    }
+
+    /// `self / other`.
+    pub fn over(&self, other: &Self) -> Result<Self, TooLarge> {
+        self.with(other, Graph::divide)
+    }
+
+    /// `constant + Σ coefficient · variable`.
+    pub fn linear(constant: f64, terms: impl IntoIterator<Item = (usize, f64)>) -> Result<Self, TooLarge> {
+        let mut sum = Self::constant(constant);
+        for (variable, coefficient) in terms {
+            let term = Self::constant(coefficient).times(&Self::variable(variable))?;
+            sum = sum.with(&term, Graph::add)?;
+        }
+        Ok(sum)
+    }
+
+    fn with(
+        &self,
+        other: &Self,
+        operation: fn(&mut Graph, Id, Id) -> Result<Id, TooLarge>,
+    ) -> Result<Self, TooLarge> {
+        let mut graph = Graph::new();
+        let left = graph.import(&self.nodes)?;
+        let right = graph.import(&other.nodes)?;
+        let root = operation(&mut graph, left[left.len() - 1], right[right.len() - 1])?;
         Ok(Self::from_nodes(graph.extract(root)))
     }
 
@@ -82,7 +122,7 @@ impl Formula {
         let mut graph = Graph::with_limit(usize::MAX);
         let mut places = Vec::with_capacity(self.nodes.len());
         for &node in self.nodes.iter() {
-            let at = |id: super::graph::Id| places[id.index()];
+            let at = |id: Id| places[id.index()];
             let id = match node {
                 Node::Variable(v) if v as usize == i => graph.constant(value)?,
                 Node::Constant(_) | Node::Variable(_) => graph.add_node(node)?,
@@ -112,7 +152,7 @@ impl Formula {
     pub fn value(&self, at: &[f64]) -> f64 {
         let mut values: Vec<f64> = Vec::with_capacity(self.nodes.len());
         for &node in self.nodes.iter() {
-            let v = |id: super::graph::Id| values[id.index()];
+            let v = |id: Id| values[id.index()];
             let value = match node {
                 Node::Constant(bits) => bits.value(),
                 Node::Variable(index) => at[index as usize],

@@ -6,10 +6,13 @@ use super::excess::ExcessEntry;
 use super::interaction::{PairEntry, PairFormEntry, ThermostatEntry};
 use super::number::formula_error;
 use crate::document::{FileError, FileErrorKind, Source};
-use crate::model::expression::{ErrorKind, ExpressionError, Formula, Variables};
-use crate::model::fluid::{ExcessFreeEnergy, Fluid, PairTerm, Polynomial, Thermostat, WeightedDensity};
+use crate::model::curve::{Curve, CurveForm, Pressure, Spline};
+use crate::model::expression::{ErrorKind, Expansion, ExpressionError, Formula, Variables};
+use crate::model::fluid::{
+    Bounds, ExcessFreeEnergy, Fluid, PairTerm, Polynomial, Thermostat, WeightedDensity,
+};
 use crate::model::kernel::Kernel;
-use crate::model::pair::{ExpressionPair, PairPotential, Soft, SplineAttractive};
+use crate::model::pair::{ExpressionPair, PairPotential, Soft, SplineAttractive, TablePair};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -38,13 +41,9 @@ pub fn bind(model: &Model, kt: f64) -> Result<Fluid, FileError> {
     let excess = model
         .excess
         .iter()
-        .map(|entry| match entry {
-            ExcessEntry::None => Ok(ExcessFreeEnergy::Formula(Formula::constant(0.0))),
-            ExcessEntry::Formula(ast) => Formula::compile(&ast.value, &context.constants, &variables)
-                .map(ExcessFreeEnergy::Formula)
-                .map_err(|e| formula_error(source, ast, e)),
-        })
+        .map(|entry| bind_excess(entry, &context, &variables, &densities))
         .collect::<Result<Vec<_>, _>>()?;
+    check_bounded(model, &densities, &excess)?;
     let pairs = model.pairs.iter().map(|entry| bind_pair(entry, &context)).collect::<Result<Vec<_>, _>>()?;
     Ok(Fluid {
         title: model.title.clone(),
@@ -57,6 +56,77 @@ pub fn bind(model: &Model, kt: f64) -> Result<Fluid, FileError> {
         pairs,
         thermostats: bind_thermostats(&model.thermostats, &context)?,
     })
+}
+
+fn bind_excess(
+    entry: &ExcessEntry,
+    context: &Context,
+    variables: &Variables,
+    densities: &[WeightedDensity],
+) -> Result<ExcessFreeEnergy, FileError> {
+    let count = context.species;
+    match entry {
+        ExcessEntry::None => Ok(ExcessFreeEnergy::Formula(Formula::constant(0.0))),
+        ExcessEntry::Formula(ast) => Formula::compile(&ast.value, &context.constants, variables)
+            .map(ExcessFreeEnergy::Formula)
+            .map_err(|e| formula_error(context.source, ast, e)),
+        ExcessEntry::Table { spline, density } => {
+            // A straight line is a formula, and needs no pass.
+            let line = spline.straight().and_then(|[intercept, slope]| {
+                Formula::linear(intercept, (0..count).map(|s| (density * count + s, slope))).ok()
+            });
+            Ok(match line {
+                Some(formula) => ExcessFreeEnergy::Formula(formula),
+                None => ExcessFreeEnergy::Curve(Curve {
+                    density: *density,
+                    form: CurveForm::Table(Arc::clone(spline)),
+                }),
+            })
+        }
+        ExcessEntry::Pressure { formula: ast, density } => {
+            let variables = Variables { count: 1, names: BTreeMap::from([("rho".to_owned(), vec![0])]) };
+            let kt = context.constants["kT"];
+            // ψ is integrated from within the bounds, if there are any.
+            let start = match densities[*density].bounds {
+                Some(Bounds { low, high, .. }) if low > 0.0 => (low * high).sqrt(),
+                Some(Bounds { high, .. }) if high > 0.0 => 0.5 * high,
+                _ => 1.0,
+            };
+            let too_large = |e| ExpressionError { kind: ErrorKind::TooLarge(e), offset: 0, length: 0 };
+            Formula::compile(&ast.value, &context.constants, &variables)
+                .and_then(|p| Pressure::new(&p, kt, start).map_err(too_large))
+                .map(|p| {
+                    ExcessFreeEnergy::Curve(Curve {
+                        density: *density,
+                        form: CurveForm::Pressure(Arc::new(p)),
+                    })
+                })
+                .map_err(|e| formula_error(context.source, ast, e))
+        }
+    }
+}
+
+/// The continuation of ψ has three to the number of bounded variables terms.
+fn check_bounded(
+    model: &Model,
+    densities: &[WeightedDensity],
+    excess: &[ExcessFreeEnergy],
+) -> Result<(), FileError> {
+    let count = model.species.len();
+    for (entry, excess) in model.excess.iter().zip(excess) {
+        let (ExcessEntry::Formula(ast), ExcessFreeEnergy::Formula(psi)) = (entry, excess) else { continue };
+        let bounded = (0..densities.len() * count)
+            .filter(|v| densities[v / count].bounds.is_some() && psi.depends_on(*v))
+            .count();
+        if bounded > Expansion::MOST {
+            let message =
+                format!("depends on {bounded} partial densities with bounds, at most {}", Expansion::MOST);
+            return Err(ast
+                .error(&model.source, FileErrorKind::Value(message))
+                .with_help("leave the bounds out, or limit the densities in the formula with min and max"));
+        }
+    }
+    Ok(())
 }
 
 /// The variables of ψ: for a density `n` of species A, B the names n_A, n_B and n = n_A + n_B.
@@ -106,7 +176,7 @@ fn bind_density(
                     )),
                 ));
             }
-            Some([low.value, high.value])
+            Some(Bounds { low: low.value, high: high.value, below: entry.below })
         }
     };
     Ok(WeightedDensity {
@@ -146,8 +216,43 @@ fn bind_pair(entry: &PairEntry, context: &Context) -> Result<PairTerm, FileError
                 .map(PairPotential::Expression)
                 .map_err(|e| formula_error(source, phi, e))?
         }
+        PairFormEntry::Table { spline, file, range } => {
+            let last = spline.ends()[1];
+            let range = match range {
+                Some(range) => {
+                    let place = range.evaluate(constants, source)?;
+                    let range = range.positive(constants, source)?;
+                    if range > last {
+                        let message = format!("is beyond the last r of the table, {last}");
+                        return Err(place.error(source, FileErrorKind::Value(message)));
+                    }
+                    range
+                }
+                None => last,
+            };
+            check_table(spline, range).map_err(|m| file.error(source, FileErrorKind::Value(m)))?;
+            PairPotential::Table(TablePair::new(Arc::clone(spline), range))
+        }
     };
     Ok(PairTerm { between: entry.between, potential })
+}
+
+/// A potential that jumps at its range would not conserve energy.
+fn check_table(spline: &Spline, range: f64) -> Result<(), String> {
+    let [first, _] = spline.ends();
+    if !(first >= 0.0 && range > first) {
+        return Err(format!("goes from r = {first} to {range}: r must rise from 0 or more"));
+    }
+    let largest = (0..=1000)
+        .map(|k| spline.at(first + (range - first) * k as f64 / 1000.0)[0].abs())
+        .fold(0.0, f64::max);
+    let end = spline.at(range)[0];
+    if end.abs() > 1e-6 * largest {
+        return Err(format!(
+            "phi is {end} at the range {range}: it must end at 0, or energy is not conserved"
+        ));
+    }
+    Ok(())
 }
 
 fn bind_thermostats(

@@ -2,6 +2,7 @@ use super::names::check_identifier;
 use super::number::Number;
 use super::species_index;
 use crate::document::{FileError, FileErrorKind, Located, Section, Value};
+use crate::model::fluid::Continuation;
 use crate::model::kernel::KernelKind;
 use std::collections::BTreeMap;
 
@@ -16,7 +17,11 @@ pub struct DensityEntry {
     /// Coefficients by (felt by, density of), row-major; empty is the identity.
     pub correction: Vec<Vec<Number>>,
     pub bounds: Option<[Number; 2]>,
+    pub below: Continuation,
 }
+
+/// Most densities of a model.
+const MOST_DENSITIES: usize = 16;
 
 /// Reads every `[density.*]`, in the order of the file.
 pub fn read(
@@ -29,7 +34,12 @@ pub fn read(
     };
     let section = value.section()?;
     let mut densities: Vec<DensityEntry> = Vec::new();
-    for (name, value) in section.entries() {
+    let entries = section.entries();
+    if entries.len() > MOST_DENSITIES {
+        let message = format!("{} densities, more than {MOST_DENSITIES}", entries.len());
+        return Err(value.error(FileErrorKind::Value(message)));
+    }
+    for (name, value) in entries {
         check_identifier(&name, &section)?;
         let Some(table) = value.as_section() else {
             return Err(value
@@ -70,7 +80,18 @@ fn read_one(name: Located<String>, table: &Section, species: &[String]) -> Resul
         }
         None => None,
     };
-    Ok(DensityEntry { name: name.value, kernel, force_kernel, range, includes_self, correction, bounds })
+    let below = match table.get("below") {
+        Some(value) => {
+            let choices = [("linear", Continuation::Linear), ("constant", Continuation::Constant)];
+            if bounds.is_none() {
+                return Err(value.error(FileErrorKind::Value("has no meaning without bounds".into())));
+            }
+            value.one_of("continuation", &choices)?.value
+        }
+        None => Continuation::default(),
+    };
+    let name = name.value;
+    Ok(DensityEntry { name, kernel, force_kernel, range, includes_self, correction, bounds, below })
 }
 
 /// One polynomial for all pairs of species, or a table of `"A|B"`: the density of A felt by B.

@@ -1,8 +1,11 @@
 use super::number::{Number, read_formula};
 use super::species_index;
+use super::table::read_spline;
 use crate::document::{FileError, FileErrorKind, Located, Section, Source, Value};
+use crate::model::curve::Spline;
 use crate::model::expression::Ast;
 use crate::model::fluid::{ExcessFreeEnergy, Fluid};
+use std::path::Path;
 use std::sync::Arc;
 
 /// A `[[pair]]` table.
@@ -18,6 +21,7 @@ pub enum PairFormEntry {
     Soft { strength: Number, range: Number },
     Spline { strength: Number, repulsion: Number, attraction: Number, range_a: Number, range_b: Number },
     Expression { phi: Located<Ast>, range: Number },
+    Table { spline: Arc<Spline>, file: Located<String>, range: Option<Number> },
 }
 
 /// A `[[thermostat]]` table.
@@ -39,30 +43,36 @@ fn read_between(value: &Value, species: &[String], source: &Arc<Source>) -> Resu
 }
 
 /// Reads every `[[pair]]`.
-pub fn read_pairs(root: &Section, species: &[String]) -> Result<Vec<PairEntry>, FileError> {
+pub fn read_pairs(root: &Section, species: &[String], directory: &Path) -> Result<Vec<PairEntry>, FileError> {
     let Some(value) = root.get("pair") else {
         return Ok(Vec::new());
     };
     let mut pairs = Vec::new();
     for item in value.array()? {
         let table = item.section()?;
-        pairs.push(read_pair(&table, species)?);
+        pairs.push(read_pair(&table, species, directory)?);
         table.finish()?;
     }
     Ok(pairs)
 }
 
-fn read_pair(table: &Section, species: &[String]) -> Result<PairEntry, FileError> {
+fn read_pair(table: &Section, species: &[String], directory: &Path) -> Result<PairEntry, FileError> {
     #[derive(Clone, Copy)]
     enum Form {
         Soft,
         Spline,
         Expression,
+        Table,
     }
     let source = table.source();
     let between = read_between(&table.require("between")?, species, source)?;
     let number = |key: &str| Number::read(&table.require(key)?, source);
-    let forms = [("soft", Form::Soft), ("spline", Form::Spline), ("expression", Form::Expression)];
+    let forms = [
+        ("soft", Form::Soft),
+        ("spline", Form::Spline),
+        ("expression", Form::Expression),
+        ("table", Form::Table),
+    ];
     let form = match table.require("form")?.one_of("form", &forms)?.value {
         Form::Soft => PairFormEntry::Soft { strength: number("strength")?, range: number("range")? },
         Form::Spline => PairFormEntry::Spline {
@@ -76,6 +86,14 @@ fn read_pair(table: &Section, species: &[String]) -> Result<PairEntry, FileError
             phi: read_formula(&table.require("phi")?, source)?,
             range: number("range")?,
         },
+        Form::Table => {
+            let file = table.require("file")?;
+            PairFormEntry::Table {
+                spline: Arc::new(read_spline(&file, directory, ["r", "phi"])?),
+                file: file.string()?,
+                range: table.get("range").map(|v| Number::read(&v, source)).transpose()?,
+            }
+        }
     };
     Ok(PairEntry { between, form })
 }
@@ -129,9 +147,12 @@ pub fn check_coverage(source: &Arc<Source>, fluid: &Fluid) -> Result<(), FileErr
         coupled[b * count + a] = true;
     }
     for (alpha, excess) in fluid.excess.iter().enumerate() {
-        let ExcessFreeEnergy::Formula(formula) = excess;
         for variable in 0..fluid.variables() {
-            if formula.depends_on(variable) {
+            let depends = match excess {
+                ExcessFreeEnergy::Formula(formula) => formula.depends_on(variable),
+                ExcessFreeEnergy::Curve(curve) => curve.density == variable / count,
+            };
+            if depends {
                 let beta = variable % count;
                 coupled[alpha * count + beta] = true;
                 coupled[beta * count + alpha] = true;

@@ -6,6 +6,7 @@ mod excess;
 mod interaction;
 mod names;
 mod number;
+mod table;
 
 use super::fluid::Fluid;
 use crate::document::{Document, FileError, FileErrorKind, Located, Section, Source};
@@ -45,7 +46,8 @@ impl Model {
         Model::read(&Document::open(path)?)
     }
 
-    /// Reads a model from a text; `name` stands for the file in messages.
+    /// Reads a model from a text; `name` stands for the file in messages, and tables are looked for
+    /// beside it.
     ///
     /// # Errors
     /// As [`Model::open`].
@@ -61,8 +63,8 @@ impl Model {
         let species = names::read_species(&root)?;
         let parameters = number::read_parameters(&root)?;
         let densities = density::read(&root, &species.value, &parameters)?;
-        let excess = excess::read(&root, &species)?;
-        let pairs = interaction::read_pairs(&root, &species.value)?;
+        let excess = excess::read(&root, &species, &densities, document.directory())?;
+        let pairs = interaction::read_pairs(&root, &species.value, document.directory())?;
         let thermostats = interaction::read_thermostats(&root, &species.value)?;
         root.finish()?;
         let model = Model {

@@ -1,7 +1,7 @@
 use super::names::check_identifier;
 use crate::document::{FileError, FileErrorKind, Located, Section, Source, Value};
 use crate::model::expression::{Ast, ExpressionError, Formula, Variables};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -115,6 +115,9 @@ fn span_in_string(source: &Source, string: &Range<usize>, error: &ExpressionErro
     start..end
 }
 
+/// Most parameters of a model: each may wait for all others.
+const MOST_PARAMETERS: usize = 1000;
+
 /// The `[parameters]` table: numbers, or formulas of other parameters, in any order.
 pub fn read_parameters(root: &Section) -> Result<BTreeMap<String, f64>, FileError> {
     let mut known = BTreeMap::new();
@@ -124,12 +127,17 @@ pub fn read_parameters(root: &Section) -> Result<BTreeMap<String, f64>, FileErro
     let section = value.section()?;
     let source = section.source();
     let mut waiting: Vec<(String, Number)> = Vec::new();
-    for (name, value) in section.entries() {
+    let entries = section.entries();
+    if entries.len() > MOST_PARAMETERS {
+        let message = format!("{} parameters, more than {MOST_PARAMETERS}", entries.len());
+        return Err(value.error(FileErrorKind::Value(message)));
+    }
+    for (name, value) in entries {
         check_identifier(&name, &section)?;
         waiting.push((name.value, Number::read(&value, source)?));
     }
     // Formulas may refer to each other: keep evaluating what can be until nothing is left.
-    let names: Vec<String> = waiting.iter().map(|(n, _)| n.clone()).collect();
+    let names: BTreeSet<String> = waiting.iter().map(|(n, _)| n.clone()).collect();
     while !waiting.is_empty() {
         let before = waiting.len();
         let mut still = Vec::new();
@@ -137,7 +145,7 @@ pub fn read_parameters(root: &Section) -> Result<BTreeMap<String, f64>, FileErro
             let ready = match &number {
                 Number::Value(_) => true,
                 Number::Formula(ast) => {
-                    ast.value.names().all(|(n, _)| known.contains_key(n) || !names.iter().any(|m| m == n))
+                    ast.value.names().all(|(n, _)| known.contains_key(n) || !names.contains(n))
                 }
             };
             if ready {

@@ -7,7 +7,7 @@
 //! w(r) = c_d W(r/R) / R^d          w'(r) = c_d W'(r/R) / R^(d+1)
 //! ```
 //!
-//! To add a kernel: write one file that implements [`Shape`] and name it once in [`kernel_table!`].
+//! To add a kernel: write one file that implements [`Shape`] and name it once in `kernel_table!`.
 
 mod bell;
 mod cubic_spline;

@@ -1,15 +1,17 @@
 //! Pair potentials `φ(r)`, added to the many-body terms.
 //!
 //! To add a form: write one file with a type that implements [`PairForm`] and name it once in
-//! [`pair_table!`]; the model file's reader then needs its keys.
+//! `pair_table!`; the model file's reader then needs its keys.
 
 mod expression;
 mod soft;
 mod spline;
+mod table;
 
 pub use expression::ExpressionPair;
 pub use soft::Soft;
 pub use spline::{SplineAttractive, spline_shape};
+pub use table::TablePair;
 
 /// A pair potential that vanishes at and beyond its range.
 pub trait PairForm {
@@ -63,6 +65,7 @@ pair_table!(
     Soft(Soft) = "soft",
     Spline(SplineAttractive) = "spline",
     Expression(ExpressionPair) = "expression",
+    Table(TablePair) = "table",
 );
 
 #[cfg(test)]
@@ -90,5 +93,15 @@ mod tests {
         slope_is_derivative(&Soft::new(25.0, 1.0), &[]);
         slope_is_derivative(&Soft::new(-40.0, 0.8), &[]);
         slope_is_derivative(&SplineAttractive::new(9.5, 2.0, 1.0, 0.8, 1.0), &[0.4, 0.5, 0.8]);
+        let r: Vec<f64> = (0..=50).map(|k| 0.02 * k as f64).collect();
+        let phi = r.iter().map(|r| 12.5 * (1.0 - r) * (1.0 - r)).collect();
+        let table =
+            TablePair::new(std::sync::Arc::new(crate::model::curve::Spline::new(r, phi).unwrap()), 1.0);
+        slope_is_derivative(&table, &[]);
+        let soft = Soft::new(25.0, 1.0);
+        for k in 0..100 {
+            let (table, soft) = (table.at(0.01 * k as f64), soft.at(0.01 * k as f64));
+            assert!((table.0 - soft.0).abs() < 1e-12 && (table.1 - soft.1).abs() < 1e-11);
+        }
     }
 }

@@ -15,7 +15,7 @@ pub fn fill(scene: &Scene) -> State {
     match &scene.initial {
         Initial::Filling(filling) => place(scene, filling, &mut random),
         Initial::File { state, velocities, .. } => {
-            let mut state = State { mass: scene.mass.clone(), ..state.clone() };
+            let mut state = State { mass: scene.mass.clone(), ..State::clone(state) };
             if let Some(velocities) = velocities {
                 let mass = state.species.iter().map(|s| scene.mass[*s as usize]);
                 state.v = velocities.draw(mass, scene.kt, scene.model.dimensions(), &mut random);

@@ -1,0 +1,143 @@
+//! Tables of numbers in files beside a model or scene file.
+
+use super::{FileError, FileErrorKind, Source, Value};
+use std::io::Read;
+use std::path::Path;
+use std::sync::Arc;
+
+/// The largest table that is read.
+const LARGEST: u64 = 16 << 20;
+
+/// Two columns of a table file, and where they came from.
+#[derive(Debug, Clone)]
+pub struct Columns {
+    source: Arc<Source>,
+    /// The first and the second column.
+    pub columns: [Vec<f64>; 2],
+    /// Where each row is in the file.
+    rows: Vec<std::ops::Range<usize>>,
+}
+
+impl Columns {
+    /// Reads the columns called `names` from the file that `value` names, relative to `directory`.
+    ///
+    /// Rows are lines of numbers separated by commas or blanks; `#` begins a comment. If the first row
+    /// is not numbers it names the columns, which may then stand in any order among others.
+    ///
+    /// # Errors
+    /// No such file, a row that is too short or not finite numbers, no row.
+    pub fn read(value: &Value, directory: &Path, names: [&str; 2]) -> Result<Columns, FileError> {
+        let path = directory.join(value.string()?.value);
+        // A pipe or a device could keep its reader waiting, and this name may come from anywhere.
+        let regular = || match std::fs::metadata(&path) {
+            Ok(about) if !about.is_file() => Err("not a regular file".to_owned()),
+            Ok(_) => Ok(()),
+            Err(error) => Err(error.to_string()),
+        };
+        let text = regular().and_then(|()| read_text(&path, LARGEST)).map_err(|message| {
+            value.error(FileErrorKind::Value(format!("cannot read {}: {message}", path.display())))
+        })?;
+        Columns::parse(&path.display().to_string(), &text, names)
+    }
+
+    /// The same from a text; `name` stands for the file in messages.
+    ///
+    /// # Errors
+    /// As [`Columns::read`].
+    pub fn parse(name: &str, text: &str, names: [&str; 2]) -> Result<Columns, FileError> {
+        let source = Arc::new(Source::new(name, text));
+        let mut table = Columns { source, columns: [Vec::new(), Vec::new()], rows: Vec::new() };
+        let mut places = None;
+        let mut start = 0;
+        for line in text.split_inclusive('\n') {
+            let span = start..start + line.len();
+            start = span.end;
+            let line = line.split('#').next().unwrap_or("").trim();
+            if line.is_empty() {
+                continue;
+            }
+            let fields: Vec<&str> = line
+                .split(|c: char| c == ',' || c == ';' || c.is_whitespace())
+                .filter(|f| !f.is_empty())
+                .map(|f| f.trim_matches('"'))
+                .collect();
+            let error = |message: String| {
+                FileError::new(&table.source, span.clone(), "", FileErrorKind::Value(message))
+            };
+            let is_header = places.is_none() && fields.iter().any(|f| f.parse::<f64>().is_err());
+            if is_header {
+                let place = |name: &str| {
+                    fields.iter().position(|f| *f == name).ok_or_else(|| {
+                        error(format!("no column is called {name}; the columns are {}", fields.join(", ")))
+                    })
+                };
+                places = Some([place(names[0])?, place(names[1])?]);
+                continue;
+            }
+            let at = *places.get_or_insert([0, 1]);
+            let number = |place: usize| match fields.get(place).map(|f| f.parse::<f64>()) {
+                Some(Ok(x)) if x.is_finite() => Ok(x),
+                Some(_) => Err(error(format!("\"{}\" is not a finite number", fields[place]))),
+                None => Err(error(format!("expected {} and {}", names[0], names[1]))),
+            };
+            let row = [number(at[0])?, number(at[1])?];
+            table.rows.push(span);
+            for (column, x) in table.columns.iter_mut().zip(row) {
+                column.push(x);
+            }
+        }
+        Ok(table)
+    }
+
+    /// An error about row `row`, or about the file as a whole if there is no such row.
+    pub fn error(&self, row: usize, kind: FileErrorKind) -> FileError {
+        FileError::new(&self.source, self.rows.get(row).cloned().unwrap_or(0..0), "", kind)
+    }
+}
+
+/// A file's text, no more than `largest` bytes.
+pub(super) fn read_text(path: &Path, largest: u64) -> Result<String, String> {
+    let file = std::fs::File::open(path).map_err(|e| e.to_string())?;
+    let mut bytes = Vec::new();
+    file.take(largest + 1).read_to_end(&mut bytes).map_err(|e| e.to_string())?;
+    if bytes.len() as u64 > largest {
+        return Err(format!("more than {largest} bytes"));
+    }
+    String::from_utf8(bytes).map_err(|_| "not UTF-8".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<[Vec<f64>; 2], String> {
+        Columns::parse("t.csv", text, ["n", "psi"]).map(|t| t.columns).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn headers_separators_and_comments() {
+        let expected = Ok([vec![0.0, 1.0], vec![2.0, 3.5]]);
+        for text in [
+            "0,2\n1,3.5\n",
+            "n,psi\n0,2\n1,3.5",
+            "# from an experiment\n\n\"psi\", \"rho\", \"n\"\r\n2, 7, 0\r\n3.5, 8, 1 # last\r\n",
+            "n psi\n0\t2e0\n 1   3.5 \n",
+        ] {
+            assert_eq!(read(text), expected, "{text}");
+        }
+        assert_eq!(read(""), Ok([vec![], vec![]]));
+    }
+
+    #[test]
+    fn errors_name_the_line() {
+        for (text, message) in [
+            ("0 1\n1\n", "t.csv:2: expected n and psi"),
+            ("0 1\nx 2\n", "t.csv:2: \"x\" is not a finite number"),
+            ("0 1\n2 inf\n", "t.csv:2: \"inf\" is not"),
+            ("n rho\n0 1\n", "t.csv:1: no column is called psi; the columns are n, rho"),
+        ] {
+            let error = read(text).unwrap_err();
+            assert!(error.contains(message), "{error}");
+        }
+    }
+}

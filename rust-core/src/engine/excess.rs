@@ -1,0 +1,278 @@
+//! ψ and its slopes for blocks of particles of one species.
+
+use crate::model::curve::{Curve, CurveBlock};
+use crate::model::expression::{Expansion, Formula, Program, TooLarge};
+use crate::model::{Bounds, Continuation, Fluid};
+
+/// `ψ_α` of the densities that need a pass.
+#[derive(Debug, Clone)]
+pub enum ExcessPlan {
+    /// No variables are left.
+    Constant(f64),
+    /// A formula of several variables.
+    Formula(FormulaPlan),
+    /// A function of the total of one density.
+    Curve(CurvePlan),
+}
+
+/// A curve and the variables it sums.
+#[derive(Debug, Clone)]
+pub struct CurvePlan {
+    pub curve: Curve,
+    species: usize,
+    /// Its density's place among the passes: where its slopes go.
+    pass: usize,
+    bounds: Option<Bounds>,
+}
+
+/// A formula with its slopes.
+#[derive(Debug, Clone)]
+pub struct FormulaPlan {
+    pub formula: Formula,
+    /// ψ, then ∂ψ/∂ñ for each variable of the passes.
+    program: Program,
+    outputs: Vec<Formula>,
+    /// The variables of the slopes.
+    variables: Vec<usize>,
+    bounded: Vec<BoundedVariable>,
+}
+
+/// A variable beyond whose bounds ψ goes on linearly or quadratically.
+#[derive(Debug, Clone)]
+struct BoundedVariable {
+    variable: usize,
+    /// Its place among the slopes.
+    slope: usize,
+    bounds: Bounds,
+}
+
+/// Work space of [`ExcessPlan::evaluate`].
+#[derive(Debug, Clone, Default)]
+pub struct ExcessWork {
+    registers: Vec<f64>,
+    point: Vec<f64>,
+    expansion: Expansion,
+    outside: Vec<Outside>,
+    /// Lanes and bounded variables, lane by lane, that are out of bounds.
+    strays: Vec<Stray>,
+    totals: Vec<f64>,
+    beyond: Vec<f64>,
+    curve: CurveBlock,
+}
+
+/// One bounded variable of one lane, out of its bounds by `beyond`.
+#[derive(Debug, Clone, Copy)]
+struct Stray {
+    lane: usize,
+    bounded: usize,
+    beyond: f64,
+}
+
+/// The same within a lane: `ε = beyond` up to `order`.
+#[derive(Debug, Clone, Copy)]
+struct Outside {
+    slope: usize,
+    beyond: f64,
+    order: usize,
+}
+
+impl ExcessPlan {
+    /// The plan of `psi` of species `alpha`, with slopes for `variables`.
+    ///
+    /// # Errors
+    /// A derivative grows beyond the limits of the formula engine.
+    pub fn of_formula(fluid: &Fluid, psi: Formula, variables: &[usize]) -> Result<ExcessPlan, TooLarge> {
+        if let Some(value) = psi.is_constant() {
+            return Ok(ExcessPlan::Constant(value));
+        }
+        let mut outputs = vec![psi.clone()];
+        for v in variables {
+            outputs.push(psi.derivative(*v)?);
+        }
+        let count = fluid.species.len();
+        let bounded: Vec<_> = variables
+            .iter()
+            .enumerate()
+            .filter_map(|(slope, &variable)| {
+                let bounds = fluid.densities[variable / count].bounds?;
+                // What is linear goes on as it is.
+                outputs[1 + slope].is_constant().is_none().then_some(BoundedVariable {
+                    variable,
+                    slope,
+                    bounds,
+                })
+            })
+            .collect();
+        Ok(ExcessPlan::Formula(FormulaPlan {
+            program: Program::new(&outputs.iter().collect::<Vec<_>>()),
+            bounded,
+            formula: psi,
+            outputs,
+            variables: variables.to_vec(),
+        }))
+    }
+
+    /// The plan of a curve, whose density is one of `passes`.
+    pub fn of_curve(fluid: &Fluid, curve: Curve, passes: &[usize]) -> ExcessPlan {
+        ExcessPlan::Curve(CurvePlan {
+            species: fluid.species.len(),
+            pass: passes.iter().position(|d| *d == curve.density).unwrap_or(0),
+            bounds: fluid.densities[curve.density].bounds,
+            curve,
+        })
+    }
+
+    /// Writes ψ and its slopes for every lane: output `o` of lane `l` is `out[o * lanes + l]`, as
+    /// variable `v` is `at[v * lanes + l]`; variables out of bounds are moved to them. Returns how many
+    /// lanes had a variable below its bounds and how many one above.
+    pub fn evaluate(&self, lanes: usize, at: &mut [f64], out: &mut [f64], work: &mut ExcessWork) -> [u64; 2] {
+        match self {
+            ExcessPlan::Constant(value) => {
+                out[..lanes].fill(*value);
+                out[lanes..].fill(0.0);
+                [0; 2]
+            }
+            ExcessPlan::Formula(plan) => plan.evaluate(lanes, at, out, work),
+            ExcessPlan::Curve(plan) => plan.evaluate(lanes, at, out, work),
+        }
+    }
+}
+
+impl CurvePlan {
+    fn evaluate(&self, lanes: usize, at: &[f64], out: &mut [f64], work: &mut ExcessWork) -> [u64; 2] {
+        let ExcessWork { totals, beyond, curve, .. } = work;
+        totals.clear();
+        totals.resize(lanes, 0.0);
+        let first = self.curve.density * self.species;
+        for values in at[first * lanes..][..self.species * lanes].chunks_exact(lanes) {
+            totals.iter_mut().zip(values).for_each(|(total, value)| *total += value);
+        }
+        let mut count = [0; 2];
+        if let Some(bounds) = self.bounds {
+            beyond.clear();
+            for total in totals.iter_mut() {
+                let delta = bounds.beyond(*total);
+                count[0] += (delta < 0.0) as u64;
+                count[1] += (delta > 0.0) as u64;
+                *total = bounds.clamp(*total);
+                beyond.push(delta);
+            }
+        }
+        self.curve.block(totals, curve);
+        if let Some(bounds) = self.bounds.filter(|_| count != [0; 2]) {
+            for (lane, delta) in beyond.iter().enumerate().filter(|(_, delta)| **delta != 0.0) {
+                let curvature = if bounds.order(*delta) == 2 { curve.curvature[lane] } else { 0.0 };
+                curve.psi[lane] += delta * (curve.slope[lane] + 0.5 * delta * curvature);
+                curve.slope[lane] += delta * curvature;
+            }
+        }
+        let (psi, slopes) = out.split_at_mut(lanes);
+        psi.copy_from_slice(&curve.psi);
+        for (k, slope) in slopes.chunks_exact_mut(lanes).enumerate() {
+            if k / self.species == self.pass {
+                slope.copy_from_slice(&curve.slope);
+            } else {
+                slope.fill(0.0);
+            }
+        }
+        count
+    }
+}
+
+impl FormulaPlan {
+    fn evaluate(&self, lanes: usize, at: &mut [f64], out: &mut [f64], work: &mut ExcessWork) -> [u64; 2] {
+        let count = self.clamp(lanes, at, &mut work.strays);
+        self.program.eval_block(lanes, at, out, &mut work.registers);
+        if !work.strays.is_empty() {
+            self.extend(lanes, at, out, work);
+        }
+        count
+    }
+
+    /// Moves variables to their bounds and lists which, lane by lane.
+    fn clamp(&self, lanes: usize, at: &mut [f64], strays: &mut Vec<Stray>) -> [u64; 2] {
+        strays.clear();
+        for (bounded, variable) in self.bounded.iter().enumerate() {
+            let values = &mut at[variable.variable * lanes..][..lanes];
+            for (lane, value) in values.iter_mut().enumerate() {
+                let beyond = variable.bounds.beyond(*value);
+                if beyond != 0.0 {
+                    *value = variable.bounds.clamp(*value);
+                    strays.push(Stray { lane, bounded, beyond });
+                }
+            }
+        }
+        strays.sort_unstable_by_key(|s| (s.lane, s.bounded));
+        let mut count = [0; 2];
+        for lane in strays.chunk_by(|a, b| a.lane == b.lane) {
+            count[0] += lane.iter().any(|s| s.beyond < 0.0) as u64;
+            count[1] += lane.iter().any(|s| s.beyond > 0.0) as u64;
+        }
+        count
+    }
+
+    /// Replaces ψ and slopes in the lanes that were moved by the continuation from the bounds.
+    ///
+    /// With the operator `E_k ψ = ψ + δ_k ψ_k + ½ δ_k² ψ_kk` at the bound for each variable out of
+    /// bounds, ψ becomes `E_1 E_2 … ψ`; these commute with each other and with the slopes along the
+    /// other variables.
+    fn extend(&self, lanes: usize, at: &[f64], out: &mut [f64], work: &mut ExcessWork) {
+        let ExcessWork { point, expansion, outside, strays, .. } = work;
+        for stray in strays.chunk_by(|a, b| a.lane == b.lane) {
+            let lane = stray[0].lane;
+            point.clear();
+            point.extend(at.chunks_exact(lanes).map(|values| values[lane]));
+            outside.clear();
+            outside.extend(stray.iter().map(|s| {
+                let BoundedVariable { slope, bounds, .. } = &self.bounded[s.bounded];
+                Outside { slope: *slope, beyond: s.beyond, order: bounds.order(s.beyond) }
+            }));
+            let mut along = [0; Expansion::MOST];
+            for (along, o) in along.iter_mut().zip(outside.iter()) {
+                *along = self.variables[o.slope];
+            }
+            let along = &along[..outside.len()];
+            let psi = expansion.coefficients(&self.outputs[0], point, along);
+            out[lane] = continued(psi, outside, None);
+            for (k, o) in outside.iter().enumerate() {
+                out[(1 + o.slope) * lanes + lane] = continued(psi, outside, Some(k));
+            }
+            for (slope, output) in self.outputs[1..].iter().enumerate() {
+                if outside.iter().all(|o| o.slope != slope) {
+                    let coefficients = expansion.coefficients(output, point, along);
+                    out[(1 + slope) * lanes + lane] = continued(coefficients, outside, None);
+                }
+            }
+        }
+    }
+}
+
+/// `Σ c_m Π δ_k^{m_k}`, or its derivative by the `δ` of one variable.
+fn continued(coefficients: &[f64], outside: &[Outside], derivative: Option<usize>) -> f64 {
+    let mut sum = 0.0;
+    for (index, coefficient) in coefficients.iter().enumerate() {
+        let mut rest = index;
+        let mut term = *coefficient;
+        for (k, o) in outside.iter().enumerate() {
+            let power = rest % 3;
+            rest /= 3;
+            term *= match (derivative == Some(k), power) {
+                (_, power) if power > o.order => 0.0,
+                (false, 0) | (true, 1) => 1.0,
+                (false, 1) => o.beyond,
+                (false, _) => o.beyond * o.beyond,
+                (true, 0) => 0.0,
+                (true, _) => 2.0 * o.beyond,
+            };
+        }
+        sum += term;
+    }
+    sum
+}
+
+impl Bounds {
+    /// The highest power of δ in the continuation: 2 where ψ′ is linear, 1 where it is constant.
+    fn order(&self, beyond: f64) -> usize {
+        if beyond < 0.0 && self.below == Continuation::Constant { 1 } else { 2 }
+    }
+}

@@ -1,0 +1,82 @@
+//! `ψ` as a function of one total density: a table, or an equation of state.
+
+mod pressure;
+mod spline;
+
+pub use pressure::Pressure;
+pub use spline::{Spline, SplineError};
+
+use std::sync::Arc;
+
+/// `ψ(n)` of the total of one density, `n = Σ_β ñ_β`.
+#[derive(Debug, Clone)]
+pub struct Curve {
+    /// Which density, by its place in [`Fluid::densities`](super::Fluid::densities).
+    pub density: usize,
+    /// The function.
+    pub form: CurveForm,
+}
+
+/// Where a curve comes from.
+#[derive(Debug, Clone)]
+pub enum CurveForm {
+    /// Interpolated.
+    Table(Arc<Spline>),
+    /// From a pressure `p(ρ)`.
+    Pressure(Arc<Pressure>),
+}
+
+/// `ψ`, `ψ′` and `ψ″` of a block of densities.
+#[derive(Debug, Clone, Default)]
+pub struct CurveBlock {
+    /// `ψ(n)`.
+    pub psi: Vec<f64>,
+    /// `ψ′(n)`.
+    pub slope: Vec<f64>,
+    /// `ψ″(n)`.
+    pub curvature: Vec<f64>,
+    work: Vec<f64>,
+    nodes: Vec<f64>,
+    out: Vec<f64>,
+}
+
+impl CurveBlock {
+    fn resize(&mut self, lanes: usize) {
+        for list in [&mut self.psi, &mut self.slope, &mut self.curvature] {
+            list.resize(lanes, 0.0);
+        }
+    }
+}
+
+impl Curve {
+    /// `ψ`, `ψ′` and `ψ″` at every `n`; where ψ is singular they are infinite or NaN.
+    pub fn block(&self, n: &[f64], to: &mut CurveBlock) {
+        to.resize(n.len());
+        match &self.form {
+            CurveForm::Table(spline) => {
+                for (lane, n) in n.iter().enumerate() {
+                    [to.psi[lane], to.slope[lane], to.curvature[lane]] = spline.at(*n);
+                }
+            }
+            CurveForm::Pressure(pressure) => pressure.block(n, to),
+        }
+    }
+
+    /// `[ψ, ψ′, ψ″]` at one density.
+    pub fn at(&self, n: f64) -> [f64; 3] {
+        let mut block = CurveBlock::default();
+        self.block(&[n], &mut block);
+        [block.psi[0], block.slope[0], block.curvature[0]]
+    }
+
+    /// What it is, for people.
+    pub fn describe(&self) -> String {
+        match &self.form {
+            CurveForm::Table(spline) => {
+                let [low, high] = spline.ends();
+                format!("table of {} points from {low} to {high}", spline.points())
+            }
+            CurveForm::Pressure(pressure) => format!("from the pressure {}", pressure.text()),
+        }
+    }
+}

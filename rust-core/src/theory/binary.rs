@@ -1,0 +1,286 @@
+use super::line::{Line, coexisting, least_stable, unstable};
+use super::one_component::change_of_sign;
+use super::search::{spaced, turning_point};
+use super::{MeanField, TheoryError};
+use crate::model::Fluid;
+
+/// Two phases of a binary mixture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CompositionBinodal {
+    /// Fraction of the first species in each phase, ascending.
+    pub composition: [f64; 2],
+    /// Total density of each phase.
+    pub density: [f64; 2],
+    /// Pressure of each phase: equal, unless the densities were held equal instead.
+    pub pressure: [f64; 2],
+    /// `μ_A − μ_B`, in both phases.
+    pub exchange_potential: f64,
+}
+
+/// A critical point of demixing at a fixed total density.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CompositionCritical {
+    /// The control parameter there: kT, or whatever the fluids were made from.
+    pub parameter: f64,
+    /// Fraction of the first species.
+    pub composition: f64,
+    /// Pressure.
+    pub pressure: f64,
+}
+
+/// What a mixture keeps while its composition changes.
+#[derive(Debug, Clone, Copy)]
+enum Held {
+    Density(f64),
+    Pressure(f64),
+}
+
+/// Free energy (per volume at fixed density, Gibbs per particle at fixed pressure) against the fraction
+/// of the first species.
+pub struct CompositionLine<'a> {
+    theory: &'a MeanField,
+    held: Held,
+    /// At fixed pressure, the logarithm of the total density at the points of the grid.
+    followed: Vec<f64>,
+}
+
+/// The grid: the logarithm of the ratio of the two species.
+const REACH: f64 = 30.0;
+const STEPS: usize = 1200;
+
+fn fractions(u: f64) -> [f64; 2] {
+    [1.0 / (1.0 + (-u).exp()), 1.0 / (1.0 + u.exp())]
+}
+
+impl<'a> CompositionLine<'a> {
+    pub fn at_density(theory: &'a MeanField, density: f64) -> CompositionLine<'a> {
+        CompositionLine { theory, held: Held::Density(density), followed: Vec::new() }
+    }
+
+    /// Follows the density from the equimolar mixture, where it is the densest there is, to both sides.
+    pub fn at_pressure(theory: &'a MeanField, pressure: f64) -> CompositionLine<'a> {
+        let held = Held::Pressure(pressure);
+        let mut line = CompositionLine { theory, held, followed: vec![f64::NAN; STEPS + 1] };
+        let grid = line.grid();
+        let densest =
+            |u: f64| theory.densities_at_pressure(&fractions(u), pressure).pop().map_or(f64::NAN, f64::ln);
+        let middle = STEPS / 2;
+        line.followed[middle] = densest(grid[middle]);
+        let towards = |from: usize, i: usize, line: &CompositionLine| {
+            let near = line.solve_density(grid[i], line.followed[from], pressure);
+            near.unwrap_or_else(|| densest(grid[i]))
+        };
+        for i in middle + 1..=STEPS {
+            line.followed[i] = towards(i - 1, i, &line);
+        }
+        for i in (0..middle).rev() {
+            line.followed[i] = towards(i + 1, i, &line);
+        }
+        line
+    }
+
+    fn new(theory: &'a MeanField, held: Held) -> CompositionLine<'a> {
+        match held {
+            Held::Density(density) => CompositionLine::at_density(theory, density),
+            Held::Pressure(pressure) => CompositionLine::at_pressure(theory, pressure),
+        }
+    }
+
+    /// `ln ρ` at which the pressure is as given, by Newton's method from a neighbour.
+    fn solve_density(&self, u: f64, from: f64, pressure: f64) -> Option<f64> {
+        let x = fractions(u);
+        let mut log = from;
+        for _ in 0..30 {
+            let rho = x.map(|x| x * log.exp());
+            let slope = log.exp() * self.theory.pressure_slope(&rho);
+            let step = (pressure - self.theory.pressure(&rho)) / slope;
+            // NaN, a step off the branch, or a branch that ended.
+            if slope.is_nan() || slope <= 0.0 || step.is_nan() || step.abs() > 1.0 {
+                return None;
+            }
+            log += step;
+            if step.abs() < 1e-14 {
+                return Some(log);
+            }
+        }
+        Some(log).filter(|_| log.is_finite())
+    }
+
+    /// Both densities.
+    pub fn densities(&self, u: f64) -> [f64; 2] {
+        let x = fractions(u);
+        let total = match self.held {
+            Held::Density(rho) => rho,
+            Held::Pressure(pressure) => {
+                let at = ((u + REACH) / (2.0 * REACH) * STEPS as f64).clamp(0.0, STEPS as f64);
+                let near = self.followed[at.round() as usize];
+                self.solve_density(u, near, pressure).map_or(f64::NAN, f64::exp)
+            }
+        };
+        x.map(|x| x * total)
+    }
+
+    fn two_phases(&self, [a, b]: [f64; 2]) -> CompositionBinodal {
+        let phases = [a, b].map(|u| self.densities(u));
+        let exchange = self.theory.chemical_potentials(&phases[0]);
+        CompositionBinodal {
+            composition: [self.x(a), self.x(b)],
+            density: phases.map(|rho| rho[0] + rho[1]),
+            pressure: phases.map(|rho| self.theory.pressure(&rho)),
+            exchange_potential: exchange[0] - exchange[1],
+        }
+    }
+}
+
+impl Line for CompositionLine<'_> {
+    fn x(&self, u: f64) -> f64 {
+        fractions(u)[0]
+    }
+
+    fn u(&self, x: f64) -> f64 {
+        (x / (1.0 - x)).ln()
+    }
+
+    fn curvature(&self, u: f64) -> f64 {
+        let [a, b] = self.densities(u);
+        let f = self.theory.excess_second_derivatives(&[a, b]);
+        let (rho, beta) = (a + b, 1.0 / self.theory.kt);
+        // c(1 − c) (∂/∂ρ_A − ∂/∂ρ_B)² βf ρ
+        let at_density = 1.0 + beta * a * b / rho * (f[0] - f[1] - f[2] + f[3]);
+        match self.held {
+            Held::Density(_) => at_density,
+            Held::Pressure(_) => {
+                // det f / (f of the ideal mixture), over ρ ∂p/∂ρ: both with the poles taken out.
+                let determinant =
+                    (1.0 + beta * a * f[0]) * (1.0 + beta * b * f[3]) - beta * beta * a * b * f[1] * f[2];
+                determinant / (beta * self.theory.pressure_slope(&[a, b]))
+            }
+        }
+    }
+
+    fn slope(&self, u: f64) -> f64 {
+        let rho = self.densities(u);
+        let mu = self.theory.excess_chemical_potentials(&rho);
+        let exchange = mu[0] - mu[1] + self.theory.kt * u;
+        match self.held {
+            Held::Density(total) => total * exchange,
+            Held::Pressure(_) => exchange,
+        }
+    }
+
+    fn intercept(&self, u: f64) -> f64 {
+        let rho = self.densities(u);
+        let mu = self.theory.excess_chemical_potentials(&rho)[1] + self.theory.kt * rho[1].ln();
+        match self.held {
+            // c ∂g/∂c − g = p − ρ μ_B
+            Held::Density(total) => self.theory.pressure(&rho) - total * mu,
+            Held::Pressure(_) => -mu,
+        }
+    }
+
+    fn grid(&self) -> Vec<f64> {
+        spaced(-REACH, REACH, STEPS)
+    }
+
+    fn limits(&self) -> [f64; 2] {
+        [-600.0, 600.0]
+    }
+}
+
+impl MeanField {
+    /// Every total density at which a fluid of the given composition has pressure `pressure` and is
+    /// mechanically stable, `∂p/∂ρ > 0`; ascending. Any number of species.
+    pub fn densities_at_pressure(&self, composition: &[f64], pressure: f64) -> Vec<f64> {
+        let total: f64 = composition.iter().sum();
+        let excess = |rho: f64| {
+            let densities: Vec<f64> = composition.iter().map(|x| x / total * rho).collect();
+            self.pressure(&densities) - pressure
+        };
+        let grid = self.density_grid(composition);
+        let values: Vec<f64> = grid.iter().map(|rho| excess(*rho)).collect();
+        (1..grid.len())
+            .filter(|i| values[i - 1] < 0.0 && values[*i] >= 0.0)
+            .map(|i| turning_point(grid[i - 1], grid[i], |rho| excess(rho) >= 0.0))
+            .collect()
+    }
+
+    /// Fractions of the first species between which a binary mixture of fixed total density is unstable
+    /// to demixing: `∂²f/∂c² = ρ²(f_AA − 2f_AB + f_BB) < 0`. Pagonabarraga–Frenkel eq. (23) is the
+    /// critical point of their symmetric mixture, `kT_c = ρ(λ − λ_A)`.
+    ///
+    /// # Errors
+    /// Not two species.
+    pub fn composition_spinodal(&self, density: f64) -> Result<Vec<[f64; 2]>, TheoryError> {
+        self.spinodal_of(Held::Density(density))
+    }
+
+    /// The same at fixed pressure, on the branch that is densest in the equimolar mixture: `det f_αβ < 0` with `∂p/∂ρ > 0`, the full
+    /// condition for a compressible mixture.
+    ///
+    /// # Errors
+    /// Not two species.
+    pub fn composition_spinodal_at_pressure(&self, pressure: f64) -> Result<Vec<[f64; 2]>, TheoryError> {
+        self.spinodal_of(Held::Pressure(pressure))
+    }
+
+    /// Two phases of a binary mixture of one and the same total density, by the common tangent of
+    /// `f(c)`. Their pressures differ unless the mixture is symmetric, so this is for nearly
+    /// incompressible mixtures (Pagonabarraga–Frenkel sec. III B, "assuming that ρ is constant");
+    /// [`MeanField::composition_binodal_at_pressure`] does without the assumption.
+    ///
+    /// # Errors
+    /// Not two species; [`TheoryError::NoCoexistence`].
+    pub fn composition_binodal(&self, density: f64) -> Result<CompositionBinodal, TheoryError> {
+        self.binodal_of(Held::Density(density))
+    }
+
+    /// Two phases of a binary mixture that have the pressure `pressure` and both chemical potentials in
+    /// common: the common tangent of the Gibbs free energy per particle, on the branch that is densest in the
+    /// equimolar mixture.
+    ///
+    /// # Errors
+    /// Not two species; [`TheoryError::NoCoexistence`].
+    pub fn composition_binodal_at_pressure(&self, pressure: f64) -> Result<CompositionBinodal, TheoryError> {
+        self.binodal_of(Held::Pressure(pressure))
+    }
+
+    fn spinodal_of(&self, held: Held) -> Result<Vec<[f64; 2]>, TheoryError> {
+        self.require_species(2)?;
+        let line = CompositionLine::new(self, held);
+        Ok(unstable(&line).into_iter().map(|[a, b]| [line.x(a), line.x(b)]).collect())
+    }
+
+    fn binodal_of(&self, held: Held) -> Result<CompositionBinodal, TheoryError> {
+        self.require_species(2)?;
+        let line = CompositionLine::new(self, held);
+        let phases = self.phases(&line)?;
+        Ok(line.two_phases(phases))
+    }
+
+    /// The two phases as parameters of the line.
+    pub(super) fn phases(&self, line: &dyn Line) -> Result<[f64; 2], TheoryError> {
+        coexisting(line).ok_or(TheoryError::NoCoexistence)
+    }
+}
+
+/// The critical point of demixing at a fixed total density, for a family of binary mixtures with any
+/// control parameter (kT, an interaction strength): where the smallest `∂²f/∂c²` over all compositions
+/// is zero. The mixture must be stable at one end of `range` and not at the other.
+///
+/// # Errors
+/// A fluid that cannot be had, not two species, or no such change.
+pub fn composition_critical_point(
+    fluid: &dyn Fn(f64) -> Result<Fluid, TheoryError>,
+    density: f64,
+    range: [f64; 2],
+) -> Result<CompositionCritical, TheoryError> {
+    let least = |parameter: f64| -> Result<(f64, f64), TheoryError> {
+        let theory = MeanField::new(&fluid(parameter)?)?;
+        theory.require_species(2)?;
+        Ok(least_stable(&CompositionLine::at_density(&theory, density)))
+    };
+    let parameter = change_of_sign(range, &|parameter| Ok(least(parameter)?.1 < 0.0))?;
+    let x = fractions(least(parameter)?.0);
+    let pressure = MeanField::new(&fluid(parameter)?)?.pressure(&x.map(|x| x * density));
+    Ok(CompositionCritical { parameter, composition: x[0], pressure })
+}

@@ -1,0 +1,255 @@
+use super::TheoryError;
+use super::free_energy::{FreeEnergy, Psi};
+use super::radial::Radial;
+use super::search::spaced;
+use super::singular;
+use crate::model::Fluid;
+use crate::model::pair::PairForm;
+
+/// The mean-field theory of a fluid at one temperature.
+///
+/// Densities are number densities in the order of the fluid's species. Outside the domain of ψ every
+/// result is NaN or infinite.
+#[derive(Debug, Clone)]
+pub struct MeanField {
+    pub(super) dimensions: usize,
+    pub(super) kt: f64,
+    pub(super) species: Vec<String>,
+    pub(super) free_energy: FreeEnergy,
+    /// What is added to the bulk density in variable `v` of `ψ_α`: the self term.
+    shift: Vec<Vec<f64>>,
+    /// `w` of each density.
+    pub(super) kernels: Vec<Radial>,
+    /// `φ` and the species it acts between.
+    pub(super) pairs: Vec<([usize; 2], Radial)>,
+    /// `[φ_αβ]`, row-major and symmetric.
+    pair_integrals: Vec<f64>,
+    /// The longest range of a density or a pair potential, and the shortest.
+    pub(super) ranges: [f64; 2],
+}
+
+impl MeanField {
+    /// The theory of `fluid`.
+    ///
+    /// # Errors
+    /// A pair potential without an integral; a free energy too large to be differentiated twice.
+    pub fn new(fluid: &Fluid) -> Result<MeanField, TheoryError> {
+        let count = fluid.species.len();
+        let d = fluid.dimensions;
+        let kernels = fluid
+            .densities
+            .iter()
+            .map(|density| {
+                let kernel = density.kernel;
+                Radial::new(d, kernel.range(), |r| kernel.value(r)).ok_or_else(|| {
+                    TheoryError::NotIntegrable(density.name.clone(), "its particles".to_owned())
+                })
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        let mut pairs = Vec::new();
+        let mut pair_integrals = vec![0.0; count * count];
+        for term in &fluid.pairs {
+            let [a, b] = term.between;
+            let radial = Radial::new(d, term.potential.range(), |r| term.potential.at(r).0)
+                .filter(|radial| radial.moment(0).is_finite())
+                .ok_or_else(|| {
+                    TheoryError::NotIntegrable(fluid.species[a].clone(), fluid.species[b].clone())
+                })?;
+            pair_integrals[a * count + b] += radial.moment(0);
+            if a != b {
+                pair_integrals[b * count + a] += radial.moment(0);
+            }
+            pairs.push((term.between, radial));
+        }
+        let shift = (0..count)
+            .map(|alpha| {
+                let mut shift = vec![0.0; fluid.variables()];
+                for (i, density) in fluid.densities.iter().enumerate() {
+                    // A corrected density means ⟨ρ̃⟩ = ρ, with or without self term.
+                    let identity =
+                        density.correction[alpha * count + alpha] == crate::model::Polynomial::identity();
+                    if density.includes_self && identity {
+                        shift[i * count + alpha] = density.kernel.value(0.0);
+                    }
+                }
+                shift
+            })
+            .collect();
+        let mut ranges = [0.0f64, f64::INFINITY];
+        let lengths = fluid.densities.iter().map(|d| d.kernel.range());
+        for range in lengths.chain(fluid.pairs.iter().map(|p| p.potential.range())) {
+            ranges = [ranges[0].max(range), ranges[1].min(range)];
+        }
+        if ranges[0] == 0.0 {
+            ranges = [1.0, 1.0];
+        }
+        Ok(MeanField {
+            dimensions: d,
+            kt: fluid.kt,
+            species: fluid.species.clone(),
+            free_energy: FreeEnergy::new(fluid)?,
+            shift,
+            kernels,
+            pairs,
+            pair_integrals,
+            ranges,
+        })
+    }
+
+    /// kT.
+    pub fn kt(&self) -> f64 {
+        self.kt
+    }
+
+    /// 2 or 3.
+    pub fn dimensions(&self) -> usize {
+        self.dimensions
+    }
+
+    /// The names of the species.
+    pub fn species(&self) -> &[String] {
+        &self.species
+    }
+
+    /// `[φ_αβ] = ∫ φ_αβ d^dr`, row-major and symmetric; 0 where no pair potential acts.
+    pub fn pair_integrals(&self) -> &[f64] {
+        &self.pair_integrals
+    }
+
+    /// `ψ_α` and its derivatives in the bulk; NaN outside its domain.
+    pub(super) fn psi(&self, alpha: usize, densities: &[f64]) -> Psi {
+        let count = self.species.len();
+        let at: Vec<f64> =
+            self.shift[alpha].iter().enumerate().map(|(v, shift)| densities[v % count] + shift).collect();
+        let mut psi = self.free_energy.at(alpha, &at);
+        if !psi.value.is_finite() {
+            // The derivatives of a logarithm go on where it does not.
+            psi.gradient.fill(f64::NAN);
+            psi.hessian.fill(f64::NAN);
+        }
+        psi
+    }
+
+    /// Excess free energy density `f_ex = Σ_α ρ_α ψ_α(ρ) + ½ Σ_αβ [φ_αβ] ρ_α ρ_β`
+    /// (Pagonabarraga–Frenkel eq. 4 in the bulk; Warren eq. 11). A species that is not there
+    /// contributes nothing, even where its ψ is singular.
+    pub fn excess_free_energy_density(&self, densities: &[f64]) -> f64 {
+        let count = self.species.len();
+        let mut f = 0.0;
+        for a in (0..count).filter(|a| densities[*a] != 0.0) {
+            f += densities[a] * self.psi(a, densities).value;
+            for b in 0..count {
+                f += 0.5 * self.pair_integrals[a * count + b] * densities[a] * densities[b];
+            }
+        }
+        f
+    }
+
+    /// Free energy density `f = f_ex + kT Σ_α ρ_α (ln ρ_α − 1)`; the thermal wavelength is 1.
+    pub fn free_energy_density(&self, densities: &[f64]) -> f64 {
+        let ideal = |rho: f64| if rho == 0.0 { 0.0 } else { rho * (rho.ln() - 1.0) };
+        let ideal: f64 = densities.iter().map(|rho| ideal(*rho)).sum();
+        self.kt * ideal + self.excess_free_energy_density(densities)
+    }
+
+    /// `∂f_ex/∂ρ_s = ψ_s + Σ_α ρ_α ∂ψ_α/∂ρ_s + Σ_β [φ_sβ] ρ_β`.
+    pub fn excess_chemical_potentials(&self, densities: &[f64]) -> Vec<f64> {
+        let count = self.species.len();
+        let mut mu = vec![0.0; count];
+        for alpha in 0..count {
+            let psi = self.psi(alpha, densities);
+            mu[alpha] += psi.value;
+            for (beta, rho) in densities.iter().enumerate() {
+                mu[alpha] += self.pair_integrals[alpha * count + beta] * rho;
+            }
+            if densities[alpha] != 0.0 {
+                for (v, slope) in psi.gradient.iter().enumerate() {
+                    mu[v % count] += densities[alpha] * slope;
+                }
+            }
+        }
+        mu
+    }
+
+    /// Chemical potentials `μ_s = kT ln ρ_s + ∂f_ex/∂ρ_s`.
+    pub fn chemical_potentials(&self, densities: &[f64]) -> Vec<f64> {
+        let mut mu = self.excess_chemical_potentials(densities);
+        for (mu, rho) in mu.iter_mut().zip(densities) {
+            *mu += self.kt * rho.ln();
+        }
+        mu
+    }
+
+    /// Pressure `p = Σ_s ρ_s μ_s − f`. The ideal part is `ρkT`, the ψ part
+    /// `Σ_α ρ_α Σ_s ρ_s ∂ψ_α/∂ρ_s` and the pair part `½ Σ [φ] ρρ`: for one species
+    /// `p = ρkT + ρ²ψ′(ρ) + ½[φ]ρ²` (Pagonabarraga–Frenkel eq. 8; Warren eq. 8), which is also the
+    /// virial with `g(r) = 1` (eq. 10).
+    pub fn pressure(&self, densities: &[f64]) -> f64 {
+        let count = self.species.len();
+        let mut p = 0.0;
+        for a in (0..count).filter(|a| densities[*a] != 0.0) {
+            p += densities[a] * self.kt;
+            let psi = self.psi(a, densities);
+            let slopes: f64 = psi.gradient.iter().enumerate().map(|(v, g)| densities[v % count] * g).sum();
+            p += densities[a] * slopes;
+            for b in 0..count {
+                p += 0.5 * self.pair_integrals[a * count + b] * densities[a] * densities[b];
+            }
+        }
+        p
+    }
+
+    /// `∂²f_ex/∂ρ_s∂ρ_t = ∂ψ_s/∂ρ_t + ∂ψ_t/∂ρ_s + Σ_α ρ_α ∂²ψ_α/∂ρ_s∂ρ_t + [φ_st]`, row-major.
+    pub fn excess_second_derivatives(&self, densities: &[f64]) -> Vec<f64> {
+        self.interaction_kernel(densities, 0.0)
+    }
+
+    /// `f_st = ∂²f/∂ρ_s∂ρ_t`, row-major: [`MeanField::excess_second_derivatives`] and `kT/ρ_s` on the
+    /// diagonal. The mixture is locally stable while the matrix is positive definite.
+    pub fn second_derivatives(&self, densities: &[f64]) -> Vec<f64> {
+        let count = self.species.len();
+        let mut f = self.excess_second_derivatives(densities);
+        for (s, rho) in densities.iter().enumerate() {
+            f[s * count + s] += self.kt / rho;
+        }
+        f
+    }
+
+    /// `∂p/∂ρ` at fixed temperature and composition, `Σ_st x_s ρ_t f_st`; for one species
+    /// `kT + ρ f_ex″`. `1/(ρ ∂p/∂ρ)` is the compressibility.
+    pub fn pressure_slope(&self, densities: &[f64]) -> f64 {
+        let count = self.species.len();
+        let total: f64 = densities.iter().sum();
+        let f = self.excess_second_derivatives(densities);
+        let mut slope = self.kt;
+        for s in (0..count).filter(|s| densities[*s] != 0.0) {
+            for t in (0..count).filter(|t| densities[*t] != 0.0) {
+                slope += densities[s] / total * densities[t] * f[s * count + t];
+            }
+        }
+        slope
+    }
+
+    /// The total densities that coexistence and stability are looked for at, for species in the
+    /// proportions of `composition`: logarithmic from `1e-6` to `1e6` particles in the cube of the
+    /// longest range, up to the first singularity of ψ and denser towards it.
+    pub(super) fn density_grid(&self, composition: &[f64]) -> Vec<f64> {
+        let unit = self.ranges[0].powi(-(self.dimensions as i32));
+        let (low, high) = ((1e-6 * unit).ln(), (1e6 * unit).ln());
+        let all: Vec<f64> = spaced(low, high, 1200).into_iter().map(f64::exp).collect();
+        let pole = singular::first_along(self, composition, &all);
+        let Some(pole) = pole else {
+            return all;
+        };
+        let mut grid: Vec<f64> = all.into_iter().filter(|rho| *rho < 0.5 * pole).collect();
+        grid.extend((0..240).map(|i| pole * (1.0 - 0.5 * 2f64.powf(-(i as f64) / 8.0))));
+        grid
+    }
+
+    /// # Errors
+    /// Another number of species than `expected`.
+    pub(super) fn require_species(&self, expected: usize) -> Result<(), TheoryError> {
+        let found = self.species.len();
+        if found == expected { Ok(()) } else { Err(TheoryError::Species { expected, found }) }
+    }
+}

@@ -1,0 +1,85 @@
+//! Mean field of a fluid: equation of state, stability, coexistence, interfaces.
+//!
+//! Everything starts from one free energy density, the continuum limit of the Hamiltonian with
+//! correlations left out (Pagonabarraga and Frenkel, J. Chem. Phys. 115, 5015 (2001), eq. 4 and 24;
+//! Warren, Phys. Rev. E 68, 066702 (2003), eq. 8):
+//!
+//! ```text
+//! F[ρ] = ∫ kT Σ_α ρ_α (ln ρ_α − 1) + Σ_α ρ_α ψ_α(w∗ρ) + ½ Σ_αβ ρ_α (φ_αβ∗ρ_β)
+//! ```
+//!
+//! in bulk, [`MeanField`], and its second functional derivative, [`Stability`]. Leaving out the
+//! correlations is the only approximation of the bulk theory; it is not a small one for strong
+//! interactions (Warren, sec. III), so what is printed here is a guide for a simulation and not a
+//! replacement. The interfaces add the square-gradient expansion, [`Interface`].
+//!
+//! # Corrected densities
+//!
+//! Trofimov et al., J. Chem. Phys. 117, 9383 (2002), calibrate `ρ̃(n)` so that the mean of the corrected
+//! density is the bulk density, `⟨ρ̃⟩ = ρ`. The theory takes the calibration at its word: where a model
+//! has a correction, ψ is evaluated at the bulk densities themselves, and the correction enters nowhere.
+//! Without a correction the variable is `ρ_β`, plus `w(0)` for a particle's own species where the model
+//! counts the self term.
+
+mod binary;
+mod free_energy;
+mod interface;
+mod limit;
+mod line;
+mod mean_field;
+mod one_component;
+mod radial;
+mod search;
+mod singular;
+mod stability;
+
+pub use binary::{CompositionBinodal, CompositionCritical, composition_critical_point};
+pub use interface::Interface;
+pub use limit::{NoLimit, Structure, thermodynamic_limit};
+pub use mean_field::MeanField;
+pub use one_component::{Binodal, CriticalPoint, critical_point, critical_point_of_model};
+pub use singular::{Singularity, SingularityKind, singular_densities};
+pub use stability::Stability;
+
+use crate::document::FileError;
+
+/// Why the theory has no answer.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TheoryError {
+    /// The model cannot be had at the temperature asked for.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// A derivative of ψ has too many operations.
+    #[error("the free energy of species {0} is too large to be differentiated twice")]
+    TooLarge(String),
+    /// `∫φ` does not exist, or cannot be had by quadrature.
+    #[error("the pair potential between {0} and {1} has no integral: mean field does not apply to it")]
+    NotIntegrable(String, String),
+    /// The question is about another number of species.
+    #[error("needs a fluid of {expected} species, this one has {found}")]
+    Species {
+        /// How many the question is about.
+        expected: usize,
+        /// How many there are.
+        found: usize,
+    },
+    /// Nothing between the limits of the search changes from stable to unstable.
+    #[error("no critical point for control parameters between {0} and {1}")]
+    NoCriticalPoint(f64, f64),
+    /// The fluid is stable everywhere, or a phase has no partner.
+    #[error("no two phases coexist")]
+    NoCoexistence,
+    /// The gradient coefficient is not positive between the two phases, so that the square-gradient
+    /// free energy favours interfaces (Pagonabarraga and Frenkel, text after eq. 30).
+    #[error("the square-gradient coefficient is {coefficient} at {at}: no stable planar interface")]
+    GradientNotPositive {
+        /// Density or composition.
+        at: f64,
+        /// κ there.
+        coefficient: f64,
+    },
+}
+
+#[cfg(test)]
+mod tests;

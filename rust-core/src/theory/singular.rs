@@ -1,0 +1,101 @@
+use super::search::{minimum, spaced, turning_point};
+use super::{MeanField, TheoryError};
+use crate::model::Fluid;
+
+/// A density at which ψ or its derivative is not a finite number.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Singularity {
+    /// Whose `ψ_α`.
+    pub species: usize,
+    /// The total density, of species in the proportions that were asked for.
+    pub density: f64,
+    /// What happens there.
+    pub kind: SingularityKind,
+}
+
+/// What happens at a [`Singularity`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SingularityKind {
+    /// At density zero: an isolated particle has no finite force or energy, as with `ln n` and `1/n`.
+    Origin,
+    /// ψ′ grows without bound from both sides.
+    Pole,
+    /// ψ or ψ′ is not a number, or overflows, on one side: the edge of what the formula is defined for,
+    /// as `n = 1/b` of `ln(1 − bn)` (Pagonabarraga–Frenkel eq. 24).
+    Edge,
+}
+
+/// The singularities of every `ψ_α` for total densities in `range`, along the line of species in the
+/// proportions of `composition` (every species present in it). Found by scanning 4000 densities and
+/// refining, so a pair of singularities closer than `range/4000` may be missed.
+///
+/// # Errors
+/// As [`MeanField::new`].
+pub fn singular_densities(
+    fluid: &Fluid,
+    composition: &[f64],
+    range: [f64; 2],
+) -> Result<Vec<Singularity>, TheoryError> {
+    let theory = MeanField::new(fluid)?;
+    let grid = spaced(range[0].max(0.0), range[1], 4000);
+    Ok((0..fluid.species.len()).flat_map(|alpha| along(&theory, alpha, composition, &grid)).collect())
+}
+
+/// The first singularity above density zero along a composition.
+pub fn first_along(theory: &MeanField, composition: &[f64], grid: &[f64]) -> Option<f64> {
+    (0..composition.len())
+        .filter(|alpha| composition[*alpha] > 0.0)
+        .flat_map(|alpha| along(theory, alpha, composition, grid))
+        .map(|s| s.density)
+        .min_by(f64::total_cmp)
+}
+
+fn along(theory: &MeanField, alpha: usize, composition: &[f64], grid: &[f64]) -> Vec<Singularity> {
+    let total: f64 = composition.iter().sum();
+    // How steep ψ is; infinite where it is not defined.
+    let steepness = |rho: f64| {
+        let densities: Vec<f64> = composition.iter().map(|x| x / total * rho).collect();
+        let psi = theory.psi(alpha, &densities);
+        let slope = psi.gradient.iter().map(|g| g.abs()).sum::<f64>();
+        if psi.value.is_finite() && slope.is_finite() { slope } else { f64::INFINITY }
+    };
+    let values: Vec<f64> = grid.iter().map(|rho| steepness(*rho)).collect();
+    let found = |density, kind| Singularity { species: alpha, density, kind };
+    let mut all = Vec::new();
+    for i in 0..grid.len() {
+        if !values[i].is_finite() && grid[i] == 0.0 {
+            all.push(found(0.0, SingularityKind::Origin));
+        }
+        if i == 0 {
+            continue;
+        }
+        match (values[i - 1].is_finite(), values[i].is_finite()) {
+            (true, false) | (false, true) if grid[i - 1] > 0.0 => {
+                let edge = turning_point(grid[i - 1], grid[i], |rho| steepness(rho).is_finite());
+                // A pole that happens to be a grid point looks like two edges.
+                let pole = all.last().is_some_and(|s: &Singularity| {
+                    s.kind == SingularityKind::Edge && (edge - s.density).abs() < 1e-12 * edge
+                });
+                if pole {
+                    all.pop();
+                }
+                all.push(found(edge, if pole { SingularityKind::Pole } else { SingularityKind::Edge }));
+            }
+            // A peak of the steepness that grows without bound when looked at closer.
+            (true, true)
+                if i + 1 < grid.len()
+                    && values[i + 1].is_finite()
+                    && values[i] > 0.0
+                    && values[i] >= values[i - 1]
+                    && values[i] >= values[i + 1] =>
+            {
+                let (place, value) = minimum(grid[i - 1], grid[i + 1], |rho| -steepness(rho));
+                if -value > 1e5 * values[i - 1].min(values[i + 1]).max(f64::MIN_POSITIVE) {
+                    all.push(found(place, SingularityKind::Pole));
+                }
+            }
+            _ => {}
+        }
+    }
+    all
+}

@@ -1,0 +1,240 @@
+//! The fuzzing corpus and mutations of it as an ordinary, bounded test: no text may bring the readers
+//! down, keep them busy, or eat memory.
+
+use proptest::prelude::*;
+use psidpd_core::engine::Engine;
+use psidpd_core::model::Model;
+use psidpd_core::model::expression::{Ast, Expansion, Formula, Variables};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// For each target; the whole test stays below 20 seconds.
+const BUDGET: Duration = Duration::from_secs(8);
+
+/// The longest that one text may take.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+fn corpus(folders: &[&str]) -> Vec<Vec<u8>> {
+    let mut files: Vec<_> = folders
+        .iter()
+        .flat_map(|f| std::fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join(f)).unwrap())
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.is_file())
+        .collect();
+    files.sort();
+    assert!(files.len() > 5);
+    files.iter().map(|f| std::fs::read(f).unwrap()).collect()
+}
+
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, n: usize) -> usize {
+        // xorshift64* (Vigna 2016)
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        (self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 33) as usize % n.max(1)
+    }
+}
+
+const TOKENS: &[&str] = &[
+    "(",
+    ")",
+    "[",
+    "]",
+    "{",
+    "}",
+    "[[",
+    "]]",
+    "\"",
+    "\"\"\"",
+    "'",
+    "=",
+    ",",
+    ".",
+    "|",
+    "#",
+    "\n",
+    "^",
+    "*",
+    "/",
+    "-",
+    "+",
+    "1e308",
+    "-1",
+    "0",
+    "9223372036854775808",
+    "nan",
+    "inf",
+    "0.0",
+    "ln",
+    "exp(",
+    "min(",
+    "n",
+    "n_A",
+    "rho",
+    "kT",
+    "pi",
+    "\u{0}",
+    "\u{fffd}",
+    "²",
+    "title",
+    "species",
+    "density",
+    "pair",
+    "kernel",
+    "range",
+    "bounds",
+    "table",
+    "pressure",
+    "= \"/dev/zero\"",
+    "= \".\"",
+    "correction",
+    "[0, 1]",
+    "true",
+];
+
+/// One to eight changes: bytes, pieces taken out, repeated or from another text, tokens put in.
+fn mutate(text: &[u8], other: &[u8], random: &mut Random) -> Vec<u8> {
+    let mut text = text.to_vec();
+    for _ in 0..=random.below(8) {
+        let at = random.below(text.len() + 1);
+        let end = (at + random.below(40)).min(text.len());
+        match random.below(7) {
+            0 => {
+                if let Some(byte) = text.get_mut(at) {
+                    *byte ^= 1 << random.below(8);
+                }
+            }
+            1 => {
+                text.drain(at..end);
+            }
+            2 => {
+                let piece = text[at..end].repeat(1 + random.below(20));
+                text.splice(at..at, piece);
+            }
+            3 => {
+                let from = random.below(other.len() + 1);
+                let to = (from + random.below(200)).min(other.len());
+                text.splice(at..at, other[from..to].iter().copied());
+            }
+            4 => {
+                let token =
+                    TOKENS[random.below(TOKENS.len())].repeat(1 + random.below(3) * random.below(100));
+                text.splice(at..at, token.bytes());
+            }
+            5 => text.truncate(at),
+            _ => {
+                let token = TOKENS[random.below(TOKENS.len())];
+                text.splice(at..end, token.bytes());
+            }
+        }
+    }
+    text
+}
+
+fn run(corpus: &[Vec<u8>], target: impl Fn(&str)) {
+    let patiently = |bytes: &[u8]| {
+        let text = String::from_utf8_lossy(bytes);
+        let start = Instant::now();
+        target(&text);
+        assert!(start.elapsed() < PATIENCE, "{:?} for\n{text}", start.elapsed());
+    };
+    corpus.iter().for_each(|text| patiently(text));
+    let start = Instant::now();
+    let mut random = Random(88_172_645_463_325_252);
+    let mut tried = 0;
+    while start.elapsed() < BUDGET && tried < 300_000 {
+        let (one, other) = (&corpus[random.below(corpus.len())], &corpus[random.below(corpus.len())]);
+        patiently(&mutate(one, other, &mut random));
+        tried += 1;
+    }
+    assert!(tried > 200, "{tried}");
+}
+
+fn model(text: &str) {
+    if let Ok(model) = Model::parse("fuzz.toml", text)
+        && let Ok(fluid) = model.at(1.0)
+        && fluid.variables() <= 8
+        && let Ok(engine) = Engine::new(&fluid)
+    {
+        assert!(!engine.plan().to_string().is_empty());
+    }
+}
+
+fn expression(text: &str) {
+    let Ok(ast) = Ast::parse(text) else { return };
+    let variables = Variables { count: 2, names: [("n".into(), vec![0, 1]), ("m".into(), vec![1])].into() };
+    let constants = [("kT".into(), 1.0), ("a".into(), 0.3)].into();
+    let Ok(formula) = Formula::compile(&ast, &constants, &variables) else { return };
+    let value = formula.value(&[0.7, 1.3]);
+    if let Ok(slope) = formula.derivative(0) {
+        slope.value(&[0.7, 1.3]);
+        assert!(!slope.with_names(&["n", "m"]).to_string().is_empty());
+    }
+    let expanded = Expansion::default().coefficients(&formula, &[0.7, 1.3], &[1])[0];
+    let both = value.abs() < 1e100 && expanded.is_finite();
+    assert!(!both || (value - expanded).abs() <= 1e-6 * value.abs().max(1.0), "{value} {expanded}: {text}");
+}
+
+#[test]
+fn models() {
+    run(&corpus(&["fuzz/corpus/model", "tests/models/good", "tests/models/bad"]), model);
+}
+
+#[test]
+fn expressions() {
+    run(&corpus(&["fuzz/corpus/expression"]), expression);
+}
+
+/// Files that are valid TOML and long in one respect.
+#[test]
+fn long_files_take_no_long_time() {
+    let head = "title = \"t\"\nspecies = [\"A\"]\n";
+    let many = |start: &str, line: &dyn Fn(usize) -> String| {
+        head.to_owned() + start + &(0..20_000).map(line).collect::<String>()
+    };
+    let texts = [
+        many("[parameters]\n", &|k| format!("p{k} = \"p{}\"\n", k + 1)),
+        many("[parameters]\n", &|k| format!("p{k} = {k}\n")),
+        many("", &|k| format!("k{k} = {k}\n")),
+        many("", &|k| format!("[density.d{k}]\nkernel = \"lucy\"\nrange = 1\n")),
+        many("[excess_free_energy]\n", &|k| format!("s{k} = \"0\"\n")),
+        many("", &|_| {
+            "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\nstrength = 1\nrange = 1\n".into()
+        }),
+        many("", &|_| "[[thermostat]]\ngamma = 1\nrange = 1\n".into()),
+        format!(
+            "{head}[density.n]\nkernel = \"lucy\"\nrange = 1\ncorrection = [{}]\n",
+            "1, ".repeat(100_000)
+        ),
+        format!("title = \"t\"\nspecies = [{}]\n", "\"A\", ".repeat(100_000)),
+    ];
+    for text in texts {
+        let start = Instant::now();
+        model(&text);
+        assert!(start.elapsed() < PATIENCE, "{:?} for {}", start.elapsed(), &text[..200]);
+    }
+}
+
+proptest! {
+    #[test]
+    fn any_text_is_a_model_or_an_error(text in "\\PC{0,300}") {
+        model(&text);
+    }
+
+    /// Values of any kind in a model that is right otherwise.
+    #[test]
+    fn any_value_is_right_or_an_error(key in 0..8usize, value in "([-+0-9.eE\\[\\]\"a-z{}=, ]{0,30}|\"[-+*/^()n.0-9a-z ]{0,60}\")") {
+        let mut values = ["3", "[\"A\"]", "\"lucy\"", "1", "[1, 2]", "\"n^2\"", "0", "1"].map(str::to_owned);
+        values[key] = value;
+        let [dimensions, species, kernel, range, bounds, psi, strength, gamma] = values;
+        model(&format!(
+            "title = \"t\"\ndimensions = {dimensions}\nspecies = {species}\n[density.n]\nkernel = {kernel}\n\
+             range = {range}\nbounds = {bounds}\n[excess_free_energy]\nA = {psi}\n[[pair]]\n\
+             between = [\"A\", \"A\"]\nform = \"soft\"\nstrength = {strength}\nrange = 1\n[[thermostat]]\n\
+             gamma = {gamma}\nrange = 1\n"
+        ));
+    }
+}

@@ -1,0 +1,381 @@
+//! Random models: the engine against the plain reference, and both against the Hamiltonian.
+
+use proptest::prelude::*;
+use psidpd_core::engine::{Engine, Images, Newton, Particles, PeriodicBox, Want, reference};
+use psidpd_core::model::{ExcessFreeEnergy, Fluid, Model};
+use std::fmt::Write;
+
+/// A stream of random numbers from a seed: shrinking a model's text would make another model.
+struct Random(u64);
+
+impl Random {
+    fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    fn below(&mut self, n: usize) -> usize {
+        (self.bits() % n as u64) as usize
+    }
+
+    fn within(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * (self.bits() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// A short decimal number, so that a failing model can be read.
+    fn number(&mut self, low: f64, high: f64) -> f64 {
+        (self.within(low, high) * 100.0).round() / 100.0
+    }
+
+    fn pick<'a>(&mut self, from: &'a [String]) -> &'a str {
+        &from[self.below(from.len())]
+    }
+}
+
+/// A smooth function of the variables, neither fast nor large.
+fn expression(random: &mut Random, variables: &[String], depth: usize) -> String {
+    if depth == 0 {
+        return format!("{}*{}", random.number(0.1, 0.5), random.pick(variables));
+    }
+    let a = expression(random, variables, depth - 1);
+    let b = expression(random, variables, depth / 2);
+    match random.below(9) {
+        0 => format!("({a} + {b})"),
+        1 => format!("({a} - {b})"),
+        2 => format!("0.5*({a})*({b})"),
+        3 => format!("tanh({a})"),
+        4 => format!("sin({a} + {b})"),
+        5 => format!("exp(-0.1*({a})^2)"),
+        6 => format!("ln(1 + ({a})^2)"),
+        7 => format!("sqrt(1 + ({a})^2)"),
+        _ => format!("({a})/(1 + ({b})^2)"),
+    }
+}
+
+const KERNELS: [&str; 6] = ["linear", "quadratic", "bell", "lucy", "cubic-spline", "wendland-c2"];
+const NAMES: [&str; 3] = ["A", "B", "C"];
+
+fn model_text(random: &mut Random) -> String {
+    let dimensions = 2 + random.below(2);
+    let species = &NAMES[..1 + random.below(3)];
+    let densities = &["n", "m"][..1 + random.below(2)];
+    let quoted: Vec<String> = species.iter().map(|s| format!("\"{s}\"")).collect();
+    let mut text =
+        format!("title = \"random\"\ndimensions = {dimensions}\nspecies = [{}]\n", quoted.join(", "));
+    // Writing to a String cannot fail.
+    let mut bounded = 0;
+    for name in densities {
+        let kernel = KERNELS[random.below(KERNELS.len())];
+        let _ =
+            writeln!(text, "[density.{name}]\nkernel = \"{kernel}\"\nrange = {}", random.number(0.7, 1.1));
+        let _ = writeln!(text, "self = {}", random.below(2) == 1);
+        let polynomial =
+            |r: &mut Random| format!("[{}, {}, 0.0{}]", r.number(-0.1, 0.5), r.number(0.8, 1.2), r.below(3));
+        match random.below(3) {
+            0 => {}
+            1 => {
+                let _ = writeln!(text, "correction = {}", polynomial(random));
+            }
+            _ => {
+                let (a, b) = (species[0], species[species.len() - 1]);
+                let (one, two) = (polynomial(random), polynomial(random));
+                let other = if a == b { String::new() } else { format!(", \"{b}|{a}\" = {two}") };
+                let _ = writeln!(text, "correction = {{ \"{a}|{b}\" = {one}{other} }}");
+            }
+        }
+        // Every bounded variable triples the terms of the reference, whose derivatives are symbolic.
+        if bounded + species.len() <= 4 && random.below(3) > 0 {
+            bounded += species.len();
+            let typical = 4.0 / species.len() as f64;
+            let (low, high) = (random.number(0.3, 0.9) * typical, random.number(1.0, 1.5) * typical);
+            let below = ["linear", "constant"][random.below(2)];
+            let _ = writeln!(text, "bounds = [{low:.3}, {high:.3}]\nbelow = \"{below}\"");
+        }
+    }
+    let _ = writeln!(text, "[excess_free_energy]");
+    let variables: Vec<String> = densities
+        .iter()
+        .flat_map(|d| std::iter::once((*d).to_owned()).chain(species.iter().map(move |s| format!("{d}_{s}"))))
+        .collect();
+    for name in species {
+        let density = densities[random.below(densities.len())];
+        let psi = match random.below(6) {
+            0 if species.len() == 1 => format!(
+                "{{ pressure = \"rho*kT/(1 - 0.0{}*rho) - {}*rho^2\", density = \"{density}\" }}",
+                1 + random.below(3),
+                random.number(0.1, 2.0)
+            ),
+            1 => format!("{{ table = \"psi.csv\", density = \"{density}\" }}"),
+            _ => {
+                let depth = 1 + random.below(3);
+                let (first, second) =
+                    (expression(random, &variables, depth), expression(random, &variables, 1));
+                format!("\"{}*({first}) + {second}\"", random.number(1.0, 5.0))
+            }
+        };
+        let _ = writeln!(text, "{name} = {psi}");
+    }
+    for a in 0..species.len() {
+        for b in a..species.len() {
+            let _ = writeln!(text, "[[pair]]\nbetween = [\"{}\", \"{}\"]", species[a], species[b]);
+            let _ = match random.below(4) {
+                0 => writeln!(
+                    text,
+                    "form = \"spline\"\nstrength = 9.5\nA = 2\nB = 1\nrange_A = 0.8\nrange_B = 1.0"
+                ),
+                1 => writeln!(text, "form = \"expression\"\nphi = \"4*(1 - r^2)^3\"\nrange = 1"),
+                2 => writeln!(text, "form = \"table\"\nfile = \"phi.txt\""),
+                _ => {
+                    writeln!(text, "form = \"soft\"\nstrength = {}\nrange = 0.9", random.number(-20.0, 40.0))
+                }
+            };
+        }
+    }
+    text
+}
+
+struct Configuration {
+    domain: PeriodicBox,
+    x: Vec<[f64; 3]>,
+    species: Vec<usize>,
+}
+
+/// Distances at which a kernel or a pair potential of the random models is not smooth.
+fn kinks(fluid: &Fluid) -> Vec<f64> {
+    let ranges = fluid.densities.iter().map(|d| d.kernel.range()).chain([0.8, 0.9, 1.0]);
+    ranges.flat_map(|r| [r, 0.5 * r]).collect()
+}
+
+fn configuration(random: &mut Random, fluid: &Fluid) -> Configuration {
+    let depth = if fluid.dimensions == 2 { 1.0 } else { random.within(1.4, 2.2) };
+    let edges = nalgebra::Matrix3::new(
+        random.within(2.0, 3.0),
+        random.within(-0.4, 0.4),
+        if fluid.dimensions == 2 { 0.0 } else { random.within(-0.4, 0.4) },
+        0.0,
+        random.within(2.0, 3.0),
+        if fluid.dimensions == 2 { 0.0 } else { random.within(-0.4, 0.4) },
+        0.0,
+        0.0,
+        depth,
+    );
+    let domain = PeriodicBox::new([-1.0, 0.5, 2.0], edges, [true, true, fluid.dimensions == 3]).unwrap();
+    let count = (4.0 * domain.volume(fluid.dimensions)).min(45.0) as usize;
+    let mut x: Vec<[f64; 3]> = Vec::new();
+    while x.len() < count {
+        let z = if fluid.dimensions == 2 { 0.0 } else { random.within(0.0, 1.0) };
+        let point = domain.point([random.within(0.0, 1.0), random.within(0.0, 1.0), z]);
+        // The densities have a cusp where two particles meet.
+        let apart = |other: &[f64; 3]| {
+            domain.minimum_image(point, *other).iter().map(|c| c * c).sum::<f64>() > 0.05f64.powi(2)
+        };
+        if x.iter().all(apart) {
+            x.push(point);
+        }
+    }
+    Configuration { species: (0..count).map(|_| random.below(fluid.species.len())).collect(), x, domain }
+}
+
+struct Outcome {
+    energy: f64,
+    forces: Vec<[f64; 3]>,
+    virial: [f64; 6],
+    densities: Vec<f64>,
+}
+
+fn run_engine(fluid: &Fluid, c: &Configuration, newton: Newton) -> Outcome {
+    let mut engine = Engine::new(fluid).unwrap();
+    engine.sum_all_densities(true);
+    let owned = c.x.len();
+    let mut images = Images::default();
+    let mut x = c.x.clone();
+    let mut tag: Vec<i32> = (1..=owned as i32).collect();
+    let mut kind: Vec<i32> = c.species.iter().map(|s| *s as i32).collect();
+    images.build(&c.domain, fluid.dimensions, fluid.cutoff(), owned, &mut x);
+    images.forward(1, &mut tag);
+    images.forward(1, &mut kind);
+    let particles = Particles { owned, x: &x, tag: &tag, kind: &kind };
+    engine.densities(&particles, newton).unwrap();
+    let width = engine.slope_width();
+    engine.slopes_mut().truncate(owned * width);
+    images.forward(width, engine.slopes_mut());
+    let mut forces = vec![[0.0; 3]; x.len()];
+    let tally = engine.forces(&particles, &[], None, Want::ALL, &mut forces).unwrap();
+    if newton == Newton::On {
+        images.reverse(&mut forces);
+    }
+    forces.truncate(owned);
+    Outcome {
+        energy: tally.energy(),
+        forces,
+        virial: tally.virial,
+        densities: engine.local_densities().to_vec(),
+    }
+}
+
+/// On which side of every kink everything is: pairs of the kinks of kernels and pair potentials,
+/// particles of their bounds and of the rows of their tables.
+fn sides(fluid: &Fluid, x: &[[f64; 3]], c: &Configuration, domain: &PeriodicBox, n: &[Vec<f64>]) -> Vec<i64> {
+    let mut sides = Vec::new();
+    let kinks = kinks(fluid);
+    let images = if fluid.dimensions == 3 { -2..=2 } else { 0..=0 };
+    for i in 0..x.len() {
+        for j in 0..i {
+            for (a, b, k) in (-2..=2)
+                .flat_map(|a| (-2..=2).flat_map(move |b| [(a, b)]))
+                .flat_map(|(a, b)| images.clone().map(move |k: i32| (a, b, k)))
+            {
+                let r2: f64 = (0..3)
+                    .map(|m| {
+                        let shift = f64::from(a) * domain.edge(0)[m]
+                            + f64::from(b) * domain.edge(1)[m]
+                            + f64::from(k) * domain.edge(2)[m];
+                        (x[i][m] - x[j][m] + shift).powi(2)
+                    })
+                    .sum();
+                if r2 < 1.21 {
+                    sides.push(kinks.iter().filter(|r| *r * *r > r2).count() as i64);
+                }
+            }
+        }
+    }
+    let count = fluid.species.len();
+    for (i, n) in n.iter().enumerate() {
+        let alpha = c.species[i];
+        for (d, density) in fluid.densities.iter().enumerate() {
+            let corrected: Vec<f64> = (0..count)
+                .map(|beta| density.correction[alpha * count + beta].at(n[d * count + beta]).0)
+                .collect();
+            let total: f64 = corrected.iter().sum();
+            if let Some(bounds) = density.bounds {
+                sides.extend(
+                    corrected.iter().chain([&total]).map(|n| bounds.beyond(*n).total_cmp(&0.0) as i64),
+                );
+            }
+            if matches!(fluid.excess[alpha], ExcessFreeEnergy::Curve(_)) {
+                sides.push((2.0 * total).floor() as i64);
+            }
+        }
+    }
+    sides
+}
+
+/// The fourth-order central difference of the energy, or `None` if it reaches across a kink.
+fn difference(
+    fluid: &Fluid,
+    c: &Configuration,
+    h: f64,
+    moved: impl Fn(f64) -> (Vec<[f64; 3]>, PeriodicBox),
+) -> Option<f64> {
+    let mut energies = [0.0; 5];
+    let mut first = None;
+    for (energy, step) in energies.iter_mut().zip([-2.0, -1.0, 0.0, 1.0, 2.0]) {
+        let (x, domain) = moved(step * h);
+        let here = reference::evaluate(fluid, &x, &c.species, &domain).unwrap();
+        *energy = here.energy;
+        let sides = sides(fluid, &x, c, &domain, &here.densities);
+        if *first.get_or_insert_with(|| sides.clone()) != sides {
+            return None;
+        }
+    }
+    let [a, b, _, d, e] = energies;
+    Some((8.0 * (d - b) - (e - a)) / (12.0 * h))
+}
+
+fn load(seed: u64) -> (String, Fluid, Random) {
+    let mut random = Random(seed);
+    let text = model_text(&mut random);
+    let name = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/models/good/random.toml");
+    let model = Model::parse(name, &text).unwrap_or_else(|e| panic!("{e}\n{text}"));
+    let fluid = model.at(random.number(0.5, 2.0)).unwrap_or_else(|e| panic!("{e}\n{text}"));
+    (text, fluid, random)
+}
+
+/// `a = b` to a fraction of `scale`.
+fn close(a: f64, b: f64, scale: f64) -> bool {
+    (a - b).abs() <= scale
+}
+
+fn equals_reference(seed: u64) {
+    let (text, fluid, mut random) = load(seed);
+    let c = configuration(&mut random, &fluid);
+    let truth = reference::evaluate(&fluid, &c.x, &c.species, &c.domain).unwrap();
+    let largest = truth.forces.iter().flatten().fold(1.0f64, |m, f| m.max(f.abs()));
+    let size = truth.virial.iter().fold(1.0f64, |m, w| m.max(w.abs()));
+    for newton in [Newton::On, Newton::Off] {
+        let found = run_engine(&fluid, &c, newton);
+        let scale = 1e-12 * truth.energy.abs().max(c.x.len() as f64);
+        assert!(close(found.energy, truth.energy, scale), "{} {}\n{text}", found.energy, truth.energy);
+        for (f, g) in found.forces.iter().flatten().zip(truth.forces.iter().flatten()) {
+            assert!(close(*f, *g, 1e-12 * largest), "force {f} {g}, largest {largest}\n{text}");
+        }
+        for (f, g) in found.virial.iter().zip(truth.virial) {
+            assert!(close(*f, g, 1e-12 * size), "virial {f} {g}\n{text}");
+        }
+        for (f, g) in found.densities.iter().zip(truth.densities.iter().flatten()) {
+            assert!(close(*f, *g, 1e-12 * g.abs().max(1.0)), "density {f} {g}\n{text}");
+        }
+    }
+}
+
+/// How many of the differences could be taken.
+fn is_gradient(seed: u64) -> usize {
+    let (text, fluid, mut random) = load(seed);
+    let c = configuration(&mut random, &fluid);
+    let here = run_engine(&fluid, &c, Newton::On);
+    let mut taken = 0;
+    let largest = here.forces.iter().flatten().fold(1.0f64, |m, f| m.max(f.abs()));
+    for _ in 0..4 {
+        let (i, k) = (random.below(c.x.len()), random.below(fluid.dimensions));
+        let found = difference(&fluid, &c, 2e-4, |h| {
+            let mut x = c.x.clone();
+            x[i][k] += h;
+            (x, c.domain.clone())
+        });
+        if let Some(found) = found {
+            taken += 1;
+            let force = here.forces[i][k];
+            assert!(close(force, -found, 1e-7 * largest), "force {force} against {}\n{text}", -found);
+        }
+    }
+    let size = here.virial.iter().fold(1.0f64, |m, w| m.max(w.abs()));
+    for (w, a, b) in [(0, 0, 0), (1, 1, 1), (3, 0, 1)] {
+        let found = difference(&fluid, &c, 5e-5, |h| {
+            // x_a → x_a + h x_b, box and particles alike.
+            let strain = |p: [f64; 3]| {
+                let mut q = p;
+                q[a] += h * p[b];
+                q
+            };
+            let edges = nalgebra::Matrix3::from_columns(&std::array::from_fn::<_, 3, _>(|k| {
+                nalgebra::Vector3::from(strain(c.domain.edge(k)))
+            }));
+            let domain = PeriodicBox::new(strain(c.domain.origin()), edges, c.domain.periodic()).unwrap();
+            (c.x.iter().map(|p| strain(*p)).collect(), domain)
+        });
+        if let Some(found) = found {
+            taken += 1;
+            let virial = here.virial[w];
+            assert!(close(virial, -found, 1e-7 * size), "virial {virial} against {}\n{text}", -found);
+        }
+    }
+    taken
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 64, max_shrink_iters: 0, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn engine_equals_reference(seed: u64) {
+        equals_reference(seed);
+    }
+}
+
+#[test]
+fn forces_and_virials_are_gradients() {
+    let taken: usize = (0..50).map(|seed| is_gradient(1000 + seed)).sum();
+    // Most differences must not have been skipped.
+    assert!(taken > 120, "{taken}");
+}

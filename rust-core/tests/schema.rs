@@ -1,0 +1,341 @@
+//! The JSON schema and the reference of the model file: written from the table of keys, current, and
+//! true of the reader.
+
+use psidpd_core::model::Model;
+use psidpd_core::model::keys::{
+    CURVES, DENSITY, EXCESS, FORMS, Key, PAIR, PARAMETERS, TABLES, THERMOSTAT, TOP, Table, ValueKind,
+};
+use serde_json::{Map, Value, json};
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+/// Keys that only one form of a pair has, or all keys of other tables.
+fn keys_of<'a>(table: &'a Table, form: Option<&'a str>) -> impl Iterator<Item = &'a Key> {
+    table.keys.iter().filter(move |k| k.forms.is_empty() || form.is_none_or(|f| k.forms.contains(&f)))
+}
+
+fn schema_of_value(kind: &ValueKind) -> Value {
+    let number = json!({ "$ref": "#/definitions/number" });
+    let polynomial = json!({ "type": "array", "items": number, "minItems": 1, "maxItems": 16 });
+    match kind {
+        ValueKind::Text | ValueKind::Formula | ValueKind::File => json!({ "type": "string" }),
+        ValueKind::Dimensions => json!({ "enum": [2, 3], "default": 3 }),
+        ValueKind::Flag => json!({ "type": "boolean" }),
+        ValueKind::Number => number,
+        ValueKind::Bounds => json!({ "type": "array", "items": number, "minItems": 2, "maxItems": 2 }),
+        ValueKind::Species => json!({
+            "type": "array", "minItems": 1, "maxItems": 64, "uniqueItems": true,
+            "items": { "type": "string", "minLength": 1 }
+        }),
+        ValueKind::Between => {
+            json!({ "type": "array", "items": { "type": "string" }, "minItems": 2, "maxItems": 2 })
+        }
+        ValueKind::Choice(choices) => json!({ "enum": choices() }),
+        ValueKind::Correction => json!({ "anyOf": [
+            polynomial,
+            { "type": "object", "additionalProperties": polynomial }
+        ]}),
+        ValueKind::Excess => {
+            let mut curve = object(&CURVES, None);
+            curve["oneOf"] = json!([{ "required": ["table"] }, { "required": ["pressure"] }]);
+            json!({ "anyOf": [{ "type": "string" }, curve] })
+        }
+    }
+}
+
+fn object(table: &Table, form: Option<&str>) -> Value {
+    let mut properties = Map::new();
+    let mut required = Vec::new();
+    let mut any_name = json!(false);
+    for key in keys_of(table, form) {
+        let mut schema = schema_of_value(&key.value);
+        // Siblings of a reference are ignored by old readers of schemas.
+        if schema.get("$ref").is_some() {
+            schema = json!({ "allOf": [schema] });
+        }
+        schema["description"] = json!(key.about);
+        if key.name == "form"
+            && let Some(form) = form
+        {
+            schema = json!({ "const": form, "description": key.about });
+        }
+        if key.name.chars().all(|c| c.is_ascii_uppercase()) && key.name.len() > 1 {
+            any_name = schema;
+        } else {
+            properties.insert(key.name.into(), schema);
+        }
+        if key.required {
+            required.push(key.name);
+        }
+    }
+    json!({
+        "type": "object", "description": table.about, "properties": properties, "required": required,
+        "additionalProperties": any_name
+    })
+}
+
+fn schema() -> String {
+    let mut root = object(&TOP, None);
+    root["$schema"] = json!("http://json-schema.org/draft-07/schema#");
+    root["title"] = json!("psidpd model file");
+    root["definitions"] = json!({ "number": {
+        "anyOf": [{ "type": "number" }, { "type": "string", "minLength": 1 }]
+    }});
+    let properties = &mut root["properties"];
+    properties["parameters"] = object(&PARAMETERS, None);
+    properties["density"] = json!({ "type": "object", "description": DENSITY.about, "additionalProperties": object(&DENSITY, None) });
+    properties["excess_free_energy"] = object(&EXCESS, None);
+    let forms: Vec<Value> = FORMS.iter().map(|form| object(&PAIR, Some(form))).collect();
+    properties["pair"] = json!({ "type": "array", "description": PAIR.about, "items": { "oneOf": forms } });
+    properties["thermostat"] =
+        json!({ "type": "array", "description": THERMOSTAT.about, "items": object(&THERMOSTAT, None) });
+    serde_json::to_string_pretty(&root).unwrap() + "\n"
+}
+
+fn reference() -> String {
+    let mut text = "# The model file\n\n\
+        What a model file may say, key by key. A model file is TOML; it says what the particles are and how they\n\
+        interact. Unknown keys are errors. Numbers may be written as formulas of the parameters and `kT`\n\
+        everywhere. Editors that know JSON schemas (taplo, Even Better TOML) complete and check model files\n\
+        with `#:schema model.schema.json` in the first line; the schema is `rust-core/schema/model.schema.json`.\n\n\
+        The examples leave out what every model needs: a title, species (one, `A`), and the density `n` where\n\
+        psi uses it.\n\n\
+        This page is written from the table of keys in `rust-core/src/model/keys.rs`.\n"
+        .to_owned();
+    // Writing to a String cannot fail.
+    for table in TABLES {
+        let heading = match table.path {
+            "" => "Top level".to_owned(),
+            "pair" | "thermostat" => format!("`[[{}]]`", table.path),
+            path if path == CURVES.path => "`SPECIES = { … }` in `[excess_free_energy]`".to_owned(),
+            path => format!("`[{path}]`"),
+        };
+        let _ = write!(text, "\n## {heading}\n\n{}\n", table.about);
+        for key in table.keys {
+            let required = if key.required { ", required" } else { "" };
+            let forms = match key.forms {
+                [] => String::new(),
+                forms => format!(" (form {})", forms.join(", ")),
+            };
+            let _ = write!(
+                text,
+                "\n### `{}`{forms}\n\n*{}{required}.* {}\n\n```toml\n{}\n```\n",
+                key.name,
+                capital(&key.value.describe()),
+                key.about,
+                key.example
+            );
+        }
+    }
+    text
+}
+
+fn capital(text: &str) -> String {
+    let mut chars = text.chars();
+    chars.next().map_or(String::new(), |c| c.to_uppercase().collect::<String>() + chars.as_str())
+}
+
+/// A whole model from an example.
+fn completed(example: &str) -> String {
+    let has = |start: &str| example.lines().any(|l| l.starts_with(start));
+    let mut text = String::new();
+    for (key, line) in [("title", "title = \"example\"\n"), ("species", "species = [\"A\"]\n")] {
+        if !has(key) {
+            text += line;
+        }
+    }
+    text += example;
+    if has("[excess_free_energy]") && !has("[density") {
+        text += "\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n";
+    }
+    text
+}
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Compares a file with what it should be, or writes it if `PSIDPD_UPDATE_SCHEMA` is set.
+fn assert_current(file: &str, expected: &str) {
+    let path = root().join(file);
+    if std::env::var_os("PSIDPD_UPDATE_SCHEMA").is_some() {
+        std::fs::write(&path, expected).unwrap();
+    }
+    let found = std::fs::read_to_string(&path).unwrap_or_default();
+    assert!(
+        found.replace("\r\n", "\n") == expected,
+        "{file} is not current: run this test with PSIDPD_UPDATE_SCHEMA=1"
+    );
+}
+
+#[test]
+fn schema_and_reference_are_current() {
+    assert_current("schema/model.schema.json", &schema());
+    assert_current("../docs/model-file.md", &reference());
+}
+
+/// Checks a value by the part of JSON Schema (draft 7) that the schema uses; a keyword that is not
+/// known here is a panic.
+fn validate(value: &Value, schema: &Value, root: &Value) -> Result<(), String> {
+    let rules = match schema {
+        Value::Bool(true) => return Ok(()),
+        Value::Bool(false) => return Err(format!("{value} may not stand here")),
+        other => other.as_object().unwrap(),
+    };
+    let count = |rule: &Value| rule.as_u64().unwrap() as usize;
+    let list = |rule: &Value| rule.as_array().unwrap().clone();
+    let matching = |rule: &Value| list(rule).iter().filter(|s| validate(value, s, root).is_ok()).count();
+    for (keyword, rule) in rules {
+        let holds = match keyword.as_str() {
+            "$schema" | "title" | "description" | "default" | "definitions" => true,
+            "$ref" => {
+                let pointer = rule.as_str().unwrap().trim_start_matches('#');
+                return validate(value, root.pointer(pointer).unwrap(), root);
+            }
+            "type" => match rule.as_str().unwrap() {
+                "string" => value.is_string(),
+                "number" => value.is_number(),
+                "boolean" => value.is_boolean(),
+                "array" => value.is_array(),
+                "object" => value.is_object(),
+                other => panic!("{other}"),
+            },
+            "const" => value == rule,
+            "enum" => list(rule).contains(value),
+            "minLength" => value.as_str().is_none_or(|s| s.chars().count() >= count(rule)),
+            "minItems" => value.as_array().is_none_or(|a| a.len() >= count(rule)),
+            "maxItems" => value.as_array().is_none_or(|a| a.len() <= count(rule)),
+            "uniqueItems" => value.as_array().is_none_or(|a| (1..a.len()).all(|k| !a[..k].contains(&a[k]))),
+            "items" => {
+                for item in value.as_array().into_iter().flatten() {
+                    validate(item, rule, root)?;
+                }
+                true
+            }
+            "required" => value
+                .as_object()
+                .is_none_or(|o| list(rule).iter().all(|k| o.contains_key(k.as_str().unwrap()))),
+            "properties" => true,
+            "additionalProperties" => {
+                let empty = json!({});
+                let properties = rules.get("properties").unwrap_or(&empty);
+                for (key, value) in value.as_object().into_iter().flatten() {
+                    let schema = properties.get(key).unwrap_or(rule);
+                    validate(value, schema, root).map_err(|e| format!("{key}: {e}"))?;
+                }
+                true
+            }
+            "allOf" => matching(rule) == list(rule).len(),
+            "anyOf" => matching(rule) > 0,
+            "oneOf" => matching(rule) == 1,
+            other => panic!("unknown keyword {other}"),
+        };
+        if !holds {
+            return Err(format!("{value} does not fit {keyword} {rule}"));
+        }
+    }
+    Ok(())
+}
+
+/// Every model file of the project that must load.
+fn models() -> Vec<PathBuf> {
+    let folders = [root().join("tests/models/good"), root().join("../validation/models")];
+    let mut found: Vec<PathBuf> = folders
+        .iter()
+        .filter_map(|folder| std::fs::read_dir(folder).ok())
+        .flatten()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|e| e == "toml"))
+        .collect();
+    found.sort();
+    assert!(found.len() > 8);
+    found
+}
+
+#[test]
+fn every_model_is_valid_by_the_schema() {
+    let schema: Value = serde_json::from_str(&schema()).unwrap();
+    for path in models() {
+        let model: Value = toml::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
+        if let Err(error) = validate(&model, &schema, &schema) {
+            panic!("{}: {error}", path.display());
+        }
+    }
+}
+
+/// The schema finds what it can know of: unknown, missing and mistyped keys.
+#[test]
+fn the_schema_refuses_unknown_and_missing_keys() {
+    let schema: Value = serde_json::from_str(&schema()).unwrap();
+    let folder = root().join("tests/models/bad");
+    let mut refused = 0;
+    for entry in std::fs::read_dir(&folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_stem().unwrap().to_string_lossy().into_owned();
+        let text = std::fs::read_to_string(&path).unwrap();
+        let known = ["unknown_", "missing_"].iter().any(|start| name.starts_with(start))
+            || name.ends_with("_unknown") && !name.starts_with("curve_density");
+        if path.extension().is_some_and(|e| e == "toml") && known {
+            let model: Value = toml::from_str(&text).unwrap();
+            assert!(validate(&model, &schema, &schema).is_err(), "{name}");
+            refused += 1;
+        }
+    }
+    assert!(refused > 12, "{refused}");
+}
+
+#[test]
+fn every_example_of_the_reference_loads() {
+    let page = std::fs::read_to_string(root().join("../docs/model-file.md")).unwrap().replace("\r\n", "\n");
+    let name = root().join("tests/models/good/example.toml");
+    let mut count = 0;
+    for block in page.split("```toml\n").skip(1) {
+        let example = block.split("\n```").next().unwrap();
+        let text = completed(example);
+        let model =
+            Model::parse(&name.display().to_string(), &text).unwrap_or_else(|e| panic!("{e}\n{text}"));
+        model.at(1.0).unwrap_or_else(|e| panic!("{e}\n{text}"));
+        count += 1;
+    }
+    assert_eq!(count, TABLES.iter().map(|t| t.keys.len()).sum::<usize>());
+}
+
+/// The reader, asked for a key that is not there, lists those it knows: they are the table's.
+#[test]
+fn the_reader_knows_the_keys_of_the_table_and_no_others() {
+    let known = |text: &str| -> Vec<String> {
+        let error = Model::parse("m.toml", text).unwrap_err().to_string();
+        let (_, list) = error.split_once("known here: ").unwrap_or_else(|| panic!("{error}\n{text}"));
+        list.trim_end_matches(')').split(", ").map(str::to_owned).collect()
+    };
+    let listed = |table: &Table, form: Option<&str>| {
+        let mut names: Vec<String> = keys_of(table, form).map(|k| k.name.to_owned()).collect();
+        names.sort();
+        names
+    };
+    let head = "title = \"t\"\nspecies = [\"A\"]\n";
+    let mut top = listed(&TOP, None);
+    top.extend(["density", "excess_free_energy", "pair", "parameters", "thermostat"].map(str::to_owned));
+    top.sort();
+    assert_eq!(known(&format!("{head}zzz = 1")), top);
+    let density = "[density.n]\nkernel = \"lucy\"\nrange = 1\n";
+    assert_eq!(known(&format!("{head}{density}zzz = 1")), listed(&DENSITY, None));
+    assert_eq!(
+        known(&format!("{head}{density}[excess_free_energy]\nA = {{ pressure = \"rho\", zzz = 1 }}")),
+        listed(&CURVES, None)
+    );
+    assert_eq!(
+        known(&format!("{head}[[thermostat]]\ngamma = 1\nrange = 1\nzzz = 1")),
+        listed(&THERMOSTAT, None)
+    );
+    for form in FORMS {
+        let keys = match *form {
+            "soft" => "strength = 1\nrange = 1",
+            "spline" => "strength = 1\nA = 1\nB = 1\nrange_A = 1\nrange_B = 1",
+            "expression" => "phi = \"1 - r\"\nrange = 1",
+            _ => "file = \"tests/models/good/phi.txt\"",
+        };
+        let text = format!("{head}[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"{form}\"\n{keys}\nzzz = 1");
+        assert_eq!(known(&text), listed(&PAIR, Some(form)), "{form}");
+    }
+}

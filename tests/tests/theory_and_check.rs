@@ -1,0 +1,87 @@
+//! `check`, `theory` and `export eam` as a user meets them.
+
+use psidpd_tests::{psidpd, root, said};
+use serde_json::Value;
+use std::path::Path;
+
+fn json(folder: &Path, arguments: &[&str], code: i32) -> Value {
+    let mut all = arguments.to_vec();
+    all.extend(["--json", "out.json"]);
+    let output = psidpd(folder, &all);
+    assert_eq!(output.status.code(), Some(code), "{}", said(&output));
+    serde_json::from_str(&std::fs::read_to_string(folder.join("out.json")).unwrap()).unwrap()
+}
+
+fn model(name: &str) -> String {
+    root().join("validation/models").join(name).display().to_string()
+}
+
+#[test]
+fn check_says_what_is_computed_and_refuses_what_cannot_work() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let good = json(here, &["check", &model("warren2003-set6.toml"), "--density", "6.05"], 0);
+    assert!(good["plan"].as_str().unwrap().contains("density pass  n: quadratic kernel"), "{good}");
+    assert_eq!(good["warnings"].as_array().unwrap().len(), 0, "{good}");
+    // Warren eq. 16: p = ρkT + π/30 (A + 2 B r_d⁴ ρ) ρ²
+    let rho: f64 = 6.05;
+    let expected = rho + std::f64::consts::PI / 30.0 * (-40.0 + 50.0 * 0.75f64.powi(4) * rho) * rho * rho;
+    assert!((good["pressure"].as_f64().unwrap() - expected).abs() < 1e-9 * expected);
+
+    // Set 6 without its many-body repulsion is an attraction and nothing else.
+    let text = std::fs::read_to_string(model("warren2003-set6.toml")).unwrap();
+    std::fs::write(here.join("bad.toml"), text.replace("B  = 25.0", "B  = 0.0")).unwrap();
+    let bad = json(here, &["check", "bad.toml", "--density", "6.05"], 1);
+    assert_eq!(bad["warnings"][0]["id"], "no-thermodynamic-limit", "{bad}");
+
+    let scene = root().join("validation/scenes/warren-set6-slab.toml").display().to_string();
+    let of_scene = json(here, &["check", &scene], 0);
+    assert!((of_scene["densities"][0].as_f64().unwrap() - 6.05).abs() < 0.01, "{of_scene}");
+
+    let wrong = psidpd(here, &["check", &model("warren2003-set6.toml"), "--density", "1,2"]);
+    assert_eq!(wrong.status.code(), Some(2), "{}", said(&wrong));
+    assert!(said(&wrong).contains("2 densities for 1 species"), "{}", said(&wrong));
+}
+
+/// The van der Waals fluid has closed forms: kT_c = 8a/27b, ρ_c = 1/3b, p_c = a/27b².
+#[test]
+fn theory_gives_the_critical_point_and_the_binodal_of_van_der_waals() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(
+        folder.path().join("vdw.toml"),
+        "title = \"vdw\"\nspecies = [\"F\"]\n[parameters]\na = 2.0\nb = 0.1\n[density.n]\nkernel = \"quadratic\"\n\
+         range = 1\n[excess_free_energy]\nF = \"-kT*ln(1 - b*n) - a*n\"\n",
+    )
+    .unwrap();
+    let found = json(folder.path(), &["theory", "vdw.toml", "--kT", "5.3", "--density", "3"], 0);
+    let critical = &found["critical_point"];
+    let close = |value: &Value, expected: f64| (value.as_f64().unwrap() / expected - 1.0).abs() < 1e-5;
+    assert!(close(&critical["kT"], 8.0 * 2.0 / 2.7), "{critical}");
+    assert!(close(&critical["density"], 1.0 / 0.3), "{critical}");
+    assert!(close(&critical["pressure"], 2.0 / 0.27), "{critical}");
+    let binodal = &found["binodal"];
+    let pressure = |rho: f64| rho * 5.3 / (1.0 - 0.1 * rho) - 2.0 * rho * rho;
+    for phase in ["vapour", "liquid"] {
+        assert!(close(&binodal["pressure"], pressure(binodal[phase].as_f64().unwrap())), "{binodal}");
+    }
+    let hot = json(folder.path(), &["theory", "vdw.toml", "--kT", "7", "--density", "3"], 0);
+    assert!(hot["binodal"]["none"].is_string(), "{hot}");
+}
+
+#[test]
+fn a_fluid_that_tables_cannot_say_is_refused_with_the_reason() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let output = psidpd(here, &["export", "eam", &model("warren2003-set6.toml"), "--out", "t.eam.alloy"]);
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    assert!(std::fs::read_to_string(here.join("t.eam.alloy")).unwrap().lines().nth(3).unwrap().contains('F'));
+    std::fs::write(
+        here.join("partial.toml"),
+        "title = \"t\"\nspecies = [\"A\", \"B\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n\
+         [excess_free_energy]\nA = \"n_A*n_B\"\nB = \"n^2\"\n",
+    )
+    .unwrap();
+    let output = psidpd(here, &["export", "eam", "partial.toml"]);
+    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+    assert!(said(&output).contains("partial densities of n"), "{}", said(&output));
+}

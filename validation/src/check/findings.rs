@@ -1,0 +1,74 @@
+use psidpd_core::theory::Stability;
+use serde::Serialize;
+
+/// What a check found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Findings {
+    /// Title of the model.
+    pub title: String,
+    /// Where it comes from.
+    pub reference: Option<String>,
+    /// What will be computed.
+    pub plan: String,
+    /// kT.
+    pub kt: f64,
+    /// Number densities of the species.
+    pub densities: Option<Vec<f64>>,
+    /// Mean-field pressure there.
+    pub pressure: Option<f64>,
+    /// Mean-field `∂p/∂ρ` at fixed composition.
+    pub pressure_slope: Option<f64>,
+    /// Mean-field stability there.
+    pub stability: Option<Waves>,
+    /// What cannot work, or may surprise.
+    pub warnings: Vec<Warning>,
+}
+
+/// Stability against waves of density and composition.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Waves {
+    /// Stable at every wave number.
+    pub stable: bool,
+    /// Unstable as `k → 0`.
+    pub spinodal: bool,
+    /// Where `S(k)⁻¹` is smallest, if not at 0.
+    pub k_star: Option<f64>,
+    /// Its smallest value.
+    pub min_inverse_s: f64,
+}
+
+impl From<Stability> for Waves {
+    fn from(s: Stability) -> Waves {
+        Waves { stable: s.stable, spinodal: s.spinodal, k_star: s.k_star, min_inverse_s: s.min_inverse_s }
+    }
+}
+
+/// How bad something is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    /// Good to know.
+    Note,
+    /// May not do what is meant.
+    Warning,
+    /// Cannot work.
+    Error,
+}
+
+/// One thing to know before a run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Warning {
+    /// A short name that does not change.
+    pub id: &'static str,
+    /// How bad it is.
+    pub severity: Severity,
+    /// What, and what to do.
+    pub message: String,
+}
+
+impl Findings {
+    /// Whether the model can work at all.
+    pub fn works(&self) -> bool {
+        self.warnings.iter().all(|w| w.severity < Severity::Error)
+    }
+}

@@ -1,0 +1,74 @@
+//! What can be known of a model before it runs: what will be computed, what mean field says, and what
+//! cannot work.
+
+mod findings;
+mod warnings;
+
+pub use findings::{Findings, Severity, Warning};
+
+use psidpd_core::engine::Plan;
+use psidpd_core::model::{Fluid, Model};
+use psidpd_core::theory::{MeanField, TheoryError};
+
+/// The state at which a model is looked at.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Conditions {
+    /// kT.
+    pub kt: f64,
+    /// Number density of each species; `None` leaves out what depends on it.
+    pub densities: Option<Vec<f64>>,
+}
+
+/// Why a model cannot be checked.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CheckError {
+    /// The model does not hold at the temperature.
+    #[error(transparent)]
+    File(#[from] psidpd_core::document::FileError),
+    /// A derivative grows beyond the limits of the formula engine.
+    #[error(transparent)]
+    TooLarge(#[from] psidpd_core::model::expression::TooLarge),
+    /// Mean field does not apply.
+    #[error(transparent)]
+    Theory(#[from] TheoryError),
+    /// Densities for another number of species.
+    #[error("{given} densities for {species} species")]
+    Densities {
+        /// How many were given.
+        given: usize,
+        /// How many species the model has.
+        species: usize,
+    },
+}
+
+/// Looks at `model` under `conditions`.
+///
+/// # Errors
+/// See [`CheckError`]; what is found is in the [`Findings`].
+pub fn check(model: &Model, conditions: &Conditions) -> Result<Findings, CheckError> {
+    let fluid: Fluid = model.at(conditions.kt)?;
+    if let Some(densities) = &conditions.densities
+        && densities.len() != fluid.species.len()
+    {
+        return Err(CheckError::Densities { given: densities.len(), species: fluid.species.len() });
+    }
+    let plan = Plan::new(&fluid)?;
+    let theory = MeanField::new(&fluid)?;
+    let densities = conditions.densities.as_deref();
+    let stability = densities.map(|rho| theory.stability(rho));
+    Ok(Findings {
+        title: model.title().to_owned(),
+        reference: model.reference().map(str::to_owned),
+        plan: plan.to_string(),
+        kt: conditions.kt,
+        pressure: densities.map(|rho| theory.pressure(rho)),
+        pressure_slope: densities.map(|rho| theory.pressure_slope(rho)),
+        stability: stability.map(Into::into),
+        densities: conditions.densities.clone(),
+        warnings: warnings::all(&fluid, densities, stability.as_ref())?,
+    })
+}
+
+#[cfg(test)]
+mod tests;

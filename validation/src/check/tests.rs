@@ -1,0 +1,65 @@
+use super::*;
+
+fn found(text: &str, kt: f64, densities: Option<Vec<f64>>) -> Findings {
+    check(&Model::parse("m.toml", text).unwrap(), &Conditions { kt, densities }).unwrap()
+}
+
+fn has(findings: &Findings, id: &str) -> bool {
+    findings.warnings.iter().any(|w| w.id == id)
+}
+
+fn spline(repulsion: f64) -> String {
+    format!(
+        "title = \"spline\"\nspecies = [\"F\"]\n[[pair]]\nbetween = [\"F\", \"F\"]\nform = \"spline\"\nstrength = 1\n\
+         A = {repulsion}\nB = 9.5\nrange_A = 0.8\nrange_B = 1.0\n"
+    )
+}
+
+/// Wang and Chen print 17.0 where a = 9.5 and A = 2.0 give 19.0; the fluid with 17.0 collapses.
+#[test]
+fn the_misprint_of_the_spline_paper_is_caught() {
+    let misprint = found(&spline(17.0), 0.5, Some(vec![12.5]));
+    assert!(has(&misprint, "no-thermodynamic-limit"), "{misprint:?}");
+    assert!(!misprint.works());
+    let right = found(&spline(19.0), 0.5, Some(vec![12.5]));
+    assert!(right.works(), "{right:?}");
+}
+
+fn van_der_waals() -> &'static str {
+    "title = \"vdw\"\nspecies = [\"F\"]\n[parameters]\na = 2.0\nb = 0.1\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n\
+     [excess_free_energy]\nF = \"-kT*ln(1 - b*n) - a*n\"\n"
+}
+
+#[test]
+fn poles_and_spinodals_are_named() {
+    // kT_c = 8a/27b = 5.93, ρ_c = 1/3b = 3.33
+    let cold = found(van_der_waals(), 4.0, Some(vec![3.3]));
+    assert!(has(&cold, "spinodal") && has(&cold, "singular"), "{cold:?}");
+    let hot = found(van_der_waals(), 8.0, Some(vec![1.0]));
+    assert!(!has(&hot, "spinodal"), "{hot:?}");
+    let beyond = found(van_der_waals(), 8.0, Some(vec![12.0]));
+    assert!(!beyond.works(), "{beyond:?}");
+}
+
+#[test]
+fn laws_without_potential_and_jumps_are_named() {
+    let lucy =
+        van_der_waals().replace("kernel = \"quadratic\"", "kernel = \"lucy\"\nforce_kernel = \"quadratic\"");
+    assert!(has(&found(&lucy, 8.0, None), "not-conservative"));
+    let linear = van_der_waals().replace("quadratic", "linear");
+    assert!(has(&found(&linear, 8.0, None), "force-jump"));
+    let cut = "title = \"t\"\nspecies = [\"F\"]\n[[pair]]\nbetween = [\"F\", \"F\"]\nform = \"expression\"\n\
+               phi = \"exp(-r)\"\nrange = 1\n";
+    assert!(has(&found(cut, 1.0, None), "energy-jump"));
+}
+
+#[test]
+fn a_plain_fluid_has_nothing_to_warn_of() {
+    let soft = "title = \"t\"\nspecies = [\"F\"]\n[[pair]]\nbetween = [\"F\", \"F\"]\nform = \"soft\"\nstrength = 25\n\
+                range = 1\n[[thermostat]]\ngamma = 4.5\nrange = 1\n";
+    let findings = found(soft, 1.0, Some(vec![3.0]));
+    assert!(findings.warnings.is_empty(), "{findings:?}");
+    // α_MF = π/30: p = 3 + π/30 · 25 · 9
+    let expected = 3.0 + std::f64::consts::PI / 30.0 * 225.0;
+    assert!((findings.pressure.unwrap() - expected).abs() < 1e-9, "{findings:?}");
+}

@@ -1,0 +1,160 @@
+//! Each thing that is looked for, in a function of its own.
+
+use super::CheckError;
+use super::findings::{Severity, Warning};
+use psidpd_core::model::Fluid;
+use psidpd_core::model::kernel::KernelKind;
+use psidpd_core::model::pair::PairForm;
+use psidpd_core::theory::{SingularityKind, Stability, singular_densities, thermodynamic_limit};
+use std::f64::consts::TAU;
+
+/// Everything worth saying, worst first.
+pub fn all(
+    fluid: &Fluid,
+    densities: Option<&[f64]>,
+    stability: Option<&Stability>,
+) -> Result<Vec<Warning>, CheckError> {
+    let mut found = Vec::new();
+    found.extend(not_conservative(fluid));
+    found.extend(collapse(fluid)?);
+    found.extend(singular(fluid, densities)?);
+    found.extend(stability.and_then(unstable));
+    found.extend(jumps(fluid));
+    found.sort_by_key(|w| std::cmp::Reverse(w.severity));
+    Ok(found)
+}
+
+fn not_conservative(fluid: &Fluid) -> Option<Warning> {
+    let density = fluid.densities.iter().find(|d| d.force_kernel != d.kernel)?;
+    Some(Warning {
+        id: "not-conservative",
+        severity: Severity::Warning,
+        message: format!(
+            "the force of density {} is not the gradient of its {} kernel (force_kernel = {}): it has no potential, does \
+             work around closed loops and heats the fluid; leave force_kernel out unless that law is what you study",
+            density.name,
+            density.kernel.kind().name(),
+            density.force_kernel.kind().name()
+        ),
+    })
+}
+
+fn collapse(fluid: &Fluid) -> Result<Option<Warning>, CheckError> {
+    let Err(limit) = thermodynamic_limit(fluid)? else {
+        return Ok(None);
+    };
+    let (severity, how) = if limit.is_uniform() {
+        (Severity::Error, "it collapses at once")
+    } else {
+        (Severity::Warning, "it may collapse onto a lattice, at densities that a run may never come near")
+    };
+    Ok(Some(Warning {
+        id: "no-thermodynamic-limit",
+        severity,
+        message: format!(
+            "{limit}: {how}; make the repulsion stronger or of longer range, or add a psi that grows faster than n"
+        ),
+    }))
+}
+
+/// How far beyond the mean density a particle's local density goes in a run, with a random start.
+const REACH: f64 = 3.0;
+
+fn singular(fluid: &Fluid, densities: Option<&[f64]>) -> Result<Vec<Warning>, CheckError> {
+    let count = fluid.species.len();
+    let (composition, total) = match densities {
+        Some(rho) if rho.iter().sum::<f64>() > 0.0 => (rho.to_vec(), rho.iter().sum()),
+        _ => (vec![1.0; count], 10.0),
+    };
+    let bounds: Vec<String> =
+        fluid.densities.iter().filter(|d| d.bounds.is_some()).map(|d| d.name.clone()).collect();
+    let mut found = Vec::new();
+    for s in singular_densities(fluid, &composition, [0.0, REACH * total])? {
+        let name = &fluid.species[s.species];
+        let (what, advice) = match s.kind {
+            SingularityKind::Origin => (
+                format!(
+                    "psi of {name} or its slope is not finite at density 0: an isolated particle stops the run"
+                ),
+                "count the self term (self = true), or set bounds on the density",
+            ),
+            SingularityKind::Pole | SingularityKind::Edge => (
+                format!(
+                    "psi of {name} is singular at total density {:.4}, {:.1} times the mean",
+                    s.density,
+                    s.density / total
+                ),
+                "start from a lattice with a short time step, or set bounds on the density",
+            ),
+        };
+        let inside = densities.is_some() && s.density > 0.0 && s.density <= total;
+        found.push(Warning {
+            id: "singular",
+            severity: match (inside, bounds.is_empty()) {
+                (true, true) => Severity::Error,
+                (_, true) => Severity::Warning,
+                (_, false) => Severity::Note,
+            },
+            message: if bounds.is_empty() {
+                format!("{what}; {advice}")
+            } else {
+                format!("{what}; the bounds of {} keep runs away from it", bounds.join(", "))
+            },
+        });
+    }
+    Ok(found)
+}
+
+fn unstable(stability: &Stability) -> Option<Warning> {
+    if stability.spinodal {
+        return Some(Warning {
+            id: "spinodal",
+            severity: Severity::Warning,
+            message: "in mean field this state is inside the spinodal: it separates into phases of other densities or \
+                      compositions (fine for a slab, a drop or demixing; not for a bulk equation of state)"
+                .into(),
+        });
+    }
+    let k = stability.k_star.filter(|_| !stability.stable)?;
+    Some(Warning {
+        id: "clustering",
+        severity: Severity::Warning,
+        message: format!(
+            "in mean field S(k) diverges before this state is reached, at k* = {k:.3}: the fluid clusters or freezes with \
+             wavelength {:.3}; a positive definite kernel (quadratic, wendland-c2), a lower density or a higher kT avoids it",
+            TAU / k
+        ),
+    })
+}
+
+fn jumps(fluid: &Fluid) -> Vec<Warning> {
+    let mut found = Vec::new();
+    for density in fluid.densities.iter().filter(|d| d.force_kernel.kind() == KernelKind::Linear) {
+        found.push(Warning {
+            id: "force-jump",
+            severity: Severity::Note,
+            message: format!(
+                "the linear kernel of density {} makes the force jump at its range: energy is conserved only to first order \
+                 in the time step",
+                density.name
+            ),
+        });
+    }
+    for term in &fluid.pairs {
+        let range = term.potential.range();
+        let edge = term.potential.at(range * (1.0 - 1e-9)).0.abs();
+        let inside = (1..20).map(|k| term.potential.at(range * k as f64 / 20.0).0.abs()).fold(0.0, f64::max);
+        if edge > 1e-6 * inside {
+            let [a, b] = term.between.map(|s| &fluid.species[s]);
+            found.push(Warning {
+                id: "energy-jump",
+                severity: Severity::Warning,
+                message: format!(
+                    "the pair potential between {a} and {b} is {edge:.3e} at its range and zero beyond: energy jumps when \
+                     particles cross it; let it vanish there"
+                ),
+            });
+        }
+    }
+    found
+}

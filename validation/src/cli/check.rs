@@ -1,0 +1,96 @@
+use super::{Failure, Verdict, write_json};
+use crate::check::{Conditions, Findings, Severity, check};
+use crate::scene::{Initial, Scene};
+use psidpd_core::document::Document;
+use psidpd_core::model::Model;
+use std::path::{Path, PathBuf};
+
+/// What a model or scene will compute, what mean field says of it, and what cannot work.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// A model file, or a scene file, which brings kT and densities along.
+    file: PathBuf,
+    /// kT; 1 if neither this nor a scene gives it.
+    #[arg(long = "kT", value_name = "T", allow_negative_numbers = true)]
+    kt: Option<f64>,
+    /// Number density, total or one for each species, as 6.05 or 8,8.
+    #[arg(long, value_name = "RHO", value_delimiter = ',')]
+    density: Vec<f64>,
+}
+
+/// Number densities of the species: as given, or a total in equal shares.
+pub fn per_species(given: &[f64], species: usize) -> Option<Vec<f64>> {
+    match given {
+        [] => None,
+        [total] => Some(vec![total / species as f64; species]),
+        all => Some(all.to_vec()),
+    }
+}
+
+pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
+    let document = Document::open(&arguments.file).map_err(Failure::new)?;
+    let (model, kt, densities) = if document.root().get("model").is_some() {
+        let scene = Scene::open(&arguments.file).map_err(Failure::new)?;
+        let densities = scene_densities(&scene);
+        (scene.model.clone(), scene.kt, Some(densities))
+    } else {
+        (Model::open(&arguments.file).map_err(Failure::new)?, 1.0, None)
+    };
+    let conditions = Conditions {
+        kt: arguments.kt.unwrap_or(kt),
+        densities: per_species(&arguments.density, model.species().len()).or(densities),
+    };
+    let findings = check(&model, &conditions).map_err(Failure::new)?;
+    print(&findings, model.species());
+    write_json(json, &findings)?;
+    Ok(if findings.works() { Verdict::Good } else { Verdict::CheckFailed })
+}
+
+/// Number densities of the filled part of a scene.
+fn scene_densities(scene: &Scene) -> Vec<f64> {
+    let state = scene.initial_state();
+    let volume = match &scene.initial {
+        Initial::Filling(filling) => filling.volume(&scene.domain, scene.model.dimensions()),
+        Initial::File { .. } => scene.domain.volume(scene.model.dimensions()),
+    };
+    let mut counts = vec![0.0; scene.model.species().len()];
+    for species in &state.species {
+        counts[*species as usize] += 1.0;
+    }
+    counts.iter().map(|n| n / volume).collect()
+}
+
+fn print(findings: &Findings, species: &[String]) {
+    if let Some(reference) = &findings.reference {
+        println!("reference     {reference}");
+    }
+    println!("{}", findings.plan);
+    println!("kT            {}", findings.kt);
+    if let Some(densities) = &findings.densities {
+        let each: Vec<String> =
+            species.iter().zip(densities).map(|(s, rho)| format!("{s} {rho:.6}")).collect();
+        println!("densities     {}", each.join(", "));
+    }
+    if let (Some(p), Some(slope)) = (findings.pressure, findings.pressure_slope) {
+        println!("mean field    pressure {p:.6}, dp/drho {slope:.6}");
+    }
+    if let Some(s) = &findings.stability {
+        let verdict = if s.stable { "stable" } else { "unstable" };
+        let place = match s.k_star {
+            Some(k) => format!("at k* = {k:.4}"),
+            None if s.spinodal => "at k = 0".to_owned(),
+            None => "(S(k) has no peak)".to_owned(),
+        };
+        println!("stability     {verdict}: smallest 1/S(k) is {:.5} {place}", s.min_inverse_s);
+    } else {
+        println!("stability     give --density to have pressure and stability");
+    }
+    for warning in &findings.warnings {
+        let kind = match warning.severity {
+            Severity::Error => "ERROR",
+            Severity::Warning => "WARNING",
+            Severity::Note => "note",
+        };
+        println!("{kind:<13} [{}] {}", warning.id, warning.message);
+    }
+}

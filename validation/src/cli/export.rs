@@ -1,0 +1,50 @@
+use super::{Failure, Verdict, write_json};
+use crate::export::eam::{self, Grid};
+use psidpd_core::model::Model;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+/// A fluid in the formats of other codes.
+#[derive(Debug, clap::Subcommand)]
+pub enum Verb {
+    /// Tables for LAMMPS's pair_style eam/alloy: the same conservative fluid in any LAMMPS.
+    Eam(EamArguments),
+}
+
+/// Arguments of `export eam`.
+#[derive(Debug, clap::Args)]
+pub struct EamArguments {
+    /// The model file.
+    model: PathBuf,
+    /// The table to write; default: the model's name with .eam.alloy.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// kT.
+    #[arg(long = "kT", value_name = "T", default_value_t = 1.0, allow_negative_numbers = true)]
+    kt: f64,
+    /// Spacing in r.
+    #[arg(long, value_name = "DR", default_value_t = Grid::default().spacing)]
+    spacing: f64,
+    /// Largest local density in the table.
+    #[arg(long, value_name = "RHO", default_value_t = Grid::default().largest_density)]
+    largest_density: f64,
+    /// How many densities.
+    #[arg(long, value_name = "N", default_value_t = Grid::default().densities)]
+    densities: usize,
+}
+
+pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
+    let Verb::Eam(a) = verb;
+    let model = Model::open(&a.model).map_err(Failure::new)?;
+    let fluid = model.at(a.kt).map_err(Failure::new)?;
+    let out = a.out.clone().unwrap_or_else(|| {
+        let stem = a.model.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        PathBuf::from(format!("{stem}.eam.alloy"))
+    });
+    let grid = Grid { spacing: a.spacing, largest_density: a.largest_density, densities: a.densities };
+    eam::write(&fluid, &vec![1.0; fluid.species.len()], grid, &out).map_err(Failure::new)?;
+    println!("{}", out.display());
+    println!("pair_style eam/alloy\npair_coeff * * {} {}", out.display(), fluid.species.join(" "));
+    write_json(json, &json!({"table": out, "species": fluid.species}))?;
+    Ok(Verdict::Good)
+}

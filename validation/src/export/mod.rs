@@ -1,0 +1,3 @@
+//! A fluid in the formats of other codes.
+
+pub mod eam;
