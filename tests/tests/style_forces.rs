@@ -311,6 +311,47 @@ fn special_bonds_and_exclusions() {
     }
 }
 
+/// The factors that a hybrid gives to one of its styles are that style's.
+#[test]
+fn a_hybrids_special_factors() {
+    let (_folder, data) = file(&chains(120));
+    let deck = |special: &str, style: &str| {
+        format!(
+            "units lj\natom_style bond\natom_modify map yes\ncomm_modify vel yes\nspecial_bonds lj {special}\n\
+             read_data {data}\nmass * 1\n{}{style}\nbond_style zero\nbond_coeff *\nfix 1 all nve\nrun 0\n",
+            load()
+        )
+    };
+    let alone = frame(&open(&deck(
+        "0.5 0.2 1",
+        &format!("pair_style mdpd/psi 1.0 1.0 {SEED}\npair_coeff * * -40 25 18 1 0.75"),
+    )));
+    let coefficients = "pair_coeff * * mdpd/psi -40 25 18 1 0.75\npair_coeff * * zero";
+    for (special, more) in
+        [("0.5 0.2 1", ""), ("0.9 0.9 0.9", "\npair_modify pair mdpd/psi special lj 0.5 0.2 1")]
+    {
+        let hybrid = open(&deck(
+            special,
+            &format!("pair_style hybrid/overlay mdpd/psi 1.0 1.0 {SEED} zero 1.0\n{coefficients}{more}"),
+        ));
+        let apart = difference(&frame(&hybrid).f, &alone.f);
+        assert!(apart < CLOSE, "{special}: {apart}");
+    }
+    // LAMMPS refuses what its list cannot know.
+    let script = deck(
+        "1 1 1",
+        &format!(
+            "pair_style hybrid/overlay mdpd/psi 1.0 1.0 {SEED} zero 1.0\n{coefficients}\n\
+             pair_modify pair mdpd/psi special lj 0.5 0.2 1"
+        ),
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("in.lammps");
+    std::fs::write(&path, script).unwrap();
+    let host = &psidpd_tests::lammps().0;
+    assert!(host.run_script(1, folder.path(), &path, &[], LIMIT).is_err());
+}
+
 /// Forces of a fluid with special factors are the gradient of its energy.
 #[test]
 fn special_factors_keep_the_potential() {

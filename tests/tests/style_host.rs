@@ -328,10 +328,3 @@ fn trouble_is_named_on_every_rank() {
         }
     }
 }
-
-/// The memory of the engine is LAMMPS's to know.
-#[test]
-fn memory_is_counted() {
-    let l = open(&deck(&format!("{}fix 1 all nve\nrun 1\n", psi())));
-    l.commands("info memory").unwrap();
-}
