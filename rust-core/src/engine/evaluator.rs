@@ -10,35 +10,12 @@ use super::excess::{ExcessPlan, ExcessWork};
 use super::force_pass::{ForceInput, ForceOutput, add_forces};
 use super::noise::PairNoise;
 use super::pairs::{Newton, Pairs};
+use super::particles::{Particles, Step};
 use super::plan::Plan;
 use super::search::CellSearch;
 use super::tally::{Tally, Want};
 use crate::model::Fluid;
 use crate::model::expression::TooLarge;
-
-/// The host's particles: owned ones first, then ghosts. All slices have one length.
-#[derive(Debug, Clone, Copy)]
-pub struct Particles<'a> {
-    /// How many are owned.
-    pub owned: usize,
-    /// Positions; ghosts where their image is.
-    pub x: &'a [[f64; 3]],
-    /// Numbers that stay with the particles, from 1; images share their owner's.
-    pub tag: &'a [i32],
-    /// Types, mapped to species by [`Engine::map_kinds`].
-    pub kind: &'a [i32],
-}
-
-/// What the thermostat of a step is keyed and scaled by.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Step {
-    /// Seed of the pair noise.
-    pub seed: u64,
-    /// Number of the step.
-    pub number: u64,
-    /// Δt.
-    pub dt: f64,
-}
 
 /// How often each pass has run: proof that what a fluid does not need is left out.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

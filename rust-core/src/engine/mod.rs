@@ -20,6 +20,7 @@ mod force_pass;
 mod images;
 pub mod noise;
 mod pairs;
+mod particles;
 mod plan;
 pub mod reference;
 mod search;
@@ -27,9 +28,10 @@ mod tally;
 
 pub use domain::{DomainError, PeriodicBox};
 pub use error::EngineError;
-pub use evaluator::{Engine, PairsOfHost, Particles, PassCounts, Step};
+pub use evaluator::{Engine, PairsOfHost, PassCounts};
 pub use images::Images;
 pub use pairs::Newton;
+pub use particles::{Particles, Step};
 pub use plan::Plan;
 pub use tally::{Tally, Want};
 

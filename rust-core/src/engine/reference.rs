@@ -2,8 +2,8 @@
 //! in the order of the formulas. Slow on purpose; everything faster is tested against it.
 
 use super::domain::PeriodicBox;
-use super::evaluator::Step;
 use super::noise::PairNoise;
+use super::particles::Step;
 use crate::model::curve::Curve;
 use crate::model::expression::{Formula, TooLarge};
 use crate::model::pair::PairForm;

@@ -1,8 +1,8 @@
 //! Pairs within the cut-off, by cells.
 
 use super::error::EngineError;
-use super::evaluator::Particles;
 use super::pairs::{Newton, Pairs};
+use super::particles::Particles;
 
 /// Cell search over open space: ghosts are particles like any other.
 ///

@@ -1,8 +1,9 @@
 //! Pairs from the host, for hosts that know more about pairs than where the particles are.
 
-use super::{Engine, Particles};
+use super::Engine;
 use crate::engine::error::EngineError;
 use crate::engine::pairs::Newton;
+use crate::engine::particles::Particles;
 
 /// The pairs of one step, as the host lists them: at least all within the cut-off of the model, those
 /// of two owned particles once, those of an owned particle `i` and a ghost `j` on either side.
