@@ -26,7 +26,14 @@ fn main() {
 
     let mut build = cxx_build::bridge("src/bridge.rs");
     build
-        .files(["cpp/pair_psi.cpp", "cpp/pair_dpd_psi.cpp", "cpp/pair_mdpd_psi.cpp"])
+        .files([
+            "cpp/pair_psi.cpp",
+            "cpp/pair_table.cpp",
+            "cpp/restart.cpp",
+            "cpp/pair_dpd_psi.cpp",
+            "cpp/pair_mdpd_psi.cpp",
+            "cpp/pair_dpd_spline.cpp",
+        ])
         .include("cpp")
         .std("c++17")
         .define("LAMMPS_SMALLBIG", None)

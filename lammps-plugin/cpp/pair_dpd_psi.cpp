@@ -18,47 +18,79 @@ class PairDPDPsi : public PairPsi {
  public:
   explicit PairDPDPsi(LAMMPS *lmp) : PairPsi(lmp, "dpd/psi") { one_coeff = 1; }
 
-  void settings(int narg, char **arg) override
+  void coeff(int narg, char **arg) override;
+
+ protected:
+  void read_settings(int narg, char **arg) override
   {
     if (narg != 2) stop("expected 'pair_style dpd/psi T seed', found " + std::to_string(narg) + " arguments");
     read_temperature(arg[0]);
     read_seed(arg[1]);
   }
 
-  void coeff(int narg, char **arg) override
+  rust::Box<Style> make_style(double kt) override
   {
-    const int types = atom->ntypes;
-    if (narg != 3 + types)
-      stop("expected 'pair_coeff * * MODEL.toml' and a species (or NULL) for each of " +
-           std::to_string(types) + " atom types, found " + std::to_string(narg) + " arguments");
-    if (strcmp(arg[0], "*") != 0 || strcmp(arg[1], "*") != 0)
-      stop("pair_coeff must begin with '* *': one model file describes all types");
-    if (!allocated) allocate();
-
-    // As other styles with files: here, or where LAMMPS_POTENTIALS says.
-    std::string path = utils::get_potential_file_path(arg[2]);
-    if (path.empty()) path = arg[2];
-    rust::Vec<rust::String> names;
-    for (int t = 0; t < types; t++) names.push_back(arg[3 + t]);
-    std::string trouble;
-    try {
-      style.emplace(style_from_file(path, kt, names, domain->dimension));
-    } catch (const std::exception &e) {
-      trouble = e.what();
-    }
-    if (!trouble.empty()) stop(trouble);
-
-    for (int i = 1; i <= types; i++)
-      for (int j = i; j <= types; j++)
-        setflag[i][j] = names[i - 1] != "NULL" && names[j - 1] != "NULL";
+    if (text.empty()) complain("no model: give one with 'pair_coeff * * MODEL.toml SPECIES ...'");
+    return style_from_text(source, text, kt, names, domain->dimension);
   }
 
- protected:
-  void build_style() override
+  std::vector<std::string> coefficients() override
   {
-    if (!style) stop("no model: give one with 'pair_coeff * * MODEL.toml SPECIES ...'");
+    std::vector<std::string> texts = {source, text};
+    for (const auto &name : names) texts.emplace_back(name);
+    return texts;
   }
+
+  void restore(const std::vector<std::string> &texts) override
+  {
+    if (texts.size() != 2 + static_cast<size_t>(atom->ntypes))
+      stop("the restart file does not hold what this style writes");
+    source = texts[0];
+    text = texts[1];
+    set_names({texts.begin() + 2, texts.end()});
+    style.reset();
+  }
+
+ private:
+  void set_names(const std::vector<std::string> &given)
+  {
+    names.clear();
+    for (const auto &name : given) names.push_back(name);
+    for (int i = 1; i <= atom->ntypes; i++)
+      for (int j = i; j <= atom->ntypes; j++) setflag[i][j] = given[i - 1] != "NULL" && given[j - 1] != "NULL";
+  }
+
+  // The model file, which a restart file carries along.
+  std::string source, text;
+  rust::Vec<rust::String> names;
 };
+
+void PairDPDPsi::coeff(int narg, char **arg)
+{
+  const int types = atom->ntypes;
+  if (narg != 3 + types)
+    stop("expected 'pair_coeff * * MODEL.toml' and a species (or NULL) for each of " + std::to_string(types) +
+         " atom types, found " + std::to_string(narg) + " arguments");
+  if (strcmp(arg[0], "*") != 0 || strcmp(arg[1], "*") != 0)
+    stop("pair_coeff must begin with '* *': one model file describes all types");
+  if (!allocated) allocate();
+
+  // As other styles with files: here, or where LAMMPS_POTENTIALS says.
+  std::string path = utils::get_potential_file_path(arg[2]);
+  if (path.empty()) path = arg[2];
+  set_names({arg + 3, arg + narg});
+  std::string trouble;
+  try {
+    style.emplace(style_from_file(path, kt(), names, domain->dimension));
+    source = std::string((*style)->model_name());
+    text = std::string((*style)->model_text());
+  } catch (const std::exception &e) {
+    trouble = e.what();
+  }
+  if (!trouble.empty()) stop(trouble);
+  // Built anew with all that belongs to it.
+  style.reset();
+}
 
 }    // namespace psidpd
 

@@ -1,6 +1,7 @@
 #include "pair_psi.h"
 
 #include "compat.h"
+#include "restart.h"
 
 #include "atom.h"
 #include "citeme.h"
@@ -9,12 +10,15 @@
 #include "error.h"
 #include "force.h"
 #include "memory.h"
+#include "neigh_list.h"
 #include "neighbor.h"
 #include "update.h"
 #include "utils.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <stdexcept>
 
 using namespace LAMMPS_NS;
 using namespace psidpd;
@@ -44,12 +48,21 @@ rust::Slice<const double> flat(double **rows, int count)
   return {rows[0], 3 * static_cast<size_t>(count)};
 }
 
+// Distances between opposite faces of the box.
+void heights(const Domain *domain, double *height)
+{
+  const double *inverse = domain->h_inv;
+  height[0] = 1.0 / std::sqrt(inverse[0] * inverse[0] + inverse[5] * inverse[5] + inverse[4] * inverse[4]);
+  height[1] = 1.0 / std::sqrt(inverse[1] * inverse[1] + inverse[3] * inverse[3]);
+  height[2] = 1.0 / std::fabs(inverse[2]);
+}
+
 }    // namespace
 
 PairPsi::PairPsi(LAMMPS *lmp, const char *name) : Pair(lmp), name(name)
 {
-  single_enable = 0;
-  restartinfo = 0;
+  single_enable = 1;
+  restartinfo = 1;
   manybody_flag = 1;
   // The virial is summed pair by pair: it needs no forces on ghosts.
   no_virial_fdotr_compute = 1;
@@ -73,6 +86,11 @@ void PairPsi::stop(const std::string &text)
   error->all(FLERR, std::string("Pair style ") + name + ": " + text);
 }
 
+void PairPsi::complain(const std::string &text)
+{
+  throw std::runtime_error(text);
+}
+
 void PairPsi::allocate()
 {
   const int n = atom->ntypes;
@@ -91,7 +109,12 @@ void PairPsi::read_temperature(const char *arg)
   const double t = utils::numeric(FLERR, arg, false, lmp);
   if (!(t > 0.0) || !std::isfinite(t))
     stop(std::string("the temperature must be positive, found ") + arg);
-  kt = force->boltz * t;
+  temperature = t;
+}
+
+double PairPsi::kt() const
+{
+  return force->boltz * temperature;
 }
 
 void PairPsi::read_seed(const char *arg)
@@ -101,14 +124,60 @@ void PairPsi::read_seed(const char *arg)
   seed = static_cast<uint64_t>(value);
 }
 
+void PairPsi::settings(int narg, char **arg)
+{
+  read_settings(narg, arg);
+  arguments.assign(arg, arg + narg);
+}
+
+// Builds the engine, or brings it up to date: fix adapt may have changed what it was built with.
+void PairPsi::refresh()
+{
+  if (style && !is_stale() && kt() == built_kt) return;
+  if (!(temperature > 0.0) || !std::isfinite(temperature))
+    stop("the temperature must be positive, found " + std::to_string(temperature));
+  std::string trouble;
+  try {
+    if (!style || is_stale())
+      style.emplace(make_style(kt()));
+    else
+      (*style)->set_temperature(kt());
+    (*style)->sum_all_densities(wants_densities);
+  } catch (const std::exception &e) {
+    trouble = e.what();
+  }
+  if (!trouble.empty()) stop(trouble);
+  built_kt = kt();
+}
+
 void PairPsi::init_style()
 {
-  build_style();
+  refresh();
   check_host();
   check_box();
-  comm_forward = static_cast<int>((*style)->slope_width());
-  if (!described && comm->me == 0) utils::logmesg(lmp, std::string((*style)->description()));
+  // Buffers are sized by this; what is sent later is never more.
+  comm_forward = static_cast<int>((*style)->variables());
+
+  why_listed.clear();
+  if (atom->molecular != Atom::ATOMIC)
+    for (int k = 1; k < 4; k++)
+      if (force->special_lj[k] != 1.0) why_listed = "special_bonds";
+  // neighbor->exclude is set only later, by neighbor->init().
+  if (neighbor->nex_type + neighbor->nex_group + neighbor->nex_mol > 0)
+    why_listed += why_listed.empty() ? "neigh_modify exclude" : " and neigh_modify exclude";
+  if (neighbor->includegroup)
+    why_listed += why_listed.empty() ? "neigh_modify include" : " and neigh_modify include";
+  if (!why_listed.empty()) request_full_list(neighbor, this, instance_me, 0);
+
+  if (!described && comm->me == 0) utils::logmesg(lmp, std::string((*style)->description(search())));
   described = true;
+}
+
+std::string PairPsi::search()
+{
+  if (why_listed.empty()) return "own cell list every step; no neighbor list is requested";
+  return "full neighbor list of LAMMPS, because of " + why_listed +
+      ": pairs that are not in it do not interact, special factors scale phi and w";
 }
 
 void PairPsi::check_host()
@@ -118,23 +187,14 @@ void PairPsi::check_host()
   if (!atom->tag_enable) stop("needs atom IDs: remove 'atom_modify id no'");
   if ((*style)->needs_velocities() && !comm->ghost_velocity)
     stop("the thermostat needs velocities of ghost atoms: add 'comm_modify vel yes'");
-  if (atom->molecular != Atom::ATOMIC)
-    for (int k = 1; k < 4; k++)
-      if (force->special_lj[k] != 1.0)
-        stop("computes all pairs, bonded or not: use 'special_bonds lj 1 1 1'");
-  // neighbor->exclude is set only later, by neighbor->init().
-  if (neighbor->nex_type + neighbor->nex_group + neighbor->nex_mol > 0)
-    stop("computes all pairs: 'neigh_modify exclude' has no effect on it; remove it, or map types to NULL");
 }
 
 // Two images of one pair would draw the same noise in a box shorter than twice its range.
 void PairPsi::check_box()
 {
   const double range = (*style)->noise_range();
-  const double *inverse = domain->h_inv;
-  const double height[3] = {
-      1.0 / std::sqrt(inverse[0] * inverse[0] + inverse[5] * inverse[5] + inverse[4] * inverse[4]),
-      1.0 / std::sqrt(inverse[1] * inverse[1] + inverse[3] * inverse[3]), 1.0 / std::fabs(inverse[2])};
+  double height[3];
+  heights(domain, height);
   for (int k = 0; k < domain->dimension; k++)
     if (domain->periodicity[k] && height[k] < 2.0 * range)
       stop("the box is " + std::to_string(height[k]) + " long in direction " + "xyz"[k] +
@@ -144,12 +204,17 @@ void PairPsi::check_box()
 
 void PairPsi::check_ghosts()
 {
-  if (domain->triclinic || comm->mode != Comm::SINGLE) return;
+  if (comm->mode != Comm::SINGLE) return;
   const double cutoff = (*style)->cutoff();
-  for (int k = 0; k < domain->dimension; k++)
-    if (comm->cutghost[k] < cutoff)
-      stop("ghost atoms reach " + std::to_string(comm->cutghost[k]) + ", the cut-off is " +
-           std::to_string(cutoff) + ": raise it with 'comm_modify cutoff'");
+  double height[3] = {1.0, 1.0, 1.0};
+  // In a triclinic box LAMMPS counts in fractions of the box.
+  if (domain->triclinic) heights(domain, height);
+  for (int k = 0; k < domain->dimension; k++) {
+    const double reach = comm->cutghost[k] * height[k];
+    if (reach < cutoff * (1.0 - 1e-12))
+      stop("ghost atoms reach " + std::to_string(reach) + ", the cut-off is " + std::to_string(cutoff) +
+           ": raise it with 'comm_modify cutoff'");
+  }
 }
 
 double PairPsi::init_one(int i, int j)
@@ -157,13 +222,76 @@ double PairPsi::init_one(int i, int j)
   if (setflag[i][j] == 0)
     stop("no coefficients for types " + std::to_string(i) + " and " + std::to_string(j) +
          ": set them with pair_coeff");
+  refresh();
   return (*style)->cutoff();
+}
+
+// Trouble on one rank stops all: the text names the particle.
+void PairPsi::stop_here(const std::string &text)
+{
+  error->one(FLERR, "Pair style " + name + " at step " + std::to_string(update->ntimestep) + ": " + text);
+}
+
+// The pairs of LAMMPS's list, each of two owned atoms once.
+void PairPsi::collect_pairs()
+{
+  const double *special = force->special_lj;
+  const bool scaled = atom->molecular != Atom::ATOMIC;
+  const int owned = atom->nlocal;
+  pair_i.clear();
+  pair_j.clear();
+  pair_factor.clear();
+  for (int ii = 0; ii < list->inum; ii++) {
+    const int i = list->ilist[ii];
+    for (int jj = 0; jj < list->numneigh[i]; jj++) {
+      const int entry = list->firstneigh[i][jj];
+      const int j = entry & NEIGHMASK;
+      if (j < owned && j < i) continue;
+      // A factor of 0 is an exclusion, as where LAMMPS leaves the pair out of the list.
+      const double factor = special[sbmask(entry)];
+      if (factor == 0.0) continue;
+      pair_i.push_back(i);
+      pair_j.push_back(j);
+      if (scaled) pair_factor.push_back(factor);
+    }
+  }
+}
+
+void PairPsi::find_densities(int all)
+{
+  const size_t owned = atom->nlocal;
+  const auto x = flat(atom->x, all);
+  const rust::Slice<const int32_t> tag{atom->tag, static_cast<size_t>(all)};
+  const rust::Slice<const int32_t> kind{atom->type, static_cast<size_t>(all)};
+  if (why_listed.empty()) {
+    (*style)->densities(owned, x, tag, kind, force->newton_pair);
+    return;
+  }
+  collect_pairs();
+  densities_of_pairs(**style, owned, x, tag, kind, force->newton_pair, {pair_i.data(), pair_i.size()},
+                     {pair_j.data(), pair_j.size()}, {pair_factor.data(), pair_factor.size()});
+}
+
+// Slopes from owners to ghosts.
+void PairPsi::forward()
+{
+  const int width = static_cast<int>((*style)->slope_width());
+  // Inside a hybrid LAMMPS has sized its buffers before it knew of our columns; those for positions fit.
+  const int most = force->pair == this ? width : 3;
+  for (first_column = 0; first_column < width; first_column += comm_forward) {
+    comm_forward = std::min(most, width - first_column);
+    forward_slopes(comm, this, 0);
+  }
 }
 
 void PairPsi::compute(int eflag, int vflag)
 {
   ev_init(eflag, vflag);
-  if (neighbor->ago == 0) check_ghosts();
+  refresh();
+  if (neighbor->ago == 0) {
+    check_ghosts();
+    if (domain->box_change) check_box();
+  }
 
   const size_t owned = atom->nlocal;
   const int all = atom->nlocal + atom->nghost;
@@ -174,17 +302,15 @@ void PairPsi::compute(int eflag, int vflag)
   const rust::Slice<const int32_t> kind{atom->type, static_cast<size_t>(all)};
   Style &fluid = **style;
 
-  // Trouble on one rank stops all: the text names the particle.
   std::string trouble;
   try {
-    fluid.densities(owned, x, tag, kind, newton);
+    find_densities(all);
   } catch (const std::exception &e) {
     trouble = e.what();
   }
-  if (!trouble.empty())
-    error->one(FLERR, "Pair style " + name + " at step " + std::to_string(update->ntimestep) + ": " + trouble);
+  if (!trouble.empty()) stop_here(trouble);
 
-  if (comm_forward > 0) forward_slopes(comm, this, 0);
+  forward();
 
   Request request;
   // A minimiser goes downhill in U: drag and noise have no place there.
@@ -205,8 +331,7 @@ void PairPsi::compute(int eflag, int vflag)
   } catch (const std::exception &e) {
     trouble = e.what();
   }
-  if (!trouble.empty())
-    error->one(FLERR, "Pair style " + name + " at step " + std::to_string(update->ntimestep) + ": " + trouble);
+  if (!trouble.empty()) stop_here(trouble);
 
   if (eflag_global) {
     eng_vdwl += totals.excess + totals.pair;
@@ -229,21 +354,93 @@ void PairPsi::compute(int eflag, int vflag)
 int PairPsi::pack_forward_comm(int n, int *list, double *buf, int, int *)
 {
   const auto slopes = (*style)->slopes_mut();
-  const int width = comm_forward;
+  const size_t width = (*style)->slope_width();
   for (int i = 0; i < n; i++)
-    for (int k = 0; k < width; k++) *buf++ = slopes[static_cast<size_t>(list[i]) * width + k];
-  return n * width;
+    for (int k = 0; k < comm_forward; k++) *buf++ = slopes[list[i] * width + first_column + k];
+  return n * comm_forward;
 }
 
 void PairPsi::unpack_forward_comm(int n, int first, double *buf)
 {
   auto slopes = (*style)->slopes_mut();
-  const int width = comm_forward;
+  const size_t width = (*style)->slope_width();
   for (int i = first; i < first + n; i++)
-    for (int k = 0; k < width; k++) slopes[static_cast<size_t>(i) * width + k] = *buf++;
+    for (int k = 0; k < comm_forward; k++) slopes[i * width + first_column + k] = *buf++;
+}
+
+// The energy is that of the terms that belong to pairs, without psi; the force is the whole conservative
+// one, with the densities of the last step. Drag and noise are left out, as in LAMMPS's other DPD styles.
+double PairPsi::single(int i, int j, int itype, int jtype, double rsq, double, double factor_lj, double &fforce)
+{
+  const double r = std::sqrt(rsq);
+  const PairValue pair = (*style)->single(itype, jtype, i, j, r);
+  fforce = r > 0.0 ? factor_lj * pair.force / r : 0.0;
+  return factor_lj * pair.energy;
+}
+
+void *PairPsi::extract(const char *what, int &dim)
+{
+  dim = 0;
+  if (strcmp(what, "T") == 0 || strcmp(what, "temperature") == 0) return &temperature;
+  return nullptr;
+}
+
+// "density" or "rho": local densities, one column for each density and species, in the order of the model
+// file; "psi": excess free energy of each atom.
+void *PairPsi::extract_peratom(const char *what, int &columns)
+{
+  const bool density = strcmp(what, "density") == 0 || strcmp(what, "rho") == 0;
+  if (!density && strcmp(what, "psi") != 0) return nullptr;
+  refresh();
+  columns = 0;
+  if (!density) return const_cast<double *>((*style)->excess().data());
+  if (!wants_densities) {
+    wants_densities = true;
+    (*style)->sum_all_densities(true);
+  }
+  const size_t width = (*style)->variables();
+  if (width == 0) return nullptr;
+  double *first = const_cast<double *>((*style)->local_densities().data());
+  if (width == 1) return first;
+  columns = static_cast<int>(width);
+  density_rows.resize((*style)->local_densities().size() / width + 1);
+  for (size_t i = 0; i < density_rows.size(); i++) density_rows[i] = first + i * width;
+  return density_rows.data();
+}
+
+// The temperature may have been changed since pair_style gave it.
+void PairPsi::write_restart_settings(FILE *fp)
+{
+  auto now = arguments;
+  if (!now.empty()) now[0] = exact(temperature);
+  write_texts(fp, now);
+}
+
+void PairPsi::read_restart_settings(FILE *fp)
+{
+  auto texts = read_texts(fp, lmp);
+  std::vector<char *> words;
+  for (auto &text : texts) words.push_back(&text[0]);
+  settings(static_cast<int>(words.size()), words.data());
+}
+
+void PairPsi::write_restart(FILE *fp)
+{
+  write_restart_settings(fp);
+  write_texts(fp, coefficients());
+}
+
+void PairPsi::read_restart(FILE *fp)
+{
+  read_restart_settings(fp);
+  if (!allocated) allocate();
+  restore(read_texts(fp, lmp));
 }
 
 double PairPsi::memory_usage()
 {
-  return Pair::memory_usage();
+  double bytes = Pair::memory_usage();
+  bytes += (pair_i.capacity() + pair_j.capacity()) * sizeof(int32_t) + pair_factor.capacity() * sizeof(double);
+  if (style) bytes += static_cast<double>((*style)->memory());
+  return bytes;
 }

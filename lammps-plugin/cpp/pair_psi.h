@@ -21,35 +21,75 @@ class PairPsi : public LAMMPS_NS::Pair {
   PairPsi &operator=(const PairPsi &) = delete;
 
   void compute(int eflag, int vflag) override;
+  void settings(int narg, char **arg) override;
   void init_style() override;
   double init_one(int i, int j) override;
+
+  double single(int i, int j, int itype, int jtype, double rsq, double factor_coul, double factor_lj,
+                double &fforce) override;
+  void *extract(const char *what, int &dim) override;
+  void *extract_peratom(const char *what, int &columns) override;
+
+  void write_restart(FILE *fp) override;
+  void read_restart(FILE *fp) override;
+  void write_restart_settings(FILE *fp) override;
+  void read_restart_settings(FILE *fp) override;
 
   int pack_forward_comm(int n, int *list, double *buf, int pbc_flag, int *pbc) override;
   void unpack_forward_comm(int n, int first, double *buf) override;
   double memory_usage() override;
 
  protected:
-  // Builds the engine, if it is not there yet; called by init_style.
-  virtual void build_style() {}
+  // Reads the arguments of pair_style.
+  virtual void read_settings(int narg, char **arg) = 0;
+  // Builds the engine from what pair_coeff has given; may throw what the engine says.
+  virtual rust::Box<Style> make_style(double kt) = 0;
+  // Whether coefficients differ from those the engine was built with.
+  virtual bool is_stale() { return false; }
+  // What pair_coeff has given, for restart files.
+  virtual std::vector<std::string> coefficients() = 0;
+  virtual void restore(const std::vector<std::string> &texts) = 0;
+  // Stops where the style does not fit the simulation.
+  virtual void check_host();
 
   void allocate();
   // Temperature and seed of pair_style, checked.
   void read_temperature(const char *arg);
   void read_seed(const char *arg);
+  double kt() const;
   // Stops with "Pair style NAME: text", on all ranks.
   [[noreturn]] void stop(const std::string &text);
+  // Throws the text, for what make_style finds wrong.
+  [[noreturn]] static void complain(const std::string &text);
 
   const std::string name;
-  double kt = 0.0;
-  uint64_t seed = 0;
   std::optional<rust::Box<Style>> style;
 
  private:
-  void check_host();
+  void refresh();
+  void find_densities(int all);
+  void collect_pairs();
+  void forward();
   void check_box();
   void check_ghosts();
+  std::string search();
+  [[noreturn]] void stop_here(const std::string &text);
 
+  double temperature = 0.0;
+  double built_kt = 0.0;
+  uint64_t seed = 0;
+  std::vector<std::string> arguments;
   bool described = false;
+  bool wants_densities = false;
+  std::vector<double *> density_rows;
+
+  // Columns of the slopes that a communication carries.
+  int first_column = 0;
+
+  // Why pairs come from LAMMPS's neighbor list; empty if the engine finds them.
+  std::string why_listed;
+  std::vector<int32_t> pair_i, pair_j;
+  std::vector<double> pair_factor;
 };
 
 }    // namespace psidpd

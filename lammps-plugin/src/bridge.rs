@@ -1,21 +1,23 @@
 //! The style for C++. Errors arrive there as exceptions, panics as errors.
 
 use crate::style::{Style, StyleError};
-use psidpd_core::engine::{Step, Want};
-use psidpd_core::model::{ForceLaw, WarrenPair};
+use psidpd_core::engine::{PairsOfHost, Step, Want};
+use psidpd_core::model::{ForceLaw, SplinePair, WarrenPair};
 
 #[cxx::bridge(namespace = "psidpd")]
 mod ffi {
-    /// Coefficients of one pair of types, as `pair_coeff` of LAMMPS's `mdpd` takes them.
-    #[derive(Clone, Copy)]
+    /// Coefficients of one pair of types, in the order of `pair_coeff`.
+    #[derive(Clone, Copy, PartialEq)]
     struct Coefficients {
         /// Whether they were given.
         set: bool,
-        a: f64,
-        b: f64,
-        gamma: f64,
-        rc: f64,
-        rd: f64,
+        value: [f64; 6],
+    }
+
+    /// Energy of a pair, and the force along the line from the second to the first.
+    struct PairValue {
+        energy: f64,
+        force: f64,
     }
 
     /// What a step asks for.
@@ -43,17 +45,37 @@ mod ffi {
 
         fn style_from_file(path: &str, kt: f64, names: &Vec<String>, dimensions: usize)
         -> Result<Box<Style>>;
-        fn style_from_coefficients(
+        fn style_from_text(
+            source: &str,
+            text: &str,
+            kt: f64,
+            names: &Vec<String>,
+            dimensions: usize,
+        ) -> Result<Box<Style>>;
+        fn warren_style(
             kt: f64,
             pairs: &[Coefficients],
             types: usize,
             dimensions: usize,
             lucy: bool,
         ) -> Result<Box<Style>>;
+        fn spline_style(
+            kt: f64,
+            pairs: &[Coefficients],
+            types: usize,
+            dimensions: usize,
+            thermostat_range: f64,
+        ) -> Result<Box<Style>>;
 
-        fn description(self: &Style) -> String;
+        fn set_temperature(self: &mut Style, kt: f64) -> Result<()>;
+        fn sum_all_densities(self: &mut Style, all: bool);
+        fn model_text(self: &Style) -> String;
+        fn model_name(self: &Style) -> String;
+        fn description(self: &Style, search: &str) -> String;
         fn cutoff(self: &Style) -> f64;
         fn slope_width(self: &Style) -> usize;
+        /// The number of densities times species: no slope width is larger.
+        fn variables(self: &Style) -> usize;
         fn needs_velocities(self: &Style) -> bool;
         /// 0 if no noise is drawn.
         fn noise_range(self: &Style) -> f64;
@@ -65,6 +87,18 @@ mod ffi {
             tag: &[i32],
             kind: &[i32],
             newton: bool,
+        ) -> Result<()>;
+        #[allow(clippy::too_many_arguments)]
+        fn densities_of_pairs(
+            style: &mut Style,
+            owned: usize,
+            x: &[f64],
+            tag: &[i32],
+            kind: &[i32],
+            newton: bool,
+            i: &[i32],
+            j: &[i32],
+            factor: &[f64],
         ) -> Result<()>;
         fn slopes_mut(self: &mut Style) -> &mut [f64];
         #[allow(clippy::too_many_arguments)]
@@ -81,6 +115,12 @@ mod ffi {
         fn particle_energy(self: &Style) -> &[f64];
         /// Six numbers a particle.
         fn particle_virial(self: &Style) -> &[f64];
+        /// Those of owned particles, a row of [`variables`] for each.
+        fn local_densities(self: &Style) -> &[f64];
+        /// psi of owned particles.
+        fn excess(self: &Style) -> &[f64];
+        fn single(self: &Style, kind_i: i32, kind_j: i32, i: usize, j: usize, r: f64) -> PairValue;
+        fn memory(self: &Style) -> usize;
     }
 }
 
@@ -93,17 +133,43 @@ fn style_from_file(
     Style::from_file(path, kt, names, dimensions).map(Box::new)
 }
 
-fn style_from_coefficients(
+fn style_from_text(
+    source: &str,
+    text: &str,
+    kt: f64,
+    names: &Vec<String>,
+    dimensions: usize,
+) -> Result<Box<Style>, StyleError> {
+    Style::from_text(source, text, kt, names, dimensions).map(Box::new)
+}
+
+fn spline_style(
+    kt: f64,
+    pairs: &[ffi::Coefficients],
+    types: usize,
+    dimensions: usize,
+    thermostat_range: f64,
+) -> Result<Box<Style>, StyleError> {
+    let spline = |c: &ffi::Coefficients| {
+        let [strength, repulsion, attraction, repulsion_range, attraction_range, gamma] = c.value;
+        SplinePair { strength, repulsion, attraction, repulsion_range, attraction_range, gamma }
+    };
+    let pairs: Vec<Option<SplinePair>> = pairs.iter().map(|c| c.set.then(|| spline(c))).collect();
+    Style::from_spline_coefficients(kt, &pairs, types, thermostat_range, dimensions).map(Box::new)
+}
+
+fn warren_style(
     kt: f64,
     pairs: &[ffi::Coefficients],
     types: usize,
     dimensions: usize,
     lucy: bool,
 ) -> Result<Box<Style>, StyleError> {
-    let pairs: Vec<Option<WarrenPair>> = pairs
-        .iter()
-        .map(|c| c.set.then_some(WarrenPair { a: c.a, b: c.b, gamma: c.gamma, rc: c.rc, rd: c.rd }))
-        .collect();
+    let warren = |c: &ffi::Coefficients| {
+        let [a, b, gamma, rc, rd, _] = c.value;
+        WarrenPair { a, b, gamma, rc, rd }
+    };
+    let pairs: Vec<Option<WarrenPair>> = pairs.iter().map(|c| c.set.then(|| warren(c))).collect();
     let law = if lucy { ForceLaw::LucyLammps } else { ForceLaw::Conservative };
     Style::from_coefficients(kt, &pairs, types, dimensions, law).map(Box::new)
 }
@@ -130,7 +196,52 @@ fn style_forces(
     Ok(ffi::Totals { excess: tally.excess, pair: tally.pair, virial: tally.total_virial() })
 }
 
+#[allow(clippy::too_many_arguments)]
+fn densities_of_pairs(
+    style: &mut Style,
+    owned: usize,
+    x: &[f64],
+    tag: &[i32],
+    kind: &[i32],
+    newton: bool,
+    i: &[i32],
+    j: &[i32],
+    factor: &[f64],
+) -> Result<(), StyleError> {
+    style.densities_of_pairs(owned, x, tag, kind, newton, &PairsOfHost { i, j, factor })
+}
+
 impl Style {
+    fn model_text(&self) -> String {
+        self.model().source().text().to_owned()
+    }
+
+    fn model_name(&self) -> String {
+        self.model().source().name().to_owned()
+    }
+
+    fn variables(&self) -> usize {
+        let plan = self.engine().plan();
+        plan.densities().count() * plan.species().len()
+    }
+
+    fn local_densities(&self) -> &[f64] {
+        self.engine().local_densities()
+    }
+
+    fn excess(&self) -> &[f64] {
+        self.engine().excess()
+    }
+
+    fn single(&self, kind_i: i32, kind_j: i32, i: usize, j: usize, r: f64) -> ffi::PairValue {
+        let (energy, force) = self.engine().single([kind_i, kind_j], r, Some([i, j]));
+        ffi::PairValue { energy, force }
+    }
+
+    fn memory(&self) -> usize {
+        self.engine().memory()
+    }
+
     fn cutoff(&self) -> f64 {
         self.engine().plan().cutoff()
     }

@@ -25,6 +25,7 @@ type Register = unsafe extern "C-unwind" fn(*mut Registration, *mut c_void);
 unsafe extern "C-unwind" {
     fn psidpd_create_dpd_psi(lmp: *mut c_void) -> *mut c_void;
     fn psidpd_create_mdpd_psi(lmp: *mut c_void) -> *mut c_void;
+    fn psidpd_create_dpd_spline(lmp: *mut c_void) -> *mut c_void;
     /// Of LAMMPS's library interface; resolved when LAMMPS loads the plugin.
     fn lammps_version(lmp: *mut c_void) -> c_int;
 }
@@ -58,13 +59,14 @@ pub unsafe extern "C-unwind" fn lammpsplugin_init(
     let Some(register) = (unsafe { std::mem::transmute::<*mut c_void, Option<Register>>(register) }) else {
         return;
     };
-    const STYLES: [(&CStr, &CStr, unsafe extern "C-unwind" fn(*mut c_void) -> *mut c_void); 2] = [
+    const STYLES: [(&CStr, &CStr, unsafe extern "C-unwind" fn(*mut c_void) -> *mut c_void); 3] = [
         (c"dpd/psi", c"many-body DPD of any excess free energy", psidpd_create_dpd_psi),
         (
             c"mdpd/psi",
             c"Warren's A/B model, conservative, with the coefficients of mdpd",
             psidpd_create_mdpd_psi,
         ),
+        (c"dpd/spline", c"DPD with a repulsive-attractive spline potential", psidpd_create_dpd_spline),
     ];
     for (name, info, creator) in STYLES {
         let mut registration = Registration {

@@ -1,7 +1,7 @@
 //! One pair style's engine, and the mapping from LAMMPS's types to species.
 
-use psidpd_core::engine::{Engine, EngineError, Newton, Particles, Step, Tally, Want};
-use psidpd_core::model::{ForceLaw, Model, WarrenPair, warren_ab};
+use psidpd_core::engine::{Engine, EngineError, Newton, PairsOfHost, Particles, Step, Tally, Want};
+use psidpd_core::model::{ForceLaw, Model, PresetError, SplinePair, WarrenPair, spline_dpd, warren_ab};
 use std::fmt::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -20,10 +20,27 @@ impl From<EngineError> for StyleError {
 /// A model at the style's temperature, ready to compute.
 #[derive(Debug)]
 pub struct Style {
+    model: Model,
     engine: Engine,
-    title: String,
-    reference: Option<String>,
-    source: String,
+    /// Species of each type, from 0; LAMMPS counts types from 1.
+    kinds: Vec<i32>,
+    all_densities: bool,
+}
+
+/// The types, from 0, that have coefficients with any type: the others are another style's of a hybrid.
+fn types_with_coefficients<T>(pairs: &[Option<T>], types: usize) -> Vec<usize> {
+    let given = |a: usize, b: usize| pairs.get(a.min(b) * types + a.max(b)).is_some_and(Option::is_some);
+    (0..types).filter(|a| (0..types).any(|b| given(*a, b))).collect()
+}
+
+/// The table of the given types alone.
+fn table_of<T: Copy>(pairs: &[Option<T>], types: usize, members: &[usize]) -> Vec<Option<T>> {
+    let row = |a: &usize| a * types;
+    members.iter().flat_map(|a| members.iter().map(|b| pairs[row(a) + b])).collect()
+}
+
+fn name_of_type(index: usize) -> String {
+    format!("T{}", index + 1)
 }
 
 /// Runs `work` and turns a panic into an error: nothing may unwind into LAMMPS.
@@ -52,7 +69,24 @@ impl Style {
     pub fn from_file(path: &str, kt: f64, names: &[String], dimensions: usize) -> Result<Style, StyleError> {
         guard(|| {
             let model = Model::open(Path::new(path)).map_err(|e| StyleError(e.to_string()))?;
-            Style::new(&model, kt, names, dimensions)
+            Style::new(model, kt, names, dimensions)
+        })
+    }
+
+    /// As [`Style::from_file`], with the text of a model file; `source` stands for the file in messages.
+    ///
+    /// # Errors
+    /// As [`Style::from_file`].
+    pub fn from_text(
+        source: &str,
+        text: &str,
+        kt: f64,
+        names: &[String],
+        dimensions: usize,
+    ) -> Result<Style, StyleError> {
+        guard(|| {
+            let model = Model::parse(source, text).map_err(|e| StyleError(e.to_string()))?;
+            Style::new(model, kt, names, dimensions)
         })
     }
 
@@ -69,13 +103,53 @@ impl Style {
         law: ForceLaw,
     ) -> Result<Style, StyleError> {
         guard(|| {
-            let names: Vec<String> = (1..=types).map(|t| format!("T{t}")).collect();
-            let model = warren_ab(&names, pairs, dimensions, law).map_err(|e| StyleError(e.to_string()))?;
-            Style::new(&model, kt, &names, dimensions)
+            let members = types_with_coefficients(pairs, types);
+            let species: Vec<String> = members.iter().copied().map(name_of_type).collect();
+            let table = table_of(pairs, types, &members);
+            let model = warren_ab(&species, &table, dimensions, law).map_err(|e| match e {
+                PresetError::Missing(i, j) => {
+                    StyleError(PresetError::Missing(members[i - 1] + 1, members[j - 1] + 1).to_string())
+                }
+                e => StyleError(e.to_string()),
+            })?;
+            Style::of_members(model, kt, &members, types, dimensions)
         })
     }
 
-    fn new(model: &Model, kt: f64, names: &[String], dimensions: usize) -> Result<Style, StyleError> {
+    /// Spline DPD; `pairs` as for [`Style::from_coefficients`], but pairs of types may be left out.
+    ///
+    /// # Errors
+    /// Coefficients that make no model.
+    pub fn from_spline_coefficients(
+        kt: f64,
+        pairs: &[Option<SplinePair>],
+        types: usize,
+        thermostat_range: f64,
+        dimensions: usize,
+    ) -> Result<Style, StyleError> {
+        guard(|| {
+            let members = types_with_coefficients(pairs, types);
+            let species: Vec<String> = members.iter().copied().map(name_of_type).collect();
+            let table = table_of(pairs, types, &members);
+            let model = spline_dpd(&species, &table, thermostat_range, dimensions)
+                .map_err(|e| StyleError(e.to_string()))?;
+            Style::of_members(model, kt, &members, types, dimensions)
+        })
+    }
+
+    fn of_members(
+        model: Model,
+        kt: f64,
+        members: &[usize],
+        types: usize,
+        dimensions: usize,
+    ) -> Result<Style, StyleError> {
+        let name = |t| if members.contains(&t) { name_of_type(t) } else { "NULL".to_owned() };
+        let names: Vec<String> = (0..types).map(name).collect();
+        Style::new(model, kt, &names, dimensions)
+    }
+
+    fn new(model: Model, kt: f64, names: &[String], dimensions: usize) -> Result<Style, StyleError> {
         if model.dimensions() != dimensions {
             return Err(StyleError(format!(
                 "{}: the model has dimensions = {}, the simulation has {dimensions}",
@@ -99,15 +173,31 @@ impl Style {
                 }
             }
         }
-        let fluid = model.at(kt).map_err(|e| StyleError(e.to_string()))?;
-        let mut engine = Engine::new(&fluid).map_err(|e| StyleError(e.to_string()))?;
-        engine.map_kinds(&kinds)?;
-        Ok(Style {
-            engine,
-            title: model.title().to_owned(),
-            reference: model.reference().map(str::to_owned),
-            source: model.source().name().to_owned(),
+        let engine = engine_at(&model, kt, &kinds)?;
+        Ok(Style { model, engine, kinds, all_densities: false })
+    }
+
+    /// Another temperature: the model's expressions see it, and the noise.
+    ///
+    /// # Errors
+    /// A model that makes no fluid at this temperature.
+    pub fn set_temperature(&mut self, kt: f64) -> Result<(), StyleError> {
+        guard(|| {
+            self.engine = engine_at(&self.model, kt, &self.kinds)?;
+            self.engine.sum_all_densities(self.all_densities);
+            Ok(())
         })
+    }
+
+    /// As [`Engine::sum_all_densities`].
+    pub fn sum_all_densities(&mut self, all: bool) {
+        self.all_densities = all;
+        self.engine.sum_all_densities(all);
+    }
+
+    /// The model.
+    pub fn model(&self) -> &Model {
+        &self.model
     }
 
     /// The engine.
@@ -116,11 +206,13 @@ impl Style {
     }
 
     /// For the log: what is computed, and what its letters mean.
-    pub fn description(&self) -> String {
+    ///
+    /// `search` says where pairs come from.
+    pub fn description(&self, search: &str) -> String {
         let mut text = String::new();
         // Writing to a String cannot fail.
-        let _ = writeln!(text, "psidpd: {} ({})", self.title, self.source);
-        if let Some(reference) = &self.reference {
+        let _ = writeln!(text, "psidpd: {} ({})", self.model.title(), self.model.source().name());
+        if let Some(reference) = self.model.reference() {
             let _ = writeln!(text, "  reference     {reference}");
         }
         for line in self.engine.plan().to_string().lines() {
@@ -134,9 +226,9 @@ impl Style {
         }
         text.push_str(
             "  conventions   number densities, [w] = 1, no self term unless the model says so; \
-             F = -dU/dr with U = sum psi + sum phi; drag sees the half-step velocity\n\
-             \x20 search        own cell list every step; no neighbor list is requested\n",
+             F = -dU/dr with U = sum psi + sum phi; drag sees the half-step velocity\n",
         );
+        let _ = writeln!(text, "  search        {search}");
         text
     }
 
@@ -156,6 +248,26 @@ impl Style {
             let newton = if newton { Newton::On } else { Newton::Off };
             let particles = Particles { owned, x: triples(x), tag, kind };
             Ok(self.engine.densities(&particles, newton)?)
+        })
+    }
+
+    /// As [`Style::densities`], with pairs listed by LAMMPS.
+    ///
+    /// # Errors
+    /// As [`Engine::densities_of_pairs`].
+    pub fn densities_of_pairs(
+        &mut self,
+        owned: usize,
+        x: &[f64],
+        tag: &[i32],
+        kind: &[i32],
+        newton: bool,
+        listed: &PairsOfHost,
+    ) -> Result<(), StyleError> {
+        guard(|| {
+            let newton = if newton { Newton::On } else { Newton::Off };
+            let particles = Particles { owned, x: triples(x), tag, kind };
+            Ok(self.engine.densities_of_pairs(&particles, listed, newton)?)
         })
     }
 
@@ -188,6 +300,13 @@ impl Style {
     }
 }
 
+fn engine_at(model: &Model, kt: f64, kinds: &[i32]) -> Result<Engine, StyleError> {
+    let fluid = model.at(kt).map_err(|e| StyleError(e.to_string()))?;
+    let mut engine = Engine::new(&fluid).map_err(|e| StyleError(e.to_string()))?;
+    engine.map_kinds(kinds)?;
+    Ok(engine)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -198,7 +317,7 @@ mod tests {
 
     fn style(names: &[&str], dimensions: usize) -> Result<Style, StyleError> {
         let names: Vec<String> = names.iter().map(|s| (*s).to_owned()).collect();
-        Style::new(&Model::parse("m.toml", MODEL).unwrap(), 1.0, &names, dimensions)
+        Style::new(Model::parse("m.toml", MODEL).unwrap(), 1.0, &names, dimensions)
     }
 
     #[test]
@@ -220,6 +339,20 @@ mod tests {
         assert!(style(&["A"], 2).unwrap_err().to_string().contains("dimensions = 3, the simulation has 2"));
         let missing = Style::from_file("nowhere.toml", 1.0, &[], 3).unwrap_err();
         assert!(missing.to_string().contains("nowhere.toml: cannot be read"), "{missing}");
+    }
+
+    #[test]
+    fn types_without_coefficients_take_no_part() {
+        let pair = WarrenPair { a: -40.0, b: 25.0, gamma: 1.0, rc: 1.0, rd: 0.75 };
+        let law = ForceLaw::Conservative;
+        let mut table = vec![None; 9];
+        table[4] = Some(pair);
+        let style = Style::from_coefficients(1.0, &table, 3, 3, law).unwrap();
+        assert_eq!(style.kinds, [-1, -1, 0, -1]);
+        table[8] = Some(pair);
+        let error = Style::from_coefficients(1.0, &table, 3, 3, law).unwrap_err();
+        assert!(error.to_string().contains("types 2 and 3"), "{error}");
+        assert!(Style::from_coefficients(1.0, &[None], 1, 3, law).is_err());
     }
 
     #[test]

@@ -27,7 +27,10 @@ pub fn add_density(pairs: &Pairs, kernel: &Kernel, owned: usize, n: &mut [f64], 
             for k in 0..list.len() {
                 let s = list.r[k] * inverse_range;
                 if s < 1.0 {
-                    let w = factor * S::value(s);
+                    let mut w = factor * S::value(s);
+                    if !list.factor.is_empty() {
+                        w *= list.factor[k];
+                    }
                     let (i, j) = (list.i[k] as usize, list.j[k] as usize);
                     self.n[i * self.width + self.offset + list.species_j[k] as usize] += w;
                     if j < self.owned {

@@ -1,3 +1,9 @@
+mod listed;
+mod memory;
+mod single;
+
+pub use listed::PairsOfHost;
+
 use super::density_pass::add_density;
 use super::error::EngineError;
 use super::excess::{ExcessPlan, ExcessWork};

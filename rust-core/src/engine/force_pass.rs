@@ -88,6 +88,7 @@ pub fn add_forces(input: &ForceInput, output: &mut ForceOutput) {
         for term in &input.plan.pairs {
             add_pair_term(input, term, begin, end, energies, &mut block);
         }
+        scale(input.list, begin, end, energies, &mut block);
         if let (Some((noise, inverse_root_dt)), Some(plan)) = (&input.thermostat, &input.plan.thermostat) {
             add_thermostat(input, plan, noise, *inverse_root_dt, begin, end, &mut block.thermostat);
         } else {
@@ -99,6 +100,21 @@ pub fn add_forces(input: &ForceInput, output: &mut ForceOutput) {
         }
         if energies {
             tally_energy(input, output, begin, end, &block);
+        }
+    }
+}
+
+/// Conservative forces and energies of pairs that do not act at full strength.
+fn scale(list: &PairList, begin: usize, end: usize, energies: bool, block: &mut Block) {
+    if list.factor.is_empty() {
+        return;
+    }
+    for (at, factor) in list.factor[begin..end].iter().enumerate() {
+        block.conservative[at] *= factor;
+        if energies {
+            block.excess_i[at] *= factor;
+            block.excess_j[at] *= factor;
+            block.pair[at] *= factor;
         }
     }
 }

@@ -27,7 +27,7 @@ mod tally;
 
 pub use domain::{DomainError, PeriodicBox};
 pub use error::EngineError;
-pub use evaluator::{Engine, Particles, PassCounts, Step};
+pub use evaluator::{Engine, PairsOfHost, Particles, PassCounts, Step};
 pub use images::Images;
 pub use pairs::Newton;
 pub use plan::Plan;

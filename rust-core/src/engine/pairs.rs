@@ -30,6 +30,8 @@ pub struct PairList {
     pub species_j: Vec<u8>,
     pub d: [Vec<f64>; 3],
     pub r: Vec<f64>,
+    /// Strength of the conservative interaction; empty if every pair has its full one.
+    pub factor: Vec<f64>,
 }
 
 impl PairList {
@@ -44,6 +46,7 @@ impl PairList {
         self.species_j.clear();
         self.d.iter_mut().for_each(Vec::clear);
         self.r.clear();
+        self.factor.clear();
     }
 
     #[inline(always)]
@@ -74,6 +77,22 @@ impl Pairs {
         let here = j < self.owned || self.newton == Newton::Off || computes(tag[i], tag[j], d);
         let list = if here { &mut self.force } else { &mut self.density_only };
         list.push(i, j, d, species);
+    }
+
+    /// As [`Pairs::push`], for pairs of strength `factor`. Either all pairs come this way or none.
+    pub fn push_scaled(
+        &mut self,
+        a: usize,
+        b: usize,
+        d: [f64; 3],
+        factor: f64,
+        tag: &[i32],
+        species: &[i32],
+    ) {
+        let before = self.force.len();
+        self.push(a, b, d, tag, species);
+        let list = if self.force.len() > before { &mut self.force } else { &mut self.density_only };
+        list.factor.push(factor);
     }
 
     /// The pairs whose force is computed here.

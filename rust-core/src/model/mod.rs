@@ -18,10 +18,12 @@ pub mod pair;
 
 mod file;
 mod fluid;
+mod preset_spline;
 mod presets;
 
 pub use file::{KNOWN_FUNCTIONS, Model};
 pub use fluid::{
     Bounds, Continuation, ExcessFreeEnergy, Fluid, PairTerm, Polynomial, Thermostat, WeightedDensity,
 };
+pub use preset_spline::{SplinePair, spline_dpd, spline_dpd_text};
 pub use presets::{ForceLaw, PresetError, WarrenPair, warren_ab, warren_ab_text};

@@ -1,0 +1,46 @@
+/* A pair style with a table of coefficients over pairs of types. */
+
+#ifndef PSIDPD_PAIR_TABLE_H
+#define PSIDPD_PAIR_TABLE_H
+
+#include "pair_psi.h"
+
+namespace psidpd {
+
+class PairTable : public PairPsi {
+ public:
+  // The names of the coefficients, at most six, in the order of pair_coeff.
+  PairTable(LAMMPS_NS::LAMMPS *lmp, const char *name, std::vector<std::string> names);
+  ~PairTable() override;
+
+  void coeff(int narg, char **arg) override;
+  void *extract(const char *what, int &dim) override;
+  void write_data(FILE *fp) override;
+  void write_data_all(FILE *fp) override;
+
+ protected:
+  bool is_stale() override;
+  std::vector<std::string> coefficients() override;
+  void restore(const std::vector<std::string> &texts) override;
+
+  // Complains if coefficients of one pair are not good.
+  virtual void check(const Coefficients &given) = 0;
+  virtual rust::Box<Style> make_from(double kt, rust::Slice<const Coefficients> pairs) = 0;
+  rust::Box<Style> make_style(double kt) final;
+  void read_cutoff(const char *arg);
+
+  double cutoff = 0.0;
+
+ private:
+  std::string words(int i, int j) const;
+  std::vector<Coefficients> table() const;
+
+  const std::vector<std::string> names;
+  // One table of types for each coefficient, as fix adapt changes them.
+  std::vector<double **> value;
+  std::vector<Coefficients> built;
+};
+
+}    // namespace psidpd
+
+#endif

@@ -1,0 +1,369 @@
+//! Forces of the pair styles inside LAMMPS against the plain evaluation of the model: every box, every
+//! boundary, hybrids, and pairs that LAMMPS lists.
+
+mod style_common;
+
+use psidpd_core::model::{Model, SplinePair, spline_dpd};
+use style_common::*;
+
+const CLOSE: f64 = 1e-10;
+
+/// Runs no step and compares forces, energy and virial; returns what was compared with.
+fn compare(script: &str, model: &Model) {
+    let l = open(&format!(
+        "{script}\ncompute w all pressure NULL virial\nthermo_style custom step pe c_w[1]\nthermo_modify norm no lost ignore\n\
+         fix 1 all nve\ntimestep {DT}\nrun 0\n"
+    ));
+    let truth = truth(&l, model, 1.0, Some(0));
+    let apart = difference(&frame(&l).f, &truth.forces);
+    assert!(apart < CLOSE, "forces differ by {apart}\n{script}");
+    let energy = l.thermo("pe").unwrap();
+    assert!((energy / truth.energy - 1.0).abs() < CLOSE, "{energy} {}\n{script}", truth.energy);
+    let virial = l.compute_vector("w").unwrap();
+    let volume = l.eval("vol").unwrap();
+    let scale = truth.virial.iter().fold(0.0f64, |m, w| m.max(w.abs()));
+    for (c, w) in truth.virial.iter().enumerate() {
+        if model.dimensions() == 3 || [0, 1, 3].contains(&c) {
+            // In two dimensions LAMMPS leaves the zz, xz and yz components out.
+            let found = virial[c] * volume;
+            assert!((found - w).abs() < 1e-9 * scale, "virial {c}: {found} {w}\n{script}");
+        }
+    }
+}
+
+#[test]
+fn spline_style_is_the_potential_of_its_coefficients() {
+    let pair = |a: f64, gamma: f64| SplinePair {
+        strength: a,
+        repulsion: 2.0,
+        attraction: 1.0,
+        repulsion_range: 0.8,
+        attraction_range: 1.0,
+        gamma,
+    };
+    let table = [Some(pair(18.75, 4.5)), Some(pair(10.0, 2.0)), None, Some(pair(25.0, 9.0))];
+    let model = spline_dpd(&["T1".into(), "T2".into()], &table, 1.2, 3).unwrap();
+    compare(
+        &format!(
+            "{}pair_style dpd/spline 1.0 1.2 {SEED}\npair_coeff 1 1 18.75 2 1 0.8 1.0 4.5\n\
+             pair_coeff 1 2 10 2 1 0.8 1.0 2.0\npair_coeff 2 2 25 2 1 0.8 1.0 9.0",
+            particles("", "block 0 5 0 5 0 5", 2, 500)
+        ),
+        &model,
+    );
+}
+
+#[test]
+fn spline_style_names_mistakes() {
+    let l = open(&particles("", "block 0 5 0 5 0 5", 1, 10));
+    let refused = |commands: &str, message: &str| {
+        let error = l.commands(commands).unwrap_err().to_string();
+        assert!(error.contains(message), "{commands}: {error}");
+    };
+    refused("pair_style dpd/spline 1.0 1.0", "expected 'pair_style dpd/spline T cutoff seed'");
+    refused("pair_style dpd/spline 1.0 -1 5", "the cut-off must be positive");
+    l.command("pair_style dpd/spline 1.0 1.0 5").unwrap();
+    refused("pair_coeff 1 1 1 2 3", "expected 'pair_coeff I J a A B rc1 rc2 gamma', found 5 arguments");
+    refused("pair_coeff 1 1 1 2 1 0.8 1.1 4.5", "must not exceed the cut-off");
+    refused("pair_coeff 1 1 1 2 1 0.8 1.0 -4.5\nrun 0", "must not be negative");
+    refused("pair_coeff 1 1 1 2 1 0.8 0.0 4.5\nrun 0", "range_B");
+}
+
+/// Boxes, boundaries, newton, on one rank.
+#[test]
+fn forces_are_the_models_in_every_box() {
+    let model = Model::open(warren().as_ref()).unwrap();
+    let style = format!("pair_style dpd/psi 1.0 {SEED}\npair_coeff * * {} F", warren());
+    for (before, region) in [
+        ("", "block 0 5 0 5 0 5"),
+        ("newton off", "block 0 5 0 4 0 3"),
+        ("", "prism 0 5 0 5 0 5 1.5 -1 2"),
+        ("newton off", "prism -1 4 0 5 0 5 -2 1 0.5"),
+        ("boundary p p f", "block 0 5 0 5 0 5"),
+        ("boundary s m f", "block -1 4 0 5 0 5"),
+        ("boundary f p p\nnewton off", "block 0 5 0 5 0 5"),
+        ("atom_modify sort 1 0.5", "block 0 5 0 5 0 5"),
+    ] {
+        compare(&format!("{}{style}", particles(before, region, 1, 500)), &model);
+    }
+}
+
+#[test]
+fn forces_are_the_models_in_two_dimensions() {
+    let (_folder, path) = file(FLAT);
+    let model = Model::parse("flat", FLAT).unwrap();
+    for (before, region) in [
+        ("dimension 2", "block 0 9 0 9 -0.1 0.1"),
+        ("dimension 2\nnewton off", "block 0 9 0 9 -0.1 0.1"),
+        ("dimension 2", "prism 0 9 0 9 -0.1 0.1 3 0 0"),
+        ("dimension 2\nboundary s p p", "block 0 9 0 9 -0.1 0.1"),
+    ] {
+        let script = format!(
+            "{}pair_style dpd/psi 1.0 {SEED}\npair_coeff * * {path} F\nfix flat all enforce2d",
+            particles(before, region, 1, 300)
+        );
+        compare(&script, &model);
+    }
+}
+
+#[test]
+fn wide_models_too() {
+    let (_folder, path) = file(WIDE);
+    let model = Model::parse("wide", WIDE).unwrap();
+    let style = format!("pair_style dpd/psi 1.0 {SEED}\npair_coeff * * {path} A B");
+    compare(&format!("{}{style}", particles("", "block 0 5 0 5 0 5", 2, 500)), &model);
+    // A hybrid forwards slopes in portions.
+    let style = format!("pair_style hybrid dpd/psi 1.0 {SEED}\npair_coeff * * dpd/psi {path} A B");
+    compare(&format!("{}{style}", particles("", "block 0 5 0 5 0 5", 2, 500)), &model);
+    // Excluding types that there are none of changes only where pairs come from.
+    let style = format!(
+        "pair_style dpd/psi 1.0 {SEED}\npair_coeff * * {path} A B\ngroup none empty\n\
+         neigh_modify exclude group none none"
+    );
+    for before in ["", "newton off"] {
+        compare(&format!("{}{style}", particles(before, "block 0 5 0 5 0 5", 2, 500)), &model);
+        compare(&format!("{}{style}", particles(before, "prism 0 5 0 5 0 5 1 1 1", 2, 500)), &model);
+    }
+}
+
+/// The same trajectory on one, two and four ranks, with sorting, in a skew box, newton on and off.
+#[test]
+fn ranks_do_not_matter() {
+    let (_folder, wide) = file(WIDE);
+    for (before, region, style) in [
+        ("", "block 0 6 0 6 0 6", format!("dpd/psi 1.0 {SEED}\npair_coeff * * {} F F", warren())),
+        ("newton off", "prism 0 6 0 6 0 6 1 2 -1", format!("dpd/psi 1.0 {SEED}\npair_coeff * * {wide} A B")),
+        (
+            "atom_modify sort 3 0.7\nboundary p f p\ncomm_style tiled",
+            "block 0 6 0 6 0 6",
+            format!("hybrid dpd/psi 1.0 {SEED}\npair_coeff * * dpd/psi {wide} A B"),
+        ),
+        (
+            "",
+            "block 0 6 0 6 0 6",
+            format!(
+                "dpd/psi 1.0 {SEED}\npair_coeff * * {wide} A B\ngroup g id 1:100\n\
+                 neigh_modify exclude group g g"
+            ),
+        ),
+    ] {
+        // Which atom has which ID depends on the ranks that create them.
+        let folder = tempfile::tempdir().unwrap();
+        let start = folder.path().join("start.data").display().to_string();
+        open(&format!(
+            "{}pair_style zero 1.0\npair_coeff * *\nwrite_data {start} nocoeff\n",
+            particles("", region, 2, 700)
+        ));
+        let script = format!(
+            "units lj\natom_style atomic\natom_modify map yes\n{before}\ncomm_modify vel yes\nread_data {start}\n{}\
+             pair_style {style}\nfix 1 all nve\nfix wall all wall/reflect ylo EDGE yhi EDGE\n\
+             timestep {DT}\nrun 10\n",
+            load()
+        );
+        let script = if before.contains("p f p") {
+            script
+        } else {
+            script.replace("fix wall all wall/reflect ylo EDGE yhi EDGE\n", "")
+        };
+        let one = run(&script, 1);
+        for ranks in [2, 4] {
+            let other = run(&script, ranks);
+            let apart =
+                [difference(&other.x, &one.x), difference(&other.v, &one.v), difference(&other.f, &one.f)];
+            assert!(apart.iter().all(|d| *d < 1e-9), "{ranks} ranks: {apart:?}\n{script}");
+        }
+    }
+}
+
+/// Forces of a hybrid with lj/cut and bonds are the sum of the forces of its parts.
+#[test]
+fn overlays_add_up() {
+    let (_folder, data) = file(&chains(100));
+    let head = |style: &str| {
+        format!(
+            "units lj\natom_style bond\natom_modify map yes\ncomm_modify vel yes\nspecial_bonds lj 1 1 1\n\
+             read_data {data}\nmass * 1\nvelocity all create 1.0 87 loop geom\n{}{style}\nfix 1 all nve\n\
+             timestep {DT}\nrun 0\n",
+            load()
+        )
+    };
+    let none = "bond_style zero\nbond_coeff *";
+    let bonds = "bond_style harmonic\nbond_coeff 1 20 0.5";
+    let psi = format!("dpd/psi 1.0 {SEED}");
+    let lj = "pair_coeff * * lj/cut 0.1 0.3";
+    let model = format!("pair_coeff * * dpd/psi {} F F", warren());
+    let all =
+        frame(&open(&head(&format!("pair_style hybrid/overlay lj/cut 1.0 {psi}\n{lj}\n{model}\n{bonds}"))));
+    let parts = [
+        format!("pair_style {psi}\npair_coeff * * {} F F\n{none}", warren()),
+        format!("pair_style lj/cut 1.0\npair_coeff * * 0.1 0.3\n{none}"),
+        format!("pair_style zero 1.0\npair_coeff * *\n{bonds}"),
+    ];
+    let mut sum = vec![[0.0; 3]; all.f.len()];
+    for part in &parts {
+        for (sum, f) in sum.iter_mut().zip(frame(&open(&head(part))).f) {
+            (0..3).for_each(|k| sum[k] += f[k]);
+        }
+    }
+    let apart = difference(&all.f, &sum);
+    assert!(apart < CLOSE, "{apart}");
+}
+
+/// In a hybrid, types of another style take no part: not in forces and not in densities.
+#[test]
+fn other_styles_types_take_no_part() {
+    let head = particles("", "block 0 5 0 5 0 5", 2, 500);
+    let lj = "pair_coeff * 2 lj/cut 0.0 0.3";
+    let psi = frame(&open(&format!(
+        "{head}pair_style hybrid dpd/psi 1.0 {SEED} lj/cut 1.0\npair_coeff * * dpd/psi {} F NULL\n{lj}\nrun 0\n",
+        warren()
+    )));
+    let mdpd = frame(&open(&format!(
+        "{head}pair_style hybrid mdpd/psi 1.0 1.0 {SEED} lj/cut 1.0\npair_coeff 1 1 mdpd/psi -40 25 18 1 0.75\n\
+         {lj}\nrun 0\n"
+    )));
+    assert!(difference(&mdpd.f, &psi.f) < CLOSE);
+    let alone = open(&format!(
+        "{head}group other type 2\ndelete_atoms group other\nreset_atoms id\npair_style dpd/psi 1.0 {SEED}\n\
+         pair_coeff * * {} F F\nrun 0\n",
+        warren()
+    ));
+    let conservative = |f: &Frame| f.f.iter().filter(|f| f.iter().any(|c| *c != 0.0)).count();
+    assert_eq!(conservative(&psi), alone.natoms().unwrap());
+    assert!(psi.f.iter().zip(&psi.kind).all(|(f, k)| *k == 1 || *f == [0.0; 3]));
+}
+
+/// Energy and conservative forces of Warren's fluid with a strength for each pair, by the formulas.
+fn scaled(x: &[[f64; 3]], length: f64, strength: impl Fn(usize, usize) -> f64) -> (f64, Vec<[f64; 3]>) {
+    let model = Model::open(warren().as_ref()).unwrap();
+    let fluid = model.at(1.0).unwrap();
+    let (kernel, coefficient) =
+        (fluid.densities[0].kernel, std::f64::consts::PI / 30.0 * 0.75f64.powi(4) * 25.0);
+    let pairs: Vec<(usize, usize, [f64; 3], f64, f64)> = (0..x.len())
+        .flat_map(|i| (0..i).map(move |j| (i, j)))
+        .filter_map(|(i, j)| {
+            let d: [f64; 3] = std::array::from_fn(|c| {
+                let d = x[i][c] - x[j][c];
+                d - length * (d / length).round()
+            });
+            let r = d.iter().map(|c| c * c).sum::<f64>().sqrt();
+            (r < 1.0).then(|| (i, j, d, r, strength(i, j)))
+        })
+        .collect();
+    let mut n = vec![0.0; x.len()];
+    let mut energy = 0.0;
+    for (i, j, _, r, s) in &pairs {
+        n[*i] += s * kernel.value(*r);
+        n[*j] += s * kernel.value(*r);
+        energy += s * -20.0 * (1.0 - r).powi(2);
+    }
+    energy += n.iter().map(|n| coefficient * n * n).sum::<f64>();
+    let mut f = vec![[0.0; 3]; x.len()];
+    for (i, j, d, r, s) in &pairs {
+        let force = s * (-40.0 * (1.0 - r) - 2.0 * coefficient * (n[*i] + n[*j]) * kernel.slope(*r));
+        for c in 0..3 {
+            f[*i][c] += force * d[c] / r;
+            f[*j][c] -= force * d[c] / r;
+        }
+    }
+    (energy, f)
+}
+
+/// Bonded neighbours at half and no strength; excluded types; the engine's pairs are LAMMPS's then.
+#[test]
+fn special_bonds_and_exclusions() {
+    let (_folder, data) = file(&chains(120));
+    let deck = |newton: &str, special: &str, more: &str| {
+        format!(
+            "newton {newton}\nunits lj\natom_style bond\natom_modify map yes\ncomm_modify vel yes\n\
+             special_bonds lj {special}\nread_data {data}\nmass * 1\n{}pair_style mdpd/psi 1.0 1.0 {SEED}\n\
+             pair_coeff * * -40 25 0 1 0.75\nbond_style zero\nbond_coeff *\n{more}\n\
+             fix 1 all nve\ntimestep {DT}\nthermo_modify norm no\nrun 0\n",
+            load()
+        )
+    };
+    let chain = |i: usize, j: usize| (i / 5 == j / 5).then(|| i.abs_diff(j));
+    for newton in ["on", "off"] {
+        let l = open(&deck(newton, "0.5 0.0 0.8", ""));
+        let (energy, f) = scaled(&frame(&l).x, 5.0, |i, j| match chain(i, j) {
+            Some(1) => 0.5,
+            Some(2) => 0.0,
+            Some(3) => 0.8,
+            _ => 1.0,
+        });
+        let apart = difference(&frame(&l).f, &f);
+        assert!(apart < CLOSE, "newton {newton}: {apart}");
+        let found = l.thermo("pe").unwrap();
+        assert!((found / energy - 1.0).abs() < CLOSE, "{found} {energy}");
+
+        let kind = frame(&l).kind;
+        let l = open(&deck(newton, "1 1 1", "neigh_modify exclude type 1 2"));
+        let (_, f) = scaled(&frame(&l).x, 5.0, |i, j| if kind[i] == kind[j] { 1.0 } else { 0.0 });
+        let apart = difference(&frame(&l).f, &f);
+        assert!(apart < CLOSE, "newton {newton}, exclusions: {apart}");
+    }
+    let two = deck("on", "0.5 0.0 0.8", "").replace("-40 25 0 1", "-40 25 18 1").replace("run 0", "run 10");
+    let one = run(&two, 1);
+    for ranks in [2, 4] {
+        let other = run(&two, ranks);
+        assert!(difference(&other.f, &one.f) < 1e-9, "{ranks} ranks");
+    }
+}
+
+/// Forces of a fluid with special factors are the gradient of its energy.
+#[test]
+fn special_factors_keep_the_potential() {
+    let (_folder, data) = file(&chains(60));
+    let l = open(&format!(
+        "units lj\natom_style bond\natom_modify map yes\nspecial_bonds lj 0.3 0.7 1\nread_data {data}\nmass * 1\n\
+         {}pair_style dpd/psi 1.0 {SEED}\npair_coeff * * {} F F\nbond_style zero\nbond_coeff *\nfix 1 all nve\n\
+         thermo_modify norm no\ncomm_modify vel yes\nmin_style quickmin\nminimize 0 0 0 0\nrun 0\n",
+        load(),
+        // Without drag, as forces are compared with the energy.
+        quiet().1
+    ));
+    let start = frame(&l);
+    for (i, c) in [(0, 0), (17, 1), (101, 2)] {
+        let h = 1e-5;
+        let mut energy = [0.0; 2];
+        for (side, energy) in energy.iter_mut().enumerate() {
+            let mut x: Vec<f64> = start.x.as_flattened().to_vec();
+            x[3 * i + c] += if side == 0 { h } else { -h };
+            l.scatter("x", 3, &x).unwrap();
+            l.command("run 0").unwrap();
+            *energy = l.thermo("pe").unwrap();
+        }
+        let slope = -(energy[0] - energy[1]) / (2.0 * h);
+        let f = start.f[i][c];
+        assert!((slope - f).abs() < 1e-4 * (1.0 + f.abs()), "{slope} {f}");
+    }
+}
+
+/// Warren's model without a thermostat, in a file that stays.
+fn quiet() -> &'static (tempfile::TempDir, String) {
+    static QUIET: std::sync::OnceLock<(tempfile::TempDir, String)> = std::sync::OnceLock::new();
+    QUIET.get_or_init(|| {
+        let text = std::fs::read_to_string(warren()).unwrap();
+        file(text.split("[[thermostat]]").next().unwrap())
+    })
+}
+
+/// Special factors and exclusions leave the temperature where the thermostat puts it: 1 in equilibrium.
+/// With 600 particles the temperature fluctuates by √(2/(3·600)) = 0.033 at one time, and by less than
+/// 0.008 in the mean over 6 time units of a thermostat with γ n ≈ 10; 0.04 is five times that.
+#[test]
+fn factors_do_not_shift_the_temperature() {
+    let (_folder, data) = file(&chains(120));
+    for (special, exclude) in [("0.5 0.2 1", ""), ("0 0 0", "neigh_modify exclude type 1 2")] {
+        let l = open(&format!(
+            "units lj\natom_style bond\natom_modify map yes\ncomm_modify vel yes\nspecial_bonds lj {special}\n\
+             read_data {data}\nmass * 1\nvelocity all create 1.0 87 loop geom\n{}\
+             pair_style dpd/spline 1.0 1.0 {SEED}\npair_coeff * * 18.75 1 0 1.0 1.0 9\n\
+             bond_style harmonic\nbond_coeff 1 10 0.3\n{exclude}\nfix 1 all nve\ntimestep 0.01\nrun 300\n\
+             fix mean all ave/time 1 600 600 c_thermo_temp\nrun 900\n",
+            load()
+        ));
+        let mean = l.eval("f_mean").unwrap();
+        assert!((mean - 1.0).abs() < 0.04, "special {special} {exclude}: {mean}");
+    }
+}
