@@ -124,6 +124,7 @@ mod ffi {
     }
 }
 
+#[allow(clippy::ptr_arg)] // What the bridge passes.
 fn style_from_file(
     path: &str,
     kt: f64,
@@ -133,6 +134,7 @@ fn style_from_file(
     Style::from_file(path, kt, names, dimensions).map(Box::new)
 }
 
+#[allow(clippy::ptr_arg)] // What the bridge passes.
 fn style_from_text(
     source: &str,
     text: &str,

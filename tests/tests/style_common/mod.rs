@@ -8,6 +8,8 @@ use psidpd_core::engine::reference::{Evaluation, evaluate, thermostat};
 use psidpd_core::engine::{PeriodicBox, Step};
 use psidpd_core::model::Model;
 use psidpd_tests::{lammps, root};
+use std::ops::Deref;
+use std::sync::{Mutex, MutexGuard};
 use std::time::Duration;
 
 pub const LIMIT: Duration = Duration::from_secs(120);
@@ -73,9 +75,25 @@ pub struct Frame {
     pub f: Vec<[f64; 3]>,
 }
 
+/// The one LAMMPS of this process that has the plugin: closing one unloads plugins from all, so they
+/// take turns. Opening a second one in the same thread waits for ever.
+pub struct Only {
+    lammps: Lammps,
+    _turn: MutexGuard<'static, ()>,
+}
+
+impl Deref for Only {
+    type Target = Lammps;
+    fn deref(&self) -> &Lammps {
+        &self.lammps
+    }
+}
+
 /// A LAMMPS in this process that has carried out a script.
-pub fn open(script: &str) -> Lammps {
-    let l = Lammps::open(&lammps().0, &[]).unwrap();
+pub fn open(script: &str) -> Only {
+    static TURN: Mutex<()> = Mutex::new(());
+    let turn = TURN.lock().unwrap_or_else(|e| e.into_inner());
+    let l = Only { lammps: Lammps::open(&lammps().0, &[]).unwrap(), _turn: turn };
     l.commands(script).unwrap_or_else(|e| panic!("{e}\n{script}"));
     l
 }

@@ -70,3 +70,126 @@ impl Engine {
         self.evaluate_excess(particles.tag)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::{Tally, Want};
+    use crate::model::{ForceLaw, Model, WarrenPair, warren_ab};
+
+    fn model() -> Model {
+        let pair = Some(WarrenPair { a: -40.0, b: 25.0, gamma: 18.0, rc: 1.0, rd: 0.75 });
+        warren_ab(&["F".into()], &[pair], 3, ForceLaw::Conservative).unwrap()
+    }
+
+    /// Some points in a box of length 2, of which `owned` are owned.
+    fn points() -> Vec<[f64; 3]> {
+        (0..60u32)
+            .map(|k| [k * 7 % 19, k * 11 % 17, k * 5 % 13].map(|n| n as f64 / 9.0 + 0.01 * (k % 3) as f64))
+            .collect()
+    }
+
+    type Forces = (Tally, Vec<[f64; 3]>);
+
+    fn forces(engine: &mut Engine, particles: &Particles) -> Forces {
+        let mut f = vec![[0.0; 3]; particles.x.len()];
+        let tally = engine.forces(particles, &[], None, Want::TOTALS, &mut f).unwrap();
+        (tally, f)
+    }
+
+    fn agree(a: &Forces, b: &Forces) {
+        assert!((a.0.energy() - b.0.energy()).abs() < 1e-9);
+        for (a, b) in a.1.as_flattened().iter().zip(b.1.as_flattened()) {
+            assert!((a - b).abs() < 1e-9, "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn all_pairs_listed_are_the_search_and_factors_scale() {
+        let mut engine = Engine::new(&model().at(1.0).unwrap()).unwrap();
+        let x = points();
+        let tag: Vec<i32> = (1..=60).collect();
+        let kind = vec![0; 60];
+        for newton in [Newton::On, Newton::Off] {
+            // Without ghosts slopes need no host.
+            let particles = Particles { owned: 60, x: &x, tag: &tag, kind: &kind };
+            let (i, j): (Vec<i32>, Vec<i32>) = (0..60).flat_map(|i| (0..i).map(move |j| (i, j))).unzip();
+            engine.densities(&particles, newton).unwrap();
+            let searched = forces(&mut engine, &particles);
+            let listed = PairsOfHost { i: &i, j: &j, factor: &[] };
+            engine.densities_of_pairs(&particles, &listed, newton).unwrap();
+            agree(&forces(&mut engine, &particles), &searched);
+            let ones = vec![1.0; i.len()];
+            engine.densities_of_pairs(&particles, &PairsOfHost { factor: &ones, ..listed }, newton).unwrap();
+            agree(&forces(&mut engine, &particles), &searched);
+            assert!(engine.memory() > 60 * 8);
+
+            // Forces are the gradient of the energy at any factors.
+            let factor: Vec<f64> = (0..i.len()).map(|k| [0.0, 0.3, 1.0][k % 3]).collect();
+            let listed = PairsOfHost { factor: &factor, ..listed };
+            engine.densities_of_pairs(&particles, &listed, newton).unwrap();
+            let (_, f) = forces(&mut engine, &particles);
+            for (k, c) in [(3, 0), (20, 1), (59, 2)] {
+                let energy = [1e-5, -1e-5].map(|h| {
+                    let mut x = x.clone();
+                    x[k][c] += h;
+                    let moved = Particles { x: &x, ..particles };
+                    let mut engine = Engine::new(&model().at(1.0).unwrap()).unwrap();
+                    engine.densities_of_pairs(&moved, &listed, newton).unwrap();
+                    forces(&mut engine, &moved).0.energy()
+                });
+                let slope = -(energy[0] - energy[1]) / 2e-5;
+                assert!((slope - f[k][c]).abs() < 1e-5 * (1.0 + slope.abs()), "{slope} {}", f[k][c]);
+            }
+        }
+    }
+
+    #[test]
+    fn single_pairs_add_up_to_the_forces() {
+        let mut engine = Engine::new(&model().at(1.0).unwrap()).unwrap();
+        let x = points();
+        let (tag, kind): (Vec<i32>, Vec<i32>) = ((1..=60).collect(), vec![0; 60]);
+        let particles = Particles { owned: 60, x: &x, tag: &tag, kind: &kind };
+        engine.densities(&particles, Newton::On).unwrap();
+        let (tally, f) = forces(&mut engine, &particles);
+        let mut sum = vec![[0.0; 3]; 60];
+        let mut phi = 0.0;
+        for i in 0..60 {
+            for j in 0..i {
+                let d: [f64; 3] = std::array::from_fn(|c| x[i][c] - x[j][c]);
+                let r = d.iter().map(|c| c * c).sum::<f64>().sqrt();
+                let (energy, force) = engine.single([0, 0], r, Some([i, j]));
+                phi += energy;
+                for (c, d) in d.iter().enumerate() {
+                    sum[i][c] += force * d / r;
+                    sum[j][c] -= force * d / r;
+                }
+            }
+        }
+        agree(&(Tally { excess: 0.0, pair: phi, ..tally }, sum), &(Tally { excess: 0.0, ..tally }, f));
+        assert_eq!(engine.single([0, 1], 0.5, None), (0.0, 0.0));
+        let alone = engine.single([0, 0], 0.5, None);
+        assert_eq!(alone, engine.single([0, 0], 0.5, Some([3, 400])));
+        assert!((alone.1 + 20.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn lists_that_make_no_sense_are_refused() {
+        let mut engine = Engine::new(&model().at(1.0).unwrap()).unwrap();
+        let mut x = points();
+        let (tag, kind): (Vec<i32>, Vec<i32>) = ((1..=60).collect(), vec![0; 60]);
+        for (i, j, factor) in [(0, 60, 1.0), (50, 0, 1.0), (-1, 0, 1.0)] {
+            let particles = Particles { owned: 50, x: &x, tag: &tag, kind: &kind };
+            let listed = PairsOfHost { i: &[i], j: &[j], factor: &[factor] };
+            assert!(engine.densities_of_pairs(&particles, &listed, Newton::On).is_err());
+            let uneven = PairsOfHost { factor: &[1.0, 1.0], ..listed };
+            assert!(engine.densities_of_pairs(&particles, &uneven, Newton::On).is_err());
+        }
+        x[7][1] = f64::NAN;
+        let particles = Particles { owned: 60, x: &x, tag: &tag, kind: &kind };
+        let error = engine
+            .densities_of_pairs(&particles, &PairsOfHost { i: &[], j: &[], factor: &[] }, Newton::On)
+            .unwrap_err();
+        assert_eq!(error, EngineError::Position { tag: 8 });
+    }
+}
