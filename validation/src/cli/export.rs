@@ -1,5 +1,7 @@
 use super::{Failure, Verdict, write_json};
 use crate::export::eam::{self, Grid};
+use crate::export::lammps as deck;
+use crate::scene::Scene;
 use psidpd_core::model::Model;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -9,6 +11,18 @@ use std::path::{Path, PathBuf};
 pub enum Verb {
     /// Tables for LAMMPS's pair_style eam/alloy: the same conservative fluid in any LAMMPS.
     Eam(EamArguments),
+    /// An input deck for LAMMPS with the pair style dpd/psi: the scene's own trajectory.
+    Lammps(LammpsArguments),
+}
+
+/// Arguments of `export lammps`.
+#[derive(Debug, clap::Args)]
+pub struct LammpsArguments {
+    /// The scene file.
+    scene: PathBuf,
+    /// Folder for in.lammps, start.data, model.toml and the tables of the model.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
 }
 
 /// Arguments of `export eam`.
@@ -34,7 +48,22 @@ pub struct EamArguments {
 }
 
 pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
-    let Verb::Eam(a) = verb;
+    match verb {
+        Verb::Eam(a) => run_eam(a, json),
+        Verb::Lammps(a) => run_lammps(a, json),
+    }
+}
+
+fn run_lammps(a: &LammpsArguments, json: Option<&Path>) -> Result<Verdict, Failure> {
+    let scene = Scene::open(&a.scene).map_err(Failure::new)?;
+    let files = deck::write(&scene, &a.out).map_err(Failure::new)?;
+    println!("written to {}; run it there:", a.out.display());
+    println!("lmp -in {} -var plugin PATH/psidpdplugin.so", deck::SCRIPT);
+    write_json(json, &json!({"folder": a.out, "files": files}))?;
+    Ok(Verdict::Good)
+}
+
+fn run_eam(a: &EamArguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     let model = Model::open(&a.model).map_err(Failure::new)?;
     let fluid = model.at(a.kt).map_err(Failure::new)?;
     let out = a.out.clone().unwrap_or_else(|| {

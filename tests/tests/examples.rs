@@ -1,0 +1,146 @@
+//! The scripts in `lammps-plugin/examples`: every one runs, on one rank and on two.
+
+use psidpd_tests::{lammps, root};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Scripts, each in its folder.
+fn scripts() -> Vec<PathBuf> {
+    let folder = root().join("lammps-plugin/examples");
+    let mut found: Vec<PathBuf> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|e| e.unwrap().path())
+        .filter(|p| p.is_dir())
+        .map(|p| {
+            let name = format!("in.{}", p.file_name().unwrap().to_str().unwrap());
+            p.join(name)
+        })
+        .collect();
+    found.sort();
+    found
+}
+
+/// Tables of thermo output, one for each run: columns and rows.
+fn tables(output: &str) -> Vec<(Vec<String>, Vec<Vec<f64>>)> {
+    let mut tables = Vec::new();
+    let mut lines = output.lines();
+    while let Some(line) = lines.next() {
+        let columns: Vec<String> = line.split_whitespace().map(str::to_owned).collect();
+        if columns.first().is_none_or(|c| c != "Step") {
+            continue;
+        }
+        let rows = lines
+            .by_ref()
+            .take_while(|l| !l.starts_with("Loop time"))
+            .filter_map(|l| l.split_whitespace().map(|w| w.parse().ok()).collect::<Option<Vec<f64>>>())
+            .filter(|row| row.len() == columns.len())
+            .collect();
+        tables.push((columns, rows));
+    }
+    tables
+}
+
+/// The potential energies of the first and of the last row, all rows checked.
+fn energies(script: &Path, output: &str) -> [f64; 2] {
+    let tables = tables(output);
+    assert!(!tables.is_empty(), "{}: no thermo output\n{output}", script.display());
+    let mut energies = Vec::new();
+    for (columns, rows) in &tables {
+        assert!(rows.len() >= 2, "{}: {rows:?}", script.display());
+        for row in rows {
+            assert!(row.iter().all(|x| x.is_finite()), "{}: {columns:?} {row:?}", script.display());
+        }
+        let energy = columns.iter().position(|c| c == "PotEng" || c == "E_pair").unwrap();
+        energies.extend(rows.iter().map(|row| row[energy]));
+    }
+    [energies[0], energies[energies.len() - 1]]
+}
+
+#[test]
+fn examples_run_on_one_rank_and_on_two() {
+    let (host, plugin) = lammps();
+    let scripts = scripts();
+    assert_eq!(scripts.len(), 8);
+    let [plugin, models] =
+        [plugin.clone(), root().join("validation/models")].map(|p| p.display().to_string());
+    let arguments =
+        ["-log", "none", "-var", "plugin", &plugin, "-var", "models", &models, "-var", "steps", "50"];
+    for script in scripts {
+        let [one, two] = [1, 2].map(|ranks| {
+            // What scripts write stays out of the checkout.
+            let folder = tempfile::tempdir().unwrap();
+            let run = host.run_script(ranks, folder.path(), &script, &arguments, Duration::from_secs(120));
+            let run = run.unwrap_or_else(|e| panic!("{}, {ranks} ranks: {e}", script.display()));
+            energies(&script, &run.stdout)
+        });
+        // LAMMPS numbers new atoms by ranks, and the noise goes by number: only the start is the same.
+        for (k, largest) in [(0, 1e-6), (1, 0.05)] {
+            let apart = (one[k] - two[k]).abs();
+            assert!(apart < largest * (1.0 + one[k].abs()), "{}: {one:?} {two:?}", script.display());
+        }
+    }
+}
+
+/// What a reader finds beside the scripts: a page, logs of both runs, and nobody's folders in them.
+#[test]
+fn examples_have_pages_and_logs() {
+    for script in scripts() {
+        let folder = script.parent().unwrap();
+        assert!(folder.join("README.md").is_file(), "{}", folder.display());
+        let mut logs: Vec<PathBuf> = std::fs::read_dir(folder)
+            .unwrap()
+            .map(|e| e.unwrap().path())
+            .filter(|p| p.file_name().unwrap().to_str().unwrap().starts_with("log."))
+            .collect();
+        logs.sort();
+        assert_eq!(logs.len(), 2, "{}", folder.display());
+        for (log, ranks) in logs.iter().zip(["1", "2"]) {
+            assert_eq!(log.extension().unwrap(), ranks);
+            let text = std::fs::read_to_string(log).unwrap();
+            assert!(text.contains(&format!("on {ranks} procs")), "{}", log.display());
+            assert!(text.contains("Total wall time"), "{} is not whole", log.display());
+            for path in ["/tmp", "/home", "/root", "/work", "/usr"] {
+                assert!(!text.contains(path), "{} has {path}", log.display());
+            }
+            // The script has not changed since.
+            for line in std::fs::read_to_string(&script).unwrap().lines() {
+                assert!(text.contains(line.trim_end()), "{} lacks: {line}", log.display());
+            }
+        }
+    }
+}
+
+/// The commands that the manual pages give as examples are accepted.
+#[test]
+fn examples_of_the_manual_pages_are_accepted() {
+    let (host, plugin) = lammps();
+    let models = root().join("validation/models");
+    let mut count = 0;
+    for page in ["pair_dpd_psi", "pair_mdpd_psi", "pair_dpd_spline"] {
+        let text = std::fs::read_to_string(root().join(format!("lammps-plugin/doc/{page}.md"))).unwrap();
+        let (_, examples) = text.split_once("## Examples\n\n```text\n").unwrap();
+        let (examples, _) = examples.split_once("```").unwrap();
+        // Paragraphs: one that loads the plugin, then one style each.
+        for style in examples.split("\n\n").skip(1) {
+            let types = if style.contains(" A B") || style.contains("1 2") { 2 } else { 1 };
+            let flat = style.contains("-2d");
+            let (dimension, edge) = if flat { (2, "-0.5 0.5") } else { (3, "0 5") };
+            let script = format!(
+                "units lj\ndimension {dimension}\ncomm_modify vel yes\nregion b block 0 5 0 5 {edge}\n\
+                 create_box {types} b\ncreate_atoms 1 random 50 1 b\ncreate_atoms {types} random 50 2 b\n\
+                 mass * 1\nplugin load {}\n{style}\nrun 0\n",
+                plugin.display()
+            );
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("in.page");
+            std::fs::write(&path, &script).unwrap();
+            for model in std::fs::read_dir(&models).unwrap().map(|e| e.unwrap().path()) {
+                std::fs::copy(&model, folder.path().join(model.file_name().unwrap())).unwrap();
+            }
+            let run = host.run_script(1, folder.path(), &path, &[], Duration::from_secs(60));
+            assert!(run.is_ok(), "{page}: {}\n{script}", run.unwrap_err());
+            count += 1;
+        }
+    }
+    assert_eq!(count, 8);
+}

@@ -1,0 +1,296 @@
+//! Decks that `export lammps` writes: the trajectory of the scene, step by step.
+
+use psidpd::lammps::{DataFile, dump};
+use psidpd_tests::{lammps, psidpd, root, said};
+use std::path::Path;
+use std::time::Duration;
+
+const ONE_SPECIES: &str = r#"
+title = "one species"
+model = "MODELS/warren2003-set6.toml"
+kT    = 1.0
+seed  = 11
+[box]
+lengths = [5.0, 6.0, 7.0]
+[initial]
+kind    = "random"
+density = 6.0
+[[stage]]
+name  = "all"
+steps = 50
+dt    = 0.005
+[output]
+thermo = 10
+dump   = 25
+"#;
+
+const TWO_SPECIES: &str = r#"
+title = "two species & stages"
+model = "mixture.toml"
+kT    = 1.0
+seed  = 12
+[box]
+lengths = [5.0, 5.0, 5.0]
+[masses]
+B = 2.0
+[initial]
+kind    = "lattice"
+density = 3.0
+composition = { A = 0.7, B = 0.3 }
+[[stage]]
+name  = "warm"
+steps = 20
+dt    = 0.02
+[[stage]]
+name  = "hot"
+steps = 10
+dt    = 0.01
+kT    = 2.0
+integrator = "groot-warren"
+lambda = 0.5
+[[stage]]
+name  = "alone"
+steps = 10
+dt    = 0.01
+thermostat = false
+[[stage]]
+name  = "warm again"
+steps = 10
+dt    = 0.02
+[output]
+thermo = 5
+dump   = 10
+"#;
+
+/// kT in ψ, partial densities, a table beside the model.
+const MIXTURE: &str = r#"
+title   = "mixture"
+species = ["A", "B"]
+[density.n]
+kernel = "quadratic"
+range  = 1.0
+[excess_free_energy]
+A = "kT*0.1*n + 0.8*n_B + 0.05*n_A^2"
+B = "2.0*n_A + 0.3*n_B"
+[[thermostat]]
+between = ["A", "B"]
+gamma = 3.0
+range = 0.8
+[[thermostat]]
+between = ["A", "A"]
+gamma = 4.5
+range = 1.0
+[[thermostat]]
+between = ["B", "B"]
+gamma = 6.0
+range = 1.0
+[[pair]]
+between = ["A", "B"]
+form    = "table"
+file    = "../ab.csv"
+range   = 1.0
+"#;
+
+const FLAT: &str = r#"
+title = "two dimensions"
+model = "flat.toml"
+kT    = 0.75
+seed  = 13
+[box]
+lengths = [7.0, 9.0]
+[initial]
+kind    = "lattice"
+density = 12.0
+[[stage]]
+name  = "all"
+steps = 50
+dt    = 0.005
+[output]
+thermo = 10
+dump   = 10
+"#;
+
+const FLAT_MODEL: &str = r#"
+title = "van der Waals in two dimensions"
+dimensions = 2
+species = ["F"]
+[density.n]
+kernel = "quadratic"
+range  = 1.0
+[excess_free_energy]
+F = "-kT*ln(1 - 0.016*n) - 0.0304*n - 0.0012*n^2"
+[[thermostat]]
+gamma = 1.0
+range = 1.0
+"#;
+
+/// A folder with a scene in `scenes/`, its model and a table.
+fn folder(scene: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let scenes = folder.path().join("scenes");
+    std::fs::create_dir(&scenes).unwrap();
+    let models = root().join("validation/models").display().to_string();
+    std::fs::write(scenes.join("scene.toml"), scene.replace("MODELS", &models)).unwrap();
+    std::fs::write(scenes.join("mixture.toml"), MIXTURE).unwrap();
+    std::fs::write(scenes.join("flat.toml"), FLAT_MODEL).unwrap();
+    let rows: String = (0..=50)
+        .map(|k| {
+            let r = 0.02 * f64::from(k);
+            format!("{r}, {}\n", 8.0 * (1.0 - r).powi(3))
+        })
+        .collect();
+    std::fs::write(folder.path().join("ab.csv"), format!("r, phi\n{rows}")).unwrap();
+    folder
+}
+
+/// Runs `scene` natively and as a deck, on `ranks`, and compares every row and frame.
+fn compare(scene: &str, ranks: usize) {
+    let folder = folder(scene);
+    let at = folder.path();
+    let run = psidpd(at, &["run", "scenes/scene.toml", "--out", "native"]);
+    assert!(run.status.success(), "{}", said(&run));
+    let export =
+        psidpd(at, &["export", "lammps", "scenes/scene.toml", "--out", "deck", "--json", "deck.json"]);
+    assert!(export.status.success(), "{}", said(&export));
+    let deck = at.join("deck");
+    let json: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(at.join("deck.json")).unwrap()).unwrap();
+    for file in json["files"].as_array().unwrap() {
+        assert!(deck.join(file.as_str().unwrap()).is_file(), "{file}");
+    }
+    let (host, plugin) = lammps();
+    let plugin = plugin.display().to_string();
+    host.run_script(
+        ranks,
+        &deck,
+        Path::new("in.lammps"),
+        &["-var", "plugin", &plugin],
+        Duration::from_secs(120),
+    )
+    .unwrap();
+    compare_frames(at);
+    compare_rows(at);
+    compare_ends(at);
+}
+
+/// The largest difference, by whole boxes where that is less.
+fn distance(a: [f64; 3], b: [f64; 3], length: [f64; 3]) -> f64 {
+    (0..3).fold(0.0, |most: f64, c| {
+        let d = a[c] - b[c];
+        let d = (d - length[c] * (d / length[c]).round()).abs();
+        if d > most || d.is_nan() { d } else { most }
+    })
+}
+
+fn compare_frames(at: &Path) {
+    let read = |folder: &str| {
+        let mut frames = dump::read(&at.join(folder).join("dump.lammpstrj")).unwrap();
+        frames.iter_mut().for_each(|f| assert!(f.sort_by_id()));
+        frames
+    };
+    let (ours, theirs) = (read("native"), read("deck"));
+    assert_eq!(ours.len(), theirs.len());
+    assert!(ours.len() > 2);
+    for (a, b) in ours.iter().zip(&theirs) {
+        assert_eq!(a.step, b.step);
+        assert_eq!(a.get("type"), b.get("type"));
+        let length: [f64; 3] = std::array::from_fn(|c| a.boxhi[c] - a.boxlo[c]);
+        for (names, length) in [(["x", "y", "z"], length), (["vx", "vy", "vz"], [f64::MAX; 3])] {
+            let (a, b) = (a.vectors(names).unwrap(), b.vectors(names).unwrap());
+            assert_eq!(a.len(), b.len());
+            let most = a.iter().zip(&b).map(|(a, b)| distance(*a, *b, length)).fold(0.0, f64::max);
+            assert!(most < 1e-10, "{names:?} differ by {most:e}");
+        }
+    }
+}
+
+/// thermo.csv and the rows of the log.
+fn compare_rows(at: &Path) {
+    let numbers = |line: &str, separator: char| -> Option<Vec<f64>> {
+        let fields = line.split(separator).filter(|f| !f.trim().is_empty());
+        fields.map(|f| f.trim().parse().ok()).collect()
+    };
+    let csv = std::fs::read_to_string(at.join("native/thermo.csv")).unwrap();
+    let log = std::fs::read_to_string(at.join("deck/log.lammps")).unwrap();
+    let theirs: Vec<Vec<f64>> =
+        log.lines().filter_map(|l| numbers(l, ' ')).filter(|row| row.len() == 12).collect();
+    let ours: Vec<Vec<f64>> = csv.lines().skip(1).map(|l| numbers(l, ',').unwrap()).collect();
+    assert!(ours.len() > 4);
+    for row in &ours {
+        // The end of a stage, and the start of the next: the first has the forces of the native row.
+        let other = theirs.iter().find(|r| r[0] == row[0]).unwrap_or_else(|| panic!("no row {}", row[0]));
+        for (a, b) in row.iter().zip(other) {
+            assert!((a - b).abs() <= 1e-9 * (1.0 + a.abs()), "{row:?}\n{other:?}");
+        }
+    }
+}
+
+fn compare_ends(at: &Path) {
+    let [ours, theirs] = ["native", "deck"].map(|folder| {
+        let mut data = DataFile::read(&at.join(folder).join("final.data")).unwrap();
+        data.sort_by_id();
+        data
+    });
+    assert_eq!(ours.masses, theirs.masses);
+    assert_eq!(ours.atoms.len(), theirs.atoms.len());
+    let length: [f64; 3] = std::array::from_fn(|c| ours.boxhi[c] - ours.boxlo[c]);
+    for (a, b) in ours.atoms.iter().zip(&theirs.atoms) {
+        let unwrapped = |x: [f64; 3], image: [i32; 3]| -> [f64; 3] {
+            std::array::from_fn(|c| x[c] + f64::from(image[c]) * length[c])
+        };
+        let most = distance(unwrapped(a.x, a.image), unwrapped(b.x, b.image), [f64::MAX; 3]);
+        assert!(a.id == b.id && most < 1e-10, "{a:?} {b:?}");
+    }
+}
+
+#[test]
+fn one_species_in_three_dimensions() {
+    compare(ONE_SPECIES, 1);
+    compare(ONE_SPECIES, 2);
+}
+
+#[test]
+fn two_species_stages_and_a_table() {
+    compare(TWO_SPECIES, 1);
+    compare(TWO_SPECIES, 2);
+}
+
+#[test]
+fn two_dimensions() {
+    compare(FLAT, 1);
+    compare(FLAT, 2);
+}
+
+#[test]
+fn what_has_no_counterpart_is_refused() {
+    let cases = [
+        (
+            ONE_SPECIES.replace("dt    = 0.005", "dt    = 0.005\nintegrator = \"groot-warren\""),
+            "groot-warren with lambda = 0.65 has no counterpart",
+        ),
+        (ONE_SPECIES.replace("seed  = 11", "seed  = 0"), "the seed must be at least 1"),
+        (ONE_SPECIES.replace("steps = 50", "steps = 3000000000"), "more than one run of LAMMPS takes"),
+    ];
+    for (scene, message) in cases {
+        let folder = folder(&scene);
+        let export = psidpd(folder.path(), &["export", "lammps", "scenes/scene.toml", "--out", "deck"]);
+        // Long messages are wrapped and framed.
+        let text = said(&export).replace('│', " ");
+        let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_eq!(export.status.code(), Some(2), "{text}");
+        assert!(text.contains(message), "{message}\n{text}");
+    }
+}
+
+/// A thermostat that is not written as sections of its own cannot be cut out.
+#[test]
+fn an_inline_thermostat_is_refused_where_it_must_go() {
+    let folder = folder(&FLAT.replace("dt    = 0.005", "dt    = 0.005\nthermostat = false"));
+    let inline = FLAT_MODEL
+        .replace("[[thermostat]]\ngamma = 1.0\nrange = 1.0\n", "")
+        .replace("species = [\"F\"]", "species = [\"F\"]\nthermostat = [{ gamma = 1.0, range = 1.0 }]");
+    std::fs::write(folder.path().join("scenes/flat.toml"), inline).unwrap();
+    let export = psidpd(folder.path(), &["export", "lammps", "scenes/scene.toml", "--out", "deck"]);
+    assert_eq!(export.status.code(), Some(2));
+    assert!(said(&export).contains("cannot take the thermostat out"), "{}", said(&export));
+}
