@@ -25,6 +25,8 @@ pub struct Style {
     /// Species of each type, from 0; LAMMPS counts types from 1.
     kinds: Vec<i32>,
     all_densities: bool,
+    /// What the letters of pair_coeff mean.
+    letters: Option<&'static str>,
 }
 
 /// The types, from 0, that have coefficients with any type: the others are another style's of a hybrid.
@@ -112,7 +114,14 @@ impl Style {
                 }
                 e => StyleError(e.to_string()),
             })?;
-            Style::of_members(model, kt, &members, types, dimensions)
+            let style = Style::of_members(model, kt, &members, types, dimensions)?;
+            Ok(Style {
+                letters: Some(
+                    "as in mdpd: the force is A (1 - r/rc) + B (n_i + n_j)(1 - r/rd), which is psi = c B n^2 with \
+                     c = pi/30 rd^4 in 3-D (Warren eq. 13)",
+                ),
+                ..style
+            })
         })
     }
 
@@ -133,7 +142,13 @@ impl Style {
             let table = table_of(pairs, types, &members);
             let model = spline_dpd(&species, &table, thermostat_range, dimensions)
                 .map_err(|e| StyleError(e.to_string()))?;
-            Style::of_members(model, kt, &members, types, dimensions)
+            let style = Style::of_members(model, kt, &members, types, dimensions)?;
+            Ok(Style {
+                letters: Some(
+                    "phi = a [A W(r, rc1) - B W(r, rc2)], W the cubic spline with W(0) = 1, not normalised",
+                ),
+                ..style
+            })
         })
     }
 
@@ -174,7 +189,7 @@ impl Style {
             }
         }
         let engine = engine_at(&model, kt, &kinds)?;
-        Ok(Style { model, engine, kinds, all_densities: false })
+        Ok(Style { model, engine, kinds, all_densities: false, letters: None })
     }
 
     /// Another temperature: the model's expressions see it, and the noise.
@@ -228,6 +243,9 @@ impl Style {
             "  conventions   number densities, [w] = 1, no self term unless the model says so; \
              F = -dU/dr with U = sum psi + sum phi; drag sees the half-step velocity\n",
         );
+        if let Some(letters) = self.letters {
+            let _ = writeln!(text, "  coefficients  {letters}");
+        }
         let _ = writeln!(text, "  search        {search}");
         text
     }
