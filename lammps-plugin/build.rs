@@ -11,7 +11,9 @@ fn main() {
     for name in ["PSIDPD_LAMMPS_INCLUDE", "PSIDPD_MPI_INCLUDE", "PSIDPD_LAMMPS_VERSION"] {
         println!("cargo::rerun-if-env-changed={name}");
     }
-    println!("cargo::rerun-if-changed=cpp");
+    for folder in ["cpp", "compat"] {
+        println!("cargo::rerun-if-changed={folder}");
+    }
     let Some(lammps) = env::var_os("PSIDPD_LAMMPS_INCLUDE").map(PathBuf::from) else {
         return;
     };
@@ -33,6 +35,7 @@ fn main() {
             "cpp/pair_dpd_psi.cpp",
             "cpp/pair_mdpd_psi.cpp",
             "cpp/pair_dpd_spline.cpp",
+            "cpp/register.cpp",
         ])
         .include("cpp")
         .std("c++17")
@@ -41,6 +44,10 @@ fn main() {
         .define("OMPI_SKIP_MPICXX", None);
     // The host's headers are not ours to warn about.
     build.flag("-isystem").flag(lammps.as_os_str());
+    // Debian 12 packages the headers without the fmt that they include.
+    if !lammps.join("fmt/format.h").is_file() {
+        build.include("compat");
+    }
     if let Some(mpi) = env::var_os("PSIDPD_MPI_INCLUDE") {
         build.flag("-isystem").flag(&mpi);
     }

@@ -26,21 +26,30 @@ auto forward_slopes(Comm *comm, LAMMPS_NS::Pair *pair, long) -> decltype(comm->f
   comm->forward_comm_pair(pair);
 }
 
+// Asks for a full neighbor list and returns true; or, where LAMMPS's headers do not let one ask, for its
+// default half list and returns false.
 // add_request(Pair *, flags), flag 1 for a full list, was request(Pair *, instance) before 2022.
 template <class Neighbor>
-auto request_full_list(Neighbor *neighbor, LAMMPS_NS::Pair *pair, int, int)
-    -> decltype(neighbor->add_request(pair, 1), void())
+auto request_list(Neighbor *neighbor, LAMMPS_NS::Pair *pair, int, int)
+    -> decltype(neighbor->add_request(pair, 1), bool())
 {
   neighbor->add_request(pair, 1);
+  return true;
 }
 
 template <class Neighbor>
-auto request_full_list(Neighbor *neighbor, LAMMPS_NS::Pair *pair, int instance, long)
-    -> decltype(neighbor->request(pair, instance), void())
+auto request_list(Neighbor *neighbor, LAMMPS_NS::Pair *pair, int instance, long)
+    -> decltype(neighbor->request(pair, instance), bool())
 {
   const int k = neighbor->request(pair, instance);
+#if __has_include("neigh_request.h")
   neighbor->requests[k]->half = 0;
   neighbor->requests[k]->full = 1;
+  return true;
+#else
+  (void) k;
+  return false;
+#endif
 }
 
 }    // namespace psidpd

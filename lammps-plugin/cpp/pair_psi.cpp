@@ -167,7 +167,10 @@ void PairPsi::init_style()
     why_listed += why_listed.empty() ? "neigh_modify exclude" : " and neigh_modify exclude";
   if (neighbor->includegroup)
     why_listed += why_listed.empty() ? "neigh_modify include" : " and neigh_modify include";
-  if (!why_listed.empty()) request_full_list(neighbor, this, instance_me, 0);
+  if (!why_listed.empty()) full_list = request_list(neighbor, this, instance_me, 0);
+  // With newton off a half list has the pairs of owned atoms with ghosts on both sides, which will do.
+  if (!why_listed.empty() && !full_list && force->newton_pair)
+    stop("with " + why_listed + " this version of LAMMPS needs 'newton off'");
 
   if (!described && comm->me == 0) utils::logmesg(lmp, std::string((*style)->description(search())));
   described = true;
@@ -176,7 +179,7 @@ void PairPsi::init_style()
 std::string PairPsi::search()
 {
   if (why_listed.empty()) return "own cell list every step; no neighbor list is requested";
-  return "full neighbor list of LAMMPS, because of " + why_listed +
+  return std::string(full_list ? "full" : "half") + " neighbor list of LAMMPS, because of " + why_listed +
       ": pairs that are not in it do not interact, special factors scale phi and w";
 }
 
@@ -246,7 +249,7 @@ void PairPsi::collect_pairs()
     for (int jj = 0; jj < list->numneigh[i]; jj++) {
       const int entry = list->firstneigh[i][jj];
       const int j = entry & NEIGHMASK;
-      if (j < owned && j < i) continue;
+      if (full_list && j < owned && j < i) continue;
       // A factor of 0 is an exclusion, as where LAMMPS leaves the pair out of the list.
       const double factor = special[sbmask(entry)];
       if (factor == 0.0) continue;

@@ -28,7 +28,8 @@ class PairPsi : public LAMMPS_NS::Pair {
   double single(int i, int j, int itype, int jtype, double rsq, double factor_coul, double factor_lj,
                 double &fforce) override;
   void *extract(const char *what, int &dim) override;
-  void *extract_peratom(const char *what, int &columns) override;
+  // Older versions of LAMMPS do not know it: no override.
+  virtual void *extract_peratom(const char *what, int &columns);
 
   void write_restart(FILE *fp) override;
   void read_restart(FILE *fp) override;
@@ -88,6 +89,7 @@ class PairPsi : public LAMMPS_NS::Pair {
 
   // Why pairs come from LAMMPS's neighbor list; empty if the engine finds them.
   std::string why_listed;
+  bool full_list = true;
   std::vector<int32_t> pair_i, pair_j;
   std::vector<double> pair_factor;
 };

@@ -78,7 +78,7 @@ fn mistakes_stop_with_one_clear_line() {
         (&coeff, format!("pair_coeff * * {} F", flat.display()), "dimensions = 2, the simulation has 3"),
         (&coeff, coeff.replace(" F", " G"), "no species \"G\"; the model has F"),
         (&coeff, format!("{coeff} F"), "a species (or NULL) for each of 1 atom types, found 5 arguments"),
-        (&coeff, coeff.replace("* *", "1 1"), "start with * *"),
+        (&coeff, coeff.replace("* *", "1 1"), "must start with * *"),
         // LAMMPS checks itself that coefficients were given at all.
         (&coeff, String::new(), "ERROR"),
         (&coeff, format!("pair_coeff * * {} F", singular.display()), "is not finite at local densities"),

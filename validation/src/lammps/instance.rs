@@ -66,7 +66,9 @@ fn load(host: &Host, _guard: &MutexGuard<()>) -> Result<&'static LammpsLibrary, 
             .map_err(|e| LammpsError::Load { path: path.clone(), reason: e.to_string() })
     };
     // MPI stays loaded for good.
-    std::mem::forget(open(&host.mpi_library)?);
+    if let Some(mpi) = &host.mpi_library {
+        std::mem::forget(open(mpi)?);
+    }
     let library = libloading::Library::from(open(&host.library)?);
     // SAFETY: the functions have the types of LAMMPS's own header; their names tell them.
     let functions = unsafe { LammpsLibrary::from_library(library) }

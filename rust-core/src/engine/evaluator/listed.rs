@@ -31,6 +31,7 @@ impl Engine {
         listed: &PairsOfHost,
         newton: Newton,
     ) -> Result<(), EngineError> {
+        self.ready = false;
         self.take_species(particles)?;
         self.owned = particles.owned;
         let (all, owned) = (particles.x.len(), particles.owned);
@@ -67,7 +68,9 @@ impl Engine {
         }
         self.counts.search += 1;
         self.sum_densities();
-        self.evaluate_excess(particles.tag)
+        self.evaluate_excess(particles.tag)?;
+        self.ready = true;
+        Ok(())
     }
 }
 

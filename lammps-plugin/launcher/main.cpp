@@ -1,0 +1,117 @@
+/* psidpd-lmp: LAMMPS with psidpd's pair styles, for a LAMMPS that has no plugins.
+
+   Takes the arguments of lmp and behaves as lmp does, under mpirun too. */
+
+#include "input.h"
+#include "lammps.h"
+#include "library.h"
+#include "pointers.h"
+
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <dlfcn.h>
+#include <exception>
+#include <map>
+#include <mpi.h>
+#include <typeinfo>
+
+using namespace LAMMPS_NS;
+
+// Of the plugin.
+extern "C" const char *psidpd_register(void *lmp);
+
+// library.h declares it for some settings of the host only.
+extern "C" void *lammps_open(int argc, char **argv, MPI_Comm comm, void **ptr);
+
+namespace {
+
+bool hooked = false;            // LAMMPS calls our post_create
+const char *trouble = nullptr;  // why the styles could not be registered
+
+[[noreturn]] void leave(const char *text)
+{
+  int rank = 0, size = 1;
+  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  MPI_Comm_size(MPI_COMM_WORLD, &size);
+  if (rank == 0 && text) fprintf(stderr, "ERROR: %s\n", text);
+  fflush(nullptr);
+  if (size > 1) MPI_Barrier(MPI_COMM_WORLD);
+  MPI_Finalize();
+  exit(1);
+}
+
+// LAMMPS has reported the error itself. One that only some ranks have must stop the others.
+[[noreturn]] void stop(const std::exception &e)
+{
+  fflush(nullptr);
+  if (strstr(typeid(e).name(), "LAMMPSException")) leave(nullptr);
+  if (!strstr(typeid(e).name(), "LAMMPS")) fprintf(stderr, "ERROR: %s\n", e.what());
+  MPI_Abort(MPI_COMM_WORLD, 1);
+  exit(1);
+}
+
+// 'plugin load .../psidpdplugin.so', so that a script for a LAMMPS with plugins runs here unchanged.
+// The same virtual functions, in the same order, as LAMMPS's class of commands, whose header is not
+// always installed.
+class PluginCommand : protected Pointers {
+ public:
+  explicit PluginCommand(LAMMPS *lmp) : Pointers(lmp) {}
+
+  virtual void command(int narg, char **arg)
+  {
+    const char *refusal = nullptr;
+    if (narg == 2 && strcmp(arg[0], "load") == 0) {
+      const char *slash = strrchr(arg[1], '/');
+      if (strcmp(slash ? slash + 1 : arg[1], "psidpdplugin.so") == 0)
+        refusal = psidpd_register(lmp);
+      else
+        refusal = "psidpd-lmp has the styles of psidpdplugin.so and can load no other plugin";
+    } else {
+      refusal = "psidpd-lmp knows the plugin command as 'plugin load psidpdplugin.so' only";
+    }
+    if (refusal) leave(refusal);
+  }
+};
+
+Command *create_plugin_command(LAMMPS *lmp)
+{
+  return reinterpret_cast<Command *>(new PluginCommand(lmp));
+}
+
+}    // namespace
+
+// LAMMPS calls this when it has made its parts, at the start and after 'clear'. The dynamic linker
+// prefers the program's definition to the library's; that is called first.
+void LAMMPS::post_create()
+{
+  using Function = void (*)(LAMMPS *);
+  static const auto original = reinterpret_cast<Function>(dlsym(RTLD_NEXT, "_ZN9LAMMPS_NS6LAMMPS11post_createEv"));
+  if (original) original(this);
+  hooked = true;
+  trouble = psidpd_register(this);
+}
+
+int main(int argc, char **argv)
+{
+  MPI_Init(&argc, &argv);
+  // Opened by the library, which knows its size; nothing here looks into it before the versions agree.
+  void *handle = nullptr;
+  try {
+    handle = lammps_open(argc, argv, MPI_COMM_WORLD, nullptr);
+    if (!handle) leave(nullptr);
+    if (!hooked) trouble = psidpd_register(handle);
+    if (trouble) leave(trouble);
+    auto *lmp = static_cast<LAMMPS *>(handle);
+    lmp->input->command_map->emplace("plugin", create_plugin_command);
+    lmp->input->file();
+  } catch (const std::exception &e) {
+    stop(e);
+  }
+  lammps_close(handle);
+  lammps_kokkos_finalize();
+  lammps_python_finalize();
+  MPI_Barrier(MPI_COMM_WORLD);
+  MPI_Finalize();
+  return 0;
+}

