@@ -261,6 +261,7 @@ fn write_script(scene: &Scene, s: &mut String) -> std::fmt::Result {
     writeln!(s, "newton        on")?;
     writeln!(s, "comm_modify   vel yes")?;
     writeln!(s, "read_data     {START}\n")?;
+    writeln!(s, "# to be left out where LAMMPS has the styles already")?;
     writeln!(s, "plugin        load ${{plugin}}\n")?;
     writeln!(s, "fix           move all nve")?;
     if flat {
