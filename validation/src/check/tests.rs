@@ -33,7 +33,7 @@ fn van_der_waals() -> &'static str {
 #[test]
 fn poles_and_spinodals_are_named() {
     // kT_c = 8a/27b = 5.93, ρ_c = 1/3b = 3.33
-    let cold = found(van_der_waals(), 4.0, Some(vec![3.3]));
+    let cold = found(van_der_waals(), 4.0, Some(vec![3.6]));
     assert!(has(&cold, "spinodal") && has(&cold, "singular"), "{cold:?}");
     let hot = found(van_der_waals(), 8.0, Some(vec![1.0]));
     assert!(!has(&hot, "spinodal"), "{hot:?}");
