@@ -66,9 +66,9 @@ PairPsi::PairPsi(LAMMPS *lmp, const char *name) : Pair(lmp), name(name)
   manybody_flag = 1;
   // The virial is summed pair by pair: it needs no forces on ghosts.
   no_virial_fdotr_compute = 1;
-  nextra = 2;
+  nextra = 4;
   pvector = new double[nextra];
-  pvector[0] = pvector[1] = 0.0;
+  for (int k = 0; k < nextra; k++) pvector[k] = 0.0;
   if (lmp->citeme) lmp->citeme->add(cite_psidpd);
 }
 
@@ -340,6 +340,8 @@ void PairPsi::compute(int eflag, int vflag)
     eng_vdwl += totals.excess + totals.pair;
     pvector[0] = totals.excess;
     pvector[1] = totals.pair;
+    pvector[2] = totals.below;
+    pvector[3] = totals.above;
   }
   if (vflag_global)
     for (int k = 0; k < 6; k++) virial[k] += totals.virial[k];

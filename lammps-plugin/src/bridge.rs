@@ -38,6 +38,9 @@ mod ffi {
         excess: f64,
         pair: f64,
         virial: [f64; 6],
+        /// Evaluations of ψ below and above the bounds of a density, since the engine was made.
+        below: f64,
+        above: f64,
     }
 
     extern "Rust" {
@@ -195,7 +198,8 @@ fn style_forces(
         particle_virial: request.particle_virial,
     };
     let tally = style.forces(owned, x, v, tag, kind, request.thermostat.then_some(step), want, f)?;
-    Ok(ffi::Totals { excess: tally.excess, pair: tally.pair, virial: tally.total_virial() })
+    let [below, above] = style.engine().out_of_bounds().map(|n| n as f64);
+    Ok(ffi::Totals { excess: tally.excess, pair: tally.pair, virial: tally.total_virial(), below, above })
 }
 
 #[allow(clippy::too_many_arguments)]

@@ -164,3 +164,23 @@ fn no_python_and_no_network_are_clear_messages() {
     assert_eq!(network.status.code(), Some(2), "{}", said(&network));
     assert!(said(&network).to_lowercase().contains("network"), "{}", said(&network));
 }
+
+/// How often ψ went on beyond its bounds is in the summary, and said.
+#[test]
+fn evaluations_beyond_bounds_are_counted_and_reported() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let text = std::fs::read_to_string(model()).unwrap();
+    // The liquid's mean local density is about 4.5: half of its particles are above this bound.
+    write(here, "bounded.toml", &text.replace("range  = \"rd\"", "range  = \"rd\"\nbounds = [0.5, 4.5]"));
+    let path = write(here, "scene.toml", &scene("").replace(&model(), "bounded.toml"));
+    let output = psidpd(here, &["run", &path, "--out", "out", "--json", "s.json"]);
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    assert!(said(&output).contains("out of bounds"), "{}", said(&output));
+    let json: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(here.join("s.json")).unwrap()).unwrap();
+    assert!(json["out_of_bounds"][1].as_u64().unwrap() > 0, "{json}");
+    let free = write(here, "free.toml", &scene(""));
+    let output = psidpd(here, &["run", &free, "--out", "out"]);
+    assert!(!said(&output).contains("out of bounds"), "{}", said(&output));
+}

@@ -173,3 +173,30 @@ fn a_plugin_for_another_lammps_is_refused() {
     let _: HostVersion = other;
     plugin::check(host, ours).unwrap();
 }
+
+/// `compute pair` counts, third and fourth, how often ψ went on below and above its bounds.
+#[test]
+fn evaluations_beyond_bounds_are_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let shipped = root().join("validation/models/warren2003-set6.toml");
+    let bounded = std::fs::read_to_string(&shipped)
+        .unwrap()
+        .replace("range  = \"rd\"", "range  = \"rd\"\nbounds = [1.0, 3.5]");
+    let path = folder.path().join("bounded.toml");
+    std::fs::write(&path, bounded).unwrap();
+    let counts = |model: &Path| -> [f64; 2] {
+        let text = script(&lammps().1)
+            .replace(&shipped.display().to_string(), &model.display().to_string())
+            .replace(
+                "thermo 10\n",
+                "thermo 10\ncompute b all pair dpd/psi\nthermo_style custom step pe c_b[3] c_b[4]\n",
+            );
+        let said = outcome(&text, 2).unwrap();
+        let row = said.lines().skip_while(|l| !l.trim_start().starts_with("Step")).nth(2).unwrap();
+        let numbers: Vec<f64> = row.split_whitespace().map(|w| w.parse().unwrap()).collect();
+        [numbers[2], numbers[3]]
+    };
+    let [below, above] = counts(&path);
+    assert!(below > 0.0 && above > 0.0, "{below} {above}");
+    assert_eq!(counts(&shipped), [0.0, 0.0]);
+}

@@ -158,6 +158,7 @@ impl Run<'_> {
             steps: self.steps,
             wall_seconds,
             particle_steps_per_second: particles as f64 * self.steps as f64 / wall_seconds,
+            out_of_bounds: self.simulation.out_of_bounds(),
             last: self.last.unwrap_or_else(|| Thermo::of(&self.simulation, self.time)),
             means: Means::of(&self.rows),
         };

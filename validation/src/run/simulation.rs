@@ -21,6 +21,8 @@ pub struct Simulation {
     number: u64,
     thermostat: bool,
     all_densities: bool,
+    /// What engines of earlier temperatures counted.
+    earlier_out_of_bounds: [u64; 2],
     dimensions: usize,
     domain: PeriodicBox,
     mass: Vec<f64>,
@@ -62,6 +64,7 @@ impl Simulation {
             number: 0,
             thermostat: true,
             all_densities: false,
+            earlier_out_of_bounds: [0; 2],
             dimensions: fluid.dimensions,
             mass,
             owned: x.len(),
@@ -86,6 +89,7 @@ impl Simulation {
     /// The model does not hold at `kt`.
     pub fn set_temperature(&mut self, kt: f64) -> Result<(), RunError> {
         if kt != self.kt {
+            self.earlier_out_of_bounds = self.out_of_bounds();
             self.engine = Engine::new(&self.model.at(kt)?)?;
             self.engine.sum_all_densities(self.all_densities);
             self.kt = kt;
@@ -205,6 +209,12 @@ impl Simulation {
     /// The plan of the engine.
     pub fn plan(&self) -> &Plan {
         self.engine.plan()
+    }
+
+    /// How many evaluations of ψ met a density below its bounds, and above them.
+    pub fn out_of_bounds(&self) -> [u64; 2] {
+        let now = self.engine.out_of_bounds();
+        std::array::from_fn(|k| self.earlier_out_of_bounds[k] + now[k])
     }
 
     /// How often each pass of the engine has run, since the temperature was last changed.

@@ -16,6 +16,8 @@ pub struct Summary {
     pub wall_seconds: f64,
     /// Particles times steps over that time.
     pub particle_steps_per_second: f64,
+    /// Evaluations of ψ that met a density below its bounds, and above them.
+    pub out_of_bounds: [u64; 2],
     /// Totals after the last step.
     pub last: Thermo,
     /// Plain means over the thermo rows of the last stage, without error bars; `None` without rows.
@@ -68,6 +70,16 @@ impl std::fmt::Display for Summary {
             self.title, self.particles, self.steps, self.wall_seconds
         )?;
         write!(f, "{:.3e} particle-steps per second", self.particle_steps_per_second)?;
+        let [below, above] = self.out_of_bounds;
+        if below + above > 0 {
+            let share = (below + above) as f64 / (self.particles as f64 * self.steps as f64);
+            write!(
+                f,
+                "\nout of bounds: psi was evaluated {below} times below and {above} times above the bounds of a density \
+                 ({:.2} % of particle-steps); it went on with a linear slope there",
+                100.0 * share
+            )?;
+        }
         if let Some(m) = &self.means {
             let n = self.particles as f64;
             write!(
