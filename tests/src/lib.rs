@@ -47,3 +47,18 @@ pub fn lammps() -> &'static (Host, PathBuf) {
         (host, plugin)
     })
 }
+
+/// What a run that must stop says. mpirun may lose the last words of a rank that aborts while it ends the
+/// others, so a run on several ranks is tried again, a few times, until they arrive; that it stops, and does
+/// not hang, must hold every time.
+pub fn last_words(ranks: usize, run: impl Fn() -> Result<String, String>) -> String {
+    let mut said = String::new();
+    for _ in 0..if ranks > 1 { 6 } else { 1 } {
+        said = run().expect_err("this should stop");
+        assert!(!said.contains("imeout"), "{ranks} ranks: {said}");
+        if said.contains("ERROR") {
+            break;
+        }
+    }
+    said
+}

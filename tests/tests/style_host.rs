@@ -310,12 +310,13 @@ fn trouble_is_named_on_every_rank() {
     for (text, message) in cases {
         std::fs::write(&path, deck(&text)).unwrap();
         for ranks in [1, 2, 4] {
-            let error = psidpd_tests::lammps()
-                .0
-                .run_script(ranks, folder.path(), &path, &[], LIMIT)
-                .map(|_| text.clone())
-                .expect_err("this should stop")
-                .to_string();
+            let error = psidpd_tests::last_words(ranks, || {
+                let host = &psidpd_tests::lammps().0;
+                match host.run_script(ranks, folder.path(), &path, &[], LIMIT) {
+                    Ok(_) => Ok(text.clone()),
+                    Err(error) => Err(error.to_string()),
+                }
+            });
             assert!(error.contains("ERROR") && !error.contains("imeout"), "{ranks}: {error}");
             assert!(error.contains(message), "{ranks}: {error}");
             if !message.is_empty() {
