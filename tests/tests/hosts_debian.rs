@@ -197,7 +197,8 @@ fn mistakes_stop_all_ranks_with_a_clear_line() {
         ("dpd/psi 1.0 5", "mdpd 1.0 5", "Unrecognized pair style"),
     ] {
         for ranks in [1, 2] {
-            let error = outcome(debian, &base.replacen(from, to, 1), ranks, folder.path()).unwrap_err();
+            let text = base.replacen(from, to, 1);
+            let error = psidpd_tests::last_words(ranks, || outcome(debian, &text, ranks, folder.path()));
             assert!(error.contains(message), "{to} on {ranks}\nexpected: {message}\nfound: {error}");
         }
     }
