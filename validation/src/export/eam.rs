@@ -110,8 +110,7 @@ pub fn write(fluid: &Fluid, mass: &[f64], grid: Grid, path: &Path) -> Result<(),
     for (alpha, species) in fluid.species.iter().enumerate() {
         for k in 0..grid.densities {
             let density = k as f64 * drho;
-            // A singularity at n = 0 alone is the value of an isolated particle: LAMMPS never differentiates
-            // there unless a particle is alone.
+            // The table begins at n = 0, an isolated particle: a spline through infinity is none.
             if !embedding(alpha, density).is_finite() {
                 return Err(EamError::Singular { species: species.clone(), density });
             }
