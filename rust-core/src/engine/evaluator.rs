@@ -6,7 +6,7 @@ pub use listed::PairsOfHost;
 
 use super::density_pass::add_density;
 use super::error::EngineError;
-use super::excess::{ExcessPlan, ExcessWork};
+use super::excess_pass::{ExcessPass, Rows};
 use super::force_pass::{ForceInput, ForceOutput, add_forces};
 use super::noise::PairNoise;
 use super::pairs::{Newton, Pairs};
@@ -36,9 +36,6 @@ pub struct PassCounts {
     pub virial: u64,
 }
 
-/// Particles per evaluation of ψ: enough to hide the interpreter, few enough for the first-level cache.
-const LANES: usize = 64;
-
 /// The forces of one fluid, and the arrays that computing them needs.
 #[derive(Debug, Clone)]
 pub struct Engine {
@@ -55,22 +52,11 @@ pub struct Engine {
     slopes: Vec<f64>,
     particle_energy: Vec<f64>,
     particle_virial: Vec<[f64; 6]>,
-    lanes: Lanes,
+    excess_pass: ExcessPass,
     counts: PassCounts,
-    out_of_bounds: [u64; 2],
     owned: usize,
     /// Whether pairs, densities and slopes are those of one configuration.
     ready: bool,
-}
-
-/// Scratch for evaluating ψ in lanes.
-#[derive(Debug, Clone, Default)]
-struct Lanes {
-    members: Vec<u32>,
-    at: Vec<f64>,
-    correction: Vec<f64>,
-    out: Vec<f64>,
-    work: ExcessWork,
 }
 
 impl Engine {
@@ -93,9 +79,8 @@ impl Engine {
             slopes: Vec::new(),
             particle_energy: Vec::new(),
             particle_virial: Vec::new(),
-            lanes: Lanes::default(),
+            excess_pass: ExcessPass::default(),
             counts: PassCounts::default(),
-            out_of_bounds: [0; 2],
             owned: 0,
             ready: false,
         })
@@ -114,7 +99,7 @@ impl Engine {
     /// How many evaluations of ψ had a density below its bounds, and how many one above, since the
     /// engine was made. Only densities count that the particle's ψ depends on, not linearly.
     pub fn out_of_bounds(&self) -> [u64; 2] {
-        self.out_of_bounds
+        self.excess_pass.out_of_bounds
     }
 
     /// Maps the host's types to species: entry `kind` is the species of type `kind`, negative for
@@ -203,78 +188,17 @@ impl Engine {
         self.excess.resize(self.owned, 0.0);
         self.slopes.clear();
         self.slopes.resize(self.species.len() * slope_width, 0.0);
-        for alpha in 0..self.plan.species.len() {
-            if let ExcessPlan::Constant(value) = self.plan.excess[alpha] {
-                if value != 0.0 {
-                    for (excess, species) in self.excess.iter_mut().zip(&self.species) {
-                        if *species == alpha as i32 {
-                            *excess = value;
-                        }
-                    }
-                }
-                continue;
-            }
-            self.counts.excess += 1;
-            let mut next = 0;
-            while next < self.owned {
-                self.lanes.members.clear();
-                while next < self.owned && self.lanes.members.len() < LANES {
-                    if self.species[next] == alpha as i32 {
-                        self.lanes.members.push(next as u32);
-                    }
-                    next += 1;
-                }
-                self.evaluate_lanes(alpha, tag)?;
-            }
-        }
-        Ok(())
-    }
-
-    /// ψ_α and its slopes, by the chain rule through ρ̃, for the particles in `lanes.members`.
-    fn evaluate_lanes(&mut self, alpha: usize, tag: &[i32]) -> Result<(), EngineError> {
-        let count = self.plan.species.len();
-        let variables = self.plan.densities.len() * count;
-        let slope_width = self.plan.slope_width();
-        let Lanes { members, at, correction, out, work } = &mut self.lanes;
-        let lanes = members.len();
-        if lanes == 0 {
-            return Ok(());
-        }
-        at.resize(variables * lanes, 0.0);
-        correction.resize(variables * lanes, 0.0);
-        out.resize((1 + slope_width) * lanes, 0.0);
-        for v in 0..variables {
-            let (d, beta) = (v / count, v % count);
-            let polynomial = &self.plan.densities[d].correction[alpha * count + beta];
-            for (lane, member) in members.iter().enumerate() {
-                let n = self.densities[*member as usize * variables + v];
-                (at[v * lanes + lane], correction[v * lanes + lane]) = polynomial.at(n);
-            }
-        }
-        let [low, high] = self.plan.excess[alpha].evaluate(lanes, at, out, work);
-        self.out_of_bounds[0] += low;
-        self.out_of_bounds[1] += high;
-        for (lane, member) in members.iter().enumerate() {
-            let i = *member as usize;
-            let mut finite = out[lane].is_finite();
-            self.excess[i] = out[lane];
-            for k in 0..slope_width {
-                let v = self.plan.passes[k / count] * count + k % count;
-                let slope = out[(1 + k) * lanes + lane] * correction[v * lanes + lane];
-                finite &= slope.is_finite();
-                self.slopes[i * slope_width + k] = slope;
-            }
-            if !finite {
-                let densities: Vec<String> =
-                    (0..variables).map(|v| format!("{:.6}", at[v * lanes + lane])).collect();
-                return Err(EngineError::ExcessFreeEnergy {
-                    tag: tag[i],
-                    species: self.plan.species[alpha].clone(),
-                    densities: densities.join(", "),
-                });
-            }
-        }
-        Ok(())
+        let columns: Vec<usize> = (0..self.plan.densities.len() * self.plan.species.len()).collect();
+        let mut rows = Rows {
+            first: 0,
+            columns: &columns,
+            densities: &self.densities,
+            excess: &mut self.excess,
+            slopes: &mut self.slopes,
+        };
+        let species = &self.species;
+        self.counts.excess += self.plan.evaluated_species();
+        self.excess_pass.run(&self.plan, 0..self.owned, |i| species[i], |i| tag[i], &mut rows)
     }
 
     /// Numbers per particle that a host forwards to ghosts: [`Plan::slope_width`].

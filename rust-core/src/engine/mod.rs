@@ -16,6 +16,7 @@ mod domain;
 mod error;
 mod evaluator;
 mod excess;
+mod excess_pass;
 mod force_pass;
 mod images;
 pub mod noise;
@@ -24,6 +25,7 @@ mod particles;
 mod plan;
 pub mod reference;
 mod search;
+mod sweep;
 mod tally;
 
 pub use domain::{DomainError, PeriodicBox};
@@ -33,6 +35,7 @@ pub use images::Images;
 pub use pairs::Newton;
 pub use particles::{Particles, Step};
 pub use plan::Plan;
+pub use sweep::{Instructions, Pool, Precision, Settings, Space, Sweep, Times, part};
 pub use tally::{Tally, Want};
 
 #[cfg(test)]

@@ -7,8 +7,11 @@
 //! fixed seed Threefry permutes its counters, so no two steps share a key and, within a step, no two
 //! pairs share a counter.
 
-const ROTATIONS: [u32; 8] = [13, 15, 26, 6, 17, 29, 16, 24];
-const PARITY: u32 = 0x1BD1_1BDA;
+pub(super) const ROTATIONS: [u32; 8] = [13, 15, 26, 6, 17, 29, 16, 24];
+pub(super) const PARITY: u32 = 0x1BD1_1BDA;
+
+/// Rounds of the number of a pair.
+pub(super) const PAIR_ROUNDS: usize = 13;
 
 /// Threefry-2x32 of `ROUNDS` rounds.
 #[inline(always)]
@@ -41,13 +44,18 @@ impl PairNoise {
         PairNoise { key: threefry2x32::<20>(split(step), split(seed)) }
     }
 
+    /// The key of the pairs of this step.
+    pub(super) fn key(&self) -> [u32; 2] {
+        self.key
+    }
+
     /// `ξ_ij = ξ_ji`: zero mean, unit variance, uniform on (−√3, √3).
     ///
     /// A uniform number serves as well as a Gaussian one: only its first two moments enter the
     /// fluctuation–dissipation relation, and a sum over neighbours is near Gaussian anyway.
     #[inline(always)]
     pub fn xi(&self, tag_i: u32, tag_j: u32) -> f64 {
-        let word = threefry2x32::<13>([tag_i.min(tag_j), tag_i.max(tag_j)], self.key)[0];
+        let word = threefry2x32::<PAIR_ROUNDS>([tag_i.min(tag_j), tag_i.max(tag_j)], self.key)[0];
         // (word + 1/2) / 2^31 − 1 lies symmetrically in (−1, 1), so the mean is exactly zero.
         const SQRT_3: f64 = 1.732_050_807_568_877_2;
         (word as f64 + 0.5) * (SQRT_3 / (1u64 << 31) as f64) - SQRT_3

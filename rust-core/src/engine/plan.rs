@@ -137,6 +137,11 @@ impl Plan {
         self.thermostat.is_some()
     }
 
+    /// How many species have a ψ that depends on a density.
+    pub(super) fn evaluated_species(&self) -> u64 {
+        self.excess.iter().filter(|e| !matches!(e, ExcessPlan::Constant(_))).count() as u64
+    }
+
     /// Whether the forces have a potential.
     pub fn is_conservative(&self) -> bool {
         self.conservative

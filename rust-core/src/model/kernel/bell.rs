@@ -1,4 +1,4 @@
-use super::Shape;
+use super::{Real, Shape};
 use std::f64::consts::PI;
 
 /// `W = 2s³ − 3s² + 1`, the w₂ that Trofimov et al. reject: flat at the centre, it lets particles sit
@@ -11,12 +11,12 @@ impl Shape for Bell {
     const FACTORS: [f64; 2] = [10.0 / (3.0 * PI), 15.0 / (4.0 * PI)];
 
     #[inline(always)]
-    fn value(s: f64) -> f64 {
-        1.0 + s * s * (2.0 * s - 3.0)
+    fn value<R: Real>(s: R) -> R {
+        R::constant(1.0) + s * s * (R::constant(2.0) * s - R::constant(3.0))
     }
 
     #[inline(always)]
-    fn slope(s: f64) -> f64 {
-        6.0 * s * (s - 1.0)
+    fn slope<R: Real>(s: R) -> R {
+        R::constant(6.0) * s * (s - R::constant(1.0))
     }
 }

@@ -1,4 +1,4 @@
-use super::Shape;
+use super::{Real, Shape};
 use std::f64::consts::PI;
 
 /// The cubic spline of Wang and Chen, eq. (8), with its whole support on `s < 1` (not `2h`):
@@ -10,23 +10,18 @@ impl Shape for CubicSpline {
     const NAME: &'static str = "cubic-spline";
     const FACTORS: [f64; 2] = [40.0 / (7.0 * PI), 8.0 / PI];
 
+    // 2(1 − s)³ − 8(½ − s)³₊: both pieces without a branch.
     #[inline(always)]
-    fn value(s: f64) -> f64 {
-        if s < 0.5 {
-            1.0 + 6.0 * s * s * (s - 1.0)
-        } else {
-            let t = 1.0 - s;
-            2.0 * t * t * t
-        }
+    fn value<R: Real>(s: R) -> R {
+        let t = R::constant(1.0) - s;
+        let u = (R::constant(0.5) - s).larger(R::constant(0.0));
+        R::constant(2.0) * (t * t * t) - R::constant(8.0) * (u * u * u)
     }
 
     #[inline(always)]
-    fn slope(s: f64) -> f64 {
-        if s < 0.5 {
-            6.0 * s * (3.0 * s - 2.0)
-        } else {
-            let t = 1.0 - s;
-            -6.0 * t * t
-        }
+    fn slope<R: Real>(s: R) -> R {
+        let t = R::constant(1.0) - s;
+        let u = (R::constant(0.5) - s).larger(R::constant(0.0));
+        R::constant(24.0) * (u * u) - R::constant(6.0) * (t * t)
     }
 }

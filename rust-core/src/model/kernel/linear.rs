@@ -1,4 +1,4 @@
-use super::Shape;
+use super::{Real, Shape};
 use std::f64::consts::PI;
 
 /// `W = 1 − s`. Its force jumps at the range: Pagonabarraga and Frenkel, Figs 3–5, compare it on
@@ -11,12 +11,12 @@ impl Shape for Linear {
     const FACTORS: [f64; 2] = [3.0 / PI, 3.0 / PI];
 
     #[inline(always)]
-    fn value(s: f64) -> f64 {
-        1.0 - s
+    fn value<R: Real>(s: R) -> R {
+        R::constant(1.0) - s
     }
 
     #[inline(always)]
-    fn slope(_s: f64) -> f64 {
-        -1.0
+    fn slope<R: Real>(_s: R) -> R {
+        R::constant(-1.0)
     }
 }

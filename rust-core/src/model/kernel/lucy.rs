@@ -1,4 +1,4 @@
-use super::Shape;
+use super::{Real, Shape};
 use std::f64::consts::PI;
 
 /// `W = (1 + 3s)(1 − s)³`, of Lucy; the density of the style `mdpd/rhosum` of LAMMPS.
@@ -10,14 +10,15 @@ impl Shape for Lucy {
     const FACTORS: [f64; 2] = [5.0 / PI, 105.0 / (16.0 * PI)];
 
     #[inline(always)]
-    fn value(s: f64) -> f64 {
-        let t = 1.0 - s;
-        (1.0 + 3.0 * s) * t * t * t
+    fn value<R: Real>(s: R) -> R {
+        let one = R::constant(1.0);
+        let t = one - s;
+        (one + R::constant(3.0) * s) * t * t * t
     }
 
     #[inline(always)]
-    fn slope(s: f64) -> f64 {
-        let t = 1.0 - s;
-        -12.0 * s * t * t
+    fn slope<R: Real>(s: R) -> R {
+        let t = R::constant(1.0) - s;
+        R::constant(-12.0) * s * t * t
     }
 }

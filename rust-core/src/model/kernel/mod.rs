@@ -14,6 +14,7 @@ mod cubic_spline;
 mod linear;
 mod lucy;
 mod quadratic;
+mod real;
 mod wendland_c2;
 
 pub use bell::Bell;
@@ -21,6 +22,7 @@ pub use cubic_spline::CubicSpline;
 pub use linear::Linear;
 pub use lucy::Lucy;
 pub use quadratic::Quadratic;
+pub use real::Real;
 pub use wendland_c2::WendlandC2;
 
 /// The shape of a weight function on `0 ≤ s < 1`; zero beyond.
@@ -32,9 +34,9 @@ pub trait Shape: Copy + Default + Send + Sync + 'static {
     /// `c_2` and `c_3`: the normalising factors in two and three dimensions.
     const FACTORS: [f64; 2];
     /// `W(s)`.
-    fn value(s: f64) -> f64;
+    fn value<R: Real>(s: R) -> R;
     /// `W'(s)`.
-    fn slope(s: f64) -> f64;
+    fn slope<R: Real>(s: R) -> R;
 }
 
 /// The one list of kernels: the enum, the names and the dispatch all come from it.

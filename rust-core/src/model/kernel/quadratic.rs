@@ -1,4 +1,4 @@
-use super::Shape;
+use super::{Real, Shape};
 use std::f64::consts::PI;
 
 /// `W = (1 − s)²`, of Warren and of Trofimov et al. Its slope is the force law of standard DPD, so a
@@ -11,13 +11,13 @@ impl Shape for Quadratic {
     const FACTORS: [f64; 2] = [6.0 / PI, 15.0 / (2.0 * PI)];
 
     #[inline(always)]
-    fn value(s: f64) -> f64 {
-        let t = 1.0 - s;
+    fn value<R: Real>(s: R) -> R {
+        let t = R::constant(1.0) - s;
         t * t
     }
 
     #[inline(always)]
-    fn slope(s: f64) -> f64 {
-        -2.0 * (1.0 - s)
+    fn slope<R: Real>(s: R) -> R {
+        R::constant(-2.0) * (R::constant(1.0) - s)
     }
 }

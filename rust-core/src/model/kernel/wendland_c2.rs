@@ -1,4 +1,4 @@
-use super::Shape;
+use super::{Real, Shape};
 use std::f64::consts::PI;
 
 /// `W = (1 + 4s)(1 − s)⁴`. Positive definite in up to three dimensions, so it does not pair.
@@ -10,14 +10,15 @@ impl Shape for WendlandC2 {
     const FACTORS: [f64; 2] = [7.0 / PI, 21.0 / (2.0 * PI)];
 
     #[inline(always)]
-    fn value(s: f64) -> f64 {
-        let t = (1.0 - s) * (1.0 - s);
-        (1.0 + 4.0 * s) * t * t
+    fn value<R: Real>(s: R) -> R {
+        let one = R::constant(1.0);
+        let t = (one - s) * (one - s);
+        (one + R::constant(4.0) * s) * t * t
     }
 
     #[inline(always)]
-    fn slope(s: f64) -> f64 {
-        let t = 1.0 - s;
-        -20.0 * s * t * t * t
+    fn slope<R: Real>(s: R) -> R {
+        let t = R::constant(1.0) - s;
+        R::constant(-20.0) * s * t * t * t
     }
 }

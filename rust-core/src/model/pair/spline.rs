@@ -35,6 +35,26 @@ impl SplineAttractive {
             attraction_range,
         }
     }
+
+    /// `aA`, what multiplies the repulsive spline.
+    pub fn repulsion(&self) -> f64 {
+        self.repulsion
+    }
+
+    /// `aB`, what multiplies the attractive spline.
+    pub fn attraction(&self) -> f64 {
+        self.attraction
+    }
+
+    /// `R_A`.
+    pub fn repulsion_range(&self) -> f64 {
+        self.repulsion_range
+    }
+
+    /// `R_B`.
+    pub fn attraction_range(&self) -> f64 {
+        self.attraction_range
+    }
 }
 
 impl PairForm for SplineAttractive {

@@ -1,0 +1,246 @@
+//! Mixed and double precision: what is kept of a particle, and how a pair's distance comes from it.
+
+use super::block::Block;
+use super::frame::Frame;
+use super::simd::{Isa, Quad, Reals, Scalar, Words};
+use crate::model::kernel::Real;
+
+/// A choice of precision on an instruction set.
+#[allow(clippy::missing_safety_doc)] // The contract of `simd`.
+pub trait Arithmetic<I: Isa>: 'static {
+    type Scalar: Scalar;
+    type Reals: Reals<Scalar = Self::Scalar>;
+    type Record: Record;
+
+    /// Fills `d`, `r` and `1/r` of the pairs of a block, and for the thermostat also their velocity along
+    /// `ê` and their tags, for whole vectors up to `count`.
+    unsafe fn separate(
+        frame: &Frame,
+        records: *const Self::Record,
+        block: &mut Block<Self::Scalar>,
+        count: usize,
+        moving: bool,
+    );
+
+    /// An index as a number of the fourth column of a row, and back.
+    fn encode(index: u32) -> Self::Scalar;
+    fn decode(number: Self::Scalar) -> u32;
+    unsafe fn load_quad(p: *const Self::Scalar) -> I::Quad;
+}
+
+/// What is kept of a particle, in the order of cells.
+pub trait Record: Copy + Default + Send + Sync + 'static {
+    fn new(u: [u32; 3], x: &[f64; 3], v: &[f64; 3], tag: u32, species: u32) -> Self;
+}
+
+/// Position as fractions of the box in units of 2⁻³²: differences wrap by themselves.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(C, align(32))]
+pub struct MixedRecord {
+    u: [u32; 3],
+    tag: u32,
+    v: [f32; 3],
+    species: u32,
+}
+
+impl Record for MixedRecord {
+    #[inline(always)]
+    fn new(u: [u32; 3], _: &[f64; 3], v: &[f64; 3], tag: u32, species: u32) -> MixedRecord {
+        MixedRecord { u, tag, v: [v[0] as f32, v[1] as f32, v[2] as f32], species }
+    }
+}
+
+/// Everything as the host has it.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(C, align(64))]
+pub struct DoubleRecord {
+    x: [f64; 3],
+    tag: u32,
+    species: u32,
+    v: [f64; 3],
+    rest: f64,
+}
+
+impl Record for DoubleRecord {
+    #[inline(always)]
+    fn new(_: [u32; 3], x: &[f64; 3], v: &[f64; 3], tag: u32, species: u32) -> DoubleRecord {
+        DoubleRecord { x: *x, tag, species, v: *v, rest: 0.0 }
+    }
+}
+
+/// Pairs in single precision.
+pub struct Mixed;
+
+/// Pairs in double precision.
+pub struct Double;
+
+/// Particles on one point have no direction; this keeps `1/r` finite, and `d/r` zero.
+const TINY: f64 = 1e-30;
+
+const TWO_TO_32: f64 = 4_294_967_296.0;
+
+impl<I: Isa> Arithmetic<I> for Mixed {
+    type Scalar = f32;
+    type Reals = I::F32;
+    type Record = MixedRecord;
+
+    #[inline(always)]
+    unsafe fn separate(
+        frame: &Frame,
+        records: *const MixedRecord,
+        block: &mut Block<f32>,
+        count: usize,
+        moving: bool,
+    ) {
+        // SAFETY: the contract of `simd`; the block has room for whole vectors.
+        unsafe {
+            let stride = size_of::<MixedRecord>();
+            let base: *const u8 = records.cast();
+            let scale = per_unit(frame.length);
+            let lean = per_unit(frame.tilt);
+            let (sx, sy, sz) = (I::F32::splat(scale[0]), I::F32::splat(scale[1]), I::F32::splat(scale[2]));
+            let (xy, xz, yz) = (I::F32::splat(lean[0]), I::F32::splat(lean[1]), I::F32::splat(lean[2]));
+            let tilted = frame.is_tilted();
+            let tiny = I::F32::splat(TINY as f32);
+            let mut k = 0;
+            while k < count {
+                let (pi, pj) = (block.i.as_ptr().add(k), block.j.as_ptr().add(k));
+                let [xi, yi, zi, ti] = I::word_columns(base, stride, pi);
+                let [xj, yj, zj, tj] = I::word_columns(base, stride, pj);
+                let (a, b, c) = (I::signed(xi.sub(xj)), I::signed(yi.sub(yj)), I::signed(zi.sub(zj)));
+                let (mut dx, mut dy, dz) = (a * sx, b * sy, c * sz);
+                if tilted {
+                    dx = b.mul_add(xy, c.mul_add(xz, dx));
+                    dy = c.mul_add(yz, dy);
+                }
+                let r2 = dx.mul_add(dx, dy.mul_add(dy, dz * dz)).larger(tiny);
+                let inverse = r2.inverse_root();
+                dx.store(block.d[0].as_mut_ptr().add(k));
+                dy.store(block.d[1].as_mut_ptr().add(k));
+                dz.store(block.d[2].as_mut_ptr().add(k));
+                (r2 * inverse).store(block.r.as_mut_ptr().add(k));
+                inverse.store(block.inverse.as_mut_ptr().add(k));
+                if moving {
+                    ti.store(block.tag_i.as_mut_ptr().add(k));
+                    tj.store(block.tag_j.as_mut_ptr().add(k));
+                    let [ui, vi, wi, _] = I::F32::columns(base.add(16), stride, pi);
+                    let [uj, vj, wj, _] = I::F32::columns(base.add(16), stride, pj);
+                    let along = (ui - uj).mul_add(dx, (vi - vj).mul_add(dy, (wi - wj) * dz));
+                    (along * inverse).store(block.along.as_mut_ptr().add(k));
+                }
+                k += <I::F32 as Reals>::LANES;
+            }
+        }
+    }
+
+    // Bits of a number of ordinary size, for indices below 2²⁹.
+    #[inline(always)]
+    fn encode(index: u32) -> f32 {
+        f32::from_bits(index + 0x4000_0000)
+    }
+    #[inline(always)]
+    fn decode(number: f32) -> u32 {
+        number.to_bits() - 0x4000_0000
+    }
+    #[inline(always)]
+    unsafe fn load_quad(p: *const f32) -> I::Quad {
+        // SAFETY: the contract of `simd`.
+        unsafe { I::Quad::load_f32(p) }
+    }
+}
+
+/// Lengths over 2³².
+#[inline(always)]
+fn per_unit(l: [f64; 3]) -> [f32; 3] {
+    [(l[0] / TWO_TO_32) as f32, (l[1] / TWO_TO_32) as f32, (l[2] / TWO_TO_32) as f32]
+}
+
+impl<I: Isa> Arithmetic<I> for Double {
+    type Scalar = f64;
+    type Reals = I::F64;
+    type Record = DoubleRecord;
+
+    #[inline(always)]
+    unsafe fn separate(
+        frame: &Frame,
+        records: *const DoubleRecord,
+        block: &mut Block<f64>,
+        count: usize,
+        moving: bool,
+    ) {
+        // SAFETY: the contract of `simd`; the block has room for whole vectors.
+        unsafe {
+            let stride = size_of::<DoubleRecord>();
+            let base: *const u8 = records.cast();
+            let mut inverse_length = [0.0; 3];
+            for c in 0..3 {
+                if frame.periodic[c] {
+                    inverse_length[c] = 1.0 / frame.length[c];
+                }
+            }
+            let l = frame.length;
+            let (lx, ly, lz) = (I::F64::splat(l[0]), I::F64::splat(l[1]), I::F64::splat(l[2]));
+            let ix = I::F64::splat(inverse_length[0]);
+            let iy = I::F64::splat(inverse_length[1]);
+            let iz = I::F64::splat(inverse_length[2]);
+            let t = frame.tilt;
+            let (xy, xz, yz) = (I::F64::splat(t[0]), I::F64::splat(t[1]), I::F64::splat(t[2]));
+            let tilted = frame.is_tilted();
+            let flat = if frame.dimensions == 3 { I::F64::splat(1.0) } else { I::F64::splat(0.0) };
+            let tiny = I::F64::splat(TINY);
+            let mut k = 0;
+            while k < count {
+                let (pi, pj) = (block.i.as_ptr().add(k), block.j.as_ptr().add(k));
+                let [xi, yi, zi, _] = I::F64::columns(base, stride, pi);
+                let [xj, yj, zj, _] = I::F64::columns(base, stride, pj);
+                let (mut dx, mut dy, mut dz) = (xi - xj, yi - yj, (zi - zj) * flat);
+                let boxes = (dz * iz).round();
+                dz = dz - boxes * lz;
+                if tilted {
+                    dx = dx - boxes * xz;
+                    dy = dy - boxes * yz;
+                }
+                let boxes = (dy * iy).round();
+                dy = dy - boxes * ly;
+                if tilted {
+                    dx = dx - boxes * xy;
+                }
+                dx = dx - (dx * ix).round() * lx;
+                let r2 = dx.mul_add(dx, dy.mul_add(dy, dz * dz)).larger(tiny);
+                let inverse = r2.inverse_root();
+                dx.store(block.d[0].as_mut_ptr().add(k));
+                dy.store(block.d[1].as_mut_ptr().add(k));
+                dz.store(block.d[2].as_mut_ptr().add(k));
+                (r2 * inverse).store(block.r.as_mut_ptr().add(k));
+                inverse.store(block.inverse.as_mut_ptr().add(k));
+                if moving {
+                    let [ui, vi, wi, _] = I::F64::columns(base.add(32), stride, pi);
+                    let [uj, vj, wj, _] = I::F64::columns(base.add(32), stride, pj);
+                    let along = (ui - uj).mul_add(dx, (vi - vj).mul_add(dy, (wi - wj) * dz));
+                    (along * inverse).store(block.along.as_mut_ptr().add(k));
+                }
+                k += <I::F64 as Reals>::LANES;
+            }
+            if moving {
+                for k in 0..count {
+                    *block.tag_i.get_unchecked_mut(k) = (*records.add(block.i[k] as usize)).tag;
+                    *block.tag_j.get_unchecked_mut(k) = (*records.add(block.j[k] as usize)).tag;
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn encode(index: u32) -> f64 {
+        f64::from_bits(0x3ff0_0000_0000_0000 | index as u64)
+    }
+    #[inline(always)]
+    fn decode(number: f64) -> u32 {
+        number.to_bits() as u32
+    }
+    #[inline(always)]
+    unsafe fn load_quad(p: *const f64) -> I::Quad {
+        // SAFETY: the contract of `simd`.
+        unsafe { I::Quad::load(p) }
+    }
+}

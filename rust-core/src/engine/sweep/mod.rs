@@ -1,0 +1,366 @@
+//! The fast engine: the same forces as [`Engine`](super::Engine), from a sweep over particles in the order
+//! of cells.
+//!
+//! Every step the particles are sorted into rows of bins ([`grid`]), each layer of rows looks for pairs in
+//! half of its neighbourhood and evaluates them in blocks that stay in the first-level cache
+//! ([`layer`], [`evaluate`]); the pairs that a many-body density reaches are kept for a second pass, after
+//! ψ. There is no neighbour list: at the speed that DPD particles move, one lives a few steps and costs
+//! more than it saves.
+//!
+//! [`simd`] has the vectors of each instruction set, [`arithmetic`] the two precisions, [`compiled`]
+//! the passes for each of both, chosen once. [`pool`] shares layers among threads; what a layer adds
+//! to another has accumulators of its own, so sums are the same for any number of threads.
+
+mod arithmetic;
+mod block;
+mod compiled;
+mod evaluate;
+mod frame;
+mod grid;
+mod layer;
+mod machine;
+mod pool;
+mod settings;
+mod simd;
+mod terms;
+
+pub use pool::{Pool, part};
+pub use settings::{Instructions, Precision, Settings};
+
+use super::domain::PeriodicBox;
+use super::error::EngineError;
+use super::evaluator::PassCounts;
+use super::noise::PairNoise;
+use super::particles::{Particles, Step};
+use super::plan::Plan;
+use super::tally::{Tally, Want};
+use crate::model::Fluid;
+use crate::model::expression::TooLarge;
+use arithmetic::{Double, Mixed};
+use frame::Frame;
+use grid::Grid;
+use machine::{Given, Machine};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// What the particles are in.
+#[derive(Debug, Clone, Copy)]
+pub enum Space<'a> {
+    /// A periodic box: there are no ghosts.
+    Box(&'a PeriodicBox),
+    /// Open space, with ghosts for whatever is beyond: a rank of a host.
+    Open,
+}
+
+/// Forces of one fluid, fast. An evaluation is [`Sweep::first`], for hosts with ghosts then a round of
+/// slopes from owners to ghosts, and [`Sweep::second`].
+pub struct Sweep {
+    plan: Plan,
+    settings: Settings,
+    pool: Arc<Pool>,
+    machine: Both,
+    kinds: Vec<i32>,
+    /// In the host's order, where it has ghosts.
+    slopes: Vec<f64>,
+    counts: PassCounts,
+    owned: usize,
+    all: usize,
+    want: Want,
+    times: Times,
+    ready: bool,
+}
+
+/// Seconds spent in the parts of evaluations, since the engine was made.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Times {
+    /// Sorting particles into bins.
+    pub sort: f64,
+    /// Finding pairs; forces that need no density, noise among them; weights.
+    pub first: f64,
+    /// Summing densities and evaluating ψ.
+    pub excess: f64,
+    /// Many-body forces.
+    pub second: f64,
+    /// Forces to the host.
+    pub forces: f64,
+}
+
+/// Adds the time since the last lap to `sum`.
+fn lap(since: &mut Instant, sum: &mut f64) {
+    let now = Instant::now();
+    *sum += (now - *since).as_secs_f64();
+    *since = now;
+}
+
+/// One of both.
+enum Both {
+    Mixed(Box<Machine<Mixed>>),
+    Double(Box<Machine<Double>>),
+}
+
+/// Does the same with the machine of either precision.
+macro_rules! with {
+    ($both:expr, $machine:ident => $do:expr) => {
+        match $both {
+            Both::Mixed($machine) => $do,
+            Both::Double($machine) => $do,
+        }
+    };
+}
+
+impl Sweep {
+    /// An engine for `fluid`; types are species indices until [`Sweep::map_kinds`] says otherwise.
+    ///
+    /// # Errors
+    /// As [`Plan::new`].
+    pub fn new(fluid: &Fluid, settings: Settings) -> Result<Sweep, TooLarge> {
+        let pool = Arc::new(Pool::new(settings.threads));
+        Sweep::with_pool(fluid, settings, pool)
+    }
+
+    /// The same with threads that others use too.
+    ///
+    /// # Errors
+    /// As [`Plan::new`].
+    pub fn with_pool(fluid: &Fluid, mut settings: Settings, pool: Arc<Pool>) -> Result<Sweep, TooLarge> {
+        let plan = Plan::new(fluid)?;
+        if !settings.instructions.available() {
+            settings.instructions = Instructions::best();
+        }
+        let threads = pool.threads();
+        let machine = match settings.precision {
+            Precision::Mixed => Both::Mixed(Box::new(Machine::new(&plan, settings.instructions, threads))),
+            Precision::Double => Both::Double(Box::new(Machine::new(&plan, settings.instructions, threads))),
+        };
+        let kinds = (0..plan.species.len() as i32).collect();
+        Ok(Sweep {
+            plan,
+            settings,
+            pool,
+            machine,
+            kinds,
+            slopes: Vec::new(),
+            counts: PassCounts::default(),
+            owned: 0,
+            all: 0,
+            want: Want::FORCES,
+            times: Times::default(),
+            ready: false,
+        })
+    }
+
+    /// The plan.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// What was chosen, with the instruction set in use.
+    pub fn settings(&self) -> Settings {
+        self.settings
+    }
+
+    /// Where the time went.
+    pub fn times(&self) -> Times {
+        self.times
+    }
+
+    /// The threads.
+    pub fn pool(&self) -> &Arc<Pool> {
+        &self.pool
+    }
+
+    /// How often each pass has run.
+    pub fn counts(&self) -> PassCounts {
+        self.counts
+    }
+
+    /// As [`Engine::out_of_bounds`](super::Engine::out_of_bounds).
+    pub fn out_of_bounds(&self) -> [u64; 2] {
+        with!(&self.machine, m => m.out_of_bounds())
+    }
+
+    /// As [`Engine::map_kinds`](super::Engine::map_kinds).
+    ///
+    /// # Errors
+    /// A species index out of range.
+    pub fn map_kinds(&mut self, kinds: &[i32]) -> Result<(), EngineError> {
+        if kinds.iter().any(|s| *s >= self.plan.species.len() as i32) {
+            return Err(EngineError::Host("a type is mapped to a species the model does not have"));
+        }
+        self.kinds = kinds.to_vec();
+        Ok(())
+    }
+
+    /// Whether particles in `domain` meet one image only of each other, as a sweep without ghosts needs:
+    /// periods of twice the cut-off or more, and edges as LAMMPS has them.
+    pub fn fits(&self, domain: &PeriodicBox) -> bool {
+        Frame::of_box(domain, self.plan.dimensions)
+            .is_some_and(|frame| Grid::new(&frame, self.plan.cutoff, 1).is_some())
+    }
+
+    /// Finds pairs, adds the forces that need no density, sums densities and evaluates ψ.
+    ///
+    /// `v` may be empty and `step` `None` where no thermostat acts; with `step` `None` only conservative
+    /// forces are computed. Of `want`, the totals: what is asked for of each particle is the business
+    /// of [`Engine`](super::Engine).
+    ///
+    /// # Errors
+    /// A position or ψ that is not finite, a tag or type out of range, arrays of different lengths, a
+    /// box that does not fit.
+    pub fn first(
+        &mut self,
+        space: Space,
+        particles: &Particles,
+        v: &[[f64; 3]],
+        step: Option<Step>,
+        want: Want,
+    ) -> Result<(), EngineError> {
+        self.ready = false;
+        let all = particles.x.len();
+        if particles.tag.len() != all || particles.kind.len() != all || particles.owned > all {
+            return Err(EngineError::Host("particle arrays have different lengths"));
+        }
+        // Indices are coded in 29 bits, copies of a layer among them.
+        if all > 1 << 28 {
+            return Err(EngineError::Host("more than 2^28 particles and ghosts on one rank"));
+        }
+        if matches!(space, Space::Box(_)) && particles.owned < all {
+            return Err(EngineError::Host("a periodic box has no ghosts"));
+        }
+        let thermostat = step
+            .filter(|_| self.plan.thermostat.is_some())
+            .map(|s| (PairNoise::new(s.seed, s.number), 1.0 / s.dt.sqrt()));
+        if thermostat.is_some() && v.len() < all {
+            return Err(EngineError::Host("the velocity array is too short"));
+        }
+        (self.owned, self.all, self.want) = (particles.owned, all, want);
+        let given = Given {
+            particles: *particles,
+            v,
+            kinds: &self.kinds,
+            thermostat,
+            totals: want.energy || want.virial,
+        };
+        let (plan, pool) = (&self.plan, &self.pool);
+        let times = &mut self.times;
+        with!(&mut self.machine, m => first(m, plan, pool, space, &given, times))?;
+        if self.owned < all {
+            with!(&self.machine, m => m.slopes_to_host(&mut self.slopes));
+        }
+        self.counts.search += 1;
+        self.counts.density += self.plan.passes.len() as u64;
+        self.counts.excess += self.plan.evaluated_species();
+        self.counts.noise += thermostat.is_some() as u64;
+        self.ready = true;
+        Ok(())
+    }
+
+    /// Numbers per particle that a host forwards to ghosts: [`Plan::slope_width`].
+    pub fn slope_width(&self) -> usize {
+        self.plan.slope_width()
+    }
+
+    /// `∂ψ/∂n` of owned particles, then room for those of ghosts; empty without ghosts.
+    pub fn slopes_mut(&mut self) -> &mut [f64] {
+        &mut self.slopes
+    }
+
+    /// Adds many-body forces; writes all forces on owned particles to `force`, or adds them to what is
+    /// there, and returns what was asked for.
+    ///
+    /// A pair of an owned particle and a ghost is computed for the owned particle alone: its other half
+    /// is that of the other rank, and half of its energy and virial.
+    ///
+    /// # Errors
+    /// A force that is not finite; arrays of other lengths than in [`Sweep::first`].
+    pub fn second(
+        &mut self,
+        particles: &Particles,
+        force: &mut [[f64; 3]],
+        add: bool,
+    ) -> Result<Tally, EngineError> {
+        if !std::mem::take(&mut self.ready) {
+            return Err(EngineError::Host("forces without densities of the same configuration"));
+        }
+        if particles.x.len() != self.all || particles.owned != self.owned || force.len() < self.owned {
+            return Err(EngineError::Host("particles changed between densities and forces"));
+        }
+        self.counts.force += 1;
+        self.counts.energy += self.want.energy as u64;
+        self.counts.virial += self.want.virial as u64;
+        let (pool, slopes) = (&self.pool, &self.slopes);
+        let ghosts = self.owned < self.all;
+        let times = &mut self.times;
+        let mut since = Instant::now();
+        with!(&mut self.machine, m => {
+            if ghosts {
+                m.slopes_from_host(slopes);
+            }
+            m.second(pool);
+            lap(&mut since, &mut times.second);
+            m.forces(pool, force, add, particles.tag)?;
+            lap(&mut since, &mut times.forces);
+            Ok(m.tally())
+        })
+    }
+
+    /// ψ and local densities of owned particles, in the host's order, into arrays that are kept: one density
+    /// for each pass of the plan and species.
+    pub fn local_densities(&self, excess: &mut Vec<f64>, densities: &mut Vec<f64>) {
+        with!(&self.machine, m => m.to_host(excess, densities));
+    }
+
+    /// The host's numbers of its particles in the order of cells: an order to keep them in that makes
+    /// sorting cheap.
+    pub fn order(&self) -> &[u32] {
+        with!(&self.machine, m => &m.order)
+    }
+
+    /// Bytes held in arrays over particles and pairs.
+    pub fn memory(&self) -> usize {
+        self.slopes.capacity() * size_of::<f64>() + with!(&self.machine, m => m.memory())
+    }
+}
+
+fn first<P: compiled::Compiled>(
+    machine: &mut Machine<P>,
+    plan: &Plan,
+    pool: &Pool,
+    space: Space,
+    given: &Given,
+    times: &mut Times,
+) -> Result<(), EngineError> {
+    let mut since = Instant::now();
+    let count = given.particles.x.len();
+    // Nothing acts at any distance: particles are sorted all the same.
+    let cutoff = if plan.cutoff > 0.0 { plan.cutoff } else { 1.0 };
+    let frame = match space {
+        Space::Open => {
+            let (low, high) = machine.extremes(pool, given)?;
+            Some(Frame::around(low, high, plan.dimensions, cutoff))
+        }
+        Space::Box(domain) => match Frame::of_box(domain, plan.dimensions) {
+            Some(mut frame) if !frame.periodic[..plan.dimensions].iter().all(|p| *p) => {
+                let (low, high) = machine.extremes(pool, given)?;
+                frame.stretch(low, high, cutoff);
+                // What leans along an open direction is no box any more.
+                (!frame.is_tilted()).then_some(frame)
+            }
+            frame => frame,
+        },
+    };
+    let grid = frame.and_then(|frame| Grid::new(&frame, cutoff, count).map(|grid| (frame, grid)));
+    let Some((frame, grid)) = grid else {
+        return Err(EngineError::Host("the box is too narrow, or leans, for a sweep without ghosts"));
+    };
+    machine.sort(pool, frame, grid, given)?;
+    lap(&mut since, &mut times.sort);
+    machine.first(pool);
+    lap(&mut since, &mut times.first);
+    machine.excess(pool, plan, given.particles.tag)?;
+    lap(&mut since, &mut times.excess);
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,112 @@
+use std::fmt;
+use std::num::NonZeroUsize;
+
+/// In what the arithmetic of pairs is done. Positions and velocities of the host, sums over pairs, ψ and
+/// totals are in double precision in either case.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Precision {
+    /// Pairs in single precision: positions as 32-bit fractions of the box, so that differences are exact
+    /// to 2⁻³² of it everywhere. Relative error of forces near 3·10⁻⁷.
+    #[default]
+    Mixed,
+    /// Pairs in double precision.
+    Double,
+}
+
+impl Precision {
+    /// All, with their names.
+    pub const ALL: [(&'static str, Precision); 2] =
+        [("mixed", Precision::Mixed), ("double", Precision::Double)];
+}
+
+impl fmt::Display for Precision {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Precision::Mixed => "mixed",
+            Precision::Double => "double",
+        })
+    }
+}
+
+/// Which instructions the kernels are compiled for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Instructions {
+    /// Whatever the compiler's target has.
+    Portable,
+    /// AVX2 and FMA.
+    Avx2,
+    /// AVX-512 F, BW, DQ and VL.
+    Avx512,
+}
+
+impl Instructions {
+    /// All, with their names, the slowest first.
+    pub const ALL: [(&'static str, Instructions); 3] = [
+        ("portable", Instructions::Portable),
+        ("avx2", Instructions::Avx2),
+        ("avx512", Instructions::Avx512),
+    ];
+
+    /// Whether this processor has them.
+    pub fn available(self) -> bool {
+        #[cfg(target_arch = "x86_64")]
+        {
+            let avx2 = is_x86_feature_detected!("avx2")
+                && is_x86_feature_detected!("fma")
+                && is_x86_feature_detected!("bmi1")
+                && is_x86_feature_detected!("bmi2")
+                && is_x86_feature_detected!("lzcnt")
+                && is_x86_feature_detected!("popcnt");
+            let avx512 = is_x86_feature_detected!("avx512f")
+                && is_x86_feature_detected!("avx512bw")
+                && is_x86_feature_detected!("avx512dq")
+                && is_x86_feature_detected!("avx512vl");
+            match self {
+                Instructions::Portable => true,
+                Instructions::Avx2 => avx2,
+                Instructions::Avx512 => avx2 && avx512,
+            }
+        }
+        #[cfg(not(target_arch = "x86_64"))]
+        {
+            self == Instructions::Portable
+        }
+    }
+
+    /// The best that this processor has.
+    pub fn best() -> Instructions {
+        let available = Instructions::ALL.into_iter().map(|(_, i)| i).filter(|i| i.available());
+        available.last().unwrap_or(Instructions::Portable)
+    }
+}
+
+impl fmt::Display for Instructions {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Instructions::Portable => "portable",
+            Instructions::Avx2 => "avx2",
+            Instructions::Avx512 => "avx512",
+        })
+    }
+}
+
+/// How forces are computed; what they are depends on the precision alone, and not on it but for rounding.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Settings {
+    /// Precision of pair arithmetic.
+    pub precision: Precision,
+    /// Instruction set; one that the processor lacks falls back to the best it has.
+    pub instructions: Instructions,
+    /// Threads that share the work. Results are bitwise the same for any number of them.
+    pub threads: NonZeroUsize,
+}
+
+impl Default for Settings {
+    fn default() -> Settings {
+        Settings {
+            precision: Precision::default(),
+            instructions: Instructions::best(),
+            threads: NonZeroUsize::MIN,
+        }
+    }
+}

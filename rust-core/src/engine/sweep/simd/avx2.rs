@@ -1,0 +1,340 @@
+//! AVX2 with FMA and BMI2.
+
+use super::avx512::{F64x4 as Quad4, operators};
+use super::{Isa, Reals, Words};
+use crate::model::kernel::Real;
+use std::arch::x86_64::*;
+use std::ops::{Add, Mul, Sub};
+
+/// The instruction set.
+#[derive(Clone, Copy)]
+pub struct Avx2;
+
+/// Eight `f32`.
+#[derive(Clone, Copy)]
+pub struct F32x8(__m256);
+
+/// Four `f64`.
+#[derive(Clone, Copy)]
+pub struct F64x4(__m256d);
+
+/// Eight `u32`.
+#[derive(Clone, Copy)]
+pub struct U32x8(__m256i);
+
+operators!(F32x8, _mm256_set1_ps as f32, _mm256_add_ps, _mm256_sub_ps, _mm256_mul_ps, _mm256_max_ps);
+operators!(F64x4, _mm256_set1_pd as f64, _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_max_pd);
+
+/// Lanes of eight words in the order that puts those of a mask first: entry `mask`, a byte for each.
+static FIRST: [u64; 256] = first();
+
+const fn first() -> [u64; 256] {
+    let mut table = [0u64; 256];
+    let mut mask = 0;
+    while mask < 256 {
+        let (mut entry, mut place, mut lane) = (0u64, 0, 0);
+        while lane < 8 {
+            if mask >> lane & 1 == 1 {
+                entry |= lane << (8 * place);
+                place += 1;
+            }
+            lane += 1;
+        }
+        table[mask] = entry;
+        mask += 1;
+    }
+    table
+}
+
+#[inline(always)]
+unsafe fn order(mask: u32) -> __m256i {
+    // SAFETY: the contract of the module, here and below.
+    unsafe { _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(FIRST[(mask & 0xff) as usize] as i64)) }
+}
+
+/// As the words of pairs: each bit of four twice.
+#[inline(always)]
+fn doubled(mask: u32) -> u32 {
+    const DOUBLE: [u8; 16] = [0, 3, 12, 15, 48, 51, 60, 63, 192, 195, 204, 207, 240, 243, 252, 255];
+    DOUBLE[(mask & 15) as usize] as u32
+}
+
+impl Reals for F32x8 {
+    type Scalar = f32;
+    const LANES: usize = 8;
+
+    #[inline(always)]
+    unsafe fn splat(x: f32) -> Self {
+        unsafe { F32x8(_mm256_set1_ps(x)) }
+    }
+    #[inline(always)]
+    unsafe fn load(p: *const f32) -> Self {
+        unsafe { F32x8(_mm256_loadu_ps(p)) }
+    }
+    #[inline(always)]
+    unsafe fn store(self, p: *mut f32) {
+        unsafe { _mm256_storeu_ps(p, self.0) }
+    }
+    #[inline(always)]
+    unsafe fn load_signed(p: *const i32) -> Self {
+        unsafe { F32x8(_mm256_cvtepi32_ps(_mm256_loadu_si256(p.cast()))) }
+    }
+    #[inline(always)]
+    unsafe fn mul_add(self, a: Self, b: Self) -> Self {
+        unsafe { F32x8(_mm256_fmadd_ps(self.0, a.0, b.0)) }
+    }
+    #[inline(always)]
+    unsafe fn inverse_root(self) -> Self {
+        unsafe {
+            // 12 bits, then one step of third order.
+            let y = _mm256_rsqrt_ps(self.0);
+            let e = _mm256_fnmadd_ps(_mm256_mul_ps(self.0, y), y, _mm256_set1_ps(1.0));
+            let c = _mm256_fmadd_ps(e, _mm256_set1_ps(0.375), _mm256_set1_ps(0.5));
+            F32x8(_mm256_fmadd_ps(_mm256_mul_ps(y, e), c, y))
+        }
+    }
+    #[inline(always)]
+    unsafe fn round(self) -> Self {
+        unsafe { F32x8(_mm256_round_ps::<{ _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }>(self.0)) }
+    }
+    #[inline(always)]
+    unsafe fn where_below(self, a: Self, b: Self) -> Self {
+        unsafe { F32x8(_mm256_and_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(a.0, b.0), self.0)) }
+    }
+    #[inline(always)]
+    unsafe fn mask_below(self, other: Self) -> u32 {
+        unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0)) as u32 }
+    }
+    #[inline(always)]
+    unsafe fn compress(self, mask: u32, p: *mut f32) {
+        unsafe { _mm256_storeu_ps(p, _mm256_permutevar8x32_ps(self.0, order(mask))) }
+    }
+    #[inline(always)]
+    unsafe fn lookup(table: *const f32, index: *const u32) -> Self {
+        unsafe { F32x8(_mm256_i32gather_ps::<4>(table, _mm256_loadu_si256(index.cast()))) }
+    }
+    #[inline(always)]
+    unsafe fn columns(base: *const u8, stride: usize, index: *const u32) -> [Self; 4] {
+        unsafe {
+            let [a, b, c, d] = columns_of_words(base, stride, index);
+            [
+                F32x8(_mm256_castsi256_ps(a)),
+                F32x8(_mm256_castsi256_ps(b)),
+                F32x8(_mm256_castsi256_ps(c)),
+                F32x8(_mm256_castsi256_ps(d)),
+            ]
+        }
+    }
+    #[inline(always)]
+    unsafe fn rows(columns: [Self; 4], p: *mut f32) {
+        unsafe {
+            let [a, b, c, d] = columns;
+            let ab_low = _mm256_castps_pd(_mm256_unpacklo_ps(a.0, b.0));
+            let ab_high = _mm256_castps_pd(_mm256_unpackhi_ps(a.0, b.0));
+            let cd_low = _mm256_castps_pd(_mm256_unpacklo_ps(c.0, d.0));
+            let cd_high = _mm256_castps_pd(_mm256_unpackhi_ps(c.0, d.0));
+            // Rows k and k + 4 in the halves.
+            let r0 = _mm256_unpacklo_pd(ab_low, cd_low);
+            let r1 = _mm256_unpackhi_pd(ab_low, cd_low);
+            let r2 = _mm256_unpacklo_pd(ab_high, cd_high);
+            let r3 = _mm256_unpackhi_pd(ab_high, cd_high);
+            let p: *mut f64 = p.cast();
+            _mm256_storeu_pd(p, _mm256_permute2f128_pd::<0x20>(r0, r1));
+            _mm256_storeu_pd(p.add(4), _mm256_permute2f128_pd::<0x20>(r2, r3));
+            _mm256_storeu_pd(p.add(8), _mm256_permute2f128_pd::<0x31>(r0, r1));
+            _mm256_storeu_pd(p.add(12), _mm256_permute2f128_pd::<0x31>(r2, r3));
+        }
+    }
+}
+
+#[inline(always)]
+unsafe fn columns_of_words(base: *const u8, stride: usize, index: *const u32) -> [__m256i; 4] {
+    unsafe {
+        // Rows k and k + 4 go to the halves of vector k.
+        let mut v = [_mm256_setzero_si256(); 4];
+        let mut k = 0;
+        while k < 4 {
+            let low: *const __m128i = base.add(*index.add(k) as usize * stride).cast();
+            let high: *const __m128i = base.add(*index.add(k + 4) as usize * stride).cast();
+            let half = _mm256_castsi128_si256(_mm_loadu_si128(low));
+            v[k] = _mm256_inserti128_si256::<1>(half, _mm_loadu_si128(high));
+            k += 1;
+        }
+        let a = _mm256_unpacklo_epi32(v[0], v[1]);
+        let b = _mm256_unpackhi_epi32(v[0], v[1]);
+        let c = _mm256_unpacklo_epi32(v[2], v[3]);
+        let d = _mm256_unpackhi_epi32(v[2], v[3]);
+        [
+            _mm256_unpacklo_epi64(a, c),
+            _mm256_unpackhi_epi64(a, c),
+            _mm256_unpacklo_epi64(b, d),
+            _mm256_unpackhi_epi64(b, d),
+        ]
+    }
+}
+
+#[inline(always)]
+unsafe fn transposed([a, b, c, d]: [__m256d; 4]) -> [__m256d; 4] {
+    unsafe {
+        let (ab_low, ab_high) = (_mm256_unpacklo_pd(a, b), _mm256_unpackhi_pd(a, b));
+        let (cd_low, cd_high) = (_mm256_unpacklo_pd(c, d), _mm256_unpackhi_pd(c, d));
+        [
+            _mm256_permute2f128_pd::<0x20>(ab_low, cd_low),
+            _mm256_permute2f128_pd::<0x20>(ab_high, cd_high),
+            _mm256_permute2f128_pd::<0x31>(ab_low, cd_low),
+            _mm256_permute2f128_pd::<0x31>(ab_high, cd_high),
+        ]
+    }
+}
+
+impl Reals for F64x4 {
+    type Scalar = f64;
+    const LANES: usize = 4;
+
+    #[inline(always)]
+    unsafe fn splat(x: f64) -> Self {
+        unsafe { F64x4(_mm256_set1_pd(x)) }
+    }
+    #[inline(always)]
+    unsafe fn load(p: *const f64) -> Self {
+        unsafe { F64x4(_mm256_loadu_pd(p)) }
+    }
+    #[inline(always)]
+    unsafe fn store(self, p: *mut f64) {
+        unsafe { _mm256_storeu_pd(p, self.0) }
+    }
+    #[inline(always)]
+    unsafe fn load_signed(p: *const i32) -> Self {
+        unsafe { F64x4(_mm256_cvtepi32_pd(_mm_loadu_si128(p.cast()))) }
+    }
+    #[inline(always)]
+    unsafe fn mul_add(self, a: Self, b: Self) -> Self {
+        unsafe { F64x4(_mm256_fmadd_pd(self.0, a.0, b.0)) }
+    }
+    #[inline(always)]
+    unsafe fn inverse_root(self) -> Self {
+        unsafe { F64x4(_mm256_div_pd(_mm256_set1_pd(1.0), _mm256_sqrt_pd(self.0))) }
+    }
+    #[inline(always)]
+    unsafe fn round(self) -> Self {
+        unsafe { F64x4(_mm256_round_pd::<{ _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }>(self.0)) }
+    }
+    #[inline(always)]
+    unsafe fn where_below(self, a: Self, b: Self) -> Self {
+        unsafe { F64x4(_mm256_and_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(a.0, b.0), self.0)) }
+    }
+    #[inline(always)]
+    unsafe fn mask_below(self, other: Self) -> u32 {
+        unsafe { _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(self.0, other.0)) as u32 }
+    }
+    #[inline(always)]
+    unsafe fn compress(self, mask: u32, p: *mut f64) {
+        unsafe {
+            let pairs = _mm256_permutevar8x32_ps(_mm256_castpd_ps(self.0), order(doubled(mask)));
+            _mm256_storeu_pd(p, _mm256_castps_pd(pairs));
+        }
+    }
+    #[inline(always)]
+    unsafe fn lookup(table: *const f64, index: *const u32) -> Self {
+        unsafe { F64x4(_mm256_i32gather_pd::<8>(table, _mm_loadu_si128(index.cast()))) }
+    }
+    #[inline(always)]
+    unsafe fn columns(base: *const u8, stride: usize, index: *const u32) -> [Self; 4] {
+        unsafe {
+            let mut v = [_mm256_setzero_pd(); 4];
+            let mut k = 0;
+            while k < 4 {
+                v[k] = _mm256_loadu_pd(base.add(*index.add(k) as usize * stride).cast());
+                k += 1;
+            }
+            let [a, b, c, d] = transposed(v);
+            [F64x4(a), F64x4(b), F64x4(c), F64x4(d)]
+        }
+    }
+    #[inline(always)]
+    unsafe fn rows([a, b, c, d]: [Self; 4], p: *mut f64) {
+        unsafe {
+            let rows = transposed([a.0, b.0, c.0, d.0]);
+            let mut k = 0;
+            while k < 4 {
+                _mm256_storeu_pd(p.add(4 * k), rows[k]);
+                k += 1;
+            }
+        }
+    }
+}
+
+impl Words for U32x8 {
+    const LANES: usize = 8;
+
+    #[inline(always)]
+    unsafe fn splat(x: u32) -> Self {
+        unsafe { U32x8(_mm256_set1_epi32(x as i32)) }
+    }
+    #[inline(always)]
+    unsafe fn load(p: *const u32) -> Self {
+        unsafe { U32x8(_mm256_loadu_si256(p.cast())) }
+    }
+    #[inline(always)]
+    unsafe fn store(self, p: *mut u32) {
+        unsafe { _mm256_storeu_si256(p.cast(), self.0) }
+    }
+    #[inline(always)]
+    unsafe fn add(self, other: Self) -> Self {
+        unsafe { U32x8(_mm256_add_epi32(self.0, other.0)) }
+    }
+    #[inline(always)]
+    unsafe fn sub(self, other: Self) -> Self {
+        unsafe { U32x8(_mm256_sub_epi32(self.0, other.0)) }
+    }
+    #[inline(always)]
+    unsafe fn xor(self, other: Self) -> Self {
+        unsafe { U32x8(_mm256_xor_si256(self.0, other.0)) }
+    }
+    #[inline(always)]
+    unsafe fn min(self, other: Self) -> Self {
+        unsafe { U32x8(_mm256_min_epu32(self.0, other.0)) }
+    }
+    #[inline(always)]
+    unsafe fn max(self, other: Self) -> Self {
+        unsafe { U32x8(_mm256_max_epu32(self.0, other.0)) }
+    }
+    #[inline(always)]
+    unsafe fn rotate(self, by: u32) -> Self {
+        unsafe {
+            let left = _mm256_sll_epi32(self.0, _mm_cvtsi32_si128(by as i32));
+            let right = _mm256_srl_epi32(self.0, _mm_cvtsi32_si128(32 - by as i32));
+            U32x8(_mm256_or_si256(left, right))
+        }
+    }
+    #[inline(always)]
+    unsafe fn compress(self, mask: u32, p: *mut u32) {
+        unsafe { _mm256_storeu_si256(p.cast(), _mm256_permutevar8x32_epi32(self.0, order(mask))) }
+    }
+}
+
+impl Isa for Avx2 {
+    type F32 = F32x8;
+    type F64 = F64x4;
+    type U32 = U32x8;
+    type Quad = Quad4;
+
+    #[inline(always)]
+    unsafe fn signed(words: U32x8) -> F32x8 {
+        unsafe { F32x8(_mm256_cvtepi32_ps(words.0)) }
+    }
+    #[inline(always)]
+    unsafe fn word_columns(base: *const u8, stride: usize, index: *const u32) -> [U32x8; 4] {
+        let [a, b, c, d] = unsafe { columns_of_words(base, stride, index) };
+        [U32x8(a), U32x8(b), U32x8(c), U32x8(d)]
+    }
+    #[inline(always)]
+    unsafe fn collect_below(a: F32x8, b: F32x8, first: u32, remaining: usize, p: *mut u32) -> usize {
+        unsafe {
+            let near = _bzhi_u32(a.mask_below(b), remaining.min(8) as u32);
+            let index = _mm256_add_epi32(_mm256_set1_epi32(first as i32), order(near));
+            _mm256_storeu_si256(p.cast(), index);
+            near.count_ones() as usize
+        }
+    }
+}

@@ -1,0 +1,435 @@
+//! AVX-512 (F, BW, DQ, VL), with AVX2, FMA and BMI2.
+
+use super::{Isa, Quad, Reals, Words};
+use crate::model::kernel::Real;
+use std::arch::x86_64::*;
+use std::ops::{Add, Mul, Sub};
+
+/// The instruction set.
+#[derive(Clone, Copy)]
+pub struct Avx512;
+
+/// Sixteen `f32`.
+#[derive(Clone, Copy)]
+pub struct F32x16(__m512);
+
+/// Eight `f64`.
+#[derive(Clone, Copy)]
+pub struct F64x8(__m512d);
+
+/// Sixteen `u32`.
+#[derive(Clone, Copy)]
+pub struct U32x16(__m512i);
+
+/// Four `f64`.
+#[derive(Clone, Copy)]
+pub struct F64x4(__m256d);
+
+/// Operators, from intrinsics. They are safe functions because operators are; see the contract of the
+/// module above.
+macro_rules! operators {
+    ($vector:ident, $constant:ident as $scalar:ty, $add:ident, $sub:ident, $mul:ident, $max:ident) => {
+        impl Add for $vector {
+            type Output = Self;
+            #[inline(always)]
+            fn add(self, other: Self) -> Self {
+                // SAFETY: the contract of the module.
+                unsafe { Self($add(self.0, other.0)) }
+            }
+        }
+        impl Sub for $vector {
+            type Output = Self;
+            #[inline(always)]
+            fn sub(self, other: Self) -> Self {
+                // SAFETY: the contract of the module.
+                unsafe { Self($sub(self.0, other.0)) }
+            }
+        }
+        impl Mul for $vector {
+            type Output = Self;
+            #[inline(always)]
+            fn mul(self, other: Self) -> Self {
+                // SAFETY: the contract of the module.
+                unsafe { Self($mul(self.0, other.0)) }
+            }
+        }
+        impl Real for $vector {
+            #[inline(always)]
+            fn constant(x: f64) -> Self {
+                // SAFETY: the contract of the module.
+                unsafe { Self($constant(x as $scalar)) }
+            }
+            #[inline(always)]
+            fn larger(self, other: Self) -> Self {
+                // SAFETY: the contract of the module.
+                unsafe { Self($max(self.0, other.0)) }
+            }
+        }
+    };
+}
+pub(super) use operators;
+
+operators!(F32x16, _mm512_set1_ps as f32, _mm512_add_ps, _mm512_sub_ps, _mm512_mul_ps, _mm512_max_ps);
+operators!(F64x8, _mm512_set1_pd as f64, _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd, _mm512_max_pd);
+
+impl Reals for F32x16 {
+    type Scalar = f32;
+    const LANES: usize = 16;
+
+    #[inline(always)]
+    unsafe fn splat(x: f32) -> Self {
+        // SAFETY: the contract of the module, here and below.
+        unsafe { F32x16(_mm512_set1_ps(x)) }
+    }
+    #[inline(always)]
+    unsafe fn load(p: *const f32) -> Self {
+        unsafe { F32x16(_mm512_loadu_ps(p)) }
+    }
+    #[inline(always)]
+    unsafe fn store(self, p: *mut f32) {
+        unsafe { _mm512_storeu_ps(p, self.0) }
+    }
+    #[inline(always)]
+    unsafe fn load_signed(p: *const i32) -> Self {
+        unsafe { F32x16(_mm512_cvtepi32_ps(_mm512_loadu_si512(p.cast()))) }
+    }
+    #[inline(always)]
+    unsafe fn mul_add(self, a: Self, b: Self) -> Self {
+        unsafe { F32x16(_mm512_fmadd_ps(self.0, a.0, b.0)) }
+    }
+    #[inline(always)]
+    unsafe fn inverse_root(self) -> Self {
+        unsafe {
+            // 14 bits, then one step of Newton's.
+            let y = _mm512_rsqrt14_ps(self.0);
+            let half = _mm512_mul_ps(_mm512_set1_ps(-0.5), self.0);
+            let yy = _mm512_mul_ps(y, y);
+            let e = _mm512_fmadd_ps(half, yy, _mm512_set1_ps(0.5));
+            F32x16(_mm512_fmadd_ps(y, e, y))
+        }
+    }
+    #[inline(always)]
+    unsafe fn round(self) -> Self {
+        unsafe {
+            F32x16(_mm512_roundscale_ps::<{ _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }>(self.0))
+        }
+    }
+    #[inline(always)]
+    unsafe fn where_below(self, a: Self, b: Self) -> Self {
+        unsafe { F32x16(_mm512_maskz_mov_ps(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(a.0, b.0), self.0)) }
+    }
+    #[inline(always)]
+    unsafe fn mask_below(self, other: Self) -> u32 {
+        unsafe { _mm512_cmp_ps_mask::<_CMP_LT_OQ>(self.0, other.0) as u32 }
+    }
+    #[inline(always)]
+    unsafe fn compress(self, mask: u32, p: *mut f32) {
+        // In a register: the form that writes memory is slow on some processors.
+        unsafe { _mm512_storeu_ps(p, _mm512_maskz_compress_ps(mask as u16, self.0)) }
+    }
+    #[inline(always)]
+    unsafe fn lookup(table: *const f32, index: *const u32) -> Self {
+        unsafe { F32x16(_mm512_i32gather_ps::<4>(_mm512_loadu_si512(index.cast()), table.cast())) }
+    }
+    #[inline(always)]
+    unsafe fn columns(base: *const u8, stride: usize, index: *const u32) -> [Self; 4] {
+        unsafe { columns_of_words(base, stride, index).map_each() }
+    }
+    #[inline(always)]
+    unsafe fn rows(columns: [Self; 4], p: *mut f32) {
+        unsafe {
+            let [a, b, c, d] = columns;
+            let ab_low = _mm512_castps_pd(_mm512_unpacklo_ps(a.0, b.0));
+            let ab_high = _mm512_castps_pd(_mm512_unpackhi_ps(a.0, b.0));
+            let cd_low = _mm512_castps_pd(_mm512_unpacklo_ps(c.0, d.0));
+            let cd_high = _mm512_castps_pd(_mm512_unpackhi_ps(c.0, d.0));
+            // Row k, k + 4, k + 8, k + 12 in the four quarters.
+            let r0 = _mm512_castpd_ps(_mm512_unpacklo_pd(ab_low, cd_low));
+            let r1 = _mm512_castpd_ps(_mm512_unpackhi_pd(ab_low, cd_low));
+            let r2 = _mm512_castpd_ps(_mm512_unpacklo_pd(ab_high, cd_high));
+            let r3 = _mm512_castpd_ps(_mm512_unpackhi_pd(ab_high, cd_high));
+            let low01 = _mm512_shuffle_f32x4::<0x44>(r0, r1);
+            let low23 = _mm512_shuffle_f32x4::<0x44>(r2, r3);
+            let high01 = _mm512_shuffle_f32x4::<0xee>(r0, r1);
+            let high23 = _mm512_shuffle_f32x4::<0xee>(r2, r3);
+            _mm512_storeu_ps(p, _mm512_shuffle_f32x4::<0x88>(low01, low23));
+            _mm512_storeu_ps(p.add(16), _mm512_shuffle_f32x4::<0xdd>(low01, low23));
+            _mm512_storeu_ps(p.add(32), _mm512_shuffle_f32x4::<0x88>(high01, high23));
+            _mm512_storeu_ps(p.add(48), _mm512_shuffle_f32x4::<0xdd>(high01, high23));
+        }
+    }
+}
+
+/// Four vectors of sixteen words.
+#[derive(Clone, Copy)]
+struct WordColumns([__m512i; 4]);
+
+impl WordColumns {
+    #[inline(always)]
+    fn map_each(self) -> [F32x16; 4] {
+        let [a, b, c, d] = self.0;
+        // SAFETY: the contract of the module.
+        unsafe {
+            [
+                F32x16(_mm512_castsi512_ps(a)),
+                F32x16(_mm512_castsi512_ps(b)),
+                F32x16(_mm512_castsi512_ps(c)),
+                F32x16(_mm512_castsi512_ps(d)),
+            ]
+        }
+    }
+}
+
+#[inline(always)]
+unsafe fn row(base: *const u8, stride: usize, index: *const u32, k: usize) -> __m128i {
+    // SAFETY: the contract of the module.
+    unsafe { _mm_loadu_si128(base.add(*index.add(k) as usize * stride).cast()) }
+}
+
+/// Rows of four words, sixteen of them, as columns: loads of 16 bytes and a transposition within
+/// quarters cost a fraction of a gather instruction.
+#[inline(always)]
+unsafe fn columns_of_words(base: *const u8, stride: usize, index: *const u32) -> WordColumns {
+    unsafe {
+        // Rows k, k + 4, k + 8, k + 12 go to the quarters of vector k.
+        let mut v = [_mm512_setzero_si512(); 4];
+        let mut k = 0;
+        while k < 4 {
+            let quarter = _mm512_castsi128_si512(row(base, stride, index, k));
+            let quarter = _mm512_inserti32x4::<1>(quarter, row(base, stride, index, k + 4));
+            let quarter = _mm512_inserti32x4::<2>(quarter, row(base, stride, index, k + 8));
+            v[k] = _mm512_inserti32x4::<3>(quarter, row(base, stride, index, k + 12));
+            k += 1;
+        }
+        let a = _mm512_unpacklo_epi32(v[0], v[1]);
+        let b = _mm512_unpackhi_epi32(v[0], v[1]);
+        let c = _mm512_unpacklo_epi32(v[2], v[3]);
+        let d = _mm512_unpackhi_epi32(v[2], v[3]);
+        WordColumns([
+            _mm512_unpacklo_epi64(a, c),
+            _mm512_unpackhi_epi64(a, c),
+            _mm512_unpacklo_epi64(b, d),
+            _mm512_unpackhi_epi64(b, d),
+        ])
+    }
+}
+
+impl Reals for F64x8 {
+    type Scalar = f64;
+    const LANES: usize = 8;
+
+    #[inline(always)]
+    unsafe fn splat(x: f64) -> Self {
+        unsafe { F64x8(_mm512_set1_pd(x)) }
+    }
+    #[inline(always)]
+    unsafe fn load(p: *const f64) -> Self {
+        unsafe { F64x8(_mm512_loadu_pd(p)) }
+    }
+    #[inline(always)]
+    unsafe fn store(self, p: *mut f64) {
+        unsafe { _mm512_storeu_pd(p, self.0) }
+    }
+    #[inline(always)]
+    unsafe fn load_signed(p: *const i32) -> Self {
+        unsafe { F64x8(_mm512_cvtepi32_pd(_mm256_loadu_si256(p.cast()))) }
+    }
+    #[inline(always)]
+    unsafe fn mul_add(self, a: Self, b: Self) -> Self {
+        unsafe { F64x8(_mm512_fmadd_pd(self.0, a.0, b.0)) }
+    }
+    #[inline(always)]
+    unsafe fn inverse_root(self) -> Self {
+        unsafe {
+            // 14, 28, 53 bits.
+            let half = _mm512_mul_pd(_mm512_set1_pd(-0.5), self.0);
+            let mut y = _mm512_rsqrt14_pd(self.0);
+            let mut k = 0;
+            while k < 2 {
+                let e = _mm512_fmadd_pd(half, _mm512_mul_pd(y, y), _mm512_set1_pd(0.5));
+                y = _mm512_fmadd_pd(y, e, y);
+                k += 1;
+            }
+            F64x8(y)
+        }
+    }
+    #[inline(always)]
+    unsafe fn round(self) -> Self {
+        unsafe {
+            F64x8(_mm512_roundscale_pd::<{ _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }>(self.0))
+        }
+    }
+    #[inline(always)]
+    unsafe fn where_below(self, a: Self, b: Self) -> Self {
+        unsafe { F64x8(_mm512_maskz_mov_pd(_mm512_cmp_pd_mask::<_CMP_LT_OQ>(a.0, b.0), self.0)) }
+    }
+    #[inline(always)]
+    unsafe fn mask_below(self, other: Self) -> u32 {
+        unsafe { _mm512_cmp_pd_mask::<_CMP_LT_OQ>(self.0, other.0) as u32 }
+    }
+    #[inline(always)]
+    unsafe fn compress(self, mask: u32, p: *mut f64) {
+        unsafe { _mm512_storeu_pd(p, _mm512_maskz_compress_pd(mask as u8, self.0)) }
+    }
+    #[inline(always)]
+    unsafe fn lookup(table: *const f64, index: *const u32) -> Self {
+        unsafe { F64x8(_mm512_i32gather_pd::<8>(_mm256_loadu_si256(index.cast()), table.cast())) }
+    }
+    #[inline(always)]
+    unsafe fn columns(base: *const u8, stride: usize, index: *const u32) -> [Self; 4] {
+        unsafe {
+            // Rows k and k + 4 in the halves.
+            let mut v = [_mm512_setzero_pd(); 4];
+            let mut k = 0;
+            while k < 4 {
+                let low: *const f64 = base.add(*index.add(k) as usize * stride).cast();
+                let high: *const f64 = base.add(*index.add(k + 4) as usize * stride).cast();
+                let half = _mm512_castpd256_pd512(_mm256_loadu_pd(low));
+                v[k] = _mm512_insertf64x4::<1>(half, _mm256_loadu_pd(high));
+                k += 1;
+            }
+            // (0,2) of rows 0,1; (1,3) …
+            let a = _mm512_unpacklo_pd(v[0], v[1]);
+            let b = _mm512_unpackhi_pd(v[0], v[1]);
+            let c = _mm512_unpacklo_pd(v[2], v[3]);
+            let d = _mm512_unpackhi_pd(v[2], v[3]);
+            let even = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13);
+            let odd = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
+            [
+                F64x8(_mm512_permutex2var_pd(a, even, c)),
+                F64x8(_mm512_permutex2var_pd(b, even, d)),
+                F64x8(_mm512_permutex2var_pd(a, odd, c)),
+                F64x8(_mm512_permutex2var_pd(b, odd, d)),
+            ]
+        }
+    }
+    #[inline(always)]
+    unsafe fn rows(columns: [Self; 4], p: *mut f64) {
+        unsafe {
+            let [a, b, c, d] = columns;
+            let ab_low = _mm512_unpacklo_pd(a.0, b.0);
+            let ab_high = _mm512_unpackhi_pd(a.0, b.0);
+            let cd_low = _mm512_unpacklo_pd(c.0, d.0);
+            let cd_high = _mm512_unpackhi_pd(c.0, d.0);
+            // Lanes 0,2,4,6 of the columns are in the quarters of the low ones, 1,3,5,7 in the high.
+            let first = _mm512_setr_epi64(0, 1, 8, 9, 2, 3, 10, 11);
+            let second = _mm512_setr_epi64(4, 5, 12, 13, 6, 7, 14, 15);
+            let even01 = _mm512_permutex2var_pd(ab_low, first, cd_low);
+            let odd01 = _mm512_permutex2var_pd(ab_high, first, cd_high);
+            let even23 = _mm512_permutex2var_pd(ab_low, second, cd_low);
+            let odd23 = _mm512_permutex2var_pd(ab_high, second, cd_high);
+            _mm512_storeu_pd(p, _mm512_shuffle_f64x2::<0x44>(even01, odd01));
+            _mm512_storeu_pd(p.add(8), _mm512_shuffle_f64x2::<0xee>(even01, odd01));
+            _mm512_storeu_pd(p.add(16), _mm512_shuffle_f64x2::<0x44>(even23, odd23));
+            _mm512_storeu_pd(p.add(24), _mm512_shuffle_f64x2::<0xee>(even23, odd23));
+        }
+    }
+}
+
+impl Words for U32x16 {
+    const LANES: usize = 16;
+
+    #[inline(always)]
+    unsafe fn splat(x: u32) -> Self {
+        unsafe { U32x16(_mm512_set1_epi32(x as i32)) }
+    }
+    #[inline(always)]
+    unsafe fn load(p: *const u32) -> Self {
+        unsafe { U32x16(_mm512_loadu_si512(p.cast())) }
+    }
+    #[inline(always)]
+    unsafe fn store(self, p: *mut u32) {
+        unsafe { _mm512_storeu_si512(p.cast(), self.0) }
+    }
+    #[inline(always)]
+    unsafe fn add(self, other: Self) -> Self {
+        unsafe { U32x16(_mm512_add_epi32(self.0, other.0)) }
+    }
+    #[inline(always)]
+    unsafe fn sub(self, other: Self) -> Self {
+        unsafe { U32x16(_mm512_sub_epi32(self.0, other.0)) }
+    }
+    #[inline(always)]
+    unsafe fn xor(self, other: Self) -> Self {
+        unsafe { U32x16(_mm512_xor_si512(self.0, other.0)) }
+    }
+    #[inline(always)]
+    unsafe fn min(self, other: Self) -> Self {
+        unsafe { U32x16(_mm512_min_epu32(self.0, other.0)) }
+    }
+    #[inline(always)]
+    unsafe fn max(self, other: Self) -> Self {
+        unsafe { U32x16(_mm512_max_epu32(self.0, other.0)) }
+    }
+    #[inline(always)]
+    unsafe fn rotate(self, by: u32) -> Self {
+        unsafe { U32x16(_mm512_rolv_epi32(self.0, _mm512_set1_epi32(by as i32))) }
+    }
+    #[inline(always)]
+    unsafe fn compress(self, mask: u32, p: *mut u32) {
+        unsafe { _mm512_storeu_si512(p.cast(), _mm512_maskz_compress_epi32(mask as u16, self.0)) }
+    }
+}
+
+impl Quad for F64x4 {
+    #[inline(always)]
+    unsafe fn zero() -> Self {
+        unsafe { F64x4(_mm256_setzero_pd()) }
+    }
+    #[inline(always)]
+    unsafe fn splat(x: f64) -> Self {
+        unsafe { F64x4(_mm256_set1_pd(x)) }
+    }
+    #[inline(always)]
+    unsafe fn load(p: *const f64) -> Self {
+        unsafe { F64x4(_mm256_loadu_pd(p)) }
+    }
+    #[inline(always)]
+    unsafe fn store(self, p: *mut f64) {
+        unsafe { _mm256_storeu_pd(p, self.0) }
+    }
+    #[inline(always)]
+    unsafe fn add(self, other: Self) -> Self {
+        unsafe { F64x4(_mm256_add_pd(self.0, other.0)) }
+    }
+    #[inline(always)]
+    unsafe fn sub(self, other: Self) -> Self {
+        unsafe { F64x4(_mm256_sub_pd(self.0, other.0)) }
+    }
+    #[inline(always)]
+    unsafe fn mul(self, other: Self) -> Self {
+        unsafe { F64x4(_mm256_mul_pd(self.0, other.0)) }
+    }
+    #[inline(always)]
+    unsafe fn load_f32(p: *const f32) -> Self {
+        unsafe { F64x4(_mm256_cvtps_pd(_mm_loadu_ps(p))) }
+    }
+}
+
+impl Isa for Avx512 {
+    type F32 = F32x16;
+    type F64 = F64x8;
+    type U32 = U32x16;
+    type Quad = F64x4;
+
+    #[inline(always)]
+    unsafe fn signed(words: U32x16) -> F32x16 {
+        unsafe { F32x16(_mm512_cvtepi32_ps(words.0)) }
+    }
+    #[inline(always)]
+    unsafe fn word_columns(base: *const u8, stride: usize, index: *const u32) -> [U32x16; 4] {
+        let [a, b, c, d] = unsafe { columns_of_words(base, stride, index).0 };
+        [U32x16(a), U32x16(b), U32x16(c), U32x16(d)]
+    }
+    #[inline(always)]
+    unsafe fn collect_below(a: F32x16, b: F32x16, first: u32, remaining: usize, p: *mut u32) -> usize {
+        unsafe {
+            let near = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a.0, b.0) as u32;
+            let near = _bzhi_u32(near, remaining.min(16) as u32);
+            let lanes = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+            let index = _mm512_add_epi32(_mm512_set1_epi32(first as i32), lanes);
+            _mm512_storeu_si512(p.cast(), _mm512_maskz_compress_epi32(near as u16, index));
+            near.count_ones() as usize
+        }
+    }
+}

@@ -1,0 +1,205 @@
+//! The plan of a fluid as tables of numbers in the precision of the pairs.
+
+use super::simd::Scalar;
+use crate::engine::plan::{Plan, ThermostatPlan};
+use crate::model::PairTerm;
+use crate::model::kernel::{Kernel, KernelKind};
+use crate::model::pair::{PairForm, PairPotential, SplineAttractive};
+
+/// All terms; tables have an entry for each pair of species, row-major.
+#[derive(Debug, Clone, Default)]
+pub struct Terms<T> {
+    pub species: usize,
+    pub soft: Vec<Soft<T>>,
+    pub linear: Vec<Linear<T>>,
+    pub spline: Vec<Spline<T>>,
+    /// Potentials that are evaluated apart, in double precision.
+    pub apart: Vec<PairTerm>,
+    pub drag: Option<Drag<T>>,
+    pub passes: Vec<Pass<T>>,
+}
+
+/// `a (1 − r/R)`.
+#[derive(Debug, Clone)]
+pub struct Soft<T> {
+    pub strength: Vec<T>,
+    pub inverse_range: Vec<T>,
+    /// `½ a R`.
+    pub energy: Vec<T>,
+}
+
+/// `−(c_αβ + c_βα) w′(r)` of a density that every ψ is linear in.
+#[derive(Debug, Clone)]
+pub struct Linear<T> {
+    pub kind: KernelKind,
+    pub inverse_range: T,
+    pub force_kind: KernelKind,
+    pub force_inverse_range: T,
+    /// `−(c_αβ + c_βα)` times the factor of `w′`.
+    pub force: Vec<T>,
+    /// `c_αβ + c_βα` times the factor of `w`.
+    pub energy: Vec<T>,
+}
+
+/// `a [A W(r, R_A) − B W(r, R_B)]`.
+#[derive(Debug, Clone)]
+pub struct Spline<T> {
+    pub repulsion: Vec<T>,
+    pub attraction: Vec<T>,
+    pub repulsion_inverse_range: Vec<T>,
+    pub attraction_inverse_range: Vec<T>,
+}
+
+/// `−γ w_R² (ê·v) + σ w_R ξ dt^{−1/2}`.
+#[derive(Debug, Clone)]
+pub struct Drag<T> {
+    pub gamma: Vec<T>,
+    pub sigma: Vec<T>,
+    pub inverse_range: Vec<T>,
+    pub exponent: Exponent<T>,
+}
+
+/// The exponent of `w_R`.
+#[derive(Debug, Clone)]
+pub enum Exponent<T> {
+    One,
+    Two,
+    Any(Vec<T>),
+}
+
+impl<T: Scalar> Exponent<T> {
+    fn new(plan: &ThermostatPlan) -> Exponent<T> {
+        let all = |e: f64| plan.exponent.iter().zip(&plan.gamma).all(|(x, gamma)| *gamma == 0.0 || *x == e);
+        if all(1.0) {
+            Exponent::One
+        } else if all(2.0) {
+            Exponent::Two
+        } else {
+            Exponent::Any(plan.exponent.iter().map(|x| T::of(*x)).collect())
+        }
+    }
+}
+
+/// A density that some ψ is not linear in.
+#[derive(Debug, Clone)]
+pub struct Pass<T> {
+    pub kind: KernelKind,
+    pub inverse_range: T,
+    pub value: T,
+    pub force_kind: KernelKind,
+    pub force_range: T,
+    pub force_inverse_range: T,
+    /// Minus the factor of `w′`.
+    pub force: T,
+}
+
+/// One over a range; 0 for no range, beyond which everything is.
+fn inverse(range: f64) -> f64 {
+    if range > 0.0 { 1.0 / range } else { f64::from(f32::MAX) }
+}
+
+impl<T: Scalar> Terms<T> {
+    pub fn new(plan: &Plan) -> Terms<T> {
+        let count = plan.species.len();
+        let mut terms = Terms { species: count, ..Terms::default() };
+        for term in &plan.pairs {
+            terms.add_pair(term);
+        }
+        for term in &plan.linear {
+            let both = |factor: f64| -> Vec<T> {
+                let c = &term.coefficients;
+                (0..count * count)
+                    .map(|p| T::of(factor * (c[p] + c[p % count * count + p / count])))
+                    .collect()
+            };
+            terms.linear.push(Linear {
+                kind: term.kernel.kind(),
+                inverse_range: T::of(1.0 / term.kernel.range()),
+                force_kind: term.force_kernel.kind(),
+                force_inverse_range: T::of(1.0 / term.force_kernel.range()),
+                force: both(-term.force_kernel.slope_factor()),
+                energy: both(term.kernel.value_factor()),
+            });
+        }
+        terms.passes = plan
+            .passes
+            .iter()
+            .map(|d| Pass::new(&plan.densities[*d].kernel, &plan.densities[*d].force_kernel))
+            .collect();
+        terms.drag = plan.thermostat.as_ref().map(|t| Drag {
+            gamma: t.gamma.iter().map(|x| T::of(*x)).collect(),
+            sigma: t.sigma.iter().map(|x| T::of(*x)).collect(),
+            inverse_range: t.range.iter().map(|x| T::of(inverse(*x))).collect(),
+            exponent: Exponent::new(t),
+        });
+        terms
+    }
+
+    /// Entries of the pair of species that a term acts on.
+    fn places(&self, [a, b]: [usize; 2]) -> [usize; 2] {
+        [a * self.species + b, b * self.species + a]
+    }
+
+    fn add_pair(&mut self, term: &PairTerm) {
+        let places = self.places(term.between);
+        let size = self.species * self.species;
+        let far = T::of(inverse(0.0));
+        let zero = || vec![T::default(); size];
+        match &term.potential {
+            PairPotential::Soft(form) => {
+                // The first table that has no such pair yet.
+                let free = self.soft.iter().position(|s| s.inverse_range[places[0]] == far);
+                let at = free.unwrap_or_else(|| {
+                    let table =
+                        Soft { strength: zero(), inverse_range: vec![far; size], energy: zero() };
+                    self.soft.push(table);
+                    self.soft.len() - 1
+                });
+                for p in places {
+                    self.soft[at].strength[p] = T::of(form.strength());
+                    self.soft[at].inverse_range[p] = T::of(inverse(form.range()));
+                    self.soft[at].energy[p] = T::of(0.5 * form.strength() * form.range());
+                }
+            }
+            PairPotential::Spline(form) => {
+                let free = self.spline.iter().position(|s| s.repulsion_inverse_range[places[0]] == far);
+                let at = free.unwrap_or_else(|| {
+                    self.spline.push(Spline {
+                        repulsion: zero(),
+                        attraction: zero(),
+                        repulsion_inverse_range: vec![far; size],
+                        attraction_inverse_range: vec![far; size],
+                    });
+                    self.spline.len() - 1
+                });
+                self.spline[at].set(form, places);
+            }
+            PairPotential::Expression(_) | PairPotential::Table(_) => self.apart.push(term.clone()),
+        }
+    }
+}
+
+impl<T: Scalar> Spline<T> {
+    fn set(&mut self, form: &SplineAttractive, places: [usize; 2]) {
+        for p in places {
+            self.repulsion[p] = T::of(form.repulsion());
+            self.attraction[p] = T::of(form.attraction());
+            self.repulsion_inverse_range[p] = T::of(inverse(form.repulsion_range()));
+            self.attraction_inverse_range[p] = T::of(inverse(form.attraction_range()));
+        }
+    }
+}
+
+impl<T: Scalar> Pass<T> {
+    fn new(kernel: &Kernel, force: &Kernel) -> Pass<T> {
+        Pass {
+            kind: kernel.kind(),
+            inverse_range: T::of(1.0 / kernel.range()),
+            value: T::of(kernel.value_factor()),
+            force_kind: force.kind(),
+            force_range: T::of(force.range()),
+            force_inverse_range: T::of(1.0 / force.range()),
+            force: T::of(-force.slope_factor()),
+        }
+    }
+}

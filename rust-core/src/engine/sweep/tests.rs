@@ -1,0 +1,295 @@
+use super::*;
+use crate::engine::{Engine, Images, Newton};
+use crate::model::Model;
+use nalgebra::Matrix3;
+use std::num::NonZeroUsize;
+use std::path::Path;
+
+/// A generator of points, the same everywhere.
+struct Points(u64);
+
+impl Points {
+    fn unit(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+/// Particles in a box, and what they move like.
+struct Cloud {
+    domain: PeriodicBox,
+    x: Vec<[f64; 3]>,
+    v: Vec<[f64; 3]>,
+    tag: Vec<i32>,
+    kind: Vec<i32>,
+}
+
+impl Cloud {
+    fn new(domain: PeriodicBox, dimensions: usize, species: usize, count: usize, seed: u64) -> Cloud {
+        let mut points = Points(seed);
+        let mut cloud = Cloud { domain, x: vec![], v: vec![], tag: vec![], kind: vec![] };
+        for k in 0..count {
+            let mut s = [points.unit(), points.unit(), points.unit()];
+            let mut v = [points.unit() - 0.5, points.unit() - 0.5, points.unit() - 0.5];
+            if dimensions == 2 {
+                (s[2], v[2]) = (0.5, 0.0);
+            }
+            cloud.x.push(cloud.domain.point(s));
+            cloud.v.push(v);
+            // Tags in no order.
+            cloud.tag.push(1 + ((k * 7919) % count) as i32);
+            cloud.kind.push((points.unit() * species as f64) as i32);
+        }
+        let mut tags = cloud.tag.clone();
+        tags.sort_unstable();
+        tags.dedup();
+        assert_eq!(tags.len(), count, "a number of particles that 7919 divides");
+        cloud
+    }
+
+    fn particles(&self) -> Particles<'_> {
+        Particles { owned: self.x.len(), x: &self.x, tag: &self.tag, kind: &self.kind }
+    }
+}
+
+const STEP: Step = Step { seed: 11, number: 5, dt: 0.01 };
+
+/// Forces and totals by the plain engine with images as ghosts.
+fn plain(fluid: &Fluid, cloud: &Cloud) -> (Vec<[f64; 3]>, Tally) {
+    let mut engine = Engine::new(fluid).unwrap();
+    let n = cloud.x.len();
+    let (mut x, mut v, mut tag, mut kind) =
+        (cloud.x.clone(), cloud.v.clone(), cloud.tag.clone(), cloud.kind.clone());
+    let mut images = Images::default();
+    images.build(&cloud.domain, fluid.dimensions, engine.plan().cutoff(), n, &mut x);
+    images.forward(1, &mut v);
+    images.forward(1, &mut tag);
+    images.forward(1, &mut kind);
+    let particles = Particles { owned: n, x: &x, tag: &tag, kind: &kind };
+    engine.densities(&particles, Newton::On).unwrap();
+    let width = engine.slope_width();
+    engine.slopes_mut().truncate(n * width);
+    images.forward(width, engine.slopes_mut());
+    let mut force = vec![[0.0; 3]; x.len()];
+    let tally = engine.forces(&particles, &v, Some(STEP), Want::TOTALS, &mut force).unwrap();
+    images.reverse(&mut force);
+    force.truncate(n);
+    (force, tally)
+}
+
+fn settings(precision: Precision, instructions: Instructions, threads: usize) -> Settings {
+    Settings { precision, instructions, threads: NonZeroUsize::new(threads).unwrap() }
+}
+
+fn every() -> impl Iterator<Item = (Precision, Instructions)> {
+    let precisions = [Precision::Mixed, Precision::Double];
+    let sets = [Instructions::Portable, Instructions::Avx2, Instructions::Avx512];
+    precisions
+        .into_iter()
+        .flat_map(move |p| sets.into_iter().filter(|i| i.available()).map(move |i| (p, i)))
+}
+
+/// Forces and totals by a sweep without ghosts.
+fn swept(sweep: &mut Sweep, cloud: &Cloud, want: Want) -> (Vec<[f64; 3]>, Tally) {
+    let particles = cloud.particles();
+    sweep.first(Space::Box(&cloud.domain), &particles, &cloud.v, Some(STEP), want).unwrap();
+    let mut force = vec![[0.0; 3]; cloud.x.len()];
+    let tally = sweep.second(&particles, &mut force, false).unwrap();
+    (force, tally)
+}
+
+/// The same with images as ghosts, as on a rank of a host.
+fn with_ghosts(sweep: &mut Sweep, cloud: &Cloud) -> (Vec<[f64; 3]>, Tally) {
+    let n = cloud.x.len();
+    let (mut x, mut v, mut tag, mut kind) =
+        (cloud.x.clone(), cloud.v.clone(), cloud.tag.clone(), cloud.kind.clone());
+    let mut images = Images::default();
+    let plan = sweep.plan();
+    images.build(&cloud.domain, plan.dimensions(), plan.cutoff(), n, &mut x);
+    images.forward(1, &mut v);
+    images.forward(1, &mut tag);
+    images.forward(1, &mut kind);
+    let particles = Particles { owned: n, x: &x, tag: &tag, kind: &kind };
+    sweep.first(Space::Open, &particles, &v, Some(STEP), Want::TOTALS).unwrap();
+    let width = sweep.slope_width();
+    let mut slopes = sweep.slopes_mut()[..n * width].to_vec();
+    images.forward(width, &mut slopes);
+    sweep.slopes_mut().copy_from_slice(&slopes);
+    let mut force = vec![[1.0; 3]; n];
+    let tally = sweep.second(&particles, &mut force, true).unwrap();
+    for f in &mut force {
+        *f = f.map(|c| c - 1.0);
+    }
+    (force, tally)
+}
+
+/// Largest difference of two sets of forces, over the rms force.
+fn difference(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
+    let square: f64 = a.as_flattened().iter().map(|f| f * f).sum();
+    let rms = (square / a.len() as f64).sqrt().max(1e-300);
+    let pairs = a.as_flattened().iter().zip(b.as_flattened());
+    pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / rms
+}
+
+fn tally_difference(a: &Tally, b: &Tally) -> f64 {
+    let list = |t: &Tally| -> Vec<f64> {
+        [t.excess, t.pair].into_iter().chain(t.virial).chain(t.thermostat_virial).collect()
+    };
+    let (a, b) = (list(a), list(b));
+    let scale = a.iter().map(|x| x.abs()).fold(1e-300, f64::max);
+    a.iter().zip(&b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / scale
+}
+
+/// What each precision may be off by, in the largest force over the rms one.
+fn tolerance(precision: Precision) -> f64 {
+    match precision {
+        Precision::Mixed => 1e-5,
+        Precision::Double => 1e-12,
+    }
+}
+
+fn boxes(dimensions: usize, length: f64) -> Vec<PeriodicBox> {
+    let l = length;
+    let cube = PeriodicBox::orthogonal([-1.0, 2.0, -0.5], [l, 1.1 * l, if dimensions == 3 { 0.9 * l } else { 1.0 }], [true; 3]);
+    let mut edges = Matrix3::new(1.2 * l, 0.3 * l, -0.2 * l, 0.0, l, 0.25 * l, 0.0, 0.0, l);
+    if dimensions == 2 {
+        edges = Matrix3::new(1.2 * l, 0.3 * l, 0.0, 0.0, l, 0.0, 0.0, 0.0, 1.0);
+    }
+    let skew = PeriodicBox::new([0.5, 0.0, -0.5], edges, [true; 3]);
+    vec![cube.unwrap(), skew.unwrap()]
+}
+
+/// Every model file that ships, and some that have what those have not.
+fn fluids() -> Vec<(String, Fluid)> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../validation/models");
+    let mut fluids: Vec<(String, Fluid)> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|e| e == "toml"))
+        .map(|path| {
+            let fluid = Model::open(&path).unwrap().at(1.0).unwrap();
+            (path.file_name().unwrap().to_string_lossy().into_owned(), fluid)
+        })
+        .collect();
+    fluids.sort_by(|a, b| a.0.cmp(&b.0));
+    for (k, text) in [MANY, EXPONENTS].into_iter().enumerate() {
+        let model = Model::parse("many", text).unwrap_or_else(|e| panic!("{e}"));
+        fluids.push((format!("own {k}"), model.at(0.7).unwrap()));
+    }
+    fluids
+}
+
+/// Two species, three densities of different range and kernel, one linear, bounds, a correction, self
+/// terms, every pair form, thermostats by pair.
+const MANY: &str = r#"
+title = "everything at once"
+species = ["A", "B"]
+[density.n]
+kernel = "lucy"
+range = 1.0
+correction = [0.5, 1.1]
+bounds = [1.0, 6.0]
+[density.m]
+kernel = "wendland-c2"
+range = 0.7
+self = true
+[density.k]
+kernel = "cubic-spline"
+range = 0.9
+[excess_free_energy]
+A = "0.3*n^1.5 + 0.1*m_A*m_B + 0.7*k_B"
+B = "0.2*n_A*n_B + 0.05*m^2 + 0.4*k_A"
+[[pair]]
+between = ["A", "A"]
+form = "soft"
+strength = 20.0
+range = 1.0
+[[pair]]
+between = ["A", "B"]
+form = "soft"
+strength = 35.0
+range = 0.8
+[[pair]]
+between = ["A", "A"]
+form = "soft"
+strength = -3.0
+range = 0.6
+[[pair]]
+between = ["B", "B"]
+form = "spline"
+strength = 9.5
+A = 2.0
+B = 1.0
+range_A = 0.8
+range_B = 1.0
+[[pair]]
+between = ["A", "B"]
+form = "expression"
+phi = "3*(1 - r)^3"
+range = 1.0
+[[thermostat]]
+between = ["A", "A"]
+gamma = 4.5
+range = 1.0
+exponent = 1
+[[thermostat]]
+between = ["A", "B"]
+gamma = 9.0
+range = 0.8
+exponent = 2
+[[thermostat]]
+between = ["B", "B"]
+gamma = 0.0
+range = 1.0
+"#;
+
+const EXPONENTS: &str = r#"
+title = "thermostat alone, with a square weight, and kernels that reach their range with a slope"
+dimensions = 2
+species = ["A"]
+[density.n]
+kernel = "linear"
+range = 1.0
+[density.m]
+kernel = "bell"
+range = 0.8
+[excess_free_energy]
+A = "0.4*n^2 + 0.1*m^3"
+[[thermostat]]
+gamma = 4.5
+range = 1.0
+exponent = 2
+"#;
+
+#[test]
+fn every_model_by_every_path_has_the_forces_of_the_plain_engine() {
+    for (name, fluid) in fluids() {
+        let cutoff = fluid.cutoff();
+        let density: f64 = if fluid.dimensions == 3 { 3.0 } else { 5.0 };
+        // As dense as can be evaluated by every model: huggins has a pole.
+        for (b, domain) in boxes(fluid.dimensions, 3.1 * cutoff).into_iter().enumerate() {
+            let volume = domain.volume(fluid.dimensions) / cutoff.powi(fluid.dimensions as i32);
+            let count = (density * volume) as usize;
+            let cloud = Cloud::new(domain, fluid.dimensions, fluid.species.len(), count, 7 + b as u64);
+            let (force, tally) = plain(&fluid, &cloud);
+            for (precision, instructions) in every() {
+                let what = format!("{name}, box {b}, {precision}, {instructions}");
+                let mut sweep = Sweep::new(&fluid, settings(precision, instructions, 1)).unwrap();
+                assert!(sweep.fits(&cloud.domain));
+                let (here, totals) = swept(&mut sweep, &cloud, Want::TOTALS);
+                let off = difference(&force, &here);
+                assert!(off < tolerance(precision), "{what}: {off:.1e}");
+                let off = tally_difference(&tally, &totals);
+                assert!(off < tolerance(precision), "{what}: totals {off:.1e} {tally:?} {totals:?}");
+                let (again, none) = swept(&mut sweep, &cloud, Want::FORCES);
+                assert_eq!(here, again, "{what}: forces depend on what else is wanted");
+                assert_eq!(none.pair, 0.0);
+                let (ghosts, totals) = with_ghosts(&mut sweep, &cloud);
+                let off = difference(&force, &ghosts);
+                assert!(off < tolerance(precision), "{what}, ghosts: {off:.1e}");
+                let off = tally_difference(&tally, &totals);
+                assert!(off < tolerance(precision), "{what}, ghosts: totals {off:.1e}");
+            }
+        }
+    }
+}
