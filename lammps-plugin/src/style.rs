@@ -44,8 +44,7 @@ struct Members<T> {
 impl<T: Copy> Members<T> {
     fn new(pairs: &[Option<T>], types: usize) -> Members<T> {
         let given = |a: usize, b: usize| pairs.get(a.min(b) * types + a.max(b)).is_some_and(Option::is_some);
-        let members: Vec<usize> =
-            (0..types).filter(|a| (0..types).any(|b| given(*a, b))).collect();
+        let members: Vec<usize> = (0..types).filter(|a| (0..types).any(|b| given(*a, b))).collect();
         let row = |a: &usize| a * types;
         Members {
             species: members.iter().copied().map(name_of_type).collect(),

@@ -95,7 +95,7 @@ fn ghosts_by_type_are_enough() {
         drop(l);
         // A third type, of long range, so that the reaches differ.
         let beside = format!(
-            "set type 2 type/ratio 3 0.3 77\nmass 3 1\npair_style hybrid {psi} lj/cut 2.0\n\
+            "set type 1 type/ratio 2 0.4 77\npair_style hybrid {psi} lj/cut 2.0\n\
              pair_coeff * * dpd/psi {wide} A B NULL\npair_coeff * 3 lj/cut 0.01 0.3 0.6\npair_coeff 3 3 lj/cut 0.01 0.3 2.0\n"
         );
         let single = frame(&open(&deck("", &beside, 3)));

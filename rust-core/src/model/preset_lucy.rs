@@ -76,12 +76,8 @@ pub fn lucy_mdpd_text(
             energy.join(" + ")
         );
         for beta in 0..count {
-            let _ = writeln!(
-                text,
-                "{} = \"2*{}*({rho})\"",
-                variable(beta),
-                strength(row[beta].1, dimensions)
-            );
+            let _ =
+                writeln!(text, "{} = \"2*{}*({rho})\"", variable(beta), strength(row[beta].1, dimensions));
         }
     }
     text += &pair_text(&names, &upper);
@@ -134,12 +130,8 @@ mod tests {
     /// Three particles, and the law as it is written above.
     #[test]
     fn forces_are_those_of_the_formula() {
-        let table = [
-            pair(-40.0, 25.0, 1.0, 0.75),
-            pair(-30.0, 20.0, 0.9, 0.8),
-            None,
-            pair(-20.0, -15.0, 1.0, 0.75),
-        ];
+        let table =
+            [pair(-40.0, 25.0, 1.0, 0.75), pair(-30.0, 20.0, 0.9, 0.8), None, pair(-20.0, -15.0, 1.0, 0.75)];
         let masses = [1.0, 2.5];
         for dimensions in [2, 3] {
             let model = lucy_mdpd(&["A".into(), "B".into()], &table, &masses, dimensions).unwrap();

@@ -36,7 +36,10 @@ impl Runs {
     pub fn outcome(&self, text: &str, ranks: usize, folder: &Path) -> Result<String, String> {
         let path = folder.join("in.lammps");
         std::fs::write(&path, format!("{}{text}", self.load)).unwrap();
-        self.host.run_script(ranks, folder, &path, &[], LIMIT).map(|run| run.stdout).map_err(|e| e.to_string())
+        self.host
+            .run_script(ranks, folder, &path, &[], LIMIT)
+            .map(|run| run.stdout)
+            .map_err(|e| e.to_string())
     }
 }
 
