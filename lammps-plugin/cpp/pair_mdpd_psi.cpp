@@ -50,21 +50,24 @@ class PairMDPDPsi : public PairTable {
 
   rust::Box<Style> make_from(double kt, rust::Slice<const Coefficients> pairs) override
   {
-    return warren_style(kt, pairs, atom->ntypes, domain->dimension, lucy);
+    if (lucy && !atom->mass)
+      complain("'law lucy' weighs densities by the masses of types, which this atom style has not");
+    built_masses = masses();
+    return warren_style(kt, pairs, atom->ntypes, domain->dimension, {built_masses.data(), built_masses.size()});
   }
 
-  void check_host() override
-  {
-    PairTable::check_host();
-    // The built-in weighs the density by the neighbours' masses.
-    if (lucy && atom->mass)
-      for (int t = 1; t <= atom->ntypes; t++)
-        if (atom->mass_setflag[t] && atom->mass[t] != 1.0)
-          stop("'law lucy' is the built-in's law for masses of 1 only: its densities are weighed by mass, these are number densities");
-  }
+  bool is_stale() override { return PairTable::is_stale() || masses() != built_masses; }
 
  private:
+  // The built-in weighs densities by the masses of the neighbours' types; none count without 'law lucy'.
+  std::vector<double> masses() const
+  {
+    if (!lucy || !atom->mass) return {};
+    return {atom->mass + 1, atom->mass + 1 + atom->ntypes};
+  }
+
   bool lucy = false;
+  std::vector<double> built_masses;
 };
 
 }    // namespace psidpd

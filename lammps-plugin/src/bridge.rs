@@ -2,7 +2,7 @@
 
 use crate::style::{Style, StyleError};
 use psidpd_core::engine::{PairsOfHost, Step, Want};
-use psidpd_core::model::{ForceLaw, SplinePair, WarrenPair};
+use psidpd_core::model::{SplinePair, WarrenPair};
 
 #[cxx::bridge(namespace = "psidpd")]
 mod ffi {
@@ -60,7 +60,7 @@ mod ffi {
             pairs: &[Coefficients],
             types: usize,
             dimensions: usize,
-            lucy: bool,
+            masses: &[f64],
         ) -> Result<Box<Style>>;
         fn spline_style(
             kt: f64,
@@ -168,15 +168,15 @@ fn warren_style(
     pairs: &[ffi::Coefficients],
     types: usize,
     dimensions: usize,
-    lucy: bool,
+    masses: &[f64],
 ) -> Result<Box<Style>, StyleError> {
     let warren = |c: &ffi::Coefficients| {
         let [a, b, gamma, rc, rd, _] = c.value;
         WarrenPair { a, b, gamma, rc, rd }
     };
     let pairs: Vec<Option<WarrenPair>> = pairs.iter().map(|c| c.set.then(|| warren(c))).collect();
-    let law = if lucy { ForceLaw::LucyLammps } else { ForceLaw::Conservative };
-    Style::from_coefficients(kt, &pairs, types, dimensions, law).map(Box::new)
+    let masses = Some(masses).filter(|m| !m.is_empty());
+    Style::from_coefficients(kt, &pairs, types, dimensions, masses).map(Box::new)
 }
 
 #[allow(clippy::too_many_arguments)]

@@ -1,7 +1,9 @@
 //! One pair style's engine, and the mapping from LAMMPS's types to species.
 
 use psidpd_core::engine::{Engine, EngineError, Newton, PairsOfHost, Particles, Step, Tally, Want};
-use psidpd_core::model::{ForceLaw, Model, PresetError, SplinePair, WarrenPair, spline_dpd, warren_ab};
+use psidpd_core::model::{
+    ForceLaw, Model, PresetError, SplinePair, WarrenPair, lucy_mdpd, spline_dpd, warren_ab,
+};
 use std::fmt::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -29,16 +31,33 @@ pub struct Style {
     letters: Option<&'static str>,
 }
 
-/// The types, from 0, that have coefficients with any type: the others are another style's of a hybrid.
-fn types_with_coefficients<T>(pairs: &[Option<T>], types: usize) -> Vec<usize> {
-    let given = |a: usize, b: usize| pairs.get(a.min(b) * types + a.max(b)).is_some_and(Option::is_some);
-    (0..types).filter(|a| (0..types).any(|b| given(*a, b))).collect()
+/// Coefficients of the types that have any, as a model takes them.
+struct Members<T> {
+    /// The types, from 0: the others are another style's of a hybrid.
+    types: Vec<usize>,
+    /// Their species.
+    species: Vec<String>,
+    /// A row-major table over them, of which the upper triangle counts.
+    pairs: Vec<Option<T>>,
 }
 
-/// The table of the given types alone.
-fn table_of<T: Copy>(pairs: &[Option<T>], types: usize, members: &[usize]) -> Vec<Option<T>> {
-    let row = |a: &usize| a * types;
-    members.iter().flat_map(|a| members.iter().map(|b| pairs[row(a) + b])).collect()
+impl<T: Copy> Members<T> {
+    fn new(pairs: &[Option<T>], types: usize) -> Members<T> {
+        let given = |a: usize, b: usize| pairs.get(a.min(b) * types + a.max(b)).is_some_and(Option::is_some);
+        let members: Vec<usize> = (0..types).filter(|a| (0..types).any(|b| given(*a, b))).collect();
+        let row = |a: &usize| a * types;
+        Members {
+            species: members.iter().copied().map(name_of_type).collect(),
+            pairs: members.iter().flat_map(|a| members.iter().map(|b| pairs[row(a) + b])).collect(),
+            types: members,
+        }
+    }
+
+    /// Types where a preset counts species.
+    fn error(&self, error: PresetError) -> StyleError {
+        let PresetError::Missing(i, j) = error else { return StyleError(error.to_string()) };
+        StyleError(PresetError::Missing(self.types[i - 1] + 1, self.types[j - 1] + 1).to_string())
+    }
 }
 
 fn name_of_type(index: usize) -> String {
@@ -95,33 +114,39 @@ impl Style {
     /// Warren's A/B model of the coefficients of LAMMPS's `mdpd`; `pairs` is a row-major table over
     /// types of which the upper triangle is read.
     ///
+    /// With `masses`, one for each type, the force law is that of LAMMPS's `mdpd`, whose densities are weighed
+    /// by them and which has no potential.
+    ///
     /// # Errors
-    /// Coefficients that make no model.
+    /// Coefficients that make no model, or none that has a potential.
     pub fn from_coefficients(
         kt: f64,
         pairs: &[Option<WarrenPair>],
         types: usize,
         dimensions: usize,
-        law: ForceLaw,
+        masses: Option<&[f64]>,
     ) -> Result<Style, StyleError> {
         guard(|| {
-            let members = types_with_coefficients(pairs, types);
-            let species: Vec<String> = members.iter().copied().map(name_of_type).collect();
-            let table = table_of(pairs, types, &members);
-            let model = warren_ab(&species, &table, dimensions, law).map_err(|e| match e {
-                PresetError::Missing(i, j) => {
-                    StyleError(PresetError::Missing(members[i - 1] + 1, members[j - 1] + 1).to_string())
-                }
-                e => StyleError(e.to_string()),
-            })?;
-            let style = Style::of_members(model, kt, &members, types, dimensions)?;
-            Ok(Style {
-                letters: Some(
+            let members = Members::new(pairs, types);
+            let Members { species, pairs, .. } = &members;
+            let (model, letters) = match masses {
+                None => (
+                    warren_ab(species, pairs, dimensions, ForceLaw::Conservative),
                     "as in mdpd: the force is A (1 - r/rc) + B (n_i + n_j)(1 - r/rd), which is psi = c B n^2 with \
                      c = pi/30 rd^4 in 3-D (Warren eq. 13)",
                 ),
-                ..style
-            })
+                Some(masses) => {
+                    let masses: Option<Vec<f64>> =
+                        members.types.iter().map(|t| masses.get(*t).copied()).collect();
+                    (
+                        lucy_mdpd(species, pairs, &masses.unwrap_or_default(), dimensions),
+                        "those of mdpd: the force is A (1 - r/rc) + B (rho_i + rho_j)(1 - r/rd), rho the sum of \
+                         Lucy's kernel over neighbours times their masses",
+                    )
+                }
+            };
+            let model = model.map_err(|e| members.error(e))?;
+            Style::of_members(model, kt, &members, types, dimensions, letters)
         })
     }
 
@@ -137,31 +162,26 @@ impl Style {
         dimensions: usize,
     ) -> Result<Style, StyleError> {
         guard(|| {
-            let members = types_with_coefficients(pairs, types);
-            let species: Vec<String> = members.iter().copied().map(name_of_type).collect();
-            let table = table_of(pairs, types, &members);
-            let model = spline_dpd(&species, &table, thermostat_range, dimensions)
-                .map_err(|e| StyleError(e.to_string()))?;
-            let style = Style::of_members(model, kt, &members, types, dimensions)?;
-            Ok(Style {
-                letters: Some(
-                    "phi = a [A W(r, rc1) - B W(r, rc2)], W the cubic spline with W(0) = 1, not normalised",
-                ),
-                ..style
-            })
+            let members = Members::new(pairs, types);
+            let model = spline_dpd(&members.species, &members.pairs, thermostat_range, dimensions)
+                .map_err(|e| members.error(e))?;
+            let letters =
+                "phi = a [A W(r, rc1) - B W(r, rc2)], W the cubic spline with W(0) = 1, not normalised";
+            Style::of_members(model, kt, &members, types, dimensions, letters)
         })
     }
 
-    fn of_members(
+    fn of_members<T>(
         model: Model,
         kt: f64,
-        members: &[usize],
+        members: &Members<T>,
         types: usize,
         dimensions: usize,
+        letters: &'static str,
     ) -> Result<Style, StyleError> {
-        let name = |t| if members.contains(&t) { name_of_type(t) } else { "NULL".to_owned() };
+        let name = |t| if members.types.contains(&t) { name_of_type(t) } else { "NULL".to_owned() };
         let names: Vec<String> = (0..types).map(name).collect();
-        Style::new(model, kt, &names, dimensions)
+        Ok(Style { letters: Some(letters), ..Style::new(model, kt, &names, dimensions)? })
     }
 
     fn new(model: Model, kt: f64, names: &[String], dimensions: usize) -> Result<Style, StyleError> {
@@ -362,15 +382,19 @@ mod tests {
     #[test]
     fn types_without_coefficients_take_no_part() {
         let pair = WarrenPair { a: -40.0, b: 25.0, gamma: 1.0, rc: 1.0, rd: 0.75 };
-        let law = ForceLaw::Conservative;
         let mut table = vec![None; 9];
         table[4] = Some(pair);
-        let style = Style::from_coefficients(1.0, &table, 3, 3, law).unwrap();
-        assert_eq!(style.kinds, [-1, -1, 0, -1]);
-        table[8] = Some(pair);
-        let error = Style::from_coefficients(1.0, &table, 3, 3, law).unwrap_err();
-        assert!(error.to_string().contains("types 2 and 3"), "{error}");
-        assert!(Style::from_coefficients(1.0, &[None], 1, 3, law).is_err());
+        for masses in [None, Some(&[7.0, 1.0, 2.0][..])] {
+            let mut table = table.clone();
+            let style = Style::from_coefficients(1.0, &table, 3, 3, masses).unwrap();
+            assert_eq!(style.kinds, [-1, -1, 0, -1]);
+            table[8] = Some(pair);
+            let error = Style::from_coefficients(1.0, &table, 3, 3, masses).unwrap_err();
+            assert!(error.to_string().contains("types 2 and 3"), "{error}");
+            assert!(Style::from_coefficients(1.0, &[None], 1, 3, masses).is_err());
+        }
+        let short = Style::from_coefficients(1.0, &table, 3, 3, Some(&[1.0])).unwrap_err();
+        assert!(short.to_string().contains("as many masses"), "{short}");
     }
 
     #[test]

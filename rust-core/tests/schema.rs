@@ -35,9 +35,10 @@ fn schema_of_value(kind: &ValueKind) -> Value {
             polynomial,
             { "type": "object", "additionalProperties": polynomial }
         ]}),
+        ValueKind::Slopes => json!({ "type": "object", "additionalProperties": { "type": "string" } }),
         ValueKind::Excess => {
             let mut curve = object(&CURVES, None);
-            curve["oneOf"] = json!([{ "required": ["table"] }, { "required": ["pressure"] }]);
+            curve["oneOf"] = ["table", "pressure", "slopes"].map(|key| json!({ "required": [key] })).into();
             json!({ "anyOf": [{ "type": "string" }, curve] })
         }
     }

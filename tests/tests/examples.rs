@@ -142,5 +142,5 @@ fn examples_of_the_manual_pages_are_accepted() {
             count += 1;
         }
     }
-    assert_eq!(count, 8);
+    assert_eq!(count, 9);
 }

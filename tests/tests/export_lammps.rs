@@ -3,6 +3,7 @@
 use psidpd::lammps::{DataFile, dump};
 use psidpd_tests::{lammps, psidpd, root, said};
 use std::path::Path;
+use std::process::Output;
 use std::time::Duration;
 
 const ONE_SPECIES: &str = r#"
@@ -143,14 +144,27 @@ fn folder(scene: &str) -> tempfile::TempDir {
     folder
 }
 
-/// Runs `scene` natively and as a deck, on `ranks`, and compares every row and frame.
-fn compare(scene: &str, ranks: usize) {
+/// Writes the deck of the scene in `folder`.
+fn export(folder: &Path) -> Output {
+    psidpd(folder, &["export", "lammps", "scenes/scene.toml", "--out", "deck", "--json", "deck.json"])
+}
+
+/// What a refused export says; long messages are wrapped and framed.
+fn refusal(folder: &Path) -> String {
+    let export = export(folder);
+    let text = said(&export).replace('│', " ");
+    let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert_eq!(export.status.code(), Some(2), "{text}");
+    text
+}
+
+/// Runs `scene` natively and as a deck, on one rank and on two, and compares every row and frame.
+fn compare(scene: &str) {
     let folder = folder(scene);
     let at = folder.path();
     let run = psidpd(at, &["run", "scenes/scene.toml", "--out", "native"]);
     assert!(run.status.success(), "{}", said(&run));
-    let export =
-        psidpd(at, &["export", "lammps", "scenes/scene.toml", "--out", "deck", "--json", "deck.json"]);
+    let export = export(at);
     assert!(export.status.success(), "{}", said(&export));
     let deck = at.join("deck");
     let json: serde_json::Value =
@@ -160,17 +174,13 @@ fn compare(scene: &str, ranks: usize) {
     }
     let (host, plugin) = lammps();
     let plugin = plugin.display().to_string();
-    host.run_script(
-        ranks,
-        &deck,
-        Path::new("in.lammps"),
-        &["-var", "plugin", &plugin],
-        Duration::from_secs(120),
-    )
-    .unwrap();
-    compare_frames(at);
-    compare_rows(at);
-    compare_ends(at);
+    let arguments = ["-var", "plugin", &plugin];
+    for ranks in [1, 2] {
+        host.run_script(ranks, &deck, Path::new("in.lammps"), &arguments, Duration::from_secs(120)).unwrap();
+        compare_frames(at);
+        compare_rows(at);
+        compare_ends(at);
+    }
 }
 
 /// The largest difference, by whole boxes where that is less.
@@ -245,20 +255,17 @@ fn compare_ends(at: &Path) {
 
 #[test]
 fn one_species_in_three_dimensions() {
-    compare(ONE_SPECIES, 1);
-    compare(ONE_SPECIES, 2);
+    compare(ONE_SPECIES);
 }
 
 #[test]
 fn two_species_stages_and_a_table() {
-    compare(TWO_SPECIES, 1);
-    compare(TWO_SPECIES, 2);
+    compare(TWO_SPECIES);
 }
 
 #[test]
 fn two_dimensions() {
-    compare(FLAT, 1);
-    compare(FLAT, 2);
+    compare(FLAT);
 }
 
 #[test]
@@ -272,12 +279,7 @@ fn what_has_no_counterpart_is_refused() {
         (ONE_SPECIES.replace("steps = 50", "steps = 3000000000"), "more than one run of LAMMPS takes"),
     ];
     for (scene, message) in cases {
-        let folder = folder(&scene);
-        let export = psidpd(folder.path(), &["export", "lammps", "scenes/scene.toml", "--out", "deck"]);
-        // Long messages are wrapped and framed.
-        let text = said(&export).replace('│', " ");
-        let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
-        assert_eq!(export.status.code(), Some(2), "{text}");
+        let text = refusal(folder(&scene).path());
         assert!(text.contains(message), "{message}\n{text}");
     }
 }
@@ -290,7 +292,6 @@ fn an_inline_thermostat_is_refused_where_it_must_go() {
         .replace("[[thermostat]]\ngamma = 1.0\nrange = 1.0\n", "")
         .replace("species = [\"F\"]", "species = [\"F\"]\nthermostat = [{ gamma = 1.0, range = 1.0 }]");
     std::fs::write(folder.path().join("scenes/flat.toml"), inline).unwrap();
-    let export = psidpd(folder.path(), &["export", "lammps", "scenes/scene.toml", "--out", "deck"]);
-    assert_eq!(export.status.code(), Some(2));
-    assert!(said(&export).contains("cannot take the thermostat out"), "{}", said(&export));
+    let text = refusal(folder.path());
+    assert!(text.contains("cannot take the thermostat out"), "{text}");
 }

@@ -1,15 +1,17 @@
 //! The LAMMPS of the distribution, which loads no plugins: the launcher, under its mpirun too, and Python.
 
-use psidpd::lammps::{DataFile, Host, HostKind, HostVersion, dump, plugin};
+mod host_common;
+mod style_common;
+
+use host_common::{LIMIT, Runs, model, script};
+use psidpd::lammps::{Host, HostKind, HostVersion, plugin};
 use psidpd_tests::{lammps, psidpd, root, said};
 use std::io::Write;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
-use std::time::Duration;
 
-const LIMIT: Duration = Duration::from_secs(120);
 const PACKAGES: [&str; 3] = ["lammps", "liblammps-dev", "python3-lammps"];
 
 /// Debian's LAMMPS, with the plugin built for it and the launcher.
@@ -51,25 +53,16 @@ fn debian() -> Option<&'static Debian> {
     found.as_ref()
 }
 
-fn model() -> PathBuf {
-    root().join("validation/models/warren2003-set6.toml")
-}
-
-fn script(model: &Path) -> String {
-    format!(
-        "units lj\natom_style atomic\ncomm_modify vel yes\nregion b block 0 5 0 5 0 5\ncreate_box 1 b\n\
-         create_atoms 1 random 600 4711 NULL\nmass 1 1\nvelocity all create 1.0 87 loop geom\n\
-         pair_style dpd/psi 1.0 5\npair_coeff * * {} F\nfix 1 all nve\ntimestep 0.001\nthermo 10\nrun 10\n",
-        model.display()
-    )
+impl Debian {
+    /// The launcher in the place of `lmp`.
+    fn runs(&self) -> Runs {
+        Runs { host: self.host.with_program(&self.launcher), load: String::new() }
+    }
 }
 
 /// Runs a script with the launcher and returns what it says, or its error.
 fn outcome(debian: &Debian, text: &str, ranks: usize, folder: &Path) -> Result<String, String> {
-    let path = folder.join("in.lammps");
-    std::fs::write(&path, text).unwrap();
-    let host = debian.host.with_program(&debian.launcher);
-    host.run_script(ranks, folder, &path, &[], LIMIT).map(|run| run.stdout).map_err(|e| e.to_string())
+    debian.runs().outcome(text, ranks, folder)
 }
 
 #[test]
@@ -116,57 +109,23 @@ fn the_launcher_runs_scripts_as_lmp_does() {
     assert!(said(&wrong[1]).contains("Invalid command-line argument"), "{}", said(&wrong[1]));
 }
 
-/// Without drag and noise, LAMMPS's forces are those of the native engine to rounding.
 #[test]
 fn forces_equal_the_native_engine() {
     let Some(debian) = debian() else { return };
+    host_common::forces_equal_the_native_engine(&debian.runs());
+}
+
+/// Its headers let nobody ask for a full list: the half list has all pairs with newton off, and the styles
+/// insist on that.
+#[test]
+fn pairs_of_the_half_list_are_the_full_ones() {
+    let Some(debian) = debian() else { return };
+    let said = host_common::special_factors_and_exclusions(&debian.runs(), "off");
+    assert!(said.contains("half neighbor list of LAMMPS, because of special_bonds"), "{said}");
     let folder = tempfile::tempdir().unwrap();
-    let text = std::fs::read_to_string(model()).unwrap();
-    let conservative = text.split("[[thermostat]]").next().unwrap();
-    let model = folder.path().join("model.toml");
-    std::fs::write(&model, conservative).unwrap();
-    let mut script = script(&model).replace("run 10\n", "");
-    script.push_str(
-        "run 40\nwrite_data atoms.data\nreset_timestep 0\n\
-         dump d all custom 1 forces.dump id type x y z fx fy fz\n\
-         dump_modify d sort id format float %.17g\nrun 0\nvariable u equal pe\nprint \"energy $(v_u:%.17g)\"\n",
-    );
-    for ranks in [1, 2] {
-        let said_here = outcome(debian, &script, ranks, folder.path()).unwrap();
-        let frame = dump::read(&folder.path().join("forces.dump")).unwrap().pop().unwrap();
-        let positions = frame.vectors(["x", "y", "z"]).unwrap();
-        let forces = frame.vectors(["fx", "fy", "fz"]).unwrap();
-        assert_eq!(forces.len(), 600);
-
-        // The positions of the dump, for those are the ones that the forces belong to.
-        let mut data = DataFile::read(&folder.path().join("atoms.data")).unwrap();
-        data.sort_by_id();
-        for (atom, x) in data.atoms.iter_mut().zip(&positions) {
-            atom.x = *x;
-        }
-        data.write(&folder.path().join("same.data")).unwrap();
-        let arguments = "forces --model model.toml --data same.data --kT 1 --json native.json";
-        let native = psidpd(folder.path(), &arguments.split(' ').collect::<Vec<_>>());
-        assert!(native.status.success(), "{}", said(&native));
-        let native = std::fs::read_to_string(folder.path().join("native.json")).unwrap();
-        let native: serde_json::Value = serde_json::from_str(&native).unwrap();
-        let own: Vec<[f64; 3]> = serde_json::from_value(native["forces"].clone()).unwrap();
-
-        let size = (own.iter().flatten().map(|c| c * c).sum::<f64>() / 600.0).sqrt();
-        assert!(size > 1.0, "{size}");
-        let worst = own
-            .iter()
-            .flatten()
-            .zip(forces.iter().flatten())
-            .map(|(a, b)| (a - b).abs() / size)
-            .fold(0.0, f64::max);
-        assert!(worst < 1e-12, "{worst:e} on {ranks} ranks");
-
-        // LAMMPS prints energies per particle.
-        let line = said_here.lines().find_map(|l| l.strip_prefix("energy ")).unwrap();
-        let energy: f64 = line.trim().parse().unwrap();
-        let own = native["energy"].as_f64().unwrap() / 600.0;
-        assert!((energy - own).abs() < 1e-12 * own.abs(), "{energy} {own}");
+    for deck in host_common::listed_decks("on", folder.path()) {
+        let error = debian.runs().outcome(&deck, 1, folder.path()).unwrap_err();
+        assert!(error.contains("this version of LAMMPS needs 'newton off'"), "{error}");
     }
 }
 

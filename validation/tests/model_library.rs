@@ -308,7 +308,7 @@ fn from_bounds<'a>(fluid: &'a Fluid, n: &'a [f64], alpha: usize) -> impl Iterato
             (0..count).map(|b| density.correction[alpha * count + b].at(n[d * count + b]).0).collect();
         let of: Vec<f64> = match &fluid.excess[alpha] {
             ExcessFreeEnergy::Curve(_) => vec![corrected.iter().sum()],
-            ExcessFreeEnergy::Formula(_) => corrected,
+            ExcessFreeEnergy::Formula(_) | ExcessFreeEnergy::Slopes(_) => corrected,
         };
         let Some(bounds) = density.bounds else { return Vec::new() };
         let low = move |n: f64| if bounds.low > 0.0 { bounds.low - n } else { f64::NEG_INFINITY };

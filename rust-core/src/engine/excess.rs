@@ -2,7 +2,7 @@
 
 use crate::model::curve::{Curve, CurveBlock};
 use crate::model::expression::{Expansion, Formula, Program, TooLarge};
-use crate::model::{Bounds, Continuation, Fluid};
+use crate::model::{Bounds, Continuation, Fluid, StatedSlopes};
 
 /// `ψ_α` of the densities that need a pass.
 #[derive(Debug, Clone)]
@@ -35,6 +35,8 @@ pub struct FormulaPlan {
     /// The variables of the slopes.
     variables: Vec<usize>,
     bounded: Vec<BoundedVariable>,
+    /// Whether the slopes are stated, and not those of `formula`.
+    stated: bool,
 }
 
 /// A variable beyond whose bounds ψ goes on linearly or quadratically.
@@ -109,7 +111,26 @@ impl ExcessPlan {
             formula: psi,
             outputs,
             variables: variables.to_vec(),
+            stated: false,
         }))
+    }
+
+    /// The plan of a law of stated slopes.
+    pub fn of_slopes(law: &StatedSlopes, variables: &[usize]) -> ExcessPlan {
+        let acts = law.slopes.iter().any(|s| s.is_constant() != Some(0.0));
+        if let (false, Some(value)) = (acts, law.energy.is_constant()) {
+            return ExcessPlan::Constant(value);
+        }
+        let slopes = variables.iter().map(|v| law.slopes[*v].clone());
+        let outputs: Vec<Formula> = std::iter::once(law.energy.clone()).chain(slopes).collect();
+        ExcessPlan::Formula(FormulaPlan {
+            program: Program::new(&outputs.iter().collect::<Vec<_>>()),
+            bounded: Vec::new(),
+            formula: law.energy.clone(),
+            outputs,
+            variables: variables.to_vec(),
+            stated: true,
+        })
     }
 
     /// The plan of a curve, whose density is one of `passes`.
@@ -180,6 +201,12 @@ impl CurvePlan {
 }
 
 impl FormulaPlan {
+    /// Variables and their slopes, if these are stated and act.
+    pub fn stated_slopes(&self) -> Option<impl Iterator<Item = (usize, &Formula)>> {
+        let acting = |(_, slope): &(usize, &Formula)| slope.is_constant() != Some(0.0);
+        self.stated.then(|| self.variables.iter().copied().zip(&self.outputs[1..]).filter(acting))
+    }
+
     fn evaluate(&self, lanes: usize, at: &mut [f64], out: &mut [f64], work: &mut ExcessWork) -> [u64; 2] {
         let count = self.clamp(lanes, at, &mut work.strays);
         self.program.eval_block(lanes, at, out, &mut work.registers);

@@ -148,7 +148,8 @@ impl Plan {
     }
 }
 
-/// `∂ψ_α/∂ñ_v` for every species and variable; `None` for that of a curve, which no formula is.
+/// `∂ψ_α/∂ñ_v` for every species and variable; `None` where no formula is, or none that may act as a
+/// pair potential: that of a curve, and a stated one.
 fn slopes(fluid: &Fluid) -> Result<Vec<Vec<Option<Formula>>>, TooLarge> {
     fluid
         .excess
@@ -159,6 +160,10 @@ fn slopes(fluid: &Fluid) -> Result<Vec<Vec<Option<Formula>>>, TooLarge> {
             }
             ExcessFreeEnergy::Curve(curve) => {
                 let zero = |v| (v / fluid.species.len() != curve.density).then(|| Formula::constant(0.0));
+                Ok((0..fluid.variables()).map(zero).collect())
+            }
+            ExcessFreeEnergy::Slopes(law) => {
+                let zero = |v| (!law.depends_on(v)).then(|| Formula::constant(0.0));
                 Ok((0..fluid.variables()).map(zero).collect())
             }
         })
@@ -189,6 +194,8 @@ fn plan_excess(fluid: &Fluid, alpha: usize, passes: &[usize]) -> Result<ExcessPl
         ExcessFreeEnergy::Formula(psi) => psi.clone(),
         // Its density has a pass, and it depends on no other.
         ExcessFreeEnergy::Curve(curve) => return Ok(ExcessPlan::of_curve(fluid, curve.clone(), passes)),
+        // Every density that it depends on has a pass.
+        ExcessFreeEnergy::Slopes(law) => return Ok(ExcessPlan::of_slopes(law, &variables(count, passes))),
     };
     for (d, density) in fluid.densities.iter().enumerate() {
         if passes.contains(&d) {
@@ -200,8 +207,12 @@ fn plan_excess(fluid: &Fluid, alpha: usize, passes: &[usize]) -> Result<ExcessPl
             psi = psi.substitute(d * count + beta, at_zero);
         }
     }
-    let variables: Vec<usize> = passes.iter().flat_map(|d| (0..count).map(move |s| d * count + s)).collect();
-    ExcessPlan::of_formula(fluid, psi, &variables)
+    ExcessPlan::of_formula(fluid, psi, &variables(count, passes))
+}
+
+/// The variables of the densities that need a pass.
+fn variables(count: usize, passes: &[usize]) -> Vec<usize> {
+    passes.iter().flat_map(|d| (0..count).map(move |s| d * count + s)).collect()
 }
 
 impl ThermostatPlan {
@@ -293,7 +304,18 @@ impl fmt::Display for Plan {
                 ExcessPlan::Constant(0.0) => {}
                 ExcessPlan::Constant(value) => writeln!(f, "psi of {name:<6} constant {value}")?,
                 ExcessPlan::Formula(plan) => {
-                    writeln!(f, "psi of {name:<6} {}", plan.formula.with_names(&names))?;
+                    let stated = plan.stated_slopes();
+                    let what = if stated.is_some() { "energy" } else { "psi" };
+                    writeln!(f, "{:<13} {}", format!("{what} of {name}"), plan.formula.with_names(&names))?;
+                    for (variable, slope) in stated.into_iter().flatten() {
+                        writeln!(
+                            f,
+                            "{:<13} {}: {}; NOT CONSERVATIVE",
+                            format!("slope of {name}"),
+                            names[variable],
+                            slope.with_names(&names)
+                        )?;
+                    }
                 }
                 ExcessPlan::Curve(plan) => writeln!(f, "psi of {name:<6} {}", plan.curve.describe())?,
             }

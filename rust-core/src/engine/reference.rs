@@ -92,7 +92,7 @@ impl<'a> Extended<'a> {
     fn new(fluid: &'a Fluid, alpha: usize) -> Extended<'a> {
         let formula = match &fluid.excess[alpha] {
             ExcessFreeEnergy::Formula(formula) => formula.clone(),
-            ExcessFreeEnergy::Curve(_) => Formula::constant(0.0),
+            ExcessFreeEnergy::Curve(_) | ExcessFreeEnergy::Slopes(_) => Formula::constant(0.0),
         };
         let derivatives = BTreeMap::from([(vec![0; fluid.variables()], formula)]);
         Extended { fluid, derivatives }
@@ -203,6 +203,13 @@ pub fn evaluate(
             for beta in 0..count {
                 let v = curve.density * count + beta;
                 slopes[i][v] = slope * corrected[v].1;
+            }
+            continue;
+        }
+        if let ExcessFreeEnergy::Slopes(law) = &fluid.excess[alpha] {
+            energy += law.energy.value(&at);
+            for (v, slope) in law.slopes.iter().enumerate() {
+                slopes[i][v] = slope.value(&at) * corrected[v].1;
             }
             continue;
         }

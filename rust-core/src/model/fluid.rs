@@ -41,10 +41,17 @@ impl Fluid {
         densities.chain(pairs).chain(thermostats).fold(0.0, f64::max)
     }
 
-    /// Whether the force of every density is the gradient of its own kernel, so that a potential
-    /// exists (Warren eq. 10).
+    /// Whether the force of every density is the gradient of its own kernel, and its strength that of
+    /// a ψ, so that a potential exists (Warren eq. 10).
     pub fn is_conservative(&self) -> bool {
-        self.densities.iter().all(|d| d.force_kernel == d.kernel)
+        self.densities.iter().all(|d| d.force_kernel == d.kernel) && self.stated_slopes().is_none()
+    }
+
+    /// The first species whose force is stated and not derived from a ψ, if there is one: mean field
+    /// has nothing to start from then.
+    pub fn stated_slopes(&self) -> Option<&str> {
+        let stated = self.excess.iter().position(|e| matches!(e, ExcessFreeEnergy::Slopes(_)))?;
+        Some(&self.species[stated])
     }
 }
 
@@ -149,6 +156,26 @@ pub enum ExcessFreeEnergy {
     Formula(Formula),
     /// A function of the total corrected density `Σ_β ñ_β` of one of the densities.
     Curve(Curve),
+    /// None: the slopes are stated, and need be those of no ψ.
+    Slopes(StatedSlopes),
+}
+
+/// A many-body force that is stated, and need not have a potential: on the pair `i`, `j` it is
+/// `−[s_i,c(j) + s_j,c(i)] w′(r) ê`, with `s` in the place of `∂ψ/∂ñ`.
+#[derive(Debug, Clone)]
+pub struct StatedSlopes {
+    /// What is reported as a particle's energy, of the [`Fluid::variables`] corrected densities.
+    pub energy: Formula,
+    /// `s`, one for each of the variables, of the same.
+    pub slopes: Vec<Formula>,
+}
+
+impl StatedSlopes {
+    /// Whether the energy, or any slope, depends on variable `v`, or the force acts through it.
+    pub fn depends_on(&self, v: usize) -> bool {
+        let acts = self.slopes[v].is_constant() != Some(0.0);
+        acts || self.energy.depends_on(v) || self.slopes.iter().any(|s| s.depends_on(v))
+    }
 }
 
 /// A pair potential and the species it acts between.

@@ -60,6 +60,8 @@ pub enum ValueKind {
     File,
     /// A formula, or one of the tables [`CURVES`].
     Excess,
+    /// A table of formulas by the names of density variables.
+    Slopes,
 }
 
 impl ValueKind {
@@ -82,8 +84,11 @@ impl ValueKind {
             ValueKind::Formula => "string with a formula".into(),
             ValueKind::File => "name of a file, relative to the model file".into(),
             ValueKind::Excess => {
-                "string with a formula, `{ table = \"FILE\" }` or `{ pressure = \"FORMULA\" }`".into()
+                "string with a formula, `{ table = \"FILE\" }`, `{ pressure = \"FORMULA\" }` or \
+                 `{ slopes = { … } }`"
+                    .into()
             }
+            ValueKind::Slopes => "table of formulas by the variables of densities".into(),
         }
     }
 }
@@ -276,7 +281,7 @@ pub const CURVES: Table = Table {
     path: "excess_free_energy.SPECIES",
     header: "[excess_free_energy]",
     about: "Instead of a formula: psi as a function of the total of one density, from a table or from an \
-            equation of state. One of `table` and `pressure`.",
+            equation of state, or a force law that has no psi. One of `table`, `pressure` and `slopes`.",
     keys: &[
         key(
             "table",
@@ -302,6 +307,26 @@ pub const CURVES: Table = Table {
             "The density it depends on, needed where there are several.",
             "[density.n]\nkernel = \"quadratic\"\nrange = 1.0\n[density.m]\nkernel = \"quadratic\"\nrange = 0.75\n\
              [excess_free_energy]\nA = { table = \"psi.csv\", density = \"m\" }",
+        ),
+        key(
+            "slopes",
+            ValueKind::Slopes,
+            OPTIONAL,
+            "A many-body force that is stated and not derived: formulas of the densities, by their variables, that \
+             stand where `dpsi/dn` would; those left out are 0. Unless they are the slopes of one psi, the \
+             force has no potential, does work around closed loops and heats. It exists to reproduce such laws: that of \
+             LAMMPS's `mdpd` with coefficients by pair of types has none (Warren's no-go theorem, Phys. Rev. E 87, \
+             045303). Densities with `bounds` are refused; theory and `export eam` do not apply.",
+            "species = [\"A\", \"B\"]\n[density.n]\nkernel = \"lucy\"\nforce_kernel = \"quadratic\"\nrange = 0.75\n\
+             [excess_free_energy]\nA = { slopes = { n_A = \"1.6*n\", n_B = \"1.2*n\" }, energy = \"0.8*n_A*n + 0.6*n_B*n\" }\n\
+             B = { slopes = { n_A = \"1.2*n\", n_B = \"1.6*n\" } }",
+        ),
+        key(
+            "energy",
+            ValueKind::Formula,
+            OPTIONAL,
+            "With `slopes`: what is reported as energy of a particle, 0 if left out. The force is not its gradient.",
+            "[excess_free_energy]\nA = { slopes = { n = \"1.6*n\" }, energy = \"0.7*n^2\" }",
         ),
     ],
 };

@@ -18,12 +18,15 @@ pub mod pair;
 
 mod file;
 mod fluid;
+mod preset_lucy;
 mod preset_spline;
 mod presets;
 
 pub use file::{KNOWN_FUNCTIONS, Model};
 pub use fluid::{
-    Bounds, Continuation, ExcessFreeEnergy, Fluid, PairTerm, Polynomial, Thermostat, WeightedDensity,
+    Bounds, Continuation, ExcessFreeEnergy, Fluid, PairTerm, Polynomial, StatedSlopes, Thermostat,
+    WeightedDensity,
 };
+pub use preset_lucy::{lucy_mdpd, lucy_mdpd_text};
 pub use preset_spline::{SplinePair, spline_dpd, spline_dpd_text};
 pub use presets::{ForceLaw, PresetError, WarrenPair, warren_ab, warren_ab_text};

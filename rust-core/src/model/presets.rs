@@ -6,6 +6,7 @@
 //! (Warren eq. 13–15), since `−w′` is then `(1 − r/r_d) / (2 c_d r_d^{d+1})`.
 
 use super::file::Model;
+use super::preset_lucy::lucy_mdpd_text;
 use crate::document::FileError;
 use std::fmt::Write;
 
@@ -14,7 +15,7 @@ use std::fmt::Write;
 pub enum ForceLaw {
     /// The quadratic kernel: the force has a potential (Warren eq. 10).
     Conservative,
-    /// The Lucy kernel, as LAMMPS's `mdpd/rhosum`: the force has no potential, and heats.
+    /// The Lucy kernel, as LAMMPS's `mdpd/rhosum`, for masses of 1: the force has no potential, and heats.
     LucyLammps,
 }
 
@@ -40,15 +41,15 @@ pub enum PresetError {
     /// Species `i` and `j` (from 1) have no coefficients.
     #[error("no coefficients for types {0} and {1}")]
     Missing(usize, usize),
-    /// Not a square table, or a table of nothing.
-    #[error("expected coefficients for every pair of types")]
+    /// Not a square table, or a table of nothing, or not as many masses.
+    #[error("expected coefficients for every pair of types, and as many masses as types")]
     Shape,
     /// `B` or `r_d` differ between pairs: Warren's no-go theorem, Phys. Rev. E 87, 045303 (2013).
     #[error(
         "{name} differs between type pairs ({first} and {second}): with one density that does not \
          tell types apart no potential gives such forces (Warren, Phys. Rev. E 87, 045303); use one \
          {name} for all pairs, or pair_style dpd/psi with a model file whose psi depends on the \
-         partial densities n_A, n_B"
+         partial densities n_A, n_B, or 'law lucy' for the force of LAMMPS's mdpd, which has no potential"
     )]
     NoPotential {
         /// `B` or `rd`.
@@ -63,28 +64,55 @@ pub enum PresetError {
     File(#[from] FileError),
 }
 
+/// The upper triangle of a row-major table of coefficients: species and what was given.
+pub(super) fn upper_triangle(
+    species: usize,
+    pairs: &[Option<WarrenPair>],
+) -> Result<Vec<(usize, usize, WarrenPair)>, PresetError> {
+    if species == 0 || pairs.len() != species * species {
+        return Err(PresetError::Shape);
+    }
+    let mut upper = Vec::new();
+    for i in 0..species {
+        for j in i..species {
+            let pair = pairs[i * species + j].ok_or(PresetError::Missing(i + 1, j + 1))?;
+            upper.push((i, j, pair));
+        }
+    }
+    Ok(upper)
+}
+
+/// Pair forces and thermostats, as a part of a model file.
+pub(super) fn pair_text(names: &[String], upper: &[(usize, usize, WarrenPair)]) -> String {
+    let mut text = String::new();
+    for (i, j, pair) in upper {
+        let between = format!("between = [{}, {}]", names[*i], names[*j]);
+        // Writing to a String cannot fail.
+        let _ = write!(
+            text,
+            "\n[[pair]]\n{between}\nform = \"soft\"\nstrength = {:?}\nrange = {:?}\n\n\
+             [[thermostat]]\n{between}\ngamma = {:?}\nrange = {:?}\n",
+            pair.a, pair.rc, pair.gamma, pair.rc,
+        );
+    }
+    text
+}
+
 /// Writes the model file of Warren's A/B model for species `species`, with `pairs` a row-major table
 /// of the coefficients (the upper triangle is read).
 ///
 /// # Errors
-/// A pair without coefficients, or coefficients that no potential can give.
+/// A pair without coefficients, or coefficients that no potential can give where `law` has one.
 pub fn warren_ab_text(
     species: &[String],
     pairs: &[Option<WarrenPair>],
     dimensions: usize,
     law: ForceLaw,
 ) -> Result<String, PresetError> {
-    let count = species.len();
-    if count == 0 || pairs.len() != count * count {
-        return Err(PresetError::Shape);
+    if law == ForceLaw::LucyLammps {
+        return lucy_mdpd_text(species, pairs, &vec![1.0; species.len()], dimensions);
     }
-    let mut upper = Vec::new();
-    for i in 0..count {
-        for j in i..count {
-            let pair = pairs[i * count + j].ok_or(PresetError::Missing(i + 1, j + 1))?;
-            upper.push((i, j, pair));
-        }
-    }
+    let upper = upper_triangle(species.len(), pairs)?;
     let first = upper[0].2;
     for (_, _, pair) in &upper {
         if pair.b != first.b {
@@ -94,10 +122,6 @@ pub fn warren_ab_text(
             return Err(PresetError::NoPotential { name: "rd", first: first.rd, second: pair.rd });
         }
     }
-    let kernel = match law {
-        ForceLaw::Conservative => "kernel = \"quadratic\"",
-        ForceLaw::LucyLammps => "kernel = \"lucy\"\nforce_kernel = \"quadratic\"",
-    };
     let coefficient = if dimensions == 2 { "pi/24 * rd^3" } else { "pi/30 * rd^4" };
     let names: Vec<String> = species.iter().map(|s| format!("\"{s}\"")).collect();
     let mut text = format!(
@@ -106,7 +130,7 @@ pub fn warren_ab_text(
          dimensions = {dimensions}\n\
          species = [{}]\n\n\
          [parameters]\nB = {:?}\nrd = {:?}\n\n\
-         [density.n]\n{kernel}\nrange = \"rd\"\n\n\
+         [density.n]\nkernel = \"quadratic\"\nrange = \"rd\"\n\n\
          [excess_free_energy]\n",
         names.join(", "),
         first.b,
@@ -116,15 +140,7 @@ pub fn warren_ab_text(
     for name in species {
         let _ = writeln!(text, "{name} = \"{coefficient} * B * n^2\"");
     }
-    for (i, j, pair) in &upper {
-        let between = format!("between = [{}, {}]", names[*i], names[*j]);
-        let _ = write!(
-            text,
-            "\n[[pair]]\n{between}\nform = \"soft\"\nstrength = {:?}\nrange = {:?}\n\n\
-             [[thermostat]]\n{between}\ngamma = {:?}\nrange = {:?}\n",
-            pair.a, pair.rc, pair.gamma, pair.rc,
-        );
-    }
+    text += &pair_text(&names, &upper);
     Ok(text)
 }
 

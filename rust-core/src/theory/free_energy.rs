@@ -47,6 +47,7 @@ impl FreeEnergy {
                     .map(Excess::Formula)
                     .map_err(|_| TheoryError::TooLarge(name.clone())),
                 ExcessFreeEnergy::Curve(curve) => Ok(Excess::Curve(curve.clone())),
+                ExcessFreeEnergy::Slopes(_) => Err(TheoryError::NoFreeEnergy(name.clone())),
             })
             .collect::<Result<Vec<_>, _>>()?;
         Ok(FreeEnergy { species: fluid.species.len(), variables, excess })

@@ -50,6 +50,13 @@ pub enum TheoryError {
     /// The model cannot be had at the temperature asked for.
     #[error(transparent)]
     File(#[from] FileError),
+    /// The model states the force of a species, which need have no potential (Warren, Phys. Rev. E 87,
+    /// 045303 (2013)).
+    #[error(
+        "species {0} has stated slopes and no excess free energy: mean field has nothing to start from; \
+         write psi as a formula of the densities if the force has one"
+    )]
+    NoFreeEnergy(String),
     /// A derivative of ψ has too many operations.
     #[error("the free energy of species {0} is too large to be differentiated twice")]
     TooLarge(String),

@@ -196,3 +196,39 @@ pub fn chains(count: usize) -> String {
         4 * count
     )
 }
+
+/// Energy and conservative forces of Warren's fluid with a strength for each pair, by the formulas.
+pub fn scaled(x: &[[f64; 3]], length: f64, strength: impl Fn(usize, usize) -> f64) -> (f64, Vec<[f64; 3]>) {
+    let model = Model::open(warren().as_ref()).unwrap();
+    let fluid = model.at(1.0).unwrap();
+    let (kernel, coefficient) =
+        (fluid.densities[0].kernel, std::f64::consts::PI / 30.0 * 0.75f64.powi(4) * 25.0);
+    let pairs: Vec<(usize, usize, [f64; 3], f64, f64)> = (0..x.len())
+        .flat_map(|i| (0..i).map(move |j| (i, j)))
+        .filter_map(|(i, j)| {
+            let d: [f64; 3] = std::array::from_fn(|c| {
+                let d = x[i][c] - x[j][c];
+                d - length * (d / length).round()
+            });
+            let r = d.iter().map(|c| c * c).sum::<f64>().sqrt();
+            (r < 1.0).then(|| (i, j, d, r, strength(i, j)))
+        })
+        .collect();
+    let mut n = vec![0.0; x.len()];
+    let mut energy = 0.0;
+    for (i, j, _, r, s) in &pairs {
+        n[*i] += s * kernel.value(*r);
+        n[*j] += s * kernel.value(*r);
+        energy += s * -20.0 * (1.0 - r).powi(2);
+    }
+    energy += n.iter().map(|n| coefficient * n * n).sum::<f64>();
+    let mut f = vec![[0.0; 3]; x.len()];
+    for (i, j, d, r, s) in &pairs {
+        let force = s * (-40.0 * (1.0 - r) - 2.0 * coefficient * (n[*i] + n[*j]) * kernel.slope(*r));
+        for c in 0..3 {
+            f[*i][c] += force * d[c] / r;
+            f[*j][c] -= force * d[c] / r;
+        }
+    }
+    (energy, f)
+}

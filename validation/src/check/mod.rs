@@ -54,16 +54,21 @@ pub fn check(model: &Model, conditions: &Conditions) -> Result<Findings, CheckEr
         return Err(CheckError::Densities { given: densities.len(), species: fluid.species.len() });
     }
     let plan = Plan::new(&fluid)?;
-    let theory = MeanField::new(&fluid)?;
+    // Mean field starts from a free energy; a law of stated slopes has none.
+    let theory = match fluid.stated_slopes() {
+        None => Some(MeanField::new(&fluid)?),
+        Some(_) => None,
+    };
     let densities = conditions.densities.as_deref();
-    let stability = densities.map(|rho| theory.stability(rho));
+    let at = theory.as_ref().zip(densities);
+    let stability = at.map(|(theory, rho)| theory.stability(rho));
     Ok(Findings {
         title: model.title().to_owned(),
         reference: model.reference().map(str::to_owned),
         plan: plan.to_string(),
         kt: conditions.kt,
-        pressure: densities.map(|rho| theory.pressure(rho)),
-        pressure_slope: densities.map(|rho| theory.pressure_slope(rho)),
+        pressure: at.map(|(theory, rho)| theory.pressure(rho)),
+        pressure_slope: at.map(|(theory, rho)| theory.pressure_slope(rho)),
         stability: stability.map(Into::into),
         densities: conditions.densities.clone(),
         warnings: warnings::all(&fluid, densities, stability.as_ref())?,

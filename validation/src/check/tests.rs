@@ -46,6 +46,10 @@ fn laws_without_potential_and_jumps_are_named() {
     let lucy =
         van_der_waals().replace("kernel = \"quadratic\"", "kernel = \"lucy\"\nforce_kernel = \"quadratic\"");
     assert!(has(&found(&lucy, 8.0, None), "not-conservative"));
+    let stated = "title = \"t\"\nspecies = [\"F\"]\n[density.n]\nkernel = \"lucy\"\nrange = 1\n\
+                  [excess_free_energy]\nF = { slopes = { n = \"2*n\" } }\n";
+    let findings = found(stated, 1.0, Some(vec![3.0]));
+    assert!(has(&findings, "no-free-energy") && findings.pressure.is_none(), "{findings:?}");
     let linear = van_der_waals().replace("quadratic", "linear");
     assert!(has(&found(&linear, 8.0, None), "force-jump"));
     let cut = "title = \"t\"\nspecies = [\"F\"]\n[[pair]]\nbetween = [\"F\", \"F\"]\nform = \"expression\"\n\

@@ -16,8 +16,12 @@ pub fn all(
 ) -> Result<Vec<Warning>, CheckError> {
     let mut found = Vec::new();
     found.extend(not_conservative(fluid));
-    found.extend(collapse(fluid)?);
-    found.extend(singular(fluid, densities)?);
+    if let Some(species) = fluid.stated_slopes() {
+        found.push(no_free_energy(species));
+    } else {
+        found.extend(collapse(fluid)?);
+        found.extend(singular(fluid, densities)?);
+    }
     found.extend(stability.and_then(unstable));
     found.extend(jumps(fluid));
     found.sort_by_key(|w| std::cmp::Reverse(w.severity));
@@ -37,6 +41,18 @@ fn not_conservative(fluid: &Fluid) -> Option<Warning> {
             density.force_kernel.kind().name()
         ),
     })
+}
+
+fn no_free_energy(species: &str) -> Warning {
+    Warning {
+        id: "no-free-energy",
+        severity: Severity::Warning,
+        message: format!(
+            "the force of species {species} is stated (slopes) and not derived from a psi: unless its slopes are those of \
+             one psi it has no potential and heats the fluid, and there is no mean field to check it by; write psi \
+             as a formula of the partial densities unless that law is what you study"
+        ),
+    }
 }
 
 fn collapse(fluid: &Fluid) -> Result<Option<Warning>, CheckError> {

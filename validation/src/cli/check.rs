@@ -82,7 +82,7 @@ fn print(findings: &Findings, species: &[String]) {
             None => "(S(k) has no peak)".to_owned(),
         };
         println!("stability     {verdict}: smallest 1/S(k) is {:.5} {place}", s.min_inverse_s);
-    } else {
+    } else if findings.densities.is_none() {
         println!("stability     give --density to have pressure and stability");
     }
     for warning in &findings.warnings {

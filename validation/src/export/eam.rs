@@ -189,6 +189,8 @@ fn embedding(fluid: &Fluid, alpha: usize, pass: Option<usize>, n: f64) -> f64 {
                 .collect();
             psi.value(&at)
         }
+        // Refused before: it has no potential.
+        ExcessFreeEnergy::Slopes(law) => law.energy.value(&vec![0.0; fluid.variables()]),
         ExcessFreeEnergy::Curve(curve) => {
             curve.at(if pass == Some(curve.density) { n + own(curve.density) } else { own(curve.density) })[0]
         }

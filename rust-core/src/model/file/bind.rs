@@ -5,11 +5,11 @@ use super::density::DensityEntry;
 use super::excess::ExcessEntry;
 use super::interaction::{PairEntry, PairFormEntry, ThermostatEntry};
 use super::number::formula_error;
-use crate::document::{FileError, FileErrorKind, Source};
+use crate::document::{FileError, FileErrorKind, Located, Source};
 use crate::model::curve::{Curve, CurveForm, Pressure, Spline};
-use crate::model::expression::{ErrorKind, Expansion, ExpressionError, Formula, Variables};
+use crate::model::expression::{Ast, ErrorKind, Expansion, ExpressionError, Formula, Variables};
 use crate::model::fluid::{
-    Bounds, ExcessFreeEnergy, Fluid, PairTerm, Polynomial, Thermostat, WeightedDensity,
+    Bounds, ExcessFreeEnergy, Fluid, PairTerm, Polynomial, StatedSlopes, Thermostat, WeightedDensity,
 };
 use crate::model::kernel::Kernel;
 use crate::model::pair::{ExpressionPair, PairPotential, Soft, SplineAttractive, TablePair};
@@ -83,6 +83,9 @@ fn bind_excess(
                 }),
             })
         }
+        ExcessEntry::Slopes { slopes, energy } => {
+            bind_slopes(slopes, energy.as_ref(), context, variables, densities).map(ExcessFreeEnergy::Slopes)
+        }
         ExcessEntry::Pressure { formula: ast, density } => {
             let variables = Variables { count: 1, names: BTreeMap::from([("rho".to_owned(), vec![0])]) };
             let kt = context.constants["kT"];
@@ -104,6 +107,48 @@ fn bind_excess(
                 .map_err(|e| formula_error(context.source, ast, e))
         }
     }
+}
+
+/// A slope is that of one partial density, or of all that make up a total.
+fn bind_slopes(
+    slopes: &[(Located<String>, Located<Ast>)],
+    energy: Option<&Located<Ast>>,
+    context: &Context,
+    variables: &Variables,
+    densities: &[WeightedDensity],
+) -> Result<StatedSlopes, FileError> {
+    let source = context.source;
+    let compile = |ast: &Located<Ast>| {
+        Formula::compile(&ast.value, &context.constants, variables).map_err(|e| formula_error(source, ast, e))
+    };
+    let mut stated: Vec<Option<Formula>> = vec![None; variables.count];
+    for (name, ast) in slopes {
+        let Some(members) = variables.names.get(&name.value) else {
+            let known = variables.names.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
+            let name_of = name.value.clone();
+            let kind = FileErrorKind::UnknownName { what: "density variable", name: name_of, known };
+            return Err(name.error(source, kind));
+        };
+        let formula = compile(ast)?;
+        for v in members {
+            if stated[*v].replace(formula.clone()).is_some() {
+                let message = "the slope of one of its partial densities is stated twice".into();
+                return Err(name.error(source, FileErrorKind::Value(message)));
+            }
+        }
+    }
+    let energy = energy.map(compile).transpose()?.unwrap_or_else(|| Formula::constant(0.0));
+    let slopes = stated.into_iter().map(|s| s.unwrap_or_else(|| Formula::constant(0.0))).collect();
+    let law = StatedSlopes { energy, slopes };
+    let bounded = |v: &usize| densities[v / context.species].bounds.is_some() && law.depends_on(*v);
+    if let Some(v) = (0..variables.count).find(bounded) {
+        let name = &densities[v / context.species].name;
+        let message =
+            format!("density {name} has bounds, beyond which psi goes on; stated slopes have no psi");
+        return Err(FileError::new(source, 0..0, "excess_free_energy", FileErrorKind::Value(message))
+            .with_help("leave the bounds out, or limit the density in the formula with min and max"));
+    }
+    Ok(law)
 }
 
 /// The continuation of ψ has three to the number of bounded variables terms.

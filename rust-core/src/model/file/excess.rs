@@ -19,6 +19,8 @@ pub enum ExcessEntry {
     Table { spline: Arc<Spline>, density: usize },
     /// The pressure as a formula of one density's total.
     Pressure { formula: Located<Ast>, density: usize },
+    /// Slopes that need have no ψ, by the names of the variables, and what is reported as energy.
+    Slopes { slopes: Vec<(Located<String>, Located<Ast>)>, energy: Option<Located<Ast>> },
 }
 
 /// Reads `[excess_free_energy]`: every species, or none.
@@ -52,7 +54,8 @@ pub fn read(
     }
 }
 
-/// `{ table = "file" }` or `{ pressure = "formula" }`, with `density = "name"` where there are several.
+/// `{ table = "file" }` or `{ pressure = "formula" }`, with `density = "name"` where there are several;
+/// or `{ slopes = { n = "formula" } }`.
 fn read_curve(
     table: &Section,
     species: usize,
@@ -62,7 +65,18 @@ fn read_curve(
     let value = |message: &str| FileErrorKind::Value(message.into());
     let file = table.get("table");
     let pressure = table.get("pressure");
-    let density = read_density(table.get("density"), table, densities)?;
+    let (slopes, energy, named) = (table.get("slopes"), table.get("energy"), table.get("density"));
+    if let Some(slopes) = slopes {
+        let others = [("table", &file), ("pressure", &pressure), ("density", &named)];
+        if let Some((name, Some(other))) = others.iter().find(|(_, v)| v.is_some()) {
+            return Err(other.error(FileErrorKind::Value(format!("slopes exclude {name}"))));
+        }
+        return read_slopes(&slopes, energy, table);
+    }
+    if let Some(energy) = energy {
+        return Err(energy.error(value("has no meaning without slopes")));
+    }
+    let density = read_density(named, table, densities)?;
     match (file, pressure) {
         (Some(file), None) => {
             Ok(ExcessEntry::Table { spline: Arc::new(read_spline(&file, directory, ["n", "psi"])?), density })
@@ -78,6 +92,18 @@ fn read_curve(
             Err(table.error(value("expected a formula, { table = \"file\" } or { pressure = \"formula\" }")))
         }
     }
+}
+
+fn read_slopes(slopes: &Value, energy: Option<Value>, table: &Section) -> Result<ExcessEntry, FileError> {
+    let section = slopes.section()?;
+    let slopes = section
+        .entries()
+        .into_iter()
+        .map(|(name, value)| Ok((name, read_formula(&value, table.source())?)))
+        .collect::<Result<Vec<_>, FileError>>()?;
+    section.finish()?;
+    let energy = energy.map(|e| read_formula(&e, table.source())).transpose()?;
+    Ok(ExcessEntry::Slopes { slopes, energy })
 }
 
 /// The density that a curve depends on: the one named, or the only one.

@@ -151,6 +151,7 @@ pub fn check_coverage(source: &Arc<Source>, fluid: &Fluid) -> Result<(), FileErr
             let depends = match excess {
                 ExcessFreeEnergy::Formula(formula) => formula.depends_on(variable),
                 ExcessFreeEnergy::Curve(curve) => curve.density == variable / count,
+                ExcessFreeEnergy::Slopes(law) => law.slopes[variable].is_constant() != Some(0.0),
             };
             if depends {
                 let beta = variable % count;

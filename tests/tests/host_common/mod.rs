@@ -1,0 +1,148 @@
+//! What every host that runs scripts must do.
+
+#![allow(dead_code)]
+
+use super::style_common::{chains, difference, scaled};
+use psidpd::lammps::{DataFile, Host, dump};
+use psidpd_tests::{psidpd, root, said};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+pub const LIMIT: Duration = Duration::from_secs(120);
+
+pub fn model() -> PathBuf {
+    root().join("validation/models/warren2003-set6.toml")
+}
+
+/// A script without a command that loads the styles.
+pub fn script(model: &Path) -> String {
+    format!(
+        "units lj\natom_style atomic\ncomm_modify vel yes\nregion b block 0 5 0 5 0 5\ncreate_box 1 b\n\
+         create_atoms 1 random 600 4711 NULL\nmass 1 1\nvelocity all create 1.0 87 loop geom\n\
+         pair_style dpd/psi 1.0 5\npair_coeff * * {} F\nfix 1 all nve\ntimestep 0.001\nthermo 10\nrun 10\n",
+        model.display()
+    )
+}
+
+/// A LAMMPS that runs scripts with the styles.
+pub struct Runs {
+    pub host: Host,
+    /// The command that loads them; empty where none is needed.
+    pub load: String,
+}
+
+impl Runs {
+    /// Runs a script and returns what it says, or its error.
+    pub fn outcome(&self, text: &str, ranks: usize, folder: &Path) -> Result<String, String> {
+        let path = folder.join("in.lammps");
+        std::fs::write(&path, format!("{}{text}", self.load)).unwrap();
+        self.host
+            .run_script(ranks, folder, &path, &[], LIMIT)
+            .map(|run| run.stdout)
+            .map_err(|e| e.to_string())
+    }
+}
+
+/// Positions and forces by ID in a dump of `x y z fx fy fz`.
+pub fn read_forces(path: &Path) -> [Vec<[f64; 3]>; 2] {
+    let frame = dump::read(path).unwrap().pop().unwrap();
+    [["x", "y", "z"], ["fx", "fy", "fz"]].map(|names| frame.vectors(names).unwrap())
+}
+
+/// The energy that a script prints as `energy …`.
+pub fn energy(said: &str) -> f64 {
+    said.lines().find_map(|l| l.strip_prefix("energy ")).expect(said).trim().parse().unwrap()
+}
+
+/// Without drag and noise, LAMMPS's forces are those of the native engine to rounding.
+pub fn forces_equal_the_native_engine(runs: &Runs) {
+    let folder = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(model()).unwrap();
+    let conservative = text.split("[[thermostat]]").next().unwrap();
+    let model = folder.path().join("model.toml");
+    std::fs::write(&model, conservative).unwrap();
+    let mut script = script(&model).replace("run 10\n", "");
+    script.push_str(
+        "run 40\nwrite_data atoms.data\nreset_timestep 0\n\
+         dump d all custom 1 forces.dump id type x y z fx fy fz\n\
+         dump_modify d sort id format float %.17g\nrun 0\nvariable u equal pe\nprint \"energy $(v_u:%.17g)\"\n",
+    );
+    for ranks in [1, 2] {
+        let said_here = runs.outcome(&script, ranks, folder.path()).unwrap();
+        let [positions, forces] = read_forces(&folder.path().join("forces.dump"));
+        assert_eq!(forces.len(), 600);
+
+        // The positions of the dump, for those are the ones that the forces belong to.
+        let mut data = DataFile::read(&folder.path().join("atoms.data")).unwrap();
+        data.sort_by_id();
+        for (atom, x) in data.atoms.iter_mut().zip(&positions) {
+            atom.x = *x;
+        }
+        data.write(&folder.path().join("same.data")).unwrap();
+        let arguments = "forces --model model.toml --data same.data --kT 1 --json native.json";
+        let native = psidpd(folder.path(), &arguments.split(' ').collect::<Vec<_>>());
+        assert!(native.status.success(), "{}", said(&native));
+        let native = std::fs::read_to_string(folder.path().join("native.json")).unwrap();
+        let native: serde_json::Value = serde_json::from_str(&native).unwrap();
+        let own: Vec<[f64; 3]> = serde_json::from_value(native["forces"].clone()).unwrap();
+
+        let size = (own.iter().flatten().map(|c| c * c).sum::<f64>() / 600.0).sqrt();
+        assert!(size > 1.0, "{size}");
+        let worst = own
+            .iter()
+            .flatten()
+            .zip(forces.iter().flatten())
+            .map(|(a, b)| (a - b).abs() / size)
+            .fold(0.0, f64::max);
+        assert!(worst < 1e-12, "{worst:e} on {ranks} ranks");
+
+        // LAMMPS prints energies per particle.
+        let energy = energy(&said_here);
+        let own = native["energy"].as_f64().unwrap() / 600.0;
+        assert!((energy - own).abs() < 1e-12 * own.abs(), "{energy} {own}");
+    }
+}
+
+const DUMP: &str = "dump d all custom 1 forces.dump id type x y z fx fy fz\n\
+    dump_modify d sort id format float %.17g\nrun 0\nvariable u equal pe*atoms\nprint \"energy $(v_u:%.17g)\"\n";
+
+/// Chains with weakened bonded neighbours, and types that do not see each other: the pairs are those of
+/// LAMMPS's list then.
+pub fn listed_decks(newton: &str, folder: &Path) -> [String; 2] {
+    std::fs::write(folder.join("chains.data"), chains(120)).unwrap();
+    let deck = |special: &str, more: &str| {
+        format!(
+            "newton {newton}\nunits lj\natom_style bond\ncomm_modify vel yes\nspecial_bonds lj {special}\n\
+             read_data chains.data\nmass * 1\npair_style mdpd/psi 1.0 1.0 5\npair_coeff * * -40 25 0 1 0.75\n\
+             bond_style zero\nbond_coeff *\n{more}fix 1 all nve\n{DUMP}"
+        )
+    };
+    [deck("0.5 0.0 0.8", ""), deck("1 1 1", "neigh_modify exclude type 1 2\n")]
+}
+
+/// Their forces and energies, by the formulas, on one rank and on several; returns what the first said.
+pub fn special_factors_and_exclusions(runs: &Runs, newton: &str) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let factor = |i: usize, j: usize| match i.abs_diff(j) {
+        1 if i / 5 == j / 5 => 0.5,
+        2 if i / 5 == j / 5 => 0.0,
+        3 if i / 5 == j / 5 => 0.8,
+        _ => 1.0,
+    };
+    let kind = |i: usize| if i % 5 < 3 { 1 } else { 2 };
+    let same = |i: usize, j: usize| if kind(i) == kind(j) { 1.0 } else { 0.0 };
+    let strengths: [&dyn Fn(usize, usize) -> f64; 2] = [&factor, &same];
+    let mut first = None;
+    for (deck, strength) in listed_decks(newton, folder.path()).iter().zip(strengths) {
+        for ranks in [1, 2, 4] {
+            let said = runs.outcome(deck, ranks, folder.path()).unwrap_or_else(|e| panic!("{e}\n{deck}"));
+            let [x, forces] = read_forces(&folder.path().join("forces.dump"));
+            let (expected, f) = scaled(&x, 5.0, strength);
+            let apart = difference(&forces, &f);
+            assert!(apart < 1e-10, "newton {newton}, {ranks} ranks: {apart}\n{deck}");
+            assert!((energy(&said) / expected - 1.0).abs() < 1e-10, "{} {expected}", energy(&said));
+            first.get_or_insert(said);
+        }
+    }
+    first.unwrap_or_default()
+}

@@ -1,0 +1,130 @@
+//! The styles beside what in LAMMPS has to do with neighbours: `compute rdf`, `comm_modify mode multi`.
+
+mod style_common;
+
+use psidpd_core::engine::PeriodicBox;
+use psidpd_core::model::Model;
+use std::f64::consts::PI;
+use style_common::*;
+
+const BINS: usize = 20;
+
+/// How many ordered pairs of kinds `a`, `b` are in each shell of width `reach/BINS`; kind 0 is any.
+fn shells(now: &Frame, domain: &PeriodicBox, [a, b]: [i32; 2], reach: f64) -> Vec<f64> {
+    let is = |i: usize, kind: i32| kind == 0 || now.kind[i] == kind;
+    let mut found = vec![0.0; BINS];
+    for i in (0..now.x.len()).filter(|i| is(*i, a)) {
+        for j in (0..now.x.len()).filter(|j| *j != i && is(*j, b)) {
+            let d = domain.minimum_image(now.x[i], now.x[j]);
+            let r = d.iter().map(|c| c * c).sum::<f64>().sqrt();
+            if r < reach {
+                found[(r / reach * BINS as f64) as usize] += 1.0;
+            }
+        }
+    }
+    found
+}
+
+/// `compute rdf` gets its pairs from a list of its own: g(r) and coordination numbers are those of a direct
+/// count, wherever the style has its pairs from.
+#[test]
+fn radial_distributions_are_those_of_a_direct_count() {
+    let model = warren();
+    for (before, region, more) in [
+        ("", "block 0 5 0 5 0 5", ""),
+        ("newton off", "block 0 5 0 5 0 5", ""),
+        ("", "prism 0 5 0 5 0 5 1 -1 1", ""),
+        // The style's own pairs are LAMMPS's here, and no atom is excluded.
+        ("", "block 0 5 0 5 0 5", "group none empty\nneigh_modify exclude group none none"),
+    ] {
+        let l = open(&format!(
+            "{}pair_style dpd/psi 1.0 {SEED}\npair_coeff * * {model} F F\n{more}\n\
+             compute g all rdf {BINS} * * 1 2 2 2\nfix 1 all nve\ntimestep {DT}\n\
+             thermo_style custom step c_g[1][1]\nthermo 5\nrun 5\n",
+            particles(before, region, 2, 500)
+        ));
+        let (now, domain) = (frame(&l), domain(&l));
+        let volume = domain.volume(3);
+        let of = |kind: i32| now.kind.iter().filter(|k| kind == 0 || **k == kind).count() as f64;
+        for (column, kinds) in [[0, 0], [1, 2], [2, 2]].into_iter().enumerate() {
+            let [from, to] = kinds.map(of);
+            // A particle is no neighbour of its own.
+            let others = if kinds[0] == kinds[1] { to - 1.0 } else { to };
+            let counts = shells(&now, &domain, kinds, 1.0);
+            assert!(counts.iter().sum::<f64>() > 100.0);
+            let mut inside = 0.0;
+            for (bin, count) in counts.iter().enumerate() {
+                let [low, high] = [bin, bin + 1].map(|b| b as f64 / BINS as f64);
+                let shell = 4.0 / 3.0 * PI * (high.powi(3) - low.powi(3)) / volume;
+                inside += count / from;
+                let value = |k: usize| l.eval(&format!("c_g[{}][{k}]", bin + 1)).unwrap();
+                let found = [value(1), value(2 + 2 * column), value(3 + 2 * column)];
+                let expected = [0.5 * (low + high), count / (from * others * shell), inside];
+                for (found, expected) in found.iter().zip(expected) {
+                    assert!(
+                        (found - expected).abs() < 1e-9 * (1.0 + expected),
+                        "{kinds:?}, bin {bin}: {found} {expected}\n{before} {region} {more}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// Ghosts that reach as far as each type needs: forces and trajectories are the same as with one reach, beside a
+/// style of another range too.
+#[test]
+fn ghosts_by_type_are_enough() {
+    let (_folder, wide) = file(WIDE);
+    let model = Model::parse("wide", WIDE).unwrap();
+    let psi = format!("dpd/psi 1.0 {SEED}");
+    let alone = format!("pair_style {psi}\npair_coeff * * {wide} A B\n");
+    let multi = "neighbor 0.3 multi\ncomm_modify mode multi vel yes";
+    for (before, region) in [("", "block 0 6 0 6 0 6"), ("newton off", "prism 0 6 0 6 0 6 1 2 -1")] {
+        let deck = |comm: &str, style: &str, types: usize| {
+            format!(
+                "{}{style}fix 1 all nve\ntimestep {DT}\nrun 0\n",
+                particles(&format!("{before}\n{comm}"), region, types, 700)
+                    .replace("comm_modify vel yes", if comm.is_empty() { "comm_modify vel yes" } else { "" })
+            )
+        };
+        let l = open(&deck(multi, &alone, 2));
+        let truth = truth(&l, &model, 1.0, Some(0));
+        let apart = difference(&frame(&l).f, &truth.forces);
+        assert!(apart < 1e-10, "{apart}");
+        drop(l);
+        // A third type, of long range, so that the reaches differ.
+        let beside = format!(
+            "set type 1 type/ratio 2 0.4 77\npair_style hybrid {psi} lj/cut 2.0\n\
+             pair_coeff * * dpd/psi {wide} A B NULL\npair_coeff * 3 lj/cut 0.01 0.3 0.6\npair_coeff 3 3 lj/cut 0.01 0.3 2.0\n"
+        );
+        let single = frame(&open(&deck("", &beside, 3)));
+        let l = open(&deck(multi, &beside, 3));
+        let found = frame(&l);
+        drop(l);
+        assert_eq!(found.kind, single.kind);
+        assert!(found.kind.contains(&1) && found.kind.contains(&2) && found.kind.contains(&3));
+        let apart = difference(&found.f, &single.f);
+        assert!(apart < 1e-10, "{apart}");
+
+        let folder = tempfile::tempdir().unwrap();
+        let start = folder.path().join("start.data").display().to_string();
+        open(&format!(
+            "{}pair_style zero 1.0\npair_coeff * *\nwrite_data {start} nocoeff\n",
+            particles("", region, 3, 700)
+        ));
+        let script = |comm: &str| {
+            format!(
+                "units lj\natom_style atomic\natom_modify map yes\n{before}\n{comm}\nread_data {start}\n{}{beside}\
+                 fix 1 all nve\ntimestep {DT}\nrun 10\n",
+                load()
+            )
+        };
+        let one = run(&script("comm_modify vel yes"), 1);
+        for ranks in [1, 2, 4] {
+            let other = run(&script(multi), ranks);
+            let apart = [difference(&other.x, &one.x), difference(&other.f, &one.f)];
+            assert!(apart.iter().all(|d| *d < 1e-9), "{ranks} ranks: {apart:?}");
+        }
+    }
+}
