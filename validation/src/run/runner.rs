@@ -187,6 +187,11 @@ impl<'a> Runner<'a> {
         &self.start
     }
 
+    /// Sets the time between checkpoints, ten minutes, for a scene that does not give steps between them.
+    pub fn set_checkpoint_interval(&mut self, interval: Duration) {
+        self.run.interval = interval;
+    }
+
     /// How many particles there are.
     pub fn particles(&self) -> usize {
         self.run.simulation.len()
@@ -280,6 +285,8 @@ struct Run<'a> {
     began: (u64, Instant),
     /// When the last checkpoint was written.
     checkpointed: Instant,
+    /// Time between checkpoints, if there are no steps between them.
+    interval: Duration,
 }
 
 impl<'a> Run<'a> {
@@ -307,6 +314,7 @@ impl<'a> Run<'a> {
             timing,
             began: (good.step, now),
             checkpointed: now,
+            interval: CHECKPOINT_INTERVAL,
             good,
         }
     }
@@ -370,7 +378,7 @@ impl<'a> Run<'a> {
         self.report(stage, totals, progress)?;
         let due = match self.scene.output.checkpoint {
             Some(interval) => every(interval, number),
-            None => self.checkpointed.elapsed() >= CHECKPOINT_INTERVAL,
+            None => self.checkpointed.elapsed() >= self.interval,
         };
         // A run that comes to its end writes one then.
         if due && number < self.steps { self.checkpoint() } else { Ok(()) }
