@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
+use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 /// Two stages, with everything that a run writes; a checkpoint takes about as long as the steps between two.
@@ -83,10 +84,14 @@ fn finished(output: &Output) -> String {
     words
 }
 
-/// The run that nothing interrupts.
-fn whole(folder: &Path) -> PathBuf {
-    finished(&run(folder, "whole", &[]));
-    folder.join("whole")
+/// The run that nothing interrupts, made once.
+fn whole() -> &'static Path {
+    static WHOLE: OnceLock<PathBuf> = OnceLock::new();
+    WHOLE.get_or_init(|| {
+        let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("whole-run");
+        finished(&run(folder().path(), out.to_str().unwrap(), &["--overwrite"]));
+        out
+    })
 }
 
 /// An interrupted run: its folder, and what it said.
@@ -102,7 +107,7 @@ fn interrupted(folder: &Path, out: &str, signal: Signal) -> (PathBuf, Output) {
 fn a_run_killed_ten_times_ends_in_the_same_bytes() {
     let folder = folder();
     let here = folder.path();
-    let whole = whole(here);
+    let whole = whole();
     let length = whole.join("thermo.csv").metadata().unwrap().len() as f64;
     let mut random = StdRng::seed_from_u64(20);
     let mut moments: Vec<f64> = (0..10).map(|_| random.random_range(0.0..0.8)).collect();
@@ -122,17 +127,17 @@ fn a_run_killed_ten_times_ends_in_the_same_bytes() {
     assert!(killed >= 8, "{killed} of 10 killed");
     let words = finished(&run(here, "killed", &["--resume"]));
     assert!(words.contains("going on after step "), "{words}");
-    assert_same(&whole, &out);
+    assert_same(whole, &out);
     let words = finished(&run(here, "killed", &["--resume"]));
     assert!(words.contains("is finished: nothing is left to do"), "{words}");
-    assert_same(&whole, &out);
+    assert_same(whole, &out);
 }
 
 #[test]
 fn signals_stop_a_run_that_says_how_to_go_on() {
     let folder = folder();
     let here = folder.path();
-    let whole = whole(here);
+    let whole = whole();
     for (signal, code) in [(Signal::INT, 130), (Signal::TERM, 143)] {
         let name = format!("by {code}");
         let (out, output) = interrupted(here, &name, signal);
@@ -151,11 +156,11 @@ fn signals_stop_a_run_that_says_how_to_go_on() {
         let words = finished(&output);
         let step = what.split(' ').nth(3).unwrap();
         assert!(words.contains(&format!("going on after step {step} of 1500")), "{words}");
-        assert_same(&whole, &out);
+        assert_same(whole, &out);
     }
     let out = interrupted(here, "over", Signal::INT).0;
     finished(&run(here, "over", &["--overwrite"]));
-    assert_same(&whole, &out);
+    assert_same(whole, &out);
 }
 
 /// Both signals wait while the program is halted, so that the second finds the first before any step ends.
@@ -176,14 +181,14 @@ fn a_second_signal_kills() {
 fn a_truncated_checkpoint_falls_back_to_the_one_before() {
     let folder = folder();
     let here = folder.path();
-    let whole = whole(here);
+    let whole = whole();
     let out = interrupted(here, "cut", Signal::INT).0;
     let newest = std::fs::File::options().write(true).open(out.join("checkpoint")).unwrap();
     newest.set_len(1000).unwrap();
     let words = finished(&run(here, "cut", &["--resume"]));
     assert!(words.contains("checkpoint is truncated: 1000 bytes of "), "{words}");
     assert!(words.contains("going on from the one before"), "{words}");
-    assert_same(&whole, &out);
+    assert_same(whole, &out);
     // With both gone wrong nothing is touched.
     let out = interrupted(here, "both", Signal::INT).0;
     for name in ["checkpoint", "checkpoint.old"] {
@@ -240,7 +245,7 @@ fn limited(folder: &Path, scene: &str, out: &str, blocks: u32) -> Output {
 fn a_full_disk_leaves_the_last_good_state() {
     let folder = folder();
     let here = folder.path();
-    let whole = whole(here);
+    let whole = whole();
     let out = here.join("full");
     // Room for checkpoints, but not for the dump.
     let output = limited(here, "s.toml", "full", 600);
@@ -251,7 +256,7 @@ fn a_full_disk_leaves_the_last_good_state() {
     assert_eq!(read_state(&out).unwrap().len(), 387);
     let words = finished(&run(here, "full", &["--resume"]));
     assert!(words.contains("going on after step "), "{words}");
-    assert_same(&whole, &out);
+    assert_same(whole, &out);
     // No room for a single checkpoint: that is found out before the first step.
     std::fs::write(here.join("slim.toml"), scene().replace("dump = 25", "dump = 0")).unwrap();
     let output = limited(here, "slim.toml", "none", 10);
@@ -267,5 +272,5 @@ fn a_full_disk_leaves_the_last_good_state() {
     assert_eq!(output.status.code(), Some(1), "{}", said(&output));
     assert!(std::fs::read(out.join("checkpoint")).unwrap() == before);
     finished(&run(here, "later", &["--resume"]));
-    assert_same(&whole, &out);
+    assert_same(whole, &out);
 }

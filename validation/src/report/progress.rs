@@ -12,8 +12,9 @@ use super::text::one_line;
 
 const BAR: &str = "{prefix:24!} {bar:32.cyan/dim} {percent:>3}% {human_pos}/{human_len} \
                    {elapsed_precise:.dim} {eta:.dim} left";
-const STEPS: &str = "{prefix:24!} {bar:24.cyan/dim} {percent:>3}% {human_pos}/{human_len} steps, {rate} \
-                     {elapsed_precise:.dim} {eta:.dim} left";
+// Fits eighty columns; the bar gets what is left.
+const STEPS: &str =
+    "{prefix:14!} {percent:>3}% {human_pos}/{human_len} {rate}, {eta} left {wide_bar:.cyan/dim}";
 const SPINNER: &str = "{prefix} {spinner:.cyan} {elapsed_precise:.dim}";
 
 /// A group of bars on standard error; silent if that is not a terminal.
@@ -123,7 +124,7 @@ fn rate(steps_per_second: f64, particles: usize) -> String {
     }
     let digits = if steps_per_second < 10.0 { 2 } else { 0 };
     let nanoseconds = 1e9 / (steps_per_second * particles.max(1) as f64);
-    format!("{steps_per_second:.digits$}/s, {nanoseconds:.0} ns per particle and step")
+    format!("{steps_per_second:.digits$} steps/s, {nanoseconds:.0} ns/particle")
 }
 
 fn style(template: &str) -> ProgressStyle {
@@ -151,8 +152,8 @@ mod tests {
 
     #[test]
     fn speeds_are_of_steps_and_particles() {
-        assert_eq!(rate(1000.0, 2000), "1000/s, 500 ns per particle and step");
-        assert_eq!(rate(0.5, 1_000_000), "0.50/s, 2000 ns per particle and step");
+        assert_eq!(rate(1000.0, 2000), "1000 steps/s, 500 ns/particle");
+        assert_eq!(rate(0.5, 1_000_000), "0.50 steps/s, 2000 ns/particle");
         assert_eq!((rate(0.0, 10), rate(f64::NAN, 0)), ("-".into(), "-".into()));
     }
 

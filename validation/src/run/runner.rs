@@ -70,7 +70,7 @@ pub enum Outcome {
     /// All steps are made.
     Finished {
         /// What it came to.
-        summary: Summary,
+        summary: Box<Summary>,
         /// What it took.
         timing: Timing,
     },
@@ -95,7 +95,7 @@ pub fn run_scene(scene: &Scene, out: &Path, progress: &mut dyn FnMut(Progress)) 
     let never = AtomicUsize::new(0);
     loop {
         if let Outcome::Finished { summary, .. } = runner.run(&never, progress)? {
-            return Ok(summary);
+            return Ok(*summary);
         }
     }
 }
@@ -210,9 +210,9 @@ impl<'a> Runner<'a> {
         let Runner { start, run } = self;
         if matches!(start, Start::Finished) {
             run.store.keep_newest()?;
-            return Ok(Outcome::Finished { summary: run.summary(), timing: run.timing.clone() });
+            return Ok(Outcome::Finished { summary: Box::new(run.summary()), timing: run.timing.clone() });
         }
-        run.to_the_end(stop, progress).map_err(|error| run.stop(error))
+        run.go_on(stop, progress).map_err(|error| run.stop(error))
     }
 }
 
@@ -319,11 +319,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    fn to_the_end(
-        &mut self,
-        stop: &AtomicUsize,
-        progress: &mut dyn FnMut(Progress),
-    ) -> Result<Outcome, RunError> {
+    fn go_on(&mut self, stop: &AtomicUsize, progress: &mut dyn FnMut(Progress)) -> Result<Outcome, RunError> {
         self.began = (self.simulation.step_number(), Instant::now());
         let scene = self.scene;
         loop {
@@ -503,7 +499,7 @@ impl<'a> Run<'a> {
         self.good.finished = true;
         self.store_good()?;
         self.store.keep_newest()?;
-        Ok(Outcome::Finished { summary, timing: self.timing_until(self.steps) })
+        Ok(Outcome::Finished { summary: Box::new(summary), timing: self.timing_until(self.steps) })
     }
 
     fn data_title(&self, step: u64) -> String {

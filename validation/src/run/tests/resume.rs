@@ -59,7 +59,7 @@ fn interrupted(scene: &Scene, out: &Path, begin: Begin, at: u64) {
 
 fn finished(scene: &Scene, out: &Path, begin: Begin) -> Summary {
     match until(scene, out, begin, u64::MAX).unwrap() {
-        Outcome::Finished { summary, .. } => summary,
+        Outcome::Finished { summary, .. } => *summary,
         other => panic!("{other:?}"),
     }
 }
@@ -146,7 +146,7 @@ fn a_finished_run_is_left_as_it_is() {
     assert!(matches!(runner.start(), Start::Finished));
     let outcome = runner.run(&AtomicUsize::new(0), &mut |_| panic!("no step is left")).unwrap();
     let Outcome::Finished { summary: again, timing } = outcome else { panic!("{outcome:?}") };
-    assert_eq!((again, timing.sessions.len()), (summary, 1));
+    assert_eq!((*again, timing.sessions.len()), (summary, 1));
     assert!(contents(out) == before);
     drop(runner);
     // It may be made anew.
