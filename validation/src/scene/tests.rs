@@ -61,7 +61,7 @@ fn reads_the_schema() {
     let Initial::Filling(filling) = &scene.initial else { panic!("not a file") };
     assert_eq!(filling.count, 630);
     assert_eq!(filling.composition.fractions(), [0.25, 0.75]);
-    assert_eq!(scene.output, Output { thermo: 100, dump: 7 });
+    assert_eq!(scene.output, Output { thermo: 100, dump: 7, checkpoint: None });
     assert_eq!(scene.mass, [1.0, 1.0]);
     let [one, two] = scene.stages.as_slice() else { panic!("two stages") };
     assert_eq!((one.kt, one.thermostat, one.integrator), (1.5, true, crate::run::Integrator::VelocityVerlet));
@@ -105,6 +105,7 @@ fn errors_name_line_key_and_cause() {
         ("kT = 2.0", "lambda = 1.5", 20, "must be from 0 to 1"),
         ("name = \"two\"", "name = \"one\"", 16, "names two stages"),
         ("dump = 7", "dump = 7\nthermos = 1", 24, "output.thermos: unknown key"),
+        ("dump = 7", "dump = 7\ncheckpoint = -1", 24, "whole number from 0"),
         ("[output]", "[masses]\nA = 0\n[output]", 23, "masses.A: must be positive"),
         ("[output]", "[masses]\nD = 1\n[output]", 23, "unknown species \"D\""),
     ];
