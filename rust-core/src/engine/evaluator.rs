@@ -36,6 +36,22 @@ pub struct PassCounts {
     pub virial: u64,
 }
 
+impl std::ops::Add for PassCounts {
+    type Output = PassCounts;
+
+    fn add(self, other: PassCounts) -> PassCounts {
+        PassCounts {
+            search: self.search + other.search,
+            density: self.density + other.density,
+            excess: self.excess + other.excess,
+            force: self.force + other.force,
+            noise: self.noise + other.noise,
+            energy: self.energy + other.energy,
+            virial: self.virial + other.virial,
+        }
+    }
+}
+
 /// The forces of one fluid, and the arrays that computing them needs.
 #[derive(Debug, Clone)]
 pub struct Engine {

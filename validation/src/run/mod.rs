@@ -8,6 +8,7 @@ pub mod checkpoint;
 mod dump;
 mod error;
 mod folder;
+mod forces;
 mod growing;
 pub mod integrator;
 mod output;

@@ -1,9 +1,8 @@
 use super::error::RunError;
+use super::forces::{Arrays, Forces};
 use super::integrator::{Before, Integrator, Motion};
 use super::state::State;
-use psidpd_core::engine::{
-    Engine, Images, Newton, Particles, PassCounts, PeriodicBox, Plan, Step, Tally, Want,
-};
+use psidpd_core::engine::{PassCounts, PeriodicBox, Plan, Precision, Settings, Step, Sweep, Tally, Want};
 use psidpd_core::model::Model;
 
 /// Particles, their periodic images, and the forces of one fluid on them.
@@ -33,8 +32,7 @@ pub struct Simulation {
     species: Vec<i32>,
     tag: Vec<i32>,
     image: Vec<[i32; 3]>,
-    engine: Engine,
-    images: Images,
+    forces: Forces,
     tally: Tally,
     before: Before,
     /// Square of the longest way that a particle may go in one step.
@@ -52,7 +50,8 @@ impl Simulation {
         if let Some(fault) = state.fault(fluid.species.len(), fluid.dimensions) {
             return Err(RunError::State(fault));
         }
-        let engine = Engine::new(&fluid)?;
+        let settings = Settings { precision: Precision::Double, ..Settings::default() };
+        let forces = Forces::new(&fluid, settings)?;
         let State { domain, mass, mut x, v, species, tag, mut image } = state;
         for (x, image) in x.iter_mut().zip(&mut image) {
             domain.wrap(x, image);
@@ -74,8 +73,7 @@ impl Simulation {
             species,
             tag,
             image,
-            engine,
-            images: Images::default(),
+            forces,
             tally: Tally::default(),
             before: Before::default(),
             longest_move: domain.lengths().iter().map(|l| l * l).sum(),
@@ -90,11 +88,33 @@ impl Simulation {
     pub fn set_temperature(&mut self, kt: f64) -> Result<(), RunError> {
         if kt != self.kt {
             self.earlier_out_of_bounds = self.out_of_bounds();
-            self.engine = Engine::new(&self.model.at(kt)?)?;
-            self.engine.sum_all_densities(self.all_densities);
+            let (settings, pool) = (self.forces.settings(), self.forces.pool().clone());
+            self.forces = Forces::with_pool(&self.model.at(kt)?, settings, pool)?;
+            self.forces.sum_all_densities(self.all_densities);
             self.kt = kt;
         }
         Ok(())
+    }
+
+    /// How forces are computed from now on; in double precision, on one thread, unless told otherwise.
+    ///
+    /// # Errors
+    /// The model does not hold at the present temperature: never, since it did before.
+    pub fn set_settings(&mut self, settings: Settings) -> Result<(), RunError> {
+        self.earlier_out_of_bounds = self.out_of_bounds();
+        self.forces = Forces::new(&self.model.at(self.kt)?, settings)?;
+        self.forces.sum_all_densities(self.all_densities);
+        Ok(())
+    }
+
+    /// How forces are computed.
+    pub fn settings(&self) -> Settings {
+        self.forces.settings()
+    }
+
+    /// The fast engine, for what it can tell of itself.
+    pub fn sweep(&self) -> &Sweep {
+        self.forces.sweep()
     }
 
     /// Switches dissipative and random forces off, or on again.
@@ -150,27 +170,14 @@ impl Simulation {
             if !(step.dt > 0.0 && step.dt.is_finite()) {
                 return Err(RunError::TimeStep(step.dt));
             }
-            check_width(&self.domain, self.engine.plan())?;
+            check_width(&self.domain, self.forces.plan())?;
         }
-        let step = step.filter(|_| self.engine.plan().needs_velocities());
+        let step = step.filter(|_| self.forces.plan().needs_velocities());
         let number = self.number;
         let failed = |source| RunError::Engine { step: number, source };
-        let Simulation { images, engine, x, v, tag, species, force, owned, .. } = self;
-        images.build(&self.domain, self.dimensions, engine.plan().cutoff(), *owned, x);
-        images.forward(1, tag);
-        images.forward(1, species);
-        if step.is_some() {
-            images.forward(1, v);
-        }
-        let particles = Particles { owned: *owned, x, tag, kind: species };
-        engine.densities(&particles, Newton::On).map_err(failed)?;
-        let width = engine.slope_width();
-        engine.slopes_mut().truncate(*owned * width);
-        images.forward(width, engine.slopes_mut());
-        force.clear();
-        force.resize(x.len(), [0.0; 3]);
-        self.tally = engine.forces(&particles, v, step, want, force).map_err(failed)?;
-        images.reverse(force);
+        let Simulation { forces, domain, x, v, tag, species, force, owned, .. } = self;
+        let arrays = Arrays { owned: *owned, x, v, tag, species, force };
+        self.tally = forces.compute(domain, arrays, step, want).map_err(failed)?;
         Ok(())
     }
 
@@ -232,29 +239,29 @@ impl Simulation {
 
     /// The plan of the engine.
     pub fn plan(&self) -> &Plan {
-        self.engine.plan()
+        self.forces.plan()
     }
 
     /// How many evaluations of ψ met a density below its bounds, and above them.
     pub fn out_of_bounds(&self) -> [u64; 2] {
-        let now = self.engine.out_of_bounds();
+        let now = self.forces.out_of_bounds();
         std::array::from_fn(|k| self.earlier_out_of_bounds[k] + now[k])
     }
 
     /// How often each pass of the engine has run, since the temperature was last changed.
     pub fn counts(&self) -> PassCounts {
-        self.engine.counts()
+        self.forces.counts()
     }
 
     /// Local densities of the particles, as [`Engine::local_densities`].
     pub fn local_densities(&self) -> &[f64] {
-        self.engine.local_densities()
+        self.forces.local_densities()
     }
 
     /// Whether every density of the model is summed, or only those that forces need.
     pub fn sum_all_densities(&mut self, all: bool) {
         self.all_densities = all;
-        self.engine.sum_all_densities(all);
+        self.forces.sum_all_densities(all);
     }
 
     /// kT.

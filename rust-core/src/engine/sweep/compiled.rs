@@ -105,4 +105,3 @@ macro_rules! precision {
 
 precision!(Mixed, f32, MixedRecord);
 precision!(Double, f64, DoubleRecord);
-

@@ -12,9 +12,7 @@ use crate::model::pair::PairForm;
 #[inline(always)]
 unsafe fn entry<R: Reals, const SEVERAL: bool>(table: &[R::Scalar], kind: *const u32) -> R {
     // SAFETY: the contract of `simd`; kinds are below the length of every table, which is not empty.
-    unsafe {
-        if SEVERAL { R::lookup(table.as_ptr(), kind) } else { R::splat(*table.get_unchecked(0)) }
-    }
+    unsafe { if SEVERAL { R::lookup(table.as_ptr(), kind) } else { R::splat(*table.get_unchecked(0)) } }
 }
 
 /// What the terms of a block are computed with.
@@ -441,7 +439,6 @@ struct Near<'a, I, R: Reals, const TALLY: bool> {
 
 impl<I: Isa, R: Reals, const TALLY: bool> ShapeVisitor for Near<'_, I, R, TALLY> {
     type Output = usize;
-
 
     #[inline(always)]
     fn visit<S: Shape>(self) -> usize {

@@ -40,13 +40,8 @@ impl Frame {
 
     /// Open space around points: `low` and `high` are their extremes.
     pub fn around(low: [f64; 3], high: [f64; 3], dimensions: usize, cutoff: f64) -> Frame {
-        let mut frame = Frame {
-            dimensions,
-            origin: low,
-            length: [1.0; 3],
-            tilt: [0.0; 3],
-            periodic: [false; 3],
-        };
+        let mut frame =
+            Frame { dimensions, origin: low, length: [1.0; 3], tilt: [0.0; 3], periodic: [false; 3] };
         for c in 0..dimensions {
             // Differences of fractions are read as signed: within reach they must stay below a half.
             frame.length[c] = ((high[c] - low[c]) * (1.0 + 1e-9)).max(4.0 * cutoff);

@@ -190,8 +190,18 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TA
                         if low <= high {
                             let first = if w == 0 { Some(i + 1) } else { None };
                             look::<I, A::Scalar>(
-                                swept.start, swept.x, swept.ghost, ghosts, window, low, high, first, place, limit,
-                                i, block,
+                                swept.start,
+                                swept.x,
+                                swept.ghost,
+                                ghosts,
+                                window,
+                                low,
+                                high,
+                                first,
+                                place,
+                                limit,
+                                i,
+                                block,
                             );
                         }
                     } else {
@@ -203,8 +213,18 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TA
                                 let first = if w == 0 && wrap == 0 { Some(i + 1) } else { None };
                                 let place = [place[0] - wrap as f32 * period, place[1], place[2]];
                                 look::<I, A::Scalar>(
-                                    swept.start, swept.x, swept.ghost, ghosts, window, a, b, first, place, limit,
-                                    i, block,
+                                    swept.start,
+                                    swept.x,
+                                    swept.ghost,
+                                    ghosts,
+                                    window,
+                                    a,
+                                    b,
+                                    first,
+                                    place,
+                                    limit,
+                                    i,
+                                    block,
                                 );
                             }
                             wrap += 1;

@@ -285,11 +285,8 @@ impl<P: Compiled> Machine<P> {
             Shared(self.species.as_mut_ptr()),
             Shared(self.ghost.as_mut_ptr()),
         );
-        let x = [
-            Shared(self.x[0].as_mut_ptr()),
-            Shared(self.x[1].as_mut_ptr()),
-            Shared(self.x[2].as_mut_ptr()),
-        ];
+        let x =
+            [Shared(self.x[0].as_mut_ptr()), Shared(self.x[1].as_mut_ptr()), Shared(self.x[2].as_mut_ptr())];
         let (cell, counts) = (&self.cell, Shared(self.counts.as_mut_ptr()));
         let moving = given.thermostat.is_some();
         pool.run(&|t| {
@@ -484,17 +481,14 @@ impl<P: Compiled> Machine<P> {
                     )
                 };
                 this.gather_densities(layer, &own, densities);
-                let mut rows =
-                    Rows { first, columns: &this.columns, densities, excess, slopes };
+                let mut rows = Rows { first, columns: &this.columns, densities, excess, slopes };
                 let species = |s: usize| match (this.ghost.get(s), this.species.get(s)) {
                     (Some(ghost), _) if *ghost > 0.0 => -1,
                     (_, Some(species)) => *species as i32,
                     _ => 0,
                 };
                 let tag = |s: usize| tag[this.order[s] as usize];
-                if let Err(fault) =
-                    scratch.excess.run(plan, first..first + count, species, tag, &mut rows)
-                {
+                if let Err(fault) = scratch.excess.run(plan, first..first + count, species, tag, &mut rows) {
                     scratch.fault = Some(fault);
                     return;
                 }

@@ -108,6 +108,21 @@ macro_rules! with {
     };
 }
 
+impl std::fmt::Debug for Sweep {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Sweep").field("settings", &self.settings).finish_non_exhaustive()
+    }
+}
+
+impl Clone for Sweep {
+    /// An engine of its own for the same fluid, with the same threads, before any evaluation.
+    fn clone(&self) -> Sweep {
+        let mut clone = Sweep::of_plan(self.plan.clone(), self.settings, self.pool.clone());
+        clone.kinds.clone_from(&self.kinds);
+        clone
+    }
+}
+
 impl Sweep {
     /// An engine for `fluid`; types are species indices until [`Sweep::map_kinds`] says otherwise.
     ///
@@ -122,8 +137,11 @@ impl Sweep {
     ///
     /// # Errors
     /// As [`Plan::new`].
-    pub fn with_pool(fluid: &Fluid, mut settings: Settings, pool: Arc<Pool>) -> Result<Sweep, TooLarge> {
-        let plan = Plan::new(fluid)?;
+    pub fn with_pool(fluid: &Fluid, settings: Settings, pool: Arc<Pool>) -> Result<Sweep, TooLarge> {
+        Ok(Sweep::of_plan(Plan::new(fluid)?, settings, pool))
+    }
+
+    fn of_plan(plan: Plan, mut settings: Settings, pool: Arc<Pool>) -> Sweep {
         if !settings.instructions.available() {
             settings.instructions = Instructions::best();
         }
@@ -133,7 +151,7 @@ impl Sweep {
             Precision::Double => Both::Double(Box::new(Machine::new(&plan, settings.instructions, threads))),
         };
         let kinds = (0..plan.species.len() as i32).collect();
-        Ok(Sweep {
+        Sweep {
             plan,
             settings,
             pool,
@@ -146,7 +164,7 @@ impl Sweep {
             want: Want::FORCES,
             times: Times::default(),
             ready: false,
-        })
+        }
     }
 
     /// The plan.

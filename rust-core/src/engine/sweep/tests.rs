@@ -84,9 +84,7 @@ fn settings(precision: Precision, instructions: Instructions, threads: usize) ->
 fn every() -> impl Iterator<Item = (Precision, Instructions)> {
     let precisions = [Precision::Mixed, Precision::Double];
     let sets = [Instructions::Portable, Instructions::Avx2, Instructions::Avx512];
-    precisions
-        .into_iter()
-        .flat_map(move |p| sets.into_iter().filter(|i| i.available()).map(move |i| (p, i)))
+    precisions.into_iter().flat_map(move |p| sets.into_iter().filter(|i| i.available()).map(move |i| (p, i)))
 }
 
 /// Forces and totals by a sweep without ghosts.
@@ -150,7 +148,11 @@ fn tolerance(precision: Precision) -> f64 {
 
 fn boxes(dimensions: usize, length: f64) -> Vec<PeriodicBox> {
     let l = length;
-    let cube = PeriodicBox::orthogonal([-1.0, 2.0, -0.5], [l, 1.1 * l, if dimensions == 3 { 0.9 * l } else { 1.0 }], [true; 3]);
+    let cube = PeriodicBox::orthogonal(
+        [-1.0, 2.0, -0.5],
+        [l, 1.1 * l, if dimensions == 3 { 0.9 * l } else { 1.0 }],
+        [true; 3],
+    );
     let mut edges = Matrix3::new(1.2 * l, 0.3 * l, -0.2 * l, 0.0, l, 0.25 * l, 0.0, 0.0, l);
     if dimensions == 2 {
         edges = Matrix3::new(1.2 * l, 0.3 * l, 0.0, 0.0, l, 0.0, 0.0, 0.0, 1.0);

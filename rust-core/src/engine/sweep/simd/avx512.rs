@@ -110,9 +110,7 @@ impl Reals for F32x16 {
     }
     #[inline(always)]
     unsafe fn round(self) -> Self {
-        unsafe {
-            F32x16(_mm512_roundscale_ps::<{ _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }>(self.0))
-        }
+        unsafe { F32x16(_mm512_roundscale_ps::<{ _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }>(self.0)) }
     }
     #[inline(always)]
     unsafe fn where_below(self, a: Self, b: Self) -> Self {
@@ -255,9 +253,7 @@ impl Reals for F64x8 {
     }
     #[inline(always)]
     unsafe fn round(self) -> Self {
-        unsafe {
-            F64x8(_mm512_roundscale_pd::<{ _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }>(self.0))
-        }
+        unsafe { F64x8(_mm512_roundscale_pd::<{ _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }>(self.0)) }
     }
     #[inline(always)]
     unsafe fn where_below(self, a: Self, b: Self) -> Self {
