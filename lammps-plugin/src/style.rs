@@ -8,8 +8,8 @@ use psidpd_core::model::{
     ForceLaw, Model, PresetError, SplinePair, WarrenPair, lucy_mdpd, spline_dpd, warren_ab,
 };
 use std::fmt::Write;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::num::NonZeroUsize;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -318,7 +318,10 @@ impl Style {
         }
         let _ = writeln!(text, "  search        {search}");
         let Settings { precision, instructions, threads } = self.engines.sweep().settings();
-        let _ = writeln!(text, "  arithmetic    {precision} precision, {instructions}, {threads} thread(s) a rank");
+        let _ = writeln!(
+            text,
+            "  arithmetic    {precision} precision, {instructions}, {threads} thread(s) a rank"
+        );
         text
     }
 
