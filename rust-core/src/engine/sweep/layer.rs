@@ -29,6 +29,8 @@ pub struct Swept<'a, T, R> {
     pub species: &'a [u8],
     /// 1 for ghosts, 0 for others; empty if there are none.
     pub ghost: &'a [f32],
+    /// The first owned particle of each row, and one past the last; empty if there are no ghosts.
+    pub owned_of_row: &'a [[u32; 2]],
     pub particles: usize,
     pub terms: &'a Terms<T>,
     /// The many-body slopes, a number for each pass and species.
@@ -76,8 +78,10 @@ pub struct NearPairs<T> {
     pub rows: Vec<Vec<[T; 4]>>,
     /// `r_i − r_j`, if virials are wanted.
     pub distances: Vec<Vec<[T; 3]>>,
-    /// How many there are for each particle.
+    /// How many there are for each particle that has looked for any.
     pub counts: Vec<Vec<u32>>,
+    /// These particles, where they are not all of the layer.
+    pub members: Vec<u32>,
     /// `share` of each, if virials are wanted.
     pub shares: Vec<Vec<T>>,
 }
@@ -91,6 +95,7 @@ impl<T> NearPairs<T> {
         self.rows.iter_mut().for_each(Vec::clear);
         self.distances.iter_mut().for_each(Vec::clear);
         self.counts.iter_mut().for_each(Vec::clear);
+        self.members.clear();
         self.shares.iter_mut().for_each(Vec::clear);
     }
 }
@@ -113,6 +118,8 @@ struct Windows {
     shift: [[f32; 16]; 3],
     /// Whether any shift of the same period is not zero.
     crosses: bool,
+    /// The first owned particle of each, and one past the last.
+    owned: [[u32; 2]; 5],
 }
 
 impl Windows {
@@ -125,6 +132,7 @@ impl Windows {
             behind: [0; 5],
             shift: [[0.0; 16]; 3],
             crosses: false,
+            owned: [[0; 2]; 5],
         };
         let around = [(0, 0), (1, 0), (-1, 1), (0, 1), (1, 1)];
         for (w, (across, up)) in around.into_iter().enumerate() {
@@ -152,6 +160,9 @@ impl Windows {
             windows.crosses |= shift != [0.0; 3];
             let cell = (to[1] as usize * grid.rows + to[0] as usize) * grid.bins;
             windows.row[w] = swept.start[cell..].as_ptr();
+            if let Some(owned) = swept.owned_of_row.get(cell / grid.bins) {
+                windows.owned[w] = *owned;
+            }
             for (period, entry) in [(-1.0, w), (0.0, w + 5), (1.0, w + 10)] {
                 for c in 0..3 {
                     let along = if c == 0 { period * frame.length[0] } else { 0.0 };
@@ -194,7 +205,11 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TA
             while i < end {
                 let count = lanes.min(end - i);
                 let across = view.spans::<I>(swept, row, i, count, &windows.there, &mut spans);
-                cut::<I, A::Scalar>(swept, &view, &windows, &spans, across, i, count, block);
+                if ghosts {
+                    cut_with_ghosts::<I, A::Scalar>(swept, &windows, &spans, i, count, block);
+                } else {
+                    cut::<I, A::Scalar>(swept, &view, &windows, &spans, across, i, count, block);
+                }
                 let shifted = windows.crosses || across != 0;
                 match (ghosts, shifted) {
                     (false, false) => look::<I, A::Scalar, false, false>(swept, &windows.shift, limit, block),
@@ -408,6 +423,56 @@ unsafe fn cut<I: Isa, T: Scalar>(
                     found += (w == 0 || length > 0) as usize + (length > lanes as u32) as usize;
                 }
                 w += 1;
+            }
+            k += 1;
+        }
+        block.chunk_count = found;
+    }
+}
+
+/// The same in open space with ghosts: these look for owned particles only, and are no members of the block
+/// if there are none.
+#[inline(always)]
+unsafe fn cut_with_ghosts<I: Isa, T: Scalar>(
+    swept: &Swept<T, impl Record>,
+    windows: &Windows,
+    spans: &Spans,
+    i: usize,
+    count: usize,
+    block: &mut Block<T>,
+) {
+    // SAFETY: the arrays are as `Swept` says, chunks have room.
+    unsafe {
+        let lanes = I::F32::LANES;
+        let mut found = 0;
+        let mut k = 0;
+        while k < count {
+            let i = i + k;
+            let member = block.members.len();
+            let is_ghost = *swept.ghost.get_unchecked(i) > 0.0;
+            let before = found;
+            let mut w = 0;
+            while w < 5 {
+                let low = *spans.low.get_unchecked(w).get_unchecked(k) as usize;
+                let end = *spans.end.get_unchecked(w).get_unchecked(k) as usize;
+                let mut to = *windows.row[w].add(end);
+                let mut from = if w == 0 { i as u32 + 1 } else { *windows.row[w].add(low) };
+                if is_ghost {
+                    let [first, last] = windows.owned[w];
+                    from = from.max(first);
+                    to = to.min(last);
+                }
+                let always = w == 0 && !is_ghost;
+                found = add_chunks(block, found, from, to.saturating_sub(from), member, w + 5, always, lanes);
+                w += 1;
+            }
+            if found > before || !is_ghost {
+                block.members.push(i as u32);
+                let mut c = 0;
+                while c < 3 {
+                    *block.place[c].get_unchecked_mut(member) = *swept.x[c].get_unchecked(i);
+                    c += 1;
+                }
             }
             k += 1;
         }
@@ -642,6 +707,9 @@ unsafe fn flush<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY: bool
         if swept.variables > 1 {
             scatter_weights::<A::Scalar>(swept, offset, block);
         }
+        if !swept.ghost.is_empty() {
+            near.members.extend_from_slice(&block.members);
+        }
         let mut pass = 0;
         while pass < swept.terms.passes.len() {
             keep_near::<I, A, TALLY>(swept, pass, block, near);
@@ -808,10 +876,11 @@ pub unsafe fn second_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const T
             let rows = near.rows.get_unchecked(pass);
             let counts = near.counts.get_unchecked(pass);
             let slopes = swept.slopes.as_ptr().add(pass * species);
+            let some = !swept.ghost.is_empty();
             let mut p = 0;
             let mut m = 0;
             while m < counts.len() {
-                let i = first + m;
+                let i = if some { *near.members.get_unchecked(m) as usize } else { first + m };
                 let end = p + *counts.get_unchecked(m) as usize;
                 let mut sum = I::Quad::zero();
                 let own = slopes.add(width * i);

@@ -39,6 +39,7 @@ pub struct Machine<P: Compiled> {
     records: Vec<P::Record>,
     species: Vec<u8>,
     ghost: Vec<f32>,
+    owned_of_row: Vec<[u32; 2]>,
     offset: Vec<isize>,
     sums: Vec<f64>,
     densities: Vec<f64>,
@@ -104,6 +105,7 @@ impl<P: Compiled> Machine<P> {
             records: Vec::new(),
             species: Vec::new(),
             ghost: Vec::new(),
+            owned_of_row: Vec::new(),
             offset: Vec::new(),
             sums: Vec::new(),
             densities: Vec::new(),
@@ -324,7 +326,29 @@ impl<P: Compiled> Machine<P> {
                 }
             }
         });
+        self.find_owned();
         self.lay_out();
+    }
+
+    /// The owned particles of each row, if there are ghosts.
+    fn find_owned(&mut self) {
+        self.owned_of_row.clear();
+        if self.ghost.is_empty() {
+            return;
+        }
+        let bins = self.grid.bins;
+        for row in 0..self.grid.rows * self.grid.layers {
+            let (first, end) = (self.start[row * bins] as usize, self.start[(row + 1) * bins] as usize);
+            let ghosts = &self.ghost[first..end];
+            let owned = match ghosts.iter().position(|g| *g == 0.0) {
+                Some(a) => {
+                    let b = ghosts.iter().rposition(|g| *g == 0.0).unwrap_or(a);
+                    [(first + a) as u32, (first + b + 1) as u32]
+                }
+                None => [0, 0],
+            };
+            self.owned_of_row.push(owned);
+        }
     }
 
     /// Accumulators of a layer: of its own particles, then of those of the next.
@@ -383,6 +407,7 @@ impl<P: Compiled> Machine<P> {
             records: &self.records,
             species: &self.species,
             ghost: &self.ghost,
+            owned_of_row: &self.owned_of_row,
             particles: self.particles,
             terms: &self.terms,
             slopes: &self.slopes,
