@@ -152,6 +152,7 @@ const TEMPLATE: &str = include_str!("scaling.md.j2");
 /// Three digits, without an exponent where that can be read.
 fn digits(x: f64) -> String {
     match x.abs() {
+        a if a < 1e6 && x.fract() == 0.0 => format!("{x:.0}"),
         a if a >= 1e6 => format!("{x:.1e}"),
         a if a >= 100.0 => format!("{x:.0}"),
         a if a >= 10.0 => format!("{x:.1}"),
@@ -316,7 +317,7 @@ mod tests {
         let p = Projection::of(&run, &scaling, 6.05, 1, 1.0).unwrap();
         let page = page(&p, &[scaling], Some(250.0), "a machine").unwrap();
         assert!(
-            page.contains("80.0 bytes") && page.contains("a machine") && page.contains("0.25 TB"),
+            page.contains("80 bytes") && page.contains("a machine") && page.contains("0.25 TB"),
             "{page}"
         );
         assert!(!page.contains("{{") && !page.contains("{%"));

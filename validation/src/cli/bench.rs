@@ -83,6 +83,9 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     let outcome = measure(&options, &program, &Progress::new()).map_err(Failure::new)?;
     println!("{}", page::speeds(&outcome).to_text());
     println!("{}", page::goals(&outcome.goals).to_text());
+    if !outcome.lammps.missing.is_empty() {
+        println!("not in this LAMMPS: {}\n", outcome.lammps.missing.join(", "));
+    }
     if let Some(load) = outcome.machine.load.filter(|l| *l > 0.5) {
         println!("the machine was busy before (load {load:.1}): do not trust these figures\n");
     }
