@@ -92,6 +92,18 @@ impl Contender {
         }
     }
 
+    /// Threads of each rank.
+    pub fn threads(&self) -> usize {
+        match &self.code {
+            Code::Native(settings) => settings.threads.get(),
+            Code::Plugin(words) => {
+                let mut words = words.split_whitespace().skip_while(|w| *w != "threads");
+                words.nth(1).and_then(|n| n.parse().ok()).unwrap_or(1)
+            }
+            _ => 1,
+        }
+    }
+
     /// How often the state is repeated along x.
     pub fn copies(&self) -> usize {
         if self.weak { self.ranks } else { 1 }
@@ -172,6 +184,14 @@ mod tests {
     use super::super::fluids::SUBJECTS;
     use super::*;
     use std::collections::HashSet;
+
+    #[test]
+    fn threads_are_those_of_the_settings_or_of_the_words() {
+        let plugin = |words: &str| Contender::alone(Code::Plugin(words.to_owned())).threads();
+        assert_eq!(["", "threads", "precision mixed", "precision mixed threads 2"].map(plugin), [1, 1, 1, 2]);
+        let settings = Settings { threads: NonZeroUsize::new(3).unwrap(), ..Settings::default() };
+        assert_eq!(Contender::alone(Code::Native(settings)).threads(), 3);
+    }
 
     #[test]
     fn every_contender_has_a_name_of_its_own() {

@@ -108,11 +108,11 @@ pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Out
     bar.finish();
     let bar = progress.bar("rounds", (options.rounds * entries.len()) as u64);
     for round in 0..options.rounds {
-        for k in 0..entries.len() {
+        for done in 0..entries.len() {
             // Back and forth: who is timed behind whom should not matter.
-            let k = if round % 2 == 0 { k } else { entries.len() - 1 - k };
+            let k = if round % 2 == 0 { done } else { entries.len() - 1 - done };
             measure(&mut entries[k], &cases, &place)?;
-            bar.set((round * entries.len() + k.min(entries.len() - 1 - k)) as u64);
+            bar.set((round * entries.len() + done + 1) as u64);
         }
     }
     bar.finish();
@@ -341,7 +341,7 @@ fn runs(entries: &[Entry], cases: &Cases) -> Vec<Run> {
                 particles,
                 pairs_per_particle: case.pairs,
                 ranks: entry.contender.ranks,
-                threads: settings.map_or(1, |s| s.threads.get()),
+                threads: entry.contender.threads(),
                 precision: settings.map(|s| s.precision.to_string()),
                 instructions: settings.map(|s| s.instructions.to_string()),
                 skin: entry.contender.in_lammps().then_some(entry.skin),

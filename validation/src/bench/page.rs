@@ -46,10 +46,20 @@ pub fn goals(verdicts: &[Verdict]) -> Table {
                 (Some(s), _) => s.to_string(),
                 (None, _) => "–".to_owned(),
             },
-            v.figure.as_ref().map_or_else(|| "–".into(), shown),
+            measured(v),
         ]);
     }
     table
+}
+
+/// The figure; where a size is missing, those that are there.
+fn measured(verdict: &Verdict) -> String {
+    if let Some(figure) = &verdict.figure {
+        return shown(figure);
+    }
+    let known: Vec<String> =
+        verdict.by_size.iter().map(|(size, spread)| format!("{size}: {}", shown(spread))).collect();
+    if known.is_empty() { "–".into() } else { known.join("; ") }
 }
 
 /// Where the time goes, of the runs for which `wanted` says so.
