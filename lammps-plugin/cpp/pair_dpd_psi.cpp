@@ -1,4 +1,4 @@
-/* pair_style dpd/psi T seed
+/* pair_style dpd/psi T seed [precision double | mixed] [threads N]
    pair_coeff * * MODEL.toml SPECIES-OF-TYPE-1 SPECIES-OF-TYPE-2 ... */
 
 #include "pair_psi.h"
@@ -23,9 +23,12 @@ class PairDPDPsi : public PairPsi {
  protected:
   void read_settings(int narg, char **arg) override
   {
-    if (narg != 2) stop("expected 'pair_style dpd/psi T seed', found " + std::to_string(narg) + " arguments");
+    if (narg < 2)
+      stop("expected 'pair_style dpd/psi T seed' and perhaps keywords, found " + std::to_string(narg) +
+           " arguments");
     read_temperature(arg[0]);
     read_seed(arg[1]);
+    read_keywords(2, narg, arg);
   }
 
   rust::Box<Style> make_style(double kt) override

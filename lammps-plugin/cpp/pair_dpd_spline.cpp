@@ -1,4 +1,4 @@
-/* pair_style dpd/spline T cutoff seed
+/* pair_style dpd/spline T cutoff seed [precision double | mixed] [threads N]
    pair_coeff I J a A B rc1 rc2 gamma
 
    phi = a [A W(r, rc1) - B W(r, rc2)] with the cubic spline W, W(0) = 1. Drag and noise act within the
@@ -21,11 +21,13 @@ class PairDPDSpline : public PairTable {
  protected:
   void read_settings(int narg, char **arg) override
   {
-    if (narg != 3)
-      stop("expected 'pair_style dpd/spline T cutoff seed', found " + std::to_string(narg) + " arguments");
+    if (narg < 3)
+      stop("expected 'pair_style dpd/spline T cutoff seed' and perhaps keywords, found " + std::to_string(narg) +
+           " arguments");
     read_temperature(arg[0]);
     read_cutoff(arg[1]);
     read_seed(arg[2]);
+    read_keywords(3, narg, arg);
     style.reset();
   }
 

@@ -1,4 +1,4 @@
-/* pair_style mdpd/psi T cutoff seed [law conservative | lucy]
+/* pair_style mdpd/psi T cutoff seed [law conservative | lucy] [precision double | mixed] [threads N]
    pair_coeff I J A B gamma rc rd
 
    The coefficients of the built-in mdpd. 'law lucy' computes the built-in's own force, which has no
@@ -23,22 +23,27 @@ class PairMDPDPsi : public PairTable {
  protected:
   void read_settings(int narg, char **arg) override
   {
-    if (narg != 3 && narg != 5)
-      stop("expected 'pair_style mdpd/psi T cutoff seed' and perhaps 'law conservative' or 'law lucy', found " +
-           std::to_string(narg) + " arguments");
+    if (narg < 3)
+      stop("expected 'pair_style mdpd/psi T cutoff seed' and perhaps keywords, found " + std::to_string(narg) +
+           " arguments");
     read_temperature(arg[0]);
     read_cutoff(arg[1]);
     read_seed(arg[2]);
     lucy = false;
-    if (narg == 5) {
-      if (strcmp(arg[3], "law") != 0) stop(std::string("unknown keyword '") + arg[3] + "': expected 'law'");
-      if (strcmp(arg[4], "lucy") == 0)
-        lucy = true;
-      else if (strcmp(arg[4], "conservative") != 0)
-        stop(std::string("unknown law '") + arg[4] + "': expected 'conservative' or 'lucy'");
-    }
+    read_keywords(3, narg, arg);
     style.reset();
   }
+
+  bool read_keyword(const std::string &key, const std::string &value) override
+  {
+    if (key != "law") return false;
+    lucy = value == "lucy";
+    if (!lucy && value != "conservative")
+      stop("unknown law '" + value + "': expected 'conservative' or 'lucy'");
+    return true;
+  }
+
+  std::string keywords() const override { return "'law', 'precision' or 'threads'"; }
 
   void check(const Coefficients &given) override
   {

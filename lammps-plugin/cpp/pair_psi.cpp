@@ -124,6 +124,30 @@ void PairPsi::read_seed(const char *arg)
   seed = static_cast<uint64_t>(value);
 }
 
+// Keywords of every style, at the end of pair_style; the others are the style's own.
+void PairPsi::read_keywords(int first, int narg, char **arg)
+{
+  mixed = false;
+  threads = 1;
+  for (int k = first; k < narg; k += 2) {
+    const std::string key = arg[k];
+    if (k + 1 >= narg) stop("keyword '" + key + "' needs a value");
+    const std::string value = arg[k + 1];
+    if (read_keyword(key, value)) continue;
+    if (key == "precision") {
+      if (value != "mixed" && value != "double")
+        stop("unknown precision '" + value + "': expected 'mixed' or 'double'");
+      mixed = value == "mixed";
+    } else if (key == "threads") {
+      const int count = utils::inumeric(FLERR, value.c_str(), false, lmp);
+      if (count < 1) stop("threads must be 1 or more, found " + value);
+      threads = count;
+    } else {
+      stop("unknown keyword '" + key + "': expected " + keywords());
+    }
+  }
+}
+
 void PairPsi::settings(int narg, char **arg)
 {
   read_settings(narg, arg);
@@ -142,6 +166,7 @@ void PairPsi::refresh()
       style.emplace(make_style(kt()));
     else
       (*style)->set_temperature(kt());
+    (*style)->configure(mixed, threads);
     (*style)->sum_all_densities(wants_densities);
   } catch (const std::exception &e) {
     trouble = e.what();
@@ -260,14 +285,14 @@ void PairPsi::collect_pairs()
   }
 }
 
-void PairPsi::find_densities(int all)
+void PairPsi::find_densities(int all, const Request &request)
 {
   const size_t owned = atom->nlocal;
   const auto x = flat(atom->x, all);
   const rust::Slice<const int32_t> tag{atom->tag, static_cast<size_t>(all)};
   const rust::Slice<const int32_t> kind{atom->type, static_cast<size_t>(all)};
   if (why_listed.empty()) {
-    (*style)->densities(owned, x, tag, kind, force->newton_pair);
+    style_densities(**style, owned, x, flat(atom->v, all), tag, kind, force->newton_pair, request);
     return;
   }
   collect_pairs();
@@ -305,16 +330,6 @@ void PairPsi::compute(int eflag, int vflag)
   const rust::Slice<const int32_t> kind{atom->type, static_cast<size_t>(all)};
   Style &fluid = **style;
 
-  std::string trouble;
-  try {
-    find_densities(all);
-  } catch (const std::exception &e) {
-    trouble = e.what();
-  }
-  if (!trouble.empty()) stop_here(trouble);
-
-  forward();
-
   Request request;
   // A minimiser goes downhill in U: drag and noise have no place there.
   request.thermostat = fluid.needs_velocities() && update->whichflag != 2;
@@ -325,6 +340,17 @@ void PairPsi::compute(int eflag, int vflag)
   request.virial = vflag_global != 0;
   request.particle_energy = eflag_atom != 0;
   request.particle_virial = vflag_atom != 0;
+
+  std::string trouble;
+  try {
+    find_densities(all, request);
+  } catch (const std::exception &e) {
+    trouble = e.what();
+  }
+  if (!trouble.empty()) stop_here(trouble);
+
+  forward();
+
   const size_t reach = newton ? all : owned;
   rust::Slice<double> f;
   if (reach > 0) f = {atom->f[0], 3 * reach};

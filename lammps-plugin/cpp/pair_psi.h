@@ -53,6 +53,13 @@ class PairPsi : public LAMMPS_NS::Pair {
   // Stops where the style does not fit the simulation.
   virtual void check_host();
 
+  // Reads keywords and values from argument `first` on.
+  void read_keywords(int first, int narg, char **arg);
+  // Takes a keyword of the style's own.
+  virtual bool read_keyword(const std::string & /*key*/, const std::string & /*value*/) { return false; }
+  // What keywords there are, for messages.
+  virtual std::string keywords() const { return "'precision' or 'threads'"; }
+
   void allocate();
   // Temperature and seed of pair_style, checked.
   void read_temperature(const char *arg);
@@ -68,7 +75,7 @@ class PairPsi : public LAMMPS_NS::Pair {
 
  private:
   void refresh();
-  void find_densities(int all);
+  void find_densities(int all, const Request &request);
   void collect_pairs();
   void forward();
   void check_box();
@@ -79,6 +86,8 @@ class PairPsi : public LAMMPS_NS::Pair {
   double temperature = 0.0;
   double built_kt = 0.0;
   uint64_t seed = 0;
+  bool mixed = false;
+  size_t threads = 1;
   std::vector<std::string> arguments;
   bool described = false;
   bool wants_densities = false;

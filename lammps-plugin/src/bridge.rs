@@ -83,13 +83,18 @@ mod ffi {
         /// 0 if no noise is drawn.
         fn noise_range(self: &Style) -> f64;
 
-        fn densities(
-            self: &mut Style,
+        fn configure(self: &mut Style, mixed: bool, threads: usize) -> Result<()>;
+
+        #[allow(clippy::too_many_arguments)]
+        fn style_densities(
+            style: &mut Style,
             owned: usize,
             x: &[f64],
+            v: &[f64],
             tag: &[i32],
             kind: &[i32],
             newton: bool,
+            request: &Request,
         ) -> Result<()>;
         #[allow(clippy::too_many_arguments)]
         fn densities_of_pairs(
@@ -119,9 +124,9 @@ mod ffi {
         /// Six numbers a particle.
         fn particle_virial(self: &Style) -> &[f64];
         /// Those of owned particles, a row of [`variables`] for each.
-        fn local_densities(self: &Style) -> &[f64];
+        fn local_densities(self: &mut Style) -> &[f64];
         /// psi of owned particles.
-        fn excess(self: &Style) -> &[f64];
+        fn excess(self: &mut Style) -> &[f64];
         fn single(self: &Style, kind_i: i32, kind_j: i32, i: usize, j: usize, r: f64) -> PairValue;
         fn memory(self: &Style) -> usize;
     }
@@ -179,6 +184,32 @@ fn warren_style(
     Style::from_coefficients(kt, &pairs, types, dimensions, masses).map(Box::new)
 }
 
+fn wanted(request: &ffi::Request) -> (Option<Step>, Want) {
+    let step = Step { seed: request.seed, number: request.step, dt: request.dt };
+    let want = Want {
+        energy: request.energy,
+        virial: request.virial,
+        particle_energy: request.particle_energy,
+        particle_virial: request.particle_virial,
+    };
+    (request.thermostat.then_some(step), want)
+}
+
+#[allow(clippy::too_many_arguments)]
+fn style_densities(
+    style: &mut Style,
+    owned: usize,
+    x: &[f64],
+    v: &[f64],
+    tag: &[i32],
+    kind: &[i32],
+    newton: bool,
+    request: &ffi::Request,
+) -> Result<(), StyleError> {
+    let (step, want) = wanted(request);
+    style.densities(owned, x, v, tag, kind, newton, step, want)
+}
+
 #[allow(clippy::too_many_arguments)]
 fn style_forces(
     style: &mut Style,
@@ -190,15 +221,9 @@ fn style_forces(
     request: &ffi::Request,
     f: &mut [f64],
 ) -> Result<ffi::Totals, StyleError> {
-    let step = Step { seed: request.seed, number: request.step, dt: request.dt };
-    let want = Want {
-        energy: request.energy,
-        virial: request.virial,
-        particle_energy: request.particle_energy,
-        particle_virial: request.particle_virial,
-    };
-    let tally = style.forces(owned, x, v, tag, kind, request.thermostat.then_some(step), want, f)?;
-    let [below, above] = style.engine().out_of_bounds().map(|n| n as f64);
+    let (step, want) = wanted(request);
+    let tally = style.forces(owned, x, v, tag, kind, step, want, f)?;
+    let [below, above] = style.engines().out_of_bounds().map(|n| n as f64);
     Ok(ffi::Totals { excess: tally.excess, pair: tally.pair, virial: tally.total_virial(), below, above })
 }
 
@@ -231,21 +256,21 @@ impl Style {
         plan.densities().count() * plan.species().len()
     }
 
-    fn local_densities(&self) -> &[f64] {
-        self.engine().local_densities()
+    fn local_densities(&mut self) -> &[f64] {
+        self.engines_mut().local_densities()
     }
 
-    fn excess(&self) -> &[f64] {
-        self.engine().excess()
+    fn excess(&mut self) -> &[f64] {
+        self.engines_mut().excess()
     }
 
     fn single(&self, kind_i: i32, kind_j: i32, i: usize, j: usize, r: f64) -> ffi::PairValue {
-        let (energy, force) = self.engine().single([kind_i, kind_j], r, Some([i, j]));
+        let (energy, force) = self.engines().single([kind_i, kind_j], r, [i, j]);
         ffi::PairValue { energy, force }
     }
 
     fn memory(&self) -> usize {
-        self.engine().memory()
+        self.engines().memory()
     }
 
     fn cutoff(&self) -> f64 {

@@ -9,6 +9,7 @@
 //! act less or not at all: `special_bonds`, `neigh_modify exclude`.
 
 pub mod bridge;
+mod engines;
 pub mod style;
 
 #[cfg(lammps_host)]

@@ -1,17 +1,28 @@
 //! One pair style's engine, and the mapping from LAMMPS's types to species.
 
-use psidpd_core::engine::{Engine, EngineError, Newton, PairsOfHost, Particles, Step, Tally, Want};
+use crate::engines::Engines;
+use psidpd_core::engine::{
+    Engine, EngineError, Newton, PairsOfHost, Particles, Pool, Precision, Settings, Step, Tally, Want,
+};
 use psidpd_core::model::{
     ForceLaw, Model, PresetError, SplinePair, WarrenPair, lucy_mdpd, spline_dpd, warren_ab,
 };
 use std::fmt::Write;
+use std::num::NonZeroUsize;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
+use std::sync::Arc;
 
 /// What goes wrong, as the text that LAMMPS prints.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{0}")]
 pub struct StyleError(String);
+
+impl StyleError {
+    pub(crate) fn new(text: String) -> StyleError {
+        StyleError(text)
+    }
+}
 
 impl From<EngineError> for StyleError {
     fn from(error: EngineError) -> StyleError {
@@ -23,7 +34,10 @@ impl From<EngineError> for StyleError {
 #[derive(Debug)]
 pub struct Style {
     model: Model,
-    engine: Engine,
+    engines: Engines,
+    settings: Settings,
+    pool: Arc<Pool>,
+    kt: f64,
     /// Species of each type, from 0; LAMMPS counts types from 1.
     kinds: Vec<i32>,
     all_densities: bool,
@@ -208,8 +222,10 @@ impl Style {
                 }
             }
         }
-        let engine = engine_at(&model, kt, &kinds)?;
-        Ok(Style { model, engine, kinds, all_densities: false, letters: None })
+        let settings = Settings { precision: Precision::Double, ..Settings::default() };
+        let pool = Arc::new(Pool::new(settings.threads));
+        let engines = engines_at(&model, kt, &kinds, settings, &pool)?;
+        Ok(Style { model, engines, settings, pool, kt, kinds, all_densities: false, letters: None })
     }
 
     /// Another temperature: the model's expressions see it, and the noise.
@@ -218,16 +234,40 @@ impl Style {
     /// A model that makes no fluid at this temperature.
     pub fn set_temperature(&mut self, kt: f64) -> Result<(), StyleError> {
         guard(|| {
-            self.engine = engine_at(&self.model, kt, &self.kinds)?;
-            self.engine.sum_all_densities(self.all_densities);
-            Ok(())
+            self.kt = kt;
+            self.rebuild()
+        })
+    }
+
+    fn rebuild(&mut self) -> Result<(), StyleError> {
+        self.engines = engines_at(&self.model, self.kt, &self.kinds, self.settings, &self.pool)?;
+        self.engines.sum_all_densities(self.all_densities);
+        Ok(())
+    }
+
+    /// How forces are computed from now on: in mixed precision or in double, by so many threads.
+    ///
+    /// # Errors
+    /// None that [`Style::set_temperature`] did not have before.
+    pub fn configure(&mut self, mixed: bool, threads: usize) -> Result<(), StyleError> {
+        guard(|| {
+            let precision = if mixed { Precision::Mixed } else { Precision::Double };
+            let threads = NonZeroUsize::new(threads).unwrap_or(NonZeroUsize::MIN);
+            if (precision, threads) == (self.settings.precision, self.settings.threads) {
+                return Ok(());
+            }
+            if threads != self.settings.threads {
+                self.pool = Arc::new(Pool::new(threads));
+            }
+            self.settings = Settings { precision, threads, ..self.settings };
+            self.rebuild()
         })
     }
 
     /// As [`Engine::sum_all_densities`].
     pub fn sum_all_densities(&mut self, all: bool) {
         self.all_densities = all;
-        self.engine.sum_all_densities(all);
+        self.engines.sum_all_densities(all);
     }
 
     /// The model.
@@ -235,9 +275,19 @@ impl Style {
         &self.model
     }
 
-    /// The engine.
+    /// The plain engine, which has the plan.
     pub fn engine(&self) -> &Engine {
-        &self.engine
+        self.engines.engine()
+    }
+
+    /// The engines.
+    pub fn engines(&self) -> &Engines {
+        &self.engines
+    }
+
+    /// The engines.
+    pub fn engines_mut(&mut self) -> &mut Engines {
+        &mut self.engines
     }
 
     /// For the log: what is computed, and what its letters mean.
@@ -250,10 +300,10 @@ impl Style {
         if let Some(reference) = self.model.reference() {
             let _ = writeln!(text, "  reference     {reference}");
         }
-        for line in self.engine.plan().to_string().lines() {
+        for line in self.engine().plan().to_string().lines() {
             let _ = writeln!(text, "  {line}");
         }
-        if !self.engine.plan().is_conservative() {
+        if !self.engine().plan().is_conservative() {
             text.push_str(
                 "  WARNING       this force law has no potential: it does work around closed loops and heats \
                  the fluid; the energy printed is not that of the forces\n",
@@ -267,32 +317,42 @@ impl Style {
             let _ = writeln!(text, "  coefficients  {letters}");
         }
         let _ = writeln!(text, "  search        {search}");
+        let Settings { precision, instructions, threads } = self.engines.sweep().settings();
+        let _ = writeln!(
+            text,
+            "  arithmetic    {precision} precision, {instructions}, {threads} thread(s) a rank"
+        );
         text
     }
 
-    /// Densities, ψ and slopes of the `owned` first particles of arrays as LAMMPS has them.
+    /// The first half of an evaluation, over the `owned` first particles of arrays as LAMMPS has them: pairs,
+    /// forces that need no density, densities, ψ and slopes.
     ///
     /// # Errors
-    /// As [`Engine::densities`].
+    /// As [`Engines::first`].
+    #[allow(clippy::too_many_arguments)]
     pub fn densities(
         &mut self,
         owned: usize,
         x: &[f64],
+        v: &[f64],
         tag: &[i32],
         kind: &[i32],
         newton: bool,
+        step: Option<Step>,
+        want: Want,
     ) -> Result<(), StyleError> {
         guard(|| {
             let newton = if newton { Newton::On } else { Newton::Off };
             let particles = Particles { owned, x: triples(x), tag, kind };
-            Ok(self.engine.densities(&particles, newton)?)
+            self.engines.first(&particles, triples(v), step, want, newton)
         })
     }
 
     /// As [`Style::densities`], with pairs listed by LAMMPS.
     ///
     /// # Errors
-    /// As [`Engine::densities_of_pairs`].
+    /// As [`Engines::first_of_pairs`].
     pub fn densities_of_pairs(
         &mut self,
         owned: usize,
@@ -305,19 +365,19 @@ impl Style {
         guard(|| {
             let newton = if newton { Newton::On } else { Newton::Off };
             let particles = Particles { owned, x: triples(x), tag, kind };
-            Ok(self.engine.densities_of_pairs(&particles, listed, newton)?)
+            self.engines.first_of_pairs(&particles, listed, newton)
         })
     }
 
     /// `∂ψ/∂n` of owned particles, then room for ghosts.
     pub fn slopes_mut(&mut self) -> &mut [f64] {
-        self.engine.slopes_mut()
+        self.engines.slopes_mut()
     }
 
     /// Adds forces to `f`.
     ///
     /// # Errors
-    /// As [`Engine::forces`].
+    /// As [`Engines::second`].
     #[allow(clippy::too_many_arguments)]
     pub fn forces(
         &mut self,
@@ -333,16 +393,20 @@ impl Style {
         guard(|| {
             let particles = Particles { owned, x: triples(x), tag, kind };
             let force = f.as_chunks_mut::<3>().0;
-            Ok(self.engine.forces(&particles, triples(v), step, want, force)?)
+            self.engines.second(&particles, triples(v), step, want, force)
         })
     }
 }
 
-fn engine_at(model: &Model, kt: f64, kinds: &[i32]) -> Result<Engine, StyleError> {
+fn engines_at(
+    model: &Model,
+    kt: f64,
+    kinds: &[i32],
+    settings: Settings,
+    pool: &Arc<Pool>,
+) -> Result<Engines, StyleError> {
     let fluid = model.at(kt).map_err(|e| StyleError(e.to_string()))?;
-    let mut engine = Engine::new(&fluid).map_err(|e| StyleError(e.to_string()))?;
-    engine.map_kinds(kinds)?;
-    Ok(engine)
+    Engines::new(&fluid, kinds, settings, pool.clone())
 }
 
 #[cfg(test)]
@@ -363,10 +427,10 @@ mod tests {
         let mut s = style(&["B", "NULL", "A"], 3).unwrap();
         let x = [0.0, 0.0, 0.0, 0.5, 0.0, 0.0];
         let mut f = [0.0; 6];
-        s.densities(2, &x, &[1, 2], &[1, 2], true).unwrap();
+        s.densities(2, &x, &[], &[1, 2], &[1, 2], true, None, Want::FORCES).unwrap();
         s.forces(2, &x, &[], &[1, 2], &[1, 2], None, Want::FORCES, &mut f).unwrap();
         assert_eq!(f, [0.0; 6]);
-        s.densities(2, &x, &[1, 2], &[1, 3], true).unwrap();
+        s.densities(2, &x, &[], &[1, 2], &[1, 3], true, None, Want::FORCES).unwrap();
         s.forces(2, &x, &[], &[1, 2], &[1, 3], None, Want::FORCES, &mut f).unwrap();
         assert_eq!(f, [-12.5, 0.0, 0.0, 12.5, 0.0, 0.0]);
     }

@@ -94,12 +94,13 @@ fn ghosts_by_type_are_enough() {
         assert!(apart < 1e-10, "{apart}");
         drop(l);
         // A third type, of long range, so that the reaches differ.
+        let mixed = "set type 1 type/ratio 2 0.4 77\n";
         let beside = format!(
-            "set type 1 type/ratio 2 0.4 77\npair_style hybrid {psi} lj/cut 2.0\n\
+            "pair_style hybrid {psi} lj/cut 2.0\n\
              pair_coeff * * dpd/psi {wide} A B NULL\npair_coeff * 3 lj/cut 0.01 0.3 0.6\npair_coeff 3 3 lj/cut 0.01 0.3 2.0\n"
         );
-        let single = frame(&open(&deck("", &beside, 3)));
-        let l = open(&deck(multi, &beside, 3));
+        let single = frame(&open(&deck("", &format!("{mixed}{beside}"), 3)));
+        let l = open(&deck(multi, &format!("{mixed}{beside}"), 3));
         let found = frame(&l);
         drop(l);
         assert_eq!(found.kind, single.kind);
@@ -110,7 +111,7 @@ fn ghosts_by_type_are_enough() {
         let folder = tempfile::tempdir().unwrap();
         let start = folder.path().join("start.data").display().to_string();
         open(&format!(
-            "{}pair_style zero 1.0\npair_coeff * *\nwrite_data {start} nocoeff\n",
+            "{}{mixed}pair_style zero 1.0\npair_coeff * *\nwrite_data {start} nocoeff\n",
             particles("", region, 3, 700)
         ));
         let script = |comm: &str| {

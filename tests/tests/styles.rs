@@ -71,7 +71,11 @@ fn mistakes_stop_with_one_clear_line() {
         (style, "pair_style dpd/psi 0.0 5".into(), "the temperature must be positive, found 0.0"),
         (style, "pair_style dpd/psi -1 5".into(), "the temperature must be positive"),
         (style, "pair_style dpd/psi 1.0 0".into(), "the seed must be a positive whole number"),
-        (style, "pair_style dpd/psi 1.0".into(), "expected 'pair_style dpd/psi T seed', found 1 arguments"),
+        (
+            style,
+            "pair_style dpd/psi 1.0".into(),
+            "expected 'pair_style dpd/psi T seed' and perhaps keywords, found 1 arguments",
+        ),
         (style, "pair_style dpd/psi 1.0 5 6".into(), "found 3 arguments"),
         (&coeff, "pair_coeff * * nowhere.toml F".into(), "nowhere.toml: cannot be read"),
         (&coeff, format!("pair_coeff * * {} F", bad.display()), "bad.toml:3: speceis: unknown key"),

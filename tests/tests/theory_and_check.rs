@@ -68,6 +68,29 @@ fn theory_gives_the_critical_point_and_the_binodal_of_van_der_waals() {
     assert!(hot["binodal"]["none"].is_string(), "{hot}");
 }
 
+/// A law that is stated and has no ψ: said where it can be used, refused where a potential is asked for.
+#[test]
+fn a_law_without_potential_is_named_and_has_no_theory() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let stated = "title = \"t\"\nspecies = [\"A\", \"B\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n\
+                  [excess_free_energy]\nA = { slopes = { n_A = \"n\", n_B = \"2*n\" } }\nB = \"n^2\"\n";
+    std::fs::write(here.join("stated.toml"), stated).unwrap();
+    let found = json(here, &["check", "stated.toml", "--density", "3"], 0);
+    assert_eq!(found["warnings"][0]["id"], "no-free-energy", "{found}");
+    assert!(found["pressure"].is_null() && found["stability"].is_null(), "{found}");
+    for (arguments, reason) in [
+        (["theory", "stated.toml"].as_slice(), "species A has stated slopes and no excess free energy"),
+        (&["export", "eam", "stated.toml"], "has no potential"),
+    ] {
+        let output = psidpd(here, arguments);
+        assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+        let text = said(&output).replace('│', " ");
+        let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(text.contains(reason), "{text}");
+    }
+}
+
 #[test]
 fn a_fluid_that_tables_cannot_say_is_refused_with_the_reason() {
     let folder = tempfile::tempdir().unwrap();

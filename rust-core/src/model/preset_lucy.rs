@@ -194,4 +194,18 @@ mod tests {
         let error = lucy_mdpd_text(&["A".into()], &[pair(-40.0, 25.0, 1.0, 0.75)], &[], 3).unwrap_err();
         assert_eq!(error, PresetError::Shape);
     }
+
+    /// Six species have 21 pairs, and a model file at most 16 densities.
+    #[test]
+    fn too_many_ranges_are_an_error() {
+        let names: Vec<String> = (1..=6).map(|k| format!("T{k}")).collect();
+        let table = |ranges: usize| -> Vec<Option<WarrenPair>> {
+            let entry =
+                |k: usize| pair(-40.0, 25.0, 1.0, 0.5 + 0.01 * ((k / 6 + 6 * (k % 6)) % ranges) as f64);
+            (0..36).map(entry).collect()
+        };
+        assert!(lucy_mdpd(&names, &table(8), &[1.0; 6], 3).is_ok());
+        let error = lucy_mdpd(&names, &table(36), &[1.0; 6], 3).unwrap_err().to_string();
+        assert!(error.contains("21 densities, more than 16"), "{error}");
+    }
 }

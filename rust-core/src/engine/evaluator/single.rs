@@ -11,6 +11,15 @@ impl Engine {
     /// density. The force also has the many-body part, with the slopes of ψ at the densities of the
     /// last evaluation; without those (`None`, or particles that were not there) it has not.
     pub fn single(&self, kinds: [i32; 2], r: f64, particles: Option<[usize; 2]>) -> (f64, f64) {
+        match particles {
+            Some(particles) => self.single_at(kinds, r, &self.slopes, particles),
+            None => self.single_at(kinds, r, &[], [0, 0]),
+        }
+    }
+
+    /// The same with the slopes of another evaluation, [`Plan::slope_width`](crate::engine::Plan::slope_width)
+    /// for each particle.
+    pub fn single_at(&self, kinds: [i32; 2], r: f64, slopes: &[f64], particles: [usize; 2]) -> (f64, f64) {
         let species = kinds.map(|k| usize::try_from(k).ok().and_then(|k| self.kinds.get(k)).copied());
         let [Some(a), Some(b)] = species else { return (0.0, 0.0) };
         let (Ok(a), Ok(b)) = (usize::try_from(a), usize::try_from(b)) else { return (0.0, 0.0) };
@@ -31,11 +40,10 @@ impl Engine {
             }
         }
         let width = plan.slope_width();
-        if let Some(particles) = particles.filter(|p| p.iter().all(|i| (i + 1) * width <= self.slopes.len()))
-        {
+        if width > 0 && particles.iter().all(|i| (i + 1) * width <= slopes.len()) {
             let [i, j] = particles.map(|i| i * width);
             for (k, d) in plan.passes.iter().enumerate() {
-                let slope = self.slopes[i + k * count + b] + self.slopes[j + k * count + a];
+                let slope = slopes[i + k * count + b] + slopes[j + k * count + a];
                 force -= slope * plan.densities[*d].force_kernel.slope(r);
             }
         }

@@ -653,18 +653,20 @@ impl<P: Compiled> Machine<P> {
         tally
     }
 
-    /// ψ of owned particles and their densities, one for each pass and species, in the host's order.
-    pub fn to_host(&self, excess: &mut Vec<f64>, densities: &mut Vec<f64>) {
+    /// ψ of owned particles and their densities, `variables` each, in the host's order.
+    pub fn to_host(&self, variables: usize, excess: &mut Vec<f64>, densities: &mut Vec<f64>) {
         let width = self.width();
         excess.clear();
         excess.resize(self.owned, 0.0);
         densities.clear();
-        densities.resize(width * self.owned, 0.0);
+        densities.resize(variables * self.owned, 0.0);
         for (s, k) in self.order.iter().enumerate() {
             let k = *k as usize;
             if k < self.owned {
                 excess[k] = self.excess[s];
-                densities[width * k..][..width].copy_from_slice(&self.rows[width * s..][..width]);
+                for (c, v) in self.columns.iter().enumerate() {
+                    densities[variables * k + v] = self.rows[width * s + c];
+                }
             }
         }
     }

@@ -278,7 +278,12 @@ impl Sweep {
         self.plan.slope_width()
     }
 
-    /// `∂ψ/∂n` of owned particles, then room for those of ghosts; empty without ghosts.
+    /// `∂ψ/∂n` of owned particles, then those of ghosts; empty in a box.
+    pub fn slopes(&self) -> &[f64] {
+        &self.slopes
+    }
+
+    /// The same, for the host to fill in the ghosts.
     pub fn slopes_mut(&mut self) -> &mut [f64] {
         &mut self.slopes
     }
@@ -322,10 +327,12 @@ impl Sweep {
         })
     }
 
-    /// ψ and local densities of owned particles, in the host's order, into arrays that are kept: one density
-    /// for each pass of the plan and species.
+    /// ψ and local densities of owned particles, in the host's order: as
+    /// [`Engine::excess`](super::Engine::excess) and
+    /// [`Engine::local_densities`](super::Engine::local_densities), those that forces do not need being zero.
     pub fn local_densities(&self, excess: &mut Vec<f64>, densities: &mut Vec<f64>) {
-        with!(&self.machine, m => m.to_host(excess, densities));
+        let variables = self.plan.densities.len() * self.plan.species.len();
+        with!(&self.machine, m => m.to_host(variables, excess, densities));
     }
 
     /// The host's numbers of its particles in the order of cells: an order to keep them in that makes
