@@ -96,11 +96,17 @@ impl Contender {
     pub fn threads(&self) -> usize {
         match &self.code {
             Code::Native(settings) => settings.threads.get(),
-            Code::Plugin(words) => {
-                let mut words = words.split_whitespace().skip_while(|w| *w != "threads");
-                words.nth(1).and_then(|n| n.parse().ok()).unwrap_or(1)
-            }
+            Code::Plugin(words) => word_after(words, "threads").and_then(|n| n.parse().ok()).unwrap_or(1),
             _ => 1,
+        }
+    }
+
+    /// The precision, where one was asked for.
+    pub fn precision(&self) -> Option<String> {
+        match &self.code {
+            Code::Native(settings) => Some(settings.precision.to_string()),
+            Code::Plugin(words) => word_after(words, "precision").map(str::to_owned),
+            _ => None,
         }
     }
 
@@ -108,6 +114,10 @@ impl Contender {
     pub fn copies(&self) -> usize {
         if self.weak { self.ranks } else { 1 }
     }
+}
+
+fn word_after<'a>(words: &'a str, key: &str) -> Option<&'a str> {
+    words.split_whitespace().skip_while(|w| *w != key).nth(1)
 }
 
 /// What the rate of others is held against: the built-in of the fluid.
@@ -121,6 +131,9 @@ pub fn reference(subject: &Subject) -> Option<Contender> {
     }
 }
 
+/// The words of the plugin's fastest setting on one thread, which is timed on several ranks.
+pub const MIXED: &str = "precision mixed";
+
 /// What a LAMMPS has, and what is asked for.
 #[derive(Debug, Clone, Default)]
 pub struct Choice {
@@ -130,7 +143,7 @@ pub struct Choice {
     pub eam: bool,
     /// Versions of `dpd` that it has.
     pub suffixes: Vec<Suffix>,
-    /// Words for `pair_style dpd/psi`; each is a contender, besides the style without any.
+    /// More words for `pair_style dpd/psi`; each is a contender.
     pub words: Vec<String>,
     /// Thread counts of the native runner.
     pub threads: Vec<NonZeroUsize>,
@@ -148,11 +161,11 @@ pub fn contenders(subject: &Subject, choice: &Choice, smallest: bool) -> Vec<Con
     } else if *subject == DPD {
         all.extend(choice.suffixes.iter().map(|s| Contender::alone(Code::Dpd(*s))));
     }
-    let plugins = std::iter::once("").chain(choice.words.iter().map(String::as_str));
-    for words in plugins {
-        all.push(Contender::alone(Code::Plugin(words.to_owned())));
-    }
     let general = *subject != MDPD && *subject != DPD;
+    let threads = choice.threads.iter().filter(|n| n.get() > 1 && !general);
+    let words = ["", MIXED, "precision double"].map(str::to_owned).into_iter();
+    let words = words.chain(threads.map(|n| format!("{MIXED} threads {n}"))).chain(choice.words.clone());
+    all.extend(words.map(|words| Contender::alone(Code::Plugin(words))));
     for &threads in &choice.threads {
         for (_, precision) in Precision::ALL {
             for (_, instructions) in Instructions::ALL.into_iter().filter(|(_, i)| i.available()) {
@@ -171,7 +184,7 @@ pub fn contenders(subject: &Subject, choice: &Choice, smallest: bool) -> Vec<Con
     if *subject == MDPD && choice.two_ranks {
         for weak in [false, true] {
             let built_in = choice.built_in.then_some(Code::BuiltIn);
-            for code in built_in.into_iter().chain([Code::Plugin(String::new())]) {
+            for code in built_in.into_iter().chain([Code::Plugin(MIXED.to_owned())]) {
                 all.push(Contender { code, ranks: 2, weak });
             }
         }
@@ -191,6 +204,9 @@ mod tests {
         assert_eq!(["", "threads", "precision mixed", "precision mixed threads 2"].map(plugin), [1, 1, 1, 2]);
         let settings = Settings { threads: NonZeroUsize::new(3).unwrap(), ..Settings::default() };
         assert_eq!(Contender::alone(Code::Native(settings)).threads(), 3);
+        let precision = |words: &str| Contender::alone(Code::Plugin(words.to_owned())).precision();
+        assert_eq!(precision("threads 2"), None);
+        assert_eq!(precision(MIXED).as_deref(), Some("mixed"));
     }
 
     #[test]
@@ -200,14 +216,15 @@ mod tests {
             eam: true,
             suffixes: vec![Suffix::None, Suffix::Omp, Suffix::Intel],
             two_ranks: true,
-            words: vec!["precision double".into()],
+            words: vec!["precision double threads 3".into()],
             threads: [1, 2].map(|n| NonZeroUsize::new(n).unwrap()).to_vec(),
         };
         for subject in &SUBJECTS {
             let all = contenders(subject, &choice, true);
             let names: HashSet<String> = all.iter().map(Contender::id).collect();
             assert_eq!(names.len(), all.len());
-            assert!(names.contains("plugin dpd/psi precision double"));
+            assert!(names.contains("plugin dpd/psi precision double threads 3"));
+            assert!(names.contains("plugin dpd/psi"));
             assert!(names.contains(&format!("native mixed {} 2", Instructions::best())));
             if let Some(reference) = reference(subject) {
                 assert!(all.contains(&reference));

@@ -50,7 +50,7 @@ pub struct Options {
     pub memory: Vec<usize>,
     /// Thread counts of the native runner.
     pub threads: Vec<NonZeroUsize>,
-    /// Words behind the seed of `pair_style dpd/psi`, each a contender besides the style without any.
+    /// More words behind the seed of `pair_style dpd/psi`, each a contender.
     pub words: Vec<String>,
     /// Another LAMMPS than the one that `psidpd lammps install` puts in place.
     pub lammps: Option<PathBuf>,
@@ -342,7 +342,7 @@ fn runs(entries: &[Entry], cases: &Cases) -> Vec<Run> {
                 pairs_per_particle: case.pairs,
                 ranks: entry.contender.ranks,
                 threads: entry.contender.threads(),
-                precision: settings.map(|s| s.precision.to_string()),
+                precision: entry.contender.precision(),
                 instructions: settings.map(|s| s.instructions.to_string()),
                 skin: entry.contender.in_lammps().then_some(entry.skin),
                 steps: entry.length.steps,
@@ -401,7 +401,7 @@ fn scaling(runs: &[Run], entries: &[Entry], slope_width: usize) -> Vec<Scaling> 
 
 /// From the largest size that the plugin was timed at on one rank and on two.
 fn projection(runs: &[Run], scaling: &[Scaling], slope_width: usize) -> Option<projection::Projection> {
-    let plugin = Contender::alone(contender::Code::Plugin(String::new())).id();
+    let plugin = Contender::alone(contender::Code::Plugin(contender::MIXED.to_owned())).id();
     let strong = scaling.iter().filter(|s| s.kind == "strong" && s.code == plugin);
     let two = strong.max_by_key(|s| s.size)?;
     let one = runs.iter().find(|r| r.fluid == MDPD.name && r.size == two.size && r.code == plugin)?;

@@ -105,7 +105,7 @@ pub struct Run {
     pub ranks: usize,
     /// Threads of each.
     pub threads: usize,
-    /// Of the native runner.
+    /// Of the native runner, and of the plugin where it was told.
     pub precision: Option<String>,
     /// Of the native runner.
     pub instructions: Option<String>,

