@@ -358,6 +358,9 @@ unsafe fn inject<I: Isa>(x0: I::U32, x1: I::U32, schedule: &[I::U32; 3], number:
     }
 }
 
+/// Masks of vectors are read back as whole words.
+const _: () = assert!(cfg!(target_endian = "little"), "big-endian targets are not supported");
+
 /// `√3/2³¹`: signed words to numbers of unit variance.
 const UNIT: f64 = 1.732_050_807_568_877_2 / 2_147_483_648.0;
 

@@ -295,3 +295,155 @@ fn every_model_by_every_path_has_the_forces_of_the_plain_engine() {
         }
     }
 }
+
+fn shipped(name: &str) -> Fluid {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../validation/models");
+    Model::open(&folder.join(name)).unwrap().at(1.0).unwrap()
+}
+
+fn many() -> Fluid {
+    Model::parse("many", MANY).unwrap().at(0.7).unwrap()
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bits() {
+    for fluid in [shipped("warren2003-set6.toml"), many(), shipped("van-der-waals-2d.toml")] {
+        for domain in boxes(fluid.dimensions, 7.3) {
+            let cloud = Cloud::new(domain, fluid.dimensions, fluid.species.len(), 1500, 3);
+            for (precision, instructions) in every() {
+                let mut one = Sweep::new(&fluid, settings(precision, instructions, 1)).unwrap();
+                let (force, tally) = swept(&mut one, &cloud, Want::TOTALS);
+                for threads in [2, 3, 7] {
+                    let mut more = Sweep::new(&fluid, settings(precision, instructions, threads)).unwrap();
+                    let (here, totals) = swept(&mut more, &cloud, Want::TOTALS);
+                    assert!(
+                        force == here && tally == totals,
+                        "{precision}, {instructions}, {threads} threads"
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_order_of_particles_matters_to_rounding_alone() {
+    let fluid = many();
+    let domain = boxes(3, 4.0).remove(0);
+    let cloud = Cloud::new(domain.clone(), 3, 2, 800, 5);
+    for (precision, instructions) in every() {
+        let mut sweep = Sweep::new(&fluid, settings(precision, instructions, 1)).unwrap();
+        let (force, tally) = swept(&mut sweep, &cloud, Want::TOTALS);
+        let order: Vec<usize> = (0..800).map(|k| k * 397 % 800).collect();
+        let shuffled = Cloud {
+            domain: domain.clone(),
+            x: order.iter().map(|k| cloud.x[*k]).collect(),
+            v: order.iter().map(|k| cloud.v[*k]).collect(),
+            tag: order.iter().map(|k| cloud.tag[*k]).collect(),
+            kind: order.iter().map(|k| cloud.kind[*k]).collect(),
+        };
+        let (other, totals) = swept(&mut sweep, &shuffled, Want::TOTALS);
+        let same: Vec<[f64; 3]> = order.iter().map(|k| force[*k]).collect();
+        assert!(difference(&same, &other) < tolerance(precision));
+        assert!(tally_difference(&tally, &totals) < tolerance(precision));
+        // The order it hands out is one of its host's particles.
+        let mut order = sweep.order().to_vec();
+        order.sort_unstable();
+        assert!(order.iter().enumerate().all(|(k, o)| k as u32 == *o));
+    }
+}
+
+/// Crowds of which one particle has more neighbours than a block has room for, walls without periods, and
+/// particles far from all others.
+#[test]
+fn crowds_open_sides_and_runaways() {
+    let fluid = shipped("warren2003-set6.toml");
+    let open = PeriodicBox::orthogonal([0.0; 3], [6.0, 7.0, 8.0], [true, true, false]).unwrap();
+    let mut cloud = Cloud::new(open, 3, 1, 700, 9);
+    for k in 0..300 {
+        cloud.x[k] = [3.0 + 0.001 * (k % 7) as f64, 3.0 + 0.002 * (k % 11) as f64, 4.0 + 1e-4 * k as f64];
+    }
+    cloud.x[300][2] = 50.0;
+    cloud.x[301][2] = -1234.5;
+    let (force, tally) = plain(&fluid, &cloud);
+    for (precision, instructions) in every() {
+        let mut sweep = Sweep::new(&fluid, settings(precision, instructions, 2)).unwrap();
+        let (here, totals) = swept(&mut sweep, &cloud, Want::TOTALS);
+        let off = difference(&force, &here);
+        // Positions are fractions of an extent of more than a thousand here.
+        let tolerance = if precision == Precision::Mixed { 1e-3 } else { 1e-12 };
+        assert!(off < tolerance, "{precision}, {instructions}: {off:.1e}");
+        assert!(tally_difference(&tally, &totals) < tolerance);
+    }
+}
+
+#[test]
+fn particles_on_one_point_do_not_push_each_other() {
+    let fluid = shipped("warren2003-set6.toml");
+    let domain = PeriodicBox::orthogonal([0.0; 3], [5.0; 3], [true; 3]).unwrap();
+    let mut cloud = Cloud::new(domain, 3, 1, 2, 9);
+    cloud.x[1] = cloud.x[0];
+    for (precision, instructions) in every() {
+        let mut sweep = Sweep::new(&fluid, settings(precision, instructions, 1)).unwrap();
+        let (force, _) = swept(&mut sweep, &cloud, Want::TOTALS);
+        assert_eq!(force, [[0.0; 3]; 2]);
+    }
+}
+
+#[test]
+fn what_cannot_be_computed_is_named() {
+    let fluid = shipped("warren2003-set6.toml");
+    let domain = PeriodicBox::orthogonal([0.0; 3], [5.0; 3], [true; 3]).unwrap();
+    let good = || Cloud::new(domain.clone(), 3, 1, 100, 9);
+    for (precision, instructions) in every() {
+        let mut sweep = Sweep::new(&fluid, settings(precision, instructions, 2)).unwrap();
+        let mut fails = |cloud: &Cloud, space: Space| {
+            let particles = cloud.particles();
+            let error = sweep.first(space, &particles, &cloud.v, Some(STEP), Want::FORCES).unwrap_err();
+            assert!(sweep.second(&particles, &mut vec![[0.0; 3]; 100], false).is_err());
+            error
+        };
+        for bad in [f64::NAN, f64::INFINITY, 1e300] {
+            let mut cloud = good();
+            cloud.x[17][1] = bad;
+            let tag = cloud.tag[17];
+            assert_eq!(fails(&cloud, Space::Box(&domain)), EngineError::Position { tag });
+            assert_eq!(fails(&cloud, Space::Open), EngineError::Position { tag });
+        }
+        let mut cloud = good();
+        cloud.tag[3] = 0;
+        assert_eq!(fails(&cloud, Space::Box(&domain)), EngineError::Tag { tag: 0 });
+        let mut cloud = good();
+        cloud.kind[5] = 1;
+        let tag = cloud.tag[5];
+        assert_eq!(fails(&cloud, Space::Box(&domain)), EngineError::Kind { tag, kind: 1 });
+        let narrow = PeriodicBox::orthogonal([0.0; 3], [5.0, 1.9, 5.0], [true; 3]).unwrap();
+        assert!(matches!(fails(&good(), Space::Box(&narrow)), EngineError::Host(_)));
+        assert!(!sweep.fits(&narrow) && sweep.fits(&domain));
+        // And it goes on after errors.
+        swept(&mut sweep, &good(), Want::TOTALS);
+        let mut cloud = good();
+        cloud.v[3] = [f64::NAN; 3];
+        cloud.x[4] = cloud.x[3].map(|x| x + 0.01);
+        let particles = cloud.particles();
+        sweep.first(Space::Box(&domain), &particles, &cloud.v, Some(STEP), Want::FORCES).unwrap();
+        let error = sweep.second(&particles, &mut vec![[0.0; 3]; 100], false).unwrap_err();
+        assert!(matches!(error, EngineError::Force { .. }), "{error}");
+    }
+}
+
+#[test]
+fn passes_that_a_fluid_does_not_need_are_left_out() {
+    let dpd = shipped("standard-dpd.toml");
+    let domain = PeriodicBox::orthogonal([0.0; 3], [5.0; 3], [true; 3]).unwrap();
+    let cloud = Cloud::new(domain, 3, 1, 300, 9);
+    let mut sweep = Sweep::new(&dpd, Settings::default()).unwrap();
+    swept(&mut sweep, &cloud, Want::FORCES);
+    let counts = sweep.counts();
+    assert_eq!((counts.density, counts.excess, counts.energy, counts.virial), (0, 0, 0, 0));
+    assert_eq!((counts.search, counts.force, counts.noise), (1, 1, 1));
+    let particles = cloud.particles();
+    sweep.first(Space::Box(&cloud.domain), &particles, &[], None, Want::TOTALS).unwrap();
+    sweep.second(&particles, &mut vec![[0.0; 3]; 300], false).unwrap();
+    assert_eq!((sweep.counts().noise, sweep.counts().energy), (1, 1));
+}
