@@ -79,6 +79,9 @@ pub enum RunError {
     /// A data file cannot be written.
     #[error(transparent)]
     Lammps(#[from] crate::lammps::LammpsError),
+    /// A description or a picture of a run cannot be written.
+    #[error(transparent)]
+    Picture(#[from] crate::output::OutputError),
     /// A file or folder cannot be written.
     #[error("{} cannot be written: {source}", path.display())]
     Output {

@@ -5,6 +5,7 @@ use super::simulation::Simulation;
 use super::state::State;
 use super::summary::{Means, Summary};
 use super::thermo::{Thermo, ThermoFile};
+use crate::output::{About, Frame, write_snapshot, write_xyz};
 use crate::scene::{Scene, Stage};
 use psidpd_core::engine::Want;
 use std::fs::File;
@@ -25,8 +26,9 @@ pub struct Progress<'a> {
     pub thermo: Option<&'a Thermo>,
 }
 
-/// Runs a scene and writes `thermo.csv`, `dump.lammpstrj`, `final.data` and `summary.json` to the
-/// folder `out`, which is made if need be.
+/// Runs a scene and writes `about.json`, `thermo.csv`, `dump.lammpstrj`, `trajectory.xyz`, `snapshots/`,
+/// `final.data` and `summary.json` to the folder `out`, which is made if need be: of the series those that
+/// the scene asks for.
 ///
 /// If the physics fails on the way, the last good state, that of the last thermo row (or of the start
 /// of the stage), is written to `last-good.data`.
@@ -124,13 +126,19 @@ impl Run<'_> {
         if every(self.scene.output.dump, step) {
             self.output.frame(&self.simulation)?;
         }
+        if every(self.scene.output.xyz, step) {
+            self.output.xyz_frame(&Frame::of(&self.simulation, self.time))?;
+        }
+        if every(self.scene.output.snapshot, step) {
+            write_snapshot(&self.output.folder, &Frame::of(&self.simulation, self.time))?;
+        }
         (self.progress)(Progress { stage: &stage.name, step, steps: self.steps, thermo: thermo.as_ref() });
         Ok(())
     }
 
     /// Saves what is left of a run that failed.
     fn stop(&self, stage: &Stage, cause: RunError) -> RunError {
-        if matches!(cause, RunError::Output { .. }) {
+        if matches!(cause, RunError::Output { .. } | RunError::Picture(_)) {
             return cause;
         }
         let saved = self.output.folder.join("last-good.data");
@@ -176,12 +184,14 @@ struct Output {
     folder: PathBuf,
     thermo: Option<ThermoFile>,
     dump: Option<(PathBuf, BufWriter<File>)>,
+    xyz: Option<(PathBuf, BufWriter<File>)>,
 }
 
 impl Output {
     fn create(scene: &Scene, folder: &Path) -> Result<Output, RunError> {
         // What an earlier run left at its end is not of this one.
-        for name in ["final.data", "last-good.data", "summary.json"] {
+        crate::output::remove_snapshots(folder)?;
+        for name in ["final.data", "last-good.data", "summary.json", "report.html"] {
             let path = folder.join(name);
             match std::fs::remove_file(&path) {
                 Err(error) if error.kind() != ErrorKind::NotFound => {
@@ -194,15 +204,26 @@ impl Output {
             0 => None,
             _ => Some(ThermoFile::create(&folder.join("thermo.csv"))?),
         };
-        let dump = match scene.output.dump {
-            0 => None,
-            _ => {
-                let path = folder.join("dump.lammpstrj");
-                let file = File::create(&path).map_err(RunError::output(&path))?;
-                Some((path, BufWriter::new(file)))
-            }
+        let frames = |interval: u64, name: &str| {
+            let path = folder.join(name);
+            (interval > 0)
+                .then(|| match File::create(&path) {
+                    Ok(file) => Ok((path, BufWriter::new(file))),
+                    Err(error) => Err(RunError::output(&path)(error)),
+                })
+                .transpose()
         };
-        Ok(Output { folder: folder.to_owned(), thermo, dump })
+        let dump = frames(scene.output.dump, "dump.lammpstrj")?;
+        let xyz = frames(scene.output.xyz, "trajectory.xyz")?;
+        About::of(scene).write(folder)?;
+        Ok(Output { folder: folder.to_owned(), thermo, dump, xyz })
+    }
+
+    fn xyz_frame(&mut self, frame: &Frame) -> Result<(), RunError> {
+        match &mut self.xyz {
+            None => Ok(()),
+            Some((path, file)) => write_xyz(frame, file).map_err(RunError::output(path)),
+        }
     }
 
     fn frame(&mut self, simulation: &Simulation) -> Result<(), RunError> {
@@ -213,9 +234,9 @@ impl Output {
     }
 
     fn flush(&mut self) -> Result<(), RunError> {
-        match &mut self.dump {
-            None => Ok(()),
-            Some((path, file)) => file.flush().map_err(RunError::output(path)),
+        for (path, file) in self.dump.iter_mut().chain(&mut self.xyz) {
+            file.flush().map_err(RunError::output(path))?;
         }
+        Ok(())
     }
 }
