@@ -87,7 +87,7 @@ pub struct Column {
 /// Name, meaning and unit of what `thermo.csv` can have.
 pub const THERMO: [(&str, &str, &str); 12] = [
     ("step", "number of the step", ""),
-    ("time", "time since the start of the run", "time"),
+    ("time", "time since the start of the run", "length (mass/energy)^(1/2)"),
     ("temperature", "kT from the kinetic energy, over d(N − 1) degrees of freedom", "energy"),
     ("potential", "potential energy U = Σ ψ + Σ φ of the whole system", "energy"),
     ("kinetic", "kinetic energy ½ Σ m v² of the whole system", "energy"),
@@ -101,8 +101,7 @@ pub const THERMO: [(&str, &str, &str); 12] = [
 ];
 
 /// What every number of a run is in.
-const UNITS: &str =
-    "reduced: length, energy and mass are those of the model file, time = length (mass/energy)^(1/2)";
+const UNITS: &str = "reduced: length, energy and mass are those of the model file";
 
 impl About {
     /// The description of a scene.
@@ -149,7 +148,7 @@ impl About {
             box_periodic: scene.domain.periodic(),
             stages,
             units: UNITS.into(),
-            thermo: THERMO.map(|(name, title, unit)| column(name, title, unit)).to_vec(),
+            thermo: THERMO.map(|c| column(c, scene.model.dimensions())).to_vec(),
         }
     }
 
@@ -179,6 +178,6 @@ impl About {
     }
 }
 
-fn column(name: &str, title: &str, unit: &str) -> Column {
-    Column { name: name.into(), title: title.into(), unit: unit.into() }
+fn column((name, title, unit): (&str, &str, &str), dimensions: usize) -> Column {
+    Column { name: name.into(), title: title.into(), unit: unit.replace("^d", &format!("^{dimensions}")) }
 }

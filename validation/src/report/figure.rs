@@ -166,15 +166,14 @@ impl Figure {
         }
         if let Some((axis, label)) = &bar {
             let x = left + w + 20.0;
-            // As many bands as can be told apart.
+            // As many bands as can be told apart, each from the top of the bar to its own lower end: the next
+            // one covers the rest, and no seams show.
             let bands = 128;
             for k in 0..bands {
-                let value = (f64::from(k) + 0.5) / f64::from(bands);
-                let (y, step) = (top + h * (1.0 - f64::from(k + 1) / f64::from(bands)), h / f64::from(bands));
+                let colour = colour::hex(colour::of_value((f64::from(k) + 0.5) / f64::from(bands)));
+                let height = h * (1.0 - f64::from(k) / f64::from(bands));
                 put(format_args!(
-                    "<rect x=\"{x}\" y=\"{y:.2}\" width=\"{BAR}\" height=\"{:.2}\" fill=\"{}\"/>\n",
-                    step + 0.3,
-                    colour::hex(colour::of_value(value))
+                    "<rect x=\"{x}\" y=\"{top}\" width=\"{BAR}\" height=\"{height:.2}\" fill=\"{colour}\"/>\n"
                 ));
             }
             put(format_args!(

@@ -159,7 +159,8 @@ impl Layout {
             let points = s.points.iter().enumerate().map(|(i, &(x, y))| (i, x, y));
             points.filter(|&(_, x, y)| fits(x, plot.log_x) && fits(y, plot.log_y)).collect()
         };
-        let mut xs = Vec::new();
+        let mut xs: Vec<f64> =
+            plot.marks.iter().map(|mark| mark.0).filter(|x| fits(*x, plot.log_x)).collect();
         let mut ys: Vec<f64> = plot.levels.iter().map(|level| level.0).collect();
         for series in &plot.series {
             for (i, x, y) in shown(series) {
@@ -567,7 +568,7 @@ mod tests {
                 Series { name: "none".into(), ..Series::default() },
             ],
             levels: vec![(2.5, "level\0".into()), (f64::NAN, "hidden".into())],
-            marks: vec![(1.0, "mark".into()), (9.0, "hidden".into())],
+            marks: vec![(1.0, "mark".into()), (f64::NAN, "hidden".into())],
             ..Plot::default()
         };
         let svg = plot.render().unwrap();

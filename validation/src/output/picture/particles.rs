@@ -41,8 +41,8 @@ const EDGE: Rgb = [0x70, 0x70, 0x70];
 pub fn draw_particles(frame: &Frame, options: &ParticleOptions) -> (Image, Projection) {
     let view = if frame.dimensions == 2 { View::Z } else { options.view };
     let radius = options.radius(frame).max(1e-9);
-    // In the box's own plane particles end at its edges; elsewhere they may stand out.
-    let margin = if frame.dimensions == 2 { 0.0 } else { radius };
+    // Along an axis the picture ends with the box; corners seen obliquely let particles stand out.
+    let margin = if view == View::Oblique { radius } else { 0.0 };
     let projection = Projection::fit(frame.domain, frame.dimensions, view, options.size(), margin);
     let size = projection.size().map(|s| s * FINER);
     let mut canvas = Canvas {

@@ -3,7 +3,14 @@ use crate::output::About;
 use serde_json::Value;
 
 /// Names and values at the top of the page.
-pub fn facts(about: Option<&About>, summary: Option<&Value>, state: Option<&State>) -> Vec<(String, String)> {
+///
+/// `timing` has the sessions of a run that was taken up again; an older `summary` has one time.
+pub fn facts(
+    about: Option<&About>,
+    summary: Option<&Value>,
+    timing: Option<&Value>,
+    state: Option<&State>,
+) -> Vec<(String, String)> {
     let mut facts: Vec<(String, String)> = Vec::new();
     let mut fact = |name: &str, value: String| facts.push((name.to_owned(), value));
     if let Some(a) = about {
@@ -28,12 +35,12 @@ pub fn facts(about: Option<&About>, summary: Option<&Value>, state: Option<&Stat
         };
         fact("stages", a.stages.iter().map(stage).collect::<Vec<_>>().join("; "));
     }
-    if let Some(seconds) = number("wall_seconds") {
-        let speed = number("particle_steps_per_second");
+    if summary.is_none() {
+        fact("state of the run", "there is no summary.json: the run is not over, or was stopped".into());
+    }
+    if let Some((seconds, speed)) = wall_time(summary, timing) {
         let speed = speed.map_or(String::new(), |s| format!(", {s:.3e} particle-steps per second"));
         fact("wall time", format!("{seconds:.1} s{speed}"));
-    } else {
-        fact("state of the run", "there is no summary.json: the run is not over, or was stopped".into());
     }
     let beyond = summary.and_then(|s| s.get("out_of_bounds")).and_then(Value::as_array);
     if let Some([below, above]) = beyond.map(Vec::as_slice) {
@@ -46,6 +53,22 @@ pub fn facts(about: Option<&About>, summary: Option<&Value>, state: Option<&Stat
         fact("written by", a.program.clone());
     }
     facts
+}
+
+/// Wall time in seconds, and particle-steps per second.
+fn wall_time(summary: Option<&Value>, timing: Option<&Value>) -> Option<(f64, Option<f64>)> {
+    let number = |value: &Value, key: &str| value.get(key).and_then(Value::as_f64);
+    let Some(sessions) = timing.and_then(|t| t.get("sessions")).and_then(Value::as_array) else {
+        return summary
+            .and_then(|s| Some((number(s, "wall_seconds")?, number(s, "particle_steps_per_second"))));
+    };
+    let (mut seconds, mut work) = (0.0, 0.0);
+    for session in sessions {
+        let time = number(session, "wall_seconds")?;
+        seconds += time;
+        work += time * number(session, "particle_steps_per_second")?;
+    }
+    (seconds > 0.0).then(|| (seconds, Some(work / seconds)))
 }
 
 fn lengths(about: &About) -> String {

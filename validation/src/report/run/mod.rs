@@ -33,11 +33,13 @@ pub enum RunReportError {
 }
 
 /// The files that a report is made from, and what they are.
-const FILES: [(&str, &str); 8] = [
+const FILES: [(&str, &str); 10] = [
     ("about.json", "what was run: species, stages, units, columns of thermo.csv"),
     ("thermo.csv", "totals every few steps"),
     ("summary.json", "what the run came to"),
+    ("timing.json", "how long the run took"),
     ("observables.json", "observables with their errors"),
+    ("observables", "the same, a CSV file for each"),
     ("final.data", "the state after the last step: LAMMPS data file"),
     ("dump.lammpstrj", "frames: LAMMPS text dump"),
     ("trajectory.xyz", "frames: extended XYZ"),
@@ -68,6 +70,7 @@ pub fn run_report(folder: &Path) -> Result<Report, RunReportError> {
     let mut notes = Vec::new();
     let about = keep(About::read(folder), &mut notes).flatten();
     let summary = keep(json(&folder.join("summary.json")), &mut notes).flatten();
+    let timing = keep(json(&folder.join("timing.json")), &mut notes).flatten();
     let table = keep(series::Table::read(&folder.join("thermo.csv")), &mut notes).flatten();
     let observables = keep(observables::read(&folder.join("observables.json")), &mut notes).flatten();
     let state = state::State::find(folder, about.as_ref(), &mut notes);
@@ -91,7 +94,7 @@ pub fn run_report(folder: &Path) -> Result<Report, RunReportError> {
     Ok(Report {
         title,
         subtitle: about.as_ref().map_or(String::new(), |a| format!("psidpd run of {}", a.model)),
-        facts: facts::facts(about.as_ref(), summary.as_ref(), state.as_ref()),
+        facts: facts::facts(about.as_ref(), summary.as_ref(), timing.as_ref(), state.as_ref()),
         sections,
         passed: 0,
         failed: 0,

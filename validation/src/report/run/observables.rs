@@ -21,13 +21,10 @@ pub struct Observable {
     /// scalar, profile, curve, series or field.
     #[serde(default)]
     pub kind: String,
-    /// The abscissa; none for scalars.
+    /// The abscissa; none for scalars and fields.
     #[serde(default)]
     pub x: Option<ObservableAxis>,
-    /// The second abscissa of a field; its values go row after row, x fastest.
-    #[serde(default)]
-    pub y: Option<ObservableAxis>,
-    /// The values.
+    /// The values. Of a field the first columns are the coordinates of its points.
     #[serde(default)]
     pub columns: Vec<ObservableColumn>,
     /// How many samples they are means of.
@@ -107,15 +104,19 @@ pub fn section(observables: Option<&[Observable]>) -> Section {
     if !scalars.rows.is_empty() {
         items.push(Item::Table(scalars));
     }
-    for observable in all.iter().filter(|o| o.x.is_some()) {
-        draw(observable, &mut items);
+    for observable in all.iter().filter(|o| !o.is_scalar()) {
+        if observable.x.is_some() {
+            draw_curve(observable, &mut items);
+        } else {
+            draw_field(observable, &mut items);
+        }
     }
     Section { heading, items }
 }
 
 fn scalar_table(all: &[Observable]) -> Table {
     let mut table = Table::new(["observable", "value ± error", "unit", "stage", "samples", "note"]);
-    for o in all.iter().filter(|o| o.x.is_none()) {
+    for o in all.iter().filter(|o| o.is_scalar()) {
         if o.columns.is_empty() {
             let note = o.note.clone().unwrap_or_default();
             table.push([o.label(), "—".into(), String::new(), o.stage.clone(), o.samples(), note]);
@@ -141,6 +142,10 @@ fn scalar_table(all: &[Observable]) -> Table {
 }
 
 impl Observable {
+    fn is_scalar(&self) -> bool {
+        self.x.is_none() && self.kind != "field"
+    }
+
     fn label(&self) -> String {
         if self.title.is_empty() { self.name.clone() } else { self.title.clone() }
     }
@@ -176,37 +181,91 @@ fn named(name: &str, unit: Option<&String>) -> String {
     }
 }
 
-fn draw(o: &Observable, items: &mut Vec<Item>) {
-    let Some(x) = &o.x else { return };
-    let mut push = |svg: Result<String, super::ReportError>| {
-        items.push(match svg {
-            Ok(svg) => Item::Figure { svg, caption: o.caption() },
-            Err(error) => Item::Prose(format!("{}: {error}", o.label())),
-        });
-    };
-    let numbers = |v: &[Option<f64>]| v.iter().map(|v| v.unwrap_or(f64::NAN)).collect::<Vec<f64>>();
-    let xs = numbers(&x.values);
-    if let Some(y) = &o.y {
-        let ys = numbers(&y.values);
-        for c in &o.columns {
-            let values = numbers(&c.values);
-            let title = if o.columns.len() > 1 { format!("{}: {}", o.label(), c.name) } else { o.label() };
-            if values.len() != xs.len() * ys.len() || values.is_empty() {
-                push(Err(super::ReportError::Plot(format!(
-                    "{} values for {} by {} places",
-                    values.len(),
-                    xs.len(),
-                    ys.len()
-                ))));
-                continue;
-            }
-            let axes = [named(&x.name, x.unit.as_ref()), named(&y.name, y.unit.as_ref())];
-            let label = named(&c.name, c.unit.as_ref());
-            let size = [xs.len(), ys.len()];
-            push(field_of_values(&title, &label, axes, [ends(&xs), ends(&ys)], size, &values).render());
-        }
-        return;
+fn numbers(values: &[Option<f64>]) -> Vec<f64> {
+    values.iter().map(|v| v.unwrap_or(f64::NAN)).collect()
+}
+
+fn figure(o: &Observable, svg: Result<String, super::ReportError>) -> Item {
+    match svg {
+        Ok(svg) => Item::Figure { svg, caption: o.caption() },
+        Err(error) => Item::Prose(format!("{}: {error}", o.label())),
     }
+}
+
+/// Names of columns that are coordinates where they come first.
+const COORDINATES: [&str; 4] = ["x", "y", "z", "r"];
+
+/// Values on a grid as a map, points that are on none as points.
+fn draw_field(o: &Observable, items: &mut Vec<Item>) {
+    let coordinates = o.columns.iter().take_while(|c| COORDINATES.contains(&c.name.as_str())).count();
+    let [first, second, ..] = o.columns.as_slice() else {
+        let error = super::ReportError::Plot("a field needs columns of coordinates".into());
+        return items.push(figure(o, Err(error)));
+    };
+    let (xs, ys) = (numbers(&first.values), numbers(&second.values));
+    let axes = [first, second].map(|c| named(&c.name, c.unit.as_ref()));
+    let grid = if coordinates == 2 { Grid::of(&xs, &ys) } else { None };
+    let values = &o.columns[coordinates.clamp(1, 2)..];
+    let Some(grid) = grid.filter(|_| !values.is_empty()) else {
+        let series = Series {
+            name: String::new(),
+            points: xs.into_iter().zip(ys).collect(),
+            errors: (!second.errors.is_empty()).then(|| numbers(&second.errors)),
+            style: Style::Points,
+        };
+        let [x_label, y_label] = axes;
+        let plot = Plot { title: o.label(), x_label, y_label, series: vec![series], ..Plot::default() };
+        return items.push(figure(o, plot.render()));
+    };
+    for c in values {
+        let title = if values.len() > 1 { format!("{}: {}", o.label(), c.name) } else { o.label() };
+        let (values, label) = (grid.sort(&numbers(&c.values)), named(&c.name, c.unit.as_ref()));
+        let size = [grid.x.len(), grid.y.len()];
+        let ranges = [ends(&grid.x), ends(&grid.y)];
+        let map = field_of_values(&title, &label, axes.clone(), ranges, size, &values);
+        items.push(figure(o, map.render()));
+    }
+}
+
+/// Points that are all the crossings of lines.
+struct Grid {
+    x: Vec<f64>,
+    y: Vec<f64>,
+    /// Where in the picture each point is: row after row, the lowest first.
+    place: Vec<usize>,
+}
+
+impl Grid {
+    fn of(xs: &[f64], ys: &[f64]) -> Option<Grid> {
+        let distinct = |values: &[f64]| {
+            let mut values = values.to_vec();
+            values.sort_by(f64::total_cmp);
+            values.dedup();
+            values
+        };
+        let (x, y) = (distinct(xs), distinct(ys));
+        if xs.len() != ys.len() || xs.len() != x.len() * y.len() || x.len() < 2 || y.len() < 2 {
+            return None;
+        }
+        let at = |of: &[f64], v: &f64| of.binary_search_by(|a| a.total_cmp(v)).ok();
+        let place: Option<Vec<usize>> =
+            xs.iter().zip(ys).map(|(a, b)| Some(at(&y, b)? * x.len() + at(&x, a)?)).collect();
+        Some(Grid { x, y, place: place? })
+    }
+
+    fn sort(&self, values: &[f64]) -> Vec<f64> {
+        let mut sorted = vec![f64::NAN; self.place.len()];
+        for (place, value) in self.place.iter().zip(values) {
+            sorted[*place] = *value;
+        }
+        sorted
+    }
+}
+
+fn draw_curve(o: &Observable, items: &mut Vec<Item>) {
+    let Some(x) = &o.x else { return };
+    let mut push = |svg| items.push(figure(o, svg));
+    let xs = numbers(&x.values);
     // One plot for each unit: a shared axis would mean nothing.
     let mut units: Vec<Option<&String>> = Vec::new();
     for c in &o.columns {

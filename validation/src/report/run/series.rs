@@ -87,7 +87,7 @@ struct Curves<'a> {
 impl<'a> Curves<'a> {
     fn of(table: &'a Table, about: Option<&'a About>) -> Curves<'a> {
         let count = || (0..table.rows()).map(|k| k as f64).collect();
-        let x = [("time", "time"), ("step", "step")]
+        let x = [("time", "time [length (mass/energy)^½]"), ("step", "step")]
             .into_iter()
             .find_map(|(name, label)| Some((label, table.get(name)?.to_vec())))
             .unwrap_or_else(|| ("row", count()));
@@ -105,6 +105,14 @@ impl<'a> Curves<'a> {
             stages.push(("run".into(), 0..table.rows()));
         }
         Curves { table, about, x, stages, drawn: vec!["step", "time"] }
+    }
+
+    /// A label with the unit of a column.
+    fn label(&self, symbol: &str, name: &str) -> String {
+        match self.column(name).1 {
+            unit if unit.is_empty() => symbol.to_owned(),
+            unit => format!("{symbol} [{unit}]"),
+        }
     }
 
     /// What a column is, and its unit.
@@ -167,7 +175,7 @@ impl<'a> Curves<'a> {
         let scale = particles.map_or(1.0, |n| n.max(1) as f64);
         let each = if particles.is_some() { " / N" } else { "" };
         if let Some(values) = self.take("temperature") {
-            let mut plot = self.plot("Temperature", "kT", values);
+            let mut plot = self.plot("Temperature", &self.label("kT", "temperature"), values);
             let last = self.about.and_then(|a| a.stages.last());
             if let Some(stage) = last.filter(|s| s.thermostat) {
                 plot.levels.push((stage.kt, format!("set: {}", stage.kt)));
@@ -177,23 +185,29 @@ impl<'a> Curves<'a> {
         let kinetic = self.take("kinetic");
         if let Some(potential) = self.take("potential") {
             let values: Vec<f64> = potential.iter().map(|u| u / scale).collect();
-            plots.push((self.plot("Potential energy", &format!("U{each}"), &values), String::new()));
+            plots.push((
+                self.plot("Potential energy", &self.label(&format!("U{each}"), "potential"), &values),
+                String::new(),
+            ));
             if let Some(kinetic) = kinetic {
                 let total: Vec<f64> = potential.iter().zip(kinetic).map(|(u, k)| (u + k) / scale).collect();
                 let caption = "Potential and kinetic energy together: constant where no thermostat acts, up to \
                                the error of the time step.";
-                plots.push((self.plot("Total energy", &format!("E{each}"), &total), caption.into()));
+                plots.push((
+                    self.plot("Total energy", &self.label(&format!("E{each}"), "potential"), &total),
+                    caption.into(),
+                ));
             }
         }
         if let Some(values) = self.take("pressure") {
-            plots.push((self.plot("Pressure", "p", values), String::new()));
+            plots.push((self.plot("Pressure", &self.label("p", "pressure"), values), String::new()));
         }
         let diagonal = [("pxx", "p_xx"), ("pyy", "p_yy"), ("pzz", "p_zz")];
         let others = [("pxy", "p_xy"), ("pxz", "p_xz"), ("pyz", "p_yz")];
         for (title, names) in
             [("Pressure tensor, diagonal", diagonal), ("Pressure tensor, off the diagonal", others)]
         {
-            let mut plot = self.empty(title, "running mean");
+            let mut plot = self.empty(title, &self.label("running mean", names[0].0));
             for (name, label) in names {
                 // In two dimensions what has to do with z is zero.
                 if let Some(values) = self.take(name).filter(|v| v.iter().any(|p| *p != 0.0)) {
@@ -211,12 +225,44 @@ impl<'a> Curves<'a> {
         let rest: Vec<&str> = self.table.header.iter().map(String::as_str).collect();
         for name in rest {
             if let Some(values) = self.take(name) {
-                let (title, unit) = self.column(name);
-                let label = if unit.is_empty() { name.to_owned() } else { format!("{name} [{unit}]") };
-                plots.push((self.plot(&title, &label, values), String::new()));
+                let title = self.column(name).0;
+                plots.push((self.plot(&title, &self.label(name, name), values), String::new()));
+            }
+        }
+        for (plot, caption) in &mut plots {
+            let hidden = self.clip(plot);
+            if hidden > 0 {
+                let space = if caption.is_empty() { "" } else { " " };
+                *caption +=
+                    &format!("{space}{hidden} points far outside the range of the last stage are not shown.");
             }
         }
         plots
+    }
+
+    /// Takes rows out of a plot that would leave no room for the last stage; says how many.
+    fn clip(&self, plot: &mut Plot) -> usize {
+        let rows = &self.stages[self.stages.len() - 1].1;
+        // A single stage begins with its own way to equilibrium.
+        let first = if self.stages.len() > 1 { rows.start } else { rows.start + rows.len() / 2 };
+        let from = self.x.1[first];
+        let late = |p: &&(f64, f64)| p.0 >= from && p.1.is_finite();
+        let (low, high) = plot
+            .series
+            .iter()
+            .flat_map(|s| s.points.iter().filter(late).map(|p| p.1))
+            .chain(plot.levels.iter().map(|l| l.0))
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), y| (l.min(y), h.max(y)));
+        let room = if high > low { high - low } else { high.abs().max(1.0) };
+        let inside = |y: f64| y >= low - room && y <= high + room;
+        let mut hidden = 0;
+        for series in &mut plot.series {
+            let outside: Vec<_> =
+                series.points.iter_mut().filter(|p| p.1.is_finite() && !inside(p.1)).collect();
+            hidden = hidden.max(outside.len());
+            outside.into_iter().for_each(|p| p.1 = f64::NAN);
+        }
+        hidden
     }
 
     /// A column that no plot has shown yet.

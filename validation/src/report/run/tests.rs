@@ -46,11 +46,12 @@ const OBSERVABLES: &str = r#"[
      "samples": 10, "note": "bins of 1"},
     {"name": "g", "title": "Radial distribution", "stage": "produce", "kind": "curve",
      "x": {"name": "r", "unit": "length", "values": []}, "columns": [], "samples": 0, "note": null},
-    {"name": "map", "title": "Density map", "stage": "produce", "kind": "field",
-     "x": {"name": "x", "unit": "length", "values": [0, 1]}, "y": {"name": "z", "unit": "length", "values": [0, 1, 2]},
-     "columns": [{"name": "rho", "unit": "", "values": [1, 2, 3, 4, 5, 6], "errors": []}], "samples": 3, "note": ""},
-    {"name": "flat", "title": "Bad map", "kind": "field", "x": {"name": "x", "values": [0, 1]},
-     "y": {"name": "z", "values": [0]}, "columns": [{"name": "rho", "values": [1]}]}
+    {"name": "map", "title": "Density map", "stage": "produce", "kind": "field", "x": null, "columns": [
+     {"name": "x", "unit": "r_c", "values": [0, 0, 0, 1, 1, 1]}, {"name": "z", "unit": "r_c", "values": [0, 1, 2, 0, 1, 2]},
+     {"name": "rho", "unit": "1", "values": [1, 2, 3, 4, 5, null], "errors": []}], "samples": 3, "note": ""},
+    {"name": "surface", "title": "Points of a surface", "kind": "field", "x": null, "columns": [
+     {"name": "r", "unit": "r_c", "values": [0, 0.5, 2]}, {"name": "z", "unit": "r_c", "values": [4, 5, 7], "errors": [0.5, 0.5, 0.5]}]},
+    {"name": "flat", "title": "Bad map", "kind": "field", "columns": [{"name": "x", "values": [0, 1]}]}
 ]"#;
 
 fn thermo() -> String {
@@ -116,7 +117,9 @@ fn every_observable_and_every_series_is_shown_with_its_error() {
         "[length^-3]",
         "Radial distribution",
         "Density map",
-        "Bad map",
+        "Points of a surface",
+        "z [r_c]",
+        "Bad map: ",
         "Local density",
         "Local density of water",
         "Temperature",
