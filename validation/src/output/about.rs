@@ -124,6 +124,7 @@ impl About {
             stage
         });
         let stages: Vec<AboutStage> = stages.collect();
+        let [x, y, z] = scene.domain.periodic();
         // A model that holds at no temperature of the scene has no scene.
         let densities = scene.model.at(scene.kt).map(|f| f.densities).unwrap_or_default();
         About {
@@ -145,7 +146,7 @@ impl About {
             seed: scene.seed,
             box_origin: scene.domain.origin(),
             box_edges: [0, 1, 2].map(|k| scene.domain.edge(k)),
-            box_periodic: scene.domain.periodic(),
+            box_periodic: [x, y, z && scene.model.dimensions() == 3],
             stages,
             units: UNITS.into(),
             thermo: THERMO.map(|c| column(c, scene.model.dimensions())).to_vec(),

@@ -40,6 +40,12 @@ impl<'a> Frame<'a> {
         }
     }
 
+    /// Which directions repeat: never z in two dimensions.
+    pub fn periodic(&self) -> [bool; 3] {
+        let [x, y, z] = self.domain.periodic();
+        [x, y, z && self.dimensions == 3]
+    }
+
     /// How many particles there are.
     pub fn len(&self) -> usize {
         self.x.len()

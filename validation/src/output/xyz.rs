@@ -16,7 +16,7 @@ use std::path::Path;
 /// `to` cannot be written.
 pub fn write_xyz(frame: &Frame, to: &mut impl Write) -> io::Result<()> {
     let flag = |periodic: bool| if periodic { "T" } else { "F" };
-    let periodic = frame.domain.periodic();
+    let periodic = frame.periodic();
     let edges: Vec<String> = (0..3).flat_map(|k| frame.domain.edge(k)).map(|c| format!("{c:?}")).collect();
     let origin = frame.domain.origin().map(|c| format!("{c:?}"));
     let velocities = if frame.v.is_some() { "velo:R:3:" } else { "" };
@@ -234,6 +234,29 @@ mod tests {
         // Numbered as they come.
         assert_eq!((first.names, first.species), (vec!["B".to_owned(), "A".to_owned()], vec![0, 1]));
         assert!(read_xyz(path, &text, Some(2)).unwrap().is_none());
+    }
+
+    #[test]
+    fn nothing_repeats_along_z_in_two_dimensions() {
+        let domain = PeriodicBox::orthogonal([0.0, 0.0, -0.5], [4.0, 5.0, 1.0], [true; 3]).unwrap();
+        let x = [[1.0, 2.0, 0.0], [2.0, 2.5, 0.0]];
+        let frame = Frame {
+            step: 0,
+            time: 0.0,
+            dimensions: 2,
+            domain: &domain,
+            names: &["A".to_owned()],
+            x: &x,
+            v: None,
+            species: &[0, 0],
+            tag: &[1, 2],
+        };
+        let mut text = Vec::new();
+        write_xyz(&frame, &mut text).unwrap();
+        let text = String::from_utf8(text).unwrap();
+        assert!(text.contains("pbc=\"T T F\""), "{text}");
+        let read = read_xyz(Path::new("f"), &text, None).unwrap().unwrap();
+        assert_eq!((read.dimensions, read.v), (2, None));
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use super::super::figure::field_of_values;
 use super::super::quantity::with_error;
+use super::super::text::typeset;
 use super::super::{Item, Plot, Section, Series, Style, Table};
 use crate::output::OutputError;
 use serde::Deserialize;
@@ -131,7 +132,7 @@ fn scalar_table(all: &[Observable]) -> Table {
                 .map(|(i, v)| with_error(v.unwrap_or(f64::NAN), c.errors.get(i).copied().flatten()))
                 .collect();
             let note = if k == 0 { o.note.clone().unwrap_or_default() } else { String::new() };
-            let unit = c.unit.clone().unwrap_or_default();
+            let unit = c.unit.as_deref().map_or(String::new(), typeset);
             let value = if values.is_empty() { "—".into() } else { values.join(", ") };
             table.push([label, value, unit, o.stage.clone(), o.samples(), note]);
         }
@@ -177,7 +178,7 @@ impl Observable {
 fn named(name: &str, unit: Option<&String>) -> String {
     match unit.map(String::as_str) {
         None | Some("" | "1") => name.to_owned(),
-        Some(unit) => format!("{name} [{unit}]"),
+        Some(unit) => format!("{name} [{}]", typeset(unit)),
     }
 }
 

@@ -1,6 +1,7 @@
 //! Totals against time, and their means.
 
 use super::super::quantity::with_error;
+use super::super::text::typeset;
 use super::super::{Item, Plot, Section, Series, Style};
 use crate::observe::statistics::{MINIMUM_SAMPLES, estimate};
 use crate::output::{About, OutputError, THERMO};
@@ -87,7 +88,7 @@ struct Curves<'a> {
 impl<'a> Curves<'a> {
     fn of(table: &'a Table, about: Option<&'a About>) -> Curves<'a> {
         let count = || (0..table.rows()).map(|k| k as f64).collect();
-        let x = [("time", "time [length (mass/energy)^½]"), ("step", "step")]
+        let x = [("time", "time [length √(mass/energy)]"), ("step", "step")]
             .into_iter()
             .find_map(|(name, label)| Some((label, table.get(name)?.to_vec())))
             .unwrap_or_else(|| ("row", count()));
@@ -111,7 +112,7 @@ impl<'a> Curves<'a> {
     fn label(&self, symbol: &str, name: &str) -> String {
         match self.column(name).1 {
             unit if unit.is_empty() => symbol.to_owned(),
-            unit => format!("{symbol} [{unit}]"),
+            unit => format!("{symbol} [{}]", typeset(&unit)),
         }
     }
 
@@ -159,7 +160,7 @@ impl<'a> Curves<'a> {
                         (with_error(mean / scale, None), String::new())
                     }
                 };
-                [name, text, worth, unit.clone(), title]
+                [name, text, worth, typeset(&unit), title]
             };
             out.push(row(name.clone(), 1.0, title));
             if let (Some(n), "potential" | "kinetic") = (particles, name.as_str()) {

@@ -114,7 +114,7 @@ fn every_observable_and_every_series_is_shown_with_its_error() {
         "rho_oil",
         "rho_water",
         "kT [energy]",
-        "[length^-3]",
+        "[length⁻³]",
         "Radial distribution",
         "Density map",
         "Points of a surface",
