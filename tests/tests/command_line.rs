@@ -99,14 +99,6 @@ fn a_run_has_a_report_and_pictures() {
     assert_eq!(thermo.lines().next().unwrap().split(',').collect::<Vec<_>>(), told);
     let pictures: Vec<_> = std::fs::read_dir(here.join("out/snapshots")).unwrap().collect();
     assert_eq!(pictures.len(), 3);
-    // A run into the same folder leaves nothing of the one before.
-    let path = write(here, "scene.toml", &scene(""));
-    run(&["run", &path, "--out", "out"]);
-    assert!(!here.join("out/report.html").exists());
-    assert_eq!(std::fs::read_dir(here.join("out/snapshots")).unwrap().count(), 0);
-    run(&["report", "out"]);
-    assert!(std::fs::read_to_string(here.join("out/report.html")).unwrap().contains("no snapshots"));
-
     for file in ["final.data", "dump.lammpstrj", "trajectory.xyz"] {
         let file = format!("out/{file}");
         run(&["snapshot", &file, "--out", "a.svg", "--model", &model()]);
@@ -114,6 +106,16 @@ fn a_run_has_a_report_and_pictures() {
         run(&["snapshot", &file, "--density", "--view", "x", "--size", "64", "--out", "a.png"]);
         assert!(std::fs::read(here.join("a.png")).unwrap().starts_with(b"\x89PNG"));
     }
+    // A run into the same folder leaves nothing of the one before.
+    let path = write(here, "scene.toml", &scene(""));
+    run(&["run", &path, "--out", "out"]);
+    for file in ["report.html", "trajectory.xyz"] {
+        assert!(!here.join("out").join(file).exists(), "{file}");
+    }
+    assert_eq!(std::fs::read_dir(here.join("out/snapshots")).unwrap().count(), 0);
+    run(&["report", "out"]);
+    assert!(std::fs::read_to_string(here.join("out/report.html")).unwrap().contains("no snapshots"));
+
     for (arguments, message) in [
         (vec!["report", "nowhere"], "nothing of a run"),
         (vec!["snapshot", "nowhere.data"], "nowhere.data"),

@@ -191,7 +191,16 @@ impl Output {
     fn create(scene: &Scene, folder: &Path) -> Result<Output, RunError> {
         // What an earlier run left at its end is not of this one.
         crate::output::remove_snapshots(folder)?;
-        for name in ["final.data", "last-good.data", "summary.json", "report.html"] {
+        for name in [
+            "about.json",
+            "thermo.csv",
+            "dump.lammpstrj",
+            "trajectory.xyz",
+            "final.data",
+            "last-good.data",
+            "summary.json",
+            "report.html",
+        ] {
             let path = folder.join(name);
             match std::fs::remove_file(&path) {
                 Err(error) if error.kind() != ErrorKind::NotFound => {
