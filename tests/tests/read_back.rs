@@ -268,10 +268,8 @@ fn lammps_finds_the_energies_of_the_series_again() {
                 inside = true;
             } else if line.starts_with("Loop time") {
                 inside = false;
-            } else if inside {
-                if let Ok(row) = line.split_whitespace().map(str::parse).collect() {
-                    rows.push(row);
-                }
+            } else if inside && let Ok(row) = line.split_whitespace().map(str::parse).collect() {
+                rows.push(row);
             }
         }
         assert!(!rows.is_empty(), "{}", run.stdout);

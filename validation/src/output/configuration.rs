@@ -1,9 +1,12 @@
 use super::{Frame, OutputError, read_xyz};
+use crate::lammps::LammpsError;
 use crate::lammps::data::DataFile;
 use crate::lammps::dump::{self, DumpReader};
 use crate::run::State;
 use nalgebra::{Matrix3, Vector3};
 use psidpd_core::engine::PeriodicBox;
+use std::fs::File;
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 /// Particles at one step, read from a file.
@@ -32,7 +35,7 @@ pub struct Configuration {
 /// Which frame of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Which {
-    /// The last one.
+    /// The last one that is whole.
     #[default]
     Last,
     /// By number, from 0.
@@ -46,9 +49,11 @@ impl Configuration {
     /// A file that cannot be read or is none of these, or a frame that it does not have.
     pub fn open(path: &Path, which: Which) -> Result<Configuration, OutputError> {
         let content = |message: &str| OutputError::Content { path: path.to_owned(), message: message.into() };
-        let bytes = std::fs::read(path).map_err(OutputError::read(path))?;
-        let text = String::from_utf8_lossy(&bytes);
-        let first = text.lines().find(|l| !l.trim().is_empty()).unwrap_or("").trim().to_owned();
+        let mut file = BufReader::new(File::open(path).map_err(OutputError::read(path))?);
+        // Trajectories may be larger than memory: their frames are read one by one.
+        let start = file.fill_buf().map_err(OutputError::read(path))?;
+        let start = String::from_utf8_lossy(start);
+        let first = start.lines().find(|l| !l.trim().is_empty()).unwrap_or("").trim().to_owned();
         let number = match which {
             Which::Last => None,
             Which::Number(n) => Some(n),
@@ -58,9 +63,9 @@ impl Configuration {
             content(&format!("there is {which}"))
         };
         let found = if first.starts_with("ITEM:") {
-            last_or_nth(path, &text, number)?.map(|f| from_dump(&f)).transpose().map_err(|m| content(&m))?
+            last_or_nth(path, file, number)?.map(|f| from_dump(&f)).transpose().map_err(|m| content(&m))?
         } else if first.parse::<usize>().is_ok() {
-            read_xyz(path, &text, number)?
+            read_xyz(path, file, number)?
         } else if number.is_none_or(|n| n == 0) {
             Some(from_data(&DataFile::read(path)?).map_err(|m| content(&m))?)
         } else {
@@ -121,13 +126,25 @@ pub(super) fn dimensions_of(x: &[[f64; 3]], periodic: [bool; 3]) -> usize {
     if flat { 2 } else { 3 }
 }
 
-fn last_or_nth(path: &Path, text: &str, which: Option<usize>) -> Result<Option<dump::Frame>, OutputError> {
+/// Without a number, the last frame that is whole: a run that is still going may be in the middle of the
+/// next.
+fn last_or_nth(
+    path: &Path,
+    input: impl BufRead,
+    which: Option<usize>,
+) -> Result<Option<dump::Frame>, OutputError> {
     let mut found = None;
-    for (number, frame) in DumpReader::new(text.as_bytes()).enumerate() {
-        let frame =
-            frame.map_err(|source| crate::lammps::LammpsError::Text { path: path.to_owned(), source })?;
-        if which.is_none_or(|n| n == number) {
-            found = Some(frame);
+    for (number, frame) in DumpReader::new(input).enumerate() {
+        match frame {
+            Ok(frame) if which.is_none_or(|n| n == number) => {
+                found = Some(frame);
+                if which.is_some() {
+                    break;
+                }
+            }
+            Ok(_) => {}
+            Err(_) if which.is_none() && found.is_some() => break,
+            Err(source) => return Err(LammpsError::Text { path: path.to_owned(), source }.into()),
         }
     }
     Ok(found)
@@ -252,6 +269,10 @@ mod tests {
             let error = Configuration::open(&path(name), Which::Number(2)).unwrap_err().to_string();
             assert!(error.contains("no frame 2"), "{error}");
         }
+        let whole = std::fs::read(path("a.dump")).unwrap();
+        std::fs::write(path("cut.dump"), &whole[..whole.len() - 30]).unwrap();
+        assert_eq!(Configuration::open(&path("cut.dump"), Which::Last).unwrap().step, Some(0));
+        assert!(Configuration::open(&path("cut.dump"), Which::Number(1)).is_err());
         assert!(Configuration::open(&path("none"), Which::Last).is_err());
         std::fs::write(path("rubbish"), "what is this\n").unwrap();
         assert!(Configuration::open(&path("rubbish"), Which::Last).is_err());

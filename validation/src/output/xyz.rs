@@ -7,7 +7,7 @@
 use super::{Configuration, Frame, OutputError};
 use nalgebra::{Matrix3, Vector3};
 use psidpd_core::engine::PeriodicBox;
-use std::io::{self, Write};
+use std::io::{self, BufRead, Write};
 use std::path::Path;
 
 /// Writes a frame in extended XYZ, every number with the digits that bring it back unchanged.
@@ -60,42 +60,70 @@ fn element_numbers(names: &[String]) -> Vec<usize> {
     known.unwrap_or_else(|| (1..=names.len()).collect())
 }
 
-/// A frame of an extended XYZ text; `None` if there is no such frame. `which` counts from 0; without it
-/// the last one is taken.
+/// A frame of an extended XYZ file; `None` if there is no such frame. `which` counts from 0; without it
+/// the last whole one is taken: a run that is still going may be in the middle of the next.
 ///
 /// Needs `Lattice` and a column `pos`; `species`, `velo`, `id`, `Origin`, `pbc`, `Time`, `Step` are used
 /// where they are. Species are numbered in the order of their first appearance in the frame.
 ///
 /// # Errors
 /// A line that is not what it should be; `path` stands for the file in messages.
-pub fn read_xyz(path: &Path, text: &str, which: Option<usize>) -> Result<Option<Configuration>, OutputError> {
-    let lines: Vec<&str> = text.lines().collect();
+pub fn read_xyz(
+    path: &Path,
+    input: impl BufRead,
+    which: Option<usize>,
+) -> Result<Option<Configuration>, OutputError> {
     let wrong = |line: usize, message: String| OutputError::Xyz { path: path.to_owned(), line, message };
-    let (mut next, mut number, mut found) = (0, 0, None);
-    while next < lines.len() && !lines[next].trim().is_empty() {
-        let count: usize = lines[next].trim().parse().map_err(|_| {
-            wrong(next + 1, format!("expected a number of particles, found {:?}", lines[next]))
-        })?;
-        let end = (next + 2).saturating_add(count);
-        if end > lines.len() {
-            return Err(wrong(lines.len(), format!("the file ends within a frame of {count} particles")));
+    let mut found = None;
+    let mut lines = input.lines().enumerate();
+    let mut next = || match lines.next() {
+        Some((k, line)) => line.map(|line| Some((k + 1, line))).map_err(OutputError::read(path)),
+        None => Ok(None),
+    };
+    let mut number = 0;
+    while let Some((start, line)) = next()?.filter(|(_, line)| !line.trim().is_empty()) {
+        let count: usize = line
+            .trim()
+            .parse()
+            .map_err(|_| wrong(start, format!("expected a number of particles, found {line:?}")))?;
+        let wanted = which.is_none_or(|w| w == number);
+        let mut frame = Vec::new();
+        for _ in 0..=count {
+            match next()? {
+                Some((_, line)) if wanted => frame.push(line),
+                Some(_) => {}
+                None if which.is_none() && found.is_some() => return parse_found(path, found),
+                None => {
+                    return Err(wrong(start, format!("the file ends within a frame of {count} particles")));
+                }
+            }
         }
-        if which.is_none_or(|w| w == number) {
-            found = Some(next);
+        if wanted {
+            found = Some((start, frame));
         }
-        next = end;
         number += 1;
     }
-    let Some(start) = found else { return Ok(None) };
-    let count: usize = lines[start].trim().parse().unwrap_or(0);
-    let rows = &lines[start + 2..start + 2 + count];
-    parse_frame(lines[start + 1], rows).map(Some).map_err(|(line, message)| wrong(start + 2 + line, message))
+    parse_found(path, found)
+}
+
+/// A frame from the number of its first line and all others.
+fn parse_found(
+    path: &Path,
+    found: Option<(usize, Vec<String>)>,
+) -> Result<Option<Configuration>, OutputError> {
+    let Some((start, lines)) = found else { return Ok(None) };
+    let Some((comment, rows)) = lines.split_first() else { return Ok(None) };
+    parse_frame(comment, rows).map(Some).map_err(|(line, message)| OutputError::Xyz {
+        path: path.to_owned(),
+        line: start + 1 + line,
+        message,
+    })
 }
 
 type Fault = (usize, String);
 
 /// One frame; lines of faults count from 0 for the comment.
-fn parse_frame(comment: &str, rows: &[&str]) -> Result<Configuration, Fault> {
+fn parse_frame(comment: &str, rows: &[String]) -> Result<Configuration, Fault> {
     let head = |message: &str| (0, message.to_owned());
     let pairs = key_values(comment);
     let value = |key: &str| pairs.iter().find(|(k, _)| k.eq_ignore_ascii_case(key)).map(|(_, v)| v.as_str());
@@ -223,9 +251,9 @@ mod tests {
         let names = ["A".to_owned(), "B".to_owned()];
         let text = frame(&names, &domain) + &frame(&names, &domain).replace("Step=7", "Step=8");
         let path = Path::new("f.xyz");
-        let last = read_xyz(path, &text, None).unwrap().unwrap();
+        let last = read_xyz(path, text.as_bytes(), None).unwrap().unwrap();
         assert_eq!(last.step, Some(8));
-        let first = read_xyz(path, &text, Some(0)).unwrap().unwrap();
+        let first = read_xyz(path, text.as_bytes(), Some(0)).unwrap().unwrap();
         assert_eq!((first.step, first.time), (Some(7), Some(0.07)));
         assert_eq!(first.domain, domain);
         assert_eq!(first.x, [[0.1, 1.0 / 3.0, 2.5e-9], [1.5, -0.0, 2.0]]);
@@ -233,7 +261,11 @@ mod tests {
         assert_eq!(first.tag, [2, 1]);
         // Numbered as they come.
         assert_eq!((first.names, first.species), (vec!["B".to_owned(), "A".to_owned()], vec![0, 1]));
-        assert!(read_xyz(path, &text, Some(2)).unwrap().is_none());
+        assert!(read_xyz(path, text.as_bytes(), Some(2)).unwrap().is_none());
+        // A run that is going on: the last whole frame.
+        let cut = &text.as_bytes()[..text.len() - 80];
+        assert_eq!(read_xyz(path, cut, None).unwrap().unwrap().step, Some(7));
+        assert!(read_xyz(path, cut, Some(1)).is_err());
     }
 
     #[test]
@@ -255,7 +287,7 @@ mod tests {
         write_xyz(&frame, &mut text).unwrap();
         let text = String::from_utf8(text).unwrap();
         assert!(text.contains("pbc=\"T T F\""), "{text}");
-        let read = read_xyz(Path::new("f"), &text, None).unwrap().unwrap();
+        let read = read_xyz(Path::new("f"), text.as_bytes(), None).unwrap().unwrap();
         assert_eq!((read.dimensions, read.v), (2, None));
     }
 
@@ -284,7 +316,7 @@ mod tests {
             (good.replace("id:I:1", "id:Q:1"), "line 2: Properties"),
         ];
         for (text, message) in cases {
-            let error = read_xyz(Path::new("f.xyz"), &text, None).unwrap_err().to_string();
+            let error = read_xyz(Path::new("f.xyz"), text.as_bytes(), None).unwrap_err().to_string();
             assert!(error.contains(message) && error.starts_with("f.xyz"), "{error}, not {message}");
         }
     }

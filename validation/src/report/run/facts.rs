@@ -43,10 +43,10 @@ pub fn facts(
         fact("wall time", format!("{seconds:.1} s{speed}"));
     }
     let beyond = summary.and_then(|s| s.get("out_of_bounds")).and_then(Value::as_array);
-    if let Some([below, above]) = beyond.map(Vec::as_slice) {
-        if below.as_u64() != Some(0) || above.as_u64() != Some(0) {
-            fact("ψ beyond the bounds of a density", format!("{below} times below, {above} times above"));
-        }
+    if let Some([below, above]) = beyond.map(Vec::as_slice)
+        && (below.as_u64() != Some(0) || above.as_u64() != Some(0))
+    {
+        fact("ψ beyond the bounds of a density", format!("{below} times below, {above} times above"));
     }
     if let Some(a) = about {
         fact("units", a.units.clone());
