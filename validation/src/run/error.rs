@@ -137,6 +137,11 @@ impl RunError {
         )
     }
 
+    /// Whether a file is the trouble, not the physics.
+    pub(super) fn is_output(&self) -> bool {
+        matches!(self, RunError::Output { .. } | RunError::Lammps(_))
+    }
+
     /// What can be done about it, where that is not in the message.
     pub fn help(&self) -> Option<String> {
         match self {

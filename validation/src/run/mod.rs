@@ -18,6 +18,7 @@ mod state;
 mod summary;
 mod thermo;
 mod timing;
+mod underway;
 
 pub use dump::write_frame;
 pub use error::RunError;
