@@ -34,6 +34,7 @@
 //! dump   = 0                                 # steps between frames of dump.lammpstrj; 0: none
 //! xyz    = 0                                 # steps between frames of trajectory.xyz; 0: none
 //! snapshot = 0                               # steps between pictures in snapshots/; 0: none
+//! # checkpoint = 10000                       # steps between checkpoints; every ten minutes if not given
 //! ```
 
 mod composition;
@@ -52,10 +53,11 @@ pub use stage::Stage;
 pub use velocities::Velocities;
 
 use crate::run::State;
-use psidpd_core::document::{Document, FileError, FileErrorKind, Section, Value};
+use psidpd_core::document::{Document, FileError, FileErrorKind, Section, Source, Value};
 use psidpd_core::engine::{PeriodicBox, Plan};
 use psidpd_core::model::Model;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// A scene file with its model, read and checked.
 #[derive(Debug, Clone)]
@@ -80,6 +82,10 @@ pub struct Scene {
     pub stages: Vec<Stage>,
     /// What is written.
     pub output: Output,
+    /// The text of the file.
+    pub source: Arc<Source>,
+    /// Where paths in the file start from.
+    pub folder: PathBuf,
 }
 
 impl Scene {
@@ -111,7 +117,21 @@ impl Scene {
         let mass = masses::read(&root, model.species(), &initial)?;
         let stages = stage::read(&root, kt)?;
         let output = output::read(&root)?;
-        let scene = Scene { title, model_path, model, kt, seed, domain, mass, initial, stages, output };
+        let (source, folder) = (root.source().clone(), base.to_owned());
+        let scene = Scene {
+            title,
+            model_path,
+            model,
+            kt,
+            seed,
+            domain,
+            mass,
+            initial,
+            stages,
+            output,
+            source,
+            folder,
+        };
         scene.check_noise(&root)?;
         root.finish()?;
         Ok(scene)

@@ -105,6 +105,7 @@ fn errors_name_line_key_and_cause() {
         ("kT = 2.0", "lambda = 1.5", 20, "must be from 0 to 1"),
         ("name = \"two\"", "name = \"one\"", 16, "names two stages"),
         ("dump = 7", "dump = 7\nthermos = 1", 24, "output.thermos: unknown key"),
+        ("dump = 7", "dump = 7\ncheckpoint = -1", 24, "whole number from 0"),
         ("[output]", "[masses]\nA = 0\n[output]", 23, "masses.A: must be positive"),
         ("[output]", "[masses]\nD = 1\n[output]", 23, "unknown species \"D\""),
     ];
