@@ -76,6 +76,61 @@ fn forces_are_the_gradient_of_the_energy_in_the_file() {
     assert!(total.abs() < 1e-12);
 }
 
+/// A report is made with the run, and again from its folder; pictures come from each of its files.
+#[test]
+fn a_run_has_a_report_and_pictures() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let run = |arguments: &[&str]| {
+        let output = psidpd(here, arguments);
+        assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", said(&output));
+    };
+    let path = write(here, "scene.toml", &scene("xyz = 25\nsnapshot = 25\n"));
+    run(&["run", &path, "--out", "out", "--report"]);
+    let page = std::fs::read_to_string(here.join("out/report.html")).unwrap();
+    for text in ["small", "Temperature", "Local density", "F (387)", "class=\"movie\"", "trajectory.xyz"] {
+        assert!(page.contains(text), "{text}");
+    }
+    let about: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(here.join("out/about.json")).unwrap()).unwrap();
+    let thermo = std::fs::read_to_string(here.join("out/thermo.csv")).unwrap();
+    let told: Vec<&str> =
+        about["thermo"].as_array().unwrap().iter().map(|c| c["name"].as_str().unwrap()).collect();
+    assert_eq!(thermo.lines().next().unwrap().split(',').collect::<Vec<_>>(), told);
+    let pictures: Vec<_> = std::fs::read_dir(here.join("out/snapshots")).unwrap().collect();
+    assert_eq!(pictures.len(), 3);
+    for file in ["final.data", "dump.lammpstrj", "trajectory.xyz"] {
+        let file = format!("out/{file}");
+        run(&["snapshot", &file, "--out", "a.svg", "--model", &model()]);
+        assert!(std::fs::read_to_string(here.join("a.svg")).unwrap().contains(">F (387)</text>"), "{file}");
+        run(&["snapshot", &file, "--density", "--view", "x", "--size", "64", "--out", "a.png"]);
+        assert!(std::fs::read(here.join("a.png")).unwrap().starts_with(b"\x89PNG"));
+    }
+    // A run into the same folder leaves nothing of the one before.
+    let path = write(here, "scene.toml", &scene(""));
+    run(&["run", &path, "--out", "out"]);
+    for file in ["report.html", "trajectory.xyz"] {
+        assert!(!here.join("out").join(file).exists(), "{file}");
+    }
+    assert_eq!(std::fs::read_dir(here.join("out/snapshots")).unwrap().count(), 0);
+    run(&["report", "out"]);
+    assert!(std::fs::read_to_string(here.join("out/report.html")).unwrap().contains("no snapshots"));
+
+    for (arguments, message) in [
+        (vec!["report", "nowhere"], "nothing of a run"),
+        (vec!["snapshot", "nowhere.data"], "nowhere.data"),
+        (vec!["snapshot", "scene.toml"], "scene.toml"),
+        (vec!["snapshot", "out/final.data", "--out", "a.gif"], ".svg or .png"),
+        (vec!["snapshot", "out/final.data", "--slice", "0"], "--slice"),
+        (vec!["snapshot", "out/dump.lammpstrj", "--frame", "3"], "no frame 3"),
+        (vec!["snapshot", "out/final.data", "--density", "--species", "G"], "no species G"),
+    ] {
+        let output = psidpd(here, &arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", said(&output));
+        assert!(said(&output).contains(message), "{arguments:?}: {}", said(&output));
+    }
+}
+
 /// What is wrong, and a part of what the program must say; all with exit code 2.
 #[test]
 fn bad_input_is_named_with_file_line_and_key() {

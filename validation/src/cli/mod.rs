@@ -9,7 +9,9 @@ mod diagnostic;
 mod export;
 mod forces;
 mod lammps;
+mod report;
 mod run;
+mod snapshot;
 mod theory;
 mod validate;
 
@@ -40,6 +42,10 @@ enum Verb {
     Theory(theory::Arguments),
     /// Run a scene natively.
     Run(run::Arguments),
+    /// Make report.html of a run again, from the files in its folder.
+    Report(report::Arguments),
+    /// A picture of the particles, or of their density, in a data, dump or XYZ file.
+    Snapshot(snapshot::Arguments),
     /// Energy, virial, densities and forces of one configuration.
     Forces(forces::Arguments),
     /// Write a fluid for another code.
@@ -69,6 +75,8 @@ pub fn main() -> ExitCode {
         Verb::Theory(a) => theory::run(a, json),
         Verb::Export(a) => export::run(a, json),
         Verb::Run(a) => run::run(a, json),
+        Verb::Report(a) => report::run(a, json),
+        Verb::Snapshot(a) => snapshot::run(a, json),
         Verb::Forces(a) => forces::run(a, json),
         Verb::Lammps(a) => lammps::run(a, json),
     };

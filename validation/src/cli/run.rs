@@ -1,5 +1,5 @@
 use super::{Failure, Verdict, write_json};
-use crate::report::Progress;
+use crate::report::{Progress, write_run_report};
 use crate::run::{Begin, Outcome, Runner, Start, Summary, Timing};
 use crate::scene::Scene;
 use serde::Serialize;
@@ -27,6 +27,9 @@ pub struct Arguments {
     /// Start over where a run waits to be taken up again.
     #[arg(long)]
     overwrite: bool,
+    /// Make report.html at the end, also of a run that stopped.
+    #[arg(long)]
+    report: bool,
 }
 
 /// What `--json` writes.
@@ -38,7 +41,7 @@ struct Report<'a> {
 }
 
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
-    let Arguments { scene: path, out, resume, overwrite } = arguments;
+    let Arguments { scene: path, out, resume, overwrite, report } = arguments;
     let scene = Scene::open(path).map_err(Failure::new)?;
     let begin = match (resume, overwrite) {
         (true, _) => Begin::Resume,
@@ -50,9 +53,16 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     let total: u64 = scene.stages.iter().map(|s| s.steps).sum();
     let made = tell_start(runner.start(), begin, out, total);
     let bar = Progress::new().steps(&scene.title, total, made, runner.particles());
-    let outcome = runner.run(&stop, &mut |p| bar.set(p.step)).map_err(Failure::new);
+    let outcome = runner.run(&stop, &mut |p| bar.set(p.step));
     bar.finish();
-    match outcome? {
+    if *report && outcome.as_ref().err().is_none_or(|e| e.is_stop()) {
+        let page = write_run_report(out);
+        // A full disk has no room for a page either, and the run's own message says more.
+        if outcome.is_ok() {
+            page.map_err(Failure::new)?;
+        }
+    }
+    match outcome.map_err(Failure::new)? {
         Outcome::Finished { summary, timing } => {
             say(&summary.to_string());
             if let Some(session) = timing.sessions.last().filter(|_| made < total) {

@@ -19,6 +19,7 @@ mod state;
 mod summary;
 mod thermo;
 mod timing;
+mod underway;
 
 pub use dump::write_frame;
 pub use error::RunError;

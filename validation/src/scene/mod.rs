@@ -31,7 +31,9 @@
 //!
 //! [output]
 //! thermo = 100                               # steps between rows of totals; 0: none
-//! dump   = 0                                 # steps between frames; 0: none
+//! dump   = 0                                 # steps between frames of dump.lammpstrj; 0: none
+//! xyz    = 0                                 # steps between frames of trajectory.xyz; 0: none
+//! snapshot = 0                               # steps between pictures in snapshots/; 0: none
 //! # checkpoint = 10000                       # steps between checkpoints; every ten minutes if not given
 //! ```
 

@@ -61,7 +61,7 @@ fn reads_the_schema() {
     let Initial::Filling(filling) = &scene.initial else { panic!("not a file") };
     assert_eq!(filling.count, 630);
     assert_eq!(filling.composition.fractions(), [0.25, 0.75]);
-    assert_eq!(scene.output, Output { thermo: 100, dump: 7, checkpoint: None });
+    assert_eq!(scene.output, Output { thermo: 100, dump: 7, ..Output::default() });
     assert_eq!(scene.mass, [1.0, 1.0]);
     let [one, two] = scene.stages.as_slice() else { panic!("two stages") };
     assert_eq!((one.kt, one.thermostat, one.integrator), (1.5, true, crate::run::Integrator::VelocityVerlet));

@@ -146,9 +146,12 @@ fn a_finished_run_is_left_as_it_is() {
     assert!(matches!(runner.start(), Start::Finished));
     let outcome = runner.run(&AtomicUsize::new(0), &mut |_| panic!("no step is left")).unwrap();
     let Outcome::Finished { summary: again, timing } = outcome else { panic!("{outcome:?}") };
-    assert_eq!((*again, timing.sessions.len()), (summary, 1));
+    assert_eq!((&*again, timing.sessions.len()), (&summary, 1));
     assert!(contents(out) == before);
     drop(runner);
+    // Even where its largest file was taken away.
+    std::fs::remove_file(out.join("dump.lammpstrj")).unwrap();
+    assert_eq!(finished(&scene, out, Begin::Resume), summary);
     // It may be made anew.
     finished(&scene, out, Begin::New);
     assert!(contents(out) == before);
