@@ -23,7 +23,11 @@ pub fn write_snapshot(folder: &Path, frame: &Frame) -> Result<PathBuf, OutputErr
     let (image, _) = draw_particles(frame, &ParticleOptions::default());
     let png =
         image.to_png().map_err(|e| OutputError::Picture { path: path.clone(), message: e.to_string() })?;
-    crate::report::write_atomically(&path, &png)?;
+    // Always by the same other name first: a run that is killed and taken up again leaves no trace of it.
+    let new = path.with_extension("png.new");
+    std::fs::write(&new, &png)
+        .and_then(|()| std::fs::rename(&new, &path))
+        .map_err(|cause| crate::report::ReportError::Write { path: path.clone(), cause })?;
     Ok(path)
 }
 
