@@ -36,7 +36,7 @@ pub struct Progress<'a> {
 pub fn run_scene(scene: &Scene, out: &Path, progress: &mut dyn FnMut(Progress)) -> Result<Summary, RunError> {
     std::fs::create_dir_all(out).map_err(RunError::output(out))?;
     let state = scene.initial_state();
-    let simulation = Simulation::new(&scene.model, scene.kt, state.clone(), scene.seed)?;
+    let simulation = scene.simulation(state.clone())?;
     let mut run = Run {
         scene,
         output: Output::create(scene, out)?,
@@ -78,8 +78,7 @@ struct Good {
 impl Run<'_> {
     fn stage(&mut self, stage: &Stage) -> Result<(), RunError> {
         self.rows.clear();
-        self.simulation.set_temperature(stage.kt)?;
-        self.simulation.set_thermostat(stage.thermostat);
+        self.scene.enter(stage, &mut self.simulation)?;
         self.simulation.prepare(stage.dt, Want::TOTALS)?;
         if self.simulation.step_number() == 0 {
             self.report(stage, true)?;
