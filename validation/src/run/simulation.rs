@@ -43,6 +43,7 @@ pub struct Simulation {
     tally: Tally,
     before: Before,
     walls: Walls,
+    frozen_tags: Tags,
     /// By particle; empty if none is frozen.
     frozen: Vec<bool>,
     mobile: usize,
@@ -92,6 +93,7 @@ impl Simulation {
             tally: Tally::default(),
             before: Before::default(),
             walls: Walls::of(&domain, fluid.dimensions),
+            frozen_tags: Tags::none(),
             frozen: Vec::new(),
             mobile: owned,
             support_force: [0.0; 3],
@@ -123,7 +125,13 @@ impl Simulation {
     /// Freezes the particles of these tags, and no others: they rest where they are, and act on the others.
     /// Their temperature and momentum do not count.
     pub fn set_frozen(&mut self, tags: &Tags) {
-        let frozen: Vec<bool> = self.tags().iter().map(|t| tags.contain(*t)).collect();
+        self.frozen_tags = tags.clone();
+        self.find_frozen();
+    }
+
+    /// Finds the frozen particles by their tags, whose order may have changed, and stops them.
+    fn find_frozen(&mut self) {
+        let frozen: Vec<bool> = self.tags().iter().map(|t| self.frozen_tags.contain(*t)).collect();
         let count = frozen.iter().filter(|f| **f).count();
         self.mobile = self.owned - count;
         self.frozen = if count > 0 { frozen } else { Vec::new() };

@@ -39,6 +39,11 @@ impl Initial {
         }
     }
 
+    /// The normal of the first slab that moves, if there is one.
+    pub fn slab_axis(&self) -> Option<usize> {
+        self.parts().iter().filter(|part| !part.frozen).find_map(|part| part.normal)
+    }
+
     /// The tags of the parts that `wanted` holds for.
     pub fn tags_of(&self, wanted: impl Fn(&Part) -> bool) -> Tags {
         let mut first = 1;

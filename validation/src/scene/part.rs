@@ -22,6 +22,8 @@ pub struct Part {
     pub name: String,
     /// Where it is.
     pub shape: Shape,
+    /// Its normal, if it is a slab across the box.
+    pub normal: Option<usize>,
     /// How many particles.
     pub count: usize,
     /// Of which species.
@@ -63,6 +65,7 @@ impl<'a> Common<'a> {
             velocities: Velocities::read(section)?,
             velocity: section.get("velocity").map_or(Ok([0.0; 3]), |v| vector(&v, dimensions))?,
             frozen: false,
+            normal: self.shapes.normal(&shape),
             name,
             shape,
         })
@@ -75,6 +78,7 @@ impl<'a> Common<'a> {
         Ok(Part {
             name: WHOLE.to_owned(),
             shape,
+            normal: None,
             count: check_count(count, |kind| value.error(kind))?,
             composition: Composition::equal(self.model.species().len()),
             arrangement: Arrangement::Random { min_distance: 0.0 },

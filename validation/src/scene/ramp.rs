@@ -42,7 +42,7 @@ pub fn read(section: &Section, stage: Stage) -> Result<Vec<Stage>, FileError> {
         },
     };
     let level = |k: u64| Stage {
-        name: format!("{} ({k} of {levels})", stage.given_name),
+        level: Some([k, levels]),
         // Whole numbers of steps that add up.
         steps: stage.steps / levels + u64::from(k <= stage.steps % levels),
         kt: if k == levels { to } else { from + (to - from) * k as f64 / levels as f64 },

@@ -8,10 +8,10 @@ use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
 /// A part of a run under one set of conditions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stage {
-    /// Its name. Levels of a ramp have names of their own: "quench (3 of 20)".
+    /// Its name; levels of one ramp share it.
     pub name: String,
-    /// The name that the file gives it: levels of one ramp share it.
-    pub given_name: String,
+    /// Which level of a ramp it is, from 1, of how many.
+    pub level: Option<[u64; 2]>,
     /// How many steps.
     pub steps: u64,
     /// Δt.
@@ -24,6 +24,16 @@ pub struct Stage {
     pub thermostat: bool,
     /// Whether body forces act.
     pub body_forces: bool,
+}
+
+impl Stage {
+    /// What it is called in comments: "quench (3 of 20)" for a level of a ramp.
+    pub fn label(&self) -> String {
+        match self.level {
+            Some([level, levels]) => format!("{} ({level} of {levels})", self.name),
+            None => self.name.clone(),
+        }
+    }
 }
 
 /// Names of the integrators.
@@ -67,10 +77,10 @@ pub fn read(root: &Section, kt: f64) -> Result<Vec<Stage>, FileError> {
         let wrong = |key: &str, message: String| {
             section.require(key).map(|v| v.error(FileErrorKind::Value(message))).unwrap_or_else(|e| e)
         };
+        if let Some(stage) = levels.iter().find(|l| stages.iter().any(|s| s.name == l.name)) {
+            return Err(wrong("name", format!("\"{}\" names two stages", stage.name)));
+        }
         for stage in levels {
-            if stages.iter().any(|s| s.name == stage.name) {
-                return Err(wrong("name", format!("\"{}\" names two stages", stage.name)));
-            }
             total = total.saturating_add(stage.steps);
             if total > MOST_STEPS {
                 return Err(wrong("steps", format!("more than {MOST_STEPS} steps in all")));
@@ -104,7 +114,7 @@ fn read_short(
     let stages = stages.into_iter().filter_map(|(name, value)| {
         let stage = |steps| Stage {
             name: name.to_owned(),
-            given_name: name.to_owned(),
+            level: None,
             steps,
             dt: defaults.dt,
             integrator: defaults.integrator,
@@ -134,8 +144,8 @@ fn read_one(section: &Section, defaults: Defaults) -> Result<Vec<Stage>, FileErr
     let steps = read_steps(&section.require("steps")?)?;
     let flag = |key: &str| section.get(key).map_or(Ok(true), |v| v.boolean().map(|b| b.value));
     let stage = Stage {
-        given_name: name.clone(),
         name,
+        level: None,
         steps,
         dt: section.get("dt").map_or(Ok(defaults.dt), |value| positive(&value))?,
         integrator: read_integrator(section, defaults.integrator)?,

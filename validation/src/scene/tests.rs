@@ -400,11 +400,11 @@ fn random_particles_keep_their_distance() {
 fn ramps_have_levels_that_add_up() {
     let text = SCENE.replace("kT = 2.0\nthermostat = false", "kT = [2.0, 1.0]\nlevels = 3");
     let scene = parse(&text).unwrap();
-    let levels: Vec<(&str, u64, f64)> =
-        scene.stages[1..].iter().map(|s| (s.name.as_str(), s.steps, s.kt)).collect();
-    assert_eq!(levels[0], ("two (1 of 3)", 7, 2.0 - 1.0 / 3.0));
-    assert_eq!((levels[1].1, levels[2]), (7, ("two (3 of 3)", 6, 1.0)));
-    assert!(scene.stages[1..].iter().all(|s| s.given_name == "two"));
+    let levels: Vec<(String, u64, f64)> =
+        scene.stages[1..].iter().map(|s| (s.label(), s.steps, s.kt)).collect();
+    assert_eq!(levels[0], ("two (1 of 3)".to_owned(), 7, 2.0 - 1.0 / 3.0));
+    assert_eq!((levels[1].1, &levels[2]), (7, &("two (3 of 3)".to_owned(), 6, 1.0)));
+    assert!(scene.stages[1..].iter().all(|s| s.name == "two"));
     let cases = [
         ("kT = 2.0", "kT = [2.0, 1.0]\nlevels = 21", 21, "must be from 1 to 20"),
         ("kT = 2.0", "kT = 2.0\nlevels = 4", 21, "has no levels"),

@@ -72,6 +72,16 @@ impl Shapes<'_> {
         Ok(shape)
     }
 
+    /// The normal of a region that reaches across the box in all directions but one.
+    pub fn normal(&self, shape: &Shape) -> Option<usize> {
+        let Shape::Block { low, high } = shape else { return None };
+        let lengths = self.domain.lengths();
+        let short = |k: &usize| high[*k] - low[*k] < lengths[*k] * (1.0 - ROUNDING);
+        let mut short = (0..self.dimensions).filter(short);
+        let first = short.next()?;
+        short.next().is_none().then_some(first)
+    }
+
     fn check_inside(&self, shape: &Shape, key: &Value) -> Result<(), FileError> {
         let [low, high] = self.whole().bounds(self.dimensions);
         let [from, to] = shape.bounds(self.dimensions);
