@@ -8,6 +8,7 @@ mod diagnostic;
 mod export;
 mod forces;
 mod lammps;
+mod new;
 mod run;
 mod theory;
 mod validate;
@@ -37,6 +38,8 @@ enum Verb {
     Check(check::Arguments),
     /// Mean field: equation of state, critical point, spinodal, binodal, surface tension.
     Theory(theory::Arguments),
+    /// Write a scene to begin with, and its model.
+    New(new::Arguments),
     /// Run a scene natively.
     Run(run::Arguments),
     /// Energy, virial, densities and forces of one configuration.
@@ -65,6 +68,7 @@ pub fn main() -> ExitCode {
         Verb::Check(a) => check::run(a, json),
         Verb::Theory(a) => theory::run(a, json),
         Verb::Export(a) => export::run(a, json),
+        Verb::New(a) => new::run(a, json),
         Verb::Run(a) => run::run(a, json),
         Verb::Forces(a) => forces::run(a, json),
         Verb::Lammps(a) => lammps::run(a, json),

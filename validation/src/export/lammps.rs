@@ -8,10 +8,10 @@ mod physics;
 
 use crate::run::{Integrator, RunError};
 use crate::scene::{Scene, Stage};
+use physics::Physics;
 use psidpd_core::document::{Document, FileError};
 use psidpd_core::model::{Fluid, Model};
 use std::fmt::Write;
-use physics::Physics;
 use std::path::{Component, Path, PathBuf};
 
 /// The script.

@@ -26,6 +26,7 @@ mod ramp;
 mod saved;
 mod shape;
 mod stage;
+mod template;
 mod velocities;
 
 pub use arrangement::{Arrangement, Lattice};
@@ -35,6 +36,7 @@ pub use output::Output;
 pub use part::Part;
 pub use shape::Shape;
 pub use stage::Stage;
+pub use template::{TEMPLATES, Template, TemplateError};
 pub use velocities::Velocities;
 
 use crate::run::{BodyForce, RunError, Simulation, State, Tags};

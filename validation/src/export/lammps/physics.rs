@@ -33,7 +33,10 @@ impl<'a> Physics<'a> {
     /// Groups, and what moves particles.
     pub fn write_motion(&self, s: &mut impl Write) -> Result {
         if self.mobile == "mobile" {
-            writeln!(s, "# frozen particles are not integrated: they keep their places, and velocities of zero")?;
+            writeln!(
+                s,
+                "# frozen particles are not integrated: they keep their places, and velocities of zero"
+            )?;
             writeln!(s, "group         frozen id {}", ids(&self.scene.frozen))?;
             writeln!(s, "group         mobile subtract all frozen")?;
             writeln!(s, "velocity      frozen set 0 0 0")?;
@@ -41,7 +44,12 @@ impl<'a> Physics<'a> {
         writeln!(s, "fix           move {} nve", self.mobile)?;
         if self.walls != [false; 3] {
             let faces = (0..3).filter(|k| self.walls[*k]).map(|k| format!("{0}lo EDGE {0}hi EDGE", AXES[k]));
-            writeln!(s, "fix           walls {} wall/reflect {}", self.mobile, faces.collect::<Vec<_>>().join(" "))?;
+            writeln!(
+                s,
+                "fix           walls {} wall/reflect {}",
+                self.mobile,
+                faces.collect::<Vec<_>>().join(" ")
+            )?;
         }
         if self.dimensions == 2 {
             writeln!(s, "fix           plane all enforce2d")?;
@@ -95,7 +103,12 @@ impl<'a> Physics<'a> {
     }
 
     /// The group that a body force acts on.
-    fn write_group(&self, s: &mut impl Write, name: &str, force: &BodyForce) -> std::result::Result<String, std::fmt::Error> {
+    fn write_group(
+        &self,
+        s: &mut impl Write,
+        name: &str,
+        force: &BodyForce,
+    ) -> std::result::Result<String, std::fmt::Error> {
         let mut group = self.mobile.to_owned();
         if let Tags::Ranges(_) = &force.tags {
             writeln!(s, "group         {name}ids id {}", ids(&force.tags))?;
