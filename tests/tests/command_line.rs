@@ -239,3 +239,41 @@ fn evaluations_beyond_bounds_are_counted_and_reported() {
     let output = psidpd(here, &["run", &free, "--out", "out"]);
     assert!(!said(&output).contains("out of bounds"), "{}", said(&output));
 }
+
+/// What `new` writes runs as it is, and says how.
+#[test]
+fn every_template_can_be_written_checked_and_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let help = said(&psidpd(here, &["new", "--help"]));
+    for template in ["bulk", "slab", "droplet", "pendant-drop", "demixing", "collision", "channel"] {
+        assert!(help.contains(template), "{help}");
+        let output = psidpd(here, &["new", template, "--template", template, "--json", "new.json"]);
+        assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+        let scene = format!("{template}.toml");
+        assert!(said(&output).contains(&format!("psidpd run {scene} --out {template}")), "{}", said(&output));
+        let json: serde_json::Value =
+            serde_json::from_str(&std::fs::read_to_string(here.join("new.json")).unwrap()).unwrap();
+        assert!(here.join(json["model"].as_str().unwrap()).is_file(), "{json}");
+        let check = psidpd(here, &["check", &scene]);
+        assert_eq!(check.status.code(), Some(0), "{template}: {}", said(&check));
+        // The scene as it is, but for the number of steps.
+        let text = std::fs::read_to_string(here.join(&scene)).unwrap();
+        let short: String = text
+            .lines()
+            .map(|line| match line.trim_start().starts_with("steps") || line.starts_with("equilibrate") {
+                true => format!("{} = 20\n", line.split('=').next().unwrap_or_default()),
+                false => format!("{line}\n"),
+            })
+            .collect();
+        write(here, "short.toml", &short);
+        let run = psidpd(here, &["run", "short.toml", "--out", template]);
+        assert_eq!(run.status.code(), Some(0), "{template}: {}", said(&run));
+        let again = psidpd(here, &["new", template, "--template", template]);
+        assert_eq!(again.status.code(), Some(2));
+        assert!(said(&again).contains("is there already"), "{}", said(&again));
+    }
+    let unknown = psidpd(here, &["new", "x", "--template", "tube"]);
+    assert_eq!(unknown.status.code(), Some(2));
+    assert!(said(&unknown).contains("pendant-drop"), "{}", said(&unknown));
+}

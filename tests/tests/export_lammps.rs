@@ -125,6 +125,104 @@ gamma = 1.0
 range = 1.0
 "#;
 
+/// A box of walls with a frozen floor and a frozen block, gravity on one part, a wind on one species of the
+/// other, a ramp, stages with and without thermostat and body forces. Hot enough that many particles reach the
+/// walls.
+const WALLS: &str = r#"
+title = "walls"
+model = "mixture.toml"
+kT    = 3.0
+seed  = 14
+dt    = 0.01
+[box]
+lengths  = [5.0, 6.0, 7.0]
+boundary = ["reflecting", "periodic", "reflecting"]
+[masses]
+B = 2.0
+[[part]]
+shape     = "layer"
+face      = "zlo"
+thickness = 1.0
+density   = 3.0
+lattice   = "fcc"
+frozen    = true
+[[part]]
+name    = "lower"
+shape   = "box"
+low     = [0.0, 0.0, 1.5]
+high    = [5.0, 6.0, 4.0]
+density = 3.0
+[[part]]
+shape   = "sphere"
+radius  = 0.5
+center  = [2.5, 3.0, 4.5]
+count   = 5
+frozen  = true
+[[part]]
+name    = "upper"
+shape   = "box"
+low     = [0.0, 0.0, 5.0]
+density = 3.0
+min_distance = 0.3
+velocity = [1.0, 0.0, 0.5]
+[[body_force]]
+acceleration = [0.3, -0.2, -0.5]
+parts        = ["upper"]
+[[body_force]]
+acceleration = [0.0, 0.7, 0.0]
+reversed_along = "z"
+parts        = ["lower", "upper"]
+species      = ["B"]
+[[stage]]
+name  = "free"
+steps = 10
+body_forces = false
+[[stage]]
+name  = "ramp"
+steps = 25
+kT    = [3.0, 5.0]
+levels = 3
+[[stage]]
+name  = "alone"
+steps = 15
+thermostat = false
+[[stage]]
+name  = "again"
+steps = 15
+body_forces = false
+[[stage]]
+name  = "and again"
+steps = 20
+integrator = "groot-warren"
+lambda = 0.5
+[output]
+thermo = 5
+dump   = 5
+"#;
+
+/// Opposite flows between two walls in two dimensions.
+const CHANNELS: &str = r#"
+title = "channels"
+model = "flat.toml"
+kT    = 2.5
+seed  = 15
+steps = 60
+dt    = 0.01
+[box]
+lengths  = [7.0, 9.0]
+boundary = ["periodic", "reflecting"]
+[initial]
+kind    = "lattice"
+lattice = "hexagonal"
+density = 12.0
+[[body_force]]
+acceleration   = [0.5, 0.0]
+reversed_along = "y"
+[output]
+thermo = 10
+dump   = 10
+"#;
+
 /// A folder with a scene in `scenes/`, its model and a table.
 fn folder(scene: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
@@ -269,6 +367,18 @@ fn two_dimensions() {
 }
 
 #[test]
+fn walls_frozen_particles_body_forces_and_a_ramp() {
+    compare(WALLS, 1);
+    compare(WALLS, 2);
+}
+
+#[test]
+fn opposite_flows_between_walls_in_two_dimensions() {
+    compare(CHANNELS, 1);
+    compare(CHANNELS, 2);
+}
+
+#[test]
 fn what_has_no_counterpart_is_refused() {
     let cases = [
         (
@@ -276,6 +386,10 @@ fn what_has_no_counterpart_is_refused() {
             "groot-warren with lambda = 0.65 has no counterpart",
         ),
         (ONE_SPECIES.replace("seed  = 11", "seed  = 0"), "the seed must be at least 1"),
+        (
+            ONE_SPECIES.to_owned() + &"[[body_force]]\nacceleration = [0.0, 0.0, 1.0]\n".repeat(10),
+            "more groups than LAMMPS has",
+        ),
         (ONE_SPECIES.replace("steps = 50", "steps = 3000000000"), "more than one run of LAMMPS takes"),
     ];
     for (scene, message) in cases {

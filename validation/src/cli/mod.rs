@@ -9,6 +9,7 @@ mod diagnostic;
 mod export;
 mod forces;
 mod lammps;
+mod new;
 mod report;
 mod run;
 mod snapshot;
@@ -40,6 +41,8 @@ enum Verb {
     Check(check::Arguments),
     /// Mean field: equation of state, critical point, spinodal, binodal, surface tension.
     Theory(theory::Arguments),
+    /// Write a scene to begin with, and its model.
+    New(new::Arguments),
     /// Run a scene natively.
     Run(run::Arguments),
     /// Make report.html of a run again, from the files in its folder.
@@ -74,6 +77,7 @@ pub fn main() -> ExitCode {
         Verb::Check(a) => check::run(a, json),
         Verb::Theory(a) => theory::run(a, json),
         Verb::Export(a) => export::run(a, json),
+        Verb::New(a) => new::run(a, json),
         Verb::Run(a) => run::run(a, json),
         Verb::Report(a) => report::run(a, json),
         Verb::Snapshot(a) => snapshot::run(a, json),

@@ -2,11 +2,10 @@ use super::checkpoint::{Checkpoint, CheckpointError, Found, Identity, Position, 
 use super::error::RunError;
 use super::folder::Folder;
 use super::output::Output;
-use super::simulation::Simulation;
 use super::summary::{Summary, Sums};
 use super::thermo::Thermo;
 use super::timing::Timing;
-use super::underway::{Run, set_conditions};
+use super::underway::Run;
 use crate::scene::Scene;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -131,7 +130,7 @@ impl<'a> Runner<'a> {
             refuse_unfinished(&store, out)?;
         }
         let state = scene.initial_state();
-        let simulation = simulation(scene, state.clone())?;
+        let simulation = scene.simulation(state.clone())?;
         store.clear()?;
         let good = Checkpoint {
             program: PROGRAM.into(),
@@ -155,9 +154,9 @@ impl<'a> Runner<'a> {
 
     fn resume(scene: &'a Scene, folder: Folder, store: Store, found: Found) -> Result<Runner<'a>, RunError> {
         let Found { checkpoint: good, fallback } = found;
-        let mut simulation = simulation(scene, good.state.clone())?;
+        let mut simulation = scene.simulation(good.state.clone())?;
         if let Some(stage) = scene.stages.get(good.position.stage) {
-            set_conditions(&mut simulation, stage)?;
+            scene.enter(stage, &mut simulation)?;
         }
         simulation.restore(good.step, &good.state, &good.forces, good.out_of_bounds);
         if fallback.is_some() {
@@ -209,11 +208,6 @@ impl<'a> Runner<'a> {
         }
         run.go_on(stop, progress).map_err(|error| run.stop(error))
     }
-}
-
-/// The simulation of a scene, in whatever state.
-fn simulation(scene: &Scene, state: super::State) -> Result<Simulation, RunError> {
-    Simulation::new(&scene.model, scene.kt, state, scene.seed)
 }
 
 /// Whether a run can go on from a checkpoint: it is of this scene, and the files have what it counts on.

@@ -107,7 +107,7 @@ impl<'a> Run<'a> {
     /// Computes the forces that a stage starts with.
     fn enter(&mut self, stage: &Stage, progress: &mut dyn FnMut(Progress)) -> Result<(), RunError> {
         self.sums = Sums::default();
-        set_conditions(&mut self.simulation, stage)?;
+        self.scene.enter(stage, &mut self.simulation)?;
         self.simulation.prepare(stage.dt, Want::TOTALS)?;
         self.position.entered = true;
         if self.simulation.step_number() == 0 {
@@ -285,11 +285,4 @@ impl<'a> Run<'a> {
 
 fn every(interval: u64, step: u64) -> bool {
     interval > 0 && step.is_multiple_of(interval)
-}
-
-/// What acts in a stage; its forces are to be computed anew.
-pub(super) fn set_conditions(simulation: &mut Simulation, stage: &Stage) -> Result<(), RunError> {
-    simulation.set_temperature(stage.kt)?;
-    simulation.set_thermostat(stage.thermostat);
-    Ok(())
 }

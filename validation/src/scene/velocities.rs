@@ -1,4 +1,4 @@
-//! `velocities` of `[initial]`.
+//! `velocities` of what is filled.
 
 use psidpd_core::document::{FileError, Section};
 use rand_chacha::ChaCha8Rng;
@@ -7,7 +7,7 @@ use rand_distr::{Distribution, StandardNormal};
 /// How particles move at the start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Velocities {
-    /// Maxwell's distribution at the temperature of the scene, with the total momentum taken out. The
+    /// Maxwell's distribution at the temperature of the scene, with the momentum of the part taken out. The
     /// velocities are not scaled: their temperature fluctuates as that of a canonical ensemble.
     #[default]
     Thermal,

@@ -1,0 +1,81 @@
+//! Starts from files that another run has left.
+
+use super::initial::Initial;
+use super::velocities::Velocities;
+use crate::lammps::DataFile;
+use crate::run::{State, Tags};
+use psidpd_core::document::{FileError, FileErrorKind, Section};
+use psidpd_core::engine::PeriodicBox;
+use psidpd_core::model::Model;
+use std::path::Path;
+
+/// What a file is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// A LAMMPS data file.
+    Data,
+}
+
+impl Format {
+    /// The format that a kind of `[initial]` stands for.
+    pub fn of(kind: &str) -> Option<Format> {
+        match kind {
+            "data" => Some(Format::Data),
+            _ => None,
+        }
+    }
+}
+
+/// The particles and the box of a file, in which `periodic` says what the box does at its faces.
+///
+/// # Errors
+/// The file cannot be read, or is no state of `model`; in words.
+pub fn open(format: Format, path: &Path, model: &Model, periodic: [bool; 3]) -> Result<State, String> {
+    match format {
+        Format::Data => {
+            let data = DataFile::read(path).map_err(|e| e.to_string())?;
+            State::from_data_in(&data, model, periodic).map_err(|e| e.to_string())
+        }
+    }
+}
+
+/// Reads the keys of a start from a file, and the file.
+pub fn read(
+    section: &Section,
+    format: Format,
+    model: &Model,
+    base: &Path,
+    periodic: [bool; 3],
+) -> Result<(Initial, PeriodicBox), FileError> {
+    let value = section.require("file")?;
+    let path = base.join(value.string()?.value);
+    let state = open(format, &path, model, periodic).map_err(|why| {
+        value.error(FileErrorKind::Value(why)).with_help("the path is relative to the scene file")
+    })?;
+    let initial = Initial::File {
+        velocities: Velocities::read_or_keep(section)?,
+        frozen: read_frozen(section, &state)?,
+        path,
+        state: Box::new(state.clone()),
+    };
+    Ok((initial, state.domain))
+}
+
+fn read_frozen(section: &Section, state: &State) -> Result<Tags, FileError> {
+    let Some(value) = section.get("frozen_ids") else { return Ok(Tags::none()) };
+    let wrong = |message: String| value.error(FileErrorKind::Value(message));
+    let ids: Vec<u64> =
+        value.array()?.iter().map(|v| v.count().map(|c| c.value)).collect::<Result<_, _>>()?;
+    let [first, last] = ids[..] else {
+        return Err(wrong(format!("expected the first and the last id, found {} values", ids.len())));
+    };
+    let (Ok(first), Ok(last)) = (i32::try_from(first), i32::try_from(last)) else {
+        return Err(wrong(format!("{last} is beyond what ids can count")));
+    };
+    let tags = Tags::Ranges(vec![first..=last]);
+    match state.tag.iter().filter(|t| tags.contain(**t)).count() {
+        0 => Err(wrong(format!("no particle of the file has an id from {first} to {last}"))),
+        all if all == state.len() => Err(wrong("every particle is frozen: nothing would move".into())),
+        _ => Ok(tags),
+    }
+}
