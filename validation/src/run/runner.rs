@@ -5,6 +5,7 @@ use super::simulation::Simulation;
 use super::state::State;
 use super::summary::{Means, Summary};
 use super::thermo::{Thermo, ThermoFile};
+use crate::observe::{Observers, write_csv, write_json};
 use crate::scene::{Scene, Stage};
 use psidpd_core::engine::Want;
 use std::fs::File;
@@ -46,6 +47,7 @@ pub fn run_scene(scene: &Scene, out: &Path, progress: &mut dyn FnMut(Progress)) 
         steps: scene.stages.iter().map(|s| s.steps).sum(),
         rows: Vec::new(),
         last: None,
+        observers: Observers::new(scene),
         progress,
     };
     let start = Instant::now();
@@ -66,6 +68,7 @@ struct Run<'a> {
     /// Thermo rows of the stage.
     rows: Vec<Thermo>,
     last: Option<Thermo>,
+    observers: Observers,
     progress: &'a mut dyn FnMut(Progress),
 }
 
@@ -89,9 +92,10 @@ impl Run<'_> {
         for step in 1..=stage.steps {
             let number = self.simulation.step_number() + 1;
             let totals = self.is_row(number);
-            let want = if totals { Want::TOTALS } else { Want::FORCES };
+            let want = if totals { Want::TOTALS } else { self.observers.wants_in(number, &stage.name) };
             self.simulation.step(stage.dt, stage.integrator, want)?;
             self.time = begin + step as f64 * stage.dt;
+            self.observers.sample(&self.simulation, &stage.name, self.time);
             self.report(stage, totals)?;
         }
         Ok(())
@@ -128,6 +132,17 @@ impl Run<'_> {
         Ok(())
     }
 
+    /// `observables.json` and the tables in `observables/`, if the scene asks for any.
+    fn write_observations(&self) -> Result<(), RunError> {
+        let observations = self.observers.finish();
+        if observations.is_empty() {
+            return Ok(());
+        }
+        let (json, tables) = (self.output.folder.join("observables.json"), self.output.folder.join("observables"));
+        write_json(&json, &observations).map_err(RunError::output(&json))?;
+        write_csv(&tables, &observations).map_err(RunError::output(&tables))
+    }
+
     /// Saves what is left of a run that failed.
     fn stop(&self, stage: &Stage, cause: RunError) -> RunError {
         if matches!(cause, RunError::Output { .. }) {
@@ -151,6 +166,7 @@ impl Run<'_> {
         self.output.flush()?;
         let title = format!("psidpd: {}, step {}", self.scene.title, self.simulation.step_number());
         write_data(&self.output.folder.join("final.data"), &title, &self.simulation.state())?;
+        self.write_observations()?;
         let particles = self.simulation.len();
         let summary = Summary {
             title: self.scene.title.clone(),

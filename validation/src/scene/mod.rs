@@ -49,6 +49,7 @@ pub use output::Output;
 pub use stage::Stage;
 pub use velocities::Velocities;
 
+use crate::observe::{self, Observe};
 use crate::run::State;
 use psidpd_core::document::{Document, FileError, FileErrorKind, Section, Value};
 use psidpd_core::engine::{PeriodicBox, Plan};
@@ -78,6 +79,8 @@ pub struct Scene {
     pub stages: Vec<Stage>,
     /// What is written.
     pub output: Output,
+    /// What is measured on the way.
+    pub observe: Observe,
 }
 
 impl Scene {
@@ -109,7 +112,8 @@ impl Scene {
         let mass = masses::read(&root, model.species(), &initial)?;
         let stages = stage::read(&root, kt)?;
         let output = output::read(&root)?;
-        let scene = Scene { title, model_path, model, kt, seed, domain, mass, initial, stages, output };
+        let observe = observe::read(&root, &model, kt, &domain, &stages, initial.slab_axis())?;
+        let scene = Scene { title, model_path, model, kt, seed, domain, mass, initial, stages, output, observe };
         scene.check_noise(&root)?;
         root.finish()?;
         Ok(scene)
