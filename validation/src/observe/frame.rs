@@ -38,6 +38,11 @@ impl<'a> Frame<'a> {
         self.simulation.masses()[self.simulation.species()[particle] as usize]
     }
 
+    /// Whether a particle moves and is part of the fluid: every one is.
+    pub fn moves(&self, _particle: usize) -> bool {
+        true
+    }
+
     /// The volume; in two dimensions the area.
     pub fn volume(&self) -> f64 {
         self.simulation.domain().volume(self.simulation.dimensions())

@@ -19,12 +19,13 @@ pub mod request;
 pub mod series;
 pub mod statistics;
 pub mod surface_tension;
+pub mod young_laplace;
 
 pub use drift::{Drift, DriftError, drift};
 pub use observation::{Abscissa, Column, Kind, Observation, write_csv, write_json};
 pub use observers::Observers;
 pub use profile::{DensityProfile, ProfileAccumulator, ProfileError, interface_width};
-pub use request::{Observe, Request, read};
+pub use request::{Drive, Observe, Request, read};
 pub use series::{Measured, Series};
 pub use statistics::{Comparison, Estimate, StatisticsError, difference, estimate, threshold};
 pub use surface_tension::{TensionError, tension_series};

@@ -30,8 +30,6 @@ pub struct Request {
 /// What the settings of an observable depend on.
 #[derive(Debug)]
 pub struct Place<'a> {
-    /// The model.
-    pub model: &'a Model,
     /// The model at the temperature of the scene.
     pub fluid: &'a Fluid,
     /// The box.
@@ -40,9 +38,23 @@ pub struct Place<'a> {
     pub stages: &'a [Stage],
     /// The normal of the slab that the scene starts from.
     pub slab: Option<usize>,
+    /// What drives two opposite flows.
+    pub drive: Option<Drive>,
 }
 
-/// Reads `[observe]`; `slab` is the normal of the slab that the scene starts from.
+/// A body force that is reversed in the upper half of the box.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Drive {
+    /// The direction in which it is reversed.
+    pub across: usize,
+    /// Its own direction.
+    pub along: usize,
+    /// The acceleration in the lower half of the box.
+    pub acceleration: f64,
+}
+
+/// Reads `[observe]`; `slab` is the normal of the slab that the scene starts from, `drive` the body force that
+/// drives two opposite flows, if there is one.
 ///
 /// # Errors
 /// Unknown keys, values out of their domain, observables that the model or the box cannot have.
@@ -53,11 +65,12 @@ pub fn read(
     domain: &PeriodicBox,
     stages: &[Stage],
     slab: Option<usize>,
+    drive: Option<Drive>,
 ) -> Result<Observe, FileError> {
     let Some(value) = root.get("observe") else { return Ok(Observe::default()) };
     let section = value.section()?;
     let fluid = model.at(kt)?;
-    let place = Place { model, fluid: &fluid, domain, stages, slab };
+    let place = Place { fluid: &fluid, domain, stages, slab, drive };
     let last: Vec<String> = stages.last().map(|s| s.name.clone()).into_iter().collect();
     let common = Common::read(&section, &place, Common { every: 10, skip: 0, stages: last })?;
     let mut observe = Observe::default();
@@ -145,7 +158,8 @@ pub struct Options<'a> {
 impl<'a> Options<'a> {
     /// The value of a key, or of the observable if the key is left out: for errors.
     pub fn at(&self, key: &str) -> Value<'a> {
-        self.get(key).unwrap_or_else(|| self.value.clone())
+        let own = if key.is_empty() { None } else { self.get(key) };
+        own.unwrap_or_else(|| self.value.clone())
     }
 
     fn get(&self, key: &str) -> Option<Value<'a>> {
@@ -185,6 +199,22 @@ impl<'a> Options<'a> {
             let message = format!("must be from {low} to {high}, is {number}");
             Err(value.error(FileErrorKind::Value(message)))
         }
+    }
+
+    /// Two whole numbers from `low` to `high`.
+    pub fn counts(&self, key: &str, low: u64, high: u64) -> Result<Option<[usize; 2]>, FileError> {
+        let Some(value) = self.get(key) else { return Ok(None) };
+        let items = value.array()?;
+        let [a, b] = items.as_slice() else {
+            return Err(value.error(FileErrorKind::Value("expected two whole numbers".into())));
+        };
+        let read = |item: &Value| {
+            let number = item.count()?.value;
+            let message = format!("must be from {low} to {high}, is {number}");
+            let inside = (low..=high).contains(&number);
+            if inside { Ok(number as usize) } else { Err(item.error(FileErrorKind::Value(message))) }
+        };
+        Ok(Some([read(a)?, read(b)?]))
     }
 
     /// True or false.

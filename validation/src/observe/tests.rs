@@ -70,14 +70,21 @@ fn every_key_is_read_and_no_other() {
     for table in tables() {
         for key in table.keys.iter().chain(COMMON) {
             let example = key.example.replace("produce", "run");
-            let observe = format!("[observe.{}]\n{} = {example}\n", table.name, key.name);
+            let mut observe = format!("[observe.{}]\n{} = {example}\n", table.name, key.name);
+            if table.name == "poiseuille" {
+                // Without a body force in the scene it needs three keys.
+                for other in table.keys.iter().filter(|k| k.name != "bins" && k.name != key.name) {
+                    observe += &format!("{} = {}\n", other.name, other.example);
+                }
+            }
             let every_step = key.name == "every" && matches!(table.name, "viscosity");
             match scene(MIXTURE, "[5.0, 5.0, 5.0]", 3.0, 10, &observe) {
                 Ok(scene) => assert!(scene.observe.requests.len() == 1 && !every_step),
                 Err(error) => assert!(every_step, "{error}"),
             }
         }
-        let wrong = format!("[observe.{}]\nbinz = 3\n", table.name);
+        let all = if table.name == "poiseuille" { "axis = \"z\"\nflow = \"x\"\nacceleration = 1\n" } else { "" };
+        let wrong = format!("[observe.{}]\nbinz = 3\n{all}", table.name);
         let error = scene(MIXTURE, "[5.0, 5.0, 5.0]", 3.0, 10, &wrong).unwrap_err().to_string();
         assert!(error.contains(&format!("observe.{}.binz: unknown key", table.name)), "{error}");
         let off = format!("[observe]\n{} = false\n", table.name);
@@ -325,7 +332,12 @@ fn a_drop_of_liquid() {
 fn a_run_that_goes_on_ends_the_same() {
     let mut observe = String::from("[observe]\nevery = 3\nstages = [\"settle\", \"run\"]\n");
     for table in tables() {
-        let every = if table.name == "viscosity" { "every = 1, length = 20" } else { "skip = 2" };
+        let every = match table.name {
+            "viscosity" => "every = 1, length = 20",
+            "poiseuille" => "axis = \"z\", flow = \"x\", acceleration = 0.1",
+            "pendant" => "bins = [8, 16]",
+            _ => "skip = 2",
+        };
         observe += &format!("{} = {{ {every} }}\n", table.name);
     }
     let scene = scene(SET6, "[4.0, 4.0, 4.0]", 6.05, 60, &observe).unwrap();

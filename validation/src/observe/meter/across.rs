@@ -31,22 +31,23 @@ pub struct Across {
 impl Across {
     /// The bins of an observable; `centred` if they are always recentred.
     pub fn read(options: &Options, centred: bool) -> Result<Across, FileError> {
-        let place = options.place;
-        let dimensions = place.fluid.dimensions;
-        let axis = options.axis("axis")?.or(place.slab).unwrap_or(dimensions - 1);
-        let height = place.domain.height(axis);
-        let bins = options.count("bins", 1, 10_000)?;
-        let bins = bins.unwrap_or(((height / 0.1).ceil() as usize).clamp(1, 10_000));
-        let periodic = place.domain.periodic()[axis];
-        let recentre = if centred {
-            true
-        } else {
-            options.flag("recentre")?.unwrap_or(periodic && place.slab == Some(axis))
-        };
-        if recentre && !periodic {
+        let mut across = Across::read_along(options, options.axis("axis")?)?;
+        let preset = across.periodic && options.place.slab == Some(across.axis);
+        across.recentre = centred || options.flag("recentre")?.unwrap_or(preset);
+        if across.recentre && !across.periodic {
             return Err(options.error("recentre", "the box is not periodic along the axis"));
         }
-        Ok(Across { bins, recentre, ..Across::at(options, axis) })
+        Ok(across)
+    }
+
+    /// Bins that are never recentred, along `axis` or else the normal of the initial slab or the last
+    /// direction.
+    pub fn read_along(options: &Options, axis: Option<usize>) -> Result<Across, FileError> {
+        let axis = axis.or(options.place.slab).unwrap_or(options.place.fluid.dimensions - 1);
+        let across = Across::at(options, axis);
+        let bins = options.count("bins", 1, 10_000)?;
+        let bins = bins.unwrap_or(((across.height / 0.1).ceil() as usize).clamp(1, 10_000));
+        Ok(Across { bins, ..across })
     }
 
     /// The direction alone, in one bin.

@@ -10,6 +10,8 @@ mod energy;
 mod interface_width;
 mod local_density;
 mod msd;
+mod pendant;
+mod poiseuille;
 mod pressure;
 mod profiles;
 mod rdf;
@@ -120,7 +122,9 @@ meters!(
     StructureFactor(structure_factor::StructureFactor),
     Msd(msd::Msd),
     Viscosity(viscosity::Viscosity),
+    Poiseuille(poiseuille::Poiseuille),
     Drop(drop::Drop),
+    Pendant(pendant::Pendant),
     Clusters(clusters::Clusters),
     LocalDensity(local_density::LocalDensity),
 );

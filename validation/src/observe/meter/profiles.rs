@@ -33,9 +33,9 @@ impl Bins {
         Ok(this)
     }
 
-    /// Numbers to a bin: particles by species, then m, m v, m v².
+    /// Numbers to a bin: particles by species, then m, m v, m v², and the number of those that move.
     fn width(&self) -> usize {
-        self.species.len() + if self.moments { 2 + self.dimensions } else { 0 }
+        self.species.len() + if self.moments { 3 + self.dimensions } else { 0 }
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
@@ -47,9 +47,10 @@ impl Bins {
             let Some(bin) = self.across.bin(*s) else { continue };
             let at = &mut sums[bin * width..(bin + 1) * width];
             at[simulation.species()[k] as usize] += 1.0;
-            if self.moments {
+            if self.moments && frame.moves(k) {
                 let (m, v) = (frame.mass(k), simulation.velocities()[k]);
                 at[count] += m;
+                at[count + 2 + self.dimensions] += 1.0;
                 for c in 0..self.dimensions {
                     at[count + 1 + c] += m * v[c];
                     at[count + 1 + self.dimensions] += m * v[c] * v[c];
@@ -173,9 +174,8 @@ impl Meter for TemperatureProfile {
         let (width, count, d) = (bins.width(), bins.species.len(), bins.dimensions);
         let temperature = bins.series.jackknife_many(|means| {
             let of = |at: &[f64]| {
-                let number: f64 = at[..count].iter().sum();
                 let flow: f64 = at[count + 1..count + 1 + d].iter().map(|p| p * p).sum::<f64>() / at[count];
-                (at[count + 1 + d] - flow) / (d as f64 * number)
+                (at[count + 1 + d] - flow) / (d as f64 * at[count + 2 + d])
             };
             Some(means.chunks_exact(width).map(of).collect())
         });

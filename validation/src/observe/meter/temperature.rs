@@ -51,8 +51,14 @@ impl Meter for Temperature {
             return self.series.push(&[kinetic]);
         }
         let landscape = frame.landscape();
-        let squares = landscape.particle_forces().iter().flatten().map(|f| f * f).sum();
-        let laplacian = landscape.laplacians(frame.interactions(), frame.simulation.species()).iter().sum();
+        let (mut squares, mut laplacian) = (0.0, 0.0);
+        let laplacians = landscape.laplacians(frame.interactions(), frame.simulation.species());
+        for (k, (f, l)) in landscape.particle_forces().iter().zip(laplacians).enumerate() {
+            if frame.moves(k) {
+                squares += f.iter().map(|f| f * f).sum::<f64>();
+                laplacian += l;
+            }
+        }
         self.series.push(&[kinetic, squares, laplacian])
     }
 
