@@ -85,7 +85,8 @@ impl Interactions {
             ExcessFreeEnergy::Curve(curve) => {
                 let range = curve.density * count..(curve.density + 1) * count;
                 let [value, slope, second] = self.curve(alpha, at[range.clone()].iter().sum());
-                let mut psi = Psi { value, slopes: vec![0.0; variables], second: vec![0.0; variables * variables] };
+                let mut psi =
+                    Psi { value, slopes: vec![0.0; variables], second: vec![0.0; variables * variables] };
                 for v in range.clone() {
                     psi.slopes[v] = slope;
                     range.clone().for_each(|u| psi.second[v * variables + u] = second);
@@ -120,7 +121,8 @@ impl Interactions {
         let variables = at.len();
         let excess = &self.species[alpha];
         let inside = (0..variables).all(|v| self.beyond(v, at).0 == 0.0);
-        let mut out = Psi { value: 0.0, slopes: vec![0.0; variables], second: vec![0.0; variables * variables] };
+        let mut out =
+            Psi { value: 0.0, slopes: vec![0.0; variables], second: vec![0.0; variables * variables] };
         if let Some(program) = excess.program.as_ref().filter(|_| inside) {
             let mut values = vec![0.0; program.outputs()];
             program.eval(at, &mut values, &mut Vec::new());
@@ -212,7 +214,13 @@ pub fn kernel_second(kernel: &Kernel, r: f64) -> f64 {
         KernelKind::Quadratic => 2.0,
         KernelKind::Bell => 12.0 * s - 6.0,
         KernelKind::Lucy => -12.0 * t * (1.0 - 3.0 * s),
-        KernelKind::CubicSpline => if s < 0.5 { 36.0 * s - 12.0 } else { 12.0 * t },
+        KernelKind::CubicSpline => {
+            if s < 0.5 {
+                36.0 * s - 12.0
+            } else {
+                12.0 * t
+            }
+        }
         KernelKind::WendlandC2 => -20.0 * t * t * (1.0 - 4.0 * s),
     };
     shape * kernel.slope_factor() / kernel.range()
@@ -238,13 +246,15 @@ pub fn pair_second(potential: &PairPotential, r: f64) -> f64 {
 /// Whether some force of the fluid jumps at its range, where `∇·F` is a delta function that no
 /// configuration shows.
 pub fn force_jumps(fluid: &Fluid) -> bool {
-    let kernels = fluid.densities.iter().any(|d| {
-        d.kernel.slope(d.kernel.range() * (1.0 - 1e-9)).abs() > 1e-6 * d.kernel.slope_factor()
-    });
+    let kernels = fluid
+        .densities
+        .iter()
+        .any(|d| d.kernel.slope(d.kernel.range() * (1.0 - 1e-9)).abs() > 1e-6 * d.kernel.slope_factor());
     kernels
         || fluid.pairs.iter().any(|p| {
             let range = p.potential.range();
-            let scale = (1..20).map(|k| p.potential.at(range * f64::from(k) / 20.0).1.abs()).fold(0.0, f64::max);
+            let scale =
+                (1..20).map(|k| p.potential.at(range * f64::from(k) / 20.0).1.abs()).fold(0.0, f64::max);
             p.potential.at(range * (1.0 - 1e-9)).1.abs() > 1e-6 * scale
         })
 }

@@ -208,9 +208,12 @@ A = { pressure = "rho*kT + rho^3" }
     fn random(model: &str, seed: u64) -> (Interactions, Vec<[f64; 3]>, Vec<i32>, PeriodicBox) {
         let fluid = Model::parse("m.toml", model).unwrap().at(1.0).unwrap();
         let flat = fluid.dimensions == 2;
-        let domain =
-            PeriodicBox::orthogonal([0.0, 0.0, if flat { -0.5 } else { 0.0 }], [3.0, 3.2, if flat { 1.0 } else { 2.9 }], [true; 3])
-                .unwrap();
+        let domain = PeriodicBox::orthogonal(
+            [0.0, 0.0, if flat { -0.5 } else { 0.0 }],
+            [3.0, 3.2, if flat { 1.0 } else { 2.9 }],
+            [true; 3],
+        )
+        .unwrap();
         let mut rng = StdRng::seed_from_u64(seed);
         let x = (0..90)
             .map(|_| {

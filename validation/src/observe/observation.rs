@@ -92,7 +92,12 @@ impl Observation {
 
     /// With one more column.
     #[must_use]
-    pub fn column(mut self, name: &str, unit: &str, values: impl IntoIterator<Item = Measured>) -> Observation {
+    pub fn column(
+        mut self,
+        name: &str,
+        unit: &str,
+        values: impl IntoIterator<Item = Measured>,
+    ) -> Observation {
         let (values, errors) = values.into_iter().map(|m| (m.value, m.error)).unzip();
         self.columns.push(Column { name: name.into(), unit: unit.into(), values, errors });
         self

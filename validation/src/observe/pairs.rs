@@ -128,7 +128,12 @@ mod tests {
     use rand::{RngExt, SeedableRng, rngs::StdRng};
 
     /// Every pair and image by brute force, as sorted (i, j, r).
-    fn brute(x: &[[f64; 3]], domain: &PeriodicBox, dimensions: usize, cutoff: f64) -> Vec<(usize, usize, f64)> {
+    fn brute(
+        x: &[[f64; 3]],
+        domain: &PeriodicBox,
+        dimensions: usize,
+        cutoff: f64,
+    ) -> Vec<(usize, usize, f64)> {
         let shells = |k: usize| if k < dimensions && domain.periodic()[k] { 3 } else { 0i32 };
         let mut found = Vec::new();
         for i in 0..x.len() {
@@ -192,6 +197,12 @@ mod tests {
                 }
             }
         }
-        for_each_pair(&[], &PeriodicBox::orthogonal([0.0; 3], [1.0; 3], [true; 3]).unwrap(), 3, 1.0, |_| panic!());
+        for_each_pair(
+            &[],
+            &PeriodicBox::orthogonal([0.0; 3], [1.0; 3], [true; 3]).unwrap(),
+            3,
+            1.0,
+            |_| panic!(),
+        );
     }
 }

@@ -148,15 +148,13 @@ pub fn fit(points: &[(f64, f64)], dimensions: usize) -> Option<Fit> {
             let (mut up, mut down) = (p, p);
             up[k] += h;
             down[k] -= h;
-            let (up, down) =
-                (residuals(&points, dimensions, &up)?, residuals(&points, dimensions, &down)?);
+            let (up, down) = (residuals(&points, dimensions, &up)?, residuals(&points, dimensions, &down)?);
             columns.push(up.iter().zip(&down).map(|(a, b)| (a - b) / (2.0 * h)).collect::<Vec<_>>());
         }
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let normal = Matrix3::from_fn(|a, b| dot(&columns[a], &columns[b]));
         let gradient = Vector3::from_fn(|a, _| dot(&columns[a], &here));
-        let mut settled = false;
-        loop {
+        let settled = loop {
             let damped = Matrix3::from_fn(|a, b| {
                 normal[(a, b)] * if a == b { 1.0 + damping } else { 1.0 } + if a == b { 1e-14 } else { 0.0 }
             });
@@ -165,17 +163,16 @@ pub fn fit(points: &[(f64, f64)], dimensions: usize) -> Option<Fit> {
             let sensible = trial[0].abs() < 5.0 && (trial[1] - widest.ln()).abs() < 3.0;
             let c = if sensible { cost(&trial)? } else { f64::INFINITY };
             if c < least {
-                settled = least - c <= 1e-12 * least;
+                let settled = least - c <= 1e-12 * least;
                 (least, p) = (c, trial);
                 damping = (damping * 0.3).max(1e-10);
-                break;
+                break settled;
             }
             damping *= 5.0;
             if damping > 1e10 {
-                settled = true;
-                break;
+                break true;
             }
-        }
+        };
         if settled {
             break;
         }
@@ -235,7 +232,8 @@ mod tests {
                     .collect();
                 let found = fit(&points, dimensions).unwrap();
                 mean += found.bond / 20.0;
-                worst = worst.max((found.radius / radius - 1.0).abs()).max((found.apex - apex).abs() / radius);
+                worst =
+                    worst.max((found.radius / radius - 1.0).abs()).max((found.apex - apex).abs() / radius);
                 assert!(found.residual < 0.04 * radius, "{found:?}");
             }
             assert!((mean - bond).abs() < 0.03 && worst < 0.12, "{dimensions} {bond}: {mean} {worst}");

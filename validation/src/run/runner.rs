@@ -138,7 +138,8 @@ impl Run<'_> {
         if observations.is_empty() {
             return Ok(());
         }
-        let (json, tables) = (self.output.folder.join("observables.json"), self.output.folder.join("observables"));
+        let (json, tables) =
+            (self.output.folder.join("observables.json"), self.output.folder.join("observables"));
         write_json(&json, &observations).map_err(RunError::output(&json))?;
         write_csv(&tables, &observations).map_err(RunError::output(&tables))
     }
@@ -197,7 +198,7 @@ struct Output {
 impl Output {
     fn create(scene: &Scene, folder: &Path) -> Result<Output, RunError> {
         // What an earlier run left at its end is not of this one.
-        for name in ["final.data", "last-good.data", "summary.json"] {
+        for name in ["final.data", "last-good.data", "summary.json", "observables.json"] {
             let path = folder.join(name);
             match std::fs::remove_file(&path) {
                 Err(error) if error.kind() != ErrorKind::NotFound => {

@@ -32,6 +32,9 @@
 //! [output]
 //! thermo = 100                               # steps between rows of totals; 0: none
 //! dump   = 0                                 # steps between frames; 0: none
+//!
+//! [observe]                                  # optional: what is measured; docs/observables.md
+//! rdf = true
 //! ```
 
 mod composition;
@@ -113,7 +116,8 @@ impl Scene {
         let stages = stage::read(&root, kt)?;
         let output = output::read(&root)?;
         let observe = observe::read(&root, &model, kt, &domain, &stages, initial.slab_axis(), None)?;
-        let scene = Scene { title, model_path, model, kt, seed, domain, mass, initial, stages, output, observe };
+        let scene =
+            Scene { title, model_path, model, kt, seed, domain, mass, initial, stages, output, observe };
         scene.check_noise(&root)?;
         root.finish()?;
         Ok(scene)

@@ -101,8 +101,7 @@ impl Across {
     /// Where the particles are, as fractions of the height; `None` if they have no centre to be put at ½.
     pub fn fractions(&self, simulation: &Simulation) -> Option<Vec<f64>> {
         let domain = simulation.domain();
-        let mut s: Vec<f64> =
-            simulation.positions().iter().map(|x| domain.fraction(*x)[self.axis]).collect();
+        let mut s: Vec<f64> = simulation.positions().iter().map(|x| domain.fraction(*x)[self.axis]).collect();
         if !self.recentre {
             return Some(s);
         }

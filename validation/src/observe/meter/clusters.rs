@@ -138,7 +138,8 @@ impl Meter for Clusters {
 
     fn finish(&self) -> Vec<Observation> {
         let names = ["count", "largest", "mean_size"];
-        let mut scalar = Observation::new("clusters", "Clusters", Kind::Scalar).samples(self.series.samples());
+        let mut scalar =
+            Observation::new("clusters", "Clusters", Kind::Scalar).samples(self.series.samples());
         let mut series = Observation::new("clusters_series", "Clusters", Kind::Series)
             .against("time", "time", self.series.channel(0))
             .samples(self.series.samples());

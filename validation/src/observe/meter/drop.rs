@@ -50,9 +50,12 @@ pub(super) fn circular_centre(
         }
     }
     let periodic = domain.periodic();
-    let fraction = std::array::from_fn(|c| {
-        if periodic[c] { sums[c][0].atan2(sums[c][1]) / TAU } else { plain[c] / count }
-    });
+    let fraction =
+        std::array::from_fn(
+            |c| {
+                if periodic[c] { sums[c][0].atan2(sums[c][1]) / TAU } else { plain[c] / count }
+            },
+        );
     (count > 0.0).then(|| domain.point(fraction))
 }
 
@@ -127,8 +130,7 @@ impl Drop {
             (p[0] + p[2] + rest * (p[1] + p[3])) / (1.0 + rest)
         };
         let (inner, outer) = (0.5 * fit.place, fit.place + 2.0 * fit.width);
-        let (liquid, vapour) =
-            (self.mean(0.0, inner, density), self.mean(outer, self.range, density));
+        let (liquid, vapour) = (self.mean(0.0, inner, density), self.mean(outer, self.range, density));
         // The sphere of liquid in vapour that holds as many particles.
         let volume = |r: f64| shell_volume(self.dimensions, 0.0, r);
         let particles: f64 = (0..self.bins).map(|k| means[k * WIDTH]).sum();
@@ -201,7 +203,9 @@ impl Meter for Drop {
         let labels = label(x, domain, self.dimensions, self.distance, |_| true);
         let sizes = sizes(&labels);
         // Of equal clusters the first.
-        let Some(largest) = (0..sizes.len()).max_by_key(|k| (sizes[*k], usize::MAX - k)) else { return false };
+        let Some(largest) = (0..sizes.len()).max_by_key(|k| (sizes[*k], usize::MAX - k)) else {
+            return false;
+        };
         let member = |k: usize| labels[k] == Some(largest);
         let Some(centre) = circular_centre(x, domain, member) else { return false };
         let mut at: Vec<[f64; 3]> = x.iter().map(|x| domain.minimum_image(*x, centre)).collect();

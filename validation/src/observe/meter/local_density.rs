@@ -166,11 +166,16 @@ impl Meter for LocalDensity {
         let range = self.range.unwrap_or(1.0);
         let width = range / self.bins as f64;
         let middles = (0..self.bins).map(|k| (k as f64 + 0.5) * width).collect();
-        let mut curve = Observation::new("local_density", &format!("Distribution of the local density {}", self.name), Kind::Curve)
-            .against(&self.name, "1/volume", middles)
-            .samples(self.series.samples());
-        let mut means = Observation::new("local_density_means", "Local densities and kernel integrals", Kind::Scalar)
-            .samples(self.series.samples());
+        let mut curve = Observation::new(
+            "local_density",
+            &format!("Distribution of the local density {}", self.name),
+            Kind::Curve,
+        )
+        .against(&self.name, "1/volume", middles)
+        .samples(self.series.samples());
+        let mut means =
+            Observation::new("local_density_means", "Local densities and kernel integrals", Kind::Scalar)
+                .samples(self.series.samples());
         let mut beyond: f64 = 0.0;
         for (s, species) in self.species.iter().enumerate() {
             let first = s * (self.bins + 1);
@@ -185,8 +190,9 @@ impl Meter for LocalDensity {
         for (a, at) in self.species.iter().enumerate() {
             for (b, of) in self.species.iter().enumerate() {
                 let first = kinds * (self.bins + 1) + 4 * (a * kinds + b);
-                for (k, (what, unit)) in
-                    [("mean", "1/volume"), ("relative", "1"), ("wg", "1"), ("rwg", "1")].into_iter().enumerate()
+                for (k, (what, unit)) in [("mean", "1/volume"), ("relative", "1"), ("wg", "1"), ("rwg", "1")]
+                    .into_iter()
+                    .enumerate()
                 {
                     means = means.column(&format!("{what}_{at}_{of}"), unit, [self.series.mean(first + k)]);
                 }

@@ -120,7 +120,11 @@ impl Meter for Pendant {
                 ρ_L g m/capillary. The part of the surface next to the support is left out of the fit. Jackknife \
                 errors.",
         keys: &[
-            Key { about: "The vertical, along an edge of the box at right angles to the others.", default: "the last direction", ..AXIS },
+            Key {
+                about: "The vertical, along an edge of the box at right angles to the others.",
+                default: "the last direction",
+                ..AXIS
+            },
             Key {
                 name: "apex",
                 value: "`\"low\"` or `\"high\"`",
@@ -192,12 +196,18 @@ impl Meter for Pendant {
         let (x, domain) = (simulation.positions(), simulation.domain());
         let labels = label(x, domain, self.dimensions, self.distance, |_| true);
         let sizes = sizes(&labels);
-        let Some(largest) = (0..sizes.len()).max_by_key(|k| (sizes[*k], usize::MAX - k)) else { return false };
+        let Some(largest) = (0..sizes.len()).max_by_key(|k| (sizes[*k], usize::MAX - k)) else {
+            return false;
+        };
         let Some(centre) = circular_centre(x, domain, |k| labels[k] == Some(largest)) else { return false };
         let mut counts = vec![0.0; self.bins[0] * self.bins[1]];
         for x in x {
             let away = domain.minimum_image(*x, centre);
-            let r = (0..self.dimensions).filter(|c| *c != self.axis).map(|c| away[c] * away[c]).sum::<f64>().sqrt();
+            let r = (0..self.dimensions)
+                .filter(|c| *c != self.axis)
+                .map(|c| away[c] * away[c])
+                .sum::<f64>()
+                .sqrt();
             let (j, z) = ((r / self.width[0]) as usize, (x[self.axis] - self.origin) / self.width[1]);
             if j < self.bins[0] && z >= 0.0 {
                 let k = (z as usize).min(self.bins[1] - 1);

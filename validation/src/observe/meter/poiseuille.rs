@@ -95,7 +95,10 @@ impl Meter for Poiseuille {
     fn read(options: &Options) -> Result<Poiseuille, FileError> {
         let drive = options.place.drive;
         let missing = |key: &str| {
-            options.error(key, format!("{key} is missing: the scene has no body force that is reversed in half of the box"))
+            options.error(
+                key,
+                format!("{key} is missing: the scene has no body force that is reversed in half of the box"),
+            )
         };
         let across = Across::read_along(options, options.axis("axis")?.or(drive.map(|d| d.across)))?;
         let axis = options.axis("axis")?.or(drive.map(|d| d.across)).ok_or_else(|| missing("axis"))?;

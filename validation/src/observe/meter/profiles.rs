@@ -27,8 +27,13 @@ impl Bins {
     fn read(options: &Options, moments: bool) -> Result<Bins, FileError> {
         let fluid = options.place.fluid;
         let across = Across::read(options, false)?;
-        let mut this =
-            Bins { across, species: fluid.species.clone(), dimensions: fluid.dimensions, moments, series: Series::new(0) };
+        let mut this = Bins {
+            across,
+            species: fluid.species.clone(),
+            dimensions: fluid.dimensions,
+            moments,
+            series: Series::new(0),
+        };
         this.series = Series::new(this.across.bins * this.width());
         Ok(this)
     }
@@ -179,10 +184,11 @@ impl Meter for TemperatureProfile {
             };
             Some(means.chunks_exact(width).map(of).collect())
         });
-        vec![
-            bins.observation("temperature_profile", "Temperature profile")
-                .column("temperature", "energy", temperature),
-        ]
+        vec![bins.observation("temperature_profile", "Temperature profile").column(
+            "temperature",
+            "energy",
+            temperature,
+        )]
     }
 }
 

@@ -79,8 +79,7 @@ impl Meter for StructureFactor {
         let shortest = basis[..d].iter().map(|b| length(*b)).fold(f64::INFINITY, f64::min);
         // |h_k| ≤ k_max |e_k|/2π, as e_k·k = 2π h_k.
         let lengths = domain.lengths();
-        let candidates =
-            |range: f64| (0..d).map(|k| 2.0 * range * lengths[k] / TAU + 1.0).product::<f64>();
+        let candidates = |range: f64| (0..d).map(|k| 2.0 * range * lengths[k] / TAU + 1.0).product::<f64>();
         let mut preset = 20.0;
         while candidates(preset) > MOST_CANDIDATES && preset > shortest {
             preset *= 0.8;
@@ -90,7 +89,8 @@ impl Meter for StructureFactor {
             return Err(options.error("range", "asks for too many wave vectors in a box of this size"));
         }
         if range < shortest {
-            let message = format!("is less than {shortest}, the length of the shortest wave vector of the box");
+            let message =
+                format!("is less than {shortest}, the length of the shortest wave vector of the box");
             return Err(options.error("range", message));
         }
         let bins = options.count("bins", 1, 1000)?;

@@ -80,7 +80,9 @@ impl Meter for SurfaceTension {
         let place = options.place;
         let axis = options.axis("axis")?.or(place.slab).unwrap_or(place.fluid.dimensions - 1);
         let lengths = place.domain.lengths();
-        if (0..place.fluid.dimensions).any(|k| (place.domain.height(k) - lengths[k]).abs() > 1e-9 * lengths[k]) {
+        if (0..place.fluid.dimensions)
+            .any(|k| (place.domain.height(k) - lengths[k]).abs() > 1e-9 * lengths[k])
+        {
             return Err(options.error("axis", "the box must have right angles"));
         }
         if !place.fluid.is_conservative() {
@@ -162,11 +164,13 @@ mod tests {
             let others: f64 = (0..3).filter(|c| *c != axis).map(|c| virial[c]).sum();
             // dU/d ln A, from ∂U/∂ε_cc = −W_cc.
             let expected = virial[axis] - 0.5 * others;
-            let change = |h: f64| {
-                (stretched_energy(&frame, axis, h) - stretched_energy(&frame, axis, -h)) / (2.0 * h)
-            };
+            let change =
+                |h: f64| (stretched_energy(&frame, axis, h) - stretched_energy(&frame, axis, -h)) / (2.0 * h);
             let found = (4.0 * change(5e-5) - change(1e-4)) / 3.0;
-            assert!((found - expected).abs() < 1e-5 * expected.abs().max(100.0), "{axis}: {found} {expected}");
+            assert!(
+                (found - expected).abs() < 1e-5 * expected.abs().max(100.0),
+                "{axis}: {found} {expected}"
+            );
         }
     }
 }

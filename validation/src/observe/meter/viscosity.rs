@@ -48,8 +48,7 @@ impl Viscosity {
         // P:P is this many times the square of one off-diagonal component.
         let shears = ((d - 1) * (d + 2)) as f64;
         let first = stress_of(&self.recent, 0);
-        let mut row: Vec<f64> =
-            self.recent.iter().map(|p| contraction(&first, p, d) / shears).collect();
+        let mut row: Vec<f64> = self.recent.iter().map(|p| contraction(&first, p, d) / shears).collect();
         row.push(temperature);
         self.recent.pop_front();
         self.series.push(&row)
@@ -120,18 +119,18 @@ impl Meter for Viscosity {
     fn finish(&self) -> Vec<Observation> {
         let dt = self.clock.spacing();
         let kt = self.series.mean(self.length + 1).value;
-        let viscosity = |lag: usize| {
-            self.series.linear(|row| Self::integral(row, lag, dt)).times(self.volume / kt)
-        };
+        let viscosity =
+            |lag: usize| self.series.linear(|row| Self::integral(row, lag, dt)).times(self.volume / kt);
         let lags = if self.series.is_empty() { 0 } else { self.length + 1 };
         let last = if lags == 0 { Measured::NONE } else { viscosity(self.length) };
         let times = (0..lags).map(|k| k as f64 * dt).collect();
         let samples = self.series.samples();
-        let curve = Observation::new("stress_correlation", "Stress autocorrelation and its integral", Kind::Curve)
-            .against("time", "time", times)
-            .samples(samples)
-            .column("correlation", "(energy/volume)^2", (0..lags).map(|k| self.series.mean(k)))
-            .column("viscosity", "mass/(r_c time)", (0..lags).map(viscosity));
+        let curve =
+            Observation::new("stress_correlation", "Stress autocorrelation and its integral", Kind::Curve)
+                .against("time", "time", times)
+                .samples(samples)
+                .column("correlation", "(energy/volume)^2", (0..lags).map(|k| self.series.mean(k)))
+                .column("viscosity", "mass/(r_c time)", (0..lags).map(viscosity));
         let scalar = Observation::new("viscosity", "Shear viscosity", Kind::Scalar)
             .samples(samples)
             .column("viscosity", "mass/(r_c time)", [last])
@@ -158,7 +157,8 @@ mod tests {
             let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
             let mut draw = || -> [f64; 6] {
                 // A random symmetric matrix with off-diagonal variance 1 and diagonal variance 2 is isotropic.
-                let mut p: [f64; 6] = std::array::from_fn(|k| if k < 3 { 2f64.sqrt() } else { 1.0 } * normal());
+                let mut p: [f64; 6] =
+                    std::array::from_fn(|k| if k < 3 { 2f64.sqrt() } else { 1.0 } * normal());
                 if dimensions == 2 {
                     (p[2], p[4], p[5]) = (0.0, 0.0, 0.0);
                 }
@@ -176,7 +176,10 @@ mod tests {
             let out = m.finish();
             let eta = out[0].scalar("viscosity").unwrap();
             let truth = volume * dt / kt * (0.5 * (s * s + q * q) + s * s * a / (1.0 - a));
-            assert!((eta.value - truth).abs() < 5.0 * eta.error && eta.error < 0.05 * truth, "{eta:?} {truth}");
+            assert!(
+                (eta.value - truth).abs() < 5.0 * eta.error && eta.error < 0.05 * truth,
+                "{eta:?} {truth}"
+            );
             let c = out[1].get("correlation").unwrap();
             for lag in 1..40 {
                 let truth = s * s * a.powi(lag as i32);
