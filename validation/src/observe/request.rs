@@ -2,7 +2,7 @@
 
 use super::keys::{COMMON, Table};
 use super::meter::{AnyMeter, KINDS};
-use crate::scene::Stage;
+use crate::scene::{Filling, Initial, Placement, Stage};
 use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::model::{Fluid, Model};
@@ -98,6 +98,14 @@ pub fn read(
     }
     section.finish()?;
     Ok(observe)
+}
+
+/// The normal of the slab that a scene starts from, if it is one.
+pub fn slab_axis(initial: &Initial) -> Option<usize> {
+    match initial {
+        Initial::Filling(Filling { placement: Placement::Slab { axis, .. }, .. }) => Some(*axis),
+        _ => None,
+    }
 }
 
 /// The tables of all observables.

@@ -30,16 +30,6 @@ pub enum Initial {
     },
 }
 
-impl Initial {
-    /// The normal of the slab it is, if it is one.
-    pub fn slab_axis(&self) -> Option<usize> {
-        match self {
-            Initial::Filling(Filling { placement: Placement::Slab { axis, .. }, .. }) => Some(*axis),
-            _ => None,
-        }
-    }
-}
-
 /// How a box is filled.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Filling {

@@ -115,7 +115,7 @@ impl Scene {
         let mass = masses::read(&root, model.species(), &initial)?;
         let stages = stage::read(&root, kt)?;
         let output = output::read(&root)?;
-        let observe = observe::read(&root, &model, kt, &domain, &stages, initial.slab_axis(), None)?;
+        let observe = observe::read(&root, &model, kt, &domain, &stages, observe::slab_axis(&initial), None)?;
         let scene =
             Scene { title, model_path, model, kt, seed, domain, mass, initial, stages, output, observe };
         scene.check_noise(&root)?;

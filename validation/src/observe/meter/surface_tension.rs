@@ -56,7 +56,7 @@ impl Meter for SurfaceTension {
                 test-area method (Gloor et al., J. Chem. Phys. 123, 134703 (2005)): configurations are stretched \
                 with their box at constant volume to 1 ± ε times the area, the many-body energy is computed anew, \
                 and γ = −kT [ln⟨exp(−ΔU₊/kT)⟩ − ln⟨exp(−ΔU₋/kT)⟩]/(2 m ε A) with the kT of the stage. The two \
-                routes agree in equilibrium. In two dimensions the area is a length.",
+                routes agree in equilibrium. ε should be small enough that ΔU stays below kT. In two dimensions the area is a length.",
         keys: &[
             AXIS,
             Key {
@@ -69,9 +69,9 @@ impl Meter for SurfaceTension {
             Key {
                 name: "perturbation",
                 value: "number from 1e-7 to 0.1",
-                default: "0.0005",
+                default: "0.0001",
                 about: "ε, the relative change of the area.",
-                example: "1e-4",
+                example: "5e-4",
             },
         ],
     };
@@ -92,7 +92,7 @@ impl Meter for SurfaceTension {
             across: Across::at(options, axis),
             dimensions: place.fluid.dimensions,
             interfaces: options.count("interfaces", 1, 1000)?.unwrap_or(2) as f64,
-            perturbation: options.number("perturbation", 1e-7, 0.1)?.unwrap_or(5e-4),
+            perturbation: options.number("perturbation", 1e-7, 0.1)?.unwrap_or(1e-4),
             kt: 0.0,
             series: Series::new(4),
         })
