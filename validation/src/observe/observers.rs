@@ -44,14 +44,20 @@ struct Sampled {
 impl Observers {
     /// The observables of a scene before its first step.
     pub fn new(scene: &Scene) -> Observers {
+        // Stages may share a name.
+        let mut names: Vec<String> = Vec::new();
+        for stage in &scene.stages {
+            if !names.contains(&stage.name) {
+                names.push(stage.name.clone());
+            }
+        }
         let observers = scene.observe.requests.iter().map(|request| Observer {
             every: request.every.max(1),
             skip: request.skip,
-            stages: scene
-                .stages
+            stages: names
                 .iter()
-                .filter(|s| request.stages.contains(&s.name))
-                .map(|s| Sampled { stage: s.name.clone(), meter: request.meter.clone(), left_out: 0 })
+                .filter(|name| request.stages.contains(name))
+                .map(|name| Sampled { stage: name.clone(), meter: request.meter.clone(), left_out: 0 })
                 .collect(),
         });
         Observers { observers: observers.collect(), ..Observers::default() }

@@ -116,7 +116,7 @@ impl Meter for Msd {
     const TABLE: Table = Table {
         name: "msd",
         title: "mean-square displacement and diffusion",
-        about: "⟨|r(t₀ + t) − r(t₀)|²⟩ of each species, positions unwrapped by the count of boxes travelled, from many \
+        about: "⟨|r(t₀ + t) − r(t₀)|²⟩ of the particles of each species that move, positions unwrapped by the count of boxes travelled, from many \
                 origins t₀: `msd_SPECIES` (`msd` with one). `diffusion`: D from the least-squares slope over the second \
                 half of the times, slope/(2d), for each origin seen to the end; its error is that of the mean over \
                 origins, correlated as they overlap. Memory and checkpoints hold one set of positions for each \
@@ -167,7 +167,7 @@ impl Meter for Msd {
         let simulation = frame.simulation;
         let domain = simulation.domain();
         let edges = [domain.edge(0), domain.edge(1), domain.edge(2)];
-        let mut order: Vec<usize> = (0..simulation.len()).collect();
+        let mut order: Vec<usize> = (0..simulation.len()).filter(|k| frame.moves(*k)).collect();
         order.sort_unstable_by_key(|k| simulation.tags()[*k]);
         let (positions, images) = (simulation.positions(), simulation.image_flags());
         let unwrapped = |k: &usize| {
