@@ -71,8 +71,7 @@ impl Interactions {
 
     /// The longest range of a conservative interaction.
     pub fn range(&self) -> f64 {
-        let densities = self.fluid.densities.iter().map(|d| d.kernel.range().max(d.force_kernel.range()));
-        densities.chain(self.fluid.pairs.iter().map(|p| p.potential.range())).fold(0.0, f64::max)
+        conservative_range(&self.fluid)
     }
 
     /// ψ of a particle of species `alpha` at the uncorrected densities `n`, density-major.
@@ -241,6 +240,12 @@ pub fn pair_second(potential: &PairPotential, r: f64) -> f64 {
             (8.0 * (slope(r + h) - slope(r - h)) - (slope(r + 2.0 * h) - slope(r - 2.0 * h))) / (12.0 * h)
         }
     }
+}
+
+/// The longest range of a conservative interaction of a fluid.
+pub fn conservative_range(fluid: &Fluid) -> f64 {
+    let densities = fluid.densities.iter().map(|d| d.kernel.range().max(d.force_kernel.range()));
+    densities.chain(fluid.pairs.iter().map(|p| p.potential.range())).fold(0.0, f64::max)
 }
 
 /// Whether some force of the fluid jumps at its range, where `∇·F` is a delta function that no

@@ -97,7 +97,10 @@ pub fn reference(tables: &[&Table]) -> String {
 fn list(out: &mut String, keys: &[Key]) {
     out.push_str("| key | value | if left out | meaning |\n|---|---|---|---|\n");
     for key in keys {
-        out.push_str(&format!("| `{}` | {} | {} | {} |\n", key.name, key.value, key.default, key.about));
+        // A bar would end the cell.
+        let [value, default, about] =
+            [key.value, key.default, key.about].map(|text| text.replace('|', "\\|"));
+        out.push_str(&format!("| `{}` | {value} | {default} | {about} |\n", key.name));
     }
 }
 
@@ -136,7 +139,7 @@ error of a single sample.
 of two errors, from the integrated autocorrelation time (Sokal's window) and from blocking (Flyvbjerg and
 Petersen, J. Chem. Phys. 91, 461 (1989)). A quotient of means R = ⟨a⟩/⟨b⟩ has the error of the mean of
 (a − R b)/⟨b⟩; what is fitted to a mean profile has the jackknife error over twenty stretches of the run. Long
-series are kept as 256 to 511 block means, so memory does not grow with the run; at the end the last block, if
+series are kept as 256 to 511 block means (hanging drops 32 to 63, viscosities 64 to 127), so memory does not grow with the run; at the end the last block, if
 it is not complete, is left out. With fewer than 8 samples the error is the plain standard error.
 
 **Units** are those of the model: lengths in r_c, energies in the unit of kT, masses in m; "1" stands for a pure

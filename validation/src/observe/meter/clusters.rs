@@ -1,5 +1,6 @@
 use super::Meter;
 use crate::observe::frame::Frame;
+use crate::observe::interactions::conservative_range;
 use crate::observe::keys::{Key, Table};
 use crate::observe::observation::{Kind, Observation};
 use crate::observe::pairs::for_each_pair;
@@ -64,9 +65,7 @@ pub(super) const DISTANCE: Key = Key {
 /// The distance that makes clusters.
 pub(super) fn read_distance(options: &Options) -> Result<f64, FileError> {
     let fluid = options.place.fluid;
-    let densities = fluid.densities.iter().map(|d| d.kernel.range());
-    let pairs = fluid.pairs.iter().map(|p| psidpd_core::model::pair::PairForm::range(&p.potential));
-    let longest = densities.chain(pairs).fold(0.0, f64::max);
+    let longest = conservative_range(fluid);
     let half = options.half_box();
     let preset = if longest > 0.0 { longest } else { fluid.cutoff() };
     let distance = options.positive("distance")?.unwrap_or(if preset > 0.0 { preset } else { 1.0 }.min(half));

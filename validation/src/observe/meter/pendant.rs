@@ -46,28 +46,18 @@ impl Pendant {
         across * self.width[1]
     }
 
-    /// Density of the liquid: that of the densest layers near the axis, where half of all particles are.
+    /// Density of the liquid: half of the particles are in cells that are denser. Unlike the mean of a chosen
+    /// region this needs no knowledge of the shape, and unlike a maximum it does not follow the noise.
     fn liquid(&self, field: &[f64]) -> f64 {
-        let mut layers: Vec<(f64, f64)> = (0..self.bins[1])
-            .map(|k| {
-                // The innermost bins hold few particles: a core of three.
-                let core = 0..3.min(self.bins[0]);
-                let count: f64 = core.clone().map(|j| field[k * self.bins[0] + j] * self.volume(j)).sum();
-                let all: f64 = (0..self.bins[0]).map(|j| field[k * self.bins[0] + j] * self.volume(j)).sum();
-                (count / core.map(|j| self.volume(j)).sum::<f64>(), all)
-            })
-            .collect();
-        layers.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let half = 0.5 * layers.iter().map(|l| l.1).sum::<f64>();
-        let (mut sum, mut weight) = (0.0, 0.0);
-        for (density, all) in layers {
-            if weight >= half {
-                break;
-            }
-            sum += density * all;
-            weight += all;
-        }
-        sum / weight
+        let particles = |k: usize| field[k] * self.volume(k % self.bins[0]);
+        let mut cells: Vec<usize> = (0..field.len()).collect();
+        cells.sort_by(|a, b| field[*b].total_cmp(&field[*a]).then(a.cmp(b)));
+        let mut left = 0.5 * (0..field.len()).map(particles).sum::<f64>();
+        let median = cells.into_iter().find(|k| {
+            left -= particles(*k);
+            left <= 0.0
+        });
+        median.map_or(f64::NAN, |k| field[k])
     }
 
     /// The isosurface: (r, z), z along the axis from the box's origin, up from the apex.
@@ -115,7 +105,7 @@ impl Meter for Pendant {
                 of mass and the height (`pendant_field`: columns `r`, `z`, `density`), the surface where it is \
                 `isodensity` (`pendant_profile`: `radius` against the height), and the solution of Young and Laplace's \
                 equation that fits it best (`pendant`): `bond` = Δρ g R₀²/γ with the radius of curvature `apex_radius` \
-                R₀ at the apex, `apex` its height, `capillary` = Bo/R₀² = Δρ g/γ for any other length, `liquid` density, \
+                R₀ at the apex, `apex` its height, `capillary` = Bo/R₀² = Δρ g/γ for any other length, `liquid` density (the median over the particles), \
                 `residual` the root mean square distance of the surface from the fit, and with `weight` the `tension` \
                 ρ_L g m/capillary. The part of the surface next to the support is left out of the fit. Jackknife \
                 errors.",

@@ -43,7 +43,7 @@ impl Meter for StructureFactor {
         about: "Direct sums over the wave vectors of the periodic box, averaged over shells of about equal |k|: `s` \
                 = ⟨|Σ exp(ik·r)|²⟩/N of all particles, and of each two of several species `s_A_B` = \
                 ⟨Re ρ_A(k) ρ_B(−k)⟩/√(N_A N_B) (Ashcroft and Langreth). Shells with many vectors keep an even \
-                choice of them, ±k being one. The box must be periodic.",
+                choice of them, one of each ±k. The box must be periodic.",
         keys: &[
             Key {
                 name: "range",

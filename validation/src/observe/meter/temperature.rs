@@ -1,6 +1,6 @@
 use super::Meter;
 use crate::observe::frame::Frame;
-use crate::observe::interactions::force_jumps;
+use crate::observe::interactions::{conservative_range, force_jumps};
 use crate::observe::keys::Table;
 use crate::observe::observation::{Kind, Observation};
 use crate::observe::request::Options;
@@ -36,7 +36,7 @@ impl Meter for Temperature {
             "a force of the model has no potential"
         } else if force_jumps(fluid) {
             "a force of the model jumps at its range, where its divergence is a delta function"
-        } else if 2.0 * options.half_box() < 2.0 * fluid.cutoff() {
+        } else if options.half_box() < conservative_range(fluid) {
             "the box is narrower than twice the range of the forces"
         } else {
             ""
