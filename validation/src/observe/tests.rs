@@ -353,7 +353,7 @@ fn a_run_that_goes_on_ends_the_same() {
         let every = match table.name {
             "viscosity" => "every = 1, length = 20",
             "poiseuille" => "axis = \"z\", flow = \"x\", acceleration = 0.1",
-            "pendant" => "bins = [8, 16]",
+            "pendant" | "density_field" => "bins = [8, 16]",
             _ => "skip = 2",
         };
         observe += &format!("{} = {{ {every} }}\n", table.name);

@@ -5,6 +5,7 @@
 
 mod across;
 mod clusters;
+mod density_field;
 mod drop;
 mod energy;
 mod interface_width;
@@ -115,6 +116,7 @@ meters!(
     CompositionProfile(profiles::CompositionProfile),
     TemperatureProfile(profiles::TemperatureProfile),
     VelocityProfile(profiles::VelocityProfile),
+    DensityField(density_field::DensityField),
     StressProfile(stress_profile::StressProfile),
     SurfaceTension(surface_tension::SurfaceTension),
     InterfaceWidth(interface_width::InterfaceWidth),
