@@ -24,6 +24,15 @@ impl BodyForce {
         (self.species.is_empty() || self.species.contains(&species)) && self.tags.contain(tag)
     }
 
+    /// What it drives, if it is reversed, along one direction and acts on every particle.
+    pub fn drive(&self) -> Option<Drive> {
+        let across = self.reversed_along?;
+        let mut directions = (0..3).filter(|k| self.acceleration[*k] != 0.0);
+        let (along, more) = (directions.next()?, directions.next());
+        let all = self.species.is_empty() && self.tags == Tags::All && more.is_none();
+        all.then_some(Drive { across, along, acceleration: self.acceleration[along] })
+    }
+
     /// The acceleration at `x`, which lies in the box.
     pub fn at(&self, domain: &PeriodicBox, x: [f64; 3]) -> [f64; 3] {
         match self.reversed_along {
@@ -31,6 +40,17 @@ impl BodyForce {
             _ => self.acceleration,
         }
     }
+}
+
+/// What drives two opposite flows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Drive {
+    /// The direction in which it is reversed.
+    pub across: usize,
+    /// Its own direction.
+    pub along: usize,
+    /// The acceleration in the lower half of the box.
+    pub acceleration: f64,
 }
 
 #[cfg(test)]

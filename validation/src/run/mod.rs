@@ -24,7 +24,7 @@ mod timing;
 mod underway;
 mod walls;
 
-pub use body_force::BodyForce;
+pub use body_force::{BodyForce, Drive};
 pub use dump::write_frame;
 pub use error::RunError;
 pub use integrator::Integrator;

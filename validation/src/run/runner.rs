@@ -6,6 +6,7 @@ use super::summary::{Summary, Sums};
 use super::thermo::Thermo;
 use super::timing::Timing;
 use super::underway::Run;
+use crate::observe::Observers;
 use crate::scene::Scene;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -131,6 +132,7 @@ impl<'a> Runner<'a> {
         }
         let state = scene.initial_state();
         let simulation = scene.simulation(state.clone())?;
+        let observers = Observers::new(scene);
         store.clear()?;
         let good = Checkpoint {
             program: PROGRAM.into(),
@@ -144,16 +146,21 @@ impl<'a> Runner<'a> {
             last: None,
             sums: Sums::default(),
             files: BTreeMap::new(),
-            observers: Vec::new(),
+            observers: observers.to_bytes(),
         };
         let mut output = Output::create(scene, out)?;
         let good = Checkpoint { files: output.lengths(), ..good };
-        let run = Run::new(scene, folder, store, simulation, Some(output), good, Timing::default());
+        let run =
+            Run::new(scene, folder, store, simulation, Some(output), good, observers, Timing::default());
         Ok(Runner { start: Start::New, run })
     }
 
     fn resume(scene: &'a Scene, folder: Folder, store: Store, found: Found) -> Result<Runner<'a>, RunError> {
         let Found { checkpoint: good, fallback } = found;
+        let observers = Observers::from_bytes(&good.observers).map_err(|error| CheckpointError::Damaged {
+            path: store.path(),
+            what: format!("what was observed: {error}"),
+        })?;
         let mut simulation = scene.simulation(good.state.clone())?;
         if let Some(stage) = scene.stages.get(good.position.stage) {
             scene.enter(stage, &mut simulation)?;
@@ -171,7 +178,7 @@ impl<'a> Runner<'a> {
         };
         let good = Checkpoint { program: PROGRAM.into(), ..good };
         let timing = Timing::read(folder.path());
-        let mut run = Run::new(scene, folder, store, simulation, output, good, timing);
+        let mut run = Run::new(scene, folder, store, simulation, output, good, observers, timing);
         run.stored = Some(run.good.step);
         Ok(Runner { start, run })
     }

@@ -1,13 +1,14 @@
 use super::checkpoint::{Checkpoint, Position, Store};
 use super::error::RunError;
 use super::folder::Folder;
-use super::output::Output;
+use super::output::{Output, write_observations};
 use super::restart::write_data;
 use super::runner::{Outcome, Progress};
 use super::simulation::Simulation;
 use super::summary::{Summary, Sums};
 use super::thermo::Thermo;
 use super::timing::{Session, Timing};
+use crate::observe::Observers;
 use crate::output::{Frame, write_snapshot};
 use crate::scene::{Scene, Stage};
 use psidpd_core::engine::Want;
@@ -34,6 +35,7 @@ pub(super) struct Run<'a> {
     steps: u64,
     sums: Sums,
     last: Option<Thermo>,
+    observers: Observers,
     pub timing: Timing,
     /// The step that this session began after, and when.
     began: (u64, Instant),
@@ -51,6 +53,7 @@ impl<'a> Run<'a> {
         simulation: Simulation,
         output: Option<Output>,
         good: Checkpoint,
+        observers: Observers,
         timing: Timing,
     ) -> Run<'a> {
         let now = Instant::now();
@@ -65,6 +68,7 @@ impl<'a> Run<'a> {
             steps: scene.stages.iter().map(|s| s.steps).sum(),
             sums: good.sums,
             last: good.last,
+            observers,
             timing,
             began: (good.step, now),
             checkpointed: now,
@@ -124,10 +128,14 @@ impl<'a> Run<'a> {
     fn step(&mut self, stage: &Stage, progress: &mut dyn FnMut(Progress)) -> Result<(), RunError> {
         let number = self.simulation.step_number() + 1;
         let totals = self.is_row(number);
-        let want = if totals { Want::TOTALS } else { Want::FORCES };
+        let mut want = self.observers.wants_in(number, &stage.name);
+        if totals {
+            want = Want { energy: true, virial: true, ..want };
+        }
         self.simulation.step(stage.dt, stage.integrator, want)?;
         self.position.done += 1;
         self.position.time = self.position.begin + self.position.done as f64 * stage.dt;
+        self.observers.sample(&self.simulation, &stage.name, self.position.time);
         self.report(stage, totals, progress)?;
         let due = match self.scene.output.checkpoint {
             Some(interval) => every(interval, number),
@@ -186,6 +194,7 @@ impl<'a> Run<'a> {
         self.good.out_of_bounds = self.simulation.out_of_bounds();
         self.good.last = self.last;
         self.good.sums = self.sums;
+        self.good.observers = self.observers.to_bytes();
         if let Some(output) = &mut self.output {
             self.good.files = output.lengths();
         }
@@ -258,6 +267,7 @@ impl<'a> Run<'a> {
         let path = self.folder.path().join("final.data");
         write_data(&path, &self.data_title(self.steps), &self.good.state)?;
         std::fs::File::open(&path).and_then(|file| file.sync_all()).map_err(RunError::output(&path))?;
+        write_observations(self.folder.path(), &self.observers.finish())?;
         let summary = self.summary();
         summary.write(&self.folder.path().join("summary.json"))?;
         // From here on the run is finished, whatever happens.

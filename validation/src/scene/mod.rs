@@ -39,6 +39,7 @@ pub use stage::Stage;
 pub use template::{TEMPLATES, Template, TemplateError};
 pub use velocities::Velocities;
 
+use crate::observe::{self, Observe};
 use crate::run::{BodyForce, RunError, Simulation, State, Tags};
 use number::positive;
 use psidpd_core::document::{Document, FileError, FileErrorKind, Section, Source, Value};
@@ -74,6 +75,8 @@ pub struct Scene {
     pub stages: Vec<Stage>,
     /// What is written.
     pub output: Output,
+    /// What is measured on the way.
+    pub observe: Observe,
     /// The text of the file.
     pub source: Arc<Source>,
     /// Where paths in the file start from.
@@ -106,6 +109,9 @@ impl Scene {
         let kt = positive(&root.require("kT")?)?;
         let seed = root.get("seed").map_or(Ok(1), |value| value.count().map(|c| c.value))?;
         let (initial, domain) = initial::read(&root, &model, base)?;
+        let stages = stage::read(&root, kt)?;
+        let body_forces = body_force::read(&root, &model, &initial)?;
+        let drive = body_forces.iter().find_map(BodyForce::drive);
         let scene = Scene {
             title: title.map_or_else(|| model.title().to_owned(), |t| t.value),
             model_path,
@@ -113,11 +119,12 @@ impl Scene {
             seed,
             mass: masses::read(&root, model.species(), &initial)?,
             frozen: initial.frozen(),
-            body_forces: body_force::read(&root, &model, &initial)?,
-            stages: stage::read(&root, kt)?,
+            body_forces,
             output: output::read(&root)?,
+            observe: observe::read(&root, &model, kt, &domain, &stages, initial.slab_axis(), drive)?,
             source: root.source().clone(),
             folder: base.to_owned(),
+            stages,
             model,
             domain,
             initial,
