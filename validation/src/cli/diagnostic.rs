@@ -72,6 +72,9 @@ impl std::error::Error for Failure {}
 
 impl Diagnostic for Failure {
     fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
+        if let Some(help) = run_error(&*self.error).and_then(RunError::help) {
+            return Some(Box::new(help));
+        }
         let help = file_error(&*self.error)?.help()?;
         Some(Box::new(help))
     }

@@ -1,7 +1,8 @@
 //! The command line: one file for each verb.
 //!
 //! Exit codes: 0 on success, 1 when a check fails or a run stops, 2 on bad input or when something that
-//! is needed is missing.
+//! is needed is missing. A run that a signal stopped exits with 128 and the number of the signal: 130 for
+//! Ctrl-C, 143 for SIGTERM.
 
 mod check;
 mod diagnostic;
@@ -57,6 +58,8 @@ enum Verb {
 enum Verdict {
     Good,
     CheckFailed,
+    /// Stopped at a good point by this signal.
+    Interrupted(u8),
 }
 
 /// Runs the program.
@@ -76,6 +79,7 @@ pub fn main() -> ExitCode {
     match outcome {
         Ok(Verdict::Good) => ExitCode::SUCCESS,
         Ok(Verdict::CheckFailed) => ExitCode::from(1),
+        Ok(Verdict::Interrupted(signal)) => ExitCode::from(128 + signal),
         Err(failure) => {
             let code = failure.exit_code();
             eprintln!("{:?}", miette::Report::new(failure));

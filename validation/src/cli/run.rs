@@ -1,28 +1,142 @@
 use super::{Failure, Verdict, write_json};
 use crate::report::Progress;
-use crate::run::run_scene;
+use crate::run::{Begin, Outcome, Runner, Start, Summary, Timing};
 use crate::scene::Scene;
+use serde::Serialize;
+use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
+use signal_hook::flag;
+use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize};
 
 /// Run a scene natively.
+///
+/// Ctrl-C or SIGTERM ends a run after the present step, with a checkpoint; a second one kills it.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// The scene file.
     scene: PathBuf,
-    /// Folder for thermo.csv, dump.lammpstrj, final.data and summary.json.
+    /// Folder for thermo.csv, dump.lammpstrj, final.data, summary.json, timing.json and checkpoints.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// Go on from the last checkpoint in the folder, to the last bit as if nothing had happened; from the
+    /// first step if there is none.
+    #[arg(long, conflicts_with = "overwrite")]
+    resume: bool,
+    /// Start over where a run waits to be taken up again.
+    #[arg(long)]
+    overwrite: bool,
+}
+
+/// What `--json` writes.
+#[derive(Serialize)]
+struct Report<'a> {
+    #[serde(flatten)]
+    summary: &'a Summary,
+    timing: &'a Timing,
 }
 
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
-    let scene = Scene::open(&arguments.scene).map_err(Failure::new)?;
-    let progress = Progress::new();
-    let total = scene.stages.iter().map(|s| s.steps).sum();
-    let bar = progress.bar(&scene.title, total);
-    let summary = run_scene(&scene, &arguments.out, &mut |p| bar.set(p.step)).map_err(Failure::new)?;
+    let Arguments { scene: path, out, resume, overwrite } = arguments;
+    let scene = Scene::open(path).map_err(Failure::new)?;
+    let begin = match (resume, overwrite) {
+        (true, _) => Begin::Resume,
+        (_, true) => Begin::Overwrite,
+        _ => Begin::New,
+    };
+    let stop = watch_signals().map_err(Failure::new)?;
+    let mut runner = Runner::begin(&scene, out, begin).map_err(Failure::new)?;
+    let total: u64 = scene.stages.iter().map(|s| s.steps).sum();
+    let made = tell_start(runner.start(), begin, out, total);
+    let bar = Progress::new().steps(&scene.title, total, made, runner.particles());
+    let outcome = runner.run(&stop, &mut |p| bar.set(p.step)).map_err(Failure::new);
     bar.finish();
-    println!("{summary}");
-    println!("written to {}", arguments.out.display());
-    write_json(json, &summary)?;
-    Ok(Verdict::Good)
+    match outcome? {
+        Outcome::Finished { summary, timing } => {
+            say(&summary.to_string());
+            if let Some(session) = timing.sessions.last().filter(|_| made < total) {
+                say(&format!(
+                    "{} steps in {:.1} s: {:.3e} particle-steps per second",
+                    session.to_step - session.from_step,
+                    session.wall_seconds,
+                    session.particle_steps_per_second
+                ));
+            }
+            say(&format!("written to {}", out.display()));
+            write_json(json, &Report { summary: &summary, timing: &timing })?;
+            Ok(Verdict::Good)
+        }
+        Outcome::Interrupted { stop, step, steps } => {
+            say(&format!(
+                "stopped after step {step} of {steps}; to go on: psidpd run {} --out {} --resume",
+                quoted(path),
+                quoted(out)
+            ));
+            Ok(Verdict::Interrupted(u8::try_from(stop).unwrap_or(0)))
+        }
+    }
+}
+
+/// Says what a run begins with, if that is not its beginning; gives the steps made.
+fn tell_start(start: &Start, begin: Begin, out: &Path, total: u64) -> u64 {
+    match start {
+        Start::New if begin == Begin::Resume => {
+            say(&format!("there is no checkpoint in {}: beginning with the first step", out.display()));
+            0
+        }
+        Start::New => 0,
+        Start::Finished => {
+            say(&format!("the run in {} is finished: nothing is left to do", out.display()));
+            total
+        }
+        Start::Resumed { step, program, fallback } => {
+            if let Some(why) = fallback {
+                warn(&format!("{why}; going on from the one before"));
+            }
+            if let Some(program) = program {
+                warn(&format!(
+                    "the checkpoint is of psidpd {program}: what follows may differ in rounding from what that \
+                     version would have computed"
+                ));
+            }
+            say(&format!("going on after step {step} of {total}"));
+            *step
+        }
+    }
+}
+
+/// A number that the first SIGINT or SIGTERM sets to its own; the second kills the program.
+fn watch_signals() -> std::io::Result<Arc<AtomicUsize>> {
+    let stop = Arc::new(AtomicUsize::new(0));
+    let stopping = Arc::new(AtomicBool::new(false));
+    for signal in [SIGINT, SIGTERM] {
+        // In the order that they are to act: a second signal finds the flag that the first set.
+        flag::register_conditional_default(signal, stopping.clone())?;
+        flag::register(signal, stopping.clone())?;
+        flag::register_usize(signal, stop.clone(), signal as usize)?;
+    }
+    // A file that grows beyond the limit of the system or the user is then an error like a full disk.
+    flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)))?;
+    Ok(stop)
+}
+
+/// Prints a line. A terminal or pipe that went away, as Ctrl-C makes it, is no reason to fail.
+fn say(line: &str) {
+    let _ = writeln!(std::io::stdout(), "{line}");
+}
+
+fn warn(line: &str) {
+    let _ = writeln!(std::io::stderr(), "warning: {line}");
+}
+
+/// A path as a shell takes it.
+fn quoted(path: &Path) -> String {
+    let text = path.display().to_string();
+    let plain = |c: char| c.is_alphanumeric() || "/._-+,=@%:".contains(c);
+    if !text.is_empty() && text.chars().all(plain) {
+        text
+    } else {
+        format!("'{}'", text.replace('\'', r"'\''"))
+    }
 }

@@ -4,12 +4,17 @@ use std::borrow::Cow;
 use std::io::{IsTerminal, stderr};
 use std::time::Duration;
 
-use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressStyle};
+use indicatif::{
+    MultiProgress, ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressState, ProgressStyle,
+};
 
 use super::text::one_line;
 
 const BAR: &str = "{prefix:24!} {bar:32.cyan/dim} {percent:>3}% {human_pos}/{human_len} \
                    {elapsed_precise:.dim} {eta:.dim} left";
+// Fits eighty columns; the bar gets what is left.
+const STEPS: &str =
+    "{prefix:14!} {percent:>3}% {human_pos}/{human_len} {rate}, {eta} left {wide_bar:.cyan/dim}";
 const SPINNER: &str = "{prefix} {spinner:.cyan} {elapsed_precise:.dim}";
 
 /// A group of bars on standard error; silent if that is not a terminal.
@@ -39,6 +44,25 @@ impl Progress {
     pub fn bar(&self, name: &str, total: u64) -> Bar {
         let style = style(BAR).progress_chars("━╸─");
         self.add(ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden()), name, style)
+    }
+
+    /// Adds a bar for a run of `steps` steps of `particles` particles that has made `made` of them. It
+    /// tells the speed too: steps per second, and nanoseconds for each step of each particle.
+    pub fn steps(&self, name: &str, steps: u64, made: u64, particles: usize) -> Bar {
+        let style = style(STEPS).progress_chars("━╸─").with_key(
+            "rate",
+            move |state: &ProgressState, to: &mut dyn std::fmt::Write| {
+                // A bar that cannot be drawn is none of the work's business.
+                let _ = to.write_str(&rate(state.per_sec(), particles));
+            },
+        );
+        let bar = ProgressBar::with_draw_target(Some(steps), ProgressDrawTarget::hidden());
+        let bar = self.add(bar, name, style);
+        // What others made says nothing of the speed: it is taken note of and forgotten.
+        bar.inner.set_position(made);
+        bar.inner.update(|_| ());
+        bar.inner.reset_eta();
+        bar
     }
 
     /// Adds a spinner, for work of unknown length.
@@ -93,6 +117,16 @@ impl Bar {
     }
 }
 
+/// A speed in words.
+fn rate(steps_per_second: f64, particles: usize) -> String {
+    if !(steps_per_second > 0.0 && steps_per_second.is_finite()) {
+        return "-".into();
+    }
+    let digits = if steps_per_second < 10.0 { 2 } else { 0 };
+    let nanoseconds = 1e9 / (steps_per_second * particles.max(1) as f64);
+    format!("{steps_per_second:.digits$} steps/s, {nanoseconds:.0} ns/particle")
+}
+
 fn style(template: &str) -> ProgressStyle {
     ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
 }
@@ -117,8 +151,28 @@ mod tests {
     }
 
     #[test]
+    fn speeds_are_of_steps_and_particles() {
+        assert_eq!(rate(1000.0, 2000), "1000 steps/s, 500 ns/particle");
+        assert_eq!(rate(0.5, 1_000_000), "0.50 steps/s, 2000 ns/particle");
+        assert_eq!((rate(0.0, 10), rate(f64::NAN, 0)), ("-".into(), "-".into()));
+    }
+
+    /// A run that goes on from far ahead must not count what others made as its own speed.
+    #[test]
+    fn bars_start_where_a_run_does() {
+        let bar = Progress::new().steps("run", 2_000_000, 1_000_000, 10);
+        assert_eq!(bar.inner.position(), 1_000_000);
+        assert!(bar.inner.per_sec() < 1.0, "{}", bar.inner.per_sec());
+        std::thread::sleep(Duration::from_millis(50));
+        bar.inner.set_position(1_000_100);
+        bar.inner.update(|_| ());
+        let speed = bar.inner.per_sec();
+        assert!(speed > 0.0 && speed <= 100.0 / 0.050, "{speed}");
+    }
+
+    #[test]
     fn templates_are_valid() {
-        for template in [BAR, SPINNER] {
+        for template in [BAR, STEPS, SPINNER] {
             ProgressStyle::with_template(template).unwrap();
         }
     }

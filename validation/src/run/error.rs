@@ -1,3 +1,4 @@
+use super::checkpoint::CheckpointError;
 use psidpd_core::document::FileError;
 use psidpd_core::engine::EngineError;
 use psidpd_core::model::expression::TooLarge;
@@ -63,8 +64,12 @@ pub enum RunError {
         /// How far.
         distance: f64,
     },
-    /// A run of a scene stopped; the last good state is on disk.
-    #[error("stage \"{stage}\" stopped: {cause}; the state of step {good} is in {}", saved.display())]
+    /// The physics of a run failed; the last good state is on disk.
+    #[error(
+        "stage \"{stage}\" stopped: {cause}; the state of step {good} is in {}{}",
+        saved.display(),
+        if *checkpoint { ", and in the checkpoint beside it" } else { "" }
+    )]
     Stopped {
         /// Name of the stage.
         stage: String,
@@ -75,7 +80,37 @@ pub enum RunError {
         good: u64,
         /// Where it is.
         saved: PathBuf,
+        /// Whether it could also be written as a checkpoint.
+        checkpoint: bool,
     },
+    /// A run could not write one of its files on the way.
+    #[error("the run stopped after step {step}: {cause}")]
+    Halted {
+        /// Step that the run had reached.
+        step: u64,
+        /// Which file, and why.
+        #[source]
+        cause: Box<RunError>,
+        /// Step of the checkpoint that is on disk.
+        checkpoint: Option<u64>,
+    },
+    /// The folder holds a run that did not reach its end.
+    #[error("{} holds a run that is not finished{}", folder.display(), reached(.step))]
+    Unfinished {
+        /// The folder.
+        folder: PathBuf,
+        /// The step that its checkpoint is of, if that can be read.
+        step: Option<u64>,
+    },
+    /// The folder is in use.
+    #[error("another run is writing to {}", folder.display())]
+    Busy {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// A run cannot be taken up again.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
     /// A data file cannot be written.
     #[error(transparent)]
     Lammps(#[from] crate::lammps::LammpsError),
@@ -95,13 +130,46 @@ impl RunError {
         matches!(
             self,
             RunError::Stopped { .. }
+                | RunError::Halted { .. }
                 | RunError::Engine { .. }
                 | RunError::Velocity { .. }
                 | RunError::Runaway { .. }
         )
     }
 
+    /// Whether a file is the trouble, not the physics.
+    pub(super) fn is_output(&self) -> bool {
+        matches!(self, RunError::Output { .. } | RunError::Lammps(_))
+    }
+
+    /// What can be done about it, where that is not in the message.
+    pub fn help(&self) -> Option<String> {
+        match self {
+            RunError::Stopped { checkpoint: true, .. } => Some(
+                "to try again from there, give another scene `[initial]` with `kind = \"checkpoint\"`, and a \
+                 smaller dt or softer forces; to start over, --overwrite"
+                    .into(),
+            ),
+            RunError::Halted { checkpoint: Some(step), .. } => Some(format!(
+                "the checkpoint of step {step} is good: when the cause is gone, go on with --resume"
+            )),
+            RunError::Halted { checkpoint: None, .. } => {
+                Some("there is no checkpoint yet: when the cause is gone, start over".into())
+            }
+            RunError::Unfinished { .. } => Some("go on with --resume, or start over with --overwrite".into()),
+            RunError::Busy { .. } => Some("wait for its end, or choose another folder".into()),
+            RunError::Checkpoint(error) => Some(error.help().into()),
+            _ => None,
+        }
+    }
+
     pub(super) fn output(path: &Path) -> impl FnOnce(std::io::Error) -> RunError + '_ {
         move |source| RunError::Output { path: path.to_owned(), source }
     }
+}
+
+fn reached(step: &Option<u64>) -> String {
+    step.map_or(" (its checkpoint cannot be read)".into(), |step| {
+        format!(" (its checkpoint is of step {step})")
+    })
 }

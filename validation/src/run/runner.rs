@@ -1,16 +1,19 @@
-use super::dump::write_frame;
+use super::checkpoint::{Checkpoint, CheckpointError, Found, Identity, Position, Store};
 use super::error::RunError;
-use super::restart::write_data;
-use super::simulation::Simulation;
-use super::state::State;
-use super::summary::{Means, Summary};
-use super::thermo::{Thermo, ThermoFile};
-use crate::scene::{Scene, Stage};
-use psidpd_core::engine::Want;
-use std::fs::File;
-use std::io::{BufWriter, ErrorKind, Write};
-use std::path::{Path, PathBuf};
-use std::time::Instant;
+use super::folder::Folder;
+use super::output::Output;
+use super::summary::{Summary, Sums};
+use super::thermo::Thermo;
+use super::timing::Timing;
+use super::underway::Run;
+use crate::scene::Scene;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::atomic::AtomicUsize;
+use std::time::Duration;
+
+/// The version of this program.
+const PROGRAM: &str = env!("CARGO_PKG_VERSION");
 
 /// Where a run is, after every step.
 #[derive(Debug, Clone, Copy)]
@@ -25,196 +28,227 @@ pub struct Progress<'a> {
     pub thermo: Option<&'a Thermo>,
 }
 
-/// Runs a scene and writes `thermo.csv`, `dump.lammpstrj`, `final.data` and `summary.json` to the
-/// folder `out`, which is made if need be.
-///
-/// If the physics fails on the way, the last good state, that of the last thermo row (or of the start
-/// of the stage), is written to `last-good.data`.
+/// How a run deals with what is in its folder.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Begin {
+    /// From the first step; a run that is not finished is left alone.
+    #[default]
+    New,
+    /// From the first step, whatever is there.
+    Overwrite,
+    /// From the last checkpoint; from the first step if there is none.
+    Resume,
+}
+
+/// What a run begins with.
+#[derive(Debug)]
+pub enum Start {
+    /// The initial state.
+    New,
+    /// A checkpoint.
+    Resumed {
+        /// Its step.
+        step: u64,
+        /// The version of the program that wrote it, if that is another one: the steps that follow need not
+        /// be to the last bit those that it would have made.
+        program: Option<String>,
+        /// What is wrong with the newest checkpoint, if it is the one before.
+        fallback: Option<CheckpointError>,
+    },
+    /// The end: there is nothing left to do.
+    Finished,
+}
+
+/// How a run ended.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Outcome {
+    /// All steps are made.
+    Finished {
+        /// What it came to.
+        summary: Box<Summary>,
+        /// What it took.
+        timing: Timing,
+    },
+    /// It was asked to stop, and left a checkpoint.
+    Interrupted {
+        /// What it was told.
+        stop: usize,
+        /// Steps made.
+        step: u64,
+        /// Steps to make.
+        steps: u64,
+    },
+}
+
+/// Runs a scene from its first step to its last, whatever is in the folder `out`; see [`Runner`].
 ///
 /// # Errors
-/// [`RunError::Stopped`] if the physics fails; [`RunError::Output`] if a file cannot be written.
+/// [`RunError::Stopped`] if the physics fails; [`RunError::Halted`] or [`RunError::Output`] if a file
+/// cannot be written.
 pub fn run_scene(scene: &Scene, out: &Path, progress: &mut dyn FnMut(Progress)) -> Result<Summary, RunError> {
-    std::fs::create_dir_all(out).map_err(RunError::output(out))?;
-    let state = scene.initial_state();
-    let simulation = scene.simulation(state.clone())?;
-    let mut run = Run {
-        scene,
-        output: Output::create(scene, out)?,
-        good: Good { step: 0, state },
-        simulation,
-        time: 0.0,
-        steps: scene.stages.iter().map(|s| s.steps).sum(),
-        rows: Vec::new(),
-        last: None,
-        progress,
+    let mut runner = Runner::begin(scene, out, Begin::Overwrite)?;
+    let never = AtomicUsize::new(0);
+    loop {
+        if let Outcome::Finished { summary, .. } = runner.run(&never, progress)? {
+            return Ok(*summary);
+        }
+    }
+}
+
+/// A run of a scene in a folder.
+///
+/// It writes `thermo.csv` and `dump.lammpstrj` as it goes, `final.data` and `summary.json` at its end, and
+/// every now and then a [`Checkpoint`], from which it can go on bit for bit: what is in these files, and in
+/// the checkpoint of a finished run, does not depend on how often it was interrupted, or at which moment.
+/// Wall times are in `timing.json` alone.
+///
+/// If the physics fails on the way, the last good state, that of the last checkpoint, thermo row or start of
+/// a stage, is written to `last-good.data` and as a checkpoint.
+pub struct Runner<'a> {
+    start: Start,
+    run: Run<'a>,
+}
+
+impl<'a> Runner<'a> {
+    /// Prepares a run in the folder `out`, which is made if need be.
+    ///
+    /// # Errors
+    /// [`RunError::Unfinished`] for [`Begin::New`] where a run waits to be taken up again;
+    /// [`RunError::Checkpoint`] for [`Begin::Resume`] if its checkpoints cannot be used;
+    /// [`RunError::Busy`] if another run is on its way there; a model or initial state that does not work;
+    /// a folder that cannot be written.
+    pub fn begin(scene: &'a Scene, out: &Path, begin: Begin) -> Result<Runner<'a>, RunError> {
+        let folder = Folder::open(out)?;
+        let store = Store::new(out);
+        let identity = Identity::of(scene);
+        if begin == Begin::Resume
+            && let Some(found) = store.find(|checkpoint| usable(checkpoint, &identity, scene, out))?
+        {
+            return Runner::resume(scene, folder, store, found);
+        }
+        if begin == Begin::New {
+            refuse_unfinished(&store, out)?;
+        }
+        let state = scene.initial_state();
+        let simulation = scene.simulation(state.clone())?;
+        store.clear()?;
+        let good = Checkpoint {
+            program: PROGRAM.into(),
+            identity,
+            finished: false,
+            step: 0,
+            position: Position::default(),
+            forces: Vec::new(),
+            state,
+            out_of_bounds: [0; 2],
+            last: None,
+            sums: Sums::default(),
+            files: BTreeMap::new(),
+            observers: Vec::new(),
+        };
+        let mut output = Output::create(scene, out)?;
+        let good = Checkpoint { files: output.lengths(), ..good };
+        let run = Run::new(scene, folder, store, simulation, Some(output), good, Timing::default());
+        Ok(Runner { start: Start::New, run })
+    }
+
+    fn resume(scene: &'a Scene, folder: Folder, store: Store, found: Found) -> Result<Runner<'a>, RunError> {
+        let Found { checkpoint: good, fallback } = found;
+        let mut simulation = scene.simulation(good.state.clone())?;
+        if let Some(stage) = scene.stages.get(good.position.stage) {
+            scene.enter(stage, &mut simulation)?;
+        }
+        simulation.restore(good.step, &good.state, &good.forces, good.out_of_bounds);
+        if fallback.is_some() {
+            store.fall_back()?;
+        }
+        let (start, output) = if good.finished {
+            (Start::Finished, None)
+        } else {
+            let program = (good.program != PROGRAM).then(|| good.program.clone());
+            let start = Start::Resumed { step: good.step, program, fallback };
+            (start, Some(Output::reopen(folder.path(), &good.files)?))
+        };
+        let good = Checkpoint { program: PROGRAM.into(), ..good };
+        let timing = Timing::read(folder.path());
+        let mut run = Run::new(scene, folder, store, simulation, output, good, timing);
+        run.stored = Some(run.good.step);
+        Ok(Runner { start, run })
+    }
+
+    /// What it begins with.
+    pub fn start(&self) -> &Start {
+        &self.start
+    }
+
+    /// Sets the time between checkpoints, ten minutes, for a scene that does not give steps between them.
+    pub fn set_checkpoint_interval(&mut self, interval: Duration) {
+        self.run.interval = interval;
+    }
+
+    /// How many particles there are.
+    pub fn particles(&self) -> usize {
+        self.run.simulation.len()
+    }
+
+    /// Makes the steps that are left. At the end of the first step that finds `stop` other than 0, the run
+    /// writes a checkpoint and ends.
+    ///
+    /// # Errors
+    /// [`RunError::Stopped`] if the physics fails; [`RunError::Halted`] if a file cannot be written.
+    pub fn run(
+        &mut self,
+        stop: &AtomicUsize,
+        progress: &mut dyn FnMut(Progress),
+    ) -> Result<Outcome, RunError> {
+        let Runner { start, run } = self;
+        if matches!(start, Start::Finished) {
+            run.store.keep_newest()?;
+            return Ok(Outcome::Finished { summary: Box::new(run.summary()), timing: run.timing.clone() });
+        }
+        run.go_on(stop, progress).map_err(|error| run.stop(error))
+    }
+}
+
+/// Whether a run can go on from a checkpoint: it is of this scene, and the files have what it counts on.
+fn usable(
+    checkpoint: &Checkpoint,
+    identity: &Identity,
+    scene: &Scene,
+    out: &Path,
+) -> Result<(), CheckpointError> {
+    let path = Store::new(out).path();
+    let differences = identity.differences(&checkpoint.identity);
+    if !differences.is_empty() {
+        return Err(CheckpointError::Foreign { path, differences });
+    }
+    let position = checkpoint.position;
+    let before: u64 = scene.stages.iter().take(position.stage).map(|s| s.steps).sum();
+    let fits = scene.stages.get(position.stage).is_some_and(|stage| position.done <= stage.steps)
+        && checkpoint.step == before + position.done
+        && checkpoint.forces.len() == if position.entered { checkpoint.state.len() } else { 0 };
+    if !fits {
+        return Err(CheckpointError::Damaged { path, what: "its parts do not fit together".into() });
+    }
+    // A finished run needs its files no more; whoever wants room may have moved them.
+    for (name, expected) in checkpoint.files.iter().filter(|_| !checkpoint.finished) {
+        let file = out.join(name);
+        let found = file.metadata().map_or(0, |m| m.len());
+        if found < *expected {
+            return Err(CheckpointError::File { path, file, found, expected: *expected });
+        }
+    }
+    Ok(())
+}
+
+fn refuse_unfinished(store: &Store, out: &Path) -> Result<(), RunError> {
+    if !store.exists() {
+        return Ok(());
+    }
+    let step = match store.find(|_| Ok(())) {
+        Ok(Some(found)) if found.checkpoint.finished => return Ok(()),
+        Ok(Some(found)) => Some(found.checkpoint.step),
+        _ => None,
     };
-    let start = Instant::now();
-    for stage in &scene.stages {
-        run.stage(stage).map_err(|error| run.stop(stage, error))?;
-    }
-    run.finish(start.elapsed().as_secs_f64())
-}
-
-/// A run on its way.
-struct Run<'a> {
-    scene: &'a Scene,
-    simulation: Simulation,
-    output: Output,
-    good: Good,
-    time: f64,
-    steps: u64,
-    /// Thermo rows of the stage.
-    rows: Vec<Thermo>,
-    last: Option<Thermo>,
-    progress: &'a mut dyn FnMut(Progress),
-}
-
-/// A state to fall back to.
-struct Good {
-    step: u64,
-    state: State,
-}
-
-impl Run<'_> {
-    fn stage(&mut self, stage: &Stage) -> Result<(), RunError> {
-        self.rows.clear();
-        self.scene.enter(stage, &mut self.simulation)?;
-        self.simulation.prepare(stage.dt, Want::TOTALS)?;
-        if self.simulation.step_number() == 0 {
-            self.report(stage, true)?;
-        }
-        self.keep_state();
-        let begin = self.time;
-        for step in 1..=stage.steps {
-            let number = self.simulation.step_number() + 1;
-            let totals = self.is_row(number);
-            let want = if totals { Want::TOTALS } else { Want::FORCES };
-            self.simulation.step(stage.dt, stage.integrator, want)?;
-            self.time = begin + step as f64 * stage.dt;
-            self.report(stage, totals)?;
-        }
-        Ok(())
-    }
-
-    fn is_row(&self, step: u64) -> bool {
-        every(self.scene.output.thermo, step) || step == self.steps
-    }
-
-    fn keep_state(&mut self) {
-        self.good.step = self.simulation.step_number();
-        self.simulation.copy_state(&mut self.good.state);
-    }
-
-    /// Writes what is due after a step.
-    fn report(&mut self, stage: &Stage, totals: bool) -> Result<(), RunError> {
-        let step = self.simulation.step_number();
-        let thermo = totals.then(|| Thermo::of(&self.simulation, self.time));
-        if let Some(thermo) = &thermo {
-            self.last = Some(*thermo);
-            if let Some(file) = &mut self.output.thermo {
-                file.row(thermo)?;
-                // The state a stage starts from is not of that stage.
-                if step > 0 {
-                    self.rows.push(*thermo);
-                }
-            }
-            self.keep_state();
-        }
-        if every(self.scene.output.dump, step) {
-            self.output.frame(&self.simulation)?;
-        }
-        (self.progress)(Progress { stage: &stage.name, step, steps: self.steps, thermo: thermo.as_ref() });
-        Ok(())
-    }
-
-    /// Saves what is left of a run that failed.
-    fn stop(&self, stage: &Stage, cause: RunError) -> RunError {
-        if matches!(cause, RunError::Output { .. }) {
-            return cause;
-        }
-        let saved = self.output.folder.join("last-good.data");
-        let title = format!("psidpd: {}, step {}", self.scene.title, self.good.step);
-        match write_data(&saved, &title, &self.good.state) {
-            Ok(()) => RunError::Stopped {
-                stage: stage.name.clone(),
-                cause: Box::new(cause),
-                good: self.good.step,
-                saved,
-            },
-            // The physics failed first, and says more.
-            Err(_) => cause,
-        }
-    }
-
-    fn finish(mut self, wall_seconds: f64) -> Result<Summary, RunError> {
-        self.output.flush()?;
-        let title = format!("psidpd: {}, step {}", self.scene.title, self.simulation.step_number());
-        write_data(&self.output.folder.join("final.data"), &title, &self.simulation.state())?;
-        let particles = self.simulation.len();
-        let summary = Summary {
-            title: self.scene.title.clone(),
-            particles,
-            steps: self.steps,
-            wall_seconds,
-            particle_steps_per_second: particles as f64 * self.steps as f64 / wall_seconds,
-            out_of_bounds: self.simulation.out_of_bounds(),
-            last: self.last.unwrap_or_else(|| Thermo::of(&self.simulation, self.time)),
-            means: Means::of(&self.rows),
-        };
-        summary.write(&self.output.folder.join("summary.json"))?;
-        Ok(summary)
-    }
-}
-
-fn every(interval: u64, step: u64) -> bool {
-    interval > 0 && step.is_multiple_of(interval)
-}
-
-/// The files of a run.
-struct Output {
-    folder: PathBuf,
-    thermo: Option<ThermoFile>,
-    dump: Option<(PathBuf, BufWriter<File>)>,
-}
-
-impl Output {
-    fn create(scene: &Scene, folder: &Path) -> Result<Output, RunError> {
-        // What an earlier run left at its end is not of this one.
-        for name in ["final.data", "last-good.data", "summary.json"] {
-            let path = folder.join(name);
-            match std::fs::remove_file(&path) {
-                Err(error) if error.kind() != ErrorKind::NotFound => {
-                    return Err(RunError::output(&path)(error));
-                }
-                _ => {}
-            }
-        }
-        let thermo = match scene.output.thermo {
-            0 => None,
-            _ => Some(ThermoFile::create(&folder.join("thermo.csv"))?),
-        };
-        let dump = match scene.output.dump {
-            0 => None,
-            _ => {
-                let path = folder.join("dump.lammpstrj");
-                let file = File::create(&path).map_err(RunError::output(&path))?;
-                Some((path, BufWriter::new(file)))
-            }
-        };
-        Ok(Output { folder: folder.to_owned(), thermo, dump })
-    }
-
-    fn frame(&mut self, simulation: &Simulation) -> Result<(), RunError> {
-        match &mut self.dump {
-            None => Ok(()),
-            Some((path, file)) => write_frame(simulation, file).map_err(RunError::output(path)),
-        }
-    }
-
-    fn flush(&mut self) -> Result<(), RunError> {
-        match &mut self.dump {
-            None => Ok(()),
-            Some((path, file)) => file.flush().map_err(RunError::output(path)),
-        }
-    }
+    Err(RunError::Unfinished { folder: out.to_owned(), step })
 }

@@ -150,6 +150,31 @@ impl Simulation {
         self.number = number;
     }
 
+    /// Takes up a run where a checkpoint left it: after step `number`, with the forces of that step, so
+    /// that the next step is bit for bit the one that would have followed. Unlike [`Simulation::new`] it
+    /// wraps no position: one that rounding left on a face must stay there.
+    ///
+    /// `state` must be of the particles, the box and the masses that the simulation was made with.
+    pub(super) fn restore(
+        &mut self,
+        number: u64,
+        state: &State,
+        forces: &[[f64; 3]],
+        out_of_bounds: [u64; 2],
+    ) {
+        self.owned = state.len();
+        self.x.clone_from(&state.x);
+        self.v.clone_from(&state.v);
+        self.species.clone_from(&state.species);
+        self.tag.clone_from(&state.tag);
+        self.image.clone_from(&state.image);
+        self.force.clear();
+        self.force.extend_from_slice(forces);
+        self.number = number;
+        self.earlier_out_of_bounds = out_of_bounds;
+        self.find_frozen();
+    }
+
     /// Computes the forces of the present step at the present velocities, as a run or a stage needs
     /// before its first step.
     ///

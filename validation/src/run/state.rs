@@ -1,9 +1,12 @@
+use super::checkpoint::box_by_edges;
 use psidpd_core::engine::PeriodicBox;
+use serde::{Deserialize, Serialize};
 
 /// Particles in their box: all that a trajectory starts from, and all that it leaves.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct State {
     /// The box. In two dimensions its third edge is a unit, and nothing depends on it.
+    #[serde(with = "box_by_edges")]
     pub domain: PeriodicBox,
     /// Mass of each species, in the order of the model.
     pub mass: Vec<f64>,
@@ -31,7 +34,7 @@ impl State {
     }
 
     /// The first thing that makes this no state of a model with `species` species.
-    pub(super) fn fault(&self, species: usize, dimensions: usize) -> Option<String> {
+    pub(crate) fn fault(&self, species: usize, dimensions: usize) -> Option<String> {
         let count = self.x.len();
         if count == 0 {
             return Some("there are no particles".into());

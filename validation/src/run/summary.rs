@@ -1,9 +1,11 @@
 use super::error::RunError;
 use super::thermo::Thermo;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+use std::io::Write;
 use std::path::Path;
 
-/// What a run came to; also `summary.json`.
+/// What a run came to; also `summary.json`. The same however often the run was interrupted: times are in
+/// [`Timing`](super::Timing).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
     /// Title of the scene.
@@ -12,10 +14,6 @@ pub struct Summary {
     pub particles: usize,
     /// Steps made, over all stages.
     pub steps: u64,
-    /// Wall time of the steps, output included, in seconds.
-    pub wall_seconds: f64,
-    /// Particles times steps over that time.
-    pub particle_steps_per_second: f64,
     /// Evaluations of ψ that met a density below its bounds, and above them.
     pub out_of_bounds: [u64; 2],
     /// Totals after the last step.
@@ -39,17 +37,35 @@ pub struct Means {
     pub conservative_pressure: f64,
 }
 
-impl Means {
-    /// The means of `rows`.
-    pub(super) fn of(rows: &[Thermo]) -> Option<Means> {
-        let count = rows.len() as f64;
-        let mean = |f: fn(&Thermo) -> f64| rows.iter().map(f).sum::<f64>() / count;
-        (!rows.is_empty()).then(|| Means {
-            rows: rows.len() as u64,
-            temperature: mean(|t| t.temperature),
-            potential: mean(|t| t.potential),
-            pressure: mean(|t| t.pressure),
-            conservative_pressure: mean(|t| t.conservative_pressure),
+/// Sums over thermo rows, from which their means come: a checkpoint can hold them.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Sums {
+    rows: u64,
+    temperature: f64,
+    potential: f64,
+    pressure: f64,
+    conservative_pressure: f64,
+}
+
+impl Sums {
+    /// Counts another row.
+    pub fn add(&mut self, t: &Thermo) {
+        self.rows += 1;
+        self.temperature += t.temperature;
+        self.potential += t.potential;
+        self.pressure += t.pressure;
+        self.conservative_pressure += t.conservative_pressure;
+    }
+
+    /// The means; `None` without rows.
+    pub fn means(&self) -> Option<Means> {
+        let count = self.rows as f64;
+        (self.rows > 0).then(|| Means {
+            rows: self.rows,
+            temperature: self.temperature / count,
+            potential: self.potential / count,
+            pressure: self.pressure / count,
+            conservative_pressure: self.conservative_pressure / count,
         })
     }
 }
@@ -57,19 +73,19 @@ impl Means {
 impl Summary {
     pub(super) fn write(&self, path: &Path) -> Result<(), RunError> {
         let text = serde_json::to_string_pretty(self).map_err(std::io::Error::from);
-        text.and_then(|text| std::fs::write(path, text + "\n")).map_err(RunError::output(path))
+        let write = |text: String| {
+            let mut file = std::fs::File::create(path)?;
+            file.write_all((text + "\n").as_bytes())?;
+            file.sync_all()
+        };
+        text.and_then(write).map_err(RunError::output(path))
     }
 }
 
 /// For the end of a run in a terminal.
 impl std::fmt::Display for Summary {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        writeln!(
-            f,
-            "{}: {} particles, {} steps in {:.1} s",
-            self.title, self.particles, self.steps, self.wall_seconds
-        )?;
-        write!(f, "{:.3e} particle-steps per second", self.particle_steps_per_second)?;
+        write!(f, "{}: {} particles, {} steps", self.title, self.particles, self.steps)?;
         let [below, above] = self.out_of_bounds;
         if below + above > 0 {
             let share = (below + above) as f64 / (self.particles as f64 * self.steps as f64);

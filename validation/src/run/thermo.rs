@@ -1,12 +1,12 @@
 use super::error::RunError;
+use super::growing::GrowingFile;
 use super::simulation::Simulation;
-use serde::Serialize;
-use std::fs::File;
-use std::io::{BufWriter, Write};
-use std::path::{Path, PathBuf};
+use serde::{Deserialize, Serialize};
+use std::io::Write;
+use std::path::Path;
 
 /// One row of totals.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Thermo {
     /// Number of the step.
     pub step: u64,
@@ -45,17 +45,21 @@ impl Thermo {
 }
 
 /// `thermo.csv`.
-pub(super) struct ThermoFile {
-    path: PathBuf,
-    file: BufWriter<File>,
-}
+pub(super) struct ThermoFile(GrowingFile);
 
 impl ThermoFile {
-    pub fn create(path: &Path) -> Result<ThermoFile, RunError> {
-        let file = File::create(path).map_err(RunError::output(path))?;
-        let mut this = ThermoFile { path: path.to_owned(), file: BufWriter::new(file) };
+    /// The name of the file in the folder of a run.
+    pub const NAME: &str = "thermo.csv";
+
+    pub fn create(folder: &Path) -> Result<ThermoFile, RunError> {
+        let mut this = ThermoFile(GrowingFile::create(folder, Self::NAME)?);
         this.line("step,time,temperature,potential,kinetic,pressure,pxx,pyy,pzz,pxy,pxz,pyz")?;
         Ok(this)
+    }
+
+    /// The file of a run that goes on, cut to the `length` it had at the checkpoint.
+    pub fn reopen(folder: &Path, length: u64) -> Result<ThermoFile, RunError> {
+        GrowingFile::reopen(folder, Self::NAME, length).map(ThermoFile)
     }
 
     /// Writes a row, and makes it visible to whoever follows the file.
@@ -65,7 +69,12 @@ impl ThermoFile {
         self.line(&format!("{},{}", t.step, columns.join(",")))
     }
 
+    /// The file.
+    pub fn file(&mut self) -> &mut GrowingFile {
+        &mut self.0
+    }
+
     fn line(&mut self, text: &str) -> Result<(), RunError> {
-        writeln!(self.file, "{text}").and_then(|()| self.file.flush()).map_err(RunError::output(&self.path))
+        self.0.attempt(|file| writeln!(file, "{text}").and_then(|()| file.flush()))
     }
 }

@@ -41,10 +41,11 @@ pub use velocities::Velocities;
 
 use crate::run::{BodyForce, RunError, Simulation, State, Tags};
 use number::positive;
-use psidpd_core::document::{Document, FileError, FileErrorKind, Section, Value};
+use psidpd_core::document::{Document, FileError, FileErrorKind, Section, Source, Value};
 use psidpd_core::engine::{PeriodicBox, Plan};
 use psidpd_core::model::Model;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// A scene file with its model, read and checked.
 #[derive(Debug, Clone)]
@@ -73,6 +74,10 @@ pub struct Scene {
     pub stages: Vec<Stage>,
     /// What is written.
     pub output: Output,
+    /// The text of the file.
+    pub source: Arc<Source>,
+    /// Where paths in the file start from.
+    pub folder: PathBuf,
 }
 
 impl Scene {
@@ -114,6 +119,8 @@ impl Scene {
             model,
             domain,
             initial,
+            source: root.source().clone(),
+            folder: base.to_owned(),
         };
         scene.check_noise(&root)?;
         root.finish()?;

@@ -9,11 +9,14 @@ pub struct Output {
     pub thermo: u64,
     /// Steps between frames of `dump.lammpstrj`; 0 for none.
     pub dump: u64,
+    /// Steps between checkpoints; 0 for none but at the end of a run, however it ends. By default they
+    /// come every ten minutes.
+    pub checkpoint: Option<u64>,
 }
 
 impl Default for Output {
     fn default() -> Output {
-        Output { thermo: 100, dump: 0 }
+        Output { thermo: 100, dump: 0, checkpoint: None }
     }
 }
 
@@ -26,6 +29,9 @@ pub fn read(root: &Section) -> Result<Output, FileError> {
         if let Some(value) = section.get(key) {
             *interval = value.count()?.value;
         }
+    }
+    if let Some(value) = section.get("checkpoint") {
+        output.checkpoint = Some(value.count()?.value);
     }
     section.finish()?;
     Ok(output)

@@ -61,7 +61,7 @@ fn reads_the_schema() {
     let [part] = scene.initial.parts() else { panic!("one part") };
     assert_eq!(part.count, 630);
     assert_eq!(part.composition.fractions(), [0.25, 0.75]);
-    assert_eq!(scene.output, Output { thermo: 100, dump: 7 });
+    assert_eq!(scene.output, Output { thermo: 100, dump: 7, checkpoint: None });
     assert_eq!(scene.mass, [1.0, 1.0]);
     let [one, two] = scene.stages.as_slice() else { panic!("two stages") };
     assert_eq!((one.kt, one.thermostat, one.integrator), (1.5, true, crate::run::Integrator::VelocityVerlet));
@@ -105,6 +105,7 @@ fn errors_name_line_key_and_cause() {
         ("kT = 2.0", "lambda = 1.5", 20, "must be from 0 to 1"),
         ("name = \"two\"", "name = \"one\"", 16, "names two stages"),
         ("dump = 7", "dump = 7\nthermos = 1", 24, "output.thermos: unknown key"),
+        ("dump = 7", "dump = 7\ncheckpoint = -1", 24, "whole number from 0"),
         ("[output]", "[masses]\nA = 0\n[output]", 23, "masses.A: must be positive"),
         ("[output]", "[masses]\nD = 1\n[output]", 23, "unknown species \"D\""),
     ];
@@ -443,5 +444,57 @@ fn data_files_bring_box_and_frozen_particles() {
     ] {
         let error = Scene::parse("s.toml", &text.replace(from, to), folder.path()).unwrap_err();
         assert!(error.to_string().contains(message), "{error}");
+    }
+}
+
+/// A run that starts from the checkpoint of another has its particles, where and as fast as they were.
+#[test]
+fn checkpoints_bring_all_but_the_clock() {
+    let folder = folder();
+    let first = Scene::parse("s.toml", PARTS, folder.path()).unwrap();
+    crate::run::run_scene(&first, &folder.path().join("run"), &mut |_| ()).unwrap();
+    std::fs::write(folder.path().join("lone.toml"), MIXTURE.replace(", \"B\"", "")).unwrap();
+    let last = crate::run::checkpoint::read_state(&folder.path().join("run")).unwrap();
+    let text = "model = \"mixture.toml\"\nkT = 1.0\nsteps = 3\n[box]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]\n\
+                [initial]\nkind = \"checkpoint\"\nfile = \"run\"\nfrozen_ids = [1, 79]\n";
+    let scene = Scene::parse("s.toml", text, folder.path()).unwrap();
+    assert_eq!(scene.initial_state(), last);
+    let file = Scene::parse("s.toml", &text.replace("\"run\"", "\"run/checkpoint\""), folder.path()).unwrap();
+    assert_eq!(file.initial_state(), last);
+    for (from, to, message) in [
+        ("\"run\"", "\"nowhere\"", "nowhere"),
+        ("\"run\"", "\"mixture.toml\"", "mixture.toml"),
+        ("mixture.toml", "lone.toml", "is no state of this model"),
+        ("\"reflecting\"", "\"periodic\"", ""),
+    ] {
+        match Scene::parse("s.toml", &text.replace(from, to), folder.path()) {
+            Err(error) => assert!(!message.is_empty() && error.to_string().contains(message), "{error}"),
+            Ok(scene) => assert!(message.is_empty() && scene.domain.periodic()[2], "{to}"),
+        }
+    }
+}
+
+/// Frozen particles, walls, body forces and a ramp go on bit for bit from any step.
+#[test]
+fn an_interrupted_run_of_parts_goes_on_to_the_same_bytes() {
+    use crate::run::{Begin, Runner};
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    let folder = folder();
+    let stages = "[[stage]]\nname = \"ramp\"\nsteps = 12\nkT = [1.5, 1.0]\nlevels = 3\n\
+                  [[stage]]\nname = \"free\"\nsteps = 6\nbody_forces = false\n";
+    let text = PARTS.replace("steps = 10\n", "") + stages + "[output]\nthermo = 1\ndump = 5\n";
+    let scene = Scene::parse("s.toml", &text, folder.path()).unwrap();
+    let whole = folder.path().join("whole");
+    crate::run::run_scene(&scene, &whole, &mut |_| ()).unwrap();
+    let parts = folder.path().join("parts");
+    for stop_at in [3, 7, 12, 15, 100] {
+        let stop = AtomicUsize::new(0);
+        let mut runner = Runner::begin(&scene, &parts, Begin::Resume).unwrap();
+        let mut watch = |p: crate::run::Progress| stop.store((p.step >= stop_at) as usize, Ordering::Relaxed);
+        runner.run(&stop, &mut watch).unwrap();
+    }
+    for file in ["thermo.csv", "dump.lammpstrj", "final.data", "summary.json"] {
+        let [a, b] = [&whole, &parts].map(|f| std::fs::read(f.join(file)).unwrap());
+        assert!(a == b, "{file}");
     }
 }

@@ -1,0 +1,278 @@
+//! Long runs as a user meets them: killed, interrupted, on a full disk, and taken up again.
+
+use psidpd::run::checkpoint::read_state;
+use psidpd_tests::{program, psidpd, root, said};
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+use rustix::process::{Pid, Signal, kill_process};
+use std::collections::BTreeMap;
+use std::os::unix::process::ExitStatusExt;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::sync::OnceLock;
+use std::time::{Duration, Instant};
+
+/// Two stages, with everything that a run writes.
+fn scene() -> String {
+    let model = root().join("validation/models/warren2003-set6.toml");
+    format!(
+        "title = \"small\"\nmodel = \"{}\"\nkT = 1.0\nseed = 3\n[box]\nlengths = [4.0, 4.0, 4.0]\n\
+         [initial]\nkind = \"lattice\"\ndensity = 6.05\n\
+         [[stage]]\nname = \"warm\"\nsteps = 400\ndt = 0.01\nkT = 1.5\nintegrator = \"groot-warren\"\n\
+         [[stage]]\nname = \"run\"\nsteps = 1100\ndt = 0.01\n\
+         [output]\nthermo = 5\ndump = 25\ncheckpoint = 100\n",
+        model.display()
+    )
+}
+
+/// A folder with the scene.
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("s.toml"), scene()).unwrap();
+    folder
+}
+
+fn run(folder: &Path, out: &str, more: &[&str]) -> Output {
+    psidpd(folder, &[&["run", "s.toml", "--out", out], more].concat())
+}
+
+fn start(folder: &Path, scene: &str, out: &str, more: &[&str]) -> Child {
+    Command::new(program())
+        .args([&["run", scene, "--out", out], more].concat())
+        .current_dir(folder)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap()
+}
+
+fn send(child: &Child, signal: Signal) {
+    kill_process(Pid::from_child(child), signal).unwrap();
+}
+
+/// Waits until a file has so many bytes, or the program has ended.
+fn wait_for(child: &mut Child, file: &Path, length: u64) {
+    let begin = Instant::now();
+    while file.metadata().map_or(0, |m| m.len()) < length && child.try_wait().unwrap().is_none() {
+        assert!(begin.elapsed() < Duration::from_secs(120), "{} does not grow", file.display());
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+/// Every file of a run but the one that tells times.
+fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut files: BTreeMap<String, Vec<u8>> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .map(|path| (path.file_name().unwrap().to_str().unwrap().to_owned(), std::fs::read(path).unwrap()))
+        .collect();
+    assert!(files.remove("timing.json").is_some());
+    files
+}
+
+fn assert_same(a: &Path, b: &Path) {
+    let (a, b) = (contents(a), contents(b));
+    assert_eq!(a.keys().collect::<Vec<_>>(), b.keys().collect::<Vec<_>>());
+    for (name, bytes) in &a {
+        assert!(*bytes == b[name], "{name} differs");
+    }
+}
+
+fn finished(output: &Output) -> String {
+    let words = said(output);
+    assert_eq!(output.status.code(), Some(0), "{words}");
+    words
+}
+
+/// The run that nothing interrupts, made once.
+fn whole() -> &'static Path {
+    static WHOLE: OnceLock<PathBuf> = OnceLock::new();
+    WHOLE.get_or_init(|| {
+        let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("whole-run");
+        finished(&run(folder().path(), out.to_str().unwrap(), &["--overwrite"]));
+        out
+    })
+}
+
+/// An interrupted run: its folder, and what it said.
+fn interrupted(folder: &Path, out: &str, signal: Signal) -> (PathBuf, Output) {
+    let mut child = start(folder, "s.toml", out, &[]);
+    let path = folder.join(out);
+    wait_for(&mut child, &path.join("thermo.csv"), 10_000);
+    send(&child, signal);
+    (path, child.wait_with_output().unwrap())
+}
+
+#[test]
+fn a_run_killed_ten_times_ends_in_the_same_bytes() {
+    let folder = folder();
+    let here = folder.path();
+    let whole = whole();
+    // Often enough that many moments are within the writing of one.
+    std::fs::write(here.join("s.toml"), scene().replace("checkpoint = 100", "checkpoint = 10")).unwrap();
+    let length = whole.join("thermo.csv").metadata().unwrap().len() as f64;
+    let mut random = StdRng::seed_from_u64(20);
+    let mut moments: Vec<f64> = (0..10).map(|_| random.random_range(0.0..0.8)).collect();
+    moments.sort_by(f64::total_cmp);
+    let out = here.join("killed");
+    let mut killed = 0;
+    for moment in moments {
+        let mut child = start(here, "s.toml", "killed", &["--resume"]);
+        wait_for(&mut child, &out.join("thermo.csv"), (moment * length) as u64);
+        // Between rows, within a checkpoint, or still before the first step.
+        std::thread::sleep(Duration::from_micros(random.random_range(0..8000)));
+        child.kill().unwrap();
+        let output = child.wait_with_output().unwrap();
+        killed += u32::from(output.status.signal() == Some(9));
+    }
+    // On a machine that is busy enough some may come too late: after the end.
+    assert!(killed >= 8, "{killed} of 10 killed");
+    let words = finished(&run(here, "killed", &["--resume"]));
+    assert!(words.contains("going on after step "), "{words}");
+    assert_same(whole, &out);
+    let words = finished(&run(here, "killed", &["--resume"]));
+    assert!(words.contains("is finished: nothing is left to do"), "{words}");
+    assert_same(whole, &out);
+}
+
+#[test]
+fn signals_stop_a_run_that_says_how_to_go_on() {
+    let folder = folder();
+    let here = folder.path();
+    let whole = whole();
+    for (signal, code) in [(Signal::INT, 130), (Signal::TERM, 143)] {
+        let name = format!("by {code}");
+        let (out, output) = interrupted(here, &name, signal);
+        let words = said(&output);
+        assert_eq!(output.status.code(), Some(code), "{words}");
+        let last = words.lines().last().unwrap();
+        let (what, how) = last.split_once("; to go on: ").unwrap_or_else(|| panic!("{words}"));
+        assert!(what.starts_with("stopped after step ") && what.ends_with(" of 1500"), "{what}");
+        // Without --resume it is left alone.
+        let again = run(here, &name, &[]);
+        let words = said(&again);
+        assert_eq!(again.status.code(), Some(2), "{words}");
+        assert!(words.contains("not finished") && words.contains("--overwrite"), "{words}");
+        let shell = how.replacen("psidpd", &program().display().to_string(), 1);
+        let output = Command::new("sh").args(["-c", &shell]).current_dir(here).output().unwrap();
+        let words = finished(&output);
+        let step = what.split(' ').nth(3).unwrap();
+        assert!(words.contains(&format!("going on after step {step} of 1500")), "{words}");
+        assert_same(whole, &out);
+    }
+    let out = interrupted(here, "over", Signal::INT).0;
+    finished(&run(here, "over", &["--overwrite"]));
+    assert_same(whole, &out);
+}
+
+/// Both signals wait while the program is halted, so that the second finds the first before any step ends.
+#[test]
+fn a_second_signal_kills() {
+    let folder = folder();
+    let mut child = start(folder.path(), "s.toml", "out", &[]);
+    wait_for(&mut child, &folder.path().join("out/thermo.csv"), 10_000);
+    for signal in [Signal::STOP, Signal::INT, Signal::TERM, Signal::CONT] {
+        send(&child, signal);
+    }
+    let output = child.wait_with_output().unwrap();
+    assert!(matches!(output.status.signal(), Some(2 | 15)), "{:?}\n{}", output.status, said(&output));
+    finished(&run(folder.path(), "out", &["--resume"]));
+}
+
+#[test]
+fn a_truncated_checkpoint_falls_back_to_the_one_before() {
+    let folder = folder();
+    let here = folder.path();
+    let whole = whole();
+    let out = interrupted(here, "cut", Signal::INT).0;
+    let newest = std::fs::File::options().write(true).open(out.join("checkpoint")).unwrap();
+    newest.set_len(1000).unwrap();
+    let words = finished(&run(here, "cut", &["--resume"]));
+    assert!(words.contains("checkpoint is truncated: 1000 bytes of "), "{words}");
+    assert!(words.contains("going on from the one before"), "{words}");
+    assert_same(whole, &out);
+    // With both gone wrong nothing is touched.
+    let out = interrupted(here, "both", Signal::INT).0;
+    for name in ["checkpoint", "checkpoint.old"] {
+        std::fs::File::options().write(true).open(out.join(name)).unwrap().set_len(1000).unwrap();
+    }
+    let before = contents(&out);
+    let output = run(here, "both", &["--resume"]);
+    let words = said(&output);
+    assert_eq!(output.status.code(), Some(2), "{words}");
+    assert!(words.contains("truncated") && words.contains("--overwrite"), "{words}");
+    assert!(contents(&out) == before);
+}
+
+#[test]
+fn foreign_checkpoints_are_refused_with_what_differs() {
+    let folder = folder();
+    let here = folder.path();
+    let out = interrupted(here, "out", Signal::INT).0;
+    let before = contents(&out);
+    let model = root().join("validation/models/warren2003-set6.toml");
+    let other = std::fs::read_to_string(&model).unwrap();
+    assert!(other.contains("gamma"));
+    std::fs::write(here.join("other.toml"), other.replace("gamma = 18.0", "gamma = 17.0")).unwrap();
+    let elsewhere = scene().replace(&model.display().to_string(), "other.toml");
+    for (scene, differs) in [
+        (scene().replace("kT = 1.0", "kT = 1.1"), "kT is 1.1, was 1"),
+        (scene().replace("steps = 1100", "steps = 1200"), "stage[2].steps is 1200, was 1100"),
+        (elsewhere, "the model's thermostat[1].gamma is 17, was 18"),
+    ] {
+        std::fs::write(here.join("s.toml"), scene).unwrap();
+        let output = run(here, "out", &["--resume"]);
+        let words = said(&output);
+        assert_eq!(output.status.code(), Some(2), "{words}");
+        // The message may be broken into lines.
+        let flat = words.split_whitespace().filter(|w| *w != "│").collect::<Vec<_>>().join(" ");
+        assert!(flat.contains(differs), "{differs} is not in\n{words}");
+        assert!(contents(&out) == before);
+    }
+}
+
+/// Files that may not grow beyond some blocks of 512 bytes, as a disk that becomes full: the shell sets it.
+fn limited(folder: &Path, scene: &str, out: &str, blocks: u32) -> Output {
+    let command = format!("ulimit -f {blocks}; exec \"$@\"");
+    Command::new("sh")
+        .args(["-c", &command, "sh"])
+        .arg(program())
+        .args(["run", scene, "--out", out, "--resume"])
+        .current_dir(folder)
+        .output()
+        .unwrap()
+}
+
+#[test]
+fn a_full_disk_leaves_the_last_good_state() {
+    let folder = folder();
+    let here = folder.path();
+    let whole = whole();
+    let out = here.join("full");
+    // Room for checkpoints, but not for the dump.
+    let output = limited(here, "s.toml", "full", 600);
+    let words = said(&output);
+    assert_eq!(output.status.code(), Some(1), "{words}");
+    assert!(words.contains("dump.lammpstrj cannot be written"), "{words}");
+    assert!(words.contains("--resume"), "{words}");
+    assert_eq!(read_state(&out).unwrap().len(), 387);
+    let words = finished(&run(here, "full", &["--resume"]));
+    assert!(words.contains("going on after step "), "{words}");
+    assert_same(whole, &out);
+    // No room for a single checkpoint: that is found out before the first step.
+    std::fs::write(here.join("slim.toml"), scene().replace("dump = 25", "dump = 0")).unwrap();
+    let output = limited(here, "slim.toml", "none", 10);
+    let words = said(&output);
+    assert_eq!(output.status.code(), Some(1), "{words}");
+    assert!(words.contains("checkpoint cannot be written"), "{words}");
+    assert!(words.contains("after step 0") && words.contains("no checkpoint yet"), "{words}");
+    assert!(!here.join("none/checkpoint.new").exists());
+    // One that grew since: what is there stays good.
+    let out = interrupted(here, "later", Signal::INT).0;
+    let before = std::fs::read(out.join("checkpoint")).unwrap();
+    let output = limited(here, "s.toml", "later", 10);
+    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    assert!(std::fs::read(out.join("checkpoint")).unwrap() == before);
+    finished(&run(here, "later", &["--resume"]));
+    assert_same(whole, &out);
+}

@@ -1,0 +1,104 @@
+//! A checkpoint as bytes.
+
+use super::{Checkpoint, CheckpointError};
+use crc32fast::Hasher;
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::path::Path;
+
+/// Version of the format. It grows whenever [`Checkpoint`] or anything that it holds changes.
+pub const VERSION: u32 = 1;
+
+const MAGIC: [u8; 8] = *b"psidpdCK";
+const HEADER: usize = 24;
+
+/// Writes a checkpoint from the start of `to` on.
+pub fn write<W: Write + Seek>(checkpoint: &Checkpoint, mut to: W) -> io::Result<()> {
+    // The header needs checksum and length of what comes behind it.
+    to.write_all(&[0; HEADER])?;
+    let payload = Payload { to: &mut to, length: 0, hasher: Hasher::new(), error: None };
+    let mut buffer = BufWriter::with_capacity(1 << 16, payload);
+    if let Err(error) = postcard::to_io(checkpoint, &mut buffer) {
+        let (payload, _) = buffer.into_parts();
+        return Err(payload.error.unwrap_or_else(|| io::Error::other(error)));
+    }
+    let payload = buffer.into_inner().map_err(io::IntoInnerError::into_error)?;
+    let (length, checksum) = (payload.length, payload.hasher.finalize());
+    to.seek(SeekFrom::Start(0))?;
+    to.write_all(&MAGIC)?;
+    to.write_all(&VERSION.to_le_bytes())?;
+    to.write_all(&checksum.to_le_bytes())?;
+    to.write_all(&length.to_le_bytes())
+}
+
+/// Counts and sums up what goes through, and keeps the error that postcard would drop.
+struct Payload<W> {
+    to: W,
+    length: u64,
+    hasher: Hasher,
+    error: Option<io::Error>,
+}
+
+impl<W: Write> Write for Payload<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self.to.write(bytes) {
+            Ok(count) => {
+                self.length += count as u64;
+                self.hasher.update(&bytes[..count]);
+                Ok(count)
+            }
+            Err(error) => {
+                let kind = error.kind();
+                self.error = Some(error);
+                Err(kind.into())
+            }
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.to.flush()
+    }
+}
+
+/// Reads a checkpoint.
+///
+/// # Errors
+/// The file cannot be read, is no checkpoint, one of another version, or not whole.
+pub fn read(path: &Path) -> Result<Checkpoint, CheckpointError> {
+    let bytes = std::fs::read(path).map_err(CheckpointError::unreadable(path))?;
+    parse(&bytes, path)
+}
+
+fn parse(bytes: &[u8], path: &Path) -> Result<Checkpoint, CheckpointError> {
+    let path = path.to_owned();
+    let found = bytes.len() as u64;
+    // A run can be killed before the header is in place, but such a file never gets its name: what is
+    // too short for a header was cut later.
+    let Some((header, payload)) = bytes.split_at_checked(HEADER) else {
+        return Err(match MAGIC.starts_with(&bytes[..bytes.len().min(MAGIC.len())]) {
+            true => CheckpointError::Truncated { path, found, expected: HEADER as u64 },
+            false => CheckpointError::Other { path },
+        });
+    };
+    if header[..8] != MAGIC {
+        return Err(CheckpointError::Other { path });
+    }
+    let word = |at: usize| u32::from_le_bytes(std::array::from_fn(|k| header[at + k]));
+    let (version, checksum) = (word(8), word(12));
+    if version != VERSION {
+        return Err(CheckpointError::Version { path, found: version });
+    }
+    let length = u64::from_le_bytes(std::array::from_fn(|k| header[16 + k]));
+    if (payload.len() as u64) < length {
+        return Err(CheckpointError::Truncated {
+            path,
+            found,
+            expected: length.saturating_add(HEADER as u64),
+        });
+    }
+    let damaged = |what: String| CheckpointError::Damaged { path, what };
+    if payload.len() as u64 > length || crc32fast::hash(payload) != checksum {
+        return Err(damaged("its checksum does not match".into()));
+    }
+    let checkpoint: Checkpoint = postcard::from_bytes(payload).map_err(|e| damaged(e.to_string()))?;
+    Ok(checkpoint)
+}

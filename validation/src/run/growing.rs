@@ -1,0 +1,70 @@
+use super::error::RunError;
+use std::fs::File;
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+/// A file of a run that grows as the run goes: it knows its length, buffered bytes included, so that a
+/// checkpoint can say how much of it belongs to the steps made.
+pub(super) struct GrowingFile {
+    name: &'static str,
+    path: PathBuf,
+    out: BufWriter<File>,
+    length: u64,
+}
+
+impl GrowingFile {
+    /// An empty file `name` in `folder`.
+    pub fn create(folder: &Path, name: &'static str) -> Result<GrowingFile, RunError> {
+        let path = folder.join(name);
+        let file = File::create(&path).map_err(RunError::output(&path))?;
+        Ok(GrowingFile { name, path, out: BufWriter::new(file), length: 0 })
+    }
+
+    /// The file of a run that goes on, cut to `length`.
+    pub fn reopen(folder: &Path, name: &'static str, length: u64) -> Result<GrowingFile, RunError> {
+        let path = folder.join(name);
+        let open = || {
+            let mut file = File::options().write(true).open(&path)?;
+            file.set_len(length)?;
+            file.seek(SeekFrom::End(0))?;
+            Ok(file)
+        };
+        let file = open().map_err(RunError::output(&path))?;
+        Ok(GrowingFile { name, path, out: BufWriter::new(file), length })
+    }
+
+    /// Its name in the folder of the run.
+    pub fn name(&self) -> &'static str {
+        self.name
+    }
+
+    /// How many bytes were written to it.
+    pub fn length(&self) -> u64 {
+        self.length
+    }
+
+    /// Writes with an error that names the file.
+    pub fn attempt(&mut self, write: impl FnOnce(&mut Self) -> io::Result<()>) -> Result<(), RunError> {
+        write(self).map_err(|source| RunError::Output { path: self.path.clone(), source })
+    }
+
+    /// Brings all of it to the disk.
+    pub fn sync(&mut self) -> Result<(), RunError> {
+        self.attempt(|file| {
+            file.out.flush()?;
+            file.out.get_ref().sync_data()
+        })
+    }
+}
+
+impl Write for GrowingFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let count = self.out.write(bytes)?;
+        self.length += count as u64;
+        Ok(count)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+}
