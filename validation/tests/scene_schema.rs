@@ -160,6 +160,9 @@ fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("fluid.toml"), MIXTURE).unwrap();
     std::fs::write(folder.path().join("start.data"), DATA).unwrap();
+    let short = "model = \"fluid.toml\"\nkT = 1.0\nbox = 6.0\ndensity = 3.0\nsteps = 2\n";
+    let scene = Scene::parse("s.toml", short, folder.path()).unwrap();
+    psidpd::run::run_scene(&scene, &folder.path().join("run"), &mut |_| ()).unwrap();
     folder
 }
 
@@ -317,10 +320,11 @@ fn the_reader_knows_the_keys_of_the_table_and_no_others() {
         "layer" => "thickness = 2\nface = \"zlo\"\n",
         "sphere" | "cylinder" => "radius = 2\n",
         "data" => "file = \"start.data\"\n",
+        "checkpoint" => "file = \"run\"\n",
         _ => "",
     };
     for form in INITIAL.forms.1 {
-        let density = if *form == "data" { "" } else { "density = 3\n" };
+        let density = if ["data", "checkpoint"].contains(form) { "" } else { "density = 3\n" };
         let text = format!("[initial]\nkind = \"{form}\"\n{}{density}zzz = 1", keys(form));
         assert_eq!(known(&text), listed(&INITIAL, Some(form)), "{form}");
     }

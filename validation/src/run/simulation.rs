@@ -192,6 +192,7 @@ impl Simulation {
         self.force.extend_from_slice(forces);
         self.number = number;
         self.earlier_out_of_bounds = out_of_bounds;
+        self.find_frozen();
     }
 
     /// Computes the forces of the present step at the present velocities, as a run or a stage needs

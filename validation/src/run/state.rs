@@ -34,7 +34,7 @@ impl State {
     }
 
     /// The first thing that makes this no state of a model with `species` species.
-    pub(super) fn fault(&self, species: usize, dimensions: usize) -> Option<String> {
+    pub(crate) fn fault(&self, species: usize, dimensions: usize) -> Option<String> {
         let count = self.x.len();
         if count == 0 {
             return Some("there are no particles".into());

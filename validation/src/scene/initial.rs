@@ -68,7 +68,7 @@ impl Initial {
 }
 
 /// Kinds of `[initial]`.
-pub const KINDS: &[&str] = &["random", "lattice", "slab", "sphere", "cylinder", "data"];
+pub const KINDS: &[&str] = &["random", "lattice", "slab", "sphere", "cylinder", "data", "checkpoint"];
 
 /// Reads the initial state, and the box: from `box`, or from the file.
 pub fn read(root: &Section, model: &Model, base: &Path) -> Result<(Initial, PeriodicBox), FileError> {

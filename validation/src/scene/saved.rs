@@ -3,7 +3,8 @@
 use super::initial::Initial;
 use super::velocities::Velocities;
 use crate::lammps::DataFile;
-use crate::run::{State, Tags};
+use crate::run::{State, Tags, checkpoint};
+use nalgebra::{Matrix3, Vector3};
 use psidpd_core::document::{FileError, FileErrorKind, Section};
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::model::Model;
@@ -14,6 +15,8 @@ use std::path::Path;
 pub enum Format {
     /// A LAMMPS data file.
     Data,
+    /// A checkpoint, or the folder of a run that left one.
+    Checkpoint,
 }
 
 impl Format {
@@ -21,6 +24,7 @@ impl Format {
     pub fn of(kind: &str) -> Option<Format> {
         match kind {
             "data" => Some(Format::Data),
+            "checkpoint" => Some(Format::Checkpoint),
             _ => None,
         }
     }
@@ -35,6 +39,17 @@ pub fn open(format: Format, path: &Path, model: &Model, periodic: [bool; 3]) -> 
         Format::Data => {
             let data = DataFile::read(path).map_err(|e| e.to_string())?;
             State::from_data_in(&data, model, periodic).map_err(|e| e.to_string())
+        }
+        Format::Checkpoint => {
+            let state = checkpoint::read_state(path).map_err(|e| e.to_string())?;
+            let edges = Matrix3::from_columns(&[0, 1, 2].map(|k| Vector3::from(state.domain.edge(k))));
+            let domain =
+                PeriodicBox::new(state.domain.origin(), edges, periodic).map_err(|e| e.to_string())?;
+            let state = State { domain, ..state };
+            match state.fault(model.species().len(), model.dimensions()) {
+                Some(fault) => Err(format!("is no state of this model: {fault}")),
+                None => Ok(state),
+            }
         }
     }
 }
@@ -53,7 +68,7 @@ pub fn read(
         value.error(FileErrorKind::Value(why)).with_help("the path is relative to the scene file")
     })?;
     let initial = Initial::File {
-        velocities: Velocities::read_or_keep(section)?,
+        velocities: Velocities::read_or_keep(section, format == Format::Checkpoint)?,
         frozen: read_frozen(section, &state)?,
         path,
         state: Box::new(state.clone()),

@@ -446,3 +446,55 @@ fn data_files_bring_box_and_frozen_particles() {
         assert!(error.to_string().contains(message), "{error}");
     }
 }
+
+/// A run that starts from the checkpoint of another has its particles, where and as fast as they were.
+#[test]
+fn checkpoints_bring_all_but_the_clock() {
+    let folder = folder();
+    let first = Scene::parse("s.toml", PARTS, folder.path()).unwrap();
+    crate::run::run_scene(&first, &folder.path().join("run"), &mut |_| ()).unwrap();
+    std::fs::write(folder.path().join("lone.toml"), MIXTURE.replace(", \"B\"", "")).unwrap();
+    let last = crate::run::checkpoint::read_state(&folder.path().join("run")).unwrap();
+    let text = "model = \"mixture.toml\"\nkT = 1.0\nsteps = 3\n[box]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]\n\
+                [initial]\nkind = \"checkpoint\"\nfile = \"run\"\nfrozen_ids = [1, 79]\n";
+    let scene = Scene::parse("s.toml", text, folder.path()).unwrap();
+    assert_eq!(scene.initial_state(), last);
+    let file = Scene::parse("s.toml", &text.replace("\"run\"", "\"run/checkpoint\""), folder.path()).unwrap();
+    assert_eq!(file.initial_state(), last);
+    for (from, to, message) in [
+        ("\"run\"", "\"nowhere\"", "nowhere"),
+        ("\"run\"", "\"mixture.toml\"", "mixture.toml"),
+        ("mixture.toml", "lone.toml", "is no state of this model"),
+        ("\"reflecting\"", "\"periodic\"", ""),
+    ] {
+        match Scene::parse("s.toml", &text.replace(from, to), folder.path()) {
+            Err(error) => assert!(!message.is_empty() && error.to_string().contains(message), "{error}"),
+            Ok(scene) => assert!(message.is_empty() && scene.domain.periodic()[2], "{to}"),
+        }
+    }
+}
+
+/// Frozen particles, walls, body forces and a ramp go on bit for bit from any step.
+#[test]
+fn an_interrupted_run_of_parts_goes_on_to_the_same_bytes() {
+    use crate::run::{Begin, Runner};
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    let folder = folder();
+    let stages = "[[stage]]\nname = \"ramp\"\nsteps = 12\nkT = [1.5, 1.0]\nlevels = 3\n\
+                  [[stage]]\nname = \"free\"\nsteps = 6\nbody_forces = false\n";
+    let text = PARTS.replace("steps = 10\n", "") + stages + "[output]\nthermo = 1\ndump = 5\n";
+    let scene = Scene::parse("s.toml", &text, folder.path()).unwrap();
+    let whole = folder.path().join("whole");
+    crate::run::run_scene(&scene, &whole, &mut |_| ()).unwrap();
+    let parts = folder.path().join("parts");
+    for stop_at in [3, 7, 12, 15, 100] {
+        let stop = AtomicUsize::new(0);
+        let mut runner = Runner::begin(&scene, &parts, Begin::Resume).unwrap();
+        let mut watch = |p: crate::run::Progress| stop.store((p.step >= stop_at) as usize, Ordering::Relaxed);
+        runner.run(&stop, &mut watch).unwrap();
+    }
+    for file in ["thermo.csv", "dump.lammpstrj", "final.data", "summary.json"] {
+        let [a, b] = [&whole, &parts].map(|f| std::fs::read(f.join(file)).unwrap());
+        assert!(a == b, "{file}");
+    }
+}

@@ -24,13 +24,13 @@ impl Velocities {
         }
     }
 
-    /// The same for a data file, whose velocities may be kept: `None`.
-    pub(super) fn read_or_keep(initial: &Section) -> Result<Option<Velocities>, FileError> {
+    /// The same for a file, whose velocities may be kept: `None`, and what is meant by saying nothing if `keep`.
+    pub(super) fn read_or_keep(initial: &Section, keep: bool) -> Result<Option<Velocities>, FileError> {
         let names =
             [("thermal", Some(Velocities::Thermal)), ("zero", Some(Velocities::Zero)), ("keep", None)];
         match initial.get("velocities") {
             Some(value) => Ok(value.one_of("velocities", &names)?.value),
-            None => Ok(Some(Velocities::default())),
+            None => Ok((!keep).then(Velocities::default)),
         }
     }
 

@@ -24,7 +24,7 @@ fn velocities() -> Vec<&'static str> {
 /// Kinds of `[initial]` that are filled.
 const FILLED: &[&str] = &["random", "lattice", "slab", "sphere", "cylinder"];
 /// Kinds that come from a file.
-const SAVED: &[&str] = &["data"];
+const SAVED: &[&str] = &["data", "checkpoint"];
 /// Shapes that have a centre.
 const ROUND: &[&str] = &["sphere", "cylinder"];
 
@@ -42,7 +42,8 @@ pub const INITIAL: Table = Table {
             REQUIRED,
             "`random`: the whole box, at random. `lattice`: the whole box, on a lattice, for fluids that must not \
              start with particles on top of each other. `slab`, `sphere`, `cylinder`: that region. `data`: a \
-             LAMMPS data file with its box; types are species.",
+             LAMMPS data file with its box; types are species. `checkpoint`: a checkpoint, or the folder of a run, \
+             with its box; the clock starts again at 0.",
             "[initial]\nkind = \"lattice\"\ndensity = 3.0",
         ),
         density(FILLED, "[initial]\nkind = \"random\"\ndensity = 3.0"),
@@ -85,7 +86,7 @@ pub const INITIAL: Table = Table {
             ValueKind::Choice(velocities),
             OPTIONAL,
             "`thermal`: Maxwell's distribution at kT, without momentum in all. `zero`: none. `keep`, for a file \
-             only: those of the file. Thermal if left out.",
+             only: those of the file. Thermal if left out, but for a checkpoint, which keeps its own.",
             "[initial]\nkind = \"data\"\nfile = \"start.data\"\nvelocities = \"keep\"",
         ),
         velocity(

@@ -140,5 +140,13 @@ pub const OUTPUT: Table = Table {
             "Steps between frames with every particle; 0, for none, if left out.",
             "[output]\ndump = 500",
         ),
+        key(
+            "checkpoint",
+            ValueKind::Count,
+            OPTIONAL,
+            "Steps between checkpoints, from which an interrupted run goes on; every ten minutes if left out, 0 for \
+             none but at the end.",
+            "[output]\ncheckpoint = 10000",
+        ),
     ],
 };
