@@ -1,6 +1,7 @@
 //! The JSON schema and the reference of the scene file: written from the table of keys, current, and
 //! true of the reader.
 
+use psidpd::observe;
 use psidpd::scene::Scene;
 use psidpd::scene::keys::{
     BODY_FORCE, BOX, INITIAL, Key, MASSES, OUTPUT, PART, STAGE, TABLES, TOP, Table, ValueKind,
@@ -80,6 +81,27 @@ fn forms(table: &Table) -> Value {
     }
 }
 
+/// `[observe]`: names and meanings; what values may be is said in words.
+fn observe() -> Value {
+    let named = |keys: &[observe::keys::Key]| -> Map<String, Value> {
+        let text =
+            |k: &observe::keys::Key| format!("{} {}; {} if left out.", k.about, capital(k.value), k.default);
+        keys.iter().map(|k| (k.name.to_owned(), json!({ "description": text(k) }))).collect()
+    };
+    let mut properties = named(observe::keys::COMMON);
+    for table in observe::request::tables() {
+        let mut keys = named(observe::keys::COMMON);
+        keys.extend(named(table.keys));
+        let own = json!({ "type": "object", "properties": keys, "additionalProperties": false });
+        let schema = json!({ "description": table.about, "anyOf": [{ "type": "boolean" }, own] });
+        properties.insert(table.name.into(), schema);
+    }
+    json!({
+        "type": "object", "description": "What is measured as the run goes.", "properties": properties,
+        "additionalProperties": false
+    })
+}
+
 fn schema() -> String {
     let mut root = object(&TOP, None);
     root["$schema"] = json!("http://json-schema.org/draft-07/schema#");
@@ -91,7 +113,7 @@ fn schema() -> String {
             false => forms(table),
         };
     }
-    properties["observe"] = json!({ "type": "object", "description": "What is measured as the run goes." });
+    properties["observe"] = observe();
     serde_json::to_string_pretty(&root).unwrap() + "\n"
 }
 
@@ -114,7 +136,7 @@ fn reference() -> String {
         those of the papers' own size.\n\n\
         The examples below leave out what every scene needs. Their model has two species, `A` and `B`, in three\n\
         dimensions. In two dimensions everything that has a number for each direction has two, and there are no\n\
-        cylinders. What is measured is in `[observe]`, which is not on this page.\n\n\
+        cylinders. What is measured is in `[observe]`, which has [a page of its own](observables.md).\n\n\
         This page is written from the tables of keys in `validation/src/scene/keys/`.\n"
         .to_owned();
     // Writing to a String cannot fail.
@@ -280,6 +302,8 @@ fn the_schema_refuses_unknown_and_missing_keys() {
         "[[stage]]\nsteps = 3",
         "[[stage]]\nname = \"a\"\nsteps = 3\nkT = [1, 2, 3]",
         "[output]\nthermo = 1.5",
+        "[observe]\nrfd = true",
+        "[observe.rdf]\nbin = 50",
     ];
     for text in bad {
         let value: Value = toml::from_str(&completed(text)).unwrap();

@@ -308,7 +308,8 @@ fn write_script(scene: &Scene, s: &mut String) -> std::fmt::Result {
             if !stage.thermostat {
                 writeln!(s, "# thermostat = false: a copy of the model without drag and noise")?;
             }
-            writeln!(s, "pair_style    dpd/psi {:?} {}", stage.kt, scene.seed)?;
+            let precision = scene.precision.map_or(String::new(), |p| format!(" precision {p}"));
+            writeln!(s, "pair_style    dpd/psi {:?} {}{precision}", stage.kt, scene.seed)?;
             writeln!(s, "pair_coeff    * * {model} {}", scene.model.species().join(" "))?;
         }
         match (before.is_some_and(|b| b.body_forces), stage.body_forces) {

@@ -28,6 +28,9 @@ pub struct About {
     pub kt: f64,
     /// Seed of the initial state and of the noise.
     pub seed: u64,
+    /// In what the forces of pairs were computed; empty if it is not told.
+    #[serde(default)]
+    pub precision: String,
     /// Corner of the box.
     pub box_origin: [f64; 3],
     /// The three edge vectors of the box. In two dimensions the third is a unit.
@@ -144,6 +147,7 @@ impl About {
                 .collect(),
             kt: scene.kt,
             seed: scene.seed,
+            precision: scene.precision().to_string(),
             box_origin: scene.domain.origin(),
             box_edges: [0, 1, 2].map(|k| scene.domain.edge(k)),
             box_periodic: [x, y, z && scene.model.dimensions() == 3],

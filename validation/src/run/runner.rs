@@ -2,13 +2,17 @@ use super::checkpoint::{Checkpoint, CheckpointError, Found, Identity, Position, 
 use super::error::RunError;
 use super::folder::Folder;
 use super::output::Output;
+use super::simulation::Simulation;
+use super::state::State;
 use super::summary::{Summary, Sums};
 use super::thermo::Thermo;
 use super::timing::Timing;
 use super::underway::Run;
 use crate::observe::Observers;
 use crate::scene::Scene;
+use psidpd_core::engine::Settings;
 use std::collections::BTreeMap;
+use std::num::NonZeroUsize;
 use std::path::Path;
 use std::sync::atomic::AtomicUsize;
 use std::time::Duration;
@@ -131,7 +135,7 @@ impl<'a> Runner<'a> {
             refuse_unfinished(&store, out)?;
         }
         let state = scene.initial_state();
-        let simulation = scene.simulation(state.clone())?;
+        let simulation = simulation(scene, state.clone())?;
         let observers = Observers::new(scene);
         store.clear()?;
         let good = Checkpoint {
@@ -161,7 +165,7 @@ impl<'a> Runner<'a> {
             path: store.path(),
             what: format!("what was observed: {error}"),
         })?;
-        let mut simulation = scene.simulation(good.state.clone())?;
+        let mut simulation = simulation(scene, good.state.clone())?;
         if let Some(stage) = scene.stages.get(good.position.stage) {
             scene.enter(stage, &mut simulation)?;
         }
@@ -193,6 +197,15 @@ impl<'a> Runner<'a> {
         self.run.interval = interval;
     }
 
+    /// Sets how many threads share the work: one, unless told otherwise. What a run writes does not depend on it.
+    ///
+    /// # Errors
+    /// The model does not hold at the present temperature: never, since it did before.
+    pub fn set_threads(&mut self, threads: NonZeroUsize) -> Result<(), RunError> {
+        let settings = self.run.simulation.settings();
+        self.run.simulation.set_settings(Settings { threads, ..settings })
+    }
+
     /// How many particles there are.
     pub fn particles(&self) -> usize {
         self.run.simulation.len()
@@ -215,6 +228,13 @@ impl<'a> Runner<'a> {
         }
         run.go_on(stop, progress).map_err(|error| run.stop(error))
     }
+}
+
+/// The simulation of a scene in the precision that its runs have.
+fn simulation(scene: &Scene, state: State) -> Result<Simulation, RunError> {
+    let mut simulation = scene.simulation(state)?;
+    simulation.set_settings(Settings { precision: scene.precision(), ..simulation.settings() })?;
+    Ok(simulation)
 }
 
 /// Whether a run can go on from a checkpoint: it is of this scene, and the files have what it counts on.

@@ -43,7 +43,7 @@ use crate::observe::{self, Observe};
 use crate::run::{BodyForce, RunError, Simulation, State, Tags};
 use number::positive;
 use psidpd_core::document::{Document, FileError, FileErrorKind, Section, Source, Value};
-use psidpd_core::engine::{PeriodicBox, Plan};
+use psidpd_core::engine::{PeriodicBox, Plan, Precision};
 use psidpd_core::model::Model;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -61,6 +61,8 @@ pub struct Scene {
     pub kt: f64,
     /// Seed of the initial state and of the noise.
     pub seed: u64,
+    /// In what a run computes pairs, if the scene says.
+    pub precision: Option<Precision>,
     /// The box.
     pub domain: PeriodicBox,
     /// Mass of each species.
@@ -108,6 +110,7 @@ impl Scene {
         let (model_path, model) = read_model(&root.require("model")?, base)?;
         let kt = positive(&root.require("kT")?)?;
         let seed = root.get("seed").map_or(Ok(1), |value| value.count().map(|c| c.value))?;
+        let precision = root.get("precision").map(|value| value.one_of("precision", &Precision::ALL));
         let (initial, domain) = initial::read(&root, &model, base)?;
         let stages = stage::read(&root, kt)?;
         let body_forces = body_force::read(&root, &model, &initial)?;
@@ -117,6 +120,7 @@ impl Scene {
             model_path,
             kt,
             seed,
+            precision: precision.transpose()?.map(|p| p.value),
             mass: masses::read(&root, model.species(), &initial)?,
             frozen: initial.frozen(),
             body_forces,
@@ -140,7 +144,13 @@ impl Scene {
         fill::fill(self).0
     }
 
+    /// In what a run of the scene computes pairs: mixed precision unless it says otherwise.
+    pub fn precision(&self) -> Precision {
+        self.precision.unwrap_or_default()
+    }
+
     /// A simulation from `state`, which is of this scene, at step 0: with its seed and its frozen particles.
+    /// It is in double precision, as every simulation is; see [`Simulation::set_settings`].
     ///
     /// # Errors
     /// `state` is no state of the model.

@@ -19,6 +19,9 @@ pub fn facts(
         fact("species", a.species.join(", "));
         fact("box", lengths(a));
         fact("seed", a.seed.to_string());
+        if !a.precision.is_empty() {
+            fact("precision", a.precision.clone());
+        }
     }
     let number = |key: &str| summary.and_then(|s| s.get(key)).and_then(Value::as_f64);
     let particles = number("particles").or_else(|| Some(state?.configuration.x.len() as f64));

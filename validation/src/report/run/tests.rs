@@ -22,6 +22,7 @@ pub fn about() -> About {
         densities: vec![AboutDensity { name: "n".into(), kernel: "quadratic".into(), range: 0.75 }],
         kt: 1.0,
         seed: 1,
+        precision: "mixed".into(),
         box_origin: [0.0; 3],
         box_edges: [[4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 6.0]],
         box_periodic: [true; 3],

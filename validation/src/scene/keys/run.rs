@@ -141,6 +141,20 @@ pub const OUTPUT: Table = Table {
             "[output]\ndump = 500",
         ),
         key(
+            "xyz",
+            ValueKind::Count,
+            OPTIONAL,
+            "Steps between frames with every particle as extended XYZ; 0, for none, if left out.",
+            "[output]\nxyz = 500",
+        ),
+        key(
+            "snapshot",
+            ValueKind::Count,
+            OPTIONAL,
+            "Steps between pictures of the particles; 0, for none, if left out.",
+            "[output]\nsnapshot = 1000",
+        ),
+        key(
             "checkpoint",
             ValueKind::Count,
             OPTIONAL,

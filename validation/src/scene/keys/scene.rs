@@ -3,6 +3,7 @@
 use super::{Key, OPTIONAL, REQUIRED, Table, ValueKind, key};
 use crate::scene::domain::BOUNDARIES;
 use crate::scene::stage::INTEGRATORS;
+use psidpd_core::engine::Precision;
 
 fn boundaries() -> Vec<&'static str> {
     BOUNDARIES.iter().map(|(name, _)| *name).collect()
@@ -10,6 +11,10 @@ fn boundaries() -> Vec<&'static str> {
 
 fn integrators() -> Vec<&'static str> {
     INTEGRATORS.to_vec()
+}
+
+fn precisions() -> Vec<&'static str> {
+    Precision::ALL.iter().map(|(name, _)| *name).collect()
 }
 
 pub(super) const INTEGRATOR: Key = key(
@@ -83,6 +88,15 @@ pub const TOP: Table = Table {
         ),
         key("dt", ValueKind::Positive, OPTIONAL, "The time step; 0.01 if left out.", "dt = 0.02"),
         INTEGRATOR,
+        key(
+            "precision",
+            ValueKind::Choice(precisions),
+            OPTIONAL,
+            "In what `psidpd run` computes the forces of pairs; `mixed` if left out: single precision, with positions \
+             exact to 2⁻³² of the box and sums in double precision. The option `--precision` goes before it. A deck \
+             for LAMMPS has it if it is given; pair styles are in double precision otherwise.",
+            "precision = \"double\"",
+        ),
         key(
             "lambda",
             ValueKind::Number,
