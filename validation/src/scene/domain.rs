@@ -16,12 +16,12 @@ pub fn read(root: &Section, dimensions: usize) -> Result<PeriodicBox, FileError>
     let lengths = section.require("lengths")?;
     let periodic = read_boundary(&section, dimensions)?;
     section.finish()?;
-    build(&lengths, dimensions, periodic)
+    build(&lengths, dimensions, periodic.unwrap_or([true; 3]))
 }
 
-/// The boundary alone: of a scene that has its box from a file.
-pub fn read_boundary_alone(root: &Section, dimensions: usize) -> Result<[bool; 3], FileError> {
-    let Some(value) = root.get("box") else { return Ok([true; 3]) };
+/// The boundary alone, if it is given: of a scene that has its box from a file.
+pub fn read_boundary_alone(root: &Section, dimensions: usize) -> Result<Option<[bool; 3]>, FileError> {
+    let Some(value) = root.get("box") else { return Ok(None) };
     let message = || "the box is that of the file: give no lengths".to_owned();
     let section = value.as_section().ok_or_else(|| value.error(FileErrorKind::Value(message())))?;
     if let Some(lengths) = section.get("lengths") {
@@ -55,9 +55,9 @@ fn read_lengths(value: &Value, dimensions: usize) -> Result<[f64; 3], FileError>
     }
 }
 
-fn read_boundary(section: &Section, dimensions: usize) -> Result<[bool; 3], FileError> {
+fn read_boundary(section: &Section, dimensions: usize) -> Result<Option<[bool; 3]>, FileError> {
     let mut periodic = [true; 3];
-    let Some(value) = section.get("boundary") else { return Ok(periodic) };
+    let Some(value) = section.get("boundary") else { return Ok(None) };
     match value.as_array() {
         None => periodic[..dimensions].fill(value.one_of("boundary", &BOUNDARIES)?.value),
         Some(items) if items.len() == dimensions => {
@@ -70,7 +70,7 @@ fn read_boundary(section: &Section, dimensions: usize) -> Result<[bool; 3], File
             return Err(value.error(FileErrorKind::Value(message)));
         }
     }
-    Ok(periodic)
+    Ok(Some(periodic))
 }
 
 /// Refuses a box in which two images of a particle would share the noise of a pair.

@@ -30,18 +30,25 @@ impl Format {
     }
 }
 
-/// The particles and the box of a file, in which `periodic` says what the box does at its faces.
+/// The particles and the box of a file. `periodic` says what the box does at its faces; without it they do what they
+/// did before in a checkpoint, and data files are periodic.
 ///
 /// # Errors
 /// The file cannot be read, or is no state of `model`; in words.
-pub fn open(format: Format, path: &Path, model: &Model, periodic: [bool; 3]) -> Result<State, String> {
+pub fn open(
+    format: Format,
+    path: &Path,
+    model: &Model,
+    periodic: Option<[bool; 3]>,
+) -> Result<State, String> {
     match format {
         Format::Data => {
             let data = DataFile::read(path).map_err(|e| e.to_string())?;
-            State::from_data_in(&data, model, periodic).map_err(|e| e.to_string())
+            State::from_data_in(&data, model, periodic.unwrap_or([true; 3])).map_err(|e| e.to_string())
         }
         Format::Checkpoint => {
             let state = checkpoint::read_state(path).map_err(|e| e.to_string())?;
+            let periodic = periodic.unwrap_or_else(|| state.domain.periodic());
             let edges = Matrix3::from_columns(&[0, 1, 2].map(|k| Vector3::from(state.domain.edge(k))));
             let domain =
                 PeriodicBox::new(state.domain.origin(), edges, periodic).map_err(|e| e.to_string())?;
@@ -60,7 +67,7 @@ pub fn read(
     format: Format,
     model: &Model,
     base: &Path,
-    periodic: [bool; 3],
+    periodic: Option<[bool; 3]>,
 ) -> Result<(Initial, PeriodicBox), FileError> {
     let value = section.require("file")?;
     let path = base.join(value.string()?.value);

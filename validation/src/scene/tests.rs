@@ -461,6 +461,10 @@ fn checkpoints_bring_all_but_the_clock() {
     assert_eq!(scene.initial_state(), last);
     let file = Scene::parse("s.toml", &text.replace("\"run\"", "\"run/checkpoint\""), folder.path()).unwrap();
     assert_eq!(file.initial_state(), last);
+    // Walls stay where they were unless the scene says otherwise.
+    let box_of = "[box]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]\n";
+    let plain = Scene::parse("s.toml", &text.replace(box_of, ""), folder.path()).unwrap();
+    assert_eq!(plain.domain, last.domain);
     for (from, to, message) in [
         ("\"run\"", "\"nowhere\"", "nowhere"),
         ("\"run\"", "\"mixture.toml\"", "mixture.toml"),

@@ -125,9 +125,9 @@ pub const BOX: Table = Table {
             "boundary",
             ValueKind::EachOf(boundaries),
             OPTIONAL,
-            "What happens at its faces; `periodic` if left out. A face that reflects puts a particle as far inside \
-             as it was outside and reverses its velocity across the face; nothing acts through it. For a wall of \
-             particles freeze a `layer` in front of it.",
+            "What happens at its faces; `periodic` if left out, or as it was in a checkpoint that is started from. A \
+             face that reflects puts a particle as far inside as it was outside and reverses its velocity across the \
+             face; nothing acts through it. For a wall of particles freeze a `layer` in front of it.",
             "[box]\nlengths = [8.0, 8.0, 16.0]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]",
         ),
     ],
