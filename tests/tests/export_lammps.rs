@@ -11,6 +11,7 @@ title = "one species"
 model = "MODELS/warren2003-set6.toml"
 kT    = 1.0
 seed  = 11
+precision = "double"
 [box]
 lengths = [5.0, 6.0, 7.0]
 [initial]
@@ -30,6 +31,7 @@ title = "two species & stages"
 model = "mixture.toml"
 kT    = 1.0
 seed  = 12
+precision = "double"
 [box]
 lengths = [5.0, 5.0, 5.0]
 [masses]
@@ -97,6 +99,7 @@ title = "two dimensions"
 model = "flat.toml"
 kT    = 0.75
 seed  = 13
+precision = "double"
 [box]
 lengths = [7.0, 9.0]
 [initial]
@@ -133,6 +136,7 @@ title = "walls"
 model = "mixture.toml"
 kT    = 3.0
 seed  = 14
+precision = "double"
 dt    = 0.01
 [box]
 lengths  = [5.0, 6.0, 7.0]
@@ -206,6 +210,7 @@ title = "channels"
 model = "flat.toml"
 kT    = 2.5
 seed  = 15
+precision = "double"
 steps = 60
 dt    = 0.01
 [box]
@@ -279,6 +284,40 @@ fn compare(scene: &str) {
         compare_rows(at);
         compare_ends(at);
     }
+}
+
+/// A deck says what the scene says; in mixed precision both go on alike until rounding has grown.
+#[test]
+fn precision_is_that_of_the_scene() {
+    let style = |scene: &str| {
+        let folder = folder(scene);
+        assert!(export(folder.path()).status.success());
+        let script = std::fs::read_to_string(folder.path().join("deck/in.lammps")).unwrap();
+        let line = script.lines().find(|l| l.starts_with("pair_style")).unwrap().to_owned();
+        (folder, line)
+    };
+    assert!(style(ONE_SPECIES).1.ends_with("dpd/psi 1.0 11 precision double"));
+    assert!(style(&ONE_SPECIES.replace("precision = \"double\"\n", "")).1.ends_with("dpd/psi 1.0 11"));
+    let (folder, line) =
+        style(&ONE_SPECIES.replace("\"double\"", "\"mixed\"").replace("dump   = 25", "dump   = 5"));
+    assert!(line.ends_with("dpd/psi 1.0 11 precision mixed"));
+    let at = folder.path();
+    let run = psidpd(at, &["run", "scenes/scene.toml", "--out", "native"]);
+    assert!(run.status.success(), "{}", said(&run));
+    let (host, plugin) = lammps();
+    let plugin = plugin.display().to_string();
+    let (deck, arguments) = (at.join("deck"), ["-var", "plugin", &plugin]);
+    host.run_script(1, &deck, Path::new("in.lammps"), &arguments, Duration::from_secs(120)).unwrap();
+    let read = |folder: &str| {
+        let mut frames = dump::read(&at.join(folder).join("dump.lammpstrj")).unwrap();
+        assert!(frames[1].sort_by_id() && frames[1].step == 5);
+        frames[1].vectors(["x", "y", "z"]).unwrap()
+    };
+    let most = |a: Vec<[f64; 3]>, b: Vec<[f64; 3]>| {
+        a.iter().zip(&b).map(|(a, b)| distance(*a, *b, [5.0, 6.0, 7.0])).fold(0.0, f64::max)
+    };
+    let off = most(read("native"), read("deck"));
+    assert!(off < 1e-6, "{off:e}");
 }
 
 /// The largest difference, by whole boxes where that is less.

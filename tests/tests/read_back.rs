@@ -44,6 +44,7 @@ title = "for others to read"
 model = "model.toml"
 kT    = 1.0
 seed  = 3
+precision = "double"
 
 [box]
 lengths = [5.0, 4.5, 6.0]
