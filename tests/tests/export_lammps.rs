@@ -407,14 +407,12 @@ fn two_dimensions() {
 
 #[test]
 fn walls_frozen_particles_body_forces_and_a_ramp() {
-    compare(WALLS, 1);
-    compare(WALLS, 2);
+    compare(WALLS);
 }
 
 #[test]
 fn opposite_flows_between_walls_in_two_dimensions() {
-    compare(CHANNELS, 1);
-    compare(CHANNELS, 2);
+    compare(CHANNELS);
 }
 
 #[test]

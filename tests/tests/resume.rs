@@ -264,7 +264,7 @@ fn a_full_disk_leaves_the_last_good_state() {
     let whole = whole();
     let out = here.join("full");
     // Room for checkpoints, but not for the dump.
-    let output = limited(here, "s.toml", "full", 600);
+    let output = limited(here, "s.toml", "full", 2000);
     let words = said(&output);
     assert_eq!(output.status.code(), Some(1), "{words}");
     assert!(words.contains("dump.lammpstrj cannot be written"), "{words}");
