@@ -274,7 +274,9 @@ fn a_full_disk_leaves_the_last_good_state() {
     assert!(words.contains("going on after step "), "{words}");
     assert_same(whole, &out);
     // No room for a single checkpoint: that is found out before the first step.
-    std::fs::write(here.join("slim.toml"), scene().replace("dump = 25", "dump = 0")).unwrap();
+    let slim = scene().replace("dump = 25\nxyz = 50\nsnapshot = 300\n", "");
+    assert!(slim != scene());
+    std::fs::write(here.join("slim.toml"), slim).unwrap();
     let output = limited(here, "slim.toml", "none", 10);
     let words = said(&output);
     assert_eq!(output.status.code(), Some(1), "{words}");
