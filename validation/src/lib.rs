@@ -1,4 +1,5 @@
 //! psidpd: native runner and cross-code validator.
+pub mod bench;
 pub mod check;
 pub mod cli;
 pub mod crosscheck;

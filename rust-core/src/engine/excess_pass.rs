@@ -81,14 +81,24 @@ impl ExcessPass {
         if lanes == 0 {
             return Ok(());
         }
-        at.clear();
         at.resize(variables * lanes, 0.0);
         correction.resize(variables * lanes, 0.0);
+        if rows.columns.len() < variables {
+            at.fill(0.0);
+        }
         out.resize((1 + slope_width) * lanes, 0.0);
         let width = rows.columns.len();
         for (column, &v) in rows.columns.iter().enumerate() {
             let (d, beta) = (v / count, v % count);
             let polynomial = &plan.densities[d].correction[alpha * count + beta];
+            if polynomial.is_identity() {
+                let members = members.iter().map(|m| (*m as usize - rows.first) * width + column);
+                for (at, place) in at[v * lanes..][..lanes].iter_mut().zip(members) {
+                    *at = rows.densities[place];
+                }
+                correction[v * lanes..][..lanes].fill(1.0);
+                continue;
+            }
             for (lane, member) in members.iter().enumerate() {
                 let n = rows.densities[(*member as usize - rows.first) * width + column];
                 (at[v * lanes + lane], correction[v * lanes + lane]) = polynomial.at(n);

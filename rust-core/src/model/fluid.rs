@@ -135,6 +135,11 @@ impl Polynomial {
         Polynomial(vec![0.0, 1.0])
     }
 
+    /// Whether it is `x`.
+    pub fn is_identity(&self) -> bool {
+        self.0 == [0.0, 1.0]
+    }
+
     /// Value and slope at `x`.
     pub fn at(&self, x: f64) -> (f64, f64) {
         self.0.iter().rev().fold((0.0, 0.0), |(value, slope), c| (value * x + c, slope * x + value))

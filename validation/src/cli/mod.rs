@@ -4,6 +4,7 @@
 //! is needed is missing. A run that a signal stopped exits with 128 and the number of the signal: 130 for
 //! Ctrl-C, 143 for SIGTERM.
 
+mod bench;
 mod check;
 mod diagnostic;
 mod export;
@@ -37,6 +38,8 @@ struct Arguments {
 enum Verb {
     /// Compare the native runner, the LAMMPS plugin, LAMMPS's mdpd and eam/alloy in one fluid.
     Validate(validate::Arguments),
+    /// Time LAMMPS, the plugin and the native runner side by side.
+    Bench(bench::Arguments),
     /// What a model or scene will compute, and what cannot work.
     Check(check::Arguments),
     /// Mean field: equation of state, critical point, spinodal, binodal, surface tension.
@@ -74,6 +77,7 @@ pub fn main() -> ExitCode {
     let json = arguments.json.as_deref();
     let outcome = match &arguments.verb {
         Verb::Validate(a) => validate::run(a, json),
+        Verb::Bench(a) => bench::run(a, json),
         Verb::Check(a) => check::run(a, json),
         Verb::Theory(a) => theory::run(a, json),
         Verb::Export(a) => export::run(a, json),

@@ -20,6 +20,7 @@ pub mod trajectory;
 mod validate;
 
 pub use error::ValidateError;
+pub(crate) use validate::machine;
 pub use validate::{Options, Outcome, check_table, validate};
 
 use crate::lammps::Host;

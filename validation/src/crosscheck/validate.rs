@@ -115,7 +115,7 @@ fn write(out: &Path, results: &Results, mut sections: Vec<Section>) -> Result<Pa
 }
 
 /// The processor, where the system says.
-fn machine() -> String {
+pub(crate) fn machine() -> String {
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
     let model = std::fs::read_to_string("/proc/cpuinfo")
         .ok()

@@ -12,6 +12,9 @@ pub trait Arithmetic<I: Isa>: 'static {
     type Reals: Reals<Scalar = Self::Scalar>;
     type Record: Record;
 
+    /// Fills `own` of the pairs of a block, and their `tag_i`, from its members; runs over by a vector.
+    unsafe fn spread(records: *const Self::Record, block: &mut Block<Self::Scalar>, moving: bool);
+
     /// Fills `d`, `r` and `1/r` of the pairs of a block, and for the thermostat also their velocity along
     /// `ê` and their tags, for whole vectors up to `count`.
     unsafe fn separate(
@@ -22,8 +25,9 @@ pub trait Arithmetic<I: Isa>: 'static {
         moving: bool,
     );
 
-    /// An index as a number of the fourth column of a row, and back.
-    fn encode(index: u32) -> Self::Scalar;
+    /// Indices as numbers of the fourth column of rows; whole vectors.
+    unsafe fn encode_all(index: *const u32, out: *mut Self::Scalar, count: usize);
+    /// The index that a number stands for.
     fn decode(number: Self::Scalar) -> u32;
     unsafe fn load_quad(p: *const Self::Scalar) -> I::Quad;
 }
@@ -85,6 +89,55 @@ impl<I: Isa> Arithmetic<I> for Mixed {
     type Record = MixedRecord;
 
     #[inline(always)]
+    unsafe fn spread(records: *const MixedRecord, block: &mut Block<f32>, moving: bool) {
+        // SAFETY: the contract of `simd`; the block has room for whole vectors.
+        unsafe {
+            let own: [*mut u32; 3] = [
+                block.own[0].as_mut_ptr().cast(),
+                block.own[1].as_mut_ptr().cast(),
+                block.own[2].as_mut_ptr().cast(),
+            ];
+            let velocity = [block.own[3].as_mut_ptr(), block.own[4].as_mut_ptr(), block.own[5].as_mut_ptr()];
+            let tag = block.tag_i.as_mut_ptr();
+            let (members, begin) = (block.members.as_ptr(), block.begin.as_ptr());
+            let lanes = I::U32::LANES;
+            let mut p = 0;
+            let mut m = 0;
+            while m < block.members.len() {
+                let record = &*records.add(*members.add(m) as usize);
+                let end = *begin.add(m + 1) as usize;
+                let [x, y, z] =
+                    [I::U32::splat(record.u[0]), I::U32::splat(record.u[1]), I::U32::splat(record.u[2])];
+                let t = I::U32::splat(record.tag);
+                let [u, v, w] =
+                    [I::F32::splat(record.v[0]), I::F32::splat(record.v[1]), I::F32::splat(record.v[2])];
+                let mut k = p;
+                // Sixteen at once, which is mostly enough.
+                loop {
+                    let stop = k + 16;
+                    while k < stop {
+                        x.store(own[0].add(k));
+                        y.store(own[1].add(k));
+                        z.store(own[2].add(k));
+                        if moving {
+                            t.store(tag.add(k));
+                            u.store(velocity[0].add(k));
+                            v.store(velocity[1].add(k));
+                            w.store(velocity[2].add(k));
+                        }
+                        k += lanes;
+                    }
+                    if k >= end {
+                        break;
+                    }
+                }
+                p = end;
+                m += 1;
+            }
+        }
+    }
+
+    #[inline(always)]
     unsafe fn separate(
         frame: &Frame,
         records: *const MixedRecord,
@@ -102,10 +155,26 @@ impl<I: Isa> Arithmetic<I> for Mixed {
             let (xy, xz, yz) = (I::F32::splat(lean[0]), I::F32::splat(lean[1]), I::F32::splat(lean[2]));
             let tilted = frame.is_tilted();
             let tiny = I::F32::splat(TINY as f32);
+            let mut own = [std::ptr::null(); 6];
+            let mut c = 0;
+            while c < 6 {
+                own[c] = block.own[c].as_ptr();
+                c += 1;
+            }
+            let p_j = block.j.as_ptr();
+            let p_d0 = block.d[0].as_mut_ptr();
+            let p_d1 = block.d[1].as_mut_ptr();
+            let p_d2 = block.d[2].as_mut_ptr();
+            let p_r = block.r.as_mut_ptr();
+            let p_inverse = block.inverse.as_mut_ptr();
+            let p_tag_j = block.tag_j.as_mut_ptr();
+            let p_along = block.along.as_mut_ptr();
             let mut k = 0;
             while k < count {
-                let (pi, pj) = (block.i.as_ptr().add(k), block.j.as_ptr().add(k));
-                let [xi, yi, zi, ti] = I::word_columns(base, stride, pi);
+                let pj = p_j.add(k);
+                let xi = I::U32::load(own[0].add(k).cast());
+                let yi = I::U32::load(own[1].add(k).cast());
+                let zi = I::U32::load(own[2].add(k).cast());
                 let [xj, yj, zj, tj] = I::word_columns(base, stride, pj);
                 let (a, b, c) = (I::signed(xi.sub(xj)), I::signed(yi.sub(yj)), I::signed(zi.sub(zj)));
                 let (mut dx, mut dy, dz) = (a * sx, b * sy, c * sz);
@@ -115,18 +184,19 @@ impl<I: Isa> Arithmetic<I> for Mixed {
                 }
                 let r2 = dx.mul_add(dx, dy.mul_add(dy, dz * dz)).larger(tiny);
                 let inverse = r2.inverse_root();
-                dx.store(block.d[0].as_mut_ptr().add(k));
-                dy.store(block.d[1].as_mut_ptr().add(k));
-                dz.store(block.d[2].as_mut_ptr().add(k));
-                (r2 * inverse).store(block.r.as_mut_ptr().add(k));
-                inverse.store(block.inverse.as_mut_ptr().add(k));
+                dx.store(p_d0.add(k));
+                dy.store(p_d1.add(k));
+                dz.store(p_d2.add(k));
+                (r2 * inverse).store(p_r.add(k));
+                inverse.store(p_inverse.add(k));
                 if moving {
-                    ti.store(block.tag_i.as_mut_ptr().add(k));
-                    tj.store(block.tag_j.as_mut_ptr().add(k));
-                    let [ui, vi, wi, _] = I::F32::columns(base.add(16), stride, pi);
+                    tj.store(p_tag_j.add(k));
+                    let ui = I::F32::load(own[3].add(k));
+                    let vi = I::F32::load(own[4].add(k));
+                    let wi = I::F32::load(own[5].add(k));
                     let [uj, vj, wj, _] = I::F32::columns(base.add(16), stride, pj);
                     let along = (ui - uj).mul_add(dx, (vi - vj).mul_add(dy, (wi - wj) * dz));
-                    (along * inverse).store(block.along.as_mut_ptr().add(k));
+                    (along * inverse).store(p_along.add(k));
                 }
                 k += <I::F32 as Reals>::LANES;
             }
@@ -135,8 +205,16 @@ impl<I: Isa> Arithmetic<I> for Mixed {
 
     // Bits of a number of ordinary size, for indices below 2²⁹.
     #[inline(always)]
-    fn encode(index: u32) -> f32 {
-        f32::from_bits(index + 0x4000_0000)
+    unsafe fn encode_all(index: *const u32, out: *mut f32, count: usize) {
+        // SAFETY: the contract of `simd`.
+        unsafe {
+            let ordinary = I::U32::splat(0x4000_0000);
+            let mut k = 0;
+            while k < count {
+                I::U32::load(index.add(k)).add(ordinary).store(out.add(k).cast());
+                k += I::U32::LANES;
+            }
+        }
     }
     #[inline(always)]
     fn decode(number: f32) -> u32 {
@@ -159,6 +237,59 @@ impl<I: Isa> Arithmetic<I> for Double {
     type Scalar = f64;
     type Reals = I::F64;
     type Record = DoubleRecord;
+
+    #[inline(always)]
+    unsafe fn spread(records: *const DoubleRecord, block: &mut Block<f64>, moving: bool) {
+        // SAFETY: the contract of `simd`; the block has room for whole vectors.
+        unsafe {
+            let mut own = [std::ptr::null_mut(); 6];
+            let mut c = 0;
+            while c < 6 {
+                own[c] = block.own[c].as_mut_ptr();
+                c += 1;
+            }
+            let tag = block.tag_i.as_mut_ptr();
+            let (members, begin) = (block.members.as_ptr(), block.begin.as_ptr());
+            let lanes = I::F64::LANES;
+            let mut p = 0;
+            let mut m = 0;
+            while m < block.members.len() {
+                let record = &*records.add(*members.add(m) as usize);
+                let end = *begin.add(m + 1) as usize;
+                let [x, y, z] =
+                    [I::F64::splat(record.x[0]), I::F64::splat(record.x[1]), I::F64::splat(record.x[2])];
+                let [u, v, w] =
+                    [I::F64::splat(record.v[0]), I::F64::splat(record.v[1]), I::F64::splat(record.v[2])];
+                let t = I::U32::splat(record.tag);
+                let mut k = p;
+                loop {
+                    let stop = k + 16;
+                    if moving {
+                        t.store(tag.add(k));
+                        if I::U32::LANES < 16 {
+                            t.store(tag.add(k + 8));
+                        }
+                    }
+                    while k < stop {
+                        x.store(own[0].add(k));
+                        y.store(own[1].add(k));
+                        z.store(own[2].add(k));
+                        if moving {
+                            u.store(own[3].add(k));
+                            v.store(own[4].add(k));
+                            w.store(own[5].add(k));
+                        }
+                        k += lanes;
+                    }
+                    if k >= end {
+                        break;
+                    }
+                }
+                p = end;
+                m += 1;
+            }
+        }
+    }
 
     #[inline(always)]
     unsafe fn separate(
@@ -188,10 +319,25 @@ impl<I: Isa> Arithmetic<I> for Double {
             let tilted = frame.is_tilted();
             let flat = if frame.dimensions == 3 { I::F64::splat(1.0) } else { I::F64::splat(0.0) };
             let tiny = I::F64::splat(TINY);
+            let mut own = [std::ptr::null(); 6];
+            let mut c = 0;
+            while c < 6 {
+                own[c] = block.own[c].as_ptr();
+                c += 1;
+            }
+            let p_j = block.j.as_ptr();
+            let p_d0 = block.d[0].as_mut_ptr();
+            let p_d1 = block.d[1].as_mut_ptr();
+            let p_d2 = block.d[2].as_mut_ptr();
+            let p_r = block.r.as_mut_ptr();
+            let p_inverse = block.inverse.as_mut_ptr();
+            let p_along = block.along.as_mut_ptr();
             let mut k = 0;
             while k < count {
-                let (pi, pj) = (block.i.as_ptr().add(k), block.j.as_ptr().add(k));
-                let [xi, yi, zi, _] = I::F64::columns(base, stride, pi);
+                let pj = p_j.add(k);
+                let xi = I::F64::load(own[0].add(k));
+                let yi = I::F64::load(own[1].add(k));
+                let zi = I::F64::load(own[2].add(k));
                 let [xj, yj, zj, _] = I::F64::columns(base, stride, pj);
                 let (mut dx, mut dy, mut dz) = (xi - xj, yi - yj, (zi - zj) * flat);
                 let boxes = (dz * iz).round();
@@ -208,22 +354,23 @@ impl<I: Isa> Arithmetic<I> for Double {
                 dx = dx - (dx * ix).round() * lx;
                 let r2 = dx.mul_add(dx, dy.mul_add(dy, dz * dz)).larger(tiny);
                 let inverse = r2.inverse_root();
-                dx.store(block.d[0].as_mut_ptr().add(k));
-                dy.store(block.d[1].as_mut_ptr().add(k));
-                dz.store(block.d[2].as_mut_ptr().add(k));
-                (r2 * inverse).store(block.r.as_mut_ptr().add(k));
-                inverse.store(block.inverse.as_mut_ptr().add(k));
+                dx.store(p_d0.add(k));
+                dy.store(p_d1.add(k));
+                dz.store(p_d2.add(k));
+                (r2 * inverse).store(p_r.add(k));
+                inverse.store(p_inverse.add(k));
                 if moving {
-                    let [ui, vi, wi, _] = I::F64::columns(base.add(32), stride, pi);
+                    let ui = I::F64::load(own[3].add(k));
+                    let vi = I::F64::load(own[4].add(k));
+                    let wi = I::F64::load(own[5].add(k));
                     let [uj, vj, wj, _] = I::F64::columns(base.add(32), stride, pj);
                     let along = (ui - uj).mul_add(dx, (vi - vj).mul_add(dy, (wi - wj) * dz));
-                    (along * inverse).store(block.along.as_mut_ptr().add(k));
+                    (along * inverse).store(p_along.add(k));
                 }
                 k += <I::F64 as Reals>::LANES;
             }
             if moving {
                 for k in 0..count {
-                    *block.tag_i.get_unchecked_mut(k) = (*records.add(block.i[k] as usize)).tag;
                     *block.tag_j.get_unchecked_mut(k) = (*records.add(block.j[k] as usize)).tag;
                 }
             }
@@ -231,8 +378,15 @@ impl<I: Isa> Arithmetic<I> for Double {
     }
 
     #[inline(always)]
-    fn encode(index: u32) -> f64 {
-        f64::from_bits(0x3ff0_0000_0000_0000 | index as u64)
+    unsafe fn encode_all(index: *const u32, out: *mut f64, count: usize) {
+        // SAFETY: the contract of `simd`.
+        unsafe {
+            let mut k = 0;
+            while k < count {
+                *out.add(k) = f64::from_bits(0x3ff0_0000_0000_0000 | *index.add(k) as u64);
+                k += 1;
+            }
+        }
     }
     #[inline(always)]
     fn decode(number: f64) -> u32 {

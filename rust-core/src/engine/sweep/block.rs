@@ -1,13 +1,16 @@
 //! The pairs in hand: some hundred, in arrays that stay in the first-level cache.
 
+use super::layer::Chunk;
 use super::simd::Scalar;
 
 /// Pairs of a run of particles, in parallel arrays; `d = r_i − r_j`.
 #[derive(Debug, Default)]
 pub struct Block<T> {
-    /// Indices of the two particles, in the order of cells.
+    /// Indices of the two particles, in the order of cells; those of the first only where they are needed.
     pub i: Vec<u32>,
     pub j: Vec<u32>,
+    /// The first particle of each pair as its record has it: position, velocity, tag.
+    pub own: [Vec<T>; 6],
     /// How many pairs there are.
     pub count: usize,
     /// The first particles, each once, and where the pairs of each begin, and of the last end.
@@ -43,6 +46,13 @@ pub struct Block<T> {
     pub bits: Vec<u64>,
     /// Work space of pair terms that are evaluated apart.
     pub apart: Apart,
+    /// What the members are to be compared with.
+    pub chunks: Vec<Chunk>,
+    /// Where the members are.
+    pub place: [Vec<f32>; 3],
+    pub chunk_count: usize,
+    /// Which of each chunk are within reach.
+    pub masks: Vec<u32>,
     capacity: usize,
 }
 
@@ -55,6 +65,9 @@ pub struct Apart {
     pub slope: Vec<f64>,
 }
 
+/// Chunks of a group of sixteen particles: five windows, in up to three periods each, of two chunks.
+const GROUP: usize = 16 * 5 * 3 * 2 + 2;
+
 /// Room behind the last pair: what whole vectors may touch.
 const SLACK: usize = 64;
 
@@ -63,6 +76,22 @@ impl<T: Scalar> Block<T> {
         self.count = 0;
         self.members.clear();
         self.begin.clear();
+        self.begin.push(0);
+        if self.chunks.is_empty() {
+            self.place = std::array::from_fn(|_| vec![0.0; 256]);
+            self.reserve_chunks(0);
+        }
+    }
+
+    /// Makes room for `count` chunks, and for those that the rest of a group may need at two each.
+    #[cold]
+    #[inline(never)]
+    pub fn reserve_chunks(&mut self, count: usize) {
+        let room = count + GROUP;
+        if room > self.chunks.len() {
+            self.chunks.resize(2 * room, Chunk::default());
+            self.masks.resize(2 * room, 0);
+        }
     }
 
     /// Makes room for `count` pairs and whole vectors behind.
@@ -94,7 +123,8 @@ impl<T: Scalar> Block<T> {
             &mut self.thermostat,
             &mut self.near_code,
         ];
-        for values in scalars.into_iter().chain(&mut self.d).chain(&mut self.near).chain(&mut self.near_d) {
+        let triples = self.d.iter_mut().chain(&mut self.near).chain(&mut self.near_d);
+        for values in scalars.into_iter().chain(&mut self.own).chain(triples) {
             values.resize(capacity, T::default());
         }
         for values in &mut self.weight {
@@ -106,6 +136,14 @@ impl<T: Scalar> Block<T> {
         for values in [&mut self.apart.r, &mut self.apart.phi, &mut self.apart.slope] {
             values.resize(capacity, 0.0);
         }
+    }
+
+    /// Fills `i`.
+    pub fn spread_members(&mut self) {
+        for (m, member) in self.members.iter().enumerate() {
+            self.i[self.begin[m] as usize..self.begin[m + 1] as usize].fill(*member);
+        }
+        self.i[self.count..self.count + 16].fill(0);
     }
 
     /// Room for the weights of `passes` densities.

@@ -96,16 +96,21 @@ unsafe fn soft<R: Reals, const SEVERAL: bool, const TALLY: bool>(
     unsafe {
         let (one, zero) = (R::constant(1.0), R::constant(0.0));
         let mut energy = zero;
+        let p_kind = block.kind.as_ptr();
+        let p_r = block.r.as_ptr();
+        let p_conservative = block.conservative.as_mut_ptr();
+        let p_share = block.share.as_ptr();
+        let count = block.count;
         let mut k = 0;
-        while k < block.count {
-            let kind = block.kind.as_ptr().add(k);
-            let r = R::load(block.r.as_ptr().add(k));
+        while k < count {
+            let kind = p_kind.add(k);
+            let r = R::load(p_r.add(k));
             let t = (one - r * entry::<R, SEVERAL>(&term.inverse_range, kind)).larger(zero);
-            let out = block.conservative.as_mut_ptr().add(k);
+            let out = p_conservative.add(k);
             let before = if first { zero } else { R::load(out) };
             t.mul_add(entry::<R, SEVERAL>(&term.strength, kind), before).store(out);
             if TALLY {
-                let share = R::load(block.share.as_ptr().add(k));
+                let share = R::load(p_share.add(k));
                 energy = (t * t).mul_add(share * entry::<R, SEVERAL>(&term.energy, kind), energy);
             }
             k += R::LANES;
@@ -143,11 +148,15 @@ impl<R: Reals, const SEVERAL: bool> ShapeVisitor for LinearForce<'_, R, SEVERAL>
         unsafe {
             let Self { term, block } = self;
             let inverse_range = R::splat(term.force_inverse_range);
+            let p_r = block.r.as_ptr();
+            let p_kind = block.kind.as_ptr();
+            let p_conservative = block.conservative.as_mut_ptr();
+            let count = block.count;
             let mut k = 0;
-            while k < block.count {
-                let s = R::load(block.r.as_ptr().add(k)) * inverse_range;
-                let factor = entry::<R, SEVERAL>(&term.force, block.kind.as_ptr().add(k));
-                let out = block.conservative.as_mut_ptr().add(k);
+            while k < count {
+                let s = R::load(p_r.add(k)) * inverse_range;
+                let factor = entry::<R, SEVERAL>(&term.force, p_kind.add(k));
+                let out = p_conservative.add(k);
                 let force = (factor * S::slope(s)).where_below(s, R::constant(1.0));
                 (R::load(out) + force).store(out);
                 k += R::LANES;
@@ -195,10 +204,15 @@ unsafe fn spline<R: Reals, const SEVERAL: bool, const TALLY: bool>(
     unsafe {
         let (one, zero) = (R::constant(1.0), R::constant(0.0));
         let mut energy = zero;
+        let p_kind = block.kind.as_ptr();
+        let p_r = block.r.as_ptr();
+        let p_conservative = block.conservative.as_mut_ptr();
+        let p_share = block.share.as_ptr();
+        let count = block.count;
         let mut k = 0;
-        while k < block.count {
-            let kind = block.kind.as_ptr().add(k);
-            let r = R::load(block.r.as_ptr().add(k));
+        while k < count {
+            let kind = p_kind.add(k);
+            let r = R::load(p_r.add(k));
             let inverse_a = entry::<R, SEVERAL>(&term.repulsion_inverse_range, kind);
             let inverse_b = entry::<R, SEVERAL>(&term.attraction_inverse_range, kind);
             // At s = 1 the shape and its slope vanish; beyond, it stays there.
@@ -208,11 +222,11 @@ unsafe fn spline<R: Reals, const SEVERAL: bool, const TALLY: bool>(
             let attraction = entry::<R, SEVERAL>(&term.attraction, kind);
             let slope = repulsion * inverse_a * CubicSpline::slope(a)
                 - attraction * inverse_b * CubicSpline::slope(b);
-            let out = block.conservative.as_mut_ptr().add(k);
+            let out = p_conservative.add(k);
             (R::load(out) - slope).store(out);
             if TALLY {
                 let phi = repulsion * CubicSpline::value(a) - attraction * CubicSpline::value(b);
-                energy = phi.mul_add(R::load(block.share.as_ptr().add(k)), energy);
+                energy = phi.mul_add(R::load(p_share.add(k)), energy);
             }
             k += R::LANES;
         }
@@ -269,9 +283,11 @@ impl<R: Reals> ShapeVisitor for Weights<'_, R> {
             let Self { pass, number, block } = self;
             let (inverse_range, factor) = (R::splat(pass.inverse_range), R::splat(pass.value));
             let out = block.weight[number].as_mut_ptr();
+            let p_r = block.r.as_ptr();
+            let count = block.count;
             let mut k = 0;
-            while k < block.count {
-                let s = R::load(block.r.as_ptr().add(k)) * inverse_range;
+            while k < count {
+                let s = R::load(p_r.add(k)) * inverse_range;
                 (factor * S::value(s)).where_below(s, R::constant(1.0)).store(out.add(k));
                 k += R::LANES;
             }
@@ -287,26 +303,58 @@ unsafe fn draw<I: Isa>(noise: PairNoise, block: &mut Block<impl Scalar>) {
         let [k0, k1] = noise.key();
         let schedule =
             [I::U32::splat(k0), I::U32::splat(k1), I::U32::splat(crate::engine::noise::PARITY ^ k0 ^ k1)];
+        let p_tag_i = block.tag_i.as_ptr();
+        let p_tag_j = block.tag_j.as_ptr();
+        let p_noise = block.noise.as_mut_ptr();
+        let count = block.count;
         let mut k = 0;
-        while k < block.count {
-            let a = I::U32::load(block.tag_i.as_ptr().add(k));
-            let b = I::U32::load(block.tag_j.as_ptr().add(k));
+        while k < count {
+            let a = I::U32::load(p_tag_i.add(k));
+            let b = I::U32::load(p_tag_j.add(k));
             let mut x0 = a.min(b).add(schedule[0]);
             let mut x1 = a.max(b).add(schedule[1]);
-            let mut round = 0;
-            while round < crate::engine::noise::PAIR_ROUNDS {
-                x0 = x0.add(x1);
-                x1 = x1.rotate(crate::engine::noise::ROTATIONS[round % 8]).xor(x0);
-                if round % 4 == 3 {
-                    let injection = round / 4 + 1;
-                    x0 = x0.add(schedule[injection % 3]);
-                    x1 = x1.add(schedule[(injection + 1) % 3]).add(I::U32::splat(injection as u32));
-                }
-                round += 1;
-            }
-            x0.xor(I::U32::splat(0x8000_0000)).store(block.noise.as_mut_ptr().add(k).cast());
+            // Written out: rotations by constants are one instruction.
+            (x0, x1) = four_rounds::<I>(x0, x1, 0);
+            (x0, x1) = inject::<I>(x0, x1, &schedule, 1);
+            (x0, x1) = four_rounds::<I>(x0, x1, 4);
+            (x0, x1) = inject::<I>(x0, x1, &schedule, 2);
+            (x0, x1) = four_rounds::<I>(x0, x1, 0);
+            (x0, x1) = inject::<I>(x0, x1, &schedule, 3);
+            // Of the last round only the first word is of use.
+            x0 = x0.add(x1);
+            x0.xor(I::U32::splat(0x8000_0000)).store(p_noise.add(k).cast());
             k += I::U32::LANES;
         }
+    }
+}
+
+const _: () = assert!(crate::engine::noise::PAIR_ROUNDS == 13);
+
+/// Four rounds of Threefry from round `at` of eight on.
+#[inline(always)]
+unsafe fn four_rounds<I: Isa>(mut x0: I::U32, mut x1: I::U32, at: usize) -> (I::U32, I::U32) {
+    use crate::engine::noise::ROTATIONS;
+    // SAFETY: the contract of `simd`.
+    unsafe {
+        x0 = x0.add(x1);
+        x1 = x1.rotate(ROTATIONS[at]).xor(x0);
+        x0 = x0.add(x1);
+        x1 = x1.rotate(ROTATIONS[at + 1]).xor(x0);
+        x0 = x0.add(x1);
+        x1 = x1.rotate(ROTATIONS[at + 2]).xor(x0);
+        x0 = x0.add(x1);
+        x1 = x1.rotate(ROTATIONS[at + 3]).xor(x0);
+    }
+    (x0, x1)
+}
+
+/// The injection of the key behind four rounds.
+#[inline(always)]
+unsafe fn inject<I: Isa>(x0: I::U32, x1: I::U32, schedule: &[I::U32; 3], number: usize) -> (I::U32, I::U32) {
+    // SAFETY: the contract of `simd`.
+    unsafe {
+        let x1 = x1.add(schedule[(number + 1) % 3]).add(I::U32::splat(number as u32));
+        (x0.add(schedule[number % 3]), x1)
     }
 }
 
@@ -323,17 +371,23 @@ unsafe fn thermostat<R: Reals, const SEVERAL: bool, const EXPONENT: usize>(
     unsafe {
         let (one, zero) = (R::constant(1.0), R::constant(0.0));
         let (half, unit) = (R::constant(0.5), R::constant(UNIT * inverse_root_dt));
+        let p_kind = block.kind.as_ptr();
+        let p_r = block.r.as_ptr();
+        let p_noise = block.noise.as_ptr();
+        let p_along = block.along.as_ptr();
+        let p_thermostat = block.thermostat.as_mut_ptr();
+        let count = block.count;
         let mut k = 0;
-        while k < block.count {
-            let kind = block.kind.as_ptr().add(k);
-            let r = R::load(block.r.as_ptr().add(k));
+        while k < count {
+            let kind = p_kind.add(k);
+            let r = R::load(p_r.add(k));
             let t = (one - r * entry::<R, SEVERAL>(&drag.inverse_range, kind)).larger(zero);
             let w = if EXPONENT == 2 { t * t } else { t };
-            let xi = (R::load_signed(block.noise.as_ptr().add(k)) + half) * unit;
-            let along = R::load(block.along.as_ptr().add(k));
+            let xi = (R::load_signed(p_noise.add(k)) + half) * unit;
+            let along = R::load(p_along.add(k));
             let pull = entry::<R, SEVERAL>(&drag.sigma, kind) * xi
                 - entry::<R, SEVERAL>(&drag.gamma, kind) * w * along;
-            (w * pull).store(block.thermostat.as_mut_ptr().add(k));
+            (w * pull).store(p_thermostat.add(k));
             k += R::LANES;
         }
     }
@@ -398,21 +452,26 @@ pub unsafe fn rows<R: Reals, const MOVING: bool, const WEIGHT: bool>(block: &mut
     // SAFETY: the contract of `simd`.
     unsafe {
         let zero = R::constant(0.0);
+        let p_conservative = block.conservative.as_ptr();
+        let p_thermostat = block.thermostat.as_ptr();
+        let p_inverse = block.inverse.as_ptr();
+        // Without a density there are no weights.
+        let p_weight0 = if WEIGHT { block.weight[0].as_ptr() } else { block.r.as_ptr() };
+        let p_d0 = block.d[0].as_ptr();
+        let p_d1 = block.d[1].as_ptr();
+        let p_d2 = block.d[2].as_ptr();
+        let p_rows = block.rows.as_mut_ptr();
+        let count = block.count;
         let mut k = 0;
-        while k < block.count {
-            let mut f = R::load(block.conservative.as_ptr().add(k));
+        while k < count {
+            let mut f = R::load(p_conservative.add(k));
             if MOVING {
-                f = f + R::load(block.thermostat.as_ptr().add(k));
+                f = f + R::load(p_thermostat.add(k));
             }
-            f = f * R::load(block.inverse.as_ptr().add(k));
-            let w = if WEIGHT { zero - R::load(block.weight[0].as_ptr().add(k)) } else { zero };
-            let columns = [
-                f * R::load(block.d[0].as_ptr().add(k)),
-                f * R::load(block.d[1].as_ptr().add(k)),
-                f * R::load(block.d[2].as_ptr().add(k)),
-                w,
-            ];
-            R::rows(columns, block.rows.as_mut_ptr().add(4 * k));
+            f = f * R::load(p_inverse.add(k));
+            let w = if WEIGHT { zero - R::load(p_weight0.add(k)) } else { zero };
+            let columns = [f * R::load(p_d0.add(k)), f * R::load(p_d1.add(k)), f * R::load(p_d2.add(k)), w];
+            R::rows(columns, p_rows.add(4 * k));
             k += R::LANES;
         }
     }
@@ -447,37 +506,42 @@ impl<I: Isa, R: Reals, const TALLY: bool> ShapeVisitor for Near<'_, I, R, TALLY>
             let Near { pass, block, .. } = self;
             let inverse_range = R::splat(pass.force_inverse_range);
             let (range, factor) = (R::splat(pass.force_range), R::splat(pass.force));
+            let (p_r, p_inverse, p_j) = (block.r.as_ptr(), block.inverse.as_ptr(), block.j.as_ptr());
+            let p_d = [block.d[0].as_ptr(), block.d[1].as_ptr(), block.d[2].as_ptr()];
+            let near = [block.near[0].as_mut_ptr(), block.near[1].as_mut_ptr(), block.near[2].as_mut_ptr()];
+            let near_d =
+                [block.near_d[0].as_mut_ptr(), block.near_d[1].as_mut_ptr(), block.near_d[2].as_mut_ptr()];
+            let near_j = block.near_j.as_mut_ptr();
+            let bits = block.bits.as_mut_ptr();
+            let count = block.count;
             let mut found = 0;
             let mut k = 0;
-            // Words of as many bits as vectors have lanes, packed.
-            let mut word = 0u64;
-            while k < block.count {
-                let r = R::load(block.r.as_ptr().add(k));
-                let mut mask = r.mask_below(range);
-                let left = block.count - k;
-                if left < R::LANES {
-                    mask &= (1u32 << left) - 1;
-                }
-                let g = factor * S::slope(r * inverse_range) * R::load(block.inverse.as_ptr().add(k));
+            while k < count {
+                let r = R::load(p_r.add(k));
+                // Lanes behind the last pair are far away.
+                let mask = r.mask_below(range);
+                let g = factor * S::slope(r * inverse_range) * R::load(p_inverse.add(k));
                 let mut c = 0;
                 while c < 3 {
-                    let d = R::load(block.d[c].as_ptr().add(k));
-                    (g * d).compress(mask, block.near[c].as_mut_ptr().add(found));
+                    let d = R::load(p_d[c].add(k));
+                    (g * d).compress(mask, near[c].add(found));
                     if TALLY {
-                        d.compress(mask, block.near_d[c].as_mut_ptr().add(found));
+                        d.compress(mask, near_d[c].add(found));
                     }
                     c += 1;
                 }
-                compress_indices::<I, R>(block.j.as_ptr().add(k), mask, block.near_j.as_mut_ptr().add(found));
+                compress_indices::<I, R>(p_j.add(k), mask, near_j.add(found));
                 found += mask.count_ones() as usize;
-                word |= (mask as u64) << (k % 64);
-                k += R::LANES;
-                if k % 64 == 0 || k >= block.count {
-                    *block.bits.get_unchecked_mut((k - 1) / 64) = word;
-                    word = 0;
+                match R::LANES {
+                    16 => *bits.cast::<u16>().add(k / 16) = mask as u16,
+                    8 => *bits.cast::<u8>().add(k / 8) = mask as u8,
+                    _ => {
+                        let half = bits.cast::<u8>().add(k / 8);
+                        *half = if k % 8 == 0 { mask as u8 } else { *half | (mask << 4) as u8 };
+                    }
                 }
+                k += R::LANES;
             }
-            *block.bits.get_unchecked_mut(block.count.div_ceil(64)) = 0;
             found
         }
     }
@@ -491,19 +555,29 @@ unsafe fn compress_indices<I: Isa, R: Reals>(from: *const u32, mask: u32, to: *m
 }
 
 /// How many of the pairs `from..to` are set in `bits`.
+///
+/// # Safety
+/// `bits` has them all, and a word behind.
 #[inline(always)]
-pub fn count_bits(bits: &[u64], from: usize, to: usize) -> u32 {
-    let mut count = 0;
-    let mut at = from;
-    while at < to {
-        let (word, shift) = (at / 64, at % 64);
-        let end = to.min((word + 1) * 64);
-        let width = end - at;
-        let mask = if width == 64 { u64::MAX } else { (1u64 << width) - 1 };
-        count += (bits[word] >> shift & mask).count_ones();
-        at = end;
+pub unsafe fn count_bits(bits: *const u64, from: usize, to: usize) -> u32 {
+    // SAFETY: the caller's.
+    unsafe {
+        let (word, shift) = (from / 64, from % 64);
+        let length = to - from;
+        // Two words hold sixty-four pairs, wherever they begin.
+        let here = *bits.add(word) >> shift | *bits.add(word + 1) << 1 << (63 - shift);
+        if length <= 64 {
+            let mask = if length == 64 { u64::MAX } else { (1u64 << length) - 1 };
+            return (here & mask).count_ones();
+        }
+        let mut count = 0;
+        let mut p = from;
+        while p < to {
+            count += (*bits.add(p / 64) >> (p % 64) & 1) as u32;
+            p += 1;
+        }
+        count
     }
-    count
 }
 
 /// Adds a row to an accumulator.

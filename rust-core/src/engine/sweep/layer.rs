@@ -13,6 +13,7 @@ use super::simd::{Isa, Quad, Reals, Scalar};
 use super::terms::Terms;
 use crate::engine::noise::PairNoise;
 use crate::engine::tally::Tally;
+use crate::model::kernel::Real;
 
 /// Particles in the order of cells, and room for what pairs add to them. Behind the last particle come
 /// copies of the first layer, one period further, if layers are periodic: the next layer of the last.
@@ -28,6 +29,8 @@ pub struct Swept<'a, T, R> {
     pub species: &'a [u8],
     /// 1 for ghosts, 0 for others; empty if there are none.
     pub ghost: &'a [f32],
+    /// The first owned particle of each row, and one past the last; empty if there are no ghosts.
+    pub owned_of_row: &'a [[u32; 2]],
     pub particles: usize,
     pub terms: &'a Terms<T>,
     /// The many-body slopes, a number for each pass and species.
@@ -75,8 +78,10 @@ pub struct NearPairs<T> {
     pub rows: Vec<Vec<[T; 4]>>,
     /// `r_i − r_j`, if virials are wanted.
     pub distances: Vec<Vec<[T; 3]>>,
-    /// How many there are for each particle.
+    /// How many there are for each particle that has looked for any.
     pub counts: Vec<Vec<u32>>,
+    /// These particles, where they are not all of the layer.
+    pub members: Vec<u32>,
     /// `share` of each, if virials are wanted.
     pub shares: Vec<Vec<T>>,
 }
@@ -90,25 +95,83 @@ impl<T> NearPairs<T> {
         self.rows.iter_mut().for_each(Vec::clear);
         self.distances.iter_mut().for_each(Vec::clear);
         self.counts.iter_mut().for_each(Vec::clear);
+        self.members.clear();
         self.shares.iter_mut().for_each(Vec::clear);
     }
 }
 
 /// Pairs of a block: enough to fill vectors, few enough for the first-level cache.
-const ENOUGH: usize = 320;
+const ENOUGH: usize = 128;
 /// Particles of a block.
-const MEMBERS: usize = 96;
+const MEMBERS: usize = 64;
 
-/// A row that particles of another look for neighbours in.
-#[derive(Clone, Copy, Default)]
-struct Window {
-    /// The first bin of the row.
-    cell: usize,
+/// The rows around one: itself, the next of its layer, three of the next layer.
+struct Windows {
+    /// Where the first particles of the bins of each are.
+    row: [*const u32; 5],
+    /// 1 for rows that are there, 0 for others.
+    there: [f32; 5],
     /// Added to the number of a particle: copies of the first layer are behind the last.
-    behind: usize,
-    /// Taken from the position of the particle that looks.
-    shift: [f32; 3],
-    there: bool,
+    behind: [u32; 5],
+    /// Taken from the position of a particle that looks into each, in the period before, the same, and the
+    /// next: entry `w + 5 (wrap + 1)` of x, y and z.
+    shift: [[f32; 16]; 3],
+    /// Whether any shift of the same period is not zero.
+    crosses: bool,
+    /// The first owned particle of each, and one past the last.
+    owned: [[u32; 2]; 5],
+}
+
+impl Windows {
+    fn new(swept: &Swept<impl Scalar, impl Record>, layer: usize, row: usize) -> Windows {
+        let (frame, grid) = (swept.frame, swept.grid);
+        let own = &swept.start[(layer * grid.rows + row) * grid.bins..];
+        let mut windows = Windows {
+            row: [own.as_ptr(); 5],
+            there: [0.0; 5],
+            behind: [0; 5],
+            shift: [[0.0; 16]; 3],
+            crosses: false,
+            owned: [[0; 2]; 5],
+        };
+        let around = [(0, 0), (1, 0), (-1, 1), (0, 1), (1, 1)];
+        for (w, (across, up)) in around.into_iter().enumerate() {
+            let mut to = [row as i64 + across, layer as i64 + up];
+            let mut shift = [0.0; 3];
+            let mut there = true;
+            let mut behind = 0;
+            if to[0] < 0 || to[0] >= grid.rows as i64 {
+                // In two dimensions a layer is one row, and has none beside it.
+                there = frame.periodic[grid.row_axis] && frame.dimensions == 3;
+                let wrap = to[0].div_euclid(grid.rows as i64) as f64;
+                to[0] = to[0].rem_euclid(grid.rows as i64);
+                shift = frame.edge(grid.row_axis).map(|e| wrap * e);
+            }
+            if to[1] >= grid.layers as i64 {
+                there &= frame.periodic[grid.layer_axis];
+                to[1] = 0;
+                behind = swept.particles as u32;
+            }
+            if !there {
+                continue;
+            }
+            windows.there[w] = 1.0;
+            windows.behind[w] = behind;
+            windows.crosses |= shift != [0.0; 3];
+            let cell = (to[1] as usize * grid.rows + to[0] as usize) * grid.bins;
+            windows.row[w] = swept.start[cell..].as_ptr();
+            if let Some(owned) = swept.owned_of_row.get(cell / grid.bins) {
+                windows.owned[w] = *owned;
+            }
+            for (period, entry) in [(-1.0, w), (0.0, w + 5), (1.0, w + 10)] {
+                for c in 0..3 {
+                    let along = if c == 0 { period * frame.length[0] } else { 0.0 };
+                    windows.shift[c][entry] = (shift[c] + along) as f32;
+                }
+            }
+        }
+        windows
+    }
 }
 
 /// First pass: finds the pairs of `layer`, adds forces that need no density, and weights.
@@ -125,117 +188,38 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TA
     // SAFETY: the caller's.
     unsafe {
         let grid = swept.grid;
+        let lanes = I::F32::LANES;
         let mut tally = Tally::default();
         near.clear(swept.terms.passes.len());
-        let row_width = (swept.frame.height(grid.row_axis) / grid.rows as f64) as f32;
-        let layer_width = (swept.frame.height(grid.layer_axis) / grid.layers as f64) as f32;
-        let reach_squared = (grid.reach * grid.reach) as f32;
-        let tilted = swept.frame.is_tilted();
-        let per_bin = (grid.bins as f64 / swept.frame.length[0]) as f32;
-        let period = swept.frame.length[0] as f32;
-        let periodic = swept.frame.periodic[0];
-        let bins = grid.bins as i32;
-        let limit = I::F32::splat(reach_squared);
+        let view = View::new(swept.frame, grid, layer);
+        let limit = I::F32::splat(view.reach_squared);
         let ghosts = !swept.ghost.is_empty();
-        let layer_edge = (layer + 1) as f32 * layer_width;
+        let mut spans = Spans::default();
         block.clear();
         let mut row = 0;
         while row < grid.rows {
             let cell = (layer * grid.rows + row) * grid.bins;
-            let windows = windows(swept.frame, grid, layer, row, swept.particles);
-            let (low_edge, high_edge) = (row as f32 * row_width, (row + 1) as f32 * row_width);
+            let windows = Windows::new(swept, layer, row);
             let mut i = *swept.start.get_unchecked(cell) as usize;
             let end = *swept.start.get_unchecked(cell + grid.bins) as usize;
             while i < end {
-                let x = *swept.x[0].get_unchecked(i);
-                let y = *swept.x[1].get_unchecked(i);
-                let z = *swept.x[2].get_unchecked(i);
-                let (across, up) = if grid.row_axis == 1 { (y, z) } else { (z, y) };
-                block.members.push(i as u32);
-                block.begin.push(block.count as u32);
-                // Half the chord of the sphere of reach in each row, in bins.
-                let mut half = [(grid.window * grid.bins as f64) as f32; 5];
-                let mut bin = x * per_bin;
-                if tilted {
-                    bin = fraction_along(swept.frame, x, y, z) * grid.bins as f32;
+                let count = lanes.min(end - i);
+                let across = view.spans::<I>(swept, row, i, count, &windows.there, &mut spans);
+                if ghosts {
+                    cut_with_ghosts::<I, A::Scalar>(swept, &windows, &spans, i, count, block);
                 } else {
-                    let below = (across - low_edge).max(0.0);
-                    let above = (high_edge - across).max(0.0);
-                    let over = (layer_edge - up).max(0.0);
-                    let (below, above, over) = (below * below, above * above, over * over);
-                    let left = reach_squared - over;
-                    half[1] = (reach_squared - above).max(0.0).sqrt() * per_bin;
-                    half[2] = (left - below).max(0.0).sqrt() * per_bin;
-                    half[3] = left.max(0.0).sqrt() * per_bin;
-                    half[4] = (left - above).max(0.0).sqrt() * per_bin;
+                    cut::<I, A::Scalar>(swept, &view, &windows, &spans, across, i, count, block);
                 }
-                let mut w = 0;
-                while w < 5 {
-                    let window = windows.get_unchecked(w);
-                    if !window.there || *half.get_unchecked(w) <= 0.0 {
-                        w += 1;
-                        continue;
-                    }
-                    // Shifted so that truncation rounds down.
-                    let low: i32 = (bin - half.get_unchecked(w) + bins as f32).to_int_unchecked();
-                    let high: i32 = (bin + half.get_unchecked(w) + bins as f32).to_int_unchecked();
-                    let (mut low, mut high) = (low - bins, high - bins);
-                    if w == 0 {
-                        low = low.max(0);
-                    }
-                    let place = [x - window.shift[0], y - window.shift[1], z - window.shift[2]];
-                    if !periodic || (low >= 0 && high < bins) {
-                        low = low.max(0);
-                        high = high.min(bins - 1);
-                        if low <= high {
-                            let first = if w == 0 { Some(i + 1) } else { None };
-                            look::<I, A::Scalar>(
-                                swept.start,
-                                swept.x,
-                                swept.ghost,
-                                ghosts,
-                                window,
-                                low,
-                                high,
-                                first,
-                                place,
-                                limit,
-                                i,
-                                block,
-                            );
-                        }
-                    } else {
-                        // Parts of the window that lie in other periods.
-                        let mut wrap = -1;
-                        while wrap <= 1 {
-                            let (a, b) = ((low - wrap * bins).max(0), (high - wrap * bins).min(bins - 1));
-                            if a <= b {
-                                let first = if w == 0 && wrap == 0 { Some(i + 1) } else { None };
-                                let place = [place[0] - wrap as f32 * period, place[1], place[2]];
-                                look::<I, A::Scalar>(
-                                    swept.start,
-                                    swept.x,
-                                    swept.ghost,
-                                    ghosts,
-                                    window,
-                                    a,
-                                    b,
-                                    first,
-                                    place,
-                                    limit,
-                                    i,
-                                    block,
-                                );
-                            }
-                            wrap += 1;
-                        }
-                    }
-                    w += 1;
+                let shifted = windows.crosses || across != 0;
+                match (ghosts, shifted) {
+                    (false, false) => look::<I, A::Scalar, false, false>(swept, &windows.shift, limit, block),
+                    (false, true) => look::<I, A::Scalar, false, true>(swept, &windows.shift, limit, block),
+                    (true, _) => look::<I, A::Scalar, true, false>(swept, &windows.shift, limit, block),
                 }
                 if block.count >= ENOUGH || block.members.len() >= MEMBERS {
                     flush::<I, A, SEVERAL, TALLY>(swept, layer, block, near, &mut tally);
                 }
-                i += 1;
+                i += count;
             }
             row += 1;
         }
@@ -246,92 +230,411 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TA
     }
 }
 
-/// The rows around one: itself, the next of its layer, three of the next layer.
-fn windows(frame: &Frame, grid: &Grid, layer: usize, row: usize, particles: usize) -> [Window; 5] {
-    let mut windows = [Window::default(); 5];
-    let around = [(0, 0), (1, 0), (-1, 1), (0, 1), (1, 1)];
-    for (window, (across, up)) in windows.iter_mut().zip(around) {
-        let mut to = [row as i64 + across, layer as i64 + up];
-        let mut shift = [0.0; 3];
-        let mut behind = 0;
-        window.there = true;
-        if to[0] < 0 || to[0] >= grid.rows as i64 {
-            // In two dimensions a layer is one row, and has none beside it.
-            window.there = frame.periodic[grid.row_axis] && frame.dimensions == 3;
-            let wrap = to[0].div_euclid(grid.rows as i64);
-            to[0] = to[0].rem_euclid(grid.rows as i64);
-            let edge = frame.edge(grid.row_axis);
-            for c in 0..3 {
-                shift[c] = wrap as f64 * edge[c];
-            }
+/// The bins, from the first to one past the last, in which particles of a vector look for others, for each
+/// window.
+#[derive(Default)]
+struct Spans {
+    low: [[i32; 16]; 5],
+    end: [[i32; 16]; 5],
+    /// Before they were cut at the ends of the row, and one row on.
+    far_low: [[i32; 16]; 5],
+    far_end: [[i32; 16]; 5],
+}
+
+/// A layer, in the numbers that spans are made of.
+struct View {
+    reach_squared: f32,
+    row_width: f32,
+    layer_edge: f32,
+    /// Half the window of the row of the particle itself, in bins.
+    half: f32,
+    per_bin: f32,
+    periodic: bool,
+    tilted: bool,
+    bins: i32,
+}
+
+impl View {
+    #[inline(always)]
+    fn new(frame: &Frame, grid: &Grid, layer: usize) -> View {
+        let layer_width = frame.height(grid.layer_axis) / grid.layers as f64;
+        View {
+            reach_squared: (grid.reach * grid.reach) as f32,
+            row_width: (frame.height(grid.row_axis) / grid.rows as f64) as f32,
+            layer_edge: ((layer + 1) as f64 * layer_width) as f32,
+            half: (grid.window * grid.bins as f64) as f32,
+            per_bin: (grid.bins as f64 / frame.length[0]) as f32,
+            periodic: frame.periodic[0],
+            tilted: frame.is_tilted(),
+            bins: grid.bins as i32,
         }
-        if to[1] >= grid.layers as i64 {
-            window.there &= frame.periodic[grid.layer_axis];
-            to[1] = 0;
-            behind = particles;
-        }
-        window.cell = (to[1] as usize * grid.rows + to[0] as usize) * grid.bins;
-        window.behind = behind;
-        window.shift = shift.map(|s| s as f32);
     }
-    windows
+
+    /// The spans of the particles from `i` on, a vector of them; they end at the ends of the row, except for
+    /// particles of which bits are set in what is returned, whose spans go on in other periods.
+    #[inline(always)]
+    unsafe fn spans<I: Isa>(
+        &self,
+        swept: &Swept<impl Scalar, impl Record>,
+        row: usize,
+        i: usize,
+        count: usize,
+        there: &[f32; 5],
+        out: &mut Spans,
+    ) -> u32 {
+        // SAFETY: the contract of `simd`.
+        unsafe {
+            let x = I::F32::load(swept.x[0].as_ptr().add(i));
+            let y = I::F32::load(swept.x[1].as_ptr().add(i));
+            let z = I::F32::load(swept.x[2].as_ptr().add(i));
+            let zero = I::F32::constant(0.0);
+            let whole = I::F32::splat(self.half);
+            let mut half = [whole; 5];
+            let mut bin = x * I::F32::splat(self.per_bin);
+            if self.tilted {
+                bin = fraction_along::<I>(swept.frame, x, y, z) * I::F32::constant(self.bins as f64);
+            } else {
+                // Half the chord of the sphere of reach in each row.
+                let (across, up) = if swept.grid.row_axis == 1 { (y, z) } else { (z, y) };
+                let low_edge = I::F32::splat(row as f32 * self.row_width);
+                let high_edge = I::F32::splat((row + 1) as f32 * self.row_width);
+                let below = (across - low_edge).larger(zero);
+                let above = (high_edge - across).larger(zero);
+                let over = (I::F32::splat(self.layer_edge) - up).larger(zero);
+                let (below, above) = (below * below, above * above);
+                let all = I::F32::splat(self.reach_squared);
+                let left = all - over * over;
+                let per_bin = I::F32::splat(self.per_bin);
+                half[1] = (all - above).larger(zero).root() * per_bin;
+                half[2] = (left - below).larger(zero).root() * per_bin;
+                half[3] = left.larger(zero).root() * per_bin;
+                half[4] = (left - above).larger(zero).root() * per_bin;
+            }
+            let most = I::F32::constant(self.bins as f64);
+            let one = I::F32::constant(1.0);
+            let mut across = 0;
+            if self.periodic {
+                // The longest span is that of the particle's own row.
+                across = (bin - half[0]).mask_below(zero) | (most - one).mask_below(bin + half[0]);
+                across &= (1u32 << count) - 1;
+            }
+            let mut w = 0;
+            while w < 5 {
+                let h = *half.get_unchecked(w) * I::F32::splat(*there.get_unchecked(w));
+                let (low, end) = (out.low.get_unchecked_mut(w), out.end.get_unchecked_mut(w));
+                if across != 0 {
+                    // One row on, so that truncation rounds down.
+                    (bin + most - h).store_whole(out.far_low.get_unchecked_mut(w).as_mut_ptr());
+                    (bin + most + h + one).store_whole(out.far_end.get_unchecked_mut(w).as_mut_ptr());
+                }
+                (bin - h).larger(zero).smaller(most).store_whole(low.as_mut_ptr());
+                // Rows out of reach, or not there, get a span without length.
+                (bin + h + one).smaller(most).where_below(zero, h).store_whole(end.as_mut_ptr());
+                w += 1;
+            }
+            across
+        }
+    }
 }
 
-/// Fractional coordinate along the first edge.
+/// Fractional coordinates along the first edge.
 #[inline(always)]
-fn fraction_along(frame: &Frame, x: f32, y: f32, z: f32) -> f32 {
-    let (x, y, z) = (x as f64, y as f64, z as f64);
-    let sz = if frame.dimensions == 3 { z / frame.length[2] } else { 0.0 };
-    let sy = (y - frame.tilt[2] * sz) / frame.length[1];
-    ((x - frame.tilt[0] * sy - frame.tilt[1] * sz) / frame.length[0]) as f32
+unsafe fn fraction_along<I: Isa>(frame: &Frame, x: I::F32, y: I::F32, z: I::F32) -> I::F32 {
+    let sz = if frame.dimensions == 3 {
+        z * I::F32::constant(1.0 / frame.length[2])
+    } else {
+        I::F32::constant(0.0)
+    };
+    let sy = (y - I::F32::constant(frame.tilt[2]) * sz) * I::F32::constant(1.0 / frame.length[1]);
+    let along = x - I::F32::constant(frame.tilt[0]) * sy - I::F32::constant(frame.tilt[1]) * sz;
+    along * I::F32::constant(1.0 / frame.length[0])
 }
 
-/// Appends the particles of the bins `low..=high` of a row that are within reach of `place`.
+/// A vector's worth of particles that one particle is to be compared with: from the first to one past the last
+/// of them, of which those beyond a vector are in the next chunk.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(C)]
+pub struct Chunk {
+    from: u32,
+    to: u32,
+    /// The particle's number in the block, and the shift it sees them with.
+    member: u32,
+    shift: u32,
+}
+
+/// Cuts the spans of `count` particles from `i` on into chunks.
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]
-unsafe fn look<I: Isa, T: Scalar>(
-    start: &[u32],
-    x: [&[f32]; 3],
-    ghost: &[f32],
-    ghosts: bool,
-    window: &Window,
-    low: i32,
-    high: i32,
-    first: Option<usize>,
-    place: [f32; 3],
-    limit: I::F32,
+unsafe fn cut<I: Isa, T: Scalar>(
+    swept: &Swept<T, impl Record>,
+    view: &View,
+    windows: &Windows,
+    spans: &Spans,
+    across: u32,
     i: usize,
+    count: usize,
+    block: &mut Block<T>,
+) {
+    // SAFETY: the arrays are as `Swept` says, chunks have room.
+    unsafe {
+        let lanes = I::F32::LANES;
+        let mut found = 0;
+        let first_member = block.members.len();
+        let mut k = 0;
+        while k < count {
+            block.members.push((i + k) as u32);
+            k += 1;
+        }
+        let mut c = 0;
+        while c < 3 {
+            let from = swept.x[c].as_ptr().add(i);
+            I::F32::load(from).store(block.place[c].as_mut_ptr().add(first_member));
+            c += 1;
+        }
+        let rows = windows.row;
+        let behind = windows.behind;
+        let mut chunks = block.chunks.as_mut_ptr();
+        let mut k = 0;
+        while k < count {
+            let i = i + k;
+            let member = first_member + k;
+            if across >> k & 1 == 1 {
+                found = cut_across(view, windows, spans, k, i, member, lanes, block, found);
+                chunks = block.chunks.as_mut_ptr();
+                k += 1;
+                continue;
+            }
+            let mut w = 0;
+            while w < 5 {
+                let low = *spans.low.get_unchecked(w).get_unchecked(k) as usize;
+                let end = *spans.end.get_unchecked(w).get_unchecked(k) as usize;
+                let to = *rows[w].add(end) + behind[w];
+                let from = if w == 0 { i as u32 + 1 } else { *rows[w].add(low) + behind[w] };
+                let to = to.max(from);
+                let length = to - from;
+                if length > 2 * lanes as u32 {
+                    found = add_many_chunks(block, found, from, length, member, w + 5, lanes as u32);
+                    chunks = block.chunks.as_mut_ptr();
+                } else {
+                    // Both are written, and counted as needed: there is no branch to foresee.
+                    let chunk = Chunk { from, to, member: member as u32, shift: w as u32 + 5 };
+                    *chunks.add(found) = chunk;
+                    *chunks.add(found + 1) = Chunk { from: from + lanes as u32, ..chunk };
+                    found += (w == 0 || length > 0) as usize + (length > lanes as u32) as usize;
+                }
+                w += 1;
+            }
+            k += 1;
+        }
+        block.chunk_count = found;
+    }
+}
+
+/// The same in open space with ghosts: these look for owned particles only, and are no members of the block
+/// if there are none.
+#[inline(always)]
+unsafe fn cut_with_ghosts<I: Isa, T: Scalar>(
+    swept: &Swept<T, impl Record>,
+    windows: &Windows,
+    spans: &Spans,
+    i: usize,
+    count: usize,
+    block: &mut Block<T>,
+) {
+    // SAFETY: the arrays are as `Swept` says, chunks have room.
+    unsafe {
+        let lanes = I::F32::LANES;
+        let mut found = 0;
+        let mut k = 0;
+        while k < count {
+            let i = i + k;
+            let member = block.members.len();
+            let is_ghost = *swept.ghost.get_unchecked(i) > 0.0;
+            let before = found;
+            let mut w = 0;
+            while w < 5 {
+                let low = *spans.low.get_unchecked(w).get_unchecked(k) as usize;
+                let end = *spans.end.get_unchecked(w).get_unchecked(k) as usize;
+                let mut to = *windows.row[w].add(end);
+                let mut from = if w == 0 { i as u32 + 1 } else { *windows.row[w].add(low) };
+                if is_ghost {
+                    let [first, last] = windows.owned[w];
+                    from = from.max(first);
+                    to = to.min(last);
+                }
+                let always = w == 0 && !is_ghost;
+                found = add_chunks(block, found, from, to.saturating_sub(from), member, w + 5, always, lanes);
+                w += 1;
+            }
+            if found > before || !is_ghost {
+                block.members.push(i as u32);
+                let mut c = 0;
+                while c < 3 {
+                    *block.place[c].get_unchecked_mut(member) = *swept.x[c].get_unchecked(i);
+                    c += 1;
+                }
+            }
+            k += 1;
+        }
+        block.chunk_count = found;
+    }
+}
+
+/// The same for a particle whose spans go on in other periods.
+#[inline(never)]
+#[allow(clippy::too_many_arguments)]
+unsafe fn cut_across<T: Scalar>(
+    view: &View,
+    windows: &Windows,
+    spans: &Spans,
+    k: usize,
+    i: usize,
+    member: usize,
+    lanes: usize,
+    block: &mut Block<T>,
+    mut found: usize,
+) -> usize {
+    // SAFETY: bins are of the row; chunks have room.
+    unsafe {
+        let bins = view.bins;
+        let mut w = 0;
+        while w < 5 {
+            let own = w == 0;
+            let mut low = *spans.far_low.get_unchecked(w).get_unchecked(k) - bins;
+            let end = *spans.far_end.get_unchecked(w).get_unchecked(k) - bins;
+            let row = *windows.row.get_unchecked(w);
+            let behind = *windows.behind.get_unchecked(w);
+            if own {
+                low = 0;
+            } else if *windows.there.get_unchecked(w) == 0.0 {
+                w += 1;
+                continue;
+            }
+            if low < 0 {
+                let (from, to) = (*row.add((low + bins) as usize) + behind, *row.add(bins as usize) + behind);
+                found = add_chunks(block, found, from, to - from, member, w, false, lanes);
+                low = 0;
+            }
+            let to = *row.add(end.min(bins) as usize) + behind;
+            let from = if own { i as u32 + 1 } else { *row.add(low as usize) + behind };
+            found = add_chunks(block, found, from, to.saturating_sub(from), member, w + 5, own, lanes);
+            if end > bins {
+                let (from, to) = (*row + behind, *row.add((end - bins) as usize) + behind);
+                found = add_chunks(block, found, from, to - from, member, w + 10, false, lanes);
+            }
+            w += 1;
+        }
+    }
+    found
+}
+
+/// Appends the chunks of the `length` particles from `from` on, at least one if `always`; returns how many
+/// chunks there are then.
+#[inline(always)]
+#[allow(clippy::too_many_arguments)]
+unsafe fn add_chunks<T: Scalar>(
+    block: &mut Block<T>,
+    found: usize,
+    from: u32,
+    length: u32,
+    member: usize,
+    shift: usize,
+    always: bool,
+    lanes: usize,
+) -> usize {
+    // SAFETY: chunks have room for two more; more make room.
+    unsafe {
+        let lanes = lanes as u32;
+        if length > 2 * lanes {
+            return add_many_chunks(block, found, from, length, member, shift, lanes);
+        }
+        // Both are written, and counted as needed: there is no branch to foresee.
+        let chunk = Chunk { from, to: from + length, member: member as u32, shift: shift as u32 };
+        let out = block.chunks.as_mut_ptr().add(found);
+        *out = chunk;
+        *out.add(1) = Chunk { from: from + lanes, ..chunk };
+        found + (always || length > 0) as usize + (length > lanes) as usize
+    }
+}
+
+#[cold]
+#[inline(never)]
+fn add_many_chunks<T: Scalar>(
+    block: &mut Block<T>,
+    found: usize,
+    from: u32,
+    length: u32,
+    member: usize,
+    shift: usize,
+    lanes: u32,
+) -> usize {
+    let pieces = length.div_ceil(lanes);
+    let end = from + length;
+    block.reserve_chunks(found + pieces as usize);
+    for p in 0..pieces {
+        let from = from + p * lanes;
+        let to = end.min(from + lanes);
+        block.chunks[found + p as usize] = Chunk { from, to, member: member as u32, shift: shift as u32 };
+    }
+    found + pieces as usize
+}
+
+/// Compares particles with their chunks, and appends the pairs within reach.
+#[inline(always)]
+unsafe fn look<I: Isa, T: Scalar, const GHOSTS: bool, const SHIFTS: bool>(
+    swept: &Swept<T, impl Record>,
+    shifts: &[[f32; 16]; 3],
+    limit: I::F32,
     block: &mut Block<T>,
 ) {
     // SAFETY: the contract of `simd`; arrays have a vector's room behind their last particle.
     unsafe {
-        let mut from = *start.get_unchecked(window.cell + low as usize) as usize + window.behind;
-        let to = *start.get_unchecked(window.cell + high as usize + 1) as usize + window.behind;
-        if let Some(first) = first {
-            from = first;
-        }
-        if from >= to {
-            return;
-        }
-        block.reserve(block.count + (to - from));
-        let (px, py, pz) = (I::F32::splat(place[0]), I::F32::splat(place[1]), I::F32::splat(place[2]));
-        let number = <I::U32 as super::simd::Words>::splat(i as u32);
-        let far = if ghosts { I::F32::splat(*ghost.get_unchecked(i) * 1e15) } else { px };
-        let (out_i, out_j) = (block.i.as_mut_ptr(), block.j.as_mut_ptr());
-        let mut count = block.count;
-        let mut j = from;
-        while j < to {
-            let dx = px - I::F32::load(x[0].as_ptr().add(j));
-            let dy = py - I::F32::load(x[1].as_ptr().add(j));
-            let dz = pz - I::F32::load(x[2].as_ptr().add(j));
-            let mut r2 = dx.mul_add(dx, dy.mul_add(dy, dz * dz));
-            if ghosts {
-                // Two ghosts are no concern of this rank.
-                r2 = far.mul_add(I::F32::load(ghost.as_ptr().add(j)), r2);
+        let lanes = I::F32::LANES;
+        block.reserve(block.count + lanes * block.chunk_count);
+        block.begin.resize(block.members.len() + 1, 0);
+        let out = block.j.as_mut_ptr();
+        let begin = block.begin.as_mut_ptr();
+        let place = [block.place[0].as_ptr(), block.place[1].as_ptr(), block.place[2].as_ptr()];
+        let x = [swept.x[0].as_ptr(), swept.x[1].as_ptr(), swept.x[2].as_ptr()];
+        let chunks = block.chunks.as_ptr();
+        // Masks first, then what they select: the two in one loop wait for each other.
+        let masks = block.masks.as_mut_ptr();
+        let many = block.chunk_count;
+        let mut c = 0;
+        while c < many {
+            let chunk = chunks.add(c);
+            let j = (*chunk).from as usize;
+            let member = (*chunk).member as usize;
+            let mut p = [*place[0].add(member), *place[1].add(member), *place[2].add(member)];
+            if SHIFTS {
+                let shift = (*chunk).shift as usize;
+                p[0] -= *shifts[0].get_unchecked(shift);
+                p[1] -= *shifts[1].get_unchecked(shift);
+                p[2] -= *shifts[2].get_unchecked(shift);
             }
-            super::simd::Words::store(number, out_i.add(count));
-            count += I::collect_below(r2, limit, j as u32, to - j, out_j.add(count));
-            j += I::F32::LANES;
+            let dx = I::F32::splat(p[0]) - I::F32::load(x[0].add(j));
+            let dy = I::F32::splat(p[1]) - I::F32::load(x[1].add(j));
+            let dz = I::F32::splat(p[2]) - I::F32::load(x[2].add(j));
+            let mut r2 = dx.mul_add(dx, dy.mul_add(dy, dz * dz));
+            if GHOSTS {
+                // Two ghosts are no concern of this rank.
+                let i = *block.members.get_unchecked(member) as usize;
+                let far = I::F32::splat(*swept.ghost.get_unchecked(i) * 1e15);
+                r2 = far.mul_add(I::F32::load(swept.ghost.as_ptr().add(j)), r2);
+            }
+            let left = ((*chunk).to - (*chunk).from).min(lanes as u32);
+            *masks.add(c) = r2.mask_below(limit) & ((1u32 << left) - 1);
+            c += 1;
+        }
+        let mut count = block.count;
+        let mut c = 0;
+        while c < many {
+            let (chunk, mask) = (chunks.add(c), *masks.add(c));
+            I::collect((*chunk).from, mask, out.add(count));
+            count += mask.count_ones() as usize;
+            // Every member has a chunk; its last one leaves where the next begins.
+            *begin.add((*chunk).member as usize + 1) = count as u32;
+            c += 1;
         }
         block.count = count;
     }
@@ -350,16 +653,25 @@ unsafe fn flush<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY: bool
     unsafe {
         let count = block.count;
         block.reserve(count);
-        block.begin.push(count as u32);
-        // Lanes behind the last pair: some particle with itself.
-        let mut k = count;
-        while k < count + 16 {
-            *block.i.get_unchecked_mut(k) = 0;
-            *block.j.get_unchecked_mut(k) = 0;
+        // Lanes behind the last pair: some particle, and far away.
+        let j = block.j.as_mut_ptr().add(count);
+        let mut k = 0;
+        while k < 16 {
+            *j.add(k) = 0;
             k += 1;
         }
         let moving = swept.thermostat.is_some();
+        A::spread(swept.records.as_ptr(), block, moving);
         A::separate(swept.frame, swept.records.as_ptr(), block, count, moving);
+        let r = block.r.as_mut_ptr().add(count);
+        let mut k = 0;
+        while k < 16 {
+            *r.add(k) = A::Scalar::of(1e30);
+            k += 1;
+        }
+        if SEVERAL || TALLY || swept.variables > 1 {
+            block.spread_members();
+        }
         if SEVERAL {
             let species = swept.terms.species as u32;
             let mut k = 0;
@@ -395,6 +707,9 @@ unsafe fn flush<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY: bool
         if swept.variables > 1 {
             scatter_weights::<A::Scalar>(swept, offset, block);
         }
+        if !swept.ghost.is_empty() {
+            near.members.extend_from_slice(&block.members);
+        }
         let mut pass = 0;
         while pass < swept.terms.passes.len() {
             keep_near::<I, A, TALLY>(swept, pass, block, near);
@@ -426,20 +741,21 @@ unsafe fn scatter<I: Isa, A: Arithmetic<I>>(sums: Shared<f64>, offset: isize, bl
         const SIGN: [f64; 4] = [1.0, 1.0, 1.0, -1.0];
         let sign = I::Quad::load(SIGN.as_ptr());
         let base = sums.0.offset(4 * offset);
+        let (begin, members) = (block.begin.as_ptr(), block.members.as_ptr());
+        let (rows, j) = (block.rows.as_ptr(), block.j.as_ptr());
+        let mut p = 0;
         let mut m = 0;
         while m < block.members.len() {
-            let from = *block.begin.get_unchecked(m) as usize;
-            let to = *block.begin.get_unchecked(m + 1) as usize;
+            let to = *begin.add(m + 1) as usize;
             let mut sum = I::Quad::zero();
-            let mut p = from;
             while p < to {
-                let row = A::load_quad(block.rows.as_ptr().add(4 * p));
-                let at = base.add(4 * *block.j.get_unchecked(p) as usize);
+                let row = A::load_quad(rows.add(4 * p));
+                let at = base.add(4 * *j.add(p) as usize);
                 sum = sum.add(row);
                 I::Quad::load(at).sub(row).store(at);
                 p += 1;
             }
-            add_to(base.add(4 * *block.members.get_unchecked(m) as usize), sum.mul(sign));
+            add_to(base.add(4 * *members.add(m) as usize), sum.mul(sign));
             m += 1;
         }
     }
@@ -491,32 +807,38 @@ unsafe fn keep_near<I: Isa, A: Arithmetic<I>, const TALLY: bool>(
             return;
         }
         let found = collect_near::<I, A::Reals, TALLY>(&swept.terms.passes[pass], block);
-        let mut k = 0;
-        while k < found {
-            *block.near_code.get_unchecked_mut(k) = A::encode(*block.near_j.get_unchecked(k));
-            k += 1;
-        }
+        A::encode_all(block.near_j.as_ptr(), block.near_code.as_mut_ptr(), found);
         let rows = &mut near.rows[pass];
         rows.reserve(found + 16);
         let out = rows.as_mut_ptr().add(rows.len()).cast::<A::Scalar>();
+        let near_at = [block.near[0].as_ptr(), block.near[1].as_ptr(), block.near[2].as_ptr()];
+        let code = block.near_code.as_ptr();
         let mut k = 0;
         while k < found {
             let columns = [
-                A::Reals::load(block.near[0].as_ptr().add(k)),
-                A::Reals::load(block.near[1].as_ptr().add(k)),
-                A::Reals::load(block.near[2].as_ptr().add(k)),
-                A::Reals::load(block.near_code.as_ptr().add(k)),
+                A::Reals::load(near_at[0].add(k)),
+                A::Reals::load(near_at[1].add(k)),
+                A::Reals::load(near_at[2].add(k)),
+                A::Reals::load(code.add(k)),
             ];
             A::Reals::rows(columns, out.add(4 * k));
             k += A::Reals::LANES;
         }
         rows.set_len(rows.len() + found);
         let counts = &mut near.counts[pass];
+        let members = block.members.len();
+        counts.reserve(members);
+        let out = counts.as_mut_ptr().add(counts.len());
+        let (begin, bits) = (block.begin.as_ptr(), block.bits.as_ptr());
+        let mut from = 0;
         let mut m = 0;
-        while m < block.members.len() {
-            counts.push(count_bits(&block.bits, block.begin[m] as usize, block.begin[m + 1] as usize));
+        while m < members {
+            let to = *begin.add(m + 1) as usize;
+            *out.add(m) = count_bits(bits, from, to);
+            from = to;
             m += 1;
         }
+        counts.set_len(counts.len() + members);
         if TALLY {
             for k in 0..found {
                 near.distances[pass].push([block.near_d[0][k], block.near_d[1][k], block.near_d[2][k]]);
@@ -554,10 +876,11 @@ pub unsafe fn second_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const T
             let rows = near.rows.get_unchecked(pass);
             let counts = near.counts.get_unchecked(pass);
             let slopes = swept.slopes.as_ptr().add(pass * species);
+            let some = !swept.ghost.is_empty();
             let mut p = 0;
             let mut m = 0;
             while m < counts.len() {
-                let i = first + m;
+                let i = if some { *near.members.get_unchecked(m) as usize } else { first + m };
                 let end = p + *counts.get_unchecked(m) as usize;
                 let mut sum = I::Quad::zero();
                 let own = slopes.add(width * i);

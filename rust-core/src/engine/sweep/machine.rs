@@ -28,6 +28,8 @@ pub struct Machine<P: Compiled> {
     frame: Frame,
     grid: Grid,
     cell: Vec<u32>,
+    /// Fractions of the frame of the host's particles, in units of 2⁻³².
+    unit: Vec<[u32; 3]>,
     /// Particles of each bin: by thread while counting, then where each thread's begin.
     counts: Vec<u32>,
     start: Vec<u32>,
@@ -37,6 +39,7 @@ pub struct Machine<P: Compiled> {
     records: Vec<P::Record>,
     species: Vec<u8>,
     ghost: Vec<f32>,
+    owned_of_row: Vec<[u32; 2]>,
     offset: Vec<isize>,
     sums: Vec<f64>,
     densities: Vec<f64>,
@@ -94,6 +97,7 @@ impl<P: Compiled> Machine<P> {
             frame,
             grid: Grid { bins: 1, rows: 1, layers: 1, row_axis: 1, layer_axis: 2, reach: 1.0, window: 1.0 },
             cell: Vec::new(),
+            unit: Vec::new(),
             counts: Vec::new(),
             start: Vec::new(),
             order: Vec::new(),
@@ -101,6 +105,7 @@ impl<P: Compiled> Machine<P> {
             records: Vec::new(),
             species: Vec::new(),
             ghost: Vec::new(),
+            owned_of_row: Vec::new(),
             offset: Vec::new(),
             sums: Vec::new(),
             densities: Vec::new(),
@@ -137,7 +142,7 @@ impl<P: Compiled> Machine<P> {
                 let x = &given.particles.x[k];
                 let sum = x[0].abs() + x[1].abs() + x[2].abs();
                 if sum.is_nan() || sum > 1e100 {
-                    if species_of(given, k).is_ok_and(|s| s < 0) {
+                    if species_of(given, k).is_some_and(|s| s < 0) {
                         continue;
                     }
                     scratch.fault = Some(EngineError::Position { tag: given.particles.tag[k] });
@@ -178,6 +183,7 @@ impl<P: Compiled> Machine<P> {
         (self.all, self.owned) = (all, given.particles.owned);
         (self.thermostat, self.totals) = (given.thermostat, given.totals);
         self.cell.resize(all, 0);
+        self.unit.resize(all, [0; 3]);
         self.counts.resize(threads * cells, 0);
         self.count(pool, given)?;
         self.add_up(threads);
@@ -191,8 +197,9 @@ impl<P: Compiled> Machine<P> {
         let (threads, cells) = (pool.threads(), self.grid.cells());
         let (frame, grid) = (&self.frame, &self.grid);
         let inverse = frame.length.map(|l| 1.0 / l);
-        let (cell, counts, scratch) = (
+        let (cell, unit, counts, scratch) = (
             Shared(self.cell.as_mut_ptr()),
+            Shared(self.unit.as_mut_ptr()),
             Shared(self.counts.as_mut_ptr()),
             Shared(self.scratch.as_mut_ptr()),
         );
@@ -203,31 +210,24 @@ impl<P: Compiled> Machine<P> {
             scratch.fault = None;
             counts.fill(0);
             for k in part(given.particles.x.len(), t, threads) {
-                let tag = given.particles.tag[k];
-                let to = match species_of(given, k) {
-                    Ok(species) if species < 0 => NOWHERE,
-                    Ok(_) if tag < 1 => {
-                        scratch.fault = Some(EngineError::Tag { tag });
-                        return;
-                    }
-                    Ok(_) => match units(frame, &inverse, &given.particles.x[k]) {
-                        Some(u) => {
-                            let cell = grid.cell(u);
-                            counts[cell] += 1;
-                            cell as u32
-                        }
-                        None => {
-                            scratch.fault = Some(EngineError::Position { tag });
-                            return;
-                        }
-                    },
-                    Err(fault) => {
-                        scratch.fault = Some(fault);
-                        return;
-                    }
+                let species = species_of(given, k);
+                if species.is_some_and(|s| s < 0) {
+                    // SAFETY: of this thread's part.
+                    unsafe { *cell.at(k) = NOWHERE };
+                    continue;
+                }
+                let u = units(frame, &inverse, &given.particles.x[k]);
+                let (Some(_), Some(u), true) = (species, u, given.particles.tag[k] > 0) else {
+                    scratch.fault = Some(fault_of(given, k));
+                    return;
                 };
-                // SAFETY: of this thread's part.
-                unsafe { *cell.at(k) = to };
+                let to = grid.cell(u);
+                // SAFETY: cells are of the grid; the rest is of this thread's part.
+                unsafe {
+                    *counts.get_unchecked_mut(to) += 1;
+                    *cell.at(k) = to as u32;
+                    *unit.at(k) = u;
+                }
             }
         });
         self.first_fault()
@@ -278,7 +278,10 @@ impl<P: Compiled> Machine<P> {
         self.species.resize(if several { total.max(1) } else { 0 }, 0);
         self.ghost.resize(if with_ghosts { total + SLACK } else { 0 }, 0.0);
         let frame = &self.frame;
-        let inverse = frame.length.map(|l| 1.0 / l);
+        let tilted = frame.is_tilted();
+        let flat = if frame.dimensions == 3 { 1.0 } else { 0.0 };
+        let scale =
+            [frame.length[0] / TWO_TO_32, frame.length[1] / TWO_TO_32, flat * frame.length[2] / TWO_TO_32];
         let (order, records, species, ghost) = (
             Shared(self.order.as_mut_ptr()),
             Shared(self.records.as_mut_ptr()),
@@ -287,7 +290,7 @@ impl<P: Compiled> Machine<P> {
         );
         let x =
             [Shared(self.x[0].as_mut_ptr()), Shared(self.x[1].as_mut_ptr()), Shared(self.x[2].as_mut_ptr())];
-        let (cell, counts) = (&self.cell, Shared(self.counts.as_mut_ptr()));
+        let (cell, unit, counts) = (&self.cell, &self.unit, Shared(self.counts.as_mut_ptr()));
         let moving = given.thermostat.is_some();
         pool.run(&|t| {
             // SAFETY: counts are this thread's own; every particle has a place of its own.
@@ -302,12 +305,15 @@ impl<P: Compiled> Machine<P> {
                     let s = *place as usize;
                     *place += 1;
                     let position = given.particles.x.get_unchecked(k);
-                    let u = units(frame, &inverse, position).unwrap_or_default();
-                    let point = frame.point(&u.map(|u| u as f64 / TWO_TO_32));
+                    let u = *unit.get_unchecked(k);
+                    let mut point = [u[0] as f64 * scale[0], u[1] as f64 * scale[1], u[2] as f64 * scale[2]];
+                    if tilted {
+                        point = frame.point(&u.map(|u| u as f64 / TWO_TO_32));
+                    }
                     for c in 0..3 {
                         *x[c].at(s) = point[c] as f32;
                     }
-                    let kind = species_of(given, k).unwrap_or(0) as u32;
+                    let kind = if several { species_of(given, k).unwrap_or(0) as u32 } else { 0 };
                     let v = if moving { *given.v.get_unchecked(k) } else { [0.0; 3] };
                     *records.at(s) = P::Record::new(u, position, &v, given.particles.tag[k] as u32, kind);
                     *order.at(s) = k as u32;
@@ -320,7 +326,29 @@ impl<P: Compiled> Machine<P> {
                 }
             }
         });
+        self.find_owned();
         self.lay_out();
+    }
+
+    /// The owned particles of each row, if there are ghosts.
+    fn find_owned(&mut self) {
+        self.owned_of_row.clear();
+        if self.ghost.is_empty() {
+            return;
+        }
+        let bins = self.grid.bins;
+        for row in 0..self.grid.rows * self.grid.layers {
+            let (first, end) = (self.start[row * bins] as usize, self.start[(row + 1) * bins] as usize);
+            let ghosts = &self.ghost[first..end];
+            let owned = match ghosts.iter().position(|g| *g == 0.0) {
+                Some(a) => {
+                    let b = ghosts.iter().rposition(|g| *g == 0.0).unwrap_or(a);
+                    [(first + a) as u32, (first + b + 1) as u32]
+                }
+                None => [0, 0],
+            };
+            self.owned_of_row.push(owned);
+        }
     }
 
     /// Accumulators of a layer: of its own particles, then of those of the next.
@@ -379,6 +407,7 @@ impl<P: Compiled> Machine<P> {
             records: &self.records,
             species: &self.species,
             ghost: &self.ghost,
+            owned_of_row: &self.owned_of_row,
             particles: self.particles,
             terms: &self.terms,
             slopes: &self.slopes,
@@ -697,6 +726,7 @@ impl<P: Compiled> Machine<P> {
             })
             .sum();
         near + bytes(&self.cell)
+            + bytes(&self.unit)
             + bytes(&self.counts)
             + bytes(&self.start)
             + bytes(&self.order)
@@ -718,11 +748,19 @@ const NOWHERE: u32 = u32::MAX;
 const TWO_TO_32: f64 = 4_294_967_296.0;
 
 #[inline(always)]
-fn species_of(given: &Given, k: usize) -> Result<i32, EngineError> {
-    let kind = given.particles.kind[k];
-    match given.kinds.get(kind as usize) {
-        Some(species) => Ok(*species),
-        None => Err(EngineError::Kind { tag: given.particles.tag[k], kind }),
+fn species_of(given: &Given, k: usize) -> Option<i32> {
+    given.kinds.get(given.particles.kind[k] as usize).copied()
+}
+
+/// What is wrong with a particle that cannot be sorted.
+#[cold]
+#[inline(never)]
+fn fault_of(given: &Given, k: usize) -> EngineError {
+    let (tag, kind) = (given.particles.tag[k], given.particles.kind[k]);
+    match species_of(given, k) {
+        None => EngineError::Kind { tag, kind },
+        Some(_) if tag < 1 => EngineError::Tag { tag },
+        Some(_) => EngineError::Position { tag },
     }
 }
 

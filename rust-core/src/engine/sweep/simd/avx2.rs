@@ -94,6 +94,18 @@ impl Reals for F32x8 {
         }
     }
     #[inline(always)]
+    unsafe fn root(self) -> Self {
+        unsafe { F32x8(_mm256_sqrt_ps(self.0)) }
+    }
+    #[inline(always)]
+    unsafe fn smaller(self, other: Self) -> Self {
+        unsafe { F32x8(_mm256_min_ps(self.0, other.0)) }
+    }
+    #[inline(always)]
+    unsafe fn store_whole(self, p: *mut i32) {
+        unsafe { _mm256_storeu_si256(p.cast(), _mm256_cvttps_epi32(self.0)) }
+    }
+    #[inline(always)]
     unsafe fn round(self) -> Self {
         unsafe { F32x8(_mm256_round_ps::<{ _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }>(self.0)) }
     }
@@ -216,6 +228,18 @@ impl Reals for F64x4 {
         unsafe { F64x4(_mm256_div_pd(_mm256_set1_pd(1.0), _mm256_sqrt_pd(self.0))) }
     }
     #[inline(always)]
+    unsafe fn root(self) -> Self {
+        unsafe { F64x4(_mm256_sqrt_pd(self.0)) }
+    }
+    #[inline(always)]
+    unsafe fn smaller(self, other: Self) -> Self {
+        unsafe { F64x4(_mm256_min_pd(self.0, other.0)) }
+    }
+    #[inline(always)]
+    unsafe fn store_whole(self, p: *mut i32) {
+        unsafe { _mm_storeu_si128(p.cast(), _mm256_cvttpd_epi32(self.0)) }
+    }
+    #[inline(always)]
     unsafe fn round(self) -> Self {
         unsafe { F64x4(_mm256_round_pd::<{ _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }>(self.0)) }
     }
@@ -329,12 +353,10 @@ impl Isa for Avx2 {
         [U32x8(a), U32x8(b), U32x8(c), U32x8(d)]
     }
     #[inline(always)]
-    unsafe fn collect_below(a: F32x8, b: F32x8, first: u32, remaining: usize, p: *mut u32) -> usize {
+    unsafe fn collect(first: u32, mask: u32, p: *mut u32) {
         unsafe {
-            let near = _bzhi_u32(a.mask_below(b), remaining.min(8) as u32);
-            let index = _mm256_add_epi32(_mm256_set1_epi32(first as i32), order(near));
+            let index = _mm256_add_epi32(_mm256_set1_epi32(first as i32), order(mask));
             _mm256_storeu_si256(p.cast(), index);
-            near.count_ones() as usize
         }
     }
 }

@@ -63,6 +63,11 @@ pub trait Reals: Real {
     unsafe fn mul_add(self, a: Self, b: Self) -> Self;
     /// `1/√self`, to the precision of the type, for positive numbers.
     unsafe fn inverse_root(self) -> Self;
+    unsafe fn root(self) -> Self;
+    /// The smaller of two.
+    unsafe fn smaller(self, other: Self) -> Self;
+    /// Writes whole numbers, rounded towards zero.
+    unsafe fn store_whole(self, p: *mut i32);
     /// The nearest whole number, as long as it is small.
     unsafe fn round(self) -> Self;
     /// `self` where `a < b`, zero elsewhere.
@@ -119,7 +124,6 @@ pub trait Isa: Copy + Send + Sync + 'static {
     unsafe fn signed(words: Self::U32) -> Self::F32;
     /// [`Reals::columns`] of words.
     unsafe fn word_columns(base: *const u8, stride: usize, index: *const u32) -> [Self::U32; 4];
-    /// Writes `first + k` for each of the first `remaining` lanes `k` with `a < b`, one after the
-    /// other, and returns how many; may write a whole vector.
-    unsafe fn collect_below(a: Self::F32, b: Self::F32, first: u32, remaining: usize, p: *mut u32) -> usize;
+    /// Writes `first + k` for each bit `k` of `mask`, one after the other; may write a whole vector.
+    unsafe fn collect(first: u32, mask: u32, p: *mut u32);
 }

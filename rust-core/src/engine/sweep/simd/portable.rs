@@ -98,6 +98,27 @@ macro_rules! lanes {
                 self
             }
             #[inline(always)]
+            unsafe fn root(mut self) -> Self {
+                for k in 0..LANES {
+                    self.0[k] = self.0[k].sqrt();
+                }
+                self
+            }
+            #[inline(always)]
+            unsafe fn smaller(mut self, other: Self) -> Self {
+                for k in 0..LANES {
+                    self.0[k] = if self.0[k] < other.0[k] { self.0[k] } else { other.0[k] };
+                }
+                self
+            }
+            #[inline(always)]
+            unsafe fn store_whole(self, p: *mut i32) {
+                for k in 0..LANES {
+                    // SAFETY: the caller's numbers are in range.
+                    unsafe { *p.add(k) = self.0[k].to_int_unchecked() };
+                }
+            }
+            #[inline(always)]
             unsafe fn round(mut self) -> Self {
                 for k in 0..LANES {
                     // Adding what has no room for a fraction rounds, without a call.
@@ -310,18 +331,11 @@ impl Isa for Portable {
         [Lanes(a), Lanes(b), Lanes(c), Lanes(d)]
     }
     #[inline(always)]
-    unsafe fn collect_below(
-        a: Lanes<f32>,
-        b: Lanes<f32>,
-        first: u32,
-        remaining: usize,
-        p: *mut u32,
-    ) -> usize {
+    unsafe fn collect(first: u32, mask: u32, p: *mut u32) {
         let mut count = 0;
         for k in 0..LANES {
             unsafe { *p.add(count) = first + k as u32 };
-            count += (a.0[k] < b.0[k] && k < remaining) as usize;
+            count += (mask >> k & 1) as usize;
         }
-        count
     }
 }

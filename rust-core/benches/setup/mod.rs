@@ -1,0 +1,125 @@
+//! Fluids and particles that micro-benchmarks and instruction counts share.
+
+use psidpd_core::engine::{Particles, PeriodicBox, Settings, Space, Step, Sweep, Want, noise};
+use psidpd_core::model::{Fluid, Model};
+
+/// A fluid and its number density.
+pub struct Subject {
+    /// For the names of measurements.
+    pub name: &'static str,
+    text: &'static str,
+    /// Number density.
+    pub density: f64,
+    /// Δt.
+    pub dt: f64,
+}
+
+/// Warren's many-body fluid, standard DPD, and a fluid with two species and two densities as formulas.
+pub const SUBJECTS: [Subject; 3] = [
+    Subject {
+        name: "mdpd",
+        text: include_str!("../../../validation/models/warren2003-set6.toml"),
+        density: 6.05,
+        dt: 0.01,
+    },
+    Subject {
+        name: "dpd",
+        text: include_str!("../../../validation/models/standard-dpd.toml"),
+        density: 3.0,
+        dt: 0.04,
+    },
+    Subject {
+        name: "formula",
+        text: include_str!("../../../validation/src/bench/two-species.toml"),
+        density: 6.05,
+        dt: 0.01,
+    },
+];
+
+impl Subject {
+    /// The fluid at kT = 1.
+    pub fn fluid(&self) -> Fluid {
+        Model::parse(self.name, self.text).expect("a model that ships").at(1.0).expect("a fluid at kT = 1")
+    }
+}
+
+/// A number from 0 to 1, the same everywhere.
+pub fn uniform(k: usize) -> f64 {
+    f64::from(noise::threefry2x32::<20>([k as u32, 0], [5, 9])[0]) / 4_294_967_296.0
+}
+
+/// Particles in a cubic box, and where their forces go.
+pub struct Cloud {
+    /// The box.
+    pub domain: PeriodicBox,
+    edge: f64,
+    /// Positions.
+    pub x: Vec<[f64; 3]>,
+    /// Velocities.
+    pub v: Vec<[f64; 3]>,
+    /// Tags.
+    pub tag: Vec<i32>,
+    /// Species.
+    pub kind: Vec<i32>,
+    /// Forces.
+    pub force: Vec<[f64; 3]>,
+    step: Step,
+}
+
+impl Cloud {
+    /// `count` particles of `fluid` on a disturbed lattice, which is nearer to a fluid than points at random.
+    pub fn new(subject: &Subject, fluid: &Fluid, count: usize) -> Cloud {
+        let edge = (count as f64 / subject.density).cbrt();
+        let side = (count as f64).cbrt().ceil() as usize;
+        let position = |k: usize| {
+            let cell = [k % side, k / side % side, k / side / side];
+            std::array::from_fn(|c| (edge / side as f64) * (cell[c] as f64 + 0.1 + 0.8 * uniform(6 * k + c)))
+        };
+        // Variance 1: kT = 1.
+        let velocity = |k: usize| std::array::from_fn(|c| 12f64.sqrt() * (uniform(6 * k + 3 + c) - 0.5));
+        Cloud {
+            domain: PeriodicBox::orthogonal([0.0; 3], [edge; 3], [true; 3]).expect("a box"),
+            edge,
+            x: (0..count).map(position).collect(),
+            v: (0..count).map(velocity).collect(),
+            tag: (1..=count as i32).collect(),
+            kind: (0..count).map(|k| (k % fluid.species.len()) as i32).collect(),
+            force: vec![[0.0; 3]; count],
+            step: Step { seed: 1, number: 0, dt: subject.dt },
+        }
+    }
+
+    /// Moves particles along their velocities by one step: forces of the lattice would heat it.
+    pub fn drift(&mut self) {
+        for (x, v) in self.x.iter_mut().zip(&self.v) {
+            for c in 0..3 {
+                x[c] += self.step.dt * v[c];
+                if x[c] < 0.0 {
+                    x[c] += self.edge;
+                } else if x[c] >= self.edge {
+                    x[c] -= self.edge;
+                }
+            }
+        }
+    }
+
+    /// One evaluation of all forces, noise among them.
+    pub fn evaluate(&mut self, sweep: &mut Sweep) {
+        self.step.number += 1;
+        let particles = Particles { owned: self.x.len(), x: &self.x, tag: &self.tag, kind: &self.kind };
+        sweep
+            .first(Space::Box(&self.domain), &particles, &self.v, Some(self.step), Want::FORCES)
+            .expect("densities");
+        sweep.second(&particles, &mut self.force, false).expect("forces");
+    }
+}
+
+/// The fast engine on one thread.
+pub fn sweep(
+    fluid: &Fluid,
+    precision: psidpd_core::engine::Precision,
+    instructions: psidpd_core::engine::Instructions,
+) -> Sweep {
+    let settings = Settings { precision, instructions, ..Settings::default() };
+    Sweep::new(fluid, settings).expect("a plan")
+}

@@ -1,0 +1,58 @@
+//! Evaluates forces a given number of times, for counting instructions: the same fluid, particles and steps
+//! in every run, one thread.
+//!
+//! ```text
+//! valgrind --tool=callgrind --callgrind-out-file=/dev/null \
+//!     target/release/examples/instructions mdpd mixed avx2 8
+//! ```
+//!
+//! Counts of runs of different length differ by what the additional evaluations take. It prints the number of
+//! particles, and a sum of forces, so that nothing is optimised away.
+
+#[path = "../benches/setup/mod.rs"]
+mod setup;
+
+use psidpd_core::engine::{Instructions, Precision};
+use setup::{Cloud, SUBJECTS, sweep};
+use std::process::ExitCode;
+
+const COUNT: usize = 2000;
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    match run(&arguments) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(fault) => {
+            eprintln!(
+                "{fault}\nusage: instructions mdpd|dpd|formula mixed|double portable|avx2|avx512 EVALUATIONS"
+            );
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(arguments: &[String]) -> Result<(), String> {
+    let [fluid, precision, instructions, evaluations] = arguments else {
+        return Err("four arguments are needed".into());
+    };
+    let subject = SUBJECTS.iter().find(|s| s.name == fluid).ok_or("no such fluid")?;
+    let (_, precision) =
+        Precision::ALL.into_iter().find(|(name, _)| name == precision).ok_or("no such precision")?;
+    let (_, set) = Instructions::ALL
+        .into_iter()
+        .find(|(name, _)| name == instructions)
+        .ok_or("no such instruction set")?;
+    if !set.available() {
+        return Err(format!("this processor has no {instructions}"));
+    }
+    let evaluations: u32 = evaluations.parse().map_err(|_| "EVALUATIONS is a number")?;
+    let fluid = subject.fluid();
+    let mut cloud = Cloud::new(subject, &fluid, COUNT);
+    let mut sweep = sweep(&fluid, precision, set);
+    for _ in 0..evaluations {
+        cloud.drift();
+        cloud.evaluate(&mut sweep);
+    }
+    println!("{COUNT} {}", cloud.force.iter().map(|f| f[0].abs()).sum::<f64>());
+    Ok(())
+}

@@ -1,0 +1,117 @@
+//! How many instructions one step of one particle takes, counted by callgrind: unlike times, these do not depend
+//! on what else the machine does, so a regression of some percent shows.
+//!
+//! Counts are held against `baselines/instructions.json`. After a change that is meant,
+//!
+//! ```text
+//! PSIDPD_WRITE_BASELINE=1 cargo test --release -p psidpd-tests --test instruction_counts
+//! ```
+//!
+//! writes it anew. Valgrind knows no AVX-512; its kernels come from the same source as those of AVX2.
+
+use psidpd_tests::{root, said};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Counts may differ from the baseline by this part of it: other versions of the compiler and the C library.
+const TOLERANCE: f64 = 0.05;
+/// Evaluations in the two runs whose difference counts; the first ones only make room.
+const EVALUATIONS: [u32; 2] = [2, 5];
+
+fn baseline() -> PathBuf {
+    root().join("tests/baselines/instructions.json")
+}
+
+/// Builds the example in release mode, whatever mode the tests are in: its counts are those of optimised code.
+fn example() -> PathBuf {
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let mut build = Command::new(cargo);
+    build.args(["build", "--release", "-p", "psidpd-core", "--example", "instructions"]);
+    build.arg("--message-format=json-render-diagnostics").current_dir(root());
+    let output = build.output().expect("cargo runs");
+    assert!(output.status.success(), "the example does not build: {}", said(&output));
+    String::from_utf8_lossy(&output.stdout)
+        .lines()
+        .filter_map(|line| serde_json::from_str::<Value>(line).ok())
+        .filter(|m| m["target"]["name"] == "instructions")
+        .find_map(|m| m["executable"].as_str().map(PathBuf::from))
+        .expect("cargo names the example")
+}
+
+/// Particles, and instructions of a whole run.
+fn count(program: &Path, case: &[&str], evaluations: u32) -> (f64, f64) {
+    let mut run = Command::new("valgrind");
+    run.args(["--tool=callgrind", "--callgrind-out-file=/dev/null"]).arg(program).args(case);
+    let output = run.arg(evaluations.to_string()).output().unwrap_or_else(|e| {
+        panic!("valgrind does not start ({e}): install it (Debian: apt-get install valgrind)")
+    });
+    assert!(output.status.success(), "{case:?}: {}", said(&output));
+    let said = said(&output);
+    let collected = said.lines().find_map(|line| line.split_once("Collected :")).map(|(_, n)| n.trim());
+    let instructions = collected.and_then(|n| n.parse().ok());
+    let particles = said.split_whitespace().next().and_then(|n| n.parse().ok());
+    match (particles, instructions) {
+        (Some(p), Some(i)) => (p, i),
+        _ => panic!("callgrind says no count: {said}"),
+    }
+}
+
+fn per_particle_step(program: &Path, case: &[&str]) -> f64 {
+    let [few, many] = EVALUATIONS.map(|evaluations| count(program, case, evaluations));
+    (many.1 - few.1) / (many.0 * f64::from(EVALUATIONS[1] - EVALUATIONS[0]))
+}
+
+fn compiler() -> String {
+    let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
+    let output = Command::new(rustc).arg("--version").current_dir(root()).output().expect("rustc runs");
+    String::from_utf8_lossy(&output.stdout).trim().to_owned()
+}
+
+#[test]
+fn instructions_per_particle_and_step_stay_what_they_were() {
+    let program = example();
+    let mut counts = BTreeMap::new();
+    for fluid in ["mdpd", "dpd", "formula"] {
+        for precision in ["mixed", "double"] {
+            for instructions in ["portable", "avx2"] {
+                let case = [fluid, precision, instructions];
+                let count = per_particle_step(&program, &case);
+                println!("{:<24} {count:8.1}", case.join(" "));
+                counts.insert(case.join(" "), (10.0 * count).round() / 10.0);
+            }
+        }
+    }
+    let rewrite = "PSIDPD_WRITE_BASELINE=1 cargo test --release -p psidpd-tests --test instruction_counts";
+    if std::env::var_os("PSIDPD_WRITE_BASELINE").is_some_and(|v| !v.is_empty()) {
+        let value = json!({ "compiler": compiler(), "instructions_per_particle_step": counts });
+        std::fs::write(baseline(), format!("{value:#}\n")).expect("the baseline is written");
+        return;
+    }
+    let text = std::fs::read_to_string(baseline())
+        .unwrap_or_else(|e| panic!("{}: {e}; write it by\n{rewrite}", baseline().display()));
+    let expected: Value = serde_json::from_str(&text).expect("the baseline is JSON");
+    let expected_counts = expected["instructions_per_particle_step"].as_object().expect("counts by name");
+    assert!(
+        expected_counts.keys().eq(counts.keys()),
+        "the baseline has other cases; write it anew by\n{rewrite}"
+    );
+    let faults: Vec<String> = counts
+        .iter()
+        .filter_map(|(case, count)| {
+            let before = expected_counts[case].as_f64().unwrap_or(f64::NAN);
+            let change = count / before - 1.0;
+            // Not the other way round: what is no number is a fault.
+            let good = change.abs() <= TOLERANCE;
+            (!good).then(|| format!("{case}: {count} instead of {before} ({:+.1} %)", 100.0 * change))
+        })
+        .collect();
+    assert!(
+        faults.is_empty(),
+        "instructions per particle and step:\n{}\nbaseline by {}, here {}. If the change is meant (fewer are welcome):\n{rewrite}",
+        faults.join("\n"),
+        expected["compiler"].as_str().unwrap_or("an unknown compiler"),
+        compiler(),
+    );
+}

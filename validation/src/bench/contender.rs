@@ -1,0 +1,234 @@
+//! Who is timed, under which name.
+
+use super::fluids::{DPD, MDPD, Subject};
+use psidpd_core::engine::{Instructions, Precision, Settings};
+use std::num::NonZeroUsize;
+
+/// A code with its settings.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Code {
+    /// LAMMPS's `mdpd/rhosum` and `mdpd`.
+    BuiltIn,
+    /// LAMMPS's `eam/alloy` with tables of the fluid, and `dpd/tstat`.
+    Eam,
+    /// LAMMPS's `dpd`, or an accelerated version of it.
+    Dpd(Suffix),
+    /// The plugin's `dpd/psi`, with these words behind the seed.
+    Plugin(String),
+    /// The native runner.
+    Native(Settings),
+    /// The native runner with the plain engine.
+    Plain,
+}
+
+/// Accelerated versions of LAMMPS's `dpd`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Suffix {
+    /// `dpd` itself.
+    None,
+    /// `dpd/omp` on one thread.
+    Omp,
+    /// `dpd/intel` on one thread, in its mixed precision.
+    Intel,
+}
+
+/// A code, and on how many MPI ranks.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Contender {
+    /// The code.
+    pub code: Code,
+    /// MPI ranks; 1 for the native runner.
+    pub ranks: usize,
+    /// Whether the box is repeated along x as often as there are ranks: weak scaling.
+    pub weak: bool,
+}
+
+impl Suffix {
+    /// The style.
+    pub fn style(self) -> &'static str {
+        match self {
+            Suffix::None => "dpd",
+            Suffix::Omp => "dpd/omp",
+            Suffix::Intel => "dpd/intel",
+        }
+    }
+}
+
+impl Contender {
+    /// On one rank.
+    pub fn alone(code: Code) -> Contender {
+        Contender { code, ranks: 1, weak: false }
+    }
+
+    /// The name that results and goals use.
+    pub fn id(&self) -> String {
+        let mut id = match &self.code {
+            Code::BuiltIn => "lammps mdpd".to_owned(),
+            Code::Eam => "lammps eam/alloy".to_owned(),
+            Code::Dpd(suffix) => format!("lammps {}", suffix.style()),
+            Code::Plugin(words) => format!("plugin dpd/psi {words}").trim_end().to_owned(),
+            Code::Native(s) => format!("native {} {} {}", s.precision, s.instructions, s.threads),
+            Code::Plain => "native plain".to_owned(),
+        };
+        if self.ranks > 1 {
+            id += &format!(", {} ranks", self.ranks);
+        }
+        if self.weak {
+            id += ", weak";
+        }
+        id
+    }
+
+    /// Whether LAMMPS runs it.
+    pub fn in_lammps(&self) -> bool {
+        !matches!(self.code, Code::Native(_) | Code::Plain)
+    }
+
+    /// The settings of the native runner.
+    pub fn settings(&self) -> Option<Settings> {
+        match self.code {
+            Code::Native(settings) => Some(settings),
+            _ => None,
+        }
+    }
+
+    /// Threads of each rank.
+    pub fn threads(&self) -> usize {
+        match &self.code {
+            Code::Native(settings) => settings.threads.get(),
+            Code::Plugin(words) => word_after(words, "threads").and_then(|n| n.parse().ok()).unwrap_or(1),
+            _ => 1,
+        }
+    }
+
+    /// The precision, where one was asked for.
+    pub fn precision(&self) -> Option<String> {
+        match &self.code {
+            Code::Native(settings) => Some(settings.precision.to_string()),
+            Code::Plugin(words) => word_after(words, "precision").map(str::to_owned),
+            _ => None,
+        }
+    }
+
+    /// How often the state is repeated along x.
+    pub fn copies(&self) -> usize {
+        if self.weak { self.ranks } else { 1 }
+    }
+}
+
+fn word_after<'a>(words: &'a str, key: &str) -> Option<&'a str> {
+    words.split_whitespace().skip_while(|w| *w != key).nth(1)
+}
+
+/// What the rate of others is held against: the built-in of the fluid.
+pub fn reference(subject: &Subject) -> Option<Contender> {
+    if *subject == MDPD {
+        Some(Contender::alone(Code::BuiltIn))
+    } else if *subject == DPD {
+        Some(Contender::alone(Code::Dpd(Suffix::None)))
+    } else {
+        None
+    }
+}
+
+/// The words of the plugin's fastest setting on one thread, which is timed on several ranks.
+pub const MIXED: &str = "precision mixed";
+
+/// What a LAMMPS has, and what is asked for.
+#[derive(Debug, Clone, Default)]
+pub struct Choice {
+    /// Whether the host has `mdpd`.
+    pub built_in: bool,
+    /// Whether it has `eam/alloy` and `dpd/tstat`.
+    pub eam: bool,
+    /// Versions of `dpd` that it has.
+    pub suffixes: Vec<Suffix>,
+    /// More words for `pair_style dpd/psi`; each is a contender.
+    pub words: Vec<String>,
+    /// Thread counts of the native runner.
+    pub threads: Vec<NonZeroUsize>,
+    /// Whether LAMMPS can be started on two ranks.
+    pub two_ranks: bool,
+}
+
+/// Everyone for a fluid. The plain engine, whose cost per particle does not depend on the size, only where
+/// `smallest`.
+pub fn contenders(subject: &Subject, choice: &Choice, smallest: bool) -> Vec<Contender> {
+    let mut all = Vec::new();
+    if *subject == MDPD {
+        all.extend(choice.built_in.then(|| Contender::alone(Code::BuiltIn)));
+        all.extend(choice.eam.then(|| Contender::alone(Code::Eam)));
+    } else if *subject == DPD {
+        all.extend(choice.suffixes.iter().map(|s| Contender::alone(Code::Dpd(*s))));
+    }
+    let general = *subject != MDPD && *subject != DPD;
+    let threads = choice.threads.iter().filter(|n| n.get() > 1 && !general);
+    let words = ["", MIXED, "precision double"].map(str::to_owned).into_iter();
+    let words = words.chain(threads.map(|n| format!("{MIXED} threads {n}"))).chain(choice.words.clone());
+    all.extend(words.map(|words| Contender::alone(Code::Plugin(words))));
+    for &threads in &choice.threads {
+        for (_, precision) in Precision::ALL {
+            for (_, instructions) in Instructions::ALL.into_iter().filter(|(_, i)| i.available()) {
+                // Of the general fluid the best instruction set will do.
+                if general && instructions != Instructions::best() {
+                    continue;
+                }
+                let settings = Settings { precision, instructions, threads };
+                all.push(Contender::alone(Code::Native(settings)));
+            }
+        }
+    }
+    if smallest {
+        all.push(Contender::alone(Code::Plain));
+    }
+    if *subject == MDPD && choice.two_ranks {
+        for weak in [false, true] {
+            let built_in = choice.built_in.then_some(Code::BuiltIn);
+            for code in built_in.into_iter().chain([Code::Plugin(MIXED.to_owned())]) {
+                all.push(Contender { code, ranks: 2, weak });
+            }
+        }
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fluids::SUBJECTS;
+    use super::*;
+    use std::collections::HashSet;
+
+    #[test]
+    fn threads_are_those_of_the_settings_or_of_the_words() {
+        let plugin = |words: &str| Contender::alone(Code::Plugin(words.to_owned())).threads();
+        assert_eq!(["", "threads", "precision mixed", "precision mixed threads 2"].map(plugin), [1, 1, 1, 2]);
+        let settings = Settings { threads: NonZeroUsize::new(3).unwrap(), ..Settings::default() };
+        assert_eq!(Contender::alone(Code::Native(settings)).threads(), 3);
+        let precision = |words: &str| Contender::alone(Code::Plugin(words.to_owned())).precision();
+        assert_eq!(precision("threads 2"), None);
+        assert_eq!(precision(MIXED).as_deref(), Some("mixed"));
+    }
+
+    #[test]
+    fn every_contender_has_a_name_of_its_own() {
+        let choice = Choice {
+            built_in: true,
+            eam: true,
+            suffixes: vec![Suffix::None, Suffix::Omp, Suffix::Intel],
+            two_ranks: true,
+            words: vec!["precision double threads 3".into()],
+            threads: [1, 2].map(|n| NonZeroUsize::new(n).unwrap()).to_vec(),
+        };
+        for subject in &SUBJECTS {
+            let all = contenders(subject, &choice, true);
+            let names: HashSet<String> = all.iter().map(Contender::id).collect();
+            assert_eq!(names.len(), all.len());
+            assert!(names.contains("plugin dpd/psi precision double threads 3"));
+            assert!(names.contains("plugin dpd/psi"));
+            assert!(names.contains(&format!("native mixed {} 2", Instructions::best())));
+            if let Some(reference) = reference(subject) {
+                assert!(all.contains(&reference));
+            }
+        }
+    }
+}

@@ -1,0 +1,448 @@
+//! The benchmark: LAMMPS, the plugin and the native runner side by side.
+//!
+//! Every code starts from one state of each fluid and size and is timed in interleaved rounds, so that what slows
+//! the machine down for a while slows them all; ratios are taken within a round. [`contender`] says who is timed,
+//! [`deck`] runs LAMMPS and [`native`] the runner, [`goals`] holds the results against a table, and
+//! [`projection`] carries them on to 10⁹ particles.
+
+pub mod contender;
+pub mod deck;
+mod error;
+pub mod fluids;
+pub mod goals;
+pub mod log;
+pub mod memory;
+pub mod native;
+pub mod outcome;
+pub mod page;
+pub mod projection;
+mod spread;
+pub mod start;
+
+pub use error::BenchError;
+pub use outcome::Outcome;
+pub use spread::Spread;
+
+use crate::lammps::{self, Host};
+use crate::report::{Progress, write_atomically};
+use contender::{Choice, Contender, Suffix};
+use deck::{Length, Place};
+use fluids::{MDPD, SUBJECTS, Subject};
+use outcome::{Asked, FluidFacts, LammpsFacts, Machine, Run, Scaling};
+use psidpd_core::engine::{Instructions, Plan, Precision, Settings};
+use start::Start;
+use std::collections::BTreeMap;
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+
+/// What `psidpd bench` is asked for.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// Particles of the many-body fluid in the boxes.
+    pub sizes: Vec<usize>,
+    /// Rounds.
+    pub rounds: usize,
+    /// Seconds that a timed run should take.
+    pub seconds: f64,
+    /// Steps of every run instead; then no skin is looked for either.
+    pub steps: Option<u64>,
+    /// Particles of the systems whose memory is measured.
+    pub memory: Vec<usize>,
+    /// Thread counts of the native runner.
+    pub threads: Vec<NonZeroUsize>,
+    /// More words behind the seed of `pair_style dpd/psi`, each a contender.
+    pub words: Vec<String>,
+    /// Another LAMMPS than the one that `psidpd lammps install` puts in place.
+    pub lammps: Option<PathBuf>,
+    /// Folder for results, starts and decks.
+    pub out: PathBuf,
+}
+
+/// Fewest steps that a timed run makes, or lists and exchanges of LAMMPS would not be met in their proportion.
+const FEWEST: u64 = 20;
+/// Skin of LAMMPS where none is looked for.
+const SKIN: f64 = 0.3;
+/// Skins that are tried.
+const SKINS: [f64; 4] = [0.2, 0.3, 0.4, 0.55];
+
+/// A contender with a fluid and a size, and what was measured so far.
+struct Entry {
+    subject: Subject,
+    size: usize,
+    contender: Contender,
+    length: Length,
+    skin: f64,
+    seconds: Vec<f64>,
+    parts: Vec<BTreeMap<String, f64>>,
+    ghosts: Option<f64>,
+    builds: Option<u64>,
+}
+
+/// A fluid at a size.
+struct Case {
+    start: Start,
+    pairs: f64,
+}
+
+type Cases = BTreeMap<(&'static str, usize), Case>;
+
+/// Runs the benchmark and writes `bench.json`, `report.html` and `scaling.md`. `program` is psidpd itself, which is
+/// started to measure memory.
+///
+/// # Errors
+/// Something could not be run or written.
+pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Outcome, BenchError> {
+    let load = load();
+    let goals = goals::read(goals::SHIPPED)?;
+    std::fs::create_dir_all(&options.out).map_err(BenchError::io(&options.out))?;
+    // LAMMPS runs in folders of its own: paths must not depend on ours.
+    let out = options.out.canonicalize().map_err(BenchError::io(&options.out))?;
+    let spinner = progress.spinner("LAMMPS and the plugin");
+    let (place, version) = place(options, &out, progress)?;
+    spinner.finish();
+
+    let (choice, missing) = choice(options, &place)?;
+    let (cases, mut entries) = entries(options, &choice, &place, &out, progress)?;
+    let bar = progress.bar("calibration", entries.len() as u64);
+    calibrate(options, &cases, &place, &mut entries, &|k| bar.set(k))?;
+    bar.finish();
+    let bar = progress.bar("rounds", (options.rounds * entries.len()) as u64);
+    for round in 0..options.rounds {
+        for done in 0..entries.len() {
+            // Back and forth: who is timed behind whom should not matter.
+            let k = if round % 2 == 0 { done } else { entries.len() - 1 - done };
+            measure(&mut entries[k], &cases, &place)?;
+            bar.set((round * entries.len() + done + 1) as u64);
+        }
+    }
+    bar.finish();
+
+    let spinner = progress.spinner("memory and threads");
+    let memory = memory::measure(program, &options.memory)?;
+    let equal_bits = equal_bits(options, &cases)?;
+    spinner.finish();
+
+    let runs = runs(&entries, &cases);
+    let (fluids, slope_widths) = facts()?;
+    let scaling = scaling(&runs, &entries, slope_widths["mdpd"]);
+    let projection = projection(&runs, &scaling, slope_widths["mdpd"]);
+    let measured = goals::Measurements { runs: &runs, memory: &memory, equal_bits: &equal_bits };
+    let goals = goals.iter().map(|g| g.judge(measured)).collect();
+    let outcome = Outcome {
+        format: 1,
+        version: env!("CARGO_PKG_VERSION"),
+        machine: Machine {
+            processor: crate::crosscheck::machine(),
+            cores: std::thread::available_parallelism().map_or(1, NonZeroUsize::get),
+            instructions: Instructions::ALL
+                .into_iter()
+                .filter(|(_, i)| i.available())
+                .map(|(name, _)| name.to_owned())
+                .collect(),
+            load,
+        },
+        lammps: LammpsFacts { version, missing },
+        options: Asked {
+            sizes: options.sizes.clone(),
+            rounds: options.rounds,
+            seconds: options.seconds,
+            steps: options.steps,
+            seed: start::SEED,
+        },
+        fluids,
+        runs,
+        scaling,
+        memory,
+        equal_bits,
+        projection,
+        goals,
+    };
+    write(&out, &outcome)?;
+    Ok(outcome)
+}
+
+fn write(out: &Path, outcome: &Outcome) -> Result<(), BenchError> {
+    let json = serde_json::to_string_pretty(outcome)
+        .map_err(|e| BenchError::io(out.join("bench.json"))(e.into()))?;
+    write_atomically(out.join("bench.json"), (json + "\n").as_bytes())?;
+    write_atomically(out.join("report.html"), page::report(outcome)?.as_bytes())?;
+    if let Some(projection) = &outcome.projection {
+        let bytes = outcome.memory.last().map(|m| m.bytes_per_particle);
+        let text = projection::page(projection, &outcome.scaling, bytes, &outcome.machine.processor)?;
+        write_atomically(out.join("scaling.md"), text.as_bytes())?;
+    }
+    Ok(())
+}
+
+/// LAMMPS with the plugin, and its version in words.
+fn place(options: &Options, out: &Path, progress: &Progress) -> Result<(Place, String), BenchError> {
+    let note = |line: &str| progress.note(line);
+    let host = match &options.lammps {
+        Some(place) => Host::at(place)?,
+        None => lammps::install(&note)?,
+    };
+    let version = host.version()?;
+    let plugin = lammps::plugin::build(&host, &note)?;
+    lammps::plugin::check(&host, &plugin)?;
+    // A LAMMPS without plugins has its own program with the styles in it.
+    let (host, load) = match lammps::plugin::launcher(&plugin) {
+        Some(launcher) => (host.with_program(&launcher), None),
+        None => (host, Some(plugin)),
+    };
+    Ok((Place { host, plugin: load, work: out.join("runs") }, version.name))
+}
+
+/// Who can be timed here, and the styles that LAMMPS lacks.
+fn choice(options: &Options, place: &Place) -> Result<(Choice, Vec<String>), BenchError> {
+    let styles = deck::pair_styles(place)?;
+    let has = |name: &str| styles.contains(name);
+    let suffixes: Vec<Suffix> =
+        [Suffix::None, Suffix::Omp, Suffix::Intel].into_iter().filter(|s| has(s.style())).collect();
+    let wanted = ["mdpd", "eam/alloy", "dpd/tstat", "dpd", "dpd/omp", "dpd/intel"];
+    let missing = wanted.iter().filter(|s| !has(s)).map(|s| (*s).to_owned()).collect();
+    let choice = Choice {
+        built_in: has("mdpd") && has("mdpd/rhosum"),
+        eam: has("eam/alloy") && has("dpd/tstat"),
+        suffixes,
+        words: options.words.clone(),
+        threads: options.threads.clone(),
+        two_ranks: place.host.mpirun.is_some(),
+    };
+    Ok((choice, missing))
+}
+
+fn entries(
+    options: &Options,
+    choice: &Choice,
+    place: &Place,
+    out: &Path,
+    progress: &Progress,
+) -> Result<(Cases, Vec<Entry>), BenchError> {
+    let smallest = options.sizes.iter().min().copied();
+    let (mut cases, mut entries) = (Cases::new(), Vec::new());
+    for &size in &options.sizes {
+        for subject in SUBJECTS {
+            let spinner = progress.spinner(&format!("equilibrium: {}, {size}", subject.name));
+            let start = start::equilibrated(&subject, size, &out.join("starts"))?;
+            spinner.finish();
+            let cutoff = subject.model()?.at(1.0).map_err(BenchError::File)?.cutoff();
+            let pairs = start::pairs_per_particle(&start.state, cutoff);
+            cases.insert((subject.name, size), Case { start, pairs });
+            deck::prepare(place, &subject, subject == MDPD && choice.eam)?;
+            for contender in contender::contenders(&subject, choice, Some(size) == smallest) {
+                entries.push(Entry {
+                    subject,
+                    size,
+                    contender,
+                    length: Length { warm_up: 5, steps: options.steps.unwrap_or(FEWEST) },
+                    skin: SKIN,
+                    seconds: Vec::new(),
+                    parts: Vec::new(),
+                    ghosts: None,
+                    builds: None,
+                });
+            }
+        }
+    }
+    Ok((cases, entries))
+}
+
+/// Finds the fastest skin of each LAMMPS contender, at the smallest size, and steps that fill the time of a run.
+fn calibrate(
+    options: &Options,
+    cases: &Cases,
+    place: &Place,
+    entries: &mut [Entry],
+    advance: &dyn Fn(u64),
+) -> Result<(), BenchError> {
+    if options.steps.is_some() {
+        return Ok(());
+    }
+    let smallest = options.sizes.iter().min().copied();
+    let mut skins: BTreeMap<(&str, String), f64> = BTreeMap::new();
+    // The smallest size first.
+    let mut order: Vec<usize> = (0..entries.len()).collect();
+    order.sort_by_key(|k| entries[*k].size);
+    for (done, k) in order.into_iter().enumerate() {
+        let entry = &mut entries[k];
+        let key = (entry.subject.name, entry.contender.id());
+        let mut fastest = f64::INFINITY;
+        if entry.contender.in_lammps() && Some(entry.size) == smallest {
+            entry.length = Length { warm_up: 20, steps: 60 };
+            for skin in SKINS {
+                let seconds = once(entry, cases, place, skin)?.0;
+                if seconds < fastest {
+                    (fastest, entry.skin) = (seconds, skin);
+                }
+            }
+            skins.insert(key, entry.skin);
+        } else {
+            entry.skin = skins.get(&key).copied().unwrap_or(SKIN);
+            entry.length = Length { warm_up: 5, steps: FEWEST };
+            fastest = once(entry, cases, place, entry.skin)?.0;
+        }
+        let step = fastest / entry.length.steps as f64;
+        let steps = ((options.seconds / step) as u64).clamp(FEWEST, 1_000_000);
+        entry.length = Length { warm_up: (steps / 10).max(5), steps };
+        advance(done as u64 + 1);
+    }
+    Ok(())
+}
+
+/// Seconds, seconds of the parts, ghosts and list builds.
+type Once = (f64, BTreeMap<String, f64>, Option<(f64, u64)>);
+
+fn once(entry: &Entry, cases: &Cases, place: &Place, skin: f64) -> Result<Once, BenchError> {
+    let start = &cases[&(entry.subject.name, entry.size)].start;
+    if entry.contender.in_lammps() {
+        let account = deck::run(place, &entry.subject, &entry.contender, start, skin, entry.length)?;
+        Ok((account.seconds, account.parts, Some((account.ghosts, account.builds))))
+    } else {
+        let measured = native::run(&entry.subject, &start.state, entry.contender.settings(), entry.length)?;
+        Ok((measured.seconds, measured.parts, None))
+    }
+}
+
+fn measure(entry: &mut Entry, cases: &Cases, place: &Place) -> Result<(), BenchError> {
+    let (seconds, parts, lammps) = once(entry, cases, place, entry.skin)?;
+    entry.seconds.push(seconds);
+    entry.parts.push(parts);
+    if let Some((ghosts, builds)) = lammps {
+        entry.ghosts = Some(ghosts);
+        entry.builds = Some(entry.builds.unwrap_or(0) + builds);
+    }
+    Ok(())
+}
+
+/// The median; 0 of nothing.
+fn median(values: &[f64]) -> f64 {
+    Spread::of(values).map_or(0.0, |s| s.median)
+}
+
+fn runs(entries: &[Entry], cases: &Cases) -> Vec<Run> {
+    let mut runs: Vec<Run> = entries
+        .iter()
+        .map(|entry| {
+            let case = &cases[&(entry.subject.name, entry.size)];
+            let particles = case.start.state.len() * entry.contender.copies();
+            let all = particles as f64 * entry.length.steps as f64;
+            let names = entry.parts.first().into_iter().flat_map(BTreeMap::keys);
+            let part = |name: &String| {
+                let of = |p: &BTreeMap<String, f64>| 1e9 * p.get(name).copied().unwrap_or(0.0) / all;
+                (name.clone(), median(&entry.parts.iter().map(of).collect::<Vec<_>>()))
+            };
+            let per_particle = 1e9 * median(&entry.seconds) / all;
+            let settings = entry.contender.settings();
+            let steps = entry.length.steps * entry.seconds.len() as u64;
+            let mut run = Run {
+                fluid: entry.subject.name,
+                size: entry.size,
+                code: entry.contender.id(),
+                particles,
+                pairs_per_particle: case.pairs,
+                ranks: entry.contender.ranks,
+                threads: entry.contender.threads(),
+                precision: entry.contender.precision(),
+                instructions: settings.map(|s| s.instructions.to_string()),
+                skin: entry.contender.in_lammps().then_some(entry.skin),
+                steps: entry.length.steps,
+                seconds: entry.seconds.clone(),
+                mega_particle_steps_per_second: Spread { min: 0.0, median: 0.0, max: 0.0 },
+                nanoseconds_per_particle_step: per_particle,
+                nanoseconds_per_pair: per_particle / case.pairs,
+                ratio_to_built_in: None,
+                parts: names.map(part).collect(),
+                ghosts: entry.ghosts,
+                steps_between_builds: entry.builds.map(|b| steps as f64 / b.max(1) as f64),
+            };
+            if let Some(rate) = Spread::of(&run.rates()) {
+                run.mega_particle_steps_per_second = rate;
+            }
+            run
+        })
+        .collect();
+    let ratios: Vec<Option<Spread>> = runs
+        .iter()
+        .zip(entries)
+        .map(|(run, entry)| {
+            let reference = contender::reference(&entry.subject)?.id();
+            let same = |r: &&Run| r.fluid == run.fluid && r.size == run.size && r.code == reference;
+            Spread::of_ratios(&run.rates(), &runs.iter().find(same)?.rates())
+        })
+        .collect();
+    for (run, ratio) in runs.iter_mut().zip(ratios) {
+        run.ratio_to_built_in = ratio;
+    }
+    runs
+}
+
+fn scaling(runs: &[Run], entries: &[Entry], slope_width: usize) -> Vec<Scaling> {
+    let of = |(run, entry): (&Run, &Entry)| {
+        let alone = Contender { ranks: 1, weak: false, ..entry.contender.clone() };
+        let same = |r: &&Run| r.fluid == run.fluid && r.size == run.size && r.code == alone.id();
+        let speed_up = Spread::of_ratios(&run.rates(), &runs.iter().find(same)?.rates())?;
+        let ranks = run.ranks as f64;
+        let plugin = matches!(entry.contender.code, contender::Code::Plugin(_));
+        let Spread { min, median, max } = speed_up;
+        Some(Scaling {
+            code: alone.id(),
+            kind: if entry.contender.weak { "weak" } else { "strong" },
+            size: run.size,
+            ranks: run.ranks,
+            speed_up,
+            efficiency: Spread { min: min / ranks, median: median / ranks, max: max / ranks },
+            ghosts: run.ghosts?,
+            bytes_per_step: plugin.then_some(run.ghosts? * projection::bytes_per_ghost(slope_width)),
+            communication_microseconds: 1e-3 * run.parts.get("comm")? * run.particles as f64,
+        })
+    };
+    runs.iter().zip(entries).filter(|(run, _)| run.ranks > 1).filter_map(of).collect()
+}
+
+/// From the largest size that the plugin was timed at on one rank and on two.
+fn projection(runs: &[Run], scaling: &[Scaling], slope_width: usize) -> Option<projection::Projection> {
+    let plugin = Contender::alone(contender::Code::Plugin(contender::MIXED.to_owned())).id();
+    let strong = scaling.iter().filter(|s| s.kind == "strong" && s.code == plugin);
+    let two = strong.max_by_key(|s| s.size)?;
+    let one = runs.iter().find(|r| r.fluid == MDPD.name && r.size == two.size && r.code == plugin)?;
+    projection::Projection::of(one, two, MDPD.density, slope_width, 1.0)
+}
+
+fn facts() -> Result<(Vec<FluidFacts>, BTreeMap<&'static str, usize>), BenchError> {
+    let mut widths = BTreeMap::new();
+    let mut facts = Vec::new();
+    for subject in &SUBJECTS {
+        let fluid = subject.model()?.at(1.0)?;
+        let plan = Plan::new(&fluid).map_err(|e| BenchError::Run(e.into()))?;
+        widths.insert(subject.name, plan.slope_width());
+        facts.push(FluidFacts {
+            name: subject.name,
+            title: subject.title,
+            density: subject.density,
+            dt: subject.dt,
+            slope_width: plan.slope_width(),
+        });
+    }
+    Ok((facts, widths))
+}
+
+fn equal_bits(options: &Options, cases: &Cases) -> Result<BTreeMap<String, bool>, BenchError> {
+    let smallest = options.sizes.iter().min().copied().unwrap_or_default();
+    let threads = [1, 2, 3].map(|n| NonZeroUsize::new(n).unwrap_or(NonZeroUsize::MIN));
+    let mut equal = BTreeMap::new();
+    for subject in &SUBJECTS {
+        let Some(case) = cases.get(&(subject.name, smallest)) else { continue };
+        for (name, precision) in Precision::ALL {
+            let settings = Settings { precision, ..Settings::default() };
+            let same = native::equal_on_threads(subject, &case.start.state, settings, &threads)?;
+            equal.insert(format!("{} {name}", subject.name), same);
+        }
+    }
+    Ok(equal)
+}
+
+/// The system's mean number of busy processes over a minute.
+fn load() -> Option<f64> {
+    let text = std::fs::read_to_string("/proc/loadavg").ok()?;
+    text.split_whitespace().next()?.parse().ok()
+}

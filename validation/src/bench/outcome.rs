@@ -1,0 +1,183 @@
+//! What the benchmark found: the fields of `bench.json`, which `docs/bench.md` describes.
+
+use super::memory::Memory;
+use super::projection::Projection;
+use super::spread::Spread;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// All of `bench.json`.
+#[derive(Debug, Clone, Serialize)]
+pub struct Outcome {
+    /// Changes when fields change their meaning.
+    pub format: u32,
+    /// Of psidpd.
+    pub version: &'static str,
+    /// The machine.
+    pub machine: Machine,
+    /// The LAMMPS.
+    pub lammps: LammpsFacts,
+    /// What was asked for.
+    pub options: Asked,
+    /// The fluids.
+    pub fluids: Vec<FluidFacts>,
+    /// Every contender with every fluid and size.
+    pub runs: Vec<Run>,
+    /// Two ranks against one.
+    pub scaling: Vec<Scaling>,
+    /// Memory of the native runner.
+    pub memory: Vec<Memory>,
+    /// Whether results are the same on 1, 2 and 3 threads, to the last bit: by fluid and precision.
+    pub equal_bits: BTreeMap<String, bool>,
+    /// 10⁹ particles on paper; none without runs on two ranks.
+    pub projection: Option<Projection>,
+    /// The goals, and whether they are met.
+    pub goals: Vec<Verdict>,
+}
+
+/// Where it ran.
+#[derive(Debug, Clone, Serialize)]
+pub struct Machine {
+    /// The processor.
+    pub processor: String,
+    /// How many cores this process may use.
+    pub cores: usize,
+    /// Instruction sets that the engine has kernels for and the processor has, the best last.
+    pub instructions: Vec<String>,
+    /// Processes that were running or waiting when the benchmark began, by the system's mean over a minute; above
+    /// a few tenths figures are not to be trusted.
+    pub load: Option<f64>,
+}
+
+/// LAMMPS.
+#[derive(Debug, Clone, Serialize)]
+pub struct LammpsFacts {
+    /// In words.
+    pub version: String,
+    /// Styles that were wanted and that it does not have.
+    pub missing: Vec<String>,
+}
+
+/// What was asked for.
+#[derive(Debug, Clone, Serialize)]
+pub struct Asked {
+    /// Particles of the many-body fluid in the boxes.
+    pub sizes: Vec<usize>,
+    /// Rounds.
+    pub rounds: usize,
+    /// Seconds that a timed run should take.
+    pub seconds: f64,
+    /// Steps of every run; null if they follow from `seconds`.
+    pub steps: Option<u64>,
+    /// Of starts and noise.
+    pub seed: u64,
+}
+
+/// A fluid.
+#[derive(Debug, Clone, Serialize)]
+pub struct FluidFacts {
+    /// In `runs`.
+    pub name: &'static str,
+    /// In words.
+    pub title: &'static str,
+    /// Number density.
+    pub density: f64,
+    /// Δt.
+    pub dt: f64,
+    /// Many-body numbers that a host forwards from a particle to its ghosts.
+    pub slope_width: usize,
+}
+
+/// One contender with one fluid at one size.
+#[derive(Debug, Clone, Serialize)]
+pub struct Run {
+    /// The name of the fluid.
+    pub fluid: &'static str,
+    /// Particles of the many-body fluid in the box before it was repeated.
+    pub size: usize,
+    /// Who.
+    pub code: String,
+    /// Particles.
+    pub particles: usize,
+    /// Pairs closer than the longest range, per particle.
+    pub pairs_per_particle: f64,
+    /// MPI ranks.
+    pub ranks: usize,
+    /// Threads of each.
+    pub threads: usize,
+    /// Of the native runner, and of the plugin where it was told.
+    pub precision: Option<String>,
+    /// Of the native runner.
+    pub instructions: Option<String>,
+    /// Of LAMMPS: the fastest of those tried.
+    pub skin: Option<f64>,
+    /// Steps in each round.
+    pub steps: u64,
+    /// Wall seconds of each round.
+    pub seconds: Vec<f64>,
+    /// Millions of particle-steps per second.
+    pub mega_particle_steps_per_second: Spread,
+    /// Nanoseconds per particle and step: the median.
+    pub nanoseconds_per_particle_step: f64,
+    /// Nanoseconds per pair in range and step: the median.
+    pub nanoseconds_per_pair: f64,
+    /// Rate over that of the built-in of the fluid in the same round; null for fluids that LAMMPS does not have.
+    pub ratio_to_built_in: Option<Spread>,
+    /// Nanoseconds per particle and step of each part: the median.
+    pub parts: BTreeMap<String, f64>,
+    /// Ghosts of a rank; of LAMMPS.
+    pub ghosts: Option<f64>,
+    /// Steps between exchanges of particles, the mean; of LAMMPS.
+    pub steps_between_builds: Option<f64>,
+}
+
+impl Run {
+    /// Millions of particle-steps per second in each round.
+    pub fn rates(&self) -> Vec<f64> {
+        self.seconds.iter().map(|s| 1e-6 * self.particles as f64 * self.steps as f64 / s).collect()
+    }
+}
+
+/// Two ranks against one.
+#[derive(Debug, Clone, Serialize)]
+pub struct Scaling {
+    /// Who.
+    pub code: String,
+    /// `strong`: the same box; `weak`: a box for each rank.
+    pub kind: &'static str,
+    /// Particles of the box of one rank.
+    pub size: usize,
+    /// Ranks.
+    pub ranks: usize,
+    /// Rate over that of one rank.
+    pub speed_up: Spread,
+    /// The same over the number of ranks.
+    pub efficiency: Spread,
+    /// Ghosts of a rank.
+    pub ghosts: f64,
+    /// Bytes that a rank sends in a step for its ghosts: positions, velocities, slopes, forces.
+    pub bytes_per_step: Option<f64>,
+    /// Microseconds of a step in LAMMPS's communication, the mean over ranks.
+    pub communication_microseconds: f64,
+}
+
+/// A goal and what was measured.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Verdict {
+    /// In words.
+    pub what: String,
+    /// `at least` or `at most`.
+    pub relation: &'static str,
+    /// The goal.
+    pub goal: f64,
+    /// What to be proud of.
+    pub stretch: Option<f64>,
+    /// What was measured at the worst of the sizes; null if it was not.
+    pub figure: Option<Spread>,
+    /// Whether the median meets the goal; null if it was not measured.
+    pub met: Option<bool>,
+    /// Whether it goes as far as `stretch`.
+    pub stretch_met: Option<bool>,
+    /// By size, as far as measured.
+    pub by_size: BTreeMap<usize, Spread>,
+}

