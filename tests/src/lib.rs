@@ -1,5 +1,9 @@
 //! What the end-to-end tests share: the program, LAMMPS, and the plugin built for it.
 
+mod python;
+
+pub use python::python;
+
 use psidpd::lammps::{Host, install, plugin};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

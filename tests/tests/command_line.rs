@@ -76,6 +76,61 @@ fn forces_are_the_gradient_of_the_energy_in_the_file() {
     assert!(total.abs() < 1e-12);
 }
 
+/// A report is made with the run, and again from its folder; pictures come from each of its files.
+#[test]
+fn a_run_has_a_report_and_pictures() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let run = |arguments: &[&str]| {
+        let output = psidpd(here, arguments);
+        assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", said(&output));
+    };
+    let path = write(here, "scene.toml", &scene("xyz = 25\nsnapshot = 25\n"));
+    run(&["run", &path, "--out", "out", "--report"]);
+    let page = std::fs::read_to_string(here.join("out/report.html")).unwrap();
+    for text in ["small", "Temperature", "Local density", "F (387)", "class=\"movie\"", "trajectory.xyz"] {
+        assert!(page.contains(text), "{text}");
+    }
+    let about: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(here.join("out/about.json")).unwrap()).unwrap();
+    let thermo = std::fs::read_to_string(here.join("out/thermo.csv")).unwrap();
+    let told: Vec<&str> =
+        about["thermo"].as_array().unwrap().iter().map(|c| c["name"].as_str().unwrap()).collect();
+    assert_eq!(thermo.lines().next().unwrap().split(',').collect::<Vec<_>>(), told);
+    let pictures: Vec<_> = std::fs::read_dir(here.join("out/snapshots")).unwrap().collect();
+    assert_eq!(pictures.len(), 3);
+    for file in ["final.data", "dump.lammpstrj", "trajectory.xyz"] {
+        let file = format!("out/{file}");
+        run(&["snapshot", &file, "--out", "a.svg", "--model", &model()]);
+        assert!(std::fs::read_to_string(here.join("a.svg")).unwrap().contains(">F (387)</text>"), "{file}");
+        run(&["snapshot", &file, "--density", "--view", "x", "--size", "64", "--out", "a.png"]);
+        assert!(std::fs::read(here.join("a.png")).unwrap().starts_with(b"\x89PNG"));
+    }
+    // A run into the same folder leaves nothing of the one before.
+    let path = write(here, "scene.toml", &scene(""));
+    run(&["run", &path, "--out", "out"]);
+    for file in ["report.html", "trajectory.xyz"] {
+        assert!(!here.join("out").join(file).exists(), "{file}");
+    }
+    assert_eq!(std::fs::read_dir(here.join("out/snapshots")).unwrap().count(), 0);
+    run(&["report", "out"]);
+    assert!(std::fs::read_to_string(here.join("out/report.html")).unwrap().contains("no snapshots"));
+
+    for (arguments, message) in [
+        (vec!["report", "nowhere"], "nothing of a run"),
+        (vec!["snapshot", "nowhere.data"], "nowhere.data"),
+        (vec!["snapshot", "scene.toml"], "scene.toml"),
+        (vec!["snapshot", "out/final.data", "--out", "a.gif"], ".svg or .png"),
+        (vec!["snapshot", "out/final.data", "--slice", "0"], "--slice"),
+        (vec!["snapshot", "out/dump.lammpstrj", "--frame", "3"], "no frame 3"),
+        (vec!["snapshot", "out/final.data", "--density", "--species", "G"], "no species G"),
+    ] {
+        let output = psidpd(here, &arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", said(&output));
+        assert!(said(&output).contains(message), "{arguments:?}: {}", said(&output));
+    }
+}
+
 /// What is wrong, and a part of what the program must say; all with exit code 2.
 #[test]
 fn bad_input_is_named_with_file_line_and_key() {
@@ -183,4 +238,42 @@ fn evaluations_beyond_bounds_are_counted_and_reported() {
     let free = write(here, "free.toml", &scene(""));
     let output = psidpd(here, &["run", &free, "--out", "out"]);
     assert!(!said(&output).contains("out of bounds"), "{}", said(&output));
+}
+
+/// What `new` writes runs as it is, and says how.
+#[test]
+fn every_template_can_be_written_checked_and_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let help = said(&psidpd(here, &["new", "--help"]));
+    for template in ["bulk", "slab", "droplet", "pendant-drop", "demixing", "collision", "channel"] {
+        assert!(help.contains(template), "{help}");
+        let output = psidpd(here, &["new", template, "--template", template, "--json", "new.json"]);
+        assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+        let scene = format!("{template}.toml");
+        assert!(said(&output).contains(&format!("psidpd run {scene} --out {template}")), "{}", said(&output));
+        let json: serde_json::Value =
+            serde_json::from_str(&std::fs::read_to_string(here.join("new.json")).unwrap()).unwrap();
+        assert!(here.join(json["model"].as_str().unwrap()).is_file(), "{json}");
+        let check = psidpd(here, &["check", &scene]);
+        assert_eq!(check.status.code(), Some(0), "{template}: {}", said(&check));
+        // The scene as it is, but for the number of steps.
+        let text = std::fs::read_to_string(here.join(&scene)).unwrap();
+        let short: String = text
+            .lines()
+            .map(|line| match line.trim_start().starts_with("steps") || line.starts_with("equilibrate") {
+                true => format!("{} = 20\n", line.split('=').next().unwrap_or_default()),
+                false => format!("{line}\n"),
+            })
+            .collect();
+        write(here, "short.toml", &short);
+        let run = psidpd(here, &["run", "short.toml", "--out", template]);
+        assert_eq!(run.status.code(), Some(0), "{template}: {}", said(&run));
+        let again = psidpd(here, &["new", template, "--template", template]);
+        assert_eq!(again.status.code(), Some(2));
+        assert!(said(&again).contains("is there already"), "{}", said(&again));
+    }
+    let unknown = psidpd(here, &["new", "x", "--template", "tube"]);
+    assert_eq!(unknown.status.code(), Some(2));
+    assert!(said(&unknown).contains("pendant-drop"), "{}", said(&unknown));
 }

@@ -11,6 +11,7 @@ title = "one species"
 model = "MODELS/warren2003-set6.toml"
 kT    = 1.0
 seed  = 11
+precision = "double"
 [box]
 lengths = [5.0, 6.0, 7.0]
 [initial]
@@ -30,6 +31,7 @@ title = "two species & stages"
 model = "mixture.toml"
 kT    = 1.0
 seed  = 12
+precision = "double"
 [box]
 lengths = [5.0, 5.0, 5.0]
 [masses]
@@ -97,6 +99,7 @@ title = "two dimensions"
 model = "flat.toml"
 kT    = 0.75
 seed  = 13
+precision = "double"
 [box]
 lengths = [7.0, 9.0]
 [initial]
@@ -123,6 +126,106 @@ F = "-kT*ln(1 - 0.016*n) - 0.0304*n - 0.0012*n^2"
 [[thermostat]]
 gamma = 1.0
 range = 1.0
+"#;
+
+/// A box of walls with a frozen floor and a frozen block, gravity on one part, a wind on one species of the
+/// other, a ramp, stages with and without thermostat and body forces. Hot enough that many particles reach the
+/// walls.
+const WALLS: &str = r#"
+title = "walls"
+model = "mixture.toml"
+kT    = 3.0
+seed  = 14
+precision = "double"
+dt    = 0.01
+[box]
+lengths  = [5.0, 6.0, 7.0]
+boundary = ["reflecting", "periodic", "reflecting"]
+[masses]
+B = 2.0
+[[part]]
+shape     = "layer"
+face      = "zlo"
+thickness = 1.0
+density   = 3.0
+lattice   = "fcc"
+frozen    = true
+[[part]]
+name    = "lower"
+shape   = "box"
+low     = [0.0, 0.0, 1.5]
+high    = [5.0, 6.0, 4.0]
+density = 3.0
+[[part]]
+shape   = "sphere"
+radius  = 0.5
+center  = [2.5, 3.0, 4.5]
+count   = 5
+frozen  = true
+[[part]]
+name    = "upper"
+shape   = "box"
+low     = [0.0, 0.0, 5.0]
+density = 3.0
+min_distance = 0.3
+velocity = [1.0, 0.0, 0.5]
+[[body_force]]
+acceleration = [0.3, -0.2, -0.5]
+parts        = ["upper"]
+[[body_force]]
+acceleration = [0.0, 0.7, 0.0]
+reversed_along = "z"
+parts        = ["lower", "upper"]
+species      = ["B"]
+[[stage]]
+name  = "free"
+steps = 10
+body_forces = false
+[[stage]]
+name  = "ramp"
+steps = 25
+kT    = [3.0, 5.0]
+levels = 3
+[[stage]]
+name  = "alone"
+steps = 15
+thermostat = false
+[[stage]]
+name  = "again"
+steps = 15
+body_forces = false
+[[stage]]
+name  = "and again"
+steps = 20
+integrator = "groot-warren"
+lambda = 0.5
+[output]
+thermo = 5
+dump   = 5
+"#;
+
+/// Opposite flows between two walls in two dimensions.
+const CHANNELS: &str = r#"
+title = "channels"
+model = "flat.toml"
+kT    = 2.5
+seed  = 15
+precision = "double"
+steps = 60
+dt    = 0.01
+[box]
+lengths  = [7.0, 9.0]
+boundary = ["periodic", "reflecting"]
+[initial]
+kind    = "lattice"
+lattice = "hexagonal"
+density = 12.0
+[[body_force]]
+acceleration   = [0.5, 0.0]
+reversed_along = "y"
+[output]
+thermo = 10
+dump   = 10
 "#;
 
 /// A folder with a scene in `scenes/`, its model and a table.
@@ -181,6 +284,40 @@ fn compare(scene: &str) {
         compare_rows(at);
         compare_ends(at);
     }
+}
+
+/// A deck says what the scene says; in mixed precision both go on alike until rounding has grown.
+#[test]
+fn precision_is_that_of_the_scene() {
+    let style = |scene: &str| {
+        let folder = folder(scene);
+        assert!(export(folder.path()).status.success());
+        let script = std::fs::read_to_string(folder.path().join("deck/in.lammps")).unwrap();
+        let line = script.lines().find(|l| l.starts_with("pair_style")).unwrap().to_owned();
+        (folder, line)
+    };
+    assert!(style(ONE_SPECIES).1.ends_with("dpd/psi 1.0 11 precision double"));
+    assert!(style(&ONE_SPECIES.replace("precision = \"double\"\n", "")).1.ends_with("dpd/psi 1.0 11"));
+    let (folder, line) =
+        style(&ONE_SPECIES.replace("\"double\"", "\"mixed\"").replace("dump   = 25", "dump   = 5"));
+    assert!(line.ends_with("dpd/psi 1.0 11 precision mixed"));
+    let at = folder.path();
+    let run = psidpd(at, &["run", "scenes/scene.toml", "--out", "native"]);
+    assert!(run.status.success(), "{}", said(&run));
+    let (host, plugin) = lammps();
+    let plugin = plugin.display().to_string();
+    let (deck, arguments) = (at.join("deck"), ["-var", "plugin", &plugin]);
+    host.run_script(1, &deck, Path::new("in.lammps"), &arguments, Duration::from_secs(120)).unwrap();
+    let read = |folder: &str| {
+        let mut frames = dump::read(&at.join(folder).join("dump.lammpstrj")).unwrap();
+        assert!(frames[1].sort_by_id() && frames[1].step == 5);
+        frames[1].vectors(["x", "y", "z"]).unwrap()
+    };
+    let most = |a: Vec<[f64; 3]>, b: Vec<[f64; 3]>| {
+        a.iter().zip(&b).map(|(a, b)| distance(*a, *b, [5.0, 6.0, 7.0])).fold(0.0, f64::max)
+    };
+    let off = most(read("native"), read("deck"));
+    assert!(off < 1e-6, "{off:e}");
 }
 
 /// The largest difference, by whole boxes where that is less.
@@ -269,6 +406,16 @@ fn two_dimensions() {
 }
 
 #[test]
+fn walls_frozen_particles_body_forces_and_a_ramp() {
+    compare(WALLS);
+}
+
+#[test]
+fn opposite_flows_between_walls_in_two_dimensions() {
+    compare(CHANNELS);
+}
+
+#[test]
 fn what_has_no_counterpart_is_refused() {
     let cases = [
         (
@@ -276,6 +423,10 @@ fn what_has_no_counterpart_is_refused() {
             "groot-warren with lambda = 0.65 has no counterpart",
         ),
         (ONE_SPECIES.replace("seed  = 11", "seed  = 0"), "the seed must be at least 1"),
+        (
+            ONE_SPECIES.to_owned() + &"[[body_force]]\nacceleration = [0.0, 0.0, 1.0]\n".repeat(10),
+            "more groups than LAMMPS has",
+        ),
         (ONE_SPECIES.replace("steps = 50", "steps = 3000000000"), "more than one run of LAMMPS takes"),
     ];
     for (scene, message) in cases {

@@ -12,15 +12,19 @@ use std::process::{Child, Command, Output, Stdio};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-/// Two stages, with everything that a run writes; a checkpoint takes about as long as the steps between two.
+/// A frozen floor, a body force, a ramp, observables, and everything that a run writes.
 fn scene() -> String {
     let model = root().join("validation/models/warren2003-set6.toml");
     format!(
         "title = \"small\"\nmodel = \"{}\"\nkT = 1.0\nseed = 3\n[box]\nlengths = [4.0, 4.0, 4.0]\n\
-         [initial]\nkind = \"lattice\"\ndensity = 6.05\n\
-         [[stage]]\nname = \"warm\"\nsteps = 400\ndt = 0.01\nkT = 1.5\nintegrator = \"groot-warren\"\n\
+         [[part]]\nshape = \"layer\"\nface = \"zlo\"\nthickness = 0.6\ndensity = 6.05\nlattice = \"fcc\"\nfrozen = true\n\
+         [[part]]\nshape = \"rest\"\ndensity = 6.05\nlattice = \"sc\"\n\
+         [[body_force]]\nacceleration = [0.05, 0.0, 0.0]\n\
+         [[stage]]\nname = \"warm\"\nsteps = 400\ndt = 0.01\nkT = [1.5, 1.0]\nlevels = 4\nintegrator = \"groot-warren\"\n\
          [[stage]]\nname = \"run\"\nsteps = 1100\ndt = 0.01\n\
-         [output]\nthermo = 5\ndump = 25\ncheckpoint = 10\n",
+         [output]\nthermo = 5\ndump = 25\nxyz = 50\nsnapshot = 300\ncheckpoint = 100\n\
+         [observe]\nrdf = {{ stages = [\"warm\", \"run\"] }}\ntemperature = true\nvelocity_profile = true\n\
+         msd = {{ length = 20 }}\n",
         model.display()
     )
 }
@@ -59,14 +63,18 @@ fn wait_for(child: &mut Child, file: &Path, length: u64) {
     }
 }
 
-/// Every file of a run but the one that tells times.
+/// Every file of a run and of the folders in it, but the one that tells times.
 fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
-    let mut files: BTreeMap<String, Vec<u8>> = std::fs::read_dir(folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
-        .map(|path| (path.file_name().unwrap().to_str().unwrap().to_owned(), std::fs::read(path).unwrap()))
-        .collect();
-    assert!(files.remove("timing.json").is_some());
+    let mut files = BTreeMap::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_str().unwrap().to_owned();
+        if path.is_dir() {
+            files.extend(contents(&path).into_iter().map(|(file, bytes)| (format!("{name}/{file}"), bytes)));
+        } else if name != "timing.json" {
+            files.insert(name, std::fs::read(&path).unwrap());
+        }
+    }
     files
 }
 
@@ -90,6 +98,11 @@ fn whole() -> &'static Path {
     WHOLE.get_or_init(|| {
         let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("whole-run");
         finished(&run(folder().path(), out.to_str().unwrap(), &["--overwrite"]));
+        let files = contents(&out);
+        for name in ["observables.json", "observables/rdf-warm.csv", "observables/velocity_profile.csv"] {
+            assert!(files.contains_key(name), "{:?}", files.keys());
+        }
+        assert_eq!(files.keys().filter(|name| name.starts_with("snapshots/")).count(), 6);
         out
     })
 }
@@ -108,14 +121,17 @@ fn a_run_killed_ten_times_ends_in_the_same_bytes() {
     let folder = folder();
     let here = folder.path();
     let whole = whole();
+    // Often enough that many moments are within the writing of one.
+    std::fs::write(here.join("s.toml"), scene().replace("checkpoint = 100", "checkpoint = 10")).unwrap();
     let length = whole.join("thermo.csv").metadata().unwrap().len() as f64;
     let mut random = StdRng::seed_from_u64(20);
     let mut moments: Vec<f64> = (0..10).map(|_| random.random_range(0.0..0.8)).collect();
     moments.sort_by(f64::total_cmp);
     let out = here.join("killed");
     let mut killed = 0;
-    for moment in moments {
-        let mut child = start(here, "s.toml", "killed", &["--resume"]);
+    for (k, moment) in moments.into_iter().enumerate() {
+        let threads = if k % 2 == 0 { "1" } else { "2" };
+        let mut child = start(here, "s.toml", "killed", &["--resume", "--threads", threads]);
         wait_for(&mut child, &out.join("thermo.csv"), (moment * length) as u64);
         // Between rows, within a checkpoint, or still before the first step.
         std::thread::sleep(Duration::from_micros(random.random_range(0..8000)));
@@ -248,17 +264,19 @@ fn a_full_disk_leaves_the_last_good_state() {
     let whole = whole();
     let out = here.join("full");
     // Room for checkpoints, but not for the dump.
-    let output = limited(here, "s.toml", "full", 600);
+    let output = limited(here, "s.toml", "full", 2000);
     let words = said(&output);
     assert_eq!(output.status.code(), Some(1), "{words}");
     assert!(words.contains("dump.lammpstrj cannot be written"), "{words}");
     assert!(words.contains("--resume"), "{words}");
-    assert_eq!(read_state(&out).unwrap().len(), 387);
+    assert_eq!(read_state(&out).unwrap().len(), read_state(whole).unwrap().len());
     let words = finished(&run(here, "full", &["--resume"]));
     assert!(words.contains("going on after step "), "{words}");
     assert_same(whole, &out);
     // No room for a single checkpoint: that is found out before the first step.
-    std::fs::write(here.join("slim.toml"), scene().replace("dump = 25", "dump = 0")).unwrap();
+    let slim = scene().replace("dump = 25\nxyz = 50\nsnapshot = 300\n", "");
+    assert!(slim != scene());
+    std::fs::write(here.join("slim.toml"), slim).unwrap();
     let output = limited(here, "slim.toml", "none", 10);
     let words = said(&output);
     assert_eq!(output.status.code(), Some(1), "{words}");

@@ -6,6 +6,7 @@ pub mod crosscheck;
 pub mod export;
 pub mod lammps;
 pub mod observe;
+pub mod output;
 pub mod report;
 pub mod run;
 pub mod scene;

@@ -411,7 +411,8 @@ fn every_file_is_in_the_table_and_opens_with_a_comment() {
 fn every_scene_opens() {
     let scenes = folder().with_file_name("scenes");
     let mut used = BTreeSet::new();
-    for file in std::fs::read_dir(scenes).unwrap().map(|e| e.unwrap().path()) {
+    let files = std::fs::read_dir(scenes).unwrap().map(|e| e.unwrap().path());
+    for file in files.filter(|f| f.is_file()) {
         let scene = psidpd::scene::Scene::open(&file).unwrap_or_else(|e| panic!("{e}"));
         used.insert(scene.model_path.file_stem().unwrap().to_string_lossy().into_owned());
     }

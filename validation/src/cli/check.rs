@@ -1,6 +1,6 @@
 use super::{Failure, Verdict, write_json};
 use crate::check::{Conditions, Findings, Severity, check};
-use crate::scene::{Initial, Scene};
+use crate::scene::Scene;
 use psidpd_core::document::Document;
 use psidpd_core::model::Model;
 use std::path::{Path, PathBuf};
@@ -31,7 +31,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     let document = Document::open(&arguments.file).map_err(Failure::new)?;
     let (model, kt, densities) = if document.root().get("model").is_some() {
         let scene = Scene::open(&arguments.file).map_err(Failure::new)?;
-        let densities = scene_densities(&scene);
+        let densities = scene.densities();
         (scene.model.clone(), scene.kt, Some(densities))
     } else {
         (Model::open(&arguments.file).map_err(Failure::new)?, 1.0, None)
@@ -44,20 +44,6 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     print(&findings, model.species());
     write_json(json, &findings)?;
     Ok(if findings.works() { Verdict::Good } else { Verdict::CheckFailed })
-}
-
-/// Number densities of the filled part of a scene.
-fn scene_densities(scene: &Scene) -> Vec<f64> {
-    let state = scene.initial_state();
-    let volume = match &scene.initial {
-        Initial::Filling(filling) => filling.volume(&scene.domain, scene.model.dimensions()),
-        Initial::File { .. } => scene.domain.volume(scene.model.dimensions()),
-    };
-    let mut counts = vec![0.0; scene.model.species().len()];
-    for species in &state.species {
-        counts[*species as usize] += 1.0;
-    }
-    counts.iter().map(|n| n / volume).collect()
 }
 
 fn print(findings: &Findings, species: &[String]) {

@@ -10,7 +10,10 @@ mod diagnostic;
 mod export;
 mod forces;
 mod lammps;
+mod new;
+mod report;
 mod run;
+mod snapshot;
 mod theory;
 mod validate;
 
@@ -41,8 +44,14 @@ enum Verb {
     Check(check::Arguments),
     /// Mean field: equation of state, critical point, spinodal, binodal, surface tension.
     Theory(theory::Arguments),
+    /// Write a scene to begin with, and its model.
+    New(new::Arguments),
     /// Run a scene natively.
     Run(run::Arguments),
+    /// Make report.html of a run again, from the files in its folder.
+    Report(report::Arguments),
+    /// A picture of the particles, or of their density, in a data, dump or XYZ file.
+    Snapshot(snapshot::Arguments),
     /// Energy, virial, densities and forces of one configuration.
     Forces(forces::Arguments),
     /// Write a fluid for another code.
@@ -72,7 +81,10 @@ pub fn main() -> ExitCode {
         Verb::Check(a) => check::run(a, json),
         Verb::Theory(a) => theory::run(a, json),
         Verb::Export(a) => export::run(a, json),
+        Verb::New(a) => new::run(a, json),
         Verb::Run(a) => run::run(a, json),
+        Verb::Report(a) => report::run(a, json),
+        Verb::Snapshot(a) => snapshot::run(a, json),
         Verb::Forces(a) => forces::run(a, json),
         Verb::Lammps(a) => lammps::run(a, json),
     };

@@ -1,11 +1,13 @@
 use super::{Failure, Verdict, write_json};
-use crate::report::Progress;
+use crate::report::{Progress, write_run_report};
 use crate::run::{Begin, Outcome, Runner, Start, Summary, Timing};
 use crate::scene::Scene;
+use psidpd_core::engine::Precision;
 use serde::Serialize;
 use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::flag;
 use std::io::Write;
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize};
@@ -27,6 +29,15 @@ pub struct Arguments {
     /// Start over where a run waits to be taken up again.
     #[arg(long)]
     overwrite: bool,
+    /// Threads that share the work; what a run writes does not depend on their number.
+    #[arg(long, value_name = "N", default_value = "1")]
+    threads: NonZeroUsize,
+    /// In what the forces of pairs are computed; as the scene says if left out, or else mixed.
+    #[arg(long, value_parser = precision, value_name = "mixed|double")]
+    precision: Option<Precision>,
+    /// Make report.html at the end, also of a run that stopped.
+    #[arg(long)]
+    report: bool,
 }
 
 /// What `--json` writes.
@@ -38,8 +49,9 @@ struct Report<'a> {
 }
 
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
-    let Arguments { scene: path, out, resume, overwrite } = arguments;
-    let scene = Scene::open(path).map_err(Failure::new)?;
+    let Arguments { scene: path, out, resume, overwrite, threads, precision, report } = arguments;
+    let mut scene = Scene::open(path).map_err(Failure::new)?;
+    scene.precision = precision.or(scene.precision);
     let begin = match (resume, overwrite) {
         (true, _) => Begin::Resume,
         (_, true) => Begin::Overwrite,
@@ -47,12 +59,20 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     };
     let stop = watch_signals().map_err(Failure::new)?;
     let mut runner = Runner::begin(&scene, out, begin).map_err(Failure::new)?;
+    runner.set_threads(*threads).map_err(Failure::new)?;
     let total: u64 = scene.stages.iter().map(|s| s.steps).sum();
     let made = tell_start(runner.start(), begin, out, total);
     let bar = Progress::new().steps(&scene.title, total, made, runner.particles());
-    let outcome = runner.run(&stop, &mut |p| bar.set(p.step)).map_err(Failure::new);
+    let outcome = runner.run(&stop, &mut |p| bar.set(p.step));
     bar.finish();
-    match outcome? {
+    if *report && outcome.as_ref().err().is_none_or(|e| e.is_stop()) {
+        let page = write_run_report(out);
+        // A full disk has no room for a page either, and the run's own message says more.
+        if outcome.is_ok() {
+            page.map_err(Failure::new)?;
+        }
+    }
+    match outcome.map_err(Failure::new)? {
         Outcome::Finished { summary, timing } => {
             say(&summary.to_string());
             if let Some(session) = timing.sessions.last().filter(|_| made < total) {
@@ -76,6 +96,12 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
             Ok(Verdict::Interrupted(u8::try_from(stop).unwrap_or(0)))
         }
     }
+}
+
+/// A precision by its name.
+fn precision(name: &str) -> Result<Precision, String> {
+    let found = Precision::ALL.iter().find(|(known, _)| *known == name);
+    found.map(|(_, precision)| *precision).ok_or_else(|| "expected mixed or double".into())
 }
 
 /// Says what a run begins with, if that is not its beginning; gives the steps made.

@@ -4,8 +4,11 @@
 //! runner computes the forces of the present step anew where a stage begins, as LAMMPS does where a `run`
 //! begins, and both key the noise of a step by its number, so stages become `run` commands.
 
+mod physics;
+
 use crate::run::{Integrator, RunError};
 use crate::scene::{Scene, Stage};
+use physics::Physics;
 use psidpd_core::document::{Document, FileError};
 use psidpd_core::model::{Fluid, Model};
 use std::fmt::Write;
@@ -22,6 +25,9 @@ pub const MODEL_WITHOUT_THERMOSTAT: &str = "model-without-thermostat.toml";
 
 /// Most steps of one `run` command.
 const MOST_STEPS: u64 = i32::MAX as u64;
+
+/// Each may need three of the 32 groups.
+const MOST_BODY_FORCES: usize = 9;
 
 /// Why a scene cannot be written as a deck.
 #[derive(Debug, thiserror::Error)]
@@ -49,6 +55,12 @@ pub enum DeckError {
         /// Its steps.
         steps: u64,
     },
+    /// Halves of a box with tilt are not told by a coordinate.
+    #[error("reversed_along has no counterpart in a deck for a box with tilt")]
+    Tilt,
+    /// LAMMPS has so many groups.
+    #[error("{0} body forces need more groups than LAMMPS has: at most {MOST_BODY_FORCES} can be written")]
+    BodyForces(usize),
     /// The thermostat could not be cut out of the text of the model.
     #[error(
         "{}: cannot take the thermostat out for the stages without; write it as [[thermostat]] sections",
@@ -128,6 +140,14 @@ pub fn write(scene: &Scene, out: &Path) -> Result<Vec<PathBuf>, DeckError> {
 fn check(scene: &Scene) -> Result<(), DeckError> {
     if scene.seed == 0 {
         return Err(DeckError::Seed(scene.seed));
+    }
+    let reversed = scene.body_forces.iter().any(|b| b.reversed_along.is_some());
+    let orthogonal = (0..3).all(|k| (0..3).all(|c| c == k || scene.domain.edge(k)[c] == 0.0));
+    if reversed && !orthogonal {
+        return Err(DeckError::Tilt);
+    }
+    if scene.body_forces.len() > MOST_BODY_FORCES {
+        return Err(DeckError::BodyForces(scene.body_forces.len()));
     }
     for stage in &scene.stages {
         if stage.steps > MOST_STEPS {
@@ -250,26 +270,24 @@ fn script(scene: &Scene) -> String {
 }
 
 fn write_script(scene: &Scene, s: &mut String) -> std::fmt::Result {
-    let flat = scene.model.dimensions() == 2;
+    let physics = Physics::of(scene);
     writeln!(s, "# {}", one_line(&scene.title))?;
     writeln!(s, "# lmp -in {SCRIPT} -var plugin PATH/psidpdplugin.so\n")?;
     writeln!(s, "variable      plugin index psidpdplugin.so\n")?;
     writeln!(s, "units         lj")?;
     writeln!(s, "dimension     {}", scene.model.dimensions())?;
-    writeln!(s, "boundary      p p p")?;
+    writeln!(s, "boundary      {}", physics.boundary())?;
     writeln!(s, "atom_style    atomic")?;
     writeln!(s, "newton        on")?;
     writeln!(s, "comm_modify   vel yes")?;
     writeln!(s, "read_data     {START}\n")?;
     writeln!(s, "# to be left out where LAMMPS has the styles already")?;
     writeln!(s, "plugin        load ${{plugin}}\n")?;
-    writeln!(s, "fix           move all nve")?;
-    if flat {
-        writeln!(s, "fix           plane all enforce2d")?;
-    }
+    physics.write_motion(s)?;
     writeln!(s)?;
     writeln!(s, "thermo_style  custom step time temp pe ke press pxx pyy pzz pxy pxz pyz")?;
     writeln!(s, "thermo_modify norm no format float %.17g")?;
+    physics.write_temperature(s)?;
     writeln!(s, "thermo        {}", scene.output.thermo)?;
     if scene.output.dump > 0 {
         writeln!(
@@ -281,7 +299,7 @@ fn write_script(scene: &Scene, s: &mut String) -> std::fmt::Result {
     }
     let mut before: Option<&Stage> = None;
     for stage in &scene.stages {
-        writeln!(s, "\n# {}", one_line(&stage.name))?;
+        writeln!(s, "\n# {}", one_line(&stage.label()))?;
         if let Integrator::GrootWarren { .. } = stage.integrator {
             writeln!(s, "# groot-warren with lambda = 0.5 is velocity Verlet")?;
         }
@@ -290,8 +308,14 @@ fn write_script(scene: &Scene, s: &mut String) -> std::fmt::Result {
             if !stage.thermostat {
                 writeln!(s, "# thermostat = false: a copy of the model without drag and noise")?;
             }
-            writeln!(s, "pair_style    dpd/psi {:?} {}", stage.kt, scene.seed)?;
+            let precision = scene.precision.map_or(String::new(), |p| format!(" precision {p}"));
+            writeln!(s, "pair_style    dpd/psi {:?} {}{precision}", stage.kt, scene.seed)?;
             writeln!(s, "pair_coeff    * * {model} {}", scene.model.species().join(" "))?;
+        }
+        match (before.is_some_and(|b| b.body_forces), stage.body_forces) {
+            (false, true) => physics.write_body_forces(s)?,
+            (true, false) => physics.write_end_of_body_forces(s)?,
+            _ => {}
         }
         writeln!(s, "timestep      {:?}", stage.dt)?;
         writeln!(s, "run           {}", stage.steps)?;

@@ -1,15 +1,34 @@
 //! Observables: read, never drive.
 //!
-//! Pure functions on recorded series and frames. All quantities are in the
-//! reduced units of the simulation (length r_c, energy k_B T, mass m), and no
-//! function panics, whatever it is given.
+//! [`read`] reads what a scene asks for; [`Observers`] measures it as the run goes, each observable a
+//! [`meter`]; [`Observation`]s come out, with error bars. The rest are functions on recorded series and
+//! frames. All quantities are in the reduced units of the simulation (length r_c, energy k_B T, mass m),
+//! and no function panics, whatever it is given.
 
 pub mod drift;
+pub mod frame;
+pub mod interactions;
+pub mod keys;
+pub mod landscape;
+pub mod meter;
+pub mod observation;
+pub mod observers;
+pub mod pairs;
 pub mod profile;
+pub mod request;
+pub mod series;
 pub mod statistics;
 pub mod surface_tension;
+pub mod young_laplace;
 
 pub use drift::{Drift, DriftError, drift};
+pub use observation::{Abscissa, Column, Kind, Observation, write_csv, write_json};
+pub use observers::Observers;
 pub use profile::{DensityProfile, ProfileAccumulator, ProfileError, interface_width};
+pub use request::{Observe, Request, read};
+pub use series::{Measured, Series};
 pub use statistics::{Comparison, Estimate, StatisticsError, difference, estimate, threshold};
 pub use surface_tension::{TensionError, tension_series};
+
+#[cfg(test)]
+mod tests;

@@ -237,6 +237,25 @@ fn mean_and_error(counts: &[f64]) -> Result<(f64, f64), StatisticsError> {
 /// beyond the flank, as wide as the flank, or narrower than one bin.
 #[must_use]
 pub fn interface_width(profile: &DensityProfile) -> Option<f64> {
+    Some(interface(profile)?.width)
+}
+
+/// What [`interface_width`] fits to a flank.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Interface {
+    /// ρ_L.
+    pub liquid: f64,
+    /// ρ_V.
+    pub vapour: f64,
+    /// s₀, from the centre.
+    pub place: f64,
+    /// w = 2d.
+    pub width: f64,
+}
+
+/// The fit of [`interface_width`], the mean of both flanks; `None` as there.
+#[must_use]
+pub fn interface(profile: &DensityProfile) -> Option<Interface> {
     let (centres, density) = (&profile.centres, &profile.density);
     if centres.len() != density.len() || centres.len() < 2 * FLANK_BINS {
         return None;
@@ -258,13 +277,19 @@ pub fn interface_width(profile: &DensityProfile) -> Option<f64> {
             .filter(|(s, _)| *s > 0.25 * height)
             .collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
-        flank_width(&points, height)
+        flank_interface(&points, height)
     };
-    Some(0.5 * (flank(1.0)? + flank(-1.0)?))
+    let (a, b) = (flank(1.0)?, flank(-1.0)?);
+    Some(Interface {
+        liquid: 0.5 * (a.liquid + b.liquid),
+        vapour: 0.5 * (a.vapour + b.vapour),
+        place: 0.5 * (a.place + b.place),
+        width: 0.5 * (a.width + b.width),
+    })
 }
 
-/// 2d of one flank: (distance from the centre, density), distances increasing.
-fn flank_width(points: &[(f64, f64)], height: f64) -> Option<f64> {
+/// The fit to one flank: (distance from the centre, density), distances increasing by `height`.
+pub(super) fn flank_interface(points: &[(f64, f64)], height: f64) -> Option<Interface> {
     if points.len() < FLANK_BINS {
         return None;
     }
@@ -279,7 +304,12 @@ fn flank_width(points: &[(f64, f64)], height: f64) -> Option<f64> {
     let fit = fit_flank(&scaled, extent)?;
     let width = 2.0 * fit[3].exp();
     let slab = fit[0] > fit[1] && fit[2] > 0.0 && fit[2] < extent;
-    (slab && width >= 1.0 && width < extent).then_some(width * height)
+    (slab && width >= 1.0 && width < extent).then_some(Interface {
+        liquid: fit[0] * scale,
+        vapour: fit[1] * scale,
+        place: fit[2] * height,
+        width: width * height,
+    })
 }
 
 /// Levenberg–Marquardt for (ρ_L, ρ_V, s₀, ln d), lengths in bins.

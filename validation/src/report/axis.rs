@@ -61,9 +61,25 @@ impl Axis {
         if log { Self::log(lo, hi, wanted) } else { Self::linear(lo, hi, wanted) }
     }
 
+    /// A linear axis from `lo` to `hi` exactly; ends that span no range get one of length 1.
+    pub fn exact(lo: f64, hi: f64, wanted: usize) -> Self {
+        let (lo, hi) = if hi > lo && (hi - lo).is_finite() { (lo, hi) } else { (0.0, 1.0) };
+        let scale = 10f64.powi(exponent(lo.abs().max(hi.abs())));
+        let (lo, hi) = (lo / scale, hi / scale);
+        let map = Map { log: false, scale, lo, hi };
+        let (ticks, factor) = linear_ticks(&map, lo, hi, scale, wanted.max(2));
+        Self { map, ticks, factor }
+    }
+
     /// Position of a value along the axis, if it can be shown.
     pub fn fraction(&self, value: f64) -> Option<f64> {
         self.map.fraction(value)
+    }
+
+    /// Position of a value within the ends of the axis.
+    pub fn inside(&self, value: f64) -> Option<f64> {
+        let v = if self.map.log { value.log10() } else { value / self.map.scale };
+        (self.map.lo..=self.map.hi).contains(&v).then(|| self.map.fraction(value))?
     }
 
     fn linear(lo: f64, hi: f64, wanted: usize) -> Self {
@@ -189,6 +205,16 @@ mod tests {
         let axis = Axis::around([0.0, 4e7].into_iter(), false, 5);
         assert_eq!(labels(&axis), ["0", "1", "2", "3", "4"]);
         assert_eq!(axis.factor.as_deref(), Some("×10⁷"));
+    }
+
+    #[test]
+    fn an_exact_axis_ends_where_it_is_told() {
+        let axis = Axis::exact(-2.0, 18.0, 5);
+        assert_eq!((axis.fraction(-2.0), axis.fraction(18.0)), (Some(0.0), Some(1.0)));
+        assert_eq!(labels(&axis), ["0", "5", "10", "15"]);
+        for (lo, hi) in [(0.0, 0.0), (f64::NAN, 1.0), (1.0, -1.0), (0.0, f64::INFINITY), (0.0, 1e-300)] {
+            assert!(labels(&Axis::exact(lo, hi, 5)).len() >= 2);
+        }
     }
 
     #[test]

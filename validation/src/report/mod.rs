@@ -7,18 +7,23 @@
 
 mod axis;
 mod error;
+pub mod figure;
 pub mod files;
 pub mod html;
 pub mod plot;
 pub mod progress;
+pub mod quantity;
 pub mod results;
+pub mod run;
 pub mod table;
 mod text;
 
 pub use error::ReportError;
+pub use figure::Figure;
 pub use files::write_atomically;
 pub use html::{Item, Report, Section};
 pub use plot::{Plot, Series, Style};
 pub use progress::{Bar, Progress};
 pub use results::{Check, Results};
+pub use run::{RunReportError, run_report, write_run_report};
 pub use table::{Align, Table};

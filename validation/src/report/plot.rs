@@ -13,6 +13,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use super::ReportError;
 use super::axis::Axis;
 use super::text::{escape, fit, width};
+use crate::output::picture::colour;
 
 /// How a series is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -24,6 +25,8 @@ pub enum Style {
     Points,
     /// A dashed line; errors appear as a band.
     Dashed,
+    /// A thin pale line, for single values behind their mean.
+    Faint,
 }
 
 /// One set of data.
@@ -58,6 +61,8 @@ pub struct Plot {
     pub log_y: bool,
     /// Horizontal reference lines with labels.
     pub levels: Vec<(f64, String)>,
+    /// Vertical reference lines, such as the ends of stages, with labels above the plot.
+    pub marks: Vec<(f64, String)>,
 }
 
 /// Drawing units per pixel: plotters has whole coordinates only.
@@ -78,17 +83,11 @@ const GREY: RGBColor = RGBColor(0x6B, 0x6B, 0x6B);
 const GRID: RGBColor = RGBColor(0xE3, 0xE3, 0xE3);
 const FAINT: RGBColor = RGBColor(0xF2, 0xF2, 0xF2);
 
-/// Okabe and Ito's colours for all kinds of sight, without the yellow, which
-/// is hard to see on white.
-const COLOURS: [RGBColor; 7] = [
-    RGBColor(0x00, 0x72, 0xB2),
-    RGBColor(0xD5, 0x5E, 0x00),
-    RGBColor(0x00, 0x9E, 0x73),
-    RGBColor(0xCC, 0x79, 0xA7),
-    RGBColor(0xE6, 0x9F, 0x00),
-    RGBColor(0x56, 0xB4, 0xE9),
-    RGBColor(0x00, 0x00, 0x00),
-];
+/// The colour of the k-th series.
+fn colour_of(k: usize) -> RGBColor {
+    let [r, g, b] = colour::of_species(k);
+    RGBColor(r, g, b)
+}
 
 impl Plot {
     /// Draws the plot as an SVG document without prolog, fit for embedding.
@@ -160,7 +159,8 @@ impl Layout {
             let points = s.points.iter().enumerate().map(|(i, &(x, y))| (i, x, y));
             points.filter(|&(_, x, y)| fits(x, plot.log_x) && fits(y, plot.log_y)).collect()
         };
-        let mut xs = Vec::new();
+        let mut xs: Vec<f64> =
+            plot.marks.iter().map(|mark| mark.0).filter(|x| fits(*x, plot.log_x)).collect();
         let mut ys: Vec<f64> = plot.levels.iter().map(|level| level.0).collect();
         for series in &plot.series {
             for (i, x, y) in shown(series) {
@@ -180,6 +180,9 @@ impl Layout {
         let mut top = if plot.title.is_empty() { 14.0 } else { 40.0 };
         if y.factor.is_some() {
             top += 14.0;
+        }
+        if plot.marks.iter().any(|m| !m.1.trim().is_empty()) {
+            top += 16.0;
         }
         let mut below = top + HEIGHT + 24.0;
         if !plot.x_label.is_empty() {
@@ -247,7 +250,7 @@ impl Canvas<'_> {
         self.area.fill(&WHITE)?;
         self.grid()?;
         for (i, series) in plot.series.iter().enumerate() {
-            self.spread(series, COLOURS[i % COLOURS.len()])?;
+            self.spread(series, colour_of(i))?;
         }
         for &(level, _) in &plot.levels {
             if let Some(y) = self.layout.y.fraction(level) {
@@ -255,6 +258,7 @@ impl Canvas<'_> {
                 self.dashed(&[(self.layout.left, y), (self.layout.right, y)], GREY, 1.2, (2.0, 3.0))?;
             }
         }
+        self.marks(plot)?;
         for (i, series) in plot.series.iter().enumerate() {
             self.series(i, series)?;
         }
@@ -335,6 +339,29 @@ impl Canvas<'_> {
         Ok(())
     }
 
+    /// Vertical reference lines. Labels begin at their lines; one that would touch the label before it is
+    /// left out.
+    fn marks(&self, plot: &Plot) -> Fallible {
+        let l = &self.layout;
+        let mut marks: Vec<(f64, &str)> = plot
+            .marks
+            .iter()
+            .filter_map(|(x, text)| Some((l.place_x(l.x.inside(*x)?), text.as_str())))
+            .collect();
+        marks.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut free = l.left;
+        for (x, text) in marks {
+            self.dashed(&[(x, l.place_y(0.0)), (x, l.place_y(1.0))], GREY, 1.2, (2.0, 3.0))?;
+            let text = fit(text, SMALL, LEVEL_ROOM);
+            let end = x + 4.0 + width(&text, SMALL);
+            if x >= free && end <= WIDTH {
+                self.text(&text, (x + 4.0, l.top - 5.0), SMALL, GREY, (HPos::Left, VPos::Bottom))?;
+                free = end + 6.0;
+            }
+        }
+        Ok(())
+    }
+
     /// Labels of reference lines to the right of the plot, kept apart.
     fn level_labels(&self, plot: &Plot) -> Fallible {
         let l = &self.layout;
@@ -365,10 +392,11 @@ impl Canvas<'_> {
             let Some(series) = plot.series.get(entry.series) else {
                 continue;
             };
-            let colour = COLOURS[entry.series % COLOURS.len()];
+            let colour = colour_of(entry.series);
             let ends = [(entry.x, entry.y), (entry.x + SAMPLE, entry.y)];
             match series.style {
                 Style::Line => self.line(&ends, colour.stroke_width(stroke(2.0)))?,
+                Style::Faint => self.line(&ends, colour.mix(FAINTNESS).stroke_width(stroke(1.4)))?,
                 Style::Dashed => self.dashed(&ends, colour, 2.0, DASH)?,
                 Style::Points => self.marker(entry.series, (entry.x + SAMPLE / 2.0, entry.y))?,
             }
@@ -422,7 +450,7 @@ impl Canvas<'_> {
     }
 
     fn series(&self, index: usize, series: &Series) -> Fallible {
-        let colour = COLOURS[index % COLOURS.len()];
+        let colour = colour_of(index);
         for run in self.runs(series) {
             let path: Vec<Pixel> = run.iter().map(|s| s.at).collect();
             match (series.style, path.as_slice()) {
@@ -435,6 +463,7 @@ impl Canvas<'_> {
                     self.area.draw(&Circle::new(unit(at), stroke(2.0) as i32, colour.filled()))?;
                 }
                 (Style::Line, path) => self.line(path, colour.stroke_width(stroke(1.8)))?,
+                (Style::Faint, path) => self.line(path, colour.mix(FAINTNESS).stroke_width(stroke(1.0)))?,
                 (Style::Dashed, path) => self.dashed(path, colour, 1.8, DASH)?,
             }
         }
@@ -443,7 +472,7 @@ impl Canvas<'_> {
 
     /// A marker whose shape, too, tells series apart.
     fn marker(&self, index: usize, at: Pixel) -> Fallible {
-        let fill = COLOURS[index % COLOURS.len()].filled();
+        let fill = colour_of(index).filled();
         let polygon = |corners: &[Pixel]| {
             let corners = corners.iter().map(|c| unit((at.0 + c.0, at.1 + c.1)));
             Polygon::new(corners.collect::<Vec<_>>(), fill)
@@ -495,6 +524,9 @@ impl Canvas<'_> {
     }
 }
 
+/// Opacity of faint lines.
+const FAINTNESS: f64 = 0.55;
+
 /// Dash and gap of dashed series.
 const DASH: (f64, f64) = (7.0, 4.0);
 
@@ -536,12 +568,13 @@ mod tests {
                 Series { name: "none".into(), ..Series::default() },
             ],
             levels: vec![(2.5, "level\0".into()), (f64::NAN, "hidden".into())],
+            marks: vec![(1.0, "mark".into()), (f64::NAN, "hidden".into())],
             ..Plot::default()
         };
         let svg = plot.render().unwrap();
         assert!(!svg.contains("<script") && !svg.contains("NaN"));
         let texts = texts(&svg);
-        for text in ["Title", "time", "<script>alert(1)</script>", "a & b", "none", "level\u{FFFD}"] {
+        for text in ["Title", "time", "<script>alert(1)</script>", "a & b", "none", "mark", "level\u{FFFD}"] {
             assert!(texts.iter().any(|t| t == text), "{text} is not in {texts:?}");
         }
         assert!(!texts.iter().any(|t| t == "hidden"));
@@ -554,7 +587,7 @@ mod tests {
     }
 
     fn style() -> impl Strategy<Value = Style> {
-        prop_oneof![Just(Style::Line), Just(Style::Points), Just(Style::Dashed)]
+        prop_oneof![Just(Style::Line), Just(Style::Points), Just(Style::Dashed), Just(Style::Faint)]
     }
 
     prop_compose! {
@@ -578,7 +611,8 @@ mod tests {
             levels in prop::collection::vec(any::<(f64, String)>(), 0..4),
         ) {
             let (title, x_label, y_label) = labels;
-            let plot = Plot { title, x_label, y_label, series, log_x: logs.0, log_y: logs.1, levels };
+            let marks = levels.clone();
+            let plot = Plot { title, x_label, y_label, series, log_x: logs.0, log_y: logs.1, levels, marks };
             texts(&plot.render().unwrap());
         }
     }

@@ -76,6 +76,26 @@ pub(super) fn superscript(n: i32) -> String {
         .collect()
 }
 
+/// Powers as superscripts: `r_c^-3` becomes `r_c⁻³`. Other exponents stay as they are.
+pub(super) fn typeset(text: &str) -> String {
+    let mut out = String::new();
+    let mut rest = text;
+    while let Some((before, after)) = rest.split_once('^') {
+        out.push_str(before);
+        let sign = usize::from(after.starts_with('-'));
+        let digits = after[sign..].chars().take_while(char::is_ascii_digit).count();
+        match after[..sign + digits].parse() {
+            Ok(power) => out.push_str(&superscript(power)),
+            Err(_) => {
+                out.push('^');
+                out.push_str(&after[..sign + digits]);
+            }
+        }
+        rest = &after[sign + digits..];
+    }
+    out + rest
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -97,5 +117,7 @@ mod tests {
     #[test]
     fn superscripts() {
         assert_eq!(superscript(-120), "⁻¹²⁰");
+        assert_eq!(typeset("kT/r_c^2, r_c^-3, (m/kT)^(1/2)"), "kT/r_c², r_c⁻³, (m/kT)^(1/2)");
+        assert_eq!(typeset("a^b^ ^-^99999999999"), "a^b^ ^-^99999999999");
     }
 }

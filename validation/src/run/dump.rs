@@ -16,7 +16,7 @@ pub fn write_frame(simulation: &Simulation, to: &mut impl Write) -> io::Result<(
         step: simulation.step_number() as i64,
         boxlo: origin,
         boxhi: std::array::from_fn(|k| origin[k] + lengths[k]),
-        periodic: [true, true, simulation.dimensions() == 3],
+        periodic: std::array::from_fn(|k| domain.periodic()[k] && k < simulation.dimensions()),
         ids: &ids,
         kinds: &kinds,
         x: simulation.positions(),

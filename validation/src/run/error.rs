@@ -114,6 +114,9 @@ pub enum RunError {
     /// A data file cannot be written.
     #[error(transparent)]
     Lammps(#[from] crate::lammps::LammpsError),
+    /// A description or a picture of a run cannot be written.
+    #[error(transparent)]
+    Picture(#[from] crate::output::OutputError),
     /// A file or folder cannot be written.
     #[error("{} cannot be written: {source}", path.display())]
     Output {
@@ -135,6 +138,11 @@ impl RunError {
                 | RunError::Velocity { .. }
                 | RunError::Runaway { .. }
         )
+    }
+
+    /// Whether a file is the trouble, not the physics.
+    pub(super) fn is_output(&self) -> bool {
+        matches!(self, RunError::Output { .. } | RunError::Picture(_) | RunError::Lammps(_))
     }
 
     /// What can be done about it, where that is not in the message.

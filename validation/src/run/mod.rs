@@ -4,6 +4,7 @@
 //! drives it through the stages of a [`Scene`](crate::scene::Scene), writes what the scene asks for, and
 //! can be stopped and taken up again by its [`checkpoint`]s; [`run_scene`] is one that nothing interrupts.
 
+mod body_force;
 pub mod checkpoint;
 mod dump;
 mod error;
@@ -17,9 +18,13 @@ mod runner;
 mod simulation;
 mod state;
 mod summary;
+mod tags;
 mod thermo;
 mod timing;
+mod underway;
+mod walls;
 
+pub use body_force::{BodyForce, Drive};
 pub use dump::write_frame;
 pub use error::RunError;
 pub use integrator::Integrator;
@@ -28,6 +33,7 @@ pub use runner::{Begin, Outcome, Progress, Runner, Start, run_scene};
 pub use simulation::Simulation;
 pub use state::State;
 pub use summary::{Means, Summary, Sums};
+pub use tags::Tags;
 pub use thermo::Thermo;
 pub use timing::{Session, Timing};
 

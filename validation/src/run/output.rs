@@ -5,39 +5,59 @@ use super::error::RunError;
 use super::growing::GrowingFile;
 use super::simulation::Simulation;
 use super::thermo::{Thermo, ThermoFile};
+use crate::observe::{Observation, write_csv, write_json};
+use crate::output::{About, Frame, remove_snapshots, write_xyz};
 use crate::scene::Scene;
 use std::collections::BTreeMap;
-use std::io::ErrorKind;
+use std::fs::File;
+use std::io::{self, ErrorKind};
 use std::path::Path;
 
 /// The name of the dump.
 const DUMP: &str = "dump.lammpstrj";
 
+/// The name of the extended XYZ file.
+const XYZ: &str = "trajectory.xyz";
+
 /// What a run writes at its end, however it ends.
-const LAST: [&str; 3] = ["final.data", "last-good.data", "summary.json"];
+const LAST: [&str; 5] = ["final.data", "last-good.data", OBSERVABLES, "summary.json", "report.html"];
+
+/// What was observed.
+const OBSERVABLES: &str = "observables.json";
+
+/// The folder with the same as tables.
+const TABLES: &str = "observables";
 
 /// The files that grow as a run goes.
 pub(super) struct Output {
     thermo: Option<ThermoFile>,
     dump: Option<GrowingFile>,
+    xyz: Option<GrowingFile>,
 }
 
 impl Output {
-    /// Empty files.
+    /// Empty files, and a description of the run.
     pub fn create(scene: &Scene, folder: &Path) -> Result<Output, RunError> {
-        remove_last(folder)?;
+        remove(folder, &[ThermoFile::NAME, DUMP, XYZ])?;
+        remove(folder, &LAST)?;
+        remove_tables(folder)?;
+        remove_snapshots(folder)?;
+        About::of(scene).write(folder)?;
         let thermo = (scene.output.thermo > 0).then(|| ThermoFile::create(folder));
         let dump = (scene.output.dump > 0).then(|| GrowingFile::create(folder, DUMP));
-        Ok(Output { thermo: thermo.transpose()?, dump: dump.transpose()? })
+        let xyz = (scene.output.xyz > 0).then(|| GrowingFile::create(folder, XYZ));
+        Ok(Output { thermo: thermo.transpose()?, dump: dump.transpose()?, xyz: xyz.transpose()? })
     }
 
     /// The files of a run that goes on, cut to the `lengths` of its checkpoint.
     pub fn reopen(folder: &Path, lengths: &BTreeMap<String, u64>) -> Result<Output, RunError> {
-        remove_last(folder)?;
+        remove(folder, &LAST)?;
+        remove_tables(folder)?;
         let length = |name: &str| lengths.get(name).copied();
         let thermo = length(ThermoFile::NAME).map(|length| ThermoFile::reopen(folder, length));
         let dump = length(DUMP).map(|length| GrowingFile::reopen(folder, DUMP, length));
-        Ok(Output { thermo: thermo.transpose()?, dump: dump.transpose()? })
+        let xyz = length(XYZ).map(|length| GrowingFile::reopen(folder, XYZ, length));
+        Ok(Output { thermo: thermo.transpose()?, dump: dump.transpose()?, xyz: xyz.transpose()? })
     }
 
     /// Writes a row of totals, if they are wanted; says whether they are.
@@ -56,6 +76,14 @@ impl Output {
         }
     }
 
+    /// Writes a frame in extended XYZ.
+    pub fn xyz_frame(&mut self, frame: &Frame) -> Result<(), RunError> {
+        match &mut self.xyz {
+            None => Ok(()),
+            Some(file) => file.attempt(|file| write_xyz(frame, file)),
+        }
+    }
+
     /// How long each file is.
     pub fn lengths(&mut self) -> BTreeMap<String, u64> {
         self.files().map(|file| (file.name().to_owned(), file.length())).collect()
@@ -67,13 +95,46 @@ impl Output {
     }
 
     fn files(&mut self) -> impl Iterator<Item = &mut GrowingFile> {
-        self.thermo.as_mut().map(ThermoFile::file).into_iter().chain(&mut self.dump)
+        self.thermo.as_mut().map(ThermoFile::file).into_iter().chain(&mut self.dump).chain(&mut self.xyz)
+    }
+}
+
+/// Writes `observables.json` and the tables in `observables/`, if anything was observed, and brings them to the
+/// disk.
+pub(super) fn write_observations(folder: &Path, observations: &[Observation]) -> Result<(), RunError> {
+    if observations.is_empty() {
+        return Ok(());
+    }
+    let (json, tables) = (folder.join(OBSERVABLES), folder.join(TABLES));
+    write_csv(&tables, observations).map_err(RunError::output(&tables))?;
+    write_json(&json, observations)
+        .and_then(|()| File::open(&json)?.sync_all())
+        .map_err(RunError::output(&json))
+}
+
+/// Removes the tables of a run before, and their folder unless there is something else in it.
+fn remove_tables(folder: &Path) -> Result<(), RunError> {
+    let tables = folder.join(TABLES);
+    let remove = || -> io::Result<()> {
+        for entry in tables.read_dir()? {
+            let path = entry?.path();
+            if path.extension().is_some_and(|e| e == "csv") {
+                std::fs::remove_file(path)?;
+            }
+        }
+        std::fs::remove_dir(&tables)
+    };
+    match remove() {
+        Err(error) if !matches!(error.kind(), ErrorKind::NotFound | ErrorKind::DirectoryNotEmpty) => {
+            Err(RunError::output(&tables)(error))
+        }
+        _ => Ok(()),
     }
 }
 
 /// What an earlier run, or an earlier end of this one, left is not of this one.
-fn remove_last(folder: &Path) -> Result<(), RunError> {
-    for name in LAST {
+fn remove(folder: &Path, names: &[&str]) -> Result<(), RunError> {
+    for name in names {
         let path = folder.join(name);
         match std::fs::remove_file(&path) {
             Err(error) if error.kind() != ErrorKind::NotFound => return Err(RunError::output(&path)(error)),

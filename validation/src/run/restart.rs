@@ -34,12 +34,22 @@ impl State {
         }
     }
 
-    /// The state of a data file, in a box periodic in every direction of the model; particles outside
-    /// are put inside. Types are species from 1. Masses not given are 1, velocities not given are 0.
+    /// The state of a data file, in a box periodic in every direction of the model; see
+    /// [`State::from_data_in`].
     ///
     /// # Errors
-    /// A type that the model has no species for, a tag beyond what LAMMPS counts, a box without volume.
+    /// As [`State::from_data_in`].
     pub fn from_data(data: &DataFile, model: &Model) -> Result<State, RunError> {
+        State::from_data_in(data, model, [true, true, model.dimensions() == 3])
+    }
+
+    /// The state of a data file, in a box periodic in some directions; particles outside are put inside along
+    /// these. Types are species from 1. Masses not given are 1, velocities not given are 0.
+    ///
+    /// # Errors
+    /// A type that the model has no species for, a tag beyond what LAMMPS counts, a box without volume, walls
+    /// of a box with tilt.
+    pub fn from_data_in(data: &DataFile, model: &Model, periodic: [bool; 3]) -> Result<State, RunError> {
         let species = model.species().len();
         let [xy, xz, yz] = data.tilt.unwrap_or([0.0; 3]);
         let [lx, ly, lz]: [f64; 3] = std::array::from_fn(|k| data.boxhi[k] - data.boxlo[k]);
@@ -48,7 +58,10 @@ impl State {
             Vector3::new(xy, ly, 0.0),
             Vector3::new(xz, yz, lz),
         ]);
-        let periodic = [true, true, model.dimensions() == 3];
+        let walls = periodic[..model.dimensions()].iter().any(|p| !p);
+        if walls && data.tilt.is_some_and(|tilt| tilt != [0.0; 3]) {
+            return Err(RunError::State("a box with tilt has no reflecting walls".into()));
+        }
         let domain =
             PeriodicBox::new(data.boxlo, edges, periodic).map_err(|e| RunError::State(e.to_string()))?;
         let mut state = State {

@@ -2,20 +2,20 @@ use super::checkpoint::{Checkpoint, CheckpointError, Found, Identity, Position, 
 use super::error::RunError;
 use super::folder::Folder;
 use super::output::Output;
-use super::restart::write_data;
 use super::simulation::Simulation;
+use super::state::State;
 use super::summary::{Summary, Sums};
 use super::thermo::Thermo;
-use super::timing::{Session, Timing};
-use crate::scene::{Scene, Stage};
-use psidpd_core::engine::Want;
+use super::timing::Timing;
+use super::underway::Run;
+use crate::observe::Observers;
+use crate::scene::Scene;
+use psidpd_core::engine::Settings;
 use std::collections::BTreeMap;
+use std::num::NonZeroUsize;
 use std::path::Path;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::{Duration, Instant};
-
-/// Time between checkpoints of scenes that do not say.
-const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(600);
+use std::sync::atomic::AtomicUsize;
+use std::time::Duration;
 
 /// The version of this program.
 const PROGRAM: &str = env!("CARGO_PKG_VERSION");
@@ -136,6 +136,7 @@ impl<'a> Runner<'a> {
         }
         let state = scene.initial_state();
         let simulation = simulation(scene, state.clone())?;
+        let observers = Observers::new(scene);
         store.clear()?;
         let good = Checkpoint {
             program: PROGRAM.into(),
@@ -149,20 +150,24 @@ impl<'a> Runner<'a> {
             last: None,
             sums: Sums::default(),
             files: BTreeMap::new(),
-            observers: Vec::new(),
+            observers: observers.to_bytes(),
         };
         let mut output = Output::create(scene, out)?;
         let good = Checkpoint { files: output.lengths(), ..good };
-        let run = Run::new(scene, folder, store, simulation, Some(output), good, Timing::default());
+        let run =
+            Run::new(scene, folder, store, simulation, Some(output), good, observers, Timing::default());
         Ok(Runner { start: Start::New, run })
     }
 
     fn resume(scene: &'a Scene, folder: Folder, store: Store, found: Found) -> Result<Runner<'a>, RunError> {
         let Found { checkpoint: good, fallback } = found;
+        let observers = Observers::from_bytes(&good.observers).map_err(|error| CheckpointError::Damaged {
+            path: store.path(),
+            what: format!("what was observed: {error}"),
+        })?;
         let mut simulation = simulation(scene, good.state.clone())?;
         if let Some(stage) = scene.stages.get(good.position.stage) {
-            simulation.set_temperature(stage.kt)?;
-            simulation.set_thermostat(stage.thermostat);
+            scene.enter(stage, &mut simulation)?;
         }
         simulation.restore(good.step, &good.state, &good.forces, good.out_of_bounds);
         if fallback.is_some() {
@@ -177,7 +182,7 @@ impl<'a> Runner<'a> {
         };
         let good = Checkpoint { program: PROGRAM.into(), ..good };
         let timing = Timing::read(folder.path());
-        let mut run = Run::new(scene, folder, store, simulation, output, good, timing);
+        let mut run = Run::new(scene, folder, store, simulation, output, good, observers, timing);
         run.stored = Some(run.good.step);
         Ok(Runner { start, run })
     }
@@ -190,6 +195,15 @@ impl<'a> Runner<'a> {
     /// Sets the time between checkpoints, ten minutes, for a scene that does not give steps between them.
     pub fn set_checkpoint_interval(&mut self, interval: Duration) {
         self.run.interval = interval;
+    }
+
+    /// Sets how many threads share the work: one, unless told otherwise. What a run writes does not depend on it.
+    ///
+    /// # Errors
+    /// The model does not hold at the present temperature: never, since it did before.
+    pub fn set_threads(&mut self, threads: NonZeroUsize) -> Result<(), RunError> {
+        let settings = self.run.simulation.settings();
+        self.run.simulation.set_settings(Settings { threads, ..settings })
     }
 
     /// How many particles there are.
@@ -216,9 +230,11 @@ impl<'a> Runner<'a> {
     }
 }
 
-/// The simulation of a scene, in whatever state.
-fn simulation(scene: &Scene, state: super::State) -> Result<Simulation, RunError> {
-    Simulation::new(&scene.model, scene.kt, state, scene.seed)
+/// The simulation of a scene in the precision that its runs have.
+fn simulation(scene: &Scene, state: State) -> Result<Simulation, RunError> {
+    let mut simulation = scene.simulation(state)?;
+    simulation.set_settings(Settings { precision: scene.precision(), ..simulation.settings() })?;
+    Ok(simulation)
 }
 
 /// Whether a run can go on from a checkpoint: it is of this scene, and the files have what it counts on.
@@ -241,7 +257,8 @@ fn usable(
     if !fits {
         return Err(CheckpointError::Damaged { path, what: "its parts do not fit together".into() });
     }
-    for (name, expected) in &checkpoint.files {
+    // A finished run needs its files no more; whoever wants room may have moved them.
+    for (name, expected) in checkpoint.files.iter().filter(|_| !checkpoint.finished) {
         let file = out.join(name);
         let found = file.metadata().map_or(0, |m| m.len());
         if found < *expected {
@@ -261,263 +278,4 @@ fn refuse_unfinished(store: &Store, out: &Path) -> Result<(), RunError> {
         _ => None,
     };
     Err(RunError::Unfinished { folder: out.to_owned(), step })
-}
-
-/// A run on its way.
-struct Run<'a> {
-    scene: &'a Scene,
-    folder: Folder,
-    store: Store,
-    simulation: Simulation,
-    /// `None` if the run is finished.
-    output: Option<Output>,
-    /// A state to fall back to.
-    good: Checkpoint,
-    /// The step of the checkpoint on disk.
-    stored: Option<u64>,
-    position: Position,
-    /// Steps to make, over all stages.
-    steps: u64,
-    sums: Sums,
-    last: Option<Thermo>,
-    timing: Timing,
-    /// The step that this session began after, and when.
-    began: (u64, Instant),
-    /// When the last checkpoint was written.
-    checkpointed: Instant,
-    /// Time between checkpoints, if there are no steps between them.
-    interval: Duration,
-}
-
-impl<'a> Run<'a> {
-    fn new(
-        scene: &'a Scene,
-        folder: Folder,
-        store: Store,
-        simulation: Simulation,
-        output: Option<Output>,
-        good: Checkpoint,
-        timing: Timing,
-    ) -> Run<'a> {
-        let now = Instant::now();
-        Run {
-            scene,
-            folder,
-            store,
-            simulation,
-            output,
-            stored: None,
-            position: good.position,
-            steps: scene.stages.iter().map(|s| s.steps).sum(),
-            sums: good.sums,
-            last: good.last,
-            timing,
-            began: (good.step, now),
-            checkpointed: now,
-            interval: CHECKPOINT_INTERVAL,
-            good,
-        }
-    }
-
-    fn go_on(&mut self, stop: &AtomicUsize, progress: &mut dyn FnMut(Progress)) -> Result<Outcome, RunError> {
-        self.began = (self.simulation.step_number(), Instant::now());
-        let scene = self.scene;
-        loop {
-            let stage = &scene.stages[self.position.stage];
-            if !self.position.entered {
-                self.enter(stage, progress)?;
-            }
-            while self.position.done < stage.steps {
-                self.step(stage, progress)?;
-                let stop = stop.load(Ordering::Relaxed);
-                // At its last step a run has come to its end by itself.
-                if stop != 0 && self.simulation.step_number() < self.steps {
-                    self.checkpoint()?;
-                    let step = self.simulation.step_number();
-                    self.timing = self.timing_until(step);
-                    return Ok(Outcome::Interrupted { stop, step, steps: self.steps });
-                }
-            }
-            if self.position.stage + 1 == scene.stages.len() {
-                return self.finish();
-            }
-            let Position { stage, time, .. } = self.position;
-            self.position = Position { stage: stage + 1, entered: false, done: 0, begin: time, time };
-        }
-    }
-
-    /// Computes the forces that a stage starts with.
-    fn enter(&mut self, stage: &Stage, progress: &mut dyn FnMut(Progress)) -> Result<(), RunError> {
-        self.sums = Sums::default();
-        self.simulation.set_temperature(stage.kt)?;
-        self.simulation.set_thermostat(stage.thermostat);
-        self.simulation.prepare(stage.dt, Want::TOTALS)?;
-        self.position.entered = true;
-        if self.simulation.step_number() == 0 {
-            self.report(stage, true, progress)?;
-            // What the disk thinks of this run is better known before the first step than later.
-            if self.scene.output.checkpoint != Some(0) {
-                self.checkpoint()?;
-            }
-        }
-        self.keep_state();
-        Ok(())
-    }
-
-    fn step(&mut self, stage: &Stage, progress: &mut dyn FnMut(Progress)) -> Result<(), RunError> {
-        let number = self.simulation.step_number() + 1;
-        let totals = self.is_row(number);
-        let want = if totals { Want::TOTALS } else { Want::FORCES };
-        self.simulation.step(stage.dt, stage.integrator, want)?;
-        self.position.done += 1;
-        self.position.time = self.position.begin + self.position.done as f64 * stage.dt;
-        self.report(stage, totals, progress)?;
-        let due = match self.scene.output.checkpoint {
-            Some(interval) => every(interval, number),
-            None => self.checkpointed.elapsed() >= self.interval,
-        };
-        // A run that comes to its end writes one then.
-        if due && number < self.steps { self.checkpoint() } else { Ok(()) }
-    }
-
-    fn is_row(&self, step: u64) -> bool {
-        every(self.scene.output.thermo, step) || step == self.steps
-    }
-
-    /// Writes what is due after a step.
-    fn report(
-        &mut self,
-        stage: &Stage,
-        totals: bool,
-        progress: &mut dyn FnMut(Progress),
-    ) -> Result<(), RunError> {
-        let step = self.simulation.step_number();
-        let thermo = totals.then(|| Thermo::of(&self.simulation, self.position.time));
-        if let Some(output) = &mut self.output {
-            if let Some(thermo) = &thermo {
-                self.last = Some(*thermo);
-                // The state a stage starts from is not of that stage.
-                if output.row(thermo)? && step > 0 {
-                    self.sums.add(thermo);
-                }
-            }
-            if every(self.scene.output.dump, step) {
-                output.frame(&self.simulation)?;
-            }
-        }
-        if totals {
-            self.keep_state();
-        }
-        progress(Progress { stage: &stage.name, step, steps: self.steps, thermo: thermo.as_ref() });
-        Ok(())
-    }
-
-    /// Makes the present state the one to fall back to. Everything due at this step must be written.
-    fn keep_state(&mut self) {
-        self.good.step = self.simulation.step_number();
-        self.good.position = self.position;
-        self.simulation.copy_state(&mut self.good.state);
-        self.good.forces.clear();
-        self.good.forces.extend_from_slice(self.simulation.forces());
-        self.good.out_of_bounds = self.simulation.out_of_bounds();
-        self.good.last = self.last;
-        self.good.sums = self.sums;
-        if let Some(output) = &mut self.output {
-            self.good.files = output.lengths();
-        }
-    }
-
-    /// Writes a checkpoint of the present state.
-    fn checkpoint(&mut self) -> Result<(), RunError> {
-        self.keep_state();
-        self.store_good()
-    }
-
-    fn store_good(&mut self) -> Result<(), RunError> {
-        // A checkpoint counts on what is in the files.
-        if let Some(output) = &mut self.output {
-            output.sync()?;
-        }
-        self.store.write(&self.good)?;
-        self.stored = Some(self.good.step);
-        self.checkpointed = Instant::now();
-        self.tell_time(self.good.step)
-    }
-
-    /// Writes what this session took up to `step`.
-    fn tell_time(&self, step: u64) -> Result<(), RunError> {
-        self.timing_until(step).write(self.folder.path())
-    }
-
-    fn timing_until(&self, step: u64) -> Timing {
-        let (from_step, since) = self.began;
-        let wall_seconds = since.elapsed().as_secs_f64();
-        let made = step.saturating_sub(from_step) as f64 * self.simulation.len() as f64;
-        let mut timing = self.timing.clone();
-        timing.sessions.push(Session {
-            from_step,
-            to_step: step,
-            wall_seconds,
-            particle_steps_per_second: made / wall_seconds,
-        });
-        timing
-    }
-
-    /// Saves what is left of a run that failed.
-    fn stop(&mut self, cause: RunError) -> RunError {
-        let step = self.simulation.step_number();
-        if matches!(cause, RunError::Output { .. } | RunError::Lammps(_)) {
-            // There may be room for a newer checkpoint; if not, that of before is still there.
-            if self.stored != Some(self.good.step) {
-                let _ = self.store_good();
-            }
-            return RunError::Halted { step, cause: Box::new(cause), checkpoint: self.stored };
-        }
-        let checkpoint = self.stored == Some(self.good.step) || self.store_good().is_ok();
-        let saved = self.folder.path().join("last-good.data");
-        match write_data(&saved, &self.data_title(self.good.step), &self.good.state) {
-            Ok(()) => RunError::Stopped {
-                stage: self.scene.stages[self.position.stage].name.clone(),
-                cause: Box::new(cause),
-                good: self.good.step,
-                saved,
-                checkpoint,
-            },
-            // The physics failed first, and says more.
-            Err(_) => cause,
-        }
-    }
-
-    fn finish(&mut self) -> Result<Outcome, RunError> {
-        self.keep_state();
-        let path = self.folder.path().join("final.data");
-        write_data(&path, &self.data_title(self.steps), &self.good.state)?;
-        std::fs::File::open(&path).and_then(|file| file.sync_all()).map_err(RunError::output(&path))?;
-        let summary = self.summary();
-        summary.write(&self.folder.path().join("summary.json"))?;
-        // From here on the run is finished, whatever happens.
-        self.good.finished = true;
-        self.store_good()?;
-        self.store.keep_newest()?;
-        Ok(Outcome::Finished { summary: Box::new(summary), timing: self.timing_until(self.steps) })
-    }
-
-    fn data_title(&self, step: u64) -> String {
-        format!("psidpd: {}, step {step}", self.scene.title)
-    }
-
-    fn summary(&self) -> Summary {
-        Summary {
-            title: self.scene.title.clone(),
-            particles: self.simulation.len(),
-            steps: self.steps,
-            out_of_bounds: self.simulation.out_of_bounds(),
-            last: self.last.unwrap_or_else(|| Thermo::of(&self.simulation, self.position.time)),
-            means: self.sums.means(),
-        }
-    }
-}
-
-fn every(interval: u64, step: u64) -> bool {
-    interval > 0 && step.is_multiple_of(interval)
 }

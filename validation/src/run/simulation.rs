@@ -1,7 +1,10 @@
+use super::body_force::BodyForce;
 use super::error::RunError;
 use super::forces::{Arrays, Forces};
 use super::integrator::{Before, Integrator, Motion};
 use super::state::State;
+use super::tags::Tags;
+use super::walls::Walls;
 use psidpd_core::engine::{PassCounts, PeriodicBox, Plan, Precision, Settings, Step, Sweep, Tally, Want};
 use psidpd_core::model::Model;
 
@@ -9,6 +12,8 @@ use psidpd_core::model::Model;
 ///
 /// Arrays that the engine reads hold the owned particles first and their images behind; every buffer
 /// is kept from step to step.
+///
+/// Directions of the box that are not periodic have walls that reflect.
 ///
 /// Pair noise is keyed by the number of the step whose forces it is in: the forces before the first
 /// step are those of step 0, and step `n` ends with forces of number `n`, as in LAMMPS.
@@ -35,6 +40,14 @@ pub struct Simulation {
     forces: Forces,
     tally: Tally,
     before: Before,
+    walls: Walls,
+    frozen_tags: Tags,
+    /// By particle; empty if none is frozen.
+    frozen: Vec<bool>,
+    mobile: usize,
+    /// Sum of the forces on the frozen particles, in the last evaluation.
+    support_force: [f64; 3],
+    body_forces: Vec<BodyForce>,
     /// Square of the longest way that a particle may go in one step.
     longest_move: f64,
 }
@@ -53,6 +66,7 @@ impl Simulation {
         let settings = Settings { precision: Precision::Double, ..Settings::default() };
         let forces = Forces::new(&fluid, settings)?;
         let State { domain, mass, mut x, v, species, tag, mut image } = state;
+        let owned = x.len();
         for (x, image) in x.iter_mut().zip(&mut image) {
             domain.wrap(x, image);
         }
@@ -66,8 +80,8 @@ impl Simulation {
             earlier_out_of_bounds: [0; 2],
             dimensions: fluid.dimensions,
             mass,
-            owned: x.len(),
-            force: vec![[0.0; 3]; x.len()],
+            owned,
+            force: vec![[0.0; 3]; owned],
             x,
             v,
             species,
@@ -76,6 +90,12 @@ impl Simulation {
             forces,
             tally: Tally::default(),
             before: Before::default(),
+            walls: Walls::of(&domain, fluid.dimensions),
+            frozen_tags: Tags::none(),
+            frozen: Vec::new(),
+            mobile: owned,
+            support_force: [0.0; 3],
+            body_forces: Vec::new(),
             longest_move: domain.lengths().iter().map(|l| l * l).sum(),
             domain,
         })
@@ -122,6 +142,29 @@ impl Simulation {
         self.thermostat = on;
     }
 
+    /// Freezes the particles of these tags, and no others: they rest where they are, and act on the others.
+    /// Their temperature and momentum do not count.
+    pub fn set_frozen(&mut self, tags: &Tags) {
+        self.frozen_tags = tags.clone();
+        self.find_frozen();
+    }
+
+    /// Finds the frozen particles by their tags, whose order may have changed, and stops them.
+    fn find_frozen(&mut self) {
+        let frozen: Vec<bool> = self.tags().iter().map(|t| self.frozen_tags.contain(*t)).collect();
+        let count = frozen.iter().filter(|f| **f).count();
+        self.mobile = self.owned - count;
+        self.frozen = if count > 0 { frozen } else { Vec::new() };
+        for (v, _) in self.v.iter_mut().zip(&self.frozen).filter(|(_, frozen)| **frozen) {
+            *v = [0.0; 3];
+        }
+    }
+
+    /// The body forces that act from the next evaluation of forces on.
+    pub fn set_body_forces(&mut self, forces: &[BodyForce]) {
+        self.body_forces = forces.to_vec();
+    }
+
     /// The number that the next forces are keyed by: for a run that goes on from step `number`.
     pub fn set_step_number(&mut self, number: u64) {
         self.number = number;
@@ -149,6 +192,7 @@ impl Simulation {
         self.force.extend_from_slice(forces);
         self.number = number;
         self.earlier_out_of_bounds = out_of_bounds;
+        self.find_frozen();
     }
 
     /// Computes the forces of the present step at the present velocities, as a run or a stage needs
@@ -158,10 +202,33 @@ impl Simulation {
     /// As [`Simulation::step`].
     pub fn prepare(&mut self, dt: f64, want: Want) -> Result<(), RunError> {
         let step = Step { seed: self.seed, number: self.number, dt };
-        self.compute(want, self.thermostat.then_some(step))
+        self.compute(want, self.thermostat.then_some(step))?;
+        self.add_external_forces();
+        Ok(())
     }
 
-    /// Computes forces, with noise and drag of `step`, or conservative ones only.
+    /// Body forces; and none at all on what is frozen, so that every integrator leaves it alone.
+    fn add_external_forces(&mut self) {
+        for body in &self.body_forces {
+            for k in 0..self.owned {
+                if body.acts_on(self.species[k], self.tag[k]) {
+                    let (mass, a) = (self.mass[self.species[k] as usize], body.at(&self.domain, self.x[k]));
+                    for c in 0..3 {
+                        self.force[k][c] += mass * a[c];
+                    }
+                }
+            }
+        }
+        self.support_force = [0.0; 3];
+        for (force, _) in self.force.iter_mut().zip(&self.frozen).filter(|(_, frozen)| **frozen) {
+            for (sum, f) in self.support_force.iter_mut().zip(std::mem::take(force)) {
+                *sum += f;
+            }
+        }
+    }
+
+    /// Computes forces between particles, with noise and drag of `step`, or conservative ones only; no body
+    /// forces.
     ///
     /// # Errors
     /// The box is too narrow for the noise, or a position, ψ or force is not finite.
@@ -193,11 +260,20 @@ impl Simulation {
         self.number += 1;
         integrator.before_forces(self.motion(), dt);
         self.check_velocities(Some(dt))?;
+        if self.walls.any() {
+            let walls = self.walls;
+            walls.reflect(&mut self.motion());
+            if let Some(k) = walls.escaped(self.positions()) {
+                let distance = self.v[k][0].hypot(self.v[k][1]).hypot(self.v[k][2]) * dt;
+                return Err(RunError::Runaway { step: self.number, tag: self.tag[k], distance });
+            }
+        }
         for (x, image) in self.x[..self.owned].iter_mut().zip(&mut self.image) {
             self.domain.wrap(x, image);
         }
         let step = Step { seed: self.seed, number: self.number, dt };
         self.compute(want, self.thermostat.then_some(step))?;
+        self.add_external_forces();
         integrator.after_forces(self.motion(), dt);
         self.check_velocities(None)
     }
@@ -277,6 +353,22 @@ impl Simulation {
     /// 2 or 3.
     pub fn dimensions(&self) -> usize {
         self.dimensions
+    }
+
+    /// Which particles are frozen, one by one; empty if none is.
+    pub fn frozen(&self) -> &[bool] {
+        &self.frozen
+    }
+
+    /// How many particles move.
+    pub fn mobile(&self) -> usize {
+        self.mobile
+    }
+
+    /// The sum of all forces on the frozen particles in the last evaluation, which nothing follows: what holds
+    /// them bears it.
+    pub fn support_force(&self) -> [f64; 3] {
+        self.support_force
     }
 
     /// How many particles there are.
@@ -375,10 +467,21 @@ impl Simulation {
         0.5 * (k[0] + k[1] + k[2])
     }
 
-    /// `kT` from the kinetic energy with `d(N − 1)` degrees of freedom, as LAMMPS's `compute temp`;
-    /// 0 for one particle.
+    /// How many degrees of freedom the kinetic energy is shared by: `d` for each particle that moves, less one
+    /// for each direction along which the total momentum is conserved. Frozen particles conserve none of it,
+    /// walls not that across them.
+    pub fn degrees_of_freedom(&self) -> usize {
+        let conserved = match self.frozen.is_empty() {
+            true => self.domain.periodic()[..self.dimensions].iter().filter(|p| **p).count(),
+            false => 0,
+        };
+        self.dimensions * self.mobile - conserved.min(self.dimensions * self.mobile)
+    }
+
+    /// `kT` from the kinetic energy of the particles that move, as LAMMPS's `compute temp`; 0 without degrees
+    /// of freedom. A flow counts as heat.
     pub fn temperature(&self) -> f64 {
-        match self.dimensions * (self.owned - 1) {
+        match self.degrees_of_freedom() {
             0 => 0.0,
             freedom => 2.0 * self.kinetic_energy() / freedom as f64,
         }

@@ -34,7 +34,7 @@ impl State {
     }
 
     /// The first thing that makes this no state of a model with `species` species.
-    pub(super) fn fault(&self, species: usize, dimensions: usize) -> Option<String> {
+    pub(crate) fn fault(&self, species: usize, dimensions: usize) -> Option<String> {
         let count = self.x.len();
         if count == 0 {
             return Some("there are no particles".into());
@@ -61,11 +61,21 @@ impl State {
         if let Some(k) = self.species.iter().position(|s| *s < 0 || *s as usize >= species) {
             return Some(format!("particle {} has species {}, out of range", self.tag[k], self.species[k]));
         }
+        if let Some(k) = (0..count).find(|k| !self.is_between_walls(self.x[*k], dimensions)) {
+            return Some(format!("particle {} is beyond a wall", self.tag[k]));
+        }
         let mut tags = self.tag.clone();
         tags.sort_unstable();
         if tags[0] < 1 {
             return Some(format!("tags must be positive, found {}", tags[0]));
         }
         tags.windows(2).find(|w| w[0] == w[1]).map(|w| format!("tag {} is given twice", w[0]))
+    }
+
+    /// Whether a point is inside, along the directions that are not periodic.
+    fn is_between_walls(&self, x: [f64; 3], dimensions: usize) -> bool {
+        let (origin, lengths) = (self.domain.origin(), self.domain.lengths());
+        (0..dimensions)
+            .all(|k| self.domain.periodic()[k] || (origin[k]..=origin[k] + lengths[k]).contains(&x[k]))
     }
 }

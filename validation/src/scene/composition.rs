@@ -1,4 +1,4 @@
-//! `composition` of `[initial]`.
+//! `composition` and `species` of what is filled.
 
 use super::masses::unknown_species;
 use psidpd_core::document::{FileError, FileErrorKind, Section};
@@ -11,8 +11,21 @@ impl Composition {
     /// Reads the fractions, equal ones if the file gives none; species that are not named have none.
     pub(super) fn read(initial: &Section, species: &[String]) -> Result<Composition, FileError> {
         let count = species.len();
+        if let Some(value) = initial.get("species") {
+            let name = value.string()?.value;
+            let Some(index) = species.iter().position(|s| *s == name) else {
+                return Err(value.error(unknown_species(&name, species)));
+            };
+            if let Some(both) = initial.get("composition") {
+                let message = "species is given too: give one of them".to_owned();
+                return Err(both.error(FileErrorKind::Value(message)));
+            }
+            let mut fractions = vec![0.0; count];
+            fractions[index] = 1.0;
+            return Ok(Composition(fractions));
+        }
         let Some(value) = initial.get("composition") else {
-            return Ok(Composition(vec![1.0 / count as f64; count]));
+            return Ok(Composition::equal(count));
         };
         let section = value.section()?;
         let mut fractions = vec![0.0; count];
@@ -32,6 +45,11 @@ impl Composition {
             return Err(value.error(FileErrorKind::Value(message)));
         }
         Ok(Composition(fractions))
+    }
+
+    /// Equal shares.
+    pub(super) fn equal(count: usize) -> Composition {
+        Composition(vec![1.0 / count as f64; count])
     }
 
     /// The fractions, in the order of the model's species.

@@ -1,25 +1,76 @@
-//! `[box]`.
+//! `[box]`, or `box = …`.
 
-use psidpd_core::document::{FileError, FileErrorKind, Section};
+use super::number::positive;
+use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
 use psidpd_core::engine::PeriodicBox;
+
+/// What happens to a particle at a face.
+pub const BOUNDARIES: [(&str, bool); 2] = [("periodic", true), ("reflecting", false)];
 
 /// Reads the box. In two dimensions particles are at z = 0, in the middle of a third edge of 1.
 pub fn read(root: &Section, dimensions: usize) -> Result<PeriodicBox, FileError> {
-    let section = root.require("box")?.section()?;
-    let value = section.require("lengths")?;
-    let (origin, lengths) = match dimensions {
-        2 => {
-            let [x, y] = value.numbers("two lengths, as the model is two-dimensional")?;
-            ([0.0, 0.0, -0.5], [x, y, 1.0])
-        }
-        _ => ([0.0; 3], value.numbers("three lengths")?),
+    let value = root.require("box")?;
+    let Some(section) = value.as_section() else {
+        return build(&value, dimensions, [true; 3]);
     };
+    let lengths = section.require("lengths")?;
+    let periodic = read_boundary(&section, dimensions)?;
+    section.finish()?;
+    build(&lengths, dimensions, periodic.unwrap_or([true; 3]))
+}
+
+/// The boundary alone, if it is given: of a scene that has its box from a file.
+pub fn read_boundary_alone(root: &Section, dimensions: usize) -> Result<Option<[bool; 3]>, FileError> {
+    let Some(value) = root.get("box") else { return Ok(None) };
+    let message = || "the box is that of the file: give no lengths".to_owned();
+    let section = value.as_section().ok_or_else(|| value.error(FileErrorKind::Value(message())))?;
+    if let Some(lengths) = section.get("lengths") {
+        return Err(lengths.error(FileErrorKind::Value(message())));
+    }
+    let periodic = read_boundary(&section, dimensions)?;
+    section.finish()?;
+    Ok(periodic)
+}
+
+fn build(value: &Value, dimensions: usize, periodic: [bool; 3]) -> Result<PeriodicBox, FileError> {
+    let lengths = read_lengths(value, dimensions)?;
     if let Some(length) = lengths.iter().find(|l| **l <= 0.0) {
         return Err(value.error(FileErrorKind::Value(format!("must be positive, is {length}"))));
     }
-    section.finish()?;
-    PeriodicBox::orthogonal(origin, lengths, [true; 3])
+    let origin = if dimensions == 2 { [0.0, 0.0, -0.5] } else { [0.0; 3] };
+    PeriodicBox::orthogonal(origin, lengths, periodic)
         .map_err(|e| value.error(FileErrorKind::Value(e.to_string())))
+}
+
+/// Lengths one by one, or one for all.
+fn read_lengths(value: &Value, dimensions: usize) -> Result<[f64; 3], FileError> {
+    let third = |z: f64| if dimensions == 2 { 1.0 } else { z };
+    if value.as_number().is_some() {
+        let length = positive(value)?;
+        return Ok([length, length, third(length)]);
+    }
+    match dimensions {
+        2 => value.numbers("two lengths, as the model is two-dimensional").map(|[x, y]| [x, y, third(1.0)]),
+        _ => value.numbers("three lengths"),
+    }
+}
+
+fn read_boundary(section: &Section, dimensions: usize) -> Result<Option<[bool; 3]>, FileError> {
+    let mut periodic = [true; 3];
+    let Some(value) = section.get("boundary") else { return Ok(None) };
+    match value.as_array() {
+        None => periodic[..dimensions].fill(value.one_of("boundary", &BOUNDARIES)?.value),
+        Some(items) if items.len() == dimensions => {
+            for (periodic, item) in periodic.iter_mut().zip(items) {
+                *periodic = item.one_of("boundary", &BOUNDARIES)?.value;
+            }
+        }
+        Some(items) => {
+            let message = format!("expected one for each of {dimensions} directions, found {}", items.len());
+            return Err(value.error(FileErrorKind::Value(message)));
+        }
+    }
+    Ok(Some(periodic))
 }
 
 /// Refuses a box in which two images of a particle would share the noise of a pair.
@@ -29,12 +80,17 @@ pub fn check_width(
     dimensions: usize,
     range: f64,
 ) -> Result<(), FileError> {
-    let lengths = domain.lengths();
-    let Some(length) = lengths[..dimensions].iter().find(|l| **l < 2.0 * range) else {
+    let (lengths, periodic) = (domain.lengths(), domain.periodic());
+    let narrow = |k: &usize| periodic[*k] && lengths[*k] < 2.0 * range;
+    let Some(length) = (0..dimensions).find(narrow).map(|k| lengths[k]) else {
         return Ok(());
     };
-    let value = match root.get("box") {
-        Some(value) => value.section()?.require("lengths")?,
+    let lengths = root.get("box").map(|value| match value.as_section() {
+        Some(section) => section.get("lengths"),
+        None => Some(value),
+    });
+    let value = match lengths.flatten() {
+        Some(value) => value,
         None => root.require("initial")?.section()?.require("file")?,
     };
     let message = format!(

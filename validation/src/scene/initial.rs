@@ -1,25 +1,23 @@
-//! `[initial]`.
+//! Where a scene starts from: `[initial]`, `[[part]]`, or the density at the top level.
 
-use super::composition::Composition;
+use super::arrangement::{Arrangement, Lattice};
 use super::domain;
-use super::positive;
+use super::number::positive;
+use super::part::{Common, Part, WHOLE};
+use super::saved;
 use super::velocities::Velocities;
-use crate::lammps::DataFile;
-use crate::run::State;
-use psidpd_core::document::{FileError, FileErrorKind, Section};
+use crate::run::{State, Tags};
+use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::model::Model;
 use std::path::{Path, PathBuf};
 
-/// Most particles that a scene may ask for.
-const MOST_PARTICLES: f64 = 1e8;
-
 /// Where a scene starts from.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Initial {
-    /// A box filled by description.
-    Filling(Filling),
-    /// A data file: particles and box. Velocities are drawn anew unless they are kept.
+    /// Regions filled with particles, by description. Their tags follow each other, from 1.
+    Parts(Vec<Part>),
+    /// A data file or a checkpoint: particles and box. Velocities are drawn anew unless they are kept.
     File {
         /// Where it is.
         path: PathBuf,
@@ -27,153 +25,116 @@ pub enum Initial {
         state: Box<State>,
         /// `None` keeps those of the file.
         velocities: Option<Velocities>,
+        /// The particles that never move.
+        frozen: Tags,
     },
 }
 
-/// How a box is filled.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Filling {
-    /// Where particles are put.
-    pub placement: Placement,
-    /// How many.
-    pub count: usize,
-    /// Of which species.
-    pub composition: Composition,
-    /// How they move.
-    pub velocities: Velocities,
-}
-
-impl Filling {
-    /// The volume of the filled part.
-    pub fn volume(&self, domain: &PeriodicBox, dimensions: usize) -> f64 {
-        let part = match self.placement {
-            Placement::Slab { axis, thickness } => thickness / domain.lengths()[axis],
-            Placement::Random | Placement::Lattice => 1.0,
-        };
-        part * domain.volume(dimensions)
-    }
-}
-
-/// Where particles are put.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Placement {
-    /// Anywhere, independently.
-    Random,
-    /// On a simple cubic (square) lattice that fits the box, with vacancies spread evenly if its sites
-    /// are more than the particles.
-    Lattice,
-    /// Anywhere in a slab in the middle of the box.
-    Slab {
-        /// Direction of its normal.
-        axis: usize,
-        /// Its thickness.
-        thickness: f64,
-    },
-}
-
-/// Reads the initial state, and the box: from `[box]`, or from the data file.
-pub fn read(root: &Section, model: &Model, base: &Path) -> Result<(Initial, PeriodicBox), FileError> {
-    #[derive(Clone, Copy, PartialEq)]
-    enum Kind {
-        Random,
-        Lattice,
-        Slab,
-        Data,
-    }
-    let section = root.require("initial")?.section()?;
-    let kinds =
-        [("random", Kind::Random), ("lattice", Kind::Lattice), ("slab", Kind::Slab), ("data", Kind::Data)];
-    let kind = section.require("kind")?.one_of("kind", &kinds)?.value;
-    if kind == Kind::Data {
-        let initial = read_file(root, &section, model, base)?;
-        section.finish()?;
-        return Ok(initial);
-    }
-    let dimensions = model.dimensions();
-    let domain = domain::read(root, dimensions)?;
-    let mut volume = domain.volume(dimensions);
-    let placement = match kind {
-        Kind::Random | Kind::Data => Placement::Random,
-        Kind::Lattice => Placement::Lattice,
-        Kind::Slab => {
-            let (axis, thickness) = read_slab(&section, dimensions, &domain)?;
-            volume *= thickness / domain.lengths()[axis];
-            Placement::Slab { axis, thickness }
+impl Initial {
+    /// The parts, if there are any.
+    pub fn parts(&self) -> &[Part] {
+        match self {
+            Initial::Parts(parts) => parts,
+            Initial::File { .. } => &[],
         }
-    };
-    let filling = Filling {
-        placement,
-        count: read_count(&section, volume)?,
-        composition: Composition::read(&section, model.species())?,
-        velocities: Velocities::read(&section)?,
+    }
+
+    /// The normal of the first slab that moves, if there is one.
+    pub fn slab_axis(&self) -> Option<usize> {
+        self.parts().iter().filter(|part| !part.frozen).find_map(|part| part.normal)
+    }
+
+    /// The tags of the parts that `wanted` holds for.
+    pub fn tags_of(&self, wanted: impl Fn(&Part) -> bool) -> Tags {
+        let mut first = 1;
+        let mut ranges = Vec::new();
+        for part in self.parts() {
+            let next = first + part.count as i32;
+            if wanted(part) {
+                ranges.push(first..=next - 1);
+            }
+            first = next;
+        }
+        Tags::Ranges(ranges)
+    }
+
+    /// The tags of the particles that never move.
+    pub fn frozen(&self) -> Tags {
+        match self {
+            Initial::Parts(_) => self.tags_of(|part| part.frozen),
+            Initial::File { frozen, .. } => frozen.clone(),
+        }
+    }
+}
+
+/// Kinds of `[initial]`.
+pub const KINDS: &[&str] = &["random", "lattice", "slab", "sphere", "cylinder", "data", "checkpoint"];
+
+/// Reads the initial state, and the box: from `box`, or from the file.
+pub fn read(root: &Section, model: &Model, base: &Path) -> Result<(Initial, PeriodicBox), FileError> {
+    let dimensions = model.dimensions();
+    let section = root.get("initial").map(|value| value.section()).transpose()?;
+    let Some(section) = section else { return read_without(root, model) };
+    let key = section.require("kind")?;
+    let kind = key.string()?.value;
+    if let Some(other) = root.get("part") {
+        let message = "there is an [initial] too: give one of them".to_owned();
+        return Err(other.error(FileErrorKind::Value(message)));
+    }
+    let initial = if let Some(format) = saved::Format::of(&kind) {
+        if let Some(value) = root.get("density") {
+            return Err(value.error(FileErrorKind::Value("the particles are those of the file".into())));
+        }
+        let periodic = domain::read_boundary_alone(root, dimensions)?;
+        saved::read(&section, format, model, base, periodic)?
+    } else {
+        let domain = domain::read(root, dimensions)?;
+        let common = Common::of(root, model, &domain)?;
+        let part = read_one(&kind, &key, &section, &common)?;
+        (Initial::Parts(vec![part]), domain)
     };
     section.finish()?;
-    Ok((Initial::Filling(filling), domain))
+    Ok(initial)
 }
 
-fn read_file(
-    root: &Section,
-    section: &Section,
-    model: &Model,
-    base: &Path,
-) -> Result<(Initial, PeriodicBox), FileError> {
-    if let Some(value) = root.get("box") {
-        let message = "the box is that of the data file: leave [box] out".to_owned();
-        return Err(value.error(FileErrorKind::Value(message)));
+/// Parts, or the whole box at the density of the scene.
+fn read_without(root: &Section, model: &Model) -> Result<(Initial, PeriodicBox), FileError> {
+    let parts = root.get("part");
+    let density = root.get("density");
+    if parts.is_none() && density.is_none() {
+        let message = "nothing says what the box is filled with".to_owned();
+        let error = root.error(FileErrorKind::Value(message));
+        return Err(error.with_help("give a density, [initial] or [[part]]"));
     }
-    let value = section.require("file")?;
-    let path = base.join(value.string()?.value);
-    let state = DataFile::read(&path)
-        .map_err(|e| e.to_string())
-        .and_then(|data| State::from_data(&data, model).map_err(|e| e.to_string()))
-        .map_err(|why| {
-            value.error(FileErrorKind::Value(why)).with_help("the path is relative to the scene file")
-        })?;
-    let velocities = Velocities::read_or_keep(section)?;
-    let domain = state.domain.clone();
-    Ok((Initial::File { path, state: Box::new(state), velocities }, domain))
-}
-
-fn read_slab(section: &Section, dimensions: usize, domain: &PeriodicBox) -> Result<(usize, f64), FileError> {
-    let names = [("x", 0), ("y", 1), ("z", 2)];
-    let axis = match section.get("axis") {
-        Some(value) => value.one_of("axis", &names[..dimensions])?.value,
-        None => dimensions - 1,
+    let domain = domain::read(root, model.dimensions())?;
+    let common = Common::of(root, model, &domain)?;
+    let parts = match (parts, density) {
+        (Some(parts), _) => common.parts(&parts)?,
+        (None, Some(density)) => vec![common.everywhere(&density, positive(&density)?)?],
+        (None, None) => Vec::new(),
     };
-    let value = section.require("thickness")?;
-    let thickness = positive(&value)?;
-    let length = domain.lengths()[axis];
-    if thickness > length {
-        let message = format!("must not exceed the box, {length} long, is {thickness}");
-        return Err(value.error(FileErrorKind::Value(message)));
-    }
-    Ok((axis, thickness))
+    Ok((Initial::Parts(parts), domain))
 }
 
-fn read_count(section: &Section, volume: f64) -> Result<usize, FileError> {
-    let (value, count) = match (section.get("density"), section.get("count")) {
-        (Some(_), Some(count)) => {
-            let message = "density is given too: give one of them".to_owned();
-            return Err(count.error(FileErrorKind::Value(message)));
-        }
-        (Some(density), None) => {
-            let count = (positive(&density)? * volume).round();
-            (density, count)
-        }
-        (None, Some(count)) => {
-            let number = count.count()?.value as f64;
-            (count, number)
-        }
-        (None, None) => {
-            return Err(section.error(FileErrorKind::Value("needs a density or a count".into())));
+fn read_one(kind: &str, key: &Value, section: &Section, common: &Common) -> Result<Part, FileError> {
+    let shape = match kind {
+        "random" | "lattice" => common.shapes.whole(),
+        "slab" | "sphere" => common.shapes.read(kind, key, section)?,
+        "cylinder" if common.shapes.dimensions == 3 => common.shapes.read(kind, key, section)?,
+        _ => {
+            let known: Vec<&str> =
+                KINDS.iter().copied().filter(|k| common.shapes.dimensions == 3 || *k != "cylinder").collect();
+            let known = known.join(", ");
+            return Err(key.error(FileErrorKind::UnknownName { what: "kind", name: kind.to_owned(), known }));
         }
     };
-    if count < 1.0 {
-        return Err(value.error(FileErrorKind::Value("leaves the box without a particle".into())));
+    let mut part = common.fill(section, WHOLE.to_owned(), shape)?;
+    if kind == "lattice" && section.get("lattice").is_none() {
+        if let Some(value) = section.get("min_distance") {
+            let message = "the sites of a lattice are apart as they are".to_owned();
+            return Err(value.error(FileErrorKind::Value(message)));
+        }
+        part.arrangement = Arrangement::Lattice(Lattice::Simple);
     }
-    if count > MOST_PARTICLES {
-        let message = format!("{count:.3e} particles are too many: at most {MOST_PARTICLES:.0e}");
-        return Err(value.error(FileErrorKind::Value(message)));
-    }
-    Ok(count as usize)
+    Ok(part)
 }

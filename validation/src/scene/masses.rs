@@ -1,12 +1,13 @@
 //! `[masses]`.
 
-use super::{Initial, positive};
+use super::Initial;
+use super::number::positive;
 use psidpd_core::document::{FileError, FileErrorKind, Section};
 
 /// Reads the mass of each species: 1, or what the data file says, if the scene gives none.
 pub fn read(root: &Section, species: &[String], initial: &Initial) -> Result<Vec<f64>, FileError> {
     let mut mass = match initial {
-        Initial::Filling(_) => vec![1.0; species.len()],
+        Initial::Parts(_) => vec![1.0; species.len()],
         Initial::File { state, .. } => state.mass.clone(),
     };
     let Some(value) = root.get("masses") else { return Ok(mass) };

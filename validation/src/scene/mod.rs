@@ -1,58 +1,49 @@
 //! Scene files: which fluid, in which box, from which start, for how many steps.
 //!
 //! ```toml
-//! title = "Warren set 6, bulk"
-//! model = "../models/warren2003-set6.toml"   # relative to this file
-//! kT    = 1.0
-//! seed  = 1                                  # of the initial state and of the noise
-//!
-//! [box]
-//! lengths = [10.0, 10.0, 10.0]               # periodic; two of them for two-dimensional models
-//!
-//! [masses]                                   # optional; 1 if not given
-//! F = 1.0
-//!
-//! [initial]
-//! kind    = "random"                         # random | lattice | slab | data
-//! density = 6.05                             # of the filled part; or count = 6050
-//! # composition = { A = 0.5, B = 0.5 }       # number fractions; equal shares if not given
-//! # axis = "z"                               # slab: its normal; the last direction if not given
-//! # thickness = 10.0                         # slab: centred
-//! # file = "start.data"                      # data: a LAMMPS data file, which has the box: no [box]
-//! # velocities = "thermal"                   # thermal | zero | keep (data only)
-//!
-//! [[stage]]
-//! name  = "produce"
-//! steps = 1000
-//! dt    = 0.01
-//! # integrator = "velocity-verlet"           # or "groot-warren", with lambda = 0.65
-//! # kT = 2.0                                 # another temperature in this stage
-//! # thermostat = false                       # no dissipative and random forces
-//!
-//! [output]
-//! thermo = 100                               # steps between rows of totals; 0: none
-//! dump   = 0                                 # steps between frames; 0: none
-//! # checkpoint = 10000                       # steps between checkpoints; every ten minutes if not given
+//! model   = "../models/warren2003-set6.toml"   # relative to this file
+//! kT      = 1.0
+//! box     = 10.0                               # periodic; or [10.0, 10.0, 20.0]; or a table
+//! density = 6.05
+//! steps   = 1000
 //! ```
+//!
+//! `docs/scene-file.md` has every key; it is written from the table in [`keys`], and tests hold the reader to
+//! it.
 
+mod arrangement;
+mod body_force;
 mod composition;
 mod domain;
 mod fill;
 mod initial;
+pub mod keys;
 mod masses;
+mod number;
 mod output;
+mod part;
+mod ramp;
+mod saved;
+mod shape;
 mod stage;
+mod template;
 mod velocities;
 
+pub use arrangement::{Arrangement, Lattice};
 pub use composition::Composition;
-pub use initial::{Filling, Initial, Placement};
+pub use initial::Initial;
 pub use output::Output;
+pub use part::Part;
+pub use shape::Shape;
 pub use stage::Stage;
+pub use template::{TEMPLATES, Template, TemplateError};
 pub use velocities::Velocities;
 
-use crate::run::State;
+use crate::observe::{self, Observe};
+use crate::run::{BodyForce, RunError, Simulation, State, Tags};
+use number::positive;
 use psidpd_core::document::{Document, FileError, FileErrorKind, Section, Source, Value};
-use psidpd_core::engine::{PeriodicBox, Plan};
+use psidpd_core::engine::{PeriodicBox, Plan, Precision};
 use psidpd_core::model::Model;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -70,16 +61,24 @@ pub struct Scene {
     pub kt: f64,
     /// Seed of the initial state and of the noise.
     pub seed: u64,
+    /// In what a run computes pairs, if the scene says.
+    pub precision: Option<Precision>,
     /// The box.
     pub domain: PeriodicBox,
     /// Mass of each species.
     pub mass: Vec<f64>,
     /// The initial state.
     pub initial: Initial,
+    /// The particles that never move.
+    pub frozen: Tags,
+    /// Body forces, in the stages that have them.
+    pub body_forces: Vec<BodyForce>,
     /// What is done with it, in this order.
     pub stages: Vec<Stage>,
     /// What is written.
     pub output: Output,
+    /// What is measured on the way.
+    pub observe: Observe,
     /// The text of the file.
     pub source: Arc<Source>,
     /// Where paths in the file start from.
@@ -107,37 +106,110 @@ impl Scene {
 
     fn read(document: &Document, base: &Path) -> Result<Scene, FileError> {
         let root = document.root();
-        let title = root.require("title")?.string()?.value;
+        let title = root.get("title").map(|value| value.string()).transpose()?;
         let (model_path, model) = read_model(&root.require("model")?, base)?;
         let kt = positive(&root.require("kT")?)?;
-        let seed = root.require("seed")?.count()?.value;
+        let seed = root.get("seed").map_or(Ok(1), |value| value.count().map(|c| c.value))?;
+        let precision = root.get("precision").map(|value| value.one_of("precision", &Precision::ALL));
         let (initial, domain) = initial::read(&root, &model, base)?;
-        let mass = masses::read(&root, model.species(), &initial)?;
         let stages = stage::read(&root, kt)?;
-        let output = output::read(&root)?;
-        let (source, folder) = (root.source().clone(), base.to_owned());
+        let body_forces = body_force::read(&root, &model, &initial)?;
+        let drive = body_forces.iter().find_map(BodyForce::drive);
         let scene = Scene {
-            title,
+            title: title.map_or_else(|| model.title().to_owned(), |t| t.value),
             model_path,
-            model,
             kt,
             seed,
-            domain,
-            mass,
-            initial,
+            precision: precision.transpose()?.map(|p| p.value),
+            mass: masses::read(&root, model.species(), &initial)?,
+            frozen: initial.frozen(),
+            body_forces,
+            output: output::read(&root)?,
+            observe: observe::read(&root, &model, kt, &domain, &stages, initial.slab_axis(), drive)?,
+            source: root.source().clone(),
+            folder: base.to_owned(),
             stages,
-            output,
-            source,
-            folder,
+            model,
+            domain,
+            initial,
         };
         scene.check_noise(&root)?;
         root.finish()?;
+        scene.check_room(document)?;
         Ok(scene)
     }
 
     /// The particles before the first step; the same for the same file.
     pub fn initial_state(&self) -> State {
-        fill::fill(self)
+        fill::fill(self).0
+    }
+
+    /// In what a run of the scene computes pairs: mixed precision unless it says otherwise.
+    pub fn precision(&self) -> Precision {
+        self.precision.unwrap_or_default()
+    }
+
+    /// A simulation from `state`, which is of this scene, at step 0: with its seed and its frozen particles.
+    /// It is in double precision, as every simulation is; see [`Simulation::set_settings`].
+    ///
+    /// # Errors
+    /// `state` is no state of the model.
+    pub fn simulation(&self, state: State) -> Result<Simulation, RunError> {
+        let mut simulation = Simulation::new(&self.model, self.kt, state, self.seed)?;
+        simulation.set_frozen(&self.frozen);
+        Ok(simulation)
+    }
+
+    /// Sets the conditions of a stage: temperature, thermostat, body forces. The forces of the present step are
+    /// to be computed anew then.
+    ///
+    /// # Errors
+    /// The model does not hold at the temperature.
+    pub fn enter(&self, stage: &Stage, simulation: &mut Simulation) -> Result<(), RunError> {
+        simulation.set_temperature(stage.kt)?;
+        simulation.set_thermostat(stage.thermostat);
+        simulation.set_body_forces(if stage.body_forces { &self.body_forces } else { &[] });
+        Ok(())
+    }
+
+    /// Number densities of the species where the fluid is: in the largest part that moves, or in the whole box
+    /// for a start from a file.
+    pub fn densities(&self) -> Vec<f64> {
+        let dimensions = self.model.dimensions();
+        let largest = self.initial.parts().iter().filter(|p| !p.frozen).max_by_key(|p| p.count);
+        let (counts, volume) = match (&self.initial, largest) {
+            (Initial::Parts(_), Some(part)) => {
+                (part.composition.share(part.count), part.shape.volume(dimensions))
+            }
+            _ => {
+                let mut counts = vec![0; self.model.species().len()];
+                self.initial_state().species.iter().for_each(|s| counts[*s as usize] += 1);
+                (counts, self.domain.volume(dimensions))
+            }
+        };
+        counts.into_iter().map(|n| n as f64 / volume).collect()
+    }
+
+    /// Refuses parts in which particles cannot keep the distance they should.
+    fn check_room(&self, document: &Document) -> Result<(), FileError> {
+        let apart =
+            |p: &Part| matches!(p.arrangement, Arrangement::Random { min_distance } if min_distance > 0.0);
+        if !self.initial.parts().iter().any(apart) {
+            return Ok(());
+        }
+        let Some(crowded) = fill::fill(self).1 else { return Ok(()) };
+        let root = document.root();
+        let section = match root.get("initial") {
+            Some(initial) => initial.section()?,
+            None => root.require("part")?.array()?[crowded.part].section()?,
+        };
+        let message = format!(
+            "only {} of {} particles found a place at this distance from all others",
+            crowded.placed,
+            self.initial.parts()[crowded.part].count
+        );
+        let error = section.require("min_distance")?.error(FileErrorKind::Value(message));
+        Err(error.with_help("use a smaller distance, or a lattice"))
     }
 
     /// The model must hold at every temperature, and the box must keep images apart that would share
@@ -168,16 +240,6 @@ fn read_model(value: &Value, base: &Path) -> Result<(PathBuf, Model), FileError>
             }
             _ => Err(error),
         },
-    }
-}
-
-/// A number above zero.
-fn positive(value: &Value) -> Result<f64, FileError> {
-    let number = value.number()?.value;
-    if number > 0.0 {
-        Ok(number)
-    } else {
-        Err(value.error(FileErrorKind::Value(format!("must be positive, is {number}"))))
     }
 }
 

@@ -9,6 +9,10 @@ pub struct Output {
     pub thermo: u64,
     /// Steps between frames of `dump.lammpstrj`; 0 for none.
     pub dump: u64,
+    /// Steps between frames of `trajectory.xyz`; 0 for none.
+    pub xyz: u64,
+    /// Steps between pictures in `snapshots/`; 0 for none.
+    pub snapshot: u64,
     /// Steps between checkpoints; 0 for none but at the end of a run, however it ends. By default they
     /// come every ten minutes.
     pub checkpoint: Option<u64>,
@@ -16,7 +20,7 @@ pub struct Output {
 
 impl Default for Output {
     fn default() -> Output {
-        Output { thermo: 100, dump: 0, checkpoint: None }
+        Output { thermo: 100, dump: 0, xyz: 0, snapshot: 0, checkpoint: None }
     }
 }
 
@@ -25,7 +29,13 @@ pub fn read(root: &Section) -> Result<Output, FileError> {
     let mut output = Output::default();
     let Some(value) = root.get("output") else { return Ok(output) };
     let section = value.section()?;
-    for (key, interval) in [("thermo", &mut output.thermo), ("dump", &mut output.dump)] {
+    let intervals = [
+        ("thermo", &mut output.thermo),
+        ("dump", &mut output.dump),
+        ("xyz", &mut output.xyz),
+        ("snapshot", &mut output.snapshot),
+    ];
+    for (key, interval) in intervals {
         if let Some(value) = section.get(key) {
             *interval = value.count()?.value;
         }

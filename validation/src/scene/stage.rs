@@ -1,14 +1,17 @@
-//! `[[stage]]`.
+//! `[[stage]]`, or `steps` at the top level.
 
-use super::positive;
+use super::number::positive;
+use super::ramp;
 use crate::run::Integrator;
-use psidpd_core::document::{FileError, FileErrorKind, Section};
+use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
 
 /// A part of a run under one set of conditions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stage {
-    /// Its name.
+    /// Its name; levels of one ramp share it.
     pub name: String,
+    /// Which level of a ramp it is, from 1, of how many.
+    pub level: Option<[u64; 2]>,
     /// How many steps.
     pub steps: u64,
     /// Δt.
@@ -19,7 +22,22 @@ pub struct Stage {
     pub kt: f64,
     /// Whether dissipative and random forces act.
     pub thermostat: bool,
+    /// Whether body forces act.
+    pub body_forces: bool,
 }
+
+impl Stage {
+    /// What it is called in comments: "quench (3 of 20)" for a level of a ramp.
+    pub fn label(&self) -> String {
+        match self.level {
+            Some([level, levels]) => format!("{} ({level} of {levels})", self.name),
+            None => self.name.clone(),
+        }
+    }
+}
+
+/// Names of the integrators.
+pub const INTEGRATORS: &[&str] = &["velocity-verlet", "groot-warren"];
 
 /// Most steps of a run: step numbers stay exact in every format that tells them.
 const MOST_STEPS: u64 = 1 << 53;
@@ -27,26 +45,49 @@ const MOST_STEPS: u64 = 1 << 53;
 /// λ of Groot and Warren's paper.
 const DEFAULT_LAMBDA: f64 = 0.65;
 
+/// Δt of stages that give none.
+const DEFAULT_DT: f64 = 0.01;
+
+/// What stages do that do not say.
+#[derive(Debug, Clone, Copy)]
+struct Defaults {
+    kt: f64,
+    dt: f64,
+    integrator: Integrator,
+}
+
 /// Reads the stages; `kt` is the temperature of those that do not say.
 pub fn read(root: &Section, kt: f64) -> Result<Vec<Stage>, FileError> {
-    let value = root.require("stage")?;
+    let defaults = Defaults {
+        kt,
+        dt: root.get("dt").map_or(Ok(DEFAULT_DT), |value| positive(&value))?,
+        integrator: read_integrator(root, Integrator::default())?,
+    };
+    let (steps, equilibrate) = (root.get("steps"), root.get("equilibrate"));
+    let Some(value) = root.get("stage") else { return read_short(root, steps, equilibrate, defaults) };
+    if let Some(other) = steps.or(equilibrate) {
+        let message = "there are [[stage]] tables too: give one of them".to_owned();
+        return Err(other.error(FileErrorKind::Value(message)));
+    }
     let mut stages: Vec<Stage> = Vec::new();
     let mut total = 0u64;
     for item in value.array()? {
         let section = item.section()?;
-        let stage = read_one(&section, kt)?;
+        let levels = read_one(&section, defaults)?;
         let wrong = |key: &str, message: String| {
             section.require(key).map(|v| v.error(FileErrorKind::Value(message))).unwrap_or_else(|e| e)
         };
-        if stages.iter().any(|s| s.name == stage.name) {
+        if let Some(stage) = levels.iter().find(|l| stages.iter().any(|s| s.name == l.name)) {
             return Err(wrong("name", format!("\"{}\" names two stages", stage.name)));
         }
-        total = total.saturating_add(stage.steps);
-        if total > MOST_STEPS {
-            return Err(wrong("steps", format!("more than {MOST_STEPS} steps in all")));
+        for stage in levels {
+            total = total.saturating_add(stage.steps);
+            if total > MOST_STEPS {
+                return Err(wrong("steps", format!("more than {MOST_STEPS} steps in all")));
+            }
+            stages.push(stage);
         }
         section.finish()?;
-        stages.push(stage);
     }
     if stages.is_empty() {
         return Err(value.error(FileErrorKind::Value("needs at least one stage".into())));
@@ -54,29 +95,74 @@ pub fn read(root: &Section, kt: f64) -> Result<Vec<Stage>, FileError> {
     Ok(stages)
 }
 
-fn read_one(section: &Section, kt: f64) -> Result<Stage, FileError> {
-    let name = section.require("name")?.string()?.value;
-    let value = section.require("steps")?;
-    let steps = value.count()?.value;
-    if steps == 0 {
-        return Err(value.error(FileErrorKind::Value("must be at least 1".into())));
-    }
-    Ok(Stage {
-        name,
-        steps,
-        dt: positive(&section.require("dt")?)?,
-        integrator: read_integrator(section)?,
-        kt: section.get("kT").map_or(Ok(kt), |value| positive(&value))?,
-        thermostat: section.get("thermostat").map_or(Ok(true), |value| Ok(value.boolean()?.value))?,
-    })
+/// `steps`, after as many as `equilibrate` says.
+fn read_short(
+    root: &Section,
+    steps: Option<Value>,
+    equilibrate: Option<Value>,
+    defaults: Defaults,
+) -> Result<Vec<Stage>, FileError> {
+    let steps = match steps {
+        Some(value) => value,
+        None if equilibrate.is_some() => root.require("steps")?,
+        None => {
+            let error = root.error(FileErrorKind::Value("nothing says how many steps to take".into()));
+            return Err(error.with_help("give steps, or [[stage]] tables"));
+        }
+    };
+    let stages = [("equilibrate", equilibrate), ("produce", Some(steps))];
+    let stages = stages.into_iter().filter_map(|(name, value)| {
+        let stage = |steps| Stage {
+            name: name.to_owned(),
+            level: None,
+            steps,
+            dt: defaults.dt,
+            integrator: defaults.integrator,
+            kt: defaults.kt,
+            thermostat: true,
+            body_forces: true,
+        };
+        value.map(|value| read_steps(&value).map(stage))
+    });
+    stages.collect()
 }
 
-fn read_integrator(section: &Section) -> Result<Integrator, FileError> {
+fn read_steps(value: &Value) -> Result<u64, FileError> {
+    match value.count()?.value {
+        0 => Err(value.error(FileErrorKind::Value("must be at least 1".into()))),
+        // Half, as there may be two.
+        steps if steps > MOST_STEPS / 2 => {
+            Err(value.error(FileErrorKind::Value(format!("more than {MOST_STEPS} steps in all"))))
+        }
+        steps => Ok(steps),
+    }
+}
+
+/// The stages that one table makes: as many as its ramp has levels.
+fn read_one(section: &Section, defaults: Defaults) -> Result<Vec<Stage>, FileError> {
+    let name = section.require("name")?.string()?.value;
+    let steps = read_steps(&section.require("steps")?)?;
+    let flag = |key: &str| section.get(key).map_or(Ok(true), |v| v.boolean().map(|b| b.value));
+    let stage = Stage {
+        name,
+        level: None,
+        steps,
+        dt: section.get("dt").map_or(Ok(defaults.dt), |value| positive(&value))?,
+        integrator: read_integrator(section, defaults.integrator)?,
+        kt: defaults.kt,
+        thermostat: flag("thermostat")?,
+        body_forces: flag("body_forces")?,
+    };
+    ramp::read(section, stage)
+}
+
+/// The integrator of a stage, or of the scene; `default` if it says nothing.
+fn read_integrator(section: &Section, default: Integrator) -> Result<Integrator, FileError> {
     let groot_warren = Integrator::GrootWarren { lambda: DEFAULT_LAMBDA };
     let names = [("velocity-verlet", Integrator::VelocityVerlet), ("groot-warren", groot_warren)];
     let integrator = match section.get("integrator") {
         Some(value) => value.one_of("integrator", &names)?.value,
-        None => Integrator::default(),
+        None => default,
     };
     let Some(value) = section.get("lambda") else { return Ok(integrator) };
     let lambda = value.number()?.value;

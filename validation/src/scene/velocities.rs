@@ -1,4 +1,4 @@
-//! `velocities` of `[initial]`.
+//! `velocities` of what is filled.
 
 use psidpd_core::document::{FileError, Section};
 use rand_chacha::ChaCha8Rng;
@@ -7,7 +7,7 @@ use rand_distr::{Distribution, StandardNormal};
 /// How particles move at the start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Velocities {
-    /// Maxwell's distribution at the temperature of the scene, with the total momentum taken out. The
+    /// Maxwell's distribution at the temperature of the scene, with the momentum of the part taken out. The
     /// velocities are not scaled: their temperature fluctuates as that of a canonical ensemble.
     #[default]
     Thermal,
@@ -24,13 +24,13 @@ impl Velocities {
         }
     }
 
-    /// The same for a data file, whose velocities may be kept: `None`.
-    pub(super) fn read_or_keep(initial: &Section) -> Result<Option<Velocities>, FileError> {
+    /// The same for a file, whose velocities may be kept: `None`, and what is meant by saying nothing if `keep`.
+    pub(super) fn read_or_keep(initial: &Section, keep: bool) -> Result<Option<Velocities>, FileError> {
         let names =
             [("thermal", Some(Velocities::Thermal)), ("zero", Some(Velocities::Zero)), ("keep", None)];
         match initial.get("velocities") {
             Some(value) => Ok(value.one_of("velocities", &names)?.value),
-            None => Ok(Some(Velocities::default())),
+            None => Ok((!keep).then(Velocities::default)),
         }
     }
 

@@ -23,10 +23,14 @@ impl Identity {
     /// That of a scene.
     pub fn of(scene: &Scene) -> Identity {
         let model = scene.model.source();
+        let mut of_scene =
+            keys(scene.source.text(), &scene.folder, &["title", "model", "output.checkpoint", "precision"]);
+        // As it is, whether the file says so, the command line, or neither.
+        of_scene.insert("precision".into(), format!("{:?}", scene.precision().to_string()));
         let beside_model = Path::new(model.name()).parent().unwrap_or(Path::new(""));
         Identity {
             // The model is compared by itself, not by where it is.
-            scene: keys(scene.source.text(), &scene.folder, &["title", "model", "output.checkpoint"]),
+            scene: of_scene,
             model: keys(model.text(), beside_model, &["title", "reference"]),
         }
     }

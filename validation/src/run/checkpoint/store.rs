@@ -55,10 +55,20 @@ impl Store {
         let mut file = File::create(new)?;
         format::write(checkpoint, &mut file)?;
         file.sync_all()?;
-        // Killed between these two, a run is left with `checkpoint.old` alone, which will do.
-        absent_is_fine(std::fs::rename(self.path(), self.folder.join(BEFORE)))?;
+        self.keep_as_before()?;
         std::fs::rename(new, self.path())?;
         self.sync()
+    }
+
+    /// Makes the newest one the one before, too: at no moment there is none.
+    fn keep_as_before(&self) -> io::Result<()> {
+        let (newest, before) = (self.path(), self.folder.join(BEFORE));
+        if !newest.exists() {
+            return Ok(());
+        }
+        absent_is_fine(std::fs::remove_file(&before))?;
+        // Where there are no hard links, a run killed now is left with `checkpoint.old` alone; that will do.
+        std::fs::hard_link(&newest, &before).or_else(|_| std::fs::rename(&newest, &before))
     }
 
     /// The newest checkpoint that is whole and that `usable` agrees with; `None` if there is none at all.

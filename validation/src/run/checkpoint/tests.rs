@@ -175,7 +175,7 @@ fn the_one_before_is_kept_and_found() {
     // Killed while the next one was written
     std::fs::write(folder.path().join("checkpoint.new"), "psid").unwrap();
     assert_eq!(step(&store), 2);
-    // Killed between the two renamings
+    // Killed between two renamings, where there are no hard links
     let (newest, old) = (store.path(), folder.path().join("checkpoint.old"));
     let (second, first) = (std::fs::read(&newest).unwrap(), std::fs::read(&old).unwrap());
     std::fs::remove_file(&newest).unwrap();

@@ -42,6 +42,17 @@ pub(super) struct Before {
     pub f: Vec<[f64; 3]>,
 }
 
+impl Before {
+    /// Turns round the component `k` of what is kept of particle `i`, which a wall has reflected.
+    pub fn turn(&mut self, i: usize, k: usize) {
+        for kept in [&mut self.v, &mut self.f] {
+            if let Some(vector) = kept.get_mut(i) {
+                vector[k] = -vector[k];
+            }
+        }
+    }
+}
+
 impl Integrator {
     /// From the end of one step to the point where the next needs its forces.
     pub(super) fn before_forces(self, motion: Motion, dt: f64) {

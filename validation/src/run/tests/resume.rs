@@ -2,7 +2,9 @@
 
 use super::*;
 use crate::run::checkpoint::{CheckpointError, Store, read_state};
+use psidpd_core::engine::Precision;
 use std::collections::BTreeMap;
+use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
@@ -18,20 +20,40 @@ fn bounded() -> String {
     SET6.replace("range  = \"rd\"", "range  = \"rd\"\nbounds = [0.5, 4.5]")
 }
 
-fn scenes() -> [Scene; 2] {
+/// A frozen floor, a body force, a ramp, and everything that a scene can write.
+const EVERYTHING: &str = "title = \"all\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7\ndensity = 6.05\nprecision = \"double\"\n\
+    [box]\nlengths = [3.0, 3.0, 5.0]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]\n\
+    [[part]]\nshape = \"layer\"\nface = \"zlo\"\nthickness = 0.8\nlattice = \"fcc\"\nfrozen = true\n\
+    [[part]]\nshape = \"rest\"\n\
+    [[body_force]]\nacceleration = [0.1, 0.0, -0.2]\n\
+    [[stage]]\nname = \"cool\"\nsteps = 7\nkT = [1.5, 1.0]\nlevels = 3\nintegrator = \"groot-warren\"\n\
+    [[stage]]\nname = \"alone\"\nsteps = 5\ndt = 0.005\nbody_forces = false\n\
+    [[stage]]\nname = \"run\"\nsteps = 9\n\
+    [output]\nthermo = 2\ndump = 3\nxyz = 4\nsnapshot = 10\ncheckpoint = 4\n\
+    [observe]\nevery = 2\nstages = [\"cool\", \"run\"]\nrdf = true\ntemperature = true\nstress_profile = true\n\
+    velocity_profile = true\npressure = true\nmsd = { every = 1, length = 4 }\nclusters = { skip = 3 }\n";
+
+fn scenes() -> [Scene; 3] {
     let solid = scene_of(&bounded(), "[3.0, 3.0, 3.0]", 6.05, &format!("{STAGES}checkpoint = 4\n")).unwrap();
     let flat = scene_of(VAN_DER_WAALS, "[5.0, 5.0]", 12.0, STAGES).unwrap();
-    [solid, flat]
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("m.toml"), SET6).unwrap();
+    [solid, flat, Scene::parse("s.toml", EVERYTHING, folder.path()).unwrap()]
 }
 
-/// Every file of a folder but the one that tells times.
+/// Every file of a folder and the folders in it, but the one that tells times.
 fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
-    std::fs::read_dir(folder)
-        .unwrap()
-        .map(|entry| entry.unwrap())
-        .map(|entry| (entry.file_name().into_string().unwrap(), std::fs::read(entry.path()).unwrap()))
-        .filter(|(name, _)| name != "timing.json")
-        .collect()
+    let mut files = BTreeMap::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_str().unwrap().to_owned();
+        if path.is_dir() {
+            files.extend(contents(&path).into_iter().map(|(file, bytes)| (format!("{name}/{file}"), bytes)));
+        } else if name != "timing.json" {
+            files.insert(name, std::fs::read(&path).unwrap());
+        }
+    }
+    files
 }
 
 fn assert_same(a: &Path, b: &Path, when: &str) {
@@ -70,16 +92,27 @@ fn a_run_stopped_after_any_step_ends_in_the_same_bytes() {
         let folder = tempfile::tempdir().unwrap();
         let whole = folder.path().join("whole");
         let summary = run_scene(&scene, &whole, &mut |_| ()).unwrap();
-        assert!(
-            contents(&whole).keys().eq([
-                "checkpoint",
-                "dump.lammpstrj",
-                "final.data",
-                "summary.json",
-                "thermo.csv"
-            ]
-            .iter())
-        );
+        let names: Vec<_> = contents(&whole).into_keys().filter(|n| !n.starts_with("observables/")).collect();
+        let all = [
+            "about.json",
+            "checkpoint",
+            "dump.lammpstrj",
+            "final.data",
+            "observables.json",
+            "snapshots/particles-0000000000.png",
+            "snapshots/particles-0000000010.png",
+            "snapshots/particles-0000000020.png",
+            "summary.json",
+            "thermo.csv",
+            "trajectory.xyz",
+        ];
+        let observed = |n: &&str| !["observables.json", "trajectory.xyz"].contains(n) && !n.contains('/');
+        let expected: Vec<_> = if scene.observe.requests.is_empty() {
+            all.into_iter().filter(observed).collect()
+        } else {
+            all.to_vec()
+        };
+        assert_eq!(names, expected);
         for step in 1..STEPS {
             let out = folder.path().join(format!("{step}"));
             interrupted(&scene, &out, Begin::New, step);
@@ -104,16 +137,24 @@ fn a_run_stopped_after_any_step_ends_in_the_same_bytes() {
 /// by a panic after every step, with its folder as it was at that moment.
 #[test]
 fn a_run_killed_after_any_step_ends_in_the_same_bytes() {
-    let [scene, _] = scenes();
+    let [plain, _, everything] = scenes();
+    for scene in [plain, everything] {
+        killed_after_any_step(&scene);
+    }
+}
+
+fn killed_after_any_step(scene: &Scene) {
     let folder = tempfile::tempdir().unwrap();
     let whole = folder.path().join("whole");
     let mut step = 0;
-    run_scene(&scene, &whole, &mut |_| {
+    run_scene(scene, &whole, &mut |_| {
         step += 1;
         let copy = folder.path().join(format!("{step}"));
         std::fs::create_dir(&copy).unwrap();
         for (name, bytes) in contents(&whole) {
-            std::fs::write(copy.join(name), bytes).unwrap();
+            let path = copy.join(name);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, bytes).unwrap();
         }
     })
     .unwrap();
@@ -121,14 +162,14 @@ fn a_run_killed_after_any_step_ends_in_the_same_bytes() {
     let mut from = Vec::new();
     for step in 1..=STEPS + 1 {
         let out = folder.path().join(format!("{step}"));
-        let runner = Runner::begin(&scene, &out, Begin::Resume).unwrap();
+        let runner = Runner::begin(scene, &out, Begin::Resume).unwrap();
         from.push(match runner.start() {
             Start::Resumed { step, fallback: None, program: None } => *step,
             Start::New => 0,
             other => panic!("{other:?}"),
         });
         drop(runner);
-        finished(&scene, &out, Begin::Resume);
+        finished(scene, &out, Begin::Resume);
         assert_same(&whole, &out, &format!("killed after {step} reports"));
     }
     // A step is reported before its checkpoint is written.
@@ -137,7 +178,7 @@ fn a_run_killed_after_any_step_ends_in_the_same_bytes() {
 
 #[test]
 fn a_finished_run_is_left_as_it_is() {
-    let [scene, _] = scenes();
+    let [scene, ..] = scenes();
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path();
     let summary = run_scene(&scene, out, &mut |_| ()).unwrap();
@@ -146,9 +187,12 @@ fn a_finished_run_is_left_as_it_is() {
     assert!(matches!(runner.start(), Start::Finished));
     let outcome = runner.run(&AtomicUsize::new(0), &mut |_| panic!("no step is left")).unwrap();
     let Outcome::Finished { summary: again, timing } = outcome else { panic!("{outcome:?}") };
-    assert_eq!((*again, timing.sessions.len()), (summary, 1));
+    assert_eq!((&*again, timing.sessions.len()), (&summary, 1));
     assert!(contents(out) == before);
     drop(runner);
+    // Even where its largest file was taken away.
+    std::fs::remove_file(out.join("dump.lammpstrj")).unwrap();
+    assert_eq!(finished(&scene, out, Begin::Resume), summary);
     // It may be made anew.
     finished(&scene, out, Begin::New);
     assert!(contents(out) == before);
@@ -156,7 +200,7 @@ fn a_finished_run_is_left_as_it_is() {
 
 #[test]
 fn an_unfinished_run_is_not_overwritten_by_mistake() {
-    let [scene, _] = scenes();
+    let [scene, ..] = scenes();
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path();
     interrupted(&scene, out, Begin::New, 9);
@@ -186,7 +230,7 @@ fn an_unfinished_run_is_not_overwritten_by_mistake() {
 /// A scene that does not say gets checkpoints by the clock; one that says 0 gets none on the way.
 #[test]
 fn checkpoints_come_when_they_are_due() {
-    let [often, by_the_clock] = scenes();
+    let [often, by_the_clock, _] = scenes();
     let never = scene_of(VAN_DER_WAALS, "[5.0, 5.0]", 12.0, &format!("{STAGES}checkpoint = 0\n")).unwrap();
     let seen = |scene: &Scene, interval: Duration| {
         let folder = tempfile::tempdir().unwrap();
@@ -209,7 +253,7 @@ fn checkpoints_come_when_they_are_due() {
 
 #[test]
 fn one_folder_holds_one_run_at_a_time() {
-    let [scene, _] = scenes();
+    let [scene, ..] = scenes();
     let folder = tempfile::tempdir().unwrap();
     let first = Runner::begin(&scene, folder.path(), Begin::New).unwrap();
     let second = Runner::begin(&scene, folder.path(), Begin::Overwrite).map(|_| ());
@@ -221,7 +265,7 @@ fn one_folder_holds_one_run_at_a_time() {
 /// Files that lost what a checkpoint counts on: the one before will do if it can, else nothing is touched.
 #[test]
 fn files_that_became_shorter_are_noticed() {
-    let [scene, _] = scenes();
+    let [scene, ..] = scenes();
     let folder = tempfile::tempdir().unwrap();
     let (whole, out) = (folder.path().join("whole"), folder.path().join("out"));
     run_scene(&scene, &whole, &mut |_| ()).unwrap();
@@ -250,7 +294,7 @@ fn files_that_became_shorter_are_noticed() {
 
 #[test]
 fn other_scenes_do_not_go_on_from_a_checkpoint() {
-    let [scene, flat] = scenes();
+    let [scene, flat, _] = scenes();
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path();
     interrupted(&scene, out, Begin::New, 9);
@@ -269,6 +313,45 @@ fn other_scenes_do_not_go_on_from_a_checkpoint() {
         &scene_of(&softer, "[3.0, 3.0, 3.0]", 6.05, STAGES).unwrap(),
         "the model's parameters.B is 20, was 25",
     );
+}
+
+/// Not the number of threads, but the precision: it tells one run from another.
+#[test]
+fn threads_change_no_byte_and_precision_is_part_of_a_run() {
+    for scene in scenes() {
+        let folder = tempfile::tempdir().unwrap();
+        let [one, two] = [1, 2].map(|threads| {
+            let out = folder.path().join(format!("{threads}"));
+            let mut runner = Runner::begin(&scene, &out, Begin::New).unwrap();
+            runner.set_threads(NonZeroUsize::new(threads).unwrap()).unwrap();
+            runner.run(&AtomicUsize::new(0), &mut |_| ()).unwrap();
+            out
+        });
+        assert_same(&one, &two, "threads");
+        // From a checkpoint with another number of threads, too.
+        let three = folder.path().join("3");
+        interrupted(&scene, &three, Begin::New, 10);
+        let mut runner = Runner::begin(&scene, &three, Begin::Resume).unwrap();
+        runner.set_threads(NonZeroUsize::new(3).unwrap()).unwrap();
+        runner.run(&AtomicUsize::new(0), &mut |_| ()).unwrap();
+        drop(runner);
+        assert_same(&one, &three, "resumed by other threads");
+
+        let other = if scene.precision() == Precision::Double { Precision::Mixed } else { Precision::Double };
+        let other = Scene { precision: Some(other), ..scene.clone() };
+        let out = folder.path().join("other");
+        interrupted(&scene, &out, Begin::New, 10);
+        let error = Runner::begin(&other, &out, Begin::Resume).map(|_| ()).unwrap_err().to_string();
+        assert!(error.contains("precision is "), "{error}");
+        finished(&other, &out, Begin::Overwrite);
+        assert!(contents(&out)["thermo.csv"] != contents(&one)["thermo.csv"]);
+        // Said or meant is the same.
+        let out = folder.path().join("said");
+        interrupted(&scene, &out, Begin::New, 10);
+        let said = Scene { precision: Some(scene.precision()), ..scene.clone() };
+        finished(&said, &out, Begin::Resume);
+        assert_same(&one, &out, "said");
+    }
 }
 
 /// The checkpoint of a run that blew up is of the last good state, and leads to the same end again.

@@ -1,9 +1,36 @@
+use super::near::Near;
+use crate::scene::shape::Shape;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-/// Uniform points between the corners `low` and `high`.
-pub fn fractions(count: usize, low: [f64; 3], high: [f64; 3], random: &mut ChaCha8Rng) -> Vec<[f64; 3]> {
-    (0..count)
-        .map(|_| std::array::from_fn(|k| low[k] + (high[k] - low[k]) * random.random::<f64>()))
-        .collect()
+/// How often a place is looked for before a region counts as full.
+const ATTEMPTS: usize = 2000;
+
+/// A uniform point of `shape`.
+pub fn point(shape: &Shape, dimensions: usize, random: &mut ChaCha8Rng) -> [f64; 3] {
+    let [low, high] = shape.bounds(dimensions);
+    loop {
+        let x = std::array::from_fn(|k| low[k] + (high[k] - low[k]) * random.random::<f64>());
+        if shape.contains(x, dimensions) {
+            return x;
+        }
+    }
+}
+
+/// A uniform point of `shape` that has nothing within the distance of `near`, or one that has, if none is
+/// found.
+pub fn point_apart(
+    shape: &Shape,
+    dimensions: usize,
+    near: &Near,
+    random: &mut ChaCha8Rng,
+) -> Result<[f64; 3], [f64; 3]> {
+    let mut x = point(shape, dimensions, random);
+    for _ in 1..ATTEMPTS {
+        if !near.is_close(x) {
+            return Ok(x);
+        }
+        x = point(shape, dimensions, random);
+    }
+    if near.is_close(x) { Err(x) } else { Ok(x) }
 }

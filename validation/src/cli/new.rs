@@ -1,0 +1,36 @@
+use super::{Failure, Verdict, write_json};
+use crate::scene::{TEMPLATES, Template};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+/// Write a scene to begin with, and its model.
+#[derive(Debug, clap::Args)]
+#[command(after_help = templates())]
+pub struct Arguments {
+    /// The scene file to write; `.toml` is added if it has no extension.
+    name: PathBuf,
+    /// What to begin with.
+    #[arg(long, default_value = TEMPLATES[0].name, value_parser = names())]
+    template: String,
+}
+
+fn names() -> clap::builder::PossibleValuesParser {
+    TEMPLATES.iter().map(|t| t.name).collect::<Vec<_>>().into()
+}
+
+/// A line for each template.
+fn templates() -> String {
+    let lines = TEMPLATES.iter().map(|t| format!("  {:<14}{}\n", t.name, t.about));
+    format!("Templates:\n{}", lines.collect::<String>())
+}
+
+pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
+    let chosen: Option<&Template> = TEMPLATES.iter().find(|t| t.name == arguments.template);
+    let template = chosen.unwrap_or(&TEMPLATES[0]);
+    let [scene, model] = template.write(&arguments.name).map_err(Failure::new)?;
+    println!("{}: {}", scene.display(), template.about);
+    println!("{}: its model", model.display());
+    println!("run it: psidpd run {} --out {}", scene.display(), scene.with_extension("").display());
+    write_json(json, &json!({"scene": scene, "model": model, "template": template.name}))?;
+    Ok(Verdict::Good)
+}

@@ -1,0 +1,19 @@
+use super::{Failure, Verdict, write_json};
+use crate::report::write_run_report;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+/// Make report.html of a run again.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// The folder of the run.
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+}
+
+pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
+    let page = write_run_report(&arguments.folder).map_err(Failure::new)?;
+    println!("{}", page.display());
+    write_json(json, &json!({"report": page}))?;
+    Ok(Verdict::Good)
+}

@@ -1,0 +1,151 @@
+//! Every key of `[observe]`, in tables that the reference `docs/observables.md` is written from and that
+//! a test holds the reader to.
+
+/// An observable and what may be said of it.
+#[derive(Debug, Clone, Copy)]
+pub struct Table {
+    /// Its name: the key in `[observe]`.
+    pub name: &'static str,
+    /// Its name for people.
+    pub title: &'static str,
+    /// What it is, how it is measured, and what it gives.
+    pub about: &'static str,
+    /// Its own keys, beside [`COMMON`].
+    pub keys: &'static [Key],
+}
+
+/// A key of an observable.
+#[derive(Debug, Clone, Copy)]
+pub struct Key {
+    /// Its name.
+    pub name: &'static str,
+    /// What its value is.
+    pub value: &'static str,
+    /// What it is if left out.
+    pub default: &'static str,
+    /// What it means.
+    pub about: &'static str,
+    /// A value it may have.
+    pub example: &'static str,
+}
+
+/// The keys of `[observe]` itself, for every observable, and of each observable, for that alone.
+pub const COMMON: &[Key] = &[
+    Key {
+        name: "every",
+        value: "whole number from 1",
+        default: "10",
+        about: "Steps between samples: those whose number is a multiple of it.",
+        example: "5",
+    },
+    Key {
+        name: "stages",
+        value: "array of names of stages",
+        default: "the last stage",
+        about: "In which stages to sample. Each has its own result.",
+        example: "[\"produce\"]",
+    },
+    Key {
+        name: "skip",
+        value: "whole number from 0",
+        default: "0",
+        about: "Steps at the beginning of a stage that are not sampled.",
+        example: "20",
+    },
+];
+
+pub(super) const AXIS: Key = Key {
+    name: "axis",
+    value: "`\"x\"`, `\"y\"` or `\"z\"`",
+    default: "the normal of the initial slab, or else the last direction",
+    about: "The direction of the profile, normal to the faces of the box there.",
+    example: "\"x\"",
+};
+
+pub(super) const BINS: Key = Key {
+    name: "bins",
+    value: "whole number from 1 to 10000",
+    default: "as many as make them 0.1 wide, or a little less",
+    about: "Bins along the axis.",
+    example: "50",
+};
+
+pub(super) const RECENTRE: Key = Key {
+    name: "recentre",
+    value: "true or false",
+    default: "true if the scene starts from a slab normal to the axis, else false",
+    about: "Whether each sample is shifted so that the centre of mass of all particles, taken on the circle, is \
+            at 0: a drifting slab is not smeared then.",
+    example: "true",
+};
+
+/// The reference of `[observe]`, as Markdown.
+pub fn reference(tables: &[&Table]) -> String {
+    let mut out = String::from(INTRODUCTION);
+    out.push_str("\n## Keys of every observable\n\n");
+    list(&mut out, COMMON);
+    for table in tables {
+        out.push_str(&format!("\n## `{}`: {}\n\n{}\n", table.name, table.title, table.about));
+        if !table.keys.is_empty() {
+            out.push('\n');
+            list(&mut out, table.keys);
+        }
+    }
+    out
+}
+
+fn list(out: &mut String, keys: &[Key]) {
+    out.push_str("| key | value | if left out | meaning |\n|---|---|---|---|\n");
+    for key in keys {
+        // A bar would end the cell.
+        let [value, default, about] =
+            [key.value, key.default, key.about].map(|text| text.replace('|', "\\|"));
+        out.push_str(&format!("| `{}` | {value} | {default} | {about} |\n", key.name));
+    }
+}
+
+const INTRODUCTION: &str = r#"# Observables
+
+What `[observe]` in a scene may ask for. Nothing is measured that is not asked for.
+
+```toml
+[observe]
+every  = 10                    # for every observable that does not say otherwise
+stages = ["produce"]
+
+rdf         = true             # with defaults
+temperature = true
+
+[observe.surface_tension]      # with settings
+axis  = "z"
+every = 20
+```
+
+A run writes what it measured to `observables.json` and, one file each, to `observables/NAME.csv`
+(`NAME-STAGE.csv` if several stages have it). The JSON file is a list of objects
+
+```text
+{ "name", "title", "stage", "kind": "scalar" | "profile" | "curve" | "series" | "field",
+  "x": { "name", "unit", "values" } or null,
+  "columns": [ { "name", "unit", "values", "errors" } ],
+  "samples", "note" }
+```
+
+A `scalar` has one value in each column and no `x`; the first columns of a `field` are the coordinates of its
+points. `null` stands for a value, or an error, that there is not: a temperature where no particle came, the
+error of a single sample.
+
+**Error bars** are one standard deviation. Samples that follow each other are correlated; a mean has the larger
+of two errors, from the integrated autocorrelation time (Sokal's window) and from blocking (Flyvbjerg and
+Petersen, J. Chem. Phys. 91, 461 (1989)). A quotient of means R = ⟨a⟩/⟨b⟩ has the error of the mean of
+(a − R b)/⟨b⟩; what is fitted to a mean profile has the jackknife error over twenty stretches of the run. Long
+series are kept as 256 to 511 block means (hanging drops 32 to 63, viscosities 64 to 127), so memory does not grow with the run; at the end the last block, if
+it is not complete, is left out. With fewer than 8 samples the error is the plain standard error.
+
+**Units** are those of the model: lengths in r_c, energies in the unit of kT, masses in m; "1" stands for a pure
+number. In two dimensions volumes are areas: densities count per r_c², pressures are forces per length, surface
+tensions are line tensions. Forces are those of the Hamiltonian, many-body terms included; drag and noise take
+part only where it says so.
+
+This page is written from the tables of keys in `validation/src/observe/`.
+"#;

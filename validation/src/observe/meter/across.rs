@@ -1,0 +1,154 @@
+//! The direction that profiles go along.
+
+use crate::observe::request::Options;
+use crate::run::Simulation;
+use psidpd_core::document::FileError;
+use psidpd_core::engine::PeriodicBox;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
+
+/// Below this the mean of the unit vectors exp(2πi s) has no direction.
+const LEAST_RESULTANT: f64 = 1e-10;
+
+/// Bins along one direction of the box.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Across {
+    /// The direction.
+    pub axis: usize,
+    /// How many bins.
+    pub bins: usize,
+    /// Whether samples are centred.
+    pub recentre: bool,
+    /// Where the axis begins.
+    origin: f64,
+    /// Distance of the faces.
+    pub height: f64,
+    /// Volume of the box.
+    pub volume: f64,
+    periodic: bool,
+}
+
+impl Across {
+    /// The bins of an observable; `centred` if they are always recentred.
+    pub fn read(options: &Options, centred: bool) -> Result<Across, FileError> {
+        let mut across = Across::read_along(options, options.axis("axis")?)?;
+        let preset = across.periodic && options.place.slab == Some(across.axis);
+        across.recentre = centred || options.flag("recentre")?.unwrap_or(preset);
+        if across.recentre && !across.periodic {
+            return Err(options.error("recentre", "the box is not periodic along the axis"));
+        }
+        Ok(across)
+    }
+
+    /// Bins that are never recentred, along `axis` or else the normal of the initial slab or the last
+    /// direction.
+    pub fn read_along(options: &Options, axis: Option<usize>) -> Result<Across, FileError> {
+        let axis = axis.or(options.place.slab).unwrap_or(options.place.fluid.dimensions - 1);
+        let across = Across::at(options, axis);
+        let bins = options.count("bins", 1, 10_000)?;
+        let bins = bins.unwrap_or(((across.height / 0.1).ceil() as usize).clamp(1, 10_000));
+        Ok(Across { bins, ..across })
+    }
+
+    /// The direction alone, in one bin.
+    pub fn at(options: &Options, axis: usize) -> Across {
+        let domain = options.place.domain;
+        Across {
+            axis,
+            bins: 1,
+            recentre: false,
+            origin: domain.origin()[axis],
+            height: domain.height(axis),
+            volume: domain.volume(options.place.fluid.dimensions),
+            periodic: domain.periodic()[axis],
+        }
+    }
+
+    /// Height of a bin.
+    pub fn bin_height(&self) -> f64 {
+        self.height / self.bins as f64
+    }
+
+    /// Volume of a bin.
+    pub fn bin_volume(&self) -> f64 {
+        self.volume / self.bins as f64
+    }
+
+    /// Area of a face.
+    pub fn area(&self) -> f64 {
+        self.volume / self.height
+    }
+
+    /// The name of the coordinate.
+    pub fn name(&self) -> &'static str {
+        ["x", "y", "z"][self.axis]
+    }
+
+    /// The middles of the bins: from the centre if samples are centred.
+    pub fn middles(&self) -> Vec<f64> {
+        let low = if self.recentre { -0.5 * self.height } else { self.origin };
+        (0..self.bins).map(|k| low + (k as f64 + 0.5) * self.bin_height()).collect()
+    }
+
+    /// The normal of the faces.
+    pub fn normal(&self, domain: &PeriodicBox) -> [f64; 3] {
+        let (a, b) = (domain.edge((self.axis + 1) % 3), domain.edge((self.axis + 2) % 3));
+        let n = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+        let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
+        n.map(|c| c / length)
+    }
+
+    /// Where the particles are, as fractions of the height; `None` if they have no centre to be put at ½.
+    pub fn fractions(&self, simulation: &Simulation) -> Option<Vec<f64>> {
+        let domain = simulation.domain();
+        let mut s: Vec<f64> = simulation.positions().iter().map(|x| domain.fraction(*x)[self.axis]).collect();
+        if !self.recentre {
+            return Some(s);
+        }
+        let (mut sine, mut cosine) = (0.0, 0.0);
+        for s in &s {
+            let (a, b) = (TAU * s).sin_cos();
+            sine += a;
+            cosine += b;
+        }
+        if f64::hypot(sine, cosine) < LEAST_RESULTANT * s.len() as f64 {
+            return None;
+        }
+        let centre = sine.atan2(cosine) / TAU;
+        s.iter_mut().for_each(|s| *s += 0.5 - centre);
+        Some(s)
+    }
+
+    /// The bin of a fraction; `None` outside an open box.
+    pub fn bin(&self, fraction: f64) -> Option<usize> {
+        let s = if self.periodic { fraction.rem_euclid(1.0) } else { fraction };
+        if !(0.0..=1.0).contains(&s) {
+            return None;
+        }
+        Some(((s * self.bins as f64) as usize).min(self.bins - 1))
+    }
+
+    /// Shares a line from fraction `a` to `b` out over the bins it goes through.
+    pub fn share(&self, a: f64, b: f64, mut visit: impl FnMut(usize, f64)) {
+        let (low, high) = (a.min(b), a.max(b));
+        let length = high - low;
+        let count = self.bins as f64;
+        // A line within a plane of the profile, or nearly so, is in one bin.
+        if length < 1e-14 {
+            if let Some(bin) = self.bin(0.5 * (low + high)) {
+                visit(bin, 1.0);
+            }
+            return;
+        }
+        let mut k = (low * count).floor();
+        while k / count < high {
+            let overlap = ((k + 1.0) / count).min(high) - (k / count).max(low);
+            if overlap > 0.0
+                && let Some(bin) = self.bin((k + 0.5) / count)
+            {
+                visit(bin, overlap / length);
+            }
+            k += 1.0;
+        }
+    }
+}

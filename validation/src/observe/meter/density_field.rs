@@ -1,0 +1,148 @@
+use super::Meter;
+use crate::observe::frame::Frame;
+use crate::observe::keys::{Key, Table};
+use crate::observe::observation::{Kind, Observation};
+use crate::observe::request::Options;
+use crate::observe::series::Series;
+use psidpd_core::document::FileError;
+use serde::{Deserialize, Serialize};
+
+/// Rows of fields that are kept for error bars.
+const ROWS: usize = 64;
+
+/// Mean density on a plane, averaged over the direction normal to it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DensityField {
+    axes: [usize; 2],
+    bins: [usize; 2],
+    origin: [f64; 2],
+    width: [f64; 2],
+    /// Volume of a cell.
+    volume: f64,
+    species: Vec<String>,
+    series: Series,
+}
+
+impl Meter for DensityField {
+    const TABLE: Table = Table {
+        name: "density_field",
+        title: "density on a plane",
+        about: "Number density in columns of the box, averaged over `axis`, of all particles and of each of several \
+                species: a map of drops, films and domains that stay where they are. The first two columns are the \
+                middles of the cells, the later of the two directions running fastest. The box must have right \
+                angles.",
+        keys: &[
+            Key {
+                name: "axis",
+                value: "`\"x\"`, `\"y\"` or `\"z\"`",
+                default: "y; none in two dimensions",
+                about: "The direction that is averaged over.",
+                example: "\"x\"",
+            },
+            Key {
+                name: "bins",
+                value: "array of two whole numbers from 1 to 2000",
+                default: "as many as make them 0.25 wide, or a little less",
+                about: "Cells along the other two directions, in their order.",
+                example: "[10, 20]",
+            },
+        ],
+    };
+
+    fn read(options: &Options) -> Result<DensityField, FileError> {
+        let (domain, fluid) = (options.place.domain, options.place.fluid);
+        let d = fluid.dimensions;
+        let lengths = domain.lengths();
+        if (0..d).any(|k| (domain.height(k) - lengths[k]).abs() > 1e-9 * lengths[k]) {
+            return Err(options.error("", "the box must have right angles"));
+        }
+        let depth = match options.axis("axis")? {
+            Some(_) if d == 2 => return Err(options.error("axis", "two dimensions have one plane only")),
+            Some(axis) => axis,
+            None if d == 2 => 2,
+            None => 1,
+        };
+        let axes = match depth {
+            0 => [1, 2],
+            1 => [0, 2],
+            _ => [0, 1],
+        };
+        let preset = axes.map(|k| ((lengths[k] / 0.25).ceil() as usize).clamp(1, 2000));
+        let bins = options.counts("bins", 1, 2000)?.unwrap_or(preset);
+        let kinds = if fluid.species.len() > 1 { fluid.species.len() } else { 1 };
+        Ok(DensityField {
+            axes,
+            bins,
+            origin: axes.map(|k| domain.origin()[k]),
+            width: std::array::from_fn(|k| lengths[axes[k]] / bins[k] as f64),
+            volume: domain.volume(d) / (bins[0] * bins[1]) as f64,
+            species: fluid.species.clone(),
+            series: Series::with_rows(bins[0] * bins[1] * kinds, ROWS),
+        })
+    }
+
+    fn sample(&mut self, frame: &Frame) -> bool {
+        let simulation = frame.simulation;
+        let cells = self.bins[0] * self.bins[1];
+        let mut field = vec![0.0; self.series.width()];
+        for (x, s) in simulation.positions().iter().zip(simulation.species()) {
+            let [a, b] = std::array::from_fn(|k| {
+                let place = (x[self.axes[k]] - self.origin[k]) / self.width[k];
+                (place.max(0.0) as usize).min(self.bins[k] - 1)
+            });
+            // One species is all there is.
+            field[*s as usize * cells + a * self.bins[1] + b] += 1.0 / self.volume;
+        }
+        self.series.push(&field)
+    }
+
+    fn finish(&self) -> Vec<Observation> {
+        let cells = self.bins[0] * self.bins[1];
+        let middle = |k: usize, bin: usize| self.origin[k] + (bin as f64 + 0.5) * self.width[k];
+        let names = self.axes.map(|k| ["x", "y", "z"][k]);
+        let kinds = self.series.width() / cells;
+        let total =
+            (0..cells).map(|c| self.series.linear(|row| (0..kinds).map(|s| row[s * cells + c]).sum()));
+        let mut out = Observation::new("density_field", "Density on a plane", Kind::Field)
+            .samples(self.series.samples())
+            .exact(names[0], "r_c", (0..cells).map(|c| middle(0, c / self.bins[1])))
+            .exact(names[1], "r_c", (0..cells).map(|c| middle(1, c % self.bins[1])))
+            .column("density", "1/volume", total);
+        if kinds > 1 {
+            for (s, name) in self.species.iter().enumerate() {
+                let own = (0..cells).map(|c| self.series.mean(s * cells + c));
+                out = out.column(&format!("density_{name}"), "1/volume", own);
+            }
+        }
+        vec![out]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::observe::tests::{IDEAL, find, run, scene};
+
+    /// The cells of a plane hold all particles, each in the cell it is in.
+    #[test]
+    fn every_particle_is_in_its_cell() {
+        let observe = "[observe.density_field]\nbins = [4, 5]\nevery = 100\nstages = [\"settle\"]\n";
+        let scene = scene(IDEAL, "[4.0, 3.0, 5.0]", 5.0, 1, observe).unwrap();
+        let mut shorter = scene.clone();
+        shorter.stages.truncate(1);
+        let (simulation, all) = run(&shorter);
+        let field = find(&all, "density_field");
+        let names: Vec<&str> = field.columns.iter().map(|c| c.name.as_str()).collect();
+        assert_eq!(names, ["x", "z", "density", "density_A", "density_B"]);
+        let (x, z) = (&field.columns[0].values, &field.columns[1].values);
+        let mut expected = vec![[0.0; 2]; 20];
+        for (p, s) in simulation.positions().iter().zip(simulation.species()) {
+            let inside = |k: &usize| (p[0] - x[*k]).abs() <= 0.5 && (p[2] - z[*k]).abs() <= 0.5;
+            expected[(0..20).find(inside).unwrap()][*s as usize] += 1.0 / 3.0;
+        }
+        for (k, e) in expected.iter().enumerate() {
+            assert!((field.columns[3].values[k] - e[0]).abs() < 1e-12);
+            assert!((field.columns[4].values[k] - e[1]).abs() < 1e-12);
+            assert!((field.columns[2].values[k] - e[0] - e[1]).abs() < 1e-12);
+        }
+    }
+}

@@ -1,0 +1,79 @@
+//! Numbering of pairs of species.
+
+use serde::{Deserialize, Serialize};
+
+/// All pairs, number 0, then those of each two species; that is all with one species.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SpeciesPairs {
+    species: Vec<String>,
+}
+
+impl SpeciesPairs {
+    /// Of species of these names.
+    pub fn new(species: &[String]) -> SpeciesPairs {
+        SpeciesPairs { species: species.to_vec() }
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        let count = self.species.len();
+        if count > 1 { 1 + count * (count + 1) / 2 } else { 1 }
+    }
+
+    /// The species of each but the first.
+    pub fn each(&self) -> impl Iterator<Item = (usize, usize)> {
+        let count = if self.species.len() > 1 { self.species.len() } else { 0 };
+        (0..count).flat_map(move |a| (a..count).map(move |b| (a, b)))
+    }
+
+    /// The numbers that a pair of these species counts under.
+    pub fn at(&self, a: i32, b: i32) -> impl Iterator<Item = usize> + use<> {
+        let count = self.species.len();
+        let (a, b) = (a.min(b) as usize, a.max(b) as usize);
+        // Rows of the upper triangle before row a have count, count − 1, … numbers.
+        let own = (count > 1).then(|| 1 + a * count - (a * (a + 1)) / 2 + b);
+        std::iter::once(0).chain(own)
+    }
+
+    /// How many pairs of each kind particles of these species make.
+    pub fn ideal_pairs(&self, species: &[i32]) -> Vec<f64> {
+        let numbers = self.numbers(species);
+        let n = species.len() as f64;
+        let mut all = vec![0.5 * n * (n - 1.0)];
+        all.extend(self.each().map(|(a, b)| {
+            if a == b { 0.5 * numbers[a] * (numbers[a] - 1.0) } else { numbers[a] * numbers[b] }
+        }));
+        all
+    }
+
+    /// Particles of each species.
+    pub fn numbers(&self, species: &[i32]) -> Vec<f64> {
+        let mut numbers = vec![0.0; self.species.len()];
+        species.iter().for_each(|s| numbers[*s as usize] += 1.0);
+        numbers
+    }
+
+    /// Names of columns.
+    pub fn names(&self, what: &str) -> Vec<String> {
+        let name = |(a, b): (usize, usize)| format!("{what}_{}_{}", self.species[a], self.species[b]);
+        std::iter::once(what.to_owned()).chain(self.each().map(name)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_and_names_go_together() {
+        let pairs = SpeciesPairs::new(&["A".into(), "B".into(), "C".into()]);
+        assert_eq!(pairs.names("g"), ["g", "g_A_A", "g_A_B", "g_A_C", "g_B_B", "g_B_C", "g_C_C"]);
+        for (k, (a, b)) in pairs.each().enumerate() {
+            assert_eq!(pairs.at(b as i32, a as i32).collect::<Vec<_>>(), [0, 1 + k]);
+        }
+        assert_eq!(pairs.len(), 7);
+        assert_eq!(pairs.ideal_pairs(&[0, 0, 1, 2]), [6.0, 1.0, 2.0, 2.0, 0.0, 1.0, 0.0]);
+        let one = SpeciesPairs::new(&["A".into()]);
+        assert_eq!((one.len(), one.names("g").len(), one.at(0, 0).count()), (1, 1, 1));
+    }
+}

@@ -1,0 +1,105 @@
+use super::Meter;
+use super::across::Across;
+use crate::observe::frame::Frame;
+use crate::observe::keys::{AXIS, BINS, RECENTRE, Table};
+use crate::observe::observation::{Kind, Observation};
+use crate::observe::request::Options;
+use crate::observe::series::{Measured, Series};
+use psidpd_core::document::FileError;
+use serde::{Deserialize, Serialize};
+
+/// Numbers to a bin: normal and tangential, of momenta and of forces.
+const WIDTH: usize = 4;
+
+/// Irving and Kirkwood's pressure tensor along an axis.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StressProfile {
+    across: Across,
+    dimensions: usize,
+    series: Series,
+}
+
+impl StressProfile {
+    /// The sums of a configuration in every bin, as pressures.
+    fn pressures(&self, frame: &Frame) -> Option<Vec<f64>> {
+        let simulation = frame.simulation;
+        let fractions = self.across.fractions(simulation)?;
+        let normal = self.across.normal(simulation.domain());
+        let along = |v: [f64; 3]| v[0] * normal[0] + v[1] * normal[1] + v[2] * normal[2];
+        let (volume, rest) = (self.across.bin_volume(), (self.dimensions - 1) as f64);
+        let mut sums = vec![0.0; self.across.bins * WIDTH];
+        for (k, v) in simulation.velocities().iter().enumerate() {
+            if let Some(bin) = self.across.bin(fractions[k]) {
+                let m = frame.mass(k);
+                let (n, square) = (along(*v), v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+                sums[bin * WIDTH] += m * n * n / volume;
+                sums[bin * WIDTH + 1] += m * (square - n * n) / rest / volume;
+            }
+        }
+        for (pair, force) in frame.landscape().forces() {
+            let n = along(pair.d);
+            let normal = force * n * n / pair.r / volume;
+            let tangential = force * (pair.r * pair.r - n * n) / pair.r / rest / volume;
+            let from = fractions[pair.i];
+            self.across.share(from, from - n / self.across.height, |bin, share| {
+                sums[bin * WIDTH + 2] += share * normal;
+                sums[bin * WIDTH + 3] += share * tangential;
+            });
+        }
+        Some(sums)
+    }
+}
+
+impl Meter for StressProfile {
+    const TABLE: Table = Table {
+        name: "stress_profile",
+        title: "pressure tensor along an axis (Irving–Kirkwood)",
+        about: "P_N and P_T in slices of the box with the conservative forces: momenta where the particles are, the \
+                force of each pair, many-body part included, spread evenly over the straight line from i to j \
+                (Irving and Kirkwood, J. Chem. Phys. 18, 817 (1950)). `normal`, `tangential` (the mean of the other \
+                directions), `ideal` (the share of the momenta in `normal`), `difference` P_N − P_T, and `integral` \
+                ∫(P_N − P_T) from the lower end of the axis. `stress_profile_integral` is the whole of it: the \
+                surface tension of all interfaces together. P_N is the same everywhere in equilibrium.",
+        keys: &[AXIS, BINS, RECENTRE],
+    };
+
+    fn read(options: &Options) -> Result<StressProfile, FileError> {
+        let across = Across::read(options, false)?;
+        let series = Series::new(across.bins * WIDTH);
+        Ok(StressProfile { across, dimensions: options.place.fluid.dimensions, series })
+    }
+
+    fn sample(&mut self, frame: &Frame) -> bool {
+        self.pressures(frame).is_some_and(|sums| self.series.push(&sums))
+    }
+
+    fn finish(&self) -> Vec<Observation> {
+        let column = |f: &dyn Fn(&[f64]) -> f64| -> Vec<Measured> {
+            (0..self.across.bins)
+                .map(|bin| self.series.linear(|row| f(&row[bin * WIDTH..(bin + 1) * WIDTH])))
+                .collect()
+        };
+        let height = self.across.bin_height();
+        let upto = |row: &[f64], bins: usize| -> f64 {
+            row.chunks_exact(WIDTH).take(bins).map(|p| height * (p[0] + p[2] - p[1] - p[3])).sum()
+        };
+        // Up to the middle of each bin.
+        let integral = (0..self.across.bins)
+            .map(|bin| self.series.linear(|row| 0.5 * (upto(row, bin) + upto(row, bin + 1))));
+        let unit = "energy/volume";
+        let centred = if self.across.recentre { "Samples are centred." } else { "" };
+        let profile = Observation::new("stress_profile", "Pressure tensor profile", Kind::Profile)
+            .against(self.across.name(), "r_c", self.across.middles())
+            .samples(self.series.samples())
+            .column("normal", unit, column(&|p| p[0] + p[2]))
+            .column("tangential", unit, column(&|p| p[1] + p[3]))
+            .column("ideal", unit, column(&|p| p[0]))
+            .column("difference", unit, column(&|p| p[0] + p[2] - p[1] - p[3]))
+            .column("integral", "energy/area", integral)
+            .note(centred);
+        let whole = Observation::new("stress_profile_integral", "Integral of P_N − P_T", Kind::Scalar)
+            .samples(self.series.samples())
+            .column("integral", "energy/area", [self.series.linear(|row| upto(row, self.across.bins))]);
+        vec![profile, whole]
+    }
+}

@@ -1,0 +1,176 @@
+use super::Meter;
+use super::across::Across;
+use crate::observe::frame::Frame;
+use crate::observe::keys::{AXIS, Key, Table};
+use crate::observe::landscape::Landscape;
+use crate::observe::observation::{Kind, Observation};
+use crate::observe::request::Options;
+use crate::observe::series::Series;
+use nalgebra::Matrix3;
+use psidpd_core::document::FileError;
+use psidpd_core::engine::{PeriodicBox, Want};
+use serde::{Deserialize, Serialize};
+
+/// The surface tension of interfaces normal to an axis.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SurfaceTension {
+    across: Across,
+    dimensions: usize,
+    interfaces: f64,
+    perturbation: f64,
+    kt: f64,
+    /// γ of conservative stress and of total stress, exp(−ΔU/kT) for more and for less area.
+    series: Series,
+}
+
+/// Fractional lengths of a box whose faces normal to `axis` have `1 + change` times the area, at the same
+/// volume.
+fn deformation(axis: usize, dimensions: usize, change: f64) -> [f64; 3] {
+    let rest = (1.0 + change).powf(1.0 / (dimensions - 1) as f64);
+    std::array::from_fn(|c| match c {
+        c if c == axis => 1.0 / (1.0 + change),
+        c if c < dimensions => rest,
+        _ => 1.0,
+    })
+}
+
+/// `U` of a configuration stretched with its box to `1 + change` times the area at constant volume.
+fn stretched_energy(frame: &Frame, axis: usize, change: f64) -> f64 {
+    let simulation = frame.simulation;
+    let domain = simulation.domain();
+    // The faces normal to a direction are those of the other two edges: edges are scaled, not directions.
+    let scale = deformation(axis, simulation.dimensions(), change);
+    let edges = Matrix3::from_fn(|row, k| scale[k] * domain.edge(k)[row]);
+    let Ok(stretched) = PeriodicBox::new(domain.origin(), edges, domain.periodic()) else { return f64::NAN };
+    let x: Vec<[f64; 3]> =
+        simulation.positions().iter().map(|x| stretched.point(domain.fraction(*x))).collect();
+    Landscape::new(frame.interactions(), &x, simulation.species(), &stretched).energy()
+}
+
+impl Meter for SurfaceTension {
+    const TABLE: Table = Table {
+        name: "surface_tension",
+        title: "surface tension of a slab, by stress and by free energy",
+        about: "`stress` is (L/m)(P_N − P_T) with the conservative stress of the whole box, m the number of interfaces, \
+                P_T the mean of the other directions; `stress_total` has drag and noise too. `free_energy` is the \
+                test-area method (Gloor et al., J. Chem. Phys. 123, 134703 (2005)): configurations are stretched \
+                with their box at constant volume to 1 ± ε times the area, the many-body energy is computed anew, \
+                and γ = −kT [ln⟨exp(−ΔU₊/kT)⟩ − ln⟨exp(−ΔU₋/kT)⟩]/(2 m ε A) with the kT of the stage. The two \
+                routes agree in equilibrium. ε should be small enough that ΔU stays below kT. In two dimensions the area is a length.",
+        keys: &[
+            AXIS,
+            Key {
+                name: "interfaces",
+                value: "whole number from 1 to 1000",
+                default: "2",
+                about: "How many interfaces are normal to the axis.",
+                example: "1",
+            },
+            Key {
+                name: "perturbation",
+                value: "number from 1e-7 to 0.1",
+                default: "0.0001",
+                about: "ε, the relative change of the area.",
+                example: "5e-4",
+            },
+        ],
+    };
+
+    fn read(options: &Options) -> Result<SurfaceTension, FileError> {
+        let place = options.place;
+        let axis = options.axis("axis")?.or(place.slab).unwrap_or(place.fluid.dimensions - 1);
+        let lengths = place.domain.lengths();
+        if (0..place.fluid.dimensions)
+            .any(|k| (place.domain.height(k) - lengths[k]).abs() > 1e-9 * lengths[k])
+        {
+            return Err(options.error("axis", "the box must have right angles"));
+        }
+        if !place.fluid.is_conservative() {
+            return Err(options.error("", "a force of the model has no potential: there is no free energy"));
+        }
+        Ok(SurfaceTension {
+            across: Across::at(options, axis),
+            dimensions: place.fluid.dimensions,
+            interfaces: options.count("interfaces", 1, 1000)?.unwrap_or(2) as f64,
+            perturbation: options.number("perturbation", 1e-7, 0.1)?.unwrap_or(1e-4),
+            kt: 0.0,
+            series: Series::new(4),
+        })
+    }
+
+    fn needs(&self) -> Want {
+        Want::TOTALS
+    }
+
+    fn sample(&mut self, frame: &Frame) -> bool {
+        let (axis, simulation) = (self.across.axis, frame.simulation);
+        self.kt = simulation.kt();
+        let tension = |p: [f64; 6]| {
+            let others: f64 = (0..self.dimensions).filter(|c| *c != axis).map(|c| p[c]).sum();
+            let difference = p[axis] - others / (self.dimensions - 1) as f64;
+            self.across.height / self.interfaces * difference
+        };
+        let energy = frame.landscape().energy();
+        let weight = |change: f64| (-(stretched_energy(frame, axis, change) - energy) / self.kt).exp();
+        let sample = [
+            tension(simulation.conservative_pressure_tensor()),
+            tension(simulation.pressure_tensor()),
+            weight(self.perturbation),
+            weight(-self.perturbation),
+        ];
+        self.series.push(&sample)
+    }
+
+    fn finish(&self) -> Vec<Observation> {
+        let mut free_energy = self.series.mean(0);
+        if !self.series.is_empty() {
+            let area = 2.0 * self.interfaces * self.perturbation * self.across.area();
+            let means = self.series.means();
+            free_energy.value = -self.kt * (means[2].ln() - means[3].ln()) / area;
+            let linear = |s: &[f64]| -self.kt * (s[2] / means[2] - s[3] / means[3]) / area;
+            free_energy.error = self.series.linear(linear).error;
+        }
+        vec![
+            Observation::new("surface_tension", "Surface tension", Kind::Scalar)
+                .samples(self.series.samples())
+                .column("stress", "energy/area", [self.series.mean(0)])
+                .column("stress_total", "energy/area", [self.series.mean(1)])
+                .column("free_energy", "energy/area", [free_energy]),
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::observe::interactions::Interactions;
+    use crate::observe::tests::{SET6, scene};
+    use crate::run::Simulation;
+
+    /// On a slab whose faces point any way: half the difference of the energies over the change of the
+    /// area is the virial part of the stress tension, to second order in the perturbation.
+    #[test]
+    fn stretching_and_stress_agree_on_every_configuration() {
+        let scene = scene(SET6, "[3.0, 3.5, 9.0]", 2.5, 10, "").unwrap();
+        let mut simulation = Simulation::new(&scene.model, 1.0, scene.initial_state(), 3).unwrap();
+        simulation.prepare(0.01, Want::TOTALS).unwrap();
+        for _ in 0..50 {
+            simulation.step(0.01, scene.stages[0].integrator, Want::TOTALS).unwrap();
+        }
+        let fluid = Interactions::new(simulation.model().at(1.0).unwrap()).unwrap();
+        let frame = Frame::new(&simulation, &fluid, 0.0);
+        let virial = frame.landscape().virial();
+        for axis in 0..3 {
+            let others: f64 = (0..3).filter(|c| *c != axis).map(|c| virial[c]).sum();
+            // dU/d ln A, from ∂U/∂ε_cc = −W_cc.
+            let expected = virial[axis] - 0.5 * others;
+            let change =
+                |h: f64| (stretched_energy(&frame, axis, h) - stretched_energy(&frame, axis, -h)) / (2.0 * h);
+            let found = (4.0 * change(5e-5) - change(1e-4)) / 3.0;
+            assert!(
+                (found - expected).abs() < 1e-5 * expected.abs().max(100.0),
+                "{axis}: {found} {expected}"
+            );
+        }
+    }
+}

@@ -1,0 +1,76 @@
+use super::Meter;
+use crate::observe::frame::Frame;
+use crate::observe::interactions::{conservative_range, force_jumps};
+use crate::observe::keys::Table;
+use crate::observe::observation::{Kind, Observation};
+use crate::observe::request::Options;
+use crate::observe::series::Series;
+use psidpd_core::document::FileError;
+use serde::{Deserialize, Serialize};
+
+/// kT from velocities and from configurations.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Temperature {
+    /// Why there is no configurational temperature; empty if there is one.
+    missing: String,
+    /// Kinetic kT, `Σ F·F`, `−Σ ∇·F`.
+    series: Series,
+}
+
+impl Meter for Temperature {
+    const TABLE: Table = Table {
+        name: "temperature",
+        title: "temperature, kinetic and configurational",
+        about: "`kinetic` is 2K/(d(N − 1)). `configurational` is ⟨Σ F·F⟩/⟨−Σ ∇·F⟩ with the conservative forces alone \
+                (Rugh; Butler et al., J. Chem. Phys. 109, 6519 (1998)), with ∇·F from the second derivatives of ψ, \
+                kernels and pair potentials; φ″ of formulas and tables is the five-point difference of the exact φ′. \
+                At large time steps the two err differently. There is no configurational temperature for a force \
+                that is no gradient, for one that jumps at its range (the linear kernel), and in boxes narrower \
+                than twice the range.",
+        keys: &[],
+    };
+
+    fn read(options: &Options) -> Result<Temperature, FileError> {
+        let fluid = options.place.fluid;
+        let missing = if !fluid.is_conservative() {
+            "a force of the model has no potential"
+        } else if force_jumps(fluid) {
+            "a force of the model jumps at its range, where its divergence is a delta function"
+        } else if options.half_box() < conservative_range(fluid) {
+            "the box is narrower than twice the range of the forces"
+        } else {
+            ""
+        };
+        let width = if missing.is_empty() { 3 } else { 1 };
+        Ok(Temperature { missing: missing.into(), series: Series::new(width) })
+    }
+
+    fn sample(&mut self, frame: &Frame) -> bool {
+        let kinetic = frame.simulation.temperature();
+        if !self.missing.is_empty() {
+            return self.series.push(&[kinetic]);
+        }
+        let landscape = frame.landscape();
+        let (mut squares, mut laplacian) = (0.0, 0.0);
+        let laplacians = landscape.laplacians(frame.interactions(), frame.simulation.species());
+        for (k, (f, l)) in landscape.particle_forces().iter().zip(laplacians).enumerate() {
+            if frame.moves(k) {
+                squares += f.iter().map(|f| f * f).sum::<f64>();
+                laplacian += l;
+            }
+        }
+        self.series.push(&[kinetic, squares, laplacian])
+    }
+
+    fn finish(&self) -> Vec<Observation> {
+        let mut out = Observation::new("temperature", "Temperature kT", Kind::Scalar)
+            .samples(self.series.samples())
+            .column("kinetic", "energy", [self.series.mean(0)]);
+        if self.missing.is_empty() {
+            out = out.column("configurational", "energy", [self.series.ratio(|s| s[1], |s| s[2])]);
+        } else {
+            out = out.note(format!("No configurational temperature: {}.", self.missing));
+        }
+        vec![out]
+    }
+}

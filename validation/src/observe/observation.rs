@@ -1,0 +1,263 @@
+//! What an observable came to, and the files it is written to.
+
+use super::series::Measured;
+use serde::{Deserialize, Serialize};
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+/// What an observation looks like on a plot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// Numbers: every column has one value, and there is no `x`.
+    Scalar,
+    /// Along a coordinate in space.
+    Profile,
+    /// Against anything else.
+    Curve,
+    /// Against time.
+    Series,
+    /// On points of space: the first columns are the coordinates, and there is no `x`.
+    Field,
+}
+
+/// The abscissa.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Abscissa {
+    /// Its name.
+    pub name: String,
+    /// Its unit, of r_c, m, kT of the model; "1" for pure numbers.
+    pub unit: String,
+    /// Its values, increasing.
+    pub values: Vec<f64>,
+}
+
+/// One quantity of an observation.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Column {
+    /// Its name.
+    pub name: String,
+    /// Its unit; "1" for pure numbers.
+    pub unit: String,
+    /// Its values; NaN, written as null, where there is none.
+    #[serde(with = "nullable")]
+    pub values: Vec<f64>,
+    /// One standard deviation of each value; NaN, written as null, where it is not known.
+    #[serde(with = "nullable")]
+    pub errors: Vec<f64>,
+}
+
+/// What an observable measured in one stage.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Observation {
+    /// Its name, unique within a stage; letters, digits and underscores.
+    pub name: String,
+    /// Its name for people.
+    pub title: String,
+    /// The stage.
+    pub stage: String,
+    /// Its shape.
+    pub kind: Kind,
+    /// What the columns are plotted against, if anything.
+    pub x: Option<Abscissa>,
+    /// The quantities.
+    pub columns: Vec<Column>,
+    /// How many configurations it is the mean of.
+    pub samples: u64,
+    /// What a reader must know.
+    pub note: String,
+}
+
+impl Observation {
+    /// An observation without columns yet.
+    pub fn new(name: &str, title: &str, kind: Kind) -> Observation {
+        Observation {
+            name: name.into(),
+            title: title.into(),
+            stage: String::new(),
+            kind,
+            x: None,
+            columns: Vec::new(),
+            samples: 0,
+            note: String::new(),
+        }
+    }
+
+    /// With an abscissa.
+    #[must_use]
+    pub fn against(mut self, name: &str, unit: &str, values: Vec<f64>) -> Observation {
+        self.x = Some(Abscissa { name: name.into(), unit: unit.into(), values });
+        self
+    }
+
+    /// With one more column.
+    #[must_use]
+    pub fn column(
+        mut self,
+        name: &str,
+        unit: &str,
+        values: impl IntoIterator<Item = Measured>,
+    ) -> Observation {
+        let (values, errors) = values.into_iter().map(|m| (m.value, m.error)).unzip();
+        self.columns.push(Column { name: name.into(), unit: unit.into(), values, errors });
+        self
+    }
+
+    /// With one more column of values that are known.
+    #[must_use]
+    pub fn exact(self, name: &str, unit: &str, values: impl IntoIterator<Item = f64>) -> Observation {
+        self.column(name, unit, values.into_iter().map(|value| Measured { value, error: 0.0 }))
+    }
+
+    /// With a number of samples.
+    #[must_use]
+    pub fn samples(mut self, samples: u64) -> Observation {
+        self.samples = samples;
+        self
+    }
+
+    /// With a sentence more to its note.
+    #[must_use]
+    pub fn note(mut self, text: impl AsRef<str>) -> Observation {
+        if !self.note.is_empty() && !text.as_ref().is_empty() {
+            self.note.push(' ');
+        }
+        self.note.push_str(text.as_ref());
+        self
+    }
+
+    /// The column of a name.
+    pub fn get(&self, column: &str) -> Option<&Column> {
+        self.columns.iter().find(|c| c.name == column)
+    }
+
+    /// Value and error of a column of one value.
+    pub fn scalar(&self, column: &str) -> Option<Measured> {
+        let c = self.get(column)?;
+        Some(Measured { value: *c.values.first()?, error: *c.errors.first()? })
+    }
+
+    /// Name of its CSV file in the folder `observables`: `NAME.csv`, or `NAME-STAGE.csv` if other stages
+    /// have it too.
+    pub fn file_name(&self, all: &[Observation]) -> String {
+        if all.iter().all(|o| o.name != self.name || o.stage == self.stage) {
+            return format!("{}.csv", self.name);
+        }
+        // Stages that differ only in what a file name cannot have keep apart by their place.
+        let place = all.iter().filter(|o| o.name == self.name).position(|o| o.stage == self.stage);
+        let plain = |c: char| if c.is_ascii_alphanumeric() || "._-".contains(c) { c } else { '_' };
+        let stage: String = self.stage.chars().map(plain).collect();
+        let same = |o: &&Observation| o.name == self.name && o.stage.chars().map(plain).eq(stage.chars());
+        match all.iter().filter(same).count() {
+            1 => format!("{}-{stage}.csv", self.name),
+            _ => format!("{}-{stage}-{}.csv", self.name, place.unwrap_or(0) + 1),
+        }
+    }
+
+    fn csv(&self, to: &mut impl Write) -> std::io::Result<()> {
+        let mut header: Vec<String> = self.x.iter().map(|x| x.name.clone()).collect();
+        for c in &self.columns {
+            header.extend([c.name.clone(), format!("{}_error", c.name)]);
+        }
+        writeln!(to, "{}", header.join(","))?;
+        let rows = self.columns.iter().map(|c| c.values.len()).max().unwrap_or(0);
+        let shown = |x: Option<&f64>| x.filter(|x| x.is_finite()).map_or(String::new(), |x| format!("{x:?}"));
+        for k in 0..rows {
+            let mut row: Vec<String> = self.x.iter().map(|x| shown(x.values.get(k))).collect();
+            for c in &self.columns {
+                row.extend([shown(c.values.get(k)), shown(c.errors.get(k))]);
+            }
+            writeln!(to, "{}", row.join(","))?;
+        }
+        Ok(())
+    }
+}
+
+/// Writes observations as a JSON array.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_json(path: &Path, observations: &[Observation]) -> std::io::Result<()> {
+    let text = serde_json::to_string_pretty(observations)?;
+    std::fs::write(path, text + "\n")
+}
+
+/// Writes each observation as a CSV file into `folder`, which is made if need be: the abscissa, then each
+/// column with its error; fields without a value are empty.
+///
+/// # Errors
+/// A file cannot be written.
+pub fn write_csv(folder: &Path, observations: &[Observation]) -> std::io::Result<()> {
+    std::fs::create_dir_all(folder)?;
+    for observation in observations {
+        let mut file =
+            BufWriter::new(std::fs::File::create(folder.join(observation.file_name(observations)))?);
+        observation.csv(&mut file)?;
+        file.flush()?;
+    }
+    Ok(())
+}
+
+/// Numbers that are not finite as null.
+mod nullable {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub fn serialize<S: Serializer>(values: &[f64], to: S) -> Result<S::Ok, S::Error> {
+        let options: Vec<Option<f64>> = values.iter().map(|x| x.is_finite().then_some(*x)).collect();
+        options.serialize(to)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Error> {
+        let options = Vec::<Option<f64>>::deserialize(from)?;
+        Ok(options.into_iter().map(|x| x.unwrap_or(f64::NAN)).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn example(stage: &str) -> Observation {
+        let mut o = Observation::new("rdf", "g(r)", Kind::Curve)
+            .against("r", "r_c", vec![0.5, 1.5])
+            .column("g", "1", [Measured { value: 1.0, error: 0.25 }, Measured::NONE])
+            .samples(3)
+            .note("one.")
+            .note("two.");
+        o.stage = stage.into();
+        o
+    }
+
+    #[test]
+    fn json_has_the_promised_keys_and_comes_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("observables.json");
+        write_json(&path, &[example("a")]).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(
+            json[0],
+            serde_json::json!({
+                "name": "rdf", "title": "g(r)", "stage": "a", "kind": "curve",
+                "x": { "name": "r", "unit": "r_c", "values": [0.5, 1.5] },
+                "columns": [{ "name": "g", "unit": "1", "values": [1.0, null], "errors": [0.25, null] }],
+                "samples": 3, "note": "one. two."
+            })
+        );
+        let back: Vec<Observation> = serde_json::from_str(&text).unwrap();
+        assert!(back[0].columns[0].values[1].is_nan() && back[0].x == example("a").x);
+    }
+
+    #[test]
+    fn csv_files_are_named_by_stage_only_if_need_be() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("observables");
+        write_csv(&out, &[example("a")]).unwrap();
+        let text = std::fs::read_to_string(out.join("rdf.csv")).unwrap();
+        assert_eq!(text, "r,g,g_error\n0.5,1.0,0.25\n1.5,,\n");
+        write_csv(&out, &[example("cold"), example("hot/1"), example("hot 1")]).unwrap();
+        for name in ["rdf-cold.csv", "rdf-hot_1-2.csv", "rdf-hot_1-3.csv"] {
+            assert!(out.join(name).exists(), "{name}");
+        }
+    }
+}

@@ -1,0 +1,306 @@
+//! Series of vectors in bounded memory, with error bars for what is computed from their means.
+
+use super::statistics::{MINIMUM_SAMPLES, estimate};
+use serde::{Deserialize, Serialize};
+
+/// The most rows a [`Series`] keeps; even.
+pub const MOST_ROWS: usize = 512;
+
+/// Groups that [`Series::jackknife`] leaves out in turn, and the fewest rows it wants in each.
+const GROUPS: usize = 20;
+
+/// A value with one standard deviation of it; NaN where unknown.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measured {
+    /// The value.
+    pub value: f64,
+    /// Its error.
+    pub error: f64,
+}
+
+impl Measured {
+    /// Nothing is known.
+    pub const NONE: Measured = Measured { value: f64::NAN, error: f64::NAN };
+
+    /// Mean of a correlated series, with the error of [`estimate`]; of fewer samples than that takes, the
+    /// plain standard error s/√M; of one sample, none.
+    pub fn mean(values: &[f64]) -> Measured {
+        if let Ok(e) = estimate(values) {
+            return Measured { value: e.mean, error: e.error };
+        }
+        let count = values.len() as f64;
+        let value = values.iter().sum::<f64>() / count;
+        let squares: f64 = values.iter().map(|x| (x - value) * (x - value)).sum();
+        let plain = (2..MINIMUM_SAMPLES).contains(&values.len());
+        Measured { value, error: if plain { (squares / (count * (count - 1.0))).sqrt() } else { f64::NAN } }
+    }
+
+    /// The same in other units.
+    #[must_use]
+    pub fn times(self, factor: f64) -> Measured {
+        Measured { value: self.value * factor, error: self.error * factor.abs() }
+    }
+}
+
+/// A series of vectors of one width, as means of consecutive blocks: the samples themselves while there
+/// are no more than [`MOST_ROWS`]; then neighbouring blocks are averaged, and blocks are twice as long.
+///
+/// A block that is not complete at the end is left out of every mean. Sums go in the order of the
+/// samples, so a series that is written, read back and continued ends with the same bits.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Series {
+    width: usize,
+    most: usize,
+    /// Samples in a block.
+    block: u64,
+    pending: Vec<f64>,
+    pending_samples: u64,
+    rows: Vec<f64>,
+}
+
+impl Series {
+    /// A series of vectors of `width` numbers.
+    pub fn new(width: usize) -> Series {
+        Series::with_rows(width, MOST_ROWS)
+    }
+
+    /// A series that keeps fewer rows, for wide vectors. `most` is even.
+    pub fn with_rows(width: usize, most: usize) -> Series {
+        let most = (most & !1).max(2);
+        Series { width, most, block: 1, pending: Vec::new(), pending_samples: 0, rows: Vec::new() }
+    }
+
+    /// Adds a sample, unless it has a number that is not finite, or another width.
+    ///
+    /// Whether it was added.
+    pub fn push(&mut self, sample: &[f64]) -> bool {
+        if sample.len() != self.width || self.width == 0 || !sample.iter().all(|x| x.is_finite()) {
+            return false;
+        }
+        if self.pending_samples == 0 {
+            self.pending.clear();
+            self.pending.extend_from_slice(sample);
+        } else {
+            self.pending.iter_mut().zip(sample).for_each(|(sum, x)| *sum += x);
+        }
+        self.pending_samples += 1;
+        if self.pending_samples == self.block {
+            let block = self.block as f64;
+            self.rows.extend(self.pending.iter().map(|x| x / block));
+            self.pending_samples = 0;
+            self.pending.clear();
+            if self.len() == self.most {
+                self.halve();
+            }
+        }
+        true
+    }
+
+    fn halve(&mut self) {
+        let width = self.width;
+        for k in 0..self.most / 2 {
+            for c in 0..width {
+                self.rows[k * width + c] =
+                    0.5 * (self.rows[2 * k * width + c] + self.rows[(2 * k + 1) * width + c]);
+            }
+        }
+        self.rows.truncate(self.most / 2 * width);
+        self.block *= 2;
+    }
+
+    /// Rows kept.
+    pub fn len(&self) -> usize {
+        self.rows.len().checked_div(self.width).unwrap_or(0)
+    }
+
+    /// Whether no row is kept.
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// Samples that the rows are the means of.
+    pub fn samples(&self) -> u64 {
+        self.len() as u64 * self.block
+    }
+
+    /// Numbers in a sample.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// The rows, oldest first.
+    pub fn rows(&self) -> impl Iterator<Item = &[f64]> {
+        self.rows.chunks_exact(self.width.max(1))
+    }
+
+    /// One component of every row.
+    pub fn channel(&self, k: usize) -> Vec<f64> {
+        self.rows().map(|row| row[k]).collect()
+    }
+
+    /// Mean of component `k`.
+    pub fn mean(&self, k: usize) -> Measured {
+        Measured::mean(&self.channel(k))
+    }
+
+    /// Means of all components.
+    pub fn means(&self) -> Vec<f64> {
+        self.means_without(0..0)
+    }
+
+    fn means_without(&self, left_out: std::ops::Range<usize>) -> Vec<f64> {
+        let mut sum = vec![0.0; self.width];
+        for (k, row) in self.rows().enumerate() {
+            if !left_out.contains(&k) {
+                sum.iter_mut().zip(row).for_each(|(s, x)| *s += x);
+            }
+        }
+        let count = (self.len() - left_out.len()) as f64;
+        sum.iter_mut().for_each(|s| *s /= count);
+        sum
+    }
+
+    /// Mean of a function linear in the samples.
+    pub fn linear(&self, function: impl Fn(&[f64]) -> f64) -> Measured {
+        let values: Vec<f64> = self.rows().map(function).collect();
+        Measured::mean(&values)
+    }
+
+    /// `⟨a⟩/⟨b⟩` of two functions linear in the samples, with the error of the mean of `(a − R b)/⟨b⟩`.
+    pub fn ratio(&self, a: impl Fn(&[f64]) -> f64, b: impl Fn(&[f64]) -> f64) -> Measured {
+        let tops: Vec<f64> = self.rows().map(a).collect();
+        let bottoms: Vec<f64> = self.rows().map(b).collect();
+        let bottom = bottoms.iter().sum::<f64>() / bottoms.len() as f64;
+        let value = tops.iter().sum::<f64>() / tops.len() as f64 / bottom;
+        if !value.is_finite() {
+            return Measured::NONE;
+        }
+        let rest: Vec<f64> = tops.iter().zip(&bottoms).map(|(a, b)| (a - value * b) / bottom).collect();
+        Measured { value, error: Measured::mean(&rest).error }
+    }
+
+    /// A function of the means, with its jackknife error over twenty stretches of the series, or as many
+    /// as there are rows. Correlation over times shorter than a stretch is allowed for.
+    pub fn jackknife(&self, function: impl Fn(&[f64]) -> Option<f64>) -> Measured {
+        self.jackknife_many(|means| function(means).map(|x| vec![x])).pop().unwrap_or(Measured::NONE)
+    }
+
+    /// The same for several functions at once; empty if they have no value at the means.
+    pub fn jackknife_many(&self, function: impl Fn(&[f64]) -> Option<Vec<f64>>) -> Vec<Measured> {
+        let Some(values) = (!self.is_empty()).then(|| function(&self.means())).flatten() else {
+            return Vec::new();
+        };
+        let groups = GROUPS.min(self.len());
+        let edge = |g: usize| g * self.len() / groups;
+        let left: Option<Vec<Vec<f64>>> = (groups > 1)
+            .then(|| (0..groups).map(|g| function(&self.means_without(edge(g)..edge(g + 1)))).collect())
+            .flatten();
+        values
+            .iter()
+            .enumerate()
+            .map(|(k, value)| {
+                let error = left.as_ref().map_or(f64::NAN, |left| {
+                    let count = groups as f64;
+                    let at: Vec<f64> = left.iter().map(|v| v.get(k).copied().unwrap_or(f64::NAN)).collect();
+                    let mean = at.iter().sum::<f64>() / count;
+                    let squares: f64 = at.iter().map(|x| (x - mean) * (x - mean)).sum();
+                    ((count - 1.0) / count * squares).sqrt()
+                });
+                Measured { value: *value, error }
+            })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{SeedableRng, rngs::StdRng};
+    use rand_distr::{Distribution, StandardNormal};
+
+    /// A series whose autocorrelation is ρ(t) = a^t: its mean has the variance (1 + a)/(1 − a)/N of the
+    /// stationary variance.
+    fn exponential(a: f64, count: usize, rng: &mut StdRng) -> Vec<f64> {
+        let mut x: f64 = StandardNormal.sample(rng);
+        (0..count)
+            .map(|_| {
+                let step: f64 = StandardNormal.sample(rng);
+                x = a * x + (1.0 - a * a).sqrt() * step;
+                x
+            })
+            .collect()
+    }
+
+    #[test]
+    fn rows_are_block_means_and_stay_bounded() {
+        let mut series = Series::new(2);
+        for k in 0..10_000 {
+            assert!(series.push(&[k as f64, 1.0]));
+            assert!(series.len() < MOST_ROWS);
+        }
+        assert!(!series.push(&[f64::NAN, 1.0]) && !series.push(&[1.0]));
+        let block = series.block as f64;
+        for (k, row) in series.rows().enumerate() {
+            assert_eq!(row, [k as f64 * block + 0.5 * (block - 1.0), 1.0]);
+        }
+        assert!(series.samples() <= 10_000 && 10_000 - series.samples() < series.block);
+    }
+
+    #[test]
+    fn a_series_read_back_goes_on_the_same() {
+        let mut rng = StdRng::seed_from_u64(4);
+        let values = exponential(0.5, 3000, &mut rng);
+        let mut whole = Series::new(1);
+        let mut parts = Series::new(1);
+        for (k, x) in values.iter().enumerate() {
+            whole.push(&[*x]);
+            parts.push(&[*x]);
+            if k % 701 == 0 {
+                let text = serde_json::to_string(&parts).unwrap();
+                parts = serde_json::from_str(&text).unwrap();
+            }
+        }
+        assert_eq!(whole, parts);
+    }
+
+    /// Mean, ratio and jackknife of 400 correlated series, 8000 samples each with a correlation time of
+    /// ten: the errors are those of theory within 10 % on average, and two of them cover the truth in
+    /// 95 % of the series: 380 ± 4.4, of which 355 is more than five deviations below. The seed is fixed.
+    #[test]
+    fn errors_of_correlated_series_are_right() {
+        let mut rng = StdRng::seed_from_u64(81);
+        let (a, count) = (0.9, 8000usize);
+        let theory = ((1.0 + a) / (1.0 - a) / count as f64).sqrt();
+        let (mut covered, mut sizes) = ([0; 3], [0.0; 3]);
+        for _ in 0..400 {
+            let (x, y) = (exponential(a, count, &mut rng), exponential(a, count, &mut rng));
+            let mut series = Series::new(2);
+            for (x, y) in x.iter().zip(&y) {
+                series.push(&[*x, 5.0 + 0.1 * y]);
+            }
+            let ratio_theory = theory / 5.0;
+            let found = [
+                (series.mean(0), 0.0, theory),
+                (series.ratio(|s| s[0], |s| s[1]), 0.0, ratio_theory),
+                (series.jackknife(|m| Some(m[0] / m[1])), 0.0, ratio_theory),
+            ];
+            for (k, (m, truth, theory)) in found.into_iter().enumerate() {
+                covered[k] += usize::from((m.value - truth).abs() < 2.0 * m.error);
+                sizes[k] += m.error / theory / 400.0;
+            }
+        }
+        assert!(covered.iter().all(|c| *c >= 355), "{covered:?}");
+        assert!(sizes.iter().all(|s| (0.9..1.15).contains(s)), "{sizes:?}");
+    }
+
+    #[test]
+    fn short_series_say_what_they_know() {
+        assert!(Measured::mean(&[]).value.is_nan());
+        let one = Measured::mean(&[2.0]);
+        assert!(one.value == 2.0 && one.error.is_nan());
+        let two = Measured::mean(&[1.0, 3.0]);
+        assert_eq!((two.value, two.error), (2.0, 1.0));
+        assert!(Series::new(1).jackknife(|m| Some(m[0])).value.is_nan());
+        assert!(Series::new(2).ratio(|s| s[0], |s| s[1]).value.is_nan());
+    }
+}

@@ -1,0 +1,415 @@
+//! Observables in whole runs, and the reference of their keys.
+
+use super::keys::{COMMON, reference};
+use super::request::tables;
+use super::*;
+use crate::run::Simulation;
+use crate::scene::Scene;
+use psidpd_core::document::FileError;
+use psidpd_core::engine::Want;
+use std::path::Path;
+
+pub(super) const SET6: &str = include_str!("../../models/warren2003-set6.toml");
+
+/// Two species with a density, for keys.
+const MIXTURE: &str = r#"
+title = "mixture"
+species = ["A", "B"]
+[density.n]
+kernel = "quadratic"
+range = 0.9
+[excess_free_energy]
+A = "0.5*n^2"
+B = "0.5*n^2"
+"#;
+
+pub(super) const IDEAL: &str = r#"
+title = "ideal gas"
+species = ["A", "B"]
+[[thermostat]]
+gamma = 4.5
+range = 1.0
+"#;
+
+/// A scene of one stage, `steps` of it at `dt` = 0.01.
+pub(super) fn scene(
+    model: &str,
+    lengths: &str,
+    density: f64,
+    steps: u64,
+    observe: &str,
+) -> Result<Scene, FileError> {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("m.toml"), model).unwrap();
+    let text = format!(
+        "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7\n[box]\nlengths = {lengths}\n\
+         [initial]\nkind = \"lattice\"\ndensity = {density}\n\
+         [[stage]]\nname = \"settle\"\nsteps = 100\ndt = 0.01\n\
+         [[stage]]\nname = \"run\"\nsteps = {steps}\ndt = 0.01\n{observe}"
+    );
+    Scene::parse("s.toml", &text, folder.path())
+}
+
+/// Runs a scene without files.
+pub(super) fn run(scene: &Scene) -> (Simulation, Vec<Observation>) {
+    let mut simulation = Simulation::new(&scene.model, scene.kt, scene.initial_state(), scene.seed).unwrap();
+    let mut observers = Observers::new(scene);
+    let mut time = 0.0;
+    for stage in &scene.stages {
+        simulation.prepare(stage.dt, Want::TOTALS).unwrap();
+        for _ in 0..stage.steps {
+            let want = observers.wants(simulation.step_number() + 1);
+            simulation.step(stage.dt, stage.integrator, want).unwrap();
+            time += stage.dt;
+            observers.sample(&simulation, &stage.name, time);
+        }
+    }
+    (simulation, observers.finish())
+}
+
+pub(super) fn find<'a>(all: &'a [Observation], name: &str) -> &'a Observation {
+    all.iter().find(|o| o.name == name).unwrap_or_else(|| panic!("no {name}"))
+}
+
+#[test]
+fn every_key_is_read_and_no_other() {
+    for table in tables() {
+        for key in table.keys.iter().chain(COMMON) {
+            let example = key.example.replace("produce", "run");
+            let mut observe = format!("[observe.{}]\n{} = {example}\n", table.name, key.name);
+            if table.name == "poiseuille" {
+                // Without a body force in the scene it needs three keys.
+                for other in table.keys.iter().filter(|k| k.name != "bins" && k.name != key.name) {
+                    observe += &format!("{} = {}\n", other.name, other.example);
+                }
+            }
+            let every_step = key.name == "every" && matches!(table.name, "viscosity");
+            match scene(MIXTURE, "[5.0, 5.0, 5.0]", 3.0, 10, &observe) {
+                Ok(scene) => assert!(scene.observe.requests.len() == 1 && !every_step),
+                Err(error) => assert!(every_step, "{error}"),
+            }
+        }
+        let all =
+            if table.name == "poiseuille" { "axis = \"z\"\nflow = \"x\"\nacceleration = 1\n" } else { "" };
+        let wrong = format!("[observe.{}]\nbinz = 3\n{all}", table.name);
+        let error = scene(MIXTURE, "[5.0, 5.0, 5.0]", 3.0, 10, &wrong).unwrap_err().to_string();
+        assert!(error.contains(&format!("observe.{}.binz: unknown key", table.name)), "{error}");
+        let off = format!("[observe]\n{} = false\n", table.name);
+        assert!(scene(MIXTURE, "[5.0, 5.0, 5.0]", 3.0, 10, &off).unwrap().observe.requests.is_empty());
+    }
+}
+
+#[test]
+fn errors_name_line_key_and_cause() {
+    for (observe, line, message) in [
+        ("[observe]\ntemprature = true", 19, "observe.temprature: unknown key"),
+        ("[observe]\ntemperature = 3", 19, "expected true or false"),
+        ("[observe]\nevery = 0", 19, "observe.every: must be at least 1"),
+        ("[observe]\nstages = [\"runs\"]", 19, "unknown stage \"runs\""),
+        ("[observe]\nstages = []", 19, "names no stage"),
+        ("[observe.temperature]\nskip = -1", 19, "whole number from 0"),
+    ] {
+        let error = scene(IDEAL, "[5.0, 5.0, 5.0]", 3.0, 10, observe).unwrap_err();
+        assert!(error.to_string().contains(message), "{error}");
+        assert_eq!(error.line(), line, "{error}");
+    }
+}
+
+/// The reference is current; `PSIDPD_WRITE_DOCS=1` writes it anew.
+#[test]
+fn the_reference_is_current() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/observables.md");
+    let text = reference(&tables());
+    if std::env::var_os("PSIDPD_WRITE_DOCS").is_some() {
+        std::fs::write(&path, &text).unwrap();
+    }
+    assert!(
+        std::fs::read_to_string(&path).is_ok_and(|t| t == text),
+        "PSIDPD_WRITE_DOCS=1 cargo test renews it"
+    );
+}
+
+/// Temperatures, pressures and energies of a liquid: thermostatted, both temperatures are kT; the parts of
+/// the energy add up to that of the engine. Within five errors, of which one in 10^6 is exceeded by chance,
+/// and the bias of the time step, which at 0.01 is a few thousandths in the kinetic temperature and 2 % in the
+/// configurational one.
+#[test]
+fn a_liquid_in_equilibrium() {
+    let scene = scene(
+        SET6,
+        "[4.0, 4.0, 4.0]",
+        6.05,
+        1500,
+        "[observe]\ntemperature = true\npressure = true\nenergy = true\nskip = 200\n",
+    )
+    .unwrap();
+    let (mut simulation, all) = run(&scene);
+    let temperature = find(&all, "temperature");
+    assert_eq!((temperature.samples, temperature.stage.as_str()), (130, "run"));
+    for (name, bias) in [("kinetic", 0.01), ("configurational", 0.02)] {
+        let kt = temperature.scalar(name).unwrap();
+        assert!((kt.value - 1.0).abs() < 5.0 * kt.error + bias, "{name} {kt:?}");
+        assert!(kt.error < 0.02);
+    }
+    let pressure = find(&all, "pressure");
+    let (p, q) = (pressure.scalar("conservative").unwrap(), pressure.scalar("total").unwrap());
+    assert!((p.value - q.value).abs() < 5.0 * q.error + 1.0 && p.error < q.error, "{p:?} {q:?}");
+    let energy = find(&all, "energy");
+    let parts: f64 = ["kinetic", "psi_F", "phi_1_F_F"].iter().map(|n| energy.scalar(n).unwrap().value).sum();
+    assert!((parts - energy.scalar("total").unwrap().value).abs() < 1e-10);
+    // One frame against the engine.
+    simulation.prepare(0.01, Want::TOTALS).unwrap();
+    let fluid = interactions::Interactions::new(simulation.model().at(1.0).unwrap()).unwrap();
+    let frame = frame::Frame::new(&simulation, &fluid, 0.0);
+    assert!((frame.landscape().energy() - simulation.potential_energy()).abs() < 1e-9);
+    for (a, b) in frame.landscape().virial().iter().zip(simulation.tally().virial) {
+        assert!((a - b).abs() < 1e-8);
+    }
+}
+
+/// A slab of liquid: the profile of the pressure tensor integrates to that of the box sample by sample, both
+/// routes to the tension agree, and it is Warren's within what a small and short run can tell (five errors and
+/// 10 %).
+#[test]
+fn a_slab_of_liquid() {
+    let observe = "[observe]\nstress_profile = true\nsurface_tension = true\ninterface_width = true\n\
+                   density_profile = true\ntemperature_profile = true\nvelocity_profile = true\npressure = true\n";
+    let text = |s: &str| {
+        s.replace("\"lattice\"", "\"slab\"\nthickness = 5.0").replace("density = 5.9", "density = 6.0")
+    };
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("m.toml"), SET6).unwrap();
+    let scene = Scene::parse(
+        "s.toml",
+        &text(&format!(
+            "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7\n[box]\nlengths = [4.0, 4.0, 11.0]\n\
+             [initial]\nkind = \"lattice\"\ndensity = 5.9\n[[stage]]\nname = \"settle\"\nsteps = 300\ndt = 0.01\n\
+             [[stage]]\nname = \"run\"\nsteps = 1500\ndt = 0.01\n{observe}"
+        )),
+        folder.path(),
+    )
+    .unwrap();
+    let (_, all) = run(&scene);
+    let density = find(&all, "density_profile");
+    let mean = density.get("density").unwrap().values.iter().sum::<f64>() / 110.0;
+    assert!((mean - 480.0 / 176.0).abs() < 1e-10 && density.x.as_ref().unwrap().values[0] == -5.45);
+    let (stress, pressure) = (find(&all, "stress_profile"), find(&all, "pressure"));
+    let average = |name: &str| stress.get(name).unwrap().values.iter().sum::<f64>() / 110.0;
+    let p = |name: &str| pressure.scalar(name).unwrap().value;
+    assert!((average("normal") - p("conservative_zz")).abs() < 1e-10);
+    let tangential = 0.5 * (p("conservative_xx") + p("conservative_yy"));
+    assert!((average("tangential") - tangential).abs() < 1e-10);
+    let tension = find(&all, "surface_tension");
+    let integral = find(&all, "stress_profile_integral").scalar("integral").unwrap();
+    let by_stress = tension.scalar("stress").unwrap();
+    assert!((0.5 * integral.value - by_stress.value).abs() < 1e-9);
+    assert!((0.5 * integral.error - by_stress.error).abs() < 1e-9);
+    let by_area = tension.scalar("free_energy").unwrap();
+    assert!((by_area.value - by_stress.value).abs() < 0.5, "{by_area:?} {by_stress:?}");
+    assert!((by_stress.value - 7.45).abs() < 5.0 * by_stress.error + 0.75, "{by_stress:?}");
+    let width = find(&all, "interface_width");
+    let (w, liquid) = (width.scalar("width").unwrap(), width.scalar("liquid").unwrap());
+    // Warren has 0.66(3) in a larger box, whose capillary waves are longer. The steepest of the differences of
+    // bins 0.2 apart is no steeper than the noise of a bin makes it.
+    let rho = &density.get("density").unwrap().values;
+    let steepest = rho.windows(3).map(|r| (r[2] - r[0]).abs() / 0.2).fold(0.0, f64::max);
+    let plain = liquid.value / steepest;
+    assert!(w.value > 0.25 && w.value < 0.69 && (w.value / plain - 1.0).abs() < 0.25, "{w:?} {plain}");
+    assert!((liquid.value - 6.05).abs() < 5.0 * liquid.error + 0.1, "{liquid:?}");
+    let temperature = find(&all, "temperature_profile").get("temperature").unwrap();
+    let middle: f64 = temperature.values[45..65].iter().sum::<f64>() / 20.0;
+    assert!((middle - 1.0).abs() < 0.05, "{middle}");
+}
+
+/// Profiles of an ideal gas whose species and velocities are put by hand.
+#[test]
+fn profiles_of_a_known_flow() {
+    let observe = "[observe]\nevery = 1\nstages = [\"settle\"]\nvelocity_profile = true\ntemperature_profile = true\n\
+                   composition_profile = true\n[observe.density_profile]\naxis = \"x\"\nbins = 4\n";
+    let scene = scene(IDEAL, "[4.0, 4.0, 5.0]", 20.0, 10, observe).unwrap();
+    let mut state = scene.initial_state();
+    let n = state.len();
+    for k in 0..n {
+        let z = state.x[k][2] / 5.0;
+        let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
+        state.v[k] = [(std::f64::consts::TAU * z).sin() + 0.5 * sign, 0.0, 0.0];
+        state.species[k] = i32::from(z >= 0.5);
+    }
+    let mut simulation = Simulation::new(&scene.model, 1.0, state, 1).unwrap();
+    simulation.set_step_number(1);
+    let mut observers = Observers::new(&scene);
+    observers.sample(&simulation, "settle", 0.01);
+    let all = observers.finish();
+    let velocity = find(&all, "velocity_profile");
+    let z = velocity.x.as_ref().unwrap().values.clone();
+    let x = &velocity.get("velocity_x").unwrap().values;
+    let filled = z.iter().zip(x).filter(|(_, v)| v.is_finite());
+    assert!(filled.clone().count() >= 10);
+    // A layer of the lattice has one velocity and as many + as −, but for one particle.
+    assert!(filled.clone().all(|(z, v)| (v - (std::f64::consts::TAU * z / 5.0).sin()).abs() < 0.1));
+    let composition = find(&all, "composition_profile");
+    let a = &composition.get("fraction_A").unwrap().values;
+    assert!(
+        a[..25].iter().all(|f| f.is_nan() || *f == 1.0) && a[25..].iter().all(|f| f.is_nan() || *f == 0.0)
+    );
+    // About the flow the temperature is m (1/2)² in one of three directions.
+    let t = &find(&all, "temperature_profile").get("temperature").unwrap().values;
+    assert!(t.iter().all(|t| t.is_nan() || (t - 0.25 / 3.0).abs() < 2e-3), "{t:?}");
+    let density = find(&all, "density_profile");
+    assert_eq!(density.x.as_ref().unwrap().values, [0.5, 1.5, 2.5, 3.5]);
+    let sum: f64 = density.get("density").unwrap().values.iter().sum();
+    assert!((sum / 4.0 - n as f64 / 80.0).abs() < 1e-12);
+}
+
+/// Partial g and S of an ideal gas are 1, between unlike species S is 0: each of some 230 values within 5.5 of its
+/// errors, and their squares on average within what independent shells have. From 200 samples an error is known to
+/// 5 %, and 5 of them are exceeded by chance once in 10^6: a false alarm in 4000 seeds. The mean of nine squares, as of
+/// χ² with nine degrees of freedom, is above 3.8 or below 0.05 for one seed in 10^4. The seed is fixed.
+#[test]
+fn an_ideal_gas_has_no_structure() {
+    let observe = "[observe]\nevery = 20\n[observe.rdf]\nbins = 50\nrange = 2.0\n\
+                   [observe.structure_factor]\nrange = 12.0\nbins = 9\n";
+    let scene = scene(IDEAL, "[5.0, 5.0, 5.0]", 2.0, 4000, observe).unwrap();
+    let (_, all) = run(&scene);
+    for (name, columns) in
+        [("rdf", ["g", "g_A_A", "g_A_B", "g_B_B"]), ("structure_factor", ["s", "s_A_A", "s_A_B", "s_B_B"])]
+    {
+        let out = find(&all, name);
+        assert_eq!(out.samples, 200);
+        for column in columns {
+            let truth = if column == "s_A_B" { 0.0 } else { 1.0 };
+            let c = out.get(column).unwrap();
+            let mut chi = 0.0;
+            for (v, e) in c.values.iter().zip(&c.errors) {
+                // No pair at all in the smallest shells: Poisson's probability of that is not small.
+                if *e == 0.0 {
+                    continue;
+                }
+                assert!((v - truth).abs() < 5.5 * e, "{column} {v} {e}");
+                chi += ((v - truth) / e).powi(2) / c.values.len() as f64;
+            }
+            let most = 1.0 + 6.0 * (2.0 / c.values.len() as f64).sqrt();
+            assert!(chi < most && chi > 0.05, "{column} {chi}");
+        }
+    }
+}
+
+/// A small drop of Warren's liquid: Laplace's pressure, gyration and the parts of the pressure. And what is
+/// local: ⟨n⟩/ρ is [w g] but for the width of the shells.
+#[test]
+fn a_drop_of_liquid() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("m.toml"), SET6).unwrap();
+    let text = "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7\n[box]\nlengths = [11.0, 11.0, 11.0]\n\
+         [initial]\nkind = \"random\"\ncount = 700\n[[stage]]\nname = \"settle\"\nsteps = 300\ndt = 0.01\n\
+         [[stage]]\nname = \"run\"\nsteps = 1200\ndt = 0.01\n\
+         [observe]\ndrop = true\nclusters = true\nlocal_density = true\nmsd = true\n";
+    let scene = Scene::parse("s.toml", text, folder.path()).unwrap();
+    let mut state = scene.initial_state();
+    // A ball in a corner of the box: it goes through all of its faces.
+    let side = (700.0f64 / 6.05).cbrt();
+    for x in &mut state.x {
+        *x = x.map(|c| (c / 11.0 - 0.5) * side);
+    }
+    let mut simulation = Simulation::new(&scene.model, 1.0, state, 3).unwrap();
+    let mut observers = Observers::new(&scene);
+    let mut time = 0.0;
+    for stage in &scene.stages {
+        simulation.prepare(stage.dt, Want::FORCES).unwrap();
+        for _ in 0..stage.steps {
+            simulation.step(stage.dt, stage.integrator, Want::FORCES).unwrap();
+            time += stage.dt;
+            observers.sample(&simulation, &stage.name, time);
+        }
+    }
+    let all = observers.finish();
+    let drop = find(&all, "drop");
+    let get = |name: &str| drop.scalar(name).unwrap();
+    let sphere = (3.0 / (4.0 * std::f64::consts::PI) * 690.0f64 / 6.15).cbrt();
+    assert!((get("radius").value - sphere).abs() < 0.1, "{:?} {sphere}", get("radius"));
+    assert!(
+        (get("radius_gyration").value - get("radius").value).abs() < 0.15,
+        "{:?}",
+        get("radius_gyration")
+    );
+    assert!(get("particles").value > 660.0 && get("liquid").value > 5.8 && get("liquid").value < 6.6);
+    let tension = get("tension");
+    assert!((tension.value - 7.45).abs() < 5.0 * tension.error + 1.5, "{tension:?}");
+    assert!(tension.error > 0.0 && tension.error < 1.5, "{tension:?}");
+    let clusters = find(&all, "clusters");
+    assert!((clusters.scalar("largest").unwrap().value - get("particles").value).abs() < 1e-9);
+    let local = find(&all, "local_density_means");
+    let (relative, wg) = (local.scalar("relative_F_F").unwrap(), local.scalar("wg_F_F").unwrap());
+    assert!((relative.value / wg.value - 1.0).abs() < 2e-3, "{relative:?} {wg:?}");
+    let p = find(&all, "local_density").get("p").unwrap();
+    let width = find(&all, "local_density").x.as_ref().unwrap().values[0] * 2.0;
+    assert!((p.values.iter().sum::<f64>() * width - 1.0).abs() < 1e-3);
+    assert!(find(&all, "diffusion").scalar("diffusion").unwrap().value > 0.0);
+}
+
+/// The checkpoint of a run in the middle: the rest of the run ends with the same bits.
+#[test]
+fn a_run_that_goes_on_ends_the_same() {
+    let mut observe = String::from("[observe]\nevery = 3\nstages = [\"settle\", \"run\"]\n");
+    for table in tables() {
+        let every = match table.name {
+            "viscosity" => "every = 1, length = 20",
+            "poiseuille" => "axis = \"z\", flow = \"x\", acceleration = 0.1",
+            "pendant" | "density_field" => "bins = [8, 16]",
+            _ => "skip = 2",
+        };
+        observe += &format!("{} = {{ {every} }}\n", table.name);
+    }
+    let scene = scene(SET6, "[4.0, 4.0, 4.0]", 6.05, 60, &observe).unwrap();
+    assert_eq!(scene.observe.requests.len(), tables().len());
+    let mut simulation = Simulation::new(&scene.model, scene.kt, scene.initial_state(), scene.seed).unwrap();
+    let (mut whole, mut parts) = (Observers::new(&scene), Observers::new(&scene));
+    for stage in &scene.stages {
+        simulation.prepare(stage.dt, Want::TOTALS).unwrap();
+        for _ in 0..stage.steps {
+            simulation.step(stage.dt, stage.integrator, Want::TOTALS).unwrap();
+            let time = simulation.step_number() as f64 * stage.dt;
+            whole.sample(&simulation, &stage.name, time);
+            parts.sample(&simulation, &stage.name, time);
+            if simulation.step_number().is_multiple_of(37) {
+                parts = Observers::from_bytes(&parts.to_bytes()).unwrap();
+            }
+        }
+    }
+    let text = |o: &Observers| serde_json::to_string(&o.finish()).unwrap();
+    assert!(text(&whole) == text(&parts));
+    assert!(whole.finish().iter().any(|o| o.stage == "settle"));
+}
+
+/// A run writes what it measured, as JSON and tables; the same scene the same bytes; no scene without `[observe]`.
+#[test]
+fn a_run_writes_what_it_measured() {
+    let folder = tempfile::tempdir().unwrap();
+    let observe = "[observe]\ntemperature = true\nclusters = { distance = 0.5 }\n[observe.rdf]\nstages = [\"settle\", \"run\"]\n";
+    let scene = scene(SET6, "[4.0, 4.0, 4.0]", 6.05, 50, observe).unwrap();
+    let read = |name: &str| {
+        let out = folder.path().join(name);
+        crate::run::run_scene(&scene, &out, &mut |_| ()).unwrap();
+        let mut files: Vec<_> = std::fs::read_dir(out.join("observables"))
+            .unwrap()
+            .map(|e| e.unwrap().path())
+            .chain([out.join("observables.json")])
+            .collect();
+        files.sort();
+        files
+            .iter()
+            .map(|f| (f.file_name().unwrap().to_owned(), std::fs::read(f).unwrap()))
+            .collect::<Vec<_>>()
+    };
+    let (a, b) = (read("a"), read("b"));
+    assert!(a == b);
+    let names: Vec<_> = a.iter().map(|f| f.0.to_str().unwrap()).collect();
+    let expected =
+        ["clusters.csv", "clusters_series.csv", "rdf-run.csv", "rdf-settle.csv", "temperature.csv"];
+    assert_eq!(names[..5], expected);
+    let list: Vec<Observation> = serde_json::from_slice(&a[5].1).unwrap();
+    assert_eq!((list.len(), list[0].name.as_str(), list[0].samples), (5, "temperature", 5));
+    let bare = self::scene(SET6, "[4.0, 4.0, 4.0]", 6.05, 5, "").unwrap();
+    crate::run::run_scene(&bare, &folder.path().join("c"), &mut |_| ()).unwrap();
+    assert!(!folder.path().join("c/observables.json").exists());
+}

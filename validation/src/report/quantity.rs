@@ -1,0 +1,71 @@
+//! Numbers with their errors, as text.
+
+/// `7.450 ± 0.042`: the error with two digits, the value to the same place; with a power of ten outside
+/// 10⁻³ … 10⁶. Without an error (none, or no positive number) six digits.
+pub fn with_error(value: f64, error: Option<f64>) -> String {
+    if !value.is_finite() {
+        return "—".into();
+    }
+    let error = error.filter(|e| e.is_finite() && *e > 0.0);
+    let Some(error) = error else { return plain(value) };
+    let size = value.abs().max(error);
+    let top = size.log10().floor() as i32;
+    let (scale, power) = if (-3..6).contains(&top) { (1.0, None) } else { (10f64.powi(top), Some(top)) };
+    let (value, error) = (value / scale, error / scale);
+    let decimals = (1.0 - error.log10().floor()).clamp(0.0, 15.0) as usize;
+    // Rounding up, 0.0996 is 0.10: one digit less.
+    let rounded: f64 = format!("{error:.decimals$}").parse().unwrap_or(error);
+    let decimals = (1.0 - rounded.max(error).log10().floor()).clamp(0.0, 15.0) as usize;
+    let text = format!("{} ± {error:.decimals$}", minus(format!("{value:.decimals$}")));
+    match power {
+        Some(power) => format!("({text})×10{}", super::text::superscript(power)),
+        None => text,
+    }
+}
+
+fn plain(value: f64) -> String {
+    if value == 0.0 {
+        return "0".into();
+    }
+    let top = value.abs().log10().floor() as i32;
+    if (-4..7).contains(&top) {
+        let decimals = (5 - top).max(0) as usize;
+        let text = format!("{value:.decimals$}");
+        let text =
+            if decimals > 0 { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text };
+        return minus(text);
+    }
+    let digits = format!("{:.5}", value / 10f64.powi(top));
+    format!("{}×10{}", minus(digits), super::text::superscript(top))
+}
+
+fn minus(text: String) -> String {
+    text.strip_prefix('-').map_or(text.clone(), |rest| format!("−{rest}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_have_two_digits() {
+        for (value, error, text) in [
+            (7.4503, Some(0.0421), "7.450 ± 0.042"),
+            (-47.0, Some(2.0), "−47.0 ± 2.0"),
+            (12345.6, Some(321.0), "12346 ± 321"),
+            (1.0, Some(0.0996), "1.00 ± 0.10"),
+            (0.0, Some(0.5), "0.00 ± 0.50"),
+            (1.234567e-8, Some(2e-10), "(1.235 ± 0.020)×10⁻⁸"),
+            (2.5e9, Some(1e8), "(2.50 ± 0.10)×10⁹"),
+            (1.5, None, "1.5"),
+            (1.5, Some(0.0), "1.5"),
+            (1.5, Some(f64::NAN), "1.5"),
+            (f64::NAN, Some(1.0), "—"),
+            (0.0, None, "0"),
+            (1234567.8, None, "1234568"),
+            (1e-12, None, "1.00000×10⁻¹²"),
+        ] {
+            assert_eq!(with_error(value, error), text);
+        }
+    }
+}

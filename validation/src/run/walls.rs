@@ -1,0 +1,151 @@
+//! Reflecting faces of a box.
+
+use super::integrator::Motion;
+use psidpd_core::engine::PeriodicBox;
+
+/// The faces of the directions that are not periodic: a particle beyond one is put as far inside as it was
+/// outside, and the component of its velocity across the face is reversed, as `fix wall/reflect` of LAMMPS
+/// does. The box must be along the axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Walls {
+    /// Lower and upper face of each direction that reflects.
+    faces: [Option<[f64; 2]>; 3],
+}
+
+impl Walls {
+    /// The walls of a box; the third direction of two-dimensional models has none.
+    pub fn of(domain: &PeriodicBox, dimensions: usize) -> Walls {
+        let (origin, lengths) = (domain.origin(), domain.lengths());
+        let face =
+            |k: usize| (k < dimensions && !domain.periodic()[k]).then(|| [origin[k], origin[k] + lengths[k]]);
+        Walls { faces: [face(0), face(1), face(2)] }
+    }
+
+    /// Whether there is one.
+    pub fn any(&self) -> bool {
+        self.faces.iter().any(Option::is_some)
+    }
+
+    /// Reflects every particle that went through a face. What an integrator has kept of a particle's
+    /// velocity and force turns round with it: its step began on the other side of the mirror.
+    pub fn reflect(&self, motion: &mut Motion) {
+        for (k, [low, high]) in self.faces.iter().enumerate().filter_map(|(k, f)| Some((k, (*f)?))) {
+            for i in 0..motion.x.len() {
+                let x = &mut motion.x[i][k];
+                if *x < low {
+                    *x = low + (low - *x);
+                } else if *x > high {
+                    *x = high - (*x - high);
+                } else {
+                    continue;
+                }
+                motion.v[i][k] = -motion.v[i][k];
+                motion.before.turn(i, k);
+            }
+        }
+    }
+
+    /// The first particle that is outside all the same: it went further than across the box.
+    pub fn escaped(&self, x: &[[f64; 3]]) -> Option<usize> {
+        let outside = |x: &[f64; 3]| {
+            (0..3).any(|k| self.faces[k].is_some_and(|[low, high]| !(low..=high).contains(&x[k])))
+        };
+        x.iter().position(outside)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::run::{Integrator, Simulation, State};
+    use psidpd_core::engine::{PeriodicBox, Want};
+    use psidpd_core::model::Model;
+
+    const IDEAL: &str = "title = \"ideal\"\nspecies = [\"A\"]\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n";
+
+    const SOFT: &str = "title = \"soft\"\nspecies = [\"A\"]\n[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\nstrength = 25\n\
+                        range = 1\n";
+
+    fn state(periodic: [bool; 3], count: usize) -> State {
+        // Points and velocities without pattern; the fractional parts of multiples of irrational numbers.
+        let irrational = [2f64.sqrt(), 3f64.sqrt(), 5f64.sqrt(), 7f64.sqrt(), 11f64.sqrt(), 13f64.sqrt()];
+        let part = |k: usize, c: usize| (k as f64 * irrational[c]).fract();
+        State {
+            domain: PeriodicBox::orthogonal([-1.0, 0.0, 2.0], [3.0, 4.0, 5.0], periodic).unwrap(),
+            mass: vec![1.0],
+            x: (0..count)
+                .map(|k| [3.0 * part(k, 0) - 1.0, 4.0 * part(k, 1), 2.0 + 5.0 * part(k, 2)])
+                .collect(),
+            v: (0..count).map(|k| std::array::from_fn(|c| 4.0 * part(k, 3 + c) - 2.0)).collect(),
+            species: vec![0; count],
+            tag: (1..=count as i32).collect(),
+            image: vec![[0; 3]; count],
+        }
+    }
+
+    /// A free particle between two walls goes as the triangle wave of one that nothing stops.
+    #[test]
+    fn free_particles_bounce_to_and_fro() {
+        let start = state([false, true, false], 200);
+        let model = Model::parse("m", IDEAL).unwrap();
+        for integrator in [Integrator::VelocityVerlet, Integrator::GrootWarren { lambda: 0.65 }] {
+            let mut run = Simulation::new(&model, 1.0, start.clone(), 1).unwrap();
+            run.set_thermostat(false);
+            run.prepare(0.01, Want::FORCES).unwrap();
+            for _ in 0..700 {
+                run.step(0.01, integrator, Want::FORCES).unwrap();
+            }
+            let fold = |x: f64, low: f64, length: f64| {
+                let s = ((x - low) / length).rem_euclid(2.0);
+                (low + length * if s > 1.0 { 2.0 - s } else { s }, if s > 1.0 { -1.0 } else { 1.0 })
+            };
+            for k in 0..200 {
+                for (c, low, length) in [(0, -1.0, 3.0), (2, 2.0, 5.0)] {
+                    let (x, sign) = fold(start.x[k][c] + 7.0 * start.v[k][c], low, length);
+                    assert!((run.positions()[k][c] - x).abs() < 1e-9, "{k} {c}");
+                    assert!((run.velocities()[k][c] - sign * start.v[k][c]).abs() < 1e-12);
+                }
+            }
+            // Momentum is kept along y alone, and each direction has its share of the degrees of freedom.
+            assert_eq!(run.degrees_of_freedom(), 599);
+        }
+    }
+
+    /// Walls do no work in the limit of short steps. Energy is kept to first order only: the force across a face
+    /// turns round where a particle is mirrored, and a step that meets the face cannot tell where in it.
+    #[test]
+    fn energy_is_kept_between_walls() {
+        let model = Model::parse("m", SOFT).unwrap();
+        let deviation = |dt: f64| {
+            let mut run = Simulation::new(&model, 1.0, state([false; 3], 180), 1).unwrap();
+            run.prepare(dt, Want::TOTALS).unwrap();
+            let energy = |run: &Simulation| run.potential_energy() + run.kinetic_energy();
+            let first = energy(&run);
+            let steps = (2.0 / dt).round() as usize;
+            let squares: f64 = (0..steps)
+                .map(|_| {
+                    run.step(dt, Integrator::VelocityVerlet, Want::TOTALS).unwrap();
+                    (energy(&run) - first).powi(2)
+                })
+                .sum();
+            (squares / steps as f64).sqrt() / 180.0
+        };
+        let [coarse, fine] = [0.01, 0.0025].map(deviation);
+        assert!(coarse < 0.03 && fine < coarse / 2.5, "{coarse} {fine}");
+    }
+
+    #[test]
+    fn what_starts_beyond_a_wall_or_crosses_the_box_is_an_error() {
+        let model = Model::parse("m", IDEAL).unwrap();
+        let mut beyond = state([true, false, true], 5);
+        beyond.x[3][1] = 4.1;
+        let error = Simulation::new(&model, 1.0, beyond, 1).unwrap_err().to_string();
+        assert!(error.contains("particle 4 is beyond a wall"), "{error}");
+        let mut fast = state([false, true, true], 5);
+        fast.v[2] = [650.0, 0.0, 0.0];
+        let mut run = Simulation::new(&model, 1.0, fast, 1).unwrap();
+        run.set_thermostat(false);
+        run.prepare(0.01, Want::FORCES).unwrap();
+        let error = run.step(0.01, Integrator::VelocityVerlet, Want::FORCES).unwrap_err().to_string();
+        assert!(error.contains("particle 3 moved 6.5"), "{error}");
+    }
+}

@@ -1,0 +1,77 @@
+//! `[[body_force]]`.
+
+use super::initial::Initial;
+use super::masses::unknown_species;
+use super::number::{axis, vector};
+use crate::run::{BodyForce, Tags};
+use psidpd_core::document::{FileError, FileErrorKind, Section};
+use psidpd_core::model::Model;
+
+/// Reads every body force of a scene.
+pub fn read(root: &Section, model: &Model, initial: &Initial) -> Result<Vec<BodyForce>, FileError> {
+    let Some(value) = root.get("body_force") else { return Ok(Vec::new()) };
+    let mut forces = Vec::new();
+    for item in value.array()? {
+        let section = item.section()?;
+        forces.push(read_one(&section, model, initial)?);
+        section.finish()?;
+    }
+    Ok(forces)
+}
+
+fn read_one(section: &Section, model: &Model, initial: &Initial) -> Result<BodyForce, FileError> {
+    let dimensions = model.dimensions();
+    let value = section.require("acceleration")?;
+    let acceleration = vector(&value, dimensions)?;
+    let reversed_along = section.get("reversed_along").map(|v| axis(&v, dimensions)).transpose()?;
+    if reversed_along.is_some_and(|k| acceleration[k] != 0.0) {
+        let message = "must not be along the direction in which it is reversed".to_owned();
+        return Err(value.error(FileErrorKind::Value(message)));
+    }
+    Ok(BodyForce {
+        acceleration,
+        reversed_along,
+        species: read_species(section, model)?,
+        tags: read_parts(section, initial)?,
+    })
+}
+
+fn read_species(section: &Section, model: &Model) -> Result<Vec<i32>, FileError> {
+    let Some(value) = section.get("species") else { return Ok(Vec::new()) };
+    let known = model.species();
+    let items = value.array()?;
+    let species = items.iter().map(|item| {
+        let name = item.string()?.value;
+        match known.iter().position(|s| *s == name) {
+            Some(index) => Ok(index as i32),
+            None => Err(item.error(unknown_species(&name, known))),
+        }
+    });
+    let species: Vec<i32> = species.collect::<Result<_, _>>()?;
+    if species.is_empty() {
+        return Err(value.error(FileErrorKind::Value("names no species".into())));
+    }
+    Ok(species)
+}
+
+fn read_parts(section: &Section, initial: &Initial) -> Result<Tags, FileError> {
+    let Some(value) = section.get("parts") else { return Ok(Tags::All) };
+    let mut wanted = Vec::new();
+    for item in value.array()? {
+        let name = item.string()?.value;
+        let Some(part) = initial.parts().iter().find(|p| p.name == name) else {
+            let known: Vec<&str> = initial.parts().iter().map(|p| p.name.as_str()).collect();
+            let known = known.join(", ");
+            return Err(item.error(FileErrorKind::UnknownName { what: "part", name, known }));
+        };
+        if part.frozen {
+            let message = format!("\"{name}\" is frozen: no force moves it");
+            return Err(item.error(FileErrorKind::Value(message)));
+        }
+        wanted.push(name);
+    }
+    if wanted.is_empty() {
+        return Err(value.error(FileErrorKind::Value("names no part".into())));
+    }
+    Ok(initial.tags_of(|part| wanted.contains(&part.name)))
+}

@@ -1,0 +1,143 @@
+//! Which fluid, in which box.
+
+use super::{Key, OPTIONAL, REQUIRED, Table, ValueKind, key};
+use crate::scene::domain::BOUNDARIES;
+use crate::scene::stage::INTEGRATORS;
+use psidpd_core::engine::Precision;
+
+fn boundaries() -> Vec<&'static str> {
+    BOUNDARIES.iter().map(|(name, _)| *name).collect()
+}
+
+fn integrators() -> Vec<&'static str> {
+    INTEGRATORS.to_vec()
+}
+
+fn precisions() -> Vec<&'static str> {
+    Precision::ALL.iter().map(|(name, _)| *name).collect()
+}
+
+pub(super) const INTEGRATOR: Key = key(
+    "integrator",
+    ValueKind::Choice(integrators),
+    OPTIONAL,
+    "How a step is made; `velocity-verlet` if left out, in which the dissipative force sees the half-step \
+     velocity, as in LAMMPS. `groot-warren` predicts a velocity for it.",
+    "integrator = \"groot-warren\"",
+);
+
+/// The top level.
+pub const TOP: Table = Table {
+    path: "",
+    array: false,
+    forms: ("", &[]),
+    about: "Which fluid, how warm, in which box, for how long. A scene needs a model, kT, a box, something in it \
+            (`density`, `[initial]` or `[[part]]`) and steps (`steps` or `[[stage]]`).",
+    keys: &[
+        key(
+            "title",
+            ValueKind::Text,
+            OPTIONAL,
+            "What the scene is called; the title of the model if left out.",
+            "title = \"A drop of Warren's liquid\"",
+        ),
+        key("model", ValueKind::File, REQUIRED, "The model file: the fluid.", "model = \"fluid.toml\""),
+        key(
+            "kT",
+            ValueKind::Positive,
+            REQUIRED,
+            "The temperature: of the initial velocities, of the thermostat, and in the formulas of the model.",
+            "kT = 1.0",
+        ),
+        key(
+            "seed",
+            ValueKind::Count,
+            OPTIONAL,
+            "Seed of the initial state and of the noise; 1 if left out. The same file gives the same run.",
+            "seed = 4711",
+        ),
+        key(
+            "box",
+            ValueKind::Box,
+            OPTIONAL,
+            "The box, from the origin along the axes: one length for all edges, one for each, or a table. A start \
+             from a file has its box from there.",
+            "box = [8.0, 8.0, 16.0]",
+        ),
+        key(
+            "density",
+            ValueKind::Positive,
+            OPTIONAL,
+            "Number density of everything that is filled and has no density or count of its own. Without \
+             `[initial]` and `[[part]]` the whole box is filled, at random and with equal shares of the species.",
+            "density = 3.0",
+        ),
+        key(
+            "steps",
+            ValueKind::Count,
+            OPTIONAL,
+            "Steps of a run of one stage, named `produce`.",
+            "steps = 2000",
+        ),
+        key(
+            "equilibrate",
+            ValueKind::Count,
+            OPTIONAL,
+            "Steps of a stage `equilibrate` before it.",
+            "equilibrate = 500\nsteps = 2000",
+        ),
+        key("dt", ValueKind::Positive, OPTIONAL, "The time step; 0.01 if left out.", "dt = 0.02"),
+        INTEGRATOR,
+        key(
+            "precision",
+            ValueKind::Choice(precisions),
+            OPTIONAL,
+            "In what `psidpd run` computes the forces of pairs; `mixed` if left out: single precision, with positions \
+             exact to 2⁻³² of the box and sums in double precision. The option `--precision` goes before it. A deck \
+             for LAMMPS has it if it is given; pair styles are in double precision otherwise.",
+            "precision = \"double\"",
+        ),
+        key(
+            "lambda",
+            ValueKind::Number,
+            OPTIONAL,
+            "The parameter of `groot-warren`, from 0 to 1; 0.65 if left out. With 0.5 it is velocity Verlet.",
+            "integrator = \"groot-warren\"\nlambda = 0.5",
+        ),
+    ],
+};
+
+/// `[box]`.
+pub const BOX: Table = Table {
+    path: "box",
+    array: false,
+    forms: ("", &[]),
+    about: "The box, where it needs more than lengths.",
+    keys: &[
+        key(
+            "lengths",
+            ValueKind::Lengths,
+            OPTIONAL,
+            "Lengths of its edges; left out in a start from a file, needed otherwise.",
+            "[box]\nlengths = [8.0, 8.0, 16.0]",
+        ),
+        key(
+            "boundary",
+            ValueKind::EachOf(boundaries),
+            OPTIONAL,
+            "What happens at its faces; `periodic` if left out, or as it was in a checkpoint that is started from. A \
+             face that reflects puts a particle as far inside as it was outside and reverses its velocity across the \
+             face; nothing acts through it. For a wall of particles freeze a `layer` in front of it.",
+            "[box]\nlengths = [8.0, 8.0, 16.0]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]",
+        ),
+    ],
+};
+
+/// `[masses]`.
+pub const MASSES: Table = Table {
+    path: "masses",
+    array: false,
+    forms: ("", &[]),
+    about: "Masses of the species; 1, or what a data file says, for those left out.",
+    keys: &[key("SPECIES", ValueKind::Positive, OPTIONAL, "The mass of a species.", "[masses]\nB = 2.0")],
+};

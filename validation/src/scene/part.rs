@@ -1,0 +1,201 @@
+//! `[[part]]`: regions filled with particles, of which drops, columns, supports and walls are made.
+
+use super::arrangement::Arrangement;
+use super::composition::Composition;
+use super::number::{positive, vector};
+use super::shape::{Shape, Shapes};
+use super::velocities::Velocities;
+use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
+use psidpd_core::engine::PeriodicBox;
+use psidpd_core::model::Model;
+
+/// Most particles that a scene may ask for.
+const MOST_PARTICLES: f64 = 1e8;
+
+/// The name of what fills a box without parts.
+pub const WHOLE: &str = "fluid";
+
+/// A region and the particles in it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Part {
+    /// What it is called.
+    pub name: String,
+    /// Where it is.
+    pub shape: Shape,
+    /// Its normal, if it is a slab across the box.
+    pub normal: Option<usize>,
+    /// How many particles.
+    pub count: usize,
+    /// Of which species.
+    pub composition: Composition,
+    /// How they are arranged.
+    pub arrangement: Arrangement,
+    /// How they move among themselves.
+    pub velocities: Velocities,
+    /// How they move together.
+    pub velocity: [f64; 3],
+    /// Whether they never move.
+    pub frozen: bool,
+}
+
+/// What parts of one scene have in common.
+pub struct Common<'a> {
+    /// The model.
+    pub model: &'a Model,
+    /// The box.
+    pub shapes: Shapes<'a>,
+    /// The density of the scene, for parts that give neither density nor count.
+    pub density: Option<f64>,
+}
+
+impl<'a> Common<'a> {
+    /// What the parts of the scene `root` have in common.
+    pub fn of(root: &Section, model: &'a Model, domain: &'a PeriodicBox) -> Result<Common<'a>, FileError> {
+        let density = root.get("density").map(|value| positive(&value)).transpose()?;
+        Ok(Common { model, shapes: Shapes { dimensions: model.dimensions(), domain }, density })
+    }
+
+    /// Reads the particles of a region, except whether they are frozen; `what` names it.
+    pub fn fill(&self, section: &Section, name: String, shape: Shape) -> Result<Part, FileError> {
+        let dimensions = self.shapes.dimensions;
+        Ok(Part {
+            count: self.count(section, shape.volume(dimensions))?,
+            composition: Composition::read(section, self.model.species())?,
+            arrangement: Arrangement::read(section, dimensions)?,
+            velocities: Velocities::read(section)?,
+            velocity: section.get("velocity").map_or(Ok([0.0; 3]), |v| vector(&v, dimensions))?,
+            frozen: false,
+            normal: self.shapes.normal(&shape),
+            name,
+            shape,
+        })
+    }
+
+    /// The whole box at the density of the scene, given by `value`, in equal shares of the species.
+    pub fn everywhere(&self, value: &Value, density: f64) -> Result<Part, FileError> {
+        let shape = self.shapes.whole();
+        let count = (density * shape.volume(self.shapes.dimensions)).round();
+        Ok(Part {
+            name: WHOLE.to_owned(),
+            shape,
+            normal: None,
+            count: check_count(count, |kind| value.error(kind))?,
+            composition: Composition::equal(self.model.species().len()),
+            arrangement: Arrangement::Random { min_distance: 0.0 },
+            velocities: Velocities::default(),
+            velocity: [0.0; 3],
+            frozen: false,
+        })
+    }
+
+    fn count(&self, section: &Section, volume: f64) -> Result<usize, FileError> {
+        match (section.get("density"), section.get("count"), self.density) {
+            (Some(_), Some(count), _) => {
+                let message = "density is given too: give one of them".to_owned();
+                Err(count.error(FileErrorKind::Value(message)))
+            }
+            (Some(density), None, _) => {
+                let count = (positive(&density)? * volume).round();
+                check_count(count, |kind| density.error(kind))
+            }
+            (None, Some(count), _) => check_count(count.count()?.value as f64, |kind| count.error(kind)),
+            (None, None, Some(density)) => {
+                check_count((density * volume).round(), |kind| section.error(kind))
+            }
+            (None, None, None) => {
+                Err(section.error(FileErrorKind::Value("needs a density or a count".into())))
+            }
+        }
+    }
+
+    /// Reads every `[[part]]`.
+    pub fn parts(&self, value: &Value) -> Result<Vec<Part>, FileError> {
+        let sections: Vec<Section> = value.array()?.iter().map(Value::section).collect::<Result<_, _>>()?;
+        let keys: Vec<Value> = sections.iter().map(|s| s.require("shape")).collect::<Result<_, _>>()?;
+        let mut shapes = Vec::with_capacity(sections.len());
+        for (section, key) in sections.iter().zip(&keys) {
+            shapes.push(self.shapes.read(&key.string()?.value, key, section)?);
+        }
+        self.check_overlaps(&keys, &shapes)?;
+        self.leave_the_rest(&keys, &mut shapes)?;
+        let mut parts: Vec<Part> = Vec::with_capacity(sections.len());
+        for (k, (section, shape)) in sections.into_iter().zip(shapes).enumerate() {
+            let part = self.part(&section, k, shape)?;
+            if parts.iter().any(|p| p.name == part.name) {
+                let message = format!("\"{}\" names two parts", part.name);
+                let kind = FileErrorKind::Value(message);
+                return Err(match section.get("name") {
+                    Some(name) => name.error(kind),
+                    None => section.error(kind),
+                });
+            }
+            section.finish()?;
+            parts.push(part);
+        }
+        check_count(parts.iter().map(|p| p.count as f64).sum(), |kind| value.error(kind))?;
+        if parts.iter().all(|p| p.frozen) {
+            return Err(value.error(FileErrorKind::Value("every part is frozen: nothing would move".into())));
+        }
+        Ok(parts)
+    }
+
+    fn part(&self, section: &Section, index: usize, shape: Shape) -> Result<Part, FileError> {
+        let name = match section.get("name") {
+            Some(value) => value.string()?.value,
+            None => format!("part {}", index + 1),
+        };
+        let frozen = section.get("frozen").map_or(Ok(false), |v| v.boolean().map(|b| b.value))?;
+        let moves = ["velocity", "velocities"].iter().find_map(|key| section.get(key));
+        if let Some(value) = moves.filter(|_| frozen) {
+            let message = "the part is frozen, and does not move".to_owned();
+            return Err(value.error(FileErrorKind::Value(message)));
+        }
+        Ok(Part { frozen, ..self.fill(section, name, shape)? })
+    }
+
+    fn check_overlaps(&self, keys: &[Value], shapes: &[Shape]) -> Result<(), FileError> {
+        for (k, shape) in shapes.iter().enumerate() {
+            if let Some(other) = (0..k).find(|o| shape.overlaps(&shapes[*o], self.shapes.dimensions)) {
+                let message = format!("overlaps with part {}", other + 1);
+                return Err(keys[k].error(FileErrorKind::Value(message)).with_help(
+                    "move or shrink one of them; shape = \"rest\" is what the other parts leave of the box",
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Tells the rest what it is the rest of.
+    fn leave_the_rest(&self, keys: &[Value], shapes: &mut [Shape]) -> Result<(), FileError> {
+        let is_rest = |s: &Shape| matches!(s, Shape::Rest { .. });
+        let mut rests = (0..shapes.len()).filter(|k| is_rest(&shapes[*k]));
+        let Some(first) = rests.next() else { return Ok(()) };
+        if let Some(second) = rests.next() {
+            let message = format!("part {} is the rest already", first + 1);
+            return Err(keys[second].error(FileErrorKind::Value(message)));
+        }
+        let all: Vec<Shape> = shapes.iter().filter(|s| !is_rest(s)).cloned().collect();
+        if let Shape::Rest { others, .. } = &mut shapes[first] {
+            *others = all;
+        }
+        let (rest, whole) =
+            (shapes[first].volume(self.shapes.dimensions), self.shapes.domain.volume(self.shapes.dimensions));
+        if rest <= 1e-9 * whole {
+            let message = "the other parts fill the box: there is no rest".to_owned();
+            return Err(keys[first].error(FileErrorKind::Value(message)));
+        }
+        Ok(())
+    }
+}
+
+/// A number of particles, if there is one at least and not too many.
+fn check_count(count: f64, error: impl Fn(FileErrorKind) -> FileError) -> Result<usize, FileError> {
+    if count < 1.0 {
+        return Err(error(FileErrorKind::Value("leaves the box without a particle".into())));
+    }
+    if count > MOST_PARTICLES {
+        let message = format!("{count:.3e} particles are too many: at most {MOST_PARTICLES:.0e}");
+        return Err(error(FileErrorKind::Value(message)));
+    }
+    Ok(count as usize)
+}

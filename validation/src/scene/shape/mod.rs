@@ -1,0 +1,128 @@
+//! Regions of a box that are filled with particles.
+
+mod overlap;
+mod read;
+
+pub use read::{SHAPES, Shapes, faces};
+
+/// A region. Directions and lengths are those of a box along the axes; in two dimensions the third
+/// coordinate is not looked at.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Shape {
+    /// Between two corners.
+    Block {
+        /// The lower corner.
+        low: [f64; 3],
+        /// The upper corner.
+        high: [f64; 3],
+    },
+    /// A ball; in two dimensions a disc.
+    Sphere {
+        /// Its centre.
+        center: [f64; 3],
+        /// Its radius.
+        radius: f64,
+    },
+    /// A cylinder along an axis.
+    Cylinder {
+        /// Direction of its axis.
+        axis: usize,
+        /// Its middle.
+        center: [f64; 3],
+        /// Its radius.
+        radius: f64,
+        /// Its length.
+        length: f64,
+    },
+    /// What other regions, which do not overlap, leave of a block.
+    Rest {
+        /// Lower corner of the block.
+        low: [f64; 3],
+        /// Upper corner of the block.
+        high: [f64; 3],
+        /// The others.
+        others: Vec<Shape>,
+    },
+}
+
+impl Shape {
+    /// The volume, in two dimensions the area.
+    pub fn volume(&self, dimensions: usize) -> f64 {
+        use std::f64::consts::PI;
+        match self {
+            Shape::Block { low, high } => (0..dimensions).map(|k| high[k] - low[k]).product(),
+            Shape::Sphere { radius, .. } if dimensions == 2 => PI * radius * radius,
+            Shape::Sphere { radius, .. } => 4.0 / 3.0 * PI * radius.powi(3),
+            Shape::Cylinder { radius, length, .. } => PI * radius * radius * length,
+            Shape::Rest { low, high, others } => {
+                let whole = Shape::Block { low: *low, high: *high }.volume(dimensions);
+                whole - others.iter().map(|s| s.volume(dimensions)).sum::<f64>()
+            }
+        }
+    }
+
+    /// The corners of the smallest block around it.
+    pub fn bounds(&self, dimensions: usize) -> [[f64; 3]; 2] {
+        match self {
+            Shape::Block { low, high } | Shape::Rest { low, high, .. } => [*low, *high],
+            Shape::Sphere { center, radius } => {
+                let half = |k: usize| if k < dimensions { *radius } else { 0.0 };
+                [std::array::from_fn(|k| center[k] - half(k)), std::array::from_fn(|k| center[k] + half(k))]
+            }
+            Shape::Cylinder { axis, center, radius, length } => {
+                let half = |k: usize| if k == *axis { 0.5 * length } else { *radius };
+                [std::array::from_fn(|k| center[k] - half(k)), std::array::from_fn(|k| center[k] + half(k))]
+            }
+        }
+    }
+
+    /// Whether a point is in it.
+    pub fn contains(&self, x: [f64; 3], dimensions: usize) -> bool {
+        match self {
+            Shape::Block { low, high } => (0..dimensions).all(|k| (low[k]..=high[k]).contains(&x[k])),
+            Shape::Sphere { center, radius } => {
+                (0..dimensions).map(|k| (x[k] - center[k]).powi(2)).sum::<f64>() <= radius * radius
+            }
+            Shape::Cylinder { axis, center, radius, length } => {
+                let across: f64 = (0..3).filter(|k| k != axis).map(|k| (x[k] - center[k]).powi(2)).sum();
+                (x[*axis] - center[*axis]).abs() <= 0.5 * length && across <= radius * radius
+            }
+            Shape::Rest { low, high, others } => {
+                Shape::Block { low: *low, high: *high }.contains(x, dimensions)
+                    && !others.iter().any(|s| s.contains(x, dimensions))
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Volumes against the share of a grid of points inside.
+    #[test]
+    fn volumes_are_those_of_the_points_inside() {
+        let ball = Shape::Sphere { center: [2.0, 2.5, 3.0], radius: 1.5 };
+        let rod = Shape::Cylinder { axis: 1, center: [4.4, 2.5, 1.2], radius: 0.8, length: 4.0 };
+        let low = [0.0; 3];
+        let high = [6.0, 5.0, 5.0];
+        let rest = Shape::Rest { low, high, others: vec![ball.clone(), rod.clone()] };
+        for shape in [ball, rod, rest] {
+            let points = 120;
+            let mut inside = 0;
+            for k in 0..points * points * points {
+                let at = [k % points, k / points % points, k / points / points];
+                let x = std::array::from_fn(|c| high[c] * (at[c] as f64 + 0.5) / points as f64);
+                inside += shape.contains(x, 3) as usize;
+                if shape.contains(x, 3) {
+                    let [a, b] = shape.bounds(3);
+                    assert!((0..3).all(|c| a[c] <= x[c] && x[c] <= b[c]));
+                }
+            }
+            let found = 150.0 * inside as f64 / (points as f64).powi(3);
+            assert!((found - shape.volume(3)).abs() < 0.01 * shape.volume(3), "{shape:?}: {found}");
+        }
+        let disc = Shape::Sphere { center: [0.0; 3], radius: 2.0 };
+        assert!((disc.volume(2) - 12.566_370_614).abs() < 1e-8);
+    }
+}

@@ -1,0 +1,177 @@
+//! The keys of a region.
+
+use super::Shape;
+use crate::scene::number::{axis, positive, vector};
+use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
+use psidpd_core::engine::PeriodicBox;
+
+/// The names of the faces.
+pub fn faces() -> Vec<&'static str> {
+    FACES.iter().map(|(name, _)| *name).collect()
+}
+
+/// How far, as a share of the box, a region may reach beyond it by rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// Names of the kinds of a `[[part]]`.
+pub const SHAPES: &[&str] = &["box", "slab", "layer", "sphere", "cylinder", "rest"];
+
+/// The faces of a box.
+const FACES: [(&str, (usize, bool)); 6] = [
+    ("xlo", (0, false)),
+    ("xhi", (0, true)),
+    ("ylo", (1, false)),
+    ("yhi", (1, true)),
+    ("zlo", (2, false)),
+    ("zhi", (2, true)),
+];
+
+/// Reads regions of one box.
+pub struct Shapes<'a> {
+    /// 2 or 3.
+    pub dimensions: usize,
+    /// The box.
+    pub domain: &'a PeriodicBox,
+}
+
+impl Shapes<'_> {
+    /// The whole box.
+    pub fn whole(&self) -> Shape {
+        let (low, lengths) = (self.domain.origin(), self.domain.lengths());
+        Shape::Block { low, high: std::array::from_fn(|k| low[k] + lengths[k]) }
+    }
+
+    /// The region named `kind`, whose keys are in `section`; `key` is what an error about it points at. What
+    /// others leave is the whole box as yet: see [`Shape::Rest`].
+    pub fn read(&self, kind: &str, key: &Value, section: &Section) -> Result<Shape, FileError> {
+        let shape = match kind {
+            "box" => self.read_block(section)?,
+            "slab" => self.read_slab(section)?,
+            "layer" => self.read_layer(section)?,
+            "sphere" => Shape::Sphere {
+                center: self.read_center(section)?,
+                radius: positive(&section.require("radius")?)?,
+            },
+            "cylinder" if self.dimensions == 3 => self.read_cylinder(section)?,
+            "rest" => {
+                let [low, high] = self.whole().bounds(self.dimensions);
+                return Ok(Shape::Rest { low, high, others: Vec::new() });
+            }
+            _ => {
+                let known: Vec<&str> =
+                    SHAPES.iter().copied().filter(|s| self.dimensions == 3 || *s != "cylinder").collect();
+                let kind = FileErrorKind::UnknownName {
+                    what: "shape",
+                    name: kind.to_owned(),
+                    known: known.join(", "),
+                };
+                return Err(key.error(kind));
+            }
+        };
+        self.check_inside(&shape, key)?;
+        Ok(shape)
+    }
+
+    /// The normal of a region that reaches across the box in all directions but one.
+    pub fn normal(&self, shape: &Shape) -> Option<usize> {
+        let Shape::Block { low, high } = shape else { return None };
+        let lengths = self.domain.lengths();
+        let short = |k: &usize| high[*k] - low[*k] < lengths[*k] * (1.0 - ROUNDING);
+        let mut short = (0..self.dimensions).filter(short);
+        let first = short.next()?;
+        short.next().is_none().then_some(first)
+    }
+
+    fn check_inside(&self, shape: &Shape, key: &Value) -> Result<(), FileError> {
+        let [low, high] = self.whole().bounds(self.dimensions);
+        let [from, to] = shape.bounds(self.dimensions);
+        for k in 0..self.dimensions {
+            let slack = ROUNDING * (high[k] - low[k]);
+            if from[k] < low[k] - slack || to[k] > high[k] + slack {
+                let message = format!(
+                    "reaches from {} to {} along {}, out of the box from {} to {}",
+                    from[k],
+                    to[k],
+                    ["x", "y", "z"][k],
+                    low[k],
+                    high[k]
+                );
+                return Err(key.error(FileErrorKind::Value(message)));
+            }
+        }
+        Ok(())
+    }
+
+    fn read_block(&self, section: &Section) -> Result<Shape, FileError> {
+        let [mut low, mut high] = self.whole().bounds(self.dimensions);
+        for (name, corner) in [("low", &mut low), ("high", &mut high)] {
+            if let Some(value) = section.get(name) {
+                corner[..self.dimensions]
+                    .copy_from_slice(&vector(&value, self.dimensions)?[..self.dimensions]);
+            }
+        }
+        if (0..self.dimensions).any(|k| low[k] >= high[k]) {
+            let message = "the corner high must be above low in every direction".to_owned();
+            return Err(section.error(FileErrorKind::Value(message)));
+        }
+        Ok(Shape::Block { low, high })
+    }
+
+    fn read_slab(&self, section: &Section) -> Result<Shape, FileError> {
+        let axis = self.read_axis(section)?;
+        let thickness = self.read_thickness(section, axis)?;
+        let [mut low, mut high] = self.whole().bounds(self.dimensions);
+        let middle = match section.get("at") {
+            Some(value) => value.number()?.value,
+            None => 0.5 * (low[axis] + high[axis]),
+        };
+        (low[axis], high[axis]) = (middle - 0.5 * thickness, middle + 0.5 * thickness);
+        Ok(Shape::Block { low, high })
+    }
+
+    fn read_layer(&self, section: &Section) -> Result<Shape, FileError> {
+        let (axis, upper) = section.require("face")?.one_of("face", &FACES[..2 * self.dimensions])?.value;
+        let thickness = self.read_thickness(section, axis)?;
+        let [mut low, mut high] = self.whole().bounds(self.dimensions);
+        match upper {
+            true => low[axis] = high[axis] - thickness,
+            false => high[axis] = low[axis] + thickness,
+        }
+        Ok(Shape::Block { low, high })
+    }
+
+    fn read_cylinder(&self, section: &Section) -> Result<Shape, FileError> {
+        let axis = self.read_axis(section)?;
+        let length = match section.get("length") {
+            Some(value) => positive(&value)?,
+            None => self.domain.lengths()[axis],
+        };
+        let radius = positive(&section.require("radius")?)?;
+        Ok(Shape::Cylinder { axis, center: self.read_center(section)?, radius, length })
+    }
+
+    fn read_axis(&self, section: &Section) -> Result<usize, FileError> {
+        section.get("axis").map_or(Ok(self.dimensions - 1), |value| axis(&value, self.dimensions))
+    }
+
+    fn read_thickness(&self, section: &Section, axis: usize) -> Result<f64, FileError> {
+        let value = section.require("thickness")?;
+        let thickness = positive(&value)?;
+        let length = self.domain.lengths()[axis];
+        if thickness > length {
+            let message = format!("must not exceed the box, {length} long, is {thickness}");
+            return Err(value.error(FileErrorKind::Value(message)));
+        }
+        Ok(thickness)
+    }
+
+    fn read_center(&self, section: &Section) -> Result<[f64; 3], FileError> {
+        match section.get("center") {
+            Some(value) => vector(&value, self.dimensions),
+            None => {
+                let [low, high] = self.whole().bounds(self.dimensions);
+                Ok(std::array::from_fn(|k| 0.5 * (low[k] + high[k])))
+            }
+        }
+    }
+}
