@@ -11,10 +11,14 @@ use std::path::Path;
 /// Who computes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Code {
-    /// The native runner.
+    /// The native runner, in double precision.
     Native,
-    /// The plugin's `dpd/psi` with a model file.
+    /// The native runner in mixed precision.
+    NativeMixed,
+    /// The plugin's `dpd/psi` with a model file, in double precision.
     Psi,
+    /// The same in mixed precision.
+    PsiMixed,
     /// The plugin's `mdpd/psi` with the built-in's coefficients.
     MdpdPsi,
     /// LAMMPS's `mdpd`; its law is [`ForceLaw::LucyLammps`] whatever is asked.
@@ -28,7 +32,9 @@ impl Code {
     pub fn label(self) -> &'static str {
         match self {
             Code::Native => "native",
+            Code::NativeMixed => "native, mixed precision",
             Code::Psi => "plugin dpd/psi",
+            Code::PsiMixed => "plugin dpd/psi, mixed precision",
             Code::MdpdPsi => "plugin mdpd/psi",
             Code::BuiltIn => "LAMMPS mdpd",
             Code::Eam => "LAMMPS eam/alloy",
@@ -39,7 +45,9 @@ impl Code {
     pub fn slug(self) -> &'static str {
         match self {
             Code::Native => "native",
+            Code::NativeMixed => "native-mixed",
             Code::Psi => "dpd-psi",
+            Code::PsiMixed => "dpd-psi-mixed",
             Code::MdpdPsi => "mdpd-psi",
             Code::BuiltIn => "mdpd",
             Code::Eam => "eam",
@@ -109,17 +117,21 @@ impl<'a> Setup<'a> {
             place("start.data"),
         );
         let (b, gamma, seed) = (self.set.b, self.gamma, self.seed);
-        if matches!(self.code, Code::Psi | Code::MdpdPsi) {
+        if matches!(self.code, Code::Psi | Code::PsiMixed | Code::MdpdPsi) {
             // Writing to a String cannot fail.
             let _ = writeln!(deck, "plugin load \"{}\"", context.plugin.display());
         }
         let pair = match self.code {
-            Code::Native => String::new(),
-            Code::Psi => {
+            Code::Native | Code::NativeMixed => String::new(),
+            Code::Psi | Code::PsiMixed => {
+                let precision = if self.code == Code::Psi { "double" } else { "mixed" };
                 let text = self.set.model_text(self.law, gamma)?;
                 let path = folder.join("model.toml");
                 std::fs::write(&path, text).map_err(ValidateError::io(&path))?;
-                format!("pair_style dpd/psi 1.0 {seed}\npair_coeff * * \"{}\" F\n", place("model.toml"))
+                format!(
+                    "pair_style dpd/psi 1.0 {seed} precision {precision}\npair_coeff * * \"{}\" F\n",
+                    place("model.toml")
+                )
             }
             Code::MdpdPsi => {
                 let law = if self.law == ForceLaw::LucyLammps { " law lucy" } else { "" };

@@ -7,7 +7,7 @@ use super::{Context, Part, ValidateError};
 use crate::lammps::Lammps;
 use crate::report::{Check, Item, Section, Table};
 use crate::run::{Simulation, State};
-use psidpd_core::engine::{Step, Want};
+use psidpd_core::engine::{Precision, Settings, Step, Want};
 use psidpd_core::model::{ForceLaw, Model};
 use serde_json::json;
 
@@ -55,13 +55,22 @@ impl Point {
 }
 
 fn native(model: &Model, state: &State, step: Option<Step>) -> Result<Point, ValidateError> {
-    let mut simulation = Simulation::new(model, 1.0, state.clone(), SEED)?;
+    point_of(Simulation::new(model, 1.0, state.clone(), SEED)?, step)
+}
+
+fn point_of(mut simulation: Simulation, step: Option<Step>) -> Result<Point, ValidateError> {
     simulation.compute(Want::TOTALS, step)?;
     Ok(Point {
         forces: by_tag(simulation.tags(), simulation.forces()),
         energy: simulation.potential_energy(),
         virial: simulation.tally().total_virial(),
     })
+}
+
+fn native_mixed(model: &Model, state: &State) -> Result<Point, ValidateError> {
+    let mut simulation = Simulation::new(model, 1.0, state.clone(), SEED)?;
+    simulation.set_settings(Settings { precision: Precision::Mixed, ..Settings::default() })?;
+    point_of(simulation, None)
 }
 
 fn by_tag(tags: &[i32], values: &[[f64; 3]]) -> Vec<[f64; 3]> {
@@ -162,6 +171,25 @@ pub fn run(context: &Context) -> Result<Part, ValidateError> {
     )?;
     compare(&mut part, setup(Code::MdpdPsi, Conservative, 0.0, true), "mdpd-psi", &truth, tight, "native")?;
     compare(&mut part, setup(Code::Eam, Conservative, 0.0, true), "eam", &truth, [1e-6; 3], "native")?;
+
+    // Largest over all particles of an error near 3e-7 of the rms force.
+    let loose = [2e-5, 1e-6, 1e-5];
+    compare(&mut part, setup(Code::PsiMixed, Conservative, 0.0, true), "psi-mixed", &truth, loose, "native")?;
+    let mixed = native_mixed(&SET6.model(Conservative, 0.0)?, &state)?.against(&truth);
+    let values = [("force", mixed.force), ("energy", mixed.energy), ("virial", mixed.virial)];
+    for ((what, value), limit) in values.into_iter().zip(loose) {
+        part.checks.push(Check::at_most(
+            format!("forces.native-mixed.{what}"),
+            "forces",
+            format!("native in mixed precision: {what} against double precision, relative"),
+            value,
+            limit,
+        ));
+    }
+    part.values.push((
+        "forces.native-mixed".into(),
+        json!({"force": mixed.force, "energy": mixed.energy, "virial": mixed.virial}),
+    ));
 
     let step = Step { seed: SEED, number: 0, dt: 0.01 };
     let noisy = native(&SET6.model(Conservative, super::fluids::GAMMA)?, &state, Some(step))?;

@@ -4,7 +4,7 @@ use super::codes::{Code, Setup};
 use super::{Context, ValidateError};
 use crate::lammps::dump;
 use crate::run::{Integrator, Simulation, State};
-use psidpd_core::engine::Want;
+use psidpd_core::engine::{Precision, Settings, Want};
 use std::path::Path;
 use std::time::Duration;
 
@@ -73,7 +73,7 @@ pub fn run(
     advance: &(dyn Fn(u64) + Sync),
 ) -> Result<Trace, ValidateError> {
     match setup.code {
-        Code::Native => native(setup, state, length, advance),
+        Code::Native | Code::NativeMixed => native(setup, state, length, advance),
         _ => lammps(context, setup, state, length, &context.work.join(name)),
     }
 }
@@ -86,6 +86,9 @@ fn native(
 ) -> Result<Trace, ValidateError> {
     let model = setup.set.model(setup.law, setup.gamma)?;
     let mut simulation = Simulation::new(&model, 1.0, state.clone(), setup.seed)?;
+    if setup.code == Code::NativeMixed {
+        simulation.set_settings(Settings { precision: Precision::Mixed, ..Settings::default() })?;
+    }
     let mut trace = Trace { particles: state.len(), ..Trace::default() };
     simulation.prepare(length.dt, Want::TOTALS)?;
     for step in 0..=length.steps {
