@@ -137,6 +137,7 @@ fn plot(outcome: &Outcome, fluid: &'static str, title: &str) -> Plot {
         log_x: true,
         log_y: true,
         levels: vec![],
+        marks: vec![],
     }
 }
 
