@@ -63,7 +63,7 @@ impl Grid {
     /// The cell of a particle at a fraction of the box, in units of 2⁻³².
     #[inline(always)]
     pub fn cell(&self, u: [u32; 3]) -> usize {
-        let part = |u: u32, of: usize| (u as u64 * of as u64 >> 32) as usize;
+        let part = |u: u32, of: usize| ((u as u64 * of as u64) >> 32) as usize;
         let row = part(u[self.layer_axis], self.layers) * self.rows + part(u[self.row_axis], self.rows);
         row * self.bins + part(u[0], self.bins)
     }

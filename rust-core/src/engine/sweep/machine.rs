@@ -769,8 +769,9 @@ fn fault_of(given: &Given, k: usize) -> EngineError {
 fn units(frame: &Frame, inverse: &[f64; 3], x: &[f64; 3]) -> Option<[u32; 3]> {
     let s = frame.fraction(x, inverse);
     let t = s.map(|s| s * TWO_TO_32);
-    // Far below what a whole number of 64 bits holds; false for NaN.
-    if !(t[0].abs() + t[1].abs() + t[2].abs() < 1e18) {
+    // Far below what a whole number of 64 bits holds.
+    let far = t[0].abs() + t[1].abs() + t[2].abs();
+    if far.is_nan() || far > 1e18 {
         return None;
     }
     let mut u = [0; 3];

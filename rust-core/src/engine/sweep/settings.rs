@@ -75,8 +75,8 @@ impl Instructions {
 
     /// The best that this processor has.
     pub fn best() -> Instructions {
-        let available = Instructions::ALL.into_iter().map(|(_, i)| i).filter(|i| i.available());
-        available.last().unwrap_or(Instructions::Portable)
+        let mut available = Instructions::ALL.into_iter().map(|(_, i)| i).filter(|i| i.available());
+        available.next_back().unwrap_or(Instructions::Portable)
     }
 }
 

@@ -48,7 +48,6 @@ const fn first() -> [u64; 256] {
 
 #[inline(always)]
 unsafe fn order(mask: u32) -> __m256i {
-    // SAFETY: the contract of the module, here and below.
     unsafe { _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(FIRST[(mask & 0xff) as usize] as i64)) }
 }
 

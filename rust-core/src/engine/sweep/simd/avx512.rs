@@ -33,7 +33,6 @@ macro_rules! operators {
             type Output = Self;
             #[inline(always)]
             fn add(self, other: Self) -> Self {
-                // SAFETY: the contract of the module.
                 unsafe { Self($add(self.0, other.0)) }
             }
         }
@@ -41,7 +40,6 @@ macro_rules! operators {
             type Output = Self;
             #[inline(always)]
             fn sub(self, other: Self) -> Self {
-                // SAFETY: the contract of the module.
                 unsafe { Self($sub(self.0, other.0)) }
             }
         }
@@ -49,19 +47,16 @@ macro_rules! operators {
             type Output = Self;
             #[inline(always)]
             fn mul(self, other: Self) -> Self {
-                // SAFETY: the contract of the module.
                 unsafe { Self($mul(self.0, other.0)) }
             }
         }
         impl Real for $vector {
             #[inline(always)]
             fn constant(x: f64) -> Self {
-                // SAFETY: the contract of the module.
                 unsafe { Self($constant(x as $scalar)) }
             }
             #[inline(always)]
             fn larger(self, other: Self) -> Self {
-                // SAFETY: the contract of the module.
                 unsafe { Self($max(self.0, other.0)) }
             }
         }
@@ -78,7 +73,6 @@ impl Reals for F32x16 {
 
     #[inline(always)]
     unsafe fn splat(x: f32) -> Self {
-        // SAFETY: the contract of the module, here and below.
         unsafe { F32x16(_mm512_set1_ps(x)) }
     }
     #[inline(always)]
@@ -178,7 +172,6 @@ impl WordColumns {
     #[inline(always)]
     fn map_each(self) -> [F32x16; 4] {
         let [a, b, c, d] = self.0;
-        // SAFETY: the contract of the module.
         unsafe {
             [
                 F32x16(_mm512_castsi512_ps(a)),
@@ -192,7 +185,6 @@ impl WordColumns {
 
 #[inline(always)]
 unsafe fn row(base: *const u8, stride: usize, index: *const u32, k: usize) -> __m128i {
-    // SAFETY: the contract of the module.
     unsafe { _mm_loadu_si128(base.add(*index.add(k) as usize * stride).cast()) }
 }
 

@@ -5,6 +5,9 @@
 //! be called, except on [`Portable`]: that is the safety contract of every `unsafe fn` of these
 //! traits, together with pointers being valid for as many elements as a vector has lanes.
 
+// That contract stands for the reason of each of some hundred blocks.
+#![allow(clippy::undocumented_unsafe_blocks)]
+
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 #[cfg(target_arch = "x86_64")]

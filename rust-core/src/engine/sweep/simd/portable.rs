@@ -70,7 +70,6 @@ macro_rules! lanes {
             }
             #[inline(always)]
             unsafe fn load(p: *const $scalar) -> Self {
-                // SAFETY: the contract of the module, here and below.
                 Lanes(unsafe { p.cast::<[$scalar; LANES]>().read_unaligned() })
             }
             #[inline(always)]
