@@ -136,7 +136,6 @@ impl<'a> Runner<'a> {
         }
         let state = scene.initial_state();
         let simulation = simulation(scene, state.clone())?;
-        let observers = Observers::new(scene);
         store.clear()?;
         let good = Checkpoint {
             program: PROGRAM.into(),
@@ -150,21 +149,16 @@ impl<'a> Runner<'a> {
             last: None,
             sums: Sums::default(),
             files: BTreeMap::new(),
-            observers: observers.to_bytes(),
+            observers: Observers::new(scene).to_bytes(),
         };
         let mut output = Output::create(scene, out)?;
         let good = Checkpoint { files: output.lengths(), ..good };
-        let run =
-            Run::new(scene, folder, store, simulation, Some(output), good, observers, Timing::default());
+        let run = Run::new(scene, folder, store, simulation, Some(output), good, Timing::default())?;
         Ok(Runner { start: Start::New, run })
     }
 
     fn resume(scene: &'a Scene, folder: Folder, store: Store, found: Found) -> Result<Runner<'a>, RunError> {
         let Found { checkpoint: good, fallback } = found;
-        let observers = Observers::from_bytes(&good.observers).map_err(|error| CheckpointError::Damaged {
-            path: store.path(),
-            what: format!("what was observed: {error}"),
-        })?;
         let mut simulation = simulation(scene, good.state.clone())?;
         if let Some(stage) = scene.stages.get(good.position.stage) {
             scene.enter(stage, &mut simulation)?;
@@ -182,7 +176,7 @@ impl<'a> Runner<'a> {
         };
         let good = Checkpoint { program: PROGRAM.into(), ..good };
         let timing = Timing::read(folder.path());
-        let mut run = Run::new(scene, folder, store, simulation, output, good, observers, timing);
+        let mut run = Run::new(scene, folder, store, simulation, output, good, timing)?;
         run.stored = Some(run.good.step);
         Ok(Runner { start, run })
     }

@@ -1,4 +1,4 @@
-use super::checkpoint::{Checkpoint, Position, Store};
+use super::checkpoint::{Checkpoint, CheckpointError, Position, Store};
 use super::error::RunError;
 use super::folder::Folder;
 use super::output::{Output, write_observations};
@@ -53,11 +53,14 @@ impl<'a> Run<'a> {
         simulation: Simulation,
         output: Option<Output>,
         good: Checkpoint,
-        observers: Observers,
         timing: Timing,
-    ) -> Run<'a> {
+    ) -> Result<Run<'a>, RunError> {
+        let observers = Observers::from_bytes(&good.observers).map_err(|error| CheckpointError::Damaged {
+            path: store.path(),
+            what: format!("what was observed: {error}"),
+        })?;
         let now = Instant::now();
-        Run {
+        Ok(Run {
             scene,
             folder,
             store,
@@ -74,7 +77,7 @@ impl<'a> Run<'a> {
             checkpointed: now,
             interval: CHECKPOINT_INTERVAL,
             good,
-        }
+        })
     }
 
     pub fn go_on(
