@@ -791,6 +791,15 @@ unsafe fn scatter_weights<T: Scalar>(swept: &Swept<T, impl Record>, offset: isiz
     }
 }
 
+/// Room for `more`, an eighth in advance: twice as much, as vectors grow by themselves, would be a good part of
+/// all memory.
+#[inline(always)]
+fn make_room<T>(values: &mut Vec<T>, more: usize) {
+    if values.capacity() - values.len() < more {
+        values.reserve_exact(more.max(values.len() / 8));
+    }
+}
+
 /// Keeps the pairs within the range of a density for the second pass.
 #[inline(always)]
 unsafe fn keep_near<I: Isa, A: Arithmetic<I>, const TALLY: bool>(
@@ -809,7 +818,7 @@ unsafe fn keep_near<I: Isa, A: Arithmetic<I>, const TALLY: bool>(
         let found = collect_near::<I, A::Reals, TALLY>(&swept.terms.passes[pass], block);
         A::encode_all(block.near_j.as_ptr(), block.near_code.as_mut_ptr(), found);
         let rows = &mut near.rows[pass];
-        rows.reserve(found + 16);
+        make_room(rows, found + 16);
         let out = rows.as_mut_ptr().add(rows.len()).cast::<A::Scalar>();
         let near_at = [block.near[0].as_ptr(), block.near[1].as_ptr(), block.near[2].as_ptr()];
         let code = block.near_code.as_ptr();
@@ -827,7 +836,7 @@ unsafe fn keep_near<I: Isa, A: Arithmetic<I>, const TALLY: bool>(
         rows.set_len(rows.len() + found);
         let counts = &mut near.counts[pass];
         let members = block.members.len();
-        counts.reserve(members);
+        make_room(counts, members);
         let out = counts.as_mut_ptr().add(counts.len());
         let (begin, bits) = (block.begin.as_ptr(), block.bits.as_ptr());
         let mut from = 0;
