@@ -329,7 +329,7 @@ impl Simulation {
         self.forces.counts()
     }
 
-    /// Local densities of the particles, as [`Engine::local_densities`].
+    /// Local densities of the particles, as [`psidpd_core::engine::Engine::local_densities`].
     pub fn local_densities(&self) -> &[f64] {
         self.forces.local_densities()
     }

@@ -78,7 +78,7 @@ macro_rules! meters {
         /// An observable of any kind.
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
         pub enum AnyMeter {
-            $(#[doc = concat!("See [`", stringify!($meter), "`].")] $variant(Box<$meter>)),+
+            $(#[doc = concat!("See `", stringify!($meter), "`.")] $variant(Box<$meter>)),+
         }
 
         impl AnyMeter {
