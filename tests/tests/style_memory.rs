@@ -1,0 +1,92 @@
+//! Valgrind over a short run of each style: no invalid access and no decision on what was never written has the
+//! plugin in its stack. What LAMMPS and MPI do among themselves is theirs.
+
+use psidpd_tests::{lammps, root};
+use std::path::Path;
+use std::process::Command;
+
+fn deck(plugin: &Path, style: &str) -> String {
+    let models = root().join("validation/models");
+    let (types, pair) = match style {
+        "dpd/psi" => (2, {
+            let model = models.join("huggins.toml");
+            format!("pair_style dpd/psi 1.0 5\npair_coeff * * {} A B\n", model.display())
+        }),
+        "dpd/psi mixed" => (1, {
+            let model = models.join("warren2003-set6-two-densities.toml");
+            format!(
+                "pair_style dpd/psi 1.0 5 precision mixed threads 2\npair_coeff * * {} F\n",
+                model.display()
+            )
+        }),
+        "mdpd/psi" => (1, "pair_style mdpd/psi 1.0 1.0 5\npair_coeff 1 1 -40 25 18.0 1.0 0.75\n".to_owned()),
+        _ => (1, "pair_style dpd/spline 1.0 1.0 5\npair_coeff 1 1 9.5 2.0 1.0 0.8 1.0 4.5\n".to_owned()),
+    };
+    let mut text = format!(
+        "units lj\natom_style atomic\ncomm_modify vel yes\nregion b block 0 4 0 4 0 4\ncreate_box {types} b\n\
+         create_atoms 1 random 150 4711 NULL overlap 0.3 maxtry 100\n"
+    );
+    if types == 2 {
+        text.push_str("create_atoms 2 random 150 4712 NULL overlap 0.3 maxtry 100\n");
+    }
+    text.push_str("mass * 1\nvelocity all create 1.0 87 loop geom\n");
+    text.push_str(&format!("plugin load {}\n{pair}", plugin.display()));
+    text.push_str(
+        "compute s all stress/atom NULL\ncompute t all reduce sum c_s[1]\nfix 1 all nve\ntimestep 0.005\n\
+         thermo 2\nthermo_style custom step pe press c_t\nrun 4\n\
+         neigh_modify exclude type 1 1\nrun 2\n",
+    );
+    text
+}
+
+/// Memory faults in a log of valgrind: paragraphs that have the plugin in their stack.
+fn ours(log: &str) -> Vec<String> {
+    let lines = log.lines().map(|l| l.splitn(3, "==").nth(2).unwrap_or(l).trim_end());
+    let text = lines.collect::<Vec<_>>().join("\n");
+    text.split("\n\n")
+        .filter(|p| {
+            let fault = ["Invalid ", "Conditional jump", "Use of uninitialised", "Mismatched", "overlap in"];
+            fault.iter().any(|f| p.trim_start().starts_with(f)) && p.contains("psidpd")
+        })
+        .map(str::to_owned)
+        .collect()
+}
+
+#[test]
+fn valgrind_finds_nothing_of_ours() {
+    let (host, plugin) = lammps();
+    for style in ["dpd/psi", "dpd/psi mixed", "mdpd/psi", "dpd/spline"] {
+        let folder = tempfile::tempdir().unwrap();
+        let script = folder.path().join("in.lammps");
+        std::fs::write(&script, deck(plugin, style)).unwrap();
+        let plain = host.command(1);
+        let log = folder.path().join("valgrind.txt");
+        let mut run = Command::new("valgrind");
+        run.args(["--num-callers=40", "--leak-check=no"]).arg(format!("--log-file={}", log.display()));
+        run.arg(plain.get_program()).arg("-in").arg(&script).args(["-nocite", "-log", "none"]);
+        for (name, value) in plain.get_envs() {
+            if let Some(value) = value {
+                run.env(name, value);
+            }
+        }
+        let output = run.current_dir(folder.path()).output().unwrap_or_else(|e| {
+            panic!("valgrind does not start ({e}): install it (Debian: apt-get install valgrind)")
+        });
+        let said = String::from_utf8_lossy(&output.stdout);
+        assert!(output.status.success() && said.contains("Loop time"), "{style}: {said}");
+        let log = std::fs::read_to_string(&log).unwrap();
+        assert!(log.contains("ERROR SUMMARY"), "{log}");
+        let faults = ours(&log);
+        assert!(faults.is_empty(), "{style}: {}\n\n{}", faults.len(), faults.join("\n\n"));
+    }
+}
+
+#[test]
+fn faults_in_the_plugin_are_told_from_others() {
+    let log = "==7== Invalid read of size 8\n==7==    at 0x1: psidpd_core::f (x.rs:1)\n==7== \n\
+               ==7== Invalid read of size 8\n==7==    at 0x1: MPIR_Init (in libmpi.so)\n==7== \n\
+               ==7== ERROR SUMMARY: 2 errors\n";
+    let found = ours(log);
+    assert_eq!(found.len(), 1);
+    assert!(found[0].contains("psidpd_core::f"));
+}
