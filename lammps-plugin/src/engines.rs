@@ -2,7 +2,7 @@
 
 use crate::style::StyleError;
 use psidpd_core::engine::{
-    Engine, Newton, PairsOfHost, Particles, Pool, Settings, Space, Step, Sweep, Tally, Want,
+    Engine, Newton, PairsOfHost, Particles, Plan, Pool, Settings, Space, Step, Sweep, Tally, Want,
 };
 use psidpd_core::model::Fluid;
 use std::sync::Arc;
@@ -32,9 +32,9 @@ impl Engines {
         settings: Settings,
         pool: Arc<Pool>,
     ) -> Result<Engines, StyleError> {
-        let mut engine = Engine::new(fluid).map_err(|e| StyleError::new(e.to_string()))?;
-        let mut sweep =
-            Sweep::with_pool(fluid, settings, pool).map_err(|e| StyleError::new(e.to_string()))?;
+        let plan = Plan::new(fluid).map_err(|e| StyleError::new(e.to_string()))?;
+        let mut engine = Engine::of_plan(plan.clone());
+        let mut sweep = Sweep::of_plan(plan, settings, pool);
         engine.map_kinds(kinds)?;
         sweep.map_kinds(kinds)?;
         Ok(Engines {

@@ -4,7 +4,7 @@
 //! Counts are held against `baselines/instructions.json`. After a change that is meant,
 //!
 //! ```text
-//! PSIDPD_WRITE_BASELINE=1 cargo test --release -p psidpd-tests --test instruction_counts
+//! PSIDPD_UPDATE_BASELINE=1 cargo test --release -p psidpd-tests --test instruction_counts
 //! ```
 //!
 //! writes it anew. Valgrind knows no AVX-512; its kernels come from the same source as those of AVX2.
@@ -83,8 +83,8 @@ fn instructions_per_particle_and_step_stay_what_they_were() {
             }
         }
     }
-    let rewrite = "PSIDPD_WRITE_BASELINE=1 cargo test --release -p psidpd-tests --test instruction_counts";
-    if std::env::var_os("PSIDPD_WRITE_BASELINE").is_some_and(|v| !v.is_empty()) {
+    let rewrite = "PSIDPD_UPDATE_BASELINE=1 cargo test --release -p psidpd-tests --test instruction_counts";
+    if std::env::var_os("PSIDPD_UPDATE_BASELINE").is_some_and(|v| !v.is_empty()) {
         let value = json!({ "compiler": compiler(), "instructions_per_particle_step": counts });
         std::fs::write(baseline(), format!("{value:#}\n")).expect("the baseline is written");
         return;

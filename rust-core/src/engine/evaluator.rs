@@ -81,9 +81,13 @@ impl Engine {
     /// # Errors
     /// As [`Plan::new`].
     pub fn new(fluid: &Fluid) -> Result<Engine, TooLarge> {
-        let plan = Plan::new(fluid)?;
+        Ok(Engine::of_plan(Plan::new(fluid)?))
+    }
+
+    /// The engine of a plan that is there already.
+    pub fn of_plan(plan: Plan) -> Engine {
         let kinds = (0..plan.species.len() as i32).collect();
-        Ok(Engine {
+        Engine {
             plan,
             kinds,
             search: CellSearch::default(),
@@ -99,7 +103,7 @@ impl Engine {
             counts: PassCounts::default(),
             owned: 0,
             ready: false,
-        })
+        }
     }
 
     /// The plan.

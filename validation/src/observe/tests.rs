@@ -115,17 +115,17 @@ fn errors_name_line_key_and_cause() {
     }
 }
 
-/// The reference is current; `PSIDPD_WRITE_DOCS=1` writes it anew.
+/// The reference is current; `PSIDPD_UPDATE_DOCS=1` writes it anew.
 #[test]
 fn the_reference_is_current() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/observables.md");
     let text = reference(&tables());
-    if std::env::var_os("PSIDPD_WRITE_DOCS").is_some() {
+    if std::env::var_os("PSIDPD_UPDATE_DOCS").is_some() {
         std::fs::write(&path, &text).unwrap();
     }
     assert!(
         std::fs::read_to_string(&path).is_ok_and(|t| t == text),
-        "PSIDPD_WRITE_DOCS=1 cargo test renews it"
+        "PSIDPD_UPDATE_DOCS=1 cargo test renews it"
     );
 }
 

@@ -47,9 +47,10 @@ impl Forces {
     /// # Errors
     /// As [`Plan::new`].
     pub fn with_pool(fluid: &Fluid, settings: Settings, pool: Arc<Pool>) -> Result<Forces, TooLarge> {
+        let plan = Plan::new(fluid)?;
         Ok(Forces {
-            engine: Engine::new(fluid)?,
-            sweep: Sweep::with_pool(fluid, settings, pool)?,
+            engine: Engine::of_plan(plan.clone()),
+            sweep: Sweep::of_plan(plan, settings, pool),
             images: Images::default(),
             all_densities: false,
             dimensions: fluid.dimensions,

@@ -10,10 +10,60 @@ use crate::model::kernel::Real;
 pub trait Arithmetic<I: Isa>: 'static {
     type Scalar: Scalar;
     type Reals: Reals<Scalar = Self::Scalar>;
-    type Record: Record;
+    type Record: Record<Scalar = Self::Scalar>;
 
     /// Fills `own` of the pairs of a block, and their `tag_i`, from its members; runs over by a vector.
-    unsafe fn spread(records: *const Self::Record, block: &mut Block<Self::Scalar>, moving: bool);
+    #[inline(always)]
+    unsafe fn spread(records: *const Self::Record, block: &mut Block<Self::Scalar>, moving: bool) {
+        // SAFETY: the contract of `simd`; the block has room for whole vectors.
+        unsafe {
+            let mut own = [std::ptr::null_mut(); 6];
+            let mut c = 0;
+            while c < 6 {
+                own[c] = block.own[c].as_mut_ptr();
+                c += 1;
+            }
+            let tag = block.tag_i.as_mut_ptr();
+            let (members, begin) = (block.members.as_ptr(), block.begin.as_ptr());
+            let mut p = 0;
+            let mut m = 0;
+            while m < block.members.len() {
+                let record = &*records.add(*members.add(m) as usize);
+                let end = *begin.add(m + 1) as usize;
+                let [x, y, z, u, v, w] = record.own();
+                let (x, y, z) = (Self::Reals::splat(x), Self::Reals::splat(y), Self::Reals::splat(z));
+                let (u, v, w) = (Self::Reals::splat(u), Self::Reals::splat(v), Self::Reals::splat(w));
+                let t = I::U32::splat(record.tag());
+                let mut k = p;
+                // Sixteen at once, which is mostly enough.
+                loop {
+                    let stop = k + 16;
+                    if moving {
+                        t.store(tag.add(k));
+                        if I::U32::LANES < 16 {
+                            t.store(tag.add(k + 8));
+                        }
+                    }
+                    while k < stop {
+                        x.store(own[0].add(k));
+                        y.store(own[1].add(k));
+                        z.store(own[2].add(k));
+                        if moving {
+                            u.store(own[3].add(k));
+                            v.store(own[4].add(k));
+                            w.store(own[5].add(k));
+                        }
+                        k += Self::Reals::LANES;
+                    }
+                    if k >= end {
+                        break;
+                    }
+                }
+                p = end;
+                m += 1;
+            }
+        }
+    }
 
     /// Fills `d`, `r` and `1/r` of the pairs of a block, and for the thermostat also their velocity along
     /// `ê` and their tags, for whole vectors up to `count`.
@@ -34,7 +84,11 @@ pub trait Arithmetic<I: Isa>: 'static {
 
 /// What is kept of a particle, in the order of cells.
 pub trait Record: Copy + Default + Send + Sync + 'static {
+    type Scalar;
     fn new(u: [u32; 3], x: &[f64; 3], v: &[f64; 3], tag: u32, species: u32) -> Self;
+    fn tag(&self) -> u32;
+    /// Position, in whatever bits it is kept, and velocity.
+    fn own(&self) -> [Self::Scalar; 6];
 }
 
 /// Position as fractions of the box in units of 2⁻³²: differences wrap by themselves.
@@ -48,9 +102,19 @@ pub struct MixedRecord {
 }
 
 impl Record for MixedRecord {
+    type Scalar = f32;
     #[inline(always)]
     fn new(u: [u32; 3], _: &[f64; 3], v: &[f64; 3], tag: u32, species: u32) -> MixedRecord {
         MixedRecord { u, tag, v: [v[0] as f32, v[1] as f32, v[2] as f32], species }
+    }
+    #[inline(always)]
+    fn tag(&self) -> u32 {
+        self.tag
+    }
+    #[inline(always)]
+    fn own(&self) -> [f32; 6] {
+        let [x, y, z] = self.u;
+        [f32::from_bits(x), f32::from_bits(y), f32::from_bits(z), self.v[0], self.v[1], self.v[2]]
     }
 }
 
@@ -66,9 +130,18 @@ pub struct DoubleRecord {
 }
 
 impl Record for DoubleRecord {
+    type Scalar = f64;
     #[inline(always)]
     fn new(_: [u32; 3], x: &[f64; 3], v: &[f64; 3], tag: u32, species: u32) -> DoubleRecord {
         DoubleRecord { x: *x, tag, species, v: *v, rest: 0.0 }
+    }
+    #[inline(always)]
+    fn tag(&self) -> u32 {
+        self.tag
+    }
+    #[inline(always)]
+    fn own(&self) -> [f64; 6] {
+        [self.x[0], self.x[1], self.x[2], self.v[0], self.v[1], self.v[2]]
     }
 }
 
@@ -87,55 +160,6 @@ impl<I: Isa> Arithmetic<I> for Mixed {
     type Scalar = f32;
     type Reals = I::F32;
     type Record = MixedRecord;
-
-    #[inline(always)]
-    unsafe fn spread(records: *const MixedRecord, block: &mut Block<f32>, moving: bool) {
-        // SAFETY: the contract of `simd`; the block has room for whole vectors.
-        unsafe {
-            let own: [*mut u32; 3] = [
-                block.own[0].as_mut_ptr().cast(),
-                block.own[1].as_mut_ptr().cast(),
-                block.own[2].as_mut_ptr().cast(),
-            ];
-            let velocity = [block.own[3].as_mut_ptr(), block.own[4].as_mut_ptr(), block.own[5].as_mut_ptr()];
-            let tag = block.tag_i.as_mut_ptr();
-            let (members, begin) = (block.members.as_ptr(), block.begin.as_ptr());
-            let lanes = I::U32::LANES;
-            let mut p = 0;
-            let mut m = 0;
-            while m < block.members.len() {
-                let record = &*records.add(*members.add(m) as usize);
-                let end = *begin.add(m + 1) as usize;
-                let [x, y, z] =
-                    [I::U32::splat(record.u[0]), I::U32::splat(record.u[1]), I::U32::splat(record.u[2])];
-                let t = I::U32::splat(record.tag);
-                let [u, v, w] =
-                    [I::F32::splat(record.v[0]), I::F32::splat(record.v[1]), I::F32::splat(record.v[2])];
-                let mut k = p;
-                // Sixteen at once, which is mostly enough.
-                loop {
-                    let stop = k + 16;
-                    while k < stop {
-                        x.store(own[0].add(k));
-                        y.store(own[1].add(k));
-                        z.store(own[2].add(k));
-                        if moving {
-                            t.store(tag.add(k));
-                            u.store(velocity[0].add(k));
-                            v.store(velocity[1].add(k));
-                            w.store(velocity[2].add(k));
-                        }
-                        k += lanes;
-                    }
-                    if k >= end {
-                        break;
-                    }
-                }
-                p = end;
-                m += 1;
-            }
-        }
-    }
 
     #[inline(always)]
     unsafe fn separate(
@@ -237,59 +261,6 @@ impl<I: Isa> Arithmetic<I> for Double {
     type Scalar = f64;
     type Reals = I::F64;
     type Record = DoubleRecord;
-
-    #[inline(always)]
-    unsafe fn spread(records: *const DoubleRecord, block: &mut Block<f64>, moving: bool) {
-        // SAFETY: the contract of `simd`; the block has room for whole vectors.
-        unsafe {
-            let mut own = [std::ptr::null_mut(); 6];
-            let mut c = 0;
-            while c < 6 {
-                own[c] = block.own[c].as_mut_ptr();
-                c += 1;
-            }
-            let tag = block.tag_i.as_mut_ptr();
-            let (members, begin) = (block.members.as_ptr(), block.begin.as_ptr());
-            let lanes = I::F64::LANES;
-            let mut p = 0;
-            let mut m = 0;
-            while m < block.members.len() {
-                let record = &*records.add(*members.add(m) as usize);
-                let end = *begin.add(m + 1) as usize;
-                let [x, y, z] =
-                    [I::F64::splat(record.x[0]), I::F64::splat(record.x[1]), I::F64::splat(record.x[2])];
-                let [u, v, w] =
-                    [I::F64::splat(record.v[0]), I::F64::splat(record.v[1]), I::F64::splat(record.v[2])];
-                let t = I::U32::splat(record.tag);
-                let mut k = p;
-                loop {
-                    let stop = k + 16;
-                    if moving {
-                        t.store(tag.add(k));
-                        if I::U32::LANES < 16 {
-                            t.store(tag.add(k + 8));
-                        }
-                    }
-                    while k < stop {
-                        x.store(own[0].add(k));
-                        y.store(own[1].add(k));
-                        z.store(own[2].add(k));
-                        if moving {
-                            u.store(own[3].add(k));
-                            v.store(own[4].add(k));
-                            w.store(own[5].add(k));
-                        }
-                        k += lanes;
-                    }
-                    if k >= end {
-                        break;
-                    }
-                }
-                p = end;
-                m += 1;
-            }
-        }
-    }
 
     #[inline(always)]
     unsafe fn separate(

@@ -1,6 +1,6 @@
 //! The pairs in hand: some hundred, in arrays that stay in the first-level cache.
 
-use super::layer::Chunk;
+use super::chunks::Chunk;
 use super::simd::Scalar;
 
 /// Pairs of a run of particles, in parallel arrays; `d = r_i − r_j`.

@@ -2,7 +2,8 @@
 
 use super::arithmetic::{Arithmetic, Double, DoubleRecord, Mixed, MixedRecord};
 use super::block::Block;
-use super::layer::{NearPairs, Swept, first_pass, second_pass};
+use super::layer::{Swept, first_pass};
+use super::many_body::{NearPairs, second_pass};
 use super::settings::Instructions;
 use super::simd::Portable;
 use crate::engine::tally::Tally;

@@ -2,9 +2,9 @@
 //! of cells.
 //!
 //! Every step the particles are sorted into rows of bins ([`grid`]), each layer of rows looks for pairs in
-//! half of its neighbourhood and evaluates them in blocks that stay in the first-level cache
-//! ([`layer`], [`evaluate`]); the pairs that a many-body density reaches are kept for a second pass, after
-//! ψ. There is no neighbour list: at the speed that DPD particles move, one lives a few steps and costs
+//! half of its neighbourhood ([`windows`], [`chunks`], [`look`]) and evaluates them in blocks that stay in the
+//! first-level cache ([`layer`], [`evaluate`], [`scatter`]); the pairs that a many-body density reaches are
+//! kept for a second pass, after ψ ([`many_body`]). There is no neighbour list: at the speed that DPD particles move, one lives a few steps and costs
 //! more than it saves.
 //!
 //! [`simd`] has the vectors of each instruction set, [`arithmetic`] the two precisions, [`compiled`]
@@ -13,16 +13,21 @@
 
 mod arithmetic;
 mod block;
+mod chunks;
 mod compiled;
 mod evaluate;
 mod frame;
 mod grid;
 mod layer;
+mod look;
 mod machine;
+mod many_body;
 mod pool;
+mod scatter;
 mod settings;
 mod simd;
 mod terms;
+mod windows;
 
 pub use pool::{Pool, part};
 pub use settings::{Instructions, Precision, Settings};
@@ -129,19 +134,11 @@ impl Sweep {
     /// # Errors
     /// As [`Plan::new`].
     pub fn new(fluid: &Fluid, settings: Settings) -> Result<Sweep, TooLarge> {
-        let pool = Arc::new(Pool::new(settings.threads));
-        Sweep::with_pool(fluid, settings, pool)
+        Ok(Sweep::of_plan(Plan::new(fluid)?, settings, Arc::new(Pool::new(settings.threads))))
     }
 
-    /// The same with threads that others use too.
-    ///
-    /// # Errors
-    /// As [`Plan::new`].
-    pub fn with_pool(fluid: &Fluid, settings: Settings, pool: Arc<Pool>) -> Result<Sweep, TooLarge> {
-        Ok(Sweep::of_plan(Plan::new(fluid)?, settings, pool))
-    }
-
-    fn of_plan(plan: Plan, mut settings: Settings, pool: Arc<Pool>) -> Sweep {
+    /// The engine of a plan that is there already, with threads that others may use too.
+    pub fn of_plan(plan: Plan, mut settings: Settings, pool: Arc<Pool>) -> Sweep {
         if !settings.instructions.available() {
             settings.instructions = Instructions::best();
         }

@@ -1,0 +1,197 @@
+//! Where a particle looks for others: in which rows, and there from which bin to which.
+
+use super::arithmetic::Record;
+use super::frame::Frame;
+use super::grid::Grid;
+use super::layer::Swept;
+use super::simd::{Isa, Reals, Scalar};
+use crate::model::kernel::Real;
+
+/// The rows around one: itself, the next of its layer, three of the next layer.
+pub struct Windows {
+    /// Where the first particles of the bins of each are.
+    pub row: [*const u32; 5],
+    /// 1 for rows that are there, 0 for others.
+    pub there: [f32; 5],
+    /// Added to the number of a particle: copies of the first layer are behind the last.
+    pub behind: [u32; 5],
+    /// Taken from the position of a particle that looks into each, in the period before, the same, and the
+    /// next: entry `w + 5 (wrap + 1)` of x, y and z.
+    pub shift: [[f32; 16]; 3],
+    /// Whether any shift of the same period is not zero.
+    pub crosses: bool,
+    /// The first owned particle of each, and one past the last.
+    pub owned: [[u32; 2]; 5],
+}
+
+impl Windows {
+    pub fn new(swept: &Swept<impl Scalar, impl Record>, layer: usize, row: usize) -> Windows {
+        let (frame, grid) = (swept.frame, swept.grid);
+        let own = &swept.start[(layer * grid.rows + row) * grid.bins..];
+        let mut windows = Windows {
+            row: [own.as_ptr(); 5],
+            there: [0.0; 5],
+            behind: [0; 5],
+            shift: [[0.0; 16]; 3],
+            crosses: false,
+            owned: [[0; 2]; 5],
+        };
+        let around = [(0, 0), (1, 0), (-1, 1), (0, 1), (1, 1)];
+        for (w, (across, up)) in around.into_iter().enumerate() {
+            let mut to = [row as i64 + across, layer as i64 + up];
+            let mut shift = [0.0; 3];
+            let mut there = true;
+            let mut behind = 0;
+            if to[0] < 0 || to[0] >= grid.rows as i64 {
+                // In two dimensions a layer is one row, and has none beside it.
+                there = frame.periodic[grid.row_axis] && frame.dimensions == 3;
+                let wrap = to[0].div_euclid(grid.rows as i64) as f64;
+                to[0] = to[0].rem_euclid(grid.rows as i64);
+                shift = frame.edge(grid.row_axis).map(|e| wrap * e);
+            }
+            if to[1] >= grid.layers as i64 {
+                there &= frame.periodic[grid.layer_axis];
+                to[1] = 0;
+                behind = swept.particles as u32;
+            }
+            if !there {
+                continue;
+            }
+            windows.there[w] = 1.0;
+            windows.behind[w] = behind;
+            windows.crosses |= shift != [0.0; 3];
+            let cell = (to[1] as usize * grid.rows + to[0] as usize) * grid.bins;
+            windows.row[w] = swept.start[cell..].as_ptr();
+            if let Some(owned) = swept.owned_of_row.get(cell / grid.bins) {
+                windows.owned[w] = *owned;
+            }
+            for (period, entry) in [(-1.0, w), (0.0, w + 5), (1.0, w + 10)] {
+                for c in 0..3 {
+                    let along = if c == 0 { period * frame.length[0] } else { 0.0 };
+                    windows.shift[c][entry] = (shift[c] + along) as f32;
+                }
+            }
+        }
+        windows
+    }
+}
+
+/// The bins, from the first to one past the last, in which particles of a vector look for others, for each
+/// window.
+#[derive(Default)]
+pub struct Spans {
+    pub low: [[i32; 16]; 5],
+    pub end: [[i32; 16]; 5],
+    /// Before they were cut at the ends of the row, and one row on.
+    pub far_low: [[i32; 16]; 5],
+    pub far_end: [[i32; 16]; 5],
+}
+
+/// A layer, in the numbers that spans are made of.
+pub struct View {
+    pub reach_squared: f32,
+    pub row_width: f32,
+    pub layer_edge: f32,
+    /// Half the window of the row of the particle itself, in bins.
+    pub half: f32,
+    pub per_bin: f32,
+    pub periodic: bool,
+    pub tilted: bool,
+    pub bins: i32,
+}
+
+impl View {
+    #[inline(always)]
+    pub fn new(frame: &Frame, grid: &Grid, layer: usize) -> View {
+        let layer_width = frame.height(grid.layer_axis) / grid.layers as f64;
+        View {
+            reach_squared: (grid.reach * grid.reach) as f32,
+            row_width: (frame.height(grid.row_axis) / grid.rows as f64) as f32,
+            layer_edge: ((layer + 1) as f64 * layer_width) as f32,
+            half: (grid.window * grid.bins as f64) as f32,
+            per_bin: (grid.bins as f64 / frame.length[0]) as f32,
+            periodic: frame.periodic[0],
+            tilted: frame.is_tilted(),
+            bins: grid.bins as i32,
+        }
+    }
+
+    /// The spans of the particles from `i` on, a vector of them; they end at the ends of the row, except for
+    /// particles of which bits are set in what is returned, whose spans go on in other periods.
+    #[inline(always)]
+    pub unsafe fn spans<I: Isa>(
+        &self,
+        swept: &Swept<impl Scalar, impl Record>,
+        row: usize,
+        i: usize,
+        count: usize,
+        there: &[f32; 5],
+        out: &mut Spans,
+    ) -> u32 {
+        // SAFETY: the contract of `simd`.
+        unsafe {
+            let x = I::F32::load(swept.x[0].as_ptr().add(i));
+            let y = I::F32::load(swept.x[1].as_ptr().add(i));
+            let z = I::F32::load(swept.x[2].as_ptr().add(i));
+            let zero = I::F32::constant(0.0);
+            let whole = I::F32::splat(self.half);
+            let mut half = [whole; 5];
+            let mut bin = x * I::F32::splat(self.per_bin);
+            if self.tilted {
+                bin = fraction_along::<I>(swept.frame, x, y, z) * I::F32::constant(self.bins as f64);
+            } else {
+                // Half the chord of the sphere of reach in each row.
+                let (across, up) = if swept.grid.row_axis == 1 { (y, z) } else { (z, y) };
+                let low_edge = I::F32::splat(row as f32 * self.row_width);
+                let high_edge = I::F32::splat((row + 1) as f32 * self.row_width);
+                let below = (across - low_edge).larger(zero);
+                let above = (high_edge - across).larger(zero);
+                let over = (I::F32::splat(self.layer_edge) - up).larger(zero);
+                let (below, above) = (below * below, above * above);
+                let all = I::F32::splat(self.reach_squared);
+                let left = all - over * over;
+                let per_bin = I::F32::splat(self.per_bin);
+                half[1] = (all - above).larger(zero).root() * per_bin;
+                half[2] = (left - below).larger(zero).root() * per_bin;
+                half[3] = left.larger(zero).root() * per_bin;
+                half[4] = (left - above).larger(zero).root() * per_bin;
+            }
+            let most = I::F32::constant(self.bins as f64);
+            let one = I::F32::constant(1.0);
+            let mut across = 0;
+            if self.periodic {
+                // The longest span is that of the particle's own row.
+                across = (bin - half[0]).mask_below(zero) | (most - one).mask_below(bin + half[0]);
+                across &= (1u32 << count) - 1;
+            }
+            let mut w = 0;
+            while w < 5 {
+                let h = *half.get_unchecked(w) * I::F32::splat(*there.get_unchecked(w));
+                let (low, end) = (out.low.get_unchecked_mut(w), out.end.get_unchecked_mut(w));
+                if across != 0 {
+                    // One row on, so that truncation rounds down.
+                    (bin + most - h).store_whole(out.far_low.get_unchecked_mut(w).as_mut_ptr());
+                    (bin + most + h + one).store_whole(out.far_end.get_unchecked_mut(w).as_mut_ptr());
+                }
+                (bin - h).larger(zero).smaller(most).store_whole(low.as_mut_ptr());
+                // Rows out of reach, or not there, get a span without length.
+                (bin + h + one).smaller(most).where_below(zero, h).store_whole(end.as_mut_ptr());
+                w += 1;
+            }
+            across
+        }
+    }
+}
+
+/// Fractional coordinates along the first edge.
+#[inline(always)]
+pub unsafe fn fraction_along<I: Isa>(frame: &Frame, x: I::F32, y: I::F32, z: I::F32) -> I::F32 {
+    let sz = if frame.dimensions == 3 {
+        z * I::F32::constant(1.0 / frame.length[2])
+    } else {
+        I::F32::constant(0.0)
+    };
+    let sy = (y - I::F32::constant(frame.tilt[2]) * sz) * I::F32::constant(1.0 / frame.length[1]);
+    let along = x - I::F32::constant(frame.tilt[0]) * sy - I::F32::constant(frame.tilt[1]) * sz;
+    along * I::F32::constant(1.0 / frame.length[0])
+}
