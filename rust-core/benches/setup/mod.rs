@@ -103,6 +103,16 @@ impl Cloud {
         }
     }
 
+    /// Gives the particles what a step's forces do.
+    #[allow(dead_code)] // Not every user of this module moves particles so.
+    pub fn kick(&mut self) {
+        for (v, f) in self.v.iter_mut().zip(&self.force) {
+            for c in 0..3 {
+                v[c] += self.step.dt * f[c];
+            }
+        }
+    }
+
     /// One evaluation of all forces, noise among them.
     pub fn evaluate(&mut self, sweep: &mut Sweep) {
         self.step.number += 1;

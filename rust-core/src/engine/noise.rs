@@ -32,7 +32,7 @@ pub fn threefry2x32<const ROUNDS: usize>(counter: [u32; 2], key: [u32; 2]) -> [u
 }
 
 /// The noise of one step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct PairNoise {
     key: [u32; 2],
 }

@@ -1,9 +1,32 @@
 //! Mixed and double precision: what is kept of a particle, and how a pair's distance comes from it.
 
-use super::block::Block;
 use super::frame::Frame;
-use super::simd::{Isa, Quad, Reals, Scalar, Words};
+use super::simd::{Isa, Reals, Scalar, Words};
 use crate::model::kernel::Real;
+
+/// A vector's worth of particles, column by column: the first particle of a pair picks its own of each.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(C, align(64))]
+pub struct Own<T> {
+    /// As the record has it.
+    pub position: [[T; 16]; 3],
+    pub velocity: [[T; 16]; 3],
+    pub tag: [u32; 16],
+    pub species: [u32; 16],
+}
+
+/// How a vector of pairs lies and moves; `d = r_i − r_j`.
+#[derive(Clone, Copy)]
+pub struct Apart<R: Reals> {
+    pub d: [R; 3],
+    pub r: R,
+    pub inverse: R,
+    /// `ê·v_ij`, for the thermostat.
+    pub along: R,
+    /// Of both particles, for the thermostat.
+    pub tags: [R::Words; 2],
+    pub species_j: R::Words,
+}
 
 /// A choice of precision on an instruction set.
 #[allow(clippy::missing_safety_doc)] // The contract of `simd`.
@@ -11,74 +34,24 @@ pub trait Arithmetic<I: Isa>: 'static {
     type Scalar: Scalar;
     type Reals: Reals<Scalar = Self::Scalar>;
     type Record: Record<Scalar = Self::Scalar>;
+    /// What distances are measured with.
+    type Metric: Copy;
 
-    /// Fills `own` of the pairs of a block, and their `tag_i`, from its members; runs over by a vector.
-    #[inline(always)]
-    unsafe fn spread(records: *const Self::Record, block: &mut Block<Self::Scalar>, moving: bool) {
-        // SAFETY: the contract of `simd`; the block has room for whole vectors.
-        unsafe {
-            let mut own = [std::ptr::null_mut(); 6];
-            let mut c = 0;
-            while c < 6 {
-                own[c] = block.own[c].as_mut_ptr();
-                c += 1;
-            }
-            let tag = block.tag_i.as_mut_ptr();
-            let (members, begin) = (block.members.as_ptr(), block.begin.as_ptr());
-            let mut p = 0;
-            let mut m = 0;
-            while m < block.members.len() {
-                let record = &*records.add(*members.add(m) as usize);
-                let end = *begin.add(m + 1) as usize;
-                let [x, y, z, u, v, w] = record.own();
-                let (x, y, z) = (Self::Reals::splat(x), Self::Reals::splat(y), Self::Reals::splat(z));
-                let (u, v, w) = (Self::Reals::splat(u), Self::Reals::splat(v), Self::Reals::splat(w));
-                let t = I::U32::splat(record.tag());
-                let mut k = p;
-                // Sixteen at once, which is mostly enough.
-                loop {
-                    let stop = k + 16;
-                    if moving {
-                        t.store(tag.add(k));
-                        if I::U32::LANES < 16 {
-                            t.store(tag.add(k + 8));
-                        }
-                    }
-                    while k < stop {
-                        x.store(own[0].add(k));
-                        y.store(own[1].add(k));
-                        z.store(own[2].add(k));
-                        if moving {
-                            u.store(own[3].add(k));
-                            v.store(own[4].add(k));
-                            w.store(own[5].add(k));
-                        }
-                        k += Self::Reals::LANES;
-                    }
-                    if k >= end {
-                        break;
-                    }
-                }
-                p = end;
-                m += 1;
-            }
-        }
-    }
+    unsafe fn metric(frame: &Frame) -> Self::Metric;
 
-    /// Fills `d`, `r` and `1/r` of the pairs of a block, and for the thermostat also their velocity along
-    /// `ê` and their tags, for whole vectors up to `count`.
+    /// The columns of the particles `index`, as many as a vector has lanes.
+    unsafe fn own(records: *const Self::Record, index: *const u32, own: &mut Own<Self::Scalar>);
+
+    /// Pairs of particles of `own` with others: `which`, and `index` of the records.
     unsafe fn separate(
-        frame: &Frame,
+        metric: &Self::Metric,
         records: *const Self::Record,
-        block: &mut Block<Self::Scalar>,
-        count: usize,
+        own: *const Own<Self::Scalar>,
+        which: <Self::Reals as Reals>::Words,
+        index: *const u32,
         moving: bool,
-    );
+    ) -> Apart<Self::Reals>;
 
-    /// Indices as numbers of the fourth column of rows; whole vectors.
-    unsafe fn encode_all(index: *const u32, out: *mut Self::Scalar, count: usize);
-    /// The index that a number stands for.
-    fn decode(number: Self::Scalar) -> u32;
     unsafe fn load_quad(p: *const Self::Scalar) -> I::Quad;
 }
 
@@ -86,9 +59,6 @@ pub trait Arithmetic<I: Isa>: 'static {
 pub trait Record: Copy + Default + Send + Sync + 'static {
     type Scalar;
     fn new(u: [u32; 3], x: &[f64; 3], v: &[f64; 3], tag: u32, species: u32) -> Self;
-    fn tag(&self) -> u32;
-    /// Position, in whatever bits it is kept, and velocity.
-    fn own(&self) -> [Self::Scalar; 6];
 }
 
 /// Position as fractions of the box in units of 2⁻³²: differences wrap by themselves.
@@ -106,15 +76,6 @@ impl Record for MixedRecord {
     #[inline(always)]
     fn new(u: [u32; 3], _: &[f64; 3], v: &[f64; 3], tag: u32, species: u32) -> MixedRecord {
         MixedRecord { u, tag, v: [v[0] as f32, v[1] as f32, v[2] as f32], species }
-    }
-    #[inline(always)]
-    fn tag(&self) -> u32 {
-        self.tag
-    }
-    #[inline(always)]
-    fn own(&self) -> [f32; 6] {
-        let [x, y, z] = self.u;
-        [f32::from_bits(x), f32::from_bits(y), f32::from_bits(z), self.v[0], self.v[1], self.v[2]]
     }
 }
 
@@ -135,14 +96,6 @@ impl Record for DoubleRecord {
     fn new(_: [u32; 3], x: &[f64; 3], v: &[f64; 3], tag: u32, species: u32) -> DoubleRecord {
         DoubleRecord { x: *x, tag, species, v: *v, rest: 0.0 }
     }
-    #[inline(always)]
-    fn tag(&self) -> u32 {
-        self.tag
-    }
-    #[inline(always)]
-    fn own(&self) -> [f64; 6] {
-        [self.x[0], self.x[1], self.x[2], self.v[0], self.v[1], self.v[2]]
-    }
 }
 
 /// Pairs in single precision.
@@ -156,216 +109,214 @@ const TINY: f64 = 1e-30;
 
 const TWO_TO_32: f64 = 4_294_967_296.0;
 
+/// Lengths of the frame, and how it leans, over 2³².
+#[derive(Clone, Copy)]
+pub struct MixedMetric<R> {
+    scale: [R; 3],
+    lean: [R; 3],
+    tilted: bool,
+}
+
 impl<I: Isa> Arithmetic<I> for Mixed {
     type Scalar = f32;
     type Reals = I::F32;
     type Record = MixedRecord;
+    type Metric = MixedMetric<I::F32>;
+
+    #[inline(always)]
+    unsafe fn metric(frame: &Frame) -> Self::Metric {
+        let per_unit = |l: f64| I::F32::constant(l / TWO_TO_32);
+        let ([a, b, c], [d, e, f]) = (frame.length, frame.tilt);
+        MixedMetric {
+            scale: [per_unit(a), per_unit(b), per_unit(c)],
+            lean: [per_unit(d), per_unit(e), per_unit(f)],
+            tilted: frame.is_tilted(),
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn own(records: *const MixedRecord, index: *const u32, own: &mut Own<f32>) {
+        // SAFETY: the contract of `simd`.
+        unsafe {
+            let base: *const u8 = records.cast();
+            let stride = size_of::<MixedRecord>();
+            let [x, y, z, tag] = <I::F32 as Reals>::Words::columns(base, stride, index);
+            x.store(own.position[0].as_mut_ptr().cast());
+            y.store(own.position[1].as_mut_ptr().cast());
+            z.store(own.position[2].as_mut_ptr().cast());
+            tag.store(own.tag.as_mut_ptr());
+            let [u, v, w, species] = <I::F32 as Reals>::Words::columns(base.add(16), stride, index);
+            u.store(own.velocity[0].as_mut_ptr().cast());
+            v.store(own.velocity[1].as_mut_ptr().cast());
+            w.store(own.velocity[2].as_mut_ptr().cast());
+            species.store(own.species.as_mut_ptr());
+        }
+    }
 
     #[inline(always)]
     unsafe fn separate(
-        frame: &Frame,
+        metric: &Self::Metric,
         records: *const MixedRecord,
-        block: &mut Block<f32>,
-        count: usize,
+        own: *const Own<f32>,
+        which: <I::F32 as Reals>::Words,
+        index: *const u32,
         moving: bool,
-    ) {
-        // SAFETY: the contract of `simd`; the block has room for whole vectors.
+    ) -> Apart<I::F32> {
+        type W<I> = <<I as Isa>::F32 as Reals>::Words;
+        // SAFETY: the contract of `simd`.
         unsafe {
-            let stride = size_of::<MixedRecord>();
+            let own = &*own;
             let base: *const u8 = records.cast();
-            let scale = per_unit(frame.length);
-            let lean = per_unit(frame.tilt);
-            let (sx, sy, sz) = (I::F32::splat(scale[0]), I::F32::splat(scale[1]), I::F32::splat(scale[2]));
-            let (xy, xz, yz) = (I::F32::splat(lean[0]), I::F32::splat(lean[1]), I::F32::splat(lean[2]));
-            let tilted = frame.is_tilted();
-            let tiny = I::F32::splat(TINY as f32);
-            let mut own = [std::ptr::null(); 6];
-            let mut c = 0;
-            while c < 6 {
-                own[c] = block.own[c].as_ptr();
-                c += 1;
+            let stride = size_of::<MixedRecord>();
+            let [sx, sy, sz] = metric.scale;
+            let [xj, yj, zj, tag_j] = W::<I>::columns(base, stride, index);
+            let xi = W::<I>::pick(own.position[0].as_ptr().cast(), which);
+            let yi = W::<I>::pick(own.position[1].as_ptr().cast(), which);
+            let zi = W::<I>::pick(own.position[2].as_ptr().cast(), which);
+            let a = I::F32::of_signed(xi.sub(xj));
+            let b = I::F32::of_signed(yi.sub(yj));
+            let c = I::F32::of_signed(zi.sub(zj));
+            let (mut dx, mut dy, dz) = (a * sx, b * sy, c * sz);
+            if metric.tilted {
+                let [xy, xz, yz] = metric.lean;
+                dx = b.mul_add(xy, c.mul_add(xz, dx));
+                dy = c.mul_add(yz, dy);
             }
-            let p_j = block.j.as_ptr();
-            let p_d0 = block.d[0].as_mut_ptr();
-            let p_d1 = block.d[1].as_mut_ptr();
-            let p_d2 = block.d[2].as_mut_ptr();
-            let p_r = block.r.as_mut_ptr();
-            let p_inverse = block.inverse.as_mut_ptr();
-            let p_tag_j = block.tag_j.as_mut_ptr();
-            let p_along = block.along.as_mut_ptr();
-            let mut k = 0;
-            while k < count {
-                let pj = p_j.add(k);
-                let xi = I::U32::load(own[0].add(k).cast());
-                let yi = I::U32::load(own[1].add(k).cast());
-                let zi = I::U32::load(own[2].add(k).cast());
-                let [xj, yj, zj, tj] = I::word_columns(base, stride, pj);
-                let (a, b, c) = (I::signed(xi.sub(xj)), I::signed(yi.sub(yj)), I::signed(zi.sub(zj)));
-                let (mut dx, mut dy, dz) = (a * sx, b * sy, c * sz);
-                if tilted {
-                    dx = b.mul_add(xy, c.mul_add(xz, dx));
-                    dy = c.mul_add(yz, dy);
-                }
-                let r2 = dx.mul_add(dx, dy.mul_add(dy, dz * dz)).larger(tiny);
-                let inverse = r2.inverse_root();
-                dx.store(p_d0.add(k));
-                dy.store(p_d1.add(k));
-                dz.store(p_d2.add(k));
-                (r2 * inverse).store(p_r.add(k));
-                inverse.store(p_inverse.add(k));
-                if moving {
-                    tj.store(p_tag_j.add(k));
-                    let ui = I::F32::load(own[3].add(k));
-                    let vi = I::F32::load(own[4].add(k));
-                    let wi = I::F32::load(own[5].add(k));
-                    let [uj, vj, wj, _] = I::F32::columns(base.add(16), stride, pj);
-                    let along = (ui - uj).mul_add(dx, (vi - vj).mul_add(dy, (wi - wj) * dz));
-                    (along * inverse).store(p_along.add(k));
-                }
-                k += <I::F32 as Reals>::LANES;
+            let tiny = I::F32::constant(TINY);
+            let r2 = dx.mul_add(dx, dy.mul_add(dy, dz * dz)).larger(tiny);
+            let inverse = r2.inverse_root();
+            let [uj, vj, wj, species_j] = I::F32::columns(base.add(16), stride, index);
+            let mut along = inverse;
+            if moving {
+                let ui = I::F32::pick(own.velocity[0].as_ptr(), which);
+                let vi = I::F32::pick(own.velocity[1].as_ptr(), which);
+                let wi = I::F32::pick(own.velocity[2].as_ptr(), which);
+                let sum = (ui - uj).mul_add(dx, (vi - vj).mul_add(dy, (wi - wj) * dz));
+                along = sum * inverse;
+            }
+            let tag_i = W::<I>::pick(own.tag.as_ptr(), which);
+            Apart {
+                d: [dx, dy, dz],
+                r: r2 * inverse,
+                inverse,
+                along,
+                tags: [tag_i, tag_j],
+                species_j: I::bits(species_j),
             }
         }
     }
 
-    // Bits of a number of ordinary size, for indices below 2²⁹.
-    #[inline(always)]
-    unsafe fn encode_all(index: *const u32, out: *mut f32, count: usize) {
-        // SAFETY: the contract of `simd`.
-        unsafe {
-            let ordinary = I::U32::splat(0x4000_0000);
-            let mut k = 0;
-            while k < count {
-                I::U32::load(index.add(k)).add(ordinary).store(out.add(k).cast());
-                k += I::U32::LANES;
-            }
-        }
-    }
-    #[inline(always)]
-    fn decode(number: f32) -> u32 {
-        number.to_bits() - 0x4000_0000
-    }
     #[inline(always)]
     unsafe fn load_quad(p: *const f32) -> I::Quad {
         // SAFETY: the contract of `simd`.
-        unsafe { I::Quad::load_f32(p) }
+        unsafe { <I::Quad as super::simd::Quad>::load_f32(p) }
     }
 }
 
-/// Lengths over 2³².
-#[inline(always)]
-fn per_unit(l: [f64; 3]) -> [f32; 3] {
-    [(l[0] / TWO_TO_32) as f32, (l[1] / TWO_TO_32) as f32, (l[2] / TWO_TO_32) as f32]
+/// Lengths of the frame, one over those along periods (zero along others), and how it leans.
+#[derive(Clone, Copy)]
+pub struct DoubleMetric<R> {
+    length: [R; 3],
+    inverse: [R; 3],
+    lean: [R; 3],
+    tilted: bool,
+    /// 1, and 0 along the direction that two dimensions do not have.
+    flat: R,
 }
 
 impl<I: Isa> Arithmetic<I> for Double {
     type Scalar = f64;
     type Reals = I::F64;
     type Record = DoubleRecord;
+    type Metric = DoubleMetric<I::F64>;
+
+    #[inline(always)]
+    unsafe fn metric(frame: &Frame) -> Self::Metric {
+        let inverse = |k: usize| I::F64::constant(if frame.periodic[k] { 1.0 / frame.length[k] } else { 0.0 });
+        let constant = |x: f64| I::F64::constant(x);
+        let ([a, b, c], [d, e, f]) = (frame.length, frame.tilt);
+        DoubleMetric {
+            length: [constant(a), constant(b), constant(c)],
+            inverse: [inverse(0), inverse(1), inverse(2)],
+            lean: [constant(d), constant(e), constant(f)],
+            tilted: frame.is_tilted(),
+            flat: constant(if frame.dimensions == 3 { 1.0 } else { 0.0 }),
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn own(records: *const DoubleRecord, index: *const u32, own: &mut Own<f64>) {
+        // SAFETY: the contract of `simd`.
+        unsafe {
+            let base: *const u8 = records.cast();
+            let stride = size_of::<DoubleRecord>();
+            let [x, y, z, bits] = I::F64::columns(base, stride, index);
+            x.store(own.position[0].as_mut_ptr());
+            y.store(own.position[1].as_mut_ptr());
+            z.store(own.position[2].as_mut_ptr());
+            let [tag, species] = I::halves(bits);
+            tag.store(own.tag.as_mut_ptr());
+            species.store(own.species.as_mut_ptr());
+            let [u, v, w, _] = I::F64::columns(base.add(32), stride, index);
+            u.store(own.velocity[0].as_mut_ptr());
+            v.store(own.velocity[1].as_mut_ptr());
+            w.store(own.velocity[2].as_mut_ptr());
+        }
+    }
 
     #[inline(always)]
     unsafe fn separate(
-        frame: &Frame,
+        metric: &Self::Metric,
         records: *const DoubleRecord,
-        block: &mut Block<f64>,
-        count: usize,
+        own: *const Own<f64>,
+        which: <I::F64 as Reals>::Words,
+        index: *const u32,
         moving: bool,
-    ) {
-        // SAFETY: the contract of `simd`; the block has room for whole vectors.
+    ) -> Apart<I::F64> {
+        // SAFETY: the contract of `simd`.
         unsafe {
-            let stride = size_of::<DoubleRecord>();
+            let own = &*own;
             let base: *const u8 = records.cast();
-            let mut inverse_length = [0.0; 3];
-            for c in 0..3 {
-                if frame.periodic[c] {
-                    inverse_length[c] = 1.0 / frame.length[c];
-                }
+            let stride = size_of::<DoubleRecord>();
+            let ([lx, ly, lz], [ix, iy, iz], [xy, xz, yz]) = (metric.length, metric.inverse, metric.lean);
+            let [xj, yj, zj, bits] = I::F64::columns(base, stride, index);
+            let xi = I::F64::pick(own.position[0].as_ptr(), which);
+            let yi = I::F64::pick(own.position[1].as_ptr(), which);
+            let zi = I::F64::pick(own.position[2].as_ptr(), which);
+            let (mut dx, mut dy, mut dz) = (xi - xj, yi - yj, (zi - zj) * metric.flat);
+            let boxes = (dz * iz).round();
+            dz = dz - boxes * lz;
+            if metric.tilted {
+                dx = dx - boxes * xz;
+                dy = dy - boxes * yz;
             }
-            let l = frame.length;
-            let (lx, ly, lz) = (I::F64::splat(l[0]), I::F64::splat(l[1]), I::F64::splat(l[2]));
-            let ix = I::F64::splat(inverse_length[0]);
-            let iy = I::F64::splat(inverse_length[1]);
-            let iz = I::F64::splat(inverse_length[2]);
-            let t = frame.tilt;
-            let (xy, xz, yz) = (I::F64::splat(t[0]), I::F64::splat(t[1]), I::F64::splat(t[2]));
-            let tilted = frame.is_tilted();
-            let flat = if frame.dimensions == 3 { I::F64::splat(1.0) } else { I::F64::splat(0.0) };
-            let tiny = I::F64::splat(TINY);
-            let mut own = [std::ptr::null(); 6];
-            let mut c = 0;
-            while c < 6 {
-                own[c] = block.own[c].as_ptr();
-                c += 1;
+            let boxes = (dy * iy).round();
+            dy = dy - boxes * ly;
+            if metric.tilted {
+                dx = dx - boxes * xy;
             }
-            let p_j = block.j.as_ptr();
-            let p_d0 = block.d[0].as_mut_ptr();
-            let p_d1 = block.d[1].as_mut_ptr();
-            let p_d2 = block.d[2].as_mut_ptr();
-            let p_r = block.r.as_mut_ptr();
-            let p_inverse = block.inverse.as_mut_ptr();
-            let p_along = block.along.as_mut_ptr();
-            let mut k = 0;
-            while k < count {
-                let pj = p_j.add(k);
-                let xi = I::F64::load(own[0].add(k));
-                let yi = I::F64::load(own[1].add(k));
-                let zi = I::F64::load(own[2].add(k));
-                let [xj, yj, zj, _] = I::F64::columns(base, stride, pj);
-                let (mut dx, mut dy, mut dz) = (xi - xj, yi - yj, (zi - zj) * flat);
-                let boxes = (dz * iz).round();
-                dz = dz - boxes * lz;
-                if tilted {
-                    dx = dx - boxes * xz;
-                    dy = dy - boxes * yz;
-                }
-                let boxes = (dy * iy).round();
-                dy = dy - boxes * ly;
-                if tilted {
-                    dx = dx - boxes * xy;
-                }
-                dx = dx - (dx * ix).round() * lx;
-                let r2 = dx.mul_add(dx, dy.mul_add(dy, dz * dz)).larger(tiny);
-                let inverse = r2.inverse_root();
-                dx.store(p_d0.add(k));
-                dy.store(p_d1.add(k));
-                dz.store(p_d2.add(k));
-                (r2 * inverse).store(p_r.add(k));
-                inverse.store(p_inverse.add(k));
-                if moving {
-                    let ui = I::F64::load(own[3].add(k));
-                    let vi = I::F64::load(own[4].add(k));
-                    let wi = I::F64::load(own[5].add(k));
-                    let [uj, vj, wj, _] = I::F64::columns(base.add(32), stride, pj);
-                    let along = (ui - uj).mul_add(dx, (vi - vj).mul_add(dy, (wi - wj) * dz));
-                    (along * inverse).store(p_along.add(k));
-                }
-                k += <I::F64 as Reals>::LANES;
-            }
+            dx = dx - (dx * ix).round() * lx;
+            let tiny = I::F64::constant(TINY);
+            let r2 = dx.mul_add(dx, dy.mul_add(dy, dz * dz)).larger(tiny);
+            let inverse = r2.inverse_root();
+            let mut along = inverse;
             if moving {
-                for k in 0..count {
-                    *block.tag_j.get_unchecked_mut(k) = (*records.add(block.j[k] as usize)).tag;
-                }
+                let [uj, vj, wj, _] = I::F64::columns(base.add(32), stride, index);
+                let ui = I::F64::pick(own.velocity[0].as_ptr(), which);
+                let vi = I::F64::pick(own.velocity[1].as_ptr(), which);
+                let wi = I::F64::pick(own.velocity[2].as_ptr(), which);
+                let sum = (ui - uj).mul_add(dx, (vi - vj).mul_add(dy, (wi - wj) * dz));
+                along = sum * inverse;
             }
+            let [tag_j, species_j] = I::halves(bits);
+            let tag_i = <I::F64 as Reals>::Words::pick(own.tag.as_ptr(), which);
+            Apart { d: [dx, dy, dz], r: r2 * inverse, inverse, along, tags: [tag_i, tag_j], species_j }
         }
     }
 
     #[inline(always)]
-    unsafe fn encode_all(index: *const u32, out: *mut f64, count: usize) {
-        // SAFETY: the contract of `simd`.
-        unsafe {
-            let mut k = 0;
-            while k < count {
-                *out.add(k) = f64::from_bits(0x3ff0_0000_0000_0000 | *index.add(k) as u64);
-                k += 1;
-            }
-        }
-    }
-    #[inline(always)]
-    fn decode(number: f64) -> u32 {
-        number.to_bits() as u32
-    }
-    #[inline(always)]
     unsafe fn load_quad(p: *const f64) -> I::Quad {
         // SAFETY: the contract of `simd`.
-        unsafe { I::Quad::load(p) }
+        unsafe { <I::Quad as super::simd::Quad>::load(p) }
     }
 }

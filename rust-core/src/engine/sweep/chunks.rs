@@ -1,224 +1,214 @@
-//! Spans of bins as chunks, a vector's worth of particles each.
+//! Spans of bins as chunks of sixteen particles, each to be compared with two.
 
 use super::arithmetic::Record;
 use super::block::Block;
 use super::layer::Swept;
-use super::simd::{Isa, Reals, Scalar};
+use super::simd::Scalar;
 use super::windows::{Spans, View, Windows};
 
-/// A vector's worth of particles that one particle is to be compared with: from the first to one past the last
-/// of them, of which those beyond a vector are in the next chunk.
+/// Sixteen particles that two others are to be compared with.
 #[derive(Debug, Clone, Copy, Default)]
 #[repr(C)]
 pub struct Chunk {
     pub from: u32,
-    pub to: u32,
-    /// The particle's number in the block, and the shift it sees them with.
-    pub member: u32,
+    /// Which of them: bits from 0 on for the first of the two, from 16 on for the second.
+    pub allowed: u32,
+    /// The number of the two in the group.
+    pub two: u32,
+    /// The shift they are seen with.
     pub shift: u32,
 }
 
-/// Cuts the spans of `count` particles from `i` on into chunks.
+/// Which of two particles.
+const BOTH: u32 = u32::MAX;
+const FIRST: u32 = 0xffff;
+const SECOND: u32 = 0xffff << 16;
+
+/// A group of particles of one row, whose spans are to be cut.
+pub struct Group<'a> {
+    pub view: &'a View,
+    pub windows: &'a Windows,
+    pub spans: &'a Spans,
+    /// Those whose spans go on in other periods.
+    pub across: u32,
+    /// The first, and how many.
+    pub first: usize,
+    pub count: usize,
+}
+
+/// Cuts the spans of a group into chunks. Two particles that follow each other look together.
 #[inline(always)]
-#[allow(clippy::too_many_arguments)]
-pub unsafe fn cut<I: Isa, T: Scalar>(
+pub unsafe fn cut<T: Scalar, const GHOSTS: bool>(
     swept: &Swept<T, impl Record>,
-    view: &View,
-    windows: &Windows,
-    spans: &Spans,
-    across: u32,
-    i: usize,
-    count: usize,
+    group: &Group,
     block: &mut Block<T>,
 ) {
     // SAFETY: the arrays are as `Swept` says, chunks have room.
     unsafe {
-        let lanes = I::F32::LANES;
+        let Group { view, spans, count, .. } = *group;
+        let x = swept.x[0].as_ptr().add(group.first);
         let mut found = 0;
-        let first_member = block.members.len();
-        let mut k = 0;
-        while k < count {
-            block.members.push((i + k) as u32);
-            k += 1;
-        }
-        let mut c = 0;
-        while c < 3 {
-            let from = swept.x[c].as_ptr().add(i);
-            I::F32::load(from).store(block.place[c].as_mut_ptr().add(first_member));
-            c += 1;
-        }
-        let rows = windows.row;
-        let behind = windows.behind;
-        let mut k = 0;
-        while k < count {
-            let i = i + k;
-            let member = first_member + k;
-            if across >> k & 1 == 1 {
-                found = cut_across(view, windows, spans, k, i, member, lanes, block, found);
-                k += 1;
+        let mut a = 0;
+        while a < count {
+            let b = a + 1;
+            let apart = b == count || (*x.add(b) - *x.add(a)).abs() > view.joined;
+            if apart || (group.across >> a) & 3 != 0 {
+                found = cut_apart::<T, GHOSTS>(swept, group, a, found, block);
+                a += 2;
                 continue;
             }
             let mut w = 0;
             while w < 5 {
-                let low = *spans.low.get_unchecked(w).get_unchecked(k) as usize;
-                let end = *spans.end.get_unchecked(w).get_unchecked(k) as usize;
-                let to = *rows[w].add(end) + behind[w];
-                let from = if w == 0 { i as u32 + 1 } else { *rows[w].add(low) + behind[w] };
-                let length = to.saturating_sub(from);
-                found = add_chunks(block, found, from, length, member, w + 5, w == 0, lanes);
+                let (low, end) = (spans.low.get_unchecked(w), spans.end.get_unchecked(w));
+                let low = (*low.get_unchecked(a)).min(*low.get_unchecked(b));
+                let end = (*end.get_unchecked(a)).max(*end.get_unchecked(b));
+                let row = *group.windows.row.get_unchecked(w);
+                let behind = *group.windows.behind.get_unchecked(w);
+                let from =
+                    if w == 0 { (group.first + b) as u32 } else { *row.add(low as usize) + behind };
+                let to = *row.add(end as usize) + behind;
+                let look = Look { a, who: BOTH, but: if w == 0 { 1 << 16 } else { 0 }, shift: w + 5 };
+                found = add::<T, GHOSTS>(swept, group, block, found, [from, to], look);
                 w += 1;
             }
-            k += 1;
+            a += 2;
         }
         block.chunk_count = found;
     }
 }
 
-/// The same in open space with ghosts: these look for owned particles only, and are no members of the block
-/// if there are none.
+/// Who looks, and how.
+#[derive(Clone, Copy)]
+struct Look {
+    /// The first of the two, in the group.
+    a: usize,
+    who: u32,
+    /// Left out of the first chunk: the second of the two is there itself.
+    but: u32,
+    shift: usize,
+}
+
+/// The bits of the first of sixteen particles, for both of two that look.
 #[inline(always)]
-pub unsafe fn cut_with_ghosts<I: Isa, T: Scalar>(
+fn first_bits(length: u32) -> u32 {
+    let one = (1u32 << length.min(16)) - 1;
+    one | one << 16
+}
+
+/// Appends the chunks of the particles `from..to`, at least one for a look without a shift at the own row;
+/// returns how many there are then.
+#[inline(always)]
+unsafe fn add<T: Scalar, const GHOSTS: bool>(
     swept: &Swept<T, impl Record>,
-    windows: &Windows,
-    spans: &Spans,
-    i: usize,
-    count: usize,
-    block: &mut Block<T>,
-) {
-    // SAFETY: the arrays are as `Swept` says, chunks have room.
-    unsafe {
-        let lanes = I::F32::LANES;
-        let mut found = 0;
-        let mut k = 0;
-        while k < count {
-            let i = i + k;
-            let member = block.members.len();
-            let is_ghost = *swept.ghost.get_unchecked(i) > 0.0;
-            let before = found;
-            let mut w = 0;
-            while w < 5 {
-                let low = *spans.low.get_unchecked(w).get_unchecked(k) as usize;
-                let end = *spans.end.get_unchecked(w).get_unchecked(k) as usize;
-                let mut to = *windows.row[w].add(end);
-                let mut from = if w == 0 { i as u32 + 1 } else { *windows.row[w].add(low) };
-                if is_ghost {
-                    let [first, last] = windows.owned[w];
-                    from = from.max(first);
-                    to = to.min(last);
-                }
-                let always = w == 0 && !is_ghost;
-                found = add_chunks(block, found, from, to.saturating_sub(from), member, w + 5, always, lanes);
-                w += 1;
-            }
-            if found > before || !is_ghost {
-                block.members.push(i as u32);
-                let mut c = 0;
-                while c < 3 {
-                    *block.place[c].get_unchecked_mut(member) = *swept.x[c].get_unchecked(i);
-                    c += 1;
-                }
-            }
-            k += 1;
-        }
-        block.chunk_count = found;
-    }
-}
-
-/// The same for a particle whose spans go on in other periods.
-#[inline(never)]
-#[allow(clippy::too_many_arguments)]
-unsafe fn cut_across<T: Scalar>(
-    view: &View,
-    windows: &Windows,
-    spans: &Spans,
-    k: usize,
-    i: usize,
-    member: usize,
-    lanes: usize,
-    block: &mut Block<T>,
-    mut found: usize,
-) -> usize {
-    // SAFETY: bins are of the row; chunks have room.
-    unsafe {
-        let bins = view.bins;
-        let mut w = 0;
-        while w < 5 {
-            let own = w == 0;
-            let mut low = *spans.far_low.get_unchecked(w).get_unchecked(k) - bins;
-            let end = *spans.far_end.get_unchecked(w).get_unchecked(k) - bins;
-            let row = *windows.row.get_unchecked(w);
-            let behind = *windows.behind.get_unchecked(w);
-            if own {
-                low = 0;
-            } else if *windows.there.get_unchecked(w) == 0.0 {
-                w += 1;
-                continue;
-            }
-            if low < 0 {
-                let (from, to) = (*row.add((low + bins) as usize) + behind, *row.add(bins as usize) + behind);
-                found = add_chunks(block, found, from, to - from, member, w, false, lanes);
-                low = 0;
-            }
-            let to = *row.add(end.min(bins) as usize) + behind;
-            let from = if own { i as u32 + 1 } else { *row.add(low as usize) + behind };
-            found = add_chunks(block, found, from, to.saturating_sub(from), member, w + 5, own, lanes);
-            if end > bins {
-                let (from, to) = (*row + behind, *row.add((end - bins) as usize) + behind);
-                found = add_chunks(block, found, from, to - from, member, w + 10, false, lanes);
-            }
-            w += 1;
-        }
-    }
-    found
-}
-
-/// Appends the chunks of the `length` particles from `from` on, at least one if `always`; returns how many
-/// chunks there are then.
-#[inline(always)]
-#[allow(clippy::too_many_arguments)]
-unsafe fn add_chunks<T: Scalar>(
+    group: &Group,
     block: &mut Block<T>,
     found: usize,
-    from: u32,
-    length: u32,
-    member: usize,
-    shift: usize,
-    always: bool,
-    lanes: usize,
+    [mut from, mut to]: [u32; 2],
+    look: Look,
 ) -> usize {
     // SAFETY: chunks have room for two more; more make room.
     unsafe {
-        let lanes = lanes as u32;
-        if length > 2 * lanes {
-            return add_many_chunks(block, found, from, length, member, shift, lanes);
+        let mut owned = [BOTH; 2];
+        if GHOSTS {
+            // Two ghosts are no concern of this rank.
+            let i = group.first + look.a;
+            let ghost = [*swept.ghost.get_unchecked(i), *swept.ghost.get_unchecked(i + 1)];
+            if ghost[0] && ghost[1] {
+                let [first, last] = *group.windows.owned.get_unchecked(look.shift % 5);
+                if look.but == 0 {
+                    from = from.max(first);
+                }
+                to = to.min(last);
+            }
+            let all = if ghost[0] { 0 } else { FIRST } | if ghost[1] { 0 } else { SECOND };
+            for (k, owned) in owned.iter_mut().enumerate() {
+                let here = swept.owned_bits(from as usize + 16 * k);
+                *owned = all | here | here << 16;
+            }
+        }
+        let length = to.saturating_sub(from);
+        if length > 32 {
+            return add_many::<T, GHOSTS>(swept, group, block, found, [from, to], look);
         }
         // Both are written, and counted as needed: there is no branch to foresee.
-        let chunk = Chunk { from, to: from + length, member: member as u32, shift: shift as u32 };
+        let (two, shift) = (look.a as u32 / 2, look.shift as u32);
         let out = block.chunks.as_mut_ptr().add(found);
-        *out = chunk;
-        *out.add(1) = Chunk { from: from + lanes, ..chunk };
-        found + (always || length > 0) as usize + (length > lanes) as usize
+        *out = Chunk { from, allowed: first_bits(length) & look.who & !look.but & owned[0], two, shift };
+        let allowed = first_bits(length.saturating_sub(16)) & look.who & owned[1];
+        *out.add(1) = Chunk { from: from + 16, allowed, two, shift };
+        found + (shift == 5 || length > 0) as usize + (length > 16) as usize
     }
 }
 
 #[cold]
 #[inline(never)]
-fn add_many_chunks<T: Scalar>(
+fn add_many<T: Scalar, const GHOSTS: bool>(
+    swept: &Swept<T, impl Record>,
+    group: &Group,
     block: &mut Block<T>,
-    found: usize,
-    from: u32,
-    length: u32,
-    member: usize,
-    shift: usize,
-    lanes: u32,
+    mut found: usize,
+    [from, to]: [u32; 2],
+    look: Look,
 ) -> usize {
-    let pieces = length.div_ceil(lanes);
-    let end = from + length;
-    block.reserve_chunks(found + pieces as usize);
-    for p in 0..pieces {
-        let from = from + p * lanes;
-        let to = end.min(from + lanes);
-        block.chunks[found + p as usize] = Chunk { from, to, member: member as u32, shift: shift as u32 };
+    block.reserve_chunks(found + (to - from).div_ceil(16) as usize);
+    let i = group.first + look.a;
+    let mut but = look.but;
+    for begin in (from..to).step_by(16) {
+        let mut allowed = first_bits(to - begin) & look.who & !but;
+        if GHOSTS {
+            // SAFETY: of a chunk.
+            let owned = unsafe { swept.owned_bits(begin as usize) };
+            allowed &= owned | if swept.ghost[i] { 0 } else { FIRST } | SECOND;
+            allowed &= owned << 16 | if swept.ghost[i + 1] { 0 } else { SECOND } | FIRST;
+        }
+        block.chunks[found] = Chunk { from: begin, allowed, two: look.a as u32 / 2, shift: look.shift as u32 };
+        found += 1;
+        but = 0;
     }
-    found + pieces as usize
+    found
+}
+
+/// The same for two particles that do not look together, or whose spans go on in other periods.
+#[inline(never)]
+unsafe fn cut_apart<T: Scalar, const GHOSTS: bool>(
+    swept: &Swept<T, impl Record>,
+    group: &Group,
+    a: usize,
+    mut found: usize,
+    block: &mut Block<T>,
+) -> usize {
+    let Group { view, windows, spans, across, first, count } = *group;
+    for (k, who) in [(a, FIRST), (a + 1, SECOND)] {
+        if k == count {
+            break;
+        }
+        let own = (first + k + 1) as u32;
+        for w in 0..5 {
+            let crosses = across >> k & 1 == 1;
+            let bins = view.bins;
+            let [mut low, mut end] = [spans.low[w][k], spans.end[w][k]];
+            if crosses {
+                if windows.there[w] == 0.0 && w > 0 {
+                    continue;
+                }
+                [low, end] = [spans.far_low[w][k] - bins, spans.far_end[w][k] - bins];
+            }
+            // SAFETY: bins are of the row.
+            let at = |bin: i32| unsafe { *windows.row[w].add(bin as usize) + windows.behind[w] };
+            let look = |period: usize| Look { a, who, but: 0, shift: w + 5 * period };
+            // SAFETY: chunks have room.
+            unsafe {
+                if low < 0 && w > 0 {
+                    found =
+                        add::<T, GHOSTS>(swept, group, block, found, [at(low + bins), at(bins)], look(0));
+                }
+                let from = if w == 0 { own } else { at(low.max(0)) };
+                found = add::<T, GHOSTS>(swept, group, block, found, [from, at(end.min(bins))], look(1));
+                if end > bins {
+                    found = add::<T, GHOSTS>(swept, group, block, found, [at(0), at(end - bins)], look(2));
+                }
+            }
+        }
+    }
+    found
 }

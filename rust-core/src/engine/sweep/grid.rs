@@ -38,7 +38,8 @@ impl Grid {
             }
         }
         let most = (4 * count + 64) as f64;
-        let mut width = reach;
+        // No narrower than the cut-off, but for rounding: of pairs in the last part in 10⁹ of it some may be missed.
+        let mut width = cutoff * (1.0 - 1e-9);
         loop {
             let along = |axis: usize, width: f64| {
                 if axis < frame.dimensions { (frame.height(axis) / width).floor().max(1.0) } else { 1.0 }
@@ -54,6 +55,11 @@ impl Grid {
             }
             width *= 1.5;
         }
+    }
+
+    /// Rows of a layer, or layers, along an axis.
+    pub fn of(&self, axis: usize) -> usize {
+        if axis == self.layer_axis { self.layers } else { self.rows }
     }
 
     pub fn cells(&self) -> usize {

@@ -6,14 +6,15 @@
 
 use super::arithmetic::Arithmetic;
 use super::block::Block;
-use super::chunks::{cut, cut_with_ghosts};
-use super::evaluate::{self, Evaluation, evaluate};
+use super::chunks::{Group, cut};
+use super::evaluate::evaluate;
 use super::frame::Frame;
 use super::grid::Grid;
 use super::look::look;
-use super::many_body::{NearPairs, keep_near};
+use super::many_body::NearPairs;
+use super::quantum::Quantum;
 use super::scatter::{scatter, scatter_weights};
-use super::simd::{Isa, Reals, Scalar};
+use super::simd::{Isa, Reals};
 use super::terms::Terms;
 use super::windows::{Spans, View, Windows};
 use crate::engine::noise::PairNoise;
@@ -28,11 +29,16 @@ pub struct Swept<'a, T, R> {
     pub start: &'a [u32],
     /// Positions from the origin of the frame.
     pub x: [&'a [f32]; 3],
+    /// The same in words.
+    pub quantum: Quantum,
+    pub q: [&'a [u16]; 3],
     pub records: &'a [R],
     /// Species; empty with one.
     pub species: &'a [u8],
-    /// 1 for ghosts, 0 for others; empty if there are none.
-    pub ghost: &'a [f32],
+    /// Which are ghosts; empty if there are none.
+    pub ghost: &'a [bool],
+    /// A bit for each particle that is not.
+    pub owned: &'a [u8],
     /// The first owned particle of each row, and one past the last; empty if there are no ghosts.
     pub owned_of_row: &'a [[u32; 2]],
     pub particles: usize,
@@ -75,10 +81,25 @@ impl<T> Shared<T> {
     }
 }
 
-/// Pairs of a block: enough to fill vectors, few enough for the first-level cache.
-const ENOUGH: usize = 128;
-/// Particles of a block.
-const MEMBERS: usize = 64;
+impl<T, R> Swept<'_, T, R> {
+    /// How much of a pair counts here: one, a half with a ghost.
+    pub fn share(&self, i: usize, j: usize) -> f64 {
+        if self.ghost.is_empty() {
+            return 1.0;
+        }
+        1.0 - 0.5 * (self.ghost[i] as u8 + self.ghost[j] as u8) as f64
+    }
+
+    /// A bit for each of the sixteen particles from `at` on that is not a ghost.
+    #[inline(always)]
+    pub unsafe fn owned_bits(&self, at: usize) -> u32 {
+        // SAFETY: there are bits for sixteen particles behind the last, and eight bytes behind those.
+        unsafe {
+            let bits = self.owned.as_ptr().add(at / 8).cast::<u32>().read_unaligned();
+            bits >> (at % 8) & 0xffff
+        }
+    }
+}
 
 /// First pass: finds the pairs of `layer`, adds forces that need no density, and weights.
 ///
@@ -94,136 +115,85 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TA
     // SAFETY: the caller's.
     unsafe {
         let grid = swept.grid;
-        let lanes = I::F32::LANES;
         let mut tally = Tally::default();
         near.clear(swept.terms.passes.len());
         let view = View::new(swept.frame, grid, layer);
-        let limit = I::F32::splat(view.reach_squared);
         let ghosts = !swept.ghost.is_empty();
         let mut spans = Spans::default();
-        block.clear();
         let mut row = 0;
         while row < grid.rows {
             let cell = (layer * grid.rows + row) * grid.bins;
             let windows = Windows::new(swept, layer, row);
-            let mut i = *swept.start.get_unchecked(cell) as usize;
+            let mut first = *swept.start.get_unchecked(cell) as usize;
             let end = *swept.start.get_unchecked(cell + grid.bins) as usize;
-            while i < end {
-                let count = lanes.min(end - i);
-                let across = view.spans::<I>(swept, row, i, count, &windows.there, &mut spans);
+            // Ghosts look for owned particles only.
+            if ghosts && windows.owned.iter().all(|[first, last]| first == last) {
+                first = end;
+            }
+            while first < end {
+                let count = I::F32::LANES.min(end - first);
+                let across = view.spans::<I>(swept, row, first, count, &windows.there, &mut spans);
+                let group = Group { view: &view, windows: &windows, spans: &spans, across, first, count };
                 if ghosts {
-                    cut_with_ghosts::<I, A::Scalar>(swept, &windows, &spans, i, count, block);
+                    cut::<A::Scalar, true>(swept, &group, block);
                 } else {
-                    cut::<I, A::Scalar>(swept, &view, &windows, &spans, across, i, count, block);
+                    cut::<A::Scalar, false>(swept, &group, block);
                 }
-                let shifted = windows.crosses || across != 0;
-                match (ghosts, shifted) {
-                    (false, false) => look::<I, A::Scalar, false, false>(swept, &windows.shift, limit, block),
-                    (false, true) => look::<I, A::Scalar, false, true>(swept, &windows.shift, limit, block),
-                    (true, _) => look::<I, A::Scalar, true, false>(swept, &windows.shift, limit, block),
+                if windows.crosses || across != 0 {
+                    look::<I, A::Scalar, true>(swept, &group, block);
+                } else {
+                    look::<I, A::Scalar, false>(swept, &group, block);
                 }
-                if block.count >= ENOUGH || block.members.len() >= MEMBERS {
-                    flush::<I, A, SEVERAL, TALLY>(swept, layer, block, near, &mut tally);
+                let mut slot = 0;
+                while slot < count {
+                    let last = count.min(slot + A::Reals::LANES);
+                    part::<I, A, SEVERAL, TALLY>(swept, layer, block, near, [slot, last], &mut tally);
+                    slot = last;
                 }
-                i += count;
+                first += count;
             }
             row += 1;
-        }
-        if !block.members.is_empty() {
-            flush::<I, A, SEVERAL, TALLY>(swept, layer, block, near, &mut tally);
         }
         tally
     }
 }
 
-/// Evaluates the pairs of a block and adds what they do.
+/// Evaluates the pairs of a vector's worth of members of a block, and adds what they do.
 #[inline(always)]
-unsafe fn flush<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY: bool>(
+unsafe fn part<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY: bool>(
     swept: &Swept<A::Scalar, A::Record>,
     layer: usize,
     block: &mut Block<A::Scalar>,
     near: &mut NearPairs<A::Scalar>,
+    [first, last]: [usize; 2],
     tally: &mut Tally,
 ) {
-    // SAFETY: the contract of `simd`.
+    // SAFETY: the contract of `simd`; members of a block are particles, as are those behind the last.
     unsafe {
-        let count = block.count;
-        block.reserve(count);
-        // Lanes behind the last pair: some particle, and far away.
-        let j = block.j.as_mut_ptr().add(count);
-        let mut k = 0;
-        while k < 16 {
-            *j.add(k) = 0;
-            k += 1;
+        let pairs =
+            [*block.begin.get_unchecked(first) as usize, *block.begin.get_unchecked(last) as usize];
+        if pairs[0] == pairs[1] {
+            near.add_none(&block.members[first..last]);
+            return;
         }
-        let moving = swept.thermostat.is_some();
-        A::spread(swept.records.as_ptr(), block, moving);
-        A::separate(swept.frame, swept.records.as_ptr(), block, count, moving);
-        let r = block.r.as_mut_ptr().add(count);
-        let mut k = 0;
-        while k < 16 {
-            *r.add(k) = A::Scalar::of(1e30);
-            k += 1;
-        }
-        if SEVERAL || TALLY || swept.variables > 1 {
-            block.spread_members();
-        }
-        if SEVERAL {
-            let species = swept.terms.species as u32;
-            let mut k = 0;
-            while k < count + 16 {
-                let a = *swept.species.get_unchecked(block.i[k] as usize);
-                let b = *swept.species.get_unchecked(block.j[k] as usize);
-                *block.species_i.get_unchecked_mut(k) = a;
-                *block.species_j.get_unchecked_mut(k) = b;
-                *block.kind.get_unchecked_mut(k) = a as u32 * species + b as u32;
-                k += 1;
+        let which = block.which.as_mut_ptr();
+        let mut m = first;
+        while m < last {
+            let end = *block.begin.get_unchecked(m + 1) as usize;
+            let mut k = *block.begin.get_unchecked(m) as usize;
+            while k < end {
+                which.add(k).cast::<[u8; 16]>().write_unaligned([(m - first) as u8; 16]);
+                k += 16;
             }
+            m += 1;
         }
-        if TALLY {
-            share(swept.ghost, block);
-        }
-        let with = Evaluation { terms: swept.terms, thermostat: swept.thermostat };
-        evaluate::<I, A::Reals, SEVERAL, TALLY>(&with, block, tally);
-        if TALLY {
-            evaluate::virial::<A::Reals>(block, &block.conservative, &mut tally.virial);
-            if moving {
-                evaluate::virial::<A::Reals>(block, &block.thermostat, &mut tally.thermostat_virial);
-            }
-        }
-        let plain = swept.variables == 1;
-        match (moving, plain) {
-            (false, false) => evaluate::rows::<A::Reals, false, false>(block),
-            (false, true) => evaluate::rows::<A::Reals, false, true>(block),
-            (true, false) => evaluate::rows::<A::Reals, true, false>(block),
-            (true, true) => evaluate::rows::<A::Reals, true, true>(block),
-        }
+        A::own(swept.records.as_ptr(), block.members.as_ptr().add(first), &mut block.own);
+        evaluate::<I, A, SEVERAL, TALLY>(swept, block, near, first, pairs, tally);
         let offset = *swept.offset.get_unchecked(layer);
-        scatter::<I, A>(swept.sums, offset, block);
+        scatter::<I, A>(swept.sums, offset, block, [first, last]);
         if swept.variables > 1 {
-            scatter_weights::<A::Scalar>(swept, offset, block);
+            scatter_weights(swept, offset, block, [first, last]);
         }
-        if !swept.ghost.is_empty() {
-            near.members.extend_from_slice(&block.members);
-        }
-        let mut pass = 0;
-        while pass < swept.terms.passes.len() {
-            keep_near::<I, A, TALLY>(swept, pass, block, near);
-            pass += 1;
-        }
-        block.clear();
+        near.add::<TALLY>(block, [first, last]);
     }
-}
-
-#[inline(never)]
-fn share<T: Scalar>(ghost: &[f32], block: &mut Block<T>) {
-    for k in 0..block.count {
-        let mut share = 1.0;
-        if !ghost.is_empty() {
-            share -= 0.5 * (ghost[block.i[k] as usize] + ghost[block.j[k] as usize]) as f64;
-        }
-        block.share[k] = T::of(share);
-    }
-    let count = block.count;
-    block.share[count..count + 16].fill(T::default());
 }

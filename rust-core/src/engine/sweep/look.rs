@@ -1,67 +1,101 @@
 //! Which particles of the chunks are within reach.
 
 use super::arithmetic::Record;
-use super::block::Block;
+use super::block::{Block, GROUP};
+use super::chunks::Group;
 use super::layer::Swept;
 use super::simd::{Isa, Reals, Scalar};
 
-/// Compares particles with their chunks, and appends the pairs within reach.
+/// Compares the particles of a group with their chunks, and lists the pairs within reach: those of the first,
+/// third, … particle, then those of the others.
 #[inline(always)]
-pub unsafe fn look<I: Isa, T: Scalar, const GHOSTS: bool, const SHIFTS: bool>(
+pub unsafe fn look<I: Isa, T: Scalar, const SHIFTS: bool>(
     swept: &Swept<T, impl Record>,
-    shifts: &[[f32; 16]; 3],
-    limit: I::F32,
+    group: &Group,
     block: &mut Block<T>,
 ) {
-    // SAFETY: the contract of `simd`; arrays have a vector's room behind their last particle.
+    // SAFETY: the contract of `simd`; arrays have sixteen particles' room behind their last.
     unsafe {
-        let lanes = I::F32::LANES;
-        block.reserve(block.count + lanes * block.chunk_count);
-        block.begin.resize(block.members.len() + 1, 0);
-        let out = block.j.as_mut_ptr();
-        let begin = block.begin.as_mut_ptr();
-        let place = [block.place[0].as_ptr(), block.place[1].as_ptr(), block.place[2].as_ptr()];
-        let x = [swept.x[0].as_ptr(), swept.x[1].as_ptr(), swept.x[2].as_ptr()];
+        let (first, count) = (group.first, group.count);
+        let many = block.chunk_count;
+        block.reserve(16 * many);
+        let q = [swept.q[0].as_ptr(), swept.q[1].as_ptr(), swept.q[2].as_ptr()];
+        let points = block.points.as_mut_ptr();
+        let mut k = 0;
+        // One more where the last is alone.
+        while k < count + (count & 1) {
+            let mut c = 0;
+            while c < 3 {
+                I::fill16(*q[c].add(first + k), &mut (&mut (*points.add(k)).0)[c]);
+                c += 1;
+            }
+            k += 1;
+        }
+        let limit = swept.quantum.limit;
         let chunks = block.chunks.as_ptr();
         // Masks first, then what they select: the two in one loop wait for each other.
         let masks = block.masks.as_mut_ptr();
-        let many = block.chunk_count;
         let mut c = 0;
         while c < many {
             let chunk = chunks.add(c);
             let j = (*chunk).from as usize;
-            let member = (*chunk).member as usize;
-            let mut p = [*place[0].add(member), *place[1].add(member), *place[2].add(member)];
-            if SHIFTS {
-                let shift = (*chunk).shift as usize;
-                p[0] -= *shifts[0].get_unchecked(shift);
-                p[1] -= *shifts[1].get_unchecked(shift);
-                p[2] -= *shifts[2].get_unchecked(shift);
-            }
-            let dx = I::F32::splat(p[0]) - I::F32::load(x[0].add(j));
-            let dy = I::F32::splat(p[1]) - I::F32::load(x[1].add(j));
-            let dz = I::F32::splat(p[2]) - I::F32::load(x[2].add(j));
-            let mut r2 = dx.mul_add(dx, dy.mul_add(dy, dz * dz));
-            if GHOSTS {
-                // Two ghosts are no concern of this rank.
-                let i = *block.members.get_unchecked(member) as usize;
-                let far = I::F32::splat(*swept.ghost.get_unchecked(i) * 1e15);
-                r2 = far.mul_add(I::F32::load(swept.ghost.as_ptr().add(j)), r2);
-            }
-            let left = ((*chunk).to - (*chunk).from).min(lanes as u32);
-            *masks.add(c) = r2.mask_below(limit) & ((1u32 << left) - 1);
+            let a = points.add(2 * (*chunk).two as usize);
+            let shift = if SHIFTS {
+                *group.windows.shift.get_unchecked((*chunk).shift as usize)
+            } else {
+                [0; 3]
+            };
+            let there = [q[0].add(j), q[1].add(j), q[2].add(j)];
+            *masks.add(c) = I::near::<SHIFTS>(there, shift, &*a, &*a.add(1), limit) & (*chunk).allowed;
             c += 1;
         }
-        let mut count = block.count;
+        let (out, other) = (block.j.as_mut_ptr(), block.other.as_mut_ptr());
+        let slots = count.div_ceil(2);
+        let mut found = [0, 0];
+        let mut ends = [[0u32; 8]; 2];
         let mut c = 0;
         while c < many {
             let (chunk, mask) = (chunks.add(c), *masks.add(c));
-            I::collect((*chunk).from, mask, out.add(count));
-            count += mask.count_ones() as usize;
-            // Every member has a chunk; its last one leaves where the next begins.
-            *begin.add((*chunk).member as usize + 1) = count as u32;
+            let (from, two) = ((*chunk).from, (*chunk).two as usize);
+            I::collect(from, mask & 0xffff, out.add(found[0]));
+            I::collect(from, mask >> 16, other.add(found[1]));
+            found[0] += (mask & 0xffff).count_ones() as usize;
+            found[1] += (mask >> 16).count_ones() as usize;
+            // Every two have a chunk; their last one leaves where the next begin.
+            *ends[0].get_unchecked_mut(two) = found[0] as u32;
+            *ends[1].get_unchecked_mut(two) = found[1] as u32;
             c += 1;
         }
-        block.count = count;
+        // Behind each other.
+        let mut k = 0;
+        while k < found[1] {
+            <I::F32 as Reals>::load(other.add(k).cast()).store(out.add(found[0] + k).cast());
+            k += <I::F32 as Reals>::LANES;
+        }
+        let pairs = found[0] + found[1];
+        // Lanes behind the last pair: some particle.
+        let mut k = 0;
+        while k < 16 {
+            *out.add(pairs + k) = first as u32;
+            k += 1;
+        }
+        block.count = pairs;
+        block.members_count = count;
+        // Members behind the last are read, and nothing else.
+        block.members = [first as u32; GROUP];
+        let begin = &mut block.begin;
+        begin[0] = 0;
+        let mut s = 0;
+        while s < slots {
+            *block.members.get_unchecked_mut(s) = (first + 2 * s) as u32;
+            *begin.get_unchecked_mut(s + 1) = *ends[0].get_unchecked(s);
+            s += 1;
+        }
+        let mut s = 0;
+        while s < count / 2 {
+            *block.members.get_unchecked_mut(slots + s) = (first + 2 * s + 1) as u32;
+            *begin.get_unchecked_mut(slots + s + 1) = found[0] as u32 + *ends[1].get_unchecked(s);
+            s += 1;
+        }
     }
 }

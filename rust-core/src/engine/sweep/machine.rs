@@ -11,7 +11,9 @@ use super::grid::Grid;
 use super::layer::{Shared, Swept};
 use super::many_body::NearPairs;
 use super::pool::Pool;
+use super::quantum::Quantum;
 use super::settings::Instructions;
+use super::simd::Scalar;
 use super::terms::Terms;
 use crate::engine::error::EngineError;
 use crate::engine::excess_pass::ExcessPass;
@@ -39,9 +41,12 @@ pub struct Machine<P: Compiled> {
     /// The host's number of each particle.
     pub order: Vec<u32>,
     x: [Vec<f32>; 3],
+    quantum: Quantum,
+    q: [Vec<u16>; 3],
     records: Vec<P::Record>,
     species: Vec<u8>,
-    ghost: Vec<f32>,
+    ghost: Vec<bool>,
+    owned_bits: Vec<u8>,
     owned_of_row: Vec<[u32; 2]>,
     offset: Vec<isize>,
     sums: Vec<f64>,
@@ -62,13 +67,20 @@ pub struct Machine<P: Compiled> {
 }
 
 /// A thread's own.
-#[derive(Default)]
 struct Scratch<T> {
     block: Block<T>,
     excess: ExcessPass,
     low: [f64; 3],
     high: [f64; 3],
     fault: Option<EngineError>,
+}
+
+impl<T: Scalar> Scratch<T> {
+    fn new(passes: usize) -> Scratch<T> {
+        let mut block = Block::default();
+        block.set_passes(passes);
+        Scratch { block, excess: ExcessPass::default(), low: [0.0; 3], high: [0.0; 3], fault: None }
+    }
 }
 
 /// What the host hands over.
@@ -88,11 +100,7 @@ impl<P: Compiled> Machine<P> {
         let count = plan.species.len();
         let columns: Vec<usize> =
             plan.passes.iter().flat_map(|d| (0..count).map(move |s| d * count + s)).collect();
-        let mut scratch: Vec<Scratch<P::Scalar>> = Vec::new();
-        scratch.resize_with(threads, Scratch::default);
-        for scratch in &mut scratch {
-            scratch.block.set_passes(terms.passes.len());
-        }
+        let scratch = (0..threads).map(|_| Scratch::new(terms.passes.len())).collect();
         let frame = Frame::around([0.0; 3], [1.0; 3], plan.dimensions, 1.0);
         Machine {
             passes: P::passes(instructions, count > 1),
@@ -105,9 +113,12 @@ impl<P: Compiled> Machine<P> {
             start: Vec::new(),
             order: Vec::new(),
             x: Default::default(),
+            quantum: Quantum::default(),
+            q: Default::default(),
             records: Vec::new(),
             species: Vec::new(),
             ghost: Vec::new(),
+            owned_bits: Vec::new(),
             owned_of_row: Vec::new(),
             offset: Vec::new(),
             sums: Vec::new(),
@@ -170,9 +181,12 @@ impl<P: Compiled> Machine<P> {
             grid: &self.grid,
             start: &self.start,
             x: [&self.x[0], &self.x[1], &self.x[2]],
+            quantum: self.quantum,
+            q: [&self.q[0], &self.q[1], &self.q[2]],
             records: &self.records,
             species: &self.species,
             ghost: &self.ghost,
+            owned: &self.owned_bits,
             owned_of_row: &self.owned_of_row,
             particles: self.particles,
             terms: &self.terms,
@@ -208,7 +222,6 @@ impl<P: Compiled> Machine<P> {
             // SAFETY: each thread has its own scratch, each layer is done once, and writes its own.
             unsafe {
                 let scratch = &mut *scratch.at(t);
-                scratch.block.reserve(1024);
                 loop {
                     let layer = next.fetch_add(1, Ordering::Relaxed);
                     if layer >= layers {

@@ -2,36 +2,109 @@
 
 use super::arithmetic::Arithmetic;
 use super::block::Block;
-use super::evaluate::{add_to, collect_near, count_bits};
 use super::layer::Swept;
-use super::simd::{Isa, Quad, Reals, Scalar};
+use super::scatter::add_to;
+use super::simd::{Isa, Quad, Scalar};
 
 /// What the first pass of a layer leaves for the second.
 #[derive(Debug, Clone, Default)]
 pub struct NearPairs<T> {
     /// For each density: rows `−w′ ê` and the second particle, those of one particle after another.
-    pub rows: Vec<Vec<[T; 4]>>,
-    /// `r_i − r_j`, if virials are wanted.
-    pub distances: Vec<Vec<[T; 3]>>,
+    pub rows: Vec<Rows<T>>,
+    /// Rows `r_i − r_j` and the share of each, if virials are wanted.
+    pub apart: Vec<Rows<T>>,
     /// How many there are for each particle that has looked for any.
     pub counts: Vec<Vec<u32>>,
-    /// These particles, where they are not all of the layer.
+    /// These particles.
     pub members: Vec<u32>,
-    /// `share` of each, if virials are wanted.
-    pub shares: Vec<Vec<T>>,
+}
+
+/// Rows of four numbers that whole vectors are written behind.
+#[derive(Debug, Clone)]
+pub struct Rows<T>(Vec<[T; 4]>);
+
+impl<T> Default for Rows<T> {
+    fn default() -> Self {
+        Rows(Vec::new())
+    }
+}
+
+impl<T> Rows<T> {
+    /// Where the next row goes.
+    #[inline(always)]
+    pub fn end(&mut self) -> *mut [T; 4] {
+        // SAFETY: one past the last, or before.
+        unsafe { self.0.as_mut_ptr().add(self.0.len()) }
+    }
+
+    pub fn bytes(&self) -> usize {
+        self.0.capacity() * size_of::<[T; 4]>()
+    }
 }
 
 impl<T> NearPairs<T> {
     pub fn clear(&mut self, passes: usize) {
-        self.rows.resize_with(passes, Vec::new);
-        self.distances.resize_with(passes, Vec::new);
+        self.rows.resize_with(passes, Rows::default);
+        self.apart.resize_with(passes, Rows::default);
         self.counts.resize_with(passes, Vec::new);
-        self.shares.resize_with(passes, Vec::new);
-        self.rows.iter_mut().for_each(Vec::clear);
-        self.distances.iter_mut().for_each(Vec::clear);
+        self.rows.iter_mut().chain(&mut self.apart).for_each(|rows| rows.0.clear());
         self.counts.iter_mut().for_each(Vec::clear);
         self.members.clear();
-        self.shares.iter_mut().for_each(Vec::clear);
+    }
+
+    /// Makes room for `more` pairs of each density.
+    #[inline(always)]
+    pub fn reserve<const TALLY: bool>(&mut self, more: usize) {
+        for rows in &mut self.rows {
+            make_room(&mut rows.0, more);
+        }
+        if TALLY {
+            for rows in &mut self.apart {
+                make_room(&mut rows.0, more);
+            }
+        }
+    }
+
+    /// Counts the pairs that were written behind the last.
+    #[inline(always)]
+    pub unsafe fn add<const TALLY: bool>(&mut self, block: &Block<T>, [first, last]: [usize; 2])
+    where
+        T: Scalar,
+    {
+        // SAFETY: the rows have been written; blocks have bits for all pairs.
+        unsafe {
+            self.members.extend_from_slice(block.members.get_unchecked(first..last));
+            let begin = block.begin.as_ptr();
+            let zero = *begin.add(first) as usize;
+            for pass in 0..self.rows.len() {
+                let found = *block.found.get_unchecked(pass);
+                let rows = &mut self.rows.get_unchecked_mut(pass).0;
+                rows.set_len(rows.len() + found);
+                if TALLY {
+                    let apart = &mut self.apart.get_unchecked_mut(pass).0;
+                    apart.set_len(apart.len() + found);
+                }
+                let counts = self.counts.get_unchecked_mut(pass);
+                make_room(counts, last - first);
+                let out = counts.as_mut_ptr().add(counts.len());
+                let bits = block.bits.get_unchecked(pass).as_ptr();
+                let mut m = first;
+                while m < last {
+                    let (from, to) = (*begin.add(m) as usize - zero, *begin.add(m + 1) as usize - zero);
+                    *out.add(m - first) = count_bits(bits, from, to);
+                    m += 1;
+                }
+                counts.set_len(counts.len() + last - first);
+            }
+        }
+    }
+
+    /// Counts no pairs for `members`.
+    pub fn add_none(&mut self, members: &[u32]) {
+        self.members.extend_from_slice(members);
+        for counts in &mut self.counts {
+            counts.resize(counts.len() + members.len(), 0);
+        }
     }
 }
 
@@ -44,64 +117,29 @@ fn make_room<T>(values: &mut Vec<T>, more: usize) {
     }
 }
 
-/// Keeps the pairs within the range of a density for the second pass.
+/// How many of the pairs `from..to` are set in `bits`.
+///
+/// # Safety
+/// `bits` has them all, and a word behind.
 #[inline(always)]
-pub unsafe fn keep_near<I: Isa, A: Arithmetic<I>, const TALLY: bool>(
-    swept: &Swept<A::Scalar, A::Record>,
-    pass: usize,
-    block: &mut Block<A::Scalar>,
-    near: &mut NearPairs<A::Scalar>,
-) {
-    // SAFETY: the contract of `simd`.
+unsafe fn count_bits(bits: *const u64, from: usize, to: usize) -> u32 {
+    // SAFETY: the caller's.
     unsafe {
-        if block.count == 0 {
-            let counts = &mut near.counts[pass];
-            counts.resize(counts.len() + block.members.len(), 0);
-            return;
+        let (word, shift) = (from / 64, from % 64);
+        let length = to - from;
+        // Two words hold sixty-four pairs, wherever they begin.
+        let here = *bits.add(word) >> shift | *bits.add(word + 1) << 1 << (63 - shift);
+        if length <= 64 {
+            let mask = if length == 64 { u64::MAX } else { (1u64 << length) - 1 };
+            return (here & mask).count_ones();
         }
-        let found = collect_near::<I, A::Reals, TALLY>(&swept.terms.passes[pass], block);
-        A::encode_all(block.near_j.as_ptr(), block.near_code.as_mut_ptr(), found);
-        let rows = &mut near.rows[pass];
-        make_room(rows, found + 16);
-        let out = rows.as_mut_ptr().add(rows.len()).cast::<A::Scalar>();
-        let near_at = [block.near[0].as_ptr(), block.near[1].as_ptr(), block.near[2].as_ptr()];
-        let code = block.near_code.as_ptr();
-        let mut k = 0;
-        while k < found {
-            let columns = [
-                A::Reals::load(near_at[0].add(k)),
-                A::Reals::load(near_at[1].add(k)),
-                A::Reals::load(near_at[2].add(k)),
-                A::Reals::load(code.add(k)),
-            ];
-            A::Reals::rows(columns, out.add(4 * k));
-            k += A::Reals::LANES;
+        let mut count = 0;
+        let mut p = from;
+        while p < to {
+            count += (*bits.add(p / 64) >> (p % 64) & 1) as u32;
+            p += 1;
         }
-        rows.set_len(rows.len() + found);
-        let counts = &mut near.counts[pass];
-        let members = block.members.len();
-        make_room(counts, members);
-        let out = counts.as_mut_ptr().add(counts.len());
-        let (begin, bits) = (block.begin.as_ptr(), block.bits.as_ptr());
-        let mut from = 0;
-        let mut m = 0;
-        while m < members {
-            let to = *begin.add(m + 1) as usize;
-            *out.add(m) = count_bits(bits, from, to);
-            from = to;
-            m += 1;
-        }
-        counts.set_len(counts.len() + members);
-        if TALLY {
-            for k in 0..found {
-                near.distances[pass].push([block.near_d[0][k], block.near_d[1][k], block.near_d[2][k]]);
-            }
-            for p in 0..block.count {
-                if block.bits[p / 64] >> (p % 64) & 1 == 1 {
-                    near.shares[pass].push(block.share[p]);
-                }
-            }
-        }
+        count
     }
 }
 
@@ -118,29 +156,27 @@ pub unsafe fn second_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const T
 ) {
     // SAFETY: the caller's.
     unsafe {
-        let grid = swept.grid;
-        let first = swept.start[layer * grid.rows * grid.bins] as usize;
         let offset = *swept.offset.get_unchecked(layer);
         let base = swept.sums.0.offset(4 * offset);
         let species = swept.terms.species;
         let width = swept.terms.passes.len() * species;
         let mut pass = 0;
         while pass < swept.terms.passes.len() {
-            let rows = near.rows.get_unchecked(pass);
+            let rows = &near.rows.get_unchecked(pass).0;
+            let apart = &near.apart.get_unchecked(pass).0;
             let counts = near.counts.get_unchecked(pass);
             let slopes = swept.slopes.as_ptr().add(pass * species);
-            let some = !swept.ghost.is_empty();
             let mut p = 0;
             let mut m = 0;
             while m < counts.len() {
-                let i = if some { *near.members.get_unchecked(m) as usize } else { first + m };
+                let i = *near.members.get_unchecked(m) as usize;
                 let end = p + *counts.get_unchecked(m) as usize;
                 let mut sum = I::Quad::zero();
                 let own = slopes.add(width * i);
                 let si = if SEVERAL { *swept.species.get_unchecked(i) as usize } else { 0 };
                 while p < end {
                     let row = rows.as_ptr().add(p).cast::<A::Scalar>();
-                    let j = A::decode(*row.add(3)) as usize;
+                    let j = (*row.add(3)).decode() as usize;
                     let there = slopes.add(width * j);
                     let slope = if SEVERAL {
                         *own.add(*swept.species.get_unchecked(j) as usize) + *there.add(si)
@@ -152,8 +188,7 @@ pub unsafe fn second_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const T
                     let at = base.add(4 * j);
                     I::Quad::load(at).sub(force).store(at);
                     if TALLY {
-                        let share = near.shares[pass][p].wide();
-                        add_dyad(near.distances[pass][p], *rows.get_unchecked(p), slope * share, virial);
+                        add_dyad(apart[p], *rows.get_unchecked(p), slope, virial);
                     }
                     p += 1;
                 }
@@ -166,8 +201,9 @@ pub unsafe fn second_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const T
 }
 
 #[inline(never)]
-fn add_dyad<T: Scalar>(d: [T; 3], g: [T; 4], factor: f64, virial: &mut [f64; 6]) {
-    let d = d.map(T::wide);
+fn add_dyad<T: Scalar>(apart: [T; 4], g: [T; 4], slope: f64, virial: &mut [f64; 6]) {
+    let d = apart.map(T::wide);
+    let factor = slope * d[3];
     let f = [g[0].wide() * factor, g[1].wide() * factor, g[2].wide() * factor];
     for (k, (a, b)) in [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)].into_iter().enumerate() {
         virial[k] += f[a] * d[b];

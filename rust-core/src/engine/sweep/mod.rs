@@ -12,10 +12,12 @@
 //! to another has accumulators of its own, so sums are the same for any number of threads.
 
 mod arithmetic;
+mod aside;
 mod block;
 mod chunks;
 mod compiled;
 mod evaluate;
+mod forces;
 mod frame;
 mod grid;
 mod layer;
@@ -23,10 +25,12 @@ mod look;
 mod machine;
 mod many_body;
 mod pool;
+mod quantum;
 mod scatter;
 mod settings;
 mod simd;
 mod terms;
+mod thermostat;
 mod windows;
 
 pub use pool::{Pool, part};

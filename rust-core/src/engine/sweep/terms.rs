@@ -19,13 +19,57 @@ pub struct Terms<T> {
     pub passes: Vec<Pass<T>>,
 }
 
+/// A number for each pair of species, row-major, and room for a vector.
+#[derive(Debug, Clone)]
+pub struct Table<T> {
+    entries: Vec<T>,
+    count: usize,
+}
+
+impl<T: Scalar> Table<T> {
+    fn new(entries: impl IntoIterator<Item = T>) -> Table<T> {
+        let mut entries: Vec<T> = entries.into_iter().collect();
+        let count = entries.len();
+        entries.resize(count.max(16), T::default());
+        Table { entries, count }
+    }
+
+    fn of(count: usize, value: T) -> Table<T> {
+        Table::new(std::iter::repeat_n(value, count))
+    }
+
+    /// How many entries there are.
+    #[inline(always)]
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    #[inline(always)]
+    pub fn as_ptr(&self) -> *const T {
+        self.entries.as_ptr()
+    }
+}
+
+impl<T> std::ops::Index<usize> for Table<T> {
+    type Output = T;
+    fn index(&self, at: usize) -> &T {
+        &self.entries[at]
+    }
+}
+
+impl<T> std::ops::IndexMut<usize> for Table<T> {
+    fn index_mut(&mut self, at: usize) -> &mut T {
+        &mut self.entries[at]
+    }
+}
+
 /// `a (1 − r/R)`.
 #[derive(Debug, Clone)]
 pub struct Soft<T> {
-    pub strength: Vec<T>,
-    pub inverse_range: Vec<T>,
+    pub strength: Table<T>,
+    pub inverse_range: Table<T>,
     /// `½ a R`.
-    pub energy: Vec<T>,
+    pub energy: Table<T>,
 }
 
 /// `−(c_αβ + c_βα) w′(r)` of a density that every ψ is linear in.
@@ -36,26 +80,26 @@ pub struct Linear<T> {
     pub force_kind: KernelKind,
     pub force_inverse_range: T,
     /// `−(c_αβ + c_βα)` times the factor of `w′`.
-    pub force: Vec<T>,
+    pub force: Table<T>,
     /// `c_αβ + c_βα` times the factor of `w`.
-    pub energy: Vec<T>,
+    pub energy: Table<T>,
 }
 
 /// `a [A W(r, R_A) − B W(r, R_B)]`.
 #[derive(Debug, Clone)]
 pub struct Spline<T> {
-    pub repulsion: Vec<T>,
-    pub attraction: Vec<T>,
-    pub repulsion_inverse_range: Vec<T>,
-    pub attraction_inverse_range: Vec<T>,
+    pub repulsion: Table<T>,
+    pub attraction: Table<T>,
+    pub repulsion_inverse_range: Table<T>,
+    pub attraction_inverse_range: Table<T>,
 }
 
 /// `−γ w_R² (ê·v) + σ w_R ξ dt^{−1/2}`.
 #[derive(Debug, Clone)]
 pub struct Drag<T> {
-    pub gamma: Vec<T>,
-    pub sigma: Vec<T>,
-    pub inverse_range: Vec<T>,
+    pub gamma: Table<T>,
+    pub sigma: Table<T>,
+    pub inverse_range: Table<T>,
     pub exponent: Exponent<T>,
 }
 
@@ -64,7 +108,7 @@ pub struct Drag<T> {
 pub enum Exponent<T> {
     One,
     Two,
-    Any(Vec<T>),
+    Any(Table<T>),
 }
 
 impl<T: Scalar> Exponent<T> {
@@ -75,7 +119,7 @@ impl<T: Scalar> Exponent<T> {
         } else if all(2.0) {
             Exponent::Two
         } else {
-            Exponent::Any(plan.exponent.iter().map(|x| T::of(*x)).collect())
+            Exponent::Any(Table::new(plan.exponent.iter().map(|x| T::of(*x))))
         }
     }
 }
@@ -106,11 +150,10 @@ impl<T: Scalar> Terms<T> {
             terms.add_pair(term);
         }
         for term in &plan.linear {
-            let both = |factor: f64| -> Vec<T> {
+            let both = |factor: f64| -> Table<T> {
                 let c = &term.coefficients;
-                (0..count * count)
-                    .map(|p| T::of(factor * (c[p] + c[p % count * count + p / count])))
-                    .collect()
+                let sum = |p: usize| c[p] + c[p % count * count + p / count];
+                Table::new((0..count * count).map(|p| T::of(factor * sum(p))))
             };
             terms.linear.push(Linear {
                 kind: term.kernel.kind(),
@@ -127,9 +170,9 @@ impl<T: Scalar> Terms<T> {
             .map(|d| Pass::new(&plan.densities[*d].kernel, &plan.densities[*d].force_kernel))
             .collect();
         terms.drag = plan.thermostat.as_ref().map(|t| Drag {
-            gamma: t.gamma.iter().map(|x| T::of(*x)).collect(),
-            sigma: t.sigma.iter().map(|x| T::of(*x)).collect(),
-            inverse_range: t.range.iter().map(|x| T::of(inverse(*x))).collect(),
+            gamma: Table::new(t.gamma.iter().map(|x| T::of(*x))),
+            sigma: Table::new(t.sigma.iter().map(|x| T::of(*x))),
+            inverse_range: Table::new(t.range.iter().map(|x| T::of(inverse(*x)))),
             exponent: Exponent::new(t),
         });
         terms
@@ -144,13 +187,13 @@ impl<T: Scalar> Terms<T> {
         let places = self.places(term.between);
         let size = self.species * self.species;
         let far = T::of(inverse(0.0));
-        let zero = || vec![T::default(); size];
+        let zero = || Table::of(size, T::default());
         match &term.potential {
             PairPotential::Soft(form) => {
                 // The first table that has no such pair yet.
                 let free = self.soft.iter().position(|s| s.inverse_range[places[0]] == far);
                 let at = free.unwrap_or_else(|| {
-                    let table = Soft { strength: zero(), inverse_range: vec![far; size], energy: zero() };
+                    let table = Soft { strength: zero(), inverse_range: Table::of(size, far), energy: zero() };
                     self.soft.push(table);
                     self.soft.len() - 1
                 });
@@ -166,8 +209,8 @@ impl<T: Scalar> Terms<T> {
                     self.spline.push(Spline {
                         repulsion: zero(),
                         attraction: zero(),
-                        repulsion_inverse_range: vec![far; size],
-                        attraction_inverse_range: vec![far; size],
+                        repulsion_inverse_range: Table::of(size, far),
+                        attraction_inverse_range: Table::of(size, far),
                     });
                     self.spline.len() - 1
                 });

@@ -4,6 +4,7 @@ use super::arithmetic::Record;
 use super::frame::Frame;
 use super::grid::Grid;
 use super::layer::Swept;
+use super::quantum::JOINED;
 use super::simd::{Isa, Reals, Scalar};
 use crate::model::kernel::Real;
 
@@ -15,9 +16,9 @@ pub struct Windows {
     pub there: [f32; 5],
     /// Added to the number of a particle: copies of the first layer are behind the last.
     pub behind: [u32; 5],
-    /// Taken from the position of a particle that looks into each, in the period before, the same, and the
-    /// next: entry `w + 5 (wrap + 1)` of x, y and z.
-    pub shift: [[f32; 16]; 3],
+    /// Added to the positions of particles there, in the period before, the same, and the next: entry
+    /// `w + 5 (wrap + 1)`.
+    pub shift: [[u16; 3]; 15],
     /// Whether any shift of the same period is not zero.
     pub crosses: bool,
     /// The first owned particle of each, and one past the last.
@@ -32,7 +33,7 @@ impl Windows {
             row: [own.as_ptr(); 5],
             there: [0.0; 5],
             behind: [0; 5],
-            shift: [[0.0; 16]; 3],
+            shift: [[0; 3]; 15],
             crosses: false,
             owned: [[0; 2]; 5],
         };
@@ -68,7 +69,8 @@ impl Windows {
             for (period, entry) in [(-1.0, w), (0.0, w + 5), (1.0, w + 10)] {
                 for c in 0..3 {
                     let along = if c == 0 { period * frame.length[0] } else { 0.0 };
-                    windows.shift[c][entry] = (shift[c] + along) as f32;
+                    let units = (shift[c] + along) * swept.quantum.per_length;
+                    windows.shift[entry][c] = units.round() as i64 as u16;
                 }
             }
         }
@@ -98,6 +100,8 @@ pub struct View {
     pub periodic: bool,
     pub tilted: bool,
     pub bins: i32,
+    /// Two particles no further apart than this along x look together.
+    pub joined: f32,
 }
 
 impl View {
@@ -113,6 +117,7 @@ impl View {
             periodic: frame.periodic[0],
             tilted: frame.is_tilted(),
             bins: grid.bins as i32,
+            joined: (JOINED * frame.length[0] / grid.bins as f64) as f32,
         }
     }
 

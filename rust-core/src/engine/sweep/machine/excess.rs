@@ -51,7 +51,7 @@ impl<P: Compiled> Machine<P> {
                 this.gather_densities(layer, &own, densities);
                 let mut rows = Rows { first, columns: &this.columns, densities, excess, slopes };
                 let species = |s: usize| match (this.ghost.get(s), this.species.get(s)) {
-                    (Some(ghost), _) if *ghost > 0.0 => -1,
+                    (Some(true), _) => -1,
                     (_, Some(species)) => *species as i32,
                     _ => 0,
                 };

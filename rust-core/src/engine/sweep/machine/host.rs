@@ -97,7 +97,7 @@ impl<P: Compiled> Machine<P> {
         }
         if self.totals {
             for (s, excess) in self.excess.iter().enumerate() {
-                if self.ghost.get(s).is_none_or(|g| *g == 0.0) {
+                if self.ghost.get(s).is_none_or(|g| !*g) {
                     tally.excess += excess;
                 }
             }
@@ -142,10 +142,9 @@ impl<P: Compiled> Machine<P> {
             .near
             .iter()
             .map(|n| {
-                n.rows.iter().map(bytes).sum::<usize>()
+                n.rows.iter().chain(&n.apart).map(|rows| rows.bytes()).sum::<usize>()
                     + n.counts.iter().map(bytes).sum::<usize>()
-                    + n.distances.iter().map(bytes).sum::<usize>()
-                    + n.shares.iter().map(bytes).sum::<usize>()
+                    + bytes(&n.members)
             })
             .sum();
         near + bytes(&self.cell)
@@ -154,9 +153,11 @@ impl<P: Compiled> Machine<P> {
             + bytes(&self.start)
             + bytes(&self.order)
             + self.x.iter().map(bytes).sum::<usize>()
+            + self.q.iter().map(bytes).sum::<usize>()
             + bytes(&self.records)
             + bytes(&self.species)
             + bytes(&self.ghost)
+            + bytes(&self.owned_bits)
             + bytes(&self.sums)
             + bytes(&self.densities)
             + bytes(&self.rows)

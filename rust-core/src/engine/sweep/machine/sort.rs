@@ -8,6 +8,7 @@ use crate::engine::sweep::frame::Frame;
 use crate::engine::sweep::grid::Grid;
 use crate::engine::sweep::many_body::NearPairs;
 use crate::engine::sweep::pool::{Pool, part};
+use crate::engine::sweep::quantum::Quantum;
 use crate::engine::tally::Tally;
 
 impl<P: Compiled> Machine<P> {
@@ -51,6 +52,7 @@ impl<P: Compiled> Machine<P> {
     /// Sorts the particles into the bins of `grid`.
     pub fn sort(&mut self, pool: &Pool, frame: Frame, grid: Grid, given: &Given) -> Result<(), EngineError> {
         (self.frame, self.grid) = (frame, grid);
+        self.quantum = Quantum::new(&frame, &grid);
         let (threads, cells) = (pool.threads(), grid.cells());
         let all = given.particles.x.len();
         (self.all, self.owned) = (all, given.particles.owned);
@@ -134,10 +136,14 @@ impl<P: Compiled> Machine<P> {
         for x in &mut self.x {
             x.resize(total + SLACK, 0.0);
         }
+        // A chunk of sixteen, and one that is not used, may begin behind the last.
+        for q in &mut self.q {
+            q.resize(total + 4 * SLACK, 0);
+        }
         self.order.resize(self.particles, 0);
         self.records.resize(total.max(1), P::Record::default());
         self.species.resize(if several { total.max(1) } else { 0 }, 0);
-        self.ghost.resize(if with_ghosts { total + SLACK } else { 0 }, 0.0);
+        self.ghost.resize(if with_ghosts { total + SLACK } else { 0 }, false);
         let frame = &self.frame;
         let tilted = frame.is_tilted();
         let flat = if frame.dimensions == 3 { 1.0 } else { 0.0 };
@@ -151,6 +157,9 @@ impl<P: Compiled> Machine<P> {
         );
         let x =
             [Shared(self.x[0].as_mut_ptr()), Shared(self.x[1].as_mut_ptr()), Shared(self.x[2].as_mut_ptr())];
+        let q =
+            [Shared(self.q[0].as_mut_ptr()), Shared(self.q[1].as_mut_ptr()), Shared(self.q[2].as_mut_ptr())];
+        let quantum = self.quantum;
         let (cell, unit, counts) = (&self.cell, &self.unit, Shared(self.counts.as_mut_ptr()));
         let moving = given.thermostat.is_some();
         pool.run(&|t| {
@@ -173,6 +182,7 @@ impl<P: Compiled> Machine<P> {
                     }
                     for c in 0..3 {
                         *x[c].at(s) = point[c] as f32;
+                        *q[c].at(s) = quantum.of(point[c]);
                     }
                     let kind = if several { species_of(given, k).unwrap_or(0) as u32 } else { 0 };
                     let v = if moving { *given.v.get_unchecked(k) } else { [0.0; 3] };
@@ -182,7 +192,7 @@ impl<P: Compiled> Machine<P> {
                         *species.at(s) = kind as u8;
                     }
                     if with_ghosts {
-                        *ghost.at(s) = if k < given.particles.owned { 0.0 } else { 1.0 };
+                        *ghost.at(s) = k >= given.particles.owned;
                     }
                 }
             }
@@ -194,16 +204,20 @@ impl<P: Compiled> Machine<P> {
     /// The owned particles of each row, if there are ghosts.
     fn find_owned(&mut self) {
         self.owned_of_row.clear();
+        self.owned_bits.clear();
         if self.ghost.is_empty() {
             return;
         }
+        let bits = |ghosts: &[bool]| ghosts.iter().enumerate().map(|(k, g)| (!g as u8) << k).sum::<u8>();
+        self.owned_bits.extend(self.ghost.chunks(8).map(bits));
+        self.owned_bits.resize(self.owned_bits.len() + SLACK, 0);
         let bins = self.grid.bins;
         for row in 0..self.grid.rows * self.grid.layers {
             let (first, end) = (self.start[row * bins] as usize, self.start[(row + 1) * bins] as usize);
             let ghosts = &self.ghost[first..end];
-            let owned = match ghosts.iter().position(|g| *g == 0.0) {
+            let owned = match ghosts.iter().position(|g| !*g) {
                 Some(a) => {
-                    let b = ghosts.iter().rposition(|g| *g == 0.0).unwrap_or(a);
+                    let b = ghosts.iter().rposition(|g| !*g).unwrap_or(a);
                     [(first + a) as u32, (first + b + 1) as u32]
                 }
                 None => [0, 0],
@@ -238,8 +252,10 @@ impl<P: Compiled> Machine<P> {
         let (n, copies) = (self.particles, self.layer(0).1);
         let edge = self.frame.edge(self.grid.layer_axis);
         for c in 0..3 {
+            let shift = (edge[c] * self.quantum.per_length).round() as i64 as u16;
             for k in 0..copies {
                 self.x[c][n + k] = (self.x[c][k] as f64 + edge[c]) as f32;
+                self.q[c][n + k] = self.q[c][k].wrapping_add(shift);
             }
         }
         self.records.copy_within(..copies, n);

@@ -1,7 +1,7 @@
 //! AVX2 with FMA and BMI2.
 
 use super::avx512::{F64x4 as Quad4, operators};
-use super::{Isa, Reals, Words};
+use super::{Isa, ORDINARY_F32, ORDINARY_F64, Point16, Reals, Words};
 use crate::model::kernel::Real;
 use std::arch::x86_64::*;
 use std::ops::{Add, Mul, Sub};
@@ -20,7 +20,11 @@ pub struct F64x4(__m256d);
 
 /// Eight `u32`.
 #[derive(Clone, Copy)]
-pub struct U32x8(__m256i);
+pub struct U32x8(pub(super) __m256i);
+
+/// Four `u32`.
+#[derive(Clone, Copy)]
+pub struct U32x4(__m128i);
 
 operators!(F32x8, _mm256_set1_ps as f32, _mm256_add_ps, _mm256_sub_ps, _mm256_mul_ps, _mm256_max_ps);
 operators!(F64x4, _mm256_set1_pd as f64, _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_max_pd);
@@ -60,6 +64,7 @@ fn doubled(mask: u32) -> u32 {
 
 impl Reals for F32x8 {
     type Scalar = f32;
+    type Words = U32x8;
     const LANES: usize = 8;
 
     #[inline(always)]
@@ -75,8 +80,13 @@ impl Reals for F32x8 {
         unsafe { _mm256_storeu_ps(p, self.0) }
     }
     #[inline(always)]
-    unsafe fn load_signed(p: *const i32) -> Self {
-        unsafe { F32x8(_mm256_cvtepi32_ps(_mm256_loadu_si256(p.cast()))) }
+    unsafe fn of_signed(words: U32x8) -> Self {
+        unsafe { F32x8(_mm256_cvtepi32_ps(words.0)) }
+    }
+    #[inline(always)]
+    unsafe fn encode(words: U32x8) -> Self {
+        let ordinary = ORDINARY_F32 as i32;
+        unsafe { F32x8(_mm256_castsi256_ps(_mm256_add_epi32(words.0, _mm256_set1_epi32(ordinary)))) }
     }
     #[inline(always)]
     unsafe fn mul_add(self, a: Self, b: Self) -> Self {
@@ -117,12 +127,16 @@ impl Reals for F32x8 {
         unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0)) as u32 }
     }
     #[inline(always)]
-    unsafe fn compress(self, mask: u32, p: *mut f32) {
-        unsafe { _mm256_storeu_ps(p, _mm256_permutevar8x32_ps(self.0, order(mask))) }
+    unsafe fn compress(self, mask: u32) -> Self {
+        unsafe { F32x8(_mm256_permutevar8x32_ps(self.0, order(mask))) }
     }
     #[inline(always)]
-    unsafe fn lookup(table: *const f32, index: *const u32) -> Self {
-        unsafe { F32x8(_mm256_i32gather_ps::<4>(table, _mm256_loadu_si256(index.cast()))) }
+    unsafe fn pick(table: *const f32, which: U32x8) -> Self {
+        unsafe { F32x8(_mm256_permutevar8x32_ps(_mm256_loadu_ps(table), which.0)) }
+    }
+    #[inline(always)]
+    unsafe fn lookup(table: *const f32, index: U32x8) -> Self {
+        unsafe { F32x8(_mm256_i32gather_ps::<4>(table, index.0)) }
     }
     #[inline(always)]
     unsafe fn columns(base: *const u8, stride: usize, index: *const u32) -> [Self; 4] {
@@ -200,6 +214,7 @@ unsafe fn transposed([a, b, c, d]: [__m256d; 4]) -> [__m256d; 4] {
 
 impl Reals for F64x4 {
     type Scalar = f64;
+    type Words = U32x4;
     const LANES: usize = 4;
 
     #[inline(always)]
@@ -215,8 +230,15 @@ impl Reals for F64x4 {
         unsafe { _mm256_storeu_pd(p, self.0) }
     }
     #[inline(always)]
-    unsafe fn load_signed(p: *const i32) -> Self {
-        unsafe { F64x4(_mm256_cvtepi32_pd(_mm_loadu_si128(p.cast()))) }
+    unsafe fn of_signed(words: U32x4) -> Self {
+        unsafe { F64x4(_mm256_cvtepi32_pd(words.0)) }
+    }
+    #[inline(always)]
+    unsafe fn encode(words: U32x4) -> Self {
+        unsafe {
+            let ordinary = _mm256_set1_epi64x(ORDINARY_F64 as i64);
+            F64x4(_mm256_castsi256_pd(_mm256_or_si256(_mm256_cvtepu32_epi64(words.0), ordinary)))
+        }
     }
     #[inline(always)]
     unsafe fn mul_add(self, a: Self, b: Self) -> Self {
@@ -251,15 +273,26 @@ impl Reals for F64x4 {
         unsafe { _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(self.0, other.0)) as u32 }
     }
     #[inline(always)]
-    unsafe fn compress(self, mask: u32, p: *mut f64) {
+    unsafe fn compress(self, mask: u32) -> Self {
         unsafe {
             let pairs = _mm256_permutevar8x32_ps(_mm256_castpd_ps(self.0), order(doubled(mask)));
-            _mm256_storeu_pd(p, _mm256_castps_pd(pairs));
+            F64x4(_mm256_castps_pd(pairs))
         }
     }
     #[inline(always)]
-    unsafe fn lookup(table: *const f64, index: *const u32) -> Self {
-        unsafe { F64x4(_mm256_i32gather_pd::<8>(table, _mm_loadu_si128(index.cast()))) }
+    unsafe fn pick(table: *const f64, which: U32x4) -> Self {
+        unsafe {
+            // Words 2k and 2k + 1.
+            let even = _mm256_slli_epi64::<1>(_mm256_cvtepu32_epi64(which.0));
+            let words = _mm256_or_si256(even, _mm256_slli_epi64::<32>(even));
+            let words = _mm256_or_si256(words, _mm256_set1_epi64x(1 << 32));
+            let table = _mm256_castpd_ps(_mm256_loadu_pd(table));
+            F64x4(_mm256_castps_pd(_mm256_permutevar8x32_ps(table, words)))
+        }
+    }
+    #[inline(always)]
+    unsafe fn lookup(table: *const f64, index: U32x4) -> Self {
+        unsafe { F64x4(_mm256_i32gather_pd::<8>(table, index.0)) }
     }
     #[inline(always)]
     unsafe fn columns(base: *const u8, stride: usize, index: *const u32) -> [Self; 4] {
@@ -331,31 +364,147 @@ impl Words for U32x8 {
         }
     }
     #[inline(always)]
-    unsafe fn compress(self, mask: u32, p: *mut u32) {
-        unsafe { _mm256_storeu_si256(p.cast(), _mm256_permutevar8x32_epi32(self.0, order(mask))) }
+    unsafe fn load_bytes(p: *const u8) -> Self {
+        unsafe { U32x8(_mm256_cvtepu8_epi32(_mm_loadl_epi64(p.cast()))) }
+    }
+    #[inline(always)]
+    unsafe fn pick(table: *const u32, which: Self) -> Self {
+        unsafe { U32x8(_mm256_permutevar8x32_epi32(_mm256_loadu_si256(table.cast()), which.0)) }
+    }
+    #[inline(always)]
+    unsafe fn columns(base: *const u8, stride: usize, index: *const u32) -> [Self; 4] {
+        let [a, b, c, d] = unsafe { columns_of_words(base, stride, index) };
+        [U32x8(a), U32x8(b), U32x8(c), U32x8(d)]
+    }
+}
+
+impl Words for U32x4 {
+    const LANES: usize = 4;
+
+    #[inline(always)]
+    unsafe fn splat(x: u32) -> Self {
+        unsafe { U32x4(_mm_set1_epi32(x as i32)) }
+    }
+    #[inline(always)]
+    unsafe fn load(p: *const u32) -> Self {
+        unsafe { U32x4(_mm_loadu_si128(p.cast())) }
+    }
+    #[inline(always)]
+    unsafe fn store(self, p: *mut u32) {
+        unsafe { _mm_storeu_si128(p.cast(), self.0) }
+    }
+    #[inline(always)]
+    unsafe fn add(self, other: Self) -> Self {
+        unsafe { U32x4(_mm_add_epi32(self.0, other.0)) }
+    }
+    #[inline(always)]
+    unsafe fn sub(self, other: Self) -> Self {
+        unsafe { U32x4(_mm_sub_epi32(self.0, other.0)) }
+    }
+    #[inline(always)]
+    unsafe fn xor(self, other: Self) -> Self {
+        unsafe { U32x4(_mm_xor_si128(self.0, other.0)) }
+    }
+    #[inline(always)]
+    unsafe fn min(self, other: Self) -> Self {
+        unsafe { U32x4(_mm_min_epu32(self.0, other.0)) }
+    }
+    #[inline(always)]
+    unsafe fn max(self, other: Self) -> Self {
+        unsafe { U32x4(_mm_max_epu32(self.0, other.0)) }
+    }
+    #[inline(always)]
+    unsafe fn rotate(self, by: u32) -> Self {
+        unsafe {
+            let left = _mm_sll_epi32(self.0, _mm_cvtsi32_si128(by as i32));
+            let right = _mm_srl_epi32(self.0, _mm_cvtsi32_si128(32 - by as i32));
+            U32x4(_mm_or_si128(left, right))
+        }
+    }
+    #[inline(always)]
+    unsafe fn load_bytes(p: *const u8) -> Self {
+        unsafe { U32x4(_mm_cvtepu8_epi32(_mm_cvtsi32_si128(p.cast::<i32>().read_unaligned()))) }
+    }
+    #[inline(always)]
+    unsafe fn pick(table: *const u32, which: Self) -> Self {
+        unsafe { U32x4(_mm_castps_si128(_mm_permutevar_ps(_mm_loadu_ps(table.cast()), which.0))) }
+    }
+    #[inline(always)]
+    unsafe fn columns(base: *const u8, stride: usize, index: *const u32) -> [Self; 4] {
+        unsafe {
+            let mut rows = [[0u32; 4]; 4];
+            for (k, row) in rows.iter_mut().enumerate() {
+                *row = base.add(*index.add(k) as usize * stride).cast::<[u32; 4]>().read_unaligned();
+            }
+            std::array::from_fn(|c| {
+                let column = [rows[0][c], rows[1][c], rows[2][c], rows[3][c]];
+                Self::load(column.as_ptr())
+            })
+        }
     }
 }
 
 impl Isa for Avx2 {
     type F32 = F32x8;
     type F64 = F64x4;
-    type U32 = U32x8;
     type Quad = Quad4;
 
     #[inline(always)]
-    unsafe fn signed(words: U32x8) -> F32x8 {
-        unsafe { F32x8(_mm256_cvtepi32_ps(words.0)) }
+    unsafe fn near<const SHIFTS: bool>(
+        x: [*const u16; 3],
+        shift: [u16; 3],
+        a: &Point16,
+        b: &Point16,
+        limit: i16,
+    ) -> u32 {
+        unsafe {
+            let [mut sa, mut sb] = [_mm256_setzero_si256(); 2];
+            let mut c = 0;
+            while c < 3 {
+                let mut there = _mm256_loadu_si256(x[c].cast());
+                if SHIFTS {
+                    there = _mm256_add_epi16(there, _mm256_set1_epi16(shift[c] as i16));
+                }
+                let da = _mm256_sub_epi16(_mm256_load_si256(a.0[c].as_ptr().cast()), there);
+                let db = _mm256_sub_epi16(_mm256_load_si256(b.0[c].as_ptr().cast()), there);
+                sa = _mm256_adds_epi16(sa, _mm256_mulhi_epi16(da, da));
+                sb = _mm256_adds_epi16(sb, _mm256_mulhi_epi16(db, db));
+                c += 1;
+            }
+            let limit = _mm256_set1_epi16(limit);
+            let (na, nb) = (_mm256_cmpgt_epi16(limit, sa), _mm256_cmpgt_epi16(limit, sb));
+            // Halves of both follow each other; then those of one.
+            let bytes = _mm256_permute4x64_epi64::<0b11_01_10_00>(_mm256_packs_epi16(na, nb));
+            _mm256_movemask_epi8(bytes) as u32
+        }
     }
     #[inline(always)]
-    unsafe fn word_columns(base: *const u8, stride: usize, index: *const u32) -> [U32x8; 4] {
-        let [a, b, c, d] = unsafe { columns_of_words(base, stride, index) };
-        [U32x8(a), U32x8(b), U32x8(c), U32x8(d)]
+    unsafe fn fill16(x: u16, p: &mut [u16; 16]) {
+        unsafe { _mm256_storeu_si256(p.as_mut_ptr().cast(), _mm256_set1_epi16(x as i16)) }
     }
     #[inline(always)]
     unsafe fn collect(first: u32, mask: u32, p: *mut u32) {
         unsafe {
             let index = _mm256_add_epi32(_mm256_set1_epi32(first as i32), order(mask));
             _mm256_storeu_si256(p.cast(), index);
+            let p = p.add((mask & 0xff).count_ones() as usize);
+            let index = _mm256_add_epi32(_mm256_set1_epi32(first as i32 + 8), order(mask >> 8));
+            _mm256_storeu_si256(p.cast(), index);
+        }
+    }
+    #[inline(always)]
+    unsafe fn bits(x: F32x8) -> U32x8 {
+        unsafe { U32x8(_mm256_castps_si256(x.0)) }
+    }
+    #[inline(always)]
+    unsafe fn halves(x: F64x4) -> [U32x4; 2] {
+        unsafe {
+            let low = _mm_castpd_ps(_mm256_castpd256_pd128(x.0));
+            let high = _mm_castpd_ps(_mm256_extractf128_pd::<1>(x.0));
+            [
+                U32x4(_mm_castps_si128(_mm_shuffle_ps::<0x88>(low, high))),
+                U32x4(_mm_castps_si128(_mm_shuffle_ps::<0xdd>(low, high))),
+            ]
         }
     }
 }

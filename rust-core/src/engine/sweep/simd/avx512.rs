@@ -1,6 +1,7 @@
 //! AVX-512 (F, BW, DQ, VL), with AVX2, FMA and BMI2.
 
-use super::{Isa, Quad, Reals, Words};
+use super::avx2::U32x8;
+use super::{Isa, ORDINARY_F32, ORDINARY_F64, Point16, Quad, Reals, Words};
 use crate::model::kernel::Real;
 use std::arch::x86_64::*;
 use std::ops::{Add, Mul, Sub};
@@ -69,6 +70,7 @@ operators!(F64x8, _mm512_set1_pd as f64, _mm512_add_pd, _mm512_sub_pd, _mm512_mu
 
 impl Reals for F32x16 {
     type Scalar = f32;
+    type Words = U32x16;
     const LANES: usize = 16;
 
     #[inline(always)]
@@ -84,8 +86,15 @@ impl Reals for F32x16 {
         unsafe { _mm512_storeu_ps(p, self.0) }
     }
     #[inline(always)]
-    unsafe fn load_signed(p: *const i32) -> Self {
-        unsafe { F32x16(_mm512_cvtepi32_ps(_mm512_loadu_si512(p.cast()))) }
+    unsafe fn of_signed(words: U32x16) -> Self {
+        unsafe { F32x16(_mm512_cvtepi32_ps(words.0)) }
+    }
+    #[inline(always)]
+    unsafe fn encode(words: U32x16) -> Self {
+        let ordinary = ORDINARY_F32 as i32;
+        unsafe {
+            F32x16(_mm512_castsi512_ps(_mm512_add_epi32(words.0, _mm512_set1_epi32(ordinary))))
+        }
     }
     #[inline(always)]
     unsafe fn mul_add(self, a: Self, b: Self) -> Self {
@@ -127,13 +136,16 @@ impl Reals for F32x16 {
         unsafe { _mm512_cmp_ps_mask::<_CMP_LT_OQ>(self.0, other.0) as u32 }
     }
     #[inline(always)]
-    unsafe fn compress(self, mask: u32, p: *mut f32) {
-        // In a register: the form that writes memory is slow on some processors.
-        unsafe { _mm512_storeu_ps(p, _mm512_maskz_compress_ps(mask as u16, self.0)) }
+    unsafe fn compress(self, mask: u32) -> Self {
+        unsafe { F32x16(_mm512_maskz_compress_ps(mask as u16, self.0)) }
     }
     #[inline(always)]
-    unsafe fn lookup(table: *const f32, index: *const u32) -> Self {
-        unsafe { F32x16(_mm512_i32gather_ps::<4>(_mm512_loadu_si512(index.cast()), table.cast())) }
+    unsafe fn pick(table: *const f32, which: U32x16) -> Self {
+        unsafe { F32x16(_mm512_permutexvar_ps(which.0, _mm512_loadu_ps(table))) }
+    }
+    #[inline(always)]
+    unsafe fn lookup(table: *const f32, index: U32x16) -> Self {
+        unsafe { F32x16(_mm512_i32gather_ps::<4>(index.0, table.cast())) }
     }
     #[inline(always)]
     unsafe fn columns(base: *const u8, stride: usize, index: *const u32) -> [Self; 4] {
@@ -197,10 +209,11 @@ unsafe fn columns_of_words(base: *const u8, stride: usize, index: *const u32) ->
         let mut v = [_mm512_setzero_si512(); 4];
         let mut k = 0;
         while k < 4 {
+            // Broadcasts from memory that write a quarter each: loads, unlike insertions, are no shuffles.
             let quarter = _mm512_castsi128_si512(row(base, stride, index, k));
-            let quarter = _mm512_inserti32x4::<1>(quarter, row(base, stride, index, k + 4));
-            let quarter = _mm512_inserti32x4::<2>(quarter, row(base, stride, index, k + 8));
-            v[k] = _mm512_inserti32x4::<3>(quarter, row(base, stride, index, k + 12));
+            let quarter = _mm512_mask_broadcast_i32x4(quarter, 0x00f0, row(base, stride, index, k + 4));
+            let quarter = _mm512_mask_broadcast_i32x4(quarter, 0x0f00, row(base, stride, index, k + 8));
+            v[k] = _mm512_mask_broadcast_i32x4(quarter, 0xf000, row(base, stride, index, k + 12));
             k += 1;
         }
         let a = _mm512_unpacklo_epi32(v[0], v[1]);
@@ -218,6 +231,7 @@ unsafe fn columns_of_words(base: *const u8, stride: usize, index: *const u32) ->
 
 impl Reals for F64x8 {
     type Scalar = f64;
+    type Words = U32x8;
     const LANES: usize = 8;
 
     #[inline(always)]
@@ -233,8 +247,15 @@ impl Reals for F64x8 {
         unsafe { _mm512_storeu_pd(p, self.0) }
     }
     #[inline(always)]
-    unsafe fn load_signed(p: *const i32) -> Self {
-        unsafe { F64x8(_mm512_cvtepi32_pd(_mm256_loadu_si256(p.cast()))) }
+    unsafe fn of_signed(words: U32x8) -> Self {
+        unsafe { F64x8(_mm512_cvtepi32_pd(words.0)) }
+    }
+    #[inline(always)]
+    unsafe fn encode(words: U32x8) -> Self {
+        unsafe {
+            let ordinary = _mm512_set1_epi64(ORDINARY_F64 as i64);
+            F64x8(_mm512_castsi512_pd(_mm512_or_si512(_mm512_cvtepu32_epi64(words.0), ordinary)))
+        }
     }
     #[inline(always)]
     unsafe fn mul_add(self, a: Self, b: Self) -> Self {
@@ -280,12 +301,18 @@ impl Reals for F64x8 {
         unsafe { _mm512_cmp_pd_mask::<_CMP_LT_OQ>(self.0, other.0) as u32 }
     }
     #[inline(always)]
-    unsafe fn compress(self, mask: u32, p: *mut f64) {
-        unsafe { _mm512_storeu_pd(p, _mm512_maskz_compress_pd(mask as u8, self.0)) }
+    unsafe fn compress(self, mask: u32) -> Self {
+        unsafe { F64x8(_mm512_maskz_compress_pd(mask as u8, self.0)) }
     }
     #[inline(always)]
-    unsafe fn lookup(table: *const f64, index: *const u32) -> Self {
-        unsafe { F64x8(_mm512_i32gather_pd::<8>(_mm256_loadu_si256(index.cast()), table.cast())) }
+    unsafe fn pick(table: *const f64, which: U32x8) -> Self {
+        unsafe {
+            F64x8(_mm512_permutexvar_pd(_mm512_cvtepu32_epi64(which.0), _mm512_loadu_pd(table)))
+        }
+    }
+    #[inline(always)]
+    unsafe fn lookup(table: *const f64, index: U32x8) -> Self {
+        unsafe { F64x8(_mm512_i32gather_pd::<8>(index.0, table.cast())) }
     }
     #[inline(always)]
     unsafe fn columns(base: *const u8, stride: usize, index: *const u32) -> [Self; 4] {
@@ -378,8 +405,17 @@ impl Words for U32x16 {
         unsafe { U32x16(_mm512_rolv_epi32(self.0, _mm512_set1_epi32(by as i32))) }
     }
     #[inline(always)]
-    unsafe fn compress(self, mask: u32, p: *mut u32) {
-        unsafe { _mm512_storeu_si512(p.cast(), _mm512_maskz_compress_epi32(mask as u16, self.0)) }
+    unsafe fn load_bytes(p: *const u8) -> Self {
+        unsafe { U32x16(_mm512_cvtepu8_epi32(_mm_loadu_si128(p.cast()))) }
+    }
+    #[inline(always)]
+    unsafe fn pick(table: *const u32, which: Self) -> Self {
+        unsafe { U32x16(_mm512_permutexvar_epi32(which.0, _mm512_loadu_si512(table.cast()))) }
+    }
+    #[inline(always)]
+    unsafe fn columns(base: *const u8, stride: usize, index: *const u32) -> [Self; 4] {
+        let [a, b, c, d] = unsafe { columns_of_words(base, stride, index).0 };
+        [U32x16(a), U32x16(b), U32x16(c), U32x16(d)]
     }
 }
 
@@ -421,17 +457,38 @@ impl Quad for F64x4 {
 impl Isa for Avx512 {
     type F32 = F32x16;
     type F64 = F64x8;
-    type U32 = U32x16;
     type Quad = F64x4;
 
     #[inline(always)]
-    unsafe fn signed(words: U32x16) -> F32x16 {
-        unsafe { F32x16(_mm512_cvtepi32_ps(words.0)) }
+    unsafe fn near<const SHIFTS: bool>(
+        x: [*const u16; 3],
+        shift: [u16; 3],
+        a: &Point16,
+        b: &Point16,
+        limit: i16,
+    ) -> u32 {
+        unsafe {
+            let [mut sa, mut sb] = [_mm256_setzero_si256(); 2];
+            let mut c = 0;
+            while c < 3 {
+                let mut there = _mm256_loadu_si256(x[c].cast());
+                if SHIFTS {
+                    there = _mm256_add_epi16(there, _mm256_set1_epi16(shift[c] as i16));
+                }
+                let da = _mm256_sub_epi16(_mm256_load_si256(a.0[c].as_ptr().cast()), there);
+                let db = _mm256_sub_epi16(_mm256_load_si256(b.0[c].as_ptr().cast()), there);
+                sa = _mm256_adds_epi16(sa, _mm256_mulhi_epi16(da, da));
+                sb = _mm256_adds_epi16(sb, _mm256_mulhi_epi16(db, db));
+                c += 1;
+            }
+            let limit = _mm256_set1_epi16(limit);
+            let (na, nb) = (_mm256_cmplt_epi16_mask(sa, limit), _mm256_cmplt_epi16_mask(sb, limit));
+            na as u32 | (nb as u32) << 16
+        }
     }
     #[inline(always)]
-    unsafe fn word_columns(base: *const u8, stride: usize, index: *const u32) -> [U32x16; 4] {
-        let [a, b, c, d] = unsafe { columns_of_words(base, stride, index).0 };
-        [U32x16(a), U32x16(b), U32x16(c), U32x16(d)]
+    unsafe fn fill16(x: u16, p: &mut [u16; 16]) {
+        unsafe { _mm256_storeu_si256(p.as_mut_ptr().cast(), _mm256_set1_epi16(x as i16)) }
     }
     #[inline(always)]
     unsafe fn collect(first: u32, mask: u32, p: *mut u32) {
@@ -444,6 +501,20 @@ impl Isa for Avx512 {
             if mask.count_ones() > 8 {
                 _mm256_storeu_si256(p.add(8).cast(), _mm512_extracti64x4_epi64::<1>(packed));
             }
+        }
+    }
+    #[inline(always)]
+    unsafe fn bits(x: F32x16) -> U32x16 {
+        unsafe { U32x16(_mm512_castps_si512(x.0)) }
+    }
+    #[inline(always)]
+    unsafe fn halves(x: F64x8) -> [U32x8; 2] {
+        unsafe {
+            let bits = _mm512_castpd_si512(x.0);
+            [
+                U32x8(_mm512_cvtepi64_epi32(bits)),
+                U32x8(_mm512_cvtepi64_epi32(_mm512_srli_epi64::<32>(bits))),
+            ]
         }
     }
 }

@@ -28,6 +28,8 @@ pub trait Scalar: Copy + Default + Send + Sync + PartialOrd + 'static {
     fn of(x: f64) -> Self;
     /// Widened.
     fn wide(self) -> f64;
+    /// The word that [`Reals::encode`] made this number of.
+    fn decode(self) -> u32;
 }
 
 impl Scalar for f32 {
@@ -38,6 +40,10 @@ impl Scalar for f32 {
     #[inline(always)]
     fn wide(self) -> f64 {
         self as f64
+    }
+    #[inline(always)]
+    fn decode(self) -> u32 {
+        self.to_bits() - ORDINARY_F32
     }
 }
 
@@ -50,18 +56,31 @@ impl Scalar for f64 {
     fn wide(self) -> f64 {
         self
     }
+    #[inline(always)]
+    fn decode(self) -> u32 {
+        self.to_bits() as u32
+    }
 }
+
+/// Bits of a number of ordinary size, to which words below 2²⁹ are added to pass as numbers.
+const ORDINARY_F32: u32 = 0x4000_0000;
+/// The same in double precision, for any word.
+const ORDINARY_F64: u64 = 0x3ff0_0000_0000_0000;
 
 /// A vector of real numbers.
 #[allow(clippy::missing_safety_doc)] // One contract, at the head of the module.
 pub trait Reals: Real {
     type Scalar: Scalar;
+    /// As many words.
+    type Words: Words;
     const LANES: usize;
     unsafe fn splat(x: Self::Scalar) -> Self;
     unsafe fn load(p: *const Self::Scalar) -> Self;
     unsafe fn store(self, p: *mut Self::Scalar);
     /// Signed words as numbers.
-    unsafe fn load_signed(p: *const i32) -> Self;
+    unsafe fn of_signed(words: Self::Words) -> Self;
+    /// Words below 2²⁹ as numbers that no arithmetic is done with.
+    unsafe fn encode(words: Self::Words) -> Self;
     /// `self · a + b`.
     unsafe fn mul_add(self, a: Self, b: Self) -> Self;
     /// `1/√self`, to the precision of the type, for positive numbers.
@@ -77,10 +96,12 @@ pub trait Reals: Real {
     unsafe fn where_below(self, a: Self, b: Self) -> Self;
     /// Bit `k` is set where lane `k` is below that of `other`.
     unsafe fn mask_below(self, other: Self) -> u32;
-    /// Writes the lanes of `mask` one after the other; may write a whole vector.
-    unsafe fn compress(self, mask: u32, p: *mut Self::Scalar);
+    /// The lanes of `mask` one after the other, in the first lanes; anything in the others.
+    unsafe fn compress(self, mask: u32) -> Self;
+    /// `table[which[k]]` in lane `k`, of a table of as many numbers as there are lanes.
+    unsafe fn pick(table: *const Self::Scalar, which: Self::Words) -> Self;
     /// `table[index[k]]` in lane `k`.
-    unsafe fn lookup(table: *const Self::Scalar, index: *const u32) -> Self;
+    unsafe fn lookup(table: *const Self::Scalar, index: Self::Words) -> Self;
     /// The four columns of the rows of four numbers at `base + stride · index[k]` bytes.
     unsafe fn columns(base: *const u8, stride: usize, index: *const u32) -> [Self; 4];
     /// Writes four columns as rows of four.
@@ -100,8 +121,18 @@ pub trait Words: Copy {
     unsafe fn min(self, other: Self) -> Self;
     unsafe fn max(self, other: Self) -> Self;
     unsafe fn rotate(self, by: u32) -> Self;
-    unsafe fn compress(self, mask: u32, p: *mut u32);
+    /// Bytes, widened.
+    unsafe fn load_bytes(p: *const u8) -> Self;
+    /// `table[which[k]]` in lane `k`, of a table of as many words as there are lanes.
+    unsafe fn pick(table: *const u32, which: Self) -> Self;
+    /// As [`Reals::columns`].
+    unsafe fn columns(base: *const u8, stride: usize, index: *const u32) -> [Self; 4];
 }
+
+/// Positions of sixteen particles at most, each coordinate for itself, in units that [`Isa::near`] compares.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(C, align(32))]
+pub struct Point16(pub [[u16; 16]; 3]);
 
 /// Four double-precision numbers: what accumulates on a particle.
 #[allow(clippy::missing_safety_doc)]
@@ -121,12 +152,23 @@ pub trait Quad: Copy {
 pub trait Isa: Copy + Send + Sync + 'static {
     type F32: Reals<Scalar = f32>;
     type F64: Reals<Scalar = f64>;
-    type U32: Words;
     type Quad: Quad;
-    /// Words read as signed numbers.
-    unsafe fn signed(words: Self::U32) -> Self::F32;
-    /// [`Reals::columns`] of words.
-    unsafe fn word_columns(base: *const u8, stride: usize, index: *const u32) -> [Self::U32; 4];
-    /// Writes `first + k` for each bit `k` of `mask`, one after the other; may write a whole vector.
+    /// Which of the sixteen particles from `x[0]`, `x[1]`, `x[2]` on, all moved by `shift`, have a distance to
+    /// `a` and to `b` (each sixteen times the same point) whose square, in units of 2¹⁶, is below `limit`: bits
+    /// from 0 on for `a`, from 16 on for `b`. Coordinates wrap.
+    unsafe fn near<const SHIFTS: bool>(
+        x: [*const u16; 3],
+        shift: [u16; 3],
+        a: &Point16,
+        b: &Point16,
+        limit: i16,
+    ) -> u32;
+    /// Sixteen times the same word.
+    unsafe fn fill16(x: u16, p: &mut [u16; 16]);
+    /// Writes `first + k` for each bit `k` of sixteen, one after the other; may write sixteen.
     unsafe fn collect(first: u32, mask: u32, p: *mut u32);
+    /// The bits of numbers.
+    unsafe fn bits(x: Self::F32) -> <Self::F32 as Reals>::Words;
+    /// The low and the high words of the bits of numbers.
+    unsafe fn halves(x: Self::F64) -> [<Self::F64 as Reals>::Words; 2];
 }

@@ -1,6 +1,6 @@
 //! Plain arrays, which the compiler vectorises for whatever the target has.
 
-use super::{Isa, Quad, Reals, Words};
+use super::{Isa, ORDINARY_F32, ORDINARY_F64, Point16, Quad, Reals, Words};
 use crate::model::kernel::Real;
 use std::ops::{Add, Mul, Sub};
 
@@ -15,7 +15,7 @@ const LANES: usize = 8;
 pub struct Lanes<T>([T; LANES]);
 
 macro_rules! lanes {
-    ($scalar:ty) => {
+    ($scalar:ty, $encode:expr) => {
         impl Add for Lanes<$scalar> {
             type Output = Self;
             #[inline(always)]
@@ -62,6 +62,7 @@ macro_rules! lanes {
 
         impl Reals for Lanes<$scalar> {
             type Scalar = $scalar;
+            type Words = Lanes<u32>;
             const LANES: usize = LANES;
 
             #[inline(always)]
@@ -77,13 +78,16 @@ macro_rules! lanes {
                 unsafe { p.cast::<[$scalar; LANES]>().write_unaligned(self.0) }
             }
             #[inline(always)]
-            unsafe fn load_signed(p: *const i32) -> Self {
-                let words = unsafe { p.cast::<[i32; LANES]>().read_unaligned() };
+            unsafe fn of_signed(words: Lanes<u32>) -> Self {
                 let mut out = [0.0; LANES];
                 for k in 0..LANES {
-                    out[k] = words[k] as $scalar;
+                    out[k] = words.0[k] as i32 as $scalar;
                 }
                 Lanes(out)
+            }
+            #[inline(always)]
+            unsafe fn encode(words: Lanes<u32>) -> Self {
+                Lanes(words.0.map($encode))
             }
             #[inline(always)]
             unsafe fn mul_add(self, a: Self, b: Self) -> Self {
@@ -142,18 +146,26 @@ macro_rules! lanes {
                 mask
             }
             #[inline(always)]
-            unsafe fn compress(self, mask: u32, p: *mut $scalar) {
+            unsafe fn compress(self, mask: u32) -> Self {
+                let mut out = [0.0; LANES + 1];
                 let mut place = 0;
                 for k in 0..LANES {
-                    unsafe { *p.add(place) = self.0[k] };
+                    out[place] = self.0[k];
                     place += (mask >> k & 1) as usize;
                 }
+                let mut first = [0.0; LANES];
+                first.copy_from_slice(&out[..LANES]);
+                Lanes(first)
             }
             #[inline(always)]
-            unsafe fn lookup(table: *const $scalar, index: *const u32) -> Self {
+            unsafe fn pick(table: *const $scalar, which: Lanes<u32>) -> Self {
+                unsafe { Self::lookup(table, which) }
+            }
+            #[inline(always)]
+            unsafe fn lookup(table: *const $scalar, index: Lanes<u32>) -> Self {
                 let mut out = [0.0; LANES];
                 for k in 0..LANES {
-                    out[k] = unsafe { *table.add(*index.add(k) as usize) };
+                    out[k] = unsafe { *table.add(index.0[k] as usize) };
                 }
                 Lanes(out)
             }
@@ -183,8 +195,8 @@ macro_rules! lanes {
     };
 }
 
-lanes!(f32);
-lanes!(f64);
+lanes!(f32, |w: u32| f32::from_bits(w.wrapping_add(ORDINARY_F32)));
+lanes!(f64, |w: u32| f64::from_bits(ORDINARY_F64 | w as u64));
 
 impl Words for Lanes<u32> {
     const LANES: usize = LANES;
@@ -244,12 +256,25 @@ impl Words for Lanes<u32> {
         self
     }
     #[inline(always)]
-    unsafe fn compress(self, mask: u32, p: *mut u32) {
-        let mut place = 0;
+    unsafe fn load_bytes(p: *const u8) -> Self {
+        Lanes(unsafe { p.cast::<[u8; LANES]>().read_unaligned() }.map(u32::from))
+    }
+    #[inline(always)]
+    unsafe fn pick(table: *const u32, which: Self) -> Self {
+        Lanes(which.0.map(|w| unsafe { *table.add(w as usize) }))
+    }
+    #[inline(always)]
+    unsafe fn columns(base: *const u8, stride: usize, index: *const u32) -> [Self; 4] {
+        let mut out = [[0; LANES]; 4];
         for k in 0..LANES {
-            unsafe { *p.add(place) = self.0[k] };
-            place += (mask >> k & 1) as usize;
+            let row =
+                unsafe { base.add(*index.add(k) as usize * stride).cast::<[u32; 4]>().read_unaligned() };
+            for c in 0..4 {
+                out[c][k] = row[c];
+            }
         }
+        let [a, b, c, d] = out;
+        [Lanes(a), Lanes(b), Lanes(c), Lanes(d)]
     }
 }
 
@@ -302,39 +327,65 @@ impl Quad for Four {
     }
 }
 
+/// Distances of sixteen particles to a point; bits where their squares are below the limit.
+#[inline(always)]
+fn below(there: &[[u16; 16]; 3], here: &Point16, limit: i16) -> u32 {
+    let mut sum = [0i32; 16];
+    for c in 0..3 {
+        for k in 0..16 {
+            let d = here.0[c][k].wrapping_sub(there[c][k]) as i16 as i32;
+            sum[k] += (d * d) >> 16;
+        }
+    }
+    let mut mask = 0;
+    for k in 0..16 {
+        mask |= ((sum[k] < limit as i32) as u32) << k;
+    }
+    mask
+}
+
 impl Isa for Portable {
     type F32 = Lanes<f32>;
     type F64 = Lanes<f64>;
-    type U32 = Lanes<u32>;
     type Quad = Four;
 
     #[inline(always)]
-    unsafe fn signed(words: Lanes<u32>) -> Lanes<f32> {
-        let mut out = [0.0; LANES];
-        for k in 0..LANES {
-            out[k] = words.0[k] as i32 as f32;
-        }
-        Lanes(out)
-    }
-    #[inline(always)]
-    unsafe fn word_columns(base: *const u8, stride: usize, index: *const u32) -> [Lanes<u32>; 4] {
-        let mut out = [[0; LANES]; 4];
-        for k in 0..LANES {
-            let row =
-                unsafe { base.add(*index.add(k) as usize * stride).cast::<[u32; 4]>().read_unaligned() };
-            for c in 0..4 {
-                out[c][k] = row[c];
+    unsafe fn near<const SHIFTS: bool>(
+        x: [*const u16; 3],
+        shift: [u16; 3],
+        a: &Point16,
+        b: &Point16,
+        limit: i16,
+    ) -> u32 {
+        let mut there = [[0; 16]; 3];
+        for c in 0..3 {
+            there[c] = unsafe { x[c].cast::<[u16; 16]>().read_unaligned() };
+            if SHIFTS {
+                there[c] = there[c].map(|x| x.wrapping_add(shift[c]));
             }
         }
-        let [a, b, c, d] = out;
-        [Lanes(a), Lanes(b), Lanes(c), Lanes(d)]
+        below(&there, a, limit) | below(&there, b, limit) << 16
+    }
+    #[inline(always)]
+    unsafe fn fill16(x: u16, p: &mut [u16; 16]) {
+        *p = [x; 16];
     }
     #[inline(always)]
     unsafe fn collect(first: u32, mask: u32, p: *mut u32) {
-        let mut count = 0;
-        for k in 0..LANES {
-            unsafe { *p.add(count) = first + k as u32 };
-            count += (mask >> k & 1) as usize;
+        let (mut mask, mut count) = (mask, 0);
+        while mask != 0 {
+            unsafe { *p.add(count) = first + mask.trailing_zeros() };
+            count += 1;
+            mask &= mask - 1;
         }
+    }
+    #[inline(always)]
+    unsafe fn bits(x: Lanes<f32>) -> Lanes<u32> {
+        Lanes(x.0.map(f32::to_bits))
+    }
+    #[inline(always)]
+    unsafe fn halves(x: Lanes<f64>) -> [Lanes<u32>; 2] {
+        let bits = x.0.map(f64::to_bits);
+        [Lanes(bits.map(|b| b as u32)), Lanes(bits.map(|b| (b >> 32) as u32))]
     }
 }

@@ -1,0 +1,84 @@
+//! Times the parts of evaluations of forces, in nanoseconds for each particle and step: the fastest of several
+//! rounds, after the fluid has come to rest.
+//!
+//! `cargo run --release -p psidpd-core --example pace mdpd mixed avx512 1 6050`
+
+#[path = "../benches/setup/mod.rs"]
+mod setup;
+
+use psidpd_core::engine::{Instructions, Precision, Settings, Sweep, Times};
+use setup::{Cloud, SUBJECTS};
+use std::process::ExitCode;
+use std::time::Instant;
+
+/// Steps before the first round, steps of a round, rounds.
+const BEFORE: u32 = 150;
+const STEPS: u32 = 50;
+const ROUNDS: u32 = 12;
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    match run(&arguments) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(fault) => {
+            eprintln!(
+                "{fault}\nusage: pace mdpd|dpd|formula mixed|double portable|avx2|avx512 THREADS PARTICLES"
+            );
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(arguments: &[String]) -> Result<(), String> {
+    let [fluid, precision, instructions, threads, count] = arguments else {
+        return Err("five arguments are needed".into());
+    };
+    let subject = SUBJECTS.iter().find(|s| s.name == fluid).ok_or("no such fluid")?;
+    let (_, precision) =
+        Precision::ALL.into_iter().find(|(name, _)| name == precision).ok_or("no such precision")?;
+    let (_, instructions) = Instructions::ALL
+        .into_iter()
+        .find(|(name, _)| name == instructions)
+        .ok_or("no such instruction set")?;
+    if !instructions.available() {
+        return Err("this processor does not have these instructions".into());
+    }
+    let threads = threads.parse().map_err(|_| "THREADS is a number above 0")?;
+    let count: usize = count.parse().map_err(|_| "PARTICLES is a number")?;
+    let fluid = subject.fluid();
+    let mut cloud = Cloud::new(subject, &fluid, count);
+    let settings = Settings { precision, instructions, threads };
+    let mut sweep = Sweep::new(&fluid, settings).map_err(|e| e.to_string())?;
+    for _ in 0..BEFORE {
+        cloud.evaluate(&mut sweep);
+        cloud.kick();
+        cloud.drift();
+    }
+    let mut best = [f64::INFINITY; 7];
+    for _ in 0..ROUNDS {
+        let mut around = 0.0;
+        let before = sweep.times();
+        let start = Instant::now();
+        for _ in 0..STEPS {
+            cloud.evaluate(&mut sweep);
+            let since = Instant::now();
+            cloud.kick();
+            cloud.drift();
+            around += since.elapsed().as_secs_f64();
+        }
+        let all = start.elapsed().as_secs_f64() - around;
+        let after = sweep.times();
+        let part = |of: fn(&Times) -> f64| of(&after) - of(&before);
+        let parts =
+            [all, part(|t| t.sort), part(|t| t.first), part(|t| t.excess), part(|t| t.second), part(|t| t.forces), around];
+        for (best, seconds) in best.iter_mut().zip(parts) {
+            *best = best.min(seconds * 1e9 / f64::from(STEPS) / count as f64);
+        }
+    }
+    let [all, sort, first, excess, second, forces, around] = best;
+    println!(
+        "evaluation {all:.1}: sort {sort:.1}, first pass {first:.1}, ψ {excess:.1}, second pass {second:.1}, \
+         forces out {forces:.1}; motion {around:.1}"
+    );
+    Ok(())
+}

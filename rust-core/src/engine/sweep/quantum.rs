@@ -1,0 +1,42 @@
+//! Positions in words of sixteen bits, for looking who is near: rounding only ever lets too many through.
+
+use super::frame::Frame;
+use super::grid::Grid;
+
+/// The unit of such positions, and the limit of squared distances in them.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Quantum {
+    /// Units per length. Words wrap, but no two particles that are compared are half a turn apart.
+    pub per_length: f64,
+    /// Sums of the high halves of squares below this may be within reach.
+    pub limit: i16,
+}
+
+/// Rows of bins that are looked through together for two particles are so many bins apart at most.
+pub const JOINED: f64 = 2.0;
+
+impl Quantum {
+    pub fn new(frame: &Frame, grid: &Grid) -> Quantum {
+        let bin = frame.length[0] / grid.bins as f64;
+        // Two rows, or layers, next to each other.
+        let two = |axis: usize| if axis < frame.dimensions { 2.0 / grid.of(axis) as f64 } else { 0.0 };
+        let [xy, xz, yz] = frame.tilt.map(f64::abs);
+        let (y, z) = (two(1), two(2));
+        let furthest = [
+            grid.window * frame.length[0] + (2.0 + JOINED) * bin + y * xy + z * xz,
+            y * frame.length[1] + z * yz,
+            z * frame.length[2],
+        ];
+        let furthest = furthest.into_iter().fold(0.0, f64::max);
+        let per_length = 32_000.0 / furthest;
+        // Each coordinate of a distance is off by up to one and a half: two positions and a shift are rounded.
+        let reach = grid.reach * per_length + 1.5 * 3f64.sqrt();
+        Quantum { per_length, limit: (reach * reach / 65_536.0) as i16 + 1 }
+    }
+
+    /// A coordinate.
+    #[inline(always)]
+    pub fn of(&self, x: f64) -> u16 {
+        (x * self.per_length) as i64 as u16
+    }
+}
