@@ -2,10 +2,16 @@
 
 use super::arithmetic::Own;
 use super::chunks::Chunk;
-use super::simd::{Point16, Scalar};
+use super::scatter::Banks;
+use super::simd::{Two, Scalar};
 
 /// Most particles whose pairs are in hand at once.
 pub const GROUP: usize = 16;
+
+/// Sixteen rows of four numbers, aligned so that no vector of them straddles lines of the cache.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(C, align(64))]
+pub struct Lines<T>([[T; 4]; 16]);
 
 /// Pairs of a group of particles, in parallel arrays.
 #[derive(Debug)]
@@ -25,21 +31,22 @@ pub struct Block<T> {
     /// A vector's worth of members.
     pub own: Own<T>,
     /// Rows `fx, fy, fz, −w`.
-    pub rows: Vec<T>,
+    pub rows: Vec<Lines<T>>,
     /// Weights, of one density after another.
     pub weight: Vec<Vec<T>>,
     /// Forces along `ê` that are evaluated apart.
     pub conservative: Vec<T>,
-    /// Pairs within the range of each density: how many, and which, a bit for each.
+    /// How many pairs are within the range of each density.
     pub found: Vec<usize>,
-    pub bits: Vec<Vec<u64>>,
+    /// What the pairs add to the members.
+    pub banks: Banks,
     /// Work space of pair terms that are evaluated apart.
     pub aside: Aside,
     /// What the members are to be compared with.
     pub chunks: Vec<Chunk>,
     pub chunk_count: usize,
     /// Where the members are.
-    pub points: [Point16; GROUP],
+    pub points: [Two; GROUP / 2],
     /// Which of each chunk are within reach.
     pub masks: Vec<u32>,
     capacity: usize,
@@ -79,11 +86,11 @@ impl<T: Scalar> Default for Block<T> {
             weight: Vec::new(),
             conservative: Vec::new(),
             found: Vec::new(),
-            bits: Vec::new(),
+            banks: Banks::default(),
             aside: Aside::default(),
             chunks: Vec::new(),
             chunk_count: 0,
-            points: [Point16::default(); GROUP],
+            points: [Two::default(); GROUP / 2],
             masks: Vec::new(),
             capacity: 0,
         };
@@ -120,13 +127,10 @@ impl<T: Scalar> Block<T> {
         self.j.resize(capacity, 0);
         self.other.resize(capacity, 0);
         self.which.resize(capacity, 0);
-        self.rows.resize(4 * capacity, T::default());
+        self.rows.resize(capacity / 16, Lines::default());
         self.conservative.resize(capacity, T::default());
         for values in &mut self.weight {
             values.resize(capacity, T::default());
-        }
-        for bits in &mut self.bits {
-            bits.resize(capacity / 64 + 2, 0);
         }
         let aside = &mut self.aside;
         aside.kind.resize(capacity, 0);
@@ -139,7 +143,6 @@ impl<T: Scalar> Block<T> {
     /// Room for the weights of `passes` densities.
     pub fn set_passes(&mut self, passes: usize) {
         self.weight.resize_with(passes, Vec::new);
-        self.bits.resize_with(passes, Vec::new);
         self.found.resize(passes, 0);
         self.capacity = 0;
         self.grow(SLACK);

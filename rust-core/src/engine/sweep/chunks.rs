@@ -51,9 +51,16 @@ pub unsafe fn cut<T: Scalar, const GHOSTS: bool>(
         let mut a = 0;
         while a < count {
             let b = a + 1;
-            let apart = b == count || (*x.add(b) - *x.add(a)).abs() > view.joined;
-            if apart || (group.across >> a) & 3 != 0 {
-                found = cut_apart::<T, GHOSTS>(swept, group, a, found, block);
+            if b == count || (*x.add(b) - *x.add(a)).abs() > view.joined {
+                found = cut_across::<T, GHOSTS>(swept, group, [a, a], FIRST, found, block);
+                if b < count {
+                    found = cut_across::<T, GHOSTS>(swept, group, [b, b], SECOND, found, block);
+                }
+                a += 2;
+                continue;
+            }
+            if (group.across >> a) & 3 != 0 {
+                found = cut_across::<T, GHOSTS>(swept, group, [a, b], BOTH, found, block);
                 a += 2;
                 continue;
             }
@@ -168,47 +175,59 @@ fn add_many<T: Scalar, const GHOSTS: bool>(
     found
 }
 
-/// The same for two particles that do not look together, or whose spans go on in other periods.
+/// The same for particles that look alone, or whose spans go on in other periods.
 #[inline(never)]
-unsafe fn cut_apart<T: Scalar, const GHOSTS: bool>(
+unsafe fn cut_across<T: Scalar, const GHOSTS: bool>(
     swept: &Swept<T, impl Record>,
     group: &Group,
-    a: usize,
+    [a, b]: [usize; 2],
+    who: u32,
     mut found: usize,
     block: &mut Block<T>,
 ) -> usize {
-    let Group { view, windows, spans, across, first, count } = *group;
-    for (k, who) in [(a, FIRST), (a + 1, SECOND)] {
-        if k == count {
-            break;
-        }
-        let own = (first + k + 1) as u32;
-        for w in 0..5 {
-            let crosses = across >> k & 1 == 1;
-            let bins = view.bins;
-            let [mut low, mut end] = [spans.low[w][k], spans.end[w][k]];
-            if crosses {
-                if windows.there[w] == 0.0 && w > 0 {
+    // SAFETY: bins are of the row; chunks have room.
+    unsafe {
+        let Group { view, windows, spans, .. } = *group;
+        let bins = view.bins;
+        let own = (group.first + a + 1) as u32;
+        let but = if who == BOTH { 1 << 16 } else { 0 };
+        let mut w = 0;
+        while w < 5 {
+            let (mut low, end);
+            if (group.across >> a | group.across >> b) & 1 == 1 {
+                if *windows.there.get_unchecked(w) == 0.0 && w > 0 {
+                    w += 1;
                     continue;
                 }
-                [low, end] = [spans.far_low[w][k] - bins, spans.far_end[w][k] - bins];
-            }
-            // SAFETY: bins are of the row.
-            let at = |bin: i32| unsafe { *windows.row[w].add(bin as usize) + windows.behind[w] };
-            let look = |period: usize| Look { a, who, but: 0, shift: w + 5 * period };
-            // SAFETY: chunks have room.
-            unsafe {
-                if low < 0 && w > 0 {
-                    found =
-                        add::<T, GHOSTS>(swept, group, block, found, [at(low + bins), at(bins)], look(0));
+                let (lows, ends) = (spans.far_low.get_unchecked(w), spans.far_end.get_unchecked(w));
+                low = (*lows.get_unchecked(a)).min(*lows.get_unchecked(b)) - bins;
+                end = (*ends.get_unchecked(a)).max(*ends.get_unchecked(b)) - bins;
+                if w == 0 {
+                    low = 0;
                 }
-                let from = if w == 0 { own } else { at(low.max(0)) };
-                found = add::<T, GHOSTS>(swept, group, block, found, [from, at(end.min(bins))], look(1));
-                if end > bins {
-                    found = add::<T, GHOSTS>(swept, group, block, found, [at(0), at(end - bins)], look(2));
-                }
+            } else {
+                low = *spans.low.get_unchecked(w).get_unchecked(a);
+                end = *spans.end.get_unchecked(w).get_unchecked(a);
             }
+            let row = *windows.row.get_unchecked(w);
+            let behind = *windows.behind.get_unchecked(w);
+            let at = |bin: i32| *row.add(bin as usize) + behind;
+            let look = |period: usize, but: u32| Look { a: a & !1, who, but, shift: w + 5 * period };
+            let (from, but) = if w == 0 { (own, but) } else { (at(low.max(0)), 0) };
+            let range = [from, at(end.min(bins))];
+            found = add::<T, GHOSTS>(swept, group, block, found, range, look(1, but));
+            // Before the row or behind it, with no branch to foresee.
+            let before = low < 0;
+            let range = if before { [low + bins, bins] } else { [0, (end - bins).max(0)] };
+            let period = if before { 0 } else { 2 };
+            let range = [at(range[0]), at(range[1])];
+            found = add::<T, GHOSTS>(swept, group, block, found, range, look(period, 0));
+            if before && end > bins {
+                let range = [at(0), at(end - bins)];
+                found = add::<T, GHOSTS>(swept, group, block, found, range, look(2, 0));
+            }
+            w += 1;
         }
+        found
     }
-    found
 }

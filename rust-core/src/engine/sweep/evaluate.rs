@@ -6,7 +6,7 @@ use super::aside::aside;
 use super::block::Block;
 use super::forces::{Kind, Sums, add_virial, slope, sum, value};
 use super::layer::Swept;
-use super::many_body::NearPairs;
+use super::many_body::{NEAR_BITS, NearPairs};
 use super::simd::{Isa, Reals, Scalar, Words};
 use super::terms::Pass;
 use super::thermostat::Draw;
@@ -46,10 +46,11 @@ pub unsafe fn evaluate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALL
         let own: *const _ = &block.own;
         let p_which = block.which.as_ptr();
         let p_j = block.j.as_ptr();
-        let p_rows = block.rows.as_mut_ptr();
+        let p_rows = block.rows.as_mut_ptr().cast::<A::Scalar>();
         let p_conservative = block.conservative.as_ptr();
         let p_found = block.found.as_mut_ptr();
         let plain = swept.variables == 1;
+        let layer_first = <A::Reals as Reals>::Words::splat(near.first);
         let mut sums = Sums::<A::Reals>::zero();
         let mut pass = 0;
         while pass < passes {
@@ -90,6 +91,8 @@ pub unsafe fn evaluate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALL
                 force = force + thermostat;
             }
             let mut weight = zero;
+            let code = <A::Reals as Reals>::Words::load(p_j.add(k)).sub(layer_first);
+            let code = A::Reals::encode(code.add(which.rotate(NEAR_BITS)));
             let mut pass = 0;
             while pass < passes {
                 let term = terms.passes.get_unchecked(pass);
@@ -102,10 +105,8 @@ pub unsafe fn evaluate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALL
                     w.store(block.weight.get_unchecked_mut(pass).as_mut_ptr().add(k));
                 }
                 let mask = r.mask_below(A::Reals::splat(term.force_range)) & valid;
-                let bits = block.bits.get_unchecked_mut(pass).as_mut_ptr();
-                set_bits(bits, k - from, lanes, mask);
                 let found = p_found.add(pass);
-                keep::<A::Reals, TALLY>(term, &pairs, p_j.add(k), mask, share, near, pass, *found);
+                keep::<A::Reals, TALLY>(term, &pairs, code, mask, share, near, pass, *found);
                 *found += mask.count_ones() as usize;
                 pass += 1;
             }
@@ -125,13 +126,13 @@ pub unsafe fn evaluate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALL
     }
 }
 
-/// Appends rows `−w′ ê` and the second particle, of the pairs of `mask`, behind `found` others.
+/// Appends rows `−w′ ê` and a code of both particles, of the pairs of `mask`, behind `found` others.
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]
 unsafe fn keep<R: Reals, const TALLY: bool>(
     term: &Pass<R::Scalar>,
     pairs: &Apart<R>,
-    j: *const u32,
+    code: R,
     mask: u32,
     share: R,
     near: &mut NearPairs<R::Scalar>,
@@ -143,7 +144,6 @@ unsafe fn keep<R: Reals, const TALLY: bool>(
         let s = pairs.r * R::splat(term.force_inverse_range);
         let g = R::splat(term.force) * slope(term.force_kind, s) * pairs.inverse;
         let [dx, dy, dz] = pairs.d;
-        let code = R::encode(R::Words::load(j));
         let columns = [
             (g * dx).compress(mask),
             (g * dy).compress(mask),
@@ -158,25 +158,6 @@ unsafe fn keep<R: Reals, const TALLY: bool>(
         }
     }
 }
-
-/// Notes the bits of a vector of pairs from `at` on.
-#[inline(always)]
-unsafe fn set_bits(bits: *mut u64, at: usize, lanes: usize, mask: u32) {
-    // SAFETY: the caller's.
-    unsafe {
-        match lanes {
-            16 => *bits.cast::<u16>().add(at / 16) = mask as u16,
-            8 => *bits.cast::<u8>().add(at / 8) = mask as u8,
-            _ => {
-                let half = bits.cast::<u8>().add(at / 8);
-                *half = if at.is_multiple_of(8) { mask as u8 } else { *half | (mask << 4) as u8 };
-            }
-        }
-    }
-}
-
-/// Masks of vectors are read back as whole words.
-const _: () = assert!(cfg!(target_endian = "little"), "big-endian targets are not supported");
 
 /// How much of each pair counts here, nothing beyond the last.
 #[inline(never)]

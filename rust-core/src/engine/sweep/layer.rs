@@ -116,7 +116,8 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TA
     unsafe {
         let grid = swept.grid;
         let mut tally = Tally::default();
-        near.clear(swept.terms.passes.len());
+        let layer_first = *swept.start.get_unchecked(layer * grid.rows * grid.bins);
+        near.clear(swept.terms.passes.len(), layer_first);
         let view = View::new(swept.frame, grid, layer);
         let ghosts = !swept.ghost.is_empty();
         let mut spans = Spans::default();
@@ -173,7 +174,6 @@ unsafe fn part<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY: bool>
         let pairs =
             [*block.begin.get_unchecked(first) as usize, *block.begin.get_unchecked(last) as usize];
         if pairs[0] == pairs[1] {
-            near.add_none(&block.members[first..last]);
             return;
         }
         let which = block.which.as_mut_ptr();

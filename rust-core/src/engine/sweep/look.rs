@@ -26,7 +26,7 @@ pub unsafe fn look<I: Isa, T: Scalar, const SHIFTS: bool>(
         while k < count + (count & 1) {
             let mut c = 0;
             while c < 3 {
-                I::fill16(*q[c].add(first + k), &mut (&mut (*points.add(k)).0)[c]);
+                I::fill16(*q[c].add(first + k), points.add(k / 2).cast::<u16>().add(32 * c + 16 * (k % 2)));
                 c += 1;
             }
             k += 1;
@@ -39,14 +39,14 @@ pub unsafe fn look<I: Isa, T: Scalar, const SHIFTS: bool>(
         while c < many {
             let chunk = chunks.add(c);
             let j = (*chunk).from as usize;
-            let a = points.add(2 * (*chunk).two as usize);
+            let two = points.add((*chunk).two as usize);
             let shift = if SHIFTS {
                 *group.windows.shift.get_unchecked((*chunk).shift as usize)
             } else {
                 [0; 3]
             };
             let there = [q[0].add(j), q[1].add(j), q[2].add(j)];
-            *masks.add(c) = I::near::<SHIFTS>(there, shift, &*a, &*a.add(1), limit) & (*chunk).allowed;
+            *masks.add(c) = I::near::<SHIFTS>(there, shift, &*two, limit) & (*chunk).allowed;
             c += 1;
         }
         let (out, other) = (block.j.as_mut_ptr(), block.other.as_mut_ptr());

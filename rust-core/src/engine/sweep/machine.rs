@@ -49,7 +49,7 @@ pub struct Machine<P: Compiled> {
     owned_bits: Vec<u8>,
     owned_of_row: Vec<[u32; 2]>,
     offset: Vec<isize>,
-    sums: Vec<f64>,
+    sums: Vec<Sum>,
     densities: Vec<f64>,
     /// Densities, ψ and slopes in the order of cells.
     rows: Vec<f64>,
@@ -65,6 +65,12 @@ pub struct Machine<P: Compiled> {
     thermostat: Option<(PairNoise, f64)>,
     totals: bool,
 }
+
+/// An accumulator: a force, and the density if there is one variable; aligned so that none straddles lines of the
+/// cache.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(C, align(32))]
+struct Sum([f64; 4]);
 
 /// A thread's own.
 struct Scratch<T> {
@@ -192,7 +198,7 @@ impl<P: Compiled> Machine<P> {
             terms: &self.terms,
             slopes: &self.slopes,
             offset: &self.offset,
-            sums: Shared(self.sums.as_mut_ptr()),
+            sums: Shared(self.sums.as_mut_ptr().cast()),
             densities: Shared(self.densities.as_mut_ptr()),
             variables: self.columns.len(),
             thermostat: self.thermostat,

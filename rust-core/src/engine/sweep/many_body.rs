@@ -3,21 +3,27 @@
 use super::arithmetic::Arithmetic;
 use super::block::Block;
 use super::layer::Swept;
-use super::scatter::add_to;
+use super::scatter::{Banks, add_to};
 use super::simd::{Isa, Quad, Scalar};
 
 /// What the first pass of a layer leaves for the second.
 #[derive(Debug, Clone, Default)]
 pub struct NearPairs<T> {
-    /// For each density: rows `−w′ ê` and the second particle, those of one particle after another.
+    /// For each density: rows `−w′ ê`, and a code of both particles.
     pub rows: Vec<Rows<T>>,
     /// Rows `r_i − r_j` and the share of each, if virials are wanted.
     pub apart: Vec<Rows<T>>,
-    /// How many there are for each particle that has looked for any.
-    pub counts: Vec<Vec<u32>>,
-    /// These particles.
-    pub members: Vec<u32>,
+    /// The first particles of the pairs, a vector's worth after another, and how many pairs each of those has
+    /// for each density.
+    parts: Vec<([u32; 16], usize)>,
+    found: Vec<u32>,
+    /// The first particle of the layer.
+    pub first: u32,
 }
+
+/// The bits of a code that count second particles, from the first of the layer on; above them is the number of the
+/// first particle in its part.
+pub const NEAR_BITS: u32 = 25;
 
 /// Rows of four numbers that whole vectors are written behind.
 #[derive(Debug, Clone)]
@@ -37,19 +43,16 @@ impl<T> Rows<T> {
         unsafe { self.0.as_mut_ptr().add(self.0.len()) }
     }
 
-    pub fn bytes(&self) -> usize {
-        self.0.capacity() * size_of::<[T; 4]>()
-    }
 }
 
 impl<T> NearPairs<T> {
-    pub fn clear(&mut self, passes: usize) {
+    pub fn clear(&mut self, passes: usize, first: u32) {
         self.rows.resize_with(passes, Rows::default);
         self.apart.resize_with(passes, Rows::default);
-        self.counts.resize_with(passes, Vec::new);
         self.rows.iter_mut().chain(&mut self.apart).for_each(|rows| rows.0.clear());
-        self.counts.iter_mut().for_each(Vec::clear);
-        self.members.clear();
+        self.parts.clear();
+        self.found.clear();
+        self.first = first;
     }
 
     /// Makes room for `more` pairs of each density.
@@ -65,46 +68,44 @@ impl<T> NearPairs<T> {
         }
     }
 
-    /// Counts the pairs that were written behind the last.
+    /// Counts the pairs that were written behind the last, of members `first..last` of a block.
     #[inline(always)]
     pub unsafe fn add<const TALLY: bool>(&mut self, block: &Block<T>, [first, last]: [usize; 2])
     where
         T: Scalar,
     {
-        // SAFETY: the rows have been written; blocks have bits for all pairs.
+        // SAFETY: the rows have been written.
         unsafe {
-            self.members.extend_from_slice(block.members.get_unchecked(first..last));
-            let begin = block.begin.as_ptr();
-            let zero = *begin.add(first) as usize;
+            if self.rows.is_empty() {
+                return;
+            }
+            let mut members = [0; 16];
+            let mut m = first;
+            while m < last {
+                members[m - first] = *block.members.get_unchecked(m);
+                m += 1;
+            }
+            make_room(&mut self.parts, 1);
+            self.parts.push((members, last - first));
+            make_room(&mut self.found, self.rows.len());
             for pass in 0..self.rows.len() {
                 let found = *block.found.get_unchecked(pass);
+                self.found.push(found as u32);
                 let rows = &mut self.rows.get_unchecked_mut(pass).0;
                 rows.set_len(rows.len() + found);
                 if TALLY {
                     let apart = &mut self.apart.get_unchecked_mut(pass).0;
                     apart.set_len(apart.len() + found);
                 }
-                let counts = self.counts.get_unchecked_mut(pass);
-                make_room(counts, last - first);
-                let out = counts.as_mut_ptr().add(counts.len());
-                let bits = block.bits.get_unchecked(pass).as_ptr();
-                let mut m = first;
-                while m < last {
-                    let (from, to) = (*begin.add(m) as usize - zero, *begin.add(m + 1) as usize - zero);
-                    *out.add(m - first) = count_bits(bits, from, to);
-                    m += 1;
-                }
-                counts.set_len(counts.len() + last - first);
             }
         }
     }
 
-    /// Counts no pairs for `members`.
-    pub fn add_none(&mut self, members: &[u32]) {
-        self.members.extend_from_slice(members);
-        for counts in &mut self.counts {
-            counts.resize(counts.len() + members.len(), 0);
-        }
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.rows.iter().chain(&self.apart).map(|rows| rows.0.capacity() * size_of::<[T; 4]>()).sum::<usize>()
+            + self.parts.capacity() * size_of::<([u32; 16], usize)>()
+            + self.found.capacity() * size_of::<u32>()
     }
 }
 
@@ -114,32 +115,6 @@ impl<T> NearPairs<T> {
 fn make_room<T>(values: &mut Vec<T>, more: usize) {
     if values.capacity() - values.len() < more {
         values.reserve_exact(more.max(values.len() / 8));
-    }
-}
-
-/// How many of the pairs `from..to` are set in `bits`.
-///
-/// # Safety
-/// `bits` has them all, and a word behind.
-#[inline(always)]
-unsafe fn count_bits(bits: *const u64, from: usize, to: usize) -> u32 {
-    // SAFETY: the caller's.
-    unsafe {
-        let (word, shift) = (from / 64, from % 64);
-        let length = to - from;
-        // Two words hold sixty-four pairs, wherever they begin.
-        let here = *bits.add(word) >> shift | *bits.add(word + 1) << 1 << (63 - shift);
-        if length <= 64 {
-            let mask = if length == 64 { u64::MAX } else { (1u64 << length) - 1 };
-            return (here & mask).count_ones();
-        }
-        let mut count = 0;
-        let mut p = from;
-        while p < to {
-            count += (*bits.add(p / 64) >> (p % 64) & 1) as u32;
-            p += 1;
-        }
-        count
     }
 }
 
@@ -158,44 +133,65 @@ pub unsafe fn second_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const T
     unsafe {
         let offset = *swept.offset.get_unchecked(layer);
         let base = swept.sums.0.offset(4 * offset);
+        let layer_base = base.add(4 * near.first as usize);
         let species = swept.terms.species;
-        let width = swept.terms.passes.len() * species;
-        let mut pass = 0;
-        while pass < swept.terms.passes.len() {
-            let rows = &near.rows.get_unchecked(pass).0;
-            let apart = &near.apart.get_unchecked(pass).0;
-            let counts = near.counts.get_unchecked(pass);
-            let slopes = swept.slopes.as_ptr().add(pass * species);
-            let mut p = 0;
-            let mut m = 0;
-            while m < counts.len() {
-                let i = *near.members.get_unchecked(m) as usize;
-                let end = p + *counts.get_unchecked(m) as usize;
-                let mut sum = I::Quad::zero();
-                let own = slopes.add(width * i);
-                let si = if SEVERAL { *swept.species.get_unchecked(i) as usize } else { 0 };
+        let passes = near.rows.len();
+        let width = passes * species;
+        let mut banks = Banks::default();
+        let mut done = vec![0; passes];
+        let mut part = 0;
+        while part < near.parts.len() {
+            let (members, count) = near.parts.get_unchecked(part);
+            let mut pass = 0;
+            while pass < passes {
+                let rows = &near.rows.get_unchecked(pass).0;
+                let apart = &near.apart.get_unchecked(pass).0;
+                let slopes = swept.slopes.as_ptr().add(pass * species);
+                let layer_slopes = slopes.add(width * near.first as usize);
+                // With one species the slope of each member.
+                let mut own = [0.0; 16];
+                if !SEVERAL {
+                    let mut m = 0;
+                    while m < *count {
+                        own[m] = *slopes.add(width * *members.get_unchecked(m) as usize);
+                        m += 1;
+                    }
+                }
+                let begin = *done.get_unchecked(pass);
+                let end = begin + *near.found.get_unchecked(part * passes + pass) as usize;
+                let mut p = begin;
                 while p < end {
                     let row = rows.as_ptr().add(p).cast::<A::Scalar>();
-                    let j = (*row.add(3)).decode() as usize;
-                    let there = slopes.add(width * j);
+                    let code = (*row.add(3)).decode();
+                    let (j, m) = ((code & ((1 << NEAR_BITS) - 1)) as usize, (code >> NEAR_BITS) as usize);
+                    let there = layer_slopes.add(width * j);
                     let slope = if SEVERAL {
-                        *own.add(*swept.species.get_unchecked(j) as usize) + *there.add(si)
+                        let i = *members.get_unchecked(m) as usize;
+                        let (si, sj) =
+                            (*swept.species.get_unchecked(i), *swept.species.get_unchecked(near.first as usize + j));
+                        *slopes.add(width * i + sj as usize) + *there.add(si as usize)
                     } else {
-                        *own + *there
+                        *own.get_unchecked(m) + *there
                     };
                     let force = A::load_quad(row).mul(I::Quad::splat(slope));
-                    sum = sum.add(force);
-                    let at = base.add(4 * j);
+                    let at = layer_base.add(4 * j);
                     I::Quad::load(at).sub(force).store(at);
+                    let at = banks.at(m, p);
+                    I::Quad::load(at).add(force).store(at);
                     if TALLY {
-                        add_dyad(apart[p], *rows.get_unchecked(p), slope, virial);
+                        add_dyad(*apart.get_unchecked(p), *rows.get_unchecked(p), slope, virial);
                     }
                     p += 1;
                 }
-                add_to(base.add(4 * i), sum);
+                *done.get_unchecked_mut(pass) = end;
+                pass += 1;
+            }
+            let mut m = 0;
+            while m < *count {
+                add_to(base.add(4 * *members.get_unchecked(m) as usize), banks.take::<I::Quad>(m));
                 m += 1;
             }
-            pass += 1;
+            part += 1;
         }
     }
 }

@@ -5,12 +5,57 @@ use super::block::Block;
 use super::layer::{Shared, Swept};
 use super::simd::{Isa, Quad, Scalar};
 
+/// How many sums of each member take turns: one alone would wait for itself at every pair.
+const BANKS: usize = 4;
+
+/// What pairs add to their first particles: sums for each of a vector's worth of members. All zero between uses.
+#[derive(Debug, Clone, Copy)]
+#[repr(C, align(64))]
+pub struct Banks([[[f64; 4]; BANKS]; 16]);
+
+impl Default for Banks {
+    fn default() -> Banks {
+        Banks([[[0.0; 4]; BANKS]; 16])
+    }
+}
+
+impl Banks {
+    /// The sum of member `m` in turn `p`.
+    ///
+    /// # Safety
+    /// There are sixteen members.
+    #[inline(always)]
+    pub unsafe fn at(&mut self, m: usize, p: usize) -> *mut f64 {
+        // SAFETY: the caller's.
+        unsafe { self.0.as_mut_ptr().cast::<[f64; 4]>().add(BANKS * m + p % BANKS).cast() }
+    }
+
+    /// The sum of member `m`, which is zero then.
+    ///
+    /// # Safety
+    /// The contract of `simd`; there are sixteen members.
+    #[inline(always)]
+    pub unsafe fn take<Q: Quad>(&mut self, m: usize) -> Q {
+        // SAFETY: the caller's.
+        unsafe {
+            let mut sums = [Q::zero(); BANKS];
+            let mut p = 0;
+            while p < BANKS {
+                sums[p] = Q::load(self.at(m, p));
+                Q::zero().store(self.at(m, p));
+                p += 1;
+            }
+            sums[0].add(sums[1]).add(sums[2].add(sums[3]))
+        }
+    }
+}
+
 /// Adds the rows of the pairs of `slots` of a block to both particles of each pair.
 #[inline(always)]
 pub unsafe fn scatter<I: Isa, A: Arithmetic<I>>(
     sums: Shared<f64>,
     offset: isize,
-    block: &Block<A::Scalar>,
+    block: &mut Block<A::Scalar>,
     [first, last]: [usize; 2],
 ) {
     // SAFETY: the contract of `simd`; accumulators are there for every particle of the layer and the next.
@@ -19,19 +64,22 @@ pub unsafe fn scatter<I: Isa, A: Arithmetic<I>>(
         const SIGN: [f64; 4] = [1.0, 1.0, 1.0, -1.0];
         let sign = I::Quad::load(SIGN.as_ptr());
         let base = sums.0.offset(4 * offset);
-        let (rows, j) = (block.rows.as_ptr(), block.j.as_ptr());
+        let rows = block.rows.as_ptr().cast::<A::Scalar>();
+        let (j, which) = (block.j.as_ptr(), block.which.as_ptr());
+        let end = *block.begin.get_unchecked(last) as usize;
         let mut p = *block.begin.get_unchecked(first) as usize;
+        // One loop over all, not one for each member: none of their ends is to be foreseen.
+        while p < end {
+            let row = A::load_quad(rows.add(4 * p));
+            let at = base.add(4 * *j.add(p) as usize);
+            I::Quad::load(at).sub(row).store(at);
+            let own = block.banks.at(*which.add(p) as usize, p);
+            I::Quad::load(own).add(row).store(own);
+            p += 1;
+        }
         let mut m = first;
         while m < last {
-            let to = *block.begin.get_unchecked(m + 1) as usize;
-            let mut sum = I::Quad::zero();
-            while p < to {
-                let row = A::load_quad(rows.add(4 * p));
-                let at = base.add(4 * *j.add(p) as usize);
-                sum = sum.add(row);
-                I::Quad::load(at).sub(row).store(at);
-                p += 1;
-            }
+            let sum = block.banks.take::<I::Quad>(m - first);
             add_to(base.add(4 * *block.members.get_unchecked(m) as usize), sum.mul(sign));
             m += 1;
         }

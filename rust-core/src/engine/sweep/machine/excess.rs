@@ -91,7 +91,7 @@ impl<P: Compiled> Machine<P> {
             let species = self.species.get(first + k).map_or(0, |s| *s as usize);
             for c in 0..width {
                 let of = |at: isize| match width {
-                    1 => self.sums[4 * at as usize + 3],
+                    1 => self.sums[at as usize].0[3],
                     _ => self.densities[width * at as usize + c],
                 };
                 let mut n = of(s + here);

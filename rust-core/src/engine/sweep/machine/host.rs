@@ -58,12 +58,12 @@ impl<P: Compiled> Machine<P> {
                     if k >= this.owned {
                         continue;
                     }
-                    let at = 4 * (s as isize + here) as usize;
-                    let mut f = [this.sums[at], this.sums[at + 1], this.sums[at + 2]];
+                    let [x, y, z, _] = this.sums[(s as isize + here) as usize].0;
+                    let mut f = [x, y, z];
                     if let Some(before) = before {
-                        let at = 4 * (s as isize + before) as usize;
+                        let sum = this.sums[(s as isize + before) as usize].0;
                         for c in 0..3 {
-                            f[c] += this.sums[at + c];
+                            f[c] += sum[c];
                         }
                     }
                     if !(f[0] + f[1] + f[2]).is_finite() {
@@ -138,15 +138,7 @@ impl<P: Compiled> Machine<P> {
         fn bytes<T>(array: &Vec<T>) -> usize {
             array.capacity() * size_of::<T>()
         }
-        let near: usize = self
-            .near
-            .iter()
-            .map(|n| {
-                n.rows.iter().chain(&n.apart).map(|rows| rows.bytes()).sum::<usize>()
-                    + n.counts.iter().map(bytes).sum::<usize>()
-                    + bytes(&n.members)
-            })
-            .sum();
+        let near: usize = self.near.iter().map(|n| n.bytes()).sum();
         near + bytes(&self.cell)
             + bytes(&self.unit)
             + bytes(&self.counts)

@@ -1,12 +1,12 @@
 //! Particles into the order of cells.
 
-use super::{Given, Machine, SLACK, Shared};
+use super::{Given, Machine, SLACK, Shared, Sum};
 use crate::engine::error::EngineError;
 use crate::engine::sweep::arithmetic::Record;
 use crate::engine::sweep::compiled::Compiled;
 use crate::engine::sweep::frame::Frame;
 use crate::engine::sweep::grid::Grid;
-use crate::engine::sweep::many_body::NearPairs;
+use crate::engine::sweep::many_body::{NEAR_BITS, NearPairs};
 use crate::engine::sweep::pool::{Pool, part};
 use crate::engine::sweep::quantum::Quantum;
 use crate::engine::tally::Tally;
@@ -62,6 +62,10 @@ impl<P: Compiled> Machine<P> {
         self.counts.resize(threads * cells, 0);
         self.count(pool, given)?;
         self.add_up(threads);
+        let crowded = |layer| (self.layer(layer).1 + self.next_layer(layer)) >> NEAR_BITS > 0;
+        if (0..grid.layers).any(crowded) {
+            return Err(EngineError::Host("2^25 particles or more in two layers next to each other"));
+        }
         self.place(pool, given);
         self.copy_first_layer();
         Ok(())
@@ -236,7 +240,7 @@ impl<P: Compiled> Machine<P> {
             self.offset.push(sum as isize - first as isize);
             sum += own + self.next_layer(layer);
         }
-        self.sums.resize(4 * sum.max(1), 0.0);
+        self.sums.resize(sum.max(1), Sum::default());
         let variables = self.width();
         self.densities.resize(if variables > 1 { variables * sum } else { 0 }, 0.0);
         self.near.resize_with(layers, NearPairs::default);

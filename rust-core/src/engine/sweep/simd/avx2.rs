@@ -1,7 +1,7 @@
 //! AVX2 with FMA and BMI2.
 
 use super::avx512::{F64x4 as Quad4, operators};
-use super::{Isa, ORDINARY_F32, ORDINARY_F64, Point16, Reals, Words};
+use super::{Isa, ORDINARY_F32, ORDINARY_F64, Two, Reals, Words};
 use crate::model::kernel::Real;
 use std::arch::x86_64::*;
 use std::ops::{Add, Mul, Sub};
@@ -450,13 +450,7 @@ impl Isa for Avx2 {
     type Quad = Quad4;
 
     #[inline(always)]
-    unsafe fn near<const SHIFTS: bool>(
-        x: [*const u16; 3],
-        shift: [u16; 3],
-        a: &Point16,
-        b: &Point16,
-        limit: i16,
-    ) -> u32 {
+    unsafe fn near<const SHIFTS: bool>(x: [*const u16; 3], shift: [u16; 3], two: &Two, limit: i16) -> u32 {
         unsafe {
             let [mut sa, mut sb] = [_mm256_setzero_si256(); 2];
             let mut c = 0;
@@ -465,8 +459,8 @@ impl Isa for Avx2 {
                 if SHIFTS {
                     there = _mm256_add_epi16(there, _mm256_set1_epi16(shift[c] as i16));
                 }
-                let da = _mm256_sub_epi16(_mm256_load_si256(a.0[c].as_ptr().cast()), there);
-                let db = _mm256_sub_epi16(_mm256_load_si256(b.0[c].as_ptr().cast()), there);
+                let da = _mm256_sub_epi16(_mm256_load_si256(two.0[c].as_ptr().cast()), there);
+                let db = _mm256_sub_epi16(_mm256_load_si256(two.0[c].as_ptr().add(16).cast()), there);
                 sa = _mm256_adds_epi16(sa, _mm256_mulhi_epi16(da, da));
                 sb = _mm256_adds_epi16(sb, _mm256_mulhi_epi16(db, db));
                 c += 1;
@@ -479,8 +473,8 @@ impl Isa for Avx2 {
         }
     }
     #[inline(always)]
-    unsafe fn fill16(x: u16, p: &mut [u16; 16]) {
-        unsafe { _mm256_storeu_si256(p.as_mut_ptr().cast(), _mm256_set1_epi16(x as i16)) }
+    unsafe fn fill16(x: u16, p: *mut u16) {
+        unsafe { _mm256_storeu_si256(p.cast(), _mm256_set1_epi16(x as i16)) }
     }
     #[inline(always)]
     unsafe fn collect(first: u32, mask: u32, p: *mut u32) {

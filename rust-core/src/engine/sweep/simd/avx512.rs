@@ -1,7 +1,7 @@
 //! AVX-512 (F, BW, DQ, VL), with AVX2, FMA and BMI2.
 
 use super::avx2::U32x8;
-use super::{Isa, ORDINARY_F32, ORDINARY_F64, Point16, Quad, Reals, Words};
+use super::{Isa, ORDINARY_F32, ORDINARY_F64, Two, Quad, Reals, Words};
 use crate::model::kernel::Real;
 use std::arch::x86_64::*;
 use std::ops::{Add, Mul, Sub};
@@ -460,35 +460,25 @@ impl Isa for Avx512 {
     type Quad = F64x4;
 
     #[inline(always)]
-    unsafe fn near<const SHIFTS: bool>(
-        x: [*const u16; 3],
-        shift: [u16; 3],
-        a: &Point16,
-        b: &Point16,
-        limit: i16,
-    ) -> u32 {
+    unsafe fn near<const SHIFTS: bool>(x: [*const u16; 3], shift: [u16; 3], two: &Two, limit: i16) -> u32 {
         unsafe {
-            let [mut sa, mut sb] = [_mm256_setzero_si256(); 2];
+            let mut sum = _mm512_setzero_si512();
             let mut c = 0;
             while c < 3 {
-                let mut there = _mm256_loadu_si256(x[c].cast());
+                let mut there = _mm512_broadcast_i64x4(_mm256_loadu_si256(x[c].cast()));
                 if SHIFTS {
-                    there = _mm256_add_epi16(there, _mm256_set1_epi16(shift[c] as i16));
+                    there = _mm512_add_epi16(there, _mm512_set1_epi16(shift[c] as i16));
                 }
-                let da = _mm256_sub_epi16(_mm256_load_si256(a.0[c].as_ptr().cast()), there);
-                let db = _mm256_sub_epi16(_mm256_load_si256(b.0[c].as_ptr().cast()), there);
-                sa = _mm256_adds_epi16(sa, _mm256_mulhi_epi16(da, da));
-                sb = _mm256_adds_epi16(sb, _mm256_mulhi_epi16(db, db));
+                let d = _mm512_sub_epi16(_mm512_load_si512(two.0[c].as_ptr().cast()), there);
+                sum = _mm512_adds_epi16(sum, _mm512_mulhi_epi16(d, d));
                 c += 1;
             }
-            let limit = _mm256_set1_epi16(limit);
-            let (na, nb) = (_mm256_cmplt_epi16_mask(sa, limit), _mm256_cmplt_epi16_mask(sb, limit));
-            na as u32 | (nb as u32) << 16
+            _mm512_cmplt_epi16_mask(sum, _mm512_set1_epi16(limit))
         }
     }
     #[inline(always)]
-    unsafe fn fill16(x: u16, p: &mut [u16; 16]) {
-        unsafe { _mm256_storeu_si256(p.as_mut_ptr().cast(), _mm256_set1_epi16(x as i16)) }
+    unsafe fn fill16(x: u16, p: *mut u16) {
+        unsafe { _mm256_storeu_si256(p.cast(), _mm256_set1_epi16(x as i16)) }
     }
     #[inline(always)]
     unsafe fn collect(first: u32, mask: u32, p: *mut u32) {

@@ -129,10 +129,17 @@ pub trait Words: Copy {
     unsafe fn columns(base: *const u8, stride: usize, index: *const u32) -> [Self; 4];
 }
 
-/// Positions of sixteen particles at most, each coordinate for itself, in units that [`Isa::near`] compares.
-#[derive(Debug, Clone, Copy, Default)]
-#[repr(C, align(32))]
-pub struct Point16(pub [[u16; 16]; 3]);
+/// Two points, in units that [`Isa::near`] compares: each coordinate sixteen times that of the first, then as often
+/// that of the second.
+#[derive(Debug, Clone, Copy)]
+#[repr(C, align(64))]
+pub struct Two(pub [[u16; 32]; 3]);
+
+impl Default for Two {
+    fn default() -> Two {
+        Two([[0; 32]; 3])
+    }
+}
 
 /// Four double-precision numbers: what accumulates on a particle.
 #[allow(clippy::missing_safety_doc)]
@@ -153,18 +160,12 @@ pub trait Isa: Copy + Send + Sync + 'static {
     type F32: Reals<Scalar = f32>;
     type F64: Reals<Scalar = f64>;
     type Quad: Quad;
-    /// Which of the sixteen particles from `x[0]`, `x[1]`, `x[2]` on, all moved by `shift`, have a distance to
-    /// `a` and to `b` (each sixteen times the same point) whose square, in units of 2¹⁶, is below `limit`: bits
-    /// from 0 on for `a`, from 16 on for `b`. Coordinates wrap.
-    unsafe fn near<const SHIFTS: bool>(
-        x: [*const u16; 3],
-        shift: [u16; 3],
-        a: &Point16,
-        b: &Point16,
-        limit: i16,
-    ) -> u32;
+    /// Which of the sixteen particles from `x[0]`, `x[1]`, `x[2]` on, all moved by `shift`, have a distance to two
+    /// points whose square, in units of 2¹⁶, is below `limit`: bits from 0 on for the first, from 16 on for the
+    /// second. Coordinates wrap.
+    unsafe fn near<const SHIFTS: bool>(x: [*const u16; 3], shift: [u16; 3], two: &Two, limit: i16) -> u32;
     /// Sixteen times the same word.
-    unsafe fn fill16(x: u16, p: &mut [u16; 16]);
+    unsafe fn fill16(x: u16, p: *mut u16);
     /// Writes `first + k` for each bit `k` of sixteen, one after the other; may write sixteen.
     unsafe fn collect(first: u32, mask: u32, p: *mut u32);
     /// The bits of numbers.

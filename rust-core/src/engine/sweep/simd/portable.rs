@@ -1,6 +1,6 @@
 //! Plain arrays, which the compiler vectorises for whatever the target has.
 
-use super::{Isa, ORDINARY_F32, ORDINARY_F64, Point16, Quad, Reals, Words};
+use super::{Isa, ORDINARY_F32, ORDINARY_F64, Two, Quad, Reals, Words};
 use crate::model::kernel::Real;
 use std::ops::{Add, Mul, Sub};
 
@@ -329,11 +329,11 @@ impl Quad for Four {
 
 /// Distances of sixteen particles to a point; bits where their squares are below the limit.
 #[inline(always)]
-fn below(there: &[[u16; 16]; 3], here: &Point16, limit: i16) -> u32 {
+fn below(there: &[[u16; 16]; 3], two: &Two, which: usize, limit: i16) -> u32 {
     let mut sum = [0i32; 16];
     for c in 0..3 {
         for k in 0..16 {
-            let d = here.0[c][k].wrapping_sub(there[c][k]) as i16 as i32;
+            let d = two.0[c][16 * which + k].wrapping_sub(there[c][k]) as i16 as i32;
             sum[k] += (d * d) >> 16;
         }
     }
@@ -350,13 +350,7 @@ impl Isa for Portable {
     type Quad = Four;
 
     #[inline(always)]
-    unsafe fn near<const SHIFTS: bool>(
-        x: [*const u16; 3],
-        shift: [u16; 3],
-        a: &Point16,
-        b: &Point16,
-        limit: i16,
-    ) -> u32 {
+    unsafe fn near<const SHIFTS: bool>(x: [*const u16; 3], shift: [u16; 3], two: &Two, limit: i16) -> u32 {
         let mut there = [[0; 16]; 3];
         for c in 0..3 {
             there[c] = unsafe { x[c].cast::<[u16; 16]>().read_unaligned() };
@@ -364,11 +358,11 @@ impl Isa for Portable {
                 there[c] = there[c].map(|x| x.wrapping_add(shift[c]));
             }
         }
-        below(&there, a, limit) | below(&there, b, limit) << 16
+        below(&there, two, 0, limit) | below(&there, two, 1, limit) << 16
     }
     #[inline(always)]
-    unsafe fn fill16(x: u16, p: &mut [u16; 16]) {
-        *p = [x; 16];
+    unsafe fn fill16(x: u16, p: *mut u16) {
+        unsafe { p.cast::<[u16; 16]>().write_unaligned([x; 16]) }
     }
     #[inline(always)]
     unsafe fn collect(first: u32, mask: u32, p: *mut u32) {
