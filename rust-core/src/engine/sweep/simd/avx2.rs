@@ -1,7 +1,7 @@
 //! AVX2 with FMA and BMI2.
 
 use super::avx512::{F64x4 as Quad4, operators};
-use super::{Isa, ORDINARY_F32, ORDINARY_F64, Two, Reals, Words};
+use super::{Isa, ORDINARY_F32, ORDINARY_F64, Two, Reals, Words, row_at};
 use crate::model::kernel::Real;
 use std::arch::x86_64::*;
 use std::ops::{Add, Mul, Sub};
@@ -179,8 +179,8 @@ unsafe fn columns_of_words(base: *const u8, stride: usize, index: *const u32) ->
         let mut v = [_mm256_setzero_si256(); 4];
         let mut k = 0;
         while k < 4 {
-            let low: *const __m128i = base.add(*index.add(k) as usize * stride).cast();
-            let high: *const __m128i = base.add(*index.add(k + 4) as usize * stride).cast();
+            let low: *const __m128i = row_at(base, stride, index, k).cast();
+            let high: *const __m128i = row_at(base, stride, index, k + 4).cast();
             let half = _mm256_castsi128_si256(_mm_loadu_si128(low));
             v[k] = _mm256_inserti128_si256::<1>(half, _mm_loadu_si128(high));
             k += 1;
@@ -300,7 +300,7 @@ impl Reals for F64x4 {
             let mut v = [_mm256_setzero_pd(); 4];
             let mut k = 0;
             while k < 4 {
-                v[k] = _mm256_loadu_pd(base.add(*index.add(k) as usize * stride).cast());
+                v[k] = _mm256_loadu_pd(row_at(base, stride, index, k).cast());
                 k += 1;
             }
             let [a, b, c, d] = transposed(v);
@@ -434,7 +434,7 @@ impl Words for U32x4 {
         unsafe {
             let mut rows = [[0u32; 4]; 4];
             for (k, row) in rows.iter_mut().enumerate() {
-                *row = base.add(*index.add(k) as usize * stride).cast::<[u32; 4]>().read_unaligned();
+                *row = row_at(base, stride, index, k).cast::<[u32; 4]>().read_unaligned();
             }
             std::array::from_fn(|c| {
                 let column = [rows[0][c], rows[1][c], rows[2][c], rows[3][c]];

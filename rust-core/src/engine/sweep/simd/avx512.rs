@@ -1,7 +1,7 @@
 //! AVX-512 (F, BW, DQ, VL), with AVX2, FMA and BMI2.
 
 use super::avx2::U32x8;
-use super::{Isa, ORDINARY_F32, ORDINARY_F64, Two, Quad, Reals, Words};
+use super::{Isa, ORDINARY_F32, ORDINARY_F64, Two, Quad, Reals, Words, row_at};
 use crate::model::kernel::Real;
 use std::arch::x86_64::*;
 use std::ops::{Add, Mul, Sub};
@@ -197,7 +197,7 @@ impl WordColumns {
 
 #[inline(always)]
 unsafe fn row(base: *const u8, stride: usize, index: *const u32, k: usize) -> __m128i {
-    unsafe { _mm_loadu_si128(base.add(*index.add(k) as usize * stride).cast()) }
+    unsafe { _mm_loadu_si128(row_at(base, stride, index, k).cast()) }
 }
 
 /// Rows of four words, sixteen of them, as columns: loads of 16 bytes and a transposition within
@@ -321,8 +321,8 @@ impl Reals for F64x8 {
             let mut v = [_mm512_setzero_pd(); 4];
             let mut k = 0;
             while k < 4 {
-                let low: *const f64 = base.add(*index.add(k) as usize * stride).cast();
-                let high: *const f64 = base.add(*index.add(k + 4) as usize * stride).cast();
+                let low: *const f64 = row_at(base, stride, index, k).cast();
+                let high: *const f64 = row_at(base, stride, index, k + 4).cast();
                 let half = _mm512_castpd256_pd512(_mm256_loadu_pd(low));
                 v[k] = _mm512_insertf64x4::<1>(half, _mm256_loadu_pd(high));
                 k += 1;

@@ -141,6 +141,14 @@ impl Default for Two {
     }
 }
 
+/// The address of row `index[k]`.
+///
+/// Read as volatile: the compiler else reads indices as vectors, and takes their lanes out one by one.
+#[inline(always)]
+unsafe fn row_at(base: *const u8, stride: usize, index: *const u32, k: usize) -> *const u8 {
+    unsafe { base.add(index.add(k).read_volatile() as usize * stride) }
+}
+
 /// Four double-precision numbers: what accumulates on a particle.
 #[allow(clippy::missing_safety_doc)]
 pub trait Quad: Copy {
