@@ -2,7 +2,7 @@
 
 use super::arithmetic::Own;
 use super::chunks::Chunk;
-use super::scatter::Banks;
+use super::scatter::Sum;
 use super::simd::{Two, Scalar};
 
 /// Most particles whose pairs are in hand at once.
@@ -38,15 +38,18 @@ pub struct Block<T> {
     pub conservative: Vec<T>,
     /// How many pairs are within the range of each density.
     pub found: Vec<usize>,
-    /// What the pairs add to the members.
-    pub banks: Banks,
+    /// Running sums of the rows.
+    pub running: Vec<Sum>,
     /// Work space of pair terms that are evaluated apart.
     pub aside: Aside,
     /// What the members are to be compared with.
     pub chunks: Vec<Chunk>,
     pub chunk_count: usize,
+    /// Members that look together, or one twice if it looks alone.
+    pub twos: [[u8; 2]; GROUP],
+    pub two_count: usize,
     /// Where the members are.
-    pub points: [Two; GROUP / 2],
+    pub points: [Two; GROUP],
     /// Which of each chunk are within reach.
     pub masks: Vec<u32>,
     capacity: usize,
@@ -86,11 +89,13 @@ impl<T: Scalar> Default for Block<T> {
             weight: Vec::new(),
             conservative: Vec::new(),
             found: Vec::new(),
-            banks: Banks::default(),
+            running: Vec::new(),
             aside: Aside::default(),
             chunks: Vec::new(),
             chunk_count: 0,
-            points: [Two::default(); GROUP / 2],
+            twos: [[0; 2]; GROUP],
+            two_count: 0,
+            points: [Two::default(); GROUP],
             masks: Vec::new(),
             capacity: 0,
         };
@@ -128,6 +133,7 @@ impl<T: Scalar> Block<T> {
         self.other.resize(capacity, 0);
         self.which.resize(capacity, 0);
         self.rows.resize(capacity / 16, Lines::default());
+        self.running.resize(capacity + 2, Sum::default());
         self.conservative.resize(capacity, T::default());
         for values in &mut self.weight {
             values.resize(capacity, T::default());

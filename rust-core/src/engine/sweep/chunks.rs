@@ -29,14 +29,15 @@ pub struct Group<'a> {
     pub view: &'a View,
     pub windows: &'a Windows,
     pub spans: &'a Spans,
-    /// Those whose spans go on in other periods.
-    pub across: u32,
+    /// Whether spans go on in the period before, or in the next.
+    pub before: bool,
+    pub after: bool,
     /// The first, and how many.
     pub first: usize,
     pub count: usize,
 }
 
-/// Cuts the spans of a group into chunks. Two particles that follow each other look together.
+/// Cuts the spans of a group into chunks. Particles that follow each other closely look two by two.
 #[inline(always)]
 pub unsafe fn cut<T: Scalar, const GHOSTS: bool>(
     swept: &Swept<T, impl Record>,
@@ -45,41 +46,63 @@ pub unsafe fn cut<T: Scalar, const GHOSTS: bool>(
 ) {
     // SAFETY: the arrays are as `Swept` says, chunks have room.
     unsafe {
-        let Group { view, spans, count, .. } = *group;
+        let Group { view, windows, spans, count, .. } = *group;
         let x = swept.x[0].as_ptr().add(group.first);
         let mut found = 0;
+        let mut two = 0;
         let mut a = 0;
         while a < count {
-            let b = a + 1;
-            if b == count || (*x.add(b) - *x.add(a)).abs() > view.joined {
-                found = cut_across::<T, GHOSTS>(swept, group, [a, a], FIRST, found, block);
-                if b < count {
-                    found = cut_across::<T, GHOSTS>(swept, group, [b, b], SECOND, found, block);
-                }
-                a += 2;
-                continue;
-            }
-            if (group.across >> a) & 3 != 0 {
-                found = cut_across::<T, GHOSTS>(swept, group, [a, b], BOTH, found, block);
-                a += 2;
-                continue;
-            }
+            let alone = a + 1 == count || (*x.add(a + 1) - *x.add(a)).abs() > view.joined;
+            let b = a + !alone as usize;
+            let who = if alone { FIRST } else { BOTH };
+            *block.twos.get_unchecked_mut(two) = [a as u8, b as u8];
             let mut w = 0;
             while w < 5 {
                 let (low, end) = (spans.low.get_unchecked(w), spans.end.get_unchecked(w));
                 let low = (*low.get_unchecked(a)).min(*low.get_unchecked(b));
                 let end = (*end.get_unchecked(a)).max(*end.get_unchecked(b));
-                let row = *group.windows.row.get_unchecked(w);
-                let behind = *group.windows.behind.get_unchecked(w);
-                let from =
-                    if w == 0 { (group.first + b) as u32 } else { *row.add(low as usize) + behind };
+                let row = *windows.row.get_unchecked(w);
+                let behind = *windows.behind.get_unchecked(w);
+                // The second of two is the first of those behind the first.
+                let own = (group.first + a + 1) as u32;
+                let from = if w == 0 { own } else { *row.add(low as usize) + behind };
                 let to = *row.add(end as usize) + behind;
-                let look = Look { a, who: BOTH, but: if w == 0 { 1 << 16 } else { 0 }, shift: w + 5 };
+                let but = if w == 0 && !alone { 1 << 16 } else { 0 };
+                let look = Look { a, b, two, who, but, shift: w + 5 };
                 found = add::<T, GHOSTS>(swept, group, block, found, [from, to], look);
                 w += 1;
             }
-            a += 2;
+            // Rows that go on in the period before, and in the next.
+            if group.before {
+                let mut w = 1;
+                while w < 5 {
+                    let low = spans.before.get_unchecked(w);
+                    let low = (*low.get_unchecked(a)).min(*low.get_unchecked(b));
+                    let row = *windows.row.get_unchecked(w);
+                    let behind = *windows.behind.get_unchecked(w);
+                    let range = [*row.add(low as usize) + behind, *row.add(view.bins as usize) + behind];
+                    let look = Look { a, b, two, who, but: 0, shift: w };
+                    found = add::<T, GHOSTS>(swept, group, block, found, range, look);
+                    w += 1;
+                }
+            }
+            if group.after {
+                let mut w = 0;
+                while w < 5 {
+                    let end = spans.after.get_unchecked(w);
+                    let end = (*end.get_unchecked(a)).max(*end.get_unchecked(b));
+                    let row = *windows.row.get_unchecked(w);
+                    let behind = *windows.behind.get_unchecked(w);
+                    let range = [*row + behind, *row.add(end as usize) + behind];
+                    let look = Look { a, b, two, who, but: 0, shift: w + 10 };
+                    found = add::<T, GHOSTS>(swept, group, block, found, range, look);
+                    w += 1;
+                }
+            }
+            two += 1;
+            a = b + 1;
         }
+        block.two_count = two;
         block.chunk_count = found;
     }
 }
@@ -87,8 +110,10 @@ pub unsafe fn cut<T: Scalar, const GHOSTS: bool>(
 /// Who looks, and how.
 #[derive(Clone, Copy)]
 struct Look {
-    /// The first of the two, in the group.
+    /// The two, in the group; the same if one looks alone.
     a: usize,
+    b: usize,
+    two: usize,
     who: u32,
     /// Left out of the first chunk: the second of the two is there itself.
     but: u32,
@@ -118,8 +143,7 @@ unsafe fn add<T: Scalar, const GHOSTS: bool>(
         let mut owned = [BOTH; 2];
         if GHOSTS {
             // Two ghosts are no concern of this rank.
-            let i = group.first + look.a;
-            let ghost = [*swept.ghost.get_unchecked(i), *swept.ghost.get_unchecked(i + 1)];
+            let ghost = [look.a, look.b].map(|k| *swept.ghost.get_unchecked(group.first + k));
             if ghost[0] && ghost[1] {
                 let [first, last] = *group.windows.owned.get_unchecked(look.shift % 5);
                 if look.but == 0 {
@@ -138,7 +162,7 @@ unsafe fn add<T: Scalar, const GHOSTS: bool>(
             return add_many::<T, GHOSTS>(swept, group, block, found, [from, to], look);
         }
         // Both are written, and counted as needed: there is no branch to foresee.
-        let (two, shift) = (look.a as u32 / 2, look.shift as u32);
+        let (two, shift) = (look.two as u32, look.shift as u32);
         let out = block.chunks.as_mut_ptr().add(found);
         *out = Chunk { from, allowed: first_bits(length) & look.who & !look.but & owned[0], two, shift };
         let allowed = first_bits(length.saturating_sub(16)) & look.who & owned[1];
@@ -158,76 +182,18 @@ fn add_many<T: Scalar, const GHOSTS: bool>(
     look: Look,
 ) -> usize {
     block.reserve_chunks(found + (to - from).div_ceil(16) as usize);
-    let i = group.first + look.a;
     let mut but = look.but;
     for begin in (from..to).step_by(16) {
         let mut allowed = first_bits(to - begin) & look.who & !but;
         if GHOSTS {
             // SAFETY: of a chunk.
             let owned = unsafe { swept.owned_bits(begin as usize) };
-            allowed &= owned | if swept.ghost[i] { 0 } else { FIRST } | SECOND;
-            allowed &= owned << 16 | if swept.ghost[i + 1] { 0 } else { SECOND } | FIRST;
+            allowed &= owned | if swept.ghost[group.first + look.a] { 0 } else { FIRST } | SECOND;
+            allowed &= owned << 16 | if swept.ghost[group.first + look.b] { 0 } else { SECOND } | FIRST;
         }
-        block.chunks[found] = Chunk { from: begin, allowed, two: look.a as u32 / 2, shift: look.shift as u32 };
+        block.chunks[found] = Chunk { from: begin, allowed, two: look.two as u32, shift: look.shift as u32 };
         found += 1;
         but = 0;
     }
     found
-}
-
-/// The same for particles that look alone, or whose spans go on in other periods.
-#[inline(never)]
-unsafe fn cut_across<T: Scalar, const GHOSTS: bool>(
-    swept: &Swept<T, impl Record>,
-    group: &Group,
-    [a, b]: [usize; 2],
-    who: u32,
-    mut found: usize,
-    block: &mut Block<T>,
-) -> usize {
-    // SAFETY: bins are of the row; chunks have room.
-    unsafe {
-        let Group { view, windows, spans, .. } = *group;
-        let bins = view.bins;
-        let own = (group.first + a + 1) as u32;
-        let but = if who == BOTH { 1 << 16 } else { 0 };
-        let mut w = 0;
-        while w < 5 {
-            let (mut low, end);
-            if (group.across >> a | group.across >> b) & 1 == 1 {
-                if *windows.there.get_unchecked(w) == 0.0 && w > 0 {
-                    w += 1;
-                    continue;
-                }
-                let (lows, ends) = (spans.far_low.get_unchecked(w), spans.far_end.get_unchecked(w));
-                low = (*lows.get_unchecked(a)).min(*lows.get_unchecked(b)) - bins;
-                end = (*ends.get_unchecked(a)).max(*ends.get_unchecked(b)) - bins;
-                if w == 0 {
-                    low = 0;
-                }
-            } else {
-                low = *spans.low.get_unchecked(w).get_unchecked(a);
-                end = *spans.end.get_unchecked(w).get_unchecked(a);
-            }
-            let row = *windows.row.get_unchecked(w);
-            let behind = *windows.behind.get_unchecked(w);
-            let at = |bin: i32| *row.add(bin as usize) + behind;
-            let look = |period: usize, but: u32| Look { a: a & !1, who, but, shift: w + 5 * period };
-            let (from, but) = if w == 0 { (own, but) } else { (at(low.max(0)), 0) };
-            let range = [from, at(end.min(bins))];
-            found = add::<T, GHOSTS>(swept, group, block, found, range, look(1, but));
-            // Before the row or behind it, with no branch to foresee.
-            let before = low < 0;
-            let range = if before { [low + bins, bins] } else { [0, (end - bins).max(0)] };
-            let period = if before { 0 } else { 2 };
-            let range = [at(range[0]), at(range[1])];
-            found = add::<T, GHOSTS>(swept, group, block, found, range, look(period, 0));
-            if before && end > bins {
-                let range = [at(0), at(end - bins)];
-                found = add::<T, GHOSTS>(swept, group, block, found, range, look(2, 0));
-            }
-            w += 1;
-        }
-        found
-    }
 }

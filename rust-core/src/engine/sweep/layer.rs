@@ -133,14 +133,14 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TA
             }
             while first < end {
                 let count = I::F32::LANES.min(end - first);
-                let across = view.spans::<I>(swept, row, first, count, &windows.there, &mut spans);
-                let group = Group { view: &view, windows: &windows, spans: &spans, across, first, count };
+                let [before, after] = view.spans::<I>(swept, row, first, count, &windows.there, &mut spans);
+                let group = Group { view: &view, windows: &windows, spans: &spans, before, after, first, count };
                 if ghosts {
                     cut::<A::Scalar, true>(swept, &group, block);
                 } else {
                     cut::<A::Scalar, false>(swept, &group, block);
                 }
-                if windows.crosses || across != 0 {
+                if windows.crosses || before || after {
                     look::<I, A::Scalar, true>(swept, &group, block);
                 } else {
                     look::<I, A::Scalar, false>(swept, &group, block);

@@ -6,8 +6,8 @@ use super::chunks::Group;
 use super::layer::Swept;
 use super::simd::{Isa, Reals, Scalar};
 
-/// Compares the particles of a group with their chunks, and lists the pairs within reach: those of the first,
-/// third, … particle, then those of the others.
+/// Compares the particles of a group with their chunks, and lists the pairs within reach: those of the
+/// first of each two particles, then those of the second.
 #[inline(always)]
 pub unsafe fn look<I: Isa, T: Scalar, const SHIFTS: bool>(
     swept: &Swept<T, impl Record>,
@@ -21,15 +21,18 @@ pub unsafe fn look<I: Isa, T: Scalar, const SHIFTS: bool>(
         block.reserve(16 * many);
         let q = [swept.q[0].as_ptr(), swept.q[1].as_ptr(), swept.q[2].as_ptr()];
         let points = block.points.as_mut_ptr();
-        let mut k = 0;
-        // One more where the last is alone.
-        while k < count + (count & 1) {
+        let twos = block.two_count;
+        let mut t = 0;
+        while t < twos {
+            let [a, b] = *block.twos.get_unchecked(t);
+            let to = points.add(t).cast::<u16>();
             let mut c = 0;
             while c < 3 {
-                I::fill16(*q[c].add(first + k), points.add(k / 2).cast::<u16>().add(32 * c + 16 * (k % 2)));
+                I::fill16(*q[c].add(first + a as usize), to.add(32 * c));
+                I::fill16(*q[c].add(first + b as usize), to.add(32 * c + 16));
                 c += 1;
             }
-            k += 1;
+            t += 1;
         }
         let limit = swept.quantum.limit;
         let chunks = block.chunks.as_ptr();
@@ -50,9 +53,8 @@ pub unsafe fn look<I: Isa, T: Scalar, const SHIFTS: bool>(
             c += 1;
         }
         let (out, other) = (block.j.as_mut_ptr(), block.other.as_mut_ptr());
-        let slots = count.div_ceil(2);
         let mut found = [0, 0];
-        let mut ends = [[0u32; 8]; 2];
+        let mut ends = [[0u32; GROUP]; 2];
         let mut c = 0;
         while c < many {
             let (chunk, mask) = (chunks.add(c), *masks.add(c));
@@ -85,17 +87,25 @@ pub unsafe fn look<I: Isa, T: Scalar, const SHIFTS: bool>(
         block.members = [first as u32; GROUP];
         let begin = &mut block.begin;
         begin[0] = 0;
-        let mut s = 0;
-        while s < slots {
-            *block.members.get_unchecked_mut(s) = (first + 2 * s) as u32;
-            *begin.get_unchecked_mut(s + 1) = *ends[0].get_unchecked(s);
-            s += 1;
+        let mut slot = 0;
+        let mut t = 0;
+        while t < twos {
+            let [a, _] = *block.twos.get_unchecked(t);
+            *block.members.get_unchecked_mut(slot) = (first + a as usize) as u32;
+            slot += 1;
+            *begin.get_unchecked_mut(slot) = *ends[0].get_unchecked(t);
+            t += 1;
         }
-        let mut s = 0;
-        while s < count / 2 {
-            *block.members.get_unchecked_mut(slots + s) = (first + 2 * s + 1) as u32;
-            *begin.get_unchecked_mut(slots + s + 1) = found[0] as u32 + *ends[1].get_unchecked(s);
-            s += 1;
+        let mut t = 0;
+        while t < twos {
+            let [a, b] = *block.twos.get_unchecked(t);
+            // One that looks alone has found nothing as the second.
+            if a != b {
+                *block.members.get_unchecked_mut(slot) = (first + b as usize) as u32;
+                slot += 1;
+                *begin.get_unchecked_mut(slot) = found[0] as u32 + *ends[1].get_unchecked(t);
+            }
+            t += 1;
         }
     }
 }

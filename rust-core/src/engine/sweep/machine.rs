@@ -11,6 +11,7 @@ use super::grid::Grid;
 use super::layer::{Shared, Swept};
 use super::many_body::NearPairs;
 use super::pool::Pool;
+use super::scatter::Sum;
 use super::quantum::Quantum;
 use super::settings::Instructions;
 use super::simd::Scalar;
@@ -65,12 +66,6 @@ pub struct Machine<P: Compiled> {
     thermostat: Option<(PairNoise, f64)>,
     totals: bool,
 }
-
-/// An accumulator: a force, and the density if there is one variable; aligned so that none straddles lines of the
-/// cache.
-#[derive(Debug, Clone, Copy, Default)]
-#[repr(C, align(32))]
-struct Sum([f64; 4]);
 
 /// A thread's own.
 struct Scratch<T> {

@@ -3,7 +3,7 @@
 use super::arithmetic::Arithmetic;
 use super::block::Block;
 use super::layer::Swept;
-use super::scatter::{Banks, add_to};
+use super::scatter::add_to;
 use super::simd::{Isa, Quad, Scalar};
 
 /// What the first pass of a layer leaves for the second.
@@ -118,6 +118,38 @@ fn make_room<T>(values: &mut Vec<T>, more: usize) {
     }
 }
 
+/// How many sums of each member take turns: one alone would wait for itself at every pair.
+const BANKS: usize = 4;
+
+/// What pairs add to their first particles: sums for each of a vector's worth of members. All zero between uses.
+#[repr(C, align(64))]
+struct Banks([[[f64; 4]; BANKS]; 16]);
+
+impl Banks {
+    /// The sum of member `m` in turn `p`; there are sixteen members.
+    #[inline(always)]
+    unsafe fn at(&mut self, m: usize, p: usize) -> *mut f64 {
+        // SAFETY: the caller's.
+        unsafe { self.0.as_mut_ptr().cast::<[f64; 4]>().add(BANKS * m + p % BANKS).cast() }
+    }
+
+    /// The sum of member `m`, which is zero then.
+    #[inline(always)]
+    unsafe fn take<Q: Quad>(&mut self, m: usize) -> Q {
+        // SAFETY: the caller's.
+        unsafe {
+            let mut sums = [Q::zero(); BANKS];
+            let mut p = 0;
+            while p < BANKS {
+                sums[p] = Q::load(self.at(m, p));
+                Q::zero().store(self.at(m, p));
+                p += 1;
+            }
+            sums[0].add(sums[1]).add(sums[2].add(sums[3]))
+        }
+    }
+}
+
 /// Second pass: many-body forces of the pairs that the first has kept.
 ///
 /// # Safety
@@ -137,7 +169,7 @@ pub unsafe fn second_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const T
         let species = swept.terms.species;
         let passes = near.rows.len();
         let width = passes * species;
-        let mut banks = Banks::default();
+        let mut banks = Banks([[[0.0; 4]; BANKS]; 16]);
         let mut done = vec![0; passes];
         let mut part = 0;
         while part < near.parts.len() {

@@ -12,8 +12,8 @@ pub struct Quantum {
     pub limit: i16,
 }
 
-/// Rows of bins that are looked through together for two particles are so many bins apart at most.
-pub const JOINED: f64 = 2.0;
+/// Particles look together if they are no more bins apart.
+pub const JOINED: f64 = 4.0;
 
 impl Quantum {
     pub fn new(frame: &Frame, grid: &Grid) -> Quantum {

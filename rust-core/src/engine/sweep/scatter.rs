@@ -5,50 +5,11 @@ use super::block::Block;
 use super::layer::{Shared, Swept};
 use super::simd::{Isa, Quad, Scalar};
 
-/// How many sums of each member take turns: one alone would wait for itself at every pair.
-const BANKS: usize = 4;
-
-/// What pairs add to their first particles: sums for each of a vector's worth of members. All zero between uses.
-#[derive(Debug, Clone, Copy)]
-#[repr(C, align(64))]
-pub struct Banks([[[f64; 4]; BANKS]; 16]);
-
-impl Default for Banks {
-    fn default() -> Banks {
-        Banks([[[0.0; 4]; BANKS]; 16])
-    }
-}
-
-impl Banks {
-    /// The sum of member `m` in turn `p`.
-    ///
-    /// # Safety
-    /// There are sixteen members.
-    #[inline(always)]
-    pub unsafe fn at(&mut self, m: usize, p: usize) -> *mut f64 {
-        // SAFETY: the caller's.
-        unsafe { self.0.as_mut_ptr().cast::<[f64; 4]>().add(BANKS * m + p % BANKS).cast() }
-    }
-
-    /// The sum of member `m`, which is zero then.
-    ///
-    /// # Safety
-    /// The contract of `simd`; there are sixteen members.
-    #[inline(always)]
-    pub unsafe fn take<Q: Quad>(&mut self, m: usize) -> Q {
-        // SAFETY: the caller's.
-        unsafe {
-            let mut sums = [Q::zero(); BANKS];
-            let mut p = 0;
-            while p < BANKS {
-                sums[p] = Q::load(self.at(m, p));
-                Q::zero().store(self.at(m, p));
-                p += 1;
-            }
-            sums[0].add(sums[1]).add(sums[2].add(sums[3]))
-        }
-    }
-}
+/// An accumulator: a force, and the density if there is one variable; aligned so that none straddles lines of the
+/// cache.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(C, align(32))]
+pub struct Sum(pub [f64; 4]);
 
 /// Adds the rows of the pairs of `slots` of a block to both particles of each pair.
 #[inline(always)]
@@ -65,23 +26,76 @@ pub unsafe fn scatter<I: Isa, A: Arithmetic<I>>(
         let sign = I::Quad::load(SIGN.as_ptr());
         let base = sums.0.offset(4 * offset);
         let rows = block.rows.as_ptr().cast::<A::Scalar>();
-        let (j, which) = (block.j.as_ptr(), block.which.as_ptr());
-        let end = *block.begin.get_unchecked(last) as usize;
-        let mut p = *block.begin.get_unchecked(first) as usize;
-        // One loop over all, not one for each member: none of their ends is to be foreseen.
+        let j = block.j.as_ptr();
+        // One loop over all, not one for each member, none of whose ends is to be foreseen: what a member gets is
+        // the difference of two running sums.
+        let mut running = Running::<I::Quad>::new(block.running.as_mut_ptr().cast());
+        let begin = block.begin.as_ptr();
+        let (from, end) = (*begin.add(first) as usize, *begin.add(last) as usize);
+        let mut p = from;
         while p < end {
             let row = A::load_quad(rows.add(4 * p));
             let at = base.add(4 * *j.add(p) as usize);
             I::Quad::load(at).sub(row).store(at);
-            let own = block.banks.at(*which.add(p) as usize, p);
-            I::Quad::load(own).add(row).store(own);
+            running.add(p - from, row);
             p += 1;
         }
         let mut m = first;
         while m < last {
-            let sum = block.banks.take::<I::Quad>(m - first);
+            let (a, b) = (*begin.add(m) as usize - from, *begin.add(m + 1) as usize - from);
+            let sum = running.sum(a, b);
             add_to(base.add(4 * *block.members.get_unchecked(m) as usize), sum.mul(sign));
             m += 1;
+        }
+    }
+}
+
+/// Running sums over rows; those with an even and those with an odd number take turns, as one alone would wait for
+/// itself.
+pub struct Running<Q> {
+    turn: [Q; 2],
+    sums: *mut f64,
+}
+
+impl<Q: Quad> Running<Q> {
+    /// Sums that go to `sums`: room for two more than there are rows.
+    ///
+    /// # Safety
+    /// The contract of `simd`.
+    #[inline(always)]
+    pub unsafe fn new(sums: *mut f64) -> Running<Q> {
+        // SAFETY: the caller's.
+        unsafe {
+            Q::zero().store(sums);
+            Q::zero().store(sums.add(4));
+            Running { turn: [Q::zero(); 2], sums }
+        }
+    }
+
+    /// Adds row `p`, of those from 0 on.
+    ///
+    /// # Safety
+    /// The contract of `simd`.
+    #[inline(always)]
+    pub unsafe fn add(&mut self, p: usize, row: Q) {
+        // SAFETY: the caller's.
+        unsafe {
+            let sum = self.turn[0].add(row);
+            sum.store(self.sums.add(4 * (p + 2)));
+            self.turn = [self.turn[1], sum];
+        }
+    }
+
+    /// The sum of rows `a..b`.
+    ///
+    /// # Safety
+    /// The contract of `simd`; these have been added.
+    #[inline(always)]
+    pub unsafe fn sum(&self, a: usize, b: usize) -> Q {
+        // SAFETY: the caller's.
+        unsafe {
+            let two = |p: usize| Q::load(self.sums.add(4 * p)).add(Q::load(self.sums.add(4 * p + 4)));
+            two(b).sub(two(a))
         }
     }
 }

@@ -84,9 +84,9 @@ impl Windows {
 pub struct Spans {
     pub low: [[i32; 16]; 5],
     pub end: [[i32; 16]; 5],
-    /// Before they were cut at the ends of the row, and one row on.
-    pub far_low: [[i32; 16]; 5],
-    pub far_end: [[i32; 16]; 5],
+    /// From where to the end of the row they look in the period before, and to where in the next.
+    pub before: [[i32; 16]; 5],
+    pub after: [[i32; 16]; 5],
 }
 
 /// A layer, in the numbers that spans are made of.
@@ -121,8 +121,8 @@ impl View {
         }
     }
 
-    /// The spans of the particles from `i` on, a vector of them; they end at the ends of the row, except for
-    /// particles of which bits are set in what is returned, whose spans go on in other periods.
+    /// The spans of the particles from `i` on, a vector of them, and whether any go on in the period before, or in
+    /// the next.
     #[inline(always)]
     pub unsafe fn spans<I: Isa>(
         &self,
@@ -132,7 +132,7 @@ impl View {
         count: usize,
         there: &[f32; 5],
         out: &mut Spans,
-    ) -> u32 {
+    ) -> [bool; 2] {
         // SAFETY: the contract of `simd`.
         unsafe {
             let x = I::F32::load(swept.x[0].as_ptr().add(i));
@@ -163,27 +163,30 @@ impl View {
             }
             let most = I::F32::constant(self.bins as f64);
             let one = I::F32::constant(1.0);
-            let mut across = 0;
+            let [mut before, mut after] = [false; 2];
             if self.periodic {
                 // The longest span is that of the particle's own row.
-                across = (bin - half[0]).mask_below(zero) | (most - one).mask_below(bin + half[0]);
-                across &= (1u32 << count) - 1;
+                let these = (1u32 << count) - 1;
+                before = (bin - half[0]).mask_below(zero) & these != 0;
+                after = (most - one).mask_below(bin + half[0]) & these != 0;
             }
             let mut w = 0;
             while w < 5 {
+                // Rows that are not there get a span without length.
                 let h = *half.get_unchecked(w) * I::F32::splat(*there.get_unchecked(w));
                 let (low, end) = (out.low.get_unchecked_mut(w), out.end.get_unchecked_mut(w));
-                if across != 0 {
-                    // One row on, so that truncation rounds down.
-                    (bin + most - h).store_whole(out.far_low.get_unchecked_mut(w).as_mut_ptr());
-                    (bin + most + h + one).store_whole(out.far_end.get_unchecked_mut(w).as_mut_ptr());
+                if before {
+                    (bin - h + most).smaller(most).store_whole(out.before.get_unchecked_mut(w).as_mut_ptr());
+                }
+                if after {
+                    let over = (bin + h + one - most).larger(zero);
+                    over.store_whole(out.after.get_unchecked_mut(w).as_mut_ptr());
                 }
                 (bin - h).larger(zero).smaller(most).store_whole(low.as_mut_ptr());
-                // Rows out of reach, or not there, get a span without length.
                 (bin + h + one).smaller(most).where_below(zero, h).store_whole(end.as_mut_ptr());
                 w += 1;
             }
-            across
+            [before, after]
         }
     }
 }
