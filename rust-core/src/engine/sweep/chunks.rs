@@ -13,10 +13,8 @@ pub struct Chunk {
     pub from: u32,
     /// Which of them: bits from 0 on for the first of the two, from 16 on for the second.
     pub allowed: u32,
-    /// The number of the two in the group.
-    pub two: u32,
-    /// The shift they are seen with.
-    pub shift: u32,
+    /// The number of the two in the group, and the shift that they see these with, in the lowest eight bits.
+    pub note: u32,
 }
 
 /// Which of two particles.
@@ -120,11 +118,20 @@ struct Look {
     shift: usize,
 }
 
-/// The bits of the first of sixteen particles, for both of two that look.
-#[inline(always)]
-fn first_bits(length: u32) -> u32 {
-    let one = (1u32 << length.min(16)) - 1;
-    one | one << 16
+/// The bits of the first of thirty-two particles, for both of two that look: those of the first chunk, and of the
+/// second.
+static FIRST_BITS: [[u32; 2]; 33] = first_bits();
+
+const fn first_bits() -> [[u32; 2]; 33] {
+    let mut table = [[0; 2]; 33];
+    let mut length = 0;
+    while length <= 32 {
+        let bits = ((1u64 << length) - 1) as u32;
+        let (here, next) = (bits & 0xffff, bits >> 16);
+        table[length] = [here | here << 16, next | next << 16];
+        length += 1;
+    }
+    table
 }
 
 /// Appends the chunks of the particles `from..to`, at least one for a look without a shift at the own row;
@@ -151,49 +158,75 @@ unsafe fn add<T: Scalar, const GHOSTS: bool>(
                 }
                 to = to.min(last);
             }
-            let all = if ghost[0] { 0 } else { FIRST } | if ghost[1] { 0 } else { SECOND };
             for (k, owned) in owned.iter_mut().enumerate() {
-                let here = swept.owned_bits(from as usize + 16 * k);
-                *owned = all | here | here << 16;
+                *owned = concerned(ghost, swept.owned_bits(from as usize + 16 * k));
             }
         }
-        let length = to.saturating_sub(from);
+        let length = to.saturating_sub(from) as usize;
+        let note = (look.two << 8 | look.shift) as u32;
+        let who = [look.who & !look.but, look.who];
         if length > 32 {
-            return add_many::<T, GHOSTS>(swept, group, block, found, [from, to], look);
+            if GHOSTS {
+                return add_many_with_ghosts(swept, group, block, found, from, to, look);
+            }
+            return add_many(block, found, from, to, who[0], note);
         }
         // Both are written, and counted as needed: there is no branch to foresee.
-        let (two, shift) = (look.two as u32, look.shift as u32);
+        let bits = FIRST_BITS.get_unchecked(length);
         let out = block.chunks.as_mut_ptr().add(found);
-        *out = Chunk { from, allowed: first_bits(length) & look.who & !look.but & owned[0], two, shift };
-        let allowed = first_bits(length.saturating_sub(16)) & look.who & owned[1];
-        *out.add(1) = Chunk { from: from + 16, allowed, two, shift };
-        found + (shift == 5 || length > 0) as usize + (length > 16) as usize
+        *out = Chunk { from, allowed: bits[0] & who[0] & owned[0], note };
+        *out.add(1) = Chunk { from: from + 16, allowed: bits[1] & who[1] & owned[1], note };
+        found + (look.shift == 5 || length > 0) as usize + (length > 16) as usize
     }
+}
+
+/// Which of sixteen particles concern this rank, of which `owned` are no ghosts, for two that look.
+#[inline(always)]
+fn concerned(ghost: [bool; 2], owned: u32) -> u32 {
+    let [a, b] = ghost.map(|ghost| if ghost { owned } else { 0xffff });
+    a | b << 16
+}
+
+/// More chunks than two; `who` looks at the first of them, and whoever has bits above the lowest at the others.
+#[cold]
+#[inline(never)]
+fn add_many<T: Scalar>(
+    block: &mut Block<T>,
+    mut found: usize,
+    from: u32,
+    to: u32,
+    mut who: u32,
+    note: u32,
+) -> usize {
+    block.reserve_chunks(found + (to - from).div_ceil(16) as usize);
+    for begin in (from..to).step_by(16) {
+        let allowed = FIRST_BITS[(to - begin).min(16) as usize][0] & who;
+        block.chunks[found] = Chunk { from: begin, allowed, note };
+        found += 1;
+        if who & SECOND != 0 {
+            who |= SECOND;
+        }
+    }
+    found
 }
 
 #[cold]
 #[inline(never)]
-fn add_many<T: Scalar, const GHOSTS: bool>(
+fn add_many_with_ghosts<T: Scalar>(
     swept: &Swept<T, impl Record>,
     group: &Group,
     block: &mut Block<T>,
-    mut found: usize,
-    [from, to]: [u32; 2],
+    found: usize,
+    from: u32,
+    to: u32,
     look: Look,
 ) -> usize {
-    block.reserve_chunks(found + (to - from).div_ceil(16) as usize);
-    let mut but = look.but;
-    for begin in (from..to).step_by(16) {
-        let mut allowed = first_bits(to - begin) & look.who & !but;
-        if GHOSTS {
-            // SAFETY: of a chunk.
-            let owned = unsafe { swept.owned_bits(begin as usize) };
-            allowed &= owned | if swept.ghost[group.first + look.a] { 0 } else { FIRST } | SECOND;
-            allowed &= owned << 16 | if swept.ghost[group.first + look.b] { 0 } else { SECOND } | FIRST;
-        }
-        block.chunks[found] = Chunk { from: begin, allowed, two: look.two as u32, shift: look.shift as u32 };
-        found += 1;
-        but = 0;
+    let note = (look.two << 8 | look.shift) as u32;
+    let end = add_many(block, found, from, to, look.who & !look.but, note);
+    let ghost = [look.a, look.b].map(|k| swept.ghost[group.first + k]);
+    for chunk in &mut block.chunks[found..end] {
+        // SAFETY: of a chunk.
+        chunk.allowed &= concerned(ghost, unsafe { swept.owned_bits(chunk.from as usize) });
     }
-    found
+    end
 }

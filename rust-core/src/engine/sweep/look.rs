@@ -42,9 +42,9 @@ pub unsafe fn look<I: Isa, T: Scalar, const SHIFTS: bool>(
         while c < many {
             let chunk = chunks.add(c);
             let j = (*chunk).from as usize;
-            let two = points.add((*chunk).two as usize);
+            let two = points.add((*chunk).note as usize >> 8);
             let shift = if SHIFTS {
-                *group.windows.shift.get_unchecked((*chunk).shift as usize)
+                *group.windows.shift.get_unchecked((*chunk).note as usize & 0xff)
             } else {
                 [0; 3]
             };
@@ -58,7 +58,7 @@ pub unsafe fn look<I: Isa, T: Scalar, const SHIFTS: bool>(
         let mut c = 0;
         while c < many {
             let (chunk, mask) = (chunks.add(c), *masks.add(c));
-            let (from, two) = ((*chunk).from, (*chunk).two as usize);
+            let (from, two) = ((*chunk).from, (*chunk).note as usize >> 8);
             I::collect(from, mask & 0xffff, out.add(found[0]));
             I::collect(from, mask >> 16, other.add(found[1]));
             found[0] += (mask & 0xffff).count_ones() as usize;
