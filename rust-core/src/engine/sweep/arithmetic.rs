@@ -1,5 +1,6 @@
 //! Mixed and double precision: what is kept of a particle, and how a pair's distance comes from it.
 
+use super::forces::Kind;
 use super::frame::Frame;
 use super::simd::{Isa, Reals, Scalar, Words};
 use crate::model::kernel::Real;
@@ -23,7 +24,22 @@ pub struct Apart<R: Reals> {
     pub inverse: R,
     /// `ê·v_ij`, for the thermostat.
     pub along: R,
-    /// Of both particles, for the thermostat.
+}
+
+/// The same, with what else is known of the pairs before any term.
+#[derive(Clone, Copy)]
+#[repr(C, align(64))]
+pub struct Pairs<R: Reals> {
+    pub apart: Apart<R>,
+    /// `ξ dt^{-1/2}`, for the thermostat.
+    pub noise: R,
+    /// Which pairs of species, with several.
+    pub kind: Kind<R>,
+}
+
+/// Tags of both particles of pairs, and the species of the second.
+#[derive(Clone, Copy)]
+pub struct Names<R: Reals> {
     pub tags: [R::Words; 2],
     pub species_j: R::Words,
 }
@@ -50,7 +66,7 @@ pub trait Arithmetic<I: Isa>: 'static {
         which: <Self::Reals as Reals>::Words,
         index: *const u32,
         moving: bool,
-    ) -> Apart<Self::Reals>;
+    ) -> (Apart<Self::Reals>, Names<Self::Reals>);
 
     unsafe fn load_quad(p: *const Self::Scalar) -> I::Quad;
 }
@@ -161,7 +177,7 @@ impl<I: Isa> Arithmetic<I> for Mixed {
         which: <I::F32 as Reals>::Words,
         index: *const u32,
         moving: bool,
-    ) -> Apart<I::F32> {
+    ) -> (Apart<I::F32>, Names<I::F32>) {
         type W<I> = <<I as Isa>::F32 as Reals>::Words;
         // SAFETY: the contract of `simd`.
         unsafe {
@@ -195,14 +211,10 @@ impl<I: Isa> Arithmetic<I> for Mixed {
                 along = sum * inverse;
             }
             let tag_i = W::<I>::pick(own.tag.as_ptr(), which);
-            Apart {
-                d: [dx, dy, dz],
-                r: r2 * inverse,
-                inverse,
-                along,
-                tags: [tag_i, tag_j],
-                species_j: I::bits(species_j),
-            }
+            (
+                Apart { d: [dx, dy, dz], r: r2 * inverse, inverse, along },
+                Names { tags: [tag_i, tag_j], species_j: I::bits(species_j) },
+            )
         }
     }
 
@@ -272,7 +284,7 @@ impl<I: Isa> Arithmetic<I> for Double {
         which: <I::F64 as Reals>::Words,
         index: *const u32,
         moving: bool,
-    ) -> Apart<I::F64> {
+    ) -> (Apart<I::F64>, Names<I::F64>) {
         // SAFETY: the contract of `simd`.
         unsafe {
             let own = &*own;
@@ -310,7 +322,10 @@ impl<I: Isa> Arithmetic<I> for Double {
             }
             let [tag_j, species_j] = I::halves(bits);
             let tag_i = <I::F64 as Reals>::Words::pick(own.tag.as_ptr(), which);
-            Apart { d: [dx, dy, dz], r: r2 * inverse, inverse, along, tags: [tag_i, tag_j], species_j }
+            (
+                Apart { d: [dx, dy, dz], r: r2 * inverse, inverse, along },
+                Names { tags: [tag_i, tag_j], species_j },
+            )
         }
     }
 

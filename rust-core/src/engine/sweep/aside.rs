@@ -11,6 +11,7 @@ use crate::model::pair::PairForm;
 #[inline(always)]
 pub unsafe fn aside<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY: bool>(
     swept: &Swept<A::Scalar, A::Record>,
+    metric: &A::Metric,
     block: &mut Block<A::Scalar>,
     slot: usize,
     [from, to]: [usize; 2],
@@ -18,12 +19,11 @@ pub unsafe fn aside<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY: 
 ) {
     // SAFETY: the contract of `simd`.
     unsafe {
-        let metric = A::metric(swept.frame);
         let mut k = from;
         while k < to {
             let which = <A::Reals as Reals>::Words::load_bytes(block.which.as_ptr().add(k));
             let index = block.j.as_ptr().add(k);
-            let pairs = A::separate(&metric, swept.records.as_ptr(), &block.own, which, index, false);
+            let (pairs, _) = A::separate(metric, swept.records.as_ptr(), &block.own, which, index, false);
             let mut lanes = [A::Scalar::default(); 16];
             pairs.r.store(lanes.as_mut_ptr());
             for (r, lane) in block.aside.all[k..].iter_mut().zip(&lanes[..A::Reals::LANES]) {

@@ -30,6 +30,8 @@ pub struct Block<T> {
     pub which: Vec<u8>,
     /// A vector's worth of members.
     pub own: Own<T>,
+    /// Room for [`Pairs`](super::arithmetic::Pairs) of a precision and instruction set, a vector each.
+    pub pairs: Vec<Lines<T>>,
     /// Rows `fx, fy, fz, −w`.
     pub rows: Vec<Lines<T>>,
     /// Weights, of one density after another.
@@ -85,6 +87,7 @@ impl<T: Scalar> Default for Block<T> {
             other: Vec::new(),
             which: Vec::new(),
             own: Own::default(),
+            pairs: Vec::new(),
             rows: Vec::new(),
             weight: Vec::new(),
             conservative: Vec::new(),
@@ -133,6 +136,8 @@ impl<T: Scalar> Block<T> {
         self.other.resize(capacity, 0);
         self.which.resize(capacity, 0);
         self.rows.resize(capacity / 16, Lines::default());
+        // Eight numbers for each pair, at most.
+        self.pairs.resize(capacity / 8, Lines::default());
         self.running.resize(capacity + 2, Sum::default());
         self.conservative.resize(capacity, T::default());
         for values in &mut self.weight {

@@ -1,7 +1,7 @@
 //! What a block of pairs does, a vector at a time: distances, each term, and the rows that are added to the
 //! particles.
 
-use super::arithmetic::{Apart, Arithmetic};
+use super::arithmetic::{Apart, Arithmetic, Pairs};
 use super::aside::aside;
 use super::block::Block;
 use super::forces::{Kind, Sums, add_virial, slope, sum, value};
@@ -22,6 +22,7 @@ use crate::model::kernel::Real;
 #[inline(always)]
 pub unsafe fn evaluate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY: bool>(
     swept: &Swept<A::Scalar, A::Record>,
+    kit: &Kit<I, A>,
     block: &mut Block<A::Scalar>,
     near: &mut NearPairs<A::Scalar>,
     slot: usize,
@@ -34,23 +35,20 @@ pub unsafe fn evaluate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALL
         let lanes = A::Reals::LANES;
         let passes = terms.passes.len();
         if !terms.apart.is_empty() {
-            aside::<I, A, SEVERAL, TALLY>(swept, block, slot, [from, to], tally);
+            aside::<I, A, SEVERAL, TALLY>(swept, &kit.metric, block, slot, [from, to], tally);
         }
         near.reserve::<TALLY>(to - from + 16);
-        let metric = A::metric(swept.frame);
+        separate::<I, A, SEVERAL>(swept, kit, block, [from, to]);
         let zero = A::Reals::constant(0.0);
-        let drag = terms.drag.as_ref().zip(swept.thermostat);
-        let moving = drag.is_some();
-        let draw = Draw::<A::Reals>::new(swept.thermostat.unwrap_or_default());
-        let records = swept.records.as_ptr();
-        let own: *const _ = &block.own;
         let p_which = block.which.as_ptr();
         let p_j = block.j.as_ptr();
         let p_rows = block.rows.as_mut_ptr().cast::<A::Scalar>();
         let p_conservative = block.conservative.as_ptr();
         let p_found = block.found.as_mut_ptr();
+        let mut p_pairs = block.pairs.as_ptr().cast::<Pairs<A::Reals>>();
         let plain = swept.variables == 1;
         let layer_first = <A::Reals as Reals>::Words::splat(near.first);
+        let drag = terms.drag.as_ref().filter(|_| swept.thermostat.is_some());
         let mut sums = Sums::<A::Reals>::zero();
         let mut pass = 0;
         while pass < passes {
@@ -59,15 +57,8 @@ pub unsafe fn evaluate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALL
         }
         let mut k = from;
         while k < to {
-            let which = <A::Reals as Reals>::Words::load_bytes(p_which.add(k));
-            let pairs = A::separate(&metric, records, own, which, p_j.add(k), moving);
-            let r = pairs.r;
-            let kind = if SEVERAL {
-                let species_i = <A::Reals as Reals>::Words::pick((*own).species.as_ptr(), which);
-                Kind::<A::Reals>::new(species_i, pairs.species_j, terms.species)
-            } else {
-                Kind(which)
-            };
+            let pairs = &*p_pairs;
+            let (r, kind) = (pairs.apart.r, pairs.kind);
             let valid = u32::MAX >> (32 - (to - k).min(lanes));
             let share = if TALLY { shares::<I, A>(swept, block, slot, k, to) } else { zero };
             let mut force = if terms.apart.is_empty() { zero } else { Reals::load(p_conservative.add(k)) };
@@ -81,38 +72,42 @@ pub unsafe fn evaluate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALL
                 force = term.add::<A::Reals, SEVERAL, TALLY>(r, kind, force, share, &mut sums.pair);
             }
             if TALLY {
-                add_virial(force, &pairs, share, &mut sums.virial);
+                add_virial(force, &pairs.apart, share, &mut sums.virial);
             }
-            if let Some((drag, _)) = drag {
-                let thermostat = draw.force::<SEVERAL>(drag, &pairs, kind);
+            if let Some(drag) = drag {
+                let thermostat = drag.force::<A::Reals, SEVERAL>(pairs);
                 if TALLY {
-                    add_virial(thermostat, &pairs, share, &mut sums.thermostat);
+                    add_virial(thermostat, &pairs.apart, share, &mut sums.thermostat);
                 }
                 force = force + thermostat;
             }
             let mut weight = zero;
-            let code = <A::Reals as Reals>::Words::load(p_j.add(k)).sub(layer_first);
-            let code = A::Reals::encode(code.add(which.rotate(NEAR_BITS)));
-            let mut pass = 0;
-            while pass < passes {
-                let term = terms.passes.get_unchecked(pass);
-                let s = r * A::Reals::splat(term.inverse_range);
-                let w = A::Reals::splat(term.value) * value(term.kind, s);
-                let w = w.where_below(s, A::Reals::constant(1.0));
-                if plain {
-                    weight = w;
-                } else {
-                    w.store(block.weight.get_unchecked_mut(pass).as_mut_ptr().add(k));
+            if passes > 0 {
+                let which = <A::Reals as Reals>::Words::load_bytes(p_which.add(k));
+                let code = <A::Reals as Reals>::Words::load(p_j.add(k)).sub(layer_first);
+                let code = A::Reals::encode(code.add(which.rotate(NEAR_BITS)));
+                let mut pass = 0;
+                while pass < passes {
+                    let term = terms.passes.get_unchecked(pass);
+                    let s = r * A::Reals::splat(term.inverse_range);
+                    let w = A::Reals::splat(term.value) * value(term.kind, s);
+                    let w = w.where_below(s, A::Reals::constant(1.0));
+                    if plain {
+                        weight = w;
+                    } else {
+                        w.store(block.weight.get_unchecked_mut(pass).as_mut_ptr().add(k));
+                    }
+                    let mask = r.mask_below(A::Reals::splat(term.force_range)) & valid;
+                    let found = p_found.add(pass);
+                    keep::<A::Reals, TALLY>(term, &pairs.apart, code, mask, share, near, pass, *found);
+                    *found += mask.count_ones() as usize;
+                    pass += 1;
                 }
-                let mask = r.mask_below(A::Reals::splat(term.force_range)) & valid;
-                let found = p_found.add(pass);
-                keep::<A::Reals, TALLY>(term, &pairs, code, mask, share, near, pass, *found);
-                *found += mask.count_ones() as usize;
-                pass += 1;
             }
-            let f = force * pairs.inverse;
-            let [dx, dy, dz] = pairs.d;
+            let f = force * pairs.apart.inverse;
+            let [dx, dy, dz] = pairs.apart.d;
             A::Reals::rows([f * dx, f * dy, f * dz, zero - weight], p_rows.add(4 * k));
+            p_pairs = p_pairs.add(1);
             k += lanes;
         }
         if TALLY {
@@ -122,6 +117,63 @@ pub unsafe fn evaluate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALL
                 tally.virial[c] += sum(sums.virial[c]);
                 tally.thermostat_virial[c] += sum(sums.thermostat[c]);
             }
+        }
+    }
+}
+
+/// What is the same for all blocks of a step.
+#[derive(Clone, Copy)]
+pub struct Kit<I: Isa, A: Arithmetic<I>> {
+    metric: A::Metric,
+    draw: Option<Draw<A::Reals>>,
+}
+
+impl<I: Isa, A: Arithmetic<I>> Kit<I, A> {
+    #[inline(always)]
+    pub unsafe fn new(swept: &Swept<A::Scalar, A::Record>) -> Self {
+        // SAFETY: the contract of `simd`.
+        unsafe {
+            let drags = swept.thermostat.filter(|_| swept.terms.drag.is_some());
+            let draw = match drags {
+                Some(noise) => Some(Draw::new(noise)),
+                None => None,
+            };
+            Kit { metric: A::metric(swept.frame), draw }
+        }
+    }
+}
+
+/// Distances, noise and kinds of the pairs, in a loop of their own: one loop for all would be so long that the
+/// processor sees but one vector at a time.
+#[inline(always)]
+unsafe fn separate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool>(
+    swept: &Swept<A::Scalar, A::Record>,
+    kit: &Kit<I, A>,
+    block: &mut Block<A::Scalar>,
+    [from, to]: [usize; 2],
+) {
+    // SAFETY: the contract of `simd`; blocks have room for all pairs and a vector behind.
+    unsafe {
+        let records = swept.records.as_ptr();
+        let own: *const _ = &block.own;
+        let p_which = block.which.as_ptr();
+        let p_j = block.j.as_ptr();
+        let mut p_pairs = block.pairs.as_mut_ptr().cast::<Pairs<A::Reals>>();
+        let mut k = from;
+        while k < to {
+            let which = <A::Reals as Reals>::Words::load_bytes(p_which.add(k));
+            let (apart, names) = A::separate(&kit.metric, records, own, which, p_j.add(k), kit.draw.is_some());
+            let pairs = &mut *p_pairs;
+            pairs.apart = apart;
+            if let Some(draw) = &kit.draw {
+                pairs.noise = draw.noise(names.tags);
+            }
+            if SEVERAL {
+                let species_i = <A::Reals as Reals>::Words::pick((*own).species.as_ptr(), which);
+                pairs.kind = Kind::new(species_i, names.species_j, swept.terms.species);
+            }
+            p_pairs = p_pairs.add(1);
+            k += A::Reals::LANES;
         }
     }
 }

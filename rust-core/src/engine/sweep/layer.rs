@@ -7,7 +7,7 @@
 use super::arithmetic::Arithmetic;
 use super::block::Block;
 use super::chunks::{Group, cut};
-use super::evaluate::evaluate;
+use super::evaluate::{Kit, evaluate};
 use super::frame::Frame;
 use super::grid::Grid;
 use super::look::look;
@@ -120,6 +120,7 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TA
         near.clear(swept.terms.passes.len(), layer_first);
         let view = View::new(swept.frame, grid, layer);
         let ghosts = !swept.ghost.is_empty();
+        let kit = Kit::<I, A>::new(swept);
         let mut spans = Spans::default();
         let mut row = 0;
         while row < grid.rows {
@@ -148,7 +149,7 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TA
                 let mut slot = 0;
                 while slot < count {
                     let last = count.min(slot + A::Reals::LANES);
-                    part::<I, A, SEVERAL, TALLY>(swept, layer, block, near, [slot, last], &mut tally);
+                    part::<I, A, SEVERAL, TALLY>(swept, &kit, layer, block, near, [slot, last], &mut tally);
                     slot = last;
                 }
                 first += count;
@@ -163,6 +164,7 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TA
 #[inline(always)]
 unsafe fn part<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY: bool>(
     swept: &Swept<A::Scalar, A::Record>,
+    kit: &Kit<I, A>,
     layer: usize,
     block: &mut Block<A::Scalar>,
     near: &mut NearPairs<A::Scalar>,
@@ -188,7 +190,7 @@ unsafe fn part<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY: bool>
             m += 1;
         }
         A::own(swept.records.as_ptr(), block.members.as_ptr().add(first), &mut block.own);
-        evaluate::<I, A, SEVERAL, TALLY>(swept, block, near, first, pairs, tally);
+        evaluate::<I, A, SEVERAL, TALLY>(swept, kit, block, near, first, pairs, tally);
         let offset = *swept.offset.get_unchecked(layer);
         scatter::<I, A>(swept.sums, offset, block, [first, last]);
         if swept.variables > 1 {

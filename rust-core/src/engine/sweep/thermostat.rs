@@ -1,7 +1,6 @@
 //! Noise and drag of a vector of pairs.
 
-use super::arithmetic::Apart;
-use super::forces::Kind;
+use super::arithmetic::Pairs;
 use super::simd::{Reals, Scalar, Words};
 use super::terms::{Drag, Exponent};
 use crate::engine::noise::{PAIR_ROUNDS, PARITY, PairNoise, ROTATIONS};
@@ -33,7 +32,7 @@ impl<R: Reals> Draw<R> {
 
     /// `ξ dt^{-1/2}` of each pair: Threefry2x32 of the two tags, in order.
     #[inline(always)]
-    unsafe fn noise(&self, [a, b]: [R::Words; 2]) -> R {
+    pub unsafe fn noise(&self, [a, b]: [R::Words; 2]) -> R {
         // SAFETY: the contract of `simd`.
         unsafe {
             let mut x0 = a.min(b).add(self.schedule[0]);
@@ -60,26 +59,24 @@ impl<R: Reals> Draw<R> {
             (x0.add(self.schedule[number % 3]), x1)
         }
     }
+}
 
+impl<T: Scalar> Drag<T> {
     /// `−γ w_R² (ê·v) + σ w_R ξ dt^{−1/2}`.
     #[inline(always)]
-    pub unsafe fn force<const SEVERAL: bool>(
-        &self,
-        drag: &Drag<R::Scalar>,
-        pairs: &Apart<R>,
-        kind: Kind<R>,
-    ) -> R {
+    pub unsafe fn force<R: Reals<Scalar = T>, const SEVERAL: bool>(&self, pairs: &Pairs<R>) -> R {
         // SAFETY: the contract of `simd`.
         unsafe {
             let (one, zero) = (R::constant(1.0), R::constant(0.0));
-            let t = (one - pairs.r * kind.of::<SEVERAL>(&drag.inverse_range)).larger(zero);
-            let w = match &drag.exponent {
+            let kind = pairs.kind;
+            let t = (one - pairs.apart.r * kind.of::<SEVERAL>(&self.inverse_range)).larger(zero);
+            let w = match &self.exponent {
                 Exponent::One => t,
                 Exponent::Two => t * t,
                 Exponent::Any(exponent) => power(t, kind.of::<SEVERAL>(exponent)),
             };
-            let pull = kind.of::<SEVERAL>(&drag.sigma) * self.noise(pairs.tags)
-                - kind.of::<SEVERAL>(&drag.gamma) * w * pairs.along;
+            let pull = kind.of::<SEVERAL>(&self.sigma) * pairs.noise
+                - kind.of::<SEVERAL>(&self.gamma) * w * pairs.apart.along;
             w * pull
         }
     }
