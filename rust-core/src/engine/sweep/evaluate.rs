@@ -82,33 +82,46 @@ pub unsafe fn evaluate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALL
                 force = force + thermostat;
             }
             let mut weight = zero;
-            if passes > 0 {
-                let which = <A::Reals as Reals>::Words::load_bytes(p_which.add(k));
-                let code = <A::Reals as Reals>::Words::load(p_j.add(k)).sub(layer_first);
-                let code = A::Reals::encode(code.add(which.rotate(NEAR_BITS)));
-                let mut pass = 0;
-                while pass < passes {
-                    let term = terms.passes.get_unchecked(pass);
-                    let s = r * A::Reals::splat(term.inverse_range);
-                    let w = A::Reals::splat(term.value) * value(term.kind, s);
-                    let w = w.where_below(s, A::Reals::constant(1.0));
-                    if plain {
-                        weight = w;
-                    } else {
-                        w.store(block.weight.get_unchecked_mut(pass).as_mut_ptr().add(k));
-                    }
-                    let mask = r.mask_below(A::Reals::splat(term.force_range)) & valid;
-                    let found = p_found.add(pass);
-                    keep::<A::Reals, TALLY>(term, &pairs.apart, code, mask, share, near, pass, *found);
-                    *found += mask.count_ones() as usize;
-                    pass += 1;
+            let mut pass = 0;
+            while pass < passes {
+                let term = terms.passes.get_unchecked(pass);
+                let s = r * A::Reals::splat(term.inverse_range);
+                let w = A::Reals::splat(term.value) * value(term.kind, s);
+                let w = w.where_below(s, A::Reals::constant(1.0));
+                if plain {
+                    weight = w;
+                } else {
+                    w.store(block.weight.get_unchecked_mut(pass).as_mut_ptr().add(k));
                 }
+                pass += 1;
             }
             let f = force * pairs.apart.inverse;
             let [dx, dy, dz] = pairs.apart.d;
             A::Reals::rows([f * dx, f * dy, f * dz, zero - weight], p_rows.add(4 * k));
             p_pairs = p_pairs.add(1);
             k += lanes;
+        }
+        let mut pass = 0;
+        while pass < passes {
+            let term = terms.passes.get_unchecked(pass);
+            let mut p_pairs = block.pairs.as_ptr().cast::<Pairs<A::Reals>>();
+            let mut found = 0;
+            let mut k = from;
+            while k < to {
+                let pairs = &*p_pairs;
+                let valid = u32::MAX >> (32 - (to - k).min(lanes));
+                let share = if TALLY { shares::<I, A>(swept, block, slot, k, to) } else { zero };
+                let which = <A::Reals as Reals>::Words::load_bytes(p_which.add(k));
+                let code = <A::Reals as Reals>::Words::load(p_j.add(k)).sub(layer_first);
+                let code = A::Reals::encode(code.add(which.rotate(NEAR_BITS)));
+                let mask = pairs.apart.r.mask_below(A::Reals::splat(term.force_range)) & valid;
+                keep::<A::Reals, TALLY>(term, &pairs.apart, code, mask, share, near, pass, found);
+                found += mask.count_ones() as usize;
+                p_pairs = p_pairs.add(1);
+                k += lanes;
+            }
+            *p_found.add(pass) = found;
+            pass += 1;
         }
         if TALLY {
             tally.pair += sum(sums.pair);
