@@ -31,8 +31,6 @@ pub struct Apart<R: Reals> {
 #[repr(C, align(64))]
 pub struct Pairs<R: Reals> {
     pub apart: Apart<R>,
-    /// `ξ dt^{-1/2}`, for the thermostat.
-    pub noise: R,
     /// Which pairs of species, with several.
     pub kind: Kind<R>,
 }

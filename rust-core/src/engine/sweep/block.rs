@@ -32,6 +32,8 @@ pub struct Block<T> {
     pub own: Own<T>,
     /// Room for [`Pairs`](super::arithmetic::Pairs) of a precision and instruction set, a vector each.
     pub pairs: Vec<Lines<T>>,
+    /// Tags of both particles; then the words of noise are where the first were.
+    pub tags: [Vec<u32>; 2],
     /// Rows `fx, fy, fz, −w`.
     pub rows: Vec<Lines<T>>,
     /// Weights, of one density after another.
@@ -88,6 +90,7 @@ impl<T: Scalar> Default for Block<T> {
             which: Vec::new(),
             own: Own::default(),
             pairs: Vec::new(),
+            tags: Default::default(),
             rows: Vec::new(),
             weight: Vec::new(),
             conservative: Vec::new(),
@@ -135,6 +138,9 @@ impl<T: Scalar> Block<T> {
         self.j.resize(capacity, 0);
         self.other.resize(capacity, 0);
         self.which.resize(capacity, 0);
+        for tags in &mut self.tags {
+            tags.resize(capacity, 0);
+        }
         self.rows.resize(capacity / 16, Lines::default());
         // Eight numbers for each pair, at most.
         self.pairs.resize(capacity / 8, Lines::default());

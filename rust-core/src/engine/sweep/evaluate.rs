@@ -9,7 +9,8 @@ use super::layer::Swept;
 use super::many_body::{NEAR_BITS, NearPairs};
 use super::simd::{Isa, Reals, Scalar, Words};
 use super::terms::Pass;
-use super::thermostat::Draw;
+use super::thermostat::{UNIT, draw};
+use crate::engine::noise::PairNoise;
 use crate::engine::tally::Tally;
 use crate::model::kernel::Real;
 
@@ -46,6 +47,7 @@ pub unsafe fn evaluate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALL
         let p_conservative = block.conservative.as_ptr();
         let p_found = block.found.as_mut_ptr();
         let mut p_pairs = block.pairs.as_ptr().cast::<Pairs<A::Reals>>();
+        let p_noise = block.tags[0].as_ptr();
         let plain = swept.variables == 1;
         let layer_first = <A::Reals as Reals>::Words::splat(near.first);
         let drag = terms.drag.as_ref().filter(|_| swept.thermostat.is_some());
@@ -59,7 +61,6 @@ pub unsafe fn evaluate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALL
         while k < to {
             let pairs = &*p_pairs;
             let (r, kind) = (pairs.apart.r, pairs.kind);
-            let valid = u32::MAX >> (32 - (to - k).min(lanes));
             let share = if TALLY { shares::<I, A>(swept, block, slot, k, to) } else { zero };
             let mut force = if terms.apart.is_empty() { zero } else { Reals::load(p_conservative.add(k)) };
             for term in &terms.soft {
@@ -75,7 +76,9 @@ pub unsafe fn evaluate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALL
                 add_virial(force, &pairs.apart, share, &mut sums.virial);
             }
             if let Some(drag) = drag {
-                let thermostat = drag.force::<A::Reals, SEVERAL>(pairs);
+                let word = <A::Reals as Reals>::Words::load(p_noise.add(k));
+                let xi = (A::Reals::of_signed(word) + A::Reals::constant(0.5)) * kit.unit;
+                let thermostat = drag.force::<A::Reals, SEVERAL>(pairs, xi);
                 if TALLY {
                     add_virial(thermostat, &pairs.apart, share, &mut sums.thermostat);
                 }
@@ -138,7 +141,9 @@ pub unsafe fn evaluate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALL
 #[derive(Clone, Copy)]
 pub struct Kit<I: Isa, A: Arithmetic<I>> {
     metric: A::Metric,
-    draw: Option<Draw<A::Reals>>,
+    noise: Option<PairNoise>,
+    /// Signed words of noise times this are `ξ dt^{−1/2}`.
+    unit: A::Reals,
 }
 
 impl<I: Isa, A: Arithmetic<I>> Kit<I, A> {
@@ -147,16 +152,14 @@ impl<I: Isa, A: Arithmetic<I>> Kit<I, A> {
         // SAFETY: the contract of `simd`.
         unsafe {
             let drags = swept.thermostat.filter(|_| swept.terms.drag.is_some());
-            let draw = match drags {
-                Some(noise) => Some(Draw::new(noise)),
-                None => None,
-            };
-            Kit { metric: A::metric(swept.frame), draw }
+            let (noise, inverse_root_dt) = drags.unzip();
+            let unit = A::Reals::constant(UNIT * inverse_root_dt.unwrap_or_default());
+            Kit { metric: A::metric(swept.frame), noise, unit }
         }
     }
 }
 
-/// Distances, noise and kinds of the pairs, in a loop of their own: one loop for all would be so long that the
+/// Distances, kinds and noise of the pairs, in loops of their own: one loop for all would be so long that the
 /// processor sees but one vector at a time.
 #[inline(always)]
 unsafe fn separate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool>(
@@ -172,14 +175,17 @@ unsafe fn separate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool>(
         let p_which = block.which.as_ptr();
         let p_j = block.j.as_ptr();
         let mut p_pairs = block.pairs.as_mut_ptr().cast::<Pairs<A::Reals>>();
+        let p_tags = [block.tags[0].as_mut_ptr(), block.tags[1].as_mut_ptr()];
+        let moving = kit.noise.is_some();
         let mut k = from;
         while k < to {
             let which = <A::Reals as Reals>::Words::load_bytes(p_which.add(k));
-            let (apart, names) = A::separate(&kit.metric, records, own, which, p_j.add(k), kit.draw.is_some());
+            let (apart, names) = A::separate(&kit.metric, records, own, which, p_j.add(k), moving);
             let pairs = &mut *p_pairs;
             pairs.apart = apart;
-            if let Some(draw) = &kit.draw {
-                pairs.noise = draw.noise(names.tags);
+            if moving {
+                names.tags[0].store(p_tags[0].add(k));
+                names.tags[1].store(p_tags[1].add(k));
             }
             if SEVERAL {
                 let species_i = <A::Reals as Reals>::Words::pick((*own).species.as_ptr(), which);
@@ -187,6 +193,9 @@ unsafe fn separate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool>(
             }
             p_pairs = p_pairs.add(1);
             k += A::Reals::LANES;
+        }
+        if let Some(noise) = kit.noise {
+            draw::<<I::F32 as Reals>::Words>(noise, p_tags[0], p_tags[1], [from, to]);
         }
     }
 }

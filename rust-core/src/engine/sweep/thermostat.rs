@@ -5,66 +5,82 @@ use super::simd::{Reals, Scalar, Words};
 use super::terms::{Drag, Exponent};
 use crate::engine::noise::{PAIR_ROUNDS, PARITY, PairNoise, ROTATIONS};
 
-/// The key of a step's noise, and `dt^{-1/2}`.
-#[derive(Clone, Copy)]
-pub struct Draw<R: Reals> {
-    schedule: [R::Words; 3],
-    unit: R,
-}
-
 /// `√3/2³¹`: signed words to numbers of unit variance.
-const UNIT: f64 = 1.732_050_807_568_877_2 / 2_147_483_648.0;
+pub const UNIT: f64 = 1.732_050_807_568_877_2 / 2_147_483_648.0;
 
 const _: () = assert!(PAIR_ROUNDS == 13);
 
-impl<R: Reals> Draw<R> {
-    #[inline(always)]
-    pub unsafe fn new((noise, inverse_root_dt): (PairNoise, f64)) -> Draw<R> {
+/// Words of noise of the pairs `from..to`: Threefry2x32 of their two tags, in order. They replace the first tags;
+/// runs over by two vectors.
+///
+/// # Safety
+/// The contract of `simd`.
+#[inline(always)]
+pub unsafe fn draw<W: Words>(noise: PairNoise, a: *mut u32, b: *const u32, [from, to]: [usize; 2]) {
+    // SAFETY: the caller's.
+    unsafe {
         let [k0, k1] = noise.key();
-        // SAFETY: the contract of `simd`.
-        unsafe {
-            Draw {
-                schedule: [R::Words::splat(k0), R::Words::splat(k1), R::Words::splat(PARITY ^ k0 ^ k1)],
-                unit: R::constant(UNIT * inverse_root_dt),
-            }
-        }
-    }
-
-    /// `ξ dt^{-1/2}` of each pair: Threefry2x32 of the two tags, in order.
-    #[inline(always)]
-    pub unsafe fn noise(&self, [a, b]: [R::Words; 2]) -> R {
-        // SAFETY: the contract of `simd`.
-        unsafe {
-            let mut x0 = a.min(b).add(self.schedule[0]);
-            let mut x1 = a.max(b).add(self.schedule[1]);
+        let schedule = [W::splat(k0), W::splat(k1), W::splat(PARITY ^ k0 ^ k1)];
+        let mut k = from;
+        while k < to {
+            // Two vectors by turns: one alone waits for itself.
+            let (a0, b0) = (W::load(a.add(k)), W::load(b.add(k)));
+            let (a1, b1) = (W::load(a.add(k + W::LANES)), W::load(b.add(k + W::LANES)));
+            let mut x0 = [a0.min(b0).add(schedule[0]), a1.min(b1).add(schedule[0])];
+            let mut x1 = [a0.max(b0).add(schedule[1]), a1.max(b1).add(schedule[1])];
             // Written out: rotations by constants are one instruction.
             (x0, x1) = four_rounds(x0, x1, 0);
-            (x0, x1) = self.inject(x0, x1, 1);
+            (x0, x1) = inject(x0, x1, &schedule, 1);
             (x0, x1) = four_rounds(x0, x1, 4);
-            (x0, x1) = self.inject(x0, x1, 2);
+            (x0, x1) = inject(x0, x1, &schedule, 2);
             (x0, x1) = four_rounds(x0, x1, 0);
-            (x0, x1) = self.inject(x0, x1, 3);
+            (x0, x1) = inject(x0, x1, &schedule, 3);
             // Of the last round only the first word is of use.
-            let word = x0.add(x1).xor(R::Words::splat(0x8000_0000));
-            (R::of_signed(word) + R::constant(0.5)) * self.unit
+            let sign = W::splat(0x8000_0000);
+            x0[0].add(x1[0]).xor(sign).store(a.add(k));
+            x0[1].add(x1[1]).xor(sign).store(a.add(k + W::LANES));
+            k += 2 * W::LANES;
         }
     }
+}
 
-    /// The injection of the key behind four rounds.
-    #[inline(always)]
-    unsafe fn inject(&self, x0: R::Words, x1: R::Words, number: usize) -> (R::Words, R::Words) {
-        // SAFETY: the contract of `simd`.
-        unsafe {
-            let x1 = x1.add(self.schedule[(number + 1) % 3]).add(R::Words::splat(number as u32));
-            (x0.add(self.schedule[number % 3]), x1)
-        }
+/// Four rounds of Threefry from round `at` of eight on.
+#[inline(always)]
+unsafe fn four_rounds<W: Words>(x0: [W; 2], x1: [W; 2], at: usize) -> ([W; 2], [W; 2]) {
+    // SAFETY: the contract of `simd`.
+    unsafe {
+        let (x0, x1) = round(x0, x1, ROTATIONS[at]);
+        let (x0, x1) = round(x0, x1, ROTATIONS[at + 1]);
+        let (x0, x1) = round(x0, x1, ROTATIONS[at + 2]);
+        round(x0, x1, ROTATIONS[at + 3])
+    }
+}
+
+#[inline(always)]
+unsafe fn round<W: Words>([a0, b0]: [W; 2], [a1, b1]: [W; 2], by: u32) -> ([W; 2], [W; 2]) {
+    // SAFETY: the contract of `simd`.
+    unsafe {
+        let x0 = [a0.add(a1), b0.add(b1)];
+        let turned = [a1.rotate(by), b1.rotate(by)];
+        (x0, [turned[0].xor(x0[0]), turned[1].xor(x0[1])])
+    }
+}
+
+/// The injection of the key behind four rounds.
+#[inline(always)]
+unsafe fn inject<W: Words>(x0: [W; 2], x1: [W; 2], schedule: &[W; 3], number: usize) -> ([W; 2], [W; 2]) {
+    // SAFETY: the contract of `simd`.
+    unsafe {
+        let first = schedule[number % 3];
+        let second = schedule[(number + 1) % 3].add(W::splat(number as u32));
+        ([x0[0].add(first), x0[1].add(first)], [x1[0].add(second), x1[1].add(second)])
     }
 }
 
 impl<T: Scalar> Drag<T> {
-    /// `−γ w_R² (ê·v) + σ w_R ξ dt^{−1/2}`.
+    /// `−γ w_R² (ê·v) + σ w_R ξ dt^{−1/2}`; `xi` is `ξ dt^{−1/2}`.
     #[inline(always)]
-    pub unsafe fn force<R: Reals<Scalar = T>, const SEVERAL: bool>(&self, pairs: &Pairs<R>) -> R {
+    pub unsafe fn force<R: Reals<Scalar = T>, const SEVERAL: bool>(&self, pairs: &Pairs<R>, xi: R) -> R {
         // SAFETY: the contract of `simd`.
         unsafe {
             let (one, zero) = (R::constant(1.0), R::constant(0.0));
@@ -75,7 +91,7 @@ impl<T: Scalar> Drag<T> {
                 Exponent::Two => t * t,
                 Exponent::Any(exponent) => power(t, kind.of::<SEVERAL>(exponent)),
             };
-            let pull = kind.of::<SEVERAL>(&self.sigma) * pairs.noise
+            let pull = kind.of::<SEVERAL>(&self.sigma) * xi
                 - kind.of::<SEVERAL>(&self.gamma) * w * pairs.apart.along;
             w * pull
         }
@@ -102,21 +118,4 @@ fn powers<T: Scalar>(bases: &mut [T], exponents: &[T]) {
         let base = t.wide();
         *t = T::of(if base > 0.0 { base.powf(e.wide()) } else { 0.0 });
     }
-}
-
-/// Four rounds of Threefry from round `at` of eight on.
-#[inline(always)]
-unsafe fn four_rounds<W: Words>(mut x0: W, mut x1: W, at: usize) -> (W, W) {
-    // SAFETY: the contract of `simd`.
-    unsafe {
-        x0 = x0.add(x1);
-        x1 = x1.rotate(ROTATIONS[at]).xor(x0);
-        x0 = x0.add(x1);
-        x1 = x1.rotate(ROTATIONS[at + 1]).xor(x0);
-        x0 = x0.add(x1);
-        x1 = x1.rotate(ROTATIONS[at + 2]).xor(x0);
-        x0 = x0.add(x1);
-        x1 = x1.rotate(ROTATIONS[at + 3]).xor(x0);
-    }
-    (x0, x1)
 }
