@@ -1,7 +1,7 @@
 //! The pairs in hand: some hundred, in arrays that stay in the first-level cache.
 
 use super::arithmetic::Own;
-use super::chunks::Chunk;
+use super::chunks::{Chunk, FOUR};
 use super::scatter::Sum;
 use super::simd::{Two, Scalar};
 
@@ -24,8 +24,8 @@ pub struct Block<T> {
     pub count: usize,
     /// The second particle of each pair, in the order of cells.
     pub j: Vec<u32>,
-    /// Work space of the same.
-    pub other: Vec<u32>,
+    /// The same, of the first of each four members, of the second …
+    pub lists: [Vec<u32>; FOUR],
     /// The first particle of each pair, a number in `own`.
     pub which: Vec<u8>,
     /// A vector's worth of members.
@@ -49,13 +49,13 @@ pub struct Block<T> {
     /// What the members are to be compared with.
     pub chunks: Vec<Chunk>,
     pub chunk_count: usize,
-    /// Members that look together, or one twice if it looks alone.
-    pub twos: [[u8; 2]; GROUP],
-    pub two_count: usize,
+    /// Members that look together: the first, and how many.
+    pub fours: [[u8; 2]; GROUP],
+    pub four_count: usize,
     /// Where the members are.
-    pub points: [Two; GROUP],
+    pub points: [Two; 2 * GROUP],
     /// Which of each chunk are within reach.
-    pub masks: Vec<u32>,
+    pub masks: Vec<u64>,
     capacity: usize,
 }
 
@@ -86,7 +86,7 @@ impl<T: Scalar> Default for Block<T> {
             members_count: 0,
             count: 0,
             j: Vec::new(),
-            other: Vec::new(),
+            lists: Default::default(),
             which: Vec::new(),
             own: Own::default(),
             pairs: Vec::new(),
@@ -99,9 +99,9 @@ impl<T: Scalar> Default for Block<T> {
             aside: Aside::default(),
             chunks: Vec::new(),
             chunk_count: 0,
-            twos: [[0; 2]; GROUP],
-            two_count: 0,
-            points: [Two::default(); GROUP],
+            fours: [[0; 2]; GROUP],
+            four_count: 0,
+            points: [Two::default(); 2 * GROUP],
             masks: Vec::new(),
             capacity: 0,
         };
@@ -122,11 +122,11 @@ impl<T: Scalar> Block<T> {
         }
     }
 
-    /// Makes room for twice `count` pairs and whole vectors behind.
+    /// Makes room for `count` pairs of each of four, and whole vectors behind.
     #[inline(always)]
     pub fn reserve(&mut self, count: usize) {
-        if 2 * count + SLACK > self.capacity {
-            self.grow(2 * count + SLACK);
+        if FOUR * count + SLACK > self.capacity {
+            self.grow(FOUR * count + SLACK);
         }
     }
 
@@ -136,7 +136,9 @@ impl<T: Scalar> Block<T> {
         let capacity = (2 * count).next_multiple_of(64);
         self.capacity = capacity;
         self.j.resize(capacity, 0);
-        self.other.resize(capacity, 0);
+        for list in &mut self.lists {
+            list.resize(capacity, 0);
+        }
         self.which.resize(capacity, 0);
         for tags in &mut self.tags {
             tags.resize(capacity, 0);

@@ -1,4 +1,4 @@
-//! Spans of bins as chunks of sixteen particles, each to be compared with two.
+//! Spans of bins as chunks of sixteen particles, each to be compared with up to four.
 
 use super::arithmetic::Record;
 use super::block::Block;
@@ -6,36 +6,34 @@ use super::layer::Swept;
 use super::simd::Scalar;
 use super::windows::{Spans, View, Windows};
 
-/// Sixteen particles that two others are to be compared with.
+/// Particles that look together, at most.
+pub const FOUR: usize = 4;
+
+/// Sixteen particles that up to four others are to be compared with.
 #[derive(Debug, Clone, Copy, Default)]
 #[repr(C)]
 pub struct Chunk {
+    /// Which of them: sixteen bits for the first of the four, then for the second …
+    pub allowed: u64,
     pub from: u32,
-    /// Which of them: bits from 0 on for the first of the two, from 16 on for the second.
-    pub allowed: u32,
-    /// The number of the two in the group, and the shift that they see these with, in the lowest eight bits.
+    /// The number of the four in the group, and the shift that they see these with, in the lowest eight bits.
     pub note: u32,
 }
-
-/// Which of two particles.
-const BOTH: u32 = u32::MAX;
-const FIRST: u32 = 0xffff;
-const SECOND: u32 = 0xffff << 16;
 
 /// A group of particles of one row, whose spans are to be cut.
 pub struct Group<'a> {
     pub view: &'a View,
     pub windows: &'a Windows,
     pub spans: &'a Spans,
-    /// Whether spans go on in the period before, or in the next.
-    pub before: bool,
-    pub after: bool,
+    /// Particles whose spans go on in the period before, and in the next: a bit for each.
+    pub before: u32,
+    pub after: u32,
     /// The first, and how many.
     pub first: usize,
     pub count: usize,
 }
 
-/// Cuts the spans of a group into chunks. Particles that follow each other closely look two by two.
+/// Cuts the spans of a group into chunks. Particles that follow each other closely look together.
 #[inline(always)]
 pub unsafe fn cut<T: Scalar, const GHOSTS: bool>(
     swept: &Swept<T, impl Record>,
@@ -47,88 +45,104 @@ pub unsafe fn cut<T: Scalar, const GHOSTS: bool>(
         let Group { view, windows, spans, count, .. } = *group;
         let x = swept.x[0].as_ptr().add(group.first);
         let mut found = 0;
-        let mut two = 0;
+        let mut fours = 0;
         let mut a = 0;
         while a < count {
-            let alone = a + 1 == count || (*x.add(a + 1) - *x.add(a)).abs() > view.joined;
-            let b = a + !alone as usize;
-            let who = if alone { FIRST } else { BOTH };
-            *block.twos.get_unchecked_mut(two) = [a as u8, b as u8];
+            let mut many = FOUR.min(count - a);
+            let begin = *x.add(a);
+            let mut k = 1;
+            while k < many {
+                if (*x.add(a + k) - begin).abs() > view.joined {
+                    many = k;
+                }
+                k += 1;
+            }
+            // The last again in the place of those that are not there.
+            let these = [a, a + 1.min(many - 1), a + 2.min(many - 1), a + many - 1];
+            *block.fours.get_unchecked_mut(fours) = [a as u8, many as u8];
+            let look = Look { these, four: fours, who: u64::MAX >> (64 - 16 * many) };
             let mut w = 0;
             while w < 5 {
-                let (low, end) = (spans.low.get_unchecked(w), spans.end.get_unchecked(w));
-                let low = (*low.get_unchecked(a)).min(*low.get_unchecked(b));
-                let end = (*end.get_unchecked(a)).max(*end.get_unchecked(b));
                 let row = *windows.row.get_unchecked(w);
-                let behind = *windows.behind.get_unchecked(w);
-                // The second of two is the first of those behind the first.
+                // In their own row they look at those behind them.
                 let own = (group.first + a + 1) as u32;
-                let from = if w == 0 { own } else { *row.add(low as usize) + behind };
-                let to = *row.add(end as usize) + behind;
-                let but = if w == 0 && !alone { 1 << 16 } else { 0 };
-                let look = Look { a, b, two, who, but, shift: w + 5 };
-                found = add::<T, GHOSTS>(swept, group, block, found, [from, to], look);
+                let from = if w == 0 { own } else { *row.add(lowest(&spans.low, w, these)) };
+                let to = *row.add(highest(&spans.end, w, these));
+                found = add::<T, GHOSTS>(swept, group, block, found, [from, to], w + 5, &look);
                 w += 1;
             }
             // Rows that go on in the period before, and in the next.
-            if group.before {
+            let bits = (1u32 << many) - 1;
+            if group.before >> a & bits != 0 {
                 let mut w = 1;
                 while w < 5 {
-                    let low = spans.before.get_unchecked(w);
-                    let low = (*low.get_unchecked(a)).min(*low.get_unchecked(b));
                     let row = *windows.row.get_unchecked(w);
-                    let behind = *windows.behind.get_unchecked(w);
-                    let range = [*row.add(low as usize) + behind, *row.add(view.bins as usize) + behind];
-                    let look = Look { a, b, two, who, but: 0, shift: w };
-                    found = add::<T, GHOSTS>(swept, group, block, found, range, look);
+                    let range =
+                        [*row.add(lowest(&spans.before, w, these)), *row.add(view.bins as usize)];
+                    found = add::<T, GHOSTS>(swept, group, block, found, range, w, &look);
                     w += 1;
                 }
             }
-            if group.after {
+            if group.after >> a & bits != 0 {
                 let mut w = 0;
                 while w < 5 {
-                    let end = spans.after.get_unchecked(w);
-                    let end = (*end.get_unchecked(a)).max(*end.get_unchecked(b));
                     let row = *windows.row.get_unchecked(w);
-                    let behind = *windows.behind.get_unchecked(w);
-                    let range = [*row + behind, *row.add(end as usize) + behind];
-                    let look = Look { a, b, two, who, but: 0, shift: w + 10 };
-                    found = add::<T, GHOSTS>(swept, group, block, found, range, look);
+                    let range = [*row, *row.add(highest(&spans.after, w, these))];
+                    found = add::<T, GHOSTS>(swept, group, block, found, range, w + 10, &look);
                     w += 1;
                 }
             }
-            two += 1;
-            a = b + 1;
+            fours += 1;
+            a += many;
         }
-        block.two_count = two;
+        block.four_count = fours;
         block.chunk_count = found;
     }
 }
 
-/// Who looks, and how.
-#[derive(Clone, Copy)]
-struct Look {
-    /// The two, in the group; the same if one looks alone.
-    a: usize,
-    b: usize,
-    two: usize,
-    who: u32,
-    /// Left out of the first chunk: the second of the two is there itself.
-    but: u32,
-    shift: usize,
+#[inline(always)]
+unsafe fn lowest(bins: &[[i32; 16]; 5], w: usize, [a, b, c, d]: [usize; FOUR]) -> usize {
+    // SAFETY: of a group.
+    unsafe {
+        let at = |k: usize| *bins.get_unchecked(w).get_unchecked(k);
+        at(a).min(at(b)).min(at(c).min(at(d))) as usize
+    }
 }
 
-/// The bits of the first of thirty-two particles, for both of two that look: those of the first chunk, and of the
-/// second.
-static FIRST_BITS: [[u32; 2]; 33] = first_bits();
+#[inline(always)]
+unsafe fn highest(bins: &[[i32; 16]; 5], w: usize, [a, b, c, d]: [usize; FOUR]) -> usize {
+    // SAFETY: of a group.
+    unsafe {
+        let at = |k: usize| *bins.get_unchecked(w).get_unchecked(k);
+        at(a).max(at(b)).max(at(c).max(at(d))) as usize
+    }
+}
 
-const fn first_bits() -> [[u32; 2]; 33] {
+/// Who looks.
+struct Look {
+    /// In the group; the last more than once if they are fewer.
+    these: [usize; FOUR],
+    four: usize,
+    /// Sixteen bits for each that is there.
+    who: u64,
+}
+
+/// The bits of the first of thirty-two particles, for each of four that look: those of the first chunk, and of the
+/// second.
+static FIRST_BITS: [[u64; 2]; 33] = first_bits();
+
+/// Sixteen bits for each of four.
+const EACH: u64 = 0x0001_0001_0001_0001;
+
+/// In the chunk that begins behind the first of the four: those behind each of them.
+const BEHIND: u64 = 0xfff8_fffc_fffe_ffff;
+
+const fn first_bits() -> [[u64; 2]; 33] {
     let mut table = [[0; 2]; 33];
     let mut length = 0;
     while length <= 32 {
-        let bits = ((1u64 << length) - 1) as u32;
-        let (here, next) = (bits & 0xffff, bits >> 16);
-        table[length] = [here | here << 16, next | next << 16];
+        let bits = (1u64 << length) - 1;
+        table[length] = [(bits & 0xffff) * EACH, (bits >> 16) * EACH];
         length += 1;
     }
     table
@@ -143,17 +157,19 @@ unsafe fn add<T: Scalar, const GHOSTS: bool>(
     block: &mut Block<T>,
     found: usize,
     [mut from, mut to]: [u32; 2],
-    look: Look,
+    shift: usize,
+    look: &Look,
 ) -> usize {
     // SAFETY: chunks have room for two more; more make room.
     unsafe {
-        let mut owned = [BOTH; 2];
+        let own = shift == 5;
+        let mut owned = [u64::MAX; 2];
         if GHOSTS {
             // Two ghosts are no concern of this rank.
-            let ghost = [look.a, look.b].map(|k| *swept.ghost.get_unchecked(group.first + k));
-            if ghost[0] && ghost[1] {
-                let [first, last] = *group.windows.owned.get_unchecked(look.shift % 5);
-                if look.but == 0 {
+            let ghost = look.these.map(|k| *swept.ghost.get_unchecked(group.first + k));
+            if ghost.iter().all(|ghost| *ghost) {
+                let [first, last] = *group.windows.owned.get_unchecked(shift % 5);
+                if !own {
                     from = from.max(first);
                 }
                 to = to.min(last);
@@ -163,70 +179,53 @@ unsafe fn add<T: Scalar, const GHOSTS: bool>(
             }
         }
         let length = to.saturating_sub(from) as usize;
-        let note = (look.two << 8 | look.shift) as u32;
-        let who = [look.who & !look.but, look.who];
+        let note = (look.four << 8 | shift) as u32;
+        let who = if own { look.who & BEHIND } else { look.who };
         if length > 32 {
-            if GHOSTS {
-                return add_many_with_ghosts(swept, group, block, found, from, to, look);
-            }
-            return add_many(block, found, from, to, who[0], note);
+            let ghosts = if GHOSTS { Some(look.these.map(|k| swept.ghost[group.first + k])) } else { None };
+            return add_many(swept, block, found, from, to, who, look.who, note, ghosts);
         }
         // Both are written, and counted as needed: there is no branch to foresee.
         let bits = FIRST_BITS.get_unchecked(length);
         let out = block.chunks.as_mut_ptr().add(found);
-        *out = Chunk { from, allowed: bits[0] & who[0] & owned[0], note };
-        *out.add(1) = Chunk { from: from + 16, allowed: bits[1] & who[1] & owned[1], note };
-        found + (look.shift == 5 || length > 0) as usize + (length > 16) as usize
+        *out = Chunk { allowed: bits[0] & who & owned[0], from, note };
+        *out.add(1) = Chunk { allowed: bits[1] & look.who & owned[1], from: from + 16, note };
+        found + (own || length > 0) as usize + (length > 16) as usize
     }
 }
 
-/// Which of sixteen particles concern this rank, of which `owned` are no ghosts, for two that look.
+/// Which of sixteen particles concern this rank, of which `owned` are no ghosts, for four that look.
 #[inline(always)]
-fn concerned(ghost: [bool; 2], owned: u32) -> u32 {
-    let [a, b] = ghost.map(|ghost| if ghost { owned } else { 0xffff });
-    a | b << 16
+fn concerned(ghost: [bool; FOUR], owned: u32) -> u64 {
+    let [a, b, c, d] = ghost.map(|ghost| if ghost { owned as u64 } else { 0xffff });
+    a | b << 16 | c << 32 | d << 48
 }
 
-/// More chunks than two; `who` looks at the first of them, and whoever has bits above the lowest at the others.
+/// More chunks than two; `first` look at the first of them, `who` at the others.
 #[cold]
 #[inline(never)]
+#[allow(clippy::too_many_arguments)]
 fn add_many<T: Scalar>(
+    swept: &Swept<T, impl Record>,
     block: &mut Block<T>,
     mut found: usize,
     from: u32,
     to: u32,
-    mut who: u32,
+    first: u64,
+    who: u64,
     note: u32,
+    ghosts: Option<[bool; FOUR]>,
 ) -> usize {
     block.reserve_chunks(found + (to - from).div_ceil(16) as usize);
     for begin in (from..to).step_by(16) {
-        let allowed = FIRST_BITS[(to - begin).min(16) as usize][0] & who;
-        block.chunks[found] = Chunk { from: begin, allowed, note };
-        found += 1;
-        if who & SECOND != 0 {
-            who |= SECOND;
+        let mut allowed = FIRST_BITS[(to - begin).min(16) as usize][0];
+        allowed &= if begin == from { first } else { who };
+        if let Some(ghosts) = ghosts {
+            // SAFETY: of a chunk.
+            allowed &= concerned(ghosts, unsafe { swept.owned_bits(begin as usize) });
         }
+        block.chunks[found] = Chunk { allowed, from: begin, note };
+        found += 1;
     }
     found
-}
-
-#[cold]
-#[inline(never)]
-fn add_many_with_ghosts<T: Scalar>(
-    swept: &Swept<T, impl Record>,
-    group: &Group,
-    block: &mut Block<T>,
-    found: usize,
-    from: u32,
-    to: u32,
-    look: Look,
-) -> usize {
-    let note = (look.two << 8 | look.shift) as u32;
-    let end = add_many(block, found, from, to, look.who & !look.but, note);
-    let ghost = [look.a, look.b].map(|k| swept.ghost[group.first + k]);
-    for chunk in &mut block.chunks[found..end] {
-        // SAFETY: of a chunk.
-        chunk.allowed &= concerned(ghost, unsafe { swept.owned_bits(chunk.from as usize) });
-    }
-    end
 }

@@ -25,7 +25,8 @@ use crate::engine::tally::Tally;
 pub struct Swept<'a, T, R> {
     pub frame: &'a Frame,
     pub grid: &'a Grid,
-    /// First particle of each bin, and one past the last.
+    /// First particle of each bin, and one past the last; if layers are periodic, then those of the copy of the first
+    /// layer, one past the last of which is the last.
     pub start: &'a [u32],
     /// Positions from the origin of the frame.
     pub x: [&'a [f32]; 3],
@@ -141,7 +142,7 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TA
                 } else {
                     cut::<A::Scalar, false>(swept, &group, block);
                 }
-                if windows.crosses || before || after {
+                if windows.crosses || before | after != 0 {
                     look::<I, A::Scalar, true>(swept, &group, block);
                 } else {
                     look::<I, A::Scalar, false>(swept, &group, block);

@@ -14,8 +14,6 @@ pub struct Windows {
     pub row: [*const u32; 5],
     /// 1 for rows that are there, 0 for others.
     pub there: [f32; 5],
-    /// Added to the number of a particle: copies of the first layer are behind the last.
-    pub behind: [u32; 5],
     /// Added to the positions of particles there, in the period before, the same, and the next: entry
     /// `w + 5 (wrap + 1)`.
     pub shift: [[u16; 3]; 15],
@@ -32,7 +30,6 @@ impl Windows {
         let mut windows = Windows {
             row: [own.as_ptr(); 5],
             there: [0.0; 5],
-            behind: [0; 5],
             shift: [[0; 3]; 15],
             crosses: false,
             owned: [[0; 2]; 5],
@@ -42,7 +39,6 @@ impl Windows {
             let mut to = [row as i64 + across, layer as i64 + up];
             let mut shift = [0.0; 3];
             let mut there = true;
-            let mut behind = 0;
             if to[0] < 0 || to[0] >= grid.rows as i64 {
                 // In two dimensions a layer is one row, and has none beside it.
                 there = frame.periodic[grid.row_axis] && frame.dimensions == 3;
@@ -51,18 +47,17 @@ impl Windows {
                 shift = frame.edge(grid.row_axis).map(|e| wrap * e);
             }
             if to[1] >= grid.layers as i64 {
+                // The copy of the first.
                 there &= frame.periodic[grid.layer_axis];
-                to[1] = 0;
-                behind = swept.particles as u32;
             }
             if !there {
                 continue;
             }
             windows.there[w] = 1.0;
-            windows.behind[w] = behind;
             windows.crosses |= shift != [0.0; 3];
             let cell = (to[1] as usize * grid.rows + to[0] as usize) * grid.bins;
             windows.row[w] = swept.start[cell..].as_ptr();
+            // Where there are ghosts there are no periods, and no copies.
             if let Some(owned) = swept.owned_of_row.get(cell / grid.bins) {
                 windows.owned[w] = *owned;
             }
@@ -121,8 +116,8 @@ impl View {
         }
     }
 
-    /// The spans of the particles from `i` on, a vector of them, and whether any go on in the period before, or in
-    /// the next.
+    /// The spans of the particles from `i` on, a vector of them, and which of them go on in the period before, and
+    /// in the next.
     #[inline(always)]
     pub unsafe fn spans<I: Isa>(
         &self,
@@ -132,7 +127,7 @@ impl View {
         count: usize,
         there: &[f32; 5],
         out: &mut Spans,
-    ) -> [bool; 2] {
+    ) -> [u32; 2] {
         // SAFETY: the contract of `simd`.
         unsafe {
             let x = I::F32::load(swept.x[0].as_ptr().add(i));
@@ -163,22 +158,22 @@ impl View {
             }
             let most = I::F32::constant(self.bins as f64);
             let one = I::F32::constant(1.0);
-            let [mut before, mut after] = [false; 2];
+            let [mut before, mut after] = [0; 2];
             if self.periodic {
                 // The longest span is that of the particle's own row.
                 let these = (1u32 << count) - 1;
-                before = (bin - half[0]).mask_below(zero) & these != 0;
-                after = (most - one).mask_below(bin + half[0]) & these != 0;
+                before = (bin - half[0]).mask_below(zero) & these;
+                after = (most - one).mask_below(bin + half[0]) & these;
             }
             let mut w = 0;
             while w < 5 {
                 // Rows that are not there get a span without length.
                 let h = *half.get_unchecked(w) * I::F32::splat(*there.get_unchecked(w));
                 let (low, end) = (out.low.get_unchecked_mut(w), out.end.get_unchecked_mut(w));
-                if before {
+                if before != 0 {
                     (bin - h + most).smaller(most).store_whole(out.before.get_unchecked_mut(w).as_mut_ptr());
                 }
-                if after {
+                if after != 0 {
                     let over = (bin + h + one - most).larger(zero);
                     over.store_whole(out.after.get_unchecked_mut(w).as_mut_ptr());
                 }

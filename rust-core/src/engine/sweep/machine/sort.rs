@@ -115,7 +115,8 @@ impl<P: Compiled> Machine<P> {
     /// Turns counts into where each thread's particles of a bin begin.
     fn add_up(&mut self, threads: usize) {
         let cells = self.grid.cells();
-        self.start.resize(cells + 1, 0);
+        let per_layer = self.grid.rows * self.grid.bins;
+        self.start.resize(cells + 1 + if self.is_ring() { per_layer } else { 0 }, 0);
         let mut sum = 0;
         for cell in 0..cells {
             self.start[cell] = sum;
@@ -128,6 +129,10 @@ impl<P: Compiled> Machine<P> {
         }
         self.start[cells] = sum;
         self.particles = sum as usize;
+        // The copy of the first layer.
+        for cell in cells + 1..self.start.len() {
+            self.start[cell] = sum + self.start[cell - cells];
+        }
     }
 
     /// Fills the arrays in the order of bins, and lays out accumulators.

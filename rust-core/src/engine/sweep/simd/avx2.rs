@@ -450,26 +450,41 @@ impl Isa for Avx2 {
     type Quad = Quad4;
 
     #[inline(always)]
-    unsafe fn near<const SHIFTS: bool>(x: [*const u16; 3], shift: [u16; 3], two: &Two, limit: i16) -> u32 {
+    unsafe fn near<const SHIFTS: bool>(
+        x: [*const u16; 3],
+        shift: [u16; 3],
+        four: [&Two; 2],
+        limit: i16,
+    ) -> u64 {
         unsafe {
-            let [mut sa, mut sb] = [_mm256_setzero_si256(); 2];
+            let mut sums = [_mm256_setzero_si256(); 4];
             let mut c = 0;
             while c < 3 {
                 let mut there = _mm256_loadu_si256(x[c].cast());
                 if SHIFTS {
                     there = _mm256_add_epi16(there, _mm256_set1_epi16(shift[c] as i16));
                 }
-                let da = _mm256_sub_epi16(_mm256_load_si256(two.0[c].as_ptr().cast()), there);
-                let db = _mm256_sub_epi16(_mm256_load_si256(two.0[c].as_ptr().add(16).cast()), there);
-                sa = _mm256_adds_epi16(sa, _mm256_mulhi_epi16(da, da));
-                sb = _mm256_adds_epi16(sb, _mm256_mulhi_epi16(db, db));
+                let mut k = 0;
+                while k < 4 {
+                    let here: *const __m256i = four[k / 2].0[c].as_ptr().add(16 * (k % 2)).cast();
+                    let d = _mm256_sub_epi16(_mm256_load_si256(here), there);
+                    sums[k] = _mm256_adds_epi16(sums[k], _mm256_mulhi_epi16(d, d));
+                    k += 1;
+                }
                 c += 1;
             }
             let limit = _mm256_set1_epi16(limit);
-            let (na, nb) = (_mm256_cmpgt_epi16(limit, sa), _mm256_cmpgt_epi16(limit, sb));
-            // Halves of both follow each other; then those of one.
-            let bytes = _mm256_permute4x64_epi64::<0b11_01_10_00>(_mm256_packs_epi16(na, nb));
-            _mm256_movemask_epi8(bytes) as u32
+            let mut mask = 0;
+            let mut k = 0;
+            while k < 4 {
+                let near = _mm256_cmpgt_epi16(limit, sums[k]);
+                let next = _mm256_cmpgt_epi16(limit, sums[k + 1]);
+                // Halves of both follow each other; then those of one.
+                let bytes = _mm256_permute4x64_epi64::<0b11_01_10_00>(_mm256_packs_epi16(near, next));
+                mask |= (_mm256_movemask_epi8(bytes) as u32 as u64) << (16 * k);
+                k += 2;
+            }
+            mask
         }
     }
     #[inline(always)]

@@ -460,20 +460,32 @@ impl Isa for Avx512 {
     type Quad = F64x4;
 
     #[inline(always)]
-    unsafe fn near<const SHIFTS: bool>(x: [*const u16; 3], shift: [u16; 3], two: &Two, limit: i16) -> u32 {
+    unsafe fn near<const SHIFTS: bool>(
+        x: [*const u16; 3],
+        shift: [u16; 3],
+        four: [&Two; 2],
+        limit: i16,
+    ) -> u64 {
         unsafe {
-            let mut sum = _mm512_setzero_si512();
+            let mut sums = [_mm512_setzero_si512(); 2];
             let mut c = 0;
             while c < 3 {
                 let mut there = _mm512_broadcast_i64x4(_mm256_loadu_si256(x[c].cast()));
                 if SHIFTS {
                     there = _mm512_add_epi16(there, _mm512_set1_epi16(shift[c] as i16));
                 }
-                let d = _mm512_sub_epi16(_mm512_load_si512(two.0[c].as_ptr().cast()), there);
-                sum = _mm512_adds_epi16(sum, _mm512_mulhi_epi16(d, d));
+                let mut k = 0;
+                while k < 2 {
+                    let d = _mm512_sub_epi16(_mm512_load_si512(four[k].0[c].as_ptr().cast()), there);
+                    sums[k] = _mm512_adds_epi16(sums[k], _mm512_mulhi_epi16(d, d));
+                    k += 1;
+                }
                 c += 1;
             }
-            _mm512_cmplt_epi16_mask(sum, _mm512_set1_epi16(limit))
+            let limit = _mm512_set1_epi16(limit);
+            let low = _mm512_cmplt_epi16_mask(sums[0], limit);
+            let high = _mm512_cmplt_epi16_mask(sums[1], limit);
+            low as u64 | (high as u64) << 32
         }
     }
     #[inline(always)]

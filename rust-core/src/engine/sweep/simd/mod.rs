@@ -168,10 +168,10 @@ pub trait Isa: Copy + Send + Sync + 'static {
     type F32: Reals<Scalar = f32>;
     type F64: Reals<Scalar = f64>;
     type Quad: Quad;
-    /// Which of the sixteen particles from `x[0]`, `x[1]`, `x[2]` on, all moved by `shift`, have a distance to two
-    /// points whose square, in units of 2¹⁶, is below `limit`: bits from 0 on for the first, from 16 on for the
-    /// second. Coordinates wrap.
-    unsafe fn near<const SHIFTS: bool>(x: [*const u16; 3], shift: [u16; 3], two: &Two, limit: i16) -> u32;
+    /// Which of the sixteen particles from `x[0]`, `x[1]`, `x[2]` on, all moved by `shift`, have a distance to four
+    /// points whose square, in units of 2¹⁶, is below `limit`: sixteen bits for each point. Coordinates wrap.
+    unsafe fn near<const SHIFTS: bool>(x: [*const u16; 3], shift: [u16; 3], four: [&Two; 2], limit: i16)
+    -> u64;
     /// Sixteen times the same word.
     unsafe fn fill16(x: u16, p: *mut u16);
     /// Writes `first + k` for each bit `k` of sixteen, one after the other; may write sixteen.

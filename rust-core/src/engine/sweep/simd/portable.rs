@@ -350,7 +350,12 @@ impl Isa for Portable {
     type Quad = Four;
 
     #[inline(always)]
-    unsafe fn near<const SHIFTS: bool>(x: [*const u16; 3], shift: [u16; 3], two: &Two, limit: i16) -> u32 {
+    unsafe fn near<const SHIFTS: bool>(
+        x: [*const u16; 3],
+        shift: [u16; 3],
+        four: [&Two; 2],
+        limit: i16,
+    ) -> u64 {
         let mut there = [[0; 16]; 3];
         for c in 0..3 {
             there[c] = unsafe { x[c].cast::<[u16; 16]>().read_unaligned() };
@@ -358,7 +363,11 @@ impl Isa for Portable {
                 there[c] = there[c].map(|x| x.wrapping_add(shift[c]));
             }
         }
-        below(&there, two, 0, limit) | below(&there, two, 1, limit) << 16
+        let mut mask = 0;
+        for k in 0..4 {
+            mask |= (below(&there, four[k / 2], k % 2, limit) as u64) << (16 * k);
+        }
+        mask
     }
     #[inline(always)]
     unsafe fn fill16(x: u16, p: *mut u16) {
