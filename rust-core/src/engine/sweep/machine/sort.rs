@@ -88,25 +88,33 @@ impl<P: Compiled> Machine<P> {
                 unsafe { (&mut *scratch.at(t), std::slice::from_raw_parts_mut(counts.at(t * cells), cells)) };
             scratch.fault = None;
             counts.fill(0);
-            for k in part(given.particles.x.len(), t, threads) {
-                let species = species_of(given, k);
-                if species.is_some_and(|s| s < 0) {
-                    // SAFETY: of this thread's part.
-                    unsafe { *cell.at(k) = NOWHERE };
-                    continue;
+            let all = part(given.particles.x.len(), t, threads);
+            let mut first = all.start;
+            while first < all.end {
+                let some = first..all.end.min(first + AT_ONCE);
+                let mut units = [[0; 3]; AT_ONCE];
+                let fine = fractions(frame, &inverse, &given.particles.x[some.clone()], &mut units);
+                for (k, u) in some.clone().zip(&units) {
+                    let species = species_of(given, k);
+                    if species.is_some_and(|s| s < 0) {
+                        // SAFETY: of this thread's part.
+                        unsafe { *cell.at(k) = NOWHERE };
+                        continue;
+                    }
+                    let known = species.is_some() && given.particles.tag[k] > 0;
+                    if !known || !(fine || is_fine(frame, &inverse, &given.particles.x[k])) {
+                        scratch.fault = Some(fault_of(given, k));
+                        return;
+                    }
+                    let to = grid.cell(*u);
+                    // SAFETY: cells are of the grid; the rest is of this thread's part.
+                    unsafe {
+                        *counts.get_unchecked_mut(to) += 1;
+                        *cell.at(k) = to as u32;
+                        *unit.at(k) = *u;
+                    }
                 }
-                let u = units(frame, &inverse, &given.particles.x[k]);
-                let (Some(_), Some(u), true) = (species, u, given.particles.tag[k] > 0) else {
-                    scratch.fault = Some(fault_of(given, k));
-                    return;
-                };
-                let to = grid.cell(u);
-                // SAFETY: cells are of the grid; the rest is of this thread's part.
-                unsafe {
-                    *counts.get_unchecked_mut(to) += 1;
-                    *cell.at(k) = to as u32;
-                    *unit.at(k) = u;
-                }
+                first = some.end;
             }
         });
         self.first_fault()
@@ -296,21 +304,58 @@ fn fault_of(given: &Given, k: usize) -> EngineError {
     }
 }
 
-/// Fractions of the frame in units of 2⁻³²; they wrap along periods. `None` if the position is not finite.
+/// Particles whose fractions are computed at once.
+const AT_ONCE: usize = 32;
+
+/// Adding this leaves the nearest whole number in the low bits.
+const WHOLE: f64 = 6_755_399_441_055_744.0;
+
+/// Far below what a whole number in the low bits holds.
+const FAR: f64 = 1e15;
+
+/// Fractions of the frame in units of 2⁻³²; they wrap along periods, and are never beyond the ends where there are
+/// none. Whether all are finite and not too far away.
 #[inline(always)]
-fn units(frame: &Frame, inverse: &[f64; 3], x: &[f64; 3]) -> Option<[u32; 3]> {
-    let s = frame.fraction(x, inverse);
-    let t = s.map(|s| s * TWO_TO_32);
-    // Far below what a whole number of 64 bits holds.
-    let far = t[0].abs() + t[1].abs() + t[2].abs();
-    if far.is_nan() || far > 1e18 {
-        return None;
+fn fractions(
+    frame: &Frame,
+    inverse: &[f64; 3],
+    x: &[[f64; 3]],
+    units: &mut [[u32; 3]; AT_ONCE],
+) -> bool {
+    let mut scaled = [[0.0; 3]; AT_ONCE];
+    if frame.is_tilted() {
+        for (t, x) in scaled.iter_mut().zip(x) {
+            *t = frame.fraction(x, inverse).map(|s| s * TWO_TO_32);
+        }
+    } else {
+        let flat = if frame.dimensions == 3 { inverse[2] } else { 0.0 };
+        let scale = [inverse[0] * TWO_TO_32, inverse[1] * TWO_TO_32, flat * TWO_TO_32];
+        for (t, x) in scaled.iter_mut().zip(x) {
+            for c in 0..3 {
+                t[c] = (x[c] - frame.origin[c]) * scale[c];
+            }
+        }
     }
-    let mut u = [0; 3];
-    for c in 0..3 {
-        // SAFETY: finite and in range, as just seen.
-        let whole: i64 = unsafe { t[c].to_int_unchecked() };
-        u[c] = if frame.periodic[c] { whole as u32 } else { whole.clamp(0, u32::MAX as i64) as u32 };
+    let mut fine = true;
+    for t in scaled.as_flattened() {
+        // Not where it is not a number.
+        fine &= t.abs() < FAR;
     }
-    Some(u)
+    for (u, t) in units.as_flattened_mut().iter_mut().zip(scaled.as_flattened()) {
+        *u = (t + WHOLE).to_bits() as u32;
+    }
+    if !frame.periodic.iter().all(|p| *p) {
+        for (u, t) in units.iter_mut().zip(&scaled) {
+            for c in 0..3 {
+                if !frame.periodic[c] {
+                    u[c] = t[c].clamp(0.0, TWO_TO_32 - 1.0) as u32;
+                }
+            }
+        }
+    }
+    fine
+}
+
+fn is_fine(frame: &Frame, inverse: &[f64; 3], x: &[f64; 3]) -> bool {
+    frame.fraction(x, inverse).iter().all(|s| (s * TWO_TO_32).abs() < FAR)
 }
