@@ -35,8 +35,12 @@ impl Quantum {
     }
 
     /// A coordinate.
+    ///
+    /// # Safety
+    /// It is finite, and within 2⁴⁰ cut-offs.
     #[inline(always)]
-    pub fn of(&self, x: f64) -> u16 {
-        (x * self.per_length) as i64 as u16
+    pub unsafe fn of(&self, x: f64) -> u16 {
+        // SAFETY: units are no smaller than the 2¹⁴th part of the cut-off.
+        unsafe { (x * self.per_length).to_int_unchecked::<i64>() as u16 }
     }
 }
