@@ -20,8 +20,6 @@ pub fn engine() -> Engine {
     let mut build = Command::new(cargo);
     build.args(["build", "--release", "--workspace", "--example", "instructions"]);
     build.args(["--locked", "--message-format=json-render-diagnostics"]).current_dir(root());
-    // Without it the files are in the folder of that target.
-    build.env_remove("CARGO_BUILD_TARGET");
     let output = build.output().expect("cargo runs");
     assert!(output.status.success(), "psidpd-core does not build: {}", said(&output));
     let made: Vec<Value> = String::from_utf8_lossy(&output.stdout)
