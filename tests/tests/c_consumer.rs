@@ -1,18 +1,15 @@
-//! Builds the static library, compiles a program against `psidpd.h` as C and as C++, and compares what
+//! Compiles a program against `psidpd.h` as C and as C++, and compares what
 //! it prints with the plain reference.
 
 #![cfg(unix)]
 
 use psidpd_core::engine::{PeriodicBox, Step, reference};
 use psidpd_core::model::{ForceLaw, WarrenPair, warren_ab};
+use psidpd_tests::{engine, root};
 use std::collections::BTreeMap;
 use std::env;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output};
-
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_owned()
-}
 
 /// Fails with all that the command has to say.
 fn run(command: &mut Command) -> Output {
@@ -27,22 +24,20 @@ fn run(command: &mut Command) -> Output {
     output
 }
 
-/// The static library, and the native libraries that it needs.
-fn build_library() -> (PathBuf, Vec<String>) {
-    // A directory of its own: the other is locked while tests are built.
-    let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join("c_consumer");
-    let output = run(Command::new(env::var_os("CARGO").unwrap_or("cargo".into()))
-        .current_dir(root())
-        .args(["rustc", "--locked", "--package", "psidpd-core", "--lib", "--crate-type", "staticlib"])
-        .arg("--target-dir")
-        .arg(&target)
-        .args(["--", "--print", "native-static-libs"])
-        .env("CARGO_TERM_COLOR", "never")
-        .env_remove("CARGO_BUILD_TARGET"));
+/// The native libraries that a static library of Rust needs: psidpd-core has none of its own.
+fn native_libraries(scratch: &Path) -> Vec<String> {
+    let source = scratch.join("empty.rs");
+    std::fs::write(&source, "").unwrap();
+    let output = run(Command::new(env::var_os("RUSTC").unwrap_or("rustc".into()))
+        .args(["--crate-type", "staticlib", "--print", "native-static-libs", "--color", "never", "-o"])
+        .arg(scratch.join("empty.a"))
+        .arg(&source)
+        // Where a toolchain is chosen.
+        .current_dir(root()));
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     let native = told.lines().find_map(|line| line.split_once("native-static-libs:"));
     let (_, native) = native.unwrap_or_else(|| panic!("no native libraries in: {told}"));
-    (target.join("debug/libpsidpd_core.a"), native.split_whitespace().map(str::to_owned).collect())
+    native.split_whitespace().map(str::to_owned).collect()
 }
 
 /// Numbers by the name in front of them.
@@ -97,8 +92,8 @@ fn check_against_reference(printed: &BTreeMap<String, Vec<f64>>) {
 
 #[test]
 fn a_program_in_c_and_in_cpp_gets_the_forces_of_the_reference() {
-    let (library, native) = build_library();
     let scratch = tempfile::tempdir().unwrap();
+    let (library, native) = (engine().library, native_libraries(scratch.path()));
     let compilers = [
         ("CC", "cc", vec!["-std=c99"], "c"),
         ("CXX", "c++", vec!["-std=c++11", "-x", "c++"], "c++ 2011"),

@@ -9,7 +9,7 @@
 //!
 //! writes it anew. Valgrind knows no AVX-512; its kernels come from the same source as those of AVX2.
 
-use psidpd_tests::{root, said};
+use psidpd_tests::{engine, root, said};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -22,22 +22,6 @@ const EVALUATIONS: [u32; 2] = [2, 5];
 
 fn baseline() -> PathBuf {
     root().join("tests/baselines/instructions.json")
-}
-
-/// Builds the example in release mode, whatever mode the tests are in: its counts are those of optimised code.
-fn example() -> PathBuf {
-    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let mut build = Command::new(cargo);
-    build.args(["build", "--release", "-p", "psidpd-core", "--example", "instructions"]);
-    build.arg("--message-format=json-render-diagnostics").current_dir(root());
-    let output = build.output().expect("cargo runs");
-    assert!(output.status.success(), "the example does not build: {}", said(&output));
-    String::from_utf8_lossy(&output.stdout)
-        .lines()
-        .filter_map(|line| serde_json::from_str::<Value>(line).ok())
-        .filter(|m| m["target"]["name"] == "instructions")
-        .find_map(|m| m["executable"].as_str().map(PathBuf::from))
-        .expect("cargo names the example")
 }
 
 /// Particles, and instructions of a whole run.
@@ -71,7 +55,7 @@ fn compiler() -> String {
 
 #[test]
 fn instructions_per_particle_and_step_stay_what_they_were() {
-    let program = example();
+    let program = engine().instructions;
     let mut counts = BTreeMap::new();
     for fluid in ["mdpd", "dpd", "formula"] {
         for precision in ["mixed", "double"] {

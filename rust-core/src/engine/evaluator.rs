@@ -218,7 +218,7 @@ impl Engine {
         };
         let species = &self.species;
         self.counts.excess += self.plan.evaluated_species();
-        self.excess_pass.run(&self.plan, 0..self.owned, |i| species[i], |i| tag[i], &mut rows)
+        self.excess_pass.run(&self.plan, Some(|i| species[i]), |i| tag[i], &mut rows)
     }
 
     /// Numbers per particle that a host forwards to ghosts: [`Plan::slope_width`].

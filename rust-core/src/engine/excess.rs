@@ -57,6 +57,8 @@ pub struct ExcessWork {
     outside: Vec<Outside>,
     /// Lanes and bounded variables, lane by lane, that are out of bounds.
     strays: Vec<Stray>,
+    /// The variables, those out of bounds moved to them; of use if there are strays.
+    moved: Vec<f64>,
     totals: Vec<f64>,
     beyond: Vec<f64>,
     curve: CurveBlock,
@@ -143,24 +145,46 @@ impl ExcessPlan {
         })
     }
 
-    /// Writes ψ and its slopes for every lane: output `o` of lane `l` is `out[o * lanes + l]`, as
-    /// variable `v` is `at[v * lanes + l]`; variables out of bounds are moved to them. Returns how many
-    /// lanes had a variable below its bounds and how many one above.
-    pub fn evaluate(&self, lanes: usize, at: &mut [f64], out: &mut [f64], work: &mut ExcessWork) -> [u64; 2] {
+    /// Writes ψ and its slopes for every lane: ψ of lane `l` is `psi[l]`, slope `k` is `slopes[k * lanes + l]`,
+    /// as variable `v` is `at[v * lanes + l]`. Returns how many lanes had a variable below its bounds and how
+    /// many one above.
+    pub fn evaluate(
+        &self,
+        lanes: usize,
+        at: &[f64],
+        psi: &mut [f64],
+        slopes: &mut [f64],
+        work: &mut ExcessWork,
+    ) -> [u64; 2] {
+        work.strays.clear();
         match self {
             ExcessPlan::Constant(value) => {
-                out[..lanes].fill(*value);
-                out[lanes..].fill(0.0);
+                psi.fill(*value);
+                slopes.fill(0.0);
                 [0; 2]
             }
-            ExcessPlan::Formula(plan) => plan.evaluate(lanes, at, out, work),
-            ExcessPlan::Curve(plan) => plan.evaluate(lanes, at, out, work),
+            ExcessPlan::Formula(plan) => plan.evaluate(lanes, at, psi, slopes, work),
+            ExcessPlan::Curve(plan) => plan.evaluate(lanes, at, psi, slopes, work),
         }
     }
 }
 
+impl ExcessWork {
+    /// Where a formula was last evaluated, having been asked for at `at`.
+    pub fn evaluated_at<'a>(&'a self, at: &'a [f64]) -> &'a [f64] {
+        if self.strays.is_empty() { at } else { &self.moved }
+    }
+}
+
 impl CurvePlan {
-    fn evaluate(&self, lanes: usize, at: &[f64], out: &mut [f64], work: &mut ExcessWork) -> [u64; 2] {
+    fn evaluate(
+        &self,
+        lanes: usize,
+        at: &[f64],
+        psi: &mut [f64],
+        slopes: &mut [f64],
+        work: &mut ExcessWork,
+    ) -> [u64; 2] {
         let ExcessWork { totals, beyond, curve, .. } = work;
         totals.clear();
         totals.resize(lanes, 0.0);
@@ -187,7 +211,6 @@ impl CurvePlan {
                 curve.slope[lane] += delta * curvature;
             }
         }
-        let (psi, slopes) = out.split_at_mut(lanes);
         psi.copy_from_slice(&curve.psi);
         for (k, slope) in slopes.chunks_exact_mut(lanes).enumerate() {
             if k / self.species == self.pass {
@@ -207,18 +230,37 @@ impl FormulaPlan {
         self.stated.then(|| self.variables.iter().copied().zip(&self.outputs[1..]).filter(acting))
     }
 
-    fn evaluate(&self, lanes: usize, at: &mut [f64], out: &mut [f64], work: &mut ExcessWork) -> [u64; 2] {
-        let count = self.clamp(lanes, at, &mut work.strays);
-        self.program.eval_block(lanes, at, out, &mut work.registers);
-        if !work.strays.is_empty() {
-            self.extend(lanes, at, out, work);
+    fn evaluate(
+        &self,
+        lanes: usize,
+        at: &[f64],
+        psi: &mut [f64],
+        slopes: &mut [f64],
+        work: &mut ExcessWork,
+    ) -> [u64; 2] {
+        let within = |b: &BoundedVariable| {
+            let values = &at[b.variable * lanes..][..lanes];
+            // No early return: the loop vectorises.
+            !values.iter().fold(false, |out, x| out | (*x < b.bounds.low) | (*x > b.bounds.high))
+        };
+        let moves = !self.bounded.iter().all(within);
+        let mut count = [0; 2];
+        if moves {
+            work.moved.clear();
+            work.moved.extend_from_slice(at);
+            count = self.clamp(lanes, &mut work.moved, &mut work.strays);
+        }
+        let at = if moves { &work.moved } else { at };
+        let outputs = std::iter::once(&mut *psi).chain(slopes.chunks_exact_mut(lanes));
+        self.program.eval_block_into(lanes, at, outputs, &mut work.registers);
+        if moves {
+            self.extend(lanes, psi, slopes, work);
         }
         count
     }
 
     /// Moves variables to their bounds and lists which, lane by lane.
     fn clamp(&self, lanes: usize, at: &mut [f64], strays: &mut Vec<Stray>) -> [u64; 2] {
-        strays.clear();
         for (bounded, variable) in self.bounded.iter().enumerate() {
             let values = &mut at[variable.variable * lanes..][..lanes];
             for (lane, value) in values.iter_mut().enumerate() {
@@ -243,12 +285,12 @@ impl FormulaPlan {
     /// With the operator `E_k ψ = ψ + δ_k ψ_k + ½ δ_k² ψ_kk` at the bound for each variable out of
     /// bounds, ψ becomes `E_1 E_2 … ψ`; these commute with each other and with the slopes along the
     /// other variables.
-    fn extend(&self, lanes: usize, at: &[f64], out: &mut [f64], work: &mut ExcessWork) {
-        let ExcessWork { point, expansion, outside, strays, .. } = work;
+    fn extend(&self, lanes: usize, psi: &mut [f64], slopes: &mut [f64], work: &mut ExcessWork) {
+        let ExcessWork { point, expansion, outside, strays, moved, .. } = work;
         for stray in strays.chunk_by(|a, b| a.lane == b.lane) {
             let lane = stray[0].lane;
             point.clear();
-            point.extend(at.chunks_exact(lanes).map(|values| values[lane]));
+            point.extend(moved.chunks_exact(lanes).map(|values| values[lane]));
             outside.clear();
             outside.extend(stray.iter().map(|s| {
                 let BoundedVariable { slope, bounds, .. } = &self.bounded[s.bounded];
@@ -259,15 +301,15 @@ impl FormulaPlan {
                 *along = self.variables[o.slope];
             }
             let along = &along[..outside.len()];
-            let psi = expansion.coefficients(&self.outputs[0], point, along);
-            out[lane] = continued(psi, outside, None);
+            let coefficients = expansion.coefficients(&self.outputs[0], point, along);
+            psi[lane] = continued(coefficients, outside, None);
             for (k, o) in outside.iter().enumerate() {
-                out[(1 + o.slope) * lanes + lane] = continued(psi, outside, Some(k));
+                slopes[o.slope * lanes + lane] = continued(coefficients, outside, Some(k));
             }
             for (slope, output) in self.outputs[1..].iter().enumerate() {
                 if outside.iter().all(|o| o.slope != slope) {
                     let coefficients = expansion.coefficients(output, point, along);
-                    out[(1 + slope) * lanes + lane] = continued(coefficients, outside, None);
+                    slopes[slope * lanes + lane] = continued(coefficients, outside, None);
                 }
             }
         }

@@ -145,6 +145,13 @@ impl Polynomial {
         self.0.iter().rev().fold((0.0, 0.0), |(value, slope), c| (value * x + c, slope * x + value))
     }
 
+    /// [`Polynomial::at`] of every `x`, which becomes the value there, with the slopes in `slope`.
+    pub(crate) fn block(&self, x: &mut [f64], slope: &mut [f64]) {
+        for (x, slope) in x.iter_mut().zip(slope) {
+            (*x, *slope) = self.at(*x);
+        }
+    }
+
     /// The slope if the polynomial is linear.
     pub fn constant_slope(&self) -> Option<f64> {
         match self.0.get(2..) {

@@ -45,7 +45,8 @@ impl BuiltFor {
 /// Builds the plugin for `host` with cargo and a C++ compiler, and says where it is: in [`base_dir`] for a Python
 /// environment, else in a folder below it with the version's name. Where LAMMPS has no plugins, [`launcher`] is made too.
 ///
-/// Quick when nothing has changed, and safe to call from several processes at once.
+/// Quick when nothing has changed, and safe to call from several processes at once. All hosts share one build folder,
+/// so that another host than the last costs the compilation of the C++ styles only.
 pub fn build(host: &Host, progress: &dyn Fn(&str)) -> Result<PathBuf, LammpsError> {
     let version = host.version()?;
     let name = format!("{}-{}", version.number, version.abi.replace(' ', "-"));
@@ -76,13 +77,20 @@ pub fn build_for(
         return Err(LammpsError::NoSources { path: manifest });
     }
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    build_with(host, version, base, &root, &cargo, progress)
+    build_with(host, version, base, &builds_dir(), &root, &cargo, progress)
+}
+
+/// Where cargo builds plugins, for every host: most of what it compiles does not depend on the host. It is not the
+/// build folder of the checkout, where builds without a host would take turns with those for one.
+fn builds_dir() -> PathBuf {
+    base_dir().join("plugin-build")
 }
 
 fn build_with(
     host: &Host,
     version: &HostVersion,
     base: &Path,
+    builds: &Path,
     root: &Path,
     cargo: &OsString,
     progress: &dyn Fn(&str),
@@ -104,16 +112,19 @@ fn build_with(
     }
     let compiler = compiler()?;
 
-    fs::create_dir_all(base).map_err(LammpsError::io("create", base))?;
-    let _lock = Lock::new(&base.join("plugin.lock"), || {
-        progress("waiting for another process that is building the plugin")
-    })?;
+    let waiting = || progress("waiting for another process that is building the plugin");
+    for folder in [base, builds] {
+        fs::create_dir_all(folder).map_err(LammpsError::io("create", folder))?;
+    }
+    let _lock = Lock::new(&base.join("plugin.lock"), waiting)?;
+    // Held until the library is copied: a build for another host replaces it.
+    let shared = Lock::new(&builds.join("psidpd.lock"), waiting)?;
     progress(&format!("building the plugin for LAMMPS {}", version.name));
     let out = cargo_command(cargo)
         .args(["build", "--release", "-p", "psidpd-lammps"])
         .arg("--message-format=json-render-diagnostics")
         .arg("--target-dir")
-        .arg(base.join("plugin-build"))
+        .arg(builds)
         .env("PSIDPD_LAMMPS_INCLUDE", &host.include)
         .env("PSIDPD_MPI_INCLUDE", &host.mpi_include)
         .env("PSIDPD_LAMMPS_VERSION", version.number.to_string())
@@ -136,6 +147,7 @@ fn build_with(
     let text = serde_json::to_string_pretty(&BuiltFor::new(version))
         .map_err(|e| LammpsError::io("write", &note)(e.into()))?;
     fs::copy(&built, &temp).map_err(LammpsError::io("copy", &built))?;
+    drop(shared);
     if fs::read_to_string(&note).is_ok_and(|old| old != text) {
         fs::remove_file(&note).map_err(LammpsError::io("remove", &note))?;
     }
@@ -306,7 +318,7 @@ mod tests {
     #[test]
     fn a_build_puts_plugin_and_note_in_place() {
         let dir = tempfile::tempdir().unwrap();
-        let (host, base) = (host(dir.path()), dir.path().join("base"));
+        let (host, base, builds) = (host(dir.path()), dir.path().join("base"), dir.path().join("builds"));
         let cargo = dir.path().join("cargo");
         let write = |script: &str| {
             fs::write(&cargo, format!("#!/bin/sh\n{script}\n")).unwrap();
@@ -314,12 +326,12 @@ mod tests {
         };
         let run = |number| {
             let cargo = cargo.clone().into_os_string();
-            build_with(&host, &version(number), &base, dir.path(), &cargo, &|_| {})
+            build_with(&host, &version(number), &base, &builds, dir.path(), &cargo, &|_| {})
         };
 
         let wide = HostVersion { abi: "bigbig mpich".into(), ..version(1) };
-        let e = build_with(&host, &wide, &base, dir.path(), &cargo.clone().into_os_string(), &|_| {})
-            .unwrap_err();
+        let script = cargo.clone().into_os_string();
+        let e = build_with(&host, &wide, &base, &builds, dir.path(), &script, &|_| {}).unwrap_err();
         assert!(e.to_string().contains("SMALLBIG"), "{e}");
         let e = run(1).unwrap_err();
         assert!(e.to_string().contains("liblammps-dev"), "{e}");
@@ -351,6 +363,32 @@ mod tests {
             assert!(e.to_string().contains(&number.to_string()), "{e}");
             assert!(e.to_string().contains("19990101"), "{e}");
         }
+    }
+
+    /// Builds for several hosts at once, in one build folder, take turns until each has its own library.
+    #[test]
+    fn hosts_that_build_at_once_do_not_get_the_plugins_of_each_other() {
+        let dir = tempfile::tempdir().unwrap();
+        for header in ["pair.h", "mpi.h"] {
+            fs::write(dir.path().join(header), "").unwrap();
+        }
+        let cargo = dir.path().join("cargo");
+        let script = "#!/bin/sh\nt=$7; echo $PSIDPD_LAMMPS_VERSION > $t/lib.so; sleep 0.1\n\
+            echo \"{\\\"reason\\\":\\\"compiler-artifact\\\",\\\"target\\\":{\\\"name\\\":\\\"psidpdplugin\\\"},\\\"filenames\\\":[\\\"$t/lib.so\\\"]}\"\n";
+        fs::write(&cargo, script).unwrap();
+        fs::set_permissions(&cargo, fs::Permissions::from_mode(0o755)).unwrap();
+        let (cargo, builds) = (cargo.into_os_string(), dir.path().join("builds"));
+        std::thread::scope(|scope| {
+            for number in 1..=4 {
+                let (dir, cargo, builds) = (dir.path(), &cargo, &builds);
+                scope.spawn(move || {
+                    let base = dir.join(number.to_string());
+                    let plugin =
+                        build_with(&host(dir), &version(number), &base, builds, dir, cargo, &|_| {}).unwrap();
+                    assert_eq!(fs::read_to_string(&plugin).unwrap(), format!("{number}\n"));
+                });
+            }
+        });
     }
 
     #[test]

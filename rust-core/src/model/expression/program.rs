@@ -136,11 +136,25 @@ impl Program {
     /// If `at` is shorter than `lanes` times [`variables`](Self::variables) or `out` than `lanes`
     /// times [`outputs`](Self::outputs).
     pub fn eval_block(&self, lanes: usize, at: &[f64], out: &mut [f64], work: &mut Vec<f64>) {
-        if lanes == 0 {
-            return;
+        if lanes > 0 {
+            let out = &mut out[..self.outputs.len() * lanes];
+            self.eval_block_into(lanes, at, out.chunks_exact_mut(lanes), work);
         }
+    }
+
+    /// The same, with each output where `out` says, which gives slices of `lanes` numbers.
+    ///
+    /// # Panics
+    ///
+    /// If `at` is shorter than `lanes` times [`variables`](Self::variables), or one of `out` of another length.
+    pub(crate) fn eval_block_into<'o>(
+        &self,
+        lanes: usize,
+        at: &[f64],
+        out: impl Iterator<Item = &'o mut [f64]>,
+        work: &mut Vec<f64>,
+    ) {
         let at = &at[..self.variables * lanes];
-        let out = &mut out[..self.outputs.len() * lanes];
         if work.len() < self.registers * lanes {
             work.resize(self.registers * lanes, 0.0);
         }
@@ -157,7 +171,7 @@ impl Program {
             };
             instruction.run(to, from);
         }
-        for (out, output) in out.chunks_exact_mut(lanes).zip(&self.outputs) {
+        for (out, output) in out.zip(&self.outputs) {
             match *output {
                 Output::Constant(value) => out.fill(value),
                 Output::Place(place) => out.copy_from_slice(match place.checked_sub(self.variables) {

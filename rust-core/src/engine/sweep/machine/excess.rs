@@ -3,11 +3,15 @@
 use super::{Machine, Shared};
 use crate::engine::error::EngineError;
 use crate::engine::excess::ExcessPlan;
-use crate::engine::excess_pass::Rows;
+use crate::engine::excess_pass::{ExcessPass, LANES, Rows};
 use crate::engine::plan::Plan;
 use crate::engine::sweep::compiled::Compiled;
 use crate::engine::sweep::pool::Pool;
 use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Particles whose densities are gathered at a time: they stay in the first-level cache until ψ is evaluated, and
+/// make several blocks of lanes where not all take part.
+const BLOCK: usize = 2 * LANES;
 
 impl<P: Compiled> Machine<P> {
     /// ψ and its slopes at the densities of the first pass.
@@ -40,25 +44,22 @@ impl<P: Compiled> Machine<P> {
                     return;
                 }
                 let (first, count) = this.layer(layer);
-                // SAFETY: as above.
-                let (excess, slopes, densities) = unsafe {
-                    (
-                        std::slice::from_raw_parts_mut(excess.at(first), count),
-                        std::slice::from_raw_parts_mut(slopes.at(width * first), width * count),
-                        std::slice::from_raw_parts_mut(rows.at(width * first), width * count),
-                    )
-                };
-                this.gather_densities(layer, &own, densities);
-                let mut rows = Rows { first, columns: &this.columns, densities, excess, slopes };
-                let species = |s: usize| match (this.ghost.get(s), this.species.get(s)) {
-                    (Some(true), _) => -1,
-                    (_, Some(species)) => *species as i32,
-                    _ => 0,
-                };
-                let tag = |s: usize| tag[this.order[s] as usize];
-                if let Err(fault) = scratch.excess.run(plan, first..first + count, species, tag, &mut rows) {
-                    scratch.fault = Some(fault);
-                    return;
+                for from in (first..first + count).step_by(BLOCK) {
+                    let count = BLOCK.min(first + count - from);
+                    // SAFETY: as above.
+                    let (excess, slopes, densities) = unsafe {
+                        (
+                            std::slice::from_raw_parts_mut(excess.at(from), count),
+                            std::slice::from_raw_parts_mut(slopes.at(width * from), width * count),
+                            std::slice::from_raw_parts_mut(rows.at(width * from), width * count),
+                        )
+                    };
+                    this.gather_densities(layer, from, &own, densities);
+                    let mut rows = Rows { first: from, columns: &this.columns, densities, excess, slopes };
+                    if let Err(fault) = this.evaluate(plan, &mut scratch.excess, tag, &mut rows) {
+                        scratch.fault = Some(fault);
+                        return;
+                    }
                 }
             }
         });
@@ -67,38 +68,65 @@ impl<P: Compiled> Machine<P> {
         Ok(())
     }
 
-    /// `w(0)` by species and column, where a density counts the particle itself.
+    /// What a particle itself adds to the densities of the passes: `w(0)`, or nothing.
     fn own_weights(&self, plan: &Plan) -> Vec<f64> {
-        let (count, width) = (plan.species.len(), self.width());
-        let mut own = vec![0.0; count * width];
-        for (k, d) in plan.passes.iter().enumerate() {
-            if plan.densities[*d].includes_self {
-                for s in 0..count {
-                    own[s * width + k * count + s] = plan.densities[*d].kernel.value(0.0);
-                }
-            }
-        }
-        own
+        let densities = plan.passes.iter().map(|d| &plan.densities[*d]);
+        densities.map(|d| if d.includes_self { d.kernel.value(0.0) } else { 0.0 }).collect()
     }
 
-    /// Densities of the particles of a layer.
-    fn gather_densities(&self, layer: usize, own: &[f64], out: &mut [f64]) {
-        let (first, count) = self.layer(layer);
+    /// ψ of the particles of `rows`, by what tells them apart.
+    fn evaluate(
+        &self,
+        plan: &Plan,
+        pass: &mut ExcessPass,
+        tag: &[i32],
+        rows: &mut Rows,
+    ) -> Result<(), EngineError> {
+        let tag = |s: usize| tag[self.order[s] as usize];
+        let (species, ghost) = (&self.species[..], &self.ghost[..]);
+        match (species.is_empty(), ghost.is_empty()) {
+            (true, true) => pass.run(plan, None::<fn(usize) -> i32>, tag, rows),
+            (true, false) => pass.run(plan, Some(|s: usize| -(ghost[s] as i32)), tag, rows),
+            (false, true) => pass.run(plan, Some(|s: usize| species[s] as i32), tag, rows),
+            (false, false) => {
+                let species = |s: usize| if ghost[s] { -1 } else { species[s] as i32 };
+                pass.run(plan, Some(species), tag, rows)
+            }
+        }
+    }
+
+    /// Densities of particles of a layer from number `from`, as many as there is room for.
+    fn gather_densities(&self, layer: usize, from: usize, own: &[f64], out: &mut [f64]) {
         let width = self.width();
         let (here, before) = self.accumulators(layer);
-        for k in 0..count {
-            let s = (first + k) as isize;
-            let species = self.species.get(first + k).map_or(0, |s| *s as usize);
-            for c in 0..width {
-                let of = |at: isize| match width {
-                    1 => self.sums[at as usize].0[3],
-                    _ => self.densities[width * at as usize + c],
-                };
-                let mut n = of(s + here);
-                if let Some(before) = before {
-                    n += of(s + before);
+        let place = |accumulators: isize| (from as isize + accumulators) as usize;
+        if let (1, &[own]) = (width, own) {
+            let sums = |accumulators| self.sums[place(accumulators)..].iter();
+            let pairs = out.iter_mut().zip(sums(here));
+            match before {
+                None => pairs.for_each(|(n, here)| *n = here.0[3] + own),
+                Some(before) => {
+                    pairs.zip(sums(before)).for_each(|((n, here), before)| *n = here.0[3] + before.0[3] + own)
                 }
-                out[width * k + c] = n + own[species * width + c];
+            }
+            return;
+        }
+        if width == 0 {
+            return;
+        }
+        let sums = |accumulators| &self.densities[width * place(accumulators)..][..out.len()];
+        match before.map(sums) {
+            None => out.copy_from_slice(sums(here)),
+            Some(before) => {
+                let pairs = sums(here).iter().zip(before);
+                out.iter_mut().zip(pairs).for_each(|(n, (here, before))| *n = here + before);
+            }
+        }
+        let count = width / own.len();
+        for (k, row) in out.chunks_exact_mut(width).enumerate() {
+            let species = self.species.get(from + k).map_or(0, |s| *s as usize);
+            for (pass, own) in own.iter().enumerate() {
+                row[pass * count + species] += own;
             }
         }
     }
