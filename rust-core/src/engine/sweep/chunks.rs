@@ -4,7 +4,7 @@ use super::arithmetic::Record;
 use super::block::Block;
 use super::layer::Swept;
 use super::simd::Scalar;
-use super::windows::{Spans, View, Windows};
+use super::windows::{Ends, Spans, View, Windows};
 
 /// Particles that look together, at most.
 pub const FOUR: usize = 4;
@@ -25,9 +25,7 @@ pub struct Group<'a> {
     pub view: &'a View,
     pub windows: &'a Windows,
     pub spans: &'a Spans,
-    /// Particles whose spans go on in the period before, and in the next: a bit for each.
-    pub before: u32,
-    pub after: u32,
+    pub ends: Ends,
     /// The first, and how many.
     pub first: usize,
     pub count: usize,
@@ -42,20 +40,22 @@ pub unsafe fn cut<T: Scalar, const GHOSTS: bool>(
 ) {
     // SAFETY: the arrays are as `Swept` says, chunks have room.
     unsafe {
-        let Group { view, windows, spans, count, .. } = *group;
+        let Group { view, windows, spans, count, ends, .. } = *group;
         let x = swept.x[0].as_ptr().add(group.first);
         let mut found = 0;
         let mut fours = 0;
         let mut a = 0;
         while a < count {
             let mut many = FOUR.min(count - a);
-            let begin = *x.add(a);
-            let mut k = 1;
-            while k < many {
-                if (*x.add(a + k) - begin).abs() > view.joined {
-                    many = k;
+            if !ends.together {
+                let begin = *x.add(a);
+                let mut k = 1;
+                while k < many {
+                    if (*x.add(a + k) - begin).abs() > view.joined {
+                        many = k;
+                    }
+                    k += 1;
                 }
-                k += 1;
             }
             // The last again in the place of those that are not there.
             let these = [a, a + 1.min(many - 1), a + 2.min(many - 1), a + many - 1];
@@ -66,28 +66,28 @@ pub unsafe fn cut<T: Scalar, const GHOSTS: bool>(
                 let row = *windows.row.get_unchecked(w);
                 // In their own row they look at those behind them.
                 let own = (group.first + a + 1) as u32;
-                let from = if w == 0 { own } else { *row.add(lowest(&spans.low, w, these)) };
-                let to = *row.add(highest(&spans.end, w, these));
+                let from = if w == 0 { own } else { *row.add(lowest(&spans.low, w, these, ends)) };
+                let to = *row.add(highest(&spans.end, w, these, ends));
                 found = add::<T, GHOSTS>(swept, group, block, found, [from, to], w + 5, &look);
                 w += 1;
             }
             // Rows that go on in the period before, and in the next.
             let bits = (1u32 << many) - 1;
-            if group.before >> a & bits != 0 {
+            if ends.before >> a & bits != 0 {
                 let mut w = 1;
                 while w < 5 {
                     let row = *windows.row.get_unchecked(w);
                     let range =
-                        [*row.add(lowest(&spans.before, w, these)), *row.add(view.bins as usize)];
+                        [*row.add(lowest(&spans.before, w, these, ends)), *row.add(view.bins as usize)];
                     found = add::<T, GHOSTS>(swept, group, block, found, range, w, &look);
                     w += 1;
                 }
             }
-            if group.after >> a & bits != 0 {
+            if ends.after >> a & bits != 0 {
                 let mut w = 0;
                 while w < 5 {
                     let row = *windows.row.get_unchecked(w);
-                    let range = [*row, *row.add(highest(&spans.after, w, these))];
+                    let range = [*row, *row.add(highest(&spans.after, w, these, ends))];
                     found = add::<T, GHOSTS>(swept, group, block, found, range, w + 10, &look);
                     w += 1;
                 }
@@ -101,19 +101,25 @@ pub unsafe fn cut<T: Scalar, const GHOSTS: bool>(
 }
 
 #[inline(always)]
-unsafe fn lowest(bins: &[[i32; 16]; 5], w: usize, [a, b, c, d]: [usize; FOUR]) -> usize {
+unsafe fn lowest(bins: &[[i32; 16]; 5], w: usize, [a, b, c, d]: [usize; FOUR], ends: Ends) -> usize {
     // SAFETY: of a group.
     unsafe {
         let at = |k: usize| *bins.get_unchecked(w).get_unchecked(k);
+        if ends.together {
+            return at(a) as usize;
+        }
         at(a).min(at(b)).min(at(c).min(at(d))) as usize
     }
 }
 
 #[inline(always)]
-unsafe fn highest(bins: &[[i32; 16]; 5], w: usize, [a, b, c, d]: [usize; FOUR]) -> usize {
+unsafe fn highest(bins: &[[i32; 16]; 5], w: usize, [a, b, c, d]: [usize; FOUR], ends: Ends) -> usize {
     // SAFETY: of a group.
     unsafe {
         let at = |k: usize| *bins.get_unchecked(w).get_unchecked(k);
+        if ends.together {
+            return at(a) as usize;
+        }
         at(a).max(at(b)).max(at(c).max(at(d))) as usize
     }
 }

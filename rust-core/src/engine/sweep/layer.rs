@@ -42,7 +42,6 @@ pub struct Swept<'a, T, R> {
     pub owned: &'a [u8],
     /// The first owned particle of each row, and one past the last; empty if there are no ghosts.
     pub owned_of_row: &'a [[u32; 2]],
-    pub particles: usize,
     pub terms: &'a Terms<T>,
     /// The many-body slopes, a number for each pass and species.
     pub slopes: &'a [f64],
@@ -135,14 +134,14 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TA
             }
             while first < end {
                 let count = I::F32::LANES.min(end - first);
-                let [before, after] = view.spans::<I>(swept, row, first, count, &windows.there, &mut spans);
-                let group = Group { view: &view, windows: &windows, spans: &spans, before, after, first, count };
+                let ends = view.spans::<I>(swept, row, first, count, &windows.there, &mut spans);
+                let group = Group { view: &view, windows: &windows, spans: &spans, ends, first, count };
                 if ghosts {
                     cut::<A::Scalar, true>(swept, &group, block);
                 } else {
                     cut::<A::Scalar, false>(swept, &group, block);
                 }
-                if windows.crosses || before | after != 0 {
+                if windows.crosses || ends.before | ends.after != 0 {
                     look::<I, A::Scalar, true>(swept, &group, block);
                 } else {
                     look::<I, A::Scalar, false>(swept, &group, block);

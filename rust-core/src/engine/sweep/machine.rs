@@ -189,7 +189,6 @@ impl<P: Compiled> Machine<P> {
             ghost: &self.ghost,
             owned: &self.owned_bits,
             owned_of_row: &self.owned_of_row,
-            particles: self.particles,
             terms: &self.terms,
             slopes: &self.slopes,
             offset: &self.offset,

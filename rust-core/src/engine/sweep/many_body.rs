@@ -167,6 +167,7 @@ pub unsafe fn second_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const T
         let base = swept.sums.0.offset(4 * offset);
         let layer_base = base.add(4 * near.first as usize);
         let species = swept.terms.species;
+        let species_j = swept.species.as_ptr().wrapping_add(near.first as usize);
         let passes = near.rows.len();
         let width = passes * species;
         let mut banks = Banks([[[0.0; 4]; BANKS]; 16]);
@@ -180,14 +181,18 @@ pub unsafe fn second_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const T
                 let apart = &near.apart.get_unchecked(pass).0;
                 let slopes = swept.slopes.as_ptr().add(pass * species);
                 let layer_slopes = slopes.add(width * near.first as usize);
-                // With one species the slope of each member.
+                // The slope of each member; its slopes and species, with several.
                 let mut own = [0.0; 16];
-                if !SEVERAL {
-                    let mut m = 0;
-                    while m < *count {
-                        own[m] = *slopes.add(width * *members.get_unchecked(m) as usize);
-                        m += 1;
+                let mut rows_of = [(slopes, 0); 16];
+                let mut m = 0;
+                while m < *count {
+                    let i = *members.get_unchecked(m) as usize;
+                    if SEVERAL {
+                        rows_of[m] = (slopes.add(width * i), *swept.species.get_unchecked(i) as usize);
+                    } else {
+                        own[m] = *slopes.add(width * i);
                     }
+                    m += 1;
                 }
                 let begin = *done.get_unchecked(pass);
                 let end = begin + *near.found.get_unchecked(part * passes + pass) as usize;
@@ -198,10 +203,8 @@ pub unsafe fn second_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const T
                     let (j, m) = ((code & ((1 << NEAR_BITS) - 1)) as usize, (code >> NEAR_BITS) as usize);
                     let there = layer_slopes.add(width * j);
                     let slope = if SEVERAL {
-                        let i = *members.get_unchecked(m) as usize;
-                        let (si, sj) =
-                            (*swept.species.get_unchecked(i), *swept.species.get_unchecked(near.first as usize + j));
-                        *slopes.add(width * i + sj as usize) + *there.add(si as usize)
+                        let (here, species_i) = *rows_of.get_unchecked(m);
+                        *here.add(*species_j.add(j) as usize) + *there.add(species_i)
                     } else {
                         *own.get_unchecked(m) + *there
                     };

@@ -116,8 +116,7 @@ impl View {
         }
     }
 
-    /// The spans of the particles from `i` on, a vector of them, and which of them go on in the period before, and
-    /// in the next.
+    /// The spans of the particles from `i` on, a vector of them.
     #[inline(always)]
     pub unsafe fn spans<I: Isa>(
         &self,
@@ -127,7 +126,7 @@ impl View {
         count: usize,
         there: &[f32; 5],
         out: &mut Spans,
-    ) -> [u32; 2] {
+    ) -> Ends {
         // SAFETY: the contract of `simd`.
         unsafe {
             let x = I::F32::load(swept.x[0].as_ptr().add(i));
@@ -165,25 +164,45 @@ impl View {
                 before = (bin - half[0]).mask_below(zero) & these;
                 after = (most - one).mask_below(bin + half[0]) & these;
             }
+            // Four by four, if no four are too far apart, and there are no others in the vector.
+            let first = I::first_of_four(x);
+            let far = I::F32::splat(self.joined);
+            let close = (x - first).mask_below(far) & (first - x).mask_below(far);
+            let together = count == I::F32::LANES && close.trailing_ones() as usize >= count;
             let mut w = 0;
             while w < 5 {
                 // Rows that are not there get a span without length.
                 let h = *half.get_unchecked(w) * I::F32::splat(*there.get_unchecked(w));
-                let (low, end) = (out.low.get_unchecked_mut(w), out.end.get_unchecked_mut(w));
+                let (mut low, mut end) = (bin - h, bin + h + one);
+                end = end.where_below(zero, h);
+                if together {
+                    (low, end) = (I::least_of_four(low), I::greatest_of_four(end));
+                }
                 if before != 0 {
-                    (bin - h + most).smaller(most).store_whole(out.before.get_unchecked_mut(w).as_mut_ptr());
+                    let low = (low + most).smaller(most);
+                    low.store_whole(out.before.get_unchecked_mut(w).as_mut_ptr());
                 }
                 if after != 0 {
-                    let over = (bin + h + one - most).larger(zero);
+                    let over = (end - most).larger(zero);
                     over.store_whole(out.after.get_unchecked_mut(w).as_mut_ptr());
                 }
-                (bin - h).larger(zero).smaller(most).store_whole(low.as_mut_ptr());
-                (bin + h + one).smaller(most).where_below(zero, h).store_whole(end.as_mut_ptr());
+                low.larger(zero).smaller(most).store_whole(out.low.get_unchecked_mut(w).as_mut_ptr());
+                end.smaller(most).store_whole(out.end.get_unchecked_mut(w).as_mut_ptr());
                 w += 1;
             }
-            [before, after]
+            Ends { before, after, together }
         }
     }
+}
+
+/// How the spans of a group end.
+#[derive(Clone, Copy)]
+pub struct Ends {
+    /// Particles whose spans go on in the period before, and in the next: a bit for each.
+    pub before: u32,
+    pub after: u32,
+    /// Whether spans are those of each four particles together.
+    pub together: bool,
 }
 
 /// Fractional coordinates along the first edge.

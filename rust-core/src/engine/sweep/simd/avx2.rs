@@ -502,6 +502,24 @@ impl Isa for Avx2 {
         }
     }
     #[inline(always)]
+    unsafe fn first_of_four(x: F32x8) -> F32x8 {
+        unsafe { F32x8(_mm256_permute_ps::<0x00>(x.0)) }
+    }
+    #[inline(always)]
+    unsafe fn least_of_four(x: F32x8) -> F32x8 {
+        unsafe {
+            let two = _mm256_min_ps(x.0, _mm256_permute_ps::<0b10_11_00_01>(x.0));
+            F32x8(_mm256_min_ps(two, _mm256_permute_ps::<0b01_00_11_10>(two)))
+        }
+    }
+    #[inline(always)]
+    unsafe fn greatest_of_four(x: F32x8) -> F32x8 {
+        unsafe {
+            let two = _mm256_max_ps(x.0, _mm256_permute_ps::<0b10_11_00_01>(x.0));
+            F32x8(_mm256_max_ps(two, _mm256_permute_ps::<0b01_00_11_10>(two)))
+        }
+    }
+    #[inline(always)]
     unsafe fn bits(x: F32x8) -> U32x8 {
         unsafe { U32x8(_mm256_castps_si256(x.0)) }
     }

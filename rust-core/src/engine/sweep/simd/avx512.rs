@@ -506,6 +506,24 @@ impl Isa for Avx512 {
         }
     }
     #[inline(always)]
+    unsafe fn first_of_four(x: F32x16) -> F32x16 {
+        unsafe { F32x16(_mm512_permute_ps::<0x00>(x.0)) }
+    }
+    #[inline(always)]
+    unsafe fn least_of_four(x: F32x16) -> F32x16 {
+        unsafe {
+            let two = _mm512_min_ps(x.0, _mm512_permute_ps::<0b10_11_00_01>(x.0));
+            F32x16(_mm512_min_ps(two, _mm512_permute_ps::<0b01_00_11_10>(two)))
+        }
+    }
+    #[inline(always)]
+    unsafe fn greatest_of_four(x: F32x16) -> F32x16 {
+        unsafe {
+            let two = _mm512_max_ps(x.0, _mm512_permute_ps::<0b10_11_00_01>(x.0));
+            F32x16(_mm512_max_ps(two, _mm512_permute_ps::<0b01_00_11_10>(two)))
+        }
+    }
+    #[inline(always)]
     unsafe fn bits(x: F32x16) -> U32x16 {
         unsafe { U32x16(_mm512_castps_si512(x.0)) }
     }

@@ -176,6 +176,10 @@ pub trait Isa: Copy + Send + Sync + 'static {
     unsafe fn fill16(x: u16, p: *mut u16);
     /// Writes `first + k` for each bit `k` of sixteen, one after the other; may write sixteen.
     unsafe fn collect(first: u32, mask: u32, p: *mut u32);
+    /// The first, the least, and the greatest of each four lanes, in all of them.
+    unsafe fn first_of_four(x: Self::F32) -> Self::F32;
+    unsafe fn least_of_four(x: Self::F32) -> Self::F32;
+    unsafe fn greatest_of_four(x: Self::F32) -> Self::F32;
     /// The bits of numbers.
     unsafe fn bits(x: Self::F32) -> <Self::F32 as Reals>::Words;
     /// The low and the high words of the bits of numbers.

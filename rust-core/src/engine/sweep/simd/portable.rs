@@ -383,6 +383,33 @@ impl Isa for Portable {
         }
     }
     #[inline(always)]
+    unsafe fn first_of_four(mut x: Lanes<f32>) -> Lanes<f32> {
+        for k in 0..LANES {
+            x.0[k] = x.0[k / 4 * 4];
+        }
+        x
+    }
+    #[inline(always)]
+    unsafe fn least_of_four(x: Lanes<f32>) -> Lanes<f32> {
+        let mut out = x.0;
+        for k in 0..LANES {
+            for other in k / 4 * 4..k / 4 * 4 + 4 {
+                out[k] = out[k].min(x.0[other]);
+            }
+        }
+        Lanes(out)
+    }
+    #[inline(always)]
+    unsafe fn greatest_of_four(x: Lanes<f32>) -> Lanes<f32> {
+        let mut out = x.0;
+        for k in 0..LANES {
+            for other in k / 4 * 4..k / 4 * 4 + 4 {
+                out[k] = out[k].max(x.0[other]);
+            }
+        }
+        Lanes(out)
+    }
+    #[inline(always)]
     unsafe fn bits(x: Lanes<f32>) -> Lanes<u32> {
         Lanes(x.0.map(f32::to_bits))
     }
