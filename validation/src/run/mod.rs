@@ -5,6 +5,7 @@
 //! can be stopped and taken up again by its [`checkpoint`]s; [`run_scene`] is one that nothing interrupts.
 
 mod body_force;
+mod bounds;
 pub mod checkpoint;
 mod dump;
 mod error;

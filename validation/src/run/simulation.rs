@@ -1,11 +1,13 @@
 use super::body_force::BodyForce;
+use super::bounds::Bounds;
 use super::error::RunError;
 use super::forces::{Arrays, Forces};
-use super::integrator::{Before, Integrator, Motion};
+use super::integrator::{Before, Faults, Integrator, Motion, Surroundings};
 use super::state::State;
 use super::tags::Tags;
-use super::walls::Walls;
-use psidpd_core::engine::{PassCounts, PeriodicBox, Plan, Precision, Settings, Step, Sweep, Tally, Want};
+use psidpd_core::engine::{
+    PassCounts, PeriodicBox, Plan, Pool, Precision, Settings, Step, Sweep, Tally, Want,
+};
 use psidpd_core::model::Model;
 
 /// Particles, their periodic images, and the forces of one fluid on them.
@@ -40,7 +42,7 @@ pub struct Simulation {
     forces: Forces,
     tally: Tally,
     before: Before,
-    walls: Walls,
+    bounds: Bounds,
     frozen_tags: Tags,
     /// By particle; empty if none is frozen.
     frozen: Vec<bool>,
@@ -90,7 +92,7 @@ impl Simulation {
             forces,
             tally: Tally::default(),
             before: Before::default(),
-            walls: Walls::of(&domain, fluid.dimensions),
+            bounds: Bounds::of(&domain, fluid.dimensions),
             frozen_tags: Tags::none(),
             frozen: Vec::new(),
             mobile: owned,
@@ -258,48 +260,37 @@ impl Simulation {
             return Err(RunError::TimeStep(dt));
         }
         self.number += 1;
-        integrator.before_forces(self.motion(), dt);
-        self.check_velocities(Some(dt))?;
-        if self.walls.any() {
-            let walls = self.walls;
-            walls.reflect(&mut self.motion());
-            if let Some(k) = walls.escaped(self.positions()) {
-                let distance = self.v[k][0].hypot(self.v[k][1]).hypot(self.v[k][2]) * dt;
-                return Err(RunError::Runaway { step: self.number, tag: self.tag[k], distance });
-            }
-        }
-        for (x, image) in self.x[..self.owned].iter_mut().zip(&mut self.image) {
-            self.domain.wrap(x, image);
-        }
+        let limit = self.longest_move / (dt * dt);
+        let faults = self.split(|motion, around, pool| {
+            integrator.before_forces(motion, dt, Surroundings { limit, ..around }, pool)
+        });
+        self.refuse(faults, Some(dt))?;
         let step = Step { seed: self.seed, number: self.number, dt };
         self.compute(want, self.thermostat.then_some(step))?;
         self.add_external_forces();
-        integrator.after_forces(self.motion(), dt);
-        self.check_velocities(None)
+        let faults = self.split(|motion, _, pool| integrator.after_forces(motion, dt, pool));
+        self.refuse(faults, None)
     }
 
-    fn motion(&mut self) -> Motion<'_> {
+    /// Calls `work` with what moves, what it moves in, and the threads.
+    fn split(&mut self, work: impl FnOnce(Motion, Surroundings, &Pool) -> Faults) -> Faults {
         let n = self.owned;
-        Motion {
+        let motion = Motion {
             x: &mut self.x[..n],
             v: &mut self.v[..n],
             f: &self.force[..n],
             species: &self.species[..n],
+            image: &mut self.image[..n],
             mass: &self.mass,
             before: &mut self.before,
-        }
+        };
+        let around = Surroundings { domain: &self.domain, bounds: &self.bounds, limit: f64::MAX };
+        work(motion, around, self.forces.pool())
     }
 
     /// Velocities must be finite, and within a step of `dt` lead nowhere beyond the box.
-    fn check_velocities(&self, dt: Option<f64>) -> Result<(), RunError> {
-        let limit = dt.map_or(f64::MAX, |dt| self.longest_move / (dt * dt));
-        let too_fast = |v: &[f64; 3]| {
-            let speed = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
-            speed.is_nan() || speed > limit
-        };
-        let Some(k) = self.v[..self.owned].iter().position(too_fast) else {
-            return Ok(());
-        };
+    fn refuse(&self, faults: Faults, dt: Option<f64>) -> Result<(), RunError> {
+        let Some(k) = faults.fast.or(faults.escaped) else { return Ok(()) };
         let (step, tag, v) = (self.number, self.tag[k], self.v[k]);
         let speed = v[0].hypot(v[1]).hypot(v[2]);
         match dt {
