@@ -30,6 +30,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let instructions =
         if Instructions::Avx2.available() { Instructions::Avx2 } else { Instructions::Portable };
     run.set_settings(Settings { precision: Precision::Mixed, instructions, ..run.settings() })?;
+    run.set_reordering(true);
     run.prepare(0.01, Want::FORCES)?;
     for _ in 0..steps {
         run.step(0.01, Integrator::VelocityVerlet, Want::FORCES)?;

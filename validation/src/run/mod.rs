@@ -6,6 +6,7 @@
 
 mod body_force;
 mod bounds;
+mod by_tag;
 pub mod checkpoint;
 mod dump;
 mod error;
@@ -14,6 +15,7 @@ mod forces;
 mod growing;
 pub mod integrator;
 mod output;
+mod reorder;
 mod restart;
 mod runner;
 mod simulation;

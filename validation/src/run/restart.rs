@@ -2,6 +2,7 @@
 
 use super::error::RunError;
 use super::state::State;
+use super::tags::order_of_tags;
 use crate::lammps::data::{Atom, DataFile};
 use nalgebra::{Matrix3, Vector3};
 use psidpd_core::engine::PeriodicBox;
@@ -9,12 +10,13 @@ use psidpd_core::model::Model;
 use std::path::Path;
 
 impl State {
-    /// The state as a data file of atom style `atomic`: types are species from 1; `title` becomes the
+    /// The state as a data file of atom style `atomic`, by tags: types are species from 1; `title` becomes the
     /// first line.
     pub fn to_data(&self, title: &str) -> DataFile {
         let origin = self.domain.origin();
         let edges = [0, 1, 2].map(|k| self.domain.edge(k));
         let tilt = [edges[1][0], edges[2][0], edges[2][1]];
+        let order = order_of_tags(&self.tag);
         DataFile {
             title: title.to_owned(),
             boxlo: origin,
@@ -22,15 +24,16 @@ impl State {
             tilt: (tilt != [0.0; 3]).then_some(tilt),
             types: self.mass.len(),
             masses: self.mass.clone(),
-            atoms: (0..self.len())
-                .map(|k| Atom {
+            atoms: order
+                .iter()
+                .map(|&k| Atom {
                     id: self.tag[k] as u32,
                     kind: self.species[k] as u32 + 1,
                     x: self.x[k],
                     image: self.image[k],
                 })
                 .collect(),
-            velocities: Some(self.v.clone()),
+            velocities: Some(order.iter().map(|k| self.v[*k]).collect()),
         }
     }
 
