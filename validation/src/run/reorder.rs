@@ -16,6 +16,9 @@ pub(super) fn is_due(step: u64) -> bool {
     step % INTERVAL == 1
 }
 
+/// Reads whole numbers.
+type Whole = fn(&[f64; 3]) -> [i32; 3];
+
 /// Brings arrays into an order, one after the other through the same memory.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Reordering {
@@ -35,7 +38,7 @@ impl Reordering {
         pool: &Pool,
         order: &[u32],
         get: impl Fn(usize) -> [i32; 3] + Sync,
-    ) -> Map<Iter<'_, [f64; 3]>, fn(&[f64; 3]) -> [i32; 3]> {
+    ) -> Map<Iter<'_, [f64; 3]>, Whole> {
         // A double holds every whole number of 32 bits.
         self.gather(pool, order, |k| get(k).map(f64::from));
         self.scratch.iter().map(|numbers| numbers.map(|number| number as i32))

@@ -1,4 +1,4 @@
-use super::body_force::BodyForce;
+use super::body_force::{self, BodyForce};
 use super::bounds::Bounds;
 use super::error::RunError;
 use super::forces::{Arrays, Forces};
@@ -10,6 +10,7 @@ use psidpd_core::engine::{
     PassCounts, PeriodicBox, Plan, Pool, Precision, Settings, Step, Sweep, Tally, Want,
 };
 use psidpd_core::model::Model;
+use std::sync::OnceLock;
 
 /// Particles, their periodic images, and the forces of one fluid on them.
 ///
@@ -53,6 +54,8 @@ pub struct Simulation {
     /// Sum of the forces on the frozen particles, in the last evaluation.
     support_force: [f64; 3],
     body_forces: Vec<BodyForce>,
+    /// `Σ m v v` of the present velocities, once somebody has asked for it.
+    flux: OnceLock<[f64; 6]>,
     /// Square of the longest way that a particle may go in one step.
     longest_move: f64,
 }
@@ -102,6 +105,7 @@ impl Simulation {
             mobile: owned,
             support_force: [0.0; 3],
             body_forces: Vec::new(),
+            flux: OnceLock::new(),
             longest_move: domain.lengths().iter().map(|l| l * l).sum(),
             domain,
         })
@@ -196,6 +200,7 @@ impl Simulation {
         let frozen: Vec<bool> = self.tags().iter().map(|t| self.frozen_tags.contain(*t)).collect();
         let count = frozen.iter().filter(|f| **f).count();
         self.mobile = self.owned - count;
+        self.flux.take();
         self.frozen = if count > 0 { frozen } else { Vec::new() };
         for (v, _) in self.v.iter_mut().zip(&self.frozen).filter(|(_, frozen)| **frozen) {
             *v = [0.0; 3];
@@ -251,15 +256,12 @@ impl Simulation {
 
     /// Body forces; and none at all on what is frozen, so that every integrator leaves it alone.
     fn add_external_forces(&mut self) {
-        for body in &self.body_forces {
-            for k in 0..self.owned {
-                if body.acts_on(self.species[k], self.tag[k]) {
-                    let (mass, a) = (self.mass[self.species[k] as usize], body.at(&self.domain, self.x[k]));
-                    for c in 0..3 {
-                        self.force[k][c] += mass * a[c];
-                    }
-                }
-            }
+        if !self.body_forces.is_empty() {
+            let Simulation { body_forces, forces, domain, mass, x, species, tag, force, owned, .. } = self;
+            body_force::add(body_forces, forces.pool(), &mut force[..*owned], |body, k| {
+                let mass = mass[species[k] as usize];
+                body.acts_on(species[k], tag[k]).then(|| body.at(domain, x[k]).map(|a| mass * a))
+            });
         }
         self.support_force = [0.0; 3];
         for (force, _) in self.force.iter_mut().zip(&self.frozen).filter(|(_, frozen)| **frozen) {
@@ -301,8 +303,8 @@ impl Simulation {
         }
         self.number += 1;
         let limit = self.longest_move / (dt * dt);
-        let faults = self.split(|motion, around, pool| {
-            integrator.before_forces(motion, dt, Surroundings { limit, ..around }, pool)
+        let faults = self.split(|motion, (domain, bounds), pool| {
+            integrator.before_forces(motion, dt, Surroundings { domain, bounds, limit }, pool)
         });
         self.refuse(faults, Some(dt))?;
         let step = Step { seed: self.seed, number: self.number, dt };
@@ -317,7 +319,8 @@ impl Simulation {
     }
 
     /// Calls `work` with what moves, what it moves in, and the threads.
-    fn split(&mut self, work: impl FnOnce(Motion, Surroundings, &Pool) -> Faults) -> Faults {
+    fn split(&mut self, work: impl FnOnce(Motion, (&PeriodicBox, &Bounds), &Pool) -> Faults) -> Faults {
+        self.flux.take();
         let n = self.owned;
         let motion = Motion {
             x: &mut self.x[..n],
@@ -328,8 +331,7 @@ impl Simulation {
             mass: &self.mass,
             before: &mut self.before,
         };
-        let around = Surroundings { domain: &self.domain, bounds: &self.bounds, limit: f64::MAX };
-        work(motion, around, self.forces.pool())
+        work(motion, (&self.domain, &self.bounds), self.forces.pool())
     }
 
     /// Velocities must be finite, and within a step of `dt` lead nowhere beyond the box.
@@ -535,14 +537,16 @@ impl Simulation {
 
     /// `Σ m v v`, in the order xx, yy, zz, xy, xz, yz.
     fn momentum_flux(&self) -> [f64; 6] {
-        let mut sum = [0.0; 6];
-        for (v, s) in self.velocities().iter().zip(&self.species) {
-            let m = self.mass[*s as usize];
-            for (k, (a, b)) in [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)].into_iter().enumerate() {
-                sum[k] += m * v[a] * v[b];
+        *self.flux.get_or_init(|| {
+            let mut sum = [0.0; 6];
+            for (v, s) in self.velocities().iter().zip(&self.species) {
+                let m = self.mass[*s as usize];
+                for (k, (a, b)) in [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)].into_iter().enumerate() {
+                    sum[k] += m * v[a] * v[b];
+                }
             }
-        }
-        sum
+            sum
+        })
     }
 
     fn over_volume(&self, virial: [f64; 6]) -> [f64; 6] {

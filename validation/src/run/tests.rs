@@ -7,6 +7,7 @@ use std::path::Path;
 
 mod order;
 mod resume;
+mod steps;
 
 const SET6: &str = include_str!("../../models/warren2003-set6.toml");
 

@@ -7,7 +7,9 @@ use psidpd_core::engine::{PeriodicBox, Pool, part};
 
 /// Particles whose coordinates are done together, in whole vectors.
 const GROUP: usize = 4;
+/// Their coordinates.
 const LANES: usize = 3 * GROUP;
+/// Coordinates of a vector.
 const WIDTH: usize = 4;
 
 /// Particles that are worth the call of a thread.
@@ -94,15 +96,9 @@ where
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx2") {
         // SAFETY: the processor has AVX2.
-        return match over_mass {
-            [_] => unsafe { drift_avx2::<true, R>(part, over_mass, around, rule) },
-            _ => unsafe { drift_avx2::<false, R>(part, over_mass, around, rule) },
-        };
+        return unsafe { drift_avx2(part, over_mass, around, rule) };
     }
-    match over_mass {
-        [_] => drift_in_groups::<true, R>(part, over_mass, around, rule),
-        _ => drift_in_groups::<false, R>(part, over_mass, around, rule),
-    }
+    drift_portably(part, over_mass, around, rule);
 }
 
 /// Changes velocities by `rule`, which makes one of velocity, force, kept velocity, kept force, and a number of
@@ -114,34 +110,50 @@ where
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx2") {
         // SAFETY: the processor has AVX2.
-        return match over_mass {
-            [_] => unsafe { kick_avx2::<KEEPS, true, R>(part, over_mass, rule) },
-            _ => unsafe { kick_avx2::<KEEPS, false, R>(part, over_mass, rule) },
-        };
+        return unsafe { kick_avx2::<KEEPS, R>(part, over_mass, rule) };
     }
-    match over_mass {
-        [_] => kick_in_groups::<KEEPS, true, R>(part, over_mass, rule),
-        _ => kick_in_groups::<KEEPS, false, R>(part, over_mass, rule),
-    }
+    kick_portably::<KEEPS, R>(part, over_mass, rule);
 }
 
 /// The same operations, four at a time; nothing is contracted, so the bits are the same.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn drift_avx2<const ONE: bool, R>(part: &mut Part, over_mass: &[f64], around: Surroundings, rule: R)
+fn drift_avx2<R>(part: &mut Part, over_mass: &[f64], around: Surroundings, rule: R)
 where
     R: Fn(f64, f64, f64, f64) -> (f64, f64),
 {
-    drift_in_groups::<ONE, R>(part, over_mass, around, rule);
+    drift_portably(part, over_mass, around, rule);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn kick_avx2<const KEEPS: bool, const ONE: bool, R>(part: &mut Part, over_mass: &[f64], rule: R)
+fn kick_avx2<const KEEPS: bool, R>(part: &mut Part, over_mass: &[f64], rule: R)
 where
     R: Fn(f64, f64, [f64; 2], f64) -> f64,
 {
-    kick_in_groups::<KEEPS, ONE, R>(part, over_mass, rule);
+    kick_portably::<KEEPS, R>(part, over_mass, rule);
+}
+
+#[inline(always)]
+fn drift_portably<R>(part: &mut Part, over_mass: &[f64], around: Surroundings, rule: R)
+where
+    R: Fn(f64, f64, f64, f64) -> (f64, f64),
+{
+    match over_mass {
+        [_] => drift_in_groups::<true, R>(part, over_mass, around, rule),
+        _ => drift_in_groups::<false, R>(part, over_mass, around, rule),
+    }
+}
+
+#[inline(always)]
+fn kick_portably<const KEEPS: bool, R>(part: &mut Part, over_mass: &[f64], rule: R)
+where
+    R: Fn(f64, f64, [f64; 2], f64) -> f64,
+{
+    match over_mass {
+        [_] => kick_in_groups::<KEEPS, true, R>(part, over_mass, rule),
+        _ => kick_in_groups::<KEEPS, false, R>(part, over_mass, rule),
+    }
 }
 
 /// A number of each species for each coordinate of a group.
@@ -266,7 +278,8 @@ where
         let mut lost = [0; WIDTH];
         for from in (0..LANES).step_by(WIDTH) {
             for c in 0..WIDTH {
-                lost[c] |= u64::from(!(to[from + c].abs() <= FINITE));
+                let finite = to[from + c].abs() <= FINITE;
+                lost[c] |= u64::from(!finite);
             }
         }
         out |= lost != [0; WIDTH];
@@ -277,7 +290,8 @@ where
         for c in 0..3 {
             let old = if KEEPS { [kept_v[from + k][c], kept_f[from + k][c]] } else { [0.0; 2] };
             v[c] = rule(v[c], f[c], old, over_mass[*s as usize]);
-            out |= !(v[c].abs() <= FINITE);
+            let finite = v[c].abs() <= FINITE;
+            out |= !finite;
         }
     }
     if out {
