@@ -10,13 +10,21 @@ use psidpd_core::model::Model;
 use std::path::Path;
 
 impl State {
-    /// The state as a data file of atom style `atomic`, by tags: types are species from 1; `title` becomes the
+    /// The state as a data file of atom style `atomic`: types are species from 1; `title` becomes the
     /// first line.
     pub fn to_data(&self, title: &str) -> DataFile {
+        self.to_data_in(0..self.len(), title)
+    }
+
+    /// The same with the particles in the order of their tags.
+    pub fn to_data_by_tag(&self, title: &str) -> DataFile {
+        self.to_data_in(order_of_tags(&self.tag).into_iter(), title)
+    }
+
+    fn to_data_in(&self, order: impl Iterator<Item = usize> + Clone, title: &str) -> DataFile {
         let origin = self.domain.origin();
         let edges = [0, 1, 2].map(|k| self.domain.edge(k));
         let tilt = [edges[1][0], edges[2][0], edges[2][1]];
-        let order = order_of_tags(&self.tag);
         DataFile {
             title: title.to_owned(),
             boxlo: origin,
@@ -25,15 +33,15 @@ impl State {
             types: self.mass.len(),
             masses: self.mass.clone(),
             atoms: order
-                .iter()
-                .map(|&k| Atom {
+                .clone()
+                .map(|k| Atom {
                     id: self.tag[k] as u32,
                     kind: self.species[k] as u32 + 1,
                     x: self.x[k],
                     image: self.image[k],
                 })
                 .collect(),
-            velocities: Some(order.iter().map(|k| self.v[*k]).collect()),
+            velocities: Some(order.map(|k| self.v[k]).collect()),
         }
     }
 
@@ -101,10 +109,10 @@ impl State {
     }
 }
 
-/// Writes `state` as a data file, every number with the seventeen digits that bring it back unchanged.
+/// Writes `state` as a data file, by tags, every number with the seventeen digits that bring it back unchanged.
 ///
 /// # Errors
 /// The file cannot be written.
 pub fn write_data(path: &Path, title: &str, state: &State) -> Result<(), RunError> {
-    state.to_data(title).write(path).map_err(RunError::Lammps)
+    state.to_data_by_tag(title).write(path).map_err(RunError::Lammps)
 }

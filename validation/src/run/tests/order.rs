@@ -64,7 +64,7 @@ fn whole_runs_have_the_same_bytes_on_any_number_of_threads() {
     }
     let state = checkpoint::read_state(&folder.path().join("1")).unwrap();
     assert!(!state.tag.is_sorted());
-    let data = state.to_data("t");
+    let data = state.to_data_by_tag("t");
     assert!(data.atoms.iter().map(|a| a.id).eq(1..=state.len() as u32));
     let velocities = data.velocities.unwrap();
     assert!((0..state.len()).all(|k| velocities[state.tag[k] as usize - 1] == state.v[k]));
