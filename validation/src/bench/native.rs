@@ -26,7 +26,10 @@ fn simulation(
 ) -> Result<Simulation, BenchError> {
     let mut simulation = Simulation::new(&subject.model()?, 1.0, state.clone(), SEED)?;
     match settings {
-        Some(settings) => simulation.set_settings(settings)?,
+        Some(settings) => {
+            simulation.set_settings(settings)?;
+            simulation.set_reordering(true);
+        }
         // Densities that no force needs are the business of the plain engine.
         None => simulation.sum_all_densities(true),
     }

@@ -1,7 +1,7 @@
 //! Accelerations that act on particles one by one.
 
 use super::tags::Tags;
-use psidpd_core::engine::PeriodicBox;
+use psidpd_core::engine::{PeriodicBox, Pool, part};
 
 /// A constant acceleration of some of the particles, as gravity; or one that is reversed in the upper half of
 /// the box along some direction, which drives two opposite Poiseuille flows (Backer et al., J. Chem. Phys.
@@ -40,6 +40,29 @@ impl BodyForce {
             _ => self.acceleration,
         }
     }
+}
+
+/// Adds the forces of `bodies` on all particles: what `on` tells of each, one after the other.
+pub(super) fn add<F>(bodies: &[BodyForce], pool: &Pool, force: &mut [[f64; 3]], on: F)
+where
+    F: Fn(&BodyForce, usize) -> Option<[f64; 3]> + Sync,
+{
+    let (count, mut rest, threads) = (force.len(), force, pool.threads());
+    let mut parts: Vec<_> = (0..threads)
+        .map(|number| {
+            let range = part(count, number, threads);
+            (range.start, rest.split_off_mut(..range.len()).unwrap_or_default())
+        })
+        .collect();
+    pool.each(&mut parts, |(first, force)| {
+        for (k, sum) in force.iter_mut().enumerate() {
+            for f in bodies.iter().filter_map(|body| on(body, *first + k)) {
+                for c in 0..3 {
+                    sum[c] += f[c];
+                }
+            }
+        }
+    });
 }
 
 /// What drives two opposite flows.

@@ -1,25 +1,25 @@
-use super::simulation::Simulation;
 use crate::lammps::dump::{Digits, DumpWriter, Snapshot};
+use crate::output::Frame;
 use std::io::{self, Write};
 
-/// Writes the present step as a frame of a LAMMPS custom dump, `id type x y z vx vy vz`; types are
-/// species from 1.
+/// Writes a frame of a LAMMPS custom dump, `id type x y z vx vy vz`, in the order that the particles are in; types
+/// are species from 1. Velocities that are not known are 0.
 ///
 /// # Errors
 /// `to` cannot be written. Boxes that are not along the axes cannot be told in this format.
-pub fn write_frame(simulation: &Simulation, to: &mut impl Write) -> io::Result<()> {
-    let domain = simulation.domain();
-    let (origin, lengths) = (domain.origin(), domain.lengths());
-    let ids: Vec<u32> = simulation.tags().iter().map(|t| *t as u32).collect();
-    let kinds: Vec<u32> = simulation.species().iter().map(|s| *s as u32 + 1).collect();
+pub fn write_frame(frame: &Frame, to: &mut impl Write) -> io::Result<()> {
+    let (origin, lengths) = (frame.domain.origin(), frame.domain.lengths());
+    let ids: Vec<u32> = frame.tag.iter().map(|t| *t as u32).collect();
+    let kinds: Vec<u32> = frame.species.iter().map(|s| *s as u32 + 1).collect();
+    let none = if frame.v.is_none() { vec![[0.0; 3]; frame.len()] } else { Vec::new() };
     DumpWriter::new(to, Digits::All).write(&Snapshot {
-        step: simulation.step_number() as i64,
+        step: frame.step as i64,
         boxlo: origin,
         boxhi: std::array::from_fn(|k| origin[k] + lengths[k]),
-        periodic: std::array::from_fn(|k| domain.periodic()[k] && k < simulation.dimensions()),
+        periodic: frame.periodic(),
         ids: &ids,
         kinds: &kinds,
-        x: simulation.positions(),
-        v: simulation.velocities(),
+        x: frame.x,
+        v: frame.v.unwrap_or(&none),
     })
 }

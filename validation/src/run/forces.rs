@@ -20,6 +20,8 @@ pub struct Forces {
     sweep: Sweep,
     images: Images,
     all_densities: bool,
+    /// Whether the last evaluation was swept.
+    swept: bool,
 }
 
 /// The arrays of the particles. Where the plain engine is used they grow by the images.
@@ -53,6 +55,7 @@ impl Forces {
             sweep: Sweep::of_plan(plan, settings, pool),
             images: Images::default(),
             all_densities: false,
+            swept: false,
             dimensions: fluid.dimensions,
         })
     }
@@ -99,6 +102,12 @@ impl Forces {
         self.engine.local_densities()
     }
 
+    /// The particles in the order in which the last evaluation swept them, all of them; `None` if it did not, or
+    /// failed.
+    pub fn order(&self) -> Option<&[u32]> {
+        self.swept.then(|| self.sweep.order())
+    }
+
     /// Whether an evaluation that asks for `want` can be swept in `domain`.
     pub fn sweeps(&self, domain: &PeriodicBox, want: Want) -> bool {
         !self.all_densities && !want.particle_energy && !want.particle_virial && self.sweep.fits(domain)
@@ -116,6 +125,7 @@ impl Forces {
         want: Want,
     ) -> Result<Tally, EngineError> {
         let Arrays { owned, x, v, tag, species, force } = arrays;
+        self.swept = false;
         force.resize(owned, [0.0; 3]);
         if self.sweeps(domain, want) {
             x.truncate(owned);
@@ -124,7 +134,9 @@ impl Forces {
             v.truncate(owned);
             let particles = Particles { owned, x, tag, kind: species };
             self.sweep.first(Space::Box(domain), &particles, v, step, want)?;
-            return self.sweep.second(&particles, force, false);
+            let tally = self.sweep.second(&particles, force, false)?;
+            self.swept = true;
+            return Ok(tally);
         }
         let Forces { engine, images, .. } = self;
         images.build(domain, self.dimensions, engine.plan().cutoff(), owned, x);

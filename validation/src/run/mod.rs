@@ -5,6 +5,8 @@
 //! can be stopped and taken up again by its [`checkpoint`]s; [`run_scene`] is one that nothing interrupts.
 
 mod body_force;
+mod bounds;
+mod by_tag;
 pub mod checkpoint;
 mod dump;
 mod error;
@@ -13,6 +15,7 @@ mod forces;
 mod growing;
 pub mod integrator;
 mod output;
+mod reorder;
 mod restart;
 mod runner;
 mod simulation;

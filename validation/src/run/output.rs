@@ -3,7 +3,6 @@
 use super::dump::write_frame;
 use super::error::RunError;
 use super::growing::GrowingFile;
-use super::simulation::Simulation;
 use super::thermo::{Thermo, ThermoFile};
 use crate::observe::{Observation, write_csv, write_json};
 use crate::output::{About, Frame, remove_snapshots, write_xyz};
@@ -69,10 +68,10 @@ impl Output {
     }
 
     /// Writes a frame of the dump.
-    pub fn frame(&mut self, simulation: &Simulation) -> Result<(), RunError> {
+    pub fn frame(&mut self, frame: &Frame) -> Result<(), RunError> {
         match &mut self.dump {
             None => Ok(()),
-            Some(file) => file.attempt(|file| write_frame(simulation, file)),
+            Some(file) => file.attempt(|file| write_frame(frame, file)),
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::error::RunError;
 use super::state::State;
+use super::tags::order_of_tags;
 use crate::lammps::data::{Atom, DataFile};
 use nalgebra::{Matrix3, Vector3};
 use psidpd_core::engine::PeriodicBox;
@@ -12,6 +13,15 @@ impl State {
     /// The state as a data file of atom style `atomic`: types are species from 1; `title` becomes the
     /// first line.
     pub fn to_data(&self, title: &str) -> DataFile {
+        self.to_data_in(0..self.len(), title)
+    }
+
+    /// The same with the particles in the order of their tags.
+    pub fn to_data_by_tag(&self, title: &str) -> DataFile {
+        self.to_data_in(order_of_tags(&self.tag).into_iter(), title)
+    }
+
+    fn to_data_in(&self, order: impl Iterator<Item = usize> + Clone, title: &str) -> DataFile {
         let origin = self.domain.origin();
         let edges = [0, 1, 2].map(|k| self.domain.edge(k));
         let tilt = [edges[1][0], edges[2][0], edges[2][1]];
@@ -22,7 +32,8 @@ impl State {
             tilt: (tilt != [0.0; 3]).then_some(tilt),
             types: self.mass.len(),
             masses: self.mass.clone(),
-            atoms: (0..self.len())
+            atoms: order
+                .clone()
                 .map(|k| Atom {
                     id: self.tag[k] as u32,
                     kind: self.species[k] as u32 + 1,
@@ -30,7 +41,7 @@ impl State {
                     image: self.image[k],
                 })
                 .collect(),
-            velocities: Some(self.v.clone()),
+            velocities: Some(order.map(|k| self.v[k]).collect()),
         }
     }
 
@@ -98,10 +109,10 @@ impl State {
     }
 }
 
-/// Writes `state` as a data file, every number with the seventeen digits that bring it back unchanged.
+/// Writes `state` as a data file, by tags, every number with the seventeen digits that bring it back unchanged.
 ///
 /// # Errors
 /// The file cannot be written.
 pub fn write_data(path: &Path, title: &str, state: &State) -> Result<(), RunError> {
-    state.to_data(title).write(path).map_err(RunError::Lammps)
+    state.to_data_by_tag(title).write(path).map_err(RunError::Lammps)
 }

@@ -224,10 +224,11 @@ impl<'a> Runner<'a> {
     }
 }
 
-/// The simulation of a scene in the precision that its runs have.
+/// The simulation of a scene in the precision that its runs have, free to reorder particles.
 fn simulation(scene: &Scene, state: State) -> Result<Simulation, RunError> {
     let mut simulation = scene.simulation(state)?;
     simulation.set_settings(Settings { precision: scene.precision(), ..simulation.settings() })?;
+    simulation.set_reordering(true);
     Ok(simulation)
 }
 

@@ -1,12 +1,16 @@
-use super::body_force::BodyForce;
+use super::body_force::{self, BodyForce};
+use super::bounds::Bounds;
 use super::error::RunError;
 use super::forces::{Arrays, Forces};
-use super::integrator::{Before, Integrator, Motion};
+use super::integrator::{Before, Faults, Integrator, Motion, Surroundings};
+use super::reorder::{self, Reordering};
 use super::state::State;
 use super::tags::Tags;
-use super::walls::Walls;
-use psidpd_core::engine::{PassCounts, PeriodicBox, Plan, Precision, Settings, Step, Sweep, Tally, Want};
+use psidpd_core::engine::{
+    PassCounts, PeriodicBox, Plan, Pool, Precision, Settings, Step, Sweep, Tally, Want,
+};
 use psidpd_core::model::Model;
+use std::sync::OnceLock;
 
 /// Particles, their periodic images, and the forces of one fluid on them.
 ///
@@ -40,7 +44,9 @@ pub struct Simulation {
     forces: Forces,
     tally: Tally,
     before: Before,
-    walls: Walls,
+    bounds: Bounds,
+    /// `None` if particles stay in the order that they were given in.
+    reordering: Option<Reordering>,
     frozen_tags: Tags,
     /// By particle; empty if none is frozen.
     frozen: Vec<bool>,
@@ -48,6 +54,8 @@ pub struct Simulation {
     /// Sum of the forces on the frozen particles, in the last evaluation.
     support_force: [f64; 3],
     body_forces: Vec<BodyForce>,
+    /// `Σ m v v` of the present velocities, once somebody has asked for it.
+    flux: OnceLock<[f64; 6]>,
     /// Square of the longest way that a particle may go in one step.
     longest_move: f64,
 }
@@ -90,12 +98,14 @@ impl Simulation {
             forces,
             tally: Tally::default(),
             before: Before::default(),
-            walls: Walls::of(&domain, fluid.dimensions),
+            bounds: Bounds::of(&domain, fluid.dimensions),
+            reordering: None,
             frozen_tags: Tags::none(),
             frozen: Vec::new(),
             mobile: owned,
             support_force: [0.0; 3],
             body_forces: Vec::new(),
+            flux: OnceLock::new(),
             longest_move: domain.lengths().iter().map(|l| l * l).sum(),
             domain,
         })
@@ -132,6 +142,42 @@ impl Simulation {
         self.forces.settings()
     }
 
+    /// Whether particles are brought, at the end of some steps, into an order in which those near each other in
+    /// space are so in memory, which is faster in large systems: after that, what belongs to a particle is told
+    /// by its tag alone. Off unless told otherwise.
+    ///
+    /// The steps depend on their number only. Trajectories differ from those without by the rounding of sums.
+    pub fn set_reordering(&mut self, on: bool) {
+        self.reordering = on.then(Reordering::default);
+    }
+
+    /// Brings all arrays over particles into the order of the last sweep, if there was one.
+    fn reorder(&mut self) {
+        let Simulation {
+            reordering: Some(reordering), forces, x, v, force, species, tag, image, frozen, ..
+        } = self
+        else {
+            return;
+        };
+        let Some(order) = forces.order().filter(|order| order.len() == self.owned) else { return };
+        let pool = forces.pool();
+        reordering.vectors(pool, order, x);
+        reordering.vectors(pool, order, v);
+        reordering.vectors(pool, order, force);
+        let ordered = reordering.numbers(pool, order, |k| image[k]);
+        for (image, ordered) in image.iter_mut().zip(ordered) {
+            *image = ordered;
+        }
+        let rests = |k: usize| frozen.get(k).is_some_and(|frozen| *frozen);
+        let ordered = reordering.numbers(pool, order, |k| [tag[k], species[k], i32::from(rests(k))]);
+        for (k, [of_tag, of_species, rests]) in ordered.enumerate() {
+            (tag[k], species[k]) = (of_tag, of_species);
+            if let Some(frozen) = frozen.get_mut(k) {
+                *frozen = rests != 0;
+            }
+        }
+    }
+
     /// The fast engine, for what it can tell of itself.
     pub fn sweep(&self) -> &Sweep {
         self.forces.sweep()
@@ -154,6 +200,7 @@ impl Simulation {
         let frozen: Vec<bool> = self.tags().iter().map(|t| self.frozen_tags.contain(*t)).collect();
         let count = frozen.iter().filter(|f| **f).count();
         self.mobile = self.owned - count;
+        self.flux.take();
         self.frozen = if count > 0 { frozen } else { Vec::new() };
         for (v, _) in self.v.iter_mut().zip(&self.frozen).filter(|(_, frozen)| **frozen) {
             *v = [0.0; 3];
@@ -209,15 +256,12 @@ impl Simulation {
 
     /// Body forces; and none at all on what is frozen, so that every integrator leaves it alone.
     fn add_external_forces(&mut self) {
-        for body in &self.body_forces {
-            for k in 0..self.owned {
-                if body.acts_on(self.species[k], self.tag[k]) {
-                    let (mass, a) = (self.mass[self.species[k] as usize], body.at(&self.domain, self.x[k]));
-                    for c in 0..3 {
-                        self.force[k][c] += mass * a[c];
-                    }
-                }
-            }
+        if !self.body_forces.is_empty() {
+            let Simulation { body_forces, forces, domain, mass, x, species, tag, force, owned, .. } = self;
+            body_force::add(body_forces, forces.pool(), &mut force[..*owned], |body, k| {
+                let mass = mass[species[k] as usize];
+                body.acts_on(species[k], tag[k]).then(|| body.at(domain, x[k]).map(|a| mass * a))
+            });
         }
         self.support_force = [0.0; 3];
         for (force, _) in self.force.iter_mut().zip(&self.frozen).filter(|(_, frozen)| **frozen) {
@@ -258,48 +302,41 @@ impl Simulation {
             return Err(RunError::TimeStep(dt));
         }
         self.number += 1;
-        integrator.before_forces(self.motion(), dt);
-        self.check_velocities(Some(dt))?;
-        if self.walls.any() {
-            let walls = self.walls;
-            walls.reflect(&mut self.motion());
-            if let Some(k) = walls.escaped(self.positions()) {
-                let distance = self.v[k][0].hypot(self.v[k][1]).hypot(self.v[k][2]) * dt;
-                return Err(RunError::Runaway { step: self.number, tag: self.tag[k], distance });
-            }
-        }
-        for (x, image) in self.x[..self.owned].iter_mut().zip(&mut self.image) {
-            self.domain.wrap(x, image);
-        }
+        let limit = self.longest_move / (dt * dt);
+        let faults = self.split(|motion, (domain, bounds), pool| {
+            integrator.before_forces(motion, dt, Surroundings { domain, bounds, limit }, pool)
+        });
+        self.refuse(faults, Some(dt))?;
         let step = Step { seed: self.seed, number: self.number, dt };
         self.compute(want, self.thermostat.then_some(step))?;
         self.add_external_forces();
-        integrator.after_forces(self.motion(), dt);
-        self.check_velocities(None)
+        let faults = self.split(|motion, _, pool| integrator.after_forces(motion, dt, pool));
+        self.refuse(faults, None)?;
+        if reorder::is_due(self.number) {
+            self.reorder();
+        }
+        Ok(())
     }
 
-    fn motion(&mut self) -> Motion<'_> {
+    /// Calls `work` with what moves, what it moves in, and the threads.
+    fn split(&mut self, work: impl FnOnce(Motion, (&PeriodicBox, &Bounds), &Pool) -> Faults) -> Faults {
+        self.flux.take();
         let n = self.owned;
-        Motion {
+        let motion = Motion {
             x: &mut self.x[..n],
             v: &mut self.v[..n],
             f: &self.force[..n],
             species: &self.species[..n],
+            image: &mut self.image[..n],
             mass: &self.mass,
             before: &mut self.before,
-        }
+        };
+        work(motion, (&self.domain, &self.bounds), self.forces.pool())
     }
 
     /// Velocities must be finite, and within a step of `dt` lead nowhere beyond the box.
-    fn check_velocities(&self, dt: Option<f64>) -> Result<(), RunError> {
-        let limit = dt.map_or(f64::MAX, |dt| self.longest_move / (dt * dt));
-        let too_fast = |v: &[f64; 3]| {
-            let speed = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
-            speed.is_nan() || speed > limit
-        };
-        let Some(k) = self.v[..self.owned].iter().position(too_fast) else {
-            return Ok(());
-        };
+    fn refuse(&self, faults: Faults, dt: Option<f64>) -> Result<(), RunError> {
+        let Some(k) = faults.fast.or(faults.escaped) else { return Ok(()) };
         let (step, tag, v) = (self.number, self.tag[k], self.v[k]);
         let speed = v[0].hypot(v[1]).hypot(v[2]);
         match dt {
@@ -500,14 +537,16 @@ impl Simulation {
 
     /// `Σ m v v`, in the order xx, yy, zz, xy, xz, yz.
     fn momentum_flux(&self) -> [f64; 6] {
-        let mut sum = [0.0; 6];
-        for (v, s) in self.velocities().iter().zip(&self.species) {
-            let m = self.mass[*s as usize];
-            for (k, (a, b)) in [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)].into_iter().enumerate() {
-                sum[k] += m * v[a] * v[b];
+        *self.flux.get_or_init(|| {
+            let mut sum = [0.0; 6];
+            for (v, s) in self.velocities().iter().zip(&self.species) {
+                let m = self.mass[*s as usize];
+                for (k, (a, b)) in [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)].into_iter().enumerate() {
+                    sum[k] += m * v[a] * v[b];
+                }
             }
-        }
-        sum
+            sum
+        })
     }
 
     fn over_volume(&self, virial: [f64; 6]) -> [f64; 6] {

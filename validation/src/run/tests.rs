@@ -5,7 +5,9 @@ use psidpd_core::engine::Want;
 use psidpd_core::model::Model;
 use std::path::Path;
 
+mod order;
 mod resume;
+mod steps;
 
 const SET6: &str = include_str!("../../models/warren2003-set6.toml");
 

@@ -1,3 +1,4 @@
+use super::by_tag::ByTag;
 use super::checkpoint::{Checkpoint, CheckpointError, Position, Store};
 use super::error::RunError;
 use super::folder::Folder;
@@ -169,15 +170,24 @@ impl<'a> Run<'a> {
                     self.sums.add(thermo);
                 }
             }
-            if every(self.scene.output.dump, step) {
-                output.frame(&self.simulation)?;
-            }
-            let frame = Frame::of(&self.simulation, self.position.time);
-            if every(self.scene.output.xyz, step) {
-                output.xyz_frame(&frame)?;
-            }
-            if every(self.scene.output.snapshot, step) {
-                write_snapshot(self.folder.path(), &frame)?;
+            let due = &self.scene.output;
+            let [dump, xyz, snapshot] =
+                [due.dump, due.xyz, due.snapshot].map(|interval| every(interval, step));
+            if dump || xyz || snapshot {
+                let sorted = ByTag::of(&self.simulation);
+                let frame = match &sorted {
+                    Some(sorted) => sorted.frame(&self.simulation, self.position.time),
+                    None => Frame::of(&self.simulation, self.position.time),
+                };
+                if dump {
+                    output.frame(&frame)?;
+                }
+                if xyz {
+                    output.xyz_frame(&frame)?;
+                }
+                if snapshot {
+                    write_snapshot(self.folder.path(), &frame)?;
+                }
             }
         }
         if totals {

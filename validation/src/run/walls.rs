@@ -1,6 +1,5 @@
 //! Reflecting faces of a box.
 
-use super::integrator::Motion;
 use psidpd_core::engine::PeriodicBox;
 
 /// The faces of the directions that are not periodic: a particle beyond one is put as far inside as it was
@@ -26,31 +25,30 @@ impl Walls {
         self.faces.iter().any(Option::is_some)
     }
 
-    /// Reflects every particle that went through a face. What an integrator has kept of a particle's
-    /// velocity and force turns round with it: its step began on the other side of the mirror.
-    pub fn reflect(&self, motion: &mut Motion) {
+    /// Lower and upper face of each direction that reflects.
+    pub fn faces(&self) -> [Option<[f64; 2]>; 3] {
+        self.faces
+    }
+
+    /// Reflects a particle that went through a face, and calls `turn` with each direction that turns round. What
+    /// an integrator has kept of the particle's velocity and force must turn with its velocity: its step began
+    /// on the other side of the mirror.
+    pub fn reflect(&self, x: &mut [f64; 3], mut turn: impl FnMut(usize)) {
         for (k, [low, high]) in self.faces.iter().enumerate().filter_map(|(k, f)| Some((k, (*f)?))) {
-            for i in 0..motion.x.len() {
-                let x = &mut motion.x[i][k];
-                if *x < low {
-                    *x = low + (low - *x);
-                } else if *x > high {
-                    *x = high - (*x - high);
-                } else {
-                    continue;
-                }
-                motion.v[i][k] = -motion.v[i][k];
-                motion.before.turn(i, k);
+            if x[k] < low {
+                x[k] = low + (low - x[k]);
+            } else if x[k] > high {
+                x[k] = high - (x[k] - high);
+            } else {
+                continue;
             }
+            turn(k);
         }
     }
 
-    /// The first particle that is outside all the same: it went further than across the box.
-    pub fn escaped(&self, x: &[[f64; 3]]) -> Option<usize> {
-        let outside = |x: &[f64; 3]| {
-            (0..3).any(|k| self.faces[k].is_some_and(|[low, high]| !(low..=high).contains(&x[k])))
-        };
-        x.iter().position(outside)
+    /// Whether a particle is outside all the same: it went further than across the box.
+    pub fn has_escaped(&self, x: &[f64; 3]) -> bool {
+        (0..3).any(|k| self.faces[k].is_some_and(|[low, high]| !(low..=high).contains(&x[k])))
     }
 }
 

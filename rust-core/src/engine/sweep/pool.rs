@@ -1,3 +1,4 @@
+use super::layer::Shared as Pointer;
 use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex};
@@ -80,6 +81,23 @@ impl Pool {
         work(0);
         drop(wait);
         assert!(!self.shared.failed.load(Ordering::Relaxed), "a worker thread panicked");
+    }
+
+    /// Calls `work` once with each of `things`, which are shared among the threads; one alone is done here.
+    ///
+    /// # Panics
+    /// If `work` panics on any thread.
+    pub fn each<T: Send>(&self, things: &mut [T], work: impl Fn(&mut T) + Sync) {
+        if let [thing] = things {
+            return work(thing);
+        }
+        let (count, threads, first) = (things.len(), self.threads(), Pointer(things.as_mut_ptr()));
+        self.run(&|t| {
+            for k in part(count, t, threads) {
+                // SAFETY: in the slice, and in the part of this thread alone.
+                work(unsafe { &mut *first.at(k) });
+            }
+        });
     }
 }
 
@@ -170,6 +188,18 @@ mod tests {
                 if round % 50 == 0 {
                     thread::sleep(std::time::Duration::from_millis(2));
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn each_thing_is_done_once() {
+        for threads in 1..5 {
+            let pool = Pool::new(NonZeroUsize::new(threads).unwrap());
+            for count in [0, 1, 2, 7] {
+                let mut things = vec![1; count];
+                pool.each(&mut things, |thing| *thing += 1);
+                assert!(things.iter().all(|thing| *thing == 2));
             }
         }
     }

@@ -3,7 +3,12 @@
 //! depends on it.
 
 mod groot_warren;
+mod parts;
 mod velocity_verlet;
+
+pub(super) use parts::{Faults, Surroundings};
+
+use psidpd_core::engine::Pool;
 
 /// How a step is made.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -30,43 +35,58 @@ pub(super) struct Motion<'a> {
     pub v: &'a mut [[f64; 3]],
     pub f: &'a [[f64; 3]],
     pub species: &'a [i32],
+    pub image: &'a mut [[i32; 3]],
     pub mass: &'a [f64],
-    /// Velocities and forces of the step before, for integrators that need them again.
     pub before: &'a mut Before,
 }
 
 /// What an integrator keeps over the evaluation of the forces.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Before {
-    pub v: Vec<[f64; 3]>,
-    pub f: Vec<[f64; 3]>,
+    /// Velocities and forces of the step before, for integrators that need them again.
+    v: Vec<[f64; 3]>,
+    f: Vec<[f64; 3]>,
+    /// Whether the integrator of the present step does.
+    in_use: bool,
+    /// A number by species.
+    over_mass: Vec<f64>,
 }
 
-impl Before {
-    /// Turns round the component `k` of what is kept of particle `i`, which a wall has reflected.
-    pub fn turn(&mut self, i: usize, k: usize) {
-        for kept in [&mut self.v, &mut self.f] {
-            if let Some(vector) = kept.get_mut(i) {
-                vector[k] = -vector[k];
-            }
-        }
+impl Motion<'_> {
+    /// Makes room for velocities and forces of before.
+    fn keep(&mut self) {
+        self.before.in_use = true;
+        self.before.v.resize(self.x.len(), [0.0; 3]);
+        self.before.f.resize(self.x.len(), [0.0; 3]);
+    }
+
+    fn keep_nothing(&mut self) {
+        self.before.in_use = false;
+    }
+
+    /// Computes a number of the mass of each species: a division for each, not for each particle.
+    fn over_mass(&mut self, number: impl Fn(f64) -> f64) {
+        self.before.over_mass.clear();
+        self.before.over_mass.extend(self.mass.iter().map(|mass| number(*mass)));
     }
 }
 
 impl Integrator {
-    /// From the end of one step to the point where the next needs its forces.
-    pub(super) fn before_forces(self, motion: Motion, dt: f64) {
+    /// From the end of one step to the point where the next needs its forces, with every particle in the box.
+    pub(super) fn before_forces(self, motion: Motion, dt: f64, around: Surroundings, pool: &Pool) -> Faults {
         match self {
-            Integrator::VelocityVerlet => velocity_verlet::before_forces(motion, dt),
-            Integrator::GrootWarren { lambda } => groot_warren::before_forces(motion, dt, lambda),
+            Integrator::VelocityVerlet => velocity_verlet::before_forces(motion, dt, around, pool),
+            Integrator::GrootWarren { lambda } => {
+                groot_warren::before_forces(motion, dt, lambda, around, pool)
+            }
         }
     }
 
     /// From there to the end of the step.
-    pub(super) fn after_forces(self, motion: Motion, dt: f64) {
+    pub(super) fn after_forces(self, motion: Motion, dt: f64, pool: &Pool) -> Faults {
         match self {
-            Integrator::VelocityVerlet => velocity_verlet::after_forces(motion, dt),
-            Integrator::GrootWarren { .. } => groot_warren::after_forces(motion, dt),
+            Integrator::VelocityVerlet => velocity_verlet::after_forces(motion, dt, pool),
+            Integrator::GrootWarren { .. } => groot_warren::after_forces(motion, dt, pool),
         }
     }
 }

@@ -365,7 +365,7 @@ fn a_blow_up_leaves_a_checkpoint() {
     let RunError::Stopped { good: 25, saved, checkpoint: true, .. } = &error else { panic!("{error}") };
     let data = crate::lammps::DataFile::read(saved).unwrap();
     let state = read_state(&folder.path().join("checkpoint")).unwrap();
-    assert_eq!(state.to_data(&data.title), data);
+    assert_eq!(state.to_data_by_tag(&data.title), data);
     let again = until(&scene, folder.path(), Begin::Resume, u64::MAX).unwrap_err();
     assert_eq!(again.to_string(), error.to_string());
     // With a smaller step it goes on.

@@ -1,0 +1,322 @@
+//! Loops over particles, each thread its part of them: a particle's coordinates depend on nothing but its own
+//! arrays, so that the results are the same for any number of parts.
+
+use super::Motion;
+use crate::run::bounds::Bounds;
+use psidpd_core::engine::{PeriodicBox, Pool, part};
+
+/// Particles whose coordinates are done together, in whole vectors.
+const GROUP: usize = 4;
+/// Their coordinates.
+const LANES: usize = 3 * GROUP;
+/// Coordinates of a vector.
+const WIDTH: usize = 4;
+
+/// Particles that are worth the call of a thread.
+const WORTH: usize = 1024;
+
+/// Velocities whose squares are no infinities, for certain.
+const FINITE: f64 = 1e150;
+
+/// What a particle that has moved may meet.
+#[derive(Debug, Clone, Copy)]
+pub struct Surroundings<'a> {
+    pub domain: &'a PeriodicBox,
+    pub bounds: &'a Bounds,
+    /// The square of the highest velocity that leads nowhere beyond the box.
+    pub limit: f64,
+}
+
+/// The first particles that went too far, by what is wrong with them.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Faults {
+    /// Its velocity is too high, or no number.
+    pub fast: Option<usize>,
+    /// No wall has kept it in.
+    pub escaped: Option<usize>,
+}
+
+/// The particles of one thread.
+pub struct Part<'a> {
+    /// The number of the first.
+    first: usize,
+    pub x: &'a mut [[f64; 3]],
+    pub v: &'a mut [[f64; 3]],
+    pub f: &'a [[f64; 3]],
+    species: &'a [i32],
+    image: &'a mut [[i32; 3]],
+    /// Empty for integrators that keep nothing.
+    pub kept: [&'a mut [[f64; 3]]; 2],
+    faults: Faults,
+}
+
+/// Does `work` with all particles of `motion`.
+pub fn share<'a>(motion: Motion<'a>, pool: &Pool, work: impl Fn(&mut Part, &[f64]) + Sync) -> Faults {
+    let Motion { mut x, mut v, mut f, mut species, mut image, before, .. } = motion;
+    let (kept_v, kept_f) = (&mut before.v[..], &mut before.f[..]);
+    let [mut kept_v, mut kept_f] = if before.in_use { [kept_v, kept_f] } else { Default::default() };
+    let count = x.len();
+    let parts = pool.threads().min(count / WORTH).max(1);
+    let mut shares = Vec::with_capacity(parts);
+    for number in 0..parts {
+        let range = part(count, number, parts);
+        let length = range.len();
+        let of_kept = length.min(kept_v.len());
+        shares.push(Part {
+            first: range.start,
+            x: x.split_off_mut(..length).unwrap_or_default(),
+            v: v.split_off_mut(..length).unwrap_or_default(),
+            f: f.split_off(..length).unwrap_or_default(),
+            species: species.split_off(..length).unwrap_or_default(),
+            image: image.split_off_mut(..length).unwrap_or_default(),
+            kept: [
+                kept_v.split_off_mut(..of_kept).unwrap_or_default(),
+                kept_f.split_off_mut(..of_kept).unwrap_or_default(),
+            ],
+            faults: Faults::default(),
+        });
+    }
+    let over_mass = &before.over_mass[..];
+    pool.each(&mut shares, |share| work(share, over_mass));
+    // Parts are in the order of particles: the first fault is that of the first part which has one.
+    let mut faults = Faults::default();
+    for share in &shares {
+        faults.fast = faults.fast.or(share.faults.fast);
+        faults.escaped = faults.escaped.or(share.faults.escaped);
+    }
+    faults
+}
+
+/// Moves particles by `rule`, which makes position and velocity of position, velocity, force, and a number of
+/// the species; then reflects and wraps those that left the bounds.
+pub fn drift<R>(part: &mut Part, over_mass: &[f64], around: Surroundings, rule: R)
+where
+    R: Fn(f64, f64, f64, f64) -> (f64, f64),
+{
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") {
+        // SAFETY: the processor has AVX2.
+        return unsafe { drift_avx2(part, over_mass, around, rule) };
+    }
+    drift_portably(part, over_mass, around, rule);
+}
+
+/// Changes velocities by `rule`, which makes one of velocity, force, kept velocity, kept force, and a number of
+/// the species.
+pub fn kick<const KEEPS: bool, R>(part: &mut Part, over_mass: &[f64], rule: R)
+where
+    R: Fn(f64, f64, [f64; 2], f64) -> f64,
+{
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") {
+        // SAFETY: the processor has AVX2.
+        return unsafe { kick_avx2::<KEEPS, R>(part, over_mass, rule) };
+    }
+    kick_portably::<KEEPS, R>(part, over_mass, rule);
+}
+
+/// The same operations, four at a time; nothing is contracted, so the bits are the same.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn drift_avx2<R>(part: &mut Part, over_mass: &[f64], around: Surroundings, rule: R)
+where
+    R: Fn(f64, f64, f64, f64) -> (f64, f64),
+{
+    drift_portably(part, over_mass, around, rule);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn kick_avx2<const KEEPS: bool, R>(part: &mut Part, over_mass: &[f64], rule: R)
+where
+    R: Fn(f64, f64, [f64; 2], f64) -> f64,
+{
+    kick_portably::<KEEPS, R>(part, over_mass, rule);
+}
+
+#[inline(always)]
+fn drift_portably<R>(part: &mut Part, over_mass: &[f64], around: Surroundings, rule: R)
+where
+    R: Fn(f64, f64, f64, f64) -> (f64, f64),
+{
+    match over_mass {
+        [_] => drift_in_groups::<true, R>(part, over_mass, around, rule),
+        _ => drift_in_groups::<false, R>(part, over_mass, around, rule),
+    }
+}
+
+#[inline(always)]
+fn kick_portably<const KEEPS: bool, R>(part: &mut Part, over_mass: &[f64], rule: R)
+where
+    R: Fn(f64, f64, [f64; 2], f64) -> f64,
+{
+    match over_mass {
+        [_] => kick_in_groups::<KEEPS, true, R>(part, over_mass, rule),
+        _ => kick_in_groups::<KEEPS, false, R>(part, over_mass, rule),
+    }
+}
+
+/// A number of each species for each coordinate of a group.
+#[inline(always)]
+fn spread(over_mass: &[f64], species: &[i32; GROUP]) -> [f64; LANES] {
+    let mut lanes = [0.0; LANES];
+    for k in 0..GROUP {
+        lanes[3 * k..3 * k + 3].fill(over_mass[species[k] as usize]);
+    }
+    lanes
+}
+
+#[inline(always)]
+fn drift_in_groups<const ONE: bool, R>(part: &mut Part, over_mass: &[f64], around: Surroundings, rule: R)
+where
+    R: Fn(f64, f64, f64, f64) -> (f64, f64),
+{
+    let Bounds { low, high, .. } = around.bounds;
+    let (low, high): ([f64; LANES], [f64; LANES]) =
+        (std::array::from_fn(|c| low[c % 3]), std::array::from_fn(|c| high[c % 3]));
+    // Faster than this is one component of whatever is too fast.
+    let most = (around.limit / 3.0).sqrt() * (1.0 - 1e-9);
+    let one = [over_mass[0]; LANES];
+    let (x, x_rest) = part.x.as_chunks_mut::<GROUP>();
+    let (v, v_rest) = part.v.as_chunks_mut::<GROUP>();
+    let (f, f_rest) = part.f.as_chunks::<GROUP>();
+    let (species, species_rest) = part.species.as_chunks::<GROUP>();
+    let (image, image_rest) = part.image.as_chunks_mut::<GROUP>();
+    for (g, ((((x, v), f), species), image)) in x.iter_mut().zip(v).zip(f).zip(species).zip(image).enumerate()
+    {
+        let m = if ONE { one } else { spread(over_mass, species) };
+        let (mut to_x, mut to_v) = ([0.0; LANES], [0.0; LANES]);
+        let (from_x, from_v, f): ([f64; LANES], [f64; LANES], [f64; LANES]) = (lanes(x), lanes(v), lanes(f));
+        for c in 0..LANES {
+            (to_x[c], to_v[c]) = rule(from_x[c], from_v[c], f[c], m[c]);
+        }
+        // As many at a time as a vector has.
+        let mut out = [0; WIDTH];
+        for from in (0..LANES).step_by(WIDTH) {
+            for c in 0..WIDTH {
+                let (x, v) = (to_x[from + c], to_v[from + c]);
+                let inside = (x >= low[from + c]) & (x <= high[from + c]) & (v.abs() <= most);
+                out[c] |= u64::from(!inside);
+            }
+        }
+        x.as_flattened_mut().copy_from_slice(&to_x);
+        v.as_flattened_mut().copy_from_slice(&to_v);
+        if out != [0; WIDTH] {
+            let from = GROUP * g;
+            settle(&around, part.first, from, x, v, image, &mut part.kept, &mut part.faults);
+        }
+    }
+    let from = part.species.len() - species_rest.len();
+    for (((x, v), f), s) in x_rest.iter_mut().zip(&mut *v_rest).zip(f_rest).zip(species_rest) {
+        for c in 0..3 {
+            (x[c], v[c]) = rule(x[c], v[c], f[c], over_mass[*s as usize]);
+        }
+    }
+    settle(&around, part.first, from, x_rest, v_rest, image_rest, &mut part.kept, &mut part.faults);
+}
+
+/// Looks at particles one by one, and puts those that are outside inside.
+#[cold]
+#[inline(never)]
+#[expect(clippy::too_many_arguments)]
+fn settle(
+    around: &Surroundings,
+    first: usize,
+    from: usize,
+    x: &mut [[f64; 3]],
+    v: &mut [[f64; 3]],
+    image: &mut [[i32; 3]],
+    kept: &mut [&mut [[f64; 3]]; 2],
+    faults: &mut Faults,
+) {
+    let walls = &around.bounds.walls;
+    for (k, ((x, v), image)) in x.iter_mut().zip(v).zip(image).enumerate() {
+        if is_too_fast(v, around.limit) {
+            faults.fast.get_or_insert(first + from + k);
+            continue;
+        }
+        if walls.any() {
+            walls.reflect(x, |c| {
+                v[c] = -v[c];
+                for kept in &mut *kept {
+                    if let Some(kept) = kept.get_mut(from + k) {
+                        kept[c] = -kept[c];
+                    }
+                }
+            });
+            if walls.has_escaped(x) {
+                faults.escaped.get_or_insert(first + from + k);
+                continue;
+            }
+        }
+        around.domain.wrap(x, image);
+    }
+}
+
+#[inline(always)]
+fn kick_in_groups<const KEEPS: bool, const ONE: bool, R>(part: &mut Part, over_mass: &[f64], rule: R)
+where
+    R: Fn(f64, f64, [f64; 2], f64) -> f64,
+{
+    let one = [over_mass[0]; LANES];
+    let mut out = false;
+    let (v, v_rest) = part.v.as_chunks_mut::<GROUP>();
+    let (f, f_rest) = part.f.as_chunks::<GROUP>();
+    let (species, species_rest) = part.species.as_chunks::<GROUP>();
+    let [kept_v, kept_f] = &part.kept;
+    for (g, ((v, f), species)) in v.iter_mut().zip(f).zip(species).enumerate() {
+        let m = if ONE { one } else { spread(over_mass, species) };
+        let [old_v, old_f] = match KEEPS {
+            true => [group(kept_v, g), group(kept_f, g)],
+            false => [[0.0; LANES]; 2],
+        };
+        let (from, f) = (lanes(v), lanes(f));
+        let mut to = [0.0; LANES];
+        for c in 0..LANES {
+            to[c] = rule(from[c], f[c], [old_v[c], old_f[c]], m[c]);
+        }
+        let mut lost = [0; WIDTH];
+        for from in (0..LANES).step_by(WIDTH) {
+            for c in 0..WIDTH {
+                let finite = to[from + c].abs() <= FINITE;
+                lost[c] |= u64::from(!finite);
+            }
+        }
+        out |= lost != [0; WIDTH];
+        v.as_flattened_mut().copy_from_slice(&to);
+    }
+    let from = part.species.len() - species_rest.len();
+    for (k, ((v, f), s)) in v_rest.iter_mut().zip(f_rest).zip(species_rest).enumerate() {
+        for c in 0..3 {
+            let old = if KEEPS { [kept_v[from + k][c], kept_f[from + k][c]] } else { [0.0; 2] };
+            v[c] = rule(v[c], f[c], old, over_mass[*s as usize]);
+            let finite = v[c].abs() <= FINITE;
+            out |= !finite;
+        }
+    }
+    if out {
+        let first = part.first;
+        part.faults.fast = part.v.iter().position(|v| is_too_fast(v, f64::MAX)).map(|k| first + k);
+    }
+}
+
+/// The coordinates of a group, one after the other.
+#[inline(always)]
+fn lanes(vectors: &[[f64; 3]; GROUP]) -> [f64; LANES] {
+    let mut lanes = [0.0; LANES];
+    lanes.copy_from_slice(vectors.as_flattened());
+    lanes
+}
+
+#[inline(always)]
+fn group(vectors: &[[f64; 3]], g: usize) -> [f64; LANES] {
+    let mut lanes = [0.0; LANES];
+    lanes.copy_from_slice(vectors[GROUP * g..GROUP * (g + 1)].as_flattened());
+    lanes
+}
+
+/// Whether the square of a velocity is above `limit`, or no number.
+fn is_too_fast(v: &[f64; 3], limit: f64) -> bool {
+    let speed = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+    speed.is_nan() || speed > limit
+}

@@ -1,0 +1,163 @@
+//! What the order of particles in memory, and the number of threads that share them, may not change.
+
+use super::*;
+use psidpd_core::engine::{Precision, Settings};
+use std::num::NonZeroUsize;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Two species of different mass in a box with walls and a frozen floor, enough for several threads.
+const CROWD: &str = "title = \"crowd\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7\ndensity = 4\n\
+    [box]\nlengths = [9.0, 9.0, 12.0]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]\n\
+    [masses]\nB = 3.0\n\
+    [[part]]\nshape = \"layer\"\nface = \"zlo\"\nthickness = 0.8\nlattice = \"fcc\"\nfrozen = true\n\
+    [[part]]\nshape = \"rest\"\n\
+    [[body_force]]\nacceleration = [0.1, 0.0, -0.2]\n\
+    [[stage]]\nname = \"a\"\nsteps = 35\nintegrator = \"groot-warren\"\n\
+    [[stage]]\nname = \"b\"\nsteps = 3\n\
+    [output]\nthermo = 3\ndump = 19\n";
+
+fn crowd() -> Scene {
+    let folder = tempfile::tempdir().unwrap();
+    let model = IDEAL.replace("[\"A\"]", "[\"A\", \"B\"]");
+    std::fs::write(folder.path().join("m.toml"), model).unwrap();
+    Scene::parse("s.toml", CROWD, folder.path()).unwrap()
+}
+
+/// Everything over particles by tag, as bits.
+fn by_tag(run: &Simulation) -> Vec<(i32, [u64; 9], [i32; 4], bool)> {
+    let mut all: Vec<_> = (0..run.len())
+        .map(|k| {
+            let vectors = [run.positions()[k], run.velocities()[k], run.forces()[k]];
+            let bits = std::array::from_fn(|c| vectors[c / 3][c % 3].to_bits());
+            let [a, b, c] = run.image_flags()[k];
+            let frozen = run.frozen().get(k).is_some_and(|frozen| *frozen);
+            (run.tags()[k], bits, [a, b, c, run.species()[k]], frozen)
+        })
+        .collect();
+    all.sort_unstable_by_key(|p| p.0);
+    all
+}
+
+fn threads(number: usize) -> NonZeroUsize {
+    NonZeroUsize::new(number).unwrap()
+}
+
+#[test]
+fn whole_runs_have_the_same_bytes_on_any_number_of_threads() {
+    let scene = crowd();
+    let folder = tempfile::tempdir().unwrap();
+    let [one, two, five] = [1, 2, 5].map(|number| {
+        let out = folder.path().join(format!("{number}"));
+        let mut runner = Runner::begin(&scene, &out, Begin::New).unwrap();
+        assert!(runner.particles() > 3 * 1024);
+        runner.set_threads(threads(number)).unwrap();
+        runner.run(&AtomicUsize::new(0), &mut |_| ()).unwrap();
+        let checkpoint = std::fs::read(out.join("checkpoint")).unwrap();
+        (files(&out), checkpoint)
+    });
+    assert!(one == two && one == five);
+    // Files have particles by tag, whatever the order in memory.
+    let dump = String::from_utf8(one.0[1].clone()).unwrap();
+    for frame in dump.split("vz\n").skip(1) {
+        let ids: Vec<u32> = frame.lines().map_while(|l| l.split(' ').next()?.parse().ok()).collect();
+        assert!(ids.iter().copied().eq(1..=ids.len() as u32) && ids.len() > 3 * 1024);
+    }
+    let state = checkpoint::read_state(&folder.path().join("1")).unwrap();
+    assert!(!state.tag.is_sorted());
+    let data = state.to_data_by_tag("t");
+    assert!(data.atoms.iter().map(|a| a.id).eq(1..=state.len() as u32));
+    let velocities = data.velocities.unwrap();
+    assert!((0..state.len()).all(|k| velocities[state.tag[k] as usize - 1] == state.v[k]));
+}
+
+/// Reordering moves every number of a particle to the same place, and changes none.
+#[test]
+fn reordering_keeps_particles_whole() {
+    let scene = crowd();
+    for integrator in [Integrator::VelocityVerlet, Integrator::GrootWarren { lambda: 0.65 }] {
+        let [kept, moved] = [false, true].map(|on| {
+            let mut run = scene.simulation(scene.initial_state()).unwrap();
+            run.set_reordering(on);
+            run.set_settings(Settings { threads: threads(3), ..run.settings() }).unwrap();
+            run.prepare(0.01, Want::FORCES).unwrap();
+            run.step(0.01, integrator, Want::FORCES).unwrap();
+            run
+        });
+        assert!(kept.tags().is_sorted() && !moved.tags().is_sorted());
+        assert!(by_tag(&kept) == by_tag(&moved));
+        assert!(kept.frozen().iter().any(|f| *f));
+        // Later ones differ by rounding.
+        let [mut kept, mut moved] = [kept, moved];
+        for run in [&mut kept, &mut moved] {
+            for _ in 0..35 {
+                run.step(0.01, integrator, Want::FORCES).unwrap();
+            }
+        }
+        let d = difference(&kept, &moved);
+        assert!(d < 1e-10, "{d}");
+        let flags = |run: &Simulation| by_tag(run).iter().map(|p| (p.2, p.3)).collect::<Vec<_>>();
+        assert!(flags(&kept) == flags(&moved));
+        assert!(kept.image_flags().iter().flatten().any(|i| *i != 0));
+    }
+}
+
+#[test]
+fn reordering_keeps_the_physics() {
+    let start = settled();
+    for precision in [Precision::Double, Precision::Mixed] {
+        let [kept, moved] = [false, true].map(|on| {
+            let mut run = simulation(SET6, start.clone());
+            run.set_settings(Settings { precision, ..run.settings() }).unwrap();
+            run.set_reordering(on);
+            run.prepare(0.01, Want::TOTALS).unwrap();
+            for _ in 0..40 {
+                run.step(0.01, Integrator::VelocityVerlet, Want::TOTALS).unwrap();
+            }
+            run
+        });
+        assert!(!moved.tags().is_sorted());
+        // Rounding of single precision, relative to forces of order 10², grows along with the steps.
+        let tolerance = if precision == Precision::Double { 1e-9 } else { 1e-3 };
+        let d = difference(&kept, &moved);
+        assert!(d < tolerance, "{d}");
+        let energies = [
+            kept.potential_energy() - moved.potential_energy(),
+            kept.kinetic_energy() - moved.kinetic_energy(),
+        ];
+        assert!(energies.iter().all(|d| d.abs() < tolerance * kept.len() as f64), "{energies:?}");
+    }
+}
+
+/// Where nothing is swept there is no order to take: in a box that is too narrow, for all densities.
+#[test]
+fn the_plain_engine_leaves_the_order_alone() {
+    let mut run = simulation(SET6, settled());
+    run.set_reordering(true);
+    run.sum_all_densities(true);
+    advance(&mut run, 3, 0.01, Integrator::VelocityVerlet);
+    assert!(run.tags().is_sorted());
+}
+
+/// Stopped before, at and between steps with a reordering, a run ends in the same bytes.
+#[test]
+fn a_run_goes_on_between_reorderings() {
+    let scene = crowd();
+    let folder = tempfile::tempdir().unwrap();
+    let whole = folder.path().join("whole");
+    run_scene(&scene, &whole, &mut |_| ()).unwrap();
+    let all = |out: &Path| (files(out), std::fs::read(out.join("checkpoint")).unwrap());
+    for at in [1, 20, 32, 33, 34] {
+        let out = folder.path().join(format!("{at}"));
+        let stop = AtomicUsize::new(0);
+        let outcome = Runner::begin(&scene, &out, Begin::New).unwrap().run(&stop, &mut |p| {
+            if p.step == at {
+                stop.store(15, Ordering::Relaxed);
+            }
+        });
+        assert!(matches!(outcome, Ok(Outcome::Interrupted { step, .. }) if step == at), "{outcome:?}");
+        let mut runner = Runner::begin(&scene, &out, Begin::Resume).unwrap();
+        runner.set_threads(threads(2)).unwrap();
+        runner.run(&AtomicUsize::new(0), &mut |_| ()).unwrap();
+        assert!(all(&out) == all(&whole), "{at}");
+    }
+}

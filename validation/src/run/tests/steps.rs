@@ -1,0 +1,64 @@
+//! A step is what its formulas say, to the last bit, one particle after the other.
+
+use super::*;
+use nalgebra::Matrix3;
+use psidpd_core::engine::PeriodicBox;
+
+/// A fluid of two masses, in a number of particles that is no multiple of four.
+fn start(masses: [f64; 2], edges: Matrix3<f64>) -> (Model, State) {
+    let two = IDEAL.replace("[\"A\"]", "[\"A\", \"B\"]");
+    let model = Model::parse("m.toml", if masses[0] == masses[1] { SET6 } else { &two }).unwrap();
+    assert_eq!(model.species().len(), if masses[0] == masses[1] { 1 } else { 2 });
+    let mut state = settled();
+    assert_eq!(state.len() % 4, 3);
+    if model.species().len() == 2 {
+        state.mass = masses.to_vec();
+        state.species = (0..state.len()).map(|k| i32::from(k % 3 == 1)).collect();
+    }
+    state.domain = PeriodicBox::new([0.0; 3], edges, [true; 3]).unwrap();
+    (model, state)
+}
+
+#[test]
+fn steps_are_their_formulas() {
+    let dt = 0.01;
+    let straight = Matrix3::from_diagonal_element(4.0);
+    let leaning = Matrix3::new(4.0, 0.3, 0.0, 0.0, 4.0, -0.2, 0.0, 0.0, 4.0);
+    for (masses, edges) in [([1.0, 1.0], straight), ([1.0, 1.0], leaning), ([1.0, 2.5], straight)] {
+        let (model, state) = start(masses, edges);
+        for integrator in [Integrator::VelocityVerlet, Integrator::GrootWarren { lambda: 0.65 }] {
+            let mut run = Simulation::new(&model, 1.0, state.clone(), 7).unwrap();
+            run.prepare(dt, Want::FORCES).unwrap();
+            let mut wrapped = 0;
+            for _ in 0..20 {
+                let (before, f) = (run.state(), run.forces().to_vec());
+                run.step(dt, integrator, Want::FORCES).unwrap();
+                for k in 0..run.len() {
+                    let (mut x, mut image, mut v) = (before.x[k], before.image[k], before.v[k]);
+                    let (mass, new) = (before.mass[before.species[k] as usize], run.forces()[k]);
+                    for c in 0..3 {
+                        match integrator {
+                            Integrator::VelocityVerlet => {
+                                v[c] += 0.5 * dt / mass * f[k][c];
+                                x[c] += dt * v[c];
+                                v[c] += 0.5 * dt / mass * new[c];
+                            }
+                            Integrator::GrootWarren { .. } => {
+                                let over_mass = dt / mass;
+                                x[c] += dt * (v[c] + 0.5 * over_mass * f[k][c]);
+                                v[c] += 0.5 * dt / mass * (f[k][c] + new[c]);
+                            }
+                        }
+                    }
+                    run.domain().wrap(&mut x, &mut image);
+                    wrapped += usize::from(image != before.image[k]);
+                    assert_eq!(
+                        (x, v, image),
+                        (run.positions()[k], run.velocities()[k], run.image_flags()[k])
+                    );
+                }
+            }
+            assert!(wrapped > 20, "{wrapped}");
+        }
+    }
+}
