@@ -38,7 +38,7 @@ impl Frame {
         Some(frame)
     }
 
-    /// Open space around points: `low` and `high` are their extremes.
+    /// Open space around points of which `low` and `high` are the extremes, and what is within reach of them.
     pub fn around(low: [f64; 3], high: [f64; 3], dimensions: usize, cutoff: f64) -> Frame {
         let mut frame =
             Frame { dimensions, origin: low, length: [1.0; 3], tilt: [0.0; 3], periodic: [false; 3] };
@@ -57,6 +57,12 @@ impl Frame {
                 self.length[c] = ((high[c] - low[c]) * (1.0 + 1e-9)).max(4.0 * cutoff);
             }
         }
+    }
+
+    /// Whether a point is within a frame without periods.
+    #[inline(always)]
+    pub fn has(&self, x: &[f64; 3]) -> bool {
+        (0..self.dimensions).all(|c| (0.0..=self.length[c]).contains(&(x[c] - self.origin[c])))
     }
 
     pub fn is_tilted(&self) -> bool {

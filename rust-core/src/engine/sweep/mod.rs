@@ -363,6 +363,7 @@ fn first<P: compiled::Compiled>(
     let frame = match space {
         Space::Open => {
             let (low, high) = machine.extremes(pool, given)?;
+            let (low, high) = (low.map(|x| x - cutoff), high.map(|x| x + cutoff));
             Some(Frame::around(low, high, plan.dimensions, cutoff))
         }
         Space::Box(domain) => match Frame::of_box(domain, plan.dimensions) {

@@ -12,7 +12,7 @@ use crate::engine::sweep::quantum::Quantum;
 use crate::engine::tally::Tally;
 
 impl<P: Compiled> Machine<P> {
-    /// The extremes of the positions.
+    /// The extremes of the positions of owned particles.
     pub fn extremes(&mut self, pool: &Pool, given: &Given) -> Result<([f64; 3], [f64; 3]), EngineError> {
         let threads = pool.threads();
         let scratch = Shared(self.scratch.as_mut_ptr());
@@ -21,7 +21,7 @@ impl<P: Compiled> Machine<P> {
             let scratch = unsafe { &mut *scratch.at(t) };
             let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
             scratch.fault = None;
-            for k in part(given.particles.x.len(), t, threads) {
+            for k in part(given.particles.owned, t, threads) {
                 let x = &given.particles.x[k];
                 let sum = x[0].abs() + x[1].abs() + x[2].abs();
                 if sum.is_nan() || sum > 1e100 {
@@ -105,6 +105,12 @@ impl<P: Compiled> Machine<P> {
                     if !known || !(fine || is_fine(frame, &inverse, &given.particles.x[k])) {
                         scratch.fault = Some(fault_of(given, k));
                         return;
+                    }
+                    // Ghosts out of reach of all that are owned.
+                    if k >= given.particles.owned && !frame.has(&given.particles.x[k]) {
+                        // SAFETY: as above.
+                        unsafe { *cell.at(k) = NOWHERE };
+                        continue;
                     }
                     let to = grid.cell(*u);
                     // SAFETY: cells are of the grid; the rest is of this thread's part.
