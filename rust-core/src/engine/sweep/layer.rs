@@ -44,7 +44,7 @@ pub struct Swept<'a, T, R> {
     pub owned_of_row: &'a [[u32; 2]],
     pub terms: &'a Terms<T>,
     /// The many-body slopes, a number for each pass and species.
-    pub slopes: &'a [f64],
+    pub slopes: Shared<f64>,
     /// What to add to the number of a particle to get that of its accumulator, for each layer.
     pub offset: &'a [isize],
     /// Four numbers for each accumulator: force, and the density if there is one variable.

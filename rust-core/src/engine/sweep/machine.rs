@@ -3,6 +3,7 @@
 mod excess;
 mod host;
 mod sort;
+mod stream;
 
 use super::block::Block;
 use super::compiled::{Compiled, Passes};
@@ -66,6 +67,25 @@ pub struct Machine<P: Compiled> {
     thermostat: Option<(PairNoise, f64)>,
     totals: bool,
 }
+
+/// Where threads write, each its own part.
+struct Arrays<P: Compiled> {
+    sums: Shared<Sum>,
+    densities: Shared<f64>,
+    rows: Shared<f64>,
+    excess: Shared<f64>,
+    slopes: Shared<f64>,
+    near: Shared<NearPairs<P::Scalar>>,
+    tallies: Shared<Tally>,
+    scratch: Shared<Scratch<P::Scalar>>,
+}
+
+impl<P: Compiled> Clone for Arrays<P> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+impl<P: Compiled> Copy for Arrays<P> {}
 
 /// A thread's own.
 struct Scratch<T> {
@@ -176,7 +196,21 @@ impl<P: Compiled> Machine<P> {
         }
     }
 
-    fn swept(&mut self) -> Swept<'_, P::Scalar, P::Record> {
+    /// The arrays that threads write disjoint parts of.
+    fn arrays(&mut self) -> Arrays<P> {
+        Arrays {
+            sums: Shared(self.sums.as_mut_ptr()),
+            densities: Shared(self.densities.as_mut_ptr()),
+            rows: Shared(self.rows.as_mut_ptr()),
+            excess: Shared(self.excess.as_mut_ptr()),
+            slopes: Shared(self.slopes.as_mut_ptr()),
+            near: Shared(self.near.as_mut_ptr()),
+            tallies: Shared(self.tallies.as_mut_ptr()),
+            scratch: Shared(self.scratch.as_mut_ptr()),
+        }
+    }
+
+    fn swept(&self, arrays: Arrays<P>) -> Swept<'_, P::Scalar, P::Record> {
         Swept {
             frame: &self.frame,
             grid: &self.grid,
@@ -190,51 +224,61 @@ impl<P: Compiled> Machine<P> {
             owned: &self.owned_bits,
             owned_of_row: &self.owned_of_row,
             terms: &self.terms,
-            slopes: &self.slopes,
+            slopes: arrays.slopes,
             offset: &self.offset,
-            sums: Shared(self.sums.as_mut_ptr().cast()),
-            densities: Shared(self.densities.as_mut_ptr()),
+            sums: Shared(arrays.sums.0.cast()),
+            densities: arrays.densities,
             variables: self.columns.len(),
             thermostat: self.thermostat,
+        }
+    }
+
+    /// The first pass of one layer.
+    ///
+    /// # Safety
+    /// No other thread does the same layer.
+    unsafe fn first_of_layer(
+        &self,
+        swept: &Swept<P::Scalar, P::Record>,
+        arrays: Arrays<P>,
+        layer: usize,
+        block: &mut Block<P::Scalar>,
+        near: &mut NearPairs<P::Scalar>,
+    ) {
+        let (first, own) = self.layer(layer);
+        let begin = (first as isize + self.offset[layer]) as usize;
+        let count = own + self.next_layer(layer);
+        let variables = self.width();
+        // SAFETY: these accumulators are the layer's own.
+        unsafe {
+            std::slice::from_raw_parts_mut(arrays.sums.at(begin), count).fill(Sum::default());
+            if variables > 1 {
+                let densities = arrays.densities.at(variables * begin);
+                std::slice::from_raw_parts_mut(densities, variables * count).fill(0.0);
+            }
+            let pass = self.passes.first[self.totals as usize];
+            *arrays.tallies.at(layer) = pass(swept, layer, block, near);
         }
     }
 
     /// The first pass over all layers.
     pub fn first(&mut self, pool: &Pool) {
         let layers = self.grid.layers;
-        let ranges: Vec<(usize, usize)> = (0..layers)
-            .map(|l| {
-                let (first, own) = self.layer(l);
-                let begin = (first as isize + self.offset[l]) as usize;
-                (begin, begin + own + self.next_layer(l))
-            })
-            .collect();
-        let variables = self.width();
-        let pass = self.passes.first[self.totals as usize];
-        let (near, tallies, scratch) = (
-            Shared(self.near.as_mut_ptr()),
-            Shared(self.tallies.as_mut_ptr()),
-            Shared(self.scratch.as_mut_ptr()),
-        );
+        self.near.resize_with(layers, NearPairs::default);
+        let arrays = self.arrays();
+        let this = &*self;
+        let swept = this.swept(arrays);
         let next = AtomicUsize::new(0);
-        let swept = self.swept();
         pool.run(&|t| {
-            // SAFETY: each thread has its own scratch, each layer is done once, and writes its own.
-            unsafe {
-                let scratch = &mut *scratch.at(t);
-                loop {
-                    let layer = next.fetch_add(1, Ordering::Relaxed);
-                    if layer >= layers {
-                        return;
-                    }
-                    let (begin, end) = ranges[layer];
-                    std::slice::from_raw_parts_mut(swept.sums.at(4 * begin), 4 * (end - begin)).fill(0.0);
-                    if variables > 1 {
-                        let count = variables * (end - begin);
-                        std::slice::from_raw_parts_mut(swept.densities.at(variables * begin), count)
-                            .fill(0.0);
-                    }
-                    *tallies.at(layer) = pass(&swept, layer, &mut scratch.block, &mut *near.at(layer));
+            loop {
+                let layer = next.fetch_add(1, Ordering::Relaxed);
+                if layer >= layers {
+                    return;
+                }
+                // SAFETY: each thread has its own scratch, each layer is done once.
+                unsafe {
+                    let (scratch, near) = (&mut *arrays.scratch.at(t), &mut *arrays.near.at(layer));
+                    this.first_of_layer(&swept, arrays, layer, &mut scratch.block, near);
                 }
             }
         });
@@ -257,9 +301,9 @@ impl<P: Compiled> Machine<P> {
         }
         let layers = self.grid.layers;
         let pass = self.passes.second[self.totals as usize];
-        let (near, tallies) = (Shared(self.near.as_mut_ptr()), Shared(self.tallies.as_mut_ptr()));
+        let arrays = self.arrays();
+        let swept = self.swept(arrays);
         let next = AtomicUsize::new(0);
-        let swept = self.swept();
         pool.run(&|_| {
             loop {
                 let layer = next.fetch_add(1, Ordering::Relaxed);
@@ -267,7 +311,10 @@ impl<P: Compiled> Machine<P> {
                     return;
                 }
                 // SAFETY: each layer is done once, and writes its own.
-                unsafe { pass(&swept, layer, &*near.at(layer), &mut (*tallies.at(layer)).virial) };
+                unsafe {
+                    let virial = &mut (*arrays.tallies.at(layer)).virial;
+                    pass(&swept, layer, &*arrays.near.at(layer), virial);
+                }
             }
         });
     }

@@ -179,7 +179,7 @@ pub unsafe fn second_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const T
             while pass < passes {
                 let rows = &near.rows.get_unchecked(pass).0;
                 let apart = &near.apart.get_unchecked(pass).0;
-                let slopes = swept.slopes.as_ptr().add(pass * species);
+                let slopes = swept.slopes.at(pass * species).cast_const();
                 let layer_slopes = slopes.add(width * near.first as usize);
                 // The slope of each member; its slopes and species, with several.
                 let mut own = [0.0; 16];

@@ -317,10 +317,11 @@ impl Sweep {
         let times = &mut self.times;
         let mut since = Instant::now();
         with!(&mut self.machine, m => {
+            // Without ghosts that is done.
             if ghosts {
                 m.slopes_from_host(slopes);
+                m.second(pool);
             }
-            m.second(pool);
             lap(&mut since, &mut times.second);
             m.forces(pool, force, add, particles.tag)?;
             lap(&mut since, &mut times.forces);
@@ -382,6 +383,9 @@ fn first<P: compiled::Compiled>(
     };
     machine.sort(pool, frame, grid, given)?;
     lap(&mut since, &mut times.sort);
+    if given.particles.owned == count {
+        return machine.stream(pool, plan, given.particles.tag, times);
+    }
     machine.first(pool);
     lap(&mut since, &mut times.first);
     machine.excess(pool, plan, given.particles.tag)?;

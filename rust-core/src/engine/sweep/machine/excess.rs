@@ -1,6 +1,6 @@
 //! Densities of the particles, and ψ at them.
 
-use super::{Machine, Shared};
+use super::{Arrays, Machine};
 use crate::engine::error::EngineError;
 use crate::engine::excess::ExcessPlan;
 use crate::engine::excess_pass::{ExcessPass, LANES, Rows};
@@ -16,6 +16,36 @@ const BLOCK: usize = 2 * LANES;
 impl<P: Compiled> Machine<P> {
     /// ψ and its slopes at the densities of the first pass.
     pub fn excess(&mut self, pool: &Pool, plan: &Plan, tag: &[i32]) -> Result<(), EngineError> {
+        let Some(own) = self.prepare_excess(plan) else { return Ok(()) };
+        let arrays = self.arrays();
+        let next = AtomicUsize::new(0);
+        let this = &*self;
+        pool.run(&|t| {
+            // SAFETY: each thread has its own scratch.
+            let scratch = unsafe { &mut *arrays.scratch.at(t) };
+            scratch.fault = None;
+            loop {
+                let layer = next.fetch_add(1, Ordering::Relaxed);
+                if layer >= this.grid.layers {
+                    return;
+                }
+                // SAFETY: each layer is done once, and writes its own.
+                let done = unsafe {
+                    this.excess_of_layer(arrays, layer, plan, &own, tag, &mut scratch.excess)
+                };
+                if let Err(fault) = done {
+                    scratch.fault = Some(fault);
+                    return;
+                }
+            }
+        });
+        self.first_fault()?;
+        self.copy_slopes();
+        Ok(())
+    }
+
+    /// Room for ψ and its slopes; what particles add to their own densities, unless ψ is zero whatever they are.
+    pub(super) fn prepare_excess(&mut self, plan: &Plan) -> Option<Vec<f64>> {
         let (width, n) = (self.width(), self.particles);
         let copies = if self.is_ring() { self.layer(0).1 } else { 0 };
         self.excess.resize(n, 0.0);
@@ -23,48 +53,49 @@ impl<P: Compiled> Machine<P> {
         self.slopes.resize(width * (n + copies), 0.0);
         if plan.excess.iter().all(|e| matches!(e, ExcessPlan::Constant(0.0))) {
             self.excess.fill(0.0);
-            return Ok(());
+            return None;
         }
-        let own: Vec<f64> = self.own_weights(plan);
-        let (excess, slopes, rows, scratch) = (
-            Shared(self.excess.as_mut_ptr()),
-            Shared(self.slopes.as_mut_ptr()),
-            Shared(self.rows.as_mut_ptr()),
-            Shared(self.scratch.as_mut_ptr()),
-        );
-        let next = AtomicUsize::new(0);
-        let this = &*self;
-        pool.run(&|t| {
-            // SAFETY: each thread has its own scratch, each layer is done once, and writes its own.
-            let scratch = unsafe { &mut *scratch.at(t) };
-            scratch.fault = None;
-            loop {
-                let layer = next.fetch_add(1, Ordering::Relaxed);
-                if layer >= this.grid.layers {
-                    return;
-                }
-                let (first, count) = this.layer(layer);
-                for from in (first..first + count).step_by(BLOCK) {
-                    let count = BLOCK.min(first + count - from);
-                    // SAFETY: as above.
-                    let (excess, slopes, densities) = unsafe {
-                        (
-                            std::slice::from_raw_parts_mut(excess.at(from), count),
-                            std::slice::from_raw_parts_mut(slopes.at(width * from), width * count),
-                            std::slice::from_raw_parts_mut(rows.at(width * from), width * count),
-                        )
-                    };
-                    this.gather_densities(layer, from, &own, densities);
-                    let mut rows = Rows { first: from, columns: &this.columns, densities, excess, slopes };
-                    if let Err(fault) = this.evaluate(plan, &mut scratch.excess, tag, &mut rows) {
-                        scratch.fault = Some(fault);
-                        return;
-                    }
-                }
-            }
-        });
-        self.first_fault()?;
-        self.slopes.copy_within(..width * copies, width * n);
+        Some(self.own_weights(plan))
+    }
+
+    /// Slopes of the copies of the first layer.
+    pub(super) fn copy_slopes(&mut self) {
+        if self.is_ring() {
+            let (width, n, copies) = (self.width(), self.particles, self.layer(0).1);
+            self.slopes.copy_within(..width * copies, width * n);
+        }
+    }
+
+    /// ψ and its slopes of one layer.
+    ///
+    /// # Safety
+    /// No other thread does the same layer, and none writes the weights of its particles.
+    pub(super) unsafe fn excess_of_layer(
+        &self,
+        arrays: Arrays<P>,
+        layer: usize,
+        plan: &Plan,
+        own: &[f64],
+        tag: &[i32],
+        pass: &mut ExcessPass,
+    ) -> Result<(), EngineError> {
+        let width = self.width();
+        let (first, count) = self.layer(layer);
+        for from in (first..first + count).step_by(BLOCK) {
+            let count = BLOCK.min(first + count - from);
+            // SAFETY: the layer's own.
+            let (excess, slopes, densities) = unsafe {
+                (
+                    std::slice::from_raw_parts_mut(arrays.excess.at(from), count),
+                    std::slice::from_raw_parts_mut(arrays.slopes.at(width * from), width * count),
+                    std::slice::from_raw_parts_mut(arrays.rows.at(width * from), width * count),
+                )
+            };
+            // SAFETY: the caller's.
+            unsafe { self.gather_densities(arrays, layer, from, own, densities) };
+            let mut rows = Rows { first: from, columns: &self.columns, densities, excess, slopes };
+            self.evaluate(plan, pass, tag, &mut rows)?;
+        }
         Ok(())
     }
 
@@ -96,12 +127,26 @@ impl<P: Compiled> Machine<P> {
     }
 
     /// Densities of particles of a layer from number `from`, as many as there is room for.
-    fn gather_densities(&self, layer: usize, from: usize, own: &[f64], out: &mut [f64]) {
+    ///
+    /// # Safety
+    /// No other thread writes their weights.
+    unsafe fn gather_densities(
+        &self,
+        arrays: Arrays<P>,
+        layer: usize,
+        from: usize,
+        own: &[f64],
+        out: &mut [f64],
+    ) {
         let width = self.width();
         let (here, before) = self.accumulators(layer);
         let place = |accumulators: isize| (from as isize + accumulators) as usize;
         if let (1, &[own]) = (width, own) {
-            let sums = |accumulators| self.sums[place(accumulators)..].iter();
+            let count = out.len();
+            // SAFETY: accumulators of particles of the layer.
+            let sums = |accumulators| unsafe {
+                std::slice::from_raw_parts(arrays.sums.at(place(accumulators)), count)
+            };
             let pairs = out.iter_mut().zip(sums(here));
             match before {
                 None => pairs.for_each(|(n, here)| *n = here.0[3] + own),
@@ -114,7 +159,11 @@ impl<P: Compiled> Machine<P> {
         if width == 0 {
             return;
         }
-        let sums = |accumulators| &self.densities[width * place(accumulators)..][..out.len()];
+        let count = out.len();
+        // SAFETY: accumulators of particles of the layer.
+        let sums = |accumulators| unsafe {
+            std::slice::from_raw_parts(arrays.densities.at(width * place(accumulators)), count)
+        };
         match before.map(sums) {
             None => out.copy_from_slice(sums(here)),
             Some(before) => {

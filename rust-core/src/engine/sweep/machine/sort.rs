@@ -6,7 +6,7 @@ use crate::engine::sweep::arithmetic::Record;
 use crate::engine::sweep::compiled::Compiled;
 use crate::engine::sweep::frame::Frame;
 use crate::engine::sweep::grid::Grid;
-use crate::engine::sweep::many_body::{NEAR_BITS, NearPairs};
+use crate::engine::sweep::many_body::NEAR_BITS;
 use crate::engine::sweep::pool::{Pool, part};
 use crate::engine::sweep::quantum::Quantum;
 use crate::engine::tally::Tally;
@@ -262,7 +262,6 @@ impl<P: Compiled> Machine<P> {
         self.sums.resize(sum.max(1), Sum::default());
         let variables = self.width();
         self.densities.resize(if variables > 1 { variables * sum } else { 0 }, 0.0);
-        self.near.resize_with(layers, NearPairs::default);
         self.tallies.clear();
         self.tallies.resize(layers, Tally::default());
     }
