@@ -1,11 +1,14 @@
 //! The fast engine: the same forces as [`Engine`](super::Engine), from a sweep over particles in the order
 //! of cells.
 //!
-//! Every step the particles are sorted into rows of bins ([`grid`]), each layer of rows looks for pairs in
-//! half of its neighbourhood ([`windows`], [`chunks`], [`look`]) and evaluates them in blocks that stay in the
-//! first-level cache ([`layer`], [`evaluate`], [`scatter`]); the pairs that a many-body density reaches are
-//! kept for a second pass, after ψ ([`many_body`]). There is no neighbour list: at the speed that DPD particles move, one lives a few steps and costs
-//! more than it saves.
+//! Every step the particles are sorted into rows of bins ([`grid`], [`machine`]). Each layer of rows
+//! ([`layer`]) finds the pairs in half of its neighbourhood: the bins where a particle looks
+//! ([`windows`]), cut into sixteens for four particles that look together ([`chunks`]), and who of those
+//! is near ([`look`]), in words of sixteen bits ([`quantum`]). Pairs are evaluated in blocks that stay in
+//! the first-level cache ([`block`], [`evaluate`], [`thermostat`], [`terms`]; [`aside`] for formulas and
+//! tables), and added to their particles ([`scatter`]). The pairs that a many-body density reaches are
+//! kept for a second pass, after ψ ([`many_body`]). There is no neighbour list: at the speed that DPD
+//! particles move, one lives a few steps and costs more than it saves.
 //!
 //! [`simd`] has the vectors of each instruction set, [`arithmetic`] the two precisions, [`compiled`]
 //! the passes for each of both, chosen once. [`pool`] shares layers among threads; what a layer adds
