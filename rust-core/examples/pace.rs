@@ -69,8 +69,15 @@ fn run(arguments: &[String]) -> Result<(), String> {
         let all = start.elapsed().as_secs_f64() - around;
         let after = sweep.times();
         let part = |of: fn(&Times) -> f64| of(&after) - of(&before);
-        let parts =
-            [all, part(|t| t.sort), part(|t| t.first), part(|t| t.excess), part(|t| t.second), part(|t| t.forces), around];
+        let parts = [
+            all,
+            part(|t| t.sort),
+            part(|t| t.first),
+            part(|t| t.excess),
+            part(|t| t.second),
+            part(|t| t.forces),
+            around,
+        ];
         for (best, seconds) in best.iter_mut().zip(parts) {
             *best = best.min(seconds * 1e9 / f64::from(STEPS) / count as f64);
         }

@@ -125,6 +125,7 @@ impl Cloud {
 }
 
 /// The fast engine on one thread.
+#[allow(dead_code)] // As above.
 pub fn sweep(
     fluid: &Fluid,
     precision: psidpd_core::engine::Precision,

@@ -242,7 +242,8 @@ impl<I: Isa> Arithmetic<I> for Double {
 
     #[inline(always)]
     unsafe fn metric(frame: &Frame) -> Self::Metric {
-        let inverse = |k: usize| I::F64::constant(if frame.periodic[k] { 1.0 / frame.length[k] } else { 0.0 });
+        let inverse =
+            |k: usize| I::F64::constant(if frame.periodic[k] { 1.0 / frame.length[k] } else { 0.0 });
         let constant = |x: f64| I::F64::constant(x);
         let ([a, b, c], [d, e, f]) = (frame.length, frame.tilt);
         DoubleMetric {

@@ -3,7 +3,7 @@
 use super::arithmetic::Own;
 use super::chunks::{Chunk, FOUR};
 use super::scatter::Sum;
-use super::simd::{Two, Scalar};
+use super::simd::{Scalar, Two};
 
 /// Most particles whose pairs are in hand at once.
 pub const GROUP: usize = 16;
@@ -19,7 +19,6 @@ pub struct Block<T> {
     /// The first particles of the pairs, each once, and where the pairs of each begin, and of the last end.
     pub members: [u32; GROUP],
     pub begin: [u32; GROUP + 1],
-    pub members_count: usize,
     /// How many pairs there are.
     pub count: usize,
     /// The second particle of each pair, in the order of cells.
@@ -83,7 +82,6 @@ impl<T: Scalar> Default for Block<T> {
         let mut block = Block {
             members: [0; GROUP],
             begin: [0; GROUP + 1],
-            members_count: 0,
             count: 0,
             j: Vec::new(),
             lists: Default::default(),

@@ -218,16 +218,11 @@ unsafe fn keep<R: Reals, const TALLY: bool>(
         let s = pairs.r * R::splat(term.force_inverse_range);
         let g = R::splat(term.force) * slope(term.force_kind, s) * pairs.inverse;
         let [dx, dy, dz] = pairs.d;
-        let columns = [
-            (g * dx).compress(mask),
-            (g * dy).compress(mask),
-            (g * dz).compress(mask),
-            code.compress(mask),
-        ];
+        let columns =
+            [(g * dx).compress(mask), (g * dy).compress(mask), (g * dz).compress(mask), code.compress(mask)];
         R::rows(columns, near.rows.get_unchecked_mut(pass).end().add(found).cast());
         if TALLY {
-            let columns =
-                [dx.compress(mask), dy.compress(mask), dz.compress(mask), share.compress(mask)];
+            let columns = [dx.compress(mask), dy.compress(mask), dz.compress(mask), share.compress(mask)];
             R::rows(columns, near.apart.get_unchecked_mut(pass).end().add(found).cast());
         }
     }

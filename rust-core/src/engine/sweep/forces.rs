@@ -164,8 +164,8 @@ impl<T: super::simd::Scalar> Spline<T> {
                 let phi = repulsion * CubicSpline::value(a) - attraction * CubicSpline::value(b);
                 *energy = phi.mul_add(share, *energy);
             }
-            let slope =
-                repulsion * inverse_a * CubicSpline::slope(a) - attraction * inverse_b * CubicSpline::slope(b);
+            let slope = repulsion * inverse_a * CubicSpline::slope(a)
+                - attraction * inverse_b * CubicSpline::slope(b);
             before - slope
         }
     }

@@ -173,8 +173,7 @@ unsafe fn part<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY: bool>
 ) {
     // SAFETY: the contract of `simd`; members of a block are particles, as are those behind the last.
     unsafe {
-        let pairs =
-            [*block.begin.get_unchecked(first) as usize, *block.begin.get_unchecked(last) as usize];
+        let pairs = [*block.begin.get_unchecked(first) as usize, *block.begin.get_unchecked(last) as usize];
         if pairs[0] == pairs[1] {
             return;
         }

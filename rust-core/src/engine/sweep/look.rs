@@ -44,11 +44,8 @@ pub unsafe fn look<I: Isa, T: Scalar, const SHIFTS: bool>(
             let chunk = &*chunks.add(c);
             let j = chunk.from as usize;
             let four = points.add(2 * (chunk.note as usize >> 8));
-            let shift = if SHIFTS {
-                *group.windows.shift.get_unchecked(chunk.note as usize & 0xff)
-            } else {
-                [0; 3]
-            };
+            let shift =
+                if SHIFTS { *group.windows.shift.get_unchecked(chunk.note as usize & 0xff) } else { [0; 3] };
             let there = [q[0].add(j), q[1].add(j), q[2].add(j)];
             *masks.add(c) = I::near::<SHIFTS>(there, shift, [&*four, &*four.add(1)], limit) & chunk.allowed;
             c += 1;
@@ -112,6 +109,5 @@ pub unsafe fn look<I: Isa, T: Scalar, const SHIFTS: bool>(
             k += 1;
         }
         block.count = pairs;
-        block.members_count = group.count;
     }
 }

@@ -42,7 +42,6 @@ impl<T> Rows<T> {
         // SAFETY: one past the last, or before.
         unsafe { self.0.as_mut_ptr().add(self.0.len()) }
     }
-
 }
 
 impl<T> NearPairs<T> {

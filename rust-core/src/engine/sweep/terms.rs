@@ -193,7 +193,8 @@ impl<T: Scalar> Terms<T> {
                 // The first table that has no such pair yet.
                 let free = self.soft.iter().position(|s| s.inverse_range[places[0]] == far);
                 let at = free.unwrap_or_else(|| {
-                    let table = Soft { strength: zero(), inverse_range: Table::of(size, far), energy: zero() };
+                    let table =
+                        Soft { strength: zero(), inverse_range: Table::of(size, far), energy: zero() };
                     self.soft.push(table);
                     self.soft.len() - 1
                 });

@@ -30,9 +30,8 @@ impl<P: Compiled> Machine<P> {
                     return;
                 }
                 // SAFETY: each layer is done once, and writes its own.
-                let done = unsafe {
-                    this.excess_of_layer(arrays, layer, plan, &own, tag, &mut scratch.excess)
-                };
+                let done =
+                    unsafe { this.excess_of_layer(arrays, layer, plan, &own, tag, &mut scratch.excess) };
                 if let Err(fault) = done {
                     scratch.fault = Some(fault);
                     return;

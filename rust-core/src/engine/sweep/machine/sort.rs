@@ -321,12 +321,7 @@ const FAR: f64 = 1e15;
 /// Fractions of the frame in units of 2⁻³²; they wrap along periods, and are never beyond the ends where there are
 /// none. Whether all are finite and not too far away.
 #[inline(always)]
-fn fractions(
-    frame: &Frame,
-    inverse: &[f64; 3],
-    x: &[[f64; 3]],
-    units: &mut [[u32; 3]; AT_ONCE],
-) -> bool {
+fn fractions(frame: &Frame, inverse: &[f64; 3], x: &[[f64; 3]], units: &mut [[u32; 3]; AT_ONCE]) -> bool {
     let mut scaled = [[0.0; 3]; AT_ONCE];
     if frame.is_tilted() {
         for (t, x) in scaled.iter_mut().zip(x) {

@@ -47,8 +47,7 @@ impl<P: Compiled> Machine<P> {
         let own = self.prepare_excess(plan);
         let slabs: Vec<Range<usize>> = (0..threads).map(|t| self.slab(t, threads)).collect();
         let arrays = self.arrays();
-        let stream =
-            Stream { machine: self, swept: self.swept(arrays), arrays, plan, own, tag };
+        let stream = Stream { machine: self, swept: self.swept(arrays), arrays, plan, own, tag };
         let shared_times = Shared(times as *mut Times);
         let timed = |t: usize, work: &dyn Fn(&mut Times)| {
             let mut unseen = Times::default();
@@ -60,8 +59,7 @@ impl<P: Compiled> Machine<P> {
         self.first_fault()?;
         self.copy_slopes();
         let arrays = self.arrays();
-        let stream =
-            Stream { machine: self, swept: self.swept(arrays), arrays, plan, own: None, tag };
+        let stream = Stream { machine: self, swept: self.swept(arrays), arrays, plan, own: None, tag };
         pool.run(&|t| timed(t, &|times| stream.second_at_ends(t, slabs[t].clone(), times)));
         Ok(())
     }
@@ -149,8 +147,14 @@ impl<P: Compiled> Stream<'_, P> {
         // SAFETY: each thread has its own scratch, each layer is done once.
         unsafe {
             let scratch = &mut *self.arrays.scratch.at(t);
-            let done =
-                self.machine.excess_of_layer(self.arrays, layer, self.plan, own, self.tag, &mut scratch.excess);
+            let done = self.machine.excess_of_layer(
+                self.arrays,
+                layer,
+                self.plan,
+                own,
+                self.tag,
+                &mut scratch.excess,
+            );
             if let Err(fault) = done {
                 scratch.fault.get_or_insert(fault);
             }

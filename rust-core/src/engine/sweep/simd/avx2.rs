@@ -1,7 +1,7 @@
 //! AVX2 with FMA and BMI2.
 
 use super::avx512::{F64x4 as Quad4, operators};
-use super::{Isa, ORDINARY_F32, ORDINARY_F64, Two, Reals, Words, row_at};
+use super::{Isa, ORDINARY_F32, ORDINARY_F64, Reals, Two, Words, row_at};
 use crate::model::kernel::Real;
 use std::arch::x86_64::*;
 use std::ops::{Add, Mul, Sub};

@@ -1,7 +1,7 @@
 //! AVX-512 (F, BW, DQ, VL), with AVX2, FMA and BMI2.
 
 use super::avx2::U32x8;
-use super::{Isa, ORDINARY_F32, ORDINARY_F64, Two, Quad, Reals, Words, row_at};
+use super::{Isa, ORDINARY_F32, ORDINARY_F64, Quad, Reals, Two, Words, row_at};
 use crate::model::kernel::Real;
 use std::arch::x86_64::*;
 use std::ops::{Add, Mul, Sub};
@@ -92,9 +92,7 @@ impl Reals for F32x16 {
     #[inline(always)]
     unsafe fn encode(words: U32x16) -> Self {
         let ordinary = ORDINARY_F32 as i32;
-        unsafe {
-            F32x16(_mm512_castsi512_ps(_mm512_add_epi32(words.0, _mm512_set1_epi32(ordinary))))
-        }
+        unsafe { F32x16(_mm512_castsi512_ps(_mm512_add_epi32(words.0, _mm512_set1_epi32(ordinary)))) }
     }
     #[inline(always)]
     unsafe fn mul_add(self, a: Self, b: Self) -> Self {
@@ -306,9 +304,7 @@ impl Reals for F64x8 {
     }
     #[inline(always)]
     unsafe fn pick(table: *const f64, which: U32x8) -> Self {
-        unsafe {
-            F64x8(_mm512_permutexvar_pd(_mm512_cvtepu32_epi64(which.0), _mm512_loadu_pd(table)))
-        }
+        unsafe { F64x8(_mm512_permutexvar_pd(_mm512_cvtepu32_epi64(which.0), _mm512_loadu_pd(table))) }
     }
     #[inline(always)]
     unsafe fn lookup(table: *const f64, index: U32x8) -> Self {
@@ -531,10 +527,7 @@ impl Isa for Avx512 {
     unsafe fn halves(x: F64x8) -> [U32x8; 2] {
         unsafe {
             let bits = _mm512_castpd_si512(x.0);
-            [
-                U32x8(_mm512_cvtepi64_epi32(bits)),
-                U32x8(_mm512_cvtepi64_epi32(_mm512_srli_epi64::<32>(bits))),
-            ]
+            [U32x8(_mm512_cvtepi64_epi32(bits)), U32x8(_mm512_cvtepi64_epi32(_mm512_srli_epi64::<32>(bits)))]
         }
     }
 }

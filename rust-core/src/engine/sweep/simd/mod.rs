@@ -131,15 +131,9 @@ pub trait Words: Copy {
 
 /// Two points, in units that [`Isa::near`] compares: each coordinate sixteen times that of the first, then as often
 /// that of the second.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 #[repr(C, align(64))]
 pub struct Two(pub [[u16; 32]; 3]);
-
-impl Default for Two {
-    fn default() -> Two {
-        Two([[0; 32]; 3])
-    }
-}
 
 /// The address of row `index[k]`.
 ///
@@ -170,8 +164,12 @@ pub trait Isa: Copy + Send + Sync + 'static {
     type Quad: Quad;
     /// Which of the sixteen particles from `x[0]`, `x[1]`, `x[2]` on, all moved by `shift`, have a distance to four
     /// points whose square, in units of 2¹⁶, is below `limit`: sixteen bits for each point. Coordinates wrap.
-    unsafe fn near<const SHIFTS: bool>(x: [*const u16; 3], shift: [u16; 3], four: [&Two; 2], limit: i16)
-    -> u64;
+    unsafe fn near<const SHIFTS: bool>(
+        x: [*const u16; 3],
+        shift: [u16; 3],
+        four: [&Two; 2],
+        limit: i16,
+    ) -> u64;
     /// Sixteen times the same word.
     unsafe fn fill16(x: u16, p: *mut u16);
     /// Writes `first + k` for each bit `k` of sixteen, one after the other; may write sixteen.

@@ -1,6 +1,6 @@
 //! Plain arrays, which the compiler vectorises for whatever the target has.
 
-use super::{Isa, ORDINARY_F32, ORDINARY_F64, Two, Quad, Reals, Words};
+use super::{Isa, ORDINARY_F32, ORDINARY_F64, Quad, Reals, Two, Words};
 use crate::model::kernel::Real;
 use std::ops::{Add, Mul, Sub};
 
