@@ -52,11 +52,6 @@ pub unsafe fn evaluate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALL
         let layer_first = <A::Reals as Reals>::Words::splat(near.first);
         let drag = terms.drag.as_ref().filter(|_| swept.thermostat.is_some());
         let mut sums = Sums::<A::Reals>::zero();
-        let mut pass = 0;
-        while pass < passes {
-            *p_found.add(pass) = 0;
-            pass += 1;
-        }
         let mut k = from;
         while k < to {
             let pairs = &*p_pairs;
