@@ -12,8 +12,7 @@
 #[path = "../benches/setup/mod.rs"]
 mod setup;
 
-use psidpd_core::engine::{Instructions, Precision};
-use setup::{Cloud, SUBJECTS, sweep};
+use setup::{Cloud, choose, sweep};
 use std::process::ExitCode;
 
 const COUNT: usize = 2000;
@@ -35,16 +34,7 @@ fn run(arguments: &[String]) -> Result<(), String> {
     let [fluid, precision, instructions, evaluations] = arguments else {
         return Err("four arguments are needed".into());
     };
-    let subject = SUBJECTS.iter().find(|s| s.name == fluid).ok_or("no such fluid")?;
-    let (_, precision) =
-        Precision::ALL.into_iter().find(|(name, _)| name == precision).ok_or("no such precision")?;
-    let (_, set) = Instructions::ALL
-        .into_iter()
-        .find(|(name, _)| name == instructions)
-        .ok_or("no such instruction set")?;
-    if !set.available() {
-        return Err(format!("this processor has no {instructions}"));
-    }
+    let (subject, precision, set) = choose(fluid, precision, instructions)?;
     let evaluations: u32 = evaluations.parse().map_err(|_| "EVALUATIONS is a number")?;
     let fluid = subject.fluid();
     let mut cloud = Cloud::new(subject, &fluid, COUNT);

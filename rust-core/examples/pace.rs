@@ -6,8 +6,8 @@
 #[path = "../benches/setup/mod.rs"]
 mod setup;
 
-use psidpd_core::engine::{Instructions, Precision, Settings, Sweep, Times};
-use setup::{Cloud, SUBJECTS};
+use psidpd_core::engine::{Settings, Sweep, Times};
+use setup::{Cloud, choose};
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -33,16 +33,7 @@ fn run(arguments: &[String]) -> Result<(), String> {
     let [fluid, precision, instructions, threads, count] = arguments else {
         return Err("five arguments are needed".into());
     };
-    let subject = SUBJECTS.iter().find(|s| s.name == fluid).ok_or("no such fluid")?;
-    let (_, precision) =
-        Precision::ALL.into_iter().find(|(name, _)| name == precision).ok_or("no such precision")?;
-    let (_, instructions) = Instructions::ALL
-        .into_iter()
-        .find(|(name, _)| name == instructions)
-        .ok_or("no such instruction set")?;
-    if !instructions.available() {
-        return Err("this processor does not have these instructions".into());
-    }
+    let (subject, precision, instructions) = choose(fluid, precision, instructions)?;
     let threads = threads.parse().map_err(|_| "THREADS is a number above 0")?;
     let count: usize = count.parse().map_err(|_| "PARTICLES is a number")?;
     let fluid = subject.fluid();

@@ -1,6 +1,8 @@
 //! Fluids and particles that micro-benchmarks and instruction counts share.
 
-use psidpd_core::engine::{Particles, PeriodicBox, Settings, Space, Step, Sweep, Want, noise};
+use psidpd_core::engine::{
+    Instructions, Particles, PeriodicBox, Precision, Settings, Space, Step, Sweep, Want, noise,
+};
 use psidpd_core::model::{Fluid, Model};
 
 /// A fluid and its number density.
@@ -15,7 +17,7 @@ pub struct Subject {
 }
 
 /// Warren's many-body fluid, standard DPD, and a fluid with two species and two densities as formulas.
-pub const SUBJECTS: [Subject; 3] = [
+pub static SUBJECTS: [Subject; 3] = [
     Subject {
         name: "mdpd",
         text: include_str!("../../../validation/models/warren2003-set6.toml"),
@@ -41,6 +43,26 @@ impl Subject {
     pub fn fluid(&self) -> Fluid {
         Model::parse(self.name, self.text).expect("a model that ships").at(1.0).expect("a fluid at kT = 1")
     }
+}
+
+/// A fluid, a precision and an instruction set that this processor has, by their names.
+#[allow(dead_code)] // Not every user of this module is told these.
+pub fn choose(
+    fluid: &str,
+    precision: &str,
+    instructions: &str,
+) -> Result<(&'static Subject, Precision, Instructions), String> {
+    let subject = SUBJECTS.iter().find(|s| s.name == fluid).ok_or("no such fluid")?;
+    let (_, precision) =
+        Precision::ALL.into_iter().find(|(name, _)| *name == precision).ok_or("no such precision")?;
+    let (_, set) = Instructions::ALL
+        .into_iter()
+        .find(|(name, _)| *name == instructions)
+        .ok_or("no such instruction set")?;
+    if !set.available() {
+        return Err(format!("this processor has no {instructions}"));
+    }
+    Ok((subject, precision, set))
 }
 
 /// A number from 0 to 1, the same everywhere.
@@ -126,11 +148,7 @@ impl Cloud {
 
 /// The fast engine on one thread.
 #[allow(dead_code)] // As above.
-pub fn sweep(
-    fluid: &Fluid,
-    precision: psidpd_core::engine::Precision,
-    instructions: psidpd_core::engine::Instructions,
-) -> Sweep {
+pub fn sweep(fluid: &Fluid, precision: Precision, instructions: Instructions) -> Sweep {
     let settings = Settings { precision, instructions, ..Settings::default() };
     Sweep::new(fluid, settings).expect("a plan")
 }

@@ -19,8 +19,6 @@ pub struct Block<T> {
     /// The first particles of the pairs, each once, and where the pairs of each begin, and of the last end.
     pub members: [u32; GROUP],
     pub begin: [u32; GROUP + 1],
-    /// How many pairs there are.
-    pub count: usize,
     /// The second particle of each pair, in the order of cells.
     pub j: Vec<u32>,
     /// The same, of the first of each four members, of the second …
@@ -82,7 +80,6 @@ impl<T: Scalar> Default for Block<T> {
         let mut block = Block {
             members: [0; GROUP],
             begin: [0; GROUP + 1],
-            count: 0,
             j: Vec::new(),
             lists: Default::default(),
             which: Vec::new(),

@@ -170,9 +170,11 @@ unsafe fn add<T: Scalar, const GHOSTS: bool>(
     unsafe {
         let own = shift == 5;
         let mut owned = [u64::MAX; 2];
+        let mut ghosts = None;
         if GHOSTS {
             // Two ghosts are no concern of this rank.
             let ghost = look.these.map(|k| *swept.ghost.get_unchecked(group.first + k));
+            ghosts = Some(ghost);
             if ghost.iter().all(|ghost| *ghost) {
                 let [first, last] = *group.windows.owned.get_unchecked(shift % 5);
                 if !own {
@@ -188,7 +190,6 @@ unsafe fn add<T: Scalar, const GHOSTS: bool>(
         let note = (look.four << 8 | shift) as u32;
         let who = if own { look.who & BEHIND } else { look.who };
         if length > 32 {
-            let ghosts = if GHOSTS { Some(look.these.map(|k| swept.ghost[group.first + k])) } else { None };
             return add_many(swept, block, found, from, to, who, look.who, note, ghosts);
         }
         // Both are written, and counted as needed: there is no branch to foresee.

@@ -108,6 +108,5 @@ pub unsafe fn look<I: Isa, T: Scalar, const SHIFTS: bool>(
             *out.add(pairs + k) = first as u32;
             k += 1;
         }
-        block.count = pairs;
     }
 }

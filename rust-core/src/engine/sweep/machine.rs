@@ -300,9 +300,9 @@ impl<P: Compiled> Machine<P> {
             return;
         }
         let layers = self.grid.layers;
-        let pass = self.passes.second[self.totals as usize];
         let arrays = self.arrays();
-        let swept = self.swept(arrays);
+        let this = &*self;
+        let swept = this.swept(arrays);
         let next = AtomicUsize::new(0);
         pool.run(&|_| {
             loop {
@@ -310,12 +310,25 @@ impl<P: Compiled> Machine<P> {
                 if layer >= layers {
                     return;
                 }
-                // SAFETY: each layer is done once, and writes its own.
-                unsafe {
-                    let virial = &mut (*arrays.tallies.at(layer)).virial;
-                    pass(&swept, layer, &*arrays.near.at(layer), virial);
-                }
+                // SAFETY: each layer is done once.
+                unsafe { this.second_of_layer(&swept, arrays, layer, &*arrays.near.at(layer)) };
             }
         });
+    }
+
+    /// The second pass of one layer.
+    ///
+    /// # Safety
+    /// No other thread does the same layer, and slopes of it and the next are there.
+    unsafe fn second_of_layer(
+        &self,
+        swept: &Swept<P::Scalar, P::Record>,
+        arrays: Arrays<P>,
+        layer: usize,
+        near: &NearPairs<P::Scalar>,
+    ) {
+        let pass = self.passes.second[self.totals as usize];
+        // SAFETY: the caller's.
+        unsafe { pass(swept, layer, near, &mut (*arrays.tallies.at(layer)).virial) };
     }
 }

@@ -165,11 +165,10 @@ impl<P: Compiled> Stream<'_, P> {
         if self.machine.terms.passes.is_empty() {
             return;
         }
-        let pass = self.machine.passes.second[self.machine.totals as usize];
-        // SAFETY: each layer is done once, and writes its own.
+        // SAFETY: each layer is done once.
         unsafe {
-            let virial = &mut (*self.arrays.tallies.at(layer)).virial;
-            pass(&self.swept, layer, self.near(t, slab, layer), virial);
+            let near = self.near(t, slab, layer);
+            self.machine.second_of_layer(&self.swept, self.arrays, layer, near);
         }
     }
 }
