@@ -1,5 +1,6 @@
 //! Mixed and double precision: what is kept of a particle, and how a pair's distance comes from it.
 
+use super::block::PLACE_BITS;
 use super::forces::Kind;
 use super::frame::Frame;
 use super::simd::{Isa, Reals, Scalar, Words};
@@ -42,6 +43,9 @@ pub struct Names<R: Reals> {
     pub species_j: R::Words,
 }
 
+const _: () =
+    assert!(size_of::<MixedRecord>() == 1 << PLACE_BITS && size_of::<DoubleRecord>() == 2 << PLACE_BITS);
+
 /// A choice of precision on an instruction set.
 #[allow(clippy::missing_safety_doc)] // The contract of `simd`.
 pub trait Arithmetic<I: Isa>: 'static {
@@ -53,16 +57,17 @@ pub trait Arithmetic<I: Isa>: 'static {
 
     unsafe fn metric(frame: &Frame) -> Self::Metric;
 
-    /// The columns of the particles `index`, as many as a vector has lanes.
-    unsafe fn own(records: *const Self::Record, index: *const u32, own: &mut Own<Self::Scalar>);
+    /// The columns of the records from `first` on, as many as a vector has lanes.
+    unsafe fn own(first: *const Self::Record, own: &mut Own<Self::Scalar>);
 
-    /// Pairs of particles of `own` with others: `which`, and `index` of the records.
-    unsafe fn separate(
+    /// Pairs of particles of `own`, `which`, with others, at 32 times their `places` in the records. Velocities and
+    /// species of the others are there with `ALL` only, how fast pairs part if they are `moving`.
+    unsafe fn separate<const ALL: bool>(
         metric: &Self::Metric,
         records: *const Self::Record,
         own: *const Own<Self::Scalar>,
         which: <Self::Reals as Reals>::Words,
-        index: *const u32,
+        places: *const u32,
         moving: bool,
     ) -> (Apart<Self::Reals>, Names<Self::Reals>);
 
@@ -121,6 +126,9 @@ pub struct Double;
 /// Particles on one point have no direction; this keeps `1/r` finite, and `d/r` zero.
 const TINY: f64 = 1e-30;
 
+/// Thirty-two times the place of records that follow each other.
+const IN_ORDER: [u32; 16] = [0, 32, 64, 96, 128, 160, 192, 224, 256, 288, 320, 352, 384, 416, 448, 480];
+
 const TWO_TO_32: f64 = 4_294_967_296.0;
 
 /// Lengths of the frame, and how it leans, over 2³².
@@ -149,17 +157,14 @@ impl<I: Isa> Arithmetic<I> for Mixed {
     }
 
     #[inline(always)]
-    unsafe fn own(records: *const MixedRecord, index: *const u32, own: &mut Own<f32>) {
+    unsafe fn own(first: *const MixedRecord, own: &mut Own<f32>) {
         // SAFETY: the contract of `simd`.
         unsafe {
-            let base: *const u8 = records.cast();
-            let stride = size_of::<MixedRecord>();
-            let [x, y, z, tag] = <I::F32 as Reals>::Words::columns(base, stride, index);
+            let [x, y, z, tag, u, v, w, species] = I::columns::<true>(first.cast(), IN_ORDER.as_ptr());
             x.store(own.position[0].as_mut_ptr().cast());
             y.store(own.position[1].as_mut_ptr().cast());
             z.store(own.position[2].as_mut_ptr().cast());
             tag.store(own.tag.as_mut_ptr());
-            let [u, v, w, species] = <I::F32 as Reals>::Words::columns(base.add(16), stride, index);
             u.store(own.velocity[0].as_mut_ptr().cast());
             v.store(own.velocity[1].as_mut_ptr().cast());
             w.store(own.velocity[2].as_mut_ptr().cast());
@@ -168,22 +173,20 @@ impl<I: Isa> Arithmetic<I> for Mixed {
     }
 
     #[inline(always)]
-    unsafe fn separate(
+    unsafe fn separate<const ALL: bool>(
         metric: &Self::Metric,
         records: *const MixedRecord,
         own: *const Own<f32>,
         which: <I::F32 as Reals>::Words,
-        index: *const u32,
+        places: *const u32,
         moving: bool,
     ) -> (Apart<I::F32>, Names<I::F32>) {
         type W<I> = <<I as Isa>::F32 as Reals>::Words;
         // SAFETY: the contract of `simd`.
         unsafe {
             let own = &*own;
-            let base: *const u8 = records.cast();
-            let stride = size_of::<MixedRecord>();
             let [sx, sy, sz] = metric.scale;
-            let [xj, yj, zj, tag_j] = W::<I>::columns(base, stride, index);
+            let [xj, yj, zj, tag_j, uj, vj, wj, species_j] = I::columns::<ALL>(records.cast(), places);
             let xi = W::<I>::pick(own.position[0].as_ptr().cast(), which);
             let yi = W::<I>::pick(own.position[1].as_ptr().cast(), which);
             let zi = W::<I>::pick(own.position[2].as_ptr().cast(), which);
@@ -199,19 +202,19 @@ impl<I: Isa> Arithmetic<I> for Mixed {
             let tiny = I::F32::constant(TINY);
             let r2 = dx.mul_add(dx, dy.mul_add(dy, dz * dz)).larger(tiny);
             let inverse = r2.inverse_root();
-            let [uj, vj, wj, species_j] = I::F32::columns(base.add(16), stride, index);
             let mut along = inverse;
             if moving {
                 let ui = I::F32::pick(own.velocity[0].as_ptr(), which);
                 let vi = I::F32::pick(own.velocity[1].as_ptr(), which);
                 let wi = I::F32::pick(own.velocity[2].as_ptr(), which);
-                let sum = (ui - uj).mul_add(dx, (vi - vj).mul_add(dy, (wi - wj) * dz));
+                let (u, v, w) = (ui - I::of_bits(uj), vi - I::of_bits(vj), wi - I::of_bits(wj));
+                let sum = u.mul_add(dx, v.mul_add(dy, w * dz));
                 along = sum * inverse;
             }
             let tag_i = W::<I>::pick(own.tag.as_ptr(), which);
             (
                 Apart { d: [dx, dy, dz], r: r2 * inverse, inverse, along },
-                Names { tags: [tag_i, tag_j], species_j: I::bits(species_j) },
+                Names { tags: [tag_i, tag_j], species_j },
             )
         }
     }
@@ -256,19 +259,16 @@ impl<I: Isa> Arithmetic<I> for Double {
     }
 
     #[inline(always)]
-    unsafe fn own(records: *const DoubleRecord, index: *const u32, own: &mut Own<f64>) {
+    unsafe fn own(first: *const DoubleRecord, own: &mut Own<f64>) {
         // SAFETY: the contract of `simd`.
         unsafe {
-            let base: *const u8 = records.cast();
-            let stride = size_of::<DoubleRecord>();
-            let [x, y, z, bits] = I::F64::columns(base, stride, index);
+            let [x, y, z, bits, u, v, w, _] = I::wide_columns::<true>(first.cast(), IN_ORDER.as_ptr());
             x.store(own.position[0].as_mut_ptr());
             y.store(own.position[1].as_mut_ptr());
             z.store(own.position[2].as_mut_ptr());
             let [tag, species] = I::halves(bits);
             tag.store(own.tag.as_mut_ptr());
             species.store(own.species.as_mut_ptr());
-            let [u, v, w, _] = I::F64::columns(base.add(32), stride, index);
             u.store(own.velocity[0].as_mut_ptr());
             v.store(own.velocity[1].as_mut_ptr());
             w.store(own.velocity[2].as_mut_ptr());
@@ -276,21 +276,19 @@ impl<I: Isa> Arithmetic<I> for Double {
     }
 
     #[inline(always)]
-    unsafe fn separate(
+    unsafe fn separate<const ALL: bool>(
         metric: &Self::Metric,
         records: *const DoubleRecord,
         own: *const Own<f64>,
         which: <I::F64 as Reals>::Words,
-        index: *const u32,
+        places: *const u32,
         moving: bool,
     ) -> (Apart<I::F64>, Names<I::F64>) {
         // SAFETY: the contract of `simd`.
         unsafe {
             let own = &*own;
-            let base: *const u8 = records.cast();
-            let stride = size_of::<DoubleRecord>();
             let ([lx, ly, lz], [ix, iy, iz], [xy, xz, yz]) = (metric.length, metric.inverse, metric.lean);
-            let [xj, yj, zj, bits] = I::F64::columns(base, stride, index);
+            let [xj, yj, zj, bits, uj, vj, wj, _] = I::wide_columns::<ALL>(records.cast(), places);
             let xi = I::F64::pick(own.position[0].as_ptr(), which);
             let yi = I::F64::pick(own.position[1].as_ptr(), which);
             let zi = I::F64::pick(own.position[2].as_ptr(), which);
@@ -312,7 +310,6 @@ impl<I: Isa> Arithmetic<I> for Double {
             let inverse = r2.inverse_root();
             let mut along = inverse;
             if moving {
-                let [uj, vj, wj, _] = I::F64::columns(base.add(32), stride, index);
                 let ui = I::F64::pick(own.velocity[0].as_ptr(), which);
                 let vi = I::F64::pick(own.velocity[1].as_ptr(), which);
                 let wi = I::F64::pick(own.velocity[2].as_ptr(), which);

@@ -2,28 +2,27 @@
 
 use super::arithmetic::Arithmetic;
 use super::block::Block;
-use super::layer::Swept;
+use super::layer::{Part, Swept};
 use super::simd::{Isa, Reals, Scalar, Words};
 use crate::engine::tally::Tally;
 use crate::model::pair::PairForm;
 
-/// Forces along `ê` of the pairs `from..to` of a block, of which `members` from `slot` on are the first.
+/// Forces along `ê` of the pairs of a vector's worth of a group.
 #[inline(always)]
 pub unsafe fn aside<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY: bool>(
     swept: &Swept<A::Scalar, A::Record>,
     metric: &A::Metric,
     block: &mut Block<A::Scalar>,
-    slot: usize,
-    [from, to]: [usize; 2],
+    part: Part,
     tally: &mut Tally,
 ) {
     // SAFETY: the contract of `simd`.
     unsafe {
-        let mut k = from;
-        while k < to {
+        let mut k = 0;
+        while k < part.count() {
             let which = <A::Reals as Reals>::Words::load_bytes(block.which.as_ptr().add(k));
-            let index = block.j.as_ptr().add(k);
-            let (pairs, _) = A::separate(metric, swept.records.as_ptr(), &block.own, which, index, false);
+            let (records, places) = (swept.records.as_ptr(), block.j.as_ptr().add(part.pairs[0] + k));
+            let (pairs, _) = A::separate::<false>(metric, records, &block.own, which, places, false);
             let mut lanes = [A::Scalar::default(); 16];
             pairs.r.store(lanes.as_mut_ptr());
             for (r, lane) in block.aside.all[k..].iter_mut().zip(&lanes[..A::Reals::LANES]) {
@@ -33,32 +32,30 @@ pub unsafe fn aside<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY: 
         }
     }
     if SEVERAL {
-        for k in from..to {
-            let i = block.members[slot + block.which[k] as usize] as usize;
-            let (a, b) = (swept.species[i] as usize, swept.species[block.j[k] as usize] as usize);
+        for k in 0..part.count() {
+            let [a, b] = block.pair(part, k).map(|i| swept.species[i] as usize);
             block.aside.kind[k] = (a * swept.terms.species + b) as u32;
         }
     }
-    each::<A::Scalar, SEVERAL>(swept, block, slot, [from, to], TALLY.then_some(tally));
+    each::<A::Scalar, SEVERAL>(swept, block, part, TALLY.then_some(tally));
 }
 
 #[inline(never)]
 fn each<T: Scalar, const SEVERAL: bool>(
     swept: &Swept<T, impl super::arithmetic::Record>,
     block: &mut Block<T>,
-    slot: usize,
-    [from, to]: [usize; 2],
+    part: Part,
     mut tally: Option<&mut Tally>,
 ) {
     let terms = swept.terms;
-    block.conservative[from..to].fill(T::default());
+    block.conservative[..part.count()].fill(T::default());
     for term in &terms.apart {
         let [a, b] = term.between;
         let (ab, ba) = ((a * terms.species + b) as u32, (b * terms.species + a) as u32);
         let range = term.potential.range();
         let mut found = 0;
         let aside = &mut block.aside;
-        for k in from..to {
+        for k in 0..part.count() {
             let r = aside.all[k];
             let acts = !SEVERAL || aside.kind[k] == ab || aside.kind[k] == ba;
             aside.place[found] = k as u32;
@@ -67,11 +64,11 @@ fn each<T: Scalar, const SEVERAL: bool>(
         }
         term.potential.block(&aside.r[..found], &mut aside.phi[..found], &mut aside.slope[..found]);
         for n in 0..found {
-            let k = aside.place[n] as usize;
-            block.conservative[k] = T::of(block.conservative[k].wide() - aside.slope[n]);
+            let k = block.aside.place[n] as usize;
+            block.conservative[k] = T::of(block.conservative[k].wide() - block.aside.slope[n]);
             if let Some(tally) = &mut tally {
-                let i = block.members[slot + block.which[k] as usize] as usize;
-                tally.pair += aside.phi[n] * swept.share(i, block.j[k] as usize);
+                let [i, j] = block.pair(part, k);
+                tally.pair += block.aside.phi[n] * swept.share(i, j);
             }
         }
     }

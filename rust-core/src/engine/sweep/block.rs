@@ -1,32 +1,39 @@
 //! The pairs in hand: some hundred, in arrays that stay in the first-level cache.
 
 use super::arithmetic::Own;
-use super::chunks::{Chunk, FOUR};
+use super::chunks::{Chunk, Four};
+use super::layer::Part;
 use super::scatter::Sum;
 use super::simd::{Scalar, Two};
 
-/// Most particles whose pairs are in hand at once.
-pub const GROUP: usize = 16;
+/// Most particles that look for others at once.
+pub const GROUP: usize = 32;
+
+/// Places of particles in the order of cells are multiplied by 32, the size of accumulators and of records in mixed
+/// precision.
+pub const PLACE_BITS: u32 = 5;
+
+/// Masks of chunks that are turned at once, and lists of which follow each other.
+pub const EIGHT: usize = 8;
 
 /// Sixteen rows of four numbers, aligned so that no vector of them straddles lines of the cache.
 #[derive(Debug, Clone, Copy, Default)]
 #[repr(C, align(64))]
 pub struct Lines<T>([[T; 4]; 16]);
 
-/// Pairs of a group of particles, in parallel arrays.
+/// Pairs of a group of particles, and of a vector's worth of them, in parallel arrays.
 #[derive(Debug)]
 pub struct Block<T> {
-    /// The first particles of the pairs, each once, and where the pairs of each begin, and of the last end.
-    pub members: [u32; GROUP],
+    /// The first of the group.
+    pub first: usize,
+    /// Where the pairs of each begin, and of the last end.
     pub begin: [u32; GROUP + 1],
-    /// The second particle of each pair, in the order of cells.
+    /// The second particle of each pair of the group: 32 times its place in the order of cells.
     pub j: Vec<u32>,
-    /// The same, of the first of each four members, of the second …
-    pub lists: [Vec<u32>; FOUR],
+    /// A vector's worth of the group, whose pairs are in hand. All arrays of pairs below begin with their first.
+    pub own: Own<T>,
     /// The first particle of each pair, a number in `own`.
     pub which: Vec<u8>,
-    /// A vector's worth of members.
-    pub own: Own<T>,
     /// Room for [`Pairs`](super::arithmetic::Pairs) of a precision and instruction set, a vector each.
     pub pairs: Vec<Lines<T>>,
     /// Tags of both particles; then the words of noise are where the first were.
@@ -43,16 +50,17 @@ pub struct Block<T> {
     pub running: Vec<Sum>,
     /// Work space of pair terms that are evaluated apart.
     pub aside: Aside,
-    /// What the members are to be compared with.
+    /// What the group is to be compared with.
     pub chunks: Vec<Chunk>,
     pub chunk_count: usize,
-    /// Members that look together: the first, and how many.
-    pub fours: [[u8; 2]; GROUP],
+    /// Who looks together.
+    pub fours: [Four; GROUP],
     pub four_count: usize,
-    /// Where the members are.
-    pub points: [Two; 2 * GROUP],
-    /// Which of each chunk are within reach.
+    /// For each eight slots, where the four are that look at their chunks.
+    pub points: Vec<[Two; 2]>,
+    /// Which of the chunk of each slot are within reach, and 32 times the place of its first particle.
     pub masks: Vec<u64>,
+    pub bases: Vec<u32>,
     capacity: usize,
 }
 
@@ -69,7 +77,7 @@ pub struct Aside {
     pub slope: Vec<f64>,
 }
 
-/// Chunks of a group: five windows, in up to three periods each, of two chunks.
+/// Chunks of a group: five windows, in up to three periods each, of two chunks for each particle.
 const CHUNKS: usize = GROUP * 5 * 3 * 2 + 2;
 
 /// Room behind the last pair: what whole vectors may touch.
@@ -78,12 +86,11 @@ const SLACK: usize = 64;
 impl<T: Scalar> Default for Block<T> {
     fn default() -> Self {
         let mut block = Block {
-            members: [0; GROUP],
+            first: 0,
             begin: [0; GROUP + 1],
             j: Vec::new(),
-            lists: Default::default(),
-            which: Vec::new(),
             own: Own::default(),
+            which: Vec::new(),
             pairs: Vec::new(),
             tags: Default::default(),
             rows: Vec::new(),
@@ -94,10 +101,11 @@ impl<T: Scalar> Default for Block<T> {
             aside: Aside::default(),
             chunks: Vec::new(),
             chunk_count: 0,
-            fours: [[0; 2]; GROUP],
+            fours: [Four::default(); GROUP],
             four_count: 0,
-            points: [Two::default(); 2 * GROUP],
+            points: Vec::new(),
             masks: Vec::new(),
+            bases: Vec::new(),
             capacity: 0,
         };
         block.reserve_chunks(0);
@@ -113,15 +121,19 @@ impl<T: Scalar> Block<T> {
         let room = count + CHUNKS;
         if room > self.chunks.len() {
             self.chunks.resize(2 * room, Chunk::default());
-            self.masks.resize(2 * room, 0);
+            // Slots of each four come in eights.
+            let eights = 2 * room / EIGHT + GROUP + 1;
+            self.points.resize(eights, Default::default());
+            self.masks.resize(EIGHT * eights, 0);
+            self.bases.resize(EIGHT * eights, 0);
         }
     }
 
-    /// Makes room for `count` pairs of each of four, and whole vectors behind.
+    /// Makes room for `count` pairs, and whole vectors behind.
     #[inline(always)]
     pub fn reserve(&mut self, count: usize) {
-        if FOUR * count + SLACK > self.capacity {
-            self.grow(FOUR * count + SLACK);
+        if count + SLACK > self.capacity {
+            self.grow(count + SLACK);
         }
     }
 
@@ -131,9 +143,6 @@ impl<T: Scalar> Block<T> {
         let capacity = (2 * count).next_multiple_of(64);
         self.capacity = capacity;
         self.j.resize(capacity, 0);
-        for list in &mut self.lists {
-            list.resize(capacity, 0);
-        }
         self.which.resize(capacity, 0);
         for tags in &mut self.tags {
             tags.resize(capacity, 0);
@@ -152,6 +161,11 @@ impl<T: Scalar> Block<T> {
         for values in [&mut aside.all, &mut aside.r, &mut aside.phi, &mut aside.slope] {
             values.resize(capacity, 0.0);
         }
+    }
+
+    /// Both particles of pair `p` of those in hand.
+    pub fn pair(&self, part: Part, p: usize) -> [usize; 2] {
+        [part.first + self.which[p] as usize, (self.j[part.pairs[0] + p] >> PLACE_BITS) as usize]
     }
 
     /// Room for the weights of `passes` densities.

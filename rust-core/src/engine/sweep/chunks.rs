@@ -1,10 +1,10 @@
 //! Spans of bins as chunks of sixteen particles, each to be compared with up to four.
 
 use super::arithmetic::Record;
-use super::block::Block;
+use super::block::{Block, EIGHT};
 use super::layer::Swept;
-use super::simd::Scalar;
-use super::windows::{Ends, Spans, View, Windows};
+use super::simd::{Isa, Reals, Scalar};
+use super::windows::{Bins, Ends, Spans, View, Windows};
 
 /// Particles that look together, at most.
 pub const FOUR: usize = 4;
@@ -16,8 +16,18 @@ pub struct Chunk {
     /// Which of them: sixteen bits for the first of the four, then for the second …
     pub allowed: u64,
     pub from: u32,
-    /// The number of the four in the group, and the shift that they see these with, in the lowest eight bits.
+    /// The slot of its masks, and the shift that the four see these with, in the lowest eight bits.
     pub note: u32,
+}
+
+/// Particles of a group that look together.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Four {
+    /// The first in the group, and how many: four, or fewer.
+    pub first: u8,
+    pub many: u8,
+    /// Their slots, of eight each: from, and to before.
+    pub eights: [u16; 2],
 }
 
 /// A group of particles of one row, whose spans are to be cut.
@@ -33,7 +43,7 @@ pub struct Group<'a> {
 
 /// Cuts the spans of a group into chunks. Particles that follow each other closely look together.
 #[inline(always)]
-pub unsafe fn cut<T: Scalar, const GHOSTS: bool>(
+pub unsafe fn cut<I: Isa, T: Scalar, const GHOSTS: bool>(
     swept: &Swept<T, impl Record>,
     group: &Group,
     block: &mut Block<T>,
@@ -44,10 +54,14 @@ pub unsafe fn cut<T: Scalar, const GHOSTS: bool>(
         let x = swept.x[0].as_ptr().add(group.first);
         let mut found = 0;
         let mut fours = 0;
+        let mut eights = 0;
         let mut a = 0;
         while a < count {
             let mut many = FOUR.min(count - a);
-            if !ends.together {
+            let together = ends.together >> (a / I::F32::LANES) & 1 == 1;
+            if !together {
+                // Vectors have spans of one or of the other kind.
+                many = many.min(I::F32::LANES - a % I::F32::LANES);
                 let begin = *x.add(a);
                 let mut k = 1;
                 while k < many {
@@ -59,15 +73,20 @@ pub unsafe fn cut<T: Scalar, const GHOSTS: bool>(
             }
             // The last again in the place of those that are not there.
             let these = [a, a + 1.min(many - 1), a + 2.min(many - 1), a + many - 1];
-            *block.fours.get_unchecked_mut(fours) = [a as u8, many as u8];
-            let look = Look { these, four: fours, who: u64::MAX >> (64 - 16 * many) };
+            let begin = found;
+            let look = Look {
+                these,
+                together,
+                slots: (EIGHT * eights).wrapping_sub(found),
+                who: u64::MAX >> (64 - 16 * many),
+            };
             let mut w = 0;
             while w < 5 {
                 let row = *windows.row.get_unchecked(w);
                 // In their own row they look at those behind them.
                 let own = (group.first + a + 1) as u32;
-                let from = if w == 0 { own } else { *row.add(lowest(&spans.low, w, these, ends)) };
-                let to = *row.add(highest(&spans.end, w, these, ends));
+                let from = if w == 0 { own } else { *row.add(lowest(&spans.low, w, &look)) };
+                let to = *row.add(highest(&spans.end, w, &look));
                 found = add::<T, GHOSTS>(swept, group, block, found, [from, to], w + 5, &look);
                 w += 1;
             }
@@ -77,8 +96,7 @@ pub unsafe fn cut<T: Scalar, const GHOSTS: bool>(
                 let mut w = 1;
                 while w < 5 {
                     let row = *windows.row.get_unchecked(w);
-                    let range =
-                        [*row.add(lowest(&spans.before, w, these, ends)), *row.add(view.bins as usize)];
+                    let range = [*row.add(lowest(&spans.before, w, &look)), *row.add(view.bins as usize)];
                     found = add::<T, GHOSTS>(swept, group, block, found, range, w, &look);
                     w += 1;
                 }
@@ -87,11 +105,16 @@ pub unsafe fn cut<T: Scalar, const GHOSTS: bool>(
                 let mut w = 0;
                 while w < 5 {
                     let row = *windows.row.get_unchecked(w);
-                    let range = [*row, *row.add(highest(&spans.after, w, these, ends))];
+                    let range = [*row, *row.add(highest(&spans.after, w, &look))];
                     found = add::<T, GHOSTS>(swept, group, block, found, range, w + 10, &look);
                     w += 1;
                 }
             }
+            // There is one at least.
+            let next = eights + (found - begin).div_ceil(EIGHT);
+            *block.fours.get_unchecked_mut(fours) =
+                Four { first: a as u8, many: many as u8, eights: [eights as u16, next as u16] };
+            eights = next;
             fours += 1;
             a += many;
         }
@@ -101,11 +124,12 @@ pub unsafe fn cut<T: Scalar, const GHOSTS: bool>(
 }
 
 #[inline(always)]
-unsafe fn lowest(bins: &[[i32; 16]; 5], w: usize, [a, b, c, d]: [usize; FOUR], ends: Ends) -> usize {
+unsafe fn lowest(bins: &Bins, w: usize, look: &Look) -> usize {
     // SAFETY: of a group.
     unsafe {
         let at = |k: usize| *bins.get_unchecked(w).get_unchecked(k);
-        if ends.together {
+        let [a, b, c, d] = look.these;
+        if look.together {
             return at(a) as usize;
         }
         at(a).min(at(b)).min(at(c).min(at(d))) as usize
@@ -113,11 +137,12 @@ unsafe fn lowest(bins: &[[i32; 16]; 5], w: usize, [a, b, c, d]: [usize; FOUR], e
 }
 
 #[inline(always)]
-unsafe fn highest(bins: &[[i32; 16]; 5], w: usize, [a, b, c, d]: [usize; FOUR], ends: Ends) -> usize {
+unsafe fn highest(bins: &Bins, w: usize, look: &Look) -> usize {
     // SAFETY: of a group.
     unsafe {
         let at = |k: usize| *bins.get_unchecked(w).get_unchecked(k);
-        if ends.together {
+        let [a, b, c, d] = look.these;
+        if look.together {
             return at(a) as usize;
         }
         at(a).max(at(b)).max(at(c).max(at(d))) as usize
@@ -128,7 +153,10 @@ unsafe fn highest(bins: &[[i32; 16]; 5], w: usize, [a, b, c, d]: [usize; FOUR], 
 struct Look {
     /// In the group; the last more than once if they are fewer.
     these: [usize; FOUR],
-    four: usize,
+    /// Whether their spans are those of all four.
+    together: bool,
+    /// Added to the number of a chunk this is its slot; it wraps.
+    slots: usize,
     /// Sixteen bits for each that is there.
     who: u64,
 }
@@ -136,6 +164,9 @@ struct Look {
 /// The bits of the first of thirty-two particles, for each of four that look: those of the first chunk, and of the
 /// second.
 static FIRST_BITS: [[u64; 2]; 33] = first_bits();
+
+/// In notes.
+const ONE_SLOT: u32 = 1 << 8;
 
 /// Sixteen bits for each of four.
 const EACH: u64 = 0x0001_0001_0001_0001;
@@ -187,7 +218,7 @@ unsafe fn add<T: Scalar, const GHOSTS: bool>(
             }
         }
         let length = to.saturating_sub(from) as usize;
-        let note = (look.four << 8 | shift) as u32;
+        let note = (look.slots.wrapping_add(found) << 8 | shift) as u32;
         let who = if own { look.who & BEHIND } else { look.who };
         if length > 32 {
             return add_many(swept, block, found, from, to, who, look.who, note, ghosts);
@@ -196,7 +227,8 @@ unsafe fn add<T: Scalar, const GHOSTS: bool>(
         let bits = FIRST_BITS.get_unchecked(length);
         let out = block.chunks.as_mut_ptr().add(found);
         *out = Chunk { allowed: bits[0] & who & owned[0], from, note };
-        *out.add(1) = Chunk { allowed: bits[1] & look.who & owned[1], from: from + 16, note };
+        *out.add(1) =
+            Chunk { allowed: bits[1] & look.who & owned[1], from: from + 16, note: note + ONE_SLOT };
         found + (own || length > 0) as usize + (length > 16) as usize
     }
 }
@@ -220,7 +252,7 @@ fn add_many<T: Scalar>(
     to: u32,
     first: u64,
     who: u64,
-    note: u32,
+    mut note: u32,
     ghosts: Option<[bool; FOUR]>,
 ) -> usize {
     block.reserve_chunks(found + (to - from).div_ceil(16) as usize);
@@ -232,6 +264,7 @@ fn add_many<T: Scalar>(
             allowed &= concerned(ghosts, unsafe { swept.owned_bits(begin as usize) });
         }
         block.chunks[found] = Chunk { allowed, from: begin, note };
+        note += ONE_SLOT;
         found += 1;
     }
     found

@@ -72,7 +72,7 @@ compile!(avx2, super::super::simd::Avx2, "avx2,fma,bmi1,bmi2,lzcnt,popcnt");
 compile!(
     avx512,
     super::super::simd::Avx512,
-    "avx512f,avx512bw,avx512dq,avx512vl,avx2,fma,bmi1,bmi2,lzcnt,popcnt"
+    "avx512f,avx512bw,avx512dq,avx512vl,avx512vbmi2,avx2,fma,bmi1,bmi2,lzcnt,popcnt"
 );
 
 /// A precision, and its passes on each instruction set.

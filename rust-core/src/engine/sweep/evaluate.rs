@@ -3,9 +3,9 @@
 
 use super::arithmetic::{Apart, Arithmetic, Pairs};
 use super::aside::aside;
-use super::block::Block;
+use super::block::{Block, PLACE_BITS};
 use super::forces::{Kind, Sums, add_virial, slope, sum, value};
-use super::layer::Swept;
+use super::layer::{Part, Swept};
 use super::many_body::{NEAR_BITS, NearPairs};
 use super::simd::{Isa, Reals, Scalar, Words};
 use super::terms::Pass;
@@ -14,7 +14,7 @@ use crate::engine::noise::PairNoise;
 use crate::engine::tally::Tally;
 use crate::model::kernel::Real;
 
-/// Evaluates the pairs `from..to` of a block, of which a vector's worth of members from `slot` on are the first.
+/// Evaluates the pairs of a vector's worth of a group.
 ///
 /// Leaves rows of forces and weights in the block; appends to `near` the pairs that a density reaches.
 ///
@@ -26,37 +26,37 @@ pub unsafe fn evaluate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALL
     kit: &Kit<I, A>,
     block: &mut Block<A::Scalar>,
     near: &mut NearPairs<A::Scalar>,
-    slot: usize,
-    [from, to]: [usize; 2],
+    part: Part,
     tally: &mut Tally,
 ) {
     // SAFETY: the contract of `simd`.
     unsafe {
+        let count = part.count();
         let terms = swept.terms;
         let lanes = A::Reals::LANES;
         let passes = terms.passes.len();
         if !terms.apart.is_empty() {
-            aside::<I, A, SEVERAL, TALLY>(swept, &kit.metric, block, slot, [from, to], tally);
+            aside::<I, A, SEVERAL, TALLY>(swept, &kit.metric, block, part, tally);
         }
-        near.reserve::<TALLY>(to - from + 16);
-        separate::<I, A, SEVERAL>(swept, kit, block, [from, to]);
+        near.reserve::<TALLY>(count + 16);
+        separate::<I, A, SEVERAL>(swept, kit, block, part);
         let zero = A::Reals::constant(0.0);
         let p_which = block.which.as_ptr();
-        let p_j = block.j.as_ptr();
+        let p_j = block.j.as_ptr().add(part.pairs[0]);
         let p_rows = block.rows.as_mut_ptr().cast::<A::Scalar>();
         let p_conservative = block.conservative.as_ptr();
         let p_found = block.found.as_mut_ptr();
         let mut p_pairs = block.pairs.as_ptr().cast::<Pairs<A::Reals>>();
         let p_noise = block.tags[0].as_ptr();
         let plain = swept.variables == 1;
-        let layer_first = <A::Reals as Reals>::Words::splat(near.first);
+        let layer_first = <A::Reals as Reals>::Words::splat(near.first << PLACE_BITS);
         let drag = terms.drag.as_ref().filter(|_| swept.thermostat.is_some());
         let mut sums = Sums::<A::Reals>::zero();
-        let mut k = from;
-        while k < to {
+        let mut k = 0;
+        while k < count {
             let pairs = &*p_pairs;
             let (r, kind) = (pairs.apart.r, pairs.kind);
-            let share = if TALLY { shares::<I, A>(swept, block, slot, k, to) } else { zero };
+            let share = if TALLY { shares::<I, A>(swept, block, part, k) } else { zero };
             let mut force = if terms.apart.is_empty() { zero } else { Reals::load(p_conservative.add(k)) };
             for term in &terms.soft {
                 force = term.add::<A::Reals, SEVERAL, TALLY>(r, kind, force, share, &mut sums.pair);
@@ -104,13 +104,14 @@ pub unsafe fn evaluate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALL
             let term = terms.passes.get_unchecked(pass);
             let mut p_pairs = block.pairs.as_ptr().cast::<Pairs<A::Reals>>();
             let mut found = 0;
-            let mut k = from;
-            while k < to {
+            let mut k = 0;
+            while k < count {
                 let pairs = &*p_pairs;
-                let valid = u32::MAX >> (32 - (to - k).min(lanes));
-                let share = if TALLY { shares::<I, A>(swept, block, slot, k, to) } else { zero };
+                let valid = u32::MAX >> (32 - (count - k).min(lanes));
+                let share = if TALLY { shares::<I, A>(swept, block, part, k) } else { zero };
                 let which = <A::Reals as Reals>::Words::load_bytes(p_which.add(k));
-                let code = <A::Reals as Reals>::Words::load(p_j.add(k)).sub(layer_first);
+                let code =
+                    <A::Reals as Reals>::Words::load(p_j.add(k)).sub(layer_first).shift_right::<PLACE_BITS>();
                 let code = A::Reals::encode(code.add(which.rotate(NEAR_BITS)));
                 let mask = pairs.apart.r.mask_below(A::Reals::splat(term.force_range)) & valid;
                 keep::<A::Reals, TALLY>(term, &pairs.apart, code, mask, share, near, pass, found);
@@ -161,21 +162,27 @@ unsafe fn separate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool>(
     swept: &Swept<A::Scalar, A::Record>,
     kit: &Kit<I, A>,
     block: &mut Block<A::Scalar>,
-    [from, to]: [usize; 2],
+    part: Part,
 ) {
     // SAFETY: the contract of `simd`; blocks have room for all pairs and a vector behind.
     unsafe {
         let records = swept.records.as_ptr();
         let own: *const _ = &block.own;
         let p_which = block.which.as_ptr();
-        let p_j = block.j.as_ptr();
+        let p_j = block.j.as_ptr().add(part.pairs[0]);
+        let count = part.count();
         let mut p_pairs = block.pairs.as_mut_ptr().cast::<Pairs<A::Reals>>();
         let p_tags = [block.tags[0].as_mut_ptr(), block.tags[1].as_mut_ptr()];
         let moving = kit.noise.is_some();
-        let mut k = from;
-        while k < to {
+        let mut k = 0;
+        while k < count {
             let which = <A::Reals as Reals>::Words::load_bytes(p_which.add(k));
-            let (apart, names) = A::separate(&kit.metric, records, own, which, p_j.add(k), moving);
+            let (metric, places) = (&kit.metric, p_j.add(k));
+            let (apart, names) = if moving || SEVERAL {
+                A::separate::<true>(metric, records, own, which, places, moving)
+            } else {
+                A::separate::<false>(metric, records, own, which, places, false)
+            };
             let pairs = &mut *p_pairs;
             pairs.apart = apart;
             if moving {
@@ -190,7 +197,7 @@ unsafe fn separate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool>(
             k += A::Reals::LANES;
         }
         if let Some(noise) = kit.noise {
-            draw::<<I::F32 as Reals>::Words>(noise, p_tags[0], p_tags[1], [from, to]);
+            draw::<<I::F32 as Reals>::Words>(noise, p_tags[0], p_tags[1], count);
         }
     }
 }
@@ -228,14 +235,13 @@ unsafe fn keep<R: Reals, const TALLY: bool>(
 unsafe fn shares<I: Isa, A: Arithmetic<I>>(
     swept: &Swept<A::Scalar, A::Record>,
     block: &Block<A::Scalar>,
-    slot: usize,
+    part: Part,
     k: usize,
-    to: usize,
 ) -> A::Reals {
     let mut shares = [A::Scalar::default(); 16];
-    for p in k..to.min(k + A::Reals::LANES) {
-        let i = block.members[slot + block.which[p] as usize] as usize;
-        shares[p - k] = A::Scalar::of(swept.share(i, block.j[p] as usize));
+    for p in k..part.count().min(k + A::Reals::LANES) {
+        let [i, j] = block.pair(part, p);
+        shares[p - k] = A::Scalar::of(swept.share(i, j));
     }
     // SAFETY: no vector has more lanes.
     unsafe { A::Reals::load(shares.as_ptr()) }

@@ -5,7 +5,7 @@
 //! which thread does which layer, nor when.
 
 use super::arithmetic::Arithmetic;
-use super::block::Block;
+use super::block::{Block, GROUP};
 use super::chunks::{Group, cut};
 use super::evaluate::{Kit, evaluate};
 use super::frame::Frame;
@@ -133,13 +133,13 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TA
                 first = end;
             }
             while first < end {
-                let count = I::F32::LANES.min(end - first);
-                let ends = view.spans::<I>(swept, row, first, count, &windows.there, &mut spans);
+                let count = GROUP.min(end - first);
+                let ends = view.spans::<I>(swept, row, [first, count], &windows.there, &mut spans);
                 let group = Group { view: &view, windows: &windows, spans: &spans, ends, first, count };
                 if ghosts {
-                    cut::<A::Scalar, true>(swept, &group, block);
+                    cut::<I, A::Scalar, true>(swept, &group, block);
                 } else {
-                    cut::<A::Scalar, false>(swept, &group, block);
+                    cut::<I, A::Scalar, false>(swept, &group, block);
                 }
                 if windows.crosses || ends.before | ends.after != 0 {
                     look::<I, A::Scalar, true>(swept, &group, block);
@@ -160,7 +160,24 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TA
     }
 }
 
-/// Evaluates the pairs of a vector's worth of members of a block, and adds what they do.
+/// A vector's worth of a group.
+#[derive(Clone, Copy)]
+pub struct Part {
+    /// From which of the group to before which.
+    pub slots: [usize; 2],
+    /// The particle that is the first.
+    pub first: usize,
+    /// Their pairs, among those of the group.
+    pub pairs: [usize; 2],
+}
+
+impl Part {
+    pub fn count(self) -> usize {
+        self.pairs[1] - self.pairs[0]
+    }
+}
+
+/// Evaluates the pairs of a vector's worth of a group, and adds what they do.
 #[inline(always)]
 unsafe fn part<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY: bool>(
     swept: &Swept<A::Scalar, A::Record>,
@@ -171,7 +188,7 @@ unsafe fn part<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY: bool>
     [first, last]: [usize; 2],
     tally: &mut Tally,
 ) {
-    // SAFETY: the contract of `simd`; members of a block are particles, as are those behind the last.
+    // SAFETY: the contract of `simd`; there are records for a vector behind the last particle.
     unsafe {
         let pairs = [*block.begin.get_unchecked(first) as usize, *block.begin.get_unchecked(last) as usize];
         if pairs[0] == pairs[1] {
@@ -180,21 +197,25 @@ unsafe fn part<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY: bool>
         let which = block.which.as_mut_ptr();
         let mut m = first;
         while m < last {
-            let end = *block.begin.get_unchecked(m + 1) as usize;
-            let mut k = *block.begin.get_unchecked(m) as usize;
+            let end = *block.begin.get_unchecked(m + 1) as usize - pairs[0];
+            let mut k = *block.begin.get_unchecked(m) as usize - pairs[0];
+            // Mostly enough.
+            which.add(k).cast::<[u8; 32]>().write_unaligned([(m - first) as u8; 32]);
+            k += 32;
             while k < end {
                 which.add(k).cast::<[u8; 16]>().write_unaligned([(m - first) as u8; 16]);
                 k += 16;
             }
             m += 1;
         }
-        A::own(swept.records.as_ptr(), block.members.as_ptr().add(first), &mut block.own);
-        evaluate::<I, A, SEVERAL, TALLY>(swept, kit, block, near, first, pairs, tally);
+        let part = Part { slots: [first, last], first: block.first + first, pairs };
+        A::own(swept.records.as_ptr().add(part.first), &mut block.own);
+        evaluate::<I, A, SEVERAL, TALLY>(swept, kit, block, near, part, tally);
         let offset = *swept.offset.get_unchecked(layer);
-        scatter::<I, A>(swept.sums, offset, block, [first, last]);
+        scatter::<I, A>(swept.sums, offset, block, part);
         if swept.variables > 1 {
-            scatter_weights(swept, offset, block, [first, last]);
+            scatter_weights(swept, offset, block, part);
         }
-        near.add::<TALLY>(block, [first, last]);
+        near.add::<TALLY>(block, part);
     }
 }

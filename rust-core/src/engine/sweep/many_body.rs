@@ -2,7 +2,7 @@
 
 use super::arithmetic::Arithmetic;
 use super::block::Block;
-use super::layer::Swept;
+use super::layer::{Part, Swept};
 use super::scatter::add_to;
 use super::simd::{Isa, Quad, Scalar};
 
@@ -13,9 +13,9 @@ pub struct NearPairs<T> {
     pub rows: Vec<Rows<T>>,
     /// Rows `r_i − r_j` and the share of each, if virials are wanted.
     pub apart: Vec<Rows<T>>,
-    /// The first particles of the pairs, a vector's worth after another, and how many pairs each of those has
-    /// for each density.
-    parts: Vec<([u32; 16], usize)>,
+    /// The first particles of the pairs, a vector's worth after another: the first, and how many; and how many pairs
+    /// those have for each density.
+    parts: Vec<[u32; 2]>,
     found: Vec<u32>,
     /// The first particle of the layer.
     pub first: u32,
@@ -67,9 +67,9 @@ impl<T> NearPairs<T> {
         }
     }
 
-    /// Counts the pairs that were written behind the last, of members `first..last` of a block.
+    /// Counts the pairs that were written behind the last.
     #[inline(always)]
-    pub unsafe fn add<const TALLY: bool>(&mut self, block: &Block<T>, [first, last]: [usize; 2])
+    pub unsafe fn add<const TALLY: bool>(&mut self, block: &Block<T>, part: Part)
     where
         T: Scalar,
     {
@@ -78,14 +78,8 @@ impl<T> NearPairs<T> {
             if self.rows.is_empty() {
                 return;
             }
-            let mut members = [0; 16];
-            let mut m = first;
-            while m < last {
-                members[m - first] = *block.members.get_unchecked(m);
-                m += 1;
-            }
             make_room(&mut self.parts, 1);
-            self.parts.push((members, last - first));
+            self.parts.push([part.first as u32, (part.slots[1] - part.slots[0]) as u32]);
             make_room(&mut self.found, self.rows.len());
             for pass in 0..self.rows.len() {
                 let found = *block.found.get_unchecked(pass);
@@ -103,7 +97,7 @@ impl<T> NearPairs<T> {
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         self.rows.iter().chain(&self.apart).map(|rows| rows.0.capacity() * size_of::<[T; 4]>()).sum::<usize>()
-            + self.parts.capacity() * size_of::<([u32; 16], usize)>()
+            + self.parts.capacity() * size_of::<[u32; 2]>()
             + self.found.capacity() * size_of::<u32>()
     }
 }
@@ -173,7 +167,7 @@ pub unsafe fn second_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const T
         let mut done = vec![0; passes];
         let mut part = 0;
         while part < near.parts.len() {
-            let (members, count) = near.parts.get_unchecked(part);
+            let [first, count] = near.parts.get_unchecked(part).map(|n| n as usize);
             let mut pass = 0;
             while pass < passes {
                 let rows = &near.rows.get_unchecked(pass).0;
@@ -184,8 +178,8 @@ pub unsafe fn second_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const T
                 let mut own = [0.0; 16];
                 let mut rows_of = [(slopes, 0); 16];
                 let mut m = 0;
-                while m < *count {
-                    let i = *members.get_unchecked(m) as usize;
+                while m < count {
+                    let i = first + m;
                     if SEVERAL {
                         rows_of[m] = (slopes.add(width * i), *swept.species.get_unchecked(i) as usize);
                     } else {
@@ -221,8 +215,8 @@ pub unsafe fn second_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const T
                 pass += 1;
             }
             let mut m = 0;
-            while m < *count {
-                add_to(base.add(4 * *members.get_unchecked(m) as usize), banks.take::<I::Quad>(m));
+            while m < count {
+                add_to(base.add(4 * (first + m)), banks.take::<I::Quad>(m));
                 m += 1;
             }
             part += 1;

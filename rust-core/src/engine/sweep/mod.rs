@@ -243,8 +243,8 @@ impl Sweep {
             return Err(EngineError::Host("particle arrays have different lengths"));
         }
         // Indices are coded in 29 bits, copies of a layer among them.
-        if all > 1 << 28 {
-            return Err(EngineError::Host("more than 2^28 particles and ghosts on one rank"));
+        if all > 1 << 27 {
+            return Err(EngineError::Host("more than 2^27 particles and ghosts on one rank"));
         }
         if matches!(space, Space::Box(_)) && particles.owned < all {
             return Err(EngineError::Host("a periodic box has no ghosts"));

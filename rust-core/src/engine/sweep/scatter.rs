@@ -1,8 +1,8 @@
 //! What pairs do, added to the accumulators of their particles.
 
 use super::arithmetic::{Arithmetic, Record};
-use super::block::Block;
-use super::layer::{Shared, Swept};
+use super::block::{Block, PLACE_BITS};
+use super::layer::{Part, Shared, Swept};
 use super::simd::{Isa, Quad, Scalar};
 
 /// An accumulator: a force, and the density if there is one variable; aligned so that none straddles lines of the
@@ -11,13 +11,15 @@ use super::simd::{Isa, Quad, Scalar};
 #[repr(C, align(32))]
 pub struct Sum(pub [f64; 4]);
 
-/// Adds the rows of the pairs of `slots` of a block to both particles of each pair.
+const _: () = assert!(size_of::<Sum>() == 1 << PLACE_BITS);
+
+/// Adds the rows of pairs to both particles of each.
 #[inline(always)]
 pub unsafe fn scatter<I: Isa, A: Arithmetic<I>>(
     sums: Shared<f64>,
     offset: isize,
     block: &mut Block<A::Scalar>,
-    [first, last]: [usize; 2],
+    part: Part,
 ) {
     // SAFETY: the contract of `simd`; accumulators are there for every particle of the layer and the next.
     unsafe {
@@ -26,25 +28,26 @@ pub unsafe fn scatter<I: Isa, A: Arithmetic<I>>(
         let sign = I::Quad::load(SIGN.as_ptr());
         let base = sums.0.offset(4 * offset);
         let rows = block.rows.as_ptr().cast::<A::Scalar>();
-        let j = block.j.as_ptr();
+        let places = block.j.as_ptr().add(part.pairs[0]);
         // One loop over all, not one for each member, none of whose ends is to be foreseen: what a member gets is
         // the difference of two running sums.
         let mut running = Running::<I::Quad>::new(block.running.as_mut_ptr().cast());
-        let begin = block.begin.as_ptr();
-        let (from, end) = (*begin.add(first) as usize, *begin.add(last) as usize);
-        let mut p = from;
-        while p < end {
+        let count = part.count();
+        let mut p = 0;
+        while p < count {
             let row = A::load_quad(rows.add(4 * p));
-            let at = base.add(4 * *j.add(p) as usize);
+            let at = base.byte_add(*places.add(p) as usize);
             I::Quad::load(at).sub(row).store(at);
-            running.add(p - from, row);
+            running.add(p, row);
             p += 1;
         }
+        let begin = block.begin.as_ptr();
+        let [first, last] = part.slots;
         let mut m = first;
         while m < last {
-            let (a, b) = (*begin.add(m) as usize - from, *begin.add(m + 1) as usize - from);
+            let [a, b] = [m, m + 1].map(|m| *begin.add(m) as usize - part.pairs[0]);
             let sum = running.sum(a, b);
-            add_to(base.add(4 * *block.members.get_unchecked(m) as usize), sum.mul(sign));
+            add_to(base.add(4 * (part.first + m - first)), sum.mul(sign));
             m += 1;
         }
     }
@@ -116,7 +119,7 @@ pub unsafe fn scatter_weights<T: Scalar>(
     swept: &Swept<T, impl Record>,
     offset: isize,
     block: &Block<T>,
-    [first, last]: [usize; 2],
+    part: Part,
 ) {
     // SAFETY: as `scatter`.
     unsafe {
@@ -124,15 +127,17 @@ pub unsafe fn scatter_weights<T: Scalar>(
         let width = swept.variables;
         let base = swept.densities.0.offset(width as isize * offset);
         let passes = swept.terms.passes.len();
-        let mut p = *block.begin.get_unchecked(first) as usize;
+        let [first, last] = part.slots;
+        let places = block.j.as_ptr().add(part.pairs[0]);
+        let mut p = 0;
         let mut m = first;
         while m < last {
-            let to = *block.begin.get_unchecked(m + 1) as usize;
-            let i = *block.members.get_unchecked(m) as usize;
+            let to = *block.begin.get_unchecked(m + 1) as usize - part.pairs[0];
+            let i = part.first + m - first;
             let si = if species > 1 { *swept.species.get_unchecked(i) as usize } else { 0 };
             let at_i = base.add(width * i);
             while p < to {
-                let j = *block.j.get_unchecked(p) as usize;
+                let j = (*places.add(p) >> PLACE_BITS) as usize;
                 let sj = if species > 1 { *swept.species.get_unchecked(j) as usize } else { 0 };
                 let at_j = base.add(width * j + si);
                 let mut d = 0;

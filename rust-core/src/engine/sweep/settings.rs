@@ -61,7 +61,8 @@ impl Instructions {
             let avx512 = is_x86_feature_detected!("avx512f")
                 && is_x86_feature_detected!("avx512bw")
                 && is_x86_feature_detected!("avx512dq")
-                && is_x86_feature_detected!("avx512vl");
+                && is_x86_feature_detected!("avx512vl")
+                && is_x86_feature_detected!("avx512vbmi2");
             match self {
                 Instructions::Portable => true,
                 Instructions::Avx2 => avx2,

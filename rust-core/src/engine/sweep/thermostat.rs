@@ -10,19 +10,19 @@ pub const UNIT: f64 = 1.732_050_807_568_877_2 / 2_147_483_648.0;
 
 const _: () = assert!(PAIR_ROUNDS == 13);
 
-/// Words of noise of the pairs `from..to`: Threefry2x32 of their two tags, in order. They replace the first tags;
+/// Words of noise of `count` pairs: Threefry2x32 of their two tags, in order. They replace the first tags;
 /// runs over by two vectors.
 ///
 /// # Safety
 /// The contract of `simd`.
 #[inline(always)]
-pub unsafe fn draw<W: Words>(noise: PairNoise, a: *mut u32, b: *const u32, [from, to]: [usize; 2]) {
+pub unsafe fn draw<W: Words>(noise: PairNoise, a: *mut u32, b: *const u32, count: usize) {
     // SAFETY: the caller's.
     unsafe {
         let [k0, k1] = noise.key();
         let schedule = [W::splat(k0), W::splat(k1), W::splat(PARITY ^ k0 ^ k1)];
-        let mut k = from;
-        while k < to {
+        let mut k = 0;
+        while k < count {
             // Two vectors by turns: one alone waits for itself.
             let (a0, b0) = (W::load(a.add(k)), W::load(b.add(k)));
             let (a1, b1) = (W::load(a.add(k + W::LANES)), W::load(b.add(k + W::LANES)));

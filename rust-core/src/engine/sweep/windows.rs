@@ -1,6 +1,7 @@
 //! Where a particle looks for others: in which rows, and there from which bin to which.
 
 use super::arithmetic::Record;
+use super::block::GROUP;
 use super::frame::Frame;
 use super::grid::Grid;
 use super::layer::Swept;
@@ -73,15 +74,17 @@ impl Windows {
     }
 }
 
-/// The bins, from the first to one past the last, in which particles of a vector look for others, for each
-/// window.
+/// A bin for each window and particle of a group.
+pub type Bins = [[i32; GROUP]; 5];
+
+/// The bins, from the first to one past the last, in which particles of a group look for others.
 #[derive(Default)]
 pub struct Spans {
-    pub low: [[i32; 16]; 5],
-    pub end: [[i32; 16]; 5],
+    pub low: Bins,
+    pub end: Bins,
     /// From where to the end of the row they look in the period before, and to where in the next.
-    pub before: [[i32; 16]; 5],
-    pub after: [[i32; 16]; 5],
+    pub before: Bins,
+    pub after: Bins,
 }
 
 /// A layer, in the numbers that spans are made of.
@@ -116,22 +119,57 @@ impl View {
         }
     }
 
-    /// The spans of the particles from `i` on, a vector of them.
+    /// The spans of a group: `count` particles from `first` on.
     #[inline(always)]
     pub unsafe fn spans<I: Isa>(
         &self,
         swept: &Swept<impl Scalar, impl Record>,
         row: usize,
-        i: usize,
-        count: usize,
+        [first, count]: [usize; 2],
         there: &[f32; 5],
         out: &mut Spans,
     ) -> Ends {
         // SAFETY: the contract of `simd`.
         unsafe {
-            let x = I::F32::load(swept.x[0].as_ptr().add(i));
-            let y = I::F32::load(swept.x[1].as_ptr().add(i));
-            let z = I::F32::load(swept.x[2].as_ptr().add(i));
+            let mut ends = Ends::default();
+            let mut at = 0;
+            while at < count {
+                let i = first + at;
+                let x = swept.x.map(|x| x.as_ptr().add(i));
+                let left = count - at;
+                if left >= I::F32::LANES {
+                    let x = x.map(|x| I::F32::load(x));
+                    self.spans_of_vector::<I>(swept, row, x, at, there, out, &mut ends);
+                } else {
+                    // The last in the place of those that are not there.
+                    let x = x.map(|x| {
+                        let mut lanes = [*x.add(left - 1); 16];
+                        std::ptr::copy_nonoverlapping(x, lanes.as_mut_ptr(), left);
+                        I::F32::load(lanes.as_ptr())
+                    });
+                    self.spans_of_vector::<I>(swept, row, x, at, there, out, &mut ends);
+                }
+                at += I::F32::LANES;
+            }
+            ends
+        }
+    }
+
+    /// The spans of particles at `x`, `y`, `z`, those of a group from `at` on.
+    #[inline(always)]
+    #[allow(clippy::too_many_arguments)]
+    unsafe fn spans_of_vector<I: Isa>(
+        &self,
+        swept: &Swept<impl Scalar, impl Record>,
+        row: usize,
+        [x, y, z]: [I::F32; 3],
+        at: usize,
+        there: &[f32; 5],
+        out: &mut Spans,
+        ends: &mut Ends,
+    ) {
+        // SAFETY: the contract of `simd`.
+        unsafe {
             let zero = I::F32::constant(0.0);
             let whole = I::F32::splat(self.half);
             let mut half = [whole; 5];
@@ -160,15 +198,14 @@ impl View {
             let [mut before, mut after] = [0; 2];
             if self.periodic {
                 // The longest span is that of the particle's own row.
-                let these = (1u32 << count) - 1;
-                before = (bin - half[0]).mask_below(zero) & these;
-                after = (most - one).mask_below(bin + half[0]) & these;
+                before = (bin - half[0]).mask_below(zero);
+                after = (most - one).mask_below(bin + half[0]);
             }
-            // Four by four, if no four are too far apart, and there are no others in the vector.
+            // Four by four, if no four are too far apart.
             let first = I::first_of_four(x);
             let far = I::F32::splat(self.joined);
             let close = (x - first).mask_below(far) & (first - x).mask_below(far);
-            let together = count == I::F32::LANES && close.trailing_ones() as usize >= count;
+            let together = close.trailing_ones() as usize >= I::F32::LANES;
             let mut w = 0;
             while w < 5 {
                 // Rows that are not there get a span without length.
@@ -180,29 +217,32 @@ impl View {
                 }
                 if before != 0 {
                     let low = (low + most).smaller(most);
-                    low.store_whole(out.before.get_unchecked_mut(w).as_mut_ptr());
+                    low.store_whole(out.before.get_unchecked_mut(w).as_mut_ptr().add(at));
                 }
                 if after != 0 {
                     let over = (end - most).larger(zero);
-                    over.store_whole(out.after.get_unchecked_mut(w).as_mut_ptr());
+                    over.store_whole(out.after.get_unchecked_mut(w).as_mut_ptr().add(at));
                 }
-                low.larger(zero).smaller(most).store_whole(out.low.get_unchecked_mut(w).as_mut_ptr());
-                end.smaller(most).store_whole(out.end.get_unchecked_mut(w).as_mut_ptr());
+                let low = low.larger(zero).smaller(most);
+                low.store_whole(out.low.get_unchecked_mut(w).as_mut_ptr().add(at));
+                end.smaller(most).store_whole(out.end.get_unchecked_mut(w).as_mut_ptr().add(at));
                 w += 1;
             }
-            Ends { before, after, together }
+            ends.before |= before << at;
+            ends.after |= after << at;
+            ends.together |= (together as u32) << (at / I::F32::LANES);
         }
     }
 }
 
 /// How the spans of a group end.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub struct Ends {
     /// Particles whose spans go on in the period before, and in the next: a bit for each.
     pub before: u32,
     pub after: u32,
-    /// Whether spans are those of each four particles together.
-    pub together: bool,
+    /// Vectors in which spans are those of each four particles together: a bit for each.
+    pub together: u32,
 }
 
 /// Fractional coordinates along the first edge.

@@ -164,7 +164,7 @@ impl<P: Compiled> Machine<P> {
             q.resize(total + 4 * SLACK, 0);
         }
         self.order.resize(self.particles, 0);
-        self.records.resize(total.max(1), P::Record::default());
+        self.records.resize(total + SLACK, P::Record::default());
         self.species.resize(if several { total.max(1) } else { 0 }, 0);
         self.ghost.resize(if with_ghosts { total + SLACK } else { 0 }, false);
         let frame = &self.frame;

@@ -1,7 +1,8 @@
 //! AVX2 with FMA and BMI2.
 
 use super::avx512::{F64x4 as Quad4, operators};
-use super::{Isa, ORDINARY_F32, ORDINARY_F64, Reals, Two, Words, row_at};
+use super::{Isa, ORDINARY_F32, ORDINARY_F64, Reals, Two, Words, row_at, wide_row_at};
+use crate::engine::sweep::block::PLACE_BITS;
 use crate::model::kernel::Real;
 use std::arch::x86_64::*;
 use std::ops::{Add, Mul, Sub};
@@ -139,18 +140,6 @@ impl Reals for F32x8 {
         unsafe { F32x8(_mm256_i32gather_ps::<4>(table, index.0)) }
     }
     #[inline(always)]
-    unsafe fn columns(base: *const u8, stride: usize, index: *const u32) -> [Self; 4] {
-        unsafe {
-            let [a, b, c, d] = columns_of_words(base, stride, index);
-            [
-                F32x8(_mm256_castsi256_ps(a)),
-                F32x8(_mm256_castsi256_ps(b)),
-                F32x8(_mm256_castsi256_ps(c)),
-                F32x8(_mm256_castsi256_ps(d)),
-            ]
-        }
-    }
-    #[inline(always)]
     unsafe fn rows(columns: [Self; 4], p: *mut f32) {
         unsafe {
             let [a, b, c, d] = columns;
@@ -172,17 +161,15 @@ impl Reals for F32x8 {
     }
 }
 
+/// Four columns of eight rows of four words.
 #[inline(always)]
-unsafe fn columns_of_words(base: *const u8, stride: usize, index: *const u32) -> [__m256i; 4] {
+unsafe fn columns_of_words(low: [__m128i; 4], high: [__m128i; 4]) -> [U32x8; 4] {
     unsafe {
         // Rows k and k + 4 go to the halves of vector k.
         let mut v = [_mm256_setzero_si256(); 4];
         let mut k = 0;
         while k < 4 {
-            let low: *const __m128i = row_at(base, stride, index, k).cast();
-            let high: *const __m128i = row_at(base, stride, index, k + 4).cast();
-            let half = _mm256_castsi128_si256(_mm_loadu_si128(low));
-            v[k] = _mm256_inserti128_si256::<1>(half, _mm_loadu_si128(high));
+            v[k] = _mm256_inserti128_si256::<1>(_mm256_castsi128_si256(low[k]), high[k]);
             k += 1;
         }
         let a = _mm256_unpacklo_epi32(v[0], v[1]);
@@ -190,10 +177,10 @@ unsafe fn columns_of_words(base: *const u8, stride: usize, index: *const u32) ->
         let c = _mm256_unpacklo_epi32(v[2], v[3]);
         let d = _mm256_unpackhi_epi32(v[2], v[3]);
         [
-            _mm256_unpacklo_epi64(a, c),
-            _mm256_unpackhi_epi64(a, c),
-            _mm256_unpacklo_epi64(b, d),
-            _mm256_unpackhi_epi64(b, d),
+            U32x8(_mm256_unpacklo_epi64(a, c)),
+            U32x8(_mm256_unpackhi_epi64(a, c)),
+            U32x8(_mm256_unpacklo_epi64(b, d)),
+            U32x8(_mm256_unpackhi_epi64(b, d)),
         ]
     }
 }
@@ -295,19 +282,6 @@ impl Reals for F64x4 {
         unsafe { F64x4(_mm256_i32gather_pd::<8>(table, index.0)) }
     }
     #[inline(always)]
-    unsafe fn columns(base: *const u8, stride: usize, index: *const u32) -> [Self; 4] {
-        unsafe {
-            let mut v = [_mm256_setzero_pd(); 4];
-            let mut k = 0;
-            while k < 4 {
-                v[k] = _mm256_loadu_pd(row_at(base, stride, index, k).cast());
-                k += 1;
-            }
-            let [a, b, c, d] = transposed(v);
-            [F64x4(a), F64x4(b), F64x4(c), F64x4(d)]
-        }
-    }
-    #[inline(always)]
     unsafe fn rows([a, b, c, d]: [Self; 4], p: *mut f64) {
         unsafe {
             let rows = transposed([a.0, b.0, c.0, d.0]);
@@ -364,17 +338,16 @@ impl Words for U32x8 {
         }
     }
     #[inline(always)]
+    unsafe fn shift_right<const BY: u32>(self) -> Self {
+        unsafe { U32x8(_mm256_srlv_epi32(self.0, _mm256_set1_epi32(BY as i32))) }
+    }
+    #[inline(always)]
     unsafe fn load_bytes(p: *const u8) -> Self {
         unsafe { U32x8(_mm256_cvtepu8_epi32(_mm_loadl_epi64(p.cast()))) }
     }
     #[inline(always)]
     unsafe fn pick(table: *const u32, which: Self) -> Self {
         unsafe { U32x8(_mm256_permutevar8x32_epi32(_mm256_loadu_si256(table.cast()), which.0)) }
-    }
-    #[inline(always)]
-    unsafe fn columns(base: *const u8, stride: usize, index: *const u32) -> [Self; 4] {
-        let [a, b, c, d] = unsafe { columns_of_words(base, stride, index) };
-        [U32x8(a), U32x8(b), U32x8(c), U32x8(d)]
     }
 }
 
@@ -422,25 +395,16 @@ impl Words for U32x4 {
         }
     }
     #[inline(always)]
+    unsafe fn shift_right<const BY: u32>(self) -> Self {
+        unsafe { U32x4(_mm_srlv_epi32(self.0, _mm_set1_epi32(BY as i32))) }
+    }
+    #[inline(always)]
     unsafe fn load_bytes(p: *const u8) -> Self {
         unsafe { U32x4(_mm_cvtepu8_epi32(_mm_cvtsi32_si128(p.cast::<i32>().read_unaligned()))) }
     }
     #[inline(always)]
     unsafe fn pick(table: *const u32, which: Self) -> Self {
         unsafe { U32x4(_mm_castps_si128(_mm_permutevar_ps(_mm_loadu_ps(table.cast()), which.0))) }
-    }
-    #[inline(always)]
-    unsafe fn columns(base: *const u8, stride: usize, index: *const u32) -> [Self; 4] {
-        unsafe {
-            let mut rows = [[0u32; 4]; 4];
-            for (k, row) in rows.iter_mut().enumerate() {
-                *row = row_at(base, stride, index, k).cast::<[u32; 4]>().read_unaligned();
-            }
-            std::array::from_fn(|c| {
-                let column = [rows[0][c], rows[1][c], rows[2][c], rows[3][c]];
-                Self::load(column.as_ptr())
-            })
-        }
     }
 }
 
@@ -453,7 +417,7 @@ impl Isa for Avx2 {
     unsafe fn near<const SHIFTS: bool>(
         x: [*const u16; 3],
         shift: [u16; 3],
-        four: [&Two; 2],
+        four: &[Two; 2],
         limit: i16,
     ) -> u64 {
         unsafe {
@@ -492,13 +456,40 @@ impl Isa for Avx2 {
         unsafe { _mm256_storeu_si256(p.cast(), _mm256_set1_epi16(x as i16)) }
     }
     #[inline(always)]
-    unsafe fn collect(first: u32, mask: u32, p: *mut u32) {
+    unsafe fn turn(masks: *mut u64) {
         unsafe {
-            let index = _mm256_add_epi32(_mm256_set1_epi32(first as i32), order(mask));
-            _mm256_storeu_si256(p.cast(), index);
-            let p = p.add((mask & 0xff).count_ones() as usize);
-            let index = _mm256_add_epi32(_mm256_set1_epi32(first as i32 + 8), order(mask >> 8));
-            _mm256_storeu_si256(p.cast(), index);
+            // In halves, words 0 of both masks, words 1, …; then those of both halves together.
+            let words = _mm256_setr_epi8(
+                0, 1, 8, 9, 2, 3, 10, 11, 4, 5, 12, 13, 6, 7, 14, 15, 0, 1, 8, 9, 2, 3, 10, 11, 4, 5, 12, 13,
+                6, 7, 14, 15,
+            );
+            let halves = _mm256_setr_epi32(0, 4, 1, 5, 2, 6, 3, 7);
+            let mut k = 0;
+            while k < 8 {
+                let p: *mut __m256i = masks.add(k).cast();
+                let m = _mm256_shuffle_epi8(_mm256_loadu_si256(p), words);
+                _mm256_storeu_si256(p, _mm256_permutevar8x32_epi32(m, halves));
+                k += 4;
+            }
+        }
+    }
+    #[inline(always)]
+    unsafe fn collect(bases: *const u32, mask: u64, p: *mut u32) -> usize {
+        unsafe {
+            let mut found = 0;
+            let mut k = 0;
+            while k < 8 {
+                let mask = (mask >> (8 * k)) as u32 & 0xff;
+                let mut base = _mm256_set1_epi32(*bases.add(k / 2) as i32);
+                if k % 2 == 1 {
+                    base = _mm256_add_epi32(base, _mm256_set1_epi32(8 << PLACE_BITS));
+                }
+                let places = _mm256_slli_epi32::<{ PLACE_BITS as i32 }>(order(mask));
+                _mm256_storeu_si256(p.add(found).cast(), _mm256_add_epi32(base, places));
+                found += mask.count_ones() as usize;
+                k += 1;
+            }
+            found
         }
     }
     #[inline(always)]
@@ -520,8 +511,43 @@ impl Isa for Avx2 {
         }
     }
     #[inline(always)]
-    unsafe fn bits(x: F32x8) -> U32x8 {
-        unsafe { U32x8(_mm256_castps_si256(x.0)) }
+    unsafe fn columns<const ALL: bool>(base: *const u8, offsets: *const u32) -> [U32x8; 8] {
+        unsafe {
+            let mut rows = [[_mm_setzero_si128(); 8]; 2];
+            let mut k = 0;
+            while k < 8 {
+                let at: *const __m128i = row_at(base, offsets, k).cast();
+                rows[0][k] = _mm_loadu_si128(at);
+                rows[1][k] = _mm_loadu_si128(at.add(1));
+                k += 1;
+            }
+            let [[a0, a1, a2, a3, a4, a5, a6, a7], [b0, b1, b2, b3, b4, b5, b6, b7]] = rows;
+            let [a, b, c, d] = columns_of_words([a0, a1, a2, a3], [a4, a5, a6, a7]);
+            let zero = U32x8(_mm256_setzero_si256());
+            let [e, f, g, h] =
+                if ALL { columns_of_words([b0, b1, b2, b3], [b4, b5, b6, b7]) } else { [zero; 4] };
+            [a, b, c, d, e, f, g, h]
+        }
+    }
+    #[inline(always)]
+    unsafe fn wide_columns<const ALL: bool>(base: *const u8, offsets: *const u32) -> [F64x4; 8] {
+        unsafe {
+            let mut rows = [[_mm256_setzero_pd(); 4]; 2];
+            let mut k = 0;
+            while k < 4 {
+                let at: *const f64 = wide_row_at(base, offsets, k).cast();
+                rows[0][k] = _mm256_loadu_pd(at);
+                rows[1][k] = _mm256_loadu_pd(at.add(4));
+                k += 1;
+            }
+            let [a, b, c, d] = transposed(rows[0]);
+            let [e, f, g, h] = if ALL { transposed(rows[1]) } else { rows[1] };
+            [F64x4(a), F64x4(b), F64x4(c), F64x4(d), F64x4(e), F64x4(f), F64x4(g), F64x4(h)]
+        }
+    }
+    #[inline(always)]
+    unsafe fn of_bits(words: U32x8) -> F32x8 {
+        unsafe { F32x8(_mm256_castsi256_ps(words.0)) }
     }
     #[inline(always)]
     unsafe fn halves(x: F64x4) -> [U32x4; 2] {

@@ -1,7 +1,7 @@
-//! AVX-512 (F, BW, DQ, VL), with AVX2, FMA and BMI2.
+//! AVX-512 (F, BW, DQ, VL, VBMI2), with AVX2, FMA and BMI2.
 
 use super::avx2::U32x8;
-use super::{Isa, ORDINARY_F32, ORDINARY_F64, Quad, Reals, Two, Words, row_at};
+use super::{Isa, ORDINARY_F32, ORDINARY_F64, Quad, Reals, Two, Words, row_at, wide_row_at};
 use crate::model::kernel::Real;
 use std::arch::x86_64::*;
 use std::ops::{Add, Mul, Sub};
@@ -146,10 +146,6 @@ impl Reals for F32x16 {
         unsafe { F32x16(_mm512_i32gather_ps::<4>(index.0, table.cast())) }
     }
     #[inline(always)]
-    unsafe fn columns(base: *const u8, stride: usize, index: *const u32) -> [Self; 4] {
-        unsafe { columns_of_words(base, stride, index).map_each() }
-    }
-    #[inline(always)]
     unsafe fn rows(columns: [Self; 4], p: *mut f32) {
         unsafe {
             let [a, b, c, d] = columns;
@@ -174,56 +170,29 @@ impl Reals for F32x16 {
     }
 }
 
-/// Four vectors of sixteen words.
-#[derive(Clone, Copy)]
-struct WordColumns([__m512i; 4]);
-
-impl WordColumns {
-    #[inline(always)]
-    fn map_each(self) -> [F32x16; 4] {
-        let [a, b, c, d] = self.0;
-        unsafe {
-            [
-                F32x16(_mm512_castsi512_ps(a)),
-                F32x16(_mm512_castsi512_ps(b)),
-                F32x16(_mm512_castsi512_ps(c)),
-                F32x16(_mm512_castsi512_ps(d)),
-            ]
-        }
+/// Sixteen bytes of the rows `offsets` bytes behind `base`.
+#[inline(always)]
+unsafe fn row(base: *const u8, offsets: *const u32, k: usize) -> [__m128i; 2] {
+    unsafe {
+        let at: *const __m128i = row_at(base, offsets, k).cast();
+        [_mm_loadu_si128(at), _mm_loadu_si128(at.add(1))]
     }
 }
 
+/// Four by four words, transposed within quarters.
 #[inline(always)]
-unsafe fn row(base: *const u8, stride: usize, index: *const u32, k: usize) -> __m128i {
-    unsafe { _mm_loadu_si128(row_at(base, stride, index, k).cast()) }
-}
-
-/// Rows of four words, sixteen of them, as columns: loads of 16 bytes and a transposition within
-/// quarters cost a fraction of a gather instruction.
-#[inline(always)]
-unsafe fn columns_of_words(base: *const u8, stride: usize, index: *const u32) -> WordColumns {
+unsafe fn transposed(v: [__m512i; 4]) -> [U32x16; 4] {
     unsafe {
-        // Rows k, k + 4, k + 8, k + 12 go to the quarters of vector k.
-        let mut v = [_mm512_setzero_si512(); 4];
-        let mut k = 0;
-        while k < 4 {
-            // Broadcasts from memory that write a quarter each: loads, unlike insertions, are no shuffles.
-            let quarter = _mm512_castsi128_si512(row(base, stride, index, k));
-            let quarter = _mm512_mask_broadcast_i32x4(quarter, 0x00f0, row(base, stride, index, k + 4));
-            let quarter = _mm512_mask_broadcast_i32x4(quarter, 0x0f00, row(base, stride, index, k + 8));
-            v[k] = _mm512_mask_broadcast_i32x4(quarter, 0xf000, row(base, stride, index, k + 12));
-            k += 1;
-        }
         let a = _mm512_unpacklo_epi32(v[0], v[1]);
         let b = _mm512_unpackhi_epi32(v[0], v[1]);
         let c = _mm512_unpacklo_epi32(v[2], v[3]);
         let d = _mm512_unpackhi_epi32(v[2], v[3]);
-        WordColumns([
-            _mm512_unpacklo_epi64(a, c),
-            _mm512_unpackhi_epi64(a, c),
-            _mm512_unpacklo_epi64(b, d),
-            _mm512_unpackhi_epi64(b, d),
-        ])
+        [
+            U32x16(_mm512_unpacklo_epi64(a, c)),
+            U32x16(_mm512_unpackhi_epi64(a, c)),
+            U32x16(_mm512_unpacklo_epi64(b, d)),
+            U32x16(_mm512_unpackhi_epi64(b, d)),
+        ]
     }
 }
 
@@ -311,34 +280,6 @@ impl Reals for F64x8 {
         unsafe { F64x8(_mm512_i32gather_pd::<8>(index.0, table.cast())) }
     }
     #[inline(always)]
-    unsafe fn columns(base: *const u8, stride: usize, index: *const u32) -> [Self; 4] {
-        unsafe {
-            // Rows k and k + 4 in the halves.
-            let mut v = [_mm512_setzero_pd(); 4];
-            let mut k = 0;
-            while k < 4 {
-                let low: *const f64 = row_at(base, stride, index, k).cast();
-                let high: *const f64 = row_at(base, stride, index, k + 4).cast();
-                let half = _mm512_castpd256_pd512(_mm256_loadu_pd(low));
-                v[k] = _mm512_insertf64x4::<1>(half, _mm256_loadu_pd(high));
-                k += 1;
-            }
-            // (0,2) of rows 0,1; (1,3) …
-            let a = _mm512_unpacklo_pd(v[0], v[1]);
-            let b = _mm512_unpackhi_pd(v[0], v[1]);
-            let c = _mm512_unpacklo_pd(v[2], v[3]);
-            let d = _mm512_unpackhi_pd(v[2], v[3]);
-            let even = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13);
-            let odd = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
-            [
-                F64x8(_mm512_permutex2var_pd(a, even, c)),
-                F64x8(_mm512_permutex2var_pd(b, even, d)),
-                F64x8(_mm512_permutex2var_pd(a, odd, c)),
-                F64x8(_mm512_permutex2var_pd(b, odd, d)),
-            ]
-        }
-    }
-    #[inline(always)]
     unsafe fn rows(columns: [Self; 4], p: *mut f64) {
         unsafe {
             let [a, b, c, d] = columns;
@@ -401,17 +342,16 @@ impl Words for U32x16 {
         unsafe { U32x16(_mm512_rolv_epi32(self.0, _mm512_set1_epi32(by as i32))) }
     }
     #[inline(always)]
+    unsafe fn shift_right<const BY: u32>(self) -> Self {
+        unsafe { U32x16(_mm512_srlv_epi32(self.0, _mm512_set1_epi32(BY as i32))) }
+    }
+    #[inline(always)]
     unsafe fn load_bytes(p: *const u8) -> Self {
         unsafe { U32x16(_mm512_cvtepu8_epi32(_mm_loadu_si128(p.cast()))) }
     }
     #[inline(always)]
     unsafe fn pick(table: *const u32, which: Self) -> Self {
         unsafe { U32x16(_mm512_permutexvar_epi32(which.0, _mm512_loadu_si512(table.cast()))) }
-    }
-    #[inline(always)]
-    unsafe fn columns(base: *const u8, stride: usize, index: *const u32) -> [Self; 4] {
-        let [a, b, c, d] = unsafe { columns_of_words(base, stride, index).0 };
-        [U32x16(a), U32x16(b), U32x16(c), U32x16(d)]
     }
 }
 
@@ -450,6 +390,83 @@ impl Quad for F64x4 {
     }
 }
 
+/// Four numbers of the rows twice `offsets` bytes behind `base`.
+#[inline(always)]
+unsafe fn four_columns(base: *const u8, offsets: *const u32) -> [F64x8; 4] {
+    unsafe {
+        // Rows k and k + 4 in the halves.
+        let mut v = [_mm512_setzero_pd(); 4];
+        let mut k = 0;
+        while k < 4 {
+            let low: *const f64 = wide_row_at(base, offsets, k).cast();
+            let high: *const f64 = wide_row_at(base, offsets, k + 4).cast();
+            let half = _mm512_castpd256_pd512(_mm256_loadu_pd(low));
+            v[k] = _mm512_insertf64x4::<1>(half, _mm256_loadu_pd(high));
+            k += 1;
+        }
+        // (0,2) of rows 0,1; (1,3) …
+        let a = _mm512_unpacklo_pd(v[0], v[1]);
+        let b = _mm512_unpackhi_pd(v[0], v[1]);
+        let c = _mm512_unpacklo_pd(v[2], v[3]);
+        let d = _mm512_unpackhi_pd(v[2], v[3]);
+        let even = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13);
+        let odd = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
+        [
+            F64x8(_mm512_permutex2var_pd(a, even, c)),
+            F64x8(_mm512_permutex2var_pd(b, even, d)),
+            F64x8(_mm512_permutex2var_pd(a, odd, c)),
+            F64x8(_mm512_permutex2var_pd(b, odd, d)),
+        ]
+    }
+}
+
+/// Sixty-four bytes, aligned.
+#[repr(C, align(64))]
+struct Line<T>(T);
+
+/// Where the words of sixteen bits of turned masks come from.
+static TURNED: Line<[u16; 32]> = Line(turned());
+
+const fn turned() -> [u16; 32] {
+    let mut from = [0; 32];
+    let mut k = 0;
+    while k < 32 {
+        // Half, particle, chunk.
+        let (h, p, c) = (k / 16, k / 4 % 4, k % 4);
+        from[k] = (16 * h + 4 * c + p) as u16;
+        k += 1;
+    }
+    from
+}
+
+/// For each bit of a mask of sixty-four: four times its number in its sixteen, and of which sixteen it is.
+static PLACES: Line<[u8; 64]> = Line(bit_places());
+
+const fn bit_places() -> [u8; 64] {
+    let mut places = [0; 64];
+    let mut k = 0;
+    while k < 64 {
+        places[k] = (4 * (k % 16) + k / 16) as u8;
+        k += 1;
+    }
+    places
+}
+
+/// Writes the places of sixteen bits.
+#[inline(always)]
+unsafe fn places(bases: __m512, bits: __m128i, p: *mut u32) {
+    unsafe {
+        let code = _mm512_cvtepu8_epi32(bits);
+        // Only the lowest two bits of each word choose.
+        let base = _mm512_castps_si512(_mm512_permutevar_ps(bases, code));
+        let place = _mm512_slli_epi32::<3>(_mm512_and_si512(code, _mm512_set1_epi32(0x3c)));
+        let sum = _mm512_add_epi32(base, place);
+        // Halves: a whole store that straddles lines takes more than twice as long.
+        _mm256_storeu_si256(p.cast(), _mm512_castsi512_si256(sum));
+        _mm256_storeu_si256(p.add(8).cast(), _mm512_extracti64x4_epi64::<1>(sum));
+    }
+}
+
 impl Isa for Avx512 {
     type F32 = F32x16;
     type F64 = F64x8;
@@ -459,7 +476,7 @@ impl Isa for Avx512 {
     unsafe fn near<const SHIFTS: bool>(
         x: [*const u16; 3],
         shift: [u16; 3],
-        four: [&Two; 2],
+        four: &[Two; 2],
         limit: i16,
     ) -> u64 {
         unsafe {
@@ -489,16 +506,29 @@ impl Isa for Avx512 {
         unsafe { _mm256_storeu_si256(p.cast(), _mm256_set1_epi16(x as i16)) }
     }
     #[inline(always)]
-    unsafe fn collect(first: u32, mask: u32, p: *mut u32) {
+    unsafe fn turn(masks: *mut u64) {
         unsafe {
-            let lanes = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-            let index = _mm512_add_epi32(_mm512_set1_epi32(first as i32), lanes);
-            let packed = _mm512_maskz_compress_epi32(mask as u16, index);
-            // Rarely more: half a store is more than twice as fast where it straddles lines.
-            _mm256_storeu_si256(p.cast(), _mm512_castsi512_si256(packed));
-            if mask.count_ones() > 8 {
-                _mm256_storeu_si256(p.add(8).cast(), _mm512_extracti64x4_epi64::<1>(packed));
+            let m = _mm512_loadu_si512(masks.cast());
+            let to = _mm512_load_si512((&raw const TURNED).cast());
+            _mm512_storeu_si512(masks.cast(), _mm512_permutexvar_epi16(to, m));
+        }
+    }
+    #[inline(always)]
+    unsafe fn collect(bases: *const u32, mask: u64, p: *mut u32) -> usize {
+        unsafe {
+            // Bytes, in which the number of the base is below the bit's in its sixteen.
+            let packed = _mm512_maskz_compress_epi8(mask, _mm512_load_si512((&raw const PLACES).cast()));
+            let bases = _mm512_castsi512_ps(_mm512_broadcast_i32x4(_mm_loadu_si128(bases.cast())));
+            let count = mask.count_ones() as usize;
+            places(bases, _mm512_castsi512_si128(packed), p);
+            if count > 16 {
+                places(bases, _mm512_extracti32x4_epi32::<1>(packed), p.add(16));
+                if count > 32 {
+                    places(bases, _mm512_extracti32x4_epi32::<2>(packed), p.add(32));
+                    places(bases, _mm512_extracti32x4_epi32::<3>(packed), p.add(48));
+                }
             }
+            count
         }
     }
     #[inline(always)]
@@ -520,8 +550,44 @@ impl Isa for Avx512 {
         }
     }
     #[inline(always)]
-    unsafe fn bits(x: F32x16) -> U32x16 {
-        unsafe { U32x16(_mm512_castps_si512(x.0)) }
+    unsafe fn columns<const ALL: bool>(base: *const u8, offsets: *const u32) -> [U32x16; 8] {
+        unsafe {
+            // Rows k, k + 4, k + 8, k + 12 go to the quarters of vector k.
+            let (mut v, mut w) = ([_mm512_setzero_si512(); 4], [_mm512_setzero_si512(); 4]);
+            let mut k = 0;
+            while k < 4 {
+                // Broadcasts from memory that write a quarter each: loads, unlike insertions, are no shuffles.
+                let [low, high] = row(base, offsets, k);
+                let (low, high) = (_mm512_castsi128_si512(low), _mm512_castsi128_si512(high));
+                let [a, b] = row(base, offsets, k + 4);
+                let low = _mm512_mask_broadcast_i32x4(low, 0x00f0, a);
+                let high = _mm512_mask_broadcast_i32x4(high, 0x00f0, b);
+                let [a, b] = row(base, offsets, k + 8);
+                let low = _mm512_mask_broadcast_i32x4(low, 0x0f00, a);
+                let high = _mm512_mask_broadcast_i32x4(high, 0x0f00, b);
+                let [a, b] = row(base, offsets, k + 12);
+                v[k] = _mm512_mask_broadcast_i32x4(low, 0xf000, a);
+                if ALL {
+                    w[k] = _mm512_mask_broadcast_i32x4(high, 0xf000, b);
+                }
+                k += 1;
+            }
+            let ([a, b, c, d], [e, f, g, h]) = (transposed(v), transposed(w));
+            [a, b, c, d, e, f, g, h]
+        }
+    }
+    #[inline(always)]
+    unsafe fn wide_columns<const ALL: bool>(base: *const u8, offsets: *const u32) -> [F64x8; 8] {
+        unsafe {
+            let zero = F64x8(_mm512_setzero_pd());
+            let [a, b, c, d] = four_columns(base, offsets);
+            let [e, f, g, h] = if ALL { four_columns(base.add(32), offsets) } else { [zero; 4] };
+            [a, b, c, d, e, f, g, h]
+        }
+    }
+    #[inline(always)]
+    unsafe fn of_bits(words: U32x16) -> F32x16 {
+        unsafe { F32x16(_mm512_castsi512_ps(words.0)) }
     }
     #[inline(always)]
     unsafe fn halves(x: F64x8) -> [U32x8; 2] {

@@ -102,8 +102,6 @@ pub trait Reals: Real {
     unsafe fn pick(table: *const Self::Scalar, which: Self::Words) -> Self;
     /// `table[index[k]]` in lane `k`.
     unsafe fn lookup(table: *const Self::Scalar, index: Self::Words) -> Self;
-    /// The four columns of the rows of four numbers at `base + stride · index[k]` bytes.
-    unsafe fn columns(base: *const u8, stride: usize, index: *const u32) -> [Self; 4];
     /// Writes four columns as rows of four.
     unsafe fn rows(columns: [Self; 4], p: *mut Self::Scalar);
 }
@@ -121,12 +119,11 @@ pub trait Words: Copy {
     unsafe fn min(self, other: Self) -> Self;
     unsafe fn max(self, other: Self) -> Self;
     unsafe fn rotate(self, by: u32) -> Self;
+    unsafe fn shift_right<const BY: u32>(self) -> Self;
     /// Bytes, widened.
     unsafe fn load_bytes(p: *const u8) -> Self;
     /// `table[which[k]]` in lane `k`, of a table of as many words as there are lanes.
     unsafe fn pick(table: *const u32, which: Self) -> Self;
-    /// As [`Reals::columns`].
-    unsafe fn columns(base: *const u8, stride: usize, index: *const u32) -> [Self; 4];
 }
 
 /// Two points, in units that [`Isa::near`] compares: each coordinate sixteen times that of the first, then as often
@@ -135,12 +132,18 @@ pub trait Words: Copy {
 #[repr(C, align(64))]
 pub struct Two(pub [[u16; 32]; 3]);
 
-/// The address of row `index[k]`.
+/// Row `k` of those at `offsets`.
 ///
-/// Read as volatile: the compiler else reads indices as vectors, and takes their lanes out one by one.
+/// Read as volatile: the compiler else reads offsets as vectors, and takes their lanes out one by one.
 #[inline(always)]
-unsafe fn row_at(base: *const u8, stride: usize, index: *const u32, k: usize) -> *const u8 {
-    unsafe { base.add(index.add(k).read_volatile() as usize * stride) }
+unsafe fn row_at(base: *const u8, offsets: *const u32, k: usize) -> *const u8 {
+    unsafe { base.add(offsets.add(k).read_volatile() as usize) }
+}
+
+/// The same of rows twice as long.
+#[inline(always)]
+unsafe fn wide_row_at(base: *const u8, offsets: *const u32, k: usize) -> *const u8 {
+    unsafe { base.add(2 * offsets.add(k).read_volatile() as usize) }
 }
 
 /// Four double-precision numbers: what accumulates on a particle.
@@ -167,19 +170,30 @@ pub trait Isa: Copy + Send + Sync + 'static {
     unsafe fn near<const SHIFTS: bool>(
         x: [*const u16; 3],
         shift: [u16; 3],
-        four: [&Two; 2],
+        four: &[Two; 2],
         limit: i16,
     ) -> u64;
     /// Sixteen times the same word.
     unsafe fn fill16(x: u16, p: *mut u16);
-    /// Writes `first + k` for each bit `k` of sixteen, one after the other; may write sixteen.
-    unsafe fn collect(first: u32, mask: u32, p: *mut u32);
+    /// Eight masks, in each of which four particles have sixteen bits each, turned: first the bits of the first particle
+    /// in the first four masks, then those of the second …, then the same of the other four masks.
+    unsafe fn turn(masks: *mut u64);
+    /// Writes `bases[k / 16] + 32 (k % 16)` for each bit `k`, one after the other, and how many; may write sixteen
+    /// more.
+    unsafe fn collect(bases: *const u32, mask: u64, p: *mut u32) -> usize;
     /// The first, the least, and the greatest of each four lanes, in all of them.
     unsafe fn first_of_four(x: Self::F32) -> Self::F32;
     unsafe fn least_of_four(x: Self::F32) -> Self::F32;
     unsafe fn greatest_of_four(x: Self::F32) -> Self::F32;
-    /// The bits of numbers.
-    unsafe fn bits(x: Self::F32) -> <Self::F32 as Reals>::Words;
+    /// The columns of rows of eight words, `offsets` bytes behind `base`; with `ALL`, else only the first four.
+    unsafe fn columns<const ALL: bool>(
+        base: *const u8,
+        offsets: *const u32,
+    ) -> [<Self::F32 as Reals>::Words; 8];
+    /// The columns of rows of eight numbers, twice `offsets` bytes behind `base`; with `ALL`, else only the first four.
+    unsafe fn wide_columns<const ALL: bool>(base: *const u8, offsets: *const u32) -> [Self::F64; 8];
+    /// The numbers of bits.
+    unsafe fn of_bits(words: <Self::F32 as Reals>::Words) -> Self::F32;
     /// The low and the high words of the bits of numbers.
     unsafe fn halves(x: Self::F64) -> [<Self::F64 as Reals>::Words; 2];
 }

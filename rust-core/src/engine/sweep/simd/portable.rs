@@ -1,6 +1,7 @@
 //! Plain arrays, which the compiler vectorises for whatever the target has.
 
-use super::{Isa, ORDINARY_F32, ORDINARY_F64, Quad, Reals, Two, Words};
+use super::{Isa, ORDINARY_F32, ORDINARY_F64, Quad, Reals, Two, Words, row_at, wide_row_at};
+use crate::engine::sweep::block::PLACE_BITS;
 use crate::model::kernel::Real;
 use std::ops::{Add, Mul, Sub};
 
@@ -170,20 +171,6 @@ macro_rules! lanes {
                 Lanes(out)
             }
             #[inline(always)]
-            unsafe fn columns(base: *const u8, stride: usize, index: *const u32) -> [Self; 4] {
-                let mut out = [[0.0; LANES]; 4];
-                for k in 0..LANES {
-                    let row = unsafe {
-                        base.add(*index.add(k) as usize * stride).cast::<[$scalar; 4]>().read_unaligned()
-                    };
-                    for c in 0..4 {
-                        out[c][k] = row[c];
-                    }
-                }
-                let [a, b, c, d] = out;
-                [Lanes(a), Lanes(b), Lanes(c), Lanes(d)]
-            }
-            #[inline(always)]
             unsafe fn rows(columns: [Self; 4], p: *mut $scalar) {
                 for k in 0..LANES {
                     for c in 0..4 {
@@ -256,25 +243,16 @@ impl Words for Lanes<u32> {
         self
     }
     #[inline(always)]
+    unsafe fn shift_right<const BY: u32>(self) -> Self {
+        Lanes(self.0.map(|x| x >> BY))
+    }
+    #[inline(always)]
     unsafe fn load_bytes(p: *const u8) -> Self {
         Lanes(unsafe { p.cast::<[u8; LANES]>().read_unaligned() }.map(u32::from))
     }
     #[inline(always)]
     unsafe fn pick(table: *const u32, which: Self) -> Self {
         Lanes(which.0.map(|w| unsafe { *table.add(w as usize) }))
-    }
-    #[inline(always)]
-    unsafe fn columns(base: *const u8, stride: usize, index: *const u32) -> [Self; 4] {
-        let mut out = [[0; LANES]; 4];
-        for k in 0..LANES {
-            let row =
-                unsafe { base.add(*index.add(k) as usize * stride).cast::<[u32; 4]>().read_unaligned() };
-            for c in 0..4 {
-                out[c][k] = row[c];
-            }
-        }
-        let [a, b, c, d] = out;
-        [Lanes(a), Lanes(b), Lanes(c), Lanes(d)]
     }
 }
 
@@ -353,7 +331,7 @@ impl Isa for Portable {
     unsafe fn near<const SHIFTS: bool>(
         x: [*const u16; 3],
         shift: [u16; 3],
-        four: [&Two; 2],
+        four: &[Two; 2],
         limit: i16,
     ) -> u64 {
         let mut there = [[0; 16]; 3];
@@ -365,7 +343,7 @@ impl Isa for Portable {
         }
         let mut mask = 0;
         for k in 0..4 {
-            mask |= (below(&there, four[k / 2], k % 2, limit) as u64) << (16 * k);
+            mask |= (below(&there, &four[k / 2], k % 2, limit) as u64) << (16 * k);
         }
         mask
     }
@@ -374,13 +352,24 @@ impl Isa for Portable {
         unsafe { p.cast::<[u16; 16]>().write_unaligned([x; 16]) }
     }
     #[inline(always)]
-    unsafe fn collect(first: u32, mask: u32, p: *mut u32) {
-        let (mut mask, mut count) = (mask, 0);
+    unsafe fn turn(masks: *mut u64) {
+        let masks = unsafe { &mut *masks.cast::<[u64; 8]>() };
+        let before = *masks;
+        for (k, mask) in masks.iter_mut().enumerate() {
+            let (half, particle) = (k / 4, k % 4);
+            *mask = (0..4).map(|c| (before[4 * half + c] >> (16 * particle) & 0xffff) << (16 * c)).sum();
+        }
+    }
+    #[inline(always)]
+    unsafe fn collect(bases: *const u32, mut mask: u64, p: *mut u32) -> usize {
+        let mut count = 0;
         while mask != 0 {
-            unsafe { *p.add(count) = first + mask.trailing_zeros() };
+            let bit = mask.trailing_zeros();
+            unsafe { *p.add(count) = *bases.add(bit as usize / 16) + (bit % 16 << PLACE_BITS) };
             count += 1;
             mask &= mask - 1;
         }
+        count
     }
     #[inline(always)]
     unsafe fn first_of_four(mut x: Lanes<f32>) -> Lanes<f32> {
@@ -410,8 +399,30 @@ impl Isa for Portable {
         Lanes(out)
     }
     #[inline(always)]
-    unsafe fn bits(x: Lanes<f32>) -> Lanes<u32> {
-        Lanes(x.0.map(f32::to_bits))
+    unsafe fn columns<const ALL: bool>(base: *const u8, offsets: *const u32) -> [Lanes<u32>; 8] {
+        let mut out = [Lanes([0; LANES]); 8];
+        for k in 0..LANES {
+            let row = unsafe { row_at(base, offsets, k).cast::<[u32; 8]>().read_unaligned() };
+            for c in 0..if ALL { 8 } else { 4 } {
+                out[c].0[k] = row[c];
+            }
+        }
+        out
+    }
+    #[inline(always)]
+    unsafe fn wide_columns<const ALL: bool>(base: *const u8, offsets: *const u32) -> [Lanes<f64>; 8] {
+        let mut out = [Lanes([0.0; LANES]); 8];
+        for k in 0..LANES {
+            let row = unsafe { wide_row_at(base, offsets, k).cast::<[f64; 8]>().read_unaligned() };
+            for c in 0..if ALL { 8 } else { 4 } {
+                out[c].0[k] = row[c];
+            }
+        }
+        out
+    }
+    #[inline(always)]
+    unsafe fn of_bits(words: Lanes<u32>) -> Lanes<f32> {
+        Lanes(words.0.map(f32::from_bits))
     }
     #[inline(always)]
     unsafe fn halves(x: Lanes<f64>) -> [Lanes<u32>; 2] {
