@@ -27,78 +27,39 @@ pub unsafe fn scatter<I: Isa, A: Arithmetic<I>>(
         const SIGN: [f64; 4] = [1.0, 1.0, 1.0, -1.0];
         let sign = I::Quad::load(SIGN.as_ptr());
         let base = sums.0.offset(4 * offset);
-        let rows = block.rows.as_ptr().cast::<A::Scalar>();
+        let rows = block.rows.as_mut_ptr().cast::<A::Scalar>();
         let places = block.j.as_ptr().add(part.pairs[0]);
         // One loop over all, not one for each member, none of whose ends is to be foreseen: what a member gets is
-        // the difference of two running sums.
-        let mut running = Running::<I::Quad>::new(block.running.as_mut_ptr().cast());
+        // the difference of two running sums, of which every other one is kept. Behind an odd number nothing follows.
         let count = part.count();
+        rows.add(4 * count).cast::<[A::Scalar; 4]>().write([A::Scalar::default(); 4]);
+        let sums = block.running.as_mut_ptr().cast::<f64>();
+        let mut sum = I::Quad::zero();
         let mut p = 0;
         while p < count {
+            sum.store(sums.add(2 * p));
             let row = A::load_quad(rows.add(4 * p));
             let at = base.byte_add(*places.add(p) as usize);
             I::Quad::load(at).sub(row).store(at);
-            running.add(p, row);
-            p += 1;
+            let next = A::load_quad(rows.add(4 * p + 4));
+            let at = base.byte_add(*places.add(p + 1) as usize);
+            I::Quad::load(at).sub(next).store(at);
+            sum = sum.add(row.add(next));
+            p += 2;
         }
+        sum.store(sums.add(2 * p));
         let begin = block.begin.as_ptr();
         let [first, last] = part.slots;
+        let mut before = I::Quad::zero();
         let mut m = first;
         while m < last {
-            let [a, b] = [m, m + 1].map(|m| *begin.add(m) as usize - part.pairs[0]);
-            let sum = running.sum(a, b);
-            add_to(base.add(4 * (part.first + m - first)), sum.mul(sign));
+            let end = *begin.add(m + 1) as usize - part.pairs[0];
+            let even = end & !1;
+            let odd = A::load_quad(rows.add(4 * even)).mul(I::Quad::splat((end & 1) as f64));
+            let all = I::Quad::load(sums.add(2 * even)).add(odd);
+            add_to(base.add(4 * (part.first + m - first)), all.sub(before).mul(sign));
+            before = all;
             m += 1;
-        }
-    }
-}
-
-/// Running sums over rows; those with an even and those with an odd number take turns, as one alone would wait for
-/// itself.
-pub struct Running<Q> {
-    turn: [Q; 2],
-    sums: *mut f64,
-}
-
-impl<Q: Quad> Running<Q> {
-    /// Sums that go to `sums`: room for two more than there are rows.
-    ///
-    /// # Safety
-    /// The contract of `simd`.
-    #[inline(always)]
-    pub unsafe fn new(sums: *mut f64) -> Running<Q> {
-        // SAFETY: the caller's.
-        unsafe {
-            Q::zero().store(sums);
-            Q::zero().store(sums.add(4));
-            Running { turn: [Q::zero(); 2], sums }
-        }
-    }
-
-    /// Adds row `p`, of those from 0 on.
-    ///
-    /// # Safety
-    /// The contract of `simd`.
-    #[inline(always)]
-    pub unsafe fn add(&mut self, p: usize, row: Q) {
-        // SAFETY: the caller's.
-        unsafe {
-            let sum = self.turn[0].add(row);
-            sum.store(self.sums.add(4 * (p + 2)));
-            self.turn = [self.turn[1], sum];
-        }
-    }
-
-    /// The sum of rows `a..b`.
-    ///
-    /// # Safety
-    /// The contract of `simd`; these have been added.
-    #[inline(always)]
-    pub unsafe fn sum(&self, a: usize, b: usize) -> Q {
-        // SAFETY: the caller's.
-        unsafe {
-            let two = |p: usize| Q::load(self.sums.add(4 * p)).add(Q::load(self.sums.add(4 * p + 4)));
-            two(b).sub(two(a))
         }
     }
 }
