@@ -1,9 +1,9 @@
 //! Potentials of any form: evaluated in double precision, apart from the others, for the pairs they act on.
 
-use super::arithmetic::Arithmetic;
+use super::arithmetic::{Arithmetic, Pairs};
 use super::block::Block;
 use super::layer::{Part, Swept};
-use super::simd::{Isa, Reals, Scalar, Words};
+use super::simd::{Isa, Reals, Scalar};
 use crate::engine::tally::Tally;
 use crate::model::pair::PairForm;
 
@@ -11,24 +11,16 @@ use crate::model::pair::PairForm;
 #[inline(always)]
 pub unsafe fn aside<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY: bool>(
     swept: &Swept<A::Scalar, A::Record>,
-    metric: &A::Metric,
     block: &mut Block<A::Scalar>,
     part: Part,
     tally: &mut Tally,
 ) {
     // SAFETY: the contract of `simd`.
     unsafe {
-        let mut k = 0;
-        while k < part.count() {
-            let which = <A::Reals as Reals>::Words::load_bytes(block.which.as_ptr().add(k));
-            let (records, places) = (swept.records.as_ptr(), block.j.as_ptr().add(part.pairs[0] + k));
-            let (pairs, _) = A::separate::<false>(metric, records, &block.own, which, places, false);
-            let mut lanes = [A::Scalar::default(); 16];
-            pairs.r.store(lanes.as_mut_ptr());
-            for (r, lane) in block.aside.all[k..].iter_mut().zip(&lanes[..A::Reals::LANES]) {
-                *r = lane.wide();
-            }
-            k += A::Reals::LANES;
+        let pairs = block.pairs.as_ptr().cast::<Pairs<A::Reals>>();
+        for k in 0..part.count() {
+            let r: *const A::Scalar = (&raw const (*pairs.add(k / A::Reals::LANES)).apart.r).cast();
+            block.aside.all[k] = (*r.add(k % A::Reals::LANES)).wide();
         }
     }
     if SEVERAL {
@@ -48,7 +40,6 @@ fn each<T: Scalar, const SEVERAL: bool>(
     mut tally: Option<&mut Tally>,
 ) {
     let terms = swept.terms;
-    block.conservative[..part.count()].fill(T::default());
     for term in &terms.apart {
         let [a, b] = term.between;
         let (ab, ba) = ((a * terms.species + b) as u32, (b * terms.species + a) as u32);

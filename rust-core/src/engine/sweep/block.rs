@@ -42,8 +42,10 @@ pub struct Block<T> {
     pub rows: Vec<Lines<T>>,
     /// Weights, of one density after another.
     pub weight: Vec<Vec<T>>,
-    /// Forces along `ê` that are evaluated apart.
+    /// Forces along `ê` of all terms but the first soft one.
     pub conservative: Vec<T>,
+    /// How much of each pair counts, if sums are wanted.
+    pub share: Vec<T>,
     /// How many pairs are within the range of each density.
     pub found: Vec<usize>,
     /// Running sums of the rows.
@@ -96,6 +98,7 @@ impl<T: Scalar> Default for Block<T> {
             rows: Vec::new(),
             weight: Vec::new(),
             conservative: Vec::new(),
+            share: Vec::new(),
             found: Vec::new(),
             running: Vec::new(),
             aside: Aside::default(),
@@ -152,6 +155,7 @@ impl<T: Scalar> Block<T> {
         self.pairs.resize(capacity / 8, Lines::default());
         self.running.resize(capacity + 2, Sum::default());
         self.conservative.resize(capacity, T::default());
+        self.share.resize(capacity, T::default());
         for values in &mut self.weight {
             values.resize(capacity, T::default());
         }

@@ -1,25 +1,27 @@
-//! What a block of pairs does, a vector at a time: distances, each term, and the rows that are added to the
-//! particles.
+//! What a vector's worth of particles and all their pairs do: distances, each term, and the rows that are added to
+//! the particles.
 
-use super::arithmetic::{Apart, Arithmetic, Pairs};
+use super::arithmetic::{Arithmetic, Pairs};
 use super::aside::aside;
-use super::block::{Block, PLACE_BITS};
-use super::forces::{Kind, Sums, add_virial, slope, sum, value};
+use super::block::Block;
+use super::forces::{Kind, Sums, add_linear, add_soft, add_spline, forces, sum};
+use super::keep::keep;
 use super::layer::{Part, Swept};
-use super::many_body::{NEAR_BITS, NearPairs};
+use super::many_body::NearPairs;
 use super::simd::{Isa, Reals, Scalar, Words};
-use super::terms::Pass;
 use super::thermostat::{UNIT, draw};
+use super::weights::weights;
 use crate::engine::noise::PairNoise;
 use crate::engine::tally::Tally;
 use crate::model::kernel::Real;
 
-/// Evaluates the pairs of a vector's worth of a group.
+/// Evaluates the pairs of a part, in short loops over vectors of them: in one for all the processor would see but one
+/// vector at a time.
 ///
 /// Leaves rows of forces and weights in the block; appends to `near` the pairs that a density reaches.
 ///
 /// # Safety
-/// The contract of `simd`; the block has the columns of the members.
+/// The contract of `simd`; the block has the columns of the part.
 #[inline(always)]
 pub unsafe fn evaluate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY: bool>(
     swept: &Swept<A::Scalar, A::Record>,
@@ -31,97 +33,18 @@ pub unsafe fn evaluate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALL
 ) {
     // SAFETY: the contract of `simd`.
     unsafe {
-        let count = part.count();
-        let terms = swept.terms;
-        let lanes = A::Reals::LANES;
-        let passes = terms.passes.len();
-        if !terms.apart.is_empty() {
-            aside::<I, A, SEVERAL, TALLY>(swept, &kit.metric, block, part, tally);
-        }
-        near.reserve::<TALLY>(count + 16);
+        near.reserve::<TALLY>(part.count() + 16);
         separate::<I, A, SEVERAL>(swept, kit, block, part);
-        let zero = A::Reals::constant(0.0);
-        let p_which = block.which.as_ptr();
-        let p_j = block.j.as_ptr().add(part.pairs[0]);
-        let p_rows = block.rows.as_mut_ptr().cast::<A::Scalar>();
-        let p_conservative = block.conservative.as_ptr();
-        let p_found = block.found.as_mut_ptr();
-        let mut p_pairs = block.pairs.as_ptr().cast::<Pairs<A::Reals>>();
-        let p_noise = block.tags[0].as_ptr();
-        let plain = swept.variables == 1;
-        let layer_first = <A::Reals as Reals>::Words::splat(near.first << PLACE_BITS);
-        let drag = terms.drag.as_ref().filter(|_| swept.thermostat.is_some());
         let mut sums = Sums::<A::Reals>::zero();
-        let mut k = 0;
-        while k < count {
-            let pairs = &*p_pairs;
-            let (r, kind) = (pairs.apart.r, pairs.kind);
-            let share = if TALLY { shares::<I, A>(swept, block, part, k) } else { zero };
-            let mut force = if terms.apart.is_empty() { zero } else { Reals::load(p_conservative.add(k)) };
-            for term in &terms.soft {
-                force = term.add::<A::Reals, SEVERAL, TALLY>(r, kind, force, share, &mut sums.pair);
-            }
-            for term in &terms.linear {
-                force = term.add::<A::Reals, SEVERAL, TALLY>(r, kind, force, share, &mut sums.excess);
-            }
-            for term in &terms.spline {
-                force = term.add::<A::Reals, SEVERAL, TALLY>(r, kind, force, share, &mut sums.pair);
-            }
-            if TALLY {
-                add_virial(force, &pairs.apart, share, &mut sums.virial);
-            }
-            if let Some(drag) = drag {
-                let word = <A::Reals as Reals>::Words::load(p_noise.add(k));
-                let xi = (A::Reals::of_signed(word) + A::Reals::constant(0.5)) * kit.unit;
-                let thermostat = drag.force::<A::Reals, SEVERAL>(pairs, xi);
-                if TALLY {
-                    add_virial(thermostat, &pairs.apart, share, &mut sums.thermostat);
-                }
-                force = force + thermostat;
-            }
-            let mut weight = zero;
-            let mut pass = 0;
-            while pass < passes {
-                let term = terms.passes.get_unchecked(pass);
-                let s = r * A::Reals::splat(term.inverse_range);
-                let w = A::Reals::splat(term.value) * value(term.kind, s);
-                let w = w.where_below(s, A::Reals::constant(1.0));
-                if plain {
-                    weight = w;
-                } else {
-                    w.store(block.weight.get_unchecked_mut(pass).as_mut_ptr().add(k));
-                }
-                pass += 1;
-            }
-            let f = force * pairs.apart.inverse;
-            let [dx, dy, dz] = pairs.apart.d;
-            A::Reals::rows([f * dx, f * dy, f * dz, zero - weight], p_rows.add(4 * k));
-            p_pairs = p_pairs.add(1);
-            k += lanes;
+        if TALLY {
+            shares(swept, block, part);
         }
-        let mut pass = 0;
-        while pass < passes {
-            let term = terms.passes.get_unchecked(pass);
-            let mut p_pairs = block.pairs.as_ptr().cast::<Pairs<A::Reals>>();
-            let mut found = 0;
-            let mut k = 0;
-            while k < count {
-                let pairs = &*p_pairs;
-                let valid = u32::MAX >> (32 - (count - k).min(lanes));
-                let share = if TALLY { shares::<I, A>(swept, block, part, k) } else { zero };
-                let which = <A::Reals as Reals>::Words::load_bytes(p_which.add(k));
-                let code =
-                    <A::Reals as Reals>::Words::load(p_j.add(k)).sub(layer_first).shift_right::<PLACE_BITS>();
-                let code = A::Reals::encode(code.add(which.rotate(NEAR_BITS)));
-                let mask = pairs.apart.r.mask_below(A::Reals::splat(term.force_range)) & valid;
-                keep::<A::Reals, TALLY>(term, &pairs.apart, code, mask, share, near, pass, found);
-                found += mask.count_ones() as usize;
-                p_pairs = p_pairs.add(1);
-                k += lanes;
-            }
-            *p_found.add(pass) = found;
-            pass += 1;
+        if swept.terms.has_more() {
+            more::<I, A, SEVERAL, TALLY>(swept, block, part, &mut sums, tally);
         }
+        weights::<I, A>(swept, block, part);
+        forces::<I, A, SEVERAL, TALLY>(swept, kit, block, part, &mut sums);
+        keep::<I, A, TALLY>(swept, block, near, part);
         if TALLY {
             tally.pair += sum(sums.pair);
             tally.excess += sum(sums.excess);
@@ -137,9 +60,11 @@ pub unsafe fn evaluate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALL
 #[derive(Clone, Copy)]
 pub struct Kit<I: Isa, A: Arithmetic<I>> {
     metric: A::Metric,
-    noise: Option<PairNoise>,
+    pub noise: Option<PairNoise>,
     /// Signed words of noise times this are `ξ dt^{−1/2}`.
-    unit: A::Reals,
+    pub unit: A::Reals,
+    /// 0, 1, 2 …
+    lane: A::Reals,
 }
 
 impl<I: Isa, A: Arithmetic<I>> Kit<I, A> {
@@ -150,13 +75,19 @@ impl<I: Isa, A: Arithmetic<I>> Kit<I, A> {
             let drags = swept.thermostat.filter(|_| swept.terms.drag.is_some());
             let (noise, inverse_root_dt) = drags.unzip();
             let unit = A::Reals::constant(UNIT * inverse_root_dt.unwrap_or_default());
-            Kit { metric: A::metric(swept.frame), noise, unit }
+            let mut lane = [A::Scalar::default(); 16];
+            for (k, lane) in lane.iter_mut().enumerate() {
+                *lane = A::Scalar::of(k as f64);
+            }
+            Kit { metric: A::metric(swept.frame), noise, unit, lane: A::Reals::load(lane.as_ptr()) }
         }
     }
 }
 
-/// Distances, kinds and noise of the pairs, in loops of their own: one loop for all would be so long that the
-/// processor sees but one vector at a time.
+/// Where lanes behind the last pair are: out of reach of everything.
+const FAR: f64 = 1e18;
+
+/// Distances, kinds and noise of the pairs.
 #[inline(always)]
 unsafe fn separate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool>(
     swept: &Swept<A::Scalar, A::Record>,
@@ -171,30 +102,38 @@ unsafe fn separate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool>(
         let p_which = block.which.as_ptr();
         let p_j = block.j.as_ptr().add(part.pairs[0]);
         let count = part.count();
-        let mut p_pairs = block.pairs.as_mut_ptr().cast::<Pairs<A::Reals>>();
+        let p_pairs = block.pairs.as_mut_ptr().cast::<Pairs<A::Reals>>();
         let p_tags = [block.tags[0].as_mut_ptr(), block.tags[1].as_mut_ptr()];
         let moving = kit.noise.is_some();
+        let metric = kit.metric;
+        let species = swept.terms.species;
+        let mut pairs = p_pairs;
         let mut k = 0;
         while k < count {
             let which = <A::Reals as Reals>::Words::load_bytes(p_which.add(k));
-            let (metric, places) = (&kit.metric, p_j.add(k));
+            let places = p_j.add(k);
             let (apart, names) = if moving || SEVERAL {
-                A::separate::<true>(metric, records, own, which, places, moving)
+                A::separate::<true>(&metric, records, own, which, places, moving)
             } else {
-                A::separate::<false>(metric, records, own, which, places, false)
+                A::separate::<false>(&metric, records, own, which, places, false)
             };
-            let pairs = &mut *p_pairs;
-            pairs.apart = apart;
+            (*pairs).apart = apart;
             if moving {
                 names.tags[0].store(p_tags[0].add(k));
                 names.tags[1].store(p_tags[1].add(k));
             }
             if SEVERAL {
                 let species_i = <A::Reals as Reals>::Words::pick((*own).species.as_ptr(), which);
-                pairs.kind = Kind::new(species_i, names.species_j, swept.terms.species);
+                (*pairs).kind = Kind::new(species_i, names.species_j, species);
             }
-            p_pairs = p_pairs.add(1);
+            pairs = pairs.add(1);
             k += A::Reals::LANES;
+        }
+        let left = count % A::Reals::LANES;
+        if left > 0 {
+            let last = &mut *p_pairs.add(count / A::Reals::LANES);
+            let far = A::Reals::constant(FAR).where_below(A::Reals::constant(left as f64 - 0.5), kit.lane);
+            last.apart.r = last.apart.r.where_below(kit.lane, A::Reals::constant(left as f64)) + far;
         }
         if let Some(noise) = kit.noise {
             draw::<<I::F32 as Reals>::Words>(noise, p_tags[0], p_tags[1], count);
@@ -202,47 +141,43 @@ unsafe fn separate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool>(
     }
 }
 
-/// Appends rows `−w′ ê` and a code of both particles, of the pairs of `mask`, behind `found` others.
+/// The forces of terms beyond the first soft one, which `forces` begins with.
 #[inline(always)]
-#[allow(clippy::too_many_arguments)]
-unsafe fn keep<R: Reals, const TALLY: bool>(
-    term: &Pass<R::Scalar>,
-    pairs: &Apart<R>,
-    code: R,
-    mask: u32,
-    share: R,
-    near: &mut NearPairs<R::Scalar>,
-    pass: usize,
-    found: usize,
+unsafe fn more<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY: bool>(
+    swept: &Swept<A::Scalar, A::Record>,
+    block: &mut Block<A::Scalar>,
+    part: Part,
+    sums: &mut Sums<A::Reals>,
+    tally: &mut Tally,
 ) {
-    // SAFETY: the contract of `simd`; `near` has room for whole vectors.
+    // SAFETY: the contract of `simd`.
     unsafe {
-        let s = pairs.r * R::splat(term.force_inverse_range);
-        let g = R::splat(term.force) * slope(term.force_kind, s) * pairs.inverse;
-        let [dx, dy, dz] = pairs.d;
-        let columns =
-            [(g * dx).compress(mask), (g * dy).compress(mask), (g * dz).compress(mask), code.compress(mask)];
-        R::rows(columns, near.rows.get_unchecked_mut(pass).end().add(found).cast());
-        if TALLY {
-            let columns = [dx.compress(mask), dy.compress(mask), dz.compress(mask), share.compress(mask)];
-            R::rows(columns, near.apart.get_unchecked_mut(pass).end().add(found).cast());
+        let terms = swept.terms;
+        let vectors = part.count().div_ceil(A::Reals::LANES);
+        block.conservative[..vectors * A::Reals::LANES].fill(A::Scalar::default());
+        if !terms.apart.is_empty() {
+            aside::<I, A, SEVERAL, TALLY>(swept, block, part, tally);
+        }
+        for term in terms.other_soft() {
+            add_soft::<A::Reals, SEVERAL, TALLY>(term, block, vectors, &mut sums.pair);
+        }
+        for term in &terms.linear {
+            add_linear::<A::Reals, SEVERAL, TALLY>(term, block, vectors, &mut sums.excess);
+        }
+        for term in &terms.spline {
+            add_spline::<A::Reals, SEVERAL, TALLY>(term, block, vectors, &mut sums.pair);
         }
     }
 }
 
 /// How much of each pair counts here, nothing beyond the last.
 #[inline(never)]
-unsafe fn shares<I: Isa, A: Arithmetic<I>>(
-    swept: &Swept<A::Scalar, A::Record>,
-    block: &Block<A::Scalar>,
-    part: Part,
-    k: usize,
-) -> A::Reals {
-    let mut shares = [A::Scalar::default(); 16];
-    for p in k..part.count().min(k + A::Reals::LANES) {
+fn shares<T: Scalar>(swept: &Swept<T, impl super::arithmetic::Record>, block: &mut Block<T>, part: Part) {
+    let count = part.count();
+    for p in 0..count {
         let [i, j] = block.pair(part, p);
-        shares[p - k] = A::Scalar::of(swept.share(i, j));
+        block.share[p] = T::of(swept.share(i, j));
     }
-    // SAFETY: no vector has more lanes.
-    unsafe { A::Reals::load(shares.as_ptr()) }
+    // No vector has more lanes.
+    block.share[count..count + 16].fill(T::default());
 }

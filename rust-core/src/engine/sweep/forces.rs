@@ -1,31 +1,20 @@
-//! What each term adds to a vector of pairs, along `ê`.
+//! What each term adds to the pairs, along `ê`.
 
-use super::arithmetic::Apart;
-use super::simd::{Reals, Words};
+use super::arithmetic::{Apart, Arithmetic, Pairs};
+use super::block::Block;
+use super::evaluate::Kit;
+use super::layer::{Part, Swept};
+use super::simd::{Isa, Reals, Scalar, Words};
 use super::terms::{Linear, Soft, Spline, Table};
-use crate::model::kernel::{CubicSpline, KernelKind, Shape, ShapeVisitor};
+use super::thermostat::Pull;
+use crate::model::kernel::{CubicSpline, KernelKind, Real, Shape, ShapeVisitor};
+use std::marker::PhantomData;
 
 /// Which pair of species each pair of a vector is: the entry of tables.
 #[derive(Clone, Copy)]
 pub struct Kind<R: Reals>(pub R::Words);
 
 impl<R: Reals> Kind<R> {
-    /// Entries of a table; with one species there is but one.
-    #[inline(always)]
-    pub unsafe fn of<const SEVERAL: bool>(self, table: &Table<R::Scalar>) -> R {
-        // SAFETY: the contract of `simd`; kinds are below the number of entries, and tables have room for a vector.
-        unsafe {
-            let entries = table.as_ptr();
-            if !SEVERAL {
-                R::splat(*entries)
-            } else if table.count() <= R::LANES {
-                R::pick(entries, self.0)
-            } else {
-                R::lookup(entries, self.0)
-            }
-        }
-    }
-
     /// Of the species of both particles.
     #[inline(always)]
     pub unsafe fn new(species_i: R::Words, species_j: R::Words, species: usize) -> Kind<R> {
@@ -38,6 +27,38 @@ impl<R: Reals> Kind<R> {
                 k += 1;
             }
             Kind(row.add(species_j))
+        }
+    }
+}
+
+/// A table at hand: in a loop nothing of it is looked up twice.
+#[derive(Clone, Copy)]
+pub struct At<R: Reals> {
+    first: R,
+    entries: *const R::Scalar,
+    few: bool,
+}
+
+impl<R: Reals> At<R> {
+    #[inline(always)]
+    pub unsafe fn new(table: &Table<R::Scalar>) -> At<R> {
+        let entries = table.as_ptr();
+        // SAFETY: the contract of `simd`; tables have an entry.
+        At { first: unsafe { R::splat(*entries) }, entries, few: table.count() <= R::LANES }
+    }
+
+    /// The entries of pairs; with one species there is but one.
+    #[inline(always)]
+    pub unsafe fn of<const SEVERAL: bool>(&self, kind: Kind<R>) -> R {
+        // SAFETY: the contract of `simd`; kinds are below the number of entries, and tables have room for a vector.
+        unsafe {
+            if !SEVERAL {
+                self.first
+            } else if self.few {
+                R::pick(self.entries, kind.0)
+            } else {
+                R::lookup(self.entries, kind.0)
+            }
         }
     }
 }
@@ -61,7 +82,7 @@ impl<R: Reals> Sums<R> {
 
 /// Adds a force along `ê` to a virial.
 #[inline(always)]
-pub unsafe fn add_virial<R: Reals>(force: R, pairs: &Apart<R>, share: R, sum: &mut [R; 6]) {
+unsafe fn add_virial<R: Reals>(force: R, pairs: &Apart<R>, share: R, sum: &mut [R; 6]) {
     // SAFETY: the contract of `simd`.
     unsafe {
         let f = force * (share * pairs.inverse);
@@ -79,7 +100,6 @@ pub unsafe fn add_virial<R: Reals>(force: R, pairs: &Apart<R>, share: R, sum: &m
 /// The sum of the lanes.
 #[inline(always)]
 pub unsafe fn sum<R: Reals>(x: R) -> f64 {
-    use super::simd::Scalar;
     let mut lanes = [R::Scalar::default(); 16];
     // SAFETY: no vector has more lanes.
     unsafe { x.store(lanes.as_mut_ptr()) };
@@ -90,10 +110,120 @@ pub unsafe fn sum<R: Reals>(x: R) -> f64 {
     sum
 }
 
-impl<T: super::simd::Scalar> Soft<T> {
-    /// `before + a (1 − r/R)`, and the energy.
+/// Rows of forces, and of minus the weight if there is one density: of the first soft term, drag and noise, and
+/// whatever other terms have left in `conservative`.
+#[inline(always)]
+pub unsafe fn forces<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY: bool>(
+    swept: &Swept<A::Scalar, A::Record>,
+    kit: &Kit<I, A>,
+    block: &mut Block<A::Scalar>,
+    part: Part,
+    sums: &mut Sums<A::Reals>,
+) {
+    // SAFETY: the contract of `simd`.
+    unsafe {
+        let terms = swept.terms;
+        let vectors = part.count().div_ceil(A::Reals::LANES);
+        let zero = A::Reals::constant(0.0);
+        let p_pairs = block.pairs.as_ptr().cast::<Pairs<A::Reals>>();
+        let p_rows = block.rows.as_mut_ptr().cast::<A::Scalar>();
+        let p_conservative = block.conservative.as_ptr();
+        let p_noise = block.tags[0].as_ptr();
+        let p_share = block.share.as_ptr();
+        let p_weight = if swept.variables == 1 { block.weight[0].as_ptr() } else { std::ptr::null() };
+        let more = terms.has_more();
+        let soft = SoftAt::<A::Reals>::new(terms.first_soft());
+        let pull = terms.drag.as_ref().filter(|_| kit.noise.is_some());
+        let pull = pull.map(|drag| Pull::<A::Reals>::new(drag, kit.unit));
+        let mut v = 0;
+        while v < vectors {
+            let k = v * A::Reals::LANES;
+            let pairs = &*p_pairs.add(v);
+            let (r, kind) = (pairs.apart.r, pairs.kind);
+            let share = if TALLY { A::Reals::load(p_share.add(k)) } else { zero };
+            let mut force = if more { A::Reals::load(p_conservative.add(k)) } else { zero };
+            force = soft.add::<SEVERAL, TALLY>(r, kind, force, share, &mut sums.pair);
+            if TALLY {
+                add_virial(force, &pairs.apart, share, &mut sums.virial);
+            }
+            if let Some(pull) = &pull {
+                let word = <A::Reals as Reals>::Words::load(p_noise.add(k));
+                let thermostat = pull.force::<SEVERAL>(pairs, word);
+                if TALLY {
+                    add_virial(thermostat, &pairs.apart, share, &mut sums.thermostat);
+                }
+                force = force + thermostat;
+            }
+            let weight = if p_weight.is_null() { zero } else { A::Reals::load(p_weight.add(k)) };
+            let f = force * pairs.apart.inverse;
+            let [dx, dy, dz] = pairs.apart.d;
+            A::Reals::rows([f * dx, f * dy, f * dz, weight], p_rows.add(4 * k));
+            v += 1;
+        }
+    }
+}
+
+/// A term at hand.
+trait Term<R: Reals> {
+    /// `before − φ′(r)`, and the energy, if it is asked for.
+    unsafe fn add<const SEVERAL: bool, const TALLY: bool>(
+        &self,
+        r: R,
+        kind: Kind<R>,
+        before: R,
+        share: R,
+        energy: &mut R,
+    ) -> R;
+}
+
+/// Adds the forces of a term to those that the block has.
+#[inline(always)]
+unsafe fn each<R: Reals, const SEVERAL: bool, const TALLY: bool>(
+    term: impl Term<R>,
+    block: &mut Block<R::Scalar>,
+    vectors: usize,
+    energy: &mut R,
+) {
+    // SAFETY: the contract of `simd`.
+    unsafe {
+        let p_pairs = block.pairs.as_ptr().cast::<Pairs<R>>();
+        let p_force = block.conservative.as_mut_ptr();
+        let p_share = block.share.as_ptr();
+        let mut v = 0;
+        while v < vectors {
+            let pairs = &*p_pairs.add(v);
+            let p = p_force.add(v * R::LANES);
+            let share = if TALLY { R::load(p_share.add(v * R::LANES)) } else { R::constant(0.0) };
+            term.add::<SEVERAL, TALLY>(pairs.apart.r, pairs.kind, R::load(p), share, energy).store(p);
+            v += 1;
+        }
+    }
+}
+
+/// `φ = ½ a R (1 − r/R)²`.
+struct SoftAt<R: Reals> {
+    strength: At<R>,
+    inverse_range: At<R>,
+    energy: At<R>,
+}
+
+impl<R: Reals> SoftAt<R> {
     #[inline(always)]
-    pub unsafe fn add<R: Reals<Scalar = T>, const SEVERAL: bool, const TALLY: bool>(
+    unsafe fn new(term: &Soft<R::Scalar>) -> Self {
+        // SAFETY: the contract of `simd`.
+        unsafe {
+            SoftAt {
+                strength: At::new(&term.strength),
+                inverse_range: At::new(&term.inverse_range),
+                energy: At::new(&term.energy),
+            }
+        }
+    }
+}
+
+impl<R: Reals> Term<R> for SoftAt<R> {
+    #[inline(always)]
+    unsafe fn add<const SEVERAL: bool, const TALLY: bool>(
         &self,
         r: R,
         kind: Kind<R>,
@@ -104,19 +234,40 @@ impl<T: super::simd::Scalar> Soft<T> {
         // SAFETY: the contract of `simd`.
         unsafe {
             let (one, zero) = (R::constant(1.0), R::constant(0.0));
-            let t = (one - r * kind.of::<SEVERAL>(&self.inverse_range)).larger(zero);
+            let t = (one - r * self.inverse_range.of::<SEVERAL>(kind)).larger(zero);
             if TALLY {
-                *energy = (t * t).mul_add(share * kind.of::<SEVERAL>(&self.energy), *energy);
+                *energy = (t * t).mul_add(share * self.energy.of::<SEVERAL>(kind), *energy);
             }
-            t.mul_add(kind.of::<SEVERAL>(&self.strength), before)
+            t.mul_add(self.strength.of::<SEVERAL>(kind), before)
         }
     }
 }
 
-impl<T: super::simd::Scalar> Linear<T> {
-    /// `before − (c_αβ + c_βα) w′(r)`, and the energy.
+/// Adds the forces of a soft term.
+#[inline(always)]
+pub unsafe fn add_soft<R: Reals, const SEVERAL: bool, const TALLY: bool>(
+    term: &Soft<R::Scalar>,
+    block: &mut Block<R::Scalar>,
+    vectors: usize,
+    energy: &mut R,
+) {
+    // SAFETY: the contract of `simd`.
+    unsafe { each::<R, SEVERAL, TALLY>(SoftAt::<R>::new(term), block, vectors, energy) }
+}
+
+/// `φ = (c_αβ + c_βα) w(r)`, for one kernel of the force.
+struct LinearAt<R: Reals, S> {
+    kind: KernelKind,
+    inverse_range: R,
+    force_inverse_range: R,
+    force: At<R>,
+    energy: At<R>,
+    shape: PhantomData<S>,
+}
+
+impl<R: Reals, S: Shape> Term<R> for LinearAt<R, S> {
     #[inline(always)]
-    pub unsafe fn add<R: Reals<Scalar = T>, const SEVERAL: bool, const TALLY: bool>(
+    unsafe fn add<const SEVERAL: bool, const TALLY: bool>(
         &self,
         r: R,
         kind: Kind<R>,
@@ -128,21 +279,77 @@ impl<T: super::simd::Scalar> Linear<T> {
         unsafe {
             let one = R::constant(1.0);
             if TALLY {
-                let s = r * R::splat(self.inverse_range);
-                let w = kind.of::<SEVERAL>(&self.energy) * value(self.kind, s);
+                let s = r * self.inverse_range;
+                let w = self.energy.of::<SEVERAL>(kind) * self.kind.visit(Value(s));
                 *energy = w.where_below(s, one).mul_add(share, *energy);
             }
-            let s = r * R::splat(self.force_inverse_range);
-            let force = kind.of::<SEVERAL>(&self.force) * slope(self.force_kind, s);
+            let s = r * self.force_inverse_range;
+            let force = self.force.of::<SEVERAL>(kind) * S::slope(s);
             before + force.where_below(s, one)
         }
     }
 }
 
-impl<T: super::simd::Scalar> Spline<T> {
-    /// `before − φ′(r)`, and the energy.
+/// Adds the forces of a density that every ψ is linear in.
+#[inline(always)]
+pub unsafe fn add_linear<R: Reals, const SEVERAL: bool, const TALLY: bool>(
+    term: &Linear<R::Scalar>,
+    block: &mut Block<R::Scalar>,
+    vectors: usize,
+    energy: &mut R,
+) {
+    term.force_kind.visit(AddLinear::<R, SEVERAL, TALLY> { term, block, vectors, energy });
+}
+
+struct AddLinear<'a, R: Reals, const SEVERAL: bool, const TALLY: bool> {
+    term: &'a Linear<R::Scalar>,
+    block: &'a mut Block<R::Scalar>,
+    vectors: usize,
+    energy: &'a mut R,
+}
+
+impl<R: Reals, const SEVERAL: bool, const TALLY: bool> ShapeVisitor for AddLinear<'_, R, SEVERAL, TALLY> {
+    type Output = ();
+
     #[inline(always)]
-    pub unsafe fn add<R: Reals<Scalar = T>, const SEVERAL: bool, const TALLY: bool>(
+    fn visit<S: Shape>(self) {
+        // SAFETY: the contract of `simd`, by way of `add_linear`.
+        unsafe {
+            let term = LinearAt::<R, S> {
+                kind: self.term.kind,
+                inverse_range: R::splat(self.term.inverse_range),
+                force_inverse_range: R::splat(self.term.force_inverse_range),
+                force: At::new(&self.term.force),
+                energy: At::new(&self.term.energy),
+                shape: PhantomData,
+            };
+            each::<R, SEVERAL, TALLY>(term, self.block, self.vectors, self.energy);
+        }
+    }
+}
+
+/// `W(s)`.
+struct Value<R>(R);
+
+impl<R: Reals> ShapeVisitor for Value<R> {
+    type Output = R;
+    #[inline(always)]
+    fn visit<S: Shape>(self) -> R {
+        S::value(self.0)
+    }
+}
+
+/// `φ = a [A W(r, R_A) − B W(r, R_B)]`.
+struct SplineAt<R: Reals> {
+    repulsion: At<R>,
+    attraction: At<R>,
+    repulsion_inverse_range: At<R>,
+    attraction_inverse_range: At<R>,
+}
+
+impl<R: Reals> Term<R> for SplineAt<R> {
+    #[inline(always)]
+    unsafe fn add<const SEVERAL: bool, const TALLY: bool>(
         &self,
         r: R,
         kind: Kind<R>,
@@ -153,13 +360,13 @@ impl<T: super::simd::Scalar> Spline<T> {
         // SAFETY: the contract of `simd`.
         unsafe {
             let (one, zero) = (R::constant(1.0), R::constant(0.0));
-            let inverse_a = kind.of::<SEVERAL>(&self.repulsion_inverse_range);
-            let inverse_b = kind.of::<SEVERAL>(&self.attraction_inverse_range);
+            let inverse_a = self.repulsion_inverse_range.of::<SEVERAL>(kind);
+            let inverse_b = self.attraction_inverse_range.of::<SEVERAL>(kind);
             // At s = 1 the shape and its slope vanish; beyond, it stays there.
             let a = one - (one - r * inverse_a).larger(zero);
             let b = one - (one - r * inverse_b).larger(zero);
-            let repulsion = kind.of::<SEVERAL>(&self.repulsion);
-            let attraction = kind.of::<SEVERAL>(&self.attraction);
+            let repulsion = self.repulsion.of::<SEVERAL>(kind);
+            let attraction = self.attraction.of::<SEVERAL>(kind);
             if TALLY {
                 let phi = repulsion * CubicSpline::value(a) - attraction * CubicSpline::value(b);
                 *energy = phi.mul_add(share, *energy);
@@ -171,30 +378,22 @@ impl<T: super::simd::Scalar> Spline<T> {
     }
 }
 
-/// `W(s)`.
+/// Adds the forces of spline potentials.
 #[inline(always)]
-pub fn value<R: Reals>(kind: KernelKind, s: R) -> R {
-    struct Value<R>(R);
-    impl<R: Reals> ShapeVisitor for Value<R> {
-        type Output = R;
-        #[inline(always)]
-        fn visit<S: Shape>(self) -> R {
-            S::value(self.0)
-        }
+pub unsafe fn add_spline<R: Reals, const SEVERAL: bool, const TALLY: bool>(
+    term: &Spline<R::Scalar>,
+    block: &mut Block<R::Scalar>,
+    vectors: usize,
+    energy: &mut R,
+) {
+    // SAFETY: the contract of `simd`.
+    unsafe {
+        let term = SplineAt::<R> {
+            repulsion: At::new(&term.repulsion),
+            attraction: At::new(&term.attraction),
+            repulsion_inverse_range: At::new(&term.repulsion_inverse_range),
+            attraction_inverse_range: At::new(&term.attraction_inverse_range),
+        };
+        each::<R, SEVERAL, TALLY>(term, block, vectors, energy);
     }
-    kind.visit(Value(s))
-}
-
-/// `W′(s)`.
-#[inline(always)]
-pub fn slope<R: Reals>(kind: KernelKind, s: R) -> R {
-    struct Slope<R>(R);
-    impl<R: Reals> ShapeVisitor for Slope<R> {
-        type Output = R;
-        #[inline(always)]
-        fn visit<S: Shape>(self) -> R {
-            S::slope(self.0)
-        }
-    }
-    kind.visit(Slope(s))
 }

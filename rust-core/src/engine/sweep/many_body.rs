@@ -21,8 +21,11 @@ pub struct NearPairs<T> {
     pub first: u32,
 }
 
-/// The bits of a code that count second particles, from the first of the layer on; above them is the number of the
-/// first particle in its part.
+/// The lowest bits of a code: the number of the first particle in its part. Those above count second particles, from
+/// the first of the layer on.
+pub const MEMBER_BITS: u32 = 4;
+
+/// How many bits these are: codes pass as numbers.
 pub const NEAR_BITS: u32 = 25;
 
 /// Rows of four numbers that whole vectors are written behind.
@@ -193,7 +196,7 @@ pub unsafe fn second_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const T
                 while p < end {
                     let row = rows.as_ptr().add(p).cast::<A::Scalar>();
                     let code = (*row.add(3)).decode();
-                    let (j, m) = ((code & ((1 << NEAR_BITS) - 1)) as usize, (code >> NEAR_BITS) as usize);
+                    let (j, m) = ((code >> MEMBER_BITS) as usize, (code & ((1 << MEMBER_BITS) - 1)) as usize);
                     let there = layer_slopes.add(width * j);
                     let slope = if SEVERAL {
                         let (here, species_i) = *rows_of.get_unchecked(m);

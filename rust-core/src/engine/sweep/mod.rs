@@ -23,6 +23,7 @@ mod evaluate;
 mod forces;
 mod frame;
 mod grid;
+mod keep;
 mod layer;
 mod look;
 mod machine;
@@ -34,6 +35,7 @@ mod settings;
 mod simd;
 mod terms;
 mod thermostat;
+mod weights;
 mod windows;
 
 pub use pool::{Pool, part};

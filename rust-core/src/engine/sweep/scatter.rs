@@ -33,7 +33,7 @@ pub unsafe fn scatter<I: Isa, A: Arithmetic<I>>(
         // the difference of two running sums, of which every other one is kept. Behind an odd number nothing follows.
         let count = part.count();
         rows.add(4 * count).cast::<[A::Scalar; 4]>().write([A::Scalar::default(); 4]);
-        let sums = block.running.as_mut_ptr().cast::<f64>();
+        let sums = block.pairs.as_mut_ptr().cast::<f64>();
         let mut sum = I::Quad::zero();
         let mut p = 0;
         while p < count {

@@ -10,7 +10,8 @@ use crate::model::pair::{PairForm, PairPotential, SplineAttractive};
 #[derive(Debug, Clone, Default)]
 pub struct Terms<T> {
     pub species: usize,
-    pub soft: Vec<Soft<T>>,
+    /// One at least.
+    soft: Vec<Soft<T>>,
     pub linear: Vec<Linear<T>>,
     pub spline: Vec<Spline<T>>,
     /// Potentials that are evaluated apart, in double precision.
@@ -164,6 +165,9 @@ impl<T: Scalar> Terms<T> {
                 energy: both(term.kernel.value_factor()),
             });
         }
+        if terms.soft.is_empty() {
+            terms.soft.push(Soft::none(count * count));
+        }
         terms.passes = plan
             .passes
             .iter()
@@ -176,6 +180,24 @@ impl<T: Scalar> Terms<T> {
             exponent: Exponent::new(t),
         });
         terms
+    }
+
+    /// Soft repulsions: there is one, of no strength if need be.
+    #[inline(always)]
+    pub fn first_soft(&self) -> &Soft<T> {
+        &self.soft[0]
+    }
+
+    /// Soft repulsions of other ranges.
+    #[inline(always)]
+    pub fn other_soft(&self) -> &[Soft<T>] {
+        &self.soft[1..]
+    }
+
+    /// Whether there are terms besides the first soft one, drag and densities.
+    #[inline(always)]
+    pub fn has_more(&self) -> bool {
+        self.soft.len() > 1 || !(self.linear.is_empty() && self.spline.is_empty() && self.apart.is_empty())
     }
 
     /// Entries of the pair of species that a term acts on.
@@ -193,9 +215,7 @@ impl<T: Scalar> Terms<T> {
                 // The first table that has no such pair yet.
                 let free = self.soft.iter().position(|s| s.inverse_range[places[0]] == far);
                 let at = free.unwrap_or_else(|| {
-                    let table =
-                        Soft { strength: zero(), inverse_range: Table::of(size, far), energy: zero() };
-                    self.soft.push(table);
+                    self.soft.push(Soft::none(size));
                     self.soft.len() - 1
                 });
                 for p in places {
@@ -219,6 +239,14 @@ impl<T: Scalar> Terms<T> {
             }
             PairPotential::Expression(_) | PairPotential::Table(_) => self.apart.push(term.clone()),
         }
+    }
+}
+
+impl<T: Scalar> Soft<T> {
+    /// Between no pair of species.
+    fn none(size: usize) -> Soft<T> {
+        let zero = || Table::of(size, T::default());
+        Soft { strength: zero(), inverse_range: Table::of(size, T::of(inverse(0.0))), energy: zero() }
     }
 }
 

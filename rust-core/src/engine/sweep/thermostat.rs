@@ -1,8 +1,9 @@
 //! Noise and drag of a vector of pairs.
 
 use super::arithmetic::Pairs;
+use super::forces::At;
 use super::simd::{Reals, Scalar, Words};
-use super::terms::{Drag, Exponent};
+use super::terms::{Drag, Exponent, Table};
 use crate::engine::noise::{PAIR_ROUNDS, PARITY, PairNoise, ROTATIONS};
 
 /// `√3/2³¹`: signed words to numbers of unit variance.
@@ -77,23 +78,62 @@ unsafe fn inject<W: Words>(x0: [W; 2], x1: [W; 2], schedule: &[W; 3], number: us
     }
 }
 
-impl<T: Scalar> Drag<T> {
-    /// `−γ w_R² (ê·v) + σ w_R ξ dt^{−1/2}`; `xi` is `ξ dt^{−1/2}`.
+/// Drag and noise at hand.
+pub struct Pull<'a, R: Reals> {
+    gamma: At<R>,
+    sigma: At<R>,
+    inverse_range: At<R>,
+    exponent: Power<'a, R::Scalar>,
+    /// Signed words of noise times this are `ξ dt^{−1/2}`.
+    unit: R,
+}
+
+/// How `w_R` comes from `1 − r/R`.
+enum Power<'a, T> {
+    One,
+    Two,
+    Any(&'a Table<T>),
+}
+
+impl<'a, R: Reals> Pull<'a, R> {
+    /// # Safety
+    /// The contract of `simd`.
     #[inline(always)]
-    pub unsafe fn force<R: Reals<Scalar = T>, const SEVERAL: bool>(&self, pairs: &Pairs<R>, xi: R) -> R {
-        // SAFETY: the contract of `simd`.
+    pub unsafe fn new(drag: &'a Drag<R::Scalar>, unit: R) -> Self {
+        // SAFETY: the caller's.
+        unsafe {
+            Pull {
+                gamma: At::new(&drag.gamma),
+                sigma: At::new(&drag.sigma),
+                inverse_range: At::new(&drag.inverse_range),
+                exponent: match &drag.exponent {
+                    Exponent::One => Power::One,
+                    Exponent::Two => Power::Two,
+                    Exponent::Any(table) => Power::Any(table),
+                },
+                unit,
+            }
+        }
+    }
+
+    /// `−γ w_R² (ê·v) + σ w_R ξ dt^{−1/2}`; `ξ` from a word of noise.
+    ///
+    /// # Safety
+    /// The contract of `simd`.
+    #[inline(always)]
+    pub unsafe fn force<const SEVERAL: bool>(&self, pairs: &Pairs<R>, word: R::Words) -> R {
+        // SAFETY: the caller's.
         unsafe {
             let (one, zero) = (R::constant(1.0), R::constant(0.0));
             let kind = pairs.kind;
-            let t = (one - pairs.apart.r * kind.of::<SEVERAL>(&self.inverse_range)).larger(zero);
-            let w = match &self.exponent {
-                Exponent::One => t,
-                Exponent::Two => t * t,
-                Exponent::Any(exponent) => power(t, kind.of::<SEVERAL>(exponent)),
+            let t = (one - pairs.apart.r * self.inverse_range.of::<SEVERAL>(kind)).larger(zero);
+            let w = match self.exponent {
+                Power::One => t,
+                Power::Two => t * t,
+                Power::Any(exponent) => power(t, At::<R>::new(exponent).of::<SEVERAL>(kind)),
             };
-            let pull = kind.of::<SEVERAL>(&self.sigma) * xi
-                - kind.of::<SEVERAL>(&self.gamma) * w * pairs.apart.along;
-            w * pull
+            let xi = (R::of_signed(word) + R::constant(0.5)) * (self.unit * self.sigma.of::<SEVERAL>(kind));
+            w * (xi - self.gamma.of::<SEVERAL>(kind) * w * pairs.apart.along)
         }
     }
 }
