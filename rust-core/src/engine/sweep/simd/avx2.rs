@@ -148,20 +148,15 @@ impl Reals for F32x8 {
             let cd_low = _mm256_castps_pd(_mm256_unpacklo_ps(c.0, d.0));
             let cd_high = _mm256_castps_pd(_mm256_unpackhi_ps(c.0, d.0));
             // Rows k and k + 4 in the halves.
-            let rows = [
-                _mm256_unpacklo_pd(ab_low, cd_low),
-                _mm256_unpackhi_pd(ab_low, cd_low),
-                _mm256_unpacklo_pd(ab_high, cd_high),
-                _mm256_unpackhi_pd(ab_high, cd_high),
-            ];
-            let p: *mut __m128d = p.cast();
-            let mut k = 0;
-            while k < 4 {
-                // Stores of halves are no shuffles. Volatile: the compiler else shuffles to store all at once.
-                p.add(k).write_volatile(_mm256_castpd256_pd128(rows[k]));
-                p.add(k + 4).write_volatile(_mm256_extractf128_pd::<1>(rows[k]));
-                k += 1;
-            }
+            let r0 = _mm256_unpacklo_pd(ab_low, cd_low);
+            let r1 = _mm256_unpackhi_pd(ab_low, cd_low);
+            let r2 = _mm256_unpacklo_pd(ab_high, cd_high);
+            let r3 = _mm256_unpackhi_pd(ab_high, cd_high);
+            let p: *mut f64 = p.cast();
+            _mm256_storeu_pd(p, _mm256_permute2f128_pd::<0x20>(r0, r1));
+            _mm256_storeu_pd(p.add(4), _mm256_permute2f128_pd::<0x20>(r2, r3));
+            _mm256_storeu_pd(p.add(8), _mm256_permute2f128_pd::<0x31>(r0, r1));
+            _mm256_storeu_pd(p.add(12), _mm256_permute2f128_pd::<0x31>(r2, r3));
         }
     }
 }
