@@ -1,0 +1,111 @@
+//! Positions as fractions of the frame, block by block.
+
+use super::{FAR, TWO_TO_32};
+use crate::engine::sweep::frame::Frame;
+use crate::engine::sweep::grid::Grid;
+
+/// Particles of a block.
+pub const BLOCK: usize = 32;
+
+/// Coordinates of particles that make whole vectors.
+const LANES: usize = 24;
+
+/// Coordinates of a block.
+const ALL: usize = 3 * BLOCK;
+
+/// How positions become fractions of the frame in units of 2⁻³², and those the cells of a grid; constants are repeated
+/// for each particle of a few.
+pub struct Fractions<'a> {
+    frame: &'a Frame,
+    inverse: [f64; 3],
+    origin: [f64; LANES],
+    scale: [f64; LANES],
+    /// Where fractions end that do not wrap.
+    ends: [[f64; LANES]; 2],
+    is_open: bool,
+    /// Cells along each axis, and from one to the next along it.
+    of: [u32; LANES],
+    step: [u32; LANES],
+}
+
+impl<'a> Fractions<'a> {
+    pub fn new(frame: &'a Frame, grid: &Grid) -> Fractions<'a> {
+        let inverse = frame.length.map(|l| 1.0 / l);
+        let flat = if frame.dimensions == 3 { 1.0 } else { 0.0 };
+        let scale = [inverse[0] * TWO_TO_32, inverse[1] * TWO_TO_32, flat * inverse[2] * TWO_TO_32];
+        let (of, step) = (grid.along(), grid.steps());
+        let end = |c: usize, end: f64, beyond: f64| if frame.periodic[c] { beyond } else { end };
+        Fractions {
+            frame,
+            inverse,
+            origin: std::array::from_fn(|c| frame.origin[c % 3]),
+            scale: std::array::from_fn(|c| scale[c % 3]),
+            ends: [
+                std::array::from_fn(|c| end(c % 3, 0.0, -FAR)),
+                std::array::from_fn(|c| end(c % 3, TWO_TO_32 - 1.0, FAR)),
+            ],
+            is_open: !frame.periodic.iter().all(|p| *p),
+            of: std::array::from_fn(|c| of[c % 3]),
+            step: std::array::from_fn(|c| step[c % 3]),
+        }
+    }
+
+    /// Fractions of a block of particles; they wrap along periods, and are never beyond the ends where there are none.
+    /// Whether all are finite and not too far away.
+    #[inline(always)]
+    pub fn of_block(&self, x: &[[f64; 3]; BLOCK], units: &mut [[u32; 3]; BLOCK]) -> bool {
+        let mut scaled = [0.0; ALL];
+        if self.frame.is_tilted() {
+            for (t, x) in scaled.as_chunks_mut::<3>().0.iter_mut().zip(x) {
+                *t = self.frame.fraction(x, &self.inverse).map(|s| s * TWO_TO_32);
+            }
+        } else {
+            for (t, x) in scaled.chunks_exact_mut(LANES).zip(x.as_flattened().chunks_exact(LANES)) {
+                for c in 0..LANES {
+                    t[c] = (x[c] - self.origin[c]) * self.scale[c];
+                }
+            }
+        }
+        let mut far = 0u64;
+        for t in scaled {
+            // Also where it is not a number.
+            far |= !(t.abs() < FAR) as u64;
+        }
+        if self.is_open {
+            for t in scaled.chunks_exact_mut(LANES) {
+                for c in 0..LANES {
+                    let low = if t[c] > self.ends[0][c] { t[c] } else { self.ends[0][c] };
+                    t[c] = if low < self.ends[1][c] { low } else { self.ends[1][c] };
+                }
+            }
+        }
+        for (u, t) in units.as_flattened_mut().iter_mut().zip(scaled) {
+            *u = (t + WHOLE).to_bits() as u32;
+        }
+        far == 0
+    }
+
+    /// Whether the fractions of a particle are finite and not too far away.
+    pub fn has(&self, x: &[f64; 3]) -> bool {
+        self.frame.fraction(x, &self.inverse).iter().all(|s| (s * TWO_TO_32).abs() < FAR)
+    }
+
+    /// The cells of a block of particles.
+    #[inline(always)]
+    pub fn cells(&self, units: &[[u32; 3]; BLOCK]) -> [u32; BLOCK] {
+        let mut parts = [0; ALL];
+        for (part, u) in parts.chunks_exact_mut(LANES).zip(units.as_flattened().chunks_exact(LANES)) {
+            for c in 0..LANES {
+                part[c] = ((u[c] as u64 * self.of[c] as u64) >> 32) as u32 * self.step[c];
+            }
+        }
+        let mut cells = [0; BLOCK];
+        for (cell, [a, b, c]) in cells.iter_mut().zip(parts.as_chunks::<3>().0) {
+            *cell = a + b + c;
+        }
+        cells
+    }
+}
+
+/// Adding this leaves the nearest whole number in the low bits.
+const WHOLE: f64 = 6_755_399_441_055_744.0;
