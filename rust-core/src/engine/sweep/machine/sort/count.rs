@@ -42,9 +42,10 @@ impl Loop for CountSome<'_> {
                 // SAFETY: of this thread's particles; cells are of the grid.
                 unsafe {
                     count.unit.at(first).cast::<[[u32; 3]; BLOCK]>().write(units);
-                    count.cell.at(first).cast::<[u32; BLOCK]>().write(cells);
-                    for cell in cells {
-                        *counts.get_unchecked_mut(cell as usize) += 1;
+                    for (k, [a, b, c]) in cells.into_iter().enumerate() {
+                        let to = a + b + c;
+                        *count.cell.at(first + k) = to;
+                        *counts.get_unchecked_mut(to as usize) += 1;
                     }
                 }
             } else {
@@ -86,7 +87,7 @@ impl Count<'_> {
         &self,
         range: Range<usize>,
         units: &[[u32; 3]; BLOCK],
-        cells: &[u32; BLOCK],
+        cells: &[[u32; 3]; BLOCK],
         counts: &mut [u32],
     ) -> Result<(), EngineError> {
         let given = self.given;
@@ -108,10 +109,11 @@ impl Count<'_> {
                 unsafe { *self.cell.at(k) = NOWHERE };
                 continue;
             }
-            counts[*to as usize] += 1;
+            let to = to.iter().sum();
+            counts[to as usize] += 1;
             // SAFETY: as above.
             unsafe {
-                *self.cell.at(k) = *to;
+                *self.cell.at(k) = to;
                 *self.unit.at(k) = *u;
             }
         }

@@ -7,21 +7,18 @@ use crate::engine::sweep::grid::Grid;
 /// Particles of a block.
 pub const BLOCK: usize = 32;
 
-/// Coordinates of particles that make whole vectors.
-const LANES: usize = 24;
-
 /// Coordinates of a block.
-const ALL: usize = 3 * BLOCK;
+const LANES: usize = 3 * BLOCK;
 
 /// How positions become fractions of the frame in units of 2⁻³², and those the cells of a grid; constants are repeated
-/// for each particle of a few.
+/// for each particle of a block, so that loops are over all coordinates alike.
 pub struct Fractions<'a> {
     frame: &'a Frame,
     inverse: [f64; 3],
     origin: [f64; LANES],
     scale: [f64; LANES],
     /// Where fractions end that do not wrap.
-    ends: [[f64; LANES]; 2],
+    ends: [[f64; 2]; LANES],
     is_open: bool,
     /// Cells along each axis, and from one to the next along it.
     of: [u32; LANES],
@@ -40,10 +37,7 @@ impl<'a> Fractions<'a> {
             inverse,
             origin: std::array::from_fn(|c| frame.origin[c % 3]),
             scale: std::array::from_fn(|c| scale[c % 3]),
-            ends: [
-                std::array::from_fn(|c| end(c % 3, 0.0, -FAR)),
-                std::array::from_fn(|c| end(c % 3, TWO_TO_32 - 1.0, FAR)),
-            ],
+            ends: std::array::from_fn(|c| [end(c % 3, 0.0, -FAR), end(c % 3, TWO_TO_32 - 1.0, FAR)]),
             is_open: !frame.periodic.iter().all(|p| *p),
             of: std::array::from_fn(|c| of[c % 3]),
             step: std::array::from_fn(|c| step[c % 3]),
@@ -54,16 +48,15 @@ impl<'a> Fractions<'a> {
     /// Whether all are finite and not too far away.
     #[inline(always)]
     pub fn of_block(&self, x: &[[f64; 3]; BLOCK], units: &mut [[u32; 3]; BLOCK]) -> bool {
-        let mut scaled = [0.0; ALL];
+        let mut scaled = [0.0; LANES];
         if self.frame.is_tilted() {
             for (t, x) in scaled.as_chunks_mut::<3>().0.iter_mut().zip(x) {
                 *t = self.frame.fraction(x, &self.inverse).map(|s| s * TWO_TO_32);
             }
         } else {
-            for (t, x) in scaled.chunks_exact_mut(LANES).zip(x.as_flattened().chunks_exact(LANES)) {
-                for c in 0..LANES {
-                    t[c] = (x[c] - self.origin[c]) * self.scale[c];
-                }
+            let constants = self.origin.iter().zip(&self.scale);
+            for (t, (x, (origin, scale))) in scaled.iter_mut().zip(x.as_flattened().iter().zip(constants)) {
+                *t = (x - origin) * scale;
             }
         }
         let mut far = 0u64;
@@ -72,11 +65,9 @@ impl<'a> Fractions<'a> {
             far |= !(t.abs() < FAR) as u64;
         }
         if self.is_open {
-            for t in scaled.chunks_exact_mut(LANES) {
-                for c in 0..LANES {
-                    let low = if t[c] > self.ends[0][c] { t[c] } else { self.ends[0][c] };
-                    t[c] = if low < self.ends[1][c] { low } else { self.ends[1][c] };
-                }
+            for (t, [low, high]) in scaled.iter_mut().zip(&self.ends) {
+                let above = if *t > *low { *t } else { *low };
+                *t = if above < *high { above } else { *high };
             }
         }
         for (u, t) in units.as_flattened_mut().iter_mut().zip(scaled) {
@@ -90,20 +81,16 @@ impl<'a> Fractions<'a> {
         self.frame.fraction(x, &self.inverse).iter().all(|s| (s * TWO_TO_32).abs() < FAR)
     }
 
-    /// The cells of a block of particles.
+    /// What the coordinates of a block of particles add to the numbers of their cells.
     #[inline(always)]
-    pub fn cells(&self, units: &[[u32; 3]; BLOCK]) -> [u32; BLOCK] {
-        let mut parts = [0; ALL];
-        for (part, u) in parts.chunks_exact_mut(LANES).zip(units.as_flattened().chunks_exact(LANES)) {
-            for c in 0..LANES {
-                part[c] = ((u[c] as u64 * self.of[c] as u64) >> 32) as u32 * self.step[c];
-            }
+    pub fn cells(&self, units: &[[u32; 3]; BLOCK]) -> [[u32; 3]; BLOCK] {
+        let mut parts = [[0; 3]; BLOCK];
+        let constants = self.of.iter().zip(&self.step);
+        let units = units.as_flattened().iter().zip(constants);
+        for (part, (u, (of, step))) in parts.as_flattened_mut().iter_mut().zip(units) {
+            *part = ((*u as u64 * *of as u64) >> 32) as u32 * step;
         }
-        let mut cells = [0; BLOCK];
-        for (cell, [a, b, c]) in cells.iter_mut().zip(parts.as_chunks::<3>().0) {
-            *cell = a + b + c;
-        }
-        cells
+        parts
     }
 }
 
