@@ -50,9 +50,7 @@ impl<'a> Fractions<'a> {
     pub fn of_block(&self, x: &[[f64; 3]; BLOCK], units: &mut [[u32; 3]; BLOCK]) -> bool {
         let mut scaled = [0.0; LANES];
         if self.frame.is_tilted() {
-            for (t, x) in scaled.as_chunks_mut::<3>().0.iter_mut().zip(x) {
-                *t = self.frame.fraction(x, &self.inverse).map(|s| s * TWO_TO_32);
-            }
+            self.lean(x, &mut scaled);
         } else {
             let constants = self.origin.iter().zip(&self.scale);
             for (t, (x, (origin, scale))) in scaled.iter_mut().zip(x.as_flattened().iter().zip(constants)) {
@@ -65,15 +63,31 @@ impl<'a> Fractions<'a> {
             far |= !(t.abs() < FAR) as u64;
         }
         if self.is_open {
-            for (t, [low, high]) in scaled.iter_mut().zip(&self.ends) {
-                let above = if *t > *low { *t } else { *low };
-                *t = if above < *high { above } else { *high };
-            }
+            self.stay(&mut scaled);
         }
         for (u, t) in units.as_flattened_mut().iter_mut().zip(scaled) {
             *u = (t + WHOLE).to_bits() as u32;
         }
         far == 0
+    }
+
+    // Neither of both is common: inlined they would keep the loops around them from becoming vectors.
+
+    /// Fractions in a frame that leans.
+    #[inline(never)]
+    fn lean(&self, x: &[[f64; 3]; BLOCK], scaled: &mut [f64; LANES]) {
+        for (t, x) in scaled.as_chunks_mut::<3>().0.iter_mut().zip(x) {
+            *t = self.frame.fraction(x, &self.inverse).map(|s| s * TWO_TO_32);
+        }
+    }
+
+    /// Fractions no further than the ends of the frame.
+    #[inline(never)]
+    fn stay(&self, scaled: &mut [f64; LANES]) {
+        for (t, [low, high]) in scaled.iter_mut().zip(&self.ends) {
+            let above = if *t > *low { *t } else { *low };
+            *t = if above < *high { above } else { *high };
+        }
     }
 
     /// Whether the fractions of a particle are finite and not too far away.
