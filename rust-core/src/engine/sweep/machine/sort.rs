@@ -3,6 +3,7 @@
 mod count;
 mod fill;
 mod fractions;
+mod span;
 
 use super::{Given, Machine, SLACK, Shared, Sum, vectors};
 use crate::engine::error::EngineError;
@@ -16,6 +17,7 @@ use crate::engine::tally::Tally;
 use count::{Count, CountSome};
 use fill::{Fill, FillSome};
 use fractions::Fractions;
+use span::SpanSome;
 
 impl<P: Compiled> Machine<P> {
     /// The extremes of the positions of owned particles.
@@ -25,24 +27,12 @@ impl<P: Compiled> Machine<P> {
         pool.run(&|t| {
             // SAFETY: each thread has its own.
             let scratch = unsafe { &mut *scratch.at(t) };
-            let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+            let span = SpanSome { given, particles: part(given.particles.owned, t, threads) };
             scratch.fault = None;
-            for k in part(given.particles.owned, t, threads) {
-                let x = &given.particles.x[k];
-                let sum = x[0].abs() + x[1].abs() + x[2].abs();
-                if sum.is_nan() || sum > 1e100 {
-                    if given.species_of(k).is_some_and(|s| s < 0) {
-                        continue;
-                    }
-                    scratch.fault = Some(EngineError::Position { tag: given.particles.tag[k] });
-                    return;
-                }
-                for c in 0..3 {
-                    low[c] = low[c].min(x[c]);
-                    high[c] = high[c].max(x[c]);
-                }
+            match vectors::run(self.instructions, span) {
+                Ok(span) => [scratch.low, scratch.high] = span,
+                Err(fault) => scratch.fault = Some(fault),
             }
-            (scratch.low, scratch.high) = (low, high);
         });
         self.first_fault()?;
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
@@ -85,6 +75,7 @@ impl<P: Compiled> Machine<P> {
             given,
             frame: &self.frame,
             fractions: Fractions::new(&self.frame, &self.grid),
+            first_kind: Count::first_kind(given),
             cell: Shared(self.cell.as_mut_ptr()),
             unit: Shared(self.unit.as_mut_ptr()),
         };
@@ -262,3 +253,6 @@ const TWO_TO_32: f64 = 4_294_967_296.0;
 
 /// Far below what a whole number in the low bits of a double holds.
 const FAR: f64 = 1e15;
+
+#[cfg(test)]
+mod tests;
