@@ -262,7 +262,8 @@ impl<P: Compiled> Machine<P> {
         let variables = self.width();
         // SAFETY: these accumulators are the layer's own.
         unsafe {
-            std::slice::from_raw_parts_mut(arrays.sums.at(begin), count).fill(Sum::default());
+            // Zeros; as bytes they are written in the widest vectors.
+            arrays.sums.at(begin).write_bytes(0, count);
             if variables > 1 {
                 let densities = arrays.densities.at(variables * begin);
                 std::slice::from_raw_parts_mut(densities, variables * count).fill(0.0);

@@ -97,17 +97,29 @@ impl<P: Compiled> Machine<P> {
         let cells = self.grid.cells();
         let per_layer = self.grid.rows * self.grid.bins;
         self.start.resize(cells + 1 + if self.is_ring() { per_layer } else { 0 }, 0);
-        let mut sum = 0;
-        for cell in 0..cells {
-            self.start[cell] = sum;
-            for t in 0..threads {
-                let count = &mut self.counts[t * cells + cell];
-                let next = sum + *count;
-                *count = sum;
-                sum = next;
+        let [first, rest @ ..] = &mut self.start[..] else { return };
+        *first = 0;
+        // How many there are in each bin, then where it begins, and last where it ends: the beginning of the next.
+        let ends = &mut rest[..cells];
+        ends.copy_from_slice(&self.counts[..cells]);
+        for counts in self.counts[..threads * cells].chunks_exact(cells).skip(1) {
+            for (end, count) in ends.iter_mut().zip(counts) {
+                *end += count;
             }
         }
-        self.start[cells] = sum;
+        let mut sum = 0;
+        for end in &mut *ends {
+            let many = *end;
+            *end = sum;
+            sum += many;
+        }
+        for counts in self.counts[..threads * cells].chunks_exact_mut(cells) {
+            for (end, count) in ends.iter_mut().zip(counts) {
+                let many = *count;
+                *count = *end;
+                *end += many;
+            }
+        }
         self.particles = sum as usize;
         // The copy of the first layer.
         for cell in cells + 1..self.start.len() {
