@@ -191,7 +191,8 @@ impl Forces<'_> {
             if k as usize >= self.owned {
                 continue;
             }
-            lost |= !(x.abs() <= f64::MAX) | !(y.abs() <= f64::MAX) | !(z.abs() <= f64::MAX);
+            let finite = x.is_finite() & y.is_finite() & z.is_finite();
+            lost |= !finite;
             // SAFETY: an owned particle, and of this layer alone.
             unsafe {
                 let out = self.out.at(k as usize);

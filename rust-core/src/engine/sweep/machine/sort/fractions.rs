@@ -59,8 +59,9 @@ impl<'a> Fractions<'a> {
         }
         let mut far = 0u64;
         for t in scaled {
-            // Also where it is not a number.
-            far |= !(t.abs() < FAR) as u64;
+            // Not where it is not a number.
+            let near = t.abs() < FAR;
+            far |= u64::from(!near);
         }
         if self.is_open {
             self.stay(&mut scaled);
