@@ -66,11 +66,18 @@ impl Grid {
         self.bins * self.rows * self.layers
     }
 
-    /// The cell of a particle at a fraction of the box, in units of 2⁻³².
-    #[inline(always)]
-    pub fn cell(&self, u: [u32; 3]) -> usize {
-        let part = |u: u32, of: usize| ((u as u64 * of as u64) >> 32) as usize;
-        let row = part(u[self.layer_axis], self.layers) * self.rows + part(u[self.row_axis], self.rows);
-        row * self.bins + part(u[0], self.bins)
+    /// Cells along each direction.
+    pub fn along(&self) -> [u32; 3] {
+        let mut along = [self.bins as u32; 3];
+        (along[self.row_axis], along[self.layer_axis]) = (self.rows as u32, self.layers as u32);
+        along
+    }
+
+    /// How far apart cells are that follow each other in each direction.
+    pub fn steps(&self) -> [u32; 3] {
+        let mut steps = [1; 3];
+        let row = self.bins as u32;
+        (steps[self.row_axis], steps[self.layer_axis]) = (row, row * self.rows as u32);
+        steps
     }
 }

@@ -4,6 +4,7 @@ mod excess;
 mod host;
 mod sort;
 mod stream;
+mod vectors;
 
 use super::block::Block;
 use super::compiled::{Compiled, Passes};
@@ -30,6 +31,7 @@ const SLACK: usize = 16;
 
 /// Arrays in the order of cells, and what goes through them.
 pub struct Machine<P: Compiled> {
+    instructions: Instructions,
     passes: Passes<P::Scalar, P::Record>,
     terms: Terms<P::Scalar>,
     frame: Frame,
@@ -115,6 +117,14 @@ pub struct Given<'a> {
     pub totals: bool,
 }
 
+impl Given<'_> {
+    /// The species of a particle, unless its type is unknown.
+    #[inline(always)]
+    fn species_of(&self, k: usize) -> Option<i32> {
+        self.kinds.get(self.particles.kind[k] as usize).copied()
+    }
+}
+
 impl<P: Compiled> Machine<P> {
     pub fn new(plan: &Plan, instructions: Instructions, threads: usize) -> Machine<P> {
         let terms = Terms::new(plan);
@@ -124,6 +134,7 @@ impl<P: Compiled> Machine<P> {
         let scratch = (0..threads).map(|_| Scratch::new(terms.passes.len())).collect();
         let frame = Frame::around([0.0; 3], [1.0; 3], plan.dimensions, 1.0);
         Machine {
+            instructions,
             passes: P::passes(instructions, count > 1),
             terms,
             frame,
@@ -251,7 +262,8 @@ impl<P: Compiled> Machine<P> {
         let variables = self.width();
         // SAFETY: these accumulators are the layer's own.
         unsafe {
-            std::slice::from_raw_parts_mut(arrays.sums.at(begin), count).fill(Sum::default());
+            // Zeros; as bytes they are written in the widest vectors.
+            arrays.sums.at(begin).write_bytes(0, count);
             if variables > 1 {
                 let densities = arrays.densities.at(variables * begin);
                 std::slice::from_raw_parts_mut(densities, variables * count).fill(0.0);

@@ -28,6 +28,8 @@ struct Shared {
     failed: AtomicBool,
     stop: AtomicBool,
     work: Mutex<Option<Work>>,
+    /// Workers that sleep; changed with `work` locked, so that none is missed.
+    asleep: AtomicUsize,
     called: Condvar,
 }
 
@@ -43,6 +45,7 @@ impl Pool {
             failed: AtomicBool::new(false),
             stop: AtomicBool::new(false),
             work: Mutex::new(None),
+            asleep: AtomicUsize::new(0),
             called: Condvar::new(),
         });
         let spawn = |number| {
@@ -71,12 +74,7 @@ impl Pool {
         // this thread's part panics.
         let pointer: *const (dyn Fn(usize) + Sync + 'static) = unsafe { std::mem::transmute(work) };
         self.shared.busy.store(self.workers.len(), Ordering::Relaxed);
-        {
-            let mut slot = self.shared.work.lock().unwrap_or_else(|e| e.into_inner());
-            *slot = Some(Work(pointer));
-            self.shared.epoch.fetch_add(1, Ordering::Release);
-        }
-        self.shared.called.notify_all();
+        self.shared.call(Some(Work(pointer)));
         let wait = Wait(&self.shared);
         work(0);
         drop(wait);
@@ -98,6 +96,22 @@ impl Pool {
                 work(unsafe { &mut *first.at(k) });
             }
         });
+    }
+}
+
+impl Shared {
+    /// Calls the workers to the next piece of work.
+    fn call(&self, work: Option<Work>) {
+        let asleep = {
+            let mut slot = self.work.lock().unwrap_or_else(|e| e.into_inner());
+            *slot = work;
+            self.epoch.fetch_add(1, Ordering::Release);
+            self.asleep.load(Ordering::Relaxed) > 0
+        };
+        // A call of the system, which costs more than many a piece of work.
+        if asleep {
+            self.called.notify_all();
+        }
     }
 }
 
@@ -126,7 +140,9 @@ fn worker(shared: &Shared, number: usize) {
         let work = {
             let mut slot = shared.work.lock().unwrap_or_else(|e| e.into_inner());
             while shared.epoch.load(Ordering::Acquire) == seen {
+                shared.asleep.fetch_add(1, Ordering::Relaxed);
                 slot = shared.called.wait(slot).unwrap_or_else(|e| e.into_inner());
+                shared.asleep.fetch_sub(1, Ordering::Relaxed);
             }
             seen += 1;
             *slot
@@ -153,12 +169,7 @@ impl std::fmt::Debug for Pool {
 impl Drop for Pool {
     fn drop(&mut self) {
         self.shared.stop.store(true, Ordering::Relaxed);
-        {
-            let mut slot = self.shared.work.lock().unwrap_or_else(|e| e.into_inner());
-            *slot = None;
-            self.shared.epoch.fetch_add(1, Ordering::Release);
-        }
-        self.shared.called.notify_all();
+        self.shared.call(None);
         for worker in self.workers.drain(..) {
             let _ = worker.join();
         }

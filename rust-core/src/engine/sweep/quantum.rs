@@ -34,6 +34,14 @@ impl Quantum {
         Quantum { per_length, limit: (reach * reach / 65_536.0) as i16 + 1 }
     }
 
+    /// Words of each edge, if edges are along the axes and there are not too many: a coordinate then is the part of
+    /// these that its fraction is, which is off by less than one, and by half the distance over the edge.
+    pub fn words(&self, frame: &Frame) -> Option<[u32; 3]> {
+        let words = frame.length.map(|l| (l * self.per_length).round());
+        let few = words.iter().all(|w| *w < 2_147_483_648.0);
+        (few && !frame.is_tilted()).then_some(words.map(|w| w as u32))
+    }
+
     /// A coordinate.
     ///
     /// # Safety

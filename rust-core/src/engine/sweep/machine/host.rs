@@ -1,6 +1,7 @@
 //! What goes to the host and comes from it, in its own order.
 
-use super::{Machine, Shared};
+use super::vectors::{self, Loop};
+use super::{Machine, Shared, Sum};
 use crate::engine::error::EngineError;
 use crate::engine::sweep::compiled::Compiled;
 use crate::engine::sweep::pool::Pool;
@@ -51,41 +52,34 @@ impl<P: Compiled> Machine<P> {
                 if layer >= this.grid.layers {
                     return;
                 }
-                let (first, count) = this.layer(layer);
-                let (here, before) = this.accumulators(layer);
-                for s in first..first + count {
-                    let k = this.order[s] as usize;
-                    if k >= this.owned {
-                        continue;
-                    }
-                    let [x, y, z, _] = this.sums[(s as isize + here) as usize].0;
-                    let mut f = [x, y, z];
-                    if let Some(before) = before {
-                        let sum = this.sums[(s as isize + before) as usize].0;
-                        for c in 0..3 {
-                            f[c] += sum[c];
-                        }
-                    }
-                    if !(f[0] + f[1] + f[2]).is_finite() {
-                        let mut lost = lost.lock().unwrap_or_else(|e| e.into_inner());
-                        *lost = Some(lost.map_or(tag[k], |t| t.min(tag[k])));
-                    }
-                    // SAFETY: `k` is an owned particle, and no other thread's.
-                    unsafe {
-                        let out = &mut *out.at(k);
-                        if add {
-                            for c in 0..3 {
-                                f[c] += out[c];
-                            }
-                        }
-                        *out = f;
-                    }
+                let forces = this.forces_of_layer(layer, out);
+                // SAFETY: each layer is done once.
+                let fine = match add {
+                    true => vectors::run(this.instructions, Write::<true>(&forces)),
+                    false => vectors::run(this.instructions, Write::<false>(&forces)),
+                };
+                if !fine {
+                    let mut lost = lost.lock().unwrap_or_else(|e| e.into_inner());
+                    *lost = forces.lost(tag).into_iter().chain(*lost).min();
                 }
             }
         });
         match lost.into_inner().unwrap_or_else(|e| e.into_inner()) {
             None => Ok(()),
             Some(tag) => Err(EngineError::Force { tag }),
+        }
+    }
+
+    fn forces_of_layer(&self, layer: usize, out: Shared<[f64; 3]>) -> Forces<'_> {
+        let (first, count) = self.layer(layer);
+        let (here, before) = self.accumulators(layer);
+        let sums = |accumulators| &self.sums[(first as isize + accumulators) as usize..][..count];
+        Forces {
+            order: &self.order[first..first + count],
+            owned: self.owned,
+            here: sums(here),
+            before: before.map(sums),
+            out,
         }
     }
 
@@ -156,4 +150,74 @@ impl<P: Compiled> Machine<P> {
             + bytes(&self.excess)
             + bytes(&self.slopes)
     }
+}
+
+/// Forces on the particles of one layer.
+struct Forces<'a> {
+    /// The host's numbers of them.
+    order: &'a [u32],
+    owned: usize,
+    /// What the layer itself has added, and the layer before.
+    here: &'a [Sum],
+    before: Option<&'a [Sum]>,
+    out: Shared<[f64; 3]>,
+}
+
+/// Writes forces, or adds them to what is there; whether all are finite.
+struct Write<'a, const ADD: bool>(&'a Forces<'a>);
+
+impl<const ADD: bool> Loop for Write<'_, ADD> {
+    type Out = bool;
+
+    #[inline(always)]
+    fn run(self) -> bool {
+        let Forces { order, here, before, .. } = *self.0;
+        match before {
+            None => self.0.write::<ADD>(order.iter().zip(here).map(|(k, here)| (*k, here.0))),
+            Some(before) => {
+                let pairs = order.iter().zip(here.iter().zip(before));
+                self.0.write::<ADD>(pairs.map(|(k, (here, before))| (*k, sum(here.0, before.0))))
+            }
+        }
+    }
+}
+
+impl Forces<'_> {
+    #[inline(always)]
+    fn write<const ADD: bool>(&self, sums: impl Iterator<Item = (u32, [f64; 4])>) -> bool {
+        let mut lost = false;
+        for (k, [x, y, z, _]) in sums {
+            let mut f = [x, y, z];
+            if k as usize >= self.owned {
+                continue;
+            }
+            let finite = x.is_finite() & y.is_finite() & z.is_finite();
+            lost |= !finite;
+            // SAFETY: an owned particle, and of this layer alone.
+            unsafe {
+                let out = self.out.at(k as usize);
+                if ADD {
+                    for c in 0..3 {
+                        f[c] += (*out)[c];
+                    }
+                }
+                *out = f;
+            }
+        }
+        !lost
+    }
+
+    /// The lowest tag of particles whose forces are not finite.
+    #[cold]
+    fn lost(&self, tag: &[i32]) -> Option<i32> {
+        let force = |s: usize| self.before.map_or(self.here[s].0, |before| sum(self.here[s].0, before[s].0));
+        let numbers = self.order.iter().map(|k| *k as usize).enumerate();
+        let lost = numbers.filter(|(s, k)| *k < self.owned && !force(*s)[..3].iter().all(|f| f.is_finite()));
+        lost.map(|(_, k)| tag[k]).min()
+    }
+}
+
+#[inline(always)]
+fn sum(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
+    std::array::from_fn(|c| a[c] + b[c])
 }

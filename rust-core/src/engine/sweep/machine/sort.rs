@@ -1,8 +1,12 @@
 //! Particles into the order of cells.
 
-use super::{Given, Machine, SLACK, Shared, Sum};
+mod count;
+mod fill;
+mod fractions;
+mod span;
+
+use super::{Given, Machine, SLACK, Shared, Sum, vectors};
 use crate::engine::error::EngineError;
-use crate::engine::sweep::arithmetic::Record;
 use crate::engine::sweep::compiled::Compiled;
 use crate::engine::sweep::frame::Frame;
 use crate::engine::sweep::grid::Grid;
@@ -10,6 +14,10 @@ use crate::engine::sweep::many_body::NEAR_BITS;
 use crate::engine::sweep::pool::{Pool, part};
 use crate::engine::sweep::quantum::Quantum;
 use crate::engine::tally::Tally;
+use count::{Count, CountSome};
+use fill::{Fill, FillSome};
+use fractions::Fractions;
+use span::SpanSome;
 
 impl<P: Compiled> Machine<P> {
     /// The extremes of the positions of owned particles.
@@ -19,24 +27,12 @@ impl<P: Compiled> Machine<P> {
         pool.run(&|t| {
             // SAFETY: each thread has its own.
             let scratch = unsafe { &mut *scratch.at(t) };
-            let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+            let span = SpanSome { given, particles: part(given.particles.owned, t, threads) };
             scratch.fault = None;
-            for k in part(given.particles.owned, t, threads) {
-                let x = &given.particles.x[k];
-                let sum = x[0].abs() + x[1].abs() + x[2].abs();
-                if sum.is_nan() || sum > 1e100 {
-                    if species_of(given, k).is_some_and(|s| s < 0) {
-                        continue;
-                    }
-                    scratch.fault = Some(EngineError::Position { tag: given.particles.tag[k] });
-                    return;
-                }
-                for c in 0..3 {
-                    low[c] = low[c].min(x[c]);
-                    high[c] = high[c].max(x[c]);
-                }
+            match vectors::run(self.instructions, span) {
+                Ok(span) => [scratch.low, scratch.high] = span,
+                Err(fault) => scratch.fault = Some(fault),
             }
-            (scratch.low, scratch.high) = (low, high);
         });
         self.first_fault()?;
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
@@ -66,7 +62,8 @@ impl<P: Compiled> Machine<P> {
         if (0..grid.layers).any(crowded) {
             return Err(EngineError::Host("2^25 particles or more in two layers next to each other"));
         }
-        self.place(pool, given);
+        self.place(pool);
+        self.fill(pool, given);
         self.copy_first_layer();
         Ok(())
     }
@@ -74,53 +71,22 @@ impl<P: Compiled> Machine<P> {
     /// The bin of each particle, and how many of each thread's particles are in each.
     fn count(&mut self, pool: &Pool, given: &Given) -> Result<(), EngineError> {
         let (threads, cells) = (pool.threads(), self.grid.cells());
-        let (frame, grid) = (&self.frame, &self.grid);
-        let inverse = frame.length.map(|l| 1.0 / l);
-        let (cell, unit, counts, scratch) = (
-            Shared(self.cell.as_mut_ptr()),
-            Shared(self.unit.as_mut_ptr()),
-            Shared(self.counts.as_mut_ptr()),
-            Shared(self.scratch.as_mut_ptr()),
-        );
+        let count = Count {
+            given,
+            frame: &self.frame,
+            fractions: Fractions::new(&self.frame, &self.grid),
+            first_kind: Count::first_kind(given),
+            cell: Shared(self.cell.as_mut_ptr()),
+            unit: Shared(self.unit.as_mut_ptr()),
+        };
+        let (counts, scratch) = (Shared(self.counts.as_mut_ptr()), Shared(self.scratch.as_mut_ptr()));
         pool.run(&|t| {
             // SAFETY: each thread has its own scratch, counts and part of the particles.
-            let (scratch, counts) =
-                unsafe { (&mut *scratch.at(t), std::slice::from_raw_parts_mut(counts.at(t * cells), cells)) };
-            scratch.fault = None;
-            counts.fill(0);
-            let all = part(given.particles.x.len(), t, threads);
-            let mut first = all.start;
-            while first < all.end {
-                let some = first..all.end.min(first + AT_ONCE);
-                let mut units = [[0; 3]; AT_ONCE];
-                let fine = fractions(frame, &inverse, &given.particles.x[some.clone()], &mut units);
-                for (k, u) in some.clone().zip(&units) {
-                    let species = species_of(given, k);
-                    if species.is_some_and(|s| s < 0) {
-                        // SAFETY: of this thread's part.
-                        unsafe { *cell.at(k) = NOWHERE };
-                        continue;
-                    }
-                    let known = species.is_some() && given.particles.tag[k] > 0;
-                    if !known || !(fine || is_fine(frame, &inverse, &given.particles.x[k])) {
-                        scratch.fault = Some(fault_of(given, k));
-                        return;
-                    }
-                    // Ghosts out of reach of all that are owned.
-                    if k >= given.particles.owned && !frame.has(&given.particles.x[k]) {
-                        // SAFETY: as above.
-                        unsafe { *cell.at(k) = NOWHERE };
-                        continue;
-                    }
-                    let to = grid.cell(*u);
-                    // SAFETY: cells are of the grid; the rest is of this thread's part.
-                    unsafe {
-                        *counts.get_unchecked_mut(to) += 1;
-                        *cell.at(k) = to as u32;
-                        *unit.at(k) = *u;
-                    }
-                }
-                first = some.end;
+            unsafe {
+                let counts = std::slice::from_raw_parts_mut(counts.at(t * cells), cells);
+                let particles = part(given.particles.x.len(), t, threads);
+                let some = CountSome { count: &count, particles, counts };
+                (*scratch.at(t)).fault = vectors::run(self.instructions, some).err();
             }
         });
         self.first_fault()
@@ -131,17 +97,29 @@ impl<P: Compiled> Machine<P> {
         let cells = self.grid.cells();
         let per_layer = self.grid.rows * self.grid.bins;
         self.start.resize(cells + 1 + if self.is_ring() { per_layer } else { 0 }, 0);
-        let mut sum = 0;
-        for cell in 0..cells {
-            self.start[cell] = sum;
-            for t in 0..threads {
-                let count = &mut self.counts[t * cells + cell];
-                let next = sum + *count;
-                *count = sum;
-                sum = next;
+        let [first, rest @ ..] = &mut self.start[..] else { return };
+        *first = 0;
+        // How many there are in each bin, then where it begins, and last where it ends: the beginning of the next.
+        let ends = &mut rest[..cells];
+        ends.copy_from_slice(&self.counts[..cells]);
+        for counts in self.counts[..threads * cells].chunks_exact(cells).skip(1) {
+            for (end, count) in ends.iter_mut().zip(counts) {
+                *end += count;
             }
         }
-        self.start[cells] = sum;
+        let mut sum = 0;
+        for end in &mut *ends {
+            let many = *end;
+            *end = sum;
+            sum += many;
+        }
+        for counts in self.counts[..threads * cells].chunks_exact_mut(cells) {
+            for (end, count) in ends.iter_mut().zip(counts) {
+                let many = *count;
+                *count = *end;
+                *end += many;
+            }
+        }
         self.particles = sum as usize;
         // The copy of the first layer.
         for cell in cells + 1..self.start.len() {
@@ -149,9 +127,31 @@ impl<P: Compiled> Machine<P> {
         }
     }
 
-    /// Fills the arrays in the order of bins, and lays out accumulators.
-    fn place(&mut self, pool: &Pool, given: &Given) {
+    /// The particles in the order of bins: within one in the order of their numbers.
+    fn place(&mut self, pool: &Pool) {
         let (threads, cells) = (pool.threads(), self.grid.cells());
+        self.order.resize(self.particles, 0);
+        let (cell, all) = (&self.cell, self.all);
+        let (order, counts) = (Shared(self.order.as_mut_ptr()), Shared(self.counts.as_mut_ptr()));
+        pool.run(&|t| {
+            // SAFETY: counts are this thread's own; every particle has a place of its own.
+            unsafe {
+                let counts = std::slice::from_raw_parts_mut(counts.at(t * cells), cells);
+                for k in part(all, t, threads) {
+                    let to = *cell.get_unchecked(k);
+                    if to == NOWHERE {
+                        continue;
+                    }
+                    let place = counts.get_unchecked_mut(to as usize);
+                    *order.at(*place as usize) = k as u32;
+                    *place += 1;
+                }
+            }
+        });
+    }
+
+    /// Fills the arrays in the order of bins, and lays out accumulators.
+    fn fill(&mut self, pool: &Pool, given: &Given) {
         let copies = if self.is_ring() { self.layer(0).1 } else { 0 };
         let total = self.particles + copies;
         let with_ghosts = given.particles.owned < given.particles.x.len();
@@ -163,61 +163,32 @@ impl<P: Compiled> Machine<P> {
         for q in &mut self.q {
             q.resize(total + 4 * SLACK, 0);
         }
-        self.order.resize(self.particles, 0);
         self.records.resize(total + SLACK, P::Record::default());
         self.species.resize(if several { total.max(1) } else { 0 }, 0);
         self.ghost.resize(if with_ghosts { total + SLACK } else { 0 }, false);
-        let frame = &self.frame;
-        let tilted = frame.is_tilted();
-        let flat = if frame.dimensions == 3 { 1.0 } else { 0.0 };
-        let scale =
-            [frame.length[0] / TWO_TO_32, frame.length[1] / TWO_TO_32, flat * frame.length[2] / TWO_TO_32];
-        let (order, records, species, ghost) = (
-            Shared(self.order.as_mut_ptr()),
-            Shared(self.records.as_mut_ptr()),
-            Shared(self.species.as_mut_ptr()),
-            Shared(self.ghost.as_mut_ptr()),
-        );
-        let x =
-            [Shared(self.x[0].as_mut_ptr()), Shared(self.x[1].as_mut_ptr()), Shared(self.x[2].as_mut_ptr())];
-        let q =
-            [Shared(self.q[0].as_mut_ptr()), Shared(self.q[1].as_mut_ptr()), Shared(self.q[2].as_mut_ptr())];
-        let quantum = self.quantum;
-        let (cell, unit, counts) = (&self.cell, &self.unit, Shared(self.counts.as_mut_ptr()));
+        let fill = Fill {
+            given,
+            frame: &self.frame,
+            quantum: self.quantum,
+            order: &self.order,
+            unit: &self.unit,
+            x: self.x.each_mut().map(|x| Shared(x.as_mut_ptr())),
+            q: self.q.each_mut().map(|q| Shared(q.as_mut_ptr())),
+            records: Shared(self.records.as_mut_ptr()),
+            species: several.then_some(Shared(self.species.as_mut_ptr())),
+            ghost: with_ghosts.then_some(Shared(self.ghost.as_mut_ptr())),
+        };
+        let (instructions, threads, count) = (self.instructions, pool.threads(), self.particles);
         let moving = given.thermostat.is_some();
         pool.run(&|t| {
-            // SAFETY: counts are this thread's own; every particle has a place of its own.
-            unsafe {
-                let counts = std::slice::from_raw_parts_mut(counts.at(t * cells), cells);
-                for k in part(given.particles.x.len(), t, threads) {
-                    let to = *cell.get_unchecked(k);
-                    if to == NOWHERE {
-                        continue;
-                    }
-                    let place = counts.get_unchecked_mut(to as usize);
-                    let s = *place as usize;
-                    *place += 1;
-                    let position = given.particles.x.get_unchecked(k);
-                    let u = *unit.get_unchecked(k);
-                    let mut point = [u[0] as f64 * scale[0], u[1] as f64 * scale[1], u[2] as f64 * scale[2]];
-                    if tilted {
-                        point = frame.point(&u.map(|u| u as f64 / TWO_TO_32));
-                    }
-                    for c in 0..3 {
-                        *x[c].at(s) = point[c] as f32;
-                        *q[c].at(s) = quantum.of(point[c]);
-                    }
-                    let kind = if several { species_of(given, k).unwrap_or(0) as u32 } else { 0 };
-                    let v = if moving { *given.v.get_unchecked(k) } else { [0.0; 3] };
-                    *records.at(s) = P::Record::new(u, position, &v, given.particles.tag[k] as u32, kind);
-                    *order.at(s) = k as u32;
-                    if several {
-                        *species.at(s) = kind as u8;
-                    }
-                    if with_ghosts {
-                        *ghost.at(s) = k >= given.particles.owned;
-                    }
-                }
+            let some = part(count.div_ceil(SLACK), t, threads);
+            let places = SLACK * some.start..count.min(SLACK * some.end);
+            let fill = &fill;
+            match (moving, several) {
+                (true, true) => vectors::run(instructions, FillSome::<_, true, true> { fill, places }),
+                (true, false) => vectors::run(instructions, FillSome::<_, true, false> { fill, places }),
+                (false, true) => vectors::run(instructions, FillSome::<_, false, true> { fill, places }),
+                (false, false) => vectors::run(instructions, FillSome::<_, false, false> { fill, places }),
             }
         });
         self.find_owned();
@@ -292,70 +263,8 @@ const NOWHERE: u32 = u32::MAX;
 
 const TWO_TO_32: f64 = 4_294_967_296.0;
 
-#[inline(always)]
-fn species_of(given: &Given, k: usize) -> Option<i32> {
-    given.kinds.get(given.particles.kind[k] as usize).copied()
-}
-
-/// What is wrong with a particle that cannot be sorted.
-#[cold]
-#[inline(never)]
-fn fault_of(given: &Given, k: usize) -> EngineError {
-    let (tag, kind) = (given.particles.tag[k], given.particles.kind[k]);
-    match species_of(given, k) {
-        None => EngineError::Kind { tag, kind },
-        Some(_) if tag < 1 => EngineError::Tag { tag },
-        Some(_) => EngineError::Position { tag },
-    }
-}
-
-/// Particles whose fractions are computed at once.
-const AT_ONCE: usize = 32;
-
-/// Adding this leaves the nearest whole number in the low bits.
-const WHOLE: f64 = 6_755_399_441_055_744.0;
-
-/// Far below what a whole number in the low bits holds.
+/// Far below what a whole number in the low bits of a double holds.
 const FAR: f64 = 1e15;
 
-/// Fractions of the frame in units of 2⁻³²; they wrap along periods, and are never beyond the ends where there are
-/// none. Whether all are finite and not too far away.
-#[inline(always)]
-fn fractions(frame: &Frame, inverse: &[f64; 3], x: &[[f64; 3]], units: &mut [[u32; 3]; AT_ONCE]) -> bool {
-    let mut scaled = [[0.0; 3]; AT_ONCE];
-    if frame.is_tilted() {
-        for (t, x) in scaled.iter_mut().zip(x) {
-            *t = frame.fraction(x, inverse).map(|s| s * TWO_TO_32);
-        }
-    } else {
-        let flat = if frame.dimensions == 3 { inverse[2] } else { 0.0 };
-        let scale = [inverse[0] * TWO_TO_32, inverse[1] * TWO_TO_32, flat * TWO_TO_32];
-        for (t, x) in scaled.iter_mut().zip(x) {
-            for c in 0..3 {
-                t[c] = (x[c] - frame.origin[c]) * scale[c];
-            }
-        }
-    }
-    let mut fine = true;
-    for t in scaled.as_flattened() {
-        // Not where it is not a number.
-        fine &= t.abs() < FAR;
-    }
-    for (u, t) in units.as_flattened_mut().iter_mut().zip(scaled.as_flattened()) {
-        *u = (t + WHOLE).to_bits() as u32;
-    }
-    if !frame.periodic.iter().all(|p| *p) {
-        for (u, t) in units.iter_mut().zip(&scaled) {
-            for c in 0..3 {
-                if !frame.periodic[c] {
-                    u[c] = t[c].clamp(0.0, TWO_TO_32 - 1.0) as u32;
-                }
-            }
-        }
-    }
-    fine
-}
-
-fn is_fine(frame: &Frame, inverse: &[f64; 3], x: &[f64; 3]) -> bool {
-    frame.fraction(x, inverse).iter().all(|s| (s * TWO_TO_32).abs() < FAR)
-}
+#[cfg(test)]
+mod tests;
