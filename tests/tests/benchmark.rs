@@ -35,8 +35,7 @@ fn documented() -> BTreeSet<String> {
 #[test]
 fn a_small_benchmark_has_every_documented_field() {
     let folder = tempfile::tempdir().unwrap();
-    let arguments =
-        "bench --sizes 500 --rounds 2 --steps 20 --memory 20000 --threads 1,2 --out b --json c.json";
+    let arguments = "bench --sizes 500,700 --few-above 600 --rounds 2 --steps 20 --memory 20000 --threads 1,2 --out b --json c.json";
     let output = psidpd(folder.path(), &arguments.split(' ').collect::<Vec<_>>());
     assert_eq!(output.status.code(), Some(0), "{}", said(&output));
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
@@ -64,12 +63,19 @@ fn a_small_benchmark_has_every_documented_field() {
         ("dpd", "native mixed portable 1"),
         ("formula", "plugin dpd/psi"),
     ] {
-        let found = runs.iter().find(|r| r["fluid"] == fluid && r["code"] == code);
+        let found = runs.iter().find(|r| r["size"] == 500 && r["fluid"] == fluid && r["code"] == code);
         let run = found.unwrap_or_else(|| panic!("no run of {code} with {fluid}"));
         assert_eq!(run["seconds"].as_array().unwrap().len(), 2);
         assert!(run["mega_particle_steps_per_second"]["median"].as_f64().unwrap() > 0.0);
         assert!(!run["parts"].as_object().unwrap().is_empty());
     }
+    // Of the box that counts as large: few codes, but both ranks for the page about scaling.
+    let large: Vec<&str> =
+        runs.iter().filter(|r| r["size"] == 700).filter_map(|r| r["code"].as_str()).collect();
+    assert!(large.contains(&"lammps mdpd") && large.contains(&"plugin dpd/psi precision mixed, 2 ranks"));
+    assert!(large.len() < runs.len() / 3 && !large.contains(&"lammps eam/alloy"), "{large:?}");
+    assert_eq!(outcome["projection"]["measured_size"], 700);
+    assert!(read("b/report.html").contains("In boxes of more than 600 particles"));
     assert!(outcome["equal_bits"].as_object().unwrap().values().all(|equal| *equal == true));
     // What a particle takes cannot be less than its position, velocity and force.
     assert!(outcome["memory"][0]["bytes_per_particle"].as_f64().unwrap() > 72.0);

@@ -151,9 +151,57 @@ pub struct Choice {
     pub two_ranks: bool,
 }
 
-/// Everyone for a fluid. The plain engine, whose cost per particle does not depend on the size, only where
-/// `smallest`.
-pub fn contenders(subject: &Subject, choice: &Choice, smallest: bool) -> Vec<Contender> {
+/// Particles of the many-body fluid above which few are timed, if nothing else is asked for: LAMMPS needs ten
+/// and more seconds for the fewest steps, for each of its styles.
+pub const FEW_ABOVE: usize = 100_000;
+
+/// Which contenders a size is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Field {
+    /// All.
+    Everyone,
+    /// All but the plain engine, whose cost per particle does not depend on the size.
+    AllButPlain,
+    /// Those that goals of large boxes and the page about scaling ask for, and who was asked for by name: the
+    /// built-in, the plugin in mixed precision on one rank and two, the native runner in mixed precision with the
+    /// best instructions; of the general fluid only the native runner.
+    Few,
+}
+
+impl Field {
+    /// Everyone at the smallest size, few at sizes above `few_above`.
+    pub fn of(size: usize, smallest: bool, few_above: usize) -> Field {
+        match (size > few_above, smallest) {
+            (true, _) => Field::Few,
+            (false, true) => Field::Everyone,
+            (false, false) => Field::AllButPlain,
+        }
+    }
+
+    fn has(self, subject: &Subject, contender: &Contender, choice: &Choice) -> bool {
+        match (self, &contender.code) {
+            (Field::Everyone, _) => true,
+            (Field::AllButPlain, code) => *code != Code::Plain,
+            (Field::Few, Code::Plugin(words)) => {
+                (words == MIXED && reference(subject).is_some()) || choice.words.contains(words)
+            }
+            (Field::Few, Code::Native(settings)) => {
+                settings.precision == Precision::Mixed && settings.instructions == Instructions::best()
+            }
+            (Field::Few, _) => reference(subject).as_ref() == Some(contender),
+        }
+    }
+}
+
+/// Who is timed with a fluid at a size.
+pub fn contenders(subject: &Subject, choice: &Choice, field: Field) -> Vec<Contender> {
+    let mut all = everyone(subject, choice);
+    all.retain(|contender| field.has(subject, contender, choice));
+    all
+}
+
+/// The native runner last: see [`turns`](super::turns).
+fn everyone(subject: &Subject, choice: &Choice) -> Vec<Contender> {
     let mut all = Vec::new();
     if *subject == MDPD {
         all.extend(choice.built_in.then(|| Contender::alone(Code::BuiltIn)));
@@ -166,6 +214,15 @@ pub fn contenders(subject: &Subject, choice: &Choice, smallest: bool) -> Vec<Con
     let words = ["", MIXED, "precision double"].map(str::to_owned).into_iter();
     let words = words.chain(threads.map(|n| format!("{MIXED} threads {n}"))).chain(choice.words.clone());
     all.extend(words.map(|words| Contender::alone(Code::Plugin(words))));
+    if *subject == MDPD && choice.two_ranks {
+        for weak in [false, true] {
+            let built_in = choice.built_in.then_some(Code::BuiltIn);
+            for code in built_in.into_iter().chain([Code::Plugin(MIXED.to_owned())]) {
+                all.push(Contender { code, ranks: 2, weak });
+            }
+        }
+    }
+    all.push(Contender::alone(Code::Plain));
     for &threads in &choice.threads {
         for (_, precision) in Precision::ALL {
             for (_, instructions) in Instructions::ALL.into_iter().filter(|(_, i)| i.available()) {
@@ -175,17 +232,6 @@ pub fn contenders(subject: &Subject, choice: &Choice, smallest: bool) -> Vec<Con
                 }
                 let settings = Settings { precision, instructions, threads };
                 all.push(Contender::alone(Code::Native(settings)));
-            }
-        }
-    }
-    if smallest {
-        all.push(Contender::alone(Code::Plain));
-    }
-    if *subject == MDPD && choice.two_ranks {
-        for weak in [false, true] {
-            let built_in = choice.built_in.then_some(Code::BuiltIn);
-            for code in built_in.into_iter().chain([Code::Plugin(MIXED.to_owned())]) {
-                all.push(Contender { code, ranks: 2, weak });
             }
         }
     }
@@ -209,18 +255,53 @@ mod tests {
         assert_eq!(precision(MIXED).as_deref(), Some("mixed"));
     }
 
-    #[test]
-    fn every_contender_has_a_name_of_its_own() {
-        let choice = Choice {
+    fn choice() -> Choice {
+        Choice {
             built_in: true,
             eam: true,
             suffixes: vec![Suffix::None, Suffix::Omp, Suffix::Intel],
             two_ranks: true,
             words: vec!["precision double threads 3".into()],
             threads: [1, 2].map(|n| NonZeroUsize::new(n).unwrap()).to_vec(),
-        };
+        }
+    }
+
+    fn names(subject: &Subject, field: Field) -> Vec<String> {
+        contenders(subject, &choice(), field).iter().map(Contender::id).collect()
+    }
+
+    #[test]
+    fn few_are_timed_in_large_boxes() {
+        assert_eq!(Field::of(10, true, 10), Field::Everyone);
+        assert_eq!(Field::of(10, false, 10), Field::AllButPlain);
+        assert_eq!([true, false].map(|smallest| Field::of(11, smallest, 10)), [Field::Few; 2]);
+        let native = |threads| format!("native mixed {} {threads}", Instructions::best());
+        let plugin = "plugin dpd/psi precision mixed".to_owned();
+        let asked = "plugin dpd/psi precision double threads 3".to_owned();
+        let ranks = [format!("{plugin}, 2 ranks"), format!("{plugin}, 2 ranks, weak")];
+        let [one, two] = [1, 2].map(native);
+        let [strong, weak] = ranks;
+        let built_in = "lammps mdpd".to_owned();
+        let few = [built_in, plugin.clone(), asked.clone(), strong, weak, one.clone(), two.clone()];
+        assert_eq!(names(&MDPD, Field::Few), few);
+        assert_eq!(
+            names(&DPD, Field::Few),
+            ["lammps dpd".to_owned(), plugin, asked.clone(), one.clone(), two.clone()]
+        );
+        assert_eq!(names(&SUBJECTS[2], Field::Few), [asked, one, two]);
         for subject in &SUBJECTS {
-            let all = contenders(subject, &choice, true);
+            let (mut all, most) = (names(subject, Field::Everyone), names(subject, Field::AllButPlain));
+            assert!(all.len() > most.len() && names(subject, Field::Few).iter().all(|n| most.contains(n)));
+            all.retain(|name| name != "native plain");
+            assert_eq!(all, most);
+        }
+    }
+
+    #[test]
+    fn every_contender_has_a_name_of_its_own() {
+        let choice = choice();
+        for subject in &SUBJECTS {
+            let all = contenders(subject, &choice, Field::Everyone);
             let names: HashSet<String> = all.iter().map(Contender::id).collect();
             assert_eq!(names.len(), all.len());
             assert!(names.contains("plugin dpd/psi precision double threads 3"));

@@ -3,6 +3,7 @@
 use super::BenchError;
 use super::contender::{Code, Contender, Suffix};
 use super::fluids::Subject;
+use super::length::Length;
 use super::log::{Loop, parse};
 use super::start::{SEED, Start};
 use crate::export::eam::{self, Grid};
@@ -24,15 +25,6 @@ pub struct Place {
     pub plugin: Option<PathBuf>,
     /// The folder.
     pub work: PathBuf,
-}
-
-/// How long a run is.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Length {
-    /// Steps before the clock starts.
-    pub warm_up: u64,
-    /// Steps that are timed.
-    pub steps: u64,
 }
 
 /// The commands: everything as a user of LAMMPS would have it, with no output within the timed loop but the one

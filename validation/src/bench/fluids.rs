@@ -23,6 +23,9 @@ pub struct Subject {
 /// Density of the many-body fluid, which sizes are counted in.
 pub const MDPD_DENSITY: f64 = 6.05;
 
+/// Particles of the many-body fluid in boxes of edge 10, 20 and 40.
+pub const SIZES: [usize; 3] = [6_050, 48_400, 387_200];
+
 /// Warren's many-body fluid, set 6: what LAMMPS's `mdpd` is for.
 pub const MDPD: Subject = Subject {
     name: "mdpd",
@@ -92,6 +95,8 @@ mod tests {
         }
         assert_eq!(MDPD.particles(48_400), 48_400);
         assert_eq!(DPD.particles(6_050), 3_000);
-        assert!((Subject::edge(6_050) - 10.0).abs() < 1e-12);
+        for (size, edge) in SIZES.into_iter().zip([10.0, 20.0, 40.0]) {
+            assert!((Subject::edge(size) - edge).abs() < 1e-12);
+        }
     }
 }

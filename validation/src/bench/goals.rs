@@ -87,9 +87,7 @@ impl Goal {
         let reaches = |median: f64, bound: f64| if least { median >= bound } else { median <= bound };
         let order = |a: &&Spread, b: &&Spread| a.median.total_cmp(&b.median);
         let worst = if least { by_size.values().min_by(order) } else { by_size.values().max_by(order) };
-        // A goal counts where each of its sizes was measured.
-        let complete = by_size.len() == self.sizes.len().max(1);
-        let figure = worst.copied().filter(|_| complete);
+        let figure = worst.copied();
         Verdict {
             what: self.what.clone(),
             relation,
@@ -98,6 +96,7 @@ impl Goal {
             figure,
             met: figure.map(|f| reaches(f.median, goal)),
             stretch_met: figure.zip(self.stretch).map(|(f, stretch)| reaches(f.median, stretch)),
+            not_measured: self.sizes.iter().copied().filter(|s| !by_size.contains_key(s)).collect(),
             by_size,
         }
     }
@@ -189,6 +188,42 @@ mod tests {
         assert!(goals.iter().all(|g| judge(g, &[]).met.is_none()), "nothing was measured");
     }
 
+    /// Goals and the choice of contenders fit together at the sizes of `--full`: everyone a goal names is timed.
+    #[test]
+    fn whom_goals_name_is_timed_at_their_sizes() {
+        use crate::bench::contender::{Choice, FEW_ABOVE, Field, Suffix, contenders};
+        use crate::bench::fluids::{SIZES, SUBJECTS};
+        let choice = Choice {
+            built_in: true,
+            eam: true,
+            suffixes: vec![Suffix::None, Suffix::Omp, Suffix::Intel],
+            two_ranks: true,
+            words: vec![],
+            threads: [1, 2].map(|n| std::num::NonZeroUsize::new(n).unwrap()).to_vec(),
+        };
+        let timed = |fluid: &str, size: usize, code: &str| {
+            let subject = SUBJECTS.iter().find(|s| s.name == fluid).unwrap();
+            let field = Field::of(size, size == SIZES[0], FEW_ABOVE);
+            let code = code.replace(" best ", &format!(" {} ", Instructions::best()));
+            SIZES.contains(&size) && contenders(subject, &choice, field).iter().any(|c| c.id() == code)
+        };
+        // Not every processor has AVX2.
+        let portable = |code: &str| code.replace(" avx2 ", " portable ");
+        for goal in read(SHIPPED).unwrap() {
+            if !matches!(goal.quantity, Quantity::Speed | Quantity::SpeedPerPair) {
+                continue;
+            }
+            for &size in &goal.sizes {
+                assert!(timed(&goal.fluid, size, &portable(&goal.code)), "{}: {size}", goal.what);
+                let fluid = goal.against_fluid.as_deref().unwrap_or(&goal.fluid);
+                let size = goal.against_size.unwrap_or(size);
+                for code in &goal.against {
+                    assert!(timed(fluid, size, code), "{}: {code} at {size}", goal.what);
+                }
+            }
+        }
+    }
+
     /// The worst size counts, and of the others the fastest in each round.
     #[test]
     fn speed_is_held_against_the_fastest_at_the_worst_size() {
@@ -203,12 +238,13 @@ mod tests {
             run("dpd", 10, "b", &[3.0, 6.0, 4.0], 1.0),
         ];
         let verdict = judge(&goal, &runs);
-        assert_eq!((verdict.met, verdict.figure), (None, None), "one size is missing");
+        assert_eq!((verdict.met, verdict.not_measured), (Some(true), vec![20]), "one size is missing");
         assert_eq!(verdict.by_size[&10], Spread { min: 3.0, median: 3.0, max: 4.0 });
         runs.push(run("dpd", 20, "native mixed best 1", &[1.0; 3], 1.0));
         runs.push(run("dpd", 20, "b", &[5.0; 3], 1.0));
         let verdict = judge(&goal, &runs);
         assert_eq!((verdict.met, verdict.stretch_met), (Some(true), Some(false)));
+        assert!(verdict.not_measured.is_empty());
         assert_eq!(verdict.figure.unwrap().median, 3.0);
         runs[1].seconds = vec![1.5; 3];
         assert_eq!(judge(&goal, &runs).met, Some(false));
@@ -229,6 +265,10 @@ mod tests {
         );
         let runs = [run("mdpd", 40, "c", &[5.0], 1.0), run("mdpd", 10, "c", &[1.0], 1.0)];
         assert_eq!(judge(&sizes, &runs).met, Some(true), "0.8 of the speed");
+        assert_eq!(judge(&sizes, &runs[..1]).met, None, "nothing to hold it against");
+        // A round in which all is half as fast changes nothing; rounds are not mixed.
+        let runs = [run("mdpd", 40, "c", &[5.0, 10.0], 1.0), run("mdpd", 10, "c", &[1.0, 2.0], 1.0)];
+        assert_eq!(judge(&sizes, &runs).figure, Some(Spread { min: 0.8, median: 0.8, max: 0.8 }));
     }
 
     #[test]

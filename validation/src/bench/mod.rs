@@ -10,6 +10,7 @@ pub mod deck;
 mod error;
 pub mod fluids;
 pub mod goals;
+pub mod length;
 pub mod log;
 pub mod memory;
 pub mod native;
@@ -18,6 +19,7 @@ pub mod page;
 pub mod projection;
 mod spread;
 pub mod start;
+mod turns;
 
 pub use error::BenchError;
 pub use outcome::Outcome;
@@ -25,13 +27,14 @@ pub use spread::Spread;
 
 use crate::lammps::{self, Host};
 use crate::report::{Progress, write_atomically};
-use contender::{Choice, Contender, Suffix};
-use deck::{Length, Place};
+use contender::{Choice, Contender, Field, Suffix};
+use deck::Place;
 use fluids::{MDPD, SUBJECTS, Subject};
+use length::{FEWEST, Length};
 use outcome::{Asked, FluidFacts, LammpsFacts, Machine, Run, Scaling};
 use psidpd_core::engine::{Instructions, Plan, Precision, Settings};
 use start::Start;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
@@ -42,7 +45,7 @@ pub struct Options {
     pub sizes: Vec<usize>,
     /// Rounds.
     pub rounds: usize,
-    /// Seconds that a timed run should take.
+    /// Seconds that a timed run may take, if that is enough for the fewest steps.
     pub seconds: f64,
     /// Steps of every run instead; then no skin is looked for either.
     pub steps: Option<u64>,
@@ -50,6 +53,8 @@ pub struct Options {
     pub memory: Vec<usize>,
     /// Thread counts of the native runner.
     pub threads: Vec<NonZeroUsize>,
+    /// Above this size only the contenders are timed that goals and the page about scaling ask for.
+    pub few_above: usize,
     /// More words behind the seed of `pair_style dpd/psi`, each a contender.
     pub words: Vec<String>,
     /// Another LAMMPS than the one that `psidpd lammps install` puts in place.
@@ -58,8 +63,6 @@ pub struct Options {
     pub out: PathBuf,
 }
 
-/// Fewest steps that a timed run makes, or lists and exchanges of LAMMPS would not be met in their proportion.
-const FEWEST: u64 = 20;
 /// Skin of LAMMPS where none is looked for.
 const SKIN: f64 = 0.3;
 /// Skins that are tried.
@@ -72,10 +75,26 @@ struct Entry {
     contender: Contender,
     length: Length,
     skin: f64,
+    /// Seconds that a step is expected to take; none where steps are given.
+    step: Option<f64>,
     seconds: Vec<f64>,
     parts: Vec<BTreeMap<String, f64>>,
     ghosts: Option<f64>,
     builds: Option<u64>,
+}
+
+impl Entry {
+    /// Seconds that a run is expected to take; 1 where nothing is known. For the bar: LAMMPS starts in 0.2 s and
+    /// reads and sets up a particle in 10 µs, roughly.
+    fn weight(&self) -> f64 {
+        let begin = if self.contender.in_lammps() { 0.2 + 1e-5 * self.particles() } else { 0.0 };
+        self.step.map_or(1.0, |step| begin + step * self.length.all() as f64)
+    }
+
+    /// Particles that a step moves, copies included.
+    fn particles(&self) -> f64 {
+        (self.subject.particles(self.size) * self.contender.copies()) as f64
+    }
 }
 
 /// A fluid at a size.
@@ -103,19 +122,8 @@ pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Out
 
     let (choice, missing) = choice(options, &place)?;
     let (cases, mut entries) = entries(options, &choice, &place, &out, progress)?;
-    let bar = progress.bar("calibration", entries.len() as u64);
-    calibrate(options, &cases, &place, &mut entries, &|k| bar.set(k))?;
-    bar.finish();
-    let bar = progress.bar("rounds", (options.rounds * entries.len()) as u64);
-    for round in 0..options.rounds {
-        for done in 0..entries.len() {
-            // Back and forth: who is timed behind whom should not matter.
-            let k = if round % 2 == 0 { done } else { entries.len() - 1 - done };
-            measure(&mut entries[k], &cases, &place)?;
-            bar.set((round * entries.len() + done + 1) as u64);
-        }
-    }
-    bar.finish();
+    calibrate(options, &cases, &place, &mut entries, progress)?;
+    time(options.rounds, &cases, &place, &mut entries, progress)?;
 
     let spinner = progress.spinner("memory and threads");
     let memory = memory::measure(program, &options.memory)?;
@@ -129,7 +137,7 @@ pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Out
     let measured = goals::Measurements { runs: &runs, memory: &memory, equal_bits: &equal_bits };
     let goals = goals.iter().map(|g| g.judge(measured)).collect();
     let outcome = Outcome {
-        format: 1,
+        format: 2,
         version: env!("CARGO_PKG_VERSION"),
         machine: Machine {
             processor: crate::crosscheck::machine(),
@@ -147,6 +155,7 @@ pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Out
             rounds: options.rounds,
             seconds: options.seconds,
             steps: options.steps,
+            few_above: options.few_above,
             seed: start::SEED,
         },
         fluids,
@@ -229,13 +238,15 @@ fn entries(
             let pairs = start::pairs_per_particle(&start.state, cutoff);
             cases.insert((subject.name, size), Case { start, pairs });
             deck::prepare(place, &subject, subject == MDPD && choice.eam)?;
-            for contender in contender::contenders(&subject, choice, Some(size) == smallest) {
+            let field = Field::of(size, Some(size) == smallest, options.few_above);
+            for contender in contender::contenders(&subject, choice, field) {
                 entries.push(Entry {
                     subject,
                     size,
                     contender,
                     length: Length { warm_up: 5, steps: options.steps.unwrap_or(FEWEST) },
                     skin: SKIN,
+                    step: None,
                     seconds: Vec::new(),
                     parts: Vec::new(),
                     ghosts: None,
@@ -247,45 +258,90 @@ fn entries(
     Ok((cases, entries))
 }
 
-/// Finds the fastest skin of each LAMMPS contender, at the smallest size, and steps that fill the time of a run.
+/// What a contender's runs at its smallest size tell of all of them.
+#[derive(Clone, Copy)]
+struct Pace {
+    skin: f64,
+    /// Seconds for a step of a particle.
+    seconds: f64,
+}
+
+/// Finds the pace of each contender and the fastest skin of those in LAMMPS, at the smallest size that has them, and
+/// steps that fill the time of a run: at all sizes, since neither depends much on the size.
 fn calibrate(
     options: &Options,
     cases: &Cases,
     place: &Place,
     entries: &mut [Entry],
-    advance: &dyn Fn(u64),
+    progress: &Progress,
 ) -> Result<(), BenchError> {
     if options.steps.is_some() {
         return Ok(());
     }
-    let smallest = options.sizes.iter().min().copied();
-    let mut skins: BTreeMap<(&str, String), f64> = BTreeMap::new();
-    // The smallest size first.
     let mut order: Vec<usize> = (0..entries.len()).collect();
     order.sort_by_key(|k| entries[*k].size);
-    for (done, k) in order.into_iter().enumerate() {
+    let key = |entry: &Entry| (entry.subject.name, entry.contender.id());
+    let all: BTreeSet<_> = entries.iter().map(key).collect();
+    let bar = progress.bar("calibration", all.len() as u64);
+    let mut paces = BTreeMap::new();
+    for k in order {
         let entry = &mut entries[k];
-        let key = (entry.subject.name, entry.contender.id());
-        let mut fastest = f64::INFINITY;
-        if entry.contender.in_lammps() && Some(entry.size) == smallest {
-            entry.length = Length { warm_up: 20, steps: 60 };
-            for skin in SKINS {
-                let seconds = once(entry, cases, place, skin)?.0;
-                if seconds < fastest {
-                    (fastest, entry.skin) = (seconds, skin);
-                }
+        let pace: Pace = match paces.get(&key(entry)) {
+            Some(pace) => *pace,
+            None => {
+                let pace = pace(options, cases, place, entry)?;
+                paces.insert(key(entry), pace);
+                bar.advance(1);
+                pace
             }
-            skins.insert(key, entry.skin);
-        } else {
-            entry.skin = skins.get(&key).copied().unwrap_or(SKIN);
-            entry.length = Length { warm_up: 5, steps: FEWEST };
-            fastest = once(entry, cases, place, entry.skin)?.0;
-        }
-        let step = fastest / entry.length.steps as f64;
-        let steps = ((options.seconds / step) as u64).clamp(FEWEST, 1_000_000);
-        entry.length = Length { warm_up: (steps / 10).max(5), steps };
-        advance(done as u64 + 1);
+        };
+        let step = pace.seconds * entry.particles();
+        (entry.skin, entry.step) = (pace.skin, Some(step));
+        entry.length = Length::within(options.seconds, &entry.contender, step);
     }
+    bar.finish();
+    Ok(())
+}
+
+fn pace(options: &Options, cases: &Cases, place: &Place, entry: &mut Entry) -> Result<Pace, BenchError> {
+    // Short runs differ by more than skins do, but in a large box long ones would take minutes.
+    let large = entry.size > options.few_above;
+    entry.length = if large { Length::of(FEWEST) } else { Length { warm_up: 20, steps: 60 } };
+    let mut pace = Pace { skin: SKIN, seconds: f64::INFINITY };
+    // Natively, where there is no skin, as many tries: one that something else disturbs must not decide.
+    for skin in SKINS {
+        let seconds = once(entry, cases, place, skin)?.0 / (entry.length.steps as f64 * entry.particles());
+        if seconds < pace.seconds {
+            pace = Pace { skin, seconds };
+        }
+    }
+    Ok(pace)
+}
+
+/// The rounds.
+fn time(
+    rounds: usize,
+    cases: &Cases,
+    place: &Place,
+    entries: &mut [Entry],
+    progress: &Progress,
+) -> Result<(), BenchError> {
+    let runs: Vec<_> = entries.iter().map(|e| (e.subject.name, e.size)).collect();
+    let mut order = turns::turns(&runs);
+    // By the time that runs are expected to take: one in a large box takes as long as many in a small one.
+    let all = rounds as f64 * entries.iter().map(Entry::weight).sum::<f64>();
+    let bar = progress.bar("rounds", all.ceil() as u64);
+    let mut done = 0.0;
+    for _ in 0..rounds {
+        for &k in &order {
+            measure(&mut entries[k], cases, place)?;
+            done += entries[k].weight();
+            bar.set(done as u64);
+        }
+        // Back and forth: who is timed behind whom should not matter.
+        order.reverse();
+    }
+    bar.finish();
     Ok(())
 }
 

@@ -1,8 +1,8 @@
 //! A timed run of the native runner, and what it shares among threads.
 
 use super::BenchError;
-use super::deck::Length;
 use super::fluids::Subject;
+use super::length::Length;
 use super::start::SEED;
 use crate::run::{Integrator, Simulation, State};
 use psidpd_core::engine::{Settings, Want};

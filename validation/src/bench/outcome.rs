@@ -65,10 +65,12 @@ pub struct Asked {
     pub sizes: Vec<usize>,
     /// Rounds.
     pub rounds: usize,
-    /// Seconds that a timed run should take.
+    /// Seconds that a timed run may take.
     pub seconds: f64,
     /// Steps of every run; null if they follow from `seconds`.
     pub steps: Option<u64>,
+    /// Size above which few contenders are timed.
+    pub few_above: usize,
     /// Of starts and noise.
     pub seed: u64,
 }
@@ -172,12 +174,14 @@ pub struct Verdict {
     pub goal: f64,
     /// What to be proud of.
     pub stretch: Option<f64>,
-    /// What was measured at the worst of the sizes; null if it was not.
+    /// The worst of the sizes that were measured; null if none was.
     pub figure: Option<Spread>,
-    /// Whether the median meets the goal; null if it was not measured.
+    /// Whether its median meets the goal; null if nothing was measured.
     pub met: Option<bool>,
     /// Whether it goes as far as `stretch`.
     pub stretch_met: Option<bool>,
+    /// Sizes of the goal that were not measured. A goal that is met is met only in part if there are any.
+    pub not_measured: Vec<usize>,
     /// By size, as far as measured.
     pub by_size: BTreeMap<usize, Spread>,
 }

@@ -1,7 +1,7 @@
 //! Results as tables and plots.
 
 use super::BenchError;
-use super::outcome::{Outcome, Run, Verdict};
+use super::outcome::{Asked, Outcome, Run, Verdict};
 use super::spread::Spread;
 use crate::report::{Item, Plot, Report, Section, Series, Style, Table};
 use psidpd_core::engine::Instructions;
@@ -27,18 +27,28 @@ pub fn speeds(outcome: &Outcome) -> Table {
     table
 }
 
+const PASS: &str = "pass";
+const FAIL: &str = "FAIL";
+
+const GOALS: &str = "A goal has to be met at each of its sizes. \u{201c}Pass in part\u{201d}: at those that were timed, \
+                     while others were not.";
+
+fn judged(verdict: &Verdict) -> &'static str {
+    match verdict.met {
+        Some(true) if verdict.not_measured.is_empty() => PASS,
+        Some(true) => "pass in part",
+        Some(false) => FAIL,
+        None => "not measured",
+    }
+}
+
 /// Every goal with its figure.
 pub fn goals(verdicts: &[Verdict]) -> Table {
     let mut table = Table::new(["", "goal", "wanted", "stretch", "measured"]);
     for v in verdicts {
         let sign = if v.relation == "at least" { "≥" } else { "≤" };
         table.push([
-            match v.met {
-                Some(true) => "pass",
-                Some(false) => "FAIL",
-                None => "not measured",
-            }
-            .to_owned(),
+            judged(v).to_owned(),
             v.what.clone(),
             format!("{sign} {}", v.goal),
             match (v.stretch, v.stretch_met) {
@@ -52,14 +62,27 @@ pub fn goals(verdicts: &[Verdict]) -> Table {
     table
 }
 
-/// The figure; where a size is missing, those that are there.
+/// The figure; of several sizes each, with those that are missing.
 fn measured(verdict: &Verdict) -> String {
-    if let Some(figure) = &verdict.figure {
+    let Some(figure) = &verdict.figure else { return "–".into() };
+    if verdict.by_size.len() + verdict.not_measured.len() == 1 {
         return shown(figure);
     }
-    let known: Vec<String> =
-        verdict.by_size.iter().map(|(size, spread)| format!("{size}: {}", shown(spread))).collect();
-    if known.is_empty() { "–".into() } else { known.join("; ") }
+    let known = verdict.by_size.iter().map(|(size, spread)| format!("{size}: {}", shown(spread)));
+    let missing = verdict.not_measured.iter().map(|size| format!("not at {size}"));
+    known.chain(missing).collect::<Vec<_>>().join("; ")
+}
+
+/// Who is timed in large boxes, in words; `None` without such a box.
+pub fn few(options: &Asked) -> Option<String> {
+    let limit = options.few_above;
+    options.sizes.iter().any(|size| *size > limit).then(|| {
+        format!(
+            "In boxes of more than {limit} particles of the many-body fluid only these are timed: the built-in, the plugin \
+             in mixed precision, the native runner in mixed precision with the best instructions, and what was \
+             asked for by name."
+        )
+    })
 }
 
 /// Where the time goes, of the runs for which `wanted` says so.
@@ -152,6 +175,7 @@ pub fn report(outcome: &Outcome) -> Result<String, BenchError> {
          round. All codes start from one state of each fluid and size; LAMMPS is timed by its own loop time, without \
          output in the loop, at the fastest of the skins tried. DPD is timed in the boxes of the many-body fluid."
     ))];
+    speed.extend(few(&outcome.options).map(Item::Prose));
     for fluid in &outcome.fluids {
         let svg = plot(outcome, fluid.name, fluid.title).render()?;
         speed.push(Item::Figure { svg, caption: String::new() });
@@ -161,7 +185,7 @@ pub fn report(outcome: &Outcome) -> Result<String, BenchError> {
     let lammps = ["pair", "neigh", "comm", "output", "modify", "other"];
     let section = |heading: &str, items: Vec<Item>| Section { heading: heading.into(), items };
     let sections = vec![
-        section("Goals", vec![Item::Table(goals(&outcome.goals))]),
+        section("Goals", vec![Item::Prose(GOALS.into()), Item::Table(goals(&outcome.goals))]),
         section("Speed", speed),
         section(
             "Where the time goes, natively",
@@ -185,7 +209,7 @@ pub fn report(outcome: &Outcome) -> Result<String, BenchError> {
         section("Two MPI ranks", vec![Item::Table(scaling(outcome))]),
         section("Memory, native, mixed precision", vec![Item::Table(memory(outcome))]),
     ];
-    let count = |met| outcome.goals.iter().filter(|v| v.met == Some(met)).count();
+    let count = |state| outcome.goals.iter().filter(|v| judged(v) == state).count();
     let missing = match outcome.lammps.missing.join(", ") {
         none if none.is_empty() => "none".to_owned(),
         some => some,
@@ -205,8 +229,47 @@ pub fn report(outcome: &Outcome) -> Result<String, BenchError> {
             ),
         ],
         sections,
-        passed: count(true),
-        failed: count(false),
+        passed: count(PASS),
+        failed: count(FAIL),
     };
     Ok(report.render()?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeMap;
+
+    /// A goal of at least 2 at sizes 10 and 20, by the medians that were measured.
+    fn row(medians: &[(usize, f64)]) -> String {
+        let spread = |median| Spread { min: median, median, max: median };
+        let by_size: BTreeMap<_, _> = medians.iter().map(|(size, m)| (*size, spread(*m))).collect();
+        let worst = medians.iter().map(|m| m.1).reduce(f64::min);
+        let verdict = Verdict {
+            what: "w".into(),
+            relation: "at least",
+            goal: 2.0,
+            stretch: None,
+            figure: worst.map(spread),
+            met: worst.map(|w| w >= 2.0),
+            stretch_met: None,
+            not_measured: [10, 20].into_iter().filter(|s| !by_size.contains_key(s)).collect(),
+            by_size,
+        };
+        goals(&[verdict]).to_text().lines().last().unwrap().to_owned()
+    }
+
+    #[test]
+    fn goals_say_what_was_not_measured() {
+        for (medians, state, figures) in [
+            (&[(10, 3.0), (20, 2.5)][..], "pass ", "10: 3.00 (3.00–3.00); 20: 2.50 (2.50–2.50)"),
+            (&[(10, 3.0), (20, 1.5)], "FAIL ", "10: 3.00 (3.00–3.00); 20: 1.50 (1.50–1.50)"),
+            (&[(20, 3.0)], "pass in part ", "20: 3.00 (3.00–3.00); not at 10"),
+            (&[(20, 1.0)], "FAIL ", "20: 1.00 (1.00–1.00); not at 10"),
+            (&[], "not measured ", "–"),
+        ] {
+            let row = row(medians);
+            assert!(row.starts_with(state) && row.trim_end().ends_with(figures), "{row}");
+        }
+    }
 }

@@ -1,5 +1,5 @@
 use super::{Failure, Verdict, write_json};
-use crate::bench::{Options, memory, page, run as measure};
+use crate::bench::{Options, contender::FEW_ABOVE, fluids::SIZES, memory, page, run as measure};
 use crate::report::Progress;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -7,21 +7,25 @@ use std::path::{Path, PathBuf};
 /// Time LAMMPS, the plugin and the native runner side by side; a few minutes. Nothing else should run.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// All sizes, more and longer rounds, memory of 3.75 million particles: about an hour.
+    /// All sizes, more and longer rounds, memory of 3.75 million particles: about 25 minutes.
     #[arg(long)]
     full: bool,
     /// Particles of the many-body fluid in the boxes [default: 6050,48400; with --full also 387200].
     #[arg(long, value_name = "N,…", value_delimiter = ',', value_parser = at_least_one)]
     sizes: Vec<NonZeroUsize>,
-    /// Interleaved rounds [default: 5; with --full 9].
+    /// Interleaved rounds [default: 5; with --full 7].
     #[arg(long, value_name = "N")]
     rounds: Option<NonZeroUsize>,
-    /// Seconds that a timed run should take [default: 0.3; with --full 1].
+    /// Seconds that a timed run may take; it makes at least 20 steps, the native runner 32 [default: 0.3; with --full
+    /// 0.5].
     #[arg(long, value_name = "S", value_parser = positive)]
     seconds: Option<f64>,
     /// Steps of every timed run, whatever time they take; no skin is looked for.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     steps: Option<u64>,
+    /// Above this many particles only those are timed whom goals of large boxes and the page about scaling ask for.
+    #[arg(long, value_name = "N", default_value_t = FEW_ABOVE)]
+    few_above: usize,
     /// Threads of the native runner.
     #[arg(long, value_name = "N,…", value_delimiter = ',', default_value = "1,2", value_parser = at_least_one)]
     threads: Vec<NonZeroUsize>,
@@ -64,16 +68,17 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         return Ok(Verdict::Good);
     }
     let full = arguments.full;
-    let sizes: &[usize] = if full { &[6_050, 48_400, 387_200] } else { &[6_050, 48_400] };
+    let sizes = if full { &SIZES[..] } else { &SIZES[..2] };
     let memory: &[usize] = if full { &[1_000_000, 3_750_000] } else { &[1_000_000] };
     let mut sizes = or_default(&arguments.sizes, sizes);
     sizes.sort_unstable();
     sizes.dedup();
     let options = Options {
         sizes,
-        rounds: arguments.rounds.map_or(if full { 9 } else { 5 }, NonZeroUsize::get),
-        seconds: arguments.seconds.unwrap_or(if full { 1.0 } else { 0.3 }),
+        rounds: arguments.rounds.map_or(if full { 7 } else { 5 }, NonZeroUsize::get),
+        seconds: arguments.seconds.unwrap_or(if full { 0.5 } else { 0.3 }),
         steps: arguments.steps,
+        few_above: arguments.few_above,
         memory: or_default(&arguments.memory, memory),
         threads: arguments.threads.clone(),
         words: arguments.psi.clone(),
@@ -84,6 +89,9 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     let outcome = measure(&options, &program, &Progress::new()).map_err(Failure::new)?;
     println!("{}", page::speeds(&outcome).to_text());
     println!("{}", page::goals(&outcome.goals).to_text());
+    if let Some(note) = page::few(&outcome.options) {
+        println!("{note}\n");
+    }
     if !outcome.lammps.missing.is_empty() {
         println!("not in this LAMMPS: {}\n", outcome.lammps.missing.join(", "));
     }

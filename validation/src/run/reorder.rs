@@ -7,7 +7,7 @@ use std::slice::Iter;
 
 /// Steps from one time to the next. Particles then have moved about a third of the range of their forces, mostly
 /// to a row of bins that is still near in memory.
-const INTERVAL: u64 = 32;
+pub(crate) const INTERVAL: u64 = 32;
 
 /// Whether the particles are brought into order at the end of a step. It depends on nothing but its number, so
 /// that a run that goes on from a checkpoint does it at the same steps; these are odd, unlike those that
