@@ -118,14 +118,14 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TA
         let mut tally = Tally::default();
         let layer_first = *swept.start.get_unchecked(layer * grid.rows * grid.bins);
         near.clear(swept.terms.passes.len(), layer_first);
-        let view = View::new(swept.frame, grid, layer);
+        let view = View::new(swept, layer);
         let ghosts = !swept.ghost.is_empty();
         let kit = Kit::<I, A>::new(swept);
         let mut spans = Spans::default();
         let mut row = 0;
         while row < grid.rows {
             let cell = (layer * grid.rows + row) * grid.bins;
-            let windows = Windows::new(swept, layer, row);
+            let windows = Windows::new(swept, &view, layer, row);
             let mut first = *swept.start.get_unchecked(cell) as usize;
             let end = *swept.start.get_unchecked(cell + grid.bins) as usize;
             // Ghosts look for owned particles only.
@@ -200,11 +200,12 @@ unsafe fn part<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY: bool>
             let end = *block.begin.get_unchecked(m + 1) as usize - pairs[0];
             let mut k = *block.begin.get_unchecked(m) as usize - pairs[0];
             // Mostly enough.
-            which.add(k).cast::<[u8; 32]>().write_unaligned([(m - first) as u8; 32]);
+            let twice = 0x101 * (m - first) as u16;
+            I::fill16(twice, which.add(k).cast());
             k += 32;
             while k < end {
-                which.add(k).cast::<[u8; 16]>().write_unaligned([(m - first) as u8; 16]);
-                k += 16;
+                I::fill16(twice, which.add(k).cast());
+                k += 32;
             }
             m += 1;
         }

@@ -42,6 +42,11 @@ impl Quantum {
         (few && !frame.is_tilted()).then_some(words.map(|w| w as u32))
     }
 
+    /// A distance between periods, to the nearest unit.
+    pub fn shift(&self, length: f64) -> u16 {
+        (length * self.per_length).round() as i64 as u16
+    }
+
     /// A coordinate.
     ///
     /// # Safety

@@ -3,7 +3,6 @@
 use super::arithmetic::Record;
 use super::block::GROUP;
 use super::frame::Frame;
-use super::grid::Grid;
 use super::layer::Swept;
 use super::quantum::JOINED;
 use super::simd::{Isa, Reals, Scalar};
@@ -25,7 +24,7 @@ pub struct Windows {
 }
 
 impl Windows {
-    pub fn new(swept: &Swept<impl Scalar, impl Record>, layer: usize, row: usize) -> Windows {
+    pub fn new(swept: &Swept<impl Scalar, impl Record>, view: &View, layer: usize, row: usize) -> Windows {
         let (frame, grid) = (swept.frame, swept.grid);
         let own = &swept.start[(layer * grid.rows + row) * grid.bins..];
         let mut windows = Windows {
@@ -38,14 +37,13 @@ impl Windows {
         let around = [(0, 0), (1, 0), (-1, 1), (0, 1), (1, 1)];
         for (w, (across, up)) in around.into_iter().enumerate() {
             let mut to = [row as i64 + across, layer as i64 + up];
-            let mut shift = [0.0; 3];
+            let mut wrap = 0;
             let mut there = true;
             if to[0] < 0 || to[0] >= grid.rows as i64 {
                 // In two dimensions a layer is one row, and has none beside it.
                 there = frame.periodic[grid.row_axis] && frame.dimensions == 3;
-                let wrap = to[0].div_euclid(grid.rows as i64) as f64;
+                wrap = to[0].div_euclid(grid.rows as i64);
                 to[0] = to[0].rem_euclid(grid.rows as i64);
-                shift = frame.edge(grid.row_axis).map(|e| wrap * e);
             }
             if to[1] >= grid.layers as i64 {
                 // The copy of the first.
@@ -55,19 +53,15 @@ impl Windows {
                 continue;
             }
             windows.there[w] = 1.0;
-            windows.crosses |= shift != [0.0; 3];
+            windows.crosses |= wrap != 0;
             let cell = (to[1] as usize * grid.rows + to[0] as usize) * grid.bins;
             windows.row[w] = swept.start[cell..].as_ptr();
             // Where there are ghosts there are no periods, and no copies.
             if let Some(owned) = swept.owned_of_row.get(cell / grid.bins) {
                 windows.owned[w] = *owned;
             }
-            for (period, entry) in [(-1.0, w), (0.0, w + 5), (1.0, w + 10)] {
-                for c in 0..3 {
-                    let along = if c == 0 { period * frame.length[0] } else { 0.0 };
-                    let units = (shift[c] + along) * swept.quantum.per_length;
-                    windows.shift[entry][c] = units.round() as i64 as u16;
-                }
+            for period in 0..3 {
+                windows.shift[w + 5 * period] = view.shift[(wrap + 1) as usize][period];
             }
         }
         windows
@@ -100,11 +94,15 @@ pub struct View {
     pub bins: i32,
     /// Two particles no further apart than this along x look together.
     pub joined: f32,
+    /// Added to the positions of particles in rows of the period before, the same, and the next, and there in the same
+    /// three periods along x.
+    shift: [[[u16; 3]; 3]; 3],
 }
 
 impl View {
     #[inline(always)]
-    pub fn new(frame: &Frame, grid: &Grid, layer: usize) -> View {
+    pub fn new(swept: &Swept<impl Scalar, impl Record>, layer: usize) -> View {
+        let (frame, grid) = (swept.frame, swept.grid);
         let layer_width = frame.height(grid.layer_axis) / grid.layers as f64;
         View {
             reach_squared: (grid.reach * grid.reach) as f32,
@@ -116,6 +114,12 @@ impl View {
             tilted: frame.is_tilted(),
             bins: grid.bins as i32,
             joined: (JOINED * frame.length[0] / grid.bins as f64) as f32,
+            shift: [-1.0, 0.0, 1.0].map(|wrap| {
+                [-frame.length[0], 0.0, frame.length[0]].map(|along| {
+                    let [x, y, z] = frame.edge(grid.row_axis).map(|e| wrap * e);
+                    [x + along, y, z].map(|shift| swept.quantum.shift(shift))
+                })
+            }),
         }
     }
 
