@@ -40,7 +40,9 @@ pub struct Block<T> {
     pub tags: [Vec<u32>; 2],
     /// Rows `fx, fy, fz, −w`.
     pub rows: Vec<Lines<T>>,
-    /// Weights, of one density after another.
+    /// Rows of weights for the first particles, with several species.
+    pub own_rows: Vec<Lines<T>>,
+    /// Minus the weights, of one density after another.
     pub weight: Vec<Vec<T>>,
     /// Forces along `ê` of all terms but the first soft one.
     pub conservative: Vec<T>,
@@ -96,6 +98,7 @@ impl<T: Scalar> Default for Block<T> {
             pairs: Vec::new(),
             tags: Default::default(),
             rows: Vec::new(),
+            own_rows: Vec::new(),
             weight: Vec::new(),
             conservative: Vec::new(),
             share: Vec::new(),
@@ -151,6 +154,7 @@ impl<T: Scalar> Block<T> {
             tags.resize(capacity, 0);
         }
         self.rows.resize(capacity / 16, Lines::default());
+        self.own_rows.resize(capacity / 16, Lines::default());
         // Eight numbers for each pair, at most.
         self.pairs.resize(capacity / 8, Lines::default());
         self.running.resize(capacity + 2, Sum::default());

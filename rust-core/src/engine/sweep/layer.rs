@@ -49,7 +49,7 @@ pub struct Swept<'a, T, R> {
     pub offset: &'a [isize],
     /// Four numbers for each accumulator: force, and the density if there is one variable.
     pub sums: Shared<f64>,
-    /// Densities, if there are more: `variables` numbers for each accumulator.
+    /// Densities, if there are more: for each accumulator `variables` numbers, and as many more as fill rows of four.
     pub densities: Shared<f64>,
     pub variables: usize,
     pub thermostat: Option<(PairNoise, f64)>,
@@ -213,9 +213,10 @@ unsafe fn part<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY: bool>
         A::own(swept.records.as_ptr().add(part.first), &mut block.own);
         evaluate::<I, A, SEVERAL, TALLY>(swept, kit, block, near, part, tally);
         let offset = *swept.offset.get_unchecked(layer);
-        scatter::<I, A>(swept.sums, offset, block, part);
+        // Forces first: rows of weights take the place of theirs.
+        scatter::<I, A>(swept.sums, swept.variables, offset, block, part);
         if swept.variables > 1 {
-            scatter_weights(swept, offset, block, part);
+            scatter_weights::<I, A, SEVERAL>(swept, offset, block, part);
         }
         near.add::<TALLY>(block, part);
     }

@@ -54,7 +54,7 @@ pub struct Machine<P: Compiled> {
     owned_of_row: Vec<[u32; 2]>,
     offset: Vec<isize>,
     sums: Vec<Sum>,
-    densities: Vec<f64>,
+    densities: Vec<Sum>,
     /// Densities, ψ and slopes in the order of cells.
     rows: Vec<f64>,
     excess: Vec<f64>,
@@ -73,7 +73,7 @@ pub struct Machine<P: Compiled> {
 /// Where threads write, each its own part.
 struct Arrays<P: Compiled> {
     sums: Shared<Sum>,
-    densities: Shared<f64>,
+    densities: Shared<Sum>,
     rows: Shared<f64>,
     excess: Shared<f64>,
     slopes: Shared<f64>,
@@ -238,7 +238,7 @@ impl<P: Compiled> Machine<P> {
             slopes: arrays.slopes,
             offset: &self.offset,
             sums: Shared(arrays.sums.0.cast()),
-            densities: arrays.densities,
+            densities: Shared(arrays.densities.0.cast()),
             variables: self.columns.len(),
             thermostat: self.thermostat,
         }
@@ -265,8 +265,8 @@ impl<P: Compiled> Machine<P> {
             // Zeros; as bytes they are written in the widest vectors.
             arrays.sums.at(begin).write_bytes(0, count);
             if variables > 1 {
-                let densities = arrays.densities.at(variables * begin);
-                std::slice::from_raw_parts_mut(densities, variables * count).fill(0.0);
+                let quads = variables.div_ceil(4);
+                arrays.densities.at(quads * begin).write_bytes(0, quads * count);
             }
             let pass = self.passes.first[self.totals as usize];
             *arrays.tallies.at(layer) = pass(swept, layer, block, near);

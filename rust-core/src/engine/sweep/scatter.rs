@@ -1,9 +1,11 @@
 //! What pairs do, added to the accumulators of their particles.
 
-use super::arithmetic::{Arithmetic, Record};
+use super::arithmetic::{Arithmetic, Pairs};
 use super::block::{Block, PLACE_BITS};
+use super::forces::At;
 use super::layer::{Part, Shared, Swept};
-use super::simd::{Isa, Quad, Scalar};
+use super::simd::{Isa, Quad, Reals};
+use crate::model::kernel::Real;
 
 /// An accumulator: a force, and the density if there is one variable; aligned so that none straddles lines of the
 /// cache.
@@ -13,38 +15,82 @@ pub struct Sum(pub [f64; 4]);
 
 const _: () = assert!(size_of::<Sum>() == 1 << PLACE_BITS);
 
+/// Accumulators of a layer: for each particle some rows of four numbers.
+#[derive(Clone, Copy)]
+struct Accumulators {
+    /// That of particle 0, were it of the layer.
+    base: *mut f64,
+    /// Rows of each particle, and which is meant.
+    quads: usize,
+    quad: usize,
+}
+
+impl Accumulators {
+    /// The row of the particle at 32 times `place`.
+    #[inline(always)]
+    unsafe fn at(self, place: usize) -> *mut f64 {
+        // SAFETY: the caller's.
+        unsafe { self.base.byte_add(place * self.quads).add(4 * self.quad) }
+    }
+}
+
 /// Adds the rows of pairs to both particles of each.
 #[inline(always)]
 pub unsafe fn scatter<I: Isa, A: Arithmetic<I>>(
     sums: Shared<f64>,
+    variables: usize,
     offset: isize,
     block: &mut Block<A::Scalar>,
     part: Part,
 ) {
     // SAFETY: the contract of `simd`; accumulators are there for every particle of the layer and the next.
     unsafe {
-        // The second particle gets minus the row, so the weight in it is negative.
-        const SIGN: [f64; 4] = [1.0, 1.0, 1.0, -1.0];
-        let sign = I::Quad::load(SIGN.as_ptr());
-        let base = sums.0.offset(4 * offset);
+        let to = Accumulators { base: sums.0.offset(4 * offset), quads: 1, quad: 0 };
         let rows = block.rows.as_mut_ptr().cast::<A::Scalar>();
+        // The second particle gets minus the row, so the weight in it is negative.
+        // Nobody asks any more what pairs are, unless there are weights to come.
+        let running = if variables > 1 { block.running.as_mut_ptr().cast() } else { block.pairs.as_mut_ptr().cast() };
+        add_rows::<I, A>(to, rows, rows, running, [1.0, 1.0, 1.0, -1.0], block, part);
+    }
+}
+
+/// Adds `own` rows times `sign` to the first particles of pairs, minus `rows` to the second ones.
+#[inline(always)]
+unsafe fn add_rows<I: Isa, A: Arithmetic<I>>(
+    to: Accumulators,
+    rows: *mut A::Scalar,
+    own: *mut A::Scalar,
+    running: *mut f64,
+    sign: [f64; 4],
+    block: &Block<A::Scalar>,
+    part: Part,
+) {
+    // SAFETY: the contract of `simd`; accumulators are there, and room for a row behind the last.
+    unsafe {
+        let sign = I::Quad::load(sign.as_ptr());
         let places = block.j.as_ptr().add(part.pairs[0]);
         // One loop over all, not one for each member, none of whose ends is to be foreseen: what a member gets is
         // the difference of two running sums, of which every other one is kept. Behind an odd number nothing follows.
         let count = part.count();
         rows.add(4 * count).cast::<[A::Scalar; 4]>().write([A::Scalar::default(); 4]);
-        let sums = block.pairs.as_mut_ptr().cast::<f64>();
+        own.add(4 * count).cast::<[A::Scalar; 4]>().write([A::Scalar::default(); 4]);
+        let sums = running;
         let mut sum = I::Quad::zero();
         let mut p = 0;
         while p < count {
             sum.store(sums.add(2 * p));
             let row = A::load_quad(rows.add(4 * p));
-            let at = base.byte_add(*places.add(p) as usize);
+            let at = to.at(*places.add(p) as usize);
             I::Quad::load(at).sub(row).store(at);
             let next = A::load_quad(rows.add(4 * p + 4));
-            let at = base.byte_add(*places.add(p + 1) as usize);
+            let at = to.at(*places.add(p + 1) as usize);
             I::Quad::load(at).sub(next).store(at);
-            sum = sum.add(row.add(next));
+            let two = if own == rows {
+                row.add(next)
+            } else {
+                A::load_quad(own.add(4 * p)).add(A::load_quad(own.add(4 * p + 4)))
+            };
+            sum = sum.add(two);
             p += 2;
         }
         sum.store(sums.add(2 * p));
@@ -55,9 +101,9 @@ pub unsafe fn scatter<I: Isa, A: Arithmetic<I>>(
         while m < last {
             let end = *begin.add(m + 1) as usize - part.pairs[0];
             let even = end & !1;
-            let odd = A::load_quad(rows.add(4 * even)).mul(I::Quad::splat((end & 1) as f64));
+            let odd = A::load_quad(own.add(4 * even)).mul(I::Quad::splat((end & 1) as f64));
             let all = I::Quad::load(sums.add(2 * even)).add(odd);
-            add_to(base.add(4 * (part.first + m - first)), all.sub(before).mul(sign));
+            add_to(to.at((part.first + m - first) << PLACE_BITS), all.sub(before).mul(sign));
             before = all;
             m += 1;
         }
@@ -74,43 +120,56 @@ pub unsafe fn add_to<Q: Quad>(p: *mut f64, x: Q) {
     unsafe { Q::load(p).add(x).store(p) }
 }
 
-/// Adds weights where there are several densities or species.
+/// Adds weights where there are several densities or species: a column for each density and species of the other
+/// particle, four of them to a row.
 #[inline(always)]
-pub unsafe fn scatter_weights<T: Scalar>(
-    swept: &Swept<T, impl Record>,
+pub unsafe fn scatter_weights<I: Isa, A: Arithmetic<I>, const SEVERAL: bool>(
+    swept: &Swept<A::Scalar, A::Record>,
     offset: isize,
-    block: &Block<T>,
+    block: &mut Block<A::Scalar>,
     part: Part,
 ) {
-    // SAFETY: as `scatter`.
+    // SAFETY: as `scatter`; there are weights and kinds of whole vectors.
     unsafe {
-        let species = swept.terms.species;
-        let width = swept.variables;
-        let base = swept.densities.0.offset(width as isize * offset);
-        let passes = swept.terms.passes.len();
-        let [first, last] = part.slots;
-        let places = block.j.as_ptr().add(part.pairs[0]);
-        let mut p = 0;
-        let mut m = first;
-        while m < last {
-            let to = *block.begin.get_unchecked(m + 1) as usize - part.pairs[0];
-            let i = part.first + m - first;
-            let si = if species > 1 { *swept.species.get_unchecked(i) as usize } else { 0 };
-            let at_i = base.add(width * i);
-            while p < to {
-                let j = (*places.add(p) >> PLACE_BITS) as usize;
-                let sj = if species > 1 { *swept.species.get_unchecked(j) as usize } else { 0 };
-                let at_j = base.add(width * j + si);
-                let mut d = 0;
-                while d < passes {
-                    let w = block.weight.get_unchecked(d).get_unchecked(p).wide();
-                    *at_i.add(d * species + sj) += w;
-                    *at_j.add(d * species) += w;
-                    d += 1;
+        let terms = swept.terms;
+        let quads = swept.variables.div_ceil(4);
+        let base = swept.densities.0.offset((4 * quads) as isize * offset);
+        let rows = block.rows.as_mut_ptr().cast::<A::Scalar>();
+        let own = if SEVERAL { block.own_rows.as_mut_ptr().cast() } else { rows };
+        let vectors = part.count().div_ceil(A::Reals::LANES);
+        let pairs = block.pairs.as_ptr().cast::<Pairs<A::Reals>>();
+        let mut quad = 0;
+        while quad < quads {
+            let mut v = 0;
+            while v < vectors {
+                let k = v * A::Reals::LANES;
+                let mut to_second = [A::Reals::constant(0.0); 4];
+                let mut to_first = to_second;
+                let mut c = 0;
+                while c < 4 && 4 * quad + c < swept.variables {
+                    let column = 4 * quad + c;
+                    let (pass, species) = (column / terms.species, column % terms.species);
+                    let weight = A::Reals::load(block.weight.get_unchecked(pass).as_ptr().add(k));
+                    to_second[c] = weight;
+                    if SEVERAL {
+                        let kind = (*pairs.add(v)).kind;
+                        let [first, second] = terms.is_species.get_unchecked(species);
+                        to_second[c] = weight * At::<A::Reals>::new(first).of::<true>(kind);
+                        to_first[c] = weight * At::<A::Reals>::new(second).of::<true>(kind);
+                    }
+                    c += 1;
                 }
-                p += 1;
+                A::Reals::rows(to_second, rows.add(4 * k));
+                if SEVERAL {
+                    A::Reals::rows(to_first, own.add(4 * k));
+                }
+                v += 1;
             }
-            m += 1;
+            // Both get minus a row: weights are negative.
+            let to = Accumulators { base, quads, quad };
+            let running = block.running.as_mut_ptr().cast();
+            add_rows::<I, A>(to, rows, own, running, [-1.0; 4], block, part);
+            quad += 1;
         }
     }
 }

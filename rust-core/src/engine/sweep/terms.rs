@@ -18,6 +18,8 @@ pub struct Terms<T> {
     pub apart: Vec<PairTerm>,
     pub drag: Option<Drag<T>>,
     pub passes: Vec<Pass<T>>,
+    /// For each species whether the first particle is of it, and whether the second: 1 or 0.
+    pub is_species: Vec<[Table<T>; 2]>,
 }
 
 /// A number for each pair of species, row-major, and room for a vector.
@@ -168,6 +170,14 @@ impl<T: Scalar> Terms<T> {
         if terms.soft.is_empty() {
             terms.soft.push(Soft::none(count * count));
         }
+        terms.is_species = (0..count)
+            .map(|s| {
+                let one = |yes: bool| T::of(f64::from(u8::from(yes)));
+                let first = Table::new((0..count * count).map(|p| one(p / count == s)));
+                let second = Table::new((0..count * count).map(|p| one(p % count == s)));
+                [first, second]
+            })
+            .collect();
         terms.passes = plan
             .passes
             .iter()

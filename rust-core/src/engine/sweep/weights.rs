@@ -7,18 +7,17 @@ use super::simd::{Isa, Reals, Scalar};
 use super::terms::Pass;
 use crate::model::kernel::{Shape, ShapeVisitor};
 
-/// The weights of the pairs for each density; minus them if there is but one, as rows have it.
+/// Minus the weights of the pairs for each density.
 #[inline(always)]
 pub unsafe fn weights<I: Isa, A: Arithmetic<I>>(
     swept: &Swept<A::Scalar, A::Record>,
     block: &mut Block<A::Scalar>,
     part: Part,
 ) {
-    let sign = if swept.variables == 1 { -1.0 } else { 1.0 };
     for (pass, term) in swept.terms.passes.iter().enumerate() {
         term.kind.visit(Weights::<A::Reals> {
             term,
-            factor: A::Scalar::of(sign * term.value.wide()),
+            factor: A::Scalar::of(-term.value.wide()),
             pairs: block.pairs.as_ptr().cast(),
             vectors: part.count().div_ceil(A::Reals::LANES),
             out: block.weight[pass].as_mut_ptr(),

@@ -159,15 +159,18 @@ impl<P: Compiled> Machine<P> {
             return;
         }
         let count = out.len();
+        let quads = width.div_ceil(4);
         // SAFETY: accumulators of particles of the layer.
         let sums = |accumulators| unsafe {
-            std::slice::from_raw_parts(arrays.densities.at(width * place(accumulators)), count)
+            let sums = arrays.densities.at(quads * place(accumulators));
+            std::slice::from_raw_parts(sums.cast::<f64>(), 4 * quads * (count / width)).chunks_exact(4 * quads)
         };
-        match before.map(sums) {
-            None => out.copy_from_slice(sums(here)),
-            Some(before) => {
-                let pairs = sums(here).iter().zip(before);
-                out.iter_mut().zip(pairs).for_each(|(n, (here, before))| *n = here + before);
+        for (row, here) in out.chunks_exact_mut(width).zip(sums(here)) {
+            row.copy_from_slice(&here[..width]);
+        }
+        if let Some(before) = before {
+            for (row, before) in out.chunks_exact_mut(width).zip(sums(before)) {
+                row.iter_mut().zip(before).for_each(|(n, before)| *n += before);
             }
         }
         let count = width / own.len();

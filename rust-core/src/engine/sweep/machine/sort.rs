@@ -232,7 +232,8 @@ impl<P: Compiled> Machine<P> {
         }
         self.sums.resize(sum.max(1), Sum::default());
         let variables = self.width();
-        self.densities.resize(if variables > 1 { variables * sum } else { 0 }, 0.0);
+        let quads = if variables > 1 { variables.div_ceil(4) } else { 0 };
+        self.densities.resize(quads * sum, Sum::default());
         self.tallies.clear();
         self.tallies.resize(layers, Tally::default());
     }
