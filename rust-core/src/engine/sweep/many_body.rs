@@ -177,19 +177,8 @@ pub unsafe fn second_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const T
                 let apart = &near.apart.get_unchecked(pass).0;
                 let slopes = swept.slopes.at(pass * species).cast_const();
                 let layer_slopes = slopes.add(width * near.first as usize);
-                // The slope of each member; its slopes and species, with several.
-                let mut own = [0.0; 16];
-                let mut rows_of = [(slopes, 0); 16];
-                let mut m = 0;
-                while m < count {
-                    let i = first + m;
-                    if SEVERAL {
-                        rows_of[m] = (slopes.add(width * i), *swept.species.get_unchecked(i) as usize);
-                    } else {
-                        own[m] = *slopes.add(width * i);
-                    }
-                    m += 1;
-                }
+                let own_slopes = slopes.add(width * first);
+                let own_species = swept.species.as_ptr().wrapping_add(first);
                 let begin = *done.get_unchecked(pass);
                 let end = begin + *near.found.get_unchecked(part * passes + pass) as usize;
                 let mut p = begin;
@@ -199,10 +188,10 @@ pub unsafe fn second_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const T
                     let (j, m) = ((code >> MEMBER_BITS) as usize, (code & ((1 << MEMBER_BITS) - 1)) as usize);
                     let there = layer_slopes.add(width * j);
                     let slope = if SEVERAL {
-                        let (here, species_i) = *rows_of.get_unchecked(m);
-                        *here.add(*species_j.add(j) as usize) + *there.add(species_i)
+                        let (i, j) = (*own_species.add(m) as usize, *species_j.add(j) as usize);
+                        *own_slopes.add(width * m + j) + *there.add(i)
                     } else {
-                        *own.get_unchecked(m) + *there
+                        *own_slopes.add(width * m) + *there
                     };
                     let force = A::load_quad(row).mul(I::Quad::splat(slope));
                     let at = layer_base.add(4 * j);
