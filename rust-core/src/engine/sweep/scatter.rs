@@ -49,7 +49,8 @@ pub unsafe fn scatter<I: Isa, A: Arithmetic<I>>(
         let rows = block.rows.as_mut_ptr().cast::<A::Scalar>();
         // The second particle gets minus the row, so the weight in it is negative.
         // Nobody asks any more what pairs are, unless there are weights to come.
-        let running = if variables > 1 { block.running.as_mut_ptr().cast() } else { block.pairs.as_mut_ptr().cast() };
+        let running =
+            if variables > 1 { block.running.as_mut_ptr().cast() } else { block.pairs.as_mut_ptr().cast() };
         add_rows::<I, A>(to, rows, rows, running, [1.0, 1.0, 1.0, -1.0], block, part);
     }
 }

@@ -163,14 +163,16 @@ impl<P: Compiled> Machine<P> {
         // SAFETY: accumulators of particles of the layer.
         let sums = |accumulators| unsafe {
             let sums = arrays.densities.at(quads * place(accumulators));
-            std::slice::from_raw_parts(sums.cast::<f64>(), 4 * quads * (count / width)).chunks_exact(4 * quads)
+            std::slice::from_raw_parts(sums.cast::<f64>(), 4 * quads * (count / width))
         };
-        for (row, here) in out.chunks_exact_mut(width).zip(sums(here)) {
-            row.copy_from_slice(&here[..width]);
-        }
-        if let Some(before) = before {
-            for (row, before) in out.chunks_exact_mut(width).zip(sums(before)) {
-                row.iter_mut().zip(before).for_each(|(n, before)| *n += before);
+        if width == 4 * quads {
+            take(out, sums(here), before.map(sums));
+        } else {
+            // What fills rows of four is left out.
+            for (k, row) in out.chunks_exact_mut(width).enumerate() {
+                let from = 4 * quads * k;
+                let columns = |accumulators| &sums(accumulators)[from..from + width];
+                take(row, columns(here), before.map(columns));
             }
         }
         let count = width / own.len();
@@ -179,6 +181,17 @@ impl<P: Compiled> Machine<P> {
             for (pass, own) in own.iter().enumerate() {
                 row[pass * count + species] += own;
             }
+        }
+    }
+}
+
+/// Densities from the sums of a layer, and of the layer before.
+#[inline(always)]
+fn take(out: &mut [f64], here: &[f64], before: Option<&[f64]>) {
+    match before {
+        None => out.copy_from_slice(here),
+        Some(before) => {
+            out.iter_mut().zip(here.iter().zip(before)).for_each(|(n, (here, before))| *n = here + before)
         }
     }
 }
