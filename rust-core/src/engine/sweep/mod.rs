@@ -244,9 +244,9 @@ impl Sweep {
         if particles.tag.len() != all || particles.kind.len() != all || particles.owned > all {
             return Err(EngineError::Host("particle arrays have different lengths"));
         }
-        // Indices are coded in 29 bits, copies of a layer among them.
-        if all > 1 << 27 {
-            return Err(EngineError::Host("more than 2^27 particles and ghosts on one rank"));
+        // Thirty-two times a place is a word; copies of a layer have places too.
+        if all > 1 << 26 {
+            return Err(EngineError::Host("more than 2^26 particles and ghosts on one rank"));
         }
         if matches!(space, Space::Box(_)) && particles.owned < all {
             return Err(EngineError::Host("a periodic box has no ghosts"));
