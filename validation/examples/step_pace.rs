@@ -3,8 +3,8 @@
 //!
 //! `cargo run --release -p psidpd --example step_pace mdpd mixed avx512 1 6050`
 
-use psidpd::bench::deck::Length;
 use psidpd::bench::fluids::SUBJECTS;
+use psidpd::bench::length::Length;
 use psidpd::bench::{native, start};
 use psidpd_core::engine::{Instructions, Precision, Settings};
 use std::error::Error;

@@ -365,7 +365,7 @@ impl Isa for Portable {
         let mut count = 0;
         while mask != 0 {
             let bit = mask.trailing_zeros();
-            unsafe { *p.add(count) = *bases.add(bit as usize / 16) + (bit % 16 << PLACE_BITS) };
+            unsafe { *p.add(count) = *bases.add(bit as usize / 16) + ((bit % 16) << PLACE_BITS) };
             count += 1;
             mask &= mask - 1;
         }
