@@ -27,7 +27,7 @@ pub struct Four {
     pub first: u8,
     pub many: u8,
     /// Their slots, of eight each: from, and to before.
-    pub eights: [u16; 2],
+    pub eights: [u32; 2],
 }
 
 /// A group of particles of one row, whose spans are to be cut.
@@ -113,7 +113,7 @@ pub unsafe fn cut<I: Isa, T: Scalar, const GHOSTS: bool>(
             // There is one at least.
             let next = eights + (found - begin).div_ceil(EIGHT);
             *block.fours.get_unchecked_mut(fours) =
-                Four { first: a as u8, many: many as u8, eights: [eights as u16, next as u16] };
+                Four { first: a as u8, many: many as u8, eights: [eights as u32, next as u32] };
             eights = next;
             fours += 1;
             a += many;
