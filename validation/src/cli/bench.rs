@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// Time LAMMPS, the plugin and the native runner side by side; a few minutes. Nothing else should run.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// All sizes, more and longer rounds, memory of 3.75 million particles: about 25 minutes.
+    /// All sizes, more and longer rounds, memory of 3.75 million particles: by estimate half an hour.
     #[arg(long)]
     full: bool,
     /// Particles of the many-body fluid in the boxes [default: 6050,48400; with --full also 387200].

@@ -199,13 +199,14 @@ unsafe fn part<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY: bool>
         while m < last {
             let end = *block.begin.get_unchecked(m + 1) as usize - pairs[0];
             let mut k = *block.begin.get_unchecked(m) as usize - pairs[0];
-            // Mostly enough.
             let twice = 0x101 * (m - first) as u16;
-            I::fill16(twice, which.add(k).cast());
-            k += 32;
-            while k < end {
+            // Thirty-two at once are mostly enough.
+            loop {
                 I::fill16(twice, which.add(k).cast());
                 k += 32;
+                if k >= end {
+                    break;
+                }
             }
             m += 1;
         }

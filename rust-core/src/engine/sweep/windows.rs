@@ -139,20 +139,19 @@ impl View {
             let mut at = 0;
             while at < count {
                 let i = first + at;
-                let x = swept.x.map(|x| x.as_ptr().add(i));
+                let mut x = swept.x.map(|x| x.as_ptr().add(i));
                 let left = count - at;
-                if left >= I::F32::LANES {
-                    let x = x.map(|x| I::F32::load(x));
-                    self.spans_of_vector::<I>(swept, row, x, at, there, out, &mut ends);
-                } else {
+                let mut lanes = [[0.0; 16]; 3];
+                if left < I::F32::LANES {
                     // The last in the place of those that are not there.
-                    let x = x.map(|x| {
-                        let mut lanes = [*x.add(left - 1); 16];
-                        std::ptr::copy_nonoverlapping(x, lanes.as_mut_ptr(), left);
-                        I::F32::load(lanes.as_ptr())
-                    });
-                    self.spans_of_vector::<I>(swept, row, x, at, there, out, &mut ends);
+                    for c in 0..3 {
+                        lanes[c] = [*x[c].add(left - 1); 16];
+                        std::ptr::copy_nonoverlapping(x[c], lanes[c].as_mut_ptr(), left);
+                        x[c] = lanes[c].as_ptr();
+                    }
                 }
+                let x = [I::F32::load(x[0]), I::F32::load(x[1]), I::F32::load(x[2])];
+                self.spans_of_vector::<I>(swept, row, x, at, there, out, &mut ends);
                 at += I::F32::LANES;
             }
             ends
