@@ -1,7 +1,7 @@
 //! The pairs in hand: some hundred, in arrays that stay in the first-level cache.
 
 use super::arithmetic::Own;
-use super::chunks::{Chunk, Four};
+use super::chunks::{Chunk, FOURS, Team};
 use super::layer::Part;
 use super::scatter::Sum;
 use super::simd::{Scalar, Two};
@@ -57,12 +57,15 @@ pub struct Block<T> {
     /// What the group is to be compared with.
     pub chunks: Vec<Chunk>,
     pub chunk_count: usize,
+    /// What is allowed to the second four of a team.
+    pub allowed: Vec<u64>,
     /// Who looks together.
-    pub fours: [Four; GROUP],
-    pub four_count: usize,
-    /// For each eight slots, where the four are that look at their chunks.
+    pub teams: [Team; GROUP],
+    pub team_count: usize,
+    /// For each eight slots, where each four of the team are that looks at their chunks.
     pub points: Vec<[Two; 2]>,
-    /// Which of the chunk of each slot are within reach, and 32 times the place of its first particle.
+    /// Which of the chunk of each slot are within reach: for each eight slots, those of each four of a team. And 32 times
+    /// the place of the first particle of the chunk of each slot.
     pub masks: Vec<u64>,
     pub bases: Vec<u32>,
     capacity: usize,
@@ -107,8 +110,9 @@ impl<T: Scalar> Default for Block<T> {
             aside: Aside::default(),
             chunks: Vec::new(),
             chunk_count: 0,
-            fours: [Four::default(); GROUP],
-            four_count: 0,
+            allowed: Vec::new(),
+            teams: [Team::default(); GROUP],
+            team_count: 0,
             points: Vec::new(),
             masks: Vec::new(),
             bases: Vec::new(),
@@ -127,10 +131,11 @@ impl<T: Scalar> Block<T> {
         let room = count + CHUNKS;
         if room > self.chunks.len() {
             self.chunks.resize(2 * room, Chunk::default());
-            // Slots of each four come in eights.
+            self.allowed.resize(2 * room, 0);
+            // Slots of each team come in eights.
             let eights = 2 * room / EIGHT + GROUP + 1;
-            self.points.resize(eights, Default::default());
-            self.masks.resize(EIGHT * eights, 0);
+            self.points.resize(FOURS * eights, Default::default());
+            self.masks.resize(FOURS * EIGHT * eights, 0);
             self.bases.resize(EIGHT * eights, 0);
         }
     }

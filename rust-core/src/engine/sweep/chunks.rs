@@ -1,4 +1,4 @@
-//! Spans of bins as chunks of sixteen particles, each to be compared with up to four.
+//! Spans of bins as chunks of sixteen particles, each to be compared with a team of up to four, or eight.
 
 use super::arithmetic::Record;
 use super::block::{Block, EIGHT};
@@ -6,24 +6,27 @@ use super::layer::Swept;
 use super::simd::{Isa, Reals, Scalar};
 use super::windows::{Bins, Ends, Spans, View, Windows};
 
-/// Particles that look together, at most.
+/// Particles that are compared at once.
 pub const FOUR: usize = 4;
 
-/// Sixteen particles that up to four others are to be compared with.
+/// Fours of the largest team.
+pub const FOURS: usize = 2;
+
+/// Sixteen particles that a team is to be compared with.
 #[derive(Debug, Clone, Copy, Default)]
 #[repr(C)]
 pub struct Chunk {
-    /// Which of them: sixteen bits for the first of the four, then for the second …
+    /// Which of them: sixteen bits for the first of the first four of the team, then for the second …
     pub allowed: u64,
     pub from: u32,
-    /// The slot of its masks, and the shift that the four see these with, in the lowest eight bits.
+    /// The slot of its masks, and the shift that the team sees these with, in the lowest eight bits.
     pub note: u32,
 }
 
 /// Particles of a group that look together.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Four {
-    /// The first in the group, and how many: four, or fewer.
+pub struct Team {
+    /// The first in the group, and how many.
     pub first: u8,
     pub many: u8,
     /// Their slots, of eight each: from, and to before.
@@ -41,9 +44,9 @@ pub struct Group<'a> {
     pub count: usize,
 }
 
-/// Cuts the spans of a group into chunks. Particles that follow each other closely look together.
+/// Cuts the spans of a group into chunks. Up to `MANY` particles that follow each other closely look together.
 #[inline(always)]
-pub unsafe fn cut<I: Isa, T: Scalar, const GHOSTS: bool>(
+pub unsafe fn cut<I: Isa, T: Scalar, const GHOSTS: bool, const MANY: usize>(
     swept: &Swept<T, impl Record>,
     group: &Group,
     block: &mut Block<T>,
@@ -53,11 +56,11 @@ pub unsafe fn cut<I: Isa, T: Scalar, const GHOSTS: bool>(
         let Group { view, windows, spans, count, ends, .. } = *group;
         let x = swept.x[0].as_ptr().add(group.first);
         let mut found = 0;
-        let mut fours = 0;
+        let mut teams = 0;
         let mut eights = 0;
         let mut a = 0;
         while a < count {
-            let mut many = FOUR.min(count - a);
+            let mut many = MANY.min(count - a);
             let together = ends.together >> (a / I::F32::LANES) & 1 == 1;
             if !together {
                 // Vectors have spans of one or of the other kind.
@@ -72,13 +75,13 @@ pub unsafe fn cut<I: Isa, T: Scalar, const GHOSTS: bool>(
                 }
             }
             // The last again in the place of those that are not there.
-            let these = [a, a + 1.min(many - 1), a + 2.min(many - 1), a + many - 1];
+            let these: [usize; MANY] = std::array::from_fn(|k| a + k.min(many - 1));
             let begin = found;
             let look = Look {
                 these,
                 together,
                 slots: (EIGHT * eights).wrapping_sub(found),
-                who: u64::MAX >> (64 - 16 * many),
+                who: first_of_team(many),
             };
             let mut w = 0;
             while w < 5 {
@@ -87,7 +90,7 @@ pub unsafe fn cut<I: Isa, T: Scalar, const GHOSTS: bool>(
                 let own = (group.first + a + 1) as u32;
                 let from = if w == 0 { own } else { *row.add(lowest(&spans.low, w, &look)) };
                 let to = *row.add(highest(&spans.end, w, &look));
-                found = add::<T, GHOSTS>(swept, group, block, found, [from, to], w + 5, &look);
+                found = add::<T, GHOSTS, MANY>(swept, group, block, found, [from, to], w + 5, &look);
                 w += 1;
             }
             // Rows that go on in the period before, and in the next.
@@ -97,7 +100,7 @@ pub unsafe fn cut<I: Isa, T: Scalar, const GHOSTS: bool>(
                 while w < 5 {
                     let row = *windows.row.get_unchecked(w);
                     let range = [*row.add(lowest(&spans.before, w, &look)), *row.add(view.bins as usize)];
-                    found = add::<T, GHOSTS>(swept, group, block, found, range, w, &look);
+                    found = add::<T, GHOSTS, MANY>(swept, group, block, found, range, w, &look);
                     w += 1;
                 }
             }
@@ -106,59 +109,62 @@ pub unsafe fn cut<I: Isa, T: Scalar, const GHOSTS: bool>(
                 while w < 5 {
                     let row = *windows.row.get_unchecked(w);
                     let range = [*row, *row.add(highest(&spans.after, w, &look))];
-                    found = add::<T, GHOSTS>(swept, group, block, found, range, w + 10, &look);
+                    found = add::<T, GHOSTS, MANY>(swept, group, block, found, range, w + 10, &look);
                     w += 1;
                 }
             }
             // There is one at least.
             let next = eights + (found - begin).div_ceil(EIGHT);
-            *block.fours.get_unchecked_mut(fours) =
-                Four { first: a as u8, many: many as u8, eights: [eights as u32, next as u32] };
+            *block.teams.get_unchecked_mut(teams) =
+                Team { first: a as u8, many: many as u8, eights: [eights as u32, next as u32] };
             eights = next;
-            fours += 1;
+            teams += 1;
             a += many;
         }
-        block.four_count = fours;
+        block.team_count = teams;
         block.chunk_count = found;
     }
 }
 
 #[inline(always)]
-unsafe fn lowest(bins: &Bins, w: usize, look: &Look) -> usize {
+unsafe fn lowest<const MANY: usize>(bins: &Bins, w: usize, look: &Look<MANY>) -> usize {
     // SAFETY: of a group.
-    unsafe {
-        let at = |k: usize| *bins.get_unchecked(w).get_unchecked(k);
-        let [a, b, c, d] = look.these;
-        if look.together {
-            return at(a) as usize;
-        }
-        at(a).min(at(b)).min(at(c).min(at(d))) as usize
+    let at = |k: usize| unsafe { *bins.get_unchecked(w).get_unchecked(k) };
+    let first = at(look.these[0]);
+    if look.together {
+        return first as usize;
     }
+    look.these.iter().fold(first, |low, k| low.min(at(*k))) as usize
 }
 
 #[inline(always)]
-unsafe fn highest(bins: &Bins, w: usize, look: &Look) -> usize {
+unsafe fn highest<const MANY: usize>(bins: &Bins, w: usize, look: &Look<MANY>) -> usize {
     // SAFETY: of a group.
-    unsafe {
-        let at = |k: usize| *bins.get_unchecked(w).get_unchecked(k);
-        let [a, b, c, d] = look.these;
-        if look.together {
-            return at(a) as usize;
-        }
-        at(a).max(at(b)).max(at(c).max(at(d))) as usize
+    let at = |k: usize| unsafe { *bins.get_unchecked(w).get_unchecked(k) };
+    let first = at(look.these[0]);
+    if look.together {
+        return first as usize;
     }
+    look.these.iter().fold(first, |high, k| high.max(at(*k))) as usize
 }
 
 /// Who looks.
-struct Look {
+struct Look<const MANY: usize> {
     /// In the group; the last more than once if they are fewer.
-    these: [usize; FOUR],
-    /// Whether their spans are those of all four.
+    these: [usize; MANY],
+    /// Whether their spans are those of all.
     together: bool,
     /// Added to the number of a chunk this is its slot; it wraps.
     slots: usize,
-    /// Sixteen bits for each that is there.
-    who: u64,
+    /// Sixteen bits for each that is there, four by four.
+    who: [u64; FOURS],
+}
+
+/// Sixteen bits for each of the first of a team.
+#[inline(always)]
+fn first_of_team(many: usize) -> [u64; FOURS] {
+    let bits = u128::MAX >> (128 - 16 * many);
+    [bits as u64, (bits >> 64) as u64]
 }
 
 /// The bits of the first of thirty-two particles, for each of four that look: those of the first chunk, and of the
@@ -171,8 +177,8 @@ const ONE_SLOT: u32 = 1 << 8;
 /// Sixteen bits for each of four.
 const EACH: u64 = 0x0001_0001_0001_0001;
 
-/// In the chunk that begins behind the first of the four: those behind each of them.
-const BEHIND: u64 = 0xfff8_fffc_fffe_ffff;
+/// In the chunk that begins behind the first of the team: those behind each of them.
+const BEHIND: [u64; FOURS] = [0xfff8_fffc_fffe_ffff, 0xff80_ffc0_ffe0_fff0];
 
 const fn first_bits() -> [[u64; 2]; 33] {
     let mut table = [[0; 2]; 33];
@@ -188,25 +194,28 @@ const fn first_bits() -> [[u64; 2]; 33] {
 /// Appends the chunks of the particles `from..to`, at least one for a look without a shift at the own row;
 /// returns how many there are then.
 #[inline(always)]
-unsafe fn add<T: Scalar, const GHOSTS: bool>(
+unsafe fn add<T: Scalar, const GHOSTS: bool, const MANY: usize>(
     swept: &Swept<T, impl Record>,
     group: &Group,
     block: &mut Block<T>,
     found: usize,
     [mut from, mut to]: [u32; 2],
     shift: usize,
-    look: &Look,
+    look: &Look<MANY>,
 ) -> usize {
     // SAFETY: chunks have room for two more; more make room.
     unsafe {
         let own = shift == 5;
-        let mut owned = [u64::MAX; 2];
+        let mut owned = [[u64::MAX; FOURS]; 2];
         let mut ghosts = None;
         if GHOSTS {
             // Two ghosts are no concern of this rank.
-            let ghost = look.these.map(|k| *swept.ghost.get_unchecked(group.first + k));
+            let mut ghost = [false; FOURS * FOUR];
+            for (ghost, k) in ghost.iter_mut().zip(look.these) {
+                *ghost = *swept.ghost.get_unchecked(group.first + k);
+            }
             ghosts = Some(ghost);
-            if ghost.iter().all(|ghost| *ghost) {
+            if ghost[..MANY].iter().all(|ghost| *ghost) {
                 let [first, last] = *group.windows.owned.get_unchecked(shift % 5);
                 if !own {
                     from = from.max(first);
@@ -219,25 +228,33 @@ unsafe fn add<T: Scalar, const GHOSTS: bool>(
         }
         let length = to.saturating_sub(from) as usize;
         let note = (look.slots.wrapping_add(found) << 8 | shift) as u32;
-        let who = if own { look.who & BEHIND } else { look.who };
+        let who = if own { both(look.who, BEHIND) } else { look.who };
         if length > 32 {
             return add_many(swept, block, found, from, to, who, look.who, note, ghosts);
         }
         // Both are written, and counted as needed: there is no branch to foresee.
-        let bits = FIRST_BITS.get_unchecked(length);
+        let bits = FIRST_BITS.get_unchecked(length).map(|bits| [bits; FOURS]);
+        let [first, next] = [both(bits[0], both(who, owned[0])), both(bits[1], both(look.who, owned[1]))];
         let out = block.chunks.as_mut_ptr().add(found);
-        *out = Chunk { allowed: bits[0] & who & owned[0], from, note };
-        *out.add(1) =
-            Chunk { allowed: bits[1] & look.who & owned[1], from: from + 16, note: note + ONE_SLOT };
+        *out = Chunk { allowed: first[0], from, note };
+        *out.add(1) = Chunk { allowed: next[0], from: from + 16, note: note + ONE_SLOT };
+        if MANY > FOUR {
+            block.allowed.as_mut_ptr().add(found).cast::<[u64; 2]>().write_unaligned([first[1], next[1]]);
+        }
         found + (own || length > 0) as usize + (length > 16) as usize
     }
 }
 
-/// Which of sixteen particles concern this rank, of which `owned` are no ghosts, for four that look.
 #[inline(always)]
-fn concerned(ghost: [bool; FOUR], owned: u32) -> u64 {
-    let [a, b, c, d] = ghost.map(|ghost| if ghost { owned as u64 } else { 0xffff });
-    a | b << 16 | c << 32 | d << 48
+fn both(a: [u64; FOURS], b: [u64; FOURS]) -> [u64; FOURS] {
+    std::array::from_fn(|f| a[f] & b[f])
+}
+
+/// Which of sixteen particles concern this rank, of which `owned` are no ghosts, for a team.
+#[inline(always)]
+fn concerned(ghost: [bool; FOURS * FOUR], owned: u32) -> [u64; FOURS] {
+    let bits = |k: usize| if ghost[k] { owned as u64 } else { 0xffff };
+    [0, FOUR].map(|k| bits(k) | bits(k + 1) << 16 | bits(k + 2) << 32 | bits(k + 3) << 48)
 }
 
 /// More chunks than two; `first` look at the first of them, `who` at the others.
@@ -250,20 +267,21 @@ fn add_many<T: Scalar>(
     mut found: usize,
     from: u32,
     to: u32,
-    first: u64,
-    who: u64,
+    first: [u64; FOURS],
+    who: [u64; FOURS],
     mut note: u32,
-    ghosts: Option<[bool; FOUR]>,
+    ghosts: Option<[bool; FOURS * FOUR]>,
 ) -> usize {
     block.reserve_chunks(found + (to - from).div_ceil(16) as usize);
     for begin in (from..to).step_by(16) {
-        let mut allowed = FIRST_BITS[(to - begin).min(16) as usize][0];
-        allowed &= if begin == from { first } else { who };
+        let bits = [FIRST_BITS[(to - begin).min(16) as usize][0]; FOURS];
+        let mut allowed = both(bits, if begin == from { first } else { who });
         if let Some(ghosts) = ghosts {
             // SAFETY: of a chunk.
-            allowed &= concerned(ghosts, unsafe { swept.owned_bits(begin as usize) });
+            allowed = both(allowed, concerned(ghosts, unsafe { swept.owned_bits(begin as usize) }));
         }
-        block.chunks[found] = Chunk { allowed, from: begin, note };
+        block.chunks[found] = Chunk { allowed: allowed[0], from: begin, note };
+        block.allowed[found] = allowed[1];
         note += ONE_SLOT;
         found += 1;
     }

@@ -19,10 +19,17 @@ pub struct Grid {
     pub reach: f64,
     /// Half the width, in fractions of the box, of the window of a row.
     pub window: f64,
+    /// How many particles of a row look together, and how many bins they are apart at most.
+    pub team: usize,
+    pub joined: f64,
 }
 
 /// Bins per cut-off.
 const FINENESS: f64 = 4.0;
+
+/// In rows with fewer particles per cut-off eight look together, else four: windows of eight still are about sixteen
+/// particles long then.
+const SPARSE: f64 = 4.5;
 
 impl Grid {
     /// The grid for `count` particles; `None` where the box is too narrow along a period for particles
@@ -51,7 +58,12 @@ impl Grid {
             if rows * layers * bins <= most.max(64.0 * FINENESS) {
                 let (bins, rows, layers) = (bins as usize, rows as usize, layers as usize);
                 let window = reach / frame.height(0);
-                return Some(Grid { bins, rows, layers, row_axis, layer_axis, reach, window });
+                let per_row = count as f64 / (rows * layers) as f64;
+                let (team, joined) = match per_row * cutoff < SPARSE * frame.height(0) {
+                    true => (8, 4.0 * FINENESS),
+                    false => (4, FINENESS),
+                };
+                return Some(Grid { bins, rows, layers, row_axis, layer_axis, reach, window, team, joined });
             }
             width *= 1.5;
         }

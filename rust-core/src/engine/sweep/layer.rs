@@ -4,7 +4,7 @@
 //! of the next layer to accumulators that only this layer writes. Sums therefore do not depend on
 //! which thread does which layer, nor when.
 
-use super::arithmetic::Arithmetic;
+use super::arithmetic::{Arithmetic, Record};
 use super::block::{Block, GROUP};
 use super::chunks::{Group, cut};
 use super::evaluate::{Kit, evaluate};
@@ -14,7 +14,7 @@ use super::look::look;
 use super::many_body::NearPairs;
 use super::quantum::Quantum;
 use super::scatter::{scatter, scatter_weights};
-use super::simd::{Isa, Reals};
+use super::simd::{Isa, Reals, Scalar};
 use super::terms::Terms;
 use super::windows::{Spans, View, Windows};
 use crate::engine::noise::PairNoise;
@@ -134,17 +134,11 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TA
             }
             while first < end {
                 let count = GROUP.min(end - first);
-                let ends = view.spans::<I>(swept, row, [first, count], &windows.there, &mut spans);
-                let group = Group { view: &view, windows: &windows, spans: &spans, ends, first, count };
-                if ghosts {
-                    cut::<I, A::Scalar, true>(swept, &group, block);
+                let group = [first, count];
+                if grid.team == 8 {
+                    find::<I, A::Scalar, 8>(swept, &view, &windows, &mut spans, row, group, block);
                 } else {
-                    cut::<I, A::Scalar, false>(swept, &group, block);
-                }
-                if windows.crosses || ends.before | ends.after != 0 {
-                    look::<I, A::Scalar, true>(swept, &group, block);
-                } else {
-                    look::<I, A::Scalar, false>(swept, &group, block);
+                    find::<I, A::Scalar, 4>(swept, &view, &windows, &mut spans, row, group, block);
                 }
                 let mut slot = 0;
                 while slot < count {
@@ -157,6 +151,34 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TA
             row += 1;
         }
         tally
+    }
+}
+
+/// Finds the pairs of a group: `count` particles of a row from `first` on.
+#[inline(always)]
+unsafe fn find<I: Isa, T: Scalar, const MANY: usize>(
+    swept: &Swept<T, impl Record>,
+    view: &View,
+    windows: &Windows,
+    spans: &mut Spans,
+    row: usize,
+    [first, count]: [usize; 2],
+    block: &mut Block<T>,
+) {
+    // SAFETY: the contract of `simd`.
+    unsafe {
+        let ends = view.spans::<I, MANY>(swept, row, [first, count], &windows.there, spans);
+        let group = Group { view, windows, spans, ends, first, count };
+        if swept.ghost.is_empty() {
+            cut::<I, T, false, MANY>(swept, &group, block);
+        } else {
+            cut::<I, T, true, MANY>(swept, &group, block);
+        }
+        if windows.crosses || ends.before | ends.after != 0 {
+            look::<I, T, true, MANY>(swept, &group, block);
+        } else {
+            look::<I, T, false, MANY>(swept, &group, block);
+        }
     }
 }
 

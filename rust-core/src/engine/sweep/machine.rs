@@ -138,7 +138,7 @@ impl<P: Compiled> Machine<P> {
             passes: P::passes(instructions, count > 1),
             terms,
             frame,
-            grid: Grid { bins: 1, rows: 1, layers: 1, row_axis: 1, layer_axis: 2, reach: 1.0, window: 1.0 },
+            grid: Grid { bins: 1, rows: 1, layers: 1, row_axis: 1, layer_axis: 2, reach: 1.0, window: 1.0, team: 4, joined: 1.0 },
             cell: Vec::new(),
             unit: Vec::new(),
             counts: Vec::new(),

@@ -12,9 +12,6 @@ pub struct Quantum {
     pub limit: i16,
 }
 
-/// Particles look together if they are no more bins apart.
-pub const JOINED: f64 = 4.0;
-
 impl Quantum {
     pub fn new(frame: &Frame, grid: &Grid) -> Quantum {
         let bin = frame.length[0] / grid.bins as f64;
@@ -23,7 +20,7 @@ impl Quantum {
         let [xy, xz, yz] = frame.tilt.map(f64::abs);
         let (y, z) = (two(1), two(2));
         let furthest = [
-            grid.window * frame.length[0] + (2.0 + JOINED) * bin + y * xy + z * xz,
+            grid.window * frame.length[0] + (2.0 + grid.joined) * bin + y * xy + z * xz,
             y * frame.length[1] + z * yz,
             z * frame.length[2],
         ];

@@ -4,7 +4,6 @@ use super::arithmetic::Record;
 use super::block::GROUP;
 use super::frame::Frame;
 use super::layer::Swept;
-use super::quantum::JOINED;
 use super::simd::{Isa, Reals, Scalar};
 use crate::model::kernel::Real;
 
@@ -113,7 +112,7 @@ impl View {
             periodic: frame.periodic[0],
             tilted: frame.is_tilted(),
             bins: grid.bins as i32,
-            joined: (JOINED * frame.length[0] / grid.bins as f64) as f32,
+            joined: (grid.joined * frame.length[0] / grid.bins as f64) as f32,
             shift: [-1.0, 0.0, 1.0].map(|wrap| {
                 [-frame.length[0], 0.0, frame.length[0]].map(|along| {
                     let [x, y, z] = frame.edge(grid.row_axis).map(|e| wrap * e);
@@ -123,9 +122,9 @@ impl View {
         }
     }
 
-    /// The spans of a group: `count` particles from `first` on.
+    /// The spans of a group: `count` particles from `first` on, of which each `MANY` may look together.
     #[inline(always)]
-    pub unsafe fn spans<I: Isa>(
+    pub unsafe fn spans<I: Isa, const MANY: usize>(
         &self,
         swept: &Swept<impl Scalar, impl Record>,
         row: usize,
@@ -151,7 +150,7 @@ impl View {
                     }
                 }
                 let x = [I::F32::load(x[0]), I::F32::load(x[1]), I::F32::load(x[2])];
-                self.spans_of_vector::<I>(swept, row, x, at, there, out, &mut ends);
+                self.spans_of_vector::<I, MANY>(swept, row, x, at, there, out, &mut ends);
                 at += I::F32::LANES;
             }
             ends
@@ -161,7 +160,7 @@ impl View {
     /// The spans of particles at `x`, `y`, `z`, those of a group from `at` on.
     #[inline(always)]
     #[allow(clippy::too_many_arguments)]
-    unsafe fn spans_of_vector<I: Isa>(
+    unsafe fn spans_of_vector<I: Isa, const MANY: usize>(
         &self,
         swept: &Swept<impl Scalar, impl Record>,
         row: usize,
@@ -204,8 +203,8 @@ impl View {
                 before = (bin - half[0]).mask_below(zero);
                 after = (most - one).mask_below(bin + half[0]);
             }
-            // Four by four, if no four are too far apart.
-            let first = I::first_of_four(x);
+            // Team by team, if no team is too far apart.
+            let first = I::first_of::<MANY>(x);
             let far = I::F32::splat(self.joined);
             let close = (x - first).mask_below(far) & (first - x).mask_below(far);
             let together = close.trailing_ones() as usize >= I::F32::LANES;
@@ -216,7 +215,7 @@ impl View {
                 let (mut low, mut end) = (bin - h, bin + h + one);
                 end = end.where_below(zero, h);
                 if together {
-                    (low, end) = (I::least_of_four(low), I::greatest_of_four(end));
+                    (low, end) = (I::least_of::<MANY>(low), I::greatest_of::<MANY>(end));
                 }
                 if before != 0 {
                     let low = (low + most).smaller(most);
@@ -244,7 +243,7 @@ pub struct Ends {
     /// Particles whose spans go on in the period before, and in the next: a bit for each.
     pub before: u32,
     pub after: u32,
-    /// Vectors in which spans are those of each four particles together: a bit for each.
+    /// Vectors in which spans are those of each team together: a bit for each.
     pub together: u32,
 }
 

@@ -161,6 +161,12 @@ impl Reals for F32x8 {
     }
 }
 
+/// The first four lanes in the place of the others.
+#[inline(always)]
+unsafe fn other_four(x: __m256) -> __m256 {
+    unsafe { _mm256_permute2f128_ps::<0x01>(x, x) }
+}
+
 /// Four columns of eight rows of four words.
 #[inline(always)]
 unsafe fn columns_of_words(low: [__m128i; 4], high: [__m128i; 4]) -> [U32x8; 4] {
@@ -493,21 +499,26 @@ impl Isa for Avx2 {
         }
     }
     #[inline(always)]
-    unsafe fn first_of_four(x: F32x8) -> F32x8 {
-        unsafe { F32x8(_mm256_permute_ps::<0x00>(x.0)) }
-    }
-    #[inline(always)]
-    unsafe fn least_of_four(x: F32x8) -> F32x8 {
+    unsafe fn first_of<const MANY: usize>(x: F32x8) -> F32x8 {
         unsafe {
-            let two = _mm256_min_ps(x.0, _mm256_permute_ps::<0b10_11_00_01>(x.0));
-            F32x8(_mm256_min_ps(two, _mm256_permute_ps::<0b01_00_11_10>(two)))
+            let first = _mm256_permute_ps::<0x00>(x.0);
+            F32x8(if MANY == 8 { _mm256_permute2f128_ps::<0x00>(first, first) } else { first })
         }
     }
     #[inline(always)]
-    unsafe fn greatest_of_four(x: F32x8) -> F32x8 {
+    unsafe fn least_of<const MANY: usize>(x: F32x8) -> F32x8 {
+        unsafe {
+            let two = _mm256_min_ps(x.0, _mm256_permute_ps::<0b10_11_00_01>(x.0));
+            let four = _mm256_min_ps(two, _mm256_permute_ps::<0b01_00_11_10>(two));
+            F32x8(if MANY == 8 { _mm256_min_ps(four, other_four(four)) } else { four })
+        }
+    }
+    #[inline(always)]
+    unsafe fn greatest_of<const MANY: usize>(x: F32x8) -> F32x8 {
         unsafe {
             let two = _mm256_max_ps(x.0, _mm256_permute_ps::<0b10_11_00_01>(x.0));
-            F32x8(_mm256_max_ps(two, _mm256_permute_ps::<0b01_00_11_10>(two)))
+            let four = _mm256_max_ps(two, _mm256_permute_ps::<0b01_00_11_10>(two));
+            F32x8(if MANY == 8 { _mm256_max_ps(four, other_four(four)) } else { four })
         }
     }
     #[inline(always)]

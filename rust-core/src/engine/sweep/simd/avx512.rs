@@ -452,6 +452,12 @@ const fn bit_places() -> [u8; 64] {
     places
 }
 
+/// The first four lanes in the place of the second, and so on.
+#[inline(always)]
+unsafe fn other_fours(x: __m512) -> __m512 {
+    unsafe { _mm512_shuffle_f32x4::<0b10_11_00_01>(x, x) }
+}
+
 /// Writes the places of sixteen bits.
 #[inline(always)]
 unsafe fn places(bases: __m512, bits: __m128i, p: *mut u32) {
@@ -532,21 +538,26 @@ impl Isa for Avx512 {
         }
     }
     #[inline(always)]
-    unsafe fn first_of_four(x: F32x16) -> F32x16 {
-        unsafe { F32x16(_mm512_permute_ps::<0x00>(x.0)) }
-    }
-    #[inline(always)]
-    unsafe fn least_of_four(x: F32x16) -> F32x16 {
+    unsafe fn first_of<const MANY: usize>(x: F32x16) -> F32x16 {
         unsafe {
-            let two = _mm512_min_ps(x.0, _mm512_permute_ps::<0b10_11_00_01>(x.0));
-            F32x16(_mm512_min_ps(two, _mm512_permute_ps::<0b01_00_11_10>(two)))
+            let first = _mm512_permute_ps::<0x00>(x.0);
+            F32x16(if MANY == 8 { _mm512_shuffle_f32x4::<0b10_10_00_00>(first, first) } else { first })
         }
     }
     #[inline(always)]
-    unsafe fn greatest_of_four(x: F32x16) -> F32x16 {
+    unsafe fn least_of<const MANY: usize>(x: F32x16) -> F32x16 {
+        unsafe {
+            let two = _mm512_min_ps(x.0, _mm512_permute_ps::<0b10_11_00_01>(x.0));
+            let four = _mm512_min_ps(two, _mm512_permute_ps::<0b01_00_11_10>(two));
+            F32x16(if MANY == 8 { _mm512_min_ps(four, other_fours(four)) } else { four })
+        }
+    }
+    #[inline(always)]
+    unsafe fn greatest_of<const MANY: usize>(x: F32x16) -> F32x16 {
         unsafe {
             let two = _mm512_max_ps(x.0, _mm512_permute_ps::<0b10_11_00_01>(x.0));
-            F32x16(_mm512_max_ps(two, _mm512_permute_ps::<0b01_00_11_10>(two)))
+            let four = _mm512_max_ps(two, _mm512_permute_ps::<0b01_00_11_10>(two));
+            F32x16(if MANY == 8 { _mm512_max_ps(four, other_fours(four)) } else { four })
         }
     }
     #[inline(always)]

@@ -181,10 +181,10 @@ pub trait Isa: Copy + Send + Sync + 'static {
     /// Writes `bases[k / 16] + 32 (k % 16)` for each bit `k`, one after the other, and how many; may write sixteen
     /// more.
     unsafe fn collect(bases: *const u32, mask: u64, p: *mut u32) -> usize;
-    /// The first, the least, and the greatest of each four lanes, in all of them.
-    unsafe fn first_of_four(x: Self::F32) -> Self::F32;
-    unsafe fn least_of_four(x: Self::F32) -> Self::F32;
-    unsafe fn greatest_of_four(x: Self::F32) -> Self::F32;
+    /// The first, the least, and the greatest of each `MANY` lanes, four or eight, in all of them.
+    unsafe fn first_of<const MANY: usize>(x: Self::F32) -> Self::F32;
+    unsafe fn least_of<const MANY: usize>(x: Self::F32) -> Self::F32;
+    unsafe fn greatest_of<const MANY: usize>(x: Self::F32) -> Self::F32;
     /// The columns of rows of eight words, `offsets` bytes behind `base`; with `ALL`, else only the first four.
     unsafe fn columns<const ALL: bool>(
         base: *const u8,

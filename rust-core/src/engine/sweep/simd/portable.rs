@@ -372,31 +372,16 @@ impl Isa for Portable {
         count
     }
     #[inline(always)]
-    unsafe fn first_of_four(mut x: Lanes<f32>) -> Lanes<f32> {
-        for k in 0..LANES {
-            x.0[k] = x.0[k / 4 * 4];
-        }
-        x
+    unsafe fn first_of<const MANY: usize>(x: Lanes<f32>) -> Lanes<f32> {
+        of_each::<MANY>(x, |first, _| first)
     }
     #[inline(always)]
-    unsafe fn least_of_four(x: Lanes<f32>) -> Lanes<f32> {
-        let mut out = x.0;
-        for k in 0..LANES {
-            for other in k / 4 * 4..k / 4 * 4 + 4 {
-                out[k] = out[k].min(x.0[other]);
-            }
-        }
-        Lanes(out)
+    unsafe fn least_of<const MANY: usize>(x: Lanes<f32>) -> Lanes<f32> {
+        of_each::<MANY>(x, f32::min)
     }
     #[inline(always)]
-    unsafe fn greatest_of_four(x: Lanes<f32>) -> Lanes<f32> {
-        let mut out = x.0;
-        for k in 0..LANES {
-            for other in k / 4 * 4..k / 4 * 4 + 4 {
-                out[k] = out[k].max(x.0[other]);
-            }
-        }
-        Lanes(out)
+    unsafe fn greatest_of<const MANY: usize>(x: Lanes<f32>) -> Lanes<f32> {
+        of_each::<MANY>(x, f32::max)
     }
     #[inline(always)]
     unsafe fn columns<const ALL: bool>(base: *const u8, offsets: *const u32) -> [Lanes<u32>; 8] {
@@ -429,4 +414,14 @@ impl Isa for Portable {
         let bits = x.0.map(f64::to_bits);
         [Lanes(bits.map(|b| b as u32)), Lanes(bits.map(|b| (b >> 32) as u32))]
     }
+}
+
+/// Each `MANY` lanes folded, in all of them.
+#[inline(always)]
+fn of_each<const MANY: usize>(x: Lanes<f32>, fold: impl Fn(f32, f32) -> f32 + Copy) -> Lanes<f32> {
+    let mut out = x.0;
+    for (lanes, out) in x.0.chunks_exact(MANY).zip(out.chunks_exact_mut(MANY)) {
+        out.fill(lanes.iter().copied().reduce(fold).unwrap_or_default());
+    }
+    Lanes(out)
 }
