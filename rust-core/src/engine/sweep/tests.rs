@@ -353,6 +353,35 @@ fn the_order_of_particles_matters_to_rounding_alone() {
     }
 }
 
+/// Teams of eight particles in sparse rows, of four in others; few enough in some that a team is not full, or too far
+/// apart to look together.
+#[test]
+fn rows_with_few_particles_and_with_many() {
+    let fluids = [shipped("warren2003-set6.toml"), many(), shipped("van-der-waals-2d.toml")];
+    let mut teams = vec![];
+    for fluid in &fluids {
+        for density in [0.4, 1.5, 4.0, 5.0, 11.0] {
+            for (b, domain) in boxes(fluid.dimensions, 4.3 * fluid.cutoff()).into_iter().enumerate() {
+                let volume = domain.volume(fluid.dimensions) / fluid.cutoff().powi(fluid.dimensions as i32);
+                let count = (density * volume) as usize;
+                let frame = Frame::of_box(&domain, fluid.dimensions).unwrap();
+                teams.push(Grid::new(&frame, fluid.cutoff(), count).unwrap().team);
+                let cloud = Cloud::new(domain, fluid.dimensions, fluid.species.len(), count, 21 + b as u64);
+                let (force, tally) = plain(fluid, &cloud);
+                for (precision, instructions) in every() {
+                    let mut sweep = Sweep::new(fluid, settings(precision, instructions, 2)).unwrap();
+                    let here = swept(&mut sweep, &cloud, Want::TOTALS);
+                    for (forces, totals) in [here, with_ghosts(&mut sweep, &cloud)] {
+                        let off = difference(&force, &forces).max(tally_difference(&tally, &totals));
+                        assert!(off < tolerance(precision), "{density}, {precision}, {instructions}: {off:.1e}");
+                    }
+                }
+            }
+        }
+    }
+    assert!(teams.contains(&4) && teams.contains(&8));
+}
+
 /// Crowds of which one particle has more neighbours than a block has room for, walls without periods, and
 /// particles far from all others.
 #[test]
