@@ -190,10 +190,10 @@ impl View {
                 let all = I::F32::splat(self.reach_squared);
                 let left = all - over * over;
                 let per_bin = I::F32::splat(self.per_bin);
-                half[1] = (all - above).larger(zero).root() * per_bin;
-                half[2] = (left - below).larger(zero).root() * per_bin;
-                half[3] = left.larger(zero).root() * per_bin;
-                half[4] = (left - above).larger(zero).root() * per_bin;
+                half[1] = I::root_or_more(all - above) * per_bin;
+                half[2] = I::root_or_more(left - below) * per_bin;
+                half[3] = I::root_or_more(left) * per_bin;
+                half[4] = I::root_or_more(left - above) * per_bin;
             }
             let most = I::F32::constant(self.bins as f64);
             let one = I::F32::constant(1.0);

@@ -104,10 +104,6 @@ impl Reals for F32x8 {
         }
     }
     #[inline(always)]
-    unsafe fn root(self) -> Self {
-        unsafe { F32x8(_mm256_sqrt_ps(self.0)) }
-    }
-    #[inline(always)]
     unsafe fn smaller(self, other: Self) -> Self {
         unsafe { F32x8(_mm256_min_ps(self.0, other.0)) }
     }
@@ -240,10 +236,6 @@ impl Reals for F64x4 {
     #[inline(always)]
     unsafe fn inverse_root(self) -> Self {
         unsafe { F64x4(_mm256_div_pd(_mm256_set1_pd(1.0), _mm256_sqrt_pd(self.0))) }
-    }
-    #[inline(always)]
-    unsafe fn root(self) -> Self {
-        unsafe { F64x4(_mm256_sqrt_pd(self.0)) }
     }
     #[inline(always)]
     unsafe fn smaller(self, other: Self) -> Self {
@@ -496,6 +488,15 @@ impl Isa for Avx2 {
                 k += 1;
             }
             found
+        }
+    }
+    #[inline(always)]
+    unsafe fn root_or_more(x: F32x8) -> F32x8 {
+        unsafe {
+            // Better than one part in 2700.
+            let inverse = _mm256_rsqrt_ps(_mm256_max_ps(x.0, _mm256_set1_ps(f32::MIN_POSITIVE)));
+            let x = _mm256_max_ps(x.0, _mm256_setzero_ps());
+            F32x8(_mm256_mul_ps(x, _mm256_mul_ps(inverse, _mm256_set1_ps(1.000_5))))
         }
     }
     #[inline(always)]

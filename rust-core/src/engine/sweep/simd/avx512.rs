@@ -110,10 +110,6 @@ impl Reals for F32x16 {
         }
     }
     #[inline(always)]
-    unsafe fn root(self) -> Self {
-        unsafe { F32x16(_mm512_sqrt_ps(self.0)) }
-    }
-    #[inline(always)]
     unsafe fn smaller(self, other: Self) -> Self {
         unsafe { F32x16(_mm512_min_ps(self.0, other.0)) }
     }
@@ -242,10 +238,6 @@ impl Reals for F64x8 {
             }
             F64x8(y)
         }
-    }
-    #[inline(always)]
-    unsafe fn root(self) -> Self {
-        unsafe { F64x8(_mm512_sqrt_pd(self.0)) }
     }
     #[inline(always)]
     unsafe fn smaller(self, other: Self) -> Self {
@@ -535,6 +527,15 @@ impl Isa for Avx512 {
                 }
             }
             count
+        }
+    }
+    #[inline(always)]
+    unsafe fn root_or_more(x: F32x16) -> F32x16 {
+        unsafe {
+            // 14 bits.
+            let inverse = _mm512_rsqrt14_ps(_mm512_max_ps(x.0, _mm512_set1_ps(f32::MIN_POSITIVE)));
+            let x = _mm512_max_ps(x.0, _mm512_setzero_ps());
+            F32x16(_mm512_mul_ps(x, _mm512_mul_ps(inverse, _mm512_set1_ps(1.000_1))))
         }
     }
     #[inline(always)]

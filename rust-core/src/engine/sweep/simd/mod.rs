@@ -85,7 +85,6 @@ pub trait Reals: Real {
     unsafe fn mul_add(self, a: Self, b: Self) -> Self;
     /// `1/√self`, to the precision of the type, for positive numbers.
     unsafe fn inverse_root(self) -> Self;
-    unsafe fn root(self) -> Self;
     /// The smaller of two.
     unsafe fn smaller(self, other: Self) -> Self;
     /// Writes whole numbers, rounded towards zero.
@@ -181,6 +180,8 @@ pub trait Isa: Copy + Send + Sync + 'static {
     /// Writes `bases[k / 16] + 32 (k % 16)` for each bit `k`, one after the other, and how many; may write sixteen
     /// more.
     unsafe fn collect(bases: *const u32, mask: u64, p: *mut u32) -> usize;
+    /// √x or up to one part in 1000 more, zero for numbers below.
+    unsafe fn root_or_more(x: Self::F32) -> Self::F32;
     /// The first, the least, and the greatest of each `MANY` lanes, four or eight, in all of them.
     unsafe fn first_of<const MANY: usize>(x: Self::F32) -> Self::F32;
     unsafe fn least_of<const MANY: usize>(x: Self::F32) -> Self::F32;

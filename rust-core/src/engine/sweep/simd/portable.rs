@@ -102,13 +102,6 @@ macro_rules! lanes {
                 self
             }
             #[inline(always)]
-            unsafe fn root(mut self) -> Self {
-                for k in 0..LANES {
-                    self.0[k] = self.0[k].sqrt();
-                }
-                self
-            }
-            #[inline(always)]
             unsafe fn smaller(mut self, other: Self) -> Self {
                 for k in 0..LANES {
                     self.0[k] = if self.0[k] < other.0[k] { self.0[k] } else { other.0[k] };
@@ -370,6 +363,10 @@ impl Isa for Portable {
             mask &= mask - 1;
         }
         count
+    }
+    #[inline(always)]
+    unsafe fn root_or_more(x: Lanes<f32>) -> Lanes<f32> {
+        Lanes(x.0.map(|x| x.max(0.0).sqrt()))
     }
     #[inline(always)]
     unsafe fn first_of<const MANY: usize>(x: Lanes<f32>) -> Lanes<f32> {
