@@ -47,6 +47,8 @@ pub struct Simulation {
     bounds: Bounds,
     /// `None` if particles stay in the order that they were given in.
     reordering: Option<Reordering>,
+    /// The step that is not at its end: Δt, and how it is made.
+    owed: Option<(f64, Integrator)>,
     frozen_tags: Tags,
     /// By particle; empty if none is frozen.
     frozen: Vec<bool>,
@@ -100,6 +102,7 @@ impl Simulation {
             before: Before::default(),
             bounds: Bounds::of(&domain, fluid.dimensions),
             reordering: None,
+            owed: None,
             frozen_tags: Tags::none(),
             frozen: Vec::new(),
             mobile: owned,
@@ -239,6 +242,7 @@ impl Simulation {
         self.force.extend_from_slice(forces);
         self.number = number;
         self.earlier_out_of_bounds = out_of_bounds;
+        self.owed = None;
         self.find_frozen();
     }
 
@@ -248,6 +252,7 @@ impl Simulation {
     /// # Errors
     /// As [`Simulation::step`].
     pub fn prepare(&mut self, dt: f64, want: Want) -> Result<(), RunError> {
+        self.end_step()?;
         let step = Step { seed: self.seed, number: self.number, dt };
         self.compute(want, self.thermostat.then_some(step))?;
         self.add_external_forces();
@@ -298,20 +303,63 @@ impl Simulation {
     /// A position, velocity or force that is not finite, ψ singular, or a particle that moved further
     /// than across the box.
     pub fn step(&mut self, dt: f64, integrator: Integrator, want: Want) -> Result<(), RunError> {
+        self.begin_step(dt, integrator, want)?;
+        self.end_step()
+    }
+
+    /// Steps of `dt` that nothing is wanted of.
+    ///
+    /// # Errors
+    /// As [`Simulation::step`].
+    pub fn advance(&mut self, steps: u64, dt: f64, integrator: Integrator) -> Result<(), RunError> {
+        for _ in 0..steps {
+            self.begin_step(dt, integrator, Want::FORCES)?;
+        }
+        self.end_step()
+    }
+
+    /// A step but for the change of velocities that may as well be made when the next begins, with the same bits:
+    /// until then, or until [`Simulation::end_step`], velocities are not those at the end of the step.
+    ///
+    /// # Errors
+    /// As [`Simulation::step`].
+    pub(super) fn begin_step(
+        &mut self,
+        dt: f64,
+        integrator: Integrator,
+        want: Want,
+    ) -> Result<(), RunError> {
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(RunError::TimeStep(dt));
         }
+        if self.owed.is_some_and(|owed| owed != (dt, integrator)) {
+            self.end_step()?;
+        }
+        let owed = self.owed.take().is_some();
         self.number += 1;
         let limit = self.longest_move / (dt * dt);
         let faults = self.split(|motion, (domain, bounds), pool| {
-            integrator.before_forces(motion, dt, Surroundings { domain, bounds, limit }, pool)
+            integrator.before_forces(motion, dt, owed, Surroundings { domain, bounds, limit }, pool)
         });
-        self.refuse(faults, Some(dt))?;
+        self.refuse(faults, Some(dt), owed)?;
         let step = Step { seed: self.seed, number: self.number, dt };
         self.compute(want, self.thermostat.then_some(step))?;
         self.add_external_forces();
+        self.owed = Some((dt, integrator));
+        if !integrator.may_owe() || reorder::is_due(self.number) {
+            self.end_step()?;
+        }
+        Ok(())
+    }
+
+    /// Ends the step that [`Simulation::begin_step`] has begun, if it is not at its end.
+    ///
+    /// # Errors
+    /// A velocity that is not finite.
+    pub(super) fn end_step(&mut self) -> Result<(), RunError> {
+        let Some((dt, integrator)) = self.owed.take() else { return Ok(()) };
         let faults = self.split(|motion, _, pool| integrator.after_forces(motion, dt, pool));
-        self.refuse(faults, None)?;
+        self.refuse(faults, None, false)?;
         if reorder::is_due(self.number) {
             self.reorder();
         }
@@ -334,14 +382,15 @@ impl Simulation {
         work(motion, (&self.domain, &self.bounds), self.forces.pool())
     }
 
-    /// Velocities must be finite, and within a step of `dt` lead nowhere beyond the box.
-    fn refuse(&self, faults: Faults, dt: Option<f64>) -> Result<(), RunError> {
+    /// Velocities must be finite, which the step before has left to this one if it is `owed`, and within a step of
+    /// `dt` lead nowhere beyond the box.
+    fn refuse(&self, faults: Faults, dt: Option<f64>, owed: bool) -> Result<(), RunError> {
         let Some(k) = faults.fast.or(faults.escaped) else { return Ok(()) };
         let (step, tag, v) = (self.number, self.tag[k], self.v[k]);
         let speed = v[0].hypot(v[1]).hypot(v[2]);
         match dt {
             Some(dt) if speed.is_finite() => Err(RunError::Runaway { step, tag, distance: speed * dt }),
-            _ => Err(RunError::Velocity { step, tag }),
+            _ => Err(RunError::Velocity { step: step - u64::from(owed), tag }),
         }
     }
 
@@ -430,6 +479,7 @@ impl Simulation {
 
     /// Velocities.
     pub fn velocities(&self) -> &[[f64; 3]] {
+        debug_assert!(self.owed.is_none(), "a step is not at its end");
         &self.v[..self.owned]
     }
 

@@ -136,7 +136,11 @@ impl<'a> Run<'a> {
         if totals {
             want = Want { energy: true, virial: true, ..want };
         }
-        self.simulation.step(stage.dt, stage.integrator, want)?;
+        self.simulation.begin_step(stage.dt, stage.integrator, want)?;
+        let is_last = self.position.done + 1 == stage.steps;
+        if is_last || totals || self.observers.may_sample(number, &stage.name) || self.writes(number) {
+            self.simulation.end_step()?;
+        }
         self.position.done += 1;
         self.position.time = self.position.begin + self.position.done as f64 * stage.dt;
         self.observers.sample(&self.simulation, &stage.name, self.position.time);
@@ -151,6 +155,12 @@ impl<'a> Run<'a> {
 
     fn is_row(&self, step: u64) -> bool {
         every(self.scene.output.thermo, step) || step == self.steps
+    }
+
+    /// Whether the particles at the end of a step are written.
+    fn writes(&self, step: u64) -> bool {
+        let due = &self.scene.output;
+        [due.dump, due.xyz, due.snapshot].into_iter().any(|interval| every(interval, step))
     }
 
     /// Writes what is due after a step.
@@ -215,6 +225,7 @@ impl<'a> Run<'a> {
 
     /// Writes a checkpoint of the present state.
     fn checkpoint(&mut self) -> Result<(), RunError> {
+        self.simulation.end_step()?;
         self.keep_state();
         self.store_good()
     }

@@ -72,10 +72,25 @@ impl Motion<'_> {
 }
 
 impl Integrator {
-    /// From the end of one step to the point where the next needs its forces, with every particle in the box.
-    pub(super) fn before_forces(self, motion: Motion, dt: f64, around: Surroundings, pool: &Pool) -> Faults {
+    /// Whether [`Integrator::after_forces`] can be left to the next step, which then does the same in the loop it
+    /// makes anyway.
+    pub(super) fn may_owe(self) -> bool {
+        matches!(self, Integrator::VelocityVerlet)
+    }
+
+    /// From the end of one step to the point where the next needs its forces, with every particle in the box. With
+    /// `owed` [`Integrator::after_forces`] of the step before, of the same `dt`, is still to be done.
+    pub(super) fn before_forces(
+        self,
+        motion: Motion,
+        dt: f64,
+        owed: bool,
+        around: Surroundings,
+        pool: &Pool,
+    ) -> Faults {
+        debug_assert!(!owed || self.may_owe());
         match self {
-            Integrator::VelocityVerlet => velocity_verlet::before_forces(motion, dt, around, pool),
+            Integrator::VelocityVerlet => velocity_verlet::before_forces(motion, dt, owed, around, pool),
             Integrator::GrootWarren { lambda } => {
                 groot_warren::before_forces(motion, dt, lambda, around, pool)
             }

@@ -4,14 +4,23 @@
 use super::parts::{Faults, Surroundings, drift, kick, share};
 use super::{Motion, Pool};
 
-pub fn before_forces(mut motion: Motion, dt: f64, around: Surroundings, pool: &Pool) -> Faults {
+/// With `owed` the step before has not been ended by [`after_forces`]: its kick comes first, in the same loop.
+pub fn before_forces(mut motion: Motion, dt: f64, owed: bool, around: Surroundings, pool: &Pool) -> Faults {
     motion.keep_nothing();
     motion.over_mass(|mass| 0.5 * dt / mass);
     share(motion, pool, |part, dtfm| {
-        drift(part, dtfm, around, |x, v, f, dtfm| {
-            let v = v + dtfm * f;
-            (x + dt * v, v)
-        });
+        if owed {
+            drift(part, dtfm, around, |x, v, f, dtfm| {
+                let kick = dtfm * f;
+                let v = v + kick + kick;
+                (x + dt * v, v)
+            });
+        } else {
+            drift(part, dtfm, around, |x, v, f, dtfm| {
+                let v = v + dtfm * f;
+                (x + dt * v, v)
+            });
+        }
     })
 }
 

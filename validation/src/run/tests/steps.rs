@@ -62,3 +62,34 @@ fn steps_are_their_formulas() {
         }
     }
 }
+
+/// Steps that leave the end of their work to the next are the same to the last bit, whatever comes between.
+#[test]
+fn steps_in_a_row_are_steps_one_by_one() {
+    let (model, state) = start([1.0, 2.5], Matrix3::from_diagonal_element(4.0));
+    for integrator in [Integrator::VelocityVerlet, Integrator::GrootWarren { lambda: 0.65 }] {
+        let [mut single, mut row] = [(); 2].map(|()| {
+            let mut run = Simulation::new(&model, 1.0, state.clone(), 7).unwrap();
+            run.set_reordering(true);
+            run.prepare(0.01, Want::FORCES).unwrap();
+            run
+        });
+        let lengths = [(0.01, 5), (0.01, 1), (0.02, 3), (0.005, 40)];
+        for (dt, steps) in lengths {
+            for _ in 0..steps {
+                single.step(dt, integrator, Want::FORCES).unwrap();
+            }
+            row.advance(steps, dt, integrator).unwrap();
+            assert!(single.state() == row.state());
+        }
+        // A step of another length, or forces once more, end what is under way.
+        for dt in [0.01, 0.02, 0.01] {
+            single.step(dt, integrator, Want::FORCES).unwrap();
+            row.begin_step(dt, integrator, Want::FORCES).unwrap();
+        }
+        for run in [&mut single, &mut row] {
+            run.prepare(0.01, Want::FORCES).unwrap();
+        }
+        assert!(single.state() == row.state() && single.forces() == row.forces());
+    }
+}
