@@ -37,7 +37,6 @@ pub struct Team {
 pub struct Group<'a> {
     pub view: &'a View,
     pub windows: &'a Windows,
-    pub spans: &'a Spans,
     pub ends: Ends,
     /// The first, and how many.
     pub first: usize,
@@ -49,48 +48,39 @@ pub struct Group<'a> {
 pub unsafe fn cut<I: Isa, T: Scalar, const GHOSTS: bool, const MANY: usize>(
     swept: &Swept<T, impl Record>,
     group: &Group,
+    spans: &mut Spans,
     block: &mut Block<T>,
 ) {
     // SAFETY: the arrays are as `Swept` says, chunks have room.
     unsafe {
-        let Group { view, windows, spans, count, ends, .. } = *group;
-        let x = swept.x[0].as_ptr().add(group.first);
+        let Group { view, windows, count, ends, .. } = *group;
         let mut found = 0;
         let mut teams = 0;
         let mut eights = 0;
         let mut a = 0;
         while a < count {
             let mut many = MANY.min(count - a);
-            let together = ends.together >> (a / I::F32::LANES) & 1 == 1;
-            if !together {
+            if ends.together >> (a / I::F32::LANES) & 1 == 0 {
                 // Vectors have spans of one or of the other kind.
                 many = many.min(I::F32::LANES - a % I::F32::LANES);
-                let begin = *x.add(a);
-                let mut k = 1;
-                while k < many {
-                    if (*x.add(a + k) - begin).abs() > view.joined {
-                        many = k;
-                    }
-                    k += 1;
-                }
+                many = join(&swept.x[0][group.first + a..][..many], view.joined, spans, a);
             }
-            // The last again in the place of those that are not there.
-            let these: [usize; MANY] = std::array::from_fn(|k| a + k.min(many - 1));
             let begin = found;
             let look = Look {
-                these,
-                together,
+                first: a,
+                many,
                 slots: (EIGHT * eights).wrapping_sub(found),
-                who: first_of_team(many),
+                who: *MEMBERS.get_unchecked(many),
             };
-            let mut w = 0;
+            // In their own row they look at those behind them.
+            let row = *windows.row.get_unchecked(0);
+            let range = [(group.first + a + 1) as u32, *row.add(bin(&spans.end, 0, a))];
+            found = add::<T, GHOSTS, MANY, true>(swept, group, block, found, range, 5, &look);
+            let mut w = 1;
             while w < 5 {
                 let row = *windows.row.get_unchecked(w);
-                // In their own row they look at those behind them.
-                let own = (group.first + a + 1) as u32;
-                let from = if w == 0 { own } else { *row.add(lowest(&spans.low, w, &look)) };
-                let to = *row.add(highest(&spans.end, w, &look));
-                found = add::<T, GHOSTS, MANY>(swept, group, block, found, [from, to], w + 5, &look);
+                let range = [*row.add(bin(&spans.low, w, a)), *row.add(bin(&spans.end, w, a))];
+                found = add::<T, GHOSTS, MANY, false>(swept, group, block, found, range, w + 5, &look);
                 w += 1;
             }
             // Rows that go on in the period before, and in the next.
@@ -99,8 +89,8 @@ pub unsafe fn cut<I: Isa, T: Scalar, const GHOSTS: bool, const MANY: usize>(
                 let mut w = 1;
                 while w < 5 {
                     let row = *windows.row.get_unchecked(w);
-                    let range = [*row.add(lowest(&spans.before, w, &look)), *row.add(view.bins as usize)];
-                    found = add::<T, GHOSTS, MANY>(swept, group, block, found, range, w, &look);
+                    let range = [*row.add(bin(&spans.before, w, a)), *row.add(view.bins as usize)];
+                    found = add::<T, GHOSTS, MANY, false>(swept, group, block, found, range, w, &look);
                     w += 1;
                 }
             }
@@ -108,8 +98,8 @@ pub unsafe fn cut<I: Isa, T: Scalar, const GHOSTS: bool, const MANY: usize>(
                 let mut w = 0;
                 while w < 5 {
                     let row = *windows.row.get_unchecked(w);
-                    let range = [*row, *row.add(highest(&spans.after, w, &look))];
-                    found = add::<T, GHOSTS, MANY>(swept, group, block, found, range, w + 10, &look);
+                    let range = [*row, *row.add(bin(&spans.after, w, a))];
+                    found = add::<T, GHOSTS, MANY, false>(swept, group, block, found, range, w + 10, &look);
                     w += 1;
                 }
             }
@@ -127,44 +117,52 @@ pub unsafe fn cut<I: Isa, T: Scalar, const GHOSTS: bool, const MANY: usize>(
 }
 
 #[inline(always)]
-unsafe fn lowest<const MANY: usize>(bins: &Bins, w: usize, look: &Look<MANY>) -> usize {
+unsafe fn bin(bins: &Bins, w: usize, a: usize) -> usize {
     // SAFETY: of a group.
-    let at = |k: usize| unsafe { *bins.get_unchecked(w).get_unchecked(k) };
-    let first = at(look.these[0]);
-    if look.together {
-        return first as usize;
-    }
-    look.these.iter().fold(first, |low, k| low.min(at(*k))) as usize
+    unsafe { *bins.get_unchecked(w).get_unchecked(a) as usize }
 }
 
-#[inline(always)]
-unsafe fn highest<const MANY: usize>(bins: &Bins, w: usize, look: &Look<MANY>) -> usize {
-    // SAFETY: of a group.
-    let at = |k: usize| unsafe { *bins.get_unchecked(w).get_unchecked(k) };
-    let first = at(look.these[0]);
-    if look.together {
-        return first as usize;
+/// Makes the spans of particle `a` of a group those of all particles that look together with it: of those at `x` the
+/// first ones that are near enough to the first. Returns how many.
+#[cold]
+#[inline(never)]
+fn join(x: &[f32], joined: f32, spans: &mut Spans, a: usize) -> usize {
+    let many = x.iter().take_while(|other| (**other - x[0]).abs() <= joined).count().max(1);
+    let all = a..a + many;
+    for w in 0..5 {
+        for lowest in [&mut spans.low[w], &mut spans.before[w]] {
+            lowest[a] = lowest[all.clone()].iter().copied().fold(lowest[a], i32::min);
+        }
+        for highest in [&mut spans.end[w], &mut spans.after[w]] {
+            highest[a] = highest[all.clone()].iter().copied().fold(highest[a], i32::max);
+        }
     }
-    look.these.iter().fold(first, |high, k| high.max(at(*k))) as usize
+    many
 }
 
 /// Who looks.
-struct Look<const MANY: usize> {
-    /// In the group; the last more than once if they are fewer.
-    these: [usize; MANY],
-    /// Whether their spans are those of all.
-    together: bool,
+struct Look {
+    /// In the group, and how many.
+    first: usize,
+    many: usize,
     /// Added to the number of a chunk this is its slot; it wraps.
     slots: usize,
     /// Sixteen bits for each that is there, four by four.
     who: [u64; FOURS],
 }
 
-/// Sixteen bits for each of the first of a team.
-#[inline(always)]
-fn first_of_team(many: usize) -> [u64; FOURS] {
-    let bits = u128::MAX >> (128 - 16 * many);
-    [bits as u64, (bits >> 64) as u64]
+/// Sixteen bits for each of the first particles of a team, four by four.
+static MEMBERS: [[u64; FOURS]; FOURS * FOUR + 1] = members();
+
+const fn members() -> [[u64; FOURS]; FOURS * FOUR + 1] {
+    let mut table = [[0; FOURS]; FOURS * FOUR + 1];
+    let mut many = 1;
+    while many <= FOURS * FOUR {
+        let bits = u128::MAX >> (128 - 16 * many);
+        table[many] = [bits as u64, (bits >> 64) as u64];
+        many += 1;
+    }
+    table
 }
 
 /// The bits of the first of thirty-two particles, for each of four that look: those of the first chunk, and of the
@@ -191,33 +189,31 @@ const fn first_bits() -> [[u64; 2]; 33] {
     table
 }
 
-/// Appends the chunks of the particles `from..to`, at least one for a look without a shift at the own row;
+/// Appends the chunks of the particles `from..to`, at least one if they are those behind the team in its own row;
 /// returns how many there are then.
 #[inline(always)]
-unsafe fn add<T: Scalar, const GHOSTS: bool, const MANY: usize>(
+unsafe fn add<T: Scalar, const GHOSTS: bool, const MANY: usize, const OWN: bool>(
     swept: &Swept<T, impl Record>,
     group: &Group,
     block: &mut Block<T>,
     found: usize,
     [mut from, mut to]: [u32; 2],
     shift: usize,
-    look: &Look<MANY>,
+    look: &Look,
 ) -> usize {
     // SAFETY: chunks have room for two more; more make room.
     unsafe {
-        let own = shift == 5;
         let mut owned = [[u64::MAX; FOURS]; 2];
         let mut ghosts = None;
         if GHOSTS {
             // Two ghosts are no concern of this rank.
             let mut ghost = [false; FOURS * FOUR];
-            for (ghost, k) in ghost.iter_mut().zip(look.these) {
-                *ghost = *swept.ghost.get_unchecked(group.first + k);
-            }
+            let these = group.first + look.first;
+            ghost[..look.many].copy_from_slice(&swept.ghost[these..these + look.many]);
             ghosts = Some(ghost);
-            if ghost[..MANY].iter().all(|ghost| *ghost) {
+            if ghost[..look.many].iter().all(|ghost| *ghost) {
                 let [first, last] = *group.windows.owned.get_unchecked(shift % 5);
-                if !own {
+                if !OWN {
                     from = from.max(first);
                 }
                 to = to.min(last);
@@ -228,7 +224,7 @@ unsafe fn add<T: Scalar, const GHOSTS: bool, const MANY: usize>(
         }
         let length = to.saturating_sub(from) as usize;
         let note = (look.slots.wrapping_add(found) << 8 | shift) as u32;
-        let who = if own { both(look.who, BEHIND) } else { look.who };
+        let who = if OWN { both(look.who, BEHIND) } else { look.who };
         if length > 32 {
             return add_many(swept, block, found, from, to, who, look.who, note, ghosts);
         }
@@ -241,7 +237,7 @@ unsafe fn add<T: Scalar, const GHOSTS: bool, const MANY: usize>(
         if MANY > FOUR {
             block.allowed.as_mut_ptr().add(found).cast::<[u64; 2]>().write_unaligned([first[1], next[1]]);
         }
-        found + (own || length > 0) as usize + (length > 16) as usize
+        found + (OWN || length > 0) as usize + (length > 16) as usize
     }
 }
 

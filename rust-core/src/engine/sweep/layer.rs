@@ -168,11 +168,11 @@ unsafe fn find<I: Isa, T: Scalar, const MANY: usize>(
     // SAFETY: the contract of `simd`.
     unsafe {
         let ends = view.spans::<I, MANY>(swept, row, [first, count], &windows.there, spans);
-        let group = Group { view, windows, spans, ends, first, count };
+        let group = Group { view, windows, ends, first, count };
         if swept.ghost.is_empty() {
-            cut::<I, T, false, MANY>(swept, &group, block);
+            cut::<I, T, false, MANY>(swept, &group, spans, block);
         } else {
-            cut::<I, T, true, MANY>(swept, &group, block);
+            cut::<I, T, true, MANY>(swept, &group, spans, block);
         }
         if windows.crosses || ends.before | ends.after != 0 {
             look::<I, T, true, MANY>(swept, &group, block);
