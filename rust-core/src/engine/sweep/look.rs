@@ -2,7 +2,7 @@
 
 use super::arithmetic::Record;
 use super::block::{Block, EIGHT, PLACE_BITS};
-use super::chunks::{FOUR, Group};
+use super::chunks::{FOUR, FOURS, Group};
 use super::layer::Swept;
 use super::simd::{Isa, Scalar, Two};
 
@@ -61,12 +61,16 @@ pub unsafe fn look<I: Isa, T: Scalar, const SHIFTS: bool, const MANY: usize>(
             let shift =
                 if SHIFTS { *group.windows.shift.get_unchecked(chunk.note as usize & 0xff) } else { [0; 3] };
             let there = [q[0].add(j), q[1].add(j), q[2].add(j)];
+            let mut near = [0; FOURS];
             let mut f = 0;
             while f < fours {
-                let near = I::near::<SHIFTS>(there, shift, &*points.add(eight + f), limit);
-                let allowed = if f == 0 { chunk.allowed } else { *allowed.add(c) };
-                *masks.add(EIGHT * (eight + f) + slot % EIGHT) = near & allowed;
+                near[f] = I::near::<SHIFTS>(there, shift, &*points.add(eight + f), limit);
                 f += 1;
+            }
+            let masks = masks.add(EIGHT * eight + slot % EIGHT);
+            *masks = near[0] & chunk.allowed;
+            if fours > 1 {
+                *masks.add(EIGHT) = near[1] & *allowed.add(c);
             }
             *bases.add(slot) = chunk.from << PLACE_BITS;
             c += 1;

@@ -15,7 +15,7 @@ pub struct Windows {
     pub there: [f32; 5],
     /// Added to the positions of particles there, in the period before, the same, and the next: entry
     /// `w + 5 (wrap + 1)`.
-    pub shift: [[u16; 3]; 15],
+    pub shift: [[u32; 3]; 15],
     /// Whether any shift of the same period is not zero.
     pub crosses: bool,
     /// The first owned particle of each, and one past the last.
@@ -95,7 +95,7 @@ pub struct View {
     pub joined: f32,
     /// Added to the positions of particles in rows of the period before, the same, and the next, and there in the same
     /// three periods along x.
-    shift: [[[u16; 3]; 3]; 3],
+    shift: [[[u32; 3]; 3]; 3],
 }
 
 impl View {
@@ -116,7 +116,7 @@ impl View {
             shift: [-1.0, 0.0, 1.0].map(|wrap| {
                 [-frame.length[0], 0.0, frame.length[0]].map(|along| {
                     let [x, y, z] = frame.edge(grid.row_axis).map(|e| wrap * e);
-                    [x + along, y, z].map(|shift| swept.quantum.shift(shift))
+                    [x + along, y, z].map(|shift| 0x1_0001 * u32::from(swept.quantum.shift(shift)))
                 })
             }),
         }

@@ -414,7 +414,7 @@ impl Isa for Avx2 {
     #[inline(always)]
     unsafe fn near<const SHIFTS: bool>(
         x: [*const u16; 3],
-        shift: [u16; 3],
+        shift: [u32; 3],
         four: &[Two; 2],
         limit: i16,
     ) -> u64 {
@@ -424,7 +424,7 @@ impl Isa for Avx2 {
             while c < 3 {
                 let mut there = _mm256_loadu_si256(x[c].cast());
                 if SHIFTS {
-                    there = _mm256_add_epi16(there, _mm256_set1_epi16(shift[c] as i16));
+                    there = _mm256_add_epi16(there, _mm256_set1_epi32(shift[c] as i32));
                 }
                 let mut k = 0;
                 while k < 4 {

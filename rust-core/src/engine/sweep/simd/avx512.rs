@@ -473,7 +473,7 @@ impl Isa for Avx512 {
     #[inline(always)]
     unsafe fn near<const SHIFTS: bool>(
         x: [*const u16; 3],
-        shift: [u16; 3],
+        shift: [u32; 3],
         four: &[Two; 2],
         limit: i16,
     ) -> u64 {
@@ -483,7 +483,7 @@ impl Isa for Avx512 {
             while c < 3 {
                 let mut there = _mm512_broadcast_i64x4(_mm256_loadu_si256(x[c].cast()));
                 if SHIFTS {
-                    there = _mm512_add_epi16(there, _mm512_set1_epi16(shift[c] as i16));
+                    there = _mm512_add_epi16(there, _mm512_set1_epi32(shift[c] as i32));
                 }
                 let mut k = 0;
                 while k < 2 {

@@ -165,10 +165,11 @@ pub trait Isa: Copy + Send + Sync + 'static {
     type F64: Reals<Scalar = f64>;
     type Quad: Quad;
     /// Which of the sixteen particles from `x[0]`, `x[1]`, `x[2]` on, all moved by `shift`, have a distance to four
-    /// points whose square, in units of 2¹⁶, is below `limit`: sixteen bits for each point. Coordinates wrap.
+    /// points whose square, in units of 2¹⁶, is below `limit`: sixteen bits for each point. Coordinates wrap; a shift is
+    /// there twice, in both halves of a word.
     unsafe fn near<const SHIFTS: bool>(
         x: [*const u16; 3],
-        shift: [u16; 3],
+        shift: [u32; 3],
         four: &[Two; 2],
         limit: i16,
     ) -> u64;

@@ -323,7 +323,7 @@ impl Isa for Portable {
     #[inline(always)]
     unsafe fn near<const SHIFTS: bool>(
         x: [*const u16; 3],
-        shift: [u16; 3],
+        shift: [u32; 3],
         four: &[Two; 2],
         limit: i16,
     ) -> u64 {
@@ -331,7 +331,7 @@ impl Isa for Portable {
         for c in 0..3 {
             there[c] = unsafe { x[c].cast::<[u16; 16]>().read_unaligned() };
             if SHIFTS {
-                there[c] = there[c].map(|x| x.wrapping_add(shift[c]));
+                there[c] = there[c].map(|x| x.wrapping_add(shift[c] as u16));
             }
         }
         let mut mask = 0;
