@@ -30,10 +30,10 @@ pub struct Block<T> {
     pub begin: [u32; GROUP + 1],
     /// The second particle of each pair of the group: 32 times its place in the order of cells.
     pub j: Vec<u32>,
+    /// The first, a number in the vector's worth of the group that it is of.
+    pub which: Vec<u8>,
     /// A vector's worth of the group, whose pairs are in hand. All arrays of pairs below begin with their first.
     pub own: Own<T>,
-    /// The first particle of each pair, a number in `own`.
-    pub which: Vec<u8>,
     /// Room for [`Pairs`](super::arithmetic::Pairs) of a precision and instruction set, a vector each.
     pub pairs: Vec<Lines<T>>,
     /// Tags of both particles; then the words of noise are where the first were.
@@ -96,8 +96,8 @@ impl<T: Scalar> Default for Block<T> {
             first: 0,
             begin: [0; GROUP + 1],
             j: Vec::new(),
-            own: Own::default(),
             which: Vec::new(),
+            own: Own::default(),
             pairs: Vec::new(),
             tags: Default::default(),
             rows: Vec::new(),
@@ -178,7 +178,8 @@ impl<T: Scalar> Block<T> {
 
     /// Both particles of pair `p` of those in hand.
     pub fn pair(&self, part: Part, p: usize) -> [usize; 2] {
-        [part.first + self.which[p] as usize, (self.j[part.pairs[0] + p] >> PLACE_BITS) as usize]
+        let p = part.pairs[0] + p;
+        [part.first + self.which[p] as usize, (self.j[p] >> PLACE_BITS) as usize]
     }
 
     /// Room for the weights of `passes` densities.

@@ -99,7 +99,7 @@ unsafe fn separate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool>(
     unsafe {
         let records = swept.records.as_ptr();
         let own: *const _ = &block.own;
-        let p_which = block.which.as_ptr();
+        let p_which = block.which.as_ptr().add(part.pairs[0]);
         let p_j = block.j.as_ptr().add(part.pairs[0]);
         let count = part.count();
         let p_pairs = block.pairs.as_mut_ptr().cast::<Pairs<A::Reals>>();

@@ -21,7 +21,7 @@ pub unsafe fn keep<I: Isa, A: Arithmetic<I>, const TALLY: bool>(
             term,
             pairs: block.pairs.as_ptr().cast(),
             vectors: part.count().div_ceil(A::Reals::LANES),
-            which: block.which.as_ptr(),
+            which: block.which[part.pairs[0]..].as_ptr(),
             places: block.j[part.pairs[0]..].as_ptr(),
             layer_first: near.first,
             share: block.share.as_ptr(),

@@ -4,7 +4,7 @@
 //! of the next layer to accumulators that only this layer writes. Sums therefore do not depend on
 //! which thread does which layer, nor when.
 
-use super::arithmetic::{Arithmetic, Record};
+use super::arithmetic::Arithmetic;
 use super::block::{Block, GROUP};
 use super::chunks::{Group, cut};
 use super::evaluate::{Kit, evaluate};
@@ -14,7 +14,7 @@ use super::look::look;
 use super::many_body::NearPairs;
 use super::quantum::Quantum;
 use super::scatter::{scatter, scatter_weights};
-use super::simd::{Isa, Reals, Scalar};
+use super::simd::{Isa, Reals};
 use super::terms::Terms;
 use super::windows::{Spans, View, Windows};
 use crate::engine::noise::PairNoise;
@@ -136,9 +136,9 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TA
                 let count = GROUP.min(end - first);
                 let group = [first, count];
                 if grid.team == 8 {
-                    find::<I, A::Scalar, 8>(swept, &view, &windows, &mut spans, row, group, block);
+                    find::<I, A, 8>(swept, &view, &windows, &mut spans, row, group, block);
                 } else {
-                    find::<I, A::Scalar, 4>(swept, &view, &windows, &mut spans, row, group, block);
+                    find::<I, A, 4>(swept, &view, &windows, &mut spans, row, group, block);
                 }
                 let mut slot = 0;
                 while slot < count {
@@ -156,28 +156,28 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TA
 
 /// Finds the pairs of a group: `count` particles of a row from `first` on.
 #[inline(always)]
-unsafe fn find<I: Isa, T: Scalar, const MANY: usize>(
-    swept: &Swept<T, impl Record>,
+unsafe fn find<I: Isa, A: Arithmetic<I>, const MANY: usize>(
+    swept: &Swept<A::Scalar, A::Record>,
     view: &View,
     windows: &Windows,
     spans: &mut Spans,
     row: usize,
     [first, count]: [usize; 2],
-    block: &mut Block<T>,
+    block: &mut Block<A::Scalar>,
 ) {
     // SAFETY: the contract of `simd`.
     unsafe {
         let ends = view.spans::<I, MANY>(swept, row, [first, count], &windows.there, spans);
         let group = Group { view, windows, ends, first, count };
         if swept.ghost.is_empty() {
-            cut::<I, T, false, MANY>(swept, &group, spans, block);
+            cut::<I, A::Scalar, false, MANY>(swept, &group, spans, block);
         } else {
-            cut::<I, T, true, MANY>(swept, &group, spans, block);
+            cut::<I, A::Scalar, true, MANY>(swept, &group, spans, block);
         }
         if windows.crosses || ends.before | ends.after != 0 {
-            look::<I, T, true, MANY>(swept, &group, block);
+            look::<I, A::Scalar, true, MANY>(swept, &group, A::Reals::LANES, block);
         } else {
-            look::<I, T, false, MANY>(swept, &group, block);
+            look::<I, A::Scalar, false, MANY>(swept, &group, A::Reals::LANES, block);
         }
     }
 }
@@ -215,22 +215,6 @@ unsafe fn part<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY: bool>
         let pairs = [*block.begin.get_unchecked(first) as usize, *block.begin.get_unchecked(last) as usize];
         if pairs[0] == pairs[1] {
             return;
-        }
-        let which = block.which.as_mut_ptr();
-        let mut m = first;
-        while m < last {
-            let end = *block.begin.get_unchecked(m + 1) as usize - pairs[0];
-            let mut k = *block.begin.get_unchecked(m) as usize - pairs[0];
-            let twice = 0x101 * (m - first) as u16;
-            // Thirty-two at once are mostly enough.
-            loop {
-                I::fill16(twice, which.add(k).cast());
-                k += 32;
-                if k >= end {
-                    break;
-                }
-            }
-            m += 1;
         }
         let part = Part { slots: [first, last], first: block.first + first, pairs };
         A::own(swept.records.as_ptr().add(part.first), &mut block.own);

@@ -7,11 +7,12 @@ use super::layer::Swept;
 use super::simd::{Isa, Scalar, Two};
 
 /// Compares the particles of a group with their chunks, and lists the pairs within reach, those of one particle after
-/// those of another.
+/// those of another; particles are counted in vectors of `lanes`.
 #[inline(always)]
 pub unsafe fn look<I: Isa, T: Scalar, const SHIFTS: bool, const MANY: usize>(
     swept: &Swept<T, impl Record>,
     group: &Group,
+    lanes: usize,
     block: &mut Block<T>,
 ) {
     // SAFETY: the contract of `simd`; arrays have sixteen particles' room behind their last.
@@ -75,7 +76,7 @@ pub unsafe fn look<I: Isa, T: Scalar, const SHIFTS: bool, const MANY: usize>(
             *bases.add(slot) = chunk.from << PLACE_BITS;
             c += 1;
         }
-        let out = block.j.as_mut_ptr();
+        let (out, which) = (block.j.as_mut_ptr(), block.which.as_mut_ptr());
         let mut pairs = 0;
         let mut member = 0;
         block.first = first;
@@ -91,6 +92,7 @@ pub unsafe fn look<I: Isa, T: Scalar, const SHIFTS: bool, const MANY: usize>(
             }
             let mut k = 0;
             while k < team.many as usize {
+                let mut named = pairs;
                 let mut eight = from;
                 while eight < to {
                     let four = fours * eight + k / FOUR;
@@ -98,6 +100,14 @@ pub unsafe fn look<I: Isa, T: Scalar, const SHIFTS: bool, const MANY: usize>(
                     pairs += I::collect(bases, *masks, out.add(pairs));
                     pairs += I::collect(bases.add(4), *masks.add(4), out.add(pairs));
                     eight += 1;
+                }
+                // Thirty-two at once are mostly enough.
+                loop {
+                    I::fill16(0x101 * (member & (lanes - 1)) as u16, which.add(named).cast());
+                    named += 32;
+                    if named >= pairs {
+                        break;
+                    }
                 }
                 member += 1;
                 *block.begin.get_unchecked_mut(member) = pairs as u32;
