@@ -17,7 +17,7 @@ const _: () = assert!(size_of::<Sum>() == 1 << PLACE_BITS);
 
 /// Accumulators of a layer: for each particle some rows of four numbers.
 #[derive(Clone, Copy)]
-struct Accumulators {
+pub struct Accumulators {
     /// That of particle 0, were it of the layer.
     base: *mut f64,
     /// Rows of each particle, and which is meant.
@@ -26,11 +26,41 @@ struct Accumulators {
 }
 
 impl Accumulators {
+    /// One row each.
+    #[inline(always)]
+    pub fn new(base: *mut f64) -> Accumulators {
+        Accumulators { base, quads: 1, quad: 0 }
+    }
+
     /// The row of the particle at 32 times `place`.
     #[inline(always)]
     unsafe fn at(self, place: usize) -> *mut f64 {
         // SAFETY: the caller's.
         unsafe { self.base.byte_add(place * self.quads).add(4 * self.quad) }
+    }
+}
+
+/// Pairs of particles that follow each other.
+#[derive(Clone, Copy)]
+pub struct Listed {
+    /// 32 times the place of the second particle of each pair, and of any particle of the layer behind the last.
+    pub places: *const u32,
+    /// Before which pair those of each particle begin, and those of the last end; counted from any number.
+    pub begin: *const u32,
+    /// The first particle, and how many.
+    pub first: usize,
+    pub members: usize,
+}
+
+impl Listed {
+    /// Those in hand.
+    #[inline(always)]
+    unsafe fn of<T>(block: &Block<T>, part: Part) -> Listed {
+        let [first, last] = part.slots;
+        // SAFETY: the caller's.
+        let (places, begin) =
+            unsafe { (block.j.as_ptr().add(part.pairs[0]), block.begin.as_ptr().add(first)) };
+        Listed { places, begin, first: part.first, members: last - first }
     }
 }
 
@@ -45,34 +75,37 @@ pub unsafe fn scatter<I: Isa, A: Arithmetic<I>>(
 ) {
     // SAFETY: the contract of `simd`; accumulators are there for every particle of the layer and the next.
     unsafe {
-        let to = Accumulators { base: sums.0.offset(4 * offset), quads: 1, quad: 0 };
+        let to = Accumulators::new(sums.0.offset(4 * offset));
         let rows = block.rows.as_mut_ptr().cast::<A::Scalar>();
         // The second particle gets minus the row, so the weight in it is negative.
         // Nobody asks any more what pairs are, unless there are weights to come.
         let running =
             if variables > 1 { block.running.as_mut_ptr().cast() } else { block.pairs.as_mut_ptr().cast() };
-        add_rows::<I, A>(to, rows, rows, running, [1.0, 1.0, 1.0, -1.0], block, part);
+        add_rows::<I, A>(to, rows, rows, running, [1.0, 1.0, 1.0, -1.0], Listed::of(block, part));
     }
 }
 
 /// Adds `own` rows times `sign` to the first particles of pairs, minus `rows` to the second ones.
+///
+/// # Safety
+/// The contract of `simd`; accumulators are there, and room for a row and a sum behind the last pair.
 #[inline(always)]
-unsafe fn add_rows<I: Isa, A: Arithmetic<I>>(
+pub unsafe fn add_rows<I: Isa, A: Arithmetic<I>>(
     to: Accumulators,
     rows: *mut A::Scalar,
     own: *mut A::Scalar,
     running: *mut f64,
     sign: [f64; 4],
-    block: &Block<A::Scalar>,
-    part: Part,
+    pairs: Listed,
 ) {
-    // SAFETY: the contract of `simd`; accumulators are there, and room for a row behind the last.
+    // SAFETY: the caller's.
     unsafe {
         let sign = I::Quad::load(sign.as_ptr());
-        let places = block.j.as_ptr().add(part.pairs[0]);
+        let Listed { places, begin, first, members } = pairs;
         // One loop over all, not one for each member, none of whose ends is to be foreseen: what a member gets is
         // the difference of two running sums, of which every other one is kept. Behind an odd number nothing follows.
-        let count = part.count();
+        let zeroth = *begin as usize;
+        let count = *begin.add(members) as usize - zeroth;
         rows.add(4 * count).cast::<[A::Scalar; 4]>().write([A::Scalar::default(); 4]);
         own.add(4 * count).cast::<[A::Scalar; 4]>().write([A::Scalar::default(); 4]);
         let sums = running;
@@ -95,16 +128,14 @@ unsafe fn add_rows<I: Isa, A: Arithmetic<I>>(
             p += 2;
         }
         sum.store(sums.add(2 * p));
-        let begin = block.begin.as_ptr();
-        let [first, last] = part.slots;
         let mut before = I::Quad::zero();
-        let mut m = first;
-        while m < last {
-            let end = *begin.add(m + 1) as usize - part.pairs[0];
+        let mut m = 0;
+        while m < members {
+            let end = *begin.add(m + 1) as usize - zeroth;
             let even = end & !1;
             let odd = A::load_quad(own.add(4 * even)).mul(I::Quad::splat((end & 1) as f64));
             let all = I::Quad::load(sums.add(2 * even)).add(odd);
-            add_to(to.at((part.first + m - first) << PLACE_BITS), all.sub(before).mul(sign));
+            add_to(to.at((first + m) << PLACE_BITS), all.sub(before).mul(sign));
             before = all;
             m += 1;
         }
@@ -169,7 +200,7 @@ pub unsafe fn scatter_weights<I: Isa, A: Arithmetic<I>, const SEVERAL: bool>(
             // Both get minus a row: weights are negative.
             let to = Accumulators { base, quads, quad };
             let running = block.running.as_mut_ptr().cast();
-            add_rows::<I, A>(to, rows, own, running, [-1.0; 4], block, part);
+            add_rows::<I, A>(to, rows, own, running, [-1.0; 4], Listed::of(block, part));
             quad += 1;
         }
     }
