@@ -233,16 +233,20 @@ impl ExcessPass {
 fn gather<const W: usize>(lanes: Lanes, rows: &Rows, at: &mut [f64]) {
     let n = lanes.count();
     let mut columns: [&mut [f64]; W] = std::array::from_fn(|_| &mut [][..]);
+    let mut found = 0;
     for (v, values) in at.chunks_exact_mut(n).enumerate() {
         if let Some(column) = rows.columns.iter().position(|c| *c == v) {
             columns[column] = values;
+            found += 1;
         }
     }
+    assert_eq!(found, W, "columns of variables that there are");
     let densities = rows.densities.as_chunks::<W>().0;
     lanes.each(|lane, row| {
         let densities = &densities[row];
         for c in 0..W {
-            columns[c][lane] = densities[c];
+            // SAFETY: the columns have as many numbers as there are lanes.
+            unsafe { *columns[c].get_unchecked_mut(lane) = densities[c] };
         }
     });
 }
@@ -264,7 +268,8 @@ fn spread<const W: usize>(lanes: Lanes, columns: &[f64], rows: &mut [f64]) {
     lanes.each(|lane, row| {
         let row = &mut rows[row];
         for c in 0..W {
-            row[c] = columns[c][lane];
+            // SAFETY: as above.
+            row[c] = unsafe { *columns[c].get_unchecked(lane) };
         }
     });
 }
@@ -404,6 +409,10 @@ mod tests {
             let expected = case.one_by_one(&mut single);
             assert_eq!(case.run(&mut pass, false).unwrap(), expected, "{text}");
             assert_eq!(pass.out_of_bounds, single.out_of_bounds, "{text}");
+            for (name, set) in Instructions::ALL.into_iter().filter(|(_, set)| set.available()) {
+                let bits = case.run(&mut ExcessPass::new(set), false).unwrap();
+                assert_eq!(bits, expected, "{name}: {text}");
+            }
             assert_eq!(pass.out_of_bounds != [0; 2], text.contains(BOUNDS), "{text}");
             if species.len() == 1 {
                 assert_eq!(case.run(&mut pass, true).unwrap(), expected, "{text}");

@@ -2,7 +2,6 @@
 
 use super::arithmetic::{Arithmetic, Pairs};
 use super::block::{Block, PLACE_BITS};
-use super::forces::At;
 use super::layer::{Part, Shared, Swept};
 use super::simd::{Isa, Quad, Reals};
 use crate::model::kernel::Real;
@@ -152,6 +151,15 @@ pub unsafe fn add_to<Q: Quad>(p: *mut f64, x: Q) {
     unsafe { Q::load(p).add(x).store(p) }
 }
 
+/// What is added for a column.
+#[derive(Clone, Copy)]
+struct WeightOf<T> {
+    /// Minus the weights of its density.
+    weight: *const T,
+    /// Whether the first particle of a pair is of its species, and the second: tables.
+    is_species: [*const T; 2],
+}
+
 /// Adds weights where there are several densities or species: a column for each density and species of the other
 /// particle, four of them to a row.
 #[inline(always)]
@@ -170,24 +178,38 @@ pub unsafe fn scatter_weights<I: Isa, A: Arithmetic<I>, const SEVERAL: bool>(
         let own = if SEVERAL { block.own_rows.as_mut_ptr().cast() } else { rows };
         let vectors = part.count().div_ceil(A::Reals::LANES);
         let pairs = block.pairs.as_ptr().cast::<Pairs<A::Reals>>();
+        let few = terms.species * terms.species <= A::Reals::LANES;
+        let zero = A::Reals::constant(0.0);
         let mut quad = 0;
         while quad < quads {
+            let columns = 4.min(swept.variables - 4 * quad);
+            let mut of = [WeightOf { weight: std::ptr::null(), is_species: [std::ptr::null(); 2] }; 4];
+            let mut c = 0;
+            while c < 4 {
+                // Behind the last there is the last again.
+                let column = 4 * quad + c.min(columns - 1);
+                let [is_first, is_second] = terms.is_species.get_unchecked(column % terms.species);
+                of[c].is_species = [is_first.as_ptr(), is_second.as_ptr()];
+                of[c].weight = block.weight.get_unchecked(column / terms.species).as_ptr();
+                c += 1;
+            }
             let mut v = 0;
             while v < vectors {
                 let k = v * A::Reals::LANES;
-                let mut to_second = [A::Reals::constant(0.0); 4];
-                let mut to_first = to_second;
+                let (mut to_second, mut to_first) = ([zero; 4], [zero; 4]);
                 let mut c = 0;
-                while c < 4 && 4 * quad + c < swept.variables {
-                    let column = 4 * quad + c;
-                    let (pass, species) = (column / terms.species, column % terms.species);
-                    let weight = A::Reals::load(block.weight.get_unchecked(pass).as_ptr().add(k));
-                    to_second[c] = weight;
-                    if SEVERAL {
-                        let kind = (*pairs.add(v)).kind;
-                        let [first, second] = terms.is_species.get_unchecked(species);
-                        to_second[c] = weight * At::<A::Reals>::new(first).of::<true>(kind);
-                        to_first[c] = weight * At::<A::Reals>::new(second).of::<true>(kind);
+                while c < 4 {
+                    if c < columns {
+                        let weight = A::Reals::load(of[c].weight.add(k));
+                        to_second[c] = weight;
+                        if SEVERAL {
+                            let kind = (*pairs.add(v)).kind.0;
+                            let [is_first, is_second] = of[c].is_species.map(|table| {
+                                if few { A::Reals::pick(table, kind) } else { A::Reals::lookup(table, kind) }
+                            });
+                            to_second[c] = weight * is_first;
+                            to_first[c] = weight * is_second;
+                        }
                     }
                     c += 1;
                 }

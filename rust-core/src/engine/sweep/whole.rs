@@ -25,6 +25,9 @@ pub struct WholePairs<T> {
     /// The first particle, a number in its part; with several species also 16 times the pair of species.
     codes: Vec<Vector<u32>>,
     parts: Vec<WholePart>,
+    /// Vectors that each column has, and has room for.
+    end: usize,
+    room: usize,
     /// Most pairs of a part.
     most: usize,
 }
@@ -54,11 +57,11 @@ struct WholePart {
 /// The bits of a code that tell the first particle.
 const MEMBER_BITS: u32 = 4;
 
-/// Where the next vector goes.
+/// Where vector `end` goes, one past the last.
 #[inline(always)]
-unsafe fn end<T, S>(column: &mut Vec<Vector<T>>) -> *mut S {
-    // SAFETY: one past the last, or before.
-    unsafe { column.as_mut_ptr().add(column.len()).cast() }
+unsafe fn at<T>(column: &mut Vec<Vector<T>>, end: usize) -> *mut T {
+    // SAFETY: the caller's.
+    unsafe { column.as_mut_ptr().add(end).cast() }
 }
 
 impl<T: Scalar> WholePairs<T> {
@@ -68,31 +71,53 @@ impl<T: Scalar> WholePairs<T> {
         self.places.clear();
         self.codes.clear();
         self.parts.clear();
-        self.most = 0;
+        (self.end, self.most) = (0, 0);
+        self.find_room();
+    }
+
+    fn find_room(&mut self) {
+        let columns = self.columns.iter().map(Vec::capacity).min().unwrap_or(0);
+        self.room = columns.min(self.places.capacity()).min(self.codes.capacity());
     }
 
     /// Makes room for `more` pairs, and a vector behind.
     #[inline(always)]
     unsafe fn reserve(&mut self, more: usize) {
         let more = more / 16 + 2;
-        for column in &mut self.columns {
-            make_room(column, more);
+        if self.room - self.end < more {
+            // SAFETY: that many have been written.
+            unsafe { self.grow(more) }
         }
-        make_room(&mut self.places, more);
-        make_room(&mut self.codes, more);
+    }
+
+    #[cold]
+    #[inline(never)]
+    unsafe fn grow(&mut self, more: usize) {
+        // SAFETY: the caller's.
+        unsafe {
+            for column in &mut self.columns {
+                column.set_len(self.end);
+                make_room(column, more);
+            }
+            for column in [&mut self.places, &mut self.codes] {
+                column.set_len(self.end);
+                make_room(column, more);
+            }
+        }
+        self.find_room();
     }
 
     /// The end of a column, which there is.
     #[inline(always)]
     unsafe fn column(&mut self, column: usize) -> *mut T {
         // SAFETY: the caller's.
-        unsafe { end(self.columns.get_unchecked_mut(column)) }
+        unsafe { at(self.columns.get_unchecked_mut(column), self.end) }
     }
 
     /// Counts the pairs that were written behind the last, and something behind them.
     #[inline(always)]
     unsafe fn add(&mut self, block: &Block<T>, part: Part) {
-        // SAFETY: the vectors have been written.
+        // SAFETY: the caller's.
         unsafe {
             let [slot, last] = part.slots;
             let mut begin = [0; 17];
@@ -101,17 +126,12 @@ impl<T: Scalar> WholePairs<T> {
                 begin[m] = *block.begin.get_unchecked(slot + m) - part.pairs[0] as u32;
                 m += 1;
             }
-            let (vector, members) = (self.places.len(), (last - slot) as u32);
+            let members = (last - slot) as u32;
             make_room(&mut self.parts, 1);
-            self.parts.push(WholePart { first: part.first as u32, members, begin, vector });
-            self.most = self.most.max(part.count());
-            let end = vector + part.count() / 16 + 1;
-            for column in &mut self.columns {
-                column.set_len(end);
-            }
-            self.places.set_len(end);
-            self.codes.set_len(end);
+            self.parts.push(WholePart { first: part.first as u32, members, begin, vector: self.end });
         }
+        self.most = self.most.max(part.count());
+        self.end += part.count() / 16 + 1;
     }
 
     /// Bytes held.
@@ -147,7 +167,7 @@ pub unsafe fn keep_whole<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TA
         let share = block.share.as_ptr();
         let to_share =
             if TALLY { whole.column(NEAR + swept.terms.passes.len()) } else { std::ptr::null_mut() };
-        let (places, codes): (*mut u32, *mut u32) = (end(&mut whole.places), end(&mut whole.codes));
+        let (places, codes) = (at(&mut whole.places, whole.end), at(&mut whole.codes, whole.end));
         let which = block.which.as_ptr();
         let j = block.j.as_ptr().add(part.pairs[0]);
         let mut v = 0;
