@@ -1,5 +1,7 @@
 //! ψ and its slopes for blocks of particles of one species.
 
+use super::sweep::Instructions;
+use super::sweep::vectors::{self, Loop};
 use crate::model::curve::{Curve, CurveBlock};
 use crate::model::expression::{Expansion, Formula, Program, TooLarge};
 use crate::model::{Bounds, Continuation, Fluid, StatedSlopes};
@@ -49,8 +51,9 @@ struct BoundedVariable {
 }
 
 /// Work space of [`ExcessPlan::evaluate`].
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct ExcessWork {
+    instructions: Instructions,
     registers: Vec<f64>,
     point: Vec<f64>,
     expansion: Expansion,
@@ -170,6 +173,22 @@ impl ExcessPlan {
 }
 
 impl ExcessWork {
+    /// For an instruction set that is available.
+    pub fn new(instructions: Instructions) -> ExcessWork {
+        ExcessWork {
+            instructions,
+            registers: Vec::new(),
+            point: Vec::new(),
+            expansion: Expansion::default(),
+            outside: Vec::new(),
+            strays: Vec::new(),
+            moved: Vec::new(),
+            totals: Vec::new(),
+            beyond: Vec::new(),
+            curve: CurveBlock::default(),
+        }
+    }
+
     /// Where a formula was last evaluated, having been asked for at `at`.
     pub fn evaluated_at<'a>(&'a self, at: &'a [f64]) -> &'a [f64] {
         if self.strays.is_empty() { at } else { &self.moved }
@@ -252,7 +271,9 @@ impl FormulaPlan {
         }
         let at = if moves { &work.moved } else { at };
         let outputs = std::iter::once(&mut *psi).chain(slopes.chunks_exact_mut(lanes));
-        self.program.eval_block_into(lanes, at, outputs, &mut work.registers);
+        let program = &self.program;
+        let registers = &mut work.registers;
+        vectors::run(work.instructions, EvaluateBlock { program, lanes, at, outputs, registers });
         if moves {
             self.extend(lanes, psi, slopes, work);
         }
@@ -313,6 +334,24 @@ impl FormulaPlan {
                 }
             }
         }
+    }
+}
+
+/// All outputs of a program.
+struct EvaluateBlock<'a, O> {
+    program: &'a Program,
+    lanes: usize,
+    at: &'a [f64],
+    outputs: O,
+    registers: &'a mut Vec<f64>,
+}
+
+impl<'o, O: Iterator<Item = &'o mut [f64]>> Loop for EvaluateBlock<'_, O> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.program.eval_block_into(self.lanes, self.at, self.outputs, self.registers);
     }
 }
 

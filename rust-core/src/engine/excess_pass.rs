@@ -3,12 +3,16 @@
 use super::error::EngineError;
 use super::excess::{ExcessPlan, ExcessWork};
 use super::plan::Plan;
+use super::sweep::Instructions;
 
 /// Particles per evaluation of ψ: enough to hide the interpreter, few enough for the first-level cache.
 pub const LANES: usize = 128;
 
+/// Most of them where not all take part: half of some have a species about, and few should be left over.
+const LISTED: usize = LANES + LANES / 2;
+
 /// Scratch for evaluating ψ in lanes, and what was counted.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct ExcessPass {
     at: Vec<f64>,
     correction: Vec<f64>,
@@ -75,7 +79,25 @@ impl<'a> Lanes<'a> {
     }
 }
 
+impl Default for ExcessPass {
+    fn default() -> ExcessPass {
+        ExcessPass::new(Instructions::best())
+    }
+}
+
 impl ExcessPass {
+    /// With loops for an instruction set that is available; the numbers are the same with any.
+    pub fn new(instructions: Instructions) -> ExcessPass {
+        ExcessPass {
+            at: Vec::new(),
+            correction: Vec::new(),
+            psi: Vec::new(),
+            slopes: Vec::new(),
+            work: ExcessWork::new(instructions),
+            out_of_bounds: [0; 2],
+        }
+    }
+
     /// Evaluates ψ and its slopes for the particles of `rows`; `species` is negative for those that have
     /// none, and `None` if all are of the only one; `tag` names them in errors.
     pub fn run(
@@ -86,7 +108,7 @@ impl ExcessPass {
         rows: &mut Rows,
     ) -> Result<(), EngineError> {
         let end = rows.excess.len();
-        let mut members = [0; LANES];
+        let mut members = [0; LISTED];
         for alpha in 0..plan.species.len() {
             let mut next = 0;
             while next < end {
@@ -94,7 +116,7 @@ impl ExcessPass {
                     None => Lanes::Run { first: next, count: LANES.min(end - next) },
                     Some(species) => {
                         let mut count = 0;
-                        while next < end && count < LANES {
+                        while next < end && count < LISTED {
                             members[count] = next as u32;
                             count += (species(rows.first + next) == alpha as i32) as usize;
                             next += 1;
@@ -148,9 +170,14 @@ impl ExcessPass {
                 if width < variables {
                     at.fill(0.0);
                 }
-                for (column, &v) in rows.columns.iter().enumerate() {
+                match width {
+                    2 => gather::<2>(lanes, rows, at),
+                    3 => gather::<3>(lanes, rows, at),
+                    4 => gather::<4>(lanes, rows, at),
+                    _ => gather_any(lanes, rows, at),
+                }
+                for &v in rows.columns {
                     let at = &mut at[v * n..][..n];
-                    lanes.each(|lane, row| at[lane] = rows.densities[row * width + column]);
                     if !polynomial(v).is_identity() {
                         polynomial(v).block(at, &mut correction[v * n..][..n]);
                     }
@@ -190,11 +217,67 @@ impl ExcessPass {
             lanes.each(|lane, row| rows.excess[row] = psi[lane]);
         }
         if !slopes_in_place {
-            for (k, slope) in slopes[..slope_width * n].chunks_exact(n).enumerate() {
-                lanes.each(|lane, row| rows.slopes[row * slope_width + k] = slope[lane]);
+            let slopes = &slopes[..slope_width * n];
+            match slope_width {
+                2 => spread::<2>(lanes, slopes, rows.slopes),
+                3 => spread::<3>(lanes, slopes, rows.slopes),
+                4 => spread::<4>(lanes, slopes, rows.slopes),
+                _ => spread_any(lanes, slopes, rows.slopes, slope_width),
             }
         }
         Ok(())
+    }
+}
+
+/// Writes rows of densities to the columns of `at` that they are of: few columns, row by row.
+fn gather<const W: usize>(lanes: Lanes, rows: &Rows, at: &mut [f64]) {
+    let n = lanes.count();
+    let mut columns: [&mut [f64]; W] = std::array::from_fn(|_| &mut [][..]);
+    let mut found = 0;
+    for (v, values) in at.chunks_exact_mut(n).enumerate() {
+        if let Some(column) = rows.columns.iter().position(|c| *c == v) {
+            columns[column] = values;
+            found += 1;
+        }
+    }
+    assert_eq!(found, W, "columns of variables that there are");
+    let densities = rows.densities.as_chunks::<W>().0;
+    lanes.each(|lane, row| {
+        let densities = &densities[row];
+        for c in 0..W {
+            // SAFETY: the columns have as many numbers as there are lanes.
+            unsafe { *columns[c].get_unchecked_mut(lane) = densities[c] };
+        }
+    });
+}
+
+/// The same of any number of columns, one after the other.
+fn gather_any(lanes: Lanes, rows: &Rows, at: &mut [f64]) {
+    let (n, width) = (lanes.count(), rows.columns.len());
+    for (column, &v) in rows.columns.iter().enumerate() {
+        let at = &mut at[v * n..][..n];
+        lanes.each(|lane, row| at[lane] = rows.densities[row * width + column]);
+    }
+}
+
+/// Writes columns as rows: few columns, row by row.
+fn spread<const W: usize>(lanes: Lanes, columns: &[f64], rows: &mut [f64]) {
+    let n = lanes.count();
+    let columns: [&[f64]; W] = std::array::from_fn(|c| &columns[c * n..][..n]);
+    let rows = rows.as_chunks_mut::<W>().0;
+    lanes.each(|lane, row| {
+        let row = &mut rows[row];
+        for c in 0..W {
+            // SAFETY: as above.
+            row[c] = unsafe { *columns[c].get_unchecked(lane) };
+        }
+    });
+}
+
+/// The same of any number of columns, one after the other.
+fn spread_any(lanes: Lanes, columns: &[f64], rows: &mut [f64], width: usize) {
+    for (k, column) in columns.chunks_exact(lanes.count()).enumerate() {
+        lanes.each(|lane, row| rows[row * width + k] = column[lane]);
     }
 }
 
@@ -326,6 +409,10 @@ mod tests {
             let expected = case.one_by_one(&mut single);
             assert_eq!(case.run(&mut pass, false).unwrap(), expected, "{text}");
             assert_eq!(pass.out_of_bounds, single.out_of_bounds, "{text}");
+            for (name, set) in Instructions::ALL.into_iter().filter(|(_, set)| set.available()) {
+                let bits = case.run(&mut ExcessPass::new(set), false).unwrap();
+                assert_eq!(bits, expected, "{name}: {text}");
+            }
             assert_eq!(pass.out_of_bounds != [0; 2], text.contains(BOUNDS), "{text}");
             if species.len() == 1 {
                 assert_eq!(case.run(&mut pass, true).unwrap(), expected, "{text}");

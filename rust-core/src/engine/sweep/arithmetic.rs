@@ -71,6 +71,16 @@ pub trait Arithmetic<I: Isa>: 'static {
         moving: bool,
     ) -> (Apart<Self::Reals>, Names<Self::Reals>);
 
+    /// The columns of rows of eight numbers, at 32 times their `places`; with `ALL`, else only the first four.
+    unsafe fn columns_at<const ALL: bool>(rows: *const Self::Scalar, places: *const u32) -> [Self::Reals; 8];
+
+    /// The same of rows that follow each other.
+    #[inline(always)]
+    unsafe fn own_columns(rows: *const Self::Scalar) -> [Self::Reals; 8] {
+        // SAFETY: the contract of `simd`.
+        unsafe { Self::columns_at::<true>(rows, IN_ORDER.as_ptr()) }
+    }
+
     unsafe fn load_quad(p: *const Self::Scalar) -> I::Quad;
 }
 
@@ -220,6 +230,21 @@ impl<I: Isa> Arithmetic<I> for Mixed {
     }
 
     #[inline(always)]
+    unsafe fn columns_at<const ALL: bool>(rows: *const f32, places: *const u32) -> [I::F32; 8] {
+        // SAFETY: the contract of `simd`.
+        unsafe {
+            let columns = I::columns::<ALL>(rows.cast(), places);
+            let mut numbers = [I::F32::constant(0.0); 8];
+            let mut c = 0;
+            while c < if ALL { 8 } else { 4 } {
+                numbers[c] = I::of_bits(columns[c]);
+                c += 1;
+            }
+            numbers
+        }
+    }
+
+    #[inline(always)]
     unsafe fn load_quad(p: *const f32) -> I::Quad {
         // SAFETY: the contract of `simd`.
         unsafe { <I::Quad as super::simd::Quad>::load_f32(p) }
@@ -323,6 +348,12 @@ impl<I: Isa> Arithmetic<I> for Double {
                 Names { tags: [tag_i, tag_j], species_j },
             )
         }
+    }
+
+    #[inline(always)]
+    unsafe fn columns_at<const ALL: bool>(rows: *const f64, places: *const u32) -> [I::F64; 8] {
+        // SAFETY: the contract of `simd`.
+        unsafe { I::wide_columns::<ALL>(rows.cast(), places) }
     }
 
     #[inline(always)]

@@ -11,6 +11,7 @@ use super::many_body::NearPairs;
 use super::simd::{Isa, Reals, Scalar, Words};
 use super::thermostat::{UNIT, draw};
 use super::weights::weights;
+use super::whole::keep_whole;
 use crate::engine::noise::PairNoise;
 use crate::engine::tally::Tally;
 use crate::model::kernel::Real;
@@ -33,7 +34,6 @@ pub unsafe fn evaluate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALL
 ) {
     // SAFETY: the contract of `simd`.
     unsafe {
-        near.reserve::<TALLY>(part.count() + 16);
         separate::<I, A, SEVERAL>(swept, kit, block, part);
         let mut sums = Sums::<A::Reals>::zero();
         if TALLY {
@@ -44,7 +44,12 @@ pub unsafe fn evaluate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALL
         }
         weights::<I, A>(swept, block, part);
         forces::<I, A, SEVERAL, TALLY>(swept, kit, block, part, &mut sums);
-        keep::<I, A, TALLY>(swept, block, near, part);
+        if swept.terms.whole {
+            keep_whole::<I, A, SEVERAL, TALLY>(swept, block, &mut near.whole, part);
+        } else {
+            near.reserve::<TALLY>(part.count() + 16);
+            keep::<I, A, TALLY>(swept, block, near, part);
+        }
         if TALLY {
             tally.pair += sum(sums.pair);
             tally.excess += sum(sums.excess);

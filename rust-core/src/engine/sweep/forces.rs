@@ -1,6 +1,6 @@
 //! What each term adds to the pairs, along `ê`.
 
-use super::arithmetic::{Apart, Arithmetic, Pairs};
+use super::arithmetic::{Arithmetic, Pairs};
 use super::block::Block;
 use super::evaluate::Kit;
 use super::layer::{Part, Swept};
@@ -80,13 +80,11 @@ impl<R: Reals> Sums<R> {
     }
 }
 
-/// Adds a force along `ê` to a virial.
+/// Adds forces `f d` to a virial.
 #[inline(always)]
-unsafe fn add_virial<R: Reals>(force: R, pairs: &Apart<R>, share: R, sum: &mut [R; 6]) {
+pub unsafe fn add_virial<R: Reals>(f: R, d: [R; 3], sum: &mut [R; 6]) {
     // SAFETY: the contract of `simd`.
     unsafe {
-        let f = force * (share * pairs.inverse);
-        let d = pairs.d;
         let fd = [f * d[0], f * d[1], f * d[2]];
         sum[0] = fd[0].mul_add(d[0], sum[0]);
         sum[1] = fd[1].mul_add(d[1], sum[1]);
@@ -131,6 +129,7 @@ pub unsafe fn forces<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY:
         let p_noise = block.tags[0].as_ptr();
         let p_share = block.share.as_ptr();
         let p_weight = if swept.variables == 1 { block.weight[0].as_ptr() } else { std::ptr::null() };
+        let p_whole = if terms.whole { block.conservative.as_mut_ptr() } else { std::ptr::null_mut() };
         let more = terms.has_more();
         let soft = SoftAt::<A::Reals>::new(terms.first_soft());
         let pull = terms.drag.as_ref().filter(|_| kit.noise.is_some());
@@ -144,15 +143,21 @@ pub unsafe fn forces<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY:
             let mut force = if more { A::Reals::load(p_conservative.add(k)) } else { zero };
             force = soft.add::<SEVERAL, TALLY>(r, kind, force, share, &mut sums.pair);
             if TALLY {
-                add_virial(force, &pairs.apart, share, &mut sums.virial);
+                add_virial(force * (share * pairs.apart.inverse), pairs.apart.d, &mut sums.virial);
             }
             if let Some(pull) = &pull {
                 let word = <A::Reals as Reals>::Words::load(p_noise.add(k));
                 let thermostat = pull.force::<SEVERAL>(pairs, word);
                 if TALLY {
-                    add_virial(thermostat, &pairs.apart, share, &mut sums.thermostat);
+                    let f = thermostat * (share * pairs.apart.inverse);
+                    add_virial(f, pairs.apart.d, &mut sums.thermostat);
                 }
                 force = force + thermostat;
+            }
+            if !p_whole.is_null() {
+                (force * pairs.apart.inverse).store(p_whole.add(k));
+                v += 1;
+                continue;
             }
             let weight = if p_weight.is_null() { zero } else { A::Reals::load(p_weight.add(k)) };
             let f = force * pairs.apart.inverse;

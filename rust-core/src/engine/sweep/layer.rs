@@ -45,6 +45,10 @@ pub struct Swept<'a, T, R> {
     pub terms: &'a Terms<T>,
     /// The many-body slopes, a number for each pass and species.
     pub slopes: Shared<f64>,
+    /// The same for pairs that are kept whole: rows of eight for all particles, then rows of the next eight …, with so
+    /// many numbers each time.
+    pub slope_rows: Shared<T>,
+    pub slope_room: usize,
     /// What to add to the number of a particle to get that of its accumulator, for each layer.
     pub offset: &'a [isize],
     /// Four numbers for each accumulator: force, and the density if there is one variable.
@@ -117,7 +121,12 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TA
         let grid = swept.grid;
         let mut tally = Tally::default();
         let layer_first = *swept.start.get_unchecked(layer * grid.rows * grid.bins);
-        near.clear(swept.terms.passes.len(), layer_first);
+        let passes = swept.terms.passes.len();
+        if swept.terms.whole {
+            near.whole.clear(passes, TALLY);
+        } else {
+            near.clear(passes, layer_first);
+        }
         let view = View::new(swept, layer);
         let ghosts = !swept.ghost.is_empty();
         let kit = Kit::<I, A>::new(swept);
@@ -221,10 +230,12 @@ unsafe fn part<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY: bool>
         evaluate::<I, A, SEVERAL, TALLY>(swept, kit, block, near, part, tally);
         let offset = *swept.offset.get_unchecked(layer);
         // Forces first: rows of weights take the place of theirs.
-        scatter::<I, A>(swept.sums, swept.variables, offset, block, part);
+        if !swept.terms.whole {
+            scatter::<I, A>(swept.sums, swept.variables, offset, block, part);
+            near.add::<TALLY>(block, part);
+        }
         if swept.variables > 1 {
             scatter_weights::<I, A, SEVERAL>(swept, offset, block, part);
         }
-        near.add::<TALLY>(block, part);
     }
 }

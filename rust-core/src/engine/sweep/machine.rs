@@ -4,7 +4,7 @@ mod excess;
 mod host;
 mod sort;
 mod stream;
-mod vectors;
+pub mod vectors;
 
 use super::block::Block;
 use super::compiled::{Compiled, Passes};
@@ -18,6 +18,7 @@ use super::scatter::Sum;
 use super::settings::Instructions;
 use super::simd::Scalar;
 use super::terms::Terms;
+use super::whole::SLOPES;
 use crate::engine::error::EngineError;
 use crate::engine::excess_pass::ExcessPass;
 use crate::engine::noise::PairNoise;
@@ -59,6 +60,8 @@ pub struct Machine<P: Compiled> {
     rows: Vec<f64>,
     excess: Vec<f64>,
     slopes: Vec<f64>,
+    /// Slopes as the second pass reads them if pairs are kept whole.
+    slope_rows: Vec<P::Scalar>,
     near: Vec<NearPairs<P::Scalar>>,
     tallies: Vec<Tally>,
     scratch: Vec<Scratch<P::Scalar>>,
@@ -77,6 +80,7 @@ struct Arrays<P: Compiled> {
     rows: Shared<f64>,
     excess: Shared<f64>,
     slopes: Shared<f64>,
+    slope_rows: Shared<P::Scalar>,
     near: Shared<NearPairs<P::Scalar>>,
     tallies: Shared<Tally>,
     scratch: Shared<Scratch<P::Scalar>>,
@@ -99,10 +103,11 @@ struct Scratch<T> {
 }
 
 impl<T: Scalar> Scratch<T> {
-    fn new(passes: usize) -> Scratch<T> {
+    fn new(passes: usize, instructions: Instructions) -> Scratch<T> {
         let mut block = Block::default();
         block.set_passes(passes);
-        Scratch { block, excess: ExcessPass::default(), low: [0.0; 3], high: [0.0; 3], fault: None }
+        let excess = ExcessPass::new(instructions);
+        Scratch { block, excess, low: [0.0; 3], high: [0.0; 3], fault: None }
     }
 }
 
@@ -131,7 +136,7 @@ impl<P: Compiled> Machine<P> {
         let count = plan.species.len();
         let columns: Vec<usize> =
             plan.passes.iter().flat_map(|d| (0..count).map(move |s| d * count + s)).collect();
-        let scratch = (0..threads).map(|_| Scratch::new(terms.passes.len())).collect();
+        let scratch = (0..threads).map(|_| Scratch::new(terms.passes.len(), instructions)).collect();
         let frame = Frame::around([0.0; 3], [1.0; 3], plan.dimensions, 1.0);
         Machine {
             instructions,
@@ -158,6 +163,7 @@ impl<P: Compiled> Machine<P> {
             rows: Vec::new(),
             excess: Vec::new(),
             slopes: Vec::new(),
+            slope_rows: Vec::new(),
             near: Vec::new(),
             tallies: Vec::new(),
             scratch,
@@ -173,6 +179,57 @@ impl<P: Compiled> Machine<P> {
     /// Numbers that a many-body pair needs of each particle.
     fn width(&self) -> usize {
         self.columns.len()
+    }
+
+    /// Numbers of the first eight slopes of all particles, of copies, and of a vector behind.
+    fn slope_room(&self) -> usize {
+        let copies = if self.is_ring() { self.layer(0).1 } else { 0 };
+        SLOPES * (self.particles + copies + SLACK)
+    }
+
+    /// Writes the slopes of particles from number `from` on as the second pass reads them.
+    ///
+    /// # Safety
+    /// No other thread writes or reads theirs.
+    unsafe fn write_slope_rows(&self, to: Shared<P::Scalar>, from: usize, slopes: &[f64]) {
+        if !self.terms.whole {
+            return;
+        }
+        match self.width() {
+            // SAFETY: the caller's.
+            2 => return unsafe { self.write_few_slopes::<2>(to, from, slopes) },
+            // SAFETY: the caller's.
+            3 => return unsafe { self.write_few_slopes::<3>(to, from, slopes) },
+            // SAFETY: the caller's.
+            4 => return unsafe { self.write_few_slopes::<4>(to, from, slopes) },
+            _ => {}
+        }
+        let room = self.slope_room();
+        for (k, row) in slopes.chunks_exact(self.width()).enumerate() {
+            for (c, slopes) in row.chunks(SLOPES).enumerate() {
+                // SAFETY: the caller's.
+                let to = unsafe { to.at(c * room + SLOPES * (from + k)) };
+                for (c, slope) in slopes.iter().enumerate() {
+                    // SAFETY: as above.
+                    unsafe { *to.add(c) = P::Scalar::of(*slope) };
+                }
+            }
+        }
+    }
+
+    /// The same of `W` slopes of each particle, no more than are read at once.
+    ///
+    /// # Safety
+    /// As above.
+    unsafe fn write_few_slopes<const W: usize>(&self, to: Shared<P::Scalar>, from: usize, slopes: &[f64]) {
+        let rows = slopes.as_chunks::<W>().0;
+        // SAFETY: the caller's.
+        let to = unsafe { std::slice::from_raw_parts_mut(to.at(SLOPES * from), SLOPES * rows.len()) };
+        for (to, row) in to.as_chunks_mut::<SLOPES>().0.iter_mut().zip(rows) {
+            for (to, slope) in to.iter_mut().zip(row) {
+                *to = P::Scalar::of(*slope);
+            }
+        }
     }
 
     fn first_fault(&mut self) -> Result<(), EngineError> {
@@ -215,6 +272,7 @@ impl<P: Compiled> Machine<P> {
             rows: Shared(self.rows.as_mut_ptr()),
             excess: Shared(self.excess.as_mut_ptr()),
             slopes: Shared(self.slopes.as_mut_ptr()),
+            slope_rows: Shared(self.slope_rows.as_mut_ptr()),
             near: Shared(self.near.as_mut_ptr()),
             tallies: Shared(self.tallies.as_mut_ptr()),
             scratch: Shared(self.scratch.as_mut_ptr()),
@@ -236,6 +294,8 @@ impl<P: Compiled> Machine<P> {
             owned_of_row: &self.owned_of_row,
             terms: &self.terms,
             slopes: arrays.slopes,
+            slope_rows: arrays.slope_rows,
+            slope_room: self.slope_room(),
             offset: &self.offset,
             sums: Shared(arrays.sums.0.cast()),
             densities: Shared(arrays.densities.0.cast()),

@@ -5,6 +5,7 @@ use super::block::Block;
 use super::layer::{Part, Swept};
 use super::scatter::add_to;
 use super::simd::{Isa, Quad, Scalar};
+use super::whole::{WholePairs, second_of_whole};
 
 /// What the first pass of a layer leaves for the second.
 #[derive(Debug, Clone, Default)]
@@ -19,6 +20,8 @@ pub struct NearPairs<T> {
     found: Vec<u32>,
     /// The first particle of the layer.
     pub first: u32,
+    /// Instead of all that, if pairs are kept whole.
+    pub whole: WholePairs<T>,
 }
 
 /// The lowest bits of a code: the number of the first particle in its part. Those above count second particles, from
@@ -47,7 +50,7 @@ impl<T> Rows<T> {
     }
 }
 
-impl<T> NearPairs<T> {
+impl<T: Scalar> NearPairs<T> {
     pub fn clear(&mut self, passes: usize, first: u32) {
         self.rows.resize_with(passes, Rows::default);
         self.apart.resize_with(passes, Rows::default);
@@ -72,10 +75,7 @@ impl<T> NearPairs<T> {
 
     /// Counts the pairs that were written behind the last.
     #[inline(always)]
-    pub unsafe fn add<const TALLY: bool>(&mut self, block: &Block<T>, part: Part)
-    where
-        T: Scalar,
-    {
+    pub unsafe fn add<const TALLY: bool>(&mut self, block: &Block<T>, part: Part) {
         // SAFETY: the rows have been written.
         unsafe {
             if self.rows.is_empty() {
@@ -102,13 +102,14 @@ impl<T> NearPairs<T> {
         self.rows.iter().chain(&self.apart).map(|rows| rows.0.capacity() * size_of::<[T; 4]>()).sum::<usize>()
             + self.parts.capacity() * size_of::<[u32; 2]>()
             + self.found.capacity() * size_of::<u32>()
+            + self.whole.bytes()
     }
 }
 
 /// Room for `more`, an eighth in advance: twice as much, as vectors grow by themselves, would be a good part of
 /// all memory.
 #[inline(always)]
-fn make_room<T>(values: &mut Vec<T>, more: usize) {
+pub fn make_room<T>(values: &mut Vec<T>, more: usize) {
     if values.capacity() - values.len() < more {
         values.reserve_exact(more.max(values.len() / 8));
     }
@@ -159,6 +160,9 @@ pub unsafe fn second_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const T
 ) {
     // SAFETY: the caller's.
     unsafe {
+        if swept.terms.whole {
+            return second_of_whole::<I, A, SEVERAL, TALLY>(swept, layer, &near.whole, virial);
+        }
         let offset = *swept.offset.get_unchecked(layer);
         let base = swept.sums.0.offset(4 * offset);
         let layer_base = base.add(4 * near.first as usize);

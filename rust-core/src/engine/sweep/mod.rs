@@ -36,8 +36,10 @@ mod simd;
 mod terms;
 mod thermostat;
 mod weights;
+mod whole;
 mod windows;
 
+pub(super) use machine::vectors;
 pub use pool::{Pool, part};
 pub use settings::{Instructions, Precision, Settings};
 

@@ -18,6 +18,8 @@ pub struct Terms<T> {
     pub apart: Vec<PairTerm>,
     pub drag: Option<Drag<T>>,
     pub passes: Vec<Pass<T>>,
+    /// Whether pairs are kept whole, and their forces added in the second pass alone.
+    pub whole: bool,
     /// For each species whether the first particle is of it, and whether the second: 1 or 0.
     pub is_species: Vec<[Table<T>; 2]>,
 }
@@ -140,6 +142,9 @@ pub struct Pass<T> {
     pub force: T,
 }
 
+/// If densities reach less far than this part of the cut-off, the second pass is for the few pairs within.
+const WHOLE: f64 = 0.7;
+
 /// One over a range; 0 for no range, beyond which everything is.
 fn inverse(range: f64) -> f64 {
     if range > 0.0 { 1.0 / range } else { f64::from(f32::MAX) }
@@ -183,6 +188,8 @@ impl<T: Scalar> Terms<T> {
             .iter()
             .map(|d| Pass::new(&plan.densities[*d].kernel, &plan.densities[*d].force_kernel))
             .collect();
+        let longest = plan.passes.iter().map(|d| plan.densities[*d].force_kernel.range()).fold(0.0, f64::max);
+        terms.whole = terms.passes.len() * count > 1 && longest > WHOLE * plan.cutoff;
         terms.drag = plan.thermostat.as_ref().map(|t| Drag {
             gamma: Table::new(t.gamma.iter().map(|x| T::of(*x))),
             sigma: Table::new(t.sigma.iter().map(|x| T::of(*x))),

@@ -174,7 +174,7 @@ fn fluids() -> Vec<(String, Fluid)> {
         })
         .collect();
     fluids.sort_by(|a, b| a.0.cmp(&b.0));
-    for (k, text) in [MANY, EXPONENTS].into_iter().enumerate() {
+    for (k, text) in [MANY, EXPONENTS, WIDE, SHORT, THREE].into_iter().enumerate() {
         let model = Model::parse("many", text).unwrap_or_else(|e| panic!("{e}"));
         fluids.push((format!("own {k}"), model.at(0.7).unwrap()));
     }
@@ -261,6 +261,70 @@ A = "0.4*n^2 + 0.1*m^3"
 gamma = 4.5
 range = 1.0
 exponent = 2
+"#;
+
+/// Three species and three densities, two of which reach equally far: more slopes than are read at once.
+const WIDE: &str = r#"
+title = "nine slopes"
+species = ["A", "B", "C"]
+[density.n]
+kernel = "quadratic"
+range = 1.0
+[density.m]
+kernel = "wendland-c2"
+range = 1.0
+[density.k]
+kernel = "lucy"
+range = 0.8
+self = true
+[excess_free_energy]
+A = "0.3*n^2 + 0.1*m_A*m_C + 0.7*k_B^2"
+B = "0.2*n_A*n_B + 0.05*m^2 + 0.4*k_C*n_A"
+C = "0.1*n_C^3 + 0.2*k^2"
+[[thermostat]]
+gamma = 4.5
+range = 1.0
+"#;
+
+/// Densities that reach much less far than a pair force.
+const SHORT: &str = r#"
+title = "short densities"
+species = ["A", "B"]
+[density.n]
+kernel = "quadratic"
+range = 0.6
+[density.m]
+kernel = "wendland-c2"
+range = 0.5
+[excess_free_energy]
+A = "0.3*n^2 + 0.1*m_A*m_B"
+B = "0.2*n_A*n_B + 0.05*m^2"
+[[pair]]
+between = ["A", "B"]
+form = "soft"
+strength = 20.0
+range = 1.0
+"#;
+
+const THREE: &str = r#"
+title = "one species, three densities"
+species = ["A"]
+[density.n]
+kernel = "quadratic"
+range = 0.8
+[density.m]
+kernel = "wendland-c2"
+range = 0.8
+[density.k]
+kernel = "cubic-spline"
+range = 0.6
+[excess_free_energy]
+A = "0.3*n^2*k + 0.1*m^3"
+[[pair]]
+between = ["A", "A"]
+form = "soft"
+strength = 20.0
+range = 1.0
 "#;
 
 #[test]

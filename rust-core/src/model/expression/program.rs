@@ -142,11 +142,13 @@ impl Program {
         }
     }
 
-    /// The same, with each output where `out` says, which gives slices of `lanes` numbers.
+    /// The same, with each output where `out` says, which gives slices of `lanes` numbers. Inlined, so that the caller
+    /// decides what vectors the loops are compiled to: the bits are the same with any.
     ///
     /// # Panics
     ///
     /// If `at` is shorter than `lanes` times [`variables`](Self::variables), or one of `out` of another length.
+    #[inline(always)]
     pub(crate) fn eval_block_into<'o>(
         &self,
         lanes: usize,
@@ -184,6 +186,7 @@ impl Program {
 }
 
 impl Instruction {
+    #[inline(always)]
     fn run<'a>(&self, to: &mut [f64], from: impl Fn(usize) -> &'a [f64]) {
         let c = self.constant;
         match self.operation {
@@ -218,12 +221,14 @@ impl Instruction {
     }
 }
 
+#[inline(always)]
 fn map(to: &mut [f64], a: &[f64], f: impl Fn(f64) -> f64) {
     for (to, &a) in to.iter_mut().zip(a) {
         *to = f(a);
     }
 }
 
+#[inline(always)]
 fn zip(to: &mut [f64], a: &[f64], b: &[f64], f: impl Fn(f64, f64) -> f64) {
     for (to, (&a, &b)) in to.iter_mut().zip(a.iter().zip(b)) {
         *to = f(a, b);

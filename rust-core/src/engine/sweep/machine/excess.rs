@@ -1,5 +1,6 @@
 //! Densities of the particles, and ψ at them.
 
+use super::vectors::{self, Loop};
 use super::{Arrays, Machine};
 use crate::engine::error::EngineError;
 use crate::engine::excess::ExcessPlan;
@@ -7,6 +8,8 @@ use crate::engine::excess_pass::{ExcessPass, LANES, Rows};
 use crate::engine::plan::Plan;
 use crate::engine::sweep::compiled::Compiled;
 use crate::engine::sweep::pool::Pool;
+use crate::engine::sweep::simd::Scalar;
+use crate::engine::sweep::whole::SLOPES;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Particles whose densities are gathered at a time: they stay in the first-level cache until ψ is evaluated, and
@@ -50,6 +53,9 @@ impl<P: Compiled> Machine<P> {
         self.excess.resize(n, 0.0);
         self.rows.resize(width * n, 0.0);
         self.slopes.resize(width * (n + copies), 0.0);
+        if self.terms.whole {
+            self.slope_rows.resize(width.div_ceil(SLOPES) * self.slope_room(), P::Scalar::of(0.0));
+        }
         if plan.excess.iter().all(|e| matches!(e, ExcessPlan::Constant(0.0))) {
             self.excess.fill(0.0);
             return None;
@@ -62,6 +68,10 @@ impl<P: Compiled> Machine<P> {
         if self.is_ring() {
             let (width, n, copies) = (self.width(), self.particles, self.layer(0).1);
             self.slopes.copy_within(..width * copies, width * n);
+            let room = self.slope_room();
+            for first in (0..self.slope_rows.len()).step_by(room) {
+                self.slope_rows.copy_within(first..first + SLOPES * copies, first + SLOPES * n);
+            }
         }
     }
 
@@ -94,14 +104,24 @@ impl<P: Compiled> Machine<P> {
             unsafe { self.gather_densities(arrays, layer, from, own, densities) };
             let mut rows = Rows { first: from, columns: &self.columns, densities, excess, slopes };
             self.evaluate(plan, pass, tag, &mut rows)?;
+            // SAFETY: the layer's own.
+            unsafe { self.write_slope_rows(arrays.slope_rows, from, rows.slopes) };
         }
         Ok(())
     }
 
-    /// What a particle itself adds to the densities of the passes: `w(0)`, or nothing.
+    /// What a particle itself adds to the densities of the passes: `w(0)` of its species, or nothing. A row for each
+    /// species.
     fn own_weights(&self, plan: &Plan) -> Vec<f64> {
-        let densities = plan.passes.iter().map(|d| &plan.densities[*d]);
-        densities.map(|d| if d.includes_self { d.kernel.value(0.0) } else { 0.0 }).collect()
+        let count = plan.species.len();
+        let mut rows = Vec::with_capacity(count * self.width());
+        for species in 0..count {
+            for d in plan.passes.iter().map(|d| &plan.densities[*d]) {
+                let own = if d.includes_self { d.kernel.value(0.0) } else { 0.0 };
+                rows.extend((0..count).map(|s| if s == species { own } else { 0.0 }));
+            }
+        }
+        rows
     }
 
     /// ψ of the particles of `rows`, by what tells them apart.
@@ -165,33 +185,53 @@ impl<P: Compiled> Machine<P> {
             let sums = arrays.densities.at(quads * place(accumulators));
             std::slice::from_raw_parts(sums.cast::<f64>(), 4 * quads * (count / width))
         };
-        if width == 4 * quads {
-            take(out, sums(here), before.map(sums));
-        } else {
-            // What fills rows of four is left out.
-            for (k, row) in out.chunks_exact_mut(width).enumerate() {
-                let from = 4 * quads * k;
-                let columns = |accumulators| &sums(accumulators)[from..from + width];
-                take(row, columns(here), before.map(columns));
-            }
-        }
-        let count = width / own.len();
-        for (k, row) in out.chunks_exact_mut(width).enumerate() {
-            let species = self.species.get(from + k).map_or(0, |s| *s as usize);
-            for (pass, own) in own.iter().enumerate() {
-                row[pass * count + species] += own;
+        let (here, before) = (sums(here), before.map(sums));
+        let species = if self.species.is_empty() { &[][..] } else { &self.species[from..][..count / width] };
+        let instructions = self.instructions;
+        match width {
+            2 => vectors::run(instructions, Take::<2> { out, here, before, own, species }),
+            3 => vectors::run(instructions, Take::<3> { out, here, before, own, species }),
+            4 => vectors::run(instructions, Take::<4> { out, here, before, own, species }),
+            _ => {
+                for (k, row) in out.chunks_exact_mut(width).enumerate() {
+                    // What fills rows of four is left out.
+                    let from = 4 * quads * k;
+                    let own = &own[width * species.get(k).map_or(0, |s| *s as usize)..][..width];
+                    for (c, n) in row.iter_mut().enumerate() {
+                        *n = here[from + c] + before.map_or(0.0, |before| before[from + c]) + own[c];
+                    }
+                }
             }
         }
     }
 }
 
-/// Densities from the sums of a layer, and of the layer before.
-#[inline(always)]
-fn take(out: &mut [f64], here: &[f64], before: Option<&[f64]>) {
-    match before {
-        None => out.copy_from_slice(here),
-        Some(before) => {
-            out.iter_mut().zip(here.iter().zip(before)).for_each(|(n, (here, before))| *n = here + before)
+/// Densities from the sums of a layer, of the layer before, and what each species adds to its own; `W` of each
+/// particle, in rows of four.
+struct Take<'a, const W: usize> {
+    out: &'a mut [f64],
+    here: &'a [f64],
+    before: Option<&'a [f64]>,
+    own: &'a [f64],
+    /// Empty with one.
+    species: &'a [u8],
+}
+
+impl<const W: usize> Loop for Take<'_, W> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let own = self.own.as_chunks::<W>().0;
+        let out = self.out.as_chunks_mut::<W>().0;
+        let here = self.here.as_chunks::<4>().0;
+        let before = self.before.map_or(&[][..], |before| before.as_chunks::<4>().0);
+        for (k, (n, here)) in out.iter_mut().zip(here).enumerate() {
+            let own = &own[self.species.get(k).map_or(0, |s| *s as usize)];
+            let before = before.get(k).unwrap_or(&[0.0; 4]);
+            for c in 0..W {
+                n[c] = here[c] + before[c] + own[c];
+            }
         }
     }
 }

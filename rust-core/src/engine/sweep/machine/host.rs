@@ -26,10 +26,14 @@ impl<P: Compiled> Machine<P> {
     /// Slopes of ghosts from the host.
     pub fn slopes_from_host(&mut self, slopes: &[f64]) {
         let width = self.width();
+        let rows = Shared(self.slope_rows.as_mut_ptr());
         for (s, k) in self.order.iter().enumerate() {
             let k = *k as usize;
             if k >= self.owned {
-                self.slopes[width * s..][..width].copy_from_slice(&slopes[width * k..][..width]);
+                let slopes = &slopes[width * k..][..width];
+                self.slopes[width * s..][..width].copy_from_slice(slopes);
+                // SAFETY: nobody else is at work.
+                unsafe { self.write_slope_rows(rows, s, slopes) };
             }
         }
     }
@@ -149,6 +153,7 @@ impl<P: Compiled> Machine<P> {
             + bytes(&self.rows)
             + bytes(&self.excess)
             + bytes(&self.slopes)
+            + bytes(&self.slope_rows)
     }
 }
 

@@ -97,7 +97,8 @@ pub trait Reals: Real {
     unsafe fn mask_below(self, other: Self) -> u32;
     /// The lanes of `mask` one after the other, in the first lanes; anything in the others.
     unsafe fn compress(self, mask: u32) -> Self;
-    /// `table[which[k]]` in lane `k`, of a table of as many numbers as there are lanes.
+    /// `table[which[k]]` in lane `k`, of a table of as many numbers as there are lanes. Higher bits of `which` than
+    /// count lanes are left out.
     unsafe fn pick(table: *const Self::Scalar, which: Self::Words) -> Self;
     /// `table[index[k]]` in lane `k`.
     unsafe fn lookup(table: *const Self::Scalar, index: Self::Words) -> Self;

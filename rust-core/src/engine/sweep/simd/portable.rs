@@ -153,7 +153,7 @@ macro_rules! lanes {
             }
             #[inline(always)]
             unsafe fn pick(table: *const $scalar, which: Lanes<u32>) -> Self {
-                unsafe { Self::lookup(table, which) }
+                unsafe { Self::lookup(table, Lanes(which.0.map(|w| w % LANES as u32))) }
             }
             #[inline(always)]
             unsafe fn lookup(table: *const $scalar, index: Lanes<u32>) -> Self {
