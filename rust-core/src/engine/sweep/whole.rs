@@ -168,7 +168,7 @@ pub unsafe fn keep_whole<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TA
         let to_share =
             if TALLY { whole.column(NEAR + swept.terms.passes.len()) } else { std::ptr::null_mut() };
         let (places, codes) = (at(&mut whole.places, whole.end), at(&mut whole.codes, whole.end));
-        let which = block.which.as_ptr();
+        let which = block.which.as_ptr().add(part.pairs[0]);
         let j = block.j.as_ptr().add(part.pairs[0]);
         let mut v = 0;
         while v < vectors {
