@@ -2,9 +2,12 @@
 
 mod excess;
 mod host;
+mod layout;
 mod sort;
 mod stream;
 mod vectors;
+
+pub use host::Out;
 
 use super::block::Block;
 use super::compiled::{Compiled, Passes};
@@ -96,13 +99,22 @@ struct Scratch<T> {
     low: [f64; 3],
     high: [f64; 3],
     fault: Option<EngineError>,
+    /// The lowest tag of the particles whose forces are not finite.
+    lost: Option<i32>,
 }
 
 impl<T: Scalar> Scratch<T> {
     fn new(passes: usize) -> Scratch<T> {
         let mut block = Block::default();
         block.set_passes(passes);
-        Scratch { block, excess: ExcessPass::default(), low: [0.0; 3], high: [0.0; 3], fault: None }
+        Scratch {
+            block,
+            excess: ExcessPass::default(),
+            low: [0.0; 3],
+            high: [0.0; 3],
+            fault: None,
+            lost: None,
+        }
     }
 }
 
@@ -182,6 +194,14 @@ impl<P: Compiled> Machine<P> {
             }
         }
         Ok(())
+    }
+
+    /// A force that is not finite: that of the lowest tag.
+    fn lost(&mut self) -> Result<(), EngineError> {
+        match self.scratch.iter_mut().filter_map(|scratch| scratch.lost.take()).min() {
+            None => Ok(()),
+            Some(tag) => Err(EngineError::Force { tag }),
+        }
     }
 
     /// Particles of layer `layer`, and the first of them.
@@ -276,6 +296,7 @@ impl<P: Compiled> Machine<P> {
     /// The first pass over all layers.
     pub fn first(&mut self, pool: &Pool) {
         let layers = self.grid.layers;
+        self.lay_out_all();
         self.near.resize_with(layers, NearPairs::default);
         let arrays = self.arrays();
         let this = &*self;

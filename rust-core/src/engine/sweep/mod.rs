@@ -53,7 +53,7 @@ use crate::model::expression::TooLarge;
 use arithmetic::{Double, Mixed};
 use frame::Frame;
 use grid::Grid;
-use machine::{Given, Machine};
+use machine::{Given, Machine, Out};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -67,7 +67,8 @@ pub enum Space<'a> {
 }
 
 /// Forces of one fluid, fast. An evaluation is [`Sweep::first`], for hosts with ghosts then a round of
-/// slopes from owners to ghosts, and [`Sweep::second`].
+/// slopes from owners to ghosts, and [`Sweep::second`]. Where there are no ghosts nothing is kept of all particles
+/// between the passes: the first call only sorts, and the second does everything else, layer by layer.
 pub struct Sweep {
     plan: Plan,
     settings: Settings,
@@ -222,14 +223,15 @@ impl Sweep {
             .is_some_and(|frame| Grid::new(&frame, self.plan.cutoff, 1).is_some())
     }
 
-    /// Finds pairs, adds the forces that need no density, sums densities and evaluates ψ.
+    /// Sorts the particles; if there are ghosts, also finds pairs, adds the forces that need no density, sums
+    /// densities and evaluates ψ.
     ///
     /// `v` may be empty and `step` `None` where no thermostat acts; with `step` `None` only conservative
     /// forces are computed. Of `want`, the totals: what is asked for of each particle is the business
     /// of [`Engine`](super::Engine).
     ///
     /// # Errors
-    /// A position or ψ that is not finite, a tag or type out of range, arrays of different lengths, a
+    /// A position that is not finite, or, with ghosts, ψ; a tag or type out of range, arrays of different lengths, a
     /// box that does not fit.
     pub fn first(
         &mut self,
@@ -294,14 +296,15 @@ impl Sweep {
         &mut self.slopes
     }
 
-    /// Adds many-body forces; writes all forces on owned particles to `force`, or adds them to what is
-    /// there, and returns what was asked for.
+    /// Adds many-body forces, without ghosts after all that [`Sweep::first`] leaves out then; writes all forces on owned
+    /// particles to `force`, or adds them to what is there, and returns what was asked for.
     ///
     /// A pair of an owned particle and a ghost is computed for the owned particle alone: its other half
     /// is that of the other rank, and half of its energy and virial.
     ///
     /// # Errors
-    /// A force that is not finite; arrays of other lengths than in [`Sweep::first`].
+    /// A force that is not finite, or, without ghosts, ψ: then some forces may have been written. Arrays of other
+    /// lengths than in [`Sweep::first`].
     pub fn second(
         &mut self,
         particles: &Particles,
@@ -317,19 +320,21 @@ impl Sweep {
         self.counts.force += 1;
         self.counts.energy += self.want.energy as u64;
         self.counts.virial += self.want.virial as u64;
-        let (pool, slopes) = (&self.pool, &self.slopes);
+        let (plan, pool, slopes) = (&self.plan, &self.pool, &self.slopes);
         let ghosts = self.owned < self.all;
         let times = &mut self.times;
-        let mut since = Instant::now();
+        let out = Out::new(force, add, particles.tag);
         with!(&mut self.machine, m => {
-            // Without ghosts that is done.
             if ghosts {
+                let mut since = Instant::now();
                 m.slopes_from_host(slopes);
                 m.second(pool);
+                lap(&mut since, &mut times.second);
+                m.forces(pool, out)?;
+                lap(&mut since, &mut times.forces);
+            } else {
+                m.stream(pool, plan, out, times)?;
             }
-            lap(&mut since, &mut times.second);
-            m.forces(pool, force, add, particles.tag)?;
-            lap(&mut since, &mut times.forces);
             Ok(m.tally())
         })
     }
@@ -389,7 +394,7 @@ fn first<P: compiled::Compiled>(
     machine.sort(pool, frame, grid, given)?;
     lap(&mut since, &mut times.sort);
     if given.particles.owned == count {
-        return machine.stream(pool, plan, given.particles.tag, times);
+        return Ok(());
     }
     machine.first(pool);
     lap(&mut since, &mut times.first);

@@ -326,6 +326,53 @@ fn any_number_of_threads_gives_the_same_bits() {
     }
 }
 
+/// Accumulators are used again as a sweep goes through its layers, and slabs of threads begin anywhere: boxes of a few
+/// layers and of many, full and nearly empty ones, swept by the same engines one after another.
+#[test]
+fn any_number_of_layers_and_threads_gives_the_forces_of_the_plain_engine() {
+    for fluid in [shipped("warren2003-set6.toml"), shipped("standard-dpd.toml"), many()] {
+        let engines = (1..=5)
+            .map(|t| Sweep::new(&fluid, settings(Precision::Double, Instructions::best(), t)).unwrap());
+        let mut engines: Vec<Sweep> = engines.collect();
+        for (layers, periodic) in
+            [2, 9, 3, 12, 4, 7, 5, 6, 8].into_iter().flat_map(|l| [(l, true), (l, false)])
+        {
+            let lengths = [3.0, 3.0, layers as f64 + 0.3].map(|l| l * fluid.cutoff());
+            let domain = PeriodicBox::orthogonal([0.0; 3], lengths, [true, true, periodic]).unwrap();
+            let mut cloud = Cloud::new(domain, 3, fluid.species.len(), 25 * layers, layers as u64);
+            for x in &mut cloud.x {
+                // Fewer and fewer with height.
+                x[2] *= x[2] / lengths[2];
+            }
+            let (force, tally) = plain(&fluid, &cloud);
+            let (first, first_tally) = swept(&mut engines[0], &cloud, Want::TOTALS);
+            let off = difference(&force, &first).max(tally_difference(&tally, &first_tally));
+            assert!(off < tolerance(Precision::Double), "{layers} layers, periodic {periodic}: {off:.1e}");
+            for sweep in &mut engines {
+                let (here, totals) = swept(sweep, &cloud, Want::TOTALS);
+                assert!(here == first && totals == first_tally, "{layers} layers, {:?}", sweep.settings());
+            }
+        }
+    }
+}
+
+/// Of a box without ghosts, forces and densities of a few layers only are summed at a time.
+#[test]
+fn longer_boxes_have_no_more_accumulators() {
+    for (fluid, most) in [(shipped("warren2003-set6.toml"), 120.0), (many(), 200.0)] {
+        let memory = |layers: usize| {
+            let domain =
+                PeriodicBox::orthogonal([0.0; 3], [6.0, 6.0, layers as f64 + 0.1], [true; 3]).unwrap();
+            let cloud = Cloud::new(domain, 3, fluid.species.len(), 300 * layers, 5);
+            let mut sweep = Sweep::new(&fluid, settings(Precision::Mixed, Instructions::best(), 1)).unwrap();
+            swept(&mut sweep, &cloud, Want::FORCES);
+            sweep.memory() as f64
+        };
+        let per_particle = (memory(40) - memory(20)) / (300.0 * 20.0);
+        assert!(per_particle < most, "{per_particle} bytes");
+    }
+}
+
 #[test]
 fn the_order_of_particles_matters_to_rounding_alone() {
     let fluid = many();

@@ -5,7 +5,7 @@ mod fill;
 mod fractions;
 mod span;
 
-use super::{Given, Machine, SLACK, Shared, Sum, vectors};
+use super::{Given, Machine, SLACK, Shared, vectors};
 use crate::engine::error::EngineError;
 use crate::engine::sweep::compiled::Compiled;
 use crate::engine::sweep::frame::Frame;
@@ -65,6 +65,8 @@ impl<P: Compiled> Machine<P> {
         self.place(pool);
         self.fill(pool, given);
         self.copy_first_layer();
+        self.tallies.clear();
+        self.tallies.resize(grid.layers, Tally::default());
         Ok(())
     }
 
@@ -150,7 +152,7 @@ impl<P: Compiled> Machine<P> {
         });
     }
 
-    /// Fills the arrays in the order of bins, and lays out accumulators.
+    /// Fills the arrays in the order of bins.
     fn fill(&mut self, pool: &Pool, given: &Given) {
         let copies = if self.is_ring() { self.layer(0).1 } else { 0 };
         let total = self.particles + copies;
@@ -192,7 +194,6 @@ impl<P: Compiled> Machine<P> {
             }
         });
         self.find_owned();
-        self.lay_out();
     }
 
     /// The owned particles of each row, if there are ghosts.
@@ -218,24 +219,6 @@ impl<P: Compiled> Machine<P> {
             };
             self.owned_of_row.push(owned);
         }
-    }
-
-    /// Accumulators of a layer: of its own particles, then of those of the next.
-    fn lay_out(&mut self) {
-        let layers = self.grid.layers;
-        self.offset.clear();
-        let mut sum = 0;
-        for layer in 0..layers {
-            let (first, own) = self.layer(layer);
-            self.offset.push(sum as isize - first as isize);
-            sum += own + self.next_layer(layer);
-        }
-        self.sums.resize(sum.max(1), Sum::default());
-        let variables = self.width();
-        let quads = if variables > 1 { variables.div_ceil(4) } else { 0 };
-        self.densities.resize(quads * sum, Sum::default());
-        self.tallies.clear();
-        self.tallies.resize(layers, Tally::default());
     }
 
     /// Copies of the first layer behind the last, one period further.

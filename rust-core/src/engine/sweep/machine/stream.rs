@@ -1,9 +1,11 @@
-//! All passes over a box without ghosts in one go, so that what the first pass of a layer leaves for the second is used
-//! while it is still in the cache, and no more of it is kept than of a few layers.
+//! All passes over a box without ghosts in one go, so that what a pass leaves for the next is used while it is still in
+//! the cache, and no more of it is kept than of a few layers.
 //!
 //! Each thread does a slab of layers. ψ of a layer needs the first pass of that layer and of the one before; many-body
-//! forces need ψ of the layer and of the one behind. Where slabs meet, layers wait for all threads.
+//! forces need ψ of the layer and of the one behind; forces are complete after both passes of the layer and of the one
+//! before. Where slabs meet, layers wait for all threads.
 
+use super::host::Out;
 use super::{Arrays, Machine};
 use crate::engine::error::EngineError;
 use crate::engine::plan::Plan;
@@ -16,7 +18,7 @@ use crate::engine::sweep::pool::Pool;
 use std::ops::Range;
 use std::time::Instant;
 
-/// Layers of a slab that are kept at once: its first, its last, and two between.
+/// Layers of a slab whose pairs are kept at once: its first, its last, and two between.
 const KEPT: usize = 4;
 
 /// What all threads work with.
@@ -27,27 +29,29 @@ struct Stream<'a, P: Compiled> {
     plan: &'a Plan,
     /// What particles add to their own densities, unless ψ is zero whatever they are.
     own: Option<Vec<f64>>,
-    tag: &'a [i32],
+    out: Out<'a>,
 }
 
 impl<P: Compiled> Machine<P> {
-    /// The first pass, ψ and the second pass over all layers. `times` are those of the caller's thread.
+    /// The first pass, ψ and the second pass over all layers, and their forces. `times` are those of the caller's
+    /// thread.
     ///
     /// # Errors
-    /// ψ that is not finite.
+    /// ψ that is not finite, or a force: of the lowest tag.
     pub fn stream(
         &mut self,
         pool: &Pool,
         plan: &Plan,
-        tag: &[i32],
+        out: Out,
         times: &mut Times,
     ) -> Result<(), EngineError> {
         let threads = pool.threads();
         self.near.resize_with(KEPT * threads, NearPairs::default);
         let own = self.prepare_excess(plan);
         let slabs: Vec<Range<usize>> = (0..threads).map(|t| self.slab(t, threads)).collect();
+        self.lay_out(&slabs);
         let arrays = self.arrays();
-        let stream = Stream { machine: self, swept: self.swept(arrays), arrays, plan, own, tag };
+        let stream = Stream { machine: self, swept: self.swept(arrays), arrays, plan, own, out };
         let shared_times = Shared(times as *mut Times);
         let timed = |t: usize, work: &dyn Fn(&mut Times)| {
             let mut unseen = Times::default();
@@ -59,9 +63,10 @@ impl<P: Compiled> Machine<P> {
         self.first_fault()?;
         self.copy_slopes();
         let arrays = self.arrays();
-        let stream = Stream { machine: self, swept: self.swept(arrays), arrays, plan, own: None, tag };
+        let stream = Stream { machine: self, swept: self.swept(arrays), arrays, plan, own: None, out };
         pool.run(&|t| timed(t, &|times| stream.second_at_ends(t, slabs[t].clone(), times)));
-        Ok(())
+        pool.run(&|t| timed(t, &|times| stream.forces_of_first(t, slabs[t].clone(), times)));
+        self.lost()
     }
 
     /// The layers of a thread: all slabs have about the same number of pairs.
@@ -97,11 +102,12 @@ impl<P: Compiled> Stream<'_, P> {
         unsafe { &mut *self.arrays.near.at(KEPT * t + at) }
     }
 
-    /// First passes of a slab, ψ of all its layers but the first, and the second pass of those between.
+    /// First passes of a slab, ψ of all its layers but the first, the second pass of those between, and the forces of
+    /// those of them that are not next to the first.
     fn within(&self, t: usize, slab: Range<usize>, times: &mut Times) {
         // SAFETY: each thread has its own scratch.
         let scratch = unsafe { &mut *self.arrays.scratch.at(t) };
-        scratch.fault = None;
+        (scratch.fault, scratch.lost) = (None, None);
         let mut since = Instant::now();
         for layer in slab.clone() {
             // SAFETY: of this thread's slab.
@@ -118,6 +124,10 @@ impl<P: Compiled> Stream<'_, P> {
                 self.second(t, &slab, layer - 1);
                 lap(&mut since, &mut times.second);
             }
+            if layer > slab.start + 2 {
+                self.forces(t, layer - 1);
+                lap(&mut since, &mut times.forces);
+            }
         }
     }
 
@@ -130,7 +140,7 @@ impl<P: Compiled> Stream<'_, P> {
         lap(&mut since, &mut times.excess);
     }
 
-    /// The second pass of the first layer of a slab, and of the last.
+    /// The second pass of the first layer of a slab, and of the last; the forces of the second, and of the last.
     fn second_at_ends(&self, t: usize, slab: Range<usize>, times: &mut Times) {
         let mut since = Instant::now();
         if !slab.is_empty() {
@@ -140,6 +150,22 @@ impl<P: Compiled> Stream<'_, P> {
             }
         }
         lap(&mut since, &mut times.second);
+        if slab.len() > 1 {
+            self.forces(t, slab.start + 1);
+        }
+        if slab.len() > 2 {
+            self.forces(t, slab.end - 1);
+        }
+        lap(&mut since, &mut times.forces);
+    }
+
+    /// The forces of the first layer of a slab, which the last of another adds to.
+    fn forces_of_first(&self, t: usize, slab: Range<usize>, times: &mut Times) {
+        let mut since = Instant::now();
+        if !slab.is_empty() {
+            self.forces(t, slab.start);
+        }
+        lap(&mut since, &mut times.forces);
     }
 
     fn excess(&self, t: usize, layer: usize) {
@@ -152,7 +178,7 @@ impl<P: Compiled> Stream<'_, P> {
                 layer,
                 self.plan,
                 own,
-                self.tag,
+                self.out.tag(),
                 &mut scratch.excess,
             );
             if let Err(fault) = done {
@@ -169,6 +195,14 @@ impl<P: Compiled> Stream<'_, P> {
         unsafe {
             let near = self.near(t, slab, layer);
             self.machine.second_of_layer(&self.swept, self.arrays, layer, near);
+        }
+    }
+
+    fn forces(&self, t: usize, layer: usize) {
+        // SAFETY: each thread has its own scratch, each layer is done once, when all passes that add to it are.
+        unsafe {
+            let scratch = &mut *self.arrays.scratch.at(t);
+            self.machine.forces_of_layer(self.arrays, layer, self.out, &mut scratch.lost);
         }
     }
 }
