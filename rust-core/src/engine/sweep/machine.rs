@@ -75,6 +75,11 @@ pub struct Machine<P: Compiled> {
 
 /// Where threads write, each its own part.
 struct Arrays<P: Compiled> {
+    x: [Shared<f32>; 3],
+    q: [Shared<u16>; 3],
+    records: Shared<P::Record>,
+    species: Shared<u8>,
+    ghost: Shared<bool>,
     sums: Shared<Sum>,
     densities: Shared<Sum>,
     rows: Shared<f64>,
@@ -230,6 +235,11 @@ impl<P: Compiled> Machine<P> {
     /// The arrays that threads write disjoint parts of.
     fn arrays(&mut self) -> Arrays<P> {
         Arrays {
+            x: self.x.each_mut().map(|x| Shared(x.as_mut_ptr())),
+            q: self.q.each_mut().map(|q| Shared(q.as_mut_ptr())),
+            records: Shared(self.records.as_mut_ptr()),
+            species: Shared(self.species.as_mut_ptr()),
+            ghost: Shared(self.ghost.as_mut_ptr()),
             sums: Shared(self.sums.as_mut_ptr()),
             densities: Shared(self.densities.as_mut_ptr()),
             rows: Shared(self.rows.as_mut_ptr()),
@@ -246,11 +256,11 @@ impl<P: Compiled> Machine<P> {
             frame: &self.frame,
             grid: &self.grid,
             start: &self.start,
-            x: [&self.x[0], &self.x[1], &self.x[2]],
+            x: arrays.x,
             quantum: self.quantum,
-            q: [&self.q[0], &self.q[1], &self.q[2]],
-            records: &self.records,
-            species: &self.species,
+            q: arrays.q,
+            records: arrays.records,
+            species: arrays.species,
             ghost: &self.ghost,
             owned: &self.owned_bits,
             owned_of_row: &self.owned_of_row,

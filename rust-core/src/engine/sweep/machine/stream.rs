@@ -3,10 +3,10 @@
 //!
 //! Each thread does a slab of layers. ψ of a layer needs the first pass of that layer and of the one before; many-body
 //! forces need ψ of the layer and of the one behind; forces are complete after both passes of the layer and of the one
-//! before. Where slabs meet, layers wait for all threads.
+//! before. The arrays in the order of cells are filled one layer ahead. Where slabs meet, layers wait for all threads.
 
 use super::host::Out;
-use super::{Arrays, Machine};
+use super::{Arrays, Given, Machine, SLACK};
 use crate::engine::error::EngineError;
 use crate::engine::plan::Plan;
 use crate::engine::sweep::Times;
@@ -27,14 +27,15 @@ struct Stream<'a, P: Compiled> {
     swept: Swept<'a, P::Scalar, P::Record>,
     arrays: Arrays<P>,
     plan: &'a Plan,
+    given: &'a Given<'a>,
     /// What particles add to their own densities, unless ψ is zero whatever they are.
     own: Option<Vec<f64>>,
     out: Out<'a>,
 }
 
 impl<P: Compiled> Machine<P> {
-    /// The first pass, ψ and the second pass over all layers, and their forces. `times` are those of the caller's
-    /// thread.
+    /// Everything that comes after [`Machine::find_order`]: the first pass, ψ and the second pass over all layers, and
+    /// their forces. `times` are those of the caller's thread.
     ///
     /// # Errors
     /// ψ that is not finite, or a force: of the lowest tag.
@@ -42,6 +43,7 @@ impl<P: Compiled> Machine<P> {
         &mut self,
         pool: &Pool,
         plan: &Plan,
+        given: &Given,
         out: Out,
         times: &mut Times,
     ) -> Result<(), EngineError> {
@@ -50,20 +52,24 @@ impl<P: Compiled> Machine<P> {
         let own = self.prepare_excess(plan);
         let slabs: Vec<Range<usize>> = (0..threads).map(|t| self.slab(t, threads)).collect();
         self.lay_out(&slabs);
-        let arrays = self.arrays();
-        let stream = Stream { machine: self, swept: self.swept(arrays), arrays, plan, own, out };
         let shared_times = Shared(times as *mut Times);
         let timed = |t: usize, work: &dyn Fn(&mut Times)| {
             let mut unseen = Times::default();
             // SAFETY: of one thread alone.
             work(if t == 0 { unsafe { &mut *shared_times.at(0) } } else { &mut unseen });
         };
+        let arrays = self.arrays();
+        let this = &*self;
+        pool.run(&|t| timed(t, &|times| this.fill_first(arrays, given, t, &slabs[t], times)));
+        self.copy_first_layer();
+        let arrays = self.arrays();
+        let stream = Stream { machine: self, swept: self.swept(arrays), arrays, plan, given, own, out };
         pool.run(&|t| timed(t, &|times| stream.within(t, slabs[t].clone(), times)));
         pool.run(&|t| timed(t, &|times| stream.excess_of_first(t, slabs[t].clone(), times)));
         self.first_fault()?;
         self.copy_slopes();
         let arrays = self.arrays();
-        let stream = Stream { machine: self, swept: self.swept(arrays), arrays, plan, own: None, out };
+        let stream = Stream { machine: self, swept: self.swept(arrays), arrays, plan, given, own: None, out };
         pool.run(&|t| timed(t, &|times| stream.second_at_ends(t, slabs[t].clone(), times)));
         pool.run(&|t| timed(t, &|times| stream.forces_of_first(t, slabs[t].clone(), times)));
         self.lost()
@@ -87,6 +93,37 @@ impl<P: Compiled> Machine<P> {
         let end = of_layer.iter().position(|of| *of > t).unwrap_or(layers);
         first..end
     }
+
+    /// The last place before a layer, or behind all, from which on whole vectors are filled.
+    fn vectors_before(&self, layer: usize) -> usize {
+        self.start[layer * self.grid.rows * self.grid.bins] as usize / SLACK * SLACK
+    }
+
+    /// The places that the thread of a slab fills: all vectors that begin in it, and the one across its beginning.
+    fn places(&self, slab: &Range<usize>) -> Range<usize> {
+        self.vectors_before(slab.start)..self.vectors_before(slab.end)
+    }
+
+    /// Of these the places that the first `layers` of a slab need: neighbours are compared in sixteens, up to two of which
+    /// begin behind the last.
+    fn needed(&self, slab: &Range<usize>, layers: usize) -> Range<usize> {
+        let Range { start, end } = self.places(slab);
+        let behind = (slab.start + layers).min(slab.end);
+        start..(self.vectors_before(behind) + 4 * SLACK).min(end)
+    }
+
+    /// Fills what the slab before needs of a slab, and the last particles that are no whole vector.
+    fn fill_first(&self, arrays: Arrays<P>, given: &Given, t: usize, slab: &Range<usize>, times: &mut Times) {
+        let mut since = Instant::now();
+        // SAFETY: places of this thread; behind the last there is room for a vector, and nothing yet.
+        unsafe {
+            if t == 0 {
+                self.fill_places(arrays, given, self.vectors_before(self.grid.layers)..self.particles);
+            }
+            self.fill_places(arrays, given, self.needed(slab, 1));
+        }
+        lap(&mut since, &mut times.sort);
+    }
 }
 
 impl<P: Compiled> Stream<'_, P> {
@@ -102,14 +139,20 @@ impl<P: Compiled> Stream<'_, P> {
         unsafe { &mut *self.arrays.near.at(KEPT * t + at) }
     }
 
-    /// First passes of a slab, ψ of all its layers but the first, the second pass of those between, and the forces of
+    /// Arrays and first passes of a slab, ψ of all its layers but the first, the second pass of those between, and the forces of
     /// those of them that are not next to the first.
     fn within(&self, t: usize, slab: Range<usize>, times: &mut Times) {
         // SAFETY: each thread has its own scratch.
         let scratch = unsafe { &mut *self.arrays.scratch.at(t) };
         (scratch.fault, scratch.lost) = (None, None);
         let mut since = Instant::now();
+        let mut filled = self.machine.needed(&slab, 1).end;
         for layer in slab.clone() {
+            let end = self.machine.needed(&slab, layer - slab.start + 2).end;
+            // SAFETY: places of this thread, of layers that no pass has come to.
+            unsafe { self.machine.fill_places(self.arrays, self.given, filled..end) };
+            filled = end;
+            lap(&mut since, &mut times.sort);
             // SAFETY: of this thread's slab.
             unsafe {
                 let near = self.near(t, &slab, layer);
