@@ -32,6 +32,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// Room behind the last particle: what whole vectors may read.
 const SLACK: usize = 16;
 
+/// Up to so many particles all arrays stay in the cache, and none of them is called there in advance. Tests have few.
+const IN_CACHE: usize = if cfg!(test) { 100 } else { 1 << 14 };
+
 /// Arrays in the order of cells, and what goes through them.
 pub struct Machine<P: Compiled> {
     instructions: Instructions,
@@ -219,6 +222,11 @@ impl<P: Compiled> Machine<P> {
     /// Whether the first layer follows the last.
     fn is_ring(&self) -> bool {
         self.frame.periodic[self.grid.layer_axis]
+    }
+
+    /// Whether arrays over all particles are beyond the cache.
+    fn is_far(&self) -> bool {
+        self.all > IN_CACHE
     }
 
     /// How many particles the layer behind `layer` has.

@@ -212,6 +212,7 @@ impl<P: Compiled> Machine<P> {
             q: arrays.q,
             records: arrays.records,
             species: several.then_some(arrays.species),
+            far: self.is_far(),
             ghost: (!self.ghost.is_empty()).then_some(arrays.ghost),
         };
         let instructions = self.instructions;

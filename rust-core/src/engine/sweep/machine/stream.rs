@@ -105,9 +105,12 @@ impl<P: Compiled> Machine<P> {
     }
 
     /// Of these the places that the first `layers` of a slab need: neighbours are compared in sixteens, up to two of which
-    /// begin behind the last.
+    /// begin behind the last. All, if they stay in the cache.
     fn needed(&self, slab: &Range<usize>, layers: usize) -> Range<usize> {
         let Range { start, end } = self.places(slab);
+        if !self.is_far() {
+            return start..end;
+        }
         let behind = (slab.start + layers).min(slab.end);
         start..(self.vectors_before(behind) + 4 * SLACK).min(end)
     }

@@ -29,6 +29,8 @@ pub struct Fill<'a, R> {
     pub records: Shared<R>,
     /// Not there with one species.
     pub species: Option<Shared<u8>>,
+    /// Whether the host's particles may be beyond the cache.
+    pub far: bool,
     /// Not there without ghosts.
     pub ghost: Option<Shared<bool>>,
 }
@@ -78,11 +80,13 @@ impl<R: Record> Fill<'_, R> {
             let (k, s) = (*k as usize, first + lane);
             // SAFETY: the caller's.
             unsafe {
-                let next = *self.order.get_unchecked((s + AHEAD).min(last)) as usize;
-                call(self.unit.as_ptr().add(next));
-                call(particles.tag.as_ptr().add(next));
-                if MOVING {
-                    call(self.given.v.as_ptr().add(next));
+                if self.far {
+                    let next = *self.order.get_unchecked((s + AHEAD).min(last)) as usize;
+                    call(self.unit.as_ptr().add(next));
+                    call(particles.tag.as_ptr().add(next));
+                    if MOVING {
+                        call(self.given.v.as_ptr().add(next));
+                    }
                 }
                 let u = *self.unit.get_unchecked(k);
                 for c in 0..3 {
