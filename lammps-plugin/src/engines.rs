@@ -2,7 +2,7 @@
 
 use crate::style::StyleError;
 use psidpd_core::engine::{
-    Engine, Newton, PairsOfHost, Particles, Plan, Pool, Settings, Space, Step, Sweep, Tally, Want,
+    Engine, Newton, PairsOfHost, Particles, Plan, Pool, Settings, Step, Sweep, Tally, Want,
 };
 use psidpd_core::model::Fluid;
 use std::sync::Arc;
@@ -77,7 +77,7 @@ impl Engines {
     ) -> Result<(), StyleError> {
         self.swept = !(self.all_densities || want.particle_energy || want.particle_virial);
         if self.swept {
-            self.sweep.first(Space::Open, particles, v, step, want)?;
+            self.sweep.first(particles, v, step, want)?;
         } else {
             self.engine.densities(particles, newton)?;
         }

@@ -3,10 +3,10 @@
 //!
 //! ```text
 //! valgrind --tool=callgrind --callgrind-out-file=steps.out target/release/examples/step_instructions 6050 40
-//! callgrind_annotate --inclusive=yes steps.out | grep -E 'Simulation::step|Sweep::(first|second)'
+//! callgrind_annotate --inclusive=yes steps.out | grep -E 'Simulation::step|Sweep::evaluate'
 //! ```
 //!
-//! What `Simulation::step` includes without `Sweep::first` and `Sweep::second` is the runner's own.
+//! What `Simulation::step` includes without `Sweep::evaluate` is the runner's own.
 
 use psidpd::run::Integrator;
 use psidpd::scene::Scene;

@@ -1,7 +1,7 @@
 //! Fluids and particles that micro-benchmarks and instruction counts share.
 
 use psidpd_core::engine::{
-    Instructions, Particles, PeriodicBox, Precision, Settings, Space, Step, Sweep, Want, noise,
+    Instructions, Particles, PeriodicBox, Precision, Settings, Step, Sweep, Want, noise,
 };
 use psidpd_core::model::{Fluid, Model};
 
@@ -140,9 +140,8 @@ impl Cloud {
         self.step.number += 1;
         let particles = Particles { owned: self.x.len(), x: &self.x, tag: &self.tag, kind: &self.kind };
         sweep
-            .first(Space::Box(&self.domain), &particles, &self.v, Some(self.step), Want::FORCES)
-            .expect("densities");
-        sweep.second(&particles, &mut self.force, false).expect("forces");
+            .evaluate(&self.domain, &particles, &self.v, Some(self.step), Want::FORCES, &mut self.force)
+            .expect("forces");
     }
 }
 

@@ -316,7 +316,7 @@ fn sum(values: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::{Images, Particles, PeriodicBox, Settings, Space, Sweep, Want};
+    use crate::engine::{Images, Particles, PeriodicBox, Settings, Sweep, Want};
     use crate::model::Model;
 
     /// Rows of `count` particles of a fluid: densities that differ, and room.
@@ -495,15 +495,16 @@ mod tests {
                         images.forward(1, &mut kind);
                     }
                     let particles = Particles { owned: count as usize, x: &x, tag: &tag, kind: &kind };
-                    let space = if ghosts { Space::Open } else { Space::Box(&domain) };
-                    sweep.first(space, &particles, &[], None, Want::TOTALS).unwrap();
-                    if ghosts {
+                    let mut force = vec![[0.0; 3]; count as usize];
+                    let tally = if ghosts {
+                        sweep.first(&particles, &[], None, Want::TOTALS).unwrap();
                         let mut slopes = sweep.slopes_mut()[..2 * count as usize].to_vec();
                         images.forward(2, &mut slopes);
                         sweep.slopes_mut().copy_from_slice(&slopes);
-                    }
-                    let mut force = vec![[0.0; 3]; count as usize];
-                    let tally = sweep.second(&particles, &mut force, false).unwrap();
+                        sweep.second(&particles, &mut force, false).unwrap()
+                    } else {
+                        sweep.evaluate(&domain, &particles, &[], None, Want::TOTALS, &mut force).unwrap()
+                    };
                     (force, tally.excess)
                 };
                 let mut used = sweep();

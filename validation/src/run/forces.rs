@@ -1,8 +1,8 @@
 //! Forces of one fluid on the particles of a simulation, by the engine that suits what is asked for.
 
 use psidpd_core::engine::{
-    Engine, EngineError, Images, Newton, Particles, PassCounts, PeriodicBox, Plan, Pool, Settings, Space,
-    Step, Sweep, Tally, Want,
+    Engine, EngineError, Images, Newton, Particles, PassCounts, PeriodicBox, Plan, Pool, Settings, Step,
+    Sweep, Tally, Want,
 };
 use psidpd_core::model::Fluid;
 use psidpd_core::model::expression::TooLarge;
@@ -116,7 +116,7 @@ impl Forces {
     /// Writes the forces on all particles to `force`, and returns what was asked for.
     ///
     /// # Errors
-    /// As [`Sweep::first`] and [`Sweep::second`], or [`Engine::densities`] and [`Engine::forces`].
+    /// As [`Sweep::evaluate`], or [`Engine::densities`] and [`Engine::forces`].
     pub fn compute(
         &mut self,
         domain: &PeriodicBox,
@@ -133,8 +133,7 @@ impl Forces {
             species.truncate(owned);
             v.truncate(owned);
             let particles = Particles { owned, x, tag, kind: species };
-            self.sweep.first(Space::Box(domain), &particles, v, step, want)?;
-            let tally = self.sweep.second(&particles, force, false)?;
+            let tally = self.sweep.evaluate(domain, &particles, v, step, want, force)?;
             self.swept = true;
             return Ok(tally);
         }

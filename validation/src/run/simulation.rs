@@ -323,12 +323,7 @@ impl Simulation {
     ///
     /// # Errors
     /// As [`Simulation::step`].
-    pub(super) fn begin_step(
-        &mut self,
-        dt: f64,
-        integrator: Integrator,
-        want: Want,
-    ) -> Result<(), RunError> {
+    pub(super) fn begin_step(&mut self, dt: f64, integrator: Integrator, want: Want) -> Result<(), RunError> {
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(RunError::TimeStep(dt));
         }

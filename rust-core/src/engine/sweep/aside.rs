@@ -25,7 +25,8 @@ pub unsafe fn aside<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY: 
     }
     if SEVERAL {
         for k in 0..part.count() {
-            let [a, b] = block.pair(part, k).map(|i| swept.species[i] as usize);
+            // SAFETY: there are species of all particles.
+            let [a, b] = block.pair(part, k).map(|i| unsafe { *swept.species.at(i) } as usize);
             block.aside.kind[k] = (a * swept.terms.species + b) as u32;
         }
     }

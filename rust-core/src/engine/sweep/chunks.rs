@@ -63,7 +63,8 @@ pub unsafe fn cut<I: Isa, T: Scalar, const GHOSTS: bool, const MANY: usize>(
             if ends.together >> (a / I::F32::LANES) & 1 == 0 {
                 // Vectors have spans of one or of the other kind.
                 many = many.min(I::F32::LANES - a % I::F32::LANES);
-                many = join(&swept.x[0][group.first + a..][..many], view.joined, spans, a);
+                let x = std::slice::from_raw_parts(swept.x[0].at(group.first + a), many);
+                many = join(x, view.joined, spans, a);
             }
             let begin = found;
             let look = Look {

@@ -29,13 +29,13 @@ pub struct Swept<'a, T, R> {
     /// layer, one past the last of which is the last.
     pub start: &'a [u32],
     /// Positions from the origin of the frame.
-    pub x: [&'a [f32]; 3],
+    pub x: [Shared<f32>; 3],
     /// The same in words.
     pub quantum: Quantum,
-    pub q: [&'a [u16]; 3],
-    pub records: &'a [R],
-    /// Species; empty with one.
-    pub species: &'a [u8],
+    pub q: [Shared<u16>; 3],
+    pub records: Shared<R>,
+    /// Species; not there with one.
+    pub species: Shared<u8>,
     /// Which are ghosts; empty if there are none.
     pub ghost: &'a [bool],
     /// A bit for each particle that is not.
@@ -74,6 +74,12 @@ unsafe impl<T: Send> Send for Shared<T> {}
 unsafe impl<T: Send> Sync for Shared<T> {}
 
 impl<T> Shared<T> {
+    /// The pointer, to read through.
+    #[inline(always)]
+    pub fn as_ptr(self) -> *const T {
+        self.0
+    }
+
     /// The pointer `at` elements on.
     ///
     /// # Safety

@@ -2,9 +2,12 @@
 
 mod excess;
 mod host;
+mod layout;
 mod sort;
 mod stream;
 pub mod vectors;
+
+pub use host::Out;
 
 use super::block::Block;
 use super::compiled::{Compiled, Passes};
@@ -29,6 +32,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Room behind the last particle: what whole vectors may read.
 const SLACK: usize = 16;
+
+/// Up to so many particles all arrays stay in the cache, and none of them is called there in advance. Tests have few.
+const IN_CACHE: usize = if cfg!(test) { 100 } else { 1 << 14 };
 
 /// Arrays in the order of cells, and what goes through them.
 pub struct Machine<P: Compiled> {
@@ -75,6 +81,11 @@ pub struct Machine<P: Compiled> {
 
 /// Where threads write, each its own part.
 struct Arrays<P: Compiled> {
+    x: [Shared<f32>; 3],
+    q: [Shared<u16>; 3],
+    records: Shared<P::Record>,
+    species: Shared<u8>,
+    ghost: Shared<bool>,
     sums: Shared<Sum>,
     densities: Shared<Sum>,
     rows: Shared<f64>,
@@ -100,6 +111,8 @@ struct Scratch<T> {
     low: [f64; 3],
     high: [f64; 3],
     fault: Option<EngineError>,
+    /// The lowest tag of the particles whose forces are not finite.
+    lost: Option<i32>,
 }
 
 impl<T: Scalar> Scratch<T> {
@@ -107,7 +120,7 @@ impl<T: Scalar> Scratch<T> {
         let mut block = Block::default();
         block.set_passes(passes);
         let excess = ExcessPass::new(instructions);
-        Scratch { block, excess, low: [0.0; 3], high: [0.0; 3], fault: None }
+        Scratch { block, excess, low: [0.0; 3], high: [0.0; 3], fault: None, lost: None }
     }
 }
 
@@ -143,7 +156,17 @@ impl<P: Compiled> Machine<P> {
             passes: P::passes(instructions, count > 1),
             terms,
             frame,
-            grid: Grid { bins: 1, rows: 1, layers: 1, row_axis: 1, layer_axis: 2, reach: 1.0, window: 1.0, team: 4, joined: 1.0 },
+            grid: Grid {
+                bins: 1,
+                rows: 1,
+                layers: 1,
+                row_axis: 1,
+                layer_axis: 2,
+                reach: 1.0,
+                window: 1.0,
+                team: 4,
+                joined: 1.0,
+            },
             cell: Vec::new(),
             unit: Vec::new(),
             counts: Vec::new(),
@@ -241,6 +264,14 @@ impl<P: Compiled> Machine<P> {
         Ok(())
     }
 
+    /// A force that is not finite: that of the lowest tag.
+    fn lost(&mut self) -> Result<(), EngineError> {
+        match self.scratch.iter_mut().filter_map(|scratch| scratch.lost.take()).min() {
+            None => Ok(()),
+            Some(tag) => Err(EngineError::Force { tag }),
+        }
+    }
+
     /// Particles of layer `layer`, and the first of them.
     fn layer(&self, layer: usize) -> (usize, usize) {
         let per_layer = self.grid.rows * self.grid.bins;
@@ -251,6 +282,11 @@ impl<P: Compiled> Machine<P> {
     /// Whether the first layer follows the last.
     fn is_ring(&self) -> bool {
         self.frame.periodic[self.grid.layer_axis]
+    }
+
+    /// Whether arrays over all particles are beyond the cache.
+    fn is_far(&self) -> bool {
+        self.all > IN_CACHE
     }
 
     /// How many particles the layer behind `layer` has.
@@ -267,6 +303,11 @@ impl<P: Compiled> Machine<P> {
     /// The arrays that threads write disjoint parts of.
     fn arrays(&mut self) -> Arrays<P> {
         Arrays {
+            x: self.x.each_mut().map(|x| Shared(x.as_mut_ptr())),
+            q: self.q.each_mut().map(|q| Shared(q.as_mut_ptr())),
+            records: Shared(self.records.as_mut_ptr()),
+            species: Shared(self.species.as_mut_ptr()),
+            ghost: Shared(self.ghost.as_mut_ptr()),
             sums: Shared(self.sums.as_mut_ptr()),
             densities: Shared(self.densities.as_mut_ptr()),
             rows: Shared(self.rows.as_mut_ptr()),
@@ -284,11 +325,11 @@ impl<P: Compiled> Machine<P> {
             frame: &self.frame,
             grid: &self.grid,
             start: &self.start,
-            x: [&self.x[0], &self.x[1], &self.x[2]],
+            x: arrays.x,
             quantum: self.quantum,
-            q: [&self.q[0], &self.q[1], &self.q[2]],
-            records: &self.records,
-            species: &self.species,
+            q: arrays.q,
+            records: arrays.records,
+            species: arrays.species,
             ghost: &self.ghost,
             owned: &self.owned_bits,
             owned_of_row: &self.owned_of_row,
@@ -336,6 +377,7 @@ impl<P: Compiled> Machine<P> {
     /// The first pass over all layers.
     pub fn first(&mut self, pool: &Pool) {
         let layers = self.grid.layers;
+        self.lay_out_all();
         self.near.resize_with(layers, NearPairs::default);
         let arrays = self.arrays();
         let this = &*self;

@@ -55,21 +55,12 @@ use crate::model::expression::TooLarge;
 use arithmetic::{Double, Mixed};
 use frame::Frame;
 use grid::Grid;
-use machine::{Given, Machine};
+use machine::{Given, Machine, Out};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// What the particles are in.
-#[derive(Debug, Clone, Copy)]
-pub enum Space<'a> {
-    /// A periodic box: there are no ghosts.
-    Box(&'a PeriodicBox),
-    /// Open space, with ghosts for whatever is beyond: a rank of a host.
-    Open,
-}
-
-/// Forces of one fluid, fast. An evaluation is [`Sweep::first`], for hosts with ghosts then a round of
-/// slopes from owners to ghosts, and [`Sweep::second`].
+/// Forces of one fluid, fast: [`Sweep::evaluate`] in a periodic box. For a rank of a host, with ghosts for whatever is
+/// beyond it, an evaluation is [`Sweep::first`], a round of slopes from owners to ghosts, and [`Sweep::second`].
 pub struct Sweep {
     plan: Plan,
     settings: Settings,
@@ -224,23 +215,99 @@ impl Sweep {
             .is_some_and(|frame| Grid::new(&frame, self.plan.cutoff, 1).is_some())
     }
 
-    /// Finds pairs, adds the forces that need no density, sums densities and evaluates ψ.
+    /// All forces on particles in a periodic box: writes them to `force`, and returns what was asked for. Nothing but
+    /// densities and ψ is kept of all particles on the way: one layer of cells after another has all its passes.
     ///
     /// `v` may be empty and `step` `None` where no thermostat acts; with `step` `None` only conservative
     /// forces are computed. Of `want`, the totals: what is asked for of each particle is the business
     /// of [`Engine`](super::Engine).
     ///
     /// # Errors
-    /// A position or ψ that is not finite, a tag or type out of range, arrays of different lengths, a
-    /// box that does not fit.
+    /// A position, ψ or a force that is not finite; then some forces may have been written. A tag or type out of range,
+    /// arrays of different lengths, ghosts, a box that does not fit.
+    pub fn evaluate(
+        &mut self,
+        domain: &PeriodicBox,
+        particles: &Particles,
+        v: &[[f64; 3]],
+        step: Option<Step>,
+        want: Want,
+        force: &mut [[f64; 3]],
+    ) -> Result<Tally, EngineError> {
+        let thermostat = self.begin(particles, v, step, want)?;
+        if self.owned < self.all {
+            return Err(EngineError::Host("a periodic box has no ghosts"));
+        }
+        if force.len() < self.owned {
+            return Err(EngineError::Host("the force array is too short"));
+        }
+        let given = Given {
+            particles: *particles,
+            v,
+            kinds: &self.kinds,
+            thermostat,
+            totals: want.energy || want.virial,
+        };
+        let (plan, pool, times) = (&self.plan, &self.pool, &mut self.times);
+        let out = Out::new(force, false, particles.tag);
+        let tally = with!(&mut self.machine, m => {
+            let mut since = Instant::now();
+            let (frame, grid) = in_box(m, plan, pool, domain, &given)?;
+            m.find_order(pool, frame, grid, &given)?;
+            lap(&mut since, &mut times.sort);
+            m.stream(pool, plan, &given, out, times)?;
+            m.tally()
+        });
+        self.count_first(thermostat.is_some());
+        self.count_second();
+        Ok(tally)
+    }
+
+    /// Finds pairs in open space, adds the forces that need no density, sums densities and evaluates ψ; other
+    /// arguments are those of [`Sweep::evaluate`].
+    ///
+    /// # Errors
+    /// A position or ψ that is not finite, a tag or type out of range, arrays of different lengths.
     pub fn first(
         &mut self,
-        space: Space,
         particles: &Particles,
         v: &[[f64; 3]],
         step: Option<Step>,
         want: Want,
     ) -> Result<(), EngineError> {
+        let thermostat = self.begin(particles, v, step, want)?;
+        let given = Given {
+            particles: *particles,
+            v,
+            kinds: &self.kinds,
+            thermostat,
+            totals: want.energy || want.virial,
+        };
+        let (plan, pool, times) = (&self.plan, &self.pool, &mut self.times);
+        with!(&mut self.machine, m => {
+            let mut since = Instant::now();
+            let (frame, grid) = in_the_open(m, plan, pool, &given)?;
+            m.sort(pool, frame, grid, &given)?;
+            lap(&mut since, &mut times.sort);
+            m.first(pool);
+            lap(&mut since, &mut times.first);
+            m.excess(pool, plan, particles.tag)?;
+            lap(&mut since, &mut times.excess);
+            m.slopes_to_host(&mut self.slopes);
+        });
+        self.count_first(thermostat.is_some());
+        self.ready = true;
+        Ok(())
+    }
+
+    /// Checks what an evaluation is given, and remembers what it is of; the thermostat, if it acts.
+    fn begin(
+        &mut self,
+        particles: &Particles,
+        v: &[[f64; 3]],
+        step: Option<Step>,
+        want: Want,
+    ) -> Result<Option<(PairNoise, f64)>, EngineError> {
         self.ready = false;
         let all = particles.x.len();
         if particles.tag.len() != all || particles.kind.len() != all || particles.owned > all {
@@ -250,9 +317,6 @@ impl Sweep {
         if all > 1 << 26 {
             return Err(EngineError::Host("more than 2^26 particles and ghosts on one rank"));
         }
-        if matches!(space, Space::Box(_)) && particles.owned < all {
-            return Err(EngineError::Host("a periodic box has no ghosts"));
-        }
         let thermostat = step
             .filter(|_| self.plan.thermostat.is_some())
             .map(|s| (PairNoise::new(s.seed, s.number), 1.0 / s.dt.sqrt()));
@@ -260,25 +324,20 @@ impl Sweep {
             return Err(EngineError::Host("the velocity array is too short"));
         }
         (self.owned, self.all, self.want) = (particles.owned, all, want);
-        let given = Given {
-            particles: *particles,
-            v,
-            kinds: &self.kinds,
-            thermostat,
-            totals: want.energy || want.virial,
-        };
-        let (plan, pool) = (&self.plan, &self.pool);
-        let times = &mut self.times;
-        with!(&mut self.machine, m => first(m, plan, pool, space, &given, times))?;
-        if self.owned < all {
-            with!(&self.machine, m => m.slopes_to_host(&mut self.slopes));
-        }
+        Ok(thermostat)
+    }
+
+    fn count_first(&mut self, noise: bool) {
         self.counts.search += 1;
         self.counts.density += self.plan.passes.len() as u64;
         self.counts.excess += self.plan.evaluated_species();
-        self.counts.noise += thermostat.is_some() as u64;
-        self.ready = true;
-        Ok(())
+        self.counts.noise += noise as u64;
+    }
+
+    fn count_second(&mut self) {
+        self.counts.force += 1;
+        self.counts.energy += self.want.energy as u64;
+        self.counts.virial += self.want.virial as u64;
     }
 
     /// Numbers per particle that a host forwards to ghosts: [`Plan::slope_width`].
@@ -286,7 +345,7 @@ impl Sweep {
         self.plan.slope_width()
     }
 
-    /// `∂ψ/∂n` of owned particles, then those of ghosts; empty in a box.
+    /// `∂ψ/∂n` of owned particles, then those of ghosts, after [`Sweep::first`].
     pub fn slopes(&self) -> &[f64] {
         &self.slopes
     }
@@ -316,21 +375,15 @@ impl Sweep {
         if particles.x.len() != self.all || particles.owned != self.owned || force.len() < self.owned {
             return Err(EngineError::Host("particles changed between densities and forces"));
         }
-        self.counts.force += 1;
-        self.counts.energy += self.want.energy as u64;
-        self.counts.virial += self.want.virial as u64;
-        let (pool, slopes) = (&self.pool, &self.slopes);
-        let ghosts = self.owned < self.all;
-        let times = &mut self.times;
-        let mut since = Instant::now();
+        self.count_second();
+        let (pool, slopes, times) = (&self.pool, &self.slopes, &mut self.times);
+        let out = Out::new(force, add, particles.tag);
         with!(&mut self.machine, m => {
-            // Without ghosts that is done.
-            if ghosts {
-                m.slopes_from_host(slopes);
-                m.second(pool);
-            }
+            let mut since = Instant::now();
+            m.slopes_from_host(slopes);
+            m.second(pool);
             lap(&mut since, &mut times.second);
-            m.forces(pool, force, add, particles.tag)?;
+            m.forces(pool, out)?;
             lap(&mut since, &mut times.forces);
             Ok(m.tally())
         })
@@ -356,48 +409,47 @@ impl Sweep {
     }
 }
 
-fn first<P: compiled::Compiled>(
+/// How far particles reach. Where nothing acts at any distance they are sorted all the same.
+fn cutoff(plan: &Plan) -> f64 {
+    if plan.cutoff > 0.0 { plan.cutoff } else { 1.0 }
+}
+
+/// The region to be swept in a box, and its cells.
+fn in_box<P: compiled::Compiled>(
     machine: &mut Machine<P>,
     plan: &Plan,
     pool: &Pool,
-    space: Space,
+    domain: &PeriodicBox,
     given: &Given,
-    times: &mut Times,
-) -> Result<(), EngineError> {
-    let mut since = Instant::now();
-    let count = given.particles.x.len();
-    // Nothing acts at any distance: particles are sorted all the same.
-    let cutoff = if plan.cutoff > 0.0 { plan.cutoff } else { 1.0 };
-    let frame = match space {
-        Space::Open => {
+) -> Result<(Frame, Grid), EngineError> {
+    let cutoff = cutoff(plan);
+    let frame = match Frame::of_box(domain, plan.dimensions) {
+        Some(mut frame) if !frame.periodic[..plan.dimensions].iter().all(|p| *p) => {
             let (low, high) = machine.extremes(pool, given)?;
-            let (low, high) = (low.map(|x| x - cutoff), high.map(|x| x + cutoff));
-            Some(Frame::around(low, high, plan.dimensions, cutoff))
+            frame.stretch(low, high, cutoff);
+            // What leans along an open direction is no box any more.
+            (!frame.is_tilted()).then_some(frame)
         }
-        Space::Box(domain) => match Frame::of_box(domain, plan.dimensions) {
-            Some(mut frame) if !frame.periodic[..plan.dimensions].iter().all(|p| *p) => {
-                let (low, high) = machine.extremes(pool, given)?;
-                frame.stretch(low, high, cutoff);
-                // What leans along an open direction is no box any more.
-                (!frame.is_tilted()).then_some(frame)
-            }
-            frame => frame,
-        },
+        frame => frame,
     };
+    let count = given.particles.x.len();
     let grid = frame.and_then(|frame| Grid::new(&frame, cutoff, count).map(|grid| (frame, grid)));
-    let Some((frame, grid)) = grid else {
-        return Err(EngineError::Host("the box is too narrow, or leans, for a sweep without ghosts"));
-    };
-    machine.sort(pool, frame, grid, given)?;
-    lap(&mut since, &mut times.sort);
-    if given.particles.owned == count {
-        return machine.stream(pool, plan, given.particles.tag, times);
-    }
-    machine.first(pool);
-    lap(&mut since, &mut times.first);
-    machine.excess(pool, plan, given.particles.tag)?;
-    lap(&mut since, &mut times.excess);
-    Ok(())
+    grid.ok_or(EngineError::Host("the box is too narrow, or leans, for a sweep without ghosts"))
+}
+
+/// The region to be swept around particles with ghosts, and its cells.
+fn in_the_open<P: compiled::Compiled>(
+    machine: &mut Machine<P>,
+    plan: &Plan,
+    pool: &Pool,
+    given: &Given,
+) -> Result<(Frame, Grid), EngineError> {
+    let cutoff = cutoff(plan);
+    let (low, high) = machine.extremes(pool, given)?;
+    let (low, high) = (low.map(|x| x - cutoff), high.map(|x| x + cutoff));
+    let frame = Frame::around(low, high, plan.dimensions, cutoff);
+    let grid = Grid::new(&frame, cutoff, given.particles.x.len());
+    grid.map(|grid| (frame, grid)).ok_or(EngineError::Host("no cells for these particles"))
 }
 
 #[cfg(test)]

@@ -90,9 +90,8 @@ fn every() -> impl Iterator<Item = (Precision, Instructions)> {
 /// Forces and totals by a sweep without ghosts.
 fn swept(sweep: &mut Sweep, cloud: &Cloud, want: Want) -> (Vec<[f64; 3]>, Tally) {
     let particles = cloud.particles();
-    sweep.first(Space::Box(&cloud.domain), &particles, &cloud.v, Some(STEP), want).unwrap();
     let mut force = vec![[0.0; 3]; cloud.x.len()];
-    let tally = sweep.second(&particles, &mut force, false).unwrap();
+    let tally = sweep.evaluate(&cloud.domain, &particles, &cloud.v, Some(STEP), want, &mut force).unwrap();
     (force, tally)
 }
 
@@ -108,7 +107,7 @@ fn with_ghosts(sweep: &mut Sweep, cloud: &Cloud) -> (Vec<[f64; 3]>, Tally) {
     images.forward(1, &mut tag);
     images.forward(1, &mut kind);
     let particles = Particles { owned: n, x: &x, tag: &tag, kind: &kind };
-    sweep.first(Space::Open, &particles, &v, Some(STEP), Want::TOTALS).unwrap();
+    sweep.first(&particles, &v, Some(STEP), Want::TOTALS).unwrap();
     let width = sweep.slope_width();
     let mut slopes = sweep.slopes_mut()[..n * width].to_vec();
     images.forward(width, &mut slopes);
@@ -390,6 +389,53 @@ fn any_number_of_threads_gives_the_same_bits() {
     }
 }
 
+/// Accumulators are used again as a sweep goes through its layers, and slabs of threads begin anywhere: boxes of a few
+/// layers and of many, full and nearly empty ones, swept by the same engines one after another.
+#[test]
+fn any_number_of_layers_and_threads_gives_the_forces_of_the_plain_engine() {
+    for fluid in [shipped("warren2003-set6.toml"), shipped("standard-dpd.toml"), many()] {
+        let engines = (1..=5)
+            .map(|t| Sweep::new(&fluid, settings(Precision::Double, Instructions::best(), t)).unwrap());
+        let mut engines: Vec<Sweep> = engines.collect();
+        for (layers, periodic) in
+            [2, 9, 3, 12, 4, 7, 5, 6, 8].into_iter().flat_map(|l| [(l, true), (l, false)])
+        {
+            let lengths = [3.0, 3.0, layers as f64 + 0.3].map(|l| l * fluid.cutoff());
+            let domain = PeriodicBox::orthogonal([0.0; 3], lengths, [true, true, periodic]).unwrap();
+            let mut cloud = Cloud::new(domain, 3, fluid.species.len(), 25 * layers, layers as u64);
+            for x in &mut cloud.x {
+                // Fewer and fewer with height.
+                x[2] *= x[2] / lengths[2];
+            }
+            let (force, tally) = plain(&fluid, &cloud);
+            let (first, first_tally) = swept(&mut engines[0], &cloud, Want::TOTALS);
+            let off = difference(&force, &first).max(tally_difference(&tally, &first_tally));
+            assert!(off < tolerance(Precision::Double), "{layers} layers, periodic {periodic}: {off:.1e}");
+            for sweep in &mut engines {
+                let (here, totals) = swept(sweep, &cloud, Want::TOTALS);
+                assert!(here == first && totals == first_tally, "{layers} layers, {:?}", sweep.settings());
+            }
+        }
+    }
+}
+
+/// Of a box without ghosts, forces and densities of a few layers only are summed at a time.
+#[test]
+fn longer_boxes_have_no_more_accumulators() {
+    for (fluid, most) in [(shipped("warren2003-set6.toml"), 120.0), (many(), 200.0)] {
+        let memory = |layers: usize| {
+            let domain =
+                PeriodicBox::orthogonal([0.0; 3], [6.0, 6.0, layers as f64 + 0.1], [true; 3]).unwrap();
+            let cloud = Cloud::new(domain, 3, fluid.species.len(), 300 * layers, 5);
+            let mut sweep = Sweep::new(&fluid, settings(Precision::Mixed, Instructions::best(), 1)).unwrap();
+            swept(&mut sweep, &cloud, Want::FORCES);
+            sweep.memory() as f64
+        };
+        let per_particle = (memory(40) - memory(20)) / (300.0 * 20.0);
+        assert!(per_particle < most, "{per_particle} bytes");
+    }
+}
+
 #[test]
 fn the_order_of_particles_matters_to_rounding_alone() {
     let fluid = many();
@@ -437,7 +483,10 @@ fn rows_with_few_particles_and_with_many() {
                     let here = swept(&mut sweep, &cloud, Want::TOTALS);
                     for (forces, totals) in [here, with_ghosts(&mut sweep, &cloud)] {
                         let off = difference(&force, &forces).max(tally_difference(&tally, &totals));
-                        assert!(off < tolerance(precision), "{density}, {precision}, {instructions}: {off:.1e}");
+                        assert!(
+                            off < tolerance(precision),
+                            "{density}, {precision}, {instructions}: {off:.1e}"
+                        );
                     }
                 }
             }
@@ -490,28 +539,34 @@ fn what_cannot_be_computed_is_named() {
     let good = || Cloud::new(domain.clone(), 3, 1, 100, 9);
     for (precision, instructions) in every() {
         let mut sweep = Sweep::new(&fluid, settings(precision, instructions, 2)).unwrap();
-        let mut fails = |cloud: &Cloud, space: Space| {
-            let particles = cloud.particles();
-            let error = sweep.first(space, &particles, &cloud.v, Some(STEP), Want::FORCES).unwrap_err();
-            assert!(sweep.second(&particles, &mut vec![[0.0; 3]; 100], false).is_err());
+        let mut force = vec![[0.0; 3]; 100];
+        let mut fails = |cloud: &Cloud, domain: Option<&PeriodicBox>| {
+            let (particles, v, want) = (cloud.particles(), &cloud.v, Want::FORCES);
+            let error = match domain {
+                Some(domain) => {
+                    sweep.evaluate(domain, &particles, v, Some(STEP), want, &mut force).unwrap_err()
+                }
+                None => sweep.first(&particles, v, Some(STEP), want).unwrap_err(),
+            };
+            assert!(sweep.second(&particles, &mut force, false).is_err());
             error
         };
         for bad in [f64::NAN, f64::INFINITY, 1e300] {
             let mut cloud = good();
             cloud.x[17][1] = bad;
             let tag = cloud.tag[17];
-            assert_eq!(fails(&cloud, Space::Box(&domain)), EngineError::Position { tag });
-            assert_eq!(fails(&cloud, Space::Open), EngineError::Position { tag });
+            assert_eq!(fails(&cloud, Some(&domain)), EngineError::Position { tag });
+            assert_eq!(fails(&cloud, None), EngineError::Position { tag });
         }
         let mut cloud = good();
         cloud.tag[3] = 0;
-        assert_eq!(fails(&cloud, Space::Box(&domain)), EngineError::Tag { tag: 0 });
+        assert_eq!(fails(&cloud, Some(&domain)), EngineError::Tag { tag: 0 });
         let mut cloud = good();
         cloud.kind[5] = 1;
         let tag = cloud.tag[5];
-        assert_eq!(fails(&cloud, Space::Box(&domain)), EngineError::Kind { tag, kind: 1 });
+        assert_eq!(fails(&cloud, Some(&domain)), EngineError::Kind { tag, kind: 1 });
         let narrow = PeriodicBox::orthogonal([0.0; 3], [5.0, 1.9, 5.0], [true; 3]).unwrap();
-        assert!(matches!(fails(&good(), Space::Box(&narrow)), EngineError::Host(_)));
+        assert!(matches!(fails(&good(), Some(&narrow)), EngineError::Host(_)));
         assert!(!sweep.fits(&narrow) && sweep.fits(&domain));
         // And it goes on after errors.
         swept(&mut sweep, &good(), Want::TOTALS);
@@ -519,9 +574,46 @@ fn what_cannot_be_computed_is_named() {
         cloud.v[3] = [f64::NAN; 3];
         cloud.x[4] = cloud.x[3].map(|x| x + 0.01);
         let particles = cloud.particles();
-        sweep.first(Space::Box(&domain), &particles, &cloud.v, Some(STEP), Want::FORCES).unwrap();
-        let error = sweep.second(&particles, &mut vec![[0.0; 3]; 100], false).unwrap_err();
+        let error =
+            sweep.evaluate(&domain, &particles, &cloud.v, Some(STEP), Want::FORCES, &mut force).unwrap_err();
         assert!(matches!(error, EngineError::Force { .. }), "{error}");
+    }
+}
+
+#[test]
+fn faults_of_the_passes_name_their_particles() {
+    const SINGULAR: &str = "title = \"vdw\"\nspecies = [\"A\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n\
+        [excess_free_energy]\nA = \"-ln(4 - n)\"\n";
+    let singular = Model::parse("vdw", SINGULAR).unwrap().at(1.0).unwrap();
+    let dpd = shipped("standard-dpd.toml");
+    let domain = PeriodicBox::orthogonal([0.0; 3], [5.0, 5.0, 9.0], [true; 3]).unwrap();
+    for threads in 1..5 {
+        let settings = settings(Precision::Mixed, Instructions::best(), threads);
+        let fault = |fluid: &Fluid, cloud: &Cloud| {
+            let mut sweep = Sweep::new(fluid, settings).unwrap();
+            let particles = cloud.particles();
+            let mut force = vec![[0.0; 3]; cloud.x.len()];
+            sweep.evaluate(&domain, &particles, &cloud.v, Some(STEP), Want::FORCES, &mut force).unwrap_err()
+        };
+        for layer in 0..9 {
+            // Ten particles on nearly one point.
+            let mut cloud = Cloud::new(domain.clone(), 3, 1, 30, 4);
+            for k in 0..10 {
+                cloud.x[k] = [2.0, 2.0 + 0.001 * k as f64, layer as f64 + 0.5];
+            }
+            let EngineError::ExcessFreeEnergy { tag, .. } = fault(&singular, &cloud) else {
+                panic!("no fault")
+            };
+            assert!(cloud.tag[..10].contains(&tag), "{tag}");
+            // Two pairs of which one particle each has no velocity, in two layers.
+            let mut cloud = Cloud::new(domain.clone(), 3, 1, 4, 4);
+            for (k, z) in [(0, layer as f64 + 0.5), (2, 8.5 - layer as f64)] {
+                cloud.v[k] = [f64::NAN; 3];
+                cloud.x[k] = [3.0, 4.0 - k as f64, z];
+                cloud.x[k + 1] = cloud.x[k].map(|x| x + 0.01);
+            }
+            assert_eq!(fault(&dpd, &cloud), EngineError::Force { tag: 1 });
+        }
     }
 }
 
@@ -536,7 +628,7 @@ fn passes_that_a_fluid_does_not_need_are_left_out() {
     assert_eq!((counts.density, counts.excess, counts.energy, counts.virial), (0, 0, 0, 0));
     assert_eq!((counts.search, counts.force, counts.noise), (1, 1, 1));
     let particles = cloud.particles();
-    sweep.first(Space::Box(&cloud.domain), &particles, &[], None, Want::TOTALS).unwrap();
-    sweep.second(&particles, &mut vec![[0.0; 3]; 300], false).unwrap();
+    let mut force = vec![[0.0; 3]; 300];
+    sweep.evaluate(&cloud.domain, &particles, &[], None, Want::TOTALS, &mut force).unwrap();
     assert_eq!((sweep.counts().noise, sweep.counts().energy), (1, 1));
 }

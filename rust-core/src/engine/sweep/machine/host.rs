@@ -1,13 +1,32 @@
 //! What goes to the host and comes from it, in its own order.
 
 use super::vectors::{self, Loop};
-use super::{Machine, Shared, Sum};
+use super::{Arrays, Machine, Shared, Sum};
 use crate::engine::error::EngineError;
 use crate::engine::sweep::compiled::Compiled;
 use crate::engine::sweep::pool::Pool;
 use crate::engine::tally::Tally;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Where the host wants forces.
+#[derive(Clone, Copy)]
+pub struct Out<'a> {
+    force: Shared<[f64; 3]>,
+    /// Whether they are added to what is there.
+    add: bool,
+    tag: &'a [i32],
+}
+
+impl<'a> Out<'a> {
+    /// Forces on the particles with these tags, of which there may be more than forces: ghosts.
+    pub fn new(force: &'a mut [[f64; 3]], add: bool, tag: &'a [i32]) -> Out<'a> {
+        Out { force: Shared(force.as_mut_ptr()), add, tag }
+    }
+
+    pub fn tag(&self) -> &'a [i32] {
+        self.tag
+    }
+}
 
 impl<P: Compiled> Machine<P> {
     /// Slopes from the order of cells to the host's, those of particles it owns.
@@ -39,51 +58,61 @@ impl<P: Compiled> Machine<P> {
     }
 
     /// Writes the forces on owned particles, or adds them to what is there.
-    pub fn forces(
-        &mut self,
-        pool: &Pool,
-        force: &mut [[f64; 3]],
-        add: bool,
-        tag: &[i32],
-    ) -> Result<(), EngineError> {
-        let out = Shared(force.as_mut_ptr());
+    ///
+    /// # Errors
+    /// A force that is not finite: of the lowest tag.
+    pub fn forces(&mut self, pool: &Pool, out: Out) -> Result<(), EngineError> {
         let next = AtomicUsize::new(0);
-        let lost: Mutex<Option<i32>> = Mutex::new(None);
+        let arrays = self.arrays();
         let this = &*self;
-        pool.run(&|_| {
+        pool.run(&|t| {
             loop {
                 let layer = next.fetch_add(1, Ordering::Relaxed);
                 if layer >= this.grid.layers {
                     return;
                 }
-                let forces = this.forces_of_layer(layer, out);
-                // SAFETY: each layer is done once.
-                let fine = match add {
-                    true => vectors::run(this.instructions, Write::<true>(&forces)),
-                    false => vectors::run(this.instructions, Write::<false>(&forces)),
-                };
-                if !fine {
-                    let mut lost = lost.lock().unwrap_or_else(|e| e.into_inner());
-                    *lost = forces.lost(tag).into_iter().chain(*lost).min();
+                // SAFETY: each thread has its own scratch, each layer is done once, when all passes are.
+                unsafe {
+                    let scratch = &mut *arrays.scratch.at(t);
+                    this.forces_of_layer(arrays, layer, out, &mut scratch.lost);
                 }
             }
         });
-        match lost.into_inner().unwrap_or_else(|e| e.into_inner()) {
-            None => Ok(()),
-            Some(tag) => Err(EngineError::Force { tag }),
-        }
+        self.lost()
     }
 
-    fn forces_of_layer(&self, layer: usize, out: Shared<[f64; 3]>) -> Forces<'_> {
+    /// Writes the forces on owned particles of one layer, or adds them to what is there; `lost` is the lowest tag of
+    /// those that are not finite.
+    ///
+    /// # Safety
+    /// No other thread does the same layer, and none adds to the forces on its particles any more. There are forces for
+    /// all owned particles.
+    pub(super) unsafe fn forces_of_layer(
+        &self,
+        arrays: Arrays<P>,
+        layer: usize,
+        out: Out,
+        lost: &mut Option<i32>,
+    ) {
         let (first, count) = self.layer(layer);
         let (here, before) = self.accumulators(layer);
-        let sums = |accumulators| &self.sums[(first as isize + accumulators) as usize..][..count];
-        Forces {
+        // SAFETY: accumulators of particles of the layer.
+        let sums = |accumulators: isize| unsafe {
+            std::slice::from_raw_parts(arrays.sums.at((first as isize + accumulators) as usize), count)
+        };
+        let forces = Forces {
             order: &self.order[first..first + count],
             owned: self.owned,
             here: sums(here),
             before: before.map(sums),
-            out,
+            out: out.force,
+        };
+        let fine = match out.add {
+            true => vectors::run(self.instructions, Write::<true>(&forces)),
+            false => vectors::run(self.instructions, Write::<false>(&forces)),
+        };
+        if !fine {
+            *lost = forces.lost(out.tag).into_iter().chain(*lost).min();
         }
     }
 

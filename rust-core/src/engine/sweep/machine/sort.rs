@@ -5,7 +5,7 @@ mod fill;
 mod fractions;
 mod span;
 
-use super::{Given, Machine, SLACK, Shared, Sum, vectors};
+use super::{Arrays, Given, Machine, SLACK, Shared, vectors};
 use crate::engine::error::EngineError;
 use crate::engine::sweep::compiled::Compiled;
 use crate::engine::sweep::frame::Frame;
@@ -18,6 +18,7 @@ use count::{Count, CountSome};
 use fill::{Fill, FillSome};
 use fractions::Fractions;
 use span::SpanSome;
+use std::ops::Range;
 
 impl<P: Compiled> Machine<P> {
     /// The extremes of the positions of owned particles.
@@ -45,8 +46,22 @@ impl<P: Compiled> Machine<P> {
         if low[0] > high[0] { Ok(([0.0; 3], [0.0; 3])) } else { Ok((low, high)) }
     }
 
-    /// Sorts the particles into the bins of `grid`.
+    /// Sorts the particles into the bins of `grid`, and fills the arrays in that order.
     pub fn sort(&mut self, pool: &Pool, frame: Frame, grid: Grid, given: &Given) -> Result<(), EngineError> {
+        self.find_order(pool, frame, grid, given)?;
+        self.fill(pool, given);
+        self.copy_first_layer();
+        Ok(())
+    }
+
+    /// The particles in the order of the bins of `grid`, and room for them in the arrays.
+    pub fn find_order(
+        &mut self,
+        pool: &Pool,
+        frame: Frame,
+        grid: Grid,
+        given: &Given,
+    ) -> Result<(), EngineError> {
         (self.frame, self.grid) = (frame, grid);
         self.quantum = Quantum::new(&frame, &grid);
         let (threads, cells) = (pool.threads(), grid.cells());
@@ -63,8 +78,9 @@ impl<P: Compiled> Machine<P> {
             return Err(EngineError::Host("2^25 particles or more in two layers next to each other"));
         }
         self.place(pool);
-        self.fill(pool, given);
-        self.copy_first_layer();
+        self.make_room(given);
+        self.tallies.clear();
+        self.tallies.resize(grid.layers, Tally::default());
         Ok(())
     }
 
@@ -150,8 +166,8 @@ impl<P: Compiled> Machine<P> {
         });
     }
 
-    /// Fills the arrays in the order of bins, and lays out accumulators.
-    fn fill(&mut self, pool: &Pool, given: &Given) {
+    /// Room for the particles and the copies of the first layer.
+    fn make_room(&mut self, given: &Given) {
         let copies = if self.is_ring() { self.layer(0).1 } else { 0 };
         let total = self.particles + copies;
         let with_ghosts = given.particles.owned < given.particles.x.len();
@@ -166,33 +182,46 @@ impl<P: Compiled> Machine<P> {
         self.records.resize(total + SLACK, P::Record::default());
         self.species.resize(if several { total.max(1) } else { 0 }, 0);
         self.ghost.resize(if with_ghosts { total + SLACK } else { 0 }, false);
-        let fill = Fill {
+    }
+
+    /// Fills the arrays in the order of bins.
+    fn fill(&mut self, pool: &Pool, given: &Given) {
+        let (arrays, count) = (self.arrays(), self.particles);
+        let this = &*self;
+        pool.run(&|t| {
+            let some = part(count.div_ceil(SLACK), t, pool.threads());
+            // SAFETY: each place is of one thread alone.
+            unsafe { this.fill_places(arrays, given, SLACK * some.start..count.min(SLACK * some.end)) };
+        });
+        self.find_owned();
+    }
+
+    /// Fills some places of the arrays: from a multiple of [`SLACK`] on, and up to one, or to the last.
+    ///
+    /// # Safety
+    /// No other thread fills them, nor reads them meanwhile; behind the last whole vectors are written.
+    pub(super) unsafe fn fill_places(&self, arrays: Arrays<P>, given: &Given, places: Range<usize>) {
+        let several = self.terms.species > 1;
+        let fill = &Fill {
             given,
             frame: &self.frame,
             quantum: self.quantum,
             order: &self.order,
             unit: &self.unit,
-            x: self.x.each_mut().map(|x| Shared(x.as_mut_ptr())),
-            q: self.q.each_mut().map(|q| Shared(q.as_mut_ptr())),
-            records: Shared(self.records.as_mut_ptr()),
-            species: several.then_some(Shared(self.species.as_mut_ptr())),
-            ghost: with_ghosts.then_some(Shared(self.ghost.as_mut_ptr())),
+            x: arrays.x,
+            q: arrays.q,
+            records: arrays.records,
+            species: several.then_some(arrays.species),
+            far: self.is_far(),
+            ghost: (!self.ghost.is_empty()).then_some(arrays.ghost),
         };
-        let (instructions, threads, count) = (self.instructions, pool.threads(), self.particles);
-        let moving = given.thermostat.is_some();
-        pool.run(&|t| {
-            let some = part(count.div_ceil(SLACK), t, threads);
-            let places = SLACK * some.start..count.min(SLACK * some.end);
-            let fill = &fill;
-            match (moving, several) {
-                (true, true) => vectors::run(instructions, FillSome::<_, true, true> { fill, places }),
-                (true, false) => vectors::run(instructions, FillSome::<_, true, false> { fill, places }),
-                (false, true) => vectors::run(instructions, FillSome::<_, false, true> { fill, places }),
-                (false, false) => vectors::run(instructions, FillSome::<_, false, false> { fill, places }),
-            }
-        });
-        self.find_owned();
-        self.lay_out();
+        let instructions = self.instructions;
+        match (given.thermostat.is_some(), several) {
+            (true, true) => vectors::run(instructions, FillSome::<_, true, true> { fill, places }),
+            (true, false) => vectors::run(instructions, FillSome::<_, true, false> { fill, places }),
+            (false, true) => vectors::run(instructions, FillSome::<_, false, true> { fill, places }),
+            (false, false) => vectors::run(instructions, FillSome::<_, false, false> { fill, places }),
+        }
     }
 
     /// The owned particles of each row, if there are ghosts.
@@ -220,26 +249,8 @@ impl<P: Compiled> Machine<P> {
         }
     }
 
-    /// Accumulators of a layer: of its own particles, then of those of the next.
-    fn lay_out(&mut self) {
-        let layers = self.grid.layers;
-        self.offset.clear();
-        let mut sum = 0;
-        for layer in 0..layers {
-            let (first, own) = self.layer(layer);
-            self.offset.push(sum as isize - first as isize);
-            sum += own + self.next_layer(layer);
-        }
-        self.sums.resize(sum.max(1), Sum::default());
-        let variables = self.width();
-        let quads = if variables > 1 { variables.div_ceil(4) } else { 0 };
-        self.densities.resize(quads * sum, Sum::default());
-        self.tallies.clear();
-        self.tallies.resize(layers, Tally::default());
-    }
-
     /// Copies of the first layer behind the last, one period further.
-    fn copy_first_layer(&mut self) {
+    pub(super) fn copy_first_layer(&mut self) {
         if !self.is_ring() {
             return;
         }

@@ -13,6 +13,9 @@ use std::ops::Range;
 /// made of to arrive in the cache.
 const BLOCK: usize = 4 * SLACK;
 
+/// How many particles ahead what is known of them is called into the cache: no processor foresees where it is.
+const AHEAD: usize = 64;
+
 /// What all threads fill the arrays with; positions in the order of bins are those behind the last of which whole
 /// vectors may be written.
 pub struct Fill<'a, R> {
@@ -26,6 +29,8 @@ pub struct Fill<'a, R> {
     pub records: Shared<R>,
     /// Not there with one species.
     pub species: Option<Shared<u8>>,
+    /// Whether the host's particles may be beyond the cache.
+    pub far: bool,
     /// Not there without ghosts.
     pub ghost: Option<Shared<bool>>,
 }
@@ -70,10 +75,19 @@ impl<R: Record> Fill<'_, R> {
         units: &mut [[u32; BLOCK]; 3],
     ) {
         let particles = &self.given.particles;
+        let last = self.order.len().saturating_sub(1);
         for (lane, k) in self.order[first..first + count].iter().enumerate() {
             let (k, s) = (*k as usize, first + lane);
             // SAFETY: the caller's.
             unsafe {
+                if self.far {
+                    let next = *self.order.get_unchecked((s + AHEAD).min(last)) as usize;
+                    call(self.unit.as_ptr().add(next));
+                    call(particles.tag.as_ptr().add(next));
+                    if MOVING {
+                        call(self.given.v.as_ptr().add(next));
+                    }
+                }
                 let u = *self.unit.get_unchecked(k);
                 for c in 0..3 {
                     units[c][lane] = u[c];
@@ -91,6 +105,23 @@ impl<R: Record> Fill<'_, R> {
             }
         }
     }
+}
+
+/// Calls a value into the cache, both its ends if they may be in two lines.
+#[inline(always)]
+fn call<T>(value: *const T) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        // SAFETY: nothing is read, and no address does harm.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(value.cast()) };
+        if size_of::<T>() > align_of::<T>() {
+            // SAFETY: as above.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(value.cast::<i8>().wrapping_add(size_of::<T>() - 1)) };
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = value;
 }
 
 /// How fractions become positions from the origin, and words of sixteen bits.
