@@ -23,7 +23,8 @@ pub unsafe fn aside<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY: 
             block.aside.all[k] = (*r.add(k % A::Reals::LANES)).wide();
         }
     }
-    if SEVERAL {
+    // With one all kinds are zero.
+    if SEVERAL && swept.terms.species > 1 {
         for k in 0..part.count() {
             // SAFETY: there are species of all particles.
             let [a, b] = block.pair(part, k).map(|i| unsafe { *swept.species.at(i) } as usize);

@@ -44,7 +44,7 @@ pub unsafe fn evaluate<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALL
         }
         weights::<I, A>(swept, block, part);
         forces::<I, A, SEVERAL, TALLY>(swept, kit, block, part, &mut sums);
-        if swept.terms.whole {
+        if SEVERAL && swept.terms.whole {
             keep_whole::<I, A, SEVERAL, TALLY>(swept, block, &mut near.whole, part);
         } else {
             near.reserve::<TALLY>(part.count() + 16);

@@ -129,7 +129,8 @@ pub unsafe fn forces<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY:
         let p_noise = block.tags[0].as_ptr();
         let p_share = block.share.as_ptr();
         let p_weight = if swept.variables == 1 { block.weight[0].as_ptr() } else { std::ptr::null() };
-        let p_whole = if terms.whole { block.conservative.as_mut_ptr() } else { std::ptr::null_mut() };
+        let p_whole =
+            if SEVERAL && terms.whole { block.conservative.as_mut_ptr() } else { std::ptr::null_mut() };
         let more = terms.has_more();
         let soft = SoftAt::<A::Reals>::new(terms.first_soft());
         let pull = terms.drag.as_ref().filter(|_| kit.noise.is_some());
@@ -154,7 +155,7 @@ pub unsafe fn forces<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY:
                 }
                 force = force + thermostat;
             }
-            if !p_whole.is_null() {
+            if SEVERAL && !p_whole.is_null() {
                 (force * pairs.apart.inverse).store(p_whole.add(k));
                 v += 1;
                 continue;

@@ -128,7 +128,7 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TA
         let mut tally = Tally::default();
         let layer_first = *swept.start.get_unchecked(layer * grid.rows * grid.bins);
         let passes = swept.terms.passes.len();
-        if swept.terms.whole {
+        if SEVERAL && swept.terms.whole {
             near.whole.clear(passes, TALLY);
         } else {
             near.clear(passes, layer_first);
@@ -236,7 +236,7 @@ unsafe fn part<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const TALLY: bool>
         evaluate::<I, A, SEVERAL, TALLY>(swept, kit, block, near, part, tally);
         let offset = *swept.offset.get_unchecked(layer);
         // Forces first: rows of weights take the place of theirs.
-        if !swept.terms.whole {
+        if !(SEVERAL && swept.terms.whole) {
             scatter::<I, A>(swept.sums, swept.variables, offset, block, part);
             near.add::<TALLY>(block, part);
         }

@@ -153,7 +153,7 @@ impl<P: Compiled> Machine<P> {
         let frame = Frame::around([0.0; 3], [1.0; 3], plan.dimensions, 1.0);
         Machine {
             instructions,
-            passes: P::passes(instructions, count > 1),
+            passes: P::passes(instructions, count > 1 || terms.whole),
             terms,
             frame,
             grid: Grid {

@@ -160,7 +160,7 @@ pub unsafe fn second_pass<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const T
 ) {
     // SAFETY: the caller's.
     unsafe {
-        if swept.terms.whole {
+        if SEVERAL && swept.terms.whole {
             return second_of_whole::<I, A, SEVERAL, TALLY>(swept, layer, &near.whole, virial);
         }
         let offset = *swept.offset.get_unchecked(layer);

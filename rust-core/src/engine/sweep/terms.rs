@@ -18,7 +18,8 @@ pub struct Terms<T> {
     pub apart: Vec<PairTerm>,
     pub drag: Option<Drag<T>>,
     pub passes: Vec<Pass<T>>,
-    /// Whether pairs are kept whole, and their forces added in the second pass alone.
+    /// Whether pairs are kept whole, and their forces added in the second pass alone: in loops that are compiled for
+    /// several species, so that those of one fluid of one density have nothing of it.
     pub whole: bool,
     /// For each species whether the first particle is of it, and whether the second: 1 or 0.
     pub is_species: Vec<[Table<T>; 2]>,
