@@ -5,8 +5,12 @@ pub mod cli;
 pub mod crosscheck;
 pub mod export;
 pub mod lammps;
+pub mod memory;
 pub mod observe;
 pub mod output;
 pub mod report;
 pub mod run;
 pub mod scene;
+
+#[global_allocator]
+static ALLOCATOR: memory::LargePages = memory::LargePages;

@@ -151,6 +151,17 @@ pub unsafe fn add_to<Q: Quad>(p: *mut f64, x: Q) {
     unsafe { Q::load(p).add(x).store(p) }
 }
 
+/// `table[which[k]]` in lane `k`; `few` if the table is a vector. A function, as closures are compiled for the least that
+/// any processor has if they are not inlined.
+///
+/// # Safety
+/// The contract of `simd`.
+#[inline(always)]
+pub unsafe fn entry<R: Reals>(table: *const R::Scalar, which: R::Words, few: bool) -> R {
+    // SAFETY: the caller's.
+    unsafe { if few { R::pick(table, which) } else { R::lookup(table, which) } }
+}
+
 /// What is added for a column.
 #[derive(Clone, Copy)]
 struct WeightOf<T> {
@@ -204,9 +215,9 @@ pub unsafe fn scatter_weights<I: Isa, A: Arithmetic<I>, const SEVERAL: bool>(
                         to_second[c] = weight;
                         if SEVERAL {
                             let kind = (*pairs.add(v)).kind.0;
-                            let [is_first, is_second] = of[c].is_species.map(|table| {
-                                if few { A::Reals::pick(table, kind) } else { A::Reals::lookup(table, kind) }
-                            });
+                            let [is_first, is_second] = of[c].is_species;
+                            let is_first = entry::<A::Reals>(is_first, kind, few);
+                            let is_second = entry::<A::Reals>(is_second, kind, few);
                             to_second[c] = weight * is_first;
                             to_first[c] = weight * is_second;
                         }

@@ -8,7 +8,7 @@ use super::block::{Block, Lines};
 use super::forces::{add_virial, sum};
 use super::layer::{Part, Swept};
 use super::many_body::make_room;
-use super::scatter::{Accumulators, Listed, Sum, add_rows};
+use super::scatter::{Accumulators, Listed, Sum, add_rows, entry};
 use super::simd::{Isa, Reals, Scalar, Words};
 use super::terms::Pass;
 use crate::model::kernel::{Real, Shape, ShapeVisitor};
@@ -387,9 +387,9 @@ unsafe fn find_factors<I: Isa, A: Arithmetic<I>, const SEVERAL: bool, const N: u
                         let near = A::Reals::load(of[c].near.add(k));
                         let here = A::Reals::pick(own.0[c].as_ptr(), code);
                         let slope = if SEVERAL {
-                            let [is_first, is_second] = of[c].is_species.map(|table| {
-                                if few { A::Reals::pick(table, kind) } else { A::Reals::lookup(table, kind) }
-                            });
+                            let [is_first, is_second] = of[c].is_species;
+                            let is_first = entry::<A::Reals>(is_first, kind, few);
+                            let is_second = entry::<A::Reals>(is_second, kind, few);
                             here.mul_add(is_second, there[c] * is_first)
                         } else {
                             here + there[c]
