@@ -68,10 +68,13 @@ pub unsafe fn cut<I: Isa, T: Scalar, const GHOSTS: bool, const MANY: usize>(
             }
             let begin = found;
             let look = Look {
-                first: a,
-                many,
                 slots: (EIGHT * eights).wrapping_sub(found),
                 who: *MEMBERS.get_unchecked(many),
+                ghosts: match GHOSTS {
+                    // There is room for a vector behind the last.
+                    true => ghosts(swept.ghost.as_ptr().add(group.first + a).cast::<u64>().read_unaligned()),
+                    false => [0; FOURS],
+                },
             };
             // In their own row they look at those behind them.
             let row = *windows.row.get_unchecked(0);
@@ -143,13 +146,12 @@ fn join(x: &[f32], joined: f32, spans: &mut Spans, a: usize) -> usize {
 
 /// Who looks.
 struct Look {
-    /// In the group, and how many.
-    first: usize,
-    many: usize,
     /// Added to the number of a chunk this is its slot; it wraps.
     slots: usize,
     /// Sixteen bits for each that is there, four by four.
     who: [u64; FOURS],
+    /// The same for each that is a ghost.
+    ghosts: [u64; FOURS],
 }
 
 /// Sixteen bits for each of the first particles of a team, four by four.
@@ -205,29 +207,23 @@ unsafe fn add<T: Scalar, const GHOSTS: bool, const MANY: usize, const OWN: bool>
     // SAFETY: chunks have room for two more; more make room.
     unsafe {
         let mut owned = [[u64::MAX; FOURS]; 2];
-        let mut ghosts = None;
         if GHOSTS {
             // Two ghosts are no concern of this rank.
-            let mut ghost = [false; FOURS * FOUR];
-            let these = group.first + look.first;
-            ghost[..look.many].copy_from_slice(&swept.ghost[these..these + look.many]);
-            ghosts = Some(ghost);
-            if ghost[..look.many].iter().all(|ghost| *ghost) {
+            if both(look.ghosts, look.who) == look.who {
                 let [first, last] = *group.windows.owned.get_unchecked(shift % 5);
                 if !OWN {
                     from = from.max(first);
                 }
                 to = to.min(last);
             }
-            for (k, owned) in owned.iter_mut().enumerate() {
-                *owned = concerned(ghost, swept.owned_bits(from as usize + 16 * k));
-            }
+            let from = from as usize;
+            owned = [from, from + 16].map(|from| concerned(look.ghosts, swept.owned_bits(from)));
         }
         let length = to.saturating_sub(from) as usize;
         let note = (look.slots.wrapping_add(found) << 8 | shift) as u32;
         let who = if OWN { both(look.who, BEHIND) } else { look.who };
         if length > 32 {
-            return add_many(swept, block, found, from, to, who, look.who, note, ghosts);
+            return add_many(swept, block, found, from, to, who, look, note);
         }
         // Both are written, and counted as needed: there is no branch to foresee.
         let bits = FIRST_BITS.get_unchecked(length).map(|bits| [bits; FOURS]);
@@ -249,12 +245,21 @@ fn both(a: [u64; FOURS], b: [u64; FOURS]) -> [u64; FOURS] {
 
 /// Which of sixteen particles concern this rank, of which `owned` are no ghosts, for a team.
 #[inline(always)]
-fn concerned(ghost: [bool; FOURS * FOUR], owned: u32) -> [u64; FOURS] {
-    let bits = |k: usize| if ghost[k] { owned as u64 } else { 0xffff };
-    [0, FOUR].map(|k| bits(k) | bits(k + 1) << 16 | bits(k + 2) << 32 | bits(k + 3) << 48)
+fn concerned(ghosts: [u64; FOURS], owned: u32) -> [u64; FOURS] {
+    [ghosts[0], ghosts[1]].map(|ghosts| !ghosts | EACH * u64::from(owned))
 }
 
-/// More chunks than two; `first` look at the first of them, `who` at the others.
+/// Sixteen bits for each of eight particles that is a ghost, of a byte for each that is 1 then.
+#[inline(always)]
+fn ghosts(bytes: u64) -> [u64; FOURS] {
+    [bytes & 0xffff_ffff, bytes >> 32].map(|four| {
+        let spread =
+            four & 0xff | (four & 0xff00) << 8 | (four & 0xff_0000) << 16 | (four & 0xff00_0000) << 24;
+        0xffff * spread
+    })
+}
+
+/// More chunks than two; `first` look at the first of them.
 #[cold]
 #[inline(never)]
 #[allow(clippy::too_many_arguments)]
@@ -265,17 +270,16 @@ fn add_many<T: Scalar>(
     from: u32,
     to: u32,
     first: [u64; FOURS],
-    who: [u64; FOURS],
+    look: &Look,
     mut note: u32,
-    ghosts: Option<[bool; FOURS * FOUR]>,
 ) -> usize {
     block.reserve_chunks(found + (to - from).div_ceil(16) as usize);
     for begin in (from..to).step_by(16) {
         let bits = [FIRST_BITS[(to - begin).min(16) as usize][0]; FOURS];
-        let mut allowed = both(bits, if begin == from { first } else { who });
-        if let Some(ghosts) = ghosts {
+        let mut allowed = both(bits, if begin == from { first } else { look.who });
+        if !swept.ghost.is_empty() {
             // SAFETY: of a chunk.
-            allowed = both(allowed, concerned(ghosts, unsafe { swept.owned_bits(begin as usize) }));
+            allowed = both(allowed, concerned(look.ghosts, unsafe { swept.owned_bits(begin as usize) }));
         }
         block.chunks[found] = Chunk { allowed: allowed[0], from: begin, note };
         block.allowed[found] = allowed[1];
