@@ -246,7 +246,8 @@ fn both(a: [u64; FOURS], b: [u64; FOURS]) -> [u64; FOURS] {
 /// Which of sixteen particles concern this rank, of which `owned` are no ghosts, for a team.
 #[inline(always)]
 fn concerned(ghosts: [u64; FOURS], owned: u32) -> [u64; FOURS] {
-    [ghosts[0], ghosts[1]].map(|ghosts| !ghosts | EACH * u64::from(owned))
+    let owned = EACH * u64::from(owned);
+    ghosts.map(|ghosts| !ghosts | owned)
 }
 
 /// Sixteen bits for each of eight particles that is a ghost, of a byte for each that is 1 then.
