@@ -69,11 +69,6 @@ impl Observers {
         Self::needs(self.observers.iter().filter(in_stage), step)
     }
 
-    /// Whether [`Observers::sample`] may have something to do after step `step`.
-    pub fn may_sample(&self, step: u64, stage: &str) -> bool {
-        self.stage != stage || self.observers.iter().any(|o| step.is_multiple_of(o.every))
-    }
-
     /// The same, whatever the stage.
     pub fn wants(&self, step: u64) -> Want {
         Self::needs(self.observers.iter(), step)
@@ -87,6 +82,11 @@ impl Observers {
             want.virial |= needs.virial;
         }
         want
+    }
+
+    /// Whether [`Observers::sample`] may have something to do after step `step`.
+    pub fn may_sample(&self, step: u64, stage: &str) -> bool {
+        self.stage != stage || self.observers.iter().any(|o| step.is_multiple_of(o.every))
     }
 
     /// Samples what is due after a step.

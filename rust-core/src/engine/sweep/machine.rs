@@ -27,7 +27,7 @@ use crate::engine::excess_pass::ExcessPass;
 use crate::engine::noise::PairNoise;
 use crate::engine::particles::Particles;
 use crate::engine::plan::Plan;
-use crate::engine::tally::Tally;
+use crate::engine::tally::{Tally, Want};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Room behind the last particle: what whole vectors may read.
@@ -135,7 +135,17 @@ pub struct Given<'a> {
     pub totals: bool,
 }
 
-impl Given<'_> {
+impl<'a> Given<'a> {
+    pub fn new(
+        particles: &Particles<'a>,
+        v: &'a [[f64; 3]],
+        kinds: &'a [i32],
+        thermostat: Option<(PairNoise, f64)>,
+        want: Want,
+    ) -> Given<'a> {
+        Given { particles: *particles, v, kinds, thermostat, totals: want.energy || want.virial }
+    }
+
     /// The species of a particle, unless its type is unknown.
     #[inline(always)]
     fn species_of(&self, k: usize) -> Option<i32> {

@@ -241,13 +241,7 @@ impl Sweep {
         if force.len() < self.owned {
             return Err(EngineError::Host("the force array is too short"));
         }
-        let given = Given {
-            particles: *particles,
-            v,
-            kinds: &self.kinds,
-            thermostat,
-            totals: want.energy || want.virial,
-        };
+        let given = Given::new(particles, v, &self.kinds, thermostat, want);
         let (plan, pool, times) = (&self.plan, &self.pool, &mut self.times);
         let out = Out::new(force, false, particles.tag);
         let tally = with!(&mut self.machine, m => {
@@ -276,13 +270,7 @@ impl Sweep {
         want: Want,
     ) -> Result<(), EngineError> {
         let thermostat = self.begin(particles, v, step, want)?;
-        let given = Given {
-            particles: *particles,
-            v,
-            kinds: &self.kinds,
-            thermostat,
-            totals: want.energy || want.virial,
-        };
+        let given = Given::new(particles, v, &self.kinds, thermostat, want);
         let (plan, pool, times) = (&self.plan, &self.pool, &mut self.times);
         with!(&mut self.machine, m => {
             let mut since = Instant::now();

@@ -142,8 +142,8 @@ impl<P: Compiled> Stream<'_, P> {
         unsafe { &mut *self.arrays.near.at(KEPT * t + at) }
     }
 
-    /// Arrays and first passes of a slab, ψ of all its layers but the first, the second pass of those between, and the forces of
-    /// those of them that are not next to the first.
+    /// Arrays and first passes of a slab, ψ of all its layers but the first, the second pass of those between, and the
+    /// forces of those of them that are not next to the first.
     fn within(&self, t: usize, slab: Range<usize>, times: &mut Times) {
         // SAFETY: each thread has its own scratch.
         let scratch = unsafe { &mut *self.arrays.scratch.at(t) };
