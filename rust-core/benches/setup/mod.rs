@@ -140,7 +140,15 @@ impl Cloud {
         self.step.number += 1;
         let particles = Particles { owned: self.x.len(), x: &self.x, tag: &self.tag, kind: &self.kind };
         sweep
-            .evaluate(&self.domain, &particles, &self.v, Some(self.step), Want::FORCES, &mut self.force)
+            .evaluate(
+                &self.domain,
+                &particles,
+                &self.v,
+                Some(self.step),
+                Want::FORCES,
+                &mut self.force,
+                false,
+            )
             .expect("forces");
     }
 }

@@ -316,7 +316,7 @@ fn sum(values: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::{Images, Particles, PeriodicBox, Settings, Sweep, Want};
+    use crate::engine::{Around, Images, Particles, PeriodicBox, Settings, Sweep, Want};
     use crate::model::Model;
 
     /// Rows of `count` particles of a fluid: densities that differ, and room.
@@ -496,14 +496,18 @@ mod tests {
                     }
                     let particles = Particles { owned: count as usize, x: &x, tag: &tag, kind: &kind };
                     let mut force = vec![[0.0; 3]; count as usize];
+                    let open = PeriodicBox::orthogonal([0.0; 3], [4.0; 3], [false; 3]).unwrap();
+                    let around = Around { domain: &open, images: &[] };
                     let tally = if ghosts {
-                        sweep.first(&particles, &[], None, Want::TOTALS).unwrap();
+                        sweep.first(around, &particles, &[], None, Want::TOTALS).unwrap();
                         let mut slopes = sweep.slopes_mut()[..2 * count as usize].to_vec();
                         images.forward(2, &mut slopes);
                         sweep.slopes_mut().copy_from_slice(&slopes);
                         sweep.second(&particles, &mut force, false).unwrap()
                     } else {
-                        sweep.evaluate(&domain, &particles, &[], None, Want::TOTALS, &mut force).unwrap()
+                        sweep
+                            .evaluate(&domain, &particles, &[], None, Want::TOTALS, &mut force, false)
+                            .unwrap()
                     };
                     (force, tally.excess)
                 };

@@ -35,7 +35,7 @@ pub use images::Images;
 pub use pairs::Newton;
 pub use particles::{Particles, Step};
 pub use plan::Plan;
-pub use sweep::{Instructions, Pool, Precision, Settings, Sweep, Times, part};
+pub use sweep::{Around, Instructions, Pool, Precision, Settings, Sweep, Times, part};
 pub use tally::{Tally, Want};
 
 #[cfg(test)]

@@ -133,7 +133,7 @@ impl Forces {
             species.truncate(owned);
             v.truncate(owned);
             let particles = Particles { owned, x, tag, kind: species };
-            let tally = self.sweep.evaluate(domain, &particles, v, step, want, force)?;
+            let tally = self.sweep.evaluate(domain, &particles, v, step, want, force, false)?;
             self.swept = true;
             return Ok(tally);
         }
@@ -151,7 +151,7 @@ impl Forces {
         images.forward(width, engine.slopes_mut());
         force.clear();
         force.resize(x.len(), [0.0; 3]);
-        let tally = engine.forces(&particles, v, step, want, force)?;
+        let tally = engine.forces(&particles, v, step, want, force, false)?;
         images.reverse(force);
         Ok(tally)
     }

@@ -59,10 +59,16 @@ impl Frame {
         }
     }
 
-    /// Whether a point is within a frame without periods.
+    /// Whether a point is not beyond the ends of the frame, which has none along periods.
     #[inline(always)]
     pub fn has(&self, x: &[f64; 3]) -> bool {
-        (0..self.dimensions).all(|c| (0.0..=self.length[c]).contains(&(x[c] - self.origin[c])))
+        (0..self.dimensions)
+            .all(|c| self.periodic[c] || (0.0..=self.length[c]).contains(&(x[c] - self.origin[c])))
+    }
+
+    /// Whether all directions are periodic.
+    pub fn is_closed(&self) -> bool {
+        self.periodic[..self.dimensions].iter().all(|p| *p)
     }
 
     pub fn is_tilted(&self) -> bool {

@@ -40,7 +40,8 @@ pub struct Swept<'a, T, R> {
     pub ghost: &'a [bool],
     /// A bit for each particle that is not.
     pub owned: &'a [u8],
-    /// The first owned particle of each row, and one past the last; empty if there are no ghosts.
+    /// The first owned particle of each row, and one past the last, then those of the copy of the first layer; empty if
+    /// there are no ghosts.
     pub owned_of_row: &'a [[u32; 2]],
     pub terms: &'a Terms<T>,
     /// The many-body slopes, a number for each pass and species.

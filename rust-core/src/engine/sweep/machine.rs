@@ -127,6 +127,8 @@ impl<T: Scalar> Scratch<T> {
 /// What the host hands over.
 pub struct Given<'a> {
     pub particles: Particles<'a>,
+    /// Whether each ghost is an image of a particle that is there too; empty if none is.
+    pub images: &'a [bool],
     /// Empty if nothing drags.
     pub v: &'a [[f64; 3]],
     /// Species of each type of particle; negative for those that take no part.
@@ -138,12 +140,13 @@ pub struct Given<'a> {
 impl<'a> Given<'a> {
     pub fn new(
         particles: &Particles<'a>,
+        images: &'a [bool],
         v: &'a [[f64; 3]],
         kinds: &'a [i32],
         thermostat: Option<(PairNoise, f64)>,
         want: Want,
     ) -> Given<'a> {
-        Given { particles: *particles, v, kinds, thermostat, totals: want.energy || want.virial }
+        Given { particles: *particles, images, v, kinds, thermostat, totals: want.energy || want.virial }
     }
 
     /// The species of a particle, unless its type is unknown.

@@ -59,8 +59,9 @@ use machine::{Given, Machine, Out};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Forces of one fluid, fast: [`Sweep::evaluate`] in a periodic box. For a rank of a host, with ghosts for whatever is
-/// beyond it, an evaluation is [`Sweep::first`], a round of slopes from owners to ghosts, and [`Sweep::second`].
+/// Forces of one fluid, fast: [`Sweep::evaluate`] where all particles are in hand. For a rank of a host, with ghosts for
+/// whatever is beyond it, an evaluation is [`Sweep::first`], a round of slopes from owners to ghosts, and
+/// [`Sweep::second`].
 pub struct Sweep {
     plan: Plan,
     settings: Settings,
@@ -75,6 +76,17 @@ pub struct Sweep {
     want: Want,
     times: Times,
     ready: bool,
+}
+
+/// What a rank of a host finds around its particles.
+#[derive(Debug, Clone, Copy)]
+pub struct Around<'a> {
+    /// The box. Along its periodic directions the rank has all of it; along the others there are ghosts for what is
+    /// beyond the rank, or nothing is.
+    pub domain: &'a PeriodicBox,
+    /// For each ghost whether it is the image, along a periodic direction of `domain`, of a particle that is there too:
+    /// those take no part. Empty if none is.
+    pub images: &'a [bool],
 }
 
 /// Seconds spent in the parts of evaluations, since the engine was made.
@@ -209,14 +221,16 @@ impl Sweep {
     }
 
     /// Whether particles in `domain` meet one image only of each other, as a sweep without ghosts needs:
-    /// periods of twice the cut-off or more, and edges as LAMMPS has them.
+    /// periods of twice the cut-off or more, and edges as LAMMPS has them, along the axes if any direction is open.
     pub fn fits(&self, domain: &PeriodicBox) -> bool {
-        Frame::of_box(domain, self.plan.dimensions)
-            .is_some_and(|frame| Grid::new(&frame, self.plan.cutoff, 1).is_some())
+        Frame::of_box(domain, self.plan.dimensions).is_some_and(|frame| {
+            (frame.is_closed() || !frame.is_tilted()) && Grid::new(&frame, cutoff(&self.plan), 1).is_some()
+        })
     }
 
-    /// All forces on particles in a periodic box: writes them to `force`, and returns what was asked for. Nothing but
-    /// densities and ψ is kept of all particles on the way: one layer of cells after another has all its passes.
+    /// All forces on particles in a box: writes them to `force`, or adds them to what is there, and returns what was asked
+    /// for. Nothing but densities and ψ is kept of all particles on the way: one layer of cells after another has all its
+    /// passes.
     ///
     /// `v` may be empty and `step` `None` where no thermostat acts; with `step` `None` only conservative
     /// forces are computed. Of `want`, the totals: what is asked for of each particle is the business
@@ -225,6 +239,7 @@ impl Sweep {
     /// # Errors
     /// A position, ψ or a force that is not finite; then some forces may have been written. A tag or type out of range,
     /// arrays of different lengths, ghosts, a box that does not fit.
+    #[allow(clippy::too_many_arguments)]
     pub fn evaluate(
         &mut self,
         domain: &PeriodicBox,
@@ -233,48 +248,56 @@ impl Sweep {
         step: Option<Step>,
         want: Want,
         force: &mut [[f64; 3]],
+        add: bool,
     ) -> Result<Tally, EngineError> {
         let thermostat = self.begin(particles, v, step, want)?;
         if self.owned < self.all {
-            return Err(EngineError::Host("a periodic box has no ghosts"));
+            return Err(EngineError::Host("where all particles are in hand there are no ghosts"));
         }
         if force.len() < self.owned {
             return Err(EngineError::Host("the force array is too short"));
         }
-        let given = Given::new(particles, v, &self.kinds, thermostat, want);
+        let given = Given::new(particles, &[], v, &self.kinds, thermostat, want);
         let (plan, pool, times) = (&self.plan, &self.pool, &mut self.times);
-        let out = Out::new(force, false, particles.tag);
+        let out = Out::new(force, add, particles.tag);
         let tally = with!(&mut self.machine, m => {
             let mut since = Instant::now();
-            let (frame, grid) = in_box(m, plan, pool, domain, &given)?;
+            let (frame, grid) = region(m, plan, pool, domain, &given)?;
             m.find_order(pool, frame, grid, &given)?;
             lap(&mut since, &mut times.sort);
             m.stream(pool, plan, &given, out, times)?;
             m.tally()
         });
+        self.slopes.clear();
         self.count_first(thermostat.is_some());
         self.count_second();
         Ok(tally)
     }
 
-    /// Finds pairs in open space, adds the forces that need no density, sums densities and evaluates ψ; other
-    /// arguments are those of [`Sweep::evaluate`].
+    /// Finds pairs on a rank, adds the forces that need no density, sums densities and evaluates ψ; other arguments are
+    /// those of [`Sweep::evaluate`].
     ///
     /// # Errors
-    /// A position or ψ that is not finite, a tag or type out of range, arrays of different lengths.
+    /// A position or ψ that is not finite, a tag or type out of range, arrays of different lengths, a box that does
+    /// not [fit](Sweep::fits).
     pub fn first(
         &mut self,
+        around: Around,
         particles: &Particles,
         v: &[[f64; 3]],
         step: Option<Step>,
         want: Want,
     ) -> Result<(), EngineError> {
         let thermostat = self.begin(particles, v, step, want)?;
-        let given = Given::new(particles, v, &self.kinds, thermostat, want);
+        let Around { domain, images } = around;
+        if !images.is_empty() && images.len() != self.all - self.owned {
+            return Err(EngineError::Host("not as many ghosts as it was said of whether they are images"));
+        }
+        let given = Given::new(particles, images, v, &self.kinds, thermostat, want);
         let (plan, pool, times) = (&self.plan, &self.pool, &mut self.times);
         with!(&mut self.machine, m => {
             let mut since = Instant::now();
-            let (frame, grid) = in_the_open(m, plan, pool, &given)?;
+            let (frame, grid) = region(m, plan, pool, domain, &given)?;
             m.sort(pool, frame, grid, &given)?;
             lap(&mut since, &mut times.sort);
             m.first(pool);
@@ -333,9 +356,15 @@ impl Sweep {
         self.plan.slope_width()
     }
 
-    /// `∂ψ/∂n` of owned particles, then those of ghosts, after [`Sweep::first`].
+    /// `∂ψ/∂n` of owned particles, then those of ghosts, after [`Sweep::first`]; empty after [`Sweep::evaluate`].
     pub fn slopes(&self) -> &[f64] {
         &self.slopes
+    }
+
+    /// Fetches the slopes of owned particles after [`Sweep::evaluate`], which nobody but a host's questions about single
+    /// pairs needs.
+    pub fn fetch_slopes(&mut self) {
+        with!(&self.machine, m => m.slopes_to_host(&mut self.slopes));
     }
 
     /// The same, for the host to fill in the ghosts.
@@ -369,6 +398,7 @@ impl Sweep {
         with!(&mut self.machine, m => {
             let mut since = Instant::now();
             m.slopes_from_host(slopes);
+            m.copy_slopes();
             m.second(pool);
             lap(&mut since, &mut times.second);
             m.forces(pool, out)?;
@@ -402,8 +432,9 @@ fn cutoff(plan: &Plan) -> f64 {
     if plan.cutoff > 0.0 { plan.cutoff } else { 1.0 }
 }
 
-/// The region to be swept in a box, and its cells.
-fn in_box<P: compiled::Compiled>(
+/// The region to be swept, and its cells: all of the box along its periodic directions, along the others what the
+/// particles span, with room for ghosts within reach of them.
+fn region<P: compiled::Compiled>(
     machine: &mut Machine<P>,
     plan: &Plan,
     pool: &Pool,
@@ -411,33 +442,25 @@ fn in_box<P: compiled::Compiled>(
     given: &Given,
 ) -> Result<(Frame, Grid), EngineError> {
     let cutoff = cutoff(plan);
-    let frame = match Frame::of_box(domain, plan.dimensions) {
-        Some(mut frame) if !frame.periodic[..plan.dimensions].iter().all(|p| *p) => {
-            let (low, high) = machine.extremes(pool, given)?;
-            frame.stretch(low, high, cutoff);
+    let mut frame = Frame::of_box(domain, plan.dimensions);
+    if frame.is_none_or(|frame| !frame.is_closed()) {
+        let margin = if given.particles.owned < given.particles.x.len() { cutoff } else { 0.0 };
+        let (low, high) = machine.extremes(pool, given)?;
+        let (low, high) = (low.map(|x| x - margin), high.map(|x| x + margin));
+        let open = !domain.periodic()[..plan.dimensions].iter().any(|p| *p);
+        frame = match frame {
+            _ if open => Some(Frame::around(low, high, plan.dimensions, cutoff)),
             // What leans along an open direction is no box any more.
-            (!frame.is_tilted()).then_some(frame)
-        }
-        frame => frame,
-    };
+            Some(mut frame) if !frame.is_tilted() => {
+                frame.stretch(low, high, cutoff);
+                Some(frame)
+            }
+            _ => None,
+        };
+    }
     let count = given.particles.x.len();
     let grid = frame.and_then(|frame| Grid::new(&frame, cutoff, count).map(|grid| (frame, grid)));
-    grid.ok_or(EngineError::Host("the box is too narrow, or leans, for a sweep without ghosts"))
-}
-
-/// The region to be swept around particles with ghosts, and its cells.
-fn in_the_open<P: compiled::Compiled>(
-    machine: &mut Machine<P>,
-    plan: &Plan,
-    pool: &Pool,
-    given: &Given,
-) -> Result<(Frame, Grid), EngineError> {
-    let cutoff = cutoff(plan);
-    let (low, high) = machine.extremes(pool, given)?;
-    let (low, high) = (low.map(|x| x - cutoff), high.map(|x| x + cutoff));
-    let frame = Frame::around(low, high, plan.dimensions, cutoff);
-    let grid = Grid::new(&frame, cutoff, given.particles.x.len());
-    grid.map(|grid| (frame, grid)).ok_or(EngineError::Host("no cells for these particles"))
+    grid.ok_or(EngineError::Host("the box is too narrow, or leans, for a sweep without images as ghosts"))
 }
 
 #[cfg(test)]

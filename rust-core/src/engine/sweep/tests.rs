@@ -5,6 +5,9 @@ use nalgebra::Matrix3;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
+mod ranks;
+use ranks::with_ghosts;
+
 /// A generator of points, the same everywhere.
 struct Points(u64);
 
@@ -91,32 +94,8 @@ fn every() -> impl Iterator<Item = (Precision, Instructions)> {
 fn swept(sweep: &mut Sweep, cloud: &Cloud, want: Want) -> (Vec<[f64; 3]>, Tally) {
     let particles = cloud.particles();
     let mut force = vec![[0.0; 3]; cloud.x.len()];
-    let tally = sweep.evaluate(&cloud.domain, &particles, &cloud.v, Some(STEP), want, &mut force).unwrap();
-    (force, tally)
-}
-
-/// The same with images as ghosts, as on a rank of a host.
-fn with_ghosts(sweep: &mut Sweep, cloud: &Cloud) -> (Vec<[f64; 3]>, Tally) {
-    let n = cloud.x.len();
-    let (mut x, mut v, mut tag, mut kind) =
-        (cloud.x.clone(), cloud.v.clone(), cloud.tag.clone(), cloud.kind.clone());
-    let mut images = Images::default();
-    let plan = sweep.plan();
-    images.build(&cloud.domain, plan.dimensions(), plan.cutoff(), n, &mut x);
-    images.forward(1, &mut v);
-    images.forward(1, &mut tag);
-    images.forward(1, &mut kind);
-    let particles = Particles { owned: n, x: &x, tag: &tag, kind: &kind };
-    sweep.first(&particles, &v, Some(STEP), Want::TOTALS).unwrap();
-    let width = sweep.slope_width();
-    let mut slopes = sweep.slopes_mut()[..n * width].to_vec();
-    images.forward(width, &mut slopes);
-    sweep.slopes_mut().copy_from_slice(&slopes);
-    let mut force = vec![[1.0; 3]; n];
-    let tally = sweep.second(&particles, &mut force, true).unwrap();
-    for f in &mut force {
-        *f = f.map(|c| c - 1.0);
-    }
+    let tally =
+        sweep.evaluate(&cloud.domain, &particles, &cloud.v, Some(STEP), want, &mut force, false).unwrap();
     (force, tally)
 }
 
@@ -540,13 +519,15 @@ fn what_cannot_be_computed_is_named() {
     for (precision, instructions) in every() {
         let mut sweep = Sweep::new(&fluid, settings(precision, instructions, 2)).unwrap();
         let mut force = vec![[0.0; 3]; 100];
+        let open = PeriodicBox::orthogonal([0.0; 3], [5.0; 3], [false; 3]).unwrap();
+        let open = Around { domain: &open, images: &[] };
         let mut fails = |cloud: &Cloud, domain: Option<&PeriodicBox>| {
             let (particles, v, want) = (cloud.particles(), &cloud.v, Want::FORCES);
             let error = match domain {
                 Some(domain) => {
-                    sweep.evaluate(domain, &particles, v, Some(STEP), want, &mut force).unwrap_err()
+                    sweep.evaluate(domain, &particles, v, Some(STEP), want, &mut force, false).unwrap_err()
                 }
-                None => sweep.first(&particles, v, Some(STEP), want).unwrap_err(),
+                None => sweep.first(open, &particles, v, Some(STEP), want).unwrap_err(),
             };
             assert!(sweep.second(&particles, &mut force, false).is_err());
             error
@@ -574,8 +555,9 @@ fn what_cannot_be_computed_is_named() {
         cloud.v[3] = [f64::NAN; 3];
         cloud.x[4] = cloud.x[3].map(|x| x + 0.01);
         let particles = cloud.particles();
-        let error =
-            sweep.evaluate(&domain, &particles, &cloud.v, Some(STEP), Want::FORCES, &mut force).unwrap_err();
+        let error = sweep
+            .evaluate(&domain, &particles, &cloud.v, Some(STEP), Want::FORCES, &mut force, false)
+            .unwrap_err();
         assert!(matches!(error, EngineError::Force { .. }), "{error}");
     }
 }
@@ -593,7 +575,9 @@ fn faults_of_the_passes_name_their_particles() {
             let mut sweep = Sweep::new(fluid, settings).unwrap();
             let particles = cloud.particles();
             let mut force = vec![[0.0; 3]; cloud.x.len()];
-            sweep.evaluate(&domain, &particles, &cloud.v, Some(STEP), Want::FORCES, &mut force).unwrap_err()
+            sweep
+                .evaluate(&domain, &particles, &cloud.v, Some(STEP), Want::FORCES, &mut force, false)
+                .unwrap_err()
         };
         for layer in 0..9 {
             // Ten particles on nearly one point.
@@ -629,6 +613,6 @@ fn passes_that_a_fluid_does_not_need_are_left_out() {
     assert_eq!((counts.search, counts.force, counts.noise), (1, 1, 1));
     let particles = cloud.particles();
     let mut force = vec![[0.0; 3]; 300];
-    sweep.evaluate(&cloud.domain, &particles, &[], None, Want::TOTALS, &mut force).unwrap();
+    sweep.evaluate(&cloud.domain, &particles, &[], None, Want::TOTALS, &mut force, false).unwrap();
     assert_eq!((sweep.counts().noise, sweep.counts().energy), (1, 1));
 }

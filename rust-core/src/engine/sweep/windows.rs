@@ -55,7 +55,6 @@ impl Windows {
             windows.crosses |= wrap != 0;
             let cell = (to[1] as usize * grid.rows + to[0] as usize) * grid.bins;
             windows.row[w] = swept.start[cell..].as_ptr();
-            // Where there are ghosts there are no periods, and no copies.
             if let Some(owned) = swept.owned_of_row.get(cell / grid.bins) {
                 windows.owned[w] = *owned;
             }

@@ -64,7 +64,7 @@ impl<P: Compiled> Machine<P> {
     }
 
     /// Slopes of the copies of the first layer.
-    pub(super) fn copy_slopes(&mut self) {
+    pub fn copy_slopes(&mut self) {
         if self.is_ring() {
             let (width, n, copies) = (self.width(), self.particles, self.layer(0).1);
             self.slopes.copy_within(..width * copies, width * n);

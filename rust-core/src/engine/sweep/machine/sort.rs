@@ -51,6 +51,7 @@ impl<P: Compiled> Machine<P> {
         self.find_order(pool, frame, grid, given)?;
         self.fill(pool, given);
         self.copy_first_layer();
+        self.find_owned();
         Ok(())
     }
 
@@ -193,7 +194,6 @@ impl<P: Compiled> Machine<P> {
             // SAFETY: each place is of one thread alone.
             unsafe { this.fill_places(arrays, given, SLACK * some.start..count.min(SLACK * some.end)) };
         });
-        self.find_owned();
     }
 
     /// Fills some places of the arrays: from a multiple of [`SLACK`] on, and up to one, or to the last.
@@ -224,7 +224,7 @@ impl<P: Compiled> Machine<P> {
         }
     }
 
-    /// The owned particles of each row, if there are ghosts.
+    /// The owned particles of each row, those of copies too, if there are ghosts.
     fn find_owned(&mut self) {
         self.owned_of_row.clear();
         self.owned_bits.clear();
@@ -235,7 +235,7 @@ impl<P: Compiled> Machine<P> {
         self.owned_bits.extend(self.ghost.chunks(8).map(bits));
         self.owned_bits.resize(self.owned_bits.len() + SLACK, 0);
         let bins = self.grid.bins;
-        for row in 0..self.grid.rows * self.grid.layers {
+        for row in 0..(self.start.len() - 1) / bins {
             let (first, end) = (self.start[row * bins] as usize, self.start[(row + 1) * bins] as usize);
             let ghosts = &self.ghost[first..end];
             let owned = match ghosts.iter().position(|g| !*g) {
@@ -266,6 +266,9 @@ impl<P: Compiled> Machine<P> {
         self.records.copy_within(..copies, n);
         if !self.species.is_empty() {
             self.species.copy_within(..copies, n);
+        }
+        if !self.ghost.is_empty() {
+            self.ghost.copy_within(..copies, n);
         }
     }
 }

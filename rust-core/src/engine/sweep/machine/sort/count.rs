@@ -81,13 +81,14 @@ impl Count<'_> {
         wrong == 0
     }
 
-    /// Whether no owned particle may reach a particle.
+    /// Whether a particle is a ghost that no owned particle needs: out of reach, or an image.
     #[inline(always)]
-    fn is_out_of_reach(&self, k: usize, x: &[f64; 3]) -> bool {
-        k >= self.given.particles.owned && !self.frame.has(x)
+    fn is_idle(&self, k: usize, x: &[f64; 3]) -> bool {
+        let Some(ghost) = k.checked_sub(self.given.particles.owned) else { return false };
+        !self.frame.has(x) || self.given.images.get(ghost).is_some_and(|image| *image)
     }
 
-    /// Counts a block of particles, of which some may be ghosts out of reach.
+    /// Counts a block of particles, of which some may be ghosts that nobody needs.
     ///
     /// # Safety
     /// Only the calling thread has these particles; cells are of the grid.
@@ -105,7 +106,7 @@ impl Count<'_> {
             self.unit.at(first).cast::<[[u32; 3]; BLOCK]>().write(*units);
             for (lane, [a, b, c]) in cells.iter().enumerate() {
                 let mut to = a + b + c;
-                if GHOSTS && self.is_out_of_reach(first + lane, &x[lane]) {
+                if GHOSTS && self.is_idle(first + lane, &x[lane]) {
                     to = NOWHERE;
                 } else {
                     *counts.get_unchecked_mut(to as usize) += 1;
@@ -136,7 +137,7 @@ impl Count<'_> {
             if species.is_none() || given.particles.tag[k] < 1 || !self.fractions.has(x) {
                 return Err(fault_of(given, k));
             }
-            if self.is_out_of_reach(k, x) {
+            if self.is_idle(k, x) {
                 // SAFETY: as above.
                 unsafe { *self.cell.at(k) = NOWHERE };
                 continue;

@@ -40,7 +40,7 @@ impl Points {
 
     fn given(&self, owned: usize) -> Given<'_> {
         let particles = Particles { owned, x: &self.x, tag: &self.tag, kind: &self.kind };
-        Given { particles, v: &[], kinds: &[-1, 0], thermostat: None, totals: false }
+        Given { particles, images: &[], v: &[], kinds: &[-1, 0], thermostat: None, totals: false }
     }
 }
 

@@ -1,0 +1,153 @@
+//! Sweeps over parts of a box, with ghosts for what is beyond: ranks of a host.
+
+use super::*;
+
+/// One rank's particles: those it owns, then ghosts.
+struct Rank {
+    /// The cloud's number of each.
+    number: Vec<usize>,
+    owned: usize,
+    x: Vec<[f64; 3]>,
+    v: Vec<[f64; 3]>,
+    tag: Vec<i32>,
+    kind: Vec<i32>,
+    images: Vec<bool>,
+}
+
+impl Rank {
+    /// Rank `r` of `ranks`, which divide a box between them along `axis`, and have all of it along other directions
+    /// if those are `closed`. Every other particle and all images are ghosts, near or far.
+    fn new(
+        cloud: &Cloud,
+        dimensions: usize,
+        cutoff: f64,
+        [r, ranks, axis]: [usize; 3],
+        closed: [bool; 3],
+    ) -> Rank {
+        let n = cloud.x.len();
+        let (mut x, mut number) = (cloud.x.clone(), (0..n).collect());
+        let mut images = Images::default();
+        images.build(&cloud.domain, dimensions, cutoff, n, &mut x);
+        images.forward(1, &mut number);
+        let part = |k: usize| (cloud.domain.fraction(cloud.x[k])[axis] * ranks as f64) as usize;
+        let mut order: Vec<usize> = (0..n).filter(|k| part(*k) == r).collect();
+        let owned = order.len();
+        order.extend((0..n).filter(|k| part(*k) != r).chain(n..x.len()));
+        let is_image = |k: &usize| {
+            let s = cloud.domain.fraction(x[*k]);
+            (0..3).any(|c| closed[c] && !(0.0..1.0).contains(&s[c]))
+        };
+        Rank {
+            owned,
+            images: order[owned..].iter().map(is_image).collect(),
+            x: order.iter().map(|k| x[*k]).collect(),
+            v: order.iter().map(|k| cloud.v[number[*k]]).collect(),
+            tag: order.iter().map(|k| cloud.tag[number[*k]]).collect(),
+            kind: order.iter().map(|k| cloud.kind[number[*k]]).collect(),
+            number: order.iter().map(|k| number[*k]).collect(),
+        }
+    }
+
+    fn particles(&self) -> Particles<'_> {
+        Particles { owned: self.owned, x: &self.x, tag: &self.tag, kind: &self.kind }
+    }
+}
+
+/// Forces and totals by as many sweeps as there are ranks along `axis`.
+pub fn on_ranks(
+    sweeps: &mut [Sweep],
+    cloud: &Cloud,
+    axis: usize,
+    closed: [bool; 3],
+) -> (Vec<[f64; 3]>, Tally) {
+    let n = cloud.x.len();
+    let edges = Matrix3::from_columns(&[0, 1, 2].map(|k| cloud.domain.edge(k).into()));
+    let domain = PeriodicBox::new(cloud.domain.origin(), edges, closed).unwrap();
+    let count = sweeps.len();
+    let width = sweeps[0].slope_width();
+    let mut slopes = vec![0.0; n * width];
+    let mut ranks = Vec::new();
+    for (r, sweep) in sweeps.iter_mut().enumerate() {
+        let (dimensions, cutoff) = (sweep.plan().dimensions(), sweep.plan().cutoff());
+        let rank = Rank::new(cloud, dimensions, cutoff, [r, count, axis], closed);
+        // Without images there is nothing to be said of them.
+        let images = if closed == [false; 3] { &[] } else { &rank.images[..] };
+        let around = Around { domain: &domain, images };
+        sweep.first(around, &rank.particles(), &rank.v, Some(STEP), Want::TOTALS).unwrap();
+        for k in 0..rank.owned {
+            slopes[width * rank.number[k]..][..width].copy_from_slice(&sweep.slopes()[width * k..][..width]);
+        }
+        ranks.push(rank);
+    }
+    let mut force = vec![[0.0; 3]; n];
+    let mut tally = Tally::default();
+    for (sweep, rank) in sweeps.iter_mut().zip(&ranks) {
+        for (k, number) in rank.number.iter().enumerate() {
+            sweep.slopes_mut()[width * k..][..width].copy_from_slice(&slopes[width * number..][..width]);
+        }
+        let mut out = vec![[1.0; 3]; rank.owned];
+        tally += sweep.second(&rank.particles(), &mut out, true).unwrap();
+        for (number, f) in rank.number.iter().zip(out) {
+            force[*number] = f.map(|c| c - 1.0);
+        }
+    }
+    (force, tally)
+}
+
+/// The same on one rank that has images for all that is beyond the box.
+pub fn with_ghosts(sweep: &mut Sweep, cloud: &Cloud) -> (Vec<[f64; 3]>, Tally) {
+    on_ranks(std::slice::from_mut(sweep), cloud, 0, [false; 3])
+}
+
+/// Along some directions a rank has ghosts, along others it goes round: in any of them rows, layers and bins may meet
+/// their copies, and ghosts among these.
+#[test]
+fn ranks_that_have_all_of_some_directions_have_the_forces_of_the_plain_engine() {
+    let fluids = [
+        shipped("warren2003-set6.toml"),
+        shipped("standard-dpd.toml"),
+        many(),
+        shipped("van-der-waals-2d.toml"),
+    ];
+    for fluid in fluids {
+        let (dimensions, cutoff) = (fluid.dimensions, fluid.cutoff());
+        let density = if dimensions == 3 { 3.5 } else { 6.0 };
+        let straight = boxes(dimensions, 4.3 * cutoff).swap_remove(0);
+        let count = (density * straight.volume(dimensions) / cutoff.powi(dimensions as i32)) as usize | 1;
+        let cloud = Cloud::new(straight, dimensions, fluid.species.len(), count, 5);
+        let (force, tally) = plain(&fluid, &cloud);
+        for (precision, instructions) in every() {
+            for set in 0..1 << dimensions {
+                let closed = [0, 1, 2].map(|c| set >> c & 1 == 1 && c < dimensions);
+                // Ranks are one behind the other along open directions; along closed ones there is one.
+                for axis in 0..dimensions {
+                    let ranks = if closed[axis] { 1 } else { 2 };
+                    let mut sweeps: Vec<Sweep> = (0..ranks)
+                        .map(|r| Sweep::new(&fluid, settings(precision, instructions, 1 + r)).unwrap())
+                        .collect();
+                    let (here, totals) = on_ranks(&mut sweeps, &cloud, axis, closed);
+                    let what =
+                        format!("closed {closed:?}, {ranks} along {axis}, {precision}, {instructions}");
+                    let off = difference(&force, &here).max(tally_difference(&tally, &totals));
+                    assert!(off < tolerance(precision), "{what}: {off:.1e}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_around_a_rank_has_to_fit() {
+    let fluid = shipped("warren2003-set6.toml");
+    let skew = boxes(3, 5.0).swap_remove(1);
+    let cloud = Cloud::new(skew, 3, 1, 301, 5);
+    let mut sweep = Sweep::new(&fluid, Settings::default()).unwrap();
+    let edges = Matrix3::from_columns(&[0, 1, 2].map(|k| cloud.domain.edge(k).into()));
+    let half = PeriodicBox::new(cloud.domain.origin(), edges, [true, true, false]).unwrap();
+    assert!(sweep.fits(&cloud.domain) && !sweep.fits(&half));
+    let around = |domain, images| Around { domain, images };
+    let mut first = |around| sweep.first(around, &cloud.particles(), &cloud.v, Some(STEP), Want::FORCES);
+    assert!(matches!(first(around(&half, &[])), Err(EngineError::Host(_))));
+    assert!(matches!(first(around(&cloud.domain, &[true])), Err(EngineError::Host(_))));
+    assert!(first(around(&cloud.domain, &[])).is_ok());
+}
