@@ -285,6 +285,48 @@ void PairPsi::collect_pairs()
   }
 }
 
+// Along periodic directions in which there is one rank only, all ghosts are images of what that rank has: the engine
+// goes round the box there instead. Not where images move at another speed, nor where some have none.
+Extent PairPsi::extent() const
+{
+  Extent extent{};
+  std::copy_n(domain->boxlo, 3, extent.origin.begin());
+  std::copy_n(domain->h, 6, extent.edges.begin());
+  if (domain->deform_vremap || atom->firstgroupname) return extent;
+  if (comm->nprocs > 1 && comm->layout == Comm::LAYOUT_TILED) return extent;
+  for (int k = 0; k < domain->dimension; k++)
+    extent.closed[k] = domain->periodicity[k] && (comm->nprocs == 1 || comm->procgrid[k] == 1);
+  return extent;
+}
+
+// Whether all ghosts, if there are any, are images along closed directions.
+bool PairPsi::is_alone(const Extent &extent) const
+{
+  if (comm->nprocs > 1 || !why_listed.empty()) return false;
+  for (int k = 0; k < domain->dimension; k++)
+    if (domain->periodicity[k] && !extent.closed[k]) return false;
+  return true;
+}
+
+// Asks which ghosts are images along closed directions: who packs them knows.
+void PairPsi::find_images()
+{
+  closed = extent().closed;
+  told = 0;
+  // All ranks agree on the box.
+  if (comm->nprocs == 1 || !why_listed.empty() || closed == std::array<bool, 3>{}) return;
+  if (atom->nghost > room || !images) {
+    room = atom->nghost + atom->nghost / 8 + 1;
+    images.reset(new bool[room]);
+  }
+  std::fill_n(images.get(), atom->nghost, false);
+  carries = Carries::images;
+  comm_forward = 1;
+  forward_slopes(comm, this, 0);
+  carries = Carries::slopes;
+  told = atom->nghost;
+}
+
 void PairPsi::find_densities(int all, const Request &request)
 {
   const size_t owned = atom->nlocal;
@@ -292,7 +334,15 @@ void PairPsi::find_densities(int all, const Request &request)
   const rust::Slice<const int32_t> tag{atom->tag, static_cast<size_t>(all)};
   const rust::Slice<const int32_t> kind{atom->type, static_cast<size_t>(all)};
   if (why_listed.empty()) {
-    style_densities(**style, owned, x, flat(atom->v, all), tag, kind, force->newton_pair, request);
+    Extent extent = this->extent();
+    rust::Slice<const bool> left_out;
+    // Only what was closed when ghosts were found has all its images told.
+    if (extent.closed == closed && told == atom->nghost && (*style)->fits(extent, request))
+      left_out = {images.get(), static_cast<size_t>(told)};
+    else
+      extent.closed = {};
+    style_densities(**style, extent, left_out, owned, x, flat(atom->v, all), tag, kind, force->newton_pair,
+                    request);
     return;
   }
   collect_pairs();
@@ -319,6 +369,7 @@ void PairPsi::compute(int eflag, int vflag)
   if (neighbor->ago == 0) {
     check_ghosts();
     if (domain->box_change) check_box();
+    find_images();
   }
 
   const size_t owned = atom->nlocal;
@@ -341,26 +392,37 @@ void PairPsi::compute(int eflag, int vflag)
   request.particle_energy = eflag_atom != 0;
   request.particle_virial = vflag_atom != 0;
 
-  std::string trouble;
-  try {
-    find_densities(all, request);
-  } catch (const std::exception &e) {
-    trouble = e.what();
-  }
-  if (!trouble.empty()) stop_here(trouble);
-
-  forward();
-
   const size_t reach = newton ? all : owned;
   rust::Slice<double> f;
   if (reach > 0) f = {atom->f[0], 3 * reach};
   Totals totals;
+  std::string trouble;
+  const Extent box = extent();
+  const bool alone = is_alone(box) && fluid.fits(box, request);
   try {
-    totals = style_forces(fluid, owned, x, v, tag, kind, request, f);
+    if (alone) {
+      totals = style_evaluate(fluid, box, flat(atom->x, owned), flat(atom->v, owned), {atom->tag, owned},
+                              {atom->type, owned}, request, f);
+    } else {
+      find_densities(all, request);
+    }
   } catch (const std::exception &e) {
     trouble = e.what();
   }
   if (!trouble.empty()) stop_here(trouble);
+
+  without_slopes = {-1, -1};
+  if (alone) {
+    without_slopes = {atom->nlocal, atom->nghost};
+  } else {
+    forward();
+    try {
+      totals = style_forces(fluid, owned, x, v, tag, kind, request, f);
+    } catch (const std::exception &e) {
+      trouble = e.what();
+    }
+    if (!trouble.empty()) stop_here(trouble);
+  }
 
   if (eflag_global) {
     eng_vdwl += totals.excess + totals.pair;
@@ -382,8 +444,15 @@ void PairPsi::compute(int eflag, int vflag)
   }
 }
 
-int PairPsi::pack_forward_comm(int n, int *list, double *buf, int, int *)
+int PairPsi::pack_forward_comm(int n, int *list, double *buf, int pbc_flag, int *pbc)
 {
+  if (carries == Carries::images) {
+    bool image = false;
+    for (int k = 0; k < 3; k++) image |= pbc_flag && closed[k] && pbc[k] != 0;
+    const int owned = atom->nlocal;
+    for (int i = 0; i < n; i++) *buf++ = image || (list[i] >= owned && images[list[i] - owned]);
+    return n;
+  }
   const auto slopes = (*style)->slopes_mut();
   const size_t width = (*style)->slope_width();
   for (int i = 0; i < n; i++)
@@ -393,6 +462,10 @@ int PairPsi::pack_forward_comm(int n, int *list, double *buf, int, int *)
 
 void PairPsi::unpack_forward_comm(int n, int first, double *buf)
 {
+  if (carries == Carries::images) {
+    for (int i = first; i < first + n; i++) images[i - atom->nlocal] = *buf++ != 0.0;
+    return;
+  }
   auto slopes = (*style)->slopes_mut();
   const size_t width = (*style)->slope_width();
   for (int i = first; i < first + n; i++)
@@ -403,6 +476,11 @@ void PairPsi::unpack_forward_comm(int n, int first, double *buf)
 // one, with the densities of the last step. Drag and noise are left out, as in LAMMPS's other DPD styles.
 double PairPsi::single(int i, int j, int itype, int jtype, double rsq, double, double factor_lj, double &fforce)
 {
+  if (without_slopes == std::array<int, 2>{atom->nlocal, atom->nghost}) {
+    (*style)->fetch_slopes(atom->nlocal + atom->nghost);
+    forward();
+    without_slopes = {-1, -1};
+  }
   const double r = std::sqrt(rsq);
   const PairValue pair = (*style)->single(itype, jtype, i, j, r);
   fforce = r > 0.0 ? factor_lj * pair.force / r : 0.0;

@@ -6,6 +6,8 @@
 #include "pair.h"
 #include "psidpd-lammps/src/bridge.rs.h"
 
+#include <array>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -75,6 +77,10 @@ class PairPsi : public LAMMPS_NS::Pair {
 
  private:
   void refresh();
+  // The box, and along which directions this rank has all of it.
+  Extent extent() const;
+  bool is_alone(const Extent &extent) const;
+  void find_images();
   void find_densities(int all, const Request &request);
   void collect_pairs();
   void forward();
@@ -93,8 +99,19 @@ class PairPsi : public LAMMPS_NS::Pair {
   bool wants_densities = false;
   std::vector<double *> density_rows;
 
-  // Columns of the slopes that a communication carries.
+  // What a communication carries: columns of the slopes, or which ghosts are images.
+  enum class Carries { slopes, images };
+  Carries carries = Carries::slopes;
   int first_column = 0;
+
+  // For each ghost whether it is the image of a particle that this rank has, along a direction that was closed when
+  // ghosts were found; and how many ghosts those are for.
+  std::array<bool, 3> closed{};
+  std::unique_ptr<bool[]> images;
+  int told = 0, room = 0;
+
+  // Atoms and ghosts of an evaluation that left no slopes of ghosts; those that single() has asked for are there.
+  std::array<int, 2> without_slopes{-1, -1};
 
   // Why pairs come from LAMMPS's neighbor list; empty if the engine finds them.
   std::string why_listed;

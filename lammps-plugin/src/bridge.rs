@@ -1,7 +1,8 @@
 //! The style for C++. Errors arrive there as exceptions, panics as errors.
 
 use crate::style::{Style, StyleError};
-use psidpd_core::engine::{PairsOfHost, Step, Want};
+use nalgebra::Matrix3;
+use psidpd_core::engine::{Around, PairsOfHost, PeriodicBox, Step, Tally, Want};
 use psidpd_core::model::{SplinePair, WarrenPair};
 
 #[cxx::bridge(namespace = "psidpd")]
@@ -18,6 +19,16 @@ mod ffi {
     struct PairValue {
         energy: f64,
         force: f64,
+    }
+
+    /// The box of LAMMPS.
+    #[derive(Clone, Copy)]
+    struct Extent {
+        origin: [f64; 3],
+        /// xx, yy, zz, yz, xz, xy.
+        edges: [f64; 6],
+        /// Periodic directions that this rank has all of.
+        closed: [bool; 3],
     }
 
     /// What a step asks for.
@@ -85,9 +96,26 @@ mod ffi {
 
         fn configure(self: &mut Style, mixed: bool, threads: usize) -> Result<()>;
 
+        /// Whether this rank can do without images along the closed directions of a box, for what is asked for.
+        fn fits(self: &Style, extent: &Extent, request: &Request) -> bool;
+        /// All forces, without ghosts.
+        #[allow(clippy::too_many_arguments)]
+        fn style_evaluate(
+            style: &mut Style,
+            extent: &Extent,
+            x: &[f64],
+            v: &[f64],
+            tag: &[i32],
+            kind: &[i32],
+            request: &Request,
+            f: &mut [f64],
+        ) -> Result<Totals>;
+        /// `images` are ghosts to be left out: see `Around`.
         #[allow(clippy::too_many_arguments)]
         fn style_densities(
             style: &mut Style,
+            extent: &Extent,
+            images: &[bool],
             owned: usize,
             x: &[f64],
             v: &[f64],
@@ -109,6 +137,8 @@ mod ffi {
             factor: &[f64],
         ) -> Result<()>;
         fn slopes_mut(self: &mut Style) -> &mut [f64];
+        /// Slopes of owned particles after an evaluation without ghosts, and room for others.
+        fn fetch_slopes(self: &mut Style, all: usize);
         #[allow(clippy::too_many_arguments)]
         fn style_forces(
             style: &mut Style,
@@ -195,9 +225,39 @@ fn wanted(request: &ffi::Request) -> (Option<Step>, Want) {
     (request.thermostat.then_some(step), want)
 }
 
+/// The box, periodic along the closed directions only.
+fn domain_of(extent: &ffi::Extent) -> Result<PeriodicBox, StyleError> {
+    let [xx, yy, zz, yz, xz, xy] = extent.edges;
+    let edges = Matrix3::new(xx, xy, xz, 0.0, yy, yz, 0.0, 0.0, zz);
+    PeriodicBox::new(extent.origin, edges, extent.closed).map_err(|e| StyleError::new(e.to_string()))
+}
+
+#[allow(clippy::too_many_arguments)]
+fn style_evaluate(
+    style: &mut Style,
+    extent: &ffi::Extent,
+    x: &[f64],
+    v: &[f64],
+    tag: &[i32],
+    kind: &[i32],
+    request: &ffi::Request,
+    f: &mut [f64],
+) -> Result<ffi::Totals, StyleError> {
+    let (step, want) = wanted(request);
+    let tally = style.evaluate(&domain_of(extent)?, x, v, tag, kind, step, want, f)?;
+    Ok(totals(style, &tally))
+}
+
+fn totals(style: &Style, tally: &Tally) -> ffi::Totals {
+    let [below, above] = style.engines().out_of_bounds().map(|n| n as f64);
+    ffi::Totals { excess: tally.excess, pair: tally.pair, virial: tally.total_virial(), below, above }
+}
+
 #[allow(clippy::too_many_arguments)]
 fn style_densities(
     style: &mut Style,
+    extent: &ffi::Extent,
+    images: &[bool],
     owned: usize,
     x: &[f64],
     v: &[f64],
@@ -207,7 +267,8 @@ fn style_densities(
     request: &ffi::Request,
 ) -> Result<(), StyleError> {
     let (step, want) = wanted(request);
-    style.densities(owned, x, v, tag, kind, newton, step, want)
+    let domain = domain_of(extent)?;
+    style.densities(Around { domain: &domain, images }, owned, x, v, tag, kind, newton, step, want)
 }
 
 #[allow(clippy::too_many_arguments)]
@@ -223,8 +284,7 @@ fn style_forces(
 ) -> Result<ffi::Totals, StyleError> {
     let (step, want) = wanted(request);
     let tally = style.forces(owned, x, v, tag, kind, step, want, f)?;
-    let [below, above] = style.engines().out_of_bounds().map(|n| n as f64);
-    Ok(ffi::Totals { excess: tally.excess, pair: tally.pair, virial: tally.total_virial(), below, above })
+    Ok(totals(style, &tally))
 }
 
 #[allow(clippy::too_many_arguments)]
@@ -254,6 +314,15 @@ impl Style {
     fn variables(&self) -> usize {
         let plan = self.engine().plan();
         plan.densities().count() * plan.species().len()
+    }
+
+    fn fits(&self, extent: &ffi::Extent, request: &ffi::Request) -> bool {
+        let (_, want) = wanted(request);
+        domain_of(extent).is_ok_and(|domain| self.engines().fits(&domain, want))
+    }
+
+    fn fetch_slopes(&mut self, all: usize) {
+        self.engines_mut().fetch_slopes(all);
     }
 
     fn local_densities(&mut self) -> &[f64] {

@@ -2,7 +2,8 @@
 
 use crate::style::StyleError;
 use psidpd_core::engine::{
-    Engine, Newton, PairsOfHost, Particles, Plan, Pool, Settings, Step, Sweep, Tally, Want,
+    Around, Engine, Newton, PairsOfHost, Particles, PeriodicBox, Plan, Pool, Settings, Step, Sweep, Tally,
+    Want,
 };
 use psidpd_core::model::Fluid;
 use std::sync::Arc;
@@ -63,21 +64,54 @@ impl Engines {
         self.engine.sum_all_densities(all);
     }
 
+    /// Whether the sweep has what is wanted.
+    fn sweeps(&self, want: Want) -> bool {
+        !(self.all_densities || want.particle_energy || want.particle_virial)
+    }
+
+    /// Whether no images are needed along the periodic directions of `domain`.
+    pub fn fits(&self, domain: &PeriodicBox, want: Want) -> bool {
+        self.sweeps(want) && self.sweep.fits(domain)
+    }
+
+    /// A whole evaluation, if a rank has all of a box that [fits](Engines::fits): adds the forces to `force`.
+    ///
+    /// # Errors
+    /// As [`Sweep::evaluate`].
+    pub fn evaluate(
+        &mut self,
+        domain: &PeriodicBox,
+        particles: &Particles,
+        v: &[[f64; 3]],
+        step: Option<Step>,
+        want: Want,
+        force: &mut [[f64; 3]],
+    ) -> Result<Tally, StyleError> {
+        self.swept = true;
+        Ok(self.sweep.evaluate(domain, particles, v, step, want, force, true)?)
+    }
+
+    /// Slopes of owned particles after [`Engines::evaluate`], and room for `all`.
+    pub fn fetch_slopes(&mut self, all: usize) {
+        self.sweep.fetch_slopes(all);
+    }
+
     /// The first half of an evaluation: all that needs no slopes of ghosts.
     ///
     /// # Errors
     /// As [`Sweep::first`] and [`Engine::densities`].
     pub fn first(
         &mut self,
+        around: Around,
         particles: &Particles,
         v: &[[f64; 3]],
         step: Option<Step>,
         want: Want,
         newton: Newton,
     ) -> Result<(), StyleError> {
-        self.swept = !(self.all_densities || want.particle_energy || want.particle_virial);
+        self.swept = self.sweeps(want);
         if self.swept {
-            self.sweep.first(particles, v, step, want)?;
+            self.sweep.first(around, particles, v, step, want)?;
         } else {
             self.engine.densities(particles, newton)?;
         }

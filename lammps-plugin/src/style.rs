@@ -2,7 +2,8 @@
 
 use crate::engines::Engines;
 use psidpd_core::engine::{
-    Engine, EngineError, Newton, PairsOfHost, Particles, Pool, Precision, Settings, Step, Tally, Want,
+    Around, Engine, EngineError, Newton, PairsOfHost, Particles, PeriodicBox, Pool, Precision, Settings,
+    Step, Tally, Want,
 };
 use psidpd_core::model::{
     ForceLaw, Model, PresetError, SplinePair, WarrenPair, lucy_mdpd, spline_dpd, warren_ab,
@@ -325,6 +326,29 @@ impl Style {
         text
     }
 
+    /// All forces on particles in a box that this rank has all of, added to `f`.
+    ///
+    /// # Errors
+    /// As [`Engines::evaluate`].
+    #[allow(clippy::too_many_arguments)]
+    pub fn evaluate(
+        &mut self,
+        domain: &PeriodicBox,
+        x: &[f64],
+        v: &[f64],
+        tag: &[i32],
+        kind: &[i32],
+        step: Option<Step>,
+        want: Want,
+        f: &mut [f64],
+    ) -> Result<Tally, StyleError> {
+        guard(|| {
+            let particles = Particles { owned: tag.len(), x: triples(x), tag, kind };
+            let force = f.as_chunks_mut::<3>().0;
+            self.engines.evaluate(domain, &particles, triples(v), step, want, force)
+        })
+    }
+
     /// The first half of an evaluation, over the `owned` first particles of arrays as LAMMPS has them: pairs,
     /// forces that need no density, densities, ψ and slopes.
     ///
@@ -333,6 +357,7 @@ impl Style {
     #[allow(clippy::too_many_arguments)]
     pub fn densities(
         &mut self,
+        around: Around,
         owned: usize,
         x: &[f64],
         v: &[f64],
@@ -345,7 +370,7 @@ impl Style {
         guard(|| {
             let newton = if newton { Newton::On } else { Newton::Off };
             let particles = Particles { owned, x: triples(x), tag, kind };
-            self.engines.first(&particles, triples(v), step, want, newton)
+            self.engines.first(around, &particles, triples(v), step, want, newton)
         })
     }
 

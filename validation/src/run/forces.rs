@@ -151,7 +151,7 @@ impl Forces {
         images.forward(width, engine.slopes_mut());
         force.clear();
         force.resize(x.len(), [0.0; 3]);
-        let tally = engine.forces(&particles, v, step, want, force, false)?;
+        let tally = engine.forces(&particles, v, step, want, force)?;
         images.reverse(force);
         Ok(tally)
     }

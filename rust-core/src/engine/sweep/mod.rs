@@ -361,10 +361,11 @@ impl Sweep {
         &self.slopes
     }
 
-    /// Fetches the slopes of owned particles after [`Sweep::evaluate`], which nobody but a host's questions about single
-    /// pairs needs.
-    pub fn fetch_slopes(&mut self) {
+    /// Fetches the slopes of owned particles after [`Sweep::evaluate`], with room for `all`: for a host's questions about
+    /// single pairs, before which nobody needs them.
+    pub fn fetch_slopes(&mut self, all: usize) {
         with!(&self.machine, m => m.slopes_to_host(&mut self.slopes));
+        self.slopes.resize(self.slope_width() * all, 0.0);
     }
 
     /// The same, for the host to fill in the ghosts.
