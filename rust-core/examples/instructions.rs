@@ -6,13 +6,15 @@
 //!     target/release/examples/instructions mdpd mixed avx2 8
 //! ```
 //!
+//! With `ghosts` as last word they are the evaluations of a rank that has ghosts along z.
+//!
 //! Counts of runs of different length differ by what the additional evaluations take. It prints the number of
 //! particles, and a sum of forces, so that nothing is optimised away.
 
 #[path = "../benches/setup/mod.rs"]
 mod setup;
 
-use setup::{Cloud, choose, sweep};
+use setup::{Cloud, Rank, choose, sweep};
 use std::process::ExitCode;
 
 const COUNT: usize = 2000;
@@ -23,7 +25,7 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(fault) => {
             eprintln!(
-                "{fault}\nusage: instructions mdpd|dpd|formula mixed|double portable|avx2|avx512 EVALUATIONS"
+                "{fault}\nusage: instructions mdpd|dpd|formula mixed|double portable|avx2|avx512 EVALUATIONS [ghosts]"
             );
             ExitCode::FAILURE
         }
@@ -31,18 +33,33 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &[String]) -> Result<(), String> {
-    let [fluid, precision, instructions, evaluations] = arguments else {
+    let [fluid, precision, instructions, evaluations, ghosts @ ..] = arguments else {
         return Err("four arguments are needed".into());
     };
     let (subject, precision, set) = choose(fluid, precision, instructions)?;
     let evaluations: u32 = evaluations.parse().map_err(|_| "EVALUATIONS is a number")?;
     let fluid = subject.fluid();
-    let mut cloud = Cloud::new(subject, &fluid, COUNT);
     let mut sweep = sweep(&fluid, precision, set);
-    for _ in 0..evaluations {
-        cloud.drift();
-        cloud.evaluate(&mut sweep);
-    }
-    println!("{COUNT} {}", cloud.force.iter().map(|f| f[0].abs()).sum::<f64>());
+    let force = match ghosts {
+        [] => {
+            let mut cloud = Cloud::new(subject, &fluid, COUNT);
+            for _ in 0..evaluations {
+                cloud.drift();
+                cloud.evaluate(&mut sweep);
+            }
+            cloud.force
+        }
+        [word] if word == "ghosts" => {
+            let mut rank = Rank::new(subject, &fluid, COUNT);
+            rank.find_ghosts(sweep.plan().cutoff());
+            for _ in 0..evaluations {
+                rank.drift();
+                rank.evaluate(&mut sweep, || ());
+            }
+            rank.cloud.force
+        }
+        _ => return Err("the last word, if there is a fifth, is ghosts".into()),
+    };
+    println!("{COUNT} {}", force.iter().map(|f| f[0].abs()).sum::<f64>());
     Ok(())
 }

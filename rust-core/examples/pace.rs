@@ -2,12 +2,14 @@
 //! rounds, after the fluid has come to rest.
 //!
 //! `cargo run --release -p psidpd-core --example pace mdpd mixed avx512 1 6050`
+//!
+//! With `ghosts` as last word it is the evaluations of a rank that has ghosts along z.
 
 #[path = "../benches/setup/mod.rs"]
 mod setup;
 
 use psidpd_core::engine::{Settings, Sweep, Times};
-use setup::{Cloud, choose};
+use setup::{Cloud, Rank, choose};
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -16,13 +18,50 @@ const BEFORE: u32 = 150;
 const STEPS: u32 = 50;
 const ROUNDS: u32 = 12;
 
+/// A box, or a rank's part of one.
+enum Any {
+    Cloud(Cloud),
+    Rank(Box<Rank>),
+}
+
+impl Any {
+    /// One step; the seconds that all but the evaluation took.
+    fn step(&mut self, sweep: &mut Sweep) -> f64 {
+        let mut since = Instant::now();
+        match self {
+            Any::Cloud(cloud) => {
+                cloud.evaluate(sweep);
+                since = Instant::now();
+                cloud.kick();
+                cloud.drift();
+                since.elapsed().as_secs_f64()
+            }
+            Any::Rank(rank) => {
+                rank.find_ghosts(sweep.plan().cutoff());
+                let mut around = since.elapsed().as_secs_f64();
+                let mut laps = 0;
+                rank.evaluate(sweep, || {
+                    if laps == 1 {
+                        around += since.elapsed().as_secs_f64();
+                    }
+                    (since, laps) = (Instant::now(), laps + 1);
+                });
+                since = Instant::now();
+                rank.cloud.kick();
+                rank.cloud.drift();
+                around + since.elapsed().as_secs_f64()
+            }
+        }
+    }
+}
+
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     match run(&arguments) {
         Ok(()) => ExitCode::SUCCESS,
         Err(fault) => {
             eprintln!(
-                "{fault}\nusage: pace mdpd|dpd|formula mixed|double portable|avx2|avx512 THREADS PARTICLES"
+                "{fault}\nusage: pace mdpd|dpd|formula mixed|double portable|avx2|avx512 THREADS PARTICLES [ghosts]"
             );
             ExitCode::FAILURE
         }
@@ -30,33 +69,32 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &[String]) -> Result<(), String> {
-    let [fluid, precision, instructions, threads, count] = arguments else {
+    let [fluid, precision, instructions, threads, count, ghosts @ ..] = arguments else {
         return Err("five arguments are needed".into());
+    };
+    let ghosts = match ghosts {
+        [] => false,
+        [word] if word == "ghosts" => true,
+        _ => return Err("the last word, if there is a sixth, is ghosts".into()),
     };
     let (subject, precision, instructions) = choose(fluid, precision, instructions)?;
     let threads = threads.parse().map_err(|_| "THREADS is a number above 0")?;
     let count: usize = count.parse().map_err(|_| "PARTICLES is a number")?;
     let fluid = subject.fluid();
-    let mut cloud = Cloud::new(subject, &fluid, count);
+    let mut particles = match ghosts {
+        true => Any::Rank(Box::new(Rank::new(subject, &fluid, count))),
+        false => Any::Cloud(Cloud::new(subject, &fluid, count)),
+    };
     let settings = Settings { precision, instructions, threads };
     let mut sweep = Sweep::new(&fluid, settings).map_err(|e| e.to_string())?;
     for _ in 0..BEFORE {
-        cloud.evaluate(&mut sweep);
-        cloud.kick();
-        cloud.drift();
+        particles.step(&mut sweep);
     }
     let mut best = [f64::INFINITY; 7];
     for _ in 0..ROUNDS {
-        let mut around = 0.0;
         let before = sweep.times();
         let start = Instant::now();
-        for _ in 0..STEPS {
-            cloud.evaluate(&mut sweep);
-            let since = Instant::now();
-            cloud.kick();
-            cloud.drift();
-            around += since.elapsed().as_secs_f64();
-        }
+        let around: f64 = (0..STEPS).map(|_| particles.step(&mut sweep)).sum();
         let all = start.elapsed().as_secs_f64() - around;
         let after = sweep.times();
         let part = |of: fn(&Times) -> f64| of(&after) - of(&before);

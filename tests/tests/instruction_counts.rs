@@ -27,8 +27,10 @@ fn baseline() -> PathBuf {
 /// Particles, and instructions of a whole run.
 fn count(program: &Path, case: &[&str], evaluations: u32) -> (f64, f64) {
     let mut run = Command::new("valgrind");
-    run.args(["--tool=callgrind", "--callgrind-out-file=/dev/null"]).arg(program).args(case);
-    let output = run.arg(evaluations.to_string()).output().unwrap_or_else(|e| {
+    run.args(["--tool=callgrind", "--callgrind-out-file=/dev/null"]).arg(program);
+    // Fluid, precision and instruction set; behind the number, whether there are ghosts.
+    run.args(&case[..3]).arg(evaluations.to_string()).args(&case[3..]);
+    let output = run.output().unwrap_or_else(|e| {
         panic!("valgrind does not start ({e}): install it (Debian: apt-get install valgrind)")
     });
     assert!(output.status.success(), "{case:?}: {}", said(&output));
@@ -60,10 +62,15 @@ fn instructions_per_particle_and_step_stay_what_they_were() {
     for fluid in ["mdpd", "dpd", "formula"] {
         for precision in ["mixed", "double"] {
             for instructions in ["portable", "avx2"] {
-                let case = [fluid, precision, instructions];
-                let count = per_particle_step(&program, &case);
-                println!("{:<24} {count:8.1}", case.join(" "));
-                counts.insert(case.join(" "), (10.0 * count).round() / 10.0);
+                // What ghosts take in addition hardly depends on the instruction set.
+                let ghosts = if instructions == "avx2" { &[false, true][..] } else { &[false] };
+                for ghosts in ghosts {
+                    let mut case = vec![fluid, precision, instructions];
+                    case.extend(ghosts.then_some("ghosts"));
+                    let count = per_particle_step(&program, &case);
+                    println!("{:<24} {count:8.1}", case.join(" "));
+                    counts.insert(case.join(" "), (10.0 * count).round() / 10.0);
+                }
             }
         }
     }

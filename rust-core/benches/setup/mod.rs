@@ -1,7 +1,7 @@
 //! Fluids and particles that micro-benchmarks and instruction counts share.
 
 use psidpd_core::engine::{
-    Instructions, Particles, PeriodicBox, Precision, Settings, Step, Sweep, Want, noise,
+    Around, Images, Instructions, Particles, PeriodicBox, Precision, Settings, Step, Sweep, Want, noise,
 };
 use psidpd_core::model::{Fluid, Model};
 
@@ -150,6 +150,68 @@ impl Cloud {
                 false,
             )
             .expect("forces");
+    }
+}
+
+/// The particles of a rank that has all of a box but along z, where there are images of its own as ghosts.
+#[allow(dead_code)] // As above.
+pub struct Rank {
+    /// The box, and owned particles.
+    pub cloud: Cloud,
+    around: PeriodicBox,
+    along: PeriodicBox,
+    images: Images,
+    x: Vec<[f64; 3]>,
+    v: Vec<[f64; 3]>,
+    tag: Vec<i32>,
+    kind: Vec<i32>,
+    slopes: Vec<f64>,
+}
+
+#[allow(dead_code)] // As above.
+impl Rank {
+    /// As [`Cloud::new`]; ghosts are found by [`Rank::find_ghosts`].
+    pub fn new(subject: &Subject, fluid: &Fluid, count: usize) -> Rank {
+        let cloud = Cloud::new(subject, fluid, count);
+        let part = |periodic| PeriodicBox::orthogonal([0.0; 3], [cloud.edge; 3], periodic).expect("a box");
+        let (around, along) = (part([true, true, false]), part([false, false, true]));
+        let (tag, kind, images) = (cloud.tag.clone(), cloud.kind.clone(), Images::default());
+        Rank { cloud, around, along, images, x: vec![], v: vec![], tag, kind, slopes: vec![] }
+    }
+
+    /// Finds the images within `reach` of the box.
+    pub fn find_ghosts(&mut self, reach: f64) {
+        let owned = self.cloud.x.len();
+        self.x.clone_from(&self.cloud.x);
+        self.images.build(&self.along, 3, reach, owned, &mut self.x);
+        self.v.clone_from(&self.cloud.v);
+        self.images.forward(1, &mut self.v);
+        self.images.forward(1, &mut self.tag);
+        self.images.forward(1, &mut self.kind);
+    }
+
+    /// Moves owned particles and ghosts along their velocities by one step.
+    pub fn drift(&mut self) {
+        for (x, v) in self.x.iter_mut().zip(&self.v) {
+            (0..3).for_each(|c| x[c] += self.cloud.step.dt * v[c]);
+        }
+    }
+
+    /// One evaluation of all forces, noise among them; `between` hears when slopes go to ghosts, and when they are there.
+    pub fn evaluate(&mut self, sweep: &mut Sweep, mut between: impl FnMut()) {
+        self.cloud.step.number += 1;
+        let owned = self.cloud.x.len();
+        let particles = Particles { owned, x: &self.x, tag: &self.tag, kind: &self.kind };
+        let around = Around { domain: &self.around, images: &[] };
+        sweep.first(around, &particles, &self.v, Some(self.cloud.step), Want::FORCES).expect("densities");
+        between();
+        let width = sweep.slope_width();
+        self.slopes.clear();
+        self.slopes.extend_from_slice(&sweep.slopes()[..width * owned]);
+        self.images.forward(width, &mut self.slopes);
+        sweep.slopes_mut().copy_from_slice(&self.slopes);
+        between();
+        sweep.second(&particles, &mut self.cloud.force, false).expect("forces");
     }
 }
 
