@@ -15,3 +15,7 @@ pub mod style;
 
 #[cfg(lammps_host)]
 mod entry;
+
+#[cfg(lammps_host)]
+#[global_allocator]
+static ALLOCATOR: psidpd_core::memory::LargePages = psidpd_core::memory::LargePages;

@@ -18,5 +18,6 @@
 pub mod c_api;
 pub mod document;
 pub mod engine;
+pub mod memory;
 pub mod model;
 pub mod theory;

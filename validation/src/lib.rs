@@ -5,7 +5,6 @@ pub mod cli;
 pub mod crosscheck;
 pub mod export;
 pub mod lammps;
-pub mod memory;
 pub mod observe;
 pub mod output;
 pub mod report;
@@ -13,4 +12,4 @@ pub mod run;
 pub mod scene;
 
 #[global_allocator]
-static ALLOCATOR: memory::LargePages = memory::LargePages;
+static ALLOCATOR: psidpd_core::memory::LargePages = psidpd_core::memory::LargePages;

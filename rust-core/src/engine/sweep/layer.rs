@@ -40,9 +40,8 @@ pub struct Swept<'a, T, R> {
     pub ghost: &'a [bool],
     /// A bit for each particle that is not.
     pub owned: &'a [u8],
-    /// The first owned particle of each row, and one past the last, then those of the copy of the first layer; empty if
-    /// there are no ghosts.
-    pub owned_of_row: &'a [[u32; 2]],
+    /// Of each row, then of those of the copy of the first layer; empty if there are no ghosts.
+    pub owned_of_row: &'a [OwnedOfRow],
     pub terms: &'a Terms<T>,
     /// The many-body slopes, a number for each pass and species.
     pub slopes: Shared<f64>,
@@ -58,6 +57,15 @@ pub struct Swept<'a, T, R> {
     pub densities: Shared<f64>,
     pub variables: usize,
     pub thermostat: Option<(PairNoise, f64)>,
+}
+
+/// The owned particles of a row.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct OwnedOfRow {
+    /// The first, and one past the last.
+    pub ends: [u32; 2],
+    /// Whether the row has ghosts.
+    pub with_ghosts: bool,
 }
 
 /// A pointer that threads write disjoint parts through.
@@ -185,10 +193,11 @@ unsafe fn find<I: Isa, A: Arithmetic<I>, const MANY: usize>(
     unsafe {
         let ends = view.spans::<I, MANY>(swept, row, [first, count], &windows.there, spans);
         let group = Group { view, windows, ends, first, count };
-        if swept.ghost.is_empty() {
-            cut::<I, A::Scalar, false, MANY>(swept, &group, spans, block);
-        } else {
+        // Owned particles look at all there are.
+        if windows.with_ghosts {
             cut::<I, A::Scalar, true, MANY>(swept, &group, spans, block);
+        } else {
+            cut::<I, A::Scalar, false, MANY>(swept, &group, spans, block);
         }
         if windows.crosses || ends.before | ends.after != 0 {
             look::<I, A::Scalar, true, MANY>(swept, &group, A::Reals::LANES, block);

@@ -13,7 +13,7 @@ use super::block::Block;
 use super::compiled::{Compiled, Passes};
 use super::frame::Frame;
 use super::grid::Grid;
-use super::layer::{Shared, Swept};
+use super::layer::{OwnedOfRow, Shared, Swept};
 use super::many_body::NearPairs;
 use super::pool::Pool;
 use super::quantum::Quantum;
@@ -58,7 +58,7 @@ pub struct Machine<P: Compiled> {
     species: Vec<u8>,
     ghost: Vec<bool>,
     owned_bits: Vec<u8>,
-    owned_of_row: Vec<[u32; 2]>,
+    owned_of_row: Vec<OwnedOfRow>,
     offset: Vec<isize>,
     sums: Vec<Sum>,
     densities: Vec<Sum>,

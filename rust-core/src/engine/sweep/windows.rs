@@ -20,6 +20,8 @@ pub struct Windows {
     pub crosses: bool,
     /// The first owned particle of each, and one past the last.
     pub owned: [[u32; 2]; 5],
+    /// Whether there are ghosts among those who look.
+    pub with_ghosts: bool,
 }
 
 impl Windows {
@@ -32,6 +34,7 @@ impl Windows {
             shift: [[0; 3]; 15],
             crosses: false,
             owned: [[0; 2]; 5],
+            with_ghosts: false,
         };
         let around = [(0, 0), (1, 0), (-1, 1), (0, 1), (1, 1)];
         for (w, (across, up)) in around.into_iter().enumerate() {
@@ -56,7 +59,8 @@ impl Windows {
             let cell = (to[1] as usize * grid.rows + to[0] as usize) * grid.bins;
             windows.row[w] = swept.start[cell..].as_ptr();
             if let Some(owned) = swept.owned_of_row.get(cell / grid.bins) {
-                windows.owned[w] = *owned;
+                windows.owned[w] = owned.ends;
+                windows.with_ghosts |= w == 0 && owned.with_ghosts;
             }
             for period in 0..3 {
                 windows.shift[w + 5 * period] = view.shift[(wrap + 1) as usize][period];

@@ -32,7 +32,7 @@ impl<P: Compiled> Machine<P> {
     /// Slopes from the order of cells to the host's, those of particles it owns.
     pub fn slopes_to_host(&self, out: &mut Vec<f64>) {
         let width = self.width();
-        out.clear();
+        // Those of ghosts are anything: the host fills them in.
         out.resize(width * self.all, 0.0);
         for (s, k) in self.order.iter().enumerate() {
             let k = *k as usize;
@@ -46,13 +46,18 @@ impl<P: Compiled> Machine<P> {
     pub fn slopes_from_host(&mut self, slopes: &[f64]) {
         let width = self.width();
         let rows = Shared(self.slope_rows.as_mut_ptr());
-        for (s, k) in self.order.iter().enumerate() {
-            let k = *k as usize;
-            if k >= self.owned {
-                let slopes = &slopes[width * k..][..width];
-                self.slopes[width * s..][..width].copy_from_slice(slopes);
-                // SAFETY: nobody else is at work.
-                unsafe { self.write_slope_rows(rows, s, slopes) };
+        for (byte, eight) in self.order.chunks(8).enumerate() {
+            if self.owned_bits.get(byte).is_none_or(|owned| *owned == u8::MAX) {
+                continue;
+            }
+            for (s, k) in (8 * byte..).zip(eight) {
+                let k = *k as usize;
+                if k >= self.owned {
+                    let slopes = &slopes[width * k..][..width];
+                    self.slopes[width * s..][..width].copy_from_slice(slopes);
+                    // SAFETY: nobody else is at work.
+                    unsafe { self.write_slope_rows(rows, s, slopes) };
+                }
             }
         }
     }

@@ -10,6 +10,7 @@ use crate::engine::error::EngineError;
 use crate::engine::sweep::compiled::Compiled;
 use crate::engine::sweep::frame::Frame;
 use crate::engine::sweep::grid::Grid;
+use crate::engine::sweep::layer::OwnedOfRow;
 use crate::engine::sweep::many_body::NEAR_BITS;
 use crate::engine::sweep::pool::{Pool, part};
 use crate::engine::sweep::quantum::Quantum;
@@ -80,6 +81,9 @@ impl<P: Compiled> Machine<P> {
         }
         self.place(pool);
         self.make_room(given);
+        // Nobody is a ghost unless it is found out.
+        self.owned_of_row.clear();
+        self.owned_bits.clear();
         self.tallies.clear();
         self.tallies.resize(grid.layers, Tally::default());
         Ok(())
@@ -182,7 +186,7 @@ impl<P: Compiled> Machine<P> {
         }
         self.records.resize(total + SLACK, P::Record::default());
         self.species.resize(if several { total.max(1) } else { 0 }, 0);
-        self.ghost.resize(if with_ghosts { total + SLACK } else { 0 }, false);
+        self.ghost.resize(if with_ghosts { (total + SLACK).next_multiple_of(8) } else { 0 }, false);
     }
 
     /// Fills the arrays in the order of bins.
@@ -226,25 +230,20 @@ impl<P: Compiled> Machine<P> {
 
     /// The owned particles of each row, those of copies too, if there are ghosts.
     fn find_owned(&mut self) {
-        self.owned_of_row.clear();
-        self.owned_bits.clear();
         if self.ghost.is_empty() {
             return;
         }
-        let bits = |ghosts: &[bool]| ghosts.iter().enumerate().map(|(k, g)| (!g as u8) << k).sum::<u8>();
-        self.owned_bits.extend(self.ghost.chunks(8).map(bits));
+        self.owned_bits.extend(self.ghost.as_chunks::<8>().0.iter().map(bits_of_owned));
         self.owned_bits.resize(self.owned_bits.len() + SLACK, 0);
         let bins = self.grid.bins;
         for row in 0..(self.start.len() - 1) / bins {
             let (first, end) = (self.start[row * bins] as usize, self.start[(row + 1) * bins] as usize);
             let ghosts = &self.ghost[first..end];
-            let owned = match ghosts.iter().position(|g| !*g) {
-                Some(a) => {
-                    let b = ghosts.iter().rposition(|g| !*g).unwrap_or(a);
-                    [(first + a) as u32, (first + b + 1) as u32]
-                }
-                None => [0, 0],
-            };
+            let mut owned = OwnedOfRow { ends: [0; 2], with_ghosts: ghosts.contains(&true) };
+            if let Some(a) = ghosts.iter().position(|g| !*g) {
+                let b = ghosts.iter().rposition(|g| !*g).unwrap_or(a);
+                owned.ends = [first + a, first + b + 1].map(|at| at as u32);
+            }
             self.owned_of_row.push(owned);
         }
     }
@@ -271,6 +270,14 @@ impl<P: Compiled> Machine<P> {
             self.ghost.copy_within(..copies, n);
         }
     }
+}
+
+/// A bit for each of eight particles that is not a ghost.
+#[inline(always)]
+fn bits_of_owned(ghosts: &[bool; 8]) -> u8 {
+    // The product has the lowest bit of each byte next to each other at its top.
+    let bytes = u64::from_le_bytes(ghosts.map(u8::from));
+    !(bytes.wrapping_mul(0x0102_0408_1020_4080) >> 56) as u8
 }
 
 /// The bin of particles that take no part.

@@ -37,6 +37,12 @@ impl Loop for CountSome<'_> {
         counts.fill(0);
         let mut units = [[0; 3]; BLOCK];
         while let Some(x) = count.given.particles.x[first..end].first_chunk::<BLOCK>() {
+            if count.are_images(first) {
+                // SAFETY: of this thread's particles.
+                unsafe { count.cell.at(first).cast::<[u32; BLOCK]>().write([NOWHERE; BLOCK]) };
+                first += BLOCK;
+                continue;
+            }
             let near = count.fractions.of_block(x, &mut units);
             let cells = count.fractions.cells(&units);
             if !near || !count.are_plain(first) {
@@ -79,6 +85,14 @@ impl Count<'_> {
             wrong |= (*tag < 1) as u32 | unknown as u32;
         }
         wrong == 0
+    }
+
+    /// Whether all particles of a block are images.
+    #[inline(always)]
+    fn are_images(&self, first: usize) -> bool {
+        let Some(ghost) = first.checked_sub(self.given.particles.owned) else { return false };
+        let images = self.given.images.get(ghost..).and_then(|images| images.first_chunk::<BLOCK>());
+        images.is_some_and(|images| images.iter().fold(true, |all, image| all & *image))
     }
 
     /// Whether a particle is a ghost that no owned particle needs: out of reach, or an image.
