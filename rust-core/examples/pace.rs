@@ -13,6 +13,10 @@ use setup::{Cloud, Rank, choose};
 use std::process::ExitCode;
 use std::time::Instant;
 
+/// As both hosts have it.
+#[global_allocator]
+static ALLOCATOR: psidpd_core::memory::LargePages = psidpd_core::memory::LargePages;
+
 /// Steps before the first round, steps of a round, rounds.
 const BEFORE: u32 = 150;
 const STEPS: u32 = 50;
@@ -20,7 +24,7 @@ const ROUNDS: u32 = 12;
 
 /// A box, or a rank's part of one.
 enum Any {
-    Cloud(Cloud),
+    Cloud(Box<Cloud>),
     Rank(Box<Rank>),
 }
 
@@ -83,7 +87,7 @@ fn run(arguments: &[String]) -> Result<(), String> {
     let fluid = subject.fluid();
     let mut particles = match ghosts {
         true => Any::Rank(Box::new(Rank::new(subject, &fluid, count))),
-        false => Any::Cloud(Cloud::new(subject, &fluid, count)),
+        false => Any::Cloud(Box::new(Cloud::new(subject, &fluid, count))),
     };
     let settings = Settings { precision, instructions, threads };
     let mut sweep = Sweep::new(&fluid, settings).map_err(|e| e.to_string())?;

@@ -11,7 +11,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 const PAGE: usize = 2 << 20;
 
 /// Smaller arrays would leave most of a large page empty.
-const LARGE: usize = PAGE / 4;
+const LARGE: usize = PAGE / 16;
 
 /// The allocator of the system, but that large arrays begin and end with large pages, and ask for them.
 pub struct LargePages;

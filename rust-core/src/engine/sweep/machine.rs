@@ -15,7 +15,6 @@ use super::frame::Frame;
 use super::grid::Grid;
 use super::layer::{OwnedOfRow, Shared, Swept};
 use super::many_body::NearPairs;
-use super::pool::Pool;
 use super::quantum::Quantum;
 use super::scatter::Sum;
 use super::settings::Instructions;
@@ -28,7 +27,6 @@ use crate::engine::noise::PairNoise;
 use crate::engine::particles::Particles;
 use crate::engine::plan::Plan;
 use crate::engine::tally::{Tally, Want};
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Room behind the last particle: what whole vectors may read.
 const SLACK: usize = 16;
@@ -85,7 +83,6 @@ struct Arrays<P: Compiled> {
     q: [Shared<u16>; 3],
     records: Shared<P::Record>,
     species: Shared<u8>,
-    ghost: Shared<bool>,
     sums: Shared<Sum>,
     densities: Shared<Sum>,
     rows: Shared<f64>,
@@ -320,7 +317,6 @@ impl<P: Compiled> Machine<P> {
             q: self.q.each_mut().map(|q| Shared(q.as_mut_ptr())),
             records: Shared(self.records.as_mut_ptr()),
             species: Shared(self.species.as_mut_ptr()),
-            ghost: Shared(self.ghost.as_mut_ptr()),
             sums: Shared(self.sums.as_mut_ptr()),
             densities: Shared(self.densities.as_mut_ptr()),
             rows: Shared(self.rows.as_mut_ptr()),
@@ -387,30 +383,6 @@ impl<P: Compiled> Machine<P> {
         }
     }
 
-    /// The first pass over all layers.
-    pub fn first(&mut self, pool: &Pool) {
-        let layers = self.grid.layers;
-        self.lay_out_all();
-        self.near.resize_with(layers, NearPairs::default);
-        let arrays = self.arrays();
-        let this = &*self;
-        let swept = this.swept(arrays);
-        let next = AtomicUsize::new(0);
-        pool.run(&|t| {
-            loop {
-                let layer = next.fetch_add(1, Ordering::Relaxed);
-                if layer >= layers {
-                    return;
-                }
-                // SAFETY: each thread has its own scratch, each layer is done once.
-                unsafe {
-                    let (scratch, near) = (&mut *arrays.scratch.at(t), &mut *arrays.near.at(layer));
-                    this.first_of_layer(&swept, arrays, layer, &mut scratch.block, near);
-                }
-            }
-        });
-    }
-
     /// The accumulators of a particle of a layer: its layer's, and that of the layer before.
     fn accumulators(&self, layer: usize) -> (isize, Option<isize>) {
         let before = match layer {
@@ -419,28 +391,6 @@ impl<P: Compiled> Machine<P> {
             _ => Some(self.offset[layer - 1]),
         };
         (self.offset[layer], before)
-    }
-
-    /// The second pass over all layers.
-    pub fn second(&mut self, pool: &Pool) {
-        if self.terms.passes.is_empty() {
-            return;
-        }
-        let layers = self.grid.layers;
-        let arrays = self.arrays();
-        let this = &*self;
-        let swept = this.swept(arrays);
-        let next = AtomicUsize::new(0);
-        pool.run(&|_| {
-            loop {
-                let layer = next.fetch_add(1, Ordering::Relaxed);
-                if layer >= layers {
-                    return;
-                }
-                // SAFETY: each layer is done once.
-                unsafe { this.second_of_layer(&swept, arrays, layer, &*arrays.near.at(layer)) };
-            }
-        });
     }
 
     /// The second pass of one layer.

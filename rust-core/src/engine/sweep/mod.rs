@@ -298,13 +298,12 @@ impl Sweep {
         with!(&mut self.machine, m => {
             let mut since = Instant::now();
             let (frame, grid) = region(m, plan, pool, domain, &given)?;
-            m.sort(pool, frame, grid, &given)?;
+            m.find_order(pool, frame, grid, &given)?;
             lap(&mut since, &mut times.sort);
-            m.first(pool);
-            lap(&mut since, &mut times.first);
-            m.excess(pool, plan, particles.tag)?;
-            lap(&mut since, &mut times.excess);
+            m.first(pool, plan, &given, times)?;
+            let mut since = Instant::now();
             m.slopes_to_host(&mut self.slopes);
+            lap(&mut since, &mut times.excess);
         });
         self.count_first(thermostat.is_some());
         self.ready = true;
@@ -399,11 +398,8 @@ impl Sweep {
         with!(&mut self.machine, m => {
             let mut since = Instant::now();
             m.slopes_from_host(slopes);
-            m.copy_slopes();
-            m.second(pool);
-            lap(&mut since, &mut times.second);
-            m.forces(pool, out)?;
-            lap(&mut since, &mut times.forces);
+            lap(&mut since, &mut times.excess);
+            m.second(pool, out, times)?;
             Ok(m.tally())
         })
     }

@@ -7,45 +7,14 @@ use crate::engine::excess::ExcessPlan;
 use crate::engine::excess_pass::{ExcessPass, LANES, Rows};
 use crate::engine::plan::Plan;
 use crate::engine::sweep::compiled::Compiled;
-use crate::engine::sweep::pool::Pool;
 use crate::engine::sweep::simd::Scalar;
 use crate::engine::sweep::whole::SLOPES;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Particles whose densities are gathered at a time: they stay in the first-level cache until ψ is evaluated, and
 /// make several blocks of lanes where not all take part.
 const BLOCK: usize = 2 * LANES;
 
 impl<P: Compiled> Machine<P> {
-    /// ψ and its slopes at the densities of the first pass.
-    pub fn excess(&mut self, pool: &Pool, plan: &Plan, tag: &[i32]) -> Result<(), EngineError> {
-        let Some(own) = self.prepare_excess(plan) else { return Ok(()) };
-        let arrays = self.arrays();
-        let next = AtomicUsize::new(0);
-        let this = &*self;
-        pool.run(&|t| {
-            // SAFETY: each thread has its own scratch.
-            let scratch = unsafe { &mut *arrays.scratch.at(t) };
-            scratch.fault = None;
-            loop {
-                let layer = next.fetch_add(1, Ordering::Relaxed);
-                if layer >= this.grid.layers {
-                    return;
-                }
-                // SAFETY: each layer is done once, and writes its own.
-                let done =
-                    unsafe { this.excess_of_layer(arrays, layer, plan, &own, tag, &mut scratch.excess) };
-                if let Err(fault) = done {
-                    scratch.fault = Some(fault);
-                    return;
-                }
-            }
-        });
-        self.first_fault()?;
-        self.copy_slopes();
-        Ok(())
-    }
-
     /// Room for ψ and its slopes; what particles add to their own densities, unless ψ is zero whatever they are.
     pub(super) fn prepare_excess(&mut self, plan: &Plan) -> Option<Vec<f64>> {
         let (width, n) = (self.width(), self.particles);
@@ -64,7 +33,7 @@ impl<P: Compiled> Machine<P> {
     }
 
     /// Slopes of the copies of the first layer.
-    pub fn copy_slopes(&mut self) {
+    pub(super) fn copy_slopes(&mut self) {
         if self.is_ring() {
             let (width, n, copies) = (self.width(), self.particles, self.layer(0).1);
             self.slopes.copy_within(..width * copies, width * n);

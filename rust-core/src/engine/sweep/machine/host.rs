@@ -2,11 +2,8 @@
 
 use super::vectors::{self, Loop};
 use super::{Arrays, Machine, Shared, Sum};
-use crate::engine::error::EngineError;
 use crate::engine::sweep::compiled::Compiled;
-use crate::engine::sweep::pool::Pool;
 use crate::engine::tally::Tally;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Where the host wants forces.
 #[derive(Clone, Copy)]
@@ -22,18 +19,22 @@ impl<'a> Out<'a> {
     pub fn new(force: &'a mut [[f64; 3]], add: bool, tag: &'a [i32]) -> Out<'a> {
         Out { force: Shared(force.as_mut_ptr()), add, tag }
     }
-
-    pub fn tag(&self) -> &'a [i32] {
-        self.tag
-    }
 }
 
 impl<P: Compiled> Machine<P> {
-    /// Slopes from the order of cells to the host's, those of particles it owns.
+    /// Slopes from the order of cells to the host's, those of particles it owns; those of ghosts are anything.
     pub fn slopes_to_host(&self, out: &mut Vec<f64>) {
         let width = self.width();
-        // Those of ghosts are anything: the host fills them in.
         out.resize(width * self.all, 0.0);
+        if width == 1 {
+            // Far the most common, and the copy of one number is no loop.
+            for (k, slope) in self.order.iter().zip(&self.slopes) {
+                if let Some(out) = out.get_mut(*k as usize) {
+                    *out = *slope;
+                }
+            }
+            return;
+        }
         for (s, k) in self.order.iter().enumerate() {
             let k = *k as usize;
             if k < self.owned {
@@ -46,44 +47,19 @@ impl<P: Compiled> Machine<P> {
     pub fn slopes_from_host(&mut self, slopes: &[f64]) {
         let width = self.width();
         let rows = Shared(self.slope_rows.as_mut_ptr());
-        for (byte, eight) in self.order.chunks(8).enumerate() {
-            if self.owned_bits.get(byte).is_none_or(|owned| *owned == u8::MAX) {
-                continue;
-            }
-            for (s, k) in (8 * byte..).zip(eight) {
-                let k = *k as usize;
-                if k >= self.owned {
-                    let slopes = &slopes[width * k..][..width];
-                    self.slopes[width * s..][..width].copy_from_slice(slopes);
-                    // SAFETY: nobody else is at work.
-                    unsafe { self.write_slope_rows(rows, s, slopes) };
-                }
+        // Where there are no ghosts there are no bits either.
+        for (byte, owned) in self.owned_bits.iter().enumerate() {
+            let mut ghosts = !owned;
+            while ghosts != 0 {
+                let s = 8 * byte + ghosts.trailing_zeros() as usize;
+                ghosts &= ghosts - 1;
+                let Some(k) = self.order.get(s) else { break };
+                let slopes = &slopes[width * *k as usize..][..width];
+                self.slopes[width * s..][..width].copy_from_slice(slopes);
+                // SAFETY: nobody else is at work.
+                unsafe { self.write_slope_rows(rows, s, slopes) };
             }
         }
-    }
-
-    /// Writes the forces on owned particles, or adds them to what is there.
-    ///
-    /// # Errors
-    /// A force that is not finite: of the lowest tag.
-    pub fn forces(&mut self, pool: &Pool, out: Out) -> Result<(), EngineError> {
-        let next = AtomicUsize::new(0);
-        let arrays = self.arrays();
-        let this = &*self;
-        pool.run(&|t| {
-            loop {
-                let layer = next.fetch_add(1, Ordering::Relaxed);
-                if layer >= this.grid.layers {
-                    return;
-                }
-                // SAFETY: each thread has its own scratch, each layer is done once, when all passes are.
-                unsafe {
-                    let scratch = &mut *arrays.scratch.at(t);
-                    this.forces_of_layer(arrays, layer, out, &mut scratch.lost);
-                }
-            }
-        });
-        self.lost()
     }
 
     /// Writes the forces on owned particles of one layer, or adds them to what is there; `lost` is the lowest tag of

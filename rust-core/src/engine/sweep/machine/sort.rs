@@ -47,15 +47,6 @@ impl<P: Compiled> Machine<P> {
         if low[0] > high[0] { Ok(([0.0; 3], [0.0; 3])) } else { Ok((low, high)) }
     }
 
-    /// Sorts the particles into the bins of `grid`, and fills the arrays in that order.
-    pub fn sort(&mut self, pool: &Pool, frame: Frame, grid: Grid, given: &Given) -> Result<(), EngineError> {
-        self.find_order(pool, frame, grid, given)?;
-        self.fill(pool, given);
-        self.copy_first_layer();
-        self.find_owned();
-        Ok(())
-    }
-
     /// The particles in the order of the bins of `grid`, and room for them in the arrays.
     pub fn find_order(
         &mut self,
@@ -81,9 +72,7 @@ impl<P: Compiled> Machine<P> {
         }
         self.place(pool);
         self.make_room(given);
-        // Nobody is a ghost unless it is found out.
-        self.owned_of_row.clear();
-        self.owned_bits.clear();
+        self.find_owned();
         self.tallies.clear();
         self.tallies.resize(grid.layers, Tally::default());
         Ok(())
@@ -189,17 +178,6 @@ impl<P: Compiled> Machine<P> {
         self.ghost.resize(if with_ghosts { (total + SLACK).next_multiple_of(8) } else { 0 }, false);
     }
 
-    /// Fills the arrays in the order of bins.
-    fn fill(&mut self, pool: &Pool, given: &Given) {
-        let (arrays, count) = (self.arrays(), self.particles);
-        let this = &*self;
-        pool.run(&|t| {
-            let some = part(count.div_ceil(SLACK), t, pool.threads());
-            // SAFETY: each place is of one thread alone.
-            unsafe { this.fill_places(arrays, given, SLACK * some.start..count.min(SLACK * some.end)) };
-        });
-    }
-
     /// Fills some places of the arrays: from a multiple of [`SLACK`] on, and up to one, or to the last.
     ///
     /// # Safety
@@ -217,7 +195,6 @@ impl<P: Compiled> Machine<P> {
             records: arrays.records,
             species: several.then_some(arrays.species),
             far: self.is_far(),
-            ghost: (!self.ghost.is_empty()).then_some(arrays.ghost),
         };
         let instructions = self.instructions;
         match (given.thermostat.is_some(), several) {
@@ -228,10 +205,19 @@ impl<P: Compiled> Machine<P> {
         }
     }
 
-    /// The owned particles of each row, those of copies too, if there are ghosts.
+    /// Who is a ghost, and the owned particles of each row, those of copies too, if there are ghosts.
     fn find_owned(&mut self) {
+        self.owned_of_row.clear();
+        self.owned_bits.clear();
         if self.ghost.is_empty() {
             return;
+        }
+        for (ghost, k) in self.ghost.iter_mut().zip(&self.order) {
+            *ghost = *k as usize >= self.owned;
+        }
+        if self.is_ring() {
+            let (_, copies) = self.layer(0);
+            self.ghost.copy_within(..copies, self.particles);
         }
         self.owned_bits.extend(self.ghost.as_chunks::<8>().0.iter().map(bits_of_owned));
         self.owned_bits.resize(self.owned_bits.len() + SLACK, 0);
@@ -265,9 +251,6 @@ impl<P: Compiled> Machine<P> {
         self.records.copy_within(..copies, n);
         if !self.species.is_empty() {
             self.species.copy_within(..copies, n);
-        }
-        if !self.ghost.is_empty() {
-            self.ghost.copy_within(..copies, n);
         }
     }
 }

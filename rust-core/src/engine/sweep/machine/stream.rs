@@ -1,5 +1,6 @@
-//! All passes over a box without ghosts in one go, so that what a pass leaves for the next is used while it is still in
-//! the cache, and no more of it is kept than of a few layers.
+//! The passes, layer by layer, so that what a pass leaves for the next is used while it is still in the cache: all of
+//! them in one go where there are no ghosts, and then no more is kept than of a few layers; else up to ψ, and from the
+//! slopes of ghosts on.
 //!
 //! Each thread does a slab of layers. ψ of a layer needs the first pass of that layer and of the one before; many-body
 //! forces need ψ of the layer and of the one behind; forces are complete after both passes of the layer and of the one
@@ -26,12 +27,22 @@ struct Stream<'a, P: Compiled> {
     machine: &'a Machine<P>,
     swept: Swept<'a, P::Scalar, P::Record>,
     arrays: Arrays<P>,
+    /// Whether pairs of all layers are kept, not of some only.
+    keeps_all: bool,
+}
+
+/// What goes in before slopes are there.
+struct Into<'a> {
     plan: &'a Plan,
     given: &'a Given<'a>,
     /// What particles add to their own densities, unless ψ is zero whatever they are.
     own: Option<Vec<f64>>,
-    out: Out<'a>,
+    /// Where forces go, if the second pass follows at once.
+    out: Option<Out<'a>>,
 }
+
+/// Work of one thread on a slab, with the times it has taken.
+type Work<'a> = dyn Fn(usize, Range<usize>, &mut Times) + Sync + 'a;
 
 impl<P: Compiled> Machine<P> {
     /// Everything that comes after [`Machine::find_order`]: the first pass, ψ and the second pass over all layers, and
@@ -47,32 +58,75 @@ impl<P: Compiled> Machine<P> {
         out: Out,
         times: &mut Times,
     ) -> Result<(), EngineError> {
-        let threads = pool.threads();
-        self.near.resize_with(KEPT * threads, NearPairs::default);
-        let own = self.prepare_excess(plan);
-        let slabs: Vec<Range<usize>> = (0..threads).map(|t| self.slab(t, threads)).collect();
+        let slabs = self.slabs(pool);
+        self.near.resize_with(KEPT * slabs.len(), NearPairs::default);
         self.lay_out(&slabs);
-        let shared_times = Shared(times as *mut Times);
-        let timed = |t: usize, work: &dyn Fn(&mut Times)| {
-            let mut unseen = Times::default();
-            // SAFETY: of one thread alone.
-            work(if t == 0 { unsafe { &mut *shared_times.at(0) } } else { &mut unseen });
-        };
+        self.up_to_slopes(pool, plan, given, Some(out), &slabs, times)?;
         let arrays = self.arrays();
-        let this = &*self;
-        pool.run(&|t| timed(t, &|times| this.fill_first(arrays, given, t, &slabs[t], times)));
-        self.copy_first_layer();
-        let arrays = self.arrays();
-        let stream = Stream { machine: self, swept: self.swept(arrays), arrays, plan, given, own, out };
-        pool.run(&|t| timed(t, &|times| stream.within(t, slabs[t].clone(), times)));
-        pool.run(&|t| timed(t, &|times| stream.excess_of_first(t, slabs[t].clone(), times)));
-        self.first_fault()?;
+        let stream = &Stream { machine: self, swept: self.swept(arrays), arrays, keeps_all: false };
+        on_slabs(pool, &slabs, times, &|t, slab, times| stream.second_at_ends(out, t, slab, times));
+        on_slabs(pool, &slabs, times, &|t, slab, times| stream.forces_of_first(out, t, slab, times));
+        self.lost()
+    }
+
+    /// What comes after [`Machine::find_order`], up to ψ and its slopes.
+    ///
+    /// # Errors
+    /// ψ that is not finite.
+    pub fn first(
+        &mut self,
+        pool: &Pool,
+        plan: &Plan,
+        given: &Given,
+        times: &mut Times,
+    ) -> Result<(), EngineError> {
+        self.near.resize_with(self.grid.layers, NearPairs::default);
+        self.lay_out_all();
+        self.up_to_slopes(pool, plan, given, None, &self.slabs(pool), times)
+    }
+
+    /// What comes after [`Machine::first`] and [`Machine::slopes_from_host`]: the second pass, and the forces.
+    ///
+    /// # Errors
+    /// A force that is not finite: of the lowest tag.
+    pub fn second(&mut self, pool: &Pool, out: Out, times: &mut Times) -> Result<(), EngineError> {
+        let slabs = self.slabs(pool);
         self.copy_slopes();
         let arrays = self.arrays();
-        let stream = Stream { machine: self, swept: self.swept(arrays), arrays, plan, given, own: None, out };
-        pool.run(&|t| timed(t, &|times| stream.second_at_ends(t, slabs[t].clone(), times)));
-        pool.run(&|t| timed(t, &|times| stream.forces_of_first(t, slabs[t].clone(), times)));
+        let stream = &Stream { machine: self, swept: self.swept(arrays), arrays, keeps_all: true };
+        on_slabs(pool, &slabs, times, &|t, slab, times| stream.second_of_all(out, t, slab, times));
+        on_slabs(pool, &slabs, times, &|t, slab, times| stream.forces_of_first(out, t, slab, times));
         self.lost()
+    }
+
+    /// Arrays, first passes and ψ of all layers; the second pass and the forces of those between the ends of slabs if
+    /// there is where to write them.
+    fn up_to_slopes(
+        &mut self,
+        pool: &Pool,
+        plan: &Plan,
+        given: &Given,
+        out: Option<Out>,
+        slabs: &[Range<usize>],
+        times: &mut Times,
+    ) -> Result<(), EngineError> {
+        let own = self.prepare_excess(plan);
+        let arrays = self.arrays();
+        let this = &*self;
+        on_slabs(pool, slabs, times, &|t, slab, times| this.fill_first(arrays, given, t, &slab, times));
+        self.copy_first_layer();
+        let arrays = self.arrays();
+        let into = &Into { plan, given, own, out };
+        let stream = &Stream { machine: self, swept: self.swept(arrays), arrays, keeps_all: out.is_none() };
+        on_slabs(pool, slabs, times, &|t, slab, times| stream.within(into, t, slab, times));
+        on_slabs(pool, slabs, times, &|t, slab, times| stream.excess_of_first(into, t, slab, times));
+        self.first_fault()?;
+        self.copy_slopes();
+        Ok(())
+    }
+
+    fn slabs(&self, pool: &Pool) -> Vec<Range<usize>> {
+        (0..pool.threads()).map(|t| self.slab(t, pool.threads())).collect()
     }
 
     /// The layers of a thread: all slabs have about the same number of pairs.
@@ -129,22 +183,34 @@ impl<P: Compiled> Machine<P> {
     }
 }
 
+/// Runs work on each slab, by the thread whose it is.
+fn on_slabs(pool: &Pool, slabs: &[Range<usize>], times: &mut Times, work: &Work) {
+    let times = Shared(times as *mut Times);
+    pool.run(&|t| {
+        let mut unseen = Times::default();
+        // SAFETY: of one thread alone.
+        let times = if t == 0 { unsafe { &mut *times.at(0) } } else { &mut unseen };
+        work(t, slabs[t].clone(), times);
+    });
+}
+
 impl<P: Compiled> Stream<'_, P> {
     /// What the first pass of a layer leaves.
     #[allow(clippy::mut_from_ref)] // Each thread has its own.
     unsafe fn near(&self, t: usize, slab: &Range<usize>, layer: usize) -> &mut NearPairs<P::Scalar> {
         let at = match layer {
-            _ if layer == slab.start => 0,
-            _ if layer + 1 == slab.end => 1,
-            _ => 2 + layer % 2,
+            _ if self.keeps_all => layer,
+            _ if layer == slab.start => KEPT * t,
+            _ if layer + 1 == slab.end => KEPT * t + 1,
+            _ => KEPT * t + 2 + layer % 2,
         };
         // SAFETY: one of the thread's own.
-        unsafe { &mut *self.arrays.near.at(KEPT * t + at) }
+        unsafe { &mut *self.arrays.near.at(at) }
     }
 
-    /// Arrays and first passes of a slab, ψ of all its layers but the first, the second pass of those between, and the
-    /// forces of those of them that are not next to the first.
-    fn within(&self, t: usize, slab: Range<usize>, times: &mut Times) {
+    /// Arrays and first passes of a slab, and ψ of all its layers but the first; if forces have a place to go, the second
+    /// pass of those between, and the forces of those of them that are not next to the first.
+    fn within(&self, into: &Into, t: usize, slab: Range<usize>, times: &mut Times) {
         // SAFETY: each thread has its own scratch.
         let scratch = unsafe { &mut *self.arrays.scratch.at(t) };
         (scratch.fault, scratch.lost) = (None, None);
@@ -153,7 +219,7 @@ impl<P: Compiled> Stream<'_, P> {
         for layer in slab.clone() {
             let end = self.machine.needed(&slab, layer - slab.start + 2).end;
             // SAFETY: places of this thread, of layers that no pass has come to.
-            unsafe { self.machine.fill_places(self.arrays, self.given, filled..end) };
+            unsafe { self.machine.fill_places(self.arrays, into.given, filled..end) };
             filled = end;
             lap(&mut since, &mut times.sort);
             // SAFETY: of this thread's slab.
@@ -163,31 +229,32 @@ impl<P: Compiled> Stream<'_, P> {
             }
             lap(&mut since, &mut times.first);
             if layer > slab.start {
-                self.excess(t, layer);
+                self.excess(into, t, layer);
                 lap(&mut since, &mut times.excess);
             }
+            let Some(out) = into.out else { continue };
             if layer > slab.start + 1 {
                 self.second(t, &slab, layer - 1);
                 lap(&mut since, &mut times.second);
             }
             if layer > slab.start + 2 {
-                self.forces(t, layer - 1);
+                self.forces(out, t, layer - 1);
                 lap(&mut since, &mut times.forces);
             }
         }
     }
 
     /// ψ of the first layer of a slab, which the last of another adds to.
-    fn excess_of_first(&self, t: usize, slab: Range<usize>, times: &mut Times) {
+    fn excess_of_first(&self, into: &Into, t: usize, slab: Range<usize>, times: &mut Times) {
         let mut since = Instant::now();
         if !slab.is_empty() {
-            self.excess(t, slab.start);
+            self.excess(into, t, slab.start);
         }
         lap(&mut since, &mut times.excess);
     }
 
     /// The second pass of the first layer of a slab, and of the last; the forces of the second, and of the last.
-    fn second_at_ends(&self, t: usize, slab: Range<usize>, times: &mut Times) {
+    fn second_at_ends(&self, out: Out, t: usize, slab: Range<usize>, times: &mut Times) {
         let mut since = Instant::now();
         if !slab.is_empty() {
             self.second(t, &slab, slab.start);
@@ -197,34 +264,49 @@ impl<P: Compiled> Stream<'_, P> {
         }
         lap(&mut since, &mut times.second);
         if slab.len() > 1 {
-            self.forces(t, slab.start + 1);
+            self.forces(out, t, slab.start + 1);
         }
         if slab.len() > 2 {
-            self.forces(t, slab.end - 1);
+            self.forces(out, t, slab.end - 1);
         }
         lap(&mut since, &mut times.forces);
+    }
+
+    /// The second pass of a slab, and the forces of all its layers but the first.
+    fn second_of_all(&self, out: Out, t: usize, slab: Range<usize>, times: &mut Times) {
+        // SAFETY: each thread has its own scratch.
+        unsafe { (*self.arrays.scratch.at(t)).lost = None };
+        let mut since = Instant::now();
+        for layer in slab.clone() {
+            self.second(t, &slab, layer);
+            lap(&mut since, &mut times.second);
+            if layer > slab.start {
+                self.forces(out, t, layer);
+                lap(&mut since, &mut times.forces);
+            }
+        }
     }
 
     /// The forces of the first layer of a slab, which the last of another adds to.
-    fn forces_of_first(&self, t: usize, slab: Range<usize>, times: &mut Times) {
+    fn forces_of_first(&self, out: Out, t: usize, slab: Range<usize>, times: &mut Times) {
         let mut since = Instant::now();
         if !slab.is_empty() {
-            self.forces(t, slab.start);
+            self.forces(out, t, slab.start);
         }
         lap(&mut since, &mut times.forces);
     }
 
-    fn excess(&self, t: usize, layer: usize) {
-        let Some(own) = &self.own else { return };
+    fn excess(&self, into: &Into, t: usize, layer: usize) {
+        let Some(own) = &into.own else { return };
         // SAFETY: each thread has its own scratch, each layer is done once.
         unsafe {
             let scratch = &mut *self.arrays.scratch.at(t);
             let done = self.machine.excess_of_layer(
                 self.arrays,
                 layer,
-                self.plan,
+                into.plan,
                 own,
-                self.out.tag(),
+                into.given.particles.tag,
                 &mut scratch.excess,
             );
             if let Err(fault) = done {
@@ -244,11 +326,11 @@ impl<P: Compiled> Stream<'_, P> {
         }
     }
 
-    fn forces(&self, t: usize, layer: usize) {
+    fn forces(&self, out: Out, t: usize, layer: usize) {
         // SAFETY: each thread has its own scratch, each layer is done once, when all passes that add to it are.
         unsafe {
             let scratch = &mut *self.arrays.scratch.at(t);
-            self.machine.forces_of_layer(self.arrays, layer, self.out, &mut scratch.lost);
+            self.machine.forces_of_layer(self.arrays, layer, out, &mut scratch.lost);
         }
     }
 }

@@ -31,8 +31,6 @@ pub struct Fill<'a, R> {
     pub species: Option<Shared<u8>>,
     /// Whether the host's particles may be beyond the cache.
     pub far: bool,
-    /// Not there without ghosts.
-    pub ghost: Option<Shared<bool>>,
 }
 
 /// The places that one thread fills: from a multiple of [`SLACK`] on.
@@ -98,9 +96,6 @@ impl<R: Record> Fill<'_, R> {
                 *self.records.at(s) = R::new(u, particles.x.get_unchecked(k), &v, tag, kind);
                 if let (true, Some(species)) = (SEVERAL, self.species) {
                     *species.at(s) = kind as u8;
-                }
-                if let Some(ghost) = self.ghost {
-                    *ghost.at(s) = k >= particles.owned;
                 }
             }
         }

@@ -144,6 +144,22 @@ fn is_sorted<P: Compiled>(machine: &Machine<P>, points: &Points, owned: usize) {
     assert_eq!(n, expected.len());
 }
 
+impl<P: Compiled> Machine<P> {
+    /// Sorts the particles, and fills all arrays at once.
+    fn sort(&mut self, pool: &Pool, frame: Frame, grid: Grid, given: &Given) -> Result<(), EngineError> {
+        self.find_order(pool, frame, grid, given)?;
+        let (arrays, count) = (self.arrays(), self.particles);
+        let this = &*self;
+        pool.run(&|t| {
+            let some = part(count.div_ceil(SLACK), t, pool.threads());
+            // SAFETY: each place is of one thread alone.
+            unsafe { this.fill_places(arrays, given, SLACK * some.start..count.min(SLACK * some.end)) };
+        });
+        self.copy_first_layer();
+        Ok(())
+    }
+}
+
 fn is_the_same<P: Compiled>(a: &Machine<P>, b: &Machine<P>) {
     let total = a.records.len();
     assert!(a.order == b.order && a.start == b.start && a.ghost == b.ghost);
