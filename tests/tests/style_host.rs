@@ -280,6 +280,64 @@ fn other_fixes_are_honoured() {
     assert!(error.contains("less than twice the range of the thermostat"), "{error}");
 }
 
+/// Ghosts that are images of a rank's own atoms are left out where they are nothing else; where pairs come from LAMMPS's
+/// list none is. Trajectories are the same, in boxes that shear with velocities or without, shrink, are too narrow or
+/// open along some direction, and for ranks along any of them.
+#[test]
+fn leaving_out_images_changes_nothing() {
+    let (_folder, wide) = file(WIDE);
+    let narrow = WIDE.split("[[thermostat]]").next().unwrap().to_owned();
+    let (_narrow, narrow) = file(&narrow);
+    for (before, region, model, more) in [
+        ("", "prism 0 5 0 5 0 5 0 0 0", &wide, "fix d all deform 1 xy erate 3.0 remap v"),
+        ("", "prism 0 5 0 5 0 5 0 0 0", &wide, "fix d all deform 1 xy erate 1.0"),
+        ("", "block 0 5 0 5 0 5", &wide, "fix d all deform 1 x scale 0.9 z scale 1.1 remap x"),
+        ("", "block 0 1.8 0 5 0 5", &narrow, ""),
+        ("boundary p p f", "block 0 5 0 5 0 5", &wide, "fix w all wall/reflect zlo EDGE zhi EDGE"),
+        ("processors 2 1 1", "block 0 5 0 5 0 5", &wide, ""),
+        ("processors 1 2 1", "block 0 5 0 5 0 5", &wide, ""),
+        (
+            "processors 1 1 2",
+            "block 0 5 0 5 0 5",
+            &wide,
+            "fix d all deform 1 x scale 0.9 z scale 1.1 remap x",
+        ),
+        ("processors 2 2 1", "block 0 5 0 5 0 5", &wide, ""),
+        ("processors 1 2 2", "block 0 5 0 5 0 5", &wide, ""),
+        ("processors 1 2 1", "prism 0 5 0 5 0 5 1 0.5 -1", &wide, ""),
+        (
+            "processors 1 1 2\nboundary p f p",
+            "block 0 5 0 5 0 5",
+            &wide,
+            "fix w all wall/reflect ylo EDGE yhi EDGE",
+        ),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let start = folder.path().join("start.data").display().to_string();
+        let start_of =
+            before.lines().filter(|line| !line.starts_with("processors")).collect::<Vec<_>>().join("\n");
+        open(&format!(
+            "{}pair_style zero 1.0\npair_coeff * *\nwrite_data {start} nocoeff\n",
+            particles(&start_of, region, 2, if region.contains("1.8") { 180 } else { 500 })
+        ));
+        let script = |list: &str| {
+            format!(
+                "units lj\natom_style atomic\natom_modify map yes\n{before}\ncomm_modify vel yes\nread_data {start}\n{}\
+                 pair_style dpd/psi 1.0 {SEED}\npair_coeff * * {model} A B\n{list}fix 1 all nve\n{more}\n\
+                 timestep {DT}\nrun 20\n",
+                load()
+            )
+        };
+        let ranks = before.split_whitespace().skip_while(|w| *w != "processors").skip(1).take(3);
+        let ranks = ranks.map(|n| n.parse::<usize>().unwrap()).product::<usize>().max(1);
+        let here = run(&script(""), ranks);
+        let listed = run(&script("group none empty\nneigh_modify exclude group none none\n"), ranks);
+        let apart =
+            [difference(&here.x, &listed.x), difference(&here.v, &listed.v), difference(&here.f, &listed.f)];
+        assert!(apart.iter().all(|d| *d < 1e-9), "{before}, {region}, {more}: {apart:?}");
+    }
+}
+
 /// Trouble on one of several ranks stops all, with the step and the particle.
 #[test]
 fn trouble_is_named_on_every_rank() {

@@ -457,11 +457,13 @@ fn scaling(runs: &[Run], entries: &[Entry], slope_width: usize) -> Vec<Scaling> 
 
 /// From the largest size that the plugin was timed at on one rank and on two.
 fn projection(runs: &[Run], scaling: &[Scaling], slope_width: usize) -> Option<projection::Projection> {
-    let plugin = Contender::alone(contender::Code::Plugin(contender::MIXED.to_owned())).id();
+    let alone = Contender::alone(contender::Code::Plugin(contender::MIXED.to_owned()));
+    let plugin = alone.id();
+    let cut = Contender { ranks: 2, ..alone }.id();
     let strong = scaling.iter().filter(|s| s.kind == "strong" && s.code == plugin);
     let two = strong.max_by_key(|s| s.size)?;
-    let one = runs.iter().find(|r| r.fluid == MDPD.name && r.size == two.size && r.code == plugin)?;
-    projection::Projection::of(one, two, MDPD.density, slope_width, 1.0)
+    let of = |code: &str| runs.iter().find(|r| r.fluid == MDPD.name && r.size == two.size && r.code == code);
+    projection::Projection::of([of(&plugin)?, of(&cut)?], two, MDPD.density, slope_width, 1.0)
 }
 
 fn facts() -> Result<(Vec<FluidFacts>, BTreeMap<&'static str, usize>), BenchError> {

@@ -34,9 +34,9 @@ pub struct Projection {
     pub density: f64,
     /// How far a rank sees beyond its own box: cut-off and skin.
     pub halo: f64,
-    /// The run on one rank that costs come from, by size.
+    /// The runs on one rank and two that costs come from, by size.
     pub measured_size: usize,
-    /// Nanoseconds of a step for each particle or ghost of a rank, communication left out; measured.
+    /// Nanoseconds of a step for each particle or ghost of a rank that has ghosts, communication left out; measured.
     pub work_nanoseconds: f64,
     /// Nanoseconds of communication for each ghost in a step without a network; measured.
     pub packing_nanoseconds: f64,
@@ -84,17 +84,26 @@ pub struct Row {
 }
 
 impl Projection {
-    /// From the plugin's run on one rank and its strong scaling to two at the largest size that has both.
-    pub fn of(one: &Run, two: &Scaling, density: f64, slope_width: usize, cutoff: f64) -> Option<Projection> {
-        let (ghosts, n) = (one.ghosts?, one.particles as f64);
-        let communication = one.parts.get("comm")? * n;
-        let work = (one.nanoseconds_per_particle_step * n - communication) / (n + ghosts);
-        let packing = communication / ghosts;
-        let waiting = (two.communication_microseconds - 1e-3 * packing * two.ghosts).max(0.0);
+    /// From the plugin's runs on one rank and on two, and how these scale, at the largest size that has both.
+    pub fn of(
+        [one, two]: [&Run; 2],
+        strong: &Scaling,
+        density: f64,
+        slope_width: usize,
+        cutoff: f64,
+    ) -> Option<Projection> {
+        let n = one.particles as f64;
+        let packing = one.parts.get("comm")? * n / one.ghosts?;
+        let waiting = (strong.communication_microseconds - 1e-3 * packing * strong.ghosts).max(0.0);
+        let halo = cutoff + one.skin?;
+        // A cube cut into two has two faces with ghosts that are no images of a rank's own atoms.
+        let ghosts = 2.0 * density * (n / density).cbrt().powi(2) * halo;
+        let alone = (two.nanoseconds_per_particle_step - two.parts.get("comm")?) * n;
+        let work = alone / (0.5 * n + ghosts);
         let mut projection = Projection {
             particles: PARTICLES,
             density,
-            halo: cutoff + one.skin?,
+            halo,
             measured_size: one.size,
             work_nanoseconds: work,
             packing_nanoseconds: packing,
@@ -257,7 +266,7 @@ mod tests {
     use super::*;
     use std::collections::BTreeMap;
 
-    fn measured() -> (Run, Scaling) {
+    fn measured() -> ([Run; 2], Scaling) {
         let spread = Spread { min: 1.0, median: 1.0, max: 1.0 };
         let run = Run {
             fluid: "mdpd",
@@ -291,18 +300,20 @@ mod tests {
             bytes_per_step: Some(1e6),
             communication_microseconds: 1000.0,
         };
-        (run, scaling)
+        let two = Run { ranks: 2, nanoseconds_per_particle_step: 130.0, ..run.clone() };
+        ([run, two], scaling)
     }
 
     #[test]
     fn the_parts_of_a_step_add_up_and_efficiency_falls() {
-        let (run, scaling) = measured();
-        let p = Projection::of(&run, &scaling, 6.05, 1, 1.0).unwrap();
+        let (runs, scaling) = measured();
+        let p = Projection::of(runs.each_ref(), &scaling, 6.05, 1, 1.0).unwrap();
         assert_eq!(p.bytes_per_ghost, 80.0);
-        // One rank of the measured size costs what was measured.
+        // Ranks of the measured sizes cost what was measured: there are two slabs of 20 by 20 by 1.3 with ghosts.
         let n = 48_400.0;
-        let total = p.work_nanoseconds * (n + 20_000.0) + p.packing_nanoseconds * 20_000.0;
-        assert!((total / n - 200.0).abs() < 1e-9);
+        let half = p.work_nanoseconds * (0.5 * n + 2.0 * 6.05 * 400.0 * 1.3);
+        assert!((half / n - 110.0).abs() < 1e-9 && p.packing_nanoseconds == 48.4);
+        assert!((p.waiting_microseconds - (1000.0 - 0.0484 * 14_000.0)).abs() < 1e-9);
         for pair in p.rows.windows(2) {
             assert!(pair[0].efficiency > pair[1].efficiency);
         }
@@ -313,8 +324,8 @@ mod tests {
 
     #[test]
     fn the_page_has_its_numbers() {
-        let (run, scaling) = measured();
-        let p = Projection::of(&run, &scaling, 6.05, 1, 1.0).unwrap();
+        let (runs, scaling) = measured();
+        let p = Projection::of(runs.each_ref(), &scaling, 6.05, 1, 1.0).unwrap();
         let page = page(&p, &[scaling], Some(250.0), "a machine").unwrap();
         assert!(
             page.contains("80 bytes") && page.contains("a machine") && page.contains("0.25 TB"),
