@@ -203,7 +203,13 @@ void PairPsi::init_style()
 
 std::string PairPsi::search()
 {
-  if (why_listed.empty()) return "own cell list every step; no neighbor list is requested";
+  if (why_listed.empty()) {
+    std::string text = "own cell list every step; no neighbor list is requested";
+    // The only style of a simulation without bonds: nobody else leaves forces on ghosts either.
+    if (comm->nprocs > 1 && force->newton && force->pair == this && atom->molecular == Atom::ATOMIC)
+      text += "\n  advice        'newton off' saves sending back forces on ghosts: this style leaves none there";
+    return text;
+  }
   return std::string(full_list ? "full" : "half") + " neighbor list of LAMMPS, because of " + why_listed +
       ": pairs that are not in it do not interact, special factors scale phi and w";
 }

@@ -452,12 +452,17 @@ mod tests {
         let mut s = style(&["B", "NULL", "A"], 3).unwrap();
         let x = [0.0, 0.0, 0.0, 0.5, 0.0, 0.0];
         let mut f = [0.0; 6];
-        s.densities(2, &x, &[], &[1, 2], &[1, 2], true, None, Want::FORCES).unwrap();
+        let open = PeriodicBox::orthogonal([0.0; 3], [1.0; 3], [false; 3]).unwrap();
+        let around = Around { domain: &open, images: &[] };
+        s.densities(around, 2, &x, &[], &[1, 2], &[1, 2], true, None, Want::FORCES).unwrap();
         s.forces(2, &x, &[], &[1, 2], &[1, 2], None, Want::FORCES, &mut f).unwrap();
         assert_eq!(f, [0.0; 6]);
-        s.densities(2, &x, &[], &[1, 2], &[1, 3], true, None, Want::FORCES).unwrap();
+        s.densities(around, 2, &x, &[], &[1, 2], &[1, 3], true, None, Want::FORCES).unwrap();
         s.forces(2, &x, &[], &[1, 2], &[1, 3], None, Want::FORCES, &mut f).unwrap();
         assert_eq!(f, [-12.5, 0.0, 0.0, 12.5, 0.0, 0.0]);
+        // Without ghosts, added to what is there.
+        s.evaluate(&open, &x, &[], &[1, 2], &[1, 3], None, Want::FORCES, &mut f).unwrap();
+        assert_eq!(f, [-25.0, 0.0, 0.0, 25.0, 0.0, 0.0]);
     }
 
     #[test]

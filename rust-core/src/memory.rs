@@ -10,7 +10,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 /// A large page.
 const PAGE: usize = 2 << 20;
 
-/// Smaller arrays would leave most of a large page empty.
+/// Smaller arrays fit into few pages as they are, and would leave nearly all of a large one empty.
 const LARGE: usize = PAGE / 16;
 
 /// The allocator of the system, but that large arrays begin and end with large pages, and ask for them.

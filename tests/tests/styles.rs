@@ -44,6 +44,7 @@ fn a_script_runs_and_says_what_is_computed() {
             assert!(said.contains(part), "{part} is missing from\n{said}");
         }
         assert!(said.contains("Loop time"), "{said}");
+        assert_eq!(said.contains("'newton off' saves"), ranks > 1, "{said}");
     }
 }
 
