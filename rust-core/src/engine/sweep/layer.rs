@@ -118,7 +118,19 @@ impl<T, R> Swept<'_, T, R> {
             bits >> (at % 8) & 0xffff
         }
     }
+
+    /// Whether there is a ghost among the particles of a group.
+    #[inline(always)]
+    unsafe fn has_ghosts(&self, [first, count]: [usize; 2]) -> bool {
+        // SAFETY: there are bits for the particles, and more than eight bytes behind them.
+        let bits = unsafe { self.owned.as_ptr().add(first / 8).cast::<u64>().read_unaligned() };
+        let all = (1 << count) - 1;
+        bits >> (first % 8) & all != all
+    }
 }
+
+// With up to seven bits before the first they fit into a word.
+const _: () = assert!(GROUP <= 57);
 
 /// First pass: finds the pairs of `layer`, adds forces that need no density, and weights.
 ///
@@ -194,7 +206,7 @@ unsafe fn find<I: Isa, A: Arithmetic<I>, const MANY: usize>(
         let ends = view.spans::<I, MANY>(swept, row, [first, count], &windows.there, spans);
         let group = Group { view, windows, ends, first, count };
         // Owned particles look at all there are.
-        if windows.with_ghosts {
+        if windows.with_ghosts && swept.has_ghosts([first, count]) {
             cut::<I, A::Scalar, true, MANY>(swept, &group, spans, block);
         } else {
             cut::<I, A::Scalar, false, MANY>(swept, &group, spans, block);

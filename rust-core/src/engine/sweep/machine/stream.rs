@@ -31,8 +31,8 @@ struct Stream<'a, P: Compiled> {
     keeps_all: bool,
 }
 
-/// What goes in before slopes are there.
-struct Into<'a> {
+/// What the passes before the slopes are given.
+struct Outset<'a> {
     plan: &'a Plan,
     given: &'a Given<'a>,
     /// What particles add to their own densities, unless ψ is zero whatever they are.
@@ -116,10 +116,10 @@ impl<P: Compiled> Machine<P> {
         on_slabs(pool, slabs, times, &|t, slab, times| this.fill_first(arrays, given, t, &slab, times));
         self.copy_first_layer();
         let arrays = self.arrays();
-        let into = &Into { plan, given, own, out };
+        let outset = &Outset { plan, given, own, out };
         let stream = &Stream { machine: self, swept: self.swept(arrays), arrays, keeps_all: out.is_none() };
-        on_slabs(pool, slabs, times, &|t, slab, times| stream.within(into, t, slab, times));
-        on_slabs(pool, slabs, times, &|t, slab, times| stream.excess_of_first(into, t, slab, times));
+        on_slabs(pool, slabs, times, &|t, slab, times| stream.within(outset, t, slab, times));
+        on_slabs(pool, slabs, times, &|t, slab, times| stream.excess_of_first(outset, t, slab, times));
         self.first_fault()?;
         self.copy_slopes();
         Ok(())
@@ -210,7 +210,7 @@ impl<P: Compiled> Stream<'_, P> {
 
     /// Arrays and first passes of a slab, and ψ of all its layers but the first; if forces have a place to go, the second
     /// pass of those between, and the forces of those of them that are not next to the first.
-    fn within(&self, into: &Into, t: usize, slab: Range<usize>, times: &mut Times) {
+    fn within(&self, outset: &Outset, t: usize, slab: Range<usize>, times: &mut Times) {
         // SAFETY: each thread has its own scratch.
         let scratch = unsafe { &mut *self.arrays.scratch.at(t) };
         (scratch.fault, scratch.lost) = (None, None);
@@ -219,7 +219,7 @@ impl<P: Compiled> Stream<'_, P> {
         for layer in slab.clone() {
             let end = self.machine.needed(&slab, layer - slab.start + 2).end;
             // SAFETY: places of this thread, of layers that no pass has come to.
-            unsafe { self.machine.fill_places(self.arrays, into.given, filled..end) };
+            unsafe { self.machine.fill_places(self.arrays, outset.given, filled..end) };
             filled = end;
             lap(&mut since, &mut times.sort);
             // SAFETY: of this thread's slab.
@@ -229,10 +229,10 @@ impl<P: Compiled> Stream<'_, P> {
             }
             lap(&mut since, &mut times.first);
             if layer > slab.start {
-                self.excess(into, t, layer);
+                self.excess(outset, t, layer);
                 lap(&mut since, &mut times.excess);
             }
-            let Some(out) = into.out else { continue };
+            let Some(out) = outset.out else { continue };
             if layer > slab.start + 1 {
                 self.second(t, &slab, layer - 1);
                 lap(&mut since, &mut times.second);
@@ -245,10 +245,10 @@ impl<P: Compiled> Stream<'_, P> {
     }
 
     /// ψ of the first layer of a slab, which the last of another adds to.
-    fn excess_of_first(&self, into: &Into, t: usize, slab: Range<usize>, times: &mut Times) {
+    fn excess_of_first(&self, outset: &Outset, t: usize, slab: Range<usize>, times: &mut Times) {
         let mut since = Instant::now();
         if !slab.is_empty() {
-            self.excess(into, t, slab.start);
+            self.excess(outset, t, slab.start);
         }
         lap(&mut since, &mut times.excess);
     }
@@ -296,17 +296,17 @@ impl<P: Compiled> Stream<'_, P> {
         lap(&mut since, &mut times.forces);
     }
 
-    fn excess(&self, into: &Into, t: usize, layer: usize) {
-        let Some(own) = &into.own else { return };
+    fn excess(&self, outset: &Outset, t: usize, layer: usize) {
+        let Some(own) = &outset.own else { return };
         // SAFETY: each thread has its own scratch, each layer is done once.
         unsafe {
             let scratch = &mut *self.arrays.scratch.at(t);
             let done = self.machine.excess_of_layer(
                 self.arrays,
                 layer,
-                into.plan,
+                outset.plan,
                 own,
-                into.given.particles.tag,
+                outset.given.particles.tag,
                 &mut scratch.excess,
             );
             if let Err(fault) = done {
