@@ -66,7 +66,7 @@ impl Engines {
 
     /// Whether the sweep has what is wanted.
     fn sweeps(&self, want: Want) -> bool {
-        !(self.all_densities || want.particle_energy || want.particle_virial)
+        !(self.all_densities || want.of_particles())
     }
 
     /// Whether no images are needed along the periodic directions of `domain`.

@@ -22,6 +22,11 @@ impl Want {
         Want { energy: true, virial: true, particle_energy: false, particle_virial: false };
     /// Everything.
     pub const ALL: Want = Want { energy: true, virial: true, particle_energy: true, particle_virial: true };
+
+    /// Whether anything is asked for of each particle.
+    pub fn of_particles(self) -> bool {
+        self.particle_energy || self.particle_virial
+    }
 }
 
 /// Sums over the particles and pairs of one host or rank; the sums of all ranks add up.

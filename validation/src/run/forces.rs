@@ -110,7 +110,7 @@ impl Forces {
 
     /// Whether an evaluation that asks for `want` can be swept in `domain`.
     pub fn sweeps(&self, domain: &PeriodicBox, want: Want) -> bool {
-        !self.all_densities && !want.particle_energy && !want.particle_virial && self.sweep.fits(domain)
+        !(self.all_densities || want.of_particles()) && self.sweep.fits(domain)
     }
 
     /// Writes the forces on all particles to `force`, and returns what was asked for.

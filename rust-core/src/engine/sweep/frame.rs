@@ -40,23 +40,20 @@ impl Frame {
 
     /// Open space around points of which `low` and `high` are the extremes, and what is within reach of them.
     pub fn around(low: [f64; 3], high: [f64; 3], dimensions: usize, cutoff: f64) -> Frame {
-        let mut frame =
-            Frame { dimensions, origin: low, length: [1.0; 3], tilt: [0.0; 3], periodic: [false; 3] };
-        for c in 0..dimensions {
-            // Differences of fractions are read as signed: within reach they must stay below a half.
-            frame.length[c] = ((high[c] - low[c]) * (1.0 + 1e-9)).max(4.0 * cutoff);
-        }
-        frame
+        let frame = Frame { dimensions, origin: low, length: [1.0; 3], tilt: [0.0; 3], periodic: [false; 3] };
+        frame.stretched(low, high, cutoff)
     }
 
-    /// Makes the directions without periods span the points.
-    pub fn stretch(&mut self, low: [f64; 3], high: [f64; 3], cutoff: f64) {
+    /// The frame with the directions without periods spanning the points.
+    pub fn stretched(mut self, low: [f64; 3], high: [f64; 3], cutoff: f64) -> Frame {
         for c in 0..self.dimensions {
             if !self.periodic[c] {
                 self.origin[c] = low[c];
+                // Differences of fractions are read as signed: within reach they must stay below a half.
                 self.length[c] = ((high[c] - low[c]) * (1.0 + 1e-9)).max(4.0 * cutoff);
             }
         }
+        self
     }
 
     /// Whether a point is not beyond the ends of the frame, which has none along periods.

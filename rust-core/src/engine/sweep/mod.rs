@@ -221,11 +221,11 @@ impl Sweep {
     }
 
     /// Whether particles in `domain` meet one image only of each other, as a sweep without ghosts needs:
-    /// periods of twice the cut-off or more, and edges as LAMMPS has them, along the axes if any direction is open.
+    /// periods of twice the cut-off or more, and edges as LAMMPS has them, along the axes if some directions are open.
     pub fn fits(&self, domain: &PeriodicBox) -> bool {
-        Frame::of_box(domain, self.plan.dimensions).is_some_and(|frame| {
-            (frame.is_closed() || !frame.is_tilted()) && Grid::new(&frame, cutoff(&self.plan), 1).is_some()
-        })
+        let frame = Frame::of_box(domain, self.plan.dimensions);
+        is_open(domain, &self.plan)
+            || frame.filter(can_stretch).is_some_and(|f| Grid::new(&f, cutoff(&self.plan), 1).is_some())
     }
 
     /// All forces on particles in a box: writes them to `force`, or adds them to what is there, and returns what was asked
@@ -429,6 +429,16 @@ fn cutoff(plan: &Plan) -> f64 {
     if plan.cutoff > 0.0 { plan.cutoff } else { 1.0 }
 }
 
+/// Whether no direction is periodic: then edges do not matter.
+fn is_open(domain: &PeriodicBox, plan: &Plan) -> bool {
+    !domain.periodic()[..plan.dimensions].iter().any(|p| *p)
+}
+
+/// Whether a frame is still one when open directions are as long as they have to be: what leans along one is none.
+fn can_stretch(frame: &Frame) -> bool {
+    frame.is_closed() || !frame.is_tilted()
+}
+
 /// The region to be swept, and its cells: all of the box along its periodic directions, along the others what the
 /// particles span, with room for ghosts within reach of them.
 fn region<P: compiled::Compiled>(
@@ -444,15 +454,9 @@ fn region<P: compiled::Compiled>(
         let margin = if given.particles.owned < given.particles.x.len() { cutoff } else { 0.0 };
         let (low, high) = machine.extremes(pool, given)?;
         let (low, high) = (low.map(|x| x - margin), high.map(|x| x + margin));
-        let open = !domain.periodic()[..plan.dimensions].iter().any(|p| *p);
-        frame = match frame {
-            _ if open => Some(Frame::around(low, high, plan.dimensions, cutoff)),
-            // What leans along an open direction is no box any more.
-            Some(mut frame) if !frame.is_tilted() => {
-                frame.stretch(low, high, cutoff);
-                Some(frame)
-            }
-            _ => None,
+        frame = match is_open(domain, plan) {
+            true => Some(Frame::around(low, high, plan.dimensions, cutoff)),
+            false => frame.filter(can_stretch).map(|frame| frame.stretched(low, high, cutoff)),
         };
     }
     let count = given.particles.x.len();

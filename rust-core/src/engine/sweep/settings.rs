@@ -7,7 +7,7 @@ use std::num::NonZeroUsize;
 pub enum Precision {
     /// Pairs in single precision: positions as 32-bit fractions of the box, so that differences are exact
     /// to 2⁻³² of it everywhere. In a liquid with interfaces, the largest error of a force on a particle
-    /// is 1.8·10⁻⁶ of the rms force.
+    /// is 1.7·10⁻⁶ of the rms force.
     #[default]
     Mixed,
     /// Pairs in double precision.

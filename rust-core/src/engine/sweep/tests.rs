@@ -19,6 +19,7 @@ impl Points {
 }
 
 /// Particles in a box, and what they move like.
+#[derive(Clone)]
 struct Cloud {
     domain: PeriodicBox,
     x: Vec<[f64; 3]>,

@@ -145,6 +145,13 @@ fn what_is_around_a_rank_has_to_fit() {
     let edges = Matrix3::from_columns(&[0, 1, 2].map(|k| cloud.domain.edge(k).into()));
     let half = PeriodicBox::new(cloud.domain.origin(), edges, [true, true, false]).unwrap();
     assert!(sweep.fits(&cloud.domain) && !sweep.fits(&half));
+    // A box that is open everywhere may lean as it likes.
+    let open = PeriodicBox::new(cloud.domain.origin(), edges, [false; 3]).unwrap();
+    assert!(sweep.fits(&open));
+    let open = Cloud { domain: open, ..cloud.clone() };
+    let (force, tally) = plain(&fluid, &open);
+    let (here, totals) = swept(&mut sweep, &open, Want::TOTALS);
+    assert!(difference(&force, &here).max(tally_difference(&tally, &totals)) < tolerance(Precision::Mixed));
     let around = |domain, images| Around { domain, images };
     let mut first = |around| sweep.first(around, &cloud.particles(), &cloud.v, Some(STEP), Want::FORCES);
     assert!(matches!(first(around(&half, &[])), Err(EngineError::Host(_))));
