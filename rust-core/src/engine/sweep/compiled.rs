@@ -1,11 +1,12 @@
 //! The passes, compiled for each instruction set and precision; chosen once.
 
 use crate::engine::settings::Instructions;
-use crate::engine::sweep::first_pass::first_pass;
 use crate::engine::sweep::ground::arithmetic::{Arithmetic, Double, DoubleParticle, Mixed, MixedParticle};
-use crate::engine::sweep::ground::pass_data::PassData;
-use crate::engine::sweep::many_body::in_range_pairs::{InRangePairs, second_pass};
-use crate::engine::sweep::pair_batch::buffers::PairBuffers;
+use crate::engine::sweep::pair_batch::in_range_pairs::InRangePairs;
+use crate::engine::sweep::passes::buffers::PairBuffers;
+use crate::engine::sweep::passes::data::PassData;
+use crate::engine::sweep::passes::first::first_pass;
+use crate::engine::sweep::passes::second::second_pass;
 use crate::engine::sweep::simd::Portable;
 use crate::engine::tally::Tally;
 

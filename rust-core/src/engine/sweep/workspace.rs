@@ -14,17 +14,20 @@ use crate::engine::noise::PairNoise;
 use crate::engine::particles::Particles;
 use crate::engine::plan::Plan;
 use crate::engine::settings::Instructions;
+use crate::engine::sweep::cells::ghosts::{Ghosts, OwnedOfColumn};
+use crate::engine::sweep::cells::sorted::SortedCells;
 use crate::engine::sweep::compiled::{Compiled, Passes};
 use crate::engine::sweep::ground::box_geometry::BoxGeometry;
 use crate::engine::sweep::ground::cell_grid::CellGrid;
 use crate::engine::sweep::ground::fixed_point::FixedPoint16;
-use crate::engine::sweep::ground::pass_data::{OwnedOfColumn, PassData};
 use crate::engine::sweep::ground::shared_ptr::SharedPtr;
 use crate::engine::sweep::ground::terms::Terms;
-use crate::engine::sweep::many_body::full_pair_cache::SLOPES_PER_PASS;
-use crate::engine::sweep::many_body::in_range_pairs::InRangePairs;
-use crate::engine::sweep::pair_batch::buffers::PairBuffers;
-use crate::engine::sweep::pair_batch::scatter::Accumulator;
+use crate::engine::sweep::pair_batch::accumulators::{Accumulator, Accumulators};
+use crate::engine::sweep::pair_batch::in_range_pairs::InRangePairs;
+use crate::engine::sweep::pair_batch::inputs::PairInputs;
+use crate::engine::sweep::passes::buffers::PairBuffers;
+use crate::engine::sweep::passes::data::PassData;
+use crate::engine::sweep::passes::slopes::{SLOPES_PER_BLOCK, Slopes};
 use crate::engine::sweep::simd::Scalar;
 use crate::engine::tally::{Tally, Want};
 
@@ -114,8 +117,7 @@ struct ThreadScratch<T> {
 
 impl<T: Scalar> ThreadScratch<T> {
     fn new(passes: usize, instructions: Instructions) -> ThreadScratch<T> {
-        let mut buffers = PairBuffers::default();
-        buffers.set_passes(passes);
+        let buffers = PairBuffers::new(passes);
         let excess = ExcessPass::new(instructions);
         ThreadScratch { buffers, excess, low: [0.0; 3], high: [0.0; 3], fault: None, lost: None }
     }
@@ -224,7 +226,7 @@ impl<P: Compiled> Workspace<P> {
     /// Numbers of the first eight slopes of all particles, of copies, and of a vector behind.
     fn packed_slope_stride(&self) -> usize {
         let copies = if self.is_plane_axis_periodic() { self.plane(0).1 } else { 0 };
-        SLOPES_PER_PASS * (self.particles + copies + VECTOR_PADDING)
+        SLOPES_PER_BLOCK * (self.particles + copies + VECTOR_PADDING)
     }
 
     /// Writes the slopes of particles from number `from` on as the second pass reads them.
@@ -246,9 +248,9 @@ impl<P: Compiled> Workspace<P> {
         }
         let room = self.packed_slope_stride();
         for (k, row) in slopes.chunks_exact(self.width()).enumerate() {
-            for (c, slopes) in row.chunks(SLOPES_PER_PASS).enumerate() {
+            for (c, slopes) in row.chunks(SLOPES_PER_BLOCK).enumerate() {
                 // SAFETY: the caller's.
-                let to = unsafe { to.at(c * room + SLOPES_PER_PASS * (from + k)) };
+                let to = unsafe { to.at(c * room + SLOPES_PER_BLOCK * (from + k)) };
                 for (c, slope) in slopes.iter().enumerate() {
                     // SAFETY: as above.
                     unsafe { *to.add(c) = P::Scalar::of(*slope) };
@@ -266,11 +268,11 @@ impl<P: Compiled> Workspace<P> {
         // SAFETY: the caller's.
         let to = unsafe {
             std::slice::from_raw_parts_mut(
-                to.at(SLOPES_PER_PASS * from),
-                SLOPES_PER_PASS * densities_of_particles.len(),
+                to.at(SLOPES_PER_BLOCK * from),
+                SLOPES_PER_BLOCK * densities_of_particles.len(),
             )
         };
-        for (to, row) in to.as_chunks_mut::<SLOPES_PER_PASS>().0.iter_mut().zip(densities_of_particles) {
+        for (to, row) in to.as_chunks_mut::<SLOPES_PER_BLOCK>().0.iter_mut().zip(densities_of_particles) {
             for (to, slope) in to.iter_mut().zip(row) {
                 *to = P::Scalar::of(*slope);
             }
@@ -342,27 +344,40 @@ impl<P: Compiled> Workspace<P> {
     }
 
     fn data(&self, arrays: SharedArrays<P>) -> PassData<'_, P::Scalar, P::PackedParticle> {
-        PassData {
-            geometry: &self.geometry,
-            grid: &self.grid,
-            start: &self.start,
-            x: arrays.x,
-            fixed16_scale: self.fixed16_scale,
-            fixed16: arrays.fixed16,
-            packed: arrays.packed,
-            species: arrays.species,
-            ghost: &self.ghost,
-            owned: &self.owned_bits,
+        let ghosts = Ghosts {
+            flags: &self.ghost,
+            owned_bits: &self.owned_bits,
             owned_of_column: &self.owned_of_column,
-            terms: &self.terms,
-            slopes: arrays.slopes,
-            packed_slopes: arrays.packed_slopes,
-            packed_slope_stride: self.packed_slope_stride(),
-            accumulator_offset: &self.accumulator_offset,
-            sums: SharedPtr(arrays.sums.0.cast()),
-            densities: SharedPtr(arrays.densities.0.cast()),
-            variables: self.variables.len(),
-            thermostat: self.thermostat,
+        };
+        PassData {
+            cells: SortedCells {
+                geometry: &self.geometry,
+                grid: &self.grid,
+                start: &self.start,
+                x: arrays.x,
+                fixed16: arrays.fixed16,
+                fixed16_scale: self.fixed16_scale,
+                ghosts,
+            },
+            inputs: PairInputs {
+                geometry: &self.geometry,
+                terms: &self.terms,
+                thermostat: self.thermostat,
+                packed: arrays.packed,
+                species: arrays.species,
+                ghosts,
+            },
+            accumulators: Accumulators {
+                offset: &self.accumulator_offset,
+                sums: SharedPtr(arrays.sums.0.cast()),
+                densities: SharedPtr(arrays.densities.0.cast()),
+                variables: self.variables.len(),
+            },
+            slopes: Slopes {
+                values: arrays.slopes,
+                packed: arrays.packed_slopes,
+                stride: self.packed_slope_stride(),
+            },
         }
     }
 

@@ -6,7 +6,7 @@ use crate::engine::excess::ExcessPlan;
 use crate::engine::excess_pass::{ExcessPass, LANES, Rows};
 use crate::engine::plan::Plan;
 use crate::engine::sweep::compiled::Compiled;
-use crate::engine::sweep::many_body::full_pair_cache::SLOPES_PER_PASS;
+use crate::engine::sweep::passes::slopes::SLOPES_PER_BLOCK;
 use crate::engine::sweep::simd::Scalar;
 use crate::engine::vectors::{self, Loop};
 
@@ -24,7 +24,7 @@ impl<P: Compiled> Workspace<P> {
         self.slopes.resize(width * (n + copies), 0.0);
         if self.terms.full_cache {
             self.packed_slopes
-                .resize(width.div_ceil(SLOPES_PER_PASS) * self.packed_slope_stride(), P::Scalar::of(0.0));
+                .resize(width.div_ceil(SLOPES_PER_BLOCK) * self.packed_slope_stride(), P::Scalar::of(0.0));
         }
         if plan.excess.iter().all(|e| matches!(e, ExcessPlan::Constant(0.0))) {
             self.excess.fill(0.0);
@@ -41,7 +41,7 @@ impl<P: Compiled> Workspace<P> {
             let room = self.packed_slope_stride();
             for first in (0..self.packed_slopes.len()).step_by(room) {
                 self.packed_slopes
-                    .copy_within(first..first + SLOPES_PER_PASS * copies, first + SLOPES_PER_PASS * n);
+                    .copy_within(first..first + SLOPES_PER_BLOCK * copies, first + SLOPES_PER_BLOCK * n);
             }
         }
     }

@@ -10,13 +10,12 @@ use super::host::ForceSink;
 use super::{Input, SharedArrays, VECTOR_PADDING, Workspace};
 use crate::engine::error::EngineError;
 use crate::engine::plan::Plan;
-use crate::engine::sweep::Times;
 use crate::engine::sweep::compiled::Compiled;
-use crate::engine::sweep::ground::pass_data::PassData;
 use crate::engine::sweep::ground::shared_ptr::SharedPtr;
-use crate::engine::sweep::lap;
-use crate::engine::sweep::many_body::in_range_pairs::InRangePairs;
+use crate::engine::sweep::pair_batch::in_range_pairs::InRangePairs;
+use crate::engine::sweep::passes::data::PassData;
 use crate::engine::sweep::pool::Pool;
+use crate::engine::sweep::times::{Times, lap};
 use std::ops::Range;
 use std::time::Instant;
 

@@ -7,12 +7,12 @@ mod fractions;
 
 use super::{Input, SharedArrays, SharedPtr, VECTOR_PADDING, Workspace};
 use crate::engine::error::EngineError;
+use crate::engine::sweep::cells::ghosts::OwnedOfColumn;
 use crate::engine::sweep::compiled::Compiled;
 use crate::engine::sweep::ground::box_geometry::BoxGeometry;
 use crate::engine::sweep::ground::cell_grid::CellGrid;
 use crate::engine::sweep::ground::fixed_point::FixedPoint16;
-use crate::engine::sweep::ground::pass_data::OwnedOfColumn;
-use crate::engine::sweep::many_body::in_range_pairs::J_CODE_BITS;
+use crate::engine::sweep::pair_batch::in_range_pairs::J_CODE_BITS;
 use crate::engine::sweep::pool::{Pool, part};
 use crate::engine::tally::Tally;
 use crate::engine::vectors;
