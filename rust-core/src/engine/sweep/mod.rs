@@ -32,6 +32,7 @@ mod pool;
 mod quantum;
 mod scatter;
 mod settings;
+mod shared_slice;
 mod simd;
 mod terms;
 mod thermostat;
