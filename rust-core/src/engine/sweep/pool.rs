@@ -7,7 +7,7 @@
 
 mod sync;
 
-use super::shared_slice::SharedSlice;
+use crate::engine::sweep::ground::shared_slice::SharedSlice;
 use std::cell::RefCell;
 use std::num::NonZeroUsize;
 use sync::{
