@@ -10,7 +10,7 @@ use crate::engine::sweep::many_body::in_range_pairs::InRangePairs;
 use crate::engine::sweep::pair_batch::batch::Batch;
 use crate::engine::sweep::pair_batch::buffers::{PairBuffers, SEARCH_GROUP};
 use crate::engine::sweep::pair_batch::evaluate::{StepConstants, evaluate};
-use crate::engine::sweep::pair_batch::scatter::{scatter, scatter_kernel_weights};
+use crate::engine::sweep::pair_batch::scatter::{PlaneSums, scatter, scatter_kernel_weights};
 use crate::engine::sweep::pair_search::cell_ranges::{CellRanges, PlaneSearch, StencilColumns};
 use crate::engine::sweep::pair_search::distance_filter::filter_by_distance;
 use crate::engine::sweep::pair_search::j_clusters::{SearchGroup, form_j_clusters};
@@ -28,6 +28,7 @@ const _: () = assert!(SEARCH_GROUP <= 57);
 pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool>(
     data: &PassData<A::Scalar, A::PackedParticle>,
     plane: usize,
+    sums: PlaneSums,
     buffers: &mut PairBuffers<A::Scalar>,
     in_range: &mut InRangePairs<A::Scalar>,
 ) -> Tally {
@@ -86,7 +87,7 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, con
                     evaluate_batch::<I, A, MULTISPECIES, TALLY>(
                         data,
                         &constants,
-                        plane,
+                        sums,
                         buffers,
                         in_range,
                         [slot, last],
@@ -142,7 +143,7 @@ unsafe fn find_pairs<I: Isa, A: Arithmetic<I>, const CLUSTER: usize>(
 unsafe fn evaluate_batch<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool>(
     data: &PassData<A::Scalar, A::PackedParticle>,
     constants: &StepConstants<I, A>,
-    plane: usize,
+    sums: PlaneSums,
     buffers: &mut PairBuffers<A::Scalar>,
     in_range: &mut InRangePairs<A::Scalar>,
     [first, last]: [usize; 2],
@@ -158,14 +159,13 @@ unsafe fn evaluate_batch<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, con
         let batch = Batch { slots: [first, last], first: buffers.first + first, pairs };
         A::load_i_particles(data.packed.as_ptr().add(batch.first), &mut buffers.i_particles);
         evaluate::<I, A, MULTISPECIES, TALLY>(data, constants, buffers, in_range, batch, tally);
-        let accumulator_offset = *data.accumulator_offset.get_unchecked(plane);
         // Forces first: columns of weights take the place of theirs.
         if !(MULTISPECIES && data.terms.full_cache) {
-            scatter::<I, A>(data.sums, data.variables, accumulator_offset, buffers, batch);
+            scatter::<I, A>(sums, data.variables, buffers, batch);
             in_range.add::<TALLY>(buffers, batch);
         }
         if data.variables > 1 {
-            scatter_kernel_weights::<I, A, MULTISPECIES>(data, accumulator_offset, buffers, batch);
+            scatter_kernel_weights::<I, A, MULTISPECIES>(data, sums, buffers, batch);
         }
     }
 }

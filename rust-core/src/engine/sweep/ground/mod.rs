@@ -5,6 +5,5 @@ pub mod box_geometry;
 pub mod cell_grid;
 pub mod fixed_point;
 pub mod pass_data;
-pub mod shared_ptr;
 pub mod shared_slice;
 pub mod terms;

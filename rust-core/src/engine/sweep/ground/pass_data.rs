@@ -3,7 +3,7 @@
 use super::box_geometry::BoxGeometry;
 use super::cell_grid::CellGrid;
 use super::fixed_point::FixedPoint16;
-use super::shared_ptr::SharedPtr;
+use super::shared_slice::SharedSlice;
 use super::terms::Terms;
 use crate::engine::noise::PairNoise;
 
@@ -16,13 +16,13 @@ pub struct PassData<'a, T, R> {
     /// plane, one past the last of which is the last.
     pub start: &'a [u32],
     /// Positions from the origin of the box geometry.
-    pub x: [SharedPtr<f32>; 3],
+    pub x: [SharedSlice<'a, f32>; 3],
     /// The same in words.
     pub fixed16_scale: FixedPoint16,
-    pub fixed16: [SharedPtr<u16>; 3],
-    pub packed: SharedPtr<R>,
+    pub fixed16: [SharedSlice<'a, u16>; 3],
+    pub packed: SharedSlice<'a, R>,
     /// Species; not there with one.
-    pub species: SharedPtr<u8>,
+    pub species: SharedSlice<'a, u8>,
     /// Which are ghosts; empty if there are none.
     pub ghost: &'a [bool],
     /// A bit for each particle that is not.
@@ -31,17 +31,12 @@ pub struct PassData<'a, T, R> {
     pub owned_of_column: &'a [OwnedOfColumn],
     pub terms: &'a Terms<T>,
     /// The many-body slopes, a number for each pass and species.
-    pub slopes: SharedPtr<f64>,
+    pub slopes: SharedSlice<'a, f64>,
     /// The same for pairs that are kept in the full pair cache: columns of eight for all particles, then columns of the next eight …, with so
     /// many numbers each time.
-    pub packed_slopes: SharedPtr<T>,
+    pub packed_slopes: SharedSlice<'a, T>,
     pub packed_slope_stride: usize,
-    /// What to add to the number of a particle to get that of its accumulator, for each plane.
-    pub accumulator_offset: &'a [isize],
-    /// Four numbers for each accumulator: force, and the density if there is one variable.
-    pub sums: SharedPtr<f64>,
-    /// Densities, if there are more: for each accumulator `variables` numbers, and as many more as fill columns of four.
-    pub densities: SharedPtr<f64>,
+    /// How many densities are summed by the many-body passes.
     pub variables: usize,
     pub thermostat: Option<(PairNoise, f64)>,
 }

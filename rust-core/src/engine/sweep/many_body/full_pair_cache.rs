@@ -11,7 +11,7 @@ use crate::engine::sweep::pair_batch::batch::Batch;
 use crate::engine::sweep::pair_batch::buffers::{CacheLines, PairBuffers};
 use crate::engine::sweep::pair_batch::pair_terms::{add_virial, sum_lanes};
 use crate::engine::sweep::pair_batch::scatter::{
-    Accumulator, PlaneAccumulators, ScatterPairs, scatter_quads, table_entry,
+    Accumulator, PlaneSums, ScatterPairs, scatter_quads, table_entry,
 };
 use crate::engine::sweep::simd::{Isa, Reals, Scalar, Words};
 use crate::model::kernel::{Real, Shape, ShapeVisitor};
@@ -240,14 +240,13 @@ pub const SLOPES_PER_PASS: usize = 8;
 #[inline(always)]
 pub unsafe fn second_pass_cached<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool>(
     data: &PassData<A::Scalar, A::PackedParticle>,
-    plane: usize,
+    sums: PlaneSums,
     cache: &FullPairCache<A::Scalar>,
     virial: &mut [f64; 6],
 ) {
     // SAFETY: the caller's.
     unsafe {
-        let offset = *data.accumulator_offset.get_unchecked(plane);
-        let to = PlaneAccumulators::new(data.sums.0.offset(4 * offset));
+        let to = sums.forces();
         // As many as whole vectors have, and a row behind.
         let room = cache.most / 16 + 2;
         let mut quads: Vec<CacheLines<A::Scalar>> = vec![CacheLines::default(); room];
@@ -338,14 +337,15 @@ unsafe fn find_factors<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const
     first: usize,
     factors: *mut A::Scalar,
 ) {
-    // SAFETY: the contract of `simd`; there are slopes of a vector's worth behind the last particle.
+    // SAFETY: the contract of `simd`; there are slopes of every particle of the plane and the next.
     unsafe {
         let zero = A::Reals::constant(0.0);
         let species = data.terms.species;
         let count = N.min(data.variables - first);
         let slopes = data.packed_slopes.at(first / SLOPES_PER_PASS * data.packed_slope_stride).cast_const();
         let mut i_slopes = ISlopes([[A::Scalar::default(); 16]; SLOPES_PER_PASS]);
-        let fields = A::load_transposed_in_order(slopes.add(SLOPES_PER_PASS * pairs.batch.first as usize));
+        let own_slopes = slopes.add(SLOPES_PER_PASS * pairs.batch.first as usize);
+        let fields = A::load_transposed_in_order(own_slopes, pairs.batch.members as usize);
         // Tables of a vector, or more.
         let fits_vector = species * species <= A::Reals::LANES;
         let mut of = [SlopeTerm { weight_gradient: std::ptr::null(), is_species: [std::ptr::null(); 2] };

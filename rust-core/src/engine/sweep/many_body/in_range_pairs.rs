@@ -1,11 +1,11 @@
 //! The pairs that a density reaches: kept by the first pass, and given their forces, after ψ, by the second.
 
-use crate::engine::sweep::ground::arithmetic::Arithmetic;
+use crate::engine::sweep::ground::arithmetic::{Arithmetic, OFFSET_BITS};
 use crate::engine::sweep::ground::pass_data::PassData;
 use crate::engine::sweep::many_body::full_pair_cache::{FullPairCache, second_pass_cached};
 use crate::engine::sweep::pair_batch::batch::Batch;
 use crate::engine::sweep::pair_batch::buffers::PairBuffers;
-use crate::engine::sweep::pair_batch::scatter::add_quad;
+use crate::engine::sweep::pair_batch::scatter::{PlaneSums, add_quad};
 use crate::engine::sweep::simd::{Isa, Quad, Scalar};
 
 /// What the first pass of a plane leaves for the second.
@@ -162,23 +162,17 @@ impl Banks {
 #[inline(always)]
 pub unsafe fn second_pass<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool>(
     data: &PassData<A::Scalar, A::PackedParticle>,
-    plane: usize,
+    sums: PlaneSums,
     in_range: &InRangePairs<A::Scalar>,
     virial: &mut [f64; 6],
 ) {
     // SAFETY: the caller's.
     unsafe {
         if MULTISPECIES && data.terms.full_cache {
-            return second_pass_cached::<I, A, MULTISPECIES, TALLY>(
-                data,
-                plane,
-                &in_range.full_cache,
-                virial,
-            );
+            return second_pass_cached::<I, A, MULTISPECIES, TALLY>(data, sums, &in_range.full_cache, virial);
         }
-        let offset = *data.accumulator_offset.get_unchecked(plane);
-        let base = data.sums.0.offset(4 * offset);
-        let plane_base = base.add(4 * in_range.first as usize);
+        let to = sums.forces();
+        let plane_base = to.at((in_range.first as usize) << OFFSET_BITS);
         let species = data.terms.species;
         let species_j = data.species.as_ptr().wrapping_add(in_range.first as usize);
         let passes = in_range.weight_gradients.len();
@@ -230,7 +224,7 @@ pub unsafe fn second_pass<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, co
             }
             let mut m = 0;
             while m < count {
-                add_quad(base.add(4 * (first + m)), banks.take::<I::Quad>(m));
+                add_quad(to.at((first + m) << OFFSET_BITS), banks.take::<I::Quad>(m));
                 m += 1;
             }
             batch += 1;

@@ -3,11 +3,11 @@
 use crate::engine::sweep::ground::arithmetic::OFFSET_BITS;
 use crate::engine::sweep::ground::arithmetic::{Arithmetic, PairVector};
 use crate::engine::sweep::ground::pass_data::PassData;
-use crate::engine::sweep::ground::shared_ptr::SharedPtr;
 use crate::engine::sweep::pair_batch::batch::Batch;
 use crate::engine::sweep::pair_batch::buffers::PairBuffers;
 use crate::engine::sweep::simd::{Isa, Quad, Reals};
 use crate::model::kernel::Real;
+use std::marker::PhantomData;
 
 /// An accumulator: a force, and the density if there is one variable; aligned so that none straddles lines of the
 /// cache.
@@ -16,6 +16,43 @@ use crate::model::kernel::Real;
 pub struct Accumulator(pub [f64; 4]);
 
 const _: () = assert!(size_of::<Accumulator>() == 1 << OFFSET_BITS);
+
+/// The accumulators that the pairs of one plane add to: those of its particles, then those of the next plane's.
+#[derive(Clone, Copy)]
+pub struct PlaneSums<'a> {
+    /// Those of particle 0, were it of the plane: out of bounds, but for planes that it is of.
+    forces: *mut f64,
+    densities: *mut f64,
+    borrowed: PhantomData<&'a mut [Accumulator]>,
+}
+
+impl<'a> PlaneSums<'a> {
+    /// Of a plane whose first particle is `first`; as many densities for each particle as there are forces, or multiples.
+    pub fn new(
+        first: usize,
+        forces: &'a mut [Accumulator],
+        densities: &'a mut [Accumulator],
+    ) -> PlaneSums<'a> {
+        let quads = densities.len().checked_div(forces.len()).unwrap_or(0);
+        PlaneSums {
+            forces: forces.as_mut_ptr().wrapping_sub(first).cast(),
+            densities: densities.as_mut_ptr().wrapping_sub(quads * first).cast(),
+            borrowed: PhantomData,
+        }
+    }
+
+    /// Forces: one row for each particle.
+    #[inline(always)]
+    pub fn forces(self) -> PlaneAccumulators {
+        PlaneAccumulators { base: self.forces, quads_per_particle: 1, quad: 0 }
+    }
+
+    /// Row `quad` of the densities.
+    #[inline(always)]
+    fn densities(self, quads_per_particle: usize, quad: usize) -> PlaneAccumulators {
+        PlaneAccumulators { base: self.densities, quads_per_particle, quad }
+    }
+}
 
 /// Accumulators of a plane: for each particle some rows of four numbers.
 #[derive(Clone, Copy)]
@@ -28,17 +65,10 @@ pub struct PlaneAccumulators {
 }
 
 impl PlaneAccumulators {
-    /// One row each.
+    /// The row of the particle at 32 times `offset`: of four numbers, if the particle is of the plane or the next.
     #[inline(always)]
-    pub fn new(base: *mut f64) -> PlaneAccumulators {
-        PlaneAccumulators { base, quads_per_particle: 1, quad: 0 }
-    }
-
-    /// The row of the particle at 32 times `offset`.
-    #[inline(always)]
-    unsafe fn at(self, offset: usize) -> *mut f64 {
-        // SAFETY: the caller's.
-        unsafe { self.base.byte_add(offset * self.quads_per_particle).add(4 * self.quad) }
+    pub fn at(self, offset: usize) -> *mut f64 {
+        self.base.wrapping_byte_add(offset * self.quads_per_particle).wrapping_add(4 * self.quad)
     }
 }
 
@@ -69,15 +99,14 @@ impl ScatterPairs {
 /// Adds the rows of pairs to both particles of each.
 #[inline(always)]
 pub unsafe fn scatter<I: Isa, A: Arithmetic<I>>(
-    sums: SharedPtr<f64>,
+    sums: PlaneSums,
     variables: usize,
-    offset: isize,
     buffers: &mut PairBuffers<A::Scalar>,
     batch: Batch,
 ) {
     // SAFETY: the contract of `simd`; accumulators are there for every particle of the plane and the next.
     unsafe {
-        let to = PlaneAccumulators::new(sums.0.offset(4 * offset));
+        let to = sums.forces();
         let quads = buffers.quads.as_mut_ptr().cast::<A::Scalar>();
         // The second particle gets minus the row, so the weight in it is negative.
         // Nobody asks any more what pairs are, unless there are weights to come.
@@ -189,7 +218,7 @@ struct WeightOf<T> {
 #[inline(always)]
 pub unsafe fn scatter_kernel_weights<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool>(
     data: &PassData<A::Scalar, A::PackedParticle>,
-    offset: isize,
+    sums: PlaneSums,
     buffers: &mut PairBuffers<A::Scalar>,
     batch: Batch,
 ) {
@@ -197,7 +226,6 @@ pub unsafe fn scatter_kernel_weights<I: Isa, A: Arithmetic<I>, const MULTISPECIE
     unsafe {
         let terms = data.terms;
         let quads_per_particle = data.variables.div_ceil(4);
-        let base = data.densities.0.offset((4 * quads_per_particle) as isize * offset);
         let quads = buffers.quads.as_mut_ptr().cast::<A::Scalar>();
         let i_quads = if MULTISPECIES { buffers.i_quads.as_mut_ptr().cast() } else { quads };
         let vectors = batch.count().div_ceil(A::Reals::LANES);
@@ -246,7 +274,7 @@ pub unsafe fn scatter_kernel_weights<I: Isa, A: Arithmetic<I>, const MULTISPECIE
                 v += 1;
             }
             // Both get minus a row: weights are negative.
-            let to = PlaneAccumulators { base, quads_per_particle, quad };
+            let to = sums.densities(quads_per_particle, quad);
             let running = buffers.running.as_mut_ptr().cast();
             scatter_quads::<I, A>(to, quads, i_quads, running, [-1.0; 4], ScatterPairs::of(buffers, batch));
             quad += 1;

@@ -67,8 +67,8 @@ fn pieces_of_two_callers_do_not_overlap() {
                         callers[caller].fetch_add(1, Ordering::SeqCst);
                         assert_eq!(callers[1 - caller].load(Ordering::SeqCst), 0, "the other is at work");
                         // SAFETY: each number has an element of its own.
-                        unsafe { parts.slice_mut(t..t + 1) }
-                        [0] = round + t;
+                        let part = unsafe { parts.slice_mut(t..t + 1) };
+                        part[0] = round + t;
                         callers[caller].fetch_sub(1, Ordering::SeqCst);
                     });
                     assert_eq!(done, [round, round + 1, round + 2]);
