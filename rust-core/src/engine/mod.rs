@@ -19,6 +19,7 @@ mod excess;
 mod excess_pass;
 mod force_pass;
 mod images;
+mod instruction_set;
 pub mod noise;
 mod pairs;
 mod particles;

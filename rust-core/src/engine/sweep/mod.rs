@@ -15,7 +15,6 @@
 //! to another has accumulators of its own, so sums are the same for any number of threads.
 
 mod cells;
-mod compiled;
 mod ground;
 mod pair_batch;
 mod pair_search;
@@ -31,10 +30,11 @@ pub use times::Times;
 use super::domain::PeriodicBox;
 use super::error::EngineError;
 use super::evaluator::PassCounts;
+use super::instruction_set::InstructionSet;
 use super::noise::PairNoise;
 use super::particles::{Particles, Step};
 use super::plan::Plan;
-use super::settings::{Instructions, Precision, Settings};
+use super::settings::{Precision, Settings};
 use super::tally::{Tally, Want};
 use crate::model::Fluid;
 use crate::model::expression::TooLarge;
@@ -44,7 +44,7 @@ use ground::cell_grid::CellGrid;
 use std::sync::Arc;
 use std::time::Instant;
 use times::lap;
-use workspace::{ForceSink, Input, Workspace};
+use workspace::{ForceSink, Input, Workspace, extremes};
 
 /// Forces of one fluid, fast: [`Sweep::evaluate`] where all particles are in hand. For a rank of a host, with ghosts for
 /// whatever is beyond it, an evaluation is [`Sweep::first`], a round of slopes from owners to ghosts, and
@@ -52,6 +52,7 @@ use workspace::{ForceSink, Input, Workspace};
 pub struct Sweep {
     plan: Plan,
     settings: Settings,
+    set: InstructionSet,
     pool: Arc<Pool>,
     workspace: EitherPrecision,
     species_of_type: Vec<i32>,
@@ -118,22 +119,18 @@ impl Sweep {
 
     /// The engine of a plan that is there already, with threads that others may use too.
     pub fn of_plan(plan: Plan, mut settings: Settings, pool: Arc<Pool>) -> Sweep {
-        if !settings.instructions.available() {
-            settings.instructions = Instructions::best();
-        }
+        let set = InstructionSet::new(settings.instructions).unwrap_or_else(InstructionSet::best);
+        settings.instructions = set.instructions();
         let threads = pool.threads();
         let workspace = match settings.precision {
-            Precision::Mixed => {
-                EitherPrecision::Mixed(Box::new(Workspace::new(&plan, settings.instructions, threads)))
-            }
-            Precision::Double => {
-                EitherPrecision::Double(Box::new(Workspace::new(&plan, settings.instructions, threads)))
-            }
+            Precision::Mixed => EitherPrecision::Mixed(Box::new(Workspace::new(&plan, set, threads))),
+            Precision::Double => EitherPrecision::Double(Box::new(Workspace::new(&plan, set, threads))),
         };
         let species_of_type = (0..plan.species.len() as i32).collect();
         Sweep {
             plan,
             settings,
+            set,
             pool,
             workspace,
             species_of_type,
@@ -229,11 +226,12 @@ impl Sweep {
             return Err(EngineError::Host("the force array is too short"));
         }
         let input = Input::new(particles, &[], v, &self.species_of_type, thermostat, want);
+        let set = self.set;
         let (plan, pool, times) = (&self.plan, &self.pool, &mut self.times);
         let out = ForceSink::new(force, add, particles.tag);
         let tally = with!(&mut self.workspace, m => {
             let mut since = Instant::now();
-            let (geometry, grid) = region(m, plan, pool, domain, &input)?;
+            let (geometry, grid) = region(set, plan, pool, domain, &input)?;
             m.sort_into_cells(pool, geometry, grid, &input)?;
             lap(&mut since, &mut times.sort);
             m.run_all(pool, plan, &input, out, times)?;
@@ -265,10 +263,11 @@ impl Sweep {
             return Err(EngineError::Host("not as many ghosts as it was said of whether they are images"));
         }
         let input = Input::new(particles, images, v, &self.species_of_type, thermostat, want);
+        let set = self.set;
         let (plan, pool, times) = (&self.plan, &self.pool, &mut self.times);
         with!(&mut self.workspace, m => {
             let mut since = Instant::now();
-            let (geometry, grid) = region(m, plan, pool, domain, &input)?;
+            let (geometry, grid) = region(set, plan, pool, domain, &input)?;
             m.sort_into_cells(pool, geometry, grid, &input)?;
             lap(&mut since, &mut times.sort);
             m.first(pool, plan, &input, times)?;
@@ -386,7 +385,7 @@ impl Sweep {
     /// The host's numbers of its particles in the order of cells: an order to keep them in that makes
     /// sorting cheap.
     pub fn order(&self) -> &[u32] {
-        with!(&self.workspace, m => &m.order)
+        with!(&self.workspace, m => m.order())
     }
 
     /// Bytes held in arrays over particles and pairs.
@@ -412,8 +411,8 @@ fn can_stretch(geometry: &BoxGeometry) -> bool {
 
 /// The region to be swept, and its cells: all of the box along its periodic directions, along the others what the
 /// particles span, with room for ghosts within reach of them.
-fn region<P: compiled::Compiled>(
-    workspace: &mut Workspace<P>,
+fn region(
+    set: InstructionSet,
     plan: &Plan,
     pool: &Pool,
     domain: &PeriodicBox,
@@ -423,7 +422,7 @@ fn region<P: compiled::Compiled>(
     let mut geometry = BoxGeometry::of_box(domain, plan.dimensions);
     if geometry.is_none_or(|geometry| !geometry.is_fully_periodic()) {
         let margin = if input.particles.owned < input.particles.x.len() { cutoff } else { 0.0 };
-        let (low, high) = workspace.extremes(pool, input)?;
+        let [low, high] = extremes(pool, set, input)?;
         let (low, high) = (low.map(|x| x - margin), high.map(|x| x + margin));
         geometry = match is_open(domain, plan) {
             true => Some(BoxGeometry::enclosing(low, high, plan.dimensions, cutoff)),

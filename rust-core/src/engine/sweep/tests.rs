@@ -1,5 +1,5 @@
 use super::*;
-use crate::engine::{Engine, Images, Newton};
+use crate::engine::{Engine, Images, Instructions, Newton};
 use crate::model::Model;
 use nalgebra::Matrix3;
 use std::num::NonZeroUsize;

@@ -1,5 +1,6 @@
 //! Where the time goes.
 
+use std::ops::AddAssign;
 use std::time::Instant;
 
 /// Seconds spent in the parts of evaluations, since the engine was made.
@@ -15,6 +16,16 @@ pub struct Times {
     pub second: f64,
     /// Forces to the host.
     pub forces: f64,
+}
+
+impl AddAssign for Times {
+    fn add_assign(&mut self, other: Times) {
+        self.sort += other.sort;
+        self.first += other.first;
+        self.excess += other.excess;
+        self.second += other.second;
+        self.forces += other.forces;
+    }
 }
 
 /// Adds the time since the last lap to `sum`.

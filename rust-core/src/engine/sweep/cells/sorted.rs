@@ -4,7 +4,7 @@ use super::ghosts::Ghosts;
 use crate::engine::sweep::ground::box_geometry::BoxGeometry;
 use crate::engine::sweep::ground::cell_grid::CellGrid;
 use crate::engine::sweep::ground::fixed_point::FixedPoint16;
-use crate::engine::sweep::ground::shared_ptr::SharedPtr;
+use crate::engine::sweep::ground::shared_slice::SharedSlice;
 
 /// Everything that the pair search reads.
 ///
@@ -18,9 +18,9 @@ pub struct SortedCells<'a> {
     /// The first particle of each cell, and one past the last; then the same for the copy of the first plane.
     pub start: &'a [u32],
     /// Positions from the origin of the box geometry.
-    pub x: [SharedPtr<f32>; 3],
+    pub x: [SharedSlice<'a, f32>; 3],
     /// The same in 16-bit fixed point.
-    pub fixed16: [SharedPtr<u16>; 3],
+    pub fixed16: [SharedSlice<'a, u16>; 3],
     pub fixed16_scale: FixedPoint16,
     pub ghosts: Ghosts<'a>,
 }

@@ -80,11 +80,18 @@ pub trait Arithmetic<I: Isa>: 'static {
         j_offsets: *const u32,
     ) -> [Self::Reals; 8];
 
-    /// The same of rows that follow each other.
+    /// The same of `count` rows that follow each other, at least one; lanes behind repeat the last.
     #[inline(always)]
-    unsafe fn load_transposed_in_order(records: *const Self::Scalar) -> [Self::Reals; 8] {
-        // SAFETY: the contract of `simd`.
-        unsafe { Self::load_transposed::<true>(records, IN_ORDER.as_ptr()) }
+    unsafe fn load_transposed_in_order(records: *const Self::Scalar, count: usize) -> [Self::Reals; 8] {
+        type W<I, A> = <<A as Arithmetic<I>>::Reals as Reals>::Words;
+        let mut offsets = [0; 16];
+        // SAFETY: `IN_ORDER` and `offsets` are no shorter than a vector, and offsets are of the rows that there are. Rows
+        // behind may be another thread's, who may be writing them.
+        unsafe {
+            let last = W::<I, Self>::splat(((count - 1) << OFFSET_BITS) as u32);
+            W::<I, Self>::load(IN_ORDER.as_ptr()).min(last).store(offsets.as_mut_ptr());
+            Self::load_transposed::<true>(records, offsets.as_ptr())
+        }
     }
 
     unsafe fn load_quad(p: *const Self::Scalar) -> I::Quad;

@@ -3,7 +3,7 @@
 use crate::engine::noise::PairNoise;
 use crate::engine::sweep::cells::ghosts::Ghosts;
 use crate::engine::sweep::ground::box_geometry::BoxGeometry;
-use crate::engine::sweep::ground::shared_ptr::SharedPtr;
+use crate::engine::sweep::ground::shared_slice::SharedSlice;
 use crate::engine::sweep::ground::terms::Terms;
 
 /// The particles in the order of cells and the terms that act between them.
@@ -14,9 +14,9 @@ pub struct PairInputs<'a, T, R> {
     /// The noise of this step and `dt^{−1/2}`, if the thermostat acts.
     pub thermostat: Option<(PairNoise, f64)>,
     /// Packed particles, and a vector of padding behind the last.
-    pub packed: SharedPtr<R>,
+    pub packed: SharedSlice<'a, R>,
     /// Species of the particles; empty with one species.
-    pub species: SharedPtr<u8>,
+    pub species: SharedSlice<'a, u8>,
     pub ghosts: Ghosts<'a>,
 }
 

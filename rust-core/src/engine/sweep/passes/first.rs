@@ -4,6 +4,7 @@
 use super::buffers::PairBuffers;
 use super::data::PassData;
 use crate::engine::sweep::ground::arithmetic::Arithmetic;
+use crate::engine::sweep::pair_batch::accumulators::PlaneSums;
 use crate::engine::sweep::pair_batch::batch::Batch;
 use crate::engine::sweep::pair_batch::evaluate::evaluate;
 use crate::engine::sweep::pair_batch::in_range_pairs::InRangePairs;
@@ -24,6 +25,7 @@ use crate::engine::tally::Tally;
 pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool>(
     data: &PassData<A::Scalar, A::PackedParticle>,
     plane: usize,
+    sums: PlaneSums,
     buffers: &mut PairBuffers<A::Scalar>,
     in_range: &mut InRangePairs<A::Scalar>,
 ) -> Tally {
@@ -61,7 +63,7 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, con
                 while slot < count {
                     let slots = [slot, count.min(slot + lanes)];
                     do_batch::<I, A, MULTISPECIES, TALLY>(
-                        data, &constants, plane, buffers, in_range, slots, &mut tally,
+                        data, &constants, sums, buffers, in_range, slots, &mut tally,
                     );
                     slot = slots[1];
                 }
@@ -81,7 +83,7 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, con
 unsafe fn do_batch<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool>(
     data: &PassData<A::Scalar, A::PackedParticle>,
     constants: &StepConstants<I, A>,
-    plane: usize,
+    sums: PlaneSums,
     buffers: &mut PairBuffers<A::Scalar>,
     in_range: &mut InRangePairs<A::Scalar>,
     slots: [usize; 2],
@@ -90,7 +92,8 @@ unsafe fn do_batch<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TAL
     // SAFETY: `packed` has a vector of padding behind the last particle (`sort::make_room`); `reserve` makes room for the
     // batch; the caller upholds the rest.
     unsafe {
-        let PassData { inputs, accumulators, .. } = data;
+        let inputs = &data.inputs;
+        let variables = inputs.terms.variables();
         let Some(batch) = Batch::of_group(&buffers.search, slots) else { return };
         let buffers = &mut buffers.batch;
         buffers.reserve(batch.count);
@@ -98,11 +101,11 @@ unsafe fn do_batch<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TAL
         evaluate::<I, A, MULTISPECIES, TALLY>(inputs, constants, buffers, in_range, batch, tally);
         // Forces first: the quads of weights replace theirs.
         if !(MULTISPECIES && inputs.caches_all_pairs()) {
-            scatter_forces::<I, A>(accumulators, plane, buffers, batch);
+            scatter_forces::<I, A>(sums, variables, buffers, batch);
             in_range.add::<TALLY>(&buffers.found, batch);
         }
-        if accumulators.variables > 1 {
-            scatter_weights::<I, A, MULTISPECIES>(inputs, accumulators, plane, buffers, batch);
+        if variables > 1 {
+            scatter_weights::<I, A, MULTISPECIES>(inputs, sums, buffers, batch);
         }
     }
 }

@@ -4,6 +4,7 @@
 use super::data::PassData;
 use super::second_cached::second_pass_cached;
 use crate::engine::sweep::ground::arithmetic::Arithmetic;
+use crate::engine::sweep::pair_batch::accumulators::PlaneSums;
 use crate::engine::sweep::pair_batch::in_range_pairs::{I_CODE_BITS, InRangePairs};
 use crate::engine::sweep::pair_batch::scatter::add_quad;
 use crate::engine::sweep::simd::{Isa, OFFSET_BITS, Quad, Scalar};
@@ -46,7 +47,7 @@ impl ISums {
     }
 }
 
-/// Does the second pass over `plane`, and adds to the virial with `TALLY`.
+/// Does the second pass over the plane of `sums`, and adds to the virial with `TALLY`.
 ///
 /// # Safety
 /// As [`first_pass`](super::first::first_pass), which has filled `in_range` with the same `TALLY`. The slopes of the plane
@@ -54,7 +55,7 @@ impl ISums {
 #[inline(always)]
 pub unsafe fn second_pass<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool>(
     data: &PassData<A::Scalar, A::PackedParticle>,
-    plane: usize,
+    sums: PlaneSums,
     in_range: &InRangePairs<A::Scalar>,
     virial: &mut [f64; 6],
 ) {
@@ -62,21 +63,16 @@ pub unsafe fn second_pass<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, co
     // one, which have accumulators, slopes and species; the caller upholds the rest.
     unsafe {
         if MULTISPECIES && data.inputs.caches_all_pairs() {
-            return second_pass_cached::<I, A, MULTISPECIES, TALLY>(
-                data,
-                plane,
-                &in_range.full_cache,
-                virial,
-            );
+            return second_pass_cached::<I, A, MULTISPECIES, TALLY>(data, sums, &in_range.full_cache, virial);
         }
-        let to = data.accumulators.forces(plane);
+        let to = sums.forces();
         let plane_first = in_range.plane_first as usize;
-        let to_plane = to.base.add(4 * plane_first);
+        let to_plane = to.at(plane_first << OFFSET_BITS);
         let species = data.inputs.terms.species;
         let species_j = data.inputs.species.as_ptr().wrapping_add(plane_first);
         let passes = in_range.weight_gradients.len();
         let width = passes * species;
-        let mut sums = ISums([[[0.0; 4]; TURNS]; 16]);
+        let mut i_sums = ISums([[[0.0; 4]; TURNS]; 16]);
         let mut done = vec![0; passes];
         let mut b = 0;
         while b < in_range.batches.len() {
@@ -106,7 +102,7 @@ pub unsafe fn second_pass<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, co
                     let force = A::load_quad(gradient).mul(I::Quad::splat(slope));
                     let at = to_plane.add(4 * j);
                     I::Quad::load(at).sub(force).store(at);
-                    let at = sums.at(m, p);
+                    let at = i_sums.at(m, p);
                     I::Quad::load(at).add(force).store(at);
                     if TALLY {
                         add_dyad(*separations.add(p), *gradients.add(p), slope, virial);
@@ -118,7 +114,7 @@ pub unsafe fn second_pass<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, co
             }
             let mut m = 0;
             while m < members {
-                add_quad(to.at((first + m) << OFFSET_BITS), sums.take::<I::Quad>(m));
+                add_quad(to.at((first + m) << OFFSET_BITS), i_sums.take::<I::Quad>(m));
                 m += 1;
             }
             b += 1;

@@ -4,7 +4,7 @@ use super::data::PassData;
 use super::slopes::SLOPES_PER_BLOCK;
 use crate::engine::sweep::ground::arithmetic::Arithmetic;
 use crate::engine::sweep::ground::species_pairs::table_entry;
-use crate::engine::sweep::pair_batch::accumulators::Accumulator;
+use crate::engine::sweep::pair_batch::accumulators::{Accumulator, PlaneSums};
 use crate::engine::sweep::pair_batch::buffers::CacheLines;
 use crate::engine::sweep::pair_batch::full_pair_cache::{
     CachedBatch, FORCE, FullPairCache, I_CODE_BITS, SEPARATION, WEIGHT_GRADIENT,
@@ -14,27 +14,27 @@ use crate::engine::sweep::pair_batch::scatter::{ScatterPairs, scatter_quads};
 use crate::engine::sweep::simd::{Isa, Reals, Words};
 use crate::model::kernel::Real;
 
-/// Does the second pass over `plane`, and adds to the virial with `TALLY`.
+/// Does the second pass over the plane of `sums`, and adds to the virial with `TALLY`.
 ///
 /// # Safety
 /// As [`second_pass`](super::second::second_pass).
 #[inline(always)]
 pub unsafe fn second_pass_cached<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool>(
     data: &PassData<A::Scalar, A::PackedParticle>,
-    plane: usize,
+    sums: PlaneSums,
     cache: &FullPairCache<A::Scalar>,
     virial: &mut [f64; 6],
 ) {
     // SAFETY: work space has room for whole vectors of the largest batch, and a quad behind; the caller upholds the rest.
     unsafe {
-        let to = data.accumulators.forces(plane);
+        let to = sums.forces();
         let room = cache.most / 16 + 2;
         let mut quads: Vec<CacheLines<A::Scalar>> = vec![CacheLines::default(); room];
         let mut running: Vec<Accumulator> = vec![Accumulator::default(); 8 * room];
         let mut factors: Vec<CacheLines<A::Scalar>> = vec![CacheLines::default(); room];
         let quads = quads.as_mut_ptr().cast::<A::Scalar>();
         let factors = factors.as_mut_ptr().cast::<A::Scalar>();
-        let variables = data.accumulators.variables;
+        let variables = data.inputs.terms.variables();
         for batch in &cache.batches {
             let count = batch.begin[batch.members as usize] as usize;
             let pairs = CachedPairs { cache, batch, vectors: count.div_ceil(A::Reals::LANES) };
@@ -116,16 +116,16 @@ unsafe fn find_factors<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const
     first: usize,
     factors: *mut A::Scalar,
 ) {
-    // SAFETY: packed slopes have a vector of padding behind the last particle (`prepare_excess`); the caller upholds the
-    // rest.
+    // SAFETY: there are slopes of every particle of the plane and of the next one; the caller upholds the rest.
     unsafe {
         let zero = A::Reals::constant(0.0);
         let terms = data.inputs.terms;
         let species = terms.species;
-        let count = N.min(data.accumulators.variables - first);
+        let count = N.min(data.inputs.terms.variables() - first);
         let slopes = data.slopes.packed.at(first / SLOPES_PER_BLOCK * data.slopes.stride).cast_const();
         let mut i_slopes = ISlopes([[A::Scalar::default(); 16]; SLOPES_PER_BLOCK]);
-        let own = A::load_transposed_in_order(slopes.add(SLOPES_PER_BLOCK * pairs.batch.first as usize));
+        let own_slopes = slopes.add(SLOPES_PER_BLOCK * pairs.batch.first as usize);
+        let own = A::load_transposed_in_order(own_slopes, pairs.batch.members as usize);
         let fits_vector = species * species <= A::Reals::LANES;
         let none = SlopeFactor { weight_gradient: std::ptr::null(), is_species: [std::ptr::null(); 2] };
         let mut of = [none; SLOPES_PER_BLOCK];
