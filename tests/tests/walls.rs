@@ -15,9 +15,11 @@ const CORE: &[&[&str]] = &[
     &["theory"],
     // What the engine stands on.
     &[
+        "engine::counts",
         "engine::domain",
         "engine::error",
         "engine::images",
+        "engine::instruction_set",
         "engine::noise",
         "engine::particles",
         "engine::settings",

@@ -3,20 +3,23 @@
 mod accumulators;
 mod cell_order;
 mod excess;
+mod fluid_constants;
 mod forces;
 mod host;
+mod input;
 mod scheduler;
+mod shared_particles;
 mod slopes;
 mod sorted_particles;
 mod thread_slab;
 
 pub use cell_order::extremes;
 pub use forces::ForceSink;
+pub use input::Input;
 
 use crate::engine::error::EngineError;
 use crate::engine::instruction_set::InstructionSet;
 use crate::engine::noise::PairNoise;
-use crate::engine::particles::Particles;
 use crate::engine::plan::Plan;
 use crate::engine::sweep::cells::ghosts::Ghosts;
 use crate::engine::sweep::cells::sorted::SortedCells;
@@ -29,18 +32,16 @@ use crate::engine::sweep::passes::slopes::PassSlopes;
 use crate::engine::sweep::passes::{PairPrecision, Passes};
 use crate::engine::sweep::pool::Pool;
 use crate::engine::sweep::times::Times;
-use crate::engine::tally::Want;
 use accumulators::Accumulators;
 use cell_order::CellOrder;
 use excess::ExcessInput;
+use fluid_constants::FluidConstants;
 use scheduler::{PassInput, Scheduler, thread_slabs};
+use shared_particles::SharedParticles;
 use slopes::Slopes;
-use sorted_particles::{SharedParticles, SortedParticles};
+use sorted_particles::SortedParticles;
 use std::ops::Range;
 use thread_slab::{PlaneResults, ThreadSlab, ThreadState};
-
-/// Room behind the last particle: what whole vectors may read.
-const VECTOR_PADDING: usize = 16;
 
 /// Arrays in the order of cells, and what goes through them.
 pub struct Workspace<P: PairPrecision> {
@@ -54,60 +55,6 @@ pub struct Workspace<P: PairPrecision> {
     /// Of the present evaluation.
     thermostat: Option<(PairNoise, f64)>,
     totals: bool,
-}
-
-/// What stays the same for one fluid.
-pub struct FluidConstants<T> {
-    pub set: InstructionSet,
-    pub terms: Terms<T>,
-    /// Which variables of ψ the many-body passes sum.
-    pub variables: Vec<usize>,
-}
-
-impl<T> FluidConstants<T> {
-    /// Numbers that a many-body pair needs of each particle.
-    pub fn width(&self) -> usize {
-        self.variables.len()
-    }
-}
-
-/// What the host hands over.
-pub struct Input<'a> {
-    pub particles: Particles<'a>,
-    /// Whether each ghost is an image of a particle that is there too; empty if none is.
-    pub images: &'a [bool],
-    /// Empty if nothing drags.
-    pub v: &'a [[f64; 3]],
-    /// Species of each type of particle; negative for those that take no part.
-    pub species_of_type: &'a [i32],
-    pub thermostat: Option<(PairNoise, f64)>,
-    pub totals: bool,
-}
-
-impl<'a> Input<'a> {
-    pub fn new(
-        particles: &Particles<'a>,
-        images: &'a [bool],
-        v: &'a [[f64; 3]],
-        species_of_type: &'a [i32],
-        thermostat: Option<(PairNoise, f64)>,
-        want: Want,
-    ) -> Input<'a> {
-        Input {
-            particles: *particles,
-            images,
-            v,
-            species_of_type,
-            thermostat,
-            totals: want.energy || want.virial,
-        }
-    }
-
-    /// The species of a particle, unless its type is unknown.
-    #[inline(always)]
-    fn species_of(&self, k: usize) -> Option<i32> {
-        self.species_of_type.get(self.particles.kind[k] as usize).copied()
-    }
 }
 
 impl<P: PairPrecision> Workspace<P> {

@@ -6,10 +6,13 @@ use crate::engine::sweep::ground::cell_grid::CellGrid;
 use crate::engine::sweep::ground::fixed_point::FixedPoint16;
 use crate::engine::sweep::ground::shared_slice::SharedSlice;
 
+/// Elements behind the last particle that whole vectors may read.
+pub const VECTOR_PADDING: usize = 16;
+
 /// Everything that the pair search reads.
 ///
 /// If the plane axis is periodic, copies of the particles of the first plane, moved by one period, follow the last
-/// particle: they are the next plane of the last one. `workspace::sort` pads all arrays behind the last particle, so
+/// particle: they are the next plane of the last one. `SortedParticles::make_room` pads all arrays behind the last particle, so
 /// that whole vectors may be read there.
 #[derive(Clone, Copy)]
 pub struct SortedCells<'a> {

@@ -1,6 +1,7 @@
 //! Mixed and double precision: the packed particle, and the geometry of pairs computed from it.
 
 use super::box_geometry::BoxGeometry;
+use super::fixed_point::TWO_TO_32;
 use super::species_pairs::SpeciesPair;
 use crate::engine::sweep::simd::{Isa, OFFSET_BITS, Reals, Scalar, Words};
 use crate::model::kernel::Real;
@@ -151,8 +152,6 @@ const TINY: f64 = 1e-30;
 
 /// Thirty-two times the place of records that follow each other.
 const IN_ORDER: [u32; 16] = [0, 32, 64, 96, 128, 160, 192, 224, 256, 288, 320, 352, 384, 416, 448, 480];
-
-const TWO_TO_32: f64 = 4_294_967_296.0;
 
 /// Lengths of the box geometry, and how it leans, over 2³².
 #[derive(Clone, Copy)]

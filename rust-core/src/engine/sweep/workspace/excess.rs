@@ -2,7 +2,8 @@
 
 use super::accumulators::Added;
 use super::cell_order::CellOrder;
-use super::{FluidConstants, Input};
+use super::fluid_constants::FluidConstants;
+use super::input::Input;
 use crate::engine::error::EngineError;
 use crate::engine::excess::ExcessPlan;
 use crate::engine::excess_pass::{ExcessPass, LANES, Rows};

@@ -15,11 +15,13 @@
 use super::accumulators::{SlabSums, Sums};
 use super::cell_order::CellOrder;
 use super::excess::{DENSITY_BLOCK, DensityBlock, ExcessInput};
+use super::fluid_constants::FluidConstants;
 use super::forces::ForceSink;
+use super::input::Input;
+use super::shared_particles::SharedParticles;
 use super::slopes::SharedSlopes;
-use super::sorted_particles::SharedParticles;
 use super::thread_slab::ThreadSlab;
-use super::{FluidConstants, Input, VECTOR_PADDING};
+use crate::engine::sweep::cells::sorted::VECTOR_PADDING;
 use crate::engine::sweep::pair_batch::accumulators::{Accumulator, PlaneSums};
 use crate::engine::sweep::passes::data::PassData;
 use crate::engine::sweep::passes::{PairPrecision, Passes};
@@ -296,6 +298,7 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         // SAFETY: an order has each particle once, those of this plane here; the plane is of this thread's slab alone.
         let lost =
             unsafe { out.write(self.fluid.set, &self.order.order[particles], self.order.owned, added) };
+        slab.state.planes_written += 1;
         slab.state.lost = slab.state.lost.into_iter().chain(lost).min();
     }
 }

@@ -1,7 +1,7 @@
 //! The slopes of ψ, as the second pass reads them.
 
-use super::VECTOR_PADDING;
 use super::cell_order::CellOrder;
+use crate::engine::sweep::cells::sorted::VECTOR_PADDING;
 use crate::engine::sweep::ground::shared_slice::SharedSlice;
 use crate::engine::sweep::passes::slopes::SLOPES_PER_BLOCK;
 use crate::engine::sweep::simd::Scalar;

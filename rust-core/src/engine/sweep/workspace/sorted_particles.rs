@@ -3,9 +3,11 @@
 mod fill;
 
 use super::cell_order::CellOrder;
-use super::{Input, VECTOR_PADDING};
+use super::input::Input;
+use super::shared_particles::SharedParticles;
 use crate::engine::instruction_set::InstructionSet;
 use crate::engine::sweep::cells::ghosts::OwnedOfColumn;
+use crate::engine::sweep::cells::sorted::VECTOR_PADDING;
 use crate::engine::sweep::ground::arithmetic::PackedParticle;
 use crate::engine::sweep::ground::fixed_point::FixedPoint16;
 use crate::engine::sweep::ground::shared_slice::SharedSlice;
@@ -27,18 +29,6 @@ pub struct SortedParticles<R> {
     pub ghost: Vec<bool>,
     owned_bits: Vec<u8>,
     owned_of_column: Vec<OwnedOfColumn>,
-}
-
-/// The same for the time of the passes: threads fill the places of their own slabs, and read there and one plane behind.
-pub struct SharedParticles<'a, R> {
-    pub x: [SharedSlice<'a, f32>; 3],
-    pub fixed16_scale: FixedPoint16,
-    pub fixed16: [SharedSlice<'a, u16>; 3],
-    pub packed: SharedSlice<'a, R>,
-    pub species: SharedSlice<'a, u8>,
-    pub ghost: &'a [bool],
-    pub owned_bits: &'a [u8],
-    pub owned_of_column: &'a [OwnedOfColumn],
 }
 
 impl<R: PackedParticle> SortedParticles<R> {

@@ -1,4 +1,3 @@
-use super::cell_order::TWO_TO_32;
 use super::*;
 use crate::engine::domain::PeriodicBox;
 use crate::engine::noise::threefry2x32;
@@ -6,6 +5,7 @@ use crate::engine::particles::Particles;
 use crate::engine::plan::Plan;
 use crate::engine::settings::Instructions;
 use crate::engine::sweep::ground::arithmetic::{Double, Mixed};
+use crate::engine::sweep::ground::fixed_point::TWO_TO_32;
 use crate::engine::sweep::pool::part;
 use crate::model::Model;
 use nalgebra::Matrix3;

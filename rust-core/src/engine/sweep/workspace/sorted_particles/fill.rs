@@ -1,11 +1,12 @@
 //! Arrays in the order of cells, from the host's.
 
-use super::SharedParticles;
+use crate::engine::sweep::cells::sorted::VECTOR_PADDING;
 use crate::engine::sweep::ground::arithmetic::PackedParticle;
 use crate::engine::sweep::ground::box_geometry::BoxGeometry;
-use crate::engine::sweep::ground::fixed_point::FixedPoint16;
-use crate::engine::sweep::workspace::cell_order::{CellOrder, TWO_TO_32};
-use crate::engine::sweep::workspace::{Input, VECTOR_PADDING};
+use crate::engine::sweep::ground::fixed_point::{FixedPoint16, TWO_TO_32};
+use crate::engine::sweep::workspace::cell_order::CellOrder;
+use crate::engine::sweep::workspace::input::Input;
+use crate::engine::sweep::workspace::shared_particles::SharedParticles;
 use crate::engine::vectors::Loop;
 use std::ops::Range;
 
