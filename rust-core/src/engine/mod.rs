@@ -29,9 +29,11 @@ mod particles;
 mod path;
 mod plan;
 pub mod reference;
+mod settings;
 mod surroundings;
 mod sweep;
 mod tally;
+mod vectors;
 
 pub use counts::PassCounts;
 pub use domain::{DomainError, PeriodicBox};
@@ -41,8 +43,9 @@ pub use images::Images;
 pub use particles::{Particles, Step};
 pub use path::{Path, Reason};
 pub use plan::Plan;
+pub use settings::{Instructions, Precision, Settings};
 pub use surroundings::{Around, Newton, PairsOfHost, Surroundings};
-pub use sweep::{Instructions, Pool, Precision, Settings, Sweep, Times, part};
+pub use sweep::{Pool, Sweep, Times, part};
 pub use tally::{Tally, Want};
 
 #[cfg(test)]
