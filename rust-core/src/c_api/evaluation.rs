@@ -11,7 +11,7 @@ use nalgebra::{Matrix3, Vector3};
 /// A box: a corner, the three edges from there, and which of them are periods.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
-pub struct Box {
+pub struct Domain {
     /// The corner.
     pub origin: [f64; 3],
     /// The edges: x, y, z of the first, of the second, of the third. The first should be along x and the second in the
@@ -51,7 +51,7 @@ pub struct Pairs {
     pub factor: *const f64,
 }
 
-impl Box {
+impl Domain {
     fn domain(&self) -> Result<PeriodicBox, Failure> {
         let [a, b, c] = [0, 3, 6].map(|k| Vector3::from_column_slice(&self.edges[k..k + 3]));
         let mut periodic = [false; 3];
@@ -118,7 +118,7 @@ impl Request {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn psidpd_engine_evaluate(
     engine: *mut Engine,
-    r#box: *const Box,
+    r#box: *const Domain,
     request: *const Request,
     force: *mut f64,
     tally: *mut Tally,
@@ -169,7 +169,7 @@ pub unsafe extern "C" fn psidpd_engine_evaluate(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn psidpd_engine_first(
     engine: *mut Engine,
-    r#box: *const Box,
+    r#box: *const Domain,
     image: *const i32,
     newton: i32,
     request: *const Request,

@@ -157,6 +157,15 @@ impl Engine {
         }
     }
 
+    /// A path for people, with what it computes by: "cell sweep, mixed precision, avx2, 2 threads".
+    pub fn describe(&self, path: Path) -> String {
+        let Settings { precision, instructions, threads } = self.settings();
+        match path {
+            Path::Sweep => format!("{path}, {precision} precision, {instructions}, {threads} thread(s)"),
+            Path::Reference(_) => format!("{path}; double precision, 1 thread"),
+        }
+    }
+
     /// Whether forces need every density of the model.
     fn sweep_has_all_densities(&self) -> bool {
         let plan = self.plan();
@@ -302,8 +311,9 @@ impl Engine {
         }
     }
 
-    /// Sums the densities of the last evaluation that it did not want, for `particles` that have not moved since.
-    /// Forces, slopes and the paths of later evaluations are what they are without.
+    /// Every density of the model in the last evaluation, for `particles` that have not moved since: sums those that it
+    /// did not want. Before the first evaluation they are zero. Forces, slopes and the paths of later evaluations are
+    /// what they are without.
     ///
     /// # Errors
     /// As [`Engine::first`].
@@ -312,6 +322,7 @@ impl Engine {
         surroundings: Surroundings,
         particles: &Particles,
     ) -> Result<&[f64], EngineError> {
+        let variables = self.plan().densities().count() * self.plan().species().len();
         match self.path {
             // The pairs are there still.
             Some(Path::Reference(_)) => self.reference.sum_all_densities(None),
@@ -320,7 +331,11 @@ impl Engine {
                 self.sweep.local_densities(&mut self.excess, &mut self.densities);
                 Ok(&self.densities)
             }
-            _ => {
+            None => {
+                self.densities.resize(particles.owned * variables, 0.0);
+                Ok(&self.densities)
+            }
+            Some(Path::Sweep) => {
                 let all = self.reference.sum_all_densities(Some((surroundings, particles)))?;
                 self.densities.extend_from_slice(all);
                 Ok(&self.densities)
@@ -330,14 +345,14 @@ impl Engine {
 
     /// ψ of owned particles in the last evaluation, without the terms that act as pair potentials.
     pub fn excess(&mut self) -> &[f64] {
-        if let Some(Path::Reference(_)) = self.path {
-            return self.reference.excess();
+        match self.path {
+            Some(Path::Reference(_)) => self.reference.excess(),
+            Some(Path::Sweep) if self.excess.is_empty() => {
+                self.sweep.local_densities(&mut self.excess, &mut Vec::new());
+                &self.excess
+            }
+            _ => &self.excess,
         }
-        if self.excess.is_empty() {
-            let mut densities = Vec::new();
-            self.sweep.local_densities(&mut self.excess, &mut densities);
-        }
-        &self.excess
     }
 
     /// Energy of each particle and ghost, if the last evaluation wanted it: its ψ and half of its pair energies.
