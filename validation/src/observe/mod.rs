@@ -10,6 +10,7 @@ pub mod frame;
 pub mod interactions;
 pub mod keys;
 pub mod landscape;
+mod least_squares;
 pub mod meter;
 pub mod observation;
 pub mod observers;
