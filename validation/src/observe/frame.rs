@@ -1,8 +1,7 @@
 //! One configuration as the observables see it: what several of them need is computed once.
 
-use super::interactions::Interactions;
-use super::landscape::Landscape;
 use crate::run::Simulation;
+use psidpd_core::engine::reference::{Evaluation, Evaluator};
 use std::cell::OnceCell;
 
 /// A configuration of a simulation.
@@ -11,26 +10,25 @@ pub struct Frame<'a> {
     pub simulation: &'a Simulation,
     /// Time since the start of the run.
     pub time: f64,
-    interactions: &'a Interactions,
-    landscape: OnceCell<Landscape>,
+    evaluator: &'a Evaluator,
+    evaluation: OnceCell<Evaluation>,
 }
 
 impl<'a> Frame<'a> {
-    /// The present configuration of `simulation`, whose fluid is that of `interactions`.
-    pub fn new(simulation: &'a Simulation, interactions: &'a Interactions, time: f64) -> Frame<'a> {
-        Frame { simulation, time, interactions, landscape: OnceCell::new() }
+    /// The present configuration of `simulation`, whose fluid is that of `evaluator`.
+    pub fn new(simulation: &'a Simulation, evaluator: &'a Evaluator, time: f64) -> Frame<'a> {
+        Frame { simulation, time, evaluator, evaluation: OnceCell::new() }
     }
 
-    /// The fluid.
-    pub fn interactions(&self) -> &'a Interactions {
-        self.interactions
+    /// What evaluates its fluid.
+    pub fn evaluator(&self) -> &'a Evaluator {
+        self.evaluator
     }
 
     /// Energies and conservative forces.
-    pub fn landscape(&self) -> &Landscape {
+    pub fn evaluation(&self) -> &Evaluation {
         let s = self.simulation;
-        self.landscape
-            .get_or_init(|| Landscape::new(self.interactions, s.positions(), s.species(), s.domain()))
+        self.evaluation.get_or_init(|| self.evaluator.evaluate(s.positions(), s.species(), s.domain()))
     }
 
     /// The mass of a particle.

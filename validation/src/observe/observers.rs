@@ -1,12 +1,12 @@
 //! The observables of a run on its way.
 
 use super::frame::Frame;
-use super::interactions::Interactions;
 use super::meter::AnyMeter;
 use super::observation::Observation;
 use crate::run::Simulation;
 use crate::scene::Scene;
 use psidpd_core::engine::Want;
+use psidpd_core::engine::reference::Evaluator;
 use serde::{Deserialize, Serialize};
 
 /// The observables that a scene asks for, with what they have seen so far.
@@ -20,7 +20,7 @@ pub struct Observers {
     /// The step before its first.
     start: u64,
     #[serde(skip)]
-    fluid: Option<(f64, Interactions)>,
+    fluid: Option<(f64, Evaluator)>,
 }
 
 /// One observable.
@@ -108,7 +108,7 @@ impl Observers {
         if self.fluid.as_ref().is_none_or(|(kt, _)| *kt != simulation.kt()) {
             // The scene has tried every temperature of its stages.
             let fluid = simulation.model().at(simulation.kt()).ok();
-            let fluid = fluid.and_then(|fluid| Interactions::new(fluid).ok());
+            let fluid = fluid.and_then(|fluid| Evaluator::new(fluid).ok());
             self.fluid = fluid.map(|fluid| (simulation.kt(), fluid));
         }
         let frame = self.fluid.as_ref().map(|(_, fluid)| Frame::new(simulation, fluid, time));

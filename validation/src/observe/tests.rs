@@ -7,6 +7,7 @@ use crate::run::Simulation;
 use crate::scene::Scene;
 use psidpd_core::document::FileError;
 use psidpd_core::engine::Want;
+use psidpd_core::engine::reference::Evaluator;
 use std::path::Path;
 
 pub(super) const SET6: &str = include_str!("../../models/warren2003-set6.toml");
@@ -159,10 +160,10 @@ fn a_liquid_in_equilibrium() {
     assert!((parts - energy.scalar("total").unwrap().value).abs() < 1e-10);
     // One frame against the engine.
     simulation.prepare(0.01, Want::TOTALS).unwrap();
-    let fluid = interactions::Interactions::new(simulation.model().at(1.0).unwrap()).unwrap();
+    let fluid = Evaluator::new(simulation.model().at(1.0).unwrap()).unwrap();
     let frame = frame::Frame::new(&simulation, &fluid, 0.0);
-    assert!((frame.landscape().energy() - simulation.potential_energy()).abs() < 1e-9);
-    for (a, b) in frame.landscape().virial().iter().zip(simulation.tally().virial) {
+    assert!((frame.evaluation().energy - simulation.potential_energy()).abs() < 1e-9);
+    for (a, b) in frame.evaluation().virial.iter().zip(simulation.tally().virial) {
         assert!((a - b).abs() < 1e-8);
     }
 }

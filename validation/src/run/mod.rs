@@ -11,7 +11,6 @@ pub mod checkpoint;
 mod dump;
 mod error;
 mod folder;
-mod forces;
 mod growing;
 pub mod integrator;
 mod output;

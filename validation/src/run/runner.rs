@@ -200,6 +200,11 @@ impl<'a> Runner<'a> {
         self.run.simulation.set_settings(Settings { threads, ..settings })
     }
 
+    /// How forces are computed, for people: see [`Simulation::evaluation`].
+    pub fn evaluation(&self) -> String {
+        self.run.simulation.evaluation()
+    }
+
     /// How many particles there are.
     pub fn particles(&self) -> usize {
         self.run.simulation.len()

@@ -4,12 +4,12 @@ use super::rdf::shell_volume;
 use crate::observe::frame::Frame;
 use crate::observe::keys::{Key, Table};
 use crate::observe::observation::{Kind, Observation};
-use crate::observe::pairs::Pair;
 use crate::observe::profile::flank_interface;
 use crate::observe::request::Options;
 use crate::observe::series::{Measured, Series};
 use psidpd_core::document::FileError;
 use psidpd_core::engine::PeriodicBox;
+use psidpd_core::engine::reference::Pair;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
@@ -237,8 +237,8 @@ impl Meter for Drop {
             sums[2] += m * (square - radial * radial) / rest / volume;
         }
         let (thickness, bins) = (self.thickness(), self.bins);
-        for (pair, force) in frame.landscape().forces() {
-            share(pair, at[pair.i], thickness, bins, |shell, length, normal| {
+        for (pair, force) in frame.evaluation().pair_forces() {
+            share(&pair, at[pair.i], thickness, bins, |shell, length, normal| {
                 let volume = self.volume(shell);
                 row[shell * WIDTH + 3] += force * normal / volume;
                 row[shell * WIDTH + 4] += force * (length - normal) / rest / volume;

@@ -3,10 +3,10 @@ use super::species_pairs::SpeciesPairs;
 use crate::observe::frame::Frame;
 use crate::observe::keys::{Key, Table};
 use crate::observe::observation::{Kind, Observation};
-use crate::observe::pairs::for_each_pair;
 use crate::observe::request::Options;
 use crate::observe::series::Series;
 use psidpd_core::document::FileError;
+use psidpd_core::engine::reference::for_each_pair;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 

@@ -36,7 +36,7 @@ impl StressProfile {
                 sums[bin * WIDTH + 1] += m * (square - n * n) / rest / volume;
             }
         }
-        for (pair, force) in frame.landscape().forces() {
+        for (pair, force) in frame.evaluation().pair_forces() {
             let n = along(pair.d);
             let normal = force * n * n / pair.r / volume;
             let tangential = force * (pair.r * pair.r - n * n) / pair.r / rest / volume;

@@ -201,10 +201,10 @@ impl Meter for StructureFactor {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::observe::interactions::Interactions;
     use crate::observe::meter::AnyMeter;
     use crate::observe::tests::{IDEAL, scene};
     use crate::run::Simulation;
+    use psidpd_core::engine::reference::Evaluator;
 
     /// A simple cubic lattice of 5³ in a box of 5³: S = N at multiples of 2π, 0 elsewhere.
     #[test]
@@ -214,7 +214,7 @@ mod tests {
         let observe = observe.replace("2000", "1000");
         let scene = scene(IDEAL, "[5.0, 5.0, 5.0]", 1.0, 10, &observe).unwrap();
         let simulation = Simulation::new(&scene.model, 1.0, scene.initial_state(), 1).unwrap();
-        let fluid = Interactions::new(simulation.model().at(1.0).unwrap()).unwrap();
+        let fluid = Evaluator::new(simulation.model().at(1.0).unwrap()).unwrap();
         let AnyMeter::StructureFactor(mut meter) = scene.observe.requests[0].meter.clone() else { panic!() };
         assert!(meter.sample(&Frame::new(&simulation, &fluid, 0.0)));
         let out = &meter.finish()[0];

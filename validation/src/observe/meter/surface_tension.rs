@@ -2,7 +2,6 @@ use super::Meter;
 use super::across::Across;
 use crate::observe::frame::Frame;
 use crate::observe::keys::{AXIS, Key, Table};
-use crate::observe::landscape::Landscape;
 use crate::observe::observation::{Kind, Observation};
 use crate::observe::request::Options;
 use crate::observe::series::Series;
@@ -44,7 +43,7 @@ fn stretched_energy(frame: &Frame, axis: usize, change: f64) -> f64 {
     let Ok(stretched) = PeriodicBox::new(domain.origin(), edges, domain.periodic()) else { return f64::NAN };
     let x: Vec<[f64; 3]> =
         simulation.positions().iter().map(|x| stretched.point(domain.fraction(*x))).collect();
-    Landscape::new(frame.interactions(), &x, simulation.species(), &stretched).energy()
+    frame.evaluator().evaluate(&x, simulation.species(), &stretched).energy
 }
 
 impl Meter for SurfaceTension {
@@ -110,7 +109,7 @@ impl Meter for SurfaceTension {
             let difference = p[axis] - others / (self.dimensions - 1) as f64;
             self.across.height / self.interfaces * difference
         };
-        let energy = frame.landscape().energy();
+        let energy = frame.evaluation().energy;
         let weight = |change: f64| (-(stretched_energy(frame, axis, change) - energy) / self.kt).exp();
         let sample = [
             tension(simulation.conservative_pressure_tensor()),
@@ -143,9 +142,9 @@ impl Meter for SurfaceTension {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::observe::interactions::Interactions;
     use crate::observe::tests::{SET6, scene};
     use crate::run::Simulation;
+    use psidpd_core::engine::reference::Evaluator;
 
     /// On a slab whose faces point any way: half the difference of the energies over the change of the
     /// area is the virial part of the stress tension, to second order in the perturbation.
@@ -157,9 +156,9 @@ mod tests {
         for _ in 0..50 {
             simulation.step(0.01, scene.stages[0].integrator, Want::TOTALS).unwrap();
         }
-        let fluid = Interactions::new(simulation.model().at(1.0).unwrap()).unwrap();
+        let fluid = Evaluator::new(simulation.model().at(1.0).unwrap()).unwrap();
         let frame = Frame::new(&simulation, &fluid, 0.0);
-        let virial = frame.landscape().virial();
+        let virial = frame.evaluation().virial;
         for axis in 0..3 {
             let others: f64 = (0..3).filter(|c| *c != axis).map(|c| virial[c]).sum();
             // dU/d ln A, from ∂U/∂ε_cc = −W_cc.
