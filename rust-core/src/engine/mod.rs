@@ -27,6 +27,7 @@ pub mod reference;
 mod search;
 mod sweep;
 mod tally;
+pub mod thermostat;
 
 pub use domain::{DomainError, PeriodicBox};
 pub use error::EngineError;

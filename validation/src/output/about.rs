@@ -1,7 +1,6 @@
 //! `about.json`: what was run, and what the columns of its series are.
 
 use super::OutputError;
-use crate::run::Integrator;
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -118,10 +117,7 @@ impl About {
                 dt: s.dt,
                 kt: s.kt,
                 thermostat: s.thermostat,
-                integrator: match s.integrator {
-                    Integrator::VelocityVerlet => "velocity-verlet".into(),
-                    Integrator::GrootWarren { lambda } => format!("groot-warren, lambda = {lambda}"),
-                },
+                integrator: s.integrator.to_string(),
             };
             begin = stage.end;
             stage

@@ -30,7 +30,7 @@ mod walls;
 pub use body_force::{BodyForce, Drive};
 pub use dump::write_frame;
 pub use error::RunError;
-pub use integrator::Integrator;
+pub use integrator::{Counterpart, Coupling, Integrator, THERMOSTAT_STEPS};
 pub(crate) use reorder::INTERVAL as REORDERING;
 pub use restart::write_data;
 pub use runner::{Begin, Outcome, Progress, Runner, Start, run_scene};

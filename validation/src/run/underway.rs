@@ -116,7 +116,7 @@ impl<'a> Run<'a> {
     fn enter(&mut self, stage: &Stage, progress: &mut dyn FnMut(Progress)) -> Result<(), RunError> {
         self.sums = Sums::default();
         self.scene.enter(stage, &mut self.simulation)?;
-        self.simulation.prepare(stage.dt, Want::TOTALS)?;
+        self.simulation.prepare_for(stage.integrator, stage.dt, Want::TOTALS)?;
         self.position.entered = true;
         if self.simulation.step_number() == 0 {
             self.report(stage, true, progress)?;
@@ -140,6 +140,7 @@ impl<'a> Run<'a> {
         let is_last = self.position.done + 1 == stage.steps;
         if is_last || totals || self.observers.may_sample(number, &stage.name) || self.writes(number) {
             self.simulation.end_step()?;
+            self.simulation.refresh(want)?;
         }
         self.position.done += 1;
         self.position.time = self.position.begin + self.position.done as f64 * stage.dt;
