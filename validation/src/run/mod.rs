@@ -26,11 +26,12 @@ mod thermo;
 mod timing;
 mod underway;
 mod walls;
+mod watch;
 
 pub use body_force::{BodyForce, Drive};
 pub use dump::write_frame;
 pub use error::RunError;
-pub use integrator::{Counterpart, Coupling, Integrator, THERMOSTAT_STEPS};
+pub use integrator::{Accuracy, Counterpart, Coupling, Integrator, THERMOSTAT_STEPS};
 pub(crate) use reorder::INTERVAL as REORDERING;
 pub use restart::write_data;
 pub use runner::{Begin, Outcome, Progress, Runner, Start, run_scene};
@@ -40,6 +41,7 @@ pub use summary::{Means, Summary, Sums};
 pub use tags::Tags;
 pub use thermo::Thermo;
 pub use timing::{Session, Timing};
+pub use watch::{Deviation, Thermometer};
 
 #[cfg(test)]
 mod tests;

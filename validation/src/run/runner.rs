@@ -8,6 +8,7 @@ use super::summary::{Summary, Sums};
 use super::thermo::Thermo;
 use super::timing::Timing;
 use super::underway::Run;
+use super::watch::Deviation;
 use crate::observe::Observers;
 use crate::scene::Scene;
 use psidpd_core::engine::Settings;
@@ -31,6 +32,8 @@ pub struct Progress<'a> {
     pub steps: u64,
     /// The totals, on steps that have them.
     pub thermo: Option<&'a Thermo>,
+    /// What is wrong with the temperatures of the stage, at its last step.
+    pub deviations: &'a [Deviation],
 }
 
 /// How a run deals with what is in its folder.

@@ -9,6 +9,7 @@ use super::simulation::Simulation;
 use super::summary::{Summary, Sums};
 use super::thermo::Thermo;
 use super::timing::{Session, Timing};
+use super::watch::Watch;
 use crate::observe::Observers;
 use crate::output::{Frame, write_snapshot};
 use crate::scene::{Scene, Stage};
@@ -37,6 +38,8 @@ pub(super) struct Run<'a> {
     sums: Sums,
     last: Option<Thermo>,
     observers: Observers,
+    /// Over the present stage, since this session began.
+    watch: Watch,
     pub timing: Timing,
     /// The step that this session began after, and when.
     began: (u64, Instant),
@@ -73,6 +76,7 @@ impl<'a> Run<'a> {
             sums: good.sums,
             last: good.last,
             observers,
+            watch: Watch::default(),
             timing,
             began: (good.step, now),
             checkpointed: now,
@@ -115,6 +119,7 @@ impl<'a> Run<'a> {
     /// Computes the forces that a stage starts with.
     fn enter(&mut self, stage: &Stage, progress: &mut dyn FnMut(Progress)) -> Result<(), RunError> {
         self.sums = Sums::default();
+        self.watch = Watch::default();
         self.scene.enter(stage, &mut self.simulation)?;
         self.simulation.prepare_for(stage.integrator, stage.dt, Want::TOTALS)?;
         self.position.entered = true;
@@ -138,6 +143,11 @@ impl<'a> Run<'a> {
         }
         self.simulation.begin_step(stage.dt, stage.integrator, want)?;
         let is_last = self.position.done + 1 == stage.steps;
+        let watched = Watch::is_due(stage, self.position.done + 1);
+        if watched {
+            self.simulation.end_step()?;
+            self.watch.sample(&mut self.simulation, stage, self.position.done + 1)?;
+        }
         if is_last || totals || self.observers.may_sample(number, &stage.name) || self.writes(number) {
             self.simulation.end_step()?;
             self.simulation.refresh(want)?;
@@ -204,7 +214,12 @@ impl<'a> Run<'a> {
         if totals {
             self.keep_state();
         }
-        progress(Progress { stage: &stage.name, step, steps: self.steps, thermo: thermo.as_ref() });
+        let deviations = match self.position.done == stage.steps {
+            true => self.watch.deviations(&self.simulation, stage),
+            false => Vec::new(),
+        };
+        let thermo = thermo.as_ref();
+        progress(Progress { stage: &stage.name, step, steps: self.steps, thermo, deviations: &deviations });
         Ok(())
     }
 

@@ -150,6 +150,36 @@ impl PairThermostat {
         }
     }
 
+    /// What drag and noise see at the velocities `v`, in the order of the particles that pairs were found of; `None` if
+    /// no pair is in range.
+    pub fn warmth(&self, v: &[[f64; 3]]) -> Option<Warmth> {
+        let (mut squares, mut weights, mut rates, mut moving) = (0.0, 0.0, 0.0, 0usize);
+        moving += self.mass.iter().filter(|m| m.is_finite()).count();
+        for plane in &self.planes {
+            for (i, ends) in plane.start.windows(2).enumerate() {
+                for pair in &plane.pairs[ends[0] as usize..ends[1] as usize] {
+                    let j = pair.j as usize;
+                    let j =
+                        j.checked_sub(plane.own.len()).map_or(plane.own.start + j, |k| plane.next.start + k);
+                    let i = plane.own.start + i;
+                    let (a, b) = (v[self.cells.order[i] as usize], v[self.cells.order[j] as usize]);
+                    let g = pair.g.map(f64::from);
+                    let along: f64 = (0..3).map(|c| g[c] * (a[c] - b[c])).sum();
+                    let inverse = 1.0 / self.mass[i] + 1.0 / self.mass[j];
+                    let square: f64 = g.iter().map(|g| g * g).sum();
+                    if inverse > 0.0 {
+                        squares += along * along / inverse;
+                        weights += square;
+                        rates += square * inverse;
+                    }
+                }
+            }
+        }
+        let freedom = (self.dimensions * moving) as f64;
+        // |g|² = ½ΔtD.
+        (weights > 0.0).then(|| Warmth { kt: squares / weights, rate: 4.0 * rates / (self.dt * freedom) })
+    }
+
     /// How many iterations the last implicit update took.
     pub fn iterations(&self) -> usize {
         self.iterations
@@ -159,6 +189,16 @@ impl PairThermostat {
     pub fn pairs(&self) -> usize {
         self.planes.iter().map(|plane| plane.pairs.len()).sum()
     }
+}
+
+/// What the thermostat sees of the particles.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Warmth {
+    /// kT of the relative velocities along pairs, `Σ D μ u²/Σ D`: flow on scales beyond the range hardly counts.
+    pub kt: f64,
+    /// The rate at which drag alone takes kinetic energy from particles without correlations, `2 Σ D/μ` over the degrees of
+    /// freedom.
+    pub rate: f64,
 }
 
 /// Which of several independent noises of one step.

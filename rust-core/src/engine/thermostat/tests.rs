@@ -1,7 +1,7 @@
 use super::*;
+use crate::engine::noise::threefry2x32;
 use crate::model::Model;
 use nalgebra::Matrix3;
-use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::num::NonZeroUsize;
 
 const ONE: &str = "title = \"one\"\nspecies = [\"A\"]\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n";
@@ -49,13 +49,17 @@ impl Cloud {
         let domain = PeriodicBox::new([-1.0, 0.5, 2.0], edges, periodic).unwrap();
         let flat = edges[(2, 2)] == 1.0;
         let n = (density * domain.volume(3)) as usize;
-        let mut rng = StdRng::seed_from_u64(5);
-        let mut vector = || std::array::from_fn::<f64, 3, _>(|_| rng.random());
+        let mut count = 0;
+        let mut number = || {
+            count += 1;
+            f64::from(threefry2x32::<13>([count, 0], [5, 0])[0]) / 4_294_967_296.0
+        };
+        let mut vector = || std::array::from_fn::<f64, 3, _>(|_| number());
         let planar = |[x, y, z]: [f64; 3]| if flat { [x, y, 0.0] } else { [x, y, z] };
         let mut cloud = Cloud {
             x: (0..n).map(|_| domain.point(planar(vector()))).collect(),
             v: (0..n).map(|_| planar(vector().map(|x| 2.0 * x - 1.0))).collect(),
-            tag: (0..n).map(|k| 1 + (k * 7919 % n) as i32).collect(),
+            tag: Vec::new(),
             species: (0..n).map(|k| (k % species) as i32).collect(),
             mass: [1.0, 7.0][..species].to_vec(),
             frozen: Vec::new(),
@@ -68,12 +72,7 @@ impl Cloud {
             cloud.x.iter_mut().for_each(|x| x[2] = 0.0);
         }
         // Tags may be any different numbers.
-        cloud.tag.iter_mut().for_each(|tag| *tag = 3 * *tag + 1);
-        cloud.tag.sort_unstable();
-        cloud.tag.dedup();
-        let mut tags: Vec<i32> = (0..n).map(|k| 3 * k as i32 + 1).collect();
-        tags.rotate_left(n / 3);
-        cloud.tag = tags;
+        cloud.tag = (0..n).map(|k| 3 * ((k + n / 3) % n) as i32 + 1).collect();
         cloud
     }
 

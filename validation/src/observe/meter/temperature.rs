@@ -1,6 +1,6 @@
 use super::Meter;
+use crate::observe::configurational;
 use crate::observe::frame::Frame;
-use crate::observe::interactions::{conservative_range, force_jumps};
 use crate::observe::keys::Table;
 use crate::observe::observation::{Kind, Observation};
 use crate::observe::request::Options;
@@ -31,16 +31,7 @@ impl Meter for Temperature {
     };
 
     fn read(options: &Options) -> Result<Temperature, FileError> {
-        let fluid = options.place.fluid;
-        let missing = if !fluid.is_conservative() {
-            "a force of the model has no potential"
-        } else if force_jumps(fluid) {
-            "a force of the model jumps at its range, where its divergence is a delta function"
-        } else if options.half_box() < conservative_range(fluid) {
-            "the box is narrower than twice the range of the forces"
-        } else {
-            ""
-        };
+        let missing = configurational::missing(options.place.fluid, options.place.domain).unwrap_or("");
         let width = if missing.is_empty() { 3 } else { 1 };
         Ok(Temperature { missing: missing.into(), series: Series::new(width) })
     }
@@ -50,15 +41,7 @@ impl Meter for Temperature {
         if !self.missing.is_empty() {
             return self.series.push(&[kinetic]);
         }
-        let landscape = frame.landscape();
-        let (mut squares, mut laplacian) = (0.0, 0.0);
-        let laplacians = landscape.laplacians(frame.interactions(), frame.simulation.species());
-        for (k, (f, l)) in landscape.particle_forces().iter().zip(laplacians).enumerate() {
-            if frame.moves(k) {
-                squares += f.iter().map(|f| f * f).sum::<f64>();
-                laplacian += l;
-            }
-        }
+        let [squares, laplacian] = configurational::sums(frame);
         self.series.push(&[kinetic, squares, laplacian])
     }
 

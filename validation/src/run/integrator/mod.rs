@@ -76,6 +76,16 @@ pub enum Integrator {
     },
 }
 
+/// What is known of an integrator's error in the temperature of configurations, for estimates: `a (ωΔt)⁴ + b κΔt`;
+/// `docs/integrators.md` has the runs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Accuracy {
+    /// `a`.
+    pub stiffness: f64,
+    /// `b`.
+    pub drag: f64,
+}
+
 /// What LAMMPS has for an integrator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Counterpart {
@@ -135,6 +145,17 @@ impl Integrator {
             Integrator::ShardlowS1 { noise } | Integrator::ShardlowS2 { noise } => Some(noise),
             Integrator::Peters { noise } => Some(noise),
             other => other.coupling().map(|coupling| &mut coupling.noise),
+        }
+    }
+
+    /// Its errors, roughly.
+    pub fn accuracy(&self) -> Accuracy {
+        const ONE_FORCE: f64 = 0.05;
+        match self {
+            Integrator::VelocityVerlet => Accuracy { stiffness: ONE_FORCE, drag: 0.25 },
+            Integrator::GrootWarren { .. } => Accuracy { stiffness: ONE_FORCE, drag: 0.12 },
+            Integrator::TwoStage { .. } => Accuracy { stiffness: 0.002, drag: 0.0 },
+            _ => Accuracy { stiffness: ONE_FORCE, drag: 0.0 },
         }
     }
 

@@ -244,6 +244,11 @@ impl Simulation {
         self.body_forces = forces.to_vec();
     }
 
+    /// Whether there are any.
+    pub fn has_body_forces(&self) -> bool {
+        !self.body_forces.is_empty()
+    }
+
     /// The number that the next forces are keyed by: for a run that goes on from step `number`.
     pub fn set_step_number(&mut self, number: u64) {
         self.number = number;

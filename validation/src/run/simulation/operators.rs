@@ -6,7 +6,7 @@
 use super::super::integrator::parts::{Faults, Motion, Surroundings, drift, kick, share};
 use super::{Bounds, RunError, Simulation, check_width};
 use psidpd_core::engine::noise::Law;
-use psidpd_core::engine::thermostat::{Bodies, Stream, Update};
+use psidpd_core::engine::thermostat::{Bodies, Stream, Update, Warmth};
 use psidpd_core::engine::{PeriodicBox, Pool, Step, Want};
 
 /// A thermostat apart from the forces.
@@ -245,6 +245,17 @@ impl Simulation {
         coupling.find_pairs(forces.pool(), &bodies, dt, virial).map_err(failed)?;
         self.found_pairs = Some(found);
         Ok(true)
+    }
+
+    /// What the thermostat sees of the particles; `None` where it does not act, or sees none.
+    ///
+    /// # Errors
+    /// A position that is not finite.
+    pub fn warmth(&mut self, dt: f64) -> Result<Option<Warmth>, RunError> {
+        if !self.find_pairs(dt, false)? {
+            return Ok(None);
+        }
+        Ok(self.coupling.as_ref().and_then(|coupling| coupling.warmth(self.velocities())))
     }
 
     fn velocities_fault(&self) -> Option<usize> {
