@@ -2,9 +2,11 @@
 //! cannot work.
 
 mod findings;
+mod timestep;
 mod warnings;
 
 pub use findings::{Findings, Severity, Warning};
+pub use timestep::{StepEstimate, estimates};
 
 use psidpd_core::engine::Plan;
 use psidpd_core::model::{Fluid, Model};
@@ -71,6 +73,7 @@ pub fn check(model: &Model, conditions: &Conditions) -> Result<Findings, CheckEr
         pressure_slope: at.map(|(theory, rho)| theory.pressure_slope(rho)),
         stability: stability.map(Into::into),
         densities: conditions.densities.clone(),
+        steps: Vec::new(),
         warnings: warnings::all(&fluid, densities, stability.as_ref())?,
     })
 }

@@ -64,7 +64,10 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     let made = tell_start(runner.start(), begin, out, total);
     say(&format!("forces by {}", runner.evaluation()));
     let bar = Progress::new().steps(&scene.title, total, made, runner.particles());
-    let outcome = runner.run(&stop, &mut |p| bar.set(p.step));
+    let outcome = runner.run(&stop, &mut |p| {
+        bar.set(p.step);
+        p.deviations.iter().for_each(|deviation| warn(&deviation.to_string()));
+    });
     bar.finish();
     if *report && outcome.as_ref().err().is_none_or(|e| e.is_stop()) {
         let page = write_run_report(out);
