@@ -14,12 +14,12 @@
 //! the passes for each of both, chosen once. [`pool`] shares planes among threads; what a plane adds
 //! to another has accumulators of its own, so sums are the same for any number of threads.
 
+mod compiled;
 mod first_pass;
 mod ground;
 mod many_body;
 mod pair_batch;
 mod pair_search;
-mod passes;
 mod pool;
 mod simd;
 mod workspace;

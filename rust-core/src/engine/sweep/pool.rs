@@ -235,7 +235,7 @@ pub fn part(count: usize, number: usize, threads: usize) -> std::ops::Range<usiz
 }
 
 #[cfg(all(test, not(loom)))]
-mod tests;
+mod miri_sized;
 
 #[cfg(all(test, loom))]
-mod model;
+mod loom_model;

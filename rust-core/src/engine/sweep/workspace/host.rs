@@ -1,7 +1,7 @@
 //! What goes to the host and comes from it, in its own order.
 
 use super::Workspace;
-use crate::engine::sweep::passes::PairPrecision;
+use crate::engine::sweep::compiled::PairPrecision;
 use crate::engine::tally::Tally;
 
 impl<P: PairPrecision> Workspace<P> {

@@ -20,10 +20,10 @@ use super::slopes::SharedSlopes;
 use super::sorted_particles::SharedParticles;
 use super::thread_slab::ThreadSlab;
 use super::{FluidConstants, Input, VECTOR_PADDING};
+use crate::engine::sweep::compiled::{PairPrecision, Passes};
 use crate::engine::sweep::ground::pass_data::PassData;
 use crate::engine::sweep::lap;
 use crate::engine::sweep::pair_batch::scatter::{Accumulator, PlaneSums};
-use crate::engine::sweep::passes::{PairPrecision, Passes};
 use std::ops::Range;
 use std::time::Instant;
 
