@@ -1,15 +1,16 @@
 //! The passes over a plane, for a precision, on an instruction set.
 
 use crate::engine::instruction_set::InstructionSet;
-use crate::engine::sweep::first_pass::first_pass;
 use crate::engine::sweep::ground::arithmetic::{
     Arithmetic, Double, DoubleParticle, Mixed, MixedParticle, PackedParticle,
 };
-use crate::engine::sweep::ground::pass_data::PassData;
 use crate::engine::sweep::ground::terms::Terms;
-use crate::engine::sweep::many_body::in_range_pairs::{InRangePairs, second_pass};
-use crate::engine::sweep::pair_batch::buffers::PairBuffers;
-use crate::engine::sweep::pair_batch::scatter::PlaneSums;
+use crate::engine::sweep::pair_batch::accumulators::PlaneSums;
+use crate::engine::sweep::pair_batch::in_range_pairs::InRangePairs;
+use crate::engine::sweep::passes::buffers::PairBuffers;
+use crate::engine::sweep::passes::data::PassData;
+use crate::engine::sweep::passes::first::first_pass;
+use crate::engine::sweep::passes::second::second_pass;
 use crate::engine::sweep::simd::{Isa, Kernel, Scalar, run};
 use crate::engine::tally::Tally;
 use std::marker::PhantomData;

@@ -14,17 +14,19 @@
 //! the passes for each of both, chosen once. [`pool`] shares planes among threads; what a plane adds
 //! to another has accumulators of its own, so sums are the same for any number of threads.
 
+mod cells;
 mod compiled;
-mod first_pass;
 mod ground;
-mod many_body;
 mod pair_batch;
 mod pair_search;
+mod passes;
 mod pool;
 mod simd;
+mod times;
 mod workspace;
 
 pub use pool::{Pool, part};
+pub use times::Times;
 
 use super::domain::PeriodicBox;
 use super::error::EngineError;
@@ -42,6 +44,7 @@ use ground::box_geometry::BoxGeometry;
 use ground::cell_grid::CellGrid;
 use std::sync::Arc;
 use std::time::Instant;
+use times::lap;
 use workspace::{ForceSink, Input, Workspace, extremes};
 
 /// Forces of one fluid, fast: [`Sweep::evaluate`] where all particles are in hand. For a rank of a host, with ghosts for
@@ -73,38 +76,6 @@ pub struct Around<'a> {
     /// For each ghost whether it is the image, along a periodic direction of `domain`, of a particle that is there too:
     /// those take no part. Empty if none is.
     pub images: &'a [bool],
-}
-
-/// Seconds spent in the parts of evaluations, since the engine was made.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Times {
-    /// Sorting particles into cells.
-    pub sort: f64,
-    /// Finding pairs; forces that need no density, noise among them; weights.
-    pub first: f64,
-    /// Summing densities and evaluating ψ.
-    pub excess: f64,
-    /// Many-body forces.
-    pub second: f64,
-    /// Forces to the host.
-    pub forces: f64,
-}
-
-impl std::ops::AddAssign for Times {
-    fn add_assign(&mut self, other: Times) {
-        self.sort += other.sort;
-        self.first += other.first;
-        self.excess += other.excess;
-        self.second += other.second;
-        self.forces += other.forces;
-    }
-}
-
-/// Adds the time since the last lap to `sum`.
-fn lap(since: &mut Instant, sum: &mut f64) {
-    let now = Instant::now();
-    *sum += (now - *since).as_secs_f64();
-    *since = now;
 }
 
 /// One of both.

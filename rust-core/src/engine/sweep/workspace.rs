@@ -3,8 +3,10 @@
 mod accumulators;
 mod cell_order;
 mod excess;
+mod fluid;
 mod forces;
 mod host;
+mod input;
 mod scheduler;
 mod slopes;
 mod sorted_particles;
@@ -12,98 +14,43 @@ mod thread_slab;
 
 pub use cell_order::extremes;
 pub use forces::ForceSink;
+pub use input::Input;
 
 use crate::engine::error::EngineError;
 use crate::engine::instruction_set::InstructionSet;
 use crate::engine::noise::PairNoise;
-use crate::engine::particles::Particles;
 use crate::engine::plan::Plan;
-use crate::engine::sweep::Times;
+use crate::engine::sweep::cells::sorted::SortedCells;
 use crate::engine::sweep::compiled::{PairPrecision, Passes};
 use crate::engine::sweep::ground::box_geometry::BoxGeometry;
 use crate::engine::sweep::ground::cell_grid::CellGrid;
-use crate::engine::sweep::ground::pass_data::PassData;
 use crate::engine::sweep::ground::terms::Terms;
+use crate::engine::sweep::pair_batch::inputs::PairInputs;
+use crate::engine::sweep::passes::data::PassData;
 use crate::engine::sweep::pool::Pool;
-use crate::engine::tally::Want;
-use accumulators::Accumulators;
+use crate::engine::sweep::times::Times;
+use accumulators::AccumulatorArrays;
 use cell_order::CellOrder;
 use excess::ExcessInput;
+use fluid::FluidConstants;
 use scheduler::{PassInput, Scheduler, thread_slabs};
-use slopes::Slopes;
+use slopes::SlopeArrays;
 use sorted_particles::{SharedParticles, SortedParticles};
 use std::ops::Range;
 use thread_slab::{PlaneResults, ThreadSlab, ThreadState};
-
-/// Room behind the last particle: what whole vectors may read.
-const VECTOR_PADDING: usize = 16;
 
 /// Arrays in the order of cells, and what goes through them.
 pub struct Workspace<P: PairPrecision> {
     fluid: FluidConstants<P::Scalar>,
     order: CellOrder,
     particles: SortedParticles<P::PackedParticle>,
-    accumulators: Accumulators,
-    slopes: Slopes<P::Scalar>,
+    accumulators: AccumulatorArrays,
+    slopes: SlopeArrays<P::Scalar>,
     results: PlaneResults<P::Scalar>,
     threads: Vec<ThreadState<P::Scalar>>,
     /// Of the present evaluation.
     thermostat: Option<(PairNoise, f64)>,
     totals: bool,
-}
-
-/// What stays the same for one fluid.
-pub struct FluidConstants<T> {
-    pub set: InstructionSet,
-    pub terms: Terms<T>,
-    /// Which variables of ψ the many-body passes sum.
-    pub variables: Vec<usize>,
-}
-
-impl<T> FluidConstants<T> {
-    /// Numbers that a many-body pair needs of each particle.
-    pub fn width(&self) -> usize {
-        self.variables.len()
-    }
-}
-
-/// What the host hands over.
-pub struct Input<'a> {
-    pub particles: Particles<'a>,
-    /// Whether each ghost is an image of a particle that is there too; empty if none is.
-    pub images: &'a [bool],
-    /// Empty if nothing drags.
-    pub v: &'a [[f64; 3]],
-    /// Species of each type of particle; negative for those that take no part.
-    pub species_of_type: &'a [i32],
-    pub thermostat: Option<(PairNoise, f64)>,
-    pub totals: bool,
-}
-
-impl<'a> Input<'a> {
-    pub fn new(
-        particles: &Particles<'a>,
-        images: &'a [bool],
-        v: &'a [[f64; 3]],
-        species_of_type: &'a [i32],
-        thermostat: Option<(PairNoise, f64)>,
-        want: Want,
-    ) -> Input<'a> {
-        Input {
-            particles: *particles,
-            images,
-            v,
-            species_of_type,
-            thermostat,
-            totals: want.energy || want.virial,
-        }
-    }
-
-    /// The species of a particle, unless its type is unknown.
-    #[inline(always)]
-    fn species_of(&self, k: usize) -> Option<i32> {
-        self.species_of_type.get(self.particles.kind[k] as usize).copied()
-    }
 }
 
 impl<P: PairPrecision> Workspace<P> {
@@ -116,8 +63,8 @@ impl<P: PairPrecision> Workspace<P> {
             fluid: FluidConstants { set, terms, variables },
             order: CellOrder::new(plan.dimensions),
             particles: SortedParticles::default(),
-            accumulators: Accumulators::default(),
-            slopes: Slopes::default(),
+            accumulators: AccumulatorArrays::default(),
+            slopes: SlopeArrays::default(),
             results: PlaneResults::default(),
             threads,
             thermostat: None,
@@ -249,30 +196,18 @@ impl<P: PairPrecision> Workspace<P> {
     fn on_slabs(
         &mut self,
         planes: &[Range<usize>],
-        work: impl FnOnce(&Scheduler<P>, &mut [ThreadSlab<P::Scalar>], &mut Accumulators),
+        work: impl FnOnce(&Scheduler<P>, &mut [ThreadSlab<P::Scalar>], &mut AccumulatorArrays),
     ) {
         let Workspace { fluid, order, particles, accumulators, slopes, results, threads, .. } = self;
         let particles = &particles.share();
         let slopes = slopes.share();
-        let SharedParticles { x, fixed16_scale, fixed16, packed, species, .. } = *particles;
+        let SharedParticles { x, fixed16_scale, fixed16, packed, species, ghosts } = *particles;
+        let (geometry, grid, start) = (&order.geometry, &order.grid, &order.start[..]);
+        let (terms, thermostat) = (&fluid.terms, self.thermostat);
         let data = PassData {
-            geometry: &order.geometry,
-            grid: &order.grid,
-            start: &order.start,
-            x,
-            fixed16_scale,
-            fixed16,
-            packed,
-            species,
-            ghost: particles.ghost,
-            owned: particles.owned_bits,
-            owned_of_column: particles.owned_of_column,
-            terms: &fluid.terms,
-            slopes: slopes.rows,
-            packed_slopes: slopes.packed,
-            packed_slope_stride: slopes.stride,
-            variables: fluid.width(),
-            thermostat: self.thermostat,
+            cells: SortedCells { geometry, grid, start, x, fixed16, fixed16_scale, ghosts },
+            inputs: PairInputs { geometry, terms, thermostat, packed, species, ghosts },
+            slopes: slopes.slopes,
         };
         let passes = Passes::new(fluid.set, &fluid.terms, self.totals);
         let mut slabs = results.split(order, planes, fluid.width(), threads);

@@ -1,13 +1,9 @@
-//! Mixed and double precision: what is kept of a particle, and how a pair's distance comes from it.
+//! Mixed and double precision: the packed particle, and the geometry of pairs computed from it.
 
-use crate::engine::sweep::ground::box_geometry::BoxGeometry;
-use crate::engine::sweep::pair_batch::pair_terms::SpeciesPair;
-use crate::engine::sweep::simd::{Isa, Reals, Scalar, Words};
+use super::box_geometry::BoxGeometry;
+use super::species_pairs::SpeciesPair;
+use crate::engine::sweep::simd::{Isa, OFFSET_BITS, Reals, Scalar, Words};
 use crate::model::kernel::Real;
-
-/// Places of particles in the order of cells are multiplied by 32, the size of accumulators and of records in mixed
-/// precision.
-pub const OFFSET_BITS: u32 = 5;
 
 /// A vector's worth of particles, column by column: the first particle of a pair picks its own of each.
 #[derive(Debug, Clone, Copy, Default)]

@@ -26,6 +26,10 @@ use portable::Portable;
 
 use crate::model::kernel::Real;
 
+/// Indices of particles are shifted by so many bits, to be byte offsets into accumulators and into packed particles of mixed
+/// precision, of 32 bytes each.
+pub const OFFSET_BITS: u32 = 5;
+
 /// `f32` or `f64`.
 pub trait Scalar: Copy + Default + Send + Sync + PartialOrd + 'static {
     /// The nearest.

@@ -4,31 +4,24 @@ mod count;
 mod extremes;
 mod fractions;
 
-use super::Input;
+use super::input::Input;
 use crate::engine::error::EngineError;
 use crate::engine::instruction_set::InstructionSet;
 use crate::engine::sweep::ground::box_geometry::BoxGeometry;
 use crate::engine::sweep::ground::cell_grid::CellGrid;
 use crate::engine::sweep::ground::shared_slice::SharedSlice;
-use crate::engine::sweep::many_body::in_range_pairs::J_CODE_BITS;
+use crate::engine::sweep::pair_batch::in_range_pairs::J_CODE_BITS;
 use crate::engine::sweep::pool::{Pool, part};
 use crate::engine::vectors;
-use count::{Count, CountRange};
+use count::{Count, CountRange, NO_CELL};
 use fractions::Fractions;
 use std::ops::Range;
 
 pub use extremes::extremes;
+pub use fractions::TWO_TO_32;
 
 /// Up to so many particles all arrays stay in the cache, and nothing is prefetched; lowered in tests.
 const PREFETCH_THRESHOLD: usize = if cfg!(test) { 100 } else { 1 << 14 };
-
-/// The cell of particles that take no part.
-const NO_CELL: u32 = u32::MAX;
-
-pub(super) const TWO_TO_32: f64 = 4_294_967_296.0;
-
-/// Far below what a whole number in the low bits of a double holds.
-const FAR: f64 = 1e15;
 
 /// Which particles are in which cell. Behind the last plane follow copies of the first, if planes are periodic.
 pub struct CellOrder {

@@ -2,13 +2,14 @@
 
 use super::accumulators::Added;
 use super::cell_order::CellOrder;
-use super::{FluidConstants, Input};
+use super::fluid::FluidConstants;
+use super::input::Input;
 use crate::engine::error::EngineError;
 use crate::engine::excess::ExcessPlan;
 use crate::engine::excess_pass::{ExcessPass, LANES, Rows};
 use crate::engine::instruction_set::InstructionSet;
 use crate::engine::plan::Plan;
-use crate::engine::sweep::pair_batch::scatter::Accumulator;
+use crate::engine::sweep::pair_batch::accumulators::Accumulator;
 use crate::engine::vectors::{self, Loop};
 
 /// Particles whose densities are gathered at a time: they stay in the first-level cache until ψ is evaluated, and

@@ -3,7 +3,7 @@
 use super::accumulators::Added;
 use crate::engine::instruction_set::InstructionSet;
 use crate::engine::sweep::ground::shared_slice::SharedSlice;
-use crate::engine::sweep::pair_batch::scatter::Accumulator;
+use crate::engine::sweep::pair_batch::accumulators::Accumulator;
 use crate::engine::vectors::{self, Loop};
 
 /// Where the host wants forces.

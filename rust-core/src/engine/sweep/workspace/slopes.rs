@@ -1,15 +1,15 @@
 //! The slopes of ψ, as the second pass reads them.
 
-use super::VECTOR_PADDING;
 use super::cell_order::CellOrder;
+use super::input::VECTOR_PADDING;
 use crate::engine::sweep::ground::shared_slice::SharedSlice;
-use crate::engine::sweep::many_body::full_pair_cache::SLOPES_PER_PASS;
+use crate::engine::sweep::passes::slopes::{SLOPES_PER_BLOCK, Slopes};
 use crate::engine::sweep::simd::Scalar;
 use std::ops::Range;
 
 /// Slopes of all particles in the order of cells, then those of the copies of the first plane.
 #[derive(Default)]
-pub struct Slopes<T> {
+pub struct SlopeArrays<T> {
     /// How many there are of each particle.
     width: usize,
     /// A row for each particle.
@@ -25,19 +25,18 @@ pub struct Slopes<T> {
 #[derive(Clone, Copy)]
 pub struct SharedSlopes<'a, T> {
     width: usize,
-    pub rows: SharedSlice<'a, f64>,
-    pub packed: SharedSlice<'a, T>,
-    pub stride: usize,
+    pub slopes: Slopes<'a, T>,
 }
 
-impl<T: Scalar> Slopes<T> {
+impl<T: Scalar> SlopeArrays<T> {
     /// Room for all particles of an order, and for packed rows if they are wanted.
     pub fn make_room(&mut self, order: &CellOrder, width: usize, packs: bool) {
         let total = order.particles() + order.copies();
         self.width = width;
         self.rows.resize(width * total, 0.0);
-        self.stride = SLOPES_PER_PASS * (total + VECTOR_PADDING);
-        self.packed.resize(if packs { width.div_ceil(SLOPES_PER_PASS) * self.stride } else { 0 }, T::of(0.0));
+        self.stride = SLOPES_PER_BLOCK * (total + VECTOR_PADDING);
+        self.packed
+            .resize(if packs { width.div_ceil(SLOPES_PER_BLOCK) * self.stride } else { 0 }, T::of(0.0));
     }
 
     /// Those of the copies of the first plane.
@@ -45,7 +44,7 @@ impl<T: Scalar> Slopes<T> {
         let (width, n, copies) = (self.width, order.particles(), order.copies());
         self.rows.copy_within(..width * copies, width * n);
         for of_eight in self.packed.chunks_exact_mut(self.stride) {
-            of_eight.copy_within(..SLOPES_PER_PASS * copies, SLOPES_PER_PASS * n);
+            of_eight.copy_within(..SLOPES_PER_BLOCK * copies, SLOPES_PER_BLOCK * n);
         }
     }
 
@@ -58,7 +57,7 @@ impl<T: Scalar> Slopes<T> {
     pub fn set(&mut self, particle: usize, slopes: &[f64]) {
         self.rows[self.width * particle..][..self.width].copy_from_slice(slopes);
         for (eight, of_eight) in self.packed.chunks_exact_mut(self.stride).enumerate() {
-            pack(self.width, eight, slopes, &mut of_eight[SLOPES_PER_PASS * particle..][..SLOPES_PER_PASS]);
+            pack(self.width, eight, slopes, &mut of_eight[SLOPES_PER_BLOCK * particle..][..SLOPES_PER_BLOCK]);
         }
     }
 
@@ -66,9 +65,11 @@ impl<T: Scalar> Slopes<T> {
     pub fn share(&mut self) -> SharedSlopes<'_, T> {
         SharedSlopes {
             width: self.width,
-            rows: SharedSlice::new(&mut self.rows),
-            packed: SharedSlice::new(&mut self.packed),
-            stride: self.stride,
+            slopes: Slopes {
+                values: SharedSlice::new(&mut self.rows),
+                packed: SharedSlice::new(&mut self.packed),
+                stride: self.stride,
+            },
         }
     }
 
@@ -85,7 +86,7 @@ impl<'a, T: Scalar> SharedSlopes<'a, T> {
     /// Nobody else accesses their slopes while they are in use.
     pub unsafe fn rows_mut(self, particles: Range<usize>) -> &'a mut [f64] {
         // SAFETY: rows of these particles, which nobody else accesses, as the caller promises.
-        unsafe { self.rows.slice_mut(self.width * particles.start..self.width * particles.end) }
+        unsafe { self.slopes.values.slice_mut(self.width * particles.start..self.width * particles.end) }
     }
 
     /// Packs the slopes of particles, if that is wanted.
@@ -93,25 +94,26 @@ impl<'a, T: Scalar> SharedSlopes<'a, T> {
     /// # Safety
     /// Nobody else accesses their slopes meanwhile.
     pub unsafe fn pack(self, particles: Range<usize>, slopes: &[f64]) {
-        let mut first = SLOPES_PER_PASS * particles.start;
-        for eight in 0..self.packed.len() / self.stride {
+        let Slopes { packed, stride, .. } = self.slopes;
+        let mut first = SLOPES_PER_BLOCK * particles.start;
+        for eight in 0..packed.len() / stride {
             // SAFETY: packed rows of these particles, which nobody else accesses, as the caller promises.
-            let to = unsafe { self.packed.slice_mut(first..first + SLOPES_PER_PASS * particles.len()) };
+            let to = unsafe { packed.slice_mut(first..first + SLOPES_PER_BLOCK * particles.len()) };
             match self.width {
                 2 => pack_few::<2, T>(slopes, to),
                 3 => pack_few::<3, T>(slopes, to),
                 4 => pack_few::<4, T>(slopes, to),
                 width => pack(width, eight, slopes, to),
             }
-            first += self.stride;
+            first += stride;
         }
     }
 }
 
 /// Packs slopes, `width` of each particle, of which row `eight` has eight or those that are left.
 fn pack<T: Scalar>(width: usize, eight: usize, slopes: &[f64], to: &mut [T]) {
-    for (to, slopes) in to.as_chunks_mut::<SLOPES_PER_PASS>().0.iter_mut().zip(slopes.chunks_exact(width)) {
-        for (to, slope) in to.iter_mut().zip(&slopes[SLOPES_PER_PASS * eight..]) {
+    for (to, slopes) in to.as_chunks_mut::<SLOPES_PER_BLOCK>().0.iter_mut().zip(slopes.chunks_exact(width)) {
+        for (to, slope) in to.iter_mut().zip(&slopes[SLOPES_PER_BLOCK * eight..]) {
             *to = T::of(*slope);
         }
     }
@@ -119,7 +121,7 @@ fn pack<T: Scalar>(width: usize, eight: usize, slopes: &[f64], to: &mut [T]) {
 
 /// The same of `W` slopes of each particle, which have one row.
 fn pack_few<const W: usize, T: Scalar>(slopes: &[f64], to: &mut [T]) {
-    for (to, slopes) in to.as_chunks_mut::<SLOPES_PER_PASS>().0.iter_mut().zip(slopes.as_chunks::<W>().0) {
+    for (to, slopes) in to.as_chunks_mut::<SLOPES_PER_BLOCK>().0.iter_mut().zip(slopes.as_chunks::<W>().0) {
         for (to, slope) in to.iter_mut().zip(slopes) {
             *to = T::of(*slope);
         }

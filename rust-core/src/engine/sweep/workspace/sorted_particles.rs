@@ -3,15 +3,11 @@
 mod fill;
 
 use super::cell_order::CellOrder;
-use super::{Input, VECTOR_PADDING};
-use crate::engine::instruction_set::InstructionSet;
+use super::input::VECTOR_PADDING;
+use crate::engine::sweep::cells::ghosts::{Ghosts, OwnedOfColumn};
 use crate::engine::sweep::ground::arithmetic::PackedParticle;
 use crate::engine::sweep::ground::fixed_point::FixedPoint16;
-use crate::engine::sweep::ground::pass_data::OwnedOfColumn;
 use crate::engine::sweep::ground::shared_slice::SharedSlice;
-use crate::engine::vectors;
-use fill::{Fill, FillRange};
-use std::ops::Range;
 
 /// Arrays in the order of cells; copies of the first plane follow the last particle, then padding.
 #[derive(Default)]
@@ -36,9 +32,7 @@ pub struct SharedParticles<'a, R> {
     pub fixed16: [SharedSlice<'a, u16>; 3],
     pub packed: SharedSlice<'a, R>,
     pub species: SharedSlice<'a, u8>,
-    pub ghost: &'a [bool],
-    pub owned_bits: &'a [u8],
-    pub owned_of_column: &'a [OwnedOfColumn],
+    pub ghosts: Ghosts<'a>,
 }
 
 impl<R: PackedParticle> SortedParticles<R> {
@@ -112,9 +106,11 @@ impl<R: PackedParticle> SortedParticles<R> {
             fixed16: self.fixed16.each_mut().map(|fixed16| SharedSlice::new(fixed16)),
             packed: SharedSlice::new(&mut self.packed),
             species: SharedSlice::new(&mut self.species),
-            ghost: &self.ghost,
-            owned_bits: &self.owned_bits,
-            owned_of_column: &self.owned_of_column,
+            ghosts: Ghosts {
+                flags: &self.ghost,
+                owned_bits: &self.owned_bits,
+                owned_of_column: &self.owned_of_column,
+            },
         }
     }
 
@@ -126,39 +122,6 @@ impl<R: PackedParticle> SortedParticles<R> {
             + self.species.capacity()
             + self.ghost.capacity()
             + self.owned_bits.capacity()
-    }
-}
-
-impl<R: PackedParticle> SharedParticles<'_, R> {
-    /// Fills places from a multiple of [`VECTOR_PADDING`] on, and up to one, or to the last. Behind the last whole
-    /// vectors are written.
-    ///
-    /// # Safety
-    /// Nobody else accesses these places meanwhile, nor, if they reach to the last, those behind it.
-    pub unsafe fn fill(&self, set: InstructionSet, order: &CellOrder, input: &Input, places: Range<usize>) {
-        let (moving, multispecies) = (input.thermostat.is_some(), self.species.len() > 0);
-        assert!(places.end <= order.particles(), "places of particles");
-        assert!(
-            self.x.iter().all(|x| x.len() >= places.end + VECTOR_PADDING)
-                && self.fixed16.iter().all(|x| x.len() >= places.end + VECTOR_PADDING)
-                && self.packed.len() >= places.end
-                && (!multispecies || self.species.len() >= places.end),
-            "room for the particles"
-        );
-        let particles = &input.particles;
-        assert!(
-            particles.x.len() >= order.all
-                && particles.tag.len() >= order.all
-                && (!moving || input.v.len() >= order.all),
-            "the particles that were sorted"
-        );
-        let fill = &Fill { input, order, to: self };
-        match (moving, multispecies) {
-            (true, true) => vectors::run(set, FillRange::<_, true, true> { fill, places }),
-            (true, false) => vectors::run(set, FillRange::<_, true, false> { fill, places }),
-            (false, true) => vectors::run(set, FillRange::<_, false, true> { fill, places }),
-            (false, false) => vectors::run(set, FillRange::<_, false, false> { fill, places }),
-        }
     }
 }
 

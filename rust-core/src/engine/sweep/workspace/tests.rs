@@ -1,4 +1,5 @@
 use super::cell_order::TWO_TO_32;
+use super::input::VECTOR_PADDING;
 use super::*;
 use crate::engine::domain::PeriodicBox;
 use crate::engine::noise::threefry2x32;

@@ -4,10 +4,10 @@ use super::cell_order::CellOrder;
 use crate::engine::error::EngineError;
 use crate::engine::excess_pass::ExcessPass;
 use crate::engine::instruction_set::InstructionSet;
-use crate::engine::sweep::Times;
-use crate::engine::sweep::many_body::in_range_pairs::InRangePairs;
-use crate::engine::sweep::pair_batch::buffers::PairBuffers;
+use crate::engine::sweep::pair_batch::in_range_pairs::InRangePairs;
+use crate::engine::sweep::passes::buffers::PairBuffers;
 use crate::engine::sweep::simd::Scalar;
+use crate::engine::sweep::times::Times;
 use crate::engine::tally::Tally;
 use std::ops::Range;
 
@@ -27,8 +27,7 @@ pub struct ThreadState<T> {
 
 impl<T: Scalar> ThreadState<T> {
     pub fn new(passes: usize, set: InstructionSet) -> ThreadState<T> {
-        let mut buffers = PairBuffers::default();
-        buffers.set_passes(passes);
+        let buffers = PairBuffers::new(passes);
         ThreadState {
             buffers,
             excess: ExcessPass::new(set),

@@ -1,12 +1,14 @@
 //! The cell of each particle, and how many there are in each.
 
-use super::NO_CELL;
 use super::fractions::{Fractions, SORT_BLOCK};
 use crate::engine::error::EngineError;
 use crate::engine::sweep::ground::box_geometry::BoxGeometry;
-use crate::engine::sweep::workspace::Input;
+use crate::engine::sweep::workspace::input::Input;
 use crate::engine::vectors::Loop;
 use std::ops::Range;
+
+/// The cell of particles that take no part.
+pub const NO_CELL: u32 = u32::MAX;
 
 /// What all threads count with.
 pub struct Count<'a> {

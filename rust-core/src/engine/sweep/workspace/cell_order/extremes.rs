@@ -3,7 +3,7 @@
 use crate::engine::error::EngineError;
 use crate::engine::instruction_set::InstructionSet;
 use crate::engine::sweep::pool::{Pool, part};
-use crate::engine::sweep::workspace::Input;
+use crate::engine::sweep::workspace::input::Input;
 use crate::engine::vectors::{self, Loop};
 use std::ops::Range;
 

@@ -1,8 +1,12 @@
 //! Positions as fractions of the box geometry, block by block.
 
-use super::{FAR, TWO_TO_32};
 use crate::engine::sweep::ground::box_geometry::BoxGeometry;
 use crate::engine::sweep::ground::cell_grid::CellGrid;
+
+pub const TWO_TO_32: f64 = 4_294_967_296.0;
+
+/// Far below what a whole number in the low bits of a double holds.
+const FAR: f64 = 1e15;
 
 /// Particles of a block.
 pub const SORT_BLOCK: usize = 32;
