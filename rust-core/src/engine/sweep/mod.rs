@@ -28,9 +28,9 @@ mod workspace;
 pub use pool::{Pool, part};
 pub use times::Times;
 
+use super::counts::PassCounts;
 use super::domain::PeriodicBox;
 use super::error::EngineError;
-use super::evaluator::PassCounts;
 use super::instruction_set::InstructionSet;
 use super::noise::PairNoise;
 use super::particles::{Particles, Step};
@@ -59,7 +59,6 @@ pub struct Sweep {
     species_of_type: Vec<i32>,
     /// In the host's order, where it has ghosts.
     slopes: Vec<f64>,
-    counts: PassCounts,
     owned: usize,
     all: usize,
     want: Want,
@@ -136,7 +135,6 @@ impl Sweep {
             workspace,
             species_of_type,
             slopes: Vec::new(),
-            counts: PassCounts::default(),
             owned: 0,
             all: 0,
             want: Want::FORCES,
@@ -165,9 +163,11 @@ impl Sweep {
         &self.pool
     }
 
-    /// How often each pass has run.
+    /// What the passes have done since the engine was made, counted in the passes: search groups, batches of pairs (for each
+    /// density, with noise, with energies and virials), blocks of particles with a ψ that depends on a density, and planes
+    /// with forces. A pass that has never run has a count of zero.
     pub fn counts(&self) -> PassCounts {
-        self.counts
+        with!(&self.workspace, m => m.counts())
     }
 
     /// As [`Engine::out_of_bounds`](super::Engine::out_of_bounds).
@@ -239,8 +239,6 @@ impl Sweep {
             m.tally()
         });
         self.slopes.clear();
-        self.count_first(thermostat.is_some());
-        self.count_second();
         Ok(tally)
     }
 
@@ -276,7 +274,6 @@ impl Sweep {
             m.slopes_to_host(&mut self.slopes);
             lap(&mut since, &mut times.excess);
         });
-        self.count_first(thermostat.is_some());
         self.ready = true;
         Ok(())
     }
@@ -306,19 +303,6 @@ impl Sweep {
         }
         (self.owned, self.all, self.want) = (particles.owned, all, want);
         Ok(thermostat)
-    }
-
-    fn count_first(&mut self, noise: bool) {
-        self.counts.search += 1;
-        self.counts.density += self.plan.passes.len() as u64;
-        self.counts.excess += self.plan.evaluated_species();
-        self.counts.noise += noise as u64;
-    }
-
-    fn count_second(&mut self) {
-        self.counts.force += 1;
-        self.counts.energy += self.want.energy as u64;
-        self.counts.virial += self.want.virial as u64;
     }
 
     /// Numbers per particle that a host forwards to ghosts: [`Plan::slope_width`].
@@ -363,7 +347,6 @@ impl Sweep {
         if particles.x.len() != self.all || particles.owned != self.owned || force.len() < self.owned {
             return Err(EngineError::Host("particles changed between densities and forces"));
         }
-        self.count_second();
         let (pool, slopes, times) = (&self.pool, &self.slopes, &mut self.times);
         let out = ForceSink::new(force, add, particles.tag);
         with!(&mut self.workspace, m => {

@@ -20,9 +20,10 @@ mod avx2;
 mod avx512;
 mod dispatch;
 mod portable;
+#[cfg(target_arch = "x86_64")]
+mod x86;
 
 pub use dispatch::{Kernel, run};
-use portable::Portable;
 
 use crate::model::kernel::Real;
 
