@@ -1,6 +1,7 @@
 //! Kernels, run on the instruction set that was found.
 
-use super::{Isa, Portable};
+use super::Isa;
+use super::portable::Portable;
 use crate::engine::instruction_set::InstructionSet;
 use crate::engine::settings::Instructions;
 

@@ -22,7 +22,6 @@ mod dispatch;
 mod portable;
 
 pub use dispatch::{Kernel, run};
-use portable::Portable;
 
 use crate::model::kernel::Real;
 
