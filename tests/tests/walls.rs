@@ -15,6 +15,7 @@ const CORE: &[&[&str]] = &[
     &["theory"],
     // What the engine stands on.
     &[
+        "engine::counts",
         "engine::domain",
         "engine::error",
         "engine::images",

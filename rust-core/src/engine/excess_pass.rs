@@ -21,6 +21,8 @@ pub struct ExcessPass {
     work: ExcessWork,
     /// Evaluations below and above the bounds of a density.
     pub out_of_bounds: [u64; 2],
+    /// Evaluations of a ψ that depends on a density, each of a block of particles.
+    pub evaluations: u64,
 }
 
 /// Numbers of consecutive particles, a row for each, `first` being the number of the one that the first row is of.
@@ -95,6 +97,7 @@ impl ExcessPass {
             slopes: Vec::new(),
             work: ExcessWork::new(set),
             out_of_bounds: [0; 2],
+            evaluations: 0,
         }
     }
 
@@ -145,7 +148,7 @@ impl ExcessPass {
     ) -> Result<(), EngineError> {
         let count = plan.species.len();
         let (variables, slope_width) = (plan.densities.len() * count, plan.slope_width());
-        let ExcessPass { at, correction, psi, slopes, work, out_of_bounds } = self;
+        let ExcessPass { at, correction, psi, slopes, work, out_of_bounds, evaluations } = self;
         let n = lanes.count();
         if n == 0 {
             return Ok(());
@@ -157,6 +160,7 @@ impl ExcessPass {
             });
             return Ok(());
         }
+        *evaluations += 1;
 
         let polynomial = |v: usize| &plan.densities[v / count].correction[alpha * count + v % count];
         let width = rows.columns.len();

@@ -11,6 +11,7 @@
 //!
 //! [`mod@reference`] evaluates the same Hamiltonian with none of this machinery.
 
+mod counts;
 mod density_pass;
 mod domain;
 mod error;
@@ -31,9 +32,10 @@ mod sweep;
 mod tally;
 mod vectors;
 
+pub use counts::PassCounts;
 pub use domain::{DomainError, PeriodicBox};
 pub use error::EngineError;
-pub use evaluator::{Engine, PairsOfHost, PassCounts};
+pub use evaluator::{Engine, PairsOfHost};
 pub use images::Images;
 pub use pairs::Newton;
 pub use particles::{Particles, Step};

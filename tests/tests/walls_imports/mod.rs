@@ -263,12 +263,19 @@ fn strip(text: &str) -> String {
     let code = without_comments(text);
     let mut out = String::with_capacity(code.len());
     let mut rest = code.as_str();
-    while let Some(at) = rest.find("#[cfg(test)]") {
+    while let Some((at, end)) = next_test(rest) {
         out.push_str(&rest[..at]);
-        rest = skip_item(&rest[at + "#[cfg(test)]".len()..]);
+        rest = skip_item(&rest[end..]);
     }
     out.push_str(rest);
     out
+}
+
+/// Where the next `#[cfg(test)]` or `#[cfg(all(test, …))]` begins, and ends.
+fn next_test(text: &str) -> Option<(usize, usize)> {
+    let found = ["#[cfg(test)]", "#[cfg(all(test,"].iter().filter_map(|attribute| text.find(attribute));
+    let at = found.min()?;
+    Some((at, at + text[at..].find(")]")? + 2))
 }
 
 /// What follows an item: its `;` or its block.
@@ -345,10 +352,13 @@ fn character(text: &str) -> Option<usize> {
 /// Names of modules that are compiled for tests only.
 fn test_modules(text: &str) -> Vec<String> {
     let code = without_comments(text);
-    let behind = code.split("#[cfg(test)]").skip(1);
-    let modules =
-        behind.filter_map(|item| item.trim_start().strip_prefix("mod ")?.split([';', '{', ' ']).next());
-    modules.map(str::to_owned).collect()
+    let (mut rest, mut modules) = (code.as_str(), Vec::new());
+    while let Some((_, end)) = next_test(rest) {
+        rest = &rest[end..];
+        let name = rest.trim_start().strip_prefix("mod ").and_then(|item| item.split([';', '{', ' ']).next());
+        modules.extend(name.map(str::to_owned));
+    }
+    modules
 }
 
 fn join(module: &str, name: &str) -> String {

@@ -1,18 +1,17 @@
-//! The fast engine: the same forces as [`Engine`](super::Engine), from a sweep over particles in the order
-//! of cells.
+//! The fast engine: forces by one traversal of all cells, without a neighbour list. `docs/engine.md` explains it with
+//! figures. At the speed of DPD particles a neighbour list would live a few steps and cost more than it saves.
 //!
-//! Every step the particles are sorted into columns of cells ([`grid`], [`workspace`]). Each plane of columns
-//! ([`plane`]) finds the pairs in half of its neighbourhood: the cells where a particle looks
-//! ([`windows`]), cut into sixteens for four particles that look together ([`chunks`]), and who of those
-//! is near ([`look`]), in words of sixteen bits ([`fixed16_scale`]). Pairs are evaluated in blocks that stay in
-//! the first-level cache ([`buffers`], [`evaluate`], [`thermostat`], [`terms`]; [`aside`] for formulas and
-//! tables), and added to their particles ([`scatter`]). The pairs that a many-body density reaches are
-//! kept for a second pass, after ψ ([`many_body`]). There is no neighbour list: at the speed that DPD
-//! particles move, one lives a few steps and costs more than it saves.
+//! Rooms, from the ground up; a file imports from its own room and from those above it in this list:
 //!
-//! [`simd`] has the vectors of each instruction set, [`arithmetic`] the two precisions, [`compiled`]
-//! the passes for each of both, chosen once. [`pool`] shares planes among threads; what a plane adds
-//! to another has accumulators of its own, so sums are the same for any number of threads.
+//! - [`simd`]: vectors of each instruction set.
+//! - [`ground`]: box geometry, cell grid, fixed-point coordinates, packed particles, tables of terms.
+//! - [`cells`]: the particles in the order of cells.
+//! - [`pair_search`]: cell ranges, i-clusters and j-clusters, distance filter.
+//! - [`pair_batch`]: terms, densities and noise of a batch of pairs, added to accumulators.
+//! - [`passes`]: the two passes over the pairs of a plane; ψ is evaluated between them.
+//! - [`compiled`]: the passes, compiled for each instruction set and precision; [`pool`]: threads.
+//! - [`workspace`]: arrays, sorting, ψ, and the scheduler that sends planes through all this.
+//! - [`Sweep`]: what hosts see.
 
 mod cells;
 mod compiled;
@@ -27,9 +26,9 @@ mod workspace;
 pub use psidpd_threads::{Pool, part};
 pub use times::Times;
 
+use super::counts::PassCounts;
 use super::domain::PeriodicBox;
 use super::error::EngineError;
-use super::evaluator::PassCounts;
 use super::instruction_set::InstructionSet;
 use super::noise::PairNoise;
 use super::particles::{Particles, Step};
@@ -46,8 +45,7 @@ use std::time::Instant;
 use times::lap;
 use workspace::{ForceSink, Input, Workspace, extremes};
 
-/// Forces of one fluid, fast: [`Sweep::evaluate`] where all particles are in hand. For a rank of a host, with ghosts for
-/// whatever is beyond it, an evaluation is [`Sweep::first`], a round of slopes from owners to ghosts, and
+/// Forces of one fluid. Without ghosts an evaluation is [`Sweep::evaluate`]. On a rank of a host with ghosts it is [`Sweep::first`], a round of slopes from owners to ghosts, and
 /// [`Sweep::second`].
 pub struct Sweep {
     plan: Plan,
@@ -58,7 +56,6 @@ pub struct Sweep {
     species_of_type: Vec<i32>,
     /// In the host's order, where it has ghosts.
     slopes: Vec<f64>,
-    counts: PassCounts,
     owned: usize,
     all: usize,
     want: Want,
@@ -135,7 +132,6 @@ impl Sweep {
             workspace,
             species_of_type,
             slopes: Vec::new(),
-            counts: PassCounts::default(),
             owned: 0,
             all: 0,
             want: Want::FORCES,
@@ -164,9 +160,11 @@ impl Sweep {
         &self.pool
     }
 
-    /// How often each pass has run.
+    /// What the passes have done since the engine was made, counted in the passes: search groups, batches of pairs (for each
+    /// density, with noise, with energies and virials), blocks of particles with a ψ that depends on a density, and planes
+    /// with forces. A pass that has never run has a count of zero.
     pub fn counts(&self) -> PassCounts {
-        self.counts
+        with!(&self.workspace, m => m.counts())
     }
 
     /// As [`Engine::out_of_bounds`](super::Engine::out_of_bounds).
@@ -238,8 +236,6 @@ impl Sweep {
             m.tally()
         });
         self.slopes.clear();
-        self.count_first(thermostat.is_some());
-        self.count_second();
         Ok(tally)
     }
 
@@ -275,7 +271,6 @@ impl Sweep {
             m.slopes_to_host(&mut self.slopes);
             lap(&mut since, &mut times.excess);
         });
-        self.count_first(thermostat.is_some());
         self.ready = true;
         Ok(())
     }
@@ -305,19 +300,6 @@ impl Sweep {
         }
         (self.owned, self.all, self.want) = (particles.owned, all, want);
         Ok(thermostat)
-    }
-
-    fn count_first(&mut self, noise: bool) {
-        self.counts.search += 1;
-        self.counts.density += self.plan.passes.len() as u64;
-        self.counts.excess += self.plan.evaluated_species();
-        self.counts.noise += noise as u64;
-    }
-
-    fn count_second(&mut self) {
-        self.counts.force += 1;
-        self.counts.energy += self.want.energy as u64;
-        self.counts.virial += self.want.virial as u64;
     }
 
     /// Numbers per particle that a host forwards to ghosts: [`Plan::slope_width`].
@@ -362,7 +344,6 @@ impl Sweep {
         if particles.x.len() != self.all || particles.owned != self.owned || force.len() < self.owned {
             return Err(EngineError::Host("particles changed between densities and forces"));
         }
-        self.count_second();
         let (pool, slopes, times) = (&self.pool, &self.slopes, &mut self.times);
         let out = ForceSink::new(force, add, particles.tag);
         with!(&mut self.workspace, m => {

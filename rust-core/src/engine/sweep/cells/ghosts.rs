@@ -42,7 +42,7 @@ impl Ghosts<'_> {
     /// There are ghosts, and `first` is at most one past the last particle.
     #[inline(always)]
     pub unsafe fn owned_of_sixteen(&self, first: usize) -> u32 {
-        // SAFETY: four bytes from that of `first` on are inside the padding that `find_owned_ranges` appends.
+        // SAFETY: four bytes from that of `first` on are inside the padding that `SortedParticles::find_owned` appends.
         unsafe {
             let bits = self.owned_bits.as_ptr().add(first / 8).cast::<u32>().read_unaligned();
             bits >> (first % 8) & 0xffff
@@ -55,7 +55,7 @@ impl Ghosts<'_> {
     /// There are ghosts, and that many particles.
     #[inline(always)]
     pub unsafe fn any_of(&self, [first, count]: [usize; 2]) -> bool {
-        // SAFETY: eight bytes from that of `first` on are inside the padding that `find_owned_ranges` appends.
+        // SAFETY: eight bytes from that of `first` on are inside the padding that `SortedParticles::find_owned` appends.
         let bits = unsafe { self.owned_bits.as_ptr().add(first / 8).cast::<u64>().read_unaligned() };
         let all = (1 << count) - 1;
         bits >> (first % 8) & all != all

@@ -9,7 +9,7 @@ use psidpd_threads::SharedSlice;
 /// Everything that the pair search reads.
 ///
 /// If the plane axis is periodic, copies of the particles of the first plane, moved by one period, follow the last
-/// particle: they are the next plane of the last one. `workspace::sort` pads all arrays behind the last particle, so
+/// particle: they are the next plane of the last one. `SortedParticles::make_room` pads all arrays behind the last particle, so
 /// that whole vectors may be read there.
 #[derive(Clone, Copy)]
 pub struct SortedCells<'a> {

@@ -30,7 +30,7 @@ pub unsafe fn scalar_fallback<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool
     // With one species all entries stay zero.
     if MULTISPECIES && inputs.terms.species > 1 {
         for k in 0..batch.count {
-            // SAFETY: with several species there is an entry for each particle (`sort::make_room`).
+            // SAFETY: with several species there is an entry for each particle (`SortedParticles::make_room`).
             let [a, b] = batch.pair(k).map(|i| unsafe { *inputs.species.at(i) } as usize);
             buffers.fallback.species_pair[k] = (a * inputs.terms.species + b) as u32;
         }

@@ -21,7 +21,7 @@ pub unsafe fn filter_by_distance<I: Isa, const SHIFTS: bool, const CLUSTER: usiz
     batch_size: usize,
     buffers: &mut SearchBuffers,
 ) {
-    // SAFETY: positions have four vectors of padding behind the last particle (`sort::make_room`), so that all sixteen of
+    // SAFETY: positions have four vectors of padding behind the last particle (`SortedParticles::make_room`), so that all sixteen of
     // a j-cluster may be read; masks, bases and positions of i-clusters have entries for all slots of the clusters
     // (`reserve_j_clusters`), pairs for every bit of the masks (`reserve_pairs`).
     unsafe {

@@ -41,7 +41,7 @@ pub unsafe fn form_j_clusters<I: Isa, const GHOSTS: bool, const CLUSTER: usize>(
                 ghosts: match GHOSTS {
                     true => {
                         let flags = cells.ghosts.flags.as_ptr().add(group.first + a);
-                        // SAFETY: `sort::make_room` pads the flags by a vector.
+                        // SAFETY: `SortedParticles::make_room` pads the flags by a vector.
                         ghost_mask(flags.cast::<u64>().read_unaligned())
                     }
                     false => [0; MASKS_PER_CLUSTER],
@@ -190,7 +190,7 @@ const fn first_bits() -> [[u64; 2]; 33] {
 /// then. `shift` is the index of the periodic shift, and modulo 5 of the stencil column.
 ///
 /// # Safety
-/// Particles up to 16 behind `end` are inside the padding of `sort::make_room`.
+/// Particles up to 16 behind `end` are inside the padding of `SortedParticles::make_room`.
 #[inline(always)]
 unsafe fn append_range<const GHOSTS: bool, const CLUSTER: usize, const OWN_COLUMN: bool>(
     cells: &SortedCells,

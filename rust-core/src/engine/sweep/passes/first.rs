@@ -89,7 +89,7 @@ unsafe fn do_batch<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TAL
     slots: [usize; 2],
     tally: &mut Tally,
 ) {
-    // SAFETY: `packed` has a vector of padding behind the last particle (`sort::make_room`); `reserve` makes room for the
+    // SAFETY: `packed` has a vector of padding behind the last particle (`SortedParticles::make_room`); `reserve` makes room for the
     // batch; the caller upholds the rest.
     unsafe {
         let inputs = &data.inputs;

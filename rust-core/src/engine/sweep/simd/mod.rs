@@ -20,6 +20,8 @@ mod avx2;
 mod avx512;
 mod dispatch;
 mod portable;
+#[cfg(target_arch = "x86_64")]
+mod x86;
 
 pub use dispatch::{Kernel, run};
 

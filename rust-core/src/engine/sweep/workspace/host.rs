@@ -1,6 +1,7 @@
 //! What goes to the host and comes from it, in its own order.
 
 use super::Workspace;
+use crate::engine::counts::PassCounts;
 use crate::engine::sweep::compiled::PairPrecision;
 use crate::engine::tally::Tally;
 
@@ -82,6 +83,25 @@ impl<P: PairPrecision> Workspace<P> {
             for k in 0..2 {
                 sum[k] += state.excess.out_of_bounds[k];
             }
+        }
+        sum
+    }
+
+    /// What all threads have counted.
+    pub fn counts(&self) -> PassCounts {
+        let mut sum = PassCounts::default();
+        for state in &self.threads {
+            let batches = &state.buffers.batch.counts;
+            sum = sum
+                + PassCounts {
+                    search: batches.searched,
+                    density: batches.weighted,
+                    excess: state.excess.evaluations,
+                    force: state.planes_written,
+                    noise: batches.noise,
+                    energy: batches.tallied,
+                    virial: batches.tallied,
+                };
         }
         sum
     }

@@ -297,6 +297,7 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         // SAFETY: an order has each particle once, those of this plane here; the plane is of this thread's slab alone.
         let lost =
             unsafe { out.write(self.fluid.set, &self.order.order[particles], self.order.owned, added) };
+        slab.state.planes_written += 1;
         slab.state.lost = slab.state.lost.into_iter().chain(lost).min();
     }
 }

@@ -22,6 +22,8 @@ pub struct ThreadState<T> {
     pub fault: Option<EngineError>,
     /// The lowest tag of the particles whose forces were not finite.
     pub lost: Option<i32>,
+    /// How many planes have had their forces written to the host.
+    pub planes_written: u64,
     pub times: Times,
 }
 
@@ -33,6 +35,7 @@ impl<T: Scalar> ThreadState<T> {
             excess: ExcessPass::new(set),
             fault: None,
             lost: None,
+            planes_written: 0,
             times: Times::default(),
         }
     }
