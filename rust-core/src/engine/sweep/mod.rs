@@ -19,12 +19,11 @@ mod ground;
 mod pair_batch;
 mod pair_search;
 mod passes;
-mod pool;
 mod simd;
 mod times;
 mod workspace;
 
-pub use pool::{Pool, part};
+pub use psidpd_threads::{Pool, part};
 pub use times::Times;
 
 use super::counts::PassCounts;

@@ -4,7 +4,7 @@ use super::ghosts::Ghosts;
 use crate::engine::sweep::ground::box_geometry::BoxGeometry;
 use crate::engine::sweep::ground::cell_grid::CellGrid;
 use crate::engine::sweep::ground::fixed_point::FixedPoint16;
-use crate::engine::sweep::ground::shared_slice::SharedSlice;
+use psidpd_threads::SharedSlice;
 
 /// Everything that the pair search reads.
 ///

@@ -1,6 +1,6 @@
 //! The slopes `∂ψ/∂n` of all particles, as the second pass reads them.
 
-use crate::engine::sweep::ground::shared_slice::SharedSlice;
+use psidpd_threads::SharedSlice;
 
 /// Slopes in the order of cells, and of the copies of the first plane behind them.
 #[derive(Clone, Copy)]

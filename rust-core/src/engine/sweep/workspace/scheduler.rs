@@ -248,7 +248,7 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         for first in of_plane.clone().step_by(DENSITY_BLOCK) {
             let particles = first..of_plane.end.min(first + DENSITY_BLOCK);
             let (own, count) = (first - slab.first, particles.len());
-            let has_species = self.particles.species.len() > 0;
+            let has_species = !self.particles.species.is_empty();
             // SAFETY: particles of a plane of this thread's slab, which is filled: nobody writes their species, and nobody
             // else accesses their slopes, as the caller promises.
             let (species, slopes) = unsafe {

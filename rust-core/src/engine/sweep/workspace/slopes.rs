@@ -2,9 +2,9 @@
 
 use super::cell_order::CellOrder;
 use super::input::VECTOR_PADDING;
-use crate::engine::sweep::ground::shared_slice::SharedSlice;
 use crate::engine::sweep::passes::slopes::{SLOPES_PER_BLOCK, Slopes};
 use crate::engine::sweep::simd::Scalar;
+use psidpd_threads::SharedSlice;
 use std::ops::Range;
 
 /// Slopes of all particles in the order of cells, then those of the copies of the first plane.

@@ -7,7 +7,7 @@ use super::input::VECTOR_PADDING;
 use crate::engine::sweep::cells::ghosts::{Ghosts, OwnedOfColumn};
 use crate::engine::sweep::ground::arithmetic::PackedParticle;
 use crate::engine::sweep::ground::fixed_point::FixedPoint16;
-use crate::engine::sweep::ground::shared_slice::SharedSlice;
+use psidpd_threads::SharedSlice;
 
 /// Arrays in the order of cells; copies of the first plane follow the last particle, then padding.
 #[derive(Default)]

@@ -7,9 +7,9 @@ use crate::engine::particles::Particles;
 use crate::engine::plan::Plan;
 use crate::engine::settings::Instructions;
 use crate::engine::sweep::ground::arithmetic::{Double, Mixed};
-use crate::engine::sweep::pool::part;
 use crate::model::Model;
 use nalgebra::Matrix3;
+use psidpd_threads::part;
 use std::num::NonZeroUsize;
 
 fn portable() -> InstructionSet {

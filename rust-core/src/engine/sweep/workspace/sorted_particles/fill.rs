@@ -24,7 +24,7 @@ impl<R: PackedParticle> SharedParticles<'_, R> {
     /// # Safety
     /// Nobody else accesses these places meanwhile, nor, if they reach to the last, those behind it.
     pub unsafe fn fill(&self, set: InstructionSet, order: &CellOrder, input: &Input, places: Range<usize>) {
-        let (moving, multispecies) = (input.thermostat.is_some(), self.species.len() > 0);
+        let (moving, multispecies) = (input.thermostat.is_some(), !self.species.is_empty());
         assert!(places.end <= order.particles(), "places of particles");
         assert!(
             self.x.iter().all(|x| x.len() >= places.end + VECTOR_PADDING)

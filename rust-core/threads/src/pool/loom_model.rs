@@ -1,5 +1,5 @@
-//! The pool in every order in which its threads may run: `RUSTFLAGS="--cfg loom" cargo test --release -p psidpd-core
-//! --lib pool`. Loom finds accesses that race, calls that nobody answers, and threads that wait for ever.
+//! The pool in every order in which its threads may run: `RUSTFLAGS="--cfg loom" cargo test --release -p
+//! psidpd-threads`. Loom finds accesses that race, calls that nobody answers, and threads that wait for ever.
 
 use super::*;
 use loom::cell::UnsafeCell;
