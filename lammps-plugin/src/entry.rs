@@ -78,7 +78,7 @@ pub unsafe extern "C-unwind" fn psidpd_register(lmp: *mut c_void) -> *const c_ch
     let trouble = if lmp.is_null() {
         Some("psidpd_register: no LAMMPS instance".to_owned())
     } else {
-        // SAFETY: the caller's promise.
+        // SAFETY: not null, so an instance of the LAMMPS library, as the caller promises.
         unsafe { trouble(lmp) }
     };
     if let Some(text) = trouble {
@@ -111,7 +111,7 @@ pub unsafe extern "C-unwind" fn lammpsplugin_init(
 ) {
     // SAFETY: LAMMPS passes its own instance.
     if let Some(text) = unsafe { trouble(lmp) } {
-        // SAFETY: as above.
+        // SAFETY: LAMMPS passes its own instance.
         unsafe { refuse(lmp, text) };
         return;
     }

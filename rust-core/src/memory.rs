@@ -30,10 +30,10 @@ fn in_pages(layout: Layout) -> Option<Layout> {
 unsafe impl GlobalAlloc for LargePages {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         let Some(pages) = in_pages(layout) else {
-            // SAFETY: the caller's.
+            // SAFETY: the caller promises a layout of more than zero bytes, as the system's allocator asks.
             return unsafe { System.alloc(layout) };
         };
-        // SAFETY: its size is not zero.
+        // SAFETY: a large layout is of more than zero bytes.
         let memory = unsafe { System.alloc(pages) };
         #[cfg(target_os = "linux")]
         if !memory.is_null() {
@@ -46,16 +46,19 @@ unsafe impl GlobalAlloc for LargePages {
     }
 
     unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
-        // SAFETY: the caller's; as it was allocated.
+        // SAFETY: the caller promises the layout that `alloc` had, so this is the one that the system's allocator had.
         unsafe { System.dealloc(memory, in_pages(layout).unwrap_or(layout)) }
     }
 
     unsafe fn realloc(&self, memory: *mut u8, layout: Layout, size: usize) -> *mut u8 {
         if layout.size() < LARGE && size < LARGE {
-            // SAFETY: the caller's; small before and after.
+            // SAFETY: small before and after, so it is the system's with this very layout; the caller promises that it is
+            // allocated, and a size above zero that does not overflow when rounded up to the alignment.
             return unsafe { System.realloc(memory, layout, size) };
         }
-        // SAFETY: the caller's.
+        // SAFETY: the caller promises a size above zero that does not overflow when rounded up to the alignment, so `new` is
+        // a layout; `to` has `size` bytes, `memory` those of `layout`, and they do not overlap; `memory` is given back with
+        // the layout that it was allocated with.
         unsafe {
             let new = Layout::from_size_align_unchecked(size, layout.align());
             if let (Some(old), Some(new)) = (in_pages(layout), in_pages(new))

@@ -35,7 +35,7 @@ const CORE: &[&[&str]] = &[
     &["engine::sweep::pair_search"],
     &["engine::sweep::pair_batch"],
     &["engine::sweep::passes"],
-    &["engine::sweep::compiled", "engine::sweep::pool"],
+    &["engine::sweep::compiled"],
     &["engine::sweep::workspace"],
     // The engines that hosts see.
     &["engine"],

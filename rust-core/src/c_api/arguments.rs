@@ -22,7 +22,7 @@ fn check<T>(pointer: *const T, name: &str) -> Result<(), Failure> {
 /// `pointer` is null or at a `T` that nobody writes to during `'a`.
 pub(super) unsafe fn shared<'a, T>(pointer: *const T, name: &str) -> Result<&'a T, Failure> {
     check(pointer, name)?;
-    // SAFETY: not null and aligned; the rest is the caller's word.
+    // SAFETY: `check` found it aligned and not null; the caller promises a `T` there that nobody writes to during `'a`.
     Ok(unsafe { &*pointer })
 }
 
@@ -30,7 +30,7 @@ pub(super) unsafe fn shared<'a, T>(pointer: *const T, name: &str) -> Result<&'a 
 /// `pointer` is null or at a `T` that nobody else reads or writes during `'a`.
 pub(super) unsafe fn exclusive<'a, T>(pointer: *mut T, name: &str) -> Result<&'a mut T, Failure> {
     check(pointer, name)?;
-    // SAFETY: not null and aligned; the rest is the caller's word.
+    // SAFETY: `check` found it aligned and not null; the caller promises a `T` there that is nobody else's during `'a`.
     Ok(unsafe { &mut *pointer })
 }
 
@@ -40,7 +40,7 @@ pub(super) unsafe fn exclusive<'a, T>(pointer: *mut T, name: &str) -> Result<&'a
 /// `pointer` is null or at a `T`.
 pub(super) unsafe fn copied<T: Copy>(pointer: *const T, name: &str) -> Result<T, Failure> {
     check(pointer, name)?;
-    // SAFETY: not null and aligned; the rest is the caller's word.
+    // SAFETY: `check` found it aligned and not null; the caller promises a `T` there, which is `Copy`.
     Ok(unsafe { pointer.read() })
 }
 
@@ -79,7 +79,8 @@ pub(super) unsafe fn array<'a, T>(pointer: *const T, length: usize, name: &str) 
         return Ok(&[]);
     }
     check_array(pointer, length, name)?;
-    // SAFETY: not null, aligned, and no longer than an array can be; the rest is the caller's word.
+    // SAFETY: `check_array` found it aligned, not null, and no longer than an array can be; the caller promises that many
+    // `T` there that nobody writes to during `'a`.
     Ok(unsafe { std::slice::from_raw_parts(pointer, length) })
 }
 
@@ -96,7 +97,8 @@ pub(super) unsafe fn array_mut<'a, T>(
         return Ok(&mut []);
     }
     check_array(pointer, length, name)?;
-    // SAFETY: not null, aligned, and no longer than an array can be; the rest is the caller's word.
+    // SAFETY: `check_array` found it aligned, not null, and no longer than an array can be; the caller promises that many
+    // `T` there that are nobody else's during `'a`.
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer, length) })
 }
 
@@ -114,7 +116,7 @@ pub(super) fn check_apart(a: *const f64, b: *const f64, length: usize, what: &st
 /// # Safety
 /// `pointer` is null or at bytes that end with a zero and that nobody writes to during `'a`.
 pub(super) unsafe fn text<'a>(pointer: *const c_char, name: &str) -> Result<&'a str, Failure> {
-    // SAFETY: as the caller promises.
+    // SAFETY: `c_str` asks for what this function does: null, or bytes up to a zero that nobody writes to during `'a`.
     let bytes = unsafe { c_str(pointer, name) }?;
     bytes
         .to_str()
@@ -125,7 +127,7 @@ pub(super) unsafe fn text<'a>(pointer: *const c_char, name: &str) -> Result<&'a 
 /// As [`text`].
 pub(super) unsafe fn c_str<'a>(pointer: *const c_char, name: &str) -> Result<&'a CStr, Failure> {
     check(pointer, name)?;
-    // SAFETY: not null; the rest is the caller's word.
+    // SAFETY: `check` found it not null; the caller promises bytes up to a zero that nobody writes to during `'a`.
     Ok(unsafe { CStr::from_ptr(pointer) })
 }
 

@@ -1,30 +1,29 @@
-//! The fast engine: the same forces as [`Reference`](super::reference::Reference), from a sweep over particles in the order
-//! of cells.
+//! The fast engine: forces by one traversal of all cells, without a neighbour list. `docs/engine.md` explains it with
+//! figures. At the speed of DPD particles a neighbour list would live a few steps and cost more than it saves.
 //!
-//! Every step the particles are sorted into columns of cells ([`grid`], [`workspace`]). Each plane of columns
-//! ([`plane`]) finds the pairs in half of its neighbourhood: the cells where a particle looks
-//! ([`windows`]), cut into sixteens for four particles that look together ([`chunks`]), and who of those
-//! is near ([`look`]), in words of sixteen bits ([`fixed16_scale`]). Pairs are evaluated in blocks that stay in
-//! the first-level cache ([`buffers`], [`evaluate`], [`thermostat`], [`terms`]; [`aside`] for formulas and
-//! tables), and added to their particles ([`scatter`]). The pairs that a many-body density reaches are
-//! kept for a second pass, after ψ ([`many_body`]). There is no neighbour list: at the speed that DPD
-//! particles move, one lives a few steps and costs more than it saves.
+//! Rooms, from the ground up; a file imports from its own room and from those above it in this list:
 //!
-//! [`simd`] has the vectors of each instruction set, [`arithmetic`] the two precisions, [`compiled`]
-//! the passes for each of both, chosen once. [`pool`] shares planes among threads; what a plane adds
-//! to another has accumulators of its own, so sums are the same for any number of threads.
+//! - [`simd`]: vectors of each instruction set.
+//! - [`ground`]: box geometry, cell grid, fixed-point coordinates, packed particles, tables of terms.
+//! - [`cells`]: the particles in the order of cells.
+//! - [`pair_search`]: cell ranges, i-clusters and j-clusters, distance filter.
+//! - [`pair_batch`]: terms, densities and noise of a batch of pairs, added to accumulators.
+//! - [`passes`]: the two passes over the pairs of a plane; ψ is evaluated between them.
+//! - [`compiled`]: the passes, compiled for each instruction set and precision.
+//! - [`workspace`]: arrays, sorting, ψ, and the scheduler that sends planes through all this.
+//! - [`Sweep`]: what hosts see.
 
 mod cells;
+mod compiled;
 mod ground;
 mod pair_batch;
 mod pair_search;
 mod passes;
-mod pool;
 mod simd;
 mod times;
 mod workspace;
 
-pub use pool::{Pool, part};
+pub use psidpd_threads::{Pool, part};
 pub use times::Times;
 
 use super::counts::PassCounts;
@@ -47,8 +46,7 @@ use std::time::Instant;
 use times::lap;
 use workspace::{ForceSink, Input, Workspace, extremes};
 
-/// Forces of one fluid, fast: [`Sweep::evaluate`] where all particles are in hand. For a rank of a host, with ghosts for
-/// whatever is beyond it, an evaluation is [`Sweep::first`], a round of slopes from owners to ghosts, and
+/// Forces of one fluid. Without ghosts an evaluation is [`Sweep::evaluate`]. On a rank of a host with ghosts it is [`Sweep::first`], a round of slopes from owners to ghosts, and
 /// [`Sweep::second`].
 pub struct Sweep {
     plan: Plan,

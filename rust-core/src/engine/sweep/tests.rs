@@ -6,6 +6,7 @@ use nalgebra::Matrix3;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
+mod miri_sized;
 mod ranks;
 use ranks::with_ghosts;
 

@@ -1,6 +1,5 @@
 //! Where the time goes.
 
-use std::ops::AddAssign;
 use std::time::Instant;
 
 /// Seconds spent in the parts of evaluations, since the engine was made.
@@ -18,7 +17,7 @@ pub struct Times {
     pub forces: f64,
 }
 
-impl AddAssign for Times {
+impl std::ops::AddAssign for Times {
     fn add_assign(&mut self, other: Times) {
         self.sort += other.sort;
         self.first += other.first;

@@ -3,12 +3,11 @@
 mod accumulators;
 mod cell_order;
 mod excess;
-mod fluid_constants;
+mod fluid;
 mod forces;
 mod host;
 mod input;
 mod scheduler;
-mod shared_particles;
 mod slopes;
 mod sorted_particles;
 mod thread_slab;
@@ -21,25 +20,22 @@ use crate::engine::error::EngineError;
 use crate::engine::instruction_set::InstructionSet;
 use crate::engine::noise::PairNoise;
 use crate::engine::plan::Plan;
-use crate::engine::sweep::cells::ghosts::Ghosts;
 use crate::engine::sweep::cells::sorted::SortedCells;
+use crate::engine::sweep::compiled::{PairPrecision, Passes};
 use crate::engine::sweep::ground::box_geometry::BoxGeometry;
 use crate::engine::sweep::ground::cell_grid::CellGrid;
 use crate::engine::sweep::ground::terms::Terms;
 use crate::engine::sweep::pair_batch::inputs::PairInputs;
 use crate::engine::sweep::passes::data::PassData;
-use crate::engine::sweep::passes::slopes::PassSlopes;
-use crate::engine::sweep::passes::{PairPrecision, Passes};
-use crate::engine::sweep::pool::Pool;
 use crate::engine::sweep::times::Times;
-use accumulators::Accumulators;
+use accumulators::AccumulatorArrays;
 use cell_order::CellOrder;
 use excess::ExcessInput;
-use fluid_constants::FluidConstants;
+use fluid::FluidConstants;
+use psidpd_threads::Pool;
 use scheduler::{PassInput, Scheduler, thread_slabs};
-use shared_particles::SharedParticles;
-use slopes::Slopes;
-use sorted_particles::SortedParticles;
+use slopes::SlopeArrays;
+use sorted_particles::{SharedParticles, SortedParticles};
 use std::ops::Range;
 use thread_slab::{PlaneResults, ThreadSlab, ThreadState};
 
@@ -48,8 +44,8 @@ pub struct Workspace<P: PairPrecision> {
     fluid: FluidConstants<P::Scalar>,
     order: CellOrder,
     particles: SortedParticles<P::PackedParticle>,
-    accumulators: Accumulators,
-    slopes: Slopes<P::Scalar>,
+    accumulators: AccumulatorArrays,
+    slopes: SlopeArrays<P::Scalar>,
     results: PlaneResults<P::Scalar>,
     threads: Vec<ThreadState<P::Scalar>>,
     /// Of the present evaluation.
@@ -67,8 +63,8 @@ impl<P: PairPrecision> Workspace<P> {
             fluid: FluidConstants { set, terms, variables },
             order: CellOrder::new(plan.dimensions),
             particles: SortedParticles::default(),
-            accumulators: Accumulators::default(),
-            slopes: Slopes::default(),
+            accumulators: AccumulatorArrays::default(),
+            slopes: SlopeArrays::default(),
             results: PlaneResults::default(),
             threads,
             thermostat: None,
@@ -200,22 +196,18 @@ impl<P: PairPrecision> Workspace<P> {
     fn on_slabs(
         &mut self,
         planes: &[Range<usize>],
-        work: impl FnOnce(&Scheduler<P>, &mut [ThreadSlab<P::Scalar>], &mut Accumulators),
+        work: impl FnOnce(&Scheduler<P>, &mut [ThreadSlab<P::Scalar>], &mut AccumulatorArrays),
     ) {
         let Workspace { fluid, order, particles, accumulators, slopes, results, threads, .. } = self;
         let particles = &particles.share();
         let slopes = slopes.share();
-        let SharedParticles { x, fixed16_scale, fixed16, packed, species, .. } = *particles;
-        let ghosts = Ghosts {
-            flags: particles.ghost,
-            owned_bits: particles.owned_bits,
-            owned_of_column: particles.owned_of_column,
-        };
-        let (geometry, grid, terms) = (&order.geometry, &order.grid, &fluid.terms);
+        let SharedParticles { x, fixed16_scale, fixed16, packed, species, ghosts } = *particles;
+        let (geometry, grid, start) = (&order.geometry, &order.grid, &order.start[..]);
+        let (terms, thermostat) = (&fluid.terms, self.thermostat);
         let data = PassData {
-            cells: SortedCells { geometry, grid, start: &order.start, x, fixed16, fixed16_scale, ghosts },
-            inputs: PairInputs { geometry, terms, thermostat: self.thermostat, packed, species, ghosts },
-            slopes: PassSlopes { values: slopes.rows, packed: slopes.packed, stride: slopes.stride },
+            cells: SortedCells { geometry, grid, start, x, fixed16, fixed16_scale, ghosts },
+            inputs: PairInputs { geometry, terms, thermostat, packed, species, ghosts },
+            slopes: slopes.slopes,
         };
         let passes = Passes::new(fluid.set, &fluid.terms, self.totals);
         let mut slabs = results.split(order, planes, fluid.width(), threads);

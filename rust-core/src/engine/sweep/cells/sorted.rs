@@ -4,10 +4,7 @@ use super::ghosts::Ghosts;
 use crate::engine::sweep::ground::box_geometry::BoxGeometry;
 use crate::engine::sweep::ground::cell_grid::CellGrid;
 use crate::engine::sweep::ground::fixed_point::FixedPoint16;
-use crate::engine::sweep::ground::shared_slice::SharedSlice;
-
-/// Elements behind the last particle that whole vectors may read.
-pub const VECTOR_PADDING: usize = 16;
+use psidpd_threads::SharedSlice;
 
 /// Everything that the pair search reads.
 ///

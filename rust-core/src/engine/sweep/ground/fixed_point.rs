@@ -1,13 +1,9 @@
-//! Fixed-point coordinates: of 32 bits in packed particles, of 16 bits in the distance filter. Rounding to 16 bits only ever
-//! lets too many pairs through.
+//! 16-bit fixed-point coordinates for the distance filter. Rounding only ever lets too many pairs through.
 
 use super::box_geometry::BoxGeometry;
 use super::cell_grid::CellGrid;
 
-/// Units of 32-bit fixed-point coordinates in the length of the box.
-pub const TWO_TO_32: f64 = 4_294_967_296.0;
-
-/// The unit of 16-bit coordinates, and the limit of the distance filter in it.
+/// The unit of these coordinates, and the limit of the distance filter in it.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct FixedPoint16 {
     /// Units per length. Coordinates wrap; particles that are compared are less than half a turn apart.

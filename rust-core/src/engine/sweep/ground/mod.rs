@@ -5,6 +5,5 @@ pub mod arithmetic;
 pub mod box_geometry;
 pub mod cell_grid;
 pub mod fixed_point;
-pub mod shared_slice;
 pub mod species_pairs;
 pub mod terms;

@@ -3,8 +3,8 @@
 use crate::engine::noise::PairNoise;
 use crate::engine::sweep::cells::ghosts::Ghosts;
 use crate::engine::sweep::ground::box_geometry::BoxGeometry;
-use crate::engine::sweep::ground::shared_slice::SharedSlice;
 use crate::engine::sweep::ground::terms::Terms;
+use psidpd_threads::SharedSlice;
 
 /// The particles in the order of cells and the terms that act between them.
 #[derive(Clone, Copy)]

@@ -32,11 +32,10 @@ impl From<Batch<'_>> for ScatterPairs {
 /// Adds the forces of a batch, and the weights if there is one density.
 ///
 /// # Safety
-/// The buffers hold the quads of the batch, which is of the plane of `sums`.
+/// The contract of `simd`. The sums are those of the plane that the batch is of, and the buffers hold its quads.
 #[inline(always)]
 pub unsafe fn scatter_forces<I: Isa, A: Arithmetic<I>>(
     sums: PlaneSums,
-    variables: usize,
     buffers: &mut BatchBuffers<A::Scalar>,
     batch: Batch,
 ) {
@@ -45,7 +44,7 @@ pub unsafe fn scatter_forces<I: Isa, A: Arithmetic<I>>(
         let to = sums.forces();
         let quads = buffers.quads.as_mut_ptr().cast::<A::Scalar>();
         // Reuse the memory of the pairs, which is in the cache, unless weights are to come.
-        let running = if variables > 1 {
+        let running = if sums.variables > 1 {
             buffers.running.as_mut_ptr().cast()
         } else {
             buffers.pairs.as_mut_ptr().cast()
@@ -147,7 +146,6 @@ pub unsafe fn scatter_weights<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool
     // SAFETY: as `scatter_forces`; weights and pairs of species are there in whole vectors.
     unsafe {
         let terms = inputs.terms;
-        let quads_per_particle = terms.variables().div_ceil(4);
         let quads = buffers.quads.as_mut_ptr().cast::<A::Scalar>();
         let i_quads = if MULTISPECIES { buffers.i_quads.as_mut_ptr().cast() } else { quads };
         let vectors = batch.count.div_ceil(A::Reals::LANES);
@@ -155,8 +153,8 @@ pub unsafe fn scatter_weights<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool
         let fits_vector = terms.species * terms.species <= A::Reals::LANES;
         let zero = A::Reals::constant(0.0);
         let mut quad = 0;
-        while quad < quads_per_particle {
-            let variables = 4.min(terms.variables() - 4 * quad);
+        while quad < sums.density_quads() {
+            let variables = 4.min(sums.variables - 4 * quad);
             let none = WeightSource { weights: std::ptr::null(), is_species: [std::ptr::null(); 2] };
             let mut sources = [none; 4];
             let mut c = 0;
@@ -195,7 +193,7 @@ pub unsafe fn scatter_weights<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool
                 v += 1;
             }
             // Weights are negative, so both particles get minus a quad.
-            let to = sums.densities(quads_per_particle, quad);
+            let to = sums.densities(quad);
             let running = buffers.running.as_mut_ptr().cast();
             scatter_quads::<I, A>(to, quads, i_quads, running, [-1.0; 4], batch.into());
             quad += 1;

@@ -152,7 +152,7 @@ unsafe fn power<R: Reals>(t: R, exponent: R) -> R {
         exponent.store(exponents.as_mut_ptr());
     }
     powers(&mut bases[..R::LANES], &exponents);
-    // SAFETY: as above.
+    // SAFETY: no vector has more than sixteen lanes.
     unsafe { R::load(bases.as_ptr()) }
 }
 

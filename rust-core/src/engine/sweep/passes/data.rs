@@ -1,6 +1,6 @@
 //! What the passes are given.
 
-use super::slopes::PassSlopes;
+use super::slopes::Slopes;
 use crate::engine::sweep::cells::sorted::SortedCells;
 use crate::engine::sweep::pair_batch::inputs::PairInputs;
 
@@ -8,5 +8,5 @@ use crate::engine::sweep::pair_batch::inputs::PairInputs;
 pub struct PassData<'a, T, R> {
     pub cells: SortedCells<'a>,
     pub inputs: PairInputs<'a, T, R>,
-    pub slopes: PassSlopes<'a, T>,
+    pub slopes: Slopes<'a, T>,
 }

@@ -19,8 +19,8 @@ use crate::engine::tally::Tally;
 /// Does the first pass over `plane`; leaves in `in_range` what the second one needs.
 ///
 /// # Safety
-/// The contract of `simd`. Arrays are as the types in [`PassData`] say, accumulators of the plane are zero, and no other
-/// thread is at this plane.
+/// The contract of `simd`. Arrays are as the types in [`PassData`] say; places of the plane, of the next one and the padding
+/// behind are filled, and nobody writes them. The sums are those of the plane, and zero.
 #[inline(always)]
 pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool>(
     data: &PassData<A::Scalar, A::PackedParticle>,
@@ -93,7 +93,6 @@ unsafe fn do_batch<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TAL
     // batch; the caller upholds the rest.
     unsafe {
         let inputs = &data.inputs;
-        let variables = inputs.terms.variables();
         let Some(batch) = Batch::of_group(&buffers.search, slots) else { return };
         let buffers = &mut buffers.batch;
         buffers.reserve(batch.count);
@@ -101,10 +100,10 @@ unsafe fn do_batch<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TAL
         evaluate::<I, A, MULTISPECIES, TALLY>(inputs, constants, buffers, in_range, batch, tally);
         // Forces first: the quads of weights replace theirs.
         if !(MULTISPECIES && inputs.caches_all_pairs()) {
-            scatter_forces::<I, A>(sums, variables, buffers, batch);
+            scatter_forces::<I, A>(sums, buffers, batch);
             in_range.add::<TALLY>(&buffers.found, batch);
         }
-        if variables > 1 {
+        if sums.variables > 1 {
             scatter_weights::<I, A, MULTISPECIES>(inputs, sums, buffers, batch);
         }
     }

@@ -47,11 +47,11 @@ impl ISums {
     }
 }
 
-/// Does the second pass over the plane of `sums`, and adds to the virial with `TALLY`.
+/// Does the second pass over `plane`, and adds to the virial with `TALLY`.
 ///
 /// # Safety
-/// As [`first_pass`](super::first::first_pass), which has filled `in_range` with the same `TALLY`. The slopes of the plane
-/// and of the next one are there.
+/// The contract of `simd`. [`first_pass`](super::first::first_pass) has filled `in_range` for the plane whose sums these are,
+/// with the same `TALLY`. The slopes of the plane and of the next one are there, and nobody writes them.
 #[inline(always)]
 pub unsafe fn second_pass<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool>(
     data: &PassData<A::Scalar, A::PackedParticle>,

@@ -14,7 +14,7 @@ use crate::engine::sweep::pair_batch::scatter::{ScatterPairs, scatter_quads};
 use crate::engine::sweep::simd::{Isa, Reals, Words};
 use crate::model::kernel::Real;
 
-/// Does the second pass over the plane of `sums`, and adds to the virial with `TALLY`.
+/// Does the second pass over `plane`, and adds to the virial with `TALLY`.
 ///
 /// # Safety
 /// As [`second_pass`](super::second::second_pass).
@@ -34,16 +34,21 @@ pub unsafe fn second_pass_cached<I: Isa, A: Arithmetic<I>, const MULTISPECIES: b
         let mut factors: Vec<CacheLines<A::Scalar>> = vec![CacheLines::default(); room];
         let quads = quads.as_mut_ptr().cast::<A::Scalar>();
         let factors = factors.as_mut_ptr().cast::<A::Scalar>();
-        let variables = data.inputs.terms.variables();
+        let variables = sums.variables;
         for batch in &cache.batches {
             let count = batch.begin[batch.members as usize] as usize;
             let pairs = CachedPairs { cache, batch, vectors: count.div_ceil(A::Reals::LANES) };
             if variables <= 4 && data.inputs.terms.species <= 2 {
-                find_factors::<I, A, MULTISPECIES, 4>(data, &pairs, 0, factors);
+                find_factors::<I, A, MULTISPECIES, 4>(data, &pairs, [0, variables], factors);
             } else {
                 let mut first = 0;
                 while first < variables {
-                    find_factors::<I, A, MULTISPECIES, SLOPES_PER_BLOCK>(data, &pairs, first, factors);
+                    find_factors::<I, A, MULTISPECIES, SLOPES_PER_BLOCK>(
+                        data,
+                        &pairs,
+                        [first, variables],
+                        factors,
+                    );
                     first += SLOPES_PER_BLOCK;
                 }
             }
@@ -80,13 +85,13 @@ impl<T> CachedPairs<'_, T> {
 
     #[inline(always)]
     fn j_offsets(&self) -> *const u32 {
-        // SAFETY: as above.
+        // SAFETY: the vectors of a batch are in every field.
         unsafe { self.cache.j_offsets.as_ptr().add(self.batch.vector).cast() }
     }
 
     #[inline(always)]
     fn codes(&self) -> *const u32 {
-        // SAFETY: as above.
+        // SAFETY: the vectors of a batch are in every field.
         unsafe { self.cache.codes.as_ptr().add(self.batch.vector).cast() }
     }
 }
@@ -113,15 +118,16 @@ struct ISlopes<T>([[T; 16]; SLOPES_PER_BLOCK]);
 unsafe fn find_factors<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const N: usize>(
     data: &PassData<A::Scalar, A::PackedParticle>,
     pairs: &CachedPairs<A::Scalar>,
-    first: usize,
+    [first, variables]: [usize; 2],
     factors: *mut A::Scalar,
 ) {
-    // SAFETY: there are slopes of every particle of the plane and of the next one; the caller upholds the rest.
+    // SAFETY: of the i-particles only slopes of those that there are are read, those of j-particles are of the plane or the
+    // next one; the caller upholds the rest.
     unsafe {
         let zero = A::Reals::constant(0.0);
         let terms = data.inputs.terms;
         let species = terms.species;
-        let count = N.min(data.inputs.terms.variables() - first);
+        let count = N.min(variables - first);
         let slopes = data.slopes.packed.at(first / SLOPES_PER_BLOCK * data.slopes.stride).cast_const();
         let mut i_slopes = ISlopes([[A::Scalar::default(); 16]; SLOPES_PER_BLOCK]);
         let own_slopes = slopes.add(SLOPES_PER_BLOCK * pairs.batch.first as usize);

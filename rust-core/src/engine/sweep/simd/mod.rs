@@ -96,7 +96,7 @@ pub trait Reals: Real {
     unsafe fn inverse_root(self) -> Self;
     /// The smaller of two.
     unsafe fn smaller(self, other: Self) -> Self;
-    /// Writes whole numbers, rounded towards zero.
+    /// Writes whole numbers, rounded towards zero; of numbers that an `i32` has room for.
     unsafe fn store_whole(self, p: *mut i32);
     /// The nearest whole number, as long as it is small.
     unsafe fn round(self) -> Self;

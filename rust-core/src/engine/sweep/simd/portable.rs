@@ -111,7 +111,7 @@ macro_rules! lanes {
             #[inline(always)]
             unsafe fn store_whole(self, p: *mut i32) {
                 for k in 0..LANES {
-                    // SAFETY: the caller's numbers are in range.
+                    // SAFETY: the trait asks for numbers in range.
                     unsafe { *p.add(k) = self.0[k].to_int_unchecked() };
                 }
             }

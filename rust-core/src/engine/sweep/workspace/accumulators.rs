@@ -14,7 +14,7 @@ const TURNS: usize = 3;
 
 /// The accumulators of all planes, those of a thread slab in one piece.
 #[derive(Default)]
-pub struct Accumulators {
+pub struct AccumulatorArrays {
     /// What to add to the number of a particle to get that of its accumulator, for each plane.
     offset: Vec<isize>,
     /// How many accumulators each thread slab has.
@@ -52,7 +52,7 @@ pub struct Added<'a> {
     pub densities: &'a [Accumulator],
 }
 
-impl Accumulators {
+impl AccumulatorArrays {
     /// Lays out accumulators for thread slabs, for `variables` densities. If planes are `reused`, all but the first two of a
     /// slab are used again three planes on.
     pub fn lay_out(&mut self, order: &CellOrder, slabs: &[Range<usize>], variables: usize, reused: bool) {
@@ -88,7 +88,7 @@ impl Accumulators {
 
     /// Those of each thread slab.
     pub fn split(&mut self) -> impl Iterator<Item = SlabSums<'_>> {
-        let Accumulators { offset, slab_sizes, forces, densities, quads } = self;
+        let AccumulatorArrays { offset, slab_sizes, forces, densities, quads } = self;
         let (offset, quads) = (&offset[..], *quads);
         let (mut forces, mut densities, mut next) = (&mut forces[..], &mut densities[..], 0);
         slab_sizes.iter().map(move |size| {
@@ -104,7 +104,7 @@ impl Accumulators {
 
     /// All of them, to read.
     pub fn sums(&self) -> Sums<'_> {
-        let Accumulators { offset, forces, densities, quads, .. } = self;
+        let AccumulatorArrays { offset, forces, densities, quads, .. } = self;
         Sums { forces, densities, offset, begin: 0, quads: *quads }
     }
 

@@ -9,15 +9,16 @@ use crate::engine::error::EngineError;
 use crate::engine::instruction_set::InstructionSet;
 use crate::engine::sweep::ground::box_geometry::BoxGeometry;
 use crate::engine::sweep::ground::cell_grid::CellGrid;
-use crate::engine::sweep::ground::shared_slice::SharedSlice;
 use crate::engine::sweep::pair_batch::in_range_pairs::J_CODE_BITS;
-use crate::engine::sweep::pool::{Pool, part};
 use crate::engine::vectors;
 use count::{Count, CountRange, NO_CELL};
 use fractions::Fractions;
+use psidpd_threads::SharedSlice;
+use psidpd_threads::{Pool, part};
 use std::ops::Range;
 
 pub use extremes::extremes;
+pub use fractions::TWO_TO_32;
 
 /// Up to so many particles all arrays stay in the cache, and nothing is prefetched; lowered in tests.
 const PREFETCH_THRESHOLD: usize = if cfg!(test) { 100 } else { 1 << 14 };

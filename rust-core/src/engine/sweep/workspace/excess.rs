@@ -2,7 +2,7 @@
 
 use super::accumulators::Added;
 use super::cell_order::CellOrder;
-use super::fluid_constants::FluidConstants;
+use super::fluid::FluidConstants;
 use super::input::Input;
 use crate::engine::error::EngineError;
 use crate::engine::excess::ExcessPlan;

@@ -2,9 +2,9 @@
 
 use super::accumulators::Added;
 use crate::engine::instruction_set::InstructionSet;
-use crate::engine::sweep::ground::shared_slice::SharedSlice;
 use crate::engine::sweep::pair_batch::accumulators::Accumulator;
 use crate::engine::vectors::{self, Loop};
+use psidpd_threads::SharedSlice;
 
 /// Where the host wants forces.
 #[derive(Clone, Copy)]

@@ -2,7 +2,7 @@
 
 use super::Workspace;
 use crate::engine::counts::PassCounts;
-use crate::engine::sweep::passes::PairPrecision;
+use crate::engine::sweep::compiled::PairPrecision;
 use crate::engine::tally::Tally;
 
 impl<P: PairPrecision> Workspace<P> {

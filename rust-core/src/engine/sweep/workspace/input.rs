@@ -2,6 +2,9 @@ use crate::engine::noise::PairNoise;
 use crate::engine::particles::Particles;
 use crate::engine::tally::Want;
 
+/// Room behind the last particle: what whole vectors may read.
+pub const VECTOR_PADDING: usize = 16;
+
 /// What the host hands over.
 pub struct Input<'a> {
     pub particles: Particles<'a>,

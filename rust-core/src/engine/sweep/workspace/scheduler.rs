@@ -15,16 +15,15 @@
 use super::accumulators::{SlabSums, Sums};
 use super::cell_order::CellOrder;
 use super::excess::{DENSITY_BLOCK, DensityBlock, ExcessInput};
-use super::fluid_constants::FluidConstants;
+use super::fluid::FluidConstants;
 use super::forces::ForceSink;
-use super::input::Input;
-use super::shared_particles::SharedParticles;
+use super::input::{Input, VECTOR_PADDING};
 use super::slopes::SharedSlopes;
+use super::sorted_particles::SharedParticles;
 use super::thread_slab::ThreadSlab;
-use crate::engine::sweep::cells::sorted::VECTOR_PADDING;
+use crate::engine::sweep::compiled::{PairPrecision, Passes};
 use crate::engine::sweep::pair_batch::accumulators::{Accumulator, PlaneSums};
 use crate::engine::sweep::passes::data::PassData;
-use crate::engine::sweep::passes::{PairPrecision, Passes};
 use crate::engine::sweep::times::lap;
 use std::ops::Range;
 use std::time::Instant;
@@ -232,7 +231,7 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         let [forces, densities] = sums.of_plane(self.order, plane);
         forces.fill(Accumulator::default());
         densities.fill(Accumulator::default());
-        let sums = PlaneSums::new(self.order.plane_start(plane), forces, densities);
+        let sums = PlaneSums::new(self.order.plane_start(plane), forces, densities, self.fluid.width());
         // SAFETY: the arrays have the room that `make_room` of each has made for this order, and are filled where the pass
         // reads them, as the caller promises; the accumulators are those of this plane and the next.
         *tally = unsafe { self.passes.first(&self.data, plane, sums, buffers, in_range) };
@@ -249,7 +248,7 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         for first in of_plane.clone().step_by(DENSITY_BLOCK) {
             let particles = first..of_plane.end.min(first + DENSITY_BLOCK);
             let (own, count) = (first - slab.first, particles.len());
-            let has_species = self.particles.species.len() > 0;
+            let has_species = !self.particles.species.is_empty();
             // SAFETY: particles of a plane of this thread's slab, which is filled: nobody writes their species, and nobody
             // else accesses their slopes, as the caller promises.
             let (species, slopes) = unsafe {
@@ -260,7 +259,7 @@ impl<P: PairPrecision> Scheduler<'_, P> {
                 first,
                 added: sums.of_particles(self.order, plane, particles.clone()),
                 species,
-                ghost: self.particles.ghost.get(particles.clone()).unwrap_or_default(),
+                ghost: self.particles.ghosts.flags.get(particles.clone()).unwrap_or_default(),
                 densities: &mut slab.densities[width * own..][..width * count],
                 excess: &mut slab.excess[own..][..count],
                 slopes: &mut *slopes,
@@ -284,7 +283,7 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         }
         let (_, in_range, tally) = slab.plane(plane);
         let [forces, densities] = sums.of_plane(self.order, plane);
-        let sums = PlaneSums::new(self.order.plane_start(plane), forces, densities);
+        let sums = PlaneSums::new(self.order.plane_start(plane), forces, densities, self.fluid.width());
         // SAFETY: the pairs are those that the first pass of this plane has kept; slopes are there, as the caller promises;
         // the accumulators are those of this plane and the next.
         unsafe { self.passes.second(&self.data, sums, in_range, &mut tally.virial) };

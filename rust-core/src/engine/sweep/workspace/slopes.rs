@@ -1,15 +1,15 @@
 //! The slopes of ψ, as the second pass reads them.
 
 use super::cell_order::CellOrder;
-use crate::engine::sweep::cells::sorted::VECTOR_PADDING;
-use crate::engine::sweep::ground::shared_slice::SharedSlice;
-use crate::engine::sweep::passes::slopes::SLOPES_PER_BLOCK;
+use super::input::VECTOR_PADDING;
+use crate::engine::sweep::passes::slopes::{SLOPES_PER_BLOCK, Slopes};
 use crate::engine::sweep::simd::Scalar;
+use psidpd_threads::SharedSlice;
 use std::ops::Range;
 
 /// Slopes of all particles in the order of cells, then those of the copies of the first plane.
 #[derive(Default)]
-pub struct Slopes<T> {
+pub struct SlopeArrays<T> {
     /// How many there are of each particle.
     width: usize,
     /// A row for each particle.
@@ -25,12 +25,10 @@ pub struct Slopes<T> {
 #[derive(Clone, Copy)]
 pub struct SharedSlopes<'a, T> {
     width: usize,
-    pub rows: SharedSlice<'a, f64>,
-    pub packed: SharedSlice<'a, T>,
-    pub stride: usize,
+    pub slopes: Slopes<'a, T>,
 }
 
-impl<T: Scalar> Slopes<T> {
+impl<T: Scalar> SlopeArrays<T> {
     /// Room for all particles of an order, and for packed rows if they are wanted.
     pub fn make_room(&mut self, order: &CellOrder, width: usize, packs: bool) {
         let total = order.particles() + order.copies();
@@ -67,9 +65,11 @@ impl<T: Scalar> Slopes<T> {
     pub fn share(&mut self) -> SharedSlopes<'_, T> {
         SharedSlopes {
             width: self.width,
-            rows: SharedSlice::new(&mut self.rows),
-            packed: SharedSlice::new(&mut self.packed),
-            stride: self.stride,
+            slopes: Slopes {
+                values: SharedSlice::new(&mut self.rows),
+                packed: SharedSlice::new(&mut self.packed),
+                stride: self.stride,
+            },
         }
     }
 
@@ -86,7 +86,7 @@ impl<'a, T: Scalar> SharedSlopes<'a, T> {
     /// Nobody else accesses their slopes while they are in use.
     pub unsafe fn rows_mut(self, particles: Range<usize>) -> &'a mut [f64] {
         // SAFETY: rows of these particles, which nobody else accesses, as the caller promises.
-        unsafe { self.rows.slice_mut(self.width * particles.start..self.width * particles.end) }
+        unsafe { self.slopes.values.slice_mut(self.width * particles.start..self.width * particles.end) }
     }
 
     /// Packs the slopes of particles, if that is wanted.
@@ -94,17 +94,18 @@ impl<'a, T: Scalar> SharedSlopes<'a, T> {
     /// # Safety
     /// Nobody else accesses their slopes meanwhile.
     pub unsafe fn pack(self, particles: Range<usize>, slopes: &[f64]) {
+        let Slopes { packed, stride, .. } = self.slopes;
         let mut first = SLOPES_PER_BLOCK * particles.start;
-        for eight in 0..self.packed.len() / self.stride {
+        for eight in 0..packed.len() / stride {
             // SAFETY: packed rows of these particles, which nobody else accesses, as the caller promises.
-            let to = unsafe { self.packed.slice_mut(first..first + SLOPES_PER_BLOCK * particles.len()) };
+            let to = unsafe { packed.slice_mut(first..first + SLOPES_PER_BLOCK * particles.len()) };
             match self.width {
                 2 => pack_few::<2, T>(slopes, to),
                 3 => pack_few::<3, T>(slopes, to),
                 4 => pack_few::<4, T>(slopes, to),
                 width => pack(width, eight, slopes, to),
             }
-            first += self.stride;
+            first += stride;
         }
     }
 }

@@ -3,17 +3,11 @@
 mod fill;
 
 use super::cell_order::CellOrder;
-use super::input::Input;
-use super::shared_particles::SharedParticles;
-use crate::engine::instruction_set::InstructionSet;
-use crate::engine::sweep::cells::ghosts::OwnedOfColumn;
-use crate::engine::sweep::cells::sorted::VECTOR_PADDING;
+use super::input::VECTOR_PADDING;
+use crate::engine::sweep::cells::ghosts::{Ghosts, OwnedOfColumn};
 use crate::engine::sweep::ground::arithmetic::PackedParticle;
 use crate::engine::sweep::ground::fixed_point::FixedPoint16;
-use crate::engine::sweep::ground::shared_slice::SharedSlice;
-use crate::engine::vectors;
-use fill::{Fill, FillRange};
-use std::ops::Range;
+use psidpd_threads::SharedSlice;
 
 /// Arrays in the order of cells; copies of the first plane follow the last particle, then padding.
 #[derive(Default)]
@@ -29,6 +23,16 @@ pub struct SortedParticles<R> {
     pub ghost: Vec<bool>,
     owned_bits: Vec<u8>,
     owned_of_column: Vec<OwnedOfColumn>,
+}
+
+/// The same for the time of the passes: threads fill the places of their own slabs, and read there and one plane behind.
+pub struct SharedParticles<'a, R> {
+    pub x: [SharedSlice<'a, f32>; 3],
+    pub fixed16_scale: FixedPoint16,
+    pub fixed16: [SharedSlice<'a, u16>; 3],
+    pub packed: SharedSlice<'a, R>,
+    pub species: SharedSlice<'a, u8>,
+    pub ghosts: Ghosts<'a>,
 }
 
 impl<R: PackedParticle> SortedParticles<R> {
@@ -102,9 +106,11 @@ impl<R: PackedParticle> SortedParticles<R> {
             fixed16: self.fixed16.each_mut().map(|fixed16| SharedSlice::new(fixed16)),
             packed: SharedSlice::new(&mut self.packed),
             species: SharedSlice::new(&mut self.species),
-            ghost: &self.ghost,
-            owned_bits: &self.owned_bits,
-            owned_of_column: &self.owned_of_column,
+            ghosts: Ghosts {
+                flags: &self.ghost,
+                owned_bits: &self.owned_bits,
+                owned_of_column: &self.owned_of_column,
+            },
         }
     }
 
@@ -116,39 +122,6 @@ impl<R: PackedParticle> SortedParticles<R> {
             + self.species.capacity()
             + self.ghost.capacity()
             + self.owned_bits.capacity()
-    }
-}
-
-impl<R: PackedParticle> SharedParticles<'_, R> {
-    /// Fills places from a multiple of [`VECTOR_PADDING`] on, and up to one, or to the last. Behind the last whole
-    /// vectors are written.
-    ///
-    /// # Safety
-    /// Nobody else accesses these places meanwhile, nor, if they reach to the last, those behind it.
-    pub unsafe fn fill(&self, set: InstructionSet, order: &CellOrder, input: &Input, places: Range<usize>) {
-        let (moving, multispecies) = (input.thermostat.is_some(), self.species.len() > 0);
-        assert!(places.end <= order.particles(), "places of particles");
-        assert!(
-            self.x.iter().all(|x| x.len() >= places.end + VECTOR_PADDING)
-                && self.fixed16.iter().all(|x| x.len() >= places.end + VECTOR_PADDING)
-                && self.packed.len() >= places.end
-                && (!multispecies || self.species.len() >= places.end),
-            "room for the particles"
-        );
-        let particles = &input.particles;
-        assert!(
-            particles.x.len() >= order.all
-                && particles.tag.len() >= order.all
-                && (!moving || input.v.len() >= order.all),
-            "the particles that were sorted"
-        );
-        let fill = &Fill { input, order, to: self };
-        match (moving, multispecies) {
-            (true, true) => vectors::run(set, FillRange::<_, true, true> { fill, places }),
-            (true, false) => vectors::run(set, FillRange::<_, true, false> { fill, places }),
-            (false, true) => vectors::run(set, FillRange::<_, false, true> { fill, places }),
-            (false, false) => vectors::run(set, FillRange::<_, false, false> { fill, places }),
-        }
     }
 }
 

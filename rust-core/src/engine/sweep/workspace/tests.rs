@@ -1,3 +1,5 @@
+use super::cell_order::TWO_TO_32;
+use super::input::VECTOR_PADDING;
 use super::*;
 use crate::engine::domain::PeriodicBox;
 use crate::engine::noise::threefry2x32;
@@ -6,10 +8,9 @@ use crate::engine::plan::Plan;
 use crate::engine::settings::Instructions;
 use crate::engine::sweep::cells::sorted::VECTOR_PADDING;
 use crate::engine::sweep::ground::arithmetic::{Double, Mixed};
-use crate::engine::sweep::ground::fixed_point::TWO_TO_32;
-use crate::engine::sweep::pool::part;
 use crate::model::Model;
 use nalgebra::Matrix3;
+use psidpd_threads::part;
 use std::num::NonZeroUsize;
 
 fn portable() -> InstructionSet {

@@ -29,8 +29,9 @@ pub struct ThreadState<T> {
 
 impl<T: Scalar> ThreadState<T> {
     pub fn new(passes: usize, set: InstructionSet) -> ThreadState<T> {
+        let buffers = PairBuffers::new(passes);
         ThreadState {
-            buffers: PairBuffers::new(passes),
+            buffers,
             excess: ExcessPass::new(set),
             fault: None,
             lost: None,

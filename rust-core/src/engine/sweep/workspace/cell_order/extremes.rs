@@ -2,9 +2,9 @@
 
 use crate::engine::error::EngineError;
 use crate::engine::instruction_set::InstructionSet;
-use crate::engine::sweep::pool::{Pool, part};
 use crate::engine::sweep::workspace::input::Input;
 use crate::engine::vectors::{self, Loop};
+use psidpd_threads::{Pool, part};
 use std::ops::Range;
 
 /// Particles that are looked at together.

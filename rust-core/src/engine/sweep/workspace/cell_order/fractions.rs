@@ -2,7 +2,8 @@
 
 use crate::engine::sweep::ground::box_geometry::BoxGeometry;
 use crate::engine::sweep::ground::cell_grid::CellGrid;
-use crate::engine::sweep::ground::fixed_point::TWO_TO_32;
+
+pub const TWO_TO_32: f64 = 4_294_967_296.0;
 
 /// Far below what a whole number in the low bits of a double holds.
 const FAR: f64 = 1e15;

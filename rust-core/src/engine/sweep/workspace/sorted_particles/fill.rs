@@ -1,13 +1,13 @@
 //! Arrays in the order of cells, from the host's.
 
-use crate::engine::sweep::cells::sorted::VECTOR_PADDING;
+use super::SharedParticles;
+use crate::engine::instruction_set::InstructionSet;
 use crate::engine::sweep::ground::arithmetic::PackedParticle;
 use crate::engine::sweep::ground::box_geometry::BoxGeometry;
-use crate::engine::sweep::ground::fixed_point::{FixedPoint16, TWO_TO_32};
-use crate::engine::sweep::workspace::cell_order::CellOrder;
-use crate::engine::sweep::workspace::input::Input;
-use crate::engine::sweep::workspace::shared_particles::SharedParticles;
-use crate::engine::vectors::Loop;
+use crate::engine::sweep::ground::fixed_point::FixedPoint16;
+use crate::engine::sweep::workspace::cell_order::{CellOrder, TWO_TO_32};
+use crate::engine::sweep::workspace::input::{Input, VECTOR_PADDING};
+use crate::engine::vectors::{self, Loop};
 use std::ops::Range;
 
 /// Particles that are fetched before their coordinates are computed: loads of vectors wait for the numbers they are
@@ -17,18 +17,51 @@ const FILL_BLOCK: usize = 4 * VECTOR_PADDING;
 /// How many particles ahead the host's data of a particle are prefetched: the order of the host looks random.
 const PREFETCH_DISTANCE: usize = 64;
 
+impl<R: PackedParticle> SharedParticles<'_, R> {
+    /// Fills places from a multiple of [`VECTOR_PADDING`] on, and up to one, or to the last. Behind the last whole
+    /// vectors are written.
+    ///
+    /// # Safety
+    /// Nobody else accesses these places meanwhile, nor, if they reach to the last, those behind it.
+    pub unsafe fn fill(&self, set: InstructionSet, order: &CellOrder, input: &Input, places: Range<usize>) {
+        let (moving, multispecies) = (input.thermostat.is_some(), !self.species.is_empty());
+        assert!(places.end <= order.particles(), "places of particles");
+        assert!(
+            self.x.iter().all(|x| x.len() >= places.end + VECTOR_PADDING)
+                && self.fixed16.iter().all(|x| x.len() >= places.end + VECTOR_PADDING)
+                && self.packed.len() >= places.end
+                && (!multispecies || self.species.len() >= places.end),
+            "room for the particles"
+        );
+        let particles = &input.particles;
+        assert!(
+            particles.x.len() >= order.all
+                && particles.tag.len() >= order.all
+                && (!moving || input.v.len() >= order.all),
+            "the particles that were sorted"
+        );
+        let fill = &Fill { input, order, to: self };
+        match (moving, multispecies) {
+            (true, true) => vectors::run(set, FillRange::<_, true, true> { fill, places }),
+            (true, false) => vectors::run(set, FillRange::<_, true, false> { fill, places }),
+            (false, true) => vectors::run(set, FillRange::<_, false, true> { fill, places }),
+            (false, false) => vectors::run(set, FillRange::<_, false, false> { fill, places }),
+        }
+    }
+}
+
 /// Where particles come from, and where they go; `SharedParticles::fill` has checked that all have room.
-pub struct Fill<'a, R> {
-    pub input: &'a Input<'a>,
-    pub order: &'a CellOrder,
-    pub to: &'a SharedParticles<'a, R>,
+struct Fill<'a, R> {
+    input: &'a Input<'a>,
+    order: &'a CellOrder,
+    to: &'a SharedParticles<'a, R>,
 }
 
 /// The places that one thread fills: from a multiple of [`VECTOR_PADDING`] on. Made by `SharedParticles::fill` alone, whose
 /// caller promises that nobody else accesses them.
-pub struct FillRange<'a, R, const WITH_VELOCITIES: bool, const MULTISPECIES: bool> {
-    pub fill: &'a Fill<'a, R>,
-    pub places: Range<usize>,
+struct FillRange<'a, R, const WITH_VELOCITIES: bool, const MULTISPECIES: bool> {
+    fill: &'a Fill<'a, R>,
+    places: Range<usize>,
 }
 
 impl<R: PackedParticle, const WITH_VELOCITIES: bool, const MULTISPECIES: bool> Loop

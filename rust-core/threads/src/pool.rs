@@ -7,7 +7,7 @@
 
 mod sync;
 
-use crate::engine::sweep::ground::shared_slice::SharedSlice;
+use crate::shared_slice::SharedSlice;
 use std::cell::RefCell;
 use std::num::NonZeroUsize;
 use sync::{
@@ -230,12 +230,13 @@ impl Drop for Pool {
 }
 
 /// The part of `count` things that thread `number` of `threads` does.
+#[inline]
 pub fn part(count: usize, number: usize, threads: usize) -> std::ops::Range<usize> {
     count * number / threads..count * (number + 1) / threads
 }
 
 #[cfg(all(test, not(loom)))]
-mod tests;
+mod miri_sized;
 
 #[cfg(all(test, loom))]
-mod model;
+mod loom_model;

@@ -36,6 +36,11 @@ impl<'a, T> SharedSlice<'a, T> {
         self.len
     }
 
+    /// Whether there are none.
+    pub fn is_empty(self) -> bool {
+        self.len == 0
+    }
+
     /// The first element, to read from.
     #[inline(always)]
     pub fn as_ptr(self) -> *const T {
@@ -58,6 +63,7 @@ impl<'a, T> SharedSlice<'a, T> {
     /// # Safety
     /// While the result is in use nobody else accesses these elements.
     #[allow(clippy::mut_from_ref)] // Elements differ from call to call, as the caller promises.
+    #[inline]
     pub unsafe fn slice_mut(self, range: Range<usize>) -> &'a mut [T] {
         assert!(range.start <= range.end && range.end <= self.len, "a range of the slice");
         // SAFETY: within the slice, which is mutably borrowed for `'a`; nobody else accesses these elements, as the
@@ -69,6 +75,7 @@ impl<'a, T> SharedSlice<'a, T> {
     ///
     /// # Safety
     /// While the result is in use nobody writes these elements.
+    #[inline]
     pub unsafe fn slice(self, range: Range<usize>) -> &'a [T]
     where
         T: Sync,

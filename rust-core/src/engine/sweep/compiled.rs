@@ -1,17 +1,4 @@
-//! The two passes over the pairs of a plane, for a precision, on an instruction set. Between them ψ and its slopes are
-//! evaluated (`workspace::excess`).
-
-pub mod buffers;
-pub mod data;
-pub mod first;
-pub mod second;
-pub mod second_cached;
-pub mod slopes;
-
-use buffers::PairBuffers;
-use data::PassData;
-use first::first_pass;
-use second::second_pass;
+//! The passes over a plane, for a precision, on an instruction set.
 
 use crate::engine::instruction_set::InstructionSet;
 use crate::engine::sweep::ground::arithmetic::{
@@ -20,6 +7,10 @@ use crate::engine::sweep::ground::arithmetic::{
 use crate::engine::sweep::ground::terms::Terms;
 use crate::engine::sweep::pair_batch::accumulators::PlaneSums;
 use crate::engine::sweep::pair_batch::in_range_pairs::InRangePairs;
+use crate::engine::sweep::passes::buffers::PairBuffers;
+use crate::engine::sweep::passes::data::PassData;
+use crate::engine::sweep::passes::first::first_pass;
+use crate::engine::sweep::passes::second::second_pass;
 use crate::engine::sweep::simd::{Isa, Kernel, Scalar, run};
 use crate::engine::tally::Tally;
 use std::marker::PhantomData;

@@ -1,5 +1,5 @@
-//! The pool in every order in which its threads may run: `RUSTFLAGS="--cfg loom" cargo test --release -p psidpd-core
-//! --lib pool`. Loom finds accesses that race, calls that nobody answers, and threads that wait for ever.
+//! The pool in every order in which its threads may run: `RUSTFLAGS="--cfg loom" cargo test --release -p
+//! psidpd-threads`. Loom finds accesses that race, calls that nobody answers, and threads that wait for ever.
 
 use super::*;
 use loom::cell::UnsafeCell;
@@ -10,19 +10,23 @@ struct Numbers([UnsafeCell<usize>; 2]);
 // SAFETY: loom's cells find accesses at once, which would be a fault of the pool.
 unsafe impl Sync for Numbers {}
 
+impl Numbers {
+    fn write(&self, t: usize, value: usize) {
+        // SAFETY: each thread has a number of its own.
+        self.0[t].with_mut(|number| unsafe { *number = value });
+    }
+
+    fn read(&self, t: usize) -> usize {
+        // SAFETY: the threads are done.
+        self.0[t].with(|number| unsafe { *number })
+    }
+}
+
 /// Runs work that borrows numbers from the stack, and looks at them when it is done.
 fn run(pool: &Pool, value: usize) {
     let numbers = Numbers([UnsafeCell::new(0), UnsafeCell::new(0)]);
-    pool.run(&|t| {
-        numbers.0[t].with_mut(|number| {
-            // SAFETY: each thread has a number of its own.
-            unsafe { *number = value + t }
-        })
-    });
-    for (t, number) in numbers.0.iter().enumerate() {
-        // SAFETY: the threads are done.
-        number.with(|number| assert_eq!(unsafe { *number }, value + t));
-    }
+    pool.run(&|t| numbers.write(t, value + t));
+    assert_eq!([numbers.read(0), numbers.read(1)], [value, value + 1]);
 }
 
 fn model(test: impl Fn() + Sync + Send + 'static) {

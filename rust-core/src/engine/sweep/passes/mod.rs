@@ -1,0 +1,8 @@
+//! The two passes over the pairs of a plane. Between them ψ and its slopes are evaluated (`workspace::excess`).
+
+pub mod buffers;
+pub mod data;
+pub mod first;
+pub mod second;
+pub mod second_cached;
+pub mod slopes;

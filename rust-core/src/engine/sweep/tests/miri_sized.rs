@@ -1,0 +1,113 @@
+//! Boxes small enough for Miri, which knows the portable instruction set alone: every array that threads share, every
+//! pass, with ghosts and without.
+
+use super::*;
+
+/// One species and one density.
+const ONE: &str = r#"
+title = "one density"
+species = ["A"]
+[density.n]
+kernel = "quadratic"
+range = 0.75
+[excess_free_energy]
+A = "0.8*n^2 + 0.1*n^3"
+[[pair]]
+between = ["A", "A"]
+form = "soft"
+strength = -40.0
+range = 1.0
+[[thermostat]]
+gamma = 4.5
+range = 1.0
+"#;
+
+/// Two species, three densities, all pairs cached; the same with pairs in range alone; and one species.
+fn fluids() -> [Fluid; 3] {
+    [MANY, SHORT, ONE].map(|text| Model::parse("test", text).unwrap().at(0.7).unwrap())
+}
+
+/// A box of more planes than a thread has accumulators for at once, and in each some particles.
+fn cloud(fluid: &Fluid) -> Cloud {
+    let domain = PeriodicBox::orthogonal([-1.0, 2.0, 0.5], [2.1, 2.2, 7.3], [true; 3]).unwrap();
+    Cloud::new(domain, 3, fluid.species.len(), 70, 9)
+}
+
+/// Forces and totals.
+fn evaluated(sweep: &mut Sweep, cloud: &Cloud) -> (Vec<[f64; 3]>, Tally) {
+    let (particles, mut force) = (cloud.particles(), vec![[0.0; 3]; cloud.x.len()]);
+    let (step, want) = (Some(STEP), Want::TOTALS);
+    let totals = sweep.evaluate(&cloud.domain, &particles, &cloud.v, step, want, &mut force, false);
+    (force, totals.unwrap())
+}
+
+fn both(threads: usize) -> [Settings; 2] {
+    [Precision::Mixed, Precision::Double].map(|p| settings(p, Instructions::Portable, threads))
+}
+
+#[test]
+fn a_small_box_has_the_forces_of_the_plain_engine() {
+    for fluid in fluids() {
+        let cloud = cloud(&fluid);
+        let (force, tally) = plain(&fluid, &cloud);
+        for settings in [1, 2].into_iter().flat_map(both) {
+            let mut sweep = Sweep::new(&fluid, settings).unwrap();
+            let (here, totals) = evaluated(&mut sweep, &cloud);
+            let off = difference(&force, &here).max(tally_difference(&tally, &totals));
+            assert!(off < tolerance(settings.precision), "{}, {settings:?}: {off:.1e}", fluid.title);
+        }
+    }
+}
+
+#[test]
+fn a_small_rank_with_ghosts_has_the_forces_of_the_plain_engine() {
+    for fluid in fluids() {
+        let cloud = cloud(&fluid);
+        let (force, tally) = plain(&fluid, &cloud);
+        for settings in both(2) {
+            let mut sweep = Sweep::new(&fluid, settings).unwrap();
+            let (here, totals) = with_ghosts(&mut sweep, &cloud);
+            let off = difference(&force, &here).max(tally_difference(&tally, &totals));
+            assert!(off < tolerance(settings.precision), "{}, {settings:?}: {off:.1e}", fluid.title);
+        }
+    }
+}
+
+/// Planes with fewer particles than a vector has lanes, in slabs of one plane and of none: what whole vectors read behind
+/// the last particle of a slab is not what another thread writes.
+#[test]
+fn nearly_empty_planes_are_of_many_threads() {
+    for fluid in fluids() {
+        let domain = PeriodicBox::orthogonal([0.0; 3], [2.1, 2.2, 9.3], [true; 3]).unwrap();
+        let cloud = Cloud::new(domain, 3, fluid.species.len(), 21, 4);
+        for precision in [Precision::Mixed, Precision::Double] {
+            let of = |threads| {
+                let settings = settings(precision, Instructions::Portable, threads);
+                evaluated(&mut Sweep::new(&fluid, settings).unwrap(), &cloud)
+            };
+            let one = of(1);
+            for threads in [3, 12] {
+                assert!(one == of(threads), "{}, {threads} threads", fluid.title);
+            }
+        }
+    }
+}
+
+/// Engines that are cloned share their threads: two that are used at once take turns.
+#[test]
+fn clones_on_two_threads_do_not_disturb_each_other() {
+    let [fluid, ..] = fluids();
+    let cloud = cloud(&fluid);
+    let mut first = Sweep::new(&fluid, settings(Precision::Mixed, Instructions::Portable, 3)).unwrap();
+    let expected = evaluated(&mut first, &cloud);
+    std::thread::scope(|scope| {
+        for mut sweep in [first.clone(), first] {
+            let (cloud, expected) = (&cloud, &expected);
+            scope.spawn(move || {
+                for _ in 0..if cfg!(miri) { 2 } else { 50 } {
+                    assert!(evaluated(&mut sweep, cloud) == *expected);
+                }
+            });
+        }
+    });
+}
