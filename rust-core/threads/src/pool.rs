@@ -54,6 +54,8 @@ const SPINS: usize = if cfg!(any(loom, miri)) { 1 } else { 20_000 };
 
 thread_local! {
     /// The pools whose work this thread is doing, each by the address of what its threads share.
+    // The macro of loom takes no constants.
+    #[allow(clippy::missing_const_for_thread_local)]
     static WITHIN: RefCell<Vec<usize>> = RefCell::new(Vec::new());
 }
 
