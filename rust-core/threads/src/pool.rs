@@ -176,9 +176,14 @@ impl Drop for Wait<'_> {
     fn drop(&mut self) {
         let mut spins = 0;
         while self.0.busy.load(Ordering::Acquire) > 0 {
-            spins += 1;
             // With fewer processors than threads the worker may need this one.
-            if spins % SPINS == 0 { yield_now() } else { spin_loop() }
+            if spins < SPINS {
+                spins += 1;
+                spin_loop();
+            } else {
+                spins = 0;
+                yield_now();
+            }
         }
     }
 }
