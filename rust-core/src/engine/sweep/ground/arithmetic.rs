@@ -5,37 +5,39 @@ use super::species_pairs::SpeciesPair;
 use crate::engine::sweep::simd::{Isa, OFFSET_BITS, Reals, Scalar, Words};
 use crate::model::kernel::Real;
 
-/// A vector's worth of particles, column by column: the first particle of a pair picks its own of each.
+/// The i-particles of a batch, field by field. Pairs pick the fields of their i-particle from a vector register.
 #[derive(Debug, Clone, Copy, Default)]
 #[repr(C, align(64))]
 pub struct IParticles<T> {
-    /// As the record has it.
+    /// In the coordinates of the packed particle.
     pub position: [[T; 16]; 3],
     pub velocity: [[T; 16]; 3],
     pub tag: [u32; 16],
     pub species: [u32; 16],
 }
 
-/// How a vector of pairs lies and moves; `d = r_i − r_j`.
+/// Separations and distances of a vector of pairs.
 #[derive(Clone, Copy)]
 pub struct PairGeometry<R: Reals> {
+    /// `r_i − r_j`.
     pub d: [R; 3],
     pub r: R,
+    /// `1/r`.
     pub inverse: R,
-    /// `ê·v_ij`, for the thermostat.
+    /// `ê·v_ij`, if the thermostat acts.
     pub radial_velocity: R,
 }
 
-/// The same, with what else is known of the pairs before any term.
+/// What the terms read of a vector of pairs.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 pub struct PairVector<R: Reals> {
     pub geometry: PairGeometry<R>,
-    /// Which pairs of species, with several.
+    /// Only with several species.
     pub species_pair: SpeciesPair<R>,
 }
 
-/// Tags of both particles of pairs, and the species of the second.
+/// Tags of both particles, and the species of the j-particle.
 #[derive(Clone, Copy)]
 pub struct PairTags<R: Reals> {
     pub tags: [R::Words; 2],
@@ -46,47 +48,48 @@ const _: () = assert!(
     size_of::<MixedParticle>() == 1 << OFFSET_BITS && size_of::<DoubleParticle>() == 2 << OFFSET_BITS
 );
 
-/// A choice of precision on an instruction set.
-#[allow(clippy::missing_safety_doc)] // The contract of `simd`.
+/// A precision of pairs on an instruction set. The functions are unsafe by the contract of `simd`.
+#[allow(clippy::missing_safety_doc)]
 pub trait Arithmetic<I: Isa>: 'static {
     type Scalar: Scalar;
     type Reals: Reals<Scalar = Self::Scalar>;
     type PackedParticle: PackedParticle<Scalar = Self::Scalar>;
-    /// What distances are measured with.
+    /// Constants for distances in a box.
     type Metric: Copy;
 
     unsafe fn metric(geometry: &BoxGeometry) -> Self::Metric;
 
-    /// The columns of the records from `first` on, as many as a vector has lanes.
+    /// Loads as many particles from `first` on as a vector has lanes.
     unsafe fn load_i_particles(
         first: *const Self::PackedParticle,
         i_particles: &mut IParticles<Self::Scalar>,
     );
 
-    /// Pairs of particles of `i_particles`, `i_in_batch`, with others, at 32 times their `j_offsets` in the records. Velocities and
-    /// species of the others are there with `ALL` only, how fast pairs part if they are `moving`.
+    /// The geometry of a vector of pairs of `i_particles[i_in_batch]` with the particles at `j_offsets`. Velocities and species
+    /// of j-particles are loaded with `ALL` only, radial velocities computed if `with_velocities`.
     unsafe fn pair_geometry<const ALL: bool>(
         metric: &Self::Metric,
         packed: *const Self::PackedParticle,
         i_particles: *const IParticles<Self::Scalar>,
         i_in_batch: <Self::Reals as Reals>::Words,
         j_offsets: *const u32,
-        moving: bool,
+        with_velocities: bool,
     ) -> (PairGeometry<Self::Reals>, PairTags<Self::Reals>);
 
-    /// The columns of rows of eight numbers, at 32 times their `j_offsets`; with `ALL`, else only the first four.
+    /// Loads records of eight numbers at `j_offsets`: the first number of each, then the second … Without `ALL` the first four
+    /// only.
     unsafe fn load_transposed<const ALL: bool>(
         records: *const Self::Scalar,
         j_offsets: *const u32,
     ) -> [Self::Reals; 8];
 
-    /// The same of `count` rows that follow each other, at least one; lanes behind repeat the last.
+    /// Loads `count` consecutive records, at least one. Lanes behind repeat the last one.
     #[inline(always)]
     unsafe fn load_transposed_in_order(records: *const Self::Scalar, count: usize) -> [Self::Reals; 8] {
         type W<I, A> = <<A as Arithmetic<I>>::Reals as Reals>::Words;
         let mut offsets = [0; 16];
-        // SAFETY: `IN_ORDER` and `offsets` are no shorter than a vector, and offsets are of the rows that there are. Rows
-        // behind may be another thread's, who may be writing them.
+        // SAFETY: `IN_ORDER` and `offsets` are no shorter than a vector, and offsets are those of the `count` records. Records
+        // behind may belong to another thread, which may be writing them.
         unsafe {
             let last = W::<I, Self>::splat(((count - 1) << OFFSET_BITS) as u32);
             W::<I, Self>::load(IN_ORDER.as_ptr()).min(last).store(offsets.as_mut_ptr());
@@ -94,16 +97,18 @@ pub trait Arithmetic<I: Isa>: 'static {
         }
     }
 
+    /// Loads four numbers, widened to double precision.
     unsafe fn load_quad(p: *const Self::Scalar) -> I::Quad;
 }
 
-/// What is kept of a particle, in the order of cells.
+/// What pairs read of a particle, in one or two cache lines.
 pub trait PackedParticle: Copy + Default + Send + Sync + 'static {
     type Scalar;
+    /// Packs a particle; `u` is its position in 32-bit fixed point.
     fn new(u: [u32; 3], x: &[f64; 3], v: &[f64; 3], tag: u32, species: u32) -> Self;
 }
 
-/// Position as fractions of the box in units of 2⁻³²: differences wrap by themselves.
+/// Position in 32-bit fixed point, in units of 2⁻³² of the box: differences wrap.
 #[derive(Debug, Clone, Copy, Default)]
 #[repr(C, align(32))]
 pub struct MixedParticle {
@@ -121,7 +126,7 @@ impl PackedParticle for MixedParticle {
     }
 }
 
-/// Everything as the host has it.
+/// Everything in double precision.
 #[derive(Debug, Clone, Copy, Default)]
 #[repr(C, align(64))]
 pub struct DoubleParticle {
@@ -146,15 +151,15 @@ pub struct Mixed;
 /// Pairs in double precision.
 pub struct Double;
 
-/// Particles on one point have no direction; this keeps `1/r` finite, and `d/r` zero.
+/// Added to `r²` by way of a maximum: two particles at one point have `1/r` finite and `d/r` zero.
 const TINY: f64 = 1e-30;
 
-/// Thirty-two times the place of records that follow each other.
+/// Offsets of consecutive records.
 const IN_ORDER: [u32; 16] = [0, 32, 64, 96, 128, 160, 192, 224, 256, 288, 320, 352, 384, 416, 448, 480];
 
 const TWO_TO_32: f64 = 4_294_967_296.0;
 
-/// Lengths of the box geometry, and how it leans, over 2³².
+/// Lengths and tilt of the box over 2³².
 #[derive(Clone, Copy)]
 pub struct MixedMetric<R> {
     scale: [R; 3],
@@ -181,7 +186,7 @@ impl<I: Isa> Arithmetic<I> for Mixed {
 
     #[inline(always)]
     unsafe fn load_i_particles(first: *const MixedParticle, i_particles: &mut IParticles<f32>) {
-        // SAFETY: the contract of `simd`.
+        // SAFETY: the caller upholds the contract of `simd`: pointers are valid for a vector.
         unsafe {
             let [x, y, z, tag, u, v, w, species] =
                 I::load_transposed::<true>(first.cast(), IN_ORDER.as_ptr());
@@ -203,10 +208,10 @@ impl<I: Isa> Arithmetic<I> for Mixed {
         i_particles: *const IParticles<f32>,
         i_in_batch: <I::F32 as Reals>::Words,
         j_offsets: *const u32,
-        moving: bool,
+        with_velocities: bool,
     ) -> (PairGeometry<I::F32>, PairTags<I::F32>) {
         type W<I> = <<I as Isa>::F32 as Reals>::Words;
-        // SAFETY: the contract of `simd`.
+        // SAFETY: the caller upholds the contract of `simd`: pointers are valid for a vector.
         unsafe {
             let i_particles = &*i_particles;
             let [sx, sy, sz] = metric.scale;
@@ -228,7 +233,7 @@ impl<I: Isa> Arithmetic<I> for Mixed {
             let r2 = dx.mul_add(dx, dy.mul_add(dy, dz * dz)).larger(tiny);
             let inverse = r2.inverse_root();
             let mut radial_velocity = inverse;
-            if moving {
+            if with_velocities {
                 let ui = I::F32::pick(i_particles.velocity[0].as_ptr(), i_in_batch);
                 let vi = I::F32::pick(i_particles.velocity[1].as_ptr(), i_in_batch);
                 let wi = I::F32::pick(i_particles.velocity[2].as_ptr(), i_in_batch);
@@ -246,7 +251,7 @@ impl<I: Isa> Arithmetic<I> for Mixed {
 
     #[inline(always)]
     unsafe fn load_transposed<const ALL: bool>(records: *const f32, j_offsets: *const u32) -> [I::F32; 8] {
-        // SAFETY: the contract of `simd`.
+        // SAFETY: the caller upholds the contract of `simd`: pointers are valid for a vector.
         unsafe {
             let load_transposed = I::load_transposed::<ALL>(records.cast(), j_offsets);
             let mut numbers = [I::F32::constant(0.0); 8];
@@ -261,19 +266,19 @@ impl<I: Isa> Arithmetic<I> for Mixed {
 
     #[inline(always)]
     unsafe fn load_quad(p: *const f32) -> I::Quad {
-        // SAFETY: the contract of `simd`.
+        // SAFETY: the caller upholds the contract of `simd`: pointers are valid for a vector.
         unsafe { <I::Quad as crate::engine::sweep::simd::Quad>::load_f32(p) }
     }
 }
 
-/// Lengths of the box geometry, one over those along periods (zero along others), and how it leans.
+/// Lengths, inverse lengths (zero along open directions) and tilt of the box.
 #[derive(Clone, Copy)]
 pub struct DoubleMetric<R> {
     length: [R; 3],
     inverse: [R; 3],
     tilt: [R; 3],
     tilted: bool,
-    /// 1, and 0 along the direction that two dimensions do not have.
+    /// 0 in two dimensions, else 1: a factor of z.
     flat: R,
 }
 
@@ -300,7 +305,7 @@ impl<I: Isa> Arithmetic<I> for Double {
 
     #[inline(always)]
     unsafe fn load_i_particles(first: *const DoubleParticle, i_particles: &mut IParticles<f64>) {
-        // SAFETY: the contract of `simd`.
+        // SAFETY: the caller upholds the contract of `simd`: pointers are valid for a vector.
         unsafe {
             let [x, y, z, bits, u, v, w, _] =
                 I::load_transposed_wide::<true>(first.cast(), IN_ORDER.as_ptr());
@@ -323,9 +328,9 @@ impl<I: Isa> Arithmetic<I> for Double {
         i_particles: *const IParticles<f64>,
         i_in_batch: <I::F64 as Reals>::Words,
         j_offsets: *const u32,
-        moving: bool,
+        with_velocities: bool,
     ) -> (PairGeometry<I::F64>, PairTags<I::F64>) {
-        // SAFETY: the contract of `simd`.
+        // SAFETY: the caller upholds the contract of `simd`: pointers are valid for a vector.
         unsafe {
             let i_particles = &*i_particles;
             let ([lx, ly, lz], [ix, iy, iz], [xy, xz, yz]) = (metric.length, metric.inverse, metric.tilt);
@@ -350,7 +355,7 @@ impl<I: Isa> Arithmetic<I> for Double {
             let r2 = dx.mul_add(dx, dy.mul_add(dy, dz * dz)).larger(tiny);
             let inverse = r2.inverse_root();
             let mut radial_velocity = inverse;
-            if moving {
+            if with_velocities {
                 let ui = I::F64::pick(i_particles.velocity[0].as_ptr(), i_in_batch);
                 let vi = I::F64::pick(i_particles.velocity[1].as_ptr(), i_in_batch);
                 let wi = I::F64::pick(i_particles.velocity[2].as_ptr(), i_in_batch);
@@ -368,13 +373,13 @@ impl<I: Isa> Arithmetic<I> for Double {
 
     #[inline(always)]
     unsafe fn load_transposed<const ALL: bool>(records: *const f64, j_offsets: *const u32) -> [I::F64; 8] {
-        // SAFETY: the contract of `simd`.
+        // SAFETY: the caller upholds the contract of `simd`: pointers are valid for a vector.
         unsafe { I::load_transposed_wide::<ALL>(records.cast(), j_offsets) }
     }
 
     #[inline(always)]
     unsafe fn load_quad(p: *const f64) -> I::Quad {
-        // SAFETY: the contract of `simd`.
+        // SAFETY: the caller upholds the contract of `simd`: pointers are valid for a vector.
         unsafe { <I::Quad as crate::engine::sweep::simd::Quad>::load(p) }
     }
 }
