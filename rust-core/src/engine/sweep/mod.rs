@@ -1,5 +1,6 @@
-//! The fast engine: forces by one traversal of all cells, without a neighbour list. `docs/engine.md` explains it with
-//! figures. At the speed of DPD particles a neighbour list would live a few steps and cost more than it saves.
+//! The fast engine: the same forces as [`Reference`](super::reference::Reference), by one traversal of all cells, without a
+//! neighbour list. `docs/engine.md` explains it with figures. At the speed of DPD particles a neighbour list would live a few
+//! steps and cost more than it saves.
 //!
 //! Rooms, from the ground up; a file imports from its own room and from those above it in this list:
 //!
@@ -9,7 +10,7 @@
 //! - [`pair_search`]: cell ranges, i-clusters and j-clusters, distance filter.
 //! - [`pair_batch`]: terms, densities and noise of a batch of pairs, added to accumulators.
 //! - [`passes`]: the two passes over the pairs of a plane; ψ is evaluated between them.
-//! - [`compiled`]: the passes, compiled for each instruction set and precision; [`pool`]: threads.
+//! - [`compiled`]: the passes, compiled for each instruction set and precision. The crate `psidpd_threads` has the threads.
 //! - [`workspace`]: arrays, sorting, ψ, and the scheduler that sends planes through all this.
 //! - [`Sweep`]: what hosts see.
 
@@ -34,6 +35,7 @@ use super::noise::PairNoise;
 use super::particles::{Particles, Step};
 use super::plan::Plan;
 use super::settings::{Precision, Settings};
+use super::surroundings::Around;
 use super::tally::{Tally, Want};
 use crate::model::Fluid;
 use crate::model::expression::TooLarge;
@@ -63,24 +65,13 @@ pub struct Sweep {
     ready: bool,
 }
 
-/// What a rank of a host finds around its particles.
-#[derive(Debug, Clone, Copy)]
-pub struct Around<'a> {
-    /// The box. Along its periodic directions the rank has all of it; along the others there are ghosts for what is
-    /// beyond the rank, or nothing is.
-    pub domain: &'a PeriodicBox,
-    /// For each ghost whether it is the image, along a periodic direction of `domain`, of a particle that is there too:
-    /// those take no part. Empty if none is.
-    pub images: &'a [bool],
-}
-
 /// One of both.
 enum EitherPrecision {
     Mixed(Box<Workspace<Mixed>>),
     Double(Box<Workspace<Double>>),
 }
 
-/// Does the same with the machine of either precision.
+/// Does the same with the workspace of either precision.
 macro_rules! with {
     ($both:expr, $workspace:ident => $do:expr) => {
         match $both {
@@ -167,12 +158,12 @@ impl Sweep {
         with!(&self.workspace, m => m.counts())
     }
 
-    /// As [`Engine::out_of_bounds`](super::Engine::out_of_bounds).
+    /// As [`Reference::out_of_bounds`](super::reference::Reference::out_of_bounds).
     pub fn out_of_bounds(&self) -> [u64; 2] {
         with!(&self.workspace, m => m.out_of_bounds())
     }
 
-    /// As [`Engine::map_kinds`](super::Engine::map_kinds).
+    /// As [`Reference::map_kinds`](super::reference::Reference::map_kinds).
     ///
     /// # Errors
     /// A species index out of range.
@@ -200,7 +191,7 @@ impl Sweep {
     ///
     /// `v` may be empty and `step` `None` where no thermostat acts; with `step` `None` only conservative
     /// forces are computed. Of `want`, the totals: what is asked for of each particle is the business
-    /// of [`Engine`](super::Engine).
+    /// of [`Reference`](super::reference::Reference).
     ///
     /// # Errors
     /// A position, ψ or a force that is not finite; then some forces may have been written. A tag or type out of range,
@@ -356,8 +347,8 @@ impl Sweep {
     }
 
     /// ψ and local densities of owned particles, in the host's order: as
-    /// [`Engine::excess`](super::Engine::excess) and
-    /// [`Engine::local_densities`](super::Engine::local_densities), those that forces do not need being zero.
+    /// [`Reference::excess`](super::reference::Reference::excess) and
+    /// [`Reference::local_densities`](super::reference::Reference::local_densities), those that forces do not need being zero.
     pub fn local_densities(&self, excess: &mut Vec<f64>, densities: &mut Vec<f64>) {
         let variables = self.plan.densities.len() * self.plan.species.len();
         with!(&self.workspace, m => m.to_host(variables, excess, densities));
