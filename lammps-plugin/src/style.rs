@@ -505,7 +505,11 @@ mod tests {
         }
         let text = [false, true].map(|listed| s.description("", listed));
         assert!(text[0].contains("evaluation    cell sweep;"), "{}", text[0]);
-        assert!(text[1].contains("evaluation    reference evaluation, because the host lists"), "{}", text[1]);
+        assert!(
+            text[1].contains("evaluation    reference evaluation, because the host lists"),
+            "{}",
+            text[1]
+        );
     }
 
     #[test]
