@@ -66,8 +66,6 @@ pub struct Sweep {
     ready: bool,
 }
 
-}
-
 /// One of both.
 enum EitherPrecision {
     Mixed(Box<Workspace<Mixed>>),
