@@ -8,6 +8,7 @@
 pub mod drift;
 pub mod frame;
 pub mod keys;
+mod least_squares;
 pub mod meter;
 pub mod observation;
 pub mod observers;

@@ -1,10 +1,10 @@
-use super::body_force::{self, BodyForce};
 use super::bounds::Bounds;
 use super::error::RunError;
 use super::integrator::{Before, Faults, Integrator, Motion, Surroundings};
 use super::reorder::{self, Reordering};
-use super::state::State;
-use super::tags::Tags;
+use crate::particles::State;
+use crate::particles::Tags;
+use crate::particles::{BodyForce, add_body_forces};
 use psidpd_core::engine::{
     self, Engine, Particles, PassCounts, PeriodicBox, Plan, Pool, Precision, Request, Settings, Step, Tally,
     Want,
@@ -270,7 +270,7 @@ impl Simulation {
     fn add_external_forces(&mut self) {
         if !self.body_forces.is_empty() {
             let Simulation { body_forces, forces, domain, mass, x, species, tag, force, owned, .. } = self;
-            body_force::add(body_forces, forces.pool(), &mut force[..*owned], |body, k| {
+            add_body_forces(body_forces, forces.pool(), &mut force[..*owned], |body, k| {
                 let mass = mass[species[k] as usize];
                 body.acts_on(species[k], tag[k]).then(|| body.at(domain, x[k]).map(|a| mass * a))
             });

@@ -72,7 +72,7 @@ enum EitherPrecision {
     Double(Box<Workspace<Double>>),
 }
 
-/// Does the same with the machine of either precision.
+/// Does the same with the workspace of either precision.
 macro_rules! with {
     ($both:expr, $workspace:ident => $do:expr) => {
         match $both {

@@ -123,15 +123,14 @@ impl Meter for Clusters {
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
-        let simulation = frame.simulation;
-        let species = simulation.species();
+        let view = frame.view;
+        let species = view.species;
         let takes_part = |k: usize| self.species.is_none_or(|s| species[k] as usize == s);
-        let labels =
-            label(simulation.positions(), simulation.domain(), self.dimensions, self.distance, takes_part);
+        let labels = label(view.x, view.domain, self.dimensions, self.distance, takes_part);
         let sizes: Vec<usize> = sizes(&labels).into_iter().filter(|n| *n >= self.smallest).collect();
         let (count, largest) = (sizes.len() as f64, sizes.iter().max().copied().unwrap_or(0) as f64);
         let mean = sizes.iter().sum::<usize>() as f64 / count.max(1.0);
-        self.series.push(&[frame.time, count, largest, mean])
+        self.series.push(&[frame.view.time, count, largest, mean])
     }
 
     fn finish(&self) -> Vec<Observation> {

@@ -198,8 +198,8 @@ impl Meter for Drop {
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
-        let simulation = frame.simulation;
-        let (x, domain) = (simulation.positions(), simulation.domain());
+        let view = frame.view;
+        let (x, domain) = (view.x, view.domain);
         let labels = label(x, domain, self.dimensions, self.distance, |_| true);
         let sizes = sizes(&labels);
         // Of equal clusters the first.
@@ -228,7 +228,7 @@ impl Meter for Drop {
             if shell >= self.bins {
                 continue;
             }
-            let (v, m, volume) = (simulation.velocities()[k], frame.mass(k), self.volume(shell));
+            let (v, m, volume) = (view.v[k], frame.mass(k), self.volume(shell));
             let radial = if r > 0.0 { (x[0] * v[0] + x[1] * v[1] + x[2] * v[2]) / r } else { 0.0 };
             let square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
             let sums = &mut row[shell * WIDTH..(shell + 1) * WIDTH];
@@ -244,7 +244,7 @@ impl Meter for Drop {
                 row[shell * WIDTH + 4] += force * (length - normal) / rest / volume;
             });
         }
-        self.shells.push(&row) && self.size.push(&[frame.time, count, squares])
+        self.shells.push(&row) && self.size.push(&[frame.view.time, count, squares])
     }
 
     fn finish(&self) -> Vec<Observation> {

@@ -106,8 +106,8 @@ impl Meter for LocalDensity {
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
-        let simulation = frame.simulation;
-        let (evaluation, species) = (frame.evaluation(), simulation.species());
+        let view = frame.view;
+        let (evaluation, species) = (frame.evaluation(), view.species);
         let fluid = frame.evaluator().fluid();
         let kinds = self.species.len();
         let density = &fluid.densities[self.density];

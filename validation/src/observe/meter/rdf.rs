@@ -69,10 +69,10 @@ impl Meter for Rdf {
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
-        let simulation = frame.simulation;
-        let species = simulation.species();
+        let view = frame.view;
+        let species = view.species;
         let mut counts = vec![0.0; self.bins * self.pairs.len()];
-        for_each_pair(simulation.positions(), simulation.domain(), self.dimensions, self.range, |p| {
+        for_each_pair(view.x, view.domain, self.dimensions, self.range, |p| {
             let bin = ((p.r / self.range * self.bins as f64) as usize).min(self.bins - 1);
             self.pairs.at(species[p.i], species[p.j]).for_each(|k| counts[k * self.bins + bin] += 1.0);
         });

@@ -45,13 +45,13 @@ impl Meter for Temperature {
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
-        let kinetic = frame.simulation.temperature();
+        let kinetic = frame.view.temperature;
         if !self.missing.is_empty() {
             return self.series.push(&[kinetic]);
         }
         let evaluation = frame.evaluation();
         let (mut squares, mut laplacian) = (0.0, 0.0);
-        let laplacians = evaluation.laplacians(frame.evaluator().fluid(), frame.simulation.species());
+        let laplacians = evaluation.laplacians(frame.evaluator().fluid(), frame.view.species);
         for (k, (f, l)) in evaluation.forces.iter().zip(laplacians).enumerate() {
             if frame.moves(k) {
                 squares += f.iter().map(|f| f * f).sum::<f64>();
