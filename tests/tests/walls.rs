@@ -22,7 +22,9 @@ const CORE: &[&[&str]] = &[
         "engine::instruction_set",
         "engine::noise",
         "engine::particles",
+        "engine::path",
         "engine::settings",
+        "engine::surroundings",
         "engine::tally",
         "engine::vectors",
     ],
@@ -37,7 +39,11 @@ const CORE: &[&[&str]] = &[
     &["engine::sweep::passes"],
     &["engine::sweep::compiled"],
     &["engine::sweep::workspace"],
-    // The engines that hosts see.
+    &["engine::sweep"],
+    // Sums over a list of pairs.
+    &["engine::reference"],
+    // The engine that hosts see.
+    &["engine::facade"],
     &["engine"],
     &["c_api"],
     &[""],
