@@ -24,6 +24,7 @@ mod excess;
 mod excess_pass;
 mod facade;
 mod images;
+mod instruction_set;
 pub mod noise;
 mod particles;
 mod path;

@@ -1,8 +1,10 @@
 //! How far particles reach.
 
 use crate::engine::error::EngineError;
-use crate::engine::sweep::workspace::Input;
-use crate::engine::vectors::Loop;
+use crate::engine::instruction_set::InstructionSet;
+use crate::engine::sweep::pool::{Pool, part};
+use crate::engine::sweep::workspace::input::Input;
+use crate::engine::vectors::{self, Loop};
 use std::ops::Range;
 
 /// Particles that are looked at together.
@@ -13,10 +15,32 @@ const COORDINATES: usize = 3 * PARTICLES;
 /// Beyond this a coordinate is none.
 const ABSURD: f64 = 1e100;
 
+/// The lowest and the highest coordinates of the owned particles; the origin if there are none.
+pub fn extremes(pool: &Pool, set: InstructionSet, input: &Input) -> Result<[[f64; 3]; 2], EngineError> {
+    let threads = pool.threads();
+    let particles = |t| part(input.particles.owned, t, threads);
+    let mut parts: Vec<_> = (0..threads).map(|t| (particles(t), Ok(NOWHERE))).collect();
+    pool.each(&mut parts, |(particles, found)| {
+        *found = vectors::run(set, FindExtremes { input, particles: particles.clone() });
+    });
+    let [mut low, mut high] = NOWHERE;
+    for (_, found) in parts {
+        let [lowest, highest] = found?;
+        for c in 0..3 {
+            low[c] = low[c].min(lowest[c]);
+            high[c] = high[c].max(highest[c]);
+        }
+    }
+    Ok(if low[0] > high[0] { [[0.0; 3]; 2] } else { [low, high] })
+}
+
+/// The extremes of no particles.
+const NOWHERE: [[f64; 3]; 2] = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+
 /// The lowest and the highest coordinates of some particles.
-pub struct FindExtremes<'a> {
-    pub input: &'a Input<'a>,
-    pub particles: Range<usize>,
+struct FindExtremes<'a> {
+    input: &'a Input<'a>,
+    particles: Range<usize>,
 }
 
 impl Loop for FindExtremes<'_> {
@@ -24,7 +48,7 @@ impl Loop for FindExtremes<'_> {
 
     #[inline(always)]
     fn run(self) -> Self::Out {
-        let mut extremes = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+        let mut extremes = NOWHERE;
         let (mut low, mut high) = ([f64::INFINITY; COORDINATES], [f64::NEG_INFINITY; COORDINATES]);
         let (groups, rest) = self.input.particles.x[self.particles.clone()].as_chunks::<PARTICLES>();
         for (g, group) in groups.iter().enumerate() {

@@ -1,13 +1,14 @@
 //! The cell of each particle, and how many there are in each.
 
-use super::NO_CELL;
 use super::fractions::{Fractions, SORT_BLOCK};
 use crate::engine::error::EngineError;
 use crate::engine::sweep::ground::box_geometry::BoxGeometry;
-use crate::engine::sweep::ground::shared_ptr::SharedPtr;
-use crate::engine::sweep::workspace::Input;
+use crate::engine::sweep::workspace::input::Input;
 use crate::engine::vectors::Loop;
 use std::ops::Range;
+
+/// The cell of particles that take no part.
+pub const NO_CELL: u32 = u32::MAX;
 
 /// What all threads count with.
 pub struct Count<'a> {
@@ -16,15 +17,17 @@ pub struct Count<'a> {
     pub fractions: Fractions<'a>,
     /// See [`Count::first_kind`].
     pub first_kind: u32,
-    pub cell: SharedPtr<u32>,
-    pub fixed32: SharedPtr<[u32; 3]>,
 }
 
-/// The particles of one thread.
+/// The particles of one thread: their cells, each of the grid or [`NO_CELL`], their fractions if they have a cell, and how
+/// many are in each.
 pub struct CountRange<'a> {
     pub count: &'a Count<'a>,
     pub particles: Range<usize>,
-    /// The thread's own.
+    /// Of these particles.
+    pub cell: &'a mut [u32],
+    pub fixed32: &'a mut [[u32; 3]],
+    /// Of all cells.
     pub counts: &'a mut [u32],
 }
 
@@ -33,36 +36,39 @@ impl Loop for CountRange<'_> {
 
     #[inline(always)]
     fn run(self) -> Result<(), EngineError> {
-        let CountRange { count, particles: Range { start: mut first, end }, counts } = self;
+        let CountRange { count, particles, cell, fixed32: units, counts } = self;
+        let mut first = particles.start;
         counts.fill(0);
         let mut fixed32 = [[0; 3]; SORT_BLOCK];
-        while let Some(x) = count.input.particles.x[first..end].first_chunk::<SORT_BLOCK>() {
+        let (cell_blocks, cell) = cell.as_chunks_mut::<SORT_BLOCK>();
+        let (unit_blocks, units) = units.as_chunks_mut::<SORT_BLOCK>();
+        let (x_blocks, rest) = count.input.particles.x[particles].as_chunks::<SORT_BLOCK>();
+        for ((x, of_block), units_of_block) in x_blocks.iter().zip(cell_blocks).zip(unit_blocks) {
             if count.are_self_ghosts(first) {
-                // SAFETY: of this thread's particles.
-                unsafe { count.cell.at(first).cast::<[u32; SORT_BLOCK]>().write([NO_CELL; SORT_BLOCK]) };
+                *of_block = [NO_CELL; SORT_BLOCK];
                 first += SORT_BLOCK;
                 continue;
             }
             let near = count.fractions.of_block(x, &mut fixed32);
             let cells = count.fractions.cells(&fixed32);
             if !near || !count.are_plain(first) {
-                count.one_by_one(first..first + SORT_BLOCK, &fixed32, &cells, counts)?;
-            } else if first + SORT_BLOCK <= count.input.particles.owned {
-                // SAFETY: of this thread's particles; cells are of the grid.
-                unsafe { count.all::<false>(first, x, &fixed32, &cells, counts) };
+                count.one_by_one(first, (&fixed32, &cells), of_block, units_of_block, counts)?;
             } else {
-                // SAFETY: as above.
-                unsafe { count.all::<true>(first, x, &fixed32, &cells, counts) };
+                *units_of_block = fixed32;
+                if first + SORT_BLOCK <= count.input.particles.owned {
+                    count.all::<false>(first, x, &cells, of_block, counts);
+                } else {
+                    count.all::<true>(first, x, &cells, of_block, counts);
+                }
             }
             first += SORT_BLOCK;
         }
-        let rest = &count.input.particles.x[first..end];
         if !rest.is_empty() {
             let mut x = [count.geometry.origin; SORT_BLOCK];
             x[..rest.len()].copy_from_slice(rest);
             count.fractions.of_block(&x, &mut fixed32);
             let cells = count.fractions.cells(&fixed32);
-            count.one_by_one(first..end, &fixed32, &cells, counts)?;
+            count.one_by_one(first, (&fixed32, &cells), cell, units, counts)?;
         }
         Ok(())
     }
@@ -103,66 +109,55 @@ impl Count<'_> {
     }
 
     /// Counts a block of particles, of which some may be ghosts that nobody needs.
-    ///
-    /// # Safety
-    /// Only the calling thread has these particles; cells are of the grid.
     #[inline(always)]
-    unsafe fn all<const GHOSTS: bool>(
+    fn all<const GHOSTS: bool>(
         &self,
         first: usize,
         x: &[[f64; 3]; SORT_BLOCK],
-        fixed32: &[[u32; 3]; SORT_BLOCK],
         cells: &[[u32; 3]; SORT_BLOCK],
+        cell: &mut [u32; SORT_BLOCK],
         counts: &mut [u32],
     ) {
-        // SAFETY: the caller's.
-        unsafe {
-            self.fixed32.at(first).cast::<[[u32; 3]; SORT_BLOCK]>().write(*fixed32);
-            for (lane, [a, b, c]) in cells.iter().enumerate() {
-                let mut to = a + b + c;
-                if GHOSTS && self.is_unneeded(first + lane, &x[lane]) {
-                    to = NO_CELL;
-                } else {
-                    *counts.get_unchecked_mut(to as usize) += 1;
-                }
-                *self.cell.at(first + lane) = to;
+        for (lane, [a, b, c]) in cells.iter().enumerate() {
+            let mut to = a + b + c;
+            if GHOSTS && self.is_unneeded(first + lane, &x[lane]) {
+                to = NO_CELL;
+            } else {
+                // SAFETY: `Fractions::cells` finds cells of the grid, each of which has a count.
+                unsafe { *counts.get_unchecked_mut(to as usize) += 1 };
             }
+            cell[lane] = to;
         }
     }
 
-    /// Counts particles of which some may take no part, or may be wrong.
+    /// Counts particles, a block or fewer, of which some may take no part, or may be wrong.
     #[inline(never)]
     fn one_by_one(
         &self,
-        range: Range<usize>,
-        fixed32: &[[u32; 3]; SORT_BLOCK],
-        cells: &[[u32; 3]; SORT_BLOCK],
+        first: usize,
+        (fixed32, cells): (&[[u32; 3]; SORT_BLOCK], &[[u32; 3]; SORT_BLOCK]),
+        cell: &mut [u32],
+        units: &mut [[u32; 3]],
         counts: &mut [u32],
     ) -> Result<(), EngineError> {
         let input = self.input;
-        for (k, (u, to)) in range.zip(fixed32.iter().zip(cells)) {
+        for (lane, (cell, unit)) in cell.iter_mut().zip(units).enumerate() {
+            let k = first + lane;
             let x = &input.particles.x[k];
             let species = input.species_of(k);
+            *cell = NO_CELL;
             if species.is_some_and(|s| s < 0) {
-                // SAFETY: of this thread's particles.
-                unsafe { *self.cell.at(k) = NO_CELL };
                 continue;
             }
             if species.is_none() || input.particles.tag[k] < 1 || !self.fractions.has(x) {
                 return Err(fault_of(input, k));
             }
             if self.is_unneeded(k, x) {
-                // SAFETY: as above.
-                unsafe { *self.cell.at(k) = NO_CELL };
                 continue;
             }
-            let to = to.iter().sum();
-            counts[to as usize] += 1;
-            // SAFETY: as above.
-            unsafe {
-                *self.cell.at(k) = to;
-                *self.fixed32.at(k) = *u;
-            }
+            *cell = cells[lane].iter().sum();
+            *unit = fixed32[lane];
+            counts[*cell as usize] += 1;
         }
         Ok(())
     }

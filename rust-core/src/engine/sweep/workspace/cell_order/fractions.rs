@@ -1,8 +1,11 @@
 //! Positions as fractions of the box geometry, block by block.
 
-use super::{FAR, TWO_TO_32};
 use crate::engine::sweep::ground::box_geometry::BoxGeometry;
 use crate::engine::sweep::ground::cell_grid::CellGrid;
+use crate::engine::sweep::ground::fixed_point::TWO_TO_32;
+
+/// Far below what a whole number in the low bits of a double holds.
+const FAR: f64 = 1e15;
 
 /// Particles of a block.
 pub const SORT_BLOCK: usize = 32;

@@ -1,11 +1,12 @@
 //! Arrays in the order of cells, from the host's.
 
-use super::TWO_TO_32;
+use crate::engine::sweep::cells::sorted::VECTOR_PADDING;
 use crate::engine::sweep::ground::arithmetic::PackedParticle;
 use crate::engine::sweep::ground::box_geometry::BoxGeometry;
-use crate::engine::sweep::ground::fixed_point::FixedPoint16;
-use crate::engine::sweep::ground::shared_ptr::SharedPtr;
-use crate::engine::sweep::workspace::{Input, VECTOR_PADDING};
+use crate::engine::sweep::ground::fixed_point::{FixedPoint16, TWO_TO_32};
+use crate::engine::sweep::workspace::cell_order::CellOrder;
+use crate::engine::sweep::workspace::input::Input;
+use crate::engine::sweep::workspace::shared_particles::SharedParticles;
 use crate::engine::vectors::Loop;
 use std::ops::Range;
 
@@ -13,30 +14,21 @@ use std::ops::Range;
 /// made of to arrive in the cache.
 const FILL_BLOCK: usize = 4 * VECTOR_PADDING;
 
-/// How many particles ahead what is known of them is called into the cache: no processor foresees where it is.
+/// How many particles ahead the host's data of a particle are prefetched: the order of the host looks random.
 const PREFETCH_DISTANCE: usize = 64;
 
-/// What all threads fill the arrays with; positions in the order of cells are those behind the last of which whole
-/// vectors may be written.
+/// Where particles come from, and where they go; `SharedParticles::fill` has checked that all have room.
 pub struct Fill<'a, R> {
     pub input: &'a Input<'a>,
-    pub geometry: &'a BoxGeometry,
-    pub fixed16_scale: FixedPoint16,
-    pub order: &'a [u32],
-    pub fixed32: &'a [[u32; 3]],
-    pub x: [SharedPtr<f32>; 3],
-    pub fixed16: [SharedPtr<u16>; 3],
-    pub packed: SharedPtr<R>,
-    /// Not there with one species.
-    pub species: Option<SharedPtr<u8>>,
-    /// Whether the host's particles may be beyond the cache.
-    pub prefetches: bool,
+    pub order: &'a CellOrder,
+    pub to: &'a SharedParticles<'a, R>,
 }
 
-/// The places that one thread fills: from a multiple of [`VECTOR_PADDING`] on.
+/// The places that one thread fills: from a multiple of [`VECTOR_PADDING`] on. Made by `SharedParticles::fill` alone, whose
+/// caller promises that nobody else accesses them.
 pub struct FillRange<'a, R, const WITH_VELOCITIES: bool, const MULTISPECIES: bool> {
     pub fill: &'a Fill<'a, R>,
-    pub sorted_range: Range<usize>,
+    pub places: Range<usize>,
 }
 
 impl<R: PackedParticle, const WITH_VELOCITIES: bool, const MULTISPECIES: bool> Loop
@@ -46,19 +38,19 @@ impl<R: PackedParticle, const WITH_VELOCITIES: bool, const MULTISPECIES: bool> L
 
     #[inline(always)]
     fn run(self) {
-        let FillRange { fill, sorted_range } = self;
-        let coordinates = Coordinates::new(fill.geometry, fill.fixed16_scale);
+        let FillRange { fill, places } = self;
+        let coordinates = Coordinates::new(&fill.order.geometry, fill.to.fixed16_scale);
         let mut u = [[0; FILL_BLOCK]; 3];
-        for first in sorted_range.clone().step_by(FILL_BLOCK) {
-            let count = FILL_BLOCK.min(sorted_range.end - first);
-            // SAFETY: these places are of this thread.
+        for first in places.clone().step_by(FILL_BLOCK) {
+            let count = FILL_BLOCK.min(places.end - first);
+            // SAFETY: of the places of this range, see `FillRange`; vectors begin in it.
             unsafe {
                 fill.fetch::<WITH_VELOCITIES, MULTISPECIES>(first, count, &mut u);
                 for from in (0..count).step_by(VECTOR_PADDING) {
                     coordinates.fill(
-                        fill,
+                        fill.to,
                         first + from,
-                        u.each_ref().map(|u| &u[from..from + VECTOR_PADDING]),
+                        u.each_ref().map(|u| &u[from..][..VECTOR_PADDING]),
                     );
                 }
             }
@@ -70,7 +62,7 @@ impl<R: PackedParticle> Fill<'_, R> {
     /// Fills all but coordinates, and collects fractions.
     ///
     /// # Safety
-    /// No other thread fills these places; all numbers in the order are of particles.
+    /// The places are of a [`FillRange`].
     #[inline(always)]
     unsafe fn fetch<const WITH_VELOCITIES: bool, const MULTISPECIES: bool>(
         &self,
@@ -78,50 +70,53 @@ impl<R: PackedParticle> Fill<'_, R> {
         count: usize,
         fixed32: &mut [[u32; FILL_BLOCK]; 3],
     ) {
-        let particles = &self.input.particles;
-        let last = self.order.len().saturating_sub(1);
-        for (lane, k) in self.order[first..first + count].iter().enumerate() {
+        let (particles, order) = (&self.input.particles, &self.order.order[..]);
+        let (units, v) = (&self.order.fixed32[..], self.input.v);
+        let prefetches = self.order.exceeds_cache();
+        let last = order.len().saturating_sub(1);
+        for (lane, k) in order[first..first + count].iter().enumerate() {
             let (k, s) = (*k as usize, first + lane);
-            // SAFETY: the caller's.
+            // SAFETY: an order has numbers of particles that were sorted, and the host's arrays are no shorter than there
+            // are particles; the place has room, and is of a `FillRange`: `SharedParticles::fill` has checked both.
             unsafe {
-                if self.prefetches {
-                    let next = *self.order.get_unchecked((s + PREFETCH_DISTANCE).min(last)) as usize;
-                    prefetch(self.fixed32.as_ptr().add(next));
+                if prefetches {
+                    let next = *order.get_unchecked((s + PREFETCH_DISTANCE).min(last)) as usize;
+                    prefetch(units.as_ptr().add(next));
                     prefetch(particles.tag.as_ptr().add(next));
                     if WITH_VELOCITIES {
-                        prefetch(self.input.v.as_ptr().add(next));
+                        prefetch(v.as_ptr().add(next));
                     }
                 }
-                let u = *self.fixed32.get_unchecked(k);
+                let u = *units.get_unchecked(k);
                 for c in 0..3 {
                     fixed32[c][lane] = u[c];
                 }
-                let v = if WITH_VELOCITIES { *self.input.v.get_unchecked(k) } else { [0.0; 3] };
+                let v = if WITH_VELOCITIES { *v.get_unchecked(k) } else { [0.0; 3] };
                 let kind = if MULTISPECIES { self.input.species_of(k).unwrap_or(0) as u32 } else { 0 };
                 let tag = *particles.tag.get_unchecked(k) as u32;
-                *self.packed.at(s) = R::new(u, particles.x.get_unchecked(k), &v, tag, kind);
-                if let (true, Some(species)) = (MULTISPECIES, self.species) {
-                    *species.at(s) = kind as u8;
+                *self.to.packed.at(s) = R::new(u, particles.x.get_unchecked(k), &v, tag, kind);
+                if MULTISPECIES {
+                    *self.to.species.at(s) = kind as u8;
                 }
             }
         }
     }
 }
 
-/// Calls a value into the cache, both its ends if they may be in two lines.
+/// Prefetches a value, both its ends if they may be in two lines of the cache.
 #[inline(always)]
 fn prefetch<T>(value: *const T) {
-    #[cfg(target_arch = "x86_64")]
+    #[cfg(all(target_arch = "x86_64", not(miri)))]
     {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-        // SAFETY: nothing is read, and no address does harm.
+        // SAFETY: every x86-64 processor prefetches; nothing is read, and no address does harm.
         unsafe { _mm_prefetch::<_MM_HINT_T0>(value.cast()) };
         if size_of::<T>() > align_of::<T>() {
-            // SAFETY: as above.
+            // SAFETY: every x86-64 processor prefetches; nothing is read, and no address does harm.
             unsafe { _mm_prefetch::<_MM_HINT_T0>(value.cast::<i8>().wrapping_add(size_of::<T>() - 1)) };
         }
     }
-    #[cfg(not(target_arch = "x86_64"))]
+    #[cfg(not(all(target_arch = "x86_64", not(miri))))]
     let _ = value;
 }
 
@@ -154,9 +149,9 @@ impl<'a> Coordinates<'a> {
     /// Fills [`VECTOR_PADDING`] places, some perhaps behind the last.
     ///
     /// # Safety
-    /// No other thread fills them.
+    /// Nobody else accesses these places, and there is room for all of them.
     #[inline(always)]
-    unsafe fn fill<R>(&self, fill: &Fill<R>, first: usize, u: [&[u32]; 3]) {
+    unsafe fn fill<R>(&self, to: &SharedParticles<R>, first: usize, u: [&[u32]; 3]) {
         let (mut x, mut fixed16) = ([[0.0; VECTOR_PADDING]; 3], [[0; VECTOR_PADDING]; 3]);
         match self {
             Coordinates::Orthogonal { scale, edge_words } => {
@@ -173,17 +168,17 @@ impl<'a> Coordinates<'a> {
                     let point = geometry.point(&[0, 1, 2].map(|c| u[c][lane] as f64 / TWO_TO_32));
                     for c in 0..3 {
                         x[c][lane] = point[c] as f32;
-                        // SAFETY: a point of the box geometry.
+                        // SAFETY: a point of the box, which is finite and no more than some periods long.
                         fixed16[c][lane] = unsafe { fixed16_scale.coordinate(point[c]) };
                     }
                 }
             }
         }
         for c in 0..3 {
-            // SAFETY: the caller's; there is room behind the last.
+            // SAFETY: places with room that nobody else accesses, as the caller promises.
             unsafe {
-                fill.x[c].at(first).cast::<[f32; VECTOR_PADDING]>().write_unaligned(x[c]);
-                fill.fixed16[c].at(first).cast::<[u16; VECTOR_PADDING]>().write_unaligned(fixed16[c]);
+                to.x[c].at(first).cast::<[f32; VECTOR_PADDING]>().write_unaligned(x[c]);
+                to.fixed16[c].at(first).cast::<[u16; VECTOR_PADDING]>().write_unaligned(fixed16[c]);
             }
         }
     }

@@ -4,10 +4,17 @@ use crate::engine::noise::threefry2x32;
 use crate::engine::particles::Particles;
 use crate::engine::plan::Plan;
 use crate::engine::settings::Instructions;
+use crate::engine::sweep::cells::sorted::VECTOR_PADDING;
 use crate::engine::sweep::ground::arithmetic::{Double, Mixed};
+use crate::engine::sweep::ground::fixed_point::TWO_TO_32;
+use crate::engine::sweep::pool::part;
 use crate::model::Model;
 use nalgebra::Matrix3;
 use std::num::NonZeroUsize;
+
+fn portable() -> InstructionSet {
+    InstructionSet::new(Instructions::Portable).unwrap()
+}
 
 /// Neither a number of whole blocks nor of whole vectors.
 const COUNT: usize = 32 * 30 + 21;
@@ -44,13 +51,13 @@ impl Points {
     }
 }
 
-fn workspace<P: Compiled>(dimensions: usize, instructions: Instructions, threads: usize) -> Workspace<P> {
+fn workspace<P: PairPrecision>(dimensions: usize, set: InstructionSet, threads: usize) -> Workspace<P> {
     let model = Model::open(
         &std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../validation/models/warren2003-set6.toml"),
     );
     let mut fluid = model.unwrap().at(1.0).unwrap();
     fluid.dimensions = dimensions;
-    Workspace::new(&Plan::new(&fluid).unwrap(), instructions, threads)
+    Workspace::new(&Plan::new(&fluid).unwrap(), set, threads)
 }
 
 /// The frames, each with how far points are beyond them, in parts of the edges, and how many are owned.
@@ -97,14 +104,14 @@ fn cell_of(geometry: &BoxGeometry, grid: &CellGrid, x: &[f64; 3]) -> usize {
     column * grid.cells_per_column + part(0, grid.cells_per_column)
 }
 
-fn sorted<P: Compiled>(
+fn sorted<P: PairPrecision>(
     geometry: &BoxGeometry,
     points: &Points,
     owned: usize,
-    instructions: Instructions,
+    set: InstructionSet,
     threads: usize,
 ) -> Workspace<P> {
-    let mut workspace = workspace(geometry.dimensions, instructions, threads);
+    let mut workspace = workspace(geometry.dimensions, set, threads);
     let grid = CellGrid::new(geometry, 1.0, COUNT).unwrap();
     let pool = Pool::new(NonZeroUsize::new(threads).unwrap());
     workspace.sort(&pool, *geometry, grid, &points.input(owned)).unwrap();
@@ -112,14 +119,14 @@ fn sorted<P: Compiled>(
 }
 
 /// All who take part are there once, in the cell where they are, and their coordinates are those of where they are.
-fn is_sorted<P: Compiled>(workspace: &Workspace<P>, points: &Points, owned: usize) {
-    let (geometry, grid, n) = (&workspace.geometry, &workspace.grid, workspace.particles);
+fn is_sorted<P: PairPrecision>(workspace: &Workspace<P>, points: &Points, owned: usize) {
+    let (geometry, grid, n) = (&workspace.order.geometry, &workspace.order.grid, workspace.order.particles());
     let takes_part = |k: &usize| points.kind[*k] == 1 && (*k < owned || geometry.contains(&points.x[*k]));
     let expected: Vec<usize> = (0..COUNT).filter(takes_part).collect();
     assert!(expected.len() > 500 && expected.len() < COUNT);
-    let mut found: Vec<usize> = workspace.order.iter().map(|k| *k as usize).collect();
+    let mut found: Vec<usize> = workspace.order.order.iter().map(|k| *k as usize).collect();
     for cell in 0..grid.cell_count() {
-        let of_cell = &found[workspace.start[cell] as usize..workspace.start[cell + 1] as usize];
+        let of_cell = &found[workspace.order.start[cell] as usize..workspace.order.start[cell + 1] as usize];
         assert!(of_cell.is_sorted(), "within a bin the order is that of the host");
         assert!(of_cell.iter().all(|k| cell_of(geometry, grid, &points.x[*k]) == cell));
     }
@@ -133,12 +140,12 @@ fn is_sorted<P: Compiled>(workspace: &Workspace<P>, points: &Points, owned: usiz
         }
         let point = geometry.point(&fraction);
         for c in 0..geometry.dimensions {
-            let off = f64::from(workspace.x[c][s]) - point[c];
+            let off = f64::from(workspace.particles.x[c][s]) - point[c];
             // Or in the next period, from the edge between both.
             let off = if off.abs() > 1.0 { continue } else { off };
             assert!(off.abs() < 2.5e-7 * longest, "{off}");
-            let word = (point[c] * workspace.fixed16_scale.per_length).floor() as i64 as u16;
-            assert!((workspace.fixed16[c][s].wrapping_sub(word) as i16).abs() <= 1);
+            let word = (point[c] * workspace.particles.fixed16_scale.per_length).floor() as i64 as u16;
+            assert!((workspace.particles.fixed16[c][s].wrapping_sub(word) as i16).abs() <= 1);
         }
     }
     found.sort_unstable();
@@ -146,7 +153,7 @@ fn is_sorted<P: Compiled>(workspace: &Workspace<P>, points: &Points, owned: usiz
     assert_eq!(n, expected.len());
 }
 
-impl<P: Compiled> Workspace<P> {
+impl<P: PairPrecision> Workspace<P> {
     /// Sorts the particles, and fills all arrays at once.
     fn sort(
         &mut self,
@@ -156,39 +163,40 @@ impl<P: Compiled> Workspace<P> {
         input: &Input,
     ) -> Result<(), EngineError> {
         self.sort_into_cells(pool, geometry, grid, input)?;
-        let (arrays, count) = (self.arrays(), self.particles);
-        let this = &*self;
+        let (count, particles) = (self.order.particles(), self.particles.share());
         pool.run(&|t| {
             let some = part(count.div_ceil(VECTOR_PADDING), t, pool.threads());
+            let places = VECTOR_PADDING * some.start..count.min(VECTOR_PADDING * some.end);
             // SAFETY: each place is of one thread alone.
-            unsafe {
-                this.fill_sorted_range(
-                    arrays,
-                    input,
-                    VECTOR_PADDING * some.start..count.min(VECTOR_PADDING * some.end),
-                )
-            };
+            unsafe { particles.fill(self.fluid.set, &self.order, input, places) };
         });
-        self.copy_first_plane();
+        self.particles.copy_first_plane(&self.order);
         Ok(())
     }
 }
 
-fn is_the_same<P: Compiled>(a: &Workspace<P>, b: &Workspace<P>) {
-    let total = a.packed.len();
-    assert!(a.order == b.order && a.start == b.start && a.ghost == b.ghost);
+fn is_the_same<P: PairPrecision>(a: &Workspace<P>, b: &Workspace<P>) {
+    let total = a.particles.packed.len();
+    assert!(
+        a.order.order == b.order.order
+            && a.order.start == b.order.start
+            && a.particles.ghost == b.particles.ghost
+    );
     for c in 0..3 {
-        assert!(a.x[c][..total] == b.x[c][..total] && a.fixed16[c][..total] == b.fixed16[c][..total]);
+        assert!(
+            a.particles.x[c][..total] == b.particles.x[c][..total]
+                && a.particles.fixed16[c][..total] == b.particles.fixed16[c][..total]
+        );
     }
 }
 
-fn all_ways<P: Compiled>() {
-    let sets = Instructions::ALL.into_iter().map(|(_, set)| set).filter(|set| set.available());
+fn all_ways<P: PairPrecision>() {
+    let sets = Instructions::ALL.into_iter().filter_map(|(_, set)| InstructionSet::new(set));
     for set in sets {
         for (geometry, points, owned) in geometries() {
             let one = sorted::<P>(&geometry, &points, owned, set, 1);
             is_sorted(&one, &points, owned);
-            is_the_same(&one, &sorted(&geometry, &points, owned, Instructions::Portable, 1));
+            is_the_same(&one, &sorted(&geometry, &points, owned, portable(), 1));
             for threads in [2, 5] {
                 is_the_same(&one, &sorted(&geometry, &points, owned, set, threads));
             }
@@ -207,7 +215,7 @@ fn trouble_is_found_in_blocks_and_behind_them() {
     let (geometry, mut points, _) = geometries().swap_remove(0);
     let grid = CellGrid::new(&geometry, 1.0, COUNT).unwrap();
     let pool = Pool::new(NonZeroUsize::MIN);
-    for set in [Instructions::Portable, Instructions::best()] {
+    for set in [portable(), InstructionSet::best()] {
         let mut workspace = workspace::<Mixed>(3, set, 1);
         for k in [0, 70, COUNT - 1] {
             let tag = points.tag[k];
@@ -228,14 +236,14 @@ fn trouble_is_found_in_blocks_and_behind_them() {
                 points.x[k][1] = bad;
                 expect(&mut workspace, &points, EngineError::Position { tag });
                 if bad != 1e17 {
-                    let extremes = workspace.extremes(&pool, &points.input(COUNT));
+                    let extremes = extremes(&pool, set, &points.input(COUNT));
                     assert_eq!(extremes, Err(EngineError::Position { tag }));
                 }
             }
             // Who takes no part may be anywhere.
             points.kind[k] = 0;
             assert_eq!(workspace.sort(&pool, geometry, grid, &points.input(COUNT)), Ok(()));
-            assert!(workspace.extremes(&pool, &points.input(COUNT)).is_ok());
+            assert!(extremes(&pool, set, &points.input(COUNT)).is_ok());
             (points.x[k], points.kind[k]) = (x, kind);
         }
     }
@@ -248,8 +256,7 @@ fn extremes_are_those_of_all() {
     let highest = |c: usize| points.x.iter().fold(f64::NEG_INFINITY, |a, x| a.max(x[c]));
     for threads in [1, 3] {
         let pool = Pool::new(NonZeroUsize::new(threads).unwrap());
-        let mut workspace = workspace::<Mixed>(3, Instructions::best(), threads);
-        let found = workspace.extremes(&pool, &points.input(COUNT));
-        assert_eq!(found, Ok(([0, 1, 2].map(lowest), [0, 1, 2].map(highest))));
+        let found = extremes(&pool, InstructionSet::best(), &points.input(COUNT));
+        assert_eq!(found, Ok([[0, 1, 2].map(lowest), [0, 1, 2].map(highest)]));
     }
 }
