@@ -19,8 +19,10 @@ pub struct Temperature {
 
 impl Meter for Temperature {
     const TABLE: Table = Table {
-        name: "temperature",
+        path: "temperature",
         title: "temperature, kinetic and configurational",
+        array: false,
+        forms: ("", &[]),
         about: "`kinetic` is 2K/(d(N − 1)). `configurational` is ⟨Σ F·F⟩/⟨−Σ ∇·F⟩ with the conservative forces alone \
                 (Rugh; Butler et al., J. Chem. Phys. 109, 6519 (1998)), with ∇·F from the second derivatives of ψ, \
                 kernels and pair potentials; φ″ of formulas and tables is the five-point difference of the exact φ′. \

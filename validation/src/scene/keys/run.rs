@@ -6,6 +6,7 @@ use super::{Key, OPTIONAL, REQUIRED, Table, ValueKind, axes, key};
 /// `[[body_force]]`.
 pub const BODY_FORCE: Table = Table {
     path: "body_force",
+    title: "",
     array: true,
     forms: ("", &[]),
     about: "An acceleration from outside; any number of them, which add up. Potential energies and virials do not \
@@ -78,6 +79,7 @@ const STAGE_NOISE: Key = Key {
 /// `[[stage]]`.
 pub const STAGE: Table = Table {
     path: "stage",
+    title: "",
     array: true,
     forms: ("", &[]),
     about: "Parts of a run under conditions of their own, one after the other: instead of `steps`.",
@@ -143,6 +145,7 @@ pub const STAGE: Table = Table {
 /// `[output]`.
 pub const OUTPUT: Table = Table {
     path: "output",
+    title: "",
     array: false,
     forms: ("", &[]),
     about: "What a run writes beside its final state.",

@@ -75,6 +75,7 @@ pub(super) const NOISE: Key = key(
 /// The top level.
 pub const TOP: Table = Table {
     path: "",
+    title: "",
     array: false,
     forms: ("", &[]),
     about: "Which fluid, how warm, in which box, for how long. A scene needs a model, kT, a box, something in it \
@@ -153,6 +154,7 @@ pub const TOP: Table = Table {
 /// `[box]`.
 pub const BOX: Table = Table {
     path: "box",
+    title: "",
     array: false,
     forms: ("", &[]),
     about: "The box, where it needs more than lengths.",
@@ -179,6 +181,7 @@ pub const BOX: Table = Table {
 /// `[masses]`.
 pub const MASSES: Table = Table {
     path: "masses",
+    title: "",
     array: false,
     forms: ("", &[]),
     about: "Masses of the species; 1, or what a data file says, for those left out.",
