@@ -148,7 +148,7 @@ impl Integrator {
         }
     }
 
-    /// Its errors, roughly: within a factor of two of those runs for one force a step, a guess from energies for two-stage.
+    /// Its errors, roughly: within a factor of three of those runs for one force a step, a guess from energies for two-stage.
     pub fn accuracy(&self) -> Accuracy {
         const ONE_FORCE: f64 = 5.0;
         match self {
