@@ -112,7 +112,7 @@ fn sampled(scene: &Scene, kt: f64) -> Result<Option<[f64; 2]>, RunError> {
     let fluid = scene.model.at(kt)?;
     let densities = scene.densities();
     let total: f64 = densities.iter().sum();
-    if !(total > 0.0) {
+    if total.is_nan() || total <= 0.0 {
         return Ok(None);
     }
     let dimensions = fluid.dimensions;

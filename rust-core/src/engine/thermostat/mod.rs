@@ -10,8 +10,8 @@
 //! from which every update here is made: the drag is `−(2/Δt) g (g·v_ij)`, the noise `(2/Δt) √kT ξ g`. Since both
 //! come from the same `g`, single precision of `g` changes the friction by rounding, but not the equilibrium.
 //!
-//! [`PairThermostat::find_pairs`] finds the pairs ([`cells`]), [`PairThermostat::draw`] their noise, and
-//! [`PairThermostat::act`] changes velocities: [`midpoint`] for all pairs at once, [`sequential`] pair by pair.
+//! [`PairThermostat::find_pairs`] finds the pairs (`cells`, `planes`), [`PairThermostat::draw`] their noise, and
+//! [`PairThermostat::act`] changes velocities: `midpoint` for all pairs at once, `sequential` pair by pair.
 //! Results depend on positions, velocities and tags: not on the order of particles in memory, nor on the
 //! number of threads. A new update is a variant of [`Update`] and its rule in one of these files.
 
@@ -37,11 +37,11 @@ use planes::Plane;
 /// How velocities are changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Update {
-    /// The implicit midpoint rule over all pairs; see [`midpoint`].
+    /// The implicit midpoint rule over all pairs; see `midpoint.rs`.
     Midpoint,
     /// Drag alone, by the implicit Euler rule over all pairs: `(M + ½ΔtG) v′ = M v`.
     ImplicitDrag,
-    /// The exact Ornstein–Uhlenbeck process of one pair after the other; see [`sequential`].
+    /// The exact Ornstein–Uhlenbeck process of one pair after the other; see `sequential.rs`.
     OrnsteinUhlenbeck,
     /// Half explicit and half implicit, one pair after the other.
     Shardlow {
@@ -153,8 +153,8 @@ impl PairThermostat {
     /// What drag and noise see at the velocities `v`, in the order of the particles that pairs were found of; `None` if
     /// no pair is in range.
     pub fn warmth(&self, v: &[[f64; 3]]) -> Option<Warmth> {
-        let (mut squares, mut weights, mut rates, mut moving) = (0.0, 0.0, 0.0, 0usize);
-        moving += self.mass.iter().filter(|m| m.is_finite()).count();
+        let moving = self.mass.iter().filter(|m| m.is_finite()).count();
+        let (mut squares, mut weights, mut rates) = (0.0, 0.0, 0.0);
         for plane in &self.planes {
             for (i, ends) in plane.start.windows(2).enumerate() {
                 for pair in &plane.pairs[ends[0] as usize..ends[1] as usize] {

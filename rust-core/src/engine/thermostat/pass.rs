@@ -111,18 +111,20 @@ impl Plane {
             let of_i = ends[0] as usize..ends[1] as usize;
             let at = p[i];
             let mut sum = [0.0; 4];
-            for k in of_i {
-                let pair = &self.pairs[k];
+            let noises = if NOISE { &self.xi[of_i.clone()] } else { &[] };
+            for (k, pair) in self.pairs[of_i].iter().enumerate() {
                 let j = pair.j as usize;
                 let [x, y, z] = pair.g.map(f64::from);
                 let (g, other) = ([x, y, z, 0.0], p[j]);
-                let along = (at[0] - other[0]) * g[0] + (at[1] - other[1]) * g[1] + (at[2] - other[2]) * g[2];
-                let xi = if NOISE { noise * f64::from(self.xi[k]) } else { 0.0 };
+                let t: Wide = std::array::from_fn(|c| (at[c] - other[c]) * g[c]);
+                let along = (t[0] + t[2]) + (t[1] + t[3]);
+                let xi = if NOISE { noise * f64::from(noises[k]) } else { 0.0 };
                 let factor = xi - drag * along;
+                let push: Wide = g.map(|g| factor * g);
                 let to = &mut sums[j];
                 for c in 0..4 {
-                    sum[c] += factor * g[c];
-                    to[c] -= factor * g[c];
+                    sum[c] += push[c];
+                    to[c] -= push[c];
                 }
             }
             for c in 0..4 {

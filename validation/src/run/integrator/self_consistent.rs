@@ -17,9 +17,8 @@ pub fn step(system: &mut Simulation, dt: f64, want: Want, noise: Law) -> Result<
     system.kick_and_drift(0.5 * dt, dt)?;
     system.forces_then_noise(dt, want, noise)?;
     system.kick(0.5 * dt)?;
-    // The drag of the last half step is in the velocities then, and its virial in what is added below.
     let heat = Heat { update: Update::ImplicitDrag, noise, time: dt, stream: Stream(0) };
-    system.heat(heat, Want::FORCES, dt)?;
+    system.heat(heat, want, dt)?;
     system.add_drag();
     Ok(())
 }
