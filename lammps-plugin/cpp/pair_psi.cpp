@@ -8,8 +8,10 @@
 #include "comm.h"
 #include "domain.h"
 #include "error.h"
+#include "fix.h"
 #include "force.h"
 #include "memory.h"
+#include "modify.h"
 #include "neigh_list.h"
 #include "neighbor.h"
 #include "update.h"
@@ -179,6 +181,7 @@ void PairPsi::init_style()
 {
   refresh();
   check_host();
+  check_callers();
   check_box();
   // Buffers are sized by this; what is sent later is never more.
   comm_forward = static_cast<int>((*style)->variables());
@@ -187,11 +190,15 @@ void PairPsi::init_style()
   if (atom->molecular != Atom::ATOMIC)
     for (int k = 1; k < 4; k++)
       if (force->special_lj[k] != 1.0) why_listed = "special_bonds";
-  // neighbor->exclude is set only later, by neighbor->init().
-  if (neighbor->nex_type + neighbor->nex_group + neighbor->nex_mol > 0)
-    why_listed += why_listed.empty() ? "neigh_modify exclude" : " and neigh_modify exclude";
-  if (neighbor->includegroup)
-    why_listed += why_listed.empty() ? "neigh_modify include" : " and neigh_modify include";
+  const auto because = [this](const std::string &text) { why_listed += (why_listed.empty() ? "" : " and ") + text; };
+  if (has_exclusions()) because("neigh_modify exclude");
+  if (neighbor->includegroup) because("neigh_modify include");
+  // These exclude a group of their own, and say so only when pair styles have asked for their lists.
+  for (int k = 0; k < modify->nfix; k++) {
+    const char *fix = modify->fix[k]->style;
+    for (const char *known : {"gcmc", "widom", "charge/regulation"})
+      if (strcmp(fix, known) == 0) because(std::string("fix ") + known);
+  }
   if (!why_listed.empty()) full_list = request_list(neighbor, this, instance_me, 0);
   // With newton off a half list has the pairs of owned atoms with ghosts on both sides, which will do.
   if (!why_listed.empty() && !full_list && force->newton_pair)
@@ -221,6 +228,30 @@ void PairPsi::check_host()
   if (!atom->tag_enable) stop("needs atom IDs: remove 'atom_modify id no'");
   if ((*style)->needs_velocities() && !comm->ghost_velocity)
     stop("the thermostat needs velocities of ghost atoms: add 'comm_modify vel yes'");
+}
+
+// neighbor->exclude is set only later, by neighbor->init(). Types that another style of a hybrid has are its business.
+bool PairPsi::has_exclusions() const
+{
+  bool some = neighbor->nex_group > 0 || neighbor->nex_mol > 0;
+  for (int k = 0; k < neighbor->nex_type; k++) {
+    const auto [i, j] = std::minmax(neighbor->ex1_type[k], neighbor->ex2_type[k]);
+    some |= i >= 1 && j <= atom->ntypes && setflag[i][j];
+  }
+  return some;
+}
+
+// What works with energies of single pairs alone has nothing to work with where energies belong to particles.
+void PairPsi::check_callers()
+{
+  if ((*style)->slope_width() == 0) return;
+  for (int k = 0; k < modify->nfix; k++)
+    if (strncmp(modify->fix[k]->style, "bond/swap", 9) == 0)
+      stop("fix bond/swap decides on the energies of single pairs: it cannot be used with a many-body style");
+  for (const char *bond : {"special", "quartic"})
+    if (force->bond_match(bond))
+      stop(std::string("bond_style ") + bond + " adds or takes away the forces of single pairs: it cannot be used with "
+           "a many-body style");
 }
 
 // Two images of one pair would draw the same noise in a box shorter than twice its range.
@@ -317,20 +348,15 @@ bool PairPsi::is_alone(const Extent &extent) const
 // Asks which ghosts are images along closed directions: who packs them knows.
 void PairPsi::find_images()
 {
-  closed = extent().closed;
-  told = 0;
+  const auto closed = extent().closed;
   // All ranks agree on the box.
-  if (comm->nprocs == 1 || !why_listed.empty() || closed == std::array<bool, 3>{}) return;
-  if (atom->nghost > room || !images) {
-    room = atom->nghost + atom->nghost / 8 + 1;
-    images.reset(new bool[room]);
-  }
-  std::fill_n(images.get(), atom->nghost, false);
+  const bool none = !why_listed.empty() || closed == std::array<bool, 3>{};
+  images.begin(closed, atom->nlocal, none ? 0 : atom->nghost);
+  if (none) return;
   carries = Carries::images;
   comm_forward = 1;
   forward_slopes(comm, this, 0);
   carries = Carries::slopes;
-  told = atom->nghost;
 }
 
 void PairPsi::find_densities(int all, const Request &request)
@@ -343,8 +369,8 @@ void PairPsi::find_densities(int all, const Request &request)
     Extent extent = this->extent();
     rust::Slice<const bool> left_out;
     // Only what was closed when ghosts were found has all its images told.
-    if (extent.closed == closed && told == atom->nghost && (*style)->fits(extent, request))
-      left_out = {images.get(), static_cast<size_t>(told)};
+    if (!strained && images.know(extent.closed, atom->nghost) && (*style)->fits(extent, request))
+      left_out = {images.flags(), static_cast<size_t>(atom->nghost)};
     else
       extent.closed = {};
     style_densities(**style, extent, left_out, owned, x, flat(atom->v, all), tag, kind, force->newton_pair,
@@ -375,6 +401,8 @@ void PairPsi::compute(int eflag, int vflag)
   if (neighbor->ago == 0) {
     check_ghosts();
     if (domain->box_change) check_box();
+    if (why_listed.empty() && has_exclusions())
+      stop("pairs were excluded after the style was set up, by a fix perhaps: run again");
     find_images();
   }
 
@@ -401,33 +429,21 @@ void PairPsi::compute(int eflag, int vflag)
   const size_t reach = newton ? all : owned;
   rust::Slice<double> f;
   if (reach > 0) f = {atom->f[0], 3 * reach};
-  Totals totals;
-  std::string trouble;
   const Extent box = extent();
-  const bool alone = is_alone(box) && fluid.fits(box, request);
-  try {
-    if (alone) {
-      totals = style_evaluate(fluid, box, flat(atom->x, owned), flat(atom->v, owned), {atom->tag, owned},
-                              {atom->type, owned}, request, f);
-    } else {
-      find_densities(all, request);
-    }
-  } catch (const std::exception &e) {
-    trouble = e.what();
-  }
-  if (!trouble.empty()) stop_here(trouble);
-
-  without_slopes = {-1, -1};
+  strained = images.have_moved(atom, domain);
+  const bool alone = !strained && is_alone(box) && attempt([&] { return fluid.fits(box, request); });
+  Totals totals;
   if (alone) {
+    totals = attempt([&] {
+      return style_evaluate(fluid, box, flat(atom->x, owned), flat(atom->v, owned), {atom->tag, owned},
+                            {atom->type, owned}, request, f);
+    });
     without_slopes = {atom->nlocal, atom->nghost};
   } else {
+    attempt([&] { find_densities(all, request); });
     forward();
-    try {
-      totals = style_forces(fluid, owned, x, v, tag, kind, request, f);
-    } catch (const std::exception &e) {
-      trouble = e.what();
-    }
-    if (!trouble.empty()) stop_here(trouble);
+    totals = attempt([&] { return style_forces(fluid, owned, x, v, tag, kind, request, f); });
+    without_slopes = {-1, -1};
   }
 
   if (eflag_global) {
@@ -453,10 +469,7 @@ void PairPsi::compute(int eflag, int vflag)
 int PairPsi::pack_forward_comm(int n, int *list, double *buf, int pbc_flag, int *pbc)
 {
   if (carries == Carries::images) {
-    bool image = false;
-    for (int k = 0; k < 3; k++) image |= pbc_flag && closed[k] && pbc[k] != 0;
-    const int owned = atom->nlocal;
-    for (int i = 0; i < n; i++) *buf++ = image || (list[i] >= owned && images[list[i] - owned]);
+    images.pack(n, list, buf, pbc_flag, pbc);
     return n;
   }
   const auto slopes = (*style)->slopes_mut();
@@ -469,7 +482,7 @@ int PairPsi::pack_forward_comm(int n, int *list, double *buf, int pbc_flag, int 
 void PairPsi::unpack_forward_comm(int n, int first, double *buf)
 {
   if (carries == Carries::images) {
-    for (int i = first; i < first + n; i++) images[i - atom->nlocal] = *buf++ != 0.0;
+    images.unpack(n, first, buf);
     return;
   }
   auto slopes = (*style)->slopes_mut();
@@ -478,17 +491,47 @@ void PairPsi::unpack_forward_comm(int n, int first, double *buf)
     for (int k = 0; k < comm_forward; k++) slopes[i * width + first_column + k] = *buf++;
 }
 
+// Whether atoms and ghosts, their types and their distance are those of the last evaluation.
+bool PairPsi::is_pair(int i, int j, int itype, int jtype, double rsq) const
+{
+  const int all = atom->nlocal + atom->nghost;
+  if (i < 0 || j < 0 || i >= all || j >= all) return false;
+  if (atom->type[i] != itype || atom->type[j] != jtype) return false;
+  double d[3];
+  for (int k = 0; k < 3; k++) d[k] = atom->x[i][k] - atom->x[j][k];
+  const auto agrees = [&] {
+    const double here = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+    return std::fabs(here - rsq) <= 1e-9 * std::max(1.0, here);
+  };
+  if (agrees()) return true;
+  // Some callers have found the atom and take the nearest of its images.
+  const double *h = domain->h;
+  const double edge[3][3] = {{h[0], 0.0, 0.0}, {h[5], h[1], 0.0}, {h[4], h[3], h[2]}};
+  for (int k = 2; k >= 0; k--) {
+    if (!domain->periodicity[k]) continue;
+    const double n = std::round(d[k] / edge[k][k]);
+    for (int c = 0; c <= k; c++) d[c] -= n * edge[k][c];
+  }
+  return agrees();
+}
+
 // The energy is that of the terms that belong to pairs, without psi; the force is the whole conservative
 // one, with the densities of the last step. Drag and noise are left out, as in LAMMPS's other DPD styles.
 double PairPsi::single(int i, int j, int itype, int jtype, double rsq, double, double factor_lj, double &fforce)
 {
-  if (without_slopes == std::array<int, 2>{atom->nlocal, atom->nghost}) {
-    (*style)->fetch_slopes(atom->nlocal + atom->nghost);
-    forward();
+  // Without densities a pair is a pair wherever its atoms are, and whether they are there at all.
+  const bool many_body = (*style)->slope_width() > 0;
+  if (many_body && !is_pair(i, j, itype, jtype, rsq))
+    stop_here("asked for the energy of a pair that is not there, as of an atom to be inserted or moved: where energies "
+              "belong to particles no single pair tells it; fix gcmc and fix widom need full_energy with a many-body "
+              "style, and pair_write cannot be used");
+  if (many_body && without_slopes == std::array<int, 2>{atom->nlocal, atom->nghost}) {
     without_slopes = {-1, -1};
+    attempt([&] { (*style)->fetch_slopes(atom->nlocal + atom->nghost); });
+    forward();
   }
   const double r = std::sqrt(rsq);
-  const PairValue pair = (*style)->single(itype, jtype, i, j, r);
+  const PairValue pair = attempt([&] { return style_single(**style, itype, jtype, i, j, r); });
   fforce = r > 0.0 ? factor_lj * pair.force / r : 0.0;
   return factor_lj * pair.energy;
 }
@@ -508,17 +551,18 @@ void *PairPsi::extract_peratom(const char *what, int &columns)
   if (!density && strcmp(what, "psi") != 0) return nullptr;
   refresh();
   columns = 0;
-  if (!density) return const_cast<double *>((*style)->excess().data());
+  if (!density) return attempt([&] { return const_cast<double *>((*style)->excess().data()); });
   if (!wants_densities) {
     wants_densities = true;
     (*style)->sum_all_densities(true);
   }
   const size_t width = (*style)->variables();
   if (width == 0) return nullptr;
-  double *first = const_cast<double *>((*style)->local_densities().data());
+  const auto densities = attempt([&] { return (*style)->local_densities(); });
+  double *first = const_cast<double *>(densities.data());
   if (width == 1) return first;
   columns = static_cast<int>(width);
-  density_rows.resize((*style)->local_densities().size() / width + 1);
+  density_rows.resize(densities.size() / width + 1);
   for (size_t i = 0; i < density_rows.size(); i++) density_rows[i] = first + i * width;
   return density_rows.data();
 }

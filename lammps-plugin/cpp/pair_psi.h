@@ -3,11 +3,12 @@
 #ifndef PSIDPD_PAIR_PSI_H
 #define PSIDPD_PAIR_PSI_H
 
+#include "images.h"
 #include "pair.h"
 #include "psidpd-lammps/src/bridge.rs.h"
 
 #include <array>
-#include <memory>
+#include <exception>
 #include <optional>
 #include <string>
 #include <vector>
@@ -86,8 +87,24 @@ class PairPsi : public LAMMPS_NS::Pair {
   void forward();
   void check_box();
   void check_ghosts();
+  void check_callers();
+  // Whether LAMMPS's neighbor list leaves out pairs of this style.
+  bool has_exclusions() const;
+  // Whether a pair is one of the last evaluation.
+  bool is_pair(int i, int j, int itype, int jtype, double rsq) const;
   std::string search();
   [[noreturn]] void stop_here(const std::string &text);
+  // Runs `work` and stops here with what it throws, once nothing of it is left on the stack.
+  template <class Work> auto attempt(Work work)
+  {
+    std::string trouble;
+    try {
+      return work();
+    } catch (const std::exception &e) {
+      trouble = e.what();
+    }
+    stop_here(trouble);
+  }
 
   double temperature = 0.0;
   double built_kt = 0.0;
@@ -104,11 +121,9 @@ class PairPsi : public LAMMPS_NS::Pair {
   Carries carries = Carries::slopes;
   int first_column = 0;
 
-  // For each ghost whether it is the image of a particle that this rank has, along a direction that was closed when
-  // ghosts were found; and how many ghosts those are for.
-  std::array<bool, 3> closed{};
-  std::unique_ptr<bool[]> images;
-  int told = 0, room = 0;
+  Images images;
+  // Whether ghosts are elsewhere than their atoms say, in this evaluation.
+  bool strained = false;
 
   // Atoms and ghosts of an evaluation that left no slopes of ghosts; those that single() has asked for are there.
   std::array<int, 2> without_slopes{-1, -1};
