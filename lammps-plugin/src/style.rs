@@ -319,9 +319,13 @@ impl Style {
         }
         let _ = writeln!(text, "  search        {search}");
         let Settings { precision, instructions, threads } = self.engines.sweep().settings();
+        let faster = match precision {
+            Precision::Double => "; 'precision mixed' is faster",
+            _ => "",
+        };
         let _ = writeln!(
             text,
-            "  arithmetic    {precision} precision, {instructions}, {threads} thread(s) a rank"
+            "  arithmetic    {precision} precision, {instructions}, {threads} thread(s) a rank{faster}"
         );
         text
     }
