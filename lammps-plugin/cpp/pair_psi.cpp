@@ -21,6 +21,7 @@
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
+#include <thread>
 
 using namespace LAMMPS_NS;
 using namespace psidpd;
@@ -83,9 +84,14 @@ PairPsi::~PairPsi()
   }
 }
 
-void PairPsi::stop(const std::string &text)
+void PairPsi::stop(const std::string &text, const char *file, int line)
 {
-  error->all(FLERR, std::string("Pair style ") + name + ": " + text);
+  error->all(file, line, "Pair style " + name + ": " + text);
+}
+
+void PairPsi::warn(const std::string &text, const char *file, int line)
+{
+  if (comm->me == 0) error->warning(file, line, "Pair style " + name + ": " + text);
 }
 
 void PairPsi::complain(const std::string &text)
@@ -205,7 +211,19 @@ void PairPsi::init_style()
     stop("with " + why_listed + " this version of LAMMPS needs 'newton off'");
 
   if (!described && comm->me == 0) utils::logmesg(lmp, std::string((*style)->description(search())));
+  if (!described) advise();
   described = true;
+}
+
+// What has been asked for and does nothing, or less than nothing.
+void PairPsi::advise()
+{
+  if (lmp->suffix_enable)
+    warn("there is no accelerated variant: the suffix has no effect on it; it has the keywords 'precision mixed' and "
+         "'threads'");
+  const size_t here = std::thread::hardware_concurrency();
+  if (here > 0 && threads > here)
+    warn("threads " + std::to_string(threads) + " is more than the " + std::to_string(here) + " processors here");
 }
 
 std::string PairPsi::search()
@@ -217,8 +235,12 @@ std::string PairPsi::search()
       text += "\n  advice        'newton off' saves sending back forces on ghosts: this style leaves none there";
     return text;
   }
-  return std::string(full_list ? "full" : "half") + " neighbor list of LAMMPS, because of " + why_listed +
+  std::string text = std::string(full_list ? "full" : "half") + " neighbor list of LAMMPS, because of " + why_listed +
       ": pairs that are not in it do not interact, special factors scale phi and w";
+  if (why_listed.find("special_bonds") != std::string::npos)
+    text += "\n  advice        in DPD 'special_bonds lj 1 1 1' is usual, bonded atoms interacting like all others; it is "
+            "faster too";
+  return text;
 }
 
 void PairPsi::check_host()
@@ -267,6 +289,22 @@ void PairPsi::check_box()
            "): images of a pair would share their noise; use a longer box");
 }
 
+// What a plane has no place for: older versions of LAMMPS fill several of them with a lattice.
+void PairPsi::check_plane()
+{
+  if (domain->dimension != 2) return;
+  double mine[2] = {-1e300, -1e300}, all[2];
+  for (int i = 0; i < atom->nlocal; i++) {
+    const double z = atom->x[i][2];
+    mine[0] = std::max(mine[0], z);
+    mine[1] = std::max(mine[1], -z);
+  }
+  MPI_Allreduce(mine, all, 2, MPI_DOUBLE, MPI_MAX, world);
+  if (all[0] + all[1] > 1e-6)
+    stop("in two dimensions all atoms must have the same z, found " + std::to_string(-all[1]) + " to " +
+         std::to_string(all[0]) + ": use a box that is thinner than the lattice, or 'set group all z 0'");
+}
+
 void PairPsi::check_ghosts()
 {
   if (comm->mode != Comm::SINGLE) return;
@@ -286,15 +324,15 @@ double PairPsi::init_one(int i, int j)
 {
   if (setflag[i][j] == 0)
     stop("no coefficients for types " + std::to_string(i) + " and " + std::to_string(j) +
-         ": set them with pair_coeff");
+         ": there is no mixing, set them with pair_coeff");
   refresh();
   return (*style)->cutoff();
 }
 
 // Trouble on one rank stops all: the text names the particle.
-void PairPsi::stop_here(const std::string &text)
+void PairPsi::stop_here(const std::string &text, const char *file, int line)
 {
-  error->one(FLERR, "Pair style " + name + " at step " + std::to_string(update->ntimestep) + ": " + text);
+  error->one(file, line, "Pair style " + name + " at step " + std::to_string(update->ntimestep) + ": " + text);
 }
 
 // The pairs of LAMMPS's list, each of two owned atoms once.
@@ -399,6 +437,7 @@ void PairPsi::compute(int eflag, int vflag)
   ev_init(eflag, vflag);
   refresh();
   if (neighbor->ago == 0) {
+    check_plane();
     check_ghosts();
     if (domain->box_change) check_box();
     if (why_listed.empty() && has_exclusions())
@@ -421,6 +460,11 @@ void PairPsi::compute(int eflag, int vflag)
   request.seed = seed;
   request.step = static_cast<uint64_t>(update->ntimestep);
   request.dt = update->dt;
+  if (request.thermostat && !(update->dt > 0.0))
+    stop("the thermostat needs a timestep greater than 0, found " + std::to_string(update->dt));
+  if (num_tally_compute > 0)
+    stop("computes of the TALLY package get no pairs from it: use compute pe/atom, stress/atom, group/group or "
+         "pair/local");
   request.energy = eflag_global != 0;
   request.virial = vflag_global != 0;
   request.particle_energy = eflag_atom != 0;

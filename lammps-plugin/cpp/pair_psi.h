@@ -68,8 +68,10 @@ class PairPsi : public LAMMPS_NS::Pair {
   void read_temperature(const char *arg);
   void read_seed(const char *arg);
   double kt() const;
-  // Stops with "Pair style NAME: text", on all ranks.
-  [[noreturn]] void stop(const std::string &text);
+  // Stops with "Pair style NAME: text", on all ranks; LAMMPS adds the place.
+  [[noreturn]] void stop(const std::string &text, const char *file = __builtin_FILE(), int line = __builtin_LINE());
+  // Says on one rank "Pair style NAME: text", with the place.
+  void warn(const std::string &text, const char *file = __builtin_FILE(), int line = __builtin_LINE());
   // Throws the text, for what make_style finds wrong.
   [[noreturn]] static void complain(const std::string &text);
 
@@ -86,16 +88,20 @@ class PairPsi : public LAMMPS_NS::Pair {
   void collect_pairs();
   void forward();
   void check_box();
+  void check_plane();
   void check_ghosts();
   void check_callers();
+  void advise();
   // Whether LAMMPS's neighbor list leaves out pairs of this style.
   bool has_exclusions() const;
   // Whether a pair is one of the last evaluation.
   bool is_pair(int i, int j, int itype, int jtype, double rsq) const;
   std::string search();
-  [[noreturn]] void stop_here(const std::string &text);
+  [[noreturn]] void stop_here(const std::string &text, const char *file = __builtin_FILE(),
+                              int line = __builtin_LINE());
   // Runs `work` and stops here with what it throws, once nothing of it is left on the stack.
-  template <class Work> auto attempt(Work work)
+  template <class Work>
+  auto attempt(Work work, const char *file = __builtin_FILE(), int line = __builtin_LINE())
   {
     std::string trouble;
     try {
@@ -103,7 +109,7 @@ class PairPsi : public LAMMPS_NS::Pair {
     } catch (const std::exception &e) {
       trouble = e.what();
     }
-    stop_here(trouble);
+    stop_here(trouble, file, line);
   }
 
   double temperature = 0.0;
