@@ -175,7 +175,6 @@ void PairPsi::refresh()
     else
       (*style)->set_temperature(kt());
     (*style)->configure(mixed, threads);
-    (*style)->sum_all_densities(wants_densities);
   } catch (const std::exception &e) {
     trouble = e.what();
   }
@@ -210,7 +209,8 @@ void PairPsi::init_style()
   if (!why_listed.empty() && !full_list && force->newton_pair)
     stop("with " + why_listed + " this version of LAMMPS needs 'newton off'");
 
-  if (!described && comm->me == 0) utils::logmesg(lmp, std::string((*style)->description(search())));
+  if (!described && comm->me == 0)
+    utils::logmesg(lmp, std::string((*style)->description(search(), !why_listed.empty())));
   if (!described) advise();
   described = true;
 }
@@ -596,13 +596,12 @@ void *PairPsi::extract_peratom(const char *what, int &columns)
   refresh();
   columns = 0;
   if (!density) return attempt([&] { return const_cast<double *>((*style)->excess().data()); });
-  if (!wants_densities) {
-    wants_densities = true;
-    (*style)->sum_all_densities(true);
-  }
   const size_t width = (*style)->variables();
   if (width == 0) return nullptr;
-  const auto densities = attempt([&] { return (*style)->local_densities(); });
+  // Forces may not have needed all of them.
+  const size_t all = atom->nlocal + atom->nghost;
+  attempt([&] { (*style)->sum_densities(atom->nlocal, flat(atom->x, all), {atom->tag, all}, {atom->type, all}); });
+  const auto densities = (*style)->local_densities();
   double *first = const_cast<double *>(densities.data());
   if (width == 1) return first;
   columns = static_cast<int>(width);

@@ -2,7 +2,7 @@
 
 use crate::style::{Style, StyleError, guard};
 use nalgebra::Matrix3;
-use psidpd_core::engine::{Around, PairsOfHost, PeriodicBox, Step, Tally, Want};
+use psidpd_core::engine::{Around, PairsOfHost, Path, PeriodicBox, Step, Surroundings, Tally, Want};
 use psidpd_core::model::{SplinePair, WarrenPair};
 
 #[cxx::bridge(namespace = "psidpd")]
@@ -82,10 +82,9 @@ mod ffi {
         ) -> Result<Box<Style>>;
 
         fn set_temperature(self: &mut Style, kt: f64) -> Result<()>;
-        fn sum_all_densities(self: &mut Style, all: bool);
         fn model_text(self: &Style) -> String;
         fn model_name(self: &Style) -> String;
-        fn description(self: &Style, search: &str) -> String;
+        fn description(self: &Style, search: &str, listed: bool) -> String;
         fn cutoff(self: &Style) -> f64;
         fn slope_width(self: &Style) -> usize;
         /// The number of densities times species: no slope width is larger.
@@ -153,8 +152,10 @@ mod ffi {
         fn particle_energy(self: &Style) -> &[f64];
         /// Six numbers a particle.
         fn particle_virial(self: &Style) -> &[f64];
+        /// Sums all densities at the positions of the last evaluation.
+        fn sum_densities(self: &mut Style, owned: usize, x: &[f64], tag: &[i32], kind: &[i32]) -> Result<()>;
         /// Those of owned particles, a row of [`variables`] for each.
-        fn local_densities(self: &mut Style) -> Result<&[f64]>;
+        fn local_densities(self: &Style) -> &[f64];
         /// psi of owned particles.
         fn excess(self: &mut Style) -> Result<&[f64]>;
         fn style_single(
@@ -228,6 +229,7 @@ fn wanted(request: &ffi::Request) -> (Option<Step>, Want) {
         virial: request.virial,
         particle_energy: request.particle_energy,
         particle_virial: request.particle_virial,
+        densities: false,
     };
     (request.thermostat.then_some(step), want)
 }
@@ -256,7 +258,7 @@ fn style_evaluate(
 }
 
 fn totals(style: &Style, tally: &Tally) -> ffi::Totals {
-    let [below, above] = style.engines().out_of_bounds().map(|n| n as f64);
+    let [below, above] = style.engine().out_of_bounds().map(|n| n as f64);
     ffi::Totals { excess: tally.excess, pair: tally.pair, virial: tally.total_virial(), below, above }
 }
 
@@ -337,26 +339,27 @@ impl Style {
 
     fn fits(&self, extent: &ffi::Extent, request: &ffi::Request) -> Result<bool, StyleError> {
         let (_, want) = wanted(request);
-        guard(|| Ok(domain_of(extent).is_ok_and(|domain| self.engines().fits(&domain, want))))
+        let path = |domain| self.engine().path_for(Surroundings::Box(&domain), want);
+        guard(|| Ok(domain_of(extent).is_ok_and(|domain| path(domain) == Path::Sweep)))
     }
 
     fn fetch_slopes(&mut self, all: usize) -> Result<(), StyleError> {
         guard(|| {
-            self.engines_mut().fetch_slopes(all);
+            self.engine_mut().fetch_slopes(all);
             Ok(())
         })
     }
 
-    fn local_densities(&mut self) -> Result<&[f64], StyleError> {
-        guard(|| Ok(self.engines_mut().local_densities()))
+    fn local_densities(&self) -> &[f64] {
+        self.engine().local_densities()
     }
 
     fn excess(&mut self) -> Result<&[f64], StyleError> {
-        guard(|| Ok(self.engines_mut().excess()))
+        guard(|| Ok(self.engine_mut().excess()))
     }
 
     fn memory(&self) -> usize {
-        self.engines().memory()
+        self.engine().memory()
     }
 
     fn cutoff(&self) -> f64 {
@@ -364,7 +367,7 @@ impl Style {
     }
 
     fn slope_width(&self) -> usize {
-        self.engine().slope_width()
+        self.engine().plan().slope_width()
     }
 
     fn needs_velocities(&self) -> bool {

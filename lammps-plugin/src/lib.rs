@@ -2,7 +2,6 @@
 //! this.
 //!
 //! - [`style`]: what a pair style asks of the engine, in safe Rust;
-//! - [`engines`]: which of the engines does an evaluation;
 //! - [`bridge`]: the same for C++, by cxx: slices, strings and exceptions, checked at compile time;
 //! - `cpp/`: the pair styles that LAMMPS sees, compiled against the headers of one LAMMPS;
 //! - `table`: the styles, as the entry finds them.
@@ -11,7 +10,6 @@
 //! act less or not at all: `special_bonds`, `neigh_modify exclude`.
 
 pub mod bridge;
-pub mod engines;
 pub mod style;
 
 #[cfg(lammps_host)]

@@ -1,6 +1,7 @@
 use super::{Context, Part, ValidateError, energy, equilibrium, forces, trajectory};
+use crate::files::write_atomically;
 use crate::lammps;
-use crate::report::{Item, Progress, Report, Results, Section, Table, write_atomically};
+use crate::report::{Item, Progress, Report, Results, Section, Table};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -110,7 +111,7 @@ fn write(out: &Path, results: &Results, mut sections: Vec<Section>) -> Result<Pa
         failed: results.failed_count(),
     };
     let path = out.join("report.html");
-    write_atomically(&path, report.render()?.as_bytes())?;
+    write_atomically(&path, report.render().as_bytes())?;
     Ok(path)
 }
 

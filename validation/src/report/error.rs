@@ -1,6 +1,6 @@
 //! The error type of this module.
 
-use std::path::PathBuf;
+use crate::files::WriteError;
 
 /// What can go wrong while making or writing a report.
 #[derive(Debug, thiserror::Error)]
@@ -8,19 +8,10 @@ pub enum ReportError {
     /// A plot could not be drawn.
     #[error("cannot draw the plot: {0}")]
     Plot(String),
-    /// The HTML page could not be produced.
-    #[error("cannot produce the HTML page: {0}")]
-    Html(#[from] minijinja::Error),
     /// Results could not be turned into JSON, or read from it.
     #[error("cannot convert results to or from JSON: {0}")]
     Json(#[from] serde_json::Error),
     /// A file could not be written.
-    #[error("cannot write {}: {cause}", path.display())]
-    Write {
-        /// The file that was to be written.
-        path: PathBuf,
-        /// Why it could not be.
-        #[source]
-        cause: std::io::Error,
-    },
+    #[error(transparent)]
+    Write(#[from] WriteError),
 }

@@ -5,22 +5,21 @@
 //! character) is left out or replaced, and what can fail returns a
 //! [`ReportError`].
 
-mod axis;
+mod chart;
 mod error;
 pub mod figure;
-pub mod files;
 pub mod html;
 pub mod plot;
 pub mod progress;
 pub mod quantity;
 pub mod results;
 pub mod run;
+mod scale;
 pub mod table;
 mod text;
 
 pub use error::ReportError;
 pub use figure::Figure;
-pub use files::write_atomically;
 pub use html::{Item, Report, Section};
 pub use plot::{Plot, Series, Style};
 pub use progress::{Bar, Progress};

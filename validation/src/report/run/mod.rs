@@ -8,7 +8,8 @@ mod observables;
 mod series;
 mod state;
 
-use super::{Item, Report, ReportError, Section, write_atomically};
+use super::{Item, Report, ReportError, Section};
+use crate::files::write_atomically;
 use crate::output::{About, OutputError};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -52,9 +53,9 @@ const FILES: [(&str, &str); 10] = [
 /// A folder without any of them; a page that cannot be written. A file that cannot be understood is no
 /// error: the page says what is wrong with it.
 pub fn write_run_report(folder: &Path) -> Result<PathBuf, RunReportError> {
-    let page = run_report(folder)?.render()?;
+    let page = run_report(folder)?.render();
     let path = folder.join("report.html");
-    write_atomically(&path, page.as_bytes())?;
+    write_atomically(&path, page.as_bytes()).map_err(ReportError::from)?;
     Ok(path)
 }
 
