@@ -33,19 +33,15 @@ pub(super) fn digest(host: &Host, root: &Path, compiler: &[String]) -> Result<St
     for part in SOURCES.iter().chain(&CPP) {
         add(&root.join(part), &root.join(part), &mut hasher)?;
     }
-    // Of a host's folder its own files: a source tree has those of its packages below.
-    let mut headers = BTreeSet::new();
-    for folder in [&host.include, &host.mpi_include] {
-        let entries = fs::read_dir(folder).map_err(LammpsError::io("read", folder))?;
-        let files = entries.filter_map(|e| Some(e.ok()?.path()));
-        let own = |p: &PathBuf| p.extension().is_some_and(|e| e == "h") && p.is_file();
-        // The system's folder of headers has those of everything.
-        let mpi = |p: &PathBuf| folder != &host.mpi_include || p.ends_with("mpi.h");
-        headers.extend(files.filter(own).filter(mpi).map(|p| (folder.clone(), p)));
+    // Of a source tree the headers of its own, without those of packages below; of MPI one, whose folder may have those of
+    // everything.
+    let entries = fs::read_dir(&host.include).map_err(LammpsError::io("read", &host.include))?;
+    let files = entries.filter_map(|e| Some(e.ok()?.path()));
+    let headers: BTreeSet<PathBuf> = files.filter(|p| p.extension().is_some_and(|e| e == "h")).collect();
+    for header in &headers {
+        add(&host.include, header, &mut hasher)?;
     }
-    for (folder, header) in headers {
-        add(&folder, &header, &mut hasher)?;
-    }
+    add(&host.mpi_include, &host.mpi_include.join("mpi.h"), &mut hasher)?;
     Ok(format!("{:016x}", hasher.finish()))
 }
 
