@@ -1,5 +1,7 @@
 //! psidpd: native runner and cross-code validator.
 pub mod bench;
+pub mod bulk;
+pub mod calibrate;
 pub mod check;
 pub mod cli;
 pub mod crosscheck;
@@ -7,6 +9,7 @@ pub mod export;
 pub mod lammps;
 pub mod observe;
 pub mod output;
+pub mod papers;
 pub mod report;
 pub mod run;
 pub mod scene;
