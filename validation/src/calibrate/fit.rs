@@ -76,10 +76,6 @@ pub struct Target {
     pub scale: f64,
 }
 
-/// How much `ρ̃(⟨n⟩) = ρ` counts against the pressures when these are fitted: it keeps the polynomial where it
-/// is in what the pressures leave open.
-const HOLD: f64 = 0.1;
-
 /// The polynomial with the wanted pressures, from `start`: by least squares of `(p − p_wanted)/scale`, with
 ///
 /// ```text
@@ -87,13 +83,15 @@ const HOLD: f64 = 0.1;
 /// ```
 ///
 /// the pressure that another ρ̃ would have if ⟨n⟩ and g(r) stayed as they are. They do not quite, so the
-/// fluid is to be measured again.
+/// fluid is to be measured again. `hold` is how much a relative difference of `ρ̃(⟨n⟩)` from ρ counts against one of
+/// the pressures.
 pub fn fit_pressure(
     points: &[Point],
     targets: &[Target],
     slope: &dyn Fn(f64) -> f64,
     start: &Polynomial,
     degree: usize,
+    hold: f64,
 ) -> Option<Fit> {
     let mut c = start.0.clone();
     c.resize(degree + 1, 0.0);
@@ -108,7 +106,7 @@ pub fn fit_pressure(
             (pressure - t.wanted) / t.scale
         });
         let holds =
-            points.iter().map(|p| HOLD * (Polynomial(c.to_vec()).at(p.means[0].value).0 / p.total - 1.0));
+            points.iter().map(|p| hold * (Polynomial(c.to_vec()).at(p.means[0].value).0 / p.total - 1.0));
         pressures.chain(holds).collect()
     };
     let size = |r: &[f64]| r.iter().map(|x| x * x).sum::<f64>();

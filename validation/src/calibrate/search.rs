@@ -71,6 +71,9 @@ pub struct Wish<'a> {
 /// How often each degree is fitted to the same goal before the next thing is tried.
 const ROUNDS: usize = 3;
 
+/// What ⟨ρ̃⟩ = ρ counts against the pressures in the rounds that are fitted to these: less where more did not do.
+const HOLDS: [f64; ROUNDS] = [0.5, 0.1, 0.02];
+
 /// Degrees that are tried: a mixture's distribution of partial densities is not measured, so means of powers are
 /// not known there.
 pub const HIGHEST_DEGREE: usize = 3;
@@ -92,14 +95,14 @@ pub fn search<E>(
     let mut points = first;
     for degree in 1..=highest {
         for goal in [Goal::Density, Goal::Pressure] {
-            for _ in 0..ROUNDS {
+            for hold in HOLDS {
                 let fits: Option<Vec<Fit>> = match (goal, wish.slope, rounds.last()) {
                     (Goal::Density, ..) => {
                         (0..pairs).map(|pair| fit_density(&points, pair, degree)).collect()
                     }
                     (Goal::Pressure, Some(slope), Some(last)) => {
                         let start = last.fits[0].polynomial();
-                        fit_pressure(&points, wish.targets, slope, &start, degree).map(|fit| vec![fit])
+                        fit_pressure(&points, wish.targets, slope, &start, degree, hold).map(|fit| vec![fit])
                     }
                     (Goal::Pressure, ..) => None,
                 };

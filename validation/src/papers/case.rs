@@ -39,7 +39,13 @@ impl Compared {
         let allowance = self.allowance.map_or(0.0, |(size, _)| size);
         let error = (self.measured.error.powi(2) + self.published.error.powi(2) + allowance.powi(2)).sqrt();
         let difference = self.measured.value - self.published.value;
-        if difference == 0.0 && error == 0.0 { 0.0 } else { difference / error }
+        // Numbers without errors agree or do not.
+        let right = match self.rule {
+            Rule::Equal => difference == 0.0,
+            Rule::AtLeast => difference >= 0.0,
+            Rule::AtMost => difference <= 0.0,
+        };
+        if error == 0.0 && right { 0.0 } else { difference / error }
     }
 
     /// Whether it agrees. What is not a number does not.
@@ -163,6 +169,13 @@ mod tests {
         assert!(!compared(Rule::AtMost, f64::NAN).passes());
         let nothing = Compared { measured: Measured::NONE, ..compared(Rule::Equal, 0.0) };
         assert!(!nothing.passes());
+        let exact = |value| Compared {
+            measured: Measured { value, error: 0.0 },
+            published: Measured { value: 1.0, error: 0.0 },
+            ..compared(Rule::AtMost, 0.0)
+        };
+        assert_eq!(exact(0.5).deviation(), 0.0);
+        assert!(!exact(1.5).passes());
         assert!(!Outcome::default().passes(), "a case without values says nothing");
     }
 }
