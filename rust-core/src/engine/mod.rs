@@ -11,6 +11,7 @@
 //!
 //! [`mod@reference`] evaluates the same Hamiltonian with none of this machinery.
 
+mod counts;
 mod density_pass;
 mod domain;
 mod error;
@@ -19,23 +20,28 @@ mod excess;
 mod excess_pass;
 mod force_pass;
 mod images;
+mod instruction_set;
 pub mod noise;
 mod pairs;
 mod particles;
 mod plan;
 pub mod reference;
 mod search;
+mod settings;
 mod sweep;
 mod tally;
+mod vectors;
 
+pub use counts::PassCounts;
 pub use domain::{DomainError, PeriodicBox};
 pub use error::EngineError;
-pub use evaluator::{Engine, PairsOfHost, PassCounts};
+pub use evaluator::{Engine, PairsOfHost};
 pub use images::Images;
 pub use pairs::Newton;
 pub use particles::{Particles, Step};
 pub use plan::Plan;
-pub use sweep::{Around, Instructions, Pool, Precision, Settings, Sweep, Times, part};
+pub use settings::{Instructions, Precision, Settings};
+pub use sweep::{Around, Pool, Sweep, Times, part};
 pub use tally::{Tally, Want};
 
 #[cfg(test)]

@@ -105,7 +105,7 @@ fn one_density_fixes_the_offset() {
 #[test]
 fn error_bars_are_those_of_repeated_fits() {
     use rand::{RngExt, SeedableRng};
-    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(7);
+    let mut rng = chacha20::ChaCha8Rng::seed_from_u64(7);
     let densities = spaced(2.0, 10.0, 9);
     let made = Made { hole: |rho| rho - (rho - 1.5) / 1.05, factor: 1.0 };
     let noise = 0.02;

@@ -96,7 +96,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         },
     };
     let found =
-        calibrate(&a.model, &options, &command(a), &mut |line| println!("{line}")).map_err(Failure::new)?;
+        calibrate(&a.model, &options, &command(a), &mut |line| println!("{line}")).map_err(failure)?;
     write_atomically(&a.out, found.text.as_bytes()).map_err(Failure::new)?;
     let mut table = Table::new(["density", "kT", "<n>", "<rho~>", "p wanted", "p measured", "off by"]);
     let pm = |v: &crate::calibrate::Value| format!("{:.5} ± {:.5}", v.value, v.error);
@@ -139,6 +139,15 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     println!("written to {}", a.out.display());
     write_json(json, &found)?;
     Ok(if found.converged { Verdict::Good } else { Verdict::CheckFailed })
+}
+
+/// What it wraps knows its line of a file, or that it stopped a run.
+fn failure(error: CalibrateError) -> Failure {
+    match error {
+        CalibrateError::File(error) => Failure::new(error),
+        CalibrateError::Run(error) => Failure::new(error),
+        other => Failure::new(other),
+    }
 }
 
 /// The command that does the same again.

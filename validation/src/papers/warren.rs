@@ -42,17 +42,30 @@ fn table1(context: &Context) -> Result<Outcome, PaperError> {
     let mut outcome = Outcome::default();
     let mut points = Vec::new();
     let printed = [(0.65, 4.1, 0.1), (0.75, 3.07, 0.05), (0.85, 2.08, 0.05), (1.0, 1.29, 0.05)];
-    let [a, b, rho] = [25.0, 25.0, 6.0];
+    // In the middle of the paper's ranges, A = 0–50 and B r_d⁴ = 0–10, and over its densities.
+    let (a, many) = (25.0, 5.0);
     for (rd, value, error) in printed {
-        let model = with_parameters(SET6, &[("A", a), ("B", b), ("rd", rd)])?;
-        let fluid = Fluid { model: &model, kt: 1.0, dt: 0.005, edge: 10.0, observe: "" };
-        let p = context.bulk(&format!("rd{rd}"), &fluid, &[rho])?.pressure();
-        let c = |alpha: f64, p: f64| {
-            rho - (p - rho - alpha * a * rho * rho) / (2.0 * alpha * b * rd.powi(4) * rho * rho)
+        let model = with_parameters(SET6, &[("A", a), ("B", many / rd.powi(4)), ("rd", rd)])?;
+        let fluid = Fluid { model: &model, kt: 1.0, dt: 0.01, edge: 10.0, observe: "" };
+        let mut pressures = Vec::new();
+        for rho in [3.0, 6.0, 9.0] {
+            let name = format!("rd{rd}-rho{rho}");
+            pressures.push((rho, context.bulk(&name, &fluid, &[rho])?.pressure()));
+        }
+        // The slope of F = (p − ρ − αAρ² − 2αBr_d⁴ρ³)/Br_d⁴ against ρ² is −2αc.
+        let slope = |alpha: f64, shift: usize| -> f64 {
+            let (mut fx, mut xx) = (0.0, 0.0);
+            for (k, (rho, p)) in pressures.iter().enumerate() {
+                let p = if k + 1 == shift { p.value + p.error } else { p.value };
+                let x: f64 = rho * rho;
+                fx += x * (p - rho - alpha * a * x - 2.0 * alpha * many * x * rho) / many;
+                xx += x * x;
+            }
+            -fx / xx / (2.0 * alpha)
         };
-        let spread = c(ALPHA[0] + ALPHA[1], p.value) - c(ALPHA[0], p.value);
-        let noise = c(ALPHA[0], p.value + p.error) - c(ALPHA[0], p.value);
-        let c = Measured { value: c(ALPHA[0], p.value), error: spread.hypot(noise) };
+        let c = slope(ALPHA[0], 0);
+        let noise: f64 = (1..=pressures.len()).map(|k| (slope(ALPHA[0], k) - c).powi(2)).sum();
+        let c = Measured { value: c, error: noise.sqrt().hypot(slope(ALPHA[0] + ALPHA[1], 0) - c) };
         outcome.equal(format!("c at r_d = {rd}"), c, value, error);
         points.push((rd, c));
     }

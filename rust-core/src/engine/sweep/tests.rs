@@ -1,5 +1,5 @@
 use super::*;
-use crate::engine::{Engine, Images, Newton};
+use crate::engine::{Engine, Images, Instructions, Newton};
 use crate::model::Model;
 use nalgebra::Matrix3;
 use std::num::NonZeroUsize;
@@ -369,20 +369,20 @@ fn any_number_of_threads_gives_the_same_bits() {
     }
 }
 
-/// Accumulators are used again as a sweep goes through its layers, and slabs of threads begin anywhere: boxes of a few
-/// layers and of many, full and nearly empty ones, swept by the same engines one after another.
+/// Accumulators are used again as a sweep goes through its planes, and slabs of threads begin anywhere: boxes of a few
+/// planes and of many, full and nearly empty ones, swept by the same engines one after another.
 #[test]
 fn any_number_of_layers_and_threads_gives_the_forces_of_the_plain_engine() {
     for fluid in [shipped("warren2003-set6.toml"), shipped("standard-dpd.toml"), many()] {
         let engines = (1..=5)
             .map(|t| Sweep::new(&fluid, settings(Precision::Double, Instructions::best(), t)).unwrap());
         let mut engines: Vec<Sweep> = engines.collect();
-        for (layers, periodic) in
+        for (planes, periodic) in
             [2, 9, 3, 12, 4, 7, 5, 6, 8].into_iter().flat_map(|l| [(l, true), (l, false)])
         {
-            let lengths = [3.0, 3.0, layers as f64 + 0.3].map(|l| l * fluid.cutoff());
+            let lengths = [3.0, 3.0, planes as f64 + 0.3].map(|l| l * fluid.cutoff());
             let domain = PeriodicBox::orthogonal([0.0; 3], lengths, [true, true, periodic]).unwrap();
-            let mut cloud = Cloud::new(domain, 3, fluid.species.len(), 25 * layers, layers as u64);
+            let mut cloud = Cloud::new(domain, 3, fluid.species.len(), 25 * planes, planes as u64);
             for x in &mut cloud.x {
                 // Fewer and fewer with height.
                 x[2] *= x[2] / lengths[2];
@@ -390,23 +390,23 @@ fn any_number_of_layers_and_threads_gives_the_forces_of_the_plain_engine() {
             let (force, tally) = plain(&fluid, &cloud);
             let (first, first_tally) = swept(&mut engines[0], &cloud, Want::TOTALS);
             let off = difference(&force, &first).max(tally_difference(&tally, &first_tally));
-            assert!(off < tolerance(Precision::Double), "{layers} layers, periodic {periodic}: {off:.1e}");
+            assert!(off < tolerance(Precision::Double), "{planes} planes, periodic {periodic}: {off:.1e}");
             for sweep in &mut engines {
                 let (here, totals) = swept(sweep, &cloud, Want::TOTALS);
-                assert!(here == first && totals == first_tally, "{layers} layers, {:?}", sweep.settings());
+                assert!(here == first && totals == first_tally, "{planes} planes, {:?}", sweep.settings());
             }
         }
     }
 }
 
-/// Of a box without ghosts, forces and densities of a few layers only are summed at a time.
+/// Of a box without ghosts, forces and densities of a few planes only are summed at a time.
 #[test]
 fn longer_boxes_have_no_more_accumulators() {
     for (fluid, most) in [(shipped("warren2003-set6.toml"), 120.0), (many(), 200.0)] {
-        let memory = |layers: usize| {
+        let memory = |planes: usize| {
             let domain =
-                PeriodicBox::orthogonal([0.0; 3], [6.0, 6.0, layers as f64 + 0.1], [true; 3]).unwrap();
-            let cloud = Cloud::new(domain, 3, fluid.species.len(), 300 * layers, 5);
+                PeriodicBox::orthogonal([0.0; 3], [6.0, 6.0, planes as f64 + 0.1], [true; 3]).unwrap();
+            let cloud = Cloud::new(domain, 3, fluid.species.len(), 300 * planes, 5);
             let mut sweep = Sweep::new(&fluid, settings(Precision::Mixed, Instructions::best(), 1)).unwrap();
             swept(&mut sweep, &cloud, Want::FORCES);
             sweep.memory() as f64
@@ -443,19 +443,19 @@ fn the_order_of_particles_matters_to_rounding_alone() {
     }
 }
 
-/// Teams of eight particles in sparse rows, of four in others; few enough in some that a team is not full, or too far
+/// Teams of eight particles in sparse rows, of four in others; few enough in some that an i-cluster is not full, or too far
 /// apart to look together.
 #[test]
 fn rows_with_few_particles_and_with_many() {
     let fluids = [shipped("warren2003-set6.toml"), many(), shipped("van-der-waals-2d.toml")];
-    let mut teams = vec![];
+    let mut i_cluster_sizes = vec![];
     for fluid in &fluids {
         for density in [0.4, 1.5, 4.0, 5.0, 11.0] {
             for (b, domain) in boxes(fluid.dimensions, 4.3 * fluid.cutoff()).into_iter().enumerate() {
                 let volume = domain.volume(fluid.dimensions) / fluid.cutoff().powi(fluid.dimensions as i32);
                 let count = (density * volume) as usize;
-                let frame = Frame::of_box(&domain, fluid.dimensions).unwrap();
-                teams.push(Grid::new(&frame, fluid.cutoff(), count).unwrap().team);
+                let geometry = BoxGeometry::of_box(&domain, fluid.dimensions).unwrap();
+                i_cluster_sizes.push(CellGrid::new(&geometry, fluid.cutoff(), count).unwrap().i_cluster_size);
                 let cloud = Cloud::new(domain, fluid.dimensions, fluid.species.len(), count, 21 + b as u64);
                 let (force, tally) = plain(fluid, &cloud);
                 for (precision, instructions) in every() {
@@ -472,7 +472,7 @@ fn rows_with_few_particles_and_with_many() {
             }
         }
     }
-    assert!(teams.contains(&4) && teams.contains(&8));
+    assert!(i_cluster_sizes.contains(&4) && i_cluster_sizes.contains(&8));
 }
 
 /// Crowds of which one particle has more neighbours than a block has room for, walls without periods, and
@@ -580,19 +580,19 @@ fn faults_of_the_passes_name_their_particles() {
                 .evaluate(&domain, &particles, &cloud.v, Some(STEP), Want::FORCES, &mut force, false)
                 .unwrap_err()
         };
-        for layer in 0..9 {
+        for plane in 0..9 {
             // Ten particles on nearly one point.
             let mut cloud = Cloud::new(domain.clone(), 3, 1, 30, 4);
             for k in 0..10 {
-                cloud.x[k] = [2.0, 2.0 + 0.001 * k as f64, layer as f64 + 0.5];
+                cloud.x[k] = [2.0, 2.0 + 0.001 * k as f64, plane as f64 + 0.5];
             }
             let EngineError::ExcessFreeEnergy { tag, .. } = fault(&singular, &cloud) else {
                 panic!("no fault")
             };
             assert!(cloud.tag[..10].contains(&tag), "{tag}");
-            // Two pairs of which one particle each has no velocity, in two layers.
+            // Two pairs of which one particle each has no velocity, in two planes.
             let mut cloud = Cloud::new(domain.clone(), 3, 1, 4, 4);
-            for (k, z) in [(0, layer as f64 + 0.5), (2, 8.5 - layer as f64)] {
+            for (k, z) in [(0, plane as f64 + 0.5), (2, 8.5 - plane as f64)] {
                 cloud.v[k] = [f64::NAN; 3];
                 cloud.x[k] = [3.0, 4.0 - k as f64, z];
                 cloud.x[k + 1] = cloud.x[k].map(|x| x + 0.01);
@@ -609,11 +609,22 @@ fn passes_that_a_fluid_does_not_need_are_left_out() {
     let cloud = Cloud::new(domain, 3, 1, 300, 9);
     let mut sweep = Sweep::new(&dpd, Settings::default()).unwrap();
     swept(&mut sweep, &cloud, Want::FORCES);
-    let counts = sweep.counts();
-    assert_eq!((counts.density, counts.excess, counts.energy, counts.virial), (0, 0, 0, 0));
-    assert_eq!((counts.search, counts.force, counts.noise), (1, 1, 1));
+    let first = sweep.counts();
+    assert_eq!((first.density, first.excess, first.energy, first.virial), (0, 0, 0, 0));
+    assert!(first.search > 0 && first.force > 0 && first.noise > 0);
     let particles = cloud.particles();
     let mut force = vec![[0.0; 3]; 300];
     sweep.evaluate(&cloud.domain, &particles, &[], None, Want::TOTALS, &mut force, false).unwrap();
-    assert_eq!((sweep.counts().noise, sweep.counts().energy), (1, 1));
+    let second = sweep.counts();
+    assert_eq!((second.search, second.force), (2 * first.search, 2 * first.force));
+    // Every batch has its energy summed, none its noise drawn.
+    assert_eq!((second.noise, second.energy, second.density), (first.noise, first.noise, 0));
+
+    // A ψ that is not linear takes a pass for its density, and an evaluation.
+    let mdpd = shipped("warren2003-set6.toml");
+    let mut sweep = Sweep::new(&mdpd, Settings::default()).unwrap();
+    swept(&mut sweep, &cloud, Want::FORCES);
+    let counts = sweep.counts();
+    assert_eq!((counts.density, counts.energy), (counts.noise, 0));
+    assert!(counts.density > 0 && counts.excess > 0);
 }

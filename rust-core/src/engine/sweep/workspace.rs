@@ -1,0 +1,239 @@
+//! One precision's arrays, and the steps of an evaluation over them.
+
+mod accumulators;
+mod cell_order;
+mod excess;
+mod fluid_constants;
+mod forces;
+mod host;
+mod input;
+mod scheduler;
+mod shared_particles;
+mod slopes;
+mod sorted_particles;
+mod thread_slab;
+
+pub use cell_order::extremes;
+pub use forces::ForceSink;
+pub use input::Input;
+
+use crate::engine::error::EngineError;
+use crate::engine::instruction_set::InstructionSet;
+use crate::engine::noise::PairNoise;
+use crate::engine::plan::Plan;
+use crate::engine::sweep::cells::ghosts::Ghosts;
+use crate::engine::sweep::cells::sorted::SortedCells;
+use crate::engine::sweep::ground::box_geometry::BoxGeometry;
+use crate::engine::sweep::ground::cell_grid::CellGrid;
+use crate::engine::sweep::ground::terms::Terms;
+use crate::engine::sweep::pair_batch::inputs::PairInputs;
+use crate::engine::sweep::passes::data::PassData;
+use crate::engine::sweep::passes::slopes::PassSlopes;
+use crate::engine::sweep::passes::{PairPrecision, Passes};
+use crate::engine::sweep::pool::Pool;
+use crate::engine::sweep::times::Times;
+use accumulators::Accumulators;
+use cell_order::CellOrder;
+use excess::ExcessInput;
+use fluid_constants::FluidConstants;
+use scheduler::{PassInput, Scheduler, thread_slabs};
+use shared_particles::SharedParticles;
+use slopes::Slopes;
+use sorted_particles::SortedParticles;
+use std::ops::Range;
+use thread_slab::{PlaneResults, ThreadSlab, ThreadState};
+
+/// Arrays in the order of cells, and what goes through them.
+pub struct Workspace<P: PairPrecision> {
+    fluid: FluidConstants<P::Scalar>,
+    order: CellOrder,
+    particles: SortedParticles<P::PackedParticle>,
+    accumulators: Accumulators,
+    slopes: Slopes<P::Scalar>,
+    results: PlaneResults<P::Scalar>,
+    threads: Vec<ThreadState<P::Scalar>>,
+    /// Of the present evaluation.
+    thermostat: Option<(PairNoise, f64)>,
+    totals: bool,
+}
+
+impl<P: PairPrecision> Workspace<P> {
+    pub fn new(plan: &Plan, set: InstructionSet, threads: usize) -> Workspace<P> {
+        let terms = Terms::new(plan);
+        let count = plan.species.len();
+        let variables = plan.passes.iter().flat_map(|d| (0..count).map(move |s| d * count + s)).collect();
+        let threads = (0..threads).map(|_| ThreadState::new(terms.passes.len(), set)).collect();
+        Workspace {
+            fluid: FluidConstants { set, terms, variables },
+            order: CellOrder::new(plan.dimensions),
+            particles: SortedParticles::default(),
+            accumulators: Accumulators::default(),
+            slopes: Slopes::default(),
+            results: PlaneResults::default(),
+            threads,
+            thermostat: None,
+            totals: false,
+        }
+    }
+
+    /// Finds the order of the particles in the cells of `grid`, and makes room for them in the arrays.
+    pub fn sort_into_cells(
+        &mut self,
+        pool: &Pool,
+        geometry: BoxGeometry,
+        grid: CellGrid,
+        input: &Input,
+    ) -> Result<(), EngineError> {
+        (self.thermostat, self.totals) = (input.thermostat, input.totals);
+        self.order.sort(pool, self.fluid.set, geometry, grid, input)?;
+        self.particles.make_room(&self.order, self.fluid.terms.species > 1);
+        let packs = self.fluid.terms.full_cache;
+        self.slopes.make_room(&self.order, self.fluid.width(), packs);
+        Ok(())
+    }
+
+    /// Everything that comes after [`Workspace::sort_into_cells`]: the first pass, ψ and the second pass over all planes, and
+    /// their forces. `times` are those of the caller's thread.
+    ///
+    /// # Errors
+    /// ψ that is not finite, or a force: of the lowest tag.
+    pub fn run_all(
+        &mut self,
+        pool: &Pool,
+        plan: &Plan,
+        input: &Input,
+        out: ForceSink,
+        times: &mut Times,
+    ) -> Result<(), EngineError> {
+        let planes = thread_slabs(&self.order, pool.threads());
+        self.up_to_slopes(pool, plan, input, Some(out), &planes)?;
+        self.on_slabs(&planes, |scheduler, slabs, accumulators| {
+            let mut work: Vec<_> = slabs.iter_mut().zip(accumulators.split()).collect();
+            // SAFETY: `up_to_slopes` has left the slopes of all particles and copies.
+            pool.each(&mut work, |(slab, sums)| unsafe { scheduler.second_at_ends(out, slab, sums) });
+            drop(work);
+            let sums = accumulators.sums();
+            pool.each(slabs, |slab| scheduler.forces_of_first(out, slab, sums));
+        });
+        self.finish(times)
+    }
+
+    /// What comes after [`Workspace::sort_into_cells`], up to ψ and its slopes.
+    ///
+    /// # Errors
+    /// ψ that is not finite.
+    pub fn first(
+        &mut self,
+        pool: &Pool,
+        plan: &Plan,
+        input: &Input,
+        times: &mut Times,
+    ) -> Result<(), EngineError> {
+        let planes = thread_slabs(&self.order, pool.threads());
+        self.up_to_slopes(pool, plan, input, None, &planes)?;
+        self.finish(times)
+    }
+
+    /// What comes after [`Workspace::first`] and [`Workspace::slopes_from_host`]: the second pass, and the forces.
+    ///
+    /// # Errors
+    /// A force that is not finite: of the lowest tag.
+    pub fn second(&mut self, pool: &Pool, out: ForceSink, times: &mut Times) -> Result<(), EngineError> {
+        self.slopes.copy_first_plane(&self.order);
+        let planes = thread_slabs(&self.order, pool.threads());
+        self.on_slabs(&planes, |scheduler, slabs, accumulators| {
+            let mut work: Vec<_> = slabs.iter_mut().zip(accumulators.split()).collect();
+            // SAFETY: `first` has left the slopes of all particles; those of the copies are there since just now.
+            pool.each(&mut work, |(slab, sums)| unsafe { scheduler.second_of_all(out, slab, sums) });
+            drop(work);
+            let sums = accumulators.sums();
+            pool.each(slabs, |slab| scheduler.forces_of_first(out, slab, sums));
+        });
+        self.finish(times)
+    }
+
+    /// Arrays, first passes and ψ of all planes; the second pass and the forces of those between the ends of slabs if
+    /// there is where to write them.
+    fn up_to_slopes(
+        &mut self,
+        pool: &Pool,
+        plan: &Plan,
+        input: &Input,
+        out: Option<ForceSink>,
+        planes: &[Range<usize>],
+    ) -> Result<(), EngineError> {
+        let (width, keeps_all) = (self.fluid.width(), out.is_none());
+        self.accumulators.lay_out(&self.order, planes, width, !keeps_all);
+        self.results.make_room(&self.order, planes.len(), width, keeps_all);
+        let excess = ExcessInput::new(plan, input);
+        if excess.is_none() {
+            self.results.excess.fill(0.0);
+        }
+        {
+            let Workspace { fluid, order, particles, results, threads, .. } = self;
+            let particles = &particles.share();
+            let slabs = results.split(order, planes, width, threads);
+            let mut slabs: Vec<_> = slabs.into_iter().enumerate().collect();
+            pool.each(&mut slabs, |(t, slab)| {
+                Scheduler::<P>::fill_start(particles, fluid, order, input, slab, *t == 0);
+            });
+        }
+        self.particles.copy_first_plane(&self.order);
+        let input = &PassInput { input, excess, out };
+        self.on_slabs(planes, |scheduler, slabs, accumulators| {
+            let mut work: Vec<_> = slabs.iter_mut().zip(accumulators.split()).collect();
+            // SAFETY: the starts of all slabs are filled, and the copies are there; this is the only work in hand.
+            pool.each(&mut work, |(slab, sums)| unsafe { scheduler.interior(input, slab, sums) });
+            drop(work);
+            let sums = accumulators.sums();
+            // SAFETY: the interior of all slabs is done; this is the only work in hand.
+            pool.each(slabs, |slab| unsafe { scheduler.excess_of_first(input, slab, sums) });
+        });
+        self.slopes.copy_first_plane(&self.order);
+        match self.threads.iter_mut().find_map(|state| state.fault.take()) {
+            Some(fault) => Err(fault),
+            None => Ok(()),
+        }
+    }
+
+    /// Lends all arrays to the threads, each its slab of planes.
+    fn on_slabs(
+        &mut self,
+        planes: &[Range<usize>],
+        work: impl FnOnce(&Scheduler<P>, &mut [ThreadSlab<P::Scalar>], &mut Accumulators),
+    ) {
+        let Workspace { fluid, order, particles, accumulators, slopes, results, threads, .. } = self;
+        let particles = &particles.share();
+        let slopes = slopes.share();
+        let SharedParticles { x, fixed16_scale, fixed16, packed, species, .. } = *particles;
+        let ghosts = Ghosts {
+            flags: particles.ghost,
+            owned_bits: particles.owned_bits,
+            owned_of_column: particles.owned_of_column,
+        };
+        let (geometry, grid, terms) = (&order.geometry, &order.grid, &fluid.terms);
+        let data = PassData {
+            cells: SortedCells { geometry, grid, start: &order.start, x, fixed16, fixed16_scale, ghosts },
+            inputs: PairInputs { geometry, terms, thermostat: self.thermostat, packed, species, ghosts },
+            slopes: PassSlopes { values: slopes.rows, packed: slopes.packed, stride: slopes.stride },
+        };
+        let passes = Passes::new(fluid.set, &fluid.terms, self.totals);
+        let mut slabs = results.split(order, planes, fluid.width(), threads);
+        let scheduler = &Scheduler { fluid, passes, order, data, particles, slopes };
+        work(scheduler, &mut slabs, accumulators);
+    }
+
+    /// The times of the caller's thread; a force that is not finite: that of the lowest tag.
+    fn finish(&mut self, times: &mut Times) -> Result<(), EngineError> {
+        if let Some(state) = self.threads.first_mut() {
+            *times += std::mem::take(&mut state.times);
+        }
+        match self.threads.iter_mut().filter_map(|state| state.lost.take()).min() {
+            None => Ok(()),
+            Some(tag) => Err(EngineError::Force { tag }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,117 @@
+//! What goes to the host and comes from it, in its own order.
+
+use super::Workspace;
+use crate::engine::counts::PassCounts;
+use crate::engine::sweep::passes::PairPrecision;
+use crate::engine::tally::Tally;
+
+impl<P: PairPrecision> Workspace<P> {
+    /// The host's numbers of its particles in the order of cells.
+    pub fn order(&self) -> &[u32] {
+        &self.order.order
+    }
+
+    /// Slopes from the order of cells to the host's, those of particles it owns; entries of ghosts are unspecified.
+    pub fn slopes_to_host(&self, out: &mut Vec<f64>) {
+        let (width, slopes) = (self.fluid.width(), self.slopes.rows());
+        out.resize(width * self.order.all, 0.0);
+        if width == 1 {
+            // Far the most common, and the copy of one number is no loop.
+            for (k, slope) in self.order.order.iter().zip(slopes) {
+                if let Some(out) = out.get_mut(*k as usize) {
+                    *out = *slope;
+                }
+            }
+            return;
+        }
+        for (s, k) in self.order.order.iter().enumerate() {
+            let k = *k as usize;
+            if k < self.order.owned {
+                out[width * k..][..width].copy_from_slice(&slopes[width * s..][..width]);
+            }
+        }
+    }
+
+    /// Slopes of ghosts from the host.
+    pub fn slopes_from_host(&mut self, slopes: &[f64]) {
+        let width = self.fluid.width();
+        for (s, (k, ghost)) in self.order.order.iter().zip(&self.particles.ghost).enumerate() {
+            if *ghost {
+                self.slopes.set(s, &slopes[width * *k as usize..][..width]);
+            }
+        }
+    }
+
+    /// Energies and virials of the last evaluation, summed in the order of planes.
+    pub fn tally(&self) -> Tally {
+        let mut tally = Tally::default();
+        for plane in &self.results.tallies {
+            tally += *plane;
+        }
+        if self.totals {
+            for (s, excess) in self.results.excess.iter().enumerate() {
+                if self.particles.ghost.get(s).is_none_or(|g| !*g) {
+                    tally.excess += excess;
+                }
+            }
+        }
+        tally
+    }
+
+    /// ψ of owned particles and their densities, `variables` each, in the host's order.
+    pub fn to_host(&self, variables: usize, excess: &mut Vec<f64>, densities: &mut Vec<f64>) {
+        let (width, owned) = (self.fluid.width(), self.order.owned);
+        excess.clear();
+        excess.resize(owned, 0.0);
+        densities.clear();
+        densities.resize(variables * owned, 0.0);
+        for (s, k) in self.order.order.iter().enumerate() {
+            let k = *k as usize;
+            if k < owned {
+                excess[k] = self.results.excess[s];
+                for (c, v) in self.fluid.variables.iter().enumerate() {
+                    densities[variables * k + v] = self.results.densities[width * s + c];
+                }
+            }
+        }
+    }
+
+    /// Evaluations below and above the bounds of a density.
+    pub fn out_of_bounds(&self) -> [u64; 2] {
+        let mut sum = [0; 2];
+        for state in &self.threads {
+            for k in 0..2 {
+                sum[k] += state.excess.out_of_bounds[k];
+            }
+        }
+        sum
+    }
+
+    /// What all threads have counted.
+    pub fn counts(&self) -> PassCounts {
+        let mut sum = PassCounts::default();
+        for state in &self.threads {
+            let batches = &state.buffers.batch.counts;
+            sum = sum
+                + PassCounts {
+                    search: batches.searched,
+                    density: batches.weighted,
+                    excess: state.excess.evaluations,
+                    force: state.planes_written,
+                    noise: batches.noise,
+                    energy: batches.tallied,
+                    virial: batches.tallied,
+                };
+        }
+        sum
+    }
+
+    /// Bytes held in arrays over particles and pairs.
+    pub fn memory(&self) -> usize {
+        self.order.bytes()
+            + self.particles.bytes()
+            + self.accumulators.bytes()
+            + self.results.bytes()
+            + self.slopes.bytes()
+    }
+}

@@ -1,0 +1,304 @@
+//! The passes, plane by plane, so that what a pass leaves for the next is used while it is still in the cache: all of
+//! them in one go where there are no ghosts, and then no more is kept than of a few planes; else up to ψ, and from the
+//! slopes of ghosts on.
+//!
+//! Each thread does a slab of planes. ψ of a plane needs the first pass of that plane and of the one before; many-body
+//! forces need ψ of the plane and of the one behind; forces are complete after both passes of the plane and of the one
+//! before. The arrays in the order of cells are filled one plane ahead. Where slabs meet, planes wait for all threads.
+//!
+//! Who accesses what: a [`ThreadSlab`] and its [`SlabSums`] hold what only its thread accesses. Two things are accessed
+//! by several threads. Packed particles are written by the thread of their slab, one plane ahead of its first pass, and
+//! read by it and, those of the slab's first plane and a vector behind, by the thread of the slab before: those places
+//! are filled before any pass begins. Slopes are written by the thread of their slab; those of its first plane are read by
+//! the thread of the slab before too, in a round of its own after all are written.
+
+use super::accumulators::{SlabSums, Sums};
+use super::cell_order::CellOrder;
+use super::excess::{DENSITY_BLOCK, DensityBlock, ExcessInput};
+use super::fluid_constants::FluidConstants;
+use super::forces::ForceSink;
+use super::input::Input;
+use super::shared_particles::SharedParticles;
+use super::slopes::SharedSlopes;
+use super::thread_slab::ThreadSlab;
+use crate::engine::sweep::cells::sorted::VECTOR_PADDING;
+use crate::engine::sweep::pair_batch::accumulators::{Accumulator, PlaneSums};
+use crate::engine::sweep::passes::data::PassData;
+use crate::engine::sweep::passes::{PairPrecision, Passes};
+use crate::engine::sweep::times::lap;
+use std::ops::Range;
+use std::time::Instant;
+
+/// What all threads work with.
+pub struct Scheduler<'a, P: PairPrecision> {
+    pub fluid: &'a FluidConstants<P::Scalar>,
+    pub passes: Passes<P>,
+    pub order: &'a CellOrder,
+    pub data: PassData<'a, P::Scalar, P::PackedParticle>,
+    pub particles: &'a SharedParticles<'a, P::PackedParticle>,
+    pub slopes: SharedSlopes<'a, P::Scalar>,
+}
+
+/// What the passes before the slopes are given.
+pub struct PassInput<'a> {
+    pub input: &'a Input<'a>,
+    /// None if ψ is zero.
+    pub excess: Option<ExcessInput<'a>>,
+    /// Where forces go, if the second pass follows at once.
+    pub out: Option<ForceSink<'a>>,
+}
+
+/// The planes of each of `threads` threads: all slabs have about the same number of pairs.
+pub fn thread_slabs(order: &CellOrder, threads: usize) -> Vec<Range<usize>> {
+    let planes = order.grid.planes;
+    let mean = order.particles() as f64 / planes as f64;
+    // A particle costs something even if it is alone.
+    let cost = |l: usize| order.plane(l).1 as f64 * (order.plane(l).1 as f64 + 0.5 * mean);
+    let all: f64 = (0..planes).map(cost).sum();
+    let mut before = 0.0;
+    let of_plane = (0..planes).map(|l| {
+        let middle = before + 0.5 * cost(l);
+        before += cost(l);
+        if all > 0.0 { ((middle / all * threads as f64) as usize).min(threads - 1) } else { 0 }
+    });
+    let of_plane: Vec<usize> = of_plane.collect();
+    let slab = |t: usize| {
+        let first = of_plane.iter().position(|of| *of >= t).unwrap_or(planes);
+        first..of_plane.iter().position(|of| *of > t).unwrap_or(planes)
+    };
+    (0..threads).map(slab).collect()
+}
+
+/// The last place before a plane, or behind all, from which on whole vectors are filled.
+fn vectors_before(order: &CellOrder, plane: usize) -> usize {
+    order.plane_start(plane) / VECTOR_PADDING * VECTOR_PADDING
+}
+
+/// The places that the thread of a slab fills, as far as its first `planes` need them: all vectors that begin in them, the
+/// one across the beginning of the slab, and those behind, as neighbours are compared in sixteens, up to two of which begin
+/// behind the last. All of the slab's, if they stay in the cache.
+fn needed(order: &CellOrder, slab: &Range<usize>, planes: usize) -> Range<usize> {
+    let (start, end) = (vectors_before(order, slab.start), vectors_before(order, slab.end));
+    if !order.exceeds_cache() {
+        return start..end;
+    }
+    let behind = (slab.start + planes).min(slab.end);
+    start..(vectors_before(order, behind) + 4 * VECTOR_PADDING).min(end)
+}
+
+impl<P: PairPrecision> Scheduler<'_, P> {
+    /// Fills what the thread slab before needs of a thread slab, and, once, the last particles that are no whole vector.
+    pub fn fill_start(
+        particles: &SharedParticles<P::PackedParticle>,
+        fluid: &FluidConstants<P::Scalar>,
+        order: &CellOrder,
+        input: &Input,
+        slab: &mut ThreadSlab<P::Scalar>,
+        is_first: bool,
+    ) {
+        let mut since = Instant::now();
+        // SAFETY: places of different slabs are disjoint, and each slab is of one thread. The places from the last whole
+        // vector on are of no slab; one thread fills them. No pass reads any yet.
+        unsafe {
+            if is_first {
+                let rest = vectors_before(order, order.grid.planes)..order.particles();
+                particles.fill(fluid.set, order, input, rest);
+            }
+            particles.fill(fluid.set, order, input, needed(order, &slab.planes, 1));
+        }
+        lap(&mut since, &mut slab.state.times.sort);
+    }
+
+    /// Arrays and first passes of a thread slab, and ψ of all its planes but the first; if forces have a place to go, the second
+    /// pass of those between, and the forces of those of them that are not next to the first.
+    ///
+    /// # Safety
+    /// The starts of all slabs are filled, and the copies of the first plane are there. Other threads do the same with
+    /// slabs of theirs, and nothing else.
+    pub unsafe fn interior(&self, input: &PassInput, slab: &mut ThreadSlab<P::Scalar>, sums: &mut SlabSums) {
+        (slab.state.fault, slab.state.lost) = (None, None);
+        let mut since = Instant::now();
+        let planes = slab.planes.clone();
+        let mut filled = needed(self.order, &planes, 1).end;
+        for plane in planes.clone() {
+            let end = needed(self.order, &planes, plane - planes.start + 2).end;
+            // SAFETY: places of this slab, behind those that were filled at the start: no other thread accesses them.
+            unsafe { self.particles.fill(self.fluid.set, self.order, input.input, filled..end) };
+            filled = end;
+            lap(&mut since, &mut slab.state.times.sort);
+            // SAFETY: this plane and the next are filled, with the vectors behind; if the next is of another slab, or a
+            // copy, since the start.
+            unsafe { self.first(slab, sums, plane) };
+            lap(&mut since, &mut slab.state.times.first);
+            if plane > planes.start {
+                // SAFETY: no second pass but this thread's reads slopes of a plane that is not the first of its slab.
+                unsafe { self.excess(input, slab, sums.sums(), plane) };
+                lap(&mut since, &mut slab.state.times.excess);
+            }
+            let Some(out) = input.out else { continue };
+            if plane > planes.start + 1 {
+                // SAFETY: ψ of `plane - 1` and `plane`, both of this slab, has been evaluated.
+                unsafe { self.second(slab, sums, plane - 1) };
+                lap(&mut since, &mut slab.state.times.second);
+            }
+            if plane > planes.start + 2 {
+                self.forces(out, slab, sums.sums(), plane - 1);
+                lap(&mut since, &mut slab.state.times.forces);
+            }
+        }
+    }
+
+    /// ψ of the first plane of a thread slab, which the last of another adds to.
+    ///
+    /// # Safety
+    /// The interior of all slabs is done. Other threads do the same with slabs of theirs, and nothing else.
+    pub unsafe fn excess_of_first(&self, input: &PassInput, slab: &mut ThreadSlab<P::Scalar>, sums: Sums) {
+        let mut since = Instant::now();
+        if !slab.planes.is_empty() {
+            // SAFETY: no second pass is under way.
+            unsafe { self.excess(input, slab, sums, slab.planes.start) };
+        }
+        lap(&mut since, &mut slab.state.times.excess);
+    }
+
+    /// The second pass of the first plane of a thread slab, and of the last; the forces of the second, and of the last.
+    ///
+    /// # Safety
+    /// All slopes are there, those of the copies too, and nobody writes any.
+    pub unsafe fn second_at_ends(
+        &self,
+        out: ForceSink,
+        slab: &mut ThreadSlab<P::Scalar>,
+        sums: &mut SlabSums,
+    ) {
+        let mut since = Instant::now();
+        let planes = slab.planes.clone();
+        if !planes.is_empty() {
+            // SAFETY: all slopes are there, as the caller promises.
+            unsafe { self.second(slab, sums, planes.start) };
+            if planes.len() > 1 {
+                // SAFETY: all slopes are there, as the caller promises.
+                unsafe { self.second(slab, sums, planes.end - 1) };
+            }
+        }
+        lap(&mut since, &mut slab.state.times.second);
+        if planes.len() > 1 {
+            self.forces(out, slab, sums.sums(), planes.start + 1);
+        }
+        if planes.len() > 2 {
+            self.forces(out, slab, sums.sums(), planes.end - 1);
+        }
+        lap(&mut since, &mut slab.state.times.forces);
+    }
+
+    /// The second pass of a thread slab, and the forces of all its planes but the first.
+    ///
+    /// # Safety
+    /// All slopes are there, those of the copies too, and nobody writes any.
+    pub unsafe fn second_of_all(
+        &self,
+        out: ForceSink,
+        slab: &mut ThreadSlab<P::Scalar>,
+        sums: &mut SlabSums,
+    ) {
+        slab.state.lost = None;
+        let mut since = Instant::now();
+        for plane in slab.planes.clone() {
+            // SAFETY: all slopes are there, as the caller promises.
+            unsafe { self.second(slab, sums, plane) };
+            lap(&mut since, &mut slab.state.times.second);
+            if plane > slab.planes.start {
+                self.forces(out, slab, sums.sums(), plane);
+                lap(&mut since, &mut slab.state.times.forces);
+            }
+        }
+    }
+
+    /// The forces of the first plane of a thread slab, which the last of another adds to.
+    pub fn forces_of_first(&self, out: ForceSink, slab: &mut ThreadSlab<P::Scalar>, sums: Sums) {
+        let mut since = Instant::now();
+        if !slab.planes.is_empty() {
+            self.forces(out, slab, sums, slab.planes.start);
+        }
+        lap(&mut since, &mut slab.state.times.forces);
+    }
+
+    /// The first pass of a plane.
+    ///
+    /// # Safety
+    /// The plane and the next are filled, and what whole vectors read behind them; nobody writes there meanwhile.
+    unsafe fn first(&self, slab: &mut ThreadSlab<P::Scalar>, sums: &mut SlabSums, plane: usize) {
+        let (buffers, in_range, tally) = slab.plane(plane);
+        let [forces, densities] = sums.of_plane(self.order, plane);
+        forces.fill(Accumulator::default());
+        densities.fill(Accumulator::default());
+        let sums = PlaneSums::new(self.order.plane_start(plane), forces, densities);
+        // SAFETY: the arrays have the room that `make_room` of each has made for this order, and are filled where the pass
+        // reads them, as the caller promises; the accumulators are those of this plane and the next.
+        *tally = unsafe { self.passes.first(&self.data, plane, sums, buffers, in_range) };
+    }
+
+    /// ψ and its slopes of a plane.
+    ///
+    /// # Safety
+    /// The plane is filled; no other thread reads its slopes meanwhile.
+    unsafe fn excess(&self, input: &PassInput, slab: &mut ThreadSlab<P::Scalar>, sums: Sums, plane: usize) {
+        let Some(excess) = &input.excess else { return };
+        let width = self.fluid.width();
+        let of_plane = self.order.particles_of(&(plane..plane + 1));
+        for first in of_plane.clone().step_by(DENSITY_BLOCK) {
+            let particles = first..of_plane.end.min(first + DENSITY_BLOCK);
+            let (own, count) = (first - slab.first, particles.len());
+            let has_species = self.particles.species.len() > 0;
+            // SAFETY: particles of a plane of this thread's slab, which is filled: nobody writes their species, and nobody
+            // else accesses their slopes, as the caller promises.
+            let (species, slopes) = unsafe {
+                let species = if has_species { particles.clone() } else { 0..0 };
+                (self.particles.species.slice(species), self.slopes.rows_mut(particles.clone()))
+            };
+            let block = DensityBlock {
+                first,
+                added: sums.of_particles(self.order, plane, particles.clone()),
+                species,
+                ghost: self.particles.ghost.get(particles.clone()).unwrap_or_default(),
+                densities: &mut slab.densities[width * own..][..width * count],
+                excess: &mut slab.excess[own..][..count],
+                slopes: &mut *slopes,
+            };
+            if let Err(fault) = block.evaluate(self.fluid, excess, self.order, &mut slab.state.excess) {
+                slab.state.fault.get_or_insert(fault);
+                return;
+            }
+            // SAFETY: nobody else accesses the slopes of these particles, as the caller promises.
+            unsafe { self.slopes.pack(particles, slopes) };
+        }
+    }
+
+    /// The second pass of a plane.
+    ///
+    /// # Safety
+    /// Slopes of the plane and of the next are there, and nobody writes them.
+    unsafe fn second(&self, slab: &mut ThreadSlab<P::Scalar>, sums: &mut SlabSums, plane: usize) {
+        if self.fluid.terms.passes.is_empty() {
+            return;
+        }
+        let (_, in_range, tally) = slab.plane(plane);
+        let [forces, densities] = sums.of_plane(self.order, plane);
+        let sums = PlaneSums::new(self.order.plane_start(plane), forces, densities);
+        // SAFETY: the pairs are those that the first pass of this plane has kept; slopes are there, as the caller promises;
+        // the accumulators are those of this plane and the next.
+        unsafe { self.passes.second(&self.data, sums, in_range, &mut tally.virial) };
+    }
+
+    /// The forces of a plane, to the host, when all passes that add to it are done.
+    fn forces(&self, out: ForceSink, slab: &mut ThreadSlab<P::Scalar>, sums: Sums, plane: usize) {
+        assert!(slab.planes.contains(&plane), "a plane of the slab");
+        let particles = self.order.particles_of(&(plane..plane + 1));
+        let added = sums.of_particles(self.order, plane, particles.clone());
+        // SAFETY: an order has each particle once, those of this plane here; the plane is of this thread's slab alone.
+        let lost =
+            unsafe { out.write(self.fluid.set, &self.order.order[particles], self.order.owned, added) };
+        slab.state.planes_written += 1;
+        slab.state.lost = slab.state.lost.into_iter().chain(lost).min();
+    }
+}
