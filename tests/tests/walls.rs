@@ -47,6 +47,9 @@ const CORE: &[&[&str]] = &[
 const PROGRAM: &[&[&str]] = &[
     &["lammps"],
     &["scene", "run", "observe", "output", "report"],
+    &["bulk"],
+    &["calibrate"],
+    &["papers"],
     &["export"],
     &["crosscheck"],
     &["bench"],

@@ -90,7 +90,6 @@ impl Plan {
     /// # Errors
     /// A derivative of ψ grows beyond the limits of the formula engine.
     pub fn new(fluid: &Fluid) -> Result<Plan, TooLarge> {
-        let count = fluid.species.len();
         let slopes = slopes(fluid)?;
         let mut passes = Vec::new();
         let mut linear = Vec::new();
@@ -106,8 +105,25 @@ impl Plan {
                 }),
             }
         }
-        let excess =
-            (0..count).map(|alpha| plan_excess(fluid, alpha, &passes)).collect::<Result<Vec<_>, _>>()?;
+        Plan::of_passes(fluid, passes, linear)
+    }
+
+    /// The plan of a fluid that leaves nothing out: every density has a pass, and no ψ is taken for a pair potential.
+    ///
+    /// # Errors
+    /// As [`Plan::new`].
+    pub fn whole(fluid: &Fluid) -> Result<Plan, TooLarge> {
+        Plan::of_passes(fluid, (0..fluid.densities.len()).collect(), Vec::new())
+    }
+
+    /// The same fluid with nothing but its thermostat.
+    pub(super) fn without_conservative_forces(self) -> Plan {
+        Plan { passes: Vec::new(), linear: Vec::new(), pairs: Vec::new(), ..self }
+    }
+
+    fn of_passes(fluid: &Fluid, passes: Vec<usize>, linear: Vec<LinearTerm>) -> Result<Plan, TooLarge> {
+        let psi = |alpha| plan_excess(fluid, alpha, &passes);
+        let excess = (0..fluid.species.len()).map(psi).collect::<Result<Vec<_>, _>>()?;
         Ok(Plan {
             species: fluid.species.clone(),
             dimensions: fluid.dimensions,

@@ -1,4 +1,4 @@
-//! The fast engine: the same forces as [`Engine`](super::Engine), from a sweep over particles in the order
+//! The fast engine: the same forces as [`Reference`](super::reference::Reference), from a sweep over particles in the order
 //! of cells.
 //!
 //! Every step the particles are sorted into columns of cells ([`grid`], [`workspace`]). Each plane of columns
@@ -35,6 +35,7 @@ use super::noise::PairNoise;
 use super::particles::{Particles, Step};
 use super::plan::Plan;
 use super::settings::{Precision, Settings};
+use super::surroundings::Around;
 use super::tally::{Tally, Want};
 use crate::model::Fluid;
 use crate::model::expression::TooLarge;
@@ -65,24 +66,13 @@ pub struct Sweep {
     ready: bool,
 }
 
-/// What a rank of a host finds around its particles.
-#[derive(Debug, Clone, Copy)]
-pub struct Around<'a> {
-    /// The box. Along its periodic directions the rank has all of it; along the others there are ghosts for what is
-    /// beyond the rank, or nothing is.
-    pub domain: &'a PeriodicBox,
-    /// For each ghost whether it is the image, along a periodic direction of `domain`, of a particle that is there too:
-    /// those take no part. Empty if none is.
-    pub images: &'a [bool],
-}
-
 /// One of both.
 enum EitherPrecision {
     Mixed(Box<Workspace<Mixed>>),
     Double(Box<Workspace<Double>>),
 }
 
-/// Does the same with the machine of either precision.
+/// Does the same with the workspace of either precision.
 macro_rules! with {
     ($both:expr, $workspace:ident => $do:expr) => {
         match $both {
@@ -169,12 +159,12 @@ impl Sweep {
         with!(&self.workspace, m => m.counts())
     }
 
-    /// As [`Engine::out_of_bounds`](super::Engine::out_of_bounds).
+    /// As [`Reference::out_of_bounds`](super::reference::Reference::out_of_bounds).
     pub fn out_of_bounds(&self) -> [u64; 2] {
         with!(&self.workspace, m => m.out_of_bounds())
     }
 
-    /// As [`Engine::map_kinds`](super::Engine::map_kinds).
+    /// As [`Reference::map_kinds`](super::reference::Reference::map_kinds).
     ///
     /// # Errors
     /// A species index out of range.
@@ -202,7 +192,7 @@ impl Sweep {
     ///
     /// `v` may be empty and `step` `None` where no thermostat acts; with `step` `None` only conservative
     /// forces are computed. Of `want`, the totals: what is asked for of each particle is the business
-    /// of [`Engine`](super::Engine).
+    /// of [`Reference`](super::reference::Reference).
     ///
     /// # Errors
     /// A position, ψ or a force that is not finite; then some forces may have been written. A tag or type out of range,
@@ -358,8 +348,8 @@ impl Sweep {
     }
 
     /// ψ and local densities of owned particles, in the host's order: as
-    /// [`Engine::excess`](super::Engine::excess) and
-    /// [`Engine::local_densities`](super::Engine::local_densities), those that forces do not need being zero.
+    /// [`Reference::excess`](super::reference::Reference::excess) and
+    /// [`Reference::local_densities`](super::reference::Reference::local_densities), those that forces do not need being zero.
     pub fn local_densities(&self, excess: &mut Vec<f64>, densities: &mut Vec<f64>) {
         let variables = self.plan.densities.len() * self.plan.species.len();
         with!(&self.workspace, m => m.to_host(variables, excess, densities));

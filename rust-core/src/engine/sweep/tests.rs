@@ -1,5 +1,6 @@
 use super::*;
-use crate::engine::{Engine, Images, Instructions, Newton};
+use crate::engine::reference::Reference;
+use crate::engine::{Images, Instructions, Surroundings};
 use crate::model::Model;
 use nalgebra::Matrix3;
 use std::num::NonZeroUsize;
@@ -58,26 +59,13 @@ impl Cloud {
 
 const STEP: Step = Step { seed: 11, number: 5, dt: 0.01 };
 
-/// Forces and totals by the plain engine with images as ghosts.
+/// Forces and totals by the reference.
 fn plain(fluid: &Fluid, cloud: &Cloud) -> (Vec<[f64; 3]>, Tally) {
-    let mut engine = Engine::new(fluid).unwrap();
-    let n = cloud.x.len();
-    let (mut x, mut v, mut tag, mut kind) =
-        (cloud.x.clone(), cloud.v.clone(), cloud.tag.clone(), cloud.kind.clone());
-    let mut images = Images::default();
-    images.build(&cloud.domain, fluid.dimensions, engine.plan().cutoff(), n, &mut x);
-    images.forward(1, &mut v);
-    images.forward(1, &mut tag);
-    images.forward(1, &mut kind);
-    let particles = Particles { owned: n, x: &x, tag: &tag, kind: &kind };
-    engine.densities(&particles, Newton::On).unwrap();
-    let width = engine.slope_width();
-    engine.slopes_mut().truncate(n * width);
-    images.forward(width, engine.slopes_mut());
-    let mut force = vec![[0.0; 3]; x.len()];
-    let tally = engine.forces(&particles, &v, Some(STEP), Want::TOTALS, &mut force).unwrap();
-    images.reverse(&mut force);
-    force.truncate(n);
+    let mut reference = Reference::new(fluid).unwrap();
+    let particles = cloud.particles();
+    reference.first(Surroundings::Box(&cloud.domain), &particles, false).unwrap();
+    let mut force = vec![[0.0; 3]; cloud.x.len()];
+    let tally = reference.second(&particles, &cloud.v, Some(STEP), Want::TOTALS, &mut force).unwrap();
     (force, tally)
 }
 

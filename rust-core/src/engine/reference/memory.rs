@@ -1,5 +1,5 @@
-use super::Engine;
-use crate::engine::pairs::PairList;
+use super::Reference;
+use super::pairs::PairList;
 
 fn bytes<T>(array: &Vec<T>) -> usize {
     array.capacity() * size_of::<T>()
@@ -16,7 +16,7 @@ fn list_bytes(list: &PairList) -> usize {
         + bytes(factor)
 }
 
-impl Engine {
+impl Reference {
     /// Bytes held in arrays over particles and pairs, without the cells of the search.
     pub fn memory(&self) -> usize {
         list_bytes(self.pairs.force())

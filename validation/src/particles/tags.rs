@@ -1,7 +1,7 @@
 use std::ops::RangeInclusive;
 
 /// The particles in the order of their tags, which files have them in.
-pub(super) fn order_of_tags(tags: &[i32]) -> Vec<usize> {
+pub(crate) fn order_of_tags(tags: &[i32]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..tags.len()).collect();
     order.sort_unstable_by_key(|k| tags[*k]);
     order

@@ -1,7 +1,6 @@
 //! The checkpoints in the folder of a run.
 
-use super::{Checkpoint, CheckpointError, format};
-use crate::run::RunError;
+use super::{Checkpoint, CheckpointError, Unwritten, format};
 use std::fs::File;
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
@@ -41,13 +40,13 @@ impl Store {
     }
 
     /// Writes another one and keeps the newest as the one before. If that fails, those that are there stay.
-    pub fn write(&self, checkpoint: &Checkpoint) -> Result<(), RunError> {
+    pub fn write(&self, checkpoint: &Checkpoint) -> Result<(), Unwritten> {
         let new = self.folder.join(UNFINISHED);
         let newest = self.path();
         self.write_new(checkpoint, &new).map_err(|source| {
             // What is there of it only takes space.
             let _ = std::fs::remove_file(&new);
-            RunError::Output { path: newest, source }
+            Unwritten { path: newest, source }
         })
     }
 
@@ -98,27 +97,27 @@ impl Store {
     }
 
     /// Makes the one before the newest, so that the next one written will not push it out.
-    pub fn fall_back(&self) -> Result<(), RunError> {
+    pub fn fall_back(&self) -> Result<(), Unwritten> {
         let newest = self.path();
         std::fs::rename(self.folder.join(BEFORE), &newest)
             .and_then(|()| self.sync())
-            .map_err(RunError::output(&newest))
+            .map_err(Unwritten::at(&newest))
     }
 
     /// Removes all but the newest.
-    pub fn keep_newest(&self) -> Result<(), RunError> {
+    pub fn keep_newest(&self) -> Result<(), Unwritten> {
         self.remove(&[UNFINISHED, BEFORE])
     }
 
     /// Removes all.
-    pub fn clear(&self) -> Result<(), RunError> {
+    pub fn clear(&self) -> Result<(), Unwritten> {
         self.remove(&[UNFINISHED, BEFORE, NEWEST])
     }
 
-    fn remove(&self, names: &[&str]) -> Result<(), RunError> {
+    fn remove(&self, names: &[&str]) -> Result<(), Unwritten> {
         for name in names {
             let path = self.folder.join(name);
-            absent_is_fine(std::fs::remove_file(&path)).map_err(RunError::output(&path))?;
+            absent_is_fine(std::fs::remove_file(&path)).map_err(Unwritten::at(&path))?;
         }
         Ok(())
     }

@@ -15,20 +15,19 @@
 //! Floating-point numbers are stored as their eight bytes. Postcard does not describe itself: whoever adds
 //! a field to [`Checkpoint`], or to what it holds, raises [`VERSION`].
 
-pub(super) mod box_by_edges;
 mod error;
 mod format;
 mod identity;
 mod store;
+mod totals;
 
-pub use error::CheckpointError;
+pub use error::{CheckpointError, Unwritten};
 pub use format::VERSION;
 pub use identity::Identity;
-pub(super) use store::{Found, Store};
+pub(crate) use store::{Found, Store};
+pub use totals::{Means, Sums, Thermo};
 
-use super::state::State;
-use super::summary::Sums;
-use super::thermo::Thermo;
+use crate::particles::State;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;

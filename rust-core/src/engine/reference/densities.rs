@@ -1,13 +1,41 @@
 //! Local densities: `n_β,i = Σ_j w(r_ij)` over the neighbours of species β.
 
 use super::pairs::{PairList, Pairs};
+use crate::engine::plan::Plan;
 use crate::model::kernel::{Kernel, Shape, ShapeVisitor};
+
+/// Sums the densities `which` of every owned particle to `n`, which has [`Fluid::variables`](crate::model::Fluid::variables)
+/// numbers for each, density-major. Returns how many sums over pairs there were.
+pub fn sum_densities(
+    pairs: &Pairs,
+    plan: &Plan,
+    which: impl Iterator<Item = usize>,
+    species: &[i32],
+    n: &mut [f64],
+) -> u64 {
+    let mut sums = 0;
+    let count = plan.species.len();
+    let width = plan.densities.len() * count;
+    for d in which {
+        let density = &plan.densities[d];
+        let owned = n.len() / width;
+        add_density(pairs, &density.kernel, owned, n, width, d * count);
+        sums += 1;
+        if density.includes_self {
+            let own = density.kernel.value(0.0);
+            for (i, species) in species[..owned].iter().enumerate().filter(|(_, s)| **s >= 0) {
+                n[i * width + d * count + *species as usize] += own;
+            }
+        }
+    }
+    sums
+}
 
 /// Adds one density of every owned particle to `n`.
 ///
 /// `n` has `width` numbers for each owned particle, species running fastest; this density's begin at
 /// `offset`.
-pub fn add_density(pairs: &Pairs, kernel: &Kernel, owned: usize, n: &mut [f64], width: usize, offset: usize) {
+fn add_density(pairs: &Pairs, kernel: &Kernel, owned: usize, n: &mut [f64], width: usize, offset: usize) {
     struct Pass<'a> {
         pairs: &'a PairList,
         kernel: &'a Kernel,

@@ -1,23 +1,15 @@
 //! The pairs of one step, and who computes which.
 
-/// Whether the host adds forces on ghosts back to their owners.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Newton {
-    /// It does: each pair is computed once over all ranks, its force put on both particles.
-    #[default]
-    On,
-    /// It does not: a pair of an owned particle and a ghost is computed on both sides, its force put
-    /// on the owned particle alone.
-    Off,
-}
+use crate::engine::surroundings::Newton;
 
-/// Pairs within the cut-off with at least one owned particle, which comes first; those whose force is
-/// this rank's in front, then those that only count in the density of the owned particle.
+/// The pairs of one configuration. All have at least one owned particle, which comes first.
 #[derive(Debug, Clone, Default)]
 pub struct Pairs {
     owned: usize,
     newton: Newton,
+    /// Those whose force is computed here.
     force: PairList,
+    /// Those that only count in the density of the owned particle.
     density_only: PairList,
 }
 
@@ -50,7 +42,7 @@ impl PairList {
     }
 
     #[inline(always)]
-    fn push(&mut self, i: usize, j: usize, d: [f64; 3], species: &[i32]) {
+    pub fn push(&mut self, i: usize, j: usize, d: [f64; 3], species: &[i32]) {
         self.i.push(i as u32);
         self.j.push(j as u32);
         self.species_i.push(species[i] as u8);
@@ -77,6 +69,12 @@ impl Pairs {
         let here = j < self.owned || self.newton == Newton::Off || computes(tag[i], tag[j], d);
         let list = if here { &mut self.force } else { &mut self.density_only };
         list.push(i, j, d, species);
+    }
+
+    /// Adds a pair of two particles in a box that are both owned, the second perhaps an image, with `d = r_i − r_j`.
+    #[inline(always)]
+    pub fn push_in_box(&mut self, i: usize, j: usize, d: [f64; 3], species: &[i32]) {
+        self.force.push(i, j, d, species);
     }
 
     /// As [`Pairs::push`], for pairs of strength `factor`. Either all pairs come this way or none.

@@ -1,16 +1,14 @@
-//! A fluid's free energies with first and second derivatives, for one particle at a time.
+//! ψ with first and second derivatives, one particle at a time, by the definition: what blocks of particles get from
+//! [`ExcessPlan`](crate::engine::excess::ExcessPlan) is tested against it.
 
-use psidpd_core::model::expression::{Formula, Program, TooLarge};
-use psidpd_core::model::kernel::{Kernel, KernelKind};
-use psidpd_core::model::pair::{PairForm, PairPotential};
-use psidpd_core::model::{Continuation, ExcessFreeEnergy, Fluid};
+use crate::model::expression::{Formula, Program, TooLarge};
+use crate::model::{Bounds, Continuation, ExcessFreeEnergy, Fluid};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 
-/// A fluid at one temperature, ready to be evaluated.
+/// The free energies of a fluid, differentiated.
 #[derive(Debug)]
-pub struct Interactions {
-    fluid: Fluid,
+pub struct FreeEnergies {
     species: Vec<Excess>,
 }
 
@@ -35,12 +33,12 @@ pub struct Psi {
     pub second: Vec<f64>,
 }
 
-impl Interactions {
+impl FreeEnergies {
     /// Differentiates what there is to differentiate.
     ///
     /// # Errors
     /// A derivative grows beyond the limits of the formula engine.
-    pub fn new(fluid: Fluid) -> Result<Interactions, TooLarge> {
+    pub fn new(fluid: &Fluid) -> Result<FreeEnergies, TooLarge> {
         let count = fluid.variables();
         let mut species = Vec::new();
         for excess in &fluid.excess {
@@ -62,29 +60,21 @@ impl Interactions {
             };
             species.push(Excess { program, derivatives: RefCell::new(derivatives) });
         }
-        Ok(Interactions { fluid, species })
-    }
-
-    /// The fluid.
-    pub fn fluid(&self) -> &Fluid {
-        &self.fluid
-    }
-
-    /// The longest range of a conservative interaction.
-    pub fn range(&self) -> f64 {
-        conservative_range(&self.fluid)
+        Ok(FreeEnergies { species })
     }
 
     /// ψ of a particle of species `alpha` at the uncorrected densities `n`, density-major.
-    pub fn psi(&self, alpha: usize, n: &[f64]) -> Psi {
-        let (count, variables) = (self.fluid.species.len(), n.len());
-        let correction = |v: usize| &self.fluid.densities[v / count].correction[alpha * count + v % count];
+    pub fn psi(&self, fluid: &Fluid, alpha: usize, n: &[f64]) -> Psi {
+        let (count, variables) = (fluid.species.len(), n.len());
+        let correction = |v: usize| &fluid.densities[v / count].correction[alpha * count + v % count];
         let corrected: Vec<[f64; 3]> = (0..variables).map(|v| polynomial(&correction(v).0, n[v])).collect();
         let at: Vec<f64> = corrected.iter().map(|c| c[0]).collect();
-        let mut psi = match &self.fluid.excess[alpha] {
+        let mut psi = match &fluid.excess[alpha] {
             ExcessFreeEnergy::Curve(curve) => {
                 let range = curve.density * count..(curve.density + 1) * count;
-                let [value, slope, second] = self.curve(alpha, at[range.clone()].iter().sum());
+                let total = at[range.clone()].iter().sum();
+                let [value, slope, second] =
+                    continued_curve(|x| curve.at(x), fluid.densities[curve.density].bounds, total);
                 let mut psi =
                     Psi { value, slopes: vec![0.0; variables], second: vec![0.0; variables * variables] };
                 for v in range.clone() {
@@ -93,7 +83,7 @@ impl Interactions {
                 }
                 psi
             }
-            ExcessFreeEnergy::Formula(_) => self.formula(alpha, &at),
+            ExcessFreeEnergy::Formula(_) => self.species[alpha].formula(fluid, &at),
             // No ψ: what is stated as energy and slopes. Nothing that needs second derivatives is measured then.
             ExcessFreeEnergy::Slopes(law) => Psi {
                 value: law.energy.value(&at),
@@ -110,26 +100,15 @@ impl Interactions {
         psi.slopes.iter_mut().zip(&corrected).for_each(|(slope, c)| *slope *= c[1]);
         psi
     }
+}
 
-    /// A curve with its derivatives, continued outside the bounds of its density.
-    fn curve(&self, alpha: usize, total: f64) -> [f64; 3] {
-        let ExcessFreeEnergy::Curve(curve) = &self.fluid.excess[alpha] else { return [f64::NAN; 3] };
-        let Some(bounds) = self.fluid.densities[curve.density].bounds else { return curve.at(total) };
-        let [psi, slope, mut second] = curve.at(bounds.clamp(total));
-        let delta = bounds.beyond(total);
-        if delta < 0.0 && bounds.below == Continuation::Constant {
-            second = 0.0;
-        }
-        [psi + delta * slope + 0.5 * delta * delta * second, slope + delta * second, second]
-    }
-
-    fn formula(&self, alpha: usize, at: &[f64]) -> Psi {
+impl Excess {
+    fn formula(&self, fluid: &Fluid, at: &[f64]) -> Psi {
         let variables = at.len();
-        let excess = &self.species[alpha];
-        let inside = (0..variables).all(|v| self.beyond(v, at).0 == 0.0);
+        let inside = (0..variables).all(|v| beyond(fluid, v, at).0 == 0.0);
         let mut out =
             Psi { value: 0.0, slopes: vec![0.0; variables], second: vec![0.0; variables * variables] };
-        if let Some(program) = excess.program.as_ref().filter(|_| inside) {
+        if let Some(program) = self.program.as_ref().filter(|_| inside) {
             let mut values = vec![0.0; program.outputs()];
             program.eval(at, &mut values, &mut Vec::new());
             out.value = values[0];
@@ -145,13 +124,13 @@ impl Interactions {
             return out;
         }
         let mut order = vec![0u8; variables];
-        out.value = self.continued(excess, &mut order.clone(), at, 0);
+        out.value = self.continued(fluid, &mut order.clone(), at, 0);
         for v in 0..variables {
             order[v] += 1;
-            out.slopes[v] = self.continued(excess, &mut order.clone(), at, 0);
+            out.slopes[v] = self.continued(fluid, &mut order.clone(), at, 0);
             for u in 0..variables {
                 order[u] += 1;
-                out.second[v * variables + u] = self.continued(excess, &mut order.clone(), at, 0);
+                out.second[v * variables + u] = self.continued(fluid, &mut order.clone(), at, 0);
                 order[u] -= 1;
             }
             order[v] -= 1;
@@ -159,34 +138,45 @@ impl Interactions {
         out
     }
 
-    /// How far variable `v` is out of its bounds, and the highest power of that in ψ.
-    fn beyond(&self, v: usize, at: &[f64]) -> (f64, u8) {
-        let Some(bounds) = self.fluid.densities[v / self.fluid.species.len()].bounds else { return (0.0, 2) };
-        let delta = bounds.beyond(at[v]);
-        (delta, if delta < 0.0 && bounds.below == Continuation::Constant { 1 } else { 2 })
-    }
-
     /// The derivative `order` of ψ continued in the variables from `v` on: outside a bound ψ is
     /// `Σ_k δ^k/k! ∂^kψ`, k up to 1 or 2, with the derivatives at the bound.
-    fn continued(&self, excess: &Excess, order: &mut Vec<u8>, at: &[f64], v: usize) -> f64 {
+    fn continued(&self, fluid: &Fluid, order: &mut Vec<u8>, at: &[f64], v: usize) -> f64 {
         if v == at.len() {
-            let edge: Vec<f64> = (0..at.len()).map(|v| at[v] - self.beyond(v, at).0).collect();
-            return derivative(&excess.derivatives, order).map_or(f64::NAN, |f| f.value(&edge));
+            let edge: Vec<f64> = (0..at.len()).map(|v| at[v] - beyond(fluid, v, at).0).collect();
+            return derivative(&self.derivatives, order).map_or(f64::NAN, |f| f.value(&edge));
         }
-        let (delta, highest) = self.beyond(v, at);
+        let (delta, highest) = beyond(fluid, v, at);
         if delta == 0.0 {
-            return self.continued(excess, order, at, v + 1);
+            return self.continued(fluid, order, at, v + 1);
         }
         let asked = order[v];
         let (mut sum, mut weight) = (0.0, 1.0);
         for k in asked..=highest {
             order[v] = k;
-            sum += weight * self.continued(excess, order, at, v + 1);
+            sum += weight * self.continued(fluid, order, at, v + 1);
             weight *= delta / (k - asked + 1) as f64;
         }
         order[v] = asked;
         sum
     }
+}
+
+/// How far variable `v` is out of its bounds, and the highest power of that in ψ.
+fn beyond(fluid: &Fluid, v: usize, at: &[f64]) -> (f64, u8) {
+    let Some(bounds) = fluid.densities[v / fluid.species.len()].bounds else { return (0.0, 2) };
+    let delta = bounds.beyond(at[v]);
+    (delta, if delta < 0.0 && bounds.below == Continuation::Constant { 1 } else { 2 })
+}
+
+/// ψ, ψ′ and ψ″ of a curve, continued outside the bounds of its density.
+fn continued_curve(curve: impl Fn(f64) -> [f64; 3], bounds: Option<Bounds>, total: f64) -> [f64; 3] {
+    let Some(bounds) = bounds else { return curve(total) };
+    let [psi, slope, mut second] = curve(bounds.clamp(total));
+    let delta = bounds.beyond(total);
+    if delta < 0.0 && bounds.below == Continuation::Constant {
+        second = 0.0;
+    }
+    [psi + delta * slope + 0.5 * delta * delta * second, slope + delta * second, second]
 }
 
 fn derivative(known: &RefCell<BTreeMap<Vec<u8>, Formula>>, order: &[u8]) -> Option<Formula> {
@@ -208,90 +198,10 @@ fn polynomial(coefficients: &[f64], x: f64) -> [f64; 3] {
     })
 }
 
-/// `w″(r)` within the range.
-pub fn kernel_second(kernel: &Kernel, r: f64) -> f64 {
-    let s = r / kernel.range();
-    if s >= 1.0 {
-        return 0.0;
-    }
-    let t = 1.0 - s;
-    let shape = match kernel.kind() {
-        KernelKind::Linear => 0.0,
-        KernelKind::Quadratic => 2.0,
-        KernelKind::Bell => 12.0 * s - 6.0,
-        KernelKind::Lucy => -12.0 * t * (1.0 - 3.0 * s),
-        KernelKind::CubicSpline => {
-            if s < 0.5 {
-                36.0 * s - 12.0
-            } else {
-                12.0 * t
-            }
-        }
-        KernelKind::WendlandC2 => -20.0 * t * t * (1.0 - 4.0 * s),
-    };
-    shape * kernel.slope_factor() / kernel.range()
-}
-
-/// `φ″(r)` within the range: by the formula of the form, or for formulas and tables of the user's the
-/// five-point difference of the exact `φ′`, whose error is of the order of its rounding, 10⁻¹¹ of φ′ over
-/// the step.
-pub fn pair_second(potential: &PairPotential, r: f64) -> f64 {
-    match potential {
-        PairPotential::Soft(soft) => soft.strength() / soft.range(),
-        _ => {
-            let h = (1e-4 * potential.range()).min(0.4 * r).min(0.4 * (potential.range() - r));
-            if h <= 0.0 {
-                return 0.0;
-            }
-            let slope = |r: f64| potential.at(r).1;
-            (8.0 * (slope(r + h) - slope(r - h)) - (slope(r + 2.0 * h) - slope(r - 2.0 * h))) / (12.0 * h)
-        }
-    }
-}
-
-/// The longest range of a conservative interaction of a fluid.
-pub fn conservative_range(fluid: &Fluid) -> f64 {
-    let densities = fluid.densities.iter().map(|d| d.kernel.range().max(d.force_kernel.range()));
-    densities.chain(fluid.pairs.iter().map(|p| p.potential.range())).fold(0.0, f64::max)
-}
-
-/// Whether some force of the fluid jumps at its range, where `∇·F` is a delta function that no
-/// configuration shows.
-pub fn force_jumps(fluid: &Fluid) -> bool {
-    let kernels = fluid
-        .densities
-        .iter()
-        .any(|d| d.kernel.slope(d.kernel.range() * (1.0 - 1e-9)).abs() > 1e-6 * d.kernel.slope_factor());
-    kernels
-        || fluid.pairs.iter().any(|p| {
-            let range = p.potential.range();
-            let scale =
-                (1..20).map(|k| p.potential.at(range * f64::from(k) / 20.0).1.abs()).fold(0.0, f64::max);
-            p.potential.at(range * (1.0 - 1e-9)).1.abs() > 1e-6 * scale
-        })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use psidpd_core::model::Model;
-
-    #[test]
-    fn second_derivatives_of_kernels() {
-        for &kind in KernelKind::ALL {
-            let w = Kernel::new(kind, 0.8, 3);
-            for k in 1..80 {
-                let r = 0.01 * f64::from(k) + 0.003;
-                if (r - 0.4).abs() < 0.004 || r > 0.795 {
-                    continue;
-                }
-                let h = 1e-5;
-                let numeric = (w.slope(r + h) - w.slope(r - h)) / (2.0 * h);
-                let scale = w.slope_factor() / 0.8;
-                assert!((numeric - kernel_second(&w, r)).abs() < 1e-6 * scale, "{} {r}", kind.name());
-            }
-        }
-    }
+    use crate::model::Model;
 
     /// Slopes and second derivatives against differences, within bounds, beyond one and beyond both.
     #[test]
@@ -312,16 +222,17 @@ B = "n^3 + sqrt(n_A)*n_B^2"
 "#,
         )
         .unwrap();
-        let interactions = Interactions::new(model.at(1.3).unwrap()).unwrap();
+        let fluid = model.at(1.3).unwrap();
+        let energies = FreeEnergies::new(&fluid).unwrap();
         for alpha in 0..2 {
             for n in [[1.0, 1.2], [0.1, 1.0], [5.0, 0.2], [4.0, 6.0], [0.2, 0.1]] {
-                let psi = interactions.psi(alpha, &n);
+                let psi = energies.psi(&fluid, alpha, &n);
                 let h = 1e-5;
                 for v in 0..2 {
                     let moved = |h: f64| {
                         let mut n = n;
                         n[v] += h;
-                        interactions.psi(alpha, &n)
+                        energies.psi(&fluid, alpha, &n)
                     };
                     let (up, down) = (moved(h), moved(-h));
                     let slope = (up.value - down.value) / (2.0 * h);
@@ -334,17 +245,5 @@ B = "n^3 + sqrt(n_A)*n_B^2"
                 }
             }
         }
-    }
-
-    #[test]
-    fn jumps_are_seen() {
-        let at = |kernel: &str| {
-            let text = format!(
-                "title = \"m\"\nspecies = [\"A\"]\n[density.n]\nkernel = \"{kernel}\"\nrange = 1.0\n\
-                 [excess_free_energy]\nA = \"n^2\"\n"
-            );
-            force_jumps(&Model::parse("m.toml", &text).unwrap().at(1.0).unwrap())
-        };
-        assert!(at("linear") && !at("quadratic") && !at("lucy"));
     }
 }

@@ -1,10 +1,6 @@
 //! Pairs within the cut-off, by cells.
 
-use super::error::EngineError;
-use super::pairs::{Newton, Pairs};
-use super::particles::Particles;
-
-/// Cell search over open space: ghosts are particles like any other.
+/// Cell search over open space: ghosts and images are points like any other.
 ///
 /// Particles are counting-sorted into cells no narrower than the cut-off; each looks at the rest of its
 /// own cell and at half of the neighbouring ones. Cells are contiguous along x, so half the stencil is
@@ -23,46 +19,40 @@ pub struct CellSearch {
     near: usize,
 }
 
-/// Index that marks a particle of no species.
+/// Marks a point that takes no part.
 const OUTSIDE: u32 = u32::MAX;
 
 impl CellSearch {
-    /// Fills `pairs` with every pair of particles closer than `cutoff` of which one is owned and both
-    /// have a species.
+    /// Calls `visit` with `a`, `b` and `x_a − x_b` of every pair of points closer than `cutoff` of which one is among the
+    /// `owned` first and both take part, each once, in an order that depends on the points alone.
+    ///
+    /// Those that take part must have finite coordinates. In two dimensions the third counts for nothing.
     pub fn find(
         &mut self,
-        particles: &Particles,
-        species: &[i32],
+        x: &[[f64; 3]],
+        owned: usize,
+        takes_part: impl Fn(usize) -> bool,
         dimensions: usize,
         cutoff: f64,
-        newton: Newton,
-        pairs: &mut Pairs,
-    ) -> Result<(), EngineError> {
-        pairs.clear(particles.owned, newton);
-        if cutoff > 0.0 && self.sort(particles, species, dimensions, cutoff)? > 0 {
-            self.sweep(particles, species, cutoff, pairs);
+        mut visit: impl FnMut(usize, usize, [f64; 3]),
+    ) {
+        if cutoff > 0.0 && self.sort(x, takes_part, dimensions, cutoff) > 0 {
+            self.sweep(owned, cutoff, &mut visit);
         }
-        Ok(())
     }
 
-    /// Sorts particles into cells; returns how many take part.
+    /// Sorts points into cells; returns how many take part.
     fn sort(
         &mut self,
-        particles: &Particles,
-        species: &[i32],
+        x: &[[f64; 3]],
+        takes_part: impl Fn(usize) -> bool,
         dimensions: usize,
         cutoff: f64,
-    ) -> Result<usize, EngineError> {
+    ) -> usize {
         let mut low = [f64::INFINITY; 3];
         let mut high = [f64::NEG_INFINITY; 3];
         let mut count = 0usize;
-        for (k, x) in particles.x.iter().enumerate() {
-            if species[k] < 0 {
-                continue;
-            }
-            if !(x[0].is_finite() && x[1].is_finite() && x[2].is_finite()) {
-                return Err(EngineError::Position { tag: particles.tag[k] });
-            }
+        for (_, x) in x.iter().enumerate().filter(|(k, _)| takes_part(*k)) {
             count += 1;
             for c in 0..3 {
                 low[c] = low[c].min(x[c]);
@@ -70,7 +60,7 @@ impl CellSearch {
             }
         }
         if count == 0 {
-            return Ok(0);
+            return 0;
         }
         // A few runaways must not make a grid of empty cells: not many more cells than particles.
         let most = (4 * count + 64) as f64;
@@ -96,8 +86,8 @@ impl CellSearch {
         self.start.clear();
         self.start.resize(total + 1, 0);
         self.cell_of.clear();
-        for (k, x) in particles.x.iter().enumerate() {
-            if species[k] < 0 {
+        for (k, x) in x.iter().enumerate() {
+            if !takes_part(k) {
                 self.cell_of.push(OUTSIDE);
                 continue;
             }
@@ -117,7 +107,7 @@ impl CellSearch {
         }
         // Filling from the back keeps the order of particles within a cell and turns `start` of each
         // cell, now its end, into its beginning.
-        for k in (0..particles.x.len()).rev() {
+        for k in (0..x.len()).rev() {
             let cell = self.cell_of[k];
             if cell == OUTSIDE {
                 continue;
@@ -127,16 +117,16 @@ impl CellSearch {
             let slot = *end as usize;
             self.order[slot] = k as u32;
             for c in 0..3 {
-                self.x[c][slot] = if c < dimensions { particles.x[k][c] } else { 0.0 };
+                self.x[c][slot] = if c < dimensions { x[k][c] } else { 0.0 };
             }
         }
         // `start[cell + 1]` is now where `cell` begins: shift.
         self.start.remove(0);
         self.start.push(count as u32);
-        Ok(count)
+        count
     }
 
-    fn sweep(&mut self, particles: &Particles, species: &[i32], cutoff: f64, pairs: &mut Pairs) {
+    fn sweep(&mut self, owned: usize, cutoff: f64, visit: &mut impl FnMut(usize, usize, [f64; 3])) {
         let [nx, ny, nz] = self.cells;
         let cutoff_squared = cutoff * cutoff;
         let mut windows: [(usize, usize); 5] = [(0, 0); 5];
@@ -159,7 +149,7 @@ impl CellSearch {
                     for i in begin..end {
                         windows[0] = (i + 1, row_end);
                         self.collect(i, &windows, cutoff_squared);
-                        self.keep(i, particles, species, pairs);
+                        self.tell(i, owned, visit);
                     }
                 }
             }
@@ -198,16 +188,14 @@ impl CellSearch {
     }
 
     #[inline(always)]
-    fn keep(&self, i: usize, particles: &Particles, species: &[i32], pairs: &mut Pairs) {
+    fn tell(&self, i: usize, owned: usize, visit: &mut impl FnMut(usize, usize, [f64; 3])) {
         let a = self.order[i] as usize;
         for &j in &self.found[..self.near] {
             let j = j as usize;
             let b = self.order[j] as usize;
-            if a >= particles.owned && b >= particles.owned {
-                continue;
+            if a < owned || b < owned {
+                visit(a, b, std::array::from_fn(|c| self.x[c][i] - self.x[c][j]));
             }
-            let d = [self.x[0][i] - self.x[0][j], self.x[1][i] - self.x[1][j], self.x[2][i] - self.x[2][j]];
-            pairs.push(a, b, d, particles.tag, species);
         }
     }
 }

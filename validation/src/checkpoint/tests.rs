@@ -242,7 +242,8 @@ fn identity(scene: &str, model: &str, psi: &str) -> Identity {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("m.toml"), model).unwrap();
     std::fs::write(folder.path().join("psi.txt"), psi).unwrap();
-    Identity::of(&Scene::parse("s.toml", scene, folder.path()).unwrap_or_else(|e| panic!("{e}")))
+    let scene = Scene::parse("s.toml", scene, folder.path()).unwrap_or_else(|e| panic!("{e}"));
+    Identity::of(scene.source.text(), &scene.folder, scene.precision(), &scene.model)
 }
 
 #[test]

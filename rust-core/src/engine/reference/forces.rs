@@ -1,10 +1,11 @@
 //! Forces, energy and virial over the pairs, in blocks: each term of the plan adds to a block's
 //! scalars in a loop of its own, compiled for its kernel, and one last loop scatters them.
 
-use super::noise::PairNoise;
-use super::pairs::{Newton, PairList};
-use super::plan::{LinearTerm, Plan, ThermostatPlan};
-use super::tally::{Tally, Want};
+use super::pairs::PairList;
+use crate::engine::noise::PairNoise;
+use crate::engine::plan::{LinearTerm, Plan, ThermostatPlan};
+use crate::engine::surroundings::Newton;
+use crate::engine::tally::{Tally, Want};
 use crate::model::PairTerm;
 use crate::model::kernel::{Kernel, Shape, ShapeVisitor};
 use crate::model::pair::PairForm;
@@ -32,63 +33,38 @@ pub struct ForceOutput<'a> {
     pub force: &'a mut [[f64; 3]],
     pub particle_energy: &'a mut [f64],
     pub particle_virial: &'a mut [[f64; 6]],
+    /// The conservative force of each pair along `ê_ij`, positive if it pushes them apart; empty if nobody asks.
+    pub pair_force: &'a mut [f64],
     pub tally: Tally,
 }
 
-/// One block's scalars: forces along `ê_ij`, and the energies that go to `i` and to `j`.
-struct Block {
-    conservative: [f64; BLOCK],
-    thermostat: [f64; BLOCK],
-    excess_i: [f64; BLOCK],
-    excess_j: [f64; BLOCK],
-    pair: [f64; BLOCK],
+/// The scalars of a block of pairs.
+pub struct Block<const N: usize> {
+    /// Forces along `ê_ij`.
+    pub conservative: [f64; N],
+    thermostat: [f64; N],
+    /// The energies of terms linear in a density: what belongs to `i`, and to `j`.
+    pub excess_i: [f64; N],
+    pub excess_j: [f64; N],
+    /// `φ`.
+    pub pair: [f64; N],
     /// Distances and places of the pairs that one pair term acts on.
-    r: [f64; BLOCK],
-    phi: [f64; BLOCK],
-    slope: [f64; BLOCK],
-    place: [u16; BLOCK],
+    r: [f64; N],
+    phi: [f64; N],
+    slope: [f64; N],
+    place: [u16; N],
 }
 
 /// Adds the forces of all pairs.
 pub fn add_forces(input: &ForceInput, output: &mut ForceOutput) {
-    let mut block = Block {
-        conservative: [0.0; BLOCK],
-        thermostat: [0.0; BLOCK],
-        excess_i: [0.0; BLOCK],
-        excess_j: [0.0; BLOCK],
-        pair: [0.0; BLOCK],
-        r: [0.0; BLOCK],
-        phi: [0.0; BLOCK],
-        slope: [0.0; BLOCK],
-        place: [0; BLOCK],
-    };
+    let mut block = Block::<BLOCK>::new();
     let energies = input.want.energy || input.want.particle_energy;
     for begin in (0..input.list.len()).step_by(BLOCK) {
         let end = (begin + BLOCK).min(input.list.len());
-        block.conservative.fill(0.0);
-        if energies {
-            block.excess_i.fill(0.0);
-            block.excess_j.fill(0.0);
-            block.pair.fill(0.0);
+        block.conserve(input, begin, end, energies);
+        if let Some(forces) = output.pair_force.get_mut(begin..end) {
+            forces.copy_from_slice(&block.conservative[..end - begin]);
         }
-        for (k, density) in input.plan.passes.iter().enumerate() {
-            let kernel = &input.plan.densities[*density].force_kernel;
-            kernel.kind().visit(ManyBody {
-                input,
-                kernel,
-                offset: k,
-                begin,
-                end,
-                out: &mut block.conservative,
-            });
-        }
-        for term in &input.plan.linear {
-            term.kernel.kind().visit(Linear { input, term, energies, begin, end, block: &mut block });
-        }
-        for term in &input.plan.pairs {
-            add_pair_term(input, term, begin, end, energies, &mut block);
-        }
-        scale(input.list, begin, end, energies, &mut block);
         if let (Some((noise, inverse_root_dt)), Some(plan)) = (&input.thermostat, &input.plan.thermostat) {
             add_thermostat(input, plan, noise, *inverse_root_dt, begin, end, &mut block.thermostat);
         } else {
@@ -104,8 +80,46 @@ pub fn add_forces(input: &ForceInput, output: &mut ForceOutput) {
     }
 }
 
+impl<const N: usize> Block<N> {
+    pub fn new() -> Block<N> {
+        Block {
+            conservative: [0.0; N],
+            thermostat: [0.0; N],
+            excess_i: [0.0; N],
+            excess_j: [0.0; N],
+            pair: [0.0; N],
+            r: [0.0; N],
+            phi: [0.0; N],
+            slope: [0.0; N],
+            place: [0; N],
+        }
+    }
+
+    /// The conservative forces of the pairs `begin` to `end`, at most `N`, and their energies if asked for.
+    pub fn conserve(&mut self, input: &ForceInput, begin: usize, end: usize, energies: bool) {
+        self.conservative.fill(0.0);
+        if energies {
+            self.excess_i.fill(0.0);
+            self.excess_j.fill(0.0);
+            self.pair.fill(0.0);
+        }
+        for (k, density) in input.plan.passes.iter().enumerate() {
+            let kernel = &input.plan.densities[*density].force_kernel;
+            let out = &mut self.conservative;
+            kernel.kind().visit(ManyBody { input, kernel, offset: k, begin, end, out });
+        }
+        for term in &input.plan.linear {
+            term.kernel.kind().visit(Linear { input, term, energies, begin, end, block: self });
+        }
+        for term in &input.plan.pairs {
+            add_pair_term(input, term, begin, end, energies, self);
+        }
+        scale(input.list, begin, end, energies, self);
+    }
+}
+
 /// Conservative forces and energies of pairs that do not act at full strength.
-fn scale(list: &PairList, begin: usize, end: usize, energies: bool, block: &mut Block) {
+fn scale<const N: usize>(list: &PairList, begin: usize, end: usize, energies: bool, block: &mut Block<N>) {
     if list.factor.is_empty() {
         return;
     }
@@ -120,16 +134,16 @@ fn scale(list: &PairList, begin: usize, end: usize, energies: bool, block: &mut 
 }
 
 /// `−[∂ψ_i/∂n_c(j) + ∂ψ_j/∂n_c(i)] w′(r)`.
-struct ManyBody<'a, 'b> {
+struct ManyBody<'a, 'b, const N: usize> {
     input: &'a ForceInput<'b>,
     kernel: &'a Kernel,
     offset: usize,
     begin: usize,
     end: usize,
-    out: &'a mut [f64; BLOCK],
+    out: &'a mut [f64; N],
 }
 
-impl ShapeVisitor for ManyBody<'_, '_> {
+impl<const N: usize> ShapeVisitor for ManyBody<'_, '_, N> {
     type Output = ();
 
     fn visit<S: Shape>(self) {
@@ -151,16 +165,16 @@ impl ShapeVisitor for ManyBody<'_, '_> {
 }
 
 /// `−(c_αβ + c_βα) w′(r)`, a density that every ψ is linear in.
-struct Linear<'a, 'b> {
+struct Linear<'a, 'b, const N: usize> {
     input: &'a ForceInput<'b>,
     term: &'a LinearTerm,
     energies: bool,
     begin: usize,
     end: usize,
-    block: &'a mut Block,
+    block: &'a mut Block<N>,
 }
 
-impl ShapeVisitor for Linear<'_, '_> {
+impl<const N: usize> ShapeVisitor for Linear<'_, '_, N> {
     type Output = ();
 
     fn visit<S: Shape>(self) {
@@ -194,13 +208,13 @@ impl ShapeVisitor for Linear<'_, '_> {
 }
 
 /// `−φ′(r)`.
-fn add_pair_term(
+fn add_pair_term<const N: usize>(
     input: &ForceInput,
     term: &PairTerm,
     begin: usize,
     end: usize,
     energies: bool,
-    block: &mut Block,
+    block: &mut Block<N>,
 ) {
     let list = input.list;
     let [a, b] = term.between.map(|s| s as u8);
@@ -255,7 +269,7 @@ fn add_thermostat(
     }
 }
 
-fn scatter(input: &ForceInput, output: &mut ForceOutput, begin: usize, end: usize, block: &Block) {
+fn scatter(input: &ForceInput, output: &mut ForceOutput, begin: usize, end: usize, block: &Block<BLOCK>) {
     let list = input.list;
     let both = input.newton == Newton::On;
     for k in begin..end {
@@ -285,7 +299,13 @@ fn share(input: &ForceInput, j: usize) -> f64 {
     if input.newton == Newton::On || j < input.owned { 1.0 } else { 0.5 }
 }
 
-fn tally_virial(input: &ForceInput, output: &mut ForceOutput, begin: usize, end: usize, block: &Block) {
+fn tally_virial(
+    input: &ForceInput,
+    output: &mut ForceOutput,
+    begin: usize,
+    end: usize,
+    block: &Block<BLOCK>,
+) {
     let list = input.list;
     for k in begin..end {
         let r = list.r[k];
@@ -317,7 +337,13 @@ fn tally_virial(input: &ForceInput, output: &mut ForceOutput, begin: usize, end:
     }
 }
 
-fn tally_energy(input: &ForceInput, output: &mut ForceOutput, begin: usize, end: usize, block: &Block) {
+fn tally_energy(
+    input: &ForceInput,
+    output: &mut ForceOutput,
+    begin: usize,
+    end: usize,
+    block: &Block<BLOCK>,
+) {
     let list = input.list;
     for k in begin..end {
         let (i, j) = (list.i[k] as usize, list.j[k] as usize);

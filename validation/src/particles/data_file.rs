@@ -1,13 +1,18 @@
 //! States as LAMMPS data files, to go on from, in either code.
 
-use super::error::RunError;
 use super::state::State;
 use super::tags::order_of_tags;
+use crate::lammps::LammpsError;
 use crate::lammps::data::{Atom, DataFile};
 use nalgebra::{Matrix3, Vector3};
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::model::Model;
 use std::path::Path;
+
+/// Particles that are no valid state of a model.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("the initial state is not usable: {0}")]
+pub struct StateError(pub String);
 
 impl State {
     /// The state as a data file of atom style `atomic`: types are species from 1; `title` becomes the
@@ -50,7 +55,7 @@ impl State {
     ///
     /// # Errors
     /// As [`State::from_data_in`].
-    pub fn from_data(data: &DataFile, model: &Model) -> Result<State, RunError> {
+    pub fn from_data(data: &DataFile, model: &Model) -> Result<State, StateError> {
         State::from_data_in(data, model, [true, true, model.dimensions() == 3])
     }
 
@@ -60,7 +65,7 @@ impl State {
     /// # Errors
     /// A type that the model has no species for, a tag beyond what LAMMPS counts, a box without volume, walls
     /// of a box with tilt.
-    pub fn from_data_in(data: &DataFile, model: &Model, periodic: [bool; 3]) -> Result<State, RunError> {
+    pub fn from_data_in(data: &DataFile, model: &Model, periodic: [bool; 3]) -> Result<State, StateError> {
         let species = model.species().len();
         let [xy, xz, yz] = data.tilt.unwrap_or([0.0; 3]);
         let [lx, ly, lz]: [f64; 3] = std::array::from_fn(|k| data.boxhi[k] - data.boxlo[k]);
@@ -71,10 +76,9 @@ impl State {
         ]);
         let walls = periodic[..model.dimensions()].iter().any(|p| !p);
         if walls && data.tilt.is_some_and(|tilt| tilt != [0.0; 3]) {
-            return Err(RunError::State("a box with tilt has no reflecting walls".into()));
+            return Err(StateError("a box with tilt has no reflecting walls".into()));
         }
-        let domain =
-            PeriodicBox::new(data.boxlo, edges, periodic).map_err(|e| RunError::State(e.to_string()))?;
+        let domain = PeriodicBox::new(data.boxlo, edges, periodic).map_err(|e| StateError(e.to_string()))?;
         let mut state = State {
             domain,
             mass: vec![1.0; species],
@@ -90,14 +94,14 @@ impl State {
         for atom in &data.atoms {
             let kind = atom.kind as usize;
             if kind > species {
-                return Err(RunError::State(format!(
+                return Err(StateError(format!(
                     "atom {} has type {kind}, the model has {species} species: {}",
                     atom.id,
                     model.species().join(", ")
                 )));
             }
             let tag = i32::try_from(atom.id)
-                .map_err(|_| RunError::State(format!("atom id {} is beyond what tags can count", atom.id)))?;
+                .map_err(|_| StateError(format!("atom id {} is beyond what tags can count", atom.id)))?;
             let (mut x, mut image) = (atom.x, atom.image);
             state.domain.wrap(&mut x, &mut image);
             state.x.push(x);
@@ -113,6 +117,6 @@ impl State {
 ///
 /// # Errors
 /// The file cannot be written.
-pub fn write_data(path: &Path, title: &str, state: &State) -> Result<(), RunError> {
-    state.to_data_by_tag(title).write(path).map_err(RunError::Lammps)
+pub fn write_data(path: &Path, title: &str, state: &State) -> Result<(), LammpsError> {
+    state.to_data_by_tag(title).write(path)
 }

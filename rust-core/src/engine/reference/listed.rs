@@ -1,84 +1,55 @@
 //! Pairs from the host, for hosts that know more about pairs than where the particles are.
 
-use super::Engine;
+use super::pairs::Pairs;
 use crate::engine::error::EngineError;
-use crate::engine::pairs::Newton;
 use crate::engine::particles::Particles;
+use crate::engine::surroundings::PairsOfHost;
 
-/// The pairs of one step, as the host lists them: at least all within the cut-off of the model, those
-/// of two owned particles once, those of an owned particle `i` and a ghost `j` on either side.
+/// Adds the listed pairs within `cutoff` to `pairs`.
 ///
-/// Pairs that are not listed do not interact. `factor` scales a pair's conservative interaction:
-/// `U = Σ ψ(n_i) + Σ s φ` with `n_i = Σ s w`. Drag and noise act at full strength, so that the
-/// thermostat keeps its temperature whatever the factors.
-#[derive(Debug, Clone, Copy)]
-pub struct PairsOfHost<'a> {
-    /// The first particle of each pair, owned.
-    pub i: &'a [i32],
-    /// The second.
-    pub j: &'a [i32],
-    /// Strengths; empty if all are one.
-    pub factor: &'a [f64],
-}
-
-impl Engine {
-    /// As [`Engine::densities`], with the host's pairs in place of the engine's search.
-    ///
-    /// # Errors
-    /// As [`Engine::densities`]; also an index out of range.
-    pub fn densities_of_pairs(
-        &mut self,
-        particles: &Particles,
-        listed: &PairsOfHost,
-        newton: Newton,
-    ) -> Result<(), EngineError> {
-        self.ready = false;
-        self.take_species(particles)?;
-        self.owned = particles.owned;
-        let (all, owned) = (particles.x.len(), particles.owned);
-        let scaled = !listed.factor.is_empty();
-        if listed.i.len() != listed.j.len() || (scaled && listed.factor.len() != listed.i.len()) {
-            return Err(EngineError::Host("the arrays of a pair list have different lengths"));
-        }
-        for (k, x) in particles.x.iter().enumerate() {
-            if self.species[k] >= 0 && !x.iter().all(|c| c.is_finite()) {
-                return Err(EngineError::Position { tag: particles.tag[k] });
-            }
-        }
-        self.pairs.clear(owned, newton);
-        let cutoff_squared = self.plan.cutoff() * self.plan.cutoff();
-        let dimensions = self.plan.dimensions();
-        for (k, (i, j)) in listed.i.iter().zip(listed.j).enumerate() {
-            let (i, j) = (*i as usize, *j as usize);
-            if i >= owned || j >= all {
-                return Err(EngineError::Host("a pair list names a particle that is not there"));
-            }
-            if self.species[i] < 0 || self.species[j] < 0 {
-                continue;
-            }
-            let (a, b) = (particles.x[i], particles.x[j]);
-            let d = std::array::from_fn(|c| if c < dimensions { a[c] - b[c] } else { 0.0 });
-            if d.iter().map(|c: &f64| c * c).sum::<f64>() >= cutoff_squared {
-                continue;
-            }
-            if scaled {
-                self.pairs.push_scaled(i, j, d, listed.factor[k], particles.tag, &self.species);
-            } else {
-                self.pairs.push(i, j, d, particles.tag, &self.species);
-            }
-        }
-        self.counts.search += 1;
-        self.sum_densities();
-        self.evaluate_excess(particles.tag)?;
-        self.ready = true;
-        Ok(())
+/// # Errors
+/// Arrays of different lengths, or an index out of range.
+pub fn add_listed(
+    listed: &PairsOfHost,
+    particles: &Particles,
+    species: &[i32],
+    dimensions: usize,
+    cutoff: f64,
+    pairs: &mut Pairs,
+) -> Result<(), EngineError> {
+    let PairsOfHost { i, j, factor } = listed;
+    let scaled = !factor.is_empty();
+    if i.len() != j.len() || (scaled && factor.len() != i.len()) {
+        return Err(EngineError::Host("the arrays of a pair list have different lengths"));
     }
+    let cutoff_squared = cutoff * cutoff;
+    for (k, (i, j)) in i.iter().zip(*j).enumerate() {
+        let (i, j) = (*i as usize, *j as usize);
+        if i >= particles.owned || j >= particles.x.len() {
+            return Err(EngineError::Host("a pair list names a particle that is not there"));
+        }
+        if species[i] < 0 || species[j] < 0 {
+            continue;
+        }
+        let (a, b) = (particles.x[i], particles.x[j]);
+        let d = std::array::from_fn(|c| if c < dimensions { a[c] - b[c] } else { 0.0 });
+        if d.iter().map(|c: &f64| c * c).sum::<f64>() >= cutoff_squared {
+            continue;
+        }
+        if scaled {
+            pairs.push_scaled(i, j, d, factor[k], particles.tag, species);
+        } else {
+            pairs.push(i, j, d, particles.tag, species);
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::{Tally, Want};
+    use crate::engine::reference::Reference;
+    use crate::engine::{Around, Newton, PeriodicBox, Surroundings, Tally, Want};
     use crate::model::{ForceLaw, Model, WarrenPair, warren_ab};
 
     fn model() -> Model {
@@ -95,10 +66,16 @@ mod tests {
 
     type Forces = (Tally, Vec<[f64; 3]>);
 
-    fn forces(engine: &mut Engine, particles: &Particles) -> Forces {
+    fn forces(engine: &mut Reference, particles: &Particles) -> Forces {
         let mut f = vec![[0.0; 3]; particles.x.len()];
-        let tally = engine.forces(particles, &[], None, Want::TOTALS, &mut f).unwrap();
+        let tally = engine.second(particles, &[], None, Want::TOTALS, &mut f).unwrap();
         (tally, f)
+    }
+
+    fn search(engine: &mut Reference, particles: &Particles, newton: Newton) {
+        let open = PeriodicBox::orthogonal([0.0; 3], [1.0; 3], [false; 3]).unwrap();
+        let around = Around { domain: &open, images: &[] };
+        engine.first(Surroundings::Ghosts(around, newton), particles, false).unwrap();
     }
 
     fn agree(a: &Forces, b: &Forces) {
@@ -110,7 +87,7 @@ mod tests {
 
     #[test]
     fn all_pairs_listed_are_the_search_and_factors_scale() {
-        let mut engine = Engine::new(&model().at(1.0).unwrap()).unwrap();
+        let mut engine = Reference::new(&model().at(1.0).unwrap()).unwrap();
         let x = points();
         let tag: Vec<i32> = (1..=60).collect();
         let kind = vec![0; 60];
@@ -118,28 +95,34 @@ mod tests {
             // Without ghosts slopes need no host.
             let particles = Particles { owned: 60, x: &x, tag: &tag, kind: &kind };
             let (i, j): (Vec<i32>, Vec<i32>) = (0..60).flat_map(|i| (0..i).map(move |j| (i, j))).unzip();
-            engine.densities(&particles, newton).unwrap();
+            search(&mut engine, &particles, newton);
             let searched = forces(&mut engine, &particles);
             let listed = PairsOfHost { i: &i, j: &j, factor: &[] };
-            engine.densities_of_pairs(&particles, &listed, newton).unwrap();
+            engine.first(Surroundings::Listed(listed, newton), &particles, false).unwrap();
             agree(&forces(&mut engine, &particles), &searched);
             let ones = vec![1.0; i.len()];
-            engine.densities_of_pairs(&particles, &PairsOfHost { factor: &ones, ..listed }, newton).unwrap();
+            engine
+                .first(
+                    Surroundings::Listed(PairsOfHost { factor: &ones, ..listed }, newton),
+                    &particles,
+                    false,
+                )
+                .unwrap();
             agree(&forces(&mut engine, &particles), &searched);
             assert!(engine.memory() > 60 * 8);
 
             // Forces are the gradient of the energy at any factors.
             let factor: Vec<f64> = (0..i.len()).map(|k| [0.0, 0.3, 1.0][k % 3]).collect();
             let listed = PairsOfHost { factor: &factor, ..listed };
-            engine.densities_of_pairs(&particles, &listed, newton).unwrap();
+            engine.first(Surroundings::Listed(listed, newton), &particles, false).unwrap();
             let (_, f) = forces(&mut engine, &particles);
             for (k, c) in [(3, 0), (20, 1), (59, 2)] {
                 let energy = [1e-5, -1e-5].map(|h| {
                     let mut x = x.clone();
                     x[k][c] += h;
                     let moved = Particles { x: &x, ..particles };
-                    let mut engine = Engine::new(&model().at(1.0).unwrap()).unwrap();
-                    engine.densities_of_pairs(&moved, &listed, newton).unwrap();
+                    let mut engine = Reference::new(&model().at(1.0).unwrap()).unwrap();
+                    engine.first(Surroundings::Listed(listed, newton), &moved, false).unwrap();
                     forces(&mut engine, &moved).0.energy()
                 });
                 let slope = -(energy[0] - energy[1]) / 2e-5;
@@ -150,11 +133,11 @@ mod tests {
 
     #[test]
     fn single_pairs_add_up_to_the_forces() {
-        let mut engine = Engine::new(&model().at(1.0).unwrap()).unwrap();
+        let mut engine = Reference::new(&model().at(1.0).unwrap()).unwrap();
         let x = points();
         let (tag, kind): (Vec<i32>, Vec<i32>) = ((1..=60).collect(), vec![0; 60]);
         let particles = Particles { owned: 60, x: &x, tag: &tag, kind: &kind };
-        engine.densities(&particles, Newton::On).unwrap();
+        search(&mut engine, &particles, Newton::On);
         let (tally, f) = forces(&mut engine, &particles);
         let mut sum = vec![[0.0; 3]; 60];
         let mut phi = 0.0;
@@ -179,20 +162,24 @@ mod tests {
 
     #[test]
     fn lists_that_make_no_sense_are_refused() {
-        let mut engine = Engine::new(&model().at(1.0).unwrap()).unwrap();
+        let mut engine = Reference::new(&model().at(1.0).unwrap()).unwrap();
         let mut x = points();
         let (tag, kind): (Vec<i32>, Vec<i32>) = ((1..=60).collect(), vec![0; 60]);
         for (i, j, factor) in [(0, 60, 1.0), (50, 0, 1.0), (-1, 0, 1.0)] {
             let particles = Particles { owned: 50, x: &x, tag: &tag, kind: &kind };
             let listed = PairsOfHost { i: &[i], j: &[j], factor: &[factor] };
-            assert!(engine.densities_of_pairs(&particles, &listed, Newton::On).is_err());
+            assert!(engine.first(Surroundings::Listed(listed, Newton::On), &particles, false).is_err());
             let uneven = PairsOfHost { factor: &[1.0, 1.0], ..listed };
-            assert!(engine.densities_of_pairs(&particles, &uneven, Newton::On).is_err());
+            assert!(engine.first(Surroundings::Listed(uneven, Newton::On), &particles, false).is_err());
         }
         x[7][1] = f64::NAN;
         let particles = Particles { owned: 60, x: &x, tag: &tag, kind: &kind };
         let error = engine
-            .densities_of_pairs(&particles, &PairsOfHost { i: &[], j: &[], factor: &[] }, Newton::On)
+            .first(
+                Surroundings::Listed(PairsOfHost { i: &[], j: &[], factor: &[] }, Newton::On),
+                &particles,
+                false,
+            )
             .unwrap_err();
         assert_eq!(error, EngineError::Position { tag: 8 });
     }

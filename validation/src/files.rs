@@ -2,18 +2,27 @@
 
 use std::fs::File;
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use super::ReportError;
+/// A file that cannot be written.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot write {}: {cause}", path.display())]
+pub struct WriteError {
+    /// The file.
+    pub path: PathBuf,
+    /// Why.
+    #[source]
+    pub cause: std::io::Error,
+}
 
 /// Writes a file so that readers see the old content or the new, never a part.
 ///
 /// The bytes go to a temporary file in the same folder, which is flushed to
 /// disk and then renamed over `path`. On failure nothing is left behind and an
 /// existing file keeps its content. A symbolic link at `path` is replaced.
-pub fn write_atomically(path: impl AsRef<Path>, bytes: &[u8]) -> Result<(), ReportError> {
+pub fn write_atomically(path: impl AsRef<Path>, bytes: &[u8]) -> Result<(), WriteError> {
     let path = path.as_ref();
-    replace(path, bytes).map_err(|cause| ReportError::Write { path: path.to_owned(), cause })
+    replace(path, bytes).map_err(|cause| WriteError { path: path.to_owned(), cause })
 }
 
 fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
@@ -65,7 +74,7 @@ mod tests {
             let error = write_atomically(&path, b"x").unwrap_err();
             let text = error.to_string();
             assert!(text.contains(path.to_str().unwrap()), "{text}");
-            let ReportError::Write { cause: found, .. } = error else { panic!("{text}") };
+            let found = error.cause;
             assert_eq!(found.kind(), cause);
             assert!(text.contains(&found.to_string()), "{text}");
             assert!(!text.contains(".psidpd-"), "{text}");

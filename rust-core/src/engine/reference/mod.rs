@@ -1,34 +1,69 @@
+//! The reference: the Hamiltonian and its forces in double precision, as sums over a list of pairs.
+//!
+//! ```text
+//! pairs        in_box (a box and its images), search (a rank and its ghosts), listed (the host's own)
+//!   ↓
+//! densities    n_β,i = Σ_j w(r_ij)
+//!   ↓
+//! ψ            excess_pass: blocks of particles;  free_energy: one particle, with second derivatives
+//!   ↓
+//! forces       F_ij = −[∂ψ_i/∂n_c(j) + ∂ψ_j/∂n_c(i)] w′ − φ′, drag and noise; energies, virials
+//! ```
+//!
+//! [`Reference`] goes through this once for a host. [`Evaluator`] does for whoever measures or tests: it leaves nothing
+//! out (every density is summed, no ψ is taken for a pair potential), and gives every pair with its force.
+//! [`evaluate`] finds the pairs by brute force. Everything faster is tested against it.
+
+mod densities;
+mod evaluation;
+mod forces;
+mod free_energy;
+mod in_box;
 mod listed;
 mod memory;
+mod pairs;
+mod search;
 mod single;
 
-pub use listed::PairsOfHost;
+pub use evaluation::{COMPONENTS, Evaluation, Evaluator, evaluate, thermostat};
+pub use free_energy::Psi;
+pub use in_box::{Pair, for_each_pair};
 
 use super::counts::PassCounts;
-use super::density_pass::add_density;
+use super::domain::PeriodicBox;
 use super::error::EngineError;
 use super::excess_pass::{ExcessPass, Rows};
-use super::force_pass::{ForceInput, ForceOutput, add_forces};
 use super::noise::PairNoise;
-use super::pairs::{Newton, Pairs};
 use super::particles::{Particles, Step};
 use super::plan::Plan;
-use super::search::CellSearch;
+use super::surroundings::{Around, Newton, Surroundings};
 use super::tally::{Tally, Want};
 use crate::model::Fluid;
 use crate::model::expression::TooLarge;
+use densities::sum_densities;
+use forces::{ForceInput, ForceOutput, add_forces};
+use in_box::BoxSearch;
+use listed::add_listed;
+use pairs::Pairs;
+use search::CellSearch;
 
-/// The forces of one fluid, and the arrays that computing them needs.
+/// The forces of one fluid over a list of pairs, with whatever can be asked for, and the arrays that computing them
+/// needs.
+///
+/// An evaluation is [`Reference::first`], a round of slopes from owners to ghosts where there are ghosts, and
+/// [`Reference::second`].
 #[derive(Debug, Clone)]
-pub struct Engine {
+pub struct Reference {
     plan: Plan,
     kinds: Vec<i32>,
     search: CellSearch,
+    box_search: BoxSearch,
     pairs: Pairs,
     species: Vec<i32>,
     /// Local densities of owned particles, density-major, [`Fluid::variables`] each.
     densities: Vec<f64>,
-    all_densities: bool,
+    /// Whether all of them are summed, or only those that forces need.
+    has_all_densities: bool,
     /// ψ of owned particles.
     excess: Vec<f64>,
     slopes: Vec<f64>,
@@ -41,26 +76,27 @@ pub struct Engine {
     ready: bool,
 }
 
-impl Engine {
-    /// An engine for `fluid`; types are species indices until [`Engine::map_kinds`] says otherwise.
+impl Reference {
+    /// The reference for `fluid`; types are species indices until [`Reference::map_kinds`] says otherwise.
     ///
     /// # Errors
     /// As [`Plan::new`].
-    pub fn new(fluid: &Fluid) -> Result<Engine, TooLarge> {
-        Ok(Engine::of_plan(Plan::new(fluid)?))
+    pub fn new(fluid: &Fluid) -> Result<Reference, TooLarge> {
+        Ok(Reference::of_plan(Plan::new(fluid)?))
     }
 
-    /// The engine of a plan that is there already.
-    pub fn of_plan(plan: Plan) -> Engine {
+    /// The reference of a plan that is there already.
+    pub fn of_plan(plan: Plan) -> Reference {
         let kinds = (0..plan.species.len() as i32).collect();
-        Engine {
+        Reference {
             plan,
             kinds,
             search: CellSearch::default(),
+            box_search: BoxSearch::default(),
             pairs: Pairs::default(),
             species: Vec::new(),
             densities: Vec::new(),
-            all_densities: false,
+            has_all_densities: false,
             excess: Vec::new(),
             slopes: Vec::new(),
             particle_energy: Vec::new(),
@@ -83,7 +119,7 @@ impl Engine {
     }
 
     /// How many evaluations of ψ had a density below its bounds, and how many one above, since the
-    /// engine was made. Only densities count that the particle's ψ depends on, not linearly.
+    /// reference was made. Only densities count that the particle's ψ depends on, not linearly.
     pub fn out_of_bounds(&self) -> [u64; 2] {
         self.excess_pass.out_of_bounds
     }
@@ -101,26 +137,70 @@ impl Engine {
         Ok(())
     }
 
-    /// Whether every density of the model is to be summed in [`Engine::densities`], or only those that
-    /// forces need.
-    pub fn sum_all_densities(&mut self, all: bool) {
-        self.all_densities = all;
-    }
-
-    /// Finds pairs, sums local densities and evaluates ψ and its slopes for owned particles.
+    /// Finds pairs, sums local densities, all of the model or those that forces need, and evaluates ψ and its slopes
+    /// for owned particles.
     ///
     /// # Errors
-    /// A position or ψ that is not finite, a tag or type out of range, arrays of different lengths.
-    pub fn densities(&mut self, particles: &Particles, newton: Newton) -> Result<(), EngineError> {
+    /// A position or ψ that is not finite, a tag or type out of range, arrays of different lengths, ghosts in a box
+    /// that has its images, pairs of particles that are not there.
+    pub fn first(
+        &mut self,
+        surroundings: Surroundings,
+        particles: &Particles,
+        all_densities: bool,
+    ) -> Result<(), EngineError> {
+        self.find_pairs(surroundings, particles)?;
+        self.sum_densities(all_densities);
+        self.evaluate_excess(particles.tag)?;
+        self.ready = true;
+        Ok(())
+    }
+
+    /// Finds the pairs of another configuration.
+    fn find_pairs(&mut self, surroundings: Surroundings, particles: &Particles) -> Result<(), EngineError> {
         self.ready = false;
         self.take_species(particles)?;
         self.owned = particles.owned;
-        let cutoff = self.plan.cutoff;
-        self.search.find(particles, &self.species, self.plan.dimensions, cutoff, newton, &mut self.pairs)?;
+        let (dimensions, cutoff) = (self.plan.dimensions, self.plan.cutoff);
+        let Reference { pairs, species, search, box_search, .. } = self;
+        let Particles { x, tag, owned, .. } = *particles;
+        let takes_part = |k: usize| species[k] >= 0;
+        let is_closed = |domain: &PeriodicBox| domain.periodic()[..dimensions].contains(&true);
+        match surroundings {
+            Surroundings::Box(domain) => {
+                if owned < x.len() {
+                    return Err(EngineError::Host("where all particles are in hand there are no ghosts"));
+                }
+                pairs.clear(owned, Newton::On);
+                box_search.find(x, owned, takes_part, domain, dimensions, cutoff, |i, j, d| {
+                    pairs.push_in_box(i, j, d, species);
+                });
+            }
+            Surroundings::Ghosts(Around { domain, images }, newton) if is_closed(domain) => {
+                if !images.is_empty() && images.len() != x.len() - owned {
+                    return Err(EngineError::Host(
+                        "not as many ghosts as it was said of whether they are images",
+                    ));
+                }
+                pairs.clear(owned, newton);
+                let is_image = |k: usize| k >= owned && images.get(k - owned).is_some_and(|image| *image);
+                let takes_part = |k| takes_part(k) && !is_image(k);
+                box_search.find(x, owned, takes_part, domain, dimensions, cutoff, |i, j, d| {
+                    pairs.push(i, j, d, tag, species);
+                });
+            }
+            Surroundings::Ghosts(_, newton) => {
+                pairs.clear(owned, newton);
+                search.find(x, owned, takes_part, dimensions, cutoff, |a, b, d| {
+                    pairs.push(a, b, d, tag, species);
+                });
+            }
+            Surroundings::Listed(listed, newton) => {
+                pairs.clear(owned, newton);
+                add_listed(&listed, particles, species, dimensions, cutoff, pairs)?;
+            }
+        }
         self.counts.search += 1;
-        self.sum_densities();
-        self.evaluate_excess(particles.tag)?;
-        self.ready = true;
         Ok(())
     }
 
@@ -133,7 +213,7 @@ impl Engine {
             return Err(EngineError::Host("more than 2^32 particles and ghosts on one rank"));
         }
         self.species.clear();
-        for (kind, tag) in particles.kind.iter().zip(particles.tag) {
+        for ((kind, tag), x) in particles.kind.iter().zip(particles.tag).zip(particles.x) {
             let species = usize::try_from(*kind).ok().and_then(|k| self.kinds.get(k));
             let Some(species) = species else {
                 return Err(EngineError::Kind { tag: *tag, kind: *kind });
@@ -141,31 +221,40 @@ impl Engine {
             if *tag < 1 {
                 return Err(EngineError::Tag { tag: *tag });
             }
+            if *species >= 0 && !x.iter().all(|c| c.is_finite()) {
+                return Err(EngineError::Position { tag: *tag });
+            }
             self.species.push(*species);
         }
         Ok(())
     }
 
-    fn sum_densities(&mut self) {
-        let count = self.plan.species.len();
-        let width = self.plan.densities.len() * count;
-        self.densities.clear();
-        self.densities.resize(self.owned * width, 0.0);
-        for (d, density) in self.plan.densities.iter().enumerate() {
-            if !self.all_densities && !self.plan.passes.contains(&d) {
-                continue;
-            }
-            add_density(&self.pairs, &density.kernel, self.owned, &mut self.densities, width, d * count);
-            self.counts.density += 1;
-            if density.includes_self {
-                let own = density.kernel.value(0.0);
-                for (i, species) in self.species[..self.owned].iter().enumerate() {
-                    if *species >= 0 {
-                        self.densities[i * width + d * count + *species as usize] += own;
-                    }
-                }
-            }
+    /// Sums the densities of the pairs that have been found.
+    fn sum_densities(&mut self, all: bool) {
+        let Reference { plan, pairs, species, densities, counts, .. } = self;
+        densities.clear();
+        densities.resize(self.owned * plan.densities.len() * plan.species.len(), 0.0);
+        let which = (0..plan.densities.len()).filter(|d| all || plan.passes.contains(d));
+        counts.density += sum_densities(pairs, plan, which, species, densities);
+        self.has_all_densities = all || plan.passes.len() == plan.densities.len();
+    }
+
+    /// Sums all densities of the model over the pairs of `particles` in `surroundings`, or over those that were found
+    /// last. Forces can be computed after that only in the latter case.
+    ///
+    /// # Errors
+    /// As [`Reference::first`].
+    pub fn sum_all_densities(
+        &mut self,
+        of: Option<(Surroundings, &Particles)>,
+    ) -> Result<&[f64], EngineError> {
+        if let Some((surroundings, particles)) = of {
+            self.find_pairs(surroundings, particles)?;
+            self.sum_densities(true);
+        } else if !self.has_all_densities {
+            self.sum_densities(true);
         }
+        Ok(&self.densities)
     }
 
     fn evaluate_excess(&mut self, tag: &[i32]) -> Result<(), EngineError> {
@@ -203,7 +292,7 @@ impl Engine {
     }
 
     /// Uncorrected local densities of owned particles, one for each density and species,
-    /// density-major. Those that forces do not need are zero unless [`Engine::sum_all_densities`].
+    /// density-major. Those that forces do not need are zero unless they were asked for.
     pub fn local_densities(&self) -> &[f64] {
         &self.densities
     }
@@ -220,8 +309,8 @@ impl Engine {
     /// host brings them home.
     ///
     /// # Errors
-    /// A force that is not finite; arrays of other lengths than in [`Engine::densities`].
-    pub fn forces(
+    /// A force that is not finite; arrays of other lengths than in [`Reference::first`].
+    pub fn second(
         &mut self,
         particles: &Particles,
         v: &[[f64; 3]],
@@ -274,6 +363,7 @@ impl Engine {
             force,
             particle_energy: &mut self.particle_energy,
             particle_virial: &mut self.particle_virial,
+            pair_force: &mut [],
             tally: Tally::default(),
         };
         add_forces(&input, &mut output);
@@ -292,12 +382,12 @@ impl Engine {
         }
     }
 
-    /// Energy of each particle and ghost, if the last [`Engine::forces`] was asked for it.
+    /// Energy of each particle and ghost, if the last [`Reference::second`] was asked for it.
     pub fn particle_energy(&self) -> &[f64] {
         &self.particle_energy
     }
 
-    /// Virial of each particle and ghost, if the last [`Engine::forces`] was asked for it.
+    /// Virial of each particle and ghost, if the last [`Reference::second`] was asked for it.
     pub fn particle_virial(&self) -> &[[f64; 6]] {
         &self.particle_virial
     }

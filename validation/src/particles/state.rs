@@ -1,4 +1,4 @@
-use super::checkpoint::box_by_edges;
+use super::box_by_edges;
 use psidpd_core::engine::PeriodicBox;
 use serde::{Deserialize, Serialize};
 

@@ -43,7 +43,7 @@ impl BodyForce {
 }
 
 /// Adds the forces of `bodies` on all particles: what `on` tells of each, one after the other.
-pub(super) fn add<F>(bodies: &[BodyForce], pool: &Pool, force: &mut [[f64; 3]], on: F)
+pub(crate) fn add<F>(bodies: &[BodyForce], pool: &Pool, force: &mut [[f64; 3]], on: F)
 where
     F: Fn(&BodyForce, usize) -> Option<[f64; 3]> + Sync,
 {

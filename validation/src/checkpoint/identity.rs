@@ -1,6 +1,7 @@
 //! What tells one run from another: the keys of its scene and of its model.
 
-use crate::scene::Scene;
+use psidpd_core::engine::Precision;
+use psidpd_core::model::Model;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -20,13 +21,12 @@ pub struct Identity {
 const FILES: [&str; 2] = ["file", "table"];
 
 impl Identity {
-    /// That of a scene.
-    pub fn of(scene: &Scene) -> Identity {
-        let model = scene.model.source();
-        let mut of_scene =
-            keys(scene.source.text(), &scene.folder, &["title", "model", "output.checkpoint", "precision"]);
+    /// That of a scene with a text, whose paths start from `folder`, run in some precision.
+    pub fn of(scene: &str, folder: &Path, precision: Precision, model: &Model) -> Identity {
+        let model = model.source();
+        let mut of_scene = keys(scene, folder, &["title", "model", "output.checkpoint", "precision"]);
         // As it is, whether the file says so, the command line, or neither.
-        of_scene.insert("precision".into(), format!("{:?}", scene.precision().to_string()));
+        of_scene.insert("precision".into(), format!("{:?}", precision.to_string()));
         let beside_model = Path::new(model.name()).parent().unwrap_or(Path::new(""));
         Identity {
             // The model is compared by itself, not by where it is.
