@@ -60,6 +60,9 @@ const PROGRAM: &[&[&str]] = &[
     // Scenes name integrators, which are of runs.
     &["scene", "run"],
     &["report"],
+    &["bulk"],
+    &["calibrate"],
+    &["papers"],
     &["export"],
     &["crosscheck"],
     &["bench"],

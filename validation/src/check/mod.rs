@@ -1,6 +1,7 @@
 //! What can be known of a model before it runs: what will be computed, what mean field says, and what
 //! cannot work.
 
+pub mod calibration;
 mod findings;
 mod timestep;
 mod warnings;

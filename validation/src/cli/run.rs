@@ -1,4 +1,5 @@
 use super::{Failure, Verdict, write_json};
+use crate::check::calibration;
 use crate::report::{Progress, write_run_report};
 use crate::run::{Begin, Outcome, Runner, Start, Summary, Timing};
 use crate::scene::Scene;
@@ -52,6 +53,9 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     let Arguments { scene: path, out, resume, overwrite, threads, precision, report } = arguments;
     let mut scene = Scene::open(path).map_err(Failure::new)?;
     scene.precision = precision.or(scene.precision);
+    if let Some(warning) = calibration::missing(&scene.model.at(scene.kt).map_err(Failure::new)?) {
+        warn(&warning.message);
+    }
     let begin = match (resume, overwrite) {
         (true, _) => Begin::Resume,
         (_, true) => Begin::Overwrite,
