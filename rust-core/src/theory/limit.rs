@@ -62,8 +62,8 @@ pub struct NoLimit {
 ///
 /// The test is necessary, not sufficient: `Ok` means that none of these arrangements collapses, not that
 /// none exists, and finding none says nothing about time scales. With lattices it does catch potentials
-/// of positive integral that still have an unbounded arrangement. Bounds of a density, beyond which ψ′
-/// goes on linearly, are not looked at: ψ is judged as the formula it is.
+/// of positive integral that still have an unbounded arrangement. Beyond the bounds of a density ψ is what a
+/// run continues it as.
 ///
 /// # Errors
 /// As [`MeanField::new`]; the inner result is the answer.

@@ -1,4 +1,4 @@
-//! 10⁹ particles on paper: what limits a run on many ranks, from costs and message sizes measured on one and two.
+//! 10⁹ particles on paper: what limits a run on many ranks, from costs measured on one and two.
 
 use super::BenchError;
 use super::outcome::{Run, Scaling};

@@ -8,6 +8,7 @@ use crate::lammps::Lammps;
 use crate::report::{Check, Item, Section, Table};
 use crate::run::{Simulation, State};
 use psidpd_core::engine::{Precision, Settings, Step, Want};
+use psidpd_core::maximum::largest;
 use psidpd_core::model::{ForceLaw, Model};
 use serde_json::json;
 
@@ -37,19 +38,13 @@ impl Point {
     fn against(&self, truth: &Point) -> Difference {
         let square = |f: &[f64; 3]| f.iter().map(|c| c * c).sum::<f64>();
         let rms = (truth.forces.iter().map(square).sum::<f64>() / truth.forces.len() as f64).sqrt();
-        let largest = self
-            .forces
-            .iter()
-            .zip(&truth.forces)
-            .map(|(a, b)| square(&[a[0] - b[0], a[1] - b[1], a[2] - b[2]]).sqrt())
-            // `max` would pass over NaN.
-            .fold(0.0, |m: f64, d| if d > m || d.is_nan() { d } else { m });
-        let size = truth.virial.iter().fold(0.0f64, |m, w| m.max(w.abs()));
-        let virial = self.virial.iter().zip(&truth.virial).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let apart = |(a, b): (&[f64; 3], &[f64; 3])| square(&[a[0] - b[0], a[1] - b[1], a[2] - b[2]]).sqrt();
+        let furthest = largest(self.forces.iter().zip(&truth.forces).map(apart));
+        let virial = largest(self.virial.iter().zip(&truth.virial).map(|(a, b)| (a - b).abs()));
         Difference {
-            force: if self.forces.len() == truth.forces.len() { largest / rms } else { f64::NAN },
+            force: if self.forces.len() == truth.forces.len() { furthest / rms } else { f64::NAN },
             energy: (self.energy - truth.energy).abs() / truth.energy.abs(),
-            virial: virial / size,
+            virial: virial / largest(&truth.virial),
         }
     }
 }
