@@ -2,9 +2,9 @@
 
 use psidpd::lammps::{DataFile, dump};
 use psidpd_core::maximum::largest;
-use psidpd_tests::{lammps, psidpd, root, said};
+use psidpd_tests::{lammps, program, root, said};
 use std::path::Path;
-use std::process::Output;
+use std::process::{Command, Output};
 use std::time::Duration;
 
 const ONE_SPECIES: &str = r#"
@@ -246,6 +246,16 @@ fn folder(scene: &str) -> tempfile::TempDir {
         .collect();
     std::fs::write(folder.path().join("ab.csv"), format!("r, phi\n{rows}")).unwrap();
     folder
+}
+
+/// Runs the program, which may read the table beside the folder of scene and model.
+fn psidpd(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(program())
+        .args(arguments)
+        .current_dir(folder)
+        .env("PSIDPD_TABLES_ANYWHERE", "1")
+        .output()
+        .expect("the program starts")
 }
 
 /// Writes the deck of the scene in `folder`.

@@ -82,7 +82,7 @@ impl ValueKind {
                 "array of 1 to 16 numbers or formulas, or a table of such arrays by `\"A|B\"`".into()
             }
             ValueKind::Formula => "string with a formula".into(),
-            ValueKind::File => "name of a file, relative to the model file".into(),
+            ValueKind::File => "name of a file in the folder of the model file or below".into(),
             ValueKind::Excess => {
                 "string with a formula, `{ table = \"FILE\" }`, `{ pressure = \"FORMULA\" }` or \
                  `{ slopes = { … } }`"
@@ -289,7 +289,8 @@ pub const CURVES: Table = Table {
             OPTIONAL,
             "Rows of `n` and `psi`, separated by commas or blanks, with `#` for comments; if the first row is \
              no numbers it names the columns. psi is the cubic spline through the rows (not a knot), and psi' \
-             its exact slope; beyond the ends psi' goes on linearly.",
+             its exact slope; beyond the ends psi' goes on linearly. With `PSIDPD_TABLES_ANYWHERE=1` in the \
+             environment the file may be anywhere.",
             "[excess_free_energy]\nA = { table = \"psi.csv\" }",
         ),
         key(

@@ -3,7 +3,7 @@
 
 use super::TheoryError;
 use crate::model::curve::Curve;
-use crate::model::expression::{Expansion, Formula, Program};
+use crate::model::expression::{Expansion, Formula, Program, TooLarge};
 use crate::model::{Bounds, ExcessFreeEnergy, Fluid};
 
 /// The `ψ_α` of a fluid with exact first and second derivatives.
@@ -71,6 +71,21 @@ impl FreeEnergy {
                 }
             }
             Excess::Curve(curve) => self.of_curve(curve, x),
+        }
+    }
+
+    /// `ψ_α` alone.
+    pub fn value(&self, alpha: usize, x: &[f64]) -> f64 {
+        match &self.excess[alpha] {
+            Excess::Formula { outputs, .. } => {
+                let strays = self.strays(outputs, x);
+                if strays.is_empty() {
+                    outputs[0].value(x)
+                } else {
+                    self.continued(outputs, &strays, x).value
+                }
+            }
+            Excess::Curve(curve) => self.of_curve(curve, x).value,
         }
     }
 
@@ -184,18 +199,24 @@ fn symmetric(n: usize, triangle: &[f64]) -> Vec<f64> {
     matrix
 }
 
+/// Of all second derivatives of one ψ: more take seconds for each state that is looked at.
+const MOST_OPERATIONS: usize = 20_000;
+
 /// ψ, its gradient, and the upper triangle of its Hessian.
-fn differentiated(
-    psi: &Formula,
-    variables: usize,
-) -> Result<Vec<Formula>, crate::model::expression::TooLarge> {
+fn differentiated(psi: &Formula, variables: usize) -> Result<Vec<Formula>, TooLarge> {
     let mut formulas = vec![psi.clone()];
     for v in 0..variables {
         formulas.push(psi.derivative(v)?);
     }
+    let mut operations = 0;
     for u in 0..variables {
         for v in u..variables {
-            formulas.push(formulas[1 + u].derivative(v)?);
+            let second = formulas[1 + u].derivative(v)?;
+            operations += second.operations();
+            if operations > MOST_OPERATIONS {
+                return Err(TooLarge);
+            }
+            formulas.push(second);
         }
     }
     Ok(formulas)

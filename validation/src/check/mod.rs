@@ -59,7 +59,7 @@ pub fn check(model: &Model, conditions: &Conditions) -> Result<Findings, CheckEr
     let (theory, no_theory) =
         match fluid.stated_slopes().map_or_else(|| MeanField::new(&fluid).map(Some), |_| Ok(None)) {
             Ok(theory) => (theory, None),
-            Err(reason @ TheoryError::NotIntegrable(..)) => (None, Some(reason)),
+            Err(reason @ (TheoryError::NotIntegrable(..) | TheoryError::TooLarge(_))) => (None, Some(reason)),
             Err(other) => return Err(other.into()),
         };
     let densities = conditions.densities.as_deref();

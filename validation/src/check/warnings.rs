@@ -34,7 +34,9 @@ pub fn all(fluid: &Fluid, state: &State) -> Result<Vec<Warning>, CheckError> {
             Some(reason) => found.push(no_mean_field(reason)),
             None => found.extend(collapse(fluid)?),
         }
-        found.extend(singular(fluid, state.densities)?);
+        if !matches!(state.no_theory, Some(TheoryError::TooLarge(_))) {
+            found.extend(singular(fluid, state.densities)?);
+        }
     }
     found.extend(state.pressure.and_then(not_finite));
     found.extend(state.stability.and_then(unstable));
@@ -47,7 +49,7 @@ fn no_mean_field(reason: &TheoryError) -> Warning {
     Warning {
         id: "no-mean-field",
         severity: Severity::Warning,
-        message: format!("{reason}; neither its stability nor its thermodynamic limit is looked at"),
+        message: format!("{reason}; neither stability nor thermodynamic limit is looked at"),
     }
 }
 

@@ -3,8 +3,11 @@
 use crate::crosscheck::ValidateError;
 use crate::run::RunError;
 use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
-use psidpd_core::document::FileError;
+use psidpd_core::document::{FileError, printable};
 use std::fmt;
+
+/// The longest line, in bytes, that is shown with an error.
+const LONGEST_LINE: usize = 2000;
 
 /// A verb that could not be carried out.
 #[derive(Debug)]
@@ -20,7 +23,9 @@ impl Failure {
         let error: Box<dyn std::error::Error + Send + Sync> = Box::new(error);
         let source = file_error(&*error)
             .filter(|e| !e.file().text().is_empty())
-            .map(|e| NamedSource::new(e.file().name(), e.file().text().to_owned()).with_language("toml"));
+            // Lines are shown whole.
+            .filter(|e| e.file().text().lines().all(|line| line.len() <= LONGEST_LINE))
+            .map(|e| NamedSource::new(e.file().name(), printable(e.file().text())).with_language("toml"));
         let stopped = matches!(run_error(&*error), Some(e) if e.is_stop());
         Failure { error, source, stopped }
     }
@@ -59,12 +64,14 @@ fn run_error<'a>(error: &'a (dyn std::error::Error + 'static)) -> Option<&'a Run
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match file_error(&*self.error) {
+        let text = match file_error(&*self.error) {
             // The place is shown with the line itself.
-            Some(e) if self.source.is_some() && !e.key().is_empty() => write!(f, "{}: {}", e.key(), e.kind()),
-            Some(e) if self.source.is_some() => write!(f, "{}", e.kind()),
-            _ => write!(f, "{}", self.error),
-        }
+            Some(e) if self.source.is_some() && !e.key().is_empty() => format!("{}: {}", e.key(), e.kind()),
+            Some(e) if self.source.is_some() => e.kind().to_string(),
+            _ => self.error.to_string(),
+        };
+        // What was read stands in it as it was written.
+        f.write_str(&printable(&text))
     }
 }
 

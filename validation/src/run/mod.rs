@@ -15,6 +15,7 @@ mod forces;
 mod growing;
 pub mod integrator;
 mod output;
+pub(crate) mod reach;
 mod reorder;
 mod restart;
 mod runner;

@@ -9,6 +9,7 @@ use super::thermo::Thermo;
 use super::timing::Timing;
 use super::underway::Run;
 use crate::observe::Observers;
+use crate::output::About;
 use crate::scene::Scene;
 use psidpd_core::engine::Settings;
 use std::collections::BTreeMap;
@@ -176,6 +177,10 @@ impl<'a> Runner<'a> {
         };
         let good = Checkpoint { program: PROGRAM.into(), ..good };
         let timing = Timing::read(folder.path());
+        // What the folder says of itself does not depend on where a run stopped.
+        if !folder.path().join("about.json").is_file() {
+            About::of(scene).write(folder.path())?;
+        }
         let mut run = Run::new(scene, folder, store, simulation, output, good, timing)?;
         run.stored = Some(run.good.step);
         Ok(Runner { start, run })

@@ -3,6 +3,7 @@ use super::bounds::Bounds;
 use super::error::RunError;
 use super::forces::{Arrays, Forces};
 use super::integrator::{Before, Faults, Integrator, Motion, Surroundings};
+use super::reach;
 use super::reorder::{self, Reordering};
 use super::state::State;
 use super::tags::Tags;
@@ -77,6 +78,7 @@ impl Simulation {
         let forces = Forces::new(&fluid, settings)?;
         let State { domain, mass, mut x, v, species, tag, mut image } = state;
         let owned = x.len();
+        reach::check(&domain, fluid.dimensions, fluid.cutoff(), owned)?;
         for (x, image) in x.iter_mut().zip(&mut image) {
             domain.wrap(x, image);
         }
@@ -380,7 +382,15 @@ impl Simulation {
     /// Velocities must be finite, which the step before has left to this one if it is `owed`, and within a step of
     /// `dt` lead nowhere beyond the box.
     fn refuse(&self, faults: Faults, dt: Option<f64>, owed: bool) -> Result<(), RunError> {
-        let Some(k) = faults.fast.or(faults.escaped) else { return Ok(()) };
+        let Some(found) = faults.fast.or(faults.escaped) else { return Ok(()) };
+        // The one that is worst off is nearest to the cause; what is no number may have been made so by another.
+        let speed = |k: usize| {
+            let v = self.v[k];
+            let speed = v[0].hypot(v[1]).hypot(v[2]);
+            if speed.is_nan() { f64::MAX } else { speed }
+        };
+        let faster = |worst: usize, k: usize| if speed(k) > speed(worst) { k } else { worst };
+        let k = if faults.fast.is_some() { (0..self.owned).fold(found, faster) } else { found };
         let (step, tag, v) = (self.number, self.tag[k], self.v[k]);
         let speed = v[0].hypot(v[1]).hypot(v[2]);
         match dt {
