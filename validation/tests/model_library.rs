@@ -1,6 +1,7 @@
 //! Every file of `validation/models`: that it says what its opening comment promises, and that the forces
 //! are those of its energy.
 
+use chacha20::ChaCha8Rng;
 use nalgebra::{Matrix3, Vector3};
 use psidpd::run::{Simulation, State};
 use psidpd_core::engine::{PeriodicBox, Want, reference};
@@ -9,7 +10,6 @@ use psidpd_core::model::pair::{PairForm, PairPotential};
 use psidpd_core::model::{ExcessFreeEnergy, Fluid, Model};
 use psidpd_core::theory::{MeanField, Structure, thermodynamic_limit};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};

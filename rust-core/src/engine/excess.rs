@@ -1,7 +1,7 @@
 //! ψ and its slopes for blocks of particles of one species.
 
-use super::sweep::Instructions;
-use super::sweep::vectors::{self, Loop};
+use super::settings::Instructions;
+use super::vectors::{self, Loop};
 use crate::model::curve::{Curve, CurveBlock};
 use crate::model::expression::{Expansion, Formula, Program, TooLarge};
 use crate::model::{Bounds, Continuation, Fluid, StatedSlopes};

@@ -3,7 +3,7 @@
 use super::error::EngineError;
 use super::excess::{ExcessPlan, ExcessWork};
 use super::plan::Plan;
-use super::sweep::Instructions;
+use super::settings::Instructions;
 
 /// Particles per evaluation of ψ: enough to hide the interpreter, few enough for the first-level cache.
 pub const LANES: usize = 128;

@@ -25,8 +25,10 @@ mod particles;
 mod plan;
 pub mod reference;
 mod search;
+mod settings;
 mod sweep;
 mod tally;
+mod vectors;
 
 pub use domain::{DomainError, PeriodicBox};
 pub use error::EngineError;
@@ -35,7 +37,8 @@ pub use images::Images;
 pub use pairs::Newton;
 pub use particles::{Particles, Step};
 pub use plan::Plan;
-pub use sweep::{Around, Instructions, Pool, Precision, Settings, Sweep, Times, part};
+pub use settings::{Instructions, Precision, Settings};
+pub use sweep::{Around, Pool, Sweep, Times, part};
 pub use tally::{Tally, Want};
 
 #[cfg(test)]

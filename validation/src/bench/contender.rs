@@ -60,7 +60,7 @@ impl Contender {
         Contender { code, ranks: 1, weak: false }
     }
 
-    /// The name that results and goals use.
+    /// The name in results.
     pub fn id(&self) -> String {
         let mut id = match &self.code {
             Code::BuiltIn => "lammps mdpd".to_owned(),
@@ -162,7 +162,7 @@ pub enum Field {
     Everyone,
     /// All but the plain engine, whose cost per particle does not depend on the size.
     AllButPlain,
-    /// Those that goals of large boxes and the page about scaling ask for, and who was asked for by name: the
+    /// Who was asked for by name, and of the others those that take few seconds or are compared with: the
     /// built-in, the plugin in mixed precision on one rank and two, the native runner in mixed precision with the
     /// best instructions; of the general fluid only the native runner.
     Few,

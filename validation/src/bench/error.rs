@@ -5,7 +5,7 @@ use crate::run::RunError;
 use psidpd_core::document::FileError;
 use std::path::PathBuf;
 
-/// Why the benchmark could not be carried out. A goal that is not met is no error.
+/// Why the benchmark could not be carried out.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum BenchError {
@@ -43,15 +43,9 @@ pub enum BenchError {
     /// A size that is too small: two images of a pair would share their noise.
     #[error("{0} particles are too few: the box must be at least three ranges wide; take 170 or more")]
     TooSmall(usize),
-    /// The table of goals is wrong.
-    #[error("the table of goals: {0}")]
-    Goals(String),
     /// The child process that measures memory failed.
     #[error("measuring memory: {0}")]
     Memory(String),
-    /// The page about scaling cannot be written.
-    #[error(transparent)]
-    Template(#[from] minijinja::Error),
 }
 
 impl BenchError {

@@ -2,21 +2,18 @@
 //!
 //! Every code starts from one state of each fluid and size and is timed in interleaved rounds, so that what slows
 //! the machine down for a while slows them all; ratios are taken within a round. [`contender`] says who is timed,
-//! [`deck`] runs LAMMPS and [`native`] the runner, [`goals`] holds the results against a table, and
-//! [`projection`] carries them on to 10⁹ particles.
+//! [`deck`] runs LAMMPS and [`native`] the runner.
 
 pub mod contender;
 pub mod deck;
 mod error;
 pub mod fluids;
-pub mod goals;
 pub mod length;
 pub mod log;
 pub mod memory;
 pub mod native;
 pub mod outcome;
 pub mod page;
-pub mod projection;
 mod spread;
 pub mod start;
 mod turns;
@@ -53,7 +50,7 @@ pub struct Options {
     pub memory: Vec<usize>,
     /// Thread counts of the native runner.
     pub threads: Vec<NonZeroUsize>,
-    /// Above this size only the contenders are timed that goals and the page about scaling ask for.
+    /// Above this size only the contenders of [`Field::Few`] are timed.
     pub few_above: usize,
     /// More words behind the seed of `pair_style dpd/psi`, each a contender.
     pub words: Vec<String>,
@@ -105,14 +102,13 @@ struct Case {
 
 type Cases = BTreeMap<(&'static str, usize), Case>;
 
-/// Runs the benchmark and writes `bench.json`, `report.html` and `scaling.md`. `program` is psidpd itself, which is
+/// Runs the benchmark and writes `bench.json` and `report.html`. `program` is psidpd itself, which is
 /// started to measure memory.
 ///
 /// # Errors
 /// Something could not be run or written.
 pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Outcome, BenchError> {
     let load = load();
-    let goals = goals::read(goals::SHIPPED)?;
     std::fs::create_dir_all(&options.out).map_err(BenchError::io(&options.out))?;
     // LAMMPS runs in folders of its own: paths must not depend on ours.
     let out = options.out.canonicalize().map_err(BenchError::io(&options.out))?;
@@ -133,11 +129,8 @@ pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Out
     let runs = runs(&entries, &cases);
     let (fluids, slope_widths) = facts()?;
     let scaling = scaling(&runs, &entries, slope_widths["mdpd"]);
-    let projection = projection(&runs, &scaling, slope_widths["mdpd"]);
-    let measured = goals::Measurements { runs: &runs, memory: &memory, equal_bits: &equal_bits };
-    let goals = goals.iter().map(|g| g.judge(measured)).collect();
     let outcome = Outcome {
-        format: 2,
+        format: 3,
         version: env!("CARGO_PKG_VERSION"),
         machine: Machine {
             processor: crate::crosscheck::machine(),
@@ -163,8 +156,6 @@ pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Out
         scaling,
         memory,
         equal_bits,
-        projection,
-        goals,
     };
     write(&out, &outcome)?;
     Ok(outcome)
@@ -175,11 +166,6 @@ fn write(out: &Path, outcome: &Outcome) -> Result<(), BenchError> {
         .map_err(|e| BenchError::io(out.join("bench.json"))(e.into()))?;
     write_atomically(out.join("bench.json"), (json + "\n").as_bytes())?;
     write_atomically(out.join("report.html"), page::report(outcome)?.as_bytes())?;
-    if let Some(projection) = &outcome.projection {
-        let bytes = outcome.memory.last().map(|m| m.bytes_per_particle);
-        let text = projection::page(projection, &outcome.scaling, bytes, &outcome.machine.processor)?;
-        write_atomically(out.join("scaling.md"), text.as_bytes())?;
-    }
     Ok(())
 }
 
@@ -448,22 +434,17 @@ fn scaling(runs: &[Run], entries: &[Entry], slope_width: usize) -> Vec<Scaling> 
             speed_up,
             efficiency: Spread { min: min / ranks, median: median / ranks, max: max / ranks },
             ghosts: run.ghosts?,
-            bytes_per_step: plugin.then_some(run.ghosts? * projection::bytes_per_ghost(slope_width)),
+            bytes_per_step: plugin.then_some(run.ghosts? * bytes_per_ghost(slope_width)),
             communication_microseconds: 1e-3 * run.parts.get("comm")? * run.particles as f64,
         })
     };
     runs.iter().zip(entries).filter(|(run, _)| run.ranks > 1).filter_map(of).collect()
 }
 
-/// From the largest size that the plugin was timed at on one rank and on two.
-fn projection(runs: &[Run], scaling: &[Scaling], slope_width: usize) -> Option<projection::Projection> {
-    let alone = Contender::alone(contender::Code::Plugin(contender::MIXED.to_owned()));
-    let plugin = alone.id();
-    let cut = Contender { ranks: 2, ..alone }.id();
-    let strong = scaling.iter().filter(|s| s.kind == "strong" && s.code == plugin);
-    let two = strong.max_by_key(|s| s.size)?;
-    let of = |code: &str| runs.iter().find(|r| r.fluid == MDPD.name && r.size == two.size && r.code == code);
-    projection::Projection::of([of(&plugin)?, of(&cut)?], two, MDPD.density, slope_width, 1.0)
+/// Bytes that LAMMPS sends for a ghost in a step: positions and velocities forward, slopes of ψ forward,
+/// forces back.
+fn bytes_per_ghost(slope_width: usize) -> f64 {
+    (6 + slope_width + 3) as f64 * 8.0
 }
 
 fn facts() -> Result<(Vec<FluidFacts>, BTreeMap<&'static str, usize>), BenchError> {

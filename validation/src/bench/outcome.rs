@@ -1,7 +1,6 @@
 //! What the benchmark found: the fields of `bench.json`, which `docs/bench.md` describes.
 
 use super::memory::Memory;
-use super::projection::Projection;
 use super::spread::Spread;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -29,10 +28,6 @@ pub struct Outcome {
     pub memory: Vec<Memory>,
     /// Whether results are the same on 1, 2 and 3 threads, to the last bit: by fluid and precision.
     pub equal_bits: BTreeMap<String, bool>,
-    /// 10⁹ particles on paper; none without runs on two ranks.
-    pub projection: Option<Projection>,
-    /// The goals, and whether they are met.
-    pub goals: Vec<Verdict>,
 }
 
 /// Where it ran.
@@ -157,31 +152,8 @@ pub struct Scaling {
     pub efficiency: Spread,
     /// Ghosts of a rank.
     pub ghosts: f64,
-    /// Bytes that a rank sends in a step for its ghosts: positions, velocities, slopes, forces.
+    /// Bytes that a rank sends in a step for its ghosts, computed: positions, velocities, slopes, forces.
     pub bytes_per_step: Option<f64>,
     /// Microseconds of a step in LAMMPS's communication, the mean over ranks.
     pub communication_microseconds: f64,
-}
-
-/// A goal and what was measured.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Verdict {
-    /// In words.
-    pub what: String,
-    /// `at least` or `at most`.
-    pub relation: &'static str,
-    /// The goal.
-    pub goal: f64,
-    /// What to be proud of.
-    pub stretch: Option<f64>,
-    /// The worst of the sizes that were measured; null if none was.
-    pub figure: Option<Spread>,
-    /// Whether its median meets the goal; null if nothing was measured.
-    pub met: Option<bool>,
-    /// Whether it goes as far as `stretch`.
-    pub stretch_met: Option<bool>,
-    /// Sizes of the goal that were not measured. A goal that is met is met only in part if there are any.
-    pub not_measured: Vec<usize>,
-    /// By size, as far as measured.
-    pub by_size: BTreeMap<usize, Spread>,
 }

@@ -1,7 +1,7 @@
 //! Results as tables and plots.
 
 use super::BenchError;
-use super::outcome::{Asked, Outcome, Run, Verdict};
+use super::outcome::{Asked, Outcome, Run};
 use super::spread::Spread;
 use crate::report::{Item, Plot, Report, Section, Series, Style, Table};
 use psidpd_core::engine::Instructions;
@@ -25,52 +25,6 @@ pub fn speeds(outcome: &Outcome) -> Table {
         ]);
     }
     table
-}
-
-const PASS: &str = "pass";
-const FAIL: &str = "FAIL";
-
-const GOALS: &str = "A goal has to be met at each of its sizes. \u{201c}Pass in part\u{201d}: at those that were timed, \
-                     while others were not.";
-
-fn judged(verdict: &Verdict) -> &'static str {
-    match verdict.met {
-        Some(true) if verdict.not_measured.is_empty() => PASS,
-        Some(true) => "pass in part",
-        Some(false) => FAIL,
-        None => "not measured",
-    }
-}
-
-/// Every goal with its figure.
-pub fn goals(verdicts: &[Verdict]) -> Table {
-    let mut table = Table::new(["", "goal", "wanted", "stretch", "measured"]);
-    for v in verdicts {
-        let sign = if v.relation == "at least" { "≥" } else { "≤" };
-        table.push([
-            judged(v).to_owned(),
-            v.what.clone(),
-            format!("{sign} {}", v.goal),
-            match (v.stretch, v.stretch_met) {
-                (Some(s), Some(true)) => format!("{s}: reached"),
-                (Some(s), _) => s.to_string(),
-                (None, _) => "–".to_owned(),
-            },
-            measured(v),
-        ]);
-    }
-    table
-}
-
-/// The figure; of several sizes each, with those that are missing.
-fn measured(verdict: &Verdict) -> String {
-    let Some(figure) = &verdict.figure else { return "–".into() };
-    if verdict.by_size.len() + verdict.not_measured.len() == 1 {
-        return shown(figure);
-    }
-    let known = verdict.by_size.iter().map(|(size, spread)| format!("{size}: {}", shown(spread)));
-    let missing = verdict.not_measured.iter().map(|size| format!("not at {size}"));
-    known.chain(missing).collect::<Vec<_>>().join("; ")
 }
 
 /// Who is timed in large boxes, in words; `None` without such a box.
@@ -99,8 +53,16 @@ fn parts(outcome: &Outcome, wanted: impl Fn(&Run) -> bool, names: &[&str]) -> Ta
 }
 
 fn scaling(outcome: &Outcome) -> Table {
-    let mut table =
-        Table::new(["code", "kind", "size", "ranks", "speed-up", "ghosts", "kB sent", "µs in comm"]);
+    let mut table = Table::new([
+        "code",
+        "kind",
+        "size",
+        "ranks",
+        "speed-up",
+        "ghosts",
+        "kB sent, computed",
+        "µs in comm",
+    ]);
     for s in &outcome.scaling {
         table.push([
             s.code.clone(),
@@ -185,7 +147,6 @@ pub fn report(outcome: &Outcome) -> Result<String, BenchError> {
     let lammps = ["pair", "neigh", "comm", "output", "modify", "other"];
     let section = |heading: &str, items: Vec<Item>| Section { heading: heading.into(), items };
     let sections = vec![
-        section("Goals", vec![Item::Prose(GOALS.into()), Item::Table(goals(&outcome.goals))]),
         section("Speed", speed),
         section(
             "Where the time goes, natively",
@@ -209,7 +170,6 @@ pub fn report(outcome: &Outcome) -> Result<String, BenchError> {
         section("Two MPI ranks", vec![Item::Table(scaling(outcome))]),
         section("Memory, native, mixed precision", vec![Item::Table(memory(outcome))]),
     ];
-    let count = |state| outcome.goals.iter().filter(|v| judged(v) == state).count();
     let missing = match outcome.lammps.missing.join(", ") {
         none if none.is_empty() => "none".to_owned(),
         some => some,
@@ -229,47 +189,7 @@ pub fn report(outcome: &Outcome) -> Result<String, BenchError> {
             ),
         ],
         sections,
-        passed: count(PASS),
-        failed: count(FAIL),
+        ..Report::default()
     };
-    Ok(report.render()?)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::collections::BTreeMap;
-
-    /// A goal of at least 2 at sizes 10 and 20, by the medians that were measured.
-    fn row(medians: &[(usize, f64)]) -> String {
-        let spread = |median| Spread { min: median, median, max: median };
-        let by_size: BTreeMap<_, _> = medians.iter().map(|(size, m)| (*size, spread(*m))).collect();
-        let worst = medians.iter().map(|m| m.1).reduce(f64::min);
-        let verdict = Verdict {
-            what: "w".into(),
-            relation: "at least",
-            goal: 2.0,
-            stretch: None,
-            figure: worst.map(spread),
-            met: worst.map(|w| w >= 2.0),
-            stretch_met: None,
-            not_measured: [10, 20].into_iter().filter(|s| !by_size.contains_key(s)).collect(),
-            by_size,
-        };
-        goals(&[verdict]).to_text().lines().last().unwrap().to_owned()
-    }
-
-    #[test]
-    fn goals_say_what_was_not_measured() {
-        for (medians, state, figures) in [
-            (&[(10, 3.0), (20, 2.5)][..], "pass ", "10: 3.00 (3.00–3.00); 20: 2.50 (2.50–2.50)"),
-            (&[(10, 3.0), (20, 1.5)], "FAIL ", "10: 3.00 (3.00–3.00); 20: 1.50 (1.50–1.50)"),
-            (&[(20, 3.0)], "pass in part ", "20: 3.00 (3.00–3.00); not at 10"),
-            (&[(20, 1.0)], "FAIL ", "20: 1.00 (1.00–1.00); not at 10"),
-            (&[], "not measured ", "–"),
-        ] {
-            let row = row(medians);
-            assert!(row.starts_with(state) && row.trim_end().ends_with(figures), "{row}");
-        }
-    }
+    Ok(report.render())
 }

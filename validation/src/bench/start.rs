@@ -3,9 +3,9 @@
 use super::BenchError;
 use super::fluids::Subject;
 use crate::run::{Integrator, RunError, Simulation, State};
+use chacha20::ChaCha8Rng;
 use psidpd_core::engine::{PeriodicBox, Settings, Want};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};

@@ -23,7 +23,7 @@ pub struct Arguments {
     /// Steps of every timed run, whatever time they take; no skin is looked for.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     steps: Option<u64>,
-    /// Above this many particles only those are timed whom goals of large boxes and the page about scaling ask for.
+    /// Above this many particles few codes are timed: see docs/bench.md.
     #[arg(long, value_name = "N", default_value_t = FEW_ABOVE)]
     few_above: usize,
     /// Threads of the native runner.
@@ -40,7 +40,7 @@ pub struct Arguments {
     /// `psidpd lammps install` puts in place.
     #[arg(long, value_name = "WHERE")]
     lammps: Option<PathBuf>,
-    /// Folder for bench.json, report.html, scaling.md, and the runs.
+    /// Folder for bench.json, report.html and the runs.
     #[arg(long, value_name = "DIR", default_value = "target/bench")]
     out: PathBuf,
     /// What the child process that measures memory is asked for.
@@ -88,7 +88,6 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     let program = std::env::current_exe().map_err(Failure::new)?;
     let outcome = measure(&options, &program, &Progress::new()).map_err(Failure::new)?;
     println!("{}", page::speeds(&outcome).to_text());
-    println!("{}", page::goals(&outcome.goals).to_text());
     if let Some(note) = page::few(&outcome.options) {
         println!("{note}\n");
     }

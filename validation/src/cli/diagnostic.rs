@@ -2,37 +2,53 @@
 
 use crate::crosscheck::ValidateError;
 use crate::run::RunError;
-use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
+use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use psidpd_core::document::{FileError, printable};
-use std::fmt;
 
 /// The longest line, in bytes, that is shown with an error.
 const LONGEST_LINE: usize = 2000;
 
 /// A verb that could not be carried out.
 #[derive(Debug)]
-pub struct Failure {
-    error: Box<dyn std::error::Error + Send + Sync + 'static>,
-    source: Option<NamedSource<String>>,
-    stopped: bool,
-}
+pub struct Failure(Box<dyn std::error::Error + Send + Sync + 'static>);
 
 impl Failure {
     /// Bad input, or something missing.
     pub fn new(error: impl std::error::Error + Send + Sync + 'static) -> Failure {
-        let error: Box<dyn std::error::Error + Send + Sync> = Box::new(error);
-        let source = file_error(&*error)
-            .filter(|e| !e.file().text().is_empty())
-            // Lines are shown whole.
-            .filter(|e| e.file().text().lines().all(|line| line.len() <= LONGEST_LINE))
-            .map(|e| NamedSource::new(e.file().name(), printable(e.file().text())).with_language("toml"));
-        let stopped = matches!(run_error(&*error), Some(e) if e.is_stop());
-        Failure { error, source, stopped }
+        Failure(Box::new(error))
     }
 
     /// 1 for a run that stopped on the way, 2 for bad input.
     pub fn exit_code(&self) -> u8 {
-        if self.stopped { 1 } else { 2 }
+        if run_error(&*self.0).is_some_and(RunError::is_stop) { 1 } else { 2 }
+    }
+
+    /// For the terminal, with escape sequences for colour: an error about a file shows the line.
+    pub fn render(&self) -> String {
+        let shows = |e: &&FileError| {
+            let text = e.file().text();
+            !text.is_empty() && text.lines().all(|line| line.len() <= LONGEST_LINE)
+        };
+        let located = file_error(&*self.0).filter(shows);
+        // What was read stands in all of these as it was written.
+        let text = located.map_or(String::new(), |e| printable(e.file().text()));
+        let name = located.map_or("", |e| e.file().name());
+        let title = match located {
+            // The place is shown with the line itself.
+            Some(e) if e.key().is_empty() => e.kind().to_string(),
+            Some(e) => format!("{}: {}", e.key(), e.kind()),
+            None => self.0.to_string(),
+        };
+        let mut report = Group::with_title(Level::ERROR.primary_title(printable(&title)));
+        if let Some(e) = located {
+            let place = AnnotationKind::Primary.span(e.span()).label("here");
+            report = report.element(Snippet::source(text).path(name).annotation(place));
+        }
+        let help = run_error(&*self.0).and_then(RunError::help).map(|help| help.to_string());
+        if let Some(help) = help.or_else(|| Some(file_error(&*self.0)?.help()?.to_string())) {
+            report = report.element(Level::HELP.message(printable(&help)));
+        }
+        Renderer::styled().render(&[report])
     }
 }
 
@@ -60,39 +76,4 @@ fn run_error<'a>(error: &'a (dyn std::error::Error + 'static)) -> Option<&'a Run
         return Some(found);
     }
     error.downcast_ref::<RunError>()
-}
-
-impl fmt::Display for Failure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let text = match file_error(&*self.error) {
-            // The place is shown with the line itself.
-            Some(e) if self.source.is_some() && !e.key().is_empty() => format!("{}: {}", e.key(), e.kind()),
-            Some(e) if self.source.is_some() => e.kind().to_string(),
-            _ => self.error.to_string(),
-        };
-        // What was read stands in it as it was written.
-        f.write_str(&printable(&text))
-    }
-}
-
-impl std::error::Error for Failure {}
-
-impl Diagnostic for Failure {
-    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
-        if let Some(help) = run_error(&*self.error).and_then(RunError::help) {
-            return Some(Box::new(help));
-        }
-        let help = file_error(&*self.error)?.help()?;
-        Some(Box::new(help))
-    }
-
-    fn source_code(&self) -> Option<&dyn SourceCode> {
-        self.source.as_ref().map(|s| s as &dyn SourceCode)
-    }
-
-    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
-        let error = file_error(&*self.error).filter(|_| self.source.is_some())?;
-        let label = LabeledSpan::new_with_span(Some("here".to_owned()), error.span());
-        Some(Box::new(std::iter::once(label)))
-    }
 }

@@ -94,7 +94,7 @@ pub fn main() -> ExitCode {
         Ok(Verdict::Interrupted(signal)) => ExitCode::from(128 + signal),
         Err(failure) => {
             let code = failure.exit_code();
-            eprintln!("{:?}", miette::Report::new(failure));
+            anstream::eprintln!("{}", failure.render());
             ExitCode::from(code)
         }
     }

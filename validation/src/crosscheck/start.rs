@@ -3,9 +3,9 @@
 use super::ValidateError;
 use super::fluids::WarrenSet;
 use crate::run::{Integrator, Simulation, State};
+use chacha20::ChaCha8Rng;
 use psidpd_core::engine::{PeriodicBox, Want};
 use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 /// A box and how much of it is filled along z.

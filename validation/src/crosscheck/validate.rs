@@ -110,7 +110,7 @@ fn write(out: &Path, results: &Results, mut sections: Vec<Section>) -> Result<Pa
         failed: results.failed_count(),
     };
     let path = out.join("report.html");
-    write_atomically(&path, report.render()?.as_bytes())?;
+    write_atomically(&path, report.render().as_bytes())?;
     Ok(path)
 }
 

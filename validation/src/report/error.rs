@@ -8,9 +8,6 @@ pub enum ReportError {
     /// A plot could not be drawn.
     #[error("cannot draw the plot: {0}")]
     Plot(String),
-    /// The HTML page could not be produced.
-    #[error("cannot produce the HTML page: {0}")]
-    Html(#[from] minijinja::Error),
     /// Results could not be turned into JSON, or read from it.
     #[error("cannot convert results to or from JSON: {0}")]
     Json(#[from] serde_json::Error),

@@ -1,14 +1,17 @@
 //! Pictures made of pixels, with axes, legends and colour bars around them, as SVG.
 
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
 use super::ReportError;
-use super::axis::Axis;
-use super::text::{escape, fit, width};
+use super::chart::{Area, BELOW, Chart, Fallible, GREY, LEFT, SMALL, axes, chart, font, note, pen, px, svg};
+use super::scale::Scale;
+use super::text::{fit, width};
 use crate::output::Frame;
 use crate::output::picture::colour::{self, Rgb};
 use crate::output::picture::{
     Field, FieldOptions, Image, ParticleOptions, View, draw_particles, paint_field,
 };
-use std::fmt::Write;
 
 /// A picture in an SVG document that needs nothing else.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,13 +37,13 @@ pub enum Border {
     Arrows(View),
 }
 
-const SMALL: f64 = 12.0;
-const MEDIUM: f64 = 13.0;
-const LARGE: f64 = 15.0;
-const INK: &str = "#333333";
-/// Narrow pictures have room for their title and legend nevertheless.
-const NARROWEST: f64 = 400.0;
-const BAR: f64 = 16.0;
+/// Above the picture.
+const TOP: f64 = 36.0;
+/// Width of a colour bar with its numbers and label.
+const BAR: f64 = 90.0;
+/// Most room for a name of the legend.
+const NAMES: f64 = 150.0;
+const CENTRE: Pos = Pos { h_pos: HPos::Center, v_pos: VPos::Center };
 
 impl Figure {
     /// The particles of a frame.
@@ -85,154 +88,37 @@ impl Figure {
     /// A picture without pixels.
     pub fn render(&self) -> Result<String, ReportError> {
         let png = self.image.to_data_url().map_err(|e| ReportError::Plot(e.to_string()))?;
-        Ok(self.around(&png))
-    }
-
-    /// The document with the picture at an address.
-    fn around(&self, address: &str) -> String {
         let (w, h) = (self.image.width as f64, self.image.height as f64);
-        let axes = match &self.border {
-            Border::Axes(names, [across, up]) => {
-                let ticks = |range: &[f64; 2], pixels: f64| {
-                    Axis::exact(range[0], range[1], (pixels / 80.0).clamp(2.0, 8.0) as usize)
-                };
-                Some((names, ticks(across, w), ticks(up, h)))
-            }
-            Border::Arrows(_) => None,
-        };
-        let labels = |axis: &Axis| {
-            axis.ticks.iter().filter_map(|t| t.label.as_deref()).map(|l| width(l, SMALL)).fold(0.0, f64::max)
-        };
-        let left = axes.as_ref().map_or(16.0, |(_, _, y)| 44.0 + labels(y));
-        let top = if self.title.is_empty() { 16.0 } else { 40.0 };
-        let bar = self.bar.as_ref().map(|(low, high, label)| (Axis::exact(*low, *high, 6), label));
-        let right = bar.as_ref().map_or(20.0, |(axis, _)| 20.0 + BAR + 14.0 + labels(axis) + 30.0);
-        let total = (left + w + right).max(NARROWEST);
-        let mut out = String::new();
-        // Writing to a string cannot fail.
-        let mut put = |text: std::fmt::Arguments| {
-            let _ = out.write_fmt(text);
-        };
-        let text = |x: f64, y: f64, anchor: &str, size: f64, words: &str| {
-            format!(
-                "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\" font-size=\"{size}\">{}</text>\n",
-                escape(words)
-            )
-        };
-        put(format_args!(
-            "<image x=\"{left}\" y=\"{top}\" width=\"{w}\" height=\"{h}\" href=\"{address}\"/>\n"
-        ));
-        if !self.title.is_empty() {
-            put(format_args!(
-                "<text x=\"{left}\" y=\"25\" font-size=\"{LARGE}\" font-weight=\"bold\">{}</text>\n",
-                escape(&fit(&self.title, LARGE, total - left - 12.0))
-            ));
-        }
-        let mut below = top + h;
-        if let Some((names, x, y)) = &axes {
-            put(format_args!(
-                "<rect x=\"{left}\" y=\"{top}\" width=\"{w}\" height=\"{h}\" fill=\"none\" stroke=\"{INK}\"/>\n"
-            ));
-            let mut free = f64::NEG_INFINITY;
-            for tick in x.ticks.iter().filter_map(|t| Some((left + t.at * w, t.label.as_deref()?))) {
-                put(format_args!(
-                    "<path d=\"M{:.1} {below:.1}v5\" stroke=\"{INK}\" fill=\"none\"/>\n",
-                    tick.0
-                ));
-                let half = 0.5 * width(tick.1, SMALL);
-                if tick.0 - half > free {
-                    free = tick.0 + half + 6.0;
-                    put(format_args!("{}", text(tick.0, below + 18.0, "middle", SMALL, tick.1)));
+        let names = self.legend.iter().map(|(name, _)| width(&fit(name, SMALL, NAMES), SMALL) + 30.0);
+        let right = names.fold(if self.bar.is_some() { BAR } else { 20.0 }, f64::max) + 20.0;
+        let size = [LEFT + w + right, TOP + h + BELOW];
+        let [x, y, across, down] = [LEFT, TOP, w, h].map(px);
+        let image =
+            format!("<image x=\"{x}\" y=\"{y}\" width=\"{across}\" height=\"{down}\" href=\"{png}\"/>");
+        svg(&self.title, size, &image, |area| {
+            match &self.border {
+                Border::Axes(names, ends) => {
+                    let [x, y] = ends.map(|[low, high]| Scale::exact(low, high));
+                    chart(area, [TOP, right], [&names[0], &names[1]], [&x, &y], false)?;
                 }
+                Border::Arrows(view) => arrows(area, *view, [40.0, TOP + h + 10.0])?,
             }
-            for tick in y.ticks.iter().filter_map(|t| Some((top + (1.0 - t.at) * h, t.label.as_deref()?))) {
-                put(format_args!(
-                    "<path d=\"M{left:.1} {:.1}h-5\" stroke=\"{INK}\" fill=\"none\"/>\n",
-                    tick.0
-                ));
-                put(format_args!("{}", text(left - 8.0, tick.0 + 4.0, "end", SMALL, tick.1)));
+            for (k, (name, colour)) in self.legend.iter().enumerate() {
+                let at = (px(LEFT + w + 24.0), px(TOP + 8.0 + 20.0 * k as f64));
+                let below = (at.0 + px(12.0), at.1 + px(6.0));
+                area.draw(&Circle::new(at, px(6.0), rgb(*colour).filled()))?;
+                area.draw(&note(&fit(name, SMALL, NAMES), below))?;
             }
-            put(format_args!(
-                "{}",
-                text(left + 0.5 * w, below + 37.0, "middle", MEDIUM, &axis_label(&names[0], x))
-            ));
-            let (x, y, label) = (16.0, top + 0.5 * h, axis_label(&names[1], y));
-            put(format_args!(
-                "<text transform=\"translate({x} {y:.1}) rotate(-90)\" text-anchor=\"middle\" \
-                 font-size=\"{MEDIUM}\">{}</text>\n",
-                escape(&label)
-            ));
-            below += 44.0;
-        }
-        if let Some((axis, label)) = &bar {
-            let x = left + w + 20.0;
-            // As many bands as can be told apart, each from the top of the bar to its own lower end: the next
-            // one covers the rest, and no seams show.
-            let bands = 128;
-            for k in 0..bands {
-                let colour = colour::hex(colour::of_value((f64::from(k) + 0.5) / f64::from(bands)));
-                let height = h * (1.0 - f64::from(k) / f64::from(bands));
-                put(format_args!(
-                    "<rect x=\"{x}\" y=\"{top}\" width=\"{BAR}\" height=\"{height:.2}\" fill=\"{colour}\"/>\n"
-                ));
+            if let Some((low, high, label)) = &self.bar {
+                bar(
+                    &area.clone().shrink((px(LEFT + w + 20.0), 0), (px(BAR), px(size[1]))),
+                    *low,
+                    *high,
+                    label,
+                )?;
             }
-            put(format_args!(
-                "<rect x=\"{x}\" y=\"{top}\" width=\"{BAR}\" height=\"{h}\" fill=\"none\" stroke=\"{INK}\"/>\n"
-            ));
-            for tick in axis.ticks.iter().filter_map(|t| Some((top + (1.0 - t.at) * h, t.label.as_deref()?)))
-            {
-                let end = x + BAR;
-                put(format_args!("<path d=\"M{end:.1} {:.1}h5\" stroke=\"{INK}\" fill=\"none\"/>\n", tick.0));
-                put(format_args!("{}", text(end + 8.0, tick.0 + 4.0, "start", SMALL, tick.1)));
-            }
-            let (x, y) = (x + BAR + 14.0 + labels(axis) + 14.0, top + 0.5 * h);
-            let label = match &axis.factor {
-                Some(factor) => format!("{label} ({factor})"),
-                None => (*label).clone(),
-            };
-            put(format_args!(
-                "<text transform=\"translate({x:.1} {y:.1}) rotate(-90)\" text-anchor=\"middle\" \
-                 font-size=\"{MEDIUM}\">{}</text>\n",
-                escape(&fit(&label, MEDIUM, h))
-            ));
-        }
-        let mut x = left;
-        let mut y = below + 20.0;
-        if let Border::Arrows(view) = &self.border {
-            for line in arrows(*view, left + 26.0, below + 36.0) {
-                put(format_args!("{line}"));
-            }
-            x += 90.0;
-            y += 12.0;
-            below += 62.0;
-        }
-        let start = x;
-        for (name, colour) in &self.legend {
-            let name = fit(name, SMALL, total - start - 30.0);
-            let room = 18.0 + width(&name, SMALL) + 18.0;
-            if x > start && x + room > total {
-                x = start;
-                y += 20.0;
-            }
-            put(format_args!(
-                "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"6\" fill=\"{}\"/>\n{}",
-                x + 6.0,
-                y,
-                colour::hex(*colour),
-                text(x + 18.0, y + 4.0, "start", SMALL, &name)
-            ));
-            x += room;
-        }
-        if !self.legend.is_empty() {
-            below = below.max(y + 14.0);
-        }
-        let (name, height) = (if self.title.is_empty() { "Picture" } else { &self.title }, below + 10.0);
-        format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{total:.0}\" height=\"{height:.0}\" \
-             viewBox=\"0 0 {total:.0} {height:.0}\" role=\"img\" font-family=\"sans-serif\" fill=\"{INK}\">\n\
-             <title>{}</title>\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n{out}</svg>",
-            escape(name)
-        )
+            Ok(())
+        })
     }
 }
 
@@ -268,22 +154,36 @@ pub(super) fn field_of_values(
     }
 }
 
-fn axis_label(name: &str, axis: &Axis) -> String {
-    axis.factor.as_ref().map_or_else(|| name.to_owned(), |factor| format!("{name} ({factor})"))
+fn rgb([r, g, b]: Rgb) -> RGBColor {
+    RGBColor(r, g, b)
+}
+
+/// The colours from a lowest value to a highest, with numbers on the right.
+fn bar(area: &Area, low: f64, high: f64, label: &str) -> Fallible {
+    let (values, across) = (Scale::exact(low, high), Scale::exact(0.0, 1.0));
+    let mut chart: Chart = ChartBuilder::on(area)
+        .margin_top(px(TOP))
+        .margin_bottom(px(BELOW))
+        .right_y_label_area_size(px(BAR - 16.0))
+        .build_cartesian_2d(across.clone(), values.clone())?;
+    let ends = values.ends();
+    // Each band goes from its own lower end to the top of the bar: the next one covers the rest, and no seams show.
+    chart.draw_series((0..128).map(|k| {
+        let from = f64::from(k) / 128.0;
+        let colour = rgb(colour::of_value(from + 0.5 / 128.0)).filled();
+        Rectangle::new([(0.0, ends.0 + from * (ends.1 - ends.0)), (1.0, ends.1)], colour)
+    }))?;
+    axes(&mut chart, ["", label], [&across, &values], false)
 }
 
 /// x, y and z as arrows from a point.
-fn arrows(view: View, x: f64, y: f64) -> Vec<String> {
-    let arrow = |([right, up], name): ([f64; 2], &str)| {
-        let (dx, dy) = (28.0 * right, -28.0 * up);
-        let length = dx.hypot(dy).max(1e-9);
-        let (lx, ly) = (x + dx + 9.0 * dx / length, y + dy + 9.0 * dy / length + 4.0);
-        format!(
-            "<path d=\"M{x:.1} {y:.1}l{dx:.1} {dy:.1}\" stroke=\"{INK}\" stroke-width=\"1.6\" fill=\"none\"/>\n\
-             <text x=\"{lx:.1}\" y=\"{ly:.1}\" text-anchor=\"middle\" font-size=\"{SMALL}\">{name}</text>\n"
-        )
-    };
-    view.directions().into_iter().zip(["x", "y", "z"]).map(arrow).collect()
+fn arrows(area: &Area, view: View, [x, y]: [f64; 2]) -> Fallible {
+    for ([right, up], name) in view.directions().into_iter().zip(["x", "y", "z"]) {
+        let along = |length: f64| (px(x + length * right), px(y - length * up));
+        area.draw(&PathElement::new([along(0.0), along(28.0)], pen(GREY, 1.6)))?;
+        area.draw(&Text::new(name, along(36.0), font(SMALL, GREY).pos(CENTRE)))?;
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -323,7 +223,7 @@ mod tests {
         // The picture in the document is the picture drawn.
         let document = roxmltree::Document::parse(&svg).unwrap();
         let image = document.descendants().find(|n| n.tag_name().name() == "image").unwrap();
-        assert_eq!(image.attribute("width"), Some(oblique.image.width.to_string().as_str()));
+        assert_eq!(image.attribute("width"), Some(px(oblique.image.width as f64).to_string().as_str()));
 
         let slice = ParticleOptions { view: View::Y, slice: Some(1.0), ..Default::default() };
         let found = texts(&Figure::particles("", &frame, &slice).render().unwrap());

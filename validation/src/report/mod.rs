@@ -5,7 +5,7 @@
 //! character) is left out or replaced, and what can fail returns a
 //! [`ReportError`].
 
-mod axis;
+mod chart;
 mod error;
 pub mod figure;
 pub mod files;
@@ -15,6 +15,7 @@ pub mod progress;
 pub mod quantity;
 pub mod results;
 pub mod run;
+mod scale;
 pub mod table;
 mod text;
 

@@ -1,18 +1,12 @@
-//! Plots as SVG.
-//!
-//! Shapes and text go through the SVG backend of plotters, which needs no
-//! fonts: text stays text, and the viewer's sans-serif font shows it. Axes,
-//! ticks and layout are computed here, since text can only be measured
-//! roughly without fonts.
+//! Plots of data as SVG, drawn by plotters.
 
-use plotters::coord::Shift;
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::ReportError;
-use super::axis::Axis;
-use super::text::{escape, fit, width};
+use super::chart::{Chart, Fallible, GREY, SMALL, chart, legend, note, pen, px, svg};
+use super::scale::Scale;
+use super::text::{fit, width};
 use crate::output::picture::colour;
 
 /// How a series is drawn.
@@ -65,63 +59,15 @@ pub struct Plot {
     pub marks: Vec<(f64, String)>,
 }
 
-/// Drawing units per pixel: plotters has whole coordinates only.
-const UNITS: f64 = 10.0;
 const WIDTH: f64 = 720.0;
-/// Height between the upper and the lower end of the vertical axis.
-const HEIGHT: f64 = 320.0;
-/// Room to the right of the plot if no labels stand there.
-const RIGHT: f64 = 20.0;
-/// Most room for the labels of reference lines.
-const LEVEL_ROOM: f64 = 150.0;
-const SMALL: f64 = 12.0;
-const MEDIUM: f64 = 13.0;
-const LARGE: f64 = 15.0;
-
-const INK: RGBColor = RGBColor(0x33, 0x33, 0x33);
-const GREY: RGBColor = RGBColor(0x6B, 0x6B, 0x6B);
-const GRID: RGBColor = RGBColor(0xE3, 0xE3, 0xE3);
-const FAINT: RGBColor = RGBColor(0xF2, 0xF2, 0xF2);
+const HEIGHT: f64 = 420.0;
+/// Most room for a name.
+const NAME: f64 = 260.0;
 
 /// The colour of the k-th series.
 fn colour_of(k: usize) -> RGBColor {
     let [r, g, b] = colour::of_species(k);
     RGBColor(r, g, b)
-}
-
-impl Plot {
-    /// Draws the plot as an SVG document without prolog, fit for embedding.
-    pub fn render(&self) -> Result<String, ReportError> {
-        let layout = Layout::of(self);
-        let units = |px: f64| (px * UNITS).round() as u32;
-        let mut drawn = String::new();
-        {
-            let area =
-                SVGBackend::with_string(&mut drawn, (units(WIDTH), units(layout.total))).into_drawing_area();
-            let mut canvas = Canvas { area, layout };
-            canvas.draw(self).map_err(|e| ReportError::Plot(e.to_string()))?;
-            canvas.area.present().map_err(|e| ReportError::Plot(e.to_string()))?;
-        }
-        // The root element comes from here: a size in pixels, whatever the
-        // drawing units, and a name for screen readers.
-        let body = drawn
-            .find('>')
-            .and_then(|end| drawn.get(end + 1..))
-            .ok_or_else(|| ReportError::Plot("the drawing has no root element".into()))?;
-        let total = Layout::of(self).total;
-        Ok(format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH}\" height=\"{total}\" \
-             viewBox=\"0 0 {} {}\" role=\"img\" stroke-linejoin=\"round\">\n<title>{}</title>{body}",
-            units(WIDTH),
-            units(total),
-            escape(if self.title.is_empty() { "Plot" } else { &self.title }),
-        ))
-    }
-
-    /// Every named series, with its index.
-    fn named(&self) -> impl Iterator<Item = (usize, &Series)> {
-        self.series.iter().enumerate().filter(|(_, s)| !s.name.trim().is_empty())
-    }
 }
 
 impl Series {
@@ -132,413 +78,183 @@ impl Series {
     }
 }
 
-/// An entry of the legend: series, position of its left end, text.
-struct Entry {
-    series: usize,
-    x: f64,
-    y: f64,
-    name: String,
-}
-
-/// Where everything goes, in pixels.
-struct Layout {
-    x: Axis,
-    y: Axis,
-    left: f64,
-    right: f64,
-    top: f64,
-    total: f64,
-    legend: Vec<Entry>,
-}
-
-impl Layout {
-    fn of(plot: &Plot) -> Self {
-        // Points that cannot be shown must not widen the axes either.
-        let fits = |v: f64, log: bool| v.is_finite() && (!log || v > 0.0);
-        let shown = |s: &Series| -> Vec<(usize, f64, f64)> {
-            let points = s.points.iter().enumerate().map(|(i, &(x, y))| (i, x, y));
-            points.filter(|&(_, x, y)| fits(x, plot.log_x) && fits(y, plot.log_y)).collect()
-        };
-        let mut xs: Vec<f64> =
-            plot.marks.iter().map(|mark| mark.0).filter(|x| fits(*x, plot.log_x)).collect();
-        let mut ys: Vec<f64> = plot.levels.iter().map(|level| level.0).collect();
-        for series in &plot.series {
-            for (i, x, y) in shown(series) {
-                xs.push(x);
-                ys.push(y);
-                if let Some(error) = series.error(i) {
-                    ys.extend([y - error, y + error]);
-                }
-            }
-        }
-        let x = Axis::around(xs.into_iter(), plot.log_x, 7);
-        let y = Axis::around(ys.into_iter(), plot.log_y, 6);
-
-        let labels = y.ticks.iter().filter_map(|t| t.label.as_deref());
-        let widest = labels.map(|l| width(l, SMALL)).fold(0.0, f64::max);
-        let left = widest + if plot.y_label.is_empty() { 22.0 } else { 44.0 };
-        let mut top = if plot.title.is_empty() { 14.0 } else { 40.0 };
-        if y.factor.is_some() {
-            top += 14.0;
-        }
-        if plot.marks.iter().any(|m| !m.1.trim().is_empty()) {
-            top += 16.0;
-        }
-        let mut below = top + HEIGHT + 24.0;
-        if !plot.x_label.is_empty() {
-            below += 22.0;
-        } else if x.factor.is_some() {
-            below += 16.0;
-        }
-        let levels = plot.levels.iter().filter(|(level, _)| y.fraction(*level).is_some());
-        let room = levels.map(|(_, text)| width(&fit(text, SMALL, LEVEL_ROOM), SMALL) + 26.0);
-        let right = WIDTH - room.fold(RIGHT, f64::max);
-        let (legend, below) = legend(plot, left, below);
-        Self { x, y, left, right, top, total: (below + 12.0).ceil(), legend }
-    }
-
-    /// Pixel of a point, if it can be shown.
-    fn place(&self, x: f64, y: f64) -> Option<(f64, f64)> {
-        Some((self.place_x(self.x.fraction(x)?), self.place_y(self.y.fraction(y)?)))
-    }
-
-    fn place_x(&self, fraction: f64) -> f64 {
-        self.left + fraction * (self.right - self.left)
-    }
-
-    fn place_y(&self, fraction: f64) -> f64 {
-        self.top + (1.0 - fraction) * HEIGHT
-    }
-}
-
-/// Length of the sample of a line in the legend.
-const SAMPLE: f64 = 24.0;
-
-/// Entries of the legend in rows below the plot, and the lower end.
-fn legend(plot: &Plot, left: f64, top: f64) -> (Vec<Entry>, f64) {
-    let mut entries = Vec::new();
-    let (mut x, mut y) = (left, top + 14.0);
-    for (series, named) in plot.named() {
-        let name = fit(&named.name, SMALL, WIDTH - RIGHT - left - SAMPLE - 8.0);
-        let room = SAMPLE + 8.0 + width(&name, SMALL);
-        if x > left && x + room > WIDTH - RIGHT {
-            x = left;
-            y += 19.0;
-        }
-        entries.push(Entry { series, x, y, name });
-        x += room + 18.0;
-    }
-    let end = if entries.is_empty() { top } else { y + 6.0 };
-    (entries, end)
-}
-
-type Fallible = Result<(), Box<dyn std::error::Error>>;
-type Pixel = (f64, f64);
-
-/// The drawing area with helpers that take pixels.
-struct Canvas<'a> {
-    area: DrawingArea<SVGBackend<'a>, Shift>,
-    layout: Layout,
-}
-
-fn unit(p: Pixel) -> (i32, i32) {
-    ((p.0 * UNITS).round() as i32, (p.1 * UNITS).round() as i32)
-}
-
-impl Canvas<'_> {
-    fn draw(&mut self, plot: &Plot) -> Fallible {
-        self.area.fill(&WHITE)?;
-        self.grid()?;
-        for (i, series) in plot.series.iter().enumerate() {
-            self.spread(series, colour_of(i))?;
-        }
-        for &(level, _) in &plot.levels {
-            if let Some(y) = self.layout.y.fraction(level) {
-                let y = self.layout.place_y(y);
-                self.dashed(&[(self.layout.left, y), (self.layout.right, y)], GREY, 1.2, (2.0, 3.0))?;
-            }
-        }
-        self.marks(plot)?;
-        for (i, series) in plot.series.iter().enumerate() {
-            self.series(i, series)?;
-        }
-        self.frame(plot)?;
-        self.level_labels(plot)?;
-        self.legend(plot)
-    }
-
-    fn grid(&self) -> Fallible {
-        let l = &self.layout;
-        let (low, high) = (l.place_y(0.0), l.place_y(1.0));
-        for major in [false, true] {
-            let colour = if major { GRID } else { FAINT };
-            for tick in l.x.ticks.iter().filter(|t| t.label.is_some() == major) {
-                let x = l.place_x(tick.at);
-                self.line(&[(x, low), (x, high)], colour.stroke_width(UNITS as u32))?;
-            }
-            for tick in l.y.ticks.iter().filter(|t| t.label.is_some() == major) {
-                let y = l.place_y(tick.at);
-                self.line(&[(l.left, y), (l.right, y)], colour.stroke_width(UNITS as u32))?;
-            }
-        }
-        Ok(())
-    }
-
-    fn frame(&self, plot: &Plot) -> Fallible {
-        let l = &self.layout;
-        let (low, right) = (l.place_y(0.0), l.right);
-        self.line(&[(l.left, l.top), (l.left, low), (right, low)], INK.stroke_width(UNITS as u32))?;
-        // Labels are centred on their ticks; one that would touch the label
-        // before it is left out.
-        let mut free = f64::NEG_INFINITY;
-        for tick in &l.x.ticks {
-            let x = l.place_x(tick.at);
-            let length = if tick.label.is_some() { 5.0 } else { 3.0 };
-            self.line(&[(x, low), (x, low + length)], INK.stroke_width(UNITS as u32))?;
-            if let Some(label) = &tick.label {
-                let half = width(label, SMALL) / 2.0;
-                if x - half > free {
-                    free = x + half + 6.0;
-                    self.text(label, (x, low + 8.0), SMALL, INK, (HPos::Center, VPos::Top))?;
-                }
-            }
-        }
-        for tick in &l.y.ticks {
-            let y = l.place_y(tick.at);
-            let length = if tick.label.is_some() { 5.0 } else { 3.0 };
-            self.line(&[(l.left - length, y), (l.left, y)], INK.stroke_width(UNITS as u32))?;
-            if let Some(label) = &tick.label {
-                self.text(label, (l.left - 8.0, y), SMALL, INK, (HPos::Right, VPos::Center))?;
-            }
-        }
-        if let Some(factor) = &l.x.factor {
-            self.text(factor, (right, low + 27.0), SMALL, INK, (HPos::Right, VPos::Top))?;
-        }
-        if let Some(factor) = &l.y.factor {
-            self.text(factor, (l.left, l.top - 7.0), SMALL, INK, (HPos::Left, VPos::Bottom))?;
-        }
-        let middle = (l.left + right) / 2.0;
-        let room = right - l.left - if l.x.factor.is_some() { 110.0 } else { 0.0 };
-        let label = fit(&plot.x_label, MEDIUM, room);
-        self.text(&label, (middle, low + 28.0), MEDIUM, INK, (HPos::Center, VPos::Top))?;
-
-        let label = fit(&plot.y_label, MEDIUM, HEIGHT);
-        let turned = self
-            .style(MEDIUM, INK, (HPos::Center, VPos::Center), FontStyle::Normal)
-            .transform(FontTransform::Rotate270);
-        let at = unit((16.0, l.top + HEIGHT / 2.0));
-        if !label.is_empty() {
-            self.area.draw(&Text::new(label, at, turned))?;
-        }
-
-        let title = fit(&plot.title, LARGE, WIDTH - RIGHT - l.left);
-        if !title.is_empty() {
-            let style = self.style(LARGE, INK, (HPos::Left, VPos::Center), FontStyle::Bold);
-            self.area.draw(&Text::new(title, unit((l.left, 20.0)), style))?;
-        }
-        Ok(())
-    }
-
-    /// Vertical reference lines. Labels begin at their lines; one that would touch the label before it is
-    /// left out.
-    fn marks(&self, plot: &Plot) -> Fallible {
-        let l = &self.layout;
-        let mut marks: Vec<(f64, &str)> = plot
-            .marks
-            .iter()
-            .filter_map(|(x, text)| Some((l.place_x(l.x.inside(*x)?), text.as_str())))
-            .collect();
-        marks.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut free = l.left;
-        for (x, text) in marks {
-            self.dashed(&[(x, l.place_y(0.0)), (x, l.place_y(1.0))], GREY, 1.2, (2.0, 3.0))?;
-            let text = fit(text, SMALL, LEVEL_ROOM);
-            let end = x + 4.0 + width(&text, SMALL);
-            if x >= free && end <= WIDTH {
-                self.text(&text, (x + 4.0, l.top - 5.0), SMALL, GREY, (HPos::Left, VPos::Bottom))?;
-                free = end + 6.0;
-            }
-        }
-        Ok(())
-    }
-
-    /// Labels of reference lines to the right of the plot, kept apart.
-    fn level_labels(&self, plot: &Plot) -> Fallible {
-        let l = &self.layout;
-        let mut labels: Vec<(f64, &str)> = plot
-            .levels
-            .iter()
-            .filter_map(|(level, text)| Some((l.place_y(l.y.fraction(*level)?), text.as_str())))
-            .filter(|(_, text)| !text.trim().is_empty())
-            .collect();
-        // From the bottom up; a label too close to the one below is raised,
-        // and a short stroke leads to it from its line.
-        labels.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let mut free = f64::INFINITY;
-        for (level, text) in labels {
-            let y = level.min(free);
-            free = y - 15.0;
-            let ends = [(l.right + 1.0, level), (l.right + 7.0, y)];
-            self.line(&ends, GREY.stroke_width(UNITS as u32))?;
-            let text = fit(text, SMALL, LEVEL_ROOM);
-            let at = (l.right + 10.0, y);
-            self.text(&text, at, SMALL, GREY, (HPos::Left, VPos::Center))?;
-        }
-        Ok(())
-    }
-
-    fn legend(&self, plot: &Plot) -> Fallible {
-        for entry in &self.layout.legend {
-            let Some(series) = plot.series.get(entry.series) else {
-                continue;
-            };
-            let colour = colour_of(entry.series);
-            let ends = [(entry.x, entry.y), (entry.x + SAMPLE, entry.y)];
-            match series.style {
-                Style::Line => self.line(&ends, colour.stroke_width(stroke(2.0)))?,
-                Style::Faint => self.line(&ends, colour.mix(FAINTNESS).stroke_width(stroke(1.4)))?,
-                Style::Dashed => self.dashed(&ends, colour, 2.0, DASH)?,
-                Style::Points => self.marker(entry.series, (entry.x + SAMPLE / 2.0, entry.y))?,
-            }
-            let at = (entry.x + SAMPLE + 8.0, entry.y);
-            self.text(&entry.name, at, SMALL, INK, (HPos::Left, VPos::Center))?;
-        }
-        Ok(())
-    }
-
-    /// Runs of points that can be shown, as pixels with the ends of the error.
-    fn runs(&self, series: &Series) -> Vec<Vec<Shown>> {
-        let l = &self.layout;
-        let mut runs = vec![Vec::new()];
-        for (i, &(x, y)) in series.points.iter().enumerate() {
-            let Some(at) = l.place(x, y) else {
-                runs.push(Vec::new());
-                continue;
-            };
-            let error = series.error(i).map(|e| {
-                let end = |v: f64, beyond| l.place_y(l.y.fraction(v).unwrap_or(beyond));
-                (end(y + e, 1.0), end(y - e, 0.0))
-            });
-            if let Some(run) = runs.last_mut() {
-                run.push(Shown { at, error });
-            }
-        }
-        runs.retain(|run| !run.is_empty());
-        runs
-    }
-
-    /// Errors, drawn below all data.
-    fn spread(&self, series: &Series, colour: RGBColor) -> Fallible {
-        for run in self.runs(series) {
-            if series.style == Style::Points || run.len() == 1 {
-                for (x, (high, low)) in run.iter().filter_map(|s| Some((s.at.0, s.error?))) {
-                    let style = colour.stroke_width(stroke(1.2));
-                    self.line(&[(x, high), (x, low)], style)?;
-                    for y in [high, low] {
-                        self.line(&[(x - 3.0, y), (x + 3.0, y)], style)?;
-                    }
-                }
-            } else if run.iter().any(|s| s.error.is_some()) {
-                let ends = |s: &Shown| s.error.unwrap_or((s.at.1, s.at.1));
-                let upper = run.iter().map(|s| unit((s.at.0, ends(s).0)));
-                let lower = run.iter().rev().map(|s| unit((s.at.0, ends(s).1)));
-                let outline: Vec<_> = upper.chain(lower).collect();
-                self.area.draw(&Polygon::new(outline, colour.mix(0.18).filled()))?;
-            }
-        }
-        Ok(())
-    }
-
-    fn series(&self, index: usize, series: &Series) -> Fallible {
-        let colour = colour_of(index);
-        for run in self.runs(series) {
-            let path: Vec<Pixel> = run.iter().map(|s| s.at).collect();
-            match (series.style, path.as_slice()) {
-                (Style::Points, path) => {
-                    for &at in path {
-                        self.marker(index, at)?;
-                    }
-                }
-                (_, &[at]) => {
-                    self.area.draw(&Circle::new(unit(at), stroke(2.0) as i32, colour.filled()))?;
-                }
-                (Style::Line, path) => self.line(path, colour.stroke_width(stroke(1.8)))?,
-                (Style::Faint, path) => self.line(path, colour.mix(FAINTNESS).stroke_width(stroke(1.0)))?,
-                (Style::Dashed, path) => self.dashed(path, colour, 1.8, DASH)?,
-            }
-        }
-        Ok(())
-    }
-
-    /// A marker whose shape, too, tells series apart.
-    fn marker(&self, index: usize, at: Pixel) -> Fallible {
-        let fill = colour_of(index).filled();
-        let polygon = |corners: &[Pixel]| {
-            let corners = corners.iter().map(|c| unit((at.0 + c.0, at.1 + c.1)));
-            Polygon::new(corners.collect::<Vec<_>>(), fill)
-        };
-        match index % 4 {
-            0 => self.area.draw(&Circle::new(unit(at), stroke(3.4) as i32, fill))?,
-            1 => self.area.draw(&polygon(&[(-3.1, -3.1), (3.1, -3.1), (3.1, 3.1), (-3.1, 3.1)]))?,
-            2 => self.area.draw(&polygon(&[(0.0, -4.2), (4.0, 3.0), (-4.0, 3.0)]))?,
-            _ => self.area.draw(&polygon(&[(0.0, -4.4), (4.4, 0.0), (0.0, 4.4), (-4.4, 0.0)]))?,
-        }
-        Ok(())
-    }
-
-    fn line(&self, path: &[Pixel], style: ShapeStyle) -> Fallible {
-        let mut path: Vec<_> = path.iter().map(|&p| unit(p)).collect();
-        path.dedup();
-        self.area.draw(&PathElement::new(path, style))?;
-        Ok(())
-    }
-
-    fn dashed(&self, path: &[Pixel], colour: RGBColor, wide: f64, dash: (f64, f64)) -> Fallible {
-        let mut path: Vec<_> = path.iter().map(|&p| unit(p)).collect();
-        path.dedup();
-        let (on, off) = (stroke(dash.0) as i32, stroke(dash.1) as i32);
-        let style = colour.stroke_width(stroke(wide));
-        self.area.draw(&DashedPathElement::new(path, on, off, style))?;
-        Ok(())
-    }
-
-    fn style(
-        &self,
-        size: f64,
-        colour: RGBColor,
-        anchor: (HPos, VPos),
-        weight: FontStyle,
-    ) -> TextStyle<'static> {
-        // The backend divides sizes by 1.24.
-        FontDesc::new(FontFamily::SansSerif, size * UNITS * 1.24, weight)
-            .color(&colour)
-            .pos(Pos::new(anchor.0, anchor.1))
-    }
-
-    fn text(&self, text: &str, at: Pixel, size: f64, colour: RGBColor, anchor: (HPos, VPos)) -> Fallible {
-        if !text.is_empty() {
-            let style = self.style(size, colour, anchor, FontStyle::Normal);
-            self.area.draw(&Text::new(text, unit(at), style))?;
-        }
-        Ok(())
-    }
-}
-
-/// Opacity of faint lines.
-const FAINTNESS: f64 = 0.55;
-
-/// Dash and gap of dashed series.
-const DASH: (f64, f64) = (7.0, 4.0);
-
-/// A length in drawing units.
-fn stroke(px: f64) -> u32 {
-    (px * UNITS).round() as u32
-}
-
-/// A point that can be shown, and the upper and lower end of its error.
+/// A point that can be shown, and the lower and upper end of its error.
+#[derive(Clone, Copy)]
 struct Shown {
-    at: Pixel,
-    error: Option<(f64, f64)>,
+    at: (f64, f64),
+    low: f64,
+    high: f64,
+}
+
+impl Plot {
+    /// Draws the plot as an SVG document without prolog, fit for embedding.
+    ///
+    /// # Errors
+    /// Plotters cannot draw it.
+    pub fn render(&self) -> Result<String, ReportError> {
+        let [x, y] = &self.scales();
+        svg(&self.title, [WIDTH, HEIGHT], "", |area| {
+            let top = if self.marks.is_empty() { 36.0 } else { 52.0 };
+            let mut chart = chart(area, [top, 20.0], [&self.x_label, &self.y_label], [x, y], true)?;
+            let runs: Vec<_> = self.series.iter().map(|s| runs(s, x, y)).collect();
+            // Errors are below all data.
+            for (k, (series, runs)) in self.series.iter().zip(&runs).enumerate() {
+                draw_errors(&mut chart, k, series, runs)?;
+            }
+            self.draw_references(&mut chart, x, y)?;
+            for (k, (series, runs)) in self.series.iter().zip(&runs).enumerate() {
+                draw_series(&mut chart, k, series, runs)?;
+            }
+            let names = self.series.iter().map(|s| &s.name).chain(self.levels.iter().map(|l| &l.1));
+            if names.into_iter().any(|name| !name.trim().is_empty()) {
+                let points = runs.iter().flatten().flatten().map(|s| s.at);
+                legend(&mut chart, corner(points, x, y))?;
+            }
+            Ok(())
+        })
+    }
+
+    /// Axes with room for all that is shown. A point that cannot be shown must not widen the other axis.
+    fn scales(&self) -> [Scale; 2] {
+        let finite = |v: f64, log: bool| v.is_finite() && (!log || v > 0.0);
+        let mut xs: Vec<f64> = self.marks.iter().map(|mark| mark.0).collect();
+        let mut ys: Vec<f64> = self.levels.iter().map(|level| level.0).collect();
+        for series in &self.series {
+            for (k, &(x, y)) in series.points.iter().enumerate() {
+                if finite(x, self.log_x) && finite(y, self.log_y) {
+                    let error = series.error(k).unwrap_or(0.0);
+                    xs.push(x);
+                    ys.extend([y - error, y, y + error]);
+                }
+            }
+        }
+        [Scale::around(xs.into_iter(), self.log_x), Scale::around(ys.into_iter(), self.log_y)]
+    }
+
+    /// Horizontal lines named in the legend; vertical ones with names above them, as far as there is room.
+    fn draw_references(&self, chart: &mut Chart, x: &Scale, y: &Scale) -> Fallible {
+        let line = pen(GREY, 1.2);
+        let dotted = |ends: [(f64, f64); 2]| DashedPathElement::new(ends, px(2.0), px(3.0), line);
+        let (across, up) = (x.ends(), y.ends());
+        for (level, name) in self.levels.iter().filter(|(level, _)| y.clamp(*level).is_some()) {
+            let drawn = chart.draw_series([dotted([(across.0, *level), (across.1, *level)])])?;
+            let name = fit(name, SMALL, NAME);
+            if !name.trim().is_empty() {
+                let sample =
+                    move |(x, y)| DashedPathElement::new([(x, y), (x + px(24.0), y)], px(2.0), px(3.0), line);
+                drawn.label(name).legend(sample);
+            }
+        }
+        let mut free = f64::NEG_INFINITY;
+        let mut marks: Vec<_> = self.marks.iter().filter(|(mark, _)| x.clamp(*mark).is_some()).collect();
+        marks.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for (mark, name) in marks {
+            chart.draw_series([dotted([(*mark, up.0), (*mark, up.1)])])?;
+            let at = chart.backend_coord(&(*mark, up.1)).0 as f64 / px(1.0) as f64;
+            let name = fit(name, SMALL, NAME);
+            if at > free {
+                free = at + width(&name, SMALL) + 6.0;
+                chart.draw_series([note(&name, (*mark, up.1))])?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Uninterrupted runs of points that can be shown.
+fn runs(series: &Series, x: &Scale, y: &Scale) -> Vec<Vec<Shown>> {
+    let shown = |(k, &(a, b)): (usize, &(f64, f64))| {
+        let at = (x.clamp(a)?, y.clamp(b)?);
+        let error = series.error(k).unwrap_or(0.0);
+        let (low, high) =
+            (y.clamp(b - error).unwrap_or(y.ends().0), y.clamp(b + error).unwrap_or(y.ends().1));
+        Some(Shown { at, low, high })
+    };
+    let points: Vec<Option<Shown>> = series.points.iter().enumerate().map(shown).collect();
+    points
+        .split(Option::is_none)
+        .filter(|run| !run.is_empty())
+        .map(|run| run.iter().flatten().copied().collect())
+        .collect()
+}
+
+/// A band along a line, bars at single points.
+fn draw_errors(chart: &mut Chart, k: usize, series: &Series, runs: &[Vec<Shown>]) -> Fallible {
+    let colour = colour_of(k);
+    for run in runs {
+        if series.style == Style::Points || run.len() == 1 {
+            let bar = |s: &Shown| {
+                ErrorBar::new_vertical(s.at.0, s.low, s.at.1, s.high, pen(colour, 1.2), px(6.0) as u32)
+            };
+            chart.draw_series(run.iter().filter(|s| s.low < s.high).map(bar))?;
+        } else if run.iter().any(|s| s.low < s.high) {
+            let upper = run.iter().map(|s| (s.at.0, s.high));
+            let outline: Vec<_> = upper.chain(run.iter().rev().map(|s| (s.at.0, s.low))).collect();
+            chart.draw_series([Polygon::new(outline, colour.mix(0.18).filled())])?;
+        }
+    }
+    Ok(())
+}
+
+fn draw_series(chart: &mut Chart, k: usize, series: &Series, runs: &[Vec<Shown>]) -> Fallible {
+    let colour = colour_of(k);
+    let line = match series.style {
+        Style::Faint => pen(colour.mix(0.55), 1.0),
+        _ => pen(colour, 1.8),
+    };
+    let mut elements = Vec::new();
+    for run in runs {
+        let path: Vec<(f64, f64)> = run.iter().map(|s| s.at).collect();
+        match (series.style, path.as_slice()) {
+            (Style::Points, path) => elements.extend(path.iter().map(|at| marker(k, *at))),
+            (_, &[at]) => elements.push(Circle::new(at, px(2.0), colour.filled()).into_dyn()),
+            (style, _) => elements.push(stroke(path, style, line)),
+        }
+    }
+    let (drawn, style) = (chart.draw_series(elements)?, series.style);
+    let name = fit(&series.name, SMALL, NAME);
+    if !name.trim().is_empty() {
+        drawn.label(name).legend(move |(x, y)| match style {
+            Style::Points => marker(k, (x + px(12.0), y)),
+            style => stroke(vec![(x, y), (x + px(24.0), y)], style, line),
+        });
+    }
+    Ok(())
+}
+
+/// A line, dashed or not.
+fn stroke<'a, At: Clone + 'static>(
+    path: Vec<At>,
+    style: Style,
+    line: ShapeStyle,
+) -> DynElement<'static, SVGBackend<'a>, At> {
+    match style {
+        Style::Dashed => DashedPathElement::new(path, px(7.0), px(4.0), line).into_dyn(),
+        _ => PathElement::new(path, line).into_dyn(),
+    }
+}
+
+/// A marker whose shape, too, tells series apart.
+fn marker<'a, At: Clone + 'static>(k: usize, at: At) -> DynElement<'static, SVGBackend<'a>, At> {
+    let fill = colour_of(k).filled();
+    match k % 4 {
+        0 => Circle::new(at, px(3.2), fill).into_dyn(),
+        1 => TriangleMarker::new(at, px(4.0), fill).into_dyn(),
+        2 => Cross::new(at, px(3.0), pen(colour_of(k), 1.8)).into_dyn(),
+        _ => Circle::new(at, px(3.0), pen(colour_of(k), 1.4)).into_dyn(),
+    }
+}
+
+/// The corner where a legend covers the fewest points.
+fn corner(points: impl Iterator<Item = (f64, f64)>, x: &Scale, y: &Scale) -> SeriesLabelPosition {
+    use SeriesLabelPosition::{LowerLeft, LowerRight, UpperLeft, UpperRight};
+    let mut corners = [(0, UpperRight), (0, UpperLeft), (0, LowerRight), (0, LowerLeft)];
+    for at in points {
+        let place = |scale: &Scale, v: f64| scale.map(&v, (0, 100));
+        let (left, low) = (place(x, at.0) < 50, place(y, at.1) < 60);
+        corners[usize::from(left) + 2 * usize::from(low)].0 += 1;
+    }
+    corners.into_iter().min_by_key(|corner| corner.0).map_or(UpperRight, |corner| corner.1)
 }
 
 #[cfg(test)]

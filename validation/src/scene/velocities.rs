@@ -1,7 +1,7 @@
 //! `velocities` of what is filled.
 
+use chacha20::ChaCha8Rng;
 use psidpd_core::document::{FileError, Section};
-use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 /// How particles move at the start.

@@ -1,47 +1,30 @@
 //! The fast engine: the same forces as [`Engine`](super::Engine), from a sweep over particles in the order
 //! of cells.
 //!
-//! Every step the particles are sorted into rows of bins ([`grid`], [`machine`]). Each layer of rows
-//! ([`layer`]) finds the pairs in half of its neighbourhood: the bins where a particle looks
+//! Every step the particles are sorted into columns of cells ([`grid`], [`workspace`]). Each plane of columns
+//! ([`plane`]) finds the pairs in half of its neighbourhood: the cells where a particle looks
 //! ([`windows`]), cut into sixteens for four particles that look together ([`chunks`]), and who of those
-//! is near ([`look`]), in words of sixteen bits ([`quantum`]). Pairs are evaluated in blocks that stay in
-//! the first-level cache ([`block`], [`evaluate`], [`thermostat`], [`terms`]; [`aside`] for formulas and
+//! is near ([`look`]), in words of sixteen bits ([`fixed16_scale`]). Pairs are evaluated in blocks that stay in
+//! the first-level cache ([`buffers`], [`evaluate`], [`thermostat`], [`terms`]; [`aside`] for formulas and
 //! tables), and added to their particles ([`scatter`]). The pairs that a many-body density reaches are
 //! kept for a second pass, after ψ ([`many_body`]). There is no neighbour list: at the speed that DPD
 //! particles move, one lives a few steps and costs more than it saves.
 //!
 //! [`simd`] has the vectors of each instruction set, [`arithmetic`] the two precisions, [`compiled`]
-//! the passes for each of both, chosen once. [`pool`] shares layers among threads; what a layer adds
+//! the passes for each of both, chosen once. [`pool`] shares planes among threads; what a plane adds
 //! to another has accumulators of its own, so sums are the same for any number of threads.
 
-mod arithmetic;
-mod aside;
-mod block;
-mod chunks;
 mod compiled;
-mod evaluate;
-mod forces;
-mod frame;
-mod grid;
-mod keep;
-mod layer;
-mod look;
-mod machine;
+mod first_pass;
+mod ground;
 mod many_body;
+mod pair_batch;
+mod pair_search;
 mod pool;
-mod quantum;
-mod scatter;
-mod settings;
 mod simd;
-mod terms;
-mod thermostat;
-mod weights;
-mod whole;
-mod windows;
+mod workspace;
 
-pub(super) use machine::vectors;
 pub use pool::{Pool, part};
-pub use settings::{Instructions, Precision, Settings};
 
 use super::domain::PeriodicBox;
 use super::error::EngineError;
@@ -49,15 +32,16 @@ use super::evaluator::PassCounts;
 use super::noise::PairNoise;
 use super::particles::{Particles, Step};
 use super::plan::Plan;
+use super::settings::{Instructions, Precision, Settings};
 use super::tally::{Tally, Want};
 use crate::model::Fluid;
 use crate::model::expression::TooLarge;
-use arithmetic::{Double, Mixed};
-use frame::Frame;
-use grid::Grid;
-use machine::{Given, Machine, Out};
+use ground::arithmetic::{Double, Mixed};
+use ground::box_geometry::BoxGeometry;
+use ground::cell_grid::CellGrid;
 use std::sync::Arc;
 use std::time::Instant;
+use workspace::{ForceSink, Input, Workspace};
 
 /// Forces of one fluid, fast: [`Sweep::evaluate`] where all particles are in hand. For a rank of a host, with ghosts for
 /// whatever is beyond it, an evaluation is [`Sweep::first`], a round of slopes from owners to ghosts, and
@@ -66,8 +50,8 @@ pub struct Sweep {
     plan: Plan,
     settings: Settings,
     pool: Arc<Pool>,
-    machine: Both,
-    kinds: Vec<i32>,
+    workspace: EitherPrecision,
+    species_of_type: Vec<i32>,
     /// In the host's order, where it has ghosts.
     slopes: Vec<f64>,
     counts: PassCounts,
@@ -92,7 +76,7 @@ pub struct Around<'a> {
 /// Seconds spent in the parts of evaluations, since the engine was made.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Times {
-    /// Sorting particles into bins.
+    /// Sorting particles into cells.
     pub sort: f64,
     /// Finding pairs; forces that need no density, noise among them; weights.
     pub first: f64,
@@ -112,17 +96,17 @@ fn lap(since: &mut Instant, sum: &mut f64) {
 }
 
 /// One of both.
-enum Both {
-    Mixed(Box<Machine<Mixed>>),
-    Double(Box<Machine<Double>>),
+enum EitherPrecision {
+    Mixed(Box<Workspace<Mixed>>),
+    Double(Box<Workspace<Double>>),
 }
 
 /// Does the same with the machine of either precision.
 macro_rules! with {
-    ($both:expr, $machine:ident => $do:expr) => {
+    ($both:expr, $workspace:ident => $do:expr) => {
         match $both {
-            Both::Mixed($machine) => $do,
-            Both::Double($machine) => $do,
+            EitherPrecision::Mixed($workspace) => $do,
+            EitherPrecision::Double($workspace) => $do,
         }
     };
 }
@@ -137,7 +121,7 @@ impl Clone for Sweep {
     /// An engine of its own for the same fluid, with the same threads, before any evaluation.
     fn clone(&self) -> Sweep {
         let mut clone = Sweep::of_plan(self.plan.clone(), self.settings, self.pool.clone());
-        clone.kinds.clone_from(&self.kinds);
+        clone.species_of_type.clone_from(&self.species_of_type);
         clone
     }
 }
@@ -157,17 +141,21 @@ impl Sweep {
             settings.instructions = Instructions::best();
         }
         let threads = pool.threads();
-        let machine = match settings.precision {
-            Precision::Mixed => Both::Mixed(Box::new(Machine::new(&plan, settings.instructions, threads))),
-            Precision::Double => Both::Double(Box::new(Machine::new(&plan, settings.instructions, threads))),
+        let workspace = match settings.precision {
+            Precision::Mixed => {
+                EitherPrecision::Mixed(Box::new(Workspace::new(&plan, settings.instructions, threads)))
+            }
+            Precision::Double => {
+                EitherPrecision::Double(Box::new(Workspace::new(&plan, settings.instructions, threads)))
+            }
         };
-        let kinds = (0..plan.species.len() as i32).collect();
+        let species_of_type = (0..plan.species.len() as i32).collect();
         Sweep {
             plan,
             settings,
             pool,
-            machine,
-            kinds,
+            workspace,
+            species_of_type,
             slopes: Vec::new(),
             counts: PassCounts::default(),
             owned: 0,
@@ -205,31 +193,33 @@ impl Sweep {
 
     /// As [`Engine::out_of_bounds`](super::Engine::out_of_bounds).
     pub fn out_of_bounds(&self) -> [u64; 2] {
-        with!(&self.machine, m => m.out_of_bounds())
+        with!(&self.workspace, m => m.out_of_bounds())
     }
 
     /// As [`Engine::map_kinds`](super::Engine::map_kinds).
     ///
     /// # Errors
     /// A species index out of range.
-    pub fn map_kinds(&mut self, kinds: &[i32]) -> Result<(), EngineError> {
-        if kinds.iter().any(|s| *s >= self.plan.species.len() as i32) {
+    pub fn map_kinds(&mut self, species_of_type: &[i32]) -> Result<(), EngineError> {
+        if species_of_type.iter().any(|s| *s >= self.plan.species.len() as i32) {
             return Err(EngineError::Host("a type is mapped to a species the model does not have"));
         }
-        self.kinds = kinds.to_vec();
+        self.species_of_type = species_of_type.to_vec();
         Ok(())
     }
 
     /// Whether particles in `domain` meet one image only of each other, as a sweep without ghosts needs:
     /// periods of twice the cut-off or more, and edges as LAMMPS has them, along the axes if some directions are open.
     pub fn fits(&self, domain: &PeriodicBox) -> bool {
-        let frame = Frame::of_box(domain, self.plan.dimensions);
+        let geometry = BoxGeometry::of_box(domain, self.plan.dimensions);
         is_open(domain, &self.plan)
-            || frame.filter(can_stretch).is_some_and(|f| Grid::new(&f, cutoff(&self.plan), 1).is_some())
+            || geometry
+                .filter(can_stretch)
+                .is_some_and(|f| CellGrid::new(&f, cutoff(&self.plan), 1).is_some())
     }
 
     /// All forces on particles in a box: writes them to `force`, or adds them to what is there, and returns what was asked
-    /// for. Nothing but densities and ψ is kept of all particles on the way: one layer of cells after another has all its
+    /// for. Nothing but densities and ψ is kept of all particles on the way: one plane of cells after another has all its
     /// passes.
     ///
     /// `v` may be empty and `step` `None` where no thermostat acts; with `step` `None` only conservative
@@ -257,15 +247,15 @@ impl Sweep {
         if force.len() < self.owned {
             return Err(EngineError::Host("the force array is too short"));
         }
-        let given = Given::new(particles, &[], v, &self.kinds, thermostat, want);
+        let input = Input::new(particles, &[], v, &self.species_of_type, thermostat, want);
         let (plan, pool, times) = (&self.plan, &self.pool, &mut self.times);
-        let out = Out::new(force, add, particles.tag);
-        let tally = with!(&mut self.machine, m => {
+        let out = ForceSink::new(force, add, particles.tag);
+        let tally = with!(&mut self.workspace, m => {
             let mut since = Instant::now();
-            let (frame, grid) = region(m, plan, pool, domain, &given)?;
-            m.find_order(pool, frame, grid, &given)?;
+            let (geometry, grid) = region(m, plan, pool, domain, &input)?;
+            m.sort_into_cells(pool, geometry, grid, &input)?;
             lap(&mut since, &mut times.sort);
-            m.stream(pool, plan, &given, out, times)?;
+            m.run_all(pool, plan, &input, out, times)?;
             m.tally()
         });
         self.slopes.clear();
@@ -293,14 +283,14 @@ impl Sweep {
         if !images.is_empty() && images.len() != self.all - self.owned {
             return Err(EngineError::Host("not as many ghosts as it was said of whether they are images"));
         }
-        let given = Given::new(particles, images, v, &self.kinds, thermostat, want);
+        let input = Input::new(particles, images, v, &self.species_of_type, thermostat, want);
         let (plan, pool, times) = (&self.plan, &self.pool, &mut self.times);
-        with!(&mut self.machine, m => {
+        with!(&mut self.workspace, m => {
             let mut since = Instant::now();
-            let (frame, grid) = region(m, plan, pool, domain, &given)?;
-            m.find_order(pool, frame, grid, &given)?;
+            let (geometry, grid) = region(m, plan, pool, domain, &input)?;
+            m.sort_into_cells(pool, geometry, grid, &input)?;
             lap(&mut since, &mut times.sort);
-            m.first(pool, plan, &given, times)?;
+            m.first(pool, plan, &input, times)?;
             let mut since = Instant::now();
             m.slopes_to_host(&mut self.slopes);
             lap(&mut since, &mut times.excess);
@@ -323,7 +313,7 @@ impl Sweep {
         if particles.tag.len() != all || particles.kind.len() != all || particles.owned > all {
             return Err(EngineError::Host("particle arrays have different lengths"));
         }
-        // Thirty-two times a place is a word; copies of a layer have places too.
+        // Thirty-two times a place is a word; copies of a plane have places too.
         if all > 1 << 26 {
             return Err(EngineError::Host("more than 2^26 particles and ghosts on one rank"));
         }
@@ -363,7 +353,7 @@ impl Sweep {
     /// Fetches the slopes of owned particles after [`Sweep::evaluate`], with room for `all`: for a host's questions about
     /// single pairs, before which nobody needs them.
     pub fn fetch_slopes(&mut self, all: usize) {
-        with!(&self.machine, m => m.slopes_to_host(&mut self.slopes));
+        with!(&self.workspace, m => m.slopes_to_host(&mut self.slopes));
         self.slopes.resize(self.slope_width() * all, 0.0);
     }
 
@@ -394,8 +384,8 @@ impl Sweep {
         }
         self.count_second();
         let (pool, slopes, times) = (&self.pool, &self.slopes, &mut self.times);
-        let out = Out::new(force, add, particles.tag);
-        with!(&mut self.machine, m => {
+        let out = ForceSink::new(force, add, particles.tag);
+        with!(&mut self.workspace, m => {
             let mut since = Instant::now();
             m.slopes_from_host(slopes);
             lap(&mut since, &mut times.excess);
@@ -409,18 +399,18 @@ impl Sweep {
     /// [`Engine::local_densities`](super::Engine::local_densities), those that forces do not need being zero.
     pub fn local_densities(&self, excess: &mut Vec<f64>, densities: &mut Vec<f64>) {
         let variables = self.plan.densities.len() * self.plan.species.len();
-        with!(&self.machine, m => m.to_host(variables, excess, densities));
+        with!(&self.workspace, m => m.to_host(variables, excess, densities));
     }
 
     /// The host's numbers of its particles in the order of cells: an order to keep them in that makes
     /// sorting cheap.
     pub fn order(&self) -> &[u32] {
-        with!(&self.machine, m => &m.order)
+        with!(&self.workspace, m => &m.order)
     }
 
     /// Bytes held in arrays over particles and pairs.
     pub fn memory(&self) -> usize {
-        self.slopes.capacity() * size_of::<f64>() + with!(&self.machine, m => m.memory())
+        self.slopes.capacity() * size_of::<f64>() + with!(&self.workspace, m => m.memory())
     }
 }
 
@@ -434,33 +424,34 @@ fn is_open(domain: &PeriodicBox, plan: &Plan) -> bool {
     !domain.periodic()[..plan.dimensions].iter().any(|p| *p)
 }
 
-/// Whether a frame is still one when open directions are as long as they have to be: what leans along one is none.
-fn can_stretch(frame: &Frame) -> bool {
-    frame.is_closed() || !frame.is_tilted()
+/// Whether a box geometry is still one when open directions are as long as they have to be: what leans along one is none.
+fn can_stretch(geometry: &BoxGeometry) -> bool {
+    geometry.is_fully_periodic() || !geometry.is_tilted()
 }
 
 /// The region to be swept, and its cells: all of the box along its periodic directions, along the others what the
 /// particles span, with room for ghosts within reach of them.
 fn region<P: compiled::Compiled>(
-    machine: &mut Machine<P>,
+    workspace: &mut Workspace<P>,
     plan: &Plan,
     pool: &Pool,
     domain: &PeriodicBox,
-    given: &Given,
-) -> Result<(Frame, Grid), EngineError> {
+    input: &Input,
+) -> Result<(BoxGeometry, CellGrid), EngineError> {
     let cutoff = cutoff(plan);
-    let mut frame = Frame::of_box(domain, plan.dimensions);
-    if frame.is_none_or(|frame| !frame.is_closed()) {
-        let margin = if given.particles.owned < given.particles.x.len() { cutoff } else { 0.0 };
-        let (low, high) = machine.extremes(pool, given)?;
+    let mut geometry = BoxGeometry::of_box(domain, plan.dimensions);
+    if geometry.is_none_or(|geometry| !geometry.is_fully_periodic()) {
+        let margin = if input.particles.owned < input.particles.x.len() { cutoff } else { 0.0 };
+        let (low, high) = workspace.extremes(pool, input)?;
         let (low, high) = (low.map(|x| x - margin), high.map(|x| x + margin));
-        frame = match is_open(domain, plan) {
-            true => Some(Frame::around(low, high, plan.dimensions, cutoff)),
-            false => frame.filter(can_stretch).map(|frame| frame.stretched(low, high, cutoff)),
+        geometry = match is_open(domain, plan) {
+            true => Some(BoxGeometry::enclosing(low, high, plan.dimensions, cutoff)),
+            false => geometry.filter(can_stretch).map(|geometry| geometry.stretched(low, high, cutoff)),
         };
     }
-    let count = given.particles.x.len();
-    let grid = frame.and_then(|frame| Grid::new(&frame, cutoff, count).map(|grid| (frame, grid)));
+    let count = input.particles.x.len();
+    let grid =
+        geometry.and_then(|geometry| CellGrid::new(&geometry, cutoff, count).map(|grid| (geometry, grid)));
     grid.ok_or(EngineError::Host("the box is too narrow, or leans, for a sweep without images as ghosts"))
 }
 

@@ -1,4 +1,4 @@
-use super::layer::Shared as Pointer;
+use crate::engine::sweep::ground::shared_ptr::SharedPtr as Pointer;
 use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex};
@@ -7,7 +7,7 @@ use std::thread::{self, JoinHandle};
 /// Threads that do one piece of work together, again and again, many times a millisecond: they wait for
 /// the next piece by spinning for a while, then asleep.
 pub struct Pool {
-    shared: Arc<Shared>,
+    shared: Arc<SharedPtr>,
     workers: Vec<JoinHandle<()>>,
 }
 
@@ -19,7 +19,7 @@ struct Work(*const (dyn Fn(usize) + Sync));
 // SAFETY: what is pointed to is `Sync`, and outlives every use; see `Pool::run`.
 unsafe impl Send for Work {}
 
-struct Shared {
+struct SharedPtr {
     /// Counts pieces of work; a change calls the workers.
     epoch: AtomicUsize,
     /// Workers not done with the present piece.
@@ -42,7 +42,7 @@ impl Pool {
 
     /// A pool of `threads`, the caller's among them; at most [`Pool::MOST`].
     pub fn new(threads: NonZeroUsize) -> Pool {
-        let shared = Arc::new(Shared {
+        let shared = Arc::new(SharedPtr {
             epoch: AtomicUsize::new(0),
             busy: AtomicUsize::new(0),
             failed: AtomicBool::new(false),
@@ -102,7 +102,7 @@ impl Pool {
     }
 }
 
-impl Shared {
+impl SharedPtr {
     /// Calls the workers to the next piece of work.
     fn call(&self, work: Option<Work>) {
         let asleep = {
@@ -119,7 +119,7 @@ impl Shared {
 }
 
 /// Waits for the workers when it goes.
-struct Wait<'a>(&'a Shared);
+struct Wait<'a>(&'a SharedPtr);
 
 impl Drop for Wait<'_> {
     fn drop(&mut self) {
@@ -132,7 +132,7 @@ impl Drop for Wait<'_> {
     }
 }
 
-fn worker(shared: &Shared, number: usize) {
+fn worker(shared: &SharedPtr, number: usize) {
     let mut seen = 0;
     loop {
         let mut spins = 0;

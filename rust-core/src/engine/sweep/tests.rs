@@ -93,7 +93,7 @@ fn every() -> impl Iterator<Item = (Precision, Instructions)> {
 }
 
 /// Forces and totals by a sweep without ghosts.
-fn swept(sweep: &mut Sweep, cloud: &Cloud, want: Want) -> (Vec<[f64; 3]>, Tally) {
+fn data(sweep: &mut Sweep, cloud: &Cloud, want: Want) -> (Vec<[f64; 3]>, Tally) {
     let particles = cloud.particles();
     let mut force = vec![[0.0; 3]; cloud.x.len()];
     let tally =
@@ -322,12 +322,12 @@ fn every_model_by_every_path_has_the_forces_of_the_plain_engine() {
                 let what = format!("{name}, box {b}, {precision}, {instructions}");
                 let mut sweep = Sweep::new(&fluid, settings(precision, instructions, 1)).unwrap();
                 assert!(sweep.fits(&cloud.domain));
-                let (here, totals) = swept(&mut sweep, &cloud, Want::TOTALS);
+                let (here, totals) = data(&mut sweep, &cloud, Want::TOTALS);
                 let off = difference(&force, &here);
                 assert!(off < tolerance(precision), "{what}: {off:.1e}");
                 let off = tally_difference(&tally, &totals);
                 assert!(off < tolerance(precision), "{what}: totals {off:.1e} {tally:?} {totals:?}");
-                let (again, none) = swept(&mut sweep, &cloud, Want::FORCES);
+                let (again, none) = data(&mut sweep, &cloud, Want::FORCES);
                 assert_eq!(here, again, "{what}: forces depend on what else is wanted");
                 assert_eq!(none.pair, 0.0);
                 let (ghosts, totals) = with_ghosts(&mut sweep, &cloud);
@@ -356,10 +356,10 @@ fn any_number_of_threads_gives_the_same_bits() {
             let cloud = Cloud::new(domain, fluid.dimensions, fluid.species.len(), 1500, 3);
             for (precision, instructions) in every() {
                 let mut one = Sweep::new(&fluid, settings(precision, instructions, 1)).unwrap();
-                let (force, tally) = swept(&mut one, &cloud, Want::TOTALS);
+                let (force, tally) = data(&mut one, &cloud, Want::TOTALS);
                 for threads in [2, 3, 7] {
                     let mut more = Sweep::new(&fluid, settings(precision, instructions, threads)).unwrap();
-                    let (here, totals) = swept(&mut more, &cloud, Want::TOTALS);
+                    let (here, totals) = data(&mut more, &cloud, Want::TOTALS);
                     assert!(
                         force == here && tally == totals,
                         "{precision}, {instructions}, {threads} threads"
@@ -370,46 +370,46 @@ fn any_number_of_threads_gives_the_same_bits() {
     }
 }
 
-/// Accumulators are used again as a sweep goes through its layers, and slabs of threads begin anywhere: boxes of a few
-/// layers and of many, full and nearly empty ones, swept by the same engines one after another.
+/// Accumulators are used again as a sweep goes through its planes, and slabs of threads begin anywhere: boxes of a few
+/// planes and of many, full and nearly empty ones, swept by the same engines one after another.
 #[test]
 fn any_number_of_layers_and_threads_gives_the_forces_of_the_plain_engine() {
     for fluid in [shipped("warren2003-set6.toml"), shipped("standard-dpd.toml"), many()] {
         let engines = (1..=5)
             .map(|t| Sweep::new(&fluid, settings(Precision::Double, Instructions::best(), t)).unwrap());
         let mut engines: Vec<Sweep> = engines.collect();
-        for (layers, periodic) in
+        for (planes, periodic) in
             [2, 9, 3, 12, 4, 7, 5, 6, 8].into_iter().flat_map(|l| [(l, true), (l, false)])
         {
-            let lengths = [3.0, 3.0, layers as f64 + 0.3].map(|l| l * fluid.cutoff());
+            let lengths = [3.0, 3.0, planes as f64 + 0.3].map(|l| l * fluid.cutoff());
             let domain = PeriodicBox::orthogonal([0.0; 3], lengths, [true, true, periodic]).unwrap();
-            let mut cloud = Cloud::new(domain, 3, fluid.species.len(), 25 * layers, layers as u64);
+            let mut cloud = Cloud::new(domain, 3, fluid.species.len(), 25 * planes, planes as u64);
             for x in &mut cloud.x {
                 // Fewer and fewer with height.
                 x[2] *= x[2] / lengths[2];
             }
             let (force, tally) = plain(&fluid, &cloud);
-            let (first, first_tally) = swept(&mut engines[0], &cloud, Want::TOTALS);
+            let (first, first_tally) = data(&mut engines[0], &cloud, Want::TOTALS);
             let off = difference(&force, &first).max(tally_difference(&tally, &first_tally));
-            assert!(off < tolerance(Precision::Double), "{layers} layers, periodic {periodic}: {off:.1e}");
+            assert!(off < tolerance(Precision::Double), "{planes} planes, periodic {periodic}: {off:.1e}");
             for sweep in &mut engines {
-                let (here, totals) = swept(sweep, &cloud, Want::TOTALS);
-                assert!(here == first && totals == first_tally, "{layers} layers, {:?}", sweep.settings());
+                let (here, totals) = data(sweep, &cloud, Want::TOTALS);
+                assert!(here == first && totals == first_tally, "{planes} planes, {:?}", sweep.settings());
             }
         }
     }
 }
 
-/// Of a box without ghosts, forces and densities of a few layers only are summed at a time.
+/// Of a box without ghosts, forces and densities of a few planes only are summed at a time.
 #[test]
 fn longer_boxes_have_no_more_accumulators() {
     for (fluid, most) in [(shipped("warren2003-set6.toml"), 120.0), (many(), 200.0)] {
-        let memory = |layers: usize| {
+        let memory = |planes: usize| {
             let domain =
-                PeriodicBox::orthogonal([0.0; 3], [6.0, 6.0, layers as f64 + 0.1], [true; 3]).unwrap();
-            let cloud = Cloud::new(domain, 3, fluid.species.len(), 300 * layers, 5);
+                PeriodicBox::orthogonal([0.0; 3], [6.0, 6.0, planes as f64 + 0.1], [true; 3]).unwrap();
+            let cloud = Cloud::new(domain, 3, fluid.species.len(), 300 * planes, 5);
             let mut sweep = Sweep::new(&fluid, settings(Precision::Mixed, Instructions::best(), 1)).unwrap();
-            swept(&mut sweep, &cloud, Want::FORCES);
+            data(&mut sweep, &cloud, Want::FORCES);
             sweep.memory() as f64
         };
         let per_particle = (memory(40) - memory(20)) / (300.0 * 20.0);
@@ -424,7 +424,7 @@ fn the_order_of_particles_matters_to_rounding_alone() {
     let cloud = Cloud::new(domain.clone(), 3, 2, 800, 5);
     for (precision, instructions) in every() {
         let mut sweep = Sweep::new(&fluid, settings(precision, instructions, 1)).unwrap();
-        let (force, tally) = swept(&mut sweep, &cloud, Want::TOTALS);
+        let (force, tally) = data(&mut sweep, &cloud, Want::TOTALS);
         let order: Vec<usize> = (0..800).map(|k| k * 397 % 800).collect();
         let shuffled = Cloud {
             domain: domain.clone(),
@@ -433,7 +433,7 @@ fn the_order_of_particles_matters_to_rounding_alone() {
             tag: order.iter().map(|k| cloud.tag[*k]).collect(),
             kind: order.iter().map(|k| cloud.kind[*k]).collect(),
         };
-        let (other, totals) = swept(&mut sweep, &shuffled, Want::TOTALS);
+        let (other, totals) = data(&mut sweep, &shuffled, Want::TOTALS);
         let same: Vec<[f64; 3]> = order.iter().map(|k| force[*k]).collect();
         assert!(difference(&same, &other) < tolerance(precision));
         assert!(tally_difference(&tally, &totals) < tolerance(precision));
@@ -444,24 +444,24 @@ fn the_order_of_particles_matters_to_rounding_alone() {
     }
 }
 
-/// Teams of eight particles in sparse rows, of four in others; few enough in some that a team is not full, or too far
+/// Teams of eight particles in sparse rows, of four in others; few enough in some that an i-cluster is not full, or too far
 /// apart to look together.
 #[test]
 fn rows_with_few_particles_and_with_many() {
     let fluids = [shipped("warren2003-set6.toml"), many(), shipped("van-der-waals-2d.toml")];
-    let mut teams = vec![];
+    let mut i_cluster_sizes = vec![];
     for fluid in &fluids {
         for density in [0.4, 1.5, 4.0, 5.0, 11.0] {
             for (b, domain) in boxes(fluid.dimensions, 4.3 * fluid.cutoff()).into_iter().enumerate() {
                 let volume = domain.volume(fluid.dimensions) / fluid.cutoff().powi(fluid.dimensions as i32);
                 let count = (density * volume) as usize;
-                let frame = Frame::of_box(&domain, fluid.dimensions).unwrap();
-                teams.push(Grid::new(&frame, fluid.cutoff(), count).unwrap().team);
+                let geometry = BoxGeometry::of_box(&domain, fluid.dimensions).unwrap();
+                i_cluster_sizes.push(CellGrid::new(&geometry, fluid.cutoff(), count).unwrap().i_cluster_size);
                 let cloud = Cloud::new(domain, fluid.dimensions, fluid.species.len(), count, 21 + b as u64);
                 let (force, tally) = plain(fluid, &cloud);
                 for (precision, instructions) in every() {
                     let mut sweep = Sweep::new(fluid, settings(precision, instructions, 2)).unwrap();
-                    let here = swept(&mut sweep, &cloud, Want::TOTALS);
+                    let here = data(&mut sweep, &cloud, Want::TOTALS);
                     for (forces, totals) in [here, with_ghosts(&mut sweep, &cloud)] {
                         let off = difference(&force, &forces).max(tally_difference(&tally, &totals));
                         assert!(
@@ -473,7 +473,7 @@ fn rows_with_few_particles_and_with_many() {
             }
         }
     }
-    assert!(teams.contains(&4) && teams.contains(&8));
+    assert!(i_cluster_sizes.contains(&4) && i_cluster_sizes.contains(&8));
 }
 
 /// Crowds of which one particle has more neighbours than a block has room for, walls without periods, and
@@ -491,7 +491,7 @@ fn crowds_open_sides_and_runaways() {
     let (force, tally) = plain(&fluid, &cloud);
     for (precision, instructions) in every() {
         let mut sweep = Sweep::new(&fluid, settings(precision, instructions, 2)).unwrap();
-        let (here, totals) = swept(&mut sweep, &cloud, Want::TOTALS);
+        let (here, totals) = data(&mut sweep, &cloud, Want::TOTALS);
         let off = difference(&force, &here);
         // Positions are fractions of an extent of more than a thousand here.
         let tolerance = if precision == Precision::Mixed { 1e-3 } else { 1e-12 };
@@ -508,7 +508,7 @@ fn particles_on_one_point_do_not_push_each_other() {
     cloud.x[1] = cloud.x[0];
     for (precision, instructions) in every() {
         let mut sweep = Sweep::new(&fluid, settings(precision, instructions, 1)).unwrap();
-        let (force, _) = swept(&mut sweep, &cloud, Want::TOTALS);
+        let (force, _) = data(&mut sweep, &cloud, Want::TOTALS);
         assert_eq!(force, [[0.0; 3]; 2]);
     }
 }
@@ -552,7 +552,7 @@ fn what_cannot_be_computed_is_named() {
         assert!(matches!(fails(&good(), Some(&narrow)), EngineError::Host(_)));
         assert!(!sweep.fits(&narrow) && sweep.fits(&domain));
         // And it goes on after errors.
-        swept(&mut sweep, &good(), Want::TOTALS);
+        data(&mut sweep, &good(), Want::TOTALS);
         let mut cloud = good();
         cloud.v[3] = [f64::NAN; 3];
         cloud.x[4] = cloud.x[3].map(|x| x + 0.01);
@@ -581,19 +581,19 @@ fn faults_of_the_passes_name_their_particles() {
                 .evaluate(&domain, &particles, &cloud.v, Some(STEP), Want::FORCES, &mut force, false)
                 .unwrap_err()
         };
-        for layer in 0..9 {
+        for plane in 0..9 {
             // Ten particles on nearly one point.
             let mut cloud = Cloud::new(domain.clone(), 3, 1, 30, 4);
             for k in 0..10 {
-                cloud.x[k] = [2.0, 2.0 + 0.001 * k as f64, layer as f64 + 0.5];
+                cloud.x[k] = [2.0, 2.0 + 0.001 * k as f64, plane as f64 + 0.5];
             }
             let EngineError::ExcessFreeEnergy { tag, .. } = fault(&singular, &cloud) else {
                 panic!("no fault")
             };
             assert!(cloud.tag[..10].contains(&tag), "{tag}");
-            // Two pairs of which one particle each has no velocity, in two layers.
+            // Two pairs of which one particle each has no velocity, in two planes.
             let mut cloud = Cloud::new(domain.clone(), 3, 1, 4, 4);
-            for (k, z) in [(0, layer as f64 + 0.5), (2, 8.5 - layer as f64)] {
+            for (k, z) in [(0, plane as f64 + 0.5), (2, 8.5 - plane as f64)] {
                 cloud.v[k] = [f64::NAN; 3];
                 cloud.x[k] = [3.0, 4.0 - k as f64, z];
                 cloud.x[k + 1] = cloud.x[k].map(|x| x + 0.01);
@@ -609,7 +609,7 @@ fn passes_that_a_fluid_does_not_need_are_left_out() {
     let domain = PeriodicBox::orthogonal([0.0; 3], [5.0; 3], [true; 3]).unwrap();
     let cloud = Cloud::new(domain, 3, 1, 300, 9);
     let mut sweep = Sweep::new(&dpd, Settings::default()).unwrap();
-    swept(&mut sweep, &cloud, Want::FORCES);
+    data(&mut sweep, &cloud, Want::FORCES);
     let counts = sweep.counts();
     assert_eq!((counts.density, counts.excess, counts.energy, counts.virial), (0, 0, 0, 0));
     assert_eq!((counts.search, counts.force, counts.noise), (1, 1, 1));

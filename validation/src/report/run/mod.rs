@@ -52,7 +52,7 @@ const FILES: [(&str, &str); 10] = [
 /// A folder without any of them; a page that cannot be written. A file that cannot be understood is no
 /// error: the page says what is wrong with it.
 pub fn write_run_report(folder: &Path) -> Result<PathBuf, RunReportError> {
-    let page = run_report(folder)?.render()?;
+    let page = run_report(folder)?.render();
     let path = folder.join("report.html");
     write_atomically(&path, page.as_bytes())?;
     Ok(path)

@@ -6,10 +6,10 @@ mod random;
 
 use super::{Arrangement, Initial, Part, Scene};
 use crate::run::State;
+use chacha20::ChaCha8Rng;
 use near::Near;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
-use rand_chacha::ChaCha8Rng;
 
 /// A part that has no room for its particles at the distance they are to keep.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 use super::near::Near;
 use crate::scene::shape::Shape;
+use chacha20::ChaCha8Rng;
 use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
 
 /// How often a place is looked for before a region counts as full.
 const ATTEMPTS: usize = 2000;

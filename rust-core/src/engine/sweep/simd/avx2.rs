@@ -1,8 +1,8 @@
 //! AVX2 with FMA and BMI2.
 
 use super::avx512::{F64x4 as Quad4, operators};
-use super::{Isa, ORDINARY_F32, ORDINARY_F64, Reals, Two, Words, row_at, wide_row_at};
-use crate::engine::sweep::block::PLACE_BITS;
+use super::{BroadcastPair, Isa, ORDINARY_F32, ORDINARY_F64, Reals, Words, record_at, wide_record_at};
+use crate::engine::sweep::ground::arithmetic::OFFSET_BITS;
 use crate::model::kernel::Real;
 use std::arch::x86_64::*;
 use std::ops::{Add, Mul, Sub};
@@ -136,9 +136,9 @@ impl Reals for F32x8 {
         unsafe { F32x8(_mm256_i32gather_ps::<4>(table, index.0)) }
     }
     #[inline(always)]
-    unsafe fn rows(columns: [Self; 4], p: *mut f32) {
+    unsafe fn store_transposed(load_transposed: [Self; 4], p: *mut f32) {
         unsafe {
-            let [a, b, c, d] = columns;
+            let [a, b, c, d] = load_transposed;
             let ab_low = _mm256_castps_pd(_mm256_unpacklo_ps(a.0, b.0));
             let ab_high = _mm256_castps_pd(_mm256_unpackhi_ps(a.0, b.0));
             let cd_low = _mm256_castps_pd(_mm256_unpacklo_ps(c.0, d.0));
@@ -165,7 +165,7 @@ unsafe fn other_four(x: __m256) -> __m256 {
 
 /// Four columns of eight rows of four words.
 #[inline(always)]
-unsafe fn columns_of_words(low: [__m128i; 4], high: [__m128i; 4]) -> [U32x8; 4] {
+unsafe fn transpose_words(low: [__m128i; 4], high: [__m128i; 4]) -> [U32x8; 4] {
     unsafe {
         // Rows k and k + 4 go to the halves of vector k.
         let mut v = [_mm256_setzero_si256(); 4];
@@ -280,12 +280,12 @@ impl Reals for F64x4 {
         unsafe { F64x4(_mm256_i32gather_pd::<8>(table, index.0)) }
     }
     #[inline(always)]
-    unsafe fn rows([a, b, c, d]: [Self; 4], p: *mut f64) {
+    unsafe fn store_transposed([a, b, c, d]: [Self; 4], p: *mut f64) {
         unsafe {
-            let rows = transposed([a.0, b.0, c.0, d.0]);
+            let store_transposed = transposed([a.0, b.0, c.0, d.0]);
             let mut k = 0;
             while k < 4 {
-                _mm256_storeu_pd(p.add(4 * k), rows[k]);
+                _mm256_storeu_pd(p.add(4 * k), store_transposed[k]);
                 k += 1;
             }
         }
@@ -412,10 +412,10 @@ impl Isa for Avx2 {
     type Quad = Quad4;
 
     #[inline(always)]
-    unsafe fn near<const SHIFTS: bool>(
+    unsafe fn distance_masks<const SHIFTS: bool>(
         x: [*const u16; 3],
         shift: [u32; 3],
-        four: &[Two; 2],
+        four: &[BroadcastPair; 2],
         limit: i16,
     ) -> u64 {
         unsafe {
@@ -439,10 +439,11 @@ impl Isa for Avx2 {
             let mut mask = 0;
             let mut k = 0;
             while k < 4 {
-                let near = _mm256_cmpgt_epi16(limit, sums[k]);
+                let distance_masks = _mm256_cmpgt_epi16(limit, sums[k]);
                 let next = _mm256_cmpgt_epi16(limit, sums[k + 1]);
                 // Halves of both follow each other; then those of one.
-                let bytes = _mm256_permute4x64_epi64::<0b11_01_10_00>(_mm256_packs_epi16(near, next));
+                let bytes =
+                    _mm256_permute4x64_epi64::<0b11_01_10_00>(_mm256_packs_epi16(distance_masks, next));
                 mask |= (_mm256_movemask_epi8(bytes) as u32 as u64) << (16 * k);
                 k += 2;
             }
@@ -450,11 +451,11 @@ impl Isa for Avx2 {
         }
     }
     #[inline(always)]
-    unsafe fn fill16(x: u16, p: *mut u16) {
+    unsafe fn broadcast16(x: u16, p: *mut u16) {
         unsafe { _mm256_storeu_si256(p.cast(), _mm256_set1_epi16(x as i16)) }
     }
     #[inline(always)]
-    unsafe fn turn(masks: *mut u64) {
+    unsafe fn transpose_masks(masks: *mut u64) {
         unsafe {
             // In halves, words 0 of both masks, words 1, …; then those of both halves together.
             let words = _mm256_setr_epi8(
@@ -472,17 +473,17 @@ impl Isa for Avx2 {
         }
     }
     #[inline(always)]
-    unsafe fn collect(bases: *const u32, mask: u64, p: *mut u32) -> usize {
+    unsafe fn expand_mask(j_bases: *const u32, mask: u64, p: *mut u32) -> usize {
         unsafe {
             let mut found = 0;
             let mut k = 0;
             while k < 8 {
                 let mask = (mask >> (8 * k)) as u32 & 0xff;
-                let mut base = _mm256_set1_epi32(*bases.add(k / 2) as i32);
+                let mut base = _mm256_set1_epi32(*j_bases.add(k / 2) as i32);
                 if k % 2 == 1 {
-                    base = _mm256_add_epi32(base, _mm256_set1_epi32(8 << PLACE_BITS));
+                    base = _mm256_add_epi32(base, _mm256_set1_epi32(8 << OFFSET_BITS));
                 }
-                let places = _mm256_slli_epi32::<{ PLACE_BITS as i32 }>(order(mask));
+                let places = _mm256_slli_epi32::<{ OFFSET_BITS as i32 }>(order(mask));
                 _mm256_storeu_si256(p.add(found).cast(), _mm256_add_epi32(base, places));
                 found += mask.count_ones() as usize;
                 k += 1;
@@ -500,60 +501,60 @@ impl Isa for Avx2 {
         }
     }
     #[inline(always)]
-    unsafe fn first_of<const MANY: usize>(x: F32x8) -> F32x8 {
+    unsafe fn cluster_first<const CLUSTER: usize>(x: F32x8) -> F32x8 {
         unsafe {
             let first = _mm256_permute_ps::<0x00>(x.0);
-            F32x8(if MANY == 8 { _mm256_permute2f128_ps::<0x00>(first, first) } else { first })
+            F32x8(if CLUSTER == 8 { _mm256_permute2f128_ps::<0x00>(first, first) } else { first })
         }
     }
     #[inline(always)]
-    unsafe fn least_of<const MANY: usize>(x: F32x8) -> F32x8 {
+    unsafe fn cluster_least<const CLUSTER: usize>(x: F32x8) -> F32x8 {
         unsafe {
             let two = _mm256_min_ps(x.0, _mm256_permute_ps::<0b10_11_00_01>(x.0));
             let four = _mm256_min_ps(two, _mm256_permute_ps::<0b01_00_11_10>(two));
-            F32x8(if MANY == 8 { _mm256_min_ps(four, other_four(four)) } else { four })
+            F32x8(if CLUSTER == 8 { _mm256_min_ps(four, other_four(four)) } else { four })
         }
     }
     #[inline(always)]
-    unsafe fn greatest_of<const MANY: usize>(x: F32x8) -> F32x8 {
+    unsafe fn cluster_greatest<const CLUSTER: usize>(x: F32x8) -> F32x8 {
         unsafe {
             let two = _mm256_max_ps(x.0, _mm256_permute_ps::<0b10_11_00_01>(x.0));
             let four = _mm256_max_ps(two, _mm256_permute_ps::<0b01_00_11_10>(two));
-            F32x8(if MANY == 8 { _mm256_max_ps(four, other_four(four)) } else { four })
+            F32x8(if CLUSTER == 8 { _mm256_max_ps(four, other_four(four)) } else { four })
         }
     }
     #[inline(always)]
-    unsafe fn columns<const ALL: bool>(base: *const u8, offsets: *const u32) -> [U32x8; 8] {
+    unsafe fn load_transposed<const ALL: bool>(base: *const u8, offsets: *const u32) -> [U32x8; 8] {
         unsafe {
-            let mut rows = [[_mm_setzero_si128(); 8]; 2];
+            let mut store_transposed = [[_mm_setzero_si128(); 8]; 2];
             let mut k = 0;
             while k < 8 {
-                let at: *const __m128i = row_at(base, offsets, k).cast();
-                rows[0][k] = _mm_loadu_si128(at);
-                rows[1][k] = _mm_loadu_si128(at.add(1));
+                let at: *const __m128i = record_at(base, offsets, k).cast();
+                store_transposed[0][k] = _mm_loadu_si128(at);
+                store_transposed[1][k] = _mm_loadu_si128(at.add(1));
                 k += 1;
             }
-            let [[a0, a1, a2, a3, a4, a5, a6, a7], [b0, b1, b2, b3, b4, b5, b6, b7]] = rows;
-            let [a, b, c, d] = columns_of_words([a0, a1, a2, a3], [a4, a5, a6, a7]);
+            let [[a0, a1, a2, a3, a4, a5, a6, a7], [b0, b1, b2, b3, b4, b5, b6, b7]] = store_transposed;
+            let [a, b, c, d] = transpose_words([a0, a1, a2, a3], [a4, a5, a6, a7]);
             let zero = U32x8(_mm256_setzero_si256());
             let [e, f, g, h] =
-                if ALL { columns_of_words([b0, b1, b2, b3], [b4, b5, b6, b7]) } else { [zero; 4] };
+                if ALL { transpose_words([b0, b1, b2, b3], [b4, b5, b6, b7]) } else { [zero; 4] };
             [a, b, c, d, e, f, g, h]
         }
     }
     #[inline(always)]
-    unsafe fn wide_columns<const ALL: bool>(base: *const u8, offsets: *const u32) -> [F64x4; 8] {
+    unsafe fn load_transposed_wide<const ALL: bool>(base: *const u8, offsets: *const u32) -> [F64x4; 8] {
         unsafe {
-            let mut rows = [[_mm256_setzero_pd(); 4]; 2];
+            let mut store_transposed = [[_mm256_setzero_pd(); 4]; 2];
             let mut k = 0;
             while k < 4 {
-                let at: *const f64 = wide_row_at(base, offsets, k).cast();
-                rows[0][k] = _mm256_loadu_pd(at);
-                rows[1][k] = _mm256_loadu_pd(at.add(4));
+                let at: *const f64 = wide_record_at(base, offsets, k).cast();
+                store_transposed[0][k] = _mm256_loadu_pd(at);
+                store_transposed[1][k] = _mm256_loadu_pd(at.add(4));
                 k += 1;
             }
-            let [a, b, c, d] = transposed(rows[0]);
-            let [e, f, g, h] = if ALL { transposed(rows[1]) } else { rows[1] };
+            let [a, b, c, d] = transposed(store_transposed[0]);
+            let [e, f, g, h] = if ALL { transposed(store_transposed[1]) } else { store_transposed[1] };
             [F64x4(a), F64x4(b), F64x4(c), F64x4(d), F64x4(e), F64x4(f), F64x4(g), F64x4(h)]
         }
     }

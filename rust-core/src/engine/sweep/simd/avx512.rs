@@ -1,7 +1,7 @@
 //! AVX-512 (F, BW, DQ, VL, VBMI2), with AVX2, FMA and BMI2.
 
 use super::avx2::U32x8;
-use super::{Isa, ORDINARY_F32, ORDINARY_F64, Quad, Reals, Two, Words, row_at, wide_row_at};
+use super::{BroadcastPair, Isa, ORDINARY_F32, ORDINARY_F64, Quad, Reals, Words, record_at, wide_record_at};
 use crate::model::kernel::Real;
 use std::arch::x86_64::*;
 use std::ops::{Add, Mul, Sub};
@@ -142,9 +142,9 @@ impl Reals for F32x16 {
         unsafe { F32x16(_mm512_i32gather_ps::<4>(index.0, table.cast())) }
     }
     #[inline(always)]
-    unsafe fn rows(columns: [Self; 4], p: *mut f32) {
+    unsafe fn store_transposed(load_transposed: [Self; 4], p: *mut f32) {
         unsafe {
-            let [a, b, c, d] = columns;
+            let [a, b, c, d] = load_transposed;
             let ab_low = _mm512_castps_pd(_mm512_unpacklo_ps(a.0, b.0));
             let ab_high = _mm512_castps_pd(_mm512_unpackhi_ps(a.0, b.0));
             let cd_low = _mm512_castps_pd(_mm512_unpacklo_ps(c.0, d.0));
@@ -170,7 +170,7 @@ impl Reals for F32x16 {
 #[inline(always)]
 unsafe fn row(base: *const u8, offsets: *const u32, k: usize) -> [__m128i; 2] {
     unsafe {
-        let at: *const __m128i = row_at(base, offsets, k).cast();
+        let at: *const __m128i = record_at(base, offsets, k).cast();
         [_mm_loadu_si128(at), _mm_loadu_si128(at.add(1))]
     }
 }
@@ -272,9 +272,9 @@ impl Reals for F64x8 {
         unsafe { F64x8(_mm512_i32gather_pd::<8>(index.0, table.cast())) }
     }
     #[inline(always)]
-    unsafe fn rows(columns: [Self; 4], p: *mut f64) {
+    unsafe fn store_transposed(load_transposed: [Self; 4], p: *mut f64) {
         unsafe {
-            let [a, b, c, d] = columns;
+            let [a, b, c, d] = load_transposed;
             let ab_low = _mm512_unpacklo_pd(a.0, b.0);
             let ab_high = _mm512_unpackhi_pd(a.0, b.0);
             let cd_low = _mm512_unpacklo_pd(c.0, d.0);
@@ -390,8 +390,8 @@ unsafe fn four_columns(base: *const u8, offsets: *const u32) -> [F64x8; 4] {
         let mut v = [_mm512_setzero_pd(); 4];
         let mut k = 0;
         while k < 4 {
-            let low: *const f64 = wide_row_at(base, offsets, k).cast();
-            let high: *const f64 = wide_row_at(base, offsets, k + 4).cast();
+            let low: *const f64 = wide_record_at(base, offsets, k).cast();
+            let high: *const f64 = wide_record_at(base, offsets, k + 4).cast();
             let half = _mm512_castpd256_pd512(_mm256_loadu_pd(low));
             v[k] = _mm512_insertf64x4::<1>(half, _mm256_loadu_pd(high));
             k += 1;
@@ -423,7 +423,7 @@ const fn turned() -> [u16; 32] {
     let mut from = [0; 32];
     let mut k = 0;
     while k < 32 {
-        // Half, particle, chunk.
+        // Half, particle, j-cluster.
         let (h, p, c) = (k / 16, k / 4 % 4, k % 4);
         from[k] = (16 * h + 4 * c + p) as u16;
         k += 1;
@@ -452,11 +452,11 @@ unsafe fn other_fours(x: __m512) -> __m512 {
 
 /// Writes the places of sixteen bits.
 #[inline(always)]
-unsafe fn places(bases: __m512, bits: __m128i, p: *mut u32) {
+unsafe fn places(j_bases: __m512, bits: __m128i, p: *mut u32) {
     unsafe {
         let code = _mm512_cvtepu8_epi32(bits);
         // Only the lowest two bits of each word choose.
-        let base = _mm512_castps_si512(_mm512_permutevar_ps(bases, code));
+        let base = _mm512_castps_si512(_mm512_permutevar_ps(j_bases, code));
         let place = _mm512_slli_epi32::<3>(_mm512_and_si512(code, _mm512_set1_epi32(0x3c)));
         let sum = _mm512_add_epi32(base, place);
         // Halves: a whole store that straddles lines takes more than twice as long.
@@ -471,10 +471,10 @@ impl Isa for Avx512 {
     type Quad = F64x4;
 
     #[inline(always)]
-    unsafe fn near<const SHIFTS: bool>(
+    unsafe fn distance_masks<const SHIFTS: bool>(
         x: [*const u16; 3],
         shift: [u32; 3],
-        four: &[Two; 2],
+        four: &[BroadcastPair; 2],
         limit: i16,
     ) -> u64 {
         unsafe {
@@ -500,11 +500,11 @@ impl Isa for Avx512 {
         }
     }
     #[inline(always)]
-    unsafe fn fill16(x: u16, p: *mut u16) {
+    unsafe fn broadcast16(x: u16, p: *mut u16) {
         unsafe { _mm256_storeu_si256(p.cast(), _mm256_set1_epi16(x as i16)) }
     }
     #[inline(always)]
-    unsafe fn turn(masks: *mut u64) {
+    unsafe fn transpose_masks(masks: *mut u64) {
         unsafe {
             let m = _mm512_loadu_si512(masks.cast());
             let to = _mm512_load_si512((&raw const TURNED).cast());
@@ -512,18 +512,18 @@ impl Isa for Avx512 {
         }
     }
     #[inline(always)]
-    unsafe fn collect(bases: *const u32, mask: u64, p: *mut u32) -> usize {
+    unsafe fn expand_mask(j_bases: *const u32, mask: u64, p: *mut u32) -> usize {
         unsafe {
             // Bytes, in which the number of the base is below the bit's in its sixteen.
             let packed = _mm512_maskz_compress_epi8(mask, _mm512_load_si512((&raw const PLACES).cast()));
-            let bases = _mm512_castsi512_ps(_mm512_broadcast_i32x4(_mm_loadu_si128(bases.cast())));
+            let j_bases = _mm512_castsi512_ps(_mm512_broadcast_i32x4(_mm_loadu_si128(j_bases.cast())));
             let count = mask.count_ones() as usize;
-            places(bases, _mm512_castsi512_si128(packed), p);
+            places(j_bases, _mm512_castsi512_si128(packed), p);
             if count > 16 {
-                places(bases, _mm512_extracti32x4_epi32::<1>(packed), p.add(16));
+                places(j_bases, _mm512_extracti32x4_epi32::<1>(packed), p.add(16));
                 if count > 32 {
-                    places(bases, _mm512_extracti32x4_epi32::<2>(packed), p.add(32));
-                    places(bases, _mm512_extracti32x4_epi32::<3>(packed), p.add(48));
+                    places(j_bases, _mm512_extracti32x4_epi32::<2>(packed), p.add(32));
+                    places(j_bases, _mm512_extracti32x4_epi32::<3>(packed), p.add(48));
                 }
             }
             count
@@ -539,30 +539,30 @@ impl Isa for Avx512 {
         }
     }
     #[inline(always)]
-    unsafe fn first_of<const MANY: usize>(x: F32x16) -> F32x16 {
+    unsafe fn cluster_first<const CLUSTER: usize>(x: F32x16) -> F32x16 {
         unsafe {
             let first = _mm512_permute_ps::<0x00>(x.0);
-            F32x16(if MANY == 8 { _mm512_shuffle_f32x4::<0b10_10_00_00>(first, first) } else { first })
+            F32x16(if CLUSTER == 8 { _mm512_shuffle_f32x4::<0b10_10_00_00>(first, first) } else { first })
         }
     }
     #[inline(always)]
-    unsafe fn least_of<const MANY: usize>(x: F32x16) -> F32x16 {
+    unsafe fn cluster_least<const CLUSTER: usize>(x: F32x16) -> F32x16 {
         unsafe {
             let two = _mm512_min_ps(x.0, _mm512_permute_ps::<0b10_11_00_01>(x.0));
             let four = _mm512_min_ps(two, _mm512_permute_ps::<0b01_00_11_10>(two));
-            F32x16(if MANY == 8 { _mm512_min_ps(four, other_fours(four)) } else { four })
+            F32x16(if CLUSTER == 8 { _mm512_min_ps(four, other_fours(four)) } else { four })
         }
     }
     #[inline(always)]
-    unsafe fn greatest_of<const MANY: usize>(x: F32x16) -> F32x16 {
+    unsafe fn cluster_greatest<const CLUSTER: usize>(x: F32x16) -> F32x16 {
         unsafe {
             let two = _mm512_max_ps(x.0, _mm512_permute_ps::<0b10_11_00_01>(x.0));
             let four = _mm512_max_ps(two, _mm512_permute_ps::<0b01_00_11_10>(two));
-            F32x16(if MANY == 8 { _mm512_max_ps(four, other_fours(four)) } else { four })
+            F32x16(if CLUSTER == 8 { _mm512_max_ps(four, other_fours(four)) } else { four })
         }
     }
     #[inline(always)]
-    unsafe fn columns<const ALL: bool>(base: *const u8, offsets: *const u32) -> [U32x16; 8] {
+    unsafe fn load_transposed<const ALL: bool>(base: *const u8, offsets: *const u32) -> [U32x16; 8] {
         unsafe {
             // Rows k, k + 4, k + 8, k + 12 go to the quarters of vector k.
             let (mut v, mut w) = ([_mm512_setzero_si512(); 4], [_mm512_setzero_si512(); 4]);
@@ -589,7 +589,7 @@ impl Isa for Avx512 {
         }
     }
     #[inline(always)]
-    unsafe fn wide_columns<const ALL: bool>(base: *const u8, offsets: *const u32) -> [F64x8; 8] {
+    unsafe fn load_transposed_wide<const ALL: bool>(base: *const u8, offsets: *const u32) -> [F64x8; 8] {
         unsafe {
             let zero = F64x8(_mm512_setzero_pd());
             let [a, b, c, d] = four_columns(base, offsets);

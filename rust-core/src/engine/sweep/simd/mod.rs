@@ -103,7 +103,7 @@ pub trait Reals: Real {
     /// `table[index[k]]` in lane `k`.
     unsafe fn lookup(table: *const Self::Scalar, index: Self::Words) -> Self;
     /// Writes four columns as rows of four.
-    unsafe fn rows(columns: [Self; 4], p: *mut Self::Scalar);
+    unsafe fn store_transposed(load_transposed: [Self; 4], p: *mut Self::Scalar);
 }
 
 /// A vector of unsigned words.
@@ -126,23 +126,23 @@ pub trait Words: Copy {
     unsafe fn pick(table: *const u32, which: Self) -> Self;
 }
 
-/// Two points, in units that [`Isa::near`] compares: each coordinate sixteen times that of the first, then as often
+/// Two points, in units that [`Isa::distance_masks`] compares: each coordinate sixteen times that of the first, then as often
 /// that of the second.
 #[derive(Debug, Clone, Copy, Default)]
 #[repr(C, align(64))]
-pub struct Two(pub [[u16; 32]; 3]);
+pub struct BroadcastPair(pub [[u16; 32]; 3]);
 
 /// Row `k` of those at `offsets`.
 ///
 /// Read as volatile: the compiler else reads offsets as vectors, and takes their lanes out one by one.
 #[inline(always)]
-unsafe fn row_at(base: *const u8, offsets: *const u32, k: usize) -> *const u8 {
+unsafe fn record_at(base: *const u8, offsets: *const u32, k: usize) -> *const u8 {
     unsafe { base.add(offsets.add(k).read_volatile() as usize) }
 }
 
 /// The same of rows twice as long.
 #[inline(always)]
-unsafe fn wide_row_at(base: *const u8, offsets: *const u32, k: usize) -> *const u8 {
+unsafe fn wide_record_at(base: *const u8, offsets: *const u32, k: usize) -> *const u8 {
     unsafe { base.add(2 * offsets.add(k).read_volatile() as usize) }
 }
 
@@ -168,33 +168,33 @@ pub trait Isa: Copy + Send + Sync + 'static {
     /// Which of the sixteen particles from `x[0]`, `x[1]`, `x[2]` on, all moved by `shift`, have a distance to four
     /// points whose square, in units of 2¹⁶, is below `limit`: sixteen bits for each point. Coordinates wrap; a shift is
     /// there twice, in both halves of a word.
-    unsafe fn near<const SHIFTS: bool>(
+    unsafe fn distance_masks<const SHIFTS: bool>(
         x: [*const u16; 3],
         shift: [u32; 3],
-        four: &[Two; 2],
+        four: &[BroadcastPair; 2],
         limit: i16,
     ) -> u64;
     /// Sixteen times the same word.
-    unsafe fn fill16(x: u16, p: *mut u16);
+    unsafe fn broadcast16(x: u16, p: *mut u16);
     /// Eight masks, in each of which four particles have sixteen bits each, turned: first the bits of the first particle
     /// in the first four masks, then those of the second …, then the same of the other four masks.
-    unsafe fn turn(masks: *mut u64);
-    /// Writes `bases[k / 16] + 32 (k % 16)` for each bit `k`, one after the other, and how many; may write sixteen
+    unsafe fn transpose_masks(masks: *mut u64);
+    /// Writes `j_bases[k / 16] + 32 (k % 16)` for each bit `k`, one after the other, and how many; may write sixteen
     /// more.
-    unsafe fn collect(bases: *const u32, mask: u64, p: *mut u32) -> usize;
+    unsafe fn expand_mask(j_bases: *const u32, mask: u64, p: *mut u32) -> usize;
     /// √x or up to one part in 1000 more, zero for numbers below.
     unsafe fn root_or_more(x: Self::F32) -> Self::F32;
-    /// The first, the least, and the greatest of each `MANY` lanes, four or eight, in all of them.
-    unsafe fn first_of<const MANY: usize>(x: Self::F32) -> Self::F32;
-    unsafe fn least_of<const MANY: usize>(x: Self::F32) -> Self::F32;
-    unsafe fn greatest_of<const MANY: usize>(x: Self::F32) -> Self::F32;
+    /// The first, the least, and the greatest of each `CLUSTER` lanes, four or eight, in all of them.
+    unsafe fn cluster_first<const CLUSTER: usize>(x: Self::F32) -> Self::F32;
+    unsafe fn cluster_least<const CLUSTER: usize>(x: Self::F32) -> Self::F32;
+    unsafe fn cluster_greatest<const CLUSTER: usize>(x: Self::F32) -> Self::F32;
     /// The columns of rows of eight words, `offsets` bytes behind `base`; with `ALL`, else only the first four.
-    unsafe fn columns<const ALL: bool>(
+    unsafe fn load_transposed<const ALL: bool>(
         base: *const u8,
         offsets: *const u32,
     ) -> [<Self::F32 as Reals>::Words; 8];
     /// The columns of rows of eight numbers, twice `offsets` bytes behind `base`; with `ALL`, else only the first four.
-    unsafe fn wide_columns<const ALL: bool>(base: *const u8, offsets: *const u32) -> [Self::F64; 8];
+    unsafe fn load_transposed_wide<const ALL: bool>(base: *const u8, offsets: *const u32) -> [Self::F64; 8];
     /// The numbers of bits.
     unsafe fn of_bits(words: <Self::F32 as Reals>::Words) -> Self::F32;
     /// The low and the high words of the bits of numbers.

@@ -1,7 +1,7 @@
 //! Plain arrays, which the compiler vectorises for whatever the target has.
 
-use super::{Isa, ORDINARY_F32, ORDINARY_F64, Quad, Reals, Two, Words, row_at, wide_row_at};
-use crate::engine::sweep::block::PLACE_BITS;
+use super::{BroadcastPair, Isa, ORDINARY_F32, ORDINARY_F64, Quad, Reals, Words, record_at, wide_record_at};
+use crate::engine::sweep::ground::arithmetic::OFFSET_BITS;
 use crate::model::kernel::Real;
 use std::ops::{Add, Mul, Sub};
 
@@ -164,10 +164,10 @@ macro_rules! lanes {
                 Lanes(out)
             }
             #[inline(always)]
-            unsafe fn rows(columns: [Self; 4], p: *mut $scalar) {
+            unsafe fn store_transposed(load_transposed: [Self; 4], p: *mut $scalar) {
                 for k in 0..LANES {
                     for c in 0..4 {
-                        unsafe { *p.add(4 * k + c) = columns[c].0[k] };
+                        unsafe { *p.add(4 * k + c) = load_transposed[c].0[k] };
                     }
                 }
             }
@@ -300,7 +300,7 @@ impl Quad for Four {
 
 /// Distances of sixteen particles to a point; bits where their squares are below the limit.
 #[inline(always)]
-fn below(there: &[[u16; 16]; 3], two: &Two, which: usize, limit: i16) -> u32 {
+fn below(there: &[[u16; 16]; 3], two: &BroadcastPair, which: usize, limit: i16) -> u32 {
     let mut sum = [0i32; 16];
     for c in 0..3 {
         for k in 0..16 {
@@ -321,10 +321,10 @@ impl Isa for Portable {
     type Quad = Four;
 
     #[inline(always)]
-    unsafe fn near<const SHIFTS: bool>(
+    unsafe fn distance_masks<const SHIFTS: bool>(
         x: [*const u16; 3],
         shift: [u32; 3],
-        four: &[Two; 2],
+        four: &[BroadcastPair; 2],
         limit: i16,
     ) -> u64 {
         let mut there = [[0; 16]; 3];
@@ -341,11 +341,11 @@ impl Isa for Portable {
         mask
     }
     #[inline(always)]
-    unsafe fn fill16(x: u16, p: *mut u16) {
+    unsafe fn broadcast16(x: u16, p: *mut u16) {
         unsafe { p.cast::<[u16; 16]>().write_unaligned([x; 16]) }
     }
     #[inline(always)]
-    unsafe fn turn(masks: *mut u64) {
+    unsafe fn transpose_masks(masks: *mut u64) {
         let masks = unsafe { &mut *masks.cast::<[u64; 8]>() };
         let before = *masks;
         for (k, mask) in masks.iter_mut().enumerate() {
@@ -354,11 +354,11 @@ impl Isa for Portable {
         }
     }
     #[inline(always)]
-    unsafe fn collect(bases: *const u32, mut mask: u64, p: *mut u32) -> usize {
+    unsafe fn expand_mask(j_bases: *const u32, mut mask: u64, p: *mut u32) -> usize {
         let mut count = 0;
         while mask != 0 {
             let bit = mask.trailing_zeros();
-            unsafe { *p.add(count) = *bases.add(bit as usize / 16) + ((bit % 16) << PLACE_BITS) };
+            unsafe { *p.add(count) = *j_bases.add(bit as usize / 16) + ((bit % 16) << OFFSET_BITS) };
             count += 1;
             mask &= mask - 1;
         }
@@ -369,22 +369,22 @@ impl Isa for Portable {
         Lanes(x.0.map(|x| x.max(0.0).sqrt()))
     }
     #[inline(always)]
-    unsafe fn first_of<const MANY: usize>(x: Lanes<f32>) -> Lanes<f32> {
-        of_each::<MANY>(x, |first, _| first)
+    unsafe fn cluster_first<const CLUSTER: usize>(x: Lanes<f32>) -> Lanes<f32> {
+        of_each::<CLUSTER>(x, |first, _| first)
     }
     #[inline(always)]
-    unsafe fn least_of<const MANY: usize>(x: Lanes<f32>) -> Lanes<f32> {
-        of_each::<MANY>(x, f32::min)
+    unsafe fn cluster_least<const CLUSTER: usize>(x: Lanes<f32>) -> Lanes<f32> {
+        of_each::<CLUSTER>(x, f32::min)
     }
     #[inline(always)]
-    unsafe fn greatest_of<const MANY: usize>(x: Lanes<f32>) -> Lanes<f32> {
-        of_each::<MANY>(x, f32::max)
+    unsafe fn cluster_greatest<const CLUSTER: usize>(x: Lanes<f32>) -> Lanes<f32> {
+        of_each::<CLUSTER>(x, f32::max)
     }
     #[inline(always)]
-    unsafe fn columns<const ALL: bool>(base: *const u8, offsets: *const u32) -> [Lanes<u32>; 8] {
+    unsafe fn load_transposed<const ALL: bool>(base: *const u8, offsets: *const u32) -> [Lanes<u32>; 8] {
         let mut out = [Lanes([0; LANES]); 8];
         for k in 0..LANES {
-            let row = unsafe { row_at(base, offsets, k).cast::<[u32; 8]>().read_unaligned() };
+            let row = unsafe { record_at(base, offsets, k).cast::<[u32; 8]>().read_unaligned() };
             for c in 0..if ALL { 8 } else { 4 } {
                 out[c].0[k] = row[c];
             }
@@ -392,10 +392,10 @@ impl Isa for Portable {
         out
     }
     #[inline(always)]
-    unsafe fn wide_columns<const ALL: bool>(base: *const u8, offsets: *const u32) -> [Lanes<f64>; 8] {
+    unsafe fn load_transposed_wide<const ALL: bool>(base: *const u8, offsets: *const u32) -> [Lanes<f64>; 8] {
         let mut out = [Lanes([0.0; LANES]); 8];
         for k in 0..LANES {
-            let row = unsafe { wide_row_at(base, offsets, k).cast::<[f64; 8]>().read_unaligned() };
+            let row = unsafe { wide_record_at(base, offsets, k).cast::<[f64; 8]>().read_unaligned() };
             for c in 0..if ALL { 8 } else { 4 } {
                 out[c].0[k] = row[c];
             }
@@ -413,11 +413,11 @@ impl Isa for Portable {
     }
 }
 
-/// Each `MANY` lanes folded, in all of them.
+/// Each `CLUSTER` lanes folded, in all of them.
 #[inline(always)]
-fn of_each<const MANY: usize>(x: Lanes<f32>, fold: impl Fn(f32, f32) -> f32 + Copy) -> Lanes<f32> {
+fn of_each<const CLUSTER: usize>(x: Lanes<f32>, fold: impl Fn(f32, f32) -> f32 + Copy) -> Lanes<f32> {
     let mut out = x.0;
-    for (lanes, out) in x.0.chunks_exact(MANY).zip(out.chunks_exact_mut(MANY)) {
+    for (lanes, out) in x.0.chunks_exact(CLUSTER).zip(out.chunks_exact_mut(CLUSTER)) {
         out.fill(lanes.iter().copied().reduce(fold).unwrap_or_default());
     }
     Lanes(out)

@@ -99,7 +99,7 @@ pub fn with_ghosts(sweep: &mut Sweep, cloud: &Cloud) -> (Vec<[f64; 3]>, Tally) {
     on_ranks(std::slice::from_mut(sweep), cloud, 0, [false; 3])
 }
 
-/// Along some directions a rank has ghosts, along others it goes round: in any of them rows, layers and bins may meet
+/// Along some directions a rank has ghosts, along others it goes round: in any of them rows, planes and cells may meet
 /// their copies, and ghosts among these.
 #[test]
 fn ranks_that_have_all_of_some_directions_have_the_forces_of_the_plain_engine() {
@@ -150,7 +150,7 @@ fn what_is_around_a_rank_has_to_fit() {
     assert!(sweep.fits(&open));
     let open = Cloud { domain: open, ..cloud.clone() };
     let (force, tally) = plain(&fluid, &open);
-    let (here, totals) = swept(&mut sweep, &open, Want::TOTALS);
+    let (here, totals) = data(&mut sweep, &open, Want::TOTALS);
     assert!(difference(&force, &here).max(tally_difference(&tally, &totals)) < tolerance(Precision::Mixed));
     let around = |domain, images| Around { domain, images };
     let mut first = |around| sweep.first(around, &cloud.particles(), &cloud.v, Some(STEP), Want::FORCES);

@@ -1,0 +1,36 @@
+//! Loops over particles, compiled for the vectors of each instruction set.
+
+use crate::engine::settings::Instructions;
+
+/// A loop that the compiler makes vectors of. Nothing in it is contracted or put into another order: the results are
+/// the same bits on every instruction set.
+pub trait Loop {
+    type Out;
+    /// To be inlined always: what is not has no more than the compiler's target.
+    fn run(self) -> Self::Out;
+}
+
+/// Runs a loop as compiled for `instructions`, which are available.
+pub fn run<L: Loop>(instructions: Instructions, work: L) -> L::Out {
+    match instructions {
+        // SAFETY: the caller's.
+        #[cfg(target_arch = "x86_64")]
+        Instructions::Avx512 => unsafe { avx512(work) },
+        // SAFETY: as above.
+        #[cfg(target_arch = "x86_64")]
+        Instructions::Avx2 => unsafe { avx2(work) },
+        _ => work.run(),
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+fn avx2<L: Loop>(work: L) -> L::Out {
+    work.run()
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,bmi1,bmi2,lzcnt,popcnt")]
+fn avx512<L: Loop>(work: L) -> L::Out {
+    work.run()
+}

@@ -1,0 +1,156 @@
+//! Axes that are linear or logarithmic.
+
+use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
+use plotters::coord::types::RangedCoordf64;
+use plotters::data::float::FloatPrettyPrinter;
+use plotters::prelude::{IntoLogRange, LogCoord};
+use std::ops::Range;
+
+use super::text::superscript;
+
+/// The range of an axis. Which kind it is shows only when the program runs, so one type has both.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Scale {
+    range: Range<f64>,
+    log: bool,
+    /// Labels of a linear axis are divided by this power of ten.
+    power: i32,
+}
+
+impl Scale {
+    /// From `low` to `high`; ends that span no range get one of length 1.
+    pub fn exact(low: f64, high: f64) -> Scale {
+        let range = if high > low && (high - low).is_finite() { low..high } else { 0.0..1.0 };
+        let size = range.start.abs().max(range.end.abs());
+        let power = size.log10().floor() as i32;
+        // Sizes of ordinary life are written out.
+        Scale { range, log: false, power: if (-3..=4).contains(&power) { 0 } else { power } }
+    }
+
+    /// With room for every value that can be shown.
+    pub fn around(values: impl Iterator<Item = f64>, log: bool) -> Scale {
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for v in values.filter(|v| shows(*v, log)) {
+            (low, high) = (low.min(v), high.max(v));
+        }
+        match (low <= high, log) {
+            (false, true) => Scale { range: 1.0..10.0, log, power: 0 },
+            (false, false) => Scale::exact(0.0, 1.0),
+            (true, true) => {
+                let room = (high / low).powf(0.04).max(1.1);
+                Scale { range: low / room..high * room, log, power: 0 }
+            }
+            (true, false) => {
+                let size = low.abs().max(high.abs());
+                // A spread that is only rounding is no spread.
+                let room = match high - low {
+                    spread if spread > 1e-9 * size => 0.04 * spread,
+                    _ if size > 0.0 => 0.1 * size,
+                    _ => 1.0,
+                };
+                Scale::exact(low - room, high + room)
+            }
+        }
+    }
+
+    /// The value, moved to the nearer end if it is outside; `None` if it cannot be shown.
+    pub fn clamp(&self, value: f64) -> Option<f64> {
+        shows(value, self.log).then(|| value.clamp(self.range.start, self.range.end))
+    }
+
+    /// A name of what the axis shows, with the power of ten that its labels lack.
+    pub fn name(&self, name: &str) -> String {
+        match self.power {
+            0 => name.to_owned(),
+            power => format!("{name} (×10{})", superscript(power)).trim_start().to_owned(),
+        }
+    }
+
+    /// The lower end and the upper.
+    pub fn ends(&self) -> (f64, f64) {
+        (self.range.start, self.range.end)
+    }
+
+    fn linear(&self) -> RangedCoordf64 {
+        let unit = 10f64.powi(self.power);
+        (self.range.start / unit..self.range.end / unit).into()
+    }
+
+    fn logarithmic(&self) -> LogCoord<f64> {
+        self.range.clone().log_scale().into()
+    }
+}
+
+/// Whether a value has a place on an axis. Powers of ten near it must be ordinary numbers.
+fn shows(value: f64, log: bool) -> bool {
+    value.abs() < 1e290 && (!log || value > 1e-290)
+}
+
+impl Ranged for Scale {
+    type FormatOption = NoDefaultFormatting;
+    type ValueType = f64;
+
+    fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
+        if self.log {
+            self.logarithmic().map(value, limit)
+        } else {
+            self.linear().map(&(value / 10f64.powi(self.power)), limit)
+        }
+    }
+
+    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
+        let most = hint.max_num_points();
+        let powers = if self.log { self.logarithmic().key_points(most) } else { Vec::new() };
+        if powers.len() > 2 {
+            return powers;
+        }
+        // Less than a decade has ticks as on a linear axis.
+        let unit = 10f64.powi(self.power);
+        self.linear().key_points(most).into_iter().map(|v| v * unit).collect()
+    }
+
+    fn range(&self) -> Range<f64> {
+        self.range.clone()
+    }
+}
+
+impl ValueFormatter<f64> for Scale {
+    /// As many digits as tell ticks apart.
+    fn format_ext(&self, value: &f64) -> String {
+        let value = value / 10f64.powi(self.power);
+        let span = (self.range.end - self.range.start) / 10f64.powi(self.power);
+        let max_decimal = if self.log { 3 } else { (2.0 - span.log10()).ceil().clamp(0.0, 15.0) as i32 };
+        FloatPrettyPrinter { allow_scientific: self.log, min_decimal: 0, max_decimal }.print(value)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn labels(scale: &Scale) -> Vec<String> {
+        scale.key_points(8).iter().map(|v| scale.format_ext(v)).collect()
+    }
+
+    #[test]
+    fn ticks_are_round_numbers() {
+        assert_eq!(labels(&Scale::exact(0.0, 10.0)), ["0", "2", "4", "6", "8", "10"]);
+        let small = Scale::around([1e-17, 3e-17].into_iter(), false);
+        assert_eq!(small.name("u"), "u (×10⁻¹⁷)");
+        assert!(labels(&small).len() > 3 && labels(&small).contains(&"2".to_owned()), "{:?}", labels(&small));
+        let near = labels(&Scale::exact(1.0, 1.0 + 1e-6));
+        assert!(near.len() > 3 && near.windows(2).all(|w| w[0] != w[1]), "{near:?}");
+        assert!(labels(&Scale::around([100.0, 1e6].into_iter(), true)).contains(&"10000".to_owned()));
+        assert!(labels(&Scale::around([2.0, 8.0].into_iter(), true)).len() > 3);
+    }
+
+    #[test]
+    fn values_without_a_place() {
+        let scale = Scale::around([f64::NAN, -1.0, 1.0, f64::INFINITY].into_iter(), false);
+        assert_eq!(scale.range(), -1.08..1.08);
+        assert_eq!((scale.clamp(5.0), scale.clamp(f64::NAN)), (Some(1.08), None));
+        let log = Scale::around([-1.0, 0.0, 10.0].into_iter(), true);
+        assert_eq!((log.clamp(0.0), log.clamp(1e9)), (None, Some(log.range().end)));
+        assert_eq!(Scale::exact(3.0, 3.0).range(), 0.0..1.0);
+    }
+}
