@@ -6,6 +6,7 @@
 //! and no function panics, whatever it is given.
 
 pub mod drift;
+pub mod edges;
 pub mod frame;
 pub mod interactions;
 pub mod keys;
