@@ -145,12 +145,13 @@ impl FileError {
     }
 }
 
-/// The longest message: names may be as long as a file.
+/// The most characters of a message, and of a key in it: names may be as long as a file.
 const LONGEST: usize = 4000;
+const LONGEST_KEY: usize = 200;
 
 /// The text, or its beginning.
-fn shortened(text: &str) -> Cow<'_, str> {
-    match text.char_indices().nth(LONGEST) {
+fn shortened(text: &str, longest: usize) -> Cow<'_, str> {
+    match text.char_indices().nth(longest) {
         Some((end, _)) => format!("{} …", &text[..end]).into(),
         None => text.into(),
     }
@@ -164,14 +165,14 @@ impl fmt::Display for FileError {
             write!(text, ":{}", self.line())?;
         }
         if !self.key.is_empty() {
-            write!(text, ": {}", self.key)?;
+            write!(text, ": {}", shortened(&self.key, LONGEST_KEY))?;
         }
         write!(text, ": {}", self.kind)?;
         if let Some(help) = &self.help {
             write!(text, " ({help})")?;
         }
         // Keys and values stand in it as they were written.
-        f.write_str(&shortened(&printable(&text)))
+        f.write_str(&shortened(&printable(&text), LONGEST))
     }
 }
 
