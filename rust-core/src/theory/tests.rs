@@ -550,7 +550,7 @@ fn bounds_continue_the_free_energy() {
     let text = |bounds: &str| {
         model(&format!(
             "title = 'b'\nspecies = ['A', 'B']\n[density.n]\nkernel = 'quadratic'\nrange = 1\n{bounds}\n\
-             [excess_free_energy]\nA = 'n_A^3 * n_B^2 + 3*n_B'\nB = 'ln(n_A)'\n"
+             [excess_free_energy]\nA = 'n_A^3 * n_B^2 + 3*n_B'\nB = 'ln(n_A) + n_B^2'\n"
         ))
     };
     let linear = theory(&text("bounds = [1.0, 2.0]"), 1.0);
@@ -572,8 +572,8 @@ fn bounds_continue_the_free_energy() {
     close(psi.gradient[0], 3.0 * 2.25 * 9.0, 1e-14);
     close(psi.hessian[1], 3.0 * 2.25 * 6.0, 1e-14);
     close(psi.hessian[0], 6.0 * 1.5 * 9.0, 1e-14);
-    // Below, the logarithm goes on from 1: −1 − ½.
-    close(linear.psi(1, &[0.0, 1.5]).value, -1.5, 1e-14);
+    // Below, the logarithm goes on from 1: −1 − ½, and 1.5² beside it.
+    close(linear.psi(1, &[0.0, 1.5]).value, 0.75, 1e-14);
     let curve = model(
         "title = 'c'\nspecies = ['F']\n[density.n]\nkernel = 'quadratic'\nrange = 1\nbounds = [1.0, 2.0]\n\
          [excess_free_energy]\nF = { pressure = 'rho*kT + rho^3' }\n",
