@@ -167,7 +167,6 @@ void PairPsi::refresh()
     else
       (*style)->set_temperature(kt());
     (*style)->configure(mixed, threads);
-    (*style)->sum_all_densities(wants_densities);
   } catch (const std::exception &e) {
     trouble = e.what();
   }
@@ -197,7 +196,8 @@ void PairPsi::init_style()
   if (!why_listed.empty() && !full_list && force->newton_pair)
     stop("with " + why_listed + " this version of LAMMPS needs 'newton off'");
 
-  if (!described && comm->me == 0) utils::logmesg(lmp, std::string((*style)->description(search())));
+  if (!described && comm->me == 0)
+    utils::logmesg(lmp, std::string((*style)->description(search(), !why_listed.empty())));
   described = true;
 }
 
@@ -509,16 +509,22 @@ void *PairPsi::extract_peratom(const char *what, int &columns)
   refresh();
   columns = 0;
   if (!density) return const_cast<double *>((*style)->excess().data());
-  if (!wants_densities) {
-    wants_densities = true;
-    (*style)->sum_all_densities(true);
-  }
   const size_t width = (*style)->variables();
   if (width == 0) return nullptr;
-  double *first = const_cast<double *>((*style)->local_densities().data());
+  // Forces may not have needed all of them.
+  const size_t all = atom->nlocal + atom->nghost;
+  std::string trouble;
+  try {
+    (*style)->sum_densities(atom->nlocal, flat(atom->x, all), {atom->tag, all}, {atom->type, all});
+  } catch (const std::exception &e) {
+    trouble = e.what();
+  }
+  if (!trouble.empty()) stop_here(trouble);
+  const auto densities = (*style)->local_densities();
+  double *first = const_cast<double *>(densities.data());
   if (width == 1) return first;
   columns = static_cast<int>(width);
-  density_rows.resize((*style)->local_densities().size() / width + 1);
+  density_rows.resize(densities.size() / width + 1);
   for (size_t i = 0; i < density_rows.size(); i++) density_rows[i] = first + i * width;
   return density_rows.data();
 }

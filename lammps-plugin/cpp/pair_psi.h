@@ -96,7 +96,6 @@ class PairPsi : public LAMMPS_NS::Pair {
   size_t threads = 1;
   std::vector<std::string> arguments;
   bool described = false;
-  bool wants_densities = false;
   std::vector<double *> density_rows;
 
   // What a communication carries: columns of the slopes, or which ghosts are images.

@@ -2,7 +2,7 @@
 
 use crate::style::{Style, StyleError};
 use nalgebra::Matrix3;
-use psidpd_core::engine::{Around, PairsOfHost, PeriodicBox, Step, Tally, Want};
+use psidpd_core::engine::{Around, PairsOfHost, Path, PeriodicBox, Step, Surroundings, Tally, Want};
 use psidpd_core::model::{SplinePair, WarrenPair};
 
 #[cxx::bridge(namespace = "psidpd")]
@@ -82,10 +82,9 @@ mod ffi {
         ) -> Result<Box<Style>>;
 
         fn set_temperature(self: &mut Style, kt: f64) -> Result<()>;
-        fn sum_all_densities(self: &mut Style, all: bool);
         fn model_text(self: &Style) -> String;
         fn model_name(self: &Style) -> String;
-        fn description(self: &Style, search: &str) -> String;
+        fn description(self: &Style, search: &str, listed: bool) -> String;
         fn cutoff(self: &Style) -> f64;
         fn slope_width(self: &Style) -> usize;
         /// The number of densities times species: no slope width is larger.
@@ -153,8 +152,10 @@ mod ffi {
         fn particle_energy(self: &Style) -> &[f64];
         /// Six numbers a particle.
         fn particle_virial(self: &Style) -> &[f64];
+        /// Sums all densities at the positions of the last evaluation.
+        fn sum_densities(self: &mut Style, owned: usize, x: &[f64], tag: &[i32], kind: &[i32]) -> Result<()>;
         /// Those of owned particles, a row of [`variables`] for each.
-        fn local_densities(self: &mut Style) -> &[f64];
+        fn local_densities(self: &Style) -> &[f64];
         /// psi of owned particles.
         fn excess(self: &mut Style) -> &[f64];
         fn single(self: &Style, kind_i: i32, kind_j: i32, i: usize, j: usize, r: f64) -> PairValue;
@@ -221,6 +222,7 @@ fn wanted(request: &ffi::Request) -> (Option<Step>, Want) {
         virial: request.virial,
         particle_energy: request.particle_energy,
         particle_virial: request.particle_virial,
+        densities: false,
     };
     (request.thermostat.then_some(step), want)
 }
@@ -249,7 +251,7 @@ fn style_evaluate(
 }
 
 fn totals(style: &Style, tally: &Tally) -> ffi::Totals {
-    let [below, above] = style.engines().out_of_bounds().map(|n| n as f64);
+    let [below, above] = style.engine().out_of_bounds().map(|n| n as f64);
     ffi::Totals { excess: tally.excess, pair: tally.pair, virial: tally.total_virial(), below, above }
 }
 
@@ -318,28 +320,29 @@ impl Style {
 
     fn fits(&self, extent: &ffi::Extent, request: &ffi::Request) -> bool {
         let (_, want) = wanted(request);
-        domain_of(extent).is_ok_and(|domain| self.engines().fits(&domain, want))
+        let path = |domain| self.engine().path_for(Surroundings::Box(&domain), want);
+        domain_of(extent).is_ok_and(|domain| path(domain) == Path::Sweep)
     }
 
     fn fetch_slopes(&mut self, all: usize) {
-        self.engines_mut().fetch_slopes(all);
+        self.engine_mut().fetch_slopes(all);
     }
 
-    fn local_densities(&mut self) -> &[f64] {
-        self.engines_mut().local_densities()
+    fn local_densities(&self) -> &[f64] {
+        self.engine().local_densities()
     }
 
     fn excess(&mut self) -> &[f64] {
-        self.engines_mut().excess()
+        self.engine_mut().excess()
     }
 
     fn single(&self, kind_i: i32, kind_j: i32, i: usize, j: usize, r: f64) -> ffi::PairValue {
-        let (energy, force) = self.engines().single([kind_i, kind_j], r, [i, j]);
+        let (energy, force) = self.engine().single([kind_i, kind_j], r, [i, j]);
         ffi::PairValue { energy, force }
     }
 
     fn memory(&self) -> usize {
-        self.engines().memory()
+        self.engine().memory()
     }
 
     fn cutoff(&self) -> f64 {
@@ -347,7 +350,7 @@ impl Style {
     }
 
     fn slope_width(&self) -> usize {
-        self.engine().slope_width()
+        self.engine().plan().slope_width()
     }
 
     fn needs_velocities(&self) -> bool {

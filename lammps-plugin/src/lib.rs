@@ -1,7 +1,6 @@
 //! psidpd pair styles for LAMMPS: `dpd/psi`, `mdpd/psi` and `dpd/spline`, loaded with `plugin load`.
 //!
 //! - [`style`]: what a pair style asks of the engine, in safe Rust;
-//! - [`engines`]: which of the engines does an evaluation;
 //! - [`bridge`]: the same for C++, by cxx: slices, strings and exceptions, checked at compile time;
 //! - `cpp/`: the pair styles that LAMMPS sees, compiled against the headers of one LAMMPS;
 //! - `entry`: `lammpsplugin_init`, which compares that LAMMPS with the one that loads the plugin.
@@ -10,7 +9,6 @@
 //! act less or not at all: `special_bonds`, `neigh_modify exclude`.
 
 pub mod bridge;
-pub mod engines;
 pub mod style;
 
 #[cfg(lammps_host)]

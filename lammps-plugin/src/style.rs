@@ -1,9 +1,8 @@
 //! One pair style's engine, and the mapping from LAMMPS's types to species.
 
-use crate::engines::Engines;
 use psidpd_core::engine::{
-    Around, Engine, EngineError, Newton, PairsOfHost, Particles, PeriodicBox, Pool, Precision, Settings,
-    Step, Tally, Want,
+    Around, Engine, EngineError, Newton, PairsOfHost, Particles, Path as EnginePath, PeriodicBox, Pool,
+    Precision, Reason, Request, Settings, Step, Surroundings, Tally, Want,
 };
 use psidpd_core::model::{
     ForceLaw, Model, PresetError, SplinePair, WarrenPair, lucy_mdpd, spline_dpd, warren_ab,
@@ -35,13 +34,12 @@ impl From<EngineError> for StyleError {
 #[derive(Debug)]
 pub struct Style {
     model: Model,
-    engines: Engines,
+    engine: Engine,
     settings: Settings,
     pool: Arc<Pool>,
     kt: f64,
     /// Species of each type, from 0; LAMMPS counts types from 1.
     kinds: Vec<i32>,
-    all_densities: bool,
     /// What the letters of pair_coeff mean.
     letters: Option<&'static str>,
 }
@@ -225,8 +223,8 @@ impl Style {
         }
         let settings = Settings { precision: Precision::Double, ..Settings::default() };
         let pool = Arc::new(Pool::new(settings.threads));
-        let engines = engines_at(&model, kt, &kinds, settings, &pool)?;
-        Ok(Style { model, engines, settings, pool, kt, kinds, all_densities: false, letters: None })
+        let engine = engine_at(&model, kt, &kinds, settings, &pool)?;
+        Ok(Style { model, engine, settings, pool, kt, kinds, letters: None })
     }
 
     /// Another temperature: the model's expressions see it, and the noise.
@@ -241,8 +239,7 @@ impl Style {
     }
 
     fn rebuild(&mut self) -> Result<(), StyleError> {
-        self.engines = engines_at(&self.model, self.kt, &self.kinds, self.settings, &self.pool)?;
-        self.engines.sum_all_densities(self.all_densities);
+        self.engine = engine_at(&self.model, self.kt, &self.kinds, self.settings, &self.pool)?;
         Ok(())
     }
 
@@ -265,36 +262,25 @@ impl Style {
         })
     }
 
-    /// As [`Engine::sum_all_densities`].
-    pub fn sum_all_densities(&mut self, all: bool) {
-        self.all_densities = all;
-        self.engines.sum_all_densities(all);
-    }
-
     /// The model.
     pub fn model(&self) -> &Model {
         &self.model
     }
 
-    /// The plain engine, which has the plan.
+    /// The engine.
     pub fn engine(&self) -> &Engine {
-        self.engines.engine()
+        &self.engine
     }
 
-    /// The engines.
-    pub fn engines(&self) -> &Engines {
-        &self.engines
-    }
-
-    /// The engines.
-    pub fn engines_mut(&mut self) -> &mut Engines {
-        &mut self.engines
+    /// The engine.
+    pub fn engine_mut(&mut self) -> &mut Engine {
+        &mut self.engine
     }
 
     /// For the log: what is computed, and what its letters mean.
     ///
-    /// `search` says where pairs come from.
-    pub fn description(&self, search: &str) -> String {
+    /// `search` says where pairs come from, and whether LAMMPS lists them.
+    pub fn description(&self, search: &str, listed: bool) -> String {
         let mut text = String::new();
         // Writing to a String cannot fail.
         let _ = writeln!(text, "psidpd: {} ({})", self.model.title(), self.model.source().name());
@@ -318,18 +304,26 @@ impl Style {
             let _ = writeln!(text, "  coefficients  {letters}");
         }
         let _ = writeln!(text, "  search        {search}");
-        let Settings { precision, instructions, threads } = self.engines.sweep().settings();
-        let _ = writeln!(
-            text,
-            "  arithmetic    {precision} precision, {instructions}, {threads} thread(s) a rank"
-        );
+        if listed {
+            let path = EnginePath::Reference(Reason::ListedPairs);
+            let _ = writeln!(text, "  evaluation    {path}");
+            text.push_str("  arithmetic    double precision, 1 thread a rank\n");
+        } else {
+            let exception = EnginePath::Reference(Reason::ParticleValues);
+            let _ = writeln!(text, "  evaluation    {}; on some steps {exception}", EnginePath::Sweep);
+            let Settings { precision, instructions, threads } = self.engine.settings();
+            let _ = writeln!(
+                text,
+                "  arithmetic    {precision} precision, {instructions}, {threads} thread(s) a rank"
+            );
+        }
         text
     }
 
     /// All forces on particles in a box that this rank has all of, added to `f`.
     ///
     /// # Errors
-    /// As [`Engines::evaluate`].
+    /// As [`Engine::forces`].
     #[allow(clippy::too_many_arguments)]
     pub fn evaluate(
         &mut self,
@@ -344,8 +338,8 @@ impl Style {
     ) -> Result<Tally, StyleError> {
         guard(|| {
             let particles = Particles { owned: tag.len(), x: triples(x), tag, kind };
-            let force = f.as_chunks_mut::<3>().0;
-            self.engines.evaluate(domain, &particles, triples(v), step, want, force)
+            let request = Request { particles, v: triples(v), step, want };
+            Ok(self.engine.forces(domain, &request, f.as_chunks_mut::<3>().0, true)?)
         })
     }
 
@@ -353,7 +347,7 @@ impl Style {
     /// forces that need no density, densities, ψ and slopes.
     ///
     /// # Errors
-    /// As [`Engines::first`].
+    /// As [`Engine::first`].
     #[allow(clippy::too_many_arguments)]
     pub fn densities(
         &mut self,
@@ -370,14 +364,15 @@ impl Style {
         guard(|| {
             let newton = if newton { Newton::On } else { Newton::Off };
             let particles = Particles { owned, x: triples(x), tag, kind };
-            self.engines.first(around, &particles, triples(v), step, want, newton)
+            let request = Request { particles, v: triples(v), step, want };
+            Ok(self.engine.first(Surroundings::Ghosts(around, newton), &request)?)
         })
     }
 
     /// As [`Style::densities`], with pairs listed by LAMMPS.
     ///
     /// # Errors
-    /// As [`Engines::first_of_pairs`].
+    /// As [`Engine::first`].
     pub fn densities_of_pairs(
         &mut self,
         owned: usize,
@@ -390,19 +385,40 @@ impl Style {
         guard(|| {
             let newton = if newton { Newton::On } else { Newton::Off };
             let particles = Particles { owned, x: triples(x), tag, kind };
-            self.engines.first_of_pairs(&particles, listed, newton)
+            // What LAMMPS wants of listed pairs it says with the forces.
+            let request = Request { particles, v: &[], step: None, want: Want::FORCES };
+            Ok(self.engine.first(Surroundings::Listed(*listed, newton), &request)?)
         })
     }
 
     /// `∂ψ/∂n` of owned particles, then room for ghosts.
     pub fn slopes_mut(&mut self) -> &mut [f64] {
-        self.engines.slopes_mut()
+        self.engine.slopes_mut()
+    }
+
+    /// Sums every density of the model at the positions of the last evaluation, those that it did not need too.
+    ///
+    /// # Errors
+    /// As [`Engine::sum_densities`].
+    pub fn sum_densities(
+        &mut self,
+        owned: usize,
+        x: &[f64],
+        tag: &[i32],
+        kind: &[i32],
+    ) -> Result<(), StyleError> {
+        guard(|| {
+            let particles = Particles { owned, x: triples(x), tag, kind };
+            // LAMMPS has ghosts for all that is around its atoms, along periods too.
+            self.engine.sum_densities(Surroundings::ghosts(Newton::On), &particles)?;
+            Ok(())
+        })
     }
 
     /// Adds forces to `f`.
     ///
     /// # Errors
-    /// As [`Engines::second`].
+    /// As [`Engine::second`].
     #[allow(clippy::too_many_arguments)]
     pub fn forces(
         &mut self,
@@ -417,21 +433,24 @@ impl Style {
     ) -> Result<Tally, StyleError> {
         guard(|| {
             let particles = Particles { owned, x: triples(x), tag, kind };
-            let force = f.as_chunks_mut::<3>().0;
-            self.engines.second(&particles, triples(v), step, want, force)
+            let request = Request { particles, v: triples(v), step, want };
+            Ok(self.engine.second(&request, f.as_chunks_mut::<3>().0, true)?)
         })
     }
 }
 
-fn engines_at(
+fn engine_at(
     model: &Model,
     kt: f64,
     kinds: &[i32],
     settings: Settings,
     pool: &Arc<Pool>,
-) -> Result<Engines, StyleError> {
-    let fluid = model.at(kt).map_err(|e| StyleError(e.to_string()))?;
-    Engines::new(&fluid, kinds, settings, pool.clone())
+) -> Result<Engine, StyleError> {
+    let error = |e: &dyn std::error::Error| StyleError(e.to_string());
+    let fluid = model.at(kt).map_err(|e| error(&e))?;
+    let mut engine = Engine::with_pool(&fluid, settings, pool.clone()).map_err(|e| error(&e))?;
+    engine.map_kinds(kinds)?;
+    Ok(engine)
 }
 
 #[cfg(test)]
@@ -463,6 +482,34 @@ mod tests {
         // Without ghosts, added to what is there.
         s.evaluate(&open, &x, &[], &[1, 2], &[1, 3], None, Want::FORCES, &mut f).unwrap();
         assert_eq!(f, [-25.0, 0.0, 0.0, 25.0, 0.0, 0.0]);
+    }
+
+    /// Somebody who looks at densities that no force needs slows no later step down.
+    #[test]
+    fn densities_of_one_step_leave_later_steps_to_the_sweep() {
+        let text = "title = \"t\"\nspecies = [\"A\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n\
+            [density.m]\nkernel = \"linear\"\nrange = 1\n[excess_free_energy]\nA = \"n^2 + m\"\n";
+        let mut s = Style::new(Model::parse("m.toml", text).unwrap(), 1.0, &["A".to_owned()], 3).unwrap();
+        let (x, tag, kind) = ([0.0, 0.0, 0.0, 0.5, 0.0, 0.0], [1, 2], [1, 1]);
+        let w = 3.0 / std::f64::consts::PI * 0.5;
+        s.sum_densities(2, &x, &tag, &kind).unwrap();
+        assert_eq!(s.engine().local_densities(), [0.0; 4]);
+        for _ in 0..2 {
+            s.evaluate(&PeriodicBox::OPEN, &x, &[], &tag, &kind, None, Want::FORCES, &mut [0.0; 6]).unwrap();
+            assert_eq!(s.engine().path(), Some(EnginePath::Sweep));
+            s.sum_densities(2, &x, &tag, &kind).unwrap();
+            let densities = s.engine().local_densities();
+            assert_eq!(densities.len(), 4);
+            assert!((densities[1] - w).abs() < 1e-14 && densities[0] > 0.0, "{densities:?}");
+            assert_eq!(s.engine().path(), Some(EnginePath::Sweep));
+        }
+        let text = [false, true].map(|listed| s.description("", listed));
+        assert!(text[0].contains("evaluation    cell sweep;"), "{}", text[0]);
+        assert!(
+            text[1].contains("evaluation    reference evaluation, because the host lists"),
+            "{}",
+            text[1]
+        );
     }
 
     #[test]

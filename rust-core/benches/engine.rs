@@ -1,7 +1,7 @@
 //! Micro-benchmarks of the engine on one thread: `cargo bench -p psidpd-core`.
 //!
 //! - `sweep`: one evaluation of all forces of 6050 particles, for each fluid, precision and instruction set;
-//! - `plain`: the same by the plain engine;
+//! - `reference`: the same by the reference;
 //! - `noise`: the random numbers of pairs;
 //! - `psi`: ψ and its slopes, in blocks as the engine evaluates them.
 
@@ -9,7 +9,8 @@ mod setup;
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use psidpd_core::engine::noise::PairNoise;
-use psidpd_core::engine::{Engine, Images, Instructions, Newton, Particles, Precision, Step, Want};
+use psidpd_core::engine::reference::Reference;
+use psidpd_core::engine::{Instructions, Particles, Precision, Step, Surroundings, Want};
 use psidpd_core::model::ExcessFreeEnergy;
 use psidpd_core::model::expression::{Formula, Program};
 use setup::{Cloud, SUBJECTS, sweep, uniform};
@@ -39,33 +40,23 @@ fn sweeps(c: &mut Criterion) {
     group.finish();
 }
 
-fn plain(c: &mut Criterion) {
-    let mut group = c.benchmark_group("plain");
+fn reference(c: &mut Criterion) {
+    let mut group = c.benchmark_group("reference");
     group.throughput(Throughput::Elements(COUNT as u64));
     for subject in &SUBJECTS {
         let fluid = subject.fluid();
-        let mut engine = Engine::new(&fluid).expect("a plan");
-        let Cloud { domain, mut x, mut v, mut tag, mut kind, .. } = Cloud::new(subject, &fluid, COUNT);
-        let mut images = Images::default();
-        let mut force = Vec::new();
+        let mut reference = Reference::new(&fluid).expect("a plan");
+        let mut cloud = Cloud::new(subject, &fluid, COUNT);
         let mut number = 0;
         group.bench_function(subject.name, |b| {
             b.iter(|| {
                 number += 1;
-                images.build(&domain, 3, fluid.cutoff(), COUNT, &mut x);
-                images.forward(1, &mut tag);
-                images.forward(1, &mut kind);
-                images.forward(1, &mut v);
-                let particles = Particles { owned: COUNT, x: &x, tag: &tag, kind: &kind };
-                engine.densities(&particles, Newton::On).expect("densities");
-                let width = engine.slope_width();
-                engine.slopes_mut().truncate(COUNT * width);
-                images.forward(width, engine.slopes_mut());
-                force.clear();
-                force.resize(x.len(), [0.0; 3]);
+                let Cloud { domain, x, v, tag, kind, force, .. } = &mut cloud;
+                let particles = Particles { owned: COUNT, x, tag, kind };
+                reference.first(Surroundings::Box(domain), &particles, false).expect("densities");
                 let step = Step { seed: 1, number, dt: subject.dt };
-                engine.forces(&particles, &v, Some(step), Want::FORCES, &mut force).expect("forces");
-                images.reverse(&mut force);
+                force.fill([0.0; 3]);
+                reference.second(&particles, v, Some(step), Want::FORCES, force).expect("forces");
             });
         });
     }
@@ -116,6 +107,6 @@ criterion_group! {
         .sample_size(30)
         .warm_up_time(Duration::from_millis(300))
         .measurement_time(Duration::from_secs(2));
-    targets = sweeps, plain, noise, psi
+    targets = sweeps, reference, noise, psi
 }
 criterion_main!(benches);

@@ -1,9 +1,10 @@
-//! How much of a step goes into evaluating ψ: times of `Engine::densities` and `Engine::forces`, and of
+//! How much of a step goes into evaluating ψ: times of `Reference::first` and `Reference::second`, and of
 //! ψ and its slopes alone, for 6000 particles on one core.
 //!
 //! `cargo run --release -p psidpd-core --example excess_share`
 
-use psidpd_core::engine::{Engine, Images, Newton, Particles, PeriodicBox, Want, noise};
+use psidpd_core::engine::reference::Reference;
+use psidpd_core::engine::{Particles, PeriodicBox, Surroundings, Want, noise};
 use psidpd_core::model::expression::{Formula, Program};
 use psidpd_core::model::{ExcessFreeEnergy, Fluid, Model};
 use std::time::Instant;
@@ -107,7 +108,7 @@ fn measure(name: &str, text: &str, rho: f64) {
     let uniform = |k: usize| f64::from(noise::threefry2x32::<20>([k as u32, 0], [5, 9])[0]) / 4294967296.0;
     // A disturbed lattice: nearer to a fluid than points at random.
     let side = (COUNT as f64).cbrt().ceil() as usize;
-    let mut x: Vec<[f64; 3]> = (0..COUNT)
+    let x: Vec<[f64; 3]> = (0..COUNT)
         .map(|k| {
             let cell = [k % side, k / side % side, k / side / side];
             std::array::from_fn(|c| {
@@ -115,26 +116,20 @@ fn measure(name: &str, text: &str, rho: f64) {
             })
         })
         .collect();
-    let mut images = Images::default();
-    let mut tag: Vec<i32> = (1..=COUNT as i32).collect();
-    let mut kind: Vec<i32> = (0..COUNT).map(|k| (k % fluid.species.len()) as i32).collect();
-    images.build(&domain, 3, fluid.cutoff(), COUNT, &mut x);
-    images.forward(1, &mut tag);
-    images.forward(1, &mut kind);
-    let v = vec![[0.0; 3]; x.len()];
+    let tag: Vec<i32> = (1..=COUNT as i32).collect();
+    let kind: Vec<i32> = (0..COUNT).map(|k| (k % fluid.species.len()) as i32).collect();
+    let v = vec![[0.0; 3]; COUNT];
     let particles = Particles { owned: COUNT, x: &x, tag: &tag, kind: &kind };
-    let mut engine = Engine::new(&fluid).unwrap();
-    let densities = fastest(|| engine.densities(&particles, Newton::On).unwrap());
-    let width = engine.slope_width();
-    images.forward(width, engine.slopes_mut());
+    let mut reference = Reference::new(&fluid).unwrap();
+    let densities = fastest(|| reference.first(Surroundings::Box(&domain), &particles, false).unwrap());
     let step = psidpd_core::engine::Step { seed: 1, number: 1, dt: 0.01 };
-    let mut f = vec![[0.0; 3]; x.len()];
+    let mut f = vec![[0.0; 3]; COUNT];
     let forces = fastest(|| {
         f.fill([0.0; 3]);
-        engine.forces(&particles, &v, Some(step), Want::FORCES, &mut f).unwrap();
+        reference.second(&particles, &v, Some(step), Want::FORCES, &mut f).unwrap();
     });
-    let excess = excess_alone(&fluid, engine.local_densities(), &kind[..COUNT]);
-    let outside = engine.out_of_bounds().iter().sum::<u64>() as f64 / (COUNT * REPEATS) as f64;
+    let excess = excess_alone(&fluid, reference.local_densities(), &kind);
+    let outside = reference.out_of_bounds().iter().sum::<u64>() as f64 / (COUNT * REPEATS) as f64;
     println!(
         "{name:<34} search+densities+psi {:7.3} ms  forces {:7.3} ms  psi alone {:7.3} ms = {:5.2} % of both, \
          {:5.1} ns per particle; out of bounds {:4.1} %",

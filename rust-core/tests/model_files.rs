@@ -1,7 +1,7 @@
 //! Model files that must load, and files that must not, each with what the message must say.
 
 use psidpd_core::document::FileError;
-use psidpd_core::engine::Engine;
+use psidpd_core::engine::Plan;
 use psidpd_core::model::Model;
 use std::path::{Path, PathBuf};
 
@@ -23,8 +23,8 @@ fn good_models_load_at_any_temperature_and_make_engines() {
         let model = Model::open(&file).unwrap_or_else(|e| panic!("{e}"));
         for kt in [0.1, 0.75, 1.0, 3.0] {
             let fluid = model.at(kt).unwrap_or_else(|e| panic!("{e}"));
-            let engine = Engine::new(&fluid).unwrap();
-            assert!(engine.plan().to_string().contains("fluid"), "{}", file.display());
+            let plan = Plan::new(&fluid).unwrap();
+            assert!(plan.to_string().contains("fluid"), "{}", file.display());
         }
     }
 }
@@ -59,7 +59,7 @@ fn straight_tables_need_no_density_pass() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/models/good");
     let width = |file: &str| {
         let fluid = Model::open(&folder.join(file)).unwrap().at(1.0).unwrap();
-        Engine::new(&fluid).unwrap().slope_width()
+        Plan::new(&fluid).unwrap().slope_width()
     };
     assert_eq!(width("straight_table.toml"), 0);
     assert_eq!(width("table.toml"), 1);

@@ -1,7 +1,8 @@
 //! Random models: the engine against the plain reference, and both against the Hamiltonian.
 
 use proptest::prelude::*;
-use psidpd_core::engine::{Engine, Images, Newton, Particles, PeriodicBox, Want, reference};
+use psidpd_core::engine::reference::{self, Reference};
+use psidpd_core::engine::{Images, Newton, Particles, PeriodicBox, Surroundings, Want};
 use psidpd_core::model::{ExcessFreeEnergy, Fluid, Model};
 use std::fmt::Write;
 
@@ -186,8 +187,7 @@ struct Outcome {
 }
 
 fn run_engine(fluid: &Fluid, c: &Configuration, newton: Newton) -> Outcome {
-    let mut engine = Engine::new(fluid).unwrap();
-    engine.sum_all_densities(true);
+    let mut engine = Reference::new(fluid).unwrap();
     let owned = c.x.len();
     let mut images = Images::default();
     let mut x = c.x.clone();
@@ -197,12 +197,12 @@ fn run_engine(fluid: &Fluid, c: &Configuration, newton: Newton) -> Outcome {
     images.forward(1, &mut tag);
     images.forward(1, &mut kind);
     let particles = Particles { owned, x: &x, tag: &tag, kind: &kind };
-    engine.densities(&particles, newton).unwrap();
+    engine.first(Surroundings::ghosts(newton), &particles, true).unwrap();
     let width = engine.slope_width();
     engine.slopes_mut().truncate(owned * width);
     images.forward(width, engine.slopes_mut());
     let mut forces = vec![[0.0; 3]; x.len()];
-    let tally = engine.forces(&particles, &[], None, Want::ALL, &mut forces).unwrap();
+    let tally = engine.second(&particles, &[], None, Want::ALL, &mut forces).unwrap();
     if newton == Newton::On {
         images.reverse(&mut forces);
     }

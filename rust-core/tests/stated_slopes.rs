@@ -1,6 +1,7 @@
 //! Laws of stated slopes: the engine against the plain reference, and against ψ where the slopes have one.
 
-use psidpd_core::engine::{Engine, Images, Newton, Particles, PeriodicBox, Want, noise, reference};
+use psidpd_core::engine::reference::{self, Reference};
+use psidpd_core::engine::{Images, Newton, Particles, PeriodicBox, Plan, Surroundings, Want, noise};
 use psidpd_core::maximum::largest;
 use psidpd_core::model::{Fluid, Model};
 use psidpd_core::theory::{MeanField, TheoryError};
@@ -34,7 +35,7 @@ fn configuration() -> (Vec<[f64; 3]>, Vec<usize>, PeriodicBox) {
 fn engine(fluid: &Fluid, newton: Newton) -> (f64, Vec<[f64; 3]>) {
     let (mut x, species, domain) = configuration();
     let owned = x.len();
-    let mut engine = Engine::new(fluid).unwrap();
+    let mut engine = Reference::new(fluid).unwrap();
     let mut images = Images::default();
     let mut tag: Vec<i32> = (1..=owned as i32).collect();
     let mut kind: Vec<i32> = species.iter().map(|s| *s as i32).collect();
@@ -42,12 +43,12 @@ fn engine(fluid: &Fluid, newton: Newton) -> (f64, Vec<[f64; 3]>) {
     images.forward(1, &mut tag);
     images.forward(1, &mut kind);
     let particles = Particles { owned, x: &x, tag: &tag, kind: &kind };
-    engine.densities(&particles, newton).unwrap();
+    engine.first(Surroundings::ghosts(newton), &particles, true).unwrap();
     let width = engine.slope_width();
     engine.slopes_mut().truncate(owned * width);
     images.forward(width, engine.slopes_mut());
     let mut forces = vec![[0.0; 3]; x.len()];
-    let tally = engine.forces(&particles, &[], None, Want::ALL, &mut forces).unwrap();
+    let tally = engine.second(&particles, &[], None, Want::ALL, &mut forces).unwrap();
     if newton == Newton::On {
         images.reverse(&mut forces);
     }
@@ -90,7 +91,7 @@ fn nobody_takes_it_for_a_free_energy() {
     let fluid = fluid(OTHER);
     assert!(!fluid.is_conservative());
     assert_eq!(fluid.stated_slopes(), Some("B"));
-    let plan = Engine::new(&fluid).unwrap().plan().to_string();
+    let plan = Plan::new(&fluid).unwrap().to_string();
     assert!(plan.contains("slope of B    n_A: ") && plan.contains("NOT CONSERVATIVE"), "{plan}");
     // Every ψ is linear in q: it needs no pass, stated slopes elsewhere or not.
     assert!(plan.contains("psi is linear in q"), "{plan}");
@@ -104,5 +105,5 @@ fn a_law_of_zeros_needs_no_pass() {
     let text = "title = \"t\"\nspecies = [\"A\"]\n[density.n]\nkernel = \"lucy\"\nrange = 1\n\
                 [excess_free_energy]\nA = { slopes = { n = \"0\" } }\n";
     let fluid = Model::parse("m.toml", text).unwrap().at(1.0).unwrap();
-    assert_eq!(Engine::new(&fluid).unwrap().slope_width(), 0);
+    assert_eq!(Plan::new(&fluid).unwrap().slope_width(), 0);
 }

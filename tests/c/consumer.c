@@ -200,6 +200,185 @@ static void check_gradient(psidpd_engine *engine, const struct host *start)
     CHECK(worst < 1e-7 * largest);
 }
 
+/* The same particles in a box of their own, and with ghosts told beforehand what is wanted: every precision, any
+ * number of threads, and every path. The wide box is one that a sweep goes round. */
+static void check_paths(const psidpd_model *model)
+{
+    enum { MANY = 200 };
+    static double x[3 * MANY], v[3 * MANY], f[4][3 * MANY], mixed[3 * MANY], energy[4];
+    static int32_t tag[MANY], kind[MANY], i[MANY * MANY / 2], j[MANY * MANY / 2];
+    static double factor[MANY * MANY / 2];
+    const psidpd_box domain = {{-1.0, 0.5, 2.0}, {3.1, 0, 0, 0.3, 3.4, 0, 0, 0, 3.2}, {1, 1, 1}};
+    psidpd_settings settings = {PSIDPD_PRECISION_DOUBLE, PSIDPD_INSTRUCTIONS_BEST, 2}, told;
+    const psidpd_step step = {9, 4, 0.01};
+    psidpd_request request;
+    psidpd_pairs pairs;
+    psidpd_engine *engine, *plain;
+    psidpd_tally tally;
+    psidpd_path path;
+    const char *text;
+    const double *given;
+    double *slopes, range;
+    size_t k, m, length, width;
+    for (k = 0; k < 3 * MANY; k++) {
+        x[k] = 3.0 * uniform();
+        v[k] = uniform() - 0.5;
+    }
+    for (k = 0; k < MANY; k++) {
+        tag[k] = (int32_t)k + 1;
+        kind[k] = 0;
+    }
+    memset(&request, 0, sizeof request);
+    request.particles.owned = MANY;
+    request.particles.all = MANY;
+    request.particles.x = x;
+    request.particles.tag = tag;
+    request.particles.kind = kind;
+    request.v = v;
+    request.step = &step;
+    request.want = PSIDPD_WANT_ENERGY | PSIDPD_WANT_VIRIAL;
+
+    settings.threads = 0;
+    FAILS(psidpd_engine_new_with(model, 1.0, &settings, &engine), PSIDPD_STATUS_INVALID_ARGUMENT, "threads");
+    settings.threads = 2;
+    settings.precision = 7;
+    FAILS(psidpd_engine_new_with(model, 1.0, &settings, &engine), PSIDPD_STATUS_INVALID_ARGUMENT, "precision");
+    settings.precision = PSIDPD_PRECISION_DOUBLE;
+    OK(psidpd_engine_new_with(model, 1.0, &settings, &engine));
+    OK(psidpd_engine_settings(engine, &told));
+    CHECK(told.threads == 2 && told.precision == PSIDPD_PRECISION_DOUBLE);
+    CHECK(told.instructions != PSIDPD_INSTRUCTIONS_BEST);
+    FAILS(psidpd_engine_path(engine, &path, &text), PSIDPD_STATUS_CALL_ORDER, "nothing");
+    FAILS(psidpd_engine_second(engine, &request, f[0], &tally), PSIDPD_STATUS_CALL_ORDER, "psidpd_engine_first");
+
+    /* Two threads, then the portable kernels on one, then the reference, which knows of single particles. */
+    OK(psidpd_engine_evaluate(engine, &domain, &request, f[0], &tally));
+    energy[0] = tally.excess + tally.pair;
+    OK(psidpd_engine_path(engine, &path, &text));
+    CHECK(path == PSIDPD_PATH_SWEEP && strcmp(text, "cell sweep") == 0);
+    FAILS(psidpd_engine_slopes(engine, &slopes, &length), PSIDPD_STATUS_CALL_ORDER, "psidpd_engine_first");
+    OK(psidpd_engine_particle_energy(engine, &given, &length));
+    CHECK(length == 0);
+    settings.threads = 1;
+    settings.instructions = PSIDPD_INSTRUCTIONS_PORTABLE;
+    OK(psidpd_engine_new_with(model, 1.0, &settings, &plain));
+    OK(psidpd_engine_evaluate(plain, &domain, &request, f[1], &tally));
+    energy[1] = tally.excess + tally.pair;
+    psidpd_engine_free(plain);
+    request.want |= PSIDPD_WANT_PARTICLE_ENERGY | PSIDPD_WANT_DENSITIES;
+    OK(psidpd_engine_evaluate(engine, &domain, &request, f[2], &tally));
+    energy[2] = tally.excess + tally.pair;
+    OK(psidpd_engine_path(engine, &path, &text));
+    CHECK(path == PSIDPD_PATH_REFERENCE && strstr(text, "single particles") != NULL);
+    OK(psidpd_engine_particle_energy(engine, &given, &length));
+    CHECK(length == MANY);
+    for (range = 0.0, k = 0; k < length; k++) range += given[k];
+    CHECK(fabs(range - energy[2]) < 1e-10 * (1.0 + fabs(energy[2])));
+    OK(psidpd_engine_local_densities(engine, &given, &length));
+    CHECK(length == MANY && given[0] > 0.0);
+
+    /* Densities that forces need anyway change nothing. */
+    request.want = PSIDPD_WANT_ENERGY | PSIDPD_WANT_DENSITIES;
+    OK(psidpd_engine_evaluate(engine, &domain, &request, f[3], &tally));
+    energy[3] = tally.excess + tally.pair;
+    OK(psidpd_engine_path(engine, &path, &text));
+    CHECK(path == PSIDPD_PATH_SWEEP);
+    OK(psidpd_engine_local_densities(engine, &given, &length));
+    CHECK(length == MANY && given[0] > 0.0);
+    for (m = 1; m < 4; m++) {
+        CHECK(fabs(energy[m] - energy[0]) < 1e-9 * (1.0 + fabs(energy[0])));
+        for (k = 0; k < 3 * MANY; k++) CHECK(fabs(f[m][k] - f[0][k]) < 1e-8 * (1.0 + fabs(f[0][k])));
+    }
+    memcpy(f[1], f[0], sizeof f[0]);
+
+    /* In two halves: a box that is all there needs no ghosts. */
+    memset(f[3], 0, sizeof f[3]);
+    request.want = PSIDPD_WANT_ENERGY;
+    OK(psidpd_engine_first(engine, &domain, NULL, 1, &request));
+    OK(psidpd_engine_slope_width(engine, &width));
+    OK(psidpd_engine_slopes(engine, &slopes, &length));
+    CHECK(length == MANY * width);
+    OK(psidpd_engine_second(engine, &request, f[3], NULL));
+    FAILS(psidpd_engine_second(engine, &request, f[3], NULL), PSIDPD_STATUS_CALL_ORDER, "psidpd_engine_first");
+    for (k = 0; k < 3 * MANY; k++) CHECK(fabs(f[3][k] - f[0][k]) < 1e-8 * (1.0 + fabs(f[0][k])));
+
+    /* Mixed precision is mixed. */
+    settings.precision = PSIDPD_PRECISION_MIXED;
+    OK(psidpd_engine_new_with(model, 1.0, &settings, &plain));
+    OK(psidpd_engine_evaluate(plain, &domain, &request, mixed, &tally));
+    psidpd_engine_free(plain);
+    for (range = 0.0, k = 0; k < 3 * MANY; k++) range = fmax(range, fabs(mixed[k] - f[0][k]) / (1.0 + fabs(f[0][k])));
+    CHECK(range > 1e-12 && range < 1e-3);
+
+    /* Pairs that the host lists, without a box: all of them are the search, and none are none. */
+    pairs.count = 0;
+    for (k = 0; k < MANY; k++) {
+        for (m = 0; m < k; m++) {
+            i[pairs.count] = (int32_t)k;
+            j[pairs.count] = (int32_t)m;
+            factor[pairs.count++] = 1.0;
+        }
+    }
+    pairs.i = i;
+    pairs.j = j;
+    pairs.factor = factor;
+    memset(f[0], 0, sizeof f[0]);
+    memset(f[1], 0, sizeof f[1]);
+    OK(psidpd_engine_first_of_pairs(engine, &pairs, 1, &request));
+    OK(psidpd_engine_second(engine, &request, f[0], NULL));
+    OK(psidpd_engine_path(engine, &path, &text));
+    CHECK(path == PSIDPD_PATH_REFERENCE && strstr(text, "lists the pairs") != NULL);
+    OK(psidpd_engine_first(engine, NULL, NULL, 0, &request));
+    OK(psidpd_engine_second(engine, &request, f[1], NULL));
+    for (k = 0; k < 3 * MANY; k++) CHECK(fabs(f[1][k] - f[0][k]) < 1e-8 * (1.0 + fabs(f[0][k])));
+    i[0] = MANY;
+    FAILS(psidpd_engine_first_of_pairs(engine, &pairs, 1, &request), PSIDPD_STATUS_INVALID_ARGUMENT, "not there");
+
+    /* What cannot be. */
+    request.want = 1u << 9;
+    FAILS(psidpd_engine_evaluate(engine, &domain, &request, f[0], NULL), PSIDPD_STATUS_INVALID_ARGUMENT, "0x200");
+    request.want = 0;
+    request.particles.owned = MANY - 1;
+    FAILS(psidpd_engine_evaluate(engine, &domain, &request, f[0], NULL), PSIDPD_STATUS_INVALID_ARGUMENT, "ghosts");
+    request.particles.owned = MANY;
+    FAILS(psidpd_engine_evaluate(engine, &domain, &request, x, NULL), PSIDPD_STATUS_INVALID_ARGUMENT, "overlap");
+    FAILS(psidpd_engine_evaluate(engine, NULL, &request, f[0], NULL), PSIDPD_STATUS_NULL_POINTER, "box is NULL");
+    {
+        psidpd_box flat = domain;
+        flat.edges[8] = 0.0;
+        FAILS(psidpd_engine_evaluate(engine, &flat, &request, f[0], NULL), PSIDPD_STATUS_INVALID_ARGUMENT, "volume");
+        flat = domain;
+        flat.periodic[1] = 2;
+        FAILS(psidpd_engine_evaluate(engine, &flat, &request, f[0], NULL), PSIDPD_STATUS_INVALID_ARGUMENT, "periodic");
+    }
+    psidpd_engine_free(engine);
+}
+
+/* Particles in a narrow box, which the library makes images for, against those with the host's own images. */
+static void check_narrow_box(psidpd_engine *engine, const struct host *start, const psidpd_step *step)
+{
+    static struct host host, own;
+    const psidpd_box domain = {{0, 0, 0}, {box[0], 0, 0, 0, box[1], 0, 0, 0, box[2]}, {1, 1, 1}};
+    psidpd_request request;
+    size_t k;
+    host = *start;
+    evaluate(engine, &host, 1, step);
+    own = *start;
+    request.particles.owned = OWNED;
+    request.particles.all = OWNED;
+    request.particles.x = own.x;
+    request.particles.tag = own.tag;
+    request.particles.kind = own.kind;
+    request.v = own.v;
+    request.step = step;
+    request.want = PSIDPD_WANT_ENERGY | PSIDPD_WANT_VIRIAL;
+    memset(own.force, 0, sizeof own.force);
+    OK(psidpd_engine_evaluate(engine, &domain, &request, own.force, &own.tally));
+    CHECK(fabs(own.tally.pair - host.tally.pair) < 1e-10 * (1.0 + fabs(host.tally.pair)));
+    CHECK(fabs(own.tally.virial[3] - host.tally.virial[3]) < 1e-9 * (1.0 + fabs(host.tally.virial[0])));
+    for (k = 0; k < 3 * OWNED; k++) CHECK(fabs(own.force[k] - host.force[k]) < 1e-9 * (1.0 + fabs(host.force[k])));
+}
+
 static void check_model_errors(const psidpd_model *model, const char *missing_path)
 {
     psidpd_model *none = NULL;
@@ -364,6 +543,7 @@ int main(int count, char **arguments)
     printf("\n");
 
     check_engine_errors(model, &start);
+    check_paths(model);
     /* The engine needs the model no more. */
     psidpd_model_free(model);
 
@@ -381,6 +561,7 @@ int main(int count, char **arguments)
     evaluate(engine, &host, 1, &step);
     print_outcome("thermal", &host);
     check_gradient(engine, &start);
+    check_narrow_box(engine, &start, &step);
     psidpd_engine_free(engine);
     return 0;
 }

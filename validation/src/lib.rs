@@ -1,12 +1,15 @@
 //! psidpd: native runner and cross-code validator.
 pub mod bench;
 pub mod check;
+pub mod checkpoint;
 pub mod cli;
 pub mod crosscheck;
 pub mod export;
+pub mod files;
 pub mod lammps;
 pub mod observe;
 pub mod output;
+pub mod particles;
 pub mod report;
 pub mod run;
 pub mod scene;

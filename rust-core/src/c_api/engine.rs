@@ -2,6 +2,7 @@
 
 use super::arguments::{Output, array, array_mut, check_apart, copied, exclusive, flag, shared};
 use super::model::Model;
+use super::settings::{Path, Settings};
 use super::status::{Failure, Status, c_text, guard};
 use crate::engine;
 use std::ffi::{CString, c_char};
@@ -9,10 +10,25 @@ use std::ffi::{CString, c_char};
 /// The forces of one model at one temperature. One thread at a time may use an engine; different
 /// threads may use different ones.
 pub struct Engine {
-    engine: engine::Engine,
+    pub(super) engine: engine::Engine,
     plan_text: CString,
-    /// Whether forces can be computed: the last psidpd_engine_densities succeeded.
-    ready: bool,
+    path_text: CString,
+    /// For psidpd_engine_densities.
+    all_densities: bool,
+    pub(super) state: State,
+}
+
+/// What an engine has computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum State {
+    /// Nothing, or nothing since a call failed.
+    Nothing,
+    /// psidpd_engine_densities: psidpd_engine_forces may follow.
+    Densities,
+    /// psidpd_engine_first: psidpd_engine_second may follow.
+    First,
+    /// A whole evaluation.
+    Whole,
 }
 
 /// Particles of one host or rank: owned ones first, then ghosts.
@@ -59,19 +75,25 @@ pub struct Tally {
     pub thermostat_virial: [f64; 6],
 }
 
-/// For psidpd_engine_forces: compute the potential energy.
+/// For `want`: compute the potential energy.
 pub const PSIDPD_WANT_ENERGY: u32 = 1;
-/// For psidpd_engine_forces: compute the virials.
+/// For `want`: compute the virials.
 pub const PSIDPD_WANT_VIRIAL: u32 = 2;
-/// For psidpd_engine_forces: compute the energy of each particle.
+/// For `want`: compute the energy of each particle.
 pub const PSIDPD_WANT_PARTICLE_ENERGY: u32 = 4;
-/// For psidpd_engine_forces: compute the virial of each particle.
+/// For `want`: compute the virial of each particle.
 pub const PSIDPD_WANT_PARTICLE_VIRIAL: u32 = 8;
+/// For `want` of a psidpd_request: sum every density of the model, also those that no force needs.
+pub const PSIDPD_WANT_DENSITIES: u32 = 16;
+
+/// What a call that gives numbers of all kinds can be asked for.
+pub(super) const WANT_ALL: u32 = WANT_FORCES | PSIDPD_WANT_DENSITIES;
+/// What psidpd_engine_forces can be asked for.
+const WANT_FORCES: u32 =
+    PSIDPD_WANT_ENERGY | PSIDPD_WANT_VIRIAL | PSIDPD_WANT_PARTICLE_ENERGY | PSIDPD_WANT_PARTICLE_VIRIAL;
 
 /// What the bits of `want` stand for.
-fn want_of(bits: u32) -> Result<engine::Want, Failure> {
-    let known =
-        PSIDPD_WANT_ENERGY | PSIDPD_WANT_VIRIAL | PSIDPD_WANT_PARTICLE_ENERGY | PSIDPD_WANT_PARTICLE_VIRIAL;
+pub(super) fn want_of(bits: u32, known: u32) -> Result<engine::Want, Failure> {
     if bits & !known != 0 {
         return Err(Failure::new(Status::InvalidArgument, format!("want has unknown bits: {bits:#x}")));
     }
@@ -81,13 +103,14 @@ fn want_of(bits: u32) -> Result<engine::Want, Failure> {
         virial: has(PSIDPD_WANT_VIRIAL),
         particle_energy: has(PSIDPD_WANT_PARTICLE_ENERGY),
         particle_virial: has(PSIDPD_WANT_PARTICLE_VIRIAL),
+        densities: has(PSIDPD_WANT_DENSITIES),
     })
 }
 
 /// # Safety
 /// The pointers in `particles` are null or at arrays as long as it says, which nobody writes to during
 /// `'a`.
-unsafe fn particles_of<'a>(particles: &Particles) -> Result<engine::Particles<'a>, Failure> {
+pub(super) unsafe fn particles_of<'a>(particles: &Particles) -> Result<engine::Particles<'a>, Failure> {
     let Particles { owned, all, .. } = *particles;
     if owned > all {
         let text = format!("particles: {owned} are owned, but there are only {all}");
@@ -104,7 +127,7 @@ unsafe fn particles_of<'a>(particles: &Particles) -> Result<engine::Particles<'a
     }
 }
 
-fn step_of(step: Step) -> Result<engine::Step, Failure> {
+pub(super) fn step_of(step: Step) -> Result<engine::Step, Failure> {
     if !(step.dt > 0.0 && step.dt.is_finite()) {
         let text = format!("step.dt is {}, not a positive number", step.dt);
         return Err(Failure::new(Status::InvalidArgument, text));
@@ -116,6 +139,9 @@ fn step_of(step: Step) -> Result<engine::Step, Failure> {
 /// `*engine`, to be freed with psidpd_engine_free. If it fails, `*engine` is left alone. The engine
 /// does not need the model any more.
 ///
+/// It computes in double precision on one thread, with the best instruction set there is; see
+/// psidpd_engine_new_with.
+///
 /// # Errors
 /// PSIDPD_STATUS_MODEL if `kt` is not a positive number, or the model is not finite at it.
 /// PSIDPD_STATUS_NULL_POINTER.
@@ -124,12 +150,103 @@ fn step_of(step: Step) -> Result<engine::Step, Failure> {
 /// `model` is NULL or a model that has not been freed; `engine` can be written to.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn psidpd_engine_new(model: *const Model, kt: f64, engine: *mut *mut Engine) -> Status {
+    // SAFETY: as this function's own section says.
+    guard(|| unsafe { Engine::make(model, kt, Settings::DEFAULT, engine) })
+}
+
+/// As psidpd_engine_new, with settings of the host's.
+///
+/// # Errors
+/// As psidpd_engine_new; PSIDPD_STATUS_INVALID_ARGUMENT for settings that are none.
+///
+/// # Safety
+/// As psidpd_engine_new; `settings` is NULL or at settings.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn psidpd_engine_new_with(
+    model: *const Model,
+    kt: f64,
+    settings: *const Settings,
+    engine: *mut *mut Engine,
+) -> Status {
+    // SAFETY: as this function's own section says.
+    guard(|| unsafe { Engine::make(model, kt, copied(settings, "settings")?, engine) })
+}
+
+impl Engine {
+    /// # Safety
+    /// `model` is null or a model that has not been freed; `engine` is null or can be written to.
+    unsafe fn make(
+        model: *const Model,
+        kt: f64,
+        settings: Settings,
+        engine: *mut *mut Engine,
+    ) -> Result<(), Failure> {
+        // SAFETY: as the caller promises.
+        let (model, out) = unsafe { (shared(model, "model")?, Output::new(engine, "engine")?) };
+        let engine = engine::Engine::new(&model.model.at(kt)?, settings.checked()?)?;
+        let plan_text = c_text(&engine.plan().to_string());
+        out.put(Box::into_raw(Box::new(Engine {
+            engine,
+            plan_text,
+            path_text: CString::default(),
+            all_densities: false,
+            state: State::Nothing,
+        })));
+        Ok(())
+    }
+
+    /// Fails unless what is needed has been computed.
+    pub(super) fn require(&self, any_of: &[State], call: &str) -> Result<(), Failure> {
+        if any_of.contains(&self.state) {
+            return Ok(());
+        }
+        Err(Failure::new(Status::CallOrder, format!("{call} has not been called, or has failed")))
+    }
+}
+
+/// Puts in `*settings` how the engine computes, with the instruction set in use.
+///
+/// # Errors
+/// PSIDPD_STATUS_NULL_POINTER.
+///
+/// # Safety
+/// `engine` is NULL or an engine that has not been freed; `settings` can be written to.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn psidpd_engine_settings(engine: *const Engine, settings: *mut Settings) -> Status {
     guard(|| {
         // SAFETY: as this function's own section says.
-        let (model, out) = unsafe { (shared(model, "model")?, Output::new(engine, "engine")?) };
-        let engine = engine::Engine::new(&model.model.at(kt)?)?;
-        let plan_text = c_text(&engine.plan().to_string());
-        out.put(Box::into_raw(Box::new(Engine { engine, plan_text, ready: false })));
+        let (engine, out) = unsafe { (shared(engine, "engine")?, Output::new(settings, "settings")?) };
+        out.put(Settings::of(engine.engine.settings()));
+        Ok(())
+    })
+}
+
+/// Puts in `*path` the way that the last evaluation went, a psidpd_path, and in `*text` the same for people, with the
+/// reason; valid until the next psidpd_engine_path of this engine, and until the engine is freed.
+///
+/// # Errors
+/// PSIDPD_STATUS_CALL_ORDER before the first evaluation. PSIDPD_STATUS_NULL_POINTER.
+///
+/// # Safety
+/// `engine` is NULL or an engine that has not been freed; `path` and `text` can be written to.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn psidpd_engine_path(
+    engine: *mut Engine,
+    path: *mut Path,
+    text: *mut *const c_char,
+) -> Status {
+    guard(|| {
+        // SAFETY: as this function's own section says.
+        let (engine, out, out_text) =
+            unsafe { (exclusive(engine, "engine")?, Output::new(path, "path")?, Output::new(text, "text")?) };
+        let path = engine.engine.path();
+        let path = path.ok_or_else(|| Failure::new(Status::CallOrder, "nothing has been evaluated yet"))?;
+        engine.path_text = c_text(&path.to_string());
+        out_text.put(engine.path_text.as_ptr());
+        out.put(match path {
+            engine::Path::Sweep => Path::Sweep,
+            engine::Path::Reference(_) => Path::Reference,
+        });
         Ok(())
     })
 }
@@ -179,7 +296,7 @@ pub unsafe extern "C" fn psidpd_engine_slope_width(engine: *const Engine, width:
     guard(|| {
         // SAFETY: as this function's own section says.
         let (engine, out) = unsafe { (shared(engine, "engine")?, Output::new(width, "width")?) };
-        out.put(engine.engine.slope_width());
+        out.put(engine.engine.plan().slope_width());
         Ok(())
     })
 }
@@ -237,7 +354,7 @@ pub unsafe extern "C" fn psidpd_engine_plan_text(engine: *const Engine, text: *m
     })
 }
 
-/// Maps the host's types to species, from the next psidpd_engine_densities on: `species[kind]` is the
+/// Maps the host's types to species, from the next evaluation on: `species[kind]` is the
 /// species index of type `kind`, negative for particles that take no part. `species` is copied.
 ///
 /// # Errors
@@ -271,13 +388,16 @@ pub unsafe extern "C" fn psidpd_engine_sum_all_densities(engine: *mut Engine, al
     guard(|| {
         // SAFETY: as this function's own section says.
         let engine = unsafe { exclusive(engine, "engine")? };
-        engine.engine.sum_all_densities(flag(all, "all")?);
+        engine.all_densities = flag(all, "all")?;
         Ok(())
     })
 }
 
 /// First half of an evaluation: finds pairs, sums local densities, evaluates psi and its slopes for
 /// owned particles.
+///
+/// It is not known yet what will be wanted: this goes the way of the reference, on one thread. What is told beforehand,
+/// with psidpd_engine_evaluate or psidpd_engine_first, can be faster.
 ///
 /// With `newton` 1, each pair is computed once over all ranks and images, and the host adds forces on
 /// ghosts back to their owners; with 0, pairs with ghosts are computed on both sides and ghosts get no
@@ -303,32 +423,28 @@ pub unsafe extern "C" fn psidpd_engine_densities(
         let (engine, particles) =
             unsafe { (exclusive(engine, "engine")?, particles_of(&copied(particles, "particles")?)?) };
         let newton = if flag(newton, "newton")? { engine::Newton::On } else { engine::Newton::Off };
-        engine.ready = false;
-        engine.engine.densities(&particles, newton)?;
-        engine.ready = true;
+        engine.state = State::Nothing;
+        let want = engine::Want { densities: engine.all_densities, ..engine::Want::FORCES };
+        let request = engine::Request { particles, v: &[], step: None, want };
+        engine.engine.use_reference_only(true);
+        let domain = super::evaluation::open_space()?;
+        let around = engine::Around { domain: &domain, images: &[] };
+        let found = engine.engine.first(engine::Surroundings::Ghosts(around, newton), &request);
+        engine.engine.use_reference_only(false);
+        found?;
+        engine.state = State::Densities;
         Ok(())
     })
 }
 
-impl Engine {
-    /// Fails unless densities have been computed.
-    fn require_densities(&self) -> Result<(), Failure> {
-        if self.ready {
-            return Ok(());
-        }
-        let text = "psidpd_engine_densities has not been called, or has failed";
-        Err(Failure::new(Status::CallOrder, text))
-    }
-}
-
 /// Puts in `*slopes` the place of the derivatives of psi, and in `*length` how many there are: of each
-/// owned particle psidpd_engine_slope_width numbers, then as many of each ghost. Those of ghosts are
-/// zero; the host must fill them in with their owners' before psidpd_engine_forces.
+/// owned particle psidpd_engine_slope_width numbers, then as many of each ghost. Those of ghosts mean nothing; the host
+/// must fill them in with their owners' before psidpd_engine_forces or psidpd_engine_second.
 ///
-/// Valid until the next psidpd_engine_densities with this engine, and until the engine is freed.
+/// Valid until the next evaluation with this engine, and until the engine is freed.
 ///
 /// # Errors
-/// PSIDPD_STATUS_CALL_ORDER without psidpd_engine_densities. PSIDPD_STATUS_NULL_POINTER.
+/// PSIDPD_STATUS_CALL_ORDER without psidpd_engine_densities or psidpd_engine_first. PSIDPD_STATUS_NULL_POINTER.
 ///
 /// # Safety
 /// `engine` is NULL or an engine that has not been freed; `slopes` and `length` can be written to.
@@ -343,7 +459,8 @@ pub unsafe extern "C" fn psidpd_engine_slopes(
         let (engine, out, out_length) = unsafe {
             (exclusive(engine, "engine")?, Output::new(slopes, "slopes")?, Output::new(length, "length")?)
         };
-        engine.require_densities()?;
+        engine
+            .require(&[State::Densities, State::First], "psidpd_engine_densities or psidpd_engine_first")?;
         let slopes = engine.engine.slopes_mut();
         out_length.put(slopes.len());
         out.put(slopes.as_mut_ptr());
@@ -383,8 +500,9 @@ pub unsafe extern "C" fn psidpd_engine_forces(
     guard(|| {
         // SAFETY: as this function's own section says.
         let (engine, lists) = unsafe { (exclusive(engine, "engine")?, copied(particles, "particles")?) };
-        engine.require_densities()?;
-        let want = want_of(want)?;
+        engine.require(&[State::Densities], "psidpd_engine_densities")?;
+        let want = want_of(want, WANT_FORCES)?;
+        let want = engine::Want { densities: engine.all_densities, ..want };
         let step = if step.is_null() {
             None
         } else {
@@ -397,46 +515,72 @@ pub unsafe extern "C" fn psidpd_engine_forces(
             // SAFETY: as this function's own section says.
             Some(unsafe { Output::new(tally, "tally")? })
         };
-        check_apart(force, lists.x, lists.all, "force and particles.x")?;
         // SAFETY: as this function's own section says.
-        let particles = unsafe { particles_of(&lists)? };
-        let thermal = step.is_some() && engine.engine.plan().needs_velocities();
-        let v = if v.is_null() && !thermal {
-            &[]
-        } else {
-            check_apart(force, v, lists.all, "force and v")?;
-            // SAFETY: as this function's own section says; a vector is three consecutive numbers.
-            unsafe { array(v.cast::<[f64; 3]>(), lists.all, "v")? }
-        };
-        // SAFETY: as this function's own section says; that it overlaps neither `x` nor `v` has been
-        // checked.
-        let force = unsafe { array_mut(force.cast::<[f64; 3]>(), lists.all, "force")? };
+        let (particles, v, force) = unsafe { arrays_of(engine, &lists, v, step, force)? };
+        let request = engine::Request { particles, v, step, want };
         // A panic leaves it so; an error does not.
-        engine.ready = false;
-        let sums = engine.engine.forces(&particles, v, step, want, force);
-        engine.ready = true;
+        engine.state = State::Nothing;
+        let sums = engine.engine.second(&request, force, true);
+        engine.state = State::Densities;
         let sums = sums?;
         if let Some(out) = out {
-            out.put(Tally {
-                excess: sums.excess,
-                pair: sums.pair,
-                virial: sums.virial,
-                thermostat_virial: sums.thermostat_virial,
-            });
+            out.put(Tally::of(&sums));
         }
         Ok(())
     })
 }
 
+impl Tally {
+    pub(super) fn of(sums: &engine::Tally) -> Tally {
+        Tally {
+            excess: sums.excess,
+            pair: sums.pair,
+            virial: sums.virial,
+            thermostat_virial: sums.thermostat_virial,
+        }
+    }
+}
+
+/// The arrays of an evaluation.
+type Arrays<'a> = (engine::Particles<'a>, &'a [[f64; 3]], &'a mut [[f64; 3]]);
+
+/// The arrays that forces are computed from, and the one that they go to, checked as far as they can be.
+///
+/// # Safety
+/// The pointers in `lists` are null or at arrays as long as it says; `v` is null or at `3 * lists.all` numbers, and so is
+/// `force`, which overlaps none but perhaps `lists.x` and `v`.
+pub(super) unsafe fn arrays_of<'a>(
+    engine: &Engine,
+    lists: &Particles,
+    v: *const f64,
+    step: Option<engine::Step>,
+    force: *mut f64,
+) -> Result<Arrays<'a>, Failure> {
+    check_apart(force, lists.x, lists.all, "force and particles.x")?;
+    // SAFETY: as the caller promises.
+    let particles = unsafe { particles_of(lists)? };
+    let thermal = step.is_some() && engine.engine.plan().needs_velocities();
+    let v = if v.is_null() && !thermal {
+        &[]
+    } else {
+        check_apart(force, v, lists.all, "force and v")?;
+        // SAFETY: as the caller promises; a vector is three consecutive numbers.
+        unsafe { array(v.cast::<[f64; 3]>(), lists.all, "v")? }
+    };
+    // SAFETY: as the caller promises; that it overlaps neither `x` nor `v` has been checked.
+    let force = unsafe { array_mut(force.cast::<[f64; 3]>(), lists.all, "force")? };
+    Ok((particles, v, force))
+}
+
 /// Puts in `*densities` the place of the local densities of owned particles, and in `*length` how many
 /// numbers that is: of each particle those of the first density, one for each species, then those of
-/// the second ... Not corrected. Those that forces do not need are zero unless
-/// psidpd_engine_sum_all_densities.
+/// the second ... Not corrected. After psidpd_engine_densities those that forces do not need are zero unless
+/// psidpd_engine_sum_all_densities; otherwise there are none unless PSIDPD_WANT_DENSITIES.
 ///
-/// Valid until the next psidpd_engine_densities with this engine, and until the engine is freed.
+/// Valid until the next evaluation with this engine, and until the engine is freed.
 ///
 /// # Errors
-/// PSIDPD_STATUS_CALL_ORDER without psidpd_engine_densities. PSIDPD_STATUS_NULL_POINTER.
+/// PSIDPD_STATUS_CALL_ORDER without an evaluation. PSIDPD_STATUS_NULL_POINTER.
 ///
 /// # Safety
 /// `engine` is NULL or an engine that has not been freed; `densities` and `length` can be written to.
@@ -451,13 +595,13 @@ pub unsafe extern "C" fn psidpd_engine_local_densities(
 }
 
 /// Puts in `*energies` the place of the energies of particles and ghosts, and in `*length` how many
-/// there are: none unless the last psidpd_engine_forces was asked for PSIDPD_WANT_PARTICLE_ENERGY.
+/// there are: none unless the last evaluation was asked for PSIDPD_WANT_PARTICLE_ENERGY.
 /// With `newton` 1 those of ghosts belong to their owners.
 ///
-/// Valid until the next psidpd_engine_forces with this engine, and until the engine is freed.
+/// Valid until the next evaluation with this engine, and until the engine is freed.
 ///
 /// # Errors
-/// PSIDPD_STATUS_CALL_ORDER without psidpd_engine_densities. PSIDPD_STATUS_NULL_POINTER.
+/// PSIDPD_STATUS_CALL_ORDER without an evaluation. PSIDPD_STATUS_NULL_POINTER.
 ///
 /// # Safety
 /// `engine` is NULL or an engine that has not been freed; `energies` and `length` can be written to.
@@ -472,13 +616,12 @@ pub unsafe extern "C" fn psidpd_engine_particle_energy(
 }
 
 /// Puts in `*virials` the place of the virials of particles and ghosts, and in `*length` how many
-/// numbers that is, six each: none unless the last psidpd_engine_forces was asked for
-/// PSIDPD_WANT_PARTICLE_VIRIAL. With `newton` 1 those of ghosts belong to their owners.
+/// numbers that is, six each: none unless the last evaluation was asked for PSIDPD_WANT_PARTICLE_VIRIAL. With `newton` 1 those of ghosts belong to their owners.
 ///
-/// Valid until the next psidpd_engine_forces with this engine, and until the engine is freed.
+/// Valid until the next evaluation with this engine, and until the engine is freed.
 ///
 /// # Errors
-/// PSIDPD_STATUS_CALL_ORDER without psidpd_engine_densities. PSIDPD_STATUS_NULL_POINTER.
+/// PSIDPD_STATUS_CALL_ORDER without an evaluation. PSIDPD_STATUS_NULL_POINTER.
 ///
 /// # Safety
 /// `engine` is NULL or an engine that has not been freed; `virials` and `length` can be written to.
@@ -511,7 +654,10 @@ unsafe fn give(
                 Output::new(length, "length")?,
             )
         };
-        engine.require_densities()?;
+        engine.require(
+            &[State::Densities, State::First, State::Whole],
+            "psidpd_engine_densities, psidpd_engine_first or psidpd_engine_evaluate",
+        )?;
         let values = array(&engine.engine);
         out_length.put(values.len());
         out.put(values.as_ptr());

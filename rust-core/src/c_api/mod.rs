@@ -6,12 +6,16 @@
 
 mod arguments;
 mod engine;
+mod evaluation;
 mod model;
+mod settings;
 mod status;
 mod version;
 
 pub use engine::*;
+pub use evaluation::*;
 pub use model::*;
+pub use settings::*;
 pub use status::{Status, psidpd_last_error};
 pub use version::*;
 

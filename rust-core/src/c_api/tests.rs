@@ -7,7 +7,8 @@ use std::path::Path;
 use std::ptr::{null, null_mut};
 
 /// In the order of the header.
-const SOURCES: [&str; 4] = ["version.rs", "status.rs", "model.rs", "engine.rs"];
+const SOURCES: [&str; 6] =
+    ["version.rs", "status.rs", "model.rs", "settings.rs", "engine.rs", "evaluation.rs"];
 
 fn last_error() -> String {
     // SAFETY: valid until the next failing call on this thread.

@@ -18,6 +18,14 @@ pub enum DomainError {
 }
 
 impl PeriodicBox {
+    /// Space without periods, where the edges do not matter.
+    pub const OPEN: PeriodicBox = PeriodicBox {
+        origin: Vector3::new(0.0, 0.0, 0.0),
+        edges: Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
+        inverse: Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
+        periodic: [false; 3],
+    };
+
     /// A box from `origin` with the columns of `edges` as edge vectors.
     ///
     /// # Errors

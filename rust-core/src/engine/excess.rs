@@ -1,6 +1,6 @@
 //! ψ and its slopes for blocks of particles of one species.
 
-use super::settings::Instructions;
+use super::instruction_set::InstructionSet;
 use super::vectors::{self, Loop};
 use crate::model::curve::{Curve, CurveBlock};
 use crate::model::expression::{Expansion, Formula, Program, TooLarge};
@@ -53,7 +53,7 @@ struct BoundedVariable {
 /// Work space of [`ExcessPlan::evaluate`].
 #[derive(Debug, Clone)]
 pub struct ExcessWork {
-    instructions: Instructions,
+    set: InstructionSet,
     registers: Vec<f64>,
     point: Vec<f64>,
     expansion: Expansion,
@@ -174,9 +174,9 @@ impl ExcessPlan {
 
 impl ExcessWork {
     /// For an instruction set that is available.
-    pub fn new(instructions: Instructions) -> ExcessWork {
+    pub fn new(set: InstructionSet) -> ExcessWork {
         ExcessWork {
-            instructions,
+            set,
             registers: Vec::new(),
             point: Vec::new(),
             expansion: Expansion::default(),
@@ -273,7 +273,7 @@ impl FormulaPlan {
         let outputs = std::iter::once(&mut *psi).chain(slopes.chunks_exact_mut(lanes));
         let program = &self.program;
         let registers = &mut work.registers;
-        vectors::run(work.instructions, EvaluateBlock { program, lanes, at, outputs, registers });
+        vectors::run(work.set, EvaluateBlock { program, lanes, at, outputs, registers });
         if moves {
             self.extend(lanes, psi, slopes, work);
         }

@@ -2,8 +2,8 @@
 
 use super::error::EngineError;
 use super::excess::{ExcessPlan, ExcessWork};
+use super::instruction_set::InstructionSet;
 use super::plan::Plan;
-use super::settings::Instructions;
 
 /// Particles per evaluation of ψ: enough to hide the interpreter, few enough for the first-level cache.
 pub const LANES: usize = 128;
@@ -21,6 +21,8 @@ pub struct ExcessPass {
     work: ExcessWork,
     /// Evaluations below and above the bounds of a density.
     pub out_of_bounds: [u64; 2],
+    /// Evaluations of a ψ that depends on a density, each of a block of particles.
+    pub evaluations: u64,
 }
 
 /// Numbers of consecutive particles, a row for each, `first` being the number of the one that the first row is of.
@@ -81,20 +83,21 @@ impl<'a> Lanes<'a> {
 
 impl Default for ExcessPass {
     fn default() -> ExcessPass {
-        ExcessPass::new(Instructions::best())
+        ExcessPass::new(InstructionSet::best())
     }
 }
 
 impl ExcessPass {
-    /// With loops for an instruction set that is available; the numbers are the same with any.
-    pub fn new(instructions: Instructions) -> ExcessPass {
+    /// With loops for an instruction set; the numbers are the same with any.
+    pub fn new(set: InstructionSet) -> ExcessPass {
         ExcessPass {
             at: Vec::new(),
             correction: Vec::new(),
             psi: Vec::new(),
             slopes: Vec::new(),
-            work: ExcessWork::new(instructions),
+            work: ExcessWork::new(set),
             out_of_bounds: [0; 2],
+            evaluations: 0,
         }
     }
 
@@ -145,7 +148,7 @@ impl ExcessPass {
     ) -> Result<(), EngineError> {
         let count = plan.species.len();
         let (variables, slope_width) = (plan.densities.len() * count, plan.slope_width());
-        let ExcessPass { at, correction, psi, slopes, work, out_of_bounds } = self;
+        let ExcessPass { at, correction, psi, slopes, work, out_of_bounds, evaluations } = self;
         let n = lanes.count();
         if n == 0 {
             return Ok(());
@@ -157,6 +160,7 @@ impl ExcessPass {
             });
             return Ok(());
         }
+        *evaluations += 1;
 
         let polynomial = |v: usize| &plan.densities[v / count].correction[alpha * count + v % count];
         let width = rows.columns.len();
@@ -268,7 +272,7 @@ fn spread<const W: usize>(lanes: Lanes, columns: &[f64], rows: &mut [f64]) {
     lanes.each(|lane, row| {
         let row = &mut rows[row];
         for c in 0..W {
-            // SAFETY: as above.
+            // SAFETY: the columns have as many numbers as there are lanes.
             row[c] = unsafe { *columns[c].get_unchecked(lane) };
         }
     });
@@ -316,7 +320,7 @@ fn sum(values: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::{Around, Images, Particles, PeriodicBox, Settings, Sweep, Want};
+    use crate::engine::{Around, Images, Instructions, Particles, PeriodicBox, Settings, Sweep, Want};
     use crate::model::Model;
 
     /// Rows of `count` particles of a fluid: densities that differ, and room.
@@ -409,7 +413,8 @@ mod tests {
             let expected = case.one_by_one(&mut single);
             assert_eq!(case.run(&mut pass, false).unwrap(), expected, "{text}");
             assert_eq!(pass.out_of_bounds, single.out_of_bounds, "{text}");
-            for (name, set) in Instructions::ALL.into_iter().filter(|(_, set)| set.available()) {
+            for (name, set) in Instructions::ALL {
+                let Some(set) = InstructionSet::new(set) else { continue };
                 let bits = case.run(&mut ExcessPass::new(set), false).unwrap();
                 assert_eq!(bits, expected, "{name}: {text}");
             }

@@ -43,15 +43,16 @@ impl Images {
                     let image = s + shell as f64;
                     if image >= -margin && image <= 1.0 + margin {
                         x.push(std::array::from_fn(|c| here[c] + shell as f64 * edge[c]));
-                        self.owner.push(self.owner_of(index));
+                        self.owner.push(self.owner_of(index) as u32);
                     }
                 }
             }
         }
     }
 
-    fn owner_of(&self, index: usize) -> u32 {
-        if index < self.owned { index as u32 } else { self.owner[index - self.owned] }
+    /// The particle that `index` is, or is an image of.
+    pub(super) fn owner_of(&self, index: usize) -> usize {
+        if index < self.owned { index } else { self.owner[index - self.owned] as usize }
     }
 
     /// How many ghosts there are.

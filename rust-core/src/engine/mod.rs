@@ -1,44 +1,52 @@
-//! The engine both hosts share: pairs → densities → ψ′ → forces.
+//! Forces, energies and virials: what all hosts share.
 //!
-//! A host (LAMMPS, or the native runner with its periodic images) owns positions, velocities, tags and
-//! ghosts, and calls
+//! [`Engine`] is what a host sees: LAMMPS, the native runner, the C interface. It gives particles, what is around them
+//! and what it [wants](Want), and gets forces. The way of a number, each file using those above it only:
 //!
-//! 1. [`Engine::densities`]: finds pairs, sums local densities, evaluates ψ and its slopes for the
-//!    particles it owns;
-//! 2. forwards [`Engine::slopes`] from owners to ghosts, [`Engine::slope_width`] numbers each
-//!    (nothing, if every ψ is linear);
-//! 3. [`Engine::forces`]: conservative, dissipative and random forces, energy and virial.
+//! ```text
+//! domain, particles, surroundings, settings    what is given
+//! plan           which passes a fluid needs, worked out once from the model
+//! excess         ψ and its slopes for blocks of particles; excess_pass for all of them
+//! noise          the random number of a pair
+//! sweep/         pairs from cells → densities → ψ′ → forces, by vector instructions and threads
+//! reference/     pairs from a list → densities → ψ′ → forces, in double precision, with values of single particles
+//! facade         Engine: chooses between the two for each evaluation, and says which and why (path)
+//! ```
 //!
-//! [`mod@reference`] evaluates the same Hamiltonian with none of this machinery.
+//! Both do the same sums: local densities `n` over pairs, `ψ` and `∂ψ/∂n` of each particle, then the force of each pair
+//! `−[∂ψ_i/∂n + ∂ψ_j/∂n] w′ − φ′`, drag and noise. Where ghosts stand for particles of other ranks the slopes travel
+//! from owners to ghosts in between, so that an evaluation has two halves.
 
-mod density_pass;
+mod counts;
 mod domain;
 mod error;
-mod evaluator;
 mod excess;
 mod excess_pass;
-mod force_pass;
+mod facade;
 mod images;
+mod instruction_set;
 pub mod noise;
-mod pairs;
 mod particles;
+mod path;
 mod plan;
 pub mod reference;
-mod search;
 mod settings;
+mod surroundings;
 mod sweep;
 mod tally;
 mod vectors;
 
+pub use counts::PassCounts;
 pub use domain::{DomainError, PeriodicBox};
 pub use error::EngineError;
-pub use evaluator::{Engine, PairsOfHost, PassCounts};
+pub use facade::{Engine, Evaluated, Request};
 pub use images::Images;
-pub use pairs::Newton;
 pub use particles::{Particles, Step};
+pub use path::{Path, Reason};
 pub use plan::Plan;
 pub use settings::{Instructions, Precision, Settings};
-pub use sweep::{Around, Pool, Sweep, Times, part};
+pub use surroundings::{Around, Newton, PairsOfHost, Surroundings};
+pub use sweep::{Pool, Sweep, Times, part};
 pub use tally::{Tally, Want};
 
 #[cfg(test)]

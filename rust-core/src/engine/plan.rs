@@ -47,13 +47,49 @@ pub struct ThermostatPlan {
     pub longest: f64,
 }
 
+/// Where the first pass over pairs keeps those that the second one needs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PairStorage {
+    /// A compact list for each density of the pairs within its range.
+    InRange,
+    /// A cache of all pairs with their separations and forces: each force is added once, in the second pass.
+    FullCache,
+}
+
+impl PairStorage {
+    /// The full cache pays if a density reaches further than this part of the cutoff; else the list is short.
+    pub const FULL_CACHE_FROM: f64 = 0.7;
+}
+
+/// How the fast engine searches for pairs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SearchPlan {
+    /// Cells along x for each cutoff.
+    pub cells_per_cutoff: f64,
+    /// Below so many particles per cutoff along a column of cells, i-clusters have eight particles, else four: the cell
+    /// ranges of eight then are still about sixteen particles long, the size of a j-cluster.
+    pub sparse: f64,
+}
+
+impl SearchPlan {
+    /// The search of every fluid.
+    pub const DEFAULT: SearchPlan = SearchPlan { cells_per_cutoff: 4.0, sparse: 4.5 };
+
+    /// The size of i-clusters, and how many cells apart their particles may be.
+    pub(super) fn i_clusters(&self, particles_per_cutoff: f64) -> (usize, f64) {
+        match particles_per_cutoff < self.sparse {
+            true => (8, 4.0 * self.cells_per_cutoff),
+            false => (4, self.cells_per_cutoff),
+        }
+    }
+}
+
 impl Plan {
     /// Works out the plan of a fluid.
     ///
     /// # Errors
     /// A derivative of ψ grows beyond the limits of the formula engine.
     pub fn new(fluid: &Fluid) -> Result<Plan, TooLarge> {
-        let count = fluid.species.len();
         let slopes = slopes(fluid)?;
         let mut passes = Vec::new();
         let mut linear = Vec::new();
@@ -69,8 +105,25 @@ impl Plan {
                 }),
             }
         }
-        let excess =
-            (0..count).map(|alpha| plan_excess(fluid, alpha, &passes)).collect::<Result<Vec<_>, _>>()?;
+        Plan::of_passes(fluid, passes, linear)
+    }
+
+    /// The plan of a fluid that leaves nothing out: every density has a pass, and no ψ is taken for a pair potential.
+    ///
+    /// # Errors
+    /// As [`Plan::new`].
+    pub fn whole(fluid: &Fluid) -> Result<Plan, TooLarge> {
+        Plan::of_passes(fluid, (0..fluid.densities.len()).collect(), Vec::new())
+    }
+
+    /// The same fluid with nothing but its thermostat.
+    pub(super) fn without_conservative_forces(self) -> Plan {
+        Plan { passes: Vec::new(), linear: Vec::new(), pairs: Vec::new(), ..self }
+    }
+
+    fn of_passes(fluid: &Fluid, passes: Vec<usize>, linear: Vec<LinearTerm>) -> Result<Plan, TooLarge> {
+        let psi = |alpha| plan_excess(fluid, alpha, &passes);
+        let excess = (0..fluid.species.len()).map(psi).collect::<Result<Vec<_>, _>>()?;
         Ok(Plan {
             species: fluid.species.clone(),
             dimensions: fluid.dimensions,
@@ -114,6 +167,14 @@ impl Plan {
     /// Indices of the densities that need a pass: some ψ is not linear in them.
     pub fn density_passes(&self) -> &[usize] {
         &self.passes
+    }
+
+    /// Where pairs are kept for the second pass, if there is one.
+    pub fn pair_storage(&self) -> Option<PairStorage> {
+        let longest = self.passes.iter().map(|d| self.densities[*d].force_kernel.range()).reduce(f64::max)?;
+        // With one variable the density goes with the force, and nothing is gained.
+        let full = self.slope_width() > 1 && longest > PairStorage::FULL_CACHE_FROM * self.cutoff;
+        Some(if full { PairStorage::FullCache } else { PairStorage::InRange })
     }
 
     /// The potential energy of a pair of species `a` and `b` at `r` from densities that every ψ is linear
@@ -268,6 +329,22 @@ impl fmt::Display for Plan {
             }
             writeln!(f)?;
         }
+        match self.pair_storage() {
+            None => {}
+            Some(PairStorage::InRange) => {
+                writeln!(f, "second pass   over compact lists of the pairs in range of each density")?;
+            }
+            Some(PairStorage::FullCache) => writeln!(
+                f,
+                "second pass   over all pairs, kept in full: a density reaches further than {} of the cut-off",
+                PairStorage::FULL_CACHE_FROM
+            )?,
+        }
+        writeln!(
+            f,
+            "pair search   i-clusters of 4 particles; of 8 in columns with fewer than {} particles per cut-off",
+            SearchPlan::DEFAULT.sparse
+        )?;
         for term in &self.linear {
             let density = &self.densities[term.density];
             writeln!(

@@ -11,19 +11,37 @@ pub struct Want {
     pub particle_energy: bool,
     /// Virial of each particle: half of its pairs'.
     pub particle_virial: bool,
+    /// Every density of the model for each particle, also those that no force needs.
+    pub densities: bool,
 }
 
 impl Want {
     /// Forces alone.
-    pub const FORCES: Want =
-        Want { energy: false, virial: false, particle_energy: false, particle_virial: false };
+    pub const FORCES: Want = Want {
+        energy: false,
+        virial: false,
+        particle_energy: false,
+        particle_virial: false,
+        densities: false,
+    };
     /// Energy and virial of the whole.
-    pub const TOTALS: Want =
-        Want { energy: true, virial: true, particle_energy: false, particle_virial: false };
+    pub const TOTALS: Want = Want { energy: true, virial: true, ..Want::FORCES };
     /// Everything.
-    pub const ALL: Want = Want { energy: true, virial: true, particle_energy: true, particle_virial: true };
+    pub const ALL: Want =
+        Want { particle_energy: true, particle_virial: true, densities: true, ..Want::TOTALS };
 
-    /// Whether anything is asked for of each particle.
+    /// What either of two asks for.
+    pub fn or(self, other: Want) -> Want {
+        Want {
+            energy: self.energy || other.energy,
+            virial: self.virial || other.virial,
+            particle_energy: self.particle_energy || other.particle_energy,
+            particle_virial: self.particle_virial || other.particle_virial,
+            densities: self.densities || other.densities,
+        }
+    }
+
+    /// Whether energies or virials are asked for of each particle.
     pub fn of_particles(self) -> bool {
         self.particle_energy || self.particle_virial
     }

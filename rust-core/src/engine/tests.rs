@@ -1,5 +1,6 @@
 //! The engine against the plain reference, and both against the Hamiltonian.
 
+use super::reference::Reference;
 use super::*;
 use crate::maximum::largest;
 use crate::model::{Fluid, ForceLaw, Model, WarrenPair, warren_ab};
@@ -56,8 +57,7 @@ struct Outcome {
 }
 
 fn run_engine(fluid: &Fluid, c: &Configuration, newton: Newton, step: Option<Step>) -> Outcome {
-    let mut engine = Engine::new(fluid).unwrap();
-    engine.sum_all_densities(true);
+    let mut engine = Reference::new(fluid).unwrap();
     let owned = c.x.len();
     let mut images = Images::default();
     let (mut x, mut v, mut tag) = (c.x.clone(), c.v.clone(), c.tag.clone());
@@ -67,12 +67,12 @@ fn run_engine(fluid: &Fluid, c: &Configuration, newton: Newton, step: Option<Ste
     images.forward(1, &mut tag);
     images.forward(1, &mut kind);
     let particles = Particles { owned, x: &x, tag: &tag, kind: &kind };
-    engine.densities(&particles, newton).unwrap();
+    engine.first(Surroundings::ghosts(newton), &particles, true).unwrap();
     let width = engine.slope_width();
     engine.slopes_mut().truncate(owned * width);
     images.forward(width, engine.slopes_mut());
     let mut forces = vec![[0.0; 3]; x.len()];
-    let tally = engine.forces(&particles, &v, step, Want::ALL, &mut forces).unwrap();
+    let tally = engine.second(&particles, &v, step, Want::ALL, &mut forces).unwrap();
     let mut energy = engine.particle_energy().to_vec();
     let mut virial = engine.particle_virial().to_vec();
     if newton == Newton::On {
@@ -164,7 +164,7 @@ fn assert_matches_reference(fluid: &Fluid, c: &Configuration) {
     let step = Step { seed: 12, number: 77, dt: 0.01 };
     let truth = reference::evaluate(fluid, &c.x, &c.species, &c.domain).unwrap();
     let (thermal, thermal_virial) =
-        reference::thermostat(fluid, &c.x, &c.v, &c.tag, &c.species, &c.domain, step);
+        reference::thermostat(fluid, &c.x, &c.v, &c.tag, &c.species, &c.domain, step).unwrap();
     let scale = largest(truth.forces.as_flattened());
     for newton in [Newton::On, Newton::Off] {
         let quiet = run_engine(fluid, c, newton, None);
@@ -194,6 +194,51 @@ fn assert_matches_reference(fluid: &Fluid, c: &Configuration) {
             let size = thermal_virial.iter().fold(100.0f64, |m, w| m.max(w.abs()));
             close(loud.tally.thermostat_virial[k], thermal_virial[k], size, "thermostat virial");
         }
+    }
+}
+
+/// `U = Σ ψ(ñ) + Σ φ` by the definition: the truth of the truth, where ψ is a formula without bounds.
+fn hamiltonian(fluid: &Fluid, c: &Configuration) -> f64 {
+    let count = fluid.species.len();
+    let mut energy = 0.0;
+    for (i, &alpha) in c.species.iter().enumerate() {
+        let mut n = vec![0.0; fluid.variables()];
+        for (d, density) in fluid.densities.iter().enumerate().filter(|(_, d)| d.includes_self) {
+            n[d * count + alpha] = density.kernel.value(0.0);
+        }
+        for (j, &beta) in c.species.iter().enumerate() {
+            for shift in (0..125).map(|m| [m % 5 - 2, m / 5 % 5 - 2, m / 25 - 2]) {
+                if i == j && shift == [0; 3] {
+                    continue;
+                }
+                let image = |m: usize| (0..3).map(|k| f64::from(shift[k]) * c.domain.edge(k)[m]).sum::<f64>();
+                let r = (0..3).map(|m| (c.x[i][m] - c.x[j][m] + image(m)).powi(2)).sum::<f64>().sqrt();
+                for (d, density) in fluid.densities.iter().enumerate() {
+                    n[d * count + beta] += density.kernel.value(r);
+                }
+                for term in fluid.pairs.iter().filter(|t| t.acts(alpha, beta, r)) {
+                    energy += 0.5 * crate::model::pair::PairForm::at(&term.potential, r).0;
+                }
+            }
+        }
+        for (v, n) in n.iter_mut().enumerate() {
+            *n = fluid.densities[v / count].correction[alpha * count + v % count].at(*n).0;
+        }
+        let crate::model::ExcessFreeEnergy::Formula(psi) = &fluid.excess[alpha] else { panic!("no formula") };
+        energy += psi.value(&n);
+    }
+    energy
+}
+
+#[test]
+fn the_energy_of_the_reference_is_the_hamiltonian() {
+    let mixture = Model::parse("mixture", MIXTURE).unwrap().at(1.3).unwrap();
+    for (fluid, lengths) in [(warren(1, ForceLaw::Conservative), [2.3, 2.1, 2.5]), (mixture, [2.3, 0.9, 1.2])]
+    {
+        let c = configuration(60, lengths, fluid.species.len(), 3);
+        let truth = hamiltonian(&fluid, &c);
+        let found = reference::evaluate(&fluid, &c.x, &c.species, &c.domain).unwrap().energy;
+        assert!((found - truth).abs() < 1e-11 * truth.abs(), "{found} {truth}");
     }
 }
 
@@ -452,7 +497,7 @@ A = "pi/30*(-40)*n + pi*0.75^4/30*25*m^2"
 "#;
     let two = Model::parse("two", text).unwrap().at(1.0).unwrap();
     let c = configuration(300, [3.1, 4.0, 3.5], 1, 3);
-    let mut engine = Engine::new(&two).unwrap();
+    let mut engine = Reference::new(&two).unwrap();
     assert_eq!(engine.slope_width(), 1);
     let a = run_engine(&two, &c, Newton::On, None);
     let b = run_engine(&warren(1, ForceLaw::Conservative), &c, Newton::On, None);
@@ -462,9 +507,9 @@ A = "pi/30*(-40)*n + pi*0.75^4/30*25*m^2"
     }
     let kind = vec![0; 300];
     let particles = Particles { owned: 300, x: &c.x, tag: &c.tag, kind: &kind };
-    engine.densities(&particles, Newton::On).unwrap();
+    engine.first(Surroundings::ghosts(Newton::On), &particles, false).unwrap();
     let mut f = vec![[0.0; 3]; 300];
-    engine.forces(&particles, &[], None, Want::FORCES, &mut f).unwrap();
+    engine.second(&particles, &[], None, Want::FORCES, &mut f).unwrap();
     let counts = engine.counts();
     assert_eq!((counts.density, counts.excess), (1, 1));
     assert_eq!((counts.noise, counts.energy, counts.virial), (0, 0, 0));
@@ -490,15 +535,16 @@ fn linear_psi_is_standard_dpd_and_needs_no_density_pass() {
         close(*f, *g, 1e3, "force");
     }
     assert_eq!(a.counts.excess, 0);
-    assert_eq!(Engine::new(&psi).unwrap().slope_width(), 0);
+    assert_eq!(Reference::new(&psi).unwrap().slope_width(), 0);
 }
 
 #[test]
 fn trouble_is_an_error_that_names_the_particle() {
     let fluid = warren(1, ForceLaw::Conservative);
-    let mut engine = Engine::new(&fluid).unwrap();
-    let check = |engine: &mut Engine, x: [[f64; 3]; 2], tag: [i32; 2], kind: [i32; 2]| {
-        engine.densities(&Particles { owned: 2, x: &x, tag: &tag, kind: &kind }, Newton::On)
+    let mut engine = Reference::new(&fluid).unwrap();
+    let check = |engine: &mut Reference, x: [[f64; 3]; 2], tag: [i32; 2], kind: [i32; 2]| {
+        let particles = Particles { owned: 2, x: &x, tag: &tag, kind: &kind };
+        engine.first(Surroundings::ghosts(Newton::On), &particles, false)
     };
     let fine = [[0.0; 3], [0.5, 0.0, 0.0]];
     assert_eq!(check(&mut engine, fine, [1, 2], [0, 0]), Ok(()));
@@ -509,7 +555,7 @@ fn trouble_is_an_error_that_names_the_particle() {
 
     let text = "title = \"vdw\"\nspecies = [\"A\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n\
                 [excess_free_energy]\nA = \"-ln(1 - n)\"\n";
-    let mut engine = Engine::new(&Model::parse("vdw", text).unwrap().at(1.0).unwrap()).unwrap();
+    let mut engine = Reference::new(&Model::parse("vdw", text).unwrap().at(1.0).unwrap()).unwrap();
     let on_top = [[0.0; 3], [0.0, 0.0, 0.0]];
     let error = check(&mut engine, on_top, [1, 2], [0, 0]).unwrap_err();
     assert!(matches!(error, EngineError::ExcessFreeEnergy { tag: 1, .. }), "{error}");
@@ -519,10 +565,10 @@ fn trouble_is_an_error_that_names_the_particle() {
 #[test]
 fn a_runaway_particle_costs_no_memory() {
     let fluid = warren(1, ForceLaw::Conservative);
-    let mut engine = Engine::new(&fluid).unwrap();
+    let mut engine = Reference::new(&fluid).unwrap();
     let x = [[0.0; 3], [1e300, -1e250, 3e12], [0.4, 0.0, 0.0]];
     let particles = Particles { owned: 3, x: &x, tag: &[1, 2, 3], kind: &[0, 0, 0] };
-    engine.densities(&particles, Newton::On).unwrap();
+    engine.first(Surroundings::ghosts(Newton::On), &particles, false).unwrap();
     assert!(engine.local_densities()[0] > 0.0);
     assert_eq!(engine.local_densities()[1], 0.0);
 }
@@ -531,13 +577,13 @@ fn a_runaway_particle_costs_no_memory() {
 #[test]
 fn unmapped_kinds_are_ignored() {
     let fluid = warren(1, ForceLaw::Conservative);
-    let mut engine = Engine::new(&fluid).unwrap();
+    let mut engine = Reference::new(&fluid).unwrap();
     engine.map_kinds(&[-1, 0, -1]).unwrap();
     let x = [[0.0; 3], [0.3, 0.0, 0.0], [0.0, 0.3, 0.0]];
     let particles = Particles { owned: 3, x: &x, tag: &[1, 2, 3], kind: &[1, 2, 1] };
-    engine.densities(&particles, Newton::On).unwrap();
+    engine.first(Surroundings::ghosts(Newton::On), &particles, false).unwrap();
     let mut f = vec![[0.0; 3]; 3];
-    engine.forces(&particles, &[], None, Want::FORCES, &mut f).unwrap();
+    engine.second(&particles, &[], None, Want::FORCES, &mut f).unwrap();
     assert_eq!(f[1], [0.0; 3]);
     assert!(f[0][1] != 0.0 && f[0][0] == 0.0);
     assert!(engine.map_kinds(&[0, 1]).is_err());

@@ -1,6 +1,7 @@
 //! Loops over particles, compiled for the vectors of each instruction set.
 
-use crate::engine::settings::Instructions;
+use super::instruction_set::InstructionSet;
+use super::settings::Instructions;
 
 /// A loop that the compiler makes vectors of. Nothing in it is contracted or put into another order: the results are
 /// the same bits on every instruction set.
@@ -10,13 +11,13 @@ pub trait Loop {
     fn run(self) -> Self::Out;
 }
 
-/// Runs a loop as compiled for `instructions`, which are available.
-pub fn run<L: Loop>(instructions: Instructions, work: L) -> L::Out {
-    match instructions {
-        // SAFETY: the caller's.
+/// Runs a loop as compiled for an instruction set.
+pub fn run<L: Loop>(set: InstructionSet, work: L) -> L::Out {
+    match set.instructions() {
+        // SAFETY: there is an `InstructionSet` only of what the processor has.
         #[cfg(target_arch = "x86_64")]
         Instructions::Avx512 => unsafe { avx512(work) },
-        // SAFETY: as above.
+        // SAFETY: there is an `InstructionSet` only of what the processor has.
         #[cfg(target_arch = "x86_64")]
         Instructions::Avx2 => unsafe { avx2(work) },
         _ => work.run(),

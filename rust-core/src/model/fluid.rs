@@ -1,7 +1,7 @@
 use super::curve::Curve;
 use super::expression::Formula;
 use super::kernel::Kernel;
-use super::pair::PairPotential;
+use super::pair::{PairForm, PairPotential};
 
 /// A model at one temperature: numbers and compiled formulas only.
 #[derive(Debug, Clone)]
@@ -34,11 +34,27 @@ impl Fluid {
 
     /// The longest range of anything in the fluid; 0 for an ideal gas without thermostat.
     pub fn cutoff(&self) -> f64 {
-        use super::pair::PairForm;
-        let densities = self.densities.iter().map(|d| d.kernel.range().max(d.force_kernel.range()));
-        let pairs = self.pairs.iter().map(|p| p.potential.range());
         let thermostats = self.thermostats.iter().flatten().map(|t| t.range);
-        densities.chain(pairs).chain(thermostats).fold(0.0, f64::max)
+        thermostats.fold(self.conservative_range(), f64::max)
+    }
+
+    /// The longest range of a conservative interaction.
+    pub fn conservative_range(&self) -> f64 {
+        let densities = self.densities.iter().map(|d| d.kernel.range().max(d.force_kernel.range()));
+        densities.chain(self.pairs.iter().map(|p| p.potential.range())).fold(0.0, f64::max)
+    }
+
+    /// Whether some force jumps at its range, where `∇·F` is a delta function that no configuration shows.
+    pub fn force_jumps(&self) -> bool {
+        let jumps = |inner: f64, scale: f64| inner.abs() > 1e-6 * scale;
+        let at_range = |range: f64| range * (1.0 - 1e-9);
+        let kernel = |w: &Kernel| jumps(w.slope(at_range(w.range())), w.slope_factor());
+        let pair = |phi: &PairPotential| {
+            let slope = |r: f64| phi.at(r).1;
+            let inside = (1..20).map(|k| slope(phi.range() * f64::from(k) / 20.0).abs());
+            jumps(slope(at_range(phi.range())), inside.fold(0.0, f64::max))
+        };
+        self.densities.iter().any(|d| kernel(&d.kernel)) || self.pairs.iter().any(|p| pair(&p.potential))
     }
 
     /// Whether the force of every density is the gradient of its own kernel, and its strength that of
@@ -199,6 +215,13 @@ pub struct PairTerm {
     pub potential: PairPotential,
 }
 
+impl PairTerm {
+    /// Whether it acts on a pair of species `a` and `b` at the distance `r`.
+    pub fn acts(&self, a: usize, b: usize, r: f64) -> bool {
+        (self.between == [a, b] || self.between == [b, a]) && r < self.potential.range()
+    }
+}
+
 /// Dissipative and random force of one pair of species:
 /// `F^D = −γ w_R² (ê·v_ij) ê`, `F^R = σ w_R ξ dt^{-1/2} ê`, `σ² = 2γkT`,
 /// `w_R = (1 − r/range)^exponent`.
@@ -226,5 +249,17 @@ mod tests {
         assert_eq!(Polynomial::identity().constant_slope(), Some(1.0));
         assert_eq!(Polynomial(vec![3.0]).constant_slope(), Some(0.0));
         assert_eq!(Polynomial(vec![1.0, 2.0, 0.0]).constant_slope(), Some(2.0));
+    }
+
+    #[test]
+    fn jumps_are_seen() {
+        let at = |kernel: &str| {
+            let text = format!(
+                "title = \"m\"\nspecies = [\"A\"]\n[density.n]\nkernel = \"{kernel}\"\nrange = 1.0\n\
+                 [excess_free_energy]\nA = \"n^2\"\n"
+            );
+            crate::model::Model::parse("m.toml", &text).unwrap().at(1.0).unwrap().force_jumps()
+        };
+        assert!(at("linear") && !at("quadratic") && !at("lucy"));
     }
 }

@@ -159,7 +159,7 @@ pub fn truth(l: &Lammps, model: &Model, kt: f64, step: Option<u64>) -> Evaluatio
     if let Some(number) = step {
         let tags: Vec<i32> = (1..=now.x.len() as i32).collect();
         let step = Step { seed: SEED, number, dt: DT };
-        let (f, w) = thermostat(&fluid, &now.x, &now.v, &tags, &species, &domain, step);
+        let (f, w) = thermostat(&fluid, &now.x, &now.v, &tags, &species, &domain, step).unwrap();
         for (all, f) in all.forces.iter_mut().zip(&f) {
             (0..3).for_each(|k| all[k] += f[k]);
         }

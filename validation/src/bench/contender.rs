@@ -17,7 +17,7 @@ pub enum Code {
     Plugin(String),
     /// The native runner.
     Native(Settings),
-    /// The native runner with the plain engine.
+    /// The native runner with the reference evaluation.
     Plain,
 }
 
@@ -160,7 +160,7 @@ pub const FEW_ABOVE: usize = 100_000;
 pub enum Field {
     /// All.
     Everyone,
-    /// All but the plain engine, whose cost per particle does not depend on the size.
+    /// All but the reference, whose cost per particle does not depend on the size.
     AllButPlain,
     /// Who was asked for by name, and of the others those that take few seconds or are compared with: the
     /// built-in, the plugin in mixed precision on one rank and two, the native runner in mixed precision with the

@@ -1,4 +1,5 @@
 use crate::export::eam::EamError;
+use crate::files::WriteError;
 use crate::lammps::LammpsError;
 use crate::report::ReportError;
 use crate::run::RunError;
@@ -18,6 +19,9 @@ pub enum BenchError {
     /// A report cannot be made.
     #[error(transparent)]
     Report(#[from] ReportError),
+    /// A file cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
     /// A model file is wrong.
     #[error(transparent)]
     File(#[from] FileError),

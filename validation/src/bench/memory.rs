@@ -59,7 +59,7 @@ pub fn child(particles: usize) -> Result<Child, BenchError> {
         .and_then(|rest| rest.split_whitespace().next()?.parse().ok());
     let peak_bytes =
         1024 * kilobytes.ok_or_else(|| BenchError::Memory(format!("no VmHWM in {}", status.display())))?;
-    Ok(Child { particles, peak_bytes, engine_bytes: simulation.sweep().memory() as u64 })
+    Ok(Child { particles, peak_bytes, engine_bytes: simulation.engine().memory() as u64 })
 }
 
 fn in_child(program: &Path, particles: usize) -> Result<Child, BenchError> {

@@ -22,8 +22,9 @@ pub use error::BenchError;
 pub use outcome::Outcome;
 pub use spread::Spread;
 
+use crate::files::write_atomically;
 use crate::lammps::{self, Host};
-use crate::report::{Progress, write_atomically};
+use crate::report::Progress;
 use contender::{Choice, Contender, Field, Suffix};
 use deck::Place;
 use fluids::{MDPD, SUBJECTS, Subject};

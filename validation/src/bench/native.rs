@@ -15,7 +15,7 @@ use std::time::Instant;
 pub struct Measured {
     /// Wall time in seconds.
     pub seconds: f64,
-    /// Seconds of each part of the steps; empty for the plain engine.
+    /// Seconds of each part of the steps; empty for the reference.
     pub parts: BTreeMap<String, f64>,
 }
 
@@ -30,8 +30,7 @@ fn simulation(
             simulation.set_settings(settings)?;
             simulation.set_reordering(true);
         }
-        // Densities that no force needs are the business of the plain engine.
-        None => simulation.sum_all_densities(true),
+        None => simulation.use_reference_only(true),
     }
     simulation.prepare(subject.dt, Want::FORCES)?;
     Ok(simulation)
@@ -41,7 +40,7 @@ fn advance(simulation: &mut Simulation, subject: &Subject, steps: u64) -> Result
     Ok(simulation.advance(steps, subject.dt, Integrator::VelocityVerlet)?)
 }
 
-/// Times steps with these settings, or of the plain engine if there are none.
+/// Times steps with these settings, or of the reference if there are none.
 pub fn run(
     subject: &Subject,
     state: &State,
@@ -50,11 +49,11 @@ pub fn run(
 ) -> Result<Measured, BenchError> {
     let mut simulation = simulation(subject, state, settings)?;
     advance(&mut simulation, subject, length.warm_up)?;
-    let before = simulation.sweep().times();
+    let before = simulation.engine().times();
     let start = Instant::now();
     advance(&mut simulation, subject, length.steps)?;
     let seconds = start.elapsed().as_secs_f64();
-    let after = simulation.sweep().times();
+    let after = simulation.engine().times();
     let mut parts = BTreeMap::new();
     if settings.is_some() {
         let named = [

@@ -82,7 +82,7 @@ pub fn equilibrated(subject: &Subject, size: usize, folder: &Path) -> Result<Sta
     // Last: it says that the others are whole.
     let bytes = postcard::to_stdvec(&state)
         .map_err(|e| BenchError::io(&kept)(std::io::Error::other(e.to_string())))?;
-    crate::report::write_atomically(&kept, &bytes)?;
+    crate::files::write_atomically(&kept, &bytes)?;
     Ok(Start { state, data, data_mdpd })
 }
 

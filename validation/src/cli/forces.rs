@@ -38,6 +38,8 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     data.sort_by_id();
     let state = State::from_data(&data, &model).map_err(Failure::new)?;
     let mut simulation = Simulation::new(&model, arguments.kt, state, 1).map_err(Failure::new)?;
+    // What others are compared with.
+    simulation.use_reference_only(true);
     simulation.sum_all_densities(true);
     simulation.compute(Want::TOTALS, None).map_err(Failure::new)?;
     let width = simulation.local_densities().len() / simulation.len().max(1);

@@ -105,5 +105,5 @@ fn write_json(json: Option<&Path>, value: &impl Serialize) -> Result<(), Failure
     let Some(path) = json else { return Ok(()) };
     let mut text = serde_json::to_string_pretty(value).map_err(Failure::new)?;
     text.push('\n');
-    crate::report::write_atomically(path, text.as_bytes()).map_err(Failure::new)
+    crate::files::write_atomically(path, text.as_bytes()).map_err(Failure::new)
 }

@@ -67,6 +67,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     runner.set_threads(*threads).map_err(Failure::new)?;
     let total: u64 = scene.stages.iter().map(|s| s.steps).sum();
     let made = tell_start(runner.start(), begin, out, total);
+    say(&format!("forces by {}", runner.evaluation()));
     let bar = Progress::new().steps(&scene.title, total, made, runner.particles());
     let outcome = runner.run(&stop, &mut |p| bar.set(p.step));
     bar.finish();

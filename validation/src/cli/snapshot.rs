@@ -1,7 +1,8 @@
 use super::{Failure, Verdict, write_json};
+use crate::files::write_atomically;
 use crate::output::picture::{FieldOptions, ParticleOptions, View};
 use crate::output::{Configuration, OutputError, Which};
-use crate::report::{Figure, write_atomically};
+use crate::report::Figure;
 use psidpd_core::model::Model;
 use psidpd_core::model::kernel::{Kernel, KernelKind};
 use serde_json::json;

@@ -1,3 +1,4 @@
+use crate::files::WriteError;
 use crate::lammps::LammpsError;
 use crate::observe::{DriftError, ProfileError, StatisticsError, TensionError};
 use crate::report::ReportError;
@@ -21,6 +22,9 @@ pub enum ValidateError {
     /// A report cannot be made.
     #[error(transparent)]
     Report(#[from] ReportError),
+    /// A file cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
     /// A model file is wrong.
     #[error(transparent)]
     File(#[from] FileError),

@@ -70,13 +70,14 @@ fn plain(model: &Model, state: &State, step: Option<Step>) -> Result<Point, Vali
     x.iter_mut().for_each(|x| domain.wrap(x, &mut [0; 3]));
     let species: Vec<usize> = state.species.iter().map(|s| *s as usize).collect();
     let sums = reference::evaluate(&fluid, &x, &species, domain)?;
+    let energy = sums.energy();
     let (mut forces, mut virial) = (sums.forces, sums.virial);
     if let Some(step) = step {
-        let (more, w) = reference::thermostat(&fluid, &x, &state.v, &state.tag, &species, domain, step);
+        let (more, w) = reference::thermostat(&fluid, &x, &state.v, &state.tag, &species, domain, step)?;
         forces.as_flattened_mut().iter_mut().zip(more.as_flattened()).for_each(|(f, more)| *f += more);
         virial.iter_mut().zip(w).for_each(|(v, w)| *v += w);
     }
-    Ok(Point { forces: by_tag(&state.tag, &forces), energy: sums.energy, virial })
+    Ok(Point { forces: by_tag(&state.tag, &forces), energy, virial })
 }
 
 /// What the native runner computes, held to the sums as they are written down: each of its terms shows in one of these.

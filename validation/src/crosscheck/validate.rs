@@ -1,6 +1,7 @@
 use super::{Context, Part, ValidateError, energy, equilibrium, forces, trajectory};
+use crate::files::write_atomically;
 use crate::lammps;
-use crate::report::{Item, Progress, Report, Results, Section, Table, write_atomically};
+use crate::report::{Item, Progress, Report, Results, Section, Table};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 

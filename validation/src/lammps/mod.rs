@@ -4,8 +4,6 @@
 //! [`Lammps`] runs one inside this process; [`plugin`] builds psidpd's pair styles for a host; [`data`], [`dump`] and
 //! [`setfl`] read and write LAMMPS's file formats.
 
-#[rustfmt::skip]
-#[allow(dead_code, missing_docs, unsafe_op_in_unsafe_fn, clippy::all, clippy::undocumented_unsafe_blocks)]
 mod bindings;
 pub mod data;
 pub mod dump;

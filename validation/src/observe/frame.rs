@@ -1,50 +1,86 @@
 //! One configuration as the observables see it: what several of them need is computed once.
 
-use super::interactions::Interactions;
-use super::landscape::Landscape;
-use crate::run::Simulation;
+use psidpd_core::engine::PeriodicBox;
+use psidpd_core::engine::reference::{Evaluation, Evaluator};
+use psidpd_core::model::Model;
 use std::cell::OnceCell;
 
-/// A configuration of a simulation.
-pub struct Frame<'a> {
-    /// The simulation.
-    pub simulation: &'a Simulation,
+/// A configuration of particles, as whoever has them lends it to the observables.
+#[derive(Clone, Copy)]
+pub struct View<'a> {
+    /// Number of the step.
+    pub step: u64,
     /// Time since the start of the run.
     pub time: f64,
-    interactions: &'a Interactions,
-    landscape: OnceCell<Landscape>,
+    /// kT.
+    pub kt: f64,
+    /// The model.
+    pub model: &'a Model,
+    /// 2 or 3.
+    pub dimensions: usize,
+    /// The box.
+    pub domain: &'a PeriodicBox,
+    /// Mass of each species.
+    pub masses: &'a [f64],
+    /// Positions, in the box.
+    pub x: &'a [[f64; 3]],
+    /// Velocities.
+    pub v: &'a [[f64; 3]],
+    /// Boxes travelled.
+    pub images: &'a [[i32; 3]],
+    /// Species, from 0.
+    pub species: &'a [i32],
+    /// Tags, from 1.
+    pub tags: &'a [i32],
+    /// Which particles never move; empty if all do.
+    pub frozen: &'a [bool],
+    /// kT from the kinetic energy.
+    pub temperature: f64,
+    /// `½ Σ m v²`.
+    pub kinetic_energy: f64,
+    /// `(Σ m v v + W)/V`, where a virial was wanted; xx, yy, zz, xy, xz, yz.
+    pub pressure: [f64; 6],
+    /// The same with conservative forces alone.
+    pub conservative_pressure: [f64; 6],
+}
+
+/// A configuration with what several observables compute from it.
+pub struct Frame<'a> {
+    /// The configuration.
+    pub view: View<'a>,
+    evaluator: &'a Evaluator,
+    evaluation: OnceCell<Evaluation>,
 }
 
 impl<'a> Frame<'a> {
-    /// The present configuration of `simulation`, whose fluid is that of `interactions`.
-    pub fn new(simulation: &'a Simulation, interactions: &'a Interactions, time: f64) -> Frame<'a> {
-        Frame { simulation, time, interactions, landscape: OnceCell::new() }
+    /// A configuration of the fluid of `evaluator`.
+    pub fn new(view: View<'a>, evaluator: &'a Evaluator) -> Frame<'a> {
+        Frame { view, evaluator, evaluation: OnceCell::new() }
     }
 
-    /// The fluid.
-    pub fn interactions(&self) -> &'a Interactions {
-        self.interactions
+    /// What evaluates its fluid.
+    pub fn evaluator(&self) -> &'a Evaluator {
+        self.evaluator
     }
 
     /// Energies and conservative forces.
-    pub fn landscape(&self) -> &Landscape {
-        let s = self.simulation;
-        self.landscape
-            .get_or_init(|| Landscape::new(self.interactions, s.positions(), s.species(), s.domain()))
+    pub fn evaluation(&self) -> &Evaluation {
+        let View { x, species, domain, .. } = self.view;
+        self.evaluation.get_or_init(|| self.evaluator.evaluate(x, species, domain))
     }
 
     /// The mass of a particle.
     pub fn mass(&self, particle: usize) -> f64 {
-        self.simulation.masses()[self.simulation.species()[particle] as usize]
+        self.view.masses[self.view.species[particle] as usize]
     }
 
     /// Whether a particle moves: frozen ones do not.
     pub fn moves(&self, particle: usize) -> bool {
-        !self.simulation.frozen().get(particle).is_some_and(|frozen| *frozen)
+        !self.view.frozen.get(particle).is_some_and(|frozen| *frozen)
     }
 
     /// The volume; in two dimensions the area.
     pub fn volume(&self) -> f64 {
-        self.simulation.domain().volume(self.simulation.dimensions())
+        self.view.domain.volume(self.view.dimensions)
     }
 }

@@ -8,13 +8,11 @@
 pub mod drift;
 pub mod edges;
 pub mod frame;
-pub mod interactions;
 pub mod keys;
-pub mod landscape;
+mod least_squares;
 pub mod meter;
 pub mod observation;
 pub mod observers;
-pub mod pairs;
 pub mod profile;
 pub mod request;
 pub mod series;

@@ -1,12 +1,11 @@
 //! The observables of a run on its way.
 
-use super::frame::Frame;
-use super::interactions::Interactions;
+use super::frame::{Frame, View};
 use super::meter::AnyMeter;
 use super::observation::Observation;
-use crate::run::Simulation;
-use crate::scene::Scene;
+use super::request::Observe;
 use psidpd_core::engine::Want;
+use psidpd_core::engine::reference::Evaluator;
 use serde::{Deserialize, Serialize};
 
 /// The observables that a scene asks for, with what they have seen so far.
@@ -20,7 +19,7 @@ pub struct Observers {
     /// The step before its first.
     start: u64,
     #[serde(skip)]
-    fluid: Option<(f64, Interactions)>,
+    fluid: Option<(f64, Evaluator)>,
 }
 
 /// One observable.
@@ -42,22 +41,22 @@ struct Sampled {
 }
 
 impl Observers {
-    /// The observables of a scene before its first step.
-    pub fn new(scene: &Scene) -> Observers {
+    /// What is asked for in a run with these stages, before its first step.
+    pub fn new<'a>(observe: &Observe, stages: impl IntoIterator<Item = &'a str>) -> Observers {
         // Stages may share a name.
-        let mut names: Vec<String> = Vec::new();
-        for stage in &scene.stages {
-            if !names.contains(&stage.name) {
-                names.push(stage.name.clone());
+        let mut names: Vec<&str> = Vec::new();
+        for stage in stages {
+            if !names.contains(&stage) {
+                names.push(stage);
             }
         }
-        let observers = scene.observe.requests.iter().map(|request| Observer {
+        let observers = observe.requests.iter().map(|request| Observer {
             every: request.every.max(1),
             skip: request.skip,
             stages: names
                 .iter()
-                .filter(|name| request.stages.contains(name))
-                .map(|name| Sampled { stage: name.clone(), meter: request.meter.clone(), left_out: 0 })
+                .filter(|name| request.stages.iter().any(|s| s == *name))
+                .map(|name| Sampled { stage: (*name).to_owned(), meter: request.meter.clone(), left_out: 0 })
                 .collect(),
         });
         Observers { observers: observers.collect(), ..Observers::default() }
@@ -90,8 +89,8 @@ impl Observers {
     }
 
     /// Samples what is due after a step.
-    pub fn sample(&mut self, simulation: &Simulation, stage: &str, time: f64) {
-        let step = simulation.step_number();
+    pub fn sample(&mut self, view: View, stage: &str) {
+        let step = view.step;
         if self.stage != stage {
             stage.clone_into(&mut self.stage);
             self.start = step.saturating_sub(1);
@@ -105,13 +104,13 @@ impl Observers {
         if !self.observers.iter().any(due) {
             return;
         }
-        if self.fluid.as_ref().is_none_or(|(kt, _)| *kt != simulation.kt()) {
+        if self.fluid.as_ref().is_none_or(|(kt, _)| *kt != view.kt) {
             // The scene has tried every temperature of its stages.
-            let fluid = simulation.model().at(simulation.kt()).ok();
-            let fluid = fluid.and_then(|fluid| Interactions::new(fluid).ok());
-            self.fluid = fluid.map(|fluid| (simulation.kt(), fluid));
+            let fluid = view.model.at(view.kt).ok();
+            let fluid = fluid.and_then(|fluid| Evaluator::new(fluid).ok());
+            self.fluid = fluid.map(|fluid| (view.kt, fluid));
         }
-        let frame = self.fluid.as_ref().map(|(_, fluid)| Frame::new(simulation, fluid, time));
+        let frame = self.fluid.as_ref().map(|(_, fluid)| Frame::new(view, fluid));
         for observer in self.observers.iter_mut().filter(|o| due(o)) {
             for sampled in observer.stages.iter_mut().filter(|s| s.stage == stage) {
                 let taken = frame.as_ref().is_some_and(|frame| sampled.meter.sample(frame));

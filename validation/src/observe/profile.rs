@@ -2,10 +2,10 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{Matrix4, Vector4};
 use serde::Serialize;
 
 use super::edges::{Edges, edges};
+use super::least_squares::least_squares;
 use super::statistics::{MINIMUM_SAMPLES, StatisticsError, estimate};
 
 /// The most bins a profile may have.
@@ -336,81 +336,39 @@ pub(super) fn flank_interface(points: &[(f64, f64)], height: f64) -> Option<Inte
     })
 }
 
-/// Levenberg–Marquardt for (ρ_L, ρ_V, s₀, ln d), lengths in bins; ρ_V is 0 unless it is `free`.
-fn fit_flank(points: &[(f64, f64)], extent: f64, free: bool) -> Option<Vector4<f64>> {
+/// The best (ρ_L, ρ_V, s₀, ln d), lengths in bins; ρ_V is 0 unless it is `free`.
+fn fit_flank(points: &[(f64, f64)], extent: f64, free: bool) -> Option<[f64; 4]> {
     let quarter = (points.len() / 4).max(1);
     let mean = |p: &[(f64, f64)]| p.iter().map(|p| p.1).sum::<f64>() / p.len() as f64;
     let liquid = mean(&points[..quarter]);
     let vapour = if free { mean(&points[points.len() - quarter..]) } else { 0.0 };
-    let linearise = |p: &Vector4<f64>| {
-        let (mut normal, mut gradient, cost) = linearise(points, p);
-        if !free {
-            normal.row_mut(1).fill(0.0);
-            normal.column_mut(1).fill(0.0);
-            normal[(1, 1)] = 1.0;
-            gradient[1] = 0.0;
-        }
-        (normal, gradient, cost)
-    };
     if liquid <= vapour {
         return None;
     }
     // The step that holds as many particles.
     let excess: f64 = points.iter().map(|p| p.1 - vapour).sum();
     let step = (excess / (liquid - vapour)).clamp(0.0, extent);
-    let mut best = Vector4::new(liquid, vapour, step, (0.1 * extent).max(1.0).ln());
-    let (mut normal, mut gradient, mut cost) = linearise(&best);
-    let mut damping = 1e-3;
-    for _ in 0..500 {
-        let mut damped: Matrix4<f64> = normal;
-        for i in 0..4 {
-            damped[(i, i)] += damping * normal[(i, i)].max(1e-12);
+    let width = (0.1 * extent).max(1.0).ln();
+    let residuals = |[liquid, vapour, place, width]: [f64; 4]| {
+        // Steeper than a thousandth of a bin, or wider than any box, the model has stopped depending on d.
+        if !(-7.0..30.0).contains(&width) {
+            return None;
         }
-        let change = damped.cholesky()?.solve(&gradient);
-        let trial = best + change;
-        // Steeper than a thousandth of a bin, or wider than any box, the
-        // model has stopped depending on d.
-        let sensible = trial[3].abs() < 30.0 && trial[3] > -7.0;
-        let (n, g, c) = linearise(&trial);
-        if sensible && c <= cost {
-            let settled = cost - c <= 1e-14 * cost || change.norm() < 1e-10;
-            (best, normal, gradient, cost) = (trial, n, g, c);
-            if settled {
-                return Some(best);
-            }
-            damping = (damping * 0.2).max(1e-12);
-        } else {
-            damping *= 5.0;
-            if damping > 1e12 {
-                // No downhill step is left: at the minimum to rounding.
-                return Some(best);
-            }
-        }
+        let d = width.exp();
+        let residual = |&(s, rho): &(f64, f64)| {
+            // Mean of tanh over the bin: d [ln cosh b − ln cosh a].
+            let mean = d * (ln_cosh((s + 0.5 - place) / d) - ln_cosh((s - 0.5 - place) / d));
+            0.5 * (liquid + vapour) - 0.5 * (liquid - vapour) * mean - rho
+        };
+        Some(points.iter().map(residual).collect())
+    };
+    if free {
+        let all = |p: &[f64]| residuals([p[0], p[1], p[2], p[3]]);
+        return Some(least_squares([liquid, vapour, step, width], [1e-6; 4], all)?.0);
     }
-    None
-}
-
-/// JᵀJ, Jᵀr and rᵀr of the model of one flank.
-fn linearise(points: &[(f64, f64)], p: &Vector4<f64>) -> (Matrix4<f64>, Vector4<f64>, f64) {
-    let d = p[3].exp();
-    let mut normal = Matrix4::zeros();
-    let mut gradient = Vector4::zeros();
-    let mut cost = 0.0;
-    for &(s, rho) in points {
-        // Mean of tanh over the bin: d [ln cosh b − ln cosh a].
-        let (a, b) = ((s - 0.5 - p[2]) / d, (s + 0.5 - p[2]) / d);
-        let rise = ln_cosh(b) - ln_cosh(a);
-        let mean = d * rise;
-        let by_place = a.tanh() - b.tanh();
-        let by_width = d * (rise - b * b.tanh() + a * a.tanh());
-        let half = 0.5 * (p[0] - p[1]);
-        let row = Vector4::new(0.5 * (1.0 - mean), 0.5 * (1.0 + mean), -half * by_place, -half * by_width);
-        let residual = rho - (0.5 * (p[0] + p[1]) - half * mean);
-        normal += row * row.transpose();
-        gradient += row * residual;
-        cost += residual * residual;
-    }
-    (normal, gradient, cost)
+    let three = |p: &[f64]| residuals([p[0], 0.0, p[1], p[2]]);
+    let [liquid, place, width] = least_squares([liquid, step, width], [1e-6; 3], three)?.0;
+    Some([liquid, 0.0, place, width])
 }
 
 /// ln cosh x + ln 2; only differences of it are used.

@@ -2,8 +2,7 @@
 
 use super::keys::{COMMON, Table};
 use super::meter::{AnyMeter, KINDS};
-use crate::run::Drive;
-use crate::scene::Stage;
+use crate::particles::Drive;
 use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::model::{Fluid, Model};
@@ -35,8 +34,8 @@ pub struct Place<'a> {
     pub fluid: &'a Fluid,
     /// The box.
     pub domain: &'a PeriodicBox,
-    /// The stages.
-    pub stages: &'a [Stage],
+    /// Names of the stages.
+    pub stages: &'a [&'a str],
     /// The normal of the slab that the scene starts from.
     pub slab: Option<usize>,
     /// What drives two opposite flows.
@@ -53,7 +52,7 @@ pub fn read(
     model: &Model,
     kt: f64,
     domain: &PeriodicBox,
-    stages: &[Stage],
+    stages: &[&str],
     slab: Option<usize>,
     drive: Option<Drive>,
 ) -> Result<Observe, FileError> {
@@ -61,7 +60,7 @@ pub fn read(
     let section = value.section()?;
     let fluid = model.at(kt)?;
     let place = Place { fluid: &fluid, domain, stages, slab, drive };
-    let last: Vec<String> = stages.last().map(|s| s.name.clone()).into_iter().collect();
+    let last: Vec<String> = stages.last().map(|s| (*s).to_owned()).into_iter().collect();
     let common = Common::read(&section, &place, Common { every: 10, skip: 0, stages: last })?;
     let mut observe = Observe::default();
     for kind in KINDS {
@@ -116,7 +115,7 @@ impl Common {
             common.skip = value.count()?.value;
         }
         if let Some(value) = section.get("stages") {
-            let known: Vec<&str> = place.stages.iter().map(|s| s.name.as_str()).collect();
+            let known = place.stages;
             common.stages.clear();
             for item in value.array()? {
                 let name = item.string()?.value;

@@ -7,6 +7,7 @@ use crate::run::Simulation;
 use crate::scene::Scene;
 use psidpd_core::document::FileError;
 use psidpd_core::engine::Want;
+use psidpd_core::engine::reference::Evaluator;
 use std::path::Path;
 
 pub(super) const SET6: &str = include_str!("../../models/warren2003-set6.toml");
@@ -50,10 +51,14 @@ pub(super) fn scene(
     Scene::parse("s.toml", &text, folder.path())
 }
 
+fn observers(scene: &Scene) -> Observers {
+    Observers::new(&scene.observe, scene.stages.iter().map(|s| s.name.as_str()))
+}
+
 /// Runs a scene without files.
 pub(super) fn run(scene: &Scene) -> (Simulation, Vec<Observation>) {
     let mut simulation = Simulation::new(&scene.model, scene.kt, scene.initial_state(), scene.seed).unwrap();
-    let mut observers = Observers::new(scene);
+    let mut observers = observers(scene);
     let mut time = 0.0;
     for stage in &scene.stages {
         simulation.prepare(stage.dt, Want::TOTALS).unwrap();
@@ -61,7 +66,7 @@ pub(super) fn run(scene: &Scene) -> (Simulation, Vec<Observation>) {
             let want = observers.wants(simulation.step_number() + 1);
             simulation.step(stage.dt, stage.integrator, want).unwrap();
             time += stage.dt;
-            observers.sample(&simulation, &stage.name, time);
+            observers.sample(simulation.view(time), &stage.name);
         }
     }
     (simulation, observers.finish())
@@ -159,10 +164,10 @@ fn a_liquid_in_equilibrium() {
     assert!((parts - energy.scalar("total").unwrap().value).abs() < 1e-10);
     // One frame against the engine.
     simulation.prepare(0.01, Want::TOTALS).unwrap();
-    let fluid = interactions::Interactions::new(simulation.model().at(1.0).unwrap()).unwrap();
-    let frame = frame::Frame::new(&simulation, &fluid, 0.0);
-    assert!((frame.landscape().energy() - simulation.potential_energy()).abs() < 1e-9);
-    for (a, b) in frame.landscape().virial().iter().zip(simulation.tally().virial) {
+    let fluid = Evaluator::new(simulation.model().at(1.0).unwrap()).unwrap();
+    let frame = frame::Frame::new(simulation.view(0.0), &fluid);
+    assert!((frame.evaluation().energy - simulation.potential_energy()).abs() < 1e-9);
+    for (a, b) in frame.evaluation().virial.iter().zip(simulation.tally().virial) {
         assert!((a - b).abs() < 1e-8);
     }
 }
@@ -237,8 +242,8 @@ fn profiles_of_a_known_flow() {
     }
     let mut simulation = Simulation::new(&scene.model, 1.0, state, 1).unwrap();
     simulation.set_step_number(1);
-    let mut observers = Observers::new(&scene);
-    observers.sample(&simulation, "settle", 0.01);
+    let mut observers = observers(&scene);
+    observers.sample(simulation.view(0.01), "settle");
     let all = observers.finish();
     let velocity = find(&all, "velocity_profile");
     let z = velocity.x.as_ref().unwrap().values.clone();
@@ -312,14 +317,14 @@ fn a_drop_of_liquid() {
         *x = x.map(|c| (c / 11.0 - 0.5) * side);
     }
     let mut simulation = Simulation::new(&scene.model, 1.0, state, 3).unwrap();
-    let mut observers = Observers::new(&scene);
+    let mut observers = observers(&scene);
     let mut time = 0.0;
     for stage in &scene.stages {
         simulation.prepare(stage.dt, Want::FORCES).unwrap();
         for _ in 0..stage.steps {
             simulation.step(stage.dt, stage.integrator, Want::FORCES).unwrap();
             time += stage.dt;
-            observers.sample(&simulation, &stage.name, time);
+            observers.sample(simulation.view(time), &stage.name);
         }
     }
     let all = observers.finish();
@@ -363,14 +368,14 @@ fn a_run_that_goes_on_ends_the_same() {
     let scene = scene(SET6, "[4.0, 4.0, 4.0]", 6.05, 60, &observe).unwrap();
     assert_eq!(scene.observe.requests.len(), tables().len());
     let mut simulation = Simulation::new(&scene.model, scene.kt, scene.initial_state(), scene.seed).unwrap();
-    let (mut whole, mut parts) = (Observers::new(&scene), Observers::new(&scene));
+    let (mut whole, mut parts) = (observers(&scene), observers(&scene));
     for stage in &scene.stages {
         simulation.prepare(stage.dt, Want::TOTALS).unwrap();
         for _ in 0..stage.steps {
             simulation.step(stage.dt, stage.integrator, Want::TOTALS).unwrap();
             let time = simulation.step_number() as f64 * stage.dt;
-            whole.sample(&simulation, &stage.name, time);
-            parts.sample(&simulation, &stage.name, time);
+            whole.sample(simulation.view(time), &stage.name);
+            parts.sample(simulation.view(time), &stage.name);
             if simulation.step_number().is_multiple_of(37) {
                 parts = Observers::from_bytes(&parts.to_bytes()).unwrap();
             }

@@ -8,7 +8,7 @@
 //!
 //! (Bashforth and Adams; in two dimensions dφ/ds = 1 − Bo z).
 
-use nalgebra::{Matrix3, Vector3};
+use super::least_squares::least_squares;
 
 /// Steps of the integration per radius of the apex.
 const STEP: f64 = 0.01;
@@ -76,7 +76,7 @@ pub struct Fit {
 }
 
 /// Distances of points from the contour, to first order; `None` beyond its end.
-fn residuals(points: &[(f64, f64)], dimensions: usize, p: &Vector3<f64>) -> Option<Vec<f64>> {
+fn residuals(points: &[(f64, f64)], dimensions: usize, p: &[f64]) -> Option<Vec<f64>> {
     let (bond, radius, apex) = (p[0], p[1].exp(), p[2]);
     let top = points.iter().map(|q| (q.1 - apex) / radius).fold(0.0, f64::max);
     let shape = contour(bond, dimensions, top);
@@ -124,13 +124,13 @@ pub fn fit(points: &[(f64, f64)], dimensions: usize) -> Option<Fit> {
     if !(widest > 0.0 && height > 0.0) {
         return None;
     }
-    let cost = |p: &Vector3<f64>| Some(residuals(&points, dimensions, p)?.iter().map(|r| r * r).sum::<f64>());
+    let cost = |p: &[f64; 3]| Some(residuals(&points, dimensions, p)?.iter().map(|r| r * r).sum::<f64>());
     // Coarse start: the best of a grid.
-    let mut best: Option<(f64, Vector3<f64>)> = None;
+    let mut best: Option<(f64, [f64; 3])> = None;
     for bond in [-0.2, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5] {
         for scale in [0.7, 0.85, 1.0, 1.2, 1.5] {
             for below in [0.0, 0.05, 0.15] {
-                let p = Vector3::new(bond, (scale * widest).ln(), low.1 - below * widest);
+                let p = [bond, (scale * widest).ln(), low.1 - below * widest];
                 let c = cost(&p)?;
                 if best.is_none_or(|b| c < b.0) {
                     best = Some((c, p));
@@ -138,45 +138,9 @@ pub fn fit(points: &[(f64, f64)], dimensions: usize) -> Option<Fit> {
             }
         }
     }
-    let (mut least, mut p) = best?;
-    let mut damping = 1e-3;
-    for _ in 0..200 {
-        let here = residuals(&points, dimensions, &p)?;
-        let steps = [1e-6, 1e-6, 1e-6 * widest];
-        let mut columns = Vec::new();
-        for (k, h) in steps.into_iter().enumerate() {
-            let (mut up, mut down) = (p, p);
-            up[k] += h;
-            down[k] -= h;
-            let (up, down) = (residuals(&points, dimensions, &up)?, residuals(&points, dimensions, &down)?);
-            columns.push(up.iter().zip(&down).map(|(a, b)| (a - b) / (2.0 * h)).collect::<Vec<_>>());
-        }
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let normal = Matrix3::from_fn(|a, b| dot(&columns[a], &columns[b]));
-        let gradient = Vector3::from_fn(|a, _| dot(&columns[a], &here));
-        let settled = loop {
-            let damped = Matrix3::from_fn(|a, b| {
-                normal[(a, b)] * if a == b { 1.0 + damping } else { 1.0 } + if a == b { 1e-14 } else { 0.0 }
-            });
-            let change = damped.cholesky()?.solve(&gradient);
-            let trial = p - change;
-            let sensible = trial[0].abs() < 5.0 && (trial[1] - widest.ln()).abs() < 3.0;
-            let c = if sensible { cost(&trial)? } else { f64::INFINITY };
-            if c < least {
-                let settled = least - c <= 1e-12 * least;
-                (least, p) = (c, trial);
-                damping = (damping * 0.3).max(1e-10);
-                break settled;
-            }
-            damping *= 5.0;
-            if damping > 1e10 {
-                break true;
-            }
-        };
-        if settled {
-            break;
-        }
-    }
+    let sensible = |p: &[f64]| p[0].abs() < 5.0 && (p[1] - widest.ln()).abs() < 3.0;
+    let within = |p: &[f64]| sensible(p).then(|| residuals(&points, dimensions, p))?;
+    let (p, least) = least_squares(best?.1, [1e-6, 1e-6, 1e-6 * widest], within)?;
     Some(Fit { bond: p[0], radius: p[1].exp(), apex: p[2], residual: (least / points.len() as f64).sqrt() })
 }
 

@@ -1,8 +1,7 @@
 //! `about.json`: what was run, and what the columns of its series are.
 
 use super::OutputError;
-use crate::run::Integrator;
-use crate::scene::Scene;
+use crate::files::write_atomically;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -104,67 +103,19 @@ pub const THERMO: [(&str, &str, &str); 12] = [
 ];
 
 /// What every number of a run is in.
-const UNITS: &str = "reduced: length, energy and mass are those of the model file";
+pub const UNITS: &str = "reduced: length, energy and mass are those of the model file";
 
 impl About {
-    /// The description of a scene.
-    pub fn of(scene: &Scene) -> About {
-        let mut begin = 0;
-        let stages = scene.stages.iter().map(|s| {
-            let stage = AboutStage {
-                name: s.name.clone(),
-                begin,
-                end: begin + s.steps,
-                dt: s.dt,
-                kt: s.kt,
-                thermostat: s.thermostat,
-                integrator: match s.integrator {
-                    Integrator::VelocityVerlet => "velocity-verlet".into(),
-                    Integrator::GrootWarren { lambda } => format!("groot-warren, lambda = {lambda}"),
-                },
-            };
-            begin = stage.end;
-            stage
-        });
-        let stages: Vec<AboutStage> = stages.collect();
-        let [x, y, z] = scene.domain.periodic();
-        // A model that holds at no temperature of the scene has no scene.
-        let densities = scene.model.at(scene.kt).map(|f| f.densities).unwrap_or_default();
-        About {
-            program: format!("psidpd {}", env!("CARGO_PKG_VERSION")),
-            title: scene.title.clone(),
-            model: scene.model.title().to_owned(),
-            dimensions: scene.model.dimensions(),
-            species: scene.model.species().to_vec(),
-            masses: scene.mass.clone(),
-            densities: densities
-                .iter()
-                .map(|d| AboutDensity {
-                    name: d.name.clone(),
-                    kernel: d.kernel.kind().name().into(),
-                    range: d.kernel.range(),
-                })
-                .collect(),
-            kt: scene.kt,
-            seed: scene.seed,
-            precision: scene.precision().to_string(),
-            box_origin: scene.domain.origin(),
-            box_edges: [0, 1, 2].map(|k| scene.domain.edge(k)),
-            box_periodic: [x, y, z && scene.model.dimensions() == 3],
-            stages,
-            units: UNITS.into(),
-            thermo: THERMO.map(|c| column(c, scene.model.dimensions())).to_vec(),
-        }
-    }
-
     /// Writes `about.json` into the folder of a run.
     ///
     /// # Errors
     /// The file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<(), OutputError> {
-        let mut text = serde_json::to_string_pretty(self).map_err(crate::report::ReportError::Json)?;
-        text.push('\n');
-        Ok(crate::report::write_atomically(folder.join("about.json"), text.as_bytes())?)
+        let path = folder.join("about.json");
+        match serde_json::to_string_pretty(self) {
+            Ok(text) => Ok(write_atomically(path, (text + "\n").as_bytes())?),
+            Err(cause) => Err(OutputError::Json { path, cause }),
+        }
     }
 
     /// Reads `about.json` of a folder; `None` if there is none.
@@ -181,8 +132,4 @@ impl About {
             }
         }
     }
-}
-
-fn column((name, title, unit): (&str, &str, &str), dimensions: usize) -> Column {
-    Column { name: name.into(), title: title.into(), unit: unit.replace("^d", &format!("^{dimensions}")) }
 }

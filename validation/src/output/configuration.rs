@@ -2,7 +2,7 @@ use super::{Frame, OutputError, read_xyz};
 use crate::lammps::LammpsError;
 use crate::lammps::data::DataFile;
 use crate::lammps::dump::{self, DumpReader};
-use crate::run::State;
+use crate::particles::State;
 use nalgebra::{Matrix3, Vector3};
 use psidpd_core::document::open_regular;
 use psidpd_core::engine::PeriodicBox;

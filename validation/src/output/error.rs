@@ -56,7 +56,7 @@ pub enum OutputError {
     Request(String),
     /// A file cannot be written.
     #[error(transparent)]
-    Write(#[from] crate::report::ReportError),
+    Write(#[from] crate::files::WriteError),
 }
 
 impl OutputError {

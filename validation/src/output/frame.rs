@@ -1,4 +1,3 @@
-use crate::run::Simulation;
 use psidpd_core::engine::PeriodicBox;
 
 /// Particles at one step, borrowed from whoever has them.
@@ -24,22 +23,7 @@ pub struct Frame<'a> {
     pub tag: &'a [i32],
 }
 
-impl<'a> Frame<'a> {
-    /// The present step of a simulation; `time` is that since the start of the run.
-    pub fn of(simulation: &'a Simulation, time: f64) -> Frame<'a> {
-        Frame {
-            step: simulation.step_number(),
-            time,
-            dimensions: simulation.dimensions(),
-            domain: simulation.domain(),
-            names: simulation.model().species(),
-            x: simulation.positions(),
-            v: Some(simulation.velocities()),
-            species: simulation.species(),
-            tag: simulation.tags(),
-        }
-    }
-
+impl Frame<'_> {
     /// Which directions repeat: never z in two dimensions.
     pub fn periodic(&self) -> [bool; 3] {
         let [x, y, z] = self.domain.periodic();

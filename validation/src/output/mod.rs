@@ -4,7 +4,7 @@
 //! to the end of a frame can be continued. [`Configuration`] is a frame read from a file, of whichever of
 //! the formats that psidpd writes. [`picture`] makes pixels of it.
 
-mod about;
+pub mod about;
 mod animation;
 mod configuration;
 mod error;

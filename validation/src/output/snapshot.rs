@@ -1,5 +1,6 @@
 use super::picture::{ParticleOptions, draw_particles};
 use super::{Frame, OutputError};
+use crate::files::WriteError;
 use std::path::{Path, PathBuf};
 
 /// The folder of snapshots in the folder of a run.
@@ -17,8 +18,7 @@ pub fn snapshot_name(step: u64) -> String {
 /// The folder or the file cannot be written.
 pub fn write_snapshot(folder: &Path, frame: &Frame) -> Result<PathBuf, OutputError> {
     let snapshots = folder.join(SNAPSHOTS);
-    std::fs::create_dir_all(&snapshots)
-        .map_err(|cause| crate::report::ReportError::Write { path: snapshots.clone(), cause })?;
+    std::fs::create_dir_all(&snapshots).map_err(|cause| WriteError { path: snapshots.clone(), cause })?;
     let path = snapshots.join(snapshot_name(frame.step));
     let (image, _) = draw_particles(frame, &ParticleOptions::default());
     let png =
@@ -27,7 +27,7 @@ pub fn write_snapshot(folder: &Path, frame: &Frame) -> Result<PathBuf, OutputErr
     let new = path.with_extension("png.new");
     std::fs::write(&new, &png)
         .and_then(|()| std::fs::rename(&new, &path))
-        .map_err(|cause| crate::report::ReportError::Write { path: path.clone(), cause })?;
+        .map_err(|cause| WriteError { path: path.clone(), cause })?;
     Ok(path)
 }
 
@@ -37,8 +37,7 @@ pub fn write_snapshot(folder: &Path, frame: &Frame) -> Result<PathBuf, OutputErr
 /// One that cannot be removed.
 pub fn remove_snapshots(folder: &Path) -> Result<(), OutputError> {
     for path in super::animation::snapshots(folder) {
-        std::fs::remove_file(&path)
-            .map_err(|cause| crate::report::ReportError::Write { path: path.clone(), cause })?;
+        std::fs::remove_file(&path).map_err(|cause| WriteError { path: path.clone(), cause })?;
     }
     Ok(())
 }

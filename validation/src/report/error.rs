@@ -1,6 +1,6 @@
 //! The error type of this module.
 
-use std::path::PathBuf;
+use crate::files::WriteError;
 
 /// What can go wrong while making or writing a report.
 #[derive(Debug, thiserror::Error)]
@@ -12,12 +12,6 @@ pub enum ReportError {
     #[error("cannot convert results to or from JSON: {0}")]
     Json(#[from] serde_json::Error),
     /// A file could not be written.
-    #[error("cannot write {}: {cause}", path.display())]
-    Write {
-        /// The file that was to be written.
-        path: PathBuf,
-        /// Why it could not be.
-        #[source]
-        cause: std::io::Error,
-    },
+    #[error(transparent)]
+    Write(#[from] WriteError),
 }

@@ -8,7 +8,6 @@
 mod chart;
 mod error;
 pub mod figure;
-pub mod files;
 pub mod html;
 pub mod plot;
 pub mod progress;
@@ -21,7 +20,6 @@ mod text;
 
 pub use error::ReportError;
 pub use figure::Figure;
-pub use files::write_atomically;
 pub use html::{Item, Report, Section};
 pub use plot::{Plot, Series, Style};
 pub use progress::{Bar, Progress};

@@ -1,8 +1,8 @@
 //! Particles as files have them.
 
 use super::simulation::Simulation;
-use super::tags::order_of_tags;
 use crate::output::Frame;
+use crate::particles::order_of_tags;
 
 /// A copy of the particles of one step in the order of their tags.
 #[derive(Debug, Clone, Default)]
@@ -35,7 +35,7 @@ impl ByTag {
             v: Some(&self.v),
             species: &self.species,
             tag: &self.tag,
-            ..Frame::of(simulation, time)
+            ..simulation.frame(time)
         }
     }
 }

@@ -1,4 +1,5 @@
-use super::checkpoint::CheckpointError;
+use crate::checkpoint::{CheckpointError, Unwritten};
+use crate::particles::StateError;
 use psidpd_core::document::FileError;
 use psidpd_core::engine::EngineError;
 use psidpd_core::model::expression::TooLarge;
@@ -141,6 +142,18 @@ pub enum RunError {
         /// Why.
         source: std::io::Error,
     },
+}
+
+impl From<StateError> for RunError {
+    fn from(error: StateError) -> RunError {
+        RunError::State(error.0)
+    }
+}
+
+impl From<Unwritten> for RunError {
+    fn from(Unwritten { path, source }: Unwritten) -> RunError {
+        RunError::Output { path, source }
+    }
 }
 
 impl RunError {

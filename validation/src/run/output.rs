@@ -3,7 +3,8 @@
 use super::dump::write_frame;
 use super::error::RunError;
 use super::growing::GrowingFile;
-use super::thermo::{Thermo, ThermoFile};
+use super::thermo::ThermoFile;
+use crate::checkpoint::Thermo;
 use crate::observe::{Observation, write_csv, write_json};
 use crate::output::{About, Frame, remove_snapshots, write_xyz};
 use crate::scene::Scene;

@@ -1,15 +1,14 @@
-use super::checkpoint::{Checkpoint, CheckpointError, Found, Identity, Position, Store};
 use super::error::RunError;
 use super::folder::Folder;
 use super::output::Output;
 use super::simulation::Simulation;
-use super::state::State;
-use super::summary::{Summary, Sums};
-use super::thermo::Thermo;
+use super::summary::Summary;
 use super::timing::Timing;
 use super::underway::Run;
+use crate::checkpoint::{Checkpoint, CheckpointError, Found, Identity, Position, Store, Sums, Thermo};
 use crate::observe::Observers;
 use crate::output::About;
+use crate::particles::State;
 use crate::scene::Scene;
 use psidpd_core::engine::Settings;
 use std::collections::BTreeMap;
@@ -126,7 +125,7 @@ impl<'a> Runner<'a> {
     pub fn begin(scene: &'a Scene, out: &Path, begin: Begin) -> Result<Runner<'a>, RunError> {
         let folder = Folder::open(out)?;
         let store = Store::new(out);
-        let identity = Identity::of(scene);
+        let identity = Identity::of(scene.source.text(), &scene.folder, scene.precision(), &scene.model);
         if begin == Begin::Resume
             && let Some(found) = store.find(|checkpoint| usable(checkpoint, &identity, scene, out))?
         {
@@ -150,7 +149,8 @@ impl<'a> Runner<'a> {
             last: None,
             sums: Sums::default(),
             files: BTreeMap::new(),
-            observers: Observers::new(scene).to_bytes(),
+            observers: Observers::new(&scene.observe, scene.stages.iter().map(|s| s.name.as_str()))
+                .to_bytes(),
         };
         let mut output = Output::create(scene, out)?;
         let good = Checkpoint { files: output.lengths(), ..good };
@@ -203,6 +203,11 @@ impl<'a> Runner<'a> {
     pub fn set_threads(&mut self, threads: NonZeroUsize) -> Result<(), RunError> {
         let settings = self.run.simulation.settings();
         self.run.simulation.set_settings(Settings { threads, ..settings })
+    }
+
+    /// How forces are computed, for people: see [`Simulation::evaluation`].
+    pub fn evaluation(&self) -> String {
+        self.run.simulation.evaluation()
     }
 
     /// How many particles there are.

@@ -1,22 +1,21 @@
-use super::body_force::{self, BodyForce};
 use super::bounds::Bounds;
 use super::error::RunError;
-use super::forces::{Arrays, Forces};
 use super::integrator::{Before, Faults, Integrator, Motion, Surroundings};
 use super::reach;
 use super::reorder::{self, Reordering};
-use super::state::State;
-use super::tags::Tags;
+use crate::particles::State;
+use crate::particles::Tags;
+use crate::particles::{BodyForce, add_body_forces};
 use psidpd_core::engine::{
-    PassCounts, PeriodicBox, Plan, Pool, Precision, Settings, Step, Sweep, Tally, Want,
+    self, Engine, Particles, PassCounts, PeriodicBox, Plan, Pool, Precision, Request, Settings, Step, Tally,
+    Want,
 };
 use psidpd_core::model::Model;
 use std::sync::OnceLock;
 
-/// Particles, their periodic images, and the forces of one fluid on them.
+/// Particles in a box, and the forces of one fluid on them.
 ///
-/// Arrays that the engine reads hold the owned particles first and their images behind; every buffer
-/// is kept from step to step.
+/// Every buffer is kept from step to step.
 ///
 /// Directions of the box that are not periodic have walls that reflect.
 ///
@@ -30,6 +29,7 @@ pub struct Simulation {
     number: u64,
     thermostat: bool,
     all_densities: bool,
+    reference_only: bool,
     /// What engines of earlier temperatures counted.
     earlier_out_of_bounds: [u64; 2],
     dimensions: usize,
@@ -42,7 +42,7 @@ pub struct Simulation {
     species: Vec<i32>,
     tag: Vec<i32>,
     image: Vec<[i32; 3]>,
-    forces: Forces,
+    forces: Engine,
     tally: Tally,
     before: Before,
     bounds: Bounds,
@@ -75,7 +75,7 @@ impl Simulation {
             return Err(RunError::State(fault));
         }
         let settings = Settings { precision: Precision::Double, ..Settings::default() };
-        let forces = Forces::new(&fluid, settings)?;
+        let forces = Engine::new(&fluid, settings)?;
         let State { domain, mass, mut x, v, species, tag, mut image } = state;
         let owned = x.len();
         reach::check(&domain, fluid.dimensions, fluid.cutoff(), owned)?;
@@ -89,6 +89,7 @@ impl Simulation {
             number: 0,
             thermostat: true,
             all_densities: false,
+            reference_only: false,
             earlier_out_of_bounds: [0; 2],
             dimensions: fluid.dimensions,
             mass,
@@ -124,8 +125,8 @@ impl Simulation {
         if kt != self.kt {
             self.earlier_out_of_bounds = self.out_of_bounds();
             let (settings, pool) = (self.forces.settings(), self.forces.pool().clone());
-            self.forces = Forces::with_pool(&self.model.at(kt)?, settings, pool)?;
-            self.forces.sum_all_densities(self.all_densities);
+            self.forces = Engine::with_pool(&self.model.at(kt)?, settings, pool)?;
+            self.forces.use_reference_only(self.reference_only);
             self.kt = kt;
         }
         Ok(())
@@ -137,8 +138,8 @@ impl Simulation {
     /// The model does not hold at the present temperature: never, since it did before.
     pub fn set_settings(&mut self, settings: Settings) -> Result<(), RunError> {
         self.earlier_out_of_bounds = self.out_of_bounds();
-        self.forces = Forces::new(&self.model.at(self.kt)?, settings)?;
-        self.forces.sum_all_densities(self.all_densities);
+        self.forces = Engine::new(&self.model.at(self.kt)?, settings)?;
+        self.forces.use_reference_only(self.reference_only);
         Ok(())
     }
 
@@ -183,9 +184,15 @@ impl Simulation {
         }
     }
 
-    /// The fast engine, for what it can tell of itself.
-    pub fn sweep(&self) -> &Sweep {
-        self.forces.sweep()
+    /// The engine, for what it can tell of itself.
+    pub fn engine(&self) -> &Engine {
+        &self.forces
+    }
+
+    /// The way that steps take of which only forces are wanted, for people.
+    pub fn evaluation(&self) -> String {
+        let want = Want { densities: self.all_densities, ..Want::FORCES };
+        self.forces.describe(self.forces.path_for(engine::Surroundings::Box(&self.domain), want))
     }
 
     /// Switches dissipative and random forces off, or on again.
@@ -265,7 +272,7 @@ impl Simulation {
     fn add_external_forces(&mut self) {
         if !self.body_forces.is_empty() {
             let Simulation { body_forces, forces, domain, mass, x, species, tag, force, owned, .. } = self;
-            body_force::add(body_forces, forces.pool(), &mut force[..*owned], |body, k| {
+            add_body_forces(body_forces, forces.pool(), &mut force[..*owned], |body, k| {
                 let mass = mass[species[k] as usize];
                 body.acts_on(species[k], tag[k]).then(|| body.at(domain, x[k]).map(|a| mass * a))
             });
@@ -293,9 +300,11 @@ impl Simulation {
         let step = step.filter(|_| self.forces.plan().needs_velocities());
         let number = self.number;
         let failed = |source| RunError::Engine { step: number, source };
-        let Simulation { forces, domain, x, v, tag, species, force, owned, .. } = self;
-        let arrays = Arrays { owned: *owned, x, v, tag, species, force };
-        self.tally = forces.compute(domain, arrays, step, want).map_err(failed)?;
+        let Simulation { forces, domain, x, v, tag, species, force, owned, all_densities, .. } = self;
+        let particles = Particles { owned: *owned, x, tag, kind: species };
+        let want = Want { densities: want.densities || *all_densities, ..want };
+        let request = Request { particles, v, step, want };
+        self.tally = forces.forces(domain, &request, force, false).map_err(failed)?;
         Ok(())
     }
 
@@ -420,15 +429,21 @@ impl Simulation {
         self.forces.counts()
     }
 
-    /// Local densities of the particles, as [`psidpd_core::engine::Engine::local_densities`].
+    /// Local densities of the particles in the last evaluation, if [`Simulation::sum_all_densities`] asked for them: one
+    /// for each density and species, density-major.
     pub fn local_densities(&self) -> &[f64] {
         self.forces.local_densities()
     }
 
-    /// Whether every density of the model is summed, or only those that forces need.
+    /// Whether evaluations bring every density of the model with them.
     pub fn sum_all_densities(&mut self, all: bool) {
         self.all_densities = all;
-        self.forces.sum_all_densities(all);
+    }
+
+    /// Whether every evaluation is done by the reference, the slower way in double precision.
+    pub fn use_reference_only(&mut self, only: bool) {
+        self.reference_only = only;
+        self.forces.use_reference_only(only);
     }
 
     /// kT.

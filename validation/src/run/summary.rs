@@ -1,6 +1,6 @@
 use super::error::RunError;
-use super::thermo::Thermo;
-use serde::{Deserialize, Serialize};
+use crate::checkpoint::{Means, Thermo};
+use serde::Serialize;
 use std::io::Write;
 use std::path::Path;
 
@@ -20,54 +20,6 @@ pub struct Summary {
     pub last: Thermo,
     /// Plain means over the thermo rows of the last stage, without error bars; `None` without rows.
     pub means: Option<Means>,
-}
-
-/// Plain means over thermo rows.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Means {
-    /// How many rows.
-    pub rows: u64,
-    /// Of kT.
-    pub temperature: f64,
-    /// Of the potential energy.
-    pub potential: f64,
-    /// Of the pressure.
-    pub pressure: f64,
-    /// Of the pressure of conservative forces.
-    pub conservative_pressure: f64,
-}
-
-/// Sums over thermo rows, from which their means come: a checkpoint can hold them.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct Sums {
-    rows: u64,
-    temperature: f64,
-    potential: f64,
-    pressure: f64,
-    conservative_pressure: f64,
-}
-
-impl Sums {
-    /// Counts another row.
-    pub fn add(&mut self, t: &Thermo) {
-        self.rows += 1;
-        self.temperature += t.temperature;
-        self.potential += t.potential;
-        self.pressure += t.pressure;
-        self.conservative_pressure += t.conservative_pressure;
-    }
-
-    /// The means; `None` without rows.
-    pub fn means(&self) -> Option<Means> {
-        let count = self.rows as f64;
-        (self.rows > 0).then(|| Means {
-            rows: self.rows,
-            temperature: self.temperature / count,
-            potential: self.potential / count,
-            pressure: self.pressure / count,
-            conservative_pressure: self.conservative_pressure / count,
-        })
-    }
 }
 
 impl Summary {

@@ -1,30 +1,9 @@
 use super::error::RunError;
 use super::growing::GrowingFile;
 use super::simulation::Simulation;
-use serde::{Deserialize, Serialize};
+use crate::checkpoint::Thermo;
 use std::io::Write;
 use std::path::Path;
-
-/// One row of totals.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Thermo {
-    /// Number of the step.
-    pub step: u64,
-    /// Time since the start of the run.
-    pub time: f64,
-    /// kT from the kinetic energy.
-    pub temperature: f64,
-    /// `U`.
-    pub potential: f64,
-    /// `½ Σ m v²`.
-    pub kinetic: f64,
-    /// A third (in two dimensions half) of the trace of `tensor`.
-    pub pressure: f64,
-    /// xx, yy, zz, xy, xz, yz; thermostat forces included.
-    pub tensor: [f64; 6],
-    /// The pressure with conservative forces alone.
-    pub conservative_pressure: f64,
-}
 
 impl Thermo {
     /// The totals of the last step, which must have been computed with

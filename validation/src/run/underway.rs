@@ -1,16 +1,15 @@
 use super::by_tag::ByTag;
-use super::checkpoint::{Checkpoint, CheckpointError, Position, Store};
 use super::error::RunError;
 use super::folder::Folder;
 use super::output::{Output, write_observations};
-use super::restart::write_data;
 use super::runner::{Outcome, Progress};
 use super::simulation::Simulation;
-use super::summary::{Summary, Sums};
-use super::thermo::Thermo;
+use super::summary::Summary;
 use super::timing::{Session, Timing};
+use crate::checkpoint::{Checkpoint, CheckpointError, Position, Store, Sums, Thermo};
 use crate::observe::Observers;
-use crate::output::{Frame, write_snapshot};
+use crate::output::write_snapshot;
+use crate::particles::write_data;
 use crate::scene::{Scene, Stage};
 use psidpd_core::engine::Want;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -138,12 +137,15 @@ impl<'a> Run<'a> {
         }
         self.simulation.begin_step(stage.dt, stage.integrator, want)?;
         let is_last = self.position.done + 1 == stage.steps;
-        if is_last || totals || self.observers.may_sample(number, &stage.name) || self.writes(number) {
+        let sampled = self.observers.may_sample(number, &stage.name);
+        if is_last || totals || sampled || self.writes(number) {
             self.simulation.end_step()?;
         }
         self.position.done += 1;
         self.position.time = self.position.begin + self.position.done as f64 * stage.dt;
-        self.observers.sample(&self.simulation, &stage.name, self.position.time);
+        if sampled {
+            self.observers.sample(self.simulation.view(self.position.time), &stage.name);
+        }
         self.report(stage, totals, progress)?;
         let due = match self.scene.output.checkpoint {
             Some(interval) => every(interval, number),
@@ -187,7 +189,7 @@ impl<'a> Run<'a> {
                 let sorted = ByTag::of(&self.simulation);
                 let frame = match &sorted {
                     Some(sorted) => sorted.frame(&self.simulation, self.position.time),
-                    None => Frame::of(&self.simulation, self.position.time),
+                    None => self.simulation.frame(self.position.time),
                 };
                 if dump {
                     output.frame(&frame)?;

@@ -3,7 +3,7 @@
 use super::initial::Initial;
 use super::masses::unknown_species;
 use super::number::{axis, vector};
-use crate::run::{BodyForce, Tags};
+use crate::particles::{BodyForce, Tags};
 use psidpd_core::document::{FileError, FileErrorKind, Section};
 use psidpd_core::model::Model;
 

@@ -6,7 +6,7 @@ use super::number::positive;
 use super::part::{Common, Part, WHOLE};
 use super::saved;
 use super::velocities::Velocities;
-use crate::run::{State, Tags};
+use crate::particles::{State, Tags};
 use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::model::Model;

@@ -40,7 +40,7 @@ pub use template::{TEMPLATES, Template, TemplateError};
 pub use velocities::Velocities;
 
 use crate::observe::{self, Observe};
-use crate::run::{BodyForce, RunError, Simulation, State, Tags};
+use crate::particles::{BodyForce, State, Tags};
 use number::positive;
 use psidpd_core::document::{Document, FileError, FileErrorKind, Section, Source, Value};
 use psidpd_core::engine::{PeriodicBox, Plan, Precision};
@@ -115,6 +115,8 @@ impl Scene {
         let stages = stage::read(&root, kt)?;
         let body_forces = body_force::read(&root, &model, &initial)?;
         let drive = body_forces.iter().find_map(BodyForce::drive);
+        let names: Vec<&str> = stages.iter().map(|s| s.name.as_str()).collect();
+        let observe = observe::read(&root, &model, kt, &domain, &names, initial.slab_axis(), drive)?;
         let scene = Scene {
             title: title.map_or_else(|| model.title().to_owned(), |t| t.value),
             model_path,
@@ -125,7 +127,7 @@ impl Scene {
             frozen: initial.frozen(),
             body_forces,
             output: output::read(&root)?,
-            observe: observe::read(&root, &model, kt, &domain, &stages, initial.slab_axis(), drive)?,
+            observe,
             source: root.source().clone(),
             folder: base.to_owned(),
             stages,
@@ -147,29 +149,6 @@ impl Scene {
     /// In what a run of the scene computes pairs: mixed precision unless it says otherwise.
     pub fn precision(&self) -> Precision {
         self.precision.unwrap_or_default()
-    }
-
-    /// A simulation from `state`, which is of this scene, at step 0: with its seed and its frozen particles.
-    /// It is in double precision, as every simulation is; see [`Simulation::set_settings`].
-    ///
-    /// # Errors
-    /// `state` is no state of the model.
-    pub fn simulation(&self, state: State) -> Result<Simulation, RunError> {
-        let mut simulation = Simulation::new(&self.model, self.kt, state, self.seed)?;
-        simulation.set_frozen(&self.frozen);
-        Ok(simulation)
-    }
-
-    /// Sets the conditions of a stage: temperature, thermostat, body forces. The forces of the present step are
-    /// to be computed anew then.
-    ///
-    /// # Errors
-    /// The model does not hold at the temperature.
-    pub fn enter(&self, stage: &Stage, simulation: &mut Simulation) -> Result<(), RunError> {
-        simulation.set_temperature(stage.kt)?;
-        simulation.set_thermostat(stage.thermostat);
-        simulation.set_body_forces(if stage.body_forces { &self.body_forces } else { &[] });
-        Ok(())
     }
 
     /// Number densities of the species where the fluid is: in the largest part that moves, or in the whole box

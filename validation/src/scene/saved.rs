@@ -2,8 +2,9 @@
 
 use super::initial::Initial;
 use super::velocities::Velocities;
+use crate::checkpoint;
 use crate::lammps::DataFile;
-use crate::run::{State, Tags, checkpoint};
+use crate::particles::{State, Tags};
 use nalgebra::{Matrix3, Vector3};
 use psidpd_core::document::{FileError, FileErrorKind, Section};
 use psidpd_core::engine::PeriodicBox;

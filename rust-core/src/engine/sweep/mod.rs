@@ -1,4 +1,4 @@
-//! The fast engine: the same forces as [`Engine`](super::Engine), from a sweep over particles in the order
+//! The fast engine: the same forces as [`Reference`](super::reference::Reference), from a sweep over particles in the order
 //! of cells.
 //!
 //! Every step the particles are sorted into columns of cells ([`grid`], [`workspace`]). Each plane of columns
@@ -14,25 +14,28 @@
 //! the passes for each of both, chosen once. [`pool`] shares planes among threads; what a plane adds
 //! to another has accumulators of its own, so sums are the same for any number of threads.
 
-mod compiled;
-mod first_pass;
+mod cells;
 mod ground;
-mod many_body;
 mod pair_batch;
 mod pair_search;
+mod passes;
 mod pool;
 mod simd;
+mod times;
 mod workspace;
 
 pub use pool::{Pool, part};
+pub use times::Times;
 
+use super::counts::PassCounts;
 use super::domain::PeriodicBox;
 use super::error::EngineError;
-use super::evaluator::PassCounts;
+use super::instruction_set::InstructionSet;
 use super::noise::PairNoise;
 use super::particles::{Particles, Step};
 use super::plan::Plan;
-use super::settings::{Instructions, Precision, Settings};
+use super::settings::{Precision, Settings};
+use super::surroundings::Around;
 use super::tally::{Tally, Want};
 use crate::model::Fluid;
 use crate::model::expression::TooLarge;
@@ -41,7 +44,8 @@ use ground::box_geometry::BoxGeometry;
 use ground::cell_grid::CellGrid;
 use std::sync::Arc;
 use std::time::Instant;
-use workspace::{ForceSink, Input, Workspace};
+use times::lap;
+use workspace::{ForceSink, Input, Workspace, extremes};
 
 /// Forces of one fluid, fast: [`Sweep::evaluate`] where all particles are in hand. For a rank of a host, with ghosts for
 /// whatever is beyond it, an evaluation is [`Sweep::first`], a round of slopes from owners to ghosts, and
@@ -49,50 +53,17 @@ use workspace::{ForceSink, Input, Workspace};
 pub struct Sweep {
     plan: Plan,
     settings: Settings,
+    set: InstructionSet,
     pool: Arc<Pool>,
     workspace: EitherPrecision,
     species_of_type: Vec<i32>,
     /// In the host's order, where it has ghosts.
     slopes: Vec<f64>,
-    counts: PassCounts,
     owned: usize,
     all: usize,
     want: Want,
     times: Times,
     ready: bool,
-}
-
-/// What a rank of a host finds around its particles.
-#[derive(Debug, Clone, Copy)]
-pub struct Around<'a> {
-    /// The box. Along its periodic directions the rank has all of it; along the others there are ghosts for what is
-    /// beyond the rank, or nothing is.
-    pub domain: &'a PeriodicBox,
-    /// For each ghost whether it is the image, along a periodic direction of `domain`, of a particle that is there too:
-    /// those take no part. Empty if none is.
-    pub images: &'a [bool],
-}
-
-/// Seconds spent in the parts of evaluations, since the engine was made.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Times {
-    /// Sorting particles into cells.
-    pub sort: f64,
-    /// Finding pairs; forces that need no density, noise among them; weights.
-    pub first: f64,
-    /// Summing densities and evaluating ψ.
-    pub excess: f64,
-    /// Many-body forces.
-    pub second: f64,
-    /// Forces to the host.
-    pub forces: f64,
-}
-
-/// Adds the time since the last lap to `sum`.
-fn lap(since: &mut Instant, sum: &mut f64) {
-    let now = Instant::now();
-    *sum += (now - *since).as_secs_f64();
-    *since = now;
 }
 
 /// One of both.
@@ -101,7 +72,7 @@ enum EitherPrecision {
     Double(Box<Workspace<Double>>),
 }
 
-/// Does the same with the machine of either precision.
+/// Does the same with the workspace of either precision.
 macro_rules! with {
     ($both:expr, $workspace:ident => $do:expr) => {
         match $both {
@@ -137,27 +108,22 @@ impl Sweep {
 
     /// The engine of a plan that is there already, with threads that others may use too.
     pub fn of_plan(plan: Plan, mut settings: Settings, pool: Arc<Pool>) -> Sweep {
-        if !settings.instructions.available() {
-            settings.instructions = Instructions::best();
-        }
+        let set = InstructionSet::new(settings.instructions).unwrap_or_else(InstructionSet::best);
+        settings.instructions = set.instructions();
         let threads = pool.threads();
         let workspace = match settings.precision {
-            Precision::Mixed => {
-                EitherPrecision::Mixed(Box::new(Workspace::new(&plan, settings.instructions, threads)))
-            }
-            Precision::Double => {
-                EitherPrecision::Double(Box::new(Workspace::new(&plan, settings.instructions, threads)))
-            }
+            Precision::Mixed => EitherPrecision::Mixed(Box::new(Workspace::new(&plan, set, threads))),
+            Precision::Double => EitherPrecision::Double(Box::new(Workspace::new(&plan, set, threads))),
         };
         let species_of_type = (0..plan.species.len() as i32).collect();
         Sweep {
             plan,
             settings,
+            set,
             pool,
             workspace,
             species_of_type,
             slopes: Vec::new(),
-            counts: PassCounts::default(),
             owned: 0,
             all: 0,
             want: Want::FORCES,
@@ -186,17 +152,19 @@ impl Sweep {
         &self.pool
     }
 
-    /// How often each pass has run.
+    /// What the passes have done since the engine was made, counted in the passes: search groups, batches of pairs (for each
+    /// density, with noise, with energies and virials), blocks of particles with a ψ that depends on a density, and planes
+    /// with forces. A pass that has never run has a count of zero.
     pub fn counts(&self) -> PassCounts {
-        self.counts
+        with!(&self.workspace, m => m.counts())
     }
 
-    /// As [`Engine::out_of_bounds`](super::Engine::out_of_bounds).
+    /// As [`Reference::out_of_bounds`](super::reference::Reference::out_of_bounds).
     pub fn out_of_bounds(&self) -> [u64; 2] {
         with!(&self.workspace, m => m.out_of_bounds())
     }
 
-    /// As [`Engine::map_kinds`](super::Engine::map_kinds).
+    /// As [`Reference::map_kinds`](super::reference::Reference::map_kinds).
     ///
     /// # Errors
     /// A species index out of range.
@@ -224,7 +192,7 @@ impl Sweep {
     ///
     /// `v` may be empty and `step` `None` where no thermostat acts; with `step` `None` only conservative
     /// forces are computed. Of `want`, the totals: what is asked for of each particle is the business
-    /// of [`Engine`](super::Engine).
+    /// of [`Reference`](super::reference::Reference).
     ///
     /// # Errors
     /// A position, ψ or a force that is not finite; then some forces may have been written. A tag or type out of range,
@@ -248,19 +216,18 @@ impl Sweep {
             return Err(EngineError::Host("the force array is too short"));
         }
         let input = Input::new(particles, &[], v, &self.species_of_type, thermostat, want);
+        let set = self.set;
         let (plan, pool, times) = (&self.plan, &self.pool, &mut self.times);
         let out = ForceSink::new(force, add, particles.tag);
         let tally = with!(&mut self.workspace, m => {
             let mut since = Instant::now();
-            let (geometry, grid) = region(m, plan, pool, domain, &input)?;
+            let (geometry, grid) = region(set, plan, pool, domain, &input)?;
             m.sort_into_cells(pool, geometry, grid, &input)?;
             lap(&mut since, &mut times.sort);
             m.run_all(pool, plan, &input, out, times)?;
             m.tally()
         });
         self.slopes.clear();
-        self.count_first(thermostat.is_some());
-        self.count_second();
         Ok(tally)
     }
 
@@ -284,10 +251,11 @@ impl Sweep {
             return Err(EngineError::Host("not as many ghosts as it was said of whether they are images"));
         }
         let input = Input::new(particles, images, v, &self.species_of_type, thermostat, want);
+        let set = self.set;
         let (plan, pool, times) = (&self.plan, &self.pool, &mut self.times);
         with!(&mut self.workspace, m => {
             let mut since = Instant::now();
-            let (geometry, grid) = region(m, plan, pool, domain, &input)?;
+            let (geometry, grid) = region(set, plan, pool, domain, &input)?;
             m.sort_into_cells(pool, geometry, grid, &input)?;
             lap(&mut since, &mut times.sort);
             m.first(pool, plan, &input, times)?;
@@ -295,7 +263,6 @@ impl Sweep {
             m.slopes_to_host(&mut self.slopes);
             lap(&mut since, &mut times.excess);
         });
-        self.count_first(thermostat.is_some());
         self.ready = true;
         Ok(())
     }
@@ -325,19 +292,6 @@ impl Sweep {
         }
         (self.owned, self.all, self.want) = (particles.owned, all, want);
         Ok(thermostat)
-    }
-
-    fn count_first(&mut self, noise: bool) {
-        self.counts.search += 1;
-        self.counts.density += self.plan.passes.len() as u64;
-        self.counts.excess += self.plan.evaluated_species();
-        self.counts.noise += noise as u64;
-    }
-
-    fn count_second(&mut self) {
-        self.counts.force += 1;
-        self.counts.energy += self.want.energy as u64;
-        self.counts.virial += self.want.virial as u64;
     }
 
     /// Numbers per particle that a host forwards to ghosts: [`Plan::slope_width`].
@@ -382,7 +336,6 @@ impl Sweep {
         if particles.x.len() != self.all || particles.owned != self.owned || force.len() < self.owned {
             return Err(EngineError::Host("particles changed between densities and forces"));
         }
-        self.count_second();
         let (pool, slopes, times) = (&self.pool, &self.slopes, &mut self.times);
         let out = ForceSink::new(force, add, particles.tag);
         with!(&mut self.workspace, m => {
@@ -395,8 +348,8 @@ impl Sweep {
     }
 
     /// ψ and local densities of owned particles, in the host's order: as
-    /// [`Engine::excess`](super::Engine::excess) and
-    /// [`Engine::local_densities`](super::Engine::local_densities), those that forces do not need being zero.
+    /// [`Reference::excess`](super::reference::Reference::excess) and
+    /// [`Reference::local_densities`](super::reference::Reference::local_densities), those that forces do not need being zero.
     pub fn local_densities(&self, excess: &mut Vec<f64>, densities: &mut Vec<f64>) {
         let variables = self.plan.densities.len() * self.plan.species.len();
         with!(&self.workspace, m => m.to_host(variables, excess, densities));
@@ -405,7 +358,7 @@ impl Sweep {
     /// The host's numbers of its particles in the order of cells: an order to keep them in that makes
     /// sorting cheap.
     pub fn order(&self) -> &[u32] {
-        with!(&self.workspace, m => &m.order)
+        with!(&self.workspace, m => m.order())
     }
 
     /// Bytes held in arrays over particles and pairs.
@@ -431,8 +384,8 @@ fn can_stretch(geometry: &BoxGeometry) -> bool {
 
 /// The region to be swept, and its cells: all of the box along its periodic directions, along the others what the
 /// particles span, with room for ghosts within reach of them.
-fn region<P: compiled::Compiled>(
-    workspace: &mut Workspace<P>,
+fn region(
+    set: InstructionSet,
     plan: &Plan,
     pool: &Pool,
     domain: &PeriodicBox,
@@ -442,7 +395,7 @@ fn region<P: compiled::Compiled>(
     let mut geometry = BoxGeometry::of_box(domain, plan.dimensions);
     if geometry.is_none_or(|geometry| !geometry.is_fully_periodic()) {
         let margin = if input.particles.owned < input.particles.x.len() { cutoff } else { 0.0 };
-        let (low, high) = workspace.extremes(pool, input)?;
+        let [low, high] = extremes(pool, set, input)?;
         let (low, high) = (low.map(|x| x - margin), high.map(|x| x + margin));
         geometry = match is_open(domain, plan) {
             true => Some(BoxGeometry::enclosing(low, high, plan.dimensions, cutoff)),

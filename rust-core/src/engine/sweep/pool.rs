@@ -1,30 +1,46 @@
-use crate::engine::sweep::ground::shared_ptr::SharedPtr as Pointer;
-use std::num::NonZeroUsize;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, Condvar, Mutex};
-use std::thread::{self, JoinHandle};
+//! Threads that do one piece of work together, again and again.
+//!
+//! The thread that calls [`Pool::run`] takes the pool's turn, so that there is one piece of work at a time. It counts the
+//! workers as busy, leaves a pointer to the work, and moves the epoch on, which calls the workers. Each worker does its
+//! part and counts itself down. The caller does its own part and returns when no worker is busy: the work that it has
+//! borrowed is in use no longer.
 
-/// Threads that do one piece of work together, again and again, many times a millisecond: they wait for
-/// the next piece by spinning for a while, then asleep.
+mod sync;
+
+use crate::engine::sweep::ground::shared_slice::SharedSlice;
+use std::cell::RefCell;
+use std::num::NonZeroUsize;
+use sync::{
+    Arc, AtomicBool, AtomicUsize, Builder, Condvar, JoinHandle, Mutex, Ordering, spin_loop, thread_local,
+    yield_now,
+};
+
+/// Threads that do one piece of work together, many times a millisecond: they wait for the next piece by spinning for a
+/// while, then asleep.
+///
+/// Pieces of work never overlap: a second thread that calls [`Pool::run`] waits until the first is done. Work that calls
+/// [`Pool::run`] of the pool it runs on does all parts of the inner piece where it is.
 pub struct Pool {
-    shared: Arc<SharedPtr>,
+    shared: Arc<Shared>,
     workers: Vec<JoinHandle<()>>,
+    /// Locked as long as a piece of work is in hand.
+    turn: Mutex<()>,
 }
 
-/// A piece of work: called with the number of the thread. The pointer is only followed while
-/// [`Pool::run`], which holds the reference it came from, waits for the workers.
+/// A piece of work: called with the number of the thread. The pointer is only followed while [`Pool::run`], which
+/// holds the reference it came from, waits for the workers.
 #[derive(Clone, Copy)]
 struct Work(*const (dyn Fn(usize) + Sync));
 
 // SAFETY: what is pointed to is `Sync`, and outlives every use; see `Pool::run`.
 unsafe impl Send for Work {}
 
-struct SharedPtr {
+struct Shared {
     /// Counts pieces of work; a change calls the workers.
     epoch: AtomicUsize,
     /// Workers not done with the present piece.
     busy: AtomicUsize,
-    /// Whether a worker panicked.
+    /// Whether a worker panicked in the present piece.
     failed: AtomicBool,
     stop: AtomicBool,
     work: Mutex<Option<Work>>,
@@ -33,8 +49,13 @@ struct SharedPtr {
     called: Condvar,
 }
 
-/// Looks at the epoch before a worker goes to sleep: some tens of microseconds.
-const SPINS: usize = 20_000;
+/// How often a worker looks at the epoch before it goes to sleep: for some tens of microseconds.
+const SPINS: usize = if cfg!(any(loom, miri)) { 1 } else { 20_000 };
+
+thread_local! {
+    /// The pools whose work this thread is doing, each by the address of what its threads share.
+    static WITHIN: RefCell<Vec<usize>> = RefCell::new(Vec::new());
+}
 
 impl Pool {
     /// More than any machine has cores. Tens of thousands run into limits of the system that end the program.
@@ -42,7 +63,7 @@ impl Pool {
 
     /// A pool of `threads`, the caller's among them; at most [`Pool::MOST`].
     pub fn new(threads: NonZeroUsize) -> Pool {
-        let shared = Arc::new(SharedPtr {
+        let shared = Arc::new(Shared {
             epoch: AtomicUsize::new(0),
             busy: AtomicUsize::new(0),
             failed: AtomicBool::new(false),
@@ -53,11 +74,11 @@ impl Pool {
         });
         let spawn = |number| {
             let shared = shared.clone();
-            thread::Builder::new().name(format!("psidpd-{number}")).spawn(move || worker(&shared, number))
+            Builder::new().name(format!("psidpd-{number}")).spawn(move || worker(&shared, number))
         };
         // With fewer threads than asked for the work is done all the same.
         let workers = (1..threads.get().min(Pool::MOST)).map_while(|number| spawn(number).ok()).collect();
-        Pool { shared, workers }
+        Pool { shared, workers, turn: Mutex::new(()) }
     }
 
     /// How many threads there are.
@@ -65,17 +86,24 @@ impl Pool {
         1 + self.workers.len()
     }
 
-    /// Calls `work` once on every thread, with its number, and waits for all.
+    /// Calls `work` once with each number of a thread, on that thread, and waits for all. If another thread's work is in
+    /// hand, waits for that first. Called from work of this pool, it calls `work` with one number after the other on the
+    /// thread that it is called on.
     ///
     /// # Panics
     /// If `work` panics on any thread.
     pub fn run(&self, work: &(dyn Fn(usize) + Sync)) {
-        if self.workers.is_empty() {
-            return work(0);
+        if self.workers.is_empty() || Within::is_inside(&self.shared) {
+            return (0..self.threads()).for_each(work);
         }
-        // SAFETY: the lifetime is dropped from the type only; workers are waited for below, also if
-        // this thread's part panics.
+        // Dropped in the opposite order: the turn ends when no worker is busy.
+        let _turn = self.turn.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        let _within = Within::enter(&self.shared);
+        // SAFETY: the lifetime is dropped from the type only. Workers follow the pointer only in between `call` and
+        // counting themselves down, and `Wait` keeps this function from returning or unwinding before all have; the turn
+        // keeps other callers from counting workers as busy, or calling them, meanwhile.
         let pointer: *const (dyn Fn(usize) + Sync + 'static) = unsafe { std::mem::transmute(work) };
+        self.shared.failed.store(false, Ordering::Relaxed);
         self.shared.busy.store(self.workers.len(), Ordering::Relaxed);
         self.shared.call(Some(Work(pointer)));
         let wait = Wait(&self.shared);
@@ -84,7 +112,8 @@ impl Pool {
         assert!(!self.shared.failed.load(Ordering::Relaxed), "a worker thread panicked");
     }
 
-    /// Calls `work` once with each of `things`, which are shared among the threads; one alone is done here.
+    /// Calls `work` once with each of `things`, which are shared among the threads: as many things as there are threads
+    /// get one each, in their order. One alone is done here.
     ///
     /// # Panics
     /// If `work` panics on any thread.
@@ -92,21 +121,20 @@ impl Pool {
         if let [thing] = things {
             return work(thing);
         }
-        let (count, threads, first) = (things.len(), self.threads(), Pointer(things.as_mut_ptr()));
+        let (threads, things) = (self.threads(), SharedSlice::new(things));
         self.run(&|t| {
-            for k in part(count, t, threads) {
-                // SAFETY: in the slice, and in the part of this thread alone.
-                work(unsafe { &mut *first.at(k) });
-            }
+            // SAFETY: `run` calls this once for each number of a thread, and parts of different numbers are disjoint.
+            let part = unsafe { things.slice_mut(part(things.len(), t, threads)) };
+            part.iter_mut().for_each(&work);
         });
     }
 }
 
-impl SharedPtr {
+impl Shared {
     /// Calls the workers to the next piece of work.
     fn call(&self, work: Option<Work>) {
         let asleep = {
-            let mut slot = self.work.lock().unwrap_or_else(|e| e.into_inner());
+            let mut slot = self.work.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
             *slot = work;
             self.epoch.fetch_add(1, Ordering::Release);
             self.asleep.load(Ordering::Relaxed) > 0
@@ -118,8 +146,32 @@ impl SharedPtr {
     }
 }
 
+/// Notes that this thread does work of a pool, until it goes.
+struct Within;
+
+impl Within {
+    fn enter(shared: &Arc<Shared>) -> Within {
+        WITHIN.with(|within| within.borrow_mut().push(address(shared)));
+        Within
+    }
+
+    fn is_inside(shared: &Arc<Shared>) -> bool {
+        WITHIN.with(|within| within.borrow().contains(&address(shared)))
+    }
+}
+
+impl Drop for Within {
+    fn drop(&mut self) {
+        WITHIN.with(|within| within.borrow_mut().pop());
+    }
+}
+
+fn address(shared: &Arc<Shared>) -> usize {
+    std::ptr::from_ref::<Shared>(shared).addr()
+}
+
 /// Waits for the workers when it goes.
-struct Wait<'a>(&'a SharedPtr);
+struct Wait<'a>(&'a Shared);
 
 impl Drop for Wait<'_> {
     fn drop(&mut self) {
@@ -127,24 +179,25 @@ impl Drop for Wait<'_> {
         while self.0.busy.load(Ordering::Acquire) > 0 {
             spins += 1;
             // With fewer processors than threads the worker may need this one.
-            if spins % SPINS == 0 { thread::yield_now() } else { std::hint::spin_loop() }
+            if spins % SPINS == 0 { yield_now() } else { spin_loop() }
         }
     }
 }
 
-fn worker(shared: &SharedPtr, number: usize) {
+fn worker(shared: &Arc<Shared>, number: usize) {
+    let _within = Within::enter(shared);
     let mut seen = 0;
     loop {
         let mut spins = 0;
         while shared.epoch.load(Ordering::Acquire) == seen && spins < SPINS {
             spins += 1;
-            std::hint::spin_loop();
+            spin_loop();
         }
         let work = {
-            let mut slot = shared.work.lock().unwrap_or_else(|e| e.into_inner());
+            let mut slot = shared.work.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
             while shared.epoch.load(Ordering::Acquire) == seen {
                 shared.asleep.fetch_add(1, Ordering::Relaxed);
-                slot = shared.called.wait(slot).unwrap_or_else(|e| e.into_inner());
+                slot = shared.called.wait(slot).unwrap_or_else(|poisoned| poisoned.into_inner());
                 shared.asleep.fetch_sub(1, Ordering::Relaxed);
             }
             seen += 1;
@@ -154,7 +207,7 @@ fn worker(shared: &SharedPtr, number: usize) {
             return;
         }
         let Some(Work(work)) = work else { continue };
-        // SAFETY: `Pool::run` holds the reference until `busy` is zero.
+        // SAFETY: this worker is busy, and `Pool::run` holds the reference until none is.
         let work = unsafe { &*work };
         if std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| work(number))).is_err() {
             shared.failed.store(true, Ordering::Relaxed);
@@ -184,46 +237,8 @@ pub fn part(count: usize, number: usize, threads: usize) -> std::ops::Range<usiz
     count * number / threads..count * (number + 1) / threads
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+#[cfg(all(test, not(loom)))]
+mod tests;
 
-    #[test]
-    fn every_thread_does_its_part_every_time() {
-        for threads in 1..5 {
-            let pool = Pool::new(NonZeroUsize::new(threads).unwrap());
-            assert_eq!(pool.threads(), threads);
-            let sum = AtomicUsize::new(0);
-            for round in 0..200 {
-                pool.run(&|t| {
-                    sum.fetch_add(part(1000, t, threads).sum::<usize>(), Ordering::Relaxed);
-                });
-                assert_eq!(sum.load(Ordering::Relaxed), (round + 1) * 499_500);
-                if round % 50 == 0 {
-                    thread::sleep(std::time::Duration::from_millis(2));
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn each_thing_is_done_once() {
-        for threads in 1..5 {
-            let pool = Pool::new(NonZeroUsize::new(threads).unwrap());
-            for count in [0, 1, 2, 7] {
-                let mut things = vec![1; count];
-                pool.each(&mut things, |thing| *thing += 1);
-                assert!(things.iter().all(|thing| *thing == 2));
-            }
-        }
-    }
-
-    #[test]
-    fn a_panic_of_a_worker_reaches_the_caller() {
-        let pool = Pool::new(NonZeroUsize::new(2).unwrap());
-        let caught = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
-            pool.run(&|t| assert_eq!(t, 0, "on purpose"));
-        }));
-        assert!(caught.is_err());
-    }
-}
+#[cfg(all(test, loom))]
+mod model;

@@ -1,5 +1,6 @@
 use super::*;
-use crate::engine::{Engine, Images, Newton};
+use crate::engine::reference::Reference;
+use crate::engine::{Images, Instructions, Surroundings};
 use crate::maximum::largest;
 use crate::model::Model;
 use nalgebra::Matrix3;
@@ -59,26 +60,13 @@ impl Cloud {
 
 const STEP: Step = Step { seed: 11, number: 5, dt: 0.01 };
 
-/// Forces and totals by the plain engine with images as ghosts.
+/// Forces and totals by the reference.
 fn plain(fluid: &Fluid, cloud: &Cloud) -> (Vec<[f64; 3]>, Tally) {
-    let mut engine = Engine::new(fluid).unwrap();
-    let n = cloud.x.len();
-    let (mut x, mut v, mut tag, mut kind) =
-        (cloud.x.clone(), cloud.v.clone(), cloud.tag.clone(), cloud.kind.clone());
-    let mut images = Images::default();
-    images.build(&cloud.domain, fluid.dimensions, engine.plan().cutoff(), n, &mut x);
-    images.forward(1, &mut v);
-    images.forward(1, &mut tag);
-    images.forward(1, &mut kind);
-    let particles = Particles { owned: n, x: &x, tag: &tag, kind: &kind };
-    engine.densities(&particles, Newton::On).unwrap();
-    let width = engine.slope_width();
-    engine.slopes_mut().truncate(n * width);
-    images.forward(width, engine.slopes_mut());
-    let mut force = vec![[0.0; 3]; x.len()];
-    let tally = engine.forces(&particles, &v, Some(STEP), Want::TOTALS, &mut force).unwrap();
-    images.reverse(&mut force);
-    force.truncate(n);
+    let mut reference = Reference::new(fluid).unwrap();
+    let particles = cloud.particles();
+    reference.first(Surroundings::Box(&cloud.domain), &particles, false).unwrap();
+    let mut force = vec![[0.0; 3]; cloud.x.len()];
+    let tally = reference.second(&particles, &cloud.v, Some(STEP), Want::TOTALS, &mut force).unwrap();
     (force, tally)
 }
 
@@ -93,7 +81,7 @@ fn every() -> impl Iterator<Item = (Precision, Instructions)> {
 }
 
 /// Forces and totals by a sweep without ghosts.
-fn data(sweep: &mut Sweep, cloud: &Cloud, want: Want) -> (Vec<[f64; 3]>, Tally) {
+fn swept(sweep: &mut Sweep, cloud: &Cloud, want: Want) -> (Vec<[f64; 3]>, Tally) {
     let particles = cloud.particles();
     let mut force = vec![[0.0; 3]; cloud.x.len()];
     let tally =
@@ -322,12 +310,12 @@ fn every_model_by_every_path_has_the_forces_of_the_plain_engine() {
                 let what = format!("{name}, box {b}, {precision}, {instructions}");
                 let mut sweep = Sweep::new(&fluid, settings(precision, instructions, 1)).unwrap();
                 assert!(sweep.fits(&cloud.domain));
-                let (here, totals) = data(&mut sweep, &cloud, Want::TOTALS);
+                let (here, totals) = swept(&mut sweep, &cloud, Want::TOTALS);
                 let off = difference(&force, &here);
                 assert!(off < tolerance(precision), "{what}: {off:.1e}");
                 let off = tally_difference(&tally, &totals);
                 assert!(off < tolerance(precision), "{what}: totals {off:.1e} {tally:?} {totals:?}");
-                let (again, none) = data(&mut sweep, &cloud, Want::FORCES);
+                let (again, none) = swept(&mut sweep, &cloud, Want::FORCES);
                 assert_eq!(here, again, "{what}: forces depend on what else is wanted");
                 assert_eq!(none.pair, 0.0);
                 let (ghosts, totals) = with_ghosts(&mut sweep, &cloud);
@@ -356,10 +344,10 @@ fn any_number_of_threads_gives_the_same_bits() {
             let cloud = Cloud::new(domain, fluid.dimensions, fluid.species.len(), 1500, 3);
             for (precision, instructions) in every() {
                 let mut one = Sweep::new(&fluid, settings(precision, instructions, 1)).unwrap();
-                let (force, tally) = data(&mut one, &cloud, Want::TOTALS);
+                let (force, tally) = swept(&mut one, &cloud, Want::TOTALS);
                 for threads in [2, 3, 7] {
                     let mut more = Sweep::new(&fluid, settings(precision, instructions, threads)).unwrap();
-                    let (here, totals) = data(&mut more, &cloud, Want::TOTALS);
+                    let (here, totals) = swept(&mut more, &cloud, Want::TOTALS);
                     assert!(
                         force == here && tally == totals,
                         "{precision}, {instructions}, {threads} threads"
@@ -389,11 +377,11 @@ fn any_number_of_layers_and_threads_gives_the_forces_of_the_plain_engine() {
                 x[2] *= x[2] / lengths[2];
             }
             let (force, tally) = plain(&fluid, &cloud);
-            let (first, first_tally) = data(&mut engines[0], &cloud, Want::TOTALS);
+            let (first, first_tally) = swept(&mut engines[0], &cloud, Want::TOTALS);
             let off = difference(&force, &first).max(tally_difference(&tally, &first_tally));
             assert!(off < tolerance(Precision::Double), "{planes} planes, periodic {periodic}: {off:.1e}");
             for sweep in &mut engines {
-                let (here, totals) = data(sweep, &cloud, Want::TOTALS);
+                let (here, totals) = swept(sweep, &cloud, Want::TOTALS);
                 assert!(here == first && totals == first_tally, "{planes} planes, {:?}", sweep.settings());
             }
         }
@@ -409,7 +397,7 @@ fn longer_boxes_have_no_more_accumulators() {
                 PeriodicBox::orthogonal([0.0; 3], [6.0, 6.0, planes as f64 + 0.1], [true; 3]).unwrap();
             let cloud = Cloud::new(domain, 3, fluid.species.len(), 300 * planes, 5);
             let mut sweep = Sweep::new(&fluid, settings(Precision::Mixed, Instructions::best(), 1)).unwrap();
-            data(&mut sweep, &cloud, Want::FORCES);
+            swept(&mut sweep, &cloud, Want::FORCES);
             sweep.memory() as f64
         };
         let per_particle = (memory(40) - memory(20)) / (300.0 * 20.0);
@@ -424,7 +412,7 @@ fn the_order_of_particles_matters_to_rounding_alone() {
     let cloud = Cloud::new(domain.clone(), 3, 2, 800, 5);
     for (precision, instructions) in every() {
         let mut sweep = Sweep::new(&fluid, settings(precision, instructions, 1)).unwrap();
-        let (force, tally) = data(&mut sweep, &cloud, Want::TOTALS);
+        let (force, tally) = swept(&mut sweep, &cloud, Want::TOTALS);
         let order: Vec<usize> = (0..800).map(|k| k * 397 % 800).collect();
         let shuffled = Cloud {
             domain: domain.clone(),
@@ -433,7 +421,7 @@ fn the_order_of_particles_matters_to_rounding_alone() {
             tag: order.iter().map(|k| cloud.tag[*k]).collect(),
             kind: order.iter().map(|k| cloud.kind[*k]).collect(),
         };
-        let (other, totals) = data(&mut sweep, &shuffled, Want::TOTALS);
+        let (other, totals) = swept(&mut sweep, &shuffled, Want::TOTALS);
         let same: Vec<[f64; 3]> = order.iter().map(|k| force[*k]).collect();
         assert!(difference(&same, &other) < tolerance(precision));
         assert!(tally_difference(&tally, &totals) < tolerance(precision));
@@ -461,7 +449,7 @@ fn rows_with_few_particles_and_with_many() {
                 let (force, tally) = plain(fluid, &cloud);
                 for (precision, instructions) in every() {
                     let mut sweep = Sweep::new(fluid, settings(precision, instructions, 2)).unwrap();
-                    let here = data(&mut sweep, &cloud, Want::TOTALS);
+                    let here = swept(&mut sweep, &cloud, Want::TOTALS);
                     for (forces, totals) in [here, with_ghosts(&mut sweep, &cloud)] {
                         let off = difference(&force, &forces).max(tally_difference(&tally, &totals));
                         assert!(
@@ -491,7 +479,7 @@ fn crowds_open_sides_and_runaways() {
     let (force, tally) = plain(&fluid, &cloud);
     for (precision, instructions) in every() {
         let mut sweep = Sweep::new(&fluid, settings(precision, instructions, 2)).unwrap();
-        let (here, totals) = data(&mut sweep, &cloud, Want::TOTALS);
+        let (here, totals) = swept(&mut sweep, &cloud, Want::TOTALS);
         let off = difference(&force, &here);
         // Positions are fractions of an extent of more than a thousand here.
         let tolerance = if precision == Precision::Mixed { 1e-3 } else { 1e-12 };
@@ -508,7 +496,7 @@ fn particles_on_one_point_do_not_push_each_other() {
     cloud.x[1] = cloud.x[0];
     for (precision, instructions) in every() {
         let mut sweep = Sweep::new(&fluid, settings(precision, instructions, 1)).unwrap();
-        let (force, _) = data(&mut sweep, &cloud, Want::TOTALS);
+        let (force, _) = swept(&mut sweep, &cloud, Want::TOTALS);
         assert_eq!(force, [[0.0; 3]; 2]);
     }
 }
@@ -552,7 +540,7 @@ fn what_cannot_be_computed_is_named() {
         assert!(matches!(fails(&good(), Some(&narrow)), EngineError::Host(_)));
         assert!(!sweep.fits(&narrow) && sweep.fits(&domain));
         // And it goes on after errors.
-        data(&mut sweep, &good(), Want::TOTALS);
+        swept(&mut sweep, &good(), Want::TOTALS);
         let mut cloud = good();
         cloud.v[3] = [f64::NAN; 3];
         cloud.x[4] = cloud.x[3].map(|x| x + 0.01);
@@ -609,12 +597,23 @@ fn passes_that_a_fluid_does_not_need_are_left_out() {
     let domain = PeriodicBox::orthogonal([0.0; 3], [5.0; 3], [true; 3]).unwrap();
     let cloud = Cloud::new(domain, 3, 1, 300, 9);
     let mut sweep = Sweep::new(&dpd, Settings::default()).unwrap();
-    data(&mut sweep, &cloud, Want::FORCES);
-    let counts = sweep.counts();
-    assert_eq!((counts.density, counts.excess, counts.energy, counts.virial), (0, 0, 0, 0));
-    assert_eq!((counts.search, counts.force, counts.noise), (1, 1, 1));
+    swept(&mut sweep, &cloud, Want::FORCES);
+    let first = sweep.counts();
+    assert_eq!((first.density, first.excess, first.energy, first.virial), (0, 0, 0, 0));
+    assert!(first.search > 0 && first.force > 0 && first.noise > 0);
     let particles = cloud.particles();
     let mut force = vec![[0.0; 3]; 300];
     sweep.evaluate(&cloud.domain, &particles, &[], None, Want::TOTALS, &mut force, false).unwrap();
-    assert_eq!((sweep.counts().noise, sweep.counts().energy), (1, 1));
+    let second = sweep.counts();
+    assert_eq!((second.search, second.force), (2 * first.search, 2 * first.force));
+    // Every batch has its energy summed, none its noise drawn.
+    assert_eq!((second.noise, second.energy, second.density), (first.noise, first.noise, 0));
+
+    // A ψ that is not linear takes a pass for its density, and an evaluation.
+    let mdpd = shipped("warren2003-set6.toml");
+    let mut sweep = Sweep::new(&mdpd, Settings::default()).unwrap();
+    swept(&mut sweep, &cloud, Want::FORCES);
+    let counts = sweep.counts();
+    assert_eq!((counts.density, counts.energy), (counts.noise, 0));
+    assert!(counts.density > 0 && counts.excess > 0);
 }

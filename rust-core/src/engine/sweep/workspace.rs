@@ -1,425 +1,239 @@
 //! One precision's arrays, and the steps of an evaluation over them.
 
+mod accumulators;
+mod cell_order;
 mod excess;
+mod fluid_constants;
+mod forces;
 mod host;
-mod layout;
+mod input;
 mod scheduler;
-mod sort;
+mod shared_particles;
+mod slopes;
+mod sorted_particles;
+mod thread_slab;
 
-pub use host::ForceSink;
+pub use cell_order::extremes;
+pub use forces::ForceSink;
+pub use input::Input;
 
 use crate::engine::error::EngineError;
-use crate::engine::excess_pass::ExcessPass;
+use crate::engine::instruction_set::InstructionSet;
 use crate::engine::noise::PairNoise;
-use crate::engine::particles::Particles;
 use crate::engine::plan::Plan;
-use crate::engine::settings::Instructions;
-use crate::engine::sweep::compiled::{Compiled, Passes};
+use crate::engine::sweep::cells::ghosts::Ghosts;
+use crate::engine::sweep::cells::sorted::SortedCells;
 use crate::engine::sweep::ground::box_geometry::BoxGeometry;
 use crate::engine::sweep::ground::cell_grid::CellGrid;
-use crate::engine::sweep::ground::fixed_point::FixedPoint16;
-use crate::engine::sweep::ground::pass_data::{OwnedOfColumn, PassData};
-use crate::engine::sweep::ground::shared_ptr::SharedPtr;
 use crate::engine::sweep::ground::terms::Terms;
-use crate::engine::sweep::many_body::full_pair_cache::SLOPES_PER_PASS;
-use crate::engine::sweep::many_body::in_range_pairs::InRangePairs;
-use crate::engine::sweep::pair_batch::buffers::PairBuffers;
-use crate::engine::sweep::pair_batch::scatter::Accumulator;
-use crate::engine::sweep::simd::Scalar;
-use crate::engine::tally::{Tally, Want};
-
-/// Room behind the last particle: what whole vectors may read.
-const VECTOR_PADDING: usize = 16;
-
-/// Up to so many particles all arrays stay in the cache, and none of them is called there in advance. Tests have few.
-const PREFETCH_THRESHOLD: usize = if cfg!(test) { 100 } else { 1 << 14 };
+use crate::engine::sweep::pair_batch::inputs::PairInputs;
+use crate::engine::sweep::passes::data::PassData;
+use crate::engine::sweep::passes::slopes::PassSlopes;
+use crate::engine::sweep::passes::{PairPrecision, Passes};
+use crate::engine::sweep::pool::Pool;
+use crate::engine::sweep::times::Times;
+use accumulators::Accumulators;
+use cell_order::CellOrder;
+use excess::ExcessInput;
+use fluid_constants::FluidConstants;
+use scheduler::{PassInput, Scheduler, thread_slabs};
+use shared_particles::SharedParticles;
+use slopes::Slopes;
+use sorted_particles::SortedParticles;
+use std::ops::Range;
+use thread_slab::{PlaneResults, ThreadSlab, ThreadState};
 
 /// Arrays in the order of cells, and what goes through them.
-pub struct Workspace<P: Compiled> {
-    instructions: Instructions,
-    passes: Passes<P::Scalar, P::PackedParticle>,
-    terms: Terms<P::Scalar>,
-    geometry: BoxGeometry,
-    grid: CellGrid,
-    cell: Vec<u32>,
-    /// Fractions of the box geometry of the host's particles, in units of 2⁻³².
-    fixed32: Vec<[u32; 3]>,
-    /// Particles of each cell: by thread while counting, then where each thread's begin.
-    counts: Vec<u32>,
-    start: Vec<u32>,
-    /// The host's number of each particle.
-    pub order: Vec<u32>,
-    x: [Vec<f32>; 3],
-    fixed16_scale: FixedPoint16,
-    fixed16: [Vec<u16>; 3],
-    packed: Vec<P::PackedParticle>,
-    species: Vec<u8>,
-    ghost: Vec<bool>,
-    owned_bits: Vec<u8>,
-    owned_of_column: Vec<OwnedOfColumn>,
-    accumulator_offset: Vec<isize>,
-    sums: Vec<Accumulator>,
-    densities: Vec<Accumulator>,
-    /// Densities, ψ and slopes in the order of cells.
-    densities_of_particles: Vec<f64>,
-    excess: Vec<f64>,
-    slopes: Vec<f64>,
-    /// Slopes as the second pass reads them if pairs are kept in the full pair cache.
-    packed_slopes: Vec<P::Scalar>,
-    in_range: Vec<InRangePairs<P::Scalar>>,
-    tallies: Vec<Tally>,
-    scratch: Vec<ThreadScratch<P::Scalar>>,
-    particles: usize,
-    owned: usize,
-    all: usize,
-    variables: Vec<usize>,
+pub struct Workspace<P: PairPrecision> {
+    fluid: FluidConstants<P::Scalar>,
+    order: CellOrder,
+    particles: SortedParticles<P::PackedParticle>,
+    accumulators: Accumulators,
+    slopes: Slopes<P::Scalar>,
+    results: PlaneResults<P::Scalar>,
+    threads: Vec<ThreadState<P::Scalar>>,
+    /// Of the present evaluation.
     thermostat: Option<(PairNoise, f64)>,
     totals: bool,
 }
 
-/// Where threads write, each its own part.
-struct SharedArrays<P: Compiled> {
-    x: [SharedPtr<f32>; 3],
-    fixed16: [SharedPtr<u16>; 3],
-    packed: SharedPtr<P::PackedParticle>,
-    species: SharedPtr<u8>,
-    sums: SharedPtr<Accumulator>,
-    densities: SharedPtr<Accumulator>,
-    densities_of_particles: SharedPtr<f64>,
-    excess: SharedPtr<f64>,
-    slopes: SharedPtr<f64>,
-    packed_slopes: SharedPtr<P::Scalar>,
-    in_range: SharedPtr<InRangePairs<P::Scalar>>,
-    tallies: SharedPtr<Tally>,
-    scratch: SharedPtr<ThreadScratch<P::Scalar>>,
-}
-
-impl<P: Compiled> Clone for SharedArrays<P> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-impl<P: Compiled> Copy for SharedArrays<P> {}
-
-/// A thread's own.
-struct ThreadScratch<T> {
-    buffers: PairBuffers<T>,
-    excess: ExcessPass,
-    low: [f64; 3],
-    high: [f64; 3],
-    fault: Option<EngineError>,
-    /// The lowest tag of the particles whose forces are not finite.
-    lost: Option<i32>,
-}
-
-impl<T: Scalar> ThreadScratch<T> {
-    fn new(passes: usize, instructions: Instructions) -> ThreadScratch<T> {
-        let mut buffers = PairBuffers::default();
-        buffers.set_passes(passes);
-        let excess = ExcessPass::new(instructions);
-        ThreadScratch { buffers, excess, low: [0.0; 3], high: [0.0; 3], fault: None, lost: None }
-    }
-}
-
-/// What the host hands over.
-pub struct Input<'a> {
-    pub particles: Particles<'a>,
-    /// Whether each ghost is an image of a particle that is there too; empty if none is.
-    pub images: &'a [bool],
-    /// Empty if nothing drags.
-    pub v: &'a [[f64; 3]],
-    /// Species of each type of particle; negative for those that take no part.
-    pub species_of_type: &'a [i32],
-    pub thermostat: Option<(PairNoise, f64)>,
-    pub totals: bool,
-}
-
-impl<'a> Input<'a> {
-    pub fn new(
-        particles: &Particles<'a>,
-        images: &'a [bool],
-        v: &'a [[f64; 3]],
-        species_of_type: &'a [i32],
-        thermostat: Option<(PairNoise, f64)>,
-        want: Want,
-    ) -> Input<'a> {
-        Input {
-            particles: *particles,
-            images,
-            v,
-            species_of_type,
-            thermostat,
-            totals: want.energy || want.virial,
-        }
-    }
-
-    /// The species of a particle, unless its type is unknown.
-    #[inline(always)]
-    fn species_of(&self, k: usize) -> Option<i32> {
-        self.species_of_type.get(self.particles.kind[k] as usize).copied()
-    }
-}
-
-impl<P: Compiled> Workspace<P> {
-    pub fn new(plan: &Plan, instructions: Instructions, threads: usize) -> Workspace<P> {
+impl<P: PairPrecision> Workspace<P> {
+    pub fn new(plan: &Plan, set: InstructionSet, threads: usize) -> Workspace<P> {
         let terms = Terms::new(plan);
         let count = plan.species.len();
-        let variables: Vec<usize> =
-            plan.passes.iter().flat_map(|d| (0..count).map(move |s| d * count + s)).collect();
-        let scratch = (0..threads).map(|_| ThreadScratch::new(terms.passes.len(), instructions)).collect();
-        let geometry = BoxGeometry::enclosing([0.0; 3], [1.0; 3], plan.dimensions, 1.0);
+        let variables = plan.passes.iter().flat_map(|d| (0..count).map(move |s| d * count + s)).collect();
+        let threads = (0..threads).map(|_| ThreadState::new(terms.passes.len(), set)).collect();
         Workspace {
-            instructions,
-            passes: P::passes(instructions, count > 1 || terms.full_cache),
-            terms,
-            geometry,
-            grid: CellGrid {
-                cells_per_column: 1,
-                columns_per_plane: 1,
-                planes: 1,
-                column_axis: 1,
-                plane_axis: 2,
-                search_cutoff: 1.0,
-                range_half_width: 1.0,
-                i_cluster_size: 4,
-                i_cluster_extent: 1.0,
-            },
-            cell: Vec::new(),
-            fixed32: Vec::new(),
-            counts: Vec::new(),
-            start: Vec::new(),
-            order: Vec::new(),
-            x: Default::default(),
-            fixed16_scale: FixedPoint16::default(),
-            fixed16: Default::default(),
-            packed: Vec::new(),
-            species: Vec::new(),
-            ghost: Vec::new(),
-            owned_bits: Vec::new(),
-            owned_of_column: Vec::new(),
-            accumulator_offset: Vec::new(),
-            sums: Vec::new(),
-            densities: Vec::new(),
-            densities_of_particles: Vec::new(),
-            excess: Vec::new(),
-            slopes: Vec::new(),
-            packed_slopes: Vec::new(),
-            in_range: Vec::new(),
-            tallies: Vec::new(),
-            scratch,
-            particles: 0,
-            owned: 0,
-            all: 0,
-            variables,
+            fluid: FluidConstants { set, terms, variables },
+            order: CellOrder::new(plan.dimensions),
+            particles: SortedParticles::default(),
+            accumulators: Accumulators::default(),
+            slopes: Slopes::default(),
+            results: PlaneResults::default(),
+            threads,
             thermostat: None,
             totals: false,
         }
     }
 
-    /// Numbers that a many-body pair needs of each particle.
-    fn width(&self) -> usize {
-        self.variables.len()
-    }
-
-    /// Numbers of the first eight slopes of all particles, of copies, and of a vector behind.
-    fn packed_slope_stride(&self) -> usize {
-        let copies = if self.is_plane_axis_periodic() { self.plane(0).1 } else { 0 };
-        SLOPES_PER_PASS * (self.particles + copies + VECTOR_PADDING)
-    }
-
-    /// Writes the slopes of particles from number `from` on as the second pass reads them.
-    ///
-    /// # Safety
-    /// No other thread writes or reads theirs.
-    unsafe fn write_packed_slopes(&self, to: SharedPtr<P::Scalar>, from: usize, slopes: &[f64]) {
-        if !self.terms.full_cache {
-            return;
-        }
-        match self.width() {
-            // SAFETY: the caller's.
-            2 => return unsafe { self.write_few_slopes::<2>(to, from, slopes) },
-            // SAFETY: the caller's.
-            3 => return unsafe { self.write_few_slopes::<3>(to, from, slopes) },
-            // SAFETY: the caller's.
-            4 => return unsafe { self.write_few_slopes::<4>(to, from, slopes) },
-            _ => {}
-        }
-        let room = self.packed_slope_stride();
-        for (k, row) in slopes.chunks_exact(self.width()).enumerate() {
-            for (c, slopes) in row.chunks(SLOPES_PER_PASS).enumerate() {
-                // SAFETY: the caller's.
-                let to = unsafe { to.at(c * room + SLOPES_PER_PASS * (from + k)) };
-                for (c, slope) in slopes.iter().enumerate() {
-                    // SAFETY: as above.
-                    unsafe { *to.add(c) = P::Scalar::of(*slope) };
-                }
-            }
-        }
-    }
-
-    /// The same of `W` slopes of each particle, no more than are read at once.
-    ///
-    /// # Safety
-    /// As above.
-    unsafe fn write_few_slopes<const W: usize>(&self, to: SharedPtr<P::Scalar>, from: usize, slopes: &[f64]) {
-        let densities_of_particles = slopes.as_chunks::<W>().0;
-        // SAFETY: the caller's.
-        let to = unsafe {
-            std::slice::from_raw_parts_mut(
-                to.at(SLOPES_PER_PASS * from),
-                SLOPES_PER_PASS * densities_of_particles.len(),
-            )
-        };
-        for (to, row) in to.as_chunks_mut::<SLOPES_PER_PASS>().0.iter_mut().zip(densities_of_particles) {
-            for (to, slope) in to.iter_mut().zip(row) {
-                *to = P::Scalar::of(*slope);
-            }
-        }
-    }
-
-    fn first_fault(&mut self) -> Result<(), EngineError> {
-        for scratch in &mut self.scratch {
-            if let Some(fault) = scratch.fault.take() {
-                return Err(fault);
-            }
-        }
+    /// Finds the order of the particles in the cells of `grid`, and makes room for them in the arrays.
+    pub fn sort_into_cells(
+        &mut self,
+        pool: &Pool,
+        geometry: BoxGeometry,
+        grid: CellGrid,
+        input: &Input,
+    ) -> Result<(), EngineError> {
+        (self.thermostat, self.totals) = (input.thermostat, input.totals);
+        self.order.sort(pool, self.fluid.set, geometry, grid, input)?;
+        self.particles.make_room(&self.order, self.fluid.terms.species > 1);
+        let packs = self.fluid.terms.full_cache;
+        self.slopes.make_room(&self.order, self.fluid.width(), packs);
         Ok(())
     }
 
-    /// A force that is not finite: that of the lowest tag.
-    fn lost(&mut self) -> Result<(), EngineError> {
-        match self.scratch.iter_mut().filter_map(|scratch| scratch.lost.take()).min() {
+    /// Everything that comes after [`Workspace::sort_into_cells`]: the first pass, ψ and the second pass over all planes, and
+    /// their forces. `times` are those of the caller's thread.
+    ///
+    /// # Errors
+    /// ψ that is not finite, or a force: of the lowest tag.
+    pub fn run_all(
+        &mut self,
+        pool: &Pool,
+        plan: &Plan,
+        input: &Input,
+        out: ForceSink,
+        times: &mut Times,
+    ) -> Result<(), EngineError> {
+        let planes = thread_slabs(&self.order, pool.threads());
+        self.up_to_slopes(pool, plan, input, Some(out), &planes)?;
+        self.on_slabs(&planes, |scheduler, slabs, accumulators| {
+            let mut work: Vec<_> = slabs.iter_mut().zip(accumulators.split()).collect();
+            // SAFETY: `up_to_slopes` has left the slopes of all particles and copies.
+            pool.each(&mut work, |(slab, sums)| unsafe { scheduler.second_at_ends(out, slab, sums) });
+            drop(work);
+            let sums = accumulators.sums();
+            pool.each(slabs, |slab| scheduler.forces_of_first(out, slab, sums));
+        });
+        self.finish(times)
+    }
+
+    /// What comes after [`Workspace::sort_into_cells`], up to ψ and its slopes.
+    ///
+    /// # Errors
+    /// ψ that is not finite.
+    pub fn first(
+        &mut self,
+        pool: &Pool,
+        plan: &Plan,
+        input: &Input,
+        times: &mut Times,
+    ) -> Result<(), EngineError> {
+        let planes = thread_slabs(&self.order, pool.threads());
+        self.up_to_slopes(pool, plan, input, None, &planes)?;
+        self.finish(times)
+    }
+
+    /// What comes after [`Workspace::first`] and [`Workspace::slopes_from_host`]: the second pass, and the forces.
+    ///
+    /// # Errors
+    /// A force that is not finite: of the lowest tag.
+    pub fn second(&mut self, pool: &Pool, out: ForceSink, times: &mut Times) -> Result<(), EngineError> {
+        self.slopes.copy_first_plane(&self.order);
+        let planes = thread_slabs(&self.order, pool.threads());
+        self.on_slabs(&planes, |scheduler, slabs, accumulators| {
+            let mut work: Vec<_> = slabs.iter_mut().zip(accumulators.split()).collect();
+            // SAFETY: `first` has left the slopes of all particles; those of the copies are there since just now.
+            pool.each(&mut work, |(slab, sums)| unsafe { scheduler.second_of_all(out, slab, sums) });
+            drop(work);
+            let sums = accumulators.sums();
+            pool.each(slabs, |slab| scheduler.forces_of_first(out, slab, sums));
+        });
+        self.finish(times)
+    }
+
+    /// Arrays, first passes and ψ of all planes; the second pass and the forces of those between the ends of slabs if
+    /// there is where to write them.
+    fn up_to_slopes(
+        &mut self,
+        pool: &Pool,
+        plan: &Plan,
+        input: &Input,
+        out: Option<ForceSink>,
+        planes: &[Range<usize>],
+    ) -> Result<(), EngineError> {
+        let (width, keeps_all) = (self.fluid.width(), out.is_none());
+        self.accumulators.lay_out(&self.order, planes, width, !keeps_all);
+        self.results.make_room(&self.order, planes.len(), width, keeps_all);
+        let excess = ExcessInput::new(plan, input);
+        if excess.is_none() {
+            self.results.excess.fill(0.0);
+        }
+        {
+            let Workspace { fluid, order, particles, results, threads, .. } = self;
+            let particles = &particles.share();
+            let slabs = results.split(order, planes, width, threads);
+            let mut slabs: Vec<_> = slabs.into_iter().enumerate().collect();
+            pool.each(&mut slabs, |(t, slab)| {
+                Scheduler::<P>::fill_start(particles, fluid, order, input, slab, *t == 0);
+            });
+        }
+        self.particles.copy_first_plane(&self.order);
+        let input = &PassInput { input, excess, out };
+        self.on_slabs(planes, |scheduler, slabs, accumulators| {
+            let mut work: Vec<_> = slabs.iter_mut().zip(accumulators.split()).collect();
+            // SAFETY: the starts of all slabs are filled, and the copies are there; this is the only work in hand.
+            pool.each(&mut work, |(slab, sums)| unsafe { scheduler.interior(input, slab, sums) });
+            drop(work);
+            let sums = accumulators.sums();
+            // SAFETY: the interior of all slabs is done; this is the only work in hand.
+            pool.each(slabs, |slab| unsafe { scheduler.excess_of_first(input, slab, sums) });
+        });
+        self.slopes.copy_first_plane(&self.order);
+        match self.threads.iter_mut().find_map(|state| state.fault.take()) {
+            Some(fault) => Err(fault),
+            None => Ok(()),
+        }
+    }
+
+    /// Lends all arrays to the threads, each its slab of planes.
+    fn on_slabs(
+        &mut self,
+        planes: &[Range<usize>],
+        work: impl FnOnce(&Scheduler<P>, &mut [ThreadSlab<P::Scalar>], &mut Accumulators),
+    ) {
+        let Workspace { fluid, order, particles, accumulators, slopes, results, threads, .. } = self;
+        let particles = &particles.share();
+        let slopes = slopes.share();
+        let SharedParticles { x, fixed16_scale, fixed16, packed, species, .. } = *particles;
+        let ghosts = Ghosts {
+            flags: particles.ghost,
+            owned_bits: particles.owned_bits,
+            owned_of_column: particles.owned_of_column,
+        };
+        let (geometry, grid, terms) = (&order.geometry, &order.grid, &fluid.terms);
+        let data = PassData {
+            cells: SortedCells { geometry, grid, start: &order.start, x, fixed16, fixed16_scale, ghosts },
+            inputs: PairInputs { geometry, terms, thermostat: self.thermostat, packed, species, ghosts },
+            slopes: PassSlopes { values: slopes.rows, packed: slopes.packed, stride: slopes.stride },
+        };
+        let passes = Passes::new(fluid.set, &fluid.terms, self.totals);
+        let mut slabs = results.split(order, planes, fluid.width(), threads);
+        let scheduler = &Scheduler { fluid, passes, order, data, particles, slopes };
+        work(scheduler, &mut slabs, accumulators);
+    }
+
+    /// The times of the caller's thread; a force that is not finite: that of the lowest tag.
+    fn finish(&mut self, times: &mut Times) -> Result<(), EngineError> {
+        if let Some(state) = self.threads.first_mut() {
+            *times += std::mem::take(&mut state.times);
+        }
+        match self.threads.iter_mut().filter_map(|state| state.lost.take()).min() {
             None => Ok(()),
             Some(tag) => Err(EngineError::Force { tag }),
         }
     }
-
-    /// Particles of plane `plane`, and the first of them.
-    fn plane(&self, plane: usize) -> (usize, usize) {
-        let per_plane = self.grid.columns_per_plane * self.grid.cells_per_column;
-        let first = self.start[plane * per_plane] as usize;
-        (first, self.start[(plane + 1) * per_plane] as usize - first)
-    }
-
-    /// Whether the first plane follows the last.
-    fn is_plane_axis_periodic(&self) -> bool {
-        self.geometry.periodic[self.grid.plane_axis]
-    }
-
-    /// Whether arrays over all particles are beyond the cache.
-    fn exceeds_cache(&self) -> bool {
-        self.all > PREFETCH_THRESHOLD
-    }
-
-    /// How many particles the plane behind `plane` has.
-    fn next_plane(&self, plane: usize) -> usize {
-        if plane + 1 < self.grid.planes {
-            self.plane(plane + 1).1
-        } else if self.is_plane_axis_periodic() {
-            self.plane(0).1
-        } else {
-            0
-        }
-    }
-
-    /// The arrays that threads write disjoint parts of.
-    fn arrays(&mut self) -> SharedArrays<P> {
-        SharedArrays {
-            x: self.x.each_mut().map(|x| SharedPtr(x.as_mut_ptr())),
-            fixed16: self.fixed16.each_mut().map(|fixed16| SharedPtr(fixed16.as_mut_ptr())),
-            packed: SharedPtr(self.packed.as_mut_ptr()),
-            species: SharedPtr(self.species.as_mut_ptr()),
-            sums: SharedPtr(self.sums.as_mut_ptr()),
-            densities: SharedPtr(self.densities.as_mut_ptr()),
-            densities_of_particles: SharedPtr(self.densities_of_particles.as_mut_ptr()),
-            excess: SharedPtr(self.excess.as_mut_ptr()),
-            slopes: SharedPtr(self.slopes.as_mut_ptr()),
-            packed_slopes: SharedPtr(self.packed_slopes.as_mut_ptr()),
-            in_range: SharedPtr(self.in_range.as_mut_ptr()),
-            tallies: SharedPtr(self.tallies.as_mut_ptr()),
-            scratch: SharedPtr(self.scratch.as_mut_ptr()),
-        }
-    }
-
-    fn data(&self, arrays: SharedArrays<P>) -> PassData<'_, P::Scalar, P::PackedParticle> {
-        PassData {
-            geometry: &self.geometry,
-            grid: &self.grid,
-            start: &self.start,
-            x: arrays.x,
-            fixed16_scale: self.fixed16_scale,
-            fixed16: arrays.fixed16,
-            packed: arrays.packed,
-            species: arrays.species,
-            ghost: &self.ghost,
-            owned: &self.owned_bits,
-            owned_of_column: &self.owned_of_column,
-            terms: &self.terms,
-            slopes: arrays.slopes,
-            packed_slopes: arrays.packed_slopes,
-            packed_slope_stride: self.packed_slope_stride(),
-            accumulator_offset: &self.accumulator_offset,
-            sums: SharedPtr(arrays.sums.0.cast()),
-            densities: SharedPtr(arrays.densities.0.cast()),
-            variables: self.variables.len(),
-            thermostat: self.thermostat,
-        }
-    }
-
-    /// The first pass of one plane.
-    ///
-    /// # Safety
-    /// No other thread does the same plane.
-    unsafe fn first_of_plane(
-        &self,
-        data: &PassData<P::Scalar, P::PackedParticle>,
-        arrays: SharedArrays<P>,
-        plane: usize,
-        buffers: &mut PairBuffers<P::Scalar>,
-        in_range: &mut InRangePairs<P::Scalar>,
-    ) {
-        let (first, own) = self.plane(plane);
-        let begin = (first as isize + self.accumulator_offset[plane]) as usize;
-        let count = own + self.next_plane(plane);
-        let variables = self.width();
-        // SAFETY: these accumulators are the plane's own.
-        unsafe {
-            // Zeros; as bytes they are written in the widest vectors.
-            arrays.sums.at(begin).write_bytes(0, count);
-            if variables > 1 {
-                let quads = variables.div_ceil(4);
-                arrays.densities.at(quads * begin).write_bytes(0, quads * count);
-            }
-            let pass = self.passes.first[self.totals as usize];
-            *arrays.tallies.at(plane) = pass(data, plane, buffers, in_range);
-        }
-    }
-
-    /// The accumulators of a particle of a plane: its plane's, and that of the plane before.
-    fn accumulators(&self, plane: usize) -> (isize, Option<isize>) {
-        let before = match plane {
-            0 if self.is_plane_axis_periodic() => {
-                Some(self.accumulator_offset[self.grid.planes - 1] + self.particles as isize)
-            }
-            0 => None,
-            _ => Some(self.accumulator_offset[plane - 1]),
-        };
-        (self.accumulator_offset[plane], before)
-    }
-
-    /// The second pass of one plane.
-    ///
-    /// # Safety
-    /// No other thread does the same plane, and slopes of it and the next are there.
-    unsafe fn second_of_plane(
-        &self,
-        data: &PassData<P::Scalar, P::PackedParticle>,
-        arrays: SharedArrays<P>,
-        plane: usize,
-        in_range: &InRangePairs<P::Scalar>,
-    ) {
-        let pass = self.passes.second[self.totals as usize];
-        // SAFETY: the caller's.
-        unsafe { pass(data, plane, in_range, &mut (*arrays.tallies.at(plane)).virial) };
-    }
 }
+
+#[cfg(test)]
+mod tests;

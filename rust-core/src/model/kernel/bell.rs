@@ -19,4 +19,9 @@ impl Shape for Bell {
     fn slope<R: Real>(s: R) -> R {
         R::constant(6.0) * s * (s - R::constant(1.0))
     }
+
+    #[inline(always)]
+    fn curvature(s: f64) -> f64 {
+        12.0 * s - 6.0
+    }
 }

@@ -24,4 +24,9 @@ impl Shape for CubicSpline {
         let u = (R::constant(0.5) - s).larger(R::constant(0.0));
         R::constant(24.0) * (u * u) - R::constant(6.0) * (t * t)
     }
+
+    #[inline(always)]
+    fn curvature(s: f64) -> f64 {
+        12.0 * (1.0 - s) - 48.0 * (0.5 - s).max(0.0)
+    }
 }

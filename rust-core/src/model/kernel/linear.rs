@@ -19,4 +19,9 @@ impl Shape for Linear {
     fn slope<R: Real>(_s: R) -> R {
         R::constant(-1.0)
     }
+
+    #[inline(always)]
+    fn curvature(_: f64) -> f64 {
+        0.0
+    }
 }

@@ -21,4 +21,9 @@ impl Shape for Lucy {
         let t = R::constant(1.0) - s;
         R::constant(-12.0) * s * t * t
     }
+
+    #[inline(always)]
+    fn curvature(s: f64) -> f64 {
+        -12.0 * (1.0 - s) * (1.0 - 3.0 * s)
+    }
 }

@@ -37,6 +37,8 @@ pub trait Shape: Copy + Default + Send + Sync + 'static {
     fn value<R: Real>(s: R) -> R;
     /// `W'(s)`.
     fn slope<R: Real>(s: R) -> R;
+    /// `W''(s)`, which no force needs, only what measures how forces change.
+    fn curvature(s: f64) -> f64;
 }
 
 /// The one list of kernels: the enum, the names and the dispatch all come from it.
@@ -150,6 +152,19 @@ impl Kernel {
         }
         if r < self.range { self.slope_factor * self.kind.visit(At(r / self.range)) } else { 0.0 }
     }
+
+    /// `w''(r)` within the range, 0 beyond: a jump of `w'` at the range does not count.
+    pub fn curvature(&self, r: f64) -> f64 {
+        struct At(f64);
+        impl ShapeVisitor for At {
+            type Output = f64;
+            fn visit<S: Shape>(self) -> f64 {
+                S::curvature(self.0)
+            }
+        }
+        let factor = self.slope_factor / self.range;
+        if r < self.range { factor * self.kind.visit(At(r / self.range)) } else { 0.0 }
+    }
 }
 
 #[cfg(test)]
@@ -211,6 +226,25 @@ mod tests {
                 let numeric = (w.value(r + h) - w.value(r - h)) / (2.0 * h);
                 assert!((numeric - w.slope(r)).abs() < 1e-7 * w.slope_factor(), "{} at {r}", kind.name());
             }
+        }
+    }
+
+    #[test]
+    fn curvature_is_the_derivative_of_slope() {
+        for &kind in KernelKind::ALL {
+            let w = Kernel::new(kind, 0.8, 3);
+            for k in 1..80 {
+                let r = 0.01 * f64::from(k) + 0.003;
+                // A kernel may have a kink in its curvature half way.
+                if (r - 0.4).abs() < 0.004 || r > 0.795 {
+                    continue;
+                }
+                let h = 1e-5;
+                let numeric = (w.slope(r + h) - w.slope(r - h)) / (2.0 * h);
+                let scale = w.slope_factor() / 0.8;
+                assert!((numeric - w.curvature(r)).abs() < 1e-6 * scale, "{} {r}", kind.name());
+            }
+            assert_eq!(w.curvature(0.8), 0.0);
         }
     }
 

@@ -20,4 +20,9 @@ impl Shape for Quadratic {
     fn slope<R: Real>(s: R) -> R {
         R::constant(-2.0) * (R::constant(1.0) - s)
     }
+
+    #[inline(always)]
+    fn curvature(_: f64) -> f64 {
+        2.0
+    }
 }

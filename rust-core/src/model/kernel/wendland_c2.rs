@@ -21,4 +21,9 @@ impl Shape for WendlandC2 {
         let t = R::constant(1.0) - s;
         R::constant(-20.0) * s * t * t * t
     }
+
+    #[inline(always)]
+    fn curvature(s: f64) -> f64 {
+        -20.0 * (1.0 - s) * (1.0 - s) * (1.0 - 4.0 * s)
+    }
 }

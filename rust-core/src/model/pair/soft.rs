@@ -31,4 +31,8 @@ impl PairForm for Soft {
         let t = 1.0 - r / self.range;
         (0.5 * self.strength * self.range * t * t, -self.strength * t)
     }
+
+    fn curvature(&self, _: f64) -> f64 {
+        self.strength / self.range
+    }
 }

@@ -1,7 +1,7 @@
 //! The direction that profiles go along.
 
+use crate::observe::frame::View;
 use crate::observe::request::Options;
-use crate::run::Simulation;
 use psidpd_core::document::FileError;
 use psidpd_core::engine::PeriodicBox;
 use serde::{Deserialize, Serialize};
@@ -99,9 +99,9 @@ impl Across {
     }
 
     /// Where the particles are, as fractions of the height; `None` if they have no centre to be put at ½.
-    pub fn fractions(&self, simulation: &Simulation) -> Option<Vec<f64>> {
-        let domain = simulation.domain();
-        let mut s: Vec<f64> = simulation.positions().iter().map(|x| domain.fraction(*x)[self.axis]).collect();
+    pub fn fractions(&self, view: &View) -> Option<Vec<f64>> {
+        let domain = view.domain;
+        let mut s: Vec<f64> = view.x.iter().map(|x| domain.fraction(*x)[self.axis]).collect();
         if !self.recentre {
             return Some(s);
         }

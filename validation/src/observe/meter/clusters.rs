@@ -1,13 +1,12 @@
 use super::Meter;
 use crate::observe::frame::Frame;
-use crate::observe::interactions::conservative_range;
 use crate::observe::keys::{Key, Table};
 use crate::observe::observation::{Kind, Observation};
-use crate::observe::pairs::for_each_pair;
 use crate::observe::request::Options;
 use crate::observe::series::{Measured, Series};
 use psidpd_core::document::FileError;
 use psidpd_core::engine::PeriodicBox;
+use psidpd_core::engine::reference::for_each_pair;
 use serde::{Deserialize, Serialize};
 
 /// Sets that are joined pair by pair.
@@ -65,7 +64,7 @@ pub(super) const DISTANCE: Key = Key {
 /// The distance that makes clusters.
 pub(super) fn read_distance(options: &Options) -> Result<f64, FileError> {
     let fluid = options.place.fluid;
-    let longest = conservative_range(fluid);
+    let longest = fluid.conservative_range();
     let half = options.half_box();
     let preset = if longest > 0.0 { longest } else { fluid.cutoff() };
     let distance = options.positive("distance")?.unwrap_or(if preset > 0.0 { preset } else { 1.0 }.min(half));
@@ -124,15 +123,14 @@ impl Meter for Clusters {
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
-        let simulation = frame.simulation;
-        let species = simulation.species();
+        let view = frame.view;
+        let species = view.species;
         let takes_part = |k: usize| self.species.is_none_or(|s| species[k] as usize == s);
-        let labels =
-            label(simulation.positions(), simulation.domain(), self.dimensions, self.distance, takes_part);
+        let labels = label(view.x, view.domain, self.dimensions, self.distance, takes_part);
         let sizes: Vec<usize> = sizes(&labels).into_iter().filter(|n| *n >= self.smallest).collect();
         let (count, largest) = (sizes.len() as f64, sizes.iter().max().copied().unwrap_or(0) as f64);
         let mean = sizes.iter().sum::<usize>() as f64 / count.max(1.0);
-        self.series.push(&[frame.time, count, largest, mean])
+        self.series.push(&[frame.view.time, count, largest, mean])
     }
 
     fn finish(&self) -> Vec<Observation> {

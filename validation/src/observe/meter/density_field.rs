@@ -82,10 +82,10 @@ impl Meter for DensityField {
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
-        let simulation = frame.simulation;
+        let view = frame.view;
         let cells = self.bins[0] * self.bins[1];
         let mut field = vec![0.0; self.series.width()];
-        for (x, s) in simulation.positions().iter().zip(simulation.species()) {
+        for (x, s) in view.x.iter().zip(view.species) {
             let [a, b] = std::array::from_fn(|k| {
                 let place = (x[self.axes[k]] - self.origin[k]) / self.width[k];
                 (place.max(0.0) as usize).min(self.bins[k] - 1)

@@ -4,12 +4,12 @@ use super::rdf::shell_volume;
 use crate::observe::frame::Frame;
 use crate::observe::keys::{Key, Table};
 use crate::observe::observation::{Kind, Observation};
-use crate::observe::pairs::Pair;
 use crate::observe::profile::flank_interface;
 use crate::observe::request::Options;
 use crate::observe::series::{Measured, Series};
 use psidpd_core::document::FileError;
 use psidpd_core::engine::PeriodicBox;
+use psidpd_core::engine::reference::Pair;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
@@ -198,8 +198,8 @@ impl Meter for Drop {
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
-        let simulation = frame.simulation;
-        let (x, domain) = (simulation.positions(), simulation.domain());
+        let view = frame.view;
+        let (x, domain) = (view.x, view.domain);
         let labels = label(x, domain, self.dimensions, self.distance, |_| true);
         let sizes = sizes(&labels);
         // Of equal clusters the first.
@@ -228,7 +228,7 @@ impl Meter for Drop {
             if shell >= self.bins {
                 continue;
             }
-            let (v, m, volume) = (simulation.velocities()[k], frame.mass(k), self.volume(shell));
+            let (v, m, volume) = (view.v[k], frame.mass(k), self.volume(shell));
             let radial = if r > 0.0 { (x[0] * v[0] + x[1] * v[1] + x[2] * v[2]) / r } else { 0.0 };
             let square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
             let sums = &mut row[shell * WIDTH..(shell + 1) * WIDTH];
@@ -237,14 +237,14 @@ impl Meter for Drop {
             sums[2] += m * (square - radial * radial) / rest / volume;
         }
         let (thickness, bins) = (self.thickness(), self.bins);
-        for (pair, force) in frame.landscape().forces() {
-            share(pair, at[pair.i], thickness, bins, |shell, length, normal| {
+        for (pair, force) in frame.evaluation().pair_forces() {
+            share(&pair, at[pair.i], thickness, bins, |shell, length, normal| {
                 let volume = self.volume(shell);
                 row[shell * WIDTH + 3] += force * normal / volume;
                 row[shell * WIDTH + 4] += force * (length - normal) / rest / volume;
             });
         }
-        self.shells.push(&row) && self.size.push(&[frame.time, count, squares])
+        self.shells.push(&row) && self.size.push(&[frame.view.time, count, squares])
     }
 
     fn finish(&self) -> Vec<Observation> {

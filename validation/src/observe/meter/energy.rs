@@ -37,11 +37,11 @@ impl Meter for Energy {
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
-        let count = frame.simulation.len() as f64;
-        let landscape = frame.landscape();
-        let terms = landscape.excess.iter().chain(&landscape.pair_energies);
+        let count = frame.view.x.len() as f64;
+        let evaluation = frame.evaluation();
+        let terms = evaluation.excess.iter().chain(&evaluation.pair_energies);
         let all: Vec<f64> =
-            std::iter::once(&frame.simulation.kinetic_energy()).chain(terms).map(|e| e / count).collect();
+            std::iter::once(&frame.view.kinetic_energy).chain(terms).map(|e| e / count).collect();
         self.series.push(&all)
     }
 

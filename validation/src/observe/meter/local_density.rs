@@ -106,12 +106,12 @@ impl Meter for LocalDensity {
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
-        let simulation = frame.simulation;
-        let (landscape, species) = (frame.landscape(), simulation.species());
-        let fluid = frame.interactions().fluid();
-        let (kinds, variables) = (self.species.len(), fluid.variables());
+        let view = frame.view;
+        let (evaluation, species) = (frame.evaluation(), view.species);
+        let fluid = frame.evaluator().fluid();
+        let kinds = self.species.len();
         let density = &fluid.densities[self.density];
-        let at = |i: usize, beta: usize| landscape.densities[i * variables + self.density * kinds + beta];
+        let at = |i: usize, beta: usize| evaluation.densities[i][self.density * kinds + beta];
         let totals: Vec<f64> =
             (0..species.len()).map(|i| (0..kinds).map(|b| at(i, b)).sum::<f64>()).collect();
         let largest = totals.iter().copied().fold(0.0, f64::max);
@@ -134,7 +134,7 @@ impl Meter for LocalDensity {
         }
         // Pairs in a shell over those at g = 1, times the integral of w over it; and r w′ over pairs.
         let width = density.kernel.range() / SHELLS as f64;
-        for p in landscape.pairs.iter() {
+        for p in evaluation.pairs() {
             let (a, b) = (species[p.i] as usize, species[p.j] as usize);
             for (a, b) in [(a, b), (b, a)] {
                 let reference = numbers[a] * partners(a, b);

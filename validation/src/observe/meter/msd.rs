@@ -164,21 +164,21 @@ impl Meter for Msd {
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
-        let simulation = frame.simulation;
-        let domain = simulation.domain();
+        let view = frame.view;
+        let domain = view.domain;
         let edges = [domain.edge(0), domain.edge(1), domain.edge(2)];
-        let mut order: Vec<usize> = (0..simulation.len()).filter(|k| frame.moves(*k)).collect();
-        order.sort_unstable_by_key(|k| simulation.tags()[*k]);
-        let (positions, images) = (simulation.positions(), simulation.image_flags());
+        let mut order: Vec<usize> = (0..view.x.len()).filter(|k| frame.moves(*k)).collect();
+        order.sort_unstable_by_key(|k| view.tags[*k]);
+        let (positions, images) = (view.x, view.images);
         let unwrapped = |k: &usize| {
             std::array::from_fn(|c| {
                 positions[*k][c] + (0..3).map(|e| f64::from(images[*k][e]) * edges[e][c]).sum::<f64>()
             })
         };
         let x: Vec<[f64; 3]> = order.iter().map(unwrapped).collect();
-        let species: Vec<i32> = order.iter().map(|k| simulation.species()[*k]).collect();
-        self.clock.tick(frame.time);
-        self.record(x, &species, simulation.masses())
+        let species: Vec<i32> = order.iter().map(|k| view.species[*k]).collect();
+        self.clock.tick(frame.view.time);
+        self.record(x, &species, view.masses)
     }
 
     fn finish(&self) -> Vec<Observation> {

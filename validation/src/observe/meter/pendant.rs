@@ -182,8 +182,8 @@ impl Meter for Pendant {
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
-        let simulation = frame.simulation;
-        let (x, domain) = (simulation.positions(), simulation.domain());
+        let view = frame.view;
+        let (x, domain) = (view.x, view.domain);
         let labels = label(x, domain, self.dimensions, self.distance, |_| true);
         let sizes = sizes(&labels);
         let Some(largest) = (0..sizes.len()).max_by_key(|k| (sizes[*k], usize::MAX - k)) else {

@@ -116,13 +116,13 @@ impl Meter for Poiseuille {
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
-        let Some(fractions) = self.across.fractions(frame.simulation) else { return false };
+        let Some(fractions) = self.across.fractions(&frame.view) else { return false };
         let mut sums = vec![0.0; 2 * self.across.bins];
         for (k, s) in fractions.iter().enumerate() {
             if let Some(bin) = self.across.bin(*s) {
                 let m = frame.mass(k);
                 sums[2 * bin] += m;
-                sums[2 * bin + 1] += m * frame.simulation.velocities()[k][self.flow];
+                sums[2 * bin + 1] += m * frame.view.v[k][self.flow];
             }
         }
         self.series.push(&sums)

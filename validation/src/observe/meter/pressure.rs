@@ -40,8 +40,8 @@ impl Meter for Pressure {
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
-        let total = frame.simulation.pressure_tensor();
-        let conservative = frame.simulation.conservative_pressure_tensor();
+        let total = frame.view.pressure;
+        let conservative = frame.view.conservative_pressure;
         self.series.push(&[total, conservative].concat())
     }
 

@@ -44,16 +44,16 @@ impl Bins {
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
-        let simulation = frame.simulation;
-        let Some(fractions) = self.across.fractions(simulation) else { return false };
+        let view = frame.view;
+        let Some(fractions) = self.across.fractions(&view) else { return false };
         let (width, count) = (self.width(), self.species.len());
         let mut sums = vec![0.0; self.across.bins * width];
         for (k, s) in fractions.iter().enumerate() {
             let Some(bin) = self.across.bin(*s) else { continue };
             let at = &mut sums[bin * width..(bin + 1) * width];
-            at[simulation.species()[k] as usize] += 1.0;
+            at[view.species[k] as usize] += 1.0;
             if self.moments && frame.moves(k) {
-                let (m, v) = (frame.mass(k), simulation.velocities()[k]);
+                let (m, v) = (frame.mass(k), view.v[k]);
                 at[count] += m;
                 at[count + 2 + self.dimensions] += 1.0;
                 for c in 0..self.dimensions {

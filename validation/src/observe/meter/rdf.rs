@@ -3,10 +3,10 @@ use super::species_pairs::SpeciesPairs;
 use crate::observe::frame::Frame;
 use crate::observe::keys::{Key, Table};
 use crate::observe::observation::{Kind, Observation};
-use crate::observe::pairs::for_each_pair;
 use crate::observe::request::Options;
 use crate::observe::series::Series;
 use psidpd_core::document::FileError;
+use psidpd_core::engine::reference::for_each_pair;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
@@ -69,10 +69,10 @@ impl Meter for Rdf {
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
-        let simulation = frame.simulation;
-        let species = simulation.species();
+        let view = frame.view;
+        let species = view.species;
         let mut counts = vec![0.0; self.bins * self.pairs.len()];
-        for_each_pair(simulation.positions(), simulation.domain(), self.dimensions, self.range, |p| {
+        for_each_pair(view.x, view.domain, self.dimensions, self.range, |p| {
             let bin = ((p.r / self.range * self.bins as f64) as usize).min(self.bins - 1);
             self.pairs.at(species[p.i], species[p.j]).for_each(|k| counts[k * self.bins + bin] += 1.0);
         });

@@ -22,13 +22,13 @@ pub struct StressProfile {
 impl StressProfile {
     /// The sums of a configuration in every bin, as pressures.
     fn pressures(&self, frame: &Frame) -> Option<Vec<f64>> {
-        let simulation = frame.simulation;
-        let fractions = self.across.fractions(simulation)?;
-        let normal = self.across.normal(simulation.domain());
+        let view = frame.view;
+        let fractions = self.across.fractions(&view)?;
+        let normal = self.across.normal(view.domain);
         let along = |v: [f64; 3]| v[0] * normal[0] + v[1] * normal[1] + v[2] * normal[2];
         let (volume, rest) = (self.across.bin_volume(), (self.dimensions - 1) as f64);
         let mut sums = vec![0.0; self.across.bins * WIDTH];
-        for (k, v) in simulation.velocities().iter().enumerate() {
+        for (k, v) in view.v.iter().enumerate() {
             if let Some(bin) = self.across.bin(fractions[k]) {
                 let m = frame.mass(k);
                 let (n, square) = (along(*v), v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
@@ -36,7 +36,7 @@ impl StressProfile {
                 sums[bin * WIDTH + 1] += m * (square - n * n) / rest / volume;
             }
         }
-        for (pair, force) in frame.landscape().forces() {
+        for (pair, force) in frame.evaluation().pair_forces() {
             let n = along(pair.d);
             let normal = force * n * n / pair.r / volume;
             let tangential = force * (pair.r * pair.r - n * n) / pair.r / rest / volume;

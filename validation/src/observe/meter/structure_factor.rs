@@ -133,8 +133,8 @@ impl Meter for StructureFactor {
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
-        let simulation = frame.simulation;
-        let (species, domain) = (simulation.species(), simulation.domain());
+        let view = frame.view;
+        let (species, domain) = (view.species, view.domain);
         let numbers = self.pairs.numbers(species);
         let count = numbers.len();
         // ρ(k) of each species.
@@ -144,7 +144,7 @@ impl Meter for StructureFactor {
         });
         let mut powers: [Vec<[f64; 2]>; 3] = Default::default();
         let times = |a: [f64; 2], b: [f64; 2]| [a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]];
-        for (x, kind) in simulation.positions().iter().zip(species) {
+        for (x, kind) in view.x.iter().zip(species) {
             let s = domain.fraction(*x);
             for c in 0..3 {
                 let (sine, cosine) = (TAU * s[c]).sin_cos();
@@ -201,10 +201,10 @@ impl Meter for StructureFactor {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::observe::interactions::Interactions;
     use crate::observe::meter::AnyMeter;
     use crate::observe::tests::{IDEAL, scene};
     use crate::run::Simulation;
+    use psidpd_core::engine::reference::Evaluator;
 
     /// A simple cubic lattice of 5³ in a box of 5³: S = N at multiples of 2π, 0 elsewhere.
     #[test]
@@ -214,9 +214,9 @@ mod tests {
         let observe = observe.replace("2000", "1000");
         let scene = scene(IDEAL, "[5.0, 5.0, 5.0]", 1.0, 10, &observe).unwrap();
         let simulation = Simulation::new(&scene.model, 1.0, scene.initial_state(), 1).unwrap();
-        let fluid = Interactions::new(simulation.model().at(1.0).unwrap()).unwrap();
+        let fluid = Evaluator::new(simulation.model().at(1.0).unwrap()).unwrap();
         let AnyMeter::StructureFactor(mut meter) = scene.observe.requests[0].meter.clone() else { panic!() };
-        assert!(meter.sample(&Frame::new(&simulation, &fluid, 0.0)));
+        assert!(meter.sample(&Frame::new(simulation.view(0.0), &fluid)));
         let out = &meter.finish()[0];
         let s = &out.get("s").unwrap().values;
         let mut peaks = 0;

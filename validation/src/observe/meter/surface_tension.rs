@@ -2,7 +2,6 @@ use super::Meter;
 use super::across::Across;
 use crate::observe::frame::Frame;
 use crate::observe::keys::{AXIS, Key, Table};
-use crate::observe::landscape::Landscape;
 use crate::observe::observation::{Kind, Observation};
 use crate::observe::request::Options;
 use crate::observe::series::Series;
@@ -36,15 +35,14 @@ fn deformation(axis: usize, dimensions: usize, change: f64) -> [f64; 3] {
 
 /// `U` of a configuration stretched with its box to `1 + change` times the area at constant volume.
 fn stretched_energy(frame: &Frame, axis: usize, change: f64) -> f64 {
-    let simulation = frame.simulation;
-    let domain = simulation.domain();
+    let view = frame.view;
+    let domain = view.domain;
     // The faces normal to a direction are those of the other two edges: edges are scaled, not directions.
-    let scale = deformation(axis, simulation.dimensions(), change);
+    let scale = deformation(axis, view.dimensions, change);
     let edges = Matrix3::from_fn(|row, k| scale[k] * domain.edge(k)[row]);
     let Ok(stretched) = PeriodicBox::new(domain.origin(), edges, domain.periodic()) else { return f64::NAN };
-    let x: Vec<[f64; 3]> =
-        simulation.positions().iter().map(|x| stretched.point(domain.fraction(*x))).collect();
-    Landscape::new(frame.interactions(), &x, simulation.species(), &stretched).energy()
+    let x: Vec<[f64; 3]> = view.x.iter().map(|x| stretched.point(domain.fraction(*x))).collect();
+    frame.evaluator().evaluate(&x, view.species, &stretched).energy
 }
 
 impl Meter for SurfaceTension {
@@ -103,18 +101,18 @@ impl Meter for SurfaceTension {
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
-        let (axis, simulation) = (self.across.axis, frame.simulation);
-        self.kt = simulation.kt();
+        let (axis, view) = (self.across.axis, frame.view);
+        self.kt = view.kt;
         let tension = |p: [f64; 6]| {
             let others: f64 = (0..self.dimensions).filter(|c| *c != axis).map(|c| p[c]).sum();
             let difference = p[axis] - others / (self.dimensions - 1) as f64;
             self.across.height / self.interfaces * difference
         };
-        let energy = frame.landscape().energy();
+        let energy = frame.evaluation().energy;
         let weight = |change: f64| (-(stretched_energy(frame, axis, change) - energy) / self.kt).exp();
         let sample = [
-            tension(simulation.conservative_pressure_tensor()),
-            tension(simulation.pressure_tensor()),
+            tension(view.conservative_pressure),
+            tension(view.pressure),
             weight(self.perturbation),
             weight(-self.perturbation),
         ];
@@ -143,9 +141,9 @@ impl Meter for SurfaceTension {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::observe::interactions::Interactions;
     use crate::observe::tests::{SET6, scene};
     use crate::run::Simulation;
+    use psidpd_core::engine::reference::Evaluator;
 
     /// On a slab whose faces point any way: half the difference of the energies over the change of the
     /// area is the virial part of the stress tension, to second order in the perturbation.
@@ -157,9 +155,9 @@ mod tests {
         for _ in 0..50 {
             simulation.step(0.01, scene.stages[0].integrator, Want::TOTALS).unwrap();
         }
-        let fluid = Interactions::new(simulation.model().at(1.0).unwrap()).unwrap();
-        let frame = Frame::new(&simulation, &fluid, 0.0);
-        let virial = frame.landscape().virial();
+        let fluid = Evaluator::new(simulation.model().at(1.0).unwrap()).unwrap();
+        let frame = Frame::new(simulation.view(0.0), &fluid);
+        let virial = frame.evaluation().virial;
         for axis in 0..3 {
             let others: f64 = (0..3).filter(|c| *c != axis).map(|c| virial[c]).sum();
             // dU/d ln A, from ∂U/∂ε_cc = −W_cc.

@@ -1,6 +1,5 @@
 use super::Meter;
 use crate::observe::frame::Frame;
-use crate::observe::interactions::{conservative_range, force_jumps};
 use crate::observe::keys::Table;
 use crate::observe::observation::{Kind, Observation};
 use crate::observe::request::Options;
@@ -34,9 +33,9 @@ impl Meter for Temperature {
         let fluid = options.place.fluid;
         let missing = if !fluid.is_conservative() {
             "a force of the model has no potential"
-        } else if force_jumps(fluid) {
+        } else if fluid.force_jumps() {
             "a force of the model jumps at its range, where its divergence is a delta function"
-        } else if options.half_box() < conservative_range(fluid) {
+        } else if options.half_box() < fluid.conservative_range() {
             "the box is narrower than twice the range of the forces"
         } else {
             ""
@@ -46,14 +45,14 @@ impl Meter for Temperature {
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
-        let kinetic = frame.simulation.temperature();
+        let kinetic = frame.view.temperature;
         if !self.missing.is_empty() {
             return self.series.push(&[kinetic]);
         }
-        let landscape = frame.landscape();
+        let evaluation = frame.evaluation();
         let (mut squares, mut laplacian) = (0.0, 0.0);
-        let laplacians = landscape.laplacians(frame.interactions(), frame.simulation.species());
-        for (k, (f, l)) in landscape.particle_forces().iter().zip(laplacians).enumerate() {
+        let laplacians = evaluation.laplacians(frame.evaluator().fluid(), frame.view.species);
+        for (k, (f, l)) in evaluation.forces.iter().zip(laplacians).enumerate() {
             if frame.moves(k) {
                 squares += f.iter().map(|f| f * f).sum::<f64>();
                 laplacian += l;

@@ -112,8 +112,8 @@ impl Meter for Viscosity {
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
-        let simulation = frame.simulation;
-        self.record(frame.time, simulation.pressure_tensor(), simulation.temperature())
+        let view = frame.view;
+        self.record(frame.view.time, view.pressure, view.temperature)
     }
 
     fn finish(&self) -> Vec<Observation> {

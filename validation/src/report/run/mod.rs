@@ -8,7 +8,8 @@ mod observables;
 mod series;
 mod state;
 
-use super::{Item, Report, ReportError, Section, write_atomically};
+use super::{Item, Report, ReportError, Section};
+use crate::files::write_atomically;
 use crate::output::{About, OutputError};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -54,7 +55,7 @@ const FILES: [(&str, &str); 10] = [
 pub fn write_run_report(folder: &Path) -> Result<PathBuf, RunReportError> {
     let page = run_report(folder)?.render();
     let path = folder.join("report.html");
-    write_atomically(&path, page.as_bytes())?;
+    write_atomically(&path, page.as_bytes()).map_err(ReportError::from)?;
     Ok(path)
 }
 

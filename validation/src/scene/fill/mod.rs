@@ -5,7 +5,7 @@ mod near;
 mod random;
 
 use super::{Arrangement, Initial, Part, Scene};
-use crate::run::State;
+use crate::particles::State;
 use chacha20::ChaCha8Rng;
 use near::Near;
 use rand::SeedableRng;

@@ -1,13 +1,10 @@
-//! Mixed and double precision: what is kept of a particle, and how a pair's distance comes from it.
+//! Mixed and double precision: the packed particle, and the geometry of pairs computed from it.
 
-use crate::engine::sweep::ground::box_geometry::BoxGeometry;
-use crate::engine::sweep::pair_batch::pair_terms::SpeciesPair;
-use crate::engine::sweep::simd::{Isa, Reals, Scalar, Words};
+use super::box_geometry::BoxGeometry;
+use super::fixed_point::TWO_TO_32;
+use super::species_pairs::SpeciesPair;
+use crate::engine::sweep::simd::{Isa, OFFSET_BITS, Reals, Scalar, Words};
 use crate::model::kernel::Real;
-
-/// Places of particles in the order of cells are multiplied by 32, the size of accumulators and of records in mixed
-/// precision.
-pub const OFFSET_BITS: u32 = 5;
 
 /// A vector's worth of particles, column by column: the first particle of a pair picks its own of each.
 #[derive(Debug, Clone, Copy, Default)]
@@ -84,11 +81,18 @@ pub trait Arithmetic<I: Isa>: 'static {
         j_offsets: *const u32,
     ) -> [Self::Reals; 8];
 
-    /// The same of rows that follow each other.
+    /// The same of `count` rows that follow each other, at least one; lanes behind repeat the last.
     #[inline(always)]
-    unsafe fn load_transposed_in_order(records: *const Self::Scalar) -> [Self::Reals; 8] {
-        // SAFETY: the contract of `simd`.
-        unsafe { Self::load_transposed::<true>(records, IN_ORDER.as_ptr()) }
+    unsafe fn load_transposed_in_order(records: *const Self::Scalar, count: usize) -> [Self::Reals; 8] {
+        type W<I, A> = <<A as Arithmetic<I>>::Reals as Reals>::Words;
+        let mut offsets = [0; 16];
+        // SAFETY: `IN_ORDER` and `offsets` are no shorter than a vector, and offsets are of the rows that there are. Rows
+        // behind may be another thread's, who may be writing them.
+        unsafe {
+            let last = W::<I, Self>::splat(((count - 1) << OFFSET_BITS) as u32);
+            W::<I, Self>::load(IN_ORDER.as_ptr()).min(last).store(offsets.as_mut_ptr());
+            Self::load_transposed::<true>(records, offsets.as_ptr())
+        }
     }
 
     unsafe fn load_quad(p: *const Self::Scalar) -> I::Quad;
@@ -148,8 +152,6 @@ const TINY: f64 = 1e-30;
 
 /// Thirty-two times the place of records that follow each other.
 const IN_ORDER: [u32; 16] = [0, 32, 64, 96, 128, 160, 192, 224, 256, 288, 320, 352, 384, 416, 448, 480];
-
-const TWO_TO_32: f64 = 4_294_967_296.0;
 
 /// Lengths of the box geometry, and how it leans, over 2³².
 #[derive(Clone, Copy)]

@@ -9,13 +9,13 @@ pub struct BoxGeometry {
     pub origin: [f64; 3],
     /// xx, yy, zz.
     pub length: [f64; 3],
-    /// xy, xz, yz: how far the second and third edge lean.
+    /// xy, xz, yz: the tilt of the second and the third edge.
     pub tilt: [f64; 3],
     pub periodic: [bool; 3],
 }
 
 impl BoxGeometry {
-    /// The box geometry of a box, unless its edges are turned.
+    /// The geometry of a box; `None` if its edges are rotated.
     pub fn of_box(domain: &PeriodicBox, dimensions: usize) -> Option<BoxGeometry> {
         let [a, b, c] = [0, 1, 2].map(|k| domain.edge(k));
         if a[1] != 0.0 || a[2] != 0.0 || b[2] != 0.0 {
@@ -38,26 +38,26 @@ impl BoxGeometry {
         Some(geometry)
     }
 
-    /// Open space around points of which `low` and `high` are the extremes, and what is within reach of them.
+    /// Open space that holds all points between `low` and `high`.
     pub fn enclosing(low: [f64; 3], high: [f64; 3], dimensions: usize, cutoff: f64) -> BoxGeometry {
         let geometry =
             BoxGeometry { dimensions, origin: low, length: [1.0; 3], tilt: [0.0; 3], periodic: [false; 3] };
         geometry.stretched(low, high, cutoff)
     }
 
-    /// The box geometry with the directions without periods spanning the points.
+    /// The same with its open directions stretched from `low` to `high`.
     pub fn stretched(mut self, low: [f64; 3], high: [f64; 3], cutoff: f64) -> BoxGeometry {
         for c in 0..self.dimensions {
             if !self.periodic[c] {
                 self.origin[c] = low[c];
-                // Differences of fractions are read as signed: within reach they must stay below a half.
+                // Differences of fractions are read as signed: within the cutoff they must stay below one half.
                 self.length[c] = ((high[c] - low[c]) * (1.0 + 1e-9)).max(4.0 * cutoff);
             }
         }
         self
     }
 
-    /// Whether a point is not beyond the ends of the box geometry, which has none along periods.
+    /// Whether a point is inside along all open directions.
     #[inline(always)]
     pub fn contains(&self, x: &[f64; 3]) -> bool {
         (0..self.dimensions)

@@ -1,27 +1,31 @@
-//! Positions in words of sixteen bits, for looking who is near: rounding only ever lets too many through.
+//! Fixed-point coordinates: of 32 bits in packed particles, of 16 bits in the distance filter. Rounding to 16 bits only ever
+//! lets too many pairs through.
 
-use crate::engine::sweep::ground::box_geometry::BoxGeometry;
-use crate::engine::sweep::ground::cell_grid::CellGrid;
+use super::box_geometry::BoxGeometry;
+use super::cell_grid::CellGrid;
 
-/// The unit of such positions, and the limit of squared distances in them.
+/// Units of 32-bit fixed-point coordinates in the length of the box.
+pub const TWO_TO_32: f64 = 4_294_967_296.0;
+
+/// The unit of 16-bit coordinates, and the limit of the distance filter in it.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct FixedPoint16 {
-    /// Units per length. Words wrap, but no two particles that are compared are half a turn apart.
+    /// Units per length. Coordinates wrap; particles that are compared are less than half a turn apart.
     pub per_length: f64,
-    /// Sums of the high halves of squares below this may be within reach.
+    /// A pair may be within the cutoff if the high halves of its squared coordinate differences add up to less than this.
     pub limit: i16,
 }
 
 impl FixedPoint16 {
     pub fn new(geometry: &BoxGeometry, grid: &CellGrid) -> FixedPoint16 {
-        let bin = geometry.length[0] / grid.cells_per_column as f64;
-        // Two columns, or planes, next to each other.
+        let cell = geometry.length[0] / grid.cells_per_column as f64;
+        // The extent of two neighbouring columns, or planes, as a fraction of the box.
         let two = |axis: usize| if axis < geometry.dimensions { 2.0 / grid.of(axis) as f64 } else { 0.0 };
         let [xy, xz, yz] = geometry.tilt.map(f64::abs);
         let (y, z) = (two(1), two(2));
         let furthest = [
             grid.range_half_width * geometry.length[0]
-                + (2.0 + grid.i_cluster_extent) * bin
+                + (2.0 + grid.i_cluster_extent) * cell
                 + y * xy
                 + z * xz,
             y * geometry.length[1] + z * yz,
@@ -29,20 +33,20 @@ impl FixedPoint16 {
         ];
         let furthest = furthest.into_iter().fold(0.0, f64::max);
         let per_length = 32_000.0 / furthest;
-        // Each coordinate of a distance is off by up to one and a half: two positions and a shift are rounded.
-        let reach = grid.search_cutoff * per_length + 1.5 * 3f64.sqrt();
-        FixedPoint16 { per_length, limit: (reach * reach / 65_536.0) as i16 + 1 }
+        // Two positions and a shift are rounded: a coordinate difference is off by up to 1.5 units.
+        let limit = grid.search_cutoff * per_length + 1.5 * 3f64.sqrt();
+        FixedPoint16 { per_length, limit: (limit * limit / 65_536.0) as i16 + 1 }
     }
 
-    /// Words of each edge, if edges are along the axes and there are not too many: a coordinate then is the part of
-    /// these that its fraction is, which is off by less than one, and by half the distance over the edge.
+    /// The lengths of the edges in units, if the edges are along the axes and the lengths fit 31 bits. A fraction of the box
+    /// times its edge is the coordinate, off by less than one unit and by half the fraction.
     pub fn edge_words(&self, geometry: &BoxGeometry) -> Option<[u32; 3]> {
         let words = geometry.length.map(|l| (l * self.per_length).round());
         let few = words.iter().all(|w| *w < 2_147_483_648.0);
         (few && !geometry.is_tilted()).then_some(words.map(|w| w as u32))
     }
 
-    /// A distance between periods, to the nearest unit.
+    /// A periodic shift, rounded to the nearest unit.
     pub fn shift(&self, length: f64) -> u16 {
         (length * self.per_length).round() as i64 as u16
     }
@@ -50,10 +54,10 @@ impl FixedPoint16 {
     /// A coordinate.
     ///
     /// # Safety
-    /// It is finite, and within 2⁴⁰ cut-offs.
+    /// It is finite and within 2⁴⁰ cutoffs.
     #[inline(always)]
     pub unsafe fn coordinate(&self, x: f64) -> u16 {
-        // SAFETY: units are no smaller than the 2¹⁴th part of the cut-off.
+        // SAFETY: a unit is at least 2⁻¹⁴ cutoffs, so the number of units fits 64 bits.
         unsafe { (x * self.per_length).to_int_unchecked::<i64>() as u16 }
     }
 }

@@ -1,9 +1,10 @@
-//! What every pass stands on: geometry, the cell grid, coordinates, packed particles and tables of terms.
+//! What everything above stands on: geometry, the cell grid, fixed-point coordinates, packed particles, and the terms of a
+//! fluid as tables.
 
 pub mod arithmetic;
 pub mod box_geometry;
 pub mod cell_grid;
 pub mod fixed_point;
-pub mod pass_data;
-pub mod shared_ptr;
+pub mod shared_slice;
+pub mod species_pairs;
 pub mod terms;

@@ -1,72 +1,29 @@
 //! The plan of a fluid as tables of numbers in the precision of the pairs.
 
-use crate::engine::plan::{Plan, ThermostatPlan};
+use super::species_pairs::SpeciesPairTable;
+use crate::engine::plan::{PairStorage, Plan, ThermostatPlan};
 use crate::engine::sweep::simd::Scalar;
 use crate::model::PairTerm;
 use crate::model::kernel::{Kernel, KernelKind};
 use crate::model::pair::{PairForm, PairPotential, SplineAttractive};
 
-/// All terms; tables have an entry for each pair of species, row-major.
+/// All terms between pairs. Tables have an entry for each pair of species, row by row.
 #[derive(Debug, Clone, Default)]
 pub struct Terms<T> {
     pub species: usize,
-    /// One at least.
+    /// At least one: without soft repulsion, one of no strength.
     soft: Vec<Soft<T>>,
     pub linear: Vec<Linear<T>>,
     pub spline: Vec<Spline<T>>,
-    /// Potentials that are evaluated apart, in double precision.
+    /// Potentials without vector code.
     pub scalar_fallback: Vec<PairTerm>,
     pub thermostat: Option<ThermostatTables<T>>,
     pub passes: Vec<Pass<T>>,
-    /// Whether pairs are kept in the full pair cache, and their forces added in the second pass alone: in loops that are compiled for
-    /// several species, so that those of one fluid of one density have nothing of it.
+    /// Whether all pairs go to the full pair cache. Only loops compiled for several species look at it, so that a fluid of
+    /// one density and one species does not pay for it.
     pub full_cache: bool,
-    /// For each species whether the first particle is of it, and whether the second: 1 or 0.
+    /// For each species: 1 where the i-particle is of it and 0 elsewhere, and the same for the j-particle.
     pub is_species: Vec<[SpeciesPairTable<T>; 2]>,
-}
-
-/// A number for each pair of species, row-major, and room for a vector.
-#[derive(Debug, Clone)]
-pub struct SpeciesPairTable<T> {
-    entries: Vec<T>,
-    count: usize,
-}
-
-impl<T: Scalar> SpeciesPairTable<T> {
-    fn new(entries: impl IntoIterator<Item = T>) -> SpeciesPairTable<T> {
-        let mut entries: Vec<T> = entries.into_iter().collect();
-        let count = entries.len();
-        entries.resize(count.max(16), T::default());
-        SpeciesPairTable { entries, count }
-    }
-
-    fn of(count: usize, value: T) -> SpeciesPairTable<T> {
-        SpeciesPairTable::new(std::iter::repeat_n(value, count))
-    }
-
-    /// How many entries there are.
-    #[inline(always)]
-    pub fn count(&self) -> usize {
-        self.count
-    }
-
-    #[inline(always)]
-    pub fn as_ptr(&self) -> *const T {
-        self.entries.as_ptr()
-    }
-}
-
-impl<T> std::ops::Index<usize> for SpeciesPairTable<T> {
-    type Output = T;
-    fn index(&self, at: usize) -> &T {
-        &self.entries[at]
-    }
-}
-
-impl<T> std::ops::IndexMut<usize> for SpeciesPairTable<T> {
-    fn index_mut(&mut self, at: usize) -> &mut T {
-        &mut self.entries[at]
-    }
 }
 
 /// `a (1 − r/R)`.
@@ -143,10 +100,7 @@ pub struct Pass<T> {
     pub force: T,
 }
 
-/// If densities reach less far than this part of the cut-off, the second pass is for the few pairs within.
-const FULL_CACHE_RANGE: f64 = 0.7;
-
-/// One over a range; 0 for no range, beyond which everything is.
+/// One over a range. A range of zero gives a number so large that every pair is beyond the range.
 fn inverse(range: f64) -> f64 {
     if range > 0.0 { 1.0 / range } else { f64::from(f32::MAX) }
 }
@@ -189,8 +143,7 @@ impl<T: Scalar> Terms<T> {
             .iter()
             .map(|d| Pass::new(&plan.densities[*d].kernel, &plan.densities[*d].force_kernel))
             .collect();
-        let longest = plan.passes.iter().map(|d| plan.densities[*d].force_kernel.range()).fold(0.0, f64::max);
-        terms.full_cache = terms.passes.len() * count > 1 && longest > FULL_CACHE_RANGE * plan.cutoff;
+        terms.full_cache = plan.pair_storage() == Some(PairStorage::FullCache);
         terms.thermostat = plan.thermostat.as_ref().map(|t| ThermostatTables {
             gamma: SpeciesPairTable::new(t.gamma.iter().map(|x| T::of(*x))),
             sigma: SpeciesPairTable::new(t.sigma.iter().map(|x| T::of(*x))),
@@ -200,19 +153,25 @@ impl<T: Scalar> Terms<T> {
         terms
     }
 
-    /// Soft repulsions: there is one, of no strength if need be.
+    /// Variables of ψ: one for each density pass and species.
+    #[inline(always)]
+    pub fn variables(&self) -> usize {
+        self.passes.len() * self.species
+    }
+
+    /// The first soft repulsion; a term of no strength if there is none.
     #[inline(always)]
     pub fn first_soft(&self) -> &Soft<T> {
         &self.soft[0]
     }
 
-    /// Soft repulsions of other ranges.
+    /// Further soft repulsions between the same species.
     #[inline(always)]
     pub fn other_soft(&self) -> &[Soft<T>] {
         &self.soft[1..]
     }
 
-    /// Whether there are terms besides the first soft one, drag and densities.
+    /// Whether there are terms besides the first soft one, the thermostat and the densities.
     #[inline(always)]
     pub fn has_more(&self) -> bool {
         self.soft.len() > 1
@@ -231,7 +190,7 @@ impl<T: Scalar> Terms<T> {
         let zero = || SpeciesPairTable::of(size, T::default());
         match &term.potential {
             PairPotential::Soft(form) => {
-                // The first table that has no such pair yet.
+                // The first term that has nothing for this pair of species yet.
                 let free = self.soft.iter().position(|s| s.inverse_range[entries[0]] == far);
                 let at = free.unwrap_or_else(|| {
                     self.soft.push(Soft::none(size));

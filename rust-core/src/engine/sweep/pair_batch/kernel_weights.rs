@@ -1,32 +1,36 @@
-//! Weights of the densities that some ψ is not linear in.
+//! The weights `w(r)` of pairs in each density that has a pass.
 
+use super::batch::Batch;
+use super::buffers::BatchBuffers;
+use super::inputs::PairInputs;
 use crate::engine::sweep::ground::arithmetic::{Arithmetic, PairVector};
-use crate::engine::sweep::ground::pass_data::PassData;
 use crate::engine::sweep::ground::terms::Pass;
-use crate::engine::sweep::pair_batch::batch::Batch;
-use crate::engine::sweep::pair_batch::buffers::PairBuffers;
 use crate::engine::sweep::simd::{Isa, Reals, Scalar};
 use crate::model::kernel::{Shape, ShapeVisitor};
 
-/// Minus the weights of the pairs for each density.
+/// Computes `−w(r)` of all pairs for each density: both particles are given minus a quad.
+///
+/// # Safety
+/// The contract of `simd`. The buffers hold the distances of the batch.
 #[inline(always)]
 pub unsafe fn kernel_weights<I: Isa, A: Arithmetic<I>>(
-    data: &PassData<A::Scalar, A::PackedParticle>,
-    buffers: &mut PairBuffers<A::Scalar>,
+    inputs: &PairInputs<A::Scalar, A::PackedParticle>,
+    buffers: &mut BatchBuffers<A::Scalar>,
     batch: Batch,
 ) {
-    for (pass, term) in data.terms.passes.iter().enumerate() {
+    for (pass, term) in inputs.terms.passes.iter().enumerate() {
+        buffers.counts.weighted += 1;
         term.kernel.visit(KernelWeights::<A::Reals> {
             term,
             factor: A::Scalar::of(-term.value.wide()),
             pairs: buffers.pairs.as_ptr().cast(),
-            vectors: batch.count().div_ceil(A::Reals::LANES),
+            vectors: batch.count.div_ceil(A::Reals::LANES),
             out: buffers.kernel_weights[pass].as_mut_ptr(),
         });
     }
 }
 
-/// The loop over vectors, for one kernel.
+/// The loop over vectors of pairs, compiled for each kernel.
 struct KernelWeights<'a, R: Reals> {
     term: &'a Pass<R::Scalar>,
     factor: R::Scalar,
@@ -40,7 +44,8 @@ impl<R: Reals> ShapeVisitor for KernelWeights<'_, R> {
 
     #[inline(always)]
     fn visit<S: Shape>(self) {
-        // SAFETY: the contract of `simd`, by way of `kernel_weights`.
+        // SAFETY: made by `kernel_weights` alone, whose caller upholds the contract of `simd`; `BatchBuffers::reserve`
+        // has made room for whole vectors.
         unsafe {
             let inverse_range = R::splat(self.term.inverse_range);
             let factor = R::splat(self.factor);

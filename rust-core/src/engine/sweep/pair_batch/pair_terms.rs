@@ -1,70 +1,18 @@
-//! What each term adds to the pairs, along `ê`.
+//! The forces of each term along `ê`.
 
+use super::batch::Batch;
+use super::buffers::BatchBuffers;
+use super::inputs::PairInputs;
+use super::step_constants::StepConstants;
+use super::thermostat::ThermostatForce;
 use crate::engine::sweep::ground::arithmetic::{Arithmetic, PairVector};
-use crate::engine::sweep::ground::pass_data::PassData;
-use crate::engine::sweep::ground::terms::{Linear, Soft, SpeciesPairTable, Spline};
-use crate::engine::sweep::pair_batch::batch::Batch;
-use crate::engine::sweep::pair_batch::buffers::PairBuffers;
-use crate::engine::sweep::pair_batch::evaluate::StepConstants;
-use crate::engine::sweep::pair_batch::thermostat::ThermostatForce;
+use crate::engine::sweep::ground::species_pairs::{SpeciesPair, TableLookup};
+use crate::engine::sweep::ground::terms::{Linear, Soft, Spline};
 use crate::engine::sweep::simd::{Isa, Reals, Scalar, Words};
 use crate::model::kernel::{CubicSpline, KernelKind, Real, Shape, ShapeVisitor};
 use std::marker::PhantomData;
 
-/// Which pair of species each pair of a vector is: the entry of tables.
-#[derive(Clone, Copy)]
-pub struct SpeciesPair<R: Reals>(pub R::Words);
-
-impl<R: Reals> SpeciesPair<R> {
-    /// Of the species of both particles.
-    #[inline(always)]
-    pub unsafe fn new(species_i: R::Words, species_j: R::Words, species: usize) -> SpeciesPair<R> {
-        // SAFETY: the contract of `simd`.
-        unsafe {
-            let mut row = R::Words::splat(0);
-            let mut k = 0;
-            while k < species {
-                row = row.add(species_i);
-                k += 1;
-            }
-            SpeciesPair(row.add(species_j))
-        }
-    }
-}
-
-/// A table at hand: in a loop nothing of it is looked up twice.
-#[derive(Clone, Copy)]
-pub struct TableLookup<R: Reals> {
-    first: R,
-    entries: *const R::Scalar,
-    fits_vector: bool,
-}
-
-impl<R: Reals> TableLookup<R> {
-    #[inline(always)]
-    pub unsafe fn new(table: &SpeciesPairTable<R::Scalar>) -> TableLookup<R> {
-        let entries = table.as_ptr();
-        // SAFETY: the contract of `simd`; tables have an entry.
-        TableLookup { first: unsafe { R::splat(*entries) }, entries, fits_vector: table.count() <= R::LANES }
-    }
-
-    /// The entries of pairs; with one species there is but one.
-    #[inline(always)]
-    pub unsafe fn lookup<const MULTISPECIES: bool>(&self, species_pair: SpeciesPair<R>) -> R {
-        // SAFETY: the contract of `simd`; kinds are below the number of entries, and tables have room for a vector.
-        unsafe {
-            if !MULTISPECIES {
-                self.first
-            } else if self.fits_vector {
-                R::pick(self.entries, species_pair.0)
-            } else {
-                R::lookup(self.entries, species_pair.0)
-            }
-        }
-    }
-}
-
-/// What is summed over pairs, where it is asked for.
+/// Energies and virials, one sum in each lane.
 #[derive(Clone, Copy)]
 pub struct PairSums<R> {
     pub pair: R,
@@ -81,22 +29,28 @@ impl<R: Reals> PairSums<R> {
     }
 }
 
-/// Adds forces `f d` to a virial.
+/// Adds the virial of forces `f d`.
+///
+/// # Safety
+/// The contract of `simd`.
 #[inline(always)]
-pub unsafe fn add_virial<R: Reals>(f: R, d: [R; 3], sum_lanes: &mut [R; 6]) {
-    // SAFETY: the contract of `simd`.
+pub unsafe fn add_virial<R: Reals>(f: R, d: [R; 3], sum: &mut [R; 6]) {
+    // SAFETY: the caller upholds the contract of `simd`.
     unsafe {
         let fd = [f * d[0], f * d[1], f * d[2]];
-        sum_lanes[0] = fd[0].mul_add(d[0], sum_lanes[0]);
-        sum_lanes[1] = fd[1].mul_add(d[1], sum_lanes[1]);
-        sum_lanes[2] = fd[2].mul_add(d[2], sum_lanes[2]);
-        sum_lanes[3] = fd[0].mul_add(d[1], sum_lanes[3]);
-        sum_lanes[4] = fd[0].mul_add(d[2], sum_lanes[4]);
-        sum_lanes[5] = fd[1].mul_add(d[2], sum_lanes[5]);
+        sum[0] = fd[0].mul_add(d[0], sum[0]);
+        sum[1] = fd[1].mul_add(d[1], sum[1]);
+        sum[2] = fd[2].mul_add(d[2], sum[2]);
+        sum[3] = fd[0].mul_add(d[1], sum[3]);
+        sum[4] = fd[0].mul_add(d[2], sum[4]);
+        sum[5] = fd[1].mul_add(d[2], sum[5]);
     }
 }
 
 /// The sum of the lanes.
+///
+/// # Safety
+/// The contract of `simd`.
 #[inline(always)]
 pub unsafe fn sum_lanes<R: Reals>(x: R) -> f64 {
     let mut lanes = [R::Scalar::default(); 16];
@@ -109,38 +63,36 @@ pub unsafe fn sum_lanes<R: Reals>(x: R) -> f64 {
     sum
 }
 
-/// Rows of forces, and of minus the weight if there is one density: of the first soft term, drag and noise, and
-/// whatever other terms have left in `conservative`.
+/// Writes the quads of the batch, `fx, fy, fz` and with one density `−w`: the first soft term, the thermostat, and what the
+/// other terms have left in `conservative`. For the full pair cache it writes forces over `r` to `conservative` instead.
+///
+/// # Safety
+/// The contract of `simd`. The buffers hold distances, noise and weights of the batch.
 #[inline(always)]
 pub unsafe fn forces<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool>(
-    data: &PassData<A::Scalar, A::PackedParticle>,
+    inputs: &PairInputs<A::Scalar, A::PackedParticle>,
     constants: &StepConstants<I, A>,
-    buffers: &mut PairBuffers<A::Scalar>,
+    buffers: &mut BatchBuffers<A::Scalar>,
     batch: Batch,
-    sum_laness: &mut PairSums<A::Reals>,
+    sums: &mut PairSums<A::Reals>,
 ) {
-    // SAFETY: the contract of `simd`.
+    // SAFETY: `BatchBuffers::reserve` has made room for whole vectors in every array.
     unsafe {
-        let terms = data.terms;
-        let vectors = batch.count().div_ceil(A::Reals::LANES);
+        let terms = inputs.terms;
+        let vectors = batch.count.div_ceil(A::Reals::LANES);
         let zero = A::Reals::constant(0.0);
         let p_pairs = buffers.pairs.as_ptr().cast::<PairVector<A::Reals>>();
         let p_quads = buffers.quads.as_mut_ptr().cast::<A::Scalar>();
-        let p_conservative = buffers.conservative.as_ptr();
+        let p_conservative = buffers.conservative.as_mut_ptr();
         let p_noise = buffers.tags[0].as_ptr();
         let p_pair_weight = buffers.pair_weight.as_ptr();
         let p_weight =
-            if data.variables == 1 { buffers.kernel_weights[0].as_ptr() } else { std::ptr::null() };
-        let p_cached = if MULTISPECIES && terms.full_cache {
-            buffers.conservative.as_mut_ptr()
-        } else {
-            std::ptr::null_mut()
-        };
+            if terms.variables() == 1 { buffers.kernel_weights[0].as_ptr() } else { std::ptr::null() };
+        let to_cache = MULTISPECIES && inputs.caches_all_pairs();
         let has_more = terms.has_more();
-        let soft = SoftAt::<A::Reals>::new(terms.first_soft());
-        let thermostat_force = terms.thermostat.as_ref().filter(|_| constants.noise.is_some());
-        let thermostat_force = thermostat_force
-            .map(|thermostat| ThermostatForce::<A::Reals>::new(thermostat, constants.noise_scale));
+        let soft = SoftTerm::<A::Reals>::new(terms.first_soft());
+        let thermostat = terms.thermostat.as_ref().filter(|_| constants.noise.is_some());
+        let thermostat = thermostat.map(|t| ThermostatForce::<A::Reals>::new(t, constants.noise_scale));
         let mut v = 0;
         while v < vectors {
             let k = v * A::Reals::LANES;
@@ -148,41 +100,37 @@ pub unsafe fn forces<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const T
             let (r, species_pair) = (pairs.geometry.r, pairs.species_pair);
             let pair_weight = if TALLY { A::Reals::load(p_pair_weight.add(k)) } else { zero };
             let mut force = if has_more { A::Reals::load(p_conservative.add(k)) } else { zero };
-            force =
-                soft.add::<MULTISPECIES, TALLY>(r, species_pair, force, pair_weight, &mut sum_laness.pair);
+            force = soft.add::<MULTISPECIES, TALLY>(r, species_pair, force, pair_weight, &mut sums.pair);
             if TALLY {
-                add_virial(
-                    force * (pair_weight * pairs.geometry.inverse),
-                    pairs.geometry.d,
-                    &mut sum_laness.virial,
-                );
+                let f = force * (pair_weight * pairs.geometry.inverse);
+                add_virial(f, pairs.geometry.d, &mut sums.virial);
             }
-            if let Some(thermostat_force) = &thermostat_force {
+            if let Some(thermostat) = &thermostat {
                 let word = <A::Reals as Reals>::Words::load(p_noise.add(k));
-                let thermostat = thermostat_force.force::<MULTISPECIES>(pairs, word);
+                let f = thermostat.force::<MULTISPECIES>(pairs, word);
                 if TALLY {
-                    let f = thermostat * (pair_weight * pairs.geometry.inverse);
-                    add_virial(f, pairs.geometry.d, &mut sum_laness.thermostat);
+                    let f = f * (pair_weight * pairs.geometry.inverse);
+                    add_virial(f, pairs.geometry.d, &mut sums.thermostat);
                 }
-                force = force + thermostat;
+                force = force + f;
             }
-            if MULTISPECIES && !p_cached.is_null() {
-                (force * pairs.geometry.inverse).store(p_cached.add(k));
+            if to_cache {
+                (force * pairs.geometry.inverse).store(p_conservative.add(k));
                 v += 1;
                 continue;
             }
-            let kernel_weight = if p_weight.is_null() { zero } else { A::Reals::load(p_weight.add(k)) };
+            let weight = if p_weight.is_null() { zero } else { A::Reals::load(p_weight.add(k)) };
             let f = force * pairs.geometry.inverse;
             let [dx, dy, dz] = pairs.geometry.d;
-            A::Reals::store_transposed([f * dx, f * dy, f * dz, kernel_weight], p_quads.add(4 * k));
+            A::Reals::store_transposed([f * dx, f * dy, f * dz, weight], p_quads.add(4 * k));
             v += 1;
         }
     }
 }
 
-/// A term at hand.
+/// A term, prepared for a loop over pairs. The functions are unsafe by the contract of `simd`.
 trait Term<R: Reals> {
-    /// `before − φ′(r)`, and the energy, if it is asked for.
+    /// `before − φ′(r)`; adds to the energy with `TALLY`.
     unsafe fn add<const MULTISPECIES: bool, const TALLY: bool>(
         &self,
         r: R,
@@ -193,15 +141,18 @@ trait Term<R: Reals> {
     ) -> R;
 }
 
-/// Adds the forces of a term to those that the block has.
+/// Adds the forces of a term to those in the buffers.
+///
+/// # Safety
+/// The contract of `simd`. The buffers hold the distances of so many vectors.
 #[inline(always)]
 unsafe fn each<R: Reals, const MULTISPECIES: bool, const TALLY: bool>(
     term: impl Term<R>,
-    buffers: &mut PairBuffers<R::Scalar>,
+    buffers: &mut BatchBuffers<R::Scalar>,
     vectors: usize,
     energy: &mut R,
 ) {
-    // SAFETY: the contract of `simd`.
+    // SAFETY: the caller upholds the contract of `simd`.
     unsafe {
         let p_pairs = buffers.pairs.as_ptr().cast::<PairVector<R>>();
         let p_force = buffers.conservative.as_mut_ptr();
@@ -225,18 +176,18 @@ unsafe fn each<R: Reals, const MULTISPECIES: bool, const TALLY: bool>(
 }
 
 /// `φ = ½ a R (1 − r/R)²`.
-struct SoftAt<R: Reals> {
+struct SoftTerm<R: Reals> {
     strength: TableLookup<R>,
     inverse_range: TableLookup<R>,
     energy: TableLookup<R>,
 }
 
-impl<R: Reals> SoftAt<R> {
+impl<R: Reals> SoftTerm<R> {
     #[inline(always)]
     unsafe fn new(term: &Soft<R::Scalar>) -> Self {
-        // SAFETY: the contract of `simd`.
+        // SAFETY: the caller upholds the contract of `simd`.
         unsafe {
-            SoftAt {
+            SoftTerm {
                 strength: TableLookup::new(&term.strength),
                 inverse_range: TableLookup::new(&term.inverse_range),
                 energy: TableLookup::new(&term.energy),
@@ -245,7 +196,7 @@ impl<R: Reals> SoftAt<R> {
     }
 }
 
-impl<R: Reals> Term<R> for SoftAt<R> {
+impl<R: Reals> Term<R> for SoftTerm<R> {
     #[inline(always)]
     unsafe fn add<const MULTISPECIES: bool, const TALLY: bool>(
         &self,
@@ -255,7 +206,7 @@ impl<R: Reals> Term<R> for SoftAt<R> {
         pair_weight: R,
         energy: &mut R,
     ) -> R {
-        // SAFETY: the contract of `simd`.
+        // SAFETY: the caller upholds the contract of `simd`.
         unsafe {
             let (one, zero) = (R::constant(1.0), R::constant(0.0));
             let t = (one - r * self.inverse_range.lookup::<MULTISPECIES>(species_pair)).larger(zero);
@@ -269,19 +220,22 @@ impl<R: Reals> Term<R> for SoftAt<R> {
 }
 
 /// Adds the forces of a soft term.
+///
+/// # Safety
+/// As [`each`].
 #[inline(always)]
 pub unsafe fn add_soft<R: Reals, const MULTISPECIES: bool, const TALLY: bool>(
     term: &Soft<R::Scalar>,
-    buffers: &mut PairBuffers<R::Scalar>,
+    buffers: &mut BatchBuffers<R::Scalar>,
     vectors: usize,
     energy: &mut R,
 ) {
-    // SAFETY: the contract of `simd`.
-    unsafe { each::<R, MULTISPECIES, TALLY>(SoftAt::<R>::new(term), buffers, vectors, energy) }
+    // SAFETY: the caller upholds the contract of `simd`.
+    unsafe { each::<R, MULTISPECIES, TALLY>(SoftTerm::<R>::new(term), buffers, vectors, energy) }
 }
 
 /// `φ = (c_αβ + c_βα) w(r)`, for one kernel of the force.
-struct LinearAt<R: Reals, S> {
+struct LinearTerm<R: Reals, S> {
     species_pair: KernelKind,
     inverse_range: R,
     force_inverse_range: R,
@@ -290,7 +244,7 @@ struct LinearAt<R: Reals, S> {
     shape: PhantomData<S>,
 }
 
-impl<R: Reals, S: Shape> Term<R> for LinearAt<R, S> {
+impl<R: Reals, S: Shape> Term<R> for LinearTerm<R, S> {
     #[inline(always)]
     unsafe fn add<const MULTISPECIES: bool, const TALLY: bool>(
         &self,
@@ -300,7 +254,7 @@ impl<R: Reals, S: Shape> Term<R> for LinearAt<R, S> {
         pair_weight: R,
         energy: &mut R,
     ) -> R {
-        // SAFETY: the contract of `simd`.
+        // SAFETY: the caller upholds the contract of `simd`.
         unsafe {
             let one = R::constant(1.0);
             if TALLY {
@@ -316,10 +270,13 @@ impl<R: Reals, S: Shape> Term<R> for LinearAt<R, S> {
 }
 
 /// Adds the forces of a density that every ψ is linear in.
+///
+/// # Safety
+/// As [`each`].
 #[inline(always)]
 pub unsafe fn add_linear<R: Reals, const MULTISPECIES: bool, const TALLY: bool>(
     term: &Linear<R::Scalar>,
-    buffers: &mut PairBuffers<R::Scalar>,
+    buffers: &mut BatchBuffers<R::Scalar>,
     vectors: usize,
     energy: &mut R,
 ) {
@@ -328,7 +285,7 @@ pub unsafe fn add_linear<R: Reals, const MULTISPECIES: bool, const TALLY: bool>(
 
 struct AddLinear<'a, R: Reals, const MULTISPECIES: bool, const TALLY: bool> {
     term: &'a Linear<R::Scalar>,
-    buffers: &'a mut PairBuffers<R::Scalar>,
+    buffers: &'a mut BatchBuffers<R::Scalar>,
     vectors: usize,
     energy: &'a mut R,
 }
@@ -340,9 +297,9 @@ impl<R: Reals, const MULTISPECIES: bool, const TALLY: bool> ShapeVisitor
 
     #[inline(always)]
     fn visit<S: Shape>(self) {
-        // SAFETY: the contract of `simd`, by way of `add_linear`.
+        // SAFETY: made by `add_linear` alone, whose caller upholds the contract.
         unsafe {
-            let term = LinearAt::<R, S> {
+            let term = LinearTerm::<R, S> {
                 species_pair: self.term.kernel,
                 inverse_range: R::splat(self.term.inverse_range),
                 force_inverse_range: R::splat(self.term.force_inverse_range),
@@ -367,14 +324,14 @@ impl<R: Reals> ShapeVisitor for Value<R> {
 }
 
 /// `φ = a [A W(r, R_A) − B W(r, R_B)]`.
-struct SplineAt<R: Reals> {
+struct SplineTerm<R: Reals> {
     repulsion: TableLookup<R>,
     attraction: TableLookup<R>,
     repulsion_inverse_range: TableLookup<R>,
     attraction_inverse_range: TableLookup<R>,
 }
 
-impl<R: Reals> Term<R> for SplineAt<R> {
+impl<R: Reals> Term<R> for SplineTerm<R> {
     #[inline(always)]
     unsafe fn add<const MULTISPECIES: bool, const TALLY: bool>(
         &self,
@@ -384,7 +341,7 @@ impl<R: Reals> Term<R> for SplineAt<R> {
         pair_weight: R,
         energy: &mut R,
     ) -> R {
-        // SAFETY: the contract of `simd`.
+        // SAFETY: the caller upholds the contract of `simd`.
         unsafe {
             let (one, zero) = (R::constant(1.0), R::constant(0.0));
             let inverse_a = self.repulsion_inverse_range.lookup::<MULTISPECIES>(species_pair);
@@ -406,16 +363,19 @@ impl<R: Reals> Term<R> for SplineAt<R> {
 }
 
 /// Adds the forces of spline potentials.
+///
+/// # Safety
+/// As [`each`].
 #[inline(always)]
 pub unsafe fn add_spline<R: Reals, const MULTISPECIES: bool, const TALLY: bool>(
     term: &Spline<R::Scalar>,
-    buffers: &mut PairBuffers<R::Scalar>,
+    buffers: &mut BatchBuffers<R::Scalar>,
     vectors: usize,
     energy: &mut R,
 ) {
-    // SAFETY: the contract of `simd`.
+    // SAFETY: the caller upholds the contract of `simd`.
     unsafe {
-        let term = SplineAt::<R> {
+        let term = SplineTerm::<R> {
             repulsion: TableLookup::new(&term.repulsion),
             attraction: TableLookup::new(&term.attraction),
             repulsion_inverse_range: TableLookup::new(&term.repulsion_inverse_range),

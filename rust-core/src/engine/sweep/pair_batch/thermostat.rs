@@ -1,42 +1,42 @@
-//! Noise and drag of a vector of pairs.
+//! Random and dissipative forces of pairs.
 
 use crate::engine::noise::{PAIR_ROUNDS, PARITY, PairNoise, ROTATIONS};
 use crate::engine::sweep::ground::arithmetic::PairVector;
-use crate::engine::sweep::ground::terms::{Exponent, SpeciesPairTable, ThermostatTables};
-use crate::engine::sweep::pair_batch::pair_terms::TableLookup;
+use crate::engine::sweep::ground::species_pairs::{SpeciesPairTable, TableLookup};
+use crate::engine::sweep::ground::terms::{Exponent, ThermostatTables};
 use crate::engine::sweep::simd::{Reals, Scalar, Words};
 
-/// `√3/2³¹`: signed words to numbers of unit variance.
+/// `√3/2³¹`: turns signed words into numbers of unit variance.
 pub const NOISE_UNIT: f64 = 1.732_050_807_568_877_2 / 2_147_483_648.0;
 
 const _: () = assert!(PAIR_ROUNDS == 13);
 
-/// Words of noise of `count` pairs: Threefry2x32 of their two tags, in order. They replace the first tags;
-/// runs over by two vectors.
+/// Draws a word of noise for each of `count` pairs: Threefry2x32 of their two tags in ascending order. The words replace the
+/// first tags.
 ///
 /// # Safety
-/// The contract of `simd`.
+/// The contract of `simd`. Both arrays have room for two vectors behind the last pair.
 #[inline(always)]
 pub unsafe fn draw<W: Words>(noise: PairNoise, a: *mut u32, b: *const u32, count: usize) {
-    // SAFETY: the caller's.
+    // SAFETY: the caller upholds it.
     unsafe {
         let [k0, k1] = noise.key();
         let schedule = [W::splat(k0), W::splat(k1), W::splat(PARITY ^ k0 ^ k1)];
         let mut k = 0;
         while k < count {
-            // Two vectors by turns: one alone waits for itself.
+            // Two vectors in turn: each hides the latency of the other.
             let (a0, b0) = (W::load(a.add(k)), W::load(b.add(k)));
             let (a1, b1) = (W::load(a.add(k + W::LANES)), W::load(b.add(k + W::LANES)));
             let mut x0 = [a0.min(b0).add(schedule[0]), a1.min(b1).add(schedule[0])];
             let mut x1 = [a0.max(b0).add(schedule[1]), a1.max(b1).add(schedule[1])];
-            // Written out: rotations by constants are one instruction.
+            // Unrolled: rotations by constants take one instruction.
             (x0, x1) = four_rounds(x0, x1, 0);
             (x0, x1) = inject(x0, x1, &schedule, 1);
             (x0, x1) = four_rounds(x0, x1, 4);
             (x0, x1) = inject(x0, x1, &schedule, 2);
             (x0, x1) = four_rounds(x0, x1, 0);
             (x0, x1) = inject(x0, x1, &schedule, 3);
-            // Of the last round only the first word is of use.
+            // Only the first word of the last round is used.
             let sign = W::splat(0x8000_0000);
             x0[0].add(x1[0]).xor(sign).store(a.add(k));
             x0[1].add(x1[1]).xor(sign).store(a.add(k + W::LANES));
@@ -45,10 +45,10 @@ pub unsafe fn draw<W: Words>(noise: PairNoise, a: *mut u32, b: *const u32, count
     }
 }
 
-/// Four rounds of Threefry from round `at` of eight on.
+/// Four rounds of Threefry, with rotations from number `at` on.
 #[inline(always)]
 unsafe fn four_rounds<W: Words>(x0: [W; 2], x1: [W; 2], at: usize) -> ([W; 2], [W; 2]) {
-    // SAFETY: the contract of `simd`.
+    // SAFETY: called by `draw` alone, whose caller upholds the contract of `simd`.
     unsafe {
         let (x0, x1) = round(x0, x1, ROTATIONS[at]);
         let (x0, x1) = round(x0, x1, ROTATIONS[at + 1]);
@@ -59,7 +59,7 @@ unsafe fn four_rounds<W: Words>(x0: [W; 2], x1: [W; 2], at: usize) -> ([W; 2], [
 
 #[inline(always)]
 unsafe fn round<W: Words>([a0, b0]: [W; 2], [a1, b1]: [W; 2], by: u32) -> ([W; 2], [W; 2]) {
-    // SAFETY: the contract of `simd`.
+    // SAFETY: called by `draw` alone, whose caller upholds the contract of `simd`.
     unsafe {
         let x0 = [a0.add(a1), b0.add(b1)];
         let turned = [a1.rotate(by), b1.rotate(by)];
@@ -67,10 +67,10 @@ unsafe fn round<W: Words>([a0, b0]: [W; 2], [a1, b1]: [W; 2], by: u32) -> ([W; 2
     }
 }
 
-/// The injection of the key behind four rounds.
+/// Adds the key after four rounds.
 #[inline(always)]
 unsafe fn inject<W: Words>(x0: [W; 2], x1: [W; 2], schedule: &[W; 3], number: usize) -> ([W; 2], [W; 2]) {
-    // SAFETY: the contract of `simd`.
+    // SAFETY: called by `draw` alone, whose caller upholds the contract of `simd`.
     unsafe {
         let first = schedule[number % 3];
         let second = schedule[(number + 1) % 3].add(W::splat(number as u32));
@@ -78,7 +78,7 @@ unsafe fn inject<W: Words>(x0: [W; 2], x1: [W; 2], schedule: &[W; 3], number: us
     }
 }
 
-/// Drag and noise at hand.
+/// The tables of the thermostat, prepared for a loop over pairs.
 pub struct ThermostatForce<'a, R: Reals> {
     gamma: TableLookup<R>,
     sigma: TableLookup<R>,
@@ -88,7 +88,7 @@ pub struct ThermostatForce<'a, R: Reals> {
     noise_scale: R,
 }
 
-/// How `w_R` comes from `1 − r/R`.
+/// The exponent of `w_R`, the power of `1 − r/R`.
 enum Power<'a, T> {
     One,
     Two,
@@ -100,7 +100,7 @@ impl<'a, R: Reals> ThermostatForce<'a, R> {
     /// The contract of `simd`.
     #[inline(always)]
     pub unsafe fn new(tables: &'a ThermostatTables<R::Scalar>, noise_scale: R) -> Self {
-        // SAFETY: the caller's.
+        // SAFETY: the caller upholds it.
         unsafe {
             ThermostatForce {
                 gamma: TableLookup::new(&tables.gamma),
@@ -122,7 +122,7 @@ impl<'a, R: Reals> ThermostatForce<'a, R> {
     /// The contract of `simd`.
     #[inline(always)]
     pub unsafe fn force<const MULTISPECIES: bool>(&self, pairs: &PairVector<R>, word: R::Words) -> R {
-        // SAFETY: the caller's.
+        // SAFETY: the caller upholds it.
         unsafe {
             let (one, zero) = (R::constant(1.0), R::constant(0.0));
             let species_pair = pairs.species_pair;
@@ -142,7 +142,7 @@ impl<'a, R: Reals> ThermostatForce<'a, R> {
     }
 }
 
-/// `t^e` where `t` is above zero, zero elsewhere.
+/// `t^e` for positive `t`, else zero: the library function, lane by lane.
 #[inline(always)]
 unsafe fn power<R: Reals>(t: R, exponent: R) -> R {
     let (mut bases, mut exponents) = ([R::Scalar::default(); 16], [R::Scalar::default(); 16]);

@@ -1,8 +1,8 @@
 //! AVX2 with FMA and BMI2.
 
-use super::avx512::{F64x4 as Quad4, operators};
+use super::x86::{Quad4, operators};
 use super::{BroadcastPair, Isa, ORDINARY_F32, ORDINARY_F64, Reals, Words, record_at, wide_record_at};
-use crate::engine::sweep::ground::arithmetic::OFFSET_BITS;
+use crate::engine::sweep::simd::OFFSET_BITS;
 use crate::model::kernel::Real;
 use std::arch::x86_64::*;
 use std::ops::{Add, Mul, Sub};

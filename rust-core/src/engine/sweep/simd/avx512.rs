@@ -1,7 +1,8 @@
 //! AVX-512 (F, BW, DQ, VL, VBMI2), with AVX2, FMA and BMI2.
 
 use super::avx2::U32x8;
-use super::{BroadcastPair, Isa, ORDINARY_F32, ORDINARY_F64, Quad, Reals, Words, record_at, wide_record_at};
+use super::x86::{Quad4, operators};
+use super::{BroadcastPair, Isa, ORDINARY_F32, ORDINARY_F64, Reals, Words, record_at, wide_record_at};
 use crate::model::kernel::Real;
 use std::arch::x86_64::*;
 use std::ops::{Add, Mul, Sub};
@@ -21,49 +22,6 @@ pub struct F64x8(__m512d);
 /// Sixteen `u32`.
 #[derive(Clone, Copy)]
 pub struct U32x16(__m512i);
-
-/// Four `f64`.
-#[derive(Clone, Copy)]
-pub struct F64x4(__m256d);
-
-/// Operators, from intrinsics. They are safe functions because operators are; see the contract of the
-/// module above.
-macro_rules! operators {
-    ($vector:ident, $constant:ident as $scalar:ty, $add:ident, $sub:ident, $mul:ident, $max:ident) => {
-        impl Add for $vector {
-            type Output = Self;
-            #[inline(always)]
-            fn add(self, other: Self) -> Self {
-                unsafe { Self($add(self.0, other.0)) }
-            }
-        }
-        impl Sub for $vector {
-            type Output = Self;
-            #[inline(always)]
-            fn sub(self, other: Self) -> Self {
-                unsafe { Self($sub(self.0, other.0)) }
-            }
-        }
-        impl Mul for $vector {
-            type Output = Self;
-            #[inline(always)]
-            fn mul(self, other: Self) -> Self {
-                unsafe { Self($mul(self.0, other.0)) }
-            }
-        }
-        impl Real for $vector {
-            #[inline(always)]
-            fn constant(x: f64) -> Self {
-                unsafe { Self($constant(x as $scalar)) }
-            }
-            #[inline(always)]
-            fn larger(self, other: Self) -> Self {
-                unsafe { Self($max(self.0, other.0)) }
-            }
-        }
-    };
-}
-pub(super) use operators;
 
 operators!(F32x16, _mm512_set1_ps as f32, _mm512_add_ps, _mm512_sub_ps, _mm512_mul_ps, _mm512_max_ps);
 operators!(F64x8, _mm512_set1_pd as f64, _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd, _mm512_max_pd);
@@ -347,41 +305,6 @@ impl Words for U32x16 {
     }
 }
 
-impl Quad for F64x4 {
-    #[inline(always)]
-    unsafe fn zero() -> Self {
-        unsafe { F64x4(_mm256_setzero_pd()) }
-    }
-    #[inline(always)]
-    unsafe fn splat(x: f64) -> Self {
-        unsafe { F64x4(_mm256_set1_pd(x)) }
-    }
-    #[inline(always)]
-    unsafe fn load(p: *const f64) -> Self {
-        unsafe { F64x4(_mm256_loadu_pd(p)) }
-    }
-    #[inline(always)]
-    unsafe fn store(self, p: *mut f64) {
-        unsafe { _mm256_storeu_pd(p, self.0) }
-    }
-    #[inline(always)]
-    unsafe fn add(self, other: Self) -> Self {
-        unsafe { F64x4(_mm256_add_pd(self.0, other.0)) }
-    }
-    #[inline(always)]
-    unsafe fn sub(self, other: Self) -> Self {
-        unsafe { F64x4(_mm256_sub_pd(self.0, other.0)) }
-    }
-    #[inline(always)]
-    unsafe fn mul(self, other: Self) -> Self {
-        unsafe { F64x4(_mm256_mul_pd(self.0, other.0)) }
-    }
-    #[inline(always)]
-    unsafe fn load_f32(p: *const f32) -> Self {
-        unsafe { F64x4(_mm256_cvtps_pd(_mm_loadu_ps(p))) }
-    }
-}
-
 /// Four numbers of the rows twice `offsets` bytes behind `base`.
 #[inline(always)]
 unsafe fn four_columns(base: *const u8, offsets: *const u32) -> [F64x8; 4] {
@@ -468,7 +391,7 @@ unsafe fn places(j_bases: __m512, bits: __m128i, p: *mut u32) {
 impl Isa for Avx512 {
     type F32 = F32x16;
     type F64 = F64x8;
-    type Quad = F64x4;
+    type Quad = Quad4;
 
     #[inline(always)]
     unsafe fn distance_masks<const SHIFTS: bool>(

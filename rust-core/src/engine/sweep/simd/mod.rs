@@ -1,26 +1,35 @@
 //! Vectors of numbers for each instruction set, behind one set of traits.
 //!
-//! Kernels are written once, generic in [`Isa`], and compiled for an instruction set by a wrapper with
-//! `#[target_feature]` into which everything here is inlined. Outside such a wrapper nothing here may
-//! be called, except on [`Portable`]: that is the safety contract of every `unsafe fn` of these
-//! traits, together with pointers being valid for as many elements as a vector has lanes.
+//! Kernels are written once, generic in [`Isa`], and compiled for an instruction set by [`run`], into which everything here
+//! is inlined.
+//!
+//! Why this is sound: vectors of an instruction set may be used only where the processor has it. Their types are private
+//! to this module, which names them in one place: [`run`], which takes an [`InstructionSet`], and there is one only of
+//! what the processor has. All other code is generic, and is compiled for these types only below [`run`]. So operators and
+//! other safe functions of the traits ask for nothing more, and `unsafe` functions ask for what their arguments say:
+//! pointers are valid for as many elements as a vector has lanes, unless another number is given.
+//!
+//! [`InstructionSet`]: crate::engine::instruction_set::InstructionSet
 
-// That contract stands for the reason of each of some hundred blocks.
+// Those two reasons, the types and the pointers, stand for that of each of some hundred blocks.
 #![allow(clippy::undocumented_unsafe_blocks)]
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
+mod dispatch;
 mod portable;
+#[cfg(target_arch = "x86_64")]
+mod x86;
 
-#[cfg(target_arch = "x86_64")]
-pub use avx2::Avx2;
-#[cfg(target_arch = "x86_64")]
-pub use avx512::Avx512;
-pub use portable::Portable;
+pub use dispatch::{Kernel, run};
 
 use crate::model::kernel::Real;
+
+/// Indices of particles are shifted by so many bits, to be byte offsets into accumulators and into packed particles of mixed
+/// precision, of 32 bytes each.
+pub const OFFSET_BITS: u32 = 5;
 
 /// `f32` or `f64`.
 pub trait Scalar: Copy + Default + Send + Sync + PartialOrd + 'static {

@@ -1,7 +1,7 @@
 //! Plain arrays, which the compiler vectorises for whatever the target has.
 
 use super::{BroadcastPair, Isa, ORDINARY_F32, ORDINARY_F64, Quad, Reals, Words, record_at, wide_record_at};
-use crate::engine::sweep::ground::arithmetic::OFFSET_BITS;
+use crate::engine::sweep::simd::OFFSET_BITS;
 use crate::model::kernel::Real;
 use std::ops::{Add, Mul, Sub};
 

@@ -150,7 +150,7 @@ fn what_is_around_a_rank_has_to_fit() {
     assert!(sweep.fits(&open));
     let open = Cloud { domain: open, ..cloud.clone() };
     let (force, tally) = plain(&fluid, &open);
-    let (here, totals) = data(&mut sweep, &open, Want::TOTALS);
+    let (here, totals) = swept(&mut sweep, &open, Want::TOTALS);
     assert!(difference(&force, &here).max(tally_difference(&tally, &totals)) < tolerance(Precision::Mixed));
     let around = |domain, images| Around { domain, images };
     let mut first = |around| sweep.first(around, &cloud.particles(), &cloud.v, Some(STEP), Want::FORCES);

@@ -5,342 +5,300 @@
 //! Each thread does a slab of planes. ψ of a plane needs the first pass of that plane and of the one before; many-body
 //! forces need ψ of the plane and of the one behind; forces are complete after both passes of the plane and of the one
 //! before. The arrays in the order of cells are filled one plane ahead. Where slabs meet, planes wait for all threads.
+//!
+//! Who accesses what: a [`ThreadSlab`] and its [`SlabSums`] hold what only its thread accesses. Two things are accessed
+//! by several threads. Packed particles are written by the thread of their slab, one plane ahead of its first pass, and
+//! read by it and, those of the slab's first plane and a vector behind, by the thread of the slab before: those places
+//! are filled before any pass begins. Slopes are written by the thread of their slab; those of its first plane are read by
+//! the thread of the slab before too, in a round of its own after all are written.
 
-use super::host::ForceSink;
-use super::{Input, SharedArrays, VECTOR_PADDING, Workspace};
-use crate::engine::error::EngineError;
-use crate::engine::plan::Plan;
-use crate::engine::sweep::Times;
-use crate::engine::sweep::compiled::Compiled;
-use crate::engine::sweep::ground::pass_data::PassData;
-use crate::engine::sweep::ground::shared_ptr::SharedPtr;
-use crate::engine::sweep::lap;
-use crate::engine::sweep::many_body::in_range_pairs::InRangePairs;
-use crate::engine::sweep::pool::Pool;
+use super::accumulators::{SlabSums, Sums};
+use super::cell_order::CellOrder;
+use super::excess::{DENSITY_BLOCK, DensityBlock, ExcessInput};
+use super::fluid_constants::FluidConstants;
+use super::forces::ForceSink;
+use super::input::Input;
+use super::shared_particles::SharedParticles;
+use super::slopes::SharedSlopes;
+use super::thread_slab::ThreadSlab;
+use crate::engine::sweep::cells::sorted::VECTOR_PADDING;
+use crate::engine::sweep::pair_batch::accumulators::{Accumulator, PlaneSums};
+use crate::engine::sweep::passes::data::PassData;
+use crate::engine::sweep::passes::{PairPrecision, Passes};
+use crate::engine::sweep::times::lap;
 use std::ops::Range;
 use std::time::Instant;
 
-/// Planes of a thread slab whose pairs are kept at once: its first, its last, and two between.
-const KEPT_PLANES: usize = 4;
-
 /// What all threads work with.
-struct Scheduler<'a, P: Compiled> {
-    workspace: &'a Workspace<P>,
-    data: PassData<'a, P::Scalar, P::PackedParticle>,
-    arrays: SharedArrays<P>,
-    /// Whether pairs of all planes are kept, not of some only.
-    keeps_all: bool,
+pub struct Scheduler<'a, P: PairPrecision> {
+    pub fluid: &'a FluidConstants<P::Scalar>,
+    pub passes: Passes<P>,
+    pub order: &'a CellOrder,
+    pub data: PassData<'a, P::Scalar, P::PackedParticle>,
+    pub particles: &'a SharedParticles<'a, P::PackedParticle>,
+    pub slopes: SharedSlopes<'a, P::Scalar>,
 }
 
 /// What the passes before the slopes are given.
-struct PassInput<'a> {
-    plan: &'a Plan,
-    input: &'a Input<'a>,
-    /// What particles add to their own densities, unless ψ is zero whatever they are.
-    own: Option<Vec<f64>>,
+pub struct PassInput<'a> {
+    pub input: &'a Input<'a>,
+    /// None if ψ is zero.
+    pub excess: Option<ExcessInput<'a>>,
     /// Where forces go, if the second pass follows at once.
-    out: Option<ForceSink<'a>>,
+    pub out: Option<ForceSink<'a>>,
 }
 
-/// Work of one thread on its slab, with the times it has taken.
-type Work<'a> = dyn Fn(usize, Range<usize>, &mut Times) + Sync + 'a;
-
-impl<P: Compiled> Workspace<P> {
-    /// Everything that comes after [`Workspace::sort_into_cells`]: the first pass, ψ and the second pass over all planes, and
-    /// their forces. `times` are those of the caller's thread.
-    ///
-    /// # Errors
-    /// ψ that is not finite, or a force: of the lowest tag.
-    pub fn run_all(
-        &mut self,
-        pool: &Pool,
-        plan: &Plan,
-        input: &Input,
-        out: ForceSink,
-        times: &mut Times,
-    ) -> Result<(), EngineError> {
-        let slabs = self.slabs(pool);
-        self.in_range.resize_with(KEPT_PLANES * slabs.len(), InRangePairs::default);
-        self.lay_out(&slabs);
-        self.up_to_slopes(pool, plan, input, Some(out), &slabs, times)?;
-        let arrays = self.arrays();
-        let scheduler = &Scheduler { workspace: self, data: self.data(arrays), arrays, keeps_all: false };
-        on_slabs(pool, &slabs, times, &|t, slab, times| scheduler.second_at_ends(out, t, slab, times));
-        on_slabs(pool, &slabs, times, &|t, slab, times| scheduler.forces_of_first(out, t, slab, times));
-        self.lost()
-    }
-
-    /// What comes after [`Workspace::sort_into_cells`], up to ψ and its slopes.
-    ///
-    /// # Errors
-    /// ψ that is not finite.
-    pub fn first(
-        &mut self,
-        pool: &Pool,
-        plan: &Plan,
-        input: &Input,
-        times: &mut Times,
-    ) -> Result<(), EngineError> {
-        self.in_range.resize_with(self.grid.planes, InRangePairs::default);
-        self.lay_out_all();
-        self.up_to_slopes(pool, plan, input, None, &self.slabs(pool), times)
-    }
-
-    /// What comes after [`Workspace::first`] and [`Workspace::slopes_from_host`]: the second pass, and the forces.
-    ///
-    /// # Errors
-    /// A force that is not finite: of the lowest tag.
-    pub fn second(&mut self, pool: &Pool, out: ForceSink, times: &mut Times) -> Result<(), EngineError> {
-        let slabs = self.slabs(pool);
-        self.copy_slopes();
-        let arrays = self.arrays();
-        let scheduler = &Scheduler { workspace: self, data: self.data(arrays), arrays, keeps_all: true };
-        on_slabs(pool, &slabs, times, &|t, slab, times| scheduler.second_of_all(out, t, slab, times));
-        on_slabs(pool, &slabs, times, &|t, slab, times| scheduler.forces_of_first(out, t, slab, times));
-        self.lost()
-    }
-
-    /// Arrays, first passes and ψ of all planes; the second pass and the forces of those between the ends of slabs if
-    /// there is where to write them.
-    fn up_to_slopes(
-        &mut self,
-        pool: &Pool,
-        plan: &Plan,
-        input: &Input,
-        out: Option<ForceSink>,
-        slabs: &[Range<usize>],
-        times: &mut Times,
-    ) -> Result<(), EngineError> {
-        let own = self.prepare_excess(plan);
-        let arrays = self.arrays();
-        let this = &*self;
-        on_slabs(pool, slabs, times, &|t, slab, times| this.fill_first(arrays, input, t, &slab, times));
-        self.copy_first_plane();
-        let arrays = self.arrays();
-        let pass_input = &PassInput { plan, input, own, out };
-        let scheduler =
-            &Scheduler { workspace: self, data: self.data(arrays), arrays, keeps_all: out.is_none() };
-        on_slabs(pool, slabs, times, &|t, slab, times| scheduler.interior(pass_input, t, slab, times));
-        on_slabs(pool, slabs, times, &|t, slab, times| scheduler.excess_of_first(pass_input, t, slab, times));
-        self.first_fault()?;
-        self.copy_slopes();
-        Ok(())
-    }
-
-    fn slabs(&self, pool: &Pool) -> Vec<Range<usize>> {
-        (0..pool.threads()).map(|t| self.slab(t, pool.threads())).collect()
-    }
-
-    /// The planes of a thread: all slabs have about the same number of pairs.
-    fn slab(&self, t: usize, threads: usize) -> Range<usize> {
-        let planes = self.grid.planes;
-        let mean = self.particles as f64 / planes as f64;
-        // A particle costs something even if it is alone.
-        let cost = |l: usize| self.plane(l).1 as f64 * (self.plane(l).1 as f64 + 0.5 * mean);
-        let all: f64 = (0..planes).map(cost).sum();
-        let mut before = 0.0;
-        let of_plane = (0..planes).map(|l| {
-            let middle = before + 0.5 * cost(l);
-            before += cost(l);
-            if all > 0.0 { ((middle / all * threads as f64) as usize).min(threads - 1) } else { 0 }
-        });
-        let of_plane: Vec<usize> = of_plane.collect();
+/// The planes of each of `threads` threads: all slabs have about the same number of pairs.
+pub fn thread_slabs(order: &CellOrder, threads: usize) -> Vec<Range<usize>> {
+    let planes = order.grid.planes;
+    let mean = order.particles() as f64 / planes as f64;
+    // A particle costs something even if it is alone.
+    let cost = |l: usize| order.plane(l).1 as f64 * (order.plane(l).1 as f64 + 0.5 * mean);
+    let all: f64 = (0..planes).map(cost).sum();
+    let mut before = 0.0;
+    let of_plane = (0..planes).map(|l| {
+        let middle = before + 0.5 * cost(l);
+        before += cost(l);
+        if all > 0.0 { ((middle / all * threads as f64) as usize).min(threads - 1) } else { 0 }
+    });
+    let of_plane: Vec<usize> = of_plane.collect();
+    let slab = |t: usize| {
         let first = of_plane.iter().position(|of| *of >= t).unwrap_or(planes);
-        let end = of_plane.iter().position(|of| *of > t).unwrap_or(planes);
-        first..end
-    }
+        first..of_plane.iter().position(|of| *of > t).unwrap_or(planes)
+    };
+    (0..threads).map(slab).collect()
+}
 
-    /// The last place before a plane, or behind all, from which on whole vectors are filled.
-    fn vectors_before(&self, plane: usize) -> usize {
-        self.start[plane * self.grid.columns_per_plane * self.grid.cells_per_column] as usize / VECTOR_PADDING
-            * VECTOR_PADDING
-    }
+/// The last place before a plane, or behind all, from which on whole vectors are filled.
+fn vectors_before(order: &CellOrder, plane: usize) -> usize {
+    order.plane_start(plane) / VECTOR_PADDING * VECTOR_PADDING
+}
 
-    /// The places that the thread of a slab fills: all vectors that begin in it, and the one across its beginning.
-    fn sorted_range(&self, slab: &Range<usize>) -> Range<usize> {
-        self.vectors_before(slab.start)..self.vectors_before(slab.end)
+/// The places that the thread of a slab fills, as far as its first `planes` need them: all vectors that begin in them, the
+/// one across the beginning of the slab, and those behind, as neighbours are compared in sixteens, up to two of which begin
+/// behind the last. All of the slab's, if they stay in the cache.
+fn needed(order: &CellOrder, slab: &Range<usize>, planes: usize) -> Range<usize> {
+    let (start, end) = (vectors_before(order, slab.start), vectors_before(order, slab.end));
+    if !order.exceeds_cache() {
+        return start..end;
     }
+    let behind = (slab.start + planes).min(slab.end);
+    start..(vectors_before(order, behind) + 4 * VECTOR_PADDING).min(end)
+}
 
-    /// Of these the places that the first `planes` of a thread slab need: neighbours are compared in sixteens, up to two of which
-    /// begin behind the last. All, if they stay in the cache.
-    fn needed(&self, slab: &Range<usize>, planes: usize) -> Range<usize> {
-        let Range { start, end } = self.sorted_range(slab);
-        if !self.exceeds_cache() {
-            return start..end;
-        }
-        let behind = (slab.start + planes).min(slab.end);
-        start..(self.vectors_before(behind) + 4 * VECTOR_PADDING).min(end)
-    }
-
-    /// Fills what the thread slab before needs of a thread slab, and the last particles that are no whole vector.
-    fn fill_first(
-        &self,
-        arrays: SharedArrays<P>,
+impl<P: PairPrecision> Scheduler<'_, P> {
+    /// Fills what the thread slab before needs of a thread slab, and, once, the last particles that are no whole vector.
+    pub fn fill_start(
+        particles: &SharedParticles<P::PackedParticle>,
+        fluid: &FluidConstants<P::Scalar>,
+        order: &CellOrder,
         input: &Input,
-        t: usize,
-        slab: &Range<usize>,
-        times: &mut Times,
+        slab: &mut ThreadSlab<P::Scalar>,
+        is_first: bool,
     ) {
         let mut since = Instant::now();
-        // SAFETY: places of this thread; behind the last there is room for a vector, and nothing yet.
+        // SAFETY: places of different slabs are disjoint, and each slab is of one thread. The places from the last whole
+        // vector on are of no slab; one thread fills them. No pass reads any yet.
         unsafe {
-            if t == 0 {
-                self.fill_sorted_range(arrays, input, self.vectors_before(self.grid.planes)..self.particles);
+            if is_first {
+                let rest = vectors_before(order, order.grid.planes)..order.particles();
+                particles.fill(fluid.set, order, input, rest);
             }
-            self.fill_sorted_range(arrays, input, self.needed(slab, 1));
+            particles.fill(fluid.set, order, input, needed(order, &slab.planes, 1));
         }
-        lap(&mut since, &mut times.sort);
-    }
-}
-
-/// Runs work on each thread slab, by the thread whose it is.
-fn on_slabs(pool: &Pool, slabs: &[Range<usize>], times: &mut Times, work: &Work) {
-    let times = SharedPtr(times as *mut Times);
-    pool.run(&|t| {
-        let mut unseen = Times::default();
-        // SAFETY: of one thread alone.
-        let times = if t == 0 { unsafe { &mut *times.at(0) } } else { &mut unseen };
-        work(t, slabs[t].clone(), times);
-    });
-}
-
-impl<P: Compiled> Scheduler<'_, P> {
-    /// What the first pass of a plane leaves.
-    #[allow(clippy::mut_from_ref)] // Each thread has its own.
-    unsafe fn in_range(&self, t: usize, slab: &Range<usize>, plane: usize) -> &mut InRangePairs<P::Scalar> {
-        let at = match plane {
-            _ if self.keeps_all => plane,
-            _ if plane == slab.start => KEPT_PLANES * t,
-            _ if plane + 1 == slab.end => KEPT_PLANES * t + 1,
-            _ => KEPT_PLANES * t + 2 + plane % 2,
-        };
-        // SAFETY: one of the thread's own.
-        unsafe { &mut *self.arrays.in_range.at(at) }
+        lap(&mut since, &mut slab.state.times.sort);
     }
 
     /// Arrays and first passes of a thread slab, and ψ of all its planes but the first; if forces have a place to go, the second
     /// pass of those between, and the forces of those of them that are not next to the first.
-    fn interior(&self, pass_input: &PassInput, t: usize, slab: Range<usize>, times: &mut Times) {
-        // SAFETY: each thread has its own scratch.
-        let scratch = unsafe { &mut *self.arrays.scratch.at(t) };
-        (scratch.fault, scratch.lost) = (None, None);
+    ///
+    /// # Safety
+    /// The starts of all slabs are filled, and the copies of the first plane are there. Other threads do the same with
+    /// slabs of theirs, and nothing else.
+    pub unsafe fn interior(&self, input: &PassInput, slab: &mut ThreadSlab<P::Scalar>, sums: &mut SlabSums) {
+        (slab.state.fault, slab.state.lost) = (None, None);
         let mut since = Instant::now();
-        let mut filled = self.workspace.needed(&slab, 1).end;
-        for plane in slab.clone() {
-            let end = self.workspace.needed(&slab, plane - slab.start + 2).end;
-            // SAFETY: places of this thread, of planes that no pass has come to.
-            unsafe { self.workspace.fill_sorted_range(self.arrays, pass_input.input, filled..end) };
+        let planes = slab.planes.clone();
+        let mut filled = needed(self.order, &planes, 1).end;
+        for plane in planes.clone() {
+            let end = needed(self.order, &planes, plane - planes.start + 2).end;
+            // SAFETY: places of this slab, behind those that were filled at the start: no other thread accesses them.
+            unsafe { self.particles.fill(self.fluid.set, self.order, input.input, filled..end) };
             filled = end;
-            lap(&mut since, &mut times.sort);
-            // SAFETY: of this thread's slab.
-            unsafe {
-                let in_range = self.in_range(t, &slab, plane);
-                self.workspace.first_of_plane(&self.data, self.arrays, plane, &mut scratch.buffers, in_range);
+            lap(&mut since, &mut slab.state.times.sort);
+            // SAFETY: this plane and the next are filled, with the vectors behind; if the next is of another slab, or a
+            // copy, since the start.
+            unsafe { self.first(slab, sums, plane) };
+            lap(&mut since, &mut slab.state.times.first);
+            if plane > planes.start {
+                // SAFETY: no second pass but this thread's reads slopes of a plane that is not the first of its slab.
+                unsafe { self.excess(input, slab, sums.sums(), plane) };
+                lap(&mut since, &mut slab.state.times.excess);
             }
-            lap(&mut since, &mut times.first);
-            if plane > slab.start {
-                self.excess(pass_input, t, plane);
-                lap(&mut since, &mut times.excess);
+            let Some(out) = input.out else { continue };
+            if plane > planes.start + 1 {
+                // SAFETY: ψ of `plane - 1` and `plane`, both of this slab, has been evaluated.
+                unsafe { self.second(slab, sums, plane - 1) };
+                lap(&mut since, &mut slab.state.times.second);
             }
-            let Some(out) = pass_input.out else { continue };
-            if plane > slab.start + 1 {
-                self.second(t, &slab, plane - 1);
-                lap(&mut since, &mut times.second);
-            }
-            if plane > slab.start + 2 {
-                self.forces(out, t, plane - 1);
-                lap(&mut since, &mut times.forces);
+            if plane > planes.start + 2 {
+                self.forces(out, slab, sums.sums(), plane - 1);
+                lap(&mut since, &mut slab.state.times.forces);
             }
         }
     }
 
     /// ψ of the first plane of a thread slab, which the last of another adds to.
-    fn excess_of_first(&self, pass_input: &PassInput, t: usize, slab: Range<usize>, times: &mut Times) {
+    ///
+    /// # Safety
+    /// The interior of all slabs is done. Other threads do the same with slabs of theirs, and nothing else.
+    pub unsafe fn excess_of_first(&self, input: &PassInput, slab: &mut ThreadSlab<P::Scalar>, sums: Sums) {
         let mut since = Instant::now();
-        if !slab.is_empty() {
-            self.excess(pass_input, t, slab.start);
+        if !slab.planes.is_empty() {
+            // SAFETY: no second pass is under way.
+            unsafe { self.excess(input, slab, sums, slab.planes.start) };
         }
-        lap(&mut since, &mut times.excess);
+        lap(&mut since, &mut slab.state.times.excess);
     }
 
     /// The second pass of the first plane of a thread slab, and of the last; the forces of the second, and of the last.
-    fn second_at_ends(&self, out: ForceSink, t: usize, slab: Range<usize>, times: &mut Times) {
+    ///
+    /// # Safety
+    /// All slopes are there, those of the copies too, and nobody writes any.
+    pub unsafe fn second_at_ends(
+        &self,
+        out: ForceSink,
+        slab: &mut ThreadSlab<P::Scalar>,
+        sums: &mut SlabSums,
+    ) {
         let mut since = Instant::now();
-        if !slab.is_empty() {
-            self.second(t, &slab, slab.start);
-            if slab.len() > 1 {
-                self.second(t, &slab, slab.end - 1);
+        let planes = slab.planes.clone();
+        if !planes.is_empty() {
+            // SAFETY: all slopes are there, as the caller promises.
+            unsafe { self.second(slab, sums, planes.start) };
+            if planes.len() > 1 {
+                // SAFETY: all slopes are there, as the caller promises.
+                unsafe { self.second(slab, sums, planes.end - 1) };
             }
         }
-        lap(&mut since, &mut times.second);
-        if slab.len() > 1 {
-            self.forces(out, t, slab.start + 1);
+        lap(&mut since, &mut slab.state.times.second);
+        if planes.len() > 1 {
+            self.forces(out, slab, sums.sums(), planes.start + 1);
         }
-        if slab.len() > 2 {
-            self.forces(out, t, slab.end - 1);
+        if planes.len() > 2 {
+            self.forces(out, slab, sums.sums(), planes.end - 1);
         }
-        lap(&mut since, &mut times.forces);
+        lap(&mut since, &mut slab.state.times.forces);
     }
 
     /// The second pass of a thread slab, and the forces of all its planes but the first.
-    fn second_of_all(&self, out: ForceSink, t: usize, slab: Range<usize>, times: &mut Times) {
-        // SAFETY: each thread has its own scratch.
-        unsafe { (*self.arrays.scratch.at(t)).lost = None };
+    ///
+    /// # Safety
+    /// All slopes are there, those of the copies too, and nobody writes any.
+    pub unsafe fn second_of_all(
+        &self,
+        out: ForceSink,
+        slab: &mut ThreadSlab<P::Scalar>,
+        sums: &mut SlabSums,
+    ) {
+        slab.state.lost = None;
         let mut since = Instant::now();
-        for plane in slab.clone() {
-            self.second(t, &slab, plane);
-            lap(&mut since, &mut times.second);
-            if plane > slab.start {
-                self.forces(out, t, plane);
-                lap(&mut since, &mut times.forces);
+        for plane in slab.planes.clone() {
+            // SAFETY: all slopes are there, as the caller promises.
+            unsafe { self.second(slab, sums, plane) };
+            lap(&mut since, &mut slab.state.times.second);
+            if plane > slab.planes.start {
+                self.forces(out, slab, sums.sums(), plane);
+                lap(&mut since, &mut slab.state.times.forces);
             }
         }
     }
 
     /// The forces of the first plane of a thread slab, which the last of another adds to.
-    fn forces_of_first(&self, out: ForceSink, t: usize, slab: Range<usize>, times: &mut Times) {
+    pub fn forces_of_first(&self, out: ForceSink, slab: &mut ThreadSlab<P::Scalar>, sums: Sums) {
         let mut since = Instant::now();
-        if !slab.is_empty() {
-            self.forces(out, t, slab.start);
+        if !slab.planes.is_empty() {
+            self.forces(out, slab, sums, slab.planes.start);
         }
-        lap(&mut since, &mut times.forces);
+        lap(&mut since, &mut slab.state.times.forces);
     }
 
-    fn excess(&self, pass_input: &PassInput, t: usize, plane: usize) {
-        let Some(own) = &pass_input.own else { return };
-        // SAFETY: each thread has its own scratch, each plane is done once.
-        unsafe {
-            let scratch = &mut *self.arrays.scratch.at(t);
-            let done = self.workspace.excess_of_plane(
-                self.arrays,
-                plane,
-                pass_input.plan,
-                own,
-                pass_input.input.particles.tag,
-                &mut scratch.excess,
-            );
-            if let Err(fault) = done {
-                scratch.fault.get_or_insert(fault);
+    /// The first pass of a plane.
+    ///
+    /// # Safety
+    /// The plane and the next are filled, and what whole vectors read behind them; nobody writes there meanwhile.
+    unsafe fn first(&self, slab: &mut ThreadSlab<P::Scalar>, sums: &mut SlabSums, plane: usize) {
+        let (buffers, in_range, tally) = slab.plane(plane);
+        let [forces, densities] = sums.of_plane(self.order, plane);
+        forces.fill(Accumulator::default());
+        densities.fill(Accumulator::default());
+        let sums = PlaneSums::new(self.order.plane_start(plane), forces, densities);
+        // SAFETY: the arrays have the room that `make_room` of each has made for this order, and are filled where the pass
+        // reads them, as the caller promises; the accumulators are those of this plane and the next.
+        *tally = unsafe { self.passes.first(&self.data, plane, sums, buffers, in_range) };
+    }
+
+    /// ψ and its slopes of a plane.
+    ///
+    /// # Safety
+    /// The plane is filled; no other thread reads its slopes meanwhile.
+    unsafe fn excess(&self, input: &PassInput, slab: &mut ThreadSlab<P::Scalar>, sums: Sums, plane: usize) {
+        let Some(excess) = &input.excess else { return };
+        let width = self.fluid.width();
+        let of_plane = self.order.particles_of(&(plane..plane + 1));
+        for first in of_plane.clone().step_by(DENSITY_BLOCK) {
+            let particles = first..of_plane.end.min(first + DENSITY_BLOCK);
+            let (own, count) = (first - slab.first, particles.len());
+            let has_species = self.particles.species.len() > 0;
+            // SAFETY: particles of a plane of this thread's slab, which is filled: nobody writes their species, and nobody
+            // else accesses their slopes, as the caller promises.
+            let (species, slopes) = unsafe {
+                let species = if has_species { particles.clone() } else { 0..0 };
+                (self.particles.species.slice(species), self.slopes.rows_mut(particles.clone()))
+            };
+            let block = DensityBlock {
+                first,
+                added: sums.of_particles(self.order, plane, particles.clone()),
+                species,
+                ghost: self.particles.ghost.get(particles.clone()).unwrap_or_default(),
+                densities: &mut slab.densities[width * own..][..width * count],
+                excess: &mut slab.excess[own..][..count],
+                slopes: &mut *slopes,
+            };
+            if let Err(fault) = block.evaluate(self.fluid, excess, self.order, &mut slab.state.excess) {
+                slab.state.fault.get_or_insert(fault);
+                return;
             }
+            // SAFETY: nobody else accesses the slopes of these particles, as the caller promises.
+            unsafe { self.slopes.pack(particles, slopes) };
         }
     }
 
-    fn second(&self, t: usize, slab: &Range<usize>, plane: usize) {
-        if self.workspace.terms.passes.is_empty() {
+    /// The second pass of a plane.
+    ///
+    /// # Safety
+    /// Slopes of the plane and of the next are there, and nobody writes them.
+    unsafe fn second(&self, slab: &mut ThreadSlab<P::Scalar>, sums: &mut SlabSums, plane: usize) {
+        if self.fluid.terms.passes.is_empty() {
             return;
         }
-        // SAFETY: each plane is done once.
-        unsafe {
-            let in_range = self.in_range(t, slab, plane);
-            self.workspace.second_of_plane(&self.data, self.arrays, plane, in_range);
-        }
+        let (_, in_range, tally) = slab.plane(plane);
+        let [forces, densities] = sums.of_plane(self.order, plane);
+        let sums = PlaneSums::new(self.order.plane_start(plane), forces, densities);
+        // SAFETY: the pairs are those that the first pass of this plane has kept; slopes are there, as the caller promises;
+        // the accumulators are those of this plane and the next.
+        unsafe { self.passes.second(&self.data, sums, in_range, &mut tally.virial) };
     }
 
-    fn forces(&self, out: ForceSink, t: usize, plane: usize) {
-        // SAFETY: each thread has its own scratch, each plane is done once, when all passes that add to it are.
-        unsafe {
-            let scratch = &mut *self.arrays.scratch.at(t);
-            self.workspace.forces_of_plane(self.arrays, plane, out, &mut scratch.lost);
-        }
+    /// The forces of a plane, to the host, when all passes that add to it are done.
+    fn forces(&self, out: ForceSink, slab: &mut ThreadSlab<P::Scalar>, sums: Sums, plane: usize) {
+        assert!(slab.planes.contains(&plane), "a plane of the slab");
+        let particles = self.order.particles_of(&(plane..plane + 1));
+        let added = sums.of_particles(self.order, plane, particles.clone());
+        // SAFETY: an order has each particle once, those of this plane here; the plane is of this thread's slab alone.
+        let lost =
+            unsafe { out.write(self.fluid.set, &self.order.order[particles], self.order.owned, added) };
+        slab.state.planes_written += 1;
+        slab.state.lost = slab.state.lost.into_iter().chain(lost).min();
     }
 }

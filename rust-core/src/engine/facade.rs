@@ -1,0 +1,407 @@
+//! The one door to forces: chooses between the sweep and the reference, evaluation by evaluation.
+
+use super::counts::PassCounts;
+use super::domain::PeriodicBox;
+use super::error::EngineError;
+use super::particles::{Particles, Step};
+use super::path::{Path, Reason};
+use super::plan::Plan;
+use super::reference::Reference;
+use super::settings::Settings;
+use super::surroundings::{Around, Surroundings};
+use super::sweep::{Pool, Sweep, Times};
+use super::tally::{Tally, Want};
+use crate::model::Fluid;
+use crate::model::expression::TooLarge;
+use std::sync::Arc;
+
+/// The forces of one fluid on the particles of a host.
+///
+/// Where all particles are in hand, an evaluation is [`Engine::forces`]. For a rank with ghosts, and for pairs that the
+/// host lists, it is [`Engine::first`], a round of [`Engine::slopes_mut`] from owners to ghosts, and
+/// [`Engine::second`].
+///
+/// Every evaluation takes the fastest [`Path`] that has what is wanted of it; the next one chooses anew.
+#[derive(Debug, Clone)]
+pub struct Engine {
+    reference: Reference,
+    sweep: Sweep,
+    reference_only: bool,
+    /// That of the last evaluation.
+    path: Option<Path>,
+    /// ψ of owned particles and densities in the last evaluation, as far as they have been fetched.
+    excess: Vec<f64>,
+    densities: Vec<f64>,
+}
+
+/// What an evaluation is given, and what is wanted of it.
+#[derive(Debug, Clone, Copy)]
+pub struct Request<'a> {
+    /// The particles.
+    pub particles: Particles<'a>,
+    /// Their velocities, and those of ghosts; may be empty where no thermostat acts.
+    pub v: &'a [[f64; 3]],
+    /// What the thermostat needs; `None` for conservative forces only.
+    pub step: Option<Step>,
+    /// What is wanted beside forces.
+    pub want: Want,
+}
+
+/// One configuration in a box, evaluated without a thermostat.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Evaluated {
+    /// The potential energy `U`, in the energy unit of the model.
+    pub energy: f64,
+    /// `Σ r_ij ⊗ F_ij`: xx, yy, zz, xy, xz, yz.
+    pub virial: [f64; 6],
+    /// Uncorrected local densities, of each particle one for each density and species, density-major.
+    pub densities: Vec<f64>,
+    /// The force on each particle.
+    pub forces: Vec<[f64; 3]>,
+}
+
+impl Engine {
+    /// An engine for `fluid`; types are species indices until [`Engine::map_kinds`] says otherwise.
+    ///
+    /// # Errors
+    /// As [`Plan::new`].
+    pub fn new(fluid: &Fluid, settings: Settings) -> Result<Engine, TooLarge> {
+        Engine::with_pool(fluid, settings, Arc::new(Pool::new(settings.threads)))
+    }
+
+    /// The same, with threads that are there already and that others may use too.
+    ///
+    /// # Errors
+    /// As [`Plan::new`].
+    pub fn with_pool(fluid: &Fluid, settings: Settings, pool: Arc<Pool>) -> Result<Engine, TooLarge> {
+        let plan = Plan::new(fluid)?;
+        Ok(Engine {
+            reference: Reference::of_plan(plan.clone()),
+            sweep: Sweep::of_plan(plan, settings, pool),
+            reference_only: false,
+            path: None,
+            excess: Vec::new(),
+            densities: Vec::new(),
+        })
+    }
+
+    /// The plan.
+    pub fn plan(&self) -> &Plan {
+        self.sweep.plan()
+    }
+
+    /// How the sweep computes, with the instruction set in use.
+    pub fn settings(&self) -> Settings {
+        self.sweep.settings()
+    }
+
+    /// The threads.
+    pub fn pool(&self) -> &Arc<Pool> {
+        self.sweep.pool()
+    }
+
+    /// Where the time of sweeps went.
+    pub fn times(&self) -> Times {
+        self.sweep.times()
+    }
+
+    /// How often each pass has run.
+    pub fn counts(&self) -> PassCounts {
+        self.reference.counts() + self.sweep.counts()
+    }
+
+    /// How many evaluations of ψ had a density below its bounds, and how many one above, since the
+    /// engine was made. Only densities count that the particle's ψ depends on, not linearly.
+    pub fn out_of_bounds(&self) -> [u64; 2] {
+        let (a, b) = (self.reference.out_of_bounds(), self.sweep.out_of_bounds());
+        [a[0] + b[0], a[1] + b[1]]
+    }
+
+    /// Maps the host's types to species: entry `kind` is the species of type `kind`, negative for
+    /// particles that take no part.
+    ///
+    /// # Errors
+    /// A species index out of range.
+    pub fn map_kinds(&mut self, kinds: &[i32]) -> Result<(), EngineError> {
+        self.reference.map_kinds(kinds)?;
+        self.sweep.map_kinds(kinds)
+    }
+
+    /// Whether every evaluation is to be done by the reference: for tests, and to see what the sweep is worth.
+    pub fn use_reference_only(&mut self, only: bool) {
+        self.reference_only = only;
+    }
+
+    /// The way that the last evaluation went; `None` before the first.
+    pub fn path(&self) -> Option<Path> {
+        self.path
+    }
+
+    /// The way that an evaluation of `want` would go.
+    pub fn path_for(&self, surroundings: Surroundings, want: Want) -> Path {
+        let fits = match surroundings {
+            Surroundings::Listed(..) => return Path::Reference(Reason::ListedPairs),
+            Surroundings::Box(domain) => self.sweep.fits(domain),
+            Surroundings::Ghosts(around, _) => self.sweep.fits(around.domain),
+        };
+        if self.reference_only {
+            Path::Reference(Reason::Asked)
+        } else if want.of_particles() {
+            Path::Reference(Reason::ParticleValues)
+        } else if want.densities && !self.sweep_has_all_densities() {
+            Path::Reference(Reason::Densities)
+        } else if !fits {
+            Path::Reference(Reason::Box)
+        } else {
+            Path::Sweep
+        }
+    }
+
+    /// A path for people, with what it computes by: "cell sweep, mixed precision, avx2, 2 threads".
+    pub fn describe(&self, path: Path) -> String {
+        let Settings { precision, instructions, threads } = self.settings();
+        match path {
+            Path::Sweep => format!("{path}, {precision} precision, {instructions}, {threads} thread(s)"),
+            Path::Reference(_) => format!("{path}; double precision, 1 thread"),
+        }
+    }
+
+    /// Whether forces need every density of the model.
+    fn sweep_has_all_densities(&self) -> bool {
+        let plan = self.plan();
+        plan.density_passes().len() == plan.densities().count()
+    }
+
+    /// Energy, virial, densities and conservative forces of particles at `x`, of a type each, in a box.
+    ///
+    /// Positions may be anywhere: along periodic directions of the box they are those of an image.
+    ///
+    /// # Errors
+    /// As [`Engine::forces`]; also types that are not as many as positions.
+    pub fn evaluate(
+        &mut self,
+        x: &[[f64; 3]],
+        domain: &PeriodicBox,
+        kinds: &[i32],
+    ) -> Result<Evaluated, EngineError> {
+        let count = i32::try_from(x.len()).map_err(|_| EngineError::Host("more than 2^31 particles"))?;
+        let tag: Vec<i32> = (1..=count).collect();
+        let particles = Particles { owned: x.len(), x, tag: &tag, kind: kinds };
+        let want = Want { densities: true, ..Want::TOTALS };
+        let mut forces = vec![[0.0; 3]; x.len()];
+        let request = Request { particles, v: &[], step: None, want };
+        let tally = self.forces(domain, &request, &mut forces, false)?;
+        Ok(Evaluated {
+            energy: tally.energy(),
+            virial: tally.virial,
+            densities: self.local_densities().to_vec(),
+            forces,
+        })
+    }
+
+    /// All forces on particles in a box of their own: writes them to `force`, or adds them to what is there, and
+    /// returns the totals that are wanted.
+    ///
+    /// # Errors
+    /// A position, ψ or a force that is not finite; then some forces may have been written. A tag or type out of
+    /// range, arrays of different lengths, ghosts.
+    pub fn forces(
+        &mut self,
+        domain: &PeriodicBox,
+        request: &Request,
+        force: &mut [[f64; 3]],
+        add: bool,
+    ) -> Result<Tally, EngineError> {
+        let Request { particles, v, step, want } = request;
+        match self.begin(Surroundings::Box(domain), *want) {
+            Path::Sweep => {
+                let tally = self.sweep.evaluate(domain, particles, v, *step, *want, force, add)?;
+                self.fetch(*want);
+                Ok(tally)
+            }
+            Path::Reference(_) => {
+                self.reference.first(Surroundings::Box(domain), particles, want.densities)?;
+                self.finish(request, force, add)
+            }
+        }
+    }
+
+    /// The first half of an evaluation: all that needs no slopes of ghosts. The second has the same `request`.
+    ///
+    /// # Errors
+    /// A position or ψ that is not finite, a tag or type out of range, arrays of different lengths, listed pairs of
+    /// particles that are not there.
+    pub fn first(&mut self, surroundings: Surroundings, request: &Request) -> Result<(), EngineError> {
+        let Request { particles, v, step, want } = request;
+        match (self.begin(surroundings, *want), surroundings) {
+            (Path::Sweep, Surroundings::Ghosts(around, _)) => {
+                self.sweep.first(around, particles, v, *step, *want)
+            }
+            (Path::Sweep, Surroundings::Box(domain)) => {
+                self.sweep.first(Around { domain, images: &[] }, particles, v, *step, *want)
+            }
+            _ => self.reference.first(surroundings, particles, want.densities),
+        }
+    }
+
+    /// `∂ψ/∂n` of owned particles, then room for those of ghosts, [`Plan::slope_width`] each.
+    pub fn slopes_mut(&mut self) -> &mut [f64] {
+        match self.path {
+            Some(Path::Reference(_)) => self.reference.slopes_mut(),
+            _ => self.sweep.slopes_mut(),
+        }
+    }
+
+    /// The second half of an evaluation: writes the forces to `force`, or adds them to what is there, and returns the
+    /// totals that are wanted.
+    ///
+    /// Forces on ghosts are the reference's only, if the host brings them home; the sweep leaves them alone, and the
+    /// rank of the other particle computes its half of the pair, for which half of the energy and virial count here.
+    ///
+    /// # Errors
+    /// A force that is not finite; arrays of other lengths than in [`Engine::first`].
+    pub fn second(
+        &mut self,
+        request: &Request,
+        force: &mut [[f64; 3]],
+        add: bool,
+    ) -> Result<Tally, EngineError> {
+        match self.path {
+            Some(Path::Reference(_)) => self.finish(request, force, add),
+            _ => {
+                let tally = self.sweep.second(&request.particles, force, add)?;
+                self.fetch(request.want);
+                Ok(tally)
+            }
+        }
+    }
+
+    /// Chooses the path of a new evaluation.
+    fn begin(&mut self, surroundings: Surroundings, want: Want) -> Path {
+        let path = self.path_for(surroundings, want);
+        self.path = Some(path);
+        self.excess.clear();
+        self.densities.clear();
+        path
+    }
+
+    /// The second half of an evaluation by the reference.
+    fn finish(&mut self, request: &Request, force: &mut [[f64; 3]], add: bool) -> Result<Tally, EngineError> {
+        if !add {
+            force.fill([0.0; 3]);
+        }
+        let Request { particles, v, step, want } = request;
+        self.reference.second(particles, v, *step, *want, force)
+    }
+
+    /// Keeps the densities of a sweep that wanted them.
+    fn fetch(&mut self, want: Want) {
+        if want.densities {
+            self.sweep.local_densities(&mut self.excess, &mut self.densities);
+        }
+    }
+
+    /// Uncorrected local densities of owned particles in the last evaluation, one for each density and species,
+    /// density-major. Unless they were wanted, or have been summed by [`Engine::sum_densities`], there are none after a
+    /// sweep, and zeros for those that no force needs after an evaluation by the reference.
+    pub fn local_densities(&self) -> &[f64] {
+        match self.path {
+            Some(Path::Reference(_)) => self.reference.local_densities(),
+            _ => &self.densities,
+        }
+    }
+
+    /// Every density of the model in the last evaluation, for `particles` that have not moved since: sums those that it
+    /// did not want. Before the first evaluation they are zero. Forces, slopes and the paths of later evaluations are
+    /// what they are without.
+    ///
+    /// # Errors
+    /// As [`Engine::first`].
+    pub fn sum_densities(
+        &mut self,
+        surroundings: Surroundings,
+        particles: &Particles,
+    ) -> Result<&[f64], EngineError> {
+        let variables = self.plan().densities().count() * self.plan().species().len();
+        match self.path {
+            // The pairs are there still.
+            Some(Path::Reference(_)) => self.reference.sum_all_densities(None),
+            _ if !self.densities.is_empty() => Ok(&self.densities),
+            Some(Path::Sweep) if self.sweep_has_all_densities() => {
+                self.sweep.local_densities(&mut self.excess, &mut self.densities);
+                Ok(&self.densities)
+            }
+            None => {
+                self.densities.resize(particles.owned * variables, 0.0);
+                Ok(&self.densities)
+            }
+            Some(Path::Sweep) => {
+                let all = self.reference.sum_all_densities(Some((surroundings, particles)))?;
+                self.densities.extend_from_slice(all);
+                Ok(&self.densities)
+            }
+        }
+    }
+
+    /// ψ of owned particles in the last evaluation, without the terms that act as pair potentials.
+    pub fn excess(&mut self) -> &[f64] {
+        match self.path {
+            Some(Path::Reference(_)) => self.reference.excess(),
+            Some(Path::Sweep) if self.excess.is_empty() => {
+                self.sweep.local_densities(&mut self.excess, &mut Vec::new());
+                &self.excess
+            }
+            _ => &self.excess,
+        }
+    }
+
+    /// Energy of each particle and ghost, if the last evaluation wanted it: its ψ and half of its pair energies.
+    pub fn particle_energy(&self) -> &[f64] {
+        self.reference.particle_energy()
+    }
+
+    /// Virial of each particle and ghost, if the last evaluation wanted it: half of its pairs'.
+    pub fn particle_virial(&self) -> &[[f64; 6]] {
+        self.reference.particle_virial()
+    }
+
+    /// Brings the slopes of owned particles to [`Engine::slopes_mut`] after [`Engine::forces`], with room for `all`:
+    /// for questions about single pairs, before which nobody needs them.
+    pub fn fetch_slopes(&mut self, all: usize) {
+        match self.path {
+            Some(Path::Reference(_)) => {
+                let length = self.plan().slope_width() * all;
+                self.reference.slopes_mut().resize(length, 0.0);
+            }
+            _ => self.sweep.fetch_slopes(all),
+        }
+    }
+
+    /// Pair energy, and conservative force along `ê_ij`, of particles `i` and `j` of the given types at the distance
+    /// `r`, with the slopes of ψ in the last evaluation.
+    ///
+    /// The energy is that of the terms that belong to pairs: `φ`, and ψ where it is linear in a density. The force
+    /// also has the many-body part, if slopes are there.
+    pub fn single(&self, kinds: [i32; 2], r: f64, particles: [usize; 2]) -> (f64, f64) {
+        let slopes = match self.path {
+            Some(Path::Reference(_)) => self.reference.slopes(),
+            _ => self.sweep.slopes(),
+        };
+        self.reference.single_at(kinds, r, slopes, particles)
+    }
+
+    /// The host's numbers of its particles in the order of cells, an order to keep them in that makes sorting cheap;
+    /// `None` if the last evaluation was not swept.
+    pub fn order(&self) -> Option<&[u32]> {
+        (self.path == Some(Path::Sweep)).then(|| self.sweep.order())
+    }
+
+    /// Bytes held in arrays over particles and pairs.
+    pub fn memory(&self) -> usize {
+        let held = self.excess.capacity() + self.densities.capacity();
+        self.reference.memory() + self.sweep.memory() + held * size_of::<f64>()
+    }
+}
+
+#[cfg(test)]
+mod tests;

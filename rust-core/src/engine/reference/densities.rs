@@ -1,0 +1,75 @@
+//! Local densities: `n_β,i = Σ_j w(r_ij)` over the neighbours of species β.
+
+use super::pairs::{PairList, Pairs};
+use crate::engine::plan::Plan;
+use crate::model::kernel::{Kernel, Shape, ShapeVisitor};
+
+/// Sums the densities `which` of every owned particle to `n`, which has [`Fluid::variables`](crate::model::Fluid::variables)
+/// numbers for each, density-major. Returns how many sums over pairs there were.
+pub fn sum_densities(
+    pairs: &Pairs,
+    plan: &Plan,
+    which: impl Iterator<Item = usize>,
+    species: &[i32],
+    n: &mut [f64],
+) -> u64 {
+    let mut sums = 0;
+    let count = plan.species.len();
+    let width = plan.densities.len() * count;
+    for d in which {
+        let density = &plan.densities[d];
+        let owned = n.len() / width;
+        add_density(pairs, &density.kernel, owned, n, width, d * count);
+        sums += 1;
+        if density.includes_self {
+            let own = density.kernel.value(0.0);
+            for (i, species) in species[..owned].iter().enumerate().filter(|(_, s)| **s >= 0) {
+                n[i * width + d * count + *species as usize] += own;
+            }
+        }
+    }
+    sums
+}
+
+/// Adds one density of every owned particle to `n`.
+///
+/// `n` has `width` numbers for each owned particle, species running fastest; this density's begin at
+/// `offset`.
+fn add_density(pairs: &Pairs, kernel: &Kernel, owned: usize, n: &mut [f64], width: usize, offset: usize) {
+    struct Pass<'a> {
+        pairs: &'a PairList,
+        kernel: &'a Kernel,
+        owned: usize,
+        n: &'a mut [f64],
+        width: usize,
+        offset: usize,
+    }
+
+    impl ShapeVisitor for Pass<'_> {
+        type Output = ();
+
+        fn visit<S: Shape>(self) {
+            let inverse_range = 1.0 / self.kernel.range();
+            let factor = self.kernel.value_factor();
+            let list = self.pairs;
+            for k in 0..list.len() {
+                let s = list.r[k] * inverse_range;
+                if s < 1.0 {
+                    let mut w = factor * S::value(s);
+                    if !list.factor.is_empty() {
+                        w *= list.factor[k];
+                    }
+                    let (i, j) = (list.i[k] as usize, list.j[k] as usize);
+                    self.n[i * self.width + self.offset + list.species_j[k] as usize] += w;
+                    if j < self.owned {
+                        self.n[j * self.width + self.offset + list.species_i[k] as usize] += w;
+                    }
+                }
+            }
+        }
+    }
+
+    for pairs in [pairs.force(), pairs.density_only()] {
+        kernel.kind().visit(Pass { pairs, kernel, owned, n, width, offset });
+    }
+}

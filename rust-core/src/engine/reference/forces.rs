@@ -1,0 +1,362 @@
+//! Forces, energy and virial over the pairs, in blocks: each term of the plan adds to a block's
+//! scalars in a loop of its own, compiled for its kernel, and one last loop scatters them.
+
+use super::pairs::PairList;
+use crate::engine::noise::PairNoise;
+use crate::engine::plan::{LinearTerm, Plan, ThermostatPlan};
+use crate::engine::surroundings::Newton;
+use crate::engine::tally::{Tally, Want};
+use crate::model::PairTerm;
+use crate::model::kernel::{Kernel, Shape, ShapeVisitor};
+use crate::model::pair::PairForm;
+
+/// Pairs in a block: its scalars stay in the first-level cache.
+const BLOCK: usize = 256;
+
+/// What a force pass reads.
+pub struct ForceInput<'a> {
+    pub plan: &'a Plan,
+    pub list: &'a PairList,
+    pub newton: Newton,
+    pub owned: usize,
+    /// `∂ψ/∂n` of owned particles and ghosts, [`Plan::slope_width`] each.
+    pub slopes: &'a [f64],
+    pub v: &'a [[f64; 3]],
+    pub tag: &'a [i32],
+    /// Noise and `dt^{-1/2}`; `None` leaves dissipative and random forces out.
+    pub thermostat: Option<(PairNoise, f64)>,
+    pub want: Want,
+}
+
+/// What it adds to.
+pub struct ForceOutput<'a> {
+    pub force: &'a mut [[f64; 3]],
+    pub particle_energy: &'a mut [f64],
+    pub particle_virial: &'a mut [[f64; 6]],
+    /// The conservative force of each pair along `ê_ij`, positive if it pushes them apart; empty if nobody asks.
+    pub pair_force: &'a mut [f64],
+    pub tally: Tally,
+}
+
+/// The scalars of a block of pairs.
+pub struct Block<const N: usize> {
+    /// Forces along `ê_ij`.
+    pub conservative: [f64; N],
+    thermostat: [f64; N],
+    /// The energies of terms linear in a density: what belongs to `i`, and to `j`.
+    pub excess_i: [f64; N],
+    pub excess_j: [f64; N],
+    /// `φ`.
+    pub pair: [f64; N],
+    /// Distances and places of the pairs that one pair term acts on.
+    r: [f64; N],
+    phi: [f64; N],
+    slope: [f64; N],
+    place: [u16; N],
+}
+
+/// Adds the forces of all pairs.
+pub fn add_forces(input: &ForceInput, output: &mut ForceOutput) {
+    let mut block = Block::<BLOCK>::new();
+    let energies = input.want.energy || input.want.particle_energy;
+    for begin in (0..input.list.len()).step_by(BLOCK) {
+        let end = (begin + BLOCK).min(input.list.len());
+        block.conserve(input, begin, end, energies);
+        if let Some(forces) = output.pair_force.get_mut(begin..end) {
+            forces.copy_from_slice(&block.conservative[..end - begin]);
+        }
+        if let (Some((noise, inverse_root_dt)), Some(plan)) = (&input.thermostat, &input.plan.thermostat) {
+            add_thermostat(input, plan, noise, *inverse_root_dt, begin, end, &mut block.thermostat);
+        } else {
+            block.thermostat.fill(0.0);
+        }
+        scatter(input, output, begin, end, &block);
+        if input.want.virial || input.want.particle_virial {
+            tally_virial(input, output, begin, end, &block);
+        }
+        if energies {
+            tally_energy(input, output, begin, end, &block);
+        }
+    }
+}
+
+impl<const N: usize> Block<N> {
+    pub fn new() -> Block<N> {
+        Block {
+            conservative: [0.0; N],
+            thermostat: [0.0; N],
+            excess_i: [0.0; N],
+            excess_j: [0.0; N],
+            pair: [0.0; N],
+            r: [0.0; N],
+            phi: [0.0; N],
+            slope: [0.0; N],
+            place: [0; N],
+        }
+    }
+
+    /// The conservative forces of the pairs `begin` to `end`, at most `N`, and their energies if asked for.
+    pub fn conserve(&mut self, input: &ForceInput, begin: usize, end: usize, energies: bool) {
+        self.conservative.fill(0.0);
+        if energies {
+            self.excess_i.fill(0.0);
+            self.excess_j.fill(0.0);
+            self.pair.fill(0.0);
+        }
+        for (k, density) in input.plan.passes.iter().enumerate() {
+            let kernel = &input.plan.densities[*density].force_kernel;
+            let out = &mut self.conservative;
+            kernel.kind().visit(ManyBody { input, kernel, offset: k, begin, end, out });
+        }
+        for term in &input.plan.linear {
+            term.kernel.kind().visit(Linear { input, term, energies, begin, end, block: self });
+        }
+        for term in &input.plan.pairs {
+            add_pair_term(input, term, begin, end, energies, self);
+        }
+        scale(input.list, begin, end, energies, self);
+    }
+}
+
+/// Conservative forces and energies of pairs that do not act at full strength.
+fn scale<const N: usize>(list: &PairList, begin: usize, end: usize, energies: bool, block: &mut Block<N>) {
+    if list.factor.is_empty() {
+        return;
+    }
+    for (at, factor) in list.factor[begin..end].iter().enumerate() {
+        block.conservative[at] *= factor;
+        if energies {
+            block.excess_i[at] *= factor;
+            block.excess_j[at] *= factor;
+            block.pair[at] *= factor;
+        }
+    }
+}
+
+/// `−[∂ψ_i/∂n_c(j) + ∂ψ_j/∂n_c(i)] w′(r)`.
+struct ManyBody<'a, 'b, const N: usize> {
+    input: &'a ForceInput<'b>,
+    kernel: &'a Kernel,
+    offset: usize,
+    begin: usize,
+    end: usize,
+    out: &'a mut [f64; N],
+}
+
+impl<const N: usize> ShapeVisitor for ManyBody<'_, '_, N> {
+    type Output = ();
+
+    fn visit<S: Shape>(self) {
+        let list = self.input.list;
+        let slopes = self.input.slopes;
+        let species = self.input.plan.species.len();
+        let (width, offset) = (self.input.plan.slope_width(), self.offset * species);
+        let inverse_range = 1.0 / self.kernel.range();
+        let factor = self.kernel.slope_factor();
+        for k in self.begin..self.end {
+            let s = list.r[k] * inverse_range;
+            if s < 1.0 {
+                let here = list.i[k] as usize * width + offset + list.species_j[k] as usize;
+                let there = list.j[k] as usize * width + offset + list.species_i[k] as usize;
+                self.out[k - self.begin] -= (slopes[here] + slopes[there]) * (factor * S::slope(s));
+            }
+        }
+    }
+}
+
+/// `−(c_αβ + c_βα) w′(r)`, a density that every ψ is linear in.
+struct Linear<'a, 'b, const N: usize> {
+    input: &'a ForceInput<'b>,
+    term: &'a LinearTerm,
+    energies: bool,
+    begin: usize,
+    end: usize,
+    block: &'a mut Block<N>,
+}
+
+impl<const N: usize> ShapeVisitor for Linear<'_, '_, N> {
+    type Output = ();
+
+    fn visit<S: Shape>(self) {
+        let list = self.input.list;
+        let count = self.input.plan.species.len();
+        let range = self.term.kernel.range();
+        let inverse_range = 1.0 / range;
+        let value_factor = self.term.kernel.value_factor();
+        let slope_factor = self.term.kernel.slope_factor();
+        // Only a law without potential has another kernel in the force; its speed is no concern.
+        let foreign = (self.term.force_kernel != self.term.kernel).then_some(self.term.force_kernel);
+        for k in self.begin..self.end {
+            let s = list.r[k] * inverse_range;
+            if s < 1.0 {
+                let (a, b) = (list.species_i[k] as usize, list.species_j[k] as usize);
+                let (ab, ba) = (self.term.coefficients[a * count + b], self.term.coefficients[b * count + a]);
+                let slope = match foreign {
+                    None => slope_factor * S::slope(s),
+                    Some(kernel) => kernel.slope(list.r[k]),
+                };
+                let at = k - self.begin;
+                self.block.conservative[at] -= (ab + ba) * slope;
+                if self.energies {
+                    let w = value_factor * S::value(s);
+                    self.block.excess_i[at] += ab * w;
+                    self.block.excess_j[at] += ba * w;
+                }
+            }
+        }
+    }
+}
+
+/// `−φ′(r)`.
+fn add_pair_term<const N: usize>(
+    input: &ForceInput,
+    term: &PairTerm,
+    begin: usize,
+    end: usize,
+    energies: bool,
+    block: &mut Block<N>,
+) {
+    let list = input.list;
+    let [a, b] = term.between.map(|s| s as u8);
+    let range = term.potential.range();
+    let mut count = 0;
+    for k in begin..end {
+        let (si, sj) = (list.species_i[k], list.species_j[k]);
+        let takes_part = ((si == a && sj == b) || (si == b && sj == a)) && list.r[k] < range;
+        block.r[count] = list.r[k];
+        block.place[count] = (k - begin) as u16;
+        count += takes_part as usize;
+    }
+    term.potential.block(&block.r[..count], &mut block.phi[..count], &mut block.slope[..count]);
+    for n in 0..count {
+        let at = block.place[n] as usize;
+        block.conservative[at] -= block.slope[n];
+        if energies {
+            block.pair[at] += block.phi[n];
+        }
+    }
+}
+
+/// `−γ w_R² (ê·v_ij) + σ w_R ξ dt^{-1/2}`.
+fn add_thermostat(
+    input: &ForceInput,
+    plan: &ThermostatPlan,
+    noise: &PairNoise,
+    inverse_root_dt: f64,
+    begin: usize,
+    end: usize,
+    out: &mut [f64; BLOCK],
+) {
+    let list = input.list;
+    let count = input.plan.species.len();
+    for k in begin..end {
+        let pair = list.species_i[k] as usize * count + list.species_j[k] as usize;
+        let (r, range) = (list.r[k], plan.range[pair]);
+        out[k - begin] = 0.0;
+        // Two particles on one point have no direction to push along.
+        if r < range && r > 0.0 {
+            let (i, j) = (list.i[k] as usize, list.j[k] as usize);
+            let base = 1.0 - r / range;
+            let exponent = plan.exponent[pair];
+            let w = if exponent == 1.0 { base } else { base.powf(exponent) };
+            let (vi, vj) = (&input.v[i], &input.v[j]);
+            let dot = list.d[0][k] * (vi[0] - vj[0])
+                + list.d[1][k] * (vi[1] - vj[1])
+                + list.d[2][k] * (vi[2] - vj[2]);
+            let xi = noise.xi(input.tag[i] as u32, input.tag[j] as u32);
+            out[k - begin] = w * (plan.sigma[pair] * xi * inverse_root_dt - plan.gamma[pair] * w * dot / r);
+        }
+    }
+}
+
+fn scatter(input: &ForceInput, output: &mut ForceOutput, begin: usize, end: usize, block: &Block<BLOCK>) {
+    let list = input.list;
+    let both = input.newton == Newton::On;
+    for k in begin..end {
+        let r = list.r[k];
+        if r == 0.0 {
+            continue;
+        }
+        let scale = (block.conservative[k - begin] + block.thermostat[k - begin]) / r;
+        let (i, j) = (list.i[k] as usize, list.j[k] as usize);
+        let f = [scale * list.d[0][k], scale * list.d[1][k], scale * list.d[2][k]];
+        let fi = &mut output.force[i];
+        fi[0] += f[0];
+        fi[1] += f[1];
+        fi[2] += f[2];
+        if both || j < input.owned {
+            let fj = &mut output.force[j];
+            fj[0] -= f[0];
+            fj[1] -= f[1];
+            fj[2] -= f[2];
+        }
+    }
+}
+
+/// The share of a pair that is tallied here: half, if its other rank tallies it too.
+#[inline(always)]
+fn share(input: &ForceInput, j: usize) -> f64 {
+    if input.newton == Newton::On || j < input.owned { 1.0 } else { 0.5 }
+}
+
+fn tally_virial(
+    input: &ForceInput,
+    output: &mut ForceOutput,
+    begin: usize,
+    end: usize,
+    block: &Block<BLOCK>,
+) {
+    let list = input.list;
+    for k in begin..end {
+        let r = list.r[k];
+        if r == 0.0 {
+            continue;
+        }
+        let (i, j) = (list.i[k] as usize, list.j[k] as usize);
+        let d = [list.d[0][k], list.d[1][k], list.d[2][k]];
+        let dyad = [d[0] * d[0], d[1] * d[1], d[2] * d[2], d[0] * d[1], d[0] * d[2], d[1] * d[2]];
+        let conservative = block.conservative[k - begin] / r;
+        let thermostat = block.thermostat[k - begin] / r;
+        if input.want.virial {
+            let share = share(input, j);
+            for c in 0..6 {
+                output.tally.virial[c] += share * conservative * dyad[c];
+                output.tally.thermostat_virial[c] += share * thermostat * dyad[c];
+            }
+        }
+        if input.want.particle_virial {
+            let half = 0.5 * (conservative + thermostat);
+            let both = input.newton == Newton::On || j < input.owned;
+            for c in 0..6 {
+                output.particle_virial[i][c] += half * dyad[c];
+                if both {
+                    output.particle_virial[j][c] += half * dyad[c];
+                }
+            }
+        }
+    }
+}
+
+fn tally_energy(
+    input: &ForceInput,
+    output: &mut ForceOutput,
+    begin: usize,
+    end: usize,
+    block: &Block<BLOCK>,
+) {
+    let list = input.list;
+    for k in begin..end {
+        let (i, j) = (list.i[k] as usize, list.j[k] as usize);
+        let at = k - begin;
+        let both = input.newton == Newton::On || j < input.owned;
+        let excess_j = if both { block.excess_j[at] } else { 0.0 };
+        output.tally.excess += block.excess_i[at] + excess_j;
+        output.tally.pair += share(input, j) * block.pair[at];
+        if input.want.particle_energy {
+            output.particle_energy[i] += block.excess_i[at] + 0.5 * block.pair[at];
+            if both {
+                output.particle_energy[j] += excess_j + 0.5 * block.pair[at];
+            }
+        }
+    }
+}

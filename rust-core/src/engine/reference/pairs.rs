@@ -1,0 +1,137 @@
+//! The pairs of one step, and who computes which.
+
+use crate::engine::surroundings::Newton;
+
+/// The pairs of one configuration. All have at least one owned particle, which comes first.
+#[derive(Debug, Clone, Default)]
+pub struct Pairs {
+    owned: usize,
+    newton: Newton,
+    /// Those whose force is computed here.
+    force: PairList,
+    /// Those that only count in the density of the owned particle.
+    density_only: PairList,
+}
+
+/// Parallel arrays over pairs. `d = r_i − r_j`.
+#[derive(Debug, Clone, Default)]
+pub struct PairList {
+    pub i: Vec<u32>,
+    pub j: Vec<u32>,
+    pub species_i: Vec<u8>,
+    pub species_j: Vec<u8>,
+    pub d: [Vec<f64>; 3],
+    pub r: Vec<f64>,
+    /// Strength of the conservative interaction; empty if every pair has its full one.
+    pub factor: Vec<f64>,
+}
+
+impl PairList {
+    pub fn len(&self) -> usize {
+        self.r.len()
+    }
+
+    fn clear(&mut self) {
+        self.i.clear();
+        self.j.clear();
+        self.species_i.clear();
+        self.species_j.clear();
+        self.d.iter_mut().for_each(Vec::clear);
+        self.r.clear();
+        self.factor.clear();
+    }
+
+    #[inline(always)]
+    pub fn push(&mut self, i: usize, j: usize, d: [f64; 3], species: &[i32]) {
+        self.i.push(i as u32);
+        self.j.push(j as u32);
+        self.species_i.push(species[i] as u8);
+        self.species_j.push(species[j] as u8);
+        for c in 0..3 {
+            self.d[c].push(d[c]);
+        }
+        self.r.push((d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt());
+    }
+}
+
+impl Pairs {
+    pub fn clear(&mut self, owned: usize, newton: Newton) {
+        self.owned = owned;
+        self.newton = newton;
+        self.force.clear();
+        self.density_only.clear();
+    }
+
+    /// Adds the pair `a`, `b` with `d = r_a − r_b`; one of them is owned.
+    #[inline(always)]
+    pub fn push(&mut self, a: usize, b: usize, d: [f64; 3], tag: &[i32], species: &[i32]) {
+        let (i, j, d) = if a < self.owned { (a, b, d) } else { (b, a, d.map(|c| -c)) };
+        let here = j < self.owned || self.newton == Newton::Off || computes(tag[i], tag[j], d);
+        let list = if here { &mut self.force } else { &mut self.density_only };
+        list.push(i, j, d, species);
+    }
+
+    /// Adds a pair of two particles in a box that are both owned, the second perhaps an image, with `d = r_i − r_j`.
+    #[inline(always)]
+    pub fn push_in_box(&mut self, i: usize, j: usize, d: [f64; 3], species: &[i32]) {
+        self.force.push(i, j, d, species);
+    }
+
+    /// As [`Pairs::push`], for pairs of strength `factor`. Either all pairs come this way or none.
+    pub fn push_scaled(
+        &mut self,
+        a: usize,
+        b: usize,
+        d: [f64; 3],
+        factor: f64,
+        tag: &[i32],
+        species: &[i32],
+    ) {
+        let before = self.force.len();
+        self.push(a, b, d, tag, species);
+        let list = if self.force.len() > before { &mut self.force } else { &mut self.density_only };
+        list.factor.push(factor);
+    }
+
+    /// The pairs whose force is computed here.
+    pub fn force(&self) -> &PairList {
+        &self.force
+    }
+
+    /// The pairs that another rank, or another image, computes the force of.
+    pub fn density_only(&self) -> &PairList {
+        &self.density_only
+    }
+
+    pub fn newton(&self) -> Newton {
+        self.newton
+    }
+}
+
+/// Whether the rank that owns `i` computes its pair with the ghost `j`. Of the two ranks that see the
+/// pair, from either side, exactly one says yes; parity of the tags shares the work evenly.
+#[inline(always)]
+fn computes(tag_i: i32, tag_j: i32, d: [f64; 3]) -> bool {
+    if tag_i != tag_j {
+        (tag_i < tag_j) == ((tag_i ^ tag_j) & 1 == 1)
+    } else {
+        // A particle and its own image: the mirrored pair has −d.
+        let first = d.iter().find(|c| **c != 0.0).copied().unwrap_or(0.0);
+        first > 0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exactly_one_side_computes_a_pair() {
+        for a in 1..20 {
+            for b in 1..20 {
+                let d = [0.0, -0.3, 0.2];
+                assert_ne!(computes(a, b, d), computes(b, a, d.map(|c: f64| -c)), "{a} {b}");
+            }
+        }
+    }
+}

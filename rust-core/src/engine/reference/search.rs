@@ -1,0 +1,201 @@
+//! Pairs within the cut-off, by cells.
+
+/// Cell search over open space: ghosts and images are points like any other.
+///
+/// Particles are counting-sorted into cells no narrower than the cut-off; each looks at the rest of its
+/// own cell and at half of the neighbouring ones. Cells are contiguous along x, so half the stencil is
+/// five windows of the sorted array.
+#[derive(Debug, Clone, Default)]
+pub struct CellSearch {
+    cells: [usize; 3],
+    /// First sorted index of each cell, and one past the last.
+    start: Vec<u32>,
+    cell_of: Vec<u32>,
+    /// Original index by sorted index.
+    order: Vec<u32>,
+    x: [Vec<f64>; 3],
+    /// Sorted indices near the particle in hand; the first `near` of them are valid.
+    found: Vec<u32>,
+    near: usize,
+}
+
+/// Marks a point that takes no part.
+const OUTSIDE: u32 = u32::MAX;
+
+impl CellSearch {
+    /// Calls `visit` with `a`, `b` and `x_a − x_b` of every pair of points closer than `cutoff` of which one is among the
+    /// `owned` first and both take part, each once, in an order that depends on the points alone.
+    ///
+    /// Those that take part must have finite coordinates. In two dimensions the third counts for nothing.
+    pub fn find(
+        &mut self,
+        x: &[[f64; 3]],
+        owned: usize,
+        takes_part: impl Fn(usize) -> bool,
+        dimensions: usize,
+        cutoff: f64,
+        mut visit: impl FnMut(usize, usize, [f64; 3]),
+    ) {
+        if cutoff > 0.0 && self.sort(x, takes_part, dimensions, cutoff) > 0 {
+            self.sweep(owned, cutoff, &mut visit);
+        }
+    }
+
+    /// Sorts points into cells; returns how many take part.
+    fn sort(
+        &mut self,
+        x: &[[f64; 3]],
+        takes_part: impl Fn(usize) -> bool,
+        dimensions: usize,
+        cutoff: f64,
+    ) -> usize {
+        let mut low = [f64::INFINITY; 3];
+        let mut high = [f64::NEG_INFINITY; 3];
+        let mut count = 0usize;
+        for (_, x) in x.iter().enumerate().filter(|(k, _)| takes_part(*k)) {
+            count += 1;
+            for c in 0..3 {
+                low[c] = low[c].min(x[c]);
+                high[c] = high[c].max(x[c]);
+            }
+        }
+        if count == 0 {
+            return 0;
+        }
+        // A few runaways must not make a grid of empty cells: not many more cells than particles.
+        let most = (4 * count + 64) as f64;
+        let mut width = [cutoff; 3];
+        loop {
+            for c in 0..3 {
+                let cells = if c < dimensions { ((high[c] - low[c]) / width[c]).floor() } else { 1.0 };
+                self.cells[c] = cells.clamp(1.0, most) as usize;
+            }
+            let total: f64 = self.cells.iter().map(|n| *n as f64).product();
+            if total <= most {
+                break;
+            }
+            let widest = (0..3).max_by_key(|c| self.cells[*c]).unwrap_or(0);
+            width[widest] *= 2.0;
+        }
+        let [nx, ny, nz] = self.cells;
+        let scale: [f64; 3] = std::array::from_fn(|c| {
+            let extent = high[c] - low[c];
+            if extent > 0.0 { self.cells[c] as f64 / extent } else { 0.0 }
+        });
+        let total = nx * ny * nz;
+        self.start.clear();
+        self.start.resize(total + 1, 0);
+        self.cell_of.clear();
+        for (k, x) in x.iter().enumerate() {
+            if !takes_part(k) {
+                self.cell_of.push(OUTSIDE);
+                continue;
+            }
+            let at = |c: usize| (((x[c] - low[c]) * scale[c]) as usize).min(self.cells[c] - 1);
+            let cell = (at(2) * ny + at(1)) * nx + at(0);
+            self.cell_of.push(cell as u32);
+            self.start[cell + 1] += 1;
+        }
+        for cell in 0..total {
+            self.start[cell + 1] += self.start[cell];
+        }
+        self.order.clear();
+        self.order.resize(count, 0);
+        for c in 0..3 {
+            self.x[c].clear();
+            self.x[c].resize(count, 0.0);
+        }
+        // Filling from the back keeps the order of particles within a cell and turns `start` of each
+        // cell, now its end, into its beginning.
+        for k in (0..x.len()).rev() {
+            let cell = self.cell_of[k];
+            if cell == OUTSIDE {
+                continue;
+            }
+            let end = &mut self.start[cell as usize + 1];
+            *end -= 1;
+            let slot = *end as usize;
+            self.order[slot] = k as u32;
+            for c in 0..3 {
+                self.x[c][slot] = if c < dimensions { x[k][c] } else { 0.0 };
+            }
+        }
+        // `start[cell + 1]` is now where `cell` begins: shift.
+        self.start.remove(0);
+        self.start.push(count as u32);
+        count
+    }
+
+    fn sweep(&mut self, owned: usize, cutoff: f64, visit: &mut impl FnMut(usize, usize, [f64; 3])) {
+        let [nx, ny, nz] = self.cells;
+        let cutoff_squared = cutoff * cutoff;
+        let mut windows: [(usize, usize); 5] = [(0, 0); 5];
+        for cz in 0..nz {
+            for cy in 0..ny {
+                // The other rows of half the stencil: (y+1, z), (y−1, z+1), (y, z+1), (y+1, z+1).
+                let rows = [(1, 0), (-1, 1), (0, 1), (1, 1)].map(|(dy, dz): (isize, isize)| {
+                    let (y, z) = (cy as isize + dy, cz as isize + dz);
+                    let inside = y >= 0 && y < ny as isize && z < nz as isize;
+                    inside.then(|| (z as usize * ny + y as usize) * nx)
+                });
+                let row = (cz * ny + cy) * nx;
+                for cx in 0..nx {
+                    let (first, last) = (cx.saturating_sub(1), (cx + 1).min(nx - 1));
+                    for (window, other) in windows[1..].iter_mut().zip(rows) {
+                        *window = other.map_or((0, 0), |base| self.span(base + first, base + last));
+                    }
+                    let (begin, end) = self.span(row + cx, row + cx);
+                    let row_end = self.span(row + cx, row + last).1;
+                    for i in begin..end {
+                        windows[0] = (i + 1, row_end);
+                        self.collect(i, &windows, cutoff_squared);
+                        self.tell(i, owned, visit);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Sorted indices of the cells `first` to `last` of one row.
+    fn span(&self, first: usize, last: usize) -> (usize, usize) {
+        (self.start[first] as usize, self.start[last + 1] as usize)
+    }
+
+    /// Puts the sorted indices in range of `i` into `found`, without a branch per candidate.
+    #[inline(always)]
+    fn collect(&mut self, i: usize, windows: &[(usize, usize); 5], cutoff_squared: f64) {
+        let candidates: usize = windows.iter().map(|(a, b)| b.saturating_sub(*a)).sum();
+        if self.found.len() < candidates {
+            self.found.resize(candidates, 0);
+        }
+        let [x, y, z] = &self.x;
+        let (xi, yi, zi) = (x[i], y[i], z[i]);
+        let mut count = 0;
+        let found = &mut self.found;
+        for &(first, last) in windows {
+            if first >= last {
+                continue;
+            }
+            let (x, y, z) = (&x[first..last], &y[first..last], &z[first..last]);
+            for (offset, ((xj, yj), zj)) in x.iter().zip(y).zip(z).enumerate() {
+                let (dx, dy, dz) = (xi - xj, yi - yj, zi - zj);
+                let near = dx * dx + dy * dy + dz * dz < cutoff_squared;
+                found[count] = (first + offset) as u32;
+                count += near as usize;
+            }
+        }
+        self.near = count;
+    }
+
+    #[inline(always)]
+    fn tell(&self, i: usize, owned: usize, visit: &mut impl FnMut(usize, usize, [f64; 3])) {
+        let a = self.order[i] as usize;
+        for &j in &self.found[..self.near] {
+            let j = j as usize;
+            let b = self.order[j] as usize;
+            if a < owned || b < owned {
+                visit(a, b, std::array::from_fn(|c| self.x[c][i] - self.x[c][j]));
+            }
+        }
+    }
+}

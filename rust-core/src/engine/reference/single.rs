@@ -1,0 +1,54 @@
+//! One pair on its own, for hosts that ask about pairs.
+
+use super::Reference;
+use super::forces::{Block, ForceInput};
+use super::pairs::PairList;
+use crate::engine::surroundings::Newton;
+use crate::engine::tally::Want;
+
+impl Reference {
+    /// Pair energy, and conservative force along `ê_ij`, of the particles `i` and `j` at the distance
+    /// `r`, of the given kinds.
+    ///
+    /// The energy is that of the terms that belong to pairs: `φ`, and ψ where it is linear in a
+    /// density. The force also has the many-body part, with the slopes of ψ at the densities of the
+    /// last evaluation; without those (`None`, or particles that were not there) it has not.
+    pub fn single(&self, kinds: [i32; 2], r: f64, particles: Option<[usize; 2]>) -> (f64, f64) {
+        match particles {
+            Some(particles) => self.single_at(kinds, r, &self.slopes, particles),
+            None => self.single_at(kinds, r, &[], [0, 0]),
+        }
+    }
+
+    /// The same with the slopes of another evaluation, [`Plan::slope_width`](crate::engine::Plan::slope_width)
+    /// for each particle.
+    pub fn single_at(&self, kinds: [i32; 2], r: f64, slopes: &[f64], particles: [usize; 2]) -> (f64, f64) {
+        let species = kinds.map(|k| usize::try_from(k).ok().and_then(|k| self.kinds.get(k)).copied());
+        let [Some(a), Some(b)] = species else { return (0.0, 0.0) };
+        if a < 0 || b < 0 {
+            return (0.0, 0.0);
+        }
+        let width = self.plan.slope_width();
+        let of = |i: usize| slopes.get(i * width..(i + 1) * width);
+        let both = match particles.map(of) {
+            [Some(i), Some(j)] => [i, j].concat(),
+            _ => vec![0.0; 2 * width],
+        };
+        let mut list = PairList::default();
+        list.push(0, 1, [r, 0.0, 0.0], &[a, b]);
+        let input = ForceInput {
+            plan: &self.plan,
+            list: &list,
+            newton: Newton::On,
+            owned: 2,
+            slopes: &both,
+            v: &[],
+            tag: &[],
+            thermostat: None,
+            want: Want::TOTALS,
+        };
+        let mut pair = Block::<1>::new();
+        pair.conserve(&input, 0, 1, true);
+        (pair.excess_i[0] + pair.excess_j[0] + pair.pair[0], pair.conservative[0])
+    }
+}

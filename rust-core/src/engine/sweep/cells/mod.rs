@@ -1,0 +1,4 @@
+//! The particles in the order of cells, as the passes over pairs read them. `workspace::sorted_particles` fills them.
+
+pub mod ghosts;
+pub mod sorted;

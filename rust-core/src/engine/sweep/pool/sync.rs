@@ -1,0 +1,22 @@
+//! What the pool is made of: the standard library's, or loom's where a test goes through all orders in which threads
+//! may run.
+
+#[cfg(not(loom))]
+mod threads {
+    pub use std::hint::spin_loop;
+    pub use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+    pub use std::sync::{Arc, Condvar, Mutex};
+    pub use std::thread::{Builder, JoinHandle, yield_now};
+    pub use std::thread_local;
+}
+
+#[cfg(loom)]
+mod threads {
+    pub use loom::hint::spin_loop;
+    pub use loom::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+    pub use loom::sync::{Arc, Condvar, Mutex};
+    pub use loom::thread::{Builder, JoinHandle, yield_now};
+    pub use loom::thread_local;
+}
+
+pub use threads::*;

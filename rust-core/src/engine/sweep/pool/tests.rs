@@ -1,0 +1,106 @@
+use super::*;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::Duration;
+
+fn pool(threads: usize) -> Pool {
+    Pool::new(NonZeroUsize::new(threads).unwrap())
+}
+
+#[test]
+fn every_thread_does_its_part_every_time() {
+    for threads in 1..5 {
+        let pool = pool(threads);
+        assert_eq!(pool.threads(), threads);
+        let sum = AtomicUsize::new(0);
+        for round in 0..200 {
+            pool.run(&|t| {
+                sum.fetch_add(part(1000, t, threads).sum::<usize>(), Ordering::Relaxed);
+            });
+            assert_eq!(sum.load(Ordering::Relaxed), (round + 1) * 499_500);
+            if round % 50 == 0 {
+                std::thread::sleep(Duration::from_millis(2));
+            }
+        }
+    }
+}
+
+#[test]
+fn each_thing_is_done_once() {
+    for threads in 1..5 {
+        let pool = pool(threads);
+        for count in [0, 1, 2, 7] {
+            let mut things = vec![1; count];
+            pool.each(&mut things, |thing| *thing += 1);
+            assert!(things.iter().all(|thing| *thing == 2));
+        }
+    }
+}
+
+#[test]
+fn a_panic_of_a_worker_reaches_the_caller_and_the_next_piece_is_done() {
+    let pool = pool(2);
+    for thread in [1, 0] {
+        let caught = catch_unwind(AssertUnwindSafe(|| pool.run(&|t| assert_ne!(t, thread, "on purpose"))));
+        assert!(caught.is_err());
+        let done = AtomicUsize::new(0);
+        pool.run(&|t| {
+            done.fetch_add(t + 1, Ordering::Relaxed);
+        });
+        assert_eq!(done.into_inner(), 3);
+    }
+}
+
+/// Each caller's work lives on its own stack, and is gone when its call returns.
+#[test]
+fn pieces_of_two_callers_do_not_overlap() {
+    let pool = pool(3);
+    let rounds = if cfg!(miri) { 5 } else { 500 };
+    let callers = [AtomicUsize::new(0), AtomicUsize::new(0)];
+    std::thread::scope(|scope| {
+        for caller in 0..2 {
+            let (pool, callers) = (&pool, &callers);
+            scope.spawn(move || {
+                for round in 0..rounds {
+                    let mut done = vec![0; 3];
+                    let parts = SharedSlice::new(&mut done);
+                    pool.run(&|t| {
+                        callers[caller].fetch_add(1, Ordering::SeqCst);
+                        assert_eq!(callers[1 - caller].load(Ordering::SeqCst), 0, "the other is at work");
+                        // SAFETY: each number has an element of its own.
+                        let part = unsafe { parts.slice_mut(t..t + 1) };
+                        part[0] = round + t;
+                        callers[caller].fetch_sub(1, Ordering::SeqCst);
+                    });
+                    assert_eq!(done, [round, round + 1, round + 2]);
+                }
+            });
+        }
+    });
+}
+
+/// Work that runs work of its own on the same pool does not wait for itself.
+#[test]
+fn inner_pieces_are_done_where_they_are_called() {
+    let (pool, other) = (pool(3), pool(2));
+    let done = [const { AtomicUsize::new(0) }; 3];
+    pool.run(&|outer| {
+        let here = std::thread::current().id();
+        pool.run(&|inner| {
+            assert_eq!(std::thread::current().id(), here);
+            done[inner].fetch_add(1 << (8 * outer), Ordering::Relaxed);
+        });
+        // Another pool is no part of this one, but its threads may be inside both.
+        other.run(&|t| {
+            if t == 0 {
+                pool.run(&|_| assert_eq!(std::thread::current().id(), here));
+            }
+        });
+    });
+    assert!(done.iter().all(|done| done.load(Ordering::Relaxed) == 0x1_0101));
+    // Outside again, all threads take part.
+    let seen = AtomicUsize::new(0);
+    pool.run(&|t| {
+        seen.fetch_or(1 << t, Ordering::Relaxed);
+    });
+    assert_eq!(seen.into_inner(), 7);
+}

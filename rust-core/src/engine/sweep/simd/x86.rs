@@ -1,0 +1,82 @@
+//! What both instruction sets of x86-64 share.
+
+use super::Quad;
+use std::arch::x86_64::*;
+
+/// Four `f64`: an accumulator.
+#[derive(Clone, Copy)]
+pub struct Quad4(__m256d);
+
+impl Quad for Quad4 {
+    #[inline(always)]
+    unsafe fn zero() -> Self {
+        unsafe { Quad4(_mm256_setzero_pd()) }
+    }
+    #[inline(always)]
+    unsafe fn splat(x: f64) -> Self {
+        unsafe { Quad4(_mm256_set1_pd(x)) }
+    }
+    #[inline(always)]
+    unsafe fn load(p: *const f64) -> Self {
+        unsafe { Quad4(_mm256_loadu_pd(p)) }
+    }
+    #[inline(always)]
+    unsafe fn store(self, p: *mut f64) {
+        unsafe { _mm256_storeu_pd(p, self.0) }
+    }
+    #[inline(always)]
+    unsafe fn add(self, other: Self) -> Self {
+        unsafe { Quad4(_mm256_add_pd(self.0, other.0)) }
+    }
+    #[inline(always)]
+    unsafe fn sub(self, other: Self) -> Self {
+        unsafe { Quad4(_mm256_sub_pd(self.0, other.0)) }
+    }
+    #[inline(always)]
+    unsafe fn mul(self, other: Self) -> Self {
+        unsafe { Quad4(_mm256_mul_pd(self.0, other.0)) }
+    }
+    #[inline(always)]
+    unsafe fn load_f32(p: *const f32) -> Self {
+        unsafe { Quad4(_mm256_cvtps_pd(_mm_loadu_ps(p))) }
+    }
+}
+
+/// Operators, from intrinsics. They are safe functions because operators are; see the contract of the
+/// module above.
+macro_rules! operators {
+    ($vector:ident, $constant:ident as $scalar:ty, $add:ident, $sub:ident, $mul:ident, $max:ident) => {
+        impl Add for $vector {
+            type Output = Self;
+            #[inline(always)]
+            fn add(self, other: Self) -> Self {
+                unsafe { Self($add(self.0, other.0)) }
+            }
+        }
+        impl Sub for $vector {
+            type Output = Self;
+            #[inline(always)]
+            fn sub(self, other: Self) -> Self {
+                unsafe { Self($sub(self.0, other.0)) }
+            }
+        }
+        impl Mul for $vector {
+            type Output = Self;
+            #[inline(always)]
+            fn mul(self, other: Self) -> Self {
+                unsafe { Self($mul(self.0, other.0)) }
+            }
+        }
+        impl Real for $vector {
+            #[inline(always)]
+            fn constant(x: f64) -> Self {
+                unsafe { Self($constant(x as $scalar)) }
+            }
+            #[inline(always)]
+            fn larger(self, other: Self) -> Self {
+                unsafe { Self($max(self.0, other.0)) }
+            }
+        }
+    };
+}
+pub(super) use operators;

@@ -1,0 +1,162 @@
+//! What pairs add to particles: forces and densities. Each plane has accumulators of its own, for its particles and those of
+//! the next, so that sums do not depend on which thread does which plane, nor when.
+
+use super::cell_order::CellOrder;
+use crate::engine::sweep::pair_batch::accumulators::Accumulator;
+use std::ops::Range;
+
+/// Blocks of accumulators of a thread slab: those of its first two planes wait for all threads, three take turns.
+const ACCUMULATOR_SLOTS: usize = 2 + TURNS;
+
+/// Planes whose accumulators are needed at once: when one is begun, the one before has no many-body forces yet, and
+/// what the one before that has added to this one is not with its force.
+const TURNS: usize = 3;
+
+/// The accumulators of all planes, those of a thread slab in one piece.
+#[derive(Default)]
+pub struct Accumulators {
+    /// What to add to the number of a particle to get that of its accumulator, for each plane.
+    offset: Vec<isize>,
+    /// How many accumulators each thread slab has.
+    slab_sizes: Vec<usize>,
+    /// Force, and the density if there is one variable.
+    forces: Vec<Accumulator>,
+    /// Densities, if there are more variables: `quads` for each particle.
+    densities: Vec<Accumulator>,
+    quads: usize,
+}
+
+/// The accumulators of one thread slab.
+pub struct SlabSums<'a> {
+    forces: &'a mut [Accumulator],
+    densities: &'a mut [Accumulator],
+    offset: &'a [isize],
+    begin: usize,
+    quads: usize,
+}
+
+/// Accumulators to read: of one thread slab, or all.
+#[derive(Clone, Copy)]
+pub struct Sums<'a> {
+    forces: &'a [Accumulator],
+    densities: &'a [Accumulator],
+    offset: &'a [isize],
+    begin: usize,
+    quads: usize,
+}
+
+/// What has been added to some particles that follow each other, by the pairs of one plane.
+#[derive(Clone, Copy)]
+pub struct Added<'a> {
+    pub forces: &'a [Accumulator],
+    pub densities: &'a [Accumulator],
+}
+
+impl Accumulators {
+    /// Lays out accumulators for thread slabs, for `variables` densities. If planes are `reused`, all but the first two of a
+    /// slab are used again three planes on.
+    pub fn lay_out(&mut self, order: &CellOrder, slabs: &[Range<usize>], variables: usize, reused: bool) {
+        self.offset.clear();
+        self.slab_sizes.clear();
+        let mut begin = 0;
+        for slab in slabs {
+            let slot = |plane: usize| match plane - slab.start {
+                k if k < ACCUMULATOR_SLOTS || !reused => k,
+                k => ACCUMULATOR_SLOTS - TURNS + (k - ACCUMULATOR_SLOTS) % TURNS,
+            };
+            let mut sizes = vec![0; if reused { ACCUMULATOR_SLOTS } else { slab.len() }];
+            for plane in slab.clone() {
+                let size = block_size(order, plane);
+                sizes[slot(plane)] = size.max(sizes[slot(plane)]);
+            }
+            let mut end = begin;
+            let mut begins = Vec::with_capacity(sizes.len());
+            for size in &sizes {
+                begins.push(end);
+                end += size;
+            }
+            let places =
+                slab.clone().map(|plane| begins[slot(plane)] as isize - order.plane_start(plane) as isize);
+            self.offset.extend(places);
+            self.slab_sizes.push(end - begin);
+            begin = end;
+        }
+        self.quads = if variables > 1 { variables.div_ceil(4) } else { 0 };
+        self.forces.resize(begin, Accumulator::default());
+        self.densities.resize(self.quads * begin, Accumulator::default());
+    }
+
+    /// Those of each thread slab.
+    pub fn split(&mut self) -> impl Iterator<Item = SlabSums<'_>> {
+        let Accumulators { offset, slab_sizes, forces, densities, quads } = self;
+        let (offset, quads) = (&offset[..], *quads);
+        let (mut forces, mut densities, mut next) = (&mut forces[..], &mut densities[..], 0);
+        slab_sizes.iter().map(move |size| {
+            let (of_slab, behind) = std::mem::take(&mut forces).split_at_mut(*size);
+            forces = behind;
+            let (densities_of_slab, behind) = std::mem::take(&mut densities).split_at_mut(quads * size);
+            densities = behind;
+            let begin = next;
+            next += size;
+            SlabSums { forces: of_slab, densities: densities_of_slab, offset, begin, quads }
+        })
+    }
+
+    /// All of them, to read.
+    pub fn sums(&self) -> Sums<'_> {
+        let Accumulators { offset, forces, densities, quads, .. } = self;
+        Sums { forces, densities, offset, begin: 0, quads: *quads }
+    }
+
+    /// Bytes held in arrays.
+    pub fn bytes(&self) -> usize {
+        (self.forces.capacity() + self.densities.capacity()) * size_of::<Accumulator>()
+    }
+}
+
+/// A plane has accumulators of its own particles, then of those of the next.
+fn block_size(order: &CellOrder, plane: usize) -> usize {
+    order.plane(plane).1 + order.next_plane(plane)
+}
+
+impl SlabSums<'_> {
+    /// Those of a plane of the slab: of its particles, then of those of the next; of forces, and of densities.
+    pub fn of_plane(&mut self, order: &CellOrder, plane: usize) -> [&mut [Accumulator]; 2] {
+        let first = (order.plane_start(plane) as isize + self.offset[plane]) as usize - self.begin;
+        let range = first..first + block_size(order, plane);
+        let quads = self.quads;
+        [&mut self.forces[range.clone()], &mut self.densities[quads * range.start..quads * range.end]]
+    }
+
+    /// To read.
+    pub fn sums(&self) -> Sums<'_> {
+        let SlabSums { forces, densities, offset, begin, quads } = self;
+        Sums { forces, densities, offset, begin: *begin, quads: *quads }
+    }
+}
+
+impl<'a> Sums<'a> {
+    /// What has been added to particles of a plane: by the pairs of that plane, and by those of the plane before.
+    pub fn of_particles(
+        &self,
+        order: &CellOrder,
+        plane: usize,
+        particles: Range<usize>,
+    ) -> (Added<'a>, Option<Added<'a>>) {
+        let before = match plane {
+            // The copies of the first plane are behind the last particle.
+            0 if order.is_periodic() => Some(self.offset[order.grid.planes - 1] + order.particles() as isize),
+            0 => None,
+            _ => Some(self.offset[plane - 1]),
+        };
+        let of = |offset: isize| {
+            let first = (particles.start as isize + offset) as usize - self.begin;
+            let end = first + particles.len();
+            Added {
+                forces: &self.forces[first..end],
+                densities: &self.densities[self.quads * first..self.quads * end],
+            }
+        };
+        (of(self.offset[plane]), before.map(of))
+    }
+}

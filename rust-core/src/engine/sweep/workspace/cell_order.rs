@@ -1,0 +1,231 @@
+//! The particles in the order of cells.
+
+mod count;
+mod extremes;
+mod fractions;
+
+use super::input::Input;
+use crate::engine::error::EngineError;
+use crate::engine::instruction_set::InstructionSet;
+use crate::engine::sweep::ground::box_geometry::BoxGeometry;
+use crate::engine::sweep::ground::cell_grid::CellGrid;
+use crate::engine::sweep::ground::shared_slice::SharedSlice;
+use crate::engine::sweep::pair_batch::in_range_pairs::J_CODE_BITS;
+use crate::engine::sweep::pool::{Pool, part};
+use crate::engine::vectors;
+use count::{Count, CountRange, NO_CELL};
+use fractions::Fractions;
+use std::ops::Range;
+
+pub use extremes::extremes;
+
+/// Up to so many particles all arrays stay in the cache, and nothing is prefetched; lowered in tests.
+const PREFETCH_THRESHOLD: usize = if cfg!(test) { 100 } else { 1 << 14 };
+
+/// Which particles are in which cell. Behind the last plane follow copies of the first, if planes are periodic.
+pub struct CellOrder {
+    pub geometry: BoxGeometry,
+    pub grid: CellGrid,
+    /// Fractions of the box geometry of the host's particles, in units of 2⁻³².
+    pub fixed32: Vec<[u32; 3]>,
+    /// First particle of each cell, those of the copies too, and one past the last.
+    pub start: Vec<u32>,
+    /// The host's number of each particle: each is there once at most.
+    pub order: Vec<u32>,
+    /// How many of the host's particles it owns, and how many there are with ghosts.
+    pub owned: usize,
+    pub all: usize,
+    /// The cell of each of the host's particles.
+    cell: Vec<u32>,
+    /// Particles of each cell: by thread while counting, then where each thread's begin.
+    counts: Vec<u32>,
+}
+
+impl CellOrder {
+    pub fn new(dimensions: usize) -> CellOrder {
+        CellOrder {
+            geometry: BoxGeometry::enclosing([0.0; 3], [1.0; 3], dimensions, 1.0),
+            grid: CellGrid {
+                cells_per_column: 1,
+                columns_per_plane: 1,
+                planes: 1,
+                column_axis: 1,
+                plane_axis: 2,
+                search_cutoff: 1.0,
+                range_half_width: 1.0,
+                i_cluster_size: 4,
+                i_cluster_extent: 1.0,
+            },
+            fixed32: Vec::new(),
+            start: Vec::new(),
+            order: Vec::new(),
+            owned: 0,
+            all: 0,
+            cell: Vec::new(),
+            counts: Vec::new(),
+        }
+    }
+
+    /// Finds the order of the particles in the cells of `grid`.
+    pub fn sort(
+        &mut self,
+        pool: &Pool,
+        set: InstructionSet,
+        geometry: BoxGeometry,
+        grid: CellGrid,
+        input: &Input,
+    ) -> Result<(), EngineError> {
+        (self.geometry, self.grid) = (geometry, grid);
+        (self.all, self.owned) = (input.particles.x.len(), input.particles.owned);
+        self.cell.resize(self.all, 0);
+        self.fixed32.resize(self.all, [0; 3]);
+        self.counts.resize(pool.threads() * grid.cell_count(), 0);
+        self.count(pool, set, input)?;
+        self.sum_counts();
+        let crowded = |plane| (self.plane(plane).1 + self.next_plane(plane)) >> J_CODE_BITS > 0;
+        if (0..grid.planes).any(crowded) {
+            return Err(EngineError::Host("2^25 particles or more in two planes next to each other"));
+        }
+        self.write_order(pool);
+        Ok(())
+    }
+
+    /// The cell of each particle, and how many of each thread's particles are in each.
+    fn count(&mut self, pool: &Pool, set: InstructionSet, input: &Input) -> Result<(), EngineError> {
+        let threads = pool.threads();
+        let count = &Count {
+            input,
+            geometry: &self.geometry,
+            fractions: Fractions::new(&self.geometry, &self.grid),
+            first_kind: Count::first_kind(input),
+        };
+        let (mut cell, mut fixed32) = (&mut self.cell[..], &mut self.fixed32[..]);
+        let parts = self.counts.chunks_exact_mut(self.grid.cell_count()).enumerate().map(|(t, counts)| {
+            let particles = part(input.particles.x.len(), t, threads);
+            let (of_thread, rest) = std::mem::take(&mut cell).split_at_mut(particles.len());
+            cell = rest;
+            let (units, rest) = std::mem::take(&mut fixed32).split_at_mut(particles.len());
+            fixed32 = rest;
+            (Some(CountRange { count, particles, cell: of_thread, fixed32: units, counts }), Ok(()))
+        });
+        let mut parts: Vec<_> = parts.collect();
+        pool.each(&mut parts, |(range, done)| {
+            if let Some(range) = range.take() {
+                *done = vectors::run(set, range);
+            }
+        });
+        parts.into_iter().try_for_each(|(_, done)| done)
+    }
+
+    /// Turns counts into where each thread's particles of a cell begin.
+    fn sum_counts(&mut self) {
+        let cells = self.grid.cell_count();
+        let per_plane = self.grid.columns_per_plane * self.grid.cells_per_column;
+        self.start.resize(cells + 1 + if self.is_periodic() { per_plane } else { 0 }, 0);
+        let [first, rest @ ..] = &mut self.start[..] else { return };
+        *first = 0;
+        // How many there are in each cell, then where it begins, and last where it ends: the beginning of the next.
+        let ends = &mut rest[..cells];
+        ends.copy_from_slice(&self.counts[..cells]);
+        for counts in self.counts.chunks_exact(cells).skip(1) {
+            for (end, count) in ends.iter_mut().zip(counts) {
+                *end += count;
+            }
+        }
+        let mut sum = 0;
+        for end in &mut *ends {
+            let many = *end;
+            *end = sum;
+            sum += many;
+        }
+        for counts in self.counts.chunks_exact_mut(cells) {
+            for (end, count) in ends.iter_mut().zip(counts) {
+                let many = *count;
+                *count = *end;
+                *end += many;
+            }
+        }
+        self.order.resize(sum as usize, 0);
+        // The copy of the first plane.
+        for cell in cells + 1..self.start.len() {
+            self.start[cell] = sum + self.start[cell - cells];
+        }
+    }
+
+    /// The particles in the order of cells: within one in the order of their numbers.
+    fn write_order(&mut self, pool: &Pool) {
+        let (threads, all) = (pool.threads(), self.all);
+        let mut cell = &self.cell[..];
+        let order = SharedSlice::new(&mut self.order);
+        let parts = self.counts.chunks_exact_mut(self.grid.cell_count()).enumerate().map(|(t, counts)| {
+            let particles = part(all, t, threads);
+            let (of_thread, rest) = cell.split_at(particles.len());
+            cell = rest;
+            (particles.start, of_thread, counts)
+        });
+        let mut parts: Vec<_> = parts.collect();
+        pool.each(&mut parts, |(first, cell, counts)| {
+            for (k, to) in (*first..).zip(*cell) {
+                if *to == NO_CELL {
+                    continue;
+                }
+                // SAFETY: all other cells are of the grid, see `CountRange`. Each thread has as many places of a cell as
+                // it has counted particles in it, beginning where `sum_counts` says, so no two particles have the same
+                // place, and all places are below the number of particles.
+                unsafe {
+                    let next = counts.get_unchecked_mut(*to as usize);
+                    *order.at(*next as usize) = k as u32;
+                    *next += 1;
+                }
+            }
+        });
+    }
+
+    /// How many particles there are.
+    pub fn particles(&self) -> usize {
+        self.order.len()
+    }
+
+    /// How many copies of particles of the first plane follow them.
+    pub fn copies(&self) -> usize {
+        if self.is_periodic() { self.plane(0).1 } else { 0 }
+    }
+
+    /// The first particle of a plane, and how many it has.
+    pub fn plane(&self, plane: usize) -> (usize, usize) {
+        let first = self.plane_start(plane);
+        (first, self.plane_start(plane + 1) - first)
+    }
+
+    /// The first particle of a plane, or one past the last.
+    pub fn plane_start(&self, plane: usize) -> usize {
+        self.start[plane * self.grid.columns_per_plane * self.grid.cells_per_column] as usize
+    }
+
+    /// The particles of planes that follow each other.
+    pub fn particles_of(&self, planes: &Range<usize>) -> Range<usize> {
+        self.plane_start(planes.start)..self.plane_start(planes.end)
+    }
+
+    /// How many particles the plane behind `plane` has.
+    pub fn next_plane(&self, plane: usize) -> usize {
+        if plane + 1 < self.grid.planes { self.plane(plane + 1).1 } else { self.copies() }
+    }
+
+    /// Whether the first plane follows the last: periodic along the plane axis.
+    pub fn is_periodic(&self) -> bool {
+        self.geometry.periodic[self.grid.plane_axis]
+    }
+
+    /// Whether arrays over all particles are beyond the cache.
+    pub fn exceeds_cache(&self) -> bool {
+        self.all > PREFETCH_THRESHOLD
+    }
+
+    /// Bytes held in arrays.
+    pub fn bytes(&self) -> usize {
+        (self.cell.capacity() + self.counts.capacity() + self.start.capacity() + self.order.capacity())
+            * size_of::<u32>()
+            + self.fixed32.capacity() * size_of::<[u32; 3]>()
+    }
+}

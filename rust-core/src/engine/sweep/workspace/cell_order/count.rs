@@ -1,0 +1,176 @@
+//! The cell of each particle, and how many there are in each.
+
+use super::fractions::{Fractions, SORT_BLOCK};
+use crate::engine::error::EngineError;
+use crate::engine::sweep::ground::box_geometry::BoxGeometry;
+use crate::engine::sweep::workspace::input::Input;
+use crate::engine::vectors::Loop;
+use std::ops::Range;
+
+/// The cell of particles that take no part.
+pub const NO_CELL: u32 = u32::MAX;
+
+/// What all threads count with.
+pub struct Count<'a> {
+    pub input: &'a Input<'a>,
+    pub geometry: &'a BoxGeometry,
+    pub fractions: Fractions<'a>,
+    /// See [`Count::first_kind`].
+    pub first_kind: u32,
+}
+
+/// The particles of one thread: their cells, each of the grid or [`NO_CELL`], their fractions if they have a cell, and how
+/// many are in each.
+pub struct CountRange<'a> {
+    pub count: &'a Count<'a>,
+    pub particles: Range<usize>,
+    /// Of these particles.
+    pub cell: &'a mut [u32],
+    pub fixed32: &'a mut [[u32; 3]],
+    /// Of all cells.
+    pub counts: &'a mut [u32],
+}
+
+impl Loop for CountRange<'_> {
+    type Out = Result<(), EngineError>;
+
+    #[inline(always)]
+    fn run(self) -> Result<(), EngineError> {
+        let CountRange { count, particles, cell, fixed32: units, counts } = self;
+        let mut first = particles.start;
+        counts.fill(0);
+        let mut fixed32 = [[0; 3]; SORT_BLOCK];
+        let (cell_blocks, cell) = cell.as_chunks_mut::<SORT_BLOCK>();
+        let (unit_blocks, units) = units.as_chunks_mut::<SORT_BLOCK>();
+        let (x_blocks, rest) = count.input.particles.x[particles].as_chunks::<SORT_BLOCK>();
+        for ((x, of_block), units_of_block) in x_blocks.iter().zip(cell_blocks).zip(unit_blocks) {
+            if count.are_self_ghosts(first) {
+                *of_block = [NO_CELL; SORT_BLOCK];
+                first += SORT_BLOCK;
+                continue;
+            }
+            let near = count.fractions.of_block(x, &mut fixed32);
+            let cells = count.fractions.cells(&fixed32);
+            if !near || !count.are_plain(first) {
+                count.one_by_one(first, (&fixed32, &cells), of_block, units_of_block, counts)?;
+            } else {
+                *units_of_block = fixed32;
+                if first + SORT_BLOCK <= count.input.particles.owned {
+                    count.all::<false>(first, x, &cells, of_block, counts);
+                } else {
+                    count.all::<true>(first, x, &cells, of_block, counts);
+                }
+            }
+            first += SORT_BLOCK;
+        }
+        if !rest.is_empty() {
+            let mut x = [count.geometry.origin; SORT_BLOCK];
+            x[..rest.len()].copy_from_slice(rest);
+            count.fractions.of_block(&x, &mut fixed32);
+            let cells = count.fractions.cells(&fixed32);
+            count.one_by_one(first, (&fixed32, &cells), cell, units, counts)?;
+        }
+        Ok(())
+    }
+}
+
+impl Count<'_> {
+    /// Types from the first of these on all have a species; hosts that number them from one have none for zero.
+    pub fn first_kind(input: &Input) -> u32 {
+        input.species_of_type.iter().rposition(|s| *s < 0).map_or(0, |last| last as u32 + 1)
+    }
+
+    /// Whether all particles of a block take part, and have tags and types in range.
+    #[inline(always)]
+    fn are_plain(&self, first: usize) -> bool {
+        let (particles, range) = (&self.input.particles, first..first + SORT_BLOCK);
+        let types = self.input.species_of_type.len() as u32 - self.first_kind;
+        let mut wrong = 0;
+        for (tag, kind) in particles.tag[range.clone()].iter().zip(&particles.kind[range]) {
+            let unknown = (*kind as u32).wrapping_sub(self.first_kind) >= types;
+            wrong |= (*tag < 1) as u32 | unknown as u32;
+        }
+        wrong == 0
+    }
+
+    /// Whether all particles of a block are images.
+    #[inline(always)]
+    fn are_self_ghosts(&self, first: usize) -> bool {
+        let Some(ghost) = first.checked_sub(self.input.particles.owned) else { return false };
+        let images = self.input.images.get(ghost..).and_then(|images| images.first_chunk::<SORT_BLOCK>());
+        images.is_some_and(|images| images.iter().fold(true, |all, image| all & *image))
+    }
+
+    /// Whether a particle is a ghost that no owned particle needs: out of reach, or an image.
+    #[inline(always)]
+    fn is_unneeded(&self, k: usize, x: &[f64; 3]) -> bool {
+        let Some(ghost) = k.checked_sub(self.input.particles.owned) else { return false };
+        !self.geometry.contains(x) || self.input.images.get(ghost).is_some_and(|image| *image)
+    }
+
+    /// Counts a block of particles, of which some may be ghosts that nobody needs.
+    #[inline(always)]
+    fn all<const GHOSTS: bool>(
+        &self,
+        first: usize,
+        x: &[[f64; 3]; SORT_BLOCK],
+        cells: &[[u32; 3]; SORT_BLOCK],
+        cell: &mut [u32; SORT_BLOCK],
+        counts: &mut [u32],
+    ) {
+        for (lane, [a, b, c]) in cells.iter().enumerate() {
+            let mut to = a + b + c;
+            if GHOSTS && self.is_unneeded(first + lane, &x[lane]) {
+                to = NO_CELL;
+            } else {
+                // SAFETY: `Fractions::cells` finds cells of the grid, each of which has a count.
+                unsafe { *counts.get_unchecked_mut(to as usize) += 1 };
+            }
+            cell[lane] = to;
+        }
+    }
+
+    /// Counts particles, a block or fewer, of which some may take no part, or may be wrong.
+    #[inline(never)]
+    fn one_by_one(
+        &self,
+        first: usize,
+        (fixed32, cells): (&[[u32; 3]; SORT_BLOCK], &[[u32; 3]; SORT_BLOCK]),
+        cell: &mut [u32],
+        units: &mut [[u32; 3]],
+        counts: &mut [u32],
+    ) -> Result<(), EngineError> {
+        let input = self.input;
+        for (lane, (cell, unit)) in cell.iter_mut().zip(units).enumerate() {
+            let k = first + lane;
+            let x = &input.particles.x[k];
+            let species = input.species_of(k);
+            *cell = NO_CELL;
+            if species.is_some_and(|s| s < 0) {
+                continue;
+            }
+            if species.is_none() || input.particles.tag[k] < 1 || !self.fractions.has(x) {
+                return Err(fault_of(input, k));
+            }
+            if self.is_unneeded(k, x) {
+                continue;
+            }
+            *cell = cells[lane].iter().sum();
+            *unit = fixed32[lane];
+            counts[*cell as usize] += 1;
+        }
+        Ok(())
+    }
+}
+
+/// What is wrong with a particle that cannot be sorted.
+#[cold]
+#[inline(never)]
+fn fault_of(input: &Input, k: usize) -> EngineError {
+    let (tag, kind) = (input.particles.tag[k], input.particles.kind[k]);
+    match input.species_of(k) {
+        None => EngineError::Kind { tag, kind },
+        Some(_) if tag < 1 => EngineError::Tag { tag },
+        Some(_) => EngineError::Position { tag },
+    }
+}

@@ -1,0 +1,107 @@
+//! How far particles reach.
+
+use crate::engine::error::EngineError;
+use crate::engine::instruction_set::InstructionSet;
+use crate::engine::sweep::pool::{Pool, part};
+use crate::engine::sweep::workspace::input::Input;
+use crate::engine::vectors::{self, Loop};
+use std::ops::Range;
+
+/// Particles that are looked at together.
+const PARTICLES: usize = 4;
+/// Their coordinates.
+const COORDINATES: usize = 3 * PARTICLES;
+
+/// Beyond this a coordinate is none.
+const ABSURD: f64 = 1e100;
+
+/// The lowest and the highest coordinates of the owned particles; the origin if there are none.
+pub fn extremes(pool: &Pool, set: InstructionSet, input: &Input) -> Result<[[f64; 3]; 2], EngineError> {
+    let threads = pool.threads();
+    let particles = |t| part(input.particles.owned, t, threads);
+    let mut parts: Vec<_> = (0..threads).map(|t| (particles(t), Ok(NOWHERE))).collect();
+    pool.each(&mut parts, |(particles, found)| {
+        *found = vectors::run(set, FindExtremes { input, particles: particles.clone() });
+    });
+    let [mut low, mut high] = NOWHERE;
+    for (_, found) in parts {
+        let [lowest, highest] = found?;
+        for c in 0..3 {
+            low[c] = low[c].min(lowest[c]);
+            high[c] = high[c].max(highest[c]);
+        }
+    }
+    Ok(if low[0] > high[0] { [[0.0; 3]; 2] } else { [low, high] })
+}
+
+/// The extremes of no particles.
+const NOWHERE: [[f64; 3]; 2] = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+
+/// The lowest and the highest coordinates of some particles.
+struct FindExtremes<'a> {
+    input: &'a Input<'a>,
+    particles: Range<usize>,
+}
+
+impl Loop for FindExtremes<'_> {
+    type Out = Result<[[f64; 3]; 2], EngineError>;
+
+    #[inline(always)]
+    fn run(self) -> Self::Out {
+        let mut extremes = NOWHERE;
+        let (mut low, mut high) = ([f64::INFINITY; COORDINATES], [f64::NEG_INFINITY; COORDINATES]);
+        let (groups, rest) = self.input.particles.x[self.particles.clone()].as_chunks::<PARTICLES>();
+        for (g, group) in groups.iter().enumerate() {
+            let mut x = [0.0; COORDINATES];
+            x.copy_from_slice(group.as_flattened());
+            let mut absurd = [0; PARTICLES];
+            for from in (0..COORDINATES).step_by(PARTICLES) {
+                for c in 0..PARTICLES {
+                    // Also what is no number.
+                    let sound = x[from + c].abs() <= ABSURD / 3.0;
+                    absurd[c] |= u64::from(!sound);
+                }
+            }
+            if absurd != [0; PARTICLES] {
+                self.one_by_one(PARTICLES * g, group, &mut extremes)?;
+                continue;
+            }
+            for c in 0..COORDINATES {
+                low[c] = if x[c] < low[c] { x[c] } else { low[c] };
+                high[c] = if x[c] > high[c] { x[c] } else { high[c] };
+            }
+        }
+        self.one_by_one(PARTICLES * groups.len(), rest, &mut extremes)?;
+        for c in 0..COORDINATES {
+            extremes[0][c % 3] = extremes[0][c % 3].min(low[c]);
+            extremes[1][c % 3] = extremes[1][c % 3].max(high[c]);
+        }
+        Ok(extremes)
+    }
+}
+
+impl FindExtremes<'_> {
+    /// Particles that may be somewhere absurd: those that take no part may.
+    #[inline(never)]
+    fn one_by_one(
+        &self,
+        from: usize,
+        x: &[[f64; 3]],
+        extremes: &mut [[f64; 3]; 2],
+    ) -> Result<(), EngineError> {
+        for (k, x) in (self.particles.start + from..).zip(x) {
+            let sum = x[0].abs() + x[1].abs() + x[2].abs();
+            if sum.is_nan() || sum > ABSURD {
+                if self.input.species_of(k).is_some_and(|s| s < 0) {
+                    continue;
+                }
+                return Err(EngineError::Position { tag: self.input.particles.tag[k] });
+            }
+            for c in 0..3 {
+                extremes[0][c] = extremes[0][c].min(x[c]);
+                extremes[1][c] = extremes[1][c].max(x[c]);
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,116 @@
+//! Positions as fractions of the box geometry, block by block.
+
+use crate::engine::sweep::ground::box_geometry::BoxGeometry;
+use crate::engine::sweep::ground::cell_grid::CellGrid;
+use crate::engine::sweep::ground::fixed_point::TWO_TO_32;
+
+/// Far below what a whole number in the low bits of a double holds.
+const FAR: f64 = 1e15;
+
+/// Particles of a block.
+pub const SORT_BLOCK: usize = 32;
+
+/// Coordinates of a block.
+const COORDINATES: usize = 3 * SORT_BLOCK;
+
+/// How positions become fractions of the box geometry in units of 2⁻³², and those the cells of a grid; constants are repeated
+/// for each particle of a block, so that loops are over all coordinates alike.
+pub struct Fractions<'a> {
+    geometry: &'a BoxGeometry,
+    inverse: [f64; 3],
+    origin: [f64; COORDINATES],
+    scale: [f64; COORDINATES],
+    /// Where fractions end that do not wrap.
+    ends: [[f64; 2]; COORDINATES],
+    is_open: bool,
+    /// Cells along each axis, and from one to the next along it.
+    of: [u32; COORDINATES],
+    step: [u32; COORDINATES],
+}
+
+impl<'a> Fractions<'a> {
+    pub fn new(geometry: &'a BoxGeometry, grid: &CellGrid) -> Fractions<'a> {
+        let inverse = geometry.length.map(|l| 1.0 / l);
+        let flat = if geometry.dimensions == 3 { 1.0 } else { 0.0 };
+        let scale = [inverse[0] * TWO_TO_32, inverse[1] * TWO_TO_32, flat * inverse[2] * TWO_TO_32];
+        let (of, step) = (grid.along(), grid.steps());
+        let end = |c: usize, end: f64, beyond: f64| if geometry.periodic[c] { beyond } else { end };
+        Fractions {
+            geometry,
+            inverse,
+            origin: std::array::from_fn(|c| geometry.origin[c % 3]),
+            scale: std::array::from_fn(|c| scale[c % 3]),
+            ends: std::array::from_fn(|c| [end(c % 3, 0.0, -FAR), end(c % 3, TWO_TO_32 - 1.0, FAR)]),
+            is_open: !geometry.periodic.iter().all(|p| *p),
+            of: std::array::from_fn(|c| of[c % 3]),
+            step: std::array::from_fn(|c| step[c % 3]),
+        }
+    }
+
+    /// Fractions of a block of particles; they wrap along periods, and are never beyond the ends where there are none.
+    /// Whether all are finite and not too far away.
+    #[inline(always)]
+    pub fn of_block(&self, x: &[[f64; 3]; SORT_BLOCK], fixed32: &mut [[u32; 3]; SORT_BLOCK]) -> bool {
+        let mut scaled = [0.0; COORDINATES];
+        if self.geometry.is_tilted() {
+            self.tilt(x, &mut scaled);
+        } else {
+            let constants = self.origin.iter().zip(&self.scale);
+            for (t, (x, (origin, scale))) in scaled.iter_mut().zip(x.as_flattened().iter().zip(constants)) {
+                *t = (x - origin) * scale;
+            }
+        }
+        let mut far = 0u64;
+        for t in scaled {
+            // Not where it is not a number.
+            let near = t.abs() < FAR;
+            far |= u64::from(!near);
+        }
+        if self.is_open {
+            self.stay(&mut scaled);
+        }
+        for (u, t) in fixed32.as_flattened_mut().iter_mut().zip(scaled) {
+            *u = (t + WHOLE).to_bits() as u32;
+        }
+        far == 0
+    }
+
+    // Neither of both is common: inlined they would keep the loops around them from becoming vectors.
+
+    /// Fractions in a box geometry that leans.
+    #[inline(never)]
+    fn tilt(&self, x: &[[f64; 3]; SORT_BLOCK], scaled: &mut [f64; COORDINATES]) {
+        for (t, x) in scaled.as_chunks_mut::<3>().0.iter_mut().zip(x) {
+            *t = self.geometry.fraction(x, &self.inverse).map(|s| s * TWO_TO_32);
+        }
+    }
+
+    /// Fractions no further than the ends of the box geometry.
+    #[inline(never)]
+    fn stay(&self, scaled: &mut [f64; COORDINATES]) {
+        for (t, [low, high]) in scaled.iter_mut().zip(&self.ends) {
+            let above = if *t > *low { *t } else { *low };
+            *t = if above < *high { above } else { *high };
+        }
+    }
+
+    /// Whether the fractions of a particle are finite and not too far away.
+    pub fn has(&self, x: &[f64; 3]) -> bool {
+        self.geometry.fraction(x, &self.inverse).iter().all(|s| (s * TWO_TO_32).abs() < FAR)
+    }
+
+    /// What the coordinates of a block of particles add to the numbers of their cells.
+    #[inline(always)]
+    pub fn cells(&self, fixed32: &[[u32; 3]; SORT_BLOCK]) -> [[u32; 3]; SORT_BLOCK] {
+        let mut parts = [[0; 3]; SORT_BLOCK];
+        let constants = self.of.iter().zip(&self.step);
+        let fixed32 = fixed32.as_flattened().iter().zip(constants);
+        for (part, (u, (of, step))) in parts.as_flattened_mut().iter_mut().zip(fixed32) {
+            *part = ((*u as u64 * *of as u64) >> 32) as u32 * step;
+        }
+        parts
+    }
+}
+
+/// Adding this leaves the nearest whole number in the low bits.
+const WHOLE: f64 = 6_755_399_441_055_744.0;

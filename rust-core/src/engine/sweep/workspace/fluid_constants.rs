@@ -1,0 +1,17 @@
+use crate::engine::instruction_set::InstructionSet;
+use crate::engine::sweep::ground::terms::Terms;
+
+/// What stays the same for one fluid.
+pub struct FluidConstants<T> {
+    pub set: InstructionSet,
+    pub terms: Terms<T>,
+    /// Which variables of ψ the many-body passes sum.
+    pub variables: Vec<usize>,
+}
+
+impl<T> FluidConstants<T> {
+    /// Numbers that a many-body pair needs of each particle.
+    pub fn width(&self) -> usize {
+        self.variables.len()
+    }
+}

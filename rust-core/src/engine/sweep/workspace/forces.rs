@@ -1,0 +1,115 @@
+//! Forces in the host's order.
+
+use super::accumulators::Added;
+use crate::engine::instruction_set::InstructionSet;
+use crate::engine::sweep::ground::shared_slice::SharedSlice;
+use crate::engine::sweep::pair_batch::accumulators::Accumulator;
+use crate::engine::vectors::{self, Loop};
+
+/// Where the host wants forces.
+#[derive(Clone, Copy)]
+pub struct ForceSink<'a> {
+    force: SharedSlice<'a, [f64; 3]>,
+    /// Whether they are added to what is there.
+    add: bool,
+    tag: &'a [i32],
+}
+
+impl<'a> ForceSink<'a> {
+    /// Forces on the particles with these tags, of which there may be more than forces: ghosts.
+    pub fn new(force: &'a mut [[f64; 3]], add: bool, tag: &'a [i32]) -> ForceSink<'a> {
+        ForceSink { force: SharedSlice::new(force), add, tag }
+    }
+
+    /// Writes forces on particles, or adds them to what is there; the lowest tag of those that are not finite.
+    ///
+    /// # Safety
+    /// No number is twice in `order`, and no other thread writes the forces on these particles.
+    pub unsafe fn write(
+        self,
+        set: InstructionSet,
+        order: &[u32],
+        owned: usize,
+        (here, before): (Added, Option<Added>),
+    ) -> Option<i32> {
+        assert!(owned <= self.force.len(), "forces of all owned particles");
+        let before = before.map(|before| before.forces);
+        let forces = PlaneForces { order, owned, here: here.forces, before, out: self.force };
+        let finite = match self.add {
+            true => vectors::run(set, WriteForces::<true>(&forces)),
+            false => vectors::run(set, WriteForces::<false>(&forces)),
+        };
+        if finite { None } else { forces.lost(self.tag) }
+    }
+}
+
+/// Forces on the particles of one plane. Made by [`ForceSink::write`] alone, whose caller promises that nobody else writes
+/// the forces on them, and which has checked that there are forces on all owned particles.
+struct PlaneForces<'a> {
+    /// The host's numbers of them.
+    order: &'a [u32],
+    owned: usize,
+    /// What the plane itself has added, and the plane before.
+    here: &'a [Accumulator],
+    before: Option<&'a [Accumulator]>,
+    out: SharedSlice<'a, [f64; 3]>,
+}
+
+/// Writes forces, or adds them to what is there; whether all are finite.
+struct WriteForces<'a, const ADD: bool>(&'a PlaneForces<'a>);
+
+impl<const ADD: bool> Loop for WriteForces<'_, ADD> {
+    type Out = bool;
+
+    #[inline(always)]
+    fn run(self) -> bool {
+        let PlaneForces { order, here, before, .. } = *self.0;
+        match before {
+            None => self.0.write::<ADD>(order.iter().zip(here).map(|(k, here)| (*k, here.0))),
+            Some(before) => {
+                let pairs = order.iter().zip(here.iter().zip(before));
+                self.0.write::<ADD>(pairs.map(|(k, (here, before))| (*k, sum(here.0, before.0))))
+            }
+        }
+    }
+}
+
+impl PlaneForces<'_> {
+    #[inline(always)]
+    fn write<const ADD: bool>(&self, sums: impl Iterator<Item = (u32, [f64; 4])>) -> bool {
+        let mut lost = false;
+        for (k, [x, y, z, _]) in sums {
+            let mut f = [x, y, z];
+            if k as usize >= self.owned {
+                continue;
+            }
+            let finite = x.is_finite() & y.is_finite() & z.is_finite();
+            lost |= !finite;
+            // SAFETY: an owned particle, whose force is there and nobody else's to write, see `PlaneForces`.
+            unsafe {
+                let out = self.out.at(k as usize);
+                if ADD {
+                    for c in 0..3 {
+                        f[c] += (*out)[c];
+                    }
+                }
+                *out = f;
+            }
+        }
+        !lost
+    }
+
+    /// The lowest tag of particles whose forces are not finite.
+    #[cold]
+    fn lost(&self, tag: &[i32]) -> Option<i32> {
+        let force = |s: usize| self.before.map_or(self.here[s].0, |before| sum(self.here[s].0, before[s].0));
+        let numbers = self.order.iter().map(|k| *k as usize).enumerate();
+        let lost = numbers.filter(|(s, k)| *k < self.owned && !force(*s)[..3].iter().all(|f| f.is_finite()));
+        lost.map(|(_, k)| tag[k]).min()
+    }
+}
+
+#[inline(always)]
+fn sum(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
+    std::array::from_fn(|c| a[c] + b[c])
+}

@@ -1,0 +1,42 @@
+use crate::engine::noise::PairNoise;
+use crate::engine::particles::Particles;
+use crate::engine::tally::Want;
+
+/// What the host hands over.
+pub struct Input<'a> {
+    pub particles: Particles<'a>,
+    /// Whether each ghost is an image of a particle that is there too; empty if none is.
+    pub images: &'a [bool],
+    /// Empty if nothing drags.
+    pub v: &'a [[f64; 3]],
+    /// Species of each type of particle; negative for those that take no part.
+    pub species_of_type: &'a [i32],
+    pub thermostat: Option<(PairNoise, f64)>,
+    pub totals: bool,
+}
+
+impl<'a> Input<'a> {
+    pub fn new(
+        particles: &Particles<'a>,
+        images: &'a [bool],
+        v: &'a [[f64; 3]],
+        species_of_type: &'a [i32],
+        thermostat: Option<(PairNoise, f64)>,
+        want: Want,
+    ) -> Input<'a> {
+        Input {
+            particles: *particles,
+            images,
+            v,
+            species_of_type,
+            thermostat,
+            totals: want.energy || want.virial,
+        }
+    }
+
+    /// The species of a particle, unless its type is unknown.
+    #[inline(always)]
+    pub fn species_of(&self, k: usize) -> Option<i32> {
+        self.species_of_type.get(self.particles.kind[k] as usize).copied()
+    }
+}

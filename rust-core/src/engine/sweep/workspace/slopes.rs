@@ -1,0 +1,128 @@
+//! The slopes of ψ, as the second pass reads them.
+
+use super::cell_order::CellOrder;
+use crate::engine::sweep::cells::sorted::VECTOR_PADDING;
+use crate::engine::sweep::ground::shared_slice::SharedSlice;
+use crate::engine::sweep::passes::slopes::SLOPES_PER_BLOCK;
+use crate::engine::sweep::simd::Scalar;
+use std::ops::Range;
+
+/// Slopes of all particles in the order of cells, then those of the copies of the first plane.
+#[derive(Default)]
+pub struct Slopes<T> {
+    /// How many there are of each particle.
+    width: usize,
+    /// A row for each particle.
+    rows: Vec<f64>,
+    /// The same in the precision of pairs, if all pairs are cached: rows of eight slopes for all particles, then rows of the
+    /// next eight …
+    packed: Vec<T>,
+    /// How many numbers there are from one row of the same particle to its next.
+    stride: usize,
+}
+
+/// The same for the time of the passes: threads write those of their own slabs, and read there and one plane behind.
+#[derive(Clone, Copy)]
+pub struct SharedSlopes<'a, T> {
+    width: usize,
+    pub rows: SharedSlice<'a, f64>,
+    pub packed: SharedSlice<'a, T>,
+    pub stride: usize,
+}
+
+impl<T: Scalar> Slopes<T> {
+    /// Room for all particles of an order, and for packed rows if they are wanted.
+    pub fn make_room(&mut self, order: &CellOrder, width: usize, packs: bool) {
+        let total = order.particles() + order.copies();
+        self.width = width;
+        self.rows.resize(width * total, 0.0);
+        self.stride = SLOPES_PER_BLOCK * (total + VECTOR_PADDING);
+        self.packed
+            .resize(if packs { width.div_ceil(SLOPES_PER_BLOCK) * self.stride } else { 0 }, T::of(0.0));
+    }
+
+    /// Those of the copies of the first plane.
+    pub fn copy_first_plane(&mut self, order: &CellOrder) {
+        let (width, n, copies) = (self.width, order.particles(), order.copies());
+        self.rows.copy_within(..width * copies, width * n);
+        for of_eight in self.packed.chunks_exact_mut(self.stride) {
+            of_eight.copy_within(..SLOPES_PER_BLOCK * copies, SLOPES_PER_BLOCK * n);
+        }
+    }
+
+    /// A row for each particle.
+    pub fn rows(&self) -> &[f64] {
+        &self.rows
+    }
+
+    /// Writes the slopes of one particle.
+    pub fn set(&mut self, particle: usize, slopes: &[f64]) {
+        self.rows[self.width * particle..][..self.width].copy_from_slice(slopes);
+        for (eight, of_eight) in self.packed.chunks_exact_mut(self.stride).enumerate() {
+            pack(self.width, eight, slopes, &mut of_eight[SLOPES_PER_BLOCK * particle..][..SLOPES_PER_BLOCK]);
+        }
+    }
+
+    /// Lends them to the passes.
+    pub fn share(&mut self) -> SharedSlopes<'_, T> {
+        SharedSlopes {
+            width: self.width,
+            rows: SharedSlice::new(&mut self.rows),
+            packed: SharedSlice::new(&mut self.packed),
+            stride: self.stride,
+        }
+    }
+
+    /// Bytes held in arrays.
+    pub fn bytes(&self) -> usize {
+        self.rows.capacity() * size_of::<f64>() + self.packed.capacity() * size_of::<T>()
+    }
+}
+
+impl<'a, T: Scalar> SharedSlopes<'a, T> {
+    /// The rows of particles, to write them.
+    ///
+    /// # Safety
+    /// Nobody else accesses their slopes while they are in use.
+    pub unsafe fn rows_mut(self, particles: Range<usize>) -> &'a mut [f64] {
+        // SAFETY: rows of these particles, which nobody else accesses, as the caller promises.
+        unsafe { self.rows.slice_mut(self.width * particles.start..self.width * particles.end) }
+    }
+
+    /// Packs the slopes of particles, if that is wanted.
+    ///
+    /// # Safety
+    /// Nobody else accesses their slopes meanwhile.
+    pub unsafe fn pack(self, particles: Range<usize>, slopes: &[f64]) {
+        let mut first = SLOPES_PER_BLOCK * particles.start;
+        for eight in 0..self.packed.len() / self.stride {
+            // SAFETY: packed rows of these particles, which nobody else accesses, as the caller promises.
+            let to = unsafe { self.packed.slice_mut(first..first + SLOPES_PER_BLOCK * particles.len()) };
+            match self.width {
+                2 => pack_few::<2, T>(slopes, to),
+                3 => pack_few::<3, T>(slopes, to),
+                4 => pack_few::<4, T>(slopes, to),
+                width => pack(width, eight, slopes, to),
+            }
+            first += self.stride;
+        }
+    }
+}
+
+/// Packs slopes, `width` of each particle, of which row `eight` has eight or those that are left.
+fn pack<T: Scalar>(width: usize, eight: usize, slopes: &[f64], to: &mut [T]) {
+    for (to, slopes) in to.as_chunks_mut::<SLOPES_PER_BLOCK>().0.iter_mut().zip(slopes.chunks_exact(width)) {
+        for (to, slope) in to.iter_mut().zip(&slopes[SLOPES_PER_BLOCK * eight..]) {
+            *to = T::of(*slope);
+        }
+    }
+}
+
+/// The same of `W` slopes of each particle, which have one row.
+fn pack_few<const W: usize, T: Scalar>(slopes: &[f64], to: &mut [T]) {
+    for (to, slopes) in to.as_chunks_mut::<SLOPES_PER_BLOCK>().0.iter_mut().zip(slopes.as_chunks::<W>().0) {
+        for (to, slope) in to.iter_mut().zip(slopes) {
+            *to = T::of(*slope);
+        }
+    }
+}

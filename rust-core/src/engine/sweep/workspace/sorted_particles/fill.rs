@@ -1,0 +1,185 @@
+//! Arrays in the order of cells, from the host's.
+
+use crate::engine::sweep::cells::sorted::VECTOR_PADDING;
+use crate::engine::sweep::ground::arithmetic::PackedParticle;
+use crate::engine::sweep::ground::box_geometry::BoxGeometry;
+use crate::engine::sweep::ground::fixed_point::{FixedPoint16, TWO_TO_32};
+use crate::engine::sweep::workspace::cell_order::CellOrder;
+use crate::engine::sweep::workspace::input::Input;
+use crate::engine::sweep::workspace::shared_particles::SharedParticles;
+use crate::engine::vectors::Loop;
+use std::ops::Range;
+
+/// Particles that are fetched before their coordinates are computed: loads of vectors wait for the numbers they are
+/// made of to arrive in the cache.
+const FILL_BLOCK: usize = 4 * VECTOR_PADDING;
+
+/// How many particles ahead the host's data of a particle are prefetched: the order of the host looks random.
+const PREFETCH_DISTANCE: usize = 64;
+
+/// Where particles come from, and where they go; `SharedParticles::fill` has checked that all have room.
+pub struct Fill<'a, R> {
+    pub input: &'a Input<'a>,
+    pub order: &'a CellOrder,
+    pub to: &'a SharedParticles<'a, R>,
+}
+
+/// The places that one thread fills: from a multiple of [`VECTOR_PADDING`] on. Made by `SharedParticles::fill` alone, whose
+/// caller promises that nobody else accesses them.
+pub struct FillRange<'a, R, const WITH_VELOCITIES: bool, const MULTISPECIES: bool> {
+    pub fill: &'a Fill<'a, R>,
+    pub places: Range<usize>,
+}
+
+impl<R: PackedParticle, const WITH_VELOCITIES: bool, const MULTISPECIES: bool> Loop
+    for FillRange<'_, R, WITH_VELOCITIES, MULTISPECIES>
+{
+    type Out = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let FillRange { fill, places } = self;
+        let coordinates = Coordinates::new(&fill.order.geometry, fill.to.fixed16_scale);
+        let mut u = [[0; FILL_BLOCK]; 3];
+        for first in places.clone().step_by(FILL_BLOCK) {
+            let count = FILL_BLOCK.min(places.end - first);
+            // SAFETY: of the places of this range, see `FillRange`; vectors begin in it.
+            unsafe {
+                fill.fetch::<WITH_VELOCITIES, MULTISPECIES>(first, count, &mut u);
+                for from in (0..count).step_by(VECTOR_PADDING) {
+                    coordinates.fill(
+                        fill.to,
+                        first + from,
+                        u.each_ref().map(|u| &u[from..][..VECTOR_PADDING]),
+                    );
+                }
+            }
+        }
+    }
+}
+
+impl<R: PackedParticle> Fill<'_, R> {
+    /// Fills all but coordinates, and collects fractions.
+    ///
+    /// # Safety
+    /// The places are of a [`FillRange`].
+    #[inline(always)]
+    unsafe fn fetch<const WITH_VELOCITIES: bool, const MULTISPECIES: bool>(
+        &self,
+        first: usize,
+        count: usize,
+        fixed32: &mut [[u32; FILL_BLOCK]; 3],
+    ) {
+        let (particles, order) = (&self.input.particles, &self.order.order[..]);
+        let (units, v) = (&self.order.fixed32[..], self.input.v);
+        let prefetches = self.order.exceeds_cache();
+        let last = order.len().saturating_sub(1);
+        for (lane, k) in order[first..first + count].iter().enumerate() {
+            let (k, s) = (*k as usize, first + lane);
+            // SAFETY: an order has numbers of particles that were sorted, and the host's arrays are no shorter than there
+            // are particles; the place has room, and is of a `FillRange`: `SharedParticles::fill` has checked both.
+            unsafe {
+                if prefetches {
+                    let next = *order.get_unchecked((s + PREFETCH_DISTANCE).min(last)) as usize;
+                    prefetch(units.as_ptr().add(next));
+                    prefetch(particles.tag.as_ptr().add(next));
+                    if WITH_VELOCITIES {
+                        prefetch(v.as_ptr().add(next));
+                    }
+                }
+                let u = *units.get_unchecked(k);
+                for c in 0..3 {
+                    fixed32[c][lane] = u[c];
+                }
+                let v = if WITH_VELOCITIES { *v.get_unchecked(k) } else { [0.0; 3] };
+                let kind = if MULTISPECIES { self.input.species_of(k).unwrap_or(0) as u32 } else { 0 };
+                let tag = *particles.tag.get_unchecked(k) as u32;
+                *self.to.packed.at(s) = R::new(u, particles.x.get_unchecked(k), &v, tag, kind);
+                if MULTISPECIES {
+                    *self.to.species.at(s) = kind as u8;
+                }
+            }
+        }
+    }
+}
+
+/// Prefetches a value, both its ends if they may be in two lines of the cache.
+#[inline(always)]
+fn prefetch<T>(value: *const T) {
+    #[cfg(all(target_arch = "x86_64", not(miri)))]
+    {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        // SAFETY: every x86-64 processor prefetches; nothing is read, and no address does harm.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(value.cast()) };
+        if size_of::<T>() > align_of::<T>() {
+            // SAFETY: every x86-64 processor prefetches; nothing is read, and no address does harm.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(value.cast::<i8>().wrapping_add(size_of::<T>() - 1)) };
+        }
+    }
+    #[cfg(not(all(target_arch = "x86_64", not(miri))))]
+    let _ = value;
+}
+
+/// How fractions become positions from the origin, and words of sixteen bits.
+enum Coordinates<'a> {
+    /// Edges along the axes: lengths of half a fraction, words of the length.
+    Orthogonal {
+        scale: [f32; 3],
+        edge_words: [u32; 3],
+    },
+    Tilted {
+        geometry: &'a BoxGeometry,
+        fixed16_scale: FixedPoint16,
+    },
+}
+
+impl<'a> Coordinates<'a> {
+    fn new(geometry: &'a BoxGeometry, fixed16_scale: FixedPoint16) -> Coordinates<'a> {
+        match fixed16_scale.edge_words(geometry) {
+            Some(edge_words) => {
+                let flat = if geometry.dimensions == 3 { 1.0 } else { 0.0 };
+                let [a, b, c] = geometry.length;
+                let scale = [a, b, flat * c].map(|length| (2.0 * length / TWO_TO_32) as f32);
+                Coordinates::Orthogonal { scale, edge_words }
+            }
+            None => Coordinates::Tilted { geometry, fixed16_scale },
+        }
+    }
+
+    /// Fills [`VECTOR_PADDING`] places, some perhaps behind the last.
+    ///
+    /// # Safety
+    /// Nobody else accesses these places, and there is room for all of them.
+    #[inline(always)]
+    unsafe fn fill<R>(&self, to: &SharedParticles<R>, first: usize, u: [&[u32]; 3]) {
+        let (mut x, mut fixed16) = ([[0.0; VECTOR_PADDING]; 3], [[0; VECTOR_PADDING]; 3]);
+        match self {
+            Coordinates::Orthogonal { scale, edge_words } => {
+                for c in 0..3 {
+                    for (lane, u) in u[c][..VECTOR_PADDING].iter().enumerate() {
+                        // Half, as vectors have no conversion of numbers without sign: 24 bits are left either way.
+                        x[c][lane] = (*u >> 1) as i32 as f32 * scale[c];
+                        fixed16[c][lane] = ((*u as u64 * edge_words[c] as u64) >> 32) as u16;
+                    }
+                }
+            }
+            Coordinates::Tilted { geometry, fixed16_scale } => {
+                for lane in 0..VECTOR_PADDING {
+                    let point = geometry.point(&[0, 1, 2].map(|c| u[c][lane] as f64 / TWO_TO_32));
+                    for c in 0..3 {
+                        x[c][lane] = point[c] as f32;
+                        // SAFETY: a point of the box, which is finite and no more than some periods long.
+                        fixed16[c][lane] = unsafe { fixed16_scale.coordinate(point[c]) };
+                    }
+                }
+            }
+        }
+        for c in 0..3 {
+            // SAFETY: places with room that nobody else accesses, as the caller promises.
+            unsafe {
+                to.x[c].at(first).cast::<[f32; VECTOR_PADDING]>().write_unaligned(x[c]);
+                to.fixed16[c].at(first).cast::<[u16; VECTOR_PADDING]>().write_unaligned(fixed16[c]);
+            }
+        }
+    }
+}

@@ -1,0 +1,134 @@
+//! What is of one thread alone.
+
+use super::cell_order::CellOrder;
+use crate::engine::error::EngineError;
+use crate::engine::excess_pass::ExcessPass;
+use crate::engine::instruction_set::InstructionSet;
+use crate::engine::sweep::pair_batch::in_range_pairs::InRangePairs;
+use crate::engine::sweep::passes::buffers::PairBuffers;
+use crate::engine::sweep::simd::Scalar;
+use crate::engine::sweep::times::Times;
+use crate::engine::tally::Tally;
+use std::ops::Range;
+
+/// Planes of a thread slab whose pairs are kept at once: its first, its last, and two between.
+pub const KEPT_PLANES: usize = 4;
+
+/// What a thread keeps from one evaluation to the next.
+pub struct ThreadState<T> {
+    pub buffers: PairBuffers<T>,
+    pub excess: ExcessPass,
+    /// A ψ that was not finite.
+    pub fault: Option<EngineError>,
+    /// The lowest tag of the particles whose forces were not finite.
+    pub lost: Option<i32>,
+    /// How many planes have had their forces written to the host.
+    pub planes_written: u64,
+    pub times: Times,
+}
+
+impl<T: Scalar> ThreadState<T> {
+    pub fn new(passes: usize, set: InstructionSet) -> ThreadState<T> {
+        ThreadState {
+            buffers: PairBuffers::new(passes),
+            excess: ExcessPass::new(set),
+            fault: None,
+            lost: None,
+            planes_written: 0,
+            times: Times::default(),
+        }
+    }
+}
+
+/// What the passes over a plane leave, plane by plane and particle by particle.
+#[derive(Default)]
+pub struct PlaneResults<T> {
+    /// The pairs that are kept for the second pass: of all planes, or of some of each thread slab.
+    in_range: Vec<InRangePairs<T>>,
+    keeps_all: bool,
+    pub tallies: Vec<Tally>,
+    /// The densities of each particle, and ψ, in the order of cells.
+    pub densities: Vec<f64>,
+    pub excess: Vec<f64>,
+}
+
+/// The planes of one thread, and all that no other thread accesses as long as it has them. There is one of each plane.
+pub struct ThreadSlab<'a, T> {
+    pub planes: Range<usize>,
+    /// The first particle.
+    pub first: usize,
+    pub state: &'a mut ThreadState<T>,
+    in_range: &'a mut [InRangePairs<T>],
+    keeps_all: bool,
+    tallies: &'a mut [Tally],
+    /// Of the particles of the slab.
+    pub densities: &'a mut [f64],
+    pub excess: &'a mut [f64],
+}
+
+impl<T: Scalar> PlaneResults<T> {
+    /// Room for all particles of an order, `width` densities each; the pairs of all planes are kept, or of some.
+    pub fn make_room(&mut self, order: &CellOrder, slabs: usize, width: usize, keeps_all: bool) {
+        let kept = if keeps_all { order.grid.planes } else { KEPT_PLANES * slabs };
+        self.keeps_all = keeps_all;
+        self.in_range.resize_with(kept, InRangePairs::default);
+        self.tallies.clear();
+        self.tallies.resize(order.grid.planes, Tally::default());
+        self.excess.resize(order.particles(), 0.0);
+        self.densities.resize(width * order.particles(), 0.0);
+    }
+
+    /// Hands each thread the slab of its planes, with what is of them.
+    pub fn split<'a>(
+        &'a mut self,
+        order: &CellOrder,
+        slabs: &[Range<usize>],
+        width: usize,
+        states: &'a mut [ThreadState<T>],
+    ) -> Vec<ThreadSlab<'a, T>> {
+        let (mut in_range, mut tallies) = (&mut self.in_range[..], &mut self.tallies[..]);
+        let (mut densities, mut excess) = (&mut self.densities[..], &mut self.excess[..]);
+        let keeps_all = self.keeps_all;
+        let slab = |(planes, state): (&Range<usize>, &'a mut ThreadState<T>)| {
+            let particles = order.particles_of(planes);
+            ThreadSlab {
+                planes: planes.clone(),
+                first: particles.start,
+                state,
+                in_range: take(&mut in_range, if keeps_all { planes.len() } else { KEPT_PLANES }),
+                keeps_all,
+                tallies: take(&mut tallies, planes.len()),
+                densities: take(&mut densities, width * particles.len()),
+                excess: take(&mut excess, particles.len()),
+            }
+        };
+        slabs.iter().zip(states).map(slab).collect()
+    }
+
+    /// Bytes held in arrays.
+    pub fn bytes(&self) -> usize {
+        self.in_range.iter().map(|pairs| pairs.bytes()).sum::<usize>()
+            + (self.densities.capacity() + self.excess.capacity()) * size_of::<f64>()
+    }
+}
+
+/// Splits off the first `count`.
+fn take<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
+    let (first, behind) = std::mem::take(rest).split_at_mut(count);
+    *rest = behind;
+    first
+}
+
+impl<T> ThreadSlab<'_, T> {
+    /// What the passes over a plane of the slab work with and leave: buffers, pairs for the second pass, sums.
+    pub fn plane(&mut self, plane: usize) -> (&mut PairBuffers<T>, &mut InRangePairs<T>, &mut Tally) {
+        let number = plane - self.planes.start;
+        let kept = match plane {
+            _ if self.keeps_all => number,
+            _ if plane == self.planes.start => 0,
+            _ if plane + 1 == self.planes.end => 1,
+            _ => 2 + plane % 2,
+        };
+        (&mut self.state.buffers, &mut self.in_range[kept], &mut self.tallies[number])
+    }
+}

@@ -1,0 +1,102 @@
+//! The architecture: no file imports from a room above its own, and no files import from each other in a circle.
+//!
+//! A room is a folder or a file. Rooms are listed from the ground up.
+
+mod walls_imports;
+
+use std::path::Path;
+use walls_imports::Crate;
+
+/// Rooms of psidpd-core. A file belongs to the room with the longest name that its module path begins with.
+const CORE: &[&[&str]] = &[
+    &["memory", "model::expression"],
+    &["document"],
+    &["model"],
+    &["theory"],
+    // What the engine stands on.
+    &[
+        "engine::counts",
+        "engine::domain",
+        "engine::error",
+        "engine::images",
+        "engine::instruction_set",
+        "engine::noise",
+        "engine::particles",
+        "engine::settings",
+        "engine::tally",
+        "engine::vectors",
+    ],
+    &["engine::excess", "engine::plan"],
+    &["engine::excess_pass"],
+    // The fast engine: one traversal of all cells, without a neighbour list.
+    &["engine::sweep::simd", "engine::sweep::times"],
+    &["engine::sweep::ground"],
+    &["engine::sweep::cells"],
+    &["engine::sweep::pair_search"],
+    &["engine::sweep::pair_batch"],
+    &["engine::sweep::passes"],
+    &["engine::sweep::compiled", "engine::sweep::pool"],
+    &["engine::sweep::workspace"],
+    // The engines that hosts see.
+    &["engine"],
+    &["c_api"],
+    &[""],
+];
+
+/// Rooms of the program. Those in one list may still import from each other.
+const PROGRAM: &[&[&str]] = &[
+    &["lammps"],
+    &["scene", "run", "observe", "output", "report"],
+    &["export"],
+    &["crosscheck"],
+    &["bench"],
+    &["check"],
+    &["cli"],
+    &[""],
+];
+
+fn sources(package: &str) -> Crate {
+    Crate::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(package).join("src"))
+}
+
+fn room(rooms: &[&[&str]], module: &str) -> usize {
+    let holds = |room: &str| room.is_empty() || module == room || module.starts_with(&format!("{room}::"));
+    let all = rooms.iter().enumerate().flat_map(|(k, room)| room.iter().map(move |name| (k, *name)));
+    let (k, _) =
+        all.filter(|(_, name)| holds(name)).max_by_key(|(_, name)| name.len()).expect("the last holds all");
+    k
+}
+
+/// Imports from a room above.
+fn upward(rooms: &[&[&str]], sources: &Crate) -> Vec<String> {
+    let all = sources.imports.iter().flat_map(|(from, to)| to.iter().map(move |to| (from, to)));
+    all.filter(|(from, to)| room(rooms, to) > room(rooms, from))
+        .map(|(from, to)| format!("{from} → {to}"))
+        .collect()
+}
+
+#[test]
+fn no_room_of_the_core_imports_from_one_above() {
+    assert_eq!(upward(CORE, &sources("rust-core")), [""; 0]);
+}
+
+#[test]
+fn no_room_of_the_program_imports_from_one_above() {
+    assert_eq!(upward(PROGRAM, &sources("validation")), [""; 0]);
+}
+
+#[test]
+fn no_files_of_the_engine_import_in_a_circle() {
+    let core = sources("rust-core");
+    let cycles: Vec<_> =
+        core.cycles().into_iter().filter(|cycle| cycle.iter().any(|m| m.starts_with("engine"))).collect();
+    assert!(cycles.is_empty(), "{cycles:#?}");
+}
+
+#[test]
+fn the_files_are_found() {
+    let core = sources("rust-core");
+    assert!(core.imports["engine::sweep::passes::first"].contains("engine::sweep::pair_search::find"));
+    assert!(core.imports["engine::sweep::passes::first"].contains("engine::tally"));
+    assert!(!core.imports.keys().any(|module| module.ends_with("tests")));
+}

@@ -1,0 +1,123 @@
+//! What tells one run from another: the keys of its scene and of its model.
+
+use psidpd_core::engine::Precision;
+use psidpd_core::model::Model;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Every key of a scene and of its model with its value, whatever the files look like otherwise: comments,
+/// the order of keys and the way numbers are written do not count.
+///
+/// A key that names a file stands for what is in it. Titles and the interval of checkpoints are left out:
+/// they change nothing in a trajectory.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Identity {
+    scene: BTreeMap<String, String>,
+    model: BTreeMap<String, String>,
+}
+
+/// Keys that name files, in whatever table.
+const FILES: [&str; 2] = ["file", "table"];
+
+impl Identity {
+    /// That of a scene with a text, whose paths start from `folder`, run in some precision.
+    pub fn of(scene: &str, folder: &Path, precision: Precision, model: &Model) -> Identity {
+        let model = model.source();
+        let mut of_scene = keys(scene, folder, &["title", "model", "output.checkpoint", "precision"]);
+        // As it is, whether the file says so, the command line, or neither.
+        of_scene.insert("precision".into(), format!("{:?}", precision.to_string()));
+        let beside_model = Path::new(model.name()).parent().unwrap_or(Path::new(""));
+        Identity {
+            // The model is compared by itself, not by where it is.
+            scene: of_scene,
+            model: keys(model.text(), beside_model, &["title", "reference"]),
+        }
+    }
+
+    /// What is different now from what was `before`, key by key with both values.
+    pub fn differences(&self, before: &Identity) -> Vec<String> {
+        let pairs = [("", &self.scene, &before.scene), ("the model's ", &self.model, &before.model)];
+        let mut found = Vec::new();
+        for (whose, now, before) in pairs {
+            for (key, value) in now {
+                match before.get(key) {
+                    None => found.push(format!("{whose}{key} is {value}, was not given")),
+                    Some(old) if old != value => found.push(format!("{whose}{key} is {value}, was {old}")),
+                    Some(_) => {}
+                }
+            }
+            for (key, old) in before.iter().filter(|(key, _)| !now.contains_key(*key)) {
+                found.push(format!("{whose}{key} is not given, was {old}"));
+            }
+        }
+        found
+    }
+}
+
+fn keys(text: &str, folder: &Path, without: &[&str]) -> BTreeMap<String, String> {
+    let mut keys = BTreeMap::new();
+    match text.parse::<toml::Table>() {
+        Ok(table) => collect(&toml::Value::Table(table), "", folder, &mut keys),
+        // A scene has been read from this text: it is TOML. If it were not, it would still be itself.
+        Err(_) => _ = keys.insert("text".into(), text.to_owned()),
+    }
+    keys.retain(|key, _| !without.contains(&key.as_str()));
+    keys
+}
+
+fn collect(value: &toml::Value, path: &str, folder: &Path, keys: &mut BTreeMap<String, String>) {
+    let is_table = |value: &toml::Value| matches!(value, toml::Value::Table(_));
+    match value {
+        toml::Value::Table(table) => {
+            for (key, value) in table {
+                let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
+                let content = value.as_str().filter(|_| FILES.contains(&key.as_str()));
+                match content.and_then(|name| content_of(&folder.join(name))) {
+                    Some(content) => _ = keys.insert(path, content),
+                    None => collect(value, &path, folder, keys),
+                }
+            }
+        }
+        toml::Value::Array(items) if items.iter().any(is_table) => {
+            for (k, item) in items.iter().enumerate() {
+                collect(item, &format!("{path}[{}]", k + 1), folder, keys);
+            }
+        }
+        _ => _ = keys.insert(path.to_owned(), written(value)),
+    }
+}
+
+/// A value that is no table, in one way only.
+fn written(value: &toml::Value) -> String {
+    match value {
+        toml::Value::Integer(x) => format!("{x}"),
+        // 1 and 1.0 are the same number.
+        toml::Value::Float(x) => format!("{x}"),
+        toml::Value::Array(items) => {
+            format!("[{}]", items.iter().map(written).collect::<Vec<_>>().join(", "))
+        }
+        _ => value.to_string(),
+    }
+}
+
+/// A file by its content; `None` if it cannot be read.
+fn content_of(path: &Path) -> Option<String> {
+    let mut file = std::fs::File::open(path).ok().filter(|f| f.metadata().is_ok_and(|m| m.is_file()))?;
+    let mut digest = Digest(crc32fast::Hasher::new());
+    let length = std::io::copy(&mut file, &mut digest).ok()?;
+    Some(format!("a file of {length} bytes with the CRC-32 {:08x}", digest.0.finalize()))
+}
+
+struct Digest(crc32fast::Hasher);
+
+impl std::io::Write for Digest {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.0.update(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}

@@ -1,0 +1,66 @@
+//! Least squares, by Levenberg and Marquardt's method.
+
+use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt, TerminationReason};
+use nalgebra::{DMatrix, DVector, Dyn, VecStorage};
+
+/// The parameters for which the residuals have the least sum of squares, searched from `start` on, and that sum.
+/// `steps` are the differences of parameters that slopes are taken over; parameters for which there are no residuals
+/// are not stepped to. `None` if the search does not come to an end.
+pub fn least_squares<const N: usize>(
+    start: [f64; N],
+    steps: [f64; N],
+    residuals: impl Fn(&[f64]) -> Option<Vec<f64>>,
+) -> Option<([f64; N], f64)> {
+    let count = residuals(&start)?.len();
+    let problem = Problem { at: DVector::from_column_slice(&start), steps, count, residuals };
+    let search = LevenbergMarquardt::new().with_ftol(1e-14).with_xtol(1e-10).with_gtol(1e-14);
+    let (found, report) = search.minimize(problem);
+    let found_it = report.termination.was_successful()
+        || matches!(report.termination, TerminationReason::NoImprovementPossible(_));
+    found_it.then(|| (std::array::from_fn(|k| found.at[k]), 2.0 * report.objective_function))
+}
+
+struct Problem<const N: usize, F> {
+    at: DVector<f64>,
+    steps: [f64; N],
+    /// How many residuals there are.
+    count: usize,
+    residuals: F,
+}
+
+impl<const N: usize, F: Fn(&[f64]) -> Option<Vec<f64>>> LeastSquaresProblem<f64, Dyn, Dyn> for Problem<N, F> {
+    type ResidualStorage = VecStorage<f64, Dyn, nalgebra::U1>;
+    type JacobianStorage = VecStorage<f64, Dyn, Dyn>;
+    type ParameterStorage = VecStorage<f64, Dyn, nalgebra::U1>;
+
+    fn set_params(&mut self, at: &DVector<f64>) {
+        self.at.copy_from(at);
+    }
+
+    fn params(&self) -> DVector<f64> {
+        self.at.clone()
+    }
+
+    fn residuals(&self) -> Option<DVector<f64>> {
+        // Far from everything, so that a shorter step is tried.
+        let found = (self.residuals)(self.at.as_slice()).unwrap_or_else(|| vec![1e100; self.count]);
+        Some(DVector::from_vec(found))
+    }
+
+    fn jacobian(&self) -> Option<DMatrix<f64>> {
+        let mut slopes = DMatrix::zeros(self.count, N);
+        for (k, h) in self.steps.into_iter().enumerate() {
+            let beside = |h: f64| {
+                let mut at = self.at.clone();
+                at[k] += h;
+                (self.residuals)(at.as_slice())
+            };
+            for (slope, (up, down)) in
+                slopes.column_mut(k).iter_mut().zip(beside(h)?.iter().zip(&beside(-h)?))
+            {
+                *slope = (up - down) / (2.0 * h);
+            }
+        }
+        Some(slopes)
+    }
+}

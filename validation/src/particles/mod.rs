@@ -1,0 +1,14 @@
+//! Particles, and what acts on some of them: the ground that scenes, runs and files stand on.
+
+mod body_force;
+mod box_by_edges;
+mod data_file;
+mod state;
+mod tags;
+
+pub(crate) use body_force::add as add_body_forces;
+pub use body_force::{BodyForce, Drive};
+pub use data_file::{StateError, write_data};
+pub use state::State;
+pub use tags::Tags;
+pub(crate) use tags::order_of_tags;
