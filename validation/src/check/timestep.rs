@@ -16,7 +16,6 @@
 //! with `a` from runs of standard DPD and of Warren's liquid; `docs/integrators.md` has them.
 
 use crate::observe::configurational;
-use crate::observe::frame::Frame;
 use psidpd_core::engine::reference::Evaluator;
 use crate::run::{Accuracy, Integrator, RunError, Simulation, State};
 use crate::scene::Scene;
