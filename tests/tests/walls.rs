@@ -45,8 +45,10 @@ const CORE: &[&[&str]] = &[
 
 /// Rooms of the program. Those in one list may still import from each other.
 const PROGRAM: &[&[&str]] = &[
+    &["files"],
     &["lammps"],
-    &["scene", "run", "observe", "output", "report"],
+    &["particles"],
+    &["scene", "run", "observe", "output", "report", "checkpoint"],
     &["export"],
     &["crosscheck"],
     &["bench"],

@@ -6,7 +6,6 @@ use crate::engine::noise::threefry2x32;
 use crate::engine::particles::Particles;
 use crate::engine::plan::Plan;
 use crate::engine::settings::Instructions;
-use crate::engine::sweep::cells::sorted::VECTOR_PADDING;
 use crate::engine::sweep::ground::arithmetic::{Double, Mixed};
 use crate::model::Model;
 use nalgebra::Matrix3;
