@@ -30,6 +30,7 @@ fn main() {
     build
         .files([
             "cpp/pair_psi.cpp",
+            "cpp/images.cpp",
             "cpp/pair_table.cpp",
             "cpp/restart.cpp",
             "cpp/pair_dpd_psi.cpp",

@@ -29,6 +29,7 @@ class PairDPDPsi : public PairPsi {
     read_temperature(arg[0]);
     read_seed(arg[1]);
     read_keywords(2, narg, arg);
+    given = false;
   }
 
   rust::Box<Style> make_style(double kt) override
@@ -63,6 +64,8 @@ class PairDPDPsi : public PairPsi {
       for (int j = i; j <= atom->ntypes; j++) setflag[i][j] = given[i - 1] != "NULL" && given[j - 1] != "NULL";
   }
 
+  // Whether pair_coeff has come since pair_style.
+  bool given = false;
   // The model file, which a restart file carries along.
   std::string source, text;
   rust::Vec<rust::String> names;
@@ -77,6 +80,7 @@ void PairDPDPsi::coeff(int narg, char **arg)
   if (strcmp(arg[0], "*") != 0 || strcmp(arg[1], "*") != 0)
     stop("pair_coeff must begin with '* *': one model file describes all types");
   if (!allocated) allocate();
+  if (given) warn(std::string("this pair_coeff replaces the model ") + source + " of the one before");
 
   // As other styles with files: here, or where LAMMPS_POTENTIALS says.
   std::string path = utils::get_potential_file_path(arg[2]);
@@ -91,6 +95,7 @@ void PairDPDPsi::coeff(int narg, char **arg)
     trouble = e.what();
   }
   if (!trouble.empty()) stop(trouble);
+  given = true;
   // Built anew with all that belongs to it.
   style.reset();
 }

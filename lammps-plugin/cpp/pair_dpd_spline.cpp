@@ -33,7 +33,8 @@ class PairDPDSpline : public PairTable {
 
   void check(const Coefficients &given) override
   {
-    const double rc1 = given.value[3], rc2 = given.value[4];
+    const double rc1 = given.value[3], rc2 = given.value[4], gamma = given.value[5];
+    if (!(gamma >= 0.0)) complain("gamma must not be negative, found " + std::to_string(gamma));
     if (rc1 > cutoff || rc2 > cutoff)
       complain("the ranges rc1 = " + std::to_string(rc1) + " and rc2 = " + std::to_string(rc2) +
            " must not exceed the cut-off of pair_style, " + std::to_string(cutoff));

@@ -47,7 +47,8 @@ class PairMDPDPsi : public PairTable {
 
   void check(const Coefficients &given) override
   {
-    const double rc = given.value[3], rd = given.value[4];
+    const double gamma = given.value[2], rc = given.value[3], rd = given.value[4];
+    if (!(gamma >= 0.0)) complain("gamma must not be negative, found " + std::to_string(gamma));
     if (rc > cutoff || rd > cutoff)
       complain("the ranges rc = " + std::to_string(rc) + " and rd = " + std::to_string(rd) +
                    " must not exceed the cut-off of pair_style, " + std::to_string(cutoff));

@@ -8,8 +8,10 @@
 #include "comm.h"
 #include "domain.h"
 #include "error.h"
+#include "fix.h"
 #include "force.h"
 #include "memory.h"
+#include "modify.h"
 #include "neigh_list.h"
 #include "neighbor.h"
 #include "update.h"
@@ -19,6 +21,7 @@
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
+#include <thread>
 
 using namespace LAMMPS_NS;
 using namespace psidpd;
@@ -81,9 +84,14 @@ PairPsi::~PairPsi()
   }
 }
 
-void PairPsi::stop(const std::string &text)
+void PairPsi::stop(const std::string &text, const char *file, int line)
 {
-  error->all(FLERR, std::string("Pair style ") + name + ": " + text);
+  error->all(file, line, "Pair style " + name + ": " + text);
+}
+
+void PairPsi::warn(const std::string &text, const char *file, int line)
+{
+  if (comm->me == 0) error->warning(file, line, "Pair style " + name + ": " + text);
 }
 
 void PairPsi::complain(const std::string &text)
@@ -178,6 +186,7 @@ void PairPsi::init_style()
 {
   refresh();
   check_host();
+  check_callers();
   check_box();
   // Buffers are sized by this; what is sent later is never more.
   comm_forward = static_cast<int>((*style)->variables());
@@ -186,11 +195,15 @@ void PairPsi::init_style()
   if (atom->molecular != Atom::ATOMIC)
     for (int k = 1; k < 4; k++)
       if (force->special_lj[k] != 1.0) why_listed = "special_bonds";
-  // neighbor->exclude is set only later, by neighbor->init().
-  if (neighbor->nex_type + neighbor->nex_group + neighbor->nex_mol > 0)
-    why_listed += why_listed.empty() ? "neigh_modify exclude" : " and neigh_modify exclude";
-  if (neighbor->includegroup)
-    why_listed += why_listed.empty() ? "neigh_modify include" : " and neigh_modify include";
+  const auto because = [this](const std::string &text) { why_listed += (why_listed.empty() ? "" : " and ") + text; };
+  if (has_exclusions()) because("neigh_modify exclude");
+  if (neighbor->includegroup) because("neigh_modify include");
+  // These exclude a group of their own, and say so only when pair styles have asked for their lists.
+  for (int k = 0; k < modify->nfix; k++) {
+    const char *fix = modify->fix[k]->style;
+    for (const char *known : {"gcmc", "widom", "charge/regulation"})
+      if (strcmp(fix, known) == 0) because(std::string("fix ") + known);
+  }
   if (!why_listed.empty()) full_list = request_list(neighbor, this, instance_me, 0);
   // With newton off a half list has the pairs of owned atoms with ghosts on both sides, which will do.
   if (!why_listed.empty() && !full_list && force->newton_pair)
@@ -198,7 +211,19 @@ void PairPsi::init_style()
 
   if (!described && comm->me == 0)
     utils::logmesg(lmp, std::string((*style)->description(search(), !why_listed.empty())));
+  if (!described) advise();
   described = true;
+}
+
+// What has been asked for and does nothing, or less than nothing.
+void PairPsi::advise()
+{
+  if (lmp->suffix_enable)
+    warn("there is no accelerated variant: the suffix has no effect on it; it has the keywords 'precision mixed' and "
+         "'threads'");
+  const size_t here = std::thread::hardware_concurrency();
+  if (here > 0 && threads > here)
+    warn("threads " + std::to_string(threads) + " is more than the " + std::to_string(here) + " processors here");
 }
 
 std::string PairPsi::search()
@@ -210,8 +235,12 @@ std::string PairPsi::search()
       text += "\n  advice        'newton off' saves sending back forces on ghosts: this style leaves none there";
     return text;
   }
-  return std::string(full_list ? "full" : "half") + " neighbor list of LAMMPS, because of " + why_listed +
+  std::string text = std::string(full_list ? "full" : "half") + " neighbor list of LAMMPS, because of " + why_listed +
       ": pairs that are not in it do not interact, special factors scale phi and w";
+  if (why_listed.find("special_bonds") != std::string::npos)
+    text += "\n  advice        in DPD 'special_bonds lj 1 1 1' is usual, bonded atoms interacting like all others; it is "
+            "faster too";
+  return text;
 }
 
 void PairPsi::check_host()
@@ -221,6 +250,30 @@ void PairPsi::check_host()
   if (!atom->tag_enable) stop("needs atom IDs: remove 'atom_modify id no'");
   if ((*style)->needs_velocities() && !comm->ghost_velocity)
     stop("the thermostat needs velocities of ghost atoms: add 'comm_modify vel yes'");
+}
+
+// neighbor->exclude is set only later, by neighbor->init(). Types that another style of a hybrid has are its business.
+bool PairPsi::has_exclusions() const
+{
+  bool some = neighbor->nex_group > 0 || neighbor->nex_mol > 0;
+  for (int k = 0; k < neighbor->nex_type; k++) {
+    const auto [i, j] = std::minmax(neighbor->ex1_type[k], neighbor->ex2_type[k]);
+    some |= i >= 1 && j <= atom->ntypes && setflag[i][j];
+  }
+  return some;
+}
+
+// What works with energies of single pairs alone has nothing to work with where energies belong to particles.
+void PairPsi::check_callers()
+{
+  if ((*style)->slope_width() == 0) return;
+  for (int k = 0; k < modify->nfix; k++)
+    if (strncmp(modify->fix[k]->style, "bond/swap", 9) == 0)
+      stop("fix bond/swap decides on the energies of single pairs: it cannot be used with a many-body style");
+  for (const char *bond : {"special", "quartic"})
+    if (force->bond_match(bond))
+      stop(std::string("bond_style ") + bond + " adds or takes away the forces of single pairs: it cannot be used with "
+           "a many-body style");
 }
 
 // Two images of one pair would draw the same noise in a box shorter than twice its range.
@@ -234,6 +287,22 @@ void PairPsi::check_box()
       stop("the box is " + std::to_string(height[k]) + " long in direction " + "xyz"[k] +
            ", less than twice the range of the thermostat (" + std::to_string(range) +
            "): images of a pair would share their noise; use a longer box");
+}
+
+// What a plane has no place for: older versions of LAMMPS fill several of them with a lattice.
+void PairPsi::check_plane()
+{
+  if (domain->dimension != 2) return;
+  double mine[2] = {-1e300, -1e300}, all[2];
+  for (int i = 0; i < atom->nlocal; i++) {
+    const double z = atom->x[i][2];
+    mine[0] = std::max(mine[0], z);
+    mine[1] = std::max(mine[1], -z);
+  }
+  MPI_Allreduce(mine, all, 2, MPI_DOUBLE, MPI_MAX, world);
+  if (all[0] + all[1] > 1e-6)
+    stop("in two dimensions all atoms must have the same z, found " + std::to_string(-all[1]) + " to " +
+         std::to_string(all[0]) + ": use a box that is thinner than the lattice, or 'set group all z 0'");
 }
 
 void PairPsi::check_ghosts()
@@ -255,15 +324,15 @@ double PairPsi::init_one(int i, int j)
 {
   if (setflag[i][j] == 0)
     stop("no coefficients for types " + std::to_string(i) + " and " + std::to_string(j) +
-         ": set them with pair_coeff");
+         ": there is no mixing, set them with pair_coeff");
   refresh();
   return (*style)->cutoff();
 }
 
 // Trouble on one rank stops all: the text names the particle.
-void PairPsi::stop_here(const std::string &text)
+void PairPsi::stop_here(const std::string &text, const char *file, int line)
 {
-  error->one(FLERR, "Pair style " + name + " at step " + std::to_string(update->ntimestep) + ": " + text);
+  error->one(file, line, "Pair style " + name + " at step " + std::to_string(update->ntimestep) + ": " + text);
 }
 
 // The pairs of LAMMPS's list, each of two owned atoms once.
@@ -317,20 +386,15 @@ bool PairPsi::is_alone(const Extent &extent) const
 // Asks which ghosts are images along closed directions: who packs them knows.
 void PairPsi::find_images()
 {
-  closed = extent().closed;
-  told = 0;
+  const auto closed = extent().closed;
   // All ranks agree on the box.
-  if (comm->nprocs == 1 || !why_listed.empty() || closed == std::array<bool, 3>{}) return;
-  if (atom->nghost > room || !images) {
-    room = atom->nghost + atom->nghost / 8 + 1;
-    images.reset(new bool[room]);
-  }
-  std::fill_n(images.get(), atom->nghost, false);
+  const bool none = !why_listed.empty() || closed == std::array<bool, 3>{};
+  images.begin(closed, atom->nlocal, none ? 0 : atom->nghost);
+  if (none) return;
   carries = Carries::images;
   comm_forward = 1;
   forward_slopes(comm, this, 0);
   carries = Carries::slopes;
-  told = atom->nghost;
 }
 
 void PairPsi::find_densities(int all, const Request &request)
@@ -343,8 +407,8 @@ void PairPsi::find_densities(int all, const Request &request)
     Extent extent = this->extent();
     rust::Slice<const bool> left_out;
     // Only what was closed when ghosts were found has all its images told.
-    if (extent.closed == closed && told == atom->nghost && (*style)->fits(extent, request))
-      left_out = {images.get(), static_cast<size_t>(told)};
+    if (!strained && images.know(extent.closed, atom->nghost) && (*style)->fits(extent, request))
+      left_out = {images.flags(), static_cast<size_t>(atom->nghost)};
     else
       extent.closed = {};
     style_densities(**style, extent, left_out, owned, x, flat(atom->v, all), tag, kind, force->newton_pair,
@@ -373,8 +437,11 @@ void PairPsi::compute(int eflag, int vflag)
   ev_init(eflag, vflag);
   refresh();
   if (neighbor->ago == 0) {
+    check_plane();
     check_ghosts();
     if (domain->box_change) check_box();
+    if (why_listed.empty() && has_exclusions())
+      stop("pairs were excluded after the style was set up, by a fix perhaps: run again");
     find_images();
   }
 
@@ -393,6 +460,11 @@ void PairPsi::compute(int eflag, int vflag)
   request.seed = seed;
   request.step = static_cast<uint64_t>(update->ntimestep);
   request.dt = update->dt;
+  if (request.thermostat && !(update->dt > 0.0))
+    stop("the thermostat needs a timestep greater than 0, found " + std::to_string(update->dt));
+  if (num_tally_compute > 0)
+    stop("computes of the TALLY package get no pairs from it: use compute pe/atom, stress/atom, group/group or "
+         "pair/local");
   request.energy = eflag_global != 0;
   request.virial = vflag_global != 0;
   request.particle_energy = eflag_atom != 0;
@@ -401,33 +473,21 @@ void PairPsi::compute(int eflag, int vflag)
   const size_t reach = newton ? all : owned;
   rust::Slice<double> f;
   if (reach > 0) f = {atom->f[0], 3 * reach};
-  Totals totals;
-  std::string trouble;
   const Extent box = extent();
-  const bool alone = is_alone(box) && fluid.fits(box, request);
-  try {
-    if (alone) {
-      totals = style_evaluate(fluid, box, flat(atom->x, owned), flat(atom->v, owned), {atom->tag, owned},
-                              {atom->type, owned}, request, f);
-    } else {
-      find_densities(all, request);
-    }
-  } catch (const std::exception &e) {
-    trouble = e.what();
-  }
-  if (!trouble.empty()) stop_here(trouble);
-
-  without_slopes = {-1, -1};
+  strained = images.have_moved(atom, domain);
+  const bool alone = !strained && is_alone(box) && attempt([&] { return fluid.fits(box, request); });
+  Totals totals;
   if (alone) {
+    totals = attempt([&] {
+      return style_evaluate(fluid, box, flat(atom->x, owned), flat(atom->v, owned), {atom->tag, owned},
+                            {atom->type, owned}, request, f);
+    });
     without_slopes = {atom->nlocal, atom->nghost};
   } else {
+    attempt([&] { find_densities(all, request); });
     forward();
-    try {
-      totals = style_forces(fluid, owned, x, v, tag, kind, request, f);
-    } catch (const std::exception &e) {
-      trouble = e.what();
-    }
-    if (!trouble.empty()) stop_here(trouble);
+    totals = attempt([&] { return style_forces(fluid, owned, x, v, tag, kind, request, f); });
+    without_slopes = {-1, -1};
   }
 
   if (eflag_global) {
@@ -453,10 +513,7 @@ void PairPsi::compute(int eflag, int vflag)
 int PairPsi::pack_forward_comm(int n, int *list, double *buf, int pbc_flag, int *pbc)
 {
   if (carries == Carries::images) {
-    bool image = false;
-    for (int k = 0; k < 3; k++) image |= pbc_flag && closed[k] && pbc[k] != 0;
-    const int owned = atom->nlocal;
-    for (int i = 0; i < n; i++) *buf++ = image || (list[i] >= owned && images[list[i] - owned]);
+    images.pack(n, list, buf, pbc_flag, pbc);
     return n;
   }
   const auto slopes = (*style)->slopes_mut();
@@ -469,7 +526,7 @@ int PairPsi::pack_forward_comm(int n, int *list, double *buf, int pbc_flag, int 
 void PairPsi::unpack_forward_comm(int n, int first, double *buf)
 {
   if (carries == Carries::images) {
-    for (int i = first; i < first + n; i++) images[i - atom->nlocal] = *buf++ != 0.0;
+    images.unpack(n, first, buf);
     return;
   }
   auto slopes = (*style)->slopes_mut();
@@ -478,17 +535,47 @@ void PairPsi::unpack_forward_comm(int n, int first, double *buf)
     for (int k = 0; k < comm_forward; k++) slopes[i * width + first_column + k] = *buf++;
 }
 
+// Whether atoms and ghosts, their types and their distance are those of the last evaluation.
+bool PairPsi::is_pair(int i, int j, int itype, int jtype, double rsq) const
+{
+  const int all = atom->nlocal + atom->nghost;
+  if (i < 0 || j < 0 || i >= all || j >= all) return false;
+  if (atom->type[i] != itype || atom->type[j] != jtype) return false;
+  double d[3];
+  for (int k = 0; k < 3; k++) d[k] = atom->x[i][k] - atom->x[j][k];
+  const auto agrees = [&] {
+    const double here = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+    return std::fabs(here - rsq) <= 1e-9 * std::max(1.0, here);
+  };
+  if (agrees()) return true;
+  // Some callers have found the atom and take the nearest of its images.
+  const double *h = domain->h;
+  const double edge[3][3] = {{h[0], 0.0, 0.0}, {h[5], h[1], 0.0}, {h[4], h[3], h[2]}};
+  for (int k = 2; k >= 0; k--) {
+    if (!domain->periodicity[k]) continue;
+    const double n = std::round(d[k] / edge[k][k]);
+    for (int c = 0; c <= k; c++) d[c] -= n * edge[k][c];
+  }
+  return agrees();
+}
+
 // The energy is that of the terms that belong to pairs, without psi; the force is the whole conservative
 // one, with the densities of the last step. Drag and noise are left out, as in LAMMPS's other DPD styles.
 double PairPsi::single(int i, int j, int itype, int jtype, double rsq, double, double factor_lj, double &fforce)
 {
-  if (without_slopes == std::array<int, 2>{atom->nlocal, atom->nghost}) {
-    (*style)->fetch_slopes(atom->nlocal + atom->nghost);
-    forward();
+  // Without densities a pair is a pair wherever its atoms are, and whether they are there at all.
+  const bool many_body = (*style)->slope_width() > 0;
+  if (many_body && !is_pair(i, j, itype, jtype, rsq))
+    stop_here("asked for the energy of a pair that is not there, as of an atom to be inserted or moved: where energies "
+              "belong to particles no single pair tells it; fix gcmc and fix widom need full_energy with a many-body "
+              "style, and pair_write cannot be used");
+  if (many_body && without_slopes == std::array<int, 2>{atom->nlocal, atom->nghost}) {
     without_slopes = {-1, -1};
+    attempt([&] { (*style)->fetch_slopes(atom->nlocal + atom->nghost); });
+    forward();
   }
   const double r = std::sqrt(rsq);
-  const PairValue pair = (*style)->single(itype, jtype, i, j, r);
+  const PairValue pair = attempt([&] { return style_single(**style, itype, jtype, i, j, r); });
   fforce = r > 0.0 ? factor_lj * pair.force / r : 0.0;
   return factor_lj * pair.energy;
 }
@@ -508,18 +595,12 @@ void *PairPsi::extract_peratom(const char *what, int &columns)
   if (!density && strcmp(what, "psi") != 0) return nullptr;
   refresh();
   columns = 0;
-  if (!density) return const_cast<double *>((*style)->excess().data());
+  if (!density) return attempt([&] { return const_cast<double *>((*style)->excess().data()); });
   const size_t width = (*style)->variables();
   if (width == 0) return nullptr;
   // Forces may not have needed all of them.
   const size_t all = atom->nlocal + atom->nghost;
-  std::string trouble;
-  try {
-    (*style)->sum_densities(atom->nlocal, flat(atom->x, all), {atom->tag, all}, {atom->type, all});
-  } catch (const std::exception &e) {
-    trouble = e.what();
-  }
-  if (!trouble.empty()) stop_here(trouble);
+  attempt([&] { (*style)->sum_densities(atom->nlocal, flat(atom->x, all), {atom->tag, all}, {atom->type, all}); });
   const auto densities = (*style)->local_densities();
   double *first = const_cast<double *>(densities.data());
   if (width == 1) return first;

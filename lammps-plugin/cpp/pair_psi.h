@@ -3,11 +3,12 @@
 #ifndef PSIDPD_PAIR_PSI_H
 #define PSIDPD_PAIR_PSI_H
 
+#include "images.h"
 #include "pair.h"
 #include "psidpd-lammps/src/bridge.rs.h"
 
 #include <array>
-#include <memory>
+#include <exception>
 #include <optional>
 #include <string>
 #include <vector>
@@ -67,8 +68,10 @@ class PairPsi : public LAMMPS_NS::Pair {
   void read_temperature(const char *arg);
   void read_seed(const char *arg);
   double kt() const;
-  // Stops with "Pair style NAME: text", on all ranks.
-  [[noreturn]] void stop(const std::string &text);
+  // Stops with "Pair style NAME: text", on all ranks; LAMMPS adds the place.
+  [[noreturn]] void stop(const std::string &text, const char *file = __builtin_FILE(), int line = __builtin_LINE());
+  // Says on one rank "Pair style NAME: text", with the place.
+  void warn(const std::string &text, const char *file = __builtin_FILE(), int line = __builtin_LINE());
   // Throws the text, for what make_style finds wrong.
   [[noreturn]] static void complain(const std::string &text);
 
@@ -85,9 +88,29 @@ class PairPsi : public LAMMPS_NS::Pair {
   void collect_pairs();
   void forward();
   void check_box();
+  void check_plane();
   void check_ghosts();
+  void check_callers();
+  void advise();
+  // Whether LAMMPS's neighbor list leaves out pairs of this style.
+  bool has_exclusions() const;
+  // Whether a pair is one of the last evaluation.
+  bool is_pair(int i, int j, int itype, int jtype, double rsq) const;
   std::string search();
-  [[noreturn]] void stop_here(const std::string &text);
+  [[noreturn]] void stop_here(const std::string &text, const char *file = __builtin_FILE(),
+                              int line = __builtin_LINE());
+  // Runs `work` and stops here with what it throws, once nothing of it is left on the stack.
+  template <class Work>
+  auto attempt(Work work, const char *file = __builtin_FILE(), int line = __builtin_LINE())
+  {
+    std::string trouble;
+    try {
+      return work();
+    } catch (const std::exception &e) {
+      trouble = e.what();
+    }
+    stop_here(trouble, file, line);
+  }
 
   double temperature = 0.0;
   double built_kt = 0.0;
@@ -103,11 +126,9 @@ class PairPsi : public LAMMPS_NS::Pair {
   Carries carries = Carries::slopes;
   int first_column = 0;
 
-  // For each ghost whether it is the image of a particle that this rank has, along a direction that was closed when
-  // ghosts were found; and how many ghosts those are for.
-  std::array<bool, 3> closed{};
-  std::unique_ptr<bool[]> images;
-  int told = 0, room = 0;
+  Images images;
+  // Whether ghosts are elsewhere than their atoms say, in this evaluation.
+  bool strained = false;
 
   // Atoms and ghosts of an evaluation that left no slopes of ghosts; those that single() has asked for are there.
   std::array<int, 2> without_slopes{-1, -1};

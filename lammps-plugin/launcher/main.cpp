@@ -2,10 +2,12 @@
 
    Takes the arguments of lmp and behaves as lmp does, under mpirun too. */
 
+#include "force.h"
 #include "input.h"
 #include "lammps.h"
 #include "library.h"
 #include "pointers.h"
+#include "utils.h"
 
 #include <cstdio>
 #include <cstdlib>
@@ -14,6 +16,7 @@
 #include <exception>
 #include <map>
 #include <mpi.h>
+#include <string>
 #include <typeinfo>
 
 using namespace LAMMPS_NS;
@@ -51,7 +54,10 @@ const char *trouble = nullptr;  // why the styles could not be registered
   exit(1);
 }
 
-// 'plugin load .../psidpdplugin.so', so that a script for a LAMMPS with plugins runs here unchanged.
+constexpr const char *STYLES[] = {"dpd/psi", "mdpd/psi", "dpd/spline"};
+
+// 'plugin load .../psidpdplugin.so', 'plugin list' and 'plugin unload pair STYLE', so that a script for a LAMMPS with
+// plugins runs here unchanged.
 // The same virtual functions, in the same order, as LAMMPS's class of commands, whose header is not
 // always installed.
 class PluginCommand : protected Pointers {
@@ -60,17 +66,50 @@ class PluginCommand : protected Pointers {
 
   virtual void command(int narg, char **arg)
   {
-    const char *refusal = nullptr;
-    if (narg == 2 && strcmp(arg[0], "load") == 0) {
-      const char *slash = strrchr(arg[1], '/');
-      if (strcmp(slash ? slash + 1 : arg[1], "psidpdplugin.so") == 0)
-        refusal = psidpd_register(lmp);
-      else
-        refusal = "psidpd-lmp has the styles of psidpdplugin.so and can load no other plugin";
-    } else {
-      refusal = "psidpd-lmp knows the plugin command as 'plugin load psidpdplugin.so' only";
-    }
+    const std::string verb = narg > 0 ? arg[0] : "";
+    if (verb == "load" && narg == 2)
+      load(arg[1]);
+    else if (verb == "list" && narg == 1)
+      list();
+    else if (verb == "unload" && narg == 3)
+      unload(arg[1], arg[2]);
+    else
+      leave("psidpd-lmp knows the plugin command as 'plugin load psidpdplugin.so', 'plugin list' and "
+            "'plugin unload pair STYLE' only");
+  }
+
+ private:
+  bool has(const char *name) const { return force->pair_map->count(name) > 0; }
+
+  void load(const char *path)
+  {
+    const char *slash = strrchr(path, '/');
+    const char *refusal = "psidpd-lmp has the styles of psidpdplugin.so and can load no other plugin";
+    if (strcmp(slash ? slash + 1 : path, "psidpdplugin.so") == 0) refusal = psidpd_register(lmp);
     if (refusal) leave(refusal);
+  }
+
+  void list()
+  {
+    std::string text = "Currently loaded plugins\n";
+    int number = 0;
+    for (const char *name : STYLES)
+      if (has(name)) text += "   " + std::to_string(++number) + ": pair style plugin " + name + "\n";
+    utils::logmesg(lmp, text);
+  }
+
+  void unload(const std::string &kind, const char *name)
+  {
+    bool ours = false;
+    for (const char *known : STYLES) ours |= kind == "pair" && strcmp(known, name) == 0 && has(known);
+    if (!ours) {
+      utils::logmesg(lmp, "Ignoring unload of " + kind + " style " + name + ": not from a plugin\n");
+      return;
+    }
+    utils::logmesg(lmp, std::string("Unloading pair style ") + name + "\n");
+    // LAMMPS too forgets a style in use, alone or in a hybrid.
+    if (force->pair_match(name, 1)) force->create_pair("none", 0);
+    force->pair_map->erase(name);
   }
 };
 

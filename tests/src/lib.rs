@@ -2,6 +2,9 @@
 
 mod engine;
 mod python;
+mod scripts;
+
+pub use scripts::{examples, readme_block};
 
 pub use engine::{Engine, engine};
 pub use python::python;

@@ -1,24 +1,8 @@
 //! The scripts in `lammps-plugin/examples`: every one runs, on one rank and on two.
 
-use psidpd_tests::{lammps, root};
+use psidpd_tests::{examples, lammps, root};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
-
-/// Scripts, each in its folder.
-fn scripts() -> Vec<PathBuf> {
-    let folder = root().join("lammps-plugin/examples");
-    let mut found: Vec<PathBuf> = std::fs::read_dir(folder)
-        .unwrap()
-        .map(|e| e.unwrap().path())
-        .filter(|p| p.is_dir())
-        .map(|p| {
-            let name = format!("in.{}", p.file_name().unwrap().to_str().unwrap());
-            p.join(name)
-        })
-        .collect();
-    found.sort();
-    found
-}
 
 /// Tables of thermo output, one for each run: columns and rows.
 fn tables(output: &str) -> Vec<(Vec<String>, Vec<Vec<f64>>)> {
@@ -59,7 +43,7 @@ fn energies(script: &Path, output: &str) -> [f64; 2] {
 #[test]
 fn examples_run_on_one_rank_and_on_two() {
     let (host, plugin) = lammps();
-    let scripts = scripts();
+    let scripts = examples();
     assert_eq!(scripts.len(), 8);
     let [plugin, models] =
         [plugin.clone(), root().join("validation/models")].map(|p| p.display().to_string());
@@ -84,7 +68,7 @@ fn examples_run_on_one_rank_and_on_two() {
 /// What a reader finds beside the scripts: a page, logs of both runs, and nobody's folders in them.
 #[test]
 fn examples_have_pages_and_logs() {
-    for script in scripts() {
+    for script in examples() {
         let folder = script.parent().unwrap();
         assert!(folder.join("README.md").is_file(), "{}", folder.display());
         let mut logs: Vec<PathBuf> = std::fs::read_dir(folder)

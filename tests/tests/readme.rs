@@ -1,26 +1,14 @@
 //! What the README tells a user to paste works as it stands there.
 
-use psidpd_tests::{lammps, psidpd, root, said};
+use psidpd_tests::{lammps, psidpd, readme_block, root, said};
 use std::time::Duration;
-
-/// The first block of the README that is marked with `language` and contains `part`.
-fn block(language: &str, part: &str) -> String {
-    let text = std::fs::read_to_string(root().join("README.md")).unwrap();
-    text.split("```")
-        .skip(1)
-        .step_by(2)
-        .filter_map(|b| b.strip_prefix(language))
-        .find(|b| b.contains(part))
-        .unwrap_or_else(|| panic!("no {language} block with {part}"))
-        .to_owned()
-}
 
 #[test]
 fn the_lammps_script_runs_in_the_checkout() {
     let folder = tempfile::tempdir().unwrap();
     let script = folder.path().join("in.readme");
     let (host, plugin) = lammps();
-    let text = block("lammps", "pair_style   dpd/psi");
+    let text = readme_block("lammps", "pair_style   dpd/psi");
     // The plugin is where the README says, unless the environment moved it.
     std::fs::write(&script, text.replace("target/lammps/psidpdplugin.so", &plugin.display().to_string()))
         .unwrap();
@@ -33,8 +21,8 @@ fn the_drop_in_lines_replace_the_styles_of_the_script() {
     let folder = tempfile::tempdir().unwrap();
     let script = folder.path().join("in.readme");
     let (host, plugin) = lammps();
-    let drop_in = block("text", "pair_style   mdpd/psi");
-    let text: String = block("lammps", "pair_style   dpd/psi")
+    let drop_in = readme_block("text", "pair_style   mdpd/psi");
+    let text: String = readme_block("lammps", "pair_style   dpd/psi")
         .lines()
         .map(|line| match line {
             l if l.starts_with("pair_style") => format!("{drop_in}\n"),
@@ -52,7 +40,7 @@ fn the_drop_in_lines_replace_the_styles_of_the_script() {
 fn the_native_scene_runs() {
     let folder = tempfile::tempdir().unwrap();
     let models = root().join("validation/models").display().to_string();
-    let scene = block("toml", "# scene.toml").replace("validation/models", &models);
+    let scene = readme_block("toml", "# scene.toml").replace("validation/models", &models);
     std::fs::write(folder.path().join("scene.toml"), scene).unwrap();
     let output = psidpd(folder.path(), &["run", "scene.toml", "--out", "slab"]);
     assert_eq!(output.status.code(), Some(0), "{}", said(&output));
@@ -64,7 +52,7 @@ fn the_native_scene_runs() {
 #[test]
 fn the_model_of_the_readme_is_the_shipped_one() {
     use psidpd_core::model::Model;
-    let readme = Model::parse("README", &block("toml", "[density.n]")).unwrap().at(1.0).unwrap();
+    let readme = Model::parse("README", &readme_block("toml", "[density.n]")).unwrap().at(1.0).unwrap();
     let shipped =
         Model::open(&root().join("validation/models/warren2003-set6.toml")).unwrap().at(1.0).unwrap();
     assert_eq!(format!("{:?}", readme.excess), format!("{:?}", shipped.excess));

@@ -3,7 +3,7 @@
 
 use psidpd_tests::{lammps, root};
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Output};
 
 fn deck(plugin: &Path, style: &str) -> String {
     let models = root().join("validation/models");
@@ -52,32 +52,52 @@ fn ours(log: &str) -> Vec<String> {
         .collect()
 }
 
+/// Runs a script under valgrind on so many ranks: what LAMMPS says, and the logs of the ranks.
+fn under_valgrind(script: &Path, ranks: usize) -> (Output, Vec<String>) {
+    let host = &lammps().0;
+    let folder = script.parent().unwrap();
+    let plain = host.command(ranks);
+    let mut run = if ranks > 1 {
+        // The launcher starts valgrind, and valgrind starts LAMMPS.
+        let mut run = Command::new(plain.get_program());
+        run.args(["-np", &ranks.to_string(), "valgrind"]);
+        run
+    } else {
+        Command::new("valgrind")
+    };
+    run.args(["--num-callers=40", "--leak-check=no"]);
+    run.arg(format!("--log-file={}", folder.join("valgrind.%p.txt").display()));
+    run.arg(&host.lmp).arg("-in").arg(script).args(["-nocite", "-log", "none"]);
+    for (name, value) in plain.get_envs() {
+        if let Some(value) = value {
+            run.env(name, value);
+        }
+    }
+    let output = run.current_dir(folder).output().unwrap_or_else(|e| {
+        panic!("valgrind does not start ({e}): install it (Debian: apt-get install valgrind)")
+    });
+    let files = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path());
+    let logs = files.filter(|p| p.file_name().unwrap().to_str().unwrap().starts_with("valgrind."));
+    (output, logs.map(|p| std::fs::read_to_string(p).unwrap()).collect())
+}
+
 #[test]
 fn valgrind_finds_nothing_of_ours() {
-    let (host, plugin) = lammps();
     for style in ["dpd/psi", "dpd/psi mixed", "mdpd/psi", "dpd/spline"] {
-        let folder = tempfile::tempdir().unwrap();
-        let script = folder.path().join("in.lammps");
-        std::fs::write(&script, deck(plugin, style)).unwrap();
-        let plain = host.command(1);
-        let log = folder.path().join("valgrind.txt");
-        let mut run = Command::new("valgrind");
-        run.args(["--num-callers=40", "--leak-check=no"]).arg(format!("--log-file={}", log.display()));
-        run.arg(plain.get_program()).arg("-in").arg(&script).args(["-nocite", "-log", "none"]);
-        for (name, value) in plain.get_envs() {
-            if let Some(value) = value {
-                run.env(name, value);
+        for ranks in [1, 2] {
+            let folder = tempfile::tempdir().unwrap();
+            let script = folder.path().join("in.lammps");
+            std::fs::write(&script, deck(&lammps().1, style)).unwrap();
+            let (output, logs) = under_valgrind(&script, ranks);
+            let said = psidpd_tests::said(&output);
+            assert!(output.status.success() && said.contains("Loop time"), "{style} on {ranks}: {said}");
+            assert_eq!(logs.len(), ranks, "{style}");
+            for log in logs {
+                assert!(log.contains("ERROR SUMMARY"), "{log}");
+                let faults = ours(&log);
+                assert!(faults.is_empty(), "{style} on {ranks}: {}\n\n{}", faults.len(), faults.join("\n\n"));
             }
         }
-        let output = run.current_dir(folder.path()).output().unwrap_or_else(|e| {
-            panic!("valgrind does not start ({e}): install it (Debian: apt-get install valgrind)")
-        });
-        let said = String::from_utf8_lossy(&output.stdout);
-        assert!(output.status.success() && said.contains("Loop time"), "{style}: {said}");
-        let log = std::fs::read_to_string(&log).unwrap();
-        assert!(log.contains("ERROR SUMMARY"), "{log}");
-        let faults = ours(&log);
-        assert!(faults.is_empty(), "{style}: {}\n\n{}", faults.len(), faults.join("\n\n"));
     }
 }
 

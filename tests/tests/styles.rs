@@ -106,7 +106,13 @@ fn mistakes_stop_with_one_clear_line() {
         (
             &coeff,
             mdpd("pair_style mdpd/psi 1.0 1.0 5", "pair_coeff 1 1 -40 25 -3 1.0 0.75"),
-            "must not be negative",
+            "gamma must not be negative, found -3",
+        ),
+        ("timestep 0.005", "timestep 0".into(), "the thermostat needs a timestep greater than 0"),
+        (
+            "run 10",
+            "compute t all pe/tally all\nrun 1".into(),
+            "computes of the TALLY package get no pairs from it",
         ),
         (&coeff, mdpd("pair_style mdpd/psi 1.0 1.0", warren), "expected 'pair_style mdpd/psi T cutoff seed'"),
         (&coeff, mdpd("pair_style mdpd/psi 1.0 1.0 5 law hard", warren), "unknown law 'hard'"),
@@ -117,6 +123,65 @@ fn mistakes_stop_with_one_clear_line() {
         let text = base.replacen(from, &to, 1);
         let error = outcome(&text, 1).expect_err(&format!("{to} should be refused"));
         assert!(error.contains(message), "{to}\nexpected: {message}\nfound: {error}");
+    }
+}
+
+/// The place that LAMMPS names behind an error is that of the check, not one for all of them.
+#[test]
+fn errors_name_the_place_of_the_check() {
+    let base = script(&lammps().1);
+    let place = |style: &str| {
+        let error = outcome(&base.replace("pair_style dpd/psi 1.0 5", style), 1).unwrap_err();
+        let line = error.lines().find(|l| l.starts_with("ERROR: Pair style")).unwrap().to_owned();
+        line.rsplit_once('(').unwrap().1.to_owned()
+    };
+    let places =
+        ["-1 5", "1.0 0", "1.0", "1.0 5 6"].map(|words| place(&format!("pair_style dpd/psi {words}")));
+    for (k, place) in places.iter().enumerate() {
+        assert!(place.contains(".cpp:"), "{place}");
+        assert!(!places[..k].contains(place), "{places:?}");
+    }
+}
+
+/// What does nothing, or replaces something, is said once, where it is no error.
+#[test]
+fn what_does_nothing_is_said() {
+    let base = script(&lammps().1);
+    let coeff = base.lines().find(|l| l.starts_with("pair_coeff")).unwrap().to_owned();
+    let warned = |text: &str, message: &str| {
+        let said = outcome(text, 2).unwrap();
+        assert_eq!(said.matches("WARNING: Pair style dpd/psi").count(), 1, "{said}");
+        assert!(said.contains(message), "{message}\n{said}");
+    };
+    let twice = base.replace(&coeff, &format!("{coeff}\n{coeff}"));
+    warned(&twice, "this pair_coeff replaces the model");
+    warned(&format!("suffix omp\n{base}"), "the suffix has no effect");
+    warned(&base.replace("psi 1.0 5", "psi 1.0 5 threads 600"), "threads 600 is more than the");
+    // A new pair_style begins anew.
+    let style = "pair_style dpd/psi 1.0 5";
+    let said = outcome(&format!("{base}{style}\n{coeff}\nrun 1\n"), 1).unwrap();
+    assert!(!said.contains("WARNING: Pair style"), "{said}");
+    // The log says what there is.
+    assert!(said.contains("'precision mixed' is faster"), "{said}");
+    let mixed = outcome(&base.replace(style, &format!("{style} precision mixed")), 1).unwrap();
+    assert!(mixed.contains("mixed precision") && !mixed.contains("is faster"), "{mixed}");
+}
+
+/// Two dimensions have no place for atoms above each other, whichever rank has them.
+#[test]
+fn atoms_out_of_the_plane_are_refused() {
+    let flat = |more: &str| {
+        format!(
+            "units lj\ndimension 2\ncomm_modify vel yes\nregion b block 0 5 0 5 -0.5 0.5\ncreate_box 1 b\n\
+             create_atoms 1 random 50 1 b\nmass 1 1\n{more}\nplugin load {}\npair_style mdpd/psi 1 1 5\n\
+             pair_coeff 1 1 -40 25 4.5 1 0.75\nfix 1 all nve\nrun 1\n",
+            lammps().1.display()
+        )
+    };
+    for ranks in [1, 2] {
+        outcome(&flat(""), ranks).unwrap();
+        let error = psidpd_tests::last_words(ranks, || outcome(&flat("set atom 7 z 0.2"), ranks));
+        assert!(error.contains("in two dimensions all atoms must have the same z"), "{error}");
     }
 }
 
@@ -147,7 +212,11 @@ fn b_by_type_pair_is_refused_with_the_reason() {
     assert!(error.contains("B differs between type pairs"), "{error}");
     assert!(error.contains("partial densities"), "{error}");
     let missing = text.replace("pair_coeff 1 2 -30 20 18 1 0.75\n", "");
-    assert!(outcome(&format!("{missing}\n"), 1).unwrap_err().contains("no coefficients for types 1 and 2"));
+    assert!(
+        outcome(&format!("{missing}\n"), 1)
+            .unwrap_err()
+            .contains("no coefficients for types 1 and 2: there is no mixing")
+    );
     let same = text.replace("-30 20", "-30 25");
     assert!(outcome(&format!("{same}\n"), 1).is_ok());
 }
@@ -172,7 +241,7 @@ fn a_plugin_for_another_lammps_is_refused() {
     let base = root().join("target/lammps/other-version");
     let stranger = plugin::build_for(host, &other, &base, &|_| {}).unwrap();
     let error = outcome(&script(&stranger), 1).unwrap_err();
-    assert!(error.contains("was built for LAMMPS 20240829, this is LAMMPS"), "{error}");
+    assert!(error.contains("was built for LAMMPS 20240829 (29 Aug 2024), this is LAMMPS"), "{error}");
     assert!(error.contains("psidpd lammps plugin"), "{error}");
     let refused = plugin::check(host, &stranger).unwrap_err().to_string();
     assert!(refused.contains("20240829"), "{refused}");

@@ -1,5 +1,7 @@
 //! psidpd: native runner and cross-code validator.
 pub mod bench;
+pub mod bulk;
+pub mod calibrate;
 pub mod check;
 pub mod checkpoint;
 pub mod cli;
@@ -9,6 +11,7 @@ pub mod files;
 pub mod lammps;
 pub mod observe;
 pub mod output;
+pub mod papers;
 pub mod particles;
 pub mod report;
 pub mod run;

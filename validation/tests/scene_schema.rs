@@ -4,16 +4,11 @@
 use psidpd::observe;
 use psidpd::scene::Scene;
 use psidpd::scene::keys::{
-    BODY_FORCE, BOX, INITIAL, Key, MASSES, OUTPUT, PART, STAGE, TABLES, TOP, Table, ValueKind,
+    BODY_FORCE, BOX, INITIAL, MASSES, OUTPUT, PART, REQUIRED, STAGE, TABLES, TOP, Table, ValueKind,
 };
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-
-/// The keys of one form of a table, or all keys.
-fn keys_of<'a>(table: &'a Table, form: Option<&'a str>) -> impl Iterator<Item = &'a Key> {
-    table.keys.iter().filter(move |k| k.forms.is_empty() || form.is_none_or(|f| k.forms.contains(&f)))
-}
 
 fn schema_of_value(kind: &ValueKind) -> Value {
     let positive = json!({ "type": "number", "exclusiveMinimum": 0 });
@@ -43,6 +38,7 @@ fn schema_of_value(kind: &ValueKind) -> Value {
         ValueKind::Ids => json!({
             "type": "array", "items": { "type": "integer", "minimum": 0 }, "minItems": 2, "maxItems": 2
         }),
+        other => panic!("no value of a scene: {other:?}"),
     }
 }
 
@@ -50,7 +46,7 @@ fn object(table: &Table, form: Option<&str>) -> Value {
     let mut properties = Map::new();
     let mut required = Vec::new();
     let mut any_name = json!(false);
-    for key in keys_of(table, form) {
+    for key in table.keys_of(form) {
         let mut schema = schema_of_value(&key.value);
         if key.name == table.forms.0
             && let Some(form) = form
@@ -63,7 +59,7 @@ fn object(table: &Table, form: Option<&str>) -> Value {
         } else {
             properties.insert(key.name.into(), schema);
         }
-        if key.required {
+        if key.need == REQUIRED {
             required.push(key.name);
         }
     }
@@ -84,8 +80,9 @@ fn forms(table: &Table) -> Value {
 /// `[observe]`: names and meanings; what values may be is said in words.
 fn observe() -> Value {
     let named = |keys: &[observe::keys::Key]| -> Map<String, Value> {
-        let text =
-            |k: &observe::keys::Key| format!("{} {}; {} if left out.", k.about, capital(k.value), k.default);
+        let text = |k: &observe::keys::Key| {
+            format!("{} {}; {} if left out.", k.about, capital(&k.value.describe()), k.default())
+        };
         keys.iter().map(|k| (k.name.to_owned(), json!({ "description": text(k) }))).collect()
     };
     let mut properties = named(observe::keys::COMMON);
@@ -94,7 +91,7 @@ fn observe() -> Value {
         keys.extend(named(table.keys));
         let own = json!({ "type": "object", "properties": keys, "additionalProperties": false });
         let schema = json!({ "description": table.about, "anyOf": [{ "type": "boolean" }, own] });
-        properties.insert(table.name.into(), schema);
+        properties.insert(table.path.into(), schema);
     }
     json!({
         "type": "object", "description": "What is measured as the run goes.", "properties": properties,
@@ -146,22 +143,7 @@ fn reference() -> String {
             (path, true) => format!("`[[{path}]]`"),
             (path, false) => format!("`[{path}]`"),
         };
-        let _ = write!(text, "\n## {heading}\n\n{}\n", table.about);
-        for key in table.keys {
-            let required = if key.required { ", required" } else { "" };
-            let forms = match key.forms {
-                [] => String::new(),
-                forms => format!(" ({} {})", table.forms.0, forms.join(", ")),
-            };
-            let _ = write!(
-                text,
-                "\n### `{}`{forms}\n\n*{}{required}.* {}\n\n```toml\n{}\n```\n",
-                key.name,
-                capital(&key.value.describe()),
-                key.about,
-                key.example
-            );
-        }
+        let _ = write!(text, "\n## {heading}\n\n{}", table.reference());
     }
     text
 }
@@ -322,7 +304,7 @@ fn the_reader_knows_the_keys_of_the_table_and_no_others() {
         list.trim_end_matches(')').split(", ").map(str::to_owned).collect()
     };
     let listed = |table: &Table, form: Option<&str>| {
-        let mut names: Vec<String> = keys_of(table, form).map(|k| k.name.to_owned()).collect();
+        let mut names: Vec<String> = table.keys_of(form).map(|k| k.name.to_owned()).collect();
         names.sort();
         names
     };

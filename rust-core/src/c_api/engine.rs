@@ -427,9 +427,7 @@ pub unsafe extern "C" fn psidpd_engine_densities(
         let want = engine::Want { densities: engine.all_densities, ..engine::Want::FORCES };
         let request = engine::Request { particles, v: &[], step: None, want };
         engine.engine.use_reference_only(true);
-        let domain = super::evaluation::open_space()?;
-        let around = engine::Around { domain: &domain, images: &[] };
-        let found = engine.engine.first(engine::Surroundings::Ghosts(around, newton), &request);
+        let found = engine.engine.first(engine::Surroundings::ghosts(newton), &request);
         engine.engine.use_reference_only(false);
         found?;
         engine.state = State::Densities;

@@ -67,11 +67,6 @@ fn invalid(error: DomainError) -> Failure {
     Failure::new(Status::InvalidArgument, error.to_string())
 }
 
-/// A box without periods: nothing but particles and ghosts.
-pub(super) fn open_space() -> Result<PeriodicBox, Failure> {
-    PeriodicBox::orthogonal([0.0; 3], [1.0; 3], [false; 3]).map_err(invalid)
-}
-
 impl Request {
     /// Without the places that forces go to.
     ///
@@ -178,7 +173,7 @@ pub unsafe extern "C" fn psidpd_engine_first(
         // SAFETY: as this function's own section says.
         let (engine, given) = unsafe { (exclusive(engine, "engine")?, copied(request, "request")?) };
         let domain = if r#box.is_null() {
-            open_space()?
+            PeriodicBox::OPEN
         } else {
             // SAFETY: as this function's own section says.
             unsafe { copied(r#box, "box")? }.domain()?

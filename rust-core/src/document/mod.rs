@@ -5,6 +5,7 @@
 
 mod columns;
 mod error;
+pub mod keys;
 mod node;
 mod section;
 

@@ -34,6 +34,7 @@ mod settings;
 mod surroundings;
 mod sweep;
 mod tally;
+pub mod thermostat;
 mod vectors;
 
 pub use counts::PassCounts;

@@ -2,96 +2,8 @@
 //! `docs/model-file.md` are written from it, and tests hold the reader to it.
 
 use super::kernel::KernelKind;
-
-/// A table of the model file.
-#[derive(Debug, Clone, Copy)]
-pub struct Table {
-    /// Where it is; the parts in capitals are names of the user's.
-    pub path: &'static str,
-    /// How its header is written in a file; empty at the top level.
-    pub header: &'static str,
-    /// What it is for.
-    pub about: &'static str,
-    /// Its keys.
-    pub keys: &'static [Key],
-}
-
-/// A key of a table.
-#[derive(Debug, Clone, Copy)]
-pub struct Key {
-    /// Its name; in capitals if any name may stand there.
-    pub name: &'static str,
-    /// What its value is.
-    pub value: ValueKind,
-    /// Whether a file is refused without it.
-    pub required: bool,
-    /// The pair forms that have it; all if empty.
-    pub forms: &'static [&'static str],
-    /// What it means.
-    pub about: &'static str,
-    /// A part of a model file that has it; what a whole model needs besides is left out.
-    pub example: &'static str,
-}
-
-/// What the value of a key may be.
-#[derive(Debug, Clone, Copy)]
-pub enum ValueKind {
-    /// Any string.
-    Text,
-    /// 2 or 3.
-    Dimensions,
-    /// True or false.
-    Flag,
-    /// A number, or a string with a formula of the parameters and kT.
-    Number,
-    /// Two numbers, rising.
-    Bounds,
-    /// The names of all species.
-    Species,
-    /// Two species.
-    Between,
-    /// One of some names.
-    Choice(fn() -> Vec<&'static str>),
-    /// A polynomial, or a table of them by pairs of species.
-    Correction,
-    /// A string with a formula.
-    Formula,
-    /// A string with the name of a file, relative to the model file.
-    File,
-    /// A formula, or one of the tables [`CURVES`].
-    Excess,
-    /// A table of formulas by the names of density variables.
-    Slopes,
-}
-
-impl ValueKind {
-    /// In words.
-    pub fn describe(&self) -> String {
-        match self {
-            ValueKind::Text => "string".into(),
-            ValueKind::Dimensions => "2 or 3".into(),
-            ValueKind::Flag => "true or false".into(),
-            ValueKind::Number => "number, or string with a formula of the parameters and `kT`".into(),
-            ValueKind::Bounds => "array of two numbers or formulas, `[lowest, highest]`".into(),
-            ValueKind::Species => "array of names (letters, digits, underscores)".into(),
-            ValueKind::Between => "array of two species".into(),
-            ValueKind::Choice(choices) => {
-                choices().iter().map(|c| format!("`\"{c}\"`")).collect::<Vec<_>>().join(", ")
-            }
-            ValueKind::Correction => {
-                "array of 1 to 16 numbers or formulas, or a table of such arrays by `\"A|B\"`".into()
-            }
-            ValueKind::Formula => "string with a formula".into(),
-            ValueKind::File => "name of a file, relative to the model file".into(),
-            ValueKind::Excess => {
-                "string with a formula, `{ table = \"FILE\" }`, `{ pressure = \"FORMULA\" }` or \
-                 `{ slopes = { … } }`"
-                    .into()
-            }
-            ValueKind::Slopes => "table of formulas by the variables of densities".into(),
-        }
-    }
-}
+pub use crate::document::keys::{Key, OPTIONAL, REQUIRED, Table, ValueKind};
+use crate::keys;
 
 /// The forms of a `[[pair]]`.
 pub const FORMS: &[&str] = &["soft", "spline", "expression", "table"];
@@ -108,364 +20,228 @@ fn continuations() -> Vec<&'static str> {
     vec!["linear", "constant"]
 }
 
-const fn key(
-    name: &'static str,
-    value: ValueKind,
-    required: bool,
-    about: &'static str,
-    example: &'static str,
-) -> Key {
-    Key { name, value, required, forms: &[], about, example }
-}
-
-const fn form_key(
-    forms: &'static [&'static str],
-    name: &'static str,
-    value: ValueKind,
-    required: bool,
-    about: &'static str,
-    example: &'static str,
-) -> Key {
-    Key { name, value, required, forms, about, example }
-}
-
-const REQUIRED: bool = true;
-const OPTIONAL: bool = false;
-
 /// Every table, in the order of the documentation.
 pub const TABLES: &[Table] = &[TOP, PARAMETERS, DENSITY, EXCESS, CURVES, PAIR, THERMOSTAT];
 
 /// The top level.
 pub const TOP: Table = Table {
     path: "",
-    header: "",
+    title: "",
+    array: false,
+    forms: ("", &[]),
     about: "What the model is called and which particles it has.",
-    keys: &[
-        key(
-            "title",
-            ValueKind::Text,
-            REQUIRED,
-            "What the model is called.",
-            "title = \"Warren 2003, set 6\"",
-        ),
-        key(
-            "reference",
-            ValueKind::Text,
-            OPTIONAL,
-            "Where it comes from.",
-            "reference = \"Phys. Rev. E 68, 066702 (2003), Table 2\"",
-        ),
-        key(
-            "dimensions",
-            ValueKind::Dimensions,
-            OPTIONAL,
-            "The space the particles live in; 3 if left out.",
-            "dimensions = 2",
-        ),
-        key(
-            "species",
-            ValueKind::Species,
-            REQUIRED,
-            "The species, 1 to 64. Their order is the order of every list of species in results.",
-            "species = [\"A\", \"B\"]",
-        ),
-    ],
+    keys: keys! {
+        "title": ValueKind::Text, REQUIRED,
+            "What the model is called."
+            => "title = \"Warren 2003, set 6\"";
+        "reference": ValueKind::Text, OPTIONAL,
+            "Where it comes from."
+            => "reference = \"Phys. Rev. E 68, 066702 (2003), Table 2\"";
+        "dimensions": ValueKind::Dimensions, OPTIONAL,
+            "The space the particles live in; 3 if left out."
+            => "dimensions = 2";
+        "species": ValueKind::Species, REQUIRED,
+            "The species, 1 to 64. Their order is the order of every list of species in results."
+            => "species = [\"A\", \"B\"]";
+    },
 };
 
 /// `[parameters]`.
 pub const PARAMETERS: Table = Table {
     path: "parameters",
-    header: "[parameters]",
+    title: "",
+    array: false,
+    forms: ("", &[]),
     about: "Constants, for every formula and every number of the file. They may refer to each other in \
             any order. `kT` is not among them: the host gives the temperature, and formulas see it as `kT`.",
-    keys: &[key(
-        "NAME",
-        ValueKind::Number,
-        OPTIONAL,
-        "A constant.",
-        "[parameters]\nb = 0.0156\na = \"1.9*b\"",
-    )],
+    keys: keys! {
+        "NAME": ValueKind::NumberOrFormula, OPTIONAL,
+            "A constant."
+            => "[parameters]\nb = 0.0156\na = \"1.9*b\"";
+    },
 };
 
 /// `[density.NAME]`.
 pub const DENSITY: Table = Table {
     path: "density.NAME",
-    header: "[density.n]",
+    title: "",
+    array: false,
+    forms: ("", &[]),
     about: "A weighted local density `n_B(i) = sum over j of species B of w(r_ij)`, with `[w] = 1`. A density \
             `n` of species A, B gives formulas the variables `n_A`, `n_B` and `n = n_A + n_B`. \
             Any number of densities.",
-    keys: &[
-        key(
-            "kernel",
-            ValueKind::Choice(kernels),
-            REQUIRED,
-            "The weight function `w`.",
-            "[density.n]\nkernel = \"wendland-c2\"\nrange = 1.0",
-        ),
-        key(
-            "force_kernel",
-            ValueKind::Choice(kernels),
-            OPTIONAL,
+    keys: keys! {
+        "kernel": ValueKind::Choice(kernels), REQUIRED,
+            "The weight function `w`."
+            => "[density.n]\nkernel = \"wendland-c2\"\nrange = 1.0";
+        "force_kernel": ValueKind::Choice(kernels), OPTIONAL,
             "The kernel whose slope is the force; `kernel` if left out. Another one gives a force without \
-             potential, which heats: LAMMPS's `mdpd` is `lucy` with `quadratic`.",
-            "[density.n]\nkernel = \"lucy\"\nforce_kernel = \"quadratic\"\nrange = 0.75",
-        ),
-        key(
-            "range",
-            ValueKind::Number,
-            REQUIRED,
-            "The distance at which `w` vanishes.",
-            "[density.n]\nkernel = \"quadratic\"\nrange = \"3*rc/4\"\n[parameters]\nrc = 1.0",
-        ),
-        key(
-            "self",
-            ValueKind::Flag,
-            OPTIONAL,
+             potential, which heats: LAMMPS's `mdpd` is `lucy` with `quadratic`."
+            => "[density.n]\nkernel = \"lucy\"\nforce_kernel = \"quadratic\"\nrange = 0.75";
+        "range": ValueKind::NumberOrFormula, REQUIRED,
+            "The distance at which `w` vanishes."
+            => "[density.n]\nkernel = \"quadratic\"\nrange = \"3*rc/4\"\n[parameters]\nrc = 1.0";
+        "self": ValueKind::Flag, OPTIONAL,
             "Whether `w(0)` counts in a particle's own density; false if left out. With it the mean of `n` is \
-             the density plus `w(0)` (Trofimov).",
-            "[density.n]\nkernel = \"quadratic\"\nrange = 1.0\nself = true",
-        ),
-        key(
-            "correction",
-            ValueKind::Correction,
-            OPTIONAL,
+             the density plus `w(0)` (Trofimov)."
+            => "[density.n]\nkernel = \"quadratic\"\nrange = 1.0\nself = true";
+        "correction": ValueKind::Correction, OPTIONAL,
             "Trofimov's corrected density, a polynomial of the weighted one in ascending powers. For mixtures \
              by `\"A|B\"`, the density of A felt by B; pairs left out are not corrected. Formulas get the \
-             corrected densities.",
-            "species = [\"A\", \"B\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1.0\n\
-             correction = { \"A|A\" = [1.57, 1.0], \"A|B\" = [0.13, 1.0], \"B|A\" = [0.13, 1.0], \"B|B\" = [1.57, 1.0] }",
-        ),
-        key(
-            "bounds",
-            ValueKind::Bounds,
-            OPTIONAL,
-            "Where psi is used as written. For a (corrected) density `x` outside, with `x_c` the nearer \
-             bound and `d = x - x_c`, it is `psi + d psi' + d^2 psi''/2` at `x_c`: psi' goes on linearly. The \
-             rule applies to each partial density of a formula, one after the other, and to the total \
-             of a table or pressure. How often it was used is counted.",
-            "[density.n]\nkernel = \"quadratic\"\nrange = 1.0\nbounds = [0.05, 20.0]\n[excess_free_energy]\nA = \"kT*ln(n)\"",
-        ),
-        key(
-            "below",
-            ValueKind::Choice(continuations),
-            OPTIONAL,
+             corrected densities."
+            => "species = [\"A\", \"B\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1.0\ncorrection = { \
+             \"A|A\" = [1.57, 1.0], \"A|B\" = [0.13, 1.0], \"B|A\" = [0.13, 1.0], \"B|B\" = [1.57, 1.0] }";
+        "bounds": ValueKind::Bounds, OPTIONAL,
+            "Where psi is used as written. For a (corrected) density `x` outside, with `x_c` the nearer bound \
+             and `d = x - x_c`, it is `psi + d psi' + d^2 psi''/2` at `x_c`: psi' goes on linearly. The rule \
+             applies to each partial density of a formula, one after the other, and to the total of a table or \
+             pressure. How often it was used is counted."
+            => "[density.n]\nkernel = \"quadratic\"\nrange = 1.0\nbounds = [0.05, \
+             20.0]\n[excess_free_energy]\nA = \"kT*ln(n)\"";
+        "below": ValueKind::Choice(continuations), OPTIONAL,
             "How psi' goes on below the lower bound: `linear`, as above, if left out; `constant`, without the \
              last term, which makes the force there a pair force as in plain DPD, the way out that Trofimov \
-             suggests where psi is singular in thin regions. It keeps the force conservative, but \
-             the fluid does not follow its equation of state there.",
-            "[density.n]\nkernel = \"quadratic\"\nrange = 1.0\nbounds = [0.5, 20.0]\nbelow = \"constant\"\n[excess_free_energy]\nA = \"kT*ln(n)\"",
-        ),
-    ],
+             suggests where psi is singular in thin regions. It keeps the force conservative, but the fluid \
+             does not follow its equation of state there."
+            => "[density.n]\nkernel = \"quadratic\"\nrange = 1.0\nbounds = [0.5, 20.0]\nbelow = \
+             \"constant\"\n[excess_free_energy]\nA = \"kT*ln(n)\"";
+    },
 };
 
 /// `[excess_free_energy]`.
 pub const EXCESS: Table = Table {
     path: "excess_free_energy",
-    header: "[excess_free_energy]",
+    title: "",
+    array: false,
+    forms: ("", &[]),
     about: "`psi`, the excess free energy per particle, of every species: energy units, and forces are \
             `-[dpsi_i/dn + dpsi_j/dn] w'(r)`. Formulas know the densities' variables, the parameters, `kT`, `pi`, \
             `+ - * / ^`, `ln` (or `log`), `exp`, `sqrt`, `sin`, `cos`, `tanh`, `abs`, `min`, `max`. Left out \
             altogether, there is none; a species that has none beside others gets `\"0\"`.",
-    keys: &[key(
-        "SPECIES",
-        ValueKind::Excess,
-        OPTIONAL,
-        "psi of one species.",
-        "species = [\"A\", \"B\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1.0\n\
-         [excess_free_energy]\nA = \"n_B + 0.2*n_A\"\nB = \"n_A + 0.2*n_B\"",
-    )],
+    keys: keys! {
+        "SPECIES": ValueKind::Excess, OPTIONAL,
+            "psi of one species."
+            => "species = [\"A\", \"B\"]\n[density.n]\nkernel = \"quadratic\"\nrange = \
+             1.0\n[excess_free_energy]\nA = \"n_B + 0.2*n_A\"\nB = \"n_A + 0.2*n_B\"";
+    },
 };
 
 /// What may stand in the braces of an excess free energy.
 pub const CURVES: Table = Table {
     path: "excess_free_energy.SPECIES",
-    header: "[excess_free_energy]",
+    title: "",
+    array: false,
+    forms: ("", &[]),
     about: "Instead of a formula: psi as a function of the total of one density, from a table or from an \
             equation of state, or a force law that has no psi. One of `table`, `pressure` and `slopes`.",
-    keys: &[
-        key(
-            "table",
-            ValueKind::File,
-            OPTIONAL,
+    keys: keys! {
+        "table": ValueKind::File, OPTIONAL,
             "Rows of `n` and `psi`, separated by commas or blanks, with `#` for comments; if the first row is \
              no numbers it names the columns. psi is the cubic spline through the rows (not a knot), and psi' \
-             its exact slope; beyond the ends psi' goes on linearly.",
-            "[excess_free_energy]\nA = { table = \"psi.csv\" }",
-        ),
-        key(
-            "pressure",
-            ValueKind::Formula,
-            OPTIONAL,
-            "The equation of state wanted, a formula of `rho` and `kT`, for one species: \
-             `psi' = (p - rho kT)/rho^2`. psi is its integral, by quadrature, from a density where it is finite.",
-            "[excess_free_energy]\nA = { pressure = \"rho*kT/(1 - 0.016*rho) - 0.03*rho^2\" }",
-        ),
-        key(
-            "density",
-            ValueKind::Text,
-            OPTIONAL,
-            "The density it depends on, needed where there are several.",
-            "[density.n]\nkernel = \"quadratic\"\nrange = 1.0\n[density.m]\nkernel = \"quadratic\"\nrange = 0.75\n\
-             [excess_free_energy]\nA = { table = \"psi.csv\", density = \"m\" }",
-        ),
-        key(
-            "slopes",
-            ValueKind::Slopes,
-            OPTIONAL,
-            "A many-body force that is stated and not derived: formulas of the densities, by their variables, that \
-             stand where `dpsi/dn` would; those left out are 0. Unless they are the slopes of one psi, the \
-             force has no potential, does work around closed loops and heats. It exists to reproduce such laws: that of \
-             LAMMPS's `mdpd` with coefficients by pair of types has none (Warren's no-go theorem, Phys. Rev. E 87, \
-             045303). Densities with `bounds` are refused; theory and `export eam` do not apply.",
-            "species = [\"A\", \"B\"]\n[density.n]\nkernel = \"lucy\"\nforce_kernel = \"quadratic\"\nrange = 0.75\n\
-             [excess_free_energy]\nA = { slopes = { n_A = \"1.6*n\", n_B = \"1.2*n\" }, energy = \"0.8*n_A*n + 0.6*n_B*n\" }\n\
-             B = { slopes = { n_A = \"1.2*n\", n_B = \"1.6*n\" } }",
-        ),
-        key(
-            "energy",
-            ValueKind::Formula,
-            OPTIONAL,
-            "With `slopes`: what is reported as energy of a particle, 0 if left out. The force is not its gradient.",
-            "[excess_free_energy]\nA = { slopes = { n = \"1.6*n\" }, energy = \"0.7*n^2\" }",
-        ),
-    ],
+             its exact slope; beyond the ends psi' goes on linearly."
+            => "[excess_free_energy]\nA = { table = \"psi.csv\" }";
+        "pressure": ValueKind::Formula, OPTIONAL,
+            "The equation of state wanted, a formula of `rho` and `kT`, for one species: `psi' = (p - rho \
+             kT)/rho^2`. psi is its integral, by quadrature, from a density where it is finite."
+            => "[excess_free_energy]\nA = { pressure = \"rho*kT/(1 - 0.016*rho) - 0.03*rho^2\" }";
+        "density": ValueKind::Text, OPTIONAL,
+            "The density it depends on, needed where there are several."
+            => "[density.n]\nkernel = \"quadratic\"\nrange = 1.0\n[density.m]\nkernel = \"quadratic\"\nrange = \
+             0.75\n[excess_free_energy]\nA = { table = \"psi.csv\", density = \"m\" }";
+        "slopes": ValueKind::Slopes, OPTIONAL,
+            "A many-body force that is stated and not derived: formulas of the densities, by their variables, \
+             that stand where `dpsi/dn` would; those left out are 0. Unless they are the slopes of one psi, \
+             the force has no potential, does work around closed loops and heats. It exists to reproduce such \
+             laws: that of LAMMPS's `mdpd` with coefficients by pair of types has none (Warren's no-go \
+             theorem, Phys. Rev. E 87, 045303). Densities with `bounds` are refused; theory and `export eam` \
+             do not apply."
+            => "species = [\"A\", \"B\"]\n[density.n]\nkernel = \"lucy\"\nforce_kernel = \"quadratic\"\nrange \
+             = 0.75\n[excess_free_energy]\nA = { slopes = { n_A = \"1.6*n\", n_B = \"1.2*n\" }, energy = \
+             \"0.8*n_A*n + 0.6*n_B*n\" }\nB = { slopes = { n_A = \"1.2*n\", n_B = \"1.6*n\" } }";
+        "energy": ValueKind::Formula, OPTIONAL,
+            "With `slopes`: what is reported as energy of a particle, 0 if left out. The force is not its \
+             gradient."
+            => "[excess_free_energy]\nA = { slopes = { n = \"1.6*n\" }, energy = \"0.7*n^2\" }";
+    },
 };
 
 /// `[[pair]]`.
 pub const PAIR: Table = Table {
     path: "pair",
-    header: "[[pair]]",
+    title: "",
+    array: true,
+    forms: ("form", FORMS),
     about: "A pair potential `phi(r)`, added to the many-body terms; any number of them. In a model with \
             interactions every two species must have one, of strength 0 if that is meant.",
-    keys: &[
-        key(
-            "between",
-            ValueKind::Between,
-            REQUIRED,
-            "The two species.",
-            "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\nstrength = 25\nrange = 1.0",
-        ),
-        key(
-            "form",
-            ValueKind::Choice(forms),
-            REQUIRED,
-            "Which potential: `soft`, `phi = strength range/2 (1 - r/range)^2`; `spline`, `phi = strength \
-             [A W(r, range_A) - B W(r, range_B)]` with Wang and Chen's cubic spline, `W(0) = 1`; `expression`, \
-             a formula; `table`, a file.",
-            "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"spline\"\nstrength = 9.5\nA = 2\nB = 1\nrange_A = 0.8\nrange_B = 1.0",
-        ),
-        form_key(
-            &["soft", "spline"],
-            "strength",
-            ValueKind::Number,
-            REQUIRED,
-            "The amplitude: a force for `soft`, negative if it attracts, an energy for `spline`.",
-            "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\nstrength = \"-40\"\nrange = 1.0",
-        ),
-        form_key(
-            &["spline"],
-            "A",
-            ValueKind::Number,
-            REQUIRED,
-            "The weight of the repulsion.",
-            "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"spline\"\nstrength = 18.75\nA = 2\nB = 1\nrange_A = 0.8\nrange_B = 1.0",
-        ),
-        form_key(
-            &["spline"],
-            "B",
-            ValueKind::Number,
-            REQUIRED,
-            "The weight of the attraction.",
-            "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"spline\"\nstrength = 18.75\nA = 2\nB = 0.8\nrange_A = 0.8\nrange_B = 1.0",
-        ),
-        form_key(
-            &["spline"],
-            "range_A",
-            ValueKind::Number,
-            REQUIRED,
-            "The range of the repulsion.",
-            "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"spline\"\nstrength = 9.5\nA = 2\nB = 1\nrange_A = 0.75\nrange_B = 1.0",
-        ),
-        form_key(
-            &["spline"],
-            "range_B",
-            ValueKind::Number,
-            REQUIRED,
-            "The range of the attraction.",
-            "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"spline\"\nstrength = 9.5\nA = 2\nB = 1\nrange_A = 0.8\nrange_B = 1.1",
-        ),
-        form_key(
-            &["expression"],
-            "phi",
-            ValueKind::Formula,
-            REQUIRED,
+    keys: keys! {
+        "between": ValueKind::Between, REQUIRED,
+            "The two species."
+            => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\nstrength = 25\nrange = 1.0";
+        "form": ValueKind::Choice(forms), REQUIRED,
+            "Which potential: `soft`, `phi = strength range/2 (1 - r/range)^2`; `spline`, `phi = strength [A \
+             W(r, range_A) - B W(r, range_B)]` with Wang and Chen's cubic spline, `W(0) = 1`; `expression`, a \
+             formula; `table`, a file."
+            => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"spline\"\nstrength = 9.5\nA = 2\nB = 1\nrange_A = \
+             0.8\nrange_B = 1.0";
+        "strength" [&["soft", "spline"]]: ValueKind::NumberOrFormula, REQUIRED,
+            "The amplitude: a force for `soft`, negative if it attracts, an energy for `spline`."
+            => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\nstrength = \"-40\"\nrange = 1.0";
+        "A" [&["spline"]]: ValueKind::NumberOrFormula, REQUIRED,
+            "The weight of the repulsion."
+            => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"spline\"\nstrength = 18.75\nA = 2\nB = 1\nrange_A \
+             = 0.8\nrange_B = 1.0";
+        "B" [&["spline"]]: ValueKind::NumberOrFormula, REQUIRED,
+            "The weight of the attraction."
+            => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"spline\"\nstrength = 18.75\nA = 2\nB = \
+             0.8\nrange_A = 0.8\nrange_B = 1.0";
+        "range_A" [&["spline"]]: ValueKind::NumberOrFormula, REQUIRED,
+            "The range of the repulsion."
+            => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"spline\"\nstrength = 9.5\nA = 2\nB = 1\nrange_A = \
+             0.75\nrange_B = 1.0";
+        "range_B" [&["spline"]]: ValueKind::NumberOrFormula, REQUIRED,
+            "The range of the attraction."
+            => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"spline\"\nstrength = 9.5\nA = 2\nB = 1\nrange_A = \
+             0.8\nrange_B = 1.1";
+        "phi" [&["expression"]]: ValueKind::Formula, REQUIRED,
             "The potential as a formula of `r`, the parameters and `kT`. It is not shifted, and should vanish \
-             at the range.",
-            "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"expression\"\nphi = \"2*(1 - r^2)^2\"\nrange = 1.0",
-        ),
-        form_key(
-            &["table"],
-            "file",
-            ValueKind::File,
-            REQUIRED,
-            "Rows of `r` and `phi`, as for a table of psi; the cubic spline through them. It is not \
-             shifted, and must end at 0.",
-            "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"table\"\nfile = \"phi.txt\"",
-        ),
-        form_key(
-            &["soft", "expression"],
-            "range",
-            ValueKind::Number,
-            REQUIRED,
-            "The distance at and beyond which the potential is zero.",
-            "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\nstrength = 25\nrange = \"2^(1/3)\"",
-        ),
-        form_key(
-            &["table"],
-            "range",
-            ValueKind::Number,
-            OPTIONAL,
-            "The same; the last `r` of the table if left out.",
-            "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"table\"\nfile = \"phi.txt\"\nrange = 1.0",
-        ),
-    ],
+             at the range."
+            => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"expression\"\nphi = \"2*(1 - r^2)^2\"\nrange = \
+             1.0";
+        "file" [&["table"]]: ValueKind::File, REQUIRED,
+            "Rows of `r` and `phi`, as for a table of psi; the cubic spline through them. It is not shifted, \
+             and must end at 0."
+            => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"table\"\nfile = \"phi.txt\"";
+        "range" [&["soft", "expression"]]: ValueKind::NumberOrFormula, REQUIRED,
+            "The distance at and beyond which the potential is zero."
+            => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\nstrength = 25\nrange = \"2^(1/3)\"";
+        "range" [&["table"]]: ValueKind::NumberOrFormula, OPTIONAL,
+            "The same; the last `r` of the table if left out."
+            => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"table\"\nfile = \"phi.txt\"\nrange = 1.0";
+    },
 };
 
 /// `[[thermostat]]`.
 pub const THERMOSTAT: Table = Table {
     path: "thermostat",
-    header: "[[thermostat]]",
+    title: "",
+    array: true,
+    forms: ("", &[]),
     about: "Dissipative and random forces of a pair of species, `-gamma w_R^2 (e.v) e` and \
             `sqrt(2 gamma kT) w_R xi dt^(-1/2) e` with `w_R = (1 - r/range)^exponent`. If any pair of species has one, \
             all must.",
-    keys: &[
-        key(
-            "between",
-            ValueKind::Between,
-            OPTIONAL,
-            "The two species; every pair without a thermostat of its own if left out.",
-            "species = [\"A\", \"B\"]\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n[[thermostat]]\nbetween = [\"A\", \"B\"]\ngamma = 9.0\nrange = 1.0",
-        ),
-        key(
-            "gamma",
-            ValueKind::Number,
-            REQUIRED,
-            "The drag, 0 or more.",
-            "[[thermostat]]\ngamma = 4.5\nrange = 1.0",
-        ),
-        key(
-            "range",
-            ValueKind::Number,
-            REQUIRED,
-            "The distance at which the drag ends.",
-            "[[thermostat]]\ngamma = 18.0\nrange = 0.75",
-        ),
-        key(
-            "exponent",
-            ValueKind::Number,
-            OPTIONAL,
-            "The exponent of `w_R`; 1 if left out.",
-            "[[thermostat]]\ngamma = 4.5\nrange = 1.0\nexponent = 0.5",
-        ),
-    ],
+    keys: keys! {
+        "between": ValueKind::Between, OPTIONAL,
+            "The two species; every pair without a thermostat of its own if left out."
+            => "species = [\"A\", \"B\"]\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n[[thermostat]]\nbetween = \
+             [\"A\", \"B\"]\ngamma = 9.0\nrange = 1.0";
+        "gamma": ValueKind::NumberOrFormula, REQUIRED,
+            "The drag, 0 or more."
+            => "[[thermostat]]\ngamma = 4.5\nrange = 1.0";
+        "range": ValueKind::NumberOrFormula, REQUIRED,
+            "The distance at which the drag ends."
+            => "[[thermostat]]\ngamma = 18.0\nrange = 0.75";
+        "exponent": ValueKind::NumberOrFormula, OPTIONAL,
+            "The exponent of `w_R`; 1 if left out."
+            => "[[thermostat]]\ngamma = 4.5\nrange = 1.0\nexponent = 0.5";
+    },
 };

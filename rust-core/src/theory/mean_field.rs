@@ -130,6 +130,11 @@ impl MeanField {
         psi
     }
 
+    /// `∂ψ_α/∂ñ_v` in the bulk, for each of the [`Fluid::variables`], density-major.
+    pub fn excess_slopes(&self, alpha: usize, densities: &[f64]) -> Vec<f64> {
+        self.psi(alpha, densities).gradient
+    }
+
     /// Excess free energy density `f_ex = Σ_α ρ_α ψ_α(ρ) + ½ Σ_αβ [φ_αβ] ρ_α ρ_β`
     /// (Pagonabarraga–Frenkel eq. 4 in the bulk; Warren eq. 11). A species that is not there
     /// contributes nothing, even where its ψ is singular.

@@ -54,6 +54,8 @@ const SPINS: usize = if cfg!(any(loom, miri)) { 1 } else { 20_000 };
 
 thread_local! {
     /// The pools whose work this thread is doing, each by the address of what its threads share.
+    // The macro of loom takes no constants.
+    #[allow(clippy::missing_const_for_thread_local)]
     static WITHIN: RefCell<Vec<usize>> = RefCell::new(Vec::new());
 }
 
@@ -174,9 +176,14 @@ impl Drop for Wait<'_> {
     fn drop(&mut self) {
         let mut spins = 0;
         while self.0.busy.load(Ordering::Acquire) > 0 {
-            spins += 1;
             // With fewer processors than threads the worker may need this one.
-            if spins % SPINS == 0 { yield_now() } else { spin_loop() }
+            if spins < SPINS {
+                spins += 1;
+                spin_loop();
+            } else {
+                spins = 0;
+                yield_now();
+            }
         }
     }
 }

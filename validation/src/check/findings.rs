@@ -1,3 +1,4 @@
+use super::timestep::StepEstimate;
 use psidpd_core::theory::Stability;
 use serde::Serialize;
 
@@ -20,6 +21,8 @@ pub struct Findings {
     pub pressure_slope: Option<f64>,
     /// Mean-field stability there.
     pub stability: Option<Waves>,
+    /// Time steps of a scene and their errors; estimates, and none for a model alone.
+    pub steps: Vec<StepEstimate>,
     /// What cannot work, or may surprise.
     pub warnings: Vec<Warning>,
 }

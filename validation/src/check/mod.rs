@@ -1,10 +1,13 @@
 //! What can be known of a model before it runs: what will be computed, what mean field says, and what
 //! cannot work.
 
+pub mod calibration;
 mod findings;
+mod timestep;
 mod warnings;
 
 pub use findings::{Findings, Severity, Warning};
+pub use timestep::{StepEstimate, estimates};
 
 use psidpd_core::engine::Plan;
 use psidpd_core::model::{Fluid, Model};
@@ -71,6 +74,7 @@ pub fn check(model: &Model, conditions: &Conditions) -> Result<Findings, CheckEr
         pressure_slope: at.map(|(theory, rho)| theory.pressure_slope(rho)),
         stability: stability.map(Into::into),
         densities: conditions.densities.clone(),
+        steps: Vec::new(),
         warnings: warnings::all(&fluid, densities, stability.as_ref())?,
     })
 }

@@ -1,6 +1,7 @@
 //! Each thing that is looked for, in a function of its own.
 
 use super::CheckError;
+use super::calibration;
 use super::findings::{Severity, Warning};
 use psidpd_core::model::Fluid;
 use psidpd_core::model::kernel::KernelKind;
@@ -22,6 +23,7 @@ pub fn all(
         found.extend(collapse(fluid)?);
         found.extend(singular(fluid, densities)?);
     }
+    found.extend(calibration::missing(fluid));
     found.extend(stability.and_then(unstable));
     found.extend(jumps(fluid));
     found.sort_by_key(|w| std::cmp::Reverse(w.severity));

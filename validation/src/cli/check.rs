@@ -1,5 +1,5 @@
 use super::{Failure, Verdict, write_json};
-use crate::check::{Conditions, Findings, Severity, check};
+use crate::check::{Conditions, Findings, Severity, check, estimates};
 use crate::scene::Scene;
 use psidpd_core::document::Document;
 use psidpd_core::model::Model;
@@ -29,18 +29,18 @@ pub fn per_species(given: &[f64], species: usize) -> Option<Vec<f64>> {
 
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     let document = Document::open(&arguments.file).map_err(Failure::new)?;
-    let (model, kt, densities) = if document.root().get("model").is_some() {
+    let (model, kt, densities, steps) = if document.root().get("model").is_some() {
         let scene = Scene::open(&arguments.file).map_err(Failure::new)?;
-        let densities = scene.densities();
-        (scene.model.clone(), scene.kt, Some(densities))
+        let steps = estimates(&scene).map_err(Failure::new)?;
+        (scene.model.clone(), scene.kt, Some(scene.densities()), steps)
     } else {
-        (Model::open(&arguments.file).map_err(Failure::new)?, 1.0, None)
+        (Model::open(&arguments.file).map_err(Failure::new)?, 1.0, None, Vec::new())
     };
     let conditions = Conditions {
         kt: arguments.kt.unwrap_or(kt),
         densities: per_species(&arguments.density, model.species().len()).or(densities),
     };
-    let findings = check(&model, &conditions).map_err(Failure::new)?;
+    let findings = Findings { steps, ..check(&model, &conditions).map_err(Failure::new)? };
     print(&findings, model.species());
     write_json(json, &findings)?;
     Ok(if findings.works() { Verdict::Good } else { Verdict::CheckFailed })
@@ -70,6 +70,19 @@ fn print(findings: &Findings, species: &[String]) {
         println!("stability     {verdict}: smallest 1/S(k) is {:.5} {place}", s.min_inverse_s);
     } else if findings.densities.is_none() {
         println!("stability     give --density to have pressure and stability");
+    }
+    for step in &findings.steps {
+        println!(
+            "time step     {} of stage \"{}\", {}: configurational temperature off by about {:.2} %, 1 % at dt = {:.3} \
+             (estimate: frequency {:.1}, drag rate {:.2})",
+            step.dt,
+            step.stage,
+            step.integrator,
+            100.0 * step.error,
+            step.one_percent,
+            step.frequency,
+            step.drag
+        );
     }
     for warning in &findings.warnings {
         let kind = match warning.severity {

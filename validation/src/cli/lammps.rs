@@ -1,5 +1,6 @@
 use super::{Failure, Verdict, write_json};
-use crate::lammps::{Host, install, plugin};
+use crate::lammps::convert::{self, Law};
+use crate::lammps::{Host, base_dir, install, plugin};
 use crate::report::Progress;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -15,6 +16,17 @@ pub enum Verb {
         /// default: the one that `install` put in place.
         #[arg(long, value_name = "WHERE")]
         lammps: Option<PathBuf>,
+    },
+    /// Rewrite a script for the built-in `mdpd` to the pair style mdpd/psi, and say what was changed and what was left.
+    Convert {
+        /// The script.
+        script: PathBuf,
+        /// The force law: Warren's, or the built-in's own.
+        #[arg(long, value_enum, default_value_t = Law::Conservative)]
+        law: Law,
+        /// Where the new script is written; data files come beside it. Default: the script to standard output.
+        #[arg(long, value_name = "FILE")]
+        out: Option<PathBuf>,
     },
 }
 
@@ -57,6 +69,24 @@ pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
             let built = built.lammps_version;
             write_json(json, &json!({"plugin": path, "launcher": launcher, "lammps_version": built}))?;
         }
+        Verb::Convert { script, law, out } => convert_script(script, *law, out.as_deref(), json)?,
     }
     Ok(Verdict::Good)
+}
+
+fn convert_script(script: &Path, law: Law, out: Option<&Path>, json: Option<&Path>) -> Result<(), Failure> {
+    // Where it is if it has been built here; else a name to be filled in.
+    let plugin = Some(base_dir().join(plugin::FILE_NAME)).filter(|p| p.is_file());
+    let plugin = plugin.unwrap_or_else(|| plugin::FILE_NAME.into());
+    let (files, new) =
+        convert::files(script, law, &plugin.display().to_string(), out).map_err(Failure::new)?;
+    if out.is_none() {
+        print!("{}", new.script);
+    }
+    for (what, notes) in [("changed", &new.changed), ("look at", &new.left)] {
+        for note in notes {
+            eprintln!("{what:8} line {:4}: {}", note.line, note.text);
+        }
+    }
+    write_json(json, &json!({"files": files, "changed": new.changed, "left": new.left}))
 }

@@ -5,6 +5,7 @@
 //! Ctrl-C, 143 for SIGTERM.
 
 mod bench;
+mod calibrate;
 mod check;
 mod diagnostic;
 mod export;
@@ -12,6 +13,7 @@ mod forces;
 mod lammps;
 mod new;
 mod report;
+mod reproduce;
 mod run;
 mod snapshot;
 mod theory;
@@ -44,6 +46,10 @@ enum Verb {
     Check(check::Arguments),
     /// Mean field: equation of state, critical point, spinodal, binodal, surface tension.
     Theory(theory::Arguments),
+    /// Find the corrected density with which a model has the pressure it was made for.
+    Calibrate(calibrate::Arguments),
+    /// Figures and tables of the papers: measured, and compared with what is published.
+    Reproduce(reproduce::Arguments),
     /// Write a scene to begin with, and its model.
     New(new::Arguments),
     /// Run a scene natively.
@@ -81,6 +87,8 @@ pub fn main() -> ExitCode {
         Verb::Check(a) => check::run(a, json),
         Verb::Theory(a) => theory::run(a, json),
         Verb::Export(a) => export::run(a, json),
+        Verb::Calibrate(a) => calibrate::run(a, json),
+        Verb::Reproduce(a) => reproduce::run(a, json),
         Verb::New(a) => new::run(a, json),
         Verb::Run(a) => run::run(a, json),
         Verb::Report(a) => report::run(a, json),

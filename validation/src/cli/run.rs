@@ -1,4 +1,5 @@
 use super::{Failure, Verdict, write_json};
+use crate::check::calibration;
 use crate::report::{Progress, write_run_report};
 use crate::run::{Begin, Outcome, Runner, Start, Summary, Timing};
 use crate::scene::Scene;
@@ -52,6 +53,9 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     let Arguments { scene: path, out, resume, overwrite, threads, precision, report } = arguments;
     let mut scene = Scene::open(path).map_err(Failure::new)?;
     scene.precision = precision.or(scene.precision);
+    if let Some(warning) = calibration::missing(&scene.model.at(scene.kt).map_err(Failure::new)?) {
+        warn(&warning.message);
+    }
     let begin = match (resume, overwrite) {
         (true, _) => Begin::Resume,
         (_, true) => Begin::Overwrite,
@@ -64,7 +68,10 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     let made = tell_start(runner.start(), begin, out, total);
     say(&format!("forces by {}", runner.evaluation()));
     let bar = Progress::new().steps(&scene.title, total, made, runner.particles());
-    let outcome = runner.run(&stop, &mut |p| bar.set(p.step));
+    let outcome = runner.run(&stop, &mut |p| {
+        bar.set(p.step);
+        p.deviations.iter().for_each(|deviation| warn(&deviation.to_string()));
+    });
     bar.finish();
     if *report && outcome.as_ref().err().is_none_or(|e| e.is_stop()) {
         let page = write_run_report(out);

@@ -6,7 +6,7 @@
 
 mod physics;
 
-use crate::run::{Integrator, RunError};
+use crate::run::{Counterpart, Integrator, RunError};
 use crate::scene::{Scene, Stage};
 use physics::Physics;
 use psidpd_core::document::{Document, FileError};
@@ -35,14 +35,16 @@ const MOST_BODY_FORCES: usize = 9;
 pub enum DeckError {
     /// LAMMPS has no such integrator.
     #[error(
-        "stage \"{stage}\": groot-warren with lambda = {lambda} has no counterpart in LAMMPS, whose drag sees the \
-         velocity predicted with lambda = 0.5; use that or velocity-verlet"
+        "stage \"{stage}\": integrator = \"{name}\" ({integrator}) has no counterpart in LAMMPS; a deck can have \
+         velocity-verlet, and groot-warren with lambda = 0.5, which is the same"
     )]
     Integrator {
         /// Name of the stage.
         stage: String,
-        /// Its λ.
-        lambda: f64,
+        /// Value of the key.
+        name: &'static str,
+        /// With its parameters.
+        integrator: Integrator,
     },
     /// The pair styles do not take this seed.
     #[error("the seed must be at least 1 for the pair style, is {0}")]
@@ -153,11 +155,13 @@ fn check(scene: &Scene) -> Result<(), DeckError> {
         if stage.steps > MOST_STEPS {
             return Err(DeckError::Steps { stage: stage.name.clone(), steps: stage.steps });
         }
-        match stage.integrator {
-            Integrator::GrootWarren { lambda } if lambda != 0.5 => {
-                return Err(DeckError::Integrator { stage: stage.name.clone(), lambda });
-            }
-            _ => {}
+        let integrator = stage.integrator;
+        if integrator.in_lammps() == Counterpart::None {
+            return Err(DeckError::Integrator {
+                stage: stage.name.clone(),
+                name: integrator.name(),
+                integrator,
+            });
         }
     }
     Ok(())

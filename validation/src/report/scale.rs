@@ -2,7 +2,6 @@
 
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 use plotters::coord::types::RangedCoordf64;
-use plotters::data::float::FloatPrettyPrinter;
 use plotters::prelude::{IntoLogRange, LogCoord};
 use std::ops::Range;
 
@@ -117,10 +116,17 @@ impl Ranged for Scale {
 impl ValueFormatter<f64> for Scale {
     /// As many digits as tell ticks apart.
     fn format_ext(&self, value: &f64) -> String {
-        let value = value / 10f64.powi(self.power);
-        let span = (self.range.end - self.range.start) / 10f64.powi(self.power);
-        let max_decimal = if self.log { 3 } else { (2.0 - span.log10()).ceil().clamp(0.0, 15.0) as i32 };
-        FloatPrettyPrinter { allow_scientific: self.log, min_decimal: 0, max_decimal }.print(value)
+        let unit = 10f64.powi(self.power);
+        if self.log && !(1e-3..1e6).contains(value) {
+            return format!("{value:.1e}").replace(".0e", "e");
+        }
+        let step = if self.log { *value } else { (self.range.end - self.range.start) / unit };
+        let decimals = (2.0 - step.log10()).ceil().clamp(0.0, 15.0) as usize;
+        let text = format!("{:.decimals$}", value / unit);
+        match text.contains('.').then(|| text.trim_end_matches('0').trim_end_matches('.')).unwrap_or(&text) {
+            "-0" => "0".to_owned(),
+            text => text.to_owned(),
+        }
     }
 }
 

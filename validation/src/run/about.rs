@@ -1,6 +1,5 @@
 //! The description of a run, for its folder.
 
-use super::integrator::Integrator;
 use crate::output::about::{Column, THERMO, UNITS};
 use crate::output::{About, AboutDensity, AboutStage};
 use crate::scene::Scene;
@@ -17,10 +16,7 @@ impl About {
                 dt: s.dt,
                 kt: s.kt,
                 thermostat: s.thermostat,
-                integrator: match s.integrator {
-                    Integrator::VelocityVerlet => "velocity-verlet".into(),
-                    Integrator::GrootWarren { lambda } => format!("groot-warren, lambda = {lambda}"),
-                },
+                integrator: s.integrator.to_string(),
             };
             begin = stage.end;
             stage

@@ -65,6 +65,24 @@ pub enum RunError {
         /// How far.
         distance: f64,
     },
+    /// The temperature is far from that of the thermostat, and stays there.
+    #[error(
+        "step {step}: the fluid has been hotter than 2 kT since step {since} and is at {ratio:.1} kT, though the thermostat \
+         had time to cool it: dt = {dt} is likely too large for its forces with {integrator}; use a smaller dt, or an integrator \
+         that bears larger ones (docs/integrators.md)"
+    )]
+    TooHot {
+        /// Number of the step.
+        step: u64,
+        /// Step of the first sample that was too hot.
+        since: u64,
+        /// The temperature in units of that of the thermostat.
+        ratio: f64,
+        /// Δt.
+        dt: f64,
+        /// How steps are made.
+        integrator: String,
+    },
     /// The physics of a run failed; the last good state is on disk.
     #[error(
         "stage \"{stage}\" stopped: {cause}; the state of step {good} is in {}{}",
@@ -150,6 +168,7 @@ impl RunError {
                 | RunError::Engine { .. }
                 | RunError::Velocity { .. }
                 | RunError::Runaway { .. }
+                | RunError::TooHot { .. }
         )
     }
 

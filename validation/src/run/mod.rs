@@ -23,17 +23,19 @@ mod timing;
 mod underway;
 mod view;
 mod walls;
+mod watch;
 
 pub use crate::checkpoint::{self, Means, Sums, Thermo};
 pub use crate::particles::{BodyForce, Drive, State, StateError, Tags, write_data};
 pub use dump::write_frame;
 pub use error::RunError;
-pub use integrator::Integrator;
+pub use integrator::{Accuracy, Counterpart, Coupling, Integrator, THERMOSTAT_STEPS};
 pub(crate) use reorder::INTERVAL as REORDERING;
 pub use runner::{Begin, Outcome, Progress, Runner, Start, run_scene};
 pub use simulation::Simulation;
 pub use summary::Summary;
 pub use timing::{Session, Timing};
+pub use watch::{Deviation, Thermometer};
 
 #[cfg(test)]
 mod tests;

@@ -5,6 +5,7 @@ use super::simulation::Simulation;
 use super::summary::Summary;
 use super::timing::Timing;
 use super::underway::Run;
+use super::watch::Deviation;
 use crate::checkpoint::{Checkpoint, CheckpointError, Found, Identity, Position, Store, Sums, Thermo};
 use crate::observe::Observers;
 use crate::particles::State;
@@ -30,6 +31,8 @@ pub struct Progress<'a> {
     pub steps: u64,
     /// The totals, on steps that have them.
     pub thermo: Option<&'a Thermo>,
+    /// What is wrong with the temperatures of the stage, at its last step.
+    pub deviations: &'a [Deviation],
 }
 
 /// How a run deals with what is in its folder.

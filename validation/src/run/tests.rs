@@ -5,6 +5,7 @@ use psidpd_core::engine::Want;
 use psidpd_core::model::Model;
 use std::path::Path;
 
+mod integrators;
 mod order;
 mod resume;
 mod steps;

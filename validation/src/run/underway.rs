@@ -6,6 +6,7 @@ use super::runner::{Outcome, Progress};
 use super::simulation::Simulation;
 use super::summary::Summary;
 use super::timing::{Session, Timing};
+use super::watch::Watch;
 use crate::checkpoint::{Checkpoint, CheckpointError, Position, Store, Sums, Thermo};
 use crate::observe::Observers;
 use crate::output::write_snapshot;
@@ -36,6 +37,8 @@ pub(super) struct Run<'a> {
     sums: Sums,
     last: Option<Thermo>,
     observers: Observers,
+    /// Over the present stage, since this session began.
+    watch: Watch,
     pub timing: Timing,
     /// The step that this session began after, and when.
     began: (u64, Instant),
@@ -72,6 +75,7 @@ impl<'a> Run<'a> {
             sums: good.sums,
             last: good.last,
             observers,
+            watch: Watch::default(),
             timing,
             began: (good.step, now),
             checkpointed: now,
@@ -114,8 +118,9 @@ impl<'a> Run<'a> {
     /// Computes the forces that a stage starts with.
     fn enter(&mut self, stage: &Stage, progress: &mut dyn FnMut(Progress)) -> Result<(), RunError> {
         self.sums = Sums::default();
+        self.watch = Watch::default();
         self.scene.enter(stage, &mut self.simulation)?;
-        self.simulation.prepare(stage.dt, Want::TOTALS)?;
+        self.simulation.prepare_for(stage.integrator, stage.dt, Want::TOTALS)?;
         self.position.entered = true;
         if self.simulation.step_number() == 0 {
             self.report(stage, true, progress)?;
@@ -137,9 +142,15 @@ impl<'a> Run<'a> {
         }
         self.simulation.begin_step(stage.dt, stage.integrator, want)?;
         let is_last = self.position.done + 1 == stage.steps;
+        let watched = Watch::is_due(stage, self.position.done + 1);
+        if watched {
+            self.simulation.end_step()?;
+            self.watch.sample(&mut self.simulation, stage, self.position.done + 1)?;
+        }
         let sampled = self.observers.may_sample(number, &stage.name);
         if is_last || totals || sampled || self.writes(number) {
             self.simulation.end_step()?;
+            self.simulation.refresh(want)?;
         }
         self.position.done += 1;
         self.position.time = self.position.begin + self.position.done as f64 * stage.dt;
@@ -205,7 +216,12 @@ impl<'a> Run<'a> {
         if totals {
             self.keep_state();
         }
-        progress(Progress { stage: &stage.name, step, steps: self.steps, thermo: thermo.as_ref() });
+        let deviations = match self.position.done == stage.steps {
+            true => self.watch.deviations(&self.simulation, stage),
+            false => Vec::new(),
+        };
+        let thermo = thermo.as_ref();
+        progress(Progress { stage: &stage.name, step, steps: self.steps, thermo, deviations: &deviations });
         Ok(())
     }
 

@@ -85,7 +85,7 @@ mod tests {
     fn free_particles_bounce_to_and_fro() {
         let start = state([false, true, false], 200);
         let model = Model::parse("m", IDEAL).unwrap();
-        for integrator in [Integrator::VelocityVerlet, Integrator::GrootWarren { lambda: 0.65 }] {
+        for (_, integrator) in Integrator::ALL {
             let mut run = Simulation::new(&model, 1.0, start.clone(), 1).unwrap();
             run.set_thermostat(false);
             run.prepare(0.01, Want::FORCES).unwrap();

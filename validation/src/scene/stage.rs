@@ -2,8 +2,9 @@
 
 use super::number::positive;
 use super::ramp;
-use crate::run::Integrator;
+use crate::run::{Integrator, THERMOSTAT_STEPS};
 use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
+use psidpd_core::engine::noise::Law;
 
 /// A part of a run under one set of conditions.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,14 +37,8 @@ impl Stage {
     }
 }
 
-/// Names of the integrators.
-pub const INTEGRATORS: &[&str] = &["velocity-verlet", "groot-warren"];
-
 /// Most steps of a run: step numbers stay exact in every format that tells them.
 const MOST_STEPS: u64 = 1 << 53;
-
-/// λ of Groot and Warren's paper.
-const DEFAULT_LAMBDA: f64 = 0.65;
 
 /// Δt of stages that give none.
 const DEFAULT_DT: f64 = 0.01;
@@ -158,24 +153,48 @@ fn read_one(section: &Section, defaults: Defaults) -> Result<Vec<Stage>, FileErr
 
 /// The integrator of a stage, or of the scene; `default` if it says nothing.
 fn read_integrator(section: &Section, default: Integrator) -> Result<Integrator, FileError> {
-    let groot_warren = Integrator::GrootWarren { lambda: DEFAULT_LAMBDA };
-    let names = [("velocity-verlet", Integrator::VelocityVerlet), ("groot-warren", groot_warren)];
-    let integrator = match section.get("integrator") {
-        Some(value) => value.one_of("integrator", &names)?.value,
+    let mut integrator = match section.get("integrator") {
+        Some(value) => value.one_of("integrator", &Integrator::ALL)?.value,
         None => default,
     };
-    let Some(value) = section.get("lambda") else { return Ok(integrator) };
-    let lambda = value.number()?.value;
-    match integrator {
-        Integrator::GrootWarren { .. } if (0.0..=1.0).contains(&lambda) => {
-            Ok(Integrator::GrootWarren { lambda })
-        }
-        Integrator::GrootWarren { .. } => {
-            Err(value.error(FileErrorKind::Value(format!("must be from 0 to 1, is {lambda}"))))
-        }
-        Integrator::VelocityVerlet => {
-            let message = "velocity-verlet has no lambda".to_owned();
-            Err(value.error(FileErrorKind::Value(message)).with_help("integrator = \"groot-warren\" has"))
+    let name = integrator.name();
+    if let Some(value) = section.get("lambda") {
+        let Some((lambda, [low, high])) = integrator.lambda() else {
+            return Err(has_none(&value, name, "lambda", |other| other.lambda().is_some()));
+        };
+        *lambda = value.number()?.value;
+        if !(low..=high).contains(lambda) {
+            let message = format!("must be from {low} to {high}, is {lambda}");
+            return Err(value.error(FileErrorKind::Value(message)));
         }
     }
+    if let Some(value) = section.get("thermostat_step") {
+        let Some(coupling) = integrator.coupling() else {
+            return Err(has_none(&value, name, "thermostat_step", |other| other.coupling().is_some()));
+        };
+        coupling.update = value.one_of("thermostat_step", &THERMOSTAT_STEPS)?.value;
+    }
+    if let Some(value) = section.get("thermostat_every") {
+        let Some(coupling) = integrator.coupling() else {
+            return Err(has_none(&value, name, "thermostat_every", |other| other.coupling().is_some()));
+        };
+        coupling.every = read_steps(&value)?;
+    }
+    if let Some(value) = section.get("noise") {
+        let Some(noise) = integrator.noise() else {
+            return Err(has_none(&value, name, "noise", |other| other.noise().is_some()));
+        };
+        *noise = value.one_of("noise", &Law::ALL)?.value;
+    }
+    Ok(integrator)
+}
+
+/// The error of a key that an integrator does not have; it names those that do.
+fn has_none(value: &Value, name: &str, key: &str, has: fn(&mut Integrator) -> bool) -> FileError {
+    let owners: Vec<String> = Integrator::ALL
+        .into_iter()
+        .filter_map(|(name, mut integrator)| has(&mut integrator).then(|| format!("\"{name}\"")))
+        .collect();
+    let error = value.error(FileErrorKind::Value(format!("{name} has no {key}")));
+    error.with_help(format!("integrator = {}", owners.join(", ")))
 }

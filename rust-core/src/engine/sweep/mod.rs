@@ -1,5 +1,6 @@
-//! The fast engine: forces by one traversal of all cells, without a neighbour list. `docs/engine.md` explains it with
-//! figures. At the speed of DPD particles a neighbour list would live a few steps and cost more than it saves.
+//! The fast engine: the same forces as [`Reference`](super::reference::Reference), by one traversal of all cells, without a
+//! neighbour list. `docs/engine.md` explains it with figures. At the speed of DPD particles a neighbour list would live a few
+//! steps and cost more than it saves.
 //!
 //! Rooms, from the ground up; a file imports from its own room and from those above it in this list:
 //!
@@ -9,7 +10,7 @@
 //! - [`pair_search`]: cell ranges, i-clusters and j-clusters, distance filter.
 //! - [`pair_batch`]: terms, densities and noise of a batch of pairs, added to accumulators.
 //! - [`passes`]: the two passes over the pairs of a plane; ψ is evaluated between them.
-//! - [`compiled`]: the passes, compiled for each instruction set and precision.
+//! - [`compiled`]: the passes, compiled for each instruction set and precision. The crate `psidpd_threads` has the threads.
 //! - [`workspace`]: arrays, sorting, ψ, and the scheduler that sends planes through all this.
 //! - [`Sweep`]: what hosts see.
 

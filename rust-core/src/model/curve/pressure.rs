@@ -7,7 +7,8 @@ use crate::model::expression::{Formula, Program, TooLarge};
 /// `ψ′` and `ψ″` are exact. `ψ` is the integral of `ψ′` from a density where it is finite, chosen once,
 /// by Gauss–Legendre quadrature on panels that are checked against their halves; it is undefined beyond
 /// a singularity of `ψ′`. Near `ρ = 0` a pressure that starts as that of an ideal gas is expanded in
-/// powers of `ρ`, where the difference `p − ρkT` would lose its digits.
+/// powers of `ρ`, where the difference `p − ρkT` would lose its digits. Where the pressure has no such expansion,
+/// as with `ρ^2.6`, and `ψ′` has a limit nevertheless, it goes to it as a power of `ρ`: see [`Tail`].
 #[derive(Debug, Clone)]
 pub struct Pressure {
     text: String,
@@ -17,6 +18,19 @@ pub struct Pressure {
     /// Where panels begin or end, rising, with ψ there.
     anchors: Vec<[f64; 2]>,
     series: Option<Series>,
+    tail: Option<Tail>,
+}
+
+/// `ψ′ = limit + factor ρ^power` below some density: the limit of `ψ′` as `ρ → 0`, which the formula
+/// itself, 0/0 there, does not tell.
+#[derive(Debug, Clone, Copy)]
+struct Tail {
+    below: f64,
+    limit: f64,
+    factor: f64,
+    power: f64,
+    /// What makes ψ continuous where the tail begins.
+    constant: f64,
 }
 
 /// `ψ′ = Σ_k c_k ρ^k` below some density.
@@ -64,6 +78,7 @@ impl Pressure {
             slope: Program::new(&[&slope]),
             anchors: Vec::new(),
             series: Series::new(pressure, kt, start),
+            tail: None,
         };
         let powers = (0..100).map(|k| start * 2f64.powi(if k % 2 == 0 { k / 2 } else { -(k + 1) / 2 }));
         let first = powers.into_iter().find(|n| curve.slope_at(*n).is_finite());
@@ -81,6 +96,13 @@ impl Pressure {
             let constant = block.psi[0] - series.value(series.below);
             series.constant = if constant.is_finite() { constant } else { 0.0 };
             curve.series = Some(series);
+        } else if let Some(mut tail) = Tail::find(&|n| curve.slope_at(n), start) {
+            let mut block = CurveBlock::default();
+            block.resize(1);
+            curve.integrate(&[tail.below], &mut block);
+            let constant = block.psi[0] - tail.value(tail.below);
+            tail.constant = if constant.is_finite() { constant } else { 0.0 };
+            curve.tail = Some(tail);
         }
         Ok(curve)
     }
@@ -184,6 +206,12 @@ impl Pressure {
                 }
             }
         }
+        if let Some(tail) = &self.tail {
+            for (lane, n) in n.iter().enumerate().filter(|(_, n)| (0.0..tail.below).contains(*n)) {
+                [to.slope[lane], to.curvature[lane]] = tail.slope(*n);
+                to.psi[lane] = tail.value(*n) + tail.constant;
+            }
+        }
     }
 }
 
@@ -203,6 +231,45 @@ const fn rule(x: [f64; 4], w: [f64; 4]) -> ([f64; POINTS], [f64; POINTS]) {
         k += 1;
     }
     (nodes, weights)
+}
+
+impl Tail {
+    /// Below this part of the first density the tail takes over: low enough for one power to be all that is
+    /// left, high enough for `p − ρkT` to have its digits.
+    const PART: f64 = 1e-4;
+
+    /// The limit of `slope` as its argument goes to 0, if its values at halved densities close in on one:
+    /// with `s(n) = L + C n^q`, each difference of values at n and n/2 is `2^−q` times the one before. A logarithm
+    /// has differences that stay equal, a pole such that grow.
+    fn find(slope: &dyn Fn(f64) -> f64, start: f64) -> Option<Tail> {
+        let below = Tail::PART * start;
+        let values: [f64; 5] = std::array::from_fn(|k| slope(below * 0.5f64.powi(k as i32)));
+        let steps: [f64; 4] = std::array::from_fn(|k| values[k] - values[k + 1]);
+        if steps.iter().any(|step| !step.is_finite() || *step == 0.0) {
+            return None;
+        }
+        let ratios: [f64; 3] = std::array::from_fn(|k| steps[k + 1] / steps[k]);
+        let ratio = ratios[0];
+        // A power less than 0.05 cannot be told from a logarithm.
+        let closes_in = ratio > 0.0 && ratio < 0.5f64.powf(0.05);
+        if !closes_in || ratios.iter().any(|r| (r - ratio).abs() > 0.02 * ratio) {
+            return None;
+        }
+        let limit = values[0] - steps[0] / (1.0 - ratio);
+        let power = -ratio.log2();
+        Some(Tail { below, limit, factor: (values[0] - limit) / below.powf(power), power, constant: 0.0 })
+    }
+
+    /// `ψ` but for the constant.
+    fn value(&self, n: f64) -> f64 {
+        n * (self.limit + self.factor * n.powf(self.power) / (self.power + 1.0))
+    }
+
+    /// `ψ′` and `ψ″`.
+    fn slope(&self, n: f64) -> [f64; 2] {
+        let power = self.factor * n.powf(self.power);
+        [self.limit + power, self.power * self.factor * n.powf(self.power - 1.0)]
+    }
 }
 
 impl Series {
@@ -314,6 +381,31 @@ mod tests {
         let singular = curve("2*rho*kT", 1.0, 1.0);
         assert!(!singular.at(0.0)[1].is_finite());
         assert!(curve("ln(-1 - rho^2)", 1.0, 1.0).at(1.0)[0].is_nan());
+    }
+
+    #[test]
+    fn broken_powers_have_their_limit_at_zero() {
+        // ψ′ = 0.9 ρ^0.6, ψ = 0.9/1.6 ρ^1.6: nothing there that an isolated particle could not have.
+        let broken = curve("rho*kT + 0.9*rho^2.6", 1.0, 1.0);
+        let [origin, slope, _] = broken.at(0.0);
+        assert!(slope.abs() < 1e-9, "{slope}");
+        for n in [1e-9, 1e-6, 9.9e-5, 1.01e-4, 0.01, 3.0f64] {
+            let [psi, slope, _] = broken.at(n);
+            assert!((slope / (0.9 * n.powf(0.6)) - 1.0).abs() < 1e-6, "{n}: {slope}");
+            let expected = 0.9 / 1.6 * n.powf(1.6);
+            assert!((psi - origin - expected).abs() < 1e-6 * expected, "{n}: {psi}");
+        }
+        // A limit other than zero, and two powers on the way to it.
+        let two = curve("rho*kT + 3*rho^2 + rho^2.5 + rho^3.2", 0.7, 1.0);
+        assert!((two.at(0.0)[1] - 3.0).abs() < 1e-4, "{:?}", two.at(0.0));
+        assert!((two.at(0.9999e-4)[1] - two.at(1.0001e-4)[1]).abs() < 1e-5);
+    }
+
+    #[test]
+    fn what_has_no_limit_keeps_none() {
+        for singular in ["2*rho*kT + rho^2.6", "rho*kT + rho^2*ln(rho)", "rho*kT + rho^1.9"] {
+            assert!(!curve(singular, 1.0, 1.0).at(0.0)[1].is_finite(), "{singular}");
+        }
     }
 
     #[test]

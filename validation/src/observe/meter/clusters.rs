@@ -1,6 +1,6 @@
 use super::Meter;
 use crate::observe::frame::Frame;
-use crate::observe::keys::{Key, Table};
+use crate::observe::keys::{Key, Need, Table, ValueKind, key};
 use crate::observe::observation::{Kind, Observation};
 use crate::observe::request::Options;
 use crate::observe::series::{Measured, Series};
@@ -53,13 +53,13 @@ pub(super) fn sizes(labels: &[Option<usize>]) -> Vec<usize> {
     sizes
 }
 
-pub(super) const DISTANCE: Key = Key {
-    name: "distance",
-    value: "positive number, at most half the box",
-    default: "the longest range of a conservative interaction",
-    about: "Particles closer than this are of one cluster.",
-    example: "0.8",
-};
+pub(super) const DISTANCE: Key = key(
+    "distance",
+    ValueKind::Words("positive number, at most half the box"),
+    Need::Default("the longest range of a conservative interaction"),
+    "Particles closer than this are of one cluster.",
+    "0.8",
+);
 
 /// The distance that makes clusters.
 pub(super) fn read_distance(options: &Options) -> Result<f64, FileError> {
@@ -87,28 +87,30 @@ pub struct Clusters {
 
 impl Meter for Clusters {
     const TABLE: Table = Table {
-        name: "clusters",
+        path: "clusters",
         title: "clusters by distance",
+        array: false,
+        forms: ("", &[]),
         about: "Particles closer than `distance` are of one cluster, and so are their clusters (union-find). `count` of \
                 the clusters of at least `smallest` particles, `largest` and `mean_size` (the mean of the sizes in a \
                 sample, 0 if there are none). `clusters_series` has them against time, in means over blocks of \
                 samples when there are more than 511.",
         keys: &[
             DISTANCE,
-            Key {
-                name: "species",
-                value: "name of a species",
-                default: "all",
-                about: "Which particles take part.",
-                example: "\"A\"",
-            },
-            Key {
-                name: "smallest",
-                value: "whole number from 1",
-                default: "1",
-                about: "Particles in the smallest cluster that counts.",
-                example: "10",
-            },
+            key(
+                "species",
+                ValueKind::Words("name of a species"),
+                Need::Default("all"),
+                "Which particles take part.",
+                "\"A\"",
+            ),
+            key(
+                "smallest",
+                ValueKind::Words("whole number from 1"),
+                Need::Default("1"),
+                "Particles in the smallest cluster that counts.",
+                "10",
+            ),
         ],
     };
 

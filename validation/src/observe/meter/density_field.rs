@@ -1,10 +1,11 @@
 use super::Meter;
 use crate::observe::frame::Frame;
-use crate::observe::keys::{Key, Table};
+use crate::observe::keys::{Need, Table, ValueKind};
 use crate::observe::observation::{Kind, Observation};
 use crate::observe::request::Options;
 use crate::observe::series::Series;
 use psidpd_core::document::FileError;
+use psidpd_core::keys;
 use serde::{Deserialize, Serialize};
 
 /// Rows of fields that are kept for error bars.
@@ -25,28 +26,22 @@ pub struct DensityField {
 
 impl Meter for DensityField {
     const TABLE: Table = Table {
-        name: "density_field",
+        path: "density_field",
         title: "density on a plane",
+        array: false,
+        forms: ("", &[]),
         about: "Number density in columns of the box, averaged over `axis`, of all particles and of each of several \
                 species: a map of drops, films and domains that stay where they are. The first two columns are the \
                 middles of the cells, the later of the two directions running fastest. The box must have right \
                 angles.",
-        keys: &[
-            Key {
-                name: "axis",
-                value: "`\"x\"`, `\"y\"` or `\"z\"`",
-                default: "y; none in two dimensions",
-                about: "The direction that is averaged over.",
-                example: "\"x\"",
-            },
-            Key {
-                name: "bins",
-                value: "array of two whole numbers from 1 to 2000",
-                default: "as many as make them 0.25 wide, or a little less",
-                about: "Cells along the other two directions, in their order.",
-                example: "[10, 20]",
-            },
-        ],
+        keys: keys! {
+            "axis": ValueKind::Words("`\"x\"`, `\"y\"` or `\"z\"`"), Need::Default("y; none in two dimensions"),
+                "The direction that is averaged over."
+                => "\"x\"";
+            "bins": ValueKind::Words("array of two whole numbers from 1 to 2000"), Need::Default("as many as make them 0.25 wide, or a little less"),
+                "Cells along the other two directions, in their order."
+                => "[10, 20]";
+        },
     };
 
     fn read(options: &Options) -> Result<DensityField, FileError> {

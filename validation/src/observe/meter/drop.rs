@@ -2,7 +2,7 @@ use super::Meter;
 use super::clusters::{DISTANCE, label, read_distance, sizes};
 use super::rdf::shell_volume;
 use crate::observe::frame::Frame;
-use crate::observe::keys::{Key, Table};
+use crate::observe::keys::{Need, Table, ValueKind, key};
 use crate::observe::observation::{Kind, Observation};
 use crate::observe::profile::flank_interface;
 use crate::observe::request::Options;
@@ -149,8 +149,10 @@ impl Drop {
 
 impl Meter for Drop {
     const TABLE: Table = Table {
-        name: "drop",
+        path: "drop",
         title: "radius and Laplace pressure of a drop",
+        array: false,
+        forms: ("", &[]),
         about: "The drop is the largest cluster of particles closer than `distance`, its centre the circular mean of \
                 them. `drop_profile`: `density`, and the spherical Irving–Kirkwood pressures with the conservative \
                 forces, `normal` P_N(r) and `tangential` P_T(r), the force of each pair spread over the straight line \
@@ -162,20 +164,20 @@ impl Meter for Drop {
                 time.",
         keys: &[
             DISTANCE,
-            Key {
-                name: "range",
-                value: "positive number, at most half the box",
-                default: "half the box",
-                about: "Radius of the largest shell.",
-                example: "2.0",
-            },
-            Key {
-                name: "bins",
-                value: "whole number from 12 to 10000",
-                default: "as many as make them 0.1 thick, or a little less",
-                about: "How many shells.",
-                example: "30",
-            },
+            key(
+                "range",
+                ValueKind::Words("positive number, at most half the box"),
+                Need::Default("half the box"),
+                "Radius of the largest shell.",
+                "2.0",
+            ),
+            key(
+                "bins",
+                ValueKind::Words("whole number from 12 to 10000"),
+                Need::Default("as many as make them 0.1 thick, or a little less"),
+                "How many shells.",
+                "30",
+            ),
         ],
     };
 

@@ -1,10 +1,11 @@
 use super::Meter;
 use crate::observe::frame::Frame;
-use crate::observe::keys::{Key, Table};
+use crate::observe::keys::{Need, Table, ValueKind};
 use crate::observe::observation::{Kind, Observation};
 use crate::observe::request::Options;
 use crate::observe::series::Series;
 use psidpd_core::document::{FileError, FileErrorKind};
+use psidpd_core::keys;
 use psidpd_core::model::kernel::Kernel;
 use serde::{Deserialize, Serialize};
 
@@ -50,37 +51,27 @@ fn shell_integrals(kernel: &Kernel, dimensions: usize) -> Vec<f64> {
 
 impl Meter for LocalDensity {
     const TABLE: Table = Table {
-        name: "local_density",
+        path: "local_density",
         title: "distribution of a weighted local density",
+        array: false,
+        forms: ("", &[]),
         about: "P(n) of n = Σ_j w(r_ij), of all species, at the particles of each species: `p_SPECIES` (`p` with one), \
                 normalised to 1. `local_density_means`: for species B at A, `mean_A_B` = ⟨n_B⟩; `relative_A_B` = \
                 ⟨n_B⟩/ρ_B with ρ_B the mean density of the box, N_B − 1 of V for A = B; `wg_A_B` = [w g] = ∫ w g \
                 over the sampled g(r) in 200 shells; `rwg_A_B` = −[r w′ g]/d with the force kernel. Without self term \
                 ⟨n⟩/ρ = [w g] (Trofimov et al., J. Chem. Phys. 117, 9383 (2002)), the two differ by the width of the \
                 shells; −[r w′ g]/d multiplies ψ′ in the virial, and all are 1 if g = 1.",
-        keys: &[
-            Key {
-                name: "density",
-                value: "name of a density of the model",
-                default: "the first",
-                about: "Which density.",
-                example: "\"n\"",
-            },
-            Key {
-                name: "bins",
-                value: "whole number from 1 to 10000",
-                default: "200",
-                about: "Bins of the histogram.",
-                example: "50",
-            },
-            Key {
-                name: "range",
-                value: "positive number",
-                default: "twice the largest n of the first sample",
-                about: "Where the histogram ends; it begins at 0.",
-                example: "20.0",
-            },
-        ],
+        keys: keys! {
+            "density": ValueKind::Words("name of a density of the model"), Need::Default("the first"),
+                "Which density."
+                => "\"n\"";
+            "bins": ValueKind::Words("whole number from 1 to 10000"), Need::Default("200"),
+                "Bins of the histogram."
+                => "50";
+            "range": ValueKind::Words("positive number"), Need::Default("twice the largest n of the first sample"),
+                "Where the histogram ends; it begins at 0."
+                => "20.0";
+        },
     };
 
     fn read(options: &Options) -> Result<LocalDensity, FileError> {

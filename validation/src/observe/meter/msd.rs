@@ -1,10 +1,11 @@
 use super::Meter;
 use crate::observe::frame::Frame;
-use crate::observe::keys::{Key, Table};
+use crate::observe::keys::{Need, Table, ValueKind};
 use crate::observe::observation::{Kind, Observation};
 use crate::observe::request::Options;
 use crate::observe::series::{Measured, Series};
 use psidpd_core::document::FileError;
+use psidpd_core::keys;
 use serde::{Deserialize, Serialize};
 
 /// Mean-square displacement and diffusion by species.
@@ -114,36 +115,26 @@ impl Msd {
 
 impl Meter for Msd {
     const TABLE: Table = Table {
-        name: "msd",
+        path: "msd",
         title: "mean-square displacement and diffusion",
+        array: false,
+        forms: ("", &[]),
         about: "⟨|r(t₀ + t) − r(t₀)|²⟩ of the particles of each species that move, positions unwrapped by the count of boxes travelled, from many \
                 origins t₀: `msd_SPECIES` (`msd` with one). `diffusion`: D from the least-squares slope over the second \
                 half of the times, slope/(2d), for each origin seen to the end; its error is that of the mean over \
                 origins, correlated as they overlap. Memory and checkpoints hold one set of positions for each \
                 origin under way, `length/spacing` of them.",
-        keys: &[
-            Key {
-                name: "length",
-                value: "whole number from 2 to 100000",
-                default: "100",
-                about: "The longest time, in samples.",
-                example: "50",
-            },
-            Key {
-                name: "spacing",
-                value: "whole number from 1 to 100000",
-                default: "a tenth of `length`",
-                about: "Samples between origins.",
-                example: "5",
-            },
-            Key {
-                name: "remove_drift",
-                value: "true or false",
-                default: "false",
-                about: "Whether displacements are those from the centre of mass of all particles.",
-                example: "true",
-            },
-        ],
+        keys: keys! {
+            "length": ValueKind::Words("whole number from 2 to 100000"), Need::Default("100"),
+                "The longest time, in samples."
+                => "50";
+            "spacing": ValueKind::Words("whole number from 1 to 100000"), Need::Default("a tenth of `length`"),
+                "Samples between origins."
+                => "5";
+            "remove_drift": ValueKind::Words("true or false"), Need::Default("false"),
+                "Whether displacements are those from the centre of mass of all particles."
+                => "true";
+        },
     };
 
     fn read(options: &Options) -> Result<Msd, FileError> {

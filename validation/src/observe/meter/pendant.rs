@@ -2,7 +2,7 @@ use super::Meter;
 use super::clusters::{DISTANCE, label, read_distance, sizes};
 use super::drop::circular_centre;
 use crate::observe::frame::Frame;
-use crate::observe::keys::{AXIS, Key, Table};
+use crate::observe::keys::{AXIS, Key, Need, Table, ValueKind, key};
 use crate::observe::observation::{Kind, Observation};
 use crate::observe::request::Options;
 use crate::observe::series::{Measured, Series};
@@ -99,8 +99,10 @@ impl Pendant {
 
 impl Meter for Pendant {
     const TABLE: Table = Table {
-        name: "pendant",
+        path: "pendant",
         title: "isosurface and Bond number of a hanging drop",
+        array: false,
+        forms: ("", &[]),
         about: "Density of the largest cluster's surroundings against the distance from the vertical through its centre \
                 of mass and the height (`pendant_field`: columns `r`, `z`, `density`), the surface where it is \
                 `isodensity` (`pendant_profile`: `radius` against the height), and the solution of Young and Laplace's \
@@ -112,45 +114,45 @@ impl Meter for Pendant {
         keys: &[
             Key {
                 about: "The vertical, along an edge of the box at right angles to the others.",
-                default: "the last direction",
+                need: Need::Default("the last direction"),
                 ..AXIS
             },
-            Key {
-                name: "apex",
-                value: "`\"low\"` or `\"high\"`",
-                default: "`\"low\"`",
-                about: "At which end of the axis the drop ends; it hangs from the other.",
-                example: "\"high\"",
-            },
+            key(
+                "apex",
+                ValueKind::Words("`\"low\"` or `\"high\"`"),
+                Need::Default("`\"low\"`"),
+                "At which end of the axis the drop ends; it hangs from the other.",
+                "\"high\"",
+            ),
             DISTANCE,
-            Key {
-                name: "bins",
-                value: "array of two whole numbers from 4 to 2000",
-                default: "as many as make them 0.25 wide, or a little less",
-                about: "Bins outwards, up to half the box, and along the axis.",
-                example: "[20, 40]",
-            },
-            Key {
-                name: "isodensity",
-                value: "positive number",
-                default: "half the density of the liquid",
-                about: "The density of the surface.",
-                example: "3.0",
-            },
-            Key {
-                name: "part",
-                value: "number from 0.1 to 1",
-                default: "0.8",
-                about: "The part of the height of the surface, from the apex, that is fitted.",
-                example: "0.7",
-            },
-            Key {
-                name: "weight",
-                value: "positive number",
-                default: "none",
-                about: "The force g m on a particle along the axis.",
-                example: "0.02",
-            },
+            key(
+                "bins",
+                ValueKind::Words("array of two whole numbers from 4 to 2000"),
+                Need::Default("as many as make them 0.25 wide, or a little less"),
+                "Bins outwards, up to half the box, and along the axis.",
+                "[20, 40]",
+            ),
+            key(
+                "isodensity",
+                ValueKind::Words("positive number"),
+                Need::Default("half the density of the liquid"),
+                "The density of the surface.",
+                "3.0",
+            ),
+            key(
+                "part",
+                ValueKind::Words("number from 0.1 to 1"),
+                Need::Default("0.8"),
+                "The part of the height of the surface, from the apex, that is fitted.",
+                "0.7",
+            ),
+            key(
+                "weight",
+                ValueKind::Words("positive number"),
+                Need::Default("none"),
+                "The force g m on a particle along the axis.",
+                "0.02",
+            ),
         ],
     };
 

@@ -1,7 +1,7 @@
 use super::Meter;
 use super::across::Across;
 use crate::observe::frame::Frame;
-use crate::observe::keys::{BINS, Key, Table};
+use crate::observe::keys::{BINS, Need, Table, ValueKind, key};
 use crate::observe::observation::{Kind, Observation};
 use crate::observe::request::Options;
 use crate::observe::series::{Measured, Series};
@@ -58,8 +58,10 @@ impl Poiseuille {
 
 impl Meter for Poiseuille {
     const TABLE: Table = Table {
-        name: "poiseuille",
+        path: "poiseuille",
         title: "shear viscosity (periodic Poiseuille flow)",
+        array: false,
+        forms: ("", &[]),
         about: "For a scene with a body force along `flow` that is reversed in the upper half of the box along `axis` \
                 (Backer et al., J. Chem. Phys. 122, 154503 (2005)): v = ρ a z (D − z)/2η in each half of width D, \
                 fitted to the mean velocity in bins by least squares. `viscosity`, and `deviation`, the root mean \
@@ -67,27 +69,27 @@ impl Meter for Poiseuille {
                 steady or not Newtonian. `poiseuille_profile`: `velocity` and `fit`. Jackknife errors. Skip the time \
                 ρD²/(π²η), several times over, in which the flow sets in.",
         keys: &[
-            Key {
-                name: "axis",
-                value: "`\"x\"`, `\"y\"` or `\"z\"`",
-                default: "the direction in which the body force of the scene is reversed",
-                about: "The direction across the flow.",
-                example: "\"z\"",
-            },
-            Key {
-                name: "flow",
-                value: "`\"x\"`, `\"y\"` or `\"z\"`",
-                default: "the direction of the body force of the scene",
-                about: "The direction of the flow.",
-                example: "\"x\"",
-            },
-            Key {
-                name: "acceleration",
-                value: "positive number",
-                default: "that of the body force of the scene",
-                about: "Force over mass in the lower half of the box.",
-                example: "0.05",
-            },
+            key(
+                "axis",
+                ValueKind::Words("`\"x\"`, `\"y\"` or `\"z\"`"),
+                Need::Default("the direction in which the body force of the scene is reversed"),
+                "The direction across the flow.",
+                "\"z\"",
+            ),
+            key(
+                "flow",
+                ValueKind::Words("`\"x\"`, `\"y\"` or `\"z\"`"),
+                Need::Default("the direction of the body force of the scene"),
+                "The direction of the flow.",
+                "\"x\"",
+            ),
+            key(
+                "acceleration",
+                ValueKind::Words("positive number"),
+                Need::Default("that of the body force of the scene"),
+                "Force over mass in the lower half of the box.",
+                "0.05",
+            ),
             BINS,
         ],
     };

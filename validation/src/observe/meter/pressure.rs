@@ -21,8 +21,10 @@ pub struct Pressure {
 
 impl Meter for Pressure {
     const TABLE: Table = Table {
-        name: "pressure",
+        path: "pressure",
         title: "pressure tensor",
+        array: false,
+        forms: ("", &[]),
         about: "P = (Σ m v v + W)/V with the virial W = Σ r_ij ⊗ F_ij, exact with the many-body pair forces. \
                 `conservative` and its components leave drag and noise out of W; `total` has them, as LAMMPS's \
                 `compute pressure`. The two means differ by a term of the order of the time step: the drag of \

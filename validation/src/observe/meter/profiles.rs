@@ -94,8 +94,10 @@ pub struct DensityProfile(Bins);
 
 impl Meter for DensityProfile {
     const TABLE: Table = Table {
-        name: "density_profile",
+        path: "density_profile",
         title: "density along an axis",
+        array: false,
+        forms: ("", &[]),
         about: "Number density in slices of the box: `density`, and `density_SPECIES` of each of several species.",
         keys: KEYS,
     };
@@ -128,8 +130,10 @@ pub struct CompositionProfile(Bins);
 
 impl Meter for CompositionProfile {
     const TABLE: Table = Table {
-        name: "composition_profile",
+        path: "composition_profile",
         title: "composition along an axis",
+        array: false,
+        forms: ("", &[]),
         about: "`fraction_SPECIES`: the mean number of particles of a species in a slice over that of all.",
         keys: KEYS,
     };
@@ -159,8 +163,10 @@ pub struct TemperatureProfile(Bins);
 
 impl Meter for TemperatureProfile {
     const TABLE: Table = Table {
-        name: "temperature_profile",
+        path: "temperature_profile",
         title: "temperature along an axis",
+        array: false,
+        forms: ("", &[]),
         about: "Kinetic kT in slices of the box, about the mean flow of the slice: \
                 (⟨Σ m v²⟩ − ⟨Σ m v⟩²/⟨Σ m⟩)/(d ⟨n⟩). Jackknife errors.",
         keys: KEYS,
@@ -198,8 +204,10 @@ pub struct VelocityProfile(Bins);
 
 impl Meter for VelocityProfile {
     const TABLE: Table = Table {
-        name: "velocity_profile",
+        path: "velocity_profile",
         title: "flow velocity along an axis",
+        array: false,
+        forms: ("", &[]),
         about: "Momentum over mass of a slice, ⟨Σ m v⟩/⟨Σ m⟩: `velocity_x` and so on.",
         keys: KEYS,
     };

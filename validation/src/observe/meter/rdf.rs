@@ -1,12 +1,13 @@
 use super::Meter;
 use super::species_pairs::SpeciesPairs;
 use crate::observe::frame::Frame;
-use crate::observe::keys::{Key, Table};
+use crate::observe::keys::{Need, Table, ValueKind};
 use crate::observe::observation::{Kind, Observation};
 use crate::observe::request::Options;
 use crate::observe::series::Series;
 use psidpd_core::document::FileError;
 use psidpd_core::engine::reference::for_each_pair;
+use psidpd_core::keys;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
@@ -30,27 +31,21 @@ pub(super) fn shell_volume(dimensions: usize, a: f64, b: f64) -> f64 {
 
 impl Meter for Rdf {
     const TABLE: Table = Table {
-        name: "rdf",
+        path: "rdf",
         title: "radial distribution functions",
+        array: false,
+        forms: ("", &[]),
         about: "Pairs in spherical shells (in two dimensions rings) over their number in an ideal gas of as many \
                 particles in the same box, N_A (N_A − 1)/2 or N_A N_B pairs in V: exactly 1 on average in an ideal \
                 gas. `g` of all particles, and `g_A_B` of each two of several species.",
-        keys: &[
-            Key {
-                name: "range",
-                value: "positive number, at most half the box",
-                default: "three times the range of the model, or half the box",
-                about: "Up to which distance.",
-                example: "2.0",
-            },
-            Key {
-                name: "bins",
-                value: "whole number from 1 to 10000",
-                default: "as many as make them 0.02 wide, or a little less",
-                about: "How many shells.",
-                example: "40",
-            },
-        ],
+        keys: keys! {
+            "range": ValueKind::Words("positive number, at most half the box"), Need::Default("three times the range of the model, or half the box"),
+                "Up to which distance."
+                => "2.0";
+            "bins": ValueKind::Words("whole number from 1 to 10000"), Need::Default("as many as make them 0.02 wide, or a little less"),
+                "How many shells."
+                => "40";
+        },
     };
 
     fn read(options: &Options) -> Result<Rdf, FileError> {

@@ -52,8 +52,10 @@ impl StressProfile {
 
 impl Meter for StressProfile {
     const TABLE: Table = Table {
-        name: "stress_profile",
+        path: "stress_profile",
         title: "pressure tensor along an axis (Irving–Kirkwood)",
+        array: false,
+        forms: ("", &[]),
         about: "P_N and P_T in slices of the box with the conservative forces: momenta where the particles are, the \
                 force of each pair, many-body part included, spread evenly over the straight line from i to j \
                 (Irving and Kirkwood, J. Chem. Phys. 18, 817 (1950)). `normal`, `tangential` (the mean of the other \

@@ -1,12 +1,13 @@
 use super::Meter;
 use super::species_pairs::SpeciesPairs;
 use crate::observe::frame::Frame;
-use crate::observe::keys::{Key, Table};
+use crate::observe::keys::{Need, Table, ValueKind};
 use crate::observe::observation::{Kind, Observation};
 use crate::observe::request::Options;
 use crate::observe::series::Series;
 use psidpd_core::document::FileError;
 use psidpd_core::engine::PeriodicBox;
+use psidpd_core::keys;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
@@ -38,35 +39,25 @@ fn reciprocal(domain: &PeriodicBox) -> [[f64; 3]; 3] {
 
 impl Meter for StructureFactor {
     const TABLE: Table = Table {
-        name: "structure_factor",
+        path: "structure_factor",
         title: "structure factors",
+        array: false,
+        forms: ("", &[]),
         about: "Direct sums over the wave vectors of the periodic box, averaged over shells of about equal |k|: `s` \
                 = ⟨|Σ exp(ik·r)|²⟩/N of all particles, and of each two of several species `s_A_B` = \
                 ⟨Re ρ_A(k) ρ_B(−k)⟩/√(N_A N_B) (Ashcroft and Langreth). Shells with many vectors keep an even \
                 choice of them, one of each ±k. The box must be periodic.",
-        keys: &[
-            Key {
-                name: "range",
-                value: "positive number",
-                default: "20, or less in a large box",
-                about: "The largest |k|.",
-                example: "9.0",
-            },
-            Key {
-                name: "bins",
-                value: "whole number from 1 to 1000",
-                default: "as many as make shells as wide as the shortest wave vector is long, at most 100",
-                about: "Shells up to the largest |k|.",
-                example: "10",
-            },
-            Key {
-                name: "vectors",
-                value: "whole number from 1 to 10000",
-                default: "24",
-                about: "The most wave vectors in a shell.",
-                example: "6",
-            },
-        ],
+        keys: keys! {
+            "range": ValueKind::Words("positive number"), Need::Default("20, or less in a large box"),
+                "The largest |k|."
+                => "9.0";
+            "bins": ValueKind::Words("whole number from 1 to 1000"), Need::Default("as many as make shells as wide as the shortest wave vector is long, at most 100"),
+                "Shells up to the largest |k|."
+                => "10";
+            "vectors": ValueKind::Words("whole number from 1 to 10000"), Need::Default("24"),
+                "The most wave vectors in a shell."
+                => "6";
+        },
     };
 
     fn read(options: &Options) -> Result<StructureFactor, FileError> {

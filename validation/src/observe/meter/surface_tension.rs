@@ -1,7 +1,7 @@
 use super::Meter;
 use super::across::Across;
 use crate::observe::frame::Frame;
-use crate::observe::keys::{AXIS, Key, Table};
+use crate::observe::keys::{AXIS, Need, Table, ValueKind, key};
 use crate::observe::observation::{Kind, Observation};
 use crate::observe::request::Options;
 use crate::observe::series::Series;
@@ -47,8 +47,10 @@ fn stretched_energy(frame: &Frame, axis: usize, change: f64) -> f64 {
 
 impl Meter for SurfaceTension {
     const TABLE: Table = Table {
-        name: "surface_tension",
+        path: "surface_tension",
         title: "surface tension of a slab, by stress and by free energy",
+        array: false,
+        forms: ("", &[]),
         about: "`stress` is (L/m)(P_N − P_T) with the conservative stress of the whole box, m the number of interfaces, \
                 P_T the mean of the other directions; `stress_total` has drag and noise too. `free_energy` is the \
                 test-area method (Gloor et al., J. Chem. Phys. 123, 134703 (2005)): configurations are stretched \
@@ -57,20 +59,20 @@ impl Meter for SurfaceTension {
                 routes agree in equilibrium. ε should be small enough that ΔU stays below kT. In two dimensions the area is a length.",
         keys: &[
             AXIS,
-            Key {
-                name: "interfaces",
-                value: "whole number from 1 to 1000",
-                default: "2",
-                about: "How many interfaces are normal to the axis.",
-                example: "1",
-            },
-            Key {
-                name: "perturbation",
-                value: "number from 1e-7 to 0.1",
-                default: "0.0001",
-                about: "ε, the relative change of the area.",
-                example: "5e-4",
-            },
+            key(
+                "interfaces",
+                ValueKind::Words("whole number from 1 to 1000"),
+                Need::Default("2"),
+                "How many interfaces are normal to the axis.",
+                "1",
+            ),
+            key(
+                "perturbation",
+                ValueKind::Words("number from 1e-7 to 0.1"),
+                Need::Default("0.0001"),
+                "ε, the relative change of the area.",
+                "5e-4",
+            ),
         ],
     };
 

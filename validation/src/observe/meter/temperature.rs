@@ -1,4 +1,5 @@
 use super::Meter;
+use crate::observe::configurational;
 use crate::observe::frame::Frame;
 use crate::observe::keys::Table;
 use crate::observe::observation::{Kind, Observation};
@@ -18,8 +19,10 @@ pub struct Temperature {
 
 impl Meter for Temperature {
     const TABLE: Table = Table {
-        name: "temperature",
+        path: "temperature",
         title: "temperature, kinetic and configurational",
+        array: false,
+        forms: ("", &[]),
         about: "`kinetic` is 2K/(d(N − 1)). `configurational` is ⟨Σ F·F⟩/⟨−Σ ∇·F⟩ with the conservative forces alone \
                 (Rugh; Butler et al., J. Chem. Phys. 109, 6519 (1998)), with ∇·F from the second derivatives of ψ, \
                 kernels and pair potentials; φ″ of formulas and tables is the five-point difference of the exact φ′. \
@@ -30,16 +33,7 @@ impl Meter for Temperature {
     };
 
     fn read(options: &Options) -> Result<Temperature, FileError> {
-        let fluid = options.place.fluid;
-        let missing = if !fluid.is_conservative() {
-            "a force of the model has no potential"
-        } else if fluid.force_jumps() {
-            "a force of the model jumps at its range, where its divergence is a delta function"
-        } else if options.half_box() < fluid.conservative_range() {
-            "the box is narrower than twice the range of the forces"
-        } else {
-            ""
-        };
+        let missing = configurational::missing(options.place.fluid, options.place.domain).unwrap_or("");
         let width = if missing.is_empty() { 3 } else { 1 };
         Ok(Temperature { missing: missing.into(), series: Series::new(width) })
     }
@@ -49,15 +43,7 @@ impl Meter for Temperature {
         if !self.missing.is_empty() {
             return self.series.push(&[kinetic]);
         }
-        let evaluation = frame.evaluation();
-        let (mut squares, mut laplacian) = (0.0, 0.0);
-        let laplacians = evaluation.laplacians(frame.evaluator().fluid(), frame.view.species);
-        for (k, (f, l)) in evaluation.forces.iter().zip(laplacians).enumerate() {
-            if frame.moves(k) {
-                squares += f.iter().map(|f| f * f).sum::<f64>();
-                laplacian += l;
-            }
-        }
+        let [squares, laplacian] = configurational::sums(frame);
         self.series.push(&[kinetic, squares, laplacian])
     }
 

@@ -1,12 +1,13 @@
 use super::Meter;
 use super::msd::Clock;
 use crate::observe::frame::Frame;
-use crate::observe::keys::{Key, Table};
+use crate::observe::keys::{Need, Table, ValueKind};
 use crate::observe::observation::{Kind, Observation};
 use crate::observe::request::Options;
 use crate::observe::series::{Measured, Series};
 use psidpd_core::document::FileError;
 use psidpd_core::engine::Want;
+use psidpd_core::keys;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
@@ -76,8 +77,10 @@ fn contraction(a: &[f64; 6], b: &[f64; 6], dimensions: usize) -> f64 {
 
 impl Meter for Viscosity {
     const TABLE: Table = Table {
-        name: "viscosity",
+        path: "viscosity",
         title: "shear viscosity (Green–Kubo)",
+        array: false,
+        forms: ("", &[]),
         about: "η(t) = V/kT ∫₀ᵗ C(t′) dt′ with the autocorrelation C of the shear stress of all forces, drag and noise \
                 included, averaged over all shears: C = ⟨P:P(t)⟩/((d − 1)(d + 2)) of the traceless tensor. Sampled \
                 at every step and summed by the trapezoid rule, this is Einstein and Helfand's slope of the square \
@@ -86,13 +89,11 @@ impl Meter for Viscosity {
                 (2006)). kT is the mean kinetic one. `viscosity` is η at the longest time, which must be past the \
                 decay of C: look at the curve `stress_correlation`, with C in `correlation` and η(t) in `viscosity`. \
                 For a fluid at rest in a periodic box, without interfaces.",
-        keys: &[Key {
-            name: "length",
-            value: "whole number from 2 to 100000",
-            default: "400",
-            about: "The longest time, in steps. A checkpoint holds 128 times as many numbers.",
-            example: "100",
-        }],
+        keys: keys! {
+            "length": ValueKind::Words("whole number from 2 to 100000"), Need::Default("400"),
+                "The longest time, in steps. A checkpoint holds 128 times as many numbers."
+                => "100";
+        },
     };
     const EVERY: Option<u64> = Some(1);
     const EVERY_STEP: bool = true;

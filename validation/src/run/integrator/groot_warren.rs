@@ -1,23 +1,19 @@
-//! The modified velocity Verlet of Groot and Warren: forces at a predicted velocity `v + λΔt f/m`.
+//! The modified velocity Verlet of Groot and Warren, J. Chem. Phys. 107, 4423 (1997).
+//!
+//! ```text
+//! x += Δt v + ½Δt² f/m;  ṽ = v + λΔt f/m;  f′ = F(x, ṽ);  v += ½Δt (f + f′)/m
+//! ```
+//!
+//! λ = ½ is velocity Verlet. Which λ gives the right temperature depends on fluid, drag and Δt; the error stays
+//! of first order. T_kin is that of the velocities at the end of the step.
 
-use super::parts::{Faults, Surroundings, drift, kick, share};
-use super::{Motion, Pool};
+use super::{RunError, Simulation, Want};
 
-pub fn before_forces(mut motion: Motion, dt: f64, lambda: f64, around: Surroundings, pool: &Pool) -> Faults {
-    motion.keep();
-    motion.over_mass(|mass| dt / mass);
-    share(motion, pool, |part, over_mass| {
-        part.kept[0].copy_from_slice(part.v);
-        part.kept[1].copy_from_slice(part.f);
-        drift(part, over_mass, around, |x, v, f, over_mass| {
-            (x + dt * (v + 0.5 * over_mass * f), v + lambda * over_mass * f)
-        });
-    })
-}
+/// That of the paper.
+pub const LAMBDA: f64 = 0.65;
 
-pub fn after_forces(mut motion: Motion, dt: f64, pool: &Pool) -> Faults {
-    motion.over_mass(|mass| 0.5 * dt / mass);
-    share(motion, pool, |part, half| {
-        kick::<true, _>(part, half, |_, f, [before_v, before_f], half| before_v + half * (before_f + f));
-    })
+pub fn step(system: &mut Simulation, dt: f64, want: Want, lambda: f64) -> Result<(), RunError> {
+    system.predict(lambda, dt)?;
+    system.forces_with_thermostat(dt, want)?;
+    system.correct(dt)
 }

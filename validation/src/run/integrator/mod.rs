@@ -1,107 +1,222 @@
-//! Integrators. Each advances positions and velocities by one step around one evaluation of the
-//! forces, and says at which velocities that evaluation sees the particles: the dissipative force
-//! depends on it.
+//! Integrators, each a composition of drift, kick, forces and thermostat, which are the operators of a simulation.
+//!
+//! An integrator is a file here, which states its step, what is exact in it and at which velocity the temperature is
+//! measured; its variant of [`Integrator`], with a line in [`Integrator::ALL`], and one in each of its short functions. Scene
+//! files, `about.json` and the export to LAMMPS take names and keys from there.
 
+mod aboba;
+mod baoab;
+mod coupling;
+mod dpd_vv;
 mod groot_warren;
-mod parts;
+mod lowe_andersen;
+pub(super) mod parts;
+mod peters;
+mod self_consistent;
+mod shardlow;
+mod two_stage;
 mod velocity_verlet;
 
-pub(super) use parts::{Faults, Surroundings};
+pub use coupling::{Coupling, THERMOSTAT_STEPS};
 
-use psidpd_core::engine::Pool;
+use super::error::RunError;
+use super::simulation::Simulation;
+use psidpd_core::engine::Want;
+use psidpd_core::engine::noise::Law;
+use std::fmt;
 
 /// How a step is made.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Integrator {
-    /// Velocity Verlet, as `fix nve` of LAMMPS.
-    ///
-    /// `v += ½Δt f/m; x += Δt v; f = F(x, v); v += ½Δt f/m`. The dissipative force sees the half-step
-    /// velocity.
+    /// Velocity Verlet, as `fix nve` of LAMMPS: drag sees the half-step velocity.
     #[default]
     VelocityVerlet,
-    /// The modified velocity Verlet of Groot and Warren (J. Chem. Phys. 107, 4423 (1997)).
-    ///
-    /// `x += Δt v + ½Δt² f/m; ṽ = v + λΔt f/m; f′ = F(x, ṽ); v += ½Δt (f + f′)/m`. The dissipative
-    /// force sees the predicted velocity `ṽ`; λ = ½ is velocity Verlet.
+    /// The modified velocity Verlet of Groot and Warren: drag sees the velocity predicted with λ.
     GrootWarren {
         /// λ.
         lambda: f64,
     },
+    /// Drag once more from the velocity at the end of the step.
+    DpdVv {
+        /// The noise.
+        noise: Law,
+    },
+    /// Drag from the velocity at the end of the step, which it makes.
+    SelfConsistent {
+        /// The noise.
+        noise: Law,
+    },
+    /// Pair by pair, half explicit and half implicit; then velocity Verlet.
+    ShardlowS1 {
+        /// The noise.
+        noise: Law,
+    },
+    /// The same by halves, before and after.
+    ShardlowS2 {
+        /// The noise.
+        noise: Law,
+    },
+    /// Velocity Verlet, then the Ornstein–Uhlenbeck process of each pair.
+    Peters {
+        /// The noise.
+        noise: Law,
+    },
+    /// Velocity Verlet, then new relative velocities for some pairs.
+    LoweAndersen,
+    /// Drift, kick, thermostat, kick, drift.
+    Aboba(Coupling),
+    /// Kick, drift, thermostat, drift, kick.
+    Baoab(Coupling),
+    /// Two kicks and a half in a step, then the thermostat.
+    TwoStage {
+        /// Share of a step in the first kick and in the last.
+        lambda: f64,
+        /// The thermostat.
+        coupling: Coupling,
+    },
 }
 
-/// The particles that an integrator moves, without ghosts.
-pub(super) struct Motion<'a> {
-    pub x: &'a mut [[f64; 3]],
-    pub v: &'a mut [[f64; 3]],
-    pub f: &'a [[f64; 3]],
-    pub species: &'a [i32],
-    pub image: &'a mut [[i32; 3]],
-    pub mass: &'a [f64],
-    pub before: &'a mut Before,
+/// What is known of an integrator's error in the temperature of configurations, for estimates: `a (ωΔt)⁴ + b κΔt`;
+/// `docs/integrators.md` has the runs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Accuracy {
+    /// `a`.
+    pub stiffness: f64,
+    /// `b`.
+    pub drag: f64,
 }
 
-/// What an integrator keeps over the evaluation of the forces.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Before {
-    /// Velocities and forces of the step before, for integrators that need them again.
-    v: Vec<[f64; 3]>,
-    f: Vec<[f64; 3]>,
-    /// Whether the integrator of the present step does.
-    in_use: bool,
-    /// A number by species.
-    over_mass: Vec<f64>,
-}
-
-impl Motion<'_> {
-    /// Makes room for velocities and forces of before.
-    fn keep(&mut self) {
-        self.before.in_use = true;
-        self.before.v.resize(self.x.len(), [0.0; 3]);
-        self.before.f.resize(self.x.len(), [0.0; 3]);
-    }
-
-    fn keep_nothing(&mut self) {
-        self.before.in_use = false;
-    }
-
-    /// Computes a number of the mass of each species: a division for each, not for each particle.
-    fn over_mass(&mut self, number: impl Fn(f64) -> f64) {
-        self.before.over_mass.clear();
-        self.before.over_mass.extend(self.mass.iter().map(|mass| number(*mass)));
-    }
+/// What LAMMPS has for an integrator.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Counterpart {
+    /// `fix nve`.
+    Nve,
+    /// Nothing.
+    None,
 }
 
 impl Integrator {
-    /// Whether [`Integrator::after_forces`] can be left to the next step, which then does the same in the loop it
-    /// makes anyway.
-    pub(super) fn may_owe(self) -> bool {
-        matches!(self, Integrator::VelocityVerlet)
+    /// Names in scene files, and what they mean with all other keys left out.
+    pub const ALL: [(&str, Integrator); 11] = [
+        ("velocity-verlet", Integrator::VelocityVerlet),
+        ("groot-warren", Integrator::GrootWarren { lambda: groot_warren::LAMBDA }),
+        ("dpd-vv", Integrator::DpdVv { noise: Law::Gaussian }),
+        ("self-consistent", Integrator::SelfConsistent { noise: Law::Gaussian }),
+        ("shardlow-s1", Integrator::ShardlowS1 { noise: Law::Gaussian }),
+        ("shardlow-s2", Integrator::ShardlowS2 { noise: Law::Gaussian }),
+        ("peters", Integrator::Peters { noise: Law::Gaussian }),
+        ("lowe-andersen", Integrator::LoweAndersen),
+        ("aboba", Integrator::Aboba(Coupling::DEFAULT)),
+        ("baoab", Integrator::Baoab(Coupling::DEFAULT)),
+        ("two-stage", Integrator::TwoStage { lambda: two_stage::LAMBDA, coupling: Coupling::DEFAULT }),
+    ];
+
+    /// Its name.
+    pub fn name(&self) -> &'static str {
+        let kind = std::mem::discriminant(self);
+        Integrator::ALL
+            .iter()
+            .find(|(_, other)| std::mem::discriminant(other) == kind)
+            .map_or("", |found| found.0)
     }
 
-    /// From the end of one step to the point where the next needs its forces, with every particle in the box. With
-    /// `owed` [`Integrator::after_forces`] of the step before, of the same `dt`, is still to be done.
-    pub(super) fn before_forces(
-        self,
-        motion: Motion,
-        dt: f64,
-        owed: bool,
-        around: Surroundings,
-        pool: &Pool,
-    ) -> Faults {
-        debug_assert!(!owed || self.may_owe());
+    /// Its λ with the range that is allowed, if it has one.
+    pub fn lambda(&mut self) -> Option<(&mut f64, [f64; 2])> {
         match self {
-            Integrator::VelocityVerlet => velocity_verlet::before_forces(motion, dt, owed, around, pool),
-            Integrator::GrootWarren { lambda } => {
-                groot_warren::before_forces(motion, dt, lambda, around, pool)
-            }
+            Integrator::GrootWarren { lambda } => Some((lambda, [0.0, 1.0])),
+            Integrator::TwoStage { lambda, .. } => Some((lambda, [0.0, 0.5])),
+            _ => None,
         }
     }
 
-    /// From there to the end of the step.
-    pub(super) fn after_forces(self, motion: Motion, dt: f64, pool: &Pool) -> Faults {
+    /// Its thermostat, if that is a choice of its own.
+    pub fn coupling(&mut self) -> Option<&mut Coupling> {
         match self {
-            Integrator::VelocityVerlet => velocity_verlet::after_forces(motion, dt, pool),
-            Integrator::GrootWarren { .. } => groot_warren::after_forces(motion, dt, pool),
+            Integrator::Aboba(coupling) | Integrator::Baoab(coupling) => Some(coupling),
+            Integrator::TwoStage { coupling, .. } => Some(coupling),
+            _ => None,
+        }
+    }
+
+    /// The law of its noise, if that can be chosen: inside the forces it is uniform.
+    pub fn noise(&mut self) -> Option<&mut Law> {
+        match self {
+            Integrator::DpdVv { noise } | Integrator::SelfConsistent { noise } => Some(noise),
+            Integrator::ShardlowS1 { noise } | Integrator::ShardlowS2 { noise } => Some(noise),
+            Integrator::Peters { noise } => Some(noise),
+            other => other.coupling().map(|coupling| &mut coupling.noise),
+        }
+    }
+
+    /// Its errors, roughly: within a factor of three of those runs for one force a step, a guess from energies for two-stage.
+    pub fn accuracy(&self) -> Accuracy {
+        const ONE_FORCE: f64 = 5.0;
+        match self {
+            Integrator::VelocityVerlet => Accuracy { stiffness: ONE_FORCE, drag: 0.25 },
+            Integrator::GrootWarren { .. } => Accuracy { stiffness: ONE_FORCE, drag: 0.12 },
+            Integrator::TwoStage { .. } => Accuracy { stiffness: 0.008, drag: 0.0 },
+            _ => Accuracy { stiffness: ONE_FORCE, drag: 0.0 },
+        }
+    }
+
+    /// What LAMMPS has for it.
+    pub fn in_lammps(&self) -> Counterpart {
+        match self {
+            Integrator::VelocityVerlet => Counterpart::Nve,
+            Integrator::GrootWarren { lambda: 0.5 } => Counterpart::Nve,
+            _ => Counterpart::None,
+        }
+    }
+
+    /// Whether drag and noise act inside the forces; apart from them otherwise.
+    pub(super) fn drag_in_forces(self) -> bool {
+        match self {
+            Integrator::VelocityVerlet | Integrator::GrootWarren { .. } => true,
+            Integrator::DpdVv { .. } | Integrator::SelfConsistent { .. } => true,
+            _ => false,
+        }
+    }
+
+    /// Whether the last forces of a step are those at its end.
+    pub(super) fn forces_at_end(self) -> bool {
+        !matches!(self, Integrator::Aboba(_))
+    }
+
+    /// A step of `dt`, whose number is set. Of `want`, what is computed with the last forces.
+    pub(super) fn step(self, system: &mut Simulation, dt: f64, want: Want) -> Result<(), RunError> {
+        match self {
+            Integrator::VelocityVerlet => velocity_verlet::step(system, dt, want),
+            Integrator::GrootWarren { lambda } => groot_warren::step(system, dt, want, lambda),
+            Integrator::DpdVv { noise } => dpd_vv::step(system, dt, want, noise),
+            Integrator::SelfConsistent { noise } => self_consistent::step(system, dt, want, noise),
+            Integrator::ShardlowS1 { noise } => shardlow::first(system, dt, want, noise),
+            Integrator::ShardlowS2 { noise } => shardlow::second(system, dt, want, noise),
+            Integrator::Peters { noise } => peters::step(system, dt, want, noise),
+            Integrator::LoweAndersen => lowe_andersen::step(system, dt, want),
+            Integrator::Aboba(coupling) => aboba::step(system, dt, want, coupling),
+            Integrator::Baoab(coupling) => baoab::step(system, dt, want, coupling),
+            Integrator::TwoStage { lambda, coupling } => two_stage::step(system, dt, want, lambda, coupling),
+        }
+    }
+}
+
+/// With all that differs from what its name alone means.
+impl fmt::Display for Integrator {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.name())?;
+        let mut this = *self;
+        if let Some((lambda, _)) = this.lambda() {
+            write!(f, ", lambda = {lambda}")?;
+        }
+        if let Some(coupling) = this.coupling() {
+            write!(f, ", thermostat_step = {}", coupling.name())?;
+            if coupling.every > 1 {
+                write!(f, ", thermostat_every = {}", coupling.every)?;
+            }
+        }
+        match this.noise() {
+            Some(Law::Uniform) => write!(f, ", noise = uniform"),
+            _ => Ok(()),
         }
     }
 }

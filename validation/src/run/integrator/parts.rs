@@ -1,7 +1,6 @@
 //! Loops over particles, each thread its part of them: a particle's coordinates depend on nothing but its own
 //! arrays, so that the results are the same for any number of parts.
 
-use super::Motion;
 use crate::run::bounds::Bounds;
 use psidpd_core::engine::{PeriodicBox, Pool, part};
 
@@ -17,6 +16,48 @@ const WORTH: usize = 1024;
 
 /// Velocities whose squares are no infinities, for certain.
 const FINITE: f64 = 1e150;
+
+/// The particles that an integrator moves, without ghosts.
+pub struct Motion<'a> {
+    pub x: &'a mut [[f64; 3]],
+    pub v: &'a mut [[f64; 3]],
+    pub f: &'a [[f64; 3]],
+    pub species: &'a [i32],
+    pub image: &'a mut [[i32; 3]],
+    pub mass: &'a [f64],
+    pub kept: &'a mut Kept,
+}
+
+/// What is kept from loop to loop.
+#[derive(Debug, Clone, Default)]
+pub struct Kept {
+    /// Velocities and forces of the beginning of the step.
+    v: Vec<[f64; 3]>,
+    f: Vec<[f64; 3]>,
+    /// Whether the present step needs them.
+    in_use: bool,
+    /// A number by species.
+    over_mass: Vec<f64>,
+}
+
+impl Motion<'_> {
+    /// Makes room for velocities and forces of before.
+    pub fn keep(&mut self) {
+        self.kept.in_use = true;
+        self.kept.v.resize(self.x.len(), [0.0; 3]);
+        self.kept.f.resize(self.x.len(), [0.0; 3]);
+    }
+
+    pub fn keep_nothing(&mut self) {
+        self.kept.in_use = false;
+    }
+
+    /// Computes a number of the mass of each species: a division for each, not for each particle.
+    pub fn over_mass(&mut self, number: impl Fn(f64) -> f64) {
+        self.kept.over_mass.clear();
+        self.kept.over_mass.extend(self.mass.iter().map(|mass| number(*mass)));
+    }
+}
 
 /// What a particle that has moved may meet.
 #[derive(Debug, Clone, Copy)]
@@ -52,9 +93,9 @@ pub struct Part<'a> {
 
 /// Does `work` with all particles of `motion`.
 pub fn share<'a>(motion: Motion<'a>, pool: &Pool, work: impl Fn(&mut Part, &[f64]) + Sync) -> Faults {
-    let Motion { mut x, mut v, mut f, mut species, mut image, before, .. } = motion;
-    let (kept_v, kept_f) = (&mut before.v[..], &mut before.f[..]);
-    let [mut kept_v, mut kept_f] = if before.in_use { [kept_v, kept_f] } else { Default::default() };
+    let Motion { mut x, mut v, mut f, mut species, mut image, kept, .. } = motion;
+    let (kept_v, kept_f) = (&mut kept.v[..], &mut kept.f[..]);
+    let [mut kept_v, mut kept_f] = if kept.in_use { [kept_v, kept_f] } else { Default::default() };
     let count = x.len();
     let parts = pool.threads().min(count / WORTH).max(1);
     let mut shares = Vec::with_capacity(parts);
@@ -76,7 +117,7 @@ pub fn share<'a>(motion: Motion<'a>, pool: &Pool, work: impl Fn(&mut Part, &[f64
             faults: Faults::default(),
         });
     }
-    let over_mass = &before.over_mass[..];
+    let over_mass = &kept.over_mass[..];
     pool.each(&mut shares, |share| work(share, over_mass));
     // Parts are in the order of particles: the first fault is that of the first part which has one.
     let mut faults = Faults::default();

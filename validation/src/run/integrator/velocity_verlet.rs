@@ -1,31 +1,20 @@
-//! Velocity Verlet with the operations in the order of LAMMPS's `fix nve`, so that trajectories of
-//! the two codes part by rounding of the forces alone.
+//! Velocity Verlet, with the operations in the order of LAMMPS's `fix nve`, so that trajectories of the two codes
+//! part by rounding of the forces alone.
+//!
+//! ```text
+//! v += ½Δt f/m;  x += Δt v;  f = F(x, v);  v += ½Δt f/m
+//! ```
+//!
+//! `F` has drag, at the half-step velocity, and noise in it. The conservative part is of second order; drag sees a velocity
+//! that lacks half a kick, so that temperatures are too high by a term of first order: in an ideal gas of ρ = 3, γ = 4.5
+//! by 5 % at Δt = 0.05. One evaluation of forces, one search for pairs. T_kin is that of the velocities at the
+//! end of the step.
 
-use super::parts::{Faults, Surroundings, drift, kick, share};
-use super::{Motion, Pool};
+use super::{RunError, Simulation, Want};
 
-/// With `owed` the step before has not been ended by [`after_forces`]: its kick comes first, in the same loop.
-pub fn before_forces(mut motion: Motion, dt: f64, owed: bool, around: Surroundings, pool: &Pool) -> Faults {
-    motion.keep_nothing();
-    motion.over_mass(|mass| 0.5 * dt / mass);
-    share(motion, pool, |part, dtfm| {
-        if owed {
-            drift(part, dtfm, around, |x, v, f, dtfm| {
-                let kick = dtfm * f;
-                let v = v + kick + kick;
-                (x + dt * v, v)
-            });
-        } else {
-            drift(part, dtfm, around, |x, v, f, dtfm| {
-                let v = v + dtfm * f;
-                (x + dt * v, v)
-            });
-        }
-    })
-}
-
-pub fn after_forces(mut motion: Motion, dt: f64, pool: &Pool) -> Faults {
-    motion.keep_nothing();
-    motion.over_mass(|mass| 0.5 * dt / mass);
-    share(motion, pool, |part, dtfm| kick::<false, _>(part, dtfm, |v, f, _, dtfm| v + dtfm * f))
+pub fn step(system: &mut Simulation, dt: f64, want: Want) -> Result<(), RunError> {
+    system.kick_and_drift(0.5 * dt, dt)?;
+    system.forces_with_thermostat(dt, want)?;
+    system.defer_kick(0.5 * dt);
+    Ok(())
 }

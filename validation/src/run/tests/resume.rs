@@ -33,12 +33,23 @@ const EVERYTHING: &str = "title = \"all\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 
     [observe]\nevery = 2\nstages = [\"cool\", \"run\"]\nrdf = true\ntemperature = true\nstress_profile = true\n\
     velocity_profile = true\npressure = true\nmsd = { every = 1, length = 4 }\nclusters = { skip = 3 }\n";
 
-fn scenes() -> [Scene; 3] {
+/// One integrator after the other.
+const INTEGRATORS: &str = "\
+    [[stage]]\nname = \"a\"\nsteps = 5\ndt = 0.02\nintegrator = \"aboba\"\nthermostat_every = 2\n\
+    [[stage]]\nname = \"b\"\nsteps = 4\ndt = 0.03\nintegrator = \"two-stage\"\n\
+    [[stage]]\nname = \"c\"\nsteps = 3\nintegrator = \"peters\"\n\
+    [[stage]]\nname = \"d\"\nsteps = 3\nintegrator = \"dpd-vv\"\n\
+    [[stage]]\nname = \"e\"\nsteps = 3\nintegrator = \"baoab\"\nthermostat_step = \"pairwise\"\n\
+    [[stage]]\nname = \"f\"\nsteps = 3\nintegrator = \"shardlow-s2\"\nnoise = \"uniform\"\n\
+    [output]\nthermo = 2\ndump = 3\n";
+
+fn scenes() -> [Scene; 4] {
     let solid = scene_of(&bounded(), "[3.0, 3.0, 3.0]", 6.05, &format!("{STAGES}checkpoint = 4\n")).unwrap();
     let flat = scene_of(VAN_DER_WAALS, "[5.0, 5.0]", 12.0, STAGES).unwrap();
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("m.toml"), SET6).unwrap();
-    [solid, flat, Scene::parse("s.toml", EVERYTHING, folder.path()).unwrap()]
+    let all = Scene::parse("s.toml", EVERYTHING, folder.path()).unwrap();
+    [solid, flat, scene_of(SET6, "[3.0, 3.0, 3.0]", 6.05, INTEGRATORS).unwrap(), all]
 }
 
 /// Every file of a folder and the folders in it, but the one that tells times.
@@ -137,8 +148,8 @@ fn a_run_stopped_after_any_step_ends_in_the_same_bytes() {
 /// by a panic after every step, with its folder as it was at that moment.
 #[test]
 fn a_run_killed_after_any_step_ends_in_the_same_bytes() {
-    let [plain, _, everything] = scenes();
-    for scene in [plain, everything] {
+    let [plain, _, many, everything] = scenes();
+    for scene in [plain, many, everything] {
         killed_after_any_step(&scene);
     }
 }
@@ -230,7 +241,7 @@ fn an_unfinished_run_is_not_overwritten_by_mistake() {
 /// A scene that does not say gets checkpoints by the clock; one that says 0 gets none on the way.
 #[test]
 fn checkpoints_come_when_they_are_due() {
-    let [often, by_the_clock, _] = scenes();
+    let [often, by_the_clock, ..] = scenes();
     let never = scene_of(VAN_DER_WAALS, "[5.0, 5.0]", 12.0, &format!("{STAGES}checkpoint = 0\n")).unwrap();
     let seen = |scene: &Scene, interval: Duration| {
         let folder = tempfile::tempdir().unwrap();
@@ -294,7 +305,7 @@ fn files_that_became_shorter_are_noticed() {
 
 #[test]
 fn other_scenes_do_not_go_on_from_a_checkpoint() {
-    let [scene, flat, _] = scenes();
+    let [scene, flat, ..] = scenes();
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path();
     interrupted(&scene, out, Begin::New, 9);

@@ -43,7 +43,7 @@ fn steps_are_their_formulas() {
                                 x[c] += dt * v[c];
                                 v[c] += 0.5 * dt / mass * new[c];
                             }
-                            Integrator::GrootWarren { .. } => {
+                            _ => {
                                 let over_mass = dt / mass;
                                 x[c] += dt * (v[c] + 0.5 * over_mass * f[k][c]);
                                 v[c] += 0.5 * dt / mass * (f[k][c] + new[c]);

@@ -31,6 +31,7 @@ const ROUND: &[&str] = &["sphere", "cylinder"];
 /// `[initial]`.
 pub const INITIAL: Table = Table {
     path: "initial",
+    title: "",
     array: false,
     forms: ("kind", KINDS),
     about: "One thing to start from: the whole box, a slab, a ball or a cylinder of fluid, or a state that another \
@@ -99,6 +100,7 @@ pub const INITIAL: Table = Table {
 /// `[[part]]`.
 pub const PART: Table = Table {
     path: "part",
+    title: "",
     array: true,
     forms: ("shape", SHAPES),
     about: "Several things to start from, instead of `[initial]`: regions that do not overlap, each filled with \

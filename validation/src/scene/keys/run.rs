@@ -1,11 +1,12 @@
 //! What is done with the particles, and what is written.
 
-use super::scene::INTEGRATOR;
+use super::scene::{INTEGRATOR, LAMBDA, NOISE, THERMOSTAT_EVERY, THERMOSTAT_STEP};
 use super::{Key, OPTIONAL, REQUIRED, Table, ValueKind, axes, key};
 
 /// `[[body_force]]`.
 pub const BODY_FORCE: Table = Table {
     path: "body_force",
+    title: "",
     array: true,
     forms: ("", &[]),
     about: "An acceleration from outside; any number of them, which add up. Potential energies and virials do not \
@@ -51,9 +52,34 @@ const STAGE_INTEGRATOR: Key = Key {
     ..INTEGRATOR
 };
 
+const STAGE_LAMBDA: Key = Key {
+    about: "The parameter of `groot-warren`, from 0 to 1, or of `two-stage`, from 0 to 0.5.",
+    example: "[[stage]]\nname = \"produce\"\nsteps = 1000\nintegrator = \"groot-warren\"\nlambda = 0.5",
+    ..LAMBDA
+};
+
+const STAGE_THERMOSTAT_STEP: Key = Key {
+    about: "The thermostat of the integrator; as at the top level.",
+    example: "[[stage]]\nname = \"produce\"\nsteps = 1000\nintegrator = \"aboba\"\nthermostat_step = \"pairwise\"",
+    ..THERMOSTAT_STEP
+};
+
+const STAGE_THERMOSTAT_EVERY: Key = Key {
+    about: "Steps from one thermostat to the next; as at the top level.",
+    example: "[[stage]]\nname = \"produce\"\nsteps = 1000\nintegrator = \"aboba\"\nthermostat_every = 4",
+    ..THERMOSTAT_EVERY
+};
+
+const STAGE_NOISE: Key = Key {
+    about: "The law of the noise of the integrator; as at the top level.",
+    example: "[[stage]]\nname = \"produce\"\nsteps = 1000\nintegrator = \"aboba\"\nnoise = \"uniform\"",
+    ..NOISE
+};
+
 /// `[[stage]]`.
 pub const STAGE: Table = Table {
     path: "stage",
+    title: "",
     array: true,
     forms: ("", &[]),
     about: "Parts of a run under conditions of their own, one after the other: instead of `steps`.",
@@ -80,13 +106,10 @@ pub const STAGE: Table = Table {
             "[[stage]]\nname = \"produce\"\nsteps = 1000\ndt = 0.005",
         ),
         STAGE_INTEGRATOR,
-        key(
-            "lambda",
-            ValueKind::Number,
-            OPTIONAL,
-            "The parameter of `groot-warren`, from 0 to 1.",
-            "[[stage]]\nname = \"produce\"\nsteps = 1000\nintegrator = \"groot-warren\"\nlambda = 0.5",
-        ),
+        STAGE_LAMBDA,
+        STAGE_THERMOSTAT_STEP,
+        STAGE_THERMOSTAT_EVERY,
+        STAGE_NOISE,
         key(
             "kT",
             ValueKind::Temperature,
@@ -122,6 +145,7 @@ pub const STAGE: Table = Table {
 /// `[output]`.
 pub const OUTPUT: Table = Table {
     path: "output",
+    title: "",
     array: false,
     forms: ("", &[]),
     about: "What a run writes beside its final state.",

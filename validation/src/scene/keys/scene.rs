@@ -1,16 +1,25 @@
 //! Which fluid, in which box.
 
 use super::{Key, OPTIONAL, REQUIRED, Table, ValueKind, key};
+use crate::run::{Integrator, THERMOSTAT_STEPS};
 use crate::scene::domain::BOUNDARIES;
-use crate::scene::stage::INTEGRATORS;
 use psidpd_core::engine::Precision;
+use psidpd_core::engine::noise::Law;
 
 fn boundaries() -> Vec<&'static str> {
     BOUNDARIES.iter().map(|(name, _)| *name).collect()
 }
 
 fn integrators() -> Vec<&'static str> {
-    INTEGRATORS.to_vec()
+    Integrator::ALL.iter().map(|(name, _)| *name).collect()
+}
+
+fn thermostat_steps() -> Vec<&'static str> {
+    THERMOSTAT_STEPS.iter().map(|(name, _)| *name).collect()
+}
+
+fn laws() -> Vec<&'static str> {
+    Law::ALL.iter().map(|(name, _)| *name).collect()
 }
 
 fn precisions() -> Vec<&'static str> {
@@ -22,13 +31,51 @@ pub(super) const INTEGRATOR: Key = key(
     ValueKind::Choice(integrators),
     OPTIONAL,
     "How a step is made; `velocity-verlet` if left out, in which the dissipative force sees the half-step \
-     velocity, as in LAMMPS. `groot-warren` predicts a velocity for it.",
+     velocity, as in LAMMPS. `docs/integrators.md` states each, says what is exact in it and which step it allows.",
     "integrator = \"groot-warren\"",
+);
+
+pub(super) const LAMBDA: Key = key(
+    "lambda",
+    ValueKind::Number,
+    OPTIONAL,
+    "The parameter of `groot-warren`, from 0 to 1, 0.65 if left out, which is velocity Verlet with 0.5; and that of \
+     `two-stage`, from 0 to 0.5, 0.21 if left out.",
+    "integrator = \"groot-warren\"\nlambda = 0.5",
+);
+
+pub(super) const THERMOSTAT_STEP: Key = key(
+    "thermostat_step",
+    ValueKind::Choice(thermostat_steps),
+    OPTIONAL,
+    "The thermostat of `aboba`, `baoab` and `two-stage`; `midpoint` if left out: the implicit midpoint rule over all \
+     pairs at once. `pairwise` is the exact Ornstein–Uhlenbeck process of one pair after the other.",
+    "integrator = \"aboba\"\nthermostat_step = \"pairwise\"",
+);
+
+pub(super) const THERMOSTAT_EVERY: Key = key(
+    "thermostat_every",
+    ValueKind::Count,
+    OPTIONAL,
+    "Steps from one thermostat to the next in `aboba`, `baoab` and `two-stage`, each for as many time steps; 1 if left \
+     out.",
+    "integrator = \"two-stage\"\nthermostat_every = 2",
+);
+
+pub(super) const NOISE: Key = key(
+    "noise",
+    ValueKind::Choice(laws),
+    OPTIONAL,
+    "The law of the noise where it acts apart from the forces; `gaussian` if left out. With `uniform` the distribution of \
+     velocities is not quite that of Maxwell at large time steps. The noise of `velocity-verlet` and \
+     `groot-warren` is uniform, that of `lowe-andersen` Gaussian.",
+    "integrator = \"aboba\"\nnoise = \"uniform\"",
 );
 
 /// The top level.
 pub const TOP: Table = Table {
     path: "",
+    title: "",
     array: false,
     forms: ("", &[]),
     about: "Which fluid, how warm, in which box, for how long. A scene needs a model, kT, a box, something in it \
@@ -97,19 +144,17 @@ pub const TOP: Table = Table {
              for LAMMPS has it if it is given; pair styles are in double precision otherwise.",
             "precision = \"double\"",
         ),
-        key(
-            "lambda",
-            ValueKind::Number,
-            OPTIONAL,
-            "The parameter of `groot-warren`, from 0 to 1; 0.65 if left out. With 0.5 it is velocity Verlet.",
-            "integrator = \"groot-warren\"\nlambda = 0.5",
-        ),
+        LAMBDA,
+        THERMOSTAT_STEP,
+        THERMOSTAT_EVERY,
+        NOISE,
     ],
 };
 
 /// `[box]`.
 pub const BOX: Table = Table {
     path: "box",
+    title: "",
     array: false,
     forms: ("", &[]),
     about: "The box, where it needs more than lengths.",
@@ -136,6 +181,7 @@ pub const BOX: Table = Table {
 /// `[masses]`.
 pub const MASSES: Table = Table {
     path: "masses",
+    title: "",
     array: false,
     forms: ("", &[]),
     about: "Masses of the species; 1, or what a data file says, for those left out.",

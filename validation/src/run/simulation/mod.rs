@@ -1,13 +1,16 @@
+mod operators;
+
+pub(super) use operators::Heat;
+
 use super::bounds::Bounds;
 use super::error::RunError;
-use super::integrator::{Before, Faults, Integrator, Motion, Surroundings};
+use super::integrator::Integrator;
+use super::integrator::parts::Kept;
 use super::reorder::{self, Reordering};
-use crate::particles::State;
-use crate::particles::Tags;
-use crate::particles::{BodyForce, add_body_forces};
+use crate::particles::{BodyForce, State, Tags, add_body_forces};
+use psidpd_core::engine::thermostat::PairThermostat;
 use psidpd_core::engine::{
-    self, Engine, Particles, PassCounts, PeriodicBox, Plan, Pool, Precision, Request, Settings, Step, Tally,
-    Want,
+    self, Engine, Particles, PassCounts, PeriodicBox, Plan, Precision, Request, Settings, Step, Tally, Want,
 };
 use psidpd_core::model::Model;
 use std::sync::OnceLock;
@@ -43,12 +46,26 @@ pub struct Simulation {
     image: Vec<[i32; 3]>,
     forces: Engine,
     tally: Tally,
-    before: Before,
+    /// What Groot and Warren's step keeps over the evaluation of the forces.
+    kept: Kept,
+    kept_forces: Vec<[f64; 3]>,
     bounds: Bounds,
     /// `None` if particles stay in the order that they were given in.
     reordering: Option<Reordering>,
-    /// The step that is not at its end: Δt, and how it is made.
-    owed: Option<(f64, Integrator)>,
+    /// The time of a kick that ends the present step and is still to be made.
+    deferred: Option<f64>,
+    /// The thermostat apart from the forces; `None` if the fluid has none.
+    coupling: Option<PairThermostat>,
+    /// Counts changes of positions, and of their order.
+    moves: u64,
+    /// Of which positions the thermostat knows the pairs, for what time, and whether with distances.
+    found_pairs: Option<(u64, f64, bool)>,
+    /// Virial of the thermostat's impulses in the present step.
+    impulse_virial: [f64; 6],
+    /// Whether drag and noise are among the forces, where the thermostat acts; `None` if the integrator must know.
+    drag_in_forces: Option<bool>,
+    /// Whether the forces are those of other positions than the present ones.
+    stale: bool,
     frozen_tags: Tags,
     /// By particle; empty if none is frozen.
     frozen: Vec<bool>,
@@ -75,6 +92,7 @@ impl Simulation {
         }
         let settings = Settings { precision: Precision::Double, ..Settings::default() };
         let forces = Engine::new(&fluid, settings)?;
+        let coupling = PairThermostat::new(forces.plan(), kt);
         let State { domain, mass, mut x, v, species, tag, mut image } = state;
         let owned = x.len();
         for (x, image) in x.iter_mut().zip(&mut image) {
@@ -100,10 +118,17 @@ impl Simulation {
             image,
             forces,
             tally: Tally::default(),
-            before: Before::default(),
+            kept: Kept::default(),
+            kept_forces: Vec::new(),
+            coupling,
+            moves: 0,
+            found_pairs: None,
+            impulse_virial: [0.0; 6],
+            drag_in_forces: None,
+            stale: false,
             bounds: Bounds::of(&domain, fluid.dimensions),
             reordering: None,
-            owed: None,
+            deferred: None,
             frozen_tags: Tags::none(),
             frozen: Vec::new(),
             mobile: owned,
@@ -126,6 +151,8 @@ impl Simulation {
             self.forces = Engine::with_pool(&self.model.at(kt)?, settings, pool)?;
             self.forces.use_reference_only(self.reference_only);
             self.kt = kt;
+            self.coupling = PairThermostat::new(self.forces.plan(), kt);
+            self.found_pairs = None;
         }
         Ok(())
     }
@@ -164,6 +191,7 @@ impl Simulation {
             return;
         };
         let Some(order) = forces.order().filter(|order| order.len() == self.owned) else { return };
+        self.found_pairs = None;
         let pool = forces.pool();
         reordering.vectors(pool, order, x);
         reordering.vectors(pool, order, v);
@@ -222,6 +250,11 @@ impl Simulation {
         self.body_forces = forces.to_vec();
     }
 
+    /// Whether there are any.
+    pub fn has_body_forces(&self) -> bool {
+        !self.body_forces.is_empty()
+    }
+
     /// The number that the next forces are keyed by: for a run that goes on from step `number`.
     pub fn set_step_number(&mut self, number: u64) {
         self.number = number;
@@ -249,21 +282,34 @@ impl Simulation {
         self.force.extend_from_slice(forces);
         self.number = number;
         self.earlier_out_of_bounds = out_of_bounds;
-        self.owed = None;
+        self.deferred = None;
+        self.found_pairs = None;
+        self.drag_in_forces = None;
+        self.stale = false;
         self.find_frozen();
     }
 
-    /// Computes the forces of the present step at the present velocities, as a run or a stage needs
-    /// before its first step.
+    /// Computes the forces of the present step at the present velocities, thermostat included, as a run or a stage
+    /// needs before its first step.
     ///
     /// # Errors
     /// As [`Simulation::step`].
     pub fn prepare(&mut self, dt: f64, want: Want) -> Result<(), RunError> {
+        self.prepare_for(Integrator::default(), dt, want)
+    }
+
+    /// The same for steps of an integrator: without thermostat, if it acts apart from the forces there.
+    ///
+    /// # Errors
+    /// As [`Simulation::step`].
+    pub fn prepare_for(&mut self, integrator: Integrator, dt: f64, want: Want) -> Result<(), RunError> {
         self.end_step()?;
-        let step = Step { seed: self.seed, number: self.number, dt };
-        self.compute(want, self.thermostat.then_some(step))?;
-        self.add_external_forces();
-        Ok(())
+        self.impulse_virial = [0.0; 6];
+        self.stale = false;
+        match integrator.drag_in_forces() {
+            true => self.forces_with_thermostat(dt, want),
+            false => self.conservative_forces(want),
+        }
     }
 
     /// Body forces; and none at all on what is frozen, so that every integrator leaves it alone.
@@ -306,14 +352,15 @@ impl Simulation {
         Ok(())
     }
 
-    /// One step of `dt`. The forces of the step before must be there: see [`Simulation::prepare`].
+    /// One step of `dt`. The forces of the step before must be there: see [`Simulation::prepare_for`].
     ///
     /// # Errors
     /// A position, velocity or force that is not finite, ψ singular, or a particle that moved further
     /// than across the box.
     pub fn step(&mut self, dt: f64, integrator: Integrator, want: Want) -> Result<(), RunError> {
         self.begin_step(dt, integrator, want)?;
-        self.end_step()
+        self.end_step()?;
+        if want == Want::FORCES { Ok(()) } else { self.refresh(want) }
     }
 
     /// Steps of `dt` that nothing is wanted of.
@@ -327,8 +374,8 @@ impl Simulation {
         self.end_step()
     }
 
-    /// A step but for the change of velocities that may as well be made when the next begins, with the same bits:
-    /// until then, or until [`Simulation::end_step`], velocities are not those at the end of the step.
+    /// A step but for a kick that may as well be made when the next begins, with the same bits: until then, or until
+    /// [`Simulation::end_step`], velocities are not those at the end of the step.
     ///
     /// # Errors
     /// As [`Simulation::step`].
@@ -336,22 +383,19 @@ impl Simulation {
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(RunError::TimeStep(dt));
         }
-        if self.owed.is_some_and(|owed| owed != (dt, integrator)) {
-            self.end_step()?;
+        let drags = integrator.drag_in_forces();
+        if self.drag_in_forces.is_some_and(|there| there != drags) && self.thermostat {
+            // Forces of another integrator.
+            self.prepare_for(integrator, dt, Want::FORCES)?;
         }
-        let owed = self.owed.take().is_some();
         self.number += 1;
-        let limit = self.longest_move / (dt * dt);
-        let faults = self.split(|motion, (domain, bounds), pool| {
-            integrator.before_forces(motion, dt, owed, Surroundings { domain, bounds, limit }, pool)
-        });
-        self.refuse(faults, Some(dt), owed)?;
-        let step = Step { seed: self.seed, number: self.number, dt };
-        self.compute(want, self.thermostat.then_some(step))?;
-        self.add_external_forces();
-        self.owed = Some((dt, integrator));
-        if !integrator.may_owe() || reorder::is_due(self.number) {
+        self.impulse_virial = [0.0; 6];
+        integrator.step(self, dt, want)?;
+        (0..6).for_each(|c| self.tally.thermostat_virial[c] += self.impulse_virial[c]);
+        self.stale = !integrator.forces_at_end();
+        if reorder::is_due(self.number) {
             self.end_step()?;
+            self.reorder();
         }
         Ok(())
     }
@@ -361,41 +405,22 @@ impl Simulation {
     /// # Errors
     /// A velocity that is not finite.
     pub(super) fn end_step(&mut self) -> Result<(), RunError> {
-        let Some((dt, integrator)) = self.owed.take() else { return Ok(()) };
-        let faults = self.split(|motion, _, pool| integrator.after_forces(motion, dt, pool));
-        self.refuse(faults, None, false)?;
-        if reorder::is_due(self.number) {
-            self.reorder();
+        self.make_deferred_kick()
+    }
+
+    /// Computes what is wanted at the end of the present step, where the integrator has computed forces at other positions
+    /// only; trajectories do not depend on it.
+    ///
+    /// # Errors
+    /// As [`Simulation::compute`].
+    pub(super) fn refresh(&mut self, want: Want) -> Result<(), RunError> {
+        if !self.stale {
+            return Ok(());
         }
+        self.conservative_forces(want)?;
+        self.stale = false;
+        (0..6).for_each(|c| self.tally.thermostat_virial[c] += self.impulse_virial[c]);
         Ok(())
-    }
-
-    /// Calls `work` with what moves, what it moves in, and the threads.
-    fn split(&mut self, work: impl FnOnce(Motion, (&PeriodicBox, &Bounds), &Pool) -> Faults) -> Faults {
-        self.flux.take();
-        let n = self.owned;
-        let motion = Motion {
-            x: &mut self.x[..n],
-            v: &mut self.v[..n],
-            f: &self.force[..n],
-            species: &self.species[..n],
-            image: &mut self.image[..n],
-            mass: &self.mass,
-            before: &mut self.before,
-        };
-        work(motion, (&self.domain, &self.bounds), self.forces.pool())
-    }
-
-    /// Velocities must be finite, which the step before has left to this one if it is `owed`, and within a step of
-    /// `dt` lead nowhere beyond the box.
-    fn refuse(&self, faults: Faults, dt: Option<f64>, owed: bool) -> Result<(), RunError> {
-        let Some(k) = faults.fast.or(faults.escaped) else { return Ok(()) };
-        let (step, tag, v) = (self.number, self.tag[k], self.v[k]);
-        let speed = v[0].hypot(v[1]).hypot(v[2]);
-        match dt {
-            Some(dt) if speed.is_finite() => Err(RunError::Runaway { step, tag, distance: speed * dt }),
-            _ => Err(RunError::Velocity { step: step - u64::from(owed), tag }),
-        }
     }
 
     /// The model.
@@ -489,7 +514,7 @@ impl Simulation {
 
     /// Velocities.
     pub fn velocities(&self) -> &[[f64; 3]] {
-        debug_assert!(self.owed.is_none(), "a step is not at its end");
+        debug_assert!(self.deferred.is_none(), "a step is not at its end");
         &self.v[..self.owned]
     }
 

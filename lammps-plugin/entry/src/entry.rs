@@ -1,0 +1,182 @@
+//! What registers the styles: `lammpsplugin_init`, which `plugin load` calls, and `psidpd_register` for a
+//! LAMMPS that has no plugins.
+//!
+//! The structure that the former fills is LAMMPS's plugin interface, version one. Functions of LAMMPS are looked up when
+//! they are needed, by their names in its C interface.
+
+use crate::styles;
+use crate::table::Creator;
+use crate::version;
+use std::ffi::{CString, c_char, c_int, c_void};
+use std::sync::OnceLock;
+
+/// The LAMMPS the styles were compiled for, as `lammps_version()` counts: 20250722.
+const BUILT_FOR: &str = env!("PSIDPD_LAMMPS_VERSION");
+
+/// LAMMPS's description of a plugin style.
+#[repr(C)]
+struct Registration {
+    version: *const c_char,
+    style: *const c_char,
+    name: *const c_char,
+    info: *const c_char,
+    author: *const c_char,
+    creator: Option<Creator>,
+    handle: *mut c_void,
+}
+
+type Register = unsafe extern "C-unwind" fn(*mut Registration, *mut c_void);
+type Version = unsafe extern "C-unwind" fn(*mut c_void) -> c_int;
+type Setting = unsafe extern "C-unwind" fn(*mut c_void, *const c_char) -> c_int;
+type Error = unsafe extern "C-unwind" fn(*mut c_void, c_int, *const c_char);
+
+/// The LAMMPS that a plugin was built for, as a number and in words.
+fn named(number: &str) -> String {
+    number.parse().map_or_else(|_| number.to_owned(), |n| format!("{n} ({})", version::in_words(n)))
+}
+
+/// Why this plugin must not touch that LAMMPS; None if it was compiled for it.
+///
+/// # Safety
+/// `lmp` is a LAMMPS instance.
+unsafe fn trouble(lmp: *mut c_void) -> Option<String> {
+    let (Some(version), Some(setting)) =
+        (styles::symbol(c"lammps_version"), styles::symbol(c"lammps_extract_setting"))
+    else {
+        return Some(format!(
+            "The psidpd plugin was built for LAMMPS {}, and finds no functions of LAMMPS's C interface here.",
+            named(BUILT_FOR)
+        ));
+    };
+    // SAFETY: these functions have these signatures in every LAMMPS library.
+    let version = unsafe { std::mem::transmute::<*mut c_void, Version>(version) };
+    // SAFETY: as above.
+    let setting = unsafe { std::mem::transmute::<*mut c_void, Setting>(setting) };
+    // SAFETY: `lmp` is a LAMMPS instance, whose layout its own functions know.
+    let (host, tag) = unsafe { (version(lmp), setting(lmp, c"tagint".as_ptr())) };
+    let openmpi = styles::symbol(c"ompi_mpi_comm_world").is_some();
+    let (built, here) = if BUILT_FOR.parse() != Ok(host) {
+        (format!("LAMMPS {}", named(BUILT_FOR)), format!("this is LAMMPS {}", named(&host.to_string())))
+    } else if tag != 4 {
+        ("32-bit atom IDs".to_owned(), format!("this LAMMPS has {}-bit ones", 8 * tag))
+    } else if openmpi != (env!("PSIDPD_MPI") == "openmpi") {
+        // Handles differ in size, and with them the layout of everything in LAMMPS that holds one.
+        ("another MPI than this LAMMPS uses".to_owned(), "the two do not mix".to_owned())
+    } else {
+        return None;
+    };
+    Some(format!(
+        "The psidpd plugin was built for {built}, {here}: its pair styles are not loaded. \
+         Build the plugin for this LAMMPS with 'psidpd lammps plugin'."
+    ))
+}
+
+fn not_loaded(reason: String) -> String {
+    format!(
+        "The pair styles of psidpd are not loaded: {reason}. Build the plugin again with 'psidpd lammps plugin'."
+    )
+}
+
+/// Registers the pair styles in a LAMMPS that has no `plugin` command: call it with the handle of the
+/// library interface (in Python, `L.lmp`), and again after each `clear`.
+///
+/// Returns null, or a text that says why nothing was registered; the text stays valid.
+///
+/// # Safety
+/// `lmp` is null or a LAMMPS instance of this process.
+#[unsafe(no_mangle)]
+pub unsafe extern "C-unwind" fn psidpd_register(lmp: *mut c_void) -> *const c_char {
+    let table = if lmp.is_null() {
+        Err("psidpd_register: no LAMMPS instance".to_owned())
+    } else {
+        // SAFETY: the caller's promise.
+        match unsafe { trouble(lmp) } {
+            Some(text) => Err(text),
+            None => styles::table().and_then(|table| Ok((table, styles::load()?))).map_err(not_loaded),
+        }
+    };
+    match table {
+        Ok((table, styles)) => {
+            for style in styles {
+                // SAFETY: an instance of the LAMMPS that the C++ was compiled for; it copies the name.
+                unsafe { (table.insert)(lmp, style.name, style.creator) };
+            }
+            std::ptr::null()
+        }
+        Err(text) => {
+            CString::new(text).map_or(c"psidpd_register failed".as_ptr(), |t| t.into_raw().cast_const())
+        }
+    }
+}
+
+/// Of LAMMPS's library interface: stop on all ranks.
+const LMP_ERROR_ALL: c_int = 2;
+
+/// Registers the pair styles, unless this plugin was built for another LAMMPS.
+///
+/// # Safety
+/// Called by LAMMPS's `plugin load`, with its own instance, the handle of this library and the
+/// function that registers styles.
+#[unsafe(no_mangle)]
+pub unsafe extern "C-unwind" fn lammpsplugin_init(
+    lmp: *mut c_void,
+    handle: *mut c_void,
+    register: *mut c_void,
+) {
+    // SAFETY: LAMMPS passes its own instance.
+    let found = match unsafe { trouble(lmp) } {
+        Some(text) => Err(text),
+        None => styles::load().map_err(not_loaded),
+    };
+    let styles = match found {
+        Ok(styles) => styles,
+        Err(text) => {
+            // SAFETY: as above.
+            unsafe { refuse(lmp, text) };
+            return;
+        }
+    };
+    // SAFETY: LAMMPS passes its registering function as a plain pointer; a null pointer becomes None.
+    let Some(register) = (unsafe { std::mem::transmute::<*mut c_void, Option<Register>>(register) }) else {
+        return;
+    };
+    for style in styles {
+        let mut registration = Registration {
+            version: version_text(),
+            style: c"pair".as_ptr(),
+            name: style.name,
+            info: style.info,
+            author: c"the psidpd developers".as_ptr(),
+            creator: Some(style.creator),
+            handle,
+        };
+        // SAFETY: LAMMPS copies the registration; its strings are static.
+        unsafe { register(&raw mut registration, lmp) };
+    }
+}
+
+/// The version in LAMMPS's own words, which prints a note where they differ from its own.
+fn version_text() -> *const c_char {
+    static TEXT: OnceLock<CString> = OnceLock::new();
+    let words = || BUILT_FOR.parse().map_or_else(|_| BUILT_FOR.to_owned(), version::in_words);
+    TEXT.get_or_init(|| CString::new(words()).unwrap_or_default()).as_ptr()
+}
+
+/// Says why nothing is loaded, and stops the script if the host can be stopped.
+///
+/// # Safety
+/// `lmp` is a LAMMPS instance.
+unsafe fn refuse(lmp: *mut c_void, text: String) {
+    let Ok(text) = CString::new(text) else { return };
+    let Some(error) = styles::symbol(c"lammps_error") else {
+        // An old library: without the styles the script stops at its pair_style command.
+        eprintln!("ERROR: {}", text.to_string_lossy());
+        return;
+    };
+    // SAFETY: the symbol has this signature in every LAMMPS that has it.
+    let error = unsafe { std::mem::transmute::<*mut c_void, Error>(error) };
+    // LAMMPS throws; the text leaks once, for nothing of ours may unwind it.
+    let text = text.into_raw();
+    // SAFETY: `lmp` is a LAMMPS instance, the text is a C string.
+    unsafe { error(lmp, LMP_ERROR_ALL, text) };
+}

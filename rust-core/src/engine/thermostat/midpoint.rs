@@ -1,0 +1,155 @@
+//! Updates of all pairs at once, by conjugate gradients.
+//!
+//! With `(G v)_i = Σ_j D (ê·v_ij) ê` and `(B ξ)_i = Σ_j √(2kTγ) w_R ξ ê`, the implicit midpoint rule is
+//!
+//! ```text
+//! (M + ½ΔtG) v′ = (M − ½ΔtG) v + √Δt B ξ.
+//! ```
+//!
+//! As `⟨Bξ ξᵀBᵀ⟩ = 2kT G`, it maps the covariance `kT M⁻¹` to itself: the Maxwell distribution is kept exactly at any
+//! Δt, γ and mass, if ξ is normal; with any other ξ of unit variance its covariance is. Momentum is kept to rounding,
+//! and nothing depends on an order of pairs.
+//!
+//! What is solved is `(M + K) δ = √kT Σ ξ g − K v` with `K = ½ΔtG`, and `v′ = v + 2δ`. The matrix is symmetric and
+//! positive, and its condition at most `1 + 2ΔtΣD/m`: each iteration is one pass over the pairs. It ends when the
+//! residual, in the norm of M⁻¹, is below [`TOLERANCE`] of what it was. Residuals of conjugate gradients are orthogonal
+//! to what was searched before, so that the error of the temperature is of the order of the square of that.
+
+use super::PairThermostat;
+use super::pass::{Sums, Terms, Wide, add_to_host, virial};
+use super::planes::Plane;
+use crate::engine::sweep::Pool;
+
+/// Relative residual at which iterations end.
+pub const TOLERANCE: f64 = 1e-4;
+
+/// Most iterations: beyond, drag is so strong that rounding ends them.
+const MOST: usize = 500;
+
+/// Vectors of the particles of one plane.
+#[derive(Debug, Clone, Default)]
+pub struct Part {
+    /// `(M + K) p`.
+    image: Vec<Wide>,
+    residual: Vec<Wide>,
+    solution: Vec<Wide>,
+    /// Sum of a scalar product over the plane.
+    sum: f64,
+}
+
+/// A plane at work.
+struct Share<'a> {
+    number: usize,
+    mass: &'a [f64],
+    p: &'a [Wide],
+    part: &'a mut Part,
+}
+
+/// Does `work` for every plane; the sum of the scalar products, in the order of the planes.
+fn each(
+    pool: &Pool,
+    planes: &[Plane],
+    mass: &[f64],
+    p: &[Wide],
+    parts: &mut [Part],
+    work: impl Fn(&mut Share) + Sync,
+) -> f64 {
+    let share = |((number, plane), part): ((usize, &Plane), _)| {
+        let own = plane.own.clone();
+        Share { number, mass: &mass[own.clone()], p: &p[own], part }
+    };
+    let mut shares: Vec<Share> = planes.iter().enumerate().zip(parts).map(share).collect();
+    pool.each(&mut shares, work);
+    shares.iter().map(|share| share.part.sum).sum()
+}
+
+impl PairThermostat {
+    /// The midpoint rule with noise; without, the implicit Euler rule of drag alone.
+    pub(super) fn implicit(&mut self, pool: &Pool, v: &mut [[f64; 3]], noise: bool) -> [f64; 6] {
+        let PairThermostat { planes, cells, mass, sums, parts, kt, iterations, .. } = self;
+        let (planes, mass) = (&planes[..], &mass[..]);
+        parts.resize_with(planes.len(), Part::default);
+        let start = Terms { noise: if noise { kt.sqrt() } else { 0.0 }, drag: 1.0 };
+        sums.gather(&cells.order, v);
+        sums.compute(pool, planes, start);
+        let first = each(pool, planes, mass, &sums.p, parts, |Share { number, mass, part, .. }| {
+            part.residual.clear();
+            part.residual.extend(sums.of(planes, *number));
+            part.solution.clear();
+            part.solution.resize(mass.len(), [0.0; 4]);
+            part.sum = part.residual.iter().zip(*mass).map(|(r, m)| dot(r, r) / m).sum();
+        });
+        direct(pool, planes, mass, sums, parts, 0.0);
+        let mut now = first;
+        *iterations = 0;
+        while now > TOLERANCE * TOLERANCE * first && *iterations < MOST {
+            *iterations += 1;
+            sums.compute(pool, planes, Terms { noise: 0.0, drag: -1.0 });
+            let curvature = each(pool, planes, mass, &sums.p, parts, |Share { number, mass, p, part }| {
+                part.image.clear();
+                part.sum = 0.0;
+                for ((p, m), drag) in p.iter().zip(*mass).zip(sums.of(planes, *number)) {
+                    // What is frozen has no p.
+                    let inertia = if m.is_finite() { *m } else { 0.0 };
+                    let image = [0, 1, 2, 3].map(|c| inertia * p[c] + drag[c]);
+                    part.sum += dot(p, &image);
+                    part.image.push(image);
+                }
+            });
+            let alpha = now / curvature;
+            let next = each(pool, planes, mass, &sums.p, parts, |Share { mass, p, part, .. }| {
+                let Part { image, residual, solution, sum } = &mut **part;
+                *sum = 0.0;
+                for ((((image, r), s), p), m) in image.iter().zip(residual).zip(solution).zip(*p).zip(*mass) {
+                    for c in 0..4 {
+                        s[c] += alpha * p[c];
+                        r[c] -= alpha * image[c];
+                    }
+                    *sum += dot(r, r) / m;
+                }
+            });
+            direct(pool, planes, mass, sums, parts, next / now);
+            now = next;
+        }
+        let mut of_planes = sums.of_planes(planes);
+        for (p, part) in of_planes.iter_mut().zip(parts.iter()) {
+            p.copy_from_slice(&part.solution);
+        }
+        // A midpoint is half of the way.
+        let factor = if noise { 2.0 } else { 1.0 };
+        let wants_virial = planes.iter().any(|plane| !plane.stretch.is_empty());
+        add_to_host(pool, &cells.place, &sums.p, 1.0, v);
+        if !wants_virial {
+            add_to_host(pool, &cells.place, &sums.p, factor - 1.0, v);
+            return [0.0; 6];
+        }
+        let solution = sums.p.clone();
+        sums.gather(&cells.order, v);
+        sums.close(planes);
+        let scale = 2.0 / self.dt;
+        let virial = virial(pool, planes, sums, Terms { noise: scale * start.noise, drag: scale });
+        add_to_host(pool, &cells.place, &solution, factor - 1.0, v);
+        virial
+    }
+}
+
+/// Makes the next direction, `p ← M⁻¹ r + beta p`.
+fn direct(pool: &Pool, planes: &[Plane], mass: &[f64], sums: &mut Sums, parts: &[Part], beta: f64) {
+    let mut shares: Vec<_> = sums
+        .of_planes(planes)
+        .into_iter()
+        .zip(planes.iter().zip(parts))
+        .map(|(p, (plane, part))| (p, &mass[plane.own.clone()], &part.residual))
+        .collect();
+    pool.each(&mut shares, |(p, mass, residual)| {
+        for ((p, m), r) in p.iter_mut().zip(*mass).zip(*residual) {
+            for c in 0..4 {
+                p[c] = r[c] / m + if beta == 0.0 { 0.0 } else { beta * p[c] };
+            }
+        }
+    });
+}
+
+fn dot(a: &Wide, b: &Wide) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}

@@ -1,0 +1,217 @@
+//! One pass over the pairs: `Σ_j g (a ξ − b g·(p_i − p_j))` for every particle `i`.
+//!
+//! A plane adds to its own particles and to those of the next in a buffer of its own, so that the order of each sum is
+//! fixed, whichever thread makes it.
+
+use super::PairThermostat;
+use super::planes::Plane;
+use crate::engine::sweep::{Pool, part};
+
+/// A vector with room to be a vector of the processor.
+pub type Wide = [f64; 4];
+
+/// `a` and `b`.
+#[derive(Debug, Clone, Copy)]
+pub struct Terms {
+    pub noise: f64,
+    pub drag: f64,
+}
+
+/// What all planes add, and what they add it for.
+#[derive(Debug, Clone, Default)]
+pub struct Sums {
+    /// By sorted particle; behind them once more those of the first plane, which the last one sees.
+    pub p: Vec<Wide>,
+    /// By plane: of its own particles, then of those of the next.
+    of_plane: Vec<Vec<Wide>>,
+}
+
+impl Sums {
+    /// Puts the vectors `v` of the host in order.
+    pub fn gather(&mut self, order: &[u32], v: &[[f64; 3]]) {
+        self.p.clear();
+        self.p.extend(order.iter().map(|k| {
+            let [x, y, z] = v[*k as usize];
+            [x, y, z, 0.0]
+        }));
+    }
+
+    /// The vectors of each plane, to be written.
+    pub fn of_planes<'a>(&'a mut self, planes: &[Plane]) -> Vec<&'a mut [Wide]> {
+        let count = planes.last().map_or(0, |plane| plane.own.end);
+        self.p.truncate(count);
+        let mut rest = &mut self.p[..];
+        planes.iter().map(|p| rest.split_off_mut(..p.own.len()).unwrap_or_default()).collect()
+    }
+
+    /// Puts what the last plane sees of the first behind the others.
+    pub fn close(&mut self, planes: &[Plane]) {
+        let Some(last) = planes.last() else { return };
+        self.p.truncate(last.own.end);
+        self.p.extend_from_within(last.next.clone());
+    }
+
+    /// Computes the sums.
+    pub fn compute(&mut self, pool: &Pool, planes: &[Plane], terms: Terms) {
+        self.close(planes);
+        let Sums { p, of_plane } = self;
+        of_plane.resize_with(planes.len(), Vec::new);
+        let mut work: Vec<_> = planes.iter().zip(of_plane).collect();
+        let p = &p[..];
+        pool.each(&mut work, |(plane, sums)| plane.add(p, terms, sums));
+    }
+
+    /// The sums of the particles of a plane.
+    pub fn of(&self, planes: &[Plane], number: usize) -> impl Iterator<Item = Wide> {
+        let below = match number {
+            0 => planes.len() - 1,
+            number => number - 1,
+        };
+        let own = &self.of_plane[number][..planes[number].own.len()];
+        let from_below = match planes[below].next == planes[number].own {
+            true => &self.of_plane[below][planes[below].own.len()..],
+            false => &[],
+        };
+        let zeros = std::iter::repeat(&[0.0; 4]);
+        own.iter().zip(from_below.iter().chain(zeros)).map(|(a, b)| [0, 1, 2, 3].map(|c| a[c] + b[c]))
+    }
+}
+
+impl Plane {
+    fn add(&self, p: &[Wide], terms: Terms, sums: &mut Vec<Wide>) {
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            return unsafe { self.add_avx2(p, terms, sums) };
+        }
+        self.add_portably(p, terms, sums);
+    }
+
+    /// The same operations in wider vectors; nothing is contracted, so the bits are the same.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn add_avx2(&self, p: &[Wide], terms: Terms, sums: &mut Vec<Wide>) {
+        self.add_portably(p, terms, sums);
+    }
+
+    #[inline(always)]
+    fn add_portably(&self, p: &[Wide], terms: Terms, sums: &mut Vec<Wide>) {
+        sums.clear();
+        sums.resize(self.own.len() + self.next.len(), [0.0; 4]);
+        match terms.noise == 0.0 {
+            true => self.add_pairs::<false>(p, terms, sums),
+            false => self.add_pairs::<true>(p, terms, sums),
+        }
+    }
+
+    #[inline(always)]
+    fn add_pairs<const NOISE: bool>(&self, p: &[Wide], Terms { noise, drag }: Terms, sums: &mut [Wide]) {
+        let p = &p[self.own.start..][..sums.len()];
+        for (i, ends) in self.start.windows(2).enumerate() {
+            let of_i = ends[0] as usize..ends[1] as usize;
+            let at = p[i];
+            let mut sum = [0.0; 4];
+            let noises = if NOISE { &self.xi[of_i.clone()] } else { &[] };
+            for (k, pair) in self.pairs[of_i].iter().enumerate() {
+                let j = pair.j as usize;
+                let [x, y, z] = pair.g.map(f64::from);
+                let (g, other) = ([x, y, z, 0.0], p[j]);
+                let t: Wide = std::array::from_fn(|c| (at[c] - other[c]) * g[c]);
+                let along = (t[0] + t[2]) + (t[1] + t[3]);
+                let xi = if NOISE { noise * f64::from(noises[k]) } else { 0.0 };
+                let factor = xi - drag * along;
+                let push: Wide = g.map(|g| factor * g);
+                let to = &mut sums[j];
+                for c in 0..4 {
+                    sum[c] += push[c];
+                    to[c] -= push[c];
+                }
+            }
+            for c in 0..4 {
+                sums[i][c] += sum[c];
+            }
+        }
+    }
+
+    /// `Σ r_ij ⊗ F_ij` of the same forces: xx, yy, zz, xy, xz, yz.
+    pub fn virial(&self, p: &[Wide], Terms { noise, drag }: Terms) -> [f64; 6] {
+        let p = &p[self.own.start..];
+        let mut virial = [0.0; 6];
+        if self.stretch.is_empty() {
+            return virial;
+        }
+        for (i, ends) in self.start.windows(2).enumerate() {
+            for k in ends[0] as usize..ends[1] as usize {
+                let pair = &self.pairs[k];
+                let (g, other) = (pair.g.map(f64::from), p[pair.j as usize]);
+                let along: f64 = (0..3).map(|c| (p[i][c] - other[c]) * g[c]).sum();
+                let xi = self.xi.get(k).map_or(0.0, |xi| f64::from(*xi));
+                add_virial(&mut virial, g, (noise * xi - drag * along) * f64::from(self.stretch[k]));
+            }
+        }
+        virial
+    }
+}
+
+/// Adds `factor g ⊗ g`.
+pub fn add_virial(virial: &mut [f64; 6], g: [f64; 3], factor: f64) {
+    for (w, (a, b)) in virial.iter_mut().zip([(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]) {
+        *w += factor * g[a] * g[b];
+    }
+}
+
+/// The virial of all planes, in their order.
+pub fn virial(pool: &Pool, planes: &[Plane], sums: &Sums, terms: Terms) -> [f64; 6] {
+    if planes.iter().all(|plane| plane.stretch.is_empty()) {
+        return [0.0; 6];
+    }
+    let mut parts: Vec<_> = planes.iter().map(|plane| (plane, [0.0; 6])).collect();
+    pool.each(&mut parts, |(plane, virial)| *virial = plane.virial(&sums.p, terms));
+    let mut sum = [0.0; 6];
+    for (_, virial) in parts {
+        (0..6).for_each(|c| sum[c] += virial[c]);
+    }
+    sum
+}
+
+impl PairThermostat {
+    /// Adds drag at the velocities `v`, or the random force, or both, to `force`; returns their virial, if distances
+    /// were kept.
+    pub fn add_forces(
+        &mut self,
+        pool: &Pool,
+        v: &[[f64; 3]],
+        drag: bool,
+        noise: bool,
+        force: &mut [[f64; 3]],
+    ) -> [f64; 6] {
+        let PairThermostat { planes, cells, sums, kt, dt, .. } = self;
+        let factor = 2.0 / *dt;
+        let noise = if noise { factor * kt.sqrt() } else { 0.0 };
+        let terms = Terms { noise, drag: if drag { factor } else { 0.0 } };
+        sums.gather(&cells.order, v);
+        sums.compute(pool, planes, terms);
+        let virial = virial(pool, planes, sums, terms);
+        // Frozen particles bear forces like others; whoever moves them does not.
+        let all: Vec<Wide> = (0..planes.len()).flat_map(|number| sums.of(planes, number)).collect();
+        add_to_host(pool, &cells.place, &all, 1.0, force);
+        virial
+    }
+}
+
+/// Adds `factor` times what is in order of the cells to what is in the order of the host.
+pub fn add_to_host(pool: &Pool, place: &[u32], from: &[Wide], factor: f64, to: &mut [[f64; 3]]) {
+    let (count, mut rest, threads) = (to.len(), to, pool.threads());
+    let mut parts: Vec<_> = (0..threads)
+        .map(|number| {
+            let range = part(count, number, threads);
+            (rest.split_off_mut(..range.len()).unwrap_or_default(), &place[range])
+        })
+        .collect();
+    pool.each(&mut parts, |(to, place)| {
+        for (to, place) in to.iter_mut().zip(*place) {
+            let from = from[*place as usize];
+            (0..3).for_each(|c| to[c] += factor * from[c]);
+        }
+    });
+}

@@ -1,0 +1,191 @@
+//! Updates of one pair after the other.
+//!
+//! The pairs of a particle come one after the other, particles in the order of cells, planes in an order of their own:
+//! every second one first, which can be done side by side, as no two of them touch the same particles. The order depends
+//! on positions and tags alone.
+//!
+//! With `u = ê·v_ij`, the reduced mass μ and `a = |g|²/μ = ½ΔtD/μ`, each rule makes a new `u′` that keeps the normal
+//! distribution of variance kT/μ, whatever Δt is.
+
+use super::pass::add_virial;
+use super::planes::Plane;
+use super::{PairThermostat, Update};
+use crate::engine::noise::Law;
+use crate::engine::sweep::Pool;
+
+/// A pair in hand.
+#[derive(Debug, Clone, Copy)]
+pub struct Encounter {
+    /// `|g| u`.
+    along: f64,
+    /// `½ Δt D/μ`.
+    a: f64,
+    /// `|g|²`.
+    square: f64,
+    mu: f64,
+    kt: f64,
+    xi: f64,
+    /// Uniform on (0, 1), where a rule asks for it.
+    chance: f64,
+}
+
+impl Encounter {
+    /// What `g` is to be multiplied by for the impulse on the first particle that makes `factor u + noise √(kT/μ) ξ` of `u`.
+    #[inline(always)]
+    fn impulse(&self, factor_less_one: f64, noise: f64) -> f64 {
+        self.mu * (factor_less_one * self.along / self.square)
+            + (self.mu * self.kt / self.square).sqrt() * noise * self.xi
+    }
+}
+
+/// `u′ = c u + √(kT/μ (1 − c²)) ξ`, `c = exp(−DΔt/μ)`: exact for the pair alone; Peters's scheme II.
+pub fn ornstein_uhlenbeck(pair: &Encounter) -> f64 {
+    let less_one = (-2.0 * pair.a).exp_m1();
+    pair.impulse(less_one, (-(-4.0 * pair.a).exp_m1()).sqrt())
+}
+
+/// `u′ = ((1 − a) u + 2 √(kT a/μ) ξ)/(1 + a)`: half a step explicit, half implicit.
+pub fn shardlow(pair: &Encounter) -> f64 {
+    let a = pair.a;
+    pair.impulse(-2.0 * a / (1.0 + a), 2.0 * a.sqrt() / (1.0 + a))
+}
+
+/// `u′ = √(kT/μ) ξ` with the probability `1 − exp(−DΔt/μ)`.
+pub fn lowe_andersen(pair: &Encounter) -> f64 {
+    if pair.chance < -(-2.0 * pair.a).exp_m1() { pair.impulse(-1.0, 1.0) } else { 0.0 }
+}
+
+/// The planes that are done side by side, one set after the other: no two of a set are neighbours.
+fn sets(planes: &[Plane]) -> [Vec<usize>; 3] {
+    let count = planes.len();
+    // The last sees the first, which may be of the same set.
+    let closes = count % 2 == 1 && count > 1 && !planes[count - 1].next.is_empty();
+    let paired = count - usize::from(closes);
+    let last = if closes { vec![count - 1] } else { Vec::new() };
+    [(0..paired).step_by(2).collect(), (1..paired).step_by(2).collect(), last]
+}
+
+/// A plane at work: its velocities and those of the next one.
+struct Share<'a> {
+    plane: &'a Plane,
+    own: &'a mut [[f64; 3]],
+    next: &'a mut [[f64; 3]],
+    of_own: &'a [f64],
+    of_next: &'a [f64],
+    chances: Vec<f32>,
+    virial: [f64; 6],
+}
+
+impl PairThermostat {
+    /// Applies a rule to all pairs in turn.
+    pub(super) fn in_turn(&mut self, pool: &Pool, v: &mut [[f64; 3]], update: Update) -> [f64; 6] {
+        let PairThermostat { planes, cells, mass, kt, dt, noise, .. } = self;
+        let (planes, mass, kt) = (&planes[..], &mass[..], *kt);
+        let reversed = matches!(update, Update::Shardlow { reversed: true });
+        let rule = match update {
+            Update::Shardlow { .. } => shardlow,
+            Update::LoweAndersen => lowe_andersen,
+            _ => ornstein_uhlenbeck,
+        };
+        let draws = update == Update::LoweAndersen;
+        let mut sorted: Vec<[f64; 3]> = cells.order.iter().map(|k| v[*k as usize]).collect();
+        let mut virial = [0.0; 6];
+        let mut sets = sets(planes);
+        if reversed {
+            sets.reverse();
+        }
+        for set in sets {
+            let mut rest = &mut sorted[..];
+            let mut slices: Vec<Option<&mut [[f64; 3]]>> =
+                planes.iter().map(|p| rest.split_off_mut(..p.own.len())).collect();
+            let mut shares: Vec<Share> = Vec::with_capacity(set.len());
+            for number in set {
+                let plane = &planes[number];
+                let above = if number + 1 < planes.len() { number + 1 } else { 0 };
+                let own = slices[number].take().unwrap_or_default();
+                let next = if plane.next.is_empty() { None } else { slices[above].take() };
+                shares.push(Share {
+                    plane,
+                    own,
+                    next: next.unwrap_or_default(),
+                    of_own: &mass[plane.own.clone()],
+                    of_next: &mass[plane.next.clone()],
+                    chances: Vec::new(),
+                    virial: [0.0; 6],
+                });
+            }
+            pool.each(&mut shares, |share| {
+                if draws {
+                    let [a, b] = &share.plane.tags;
+                    share.chances.resize(a.len(), 0.0);
+                    noise[1].fill(Law::Uniform, a, b, &mut share.chances);
+                }
+                share.update(kt, reversed, rule);
+            });
+            for share in shares {
+                (0..6).for_each(|c| virial[c] += share.virial[c] / *dt);
+            }
+        }
+        for (k, v_sorted) in cells.order.iter().zip(sorted) {
+            v[*k as usize] = v_sorted;
+        }
+        virial
+    }
+}
+
+impl Share<'_> {
+    fn update(&mut self, kt: f64, reversed: bool, rule: impl Fn(&Encounter) -> f64) {
+        let plane = self.plane;
+        let rows = plane.start.len() - 1;
+        for n in 0..rows {
+            let i = if reversed { rows - 1 - n } else { n };
+            let of_i = plane.start[i] as usize..plane.start[i + 1] as usize;
+            for n in 0..of_i.len() {
+                let k = if reversed { of_i.end - 1 - n } else { of_i.start + n };
+                self.encounter(i, k, kt, &rule);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn encounter(&mut self, i: usize, k: usize, kt: f64, rule: &impl Fn(&Encounter) -> f64) {
+        let pair = &self.plane.pairs[k];
+        let (j, g) = (pair.j as usize, pair.g.map(f64::from));
+        let (own, beyond) = (self.own.len(), j.wrapping_sub(self.own.len()));
+        let (other, mass) = match j < own {
+            true => (self.own[j], self.of_own[j]),
+            false => (self.next[beyond], self.of_next[beyond]),
+        };
+        let inverse = [1.0 / self.of_own[i], 1.0 / mass];
+        let sum = inverse[0] + inverse[1];
+        // Neither of two frozen particles moves.
+        if sum == 0.0 {
+            return;
+        }
+        let v = self.own[i];
+        let square = g[0] * g[0] + g[1] * g[1] + g[2] * g[2];
+        if square == 0.0 {
+            return;
+        }
+        let chance = self.chances.get(k).map_or(0.0, |xi| 0.5 + f64::from(*xi) / 12f64.sqrt());
+        let impulse = rule(&Encounter {
+            along: (v[0] - other[0]) * g[0] + (v[1] - other[1]) * g[1] + (v[2] - other[2]) * g[2],
+            a: square * sum,
+            square,
+            mu: 1.0 / sum,
+            kt,
+            xi: f64::from(self.plane.xi[k]),
+            chance,
+        });
+        for c in 0..3 {
+            self.own[i][c] += impulse * inverse[0] * g[c];
+        }
+        let other = if j < own { &mut self.own[j] } else { &mut self.next[beyond] };
+        for c in 0..3 {
+            other[c] -= impulse * inverse[1] * g[c];
+        }
+        if let Some(stretch) = self.plane.stretch.get(k) {
+            add_virial(&mut self.virial, g, impulse * f64::from(*stretch));
+        }
+    }
+}

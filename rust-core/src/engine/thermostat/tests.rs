@@ -1,0 +1,342 @@
+use super::*;
+use crate::engine::noise::threefry2x32;
+use crate::model::Model;
+use nalgebra::Matrix3;
+use std::num::NonZeroUsize;
+
+const ONE: &str = "title = \"one\"\nspecies = [\"A\"]\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n";
+
+const TWO: &str = r#"
+title = "two"
+species = ["A", "B"]
+[[thermostat]]
+between = ["A", "A"]
+gamma = 4.5
+range = 0.8
+exponent = 2
+[[thermostat]]
+between = ["A", "B"]
+gamma = 30.0
+range = 1.0
+exponent = 0.5
+"#;
+
+const FLAT: &str = "title = \"flat\"\ndimensions = 2\nspecies = [\"A\"]\n[[thermostat]]\ngamma = 9.0\nrange = 1.0\nexponent = 2\n";
+
+const DT: f64 = 0.05;
+
+const UPDATES: [Update; 5] = [
+    Update::Midpoint,
+    Update::OrnsteinUhlenbeck,
+    Update::Shardlow { reversed: false },
+    Update::Shardlow { reversed: true },
+    Update::LoweAndersen,
+];
+
+#[derive(Clone)]
+struct Cloud {
+    domain: PeriodicBox,
+    x: Vec<[f64; 3]>,
+    v: Vec<[f64; 3]>,
+    tag: Vec<i32>,
+    species: Vec<i32>,
+    mass: Vec<f64>,
+    frozen: Vec<bool>,
+}
+
+impl Cloud {
+    fn new(species: usize, edges: Matrix3<f64>, periodic: [bool; 3], density: f64) -> Cloud {
+        let domain = PeriodicBox::new([-1.0, 0.5, 2.0], edges, periodic).unwrap();
+        let flat = edges[(2, 2)] == 1.0;
+        let n = (density * domain.volume(3)) as usize;
+        let mut count = 0;
+        let mut number = || {
+            count += 1;
+            f64::from(threefry2x32::<13>([count, 0], [5, 0])[0]) / 4_294_967_296.0
+        };
+        let mut vector = || std::array::from_fn::<f64, 3, _>(|_| number());
+        let planar = |[x, y, z]: [f64; 3]| if flat { [x, y, 0.0] } else { [x, y, z] };
+        let mut cloud = Cloud {
+            x: (0..n).map(|_| domain.point(planar(vector()))).collect(),
+            v: (0..n).map(|_| planar(vector().map(|x| 2.0 * x - 1.0))).collect(),
+            tag: Vec::new(),
+            species: (0..n).map(|k| (k % species) as i32).collect(),
+            mass: [1.0, 7.0][..species].to_vec(),
+            frozen: Vec::new(),
+            domain,
+        };
+        // Two on one point, and one on a face.
+        cloud.x[1] = cloud.x[0];
+        cloud.x[2] = cloud.domain.origin();
+        if flat {
+            cloud.x.iter_mut().for_each(|x| x[2] = 0.0);
+        }
+        // Tags may be any different numbers.
+        cloud.tag = (0..n).map(|k| 3 * ((k + n / 3) % n) as i32 + 1).collect();
+        cloud
+    }
+
+    fn bodies(&self) -> Bodies<'_> {
+        let Cloud { domain, x, tag, species, mass, frozen, .. } = self;
+        Bodies { domain, x, tag, species, mass, frozen }
+    }
+
+    fn mass_of(&self, k: usize) -> f64 {
+        let frozen = self.frozen.get(k).is_some_and(|f| *f);
+        if frozen { f64::INFINITY } else { self.mass[self.species[k] as usize] }
+    }
+
+    fn momentum(&self, v: &[[f64; 3]]) -> [f64; 3] {
+        std::array::from_fn(|c| (0..v.len()).map(|k| self.mass[self.species[k] as usize] * v[k][c]).sum())
+    }
+
+    fn in_order(&self, order: &[usize]) -> Cloud {
+        Cloud {
+            x: order.iter().map(|k| self.x[*k]).collect(),
+            v: order.iter().map(|k| self.v[*k]).collect(),
+            tag: order.iter().map(|k| self.tag[*k]).collect(),
+            species: order.iter().map(|k| self.species[*k]).collect(),
+            frozen: if self.frozen.is_empty() {
+                Vec::new()
+            } else {
+                order.iter().map(|k| self.frozen[*k]).collect()
+            },
+            ..self.clone()
+        }
+    }
+}
+
+fn clouds() -> Vec<(&'static str, Cloud)> {
+    let straight = Matrix3::from_diagonal(&[3.0, 4.1, 5.3].into());
+    let narrow = Matrix3::from_diagonal_element(2.0);
+    let leaning = Matrix3::new(4.0, 1.3, -0.7, 0.0, 3.5, 0.9, 0.0, 0.0, 3.0);
+    let flat = Matrix3::from_diagonal(&[6.0, 5.0, 1.0].into());
+    vec![
+        (ONE, Cloud::new(1, straight, [true; 3], 6.0)),
+        (TWO, Cloud::new(2, straight, [true; 3], 6.0)),
+        (TWO, Cloud::new(2, narrow, [true; 3], 6.0)),
+        (ONE, Cloud::new(1, leaning, [true; 3], 6.0)),
+        (TWO, Cloud::new(2, straight, [true, false, true], 6.0)),
+        (ONE, Cloud::new(1, straight, [false, true, false], 6.0)),
+        (FLAT, Cloud::new(1, flat, [true; 3], 8.0)),
+        (ONE, Cloud::new(1, straight, [true; 3], 0.05)),
+    ]
+}
+
+fn thermostat(model: &str, kt: f64) -> PairThermostat {
+    let fluid = Model::parse("m.toml", model).unwrap().at(1.0).unwrap();
+    PairThermostat::new(&Plan::new(&fluid).unwrap(), kt).unwrap()
+}
+
+fn pool(threads: usize) -> Pool {
+    Pool::new(NonZeroUsize::new(threads).unwrap())
+}
+
+/// With pairs and noise of `cloud`.
+fn ready(model: &str, kt: f64, cloud: &Cloud, pool: &Pool) -> PairThermostat {
+    let mut thermostat = thermostat(model, kt);
+    thermostat.find_pairs(pool, &cloud.bodies(), DT, true).unwrap();
+    thermostat.draw(pool, 11, 5, Stream(0), Law::Gaussian);
+    thermostat
+}
+
+/// Drag from all pairs there are.
+fn plain_drag(model: &str, cloud: &Cloud) -> Vec<[f64; 3]> {
+    let fluid = Model::parse("m.toml", model).unwrap().at(1.0).unwrap();
+    let mut force = vec![[0.0; 3]; cloud.x.len()];
+    for i in 0..cloud.x.len() {
+        for j in 0..i {
+            let pair = cloud.species[i] as usize * fluid.species.len() + cloud.species[j] as usize;
+            let Some(law) = fluid.thermostats[pair] else { continue };
+            let d = cloud.domain.minimum_image(cloud.x[i], cloud.x[j]);
+            let r = d.iter().map(|d| d * d).sum::<f64>().sqrt();
+            if r == 0.0 || r >= law.range {
+                continue;
+            }
+            let w = (1.0 - r / law.range).powf(law.exponent);
+            let along: f64 = (0..3).map(|c| d[c] / r * (cloud.v[i][c] - cloud.v[j][c])).sum();
+            for c in 0..3 {
+                let f = -law.gamma * w * w * along * d[c] / r;
+                force[i][c] += f;
+                force[j][c] -= f;
+            }
+        }
+    }
+    force
+}
+
+#[test]
+fn every_pair_in_range_drags_once() {
+    for (number, (model, cloud)) in clouds().into_iter().enumerate() {
+        let pool = pool(1);
+        let mut thermostat = ready(model, 1.0, &cloud, &pool);
+        let mut force = vec![[0.0; 3]; cloud.x.len()];
+        thermostat.add_forces(&pool, &cloud.v, true, false, &mut force);
+        for (f, g) in force.iter().flatten().zip(plain_drag(model, &cloud).iter().flatten()) {
+            assert!((f - g).abs() < 1e-5 * (1.0 + g.abs()), "cloud {number}: {f} {g}");
+        }
+    }
+}
+
+/// `M (v′ − v) = Δt F((v + v′)/2)` with the forces of drag and noise.
+#[test]
+fn the_midpoint_rule_is_solved() {
+    for (number, (model, mut cloud)) in clouds().into_iter().enumerate() {
+        if number % 2 == 1 {
+            cloud.frozen = (0..cloud.x.len()).map(|k| k % 5 == 0).collect();
+        }
+        let pool = pool(2);
+        let mut thermostat = ready(model, 1.3, &cloud, &pool);
+        let mut v = cloud.v.clone();
+        thermostat.act(&pool, Update::Midpoint, &mut v);
+        assert!(
+            thermostat.pairs() < 2 || (1..12).contains(&thermostat.iterations()),
+            "{}",
+            thermostat.iterations()
+        );
+        let middle: Vec<[f64; 3]> =
+            v.iter().zip(&cloud.v).map(|(a, b)| std::array::from_fn(|c| 0.5 * (a[c] + b[c]))).collect();
+        let mut force = vec![[0.0; 3]; v.len()];
+        thermostat.add_forces(&pool, &middle, true, true, &mut force);
+        let (mut wrong, mut whole) = (0.0, 0.0);
+        for k in 0..v.len() {
+            let mass = cloud.mass_of(k);
+            for c in 0..3 {
+                let change = v[k][c] - cloud.v[k][c];
+                if mass.is_infinite() {
+                    assert_eq!(change, 0.0);
+                    continue;
+                }
+                wrong += (change - DT * force[k][c] / mass).powi(2) * mass;
+                whole += change * change * mass;
+            }
+        }
+        assert!(wrong <= (2.0 * midpoint::TOLERANCE).powi(2) * whole, "cloud {number}: {wrong} of {whole}");
+    }
+}
+
+/// Implicit drag: `M (v′ − v) = Δt/2 F(v′)`.
+#[test]
+fn implicit_drag_is_solved() {
+    for (model, cloud) in clouds() {
+        let pool = pool(1);
+        let mut thermostat = ready(model, 1.0, &cloud, &pool);
+        let mut v = cloud.v.clone();
+        thermostat.act(&pool, Update::ImplicitDrag, &mut v);
+        let mut force = vec![[0.0; 3]; v.len()];
+        thermostat.add_forces(&pool, &v, true, false, &mut force);
+        for k in 0..v.len() {
+            for c in 0..3 {
+                let change = v[k][c] - cloud.v[k][c];
+                assert!((change - 0.5 * DT * force[k][c] / cloud.mass_of(k)).abs() < 1e-3, "{change}");
+            }
+        }
+    }
+}
+
+#[test]
+fn neither_threads_nor_memory_change_a_bit() {
+    for (model, mut cloud) in clouds() {
+        cloud.frozen = (0..cloud.x.len()).map(|k| k % 7 == 3).collect();
+        let n = cloud.x.len();
+        let order: Vec<usize> = (0..n).map(|k| (k * 1009 + 3) % n).collect();
+        assert!(n % 1009 != 0);
+        let moved = cloud.in_order(&order);
+        for update in UPDATES {
+            let [one, two, five] = [1, 2, 5].map(|threads| {
+                let pool = pool(threads);
+                let mut v = cloud.v.clone();
+                let virial = ready(model, 1.0, &cloud, &pool).act(&pool, update, &mut v);
+                (v, virial)
+            });
+            assert!(one == two && one == five, "{update:?}");
+            let pool = pool(1);
+            let mut v = moved.v.clone();
+            let virial = ready(model, 1.0, &moved, &pool).act(&pool, update, &mut v);
+            assert!(virial == one.1 && (0..n).all(|k| v[k] == one.0[order[k]]), "{update:?}");
+            let frozen = (0..n).filter(|k| cloud.frozen[*k]).all(|k| one.0[k] == cloud.v[k]);
+            assert!(frozen, "{update:?}");
+        }
+    }
+}
+
+#[test]
+fn momentum_is_kept() {
+    for (model, cloud) in clouds() {
+        for update in UPDATES {
+            let pool = pool(1);
+            let mut v = cloud.v.clone();
+            ready(model, 1.0, &cloud, &pool).act(&pool, update, &mut v);
+            for (p, q) in cloud.momentum(&v).into_iter().zip(cloud.momentum(&cloud.v)) {
+                assert!((p - q).abs() < 1e-11 * cloud.x.len() as f64, "{update:?}: {p} {q}");
+            }
+            assert!(v != cloud.v || cloud.x.len() < 10);
+        }
+    }
+}
+
+/// In open space `Σ r_ij ⊗ J_ij` is `Σ x_i ⊗ m Δv_i`.
+#[test]
+fn the_virial_is_that_of_the_impulses() {
+    let edges = Matrix3::from_diagonal(&[3.0, 4.1, 5.3].into());
+    for (model, species) in [(ONE, 1), (TWO, 2)] {
+        let cloud = Cloud::new(species, edges, [false; 3], 6.0);
+        for update in UPDATES {
+            let pool = pool(2);
+            let mut v = cloud.v.clone();
+            let found = ready(model, 1.0, &cloud, &pool).act(&pool, update, &mut v);
+            for (w, (a, b)) in found.iter().zip([(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]) {
+                let sum: f64 = (0..v.len())
+                    .map(|k| cloud.x[k][a] * cloud.mass_of(k) * (v[k][b] - cloud.v[k][b]) / DT)
+                    .sum();
+                // The midpoint is known to its residual.
+                assert!((sum - w).abs() < 2e-4 * (1.0 + v.len() as f64), "{update:?}: {sum} {w}");
+            }
+        }
+    }
+}
+
+/// Without temperature there is drag alone, and it only takes energy.
+#[test]
+fn at_zero_temperature_drag_is_left() {
+    for (model, cloud) in clouds().into_iter().filter(|(_, cloud)| cloud.x.len() > 50) {
+        for update in UPDATES {
+            let pool = pool(1);
+            let mut v = cloud.v.clone();
+            ready(model, 0.0, &cloud, &pool).act(&pool, update, &mut v);
+            let energy = |v: &[[f64; 3]]| -> f64 {
+                (0..v.len()).map(|k| cloud.mass_of(k) * v[k].iter().map(|c| c * c).sum::<f64>()).sum()
+            };
+            assert!(energy(&v) < energy(&cloud.v), "{update:?}");
+        }
+    }
+}
+
+/// Drag of a hundred times the inertia, and a hundredth of it.
+#[test]
+fn weak_and_strong_drag_converge() {
+    let cloud = clouds().swap_remove(0).1;
+    for dt in [1e-6, 1.0, 100.0] {
+        let pool = pool(1);
+        let mut thermostat = thermostat(ONE, 1.0);
+        thermostat.find_pairs(&pool, &cloud.bodies(), dt, false).unwrap();
+        thermostat.draw(&pool, 11, 5, Stream(0), Law::Uniform);
+        let mut v = cloud.v.clone();
+        thermostat.act(&pool, Update::Midpoint, &mut v);
+        assert!(thermostat.iterations() < 200, "dt = {dt}: {}", thermostat.iterations());
+        assert!(v.iter().flatten().all(|v| v.abs() < 10.0));
+    }
+}
+
+#[test]
+fn unusable_input_is_refused() {
+    let pool = pool(1);
+    let mut cloud = Cloud::new(1, Matrix3::from_diagonal_element(1.9), [true; 3], 3.0);
+    let mut thermostat = thermostat(ONE, 1.0);
+    let narrow = thermostat.find_pairs(&pool, &cloud.bodies(), DT, false);
+    assert!(matches!(narrow, Err(EngineError::Host(_))));
+    cloud = Cloud::new(1, Matrix3::from_diagonal_element(3.0), [true; 3], 3.0);
+    cloud.x[4][1] = f64::NAN;
+    let lost = thermostat.find_pairs(&pool, &cloud.bodies(), DT, false);
+    assert_eq!(lost, Err(EngineError::Position { tag: cloud.tag[4] }));
+}

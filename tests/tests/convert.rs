@@ -1,0 +1,67 @@
+//! `psidpd lammps convert`: a script for the built-in `mdpd`, and the same fluid with `mdpd/psi`.
+
+mod style_common;
+
+use psidpd::lammps::dump;
+use psidpd_tests::{lammps, psidpd, said};
+use std::path::Path;
+use style_common::{LIMIT, difference};
+
+/// A drop, as its user wrote it.
+const OLD: &str = "# a drop\nunits        lj\natom_style   mdpd\ncomm_modify  vel yes\nread_data    drop.data\n\
+    set          type * sph/rho 0.0\nmass         * 1.0\n\
+    pair_style   hybrid/overlay mdpd/rhosum mdpd 1.0 1.0 9872598\n\
+    pair_coeff   * * mdpd/rhosum 0.75\npair_coeff   * * mdpd -40 25 &\n             0 1.0 0.75\n\
+    fix          move all mvv/dpd\ntimestep     0.001\n\
+    dump         d all custom 20 f.dump id type x y z fx fy fz\n\
+    dump_modify  d sort id format float %.17g\nrun          20\n";
+
+/// Positions and forces at the start and at the end.
+fn frames(folder: &Path, script: &str) -> Vec<[Vec<[f64; 3]>; 2]> {
+    let run = lammps().0.run_script(1, folder, script.as_ref(), &[], LIMIT);
+    run.unwrap_or_else(|e| panic!("{script}: {e}"));
+    let frames = dump::read(&folder.join("f.dump")).unwrap();
+    frames
+        .iter()
+        .map(|f| [["x", "y", "z"], ["fx", "fy", "fz"]].map(|names| f.vectors(names).unwrap()))
+        .collect()
+}
+
+#[test]
+fn a_converted_script_is_the_same_fluid() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let make = "units lj\natom_style mdpd\nregion b block 0 5 0 5 0 5\ncreate_box 2 b\n\
+        create_atoms 1 random 600 4711 NULL overlap 0.3 maxtry 100\nset type 1 type/ratio 2 0.4 77\nmass * 1\n\
+        pair_style zero 1.0\npair_coeff * *\nvelocity all create 1.0 87 loop geom\nwrite_data drop.data nocoeff\n";
+    std::fs::write(at("in.make"), make).unwrap();
+    lammps().0.run_script(1, folder.path(), "in.make".as_ref(), &[], LIMIT).unwrap();
+    std::fs::write(at("in.old"), OLD).unwrap();
+    let old = frames(folder.path(), "in.old");
+
+    let arguments = ["lammps", "convert", "in.old", "--law", "lucy", "--out", "in.new", "--json", "new.json"];
+    let out = psidpd(folder.path(), &arguments);
+    assert!(out.status.success(), "{}", said(&out));
+    let report: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(at("new.json")).unwrap()).unwrap();
+    assert_eq!(report["left"].as_array().unwrap().len(), 0, "{report}");
+    assert_eq!(report["files"].as_array().unwrap().len(), 2, "{report}");
+    let text = std::fs::read_to_string(at("in.new")).unwrap();
+    // Wherever the program would have put a plugin: this test has its own.
+    let plugin = text.lines().find(|l| l.starts_with("plugin")).unwrap().to_owned();
+    let text = text.replace(&plugin, &format!("plugin load {}", lammps().1.display()));
+    std::fs::write(at("in.new"), &text).unwrap();
+    let new = frames(folder.path(), "in.new");
+    assert_eq!(old.len(), 2);
+    for ([x, f], [same_x, same_f]) in old.iter().zip(&new) {
+        assert!(difference(same_x, x) < 1e-9, "{}", difference(same_x, x));
+        assert!(difference(same_f, f) < 1e-9, "{}", difference(same_f, f));
+    }
+
+    // The conservative law is another fluid, and that is said.
+    let out = psidpd(folder.path(), &["lammps", "convert", "in.old"]);
+    assert!(out.status.success() && said(&out).contains("another fluid"), "{}", said(&out));
+    assert!(String::from_utf8_lossy(&out.stdout).contains("mdpd/psi 1.0 1.0 9872598\n"), "{}", said(&out));
+    let missing = psidpd(folder.path(), &["lammps", "convert", "in.nowhere"]);
+    assert_eq!(missing.status.code(), Some(2), "{}", said(&missing));
+}

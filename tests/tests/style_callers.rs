@@ -1,0 +1,144 @@
+//! Commands that look behind a pair style: Monte Carlo fixes, and those that ask for energies of single pairs or strain
+//! atoms and their images in a box that stays.
+
+mod style_common;
+
+use style_common::*;
+
+/// Warren's fluid without drag.
+fn quiet() -> String {
+    let text = std::fs::read_to_string(warren()).unwrap();
+    text.split("[[thermostat]]").next().unwrap().to_owned()
+}
+
+/// The conservative force of LAMMPS's `dpd`.
+const SOFT: &str = "title = \"soft\"\nspecies = [\"F\"]\n[[pair]]\nbetween = [\"F\", \"F\"]\nform = \"soft\"\n\
+    strength = 25\nrange = 1\n";
+
+/// The last row of the last thermo output of a run on `ranks` ranks.
+fn last_row(script: &str, ranks: usize) -> Vec<f64> {
+    let said = outcome(script, ranks).unwrap_or_else(|e| panic!("{ranks} ranks: {e}\n{script}"));
+    let (table, _) = said.rsplit_once("Loop time").unwrap();
+    let row = table.lines().rev().find(|line| !line.trim().is_empty()).unwrap();
+    row.split_whitespace().map(|word| word.parse().unwrap_or_else(|_| panic!("{said}"))).collect()
+}
+
+/// What a script says on `ranks` ranks, or its error.
+fn outcome(script: &str, ranks: usize) -> Result<String, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("in.lammps");
+    std::fs::write(&path, script).unwrap();
+    let run = psidpd_tests::lammps().0.run_script(ranks, folder.path(), &path, &[], LIMIT);
+    run.map(|run| run.stdout).map_err(|e| e.to_string())
+}
+
+fn deck(more: &str) -> String {
+    format!("{}{more}", particles("", "block 0 5 0 5 0 5", 1, 500))
+}
+
+/// Strains that leave the box as it is are seen: virials by differences are those of the forces, and elastic constants
+/// those of LAMMPS's `dpd`, on any number of ranks.
+#[test]
+fn strained_ghosts_are_seen() {
+    let (_soft, soft) = file(SOFT);
+    let (_quiet, quiet) = file(&quiet());
+    let measure = "compute p all pressure NULL virial\ncompute b all born/matrix numdiff 1e-4 p\n\
+        fix v all numdiff/virial 1 1e-5\nfix 1 all nve\ntimestep 0.001\nthermo_modify norm no format float %.15g\n";
+    let components: String =
+        (1..=6).map(|k| format!(" c_p[{k}] f_v[{}]", [1, 2, 3, 6, 5, 4][k - 1])).collect();
+    let constants: String = (1..=21).map(|k| format!(" c_b[{k}]")).collect();
+    let columns = format!("{measure}thermo_style custom step pe{components}{constants}\nthermo 1\nrun 1\n");
+    let close = |a: f64, b: f64, tolerance: f64, what: &str| {
+        assert!((a - b).abs() < tolerance * (1.0 + a.abs().max(b.abs())), "{what}: {a} {b}");
+    };
+    for (before, region) in [
+        ("", "block 0 5 0 5 0 5"),
+        ("boundary p f p", "block 0 5 0 5 0 5"),
+        ("", "prism 0 5 0 5 0 5 1 -1 0.5"),
+    ] {
+        let start = particles(before, region, 1, 500);
+        let of = |style: &str| format!("{start}{style}{columns}");
+        let reference = of("pair_style dpd 1.0 1.0 5\npair_coeff 1 1 25 0\n");
+        let reference = last_row(&reference, 1);
+        for ranks in [1, 2, 8] {
+            let soft = of(&format!("pair_style dpd/psi 1.0 5\npair_coeff * * {soft} F\n"));
+            let row = last_row(&soft, ranks);
+            assert_eq!(row.len(), reference.len());
+            for (k, (a, b)) in row.iter().zip(&reference).enumerate() {
+                // Random atoms are the same on any number of ranks, and so are all sums over them.
+                close(*a, *b, 1e-5, &format!("{region}, {before}, {ranks} ranks, column {k}"));
+            }
+            let row = last_row(&of(&format!("pair_style dpd/psi 1.0 5\npair_coeff * * {quiet} F\n")), ranks);
+            for k in 0..6 {
+                let what = format!("{region}, {before}, {ranks} ranks, virial {k}");
+                close(row[2 + 2 * k], row[3 + 2 * k], 1e-4, &what);
+            }
+        }
+    }
+}
+
+/// Where energies belong to particles, a fix that asks for the energy of a single pair stops with what it needs; with
+/// that it runs. Without densities it gets its answer.
+#[test]
+fn monte_carlo_needs_full_energies_of_many_bodies() {
+    let many = format!("pair_style dpd/psi 1.0 5\npair_coeff * * {} F\n", warren());
+    let mdpd = "pair_style mdpd/psi 1.0 1.0 5\npair_coeff 1 1 -40 25 4.5 1 0.75\n".to_owned();
+    let pairs = "pair_style dpd/spline 1.0 1.0 5\npair_coeff 1 1 9.5 2 1 0.8 1 4.5\n";
+    for fix in ["fix mc all gcmc 1 10 10 1 777 1.0 -2.0 0.1", "fix mc all widom 1 20 1 777 1.0"] {
+        let rest = |full: &str| {
+            format!(
+                "fix 1 all nve\ntimestep 0.001\n{fix}{full}\nthermo_style custom step pe atoms f_mc[1] f_mc[2]\n\
+                 thermo_modify norm no format float %.15g\nthermo 1\nrun 3\n"
+            )
+        };
+        for style in [&many, &mdpd] {
+            for ranks in [1, 2] {
+                let script = deck(&format!("{style}{}", rest("")));
+                let error = psidpd_tests::last_words(ranks, || outcome(&script, ranks));
+                assert!(error.contains("need full_energy with a many-body style"), "{ranks}: {error}");
+                let row = last_row(&deck(&format!("{style}{}", rest(" full_energy"))), ranks);
+                assert!(row.iter().all(|x| x.is_finite()), "{row:?}");
+            }
+        }
+        // Energies of pairs and the whole energy decide alike, deletions included, whose atoms LAMMPS excludes.
+        let pair_by_pair = last_row(&deck(&format!("{pairs}{}", rest(""))), 1);
+        let whole = last_row(&deck(&format!("{pairs}{}", rest(" full_energy"))), 1);
+        for (a, b) in pair_by_pair.iter().zip(&whole) {
+            assert!((a - b).abs() < 1e-9 * (1.0 + a.abs()), "{fix}: {pair_by_pair:?} {whole:?}");
+        }
+    }
+}
+
+/// What replaces forces of pairs by others, or decides on energies of pairs alone, is refused by name where there are
+/// densities.
+#[test]
+fn what_works_with_single_pairs_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path().join("chains.data");
+    std::fs::write(&data, chains(100)).unwrap();
+    let script = |special: &str, style: &str, more: &str| {
+        format!(
+            "units lj\natom_style bond\natom_modify map yes\ncomm_modify vel yes\nspecial_bonds lj {special}\nread_data {}\n\
+             {}{style}bond_style {more}fix 1 all nve\ntimestep 0.0001\nrun 1\n",
+            data.display(),
+            load()
+        )
+    };
+    let many = "pair_style mdpd/psi 1.0 1.0 5\npair_coeff * * -40 25 4.5 1 0.75\n";
+    let pairs = "pair_style dpd/spline 1.0 1.0 5\npair_coeff * * 9.5 2 1 0.8 1 4.5\n";
+    for (special, more, name) in [
+        ("0 1 1", "harmonic\nbond_coeff 1 10 0.5\nfix s all bond/swap 1 0.5 1.2 598934\n", "fix bond/swap"),
+        ("1 1 1", "quartic\nbond_coeff 1 1200 -0.55 0.25 1.3 34.6878\n", "bond_style quartic"),
+        ("1e-10 1e-10 1e-10", "special\nbond_coeff 1 0.5 0.5\n", "bond_style special"),
+    ] {
+        let error = outcome(&script(special, many, more), 1).unwrap_err();
+        assert!(error.contains(name) && error.contains("with a many-body style"), "{error}");
+        if let Err(error) = outcome(&script(special, pairs, more), 1) {
+            assert!(!error.contains("many-body style"), "{error}");
+        }
+    }
+    let write = format!("pair_write 1 1 20 r 0.1 1 {} F", folder.path().join("table").display());
+    let error = outcome(&deck(&format!("{many}run 0\n{write}\n")), 1).unwrap_err();
+    assert!(error.contains("pair_write cannot be used"), "{error}");
+    outcome(&deck(&format!("{pairs}run 0\n{write}\n")), 1).unwrap();
+}

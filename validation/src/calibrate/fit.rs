@@ -1,0 +1,169 @@
+//! Fits of the corrected density `ρ̃(n)`, a polynomial, to what runs measured.
+
+use super::point::Point;
+use nalgebra::{DMatrix, DVector};
+use psidpd_core::model::Polynomial;
+use serde::Serialize;
+
+/// A polynomial with the standard error of each coefficient.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Fit {
+    /// In ascending powers.
+    pub coefficients: Vec<f64>,
+    /// One standard deviation of each; none of a coefficient that is not fitted.
+    pub errors: Vec<Option<f64>>,
+}
+
+impl Fit {
+    /// As the model has it.
+    pub fn polynomial(&self) -> Polynomial {
+        Polynomial(self.coefficients.clone())
+    }
+}
+
+/// The polynomial of `degree` with `⟨ρ̃(n)⟩ = ρ` at every point by least squares, all densities alike:
+/// `Σ_m c_m ⟨n^m⟩ = ρ`. With a single point the slope is 1 and the offset is fitted. `None` if there are too few
+/// points, or they do not tell the coefficients apart.
+///
+/// The errors come from those of ⟨n⟩ and from how far the points are from the fit.
+pub fn fit_density(points: &[Point], pair: usize, degree: usize) -> Option<Fit> {
+    if let [point] = points {
+        let n = point.means[pair];
+        let coefficients = vec![point.own[pair] - n.value, 1.0];
+        return Some(Fit { coefficients, errors: vec![Some(n.error), None] });
+    }
+    let columns = degree + 1;
+    if points.len() < columns {
+        return None;
+    }
+    let x = DMatrix::from_fn(points.len(), columns, |k, m| points[k].moment(pair, m));
+    let y = DVector::from_iterator(points.len(), points.iter().map(|p| p.own[pair]));
+    // Columns of like size, so that the test for rank means something.
+    let size: Vec<f64> = (0..columns).map(|m| x.column(m).norm()).collect();
+    let scaled = DMatrix::from_fn(points.len(), columns, |k, m| x[(k, m)] / size[m]);
+    let inverse = scaled.clone().pseudo_inverse(1e-10).ok()?;
+    let c = &inverse * &y;
+    let rest = &y - &scaled * &c;
+    let coefficients: Vec<f64> = (0..columns).map(|m| c[m] / size[m]).collect();
+    if !coefficients.iter().all(|c| c.is_finite()) {
+        return None;
+    }
+    let polynomial = Polynomial(coefficients.clone());
+    let freedom = points.len() - columns;
+    let noise: Vec<f64> =
+        points.iter().map(|p| (polynomial.at(p.means[pair].value).1 * p.means[pair].error).powi(2)).collect();
+    // What is left of the distance from the fit beyond the noise: the polynomial is not the whole truth.
+    let expected = noise.iter().sum::<f64>() / points.len() as f64;
+    let scatter = if freedom > 0 { (rest.norm_squared() / freedom as f64 - expected).max(0.0) } else { 0.0 };
+    let errors = (0..columns)
+        .map(|m| {
+            let share = |k: usize| (inverse[(m, k)] / size[m]).powi(2);
+            let variance: f64 = noise.iter().enumerate().map(|(k, noise)| share(k) * (noise + scatter)).sum();
+            Some(variance.sqrt())
+        })
+        .collect();
+    Some(Fit { coefficients, errors })
+}
+
+/// What is needed of a target equation of state to fit `ρ̃` to it, at one density.
+#[derive(Debug, Clone, Copy)]
+pub struct Target {
+    /// The pressure that is wanted.
+    pub wanted: f64,
+    /// What ψ does not contribute to it.
+    pub base: f64,
+    /// The pressure that differences are compared with.
+    pub scale: f64,
+}
+
+/// The polynomial with the wanted pressures, from `start`: by least squares of `(p − p_wanted)/scale`, with
+///
+/// ```text
+/// p(c) = base + (p_measured − base) · ψ′(ρ̃_c(⟨n⟩)) ρ̃_c′(⟨n⟩) / [ψ′(ρ̃(⟨n⟩)) ρ̃′(⟨n⟩)]
+/// ```
+///
+/// the pressure that another ρ̃ would have if ⟨n⟩ and g(r) stayed as they are. They do not quite, so the
+/// fluid is to be measured again. `hold` is how much a relative difference of `ρ̃(⟨n⟩)` from ρ counts against one of
+/// the pressures.
+pub fn fit_pressure(
+    points: &[Point],
+    targets: &[Target],
+    slope: &dyn Fn(f64) -> f64,
+    start: &Polynomial,
+    degree: usize,
+    hold: f64,
+) -> Option<Fit> {
+    let mut c = start.0.clone();
+    c.resize(degree + 1, 0.0);
+    let strength = |c: &[f64], n: f64| {
+        let (value, derivative) = Polynomial(c.to_vec()).at(n);
+        slope(value) * derivative
+    };
+    let here: Vec<f64> = points.iter().map(|p| strength(&start.0, p.means[0].value)).collect();
+    let residuals = |c: &[f64]| -> Vec<f64> {
+        let pressures = points.iter().zip(targets).zip(&here).map(|((p, t), here)| {
+            let pressure = t.base + (p.pressure.value - t.base) * strength(c, p.means[0].value) / here;
+            (pressure - t.wanted) / t.scale
+        });
+        let holds =
+            points.iter().map(|p| hold * (Polynomial(c.to_vec()).at(p.means[0].value).0 / p.total - 1.0));
+        pressures.chain(holds).collect()
+    };
+    let size = |r: &[f64]| r.iter().map(|x| x * x).sum::<f64>();
+    let largest = points.iter().map(|p| p.means[0].value).fold(0.0, f64::max);
+    // Coefficients of powers of n over its largest value, which are of like size.
+    let unit: Vec<f64> = (0..=degree).map(|m| largest.powi(m as i32).max(1e-12)).collect();
+    let jacobian = |c: &[f64], r: &[f64]| {
+        let mut j = DMatrix::zeros(r.len(), c.len());
+        for m in 0..c.len() {
+            let h = 1e-6 * largest / unit[m];
+            let mut moved = c.to_vec();
+            moved[m] += h;
+            for (k, (after, before)) in residuals(&moved).iter().zip(r).enumerate() {
+                j[(k, m)] = (after - before) / h / unit[m];
+            }
+        }
+        j
+    };
+    let mut r = residuals(&c);
+    let mut damping = 1e-3;
+    for _ in 0..200 {
+        let j = jacobian(&c, &r);
+        let gradient = j.transpose() * DVector::from_column_slice(&r);
+        let mut normal = j.transpose() * &j;
+        let trace = normal.trace().max(f64::MIN_POSITIVE);
+        (0..c.len()).for_each(|m| normal[(m, m)] += damping * trace);
+        let Some(step) = normal.lu().solve(&gradient) else { break };
+        let next: Vec<f64> = (0..c.len()).map(|m| c[m] - step[m] / unit[m]).collect();
+        let there = residuals(&next);
+        if there.iter().all(|x| x.is_finite()) && size(&there) < size(&r) {
+            let gain = size(&r) - size(&there);
+            (c, r) = (next, there);
+            damping = (0.2 * damping).max(1e-12);
+            if gain < 1e-10 * size(&r) {
+                break;
+            }
+        } else {
+            damping *= 10.0;
+            if damping > 1e9 {
+                break;
+            }
+        }
+    }
+    if !c.iter().chain(&r).all(|x| x.is_finite()) {
+        return None;
+    }
+    let inverse = jacobian(&c, &r).pseudo_inverse(1e-12).ok()?;
+    let errors = (0..c.len())
+        .map(|m| {
+            let variance: f64 = points
+                .iter()
+                .zip(targets)
+                .enumerate()
+                .map(|(k, (p, t))| (inverse[(m, k)] / unit[m] * p.pressure.error / t.scale).powi(2))
+                .sum();
+            Some(variance.sqrt())
+        })
+        .collect();
+    Some(Fit { coefficients: c, errors })
+}

@@ -1,0 +1,182 @@
+use super::{Failure, Verdict, write_json};
+use crate::bulk::Sampling;
+use crate::calibrate::{CalibrateError, Options, calibrate, shown, spaced};
+use crate::report::{Table, write_atomically};
+use psidpd_core::model::Model;
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+
+/// Find the corrected density with which a model has the pressure it was made for.
+///
+/// Runs the fluid at several densities, fits a polynomial with <rho~(n)> = rho, and repeats until it holds and
+/// the pressure is the wanted one: linear if that does, else fitted to the pressures, quadratic, or cubic.
+/// Exits with 1 if none meets the tolerance; the file then has the best of them.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// The model file.
+    model: PathBuf,
+    /// kT.
+    #[arg(long = "kT", value_name = "T", default_value_t = 1.0)]
+    kt: f64,
+    /// Total number densities over which the pressure is to be right: LOW:HIGH, or one.
+    #[arg(long, value_name = "LOW:HIGH", default_value = "3:10", value_parser = range)]
+    density: [f64; 2],
+    /// How many densities are run.
+    #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    points: u16,
+    /// Shares of the species; equal ones if left out.
+    #[arg(long, value_name = "X", value_delimiter = ',')]
+    composition: Vec<f64>,
+    /// Which density of the model, if it has several.
+    #[arg(long)]
+    name: Option<String>,
+    /// Largest difference of pressures, relative to the wanted one (or to a tenth of the bulk modulus, where the
+    /// pressure is less), and of <rho~> from rho.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.02)]
+    tolerance: f64,
+    /// Particles in each run.
+    #[arg(long, value_name = "N", default_value_t = 2000, value_parser = clap::value_parser!(u32).range(100..))]
+    particles: u32,
+    /// Steps of each run that are measured.
+    #[arg(long, value_name = "N", default_value_t = 2000, value_parser = clap::value_parser!(u64).range(100..))]
+    steps: u64,
+    /// Steps before them.
+    #[arg(long, value_name = "N", default_value_t = 500)]
+    equilibrate: u64,
+    /// Time step.
+    #[arg(long, default_value_t = 0.01)]
+    dt: f64,
+    /// Seed of the starts and of the noise.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Threads that share the work.
+    #[arg(long, value_name = "N", default_value = "1")]
+    threads: NonZeroUsize,
+    /// Where the model file with its correction goes.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+}
+
+fn range(text: &str) -> Result<[f64; 2], String> {
+    let mut ends = text.splitn(2, ':').map(|end| end.trim().parse::<f64>());
+    let low = ends.next().and_then(Result::ok);
+    let high = ends.next().map_or(low, Result::ok);
+    match (low, high) {
+        (Some(low), Some(high)) if 0.0 < low && low <= high && high.is_finite() => Ok([low, high]),
+        _ => Err("expected LOW:HIGH with 0 < LOW <= HIGH, or one density".into()),
+    }
+}
+
+pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
+    let a = arguments;
+    let bad = |message: String| Failure::new(CalibrateError::Conditions(message));
+    if !(a.tolerance > 0.0 && a.dt > 0.0 && a.tolerance.is_finite() && a.dt.is_finite()) {
+        return Err(bad("tolerance and time step must be positive numbers".into()));
+    }
+    let species = Model::open(&a.model).map_err(Failure::new)?.species().len();
+    let shares = if a.composition.is_empty() { vec![1.0; species] } else { a.composition.clone() };
+    let sum: f64 = shares.iter().sum();
+    if shares.iter().any(|share| share.is_nan() || *share <= 0.0) || !sum.is_finite() {
+        return Err(bad("shares of the composition must be positive numbers".into()));
+    }
+    let options = Options {
+        kt: a.kt,
+        densities: spaced(a.density[0], a.density[1], usize::from(a.points)),
+        composition: shares.iter().map(|share| share / sum).collect(),
+        name: a.name.clone(),
+        tolerance: a.tolerance,
+        sampling: Sampling {
+            particles: a.particles as usize,
+            dt: a.dt,
+            equilibrate: a.equilibrate,
+            steps: a.steps,
+            every: 20,
+            seed: a.seed,
+            threads: a.threads,
+        },
+    };
+    let found =
+        calibrate(&a.model, &options, &command(a), &mut |line| println!("{line}")).map_err(failure)?;
+    write_atomically(&a.out, found.text.as_bytes()).map_err(Failure::new)?;
+    let mut table = Table::new(["density", "kT", "<n>", "<rho~>", "p wanted", "p measured", "off by"]);
+    let pm = |v: &crate::calibrate::Value| format!("{:.5} ± {:.5}", v.value, v.error);
+    for r in &found.residuals {
+        table.push([
+            format!("{:.4}", r.density),
+            format!("{:.4}", r.temperature.value),
+            r.mean.iter().map(pm).collect::<Vec<_>>().join(", "),
+            r.corrected.iter().map(|c| format!("{:.4}", c.value)).collect::<Vec<_>>().join(", "),
+            format!("{:.4}", r.wanted),
+            format!("{:.4} ± {:.4}", r.pressure.value, r.pressure.error),
+            format!("{:.2} %", 100.0 * r.deviation),
+        ]);
+    }
+    println!("\n{}", table.to_text());
+    for (pair, fit) in found.pairs.iter().zip(found.fits()) {
+        println!("rho~ {pair}: {}", shown(fit));
+    }
+    let best = &found.rounds[found.chosen];
+    if best.pressure_error > 0.5 * a.tolerance {
+        println!(
+            "error bars of the pressure reach {:.2} %, more than half of the tolerance: raise --steps or --particles",
+            100.0 * best.pressure_error
+        );
+    }
+    for r in &found.residuals {
+        if (r.temperature.value / a.kt - 1.0).abs() > 0.02 {
+            println!(
+                "at density {} the temperature is {:.3}, not {}: a shorter time step (--dt) is in order",
+                r.density, r.temperature.value, a.kt
+            );
+        }
+    }
+    if !found.converged {
+        println!(
+            "no correction up to third order meets the tolerance of {:.2} %: narrow --density, or widen --tolerance",
+            100.0 * a.tolerance
+        );
+    }
+    println!("written to {}", a.out.display());
+    write_json(json, &found)?;
+    Ok(if found.converged { Verdict::Good } else { Verdict::CheckFailed })
+}
+
+/// What it wraps knows its line of a file, or that it stopped a run.
+fn failure(error: CalibrateError) -> Failure {
+    match error {
+        CalibrateError::File(error) => Failure::new(error),
+        CalibrateError::Run(error) => Failure::new(error),
+        other => Failure::new(other),
+    }
+}
+
+/// The command that does the same again.
+fn command(a: &Arguments) -> String {
+    let [low, high] = a.density;
+    let name = |path: &Path| path.file_name().map_or(String::new(), |n| n.to_string_lossy().into_owned());
+    let mut text = format!("psidpd calibrate {} --kT {} --density {low}:{high}", name(&a.model), a.kt);
+    let mut add = |option: String| {
+        text.push(' ');
+        text.push_str(&option);
+    };
+    add(format!("--points {} --tolerance {}", a.points, a.tolerance));
+    if !a.composition.is_empty() {
+        add(format!(
+            "--composition {}",
+            a.composition.iter().map(f64::to_string).collect::<Vec<_>>().join(",")
+        ));
+    }
+    if let Some(name) = &a.name {
+        add(format!("--name {name}"));
+    }
+    add(format!(
+        "--particles {} --equilibrate {} --steps {} --dt {} --seed {} --out {}",
+        a.particles,
+        a.equilibrate,
+        a.steps,
+        a.dt,
+        a.seed,
+        name(&a.out)
+    ));
+    text
+}

@@ -1,0 +1,138 @@
+use super::{Failure, Verdict, write_json};
+use crate::papers::{Case, Compared, Context, Outcome, PaperError, Size, cases};
+use crate::report::{Table, write_atomically};
+use serde_json::{Value, json};
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+
+/// Figures and tables of the papers: measured, and compared with what is published.
+///
+/// Exits with 1 if a value deviates by more than three combined errors.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Which cases, by id, or by the first part of it; all if left out.
+    ids: Vec<String>,
+    /// Only list the cases.
+    #[arg(long)]
+    list: bool,
+    /// Small and short runs, half an hour for all cases; what is done if --full is left out.
+    #[arg(long, conflicts_with = "full")]
+    quick: bool,
+    /// Boxes of the papers and long runs; those that were interrupted go on.
+    #[arg(long)]
+    full: bool,
+    /// Folder for runs, plots and results.
+    #[arg(long, value_name = "DIR", default_value = "target/reproduce")]
+    out: PathBuf,
+    /// Threads of each run.
+    #[arg(long, value_name = "N", default_value = "1")]
+    threads: NonZeroUsize,
+}
+
+/// No case has this name.
+#[derive(Debug, thiserror::Error)]
+#[error("there is no case {0}: psidpd reproduce --list shows all")]
+struct Unknown(String);
+
+pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
+    let chosen = choose(&arguments.ids)?;
+    if arguments.list {
+        let mut table = Table::new(["id", "what"]);
+        chosen.iter().for_each(|case| table.push([case.id, case.what]));
+        println!("{}", table.to_text());
+        let entry = |case: &&Case| json!({ "id": case.id, "paper": case.paper, "what": case.what });
+        write_json(json, &json!({ "cases": chosen.iter().map(entry).collect::<Vec<_>>() }))?;
+        return Ok(Verdict::Good);
+    }
+    let size = if arguments.full { Size::Full } else { Size::Quick };
+    let mut results = Vec::new();
+    let mut good = true;
+    for case in &chosen {
+        println!("{}: {}", case.id, case.what);
+        let folder = arguments.out.join(if arguments.full { "full" } else { "quick" }).join(case.id);
+        let context = Context { size, folder: folder.clone(), threads: arguments.threads };
+        let begun = std::time::Instant::now();
+        let result = match case.run(&context) {
+            Ok(outcome) => {
+                show(&outcome);
+                good &= outcome.passes();
+                write_plots(&outcome, &folder)?;
+                result(case, &outcome)
+            }
+            Err(PaperError::Run(why)) if why.is_stop() => {
+                println!("  stopped: {why}");
+                good = false;
+                json!({ "id": case.id, "values": [], "pass": false, "stopped": why.to_string() })
+            }
+            Err(why) => return Err(Failure::new(why)),
+        };
+        println!("  {:.0} s\n", begun.elapsed().as_secs_f64());
+        results.push(result);
+    }
+    match &results[..] {
+        [one] => write_json(json, one)?,
+        all => write_json(json, &json!({ "cases": all, "pass": good }))?,
+    }
+    Ok(if good { Verdict::Good } else { Verdict::CheckFailed })
+}
+
+fn choose(ids: &[String]) -> Result<Vec<&'static Case>, Failure> {
+    let all = cases();
+    if ids.is_empty() {
+        return Ok(all);
+    }
+    let mut chosen: Vec<&Case> = Vec::new();
+    for id in ids {
+        let one = all.iter().find(|case| case.id == id);
+        let prefix = format!("{id}-");
+        let some: Vec<&Case> = match one {
+            Some(case) => vec![*case],
+            None => all.iter().copied().filter(|case| case.id.starts_with(&prefix)).collect(),
+        };
+        if some.is_empty() {
+            return Err(Failure::new(Unknown(id.clone())));
+        }
+        chosen.extend(
+            some.into_iter().filter(|case| chosen.iter().all(|c| c.id != case.id)).collect::<Vec<_>>(),
+        );
+    }
+    Ok(chosen)
+}
+
+fn result(case: &Case, outcome: &Outcome) -> Value {
+    let values: Vec<Value> = outcome.values.iter().map(Compared::to_json).collect();
+    json!({ "id": case.id, "values": values, "pass": outcome.passes() })
+}
+
+fn show(outcome: &Outcome) {
+    use crate::papers::Rule;
+    let mut table = Table::new(["value", "measured", "published", "deviation", ""]);
+    for v in &outcome.values {
+        let sign = match v.rule {
+            Rule::Equal => "",
+            Rule::AtLeast => "≥ ",
+            Rule::AtMost => "≤ ",
+        };
+        table.push([
+            v.name.clone(),
+            format!("{:.5} ± {:.5}", v.measured.value, v.measured.error),
+            format!("{sign}{:.5} ± {:.5}", v.published.value, v.published.error),
+            format!("{:+.2}", v.deviation()),
+            if v.passes() { "pass" } else { "fail" }.to_owned(),
+        ]);
+    }
+    println!("{}", table.to_text());
+    for (name, (size, why)) in outcome.values.iter().filter_map(|v| Some((&v.name, v.allowance?))) {
+        println!("  {name}: {size} allowed, {why}");
+    }
+}
+
+fn write_plots(outcome: &Outcome, folder: &Path) -> Result<(), Failure> {
+    for (name, plot) in &outcome.plots {
+        let svg = plot.render().map_err(Failure::new)?;
+        let io = |source| Failure::new(PaperError::Io { path: folder.to_owned(), source });
+        std::fs::create_dir_all(folder).map_err(io)?;
+        write_atomically(&folder.join(format!("{name}.svg")), svg.as_bytes()).map_err(Failure::new)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,60 @@
+//! What a plugin is made from, as a digest: the same digest means the same plugin.
+
+use super::error::LammpsError;
+use super::host::Host;
+use std::collections::BTreeSet;
+use std::fs;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::path::{Path, PathBuf};
+
+/// Folders and files of the checkout that go into a plugin.
+const SOURCES: [&str; 8] = [
+    "Cargo.toml",
+    "Cargo.lock",
+    "rust-core/Cargo.toml",
+    "rust-core/src",
+    "lammps-plugin/Cargo.toml",
+    "lammps-plugin/build.rs",
+    "lammps-plugin/src",
+    "lammps-plugin/entry",
+];
+const CPP: [&str; 3] = ["lammps-plugin/cpp", "lammps-plugin/compat", "lammps-plugin/launcher"];
+
+/// Settings that compilers hear of.
+const SETTINGS: [&str; 4] = ["RUSTFLAGS", "CXXFLAGS", "CARGO_ENCODED_RUSTFLAGS", "RUSTUP_TOOLCHAIN"];
+
+/// The digest of a plugin for `host` from the checkout `root`.
+pub(super) fn digest(host: &Host, root: &Path, compiler: &[String]) -> Result<String, LammpsError> {
+    let mut hasher = DefaultHasher::new();
+    compiler.hash(&mut hasher);
+    for name in SETTINGS {
+        std::env::var_os(name).hash(&mut hasher);
+    }
+    for part in SOURCES.iter().chain(&CPP) {
+        add(&root.join(part), &root.join(part), &mut hasher)?;
+    }
+    // Of a source tree the headers of its own, without those of packages below; of MPI one, whose folder may have those of
+    // everything.
+    let entries = fs::read_dir(&host.include).map_err(LammpsError::io("read", &host.include))?;
+    let files = entries.filter_map(|e| Some(e.ok()?.path()));
+    let headers: BTreeSet<PathBuf> = files.filter(|p| p.extension().is_some_and(|e| e == "h")).collect();
+    for header in &headers {
+        add(&host.include, header, &mut hasher)?;
+    }
+    add(&host.mpi_include, &host.mpi_include.join("mpi.h"), &mut hasher)?;
+    Ok(format!("{:016x}", hasher.finish()))
+}
+
+/// Adds a file, or all files in a folder, by their names below `top` and what is in them.
+fn add(top: &Path, path: &Path, hasher: &mut DefaultHasher) -> Result<(), LammpsError> {
+    if path.is_dir() {
+        let entries = fs::read_dir(path).map_err(LammpsError::io("read", path))?;
+        let inside: BTreeSet<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
+        return inside.iter().try_for_each(|path| add(top, path, hasher));
+    }
+    // A part that is not there is built without.
+    let text = fs::read(path).unwrap_or_default();
+    path.strip_prefix(top).unwrap_or(path).hash(hasher);
+    text.hash(hasher);
+    Ok(())
+}

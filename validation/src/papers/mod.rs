@@ -1,0 +1,62 @@
+//! Figures and tables of the papers that the models come from, one case each, compared with what is printed.
+//!
+//! A case runs at a [`Size`] and gives named values, each beside the published one. Numbers are those of the
+//! text and tables of the papers; of a curve without numbers, the stated trend or the theory is compared.
+//!
+//! The rule is the same for every value: the deviation, in units of the combined error of both sides, is at most
+//! [`LIMIT`]; a trend counts on its wrong side only. A published number without an error bar has that of its last
+//! printed digit. What is known to differ is named as an allowance of that value, with its reason.
+
+mod berendsen;
+mod case;
+mod context;
+mod pagonabarraga;
+mod trofimov;
+mod wang;
+mod warren;
+
+pub use case::{Compared, LIMIT, Outcome, Rule};
+pub use context::{Context, PaperError, Size};
+
+/// A figure or table.
+#[derive(Debug, Clone, Copy)]
+pub struct Case {
+    /// `PAPER-figN`, `PAPER-tableN`, or another short name.
+    pub id: &'static str,
+    /// Which paper.
+    pub paper: &'static str,
+    /// What is compared.
+    pub what: &'static str,
+    run: fn(&Context) -> Result<Outcome, PaperError>,
+}
+
+impl Case {
+    /// Runs the case.
+    ///
+    /// # Errors
+    /// A run stops, or a file cannot be written. A value that does not agree is no error.
+    pub fn run(&self, context: &Context) -> Result<Outcome, PaperError> {
+        (self.run)(context)
+    }
+}
+
+/// Every case, by paper.
+pub fn cases() -> Vec<&'static Case> {
+    let papers: [&'static [Case]; 5] =
+        [pagonabarraga::CASES, trofimov::CASES, warren::CASES, wang::CASES, berendsen::CASES];
+    papers.into_iter().flatten().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn ids_are_unique_and_begin_with_their_paper() {
+        let mut ids: Vec<&str> = super::cases().iter().map(|case| case.id).collect();
+        let papers = ["pagonabarraga-", "trofimov-", "warren-", "wang-", "berendsen-"];
+        assert!(ids.iter().all(|id| papers.iter().any(|paper| id.starts_with(paper))), "{ids:?}");
+        let count = ids.len();
+        ids.sort_unstable();
+        ids.dedup();
+        assert_eq!(ids.len(), count);
+    }
+}

@@ -1,0 +1,255 @@
+//! What each integrator promises.
+
+use super::*;
+use psidpd_core::engine::thermostat::Update;
+
+/// Those that keep the Maxwell distribution of an ideal gas exactly, at any time step.
+fn exact() -> Vec<Integrator> {
+    let pairwise = Coupling { update: Update::OrnsteinUhlenbeck, ..Coupling::DEFAULT };
+    let rare = Coupling { every: 3, ..Coupling::DEFAULT };
+    let inside = ["velocity-verlet", "groot-warren", "dpd-vv", "self-consistent"];
+    let mut all: Vec<_> =
+        Integrator::ALL.iter().filter(|(name, _)| !inside.contains(name)).map(|(_, it)| *it).collect();
+    all.extend([Integrator::Aboba(pairwise), Integrator::Aboba(rare)]);
+    all
+}
+
+/// T_kin, kurtosis of velocities and pairs in shells of an ideal gas of two masses, with their standard errors.
+struct Gas {
+    temperature: [f64; 2],
+    kurtosis: [f64; 2],
+    /// By shell, in standard deviations.
+    shells: [f64; 3],
+}
+
+fn ideal_gas(integrator: Integrator, dt: f64) -> Gas {
+    let model = IDEAL.replace("[\"A\"]", "[\"A\", \"B\"]");
+    let rest = ONE_STAGE.to_owned() + "[masses]\nB = 3.0\n";
+    let state = scene_of(&model, "[4.0, 5.0, 4.0]", 4.0, &rest).unwrap().initial_state();
+    let mut run = simulation(&model, state);
+    run.prepare_for(integrator, dt, Want::FORCES).unwrap();
+    run.advance(30, dt, integrator).unwrap();
+    let edges = [0.0, 0.4, 0.7, 1.0f64];
+    let (mut found, mut frames) = ([0.0; 3], 0.0);
+    let blocks: Vec<[f64; 2]> = (0..20)
+        .map(|block| {
+            let mut sums = [0.0; 2];
+            for _ in 0..15 {
+                run.step(dt, integrator, Want::FORCES).unwrap();
+                let masses: Vec<f64> = run.species().iter().map(|s| run.masses()[*s as usize]).collect();
+                let fourth: f64 = run
+                    .velocities()
+                    .iter()
+                    .zip(masses)
+                    .map(|(v, m)| v.iter().map(|c| (m * c * c).powi(2)).sum::<f64>())
+                    .sum();
+                sums[0] += run.temperature() / 15.0;
+                sums[1] += fourth / (3 * run.len()) as f64 / 15.0;
+            }
+            if block % 2 == 0 {
+                frames += 1.0;
+                count_pairs(&run, &edges, &mut found);
+            }
+            sums
+        })
+        .collect();
+    assert!(run.momentum().iter().all(|p| p.abs() < 1e-9), "{integrator}: {:?}", run.momentum());
+    let of = |k: usize| {
+        let n = blocks.len() as f64;
+        let mean = blocks.iter().map(|b| b[k]).sum::<f64>() / n;
+        let variance = blocks.iter().map(|b| (b[k] - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        [mean, (variance / n).sqrt()]
+    };
+    let pairs = 0.5 * (run.len() * (run.len() - 1)) as f64 * frames / run.domain().volume(3);
+    let shells = std::array::from_fn(|s| {
+        let expected = pairs * 4.0 / 3.0 * std::f64::consts::PI * (edges[s + 1].powi(3) - edges[s].powi(3));
+        (found[s] - expected) / expected.sqrt()
+    });
+    Gas { temperature: of(0), kurtosis: of(1), shells }
+}
+
+fn count_pairs(run: &Simulation, edges: &[f64; 4], found: &mut [f64; 3]) {
+    let x = run.positions();
+    for i in 0..x.len() {
+        for j in 0..i {
+            let d = run.domain().minimum_image(x[i], x[j]);
+            let r = d.iter().map(|c| c * c).sum::<f64>().sqrt();
+            if let Some(shell) = (0..3).find(|s| (edges[*s]..edges[s + 1]).contains(&r)) {
+                found[shell] += 1.0;
+            }
+        }
+    }
+}
+
+/// At Δt = 0.2, ten times what velocity Verlet bears. Student's t of 19 degrees of freedom beyond 6 is rarer than
+/// once in 10^5, beyond five standard deviations so is a shell: 45 numbers fail by chance less than once in 2000 seeds,
+/// and the seed is fixed. ⟨v⁴⟩ of N particles without momentum is below 3 kT²/m² by 2/N of it, 0.02 here.
+#[test]
+fn the_maxwell_distribution_is_exact_at_long_steps() {
+    for integrator in exact() {
+        let Gas { temperature: [t, t_error], kurtosis: [k, k_error], shells } = ideal_gas(integrator, 0.2);
+        assert!((t - 1.0).abs() < 6.0 * t_error, "{integrator}: T = {t} +- {t_error}");
+        assert!(t_error < 0.01, "{integrator}: {t_error}");
+        assert!((k - 3.0).abs() < 6.0 * k_error + 0.02, "{integrator}: <v^4> = {k} +- {k_error}");
+        assert!(k_error < 0.1, "{integrator}: {k_error}");
+        assert!(shells.iter().all(|z| z.abs() < 5.0), "{integrator}: {shells:?}");
+    }
+}
+
+/// The others have errors that are known, at Δt = 0.05 and γρ∫w²/(3m) = 2.51 for mass 1. Beyond six standard errors of
+/// these bands by chance less than once in 10^5.
+#[test]
+fn the_errors_of_the_others_show() {
+    for (name, integrator) in Integrator::ALL {
+        let [low, high] = match name {
+            "velocity-verlet" => [0.02, 0.09],
+            "groot-warren" => [0.005, 0.06],
+            "dpd-vv" | "self-consistent" => [-0.02, 0.02],
+            _ => continue,
+        };
+        let [t, error] = ideal_gas(integrator, 0.05).temperature;
+        let off = t - 1.0;
+        assert!(off > low - 6.0 * error && off < high + 6.0 * error, "{integrator}: {t} +- {error}");
+        assert!(error < 0.01, "{integrator}: {error}");
+    }
+    // Twice the step, and what is wrong shows beyond doubt.
+    let [t, error] = ideal_gas(Integrator::VelocityVerlet, 0.1).temperature;
+    assert!(t - 1.0 > 0.05 + 6.0 * error, "{t} +- {error}");
+}
+
+/// Deviations of the energy without thermostat, over several starts, at steps of 0.01 and an eighth of it.
+#[test]
+fn without_thermostat_all_are_of_second_order() {
+    let mut run = simulation(SET6, settled());
+    let starts: Vec<State> = (0..4)
+        .map(|_| {
+            advance(&mut run, 50, 0.01, Integrator::VelocityVerlet);
+            run.state()
+        })
+        .collect();
+    let energy = |run: &Simulation| run.potential_energy() + run.kinetic_energy();
+    for (name, integrator) in Integrator::ALL {
+        let deviation = |dt: f64| {
+            let (mut squares, mut count) = (0.0, 0.0);
+            for start in &starts {
+                let mut run = simulation(SET6, start.clone());
+                run.set_thermostat(false);
+                run.prepare_for(integrator, dt, Want::TOTALS).unwrap();
+                let first = energy(&run);
+                for _ in 0..(0.4 / dt).round() as usize {
+                    run.step(dt, integrator, Want::TOTALS).unwrap();
+                    squares += (energy(&run) - first).powi(2);
+                    count += 1.0;
+                }
+            }
+            (squares / count).sqrt() / starts[0].len() as f64
+        };
+        let [coarse, fine] = [0.01, 0.00125].map(deviation);
+        let order = (coarse / fine).log2() / 3.0;
+        assert!((1.7..2.4).contains(&order), "{name}: order {order}: {coarse} and {fine}");
+        // Two stages for twice the forces: the error of energy is less than half of that of the same forces.
+        assert!(name != "two-stage" || coarse < 0.5 * 2e-3, "{coarse}");
+    }
+}
+
+/// Mean pressure and temperature of standard DPD, a = 25, ρ = 3, kT = 1: 23.637(2) by Lowe–Andersen and 23.635(2) by
+/// Shardlow's method at Δt = 0.02, in the example programs of Allen and Tildesley. Blocks give the standard errors, of
+/// 0.05 or less; with 0.03 for the differences of finite steps, six of them are exceeded by chance once in 10^5 per case.
+#[test]
+fn pressures_are_those_of_other_codes() {
+    const DPD: &str = "title = \"dpd\"\nspecies = [\"A\"]\n[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\n\
+        strength = 25\nrange = 1\n[[thermostat]]\ngamma = 4.5\nrange = 1\n";
+    let start = state_of(DPD, "[4.0, 4.0, 4.0]", 3.0);
+    for (name, integrator) in Integrator::ALL {
+        let dt = match name {
+            "two-stage" => 0.04,
+            "velocity-verlet" | "groot-warren" => 0.01,
+            _ => 0.02,
+        };
+        let mut run = simulation(DPD, start.clone());
+        run.prepare_for(integrator, dt, Want::FORCES).unwrap();
+        run.advance((4.0 / dt) as u64, dt, integrator).unwrap();
+        let samples = (10.0 / dt / 16.0) as usize;
+        let blocks: Vec<[f64; 2]> = (0..16)
+            .map(|_| {
+                let mut sums = [0.0; 2];
+                for _ in 0..samples {
+                    run.advance(3, dt, integrator).unwrap();
+                    run.step(dt, integrator, Want::TOTALS).unwrap();
+                    sums[0] += run.scalar_pressure(run.conservative_pressure_tensor());
+                    sums[1] += run.temperature();
+                }
+                sums.map(|sum| sum / samples as f64)
+            })
+            .collect();
+        let of = |k: usize| {
+            let mean = blocks.iter().map(|b| b[k]).sum::<f64>() / 16.0;
+            let variance = blocks.iter().map(|b| (b[k] - mean).powi(2)).sum::<f64>() / 15.0;
+            [mean, (variance / 16.0).sqrt()]
+        };
+        let [[p, p_error], [t, t_error]] = [of(0), of(1)];
+        assert!((p - 23.636).abs() < 6.0 * p_error + 0.03, "{name}: p = {p} +- {p_error}");
+        assert!(p_error < 0.05, "{name}: {p_error}");
+        assert!((t - 1.0).abs() < 6.0 * t_error + 0.02, "{name}: T = {t} +- {t_error}");
+    }
+}
+
+/// Steps in a row, between which a kick is deferred, are the same as single ones; so are steps at whose ends energies are
+/// asked for.
+#[test]
+fn what_is_asked_for_changes_no_step() {
+    let start = settled();
+    for (name, integrator) in Integrator::ALL {
+        let [mut single, mut row, mut asked] = [(); 3].map(|()| {
+            let mut run = simulation(SET6, start.clone());
+            run.set_reordering(true);
+            run.prepare_for(integrator, 0.01, Want::FORCES).unwrap();
+            run
+        });
+        for (dt, steps) in [(0.01, 5), (0.02, 3), (0.005, 34)] {
+            for _ in 0..steps {
+                single.step(dt, integrator, Want::FORCES).unwrap();
+                asked.step(dt, integrator, Want::TOTALS).unwrap();
+            }
+            row.advance(steps, dt, integrator).unwrap();
+            assert!(single.state() == row.state(), "{name}");
+            assert!(single.state() == asked.state(), "{name}");
+        }
+        // Energies are those of the positions at the end.
+        let energy = asked.potential_energy();
+        asked.compute(Want::TOTALS, None).unwrap();
+        assert!((energy - asked.potential_energy()).abs() < 1e-9 * energy.abs(), "{name}");
+    }
+}
+
+/// Forces that were prepared for another integrator are computed anew.
+#[test]
+fn integrators_may_follow_each_other() {
+    let start = settled();
+    for (name, integrator) in Integrator::ALL {
+        let [mut prepared, mut switched] = [(); 2].map(|()| simulation(SET6, start.clone()));
+        let dragging = !["velocity-verlet", "groot-warren", "dpd-vv", "self-consistent"].contains(&name);
+        let other = if dragging { Integrator::VelocityVerlet } else { Integrator::ALL[6].1 };
+        prepared.prepare_for(integrator, 0.01, Want::FORCES).unwrap();
+        switched.prepare_for(other, 0.01, Want::FORCES).unwrap();
+        for run in [&mut prepared, &mut switched] {
+            run.step(0.01, integrator, Want::FORCES).unwrap();
+        }
+        assert!(prepared.state() == switched.state(), "{name}");
+    }
+}
+
+/// As large steps as a tenth of the box, and still to the last bit the same in a box that leans, between walls, with frozen
+/// particles and unequal masses: the pairs of the thermostat are all there is.
+#[test]
+fn noise_of_pairs_acts_at_every_kth_step() {
+    let mut run = simulation(IDEAL, state_of(IDEAL, "[4.0, 4.0, 4.0]", 3.0));
+    let coupling = Coupling { every: 4, ..Coupling::DEFAULT };
+    let integrator = Integrator::TwoStage { lambda: 0.21, coupling };
+    run.prepare_for(integrator, 0.01, Want::FORCES).unwrap();
+    for step in 1..=12 {
+        let before = run.velocities().to_vec();
+        run.step(0.01, integrator, Want::FORCES).unwrap();
+        assert_eq!(run.velocities() != before, step % 4 == 0, "{step}");
+    }
+}

@@ -1,0 +1,167 @@
+//! Looks after the temperature of a run: warns where it leaves its target, and stops a run that is far off.
+//!
+//! The temperature is that of the relative velocities which drag and noise act on: a drop that flies, or a flow, has
+//! its thermal one. It is sampled a few times in a stage, and every [`INTERVAL`] steps in a long one, at less than a hundredth of the
+//! cost of the steps; what is sampled changes no step. The temperature of configurations, which errors of the
+//! forces change most, comes every [`RARE`] steps.
+
+use super::error::RunError;
+use super::simulation::Simulation;
+use crate::observe::configurational;
+use crate::observe::frame::Frame;
+use crate::scene::Stage;
+use psidpd_core::engine::reference::Evaluator;
+use std::fmt;
+
+/// Most steps from sample to sample, and fewest.
+const INTERVAL: u64 = 250;
+const LEAST: u64 = 10;
+
+/// Samples of a stage that is too short for more.
+const SAMPLES: u64 = 8;
+
+/// Steps between temperatures of configurations: one costs about as much as fifty steps.
+const RARE: u64 = 5000;
+
+/// A run stops where it is hotter than this, in kT, for [`PATIENCE`] relaxation times and [`IN_A_ROW`] samples.
+const FAR_OFF: f64 = 2.0;
+const PATIENCE: f64 = 10.0;
+const IN_A_ROW: u64 = 4;
+
+/// Relative deviation that is not worth a warning.
+const TOLERANCE: f64 = 0.02;
+
+/// How a temperature was measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Thermometer {
+    /// From relative velocities of pairs.
+    Kinetic,
+    /// From forces.
+    Configurational,
+}
+
+/// A temperature that is not that of its stage.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Deviation {
+    /// Name of the stage.
+    pub stage: String,
+    /// How it was measured.
+    pub thermometer: Thermometer,
+    /// Mean over the last two thirds of the stage, and its standard error, in units of kT.
+    pub mean: f64,
+    /// Its standard error.
+    pub error: f64,
+    /// Δt.
+    pub dt: f64,
+}
+
+impl fmt::Display for Deviation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Deviation { stage, thermometer, mean, error, dt } = self;
+        let (what, cause) = match thermometer {
+            Thermometer::Kinetic => ("kinetic", "the thermostat's and the forces' error at this step"),
+            Thermometer::Configurational => ("configurational", "the forces' error at this step"),
+        };
+        write!(
+            f,
+            "stage \"{stage}\": the {what} temperature is {mean:.3} +- {error:.3} kT: likely {cause}, dt = {dt}; use a smaller \
+             dt, or an integrator that bears it (docs/integrators.md)"
+        )
+    }
+}
+
+/// The watch over one stage.
+#[derive(Debug, Default)]
+pub(super) struct Watch {
+    /// Of each sample, in units of kT.
+    kinetic: Vec<f64>,
+    configurational: Vec<[f64; 2]>,
+    /// Samples in a row that were too hot, and the step of the first.
+    hot: Option<(u64, u64)>,
+}
+
+impl Watch {
+    /// Whether a sample is due after step `done` of a stage.
+    pub fn is_due(stage: &Stage, done: u64) -> bool {
+        let interval = (stage.steps / SAMPLES).clamp(LEAST, INTERVAL);
+        stage.thermostat && (done.is_multiple_of(interval) || done.is_multiple_of(RARE))
+    }
+
+    /// Takes a sample; the step must be at its end.
+    pub fn sample(&mut self, simulation: &mut Simulation, stage: &Stage, done: u64) -> Result<(), RunError> {
+        let Some(warmth) = simulation.warmth(stage.dt)? else { return Ok(()) };
+        let ratio = warmth.kt / stage.kt;
+        self.kinetic.push(ratio);
+        if done.is_multiple_of(RARE)
+            && let Some(sums) = configurational(simulation)
+        {
+            self.configurational.push(sums);
+        }
+        // A body force may drive a flow that is hot by itself.
+        let driven = stage.body_forces && simulation.has_body_forces();
+        if ratio <= FAR_OFF || driven {
+            self.hot = None;
+            return Ok(());
+        }
+        let (count, since) = self.hot.map_or((1, done), |(count, since)| (count + 1, since));
+        self.hot = Some((count, since));
+        let relaxations = (done - since) as f64 * stage.dt * warmth.rate;
+        if count >= IN_A_ROW && relaxations > PATIENCE {
+            return Err(RunError::TooHot {
+                step: simulation.step_number(),
+                since: simulation.step_number() - (done - since),
+                ratio,
+                dt: stage.dt,
+                integrator: stage.integrator.to_string(),
+            });
+        }
+        Ok(())
+    }
+
+    /// What is to be said at the end of a stage.
+    pub fn deviations(&self, simulation: &Simulation, stage: &Stage) -> Vec<Deviation> {
+        let deviation = |thermometer, [mean, error]: [f64; 2]| {
+            let off = (mean - 1.0).abs() > TOLERANCE + 3.0 * error;
+            off.then(|| Deviation { stage: stage.name.clone(), thermometer, mean, error, dt: stage.dt })
+        };
+        let mut found = Vec::new();
+        if stage.level.is_some() {
+            // A level of a ramp is on its way.
+            return found;
+        }
+        let settled = &self.kinetic[self.kinetic.len() / 3..];
+        if settled.len() >= 4 {
+            found.extend(deviation(Thermometer::Kinetic, estimate(settled)));
+        }
+        let settled = &self.configurational[self.configurational.len() / 3..];
+        if !settled.is_empty() {
+            let [squares, laplacians] =
+                [0, 1].map(|k| settled.iter().map(|s| s[k]).sum::<f64>() / settled.len() as f64);
+            // One sample has an error of its own: about that of so many free particles.
+            let freedom = (simulation.dimensions() * simulation.mobile() * settled.len()) as f64;
+            let mean = squares / laplacians / stage.kt;
+            found
+                .extend(deviation(Thermometer::Configurational, [mean, 2.0 * mean * (2.0 / freedom).sqrt()]));
+        }
+        found
+    }
+}
+
+/// Mean and standard error.
+fn estimate(samples: &[f64]) -> [f64; 2] {
+    let n = samples.len() as f64;
+    let mean = samples.iter().sum::<f64>() / n;
+    let variance = samples.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    [mean, (variance / n).sqrt()]
+}
+
+/// `Σ F·F` and `Σ ∇²U`, if there is a temperature of configurations.
+fn configurational(simulation: &Simulation) -> Option<[f64; 2]> {
+    let fluid = simulation.model().at(simulation.kt()).ok()?;
+    if simulation.has_body_forces() || configurational::missing(&fluid, simulation.domain()).is_some() {
+        return None;
+    }
+    let evaluator = Evaluator::new(fluid).ok()?;
+    let [squares, laplacians] = configurational::sums(&Frame::new(simulation.view(0.0), &evaluator));
+    (laplacians > 0.0).then_some([squares, laplacians])
+}
