@@ -426,7 +426,7 @@ impl Style {
     /// A particle that was not there then.
     pub fn single(&mut self, kinds: [i32; 2], r: f64, particles: [i32; 2]) -> Result<(f64, f64), StyleError> {
         guard(|| {
-            let width = self.engine().slope_width();
+            let width = self.engine().plan().slope_width();
             if width == 0 {
                 return Ok(self.engine.single(kinds, r, [0, 0]));
             }

@@ -18,6 +18,7 @@
 pub mod c_api;
 pub mod document;
 pub mod engine;
+pub mod maximum;
 pub mod memory;
 pub mod model;
 pub mod theory;

@@ -379,3 +379,93 @@ fn forces_and_virials_are_gradients() {
     // Most differences must not have been skipped.
     assert!(taken > 120, "{taken}");
 }
+
+/// A box that a sweep goes round in, or with room for ghosts around it.
+fn wide_configuration(random: &mut Random, fluid: &Fluid) -> Configuration {
+    let flat = fluid.dimensions == 2;
+    let mut edge = || fluid.cutoff() * random.within(2.7, 3.2);
+    let (a, b, c) = (edge(), edge(), if flat { 1.0 } else { edge() });
+    let mut tilt = || random.within(-0.3, 0.3);
+    let (xy, xz, yz) = (tilt(), if flat { 0.0 } else { tilt() }, if flat { 0.0 } else { tilt() });
+    let edges = nalgebra::Matrix3::new(a, xy, xz, 0.0, b, yz, 0.0, 0.0, c);
+    let domain = PeriodicBox::new([-1.0, 0.5, 2.0], edges, [true, true, !flat]).unwrap();
+    let count = (4.0 * domain.volume(fluid.dimensions)) as usize;
+    let x: Vec<[f64; 3]> = (0..count)
+        .map(|_| {
+            let z = if flat { 0.0 } else { random.within(0.0, 1.0) };
+            domain.point([random.within(0.0, 1.0), random.within(0.0, 1.0), z])
+        })
+        .collect();
+    Configuration { species: (0..count).map(|_| random.below(fluid.species.len())).collect(), x, domain }
+}
+
+/// Energy, forces and virial of the fast engine: in the box itself, and in open space with ghosts for what is beyond it.
+fn run_sweep(
+    fluid: &Fluid,
+    c: &Configuration,
+    settings: psidpd_core::engine::Settings,
+    ghosts: bool,
+) -> (f64, Vec<[f64; 3]>, [f64; 6]) {
+    let mut sweep = psidpd_core::engine::Sweep::new(fluid, settings).unwrap();
+    let owned = c.x.len();
+    let mut x = c.x.clone();
+    let mut tag: Vec<i32> = (1..=owned as i32).collect();
+    let mut kind: Vec<i32> = c.species.iter().map(|s| *s as i32).collect();
+    let mut forces = vec![[0.0; 3]; owned];
+    if !ghosts {
+        assert!(sweep.fits(&c.domain));
+        let particles = Particles { owned, x: &x, tag: &tag, kind: &kind };
+        let tally =
+            sweep.evaluate(&c.domain, &particles, &[], None, Want::TOTALS, &mut forces, false).unwrap();
+        return (tally.energy(), forces, tally.virial);
+    }
+    let mut images = Images::default();
+    images.build(&c.domain, fluid.dimensions, fluid.cutoff(), owned, &mut x);
+    images.forward(1, &mut tag);
+    images.forward(1, &mut kind);
+    let particles = Particles { owned, x: &x, tag: &tag, kind: &kind };
+    let edges = nalgebra::Matrix3::from_columns(&[0, 1, 2].map(|k| c.domain.edge(k).into()));
+    let open = PeriodicBox::new(c.domain.origin(), edges, [false; 3]).unwrap();
+    let around = psidpd_core::engine::Around { domain: &open, images: &[] };
+    sweep.first(around, &particles, &[], None, Want::TOTALS).unwrap();
+    let width = sweep.slope_width();
+    let mut slopes = sweep.slopes()[..owned * width].to_vec();
+    images.forward(width, &mut slopes);
+    sweep.slopes_mut().copy_from_slice(&slopes);
+    let tally = sweep.second(&particles, &mut forces, false).unwrap();
+    (tally.energy(), forces, tally.virial)
+}
+
+/// Every instruction set and precision, in the box and with ghosts, against the plain engine, which the test above holds to
+/// the reference. In mixed precision a force may be off by some millionths of the largest.
+#[test]
+fn fast_engine_equals_plain_engine() {
+    use psidpd_core::engine::{Instructions, Precision, Settings};
+    for seed in 0..24 {
+        let (text, fluid, mut random) = load(5000 + seed);
+        let c = wide_configuration(&mut random, &fluid);
+        let truth = run_engine(&fluid, &c, Newton::On);
+        let largest = truth.forces.iter().flatten().fold(1.0f64, |m, f| m.max(f.abs()));
+        let size = truth.virial.iter().fold(1.0f64, |m, w| m.max(w.abs()));
+        let energy = truth.energy.abs().max(c.x.len() as f64);
+        for (name, instructions) in Instructions::ALL {
+            if !instructions.available() {
+                continue;
+            }
+            for (precision, limit) in [(Precision::Double, 1e-11), (Precision::Mixed, 1e-4)] {
+                for ghosts in [false, true] {
+                    let settings = Settings { precision, instructions, ..Settings::default() };
+                    let (u, f, w) = run_sweep(&fluid, &c, settings, ghosts);
+                    let what = format!("{name}, {precision}, ghosts {ghosts}, seed {seed}\n{text}");
+                    assert!(close(u, truth.energy, limit * energy), "energy {u} {}: {what}", truth.energy);
+                    for (f, g) in f.as_flattened().iter().zip(truth.forces.as_flattened()) {
+                        assert!(close(*f, *g, limit * largest), "force {f} {g}, largest {largest}: {what}");
+                    }
+                    for (w, v) in w.iter().zip(truth.virial) {
+                        assert!(close(*w, v, limit * size), "virial {w} {v}: {what}");
+                    }
+                }
+            }
+        }
+    }
+}

@@ -2,6 +2,7 @@
 
 use psidpd_core::engine::reference::{self, Reference};
 use psidpd_core::engine::{Images, Newton, Particles, PeriodicBox, Plan, Surroundings, Want, noise};
+use psidpd_core::maximum::largest;
 use psidpd_core::model::{Fluid, Model};
 use psidpd_core::theory::{MeanField, TheoryError};
 
@@ -56,7 +57,7 @@ fn engine(fluid: &Fluid, newton: Newton) -> (f64, Vec<[f64; 3]>) {
 }
 
 fn assert_close(a: &[[f64; 3]], b: &[[f64; 3]]) {
-    let scale = b.iter().flatten().fold(0.0f64, |m, f| m.max(f.abs()));
+    let scale = largest(b.as_flattened());
     for (a, b) in a.iter().flatten().zip(b.iter().flatten()) {
         assert!((a - b).abs() < 1e-12 * scale, "{a} {b}");
     }

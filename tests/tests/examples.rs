@@ -1,6 +1,7 @@
 //! The scripts in `lammps-plugin/examples`: every one runs, on one rank and on two.
 
 use psidpd_tests::{examples, lammps, root};
+use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -45,14 +46,15 @@ fn examples_run_on_one_rank_and_on_two() {
     let (host, plugin) = lammps();
     let scripts = examples();
     assert_eq!(scripts.len(), 8);
-    let [plugin, models] =
-        [plugin.clone(), root().join("validation/models")].map(|p| p.display().to_string());
-    let arguments =
-        ["-log", "none", "-var", "plugin", &plugin, "-var", "models", &models, "-var", "steps", "50"];
+    let arguments = ["-log", "none", "-var", "plugin", "./psidpdplugin.so", "-var", "models", "models"];
+    let arguments = [&arguments[..], &["-var", "steps", "50"]].concat();
     for script in scripts {
         let [one, two] = [1, 2].map(|ranks| {
             // What scripts write stays out of the checkout.
             let folder = tempfile::tempdir().unwrap();
+            // LAMMPS puts no variables in between quotes: values with a space would fall apart.
+            symlink(plugin, folder.path().join("psidpdplugin.so")).unwrap();
+            symlink(root().join("validation/models"), folder.path().join("models")).unwrap();
             let run = host.run_script(ranks, folder.path(), &script, &arguments, Duration::from_secs(120));
             let run = run.unwrap_or_else(|e| panic!("{}, {ranks} ranks: {e}", script.display()));
             energies(&script, &run.stdout)
@@ -112,7 +114,7 @@ fn examples_of_the_manual_pages_are_accepted() {
             let script = format!(
                 "units lj\ndimension {dimension}\ncomm_modify vel yes\nregion b block 0 5 0 5 {edge}\n\
                  create_box {types} b\ncreate_atoms 1 random 50 1 b\ncreate_atoms {types} random 50 2 b\n\
-                 mass * 1\nplugin load {}\n{style}\nrun 0\n",
+                 mass * 1\nplugin load \"{}\"\n{style}\nrun 0\n",
                 plugin.display()
             );
             let folder = tempfile::tempdir().unwrap();

@@ -3,6 +3,7 @@
 
 use psidpd::export::eam::{EamError, Grid, write};
 use psidpd::lammps::Lammps;
+use psidpd_core::maximum::largest;
 use psidpd_core::model::{Fluid, Model};
 use psidpd_tests::{lammps, root};
 use std::path::Path;
@@ -69,11 +70,7 @@ fn compare(text: &str, kt: f64, density: f64, grid: Grid) {
 
     assert_eq!(forces.len(), 3 * count * types);
     let rms = (forces.iter().map(|f| f * f).sum::<f64>() / (count * types) as f64).sqrt();
-    let worst = forces
-        .iter()
-        .zip(&tabulated_forces)
-        .map(|(a, b)| (a - b).abs())
-        .fold(0.0, |m: f64, d| if d > m || d.is_nan() { d } else { m });
+    let worst = largest(forces.iter().zip(&tabulated_forces).map(|(a, b)| (a - b).abs()));
     println!("{}: force {:.1e}, energy {energy} {tabulated}", fluid.title, worst / rms);
     assert!(rms > 1.0 && worst < 1e-6 * rms, "{}: {worst} of {rms}", fluid.title);
     let scale = energy.abs().max((count * types) as f64);

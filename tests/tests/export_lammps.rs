@@ -1,13 +1,14 @@
 //! Decks that `export lammps` writes: the trajectory of the scene, step by step.
 
 use psidpd::lammps::{DataFile, dump};
-use psidpd_tests::{lammps, psidpd, root, said};
+use psidpd_core::maximum::largest;
+use psidpd_tests::{lammps, program, root, said};
 use std::path::Path;
-use std::process::Output;
+use std::process::{Command, Output};
 use std::time::Duration;
 
 const ONE_SPECIES: &str = r#"
-title = "one species"
+title = 'one """ species'
 model = "MODELS/warren2003-set6.toml"
 kT    = 1.0
 seed  = 11
@@ -18,7 +19,7 @@ lengths = [5.0, 6.0, 7.0]
 kind    = "random"
 density = 6.0
 [[stage]]
-name  = "all"
+name  = 'all """ of it'
 steps = 50
 dt    = 0.005
 [output]
@@ -247,6 +248,16 @@ fn folder(scene: &str) -> tempfile::TempDir {
     folder
 }
 
+/// Runs the program, which may read the table beside the folder of scene and model.
+fn psidpd(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(program())
+        .args(arguments)
+        .current_dir(folder)
+        .env("PSIDPD_TABLES_ANYWHERE", "1")
+        .output()
+        .expect("the program starts")
+}
+
 /// Writes the deck of the scene in `folder`.
 fn export(folder: &Path) -> Output {
     psidpd(folder, &["export", "lammps", "scenes/scene.toml", "--out", "deck", "--json", "deck.json"])
@@ -276,7 +287,8 @@ fn compare(scene: &str) {
         assert!(deck.join(file.as_str().unwrap()).is_file(), "{file}");
     }
     let (host, plugin) = lammps();
-    let plugin = plugin.display().to_string();
+    // As for any path with a space: LAMMPS puts no variables in between quotes.
+    let plugin = format!("\"{}\"", plugin.display());
     let arguments = ["-var", "plugin", &plugin];
     for ranks in [1, 2] {
         host.run_script(ranks, &deck, Path::new("in.lammps"), &arguments, Duration::from_secs(120)).unwrap();
@@ -305,7 +317,7 @@ fn precision_is_that_of_the_scene() {
     let run = psidpd(at, &["run", "scenes/scene.toml", "--out", "native"]);
     assert!(run.status.success(), "{}", said(&run));
     let (host, plugin) = lammps();
-    let plugin = plugin.display().to_string();
+    let plugin = format!("\"{}\"", plugin.display());
     let (deck, arguments) = (at.join("deck"), ["-var", "plugin", &plugin]);
     host.run_script(1, &deck, Path::new("in.lammps"), &arguments, Duration::from_secs(120)).unwrap();
     let read = |folder: &str| {
@@ -314,7 +326,7 @@ fn precision_is_that_of_the_scene() {
         frames[1].vectors(["x", "y", "z"]).unwrap()
     };
     let most = |a: Vec<[f64; 3]>, b: Vec<[f64; 3]>| {
-        a.iter().zip(&b).map(|(a, b)| distance(*a, *b, [5.0, 6.0, 7.0])).fold(0.0, f64::max)
+        largest(a.iter().zip(&b).map(|(a, b)| distance(*a, *b, [5.0, 6.0, 7.0])))
     };
     let off = most(read("native"), read("deck"));
     assert!(off < 1e-6, "{off:e}");
@@ -322,11 +334,10 @@ fn precision_is_that_of_the_scene() {
 
 /// The largest difference, by whole boxes where that is less.
 fn distance(a: [f64; 3], b: [f64; 3], length: [f64; 3]) -> f64 {
-    (0..3).fold(0.0, |most: f64, c| {
+    largest((0..3).map(|c| {
         let d = a[c] - b[c];
-        let d = (d - length[c] * (d / length[c]).round()).abs();
-        if d > most || d.is_nan() { d } else { most }
-    })
+        (d - length[c] * (d / length[c]).round()).abs()
+    }))
 }
 
 fn compare_frames(at: &Path) {
@@ -345,7 +356,7 @@ fn compare_frames(at: &Path) {
         for (names, length) in [(["x", "y", "z"], length), (["vx", "vy", "vz"], [f64::MAX; 3])] {
             let (a, b) = (a.vectors(names).unwrap(), b.vectors(names).unwrap());
             assert_eq!(a.len(), b.len());
-            let most = a.iter().zip(&b).map(|(a, b)| distance(*a, *b, length)).fold(0.0, f64::max);
+            let most = largest(a.iter().zip(&b).map(|(a, b)| distance(*a, *b, length)));
             assert!(most < 1e-10, "{names:?} differ by {most:e}");
         }
     }

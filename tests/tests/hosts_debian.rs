@@ -1,4 +1,5 @@
-//! The LAMMPS of the distribution, which loads no plugins: the launcher, under its mpirun too, and Python.
+//! The LAMMPS of the distribution, which loads no plugins: the launcher, under its mpirun too, and Python. Where it is
+//! installed: `cargo test --release --workspace --test hosts_debian -- --ignored`.
 
 mod host_common;
 mod style_common;
@@ -6,7 +7,6 @@ mod style_common;
 use host_common::{LIMIT, Runs, model, script};
 use psidpd::lammps::{Host, HostKind, HostVersion, plugin};
 use psidpd_tests::{lammps, psidpd, root, said};
-use std::io::Write;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -21,36 +21,21 @@ struct Debian {
     launcher: PathBuf,
 }
 
-/// None, after saying so, where it is not installed; in CI it must be.
-fn debian() -> Option<&'static Debian> {
-    static DEBIAN: OnceLock<Option<Debian>> = OnceLock::new();
-    let found = DEBIAN.get_or_init(|| {
+/// Fails where it is not installed: these tests are ignored unless asked for.
+fn debian() -> &'static Debian {
+    static DEBIAN: OnceLock<Debian> = OnceLock::new();
+    DEBIAN.get_or_init(|| {
         let installed = |package: &str| {
             let out = Command::new("dpkg").args(["-s", package]).output();
             out.is_ok_and(|o| String::from_utf8_lossy(&o.stdout).contains("Status: install ok installed"))
         };
-        if !PACKAGES.into_iter().all(installed) {
-            return None;
-        }
+        assert!(PACKAGES.into_iter().all(installed), "install them: apt install {}", PACKAGES.join(" "));
         let host = Host::system().expect("Debian's LAMMPS is found");
         let plugin = plugin::build(&host, &|_| {}).expect("the plugin builds");
         let launcher =
             plugin::launcher(&plugin).expect("Debian's LAMMPS loads no plugins: there is a launcher");
-        Some(Debian { host, plugin, launcher })
-    });
-    if found.is_none() {
-        // Not by eprintln!, which the test harness swallows.
-        let _ = writeln!(
-            std::io::stderr(),
-            "not run: Debian LAMMPS is not installed (apt install {})",
-            PACKAGES.join(" ")
-        );
-        assert!(
-            std::env::var_os("CI").is_none_or(|ci| ci != "true"),
-            "Debian's LAMMPS must be installed in CI"
-        );
-    }
-    found.as_ref()
+        Debian { host, plugin, launcher }
+    })
 }
 
 impl Debian {
@@ -66,8 +51,9 @@ fn outcome(debian: &Debian, text: &str, ranks: usize, folder: &Path) -> Result<S
 }
 
 #[test]
+#[ignore = "needs the LAMMPS of Debian: apt install lammps liblammps-dev python3-lammps"]
 fn the_launcher_runs_scripts_as_lmp_does() {
-    let Some(debian) = debian() else { return };
+    let debian = debian();
     let folder = tempfile::tempdir().unwrap();
     // LAMMPS numbers random atoms by rank, and the noise goes by number: both start from one file.
     let make = script(&model()).replace("run 10", "run 0\nwrite_data start.data");
@@ -110,16 +96,18 @@ fn the_launcher_runs_scripts_as_lmp_does() {
 }
 
 #[test]
+#[ignore = "needs the LAMMPS of Debian: apt install lammps liblammps-dev python3-lammps"]
 fn forces_equal_the_native_engine() {
-    let Some(debian) = debian() else { return };
+    let debian = debian();
     host_common::forces_equal_the_native_engine(&debian.runs());
 }
 
 /// Its headers let nobody ask for a full list: the half list has all pairs with newton off, and the styles
 /// insist on that.
 #[test]
+#[ignore = "needs the LAMMPS of Debian: apt install lammps liblammps-dev python3-lammps"]
 fn pairs_of_the_half_list_are_the_full_ones() {
-    let Some(debian) = debian() else { return };
+    let debian = debian();
     let said = host_common::special_factors_and_exclusions(&debian.runs(), "off");
     assert!(said.contains("half neighbor list of LAMMPS, because of special_bonds"), "{said}");
     let folder = tempfile::tempdir().unwrap();
@@ -130,14 +118,15 @@ fn pairs_of_the_half_list_are_the_full_ones() {
 }
 
 #[test]
+#[ignore = "needs the LAMMPS of Debian: apt install lammps liblammps-dev python3-lammps"]
 fn styles_survive_clear_and_scripts_for_plugins_run_unchanged() {
-    let Some(debian) = debian() else { return };
+    let debian = debian();
     let folder = tempfile::tempdir().unwrap();
     let text = script(&model());
     let run = |text: &str| outcome(debian, text, 1, folder.path());
     let twice = run(&format!("{text}clear\n{text}")).unwrap();
     assert_eq!(twice.matches("Loop time").count(), 2, "{twice}");
-    run(&format!("plugin load {}\n{text}", debian.plugin.display())).unwrap();
+    run(&format!("plugin load \"{}\"\n{text}", debian.plugin.display())).unwrap();
     let listed = run(&format!(
         "plugin list\nplugin unload pair mdpd/psi\nplugin unload pair lj/cut\nplugin list\n{text}"
     ))
@@ -154,8 +143,9 @@ fn styles_survive_clear_and_scripts_for_plugins_run_unchanged() {
 }
 
 #[test]
+#[ignore = "needs the LAMMPS of Debian: apt install lammps liblammps-dev python3-lammps"]
 fn mistakes_stop_all_ranks_with_a_clear_line() {
-    let Some(debian) = debian() else { return };
+    let debian = debian();
     let folder = tempfile::tempdir().unwrap();
     let base = script(&model());
     for (from, to, message) in [
@@ -176,8 +166,9 @@ fn mistakes_stop_all_ranks_with_a_clear_line() {
 
 /// From Python: the handle of the instance, to the plugin.
 #[test]
+#[ignore = "needs the LAMMPS of Debian: apt install lammps liblammps-dev python3-lammps"]
 fn python_registers_the_styles() {
-    let Some(debian) = debian() else { return };
+    let debian = debian();
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("in.lammps"), script(&model())).unwrap();
     let code = "import sys, ctypes, lammps\n\
@@ -225,8 +216,9 @@ fn python(code: &str, plugin: &Path, folder: &Path) -> Output {
 /// Built for another version: a message and a failure, from the launcher and from Python, before any of its code looks
 /// into LAMMPS.
 #[test]
+#[ignore = "needs the LAMMPS of Debian: apt install lammps liblammps-dev python3-lammps"]
 fn a_plugin_for_another_lammps_is_refused() {
-    let Some(debian) = debian() else { return };
+    let debian = debian();
     let mut other = debian.host.version().unwrap();
     other.number = 20_240_829;
     let base = debian.plugin.parent().unwrap().join("other-version");
@@ -251,8 +243,9 @@ fn a_plugin_for_another_lammps_is_refused() {
 
 /// In a LAMMPS with plugins that it was not built for, where the symbols it needs are not all there.
 #[test]
+#[ignore = "needs the LAMMPS of Debian: apt install lammps liblammps-dev python3-lammps"]
 fn the_wheel_refuses_it_with_both_versions() {
-    let Some(debian) = debian() else { return };
+    let debian = debian();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("in.lammps");
     std::fs::write(&path, format!("plugin load {}\n{}", debian.plugin.display(), script(&model()))).unwrap();
@@ -271,8 +264,9 @@ fn the_wheel_refuses_it_with_both_versions() {
 
 /// The scripts of the examples and of the README run here as they stand.
 #[test]
+#[ignore = "needs the LAMMPS of Debian: apt install lammps liblammps-dev python3-lammps"]
 fn examples_and_the_readme_run_here() {
-    let Some(debian) = debian() else { return };
+    let debian = debian();
     let host = debian.runs().host;
     let plugin = debian.plugin.display().to_string();
     let models = root().join("validation/models").display().to_string();
@@ -293,8 +287,9 @@ fn examples_and_the_readme_run_here() {
 
 /// The right version, compiled with the headers of another MPI: LAMMPS's objects would not be where it looks.
 #[test]
+#[ignore = "needs the LAMMPS of Debian: apt install lammps liblammps-dev python3-lammps"]
 fn a_plugin_for_another_mpi_is_refused() {
-    let Some(debian) = debian() else { return };
+    let debian = debian();
     let mixed = Host { mpi_include: lammps().0.mpi_include.clone(), ..debian.host.clone() };
     // No launcher: it could not be linked to that MPI.
     let version = HostVersion { plugins: true, ..debian.host.version().unwrap() };
@@ -306,8 +301,9 @@ fn a_plugin_for_another_mpi_is_refused() {
 }
 
 #[test]
+#[ignore = "needs the LAMMPS of Debian: apt install lammps liblammps-dev python3-lammps"]
 fn the_program_builds_for_the_system_and_says_how_to_use_it() {
-    let Some(debian) = debian() else { return };
+    let debian = debian();
     let folder = tempfile::tempdir().unwrap();
     for place in ["system", "/usr"] {
         let out = psidpd(folder.path(), &["lammps", "plugin", "--lammps", place, "--json", "built.json"]);
@@ -326,8 +322,9 @@ fn the_program_builds_for_the_system_and_says_how_to_use_it() {
 
 /// A source tree, here of links to the parts of the installed LAMMPS.
 #[test]
+#[ignore = "needs the LAMMPS of Debian: apt install lammps liblammps-dev python3-lammps"]
 fn a_source_tree_is_a_host() {
-    let Some(debian) = debian() else { return };
+    let debian = debian();
     let folder = tempfile::tempdir().unwrap();
     let build = folder.path().join("build");
     std::fs::create_dir(&build).unwrap();

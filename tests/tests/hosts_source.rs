@@ -37,7 +37,7 @@ fn source() -> &'static Source {
 
 impl Source {
     fn runs(&self) -> Runs {
-        Runs { host: self.host.clone(), load: format!("plugin load {}\n", self.plugin.display()) }
+        Runs { host: self.host.clone(), load: format!("plugin load \"{}\"\n", self.plugin.display()) }
     }
 }
 
@@ -65,7 +65,7 @@ fn the_program_builds_for_it_and_the_plugin_goes_and_comes() {
     let place = source().host.root.display().to_string();
     let out = psidpd(folder.path(), &["lammps", "plugin", "--lammps", &place]);
     assert!(out.status.success(), "{}", said(&out));
-    assert!(said(&out).contains(&format!("plugin load {}", source().plugin.display())), "{}", said(&out));
+    assert!(said(&out).contains(&format!("plugin load \"{}\"", source().plugin.display())), "{}", said(&out));
     let runs = source().runs();
     let text = script(&model());
     let again = format!("{text}plugin unload pair dpd/psi\nclear\n{}{text}", runs.load);

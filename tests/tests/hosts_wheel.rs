@@ -11,7 +11,7 @@ fn script() -> String {
     format!(
         "units lj\natom_style atomic\ncomm_modify vel yes\nregion b block 0 5 0 5 0 5\ncreate_box 1 b\n\
          create_atoms 1 random 300 4711 NULL\nmass 1 1\nvelocity all create 1.0 87 loop geom\n\
-         pair_style dpd/psi 1.0 5\npair_coeff * * {} F\nfix 1 all nve\ntimestep 0.001\nrun 2\n",
+         pair_style dpd/psi 1.0 5\npair_coeff * * \"{}\" F\nfix 1 all nve\ntimestep 0.001\nrun 2\n",
         model.display()
     )
 }

@@ -7,6 +7,7 @@
 //! same doubles in another order: 10⁻¹¹ of the largest term.
 
 use psidpd::lammps::{DataFile, dump};
+use psidpd_core::maximum::largest;
 use psidpd_tests::{lammps, psidpd, python, said};
 use serde_json::Value;
 use std::path::Path;
@@ -93,7 +94,7 @@ fn words(value: &Value) -> Vec<&str> {
 fn assert_near(what: &str, found: &[[f64; 3]], expected: &[[f64; 3]], tolerance: f64) {
     assert_eq!(found.len(), expected.len(), "{what}");
     for (k, (a, b)) in found.iter().zip(expected).enumerate() {
-        let off = (0..3).map(|c| (a[c] - b[c]).abs()).fold(0.0, f64::max);
+        let off = largest((0..3).map(|c| (a[c] - b[c]).abs()));
         assert!(off <= tolerance, "{what}, particle {k}: {a:?} against {b:?}");
     }
 }
@@ -248,7 +249,7 @@ fn lammps_finds_the_energies_of_the_series_again() {
     let (host, plugin) = lammps();
     let head = |extra: &str| {
         format!(
-            "units lj\natom_style atomic\ncomm_modify vel yes\n{extra}plugin load {}\npair_style dpd/psi 1.0 1\n\
+            "units lj\natom_style atomic\ncomm_modify vel yes\n{extra}plugin load \"{}\"\npair_style dpd/psi 1.0 1\n\
              pair_coeff * * model.toml A B\nthermo_style custom step temp pe ke press pxx pyy pzz pxy pxz pyz\n\
              thermo_modify norm no format float %.17g\nthermo 1\n",
             plugin.display()

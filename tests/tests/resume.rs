@@ -167,7 +167,7 @@ fn signals_stop_a_run_that_says_how_to_go_on() {
         let words = said(&again);
         assert_eq!(again.status.code(), Some(2), "{words}");
         assert!(words.contains("not finished") && words.contains("--overwrite"), "{words}");
-        let shell = how.replacen("psidpd", &program().display().to_string(), 1);
+        let shell = how.replacen("psidpd", &format!("'{}'", program().display()), 1);
         let output = Command::new("sh").args(["-c", &shell]).current_dir(here).output().unwrap();
         let words = finished(&output);
         let step = what.split(' ').nth(3).unwrap();

@@ -3,6 +3,7 @@
 
 mod style_common;
 
+use psidpd_core::maximum::largest;
 use psidpd_core::model::{Model, SplinePair, spline_dpd};
 use style_common::*;
 
@@ -21,7 +22,7 @@ fn compare(script: &str, model: &Model) {
     assert!((energy / truth.energy - 1.0).abs() < CLOSE, "{energy} {}\n{script}", truth.energy);
     let virial = l.compute_vector("w").unwrap();
     let volume = l.eval("vol").unwrap();
-    let scale = truth.virial.iter().fold(0.0f64, |m, w| m.max(w.abs()));
+    let scale = largest(&truth.virial);
     for (c, w) in truth.virial.iter().enumerate() {
         if model.dimensions() == 3 || [0, 1, 3].contains(&c) {
             // In two dimensions LAMMPS leaves the zz, xz and yz components out.
@@ -73,7 +74,7 @@ fn spline_style_names_mistakes() {
 #[test]
 fn forces_are_the_models_in_every_box() {
     let model = Model::open(warren().as_ref()).unwrap();
-    let style = format!("pair_style dpd/psi 1.0 {SEED}\npair_coeff * * {} F", warren());
+    let style = format!("pair_style dpd/psi 1.0 {SEED}\npair_coeff * * \"{}\" F", warren());
     for (before, region) in [
         ("", "block 0 5 0 5 0 5"),
         ("newton off", "block 0 5 0 4 0 3"),
@@ -131,7 +132,7 @@ fn wide_models_too() {
 fn ranks_do_not_matter() {
     let (_folder, wide) = file(WIDE);
     for (before, region, style) in [
-        ("", "block 0 6 0 6 0 6", format!("dpd/psi 1.0 {SEED}\npair_coeff * * {} F F", warren())),
+        ("", "block 0 6 0 6 0 6", format!("dpd/psi 1.0 {SEED}\npair_coeff * * \"{}\" F F", warren())),
         ("newton off", "prism 0 6 0 6 0 6 1 2 -1", format!("dpd/psi 1.0 {SEED}\npair_coeff * * {wide} A B")),
         (
             "atom_modify sort 3 0.7\nboundary p f p\ncomm_style tiled",
@@ -191,11 +192,11 @@ fn overlays_add_up() {
     let bonds = "bond_style harmonic\nbond_coeff 1 20 0.5";
     let psi = format!("dpd/psi 1.0 {SEED}");
     let lj = "pair_coeff * * lj/cut 0.1 0.3";
-    let model = format!("pair_coeff * * dpd/psi {} F F", warren());
+    let model = format!("pair_coeff * * dpd/psi \"{}\" F F", warren());
     let all =
         frame(&open(&head(&format!("pair_style hybrid/overlay lj/cut 1.0 {psi}\n{lj}\n{model}\n{bonds}"))));
     let parts = [
-        format!("pair_style {psi}\npair_coeff * * {} F F\n{none}", warren()),
+        format!("pair_style {psi}\npair_coeff * * \"{}\" F F\n{none}", warren()),
         format!("pair_style lj/cut 1.0\npair_coeff * * 0.1 0.3\n{none}"),
         format!("pair_style zero 1.0\npair_coeff * *\n{bonds}"),
     ];
@@ -215,7 +216,7 @@ fn other_styles_types_take_no_part() {
     let head = particles("", "block 0 5 0 5 0 5", 2, 500);
     let lj = "pair_coeff * 2 lj/cut 0.0 0.3";
     let psi = frame(&open(&format!(
-        "{head}pair_style hybrid dpd/psi 1.0 {SEED} lj/cut 1.0\npair_coeff * * dpd/psi {} F NULL\n{lj}\nrun 0\n",
+        "{head}pair_style hybrid dpd/psi 1.0 {SEED} lj/cut 1.0\npair_coeff * * dpd/psi \"{}\" F NULL\n{lj}\nrun 0\n",
         warren()
     )));
     let mdpd = frame(&open(&format!(
@@ -225,7 +226,7 @@ fn other_styles_types_take_no_part() {
     assert!(difference(&mdpd.f, &psi.f) < CLOSE);
     let alone = open(&format!(
         "{head}group other type 2\ndelete_atoms group other\nreset_atoms id\npair_style dpd/psi 1.0 {SEED}\n\
-         pair_coeff * * {} F F\nrun 0\n",
+         pair_coeff * * \"{}\" F F\nrun 0\n",
         warren()
     ));
     let conservative = |f: &Frame| f.f.iter().filter(|f| f.iter().any(|c| *c != 0.0)).count();
@@ -322,7 +323,7 @@ fn special_factors_keep_the_potential() {
     let (_folder, data) = file(&chains(60));
     let l = open(&format!(
         "units lj\natom_style bond\natom_modify map yes\nspecial_bonds lj 0.3 0.7 1\nread_data {data}\nmass * 1\n\
-         {}pair_style dpd/psi 1.0 {SEED}\npair_coeff * * {} F F\nbond_style zero\nbond_coeff *\nfix 1 all nve\n\
+         {}pair_style dpd/psi 1.0 {SEED}\npair_coeff * * \"{}\" F F\nbond_style zero\nbond_coeff *\nfix 1 all nve\n\
          thermo_modify norm no\ncomm_modify vel yes\nmin_style quickmin\nminimize 0 0 0 0\nrun 0\n",
         load(),
         // Without drag, as forces are compared with the energy.

@@ -10,12 +10,12 @@ fn deck(plugin: &Path, style: &str) -> String {
     let (types, pair) = match style {
         "dpd/psi" => (2, {
             let model = models.join("huggins.toml");
-            format!("pair_style dpd/psi 1.0 5\npair_coeff * * {} A B\n", model.display())
+            format!("pair_style dpd/psi 1.0 5\npair_coeff * * \"{}\" A B\n", model.display())
         }),
         "dpd/psi mixed" => (1, {
             let model = models.join("warren2003-set6-two-densities.toml");
             format!(
-                "pair_style dpd/psi 1.0 5 precision mixed threads 2\npair_coeff * * {} F\n",
+                "pair_style dpd/psi 1.0 5 precision mixed threads 2\npair_coeff * * \"{}\" F\n",
                 model.display()
             )
         }),
@@ -30,7 +30,7 @@ fn deck(plugin: &Path, style: &str) -> String {
         text.push_str("create_atoms 2 random 150 4712 NULL overlap 0.3 maxtry 100\n");
     }
     text.push_str("mass * 1\nvelocity all create 1.0 87 loop geom\n");
-    text.push_str(&format!("plugin load {}\n{pair}", plugin.display()));
+    text.push_str(&format!("plugin load \"{}\"\n{pair}", plugin.display()));
     text.push_str(
         "compute s all stress/atom NULL\ncompute t all reduce sum c_s[1]\nfix 1 all nve\ntimestep 0.005\n\
          thermo 2\nthermo_style custom step pe press c_t\nrun 4\n\
@@ -46,7 +46,7 @@ fn ours(log: &str) -> Vec<String> {
     text.split("\n\n")
         .filter(|p| {
             let fault = ["Invalid ", "Conditional jump", "Use of uninitialised", "Mismatched", "overlap in"];
-            fault.iter().any(|f| p.trim_start().starts_with(f)) && p.contains("psidpd")
+            fault.iter().any(|f| p.trim_start().starts_with(f)) && p.lines().any(in_plugin)
         })
         .map(str::to_owned)
         .collect()
@@ -81,6 +81,14 @@ fn under_valgrind(script: &Path, ranks: usize) -> (Output, Vec<String>) {
     (output, logs.map(|p| std::fs::read_to_string(p).unwrap()).collect())
 }
 
+/// Whether a line of a stack names a function of the crates or a library of the plugin. A folder may be called anything:
+/// LAMMPS and MPI themselves lie below that of the checkout.
+fn in_plugin(line: &str) -> bool {
+    let (function, file) = line.split_once(" (in ").unwrap_or((line, ""));
+    let file = Path::new(file.trim_end_matches(')')).file_name();
+    function.contains("psidpd") || file.is_some_and(|name| name.to_string_lossy().starts_with("psidpd"))
+}
+
 #[test]
 fn valgrind_finds_nothing_of_ours() {
     for style in ["dpd/psi", "dpd/psi mixed", "mdpd/psi", "dpd/spline"] {
@@ -103,10 +111,21 @@ fn valgrind_finds_nothing_of_ours() {
 
 #[test]
 fn faults_in_the_plugin_are_told_from_others() {
-    let log = "==7== Invalid read of size 8\n==7==    at 0x1: psidpd_core::f (x.rs:1)\n==7== \n\
-               ==7== Invalid read of size 8\n==7==    at 0x1: MPIR_Init (in libmpi.so)\n==7== \n\
-               ==7== ERROR SUMMARY: 2 errors\n";
-    let found = ours(log);
-    assert_eq!(found.len(), 1);
-    assert!(found[0].contains("psidpd_core::f"));
+    let mpi = "/a folder/psidpd/target/lammps/venv/lib/libmpi.so.12.3";
+    let plugin = "/a folder/target/lammps/psidpdplugin.so";
+    let stacks = [
+        ("psidpd_core::f (x.rs:1)".to_owned(), true),
+        (format!("MPIR_Init (in {mpi})"), false),
+        ("LAMMPS_NS::Input::file() (input.cpp:2)".to_owned(), false),
+        (format!("??? (in {plugin})"), true),
+        ("psidpd::PairPsi::compute(int, int) (pair_psi.cpp:3)".to_owned(), true),
+    ];
+    let log: String = stacks
+        .iter()
+        .map(|(frame, _)| format!("==7== Invalid read of size 8\n==7==    at 0x1: {frame}\n==7== \n"))
+        .collect();
+    let found = ours(&format!("{log}==7== ERROR SUMMARY: 5 errors\n"));
+    let expected: Vec<&String> = stacks.iter().filter(|(_, ours)| *ours).map(|(frame, _)| frame).collect();
+    assert_eq!(found.len(), expected.len(), "{found:?}");
+    assert!(found.iter().zip(expected).all(|(paragraph, frame)| paragraph.contains(frame)), "{found:?}");
 }

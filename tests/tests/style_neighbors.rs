@@ -38,7 +38,7 @@ fn radial_distributions_are_those_of_a_direct_count() {
         ("", "block 0 5 0 5 0 5", "group none empty\nneigh_modify exclude group none none"),
     ] {
         let l = open(&format!(
-            "{}pair_style dpd/psi 1.0 {SEED}\npair_coeff * * {model} F F\n{more}\n\
+            "{}pair_style dpd/psi 1.0 {SEED}\npair_coeff * * \"{model}\" F F\n{more}\n\
              compute g all rdf {BINS} * * 1 2 2 2\nfix 1 all nve\ntimestep {DT}\n\
              thermo_style custom step c_g[1][1]\nthermo 5\nrun 5\n",
             particles(before, region, 2, 500)

@@ -60,7 +60,8 @@ fn a_restart_goes_on_as_the_split_run() {
 fn hybrids_restart_too() {
     let folder = tempfile::tempdir().unwrap();
     let restart = folder.path().join("middle.restart").display().to_string();
-    let coefficients = format!("pair_coeff * * dpd/psi {} F F\npair_coeff * * lj/cut 0.1 0.3\n", warren());
+    let coefficients =
+        format!("pair_coeff * * dpd/psi \"{}\" F F\npair_coeff * * lj/cut 0.1 0.3\n", warren());
     let l = open(&format!(
         "{}pair_style hybrid/overlay dpd/psi 1.0 {SEED} lj/cut 1.0\n{coefficients}{MOVE}run 10\nwrite_restart {restart}\nrun 10\n",
         particles("", "block 0 5 0 5 0 5", 2, 400)

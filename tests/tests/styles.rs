@@ -13,8 +13,8 @@ fn script(plugin: &Path) -> String {
     format!(
         "units lj\natom_style atomic\ncomm_modify vel yes\nregion b block 0 5 0 5 0 5\ncreate_box 1 b\n\
          create_atoms 1 random 600 4711 NULL overlap 0.3 maxtry 100\nmass 1 1\n\
-         velocity all create 1.0 87 loop geom\nplugin load {}\npair_style dpd/psi 1.0 5\n\
-         pair_coeff * * {} F\nfix 1 all nve\ntimestep 0.005\nthermo 10\nrun 10\n",
+         velocity all create 1.0 87 loop geom\nplugin load \"{}\"\npair_style dpd/psi 1.0 5\n\
+         pair_coeff * * \"{}\" F\nfix 1 all nve\ntimestep 0.005\nthermo 10\nrun 10\n",
         plugin.display(),
         model.display()
     )

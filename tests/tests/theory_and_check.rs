@@ -68,6 +68,37 @@ fn theory_gives_the_critical_point_and_the_binodal_of_van_der_waals() {
     assert!(hot["binodal"]["none"].is_string(), "{hot}");
 }
 
+/// Where ψ is no number, theory has no answer, and says so by its exit.
+#[test]
+fn theory_fails_where_psi_is_no_number() {
+    let folder = tempfile::tempdir().unwrap();
+    for psi in ["1e308*n^2", "n^1000000", "ln(1 - n)"] {
+        let text = format!(
+            "title = \"t\"\nspecies = [\"F\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n\
+             [excess_free_energy]\nF = \"{psi}\"\n"
+        );
+        std::fs::write(folder.path().join("m.toml"), text).unwrap();
+        json(folder.path(), &["theory", "m.toml", "--density", "3"], 1);
+        json(folder.path(), &["check", "m.toml", "--density", "3"], 1);
+    }
+    for density in ["-1", "nan", "inf"] {
+        let argument = format!("--density={density}");
+        let output = psidpd(folder.path(), &["theory", "m.toml", &argument]);
+        assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+    }
+}
+
+/// Between zeros of det f, and not between those of f_AA − 2 f_AB + f_BB, which are at 0.146 and 0.854.
+#[test]
+fn the_spinodal_of_a_mixture_is_where_its_determinant_vanishes() {
+    let folder = tempfile::tempdir().unwrap();
+    let found = json(folder.path(), &["theory", &model("binary-2d.toml"), "--kT", "4", "--density", "10"], 0);
+    let ends = &found["spinodal_at_this_density"][0];
+    for (end, expected) in [(0, 0.5 - (1.0f64 / 6.0).sqrt()), (1, 0.5 + (1.0f64 / 6.0).sqrt())] {
+        assert!((ends[end].as_f64().unwrap() - expected).abs() < 1e-6, "{ends}");
+    }
+}
+
 /// A law that is stated and has no ψ: said where it can be used, refused where a potential is asked for.
 #[test]
 fn a_law_without_potential_is_named_and_has_no_theory() {

@@ -1,7 +1,8 @@
 //! Writing files whole or not at all.
 
-use std::fs::File;
-use std::io::{self, Write};
+use std::fs::{self, File};
+use std::io::{self, ErrorKind, Write};
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 /// A file that cannot be written.
@@ -19,10 +20,42 @@ pub struct WriteError {
 ///
 /// The bytes go to a temporary file in the same folder, which is flushed to
 /// disk and then renamed over `path`. On failure nothing is left behind and an
-/// existing file keeps its content. A symbolic link at `path` is replaced.
+/// existing file keeps its content. Of a symbolic link the file that it leads
+/// to is replaced. What is no regular file, as a pipe or a device, and the
+/// program's own output, is written to as it is.
 pub fn write_atomically(path: impl AsRef<Path>, bytes: &[u8]) -> Result<(), WriteError> {
     let path = path.as_ref();
-    replace(path, bytes).map_err(|cause| WriteError { path: path.to_owned(), cause })
+    write(path, bytes).map_err(|cause| WriteError { path: path.to_owned(), cause })
+}
+
+fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let about = match fs::metadata(path) {
+        Err(e) if e.kind() == ErrorKind::NotFound => return replace(&end_of_links(path)?, bytes),
+        about => about?,
+    };
+    let output = rustix::fs::fstat(io::stdout())?;
+    if (about.dev(), about.ino()) == (output.st_dev, output.st_ino) {
+        let mut output = io::stdout().lock();
+        output.write_all(bytes)?;
+        output.flush()
+    } else if about.is_file() || about.is_dir() {
+        replace(&fs::canonicalize(path)?, bytes)
+    } else {
+        File::options().write(true).open(path)?.write_all(bytes)
+    }
+}
+
+/// Where a file is to be made that is not there: at `path`, or where links that lead nowhere yet point to.
+fn end_of_links(path: &Path) -> io::Result<PathBuf> {
+    let mut path = path.to_owned();
+    // As many as Linux follows.
+    for _ in 0..40 {
+        match fs::read_link(&path) {
+            Ok(target) => path = path.parent().unwrap_or(Path::new("")).join(target),
+            Err(_) => return Ok(path),
+        }
+    }
+    Err(rustix::io::Errno::LOOP.into())
 }
 
 fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
@@ -51,6 +84,8 @@ fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rustix::fs::{CWD, FileType, Mode, mknodat};
+    use std::os::unix::fs::symlink;
 
     #[test]
     fn writes_and_replaces() {
@@ -79,6 +114,44 @@ mod tests {
             assert!(text.contains(&found.to_string()), "{text}");
             assert!(!text.contains(".psidpd-"), "{text}");
         }
+    }
+
+    /// The file that a link leads to is replaced, there or not, and the link stays.
+    #[test]
+    fn links_are_followed() {
+        let folder = tempfile::tempdir().unwrap();
+        let [first, second, file] = ["first", "second", "inner/file"].map(|name| folder.path().join(name));
+        std::fs::create_dir(folder.path().join("inner")).unwrap();
+        symlink("second", &first).unwrap();
+        symlink("inner/file", &second).unwrap();
+        for bytes in [b"one", b"two"] {
+            write_atomically(&first, bytes).unwrap();
+            assert_eq!(std::fs::read(&file).unwrap(), bytes);
+            assert!(first.is_symlink() && second.is_symlink() && !file.is_symlink());
+        }
+        symlink("round", folder.path().join("round")).unwrap();
+        assert!(write_atomically(folder.path().join("round"), b"x").is_err());
+    }
+
+    /// A pipe gets the bytes and stays a pipe.
+    #[test]
+    fn what_is_no_file_is_written_to() {
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("pipe");
+        mknodat(CWD, &pipe, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).unwrap();
+        let link = folder.path().join("link");
+        symlink("pipe", &link).unwrap();
+        for path in [&pipe, &link] {
+            let reader = std::thread::spawn({
+                let pipe = pipe.clone();
+                move || std::fs::read(pipe).unwrap()
+            });
+            write_atomically(path, b"bytes").unwrap();
+            assert_eq!(reader.join().unwrap(), b"bytes");
+            assert!(!std::fs::metadata(&pipe).unwrap().is_file());
+        }
+        write_atomically("/dev/null", b"bytes").unwrap();
+        assert!(!std::fs::metadata("/dev/null").unwrap().is_file());
     }
 
     #[test]

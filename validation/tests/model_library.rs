@@ -5,6 +5,7 @@ use chacha20::ChaCha8Rng;
 use nalgebra::{Matrix3, Vector3};
 use psidpd::run::{Simulation, State};
 use psidpd_core::engine::{PeriodicBox, Want, reference};
+use psidpd_core::maximum::largest;
 use psidpd_core::model::pair::{PairForm, PairPotential};
 use psidpd_core::model::{ExcessFreeEnergy, Fluid, Model};
 use psidpd_core::theory::{MeanField, Structure, thermodynamic_limit};
@@ -362,10 +363,6 @@ fn forces(model: &Model, kt: f64, c: &Configuration) -> Forces {
         forces[*tag as usize - 1] = *force;
     }
     Forces { energy: simulation.potential_energy(), forces, virial: simulation.tally().total_virial() }
-}
-
-fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
-    values.into_iter().fold(0.0, |m, v| if v.abs() > m || v.is_nan() { v.abs() } else { m })
 }
 
 /// Largest differences of force, virial and energy, over the largest force, the largest component of the

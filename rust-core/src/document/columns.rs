@@ -1,9 +1,13 @@
 //! Tables of numbers in files beside a model or scene file.
 
 use super::{FileError, FileErrorKind, Source, Value};
-use std::io::Read;
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::Path;
 use std::sync::Arc;
+
+/// The variable that allows tables outside the folder of the file that names them.
+const ANYWHERE: &str = "PSIDPD_TABLES_ANYWHERE";
 
 /// The largest table that is read.
 const LARGEST: u64 = 16 << 20;
@@ -28,15 +32,15 @@ impl Columns {
     /// No such file, a row that is too short or not finite numbers, no row.
     pub fn read(value: &Value, directory: &Path, names: [&str; 2]) -> Result<Columns, FileError> {
         let path = directory.join(value.string()?.value);
-        // A pipe or a device could keep its reader waiting, and this name may come from anywhere.
-        let regular = || match std::fs::metadata(&path) {
-            Ok(about) if !about.is_file() => Err("not a regular file".to_owned()),
-            Ok(_) => Ok(()),
-            Err(error) => Err(error.to_string()),
-        };
-        let text = regular().and_then(|()| read_text(&path, LARGEST)).map_err(|message| {
+        let text = read_text(&path, LARGEST).map_err(|message| {
             value.error(FileErrorKind::Value(format!("cannot read {}: {message}", path.display())))
         })?;
+        if !(lies_in(&path, directory) || std::env::var_os(ANYWHERE).is_some_and(|v| v == "1")) {
+            let message = format!("{} lies outside the folder of the file that names it", path.display());
+            return Err(value
+                .error(FileErrorKind::Value(message))
+                .with_help(format!("put it there, or set {ANYWHERE}=1 to read tables from anywhere")));
+        }
         Columns::parse(&path.display().to_string(), &text, names)
     }
 
@@ -45,7 +49,7 @@ impl Columns {
     /// # Errors
     /// As [`Columns::read`].
     pub fn parse(name: &str, text: &str, names: [&str; 2]) -> Result<Columns, FileError> {
-        let source = Arc::new(Source::new(name, text));
+        let source = Arc::new(Source::unquoted(name, text));
         let mut table = Columns { source, columns: [Vec::new(), Vec::new()], rows: Vec::new() };
         let mut places = None;
         let mut start = 0;
@@ -67,9 +71,8 @@ impl Columns {
             let is_header = places.is_none() && fields.iter().any(|f| f.parse::<f64>().is_err());
             if is_header {
                 let place = |name: &str| {
-                    fields.iter().position(|f| *f == name).ok_or_else(|| {
-                        error(format!("no column is called {name}; the columns are {}", fields.join(", ")))
-                    })
+                    let place = fields.iter().position(|f| *f == name);
+                    place.ok_or_else(|| error(format!("no column is called {name}")))
                 };
                 places = Some([place(names[0])?, place(names[1])?]);
                 continue;
@@ -77,7 +80,7 @@ impl Columns {
             let at = *places.get_or_insert([0, 1]);
             let number = |place: usize| match fields.get(place).map(|f| f.parse::<f64>()) {
                 Some(Ok(x)) if x.is_finite() => Ok(x),
-                Some(_) => Err(error(format!("\"{}\" is not a finite number", fields[place]))),
+                Some(_) => Err(error(format!("field {} is not a finite number", place + 1))),
                 None => Err(error(format!("expected {} and {}", names[0], names[1]))),
             };
             let row = [number(at[0])?, number(at[1])?];
@@ -95,9 +98,31 @@ impl Columns {
     }
 }
 
+/// Whether the file is in the folder or in one below, wherever links lead.
+fn lies_in(path: &Path, folder: &Path) -> bool {
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    match (path.canonicalize(), folder.canonicalize()) {
+        (Ok(path), Ok(folder)) => path.starts_with(folder),
+        _ => false,
+    }
+}
+
+/// Opens a file to read. A pipe or a device, which could keep its reader waiting, is refused.
+///
+/// # Errors
+/// It cannot be opened, or is no regular file.
+pub fn open_regular(path: &Path) -> io::Result<File> {
+    // Opening a pipe would wait for who writes to it.
+    let refused = || io::Error::new(io::ErrorKind::InvalidInput, "not a regular file");
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(refused());
+    }
+    File::open(path)
+}
+
 /// A file's text, no more than `largest` bytes.
 pub(super) fn read_text(path: &Path, largest: u64) -> Result<String, String> {
-    let file = std::fs::File::open(path).map_err(|e| e.to_string())?;
+    let file = open_regular(path).map_err(|e| e.to_string())?;
     let mut bytes = Vec::new();
     file.take(largest + 1).read_to_end(&mut bytes).map_err(|e| e.to_string())?;
     if bytes.len() as u64 > largest {
@@ -132,9 +157,9 @@ mod tests {
     fn errors_name_the_line() {
         for (text, message) in [
             ("0 1\n1\n", "t.csv:2: expected n and psi"),
-            ("0 1\nx 2\n", "t.csv:2: \"x\" is not a finite number"),
-            ("0 1\n2 inf\n", "t.csv:2: \"inf\" is not"),
-            ("n rho\n0 1\n", "t.csv:1: no column is called psi; the columns are n, rho"),
+            ("0 1\nx 2\n", "t.csv:2: field 1 is not a finite number"),
+            ("0 1\n2 inf\n", "t.csv:2: field 2 is not"),
+            ("n rho\n0 1\n", "t.csv:1: no column is called psi"),
         ] {
             let error = read(text).unwrap_err();
             assert!(error.contains(message), "{error}");

@@ -1,5 +1,7 @@
+use super::printable::printable;
 use crate::model::expression::ExpressionError;
-use std::fmt;
+use std::borrow::Cow;
+use std::fmt::{self, Write};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -8,12 +10,18 @@ use std::sync::Arc;
 pub struct Source {
     name: String,
     text: String,
+    quoted: bool,
 }
 
 impl Source {
     /// A named text.
     pub fn new(name: &str, text: &str) -> Source {
-        Source { name: name.to_owned(), text: text.to_owned() }
+        Source { name: name.to_owned(), text: text.to_owned(), quoted: true }
+    }
+
+    /// A named text of which messages tell lines but show none: a model file may name any file as a table.
+    pub fn unquoted(name: &str, text: &str) -> Source {
+        Source { quoted: false, ..Source::new(name, text) }
     }
 
     /// The file's name.
@@ -21,9 +29,9 @@ impl Source {
         &self.name
     }
 
-    /// The file's text.
+    /// The file's text, where messages may show it; else nothing.
     pub fn text(&self) -> &str {
-        &self.text
+        if self.quoted { &self.text } else { "" }
     }
 
     /// Line and column, from 1, of a byte offset.
@@ -137,21 +145,34 @@ impl FileError {
     }
 }
 
+/// The most characters of a message, and of a key in it: names may be as long as a file.
+const LONGEST: usize = 4000;
+const LONGEST_KEY: usize = 200;
+
+/// The text, or its beginning.
+fn shortened(text: &str, longest: usize) -> Cow<'_, str> {
+    match text.char_indices().nth(longest) {
+        Some((end, _)) => format!("{} …", &text[..end]).into(),
+        None => text.into(),
+    }
+}
+
 /// One line: `file:line: key: what (what to do)`.
 impl fmt::Display for FileError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", self.source.name)?;
+        let mut text = self.source.name.clone();
         if !matches!(*self.kind, FileErrorKind::Unreadable(_)) {
-            write!(f, ":{}", self.line())?;
+            write!(text, ":{}", self.line())?;
         }
         if !self.key.is_empty() {
-            write!(f, ": {}", self.key)?;
+            write!(text, ": {}", shortened(&self.key, LONGEST_KEY))?;
         }
-        write!(f, ": {}", self.kind)?;
+        write!(text, ": {}", self.kind)?;
         if let Some(help) = &self.help {
-            write!(f, " ({help})")?;
+            write!(text, " ({help})")?;
         }
-        Ok(())
+        // Keys and values stand in it as they were written.
+        f.write_str(&shortened(&printable(&text), LONGEST))
     }
 }
 

@@ -144,7 +144,7 @@ impl ValueKind {
         };
         let words = match self {
             ValueKind::Text => "string",
-            ValueKind::File => "name of a file, relative to this one",
+            ValueKind::File => "name of a file in the folder of this one or below",
             ValueKind::Number => "number",
             ValueKind::NumberOrFormula => "number, or string with a formula of the parameters and `kT`",
             ValueKind::Positive => "number above 0",

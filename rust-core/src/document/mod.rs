@@ -7,10 +7,12 @@ mod columns;
 mod error;
 pub mod keys;
 mod node;
+mod printable;
 mod section;
 
-pub use columns::Columns;
+pub use columns::{Columns, open_regular};
 pub use error::{FileError, FileErrorKind, Source};
+pub use printable::printable;
 pub use section::{Located, Section, Value};
 
 use std::path::{Path, PathBuf};

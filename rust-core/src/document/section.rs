@@ -1,4 +1,5 @@
 use super::node::{Content, Node, Table};
+use super::printable::is_control;
 use super::{FileError, FileErrorKind, Source};
 use std::cell::RefCell;
 use std::ops::Range;
@@ -192,6 +193,10 @@ impl<'a> Value<'a> {
     /// A string.
     pub fn string(&self) -> Result<Located<String>, FileError> {
         match self.as_str() {
+            // It may be printed, and go into other files.
+            Some(s) if s.contains(is_control) => {
+                Err(self.error(FileErrorKind::Value("has a control character in it".into())))
+            }
             Some(s) => Ok(self.located(s.to_owned())),
             None => Err(self.wrong("a string")),
         }

@@ -380,7 +380,7 @@ fn continued(coefficients: &[f64], outside: &[Outside], derivative: Option<usize
 
 impl Bounds {
     /// The highest power of δ in the continuation: 2 where ψ′ is linear, 1 where it is constant.
-    fn order(&self, beyond: f64) -> usize {
+    pub(crate) fn order(&self, beyond: f64) -> usize {
         if beyond < 0.0 && self.below == Continuation::Constant { 1 } else { 2 }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::reference::Reference;
 use super::*;
+use crate::maximum::largest;
 use crate::model::{Fluid, ForceLaw, Model, WarrenPair, warren_ab};
 
 /// A small reproducible stream of uniform numbers, from the noise generator itself.
@@ -164,7 +165,7 @@ fn assert_matches_reference(fluid: &Fluid, c: &Configuration) {
     let truth = reference::evaluate(fluid, &c.x, &c.species, &c.domain).unwrap();
     let (thermal, thermal_virial) =
         reference::thermostat(fluid, &c.x, &c.v, &c.tag, &c.species, &c.domain, step).unwrap();
-    let scale = truth.forces.iter().flatten().fold(0.0f64, |m, f| m.max(f.abs()));
+    let scale = largest(truth.forces.as_flattened());
     for newton in [Newton::On, Newton::Off] {
         let quiet = run_engine(fluid, c, newton, None);
         for (i, force) in quiet.forces.iter().enumerate() {
@@ -175,7 +176,7 @@ fn assert_matches_reference(fluid: &Fluid, c: &Configuration) {
         close(quiet.tally.energy(), truth.energy, truth.energy.abs(), "energy");
         close(quiet.energy.iter().sum(), truth.energy, truth.energy.abs(), "sum of particle energies");
         for k in 0..6 {
-            let size = truth.virial.iter().fold(0.0f64, |m, w| m.max(w.abs()));
+            let size = largest(&truth.virial);
             close(quiet.tally.virial[k], truth.virial[k], size, "virial");
             close(quiet.virial.iter().map(|w| w[k]).sum(), truth.virial[k], size, "sum of particle virials");
         }
@@ -361,7 +362,7 @@ fn are_gradients(fluid: &Fluid) {
         reference::evaluate(fluid, x, &c.species, domain).unwrap().energy
     };
     let here = run_engine(fluid, &c, Newton::On, None);
-    let scale = here.forces.iter().flatten().map(|f| f.abs()).fold(0.0, f64::max);
+    let scale = largest(here.forces.as_flattened());
     for i in [0, 7, 31] {
         for k in 0..3 {
             let difference = five_point(|h| {
@@ -392,7 +393,7 @@ fn are_gradients(fluid: &Fluid) {
             let x: Vec<_> = c.x.iter().map(|p| strain(*p)).collect();
             energy(&x, &domain)
         });
-        let size = here.tally.virial.iter().map(|w| w.abs()).fold(0.0, f64::max);
+        let size = largest(&here.tally.virial);
         assert!(
             (here.tally.virial[w] + difference).abs() < 1e-8 * size,
             "virial {w}: {} against {}",

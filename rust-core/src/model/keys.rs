@@ -138,7 +138,8 @@ pub const CURVES: Table = Table {
         "table": ValueKind::File, OPTIONAL,
             "Rows of `n` and `psi`, separated by commas or blanks, with `#` for comments; if the first row is \
              no numbers it names the columns. psi is the cubic spline through the rows (not a knot), and psi' \
-             its exact slope; beyond the ends psi' goes on linearly."
+             its exact slope; beyond the ends psi' goes on linearly. With `PSIDPD_TABLES_ANYWHERE=1` in the \
+             environment the file may be anywhere."
             => "[excess_free_energy]\nA = { table = \"psi.csv\" }";
         "pressure": ValueKind::Formula, OPTIONAL,
             "The equation of state wanted, a formula of `rho` and `kT`, for one species: `psi' = (p - rho \

@@ -1,4 +1,4 @@
-use super::line::{Line, coexisting, least_stable, unstable};
+use super::line::{Line, coexisting, least_stable, negative, unstable};
 use super::one_component::change_of_sign;
 use super::search::{spaced, turning_point};
 use super::{MeanField, TheoryError};
@@ -204,23 +204,30 @@ impl MeanField {
             .collect()
     }
 
-    /// Fractions of the first species between which a binary mixture of fixed total density is unstable
-    /// to demixing: `∂²f/∂c² = ρ²(f_AA − 2f_AB + f_BB) < 0`. Pagonabarraga–Frenkel eq. (23) is the
-    /// critical point of their symmetric mixture, `kT_c = ρ(λ − λ_A)`.
+    /// Fractions of the first species between which a binary mixture is unstable, among mixtures of total density
+    /// `density`: where `f_αβ` is not positive definite, so between zeros of its determinant. A wave may change composition
+    /// and density together there, so the interval is wider than that of `f_AA − 2f_AB + f_BB < 0`, for which the density
+    /// is held; both shrink to the same critical point where the mixture is symmetric (Pagonabarraga–Frenkel eq. 23,
+    /// `kT_c = ρ(λ − λ_A)`).
     ///
     /// # Errors
     /// Not two species.
     pub fn composition_spinodal(&self, density: f64) -> Result<Vec<[f64; 2]>, TheoryError> {
-        self.spinodal_of(Held::Density(density))
+        self.require_species(2)?;
+        let line = CompositionLine::at_density(self, density);
+        let stability = |u: f64| self.smallest_inverse_structure_factor(&line.densities(u), 0.0);
+        let regions = negative(&line.grid(), &stability);
+        Ok(regions.into_iter().map(|ends| ends.map(|u| line.x(u))).collect())
     }
 
-    /// The same at fixed pressure, on the branch that is densest in the equimolar mixture: `det f_αβ < 0` with `∂p/∂ρ > 0`, the full
-    /// condition for a compressible mixture.
+    /// The same among mixtures of one pressure, on the branch that is densest in the equimolar mixture.
     ///
     /// # Errors
     /// Not two species.
     pub fn composition_spinodal_at_pressure(&self, pressure: f64) -> Result<Vec<[f64; 2]>, TheoryError> {
-        self.spinodal_of(Held::Pressure(pressure))
+        self.require_species(2)?;
+        let line = CompositionLine::at_pressure(self, pressure);
+        Ok(unstable(&line).into_iter().map(|ends| ends.map(|u| line.x(u))).collect())
     }
 
     /// Two phases of a binary mixture of one and the same total density, by the common tangent of
@@ -242,12 +249,6 @@ impl MeanField {
     /// Not two species; [`TheoryError::NoCoexistence`].
     pub fn composition_binodal_at_pressure(&self, pressure: f64) -> Result<CompositionBinodal, TheoryError> {
         self.binodal_of(Held::Pressure(pressure))
-    }
-
-    fn spinodal_of(&self, held: Held) -> Result<Vec<[f64; 2]>, TheoryError> {
-        self.require_species(2)?;
-        let line = CompositionLine::new(self, held);
-        Ok(unstable(&line).into_iter().map(|[a, b]| [line.x(a), line.x(b)]).collect())
     }
 
     fn binodal_of(&self, held: Held) -> Result<CompositionBinodal, TheoryError> {

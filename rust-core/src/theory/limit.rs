@@ -57,13 +57,14 @@ pub struct NoLimit {
 ///
 /// Tried are the uniform fluid and lattices whose sites take any number of particles, at 60 spacings up
 /// to the range of the potentials, each in many compositions, among them all those at which the pair
-/// energy has a minimum: an exact test of copositivity of the pair energies. The growth of ψ is judged
+/// energy has a minimum: an exact test of copositivity of the pair energies. Of more than eight species, 12 spacings
+/// and mixtures of two or of all. The growth of ψ is judged
 /// numerically, from its values up to `1e8` particles in the volume of the interaction.
 ///
 /// The test is necessary, not sufficient: `Ok` means that none of these arrangements collapses, not that
 /// none exists, and finding none says nothing about time scales. With lattices it does catch potentials
-/// of positive integral that still have an unbounded arrangement. Bounds of a density, beyond which ψ′
-/// goes on linearly, are not looked at: ψ is judged as the formula it is.
+/// of positive integral that still have an unbounded arrangement. Beyond the bounds of a density ψ is what a
+/// run continues it as.
 ///
 /// # Errors
 /// As [`MeanField::new`]; the inner result is the answer.
@@ -80,6 +81,9 @@ impl NoLimit {
         self.structure == Structure::Uniform
     }
 }
+
+/// All their mixtures can be tried in a moment.
+const FEW_SPECIES: usize = 8;
 
 struct Search<'a> {
     fluid: &'a Fluid,
@@ -114,7 +118,8 @@ impl Search<'_> {
             return None;
         }
         let longest = theory.ranges[0];
-        for spacing in spaced(0.2 * longest, longest, 60) {
+        let spacings = if self.fluid.species.len() <= FEW_SPECIES { 60 } else { 12 };
+        for spacing in spaced(0.2 * longest, longest, spacings) {
             let structures = match theory.dimensions {
                 2 => vec![Structure::Cubic { spacing }, Structure::ClosePacked { spacing }],
                 _ => vec![
@@ -182,7 +187,7 @@ impl Search<'_> {
                     sums.densities.iter().flat_map(|w| x.iter().map(move |x| x * w * n)).collect();
                 let many: f64 = (0..count)
                     .filter(|a| x[*a] > 0.0)
-                    .map(|a| x[a] * self.theory.free_energy.at(a, &variables).value)
+                    .map(|a| x[a] * self.theory.free_energy.value(a, &variables))
                     .sum();
                 many + pair * n
             };
@@ -225,19 +230,20 @@ fn falls_without_bound(energy: &dyn Fn(f64) -> f64, unit: f64) -> Option<(f64, f
 /// its minimum over all compositions is among them, and a grid for the many-body part.
 fn compositions(pairs: &[f64], count: usize) -> Vec<Vec<f64>> {
     let mut all: Vec<Vec<f64>> = Vec::new();
-    // Faces by their species; beyond ten species, those of up to three.
-    let faces: Vec<Vec<usize>> = if count <= 10 {
+    let few = count <= FEW_SPECIES;
+    // Faces by their species.
+    let faces: Vec<Vec<usize>> = if few {
         (1usize..1 << count).map(|mask| (0..count).filter(|s| mask >> s & 1 == 1).collect()).collect()
     } else {
         let mut faces: Vec<Vec<usize>> = (0..count).map(|a| vec![a]).collect();
         faces.extend((0..count).flat_map(|a| (0..a).map(move |b| vec![b, a])));
-        faces.extend((0..count).flat_map(|a| (0..a).flat_map(move |b| (0..b).map(move |c| vec![c, b, a]))));
+        faces.push((0..count).collect());
         faces
     };
     for face in &faces {
         let size = face.len();
         all.push((0..count).map(|s| if face.contains(&s) { 1.0 / size as f64 } else { 0.0 }).collect());
-        if size == 2 {
+        if size == 2 && few {
             for part in 1..20 {
                 let mut x = vec![0.0; count];
                 x[face[0]] = f64::from(part) / 20.0;

@@ -23,14 +23,18 @@ pub trait Line {
 
 /// The intervals of `u` in which `g″ < 0`. One that reaches the end of the grid ends at ±∞.
 pub fn unstable(line: &dyn Line) -> Vec<[f64; 2]> {
-    let grid = line.grid();
+    negative(&line.grid(), &|u| line.curvature(u))
+}
+
+/// The intervals in which `f < 0`. One that reaches the end of the grid ends at ±∞.
+pub fn negative(grid: &[f64], f: &dyn Fn(f64) -> f64) -> Vec<[f64; 2]> {
     let mut points: Vec<(f64, bool)> = Vec::with_capacity(grid.len());
-    let values: Vec<f64> = grid.iter().map(|u| line.curvature(*u)).collect();
+    let values: Vec<f64> = grid.iter().map(|u| f(*u)).collect();
     for (i, u) in grid.iter().enumerate() {
         points.push((*u, values[i] < 0.0));
         // A dip below zero between two points of the grid.
         if i > 0 && i + 1 < grid.len() && values[i] <= values[i - 1] && values[i] <= values[i + 1] {
-            let (place, value) = minimum(grid[i - 1], grid[i + 1], |u| line.curvature(u));
+            let (place, value) = minimum(grid[i - 1], grid[i + 1], f);
             if value < 0.0 && values[i] >= 0.0 {
                 points.push((place, true));
             }
@@ -42,7 +46,7 @@ pub fn unstable(line: &dyn Line) -> Vec<[f64; 2]> {
     for pair in points.windows(2) {
         let [(a, before), (b, after)] = [pair[0], pair[1]];
         if before != after {
-            let edge = turning_point(a, b, |u| line.curvature(u) < 0.0);
+            let edge = turning_point(a, b, |u| f(u) < 0.0);
             match start.take() {
                 None => start = Some(edge),
                 Some(from) => all.push([from, edge]),

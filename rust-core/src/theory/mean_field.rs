@@ -18,6 +18,8 @@ pub struct MeanField {
     pub(super) free_energy: FreeEnergy,
     /// What is added to the bulk density in variable `v` of `ψ_α`: the self term.
     shift: Vec<Vec<f64>>,
+    /// The variables of `ψ_α` for a particle without neighbours: its corrected densities.
+    isolated: Vec<Vec<f64>>,
     /// `w` of each density.
     pub(super) kernels: Vec<Radial>,
     /// `φ` and the species it acts between.
@@ -75,6 +77,20 @@ impl MeanField {
                 shift
             })
             .collect();
+        let isolated = (0..count)
+            .map(|alpha| {
+                let of = |v: usize| {
+                    let density = &fluid.densities[v / count];
+                    let own = if density.includes_self && v % count == alpha {
+                        density.kernel.value(0.0)
+                    } else {
+                        0.0
+                    };
+                    density.correction[alpha * count + v % count].at(own).0
+                };
+                (0..fluid.variables()).map(of).collect()
+            })
+            .collect();
         let mut ranges = [0.0f64, f64::INFINITY];
         let lengths = fluid.densities.iter().map(|d| d.kernel.range());
         for range in lengths.chain(fluid.pairs.iter().map(|p| p.potential.range())) {
@@ -89,6 +105,7 @@ impl MeanField {
             species: fluid.species.clone(),
             free_energy: FreeEnergy::new(fluid)?,
             shift,
+            isolated,
             kernels,
             pairs,
             pair_integrals,
@@ -121,7 +138,16 @@ impl MeanField {
         let count = self.species.len();
         let at: Vec<f64> =
             self.shift[alpha].iter().enumerate().map(|(v, shift)| densities[v % count] + shift).collect();
-        let mut psi = self.free_energy.at(alpha, &at);
+        self.psi_at(alpha, &at)
+    }
+
+    /// `ψ_α` and its derivatives for a particle without neighbours.
+    pub(super) fn isolated_psi(&self, alpha: usize) -> Psi {
+        self.psi_at(alpha, &self.isolated[alpha])
+    }
+
+    fn psi_at(&self, alpha: usize, at: &[f64]) -> Psi {
+        let mut psi = self.free_energy.at(alpha, at);
         if !psi.value.is_finite() {
             // The derivatives of a logarithm go on where it does not.
             psi.gradient.fill(f64::NAN);

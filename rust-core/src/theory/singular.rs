@@ -1,3 +1,4 @@
+use super::free_energy::Psi;
 use super::search::{minimum, spaced, turning_point};
 use super::{MeanField, TheoryError};
 use crate::model::Fluid;
@@ -16,7 +17,8 @@ pub struct Singularity {
 /// What happens at a [`Singularity`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SingularityKind {
-    /// At density zero: an isolated particle has no finite force or energy, as with `ln n` and `1/n`.
+    /// A particle without neighbours has no finite force or energy, as with `ln n` and `1/n` where neither the self term nor
+    /// a correction keeps its density from zero.
     Origin,
     /// ψ′ grows without bound from both sides.
     Pole,
@@ -26,7 +28,8 @@ pub enum SingularityKind {
 }
 
 /// The singularities of every `ψ_α` for total densities in `range`, along the line of species in the
-/// proportions of `composition` (every species present in it). Found by scanning 4000 densities and
+/// proportions of `composition` (every species present in it), that the bounds of the densities leave; and, if `range`
+/// begins at 0, those of a particle without neighbours. Found by scanning 4000 densities and
 /// refining, so a pair of singularities closer than `range/4000` may be missed.
 ///
 /// # Errors
@@ -50,28 +53,28 @@ pub fn first_along(theory: &MeanField, composition: &[f64], grid: &[f64]) -> Opt
         .min_by(f64::total_cmp)
 }
 
+/// How steep ψ is; infinite where it is not defined.
+fn steepness(psi: &Psi) -> f64 {
+    let slope = psi.gradient.iter().map(|g| g.abs()).sum::<f64>();
+    if psi.value.is_finite() && slope.is_finite() { slope } else { f64::INFINITY }
+}
+
 fn along(theory: &MeanField, alpha: usize, composition: &[f64], grid: &[f64]) -> Vec<Singularity> {
     let total: f64 = composition.iter().sum();
-    // How steep ψ is; infinite where it is not defined.
-    let steepness = |rho: f64| {
+    let at = |rho: f64| {
         let densities: Vec<f64> = composition.iter().map(|x| x / total * rho).collect();
-        let psi = theory.psi(alpha, &densities);
-        let slope = psi.gradient.iter().map(|g| g.abs()).sum::<f64>();
-        if psi.value.is_finite() && slope.is_finite() { slope } else { f64::INFINITY }
+        steepness(&theory.psi(alpha, &densities))
     };
-    let values: Vec<f64> = grid.iter().map(|rho| steepness(*rho)).collect();
+    let values: Vec<f64> = grid.iter().map(|rho| at(*rho)).collect();
     let found = |density, kind| Singularity { species: alpha, density, kind };
     let mut all = Vec::new();
-    for i in 0..grid.len() {
-        if !values[i].is_finite() && grid[i] == 0.0 {
-            all.push(found(0.0, SingularityKind::Origin));
-        }
-        if i == 0 {
-            continue;
-        }
+    if grid[0] == 0.0 && !steepness(&theory.isolated_psi(alpha)).is_finite() {
+        all.push(found(0.0, SingularityKind::Origin));
+    }
+    for i in 1..grid.len() {
         match (values[i - 1].is_finite(), values[i].is_finite()) {
             (true, false) | (false, true) if grid[i - 1] > 0.0 => {
-                let edge = turning_point(grid[i - 1], grid[i], |rho| steepness(rho).is_finite());
+                let edge = turning_point(grid[i - 1], grid[i], |rho| at(rho).is_finite());
                 // A pole that happens to be a grid point looks like two edges.
                 let pole = all.last().is_some_and(|s: &Singularity| {
                     s.kind == SingularityKind::Edge && (edge - s.density).abs() < 1e-12 * edge
@@ -89,7 +92,7 @@ fn along(theory: &MeanField, alpha: usize, composition: &[f64], grid: &[f64]) ->
                     && values[i] >= values[i - 1]
                     && values[i] >= values[i + 1] =>
             {
-                let (place, value) = minimum(grid[i - 1], grid[i + 1], |rho| -steepness(rho));
+                let (place, value) = minimum(grid[i - 1], grid[i + 1], |rho| -at(rho));
                 if -value > 1e5 * values[i - 1].min(values[i + 1]).max(f64::MIN_POSITIVE) {
                     all.push(found(place, SingularityKind::Pole));
                 }

@@ -235,9 +235,13 @@ fn symmetric_mixture() {
     let reduced = 0.5;
     let mf = theory(&mixture(2, lambda, lambda_a, lambda_a), reduced * 8.0);
     let spinodal = mf.composition_spinodal(rho).unwrap();
-    // 4c(1−c) = T/T_c
+    // det f = 0: (kT/cρ + 2λ_A)(kT/(1−c)ρ + 2λ_A) = 4λ², and so c(1−c) = 1/12 here.
+    assert_eq!(spinodal.len(), 1);
+    close(spinodal[0][0], 0.5 - (1.0f64 / 6.0).sqrt(), 1e-12);
+    close(spinodal[0][1], 0.5 + (1.0f64 / 6.0).sqrt(), 1e-12);
     for c in spinodal[0] {
-        close(4.0 * c * (1.0 - c), reduced, 1e-12);
+        let f = mf.second_derivatives(&[c * rho, (1.0 - c) * rho]);
+        assert!((f[0] * f[3] - f[1] * f[2]).abs() < 1e-10, "{f:?}");
     }
     let phases = mf.composition_binodal(rho).unwrap();
     // ln((1−c)/c) = 2 T_c/T (1 − 2c)
@@ -537,6 +541,46 @@ fn singularities_are_found() {
     assert!(at("n^2 + abs(n - 2) + exp(n)").is_empty());
     let mixture = singular_densities(&huggins(1.6).at(1.0).unwrap(), &[0.5, 0.5], [0.0, 30.0]).unwrap();
     assert!(mixture.iter().any(|s| s.kind == SingularityKind::Edge && (s.density - 20.0).abs() < 1e-9));
+}
+
+/// What a run continues ψ as beyond the bounds of a density, mean field does too: value, slopes and curvatures against the
+/// rule written out, for one variable and for two at once, and for a curve.
+#[test]
+fn bounds_continue_the_free_energy() {
+    let text = |bounds: &str| {
+        model(&format!(
+            "title = 'b'\nspecies = ['A', 'B']\n[density.n]\nkernel = 'quadratic'\nrange = 1\n{bounds}\n\
+             [excess_free_energy]\nA = 'n_A^3 * n_B^2 + 3*n_B'\nB = 'ln(n_A) + n_B^2'\n"
+        ))
+    };
+    let linear = theory(&text("bounds = [1.0, 2.0]"), 1.0);
+    let constant = theory(&text("bounds = [1.0, 2.0]\nbelow = 'constant'"), 1.0);
+    // n_A = 3 above, n_B = 0.5 below: (8 + 12 + 6)(1 − 1 + ¼) and (8 + 12 + 6)(1 − 1).
+    let psi = linear.psi(0, &[3.0, 0.5]);
+    close(psi.value, 26.0 * 0.25 + 1.5, 1e-14);
+    close(psi.gradient[0], 24.0 * 0.25, 1e-14);
+    close(psi.gradient[1], 26.0 * 1.0 + 3.0, 1e-14);
+    for (found, expected) in psi.hessian.iter().zip([12.0 * 0.25, 24.0, 24.0, 26.0 * 2.0]) {
+        close(*found, expected, 1e-14);
+    }
+    let psi = constant.psi(0, &[3.0, 0.5]);
+    assert!((psi.value - 1.5).abs() < 1e-13, "{}", psi.value);
+    close(psi.gradient[1], 26.0 * 2.0 + 3.0, 1e-14);
+    assert!(psi.hessian[3].abs() < 1e-13);
+    // Within one bound and beyond the other.
+    let psi = linear.psi(0, &[1.5, 3.0]);
+    close(psi.gradient[0], 3.0 * 2.25 * 9.0, 1e-14);
+    close(psi.hessian[1], 3.0 * 2.25 * 6.0, 1e-14);
+    close(psi.hessian[0], 6.0 * 1.5 * 9.0, 1e-14);
+    // Below, the logarithm goes on from 1: −1 − ½, and 1.5² beside it.
+    close(linear.psi(1, &[0.0, 1.5]).value, 0.75, 1e-14);
+    let curve = model(
+        "title = 'c'\nspecies = ['F']\n[density.n]\nkernel = 'quadratic'\nrange = 1\nbounds = [1.0, 2.0]\n\
+         [excess_free_energy]\nF = { pressure = 'rho*kT + rho^3' }\n",
+    );
+    // ψ′ = n, so at 3 as within; p = ρkT + ρ²ψ′.
+    close(theory(&curve, 1.0).pressure(&[3.0]), 3.0 + 27.0, 1e-9);
+    close(theory(&curve, 1.0).pressure(&[1.5]), 1.5 + 1.5f64.powi(3), 1e-9);
 }
 
 #[test]

@@ -60,7 +60,10 @@ thread_local! {
 }
 
 impl Pool {
-    /// A pool of `threads`, the caller's among them.
+    /// More than any machine has cores. Tens of thousands run into limits of the system that end the program.
+    pub const MOST: usize = 1024;
+
+    /// A pool of `threads`, the caller's among them; at most [`Pool::MOST`].
     pub fn new(threads: NonZeroUsize) -> Pool {
         let shared = Arc::new(Shared {
             epoch: AtomicUsize::new(0),
@@ -76,7 +79,7 @@ impl Pool {
             Builder::new().name(format!("psidpd-{number}")).spawn(move || worker(&shared, number))
         };
         // With fewer threads than asked for the work is done all the same.
-        let workers = (1..threads.get()).map_while(|number| spawn(number).ok()).collect();
+        let workers = (1..threads.get().min(Pool::MOST)).map_while(|number| spawn(number).ok()).collect();
         Pool { shared, workers, turn: Mutex::new(()) }
     }
 

@@ -4,6 +4,7 @@
 
 use super::style_common::{chains, difference, scaled};
 use psidpd::lammps::{DataFile, Host, dump};
+use psidpd_core::maximum::largest;
 use psidpd_tests::{psidpd, root, said};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -19,7 +20,7 @@ pub fn script(model: &Path) -> String {
     format!(
         "units lj\natom_style atomic\ncomm_modify vel yes\nregion b block 0 5 0 5 0 5\ncreate_box 1 b\n\
          create_atoms 1 random 600 4711 NULL\nmass 1 1\nvelocity all create 1.0 87 loop geom\n\
-         pair_style dpd/psi 1.0 5\npair_coeff * * {} F\nfix 1 all nve\ntimestep 0.001\nthermo 10\nrun 10\n",
+         pair_style dpd/psi 1.0 5\npair_coeff * * \"{}\" F\nfix 1 all nve\ntimestep 0.001\nthermo 10\nrun 10\n",
         model.display()
     )
 }
@@ -88,12 +89,8 @@ pub fn forces_equal_the_native_engine(runs: &Runs) {
 
         let size = (own.iter().flatten().map(|c| c * c).sum::<f64>() / 600.0).sqrt();
         assert!(size > 1.0, "{size}");
-        let worst = own
-            .iter()
-            .flatten()
-            .zip(forces.iter().flatten())
-            .map(|(a, b)| (a - b).abs() / size)
-            .fold(0.0, f64::max);
+        let pairs = own.as_flattened().iter().zip(forces.as_flattened());
+        let worst = largest(pairs.map(|(a, b)| (a - b).abs() / size));
         assert!(worst < 1e-12, "{worst:e} on {ranks} ranks");
 
         // LAMMPS prints energies per particle.

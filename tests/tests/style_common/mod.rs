@@ -6,6 +6,7 @@ use nalgebra::Matrix3;
 use psidpd::lammps::Lammps;
 use psidpd_core::engine::reference::{Evaluation, evaluate, thermostat};
 use psidpd_core::engine::{PeriodicBox, Step};
+use psidpd_core::maximum::largest;
 use psidpd_core::model::Model;
 use psidpd_tests::{lammps, root};
 use std::ops::Deref;
@@ -47,7 +48,7 @@ pub fn file(text: &str) -> (tempfile::TempDir, String) {
 
 /// A command that loads the plugin.
 pub fn load() -> String {
-    format!("plugin load {}\n", lammps().1.display())
+    format!("plugin load \"{}\"\n", lammps().1.display())
 }
 
 /// A box with particles of `types` types, before any pair style.
@@ -136,8 +137,7 @@ pub fn difference(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
     let square = |v: &[f64; 3]| v.iter().map(|c| c * c).sum::<f64>();
     let rms = (b.iter().map(square).sum::<f64>() / b.len() as f64).sqrt();
     let far = |(a, b): (&[f64; 3], &[f64; 3])| square(&[a[0] - b[0], a[1] - b[1], a[2] - b[2]]).sqrt();
-    // `max` would pass over NaN.
-    a.iter().zip(b).map(far).fold(0.0, |m: f64, d| if d > m || d.is_nan() { d } else { m }) / rms
+    largest(a.iter().zip(b).map(far)) / rms
 }
 
 /// The box that LAMMPS has.

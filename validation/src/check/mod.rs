@@ -57,25 +57,30 @@ pub fn check(model: &Model, conditions: &Conditions) -> Result<Findings, CheckEr
         return Err(CheckError::Densities { given: densities.len(), species: fluid.species.len() });
     }
     let plan = Plan::new(&fluid)?;
-    // Mean field starts from a free energy; a law of stated slopes has none.
-    let theory = match fluid.stated_slopes() {
-        None => Some(MeanField::new(&fluid)?),
-        Some(_) => None,
-    };
+    // Mean field starts from a free energy, which a law of stated slopes does not have, and from integrals of the pair
+    // potentials, which those that rise too steeply do not have.
+    let (theory, no_theory) =
+        match fluid.stated_slopes().map_or_else(|| MeanField::new(&fluid).map(Some), |_| Ok(None)) {
+            Ok(theory) => (theory, None),
+            Err(reason @ (TheoryError::NotIntegrable(..) | TheoryError::TooLarge(_))) => (None, Some(reason)),
+            Err(other) => return Err(other.into()),
+        };
     let densities = conditions.densities.as_deref();
     let at = theory.as_ref().zip(densities);
     let stability = at.map(|(theory, rho)| theory.stability(rho));
+    let pressure = at.map(|(theory, rho)| theory.pressure(rho));
+    let state = warnings::State { densities, pressure, stability: stability.as_ref(), no_theory };
     Ok(Findings {
         title: model.title().to_owned(),
         reference: model.reference().map(str::to_owned),
         plan: plan.to_string(),
         kt: conditions.kt,
-        pressure: at.map(|(theory, rho)| theory.pressure(rho)),
+        pressure,
         pressure_slope: at.map(|(theory, rho)| theory.pressure_slope(rho)),
         stability: stability.map(Into::into),
         densities: conditions.densities.clone(),
         steps: Vec::new(),
-        warnings: warnings::all(&fluid, densities, stability.as_ref())?,
+        warnings: warnings::all(&fluid, &state)?,
     })
 }
 

@@ -41,6 +41,59 @@ fn poles_and_spinodals_are_named() {
     assert!(!beyond.works(), "{beyond:?}");
 }
 
+fn bounded(psi: &str, density: &str, more: &str) -> String {
+    format!(
+        "title = \"t\"\nspecies = [\"F\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n{density}\n{more}\n\
+         [excess_free_energy]\nF = \"{psi}\"\n"
+    )
+}
+
+/// The severity of what is said of singularities, worst first.
+fn singular(text: &str, density: f64) -> Vec<Severity> {
+    let findings = found(text, 1.0, Some(vec![density]));
+    findings.warnings.iter().filter(|w| w.id == "singular").map(|w| w.severity).collect()
+}
+
+/// Bounds protect from what they leave out, and from nothing else.
+#[test]
+fn bounds_are_those_of_the_variable_and_must_exclude_the_pole() {
+    use Severity::{Error, Note, Warning};
+    let other = "[density.m]\nkernel = \"lucy\"\nrange = 1\nbounds = [0.1, 5.0]";
+    let pole = "-kT*ln(1 - 0.1*n) + m";
+    let elsewhere = found(&bounded(pole, "", other), 1.0, Some(vec![12.0]));
+    assert!(!elsewhere.works() && elsewhere.pressure.unwrap().is_nan(), "{elsewhere:?}");
+    assert!(has(&elsewhere, "not-finite"), "{elsewhere:?}");
+    let pole = "-kT*ln(1 - 0.1*n)";
+    assert_eq!(singular(&bounded(pole, "bounds = [0.05, 100]", ""), 12.0), [Error]);
+    assert_eq!(singular(&bounded(pole, "bounds = [0.05, 100]", ""), 5.0), [Warning]);
+    assert_eq!(singular(&bounded(pole, "bounds = [0.05, 9.5]", ""), 5.0), [Note]);
+    // Mean field knows how psi goes on.
+    let beyond = found(&bounded(pole, "bounds = [0.05, 9.5]", ""), 1.0, Some(vec![12.0]));
+    assert!(beyond.works() && beyond.pressure.unwrap().is_finite(), "{beyond:?}");
+    for (bounds, expected) in [("[0, 50]", Warning), ("[0.05, 50]", Note)] {
+        assert_eq!(singular(&bounded("20*kT*ln(n)", &format!("bounds = {bounds}"), ""), 5.0), [expected]);
+    }
+}
+
+/// A particle without neighbours has the corrected density that the correction gives it.
+#[test]
+fn corrected_densities_keep_particles_from_the_origin() {
+    assert!(singular(&bounded("kT*ln(n)", "correction = [1.5, 1.0]", ""), 5.0).is_empty());
+    assert_eq!(singular(&bounded("kT*ln(n)", "correction = [-0.5, 1.0]", ""), 5.0), [Severity::Warning]);
+    assert!(singular(&bounded("kT*ln(n)", "self = true", ""), 5.0).is_empty());
+}
+
+/// What a run accepts is looked at as far as it goes.
+#[test]
+fn a_potential_without_integral_has_a_plan_and_a_warning() {
+    let text = "title = \"t\"\nspecies = [\"F\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n\
+                [excess_free_energy]\nF = \"ln(n)\"\n[[pair]]\nbetween = [\"F\", \"F\"]\nform = \"expression\"\n\
+                phi = \"1/r^12 - 1\"\nrange = 1\n";
+    let findings = found(text, 1.0, Some(vec![1.0]));
+    assert!(has(&findings, "no-mean-field") && has(&findings, "singular"), "{findings:?}");
+    assert!(findings.pressure.is_none() && !findings.plan.is_empty());
+}
+
 #[test]
 fn laws_without_potential_and_jumps_are_named() {
     let lucy =

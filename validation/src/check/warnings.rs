@@ -3,31 +3,67 @@
 use super::CheckError;
 use super::calibration;
 use super::findings::{Severity, Warning};
-use psidpd_core::model::Fluid;
+use psidpd_core::maximum::largest;
 use psidpd_core::model::kernel::KernelKind;
 use psidpd_core::model::pair::PairForm;
-use psidpd_core::theory::{SingularityKind, Stability, singular_densities, thermodynamic_limit};
+use psidpd_core::model::{ExcessFreeEnergy, Fluid};
+use psidpd_core::theory::{
+    Singularity, SingularityKind, Stability, TheoryError, singular_densities, thermodynamic_limit,
+};
 use std::f64::consts::TAU;
 
+/// What mean field says of the fluid, as far as it applies.
+pub struct State<'a> {
+    /// Number densities of the species.
+    pub densities: Option<&'a [f64]>,
+    /// The pressure there.
+    pub pressure: Option<f64>,
+    /// Stability there.
+    pub stability: Option<&'a Stability>,
+    /// Why there is no mean field, where there should be one.
+    pub no_theory: Option<TheoryError>,
+}
+
 /// Everything worth saying, worst first.
-pub fn all(
-    fluid: &Fluid,
-    densities: Option<&[f64]>,
-    stability: Option<&Stability>,
-) -> Result<Vec<Warning>, CheckError> {
+pub fn all(fluid: &Fluid, state: &State) -> Result<Vec<Warning>, CheckError> {
     let mut found = Vec::new();
     found.extend(not_conservative(fluid));
     if let Some(species) = fluid.stated_slopes() {
         found.push(no_free_energy(species));
     } else {
-        found.extend(collapse(fluid)?);
-        found.extend(singular(fluid, densities)?);
+        match &state.no_theory {
+            Some(reason) => found.push(no_mean_field(reason)),
+            None => found.extend(collapse(fluid)?),
+        }
+        if !matches!(state.no_theory, Some(TheoryError::TooLarge(_))) {
+            found.extend(singular(fluid, state.densities)?);
+        }
     }
     found.extend(calibration::missing(fluid));
-    found.extend(stability.and_then(unstable));
+    found.extend(state.pressure.and_then(not_finite));
+    found.extend(state.stability.and_then(unstable));
     found.extend(jumps(fluid));
     found.sort_by_key(|w| std::cmp::Reverse(w.severity));
     Ok(found)
+}
+
+fn no_mean_field(reason: &TheoryError) -> Warning {
+    Warning {
+        id: "no-mean-field",
+        severity: Severity::Warning,
+        message: format!("{reason}; neither stability nor thermodynamic limit is looked at"),
+    }
+}
+
+fn not_finite(pressure: f64) -> Option<Warning> {
+    (!pressure.is_finite()).then(|| Warning {
+        id: "not-finite",
+        severity: Severity::Error,
+        message: format!(
+            "the mean-field pressure at these densities is {pressure}: psi is not defined there; choose other densities, or \
+             set bounds on the density that leave such places out"
+        ),
+    })
 }
 
 fn not_conservative(fluid: &Fluid) -> Option<Warning> {
@@ -84,16 +120,25 @@ fn singular(fluid: &Fluid, densities: Option<&[f64]>) -> Result<Vec<Warning>, Ch
         Some(rho) if rho.iter().sum::<f64>() > 0.0 => (rho.to_vec(), rho.iter().sum()),
         _ => (vec![1.0; count], 10.0),
     };
-    let bounds: Vec<String> =
-        fluid.densities.iter().filter(|d| d.bounds.is_some()).map(|d| d.name.clone()).collect();
-    let mut found = Vec::new();
-    for s in singular_densities(fluid, &composition, [0.0, REACH * total])? {
+    // The pair potentials do not matter here, and may have no integral.
+    let mut bounded = fluid.clone();
+    bounded.pairs.clear();
+    let mut unbounded = bounded.clone();
+    unbounded.densities.iter_mut().for_each(|d| d.bounds = None);
+    let range = [0.0, REACH * total];
+    let left = singular_densities(&bounded, &composition, range)?;
+    let mut all = left.clone();
+    let among = |list: &[Singularity], s: &Singularity| {
+        list.iter().any(|t| t.species == s.species && (t.density - s.density).abs() <= 1e-6 * s.density)
+    };
+    all.extend(singular_densities(&unbounded, &composition, range)?.into_iter().filter(|s| !among(&left, s)));
+    let warnings = all.iter().enumerate().map(|(place, s)| {
+        let excluded = place >= left.len();
+        let bounds: Vec<&str> = bounds_of(fluid, s.species);
         let name = &fluid.species[s.species];
         let (what, advice) = match s.kind {
             SingularityKind::Origin => (
-                format!(
-                    "psi of {name} or its slope is not finite at density 0: an isolated particle stops the run"
-                ),
+                format!("psi of {name} or its slope is not finite for a particle without neighbours: it stops the run"),
                 "count the self term (self = true), or set bounds on the density",
             ),
             SingularityKind::Pole | SingularityKind::Edge => (
@@ -106,21 +151,31 @@ fn singular(fluid: &Fluid, densities: Option<&[f64]>) -> Result<Vec<Warning>, Ch
             ),
         };
         let inside = densities.is_some() && s.density > 0.0 && s.density <= total;
-        found.push(Warning {
-            id: "singular",
-            severity: match (inside, bounds.is_empty()) {
-                (true, true) => Severity::Error,
-                (_, true) => Severity::Warning,
-                (_, false) => Severity::Note,
-            },
-            message: if bounds.is_empty() {
-                format!("{what}; {advice}")
-            } else {
-                format!("{what}; the bounds of {} keep runs away from it", bounds.join(", "))
-            },
-        });
-    }
-    Ok(found)
+        let message = match (excluded, bounds.is_empty()) {
+            (true, _) => format!("{what}; the bounds of {} keep runs away from it", bounds.join(", ")),
+            (false, true) => format!("{what}; {advice}"),
+            (false, false) => format!("{what}; {advice} that leave it out: those of {} do not", bounds.join(", ")),
+        };
+        let severity = match (excluded, inside) {
+            (true, _) => Severity::Note,
+            (false, true) => Severity::Error,
+            (false, false) => Severity::Warning,
+        };
+        Warning { id: "singular", severity, message }
+    });
+    Ok(warnings.collect())
+}
+
+/// The densities with bounds that ψ of `species` depends on.
+fn bounds_of(fluid: &Fluid, species: usize) -> Vec<&str> {
+    let count = fluid.species.len();
+    let depends = |d: usize| match &fluid.excess[species] {
+        ExcessFreeEnergy::Formula(psi) => (0..count).any(|s| psi.depends_on(d * count + s)),
+        ExcessFreeEnergy::Curve(curve) => curve.density == d,
+        ExcessFreeEnergy::Slopes(_) => false,
+    };
+    let bounded = |d: &usize| fluid.densities[*d].bounds.is_some() && depends(*d);
+    (0..fluid.densities.len()).filter(bounded).map(|d| fluid.densities[d].name.as_str()).collect()
 }
 
 fn unstable(stability: &Stability) -> Option<Warning> {
@@ -161,7 +216,7 @@ fn jumps(fluid: &Fluid) -> Vec<Warning> {
     for term in &fluid.pairs {
         let range = term.potential.range();
         let edge = term.potential.at(range * (1.0 - 1e-9)).0.abs();
-        let inside = (1..20).map(|k| term.potential.at(range * k as f64 / 20.0).0.abs()).fold(0.0, f64::max);
+        let inside = largest((1..20).map(|k| term.potential.at(range * k as f64 / 20.0).0.abs()));
         if edge > 1e-6 * inside {
             let [a, b] = term.between.map(|s| &fluid.species[s]);
             found.push(Warning {

@@ -1,5 +1,6 @@
 use super::{Failure, Verdict, write_json};
-use crate::check::{Conditions, Findings, Severity, check, estimates};
+use crate::check::{Conditions, Findings, Severity, Warning, check, estimates};
+use crate::run::reach;
 use crate::scene::Scene;
 use psidpd_core::document::Document;
 use psidpd_core::model::Model;
@@ -14,8 +15,18 @@ pub struct Arguments {
     #[arg(long = "kT", value_name = "T", allow_negative_numbers = true)]
     kt: Option<f64>,
     /// Number density, total or one for each species, as 6.05 or 8,8.
-    #[arg(long, value_name = "RHO", value_delimiter = ',')]
+    #[arg(long, value_name = "RHO", value_delimiter = ',', value_parser = number_density)]
     density: Vec<f64>,
+}
+
+/// A number density on the command line.
+pub fn number_density(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|e| format!("{e}"))?;
+    if value >= 0.0 && value.is_finite() {
+        Ok(value)
+    } else {
+        Err("a density is a number that is not negative".into())
+    }
 }
 
 /// Number densities of the species: as given, or a total in equal shares.
@@ -29,10 +40,15 @@ pub fn per_species(given: &[f64], species: usize) -> Option<Vec<f64>> {
 
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     let document = Document::open(&arguments.file).map_err(Failure::new)?;
+    let mut too_far = None;
     let (model, kt, densities, steps) = if document.root().get("model").is_some() {
         let scene = Scene::open(&arguments.file).map_err(Failure::new)?;
-        let steps = estimates(&scene).map_err(Failure::new)?;
-        (scene.model.clone(), scene.kt, Some(scene.densities()), steps)
+        let densities = scene.densities();
+        let range = scene.model.at(scene.kt).map_err(Failure::new)?.cutoff();
+        let particles = scene.initial.parts().iter().map(|p| p.count).sum();
+        too_far = reach::check(&scene.domain, scene.model.dimensions(), range, particles).err();
+        let steps = if too_far.is_none() { estimates(&scene).map_err(Failure::new)? } else { Vec::new() };
+        (scene.model.clone(), scene.kt, Some(densities), steps)
     } else {
         (Model::open(&arguments.file).map_err(Failure::new)?, 1.0, None, Vec::new())
     };
@@ -40,7 +56,13 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         kt: arguments.kt.unwrap_or(kt),
         densities: per_species(&arguments.density, model.species().len()).or(densities),
     };
-    let findings = Findings { steps, ..check(&model, &conditions).map_err(Failure::new)? };
+    let mut findings = Findings { steps, ..check(&model, &conditions).map_err(Failure::new)? };
+    if let Some(error) = too_far {
+        findings.warnings.insert(
+            0,
+            Warning { id: "range-beyond-box", severity: Severity::Error, message: error.to_string() },
+        );
+    }
     print(&findings, model.species());
     write_json(json, &findings)?;
     Ok(if findings.works() { Verdict::Good } else { Verdict::CheckFailed })

@@ -3,7 +3,10 @@
 use crate::crosscheck::ValidateError;
 use crate::run::RunError;
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
-use psidpd_core::document::FileError;
+use psidpd_core::document::{FileError, printable};
+
+/// The longest line, in bytes, that is shown with an error.
+const LONGEST_LINE: usize = 2000;
 
 /// A verb that could not be carried out.
 #[derive(Debug)]
@@ -22,21 +25,28 @@ impl Failure {
 
     /// For the terminal, with escape sequences for colour: an error about a file shows the line.
     pub fn render(&self) -> String {
-        let located = file_error(&*self.0).filter(|e| !e.file().text().is_empty());
+        let shows = |e: &&FileError| {
+            let text = e.file().text();
+            !text.is_empty() && text.lines().all(|line| line.len() <= LONGEST_LINE)
+        };
+        let located = file_error(&*self.0).filter(shows);
+        // What was read stands in all of these as it was written.
+        let text = located.map_or(String::new(), |e| printable(e.file().text()));
+        let name = located.map_or("", |e| e.file().name());
         let title = match located {
             // The place is shown with the line itself.
             Some(e) if e.key().is_empty() => e.kind().to_string(),
             Some(e) => format!("{}: {}", e.key(), e.kind()),
             None => self.0.to_string(),
         };
-        let mut report = Group::with_title(Level::ERROR.primary_title(title));
+        let mut report = Group::with_title(Level::ERROR.primary_title(printable(&title)));
         if let Some(e) = located {
             let place = AnnotationKind::Primary.span(e.span()).label("here");
-            report = report.element(Snippet::source(e.file().text()).path(e.file().name()).annotation(place));
+            report = report.element(Snippet::source(text).path(name).annotation(place));
         }
         let help = run_error(&*self.0).and_then(RunError::help).map(|help| help.to_string());
         if let Some(help) = help.or_else(|| Some(file_error(&*self.0)?.help()?.to_string())) {
-            report = report.element(Level::HELP.message(help));
+            report = report.element(Level::HELP.message(printable(&help)));
         }
         Renderer::styled().render(&[report])
     }

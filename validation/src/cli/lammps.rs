@@ -57,7 +57,7 @@ pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
             println!("plugin for LAMMPS {}: {}", built.lammps_version, path.display());
             let launcher = plugin::launcher(&path);
             match &launcher {
-                None => println!("in a LAMMPS script: plugin load {}", path.display()),
+                None => println!("in a LAMMPS script: plugin load \"{}\"", path.display()),
                 Some(program) => {
                     println!(
                         "this LAMMPS loads no plugins; use this program in place of lmp, under mpirun too:"

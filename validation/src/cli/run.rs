@@ -3,7 +3,7 @@ use crate::check::calibration;
 use crate::report::{Progress, write_run_report};
 use crate::run::{Begin, Outcome, Runner, Start, Summary, Timing};
 use crate::scene::Scene;
-use psidpd_core::engine::Precision;
+use psidpd_core::engine::{Pool, Precision};
 use serde::Serialize;
 use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::flag;
@@ -31,7 +31,7 @@ pub struct Arguments {
     #[arg(long)]
     overwrite: bool,
     /// Threads that share the work; what a run writes does not depend on their number.
-    #[arg(long, value_name = "N", default_value = "1")]
+    #[arg(long, value_name = "N", default_value = "1", value_parser = thread_count)]
     threads: NonZeroUsize,
     /// In what the forces of pairs are computed; as the scene says if left out, or else mixed.
     #[arg(long, value_parser = precision, value_name = "mixed|double")]
@@ -39,6 +39,11 @@ pub struct Arguments {
     /// Make report.html at the end, also of a run that stopped.
     #[arg(long)]
     report: bool,
+}
+
+fn thread_count(text: &str) -> Result<NonZeroUsize, String> {
+    let count: NonZeroUsize = text.parse().map_err(|e| format!("{e}"))?;
+    if count.get() <= Pool::MOST { Ok(count) } else { Err(format!("at most {}", Pool::MOST)) }
 }
 
 /// What `--json` writes.

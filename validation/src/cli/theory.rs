@@ -1,4 +1,4 @@
-use super::check::per_species;
+use super::check::{number_density, per_species};
 use super::{Failure, Verdict, write_json};
 use crate::report::Table;
 use psidpd_core::model::Model;
@@ -16,7 +16,7 @@ pub struct Arguments {
     kt: f64,
     /// Number density, total or one for each species: where a mixture is looked at, and the middle of the
     /// table of the equation of state.
-    #[arg(long, value_name = "RHO", value_delimiter = ',')]
+    #[arg(long, value_name = "RHO", value_delimiter = ',', value_parser = number_density)]
     density: Vec<f64>,
     /// Rows of the table.
     #[arg(long, default_value_t = 12)]
@@ -63,6 +63,11 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         rows.push(json!({"density": scale * total, "pressure": p, "pressure_slope": slope, "excess": f}));
     }
     println!("{}", table.to_text());
+    let middle = theory.pressure(&densities);
+    let defined = middle.is_finite();
+    if !defined {
+        println!("at density {total} the pressure is {middle}: psi or its slope is no finite number there\n");
+    }
 
     let answers: Vec<(&str, Value)> = match species {
         1 => vec![
@@ -127,7 +132,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         all[name.replace(' ', "_")] = value;
     }
     write_json(json, &all)?;
-    Ok(Verdict::Good)
+    Ok(if defined { Verdict::Good } else { Verdict::CheckFailed })
 }
 
 /// A value as a person reads it.

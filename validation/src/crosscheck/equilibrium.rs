@@ -17,6 +17,9 @@ pub const SEED: u64 = 20_020_922;
 
 /// Chance that any of the comparisons of equal fluids fails although nothing is wrong.
 pub const FALSE_ALARM: f64 = 1e-3;
+/// How far the temperature may be from kT. The time step shifts it by 0.004 here; a drag that is 5 % wrong would by 0.05, such
+/// a noise by 0.1.
+const WARMER: f64 = 0.02;
 /// How far from the published liquid density a run may be, relative: his figures come from steps of 0.05,
 /// ours from 0.01.
 const PUBLISHED: f64 = 0.015;
@@ -222,6 +225,18 @@ fn report_set(
             );
             check.passed = !comparison.exceeds(comparisons, FALSE_ALARM) && comparison.error > 0.0;
             part.checks.push(check);
+        }
+    }
+    for ((code, law, _), m) in RUNS.iter().zip(measured) {
+        if matches!(code, Code::Native | Code::Psi) {
+            let check = Check::at_most(
+                format!("nvt.{slug}.{}.thermostat", code.slug()),
+                "equilibrium",
+                format!("{}: temperature of {} against kT", set.name, name(*code, *law)),
+                m.temperature.mean - 1.0,
+                WARMER,
+            );
+            part.checks.push(check.with_error(m.temperature.error));
         }
     }
     let native = &measured[0];

@@ -7,7 +7,8 @@ use super::{Context, Part, ValidateError};
 use crate::lammps::Lammps;
 use crate::report::{Check, Item, Section, Table};
 use crate::run::{Simulation, State};
-use psidpd_core::engine::{Precision, Settings, Step, Want};
+use psidpd_core::engine::{Precision, Settings, Step, Want, reference};
+use psidpd_core::maximum::largest;
 use psidpd_core::model::{ForceLaw, Model};
 use serde_json::json;
 
@@ -37,19 +38,13 @@ impl Point {
     fn against(&self, truth: &Point) -> Difference {
         let square = |f: &[f64; 3]| f.iter().map(|c| c * c).sum::<f64>();
         let rms = (truth.forces.iter().map(square).sum::<f64>() / truth.forces.len() as f64).sqrt();
-        let largest = self
-            .forces
-            .iter()
-            .zip(&truth.forces)
-            .map(|(a, b)| square(&[a[0] - b[0], a[1] - b[1], a[2] - b[2]]).sqrt())
-            // `max` would pass over NaN.
-            .fold(0.0, |m: f64, d| if d > m || d.is_nan() { d } else { m });
-        let size = truth.virial.iter().fold(0.0f64, |m, w| m.max(w.abs()));
-        let virial = self.virial.iter().zip(&truth.virial).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let apart = |(a, b): (&[f64; 3], &[f64; 3])| square(&[a[0] - b[0], a[1] - b[1], a[2] - b[2]]).sqrt();
+        let furthest = largest(self.forces.iter().zip(&truth.forces).map(apart));
+        let virial = largest(self.virial.iter().zip(&truth.virial).map(|(a, b)| (a - b).abs()));
         Difference {
-            force: if self.forces.len() == truth.forces.len() { largest / rms } else { f64::NAN },
+            force: if self.forces.len() == truth.forces.len() { furthest / rms } else { f64::NAN },
             energy: (self.energy - truth.energy).abs() / truth.energy.abs(),
-            virial: virial / size,
+            virial: virial / largest(&truth.virial),
         }
     }
 }
@@ -65,6 +60,49 @@ fn point_of(mut simulation: Simulation, step: Option<Step>) -> Result<Point, Val
         energy: simulation.potential_energy(),
         virial: simulation.tally().total_virial(),
     })
+}
+
+/// The sums over pairs as they are written down, which share no code with those that runs are made with.
+fn plain(model: &Model, state: &State, step: Option<Step>) -> Result<Point, ValidateError> {
+    let fluid = model.at(1.0)?;
+    let domain = &state.domain;
+    let mut x = state.x.clone();
+    x.iter_mut().for_each(|x| domain.wrap(x, &mut [0; 3]));
+    let species: Vec<usize> = state.species.iter().map(|s| *s as usize).collect();
+    let sums = reference::evaluate(&fluid, &x, &species, domain)?;
+    let energy = sums.energy();
+    let (mut forces, mut virial) = (sums.forces, sums.virial);
+    if let Some(step) = step {
+        let (more, w) = reference::thermostat(&fluid, &x, &state.v, &state.tag, &species, domain, step)?;
+        forces.as_flattened_mut().iter_mut().zip(more.as_flattened()).for_each(|(f, more)| *f += more);
+        virial.iter_mut().zip(w).for_each(|(v, w)| *v += w);
+    }
+    Ok(Point { forces: by_tag(&state.tag, &forces), energy, virial })
+}
+
+/// What the native runner computes, held to the sums as they are written down: each of its terms shows in one of these.
+fn against_plain(part: &mut Part, state: &State) -> Result<(), ValidateError> {
+    let step = Some(Step { seed: SEED, number: 0, dt: 0.01 });
+    for (id, law, gamma, step) in [
+        ("conservative", ForceLaw::Conservative, 0.0, None),
+        ("lucy", ForceLaw::LucyLammps, 0.0, None),
+        ("thermostat", ForceLaw::Conservative, super::fluids::GAMMA, step),
+    ] {
+        let model = SET6.model(law, gamma)?;
+        let found = native(&model, state, step)?.against(&plain(&model, state, step)?);
+        for (what, value) in [("force", found.force), ("energy", found.energy), ("virial", found.virial)] {
+            part.checks.push(Check::at_most(
+                format!("forces.native-{id}.{what}"),
+                "forces",
+                format!(
+                    "native, {id}: {what} against the sums over pairs as they are written down, relative"
+                ),
+                value,
+                1e-11,
+            ));
+        }
+    }
+    Ok(())
 }
 
 fn native_mixed(model: &Model, state: &State) -> Result<Point, ValidateError> {
@@ -157,6 +195,7 @@ pub fn run(context: &Context) -> Result<Part, ValidateError> {
         ..Setup::new(code, &SET6, law)
     };
 
+    against_plain(&mut part, &state)?;
     use ForceLaw::{Conservative, LucyLammps};
     let truth = native(&SET6.model(Conservative, 0.0)?, &state, None)?;
     let tight = [1e-12; 3];
@@ -296,4 +335,40 @@ fn smooth_particles(state: &State, margin: f64) -> Vec<usize> {
         })
     };
     (0..ordered.len()).filter(smooth).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A term that is 5 % wrong, in the forces or in the virial, is far beyond every limit; so is what is no number.
+    #[test]
+    fn wrong_terms_and_numbers_that_are_none_show() {
+        let filling = Filling { lengths: [4.0; 3], thickness: 4.0, density: SET6.liquid };
+        let state = equilibrated(&SET6, filling, 20, SEED).unwrap();
+        let step = Some(Step { seed: SEED, number: 0, dt: 0.01 });
+        let model = SET6.model(ForceLaw::Conservative, super::super::fluids::GAMMA).unwrap();
+        let right = native(&model, &state, step).unwrap();
+        let whole = right.against(&plain(&model, &state, step).unwrap());
+        assert!(whole.force < 1e-11 && whole.energy < 1e-11 && whole.virial < 1e-11, "{whole:?}");
+        let text = SET6.model_text(ForceLaw::Conservative, super::super::fluids::GAMMA).unwrap();
+        let wrong = |from: &str, to: &str| {
+            assert!(text.contains(from), "{text}");
+            let model = Model::parse("wrong.toml", &text.replace(from, to)).unwrap();
+            right.against(&plain(&model, &state, step).unwrap())
+        };
+        for (from, to) in [("-40.0", "-42.0"), ("25.0", "26.25"), ("18.0", "18.9")] {
+            let found = wrong(from, to);
+            assert!(found.force > 1e-4 && found.virial > 1e-4, "{from}: {found:?}");
+        }
+        for bad in [1.05, f64::NAN] {
+            let virial = right.virial.map(|w| w * bad);
+            let found = Point { virial, ..right.clone() }.against(&right);
+            assert!(found.virial.is_nan() || found.virial > 1e-3, "{found:?}");
+            let mut forces = right.forces.clone();
+            forces[0][1] *= bad;
+            let found = Point { forces, ..right.clone() }.against(&right);
+            assert!(found.force.is_nan() || found.force > 1e-5, "{found:?}");
+        }
+    }
 }

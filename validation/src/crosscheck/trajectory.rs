@@ -8,6 +8,7 @@ use crate::lammps::dump;
 use crate::report::{Check, Item, Section, Table};
 use crate::run::{Integrator, Simulation, State};
 use psidpd_core::engine::Want;
+use psidpd_core::maximum::largest;
 use psidpd_core::model::ForceLaw;
 use serde_json::json;
 use std::time::Duration;
@@ -35,11 +36,10 @@ pub fn run(context: &Context) -> Result<Part, ValidateError> {
         (Code::MdpdPsi, 2, true),
     ] {
         let theirs = lammps(context, &state, code, ranks, newton)?;
-        let distance = ours
-            .iter()
-            .zip(&theirs)
-            .map(|(a, b)| state.domain.minimum_image(*a, *b).iter().map(|c| c * c).sum::<f64>().sqrt())
-            .fold(0.0, |m: f64, d| if d > m || d.is_nan() { d } else { m });
+        let apart = |(a, b): (&[f64; 3], &[f64; 3])| {
+            state.domain.minimum_image(*a, *b).iter().map(|c| c * c).sum::<f64>()
+        };
+        let distance = largest(ours.iter().zip(&theirs).map(apart)).sqrt();
         let newton = if newton { "on" } else { "off" };
         table.push([
             code.label().to_owned(),

@@ -328,9 +328,16 @@ fn write_script(scene: &Scene, s: &mut String) -> std::fmt::Result {
     writeln!(s, "\nwrite_data    final.data nocoeff")
 }
 
-/// A title fit for a comment: one line, without the character that goes on with the next.
+/// A title fit for a comment: one line, without the character that goes on with the next, and without quotes, of which
+/// three make LAMMPS read on to the next three.
 fn one_line(text: &str) -> String {
-    text.chars().map(|c| if c.is_control() || c == '&' { ' ' } else { c }).collect()
+    let plain = |c: char| match c {
+        '&' => ' ',
+        '"' => '\'',
+        c if c.is_control() => ' ',
+        c => c,
+    };
+    text.chars().map(plain).collect()
 }
 
 fn save(path: &Path, text: &str) -> Result<(), DeckError> {
@@ -362,5 +369,6 @@ mod tests {
     #[test]
     fn titles_become_one_line() {
         assert_eq!(one_line("a &\nrun 5"), "a   run 5");
+        assert_eq!(one_line("a \"\"\" b"), "a ''' b");
     }
 }

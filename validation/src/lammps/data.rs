@@ -1,7 +1,7 @@
 //! LAMMPS data files with atoms as points.
 
 use std::collections::{HashMap, HashSet};
-use std::io::{self, Write};
+use std::io::{self, Read, Write};
 use std::path::Path;
 
 use super::error::LammpsError;
@@ -61,7 +61,10 @@ const XYZ: [&str; 3] = ["x", "y", "z"];
 impl DataFile {
     /// Reads a file.
     pub fn read(path: &Path) -> Result<DataFile, LammpsError> {
-        let bytes = std::fs::read(path).map_err(LammpsError::io("read", path))?;
+        let mut bytes = Vec::new();
+        psidpd_core::document::open_regular(path)
+            .and_then(|mut file| file.read_to_end(&mut bytes))
+            .map_err(LammpsError::io("read", path))?;
         DataFile::parse(&String::from_utf8_lossy(&bytes))
             .map_err(|source| LammpsError::Text { path: path.to_owned(), source })
     }

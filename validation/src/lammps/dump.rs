@@ -82,7 +82,7 @@ pub struct DumpReader<R> {
 
 /// All frames of a dump file.
 pub fn read(path: &Path) -> Result<Vec<Frame>, LammpsError> {
-    let file = std::fs::File::open(path).map_err(LammpsError::io("read", path))?;
+    let file = psidpd_core::document::open_regular(path).map_err(LammpsError::io("read", path))?;
     DumpReader::new(io::BufReader::new(file))
         .collect::<Result<_, _>>()
         .map_err(|source| LammpsError::Text { path: path.to_owned(), source })

@@ -1,5 +1,6 @@
 //! Drift of a quantity that ought to be conserved.
 
+use psidpd_core::maximum::largest;
 use serde::Serialize;
 
 use super::statistics::{StatisticsError, estimate};
@@ -85,7 +86,7 @@ pub fn drift(times: &[f64], values: &[f64]) -> Result<Drift, DriftError> {
         slope,
         slope_error: (2.0 * tau * variance / tt).sqrt(),
         net: values[values.len() - 1] - first,
-        largest: values.iter().map(|x| (x - first).abs()).fold(0.0, f64::max),
+        largest: largest(values.iter().map(|x| (x - first).abs())),
     })
 }
 

@@ -7,6 +7,7 @@
 
 pub mod configurational;
 pub mod drift;
+pub mod edges;
 pub mod frame;
 pub mod keys;
 mod least_squares;

@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use serde::Serialize;
 
+use super::edges::{Edges, edges};
 use super::least_squares::least_squares;
 use super::statistics::{MINIMUM_SAMPLES, StatisticsError, estimate};
 
@@ -256,6 +257,33 @@ pub struct Interface {
 /// The fit of [`interface_width`], the mean of both flanks; `None` as there.
 #[must_use]
 pub fn interface(profile: &DensityProfile) -> Option<Interface> {
+    let [a, b] = flanks(profile)?.map(|(points, height)| flank_interface(&points, height));
+    let (a, b) = (a?, b?);
+    Some(Interface {
+        liquid: 0.5 * (a.liquid + b.liquid),
+        vapour: 0.5 * (a.vapour + b.vapour),
+        place: 0.5 * (a.place + b.place),
+        width: 0.5 * (a.width + b.width),
+    })
+}
+
+/// What both flanks show by themselves, the mean of the two; see [`edges`].
+#[must_use]
+pub fn slab_edges(profile: &DensityProfile) -> Option<Edges> {
+    let [a, b] = flanks(profile)?.map(|(points, height)| edges(&points, height));
+    let (a, b) = (a?, b?);
+    Some(Edges {
+        liquid: 0.5 * (a.liquid + b.liquid),
+        vapour: 0.5 * (a.vapour + b.vapour),
+        place: 0.5 * (a.place + b.place),
+        ten_ninety: 0.5 * (a.ten_ninety + b.ten_ninety),
+        steepest: 0.5 * (a.steepest + b.steepest),
+    })
+}
+
+/// Both flanks, (distance from the centre, density) with distances increasing, and the height of a bin.
+#[allow(clippy::type_complexity)]
+fn flanks(profile: &DensityProfile) -> Option<[(Vec<(f64, f64)>, f64); 2]> {
     let (centres, density) = (&profile.centres, &profile.density);
     if centres.len() != density.len() || centres.len() < 2 * FLANK_BINS {
         return None;
@@ -277,15 +305,9 @@ pub fn interface(profile: &DensityProfile) -> Option<Interface> {
             .filter(|(s, _)| *s > 0.25 * height)
             .collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
-        flank_interface(&points, height)
+        (points, height)
     };
-    let (a, b) = (flank(1.0)?, flank(-1.0)?);
-    Some(Interface {
-        liquid: 0.5 * (a.liquid + b.liquid),
-        vapour: 0.5 * (a.vapour + b.vapour),
-        place: 0.5 * (a.place + b.place),
-        width: 0.5 * (a.width + b.width),
-    })
+    Some([flank(1.0), flank(-1.0)])
 }
 
 /// The fit to one flank: (distance from the centre, density), distances increasing by `height`.
@@ -301,7 +323,9 @@ pub(super) fn flank_interface(points: &[(f64, f64)], height: f64) -> Option<Inte
     }
     let scaled: Vec<(f64, f64)> = points.iter().map(|(s, rho)| (s / height, rho / scale)).collect();
     let extent = extent / height;
-    let fit = fit_flank(&scaled, extent)?;
+    let free = fit_flank(&scaled, extent, true)?;
+    // A density is not negative, and where the curve would have it so the profile is no such curve.
+    let fit = if free[1] < 0.0 { fit_flank(&scaled, extent, false)? } else { free };
     let width = 2.0 * fit[3].exp();
     let slab = fit[0] > fit[1] && fit[2] > 0.0 && fit[2] < extent;
     (slab && width >= 1.0 && width < extent).then_some(Interface {
@@ -312,33 +336,39 @@ pub(super) fn flank_interface(points: &[(f64, f64)], height: f64) -> Option<Inte
     })
 }
 
-/// The best (ρ_L, ρ_V, s₀, ln d), lengths in bins.
-fn fit_flank(points: &[(f64, f64)], extent: f64) -> Option<[f64; 4]> {
+/// The best (ρ_L, ρ_V, s₀, ln d), lengths in bins; ρ_V is 0 unless it is `free`.
+fn fit_flank(points: &[(f64, f64)], extent: f64, free: bool) -> Option<[f64; 4]> {
     let quarter = (points.len() / 4).max(1);
     let mean = |p: &[(f64, f64)]| p.iter().map(|p| p.1).sum::<f64>() / p.len() as f64;
     let liquid = mean(&points[..quarter]);
-    let vapour = mean(&points[points.len() - quarter..]);
+    let vapour = if free { mean(&points[points.len() - quarter..]) } else { 0.0 };
     if liquid <= vapour {
         return None;
     }
     // The step that holds as many particles.
     let excess: f64 = points.iter().map(|p| p.1 - vapour).sum();
     let step = (excess / (liquid - vapour)).clamp(0.0, extent);
-    let start = [liquid, vapour, step, (0.1 * extent).max(1.0).ln()];
-    let residuals = |p: &[f64]| {
+    let width = (0.1 * extent).max(1.0).ln();
+    let residuals = |[liquid, vapour, place, width]: [f64; 4]| {
         // Steeper than a thousandth of a bin, or wider than any box, the model has stopped depending on d.
-        if !(-7.0..30.0).contains(&p[3]) {
+        if !(-7.0..30.0).contains(&width) {
             return None;
         }
-        let d = p[3].exp();
+        let d = width.exp();
         let residual = |&(s, rho): &(f64, f64)| {
             // Mean of tanh over the bin: d [ln cosh b − ln cosh a].
-            let mean = d * (ln_cosh((s + 0.5 - p[2]) / d) - ln_cosh((s - 0.5 - p[2]) / d));
-            0.5 * (p[0] + p[1]) - 0.5 * (p[0] - p[1]) * mean - rho
+            let mean = d * (ln_cosh((s + 0.5 - place) / d) - ln_cosh((s - 0.5 - place) / d));
+            0.5 * (liquid + vapour) - 0.5 * (liquid - vapour) * mean - rho
         };
         Some(points.iter().map(residual).collect())
     };
-    Some(least_squares(start, [1e-6; 4], residuals)?.0)
+    if free {
+        let all = |p: &[f64]| residuals([p[0], p[1], p[2], p[3]]);
+        return Some(least_squares([liquid, vapour, step, width], [1e-6; 4], all)?.0);
+    }
+    let three = |p: &[f64]| residuals([p[0], 0.0, p[1], p[2]]);
+    let [liquid, place, width] = least_squares([liquid, step, width], [1e-6; 3], three)?.0;
+    Some([liquid, 0.0, place, width])
 }
 
 /// ln cosh x + ln 2; only differences of it are used.
@@ -414,6 +444,19 @@ mod tests {
             let width = interface_width(&profile).unwrap();
             assert!((width - 1.4).abs() < 1e-3, "{bins}: {width}");
         }
+    }
+
+    /// An interface with a foot that is cut off draws a tangent below zero; a density stays a density.
+    #[test]
+    fn densities_are_not_negative() {
+        let height = 0.1;
+        let centres: Vec<f64> = (0..200).map(|i| (f64::from(i) + 0.5) * height - 10.0).collect();
+        let rho = |z: f64| (6.0 * ((6.5 - z.abs()) / 3.0).clamp(0.0, 1.0)).powf(1.2);
+        let density = centres.iter().map(|z| rho(*z)).collect();
+        let profile = DensityProfile { error: Vec::new(), centres, density };
+        let found = interface(&profile).unwrap();
+        assert!(found.vapour >= 0.0 && found.liquid > 0.0, "{found:?}");
+        assert!(slab_edges(&profile).unwrap().vapour >= 0.0);
     }
 
     #[test]

@@ -4,8 +4,8 @@ use crate::lammps::data::DataFile;
 use crate::lammps::dump::{self, DumpReader};
 use crate::particles::State;
 use nalgebra::{Matrix3, Vector3};
+use psidpd_core::document::open_regular;
 use psidpd_core::engine::PeriodicBox;
-use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
@@ -49,7 +49,7 @@ impl Configuration {
     /// A file that cannot be read or is none of these, or a frame that it does not have.
     pub fn open(path: &Path, which: Which) -> Result<Configuration, OutputError> {
         let content = |message: &str| OutputError::Content { path: path.to_owned(), message: message.into() };
-        let mut file = BufReader::new(File::open(path).map_err(OutputError::read(path))?);
+        let mut file = BufReader::new(open_regular(path).map_err(OutputError::read(path))?);
         // Trajectories may be larger than memory: their frames are read one by one.
         let start = file.fill_buf().map_err(OutputError::read(path))?;
         let start = String::from_utf8_lossy(start);

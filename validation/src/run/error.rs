@@ -30,6 +30,22 @@ pub enum RunError {
         /// Range of the random force.
         range: f64,
     },
+    /// A range is many times the box.
+    #[error(
+        "the range {range} is {:.1} times the width {height} of the box between two faces: particles would meet \
+         {images:.1e} images of each other, which take about {gigabytes:.1} GB; use a larger box or a shorter range",
+        range / height
+    )]
+    Reach {
+        /// The longest range of the model.
+        range: f64,
+        /// The smallest width.
+        height: f64,
+        /// How many images there would be.
+        images: f64,
+        /// What they would take.
+        gigabytes: f64,
+    },
     /// A time step that is not a positive number.
     #[error("the time step must be a positive number, is {0}")]
     TimeStep(f64),

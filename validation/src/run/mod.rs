@@ -13,6 +13,7 @@ mod folder;
 mod growing;
 pub mod integrator;
 mod output;
+pub(crate) mod reach;
 mod reorder;
 mod runner;
 mod scene;

@@ -8,6 +8,7 @@ use super::underway::Run;
 use super::watch::Deviation;
 use crate::checkpoint::{Checkpoint, CheckpointError, Found, Identity, Position, Store, Sums, Thermo};
 use crate::observe::Observers;
+use crate::output::About;
 use crate::particles::State;
 use crate::scene::Scene;
 use psidpd_core::engine::Settings;
@@ -179,6 +180,10 @@ impl<'a> Runner<'a> {
         };
         let good = Checkpoint { program: PROGRAM.into(), ..good };
         let timing = Timing::read(folder.path());
+        // What the folder says of itself does not depend on where a run stopped.
+        if !folder.path().join("about.json").is_file() {
+            About::of(scene).write(folder.path())?;
+        }
         let mut run = Run::new(scene, folder, store, simulation, output, good, timing)?;
         run.stored = Some(run.good.step);
         Ok(Runner { start, run })

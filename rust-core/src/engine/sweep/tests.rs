@@ -1,6 +1,7 @@
 use super::*;
 use crate::engine::reference::Reference;
 use crate::engine::{Images, Instructions, Surroundings};
+use crate::maximum::largest;
 use crate::model::Model;
 use nalgebra::Matrix3;
 use std::num::NonZeroUsize;
@@ -94,7 +95,7 @@ fn difference(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
     let square: f64 = a.as_flattened().iter().map(|f| f * f).sum();
     let rms = (square / a.len() as f64).sqrt().max(1e-300);
     let pairs = a.as_flattened().iter().zip(b.as_flattened());
-    pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / rms
+    largest(pairs.map(|(a, b)| (a - b).abs())) / rms
 }
 
 fn tally_difference(a: &Tally, b: &Tally) -> f64 {
@@ -102,8 +103,8 @@ fn tally_difference(a: &Tally, b: &Tally) -> f64 {
         [t.excess, t.pair].into_iter().chain(t.virial).chain(t.thermostat_virial).collect()
     };
     let (a, b) = (list(a), list(b));
-    let scale = a.iter().map(|x| x.abs()).fold(1e-300, f64::max);
-    a.iter().zip(&b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / scale
+    let scale = largest(&a).max(1e-300);
+    largest(a.iter().zip(&b).map(|(a, b)| (a - b).abs())) / scale
 }
 
 /// What each precision may be off by, in the largest force over the rms one.

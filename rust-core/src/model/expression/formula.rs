@@ -53,6 +53,11 @@ impl Formula {
         }
     }
 
+    /// How many operations, constants and variables it is made of; equal parts count once.
+    pub fn operations(&self) -> usize {
+        self.nodes.len()
+    }
+
     /// Whether variable `i` occurs in the formula, after simplification.
     pub fn depends_on(&self, i: usize) -> bool {
         self.nodes.iter().any(|node| matches!(*node, Node::Variable(v) if v as usize == i))

@@ -3,7 +3,7 @@ use super::across::Across;
 use crate::observe::frame::Frame;
 use crate::observe::keys::{AXIS, BINS, Table};
 use crate::observe::observation::{Kind, Observation};
-use crate::observe::profile::{DensityProfile, interface};
+use crate::observe::profile::{DensityProfile, interface, slab_edges};
 use crate::observe::request::Options;
 use crate::observe::series::{Measured, Series};
 use psidpd_core::document::FileError;
@@ -25,8 +25,12 @@ impl Meter for InterfaceWidth {
         about: "w = (ρ_L − ρ_V)/max|dρ/dz|, as Warren, Phys. Rev. E 68, 066702 (2003), eq. 19, defines it, from a fit of \
                 (ρ_L + ρ_V)/2 − (ρ_L − ρ_V)/2 tanh((|z| − z₀)/d) to both flanks of the recentred density profile, \
                 averaged over each bin: w = 2d. Differences of neighbouring bins would overrate the slope in \
-                proportion to their noise. `width`, `liquid`, `vapour`, `thickness` (2 z₀). Jackknife errors. No \
-                values if the profile is not that of one slab.",
+                proportion to their noise. `width`, `liquid`, `vapour`, `thickness` (2 z₀). Where the interface is no such \
+                curve the fit misleads, so the profile's own widths are given too: `width_10_90`, between the places where \
+                10 and 90 % of the way between the plateaus are made (1.10 w of a tanh), and `width_slope`, w with the \
+                slope of a straight line through three tenths of the interface. If nothing can be fitted `width` has no \
+                value, and densities are those of the plateaus. Jackknife errors. No values if the profile is not that of \
+                one slab.",
         keys: &[AXIS, BINS],
     };
 
@@ -48,8 +52,13 @@ impl Meter for InterfaceWidth {
         let volume = self.across.bin_volume();
         let fit = self.series.jackknife_many(|means| {
             let density = means.iter().map(|n| n / volume).collect();
-            let fit = interface(&DensityProfile { centres: centres.clone(), density, error: Vec::new() })?;
-            Some(vec![fit.width, fit.liquid, fit.vapour, 2.0 * fit.place])
+            let profile = DensityProfile { centres: centres.clone(), density, error: Vec::new() };
+            let found = slab_edges(&profile)?;
+            let widths = [found.ten_ninety, found.steepest];
+            Some(match interface(&profile) {
+                Some(fit) => vec![fit.width, fit.liquid, fit.vapour, 2.0 * fit.place, widths[0], widths[1]],
+                None => vec![f64::NAN, found.liquid, found.vapour, 2.0 * found.place, widths[0], widths[1]],
+            })
         });
         let at = |k: usize| [fit.get(k).copied().unwrap_or(Measured::NONE)];
         vec![
@@ -59,6 +68,8 @@ impl Meter for InterfaceWidth {
                 .column("liquid", "1/volume", at(1))
                 .column("vapour", "1/volume", at(2))
                 .column("thickness", "r_c", at(3))
+                .column("width_10_90", "r_c", at(4))
+                .column("width_slope", "r_c", at(5))
                 .note(if fit.is_empty() { "The profile is not that of a slab." } else { "" }),
         ]
     }

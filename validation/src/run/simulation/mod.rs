@@ -6,6 +6,7 @@ use super::bounds::Bounds;
 use super::error::RunError;
 use super::integrator::Integrator;
 use super::integrator::parts::Kept;
+use super::reach;
 use super::reorder::{self, Reordering};
 use crate::particles::{BodyForce, State, Tags, add_body_forces};
 use psidpd_core::engine::thermostat::PairThermostat;
@@ -95,6 +96,7 @@ impl Simulation {
         let coupling = PairThermostat::new(forces.plan(), kt);
         let State { domain, mass, mut x, v, species, tag, mut image } = state;
         let owned = x.len();
+        reach::check(&domain, fluid.dimensions, fluid.cutoff(), owned)?;
         for (x, image) in x.iter_mut().zip(&mut image) {
             domain.wrap(x, image);
         }

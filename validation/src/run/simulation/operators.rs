@@ -289,7 +289,15 @@ impl Simulation {
     /// Velocities must be finite, which the step before has left to this one if its kick was deferred, and within `dt` lead
     /// nowhere beyond the box.
     fn refuse(&self, faults: Faults, dt: Option<f64>, deferred: bool) -> Result<(), RunError> {
-        let Some(k) = faults.fast.or(faults.escaped) else { return Ok(()) };
+        let Some(found) = faults.fast.or(faults.escaped) else { return Ok(()) };
+        // The one that is worst off is nearest to the cause; what is no number may have been made so by another.
+        let speed = |k: usize| {
+            let v = self.v[k];
+            let speed = v[0].hypot(v[1]).hypot(v[2]);
+            if speed.is_nan() { f64::MAX } else { speed }
+        };
+        let faster = |worst: usize, k: usize| if speed(k) > speed(worst) { k } else { worst };
+        let k = if faults.fast.is_some() { (0..self.owned).fold(found, faster) } else { found };
         let (step, tag, v) = (self.number, self.tag[k], self.v[k]);
         let speed = v[0].hypot(v[1]).hypot(v[2]);
         match dt {
