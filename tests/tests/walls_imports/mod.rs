@@ -92,7 +92,8 @@ fn imports_of(name: &str, module: &Module, modules: &BTreeMap<String, Module>) -
             let to = resolve(&import.path, modules, 0)?;
             // A module may show the names of its children.
             let of_child = name.is_empty() || to.starts_with(&format!("{name}::"));
-            (to != name && !(import.passed_on_as.is_some() && of_child)).then_some(to)
+            // Of the root itself there are macros only.
+            (to != name && !to.is_empty() && !(import.passed_on_as.is_some() && of_child)).then_some(to)
         })
         .collect()
 }
@@ -174,7 +175,11 @@ fn paths(text: &str) -> Vec<(Vec<String>, bool)> {
             let end =
                 from.find(|c: char| !(c.is_alphanumeric() || c == '_' || c == ':')).unwrap_or(from.len());
             let path = &from[..end];
-            if path.contains("::") && !line_of(before).trim_start().starts_with("pub(") {
+            // A macro belongs to no module.
+            if path.contains("::")
+                && !from[end..].starts_with('!')
+                && !line_of(before).trim_start().starts_with("pub(")
+            {
                 let mut path = path.split("::").filter(|s| !s.is_empty()).map(str::to_owned).collect();
                 leave_inline_modules(before_of(text, from), &mut path);
                 found.push((path, false));

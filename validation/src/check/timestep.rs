@@ -16,10 +16,10 @@
 //! with `a` from runs of standard DPD and of Warren's liquid; `docs/integrators.md` has them.
 
 use crate::observe::configurational;
-use psidpd_core::engine::reference::Evaluator;
 use crate::run::{Accuracy, Integrator, RunError, Simulation, State};
 use crate::scene::Scene;
 use psidpd_core::engine::noise::{Law, PairNoise};
+use psidpd_core::engine::reference::Evaluator;
 use psidpd_core::engine::{PeriodicBox, Want};
 use serde::Serialize;
 

@@ -9,8 +9,8 @@ use super::error::RunError;
 use super::simulation::Simulation;
 use crate::observe::configurational;
 use crate::observe::frame::Frame;
-use psidpd_core::engine::reference::Evaluator;
 use crate::scene::Stage;
+use psidpd_core::engine::reference::Evaluator;
 use std::fmt;
 
 /// Most steps from sample to sample, and fewest.

@@ -4,7 +4,7 @@
 //! four others, and nowhere else; bins along a column are narrower, which spares candidates. Within a bin
 //! particles are in the order of their tags: the whole order depends on positions and tags alone.
 
-use super::Bodies;
+use super::bodies::Bodies;
 use crate::engine::error::EngineError;
 use crate::engine::sweep::{Pool, part};
 

@@ -16,6 +16,7 @@
 //! to what was searched before, so that the error of the temperature is of the order of the square of that.
 
 use super::PairThermostat;
+use super::part::Part;
 use super::pass::{Sums, Terms, Wide, add_to_host, virial};
 use super::planes::Plane;
 use crate::engine::sweep::Pool;
@@ -25,17 +26,6 @@ pub const TOLERANCE: f64 = 1e-4;
 
 /// Most iterations: beyond, drag is so strong that rounding ends them.
 const MOST: usize = 500;
-
-/// Vectors of the particles of one plane.
-#[derive(Debug, Clone, Default)]
-pub struct Part {
-    /// `(M + K) p`.
-    image: Vec<Wide>,
-    residual: Vec<Wide>,
-    solution: Vec<Wide>,
-    /// Sum of a scalar product over the plane.
-    sum: f64,
-}
 
 /// A plane at work.
 struct Share<'a> {

@@ -15,8 +15,11 @@
 //! Results depend on positions, velocities and tags: not on the order of particles in memory, nor on the
 //! number of threads. A new update is a variant of [`Update`] and its rule in one of these files.
 
+mod bodies;
 mod cells;
+mod forces;
 mod midpoint;
+mod part;
 mod pass;
 mod planes;
 mod sequential;
@@ -24,13 +27,14 @@ mod sequential;
 #[cfg(test)]
 mod tests;
 
-use super::domain::PeriodicBox;
+pub use bodies::Bodies;
+
 use super::error::EngineError;
 use super::noise::{Law, PairNoise};
 use super::plan::{Plan, ThermostatPlan};
 use super::sweep::Pool;
 use cells::Cells;
-use midpoint::Part;
+use part::Part;
 use pass::Sums;
 use planes::Plane;
 
@@ -50,23 +54,6 @@ pub enum Update {
     },
     /// The relative velocity of some pairs, one after the other, drawn anew.
     LoweAndersen,
-}
-
-/// The particles that the thermostat acts on.
-#[derive(Debug, Clone, Copy)]
-pub struct Bodies<'a> {
-    /// The box: at least twice as wide as the range along periodic directions.
-    pub domain: &'a PeriodicBox,
-    /// Positions, in the box along its periodic directions.
-    pub x: &'a [[f64; 3]],
-    /// Tags, each once.
-    pub tag: &'a [i32],
-    /// Species.
-    pub species: &'a [i32],
-    /// Mass of each species.
-    pub mass: &'a [f64],
-    /// Which particles have a velocity that nothing changes; empty if none has.
-    pub frozen: &'a [bool],
 }
 
 /// Drag and noise of one fluid, by pairs.

@@ -3,7 +3,6 @@
 //! A plane adds to its own particles and to those of the next in a buffer of its own, so that the order of each sum is
 //! fixed, whichever thread makes it.
 
-use super::PairThermostat;
 use super::planes::Plane;
 use crate::engine::sweep::{Pool, part};
 
@@ -172,31 +171,6 @@ pub fn virial(pool: &Pool, planes: &[Plane], sums: &Sums, terms: Terms) -> [f64;
         (0..6).for_each(|c| sum[c] += virial[c]);
     }
     sum
-}
-
-impl PairThermostat {
-    /// Adds drag at the velocities `v`, or the random force, or both, to `force`; returns their virial, if distances
-    /// were kept.
-    pub fn add_forces(
-        &mut self,
-        pool: &Pool,
-        v: &[[f64; 3]],
-        drag: bool,
-        noise: bool,
-        force: &mut [[f64; 3]],
-    ) -> [f64; 6] {
-        let PairThermostat { planes, cells, sums, kt, dt, .. } = self;
-        let factor = 2.0 / *dt;
-        let noise = if noise { factor * kt.sqrt() } else { 0.0 };
-        let terms = Terms { noise, drag: if drag { factor } else { 0.0 } };
-        sums.gather(&cells.order, v);
-        sums.compute(pool, planes, terms);
-        let virial = virial(pool, planes, sums, terms);
-        // Frozen particles bear forces like others; whoever moves them does not.
-        let all: Vec<Wide> = (0..planes.len()).flat_map(|number| sums.of(planes, number)).collect();
-        add_to_host(pool, &cells.place, &all, 1.0, force);
-        virial
-    }
 }
 
 /// Adds `factor` times what is in order of the cells to what is in the order of the host.

@@ -1,4 +1,5 @@
 use super::*;
+use crate::engine::domain::PeriodicBox;
 use crate::engine::noise::threefry2x32;
 use crate::model::Model;
 use nalgebra::Matrix3;

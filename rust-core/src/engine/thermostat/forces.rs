@@ -1,0 +1,30 @@
+//! Drag and noise as forces on the particles of a host.
+
+use super::PairThermostat;
+use super::pass::{Terms, Wide, add_to_host, virial};
+use crate::engine::sweep::Pool;
+
+impl PairThermostat {
+    /// Adds drag at the velocities `v`, or the random force, or both, to `force`; returns their virial, if distances
+    /// were kept.
+    pub fn add_forces(
+        &mut self,
+        pool: &Pool,
+        v: &[[f64; 3]],
+        drag: bool,
+        noise: bool,
+        force: &mut [[f64; 3]],
+    ) -> [f64; 6] {
+        let PairThermostat { planes, cells, sums, kt, dt, .. } = self;
+        let factor = 2.0 / *dt;
+        let noise = if noise { factor * kt.sqrt() } else { 0.0 };
+        let terms = Terms { noise, drag: if drag { factor } else { 0.0 } };
+        sums.gather(&cells.order, v);
+        sums.compute(pool, planes, terms);
+        let virial = virial(pool, planes, sums, terms);
+        // Frozen particles bear forces like others; whoever moves them does not.
+        let all: Vec<Wide> = (0..planes.len()).flat_map(|number| sums.of(planes, number)).collect();
+        add_to_host(pool, &cells.place, &all, 1.0, force);
+        virial
+    }
+}
