@@ -97,7 +97,8 @@ fn no_room_of_the_program_imports_from_one_above() {
 fn observables_and_files_know_nothing_of_scenes_and_runs() {
     let program = sources("validation");
     for (from, to) in &program.imports {
-        let below = ["observe", "output", "checkpoint", "particles"].iter().any(|room| from.starts_with(room));
+        let below =
+            ["observe", "output", "checkpoint", "particles"].iter().any(|room| from.starts_with(room));
         let above = to.iter().find(|to| ["scene", "run"].iter().any(|room| to.starts_with(room)));
         assert!(!below || above.is_none(), "{from} → {above:?}");
     }
