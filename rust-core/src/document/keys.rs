@@ -216,3 +216,5 @@ macro_rules! keys {
         }),*]
     };
 }
+
+pub use keys;

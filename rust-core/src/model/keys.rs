@@ -2,8 +2,8 @@
 //! `docs/model-file.md` are written from it, and tests hold the reader to it.
 
 use super::kernel::KernelKind;
+use crate::document::keys::keys;
 pub use crate::document::keys::{Key, OPTIONAL, REQUIRED, Table, ValueKind};
-use crate::keys;
 
 /// The forms of a `[[pair]]`.
 pub const FORMS: &[&str] = &["soft", "spline", "expression", "table"];

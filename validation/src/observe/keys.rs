@@ -1,8 +1,8 @@
 //! Every key of `[observe]`, in tables that the reference `docs/observables.md` is written from and that
 //! a test holds the reader to.
 
+use psidpd_core::document::keys::keys;
 pub use psidpd_core::document::keys::{Key, Need, Table, ValueKind, key};
-use psidpd_core::keys;
 
 /// The keys of `[observe]` itself, for every observable, and of each observable, for that alone.
 pub const COMMON: &[Key] = keys! {

@@ -5,7 +5,7 @@ use crate::observe::observation::{Kind, Observation};
 use crate::observe::request::Options;
 use crate::observe::series::Series;
 use psidpd_core::document::FileError;
-use psidpd_core::keys;
+use psidpd_core::document::keys::keys;
 use serde::{Deserialize, Serialize};
 
 /// Rows of fields that are kept for error bars.

@@ -4,8 +4,8 @@ use crate::observe::keys::{Need, Table, ValueKind};
 use crate::observe::observation::{Kind, Observation};
 use crate::observe::request::Options;
 use crate::observe::series::Series;
+use psidpd_core::document::keys::keys;
 use psidpd_core::document::{FileError, FileErrorKind};
-use psidpd_core::keys;
 use psidpd_core::model::kernel::Kernel;
 use serde::{Deserialize, Serialize};
 

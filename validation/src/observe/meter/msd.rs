@@ -5,7 +5,7 @@ use crate::observe::observation::{Kind, Observation};
 use crate::observe::request::Options;
 use crate::observe::series::{Measured, Series};
 use psidpd_core::document::FileError;
-use psidpd_core::keys;
+use psidpd_core::document::keys::keys;
 use serde::{Deserialize, Serialize};
 
 /// Mean-square displacement and diffusion by species.

@@ -6,8 +6,8 @@ use crate::observe::observation::{Kind, Observation};
 use crate::observe::request::Options;
 use crate::observe::series::Series;
 use psidpd_core::document::FileError;
+use psidpd_core::document::keys::keys;
 use psidpd_core::engine::reference::for_each_pair;
-use psidpd_core::keys;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
