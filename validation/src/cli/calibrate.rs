@@ -1,7 +1,8 @@
 use super::{Failure, Verdict, write_json};
 use crate::bulk::Sampling;
 use crate::calibrate::{CalibrateError, Options, calibrate, shown, spaced};
-use crate::report::{Table, write_atomically};
+use crate::files::write_atomically;
+use crate::report::Table;
 use psidpd_core::model::Model;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};

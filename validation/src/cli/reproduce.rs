@@ -1,6 +1,7 @@
 use super::{Failure, Verdict, write_json};
+use crate::files::write_atomically;
 use crate::papers::{Case, Compared, Context, Outcome, PaperError, Size, cases};
-use crate::report::{Table, write_atomically};
+use crate::report::Table;
 use serde_json::{Value, json};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
