@@ -85,8 +85,9 @@ pub(super) fn chart<'a>(
     let mut chart = ChartBuilder::on(area)
         .margin_top(px(top))
         .margin_right(px(right))
+        .margin_left(px(8.0))
         .x_label_area_size(px(BELOW))
-        .y_label_area_size(px(LEFT))
+        .y_label_area_size(px(LEFT - 8.0))
         .build_cartesian_2d(scales[0].clone(), scales[1].clone())?;
     axes(&mut chart, names, scales, grid)?;
     Ok(chart)

@@ -107,8 +107,7 @@ impl Plot {
             }
             let names = self.series.iter().map(|s| &s.name).chain(self.levels.iter().map(|l| &l.1));
             if names.into_iter().any(|name| !name.trim().is_empty()) {
-                let points = runs.iter().flatten().flatten().map(|s| s.at);
-                legend(&mut chart, corner(points, x, y))?;
+                legend(&mut chart, corner(&runs, x, y))?;
             }
             Ok(())
         })
@@ -245,14 +244,19 @@ fn marker<'a, At: Clone + 'static>(k: usize, at: At) -> DynElement<'static, SVGB
     }
 }
 
-/// The corner where a legend covers the fewest points.
-fn corner(points: impl Iterator<Item = (f64, f64)>, x: &Scale, y: &Scale) -> SeriesLabelPosition {
+/// The corner where a legend covers the least of the data, lines between points included.
+fn corner(runs: &[Vec<Vec<Shown>>], x: &Scale, y: &Scale) -> SeriesLabelPosition {
     use SeriesLabelPosition::{LowerLeft, LowerRight, UpperLeft, UpperRight};
     let mut corners = [(0, UpperRight), (0, UpperLeft), (0, LowerRight), (0, LowerLeft)];
-    for at in points {
-        let place = |scale: &Scale, v: f64| scale.map(&v, (0, 100));
-        let (left, low) = (place(x, at.0) < 50, place(y, at.1) < 60);
-        corners[usize::from(left) + 2 * usize::from(low)].0 += 1;
+    let place = |s: &Shown| (x.map(&s.at.0, (0, 100)), y.map(&s.at.1, (0, 100)));
+    for run in runs.iter().flatten() {
+        for (a, b) in run.iter().zip(run.iter().skip(1).chain(run.last())) {
+            let (a, b) = (place(a), place(b));
+            for t in 0..10 {
+                let at = ((10 - t) * a.0 + t * b.0, (10 - t) * a.1 + t * b.1);
+                corners[usize::from(at.0 < 500) + 2 * usize::from(at.1 < 600)].0 += 1;
+            }
+        }
     }
     corners.into_iter().min_by_key(|corner| corner.0).map_or(UpperRight, |corner| corner.1)
 }

@@ -2,7 +2,6 @@
 
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 use plotters::coord::types::RangedCoordf64;
-use plotters::prelude::{IntoLogRange, LogCoord};
 use std::ops::Range;
 
 use super::text::superscript;
@@ -19,9 +18,12 @@ pub(super) struct Scale {
 impl Scale {
     /// From `low` to `high`; ends that span no range get one of length 1.
     pub fn exact(low: f64, high: f64) -> Scale {
-        let range = if high > low && (high - low).is_finite() { low..high } else { 0.0..1.0 };
+        let spread = high - low;
+        let spans = spread.is_finite() && spread > 1e-9 * low.abs().max(high.abs());
+        let range = if spans { low..high } else { 0.0..1.0 };
         let size = range.start.abs().max(range.end.abs());
-        let power = size.log10().floor() as i32;
+        // Powers of ten that are ordinary numbers.
+        let power = if size > 0.0 { (size.log10().floor() as i32).clamp(-290, 290) } else { 0 };
         // Sizes of ordinary life are written out.
         Scale { range, log: false, power: if (-3..=4).contains(&power) { 0 } else { power } }
     }
@@ -36,8 +38,9 @@ impl Scale {
             (false, true) => Scale { range: 1.0..10.0, log, power: 0 },
             (false, false) => Scale::exact(0.0, 1.0),
             (true, true) => {
-                let room = (high / low).powf(0.04).max(1.1);
-                Scale { range: low / room..high * room, log, power: 0 }
+                let (low, high) = (low.log10(), high.log10());
+                let room = 0.04 * (high - low).max(1.0);
+                Scale { range: 10f64.powf(low - room)..10f64.powf(high + room), log, power: 0 }
             }
             (true, false) => {
                 let size = low.abs().max(high.abs());
@@ -75,14 +78,25 @@ impl Scale {
         (self.range.start / unit..self.range.end / unit).into()
     }
 
-    fn logarithmic(&self) -> LogCoord<f64> {
-        self.range.clone().log_scale().into()
+    /// The logarithm of the axis, to the base of ten.
+    fn logarithmic(&self) -> RangedCoordf64 {
+        (self.range.start.log10()..self.range.end.log10()).into()
+    }
+
+    /// Powers of ten; with their double and fivefold where there are few.
+    fn decades(&self, most: usize) -> Vec<f64> {
+        let (low, high) = (self.range.start.log10().floor() as i32, self.range.end.log10().ceil() as i32);
+        let digits: &[f64] = if high - low <= 3 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+        let stride = (high - low) as usize / most.max(1) + 1;
+        let powers = (low..=high).step_by(stride).map(|power| 10f64.powi(power));
+        let ticks = powers.flat_map(|power| digits.iter().map(move |digit| digit * power));
+        ticks.filter(|tick| self.range.contains(tick)).collect()
     }
 }
 
 /// Whether a value has a place on an axis. Powers of ten near it must be ordinary numbers.
 fn shows(value: f64, log: bool) -> bool {
-    value.abs() < 1e290 && (!log || value > 1e-290)
+    value.abs() < 1e250 && (!log || value > 1e-250)
 }
 
 impl Ranged for Scale {
@@ -91,7 +105,7 @@ impl Ranged for Scale {
 
     fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
         if self.log {
-            self.logarithmic().map(value, limit)
+            self.logarithmic().map(&value.log10(), limit)
         } else {
             self.linear().map(&(value / 10f64.powi(self.power)), limit)
         }
@@ -99,11 +113,11 @@ impl Ranged for Scale {
 
     fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
         let most = hint.max_num_points();
-        let powers = if self.log { self.logarithmic().key_points(most) } else { Vec::new() };
-        if powers.len() > 2 {
-            return powers;
+        let decades = if self.log { self.decades(most) } else { Vec::new() };
+        if decades.len() > 2 {
+            return decades;
         }
-        // Less than a decade has ticks as on a linear axis.
+        // Much less than a decade has ticks as on a linear axis.
         let unit = 10f64.powi(self.power);
         self.linear().key_points(most).into_iter().map(|v| v * unit).collect()
     }
