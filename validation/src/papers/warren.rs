@@ -41,7 +41,8 @@ pub const CASES: &[Case] = &[
 fn table1(context: &Context) -> Result<Outcome, PaperError> {
     let mut outcome = Outcome::default();
     let mut points = Vec::new();
-    let printed = [(0.65, 4.1, 0.1), (0.75, 3.07, 0.05), (0.85, 2.08, 0.05), (1.0, 1.29, 0.05)];
+    let printed: [(f64, f64, f64); 4] =
+        [(0.65, 4.1, 0.1), (0.75, 3.07, 0.05), (0.85, 2.08, 0.05), (1.0, 1.29, 0.05)];
     // In the middle of the paper's ranges, A = 0–50 and B r_d⁴ = 0–10, and over its densities.
     let (a, many) = (25.0, 5.0);
     for (rd, value, error) in printed {
