@@ -71,7 +71,8 @@ fn load(host: &Host, _guard: &MutexGuard<()>) -> Result<&'static LammpsLibrary, 
     }
     let library = libloading::Library::from(open(&host.library)?);
     // SAFETY: the functions have the types of LAMMPS's own header; their names tell them.
-    let functions = unsafe { LammpsLibrary::of(library) };
+    let functions = unsafe { LammpsLibrary::from_library(library) }
+        .map_err(|e| LammpsError::Load { path: host.library.clone(), reason: e.to_string() })?;
     let loaded = LOADED.get_or_init(|| Loaded { path: host.library.clone(), functions });
     // SAFETY: registers a function that lives as long as the process and unwinds never.
     unsafe { atexit(finalize_mpi) };

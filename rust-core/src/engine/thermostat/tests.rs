@@ -20,6 +20,10 @@ between = ["A", "B"]
 gamma = 30.0
 range = 1.0
 exponent = 0.5
+[[thermostat]]
+between = ["B", "B"]
+gamma = 0.0
+range = 1.0
 "#;
 
 const FLAT: &str = "title = \"flat\"\ndimensions = 2\nspecies = [\"A\"]\n[[thermostat]]\ngamma = 9.0\nrange = 1.0\nexponent = 2\n";
