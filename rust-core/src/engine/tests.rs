@@ -176,7 +176,7 @@ fn assert_matches_reference(fluid: &Fluid, c: &Configuration) {
         close(quiet.tally.energy(), truth.energy, truth.energy.abs(), "energy");
         close(quiet.energy.iter().sum(), truth.energy, truth.energy.abs(), "sum of particle energies");
         for k in 0..6 {
-            let size = largest(&truth.virial);
+            let size = largest(truth.virial);
             close(quiet.tally.virial[k], truth.virial[k], size, "virial");
             close(quiet.virial.iter().map(|w| w[k]).sum(), truth.virial[k], size, "sum of particle virials");
         }
@@ -393,7 +393,7 @@ fn are_gradients(fluid: &Fluid) {
             let x: Vec<_> = c.x.iter().map(|p| strain(*p)).collect();
             energy(&x, &domain)
         });
-        let size = largest(&here.tally.virial);
+        let size = largest(here.tally.virial);
         assert!(
             (here.tally.virial[w] + difference).abs() < 1e-8 * size,
             "virial {w}: {} against {}",

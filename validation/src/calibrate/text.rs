@@ -23,7 +23,7 @@ pub fn with_correction(
             let mut table = InlineTable::new();
             for (k, p) in several.iter().enumerate() {
                 let (at, of) = (&species[k / species.len()], &species[k % species.len()]);
-                table.insert(&format!("{of}|{at}"), Value::Array(coefficients(p)));
+                table.insert(format!("{of}|{at}"), Value::Array(coefficients(p)));
             }
             Value::InlineTable(table)
         }
@@ -75,14 +75,15 @@ mod tests {
     fn a_correction_is_one_more_line_and_nothing_else() {
         let fitted = Polynomial(vec![1.54, 1.047, -0.001]);
         let text =
-            with_correction(MODEL, "n", &["F".into()], &[fitted.clone()], "found by\nrunning").unwrap();
+            with_correction(MODEL, "n", &["F".into()], std::slice::from_ref(&fitted), "found by\nrunning")
+                .unwrap();
         let expected = MODEL.replace(
             "range = 1.0 # r_c\n",
             "range = 1.0 # r_c\n# found by\n# running\ncorrection = [1.54, 1.047, -0.001]\n",
         );
         assert_eq!(text, expected);
         let model = Model::parse("m.toml", &text).unwrap();
-        assert_eq!(model.at(1.0).unwrap().densities[0].correction, [fitted.clone()]);
+        assert_eq!(model.at(1.0).unwrap().densities[0].correction, std::slice::from_ref(&fitted));
         // Once more: the old one goes.
         let again = with_correction(&text, "n", &["F".into()], &[Polynomial(vec![2.0, 1.0])], "").unwrap();
         assert_eq!(again.matches("correction").count(), 1, "{again}");

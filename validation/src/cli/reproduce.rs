@@ -133,7 +133,7 @@ fn write_plots(outcome: &Outcome, folder: &Path) -> Result<(), Failure> {
         let svg = plot.render().map_err(Failure::new)?;
         let io = |source| Failure::new(PaperError::Io { path: folder.to_owned(), source });
         std::fs::create_dir_all(folder).map_err(io)?;
-        write_atomically(&folder.join(format!("{name}.svg")), svg.as_bytes()).map_err(Failure::new)?;
+        write_atomically(folder.join(format!("{name}.svg")), svg.as_bytes()).map_err(Failure::new)?;
     }
     Ok(())
 }

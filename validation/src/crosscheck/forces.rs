@@ -44,7 +44,7 @@ impl Point {
         Difference {
             force: if self.forces.len() == truth.forces.len() { furthest / rms } else { f64::NAN },
             energy: (self.energy - truth.energy).abs() / truth.energy.abs(),
-            virial: virial / largest(&truth.virial),
+            virial: virial / largest(truth.virial),
         }
     }
 }

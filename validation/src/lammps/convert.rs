@@ -9,9 +9,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// The force law of the new script.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
 pub enum Law {
     /// That of Warren's potential: the default of `mdpd/psi`.
+    #[default]
     Conservative,
     /// That of the built-in itself, which has no potential.
     Lucy,
@@ -171,12 +172,6 @@ struct Work<'a> {
     strengths: BTreeMap<(String, String), String>,
     /// The line of the pair style.
     style_line: usize,
-}
-
-impl Default for Law {
-    fn default() -> Law {
-        Law::Conservative
-    }
 }
 
 impl Work<'_> {

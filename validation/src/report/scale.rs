@@ -137,10 +137,9 @@ impl ValueFormatter<f64> for Scale {
         let step = if self.log { *value } else { (self.range.end - self.range.start) / unit };
         let decimals = (2.0 - step.log10()).ceil().clamp(0.0, 15.0) as usize;
         let text = format!("{:.decimals$}", value / unit);
-        match text.contains('.').then(|| text.trim_end_matches('0').trim_end_matches('.')).unwrap_or(&text) {
-            "-0" => "0".to_owned(),
-            text => text.to_owned(),
-        }
+        let fraction = text.contains('.');
+        let short = if fraction { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+        if short == "-0" { "0".to_owned() } else { short.to_owned() }
     }
 }
 

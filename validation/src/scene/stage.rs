@@ -191,10 +191,9 @@ fn read_integrator(section: &Section, default: Integrator) -> Result<Integrator,
 
 /// The error of a key that an integrator does not have; it names those that do.
 fn has_none(value: &Value, name: &str, key: &str, has: fn(&mut Integrator) -> bool) -> FileError {
-    let owners: Vec<String> = Integrator::ALL
-        .into_iter()
-        .filter_map(|(name, mut integrator)| has(&mut integrator).then(|| format!("\"{name}\"")))
-        .collect();
+    let mut owners = Vec::from(Integrator::ALL);
+    owners.retain_mut(|(_, integrator)| has(integrator));
+    let owners: Vec<String> = owners.iter().map(|(name, _)| format!("\"{name}\"")).collect();
     let error = value.error(FileErrorKind::Value(format!("{name} has no {key}")));
     error.with_help(format!("integrator = {}", owners.join(", ")))
 }

@@ -33,6 +33,7 @@ impl BoxSearch {
     /// In boxes narrower than twice the cut-off a particle may meet several images of another, and its own: each is a
     /// pair. Particles behind the `owned` first are ghosts: two of them are no pair. Particles that take part must have
     /// finite positions.
+    #[expect(clippy::too_many_arguments)] // A search is of all that it goes over.
     pub fn find(
         &mut self,
         x: &[[f64; 3]],

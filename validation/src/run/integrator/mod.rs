@@ -170,11 +170,13 @@ impl Integrator {
 
     /// Whether drag and noise act inside the forces; apart from them otherwise.
     pub(super) fn drag_in_forces(self) -> bool {
-        match self {
-            Integrator::VelocityVerlet | Integrator::GrootWarren { .. } => true,
-            Integrator::DpdVv { .. } | Integrator::SelfConsistent { .. } => true,
-            _ => false,
-        }
+        matches!(
+            self,
+            Integrator::VelocityVerlet
+                | Integrator::GrootWarren { .. }
+                | Integrator::DpdVv { .. }
+                | Integrator::SelfConsistent { .. }
+        )
     }
 
     /// Whether the last forces of a step are those at its end.
