@@ -22,7 +22,7 @@ fn compare(script: &str, model: &Model) {
     assert!((energy / truth.energy - 1.0).abs() < CLOSE, "{energy} {}\n{script}", truth.energy);
     let virial = l.compute_vector("w").unwrap();
     let volume = l.eval("vol").unwrap();
-    let scale = largest(&truth.virial);
+    let scale = largest(truth.virial);
     for (c, w) in truth.virial.iter().enumerate() {
         if model.dimensions() == 3 || [0, 1, 3].contains(&c) {
             // In two dimensions LAMMPS leaves the zz, xz and yz components out.

@@ -106,11 +106,10 @@ fn resolve(path: &[String], modules: &BTreeMap<String, Module>, depth: usize) ->
         module = join(&module, &path[at]);
         at += 1;
     }
-    if let Some(next) = path.get(at).and_then(|name| modules[&module].passed_on.get(name)) {
-        if depth < 10 {
-            let further: Vec<String> = next.iter().chain(&path[at + 1..]).cloned().collect();
-            return resolve(&further, modules, depth + 1);
-        }
+    let passed_on = path.get(at).and_then(|name| modules[&module].passed_on.get(name));
+    if let Some(next) = passed_on.filter(|_| depth < 10) {
+        let further: Vec<String> = next.iter().chain(&path[at + 1..]).cloned().collect();
+        return resolve(&further, modules, depth + 1);
     }
     Some(module)
 }

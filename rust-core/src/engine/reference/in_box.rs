@@ -87,7 +87,8 @@ fn is_first(d: [f64; 3]) -> bool {
     d.iter().find(|c| **c != 0.0).is_some_and(|c| *c > 0.0)
 }
 
-/// As [`BoxSearch::find`], with lengths, for all particles with finite positions.
+/// Every pair of particles with finite positions that are closer than a cutoff, each once, with its length; in boxes
+/// narrower than twice the cutoff every image that is in reach is a pair.
 pub fn for_each_pair(
     x: &[[f64; 3]],
     domain: &PeriodicBox,

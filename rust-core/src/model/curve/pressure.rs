@@ -8,7 +8,7 @@ use crate::model::expression::{Formula, Program, TooLarge};
 /// by Gauss–Legendre quadrature on panels that are checked against their halves; it is undefined beyond
 /// a singularity of `ψ′`. Near `ρ = 0` a pressure that starts as that of an ideal gas is expanded in
 /// powers of `ρ`, where the difference `p − ρkT` would lose its digits. Where the pressure has no such expansion,
-/// as with `ρ^2.6`, and `ψ′` has a limit nevertheless, it goes to it as a power of `ρ`: see [`Tail`].
+/// as with `ρ^2.6`, and `ψ′` has a limit nevertheless, it goes to it as a power of `ρ`.
 #[derive(Debug, Clone)]
 pub struct Pressure {
     text: String,
