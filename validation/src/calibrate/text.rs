@@ -97,7 +97,7 @@ mod tests {
     fn pairs_of_species_keep_who_feels_whom() {
         let text = MODEL.replace("[\"F\"]", "[\"A\", \"B\"]").replace(
             "[excess_free_energy.F]\npressure = \"rho*kT + 5*rho^3\"",
-            "[excess_free_energy]\nA = \"n^2\"\nB = \"n_A\"",
+            "[excess_free_energy]\nA = \"n^2\"\nB = \"n_A*n_B\"",
         );
         let species = ["A".to_owned(), "B".to_owned()];
         let all: Vec<Polynomial> = (0..4).map(|k| Polynomial(vec![f64::from(k), 1.0])).collect();

@@ -194,7 +194,7 @@ mod tests {
     fn texts(svg: &str) -> Vec<String> {
         let document = roxmltree::Document::parse(svg).unwrap();
         let nodes = document.descendants().filter(|n| n.tag_name().name() == "text");
-        nodes.filter_map(|n| n.text().map(str::to_owned)).collect()
+        nodes.filter_map(|n| n.text().map(|text| text.trim().to_owned())).collect()
     }
 
     #[test]

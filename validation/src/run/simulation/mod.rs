@@ -282,6 +282,8 @@ impl Simulation {
         self.image.clone_from(&state.image);
         self.force.clear();
         self.force.extend_from_slice(forces);
+        // A start that failed has left none.
+        self.force.resize(self.owned, [0.0; 3]);
         self.number = number;
         self.earlier_out_of_bounds = out_of_bounds;
         self.deferred = None;

@@ -41,7 +41,7 @@ const INTEGRATORS: &str = "\
     [[stage]]\nname = \"d\"\nsteps = 3\nintegrator = \"dpd-vv\"\n\
     [[stage]]\nname = \"e\"\nsteps = 3\nintegrator = \"baoab\"\nthermostat_step = \"pairwise\"\n\
     [[stage]]\nname = \"f\"\nsteps = 3\nintegrator = \"shardlow-s2\"\nnoise = \"uniform\"\n\
-    [output]\nthermo = 2\ndump = 3\n";
+    [output]\nthermo = 2\ndump = 3\ncheckpoint = 4\n";
 
 fn scenes() -> [Scene; 4] {
     let solid = scene_of(&bounded(), "[3.0, 3.0, 3.0]", 6.05, &format!("{STAGES}checkpoint = 4\n")).unwrap();
