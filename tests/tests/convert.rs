@@ -49,7 +49,7 @@ fn a_converted_script_is_the_same_fluid() {
     let text = std::fs::read_to_string(at("in.new")).unwrap();
     // Wherever the program would have put a plugin: this test has its own.
     let plugin = text.lines().find(|l| l.starts_with("plugin")).unwrap().to_owned();
-    let text = text.replace(&plugin, &format!("plugin load {}", lammps().1.display()));
+    let text = text.replace(&plugin, &format!("plugin load \"{}\"", lammps().1.display()));
     std::fs::write(at("in.new"), &text).unwrap();
     let new = frames(folder.path(), "in.new");
     assert_eq!(old.len(), 2);

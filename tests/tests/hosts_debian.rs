@@ -248,7 +248,7 @@ fn the_wheel_refuses_it_with_both_versions() {
     let debian = debian();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("in.lammps");
-    std::fs::write(&path, format!("plugin load {}\n{}", debian.plugin.display(), script(&model()))).unwrap();
+    std::fs::write(&path, format!("plugin load \"{}\"\n{}", debian.plugin.display(), script(&model()))).unwrap();
     let here = lammps().0.version().unwrap().number;
     for ranks in [1, 2] {
         let error = psidpd_tests::last_words(ranks, || {
@@ -268,12 +268,13 @@ fn the_wheel_refuses_it_with_both_versions() {
 fn examples_and_the_readme_run_here() {
     let debian = debian();
     let host = debian.runs().host;
-    let plugin = debian.plugin.display().to_string();
-    let models = root().join("validation/models").display().to_string();
-    let arguments =
-        ["-log", "none", "-var", "plugin", &plugin, "-var", "models", &models, "-var", "steps", "50"];
+    let arguments = ["-log", "none", "-var", "plugin", "./psidpdplugin.so", "-var", "models", "models"];
+    let arguments = [&arguments[..], &["-var", "steps", "50"]].concat();
     for script in psidpd_tests::examples() {
         let folder = tempfile::tempdir().unwrap();
+        // LAMMPS puts no variables in between quotes: values with a space would fall apart.
+        symlink(&debian.plugin, folder.path().join("psidpdplugin.so")).unwrap();
+        symlink(root().join("validation/models"), folder.path().join("models")).unwrap();
         let run = host.run_script(1, folder.path(), &script, &arguments, LIMIT);
         let run = run.unwrap_or_else(|e| panic!("{}: {e}", script.display()));
         assert!(run.stdout.contains("Loop time"), "{}", run.stdout);

@@ -104,7 +104,7 @@ fn the_loaded_file_needs_nothing_of_lammps() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("in.lammps");
     let outcome = |plugin: &Path| {
-        std::fs::write(&path, format!("plugin load {}\n{}", plugin.display(), script())).unwrap();
+        std::fs::write(&path, format!("plugin load \"{}\"\n{}", plugin.display(), script())).unwrap();
         let run = lammps().0.run_script(1, folder.path(), &path, &[], std::time::Duration::from_secs(60));
         run.map(|run| run.stdout).map_err(|e| e.to_string())
     };

@@ -173,7 +173,7 @@ fn atoms_out_of_the_plane_are_refused() {
     let flat = |more: &str| {
         format!(
             "units lj\ndimension 2\ncomm_modify vel yes\nregion b block 0 5 0 5 -0.5 0.5\ncreate_box 1 b\n\
-             create_atoms 1 random 50 1 b\nmass 1 1\n{more}\nplugin load {}\npair_style mdpd/psi 1 1 5\n\
+             create_atoms 1 random 50 1 b\nmass 1 1\n{more}\nplugin load \"{}\"\npair_style mdpd/psi 1 1 5\n\
              pair_coeff 1 1 -40 25 4.5 1 0.75\nfix 1 all nve\nrun 1\n",
             lammps().1.display()
         )
