@@ -248,7 +248,8 @@ fn the_wheel_refuses_it_with_both_versions() {
     let debian = debian();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("in.lammps");
-    std::fs::write(&path, format!("plugin load \"{}\"\n{}", debian.plugin.display(), script(&model()))).unwrap();
+    std::fs::write(&path, format!("plugin load \"{}\"\n{}", debian.plugin.display(), script(&model())))
+        .unwrap();
     let here = lammps().0.version().unwrap().number;
     for ranks in [1, 2] {
         let error = psidpd_tests::last_words(ranks, || {

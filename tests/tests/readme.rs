@@ -10,8 +10,11 @@ fn the_lammps_script_runs_in_the_checkout() {
     let (host, plugin) = lammps();
     let text = readme_block("lammps", "pair_style   dpd/psi");
     // The plugin is where the README says, unless the environment moved it.
-    std::fs::write(&script, text.replace("target/lammps/psidpdplugin.so", &format!("\"{}\"", plugin.display())))
-        .unwrap();
+    std::fs::write(
+        &script,
+        text.replace("target/lammps/psidpdplugin.so", &format!("\"{}\"", plugin.display())),
+    )
+    .unwrap();
     let run = host.run_script(1, &root(), &script, &["-log", "none"], Duration::from_secs(300)).unwrap();
     assert!(run.stdout.contains("Loop time"), "{}", run.stdout);
 }
@@ -30,8 +33,11 @@ fn the_drop_in_lines_replace_the_styles_of_the_script() {
             l => format!("{l}\n"),
         })
         .collect();
-    std::fs::write(&script, text.replace("target/lammps/psidpdplugin.so", &format!("\"{}\"", plugin.display())))
-        .unwrap();
+    std::fs::write(
+        &script,
+        text.replace("target/lammps/psidpdplugin.so", &format!("\"{}\"", plugin.display())),
+    )
+    .unwrap();
     let run = host.run_script(2, &root(), &script, &["-log", "none"], Duration::from_secs(300)).unwrap();
     assert!(run.stdout.contains("Loop time"), "{}", run.stdout);
 }
