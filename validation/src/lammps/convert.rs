@@ -283,7 +283,8 @@ impl Work<'_> {
         }
         let mut text = String::new();
         if !std::mem::replace(&mut self.loaded, true) {
-            text += &command.with("plugin", &["load", self.plugin]);
+            let quote = if self.plugin.contains(char::is_whitespace) { "\"" } else { "" };
+            text += &command.with("plugin", &["load", &format!("{quote}{}{quote}", self.plugin)]);
         }
         Some(text + &command.with("pair_style", &new))
     }
