@@ -103,7 +103,7 @@ fn monte_carlo_needs_full_energies_of_many_bodies() {
         // Both ways run, and find something. (They draw other moves, with LAMMPS's own styles too.)
         for full in ["", " full_energy"] {
             let row = last_row(&deck(&format!("{pairs}{}", rest(full))), 1);
-            assert!(row.iter().all(|x| x.is_finite()) && row[3] > 0.0, "{fix}{full}: {row:?}");
+            assert!(row.iter().all(|x| x.is_finite()) && row[3] != 0.0, "{fix}{full}: {row:?}");
         }
     }
 }
