@@ -107,7 +107,7 @@ mod tests {
         let fluid = Model::parse("m.toml", &text).unwrap().at(1.0).unwrap();
         assert_eq!(fluid.densities[0].correction, all);
         let flat =
-            with_slopes(&text, &species, &["n_A".into(), "n_B".into()], &[vec![1e-7, -2.0], vec![3.0, 0.0]]);
+            with_slopes(&text, &species, &["n_A".into(), "n_B".into()], &[vec![1e-7, -2.0], vec![3.0, 4.0]]);
         let fluid = Model::parse("m.toml", &flat.unwrap()).unwrap().at(1.0).unwrap();
         let theory = psidpd_core::theory::MeanField::new(&fluid).unwrap();
         assert_eq!(theory.excess_slopes(0, &[1.0, 2.0]), [1e-7, -2.0]);
