@@ -111,6 +111,6 @@ mod tests {
         let fluid = Model::parse("m.toml", &flat.unwrap()).unwrap().at(1.0).unwrap();
         let theory = psidpd_core::theory::MeanField::new(&fluid).unwrap();
         assert_eq!(theory.excess_slopes(0, &[1.0, 2.0]), [1e-7, -2.0]);
-        assert_eq!(theory.excess_slopes(1, &[1.0, 2.0]), [3.0, 0.0]);
+        assert_eq!(theory.excess_slopes(1, &[1.0, 2.0]), [3.0, 4.0]);
     }
 }
