@@ -212,7 +212,8 @@ fn b_by_type_pair_is_refused_with_the_reason() {
     assert!(error.contains("B differs between type pairs"), "{error}");
     assert!(error.contains("partial densities"), "{error}");
     let missing = text.replace("pair_coeff 1 2 -30 20 18 1 0.75\n", "");
-    assert!(outcome(&format!("{missing}\n"), 1).unwrap_err().contains("no coefficients for types 1 and 2"));
+    let error = outcome(&format!("{missing}\n"), 1).unwrap_err();
+    assert!(error.contains("no coefficients for types 1 and 2: there is no mixing"), "{error}");
     let same = text.replace("-30 20", "-30 25");
     assert!(outcome(&format!("{same}\n"), 1).is_ok());
 }

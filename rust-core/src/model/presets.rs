@@ -39,7 +39,7 @@ pub struct WarrenPair {
 #[non_exhaustive]
 pub enum PresetError {
     /// Species `i` and `j` (from 1) have no coefficients.
-    #[error("no coefficients for types {0} and {1}")]
+    #[error("no coefficients for types {0} and {1}: there is no mixing, set them with pair_coeff")]
     Missing(usize, usize),
     /// Not a square table, or a table of nothing, or not as many masses.
     #[error("expected coefficients for every pair of types, and as many masses as types")]
