@@ -15,12 +15,21 @@ fn quiet() -> String {
 const SOFT: &str = "title = \"soft\"\nspecies = [\"F\"]\n[[pair]]\nbetween = [\"F\", \"F\"]\nform = \"soft\"\n\
     strength = 25\nrange = 1\n";
 
-/// The last row of the last thermo output of a run on `ranks` ranks.
+/// The last row of the last thermo output of a script on `ranks` ranks.
 fn last_row(script: &str, ranks: usize) -> Vec<f64> {
+    last_rows(script, ranks).pop().unwrap()
+}
+
+/// The last row of the thermo output of each run of a script.
+fn last_rows(script: &str, ranks: usize) -> Vec<Vec<f64>> {
     let said = outcome(script, ranks).unwrap_or_else(|e| panic!("{ranks} ranks: {e}\n{script}"));
-    let (table, _) = said.rsplit_once("Loop time").unwrap();
-    let row = table.lines().rev().find(|line| !line.trim().is_empty()).unwrap();
-    row.split_whitespace().map(|word| word.parse().unwrap_or_else(|_| panic!("{said}"))).collect()
+    let mut tables: Vec<&str> = said.split("Loop time").collect();
+    tables.pop();
+    let row = |table: &&str| {
+        let row = table.lines().rev().find(|line| !line.trim().is_empty()).unwrap();
+        row.split_whitespace().map(|word| word.parse().unwrap_or_else(|_| panic!("{said}"))).collect()
+    };
+    tables.iter().map(row).collect()
 }
 
 /// What a script says on `ranks` ranks, or its error.
@@ -100,10 +109,28 @@ fn monte_carlo_needs_full_energies_of_many_bodies() {
                 assert!(row.iter().all(|x| x.is_finite()), "{row:?}");
             }
         }
-        // Both ways run, and find something. (They draw other moves, with LAMMPS's own styles too.)
-        for full in ["", " full_energy"] {
-            let row = last_row(&deck(&format!("{pairs}{}", rest(full))), 1);
-            assert!(row.iter().all(|x| x.is_finite()) && row[3] != 0.0, "{fix}{full}: {row:?}");
+        // What is left must have the energy that the same atoms have afresh: none of them may still be excluded.
+        let both = ["", " full_energy"].map(|full| {
+            let afresh = format!(
+                "write_data left.data nocoeff\nclear\nunits lj\natom_style atomic\ncomm_modify vel yes\n\
+                 read_data left.data\n{pairs}fix 1 all nve\nthermo_style custom step pe atoms\n\
+                 thermo_modify norm no format float %.15g\nrun 0\n"
+            );
+            let rows = last_rows(&deck(&format!("{pairs}{}{afresh}", rest(full))), 1);
+            let [run, fresh] = &rows[..] else { panic!("{rows:?}") };
+            assert!(run.iter().all(|x| x.is_finite()) && run[3] != 0.0, "{fix}{full}: {run:?}");
+            assert!(
+                (run[1] - fresh[1]).abs() < 1e-9 * (1.0 + run[1].abs()),
+                "{fix}{full}: {run:?} {fresh:?}"
+            );
+            assert_eq!(run[2], fresh[2], "{fix}{full}");
+            run.clone()
+        });
+        // Test insertions are the same ones; gcmc draws other moves for each, with LAMMPS's own styles too.
+        if fix.contains("widom") {
+            for (a, b) in both[0].iter().zip(&both[1]) {
+                assert!((a - b).abs() < 1e-9 * (1.0 + a.abs()), "{fix}: {both:?}");
+            }
         }
     }
 }
