@@ -1,4 +1,4 @@
-//! The one door to forces: chooses between the sweep and the reference, evaluation by evaluation.
+//! All forces come from here: the engine chooses between the sweep and the reference, evaluation by evaluation.
 
 use super::counts::PassCounts;
 use super::domain::PeriodicBox;
