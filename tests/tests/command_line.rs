@@ -277,3 +277,25 @@ fn every_template_can_be_written_checked_and_run() {
     assert_eq!(unknown.status.code(), Some(2));
     assert!(said(&unknown).contains("pendant-drop"), "{}", said(&unknown));
 }
+
+/// A drop at a time step that its forces do not bear heats for good: the run stops, says why, and leaves a state.
+#[test]
+fn a_drop_that_heats_stops_its_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = root().join("validation/models/spline-attractive.toml");
+    let text = format!(
+        "title = \"hot\"\nmodel = \"{}\"\nkT = 0.5\nbox = [8.0, 8.0, 8.0]\nsteps = 3000\ndt = 0.3\n\
+         [[part]]\nshape = \"sphere\"\ncenter = [4.0, 4.0, 4.0]\nradius = 2.0\ndensity = 12.0\n",
+        model.display()
+    );
+    let path = write(folder.path(), "scene.toml", &text);
+    let output = psidpd(folder.path(), &["run", &path, "--out", "out"]);
+    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    for words in ["hotter than 2 kT", "dt = 0.3 is likely too large", "last-good.data"] {
+        assert!(said(&output).contains(words), "{words}: {}", said(&output));
+    }
+    assert!(folder.path().join("out/last-good.data").is_file());
+    let calm = write(folder.path(), "calm.toml", &text.replace("dt = 0.3", "dt = 0.01"));
+    let output = psidpd(folder.path(), &["run", &calm, "--out", "calm"]);
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+}
