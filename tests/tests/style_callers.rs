@@ -69,7 +69,10 @@ fn strained_ghosts_are_seen() {
         let of = |style: &str| format!("{start}{style}{columns}");
         let reference = of("pair_style dpd 1.0 1.0 5\npair_coeff 1 1 25 0\n");
         let reference = last_row(&reference, 1);
-        for ranks in [1, 2, 8] {
+        // Eight ranks on two cores wait for each other most of the time: once is enough.
+        let ranks: &[usize] =
+            if (before, region) == ("", "block 0 5 0 5 0 5") { &[1, 2, 8] } else { &[1, 2] };
+        for &ranks in ranks {
             let soft = of(&format!("pair_style dpd/psi 1.0 5\npair_coeff * * {soft} F\n"));
             let row = last_row(&soft, ranks);
             assert_eq!(row.len(), reference.len());
@@ -90,7 +93,7 @@ fn strained_ghosts_are_seen() {
 /// that it runs. Without densities it gets its answer.
 #[test]
 fn monte_carlo_needs_full_energies_of_many_bodies() {
-    let many = format!("pair_style dpd/psi 1.0 5\npair_coeff * * {} F\n", warren());
+    let many = format!("pair_style dpd/psi 1.0 5\npair_coeff * * \"{}\" F\n", warren());
     let mdpd = "pair_style mdpd/psi 1.0 1.0 5\npair_coeff 1 1 -40 25 4.5 1 0.75\n".to_owned();
     let pairs = "pair_style dpd/spline 1.0 1.0 5\npair_coeff 1 1 9.5 2 1 0.8 1 4.5\n";
     for fix in ["fix mc all gcmc 1 10 10 1 777 1.0 -2.0 0.1", "fix mc all widom 1 20 1 777 1.0"] {
