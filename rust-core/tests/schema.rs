@@ -97,7 +97,7 @@ fn reference() -> String {
         with `#:schema model.schema.json` in the first line; the schema is `rust-core/schema/model.schema.json`.\n\n\
         The examples leave out what every model needs: a title, species (one, `A`), and the density `n` where\n\
         psi uses it.\n\n\
-        This page is written from the table of keys in `rust-core/src/model/keys.rs`.\n"
+        This page is written from the table of keys in `rust-core/model/src/keys.rs`.\n"
         .to_owned();
     // Writing to a String cannot fail.
     for table in TABLES {

@@ -28,7 +28,7 @@ pub fn engine() -> Engine {
         .filter(|message: &Value| message["reason"] == "compiler-artifact")
         .collect();
     let of = |name: &'static str| made.iter().filter(move |message| message["target"]["name"] == name);
-    let library = of("psidpd_core")
+    let library = of("psidpd_c")
         .filter_map(|message| message["filenames"].as_array())
         .flatten()
         .filter_map(Value::as_str)

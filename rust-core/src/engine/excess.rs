@@ -1,10 +1,10 @@
 //! ψ and its slopes for blocks of particles of one species.
 
-use super::instruction_set::InstructionSet;
 use super::vectors::{self, Loop};
 use crate::model::curve::{Curve, CurveBlock};
 use crate::model::expression::{Expansion, Formula, Program, TooLarge};
-use crate::model::{Bounds, Continuation, Fluid, StatedSlopes};
+use crate::model::{Bounds, Fluid, StatedSlopes};
+use psidpd_passes::instruction_set::InstructionSet;
 
 /// `ψ_α` of the densities that need a pass.
 #[derive(Debug, Clone)]
@@ -376,11 +376,4 @@ fn continued(coefficients: &[f64], outside: &[Outside], derivative: Option<usize
         sum += term;
     }
     sum
-}
-
-impl Bounds {
-    /// The highest power of δ in the continuation: 2 where ψ′ is linear, 1 where it is constant.
-    pub(crate) fn order(&self, beyond: f64) -> usize {
-        if beyond < 0.0 && self.below == Continuation::Constant { 1 } else { 2 }
-    }
 }

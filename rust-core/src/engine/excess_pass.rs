@@ -2,8 +2,8 @@
 
 use super::error::EngineError;
 use super::excess::{ExcessPlan, ExcessWork};
-use super::instruction_set::InstructionSet;
 use super::plan::Plan;
+use psidpd_passes::instruction_set::InstructionSet;
 
 /// Particles per evaluation of ψ: enough to hide the interpreter, few enough for the first-level cache.
 pub const LANES: usize = 128;

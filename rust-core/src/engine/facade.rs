@@ -1,18 +1,18 @@
 //! All forces come from here: the engine chooses between the sweep and the reference, evaluation by evaluation.
 
 use super::counts::PassCounts;
-use super::domain::PeriodicBox;
 use super::error::EngineError;
 use super::particles::{Particles, Step};
 use super::path::{Path, Reason};
 use super::plan::Plan;
 use super::reference::Reference;
-use super::settings::Settings;
 use super::surroundings::{Around, Surroundings};
 use super::sweep::{Pool, Sweep, Times};
-use super::tally::{Tally, Want};
 use crate::model::Fluid;
 use crate::model::expression::TooLarge;
+use psidpd_passes::domain::PeriodicBox;
+use psidpd_passes::settings::Settings;
+use psidpd_passes::tally::{Tally, Want};
 use std::sync::Arc;
 
 /// The forces of one fluid on the particles of a host.

@@ -1,4 +1,4 @@
-use super::domain::PeriodicBox;
+use psidpd_passes::domain::PeriodicBox;
 
 /// The periodic images of a host's own particles, as ghosts: what LAMMPS's communication does on one
 /// rank, for the native runner.

@@ -18,37 +18,33 @@
 //! from owners to ghosts in between, so that an evaluation has two halves.
 
 mod counts;
-mod domain;
 mod error;
 mod excess;
 mod excess_pass;
 mod facade;
 mod images;
-mod instruction_set;
-pub mod noise;
 mod particles;
 mod path;
 mod plan;
 pub mod reference;
-mod settings;
 mod surroundings;
 mod sweep;
-mod tally;
 pub mod thermostat;
 mod vectors;
 
 pub use counts::PassCounts;
-pub use domain::{DomainError, PeriodicBox};
 pub use error::EngineError;
 pub use facade::{Engine, Evaluated, Request};
 pub use images::Images;
 pub use particles::{Particles, Step};
 pub use path::{Path, Reason};
 pub use plan::Plan;
-pub use settings::{Instructions, Precision, Settings};
+pub use psidpd_passes::domain::{DomainError, PeriodicBox};
+pub use psidpd_passes::noise;
+pub use psidpd_passes::settings::{Instructions, Precision, Settings};
+pub use psidpd_passes::tally::{Tally, Want};
 pub use surroundings::{Around, Newton, PairsOfHost, Surroundings};
 pub use sweep::{Pool, Sweep, Times, part};
-pub use tally::{Tally, Want};
 
 #[cfg(test)]
 mod tests;

@@ -4,6 +4,7 @@ use super::excess::ExcessPlan;
 use crate::model::expression::{Formula, TooLarge};
 use crate::model::kernel::Kernel;
 use crate::model::{Continuation, ExcessFreeEnergy, Fluid, PairTerm, WeightedDensity};
+use psidpd_passes::ground::cell_grid::SearchPlan;
 use std::fmt;
 
 /// The passes, kernels and ranges of one fluid.
@@ -59,29 +60,6 @@ pub enum PairStorage {
 impl PairStorage {
     /// The full cache pays if a density reaches further than this part of the cutoff; else the list is short.
     pub const FULL_CACHE_FROM: f64 = 0.7;
-}
-
-/// How the fast engine searches for pairs.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SearchPlan {
-    /// Cells along x for each cutoff.
-    pub cells_per_cutoff: f64,
-    /// Below so many particles per cutoff along a column of cells, i-clusters have eight particles, else four: the cell
-    /// ranges of eight then are still about sixteen particles long, the size of a j-cluster.
-    pub sparse: f64,
-}
-
-impl SearchPlan {
-    /// The search of every fluid.
-    pub const DEFAULT: SearchPlan = SearchPlan { cells_per_cutoff: 4.0, sparse: 4.5 };
-
-    /// The size of i-clusters, and how many cells apart their particles may be.
-    pub(super) fn i_clusters(&self, particles_per_cutoff: f64) -> (usize, f64) {
-        match particles_per_cutoff < self.sparse {
-            true => (8, 4.0 * self.cells_per_cutoff),
-            false => (4, self.cells_per_cutoff),
-        }
-    }
 }
 
 impl Plan {

@@ -1,6 +1,6 @@
 //! Where the particles of an evaluation are, and which of them interact.
 
-use super::domain::PeriodicBox;
+use psidpd_passes::domain::PeriodicBox;
 
 /// What a host knows about the pairs of its particles.
 #[derive(Debug, Clone, Copy)]

@@ -1,7 +1,7 @@
 //! Loops over particles, compiled for the vectors of each instruction set.
 
-use super::instruction_set::InstructionSet;
-use super::settings::Instructions;
+use psidpd_passes::instruction_set::InstructionSet;
+use psidpd_passes::settings::Instructions;
 
 /// A loop that the compiler makes vectors of. Nothing in it is contracted or put into another order: the results are
 /// the same bits on every instruction set.

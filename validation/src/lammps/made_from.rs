@@ -8,11 +8,14 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 
 /// Folders and files of the checkout that go into a plugin.
-const SOURCES: [&str; 8] = [
+const SOURCES: [&str; 11] = [
     "Cargo.toml",
     "Cargo.lock",
     "rust-core/Cargo.toml",
     "rust-core/src",
+    "rust-core/model",
+    "rust-core/passes",
+    "rust-core/threads",
     "lammps-plugin/Cargo.toml",
     "lammps-plugin/build.rs",
     "lammps-plugin/src",

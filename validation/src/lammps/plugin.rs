@@ -93,13 +93,19 @@ pub fn build_for(
         return Err(LammpsError::NoSources { path: manifest });
     }
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    build_with(host, version, base, &builds_dir(), &root, &cargo, progress)
+    build_with(host, version, base, &builds_dir(&root), &root, &cargo, progress)
 }
 
-/// Where cargo builds plugins, for every host: most of what it compiles does not depend on the host. It is not the
-/// build folder of the checkout, where builds without a host would take turns with those for one.
-fn builds_dir() -> PathBuf {
-    base_dir().join("plugin-build")
+/// Where cargo builds plugins, for every host: the build folder of this program, where what both need is compiled already,
+/// or if it was put elsewhere, that of the checkout.
+fn builds_dir(root: &Path) -> PathBuf {
+    let program = std::env::current_exe().and_then(fs::canonicalize).unwrap_or_default();
+    let folders = program.ancestors().skip(1);
+    let own = folders
+        .clone()
+        .zip(folders.skip(1))
+        .find(|(profile, target)| profile.ends_with("release") && target.join("CACHEDIR.TAG").is_file());
+    own.map_or_else(|| root.join("target"), |(_, target)| target.to_owned())
 }
 
 fn build_with(
@@ -147,7 +153,18 @@ fn build_with(
         version.name
     ));
     let out = cargo_command(cargo)
-        .args(["build", "--release", "-p", "psidpd-lammps", "-p", "psidpd-lammps-entry"])
+        // With the program, for the same features of what both need.
+        .args([
+            "build",
+            "--release",
+            "--lib",
+            "-p",
+            "psidpd",
+            "-p",
+            "psidpd-lammps",
+            "-p",
+            "psidpd-lammps-entry",
+        ])
         .arg("--message-format=json-render-diagnostics")
         .arg("--target-dir")
         .arg(builds)
@@ -348,19 +365,19 @@ mod tests {
         HostVersion { number, abi: "smallbig mpich".into(), name: "a test".into(), plugins: true }
     }
 
-    /// A stand-in for cargo, which is told by its eighth and ninth argument where to build: it makes two libraries of
+    /// A stand-in for cargo, which is told by its last two arguments where to build: it makes two libraries of
     /// `text`.
     fn cargo(path: &Path, text: &str) {
         let message = |target: &str, files: &str| {
             format!(
                 "echo '{{\"reason\":\"compiler-artifact\",\"target\":{{\"name\":\"{target}\"}},\"filenames\":[{files}]}}' \
-                 | sed \"s|FOLDER|$9|g\"\n"
+                 | sed \"s|FOLDER|${{12}}|g\"\n"
             )
         };
         let entry = message("psidpdplugin", "\"FOLDER/entry.so\"");
         let styles = message("psidpd_styles", "\"FOLDER/x.rlib\",\"FOLDER/styles.so\"");
         let script = format!(
-            "#!/bin/sh\nmkdir -p $9\necho x >> $9/count\nprintf \"{text}\" > $9/entry.so\nprintf styles > $9/styles.so\n\
+            "#!/bin/sh\nmkdir -p ${{12}}\necho x >> ${{12}}/count\nprintf \"{text}\" > ${{12}}/entry.so\nprintf styles > ${{12}}/styles.so\n\
              echo not json\n{entry}{styles}"
         );
         fs::write(path, script).unwrap();

@@ -1,9 +1,9 @@
 //! Which path evaluations take, and that all give the same numbers.
 
 use super::*;
-use crate::engine::noise::threefry2x32;
 use crate::engine::{Images, Newton, PairsOfHost, Precision};
 use crate::model::{ForceLaw, Model, WarrenPair, warren_ab};
+use psidpd_passes::noise::threefry2x32;
 
 /// ψ is not linear in its only density.
 fn warren() -> Fluid {

@@ -6,15 +6,15 @@ use super::forces::{ForceInput, ForceOutput, add_forces};
 use super::free_energy::{FreeEnergies, Psi};
 use super::in_box::{BoxSearch, Pair, for_each_pair_by_brute_force};
 use super::pairs::Pairs;
-use crate::engine::domain::PeriodicBox;
-use crate::engine::noise::PairNoise;
 use crate::engine::particles::Step;
 use crate::engine::plan::Plan;
 use crate::engine::surroundings::Newton;
-use crate::engine::tally::{Tally, Want};
 use crate::model::Fluid;
 use crate::model::expression::TooLarge;
 use crate::model::pair::PairForm;
+use psidpd_passes::domain::PeriodicBox;
+use psidpd_passes::noise::PairNoise;
+use psidpd_passes::tally::{Tally, Want};
 
 /// A fluid at one temperature, ready to be evaluated.
 #[derive(Debug)]
@@ -281,8 +281,8 @@ pub fn thermostat(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::noise::threefry2x32;
     use crate::model::Model;
+    use psidpd_passes::noise::threefry2x32;
 
     const BOUNDED: &str = r#"
 title = "bounded"

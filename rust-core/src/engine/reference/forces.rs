@@ -2,13 +2,13 @@
 //! scalars in a loop of its own, compiled for its kernel, and one last loop scatters them.
 
 use super::pairs::PairList;
-use crate::engine::noise::PairNoise;
 use crate::engine::plan::{LinearTerm, Plan, ThermostatPlan};
 use crate::engine::surroundings::Newton;
-use crate::engine::tally::{Tally, Want};
 use crate::model::PairTerm;
 use crate::model::kernel::{Kernel, Shape, ShapeVisitor};
 use crate::model::pair::PairForm;
+use psidpd_passes::noise::PairNoise;
+use psidpd_passes::tally::{Tally, Want};
 
 /// Pairs in a block: its scalars stay in the first-level cache.
 const BLOCK: usize = 256;

@@ -1,8 +1,8 @@
 //! Every pair of particles in a box, images included.
 
 use super::search::CellSearch;
-use crate::engine::domain::PeriodicBox;
 use crate::engine::images::Images;
+use psidpd_passes::domain::PeriodicBox;
 
 /// Two particles, the second perhaps an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -140,8 +140,8 @@ pub fn for_each_pair_by_brute_force(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::noise::threefry2x32;
     use nalgebra::Matrix3;
+    use psidpd_passes::noise::threefry2x32;
 
     #[test]
     fn pairs_are_those_of_brute_force() {

@@ -30,14 +30,11 @@ pub use free_energy::Psi;
 pub use in_box::{Pair, for_each_pair};
 
 use super::counts::PassCounts;
-use super::domain::PeriodicBox;
 use super::error::EngineError;
 use super::excess_pass::{ExcessPass, Rows};
-use super::noise::PairNoise;
 use super::particles::{Particles, Step};
 use super::plan::Plan;
 use super::surroundings::{Around, Newton, Surroundings};
-use super::tally::{Tally, Want};
 use crate::model::Fluid;
 use crate::model::expression::TooLarge;
 use densities::sum_densities;
@@ -45,6 +42,9 @@ use forces::{ForceInput, ForceOutput, add_forces};
 use in_box::BoxSearch;
 use listed::add_listed;
 use pairs::Pairs;
+use psidpd_passes::domain::PeriodicBox;
+use psidpd_passes::noise::PairNoise;
+use psidpd_passes::tally::{Tally, Want};
 use search::CellSearch;
 
 /// The forces of one fluid over a list of pairs, with whatever can be asked for, and the arrays that computing them

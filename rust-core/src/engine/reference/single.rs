@@ -4,7 +4,7 @@ use super::Reference;
 use super::forces::{Block, ForceInput};
 use super::pairs::PairList;
 use crate::engine::surroundings::Newton;
-use crate::engine::tally::Want;
+use psidpd_passes::tally::Want;
 
 impl Reference {
     /// Pair energy, and conservative force along `ê_ij`, of the particles `i` and `j` at the distance

@@ -2,25 +2,13 @@
 //! neighbour list. `docs/engine.md` explains it with figures. At the speed of DPD particles a neighbour list would live a few
 //! steps and cost more than it saves.
 //!
-//! Rooms, from the ground up; a file imports from its own room and from those above it in this list:
+//! The crate `psidpd_passes` has the loops over cells and pairs, `psidpd_threads` the threads. Here are
 //!
-//! - [`simd`]: vectors of each instruction set.
-//! - [`ground`]: box geometry, cell grid, fixed-point coordinates, packed particles, tables of terms.
-//! - [`cells`]: the particles in the order of cells.
-//! - [`pair_search`]: cell ranges, i-clusters and j-clusters, distance filter.
-//! - [`pair_batch`]: terms, densities and noise of a batch of pairs, added to accumulators.
-//! - [`passes`]: the two passes over the pairs of a plane; ψ is evaluated between them.
-//! - [`compiled`]: the passes, compiled for each instruction set and precision. The crate `psidpd_threads` has the threads.
-//! - [`workspace`]: arrays, sorting, ψ, and the scheduler that sends planes through all this.
+//! - [`terms`]: the plan as tables of numbers for those loops.
+//! - [`workspace`]: arrays, sorting, ψ, and the scheduler that sends planes through the passes.
 //! - [`Sweep`]: what hosts see.
 
-mod cells;
-mod compiled;
-mod ground;
-mod pair_batch;
-mod pair_search;
-mod passes;
-mod simd;
+mod terms;
 mod times;
 mod workspace;
 
@@ -28,20 +16,20 @@ pub use psidpd_threads::{Pool, part};
 pub use times::Times;
 
 use super::counts::PassCounts;
-use super::domain::PeriodicBox;
 use super::error::EngineError;
-use super::instruction_set::InstructionSet;
-use super::noise::PairNoise;
 use super::particles::{Particles, Step};
 use super::plan::Plan;
-use super::settings::{Precision, Settings};
 use super::surroundings::Around;
-use super::tally::{Tally, Want};
 use crate::model::Fluid;
 use crate::model::expression::TooLarge;
-use ground::arithmetic::{Double, Mixed};
-use ground::box_geometry::BoxGeometry;
-use ground::cell_grid::CellGrid;
+use psidpd_passes::domain::PeriodicBox;
+use psidpd_passes::ground::arithmetic::{Double, Mixed};
+use psidpd_passes::ground::box_geometry::BoxGeometry;
+use psidpd_passes::ground::cell_grid::CellGrid;
+use psidpd_passes::instruction_set::InstructionSet;
+use psidpd_passes::noise::PairNoise;
+use psidpd_passes::settings::{Precision, Settings};
+use psidpd_passes::tally::{Tally, Want};
 use std::sync::Arc;
 use std::time::Instant;
 use times::lap;

@@ -17,21 +17,21 @@ pub use forces::ForceSink;
 pub use input::Input;
 
 use crate::engine::error::EngineError;
-use crate::engine::instruction_set::InstructionSet;
-use crate::engine::noise::PairNoise;
 use crate::engine::plan::Plan;
-use crate::engine::sweep::cells::sorted::SortedCells;
-use crate::engine::sweep::compiled::{PairPrecision, Passes};
-use crate::engine::sweep::ground::box_geometry::BoxGeometry;
-use crate::engine::sweep::ground::cell_grid::CellGrid;
-use crate::engine::sweep::ground::terms::Terms;
-use crate::engine::sweep::pair_batch::inputs::PairInputs;
-use crate::engine::sweep::passes::data::PassData;
+use crate::engine::sweep::terms::terms;
 use crate::engine::sweep::times::Times;
 use accumulators::AccumulatorArrays;
 use cell_order::CellOrder;
 use excess::ExcessInput;
 use fluid::FluidConstants;
+use psidpd_passes::cells::sorted::SortedCells;
+use psidpd_passes::compiled::{PairPrecision, Passes};
+use psidpd_passes::ground::box_geometry::BoxGeometry;
+use psidpd_passes::ground::cell_grid::CellGrid;
+use psidpd_passes::instruction_set::InstructionSet;
+use psidpd_passes::noise::PairNoise;
+use psidpd_passes::pair_batch::inputs::PairInputs;
+use psidpd_passes::plane::data::PassData;
 use psidpd_threads::Pool;
 use scheduler::{PassInput, Scheduler, thread_slabs};
 use slopes::SlopeArrays;
@@ -55,7 +55,7 @@ pub struct Workspace<P: PairPrecision> {
 
 impl<P: PairPrecision> Workspace<P> {
     pub fn new(plan: &Plan, set: InstructionSet, threads: usize) -> Workspace<P> {
-        let terms = Terms::new(plan);
+        let terms = terms(plan);
         let count = plan.species.len();
         let variables = plan.passes.iter().flat_map(|d| (0..count).map(move |s| d * count + s)).collect();
         let threads = (0..threads).map(|_| ThreadState::new(terms.passes.len(), set)).collect();

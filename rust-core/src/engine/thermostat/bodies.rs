@@ -1,4 +1,4 @@
-use crate::engine::domain::PeriodicBox;
+use psidpd_passes::domain::PeriodicBox;
 
 /// The particles that the thermostat acts on.
 #[derive(Debug, Clone, Copy)]

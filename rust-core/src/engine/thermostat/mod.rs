@@ -30,13 +30,13 @@ mod tests;
 pub use bodies::Bodies;
 
 use super::error::EngineError;
-use super::noise::{Law, PairNoise};
 use super::plan::{Plan, ThermostatPlan};
 use super::sweep::Pool;
 use cells::Cells;
 use part::Part;
 use pass::Sums;
 use planes::Plane;
+use psidpd_passes::noise::{Law, PairNoise};
 
 /// How velocities are changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

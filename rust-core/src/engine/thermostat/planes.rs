@@ -1,8 +1,8 @@
 //! The pairs of one plane of cells, with what drag and noise need of them.
 
 use super::cells::{Cells, Segment};
-use crate::engine::noise::{Law, PairNoise};
 use crate::engine::plan::ThermostatPlan;
+use psidpd_passes::noise::{Law, PairNoise};
 
 /// A pair: `g`, and the second particle.
 #[derive(Debug, Clone, Copy, Default)]

@@ -10,8 +10,8 @@
 use super::pass::add_virial;
 use super::planes::Plane;
 use super::{PairThermostat, Update};
-use crate::engine::noise::Law;
 use crate::engine::sweep::Pool;
+use psidpd_passes::noise::Law;
 
 /// A pair in hand.
 #[derive(Debug, Clone, Copy)]

@@ -1,8 +1,8 @@
 use super::*;
-use crate::engine::domain::PeriodicBox;
-use crate::engine::noise::threefry2x32;
 use crate::model::Model;
 use nalgebra::Matrix3;
+use psidpd_passes::domain::PeriodicBox;
+use psidpd_passes::noise::threefry2x32;
 use std::num::NonZeroUsize;
 
 const ONE: &str = "title = \"one\"\nspecies = [\"A\"]\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n";

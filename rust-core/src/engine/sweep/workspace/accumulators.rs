@@ -2,7 +2,7 @@
 //! the next, so that sums do not depend on which thread does which plane, nor when.
 
 use super::cell_order::CellOrder;
-use crate::engine::sweep::pair_batch::accumulators::Accumulator;
+use psidpd_passes::pair_batch::accumulators::Accumulator;
 use std::ops::Range;
 
 /// Blocks of accumulators of a thread slab: those of its first two planes wait for all threads, three take turns.

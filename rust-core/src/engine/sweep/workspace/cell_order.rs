@@ -6,13 +6,13 @@ mod fractions;
 
 use super::input::Input;
 use crate::engine::error::EngineError;
-use crate::engine::instruction_set::InstructionSet;
-use crate::engine::sweep::ground::box_geometry::BoxGeometry;
-use crate::engine::sweep::ground::cell_grid::CellGrid;
-use crate::engine::sweep::pair_batch::in_range_pairs::J_CODE_BITS;
 use crate::engine::vectors;
 use count::{Count, CountRange, NO_CELL};
 use fractions::Fractions;
+use psidpd_passes::ground::box_geometry::BoxGeometry;
+use psidpd_passes::ground::cell_grid::CellGrid;
+use psidpd_passes::instruction_set::InstructionSet;
+use psidpd_passes::pair_batch::in_range_pairs::J_CODE_BITS;
 use psidpd_threads::SharedSlice;
 use psidpd_threads::{Pool, part};
 use std::ops::Range;

@@ -7,10 +7,10 @@ use super::input::Input;
 use crate::engine::error::EngineError;
 use crate::engine::excess::ExcessPlan;
 use crate::engine::excess_pass::{ExcessPass, LANES, Rows};
-use crate::engine::instruction_set::InstructionSet;
 use crate::engine::plan::Plan;
-use crate::engine::sweep::pair_batch::accumulators::Accumulator;
 use crate::engine::vectors::{self, Loop};
+use psidpd_passes::instruction_set::InstructionSet;
+use psidpd_passes::pair_batch::accumulators::Accumulator;
 
 /// Particles whose densities are gathered at a time: they stay in the first-level cache until ψ is evaluated, and
 /// make several blocks of lanes where not all take part.

@@ -1,5 +1,5 @@
-use crate::engine::instruction_set::InstructionSet;
-use crate::engine::sweep::ground::terms::Terms;
+use psidpd_passes::ground::terms::Terms;
+use psidpd_passes::instruction_set::InstructionSet;
 
 /// What stays the same for one fluid.
 pub struct FluidConstants<T> {

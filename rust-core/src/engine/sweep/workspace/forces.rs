@@ -1,9 +1,9 @@
 //! Forces in the host's order.
 
 use super::accumulators::Added;
-use crate::engine::instruction_set::InstructionSet;
-use crate::engine::sweep::pair_batch::accumulators::Accumulator;
 use crate::engine::vectors::{self, Loop};
+use psidpd_passes::instruction_set::InstructionSet;
+use psidpd_passes::pair_batch::accumulators::Accumulator;
 use psidpd_threads::SharedSlice;
 
 /// Where the host wants forces.

@@ -2,8 +2,8 @@
 
 use super::Workspace;
 use crate::engine::counts::PassCounts;
-use crate::engine::sweep::compiled::PairPrecision;
-use crate::engine::tally::Tally;
+use psidpd_passes::compiled::PairPrecision;
+use psidpd_passes::tally::Tally;
 
 impl<P: PairPrecision> Workspace<P> {
     /// The host's numbers of its particles in the order of cells.

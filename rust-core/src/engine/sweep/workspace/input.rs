@@ -1,6 +1,6 @@
-use crate::engine::noise::PairNoise;
 use crate::engine::particles::Particles;
-use crate::engine::tally::Want;
+use psidpd_passes::noise::PairNoise;
+use psidpd_passes::tally::Want;
 
 /// Room behind the last particle: what whole vectors may read.
 pub const VECTOR_PADDING: usize = 16;

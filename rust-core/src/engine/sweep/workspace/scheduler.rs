@@ -21,10 +21,10 @@ use super::input::{Input, VECTOR_PADDING};
 use super::slopes::SharedSlopes;
 use super::sorted_particles::SharedParticles;
 use super::thread_slab::ThreadSlab;
-use crate::engine::sweep::compiled::{PairPrecision, Passes};
-use crate::engine::sweep::pair_batch::accumulators::{Accumulator, PlaneSums};
-use crate::engine::sweep::passes::data::PassData;
 use crate::engine::sweep::times::lap;
+use psidpd_passes::compiled::{First, PairPrecision, Passes, Second};
+use psidpd_passes::pair_batch::accumulators::{Accumulator, PlaneSums};
+use psidpd_passes::plane::data::PassData;
 use std::ops::Range;
 use std::time::Instant;
 
@@ -234,7 +234,8 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         let sums = PlaneSums::new(self.order.plane_start(plane), forces, densities, self.fluid.width());
         // SAFETY: the arrays have the room that `make_room` of each has made for this order, and are filled where the pass
         // reads them, as the caller promises; the accumulators are those of this plane and the next.
-        *tally = unsafe { self.passes.first(&self.data, plane, sums, buffers, in_range) };
+        *tally =
+            unsafe { P::first(&self.passes, First { data: &self.data, plane, sums, buffers, in_range }) };
     }
 
     /// ψ and its slopes of a plane.
@@ -286,7 +287,9 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         let sums = PlaneSums::new(self.order.plane_start(plane), forces, densities, self.fluid.width());
         // SAFETY: the pairs are those that the first pass of this plane has kept; slopes are there, as the caller promises;
         // the accumulators are those of this plane and the next.
-        unsafe { self.passes.second(&self.data, sums, in_range, &mut tally.virial) };
+        unsafe {
+            P::second(&self.passes, Second { data: &self.data, sums, in_range, virial: &mut tally.virial })
+        };
     }
 
     /// The forces of a plane, to the host, when all passes that add to it are done.

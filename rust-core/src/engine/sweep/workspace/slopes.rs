@@ -2,8 +2,8 @@
 
 use super::cell_order::CellOrder;
 use super::input::VECTOR_PADDING;
-use crate::engine::sweep::passes::slopes::{SLOPES_PER_BLOCK, Slopes};
-use crate::engine::sweep::simd::Scalar;
+use psidpd_passes::plane::slopes::{SLOPES_PER_BLOCK, Slopes};
+use psidpd_passes::simd::Scalar;
 use psidpd_threads::SharedSlice;
 use std::ops::Range;
 

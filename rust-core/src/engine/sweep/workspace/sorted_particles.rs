@@ -4,9 +4,9 @@ mod fill;
 
 use super::cell_order::CellOrder;
 use super::input::VECTOR_PADDING;
-use crate::engine::sweep::cells::ghosts::{Ghosts, OwnedOfColumn};
-use crate::engine::sweep::ground::arithmetic::PackedParticle;
-use crate::engine::sweep::ground::fixed_point::FixedPoint16;
+use psidpd_passes::cells::ghosts::{Ghosts, OwnedOfColumn};
+use psidpd_passes::ground::arithmetic::PackedParticle;
+use psidpd_passes::ground::fixed_point::FixedPoint16;
 use psidpd_threads::SharedSlice;
 
 /// Arrays in the order of cells; copies of the first plane follow the last particle, then padding.

@@ -1,14 +1,14 @@
 use super::cell_order::TWO_TO_32;
 use super::input::VECTOR_PADDING;
 use super::*;
-use crate::engine::domain::PeriodicBox;
-use crate::engine::noise::threefry2x32;
 use crate::engine::particles::Particles;
 use crate::engine::plan::Plan;
-use crate::engine::settings::Instructions;
-use crate::engine::sweep::ground::arithmetic::{Double, Mixed};
 use crate::model::Model;
 use nalgebra::Matrix3;
+use psidpd_passes::domain::PeriodicBox;
+use psidpd_passes::ground::arithmetic::{Double, Mixed};
+use psidpd_passes::noise::threefry2x32;
+use psidpd_passes::settings::Instructions;
 use psidpd_threads::part;
 use std::num::NonZeroUsize;
 

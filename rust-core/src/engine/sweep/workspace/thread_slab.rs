@@ -3,12 +3,12 @@
 use super::cell_order::CellOrder;
 use crate::engine::error::EngineError;
 use crate::engine::excess_pass::ExcessPass;
-use crate::engine::instruction_set::InstructionSet;
-use crate::engine::sweep::pair_batch::in_range_pairs::InRangePairs;
-use crate::engine::sweep::passes::buffers::PairBuffers;
-use crate::engine::sweep::simd::Scalar;
 use crate::engine::sweep::times::Times;
-use crate::engine::tally::Tally;
+use psidpd_passes::instruction_set::InstructionSet;
+use psidpd_passes::pair_batch::in_range_pairs::InRangePairs;
+use psidpd_passes::plane::buffers::PairBuffers;
+use psidpd_passes::simd::Scalar;
+use psidpd_passes::tally::Tally;
 use std::ops::Range;
 
 /// Planes of a thread slab whose pairs are kept at once: its first, its last, and two between.

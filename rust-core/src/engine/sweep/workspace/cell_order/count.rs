@@ -2,9 +2,9 @@
 
 use super::fractions::{Fractions, SORT_BLOCK};
 use crate::engine::error::EngineError;
-use crate::engine::sweep::ground::box_geometry::BoxGeometry;
 use crate::engine::sweep::workspace::input::Input;
 use crate::engine::vectors::Loop;
+use psidpd_passes::ground::box_geometry::BoxGeometry;
 use std::ops::Range;
 
 /// The cell of particles that take no part.

@@ -1,9 +1,9 @@
 //! How far particles reach.
 
 use crate::engine::error::EngineError;
-use crate::engine::instruction_set::InstructionSet;
 use crate::engine::sweep::workspace::input::Input;
 use crate::engine::vectors::{self, Loop};
+use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_threads::{Pool, part};
 use std::ops::Range;
 

@@ -1,7 +1,7 @@
 //! Positions as fractions of the box geometry, block by block.
 
-use crate::engine::sweep::ground::box_geometry::BoxGeometry;
-use crate::engine::sweep::ground::cell_grid::CellGrid;
+use psidpd_passes::ground::box_geometry::BoxGeometry;
+use psidpd_passes::ground::cell_grid::CellGrid;
 
 pub const TWO_TO_32: f64 = 4_294_967_296.0;
 

@@ -1,13 +1,13 @@
 //! Arrays in the order of cells, from the host's.
 
 use super::SharedParticles;
-use crate::engine::instruction_set::InstructionSet;
-use crate::engine::sweep::ground::arithmetic::PackedParticle;
-use crate::engine::sweep::ground::box_geometry::BoxGeometry;
-use crate::engine::sweep::ground::fixed_point::FixedPoint16;
 use crate::engine::sweep::workspace::cell_order::{CellOrder, TWO_TO_32};
 use crate::engine::sweep::workspace::input::{Input, VECTOR_PADDING};
 use crate::engine::vectors::{self, Loop};
+use psidpd_passes::ground::arithmetic::PackedParticle;
+use psidpd_passes::ground::box_geometry::BoxGeometry;
+use psidpd_passes::ground::fixed_point::FixedPoint16;
+use psidpd_passes::instruction_set::InstructionSet;
 use std::ops::Range;
 
 /// Particles that are fetched before their coordinates are computed: loads of vectors wait for the numbers they are

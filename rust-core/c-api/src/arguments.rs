@@ -1,0 +1,141 @@
+//! Checks of what comes from C.
+
+use crate::status::{Failure, Status};
+use std::ffi::{CStr, c_char};
+
+fn null(name: &str) -> Failure {
+    Failure::new(Status::NullPointer, format!("{name} is NULL"))
+}
+
+/// Fails for pointers that no object of type `T` can be at.
+fn check<T>(pointer: *const T, name: &str) -> Result<(), Failure> {
+    if pointer.is_null() {
+        return Err(null(name));
+    }
+    if !pointer.is_aligned() {
+        return Err(Failure::new(Status::InvalidArgument, format!("{name} is not aligned")));
+    }
+    Ok(())
+}
+
+/// # Safety
+/// `pointer` is null or at a `T` that nobody writes to during `'a`.
+pub(super) unsafe fn shared<'a, T>(pointer: *const T, name: &str) -> Result<&'a T, Failure> {
+    check(pointer, name)?;
+    // SAFETY: `check` found it aligned and not null; the caller promises a `T` there that nobody writes to during `'a`.
+    Ok(unsafe { &*pointer })
+}
+
+/// # Safety
+/// `pointer` is null or at a `T` that nobody else reads or writes during `'a`.
+pub(super) unsafe fn exclusive<'a, T>(pointer: *mut T, name: &str) -> Result<&'a mut T, Failure> {
+    check(pointer, name)?;
+    // SAFETY: `check` found it aligned and not null; the caller promises a `T` there that is nobody else's during `'a`.
+    Ok(unsafe { &mut *pointer })
+}
+
+/// Copies the `T` at `pointer`.
+///
+/// # Safety
+/// `pointer` is null or at a `T`.
+pub(super) unsafe fn copied<T: Copy>(pointer: *const T, name: &str) -> Result<T, Failure> {
+    check(pointer, name)?;
+    // SAFETY: `check` found it aligned and not null; the caller promises a `T` there, which is `Copy`.
+    Ok(unsafe { pointer.read() })
+}
+
+/// A place to put a result, which may hold nothing yet.
+pub(super) struct Output<T>(*mut T);
+
+impl<T> Output<T> {
+    /// # Safety
+    /// `pointer` is null or at memory for a `T` that can be written until [`Output::put`].
+    pub unsafe fn new(pointer: *mut T, name: &str) -> Result<Output<T>, Failure> {
+        check(pointer, name)?;
+        Ok(Output(pointer))
+    }
+
+    pub fn put(self, value: T) {
+        // SAFETY: `new` has checked the pointer, and was promised that it can be written to.
+        unsafe { self.0.write(value) }
+    }
+}
+
+/// Fails for lengths that no array of `T` can have.
+fn check_array<T>(pointer: *const T, length: usize, name: &str) -> Result<(), Failure> {
+    check(pointer, name)?;
+    match length.checked_mul(size_of::<T>()) {
+        Some(bytes) if isize::try_from(bytes).is_ok() => Ok(()),
+        _ => Err(Failure::new(Status::InvalidArgument, format!("{name} cannot be as long as {length}"))),
+    }
+}
+
+/// An array of `length`; null will do if that is zero.
+///
+/// # Safety
+/// `pointer` is null or at `length` times `T` that nobody writes to during `'a`.
+pub(super) unsafe fn array<'a, T>(pointer: *const T, length: usize, name: &str) -> Result<&'a [T], Failure> {
+    if length == 0 {
+        return Ok(&[]);
+    }
+    check_array(pointer, length, name)?;
+    // SAFETY: `check_array` found it aligned, not null, and no longer than an array can be; the caller promises that many
+    // `T` there that nobody writes to during `'a`.
+    Ok(unsafe { std::slice::from_raw_parts(pointer, length) })
+}
+
+/// As [`array`], to write to.
+///
+/// # Safety
+/// `pointer` is null or at `length` times `T` that nobody else reads or writes during `'a`.
+pub(super) unsafe fn array_mut<'a, T>(
+    pointer: *mut T,
+    length: usize,
+    name: &str,
+) -> Result<&'a mut [T], Failure> {
+    if length == 0 {
+        return Ok(&mut []);
+    }
+    check_array(pointer, length, name)?;
+    // SAFETY: `check_array` found it aligned, not null, and no longer than an array can be; the caller promises that many
+    // `T` there that are nobody else's during `'a`.
+    Ok(unsafe { std::slice::from_raw_parts_mut(pointer, length) })
+}
+
+/// Fails if `length` vectors at `a` and at `b` have a byte in common.
+pub(super) fn check_apart(a: *const f64, b: *const f64, length: usize, what: &str) -> Result<(), Failure> {
+    let bytes = length.saturating_mul(size_of::<[f64; 3]>());
+    if bytes > 0 && a.addr().abs_diff(b.addr()) < bytes {
+        return Err(Failure::new(Status::InvalidArgument, format!("{what} overlap")));
+    }
+    Ok(())
+}
+
+/// A text that ends with a zero byte, as UTF-8.
+///
+/// # Safety
+/// `pointer` is null or at bytes that end with a zero and that nobody writes to during `'a`.
+pub(super) unsafe fn text<'a>(pointer: *const c_char, name: &str) -> Result<&'a str, Failure> {
+    // SAFETY: `c_str` asks for what this function does: null, or bytes up to a zero that nobody writes to during `'a`.
+    let bytes = unsafe { c_str(pointer, name) }?;
+    bytes
+        .to_str()
+        .map_err(|error| Failure::new(Status::InvalidArgument, format!("{name} is not UTF-8: {error}")))
+}
+
+/// # Safety
+/// As [`text`].
+pub(super) unsafe fn c_str<'a>(pointer: *const c_char, name: &str) -> Result<&'a CStr, Failure> {
+    check(pointer, name)?;
+    // SAFETY: `check` found it not null; the caller promises bytes up to a zero that nobody writes to during `'a`.
+    Ok(unsafe { CStr::from_ptr(pointer) })
+}
+
+/// 0 or 1.
+pub(super) fn flag(value: i32, name: &str) -> Result<bool, Failure> {
+    match value {
+        0 => Ok(false),
+        1 => Ok(true),
+        _ => Err(Failure::new(Status::InvalidArgument, format!("{name} is {value}, not 0 or 1"))),
+    }
+}

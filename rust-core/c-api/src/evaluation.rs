@@ -1,0 +1,278 @@
+//! Evaluations that are told beforehand what is wanted of them.
+
+use crate::arguments::{Output, array, copied, exclusive, flag};
+use crate::engine::{
+    Engine, Particles, State, Step, Tally, WANT_ALL, arrays_of, particles_of, step_of, want_of,
+};
+use crate::status::{Failure, Status, guard};
+use nalgebra::{Matrix3, Vector3};
+use psidpd_core::engine::{self, Around, DomainError, Newton, PairsOfHost, PeriodicBox, Surroundings};
+
+/// A box: a corner, the three edges from there, and which of them are periods.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct Domain {
+    /// The corner.
+    pub origin: [f64; 3],
+    /// The edges: x, y, z of the first, of the second, of the third. The first should be along x and the second in the
+    /// plane of x and y; others are slower. In two dimensions the third is (0, 0, 1).
+    pub edges: [f64; 9],
+    /// For each edge 1 if the box is periodic along it, and 0 if it is open.
+    pub periodic: [i32; 3],
+}
+
+/// What an evaluation is given, and what is wanted of it.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct Request {
+    /// The particles.
+    pub particles: Particles,
+    /// Velocities, `3 * particles.all`; may be NULL without a step, or if there is no thermostat (see
+    /// psidpd_engine_needs_velocities).
+    pub v: *const f64,
+    /// What the thermostat needs; NULL for conservative forces only.
+    pub step: *const Step,
+    /// 0, or PSIDPD_WANT_... joined by `|`.
+    pub want: u32,
+}
+
+/// Pairs that the host lists: at least all within the cut-off, those of two owned particles once, those of an owned
+/// particle and a ghost on either side. Pairs that are not listed do not interact.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct Pairs {
+    /// How many there are.
+    pub count: usize,
+    /// The first particle of each, owned: its place in the arrays, from 0.
+    pub i: *const i32,
+    /// The second.
+    pub j: *const i32,
+    /// By how much each pair's conservative interaction is scaled; NULL if all have their full strength.
+    pub factor: *const f64,
+}
+
+impl Domain {
+    fn domain(&self) -> Result<PeriodicBox, Failure> {
+        let [a, b, c] = [0, 3, 6].map(|k| Vector3::from_column_slice(&self.edges[k..k + 3]));
+        let mut periodic = [false; 3];
+        for (is, given) in periodic.iter_mut().zip(self.periodic) {
+            *is = flag(given, "box.periodic")?;
+        }
+        let edges = Matrix3::from_columns(&[a, b, c]);
+        PeriodicBox::new(self.origin, edges, periodic).map_err(invalid)
+    }
+}
+
+fn invalid(error: DomainError) -> Failure {
+    Failure::new(Status::InvalidArgument, error.to_string())
+}
+
+impl Request {
+    /// Without the places that forces go to.
+    ///
+    /// # Safety
+    /// The pointers are null or at arrays as long as they must be, which nobody writes to during `'a`.
+    unsafe fn checked<'a>(&self, engine: &Engine) -> Result<engine::Request<'a>, Failure> {
+        let step = self.step()?;
+        // SAFETY: as the caller promises.
+        let particles = unsafe { particles_of(&self.particles)? };
+        let thermal = step.is_some() && engine.engine.plan().needs_velocities();
+        let v = if self.v.is_null() && !thermal {
+            &[]
+        } else {
+            // SAFETY: as the caller promises; a vector is three consecutive numbers.
+            unsafe { array(self.v.cast::<[f64; 3]>(), self.particles.all, "request.v")? }
+        };
+        Ok(engine::Request { particles, v, step, want: want_of(self.want, WANT_ALL)? })
+    }
+
+    fn step(&self) -> Result<Option<engine::Step>, Failure> {
+        if self.step.is_null() {
+            return Ok(None);
+        }
+        // SAFETY: `checked` and its callers promise that it is at a step.
+        Ok(Some(step_of(unsafe { copied(self.step, "request.step")? })?))
+    }
+}
+
+/// All forces on particles in a box of their own, without ghosts: adds them to `force`, `3 * particles.all` numbers, and
+/// puts in `*tally` the sums that are wanted. `tally` may be NULL.
+///
+/// Positions may be anywhere: along periodic edges they are those of an image.
+///
+/// # Errors
+/// PSIDPD_STATUS_ENGINE for a position, psi or force that is not finite, a tag below 1, a type that is not mapped;
+/// some forces may have been added then. PSIDPD_STATUS_INVALID_ARGUMENT for a box without volume, numbers of particles
+/// that cannot be, ghosts, unknown bits in `want`, a `dt` that is not positive, or if `force` overlaps `x` or `v`.
+/// PSIDPD_STATUS_NULL_POINTER; arrays may be NULL if there are no particles.
+///
+/// # Safety
+/// `engine` is NULL or an engine that has not been freed; `box` and `request` are NULL or at such structures, whose arrays
+/// are as long as they must be; `force` has `3 * particles.all` numbers and must overlap none of the others, nor what the
+/// engine has given out; `tally` is NULL or can be written to. Nothing is kept of them.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn psidpd_engine_evaluate(
+    engine: *mut Engine,
+    r#box: *const Domain,
+    request: *const Request,
+    force: *mut f64,
+    tally: *mut Tally,
+) -> Status {
+    guard(|| {
+        // SAFETY: as this function's own section says.
+        let (engine, domain, given, out) = unsafe {
+            (
+                exclusive(engine, "engine")?,
+                copied(r#box, "box")?.domain()?,
+                copied(request, "request")?,
+                optional(tally)?,
+            )
+        };
+        let want = want_of(given.want, WANT_ALL)?;
+        let step = given.step()?;
+        // SAFETY: as this function's own section says.
+        let (particles, v, force) = unsafe { arrays_of(engine, &given.particles, given.v, step, force)? };
+        let request = engine::Request { particles, v, step, want };
+        engine.state = State::Nothing;
+        let sums = engine.engine.forces(&domain, &request, force, true)?;
+        engine.state = State::Whole;
+        if let Some(out) = out {
+            out.put(Tally::of(&sums));
+        }
+        Ok(())
+    })
+}
+
+/// First half of an evaluation with ghosts: all that needs no slopes of ghosts. psidpd_engine_second follows, with the same
+/// request, when psidpd_engine_slopes have been copied from owners to ghosts.
+///
+/// `box` may be NULL: then ghosts stand for everything beyond the owned particles. Where it is periodic the host has all of it
+/// along that edge, and the engine goes round it; `image` has 1 for each ghost that is the image of another particle along
+/// such an edge, which takes no part, and 0 for the others, `particles.all - particles.owned` of them. It may be NULL if
+/// there is none.
+///
+/// With `newton` 1 the host adds forces on ghosts back to their owners, and every pair is computed once over all ranks; with
+/// 0 ghosts get no forces. Either way the sweep computes pairs with ghosts on both sides and leaves ghosts without forces.
+///
+/// # Errors
+/// As psidpd_engine_evaluate; PSIDPD_STATUS_INVALID_ARGUMENT also for other values of `newton` and `image`. After an error
+/// there are no slopes.
+///
+/// # Safety
+/// `engine` is NULL or an engine that has not been freed; `box` and `request` are NULL or at such structures, whose arrays
+/// are as long as they must be; `image` is NULL or as long as said above. Nothing is kept of them.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn psidpd_engine_first(
+    engine: *mut Engine,
+    r#box: *const Domain,
+    image: *const i32,
+    newton: i32,
+    request: *const Request,
+) -> Status {
+    guard(|| {
+        // SAFETY: as this function's own section says.
+        let (engine, given) = unsafe { (exclusive(engine, "engine")?, copied(request, "request")?) };
+        let domain = if r#box.is_null() {
+            PeriodicBox::OPEN
+        } else {
+            // SAFETY: as this function's own section says.
+            unsafe { copied(r#box, "box")? }.domain()?
+        };
+        // SAFETY: as this function's own section says.
+        let request = unsafe { given.checked(engine)? };
+        let ghosts = if image.is_null() { 0 } else { given.particles.all - given.particles.owned };
+        // SAFETY: as this function's own section says.
+        let told = unsafe { array(image, ghosts, "image")? };
+        let images = told.iter().map(|i| flag(*i, "image")).collect::<Result<Vec<bool>, _>>()?;
+        let around = Around { domain: &domain, images: &images };
+        first(engine, Surroundings::Ghosts(around, newton_of(newton)?), &request)
+    })
+}
+
+/// As psidpd_engine_first, with pairs that the host lists. `U` has the factor of a pair in its density and in its pair
+/// energy; drag and noise act at full strength.
+///
+/// # Errors
+/// As psidpd_engine_first; PSIDPD_STATUS_INVALID_ARGUMENT also for pairs of particles that are not there.
+///
+/// # Safety
+/// As psidpd_engine_first; `pairs` is NULL or at such a structure, whose arrays are as long as it says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn psidpd_engine_first_of_pairs(
+    engine: *mut Engine,
+    pairs: *const Pairs,
+    newton: i32,
+    request: *const Request,
+) -> Status {
+    guard(|| {
+        // SAFETY: as this function's own section says.
+        let (engine, pairs, given) =
+            unsafe { (exclusive(engine, "engine")?, copied(pairs, "pairs")?, copied(request, "request")?) };
+        let Pairs { count, i, j, factor } = pairs;
+        let factors = if factor.is_null() { 0 } else { count };
+        // SAFETY: as this function's own section says.
+        let (request, listed) = unsafe {
+            let i = array(i, count, "pairs.i")?;
+            let j = array(j, count, "pairs.j")?;
+            (given.checked(engine)?, PairsOfHost { i, j, factor: array(factor, factors, "pairs.factor")? })
+        };
+        first(engine, Surroundings::Listed(listed, newton_of(newton)?), &request)
+    })
+}
+
+/// Second half of an evaluation: adds to `force`, `3 * particles.all` numbers, the forces on the particles, and puts in
+/// `*tally` the sums that are wanted. The request is that of the first half. `tally` may be NULL.
+///
+/// # Errors
+/// PSIDPD_STATUS_CALL_ORDER without psidpd_engine_first or psidpd_engine_first_of_pairs right before; otherwise as
+/// psidpd_engine_evaluate.
+///
+/// # Safety
+/// As psidpd_engine_evaluate.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn psidpd_engine_second(
+    engine: *mut Engine,
+    request: *const Request,
+    force: *mut f64,
+    tally: *mut Tally,
+) -> Status {
+    guard(|| {
+        // SAFETY: as this function's own section says.
+        let (engine, given, out) =
+            unsafe { (exclusive(engine, "engine")?, copied(request, "request")?, optional(tally)?) };
+        engine.require(&[State::First], "psidpd_engine_first")?;
+        let want = want_of(given.want, WANT_ALL)?;
+        let step = given.step()?;
+        // SAFETY: as this function's own section says.
+        let (particles, v, force) = unsafe { arrays_of(engine, &given.particles, given.v, step, force)? };
+        let request = engine::Request { particles, v, step, want };
+        engine.state = State::Nothing;
+        let sums = engine.engine.second(&request, force, true)?;
+        engine.state = State::Whole;
+        if let Some(out) = out {
+            out.put(Tally::of(&sums));
+        }
+        Ok(())
+    })
+}
+
+fn first(engine: &mut Engine, surroundings: Surroundings, request: &engine::Request) -> Result<(), Failure> {
+    engine.state = State::Nothing;
+    engine.engine.first(surroundings, request)?;
+    engine.state = State::First;
+    Ok(())
+}
+
+fn newton_of(newton: i32) -> Result<Newton, Failure> {
+    Ok(if flag(newton, "newton")? { Newton::On } else { Newton::Off })
+}
+
+/// # Safety
+/// `tally` is null or can be written to.
+unsafe fn optional(tally: *mut Tally) -> Result<Option<Output<Tally>>, Failure> {
+    if tally.is_null() {
+        return Ok(None);
+    }
+    // SAFETY: as the caller promises.
+    Ok(Some(unsafe { Output::new(tally, "tally")? }))
+}

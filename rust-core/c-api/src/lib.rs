@@ -1,0 +1,23 @@
+//! The C interface, declared in `include/psidpd.h`: models and engines behind opaque handles.
+//!
+//! Every function that can fail returns a [`Status`] and leaves a message in [`psidpd_last_error`];
+//! no panic leaves this module. What the functions do is in [`psidpd_core::model`] and [`psidpd_core::engine`];
+//! here are only checks and conversions.
+
+mod arguments;
+mod engine;
+mod evaluation;
+mod model;
+mod settings;
+mod status;
+mod version;
+
+pub use engine::*;
+pub use evaluation::*;
+pub use model::*;
+pub use settings::*;
+pub use status::{Status, psidpd_last_error};
+pub use version::*;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,85 @@
+//! How an engine computes.
+
+use crate::status::{Failure, Status};
+use psidpd_core::engine;
+use std::num::NonZeroUsize;
+
+/// For psidpd_settings: pairs in double precision.
+pub const PSIDPD_PRECISION_DOUBLE: i32 = 0;
+/// For psidpd_settings: pairs in single precision, with positions to 2^-32 of the box; sums, psi and totals in double.
+pub const PSIDPD_PRECISION_MIXED: i32 = 1;
+
+/// For psidpd_settings: the best instruction set that the processor has.
+pub const PSIDPD_INSTRUCTIONS_BEST: i32 = 0;
+/// For psidpd_settings: whatever the library was compiled for.
+pub const PSIDPD_INSTRUCTIONS_PORTABLE: i32 = 1;
+/// For psidpd_settings: AVX2 and FMA.
+pub const PSIDPD_INSTRUCTIONS_AVX2: i32 = 2;
+/// For psidpd_settings: AVX-512.
+pub const PSIDPD_INSTRUCTIONS_AVX512: i32 = 3;
+
+/// How an engine computes. Results depend on the precision, and only by rounding on anything else; for any number of
+/// threads they are the same to the bit. With all bytes zero and one thread it is what psidpd_engine_new chooses.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct Settings {
+    /// PSIDPD_PRECISION_...
+    pub precision: i32,
+    /// PSIDPD_INSTRUCTIONS_...; one that the processor lacks becomes the best that it has.
+    pub instructions: i32,
+    /// Threads that share the work, from 1.
+    pub threads: usize,
+}
+
+/// Which way an evaluation went.
+#[repr(i32)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Path {
+    /// By the sweep over cells: vector instructions, threads.
+    Sweep = 0,
+    /// By the reference, over a list of pairs, in double precision and on one thread.
+    Reference = 1,
+}
+
+impl Settings {
+    pub(super) const DEFAULT: Settings =
+        Settings { precision: PSIDPD_PRECISION_DOUBLE, instructions: PSIDPD_INSTRUCTIONS_BEST, threads: 1 };
+
+    pub(super) fn checked(self) -> Result<engine::Settings, Failure> {
+        let wrong = |what: &str, value: i32| {
+            Failure::new(Status::InvalidArgument, format!("settings.{what} is {value}, which is none"))
+        };
+        let precision = match self.precision {
+            PSIDPD_PRECISION_DOUBLE => engine::Precision::Double,
+            PSIDPD_PRECISION_MIXED => engine::Precision::Mixed,
+            other => return Err(wrong("precision", other)),
+        };
+        let instructions = match self.instructions {
+            PSIDPD_INSTRUCTIONS_BEST => engine::Instructions::best(),
+            PSIDPD_INSTRUCTIONS_PORTABLE => engine::Instructions::Portable,
+            PSIDPD_INSTRUCTIONS_AVX2 => engine::Instructions::Avx2,
+            PSIDPD_INSTRUCTIONS_AVX512 => engine::Instructions::Avx512,
+            other => return Err(wrong("instructions", other)),
+        };
+        let threads = NonZeroUsize::new(self.threads).filter(|n| n.get() <= 4096).ok_or_else(|| {
+            let text = format!("settings.threads is {}, not from 1 to 4096", self.threads);
+            Failure::new(Status::InvalidArgument, text)
+        })?;
+        Ok(engine::Settings { precision, instructions, threads })
+    }
+
+    pub(super) fn of(settings: engine::Settings) -> Settings {
+        Settings {
+            precision: match settings.precision {
+                engine::Precision::Double => PSIDPD_PRECISION_DOUBLE,
+                engine::Precision::Mixed => PSIDPD_PRECISION_MIXED,
+            },
+            instructions: match settings.instructions {
+                engine::Instructions::Portable => PSIDPD_INSTRUCTIONS_PORTABLE,
+                engine::Instructions::Avx2 => PSIDPD_INSTRUCTIONS_AVX2,
+                engine::Instructions::Avx512 => PSIDPD_INSTRUCTIONS_AVX512,
+            },
+            threads: settings.threads.get(),
+        }
+    }
+}

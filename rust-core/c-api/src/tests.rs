@@ -1,0 +1,215 @@
+//! The header, and what no C program can bring about.
+
+use crate::status::{Failure, Status, guard};
+use crate::*;
+use std::ffi::CStr;
+use std::path::Path;
+use std::ptr::{null, null_mut};
+
+/// In the order of the header.
+const SOURCES: [&str; 6] =
+    ["version.rs", "status.rs", "model.rs", "settings.rs", "engine.rs", "evaluation.rs"];
+
+fn last_error() -> String {
+    // SAFETY: valid until the next failing call on this thread.
+    unsafe { CStr::from_ptr(psidpd_last_error()) }.to_str().unwrap().to_owned()
+}
+
+fn header() -> String {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let config = cbindgen::Config::from_file(root.join("cbindgen.toml")).unwrap();
+    let builder = cbindgen::Builder::new().with_config(config);
+    let builder = SOURCES.iter().fold(builder, |builder, file| builder.with_src(root.join("src").join(file)));
+    let mut text = Vec::new();
+    builder.generate().unwrap().write(&mut text);
+    String::from_utf8(text).unwrap()
+}
+
+/// Set `PSIDPD_UPDATE_HEADER=1` to write it.
+#[test]
+fn header_is_current() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("include/psidpd.h");
+    let made = header();
+    if std::env::var_os("PSIDPD_UPDATE_HEADER").is_some_and(|value| value == "1") {
+        std::fs::write(&path, &made).unwrap();
+    }
+    let there = std::fs::read_to_string(&path).unwrap_or_default();
+    let there = there.replace("\r\n", "\n");
+    let difference = there.lines().zip(made.lines()).position(|(a, b)| a != b);
+    assert!(
+        there == made,
+        "include/psidpd.h differs from src/ (first in line {:?}); set PSIDPD_UPDATE_HEADER=1 to \
+         write it again",
+        difference.map(|line| line + 1)
+    );
+}
+
+/// The functions of the sources that the linker sees.
+fn exported() -> Vec<String> {
+    let mut names = Vec::new();
+    for file in SOURCES {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("src").join(file);
+        let text = std::fs::read_to_string(path).unwrap();
+        for after in text.split("#[unsafe(no_mangle)]").skip(1) {
+            let name = after.split("fn ").nth(1).unwrap().split('(').next().unwrap();
+            assert!(name.starts_with("psidpd_"), "{name}");
+            names.push(name.to_owned());
+        }
+    }
+    assert!(names.len() > 20);
+    names
+}
+
+/// Every function is in the header, once, behind a comment of its own that names its errors, if it has any.
+#[test]
+fn every_function_is_documented() {
+    let header = header();
+    let (_, header) = header.split_once("extern \"C\"").unwrap();
+    for name in exported() {
+        let at = header.find(&format!("{name}(")).unwrap_or_else(|| panic!("{name} is not in the header"));
+        assert_eq!(header.matches(&format!("{name}(")).count(), 1, "{name}");
+        let begin = header[..at].rfind('\n').unwrap() + 1;
+        let before = header[..begin].trim_end();
+        assert!(before.ends_with("*/"), "{name} has no comment");
+        let comment = &before[before.rfind("/*").unwrap()..];
+        assert!(comment.len() > 40, "{name}: {comment}");
+        if header[begin..at].contains("psidpd_status") {
+            assert!(comment.contains("# Errors") && comment.contains("# Safety"), "{name}: {comment}");
+        }
+    }
+}
+
+/// Programs are compiled against these numbers.
+#[test]
+fn status_values_are_what_they_always_were() {
+    let values = [
+        (Status::Ok, 0),
+        (Status::InvalidArgument, 1),
+        (Status::NullPointer, 2),
+        (Status::File, 3),
+        (Status::Model, 4),
+        (Status::Engine, 5),
+        (Status::CallOrder, 6),
+        (Status::Panic, 255),
+    ];
+    for (status, value) in values {
+        assert_eq!(status as i32, value);
+    }
+    assert_eq!(psidpd_abi_version(), 1);
+}
+
+#[test]
+fn panics_become_a_status_and_a_message() {
+    let hook = std::panic::take_hook();
+    std::panic::set_hook(Box::new(|_| {}));
+    let fixed = guard(|| panic!("fixed"));
+    let fixed_text = last_error();
+    let made = guard(|| panic!("number {}", 7));
+    let made_text = last_error();
+    /// A payload that panics when it is dropped.
+    struct Spiteful;
+    impl Drop for Spiteful {
+        fn drop(&mut self) {
+            panic!("again");
+        }
+    }
+    let spiteful = guard(|| std::panic::panic_any(Spiteful));
+    let spiteful_text = last_error();
+    std::panic::set_hook(hook);
+    assert_eq!([fixed, made, spiteful], [Status::Panic; 3]);
+    assert!(fixed_text.ends_with(": fixed"), "{fixed_text}");
+    assert!(made_text.ends_with(": number 7"), "{made_text}");
+    assert!(spiteful_text.ends_with("no message"), "{spiteful_text}");
+}
+
+#[test]
+fn messages_belong_to_threads_and_survive_zero_bytes_and_successes() {
+    let failed = guard(|| Err(Failure::new(Status::Engine, "a\0b")));
+    assert_eq!(failed, Status::Engine);
+    assert_eq!(guard(|| Ok(())), Status::Ok);
+    assert_eq!(last_error(), "a\u{fffd}b");
+    assert_eq!(std::thread::spawn(last_error).join().unwrap(), "");
+}
+
+fn model(text: &CStr) -> *mut Model {
+    let mut model = null_mut();
+    // SAFETY: the texts end with zero bytes, and the place can be written to.
+    let status = unsafe { psidpd_model_parse(c"test".as_ptr(), text.as_ptr(), &mut model) };
+    assert_eq!(status, Status::Ok, "{}", last_error());
+    model
+}
+
+const TEXT: &CStr = c"title = \"a fluid\"\nspecies = [\"A\"]\n[density.n]\nkernel = \"quadratic\"\n\
+    range = 1\n[excess_free_energy]\nA = \"n^2\"\n";
+
+/// Addresses that no array can be at, and lengths that none can have, are found out before they are
+/// used.
+#[test]
+fn impossible_pointers_and_lengths_are_refused() {
+    let model = model(TEXT);
+    let mut engine = null_mut();
+    let x = [0.0, 0.0, 0.0, 0.5, 0.0, 0.0];
+    let (tag, kind) = ([1, 2], [0, 0]);
+    let good = Particles { owned: 2, all: 2, x: x.as_ptr(), tag: tag.as_ptr(), kind: kind.as_ptr() };
+    // SAFETY: handles are alive, arrays as long as stated; where they are not, that is what is refused.
+    unsafe {
+        let mut title = null();
+        assert_eq!(psidpd_model_title(model, &mut title), Status::Ok);
+        assert_eq!(CStr::from_ptr(title).to_str().unwrap(), "a fluid");
+        assert_eq!(psidpd_engine_new(model, 1.0, &mut engine), Status::Ok);
+        psidpd_model_free(model);
+
+        let long = Particles { owned: 0, all: usize::MAX / 8, ..good };
+        assert_eq!(psidpd_engine_densities(engine, &long, 1), Status::InvalidArgument);
+        assert!(last_error().contains("cannot be as long"), "{}", last_error());
+        let odd = Particles { x: x.as_ptr().wrapping_byte_add(1), ..good };
+        assert_eq!(psidpd_engine_densities(engine, &odd, 1), Status::InvalidArgument);
+        assert!(last_error().contains("not aligned"), "{}", last_error());
+
+        let mut force = [0.0; 6];
+        let forces = |particles: &Particles, force: *mut f64| {
+            psidpd_engine_forces(engine, particles, null(), null(), 0, force, null_mut())
+        };
+        assert_eq!(forces(&good, force.as_mut_ptr()), Status::CallOrder);
+        assert_eq!(psidpd_engine_densities(engine, &good, 1), Status::Ok);
+        assert_eq!(forces(&good, x.as_ptr().cast_mut()), Status::InvalidArgument);
+        assert!(last_error().contains("overlap"), "{}", last_error());
+        assert_eq!(forces(&good, force.as_mut_ptr()), Status::Ok);
+        assert!(force[0] < 0.0 && force[0] == -force[3]);
+
+        // What failed once is not ready, and is again after the next success.
+        let nowhere = [f64::NAN, 0.0, 0.0, 0.5, 0.0, 0.0];
+        let lost = Particles { x: nowhere.as_ptr(), ..good };
+        assert_eq!(psidpd_engine_densities(engine, &lost, 1), Status::Engine);
+        assert!(last_error().contains("particle 1 "), "{}", last_error());
+        assert_eq!(forces(&good, force.as_mut_ptr()), Status::CallOrder);
+        assert_eq!(psidpd_engine_densities(engine, &good, 0), Status::Ok);
+        assert_eq!(forces(&good, force.as_mut_ptr()), Status::Ok);
+        psidpd_engine_free(engine);
+    }
+}
+
+#[test]
+fn no_particles_need_no_arrays() {
+    let model = model(TEXT);
+    let mut engine = null_mut();
+    let none = Particles { owned: 0, all: 0, x: null(), tag: null(), kind: null() };
+    // SAFETY: handles are alive, and arrays have no elements.
+    unsafe {
+        assert_eq!(psidpd_engine_new(model, 1.0, &mut engine), Status::Ok);
+        assert_eq!(psidpd_engine_densities(engine, &none, 1), Status::Ok);
+        let want = PSIDPD_WANT_ENERGY | PSIDPD_WANT_PARTICLE_VIRIAL;
+        let status = psidpd_engine_forces(engine, &none, null(), null(), want, null_mut(), null_mut());
+        assert_eq!(status, Status::Ok, "{}", last_error());
+        psidpd_engine_free(engine);
+        psidpd_model_free(model);
+    }
+}
+
+/// The header allows models to be shared, and engines to move, between threads.
+#[test]
+fn handles_may_cross_threads() {
+    fn shared<T: Send + Sync>() {}
+    shared::<Model>();
+    shared::<Engine>();
+}

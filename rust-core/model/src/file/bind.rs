@@ -1,0 +1,334 @@
+//! Puts the temperature in: from entries of the file to a [`Fluid`].
+
+use super::Model;
+use super::density::DensityEntry;
+use super::excess::ExcessEntry;
+use super::interaction::{PairEntry, PairFormEntry, ThermostatEntry};
+use super::number::formula_error;
+use crate::curve::{Curve, CurveForm, Pressure, Spline};
+use crate::document::{FileError, FileErrorKind, Located, Source};
+use crate::expression::{Ast, ErrorKind, Expansion, ExpressionError, Formula, Variables};
+use crate::fluid::{
+    Bounds, ExcessFreeEnergy, Fluid, PairTerm, Polynomial, StatedSlopes, Thermostat, WeightedDensity,
+};
+use crate::kernel::Kernel;
+use crate::pair::{ExpressionPair, PairPotential, Soft, SplineAttractive, TablePair};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Everything a formula may refer to.
+struct Context<'a> {
+    source: &'a Arc<Source>,
+    constants: BTreeMap<String, f64>,
+    species: usize,
+}
+
+pub fn bind(model: &Model, kt: f64) -> Result<Fluid, FileError> {
+    let source = &model.source;
+    if !(kt > 0.0 && kt.is_finite()) {
+        let message = format!("the temperature must be a positive number, is {kt}");
+        return Err(FileError::new(source, 0..0, "kT", FileErrorKind::Value(message)));
+    }
+    let mut constants = model.parameters.clone();
+    constants.insert("kT".into(), kt);
+    let context = Context { source, constants, species: model.species.len() };
+    let densities = model
+        .densities
+        .iter()
+        .map(|entry| bind_density(entry, &context, model.dimensions))
+        .collect::<Result<Vec<_>, _>>()?;
+    let variables = variables(model);
+    let excess = model
+        .excess
+        .iter()
+        .map(|entry| bind_excess(entry, &context, &variables, &densities))
+        .collect::<Result<Vec<_>, _>>()?;
+    check_bounded(model, &densities, &excess)?;
+    let pairs = model.pairs.iter().map(|entry| bind_pair(entry, &context)).collect::<Result<Vec<_>, _>>()?;
+    Ok(Fluid {
+        title: model.title.clone(),
+        reference: model.reference.clone(),
+        dimensions: model.dimensions,
+        kt,
+        species: model.species.clone(),
+        densities,
+        excess,
+        pairs,
+        thermostats: bind_thermostats(&model.thermostats, &context)?,
+    })
+}
+
+fn bind_excess(
+    entry: &ExcessEntry,
+    context: &Context,
+    variables: &Variables,
+    densities: &[WeightedDensity],
+) -> Result<ExcessFreeEnergy, FileError> {
+    let count = context.species;
+    match entry {
+        ExcessEntry::None => Ok(ExcessFreeEnergy::Formula(Formula::constant(0.0))),
+        ExcessEntry::Formula(ast) => Formula::compile(&ast.value, &context.constants, variables)
+            .map(ExcessFreeEnergy::Formula)
+            .map_err(|e| formula_error(context.source, ast, e)),
+        ExcessEntry::Table { spline, density } => {
+            // A straight line is a formula, and needs no pass.
+            let line = spline.straight().and_then(|[intercept, slope]| {
+                Formula::linear(intercept, (0..count).map(|s| (density * count + s, slope))).ok()
+            });
+            Ok(match line {
+                Some(formula) => ExcessFreeEnergy::Formula(formula),
+                None => ExcessFreeEnergy::Curve(Curve {
+                    density: *density,
+                    form: CurveForm::Table(Arc::clone(spline)),
+                }),
+            })
+        }
+        ExcessEntry::Slopes { slopes, energy } => {
+            bind_slopes(slopes, energy.as_ref(), context, variables, densities).map(ExcessFreeEnergy::Slopes)
+        }
+        ExcessEntry::Pressure { formula: ast, density } => {
+            let variables = Variables { count: 1, names: BTreeMap::from([("rho".to_owned(), vec![0])]) };
+            let kt = context.constants["kT"];
+            // ψ is integrated from within the bounds, if there are any.
+            let start = match densities[*density].bounds {
+                Some(Bounds { low, high, .. }) if low > 0.0 => (low * high).sqrt(),
+                Some(Bounds { high, .. }) if high > 0.0 => 0.5 * high,
+                _ => 1.0,
+            };
+            let too_large = |e| ExpressionError { kind: ErrorKind::TooLarge(e), offset: 0, length: 0 };
+            Formula::compile(&ast.value, &context.constants, &variables)
+                .and_then(|p| Pressure::new(&p, kt, start).map_err(too_large))
+                .map(|p| {
+                    ExcessFreeEnergy::Curve(Curve {
+                        density: *density,
+                        form: CurveForm::Pressure(Arc::new(p)),
+                    })
+                })
+                .map_err(|e| formula_error(context.source, ast, e))
+        }
+    }
+}
+
+/// A slope is that of one partial density, or of all that make up a total.
+fn bind_slopes(
+    slopes: &[(Located<String>, Located<Ast>)],
+    energy: Option<&Located<Ast>>,
+    context: &Context,
+    variables: &Variables,
+    densities: &[WeightedDensity],
+) -> Result<StatedSlopes, FileError> {
+    let source = context.source;
+    let compile = |ast: &Located<Ast>| {
+        Formula::compile(&ast.value, &context.constants, variables).map_err(|e| formula_error(source, ast, e))
+    };
+    let mut stated: Vec<Option<Formula>> = vec![None; variables.count];
+    for (name, ast) in slopes {
+        let Some(members) = variables.names.get(&name.value) else {
+            let known = variables.names.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
+            let name_of = name.value.clone();
+            let kind = FileErrorKind::UnknownName { what: "density variable", name: name_of, known };
+            return Err(name.error(source, kind));
+        };
+        let formula = compile(ast)?;
+        for v in members {
+            if stated[*v].replace(formula.clone()).is_some() {
+                let message = "the slope of one of its partial densities is stated twice".into();
+                return Err(name.error(source, FileErrorKind::Value(message)));
+            }
+        }
+    }
+    let energy = energy.map(compile).transpose()?.unwrap_or_else(|| Formula::constant(0.0));
+    let slopes = stated.into_iter().map(|s| s.unwrap_or_else(|| Formula::constant(0.0))).collect();
+    let law = StatedSlopes { energy, slopes };
+    let bounded = |v: &usize| densities[v / context.species].bounds.is_some() && law.depends_on(*v);
+    if let Some(v) = (0..variables.count).find(bounded) {
+        let name = &densities[v / context.species].name;
+        let message =
+            format!("density {name} has bounds, beyond which psi goes on; stated slopes have no psi");
+        return Err(FileError::new(source, 0..0, "excess_free_energy", FileErrorKind::Value(message))
+            .with_help("leave the bounds out, or limit the density in the formula with min and max"));
+    }
+    Ok(law)
+}
+
+/// The continuation of ψ has three to the number of bounded variables terms.
+fn check_bounded(
+    model: &Model,
+    densities: &[WeightedDensity],
+    excess: &[ExcessFreeEnergy],
+) -> Result<(), FileError> {
+    let count = model.species.len();
+    for (entry, excess) in model.excess.iter().zip(excess) {
+        let (ExcessEntry::Formula(ast), ExcessFreeEnergy::Formula(psi)) = (entry, excess) else { continue };
+        let bounded = (0..densities.len() * count)
+            .filter(|v| densities[v / count].bounds.is_some() && psi.depends_on(*v))
+            .count();
+        if bounded > Expansion::MOST {
+            let message =
+                format!("depends on {bounded} partial densities with bounds, at most {}", Expansion::MOST);
+            return Err(ast
+                .error(&model.source, FileErrorKind::Value(message))
+                .with_help("leave the bounds out, or limit the densities in the formula with min and max"));
+        }
+    }
+    Ok(())
+}
+
+/// The variables of ψ: for a density `n` of species A, B the names n_A, n_B and n = n_A + n_B.
+fn variables(model: &Model) -> Variables {
+    let count = model.species.len();
+    let mut names = BTreeMap::new();
+    for (d, density) in model.densities.iter().enumerate() {
+        names.insert(density.name.clone(), (0..count).map(|s| d * count + s).collect());
+        for (s, species) in model.species.iter().enumerate() {
+            names.insert(format!("{}_{species}", density.name), vec![d * count + s]);
+        }
+    }
+    Variables { count: model.densities.len() * count, names }
+}
+
+fn bind_density(
+    entry: &DensityEntry,
+    context: &Context,
+    dimensions: usize,
+) -> Result<WeightedDensity, FileError> {
+    let (constants, source) = (&context.constants, context.source);
+    let range = entry.range.positive(constants, source)?;
+    let correction = entry
+        .correction
+        .iter()
+        .map(|coefficients| {
+            if coefficients.is_empty() {
+                return Ok(Polynomial::identity());
+            }
+            let values: Result<Vec<f64>, FileError> =
+                coefficients.iter().map(|c| c.evaluate(constants, source).map(|x| x.value)).collect();
+            values.map(Polynomial)
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    debug_assert_eq!(correction.len(), context.species * context.species);
+    let bounds = match &entry.bounds {
+        None => None,
+        Some([low, high]) => {
+            let low = low.evaluate(constants, source)?;
+            let high = high.evaluate(constants, source)?;
+            if low.value >= high.value {
+                return Err(low.error(
+                    source,
+                    FileErrorKind::Value(format!(
+                        "the lower bound {} is not below the upper {}",
+                        low.value, high.value
+                    )),
+                ));
+            }
+            Some(Bounds { low: low.value, high: high.value, below: entry.below })
+        }
+    };
+    Ok(WeightedDensity {
+        name: entry.name.clone(),
+        kernel: Kernel::new(entry.kernel, range, dimensions),
+        force_kernel: Kernel::new(entry.force_kernel, range, dimensions),
+        includes_self: entry.includes_self,
+        correction,
+        bounds,
+    })
+}
+
+fn bind_pair(entry: &PairEntry, context: &Context) -> Result<PairTerm, FileError> {
+    let (constants, source) = (&context.constants, context.source);
+    let value = |n: &super::Number| n.evaluate(constants, source).map(|x| x.value);
+    let potential = match &entry.form {
+        PairFormEntry::Soft { strength, range } => {
+            PairPotential::Soft(Soft::new(value(strength)?, range.positive(constants, source)?))
+        }
+        PairFormEntry::Spline { strength, repulsion, attraction, range_a, range_b } => {
+            PairPotential::Spline(SplineAttractive::new(
+                value(strength)?,
+                value(repulsion)?,
+                value(attraction)?,
+                range_a.positive(constants, source)?,
+                range_b.positive(constants, source)?,
+            ))
+        }
+        PairFormEntry::Expression { phi, range } => {
+            let variables = Variables { count: 1, names: BTreeMap::from([("r".to_owned(), vec![0])]) };
+            let range = range.positive(constants, source)?;
+            Formula::compile(&phi.value, constants, &variables)
+                .and_then(|formula| {
+                    let whole = |e| ExpressionError { kind: ErrorKind::TooLarge(e), offset: 0, length: 0 };
+                    ExpressionPair::new(&formula, range).map_err(whole)
+                })
+                .map(PairPotential::Expression)
+                .map_err(|e| formula_error(source, phi, e))?
+        }
+        PairFormEntry::Table { spline, file, range } => {
+            let last = spline.ends()[1];
+            let range = match range {
+                Some(range) => {
+                    let place = range.evaluate(constants, source)?;
+                    let range = range.positive(constants, source)?;
+                    if range > last {
+                        let message = format!("is beyond the last r of the table, {last}");
+                        return Err(place.error(source, FileErrorKind::Value(message)));
+                    }
+                    range
+                }
+                None => last,
+            };
+            check_table(spline, range).map_err(|m| file.error(source, FileErrorKind::Value(m)))?;
+            PairPotential::Table(TablePair::new(Arc::clone(spline), range))
+        }
+    };
+    Ok(PairTerm { between: entry.between, potential })
+}
+
+/// A potential that jumps at its range would not conserve energy.
+fn check_table(spline: &Spline, range: f64) -> Result<(), String> {
+    let [first, _] = spline.ends();
+    if !(first >= 0.0 && range > first) {
+        return Err(format!("goes from r = {first} to {range}: r must rise from 0 or more"));
+    }
+    let largest = (0..=1000)
+        .map(|k| spline.at(first + (range - first) * k as f64 / 1000.0)[0].abs())
+        .fold(0.0, f64::max);
+    let end = spline.at(range)[0];
+    if end.abs() > 1e-6 * largest {
+        return Err(format!(
+            "phi is {end} at the range {range}: it must end at 0, or energy is not conserved"
+        ));
+    }
+    Ok(())
+}
+
+fn bind_thermostats(
+    entries: &[ThermostatEntry],
+    context: &Context,
+) -> Result<Vec<Option<Thermostat>>, FileError> {
+    let (constants, source) = (&context.constants, context.source);
+    let count = context.species;
+    let mut all = vec![None; count * count];
+    // The entry for every pair first, so that particular ones replace it.
+    let ordered =
+        entries.iter().filter(|e| e.between.is_none()).chain(entries.iter().filter(|e| e.between.is_some()));
+    for entry in ordered {
+        let gamma = entry.gamma.evaluate(constants, source)?;
+        if gamma.value < 0.0 {
+            return Err(gamma
+                .error(source, FileErrorKind::Value(format!("must not be negative, is {}", gamma.value))));
+        }
+        let exponent = match &entry.exponent {
+            Some(number) => number.positive(constants, source)?,
+            None => 1.0,
+        };
+        let thermostat =
+            Thermostat { gamma: gamma.value, range: entry.range.positive(constants, source)?, exponent };
+        match entry.between {
+            None => all.fill(Some(thermostat)),
+            Some([a, b]) => {
+                all[a * count + b] = Some(thermostat);
+                all[b * count + a] = Some(thermostat);
+            }
+        }
+    }
+    Ok(all)
+}

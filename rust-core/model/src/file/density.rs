@@ -1,0 +1,165 @@
+use super::names::check_identifier;
+use super::number::Number;
+use super::species_index;
+use crate::document::{FileError, FileErrorKind, Located, Section, Value};
+use crate::fluid::Continuation;
+use crate::kernel::KernelKind;
+use std::collections::BTreeMap;
+
+/// A `[density.NAME]` table.
+#[derive(Debug, Clone)]
+pub struct DensityEntry {
+    pub name: String,
+    pub kernel: KernelKind,
+    pub force_kernel: KernelKind,
+    pub range: Number,
+    pub includes_self: bool,
+    /// Coefficients by (felt by, density of), row-major; empty is the identity.
+    pub correction: Vec<Vec<Number>>,
+    pub bounds: Option<[Number; 2]>,
+    pub below: Continuation,
+}
+
+/// Most densities of a model.
+const MOST_DENSITIES: usize = 16;
+
+/// Reads every `[density.*]`, in the order of the file.
+pub fn read(
+    root: &Section,
+    species: &[String],
+    parameters: &BTreeMap<String, f64>,
+) -> Result<Vec<DensityEntry>, FileError> {
+    let Some(value) = root.get("density") else {
+        return Ok(Vec::new());
+    };
+    let section = value.section()?;
+    let mut densities: Vec<DensityEntry> = Vec::new();
+    let entries = section.entries();
+    if entries.len() > MOST_DENSITIES {
+        let message = format!("{} densities, more than {MOST_DENSITIES}", entries.len());
+        return Err(value.error(FileErrorKind::Value(message)));
+    }
+    for (name, value) in entries {
+        check_identifier(&name, &section)?;
+        let Some(table) = value.as_section() else {
+            return Err(value
+                .error(FileErrorKind::WrongType { expected: "a table", found: "something else" })
+                .with_help(format!("densities have names: write [density.{}]", "n")));
+        };
+        let entry = read_one(name.clone(), &table, species)?;
+        table.finish()?;
+        check_clashes(&name, &section, species, parameters, &densities)?;
+        densities.push(entry);
+    }
+    Ok(densities)
+}
+
+fn read_one(name: Located<String>, table: &Section, species: &[String]) -> Result<DensityEntry, FileError> {
+    let choices: Vec<(&str, KernelKind)> = KernelKind::ALL.iter().map(|k| (k.name(), *k)).collect();
+    let kernel = table.require("kernel")?.one_of("kernel", &choices)?.value;
+    let force_kernel = match table.get("force_kernel") {
+        Some(value) => value.one_of("kernel", &choices)?.value,
+        None => kernel,
+    };
+    let range = Number::read(&table.require("range")?, table.source())?;
+    let includes_self = match table.get("self") {
+        Some(value) => value.boolean()?.value,
+        None => false,
+    };
+    let correction = match table.get("correction") {
+        Some(value) => read_correction(&value, table, species)?,
+        None => vec![Vec::new(); species.len() * species.len()],
+    };
+    let bounds = match table.get("bounds") {
+        Some(value) => {
+            let items = value.array()?;
+            let [low, high] = items.as_slice() else {
+                return Err(value.error(FileErrorKind::Value("expected [lowest, highest]".into())));
+            };
+            Some([Number::read(low, table.source())?, Number::read(high, table.source())?])
+        }
+        None => None,
+    };
+    let below = match table.get("below") {
+        Some(value) => {
+            let choices = [("linear", Continuation::Linear), ("constant", Continuation::Constant)];
+            if bounds.is_none() {
+                return Err(value.error(FileErrorKind::Value("has no meaning without bounds".into())));
+            }
+            value.one_of("continuation", &choices)?.value
+        }
+        None => Continuation::default(),
+    };
+    let name = name.value;
+    Ok(DensityEntry { name, kernel, force_kernel, range, includes_self, correction, bounds, below })
+}
+
+/// One polynomial for all pairs of species, or a table of `"A|B"`: the density of A felt by B.
+fn read_correction(
+    value: &Value,
+    table: &Section,
+    species: &[String],
+) -> Result<Vec<Vec<Number>>, FileError> {
+    let coefficients = |value: &Value| -> Result<Vec<Number>, FileError> {
+        let items = value.array()?;
+        if items.is_empty() || items.len() > 16 {
+            return Err(
+                value.error(FileErrorKind::Value("expected 1 to 16 coefficients in ascending powers".into()))
+            );
+        }
+        items.iter().map(|item| Number::read(item, table.source())).collect()
+    };
+    let count = species.len();
+    if value.as_array().is_some() {
+        return Ok(vec![coefficients(value)?; count * count]);
+    }
+    let Some(pairs) = value.as_section() else {
+        return Err(value.error(FileErrorKind::WrongType {
+            expected: "coefficients or a table of \"A|B\" = coefficients",
+            found: "something else",
+        }));
+    };
+    let mut all = vec![Vec::new(); count * count];
+    for (key, value) in pairs.entries() {
+        let Some((of, by)) = key.value.split_once('|') else {
+            return Err(key.error(
+                table.source(),
+                FileErrorKind::Value("expected \"A|B\", the density of A felt by B".into()),
+            ));
+        };
+        let index =
+            |name: &str| species_index(species, &key.clone().map(|_| name.trim().to_owned()), table.source());
+        all[index(by)? * count + index(of)?] = coefficients(&value)?;
+    }
+    Ok(all)
+}
+
+/// The variables of one density must not hide parameters or the variables of another.
+fn check_clashes(
+    name: &Located<String>,
+    section: &Section,
+    species: &[String],
+    parameters: &BTreeMap<String, f64>,
+    others: &[DensityEntry],
+) -> Result<(), FileError> {
+    let variables = |density: &str| {
+        let mut names = vec![density.to_owned()];
+        names.extend(species.iter().map(|s| format!("{density}_{s}")));
+        names
+    };
+    let mine = variables(&name.value);
+    let taken = parameters
+        .keys()
+        .cloned()
+        .chain(others.iter().flat_map(|d| variables(&d.name)))
+        .find(|n| mine.contains(n));
+    match taken {
+        None => Ok(()),
+        Some(taken) => Err(name.error(
+            section.source(),
+            FileErrorKind::Value(format!(
+                "its variable {taken} has the name of another variable or parameter"
+            )),
+        )),
+    }
+}

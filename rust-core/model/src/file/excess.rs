@@ -1,0 +1,131 @@
+use super::density::DensityEntry;
+use super::number::read_formula;
+use super::species_index;
+use super::table::read_spline;
+use crate::curve::Spline;
+use crate::document::{FileError, FileErrorKind, Located, Section, Value};
+use crate::expression::Ast;
+use std::path::Path;
+use std::sync::Arc;
+
+/// What the file says of one species' `ψ`.
+#[derive(Debug, Clone)]
+pub enum ExcessEntry {
+    /// No `[excess_free_energy]` at all: ψ = 0.
+    None,
+    /// A formula of the densities.
+    Formula(Located<Ast>),
+    /// A table of one density's total.
+    Table { spline: Arc<Spline>, density: usize },
+    /// The pressure as a formula of one density's total.
+    Pressure { formula: Located<Ast>, density: usize },
+    /// Slopes that need have no ψ, by the names of the variables, and what is reported as energy.
+    Slopes { slopes: Vec<(Located<String>, Located<Ast>)>, energy: Option<Located<Ast>> },
+}
+
+/// Reads `[excess_free_energy]`: every species, or none.
+pub fn read(
+    root: &Section,
+    species: &Located<Vec<String>>,
+    densities: &[DensityEntry],
+    directory: &Path,
+) -> Result<Vec<ExcessEntry>, FileError> {
+    let mut all = vec![ExcessEntry::None; species.value.len()];
+    let Some(value) = root.get("excess_free_energy") else {
+        return Ok(all);
+    };
+    let section = value.section()?;
+    for (name, value) in section.entries() {
+        let index = species_index(&species.value, &name, section.source())?;
+        all[index] = match value.as_section() {
+            None => ExcessEntry::Formula(read_formula(&value, section.source())?),
+            Some(table) => {
+                let entry = read_curve(&table, species.value.len(), densities, directory)?;
+                table.finish()?;
+                entry
+            }
+        };
+    }
+    match all.iter().position(|e| matches!(e, ExcessEntry::None)) {
+        None => Ok(all),
+        Some(missing) => Err(section
+            .error(FileErrorKind::Value(format!("species {} has no entry", species.value[missing])))
+            .with_help(format!("write {} = \"0\" if it has none", species.value[missing]))),
+    }
+}
+
+/// `{ table = "file" }` or `{ pressure = "formula" }`, with `density = "name"` where there are several;
+/// or `{ slopes = { n = "formula" } }`.
+fn read_curve(
+    table: &Section,
+    species: usize,
+    densities: &[DensityEntry],
+    directory: &Path,
+) -> Result<ExcessEntry, FileError> {
+    let value = |message: &str| FileErrorKind::Value(message.into());
+    let file = table.get("table");
+    let pressure = table.get("pressure");
+    let (slopes, energy, named) = (table.get("slopes"), table.get("energy"), table.get("density"));
+    if let Some(slopes) = slopes {
+        let others = [("table", &file), ("pressure", &pressure), ("density", &named)];
+        if let Some((name, Some(other))) = others.iter().find(|(_, v)| v.is_some()) {
+            return Err(other.error(FileErrorKind::Value(format!("slopes exclude {name}"))));
+        }
+        return read_slopes(&slopes, energy, table);
+    }
+    if let Some(energy) = energy {
+        return Err(energy.error(value("has no meaning without slopes")));
+    }
+    let density = read_density(named, table, densities)?;
+    match (file, pressure) {
+        (Some(file), None) => {
+            Ok(ExcessEntry::Table { spline: Arc::new(read_spline(&file, directory, ["n", "psi"])?), density })
+        }
+        (None, Some(pressure)) if species == 1 => {
+            Ok(ExcessEntry::Pressure { formula: read_formula(&pressure, table.source())?, density })
+        }
+        (None, Some(pressure)) => Err(pressure
+            .error(value("gives psi for a model of one species only"))
+            .with_help("write psi of each species as a formula or a table")),
+        (Some(_), Some(pressure)) => Err(pressure.error(value("excludes a table"))),
+        (None, None) => {
+            Err(table.error(value("expected a formula, { table = \"file\" } or { pressure = \"formula\" }")))
+        }
+    }
+}
+
+fn read_slopes(slopes: &Value, energy: Option<Value>, table: &Section) -> Result<ExcessEntry, FileError> {
+    let section = slopes.section()?;
+    let slopes = section
+        .entries()
+        .into_iter()
+        .map(|(name, value)| Ok((name, read_formula(&value, table.source())?)))
+        .collect::<Result<Vec<_>, FileError>>()?;
+    section.finish()?;
+    let energy = energy.map(|e| read_formula(&e, table.source())).transpose()?;
+    Ok(ExcessEntry::Slopes { slopes, energy })
+}
+
+/// The density that a curve depends on: the one named, or the only one.
+fn read_density(
+    named: Option<Value>,
+    table: &Section,
+    densities: &[DensityEntry],
+) -> Result<usize, FileError> {
+    let known = || densities.iter().map(|d| d.name.as_str()).collect::<Vec<_>>().join(", ");
+    match (named, densities) {
+        (Some(value), _) => {
+            let name = value.string()?.value;
+            densities.iter().position(|d| d.name == name).ok_or_else(|| {
+                value.error(FileErrorKind::UnknownName { what: "density", name, known: known() })
+            })
+        }
+        (None, [_]) => Ok(0),
+        (None, []) => Err(table
+            .error(FileErrorKind::Value("depends on a density, and the model has none".into()))
+            .with_help("write a [density.n]")),
+        (None, _) => Err(table
+            .error(FileErrorKind::Value(format!("does not say which density it depends on: {}", known())))
+            .with_help("write density = \"name\" in the braces")),
+    }
+}

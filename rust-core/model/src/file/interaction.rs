@@ -1,0 +1,187 @@
+use super::number::{Number, read_formula};
+use super::species_index;
+use super::table::read_spline;
+use crate::curve::Spline;
+use crate::document::{FileError, FileErrorKind, Located, Section, Source, Value};
+use crate::expression::Ast;
+use crate::fluid::{ExcessFreeEnergy, Fluid};
+use std::path::Path;
+use std::sync::Arc;
+
+/// A `[[pair]]` table.
+#[derive(Debug, Clone)]
+pub struct PairEntry {
+    pub between: [usize; 2],
+    pub form: PairFormEntry,
+}
+
+/// The form of a pair potential, with what it takes.
+#[derive(Debug, Clone)]
+pub enum PairFormEntry {
+    Soft { strength: Number, range: Number },
+    Spline { strength: Number, repulsion: Number, attraction: Number, range_a: Number, range_b: Number },
+    Expression { phi: Located<Ast>, range: Number },
+    Table { spline: Arc<Spline>, file: Located<String>, range: Option<Number> },
+}
+
+/// A `[[thermostat]]` table.
+#[derive(Debug, Clone)]
+pub struct ThermostatEntry {
+    /// Every pair that has no entry of its own if `None`.
+    pub between: Option<[usize; 2]>,
+    pub gamma: Number,
+    pub range: Number,
+    pub exponent: Option<Number>,
+}
+
+fn read_between(value: &Value, species: &[String], source: &Arc<Source>) -> Result<[usize; 2], FileError> {
+    let items = value.array()?;
+    let [a, b] = items.as_slice() else {
+        return Err(value.error(FileErrorKind::Value("expected two species".into())));
+    };
+    Ok([species_index(species, &a.string()?, source)?, species_index(species, &b.string()?, source)?])
+}
+
+/// Reads every `[[pair]]`.
+pub fn read_pairs(root: &Section, species: &[String], directory: &Path) -> Result<Vec<PairEntry>, FileError> {
+    let Some(value) = root.get("pair") else {
+        return Ok(Vec::new());
+    };
+    let mut pairs = Vec::new();
+    for item in value.array()? {
+        let table = item.section()?;
+        pairs.push(read_pair(&table, species, directory)?);
+        table.finish()?;
+    }
+    Ok(pairs)
+}
+
+fn read_pair(table: &Section, species: &[String], directory: &Path) -> Result<PairEntry, FileError> {
+    #[derive(Clone, Copy)]
+    enum Form {
+        Soft,
+        Spline,
+        Expression,
+        Table,
+    }
+    let source = table.source();
+    let between = read_between(&table.require("between")?, species, source)?;
+    let number = |key: &str| Number::read(&table.require(key)?, source);
+    let forms = [
+        ("soft", Form::Soft),
+        ("spline", Form::Spline),
+        ("expression", Form::Expression),
+        ("table", Form::Table),
+    ];
+    let form = match table.require("form")?.one_of("form", &forms)?.value {
+        Form::Soft => PairFormEntry::Soft { strength: number("strength")?, range: number("range")? },
+        Form::Spline => PairFormEntry::Spline {
+            strength: number("strength")?,
+            repulsion: number("A")?,
+            attraction: number("B")?,
+            range_a: number("range_A")?,
+            range_b: number("range_B")?,
+        },
+        Form::Expression => PairFormEntry::Expression {
+            phi: read_formula(&table.require("phi")?, source)?,
+            range: number("range")?,
+        },
+        Form::Table => {
+            let file = table.require("file")?;
+            PairFormEntry::Table {
+                spline: Arc::new(read_spline(&file, directory, ["r", "phi"])?),
+                file: file.string()?,
+                range: table.get("range").map(|v| Number::read(&v, source)).transpose()?,
+            }
+        }
+    };
+    Ok(PairEntry { between, form })
+}
+
+/// Reads every `[[thermostat]]`.
+pub fn read_thermostats(root: &Section, species: &[String]) -> Result<Vec<ThermostatEntry>, FileError> {
+    let Some(value) = root.get("thermostat") else {
+        return Ok(Vec::new());
+    };
+    let mut entries: Vec<ThermostatEntry> = Vec::new();
+    for item in value.array()? {
+        let table = item.section()?;
+        let source = table.source();
+        let between = match table.get("between") {
+            Some(value) => Some(read_between(&value, species, source)?),
+            None => None,
+        };
+        let same = |a: [usize; 2], b: [usize; 2]| a == b || a == [b[1], b[0]];
+        let twice = entries.iter().any(|e| match (e.between, between) {
+            (None, None) => true,
+            (Some(a), Some(b)) => same(a, b),
+            _ => false,
+        });
+        if twice {
+            return Err(
+                table.error(FileErrorKind::Value("this pair of species has a thermostat already".into()))
+            );
+        }
+        entries.push(ThermostatEntry {
+            between,
+            gamma: Number::read(&table.require("gamma")?, source)?,
+            range: Number::read(&table.require("range")?, source)?,
+            exponent: match table.get("exponent") {
+                Some(value) => Some(Number::read(&value, source)?),
+                None => None,
+            },
+        });
+        table.finish()?;
+    }
+    Ok(entries)
+}
+
+/// In a fluid whose particles interact at all, every two species must: what is forgotten should not
+/// pass for an ideal mixture.
+pub fn check_coverage(source: &Arc<Source>, fluid: &Fluid) -> Result<(), FileError> {
+    let count = fluid.species.len();
+    let mut coupled = vec![false; count * count];
+    for term in &fluid.pairs {
+        let [a, b] = term.between;
+        coupled[a * count + b] = true;
+        coupled[b * count + a] = true;
+    }
+    for (alpha, excess) in fluid.excess.iter().enumerate() {
+        for variable in 0..fluid.variables() {
+            let depends = match excess {
+                ExcessFreeEnergy::Formula(formula) => formula.depends_on(variable),
+                ExcessFreeEnergy::Curve(curve) => curve.density == variable / count,
+                ExcessFreeEnergy::Slopes(law) => law.slopes[variable].is_constant() != Some(0.0),
+            };
+            if depends {
+                let beta = variable % count;
+                coupled[alpha * count + beta] = true;
+                coupled[beta * count + alpha] = true;
+            }
+        }
+    }
+    let nothing = coupled.iter().all(|c| !c);
+    let missing =
+        |table: &[bool]| (0..count).find_map(|a| (a..count).find(|b| !table[a * count + b]).map(|b| (a, b)));
+    let whole = |key: &str, message: String, help: String| {
+        Err(FileError::new(source, 0..0, key, FileErrorKind::Value(message)).with_help(help))
+    };
+    if let (false, Some((a, b))) = (nothing, missing(&coupled)) {
+        let (a, b) = (&fluid.species[a], &fluid.species[b]);
+        return whole(
+            "pair",
+            format!("nothing acts between species {a} and {b}"),
+            format!("add a [[pair]] with between = [\"{a}\", \"{b}\"], of strength 0 if that is meant"),
+        );
+    }
+    let held: Vec<bool> = fluid.thermostats.iter().map(Option::is_some).collect();
+    if let (true, Some((a, b))) = (held.iter().any(|h| *h), missing(&held)) {
+        let (a, b) = (&fluid.species[a], &fluid.species[b]);
+        return whole(
+            "thermostat",
+            format!("species {a} and {b} have none, others have"),
+            "leave `between` out for a thermostat of every pair, or add one with gamma = 0".into(),
+        );
+    }
+    Ok(())
+}

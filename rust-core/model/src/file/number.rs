@@ -1,0 +1,168 @@
+use super::names::check_identifier;
+use crate::document::{FileError, FileErrorKind, Located, Section, Source, Value};
+use crate::expression::{Ast, ExpressionError, Formula, Variables};
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+use std::sync::Arc;
+
+/// A number, written as one or as a formula of the parameters and kT.
+#[derive(Debug, Clone)]
+pub enum Number {
+    /// Written as a number.
+    Value(Located<f64>),
+    /// Written as a formula.
+    Formula(Located<Ast>),
+}
+
+impl Number {
+    /// Reads a number or a formula; names are looked up when it is evaluated.
+    pub fn read(value: &Value, source: &Arc<Source>) -> Result<Number, FileError> {
+        if let Some(number) = value.as_number() {
+            return Ok(Number::Value(Located {
+                value: number?,
+                span: value.span(),
+                key: value.key().to_owned(),
+            }));
+        }
+        match value.as_str() {
+            Some(_) => Ok(Number::Formula(read_formula(value, source)?)),
+            None => Err(value.error(FileErrorKind::WrongType {
+                expected: "a number or a formula of the parameters",
+                found: "something else",
+            })),
+        }
+    }
+
+    /// Its value with the constants put in.
+    pub fn evaluate(
+        &self,
+        constants: &BTreeMap<String, f64>,
+        source: &Arc<Source>,
+    ) -> Result<Located<f64>, FileError> {
+        match self {
+            Number::Value(value) => Ok(value.clone()),
+            Number::Formula(ast) => {
+                let formula = Formula::compile(&ast.value, constants, &Variables::default())
+                    .map_err(|e| formula_error(source, ast, e))?;
+                // Without variables a formula always folds to a number.
+                let value = formula.value(&[]);
+                if !value.is_finite() {
+                    return Err(
+                        ast.error(source, FileErrorKind::Value(format!("is {value}, not a finite number")))
+                    );
+                }
+                Ok(Located { value, span: ast.span.clone(), key: ast.key.clone() })
+            }
+        }
+    }
+
+    /// Its value, which must be positive.
+    pub fn positive(
+        &self,
+        constants: &BTreeMap<String, f64>,
+        source: &Arc<Source>,
+    ) -> Result<f64, FileError> {
+        let number = self.evaluate(constants, source)?;
+        if number.value > 0.0 {
+            Ok(number.value)
+        } else {
+            Err(number.error(source, FileErrorKind::Value(format!("must be positive, is {}", number.value))))
+        }
+    }
+}
+
+/// Parses the formula in a string value.
+pub fn read_formula(value: &Value, source: &Arc<Source>) -> Result<Located<Ast>, FileError> {
+    let text = value.string()?;
+    match Ast::parse(&text.value) {
+        Ok(ast) => Ok(text.map(|_| ast)),
+        Err(error) => Err(FileError::new(
+            source,
+            span_in_string(source, &text.span, &error),
+            &text.key,
+            FileErrorKind::Expression(error),
+        )),
+    }
+}
+
+/// The error of a formula that parsed but does not compile, at the offending name.
+pub fn formula_error(source: &Arc<Source>, at: &Located<Ast>, error: ExpressionError) -> FileError {
+    FileError::new(
+        source,
+        span_in_string(source, &at.span, &error),
+        &at.key,
+        FileErrorKind::Expression(error),
+    )
+}
+
+/// Where in the file an error in a quoted formula stands. Exact when the string has no escapes.
+fn span_in_string(source: &Source, string: &Range<usize>, error: &ExpressionError) -> Range<usize> {
+    let text = source.text();
+    let quoted = text.get(string.clone()).unwrap_or("");
+    let mut quotes = if quoted.starts_with("\"\"\"") || quoted.starts_with("'''") { 3 } else { 1 };
+    // A newline right behind the opening triple quote is not part of the string.
+    if quotes == 3 && quoted[3..].starts_with('\n') {
+        quotes += 1;
+    }
+    let mut start = (string.start + quotes + error.offset).min(string.end);
+    let mut end = (start + error.length).min(string.end);
+    while !text.is_char_boundary(start) {
+        start -= 1;
+    }
+    while !text.is_char_boundary(end) {
+        end += 1;
+    }
+    start..end
+}
+
+/// Most parameters of a model: each may wait for all others.
+const MOST_PARAMETERS: usize = 1000;
+
+/// The `[parameters]` table: numbers, or formulas of other parameters, in any order.
+pub fn read_parameters(root: &Section) -> Result<BTreeMap<String, f64>, FileError> {
+    let mut known = BTreeMap::new();
+    let Some(value) = root.get("parameters") else {
+        return Ok(known);
+    };
+    let section = value.section()?;
+    let source = section.source();
+    let mut waiting: Vec<(String, Number)> = Vec::new();
+    let entries = section.entries();
+    if entries.len() > MOST_PARAMETERS {
+        let message = format!("{} parameters, more than {MOST_PARAMETERS}", entries.len());
+        return Err(value.error(FileErrorKind::Value(message)));
+    }
+    for (name, value) in entries {
+        check_identifier(&name, &section)?;
+        waiting.push((name.value, Number::read(&value, source)?));
+    }
+    // Formulas may refer to each other: keep evaluating what can be until nothing is left.
+    let names: BTreeSet<String> = waiting.iter().map(|(n, _)| n.clone()).collect();
+    while !waiting.is_empty() {
+        let before = waiting.len();
+        let mut still = Vec::new();
+        for (name, number) in waiting {
+            let ready = match &number {
+                Number::Value(_) => true,
+                Number::Formula(ast) => {
+                    ast.value.names().all(|(n, _)| known.contains_key(n) || !names.contains(n))
+                }
+            };
+            if ready {
+                let value = number.evaluate(&known, source)?.value;
+                known.insert(name, value);
+            } else {
+                still.push((name, number));
+            }
+        }
+        if still.len() == before {
+            let circle: Vec<&str> = still.iter().map(|(n, _)| n.as_str()).collect();
+            return Err(section.error(FileErrorKind::Value(format!(
+                "these parameters refer to each other in a circle: {}",
+                circle.join(", ")
+            ))));
+        }
+        waiting = still;
+    }
+    Ok(known)
+}

@@ -1,0 +1,122 @@
+//! Pair potentials `φ(r)`, added to the many-body terms.
+//!
+//! To add a form: write one file with a type that implements [`PairForm`] and name it once in
+//! `pair_table!`; the model file's reader then needs its keys.
+
+mod expression;
+mod soft;
+mod spline;
+mod table;
+
+pub use expression::ExpressionPair;
+pub use soft::Soft;
+pub use spline::{SplineAttractive, spline_shape};
+pub use table::TablePair;
+
+/// A pair potential that vanishes at and beyond its range.
+pub trait PairForm {
+    /// The distance at and beyond which the potential is zero.
+    fn range(&self) -> f64;
+
+    /// `φ(r)` and `φ'(r)` for `r < range`.
+    fn at(&self, r: f64) -> (f64, f64);
+
+    /// `φ''(r)` for `0 < r < range`: where a form has no formula for it, the five-point difference of the exact `φ'`,
+    /// whose error is of the order of its rounding, 10⁻¹¹ of `φ'` over the step.
+    fn curvature(&self, r: f64) -> f64 {
+        let range = self.range();
+        let h = (1e-4 * range).min(0.4 * r).min(0.4 * (range - r));
+        if h <= 0.0 {
+            return 0.0;
+        }
+        let slope = |r: f64| self.at(r).1;
+        (8.0 * (slope(r + h) - slope(r - h)) - (slope(r + 2.0 * h) - slope(r - 2.0 * h))) / (12.0 * h)
+    }
+
+    /// `φ` and `φ'` at every `r` of a block; all `r < range`. The slices have one length.
+    fn block(&self, r: &[f64], phi: &mut [f64], slope: &mut [f64]) {
+        for ((r, phi), slope) in r.iter().zip(phi).zip(slope) {
+            (*phi, *slope) = self.at(*r);
+        }
+    }
+}
+
+/// The one list of pair forms.
+macro_rules! pair_table {
+    ($($variant:ident($form:ty) = $name:literal),+ $(,)?) => {
+        /// A pair potential of any form.
+        #[derive(Debug, Clone)]
+        pub enum PairPotential {
+            $(#[doc = concat!("The form `", $name, "` of the model file.")] $variant($form)),+
+        }
+
+        impl PairPotential {
+            /// The name of the form in the model file.
+            pub fn name(&self) -> &'static str {
+                match self { $(PairPotential::$variant(_) => $name),+ }
+            }
+        }
+
+        impl PairForm for PairPotential {
+            fn range(&self) -> f64 {
+                match self { $(PairPotential::$variant(form) => form.range()),+ }
+            }
+
+            fn at(&self, r: f64) -> (f64, f64) {
+                match self { $(PairPotential::$variant(form) => form.at(r)),+ }
+            }
+
+            fn curvature(&self, r: f64) -> f64 {
+                match self { $(PairPotential::$variant(form) => form.curvature(r)),+ }
+            }
+
+            fn block(&self, r: &[f64], phi: &mut [f64], slope: &mut [f64]) {
+                match self { $(PairPotential::$variant(form) => form.block(r, phi, slope)),+ }
+            }
+        }
+    };
+}
+
+pair_table!(
+    Soft(Soft) = "soft",
+    Spline(SplineAttractive) = "spline",
+    Expression(ExpressionPair) = "expression",
+    Table(TablePair) = "table",
+);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// φ' against central differences, and φ = 0 at the range.
+    pub(crate) fn slope_is_derivative(form: &impl PairForm, skip: &[f64]) {
+        let range = form.range();
+        assert!(form.at(range * (1.0 - 1e-12)).0.abs() < 1e-9);
+        for k in 1..100 {
+            let r = range * k as f64 / 100.0;
+            let h = 1e-6 * range;
+            if skip.iter().any(|s| (r - s).abs() < 2.0 * h) {
+                continue;
+            }
+            let numeric = (form.at(r + h).0 - form.at(r - h).0) / (2.0 * h);
+            let scale = form.at(0.3 * range).1.abs();
+            assert!((numeric - form.at(r).1).abs() < 1e-7 * scale, "at {r}");
+        }
+    }
+
+    #[test]
+    fn slopes_are_derivatives() {
+        slope_is_derivative(&Soft::new(25.0, 1.0), &[]);
+        slope_is_derivative(&Soft::new(-40.0, 0.8), &[]);
+        slope_is_derivative(&SplineAttractive::new(9.5, 2.0, 1.0, 0.8, 1.0), &[0.4, 0.5, 0.8]);
+        let r: Vec<f64> = (0..=50).map(|k| 0.02 * k as f64).collect();
+        let phi = r.iter().map(|r| 12.5 * (1.0 - r) * (1.0 - r)).collect();
+        let table = TablePair::new(std::sync::Arc::new(crate::curve::Spline::new(r, phi).unwrap()), 1.0);
+        slope_is_derivative(&table, &[]);
+        let soft = Soft::new(25.0, 1.0);
+        for k in 0..100 {
+            let (table, soft) = (table.at(0.01 * k as f64), soft.at(0.01 * k as f64));
+            assert!((table.0 - soft.0).abs() < 1e-12 && (table.1 - soft.1).abs() < 1e-11);
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! DPD with a repulsive–attractive pair potential, from the coefficients of a LAMMPS style, written as
+//! a model file: `φ = a [A W(r, r_A) − B W(r, r_B)]`.
+
+use super::file::Model;
+use super::presets::PresetError;
+use std::fmt::Write;
+
+/// The coefficients of one pair of species.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SplinePair {
+    /// `a`, energy.
+    pub strength: f64,
+    /// `A`, repulsion.
+    pub repulsion: f64,
+    /// `B`, attraction.
+    pub attraction: f64,
+    /// `r_A`.
+    pub repulsion_range: f64,
+    /// `r_B`.
+    pub attraction_range: f64,
+    /// γ of the thermostat.
+    pub gamma: f64,
+}
+
+/// Writes the model file of spline DPD for species `species`, with `pairs` a row-major table of the
+/// coefficients (the upper triangle is read; pairs without coefficients do not interact), and the
+/// range of the thermostat, which is that of all pairs.
+///
+/// # Errors
+/// A table that is not square, or without any coefficients.
+pub fn spline_dpd_text(
+    species: &[String],
+    pairs: &[Option<SplinePair>],
+    thermostat_range: f64,
+    dimensions: usize,
+) -> Result<String, PresetError> {
+    let count = species.len();
+    if count == 0 || pairs.len() != count * count {
+        return Err(PresetError::Shape);
+    }
+    let names: Vec<String> = species.iter().map(|s| format!("\"{s}\"")).collect();
+    let mut text = format!(
+        "title = \"DPD with a spline potential\"\ndimensions = {dimensions}\nspecies = [{}]\n",
+        names.join(", "),
+    );
+    let nothing = SplinePair {
+        strength: 0.0,
+        repulsion: 0.0,
+        attraction: 0.0,
+        repulsion_range: thermostat_range,
+        attraction_range: thermostat_range,
+        gamma: 0.0,
+    };
+    for i in 0..count {
+        for j in i..count {
+            let pair = pairs[i * count + j].unwrap_or(nothing);
+            let between = format!("between = [{}, {}]", names[i], names[j]);
+            // Writing to a String cannot fail.
+            let _ = write!(
+                text,
+                "\n[[pair]]\n{between}\nform = \"spline\"\nstrength = {:?}\nA = {:?}\nB = {:?}\n\
+                 range_A = {:?}\nrange_B = {:?}\n\n[[thermostat]]\n{between}\ngamma = {:?}\n\
+                 range = {thermostat_range:?}\n",
+                pair.strength,
+                pair.repulsion,
+                pair.attraction,
+                pair.repulsion_range,
+                pair.attraction_range,
+                pair.gamma,
+            );
+        }
+    }
+    Ok(text)
+}
+
+/// The model of [`spline_dpd_text`].
+///
+/// # Errors
+/// As [`spline_dpd_text`]; also a range that is not positive or a negative γ.
+pub fn spline_dpd(
+    species: &[String],
+    pairs: &[Option<SplinePair>],
+    thermostat_range: f64,
+    dimensions: usize,
+) -> Result<Model, PresetError> {
+    let text = spline_dpd_text(species, pairs, thermostat_range, dimensions)?;
+    Ok(Model::parse("dpd/spline", &text)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pair::PairForm;
+
+    #[test]
+    fn coefficients_make_the_potential() {
+        let pair = SplinePair {
+            strength: 18.75,
+            repulsion: 2.0,
+            attraction: 1.0,
+            repulsion_range: 0.8,
+            attraction_range: 1.0,
+            gamma: 4.5,
+        };
+        let names = ["A".into(), "B".into()];
+        let model = spline_dpd(&names, &[Some(pair), None, None, Some(pair)], 1.0, 3).unwrap();
+        let fluid = model.at(1.0).unwrap();
+        assert!((fluid.pairs[0].potential.at(0.0).0 - 18.75).abs() < 1e-12);
+        assert_eq!(fluid.pairs[1].potential.at(0.1).0, 0.0);
+        assert_eq!(fluid.thermostats[1].unwrap().gamma, 0.0);
+        let bad = SplinePair { gamma: -1.0, ..pair };
+        assert!(spline_dpd(&names[..1], &[Some(bad)], 1.0, 3).is_err());
+        assert_eq!(spline_dpd(&names, &[None], 1.0, 3).unwrap_err(), PresetError::Shape);
+    }
+}

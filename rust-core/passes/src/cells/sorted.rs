@@ -1,0 +1,48 @@
+//! Positions in the order of cells.
+
+use super::ghosts::Ghosts;
+use crate::ground::box_geometry::BoxGeometry;
+use crate::ground::cell_grid::CellGrid;
+use crate::ground::fixed_point::FixedPoint16;
+use psidpd_threads::SharedSlice;
+
+/// Everything that the pair search reads.
+///
+/// If the plane axis is periodic, copies of the particles of the first plane, moved by one period, follow the last
+/// particle: they are the next plane of the last one. `SortedParticles::make_room` pads all arrays behind the last particle, so
+/// that whole vectors may be read there.
+#[derive(Clone, Copy)]
+pub struct SortedCells<'a> {
+    pub geometry: &'a BoxGeometry,
+    pub grid: &'a CellGrid,
+    /// The first particle of each cell, and one past the last; then the same for the copy of the first plane.
+    pub start: &'a [u32],
+    /// Positions from the origin of the box geometry.
+    pub x: [SharedSlice<'a, f32>; 3],
+    /// The same in 16-bit fixed point.
+    pub fixed16: [SharedSlice<'a, u16>; 3],
+    pub fixed16_scale: FixedPoint16,
+    pub ghosts: Ghosts<'a>,
+}
+
+impl SortedCells<'_> {
+    /// Number of the first cell of a column.
+    #[inline(always)]
+    pub fn first_cell(&self, plane: usize, column: usize) -> usize {
+        (plane * self.grid.columns_per_plane + column) * self.grid.cells_per_column
+    }
+
+    /// The particles of a column: the first, and one past the last.
+    ///
+    /// # Safety
+    /// The column is one of the grid.
+    #[inline(always)]
+    pub unsafe fn column(&self, plane: usize, column: usize) -> [usize; 2] {
+        let cell = self.first_cell(plane, column);
+        // SAFETY: `start` has an entry for each cell and one behind the last.
+        unsafe {
+            let end = *self.start.get_unchecked(cell + self.grid.cells_per_column);
+            [*self.start.get_unchecked(cell) as usize, end as usize]
+        }
+    }
+}

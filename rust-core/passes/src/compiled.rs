@@ -1,0 +1,170 @@
+//! The passes over a plane, for a precision, on an instruction set.
+
+use crate::ground::arithmetic::{Arithmetic, Double, DoubleParticle, Mixed, MixedParticle, PackedParticle};
+use crate::ground::terms::Terms;
+use crate::instruction_set::InstructionSet;
+use crate::pair_batch::accumulators::PlaneSums;
+use crate::pair_batch::in_range_pairs::InRangePairs;
+use crate::plane::buffers::PairBuffers;
+use crate::plane::data::PassData;
+use crate::plane::first::first_pass;
+use crate::plane::second::second_pass;
+use crate::simd::{Isa, Kernel, Scalar, run};
+use crate::tally::Tally;
+use std::marker::PhantomData;
+
+/// A precision of pairs.
+///
+/// The passes are compiled with this crate: its two methods are no templates, so that no other crate compiles them again.
+pub trait PairPrecision: Send + Sync + Sized + 'static {
+    /// What pairs are computed in.
+    type Scalar: Scalar;
+    /// What is kept of a particle.
+    type PackedParticle: PackedParticle;
+    /// The arithmetic on an instruction set.
+    type On<I: Isa>: Arithmetic<I, Scalar = Self::Scalar, PackedParticle = Self::PackedParticle>;
+
+    /// The first pass over a plane.
+    ///
+    /// # Safety
+    /// As [`first_pass`].
+    unsafe fn first(passes: &Passes<Self>, pass: First<Self>) -> Tally;
+
+    /// The second pass over a plane.
+    ///
+    /// # Safety
+    /// As [`second_pass`].
+    unsafe fn second(passes: &Passes<Self>, pass: Second<Self>);
+}
+
+impl PairPrecision for Mixed {
+    type Scalar = f32;
+    type PackedParticle = MixedParticle;
+    type On<I: Isa> = Mixed;
+
+    #[inline(never)]
+    unsafe fn first(passes: &Passes<Mixed>, pass: First<Mixed>) -> Tally {
+        // SAFETY: the caller upholds it.
+        unsafe { passes.first(pass) }
+    }
+
+    #[inline(never)]
+    unsafe fn second(passes: &Passes<Mixed>, pass: Second<Mixed>) {
+        // SAFETY: the caller upholds it.
+        unsafe { passes.second(pass) }
+    }
+}
+
+impl PairPrecision for Double {
+    type Scalar = f64;
+    type PackedParticle = DoubleParticle;
+    type On<I: Isa> = Double;
+
+    #[inline(never)]
+    unsafe fn first(passes: &Passes<Double>, pass: First<Double>) -> Tally {
+        // SAFETY: the caller upholds it.
+        unsafe { passes.first(pass) }
+    }
+
+    #[inline(never)]
+    unsafe fn second(passes: &Passes<Double>, pass: Second<Double>) {
+        // SAFETY: the caller upholds it.
+        unsafe { passes.second(pass) }
+    }
+}
+
+/// The passes of one fluid.
+pub struct Passes<P> {
+    set: InstructionSet,
+    /// Whether loops are needed that know species, or that cache all pairs.
+    multispecies: bool,
+    /// Whether energies and virials are wanted.
+    tally: bool,
+    precision: PhantomData<P>,
+}
+
+impl<P: PairPrecision> Passes<P> {
+    pub fn new(set: InstructionSet, terms: &Terms<P::Scalar>, tally: bool) -> Passes<P> {
+        Passes { set, multispecies: terms.species > 1 || terms.full_cache, tally, precision: PhantomData }
+    }
+
+    /// The loops of the first pass for this fluid.
+    ///
+    /// # Safety
+    /// As [`first_pass`].
+    #[inline(always)]
+    unsafe fn first(&self, pass: First<P>) -> Tally {
+        // SAFETY: `first_pass` asks for no more than this function does.
+        unsafe {
+            match (self.multispecies, self.tally) {
+                (false, false) => run(self.set, With::<_, false, false>(pass)),
+                (false, true) => run(self.set, With::<_, false, true>(pass)),
+                (true, false) => run(self.set, With::<_, true, false>(pass)),
+                (true, true) => run(self.set, With::<_, true, true>(pass)),
+            }
+        }
+    }
+
+    /// The loops of the second pass for this fluid.
+    ///
+    /// # Safety
+    /// As [`second_pass`].
+    #[inline(always)]
+    unsafe fn second(&self, pass: Second<P>) {
+        // SAFETY: `second_pass` asks for no more than this function does.
+        unsafe {
+            match (self.multispecies, self.tally) {
+                (false, false) => run(self.set, With::<_, false, false>(pass)),
+                (false, true) => run(self.set, With::<_, false, true>(pass)),
+                (true, false) => run(self.set, With::<_, true, false>(pass)),
+                (true, true) => run(self.set, With::<_, true, true>(pass)),
+            }
+        }
+    }
+}
+
+/// A pass, compiled with species or without, with energies and virials or without.
+struct With<K, const MULTISPECIES: bool, const TALLY: bool>(K);
+
+/// A plane, as the first pass takes it.
+pub struct First<'a, P: PairPrecision> {
+    pub data: &'a PassData<'a, P::Scalar, P::PackedParticle>,
+    pub plane: usize,
+    pub sums: PlaneSums<'a>,
+    pub buffers: &'a mut PairBuffers<P::Scalar>,
+    pub in_range: &'a mut InRangePairs<P::Scalar>,
+}
+
+impl<P: PairPrecision, const MULTISPECIES: bool, const TALLY: bool> Kernel
+    for With<First<'_, P>, MULTISPECIES, TALLY>
+{
+    type Out = Tally;
+
+    #[inline(always)]
+    unsafe fn run<I: Isa>(self) -> Tally {
+        let First { data, plane, sums, buffers, in_range } = self.0;
+        // SAFETY: what `first_pass` asks for is promised to `PairPrecision::first`.
+        unsafe { first_pass::<I, P::On<I>, MULTISPECIES, TALLY>(data, plane, sums, buffers, in_range) }
+    }
+}
+
+/// A plane, as the second pass takes it.
+pub struct Second<'a, P: PairPrecision> {
+    pub data: &'a PassData<'a, P::Scalar, P::PackedParticle>,
+    pub sums: PlaneSums<'a>,
+    pub in_range: &'a InRangePairs<P::Scalar>,
+    pub virial: &'a mut [f64; 6],
+}
+
+impl<P: PairPrecision, const MULTISPECIES: bool, const TALLY: bool> Kernel
+    for With<Second<'_, P>, MULTISPECIES, TALLY>
+{
+    type Out = ();
+
+    #[inline(always)]
+    unsafe fn run<I: Isa>(self) {
+        let Second { data, sums, in_range, virial } = self.0;
+        // SAFETY: what `second_pass` asks for is promised to `PairPrecision::second`.
+        unsafe { second_pass::<I, P::On<I>, MULTISPECIES, TALLY>(data, sums, in_range, virial) }
+    }
+}

@@ -1,0 +1,129 @@
+//! The cell grid that particles are sorted into.
+
+use super::box_geometry::BoxGeometry;
+
+/// How the fast engine searches for pairs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SearchPlan {
+    /// Cells along x for each cutoff.
+    pub cells_per_cutoff: f64,
+    /// Below so many particles per cutoff along a column of cells, i-clusters have eight particles, else four: the cell
+    /// ranges of eight then are still about sixteen particles long, the size of a j-cluster.
+    pub sparse: f64,
+}
+
+impl SearchPlan {
+    /// The search of every fluid.
+    pub const DEFAULT: SearchPlan = SearchPlan { cells_per_cutoff: 4.0, sparse: 4.5 };
+
+    /// The size of i-clusters, and how many cells apart their particles may be.
+    fn i_clusters(&self, particles_per_cutoff: f64) -> (usize, f64) {
+        match particles_per_cutoff < self.sparse {
+            true => (8, 4.0 * self.cells_per_cutoff),
+            false => (4, self.cells_per_cutoff),
+        }
+    }
+}
+
+/// Columns along x, no narrower than the cutoff, each divided into cells.
+///
+/// In three dimensions a plane is a sheet of columns that follow each other along y, and planes follow each other along z. In
+/// two dimensions a plane is one column, and planes follow each other along y. A particle pairs with those behind it in its
+/// column, with the next column of its plane, and with three columns of the next plane: half of its neighbourhood, so that
+/// every pair is found once.
+#[derive(Debug, Clone, Copy)]
+pub struct CellGrid {
+    pub cells_per_column: usize,
+    pub columns_per_plane: usize,
+    pub planes: usize,
+    /// The axis along which the columns of a plane follow each other.
+    pub column_axis: usize,
+    /// The axis along which planes follow each other.
+    pub plane_axis: usize,
+    /// Pairs are searched up to this distance: the cutoff and room for rounding.
+    pub search_cutoff: f64,
+    /// The search cutoff along x, as a fraction of the box.
+    pub range_half_width: f64,
+    /// Particles of an i-cluster.
+    pub i_cluster_size: usize,
+    /// Most cells between particles of an i-cluster.
+    pub i_cluster_extent: f64,
+}
+
+impl CellGrid {
+    /// The grid for `count` particles; `None` if the box is so narrow along a period that a particle meets two images of
+    /// another.
+    pub fn new(geometry: &BoxGeometry, cutoff: f64, count: usize) -> Option<CellGrid> {
+        let (column_axis, plane_axis) = if geometry.dimensions == 3 { (1, 2) } else { (2, 1) };
+        let longest = geometry.length[..geometry.dimensions].iter().fold(0.0, |a: f64, b| a.max(*b));
+        // Coordinates are in single precision, relative to the box.
+        let search_cutoff = cutoff + 1e-6 * (cutoff + longest);
+        for k in 0..geometry.dimensions {
+            if geometry.periodic[k] && geometry.height(k) < 2.0 * search_cutoff {
+                return None;
+            }
+        }
+        let plan = SearchPlan::DEFAULT;
+        let most = (4 * count + 64) as f64;
+        // As narrow as the cutoff less rounding: pairs in the last 10⁻⁹ of the cutoff may be missed.
+        let mut width = cutoff * (1.0 - 1e-9);
+        loop {
+            let along = |axis: usize, width: f64| {
+                if axis < geometry.dimensions {
+                    (geometry.height(axis) / width).floor().max(1.0)
+                } else {
+                    1.0
+                }
+            };
+            let columns_per_plane = along(column_axis, width);
+            let planes = along(plane_axis, width);
+            let cells_per_column = along(0, width / plan.cells_per_cutoff);
+            // Widen the cells until there are not many more than particles: a few runaways must not make a grid of empty cells.
+            if columns_per_plane * planes * cells_per_column <= most.max(64.0 * plan.cells_per_cutoff) {
+                let (cells_per_column, columns_per_plane, planes) =
+                    (cells_per_column as usize, columns_per_plane as usize, planes as usize);
+                let range_half_width = search_cutoff / geometry.height(0);
+                let per_column = count as f64 / (columns_per_plane * planes) as f64;
+                let (i_cluster_size, i_cluster_extent) =
+                    plan.i_clusters(per_column * cutoff / geometry.height(0));
+                return Some(CellGrid {
+                    cells_per_column,
+                    columns_per_plane,
+                    planes,
+                    column_axis,
+                    plane_axis,
+                    search_cutoff,
+                    range_half_width,
+                    i_cluster_size,
+                    i_cluster_extent,
+                });
+            }
+            width *= 1.5;
+        }
+    }
+
+    /// Number of columns or planes that follow each other along an axis.
+    pub fn of(&self, axis: usize) -> usize {
+        if axis == self.plane_axis { self.planes } else { self.columns_per_plane }
+    }
+
+    pub fn cell_count(&self) -> usize {
+        self.cells_per_column * self.columns_per_plane * self.planes
+    }
+
+    /// Number of cells along each axis.
+    pub fn along(&self) -> [u32; 3] {
+        let mut along = [self.cells_per_column as u32; 3];
+        (along[self.column_axis], along[self.plane_axis]) =
+            (self.columns_per_plane as u32, self.planes as u32);
+        along
+    }
+
+    /// How much the number of a cell grows from one cell to the next along each axis.
+    pub fn steps(&self) -> [u32; 3] {
+        let mut steps = [1; 3];
+        let column = self.cells_per_column as u32;
+        (steps[self.column_axis], steps[self.plane_axis]) = (column, column * self.columns_per_plane as u32);
+        steps
+    }
+}

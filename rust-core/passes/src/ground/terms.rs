@@ -1,0 +1,113 @@
+//! The terms of a fluid as tables of numbers in the precision of the pairs.
+
+use super::species_pairs::SpeciesPairTable;
+use crate::simd::Scalar;
+use psidpd_model::PairTerm;
+use psidpd_model::kernel::KernelKind;
+
+/// All terms between pairs. Tables have an entry for each pair of species, row by row.
+#[derive(Debug, Clone, Default)]
+pub struct Terms<T> {
+    pub species: usize,
+    /// At least one: without soft repulsion, one of no strength.
+    pub soft: Vec<Soft<T>>,
+    pub linear: Vec<Linear<T>>,
+    pub spline: Vec<Spline<T>>,
+    /// Potentials without vector code.
+    pub scalar_fallback: Vec<PairTerm>,
+    pub thermostat: Option<ThermostatTables<T>>,
+    pub passes: Vec<Pass<T>>,
+    /// Whether all pairs go to the full pair cache. Only loops compiled for several species look at it, so that a fluid of
+    /// one density and one species does not pay for it.
+    pub full_cache: bool,
+    /// For each species: 1 where the i-particle is of it and 0 elsewhere, and the same for the j-particle.
+    pub is_species: Vec<[SpeciesPairTable<T>; 2]>,
+}
+
+/// `a (1 − r/R)`.
+#[derive(Debug, Clone)]
+pub struct Soft<T> {
+    pub strength: SpeciesPairTable<T>,
+    pub inverse_range: SpeciesPairTable<T>,
+    /// `½ a R`.
+    pub energy: SpeciesPairTable<T>,
+}
+
+/// `−(c_αβ + c_βα) w′(r)` of a density that every ψ is linear in.
+#[derive(Debug, Clone)]
+pub struct Linear<T> {
+    pub kernel: KernelKind,
+    pub inverse_range: T,
+    pub force_kernel: KernelKind,
+    pub force_inverse_range: T,
+    /// `−(c_αβ + c_βα)` times the factor of `w′`.
+    pub force: SpeciesPairTable<T>,
+    /// `c_αβ + c_βα` times the factor of `w`.
+    pub energy: SpeciesPairTable<T>,
+}
+
+/// `a [A W(r, R_A) − B W(r, R_B)]`.
+#[derive(Debug, Clone)]
+pub struct Spline<T> {
+    pub repulsion: SpeciesPairTable<T>,
+    pub attraction: SpeciesPairTable<T>,
+    pub repulsion_inverse_range: SpeciesPairTable<T>,
+    pub attraction_inverse_range: SpeciesPairTable<T>,
+}
+
+/// `−γ w_R² (ê·v) + σ w_R ξ dt^{−1/2}`.
+#[derive(Debug, Clone)]
+pub struct ThermostatTables<T> {
+    pub gamma: SpeciesPairTable<T>,
+    pub sigma: SpeciesPairTable<T>,
+    pub inverse_range: SpeciesPairTable<T>,
+    pub exponent: Exponent<T>,
+}
+
+/// The exponent of `w_R`.
+#[derive(Debug, Clone)]
+pub enum Exponent<T> {
+    One,
+    Two,
+    Any(SpeciesPairTable<T>),
+}
+
+/// A density that some ψ is not linear in.
+#[derive(Debug, Clone)]
+pub struct Pass<T> {
+    pub kernel: KernelKind,
+    pub inverse_range: T,
+    pub value: T,
+    pub force_kernel: KernelKind,
+    pub force_range: T,
+    pub force_inverse_range: T,
+    /// Minus the factor of `w′`.
+    pub force: T,
+}
+
+impl<T: Scalar> Terms<T> {
+    /// Variables of ψ: one for each density pass and species.
+    #[inline(always)]
+    pub fn variables(&self) -> usize {
+        self.passes.len() * self.species
+    }
+
+    /// The first soft repulsion; a term of no strength if there is none.
+    #[inline(always)]
+    pub fn first_soft(&self) -> &Soft<T> {
+        &self.soft[0]
+    }
+
+    /// Further soft repulsions between the same species.
+    #[inline(always)]
+    pub fn other_soft(&self) -> &[Soft<T>] {
+        &self.soft[1..]
+    }
+
+    /// Whether there are terms besides the first soft one, the thermostat and the densities.
+    #[inline(always)]
+    pub fn has_more(&self) -> bool {
+        self.soft.len() > 1
+            || !(self.linear.is_empty() && self.spline.is_empty() && self.scalar_fallback.is_empty())
+    }
+}

@@ -1,0 +1,29 @@
+//! The loops of the fast engine over cells and pairs, compiled for each instruction set and precision.
+//!
+//! A crate of its own: these loops take the compiler most of its time, and change rarely. `psidpd-core` sorts particles,
+//! shares the planes out among threads, evaluates ψ, and calls [`compiled`] for each plane; `docs/engine.md` explains the
+//! whole with figures.
+//!
+//! Rooms, from the ground up; a file imports from its own room and from those above it in this list:
+//!
+//! - [`domain`], [`noise`], [`settings`], [`instruction_set`], [`tally`]: what all of the engine means by these words.
+//! - [`simd`]: vectors of each instruction set.
+//! - [`ground`]: box geometry, cell grid, fixed-point coordinates, packed particles, tables of terms.
+//! - [`cells`]: the particles in the order of cells.
+//! - [`pair_search`]: cell ranges, i-clusters and j-clusters, distance filter.
+//! - [`pair_batch`]: terms, densities and noise of a batch of pairs, added to accumulators.
+//! - [`plane`]: the two passes over the pairs of a plane; ψ is evaluated between them.
+//! - [`compiled`]: the passes, compiled for each instruction set and precision.
+
+pub mod cells;
+pub mod compiled;
+pub mod domain;
+pub mod ground;
+pub mod instruction_set;
+pub mod noise;
+pub mod pair_batch;
+pub mod pair_search;
+pub mod plane;
+pub mod settings;
+pub mod simd;
+pub mod tally;

@@ -1,0 +1,29 @@
+//! What the evaluation of a batch reads.
+
+use crate::cells::ghosts::Ghosts;
+use crate::ground::box_geometry::BoxGeometry;
+use crate::ground::terms::Terms;
+use crate::noise::PairNoise;
+use psidpd_threads::SharedSlice;
+
+/// The particles in the order of cells and the terms that act between them.
+#[derive(Clone, Copy)]
+pub struct PairInputs<'a, T, R> {
+    pub geometry: &'a BoxGeometry,
+    pub terms: &'a Terms<T>,
+    /// The noise of this step and `dt^{−1/2}`, if the thermostat acts.
+    pub thermostat: Option<(PairNoise, f64)>,
+    /// Packed particles, and a vector of padding behind the last.
+    pub packed: SharedSlice<'a, R>,
+    /// Species of the particles; empty with one species.
+    pub species: SharedSlice<'a, u8>,
+    pub ghosts: Ghosts<'a>,
+}
+
+impl<T, R> PairInputs<'_, T, R> {
+    /// Whether all pairs go to the full pair cache.
+    #[inline(always)]
+    pub fn caches_all_pairs(&self) -> bool {
+        self.terms.full_cache
+    }
+}

@@ -1,0 +1,202 @@
+//! Adds what pairs do to the accumulators of both particles.
+
+use super::accumulators::{PlaneAccumulators, PlaneSums};
+use super::batch::Batch;
+use super::buffers::BatchBuffers;
+use super::inputs::PairInputs;
+use crate::ground::arithmetic::{Arithmetic, PackedParticle, PairVector};
+use crate::ground::species_pairs::table_entry;
+use crate::simd::{Isa, OFFSET_BITS, Quad, Reals};
+use psidpd_model::kernel::Real;
+
+/// Pairs sorted by their i-particles.
+#[derive(Clone, Copy)]
+pub struct ScatterPairs {
+    /// The j-particle of each pair: its index shifted by `OFFSET_BITS`; one more behind the last pair.
+    pub j_offsets: *const u32,
+    /// Index of the first pair of each i-particle, and one past the last pair of the last one; counted from any number.
+    pub begin: *const u32,
+    /// The first i-particle, and how many.
+    pub first: usize,
+    pub members: usize,
+}
+
+impl From<Batch<'_>> for ScatterPairs {
+    #[inline(always)]
+    fn from(batch: Batch) -> ScatterPairs {
+        let Batch { first, members, .. } = batch;
+        ScatterPairs { j_offsets: batch.j_offsets.as_ptr(), begin: batch.begin.as_ptr(), first, members }
+    }
+}
+
+/// Adds the forces of a batch, and the weights if there is one density.
+///
+/// # Safety
+/// The contract of `simd`. The sums are those of the plane that the batch is of, and the buffers hold its quads.
+#[inline(always)]
+pub unsafe fn scatter_forces<I: Isa, A: Arithmetic<I>>(
+    sums: PlaneSums,
+    buffers: &mut BatchBuffers<A::Scalar>,
+    batch: Batch,
+) {
+    // SAFETY: both particles of each pair are of the plane or the next (the half stencil of the search).
+    unsafe {
+        let to = sums.forces();
+        let quads = buffers.quads.as_mut_ptr().cast::<A::Scalar>();
+        // Reuse the memory of the pairs, which is in the cache, unless weights are to come.
+        let running = if sums.variables > 1 {
+            buffers.running.as_mut_ptr().cast()
+        } else {
+            buffers.pairs.as_mut_ptr().cast()
+        };
+        // The j-particle gets minus the quad, so the weight in it is negative.
+        scatter_quads::<I, A>(to, quads, quads, running, [1.0, 1.0, 1.0, -1.0], batch.into());
+    }
+}
+
+/// Adds `i_quads` times `sign` to the i-particles of pairs, minus `quads` to the j-particles.
+///
+/// # Safety
+/// The contract of `simd`. The accumulators have both particles of each pair; there is room for a quad and a running sum
+/// behind the last pair.
+#[inline(always)]
+pub unsafe fn scatter_quads<I: Isa, A: Arithmetic<I>>(
+    to: PlaneAccumulators,
+    quads: *mut A::Scalar,
+    i_quads: *mut A::Scalar,
+    running: *mut f64,
+    sign: [f64; 4],
+    pairs: ScatterPairs,
+) {
+    // SAFETY: the caller upholds it.
+    unsafe {
+        let sign = I::Quad::load(sign.as_ptr());
+        let ScatterPairs { j_offsets, begin, first, members } = pairs;
+        // One loop over all pairs instead of one for each i-particle, whose end the processor would mispredict: what an
+        // i-particle gets is the difference of two running sums, of which every other one is stored. Behind an odd number
+        // of pairs follows a zero.
+        let zeroth = *begin as usize;
+        let count = *begin.add(members) as usize - zeroth;
+        quads.add(4 * count).cast::<[A::Scalar; 4]>().write([A::Scalar::default(); 4]);
+        i_quads.add(4 * count).cast::<[A::Scalar; 4]>().write([A::Scalar::default(); 4]);
+        let mut sum = I::Quad::zero();
+        let mut p = 0;
+        while p < count {
+            sum.store(running.add(2 * p));
+            let one = A::load_quad(quads.add(4 * p));
+            let at = to.at(*j_offsets.add(p) as usize);
+            I::Quad::load(at).sub(one).store(at);
+            let next = A::load_quad(quads.add(4 * p + 4));
+            let at = to.at(*j_offsets.add(p + 1) as usize);
+            I::Quad::load(at).sub(next).store(at);
+            let two = if i_quads == quads {
+                one.add(next)
+            } else {
+                A::load_quad(i_quads.add(4 * p)).add(A::load_quad(i_quads.add(4 * p + 4)))
+            };
+            sum = sum.add(two);
+            p += 2;
+        }
+        sum.store(running.add(2 * p));
+        let mut before = I::Quad::zero();
+        let mut m = 0;
+        while m < members {
+            let end = *begin.add(m + 1) as usize - zeroth;
+            let even = end & !1;
+            let odd = A::load_quad(i_quads.add(4 * even)).mul(I::Quad::splat((end & 1) as f64));
+            let all = I::Quad::load(running.add(2 * even)).add(odd);
+            add_quad(to.at((first + m) << OFFSET_BITS), all.sub(before).mul(sign));
+            before = all;
+            m += 1;
+        }
+    }
+}
+
+/// Adds a quad to an accumulator.
+///
+/// # Safety
+/// The contract of `simd`.
+#[inline(always)]
+pub unsafe fn add_quad<Q: Quad>(p: *mut f64, x: Q) {
+    // SAFETY: the caller upholds it.
+    unsafe { Q::load(p).add(x).store(p) }
+}
+
+/// Where the weights of one variable come from.
+#[derive(Clone, Copy)]
+struct WeightSource<T> {
+    /// The weights of its density, negative.
+    weights: *const T,
+    /// Tables over pairs of species: 1 where the i-particle, or the j-particle, is of the variable's species.
+    is_species: [*const T; 2],
+}
+
+/// Adds weights where there are several variables: one for each density and species of the other particle, four of them in
+/// a quad.
+///
+/// # Safety
+/// As [`scatter_forces`]; the buffers hold the weights of the batch.
+#[inline(always)]
+pub unsafe fn scatter_weights<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool>(
+    inputs: &PairInputs<A::Scalar, impl PackedParticle>,
+    sums: PlaneSums,
+    buffers: &mut BatchBuffers<A::Scalar>,
+    batch: Batch,
+) {
+    // SAFETY: as `scatter_forces`; weights and pairs of species are there in whole vectors.
+    unsafe {
+        let terms = inputs.terms;
+        let quads = buffers.quads.as_mut_ptr().cast::<A::Scalar>();
+        let i_quads = if MULTISPECIES { buffers.i_quads.as_mut_ptr().cast() } else { quads };
+        let vectors = batch.count.div_ceil(A::Reals::LANES);
+        let pairs = buffers.pairs.as_ptr().cast::<PairVector<A::Reals>>();
+        let fits_vector = terms.species * terms.species <= A::Reals::LANES;
+        let zero = A::Reals::constant(0.0);
+        let mut quad = 0;
+        while quad < sums.density_quads() {
+            let variables = 4.min(sums.variables - 4 * quad);
+            let none = WeightSource { weights: std::ptr::null(), is_species: [std::ptr::null(); 2] };
+            let mut sources = [none; 4];
+            let mut c = 0;
+            while c < 4 {
+                // Behind the last variable, repeat it.
+                let variable = 4 * quad + c.min(variables - 1);
+                let [is_i, is_j] = terms.is_species.get_unchecked(variable % terms.species);
+                sources[c].is_species = [is_i.as_ptr(), is_j.as_ptr()];
+                sources[c].weights = buffers.kernel_weights.get_unchecked(variable / terms.species).as_ptr();
+                c += 1;
+            }
+            let mut v = 0;
+            while v < vectors {
+                let k = v * A::Reals::LANES;
+                let (mut to_j, mut to_i) = ([zero; 4], [zero; 4]);
+                let mut c = 0;
+                while c < 4 {
+                    if c < variables {
+                        let weight = A::Reals::load(sources[c].weights.add(k));
+                        to_j[c] = weight;
+                        if MULTISPECIES {
+                            let species_pair = (*pairs.add(v)).species_pair.0;
+                            let [is_i, is_j] = sources[c].is_species;
+                            let is_i = table_entry::<A::Reals>(is_i, species_pair, fits_vector);
+                            let is_j = table_entry::<A::Reals>(is_j, species_pair, fits_vector);
+                            to_j[c] = weight * is_i;
+                            to_i[c] = weight * is_j;
+                        }
+                    }
+                    c += 1;
+                }
+                A::Reals::store_transposed(to_j, quads.add(4 * k));
+                if MULTISPECIES {
+                    A::Reals::store_transposed(to_i, i_quads.add(4 * k));
+                }
+                v += 1;
+            }
+            // Weights are negative, so both particles get minus a quad.
+            let to = sums.densities(quad);
+            let running = buffers.running.as_mut_ptr().cast();
+            scatter_quads::<I, A>(to, quads, i_quads, running, [-1.0; 4], batch.into());
+            quad += 1;
+        }
+    }
+}

@@ -1,0 +1,165 @@
+//! Random and dissipative forces of pairs.
+
+use crate::ground::arithmetic::PairVector;
+use crate::ground::species_pairs::{SpeciesPairTable, TableLookup};
+use crate::ground::terms::{Exponent, ThermostatTables};
+use crate::noise::{PAIR_ROUNDS, PARITY, PairNoise, ROTATIONS};
+use crate::simd::{Reals, Scalar, Words};
+
+/// `√3/2³¹`: turns signed words into numbers of unit variance.
+pub const NOISE_UNIT: f64 = 1.732_050_807_568_877_2 / 2_147_483_648.0;
+
+const _: () = assert!(PAIR_ROUNDS == 13);
+
+/// Draws a word of noise for each of `count` pairs: Threefry2x32 of their two tags in ascending order. The words replace the
+/// first tags.
+///
+/// # Safety
+/// The contract of `simd`. Both arrays have room for two vectors behind the last pair.
+#[inline(always)]
+pub unsafe fn draw<W: Words>(noise: PairNoise, a: *mut u32, b: *const u32, count: usize) {
+    // SAFETY: the caller upholds it.
+    unsafe {
+        let [k0, k1] = noise.key();
+        let schedule = [W::splat(k0), W::splat(k1), W::splat(PARITY ^ k0 ^ k1)];
+        let mut k = 0;
+        while k < count {
+            // Two vectors in turn: each hides the latency of the other.
+            let (a0, b0) = (W::load(a.add(k)), W::load(b.add(k)));
+            let (a1, b1) = (W::load(a.add(k + W::LANES)), W::load(b.add(k + W::LANES)));
+            let mut x0 = [a0.min(b0).add(schedule[0]), a1.min(b1).add(schedule[0])];
+            let mut x1 = [a0.max(b0).add(schedule[1]), a1.max(b1).add(schedule[1])];
+            // Unrolled: rotations by constants take one instruction.
+            (x0, x1) = four_rounds(x0, x1, 0);
+            (x0, x1) = inject(x0, x1, &schedule, 1);
+            (x0, x1) = four_rounds(x0, x1, 4);
+            (x0, x1) = inject(x0, x1, &schedule, 2);
+            (x0, x1) = four_rounds(x0, x1, 0);
+            (x0, x1) = inject(x0, x1, &schedule, 3);
+            // Only the first word of the last round is used.
+            let sign = W::splat(0x8000_0000);
+            x0[0].add(x1[0]).xor(sign).store(a.add(k));
+            x0[1].add(x1[1]).xor(sign).store(a.add(k + W::LANES));
+            k += 2 * W::LANES;
+        }
+    }
+}
+
+/// Four rounds of Threefry, with rotations from number `at` on.
+#[inline(always)]
+unsafe fn four_rounds<W: Words>(x0: [W; 2], x1: [W; 2], at: usize) -> ([W; 2], [W; 2]) {
+    // SAFETY: called by `draw` alone, whose caller upholds the contract of `simd`.
+    unsafe {
+        let (x0, x1) = round(x0, x1, ROTATIONS[at]);
+        let (x0, x1) = round(x0, x1, ROTATIONS[at + 1]);
+        let (x0, x1) = round(x0, x1, ROTATIONS[at + 2]);
+        round(x0, x1, ROTATIONS[at + 3])
+    }
+}
+
+#[inline(always)]
+unsafe fn round<W: Words>([a0, b0]: [W; 2], [a1, b1]: [W; 2], by: u32) -> ([W; 2], [W; 2]) {
+    // SAFETY: called by `draw` alone, whose caller upholds the contract of `simd`.
+    unsafe {
+        let x0 = [a0.add(a1), b0.add(b1)];
+        let turned = [a1.rotate(by), b1.rotate(by)];
+        (x0, [turned[0].xor(x0[0]), turned[1].xor(x0[1])])
+    }
+}
+
+/// Adds the key after four rounds.
+#[inline(always)]
+unsafe fn inject<W: Words>(x0: [W; 2], x1: [W; 2], schedule: &[W; 3], number: usize) -> ([W; 2], [W; 2]) {
+    // SAFETY: called by `draw` alone, whose caller upholds the contract of `simd`.
+    unsafe {
+        let first = schedule[number % 3];
+        let second = schedule[(number + 1) % 3].add(W::splat(number as u32));
+        ([x0[0].add(first), x0[1].add(first)], [x1[0].add(second), x1[1].add(second)])
+    }
+}
+
+/// The tables of the thermostat, prepared for a loop over pairs.
+pub struct ThermostatForce<'a, R: Reals> {
+    gamma: TableLookup<R>,
+    sigma: TableLookup<R>,
+    inverse_range: TableLookup<R>,
+    exponent: Power<'a, R::Scalar>,
+    /// Signed words of noise times this are `ξ dt^{−1/2}`.
+    noise_scale: R,
+}
+
+/// The exponent of `w_R`, the power of `1 − r/R`.
+enum Power<'a, T> {
+    One,
+    Two,
+    Any(&'a SpeciesPairTable<T>),
+}
+
+impl<'a, R: Reals> ThermostatForce<'a, R> {
+    /// # Safety
+    /// The contract of `simd`.
+    #[inline(always)]
+    pub unsafe fn new(tables: &'a ThermostatTables<R::Scalar>, noise_scale: R) -> Self {
+        // SAFETY: the caller upholds it.
+        unsafe {
+            ThermostatForce {
+                gamma: TableLookup::new(&tables.gamma),
+                sigma: TableLookup::new(&tables.sigma),
+                inverse_range: TableLookup::new(&tables.inverse_range),
+                exponent: match &tables.exponent {
+                    Exponent::One => Power::One,
+                    Exponent::Two => Power::Two,
+                    Exponent::Any(table) => Power::Any(table),
+                },
+                noise_scale,
+            }
+        }
+    }
+
+    /// `−γ w_R² (ê·v) + σ w_R ξ dt^{−1/2}`; `ξ` from a word of noise.
+    ///
+    /// # Safety
+    /// The contract of `simd`.
+    #[inline(always)]
+    pub unsafe fn force<const MULTISPECIES: bool>(&self, pairs: &PairVector<R>, word: R::Words) -> R {
+        // SAFETY: the caller upholds it.
+        unsafe {
+            let (one, zero) = (R::constant(1.0), R::constant(0.0));
+            let species_pair = pairs.species_pair;
+            let t = (one - pairs.geometry.r * self.inverse_range.lookup::<MULTISPECIES>(species_pair))
+                .larger(zero);
+            let w = match self.exponent {
+                Power::One => t,
+                Power::Two => t * t,
+                Power::Any(exponent) => {
+                    power(t, TableLookup::<R>::new(exponent).lookup::<MULTISPECIES>(species_pair))
+                }
+            };
+            let xi = (R::of_signed(word) + R::constant(0.5))
+                * (self.noise_scale * self.sigma.lookup::<MULTISPECIES>(species_pair));
+            w * (xi - self.gamma.lookup::<MULTISPECIES>(species_pair) * w * pairs.geometry.radial_velocity)
+        }
+    }
+}
+
+/// `t^e` for positive `t`, else zero: the library function, lane by lane.
+#[inline(always)]
+unsafe fn power<R: Reals>(t: R, exponent: R) -> R {
+    let (mut bases, mut exponents) = ([R::Scalar::default(); 16], [R::Scalar::default(); 16]);
+    // SAFETY: no vector has more lanes.
+    unsafe {
+        t.store(bases.as_mut_ptr());
+        exponent.store(exponents.as_mut_ptr());
+    }
+    powers(&mut bases[..R::LANES], &exponents);
+    // SAFETY: no vector has more than sixteen lanes.
+    unsafe { R::load(bases.as_ptr()) }
+}
+
+#[inline(never)]
+fn powers<T: Scalar>(bases: &mut [T], exponents: &[T]) {
+    for (t, e) in bases.iter_mut().zip(exponents) {
+        let base = t.wide();
+        *t = T::of(if base > 0.0 { base.powf(e.wide()) } else { 0.0 });
+    }
+}

@@ -1,0 +1,293 @@
+//! In which cells an i-particle looks for partners: those within the cutoff sphere, column by column.
+
+use super::clusters::SEARCH_GROUP;
+use crate::cells::sorted::SortedCells;
+use crate::ground::box_geometry::BoxGeometry;
+use crate::simd::{Isa, Reals};
+use psidpd_model::kernel::Real;
+
+/// The five columns of the half stencil: the particle's own, the next of its plane, three of the next plane.
+pub struct StencilColumns {
+    /// The number of the particle's own column in its plane.
+    number: usize,
+    /// For each column a pointer to the first particles of its cells.
+    pub start: [*const u32; 5],
+    /// 1 for columns that exist, 0 for those beyond an open side.
+    present: [f32; 5],
+    /// Added to positions there in the period before, the same and the next one along x: entry `w + 5 (period + 1)` for
+    /// column `w`.
+    pub shift: [[u32; 3]; 15],
+    /// Whether a column lies across a period in the direction of `column_axis`.
+    pub wraps: bool,
+    /// The owned particles of each column: the first, and one past the last.
+    pub owned: [[u32; 2]; 5],
+    /// Whether the particle's own column has ghosts.
+    pub with_ghosts: bool,
+}
+
+impl StencilColumns {
+    pub fn new(cells: &SortedCells, search: &PlaneSearch, plane: usize, column: usize) -> StencilColumns {
+        let (geometry, grid) = (cells.geometry, cells.grid);
+        let own = &cells.start[cells.first_cell(plane, column)..];
+        let mut stencil = StencilColumns {
+            number: column,
+            start: [own.as_ptr(); 5],
+            present: [0.0; 5],
+            shift: [[0; 3]; 15],
+            wraps: false,
+            owned: [[0; 2]; 5],
+            with_ghosts: false,
+        };
+        let columns = grid.columns_per_plane as i64;
+        let neighbours = [(0, 0), (1, 0), (-1, 1), (0, 1), (1, 1)];
+        for (w, (across, up)) in neighbours.into_iter().enumerate() {
+            let (mut to, above) = (column as i64 + across, plane + up);
+            let mut wrap = 0;
+            let mut present = true;
+            if to < 0 || to >= columns {
+                // In two dimensions a plane is one column and has no neighbours beside it.
+                present = geometry.periodic[grid.column_axis] && geometry.dimensions == 3;
+                wrap = to.div_euclid(columns);
+                to = to.rem_euclid(columns);
+            }
+            if above >= grid.planes {
+                // The copy of the first plane.
+                present &= geometry.periodic[grid.plane_axis];
+            }
+            if !present {
+                continue;
+            }
+            stencil.present[w] = 1.0;
+            stencil.wraps |= wrap != 0;
+            let cell = cells.first_cell(above, to as usize);
+            stencil.start[w] = cells.start[cell..].as_ptr();
+            if let Some(owned) = cells.ghosts.owned_of_column.get(cell / grid.cells_per_column) {
+                stencil.owned[w] = owned.range;
+                stencil.with_ghosts |= w == 0 && owned.with_ghosts;
+            }
+            for period in 0..3 {
+                stencil.shift[w + 5 * period] = search.shift[(wrap + 1) as usize][period];
+            }
+        }
+        stencil
+    }
+
+    /// Whether all particles of the five columns are ghosts: then none of their pairs counts on this rank.
+    pub fn only_ghosts(&self) -> bool {
+        self.owned.iter().all(|[first, end]| first == end)
+    }
+}
+
+/// A cell for each stencil column and i-particle of a search group.
+pub type CellIndices = [[i32; SEARCH_GROUP]; 5];
+
+/// Cell ranges of a search group.
+#[derive(Default)]
+pub struct CellRanges {
+    /// The first cell, and one past the last.
+    pub low: CellIndices,
+    pub end: CellIndices,
+    /// Ranges that cross a period along x: from here to the end of the column in the period before, and from the
+    /// beginning of the column to here in the next one.
+    pub before: CellIndices,
+    pub after: CellIndices,
+}
+
+/// What the cell ranges of a search group look like.
+#[derive(Clone, Copy, Default)]
+pub struct RangeFlags {
+    /// i-particles whose ranges continue in the period before, and in the next: one bit each.
+    pub before: u32,
+    pub after: u32,
+    /// Vectors of i-particles whose ranges are already those of whole i-clusters: one bit each.
+    pub together: u32,
+}
+
+/// Up to [`SEARCH_GROUP`] i-particles of one column, with their cell ranges.
+pub struct SearchGroup<'a> {
+    pub plane: &'a PlaneSearch,
+    pub stencil: &'a StencilColumns,
+    pub flags: RangeFlags,
+    /// The first i-particle, and how many.
+    pub first: usize,
+    pub count: usize,
+}
+
+/// Constants of the search in one plane.
+pub struct PlaneSearch {
+    cutoff_squared: f32,
+    column_width: f32,
+    /// Where the next plane begins.
+    plane_edge: f32,
+    /// The search cutoff along x, in cells.
+    half_range: f32,
+    cells_per_length: f32,
+    periodic: bool,
+    tilted: bool,
+    pub cells_per_column: i32,
+    /// Particles of an i-cluster are no further apart along x.
+    pub i_cluster_extent: f32,
+    /// Periodic shifts in 16-bit fixed point, doubled in both halves of a word: one period back, none and one ahead along
+    /// `column_axis`, and for each of these the same along x.
+    shift: [[[u32; 3]; 3]; 3],
+}
+
+impl PlaneSearch {
+    #[inline(always)]
+    pub fn new(cells: &SortedCells, plane: usize) -> PlaneSearch {
+        let (geometry, grid, scale) = (cells.geometry, cells.grid, cells.fixed16_scale);
+        let plane_width = geometry.height(grid.plane_axis) / grid.planes as f64;
+        let cells_per_length = grid.cells_per_column as f64 / geometry.length[0];
+        PlaneSearch {
+            cutoff_squared: (grid.search_cutoff * grid.search_cutoff) as f32,
+            column_width: (geometry.height(grid.column_axis) / grid.columns_per_plane as f64) as f32,
+            plane_edge: ((plane + 1) as f64 * plane_width) as f32,
+            half_range: (grid.range_half_width * grid.cells_per_column as f64) as f32,
+            cells_per_length: cells_per_length as f32,
+            periodic: geometry.periodic[0],
+            tilted: geometry.is_tilted(),
+            cells_per_column: grid.cells_per_column as i32,
+            i_cluster_extent: (grid.i_cluster_extent * geometry.length[0] / grid.cells_per_column as f64)
+                as f32,
+            shift: [-1.0, 0.0, 1.0].map(|wrap| {
+                [-geometry.length[0], 0.0, geometry.length[0]].map(|along| {
+                    let [x, y, z] = geometry.edge(grid.column_axis).map(|e| wrap * e);
+                    [x + along, y, z].map(|shift| 0x1_0001 * u32::from(scale.shift(shift)))
+                })
+            }),
+        }
+    }
+
+    /// Finds the cell ranges of `count` i-particles from `first` on, in i-clusters of `CLUSTER`.
+    ///
+    /// # Safety
+    /// The contract of `simd`. The particles are of one column of this plane, at most [`SEARCH_GROUP`] of them.
+    #[inline(always)]
+    pub unsafe fn cell_ranges<I: Isa, const CLUSTER: usize>(
+        &self,
+        cells: &SortedCells,
+        stencil: &StencilColumns,
+        [first, count]: [usize; 2],
+        out: &mut CellRanges,
+    ) -> RangeFlags {
+        // SAFETY: the particles exist; vectors that reach beyond the last one are loaded from `lanes`.
+        unsafe {
+            let mut flags = RangeFlags::default();
+            let mut at = 0;
+            while at < count {
+                let mut x = cells.x.map(|x| x.as_ptr().add(first + at));
+                let left = count - at;
+                let mut lanes = [[0.0; 16]; 3];
+                if left < I::F32::LANES {
+                    // Repeat the last particle.
+                    for c in 0..3 {
+                        lanes[c] = [*x[c].add(left - 1); 16];
+                        std::ptr::copy_nonoverlapping(x[c], lanes[c].as_mut_ptr(), left);
+                        x[c] = lanes[c].as_ptr();
+                    }
+                }
+                let x = [I::F32::load(x[0]), I::F32::load(x[1]), I::F32::load(x[2])];
+                self.ranges_of_vector::<I, CLUSTER>(cells, stencil, x, at, out, &mut flags);
+                at += I::F32::LANES;
+            }
+            flags
+        }
+    }
+
+    /// Finds the cell ranges of a vector of i-particles at `x`, `y`, `z`: those of the group from `at` on.
+    ///
+    /// # Safety
+    /// The contract of `simd`. `at` is a multiple of the lanes below [`SEARCH_GROUP`].
+    #[inline(always)]
+    unsafe fn ranges_of_vector<I: Isa, const CLUSTER: usize>(
+        &self,
+        cells: &SortedCells,
+        stencil: &StencilColumns,
+        [x, y, z]: [I::F32; 3],
+        at: usize,
+        out: &mut CellRanges,
+        flags: &mut RangeFlags,
+    ) {
+        // SAFETY: lanes divide `SEARCH_GROUP`, so that a vector from `at` on is inside the arrays of `out`.
+        unsafe {
+            let zero = I::F32::constant(0.0);
+            let longest = I::F32::splat(self.half_range);
+            let mut half_range = [longest; 5];
+            let mut cell = x * I::F32::splat(self.cells_per_length);
+            if self.tilted {
+                cell = fraction_along::<I>(cells.geometry, x, y, z)
+                    * I::F32::constant(self.cells_per_column as f64);
+            } else {
+                // Half the extent of the cutoff sphere within each column.
+                let (across, up) = if cells.grid.column_axis == 1 { (y, z) } else { (z, y) };
+                let low_edge = I::F32::splat(stencil.number as f32 * self.column_width);
+                let high_edge = I::F32::splat((stencil.number + 1) as f32 * self.column_width);
+                let below = (across - low_edge).larger(zero);
+                let above = (high_edge - across).larger(zero);
+                let over = (I::F32::splat(self.plane_edge) - up).larger(zero);
+                let (below, above) = (below * below, above * above);
+                let all = I::F32::splat(self.cutoff_squared);
+                let left = all - over * over;
+                let cells_per_length = I::F32::splat(self.cells_per_length);
+                half_range[1] = I::root_or_more(all - above) * cells_per_length;
+                half_range[2] = I::root_or_more(left - below) * cells_per_length;
+                half_range[3] = I::root_or_more(left) * cells_per_length;
+                half_range[4] = I::root_or_more(left - above) * cells_per_length;
+            }
+            let most = I::F32::constant(self.cells_per_column as f64);
+            let one = I::F32::constant(1.0);
+            let [mut before, mut after] = [0; 2];
+            if self.periodic {
+                // The particle's own column has the longest range.
+                before = (cell - half_range[0]).mask_below(zero);
+                after = (most - one).mask_below(cell + half_range[0]);
+            }
+            // Merge the ranges of each i-cluster here if all clusters of the vector are compact.
+            let first = I::cluster_first::<CLUSTER>(x);
+            let far = I::F32::splat(self.i_cluster_extent);
+            let close = (x - first).mask_below(far) & (first - x).mask_below(far);
+            let together = close.trailing_ones() as usize >= I::F32::LANES;
+            let mut w = 0;
+            while w < 5 {
+                // Missing columns get an empty range.
+                let h = *half_range.get_unchecked(w) * I::F32::splat(*stencil.present.get_unchecked(w));
+                let (mut low, mut end) = (cell - h, cell + h + one);
+                end = end.where_below(zero, h);
+                if together {
+                    (low, end) = (I::cluster_least::<CLUSTER>(low), I::cluster_greatest::<CLUSTER>(end));
+                }
+                if before != 0 {
+                    let low = (low + most).smaller(most);
+                    low.store_whole(out.before.get_unchecked_mut(w).as_mut_ptr().add(at));
+                }
+                if after != 0 {
+                    let over = (end - most).larger(zero);
+                    over.store_whole(out.after.get_unchecked_mut(w).as_mut_ptr().add(at));
+                }
+                let low = low.larger(zero).smaller(most);
+                low.store_whole(out.low.get_unchecked_mut(w).as_mut_ptr().add(at));
+                end.smaller(most).store_whole(out.end.get_unchecked_mut(w).as_mut_ptr().add(at));
+                w += 1;
+            }
+            flags.before |= before << at;
+            flags.after |= after << at;
+            flags.together |= (together as u32) << (at / I::F32::LANES);
+        }
+    }
+}
+
+/// Fractional coordinates along the first edge.
+///
+/// # Safety
+/// The contract of `simd`.
+#[inline(always)]
+unsafe fn fraction_along<I: Isa>(geometry: &BoxGeometry, x: I::F32, y: I::F32, z: I::F32) -> I::F32 {
+    let sz = if geometry.dimensions == 3 {
+        z * I::F32::constant(1.0 / geometry.length[2])
+    } else {
+        I::F32::constant(0.0)
+    };
+    let sy = (y - I::F32::constant(geometry.tilt[2]) * sz) * I::F32::constant(1.0 / geometry.length[1]);
+    let along = x - I::F32::constant(geometry.tilt[0]) * sy - I::F32::constant(geometry.tilt[1]) * sz;
+    along * I::F32::constant(1.0 / geometry.length[0])
+}

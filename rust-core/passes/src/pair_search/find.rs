@@ -1,0 +1,70 @@
+//! The three steps of the search, one after the other.
+
+use super::buffers::SearchBuffers;
+use super::cell_ranges::{CellRanges, PlaneSearch, SearchGroup, StencilColumns};
+use super::clusters::SEARCH_GROUP;
+use super::distance_filter::filter_by_distance;
+use super::j_clusters::form_j_clusters;
+use crate::cells::ghosts::MOST_OF_ANY;
+use crate::cells::sorted::SortedCells;
+use crate::simd::{Isa, Kernel};
+
+const _: () = assert!(SEARCH_GROUP <= MOST_OF_ANY);
+
+/// Lists the pairs of a search group: of `count` i-particles of a column from `first` on.
+pub struct FindPairs<'a> {
+    pub cells: &'a SortedCells<'a>,
+    pub plane: &'a PlaneSearch,
+    pub stencil: &'a StencilColumns,
+    pub ranges: &'a mut CellRanges,
+    /// `first` and `count`.
+    pub group: [usize; 2],
+    /// i-particles of a batch.
+    pub batch_size: usize,
+    pub buffers: &'a mut SearchBuffers,
+}
+
+impl Kernel for FindPairs<'_> {
+    type Out = ();
+
+    /// # Safety
+    /// The contract of `simd`. The particles are of the column.
+    #[inline(always)]
+    unsafe fn run<I: Isa>(self) {
+        // SAFETY: what `in_clusters` asks for is promised to this function.
+        unsafe {
+            match self.cells.grid.i_cluster_size {
+                8 => self.in_clusters::<I, 8>(),
+                _ => self.in_clusters::<I, 4>(),
+            }
+        }
+    }
+}
+
+impl FindPairs<'_> {
+    /// In i-clusters of `CLUSTER`.
+    ///
+    /// # Safety
+    /// As [`FindPairs::run`].
+    #[inline(always)]
+    unsafe fn in_clusters<I: Isa, const CLUSTER: usize>(self) {
+        let FindPairs { cells, plane, stencil, ranges, group: [first, count], batch_size, buffers } = self;
+        // SAFETY: the caller upholds the contract of `simd`; the group is not longer than `SEARCH_GROUP`, for which ranges
+        // and buffers have room.
+        unsafe {
+            let flags = plane.cell_ranges::<I, CLUSTER>(cells, stencil, [first, count], ranges);
+            let group = SearchGroup { plane, stencil, flags, first, count };
+            // Ghost masks are applied only to groups that contain ghosts: owned particles pair with every candidate.
+            if stencil.with_ghosts && cells.ghosts.any_of([first, count]) {
+                form_j_clusters::<I, true, CLUSTER>(cells, &group, ranges, buffers);
+            } else {
+                form_j_clusters::<I, false, CLUSTER>(cells, &group, ranges, buffers);
+            }
+            if stencil.wraps || flags.before | flags.after != 0 {
+                filter_by_distance::<I, true, CLUSTER>(cells, &group, batch_size, buffers);
+            } else {
+                filter_by_distance::<I, false, CLUSTER>(cells, &group, batch_size, buffers);
+            }
+        }
+    }
+}

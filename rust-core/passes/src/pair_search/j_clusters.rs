@@ -1,0 +1,291 @@
+//! Cuts the cell ranges of i-clusters into j-clusters of sixteen candidates, with a bit for each candidate that a pair may
+//! be formed with.
+
+use super::buffers::SearchBuffers;
+use super::cell_ranges::{CellIndices, CellRanges, SearchGroup};
+use super::clusters::{I_PER_MASK, ICluster, JCluster, MASKS_PER_CLUSTER, SLOT_BLOCK};
+use crate::cells::sorted::SortedCells;
+use crate::simd::{Isa, Reals};
+
+/// Forms the i-clusters and j-clusters of a search group. Up to `CLUSTER` consecutive particles form an i-cluster.
+///
+/// # Safety
+/// The contract of `simd`. `ranges` are those of the group, found with the same `CLUSTER`.
+#[inline(always)]
+pub unsafe fn form_j_clusters<I: Isa, const GHOSTS: bool, const CLUSTER: usize>(
+    cells: &SortedCells,
+    group: &SearchGroup,
+    ranges: &mut CellRanges,
+    buffers: &mut SearchBuffers,
+) {
+    // SAFETY: cells of the ranges are of the column, or one past its last (`ranges_of_vector` clamps them), so `start` has
+    // them; a group has no more than `SEARCH_GROUP` i-clusters.
+    unsafe {
+        let SearchGroup { plane, stencil, count, flags, .. } = *group;
+        let mut found = 0;
+        let mut clusters = 0;
+        let mut slot_blocks = 0;
+        let mut a = 0;
+        while a < count {
+            let mut size = CLUSTER.min(count - a);
+            if flags.together >> (a / I::F32::LANES) & 1 == 0 {
+                // Ranges in other vectors may be merged already: end the cluster with this vector.
+                size = size.min(I::F32::LANES - a % I::F32::LANES);
+                let x = std::slice::from_raw_parts(cells.x[0].at(group.first + a), size);
+                size = merge_ranges(x, plane.i_cluster_extent, ranges, a);
+            }
+            let begin = found;
+            let masks = ClusterMasks {
+                slots: (SLOT_BLOCK * slot_blocks).wrapping_sub(found),
+                members: *MEMBERS.get_unchecked(size),
+                ghosts: match GHOSTS {
+                    true => {
+                        let flags = cells.ghosts.flags.as_ptr().add(group.first + a);
+                        // SAFETY: `SortedParticles::make_room` pads the flags by a vector.
+                        ghost_mask(flags.cast::<u64>().read_unaligned())
+                    }
+                    false => [0; MASKS_PER_CLUSTER],
+                },
+            };
+            // In its own column a particle pairs with those behind it.
+            let start = *stencil.start.get_unchecked(0);
+            let range = [(group.first + a + 1) as u32, *start.add(cell_of(&ranges.end, 0, a))];
+            found = append_range::<GHOSTS, CLUSTER, true>(cells, group, buffers, found, range, 5, &masks);
+            let mut w = 1;
+            while w < 5 {
+                let start = *stencil.start.get_unchecked(w);
+                let range = [*start.add(cell_of(&ranges.low, w, a)), *start.add(cell_of(&ranges.end, w, a))];
+                found = append_range::<GHOSTS, CLUSTER, false>(
+                    cells,
+                    group,
+                    buffers,
+                    found,
+                    range,
+                    w + 5,
+                    &masks,
+                );
+                w += 1;
+            }
+            // Ranges that continue in the period before, and in the next.
+            let bits = (1u32 << size) - 1;
+            if flags.before >> a & bits != 0 {
+                let mut w = 1;
+                while w < 5 {
+                    let start = *stencil.start.get_unchecked(w);
+                    let end = *start.add(plane.cells_per_column as usize);
+                    let range = [*start.add(cell_of(&ranges.before, w, a)), end];
+                    found = append_range::<GHOSTS, CLUSTER, false>(
+                        cells, group, buffers, found, range, w, &masks,
+                    );
+                    w += 1;
+                }
+            }
+            if flags.after >> a & bits != 0 {
+                let mut w = 0;
+                while w < 5 {
+                    let start = *stencil.start.get_unchecked(w);
+                    let range = [*start, *start.add(cell_of(&ranges.after, w, a))];
+                    found = append_range::<GHOSTS, CLUSTER, false>(
+                        cells,
+                        group,
+                        buffers,
+                        found,
+                        range,
+                        w + 10,
+                        &masks,
+                    );
+                    w += 1;
+                }
+            }
+            // Every i-cluster has at least one j-cluster.
+            let next = slot_blocks + (found - begin).div_ceil(SLOT_BLOCK);
+            *buffers.i_clusters.get_unchecked_mut(clusters) =
+                ICluster { first: a as u8, size: size as u8, slot_blocks: [slot_blocks as u32, next as u32] };
+            slot_blocks = next;
+            clusters += 1;
+            a += size;
+        }
+        buffers.i_cluster_count = clusters;
+        buffers.j_cluster_count = found;
+    }
+}
+
+/// The cell of i-particle `a` in stencil column `w`.
+///
+/// # Safety
+/// `w` is below 5, `a` below the size of a search group.
+#[inline(always)]
+unsafe fn cell_of(indices: &CellIndices, w: usize, a: usize) -> usize {
+    // SAFETY: the caller upholds the bounds.
+    unsafe { *indices.get_unchecked(w).get_unchecked(a) as usize }
+}
+
+/// Shortens an i-cluster to the particles at `x` that are near enough to the first one, `a`, and merges their cell ranges
+/// into those of `a`. Returns how many there are.
+#[cold]
+#[inline(never)]
+fn merge_ranges(x: &[f32], extent: f32, ranges: &mut CellRanges, a: usize) -> usize {
+    let size = x.iter().take_while(|other| (**other - x[0]).abs() <= extent).count().max(1);
+    let all = a..a + size;
+    for w in 0..5 {
+        for lowest in [&mut ranges.low[w], &mut ranges.before[w]] {
+            lowest[a] = lowest[all.clone()].iter().copied().fold(lowest[a], i32::min);
+        }
+        for highest in [&mut ranges.end[w], &mut ranges.after[w]] {
+            highest[a] = highest[all.clone()].iter().copied().fold(highest[a], i32::max);
+        }
+    }
+    size
+}
+
+/// What all j-clusters of an i-cluster share.
+struct ClusterMasks {
+    /// Added to the number of a j-cluster this is its slot; the sum wraps.
+    slots: usize,
+    /// Sixteen set bits for each member of the i-cluster.
+    members: [u64; MASKS_PER_CLUSTER],
+    /// Sixteen set bits for each member that is a ghost.
+    ghosts: [u64; MASKS_PER_CLUSTER],
+}
+
+/// `ClusterMasks::members` for each size of an i-cluster.
+static MEMBERS: [[u64; MASKS_PER_CLUSTER]; MASKS_PER_CLUSTER * I_PER_MASK + 1] = members();
+
+const fn members() -> [[u64; MASKS_PER_CLUSTER]; MASKS_PER_CLUSTER * I_PER_MASK + 1] {
+    let mut table = [[0; MASKS_PER_CLUSTER]; MASKS_PER_CLUSTER * I_PER_MASK + 1];
+    let mut size = 1;
+    while size <= MASKS_PER_CLUSTER * I_PER_MASK {
+        let bits = u128::MAX >> (128 - 16 * size);
+        table[size] = [bits as u64, (bits >> 64) as u64];
+        size += 1;
+    }
+    table
+}
+
+/// Candidate bits of the first `n` of thirty-two particles, for each of four members: in the first j-cluster, and in the
+/// second.
+static FIRST_BITS: [[u64; 2]; 33] = first_bits();
+
+/// Adds one to the slot in `slot_and_shift`.
+const ONE_SLOT: u32 = 1 << 8;
+
+/// The lowest bit of each member.
+const EACH: u64 = 0x0001_0001_0001_0001;
+
+/// In the j-cluster that begins behind the first member, the bits of particles behind each member: every pair is found once.
+const LATER: [u64; MASKS_PER_CLUSTER] = [0xfff8_fffc_fffe_ffff, 0xff80_ffc0_ffe0_fff0];
+
+const fn first_bits() -> [[u64; 2]; 33] {
+    let mut table = [[0; 2]; 33];
+    let mut length = 0;
+    while length <= 32 {
+        let bits = (1u64 << length) - 1;
+        table[length] = [(bits & 0xffff) * EACH, (bits >> 16) * EACH];
+        length += 1;
+    }
+    table
+}
+
+/// Appends the j-clusters of the particles `first..end`, and at least one in the own column; returns how many there are
+/// then. `shift` is the index of the periodic shift, and modulo 5 of the stencil column.
+///
+/// # Safety
+/// Particles up to 16 behind `end` are inside the padding of `SortedParticles::make_room`.
+#[inline(always)]
+unsafe fn append_range<const GHOSTS: bool, const CLUSTER: usize, const OWN_COLUMN: bool>(
+    cells: &SortedCells,
+    group: &SearchGroup,
+    buffers: &mut SearchBuffers,
+    found: usize,
+    [mut first, mut end]: [u32; 2],
+    shift: usize,
+    masks: &ClusterMasks,
+) -> usize {
+    // SAFETY: the buffers always have room for two more j-clusters at each range of a group (`USUAL_J_CLUSTERS`);
+    // `append_long_range` makes room for more than two.
+    unsafe {
+        let mut owned = [[u64::MAX; MASKS_PER_CLUSTER]; 2];
+        if GHOSTS {
+            // Skip ghost–ghost pairs: a cluster of ghosts meets owned particles only.
+            if and(masks.ghosts, masks.members) == masks.members {
+                let [first_owned, end_owned] = *group.stencil.owned.get_unchecked(shift % 5);
+                if !OWN_COLUMN {
+                    first = first.max(first_owned);
+                }
+                end = end.min(end_owned);
+            }
+            let first = first as usize;
+            owned = [first, first + 16]
+                .map(|first| not_both_ghosts(masks.ghosts, cells.ghosts.owned_of_sixteen(first)));
+        }
+        let length = end.saturating_sub(first) as usize;
+        let slot_and_shift = (masks.slots.wrapping_add(found) << 8 | shift) as u32;
+        let members = if OWN_COLUMN { and(masks.members, LATER) } else { masks.members };
+        if length > 32 {
+            return append_long_range(cells, buffers, found, [first, end], members, masks, slot_and_shift);
+        }
+        // Write two j-clusters and count those in use: no branch to predict.
+        let bits = FIRST_BITS.get_unchecked(length).map(|bits| [bits; MASKS_PER_CLUSTER]);
+        let [one, two] = [and(bits[0], and(members, owned[0])), and(bits[1], and(masks.members, owned[1]))];
+        let out = buffers.j_clusters.as_mut_ptr().add(found);
+        *out = JCluster { candidates: one[0], first, slot_and_shift };
+        *out.add(1) =
+            JCluster { candidates: two[0], first: first + 16, slot_and_shift: slot_and_shift + ONE_SLOT };
+        if CLUSTER > I_PER_MASK {
+            let high = buffers.high_candidates.as_mut_ptr().add(found);
+            high.cast::<[u64; 2]>().write_unaligned([one[1], two[1]]);
+        }
+        found + (OWN_COLUMN || length > 0) as usize + (length > 16) as usize
+    }
+}
+
+#[inline(always)]
+fn and(a: [u64; MASKS_PER_CLUSTER], b: [u64; MASKS_PER_CLUSTER]) -> [u64; MASKS_PER_CLUSTER] {
+    std::array::from_fn(|f| a[f] & b[f])
+}
+
+/// Candidate bits of pairs with at least one owned particle; `owned` has a bit for each of the sixteen candidates.
+#[inline(always)]
+fn not_both_ghosts(ghosts: [u64; MASKS_PER_CLUSTER], owned: u32) -> [u64; MASKS_PER_CLUSTER] {
+    let owned = EACH * u64::from(owned);
+    ghosts.map(|ghosts| !ghosts | owned)
+}
+
+/// Sixteen set bits for each ghost of eight particles, from their flags, a byte each.
+#[inline(always)]
+fn ghost_mask(flags: u64) -> [u64; MASKS_PER_CLUSTER] {
+    [flags & 0xffff_ffff, flags >> 32].map(|four| {
+        let spread =
+            four & 0xff | (four & 0xff00) << 8 | (four & 0xff_0000) << 16 | (four & 0xff00_0000) << 24;
+        0xffff * spread
+    })
+}
+
+/// Appends more than two j-clusters; `members` are those of the first one.
+#[cold]
+#[inline(never)]
+fn append_long_range(
+    cells: &SortedCells,
+    buffers: &mut SearchBuffers,
+    mut found: usize,
+    [first, end]: [u32; 2],
+    members: [u64; MASKS_PER_CLUSTER],
+    masks: &ClusterMasks,
+    mut slot_and_shift: u32,
+) -> usize {
+    buffers.reserve_j_clusters(found + (end - first).div_ceil(16) as usize);
+    for begin in (first..end).step_by(16) {
+        let bits = [FIRST_BITS[(end - begin).min(16) as usize][0]; MASKS_PER_CLUSTER];
+        let mut candidates = and(bits, if begin == first { members } else { masks.members });
+        if !cells.ghosts.is_empty() {
+            // SAFETY: `begin` is a particle.
+            let owned = unsafe { cells.ghosts.owned_of_sixteen(begin as usize) };
+            candidates = and(candidates, not_both_ghosts(masks.ghosts, owned));
+        }
+        buffers.j_clusters[found] = JCluster { candidates: candidates[0], first: begin, slot_and_shift };
+        buffers.high_candidates[found] = candidates[1];
+        slot_and_shift += ONE_SLOT;
+        found += 1;
+    }
+    found
+}

@@ -1,0 +1,19 @@
+//! A thread's work space for the first pass.
+
+use crate::pair_batch::buffers::BatchBuffers;
+use crate::pair_search::buffers::SearchBuffers;
+use crate::simd::Scalar;
+
+/// What the search finds, and what a batch is evaluated in.
+#[derive(Debug)]
+pub struct PairBuffers<T> {
+    pub search: SearchBuffers,
+    pub batch: BatchBuffers<T>,
+}
+
+impl<T: Scalar> PairBuffers<T> {
+    /// Buffers for the weights of `passes` densities.
+    pub fn new(passes: usize) -> PairBuffers<T> {
+        PairBuffers { search: SearchBuffers::default(), batch: BatchBuffers::new(passes) }
+    }
+}

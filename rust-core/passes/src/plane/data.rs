@@ -1,0 +1,12 @@
+//! What the passes are given.
+
+use super::slopes::Slopes;
+use crate::cells::sorted::SortedCells;
+use crate::pair_batch::inputs::PairInputs;
+
+/// The arrays of a workspace, as the passes over one plane see them.
+pub struct PassData<'a, T, R> {
+    pub cells: SortedCells<'a>,
+    pub inputs: PairInputs<'a, T, R>,
+    pub slopes: Slopes<'a, T>,
+}

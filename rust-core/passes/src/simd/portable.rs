@@ -1,0 +1,426 @@
+//! Plain arrays, which the compiler vectorises for whatever the target has.
+
+use super::{BroadcastPair, Isa, ORDINARY_F32, ORDINARY_F64, Quad, Reals, Words, record_at, wide_record_at};
+use crate::settings::Instructions;
+use crate::simd::OFFSET_BITS;
+use psidpd_model::kernel::Real;
+use std::ops::{Add, Mul, Sub};
+
+/// No instruction set in particular.
+#[derive(Clone, Copy)]
+pub struct Portable;
+
+const LANES: usize = 8;
+
+/// Eight numbers.
+#[derive(Clone, Copy)]
+pub struct Lanes<T>([T; LANES]);
+
+macro_rules! lanes {
+    ($scalar:ty, $encode:expr) => {
+        impl Add for Lanes<$scalar> {
+            type Output = Self;
+            #[inline(always)]
+            fn add(mut self, other: Self) -> Self {
+                for k in 0..LANES {
+                    self.0[k] += other.0[k];
+                }
+                self
+            }
+        }
+        impl Sub for Lanes<$scalar> {
+            type Output = Self;
+            #[inline(always)]
+            fn sub(mut self, other: Self) -> Self {
+                for k in 0..LANES {
+                    self.0[k] -= other.0[k];
+                }
+                self
+            }
+        }
+        impl Mul for Lanes<$scalar> {
+            type Output = Self;
+            #[inline(always)]
+            fn mul(mut self, other: Self) -> Self {
+                for k in 0..LANES {
+                    self.0[k] *= other.0[k];
+                }
+                self
+            }
+        }
+        impl Real for Lanes<$scalar> {
+            #[inline(always)]
+            fn constant(x: f64) -> Self {
+                Lanes([x as $scalar; LANES])
+            }
+            #[inline(always)]
+            fn larger(mut self, other: Self) -> Self {
+                for k in 0..LANES {
+                    self.0[k] = if self.0[k] > other.0[k] { self.0[k] } else { other.0[k] };
+                }
+                self
+            }
+        }
+
+        impl Reals for Lanes<$scalar> {
+            type Scalar = $scalar;
+            type Words = Lanes<u32>;
+            const LANES: usize = LANES;
+
+            #[inline(always)]
+            unsafe fn splat(x: $scalar) -> Self {
+                Lanes([x; LANES])
+            }
+            #[inline(always)]
+            unsafe fn load(p: *const $scalar) -> Self {
+                Lanes(unsafe { p.cast::<[$scalar; LANES]>().read_unaligned() })
+            }
+            #[inline(always)]
+            unsafe fn store(self, p: *mut $scalar) {
+                unsafe { p.cast::<[$scalar; LANES]>().write_unaligned(self.0) }
+            }
+            #[inline(always)]
+            unsafe fn of_signed(words: Lanes<u32>) -> Self {
+                let mut out = [0.0; LANES];
+                for k in 0..LANES {
+                    out[k] = words.0[k] as i32 as $scalar;
+                }
+                Lanes(out)
+            }
+            #[inline(always)]
+            unsafe fn encode(words: Lanes<u32>) -> Self {
+                Lanes(words.0.map($encode))
+            }
+            #[inline(always)]
+            unsafe fn mul_add(self, a: Self, b: Self) -> Self {
+                self * a + b
+            }
+            #[inline(always)]
+            unsafe fn inverse_root(mut self) -> Self {
+                for k in 0..LANES {
+                    self.0[k] = 1.0 / self.0[k].sqrt();
+                }
+                self
+            }
+            #[inline(always)]
+            unsafe fn smaller(mut self, other: Self) -> Self {
+                for k in 0..LANES {
+                    self.0[k] = if self.0[k] < other.0[k] { self.0[k] } else { other.0[k] };
+                }
+                self
+            }
+            #[inline(always)]
+            unsafe fn store_whole(self, p: *mut i32) {
+                for k in 0..LANES {
+                    // SAFETY: the trait asks for numbers in range.
+                    unsafe { *p.add(k) = self.0[k].to_int_unchecked() };
+                }
+            }
+            #[inline(always)]
+            unsafe fn round(mut self) -> Self {
+                for k in 0..LANES {
+                    // Adding what has no room for a fraction rounds, without a call.
+                    const ROOM: $scalar = 1.5 / <$scalar>::EPSILON;
+                    self.0[k] = (self.0[k] + ROOM) - ROOM;
+                }
+                self
+            }
+            #[inline(always)]
+            unsafe fn where_below(mut self, a: Self, b: Self) -> Self {
+                for k in 0..LANES {
+                    self.0[k] = if a.0[k] < b.0[k] { self.0[k] } else { 0.0 };
+                }
+                self
+            }
+            #[inline(always)]
+            unsafe fn mask_below(self, other: Self) -> u32 {
+                let mut mask = 0;
+                for k in 0..LANES {
+                    mask |= ((self.0[k] < other.0[k]) as u32) << k;
+                }
+                mask
+            }
+            #[inline(always)]
+            unsafe fn compress(self, mask: u32) -> Self {
+                let mut out = [0.0; LANES + 1];
+                let mut place = 0;
+                for k in 0..LANES {
+                    out[place] = self.0[k];
+                    place += (mask >> k & 1) as usize;
+                }
+                let mut first = [0.0; LANES];
+                first.copy_from_slice(&out[..LANES]);
+                Lanes(first)
+            }
+            #[inline(always)]
+            unsafe fn pick(table: *const $scalar, which: Lanes<u32>) -> Self {
+                unsafe { Self::lookup(table, Lanes(which.0.map(|w| w % LANES as u32))) }
+            }
+            #[inline(always)]
+            unsafe fn lookup(table: *const $scalar, index: Lanes<u32>) -> Self {
+                let mut out = [0.0; LANES];
+                for k in 0..LANES {
+                    out[k] = unsafe { *table.add(index.0[k] as usize) };
+                }
+                Lanes(out)
+            }
+            #[inline(always)]
+            unsafe fn store_transposed(load_transposed: [Self; 4], p: *mut $scalar) {
+                for k in 0..LANES {
+                    for c in 0..4 {
+                        unsafe { *p.add(4 * k + c) = load_transposed[c].0[k] };
+                    }
+                }
+            }
+        }
+    };
+}
+
+lanes!(f32, |w: u32| f32::from_bits(w.wrapping_add(ORDINARY_F32)));
+lanes!(f64, |w: u32| f64::from_bits(ORDINARY_F64 | w as u64));
+
+impl Words for Lanes<u32> {
+    const LANES: usize = LANES;
+
+    #[inline(always)]
+    unsafe fn splat(x: u32) -> Self {
+        Lanes([x; LANES])
+    }
+    #[inline(always)]
+    unsafe fn load(p: *const u32) -> Self {
+        Lanes(unsafe { p.cast::<[u32; LANES]>().read_unaligned() })
+    }
+    #[inline(always)]
+    unsafe fn store(self, p: *mut u32) {
+        unsafe { p.cast::<[u32; LANES]>().write_unaligned(self.0) }
+    }
+    #[inline(always)]
+    unsafe fn add(mut self, other: Self) -> Self {
+        for k in 0..LANES {
+            self.0[k] = self.0[k].wrapping_add(other.0[k]);
+        }
+        self
+    }
+    #[inline(always)]
+    unsafe fn sub(mut self, other: Self) -> Self {
+        for k in 0..LANES {
+            self.0[k] = self.0[k].wrapping_sub(other.0[k]);
+        }
+        self
+    }
+    #[inline(always)]
+    unsafe fn xor(mut self, other: Self) -> Self {
+        for k in 0..LANES {
+            self.0[k] ^= other.0[k];
+        }
+        self
+    }
+    #[inline(always)]
+    unsafe fn min(mut self, other: Self) -> Self {
+        for k in 0..LANES {
+            self.0[k] = if self.0[k] < other.0[k] { self.0[k] } else { other.0[k] };
+        }
+        self
+    }
+    #[inline(always)]
+    unsafe fn max(mut self, other: Self) -> Self {
+        for k in 0..LANES {
+            self.0[k] = if self.0[k] > other.0[k] { self.0[k] } else { other.0[k] };
+        }
+        self
+    }
+    #[inline(always)]
+    unsafe fn rotate(mut self, by: u32) -> Self {
+        for k in 0..LANES {
+            self.0[k] = self.0[k].rotate_left(by);
+        }
+        self
+    }
+    #[inline(always)]
+    unsafe fn shift_right<const BY: u32>(self) -> Self {
+        Lanes(self.0.map(|x| x >> BY))
+    }
+    #[inline(always)]
+    unsafe fn load_bytes(p: *const u8) -> Self {
+        Lanes(unsafe { p.cast::<[u8; LANES]>().read_unaligned() }.map(u32::from))
+    }
+    #[inline(always)]
+    unsafe fn pick(table: *const u32, which: Self) -> Self {
+        Lanes(which.0.map(|w| unsafe { *table.add(w as usize) }))
+    }
+}
+
+/// Four numbers.
+#[derive(Clone, Copy)]
+pub struct Four([f64; 4]);
+
+impl Quad for Four {
+    #[inline(always)]
+    unsafe fn zero() -> Self {
+        Four([0.0; 4])
+    }
+    #[inline(always)]
+    unsafe fn splat(x: f64) -> Self {
+        Four([x; 4])
+    }
+    #[inline(always)]
+    unsafe fn load(p: *const f64) -> Self {
+        Four(unsafe { p.cast::<[f64; 4]>().read_unaligned() })
+    }
+    #[inline(always)]
+    unsafe fn store(self, p: *mut f64) {
+        unsafe { p.cast::<[f64; 4]>().write_unaligned(self.0) }
+    }
+    #[inline(always)]
+    unsafe fn add(mut self, other: Self) -> Self {
+        for k in 0..4 {
+            self.0[k] += other.0[k];
+        }
+        self
+    }
+    #[inline(always)]
+    unsafe fn sub(mut self, other: Self) -> Self {
+        for k in 0..4 {
+            self.0[k] -= other.0[k];
+        }
+        self
+    }
+    #[inline(always)]
+    unsafe fn mul(mut self, other: Self) -> Self {
+        for k in 0..4 {
+            self.0[k] *= other.0[k];
+        }
+        self
+    }
+    #[inline(always)]
+    unsafe fn load_f32(p: *const f32) -> Self {
+        let row = unsafe { p.cast::<[f32; 4]>().read_unaligned() };
+        Four([row[0] as f64, row[1] as f64, row[2] as f64, row[3] as f64])
+    }
+}
+
+/// Distances of sixteen particles to a point; bits where their squares are below the limit.
+#[inline(always)]
+fn below(there: &[[u16; 16]; 3], two: &BroadcastPair, which: usize, limit: i16) -> u32 {
+    let mut sum = [0i32; 16];
+    for c in 0..3 {
+        for k in 0..16 {
+            let d = two.0[c][16 * which + k].wrapping_sub(there[c][k]) as i16 as i32;
+            sum[k] += (d * d) >> 16;
+        }
+    }
+    let mut mask = 0;
+    for k in 0..16 {
+        mask |= ((sum[k] < limit as i32) as u32) << k;
+    }
+    mask
+}
+
+impl Isa for Portable {
+    const INSTRUCTIONS: Instructions = Instructions::Portable;
+    type F32 = Lanes<f32>;
+    type F64 = Lanes<f64>;
+    type Quad = Four;
+
+    #[inline(always)]
+    unsafe fn distance_masks<const SHIFTS: bool>(
+        x: [*const u16; 3],
+        shift: [u32; 3],
+        four: &[BroadcastPair; 2],
+        limit: i16,
+    ) -> u64 {
+        let mut there = [[0; 16]; 3];
+        for c in 0..3 {
+            there[c] = unsafe { x[c].cast::<[u16; 16]>().read_unaligned() };
+            if SHIFTS {
+                there[c] = there[c].map(|x| x.wrapping_add(shift[c] as u16));
+            }
+        }
+        let mut mask = 0;
+        for k in 0..4 {
+            mask |= (below(&there, &four[k / 2], k % 2, limit) as u64) << (16 * k);
+        }
+        mask
+    }
+    #[inline(always)]
+    unsafe fn broadcast16(x: u16, p: *mut u16) {
+        unsafe { p.cast::<[u16; 16]>().write_unaligned([x; 16]) }
+    }
+    #[inline(always)]
+    unsafe fn transpose_masks(masks: *mut u64) {
+        let masks = unsafe { &mut *masks.cast::<[u64; 8]>() };
+        let before = *masks;
+        for (k, mask) in masks.iter_mut().enumerate() {
+            let (half, particle) = (k / 4, k % 4);
+            *mask = (0..4).map(|c| (before[4 * half + c] >> (16 * particle) & 0xffff) << (16 * c)).sum();
+        }
+    }
+    #[inline(always)]
+    unsafe fn expand_mask(j_bases: *const u32, mut mask: u64, p: *mut u32) -> usize {
+        let mut count = 0;
+        while mask != 0 {
+            let bit = mask.trailing_zeros();
+            unsafe { *p.add(count) = *j_bases.add(bit as usize / 16) + ((bit % 16) << OFFSET_BITS) };
+            count += 1;
+            mask &= mask - 1;
+        }
+        count
+    }
+    #[inline(always)]
+    unsafe fn root_or_more(x: Lanes<f32>) -> Lanes<f32> {
+        Lanes(x.0.map(|x| x.max(0.0).sqrt()))
+    }
+    #[inline(always)]
+    unsafe fn cluster_first<const CLUSTER: usize>(x: Lanes<f32>) -> Lanes<f32> {
+        of_each::<CLUSTER>(x, |first, _| first)
+    }
+    #[inline(always)]
+    unsafe fn cluster_least<const CLUSTER: usize>(x: Lanes<f32>) -> Lanes<f32> {
+        of_each::<CLUSTER>(x, f32::min)
+    }
+    #[inline(always)]
+    unsafe fn cluster_greatest<const CLUSTER: usize>(x: Lanes<f32>) -> Lanes<f32> {
+        of_each::<CLUSTER>(x, f32::max)
+    }
+    #[inline(always)]
+    unsafe fn load_transposed<const ALL: bool>(base: *const u8, offsets: *const u32) -> [Lanes<u32>; 8] {
+        let mut out = [Lanes([0; LANES]); 8];
+        for k in 0..LANES {
+            let row = unsafe { record_at(base, offsets, k).cast::<[u32; 8]>().read_unaligned() };
+            for c in 0..if ALL { 8 } else { 4 } {
+                out[c].0[k] = row[c];
+            }
+        }
+        out
+    }
+    #[inline(always)]
+    unsafe fn load_transposed_wide<const ALL: bool>(base: *const u8, offsets: *const u32) -> [Lanes<f64>; 8] {
+        let mut out = [Lanes([0.0; LANES]); 8];
+        for k in 0..LANES {
+            let row = unsafe { wide_record_at(base, offsets, k).cast::<[f64; 8]>().read_unaligned() };
+            for c in 0..if ALL { 8 } else { 4 } {
+                out[c].0[k] = row[c];
+            }
+        }
+        out
+    }
+    #[inline(always)]
+    unsafe fn of_bits(words: Lanes<u32>) -> Lanes<f32> {
+        Lanes(words.0.map(f32::from_bits))
+    }
+    #[inline(always)]
+    unsafe fn halves(x: Lanes<f64>) -> [Lanes<u32>; 2] {
+        let bits = x.0.map(f64::to_bits);
+        [Lanes(bits.map(|b| b as u32)), Lanes(bits.map(|b| (b >> 32) as u32))]
+    }
+}
+
+/// Each `CLUSTER` lanes folded, in all of them.
+#[inline(always)]
+fn of_each<const CLUSTER: usize>(x: Lanes<f32>, fold: impl Fn(f32, f32) -> f32 + Copy) -> Lanes<f32> {
+    let mut out = x.0;
+    for (lanes, out) in x.0.chunks_exact(CLUSTER).zip(out.chunks_exact_mut(CLUSTER)) {
+        out.fill(lanes.iter().copied().reduce(fold).unwrap_or_default());
+    }
+    Lanes(out)
+}

@@ -1,0 +1,348 @@
+//! The JSON schema and the reference of the scene file: written from the table of keys, current, and
+//! true of the reader.
+
+use psidpd::observe;
+use psidpd::scene::Scene;
+use psidpd::scene::keys::{
+    BODY_FORCE, BOX, INITIAL, MASSES, OUTPUT, PART, REQUIRED, STAGE, TABLES, TOP, Table, ValueKind,
+};
+use serde_json::{Map, Value, json};
+use std::fmt::Write;
+use std::path::PathBuf;
+use std::process::Command;
+
+fn schema_of_value(kind: &ValueKind) -> Value {
+    let positive = json!({ "type": "number", "exclusiveMinimum": 0 });
+    let each = |items: &Value| json!({ "type": "array", "items": items, "minItems": 2, "maxItems": 3 });
+    match kind {
+        ValueKind::Text | ValueKind::File => json!({ "type": "string" }),
+        ValueKind::Number => json!({ "type": "number" }),
+        ValueKind::Positive => positive,
+        ValueKind::Count => json!({ "type": "integer", "minimum": 0 }),
+        ValueKind::Flag => json!({ "type": "boolean" }),
+        ValueKind::Point => each(&json!({ "type": "number" })),
+        ValueKind::Lengths => json!({ "anyOf": [positive, each(&positive)] }),
+        ValueKind::Box => json!({ "anyOf": [positive, each(&positive), object(&BOX, None)] }),
+        ValueKind::EachOf(choices) => {
+            let one = json!({ "enum": choices() });
+            json!({ "anyOf": [one, each(&one)] })
+        }
+        ValueKind::Temperature => json!({ "anyOf": [
+            positive,
+            { "type": "array", "items": positive, "minItems": 2, "maxItems": 2 }
+        ]}),
+        ValueKind::Choice(choices) => json!({ "enum": choices() }),
+        ValueKind::Names => json!({ "type": "array", "items": { "type": "string" }, "minItems": 1 }),
+        ValueKind::Fractions => json!({
+            "type": "object", "additionalProperties": { "type": "number", "minimum": 0, "maximum": 1 }
+        }),
+        ValueKind::Ids => json!({
+            "type": "array", "items": { "type": "integer", "minimum": 0 }, "minItems": 2, "maxItems": 2
+        }),
+        other => panic!("no value of a scene: {other:?}"),
+    }
+}
+
+fn object(table: &Table, form: Option<&str>) -> Value {
+    let mut properties = Map::new();
+    let mut required = Vec::new();
+    let mut any_name = json!(false);
+    for key in table.keys_of(form) {
+        let mut schema = schema_of_value(&key.value);
+        if key.name == table.forms.0
+            && let Some(form) = form
+        {
+            schema = json!({ "const": form });
+        }
+        schema["description"] = json!(key.about);
+        if key.name.chars().all(|c| c.is_ascii_uppercase()) {
+            any_name = schema;
+        } else {
+            properties.insert(key.name.into(), schema);
+        }
+        if key.need == REQUIRED {
+            required.push(key.name);
+        }
+    }
+    json!({
+        "type": "object", "description": table.about, "properties": properties, "required": required,
+        "additionalProperties": any_name
+    })
+}
+
+/// A table with a schema for each of its forms.
+fn forms(table: &Table) -> Value {
+    match table.forms.1 {
+        [] => object(table, None),
+        forms => json!({ "oneOf": forms.iter().map(|f| object(table, Some(f))).collect::<Vec<_>>() }),
+    }
+}
+
+/// `[observe]`: names and meanings; what values may be is said in words.
+fn observe() -> Value {
+    let named = |keys: &[observe::keys::Key]| -> Map<String, Value> {
+        let text = |k: &observe::keys::Key| {
+            format!("{} {}; {} if left out.", k.about, capital(&k.value.describe()), k.default())
+        };
+        keys.iter().map(|k| (k.name.to_owned(), json!({ "description": text(k) }))).collect()
+    };
+    let mut properties = named(observe::keys::COMMON);
+    for table in observe::request::tables() {
+        let mut keys = named(observe::keys::COMMON);
+        keys.extend(named(table.keys));
+        let own = json!({ "type": "object", "properties": keys, "additionalProperties": false });
+        let schema = json!({ "description": table.about, "anyOf": [{ "type": "boolean" }, own] });
+        properties.insert(table.path.into(), schema);
+    }
+    json!({
+        "type": "object", "description": "What is measured as the run goes.", "properties": properties,
+        "additionalProperties": false
+    })
+}
+
+fn schema() -> String {
+    let mut root = object(&TOP, None);
+    root["$schema"] = json!("http://json-schema.org/draft-07/schema#");
+    root["title"] = json!("psidpd scene file");
+    let properties = &mut root["properties"];
+    for table in [&MASSES, &INITIAL, &PART, &BODY_FORCE, &STAGE, &OUTPUT] {
+        properties[table.path] = match table.array {
+            true => json!({ "type": "array", "description": table.about, "items": forms(table) }),
+            false => forms(table),
+        };
+    }
+    properties["observe"] = observe();
+    serde_json::to_string_pretty(&root).unwrap() + "\n"
+}
+
+fn reference() -> String {
+    let mut text = "# The scene file\n\n\
+        What a scene file may say, key by key. A scene file is TOML; it says which fluid is run, in which box, from\n\
+        which start, for how many steps. Unknown keys are errors, with line and key. Editors that know JSON schemas\n\
+        (taplo, Even Better TOML) complete and check scene files with `#:schema scene.schema.json` in the first\n\
+        line; the schema is `validation/schema/scene.schema.json`.\n\n\
+        Five lines are a scene:\n\n\
+        ```toml\n\
+        model   = \"fluid.toml\"\n\
+        kT      = 1.0\n\
+        box     = 6.0\n\
+        density = 3.0\n\
+        steps   = 1000\n\
+        ```\n\n\
+        `psidpd new NAME --template …` writes one to begin with, `psidpd check SCENE` says what it will do, and\n\
+        `validation/scenes/` has one for every system of the papers, small ones that take seconds and, in `full/`,\n\
+        those of the papers' own size.\n\n\
+        The examples below leave out what every scene needs. Their model has two species, `A` and `B`, in three\n\
+        dimensions. In two dimensions everything that has a number for each direction has two, and there are no\n\
+        cylinders. What is measured is in `[observe]`, which has [a page of its own](observables.md).\n\n\
+        This page is written from the tables of keys in `validation/src/scene/keys/`.\n"
+        .to_owned();
+    // Writing to a String cannot fail.
+    for table in TABLES {
+        let heading = match (table.path, table.array) {
+            ("", _) => "Top level".to_owned(),
+            (path, true) => format!("`[[{path}]]`"),
+            (path, false) => format!("`[{path}]`"),
+        };
+        let _ = write!(text, "\n## {heading}\n\n{}", table.reference());
+    }
+    text
+}
+
+fn capital(text: &str) -> String {
+    let mut chars = text.chars();
+    chars.next().map_or(String::new(), |c| c.to_uppercase().collect::<String>() + chars.as_str())
+}
+
+const MIXTURE: &str =
+    "title = \"ideal mixture\"\nspecies = [\"A\", \"B\"]\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n";
+
+const DATA: &str = "three\n\n3 atoms\n2 atom types\n\n0 6 xlo xhi\n0 6 ylo yhi\n0 6 zlo zhi\n\nAtoms # atomic\n\n\
+                    1 1 1 1 1\n2 2 2 2 2\n3 1 3 3 3\n";
+
+/// A folder with what the examples refer to.
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("fluid.toml"), MIXTURE).unwrap();
+    std::fs::write(folder.path().join("start.data"), DATA).unwrap();
+    let short = "model = \"fluid.toml\"\nkT = 1.0\nbox = 6.0\ndensity = 3.0\nsteps = 2\n";
+    let scene = Scene::parse("s.toml", short, folder.path()).unwrap();
+    psidpd::run::run_scene(&scene, &folder.path().join("run"), &mut |_| ()).unwrap();
+    folder
+}
+
+/// A whole scene from an example.
+fn completed(example: &str) -> String {
+    let has = |start: &str| example.lines().any(|l| l.starts_with(start));
+    let mut text = String::new();
+    for (given, line) in [("model", "model = \"fluid.toml\"\n"), ("kT", "kT = 1.0\n")] {
+        // A stage has a kT of its own.
+        if !has(given) || has("[[stage]]") {
+            text += line;
+        }
+    }
+    if !has("box") && !has("[box]") && !has("file") {
+        text += "box = 6.0\n";
+    }
+    if !["density", "[initial]", "[[part]]"].iter().any(|k| has(k)) {
+        text += "density = 3.0\n";
+    }
+    if !has("steps") {
+        text += "steps = 10\n";
+    }
+    text + example
+}
+
+fn root() -> PathBuf {
+    psidpd_tests::root().join("validation")
+}
+
+/// Compares a file with what it should be, or writes it if `PSIDPD_UPDATE_SCHEMA` is set.
+fn assert_current(file: &str, expected: &str) {
+    let path = root().join(file);
+    if std::env::var_os("PSIDPD_UPDATE_SCHEMA").is_some() {
+        std::fs::write(&path, expected).unwrap();
+    }
+    let found = std::fs::read_to_string(&path).unwrap_or_default();
+    assert!(
+        found.replace("\r\n", "\n") == expected,
+        "{file} is not current: run this test with PSIDPD_UPDATE_SCHEMA=1"
+    );
+}
+
+#[test]
+fn schema_and_reference_are_current() {
+    assert_current("schema/scene.schema.json", &schema());
+    assert_current("../docs/scene-file.md", &reference());
+}
+
+/// Every scene that ships, quick and full-sized, and every template.
+fn scenes() -> Vec<PathBuf> {
+    let folders = ["scenes", "scenes/full", "src/scene/templates"].map(|f| root().join(f));
+    let mut found: Vec<PathBuf> = folders
+        .iter()
+        .flat_map(|folder| std::fs::read_dir(folder).unwrap())
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|e| e == "toml"))
+        .collect();
+    found.sort();
+    assert!(found.len() > 50, "{}", found.len());
+    found
+}
+
+/// Which of these scenes the schema takes: what Python's `jsonschema` has against each, nothing where it is valid.
+fn complaints(scenes: &[String]) -> Vec<String> {
+    let scenes: Vec<Value> = scenes.iter().map(|text| toml::from_str(text).unwrap()).collect();
+    let folder = tempfile::tempdir().unwrap();
+    let question = folder.path().join("question.json");
+    let schema: Value = serde_json::from_str(&schema()).unwrap();
+    std::fs::write(&question, json!({ "schema": schema, "scenes": scenes }).to_string()).unwrap();
+    let script = psidpd_tests::root().join("tests/python/validate_scenes.py");
+    let output = Command::new(psidpd_tests::python()).arg(script).arg(&question).output().unwrap();
+    assert!(output.status.success(), "{}", psidpd_tests::said(&output));
+    let found: Vec<String> = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(found.len(), scenes.len());
+    found
+}
+
+#[test]
+fn every_scene_is_valid_by_the_schema() {
+    let paths = scenes();
+    let texts: Vec<String> = paths.iter().map(|path| std::fs::read_to_string(path).unwrap()).collect();
+    for (path, complaint) in paths.iter().zip(complaints(&texts)) {
+        assert!(complaint.is_empty(), "{}: {complaint}", path.display());
+    }
+}
+
+/// Examples load, and the schema takes them too.
+#[test]
+fn every_example_of_the_reference_loads() {
+    let page = std::fs::read_to_string(root().join("../docs/scene-file.md")).unwrap().replace("\r\n", "\n");
+    let folder = folder();
+    let blocks = page.split("```toml\n").skip(1);
+    let texts: Vec<String> = blocks.map(|block| completed(block.split("\n```").next().unwrap())).collect();
+    for text in &texts {
+        let scene =
+            Scene::parse("example.toml", text, folder.path()).unwrap_or_else(|e| panic!("{e}\n{text}"));
+        let state = scene.initial_state();
+        assert!(scene.simulation(state).is_ok(), "{text}");
+    }
+    for (text, complaint) in texts.iter().zip(complaints(&texts)) {
+        assert!(complaint.is_empty(), "{complaint}\n{text}");
+    }
+    assert_eq!(texts.len(), 1 + TABLES.iter().map(|t| t.keys.len()).sum::<usize>());
+}
+
+/// The schema finds what it can know of: unknown, missing and mistyped keys.
+#[test]
+fn the_schema_refuses_unknown_and_missing_keys() {
+    let bad = [
+        "kTT = 1.0",
+        "kT = 0",
+        "kT = \"warm\"",
+        "seed = -1",
+        "[box]\nlength = 3",
+        "[box]\nlengths = 3\nboundary = \"open\"",
+        "[initial]\ndensity = 3",
+        "[initial]\nkind = \"slab\"",
+        "[initial]\nkind = \"random\"\nthickness = 3",
+        "[[part]]\nshape = \"sphere\"\nradius = 0",
+        "[[part]]\nshape = \"rest\"\nradius = 1",
+        "[[body_force]]\nspecies = [\"A\"]",
+        "[[stage]]\nsteps = 3",
+        "[[stage]]\nname = \"a\"\nsteps = 3\nkT = [1, 2, 3]",
+        "[output]\nthermo = 1.5",
+        "[observe]\nrfd = true",
+        "[observe.rdf]\nbin = 50",
+    ];
+    for (text, complaint) in bad.iter().zip(complaints(&bad.map(completed))) {
+        assert!(!complaint.is_empty(), "{text}");
+    }
+}
+
+/// The reader, asked for a key that is not there, lists those it knows: they are the table's.
+#[test]
+fn the_reader_knows_the_keys_of_the_table_and_no_others() {
+    let folder = folder();
+    let known = |text: &str| -> Vec<String> {
+        let text = completed(text);
+        let error = Scene::parse("s.toml", &text, folder.path()).unwrap_err().to_string();
+        let (_, list) = error.split_once("known here: ").unwrap_or_else(|| panic!("{error}\n{text}"));
+        list.trim_end_matches(')').split(", ").map(str::to_owned).collect()
+    };
+    let listed = |table: &Table, form: Option<&str>| {
+        let mut names: Vec<String> = table.keys_of(form).map(|k| k.name.to_owned()).collect();
+        names.sort();
+        names
+    };
+    let mut top = listed(&TOP, None);
+    top.extend(["masses", "initial", "part", "body_force", "stage", "output"].map(str::to_owned));
+    top.sort();
+    let mut found = known("zzz = 1");
+    found.retain(|k| k != "observe");
+    assert_eq!(found, top);
+    assert_eq!(known("[box]\nlengths = 6\nzzz = 1"), listed(&BOX, None));
+    let force = "[[body_force]]\nacceleration = [0, 0, 1]\nzzz = 1";
+    assert_eq!(known(force), listed(&BODY_FORCE, None));
+    assert_eq!(known("[[stage]]\nname = \"a\"\nsteps = 3\nzzz = 1"), listed(&STAGE, None));
+    for key in listed(&OUTPUT, None) {
+        assert!(known("[output]\nzzz = 1").contains(&key), "{key}");
+    }
+    let keys = |form: &str| match form {
+        "slab" => "thickness = 2\n",
+        "layer" => "thickness = 2\nface = \"zlo\"\n",
+        "sphere" | "cylinder" => "radius = 2\n",
+        "data" => "file = \"start.data\"\n",
+        "checkpoint" => "file = \"run\"\n",
+        _ => "",
+    };
+    for form in INITIAL.forms.1 {
+        let density = if ["data", "checkpoint"].contains(form) { "" } else { "density = 3\n" };
+        let text = format!("[initial]\nkind = \"{form}\"\n{}{density}zzz = 1", keys(form));
+        assert_eq!(known(&text), listed(&INITIAL, Some(form)), "{form}");
+    }
+    for form in PART.forms.1 {
+        let text = format!("[[part]]\nshape = \"{form}\"\n{}density = 3\nzzz = 1", keys(form));
+        assert_eq!(known(&text), listed(&PART, Some(form)), "{form}");
+    }
+}
