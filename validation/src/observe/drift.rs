@@ -80,7 +80,7 @@ pub fn drift(times: &[f64], values: &[f64]) -> Result<Drift, DriftError> {
     if !(tt.is_finite() && slope.is_finite() && residuals.iter().all(|r| r.is_finite())) {
         return Err(StatisticsError::Overflow.into());
     }
-    let tau = estimate(&residuals)?.tau;
+    let tau = estimate(&residuals)?.tau.max(0.5);
     let variance = residuals.iter().map(|r| r * r).sum::<f64>() / (n - 2.0);
     Ok(Drift {
         slope,

@@ -1,5 +1,6 @@
 //! One configuration as the observables see it: what several of them need is computed once.
 
+use super::flux::{Carrier, Flux, Line};
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::engine::reference::{Evaluation, Evaluator};
 use psidpd_core::model::Model;
@@ -42,6 +43,8 @@ pub struct View<'a> {
     pub pressure: [f64; 6],
     /// The same with conservative forces alone.
     pub conservative_pressure: [f64; 6],
+    /// What carried momentum in the step, where that was asked for.
+    pub flux: Option<&'a Flux>,
 }
 
 /// A configuration with what several observables compute from it.
@@ -50,12 +53,14 @@ pub struct Frame<'a> {
     pub view: View<'a>,
     evaluator: &'a Evaluator,
     evaluation: OnceCell<Evaluation>,
+    /// Where forces acted at other positions than the present ones.
+    earlier: OnceCell<Vec<Option<Evaluation>>>,
 }
 
 impl<'a> Frame<'a> {
     /// A configuration of the fluid of `evaluator`.
     pub fn new(view: View<'a>, evaluator: &'a Evaluator) -> Frame<'a> {
-        Frame { view, evaluator, evaluation: OnceCell::new() }
+        Frame { view, evaluator, evaluation: OnceCell::new(), earlier: OnceCell::new() }
     }
 
     /// What evaluates its fluid.
@@ -67,6 +72,31 @@ impl<'a> Frame<'a> {
     pub fn evaluation(&self) -> &Evaluation {
         let View { x, species, domain, .. } = self.view;
         self.evaluation.get_or_init(|| self.evaluator.evaluate(x, species, domain))
+    }
+
+    /// Every line that momentum was carried along in the step; whether that is known.
+    pub fn lines(&self, mut visit: impl FnMut(Carrier, &Line)) -> bool {
+        let Some(flux) = self.view.flux else { return false };
+        flux.ways.iter().for_each(|line| visit(Carrier::Particle, line));
+        flux.drag.iter().for_each(|line| visit(Carrier::Pair, line));
+        let View { x, domain, .. } = self.view;
+        let earlier = self.earlier.get_or_init(|| {
+            let at = flux.forces.iter().map(|acted| acted.at.as_ref());
+            at.map(|at| at.map(|(x, species)| self.evaluator.evaluate(x, species, domain))).collect()
+        });
+        for (acted, earlier) in flux.forces.iter().zip(earlier) {
+            let x = acted.at.as_ref().map_or(x, |at| &at.0);
+            for (pair, force) in earlier.as_ref().unwrap_or_else(|| self.evaluation()).pair_forces() {
+                let strength = acted.share * force / pair.r;
+                visit(Carrier::Pair, &Line { from: x[pair.i], d: pair.d, strength });
+            }
+        }
+        true
+    }
+
+    /// The pressure tensor of the momentum that was carried, for the whole box; `None` if it is not known.
+    pub fn carried_pressure(&self) -> Option<[f64; 6]> {
+        Some(self.view.flux?.sum().map(|sum| sum / self.volume()))
     }
 
     /// The mass of a particle.

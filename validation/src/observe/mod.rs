@@ -8,6 +8,7 @@
 pub mod configurational;
 pub mod drift;
 pub mod edges;
+pub mod flux;
 pub mod frame;
 pub mod keys;
 mod least_squares;
@@ -30,5 +31,7 @@ pub use series::{Measured, Series};
 pub use statistics::{Comparison, Estimate, StatisticsError, difference, estimate, threshold};
 pub use surface_tension::{TensionError, tension_series};
 
+#[cfg(test)]
+mod balance;
 #[cfg(test)]
 mod tests;

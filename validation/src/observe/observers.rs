@@ -83,6 +83,12 @@ impl Observers {
         want
     }
 
+    /// Whether step `step` of stage `stage` must record what carries momentum.
+    pub fn wants_flux(&self, step: u64, stage: &str) -> bool {
+        let due = |o: &&Observer| step.is_multiple_of(o.every) && o.stages.iter().any(|s| s.stage == stage);
+        self.observers.iter().filter(due).flat_map(|o| &o.stages).any(|s| s.meter.needs_flux())
+    }
+
     /// Whether [`Observers::sample`] may have something to do after step `step`.
     pub fn may_sample(&self, step: u64, stage: &str) -> bool {
         self.stage != stage || self.observers.iter().any(|o| step.is_multiple_of(o.every))

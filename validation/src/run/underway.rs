@@ -140,6 +140,7 @@ impl<'a> Run<'a> {
         if totals {
             want = Want { energy: true, virial: true, ..want };
         }
+        self.simulation.record_flux(self.observers.wants_flux(number, &stage.name));
         self.simulation.begin_step(stage.dt, stage.integrator, want)?;
         let is_last = self.position.done + 1 == stage.steps;
         let watched = Watch::is_due(stage, self.position.done + 1);

@@ -25,6 +25,7 @@ impl Simulation {
             kinetic_energy: self.kinetic_energy(),
             pressure: self.pressure_tensor(),
             conservative_pressure: self.conservative_pressure_tensor(),
+            flux: self.flux(),
         }
     }
 

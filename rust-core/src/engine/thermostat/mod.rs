@@ -22,12 +22,14 @@ mod midpoint;
 mod part;
 mod pass;
 mod planes;
+mod pulls;
 mod sequential;
 
 #[cfg(test)]
 mod tests;
 
 pub use bodies::Bodies;
+pub use pulls::Pull;
 
 use super::error::EngineError;
 use super::plan::{Plan, ThermostatPlan};
@@ -69,6 +71,8 @@ pub struct PairThermostat {
     mass: Vec<f64>,
     sums: Sums,
     parts: Vec<Part>,
+    /// By plane and pair, what `g` was multiplied by in turn, but for the noise; where distances are kept.
+    impulses: Vec<Vec<f64>>,
     iterations: usize,
     /// Of the pairs; of whatever else a rule draws.
     noise: [PairNoise; 2],
@@ -87,6 +91,7 @@ impl PairThermostat {
             mass: Vec::new(),
             sums: Sums::default(),
             parts: Vec::new(),
+            impulses: Vec::new(),
             iterations: 0,
             noise: [PairNoise::default(); 2],
         })

@@ -74,12 +74,14 @@ struct Share<'a> {
     of_next: &'a [f64],
     chances: Vec<f32>,
     virial: [f64; 6],
+    impulses: &'a mut Vec<f64>,
 }
 
 impl PairThermostat {
     /// Applies a rule to all pairs in turn.
     pub(super) fn in_turn(&mut self, pool: &Pool, v: &mut [[f64; 3]], update: Update) -> [f64; 6] {
-        let PairThermostat { planes, cells, mass, kt, dt, noise, .. } = self;
+        let PairThermostat { planes, cells, mass, kt, dt, noise, impulses, .. } = self;
+        impulses.resize_with(planes.len(), Vec::new);
         let (planes, mass, kt) = (&planes[..], &mass[..], *kt);
         let reversed = matches!(update, Update::Shardlow { reversed: true });
         let rule = match update {
@@ -98,12 +100,16 @@ impl PairThermostat {
             let mut rest = &mut sorted[..];
             let mut slices: Vec<Option<&mut [[f64; 3]]>> =
                 planes.iter().map(|p| rest.split_off_mut(..p.own.len())).collect();
+            let mut records: Vec<Option<&mut Vec<f64>>> = impulses.iter_mut().map(Some).collect();
             let mut shares: Vec<Share> = Vec::with_capacity(set.len());
             for number in set {
                 let plane = &planes[number];
                 let above = if number + 1 < planes.len() { number + 1 } else { 0 };
                 let own = slices[number].take().unwrap_or_default();
                 let next = if plane.next.is_empty() { None } else { slices[above].take() };
+                let Some(impulses) = records[number].take() else { continue };
+                impulses.clear();
+                impulses.resize(plane.stretch.len(), 0.0);
                 shares.push(Share {
                     plane,
                     own,
@@ -112,6 +118,7 @@ impl PairThermostat {
                     of_next: &mass[plane.next.clone()],
                     chances: Vec::new(),
                     virial: [0.0; 6],
+                    impulses,
                 });
             }
             pool.each(&mut shares, |share| {
@@ -168,7 +175,7 @@ impl Share<'_> {
             return;
         }
         let chance = self.chances.get(k).map_or(0.0, |xi| 0.5 + f64::from(*xi) / 12f64.sqrt());
-        let impulse = rule(&Encounter {
+        let encounter = Encounter {
             along: (v[0] - other[0]) * g[0] + (v[1] - other[1]) * g[1] + (v[2] - other[2]) * g[2],
             a: square * sum,
             square,
@@ -176,7 +183,8 @@ impl Share<'_> {
             kt,
             xi: f64::from(self.plane.xi[k]),
             chance,
-        });
+        };
+        let impulse = rule(&encounter);
         for c in 0..3 {
             self.own[i][c] += impulse * inverse[0] * g[c];
         }
@@ -186,6 +194,7 @@ impl Share<'_> {
         }
         if let Some(stretch) = self.plane.stretch.get(k) {
             add_virial(&mut self.virial, g, impulse * f64::from(*stretch));
+            self.impulses[k] = rule(&Encounter { xi: 0.0, ..encounter });
         }
     }
 }

@@ -1,6 +1,7 @@
 use super::Meter;
 use super::clusters::{DISTANCE, label, read_distance, sizes};
 use super::rdf::shell_volume;
+use crate::observe::flux::Carrier;
 use crate::observe::frame::Frame;
 use crate::observe::keys::{Need, Table, ValueKind, key};
 use crate::observe::observation::{Kind, Observation};
@@ -9,7 +10,6 @@ use crate::observe::request::Options;
 use crate::observe::series::{Measured, Series};
 use psidpd_core::document::FileError;
 use psidpd_core::engine::PeriodicBox;
-use psidpd_core::engine::reference::Pair;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
@@ -59,12 +59,19 @@ pub(super) fn circular_centre(
     (count > 0.0).then(|| domain.point(fraction))
 }
 
-/// Shares the line of a pair out over spherical shells of equal thickness around the origin: for each shell the
-/// length of the line in it, and the part `∫ (ê·r̂)² dl` of it that is normal. `from` is where particle i is.
-fn share(pair: &Pair, from: [f64; 3], thickness: f64, bins: usize, mut visit: impl FnMut(usize, f64, f64)) {
-    let e = pair.d.map(|c| -c / pair.r);
+/// Shares a line of length `r` from `from` to `from − d` out over spherical shells of equal thickness around the origin: for
+/// each shell the length of the line in it, and the part `∫ (ê·r̂)² dl` of it that is normal.
+fn share(
+    d: [f64; 3],
+    r: f64,
+    from: [f64; 3],
+    thickness: f64,
+    bins: usize,
+    mut visit: impl FnMut(usize, f64, f64),
+) {
+    let e = d.map(|c| -c / r);
     let start = from[0] * e[0] + from[1] * e[1] + from[2] * e[2];
-    let end = start + pair.r;
+    let end = start + r;
     let square = from[0] * from[0] + from[1] * from[1] + from[2] * from[2];
     // Distance of the line from the centre.
     let b = (square - start * start).max(0.0).sqrt();
@@ -154,9 +161,9 @@ impl Meter for Drop {
         array: false,
         forms: ("", &[]),
         about: "The drop is the largest cluster of particles closer than `distance`, its centre the circular mean of \
-                them. `drop_profile`: `density`, and the spherical Irving–Kirkwood pressures with the conservative \
-                forces, `normal` P_N(r) and `tangential` P_T(r), the force of each pair spread over the straight line \
-                between its particles. `drop`: `radius` of the sphere of liquid in vapour that holds as many particles \
+                them. `drop_profile`: `density`, and the spherical Irving–Kirkwood pressures `normal` P_N(r) and \
+                `tangential` P_T(r) of the momentum that the integrator carries, as in `stress_profile`: they balance, \
+                dP_N/dr = (d − 1)(P_T − P_N)/r, at any time step. `drop`: `radius` of the sphere of liquid in vapour that holds as many particles \
                 (equimolar), `radius_gyration` = √((d + 2)/d ⟨R_g²⟩) of the cluster, `width` of the interface from a \
                 tanh fit as for a slab, `liquid` and `vapour` densities, `inside` and `outside` pressures (within \
                 half of the radius; beyond radius and two widths), `laplace` their difference, and `tension` = \
@@ -180,6 +187,8 @@ impl Meter for Drop {
             ),
         ],
     };
+
+    const NEEDS_FLUX: bool = true;
 
     fn read(options: &Options) -> Result<Drop, FileError> {
         let half = options.half_box();
@@ -224,27 +233,34 @@ impl Meter for Drop {
 
         let rest = (self.dimensions - 1) as f64;
         let mut row = vec![0.0; self.bins * WIDTH];
-        for (k, x) in at.iter().enumerate() {
+        for x in &at {
             let r = (x[0] * x[0] + x[1] * x[1] + x[2] * x[2]).sqrt();
             let shell = (r / self.thickness()) as usize;
             if shell >= self.bins {
                 continue;
             }
-            let (v, m, volume) = (view.v[k], frame.mass(k), self.volume(shell));
-            let radial = if r > 0.0 { (x[0] * v[0] + x[1] * v[1] + x[2] * v[2]) / r } else { 0.0 };
-            let square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
-            let sums = &mut row[shell * WIDTH..(shell + 1) * WIDTH];
-            sums[0] += 1.0;
-            sums[1] += m * radial * radial / volume;
-            sums[2] += m * (square - radial * radial) / rest / volume;
+            row[shell * WIDTH] += 1.0;
         }
         let (thickness, bins) = (self.thickness(), self.bins);
-        for (pair, force) in frame.evaluation().pair_forces() {
-            share(&pair, at[pair.i], thickness, bins, |shell, length, normal| {
+        let known = frame.lines(|carrier, line| {
+            let r = (line.d[0] * line.d[0] + line.d[1] * line.d[1] + line.d[2] * line.d[2]).sqrt();
+            if r == 0.0 {
+                return;
+            }
+            let image = domain.minimum_image(line.from, centre);
+            let mut from: [f64; 3] = std::array::from_fn(|c| image[c] - mean[c]);
+            if self.dimensions == 2 {
+                from[2] = 0.0;
+            }
+            let (force, at) = (line.strength * r, if carrier == Carrier::Particle { 1 } else { 3 });
+            share(line.d, r, from, thickness, bins, |shell, length, normal| {
                 let volume = self.volume(shell);
-                row[shell * WIDTH + 3] += force * normal / volume;
-                row[shell * WIDTH + 4] += force * (length - normal) / rest / volume;
+                row[shell * WIDTH + at] += force * normal / volume;
+                row[shell * WIDTH + at + 1] += force * (length - normal) / rest / volume;
             });
+        });
+        if !known {
+            return false;
         }
         self.shells.push(&row) && self.size.push(&[frame.view.time, count, squares])
     }
@@ -310,9 +326,8 @@ mod tests {
             let from: [f64; 3] = std::array::from_fn(|_| 2.0 * rng.random::<f64>() - 1.0);
             let d: [f64; 3] = std::array::from_fn(|_| rng.random::<f64>() - 0.5);
             let r = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
-            let pair = Pair { i: 0, j: 1, d, r };
             let mut found = vec![[0.0; 2]; 40];
-            share(&pair, from, 0.1, 40, |k, length, normal| {
+            share(d, r, from, 0.1, 40, |k, length, normal| {
                 found[k][0] += length;
                 found[k][1] += normal;
             });

@@ -41,6 +41,9 @@ pub trait Meter: Sized {
     /// Whether it must see every step.
     const EVERY_STEP: bool = false;
 
+    /// Whether a sample needs what carried momentum in its step.
+    const NEEDS_FLUX: bool = false;
+
     /// Reads its settings.
     ///
     /// # Errors
@@ -85,6 +88,11 @@ macro_rules! meters {
             /// As [`Meter::needs`].
             pub fn needs(&self) -> Want {
                 match self { $(AnyMeter::$variant(meter) => meter.needs()),+ }
+            }
+
+            /// As [`Meter::NEEDS_FLUX`].
+            pub fn needs_flux(&self) -> bool {
+                match self { $(AnyMeter::$variant(_) => <$meter as Meter>::NEEDS_FLUX),+ }
             }
 
             /// As [`Meter::sample`].

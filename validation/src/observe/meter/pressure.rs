@@ -15,7 +15,7 @@ const NAMES: [&str; 6] = ["xx", "yy", "zz", "xy", "xz", "yz"];
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Pressure {
     dimensions: usize,
-    /// Tensor of all forces, tensor of conservative forces.
+    /// Tensor of all forces, tensor of conservative forces, tensor of the momentum carried.
     series: Series,
 }
 
@@ -25,16 +25,22 @@ impl Meter for Pressure {
         title: "pressure tensor",
         array: false,
         forms: ("", &[]),
-        about: "P = (Σ m v v + W)/V with the virial W = Σ r_ij ⊗ F_ij, exact with the many-body pair forces. \
-                `conservative` and its components leave drag and noise out of W; `total` has them, as LAMMPS's \
-                `compute pressure`. The two means differ by a term of the order of the time step: the drag of \
-                velocity Verlet sees the velocity that brought particles to where they are. `conservative` has \
-                less noise.",
+        about: "Three tensors with the same limit as the time step goes to 0. `carried` is the flux of momentum that the \
+                integrator makes: Σ m u u with the velocities u that moved the particles in the step, and the virial \
+                Σ r_ij ⊗ F_ij of all pair forces where they acted, drag included; the random force, whose mean is 0, is \
+                left out. It is the pressure that walls feel and that balances in interfaces, at any time step. \
+                `total` is (Σ m v v + W)/V with the velocities at the end of the step and the virial of all forces, \
+                noise included, as `pressure` in `thermo.csv`, as LAMMPS's `compute pressure` and its thermo output: in \
+                velocity Verlet too low by ¼ Δt² ⟨Σ f²/m⟩/(dV), which is of first order, as the random force is. \
+                `conservative` leaves drag and noise out of W; it has the least noise, and lacks drag as well. With \
+                `thermostat_every`, sample at steps of all phases.",
         keys: &[],
     };
 
+    const NEEDS_FLUX: bool = true;
+
     fn read(options: &Options) -> Result<Pressure, FileError> {
-        Ok(Pressure { dimensions: options.place.fluid.dimensions, series: Series::new(12) })
+        Ok(Pressure { dimensions: options.place.fluid.dimensions, series: Series::new(18) })
     }
 
     fn needs(&self) -> Want {
@@ -44,17 +50,19 @@ impl Meter for Pressure {
     fn sample(&mut self, frame: &Frame) -> bool {
         let total = frame.view.pressure;
         let conservative = frame.view.conservative_pressure;
-        self.series.push(&[total, conservative].concat())
+        frame
+            .carried_pressure()
+            .is_some_and(|carried| self.series.push(&[total, conservative, carried].concat()))
     }
 
     fn finish(&self) -> Vec<Observation> {
         let d = self.dimensions;
         let mut out = Observation::new("pressure", "Pressure", Kind::Scalar).samples(self.series.samples());
-        for (what, first) in [("conservative", 6), ("total", 0)] {
+        for (what, first) in [("carried", 12), ("conservative", 6), ("total", 0)] {
             let trace = self.series.linear(|s| s[first..first + d].iter().sum::<f64>() / d as f64);
             out = out.column(what, "energy/volume", [trace]);
         }
-        for (what, first) in [("conservative", 6), ("total", 0)] {
+        for (what, first) in [("carried", 12), ("conservative", 6), ("total", 0)] {
             let there = |k: &usize| d == 3 || [0, 1, 3].contains(k);
             for k in (0..6).filter(there) {
                 let name = format!("{what}_{}", NAMES[k]);

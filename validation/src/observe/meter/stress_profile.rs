@@ -1,5 +1,6 @@
 use super::Meter;
 use super::across::Across;
+use crate::observe::flux::Carrier;
 use crate::observe::frame::Frame;
 use crate::observe::keys::{AXIS, BINS, RECENTRE, Table};
 use crate::observe::observation::{Kind, Observation};
@@ -28,23 +29,22 @@ impl StressProfile {
         let along = |v: [f64; 3]| v[0] * normal[0] + v[1] * normal[1] + v[2] * normal[2];
         let (volume, rest) = (self.across.bin_volume(), (self.dimensions - 1) as f64);
         let mut sums = vec![0.0; self.across.bins * WIDTH];
-        for (k, v) in view.v.iter().enumerate() {
-            if let Some(bin) = self.across.bin(fractions[k]) {
-                let m = frame.mass(k);
-                let (n, square) = (along(*v), v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-                sums[bin * WIDTH] += m * n * n / volume;
-                sums[bin * WIDTH + 1] += m * (square - n * n) / rest / volume;
-            }
-        }
-        for (pair, force) in frame.evaluation().pair_forces() {
-            let n = along(pair.d);
-            let normal = force * n * n / pair.r / volume;
-            let tangential = force * (pair.r * pair.r - n * n) / pair.r / rest / volume;
-            let from = fractions[pair.i];
+        // Lines begin anywhere; the profile is centred as the particles are.
+        let shift = fractions.first()? - view.domain.fraction(*view.x.first()?)[self.across.axis];
+        let known = frame.lines(|carrier, line| {
+            let n = along(line.d);
+            let square = line.d.iter().map(|d| d * d).sum::<f64>();
+            let normal = line.strength * n * n / volume;
+            let tangential = line.strength * (square - n * n) / rest / volume;
+            let from = view.domain.fraction(line.from)[self.across.axis] + shift;
+            let at = if carrier == Carrier::Particle { 0 } else { 2 };
             self.across.share(from, from - n / self.across.height, |bin, share| {
-                sums[bin * WIDTH + 2] += share * normal;
-                sums[bin * WIDTH + 3] += share * tangential;
+                sums[bin * WIDTH + at] += share * normal;
+                sums[bin * WIDTH + at + 1] += share * tangential;
             });
+        });
+        if !known {
+            return None;
         }
         Some(sums)
     }
@@ -56,14 +56,18 @@ impl Meter for StressProfile {
         title: "pressure tensor along an axis (Irving–Kirkwood)",
         array: false,
         forms: ("", &[]),
-        about: "P_N and P_T in slices of the box with the conservative forces: momenta where the particles are, the \
-                force of each pair, many-body part included, spread evenly over the straight line from i to j \
-                (Irving and Kirkwood, J. Chem. Phys. 18, 817 (1950)). `normal`, `tangential` (the mean of the other \
-                directions), `ideal` (the share of the momenta in `normal`), `difference` P_N − P_T, and `integral` \
-                ∫(P_N − P_T) from the lower end of the axis. `stress_profile_integral` is the whole of it: the \
-                surface tension of all interfaces together. P_N is the same everywhere in equilibrium.",
+        about: "P_N and P_T in slices of the box: momentum carried by each particle, with the velocity that moved it, along \
+                its way in the step, and by the force of each pair, many-body part and drag included, along the \
+                straight line from i to j (Irving and Kirkwood, J. Chem. Phys. 18, 817 (1950)). That is the flux of \
+                momentum which the integrator makes, so that in equilibrium P_N is the same everywhere, at any time \
+                step; with the velocities at the ends of steps, or without drag, it is not. The random force is left \
+                out: its mean is 0. `normal`, `tangential` (the mean of the other directions), `ideal` (the share of \
+                the particles in `normal`), `difference` P_N − P_T, and `integral` ∫(P_N − P_T) from the lower end of \
+                the axis. `stress_profile_integral` is the whole of it: the surface tension of all interfaces together.",
         keys: &[AXIS, BINS, RECENTRE],
     };
+
+    const NEEDS_FLUX: bool = true;
 
     fn read(options: &Options) -> Result<StressProfile, FileError> {
         let across = Across::read(options, false)?;

@@ -18,7 +18,7 @@ pub struct SurfaceTension {
     interfaces: f64,
     perturbation: f64,
     kt: f64,
-    /// γ of conservative stress and of total stress, exp(−ΔU/kT) for more and for less area.
+    /// γ of the momentum carried and of the conservative stress, exp(−ΔU/kT) for more and for less area.
     series: Series,
 }
 
@@ -51,12 +51,14 @@ impl Meter for SurfaceTension {
         title: "surface tension of a slab, by stress and by free energy",
         array: false,
         forms: ("", &[]),
-        about: "`stress` is (L/m)(P_N − P_T) with the conservative stress of the whole box, m the number of interfaces, \
-                P_T the mean of the other directions; `stress_total` has drag and noise too. `free_energy` is the \
+        about: "`stress` is (L/m)(P_N − P_T) with the flux of momentum that the integrator makes in the whole box, as \
+                `carried` of `pressure`, m the number of interfaces, P_T the mean of the other directions. \
+                `stress_conservative` has the velocities at the ends of steps and conservative forces alone. Both have \
+                the same limit as the time step goes to 0. `free_energy` is the \
                 test-area method (Gloor et al., J. Chem. Phys. 123, 134703 (2005)): configurations are stretched \
                 with their box at constant volume to 1 ± ε times the area, the many-body energy is computed anew, \
                 and γ = −kT [ln⟨exp(−ΔU₊/kT)⟩ − ln⟨exp(−ΔU₋/kT)⟩]/(2 m ε A) with the kT of the stage. The two \
-                routes agree in equilibrium. ε should be small enough that ΔU stays below kT. In two dimensions the area is a length.",
+                routes agree in equilibrium, to the error of the time step. ε should be small enough that ΔU stays below kT. In two dimensions the area is a length.",
         keys: &[
             AXIS,
             key(
@@ -75,6 +77,8 @@ impl Meter for SurfaceTension {
             ),
         ],
     };
+
+    const NEEDS_FLUX: bool = true;
 
     fn read(options: &Options) -> Result<SurfaceTension, FileError> {
         let place = options.place;
@@ -105,6 +109,7 @@ impl Meter for SurfaceTension {
     fn sample(&mut self, frame: &Frame) -> bool {
         let (axis, view) = (self.across.axis, frame.view);
         self.kt = view.kt;
+        let Some(carried) = frame.carried_pressure() else { return false };
         let tension = |p: [f64; 6]| {
             let others: f64 = (0..self.dimensions).filter(|c| *c != axis).map(|c| p[c]).sum();
             let difference = p[axis] - others / (self.dimensions - 1) as f64;
@@ -113,8 +118,8 @@ impl Meter for SurfaceTension {
         let energy = frame.evaluation().energy;
         let weight = |change: f64| (-(stretched_energy(frame, axis, change) - energy) / self.kt).exp();
         let sample = [
+            tension(carried),
             tension(view.conservative_pressure),
-            tension(view.pressure),
             weight(self.perturbation),
             weight(-self.perturbation),
         ];
@@ -134,7 +139,7 @@ impl Meter for SurfaceTension {
             Observation::new("surface_tension", "Surface tension", Kind::Scalar)
                 .samples(self.series.samples())
                 .column("stress", "energy/area", [self.series.mean(0)])
-                .column("stress_total", "energy/area", [self.series.mean(1)])
+                .column("stress_conservative", "energy/area", [self.series.mean(1)])
                 .column("free_energy", "energy/area", [free_energy]),
         ]
     }

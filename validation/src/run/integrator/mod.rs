@@ -184,6 +184,14 @@ impl Integrator {
         !matches!(self, Integrator::Aboba(_))
     }
 
+    /// For which part of a step each of its evaluations of forces acts, on average.
+    pub(super) fn force_shares(self) -> [f64; 2] {
+        match self {
+            Integrator::TwoStage { lambda, .. } => [1.0 - 2.0 * lambda, 2.0 * lambda],
+            _ => [1.0, 0.0],
+        }
+    }
+
     /// A step of `dt`, whose number is set. Of `want`, what is computed with the last forces.
     pub(super) fn step(self, system: &mut Simulation, dt: f64, want: Want) -> Result<(), RunError> {
         match self {

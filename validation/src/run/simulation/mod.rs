@@ -1,4 +1,5 @@
 mod operators;
+mod record;
 
 pub(super) use operators::Heat;
 
@@ -14,6 +15,7 @@ use psidpd_core::engine::{
     self, Engine, Particles, PassCounts, PeriodicBox, Plan, Precision, Request, Settings, Step, Tally, Want,
 };
 use psidpd_core::model::Model;
+use record::Record;
 use std::sync::OnceLock;
 
 /// Particles in a box, and the forces of one fluid on them.
@@ -76,6 +78,7 @@ pub struct Simulation {
     body_forces: Vec<BodyForce>,
     /// `Σ m v v` of the present velocities, once somebody has asked for it.
     flux: OnceLock<[f64; 6]>,
+    record: Option<Box<Record>>,
     /// Square of the longest way that a particle may go in one step.
     longest_move: f64,
 }
@@ -137,6 +140,7 @@ impl Simulation {
             support_force: [0.0; 3],
             body_forces: Vec::new(),
             flux: OnceLock::new(),
+            record: None,
             longest_move: domain.lengths().iter().map(|l| l * l).sum(),
             domain,
         })
@@ -394,7 +398,9 @@ impl Simulation {
         }
         self.number += 1;
         self.impulse_virial = [0.0; 6];
+        self.open_record(dt);
         integrator.step(self, dt, want)?;
+        self.close_record(integrator);
         (0..6).for_each(|c| self.tally.thermostat_virial[c] += self.impulse_virial[c]);
         self.stale = !integrator.forces_at_end();
         if reorder::is_due(self.number) {

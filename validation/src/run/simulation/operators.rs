@@ -49,6 +49,7 @@ impl Simulation {
                 }
             })
         });
+        self.record_ways(dt, |this, k| this.v[k]);
         self.refuse(faults, Some(dt), deferred)
     }
 
@@ -65,6 +66,7 @@ impl Simulation {
                 drift(part, over_mass, around, |x, v, _, _| (x + dt * v, v));
             })
         });
+        self.record_ways(dt, |this, k| this.v[k]);
         self.refuse(faults, Some(dt), false)
     }
 
@@ -111,6 +113,10 @@ impl Simulation {
                 });
             })
         });
+        self.record_ways(dt, |this, k| {
+            let back = (0.5 - lambda) * dt / this.mass[this.species[k] as usize];
+            std::array::from_fn(|c| this.v[k][c] + back * this.force[k][c])
+        });
         self.refuse(faults, Some(dt), false)
     }
 
@@ -130,27 +136,40 @@ impl Simulation {
     /// All forces at the present positions, drag at the present velocities and noise for a step of `dt` among them.
     pub(in crate::run) fn forces_with_thermostat(&mut self, dt: f64, want: Want) -> Result<(), RunError> {
         let step = Step { seed: self.seed, number: self.number, dt };
-        self.compute(want, self.thermostat.then_some(step))?;
+        self.compute(self.wants(want), self.thermostat.then_some(step))?;
         self.add_external_forces();
         self.drag_in_forces = Some(true);
+        self.record_forces();
+        if self.is_recording() && self.find_pairs(dt, true)? {
+            let v = std::mem::take(&mut self.v);
+            self.record_drag(1.0, &v);
+            self.v = v;
+        }
         Ok(())
     }
 
     /// All forces at the present positions but those of the thermostat.
     pub(in crate::run) fn conservative_forces(&mut self, want: Want) -> Result<(), RunError> {
-        self.compute(want, None)?;
+        self.compute(self.wants(want), None)?;
         self.add_external_forces();
         self.drag_in_forces = Some(false);
+        self.record_forces();
         Ok(())
+    }
+
+    /// With the virial, where it is recorded.
+    fn wants(&self, want: Want) -> Want {
+        Want { virial: want.virial || self.is_recording(), ..want }
     }
 
     /// Changes velocities by the thermostat, if it acts.
     pub(in crate::run) fn heat(&mut self, heat: Heat, want: Want, dt: f64) -> Result<(), RunError> {
         self.make_deferred_kick()?;
-        if !self.find_pairs(heat.time, want.virial)? {
+        if !self.find_pairs(heat.time, self.wants(want).virial)? {
             return Ok(());
         }
         self.flux.take();
+        let before = self.is_recording().then(|| self.v.clone());
         let Simulation { coupling: Some(coupling), forces, v, owned, seed, number, .. } = self else {
             return Ok(());
         };
@@ -162,6 +181,24 @@ impl Simulation {
             // That of a mean force over the step.
             for (sum, w) in self.impulse_virial.iter_mut().zip(virial) {
                 *sum += w * heat.time / dt;
+            }
+        }
+        if let Some(mut v) = before {
+            let share = heat.time / dt;
+            match heat.update {
+                // Drag at the velocities in the middle.
+                Update::Midpoint => {
+                    v.iter_mut()
+                        .zip(&self.v)
+                        .for_each(|(v, w)| (0..3).for_each(|c| v[c] = 0.5 * (v[c] + w[c])));
+                    self.record_drag(share, &v);
+                }
+                // The half of it that ends the step.
+                Update::ImplicitDrag => {
+                    v.clone_from(&self.v);
+                    self.record_drag(0.5 * share, &v);
+                }
+                _ => self.record_last_update(share),
             }
         }
         match self.velocities_fault() {
@@ -178,7 +215,7 @@ impl Simulation {
         noise: Law,
     ) -> Result<(), RunError> {
         self.conservative_forces(want)?;
-        if self.find_pairs(dt, want.virial)? {
+        if self.find_pairs(dt, self.wants(want).virial)? {
             let Simulation { coupling: Some(coupling), forces, seed, number, .. } = self else {
                 return Ok(());
             };
@@ -204,6 +241,12 @@ impl Simulation {
             *force = [0.0; 3];
         }
         (0..6).for_each(|c| self.impulse_virial[c] += virial[c]);
+        if drag {
+            // At the end of a step and at the beginning of the next.
+            let v = std::mem::take(&mut self.v);
+            self.record_drag(0.5, &v);
+            self.v = v;
+        }
     }
 
     /// Calls `work` and takes back what it does to the forces, and to their virial.

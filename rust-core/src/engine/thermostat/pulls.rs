@@ -1,0 +1,56 @@
+//! What drag does to each pair, for profiles of stress.
+//!
+//! The random force is left out: it is independent of the positions it acts at, so that it adds nothing to a mean but
+//! scatter.
+
+use super::PairThermostat;
+
+/// A pair and the mean force of drag on it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pull {
+    /// The first particle.
+    pub i: usize,
+    /// `r_i − r_j`.
+    pub d: [f64; 3],
+    /// The force on the first particle, divided by `d`.
+    pub strength: f64,
+}
+
+impl PairThermostat {
+    /// Drag at the velocities `v`, in the order of the particles that pairs were found of. None if distances were not
+    /// kept.
+    pub fn drags(&self, v: &[[f64; 3]]) -> Vec<Pull> {
+        let order = &self.cells.order;
+        self.pulls_by(|i, j, _, _, g| {
+            let (a, b) = (v[order[i] as usize], v[order[j] as usize]);
+            let along: f64 = (0..3).map(|c| g[c] * (a[c] - b[c])).sum();
+            -2.0 / self.dt * along
+        })
+    }
+
+    /// What the last update of one pair after the other has done, but for the noise of each pair itself, as a force over
+    /// its time. None if distances were not kept.
+    pub fn pulls(&self) -> Vec<Pull> {
+        self.pulls_by(|_, _, plane, k, _| self.impulses[plane][k] / self.dt)
+    }
+
+    /// With `strength` of the sorted particles, the plane, the pair in it, and `g`: what `g` is to be multiplied by.
+    fn pulls_by(&self, strength: impl Fn(usize, usize, usize, usize, [f64; 3]) -> f64) -> Vec<Pull> {
+        let mut pulls = Vec::new();
+        for (number, plane) in self.planes.iter().enumerate().filter(|(_, plane)| !plane.stretch.is_empty()) {
+            for (i, ends) in plane.start.windows(2).enumerate() {
+                for k in ends[0] as usize..ends[1] as usize {
+                    let (pair, stretch) = (&plane.pairs[k], f64::from(plane.stretch[k]));
+                    let j = pair.j as usize;
+                    let j =
+                        j.checked_sub(plane.own.len()).map_or(plane.own.start + j, |k| plane.next.start + k);
+                    let (i, g) = (plane.own.start + i, pair.g.map(f64::from));
+                    let strength = strength(i, j, number, k, g) / stretch;
+                    let i = self.cells.order[i] as usize;
+                    pulls.push(Pull { i, d: g.map(|g| stretch * g), strength });
+                }
+            }
+        }
+        pulls
+    }
+}

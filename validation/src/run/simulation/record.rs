@@ -1,0 +1,104 @@
+//! Records what carries momentum in a step, for observables.
+
+use super::{Integrator, Simulation};
+use crate::observe::flux::{Acted, Flux, Line};
+use psidpd_core::engine::thermostat::Pull;
+
+/// What is recorded of the present step, which takes `dt`.
+#[derive(Debug, Clone, Default)]
+pub struct Record {
+    dt: f64,
+    flux: Flux,
+    /// Whether operators add to it.
+    open: bool,
+}
+
+impl Simulation {
+    /// Whether what carries momentum is recorded in the steps from now on. Trajectories do not depend on it.
+    pub fn record_flux(&mut self, on: bool) {
+        match on {
+            true => drop(self.record.get_or_insert_default()),
+            false => self.record = None,
+        }
+    }
+
+    /// What carried momentum in the present step, if that was recorded.
+    pub fn flux(&self) -> Option<&Flux> {
+        self.record.as_deref().filter(|record| record.dt > 0.0).map(|record| &record.flux)
+    }
+
+    pub(super) fn is_recording(&self) -> bool {
+        self.record.as_ref().is_some_and(|record| record.open)
+    }
+
+    pub(super) fn open_record(&mut self, dt: f64) {
+        if let Some(record) = &mut self.record {
+            **record = Record { dt, flux: Flux::default(), open: true };
+        }
+    }
+
+    pub(super) fn close_record(&mut self, integrator: Integrator) {
+        let Some(record) = self.record.as_mut().filter(|record| record.open) else { return };
+        record.open = false;
+        let forces = &mut record.flux.forces;
+        for (acted, share) in forces.iter_mut().zip(integrator.force_shares()) {
+            acted.share = share;
+        }
+        // No need to keep what is still there.
+        if let Some(last) = forces.last_mut().filter(|_| integrator.forces_at_end()) {
+            last.at = None;
+        }
+    }
+
+    /// The ways of all particles to where they are, for a time `h` with the velocities `u`.
+    pub(super) fn record_ways(&mut self, h: f64, u: impl Fn(&Simulation, usize) -> [f64; 3]) {
+        if !self.is_recording() {
+            return;
+        }
+        let strengths: Vec<f64> = self.mass.iter().map(|m| m / h).collect();
+        let ways: Vec<Line> = (0..self.owned)
+            .map(|k| {
+                let strength = strengths[self.species[k] as usize];
+                Line { from: self.x[k], d: u(self, k).map(|u| h * u), strength }
+            })
+            .collect();
+        if let Some(Record { dt, flux, .. }) = self.record.as_deref_mut() {
+            flux.ways.extend(ways.into_iter().map(|way| Line { strength: way.strength / *dt, ..way }));
+        }
+    }
+
+    /// Conservative forces at the present positions.
+    pub(super) fn record_forces(&mut self) {
+        if !self.is_recording() {
+            return;
+        }
+        let at = Some((self.x[..self.owned].to_vec(), self.species[..self.owned].to_vec()));
+        let acted = Acted { share: 1.0, virial: self.tally.virial, at };
+        if let Some(record) = &mut self.record {
+            record.flux.forces.push(acted);
+        }
+    }
+
+    /// Drag at the velocities `v` for a part of the step; its pairs must have been found.
+    pub(super) fn record_drag(&mut self, share: f64, v: &[[f64; 3]]) {
+        if let Some(coupling) = self.coupling.as_ref().filter(|_| self.is_recording()) {
+            self.record_pulls(share, coupling.drags(v));
+        }
+    }
+
+    /// What an update of one pair after the other has done for a part of the step.
+    pub(super) fn record_last_update(&mut self, share: f64) {
+        if let Some(coupling) = self.coupling.as_ref().filter(|_| self.is_recording()) {
+            self.record_pulls(share, coupling.pulls());
+        }
+    }
+
+    fn record_pulls(&mut self, share: f64, pulls: Vec<Pull>) {
+        let Simulation { record: Some(record), x, .. } = self else { return };
+        record.flux.drag.extend(pulls.into_iter().map(|pull| Line {
+            from: x[pull.i],
+            d: pull.d,
+            strength: share * pull.strength,
+        }));
+    }
+}
