@@ -2,6 +2,7 @@
 
 use super::counts::PassCounts;
 use super::error::EngineError;
+use super::fault::Fault;
 use super::particles::{Particles, Step};
 use super::path::{Path, Reason};
 use super::plan::Plan;
@@ -74,15 +75,29 @@ impl Engine {
     /// # Errors
     /// As [`Plan::new`].
     pub fn with_pool(fluid: &Fluid, settings: Settings, pool: Arc<Pool>) -> Result<Engine, TooLarge> {
-        let plan = Plan::new(fluid)?;
-        Ok(Engine {
+        Ok(Engine::of_plan(Plan::new(fluid)?, settings, pool))
+    }
+
+    /// An engine whose sweep is wrong: for tests that others notice it.
+    ///
+    /// # Errors
+    /// As [`Plan::new`].
+    #[doc(hidden)]
+    pub fn with_fault(fluid: &Fluid, settings: Settings, fault: Fault) -> Result<Engine, TooLarge> {
+        let mut plan = Plan::new(fluid)?;
+        plan.fault = Some(fault);
+        Ok(Engine::of_plan(plan, settings, Arc::new(Pool::new(settings.threads))))
+    }
+
+    fn of_plan(plan: Plan, settings: Settings, pool: Arc<Pool>) -> Engine {
+        Engine {
             reference: Reference::of_plan(plan.clone()),
             sweep: Sweep::of_plan(plan, settings, pool),
             reference_only: false,
             path: None,
             excess: Vec::new(),
             densities: Vec::new(),
-        })
+        }
     }
 
     /// The plan.
@@ -215,8 +230,10 @@ impl Engine {
         let Request { particles, v, step, want } = request;
         match self.begin(Surroundings::Box(domain), *want) {
             Path::Sweep => {
-                let tally = self.sweep.evaluate(domain, particles, v, *step, *want, force, add)?;
+                let mut tally = self.sweep.evaluate(domain, particles, v, *step, *want, force, add)?;
                 self.fetch(*want);
+                let factor = Fault::factor(Fault::Virial, self.plan().fault);
+                tally.virial.iter_mut().chain(&mut tally.thermostat_virial).for_each(|w| *w *= factor);
                 Ok(tally)
             }
             Path::Reference(_) => {

@@ -22,6 +22,7 @@ mod error;
 mod excess;
 mod excess_pass;
 mod facade;
+mod fault;
 mod images;
 mod particles;
 mod path;
@@ -35,6 +36,8 @@ mod vectors;
 pub use counts::PassCounts;
 pub use error::EngineError;
 pub use facade::{Engine, Evaluated, Request};
+#[doc(hidden)]
+pub use fault::Fault;
 pub use images::Images;
 pub use particles::{Particles, Step};
 pub use path::{Path, Reason};

@@ -1,6 +1,7 @@
 //! What a fluid needs computed, worked out once.
 
 use super::excess::ExcessPlan;
+use super::fault::Fault;
 use crate::model::expression::{Formula, TooLarge};
 use crate::model::kernel::Kernel;
 use crate::model::{Continuation, ExcessFreeEnergy, Fluid, PairTerm, WeightedDensity};
@@ -23,6 +24,8 @@ pub struct Plan {
     pub(super) excess: Vec<ExcessPlan>,
     pub(super) pairs: Vec<PairTerm>,
     pub(super) thermostat: Option<ThermostatPlan>,
+    /// Of the sweep; for tests.
+    pub(super) fault: Option<Fault>,
     title: String,
     conservative: bool,
 }
@@ -108,6 +111,7 @@ impl Plan {
             cutoff: fluid.cutoff(),
             densities: fluid.densities.clone(),
             passes,
+            fault: None,
             linear,
             excess,
             pairs: fluid.pairs.clone(),

@@ -25,7 +25,7 @@ pub fn run(context: &Context) -> Result<Part, ValidateError> {
     let edge = if context.full { 12.0 } else { 7.0 };
     let filling = Filling { lengths: [edge; 3], thickness: edge, density: SET6.liquid };
     let state = equilibrated(&SET6, filling, 1500, SEED)?;
-    let length = Length { dt: 0.001, steps: 10_000, sample: 50, frame: 0 };
+    let length = Length { dt: 0.001, steps: 10_000, sample: 50, averaged: false, frame: 0 };
     let codes = [Code::BuiltIn, Code::Psi, Code::PsiMixed, Code::Eam, Code::Native, Code::NativeMixed];
     let state = &state;
     let jobs: Vec<Job<Result<Trace, ValidateError>>> = codes

@@ -12,6 +12,8 @@ pub struct WarrenSet {
     pub b: f64,
     /// Coexisting liquid density.
     pub liquid: f64,
+    /// Its error.
+    pub liquid_error: f64,
     /// Surface tension and its error.
     pub tension: (f64, f64),
     /// The shipped model file.
@@ -23,6 +25,7 @@ pub const SET5: WarrenSet = WarrenSet {
     name: "set 5",
     b: 40.0,
     liquid: 5.08,
+    liquid_error: 0.01,
     tension: (4.95, 0.03),
     file: include_str!("../../models/warren2003-set5.toml"),
 };
@@ -32,6 +35,7 @@ pub const SET6: WarrenSet = WarrenSet {
     name: "set 6",
     b: 25.0,
     liquid: 6.05,
+    liquid_error: 0.01,
     tension: (7.45, 0.04),
     file: include_str!("../../models/warren2003-set6.toml"),
 };

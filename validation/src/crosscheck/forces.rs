@@ -7,7 +7,7 @@ use super::{Context, Part, ValidateError};
 use crate::lammps::Lammps;
 use crate::report::{Check, Item, Section, Table};
 use crate::run::{Simulation, State};
-use psidpd_core::engine::{Precision, Settings, Step, Want, reference};
+use psidpd_core::engine::{Fault, PeriodicBox, Precision, Settings, Step, Want, reference};
 use psidpd_core::maximum::largest;
 use psidpd_core::model::{ForceLaw, Model};
 use serde_json::json;
@@ -80,8 +80,14 @@ fn plain(model: &Model, state: &State, step: Option<Step>) -> Result<Point, Vali
     Ok(Point { forces: by_tag(&state.tag, &forces), energy, virial })
 }
 
-/// What the native runner computes, held to the sums as they are written down: each of its terms shows in one of these.
-fn against_plain(part: &mut Part, state: &State) -> Result<(), ValidateError> {
+/// What the native runner computes, held to the sums as they are written down: each of its terms shows in one of these,
+/// were it wrong.
+fn against_plain(part: &mut Part, state: &State, fault: Option<Fault>) -> Result<(), ValidateError> {
+    let native = |model: &Model, step| {
+        let mut simulation = Simulation::new(model, 1.0, state.clone(), SEED)?;
+        fault.map_or(Ok(()), |fault| simulation.falsify(fault))?;
+        point_of(simulation, step)
+    };
     let step = Some(Step { seed: SEED, number: 0, dt: 0.01 });
     for (id, law, gamma, step) in [
         ("conservative", ForceLaw::Conservative, 0.0, None),
@@ -89,7 +95,7 @@ fn against_plain(part: &mut Part, state: &State) -> Result<(), ValidateError> {
         ("thermostat", ForceLaw::Conservative, super::fluids::GAMMA, step),
     ] {
         let model = SET6.model(law, gamma)?;
-        let found = native(&model, state, step)?.against(&plain(&model, state, step)?);
+        let found = native(&model, step)?.against(&plain(&model, state, step)?);
         for (what, value) in [("force", found.force), ("energy", found.energy), ("virial", found.virial)] {
             part.checks.push(Check::at_most(
                 format!("forces.native-{id}.{what}"),
@@ -102,7 +108,42 @@ fn against_plain(part: &mut Part, state: &State) -> Result<(), ValidateError> {
             ));
         }
     }
+    let model = SET6.model(ForceLaw::Conservative, 0.0)?;
+    let virial = native(&model, None)?.virial;
+    let (by_stress, by_energy) =
+        (virial[2] - 0.5 * (virial[0] + virial[1]), stretching(&model, state, fault)?);
+    part.checks.push(Check::at_most(
+        "forces.native.stretching",
+        "forces",
+        "native: W_zz − (W_xx + W_yy)/2, which makes the surface tension, against the change of U as the box is \
+         stretched at constant volume, relative",
+        by_stress / by_energy - 1.0,
+        1e-4,
+    ));
     Ok(())
+}
+
+/// dU/d ln A as the faces normal to z are stretched to A at constant volume.
+fn stretching(model: &Model, state: &State, fault: Option<Fault>) -> Result<f64, ValidateError> {
+    let energy = |change: f64| -> Result<f64, ValidateError> {
+        let scale = [(1.0 + change).sqrt(), (1.0 + change).sqrt(), 1.0 / (1.0 + change)];
+        let lengths = state.domain.lengths();
+        let lengths = std::array::from_fn(|c| scale[c] * lengths[c]);
+        let origin = state.domain.origin();
+        let mut stretched = state.clone();
+        stretched.domain = PeriodicBox::orthogonal(origin, lengths, state.domain.periodic())
+            .map_err(|e| ValidateError::Run(crate::run::RunError::State(e.to_string())))?;
+        for x in &mut stretched.x {
+            *x = stretched.domain.point(state.domain.fraction(*x));
+        }
+        let mut simulation = Simulation::new(model, 1.0, stretched, SEED)?;
+        fault.map_or(Ok(()), |fault| simulation.falsify(fault))?;
+        simulation.compute(Want::TOTALS, None)?;
+        Ok(simulation.potential_energy())
+    };
+    // The second derivative jumps where pairs leave a range: a small step, and rounding is far below.
+    const H: f64 = 1e-5;
+    Ok((energy(H)? - energy(-H)?) / (2.0 * H))
 }
 
 fn native_mixed(model: &Model, state: &State) -> Result<Point, ValidateError> {
@@ -195,7 +236,7 @@ pub fn run(context: &Context) -> Result<Part, ValidateError> {
         ..Setup::new(code, &SET6, law)
     };
 
-    against_plain(&mut part, &state)?;
+    against_plain(&mut part, &state, None)?;
     use ForceLaw::{Conservative, LucyLammps};
     let truth = native(&SET6.model(Conservative, 0.0)?, &state, None)?;
     let tight = [1e-12; 3];
@@ -340,6 +381,28 @@ fn smooth_particles(state: &State, margin: f64) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// An engine one of whose terms is 5 % wrong fails the checks of `psidpd validate`.
+    #[test]
+    fn every_fault_of_the_engine_fails_a_check() {
+        let filling = Filling { lengths: [4.0, 4.0, 6.0], thickness: 3.0, density: SET6.liquid };
+        let state = equilibrated(&SET6, filling, 100, SEED).unwrap();
+        let failed = |fault: Option<Fault>| -> Vec<String> {
+            let mut part = Part::default();
+            against_plain(&mut part, &state, fault).unwrap();
+            part.checks.iter().filter(|c| !c.passed).map(|c| c.id.clone()).collect()
+        };
+        assert_eq!(failed(None), Vec::<String>::new());
+        for fault in Fault::ALL {
+            let failed = failed(Some(fault));
+            let sign = match fault {
+                Fault::Drag | Fault::Noise => "forces.native-thermostat.force",
+                Fault::Virial => "forces.native.stretching",
+                _ => "forces.native-conservative.force",
+            };
+            assert!(failed.iter().any(|id| id == sign), "{fault:?}: {failed:?}");
+        }
+    }
 
     /// A term that is 5 % wrong, in the forces or in the virial, is far beyond every limit; so is what is no number.
     #[test]

@@ -5,7 +5,9 @@ use super::{Context, ValidateError};
 use crate::lammps::dump;
 use crate::run::{Integrator, Simulation, State};
 use psidpd_core::engine::{Precision, Settings, Want};
+use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// How long a run is and what is kept of it.
@@ -17,11 +19,13 @@ pub struct Length {
     pub steps: u64,
     /// Steps between samples of temperature, energy and pressure.
     pub sample: u64,
+    /// Whether a sample is the mean over these steps, which has less of the random force in it.
+    pub averaged: bool,
     /// Steps between frames of positions; 0 for none.
     pub frame: u64,
 }
 
-/// Series of a run, sampled every [`Length::sample`] steps from step 0.
+/// Series of a run, sampled every [`Length::sample`] steps, from step 0 unless averaged.
 #[derive(Debug, Clone, Default)]
 pub struct Trace {
     /// Time.
@@ -34,6 +38,8 @@ pub struct Trace {
     pub potential: Vec<f64>,
     /// Pressure tensor xx, yy, zz, xy, xz, yz.
     pub pressure: [Vec<f64>; 6],
+    /// The same without drag and noise; of the native runner alone.
+    pub conservative: [Vec<f64>; 6],
     /// z of every particle, for each frame.
     pub frames: Vec<Vec<f64>>,
     /// How many particles.
@@ -41,14 +47,12 @@ pub struct Trace {
 }
 
 impl Trace {
-    fn push(&mut self, time: f64, temperature: f64, kinetic: f64, potential: f64, pressure: [f64; 6]) {
-        self.time.push(time);
-        self.temperature.push(temperature);
-        self.kinetic.push(kinetic);
-        self.potential.push(potential);
-        for (series, p) in self.pressure.iter_mut().zip(pressure) {
-            series.push(p);
-        }
+    /// Time, temperature, kinetic and potential energy, pressure tensor, and perhaps that of conservative forces.
+    fn push(&mut self, sample: &[f64]) {
+        let Trace { time, temperature, kinetic, potential, pressure, conservative, .. } = self;
+        let first = [time, temperature, kinetic, potential];
+        let series = first.into_iter().chain(pressure).chain(conservative);
+        series.zip(sample).for_each(|(series, x)| series.push(*x));
     }
 
     /// A third of the trace of the pressure tensor.
@@ -74,7 +78,7 @@ pub fn run(
 ) -> Result<Trace, ValidateError> {
     match setup.code {
         Code::Native | Code::NativeMixed => native(setup, state, length, advance),
-        _ => lammps(context, setup, state, length, &context.work.join(name)),
+        _ => lammps(context, setup, state, length, &context.work.join(name), advance),
     }
 }
 
@@ -91,20 +95,27 @@ fn native(
     }
     let mut trace = Trace { particles: state.len(), ..Trace::default() };
     simulation.prepare(length.dt, Want::TOTALS)?;
+    let (mut sum, mut count) = ([0.0; 16], 0.0);
     for step in 0..=length.steps {
-        let sample = step % length.sample == 0;
+        let due = step % length.sample == 0;
+        let taken = due || length.averaged;
         if step > 0 {
-            let want = if sample { Want::TOTALS } else { Want::FORCES };
+            let want = if taken { Want::TOTALS } else { Want::FORCES };
             simulation.step(length.dt, Integrator::VelocityVerlet, want)?;
         }
-        if sample {
-            trace.push(
-                step as f64 * length.dt,
-                simulation.temperature(),
-                simulation.kinetic_energy(),
-                simulation.potential_energy(),
-                simulation.pressure_tensor(),
-            );
+        if taken && (step > 0 || !length.averaged) {
+            let scalars =
+                [simulation.temperature(), simulation.kinetic_energy(), simulation.potential_energy()];
+            let tensors = [simulation.pressure_tensor(), simulation.conservative_pressure_tensor()];
+            let values = scalars.iter().chain(tensors.as_flattened());
+            sum[1..].iter_mut().zip(values).for_each(|(sum, x)| *sum += x);
+            count += 1.0;
+        }
+        if due && count > 0.0 {
+            let mut sample = sum.map(|sum| sum / count);
+            sample[0] = step as f64 * length.dt;
+            trace.push(&sample);
+            (sum, count) = ([0.0; 16], 0.0);
             advance(step);
         }
         if length.frame > 0 && step % length.frame == 0 {
@@ -121,14 +132,16 @@ fn lammps(
     state: &State,
     length: Length,
     folder: &Path,
+    advance: &(dyn Fn(u64) + Sync),
 ) -> Result<Trace, ValidateError> {
     let mut deck = setup.prepare(context, state, folder, false)?;
     deck.push_str(&format!(
         "fix move all nve\ntimestep {}\nthermo_modify norm no\nvariable kinetic equal ke\n\
-         variable potential equal pe\nfix series all ave/time {s} 1 {s} c_thermo_temp v_kinetic v_potential \
+         variable potential equal pe\nfix series all ave/time {} {s} c_thermo_temp v_kinetic v_potential \
          c_thermo_press[1] c_thermo_press[2] c_thermo_press[3] c_thermo_press[4] c_thermo_press[5] \
          c_thermo_press[6] file series.txt format \" %.16g\"\n",
         length.dt,
+        if length.averaged { format!("1 {}", length.sample) } else { format!("{} 1", length.sample) },
         s = length.sample,
     ));
     if length.frame > 0 {
@@ -141,9 +154,23 @@ fn lammps(
     let script = folder.join("in.lammps");
     std::fs::write(&script, deck).map_err(ValidateError::io(&script))?;
     let limit = Duration::from_secs(if context.full { 6 * 3600 } else { 1200 });
-    context.host.run_script(1, folder, &script, &["-log", "log.lammps"], limit)?;
+    let over = AtomicBool::new(false);
+    let series = folder.join("series.txt");
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            while !over.load(Ordering::Relaxed) {
+                std::thread::sleep(Duration::from_millis(200));
+                if let Some(step) = last_step(&series) {
+                    advance(step);
+                }
+            }
+        });
+        let done = context.host.run_script(1, folder, &script, &["-log", "log.lammps"], limit);
+        over.store(true, Ordering::Relaxed);
+        done
+    })?;
     let mut trace = Trace { particles: state.len(), ..Trace::default() };
-    read_series(&folder.join("series.txt"), length, &mut trace)?;
+    read_series(&series, length, &mut trace)?;
     if length.frame > 0 {
         let path = folder.join("frames.txt");
         for frame in dump::read(&path)? {
@@ -157,24 +184,32 @@ fn lammps(
     Ok(trace)
 }
 
+/// The step of the last whole line of that file.
+fn last_step(path: &Path) -> Option<u64> {
+    const ENOUGH: u64 = 1000;
+    let mut file = std::fs::File::open(path).ok()?;
+    let length = file.metadata().ok()?.len();
+    file.seek(SeekFrom::Start(length.saturating_sub(ENOUGH))).ok()?;
+    let mut text = String::new();
+    file.read_to_string(&mut text).ok()?;
+    text.rsplit('\n').nth(1)?.split_whitespace().next()?.parse().ok()
+}
+
 /// The file of `fix ave/time`: comments, then step and nine numbers.
 fn read_series(path: &Path, length: Length, trace: &mut Trace) -> Result<(), ValidateError> {
     let text = std::fs::read_to_string(path).map_err(ValidateError::io(path))?;
     for line in text.lines().filter(|l| !l.starts_with('#')) {
         let numbers: Vec<f64> = line.split_whitespace().filter_map(|w| w.parse().ok()).collect();
-        let [step, t, k, u, pressure @ ..] = numbers.as_slice() else {
+        let Ok(mut sample) = <[f64; 10]>::try_from(numbers) else {
             return Err(ValidateError::Output {
                 path: path.into(),
                 problem: format!("unexpected line: {line}"),
             });
         };
-        let pressure = <[f64; 6]>::try_from(pressure).map_err(|_| ValidateError::Output {
-            path: path.into(),
-            problem: format!("unexpected line: {line}"),
-        })?;
-        trace.push(step * length.dt, *t, *k, *u, pressure);
+        sample[0] *= length.dt;
+        trace.push(&sample);
     }
-    let expected = (length.steps / length.sample + 1) as usize;
+    let expected = (length.steps / length.sample) as usize + usize::from(!length.averaged);
     if trace.time.len() != expected {
         return Err(ValidateError::Output {
             path: path.into(),

@@ -1,6 +1,6 @@
 //! Momentum balances in what the observables tell of stress, at a time step so long that velocities at the ends of steps and
-//! conservative forces alone are far from it. Errors are those of means over stretches of a run, or of the run; five of
-//! them, or six of sixteen stretches, are exceeded by chance less than once in 10⁴ runs. The seeds are fixed.
+//! conservative forces alone are far from it. Errors are those of the mean of sixteen stretches of a run; six of
+//! them are exceeded by chance less than once in 10⁴ runs. The seeds are fixed.
 
 use super::frame::Frame;
 use super::tests::{SET6, find};
@@ -52,16 +52,20 @@ fn what_is_carried_across_a_film_is_nothing() {
         simulation.advance(200, DT, integrator).unwrap();
         simulation.record_flux(true);
         let (mut carried, mut conservative) = (Vec::new(), Vec::new());
-        for _ in 0..1500 {
-            simulation.step(DT, integrator, Want::TOTALS).unwrap();
-            let frame = Frame::new(simulation.view(0.0), &fluid);
-            carried.push(frame.carried_pressure().unwrap()[2]);
-            conservative.push(frame.view.conservative_pressure[2]);
+        for _ in 0..16 {
+            let (mut sums, steps) = ([0.0; 2], 100);
+            for _ in 0..steps {
+                simulation.step(DT, integrator, Want::TOTALS).unwrap();
+                let frame = Frame::new(simulation.view(0.0), &fluid);
+                sums[0] += frame.carried_pressure().unwrap()[2];
+                sums[1] += frame.view.conservative_pressure[2];
+            }
+            carried.push(sums[0] / f64::from(steps));
+            conservative.push(sums[1] / f64::from(steps));
         }
         let (carried, conservative) = (Measured::mean(&carried), Measured::mean(&conservative));
-        assert!(carried.value.abs() < 5.0 * carried.error, "{name}: {carried:?}");
-        assert!(carried.error < 0.06, "{name}: {carried:?}");
-        let seen = conservative.value.abs() > 5.0 * conservative.error;
+        assert!(carried.value.abs() < 6.0 * carried.error && carried.error < 0.12, "{name}: {carried:?}");
+        let seen = conservative.value.abs() > 4.0 * carried.error;
         assert!(seen || integrator != Integrator::VelocityVerlet, "{conservative:?}");
     }
 }
@@ -75,7 +79,7 @@ fn normal_pressure_is_the_same_everywhere() {
     let mut simulation = Simulation::new(&scene.model, 1.0, scene.initial_state(), 11).unwrap();
     simulation.prepare(DT, Want::FORCES).unwrap();
     simulation.advance(300, DT, Integrator::VelocityVerlet).unwrap();
-    let differences: Vec<f64> = stretches(&scene, &mut simulation, 20)
+    let differences: Vec<f64> = stretches(&scene, &mut simulation, 40)
         .iter()
         .map(|out| {
             let normal = &find(out, "stress_profile").get("normal").unwrap().values;
@@ -84,7 +88,8 @@ fn normal_pressure_is_the_same_everywhere() {
         })
         .collect();
     let found = Measured::mean(&differences);
-    assert!(found.value.abs() < 6.0 * found.error && found.error < 0.12, "{found:?}");
+    eprintln!("{found:?}");
+    assert!(found.value.abs() < 6.0 * found.error && found.error < 0.16, "{found:?}");
 }
 
 /// In a drop `r² P_N` grows as `∫ 2 r P_T dr`: between the liquid and the vapour, where nothing is left. With velocities at
@@ -93,11 +98,11 @@ fn normal_pressure_is_the_same_everywhere() {
 fn a_drop_balances() {
     let scene = scene(
         "[8.0, 8.0, 8.0]",
-        "kind = \"random\"\ncount = 400",
+        "kind = \"random\"\ncount = 500",
         "[observe.drop]\nevery = 5\nbins = 40\nrange = 4.0",
     );
     let mut state = scene.initial_state();
-    let side = (400.0f64 / 6.05).cbrt();
+    let side = (500.0f64 / 6.05).cbrt();
     for x in &mut state.x {
         *x = x.map(|c| (c / 8.0 - 0.5) * side);
     }
@@ -107,7 +112,7 @@ fn a_drop_balances() {
         simulation.advance(300, dt, Integrator::VelocityVerlet).unwrap();
     }
     let h = 0.1;
-    let residuals: Vec<f64> = stretches(&scene, &mut simulation, 15)
+    let residuals: Vec<f64> = stretches(&scene, &mut simulation, 25)
         .iter()
         .map(|out| {
             let profile = find(out, "drop_profile");
@@ -118,9 +123,59 @@ fn a_drop_balances() {
                 let pull: f64 = (a..40).map(|k| 2.0 * (k as f64 + 0.5) * h * tangential[k] * h).sum();
                 0.5 * (normal[a - 1] + normal[a]) + (pull - 16.0 * normal[39]) / (r * r)
             };
-            (14..=18).map(residual).sum::<f64>() / 5.0
+            if std::env::var_os("SHOW").is_some() {
+                for a in 1..40 {
+                    eprintln!(
+                        "R {a} {} {} {} {}",
+                        normal[a],
+                        tangential[a],
+                        residual(a),
+                        profile.get("density").unwrap().values[a]
+                    );
+                }
+            }
+            (20..=22).map(residual).sum::<f64>() / 3.0
         })
         .collect();
     let found = Measured::mean(&residuals);
-    assert!(found.value.abs() < 6.0 * found.error && found.error < 0.14, "{found:?}");
+    eprintln!("{found:?}");
+    assert!(found.value.abs() < 6.0 * found.error && found.error < 0.16, "{found:?}");
+}
+
+/// Of sixteen runs of a liquid, errors that are reported over the spread of what they are errors of: by chance beyond these
+/// bounds for one quantity in 10⁴.
+#[test]
+fn errors_in_a_liquid_are_the_spread_over_seeds() {
+    let observe = "[observe]\nevery = 5\ntemperature = true\npressure = true\nenergy = true\n";
+    let scene = scene("[3.0, 3.0, 3.0]", "kind = \"lattice\"\ndensity = 6.05", observe);
+    let run = |seed: u64| {
+        let mut simulation = Simulation::new(&scene.model, 1.0, scene.initial_state(), seed).unwrap();
+        simulation.prepare(0.01, Want::FORCES).unwrap();
+        simulation.advance(300, 0.01, Integrator::VelocityVerlet).unwrap();
+        let mut observers = Observers::new(&scene.observe, ["run"]);
+        for _ in 0..300 {
+            simulation.record_flux(false);
+            simulation.advance(4, 0.01, Integrator::VelocityVerlet).unwrap();
+            simulation.record_flux(true);
+            simulation.step(0.01, Integrator::VelocityVerlet, Want::TOTALS).unwrap();
+            observers.sample(simulation.view(0.0), "run");
+        }
+        observers.finish()
+    };
+    let runs: Vec<Vec<Observation>> = (0..16).map(|seed| run(100 + seed)).collect();
+    for (observable, quantity) in [
+        ("temperature", "kinetic"),
+        ("pressure", "carried"),
+        ("pressure", "conservative"),
+        ("pressure", "total"),
+        ("energy", "potential"),
+    ] {
+        let found: Vec<Measured> =
+            runs.iter().map(|all| find(all, observable).scalar(quantity).unwrap()).collect();
+        let mean = found.iter().map(|m| m.value).sum::<f64>() / 16.0;
+        let spread = (found.iter().map(|m| (m.value - mean).powi(2)).sum::<f64>() / 15.0).sqrt();
+        let reported = found.iter().map(|m| m.error).sum::<f64>() / 16.0;
+        eprintln!("{observable} {quantity} {mean} {reported} {spread} {}", spread / reported);
+        assert!((0.45..1.8).contains(&(spread / reported)), "{observable} {quantity}: {spread} {reported}");
+    }
 }

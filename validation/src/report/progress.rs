@@ -2,7 +2,8 @@
 
 use std::borrow::Cow;
 use std::io::{IsTerminal, stderr};
-use std::time::Duration;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
 
 use indicatif::{
     MultiProgress, ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressState, ProgressStyle,
@@ -30,6 +31,39 @@ pub struct Progress {
 #[derive(Debug, Clone)]
 pub struct Bar {
     inner: ProgressBar,
+}
+
+/// How far work as a whole is, of which a line is printed every minute where no bar can be drawn.
+#[derive(Debug)]
+pub struct Overall {
+    bar: Bar,
+    name: String,
+    total: u64,
+    made: AtomicU64,
+    start: Instant,
+    /// Minutes that were told; none are where there is a bar.
+    told: Option<AtomicU64>,
+}
+
+impl Overall {
+    /// Counts `n` more.
+    pub fn advance(&self, n: u64) {
+        self.bar.advance(n);
+        let made = n + self.made.fetch_add(n, Ordering::Relaxed);
+        let minutes = self.start.elapsed().as_secs() / 60;
+        if let Some(told) = &self.told
+            && told.fetch_max(minutes, Ordering::Relaxed) < minutes
+        {
+            eprintln!("{}", so_far(&self.name, made, self.total, self.start.elapsed()));
+        }
+    }
+}
+
+fn so_far(name: &str, made: u64, total: u64, elapsed: Duration) -> String {
+    let share = made as f64 / total.max(1) as f64;
+    let left = elapsed.as_secs_f64() * (1.0 - share).max(0.0) / share;
+    let left = if left.is_finite() { format!("{:.0} min", left / 60.0) } else { "unknown".into() };
+    format!("{name}: {:.0} % after {} min, left: {left}", 100.0 * share, elapsed.as_secs() / 60)
 }
 
 impl Progress {
@@ -63,6 +97,18 @@ impl Progress {
         bar.inner.update(|_| ());
         bar.inner.reset_eta();
         bar
+    }
+
+    /// Adds a bar for work as a whole, of `total` parts.
+    pub fn overall(&self, name: &str, total: u64) -> Overall {
+        Overall {
+            bar: self.bar(name, total),
+            name: one_line(name),
+            total,
+            made: AtomicU64::new(0),
+            start: Instant::now(),
+            told: (!self.visible).then(AtomicU64::default),
+        }
     }
 
     /// Adds a spinner, for work of unknown length.
@@ -148,6 +194,17 @@ mod tests {
         progress.bar("nothing", 0).advance(u64::MAX);
         progress.spinner("wait\nhere").advance(1);
         progress.note("a line");
+    }
+
+    #[test]
+    fn work_as_a_whole_says_what_is_left() {
+        let minutes = |n: u64| Duration::from_secs(60 * n);
+        assert_eq!(so_far("runs", 250, 1000, minutes(10)), "runs: 25 % after 10 min, left: 30 min");
+        assert_eq!(so_far("runs", 0, 1000, minutes(1)), "runs: 0 % after 1 min, left: unknown");
+        let overall = Progress::new().overall("runs", 10);
+        overall.advance(3);
+        overall.advance(4);
+        assert_eq!(overall.made.into_inner(), 7);
     }
 
     #[test]

@@ -12,7 +12,8 @@ use super::reorder::{self, Reordering};
 use crate::particles::{BodyForce, State, Tags, add_body_forces};
 use psidpd_core::engine::thermostat::PairThermostat;
 use psidpd_core::engine::{
-    self, Engine, Particles, PassCounts, PeriodicBox, Plan, Precision, Request, Settings, Step, Tally, Want,
+    self, Engine, Fault, Particles, PassCounts, PeriodicBox, Plan, Precision, Request, Settings, Step, Tally,
+    Want,
 };
 use psidpd_core::model::Model;
 use record::Record;
@@ -225,6 +226,16 @@ impl Simulation {
     pub fn evaluation(&self) -> String {
         let want = Want { densities: self.all_densities, ..Want::FORCES };
         self.forces.describe(self.forces.path_for(engine::Surroundings::Box(&self.domain), want))
+    }
+
+    /// Makes forces wrong from now on, until settings or the temperature are set: for tests that others notice it.
+    ///
+    /// # Errors
+    /// As [`Simulation::set_settings`].
+    #[doc(hidden)]
+    pub fn falsify(&mut self, fault: Fault) -> Result<(), RunError> {
+        self.forces = Engine::with_fault(&self.model.at(self.kt)?, self.settings(), fault)?;
+        Ok(())
     }
 
     /// Switches dissipative and random forces off, or on again.
