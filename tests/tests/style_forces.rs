@@ -5,6 +5,7 @@ mod style_common;
 
 use psidpd_core::maximum::largest;
 use psidpd_core::model::{Model, SplinePair, spline_dpd};
+use psidpd_tests::lammps;
 use style_common::*;
 
 const CLOSE: f64 = 1e-10;
@@ -173,6 +174,73 @@ fn ranks_do_not_matter() {
                 [difference(&other.x, &one.x), difference(&other.v, &one.v), difference(&other.f, &one.f)];
             assert!(apart.iter().all(|d| *d < 1e-9), "{ranks} ranks: {apart:?}\n{script}");
         }
+    }
+}
+
+/// Energies, stresses, densities and ψ of single atoms are the same on two ranks as on one, and add up to the totals; forces
+/// in mixed precision by two threads on each rank are those in double precision to rounding.
+#[test]
+fn single_atoms_and_mixed_precision_on_two_ranks() {
+    let (_folder, wide) = file(WIDE);
+    let folder = tempfile::tempdir().unwrap();
+    let start = folder.path().join("start.data").display().to_string();
+    open(&format!(
+        "{}pair_style zero 1.0\npair_coeff * *\nwrite_data \"{start}\" nocoeff\n",
+        particles("", "block 0 6 0 6 0 6", 2, 700)
+    ));
+    let script = |keywords: &str, more: &str| {
+        format!(
+            "units lj\natom_style atomic\natom_modify map yes\ncomm_modify vel yes\nread_data \"{start}\"\n{}\
+             pair_style dpd/psi 1.0 {SEED} {keywords}\npair_coeff * * \"{wide}\" A B\n{more}fix 1 all nve\n\
+             thermo_modify norm no\ntimestep {DT}\nrun 2\n",
+            load()
+        )
+    };
+    let exact = run(&script("precision double", ""), 1);
+    for ranks in [1, 2] {
+        let mixed = run(&script("precision mixed threads 2", ""), ranks);
+        let apart = difference(&mixed.f, &exact.f);
+        assert!(apart > 1e-13 && apart < 1e-4, "{ranks} ranks: {apart}");
+    }
+    let values = |ranks: usize| -> (Vec<f64>, Vec<f64>) {
+        let more = "fix n all pair 1 dpd/psi density 0\nfix u all pair 1 dpd/psi psi 0\n\
+            compute e all pe/atom\ncompute s all stress/atom NULL virial\ncompute w all pressure NULL virial\n\
+            compute all all reduce sum c_e c_s[1] c_s[2] c_s[3] c_s[4] c_s[5] c_s[6]\n\
+            thermo_style custom step pe c_all[1] c_w[1] c_w[2] c_w[3] c_w[4] c_w[5] c_w[6]\n";
+        let last = "print \"$(pe:%.17g) $(c_w[1]*vol:%.17g) $(c_w[2]*vol:%.17g) $(c_w[3]*vol:%.17g) \
+            $(c_w[4]*vol:%.17g) $(c_w[5]*vol:%.17g) $(c_w[6]*vol:%.17g) \" file totals.txt screen no\n\
+            write_dump all custom atoms.dump id f_n[1] f_n[2] f_n[3] f_n[4] f_u c_e c_s[1] c_s[2] c_s[3] c_s[4] c_s[5] \
+            c_s[6] modify sort id format float %.17g\n";
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("in.lammps");
+        let text = script("precision mixed threads 2", more);
+        std::fs::write(&path, format!("{text}{last}")).unwrap();
+        lammps().0.run_script(ranks, folder.path(), &path, &[], LIMIT).unwrap();
+        let numbers = |name: &str, skip: usize| -> Vec<f64> {
+            let text = std::fs::read_to_string(folder.path().join(name)).unwrap();
+            let lines = text.lines().skip(skip);
+            lines.flat_map(|l| l.split_whitespace().map(|w| w.parse().unwrap())).collect()
+        };
+        (numbers("totals.txt", 0), numbers("atoms.dump", 9))
+    };
+    let (totals, one) = values(1);
+    let (others, two) = values(2);
+    assert_eq!((totals.len(), one.len(), two.len()), (7, 700 * 13, 700 * 13));
+    let near = |a: f64, b: f64, scale: f64| (a - b).abs() < 1e-4 * scale;
+    for (totals, atoms) in [(&totals, &one), (&others, &two)] {
+        for (k, total) in totals.iter().enumerate() {
+            let sum: f64 = atoms.chunks(13).map(|row| row[6 + k]).sum();
+            let sign = if k == 0 { 1.0 } else { -1.0 };
+            assert!((sign * sum - total).abs() < 1e-9 * totals[0].abs(), "{k}: {sum} {total}");
+        }
+    }
+    for column in 0..13 {
+        let of = |rows: &[f64]| -> Vec<f64> { rows.chunks(13).map(|row| row[column]).collect() };
+        let (a, b) = (of(&one), of(&two));
+        let scale = (a.iter().map(|x| x * x).sum::<f64>() / 700.0).sqrt();
+        assert!(scale > 0.0, "{column}");
+        // Drag and noise of mixed precision have moved the atoms by two steps.
+        assert!(a.iter().zip(&b).all(|(a, b)| near(*a, *b, scale)), "{column}");
     }
 }
 

@@ -88,7 +88,6 @@ fn normal_pressure_is_the_same_everywhere() {
         })
         .collect();
     let found = Measured::mean(&differences);
-    eprintln!("{found:?}");
     assert!(found.value.abs() < 6.0 * found.error && found.error < 0.16, "{found:?}");
 }
 
@@ -97,14 +96,14 @@ fn normal_pressure_is_the_same_everywhere() {
 #[test]
 fn a_drop_balances() {
     let scene = scene(
-        "[8.0, 8.0, 8.0]",
-        "kind = \"random\"\ncount = 500",
+        "[9.0, 9.0, 9.0]",
+        "kind = \"random\"\ncount = 400",
         "[observe.drop]\nevery = 5\nbins = 40\nrange = 4.0",
     );
     let mut state = scene.initial_state();
-    let side = (500.0f64 / 6.05).cbrt();
+    let side = (400.0f64 / 6.05).cbrt();
     for x in &mut state.x {
-        *x = x.map(|c| (c / 8.0 - 0.5) * side);
+        *x = x.map(|c| (c / 9.0 - 0.5) * side);
     }
     let mut simulation = Simulation::new(&scene.model, 1.0, state, 11).unwrap();
     for dt in [0.005, DT] {
@@ -123,23 +122,11 @@ fn a_drop_balances() {
                 let pull: f64 = (a..40).map(|k| 2.0 * (k as f64 + 0.5) * h * tangential[k] * h).sum();
                 0.5 * (normal[a - 1] + normal[a]) + (pull - 16.0 * normal[39]) / (r * r)
             };
-            if std::env::var_os("SHOW").is_some() {
-                for a in 1..40 {
-                    eprintln!(
-                        "R {a} {} {} {} {}",
-                        normal[a],
-                        tangential[a],
-                        residual(a),
-                        profile.get("density").unwrap().values[a]
-                    );
-                }
-            }
-            (20..=22).map(residual).sum::<f64>() / 3.0
+            (17..=19).map(residual).sum::<f64>() / 3.0
         })
         .collect();
     let found = Measured::mean(&residuals);
-    eprintln!("{found:?}");
-    assert!(found.value.abs() < 6.0 * found.error && found.error < 0.16, "{found:?}");
+    assert!(found.value.abs() < 6.0 * found.error && found.error < 0.18, "{found:?}");
 }
 
 /// Of sixteen runs of a liquid, errors that are reported over the spread of what they are errors of: by chance beyond these
@@ -175,7 +162,6 @@ fn errors_in_a_liquid_are_the_spread_over_seeds() {
         let mean = found.iter().map(|m| m.value).sum::<f64>() / 16.0;
         let spread = (found.iter().map(|m| (m.value - mean).powi(2)).sum::<f64>() / 15.0).sqrt();
         let reported = found.iter().map(|m| m.error).sum::<f64>() / 16.0;
-        eprintln!("{observable} {quantity} {mean} {reported} {spread} {}", spread / reported);
         assert!((0.45..1.8).contains(&(spread / reported)), "{observable} {quantity}: {spread} {reported}");
     }
 }

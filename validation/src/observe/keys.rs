@@ -100,7 +100,7 @@ error of a single sample.
 
 **Error bars** are one standard deviation. Samples that follow each other are correlated; a mean has the larger
 of two errors, from the integrated autocorrelation time (Sokal's window) and from blocking (Flyvbjerg and
-Petersen, J. Chem. Phys. 91, 461 (1989)). A quotient of means R = ⟨a⟩/⟨b⟩ has the error of the mean of
+Petersen, J. Chem. Phys. 91, 461 (1989)); that from blocking where the series swings, as pressures do. A quotient of means R = ⟨a⟩/⟨b⟩ has the error of the mean of
 (a − R b)/⟨b⟩; what is fitted to a mean profile has the jackknife error over twenty stretches of the run. Long
 series are kept as 256 to 511 block means (hanging drops 32 to 63, viscosities 64 to 127), so memory does not grow with the run; at the end the last block, if
 it is not complete, is left out. With fewer than 8 samples the error is the plain standard error.

@@ -101,8 +101,12 @@ impl Simulation {
         let State { domain, mass, mut x, v, species, tag, mut image } = state;
         let owned = x.len();
         reach::check(&domain, fluid.dimensions, fluid.cutoff(), owned)?;
-        for (x, image) in x.iter_mut().zip(&mut image) {
+        for ((x, image), tag) in x.iter_mut().zip(&mut image).zip(&tag) {
             domain.wrap(x, image);
+            // Counts that end there have stopped counting.
+            if image.iter().any(|boxes| [i32::MIN, i32::MAX].contains(boxes)) {
+                return Err(RunError::State(format!("particle {tag} is more than 2^31 boxes away")));
+            }
         }
         Ok(Simulation {
             model: model.clone(),

@@ -93,3 +93,17 @@ fn steps_in_a_row_are_steps_one_by_one() {
         assert!(single.state() == row.state() && single.forces() == row.forces());
     }
 }
+
+/// Counts of boxes hold 2³¹: who is farther away is refused, not counted wrong.
+#[test]
+fn particles_beyond_all_counts_are_refused() {
+    let mut state = state_of(IDEAL, "[4.0, 4.0, 4.0]", 1.0);
+    state.x[3][1] = 1e9;
+    assert!(Simulation::new(&Model::parse("m.toml", IDEAL).unwrap(), 1.0, state.clone(), 7).is_ok());
+    state.x[3][1] = -1e10;
+    let error = Simulation::new(&Model::parse("m.toml", IDEAL).unwrap(), 1.0, state.clone(), 7).unwrap_err();
+    assert!(
+        error.to_string().contains(&format!("particle {} is more than 2^31 boxes", state.tag[3])),
+        "{error}"
+    );
+}
