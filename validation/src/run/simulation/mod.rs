@@ -93,7 +93,7 @@ impl Simulation {
         }
         let settings = Settings { precision: Precision::Double, ..Settings::default() };
         let forces = Engine::new(&fluid, settings)?;
-        let coupling = PairThermostat::new(forces.plan(), kt);
+        let coupling = PairThermostat::new(forces.plan(), kt, forces.settings().instructions);
         let State { domain, mass, mut x, v, species, tag, mut image } = state;
         let owned = x.len();
         reach::check(&domain, fluid.dimensions, fluid.cutoff(), owned)?;
@@ -153,8 +153,7 @@ impl Simulation {
             self.forces = Engine::with_pool(&self.model.at(kt)?, settings, pool)?;
             self.forces.use_reference_only(self.reference_only);
             self.kt = kt;
-            self.coupling = PairThermostat::new(self.forces.plan(), kt);
-            self.found_pairs = None;
+            self.renew_coupling();
         }
         Ok(())
     }
@@ -167,7 +166,14 @@ impl Simulation {
         self.earlier_out_of_bounds = self.out_of_bounds();
         self.forces = Engine::new(&self.model.at(self.kt)?, settings)?;
         self.forces.use_reference_only(self.reference_only);
+        self.renew_coupling();
         Ok(())
+    }
+
+    fn renew_coupling(&mut self) {
+        let instructions = self.forces.settings().instructions;
+        self.coupling = PairThermostat::new(self.forces.plan(), self.kt, instructions);
+        self.found_pairs = None;
     }
 
     /// How forces are computed.
