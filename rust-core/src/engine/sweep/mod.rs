@@ -50,6 +50,9 @@ pub struct Sweep {
     pool: Arc<Pool>,
     workspace: EitherPrecision,
     species_of_type: Vec<i32>,
+    /// What is added to the densities of owned particles in the evaluation to come, beside pairs: a row of
+    /// [`Plan::slope_width`] for each, or nothing.
+    added_densities: Vec<f64>,
     /// In the host's order, where it has ghosts.
     slopes: Vec<f64>,
     owned: usize,
@@ -116,6 +119,7 @@ impl Sweep {
             pool,
             workspace,
             species_of_type,
+            added_densities: Vec::new(),
             slopes: Vec::new(),
             owned: 0,
             all: 0,
@@ -169,6 +173,12 @@ impl Sweep {
         Ok(())
     }
 
+    /// What to add to the densities of owned particles in evaluations to come, beside pairs: a row of
+    /// [`Plan::slope_width`] for each, or nothing.
+    pub(super) fn added_densities_mut(&mut self) -> &mut Vec<f64> {
+        &mut self.added_densities
+    }
+
     /// Whether particles in `domain` meet one image only of each other, as a sweep without ghosts needs:
     /// periods of twice the cut-off or more, and edges as LAMMPS has them, along the axes if some directions are open.
     pub fn fits(&self, domain: &PeriodicBox) -> bool {
@@ -208,7 +218,8 @@ impl Sweep {
         if force.len() < self.owned {
             return Err(EngineError::Host("the force array is too short"));
         }
-        let input = Input::new(particles, &[], v, &self.species_of_type, thermostat, want);
+        let input =
+            Input::new(particles, &[], v, &self.species_of_type, &self.added_densities, thermostat, want);
         let set = self.set;
         let (plan, pool, times) = (&self.plan, &self.pool, &mut self.times);
         let out = ForceSink::new(force, add, particles.tag);
@@ -243,7 +254,8 @@ impl Sweep {
         if !images.is_empty() && images.len() != self.all - self.owned {
             return Err(EngineError::Host("not as many ghosts as it was said of whether they are images"));
         }
-        let input = Input::new(particles, images, v, &self.species_of_type, thermostat, want);
+        let input =
+            Input::new(particles, images, v, &self.species_of_type, &self.added_densities, thermostat, want);
         let set = self.set;
         let (plan, pool, times) = (&self.plan, &self.pool, &mut self.times);
         with!(&mut self.workspace, m => {
@@ -356,7 +368,8 @@ impl Sweep {
 
     /// Bytes held in arrays over particles and pairs.
     pub fn memory(&self) -> usize {
-        self.slopes.capacity() * size_of::<f64>() + with!(&self.workspace, m => m.memory())
+        let numbers = self.slopes.capacity() + self.added_densities.capacity();
+        numbers * size_of::<f64>() + with!(&self.workspace, m => m.memory())
     }
 }
 

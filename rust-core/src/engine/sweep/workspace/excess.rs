@@ -22,6 +22,8 @@ pub struct ExcessInput<'a> {
     pub tag: &'a [i32],
     /// The self term of each density: `w(0)` for the particle's own species, else zero. One row for each species.
     self_weights: Vec<f64>,
+    /// What is added beside pairs, a row for each owned particle in the host's order; empty if nothing is.
+    added: &'a [f64],
 }
 
 impl<'a> ExcessInput<'a> {
@@ -38,7 +40,16 @@ impl<'a> ExcessInput<'a> {
                 self_weights.extend((0..count).map(|s| if s == species { own } else { 0.0 }));
             }
         }
-        Some(ExcessInput { plan, tag: input.particles.tag, self_weights })
+        Some(ExcessInput { plan, tag: input.particles.tag, self_weights, added: input.added_densities })
+    }
+
+    /// Adds what is added beside pairs to the densities of particles with these numbers.
+    fn add(&self, numbers: &[u32], width: usize, densities: &mut [f64]) {
+        for (k, row) in numbers.iter().zip(densities.chunks_exact_mut(width)) {
+            // Ghosts have no row.
+            let added = self.added.get(width * *k as usize..).unwrap_or_default();
+            row.iter_mut().zip(added).for_each(|(n, added)| *n += added);
+        }
     }
 }
 
@@ -68,6 +79,9 @@ impl DensityBlock<'_> {
     ) -> Result<(), EngineError> {
         let DensityBlock { first, added, species, ghost, densities, excess, slopes } = self;
         sum_densities(fluid.set, fluid.width(), added, &input.self_weights, species, densities);
+        if !input.added.is_empty() {
+            input.add(&order.order[first..][..excess.len()], fluid.width(), densities);
+        }
         let rows = &mut Rows { first: 0, columns: &fluid.variables, densities, excess, slopes };
         let tag = |s: usize| input.tag[order.order[first + s] as usize];
         match (species.is_empty(), ghost.is_empty()) {
