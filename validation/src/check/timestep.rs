@@ -15,8 +15,9 @@
 //!
 //! with `a` from runs of standard DPD and of Warren's liquid; `docs/integrators.md` has them.
 
+use crate::integrator::{Accuracy, Integrator};
 use crate::observe::configurational;
-use crate::run::{Accuracy, Integrator, RunError, Simulation, State};
+use crate::run::{RunError, Simulation, State};
 use crate::scene::Scene;
 use psidpd_core::engine::noise::{Law, PairNoise};
 use psidpd_core::engine::reference::Evaluator;

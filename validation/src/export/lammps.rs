@@ -6,7 +6,8 @@
 
 mod physics;
 
-use crate::run::{Counterpart, Integrator, RunError};
+use crate::integrator::{Counterpart, Integrator};
+use crate::run::RunError;
 use crate::scene::{Scene, Stage};
 use physics::Physics;
 use psidpd_core::document::{Document, FileError};

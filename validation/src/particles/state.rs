@@ -33,6 +33,15 @@ impl State {
         self.x.is_empty()
     }
 
+    /// Takes over all particles of `other`, which is of the same box and masses, and keeps the memory.
+    pub(crate) fn copy_particles(&mut self, other: &State) {
+        self.x.clone_from(&other.x);
+        self.v.clone_from(&other.v);
+        self.species.clone_from(&other.species);
+        self.tag.clone_from(&other.tag);
+        self.image.clone_from(&other.image);
+    }
+
     /// The first thing that makes this no state of a model with `species` species.
     pub(crate) fn fault(&self, species: usize, dimensions: usize) -> Option<String> {
         let count = self.x.len();

@@ -1,6 +1,7 @@
 //! What each integrator promises.
 
 use super::*;
+use crate::integrator::Coupling;
 use psidpd_core::engine::thermostat::Update;
 
 /// Those that keep the Maxwell distribution of an ideal gas exactly, at any time step.

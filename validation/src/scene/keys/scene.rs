@@ -1,7 +1,7 @@
 //! Which fluid, in which box.
 
 use super::{Key, OPTIONAL, REQUIRED, Table, ValueKind, key};
-use crate::run::{Integrator, THERMOSTAT_STEPS};
+use crate::integrator::{Integrator, THERMOSTAT_STEPS};
 use crate::scene::domain::BOUNDARIES;
 use psidpd_core::engine::Precision;
 use psidpd_core::engine::noise::Law;
