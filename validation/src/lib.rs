@@ -17,6 +17,8 @@ mod particles;
 pub mod report;
 pub mod run;
 pub mod scene;
+#[cfg(test)]
+mod test_support;
 
 #[global_allocator]
 static ALLOCATOR: psidpd_core::memory::LargePages = psidpd_core::memory::LargePages;

@@ -10,7 +10,7 @@ mod configuration;
 mod error;
 mod frame;
 pub mod picture;
-mod snapshot;
+pub mod snapshot;
 mod xyz;
 
 pub use about::{About, AboutDensity, AboutStage, THERMO};

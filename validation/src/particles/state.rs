@@ -23,6 +23,20 @@ pub struct State {
 }
 
 impl State {
+    /// Particles of the first species at rest at `x`, with tags from 1; `mass` is that of each species.
+    pub fn at_rest(domain: PeriodicBox, mass: Vec<f64>, x: Vec<[f64; 3]>) -> State {
+        let count = x.len();
+        State {
+            domain,
+            mass,
+            x,
+            v: vec![[0.0; 3]; count],
+            species: vec![0; count],
+            tag: (1..).take(count).collect(),
+            image: vec![[0; 3]; count],
+        }
+    }
+
     /// How many particles there are.
     pub fn len(&self) -> usize {
         self.x.len()

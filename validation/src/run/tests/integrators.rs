@@ -24,7 +24,7 @@ struct Gas {
 }
 
 fn ideal_gas(integrator: Integrator, dt: f64) -> Gas {
-    let model = IDEAL.replace("[\"A\"]", "[\"A\", \"B\"]");
+    let model = IDEAL_MIXTURE;
     let rest = ONE_STAGE.to_owned() + "[masses]\nB = 3.0\n";
     let state = scene_of(&model, "[4.0, 5.0, 4.0]", 4.0, &rest).unwrap().initial_state();
     let mut run = simulation(&model, state);
