@@ -89,7 +89,7 @@ impl PairLists {
         planes: &'p mut Vec<T>,
     ) -> Result<(), EngineError> {
         let species: Vec<i32> = (0..tables.species as i32).collect();
-        let input = Input::new(particles, &[], &[], &species, None, Want::FORCES);
+        let input = Input::new(particles, &[], &[], &species, &[], None, Want::FORCES);
         let set = self.set;
         let (geometry, mut grid) =
             region(set, pool, (self.dimensions, range), domain, &input).map_err(|fault| match fault {
