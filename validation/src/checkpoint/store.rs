@@ -1,6 +1,7 @@
 //! The checkpoints in the folder of a run.
 
 use super::{Checkpoint, CheckpointError, Unwritten, format};
+use crate::files::remove_if_there;
 use std::fs::File;
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
@@ -44,7 +45,7 @@ impl Store {
         let new = self.folder.join(UNFINISHED);
         let newest = self.path();
         self.write_new(checkpoint, &new).map_err(|source| {
-            // What is there of it only takes space.
+            // A partial file only takes space.
             let _ = std::fs::remove_file(&new);
             Unwritten { path: newest, source }
         })
@@ -59,13 +60,13 @@ impl Store {
         self.sync()
     }
 
-    /// Makes the newest one the one before, too: at no moment there is none.
+    /// Links the newest one as the one before, so that there is always at least one.
     fn keep_as_before(&self) -> io::Result<()> {
         let (newest, before) = (self.path(), self.folder.join(BEFORE));
         if !newest.exists() {
             return Ok(());
         }
-        absent_is_fine(std::fs::remove_file(&before))?;
+        remove_if_there(&before)?;
         // Where there are no hard links, a run killed now is left with `checkpoint.old` alone; that will do.
         std::fs::hard_link(&newest, &before).or_else(|_| std::fs::rename(&newest, &before))
     }
@@ -91,7 +92,7 @@ impl Store {
             Ok(checkpoint) => Ok(Some(Found { checkpoint, fallback: Some(newest) })),
             Err(error @ CheckpointError::Foreign { .. }) => Err(error),
             Err(_) if !self.exists() => Ok(None),
-            // A newest one that is not there says less.
+            // A missing newest one is less informative.
             Err(error) => Err(if self.path().exists() { newest } else { error }),
         }
     }
@@ -117,7 +118,7 @@ impl Store {
     fn remove(&self, names: &[&str]) -> Result<(), Unwritten> {
         for name in names {
             let path = self.folder.join(name);
-            absent_is_fine(std::fs::remove_file(&path)).map_err(Unwritten::at(&path))?;
+            remove_if_there(&path).map_err(Unwritten::at(&path))?;
         }
         Ok(())
     }
@@ -125,12 +126,5 @@ impl Store {
     /// Brings names to the disk.
     fn sync(&self) -> io::Result<()> {
         File::open(&self.folder)?.sync_all()
-    }
-}
-
-fn absent_is_fine(result: io::Result<()>) -> io::Result<()> {
-    match result {
-        Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
-        other => other,
     }
 }
