@@ -3,7 +3,7 @@
 use super::{Checkpoint, CheckpointError, Unwritten, format};
 use crate::files::remove_if_there;
 use std::fs::File;
-use std::io::{self, ErrorKind};
+use std::io;
 use std::path::{Path, PathBuf};
 
 pub(super) const NEWEST: &str = "checkpoint";

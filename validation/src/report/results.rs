@@ -82,6 +82,13 @@ impl Check {
         check
     }
 
+    /// The same check with a standard error to show; the verdict stays.
+    #[must_use]
+    pub fn with_error(mut self, error: f64) -> Self {
+        self.error = Some(error);
+        self
+    }
+
     fn judged(
         id: String,
         section: String,
@@ -205,8 +212,7 @@ mod tests {
     #[test]
     fn non_finite_floats_become_null() {
         let mut results = Results::new("t", "v");
-        let check = Check::at_most("a", "b", "c", f64::NAN, f64::INFINITY);
-        results.push(Check { error: Some(f64::NAN), ..check });
+        results.push(Check::at_most("a", "b", "c", f64::NAN, f64::INFINITY).with_error(f64::NAN));
         results.record("x", [1.0, f64::NAN]).unwrap();
         let json = results.to_json().unwrap();
         assert!(json.contains("\"value\": null") && json.contains("\"limit\": null"));

@@ -85,6 +85,10 @@ impl Forces {
         self.engine.plan()
     }
 
+    pub fn settings(&self) -> Settings {
+        self.engine.settings()
+    }
+
     pub fn pool(&self) -> &Pool {
         self.engine.pool()
     }
@@ -131,12 +135,13 @@ impl Simulation {
     pub fn set_settings(&mut self, settings: Settings) -> Result<(), RunError> {
         let Forces { model, kt, .. } = &self.forces;
         self.forces.replace(Engine::new(&model.at(*kt)?, settings)?);
+        self.thermostat.follow(&self.forces);
         Ok(())
     }
 
     /// How forces are computed.
     pub fn settings(&self) -> Settings {
-        self.forces.engine.settings()
+        self.forces.settings()
     }
 
     /// The engine, for what it can tell of itself.

@@ -36,7 +36,7 @@ pub struct Heat {
 
 impl Thermostat {
     pub fn new(forces: &Forces) -> Thermostat {
-        let pairs = PairThermostat::new(forces.plan(), forces.kt());
+        let pairs = pairs_of(forces);
         Thermostat {
             on: true,
             pairs,
@@ -47,9 +47,9 @@ impl Thermostat {
         }
     }
 
-    /// Takes over the temperature of `forces`.
+    /// Takes over the temperature and the settings of `forces`.
     pub fn follow(&mut self, forces: &Forces) {
-        self.pairs = PairThermostat::new(forces.plan(), forces.kt());
+        self.pairs = pairs_of(forces);
         self.found = None;
     }
 
@@ -73,9 +73,6 @@ impl Thermostat {
     }
 
     /// Finds the pairs for a time `dt`, and returns them if the thermostat acts.
-    ///
-    /// Where the forces were computed at these positions, their pairs could serve: the search is about half of what the
-    /// thermostat costs.
     fn find_pairs(
         &mut self,
         particles: &Particles,
@@ -117,6 +114,10 @@ impl Thermostat {
         external.clear_frozen(force);
         (0..6).for_each(|c| self.impulse_virial[c] += virial[c]);
     }
+}
+
+fn pairs_of(forces: &Forces) -> Option<PairThermostat> {
+    PairThermostat::new(forces.plan(), forces.kt(), forces.settings().instructions)
 }
 
 impl Simulation {
