@@ -16,6 +16,13 @@ pub struct WriteError {
     pub cause: std::io::Error,
 }
 
+impl WriteError {
+    /// For `map_err` on operations that write `path`.
+    pub fn at(path: &Path) -> impl FnOnce(io::Error) -> WriteError + '_ {
+        move |cause| WriteError { path: path.to_owned(), cause }
+    }
+}
+
 /// Writes a file so that readers see the old content or the new, never a part.
 ///
 /// The bytes go to a temporary file in the same folder, which is flushed to disk and then renamed over
@@ -23,7 +30,7 @@ pub struct WriteError {
 /// link, its target is replaced. Pipes, devices and the program's own output are written to directly.
 pub fn write_atomically(path: impl AsRef<Path>, bytes: &[u8]) -> Result<(), WriteError> {
     let path = path.as_ref();
-    write(path, bytes).map_err(|cause| WriteError { path: path.to_owned(), cause })
+    write(path, bytes).map_err(WriteError::at(path))
 }
 
 /// Removes a file, which need not be there.

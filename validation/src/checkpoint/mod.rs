@@ -21,7 +21,7 @@ mod identity;
 mod store;
 mod totals;
 
-pub use error::{CheckpointError, Unwritten};
+pub use error::CheckpointError;
 pub use format::VERSION;
 pub use identity::Identity;
 pub(crate) use store::{Found, Store};

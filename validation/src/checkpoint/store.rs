@@ -1,7 +1,7 @@
 //! The checkpoints in the folder of a run.
 
-use super::{Checkpoint, CheckpointError, Unwritten, format};
-use crate::files::remove_if_there;
+use super::{Checkpoint, CheckpointError, format};
+use crate::files::{WriteError, remove_if_there};
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -41,13 +41,13 @@ impl Store {
     }
 
     /// Writes another one and keeps the newest as the one before. If that fails, those that are there stay.
-    pub fn write(&self, checkpoint: &Checkpoint) -> Result<(), Unwritten> {
+    pub fn write(&self, checkpoint: &Checkpoint) -> Result<(), WriteError> {
         let new = self.folder.join(UNFINISHED);
         let newest = self.path();
-        self.write_new(checkpoint, &new).map_err(|source| {
+        self.write_new(checkpoint, &new).map_err(|cause| {
             // A partial file only takes space.
             let _ = std::fs::remove_file(&new);
-            Unwritten { path: newest, source }
+            WriteError { path: newest, cause }
         })
     }
 
@@ -98,27 +98,27 @@ impl Store {
     }
 
     /// Makes the one before the newest, so that the next one written will not push it out.
-    pub fn fall_back(&self) -> Result<(), Unwritten> {
+    pub fn fall_back(&self) -> Result<(), WriteError> {
         let newest = self.path();
         std::fs::rename(self.folder.join(BEFORE), &newest)
             .and_then(|()| self.sync())
-            .map_err(Unwritten::at(&newest))
+            .map_err(WriteError::at(&newest))
     }
 
     /// Removes all but the newest.
-    pub fn keep_newest(&self) -> Result<(), Unwritten> {
+    pub fn keep_newest(&self) -> Result<(), WriteError> {
         self.remove(&[UNFINISHED, BEFORE])
     }
 
     /// Removes all.
-    pub fn clear(&self) -> Result<(), Unwritten> {
+    pub fn clear(&self) -> Result<(), WriteError> {
         self.remove(&[UNFINISHED, BEFORE, NEWEST])
     }
 
-    fn remove(&self, names: &[&str]) -> Result<(), Unwritten> {
+    fn remove(&self, names: &[&str]) -> Result<(), WriteError> {
         for name in names {
             let path = self.folder.join(name);
-            remove_if_there(&path).map_err(Unwritten::at(&path))?;
+            remove_if_there(&path).map_err(WriteError::at(&path))?;
         }
         Ok(())
     }
