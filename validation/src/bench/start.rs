@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 /// Seed of starts and noise.
 pub const SEED: u64 = 20_030_606;
 
-/// Steps of Δt after 100 short ones: some times that a particle needs to pass its neighbours.
+/// Steps of Δt after 100 short ones: several times the time in which a particle passes its neighbours.
 const STEPS: u64 = 300;
 
 /// A state with the data files that LAMMPS reads.
@@ -46,7 +46,7 @@ pub fn random(subject: &Subject, size: usize) -> Result<State, BenchError> {
 /// The fluid in equilibrium, from `folder` if it is there.
 pub fn equilibrated(subject: &Subject, size: usize, folder: &Path) -> Result<Start, BenchError> {
     std::fs::create_dir_all(folder).map_err(BenchError::io(folder))?;
-    // Another model, seed or length of the run is another state.
+    // The state depends on model, seed and length of the run.
     let key = crc32fast::hash(format!("{} {SEED} {STEPS}", subject.text).as_bytes());
     let file = |end: &str| folder.join(format!("{}-{size}-{key:08x}.{end}", subject.name));
     let (kept, data, data_mdpd) = (file("state"), file("data"), file("mdpd.data"));
@@ -65,7 +65,7 @@ pub fn equilibrated(subject: &Subject, size: usize, folder: &Path) -> Result<Sta
     let text = state.to_data("psidpd bench");
     text.write(&data)?;
     text.write_mdpd(&data_mdpd)?;
-    // Last: it says that the others are whole.
+    // Written last: its presence shows that the others are complete.
     let bytes = postcard::to_stdvec(&state)
         .map_err(|e| BenchError::io(&kept)(std::io::Error::other(e.to_string())))?;
     crate::files::write_atomically(&kept, &bytes)?;
@@ -121,8 +121,8 @@ mod tests {
         assert!(matches!(random(&DPD, 20), Err(BenchError::TooSmall(20))));
     }
 
-    /// A temperature of 1200 and more degrees of freedom varies by 0.04: five times that is met once in 10⁶ runs.
-    /// A liquid that falls apart or collapses has other numbers of pairs.
+    /// A temperature of 1200 and more degrees of freedom varies by 0.04: five times that is met once in 10⁶
+    /// runs. The number of pairs shows whether the liquid fell apart or collapsed.
     #[test]
     fn fluids_are_in_equilibrium() {
         let folder = tempfile::tempdir().unwrap();

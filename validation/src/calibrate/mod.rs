@@ -288,7 +288,7 @@ pub fn calibrate(
     })
 }
 
-/// Digits that a calibration does not know only make a file unreadable.
+/// Drops digits below the accuracy of a calibration.
 fn rounded(p: &Polynomial) -> Polynomial {
     let round = |c: f64| {
         let digits = 6 - c.abs().max(1e-12).log10().ceil() as i32;

@@ -62,19 +62,3 @@ fn list(differences: &[String]) -> String {
         more => format!("{shown}; and {more} more"),
     }
 }
-
-/// A checkpoint that cannot be written.
-#[derive(Debug, thiserror::Error)]
-#[error("{} cannot be written: {source}", path.display())]
-pub struct Unwritten {
-    /// The file.
-    pub path: PathBuf,
-    /// Why.
-    pub source: std::io::Error,
-}
-
-impl Unwritten {
-    pub(super) fn at(path: &Path) -> impl FnOnce(std::io::Error) -> Unwritten + '_ {
-        move |source| Unwritten { path: path.to_owned(), source }
-    }
-}

@@ -68,7 +68,7 @@ enum Verb {
     Lammps(lammps::Verb),
 }
 
-/// What a verb that could be carried out says.
+/// The outcome of a verb that could be carried out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Verdict {
     Good,

@@ -91,7 +91,7 @@ pub fn write(fluid: &Fluid, mass: &[f64], grid: Grid, path: &Path) -> Result<(),
     for (alpha, species) in fluid.species.iter().enumerate() {
         for k in 0..grid.densities {
             let density = k as f64 * drho;
-            // The table begins at n = 0, an isolated particle: a spline through infinity is none.
+            // The table begins at n = 0, an isolated particle, and a spline needs finite values.
             if !embedding(alpha, density).is_finite() {
                 return Err(EamError::Singular { species: species.clone(), density });
             }

@@ -291,8 +291,8 @@ fn write_script(scene: &Scene, s: &mut String) -> std::fmt::Result {
     writeln!(s, "\nwrite_data    final.data nocoeff")
 }
 
-/// A title fit for a comment: one line, without the character that goes on with the next, and without quotes, of which
-/// three make LAMMPS read on to the next three.
+/// A title for a comment: one line, without `&`, which continues a line, and without double quotes, since
+/// three of them begin a multi-line text in LAMMPS.
 fn one_line(text: &str) -> String {
     let plain = |c: char| match c {
         '&' => ' ',

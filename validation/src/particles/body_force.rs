@@ -42,7 +42,7 @@ impl BodyForce {
     }
 }
 
-/// Adds the forces of `bodies` on all particles: what `on` tells of each, one after the other.
+/// Adds the forces of `bodies` on all particles; `on` computes the force of one of them on one particle.
 pub(crate) fn add<F>(bodies: &[BodyForce], pool: &Pool, force: &mut [[f64; 3]], on: F)
 where
     F: Fn(&BodyForce, usize) -> Option<[f64; 3]> + Sync,

@@ -1,4 +1,5 @@
-use crate::checkpoint::{CheckpointError, Unwritten};
+use crate::checkpoint::CheckpointError;
+use crate::files::WriteError;
 use crate::particles::StateError;
 use psidpd_core::document::FileError;
 use psidpd_core::engine::EngineError;
@@ -88,9 +89,9 @@ impl From<StateError> for RunError {
     }
 }
 
-impl From<Unwritten> for RunError {
-    fn from(Unwritten { path, source }: Unwritten) -> RunError {
-        RunError::Output { path, source }
+impl From<WriteError> for RunError {
+    fn from(WriteError { path, cause }: WriteError) -> RunError {
+        RunError::Output { path, source: cause }
     }
 }
 

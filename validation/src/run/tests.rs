@@ -374,8 +374,8 @@ fn state_of_narrow() -> State {
 fn masses_count() {
     let model = IDEAL_MIXTURE;
     let rest = ONE_STAGE.to_owned() + "[masses]\nB = 5.0\n";
-    let state = scene_of(&model, "[4.0, 4.0, 4.0]", 4.0, &rest).unwrap().initial_state();
-    let mut run = simulation(&model, state);
+    let state = scene_of(model, "[4.0, 4.0, 4.0]", 4.0, &rest).unwrap().initial_state();
+    let mut run = simulation(model, state);
     advance(&mut run, 200, 0.02, Integrator::VelocityVerlet);
     let (mean, error) = mean_temperature(&mut run, 20, 50, 0.02);
     assert!((mean - 1.0).abs() < 6.0 * error + 0.005, "{mean} +- {error}");

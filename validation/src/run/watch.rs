@@ -1,4 +1,4 @@
-//! Looks after the temperature of a run: warns where it leaves its target, and stops a run that is far off.
+//! Watches the temperature of a run: warns if it deviates from the target, and stops a run that is far off.
 //!
 //! The temperature is that of the relative velocities which drag and noise act on: a drop that flies, or a flow, has
 //! its thermal one. It is sampled a few times in a stage, and every [`INTERVAL`] steps in a long one, at less than a hundredth of the
@@ -118,7 +118,7 @@ impl Watch {
         Ok(())
     }
 
-    /// What is to be said at the end of a stage.
+    /// Deviations to report at the end of a stage.
     pub fn deviations(&self, simulation: &Simulation, stage: &Stage) -> Vec<Deviation> {
         let deviation = |thermometer, [mean, error]: [f64; 2]| {
             let off = (mean - 1.0).abs() > TOLERANCE + 3.0 * error;
@@ -126,7 +126,7 @@ impl Watch {
         };
         let mut found = Vec::new();
         if stage.level.is_some() {
-            // A level of a ramp is on its way.
+            // A level of a ramp is not in equilibrium.
             return found;
         }
         let settled = &self.kinetic[self.kinetic.len() / 3..];
@@ -137,7 +137,7 @@ impl Watch {
         if !settled.is_empty() {
             let [squares, laplacians] =
                 [0, 1].map(|k| settled.iter().map(|s| s[k]).sum::<f64>() / settled.len() as f64);
-            // One sample has an error of its own: about that of so many free particles.
+            // The error of one sample is about that of as many free particles.
             let freedom = (simulation.dimensions() * simulation.mobile() * settled.len()) as f64;
             let mean = squares / laplacians / stage.kt;
             found

@@ -23,7 +23,7 @@ impl Velocities {
         }
     }
 
-    /// The same for a file, whose velocities may be kept: `None`, and what is meant by saying nothing if `keep`.
+    /// The same for a start from a file: `None` keeps its velocities, which is the default if `keep` is set.
     pub(super) fn read_or_keep(initial: &Section, keep: bool) -> Result<Option<Velocities>, FileError> {
         let names =
             [("thermal", Some(Velocities::Thermal)), ("zero", Some(Velocities::Zero)), ("keep", None)];

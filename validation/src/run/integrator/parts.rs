@@ -11,10 +11,10 @@ const LANES: usize = 3 * GROUP;
 /// Coordinates of a vector.
 const WIDTH: usize = 4;
 
-/// Particles that are worth the call of a thread.
+/// Fewest particles for which another thread pays off.
 const WORTH: usize = 1024;
 
-/// Velocities whose squares are no infinities, for certain.
+/// Velocities below this have finite squares.
 const FINITE: f64 = 1e150;
 
 /// The particles that an integrator moves, without ghosts.
@@ -59,7 +59,7 @@ impl Moving<'_> {
     }
 }
 
-/// What a particle that has moved may meet.
+/// What a moved particle is checked against.
 #[derive(Debug, Clone, Copy)]
 pub struct Surroundings<'a> {
     pub domain: &'a PeriodicBox,
@@ -73,7 +73,7 @@ pub struct Surroundings<'a> {
 pub struct Faults {
     /// Its velocity is too high, or no number.
     pub fast: Option<usize>,
-    /// No wall has kept it in.
+    /// It is beyond a wall even after reflection.
     pub escaped: Option<usize>,
 }
 
@@ -256,7 +256,7 @@ where
     settle(&around, part.first, from, x_rest, v_rest, image_rest, &mut part.kept, &mut part.faults);
 }
 
-/// Looks at particles one by one, and puts those that are outside inside.
+/// Checks particles one by one, and reflects or wraps those outside.
 #[cold]
 #[inline(never)]
 #[expect(clippy::too_many_arguments)]

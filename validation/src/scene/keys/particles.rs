@@ -58,8 +58,8 @@ pub const INITIAL: Table = Table {
              other, from 1.",
             "[initial]\nkind = \"data\"\nfile = \"start.data\"\nfrozen_ids = [1, 2]"),
         key("velocities", Choice(|| vec!["thermal", "zero", "keep"]), OPTIONAL,
-            "`thermal`: Maxwell's distribution at kT, without momentum in all. `zero`: none. `keep`, for a file \
-             only: those of the file. Thermal if left out, but for a checkpoint, which keeps its own.",
+            "`thermal`: Maxwell's distribution at kT, with zero total momentum. `zero`: none. `keep`, for a file \
+             only: those of the file. If left out, a checkpoint keeps its own velocities, and everything else is thermal.",
             "[initial]\nkind = \"data\"\nfile = \"start.data\"\nvelocities = \"keep\""),
         velocity(
             FILLED,
@@ -126,7 +126,7 @@ pub const PART: Table = Table {
         ),
         length("[[part]]\nshape = \"cylinder\"\nradius = 2.0\nlength = 3.0\ndensity = 3.0"),
         form_key(&[], "velocities", Choice(|| vec!["thermal", "zero"]), OPTIONAL,
-            "`thermal`: Maxwell's distribution at kT, without momentum in all. `zero`: none. Thermal if left out.",
+            "`thermal`: Maxwell's distribution at kT, with zero total momentum. `zero`: none. Thermal if left out.",
             "[[part]]\nshape = \"box\"\ndensity = 3.0\nvelocities = \"zero\""),
         velocity(
             &[],
@@ -167,9 +167,9 @@ const fn lattice(forms: Forms, example: &'static str) -> Key {
 
 const fn min_distance(forms: Forms, example: &'static str) -> Key {
     form_key(forms, "min_distance", Positive, OPTIONAL,
-        "The least distance of random particles from each other and from parts before: places nearer are thrown \
-         again. A scene whose particles find no place is refused; up to about 0.75 density^(-1/3), in two \
-         dimensions 0.7 density^(-1/2), they do.",
+        "The least distance of random particles from each other and from parts before: closer positions are \
+         redrawn. A scene without room for its particles is refused; there is room up to about 0.75 density^(-1/3), \
+         in two dimensions 0.7 density^(-1/2).",
         example)
 }
 
@@ -201,5 +201,5 @@ const fn length(example: &'static str) -> Key {
 
 const fn velocity(forms: Forms, example: &'static str) -> Key {
     form_key(forms, "velocity", Point, OPTIONAL,
-        "A velocity that all have in common, on top of their own.", example)
+        "A velocity that is added to those of all its particles.", example)
 }

@@ -54,7 +54,7 @@ pub const TOP: Table = Table {
             "seed = 4711"),
         key("box", Box, OPTIONAL,
             "The box, from the origin along the axes: one length for all edges, one for each, or a table. A start \
-             from a file has its box from there.",
+             from a file takes its box from there.",
             "box = [8.0, 8.0, 16.0]"),
         key("density", Positive, OPTIONAL,
             "Number density of everything that is filled and has no density or count of its own. Without \
@@ -66,9 +66,9 @@ pub const TOP: Table = Table {
         key("dt", Positive, OPTIONAL, "The time step; 0.01 if left out.", "dt = 0.02"),
         INTEGRATOR,
         key("precision", Choice(|| names(&Precision::ALL)), OPTIONAL,
-            "In what `psidpd run` computes the forces of pairs; `mixed` if left out: single precision, with positions \
-             exact to 2⁻³² of the box and sums in double precision. The option `--precision` goes before it. A deck \
-             for LAMMPS has it if it is given; pair styles are in double precision otherwise.",
+            "Precision in which `psidpd run` computes pair forces; `mixed` if left out: single precision, with positions \
+             exact to 2⁻³² of the box and sums in double precision. The option `--precision` overrides it. A deck \
+             for LAMMPS takes it over if it is given; pair styles are in double precision otherwise.",
             "precision = \"double\""),
         LAMBDA,
         THERMOSTAT_STEP,

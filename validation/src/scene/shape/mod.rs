@@ -5,8 +5,8 @@ mod read;
 
 pub use read::{FACES, SHAPES, Shapes};
 
-/// A region. Directions and lengths are those of a box along the axes; in two dimensions the third
-/// coordinate is not looked at.
+/// A region. Directions and lengths are those of a box along the axes; in two dimensions the third coordinate
+/// is ignored.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Shape {
     /// Between two corners.
