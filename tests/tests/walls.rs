@@ -68,6 +68,7 @@ const PROGRAM: &[&[&str]] = &[
     &["export"],
     &["crosscheck"],
     &["bench"],
+    &["pareto"],
     &["check"],
     &["cli"],
     &[""],

@@ -12,6 +12,7 @@ pub mod lammps;
 pub mod observe;
 pub mod output;
 pub mod papers;
+pub mod pareto;
 pub mod particles;
 pub mod report;
 pub mod run;
