@@ -69,6 +69,7 @@ const PROGRAM: &[&[&str]] = &[
     &["crosscheck"],
     &["bench"],
     &["pareto"],
+    &["hardcases"],
     &["check"],
     &["cli"],
     &[""],

@@ -8,6 +8,7 @@ pub mod cli;
 pub mod crosscheck;
 pub mod export;
 pub mod files;
+pub mod hardcases;
 pub mod lammps;
 pub mod observe;
 pub mod output;

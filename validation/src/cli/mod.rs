@@ -10,6 +10,7 @@ mod check;
 mod diagnostic;
 mod export;
 mod forces;
+mod hardcases;
 mod lammps;
 mod new;
 mod pareto;
@@ -45,6 +46,8 @@ enum Verb {
     Bench(bench::Arguments),
     /// What a unit of simulated time costs with each integrator, time step and precision, and how far off its results are.
     Pareto(pareto::Arguments),
+    /// Cases that are hard for a simulation: what must happen in each, and what did.
+    Hardcases(hardcases::Arguments),
     /// What a model or scene will compute, and what cannot work.
     Check(check::Arguments),
     /// Mean field: equation of state, critical point, spinodal, binodal, surface tension.
@@ -88,6 +91,7 @@ pub fn main() -> ExitCode {
         Verb::Validate(a) => validate::run(a, json),
         Verb::Bench(a) => bench::run(a, json),
         Verb::Pareto(a) => pareto::run(a, json),
+        Verb::Hardcases(a) => hardcases::run(a, json),
         Verb::Check(a) => check::run(a, json),
         Verb::Theory(a) => theory::run(a, json),
         Verb::Export(a) => export::run(a, json),
