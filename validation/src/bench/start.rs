@@ -2,11 +2,11 @@
 
 use super::BenchError;
 use super::fluids::Subject;
+use crate::particles::thermal_velocities;
 use crate::run::{Integrator, RunError, Simulation, State};
 use chacha20::ChaCha8Rng;
 use psidpd_core::engine::{PeriodicBox, Settings, Want};
 use rand::{RngExt, SeedableRng};
-use rand_distr::{Distribution, StandardNormal};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
@@ -37,22 +37,10 @@ pub fn random(subject: &Subject, size: usize) -> Result<State, BenchError> {
         .map_err(|e| RunError::State(e.to_string()))?;
     let mut random = ChaCha8Rng::seed_from_u64(SEED);
     let x = (0..count).map(|_| std::array::from_fn(|_| edge * random.random::<f64>())).collect();
-    let mut v: Vec<[f64; 3]> =
-        (0..count).map(|_| std::array::from_fn(|_| StandardNormal.sample(&mut random))).collect();
-    for k in 0..3 {
-        let drift = v.iter().map(|v| v[k]).sum::<f64>() / count as f64;
-        v.iter_mut().for_each(|v| v[k] -= drift);
-    }
-    let species = subject.species.len();
-    Ok(State {
-        domain,
-        mass: vec![1.0; species],
-        species: (0..count).map(|k| (k % species) as i32).collect(),
-        tag: (1..=count as i32).collect(),
-        image: vec![[0; 3]; count],
-        x,
-        v,
-    })
+    let v = thermal_velocities(std::iter::repeat_n(1.0, count), 1.0, 3, &mut random);
+    let kinds = subject.species.len();
+    let species = (0..count).map(|k| (k % kinds) as i32).collect();
+    Ok(State { species, v, ..State::at_rest(domain, vec![1.0; kinds], x) })
 }
 
 /// The fluid in equilibrium, from `folder` if it is there.
@@ -71,9 +59,7 @@ pub fn equilibrated(subject: &Subject, size: usize, folder: &Path) -> Result<Sta
     simulation.set_settings(Settings { threads, ..Settings::default() })?;
     for (dt, steps) in [(0.1 * subject.dt, 100), (subject.dt, STEPS)] {
         simulation.prepare(dt, Want::FORCES)?;
-        for _ in 0..steps {
-            simulation.step(dt, Integrator::VelocityVerlet, Want::FORCES)?;
-        }
+        simulation.advance(steps, dt, Integrator::VelocityVerlet)?;
     }
     let state = simulation.state();
     let text = state.to_data("psidpd bench");

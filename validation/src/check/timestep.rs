@@ -15,8 +15,9 @@
 //!
 //! with `a` from runs of standard DPD and of Warren's liquid; `docs/integrators.md` has them.
 
+use crate::integrator::{Accuracy, Integrator};
 use crate::observe::configurational;
-use crate::run::{Accuracy, Integrator, RunError, Simulation, State};
+use crate::run::{RunError, Simulation, State};
 use crate::scene::Scene;
 use psidpd_core::engine::noise::{Law, PairNoise};
 use psidpd_core::engine::reference::Evaluator;
@@ -176,6 +177,5 @@ fn start(scene: &Scene, domain: PeriodicBox, densities: &[f64], kt: f64, dimensi
             v[k][c] = f64::from(speeds[k]) * (kt / scene.mass[species[k] as usize]).sqrt();
         }
     }
-    let tag = tags.into_iter().map(|tag| tag as i32).collect();
-    State { domain, mass: scene.mass.clone(), x, v, species, tag, image: vec![[0; 3]; n] }
+    State { v, species, ..State::at_rest(domain, scene.mass.clone(), x) }
 }

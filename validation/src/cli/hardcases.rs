@@ -28,8 +28,7 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<super::Verdict, Failure
         (_, true) => Extent::Full,
         _ => Extent::All,
     };
-    let found =
-        hardcases::run(extent, a.lammps, a.only.as_deref(), &Progress::new()).map_err(Failure::new)?;
+    let found = hardcases::run(extent, a.lammps, a.only.as_deref(), &Progress::new())?;
     println!("{}", hardcases::table(&found).to_text());
     let wrong: Vec<_> = found.iter().filter(|v| v.wrong.is_some()).collect();
     for v in &wrong {

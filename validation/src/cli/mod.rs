@@ -119,7 +119,7 @@ pub fn main() -> ExitCode {
 /// Writes `value` to the file of `--json`, if there is one.
 fn write_json(json: Option<&Path>, value: &impl Serialize) -> Result<(), Failure> {
     let Some(path) = json else { return Ok(()) };
-    let mut text = serde_json::to_string_pretty(value).map_err(Failure::new)?;
+    let mut text = serde_json::to_string_pretty(value)?;
     text.push('\n');
-    crate::files::write_atomically(path, text.as_bytes()).map_err(Failure::new)
+    crate::files::write_atomically(path, text.as_bytes()).map_err(Failure::from)
 }

@@ -1,5 +1,5 @@
 use super::{Failure, Verdict, write_json};
-use crate::pareto::{self, Choice, Options, Tolerance, page};
+use crate::pareto::{self, Choice, Effort, Options, Pace, Tolerance, page};
 use crate::report::Progress;
 use crate::scene::Scene;
 use psidpd_core::engine::Pool;
@@ -20,6 +20,9 @@ pub struct Arguments {
     /// Minutes that all of it may take, roughly; 20 with --full.
     #[arg(long, value_name = "N", value_parser = minutes)]
     minutes: Option<f64>,
+    /// Samples of every setting, whatever time they take, instead of as many as the minutes allow.
+    #[arg(long, value_name = "N", conflicts_with = "minutes")]
+    samples: Option<u64>,
     /// All integrators, in both precisions.
     #[arg(long)]
     full: bool,
@@ -45,7 +48,7 @@ fn threads(text: &str) -> Result<NonZeroUsize, String> {
 }
 
 pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
-    let scene = Scene::open(&a.scene).map_err(Failure::new)?;
+    let scene = Scene::open(&a.scene)?;
     let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
     let usual = [Some(NonZeroUsize::MIN), NonZeroUsize::new(2).filter(|_| cores > 1)];
     let mut threads = a.threads.clone();
@@ -60,10 +63,10 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
         threads,
         tolerances: a.tolerance.clone(),
         lammps: !a.without_lammps,
-        fixed: None,
+        fixed: a.samples.map(|n| (Effort::Samples(n), Pace { rounds: 5, seconds: 0.2 })),
         out: a.out.clone(),
     };
-    let outcome = pareto::run(&scene, &options, &Progress::new()).map_err(Failure::new)?;
+    let outcome = pareto::run(&scene, &options, &Progress::new())?;
     println!("{}", page::table(&outcome).to_text());
     println!("{}\n", page::explanation(&outcome));
     outcome.left_out.iter().for_each(|line| println!("{line}\n"));

@@ -56,9 +56,9 @@ struct Report<'a> {
 
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     let Arguments { scene: path, out, resume, overwrite, threads, precision, report } = arguments;
-    let mut scene = Scene::open(path).map_err(Failure::new)?;
+    let mut scene = Scene::open(path)?;
     scene.precision = precision.or(scene.precision);
-    if let Some(warning) = calibration::missing(&scene.model.at(scene.kt).map_err(Failure::new)?) {
+    if let Some(warning) = calibration::missing(&scene.model.at(scene.kt)?) {
         warn(&warning.message);
     }
     let begin = match (resume, overwrite) {
@@ -66,9 +66,9 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         (_, true) => Begin::Overwrite,
         _ => Begin::New,
     };
-    let stop = watch_signals().map_err(Failure::new)?;
-    let mut runner = Runner::begin(&scene, out, begin).map_err(Failure::new)?;
-    runner.set_threads(*threads).map_err(Failure::new)?;
+    let stop = watch_signals()?;
+    let mut runner = Runner::begin(&scene, out, begin)?;
+    runner.set_threads(*threads)?;
     let total: u64 = scene.stages.iter().map(|s| s.steps).sum();
     let made = tell_start(runner.start(), begin, out, total);
     say(&format!("forces by {}", runner.evaluation()));
@@ -82,10 +82,10 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         let page = write_run_report(out);
         // A full disk has no room for a page either, and the run's own message says more.
         if outcome.is_ok() {
-            page.map_err(Failure::new)?;
+            page?;
         }
     }
-    match outcome.map_err(Failure::new)? {
+    match outcome? {
         Outcome::Finished { summary, timing } => {
             say(&summary.to_string());
             if let Some(session) = timing.sessions.last().filter(|_| made < total) {

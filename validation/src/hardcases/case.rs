@@ -1,6 +1,6 @@
 //! A hard case: a scene, and what must come of it.
 
-use crate::run::Integrator;
+use crate::integrator::Integrator;
 
 /// What must happen.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -160,8 +160,11 @@ pub fn said(found: &Found) -> String {
     match found {
         Found::Ended { temperatures, momentum, counted, warnings } => {
             let kinds = ["T_kin", "T_conf"];
-            let mut text: Vec<String> =
-                temperatures.iter().zip(kinds).map(|([t, e], kind)| format!("{kind} {t:.3} ± {e:.3}")).collect();
+            let mut text: Vec<String> = temperatures
+                .iter()
+                .zip(kinds)
+                .map(|([t, e], kind)| format!("{kind} {t:.3} ± {e:.3}"))
+                .collect();
             if *momentum > 1e-9 {
                 text.push(format!("momentum {momentum:.0e}"));
             }

@@ -10,7 +10,8 @@ pub const LINEAR: &str = include_str!("../../models/groot-warren-linear.toml");
 pub const SPLINE: &str = include_str!("../../models/spline-attractive.toml");
 
 /// A gas that has a thermostat alone.
-pub const IDEAL: &str = "title = \"ideal gas\"\nspecies = [\"A\"]\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n";
+pub const IDEAL: &str =
+    "title = \"ideal gas\"\nspecies = [\"A\"]\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n";
 
 /// The same with two species.
 pub const IDEAL_TWO: &str =

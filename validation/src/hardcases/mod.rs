@@ -13,12 +13,13 @@ mod singular;
 mod starts;
 mod steps;
 
-pub use case::{Case, Found, Must, Run};
+use case::{Case, Must};
 
 use crate::crosscheck::jobs::{self, Job};
+use crate::integrator::Integrator;
 use crate::lammps::LammpsError;
 use crate::report::{Progress, Table};
-use crate::run::{Integrator, RunError};
+use crate::run::RunError;
 use plugin::Plugin;
 use psidpd_core::document::FileError;
 use psidpd_core::engine::Precision;
@@ -89,7 +90,7 @@ pub struct Verdict {
 }
 
 /// All cases.
-pub fn cases(extent: Extent) -> Vec<Case> {
+fn cases(extent: Extent) -> Vec<Case> {
     let mut all = starts::cases();
     all.extend(singular::cases());
     all.extend(phases::cases());
@@ -197,7 +198,15 @@ pub fn table(results: &[Verdict]) -> Table {
         let verdict = if r.wrong.is_some() { "fail" } else { "pass" };
         // Messages are long, and their beginning says what happened.
         let did: String = r.did.chars().take(90).collect();
-        table.push([r.case, r.host, r.integrator, r.precision.as_str(), r.must.as_str(), did.as_str(), verdict]);
+        table.push([
+            r.case,
+            r.host,
+            r.integrator,
+            r.precision.as_str(),
+            r.must.as_str(),
+            did.as_str(),
+            verdict,
+        ]);
     }
     table
 }

@@ -4,8 +4,8 @@ use super::HardCasesError;
 use super::case::{Case, Found, Must};
 use super::native;
 use crate::export::lammps as deck;
+use crate::integrator::Integrator;
 use crate::lammps::{self, Host, LammpsError};
-use crate::run::Integrator;
 use psidpd_core::engine::Precision;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -48,7 +48,12 @@ impl Plugin {
     ///
     /// # Errors
     /// Files cannot be written or read, or LAMMPS takes too long.
-    pub fn carry_out(&self, case: &Case, precision: Precision, folder: &Path) -> Result<Found, HardCasesError> {
+    pub fn carry_out(
+        &self,
+        case: &Case,
+        precision: Precision,
+        folder: &Path,
+    ) -> Result<Found, HardCasesError> {
         let scene = match native::scene(&case.run, Integrator::VelocityVerlet, precision, folder)? {
             Ok(scene) => scene,
             Err(refusal) => return Ok(Found::Refused(refusal.to_string())),
@@ -63,7 +68,10 @@ impl Plugin {
         let (before, last) = script.rsplit_once("timestep").unwrap_or((&script, ""));
         let mut script = format!("{before}{counts}timestep{last}");
         if self.plugin.is_none() {
-            script = script.lines().filter(|l| !l.starts_with("plugin  ")).fold(String::new(), |a, l| a + l + "\n");
+            script = script
+                .lines()
+                .filter(|l| !l.starts_with("plugin  "))
+                .fold(String::new(), |a, l| a + l + "\n");
         }
         std::fs::write(&path, script).map_err(HardCasesError::io(&path))?;
         let plugin = self.plugin.as_ref().map(|p| p.display().to_string()).unwrap_or_default();
@@ -77,7 +85,7 @@ impl Plugin {
         let of = |k: usize| rows.iter().map(|row| row[k]).collect::<Vec<f64>>();
         let mean = crate::observe::Measured::mean(&of(1));
         let counted = [2, 3].map(|k| of(k).last().copied().unwrap_or(0.0) as u64);
-        let alone = scene.initial_state().len() < 2;
+        let alone = scene.initial_state().len() < native::FEW;
         let temperatures =
             if alone { Vec::new() } else { vec![[mean.value / scene.kt, mean.error / scene.kt]] };
         Ok(Found::Ended { temperatures, momentum: 0.0, counted, warnings: Vec::new() })

@@ -24,8 +24,10 @@ pub fn cases() -> Vec<Case> {
         dt: 0.002,
         steps: [50, 150],
     };
-    let unbounded: String =
-        VAN_DER_WAALS.lines().filter(|l| !l.starts_with("bounds")).fold(String::new(), |all, l| all + l + "\n");
+    let unbounded: String = VAN_DER_WAALS
+        .lines()
+        .filter(|l| !l.starts_with("bounds"))
+        .fold(String::new(), |all, l| all + l + "\n");
     // Two particles in a large box, out of each other's reach.
     let thin = |bounds: &str| Run {
         model: logarithm(bounds),
@@ -53,11 +55,7 @@ pub fn cases() -> Vec<Case> {
             thin("bounds = [0.5, 20.0]\nbelow = \"constant\""),
             Must::Counted,
         ),
-        case(
-            "an evaporated Huggins particle",
-            huggins("count = 2", "box = 20.0\n"),
-            Must::RightOrSaid(1.1),
-        ),
+        case("an evaporated Huggins particle", huggins("count = 2", "box = 20.0\n"), Must::RightOrSaid(1.1)),
         case(
             "a species absent from every neighbourhood",
             huggins("density = 3.0\nspecies = \"A\"", "box = 4.0\n"),

@@ -36,8 +36,16 @@ pub fn cases() -> Vec<Case> {
         faces.push([at(a), at(b), at(c)]);
     }
     vec![
-        case("coincident particles: every place taken twice", from_data(dpd.clone(), &twice, 4.2), Must::Right(0.06)),
-        case("particles exactly on faces, edges and corners", from_data(dpd.clone(), &faces, 4.2), Must::Right(0.06)),
+        case(
+            "coincident particles: every place taken twice",
+            from_data(dpd.clone(), &twice, 4.2),
+            Must::Right(0.06),
+        ),
+        case(
+            "particles exactly on faces, edges and corners",
+            from_data(dpd.clone(), &faces, 4.2),
+            Must::Right(0.06),
+        ),
         case(
             "random overlapping start at three times the density of the liquid",
             set6("box = 3.0\ndensity = 18.0\n"),
@@ -53,7 +61,11 @@ pub fn cases() -> Vec<Case> {
             Run { scene: "box = 1.9\ndensity = 3.0\n".into(), ..dpd.clone() },
             Must::Refused,
         ),
-        case("a lone particle", set6("box = 4.0\n[initial]\nkind = \"random\"\ncount = 1\n"), Must::Right(1.1)),
+        case(
+            "a lone particle",
+            set6("box = 4.0\n[initial]\nkind = \"random\"\ncount = 1\n"),
+            Must::Right(1.1),
+        ),
         case("an empty box", set6("box = 4.0\n[initial]\nkind = \"random\"\ncount = 0\n"), Must::Refused),
     ]
 }

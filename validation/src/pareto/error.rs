@@ -11,7 +11,9 @@ use std::path::PathBuf;
 #[non_exhaustive]
 pub enum ParetoError {
     /// No stage has a thermostat, whose temperature could be compared with.
-    #[error("no stage of the scene has a thermostat and a fixed temperature, so there is nothing to compare with")]
+    #[error(
+        "no stage of the scene has a thermostat and a fixed temperature, so there is nothing to compare with"
+    )]
     NoStage,
     /// The start or the reference stopped.
     #[error("{what}: {source}")]

@@ -18,9 +18,10 @@ pub fn mark(points: &mut [Point]) {
             .collect();
         for (point, place) in points.iter_mut().zip(&places) {
             let Some([cost, error]) = *place else { continue };
-            let beaten = places.iter().flatten().any(|[c, e]| {
-                (*c < cost && *e <= error) || (*c <= cost && *e < error)
-            });
+            let beaten = places
+                .iter()
+                .flatten()
+                .any(|[c, e]| (*c < cost && *e <= error) || (*c <= cost && *e < error));
             if !beaten {
                 point.front.push(class);
             }

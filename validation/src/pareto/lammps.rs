@@ -90,7 +90,9 @@ impl Lammps {
         let text = match self.run(origin, &setting, &steps, name, add) {
             Ok(text) => text,
             Err(ParetoError::Lammps(error @ lammps::LammpsError::Run { .. })) => {
-                return Ok(Sampled::Unstable(error.to_string().lines().next().unwrap_or_default().to_owned()));
+                return Ok(Sampled::Unstable(
+                    error.to_string().lines().next().unwrap_or_default().to_owned(),
+                ));
             }
             Err(other) => return Err(other),
         };
@@ -100,7 +102,10 @@ impl Lammps {
         }
         let mean = kinetic.mean(0);
         if !(mean.value < 5.0 * origin.stage.kt) {
-            return Ok(Sampled::Unstable(format!("the temperature is {:.1} kT", mean.value / origin.stage.kt)));
+            return Ok(Sampled::Unstable(format!(
+                "the temperature is {:.1} kT",
+                mean.value / origin.stage.kt
+            )));
         }
         let observe = observe(origin, every, Who::Lammps)?;
         let mut observers = Observers::new(&observe, [origin.stage.name.as_str()]);
@@ -123,7 +128,8 @@ impl Lammps {
         every: u64,
         observers: &mut Observers,
     ) -> Result<(), ParetoError> {
-        let missing = || ParetoError::Output { what: "a dump of LAMMPS".into(), problem: "no columns of positions" };
+        let missing =
+            || ParetoError::Output { what: "a dump of LAMMPS".into(), problem: "no columns of positions" };
         let x = frame.vectors(["x", "y", "z"]).ok_or_else(missing)?;
         let images = frame.vectors(["ix", "iy", "iz"]).ok_or_else(missing)?;
         let images: Vec<[i32; 3]> = images.iter().map(|i| i.map(|c| c as i32)).collect();

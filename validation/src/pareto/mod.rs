@@ -18,21 +18,22 @@ mod setting;
 mod time;
 mod tolerance;
 
-pub use drift::EnergyDrift;
+use drift::EnergyDrift;
 pub use error::ParetoError;
-pub use outcome::{Outcome, Point, Reference};
-pub use quantity::{Class, Deviation};
+use outcome::{Outcome, Point, Reference};
+use quantity::Deviation;
 pub use sample::Effort;
-pub use setting::{Choice, Host};
+pub use setting::Choice;
+use setting::Host;
 pub use time::Pace;
-pub use tolerance::{BadTolerance, Tolerance};
+pub use tolerance::Tolerance;
 
 use crate::bench::Spread;
 use crate::crosscheck::jobs::{self, Job};
 use crate::crosscheck::machine;
 use crate::files::write_atomically;
+use crate::integrator::Integrator;
 use crate::report::Progress;
-use crate::run::Integrator;
 use crate::scene::Scene;
 use lammps::Lammps;
 use origin::Origin;
@@ -110,14 +111,16 @@ pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Outc
     let reference_quantities = match &reference {
         Sampled::Made { quantities, .. } => quantities.clone(),
         Sampled::Unstable(why) => {
-            return Err(ParetoError::Reference { what: what(&origin, &Physics::reference()), why: why.clone() });
+            return Err(ParetoError::Reference {
+                what: what(&origin, &Physics::reference()),
+                why: why.clone(),
+            });
         }
     };
     let drifts = drifts(&origin, known, options, DRIFTS * WORKERS * seconds, progress)?;
 
-    let mut points = native_points(&origin, options, &physics, &sampled, |q| {
-        deviations(q, &reference_quantities, known)
-    });
+    let mut points =
+        native_points(&origin, options, &physics, &sampled, |q| deviations(q, &reference_quantities, known));
     let mut lammps_reference = None;
     if let Some(lammps) = &lammps {
         plugin_points(&origin, &mut points);
@@ -126,7 +129,9 @@ pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Outc
                 lammps_reference = reference;
                 points.extend(own);
             }
-            Ok(None) => left_out.push("LAMMPS has no style of its own for this fluid that is known here.".into()),
+            Ok(None) => {
+                left_out.push("LAMMPS has no style of its own for this fluid that is known here.".into())
+            }
             Err(error) => left_out.push(format!("LAMMPS's own style is not among the points: {error}.")),
         }
     }
@@ -282,9 +287,12 @@ fn native_points(
             Sampled::Unstable(_) => Vec::new(),
         };
         let fewest = options.threads.iter().min().copied().unwrap_or(NonZeroUsize::MIN);
-        let matters = options.choice == Choice::Full
-            || matches!(physics.integrator, Integrator::VelocityVerlet | Integrator::TwoStage { .. })
-                && physics.precision == Precision::Mixed;
+        let usual = match physics.integrator {
+            Integrator::VelocityVerlet => physics.multiple == 1.0,
+            Integrator::TwoStage { .. } => physics.multiple >= 4.0,
+            _ => false,
+        };
+        let matters = options.choice == Choice::Full || usual && physics.precision == Precision::Mixed;
         for &threads in &options.threads {
             if threads == fewest || (matters && matches!(sampled, Sampled::Made { .. })) {
                 let setting = Setting { host: Host::Native, physics: *physics, threads };
@@ -400,7 +408,8 @@ fn recommend(origin: &Origin, outcome: &mut Outcome) {
             let cost = |p: &&Point| p.cost.as_ref().map_or(f64::INFINITY, |c| c.median);
             let native = outcome.points.iter().filter(|p| p.host == Host::Native && p.unstable.is_none());
             let found = native.filter(runs).filter(within).min_by(|a, b| cost(a).total_cmp(&cost(b)));
-            outcome.lammps_lines = found.and_then(|p| recommend::lammps_lines(origin, &p.setting.physics).ok());
+            outcome.lammps_lines =
+                found.and_then(|p| recommend::lammps_lines(origin, &p.setting.physics).ok());
         }
     }
 }

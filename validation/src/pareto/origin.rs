@@ -2,7 +2,8 @@
 
 use super::ParetoError;
 use super::setting::{INTERVAL, Physics};
-use crate::run::{RunError, Simulation, State};
+use crate::particles::State;
+use crate::run::{RunError, Simulation};
 use crate::scene::{Scene, Stage};
 use psidpd_core::engine::{Precision, Settings, Want};
 use std::num::NonZeroUsize;
@@ -41,8 +42,10 @@ impl<'a> Origin<'a> {
         let settle = (SETTLE * INTERVAL).min(stage.steps);
         let stages = scene.stages[..measured].iter().map(|s| (s, s.steps)).chain([(stage, settle)]);
         for (stage, mut steps) in stages {
-            let failed =
-                |source| ParetoError::Stopped { what: format!("the start, stage \"{}\"", stage.name), source };
+            let failed = |source| ParetoError::Stopped {
+                what: format!("the start, stage \"{}\"", stage.name),
+                source,
+            };
             scene.enter(stage, &mut run)?;
             run.prepare_for(stage.integrator, stage.dt, Want::FORCES).map_err(failed)?;
             while steps > 0 && begin.elapsed() < limit {

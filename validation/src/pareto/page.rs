@@ -12,7 +12,13 @@ fn shown(d: &Deviation) -> String {
     if !d.resolved {
         return format!("< {:.2}", percent(d.bound()));
     }
-    let sign = if d.class == Class::Structure { "" } else if d.relative < 0.0 { "-" } else { "+" };
+    let sign = if d.class == Class::Structure {
+        ""
+    } else if d.relative < 0.0 {
+        "-"
+    } else {
+        "+"
+    };
     format!("{sign}{:.2} ± {:.2}", percent(d.relative.abs()), percent(d.uncertainty))
 }
 
@@ -33,7 +39,8 @@ fn row(names: &[String], errors: &[Deviation]) -> Vec<String> {
 }
 
 fn reference_row(names: &[String], who: &str, reference: &Reference) -> Vec<String> {
-    let mut cells = vec![who.to_owned(), format!("{}", reference.dt), String::new(), String::new(), String::new()];
+    let mut cells =
+        vec![who.to_owned(), format!("{}", reference.dt), String::new(), String::new(), String::new()];
     cells.extend(row(names, &reference.values));
     cells.push(String::new());
     cells
@@ -55,8 +62,7 @@ pub fn table(outcome: &Outcome) -> Table {
             Some(c) => format!("{:.4} ({:.4}–{:.4})", c.median, c.min, c.max),
             None => "unstable".into(),
         };
-        let mut cells =
-            vec![p.name(), format!("{}", p.dt), p.precision.clone(), p.threads.to_string(), cost];
+        let mut cells = vec![p.name(), format!("{}", p.dt), p.precision.clone(), p.threads.to_string(), cost];
         cells.extend(row(&names, &p.errors));
         cells.push(p.front.iter().map(|c| c.name()).collect::<Vec<_>>().join(" "));
         table.push(cells);

@@ -95,7 +95,8 @@ pub struct Quantities {
 impl Quantities {
     /// From a kinetic temperature and what was observed.
     pub fn of(kinetic: Measured, observations: &[Observation], dimensions: usize) -> Quantities {
-        let mut scalars = vec![Quantity { class: Class::Temperature, name: "T_kin".into(), measured: kinetic }];
+        let mut scalars =
+            vec![Quantity { class: Class::Temperature, name: "T_kin".into(), measured: kinetic }];
         let known = |m: &Measured| m.value.is_finite() && m.error.is_finite();
         for (class, name, of, column) in SCALARS {
             let found = observations.iter().find(|o| o.name == of).and_then(|o| o.scalar(column));

@@ -3,7 +3,7 @@
 use super::origin::Origin;
 use super::setting::{Physics, Setting};
 use crate::export::lammps::{self as deck, DeckError};
-use crate::run::Integrator;
+use crate::integrator::Integrator;
 use crate::scene::{Scene, Stage};
 use psidpd_core::engine::noise::Law;
 use std::fmt::Write;

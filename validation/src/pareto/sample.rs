@@ -76,8 +76,15 @@ pub fn observe(origin: &Origin, every: u64, host: Host) -> Result<Observe, Paret
     let text = format!("[observe]\n{forces}rdf = {{ bins = 100 }}\nmsd = {{ length = 10, spacing = 2 }}\n");
     let document = Document::parse("pareto", &text)?;
     let names = [stage.name.as_str()];
-    let mut found =
-        read(&document.root(), &scene.model, stage.kt, &scene.domain, &names, scene.initial.slab_axis(), None)?;
+    let mut found = read(
+        &document.root(),
+        &scene.model,
+        stage.kt,
+        &scene.domain,
+        &names,
+        scene.initial.slab_axis(),
+        None,
+    )?;
     let own = scene.observe.requests.iter().filter(|request| match request.meter {
         AnyMeter::InterfaceWidth(_) => true,
         AnyMeter::SurfaceTension(_) | AnyMeter::Drop(_) => with_forces,
@@ -143,9 +150,8 @@ pub fn sample(origin: &Origin, physics: &Physics, effort: Effort) -> Result<Samp
 
 fn too_hot(run: &Simulation, kt: f64) -> Option<Sampled> {
     let ratio = run.temperature() / kt;
-    (ratio > FAR_OFF).then(|| {
-        Sampled::Unstable(format!("step {}: the temperature is {ratio:.1} kT", run.step_number()))
-    })
+    (ratio > FAR_OFF)
+        .then(|| Sampled::Unstable(format!("step {}: the temperature is {ratio:.1} kT", run.step_number())))
 }
 
 /// The time from one sample to the next.

@@ -1,6 +1,6 @@
 //! The settings that are held against each other: integrator × Δt × precision, and threads.
 
-use crate::run::{Coupling, Integrator};
+use crate::integrator::{Coupling, Integrator};
 use psidpd_core::engine::Precision;
 use serde::Serialize;
 use std::num::NonZeroUsize;

@@ -47,9 +47,7 @@ fn longer_steps_err_more_and_all_results_agree() {
         assert!(p.is_within(&outcome.tolerances[0]) != Some(true) || cost(p) >= cost(best));
     }
     let lines = outcome.scene_lines.clone().unwrap();
-    let text = format!(
-        "model = \"m.toml\"\nkT = 1.0\nbox = 4.0\ndensity = 6.05\nsteps = 5\n{lines}"
-    );
+    let text = format!("model = \"m.toml\"\nkT = 1.0\nbox = 4.0\ndensity = 6.05\nsteps = 5\n{lines}");
     let again = Scene::parse("again", &text, folder.path()).unwrap();
     assert_eq!(again.stages[0].integrator, best.setting.physics.integrator);
     assert_eq!((again.stages[0].dt, again.precision()), (best.dt, best.setting.physics.precision));
@@ -57,7 +55,8 @@ fn longer_steps_err_more_and_all_results_agree() {
 
     // The table and the JSON tell the same.
     let json: serde_json::Value =
-        serde_json::from_str(&std::fs::read_to_string(folder.path().join("out/pareto.json")).unwrap()).unwrap();
+        serde_json::from_str(&std::fs::read_to_string(folder.path().join("out/pareto.json")).unwrap())
+            .unwrap();
     let found = &json["points"][outcome.cheapest.unwrap()];
     assert_eq!(found["dt"], best.dt);
     assert_eq!(found["cost"]["median"], cost(best));
@@ -93,7 +92,9 @@ fn lammps_lines_are_those_that_lammps_can_run() {
                 }
                 assert!(lines.contains(&format!("timestep      {:?}", origin.dt(&physics))));
             }
-            integrator => assert_eq!(lines.is_ok(), integrator.in_lammps() != crate::run::Counterpart::None),
+            integrator => {
+                assert_eq!(lines.is_ok(), integrator.in_lammps() != crate::integrator::Counterpart::None)
+            }
         }
     }
 }

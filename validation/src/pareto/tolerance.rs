@@ -22,7 +22,8 @@ impl FromStr for Tolerance {
 
     fn from_str(text: &str) -> Result<Tolerance, BadTolerance> {
         let (name, bound) = text.split_once('=').ok_or(BadTolerance)?;
-        let (_, class) = Class::ALL.into_iter().find(|(known, _)| *known == name.trim()).ok_or(BadTolerance)?;
+        let (_, class) =
+            Class::ALL.into_iter().find(|(known, _)| *known == name.trim()).ok_or(BadTolerance)?;
         let (number, unit) = match bound.trim().strip_suffix('%') {
             Some(number) => (number, 0.01),
             None => (bound.trim(), 1.0),

@@ -2,7 +2,7 @@
 
 use super::number::positive;
 use super::ramp;
-use crate::run::{Integrator, THERMOSTAT_STEPS};
+use crate::integrator::{Integrator, THERMOSTAT_STEPS};
 use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
 use psidpd_core::engine::noise::Law;
 

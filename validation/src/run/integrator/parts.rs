@@ -18,7 +18,7 @@ const WORTH: usize = 1024;
 const FINITE: f64 = 1e150;
 
 /// The particles that an integrator moves, without ghosts.
-pub struct Motion<'a> {
+pub struct Moving<'a> {
     pub x: &'a mut [[f64; 3]],
     pub v: &'a mut [[f64; 3]],
     pub f: &'a [[f64; 3]],
@@ -40,7 +40,7 @@ pub struct Kept {
     over_mass: Vec<f64>,
 }
 
-impl Motion<'_> {
+impl Moving<'_> {
     /// Makes room for velocities and forces of before.
     pub fn keep(&mut self) {
         self.kept.in_use = true;
@@ -91,9 +91,9 @@ pub struct Part<'a> {
     faults: Faults,
 }
 
-/// Does `work` with all particles of `motion`.
-pub fn share<'a>(motion: Motion<'a>, pool: &Pool, work: impl Fn(&mut Part, &[f64]) + Sync) -> Faults {
-    let Motion { mut x, mut v, mut f, mut species, mut image, kept, .. } = motion;
+/// Does `work` with all particles of `moving`.
+pub fn share<'a>(moving: Moving<'a>, pool: &Pool, work: impl Fn(&mut Part, &[f64]) + Sync) -> Faults {
+    let Moving { mut x, mut v, mut f, mut species, mut image, kept, .. } = moving;
     let (kept_v, kept_f) = (&mut kept.v[..], &mut kept.f[..]);
     let [mut kept_v, mut kept_f] = if kept.in_use { [kept_v, kept_f] } else { Default::default() };
     let count = x.len();

@@ -3,7 +3,7 @@
 mod overlap;
 mod read;
 
-pub use read::{SHAPES, Shapes, faces};
+pub use read::{FACES, SHAPES, Shapes};
 
 /// A region. Directions and lengths are those of a box along the axes; in two dimensions the third
 /// coordinate is not looked at.
