@@ -1,9 +1,4 @@
-//! A LAMMPS that was built from source, with plugins. These tests need one: `lammps-plugin/README.md` says how to
-//! build it. They run with
-//!
-//! ```sh
-//! PSIDPD_LAMMPS_SOURCE=/path/to/lammps cargo test --release -p psidpd-tests --test hosts_source -- --ignored
-//! ```
+//! A LAMMPS that was built from source, with plugins. `.ci/source-host` builds one, keeps it, and runs these tests in it.
 
 mod host_common;
 mod style_common;
