@@ -137,7 +137,7 @@ impl PairNoise {
     /// fluctuation–dissipation relation, and a sum over neighbours is near Gaussian anyway.
     #[inline(always)]
     pub fn xi(&self, tag_i: u32, tag_j: u32) -> f64 {
-        let word = threefry2x32::<PAIR_ROUNDS>([tag_i.min(tag_j), tag_i.max(tag_j)], self.key)[0];
+        let word = thirteen_rounds([tag_i.min(tag_j), tag_i.max(tag_j)], self.key)[0];
         // (word + 1/2) / 2^31 − 1 lies symmetrically in (−1, 1), so the mean is exactly zero.
         const SQRT_3: f64 = 1.732_050_807_568_877_2;
         (word as f64 + 0.5) * (SQRT_3 / (1u64 << 31) as f64) - SQRT_3
