@@ -192,10 +192,13 @@ void PairPsi::init_style()
   comm_forward = static_cast<int>((*style)->variables());
 
   why_listed.clear();
-  if (atom->molecular != Atom::ATOMIC)
-    for (int k = 1; k < 4; k++)
-      if (force->special_lj[k] != 1.0) why_listed = "special_bonds";
   const auto because = [this](const std::string &text) { why_listed += (why_listed.empty() ? "" : " and ") + text; };
+  if (is_scaled()) {
+    if (atom->molecular == Atom::TEMPLATE) because("special_bonds with atom_style template");
+    if (atom->map_style == Atom::MAP_NONE) because("special_bonds without an atom map");
+    if ((*style)->has_core()) because("special_bonds with a pair potential that is very large at contact");
+    if (is_narrow()) because("special_bonds in a box narrower than twice the cut-off");
+  }
   if (has_exclusions()) because("neigh_modify exclude");
   if (neighbor->includegroup) because("neigh_modify include");
   // These exclude a group of their own, and say so only when pair styles have asked for their lists.
@@ -233,14 +236,13 @@ std::string PairPsi::search()
     // The only style of a simulation without bonds: nobody else leaves forces on ghosts either.
     if (comm->nprocs > 1 && force->newton && force->pair == this && atom->molecular == Atom::ATOMIC)
       text += "\n  advice        'newton off' saves sending back forces on ghosts: this style leaves none there";
+    if (is_scaled())
+      text += "\n  special bonds factors above 0 scale phi and w of bonded neighbors, not drag and noise; with 0 they do not "
+              "interact\n  advice        in DPD 'special_bonds lj 1 1 1' is usual, bonded atoms interacting like all others";
     return text;
   }
-  std::string text = std::string(full_list ? "full" : "half") + " neighbor list of LAMMPS, because of " + why_listed +
+  return std::string(full_list ? "full" : "half") + " neighbor list of LAMMPS, because of " + why_listed +
       ": pairs that are not in it do not interact, special factors scale phi and w";
-  if (why_listed.find("special_bonds") != std::string::npos)
-    text += "\n  advice        in DPD 'special_bonds lj 1 1 1' is usual, bonded atoms interacting like all others; it is "
-            "faster too";
-  return text;
 }
 
 void PairPsi::check_host()
@@ -261,6 +263,21 @@ bool PairPsi::has_exclusions() const
     some |= i >= 1 && j <= atom->ntypes && setflag[i][j];
   }
   return some;
+}
+
+bool PairPsi::is_scaled() const
+{
+  const double *factor = force->special_lj;
+  return atom->molecular != Atom::ATOMIC && (factor[1] != 1.0 || factor[2] != 1.0 || factor[3] != 1.0);
+}
+
+bool PairPsi::is_narrow() const
+{
+  double height[3];
+  heights(domain, height);
+  for (int k = 0; k < domain->dimension; k++)
+    if (domain->periodicity[k] && height[k] < 2.0 * (*style)->cutoff()) return true;
+  return false;
 }
 
 // What works with energies of single pairs alone has nothing to work with where energies belong to particles.
@@ -360,6 +377,35 @@ void PairPsi::collect_pairs()
   }
 }
 
+// Each pair of bonded neighbors once, if both are of this rank; else with all ghosts of the second, of which the engine
+// takes the one that is near.
+void PairPsi::find_special()
+{
+  special.clear();
+  special_owned = 0;
+  if (!why_listed.empty() || !is_scaled()) return;
+  const int owned = atom->nlocal;
+  const int *next_image = atom->sametag;
+  const std::array<double, 3> factors{force->special_lj[1], force->special_lj[2], force->special_lj[3]};
+  std::vector<SpecialPair> with_ghosts;
+  for (int i = 0; i < owned; i++) {
+    const tagint *neighbors = atom->special[i];
+    const int *count = atom->nspecial[i];
+    for (int k = 0; k < count[2]; k++) {
+      const double factor = factors[k < count[0] ? 0 : k < count[1] ? 1 : 2];
+      // In a ring a neighbor may be one in two ways: the shorter counts.
+      if (factor == 1.0 || std::find(neighbors, neighbors + k, neighbors[k]) != neighbors + k) continue;
+      for (int j = atom->map(neighbors[k]); j >= 0; j = next_image[j])
+        if (j >= owned)
+          with_ghosts.push_back({i, j, factor});
+        else if (i < j)
+          special.push_back({i, j, factor});
+    }
+  }
+  special_owned = special.size();
+  special.insert(special.end(), with_ghosts.begin(), with_ghosts.end());
+}
+
 // Along periodic directions in which there is one rank only, all ghosts are images of what that rank has: the engine
 // goes round the box there instead. Not where images move at another speed, nor where some have none.
 Extent PairPsi::extent() const
@@ -442,7 +488,10 @@ void PairPsi::compute(int eflag, int vflag)
     if (domain->box_change) check_box();
     if (why_listed.empty() && has_exclusions())
       stop("pairs were excluded after the style was set up, by a fix perhaps: run again");
+    if (why_listed.empty() && is_scaled() && is_narrow())
+      stop("the box has become narrower than twice the cut-off, where special_bonds needs a neighbor list: run again");
     find_images();
+    find_special();
   }
 
   const size_t owned = atom->nlocal;
@@ -476,6 +525,7 @@ void PairPsi::compute(int eflag, int vflag)
   const Extent box = extent();
   strained = images.have_moved(atom, domain);
   const bool alone = !strained && is_alone(box) && attempt([&] { return fluid.fits(box, request); });
+  attempt([&] { fluid.set_special_pairs({special.data(), alone ? special_owned : special.size()}); });
   Totals totals;
   if (alone) {
     totals = attempt([&] {
@@ -600,6 +650,7 @@ void *PairPsi::extract_peratom(const char *what, int &columns)
   if (width == 0) return nullptr;
   // Forces may not have needed all of them.
   const size_t all = atom->nlocal + atom->nghost;
+  attempt([&] { (*style)->set_special_pairs({special.data(), special.size()}); });
   attempt([&] { (*style)->sum_densities(atom->nlocal, flat(atom->x, all), {atom->tag, all}, {atom->type, all}); });
   const auto densities = (*style)->local_densities();
   double *first = const_cast<double *>(densities.data());
@@ -643,6 +694,7 @@ double PairPsi::memory_usage()
 {
   double bytes = Pair::memory_usage();
   bytes += (pair_i.capacity() + pair_j.capacity()) * sizeof(int32_t) + pair_factor.capacity() * sizeof(double);
+  bytes += special.capacity() * sizeof(SpecialPair);
   if (style) bytes += static_cast<double>((*style)->memory());
   return bytes;
 }

@@ -86,6 +86,11 @@ class PairPsi : public LAMMPS_NS::Pair {
   void find_images();
   void find_densities(int all, const Request &request);
   void collect_pairs();
+  // Whether special_bonds gives bonded neighbors other factors than 1.
+  bool is_scaled() const;
+  // Whether atoms may see two images of each other.
+  bool is_narrow() const;
+  void find_special();
   void forward();
   void check_box();
   void check_plane();
@@ -138,6 +143,9 @@ class PairPsi : public LAMMPS_NS::Pair {
   bool full_list = true;
   std::vector<int32_t> pair_i, pair_j;
   std::vector<double> pair_factor;
+  // Bonded neighbors with a factor other than 1: the first so many are both atoms of this rank, the others have ghosts.
+  std::vector<SpecialPair> special;
+  size_t special_owned = 0;
 };
 
 }    // namespace psidpd

@@ -2,7 +2,9 @@
 
 use crate::style::{Style, StyleError, guard};
 use nalgebra::Matrix3;
-use psidpd_core::engine::{Around, PairsOfHost, Path, PeriodicBox, Step, Surroundings, Tally, Want};
+use psidpd_core::engine::{
+    Around, PairsOfHost, Path, PeriodicBox, SpecialPair, Step, Surroundings, Tally, Want,
+};
 use psidpd_core::model::{SplinePair, WarrenPair};
 
 #[cxx::bridge(namespace = "psidpd")]
@@ -29,6 +31,14 @@ mod ffi {
         edges: [f64; 6],
         /// Periodic directions that this rank has all of.
         closed: [bool; 3],
+    }
+
+    /// A pair that does not act at its full strength: an atom, and another or a ghost of it.
+    #[derive(Clone, Copy)]
+    struct SpecialPair {
+        i: i32,
+        j: i32,
+        factor: f64,
     }
 
     /// What a step asks for.
@@ -94,6 +104,10 @@ mod ffi {
         fn noise_range(self: &Style) -> f64;
 
         fn configure(self: &mut Style, mixed: bool, threads: usize) -> Result<()>;
+        /// Whether close pairs have forces that cannot be taken away again without losing digits.
+        fn has_core(self: &Style) -> bool;
+        /// Which pairs do not act at their full strength, unless LAMMPS lists pairs: for all that comes until the next call.
+        fn set_special_pairs(self: &mut Style, pairs: &[SpecialPair]) -> Result<()>;
 
         /// Whether this rank can do without images along the closed directions of a box, for what is asked for.
         fn fits(self: &Style, extent: &Extent, request: &Request) -> Result<bool>;
@@ -335,6 +349,20 @@ impl Style {
     fn variables(&self) -> usize {
         let plan = self.engine().plan();
         plan.densities().count() * plan.species().len()
+    }
+
+    fn has_core(&self) -> bool {
+        self.engine().plan().has_core()
+    }
+
+    fn set_special_pairs(&mut self, pairs: &[ffi::SpecialPair]) -> Result<(), StyleError> {
+        // A number that is none is refused by the engine, as one behind the last.
+        let number = |k: i32| u32::try_from(k).unwrap_or(u32::MAX);
+        let pairs = pairs.iter().map(|p| SpecialPair { i: number(p.i), j: number(p.j), factor: p.factor });
+        guard(|| {
+            self.engine_mut().set_special_pairs(pairs);
+            Ok(())
+        })
     }
 
     fn fits(&self, extent: &ffi::Extent, request: &ffi::Request) -> Result<bool, StyleError> {

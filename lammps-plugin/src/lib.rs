@@ -6,8 +6,8 @@
 //! - `cpp/`: the pair styles that LAMMPS sees, compiled against the headers of one LAMMPS;
 //! - `table`: the styles, as the entry finds them.
 //!
-//! The engine keeps its own cells; LAMMPS's neighbour list is requested only where it knows of pairs that
-//! act less or not at all: `special_bonds`, `neigh_modify exclude`.
+//! The engine keeps its own cells, and corrects pairs that `special_bonds` weakens; LAMMPS's neighbour list is requested
+//! only where it alone knows which pairs do not act: `neigh_modify exclude`.
 
 pub mod bridge;
 pub mod style;

@@ -344,6 +344,89 @@ fn special_bonds_and_exclusions() {
     }
 }
 
+/// Corrected pairs of the fast sweep are the pairs of LAMMPS's list with their factors, drag, noise and pressure among
+/// what they give, for two species with two densities, and on every number of ranks. An exclusion of nothing asks for
+/// the list.
+#[test]
+fn special_bonds_are_the_same_by_the_sweep_and_by_the_list() {
+    let (_folder, data) = file(&chains(120));
+    let (_model, model) = file(WIDE);
+    let outcome = |listed: bool, precision: &str, newton: &str, special: &str, more: &str, ranks: usize| {
+        let list = if listed { "group nobody empty\nneigh_modify exclude group nobody nobody\n" } else { "" };
+        let script = format!(
+            "newton {newton}\nunits lj\natom_style bond\natom_modify map yes\ncomm_modify vel yes\n\
+             special_bonds lj {special}\nread_data \"{data}\"\nmass * 1\nvelocity all create 1.0 87 loop geom\n{}\
+             pair_style dpd/psi 1.0 {SEED} precision {precision}\npair_coeff * * \"{model}\" A B\nbond_style zero\n\
+             bond_coeff *\n{list}{more}fix 1 all nve\ntimestep {DT}\nthermo_modify norm no\n\
+             thermo_style custom step pe pxx pyy pzz pxy pxz pyz\nrun 3\n\
+             print \"$(pe:%.17g) $(pxx:%.17g) $(pyy:%.17g) $(pzz:%.17g) $(pxy:%.17g) $(pxz:%.17g) $(pyz:%.17g)\" \
+             file totals\n",
+            load()
+        );
+        let folder = tempfile::tempdir().unwrap();
+        let frame = run_in(folder.path(), &script, ranks);
+        let log = std::fs::read_to_string(folder.path().join("log.lammps")).unwrap();
+        assert_eq!(log.contains("because of neigh_modify exclude"), listed, "{log}");
+        assert_eq!(log.contains("  special bonds factors"), !listed, "{log}");
+        let totals = std::fs::read_to_string(folder.path().join("totals")).unwrap();
+        let totals: Vec<f64> = totals.split_whitespace().map(|t| t.parse().unwrap()).collect();
+        (frame, totals)
+    };
+    let strained = "fix d all deform 1 xy erate 0.3 remap x\n";
+    for (special, more) in [("0 0 0", ""), ("0.5 0 0.8", ""), ("0 0.3 0.7", strained)] {
+        let more = if more.is_empty() { more.into() } else { format!("change_box all triclinic\n{more}") };
+        let expected = outcome(true, "double", "on", special, &more, 1);
+        let scale = largest(&expected.1);
+        let worst = |(frame, totals): (Frame, Vec<f64>)| {
+            let totals = largest(totals.iter().zip(&expected.1).map(|(a, b)| (a - b).abs() / scale));
+            [difference(&frame.f, &expected.0.f), totals]
+        };
+        let plain = worst(outcome(false, "double", "on", "0.9 1 1", &more, 1));
+        assert!(plain[0] > 0.01, "factors matter: {plain:?}");
+        for (newton, ranks) in [("on", 1), ("on", 2), ("off", 2), ("on", 4), ("off", 4)] {
+            let off = worst(outcome(false, "double", newton, special, &more, ranks));
+            assert!(off[0] < 1e-11 && off[1] < 1e-12, "{special}, newton {newton}, {ranks} ranks: {off:?}");
+        }
+        let off = worst(outcome(false, "mixed", "on", special, &more, 2));
+        assert!(off[0] < 2e-5 && off[1] < 2e-5, "{special}, mixed: {off:?}");
+    }
+}
+
+/// Pairs whose force is too large to be taken away again, and boxes in which a pair has two images, take the list.
+#[test]
+fn special_bonds_that_need_the_list() {
+    let (_folder, data) = file(&chains(120));
+    let (_core, core) = file(
+        "title = \"core\"\nspecies = [\"A\"]\n[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"expression\"\n\
+         phi = \"(1 - r)^2/r\"\nrange = 1\n",
+    );
+    for (range, style, why) in [
+        (
+            5.0,
+            format!("pair_style dpd/psi 1.0 {SEED}\npair_coeff * * \"{core}\" A A"),
+            "very large at contact",
+        ),
+        (
+            3.0,
+            format!("pair_style mdpd/psi 1.0 3.0 {SEED}\npair_coeff * * -4 2 0 3 0.75"),
+            "narrower than twice",
+        ),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let script = format!(
+            "units lj\natom_style bond\ncomm_modify vel yes cutoff {range}\nspecial_bonds lj 0 1 1\n\
+             read_data \"{data}\"\nmass * 1\n{}{style}\nbond_style zero\nbond_coeff *\nfix 1 all nve\nrun 0\n",
+            load()
+        );
+        run_in(folder.path(), &script, 1);
+        let log = std::fs::read_to_string(folder.path().join("log.lammps")).unwrap();
+        assert!(
+            log.contains("neighbor list of LAMMPS, because of special_bonds") && log.contains(why),
+            "{log}"
+        );
+    }
+}
+
 /// The factors that a hybrid gives to one of its styles are that style's.
 #[test]
 fn a_hybrids_special_factors() {

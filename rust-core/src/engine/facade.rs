@@ -6,12 +6,13 @@ use super::fault::Fault;
 use super::particles::{Particles, Step};
 use super::path::{Path, Reason};
 use super::plan::Plan;
-use super::reference::Reference;
-use super::surroundings::{Around, Surroundings};
+use super::reference::{Corrections, Reference};
+use super::surroundings::{Around, SpecialPair, Surroundings};
 use super::sweep::{Pool, Sweep, Times};
 use crate::model::Fluid;
 use crate::model::expression::TooLarge;
 use psidpd_passes::domain::PeriodicBox;
+use psidpd_passes::noise::PairNoise;
 use psidpd_passes::settings::Settings;
 use psidpd_passes::tally::{Tally, Want};
 use std::sync::Arc;
@@ -28,6 +29,8 @@ pub struct Engine {
     reference: Reference,
     sweep: Sweep,
     reference_only: bool,
+    special: Vec<SpecialPair>,
+    corrections: Corrections,
     /// That of the last evaluation.
     path: Option<Path>,
     /// ψ of owned particles and densities in the last evaluation, as far as they have been fetched.
@@ -94,6 +97,8 @@ impl Engine {
             reference: Reference::of_plan(plan.clone()),
             sweep: Sweep::of_plan(plan, settings, pool),
             reference_only: false,
+            special: Vec::new(),
+            corrections: Corrections::default(),
             path: None,
             excess: Vec::new(),
             densities: Vec::new(),
@@ -140,6 +145,17 @@ impl Engine {
     pub fn map_kinds(&mut self, kinds: &[i32]) -> Result<(), EngineError> {
         self.reference.map_kinds(kinds)?;
         self.sweep.map_kinds(kinds)
+    }
+
+    /// Which pairs do not act at their full strength in evaluations to come, until the host says otherwise or numbers its
+    /// particles anew.
+    ///
+    /// Within the cut-off two particles must meet in one image only. A sweep takes all pairs for ordinary ones and corrects
+    /// these, so that what they lack should not be much larger than other forces: see [`Plan::has_core`]. Pairs that the
+    /// host lists have their factors in its list, and no special ones beside them.
+    pub fn set_special_pairs(&mut self, pairs: impl IntoIterator<Item = SpecialPair>) {
+        self.special.clear();
+        self.special.extend(pairs.into_iter().filter(|pair| pair.factor != 1.0));
     }
 
     /// Whether every evaluation is to be done by the reference: for tests, and to see what the sweep is worth.
@@ -230,13 +246,19 @@ impl Engine {
         let Request { particles, v, step, want } = request;
         match self.begin(Surroundings::Box(domain), *want) {
             Path::Sweep => {
+                self.find_corrections(Around { domain, images: &[] }, particles)?;
                 let mut tally = self.sweep.evaluate(domain, particles, v, *step, *want, force, add)?;
+                if !self.corrections.is_empty() {
+                    self.sweep.fetch_slopes(particles.owned);
+                    tally += self.correct(request, force)?;
+                }
                 self.fetch(*want);
                 let factor = Fault::factor(Fault::Virial, self.plan().fault);
                 tally.virial.iter_mut().chain(&mut tally.thermostat_virial).for_each(|w| *w *= factor);
                 Ok(tally)
             }
             Path::Reference(_) => {
+                self.reference.set_special_pairs(&self.special);
                 self.reference.first(Surroundings::Box(domain), particles, want.densities)?;
                 self.finish(request, force, add)
             }
@@ -252,13 +274,36 @@ impl Engine {
         let Request { particles, v, step, want } = request;
         match (self.begin(surroundings, *want), surroundings) {
             (Path::Sweep, Surroundings::Ghosts(around, _)) => {
+                self.find_corrections(around, particles)?;
                 self.sweep.first(around, particles, v, *step, *want)
             }
             (Path::Sweep, Surroundings::Box(domain)) => {
-                self.sweep.first(Around { domain, images: &[] }, particles, v, *step, *want)
+                let around = Around { domain, images: &[] };
+                self.find_corrections(around, particles)?;
+                self.sweep.first(around, particles, v, *step, *want)
             }
-            _ => self.reference.first(surroundings, particles, want.densities),
+            _ => {
+                self.reference.set_special_pairs(&self.special);
+                self.reference.first(surroundings, particles, want.densities)
+            }
         }
+    }
+
+    /// What special pairs change in a sweep; the densities among it go there.
+    fn find_corrections(&mut self, around: Around, particles: &Particles) -> Result<(), EngineError> {
+        let Engine { reference, sweep, special, corrections, .. } = self;
+        let densities = sweep.added_densities_mut();
+        corrections.find(reference.plan(), special, around, particles, reference.kinds(), densities)
+    }
+
+    /// Corrects the forces of a sweep, whose slopes are there; the difference in the totals.
+    fn correct(&self, request: &Request, force: &mut [[f64; 3]]) -> Result<Tally, EngineError> {
+        let Request { particles, v, step, want } = request;
+        let (plan, slopes) = (self.sweep.plan(), self.sweep.slopes());
+        let thermostat = step
+            .filter(|_| plan.thermostat.is_some())
+            .map(|s| (PairNoise::new(s.seed, s.number), 1.0 / s.dt.sqrt()));
+        self.corrections.add_forces(plan, slopes, particles, v, thermostat, *want, force)
     }
 
     /// `∂ψ/∂n` of owned particles, then room for those of ghosts, [`Plan::slope_width`] each.
@@ -286,7 +331,10 @@ impl Engine {
         match self.path {
             Some(Path::Reference(_)) => self.finish(request, force, add),
             _ => {
-                let tally = self.sweep.second(&request.particles, force, add)?;
+                let mut tally = self.sweep.second(&request.particles, force, add)?;
+                if !self.corrections.is_empty() {
+                    tally += self.correct(request, force)?;
+                }
                 self.fetch(request.want);
                 Ok(tally)
             }
@@ -353,6 +401,7 @@ impl Engine {
                 Ok(&self.densities)
             }
             Some(Path::Sweep) => {
+                self.reference.set_special_pairs(&self.special);
                 let all = self.reference.sum_all_densities(Some((surroundings, particles)))?;
                 self.densities.extend_from_slice(all);
                 Ok(&self.densities)
@@ -416,9 +465,12 @@ impl Engine {
     /// Bytes held in arrays over particles and pairs.
     pub fn memory(&self) -> usize {
         let held = self.excess.capacity() + self.densities.capacity();
-        self.reference.memory() + self.sweep.memory() + held * size_of::<f64>()
+        let special = self.special.capacity() * size_of::<SpecialPair>() + self.corrections.memory();
+        self.reference.memory() + self.sweep.memory() + special + held * size_of::<f64>()
     }
 }
 
+#[cfg(test)]
+mod special_tests;
 #[cfg(test)]
 mod tests;

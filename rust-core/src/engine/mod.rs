@@ -46,7 +46,7 @@ pub use psidpd_passes::domain::{DomainError, PeriodicBox};
 pub use psidpd_passes::noise;
 pub use psidpd_passes::settings::{Instructions, Precision, Settings};
 pub use psidpd_passes::tally::{Tally, Want};
-pub use surroundings::{Around, Newton, PairsOfHost, Surroundings};
+pub use surroundings::{Around, Newton, PairsOfHost, SpecialPair, Surroundings};
 pub use sweep::{Pool, Sweep, Times, part};
 
 #[cfg(test)]

@@ -42,6 +42,20 @@ pub enum Newton {
     Off,
 }
 
+/// A pair that does not act at its full strength, as two particles with a bond between them may not.
+///
+/// `factor` scales the conservative interaction: `U = Σ ψ(n_i) + Σ s φ` with `n_i = Σ s w`. Drag and noise act at full
+/// strength, so that the thermostat keeps its temperature; only pairs with a factor of 0 do not interact at all.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpecialPair {
+    /// The host's number of the first particle, an owned one.
+    pub i: u32,
+    /// That of the second. Where it is a ghost, the rank of the second has the same pair from its side.
+    pub j: u32,
+    /// The strength.
+    pub factor: f64,
+}
+
 /// The pairs of one step, as the host lists them: at least all within the cut-off of the model, those
 /// of two owned particles once, those of an owned particle `i` and a ghost `j` on either side.
 ///

@@ -103,9 +103,9 @@ pub fn forces_equal_the_native_engine(runs: &Runs) {
 const DUMP: &str = "dump d all custom 1 forces.dump id type x y z fx fy fz\n\
     dump_modify d sort id format float %.17g\nrun 0\nvariable u equal pe*atoms\nprint \"energy $(v_u:%.17g)\"\n";
 
-/// Chains with weakened bonded neighbours, and types that do not see each other: the pairs are those of
-/// LAMMPS's list then.
-pub fn listed_decks(newton: &str, folder: &Path) -> [String; 2] {
+/// Chains with weakened bonded neighbours; and with types that do not see each other: the pairs are those of LAMMPS's
+/// list then.
+pub fn weakened_decks(newton: &str, folder: &Path) -> [String; 2] {
     std::fs::write(folder.join("chains.data"), chains(120)).unwrap();
     let deck = |special: &str, more: &str| {
         format!(
@@ -117,8 +117,8 @@ pub fn listed_decks(newton: &str, folder: &Path) -> [String; 2] {
     [deck("0.5 0.0 0.8", ""), deck("1 1 1", "neigh_modify exclude type 1 2\n")]
 }
 
-/// Their forces and energies, by the formulas, on one rank and on several; returns what the first said.
-pub fn special_factors_and_exclusions(runs: &Runs, newton: &str) -> String {
+/// Their forces and energies, by the formulas, on one rank and on several; returns what each said on one.
+pub fn special_factors_and_exclusions(runs: &Runs, newton: &str) -> [String; 2] {
     let folder = tempfile::tempdir().unwrap();
     let factor = |i: usize, j: usize| match i.abs_diff(j) {
         1 if i / 5 == j / 5 => 0.5,
@@ -129,17 +129,17 @@ pub fn special_factors_and_exclusions(runs: &Runs, newton: &str) -> String {
     let kind = |i: usize| if i % 5 < 3 { 1 } else { 2 };
     let same = |i: usize, j: usize| if kind(i) == kind(j) { 1.0 } else { 0.0 };
     let strengths: [&dyn Fn(usize, usize) -> f64; 2] = [&factor, &same];
-    let mut first = None;
-    for (deck, strength) in listed_decks(newton, folder.path()).iter().zip(strengths) {
-        for ranks in [1, 2, 4] {
+    let mut on_one = [String::new(), String::new()];
+    for (k, (deck, strength)) in weakened_decks(newton, folder.path()).iter().zip(strengths).enumerate() {
+        for ranks in [4, 2, 1] {
             let said = runs.outcome(deck, ranks, folder.path()).unwrap_or_else(|e| panic!("{e}\n{deck}"));
             let [x, forces] = read_forces(&folder.path().join("forces.dump"));
             let (expected, f) = scaled(&x, 5.0, strength);
             let apart = difference(&forces, &f);
             assert!(apart < 1e-10, "newton {newton}, {ranks} ranks: {apart}\n{deck}");
             assert!((energy(&said) / expected - 1.0).abs() < 1e-10, "{} {expected}", energy(&said));
-            first.get_or_insert(said);
+            on_one[k] = said;
         }
     }
-    first.unwrap_or_default()
+    on_one
 }

@@ -10,6 +10,7 @@ use psidpd_core::maximum::largest;
 use psidpd_core::model::Model;
 use psidpd_tests::{lammps, root};
 use std::ops::Deref;
+use std::path::Path;
 use std::sync::{Mutex, MutexGuard};
 use std::time::Duration;
 
@@ -110,16 +111,20 @@ pub fn frame(l: &Lammps) -> Frame {
 
 /// Runs a script as a program on `ranks` ranks and returns the end.
 pub fn run(script: &str, ranks: usize) -> Frame {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("in.lammps");
+    run_in(tempfile::tempdir().unwrap().path(), script, ranks)
+}
+
+/// The same in a folder.
+pub fn run_in(folder: &Path, script: &str, ranks: usize) -> Frame {
+    let path = folder.join("in.lammps");
     let dump =
         "write_dump all custom end.dump id type x y z vx vy vz fx fy fz modify sort id format float %.17g\n";
     std::fs::write(&path, format!("{script}{dump}")).unwrap();
     lammps()
         .0
-        .run_script(ranks, folder.path(), &path, &[], LIMIT)
+        .run_script(ranks, folder, &path, &[], LIMIT)
         .unwrap_or_else(|e| panic!("{ranks} ranks: {e}\n{script}"));
-    let text = std::fs::read_to_string(folder.path().join("end.dump")).unwrap();
+    let text = std::fs::read_to_string(folder.join("end.dump")).unwrap();
     let mut end = Frame { kind: vec![], x: vec![], v: vec![], f: vec![] };
     for line in text.lines().skip(9) {
         let n: Vec<f64> = line.split_whitespace().map(|w| w.parse().unwrap()).collect();

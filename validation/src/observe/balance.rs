@@ -3,10 +3,11 @@
 //! them are exceeded by chance less than once in 10⁴ runs. The seeds are fixed.
 
 use super::frame::Frame;
-use super::tests::{SET6, find};
+use super::tests::find;
 use super::{Measured, Observation, Observers};
 use crate::run::{Integrator, Simulation};
 use crate::scene::Scene;
+use crate::test_support::SET6;
 use psidpd_core::engine::Want;
 use psidpd_core::engine::reference::Evaluator;
 

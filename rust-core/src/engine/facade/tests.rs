@@ -6,13 +6,13 @@ use crate::model::{ForceLaw, Model, WarrenPair, warren_ab};
 use psidpd_passes::noise::threefry2x32;
 
 /// ψ is not linear in its only density.
-fn warren() -> Fluid {
+pub(super) fn warren() -> Fluid {
     let pair = Some(WarrenPair { a: -40.0, b: 25.0, gamma: 18.0, rc: 1.0, rd: 0.75 });
     warren_ab(&["F".into()], &[pair], 3, ForceLaw::Conservative).unwrap().at(1.0).unwrap()
 }
 
 /// ψ is linear in m, which needs no pass.
-fn two_densities() -> Fluid {
+pub(super) fn two_densities() -> Fluid {
     let text = "title = \"two\"\nspecies = [\"A\", \"B\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 0.75\n\
         [density.m]\nkernel = \"lucy\"\nrange = 1.0\nself = true\n[excess_free_energy]\nA = \"n^2 + m_B\"\n\
         B = \"n*n_A - 2*m\"\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n";
@@ -20,15 +20,15 @@ fn two_densities() -> Fluid {
 }
 
 /// Forces need both densities, one with a self term.
-fn two_passes() -> Fluid {
+pub(super) fn two_passes() -> Fluid {
     let text = "title = \"two\"\nspecies = [\"A\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 0.75\n\
         [density.m]\nkernel = \"lucy\"\nrange = 1.0\nself = true\n[excess_free_energy]\nA = \"n^2 + m^2\"\n";
     Model::parse("passes", text).unwrap().at(1.0).unwrap()
 }
 
-struct Cloud {
-    domain: PeriodicBox,
-    x: Vec<[f64; 3]>,
+pub(super) struct Cloud {
+    pub domain: PeriodicBox,
+    pub x: Vec<[f64; 3]>,
     v: Vec<[f64; 3]>,
     tag: Vec<i32>,
     kind: Vec<i32>,
@@ -37,7 +37,7 @@ struct Cloud {
 const STEP: Step = Step { seed: 3, number: 5, dt: 0.01 };
 
 impl Cloud {
-    fn new(lengths: [f64; 3], count: u32, species: i32) -> Cloud {
+    pub(super) fn new(lengths: [f64; 3], count: u32, species: i32) -> Cloud {
         let domain = PeriodicBox::orthogonal([-1.0, 0.5, 2.0], lengths, [true; 3]).unwrap();
         let uniform = |k: u32| f64::from(threefry2x32::<20>([k, 0], [5, 9])[0]) / 4_294_967_296.0;
         Cloud {
@@ -49,13 +49,13 @@ impl Cloud {
         }
     }
 
-    fn request(&self, want: Want) -> Request<'_> {
+    pub(super) fn request(&self, want: Want) -> Request<'_> {
         let particles = Particles { owned: self.x.len(), x: &self.x, tag: &self.tag, kind: &self.kind };
         Request { particles, v: &self.v, step: Some(STEP), want }
     }
 
     /// With images along `along` as ghosts, and where these are.
-    fn with_ghosts(&self, along: [bool; 3]) -> (Cloud, Images) {
+    pub(super) fn with_ghosts(&self, along: [bool; 3]) -> (Cloud, Images) {
         let lengths = self.domain.lengths();
         let domain = PeriodicBox::orthogonal(self.domain.origin(), lengths, along).unwrap();
         let mut all = Cloud {
@@ -74,20 +74,20 @@ impl Cloud {
     }
 }
 
-fn engine(fluid: &Fluid) -> Engine {
+pub(super) fn engine(fluid: &Fluid) -> Engine {
     Engine::new(fluid, Settings { precision: Precision::Double, ..Settings::default() }).unwrap()
 }
 
-type Outcome = (Tally, Vec<[f64; 3]>, Vec<f64>);
+pub(super) type Outcome = (Tally, Vec<[f64; 3]>, Vec<f64>);
 
-fn in_box(engine: &mut Engine, cloud: &Cloud, want: Want) -> Outcome {
+pub(super) fn in_box(engine: &mut Engine, cloud: &Cloud, want: Want) -> Outcome {
     let mut force = vec![[7.0; 3]; cloud.x.len()];
     let tally = engine.forces(&cloud.domain, &cloud.request(want), &mut force, false).unwrap();
     (tally, force, engine.local_densities().to_vec())
 }
 
 /// Both halves, with slopes to ghosts and, if they get any, forces home.
-fn with_ghosts(
+pub(super) fn with_ghosts(
     engine: &mut Engine,
     surroundings: Surroundings,
     all: &Cloud,
@@ -109,7 +109,7 @@ fn with_ghosts(
     (tally, force, engine.local_densities().to_vec())
 }
 
-fn agree(a: &Outcome, b: &Outcome) {
+pub(super) fn agree(a: &Outcome, b: &Outcome) {
     let close =
         |a: f64, b: f64, what: &str| assert!((a - b).abs() < 1e-8 * (100.0 + b.abs()), "{what}: {a} {b}");
     close(a.0.energy(), b.0.energy(), "energy");

@@ -19,7 +19,9 @@ pub fn sum_densities(
     for d in which {
         let density = &plan.densities[d];
         let owned = n.len() / width;
-        add_density(pairs, &density.kernel, owned, n, width, d * count);
+        for list in [pairs.force(), pairs.density_only()] {
+            add_density(list, &density.kernel, owned, n, width, d * count);
+        }
         sums += 1;
         if density.includes_self {
             let own = density.kernel.value(0.0);
@@ -31,11 +33,18 @@ pub fn sum_densities(
     sums
 }
 
-/// Adds one density of every owned particle to `n`.
+/// Adds what pairs of a list add to one density of every owned particle to `n`.
 ///
 /// `n` has `width` numbers for each owned particle, species running fastest; this density's begin at
 /// `offset`.
-fn add_density(pairs: &Pairs, kernel: &Kernel, owned: usize, n: &mut [f64], width: usize, offset: usize) {
+pub fn add_density(
+    pairs: &PairList,
+    kernel: &Kernel,
+    owned: usize,
+    n: &mut [f64],
+    width: usize,
+    offset: usize,
+) {
     struct Pass<'a> {
         pairs: &'a PairList,
         kernel: &'a Kernel,
@@ -69,7 +78,5 @@ fn add_density(pairs: &Pairs, kernel: &Kernel, owned: usize, n: &mut [f64], widt
         }
     }
 
-    for pairs in [pairs.force(), pairs.density_only()] {
-        kernel.kind().visit(Pass { pairs, kernel, owned, n, width, offset });
-    }
+    kernel.kind().visit(Pass { pairs, kernel, owned, n, width, offset });
 }

@@ -253,8 +253,9 @@ fn add_thermostat(
         let pair = list.species_i[k] as usize * count + list.species_j[k] as usize;
         let (r, range) = (list.r[k], plan.range[pair]);
         out[k - begin] = 0.0;
+        let strength = list.thermostat_factor.get(k).copied().unwrap_or(1.0);
         // Two particles on one point have no direction to push along.
-        if r < range && r > 0.0 {
+        if r < range && r > 0.0 && strength != 0.0 {
             let (i, j) = (list.i[k] as usize, list.j[k] as usize);
             let base = 1.0 - r / range;
             let exponent = plan.exponent[pair];
@@ -264,7 +265,8 @@ fn add_thermostat(
                 + list.d[1][k] * (vi[1] - vj[1])
                 + list.d[2][k] * (vi[2] - vj[2]);
             let xi = noise.xi(input.tag[i] as u32, input.tag[j] as u32);
-            out[k - begin] = w * (plan.sigma[pair] * xi * inverse_root_dt - plan.gamma[pair] * w * dot / r);
+            let force = w * (plan.sigma[pair] * xi * inverse_root_dt - plan.gamma[pair] * w * dot / r);
+            out[k - begin] = strength * force;
         }
     }
 }

@@ -5,8 +5,8 @@ fn bytes<T>(array: &Vec<T>) -> usize {
     array.capacity() * size_of::<T>()
 }
 
-fn list_bytes(list: &PairList) -> usize {
-    let PairList { i, j, species_i, species_j, d, r, factor } = list;
+pub fn list_bytes(list: &PairList) -> usize {
+    let PairList { i, j, species_i, species_j, d, r, factor, thermostat_factor } = list;
     bytes(i)
         + bytes(j)
         + bytes(species_i)
@@ -14,6 +14,7 @@ fn list_bytes(list: &PairList) -> usize {
         + d.iter().map(bytes).sum::<usize>()
         + bytes(r)
         + bytes(factor)
+        + bytes(thermostat_factor)
 }
 
 impl Reference {

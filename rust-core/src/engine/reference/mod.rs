@@ -24,6 +24,9 @@ mod memory;
 mod pairs;
 mod search;
 mod single;
+mod special;
+
+pub(super) use special::Corrections;
 
 pub use evaluation::{COMPONENTS, Evaluation, Evaluator, evaluate, thermostat};
 pub use free_energy::Psi;
@@ -34,7 +37,7 @@ use super::error::EngineError;
 use super::excess_pass::{ExcessPass, Rows};
 use super::particles::{Particles, Step};
 use super::plan::Plan;
-use super::surroundings::{Around, Newton, Surroundings};
+use super::surroundings::{Around, Newton, SpecialPair, Surroundings};
 use crate::model::Fluid;
 use crate::model::expression::TooLarge;
 use densities::sum_densities;
@@ -46,6 +49,7 @@ use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::noise::PairNoise;
 use psidpd_passes::tally::{Tally, Want};
 use search::CellSearch;
+use special::scale;
 
 /// The forces of one fluid over a list of pairs, with whatever can be asked for, and the arrays that computing them
 /// needs.
@@ -59,6 +63,7 @@ pub struct Reference {
     search: CellSearch,
     box_search: BoxSearch,
     pairs: Pairs,
+    special: Vec<SpecialPair>,
     species: Vec<i32>,
     /// Local densities of owned particles, density-major, [`Fluid::variables`] each.
     densities: Vec<f64>,
@@ -94,6 +99,7 @@ impl Reference {
             search: CellSearch::default(),
             box_search: BoxSearch::default(),
             pairs: Pairs::default(),
+            special: Vec::new(),
             species: Vec::new(),
             densities: Vec::new(),
             has_all_densities: false,
@@ -135,6 +141,18 @@ impl Reference {
         }
         self.kinds = kinds.to_vec();
         Ok(())
+    }
+
+    /// Species of each of the host's types.
+    pub(super) fn kinds(&self) -> &[i32] {
+        &self.kinds
+    }
+
+    /// Which pairs do not act at their full strength in evaluations to come, by the host's numbers. Within the cut-off two
+    /// particles must meet in one image only. Pairs that a host lists have their factors in its list.
+    pub fn set_special_pairs(&mut self, special: &[SpecialPair]) {
+        self.special.clear();
+        self.special.extend_from_slice(special);
     }
 
     /// Finds pairs, sums local densities, all of the model or those that forces need, and evaluates ψ and its slopes
@@ -199,6 +217,16 @@ impl Reference {
                 pairs.clear(owned, newton);
                 add_listed(&listed, particles, species, dimensions, cutoff, pairs)?;
             }
+        }
+        if !self.special.is_empty() {
+            let domain = match surroundings {
+                Surroundings::Box(domain) => domain,
+                Surroundings::Ghosts(around, _) => around.domain,
+                Surroundings::Listed(..) => {
+                    return Err(EngineError::Host("listed pairs have factors of their own"));
+                }
+            };
+            scale(&mut self.pairs, &self.special, domain, dimensions, cutoff)?;
         }
         self.counts.search += 1;
         Ok(())

@@ -24,6 +24,8 @@ pub struct PairList {
     pub r: Vec<f64>,
     /// Strength of the conservative interaction; empty if every pair has its full one.
     pub factor: Vec<f64>,
+    /// Strength of drag and noise; empty if every pair has its full one.
+    pub thermostat_factor: Vec<f64>,
 }
 
 impl PairList {
@@ -31,7 +33,7 @@ impl PairList {
         self.r.len()
     }
 
-    fn clear(&mut self) {
+    pub fn clear(&mut self) {
         self.i.clear();
         self.j.clear();
         self.species_i.clear();
@@ -39,14 +41,21 @@ impl PairList {
         self.d.iter_mut().for_each(Vec::clear);
         self.r.clear();
         self.factor.clear();
+        self.thermostat_factor.clear();
     }
 
     #[inline(always)]
     pub fn push(&mut self, i: usize, j: usize, d: [f64; 3], species: &[i32]) {
+        self.push_of(i, j, d, [species[i], species[j]]);
+    }
+
+    /// Adds a pair of particles of two species.
+    #[inline(always)]
+    pub fn push_of(&mut self, i: usize, j: usize, d: [f64; 3], [a, b]: [i32; 2]) {
         self.i.push(i as u32);
         self.j.push(j as u32);
-        self.species_i.push(species[i] as u8);
-        self.species_j.push(species[j] as u8);
+        self.species_i.push(a as u8);
+        self.species_j.push(b as u8);
         for c in 0..3 {
             self.d[c].push(d[c]);
         }
@@ -101,6 +110,11 @@ impl Pairs {
     /// The pairs that another rank, or another image, computes the force of.
     pub fn density_only(&self) -> &PairList {
         &self.density_only
+    }
+
+    /// Both, for strengths that are known once all pairs are.
+    pub fn lists_mut(&mut self) -> [&mut PairList; 2] {
+        [&mut self.force, &mut self.density_only]
     }
 
     pub fn newton(&self) -> Newton {

@@ -4,6 +4,7 @@
 //! scatter.
 
 use super::PairThermostat;
+use crate::engine::sweep::PlanePairs;
 
 /// A pair and the mean force of drag on it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,7 +21,7 @@ impl PairThermostat {
     /// Drag at the velocities `v`, in the order of the particles that pairs were found of. None if distances were not
     /// kept.
     pub fn drags(&self, v: &[[f64; 3]]) -> Vec<Pull> {
-        let order = &self.cells.order;
+        let order = self.lists.order();
         self.pulls_by(|i, j, _, _, g| {
             let (a, b) = (v[order[i] as usize], v[order[j] as usize]);
             let along: f64 = (0..3).map(|c| g[c] * (a[c] - b[c])).sum();
@@ -37,17 +38,20 @@ impl PairThermostat {
     /// With `strength` of the sorted particles, the plane, the pair in it, and `g`: what `g` is to be multiplied by.
     fn pulls_by(&self, strength: impl Fn(usize, usize, usize, usize, [f64; 3]) -> f64) -> Vec<Pull> {
         let mut pulls = Vec::new();
-        for (number, plane) in self.planes.iter().enumerate().filter(|(_, plane)| !plane.stretch.is_empty()) {
-            for (i, ends) in plane.start.windows(2).enumerate() {
+        let order = self.lists.order();
+        for (number, plane) in self.planes.iter().enumerate() {
+            let PlanePairs { own, next, list } = &plane.found;
+            if list.stretch.is_empty() {
+                continue;
+            }
+            for (i, ends) in list.start.windows(2).enumerate() {
                 for k in ends[0] as usize..ends[1] as usize {
-                    let (pair, stretch) = (&plane.pairs[k], f64::from(plane.stretch[k]));
+                    let (pair, stretch) = (&list.pairs[k], f64::from(list.stretch[k]));
                     let j = pair.j as usize;
-                    let j =
-                        j.checked_sub(plane.own.len()).map_or(plane.own.start + j, |k| plane.next.start + k);
-                    let (i, g) = (plane.own.start + i, pair.g.map(f64::from));
+                    let j = j.checked_sub(own.len()).map_or(own.start + j, |k| next.start + k);
+                    let (i, g) = (own.start + i, pair.g.map(f64::from));
                     let strength = strength(i, j, number, k, g) / stretch;
-                    let i = self.cells.order[i] as usize;
-                    pulls.push(Pull { i, d: g.map(|g| stretch * g), strength });
+                    pulls.push(Pull { i: order[i] as usize, d: g.map(|g| stretch * g), strength });
                 }
             }
         }

@@ -1,6 +1,7 @@
 //! Records what carries momentum in a step, for observables.
 
-use super::{Integrator, Simulation};
+use super::Simulation;
+use crate::integrator::Integrator;
 use crate::observe::flux::{Acted, Flux, Line};
 use psidpd_core::engine::thermostat::Pull;
 
@@ -55,11 +56,11 @@ impl Simulation {
         if !self.is_recording() {
             return;
         }
-        let strengths: Vec<f64> = self.mass.iter().map(|m| m / h).collect();
-        let ways: Vec<Line> = (0..self.owned)
+        let strengths: Vec<f64> = self.masses().iter().map(|m| m / h).collect();
+        let ways: Vec<Line> = (0..self.len())
             .map(|k| {
-                let strength = strengths[self.species[k] as usize];
-                Line { from: self.x[k], d: u(self, k).map(|u| h * u), strength }
+                let strength = strengths[self.species()[k] as usize];
+                Line { from: self.positions()[k], d: u(self, k).map(|u| h * u), strength }
             })
             .collect();
         if let Some(Record { dt, flux, .. }) = self.record.as_deref_mut() {
@@ -72,31 +73,18 @@ impl Simulation {
         if !self.is_recording() {
             return;
         }
-        let at = Some((self.x[..self.owned].to_vec(), self.species[..self.owned].to_vec()));
-        let acted = Acted { share: 1.0, virial: self.tally.virial, at };
+        let at = Some((self.positions().to_vec(), self.species().to_vec()));
+        let acted = Acted { share: 1.0, virial: self.tally().virial, at };
         if let Some(record) = &mut self.record {
             record.flux.forces.push(acted);
         }
     }
 
-    /// Drag at the velocities `v` for a part of the step; its pairs must have been found.
-    pub(super) fn record_drag(&mut self, share: f64, v: &[[f64; 3]]) {
-        if let Some(coupling) = self.coupling.as_ref().filter(|_| self.is_recording()) {
-            self.record_pulls(share, coupling.drags(v));
-        }
-    }
-
-    /// What an update of one pair after the other has done for a part of the step.
-    pub(super) fn record_last_update(&mut self, share: f64) {
-        if let Some(coupling) = self.coupling.as_ref().filter(|_| self.is_recording()) {
-            self.record_pulls(share, coupling.pulls());
-        }
-    }
-
-    fn record_pulls(&mut self, share: f64, pulls: Vec<Pull>) {
-        let Simulation { record: Some(record), x, .. } = self else { return };
+    /// Pulls of drag for a part of the step.
+    pub(super) fn record_pulls(&mut self, share: f64, pulls: Vec<Pull>) {
+        let Simulation { record: Some(record), particles, .. } = self else { return };
         record.flux.drag.extend(pulls.into_iter().map(|pull| Line {
-            from: x[pull.i],
+            from: particles.now().x[pull.i],
             d: pull.d,
             strength: share * pull.strength,
         }));

@@ -12,21 +12,22 @@ use crate::engine::vectors::{self, Loop};
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::pair_batch::accumulators::Accumulator;
 
-/// Particles whose densities are gathered at a time: they stay in the first-level cache until ψ is evaluated, and
-/// make several blocks of lanes where not all take part.
+/// Particles whose densities are gathered at once: few enough to stay in the first-level cache until ψ is evaluated, and
+/// enough to fill several blocks of lanes where some particles take no part.
 pub const DENSITY_BLOCK: usize = 2 * LANES;
 
 /// What ψ is evaluated with.
 pub struct ExcessInput<'a> {
     pub plan: &'a Plan,
     pub tag: &'a [i32],
-    /// What a particle itself adds to the densities of the passes: `w(0)` of its species, or nothing. A row for each
-    /// species.
+    /// The self term of each density: `w(0)` for the particle's own species, else zero. One row for each species.
     self_weights: Vec<f64>,
+    /// What is added beside pairs, a row for each owned particle in the host's order; empty if nothing is.
+    added: &'a [f64],
 }
 
 impl<'a> ExcessInput<'a> {
-    /// None if ψ is zero whatever the densities are.
+    /// None if ψ is zero at all densities.
     pub fn new(plan: &'a Plan, input: &Input<'a>) -> Option<ExcessInput<'a>> {
         if plan.excess.iter().all(|e| matches!(e, ExcessPlan::Constant(0.0))) {
             return None;
@@ -39,11 +40,20 @@ impl<'a> ExcessInput<'a> {
                 self_weights.extend((0..count).map(|s| if s == species { own } else { 0.0 }));
             }
         }
-        Some(ExcessInput { plan, tag: input.particles.tag, self_weights })
+        Some(ExcessInput { plan, tag: input.particles.tag, self_weights, added: input.added_densities })
+    }
+
+    /// Adds what is added beside pairs to the densities of particles with these numbers.
+    fn add(&self, numbers: &[u32], width: usize, densities: &mut [f64]) {
+        for (k, row) in numbers.iter().zip(densities.chunks_exact_mut(width)) {
+            // Ghosts have no row.
+            let added = self.added.get(width * *k as usize..).unwrap_or_default();
+            row.iter_mut().zip(added).for_each(|(n, added)| *n += added);
+        }
     }
 }
 
-/// Some particles that follow each other, no more than [`DENSITY_BLOCK`].
+/// Up to [`DENSITY_BLOCK`] consecutive particles.
 pub struct DensityBlock<'a> {
     /// The first.
     pub first: usize,
@@ -69,6 +79,9 @@ impl DensityBlock<'_> {
     ) -> Result<(), EngineError> {
         let DensityBlock { first, added, species, ghost, densities, excess, slopes } = self;
         sum_densities(fluid.set, fluid.width(), added, &input.self_weights, species, densities);
+        if !input.added.is_empty() {
+            input.add(&order.order[first..][..excess.len()], fluid.width(), densities);
+        }
         let rows = &mut Rows { first: 0, columns: &fluid.variables, densities, excess, slopes };
         let tag = |s: usize| input.tag[order.order[first + s] as usize];
         match (species.is_empty(), ghost.is_empty()) {
@@ -83,7 +96,7 @@ impl DensityBlock<'_> {
     }
 }
 
-/// Densities of particles, `width` each, from what pairs have added, and what each particle adds itself.
+/// Densities of particles, `width` each: sums over pairs plus self terms.
 fn sum_densities(
     set: InstructionSet,
     width: usize,

@@ -14,6 +14,8 @@ pub struct Input<'a> {
     pub v: &'a [[f64; 3]],
     /// Species of each type of particle; negative for those that take no part.
     pub species_of_type: &'a [i32],
+    /// What is added to the densities of owned particles beside pairs, a row for each; empty if nothing is.
+    pub added_densities: &'a [f64],
     pub thermostat: Option<(PairNoise, f64)>,
     pub totals: bool,
 }
@@ -24,6 +26,7 @@ impl<'a> Input<'a> {
         images: &'a [bool],
         v: &'a [[f64; 3]],
         species_of_type: &'a [i32],
+        added_densities: &'a [f64],
         thermostat: Option<(PairNoise, f64)>,
         want: Want,
     ) -> Input<'a> {
@@ -32,6 +35,7 @@ impl<'a> Input<'a> {
             images,
             v,
             species_of_type,
+            added_densities,
             thermostat,
             totals: want.energy || want.virial,
         }

@@ -47,7 +47,15 @@ impl Points {
 
     fn input(&self, owned: usize) -> Input<'_> {
         let particles = Particles { owned, x: &self.x, tag: &self.tag, kind: &self.kind };
-        Input { particles, images: &[], v: &[], species_of_type: &[-1, 0], thermostat: None, totals: false }
+        Input {
+            particles,
+            images: &[],
+            v: &[],
+            species_of_type: &[-1, 0],
+            added_densities: &[],
+            thermostat: None,
+            totals: false,
+        }
     }
 }
 

@@ -1,0 +1,165 @@
+//! Special pairs: their strengths in the lists of pairs of the reference, and what they change in a sweep, which takes
+//! every pair for an ordinary one.
+
+use super::densities::add_density;
+use super::forces::{ForceInput, ForceOutput, add_forces};
+use super::memory::list_bytes;
+use super::pairs::{PairList, Pairs};
+use crate::engine::error::EngineError;
+use crate::engine::particles::Particles;
+use crate::engine::plan::Plan;
+use crate::engine::surroundings::{Around, Newton, SpecialPair};
+use psidpd_passes::domain::PeriodicBox;
+use psidpd_passes::noise::PairNoise;
+use psidpd_passes::tally::{Tally, Want};
+use std::collections::HashMap;
+
+/// Gives the special ones among pairs that have been found their strengths.
+///
+/// # Errors
+/// A box in which two particles meet in several images, of which it is not said which one is special.
+pub fn scale(
+    pairs: &mut Pairs,
+    special: &[SpecialPair],
+    domain: &PeriodicBox,
+    dimensions: usize,
+    cutoff: f64,
+) -> Result<(), EngineError> {
+    if (0..dimensions).any(|k| domain.periodic()[k] && domain.height(k) < 2.0 * cutoff) {
+        return Err(EngineError::Host("special pairs in a box narrower than twice the cut-off"));
+    }
+    let key = |i: u32, j: u32| (i.min(j), i.max(j));
+    let factors: HashMap<_, _> = special.iter().map(|p| (key(p.i, p.j), p.factor)).collect();
+    for list in pairs.lists_mut() {
+        let factor = |(i, j): (&u32, &u32)| factors.get(&key(*i, *j)).copied().unwrap_or(1.0);
+        list.factor = list.i.iter().zip(&list.j).map(factor).collect();
+        list.thermostat_factor = list.factor.iter().map(|f| if *f == 0.0 { 0.0 } else { 1.0 }).collect();
+    }
+    Ok(())
+}
+
+/// The difference that special pairs make to an evaluation in which all pairs acted at full strength: to densities before
+/// ψ is evaluated, and to forces and totals at the end.
+#[derive(Debug, Clone, Default)]
+pub struct Corrections {
+    /// Special pairs within the cut-off, with what their strengths have too much.
+    pairs: PairList,
+    owned: usize,
+    /// Whether there are some that do not interact at all.
+    excludes: bool,
+}
+
+impl Corrections {
+    /// Finds the special pairs that are within the cut-off, and what they change in the densities that forces need: for
+    /// each owned particle [`Plan::slope_width`] numbers, or none at all if nothing changes.
+    ///
+    /// # Errors
+    /// A pair of particles that are not there, or of none that is owned.
+    pub fn find(
+        &mut self,
+        plan: &Plan,
+        special: &[SpecialPair],
+        around: Around,
+        particles: &Particles,
+        species_of_type: &[i32],
+        densities: &mut Vec<f64>,
+    ) -> Result<(), EngineError> {
+        self.pairs.clear();
+        (self.owned, self.excludes) = (particles.owned, false);
+        densities.clear();
+        let Particles { x, kind, owned, .. } = *particles;
+        let Around { domain, images } = around;
+        let is_periodic = domain.periodic() != [false; 3];
+        let (squared, depth) = (plan.cutoff * plan.cutoff, if plan.dimensions == 2 { 0.0 } else { 1.0 });
+        let square = |d: &[f64; 3]| d[0] * d[0] + d[1] * d[1] + depth * d[2] * d[2];
+        let species = |k: usize| species_of_type.get(kind[k] as usize).copied().unwrap_or(-1);
+        for pair in special {
+            let (i, j) = (pair.i as usize, pair.j as usize);
+            if i >= owned || j >= x.len() {
+                return Err(EngineError::Host("a special pair names a particle that is not there"));
+            }
+            let mut d = std::array::from_fn(|c| x[i][c] - x[j][c]);
+            // Within the cut-off there is one image at most.
+            if square(&d) >= squared && is_periodic {
+                d = domain.minimum_image(x[i], x[j]);
+            }
+            let is_image = j >= owned && images.get(j - owned).is_some_and(|image| *image);
+            let (a, b) = (species(i), species(j));
+            if square(&d) < squared && !is_image && a >= 0 && b >= 0 {
+                d[2] *= depth;
+                self.pairs.push_of(i, j, d, [a, b]);
+                self.pairs.factor.push(pair.factor - 1.0);
+                self.pairs.thermostat_factor.push(if pair.factor == 0.0 { -1.0 } else { 0.0 });
+                self.excludes |= pair.factor == 0.0;
+            }
+        }
+        if self.pairs.len() > 0 {
+            let width = plan.slope_width();
+            densities.resize(width * self.owned, 0.0);
+            for (k, density) in plan.passes.iter().enumerate() {
+                let kernel = &plan.densities[*density].kernel;
+                add_density(&self.pairs, kernel, self.owned, densities, width, k * plan.species.len());
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether nothing changes.
+    pub fn is_empty(&self) -> bool {
+        self.pairs.len() == 0
+    }
+
+    /// Adds what changes to the forces on owned particles, and returns what changes in the totals. A pair with a ghost
+    /// counts half, as in a sweep.
+    ///
+    /// # Errors
+    /// A force that is not finite.
+    #[expect(clippy::too_many_arguments)] // An evaluation is of all these.
+    pub fn add_forces(
+        &self,
+        plan: &Plan,
+        slopes: &[f64],
+        particles: &Particles,
+        v: &[[f64; 3]],
+        thermostat: Option<(PairNoise, f64)>,
+        want: Want,
+        force: &mut [[f64; 3]],
+    ) -> Result<Tally, EngineError> {
+        let input = ForceInput {
+            plan,
+            list: &self.pairs,
+            newton: Newton::Off,
+            owned: self.owned,
+            slopes,
+            v,
+            tag: particles.tag,
+            thermostat: thermostat.filter(|_| self.excludes),
+            want,
+        };
+        let mut output = ForceOutput {
+            force: &mut force[..self.owned],
+            particle_energy: &mut [],
+            particle_virial: &mut [],
+            pair_force: &mut [],
+            tally: Tally::default(),
+        };
+        add_forces(&input, &mut output);
+        let tally = output.tally;
+        // A force that is not finite makes the sum none.
+        let of = |list: &[u32]| list.iter().filter_map(|k| force.get(*k as usize)).flatten().sum::<f64>();
+        if (of(&self.pairs.i) + of(&self.pairs.j)).is_finite() {
+            return Ok(tally);
+        }
+        let members = self.pairs.i.iter().chain(&self.pairs.j).map(|k| *k as usize);
+        let is_lost = |k: &usize| *k < self.owned && !force[*k].iter().all(|f| f.is_finite());
+        match members.filter(is_lost).map(|k| particles.tag[k]).min() {
+            None => Ok(tally),
+            Some(tag) => Err(EngineError::Force { tag }),
+        }
+    }
+
+    /// Bytes held in arrays over pairs.
+    pub fn memory(&self) -> usize {
+        list_bytes(&self.pairs)
+    }
+}
