@@ -385,15 +385,17 @@ void PairPsi::find_special()
   special_owned = 0;
   if (!why_listed.empty() || !is_scaled()) return;
   const int owned = atom->nlocal;
+  const int *next_image = atom->sametag;
+  const std::array<double, 3> factors{force->special_lj[1], force->special_lj[2], force->special_lj[3]};
   std::vector<SpecialPair> with_ghosts;
   for (int i = 0; i < owned; i++) {
     const tagint *neighbors = atom->special[i];
     const int *count = atom->nspecial[i];
     for (int k = 0; k < count[2]; k++) {
-      const double factor = force->special_lj[k < count[0] ? 1 : k < count[1] ? 2 : 3];
+      const double factor = factors[k < count[0] ? 0 : k < count[1] ? 1 : 2];
       // In a ring a neighbor may be one in two ways: the shorter counts.
       if (factor == 1.0 || std::find(neighbors, neighbors + k, neighbors[k]) != neighbors + k) continue;
-      for (int j = atom->map(neighbors[k]); j >= 0; j = atom->sametag[j])
+      for (int j = atom->map(neighbors[k]); j >= 0; j = next_image[j])
         if (j >= owned)
           with_ghosts.push_back({i, j, factor});
         else if (i < j)

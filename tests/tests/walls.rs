@@ -70,6 +70,8 @@ const PROGRAM: &[&[&str]] = &[
     &["export"],
     &["crosscheck"],
     &["bench"],
+    &["pareto"],
+    &["hardcases"],
     &["check"],
     &["cli"],
     &[""],

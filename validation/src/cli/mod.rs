@@ -10,8 +10,10 @@ mod check;
 mod diagnostic;
 mod export;
 mod forces;
+mod hardcases;
 mod lammps;
 mod new;
+mod pareto;
 mod report;
 mod reproduce;
 mod run;
@@ -42,6 +44,10 @@ enum Verb {
     Validate(validate::Arguments),
     /// Time LAMMPS, the plugin and the native runner side by side.
     Bench(bench::Arguments),
+    /// What a unit of simulated time costs with each integrator, time step and precision, and how far off its results are.
+    Pareto(pareto::Arguments),
+    /// Cases that are hard for a simulation: what must happen in each, and what did.
+    Hardcases(hardcases::Arguments),
     /// What a model or scene will compute, and what cannot work.
     Check(check::Arguments),
     /// Mean field: equation of state, critical point, spinodal, binodal, surface tension.
@@ -84,6 +90,8 @@ pub fn main() -> ExitCode {
     let outcome = match &arguments.verb {
         Verb::Validate(a) => validate::run(a, json),
         Verb::Bench(a) => bench::run(a, json),
+        Verb::Pareto(a) => pareto::run(a, json),
+        Verb::Hardcases(a) => hardcases::run(a, json),
         Verb::Check(a) => check::run(a, json),
         Verb::Theory(a) => theory::run(a, json),
         Verb::Export(a) => export::run(a, json),

@@ -7,6 +7,7 @@
 mod physics;
 
 use crate::integrator::{Counterpart, Integrator};
+use crate::particles::State;
 use crate::run::RunError;
 use crate::scene::{Scene, Stage};
 use physics::Physics;
@@ -97,7 +98,7 @@ pub fn write(scene: &Scene, out: &Path) -> Result<Vec<PathBuf>, DeckError> {
         files.push(MODEL_WITHOUT_THERMOSTAT.into());
     }
 
-    write_start(scene, &out.join(START))?;
+    write_start(scene, &scene.initial_state(), &out.join(START))?;
     save(&out.join(SCRIPT), &script(scene))?;
     Ok(files)
 }
@@ -215,8 +216,12 @@ fn compare(scene: &Scene, path: &Path, thermostat: bool) -> Result<bool, DeckErr
     Ok(true)
 }
 
-fn write_start(scene: &Scene, path: &Path) -> Result<(), DeckError> {
-    let mut data = scene.initial_state().to_data(&format!("psidpd: {}, step 0", one_line(&scene.title)));
+/// Writes a state as the start of a deck.
+///
+/// # Errors
+/// The file cannot be written.
+pub(crate) fn write_start(scene: &Scene, state: &State, path: &Path) -> Result<(), DeckError> {
+    let mut data = state.to_data(&format!("psidpd: {}, step 0", one_line(&scene.title)));
     data.sort_by_id();
     if scene.model.dimensions() == 2 {
         // LAMMPS wants the plane z = 0, and nothing depends on it.
@@ -227,6 +232,15 @@ fn write_start(scene: &Scene, path: &Path) -> Result<(), DeckError> {
         }
     }
     data.write(path).map_err(|e| DeckError::Run(e.into()))
+}
+
+/// The script of [`write`] alone.
+///
+/// # Errors
+/// The scene has no counterpart in LAMMPS.
+pub(crate) fn script_of(scene: &Scene) -> Result<String, DeckError> {
+    check(scene)?;
+    Ok(script(scene))
 }
 
 fn script(scene: &Scene) -> String {

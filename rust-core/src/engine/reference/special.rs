@@ -67,8 +67,31 @@ impl Corrections {
         self.pairs.clear();
         (self.owned, self.excludes) = (particles.owned, false);
         densities.clear();
+        let Particles { x, kind, owned, .. } = *particles;
+        let Around { domain, images } = around;
+        let is_periodic = domain.periodic() != [false; 3];
+        let (squared, depth) = (plan.cutoff * plan.cutoff, if plan.dimensions == 2 { 0.0 } else { 1.0 });
+        let square = |d: &[f64; 3]| d[0] * d[0] + d[1] * d[1] + depth * d[2] * d[2];
+        let species = |k: usize| species_of_type.get(kind[k] as usize).copied().unwrap_or(-1);
         for pair in special {
-            self.add(plan, pair, around, particles, species_of_type)?;
+            let (i, j) = (pair.i as usize, pair.j as usize);
+            if i >= owned || j >= x.len() {
+                return Err(EngineError::Host("a special pair names a particle that is not there"));
+            }
+            let mut d = std::array::from_fn(|c| x[i][c] - x[j][c]);
+            // Within the cut-off there is one image at most.
+            if square(&d) >= squared && is_periodic {
+                d = domain.minimum_image(x[i], x[j]);
+            }
+            let is_image = j >= owned && images.get(j - owned).is_some_and(|image| *image);
+            let (a, b) = (species(i), species(j));
+            if square(&d) < squared && !is_image && a >= 0 && b >= 0 {
+                d[2] *= depth;
+                self.pairs.push_of(i, j, d, [a, b]);
+                self.pairs.factor.push(pair.factor - 1.0);
+                self.pairs.thermostat_factor.push(if pair.factor == 0.0 { -1.0 } else { 0.0 });
+                self.excludes |= pair.factor == 0.0;
+            }
         }
         if self.pairs.len() > 0 {
             let width = plan.slope_width();
@@ -77,38 +100,6 @@ impl Corrections {
                 let kernel = &plan.densities[*density].kernel;
                 add_density(&self.pairs, kernel, self.owned, densities, width, k * plan.species.len());
             }
-        }
-        Ok(())
-    }
-
-    fn add(
-        &mut self,
-        plan: &Plan,
-        pair: &SpecialPair,
-        Around { domain, images }: Around,
-        particles: &Particles,
-        species_of_type: &[i32],
-    ) -> Result<(), EngineError> {
-        let Particles { x, kind, owned, .. } = *particles;
-        let (i, j) = (pair.i as usize, pair.j as usize);
-        if i >= owned || j >= x.len() {
-            return Err(EngineError::Host("a special pair names a particle that is not there"));
-        }
-        let is_image = j >= owned && images.get(j - owned).is_some_and(|image| *image);
-        let species = |k: usize| species_of_type.get(kind[k] as usize).copied().filter(|s| *s >= 0);
-        let (Some(a), Some(b), false) = (species(i), species(j), is_image) else { return Ok(()) };
-        let flat = |d: [f64; 3]| if plan.dimensions == 2 { [d[0], d[1], 0.0] } else { d };
-        let is_near = |d: &[f64; 3]| d.iter().map(|c| c * c).sum::<f64>() < plan.cutoff * plan.cutoff;
-        // Within the cut-off there is one image at most.
-        let mut d = flat(std::array::from_fn(|c| x[i][c] - x[j][c]));
-        if !is_near(&d) && domain.periodic() != [false; 3] {
-            d = flat(domain.minimum_image(x[i], x[j]));
-        }
-        if is_near(&d) {
-            self.excludes |= pair.factor == 0.0;
-            self.pairs.push_of(i, j, d, [a, b]);
-            self.pairs.factor.push(pair.factor - 1.0);
-            self.pairs.thermostat_factor.push(if pair.factor == 0.0 { -1.0 } else { 0.0 });
         }
         Ok(())
     }
@@ -154,6 +145,11 @@ impl Corrections {
         };
         add_forces(&input, &mut output);
         let tally = output.tally;
+        // A force that is not finite makes the sum none.
+        let of = |list: &[u32]| list.iter().filter_map(|k| force.get(*k as usize)).flatten().sum::<f64>();
+        if (of(&self.pairs.i) + of(&self.pairs.j)).is_finite() {
+            return Ok(tally);
+        }
         let members = self.pairs.i.iter().chain(&self.pairs.j).map(|k| *k as usize);
         let is_lost = |k: &usize| *k < self.owned && !force[*k].iter().all(|f| f.is_finite());
         match members.filter(is_lost).map(|k| particles.tag[k]).min() {
