@@ -1,11 +1,11 @@
-//! What cargo makes of psidpd-core in release mode.
+//! What cargo makes of the core in release mode.
 
 use crate::{root, said};
 use serde_json::Value;
 use std::path::PathBuf;
 use std::process::Command;
 
-/// Where cargo has put parts of psidpd-core.
+/// Where cargo has put them.
 pub struct Engine {
     /// The static library with the functions of `psidpd.h`.
     pub library: PathBuf,
@@ -18,10 +18,10 @@ pub struct Engine {
 pub fn engine() -> Engine {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut build = Command::new(cargo);
-    build.args(["build", "--release", "--workspace", "--example", "instructions"]);
+    build.args(["build", "--release", "--workspace", "--lib", "--example", "instructions"]);
     build.args(["--locked", "--message-format=json-render-diagnostics"]).current_dir(root());
     let output = build.output().expect("cargo runs");
-    assert!(output.status.success(), "psidpd-core does not build: {}", said(&output));
+    assert!(output.status.success(), "the core does not build: {}", said(&output));
     let made: Vec<Value> = String::from_utf8_lossy(&output.stdout)
         .lines()
         .filter_map(|line| serde_json::from_str(line).ok())

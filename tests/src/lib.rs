@@ -40,6 +40,14 @@ pub fn psidpd(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(program()).args(arguments).current_dir(folder).output().expect("the program starts")
 }
 
+/// Runs the program in `folder`, which must exit with `code`, and reads what it writes to the file of `--json`.
+pub fn json(folder: &Path, arguments: &[&str], code: i32) -> serde_json::Value {
+    let output = psidpd(folder, &[arguments, &["--json", "out.json"]].concat());
+    assert_eq!(output.status.code(), Some(code), "{}", said(&output));
+    let text = std::fs::read_to_string(folder.join("out.json")).expect("the program writes its results");
+    serde_json::from_str(&text).expect("the results are JSON")
+}
+
 /// Both outputs of a program as one text, for messages.
 pub fn said(output: &Output) -> String {
     format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr))

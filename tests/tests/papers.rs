@@ -1,16 +1,7 @@
 //! `calibrate` and `reproduce` as a user meets them.
 
-use psidpd_tests::{psidpd, said};
+use psidpd_tests::{json, psidpd, said};
 use serde_json::Value;
-use std::path::Path;
-
-fn json(folder: &Path, arguments: &[&str], code: i32) -> Value {
-    let mut all = arguments.to_vec();
-    all.extend(["--json", "out.json"]);
-    let output = psidpd(folder, &all);
-    assert_eq!(output.status.code(), Some(code), "{}", said(&output));
-    serde_json::from_str(&std::fs::read_to_string(folder.join("out.json")).unwrap()).unwrap()
-}
 
 const TARGET: &str = "# What is wanted.\ntitle = \"target\"\nspecies = [\"F\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1.0\n\
                       [excess_free_energy.F]\npressure = \"rho*kT + 0.9*rho^2.6\"\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n";

@@ -1,16 +1,7 @@
 //! `check`, `theory` and `export eam` as a user meets them.
 
-use psidpd_tests::{psidpd, root, said};
+use psidpd_tests::{json, psidpd, root, said};
 use serde_json::Value;
-use std::path::Path;
-
-fn json(folder: &Path, arguments: &[&str], code: i32) -> Value {
-    let mut all = arguments.to_vec();
-    all.extend(["--json", "out.json"]);
-    let output = psidpd(folder, &all);
-    assert_eq!(output.status.code(), Some(code), "{}", said(&output));
-    serde_json::from_str(&std::fs::read_to_string(folder.join("out.json")).unwrap()).unwrap()
-}
 
 fn model(name: &str) -> String {
     root().join("validation/models").join(name).display().to_string()

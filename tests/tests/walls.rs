@@ -59,8 +59,10 @@ const PROGRAM: &[&[&str]] = &[
     &["checkpoint"],
     &["observe"],
     &["output"],
-    // Scenes name integrators, which are of runs.
-    &["scene", "run"],
+    // Names and keys of integrators, which scenes and runs share.
+    &["integrator"],
+    &["scene"],
+    &["run"],
     &["report"],
     &["bulk"],
     &["calibrate"],
@@ -68,6 +70,8 @@ const PROGRAM: &[&[&str]] = &[
     &["export"],
     &["crosscheck"],
     &["bench"],
+    &["pareto"],
+    &["hardcases"],
     &["check"],
     &["cli"],
     &[""],

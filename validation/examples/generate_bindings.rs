@@ -2,7 +2,7 @@
 //!
 //! `cargo run -p psidpd --example generate_bindings --features bindgen -- PATH/TO/lammps/library.h`
 //!
-//! Needs libclang (Debian: `libclang1`; PyPI: `libclang`, with `LIBCLANG_PATH` set to its folder) and a C compiler's headers.
+//! and then `cargo fmt`. Needs libclang (Debian: `libclang1`; PyPI: `libclang`, with `LIBCLANG_PATH` set to its folder) and a C compiler's headers.
 use std::path::Path;
 
 /// What `Lammps` calls. A function that a LAMMPS version lacks does not prevent loading: it fails when called.

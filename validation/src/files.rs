@@ -16,16 +16,31 @@ pub struct WriteError {
     pub cause: std::io::Error,
 }
 
+impl WriteError {
+    /// For `map_err` on operations that write `path`.
+    pub fn at(path: &Path) -> impl FnOnce(io::Error) -> WriteError + '_ {
+        move |cause| WriteError { path: path.to_owned(), cause }
+    }
+}
+
 /// Writes a file so that readers see the old content or the new, never a part.
 ///
-/// The bytes go to a temporary file in the same folder, which is flushed to
-/// disk and then renamed over `path`. On failure nothing is left behind and an
-/// existing file keeps its content. Of a symbolic link the file that it leads
-/// to is replaced. What is no regular file, as a pipe or a device, and the
-/// program's own output, is written to as it is.
+/// The bytes go to a temporary file in the same folder, which is flushed to disk and then renamed over
+/// `path`. On failure nothing is left behind and an existing file keeps its content. If `path` is a symbolic
+/// link, its target is replaced. Pipes, devices and the program's own output are written to directly.
 pub fn write_atomically(path: impl AsRef<Path>, bytes: &[u8]) -> Result<(), WriteError> {
     let path = path.as_ref();
-    write(path, bytes).map_err(|cause| WriteError { path: path.to_owned(), cause })
+    write(path, bytes).map_err(WriteError::at(path))
+}
+
+/// Removes a file, which need not be there.
+pub fn remove_if_there(path: &Path) -> io::Result<()> {
+    fs::remove_file(path).or_else(unless_missing)
+}
+
+/// Takes a missing file for success.
+pub fn unless_missing(error: io::Error) -> io::Result<()> {
+    if error.kind() == ErrorKind::NotFound { Ok(()) } else { Err(error) }
 }
 
 fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {

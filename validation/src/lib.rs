@@ -1,21 +1,26 @@
 //! psidpd: native runner and cross-code validator.
 pub mod bench;
-pub mod bulk;
-pub mod calibrate;
-pub mod check;
+mod bulk;
+mod calibrate;
+mod check;
 pub mod checkpoint;
 pub mod cli;
-pub mod crosscheck;
+mod crosscheck;
 pub mod export;
-pub mod files;
+mod files;
+mod hardcases;
+mod integrator;
 pub mod lammps;
 pub mod observe;
-pub mod output;
-pub mod papers;
-pub mod particles;
+mod output;
+mod papers;
+mod pareto;
+mod particles;
 pub mod report;
 pub mod run;
 pub mod scene;
+#[cfg(test)]
+mod test_support;
 
 #[global_allocator]
 static ALLOCATOR: psidpd_core::memory::LargePages = psidpd_core::memory::LargePages;

@@ -9,45 +9,26 @@ use std::path::PathBuf;
 /// Why the benchmark could not be carried out.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say it")]
 pub enum BenchError {
-    /// LAMMPS is missing, or stopped.
     #[error(transparent)]
     Lammps(#[from] LammpsError),
-    /// The native runner stopped.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// A report cannot be made.
     #[error(transparent)]
     Report(#[from] ReportError),
-    /// A file cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
-    /// A model file is wrong.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A fluid cannot be tabulated.
     #[error(transparent)]
     Eam(#[from] EamError),
-    /// A file cannot be read or written.
     #[error("{path}: {source}")]
-    Io {
-        /// Which file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// What LAMMPS printed lacks its own timing.
+    Io { path: PathBuf, source: std::io::Error },
     #[error("{what}: {problem} in what LAMMPS printed")]
-    Output {
-        /// Which run.
-        what: String,
-        /// What is missing.
-        problem: &'static str,
-    },
-    /// A size that is too small: two images of a pair would share their noise.
+    Output { what: String, problem: &'static str },
     #[error("{0} particles are too few: the box must be at least three ranges wide; take 170 or more")]
     TooSmall(usize),
-    /// The child process that measures memory failed.
     #[error("measuring memory: {0}")]
     Memory(String),
 }

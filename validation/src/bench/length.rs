@@ -11,9 +11,10 @@ pub struct Length {
     pub steps: u64,
 }
 
-/// Fewest steps that are timed: LAMMPS builds its lists every two to ten, which must be met in their proportion.
+/// Fewest steps that are timed: LAMMPS builds its lists every two to ten steps, and a run must contain its
+/// share of builds.
 pub const FEWEST: u64 = 20;
-/// The native runner brings particles into order every so many steps: its runs are made of whole such cycles.
+/// Steps between reorderings of the native runner: its runs are whole multiples of this.
 pub const CYCLE: u64 = crate::run::REORDERING;
 /// Most steps, however fast they are.
 const MOST: u64 = 1_000_000;

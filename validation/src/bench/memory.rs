@@ -48,9 +48,7 @@ pub fn child(particles: usize) -> Result<Child, BenchError> {
     // Short steps: random particles sit on each other.
     let dt = 0.1 * MDPD.dt;
     simulation.prepare(dt, Want::FORCES)?;
-    for _ in 0..5 {
-        simulation.step(dt, Integrator::VelocityVerlet, Want::FORCES)?;
-    }
+    simulation.advance(5, dt, Integrator::VelocityVerlet)?;
     let status = Path::new("/proc/self/status");
     let text = std::fs::read_to_string(status).map_err(BenchError::io(status))?;
     let kilobytes: Option<u64> = text

@@ -245,7 +245,7 @@ fn entries(
     Ok((cases, entries))
 }
 
-/// What a contender's runs at its smallest size tell of all of them.
+/// Speed and skin of a contender, measured at its smallest size and used for all.
 #[derive(Clone, Copy)]
 struct Pace {
     skin: f64,
@@ -291,11 +291,11 @@ fn calibrate(
 }
 
 fn pace(options: &Options, cases: &Cases, place: &Place, entry: &mut Entry) -> Result<Pace, BenchError> {
-    // Short runs differ by more than skins do, but in a large box long ones would take minutes.
+    // Short runs scatter more than skins differ, but in a large box long runs would take minutes.
     let large = entry.size > options.few_above;
     entry.length = if large { Length::of(FEWEST) } else { Length { warm_up: 20, steps: 60 } };
     let mut pace = Pace { skin: SKIN, seconds: f64::INFINITY };
-    // Natively, where there is no skin, as many tries: one that something else disturbs must not decide.
+    // The native runner has no skin but is tried as often, so that one disturbed run does not decide.
     for skin in SKINS {
         let seconds = once(entry, cases, place, skin)?.0 / (entry.length.steps as f64 * entry.particles());
         if seconds < pace.seconds {
@@ -325,7 +325,7 @@ fn time(
             done += entries[k].weight();
             bar.set(done as u64);
         }
-        // Back and forth: who is timed behind whom should not matter.
+        // Alternate the order, so that neighbours in time do not matter.
         order.reverse();
     }
     bar.finish();

@@ -1,4 +1,4 @@
-//! A timed run of the native runner, and what it shares among threads.
+//! Timed runs of the native runner, and the test that threads change no bit.
 
 use super::BenchError;
 use super::fluids::Subject;

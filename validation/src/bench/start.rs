@@ -2,18 +2,18 @@
 
 use super::BenchError;
 use super::fluids::Subject;
+use crate::particles::thermal_velocities;
 use crate::run::{Integrator, RunError, Simulation, State};
 use chacha20::ChaCha8Rng;
 use psidpd_core::engine::{PeriodicBox, Settings, Want};
 use rand::{RngExt, SeedableRng};
-use rand_distr::{Distribution, StandardNormal};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 /// Seed of starts and noise.
 pub const SEED: u64 = 20_030_606;
 
-/// Steps of Δt after 100 short ones: some times that a particle needs to pass its neighbours.
+/// Steps of Δt after 100 short ones: several times the time in which a particle passes its neighbours.
 const STEPS: u64 = 300;
 
 /// A state with the data files that LAMMPS reads.
@@ -37,28 +37,16 @@ pub fn random(subject: &Subject, size: usize) -> Result<State, BenchError> {
         .map_err(|e| RunError::State(e.to_string()))?;
     let mut random = ChaCha8Rng::seed_from_u64(SEED);
     let x = (0..count).map(|_| std::array::from_fn(|_| edge * random.random::<f64>())).collect();
-    let mut v: Vec<[f64; 3]> =
-        (0..count).map(|_| std::array::from_fn(|_| StandardNormal.sample(&mut random))).collect();
-    for k in 0..3 {
-        let drift = v.iter().map(|v| v[k]).sum::<f64>() / count as f64;
-        v.iter_mut().for_each(|v| v[k] -= drift);
-    }
-    let species = subject.species.len();
-    Ok(State {
-        domain,
-        mass: vec![1.0; species],
-        species: (0..count).map(|k| (k % species) as i32).collect(),
-        tag: (1..=count as i32).collect(),
-        image: vec![[0; 3]; count],
-        x,
-        v,
-    })
+    let v = thermal_velocities(std::iter::repeat_n(1.0, count), 1.0, 3, &mut random);
+    let kinds = subject.species.len();
+    let species = (0..count).map(|k| (k % kinds) as i32).collect();
+    Ok(State { species, v, ..State::at_rest(domain, vec![1.0; kinds], x) })
 }
 
 /// The fluid in equilibrium, from `folder` if it is there.
 pub fn equilibrated(subject: &Subject, size: usize, folder: &Path) -> Result<Start, BenchError> {
     std::fs::create_dir_all(folder).map_err(BenchError::io(folder))?;
-    // Another model, seed or length of the run is another state.
+    // The state depends on model, seed and length of the run.
     let key = crc32fast::hash(format!("{} {SEED} {STEPS}", subject.text).as_bytes());
     let file = |end: &str| folder.join(format!("{}-{size}-{key:08x}.{end}", subject.name));
     let (kept, data, data_mdpd) = (file("state"), file("data"), file("mdpd.data"));
@@ -71,15 +59,13 @@ pub fn equilibrated(subject: &Subject, size: usize, folder: &Path) -> Result<Sta
     simulation.set_settings(Settings { threads, ..Settings::default() })?;
     for (dt, steps) in [(0.1 * subject.dt, 100), (subject.dt, STEPS)] {
         simulation.prepare(dt, Want::FORCES)?;
-        for _ in 0..steps {
-            simulation.step(dt, Integrator::VelocityVerlet, Want::FORCES)?;
-        }
+        simulation.advance(steps, dt, Integrator::VelocityVerlet)?;
     }
     let state = simulation.state();
     let text = state.to_data("psidpd bench");
     text.write(&data)?;
     text.write_mdpd(&data_mdpd)?;
-    // Last: it says that the others are whole.
+    // Written last: its presence shows that the others are complete.
     let bytes = postcard::to_stdvec(&state)
         .map_err(|e| BenchError::io(&kept)(std::io::Error::other(e.to_string())))?;
     crate::files::write_atomically(&kept, &bytes)?;
@@ -135,8 +121,8 @@ mod tests {
         assert!(matches!(random(&DPD, 20), Err(BenchError::TooSmall(20))));
     }
 
-    /// A temperature of 1200 and more degrees of freedom varies by 0.04: five times that is met once in 10⁶ runs.
-    /// A liquid that falls apart or collapses has other numbers of pairs.
+    /// A temperature of 1200 and more degrees of freedom varies by 0.04: five times that is met once in 10⁶
+    /// runs. The number of pairs shows whether the liquid fell apart or collapsed.
     #[test]
     fn fluids_are_in_equilibrium() {
         let folder = tempfile::tempdir().unwrap();

@@ -1,9 +1,9 @@
 //! The order in which a round goes through the runs.
 
-/// Places in a list of runs, each with its fluid and size, in the order of a round: fluid by fluid; of its sizes the
-/// smallest, then the largest, then the others; there and back, so that the last of a size and the last of the
-/// next are neighbours in time. A goal holds the largest size against the smallest, and a machine is more
-/// like itself seconds later than minutes.
+/// Places in a list of runs, each with its fluid and size, in the order of a round: fluid by fluid; of its
+/// sizes the smallest, then the largest, then the others; there and back, so that the last of a size and the
+/// last of the next are neighbours in time. A goal compares the largest size with the smallest, and a machine
+/// changes less within seconds than within minutes.
 pub fn turns(runs: &[(&str, usize)]) -> Vec<usize> {
     let mut fluids: Vec<&str> = Vec::new();
     for (fluid, _) in runs {

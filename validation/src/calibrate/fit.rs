@@ -38,7 +38,7 @@ pub fn fit_density(points: &[Point], pair: usize, degree: usize) -> Option<Fit> 
     }
     let x = DMatrix::from_fn(points.len(), columns, |k, m| points[k].moment(pair, m));
     let y = DVector::from_iterator(points.len(), points.iter().map(|p| p.own[pair]));
-    // Columns of like size, so that the test for rank means something.
+    // Scale the columns to one size, so that the rank test is meaningful.
     let size: Vec<f64> = (0..columns).map(|m| x.column(m).norm()).collect();
     let scaled = DMatrix::from_fn(points.len(), columns, |k, m| x[(k, m)] / size[m]);
     let inverse = scaled.clone().pseudo_inverse(1e-10).ok()?;
@@ -52,7 +52,7 @@ pub fn fit_density(points: &[Point], pair: usize, degree: usize) -> Option<Fit> 
     let freedom = points.len() - columns;
     let noise: Vec<f64> =
         points.iter().map(|p| (polynomial.at(p.means[pair].value).1 * p.means[pair].error).powi(2)).collect();
-    // What is left of the distance from the fit beyond the noise: the polynomial is not the whole truth.
+    // Scatter about the fit beyond the noise, because a polynomial fits only approximately.
     let expected = noise.iter().sum::<f64>() / points.len() as f64;
     let scatter = if freedom > 0 { (rest.norm_squared() / freedom as f64 - expected).max(0.0) } else { 0.0 };
     let errors = (0..columns)
@@ -82,9 +82,9 @@ pub struct Target {
 /// p(c) = base + (p_measured − base) · ψ′(ρ̃_c(⟨n⟩)) ρ̃_c′(⟨n⟩) / [ψ′(ρ̃(⟨n⟩)) ρ̃′(⟨n⟩)]
 /// ```
 ///
-/// the pressure that another ρ̃ would have if ⟨n⟩ and g(r) stayed as they are. They do not quite, so the
-/// fluid is to be measured again. `hold` is how much a relative difference of `ρ̃(⟨n⟩)` from ρ counts against one of
-/// the pressures.
+/// the pressure that another ρ̃ would have if ⟨n⟩ and g(r) stayed as they are. They change a little, so the
+/// fluid has to be measured again. `hold` is how much a relative difference of `ρ̃(⟨n⟩)` from ρ counts
+/// against one of the pressures.
 pub fn fit_pressure(
     points: &[Point],
     targets: &[Target],

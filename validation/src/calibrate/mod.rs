@@ -16,7 +16,7 @@ mod point;
 mod search;
 mod text;
 
-pub use fit::{Fit, Target, fit_density, fit_pressure};
+pub use fit::{Fit, Target, fit_density};
 pub use point::Point;
 pub use search::{DUMMY_SLOPE, Goal, Round, Trial, Wish, search};
 pub use text::with_correction;
@@ -32,32 +32,24 @@ use std::path::Path;
 /// Why a model cannot be calibrated. A tolerance that is not met is no error.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say it")]
 pub enum CalibrateError {
-    /// The model file, or a trial of it, is wrong.
     #[error(transparent)]
     File(#[from] FileError),
-    /// There is no target: the model has no free energy.
     #[error(transparent)]
     Theory(#[from] TheoryError),
-    /// A run stopped.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// The file cannot be edited.
     #[error("the model file cannot be edited: {0}")]
     Edit(#[from] toml_edit::TomlError),
-    /// There is no such density.
     #[error("the model has no [density.{0}]")]
     NoSuchDensity(String),
-    /// Several densities, and none named.
     #[error("the model has several densities ({0}): name the one to calibrate with --name")]
     WhichDensity(String),
-    /// A density range or composition that makes no sense.
     #[error("{0}")]
     Conditions(String),
-    /// The target pressure is not a number.
     #[error("the wanted pressure at density {0} is not a finite number: choose another range of densities")]
     NoTarget(f64),
-    /// A folder for the runs.
     #[error("no folder for the runs: {0}")]
     Folder(#[from] std::io::Error),
 }
@@ -296,7 +288,7 @@ pub fn calibrate(
     })
 }
 
-/// Digits that a calibration does not know only make a file unreadable.
+/// Drops digits below the accuracy of a calibration.
 fn rounded(p: &Polynomial) -> Polynomial {
     let round = |c: f64| {
         let digits = 6 - c.abs().max(1e-12).log10().ceil() as i32;

@@ -5,7 +5,7 @@ use super::point::Point;
 use psidpd_core::model::Polynomial;
 use serde::Serialize;
 
-/// Under which correction a fluid is measured.
+/// The correction with which a fluid is measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Trial<'a> {
     /// ρ̃ = ρ, with [`DUMMY_SLOPE`]: at each density a pair force of constant strength.
@@ -68,10 +68,10 @@ pub struct Wish<'a> {
     pub tolerance: f64,
 }
 
-/// How often each degree is fitted to the same goal before the next thing is tried.
+/// Fits of each degree to the same goal before the next degree or goal is tried.
 const ROUNDS: usize = 3;
 
-/// What ⟨ρ̃⟩ = ρ counts against the pressures in the rounds that are fitted to these: less where more did not do.
+/// Weight of ⟨ρ̃⟩ = ρ against the pressures in the rounds that are fitted to pressures: lower in every round.
 const HOLDS: [f64; ROUNDS] = [0.5, 0.1, 0.02];
 
 /// Degrees that are tried: a mixture's distribution of partial densities is not measured, so means of powers are
@@ -128,7 +128,7 @@ pub fn search<E>(
 
 fn assess(degree: usize, goal: Goal, fits: Vec<Fit>, points: Vec<Point>, wish: &Wish) -> Round {
     let worst = |values: &mut dyn Iterator<Item = f64>| {
-        // What is not a number is as far off as can be.
+        // NaN counts as the largest deviation.
         values.fold(0.0f64, |worst, x| {
             if x <= worst {
                 worst

@@ -7,7 +7,7 @@ mod timestep;
 mod warnings;
 
 pub use findings::{Findings, Severity, Warning};
-pub use timestep::{StepEstimate, estimates};
+pub use timestep::estimates;
 
 use psidpd_core::engine::Plan;
 use psidpd_core::model::{Fluid, Model};
@@ -25,24 +25,16 @@ pub struct Conditions {
 /// Why a model cannot be checked.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say it")]
 pub enum CheckError {
-    /// The model does not hold at the temperature.
     #[error(transparent)]
     File(#[from] psidpd_core::document::FileError),
-    /// A derivative grows beyond the limits of the formula engine.
     #[error(transparent)]
     TooLarge(#[from] psidpd_core::model::expression::TooLarge),
-    /// Mean field does not apply.
     #[error(transparent)]
     Theory(#[from] TheoryError),
-    /// Densities for another number of species.
     #[error("{given} densities for {species} species")]
-    Densities {
-        /// How many were given.
-        given: usize,
-        /// How many species the model has.
-        species: usize,
-    },
+    Densities { given: usize, species: usize },
 }
 
 /// Looks at `model` under `conditions`.

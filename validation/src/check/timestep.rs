@@ -6,8 +6,8 @@
 //! ω² = ⟨Σ ∇²U/m⟩/(dN),    κ = 2 ⟨Σ D/μ⟩/(dN)
 //! ```
 //!
-//! the mean square of the frequency at which a particle swings in the forces of the others, and the rate at which drag takes its
-//! energy. What the temperature of configurations is off by is then about
+//! the mean square frequency of a particle in the force field of the others, and the rate at which drag takes
+//! its kinetic energy. The relative error of the configurational temperature is then about
 //!
 //! ```text
 //! a (ωΔt)⁴ + ¼ κΔt (drag inside the forces) or nothing of the latter (thermostat apart from them)
@@ -15,8 +15,9 @@
 //!
 //! with `a` from runs of standard DPD and of Warren's liquid; `docs/integrators.md` has them.
 
+use crate::integrator::{Accuracy, Integrator};
 use crate::observe::configurational;
-use crate::run::{Accuracy, Integrator, RunError, Simulation, State};
+use crate::run::{RunError, Simulation, State};
 use crate::scene::Scene;
 use psidpd_core::engine::noise::{Law, PairNoise};
 use psidpd_core::engine::reference::Evaluator;
@@ -45,7 +46,7 @@ pub struct StepEstimate {
     pub frequency: f64,
     /// κ.
     pub drag: f64,
-    /// By which part the temperature of configurations is off.
+    /// Relative error of the configurational temperature.
     pub error: f64,
     /// The Δt at which that is 0.01.
     pub one_percent: f64,
@@ -130,7 +131,7 @@ fn sampled(scene: &Scene, kt: f64) -> Result<Option<[f64; 2]>, RunError> {
     let state = start(scene, domain, &densities, kt, dimensions);
     let masses = state.mass.clone();
     let mut run = Simulation::new(&scene.model, kt, state, scene.seed)?;
-    // Short steps settle whatever can be settled.
+    // Short steps relax the random start.
     let dt = 0.25 * scene.stages.iter().map(|s| s.dt).fold(0.01, f64::min);
     let integrator = Integrator::VelocityVerlet;
     run.prepare(dt, Want::FORCES)?;
@@ -176,6 +177,5 @@ fn start(scene: &Scene, domain: PeriodicBox, densities: &[f64], kt: f64, dimensi
             v[k][c] = f64::from(speeds[k]) * (kt / scene.mass[species[k] as usize]).sqrt();
         }
     }
-    let tag = tags.into_iter().map(|tag| tag as i32).collect();
-    State { domain, mass: scene.mass.clone(), x, v, species, tag, image: vec![[0; 3]; n] }
+    State { v, species, ..State::at_rest(domain, scene.mass.clone(), x) }
 }

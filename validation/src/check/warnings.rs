@@ -1,4 +1,4 @@
-//! Each thing that is looked for, in a function of its own.
+//! The checks, one function each.
 
 use super::CheckError;
 use super::calibration;
@@ -24,7 +24,7 @@ pub struct State<'a> {
     pub no_theory: Option<TheoryError>,
 }
 
-/// Everything worth saying, worst first.
+/// All warnings, the most severe first.
 pub fn all(fluid: &Fluid, state: &State) -> Result<Vec<Warning>, CheckError> {
     let mut found = Vec::new();
     found.extend(not_conservative(fluid));

@@ -3,73 +3,28 @@ use std::path::{Path, PathBuf};
 /// Why a checkpoint cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say it")]
 pub enum CheckpointError {
-    /// It cannot be read.
     #[error("the checkpoint {} cannot be read: {source}", path.display())]
-    Unreadable {
-        /// The checkpoint.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// The file is something else.
+    Unreadable { path: PathBuf, source: std::io::Error },
     #[error("{} is no checkpoint of psidpd", path.display())]
-    Other {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The format is that of another version of the program.
+    Other { path: PathBuf },
     #[error(
         "the checkpoint {} is in version {found} of the format, and this program (psidpd {}) reads version {}",
         path.display(), env!("CARGO_PKG_VERSION"), super::VERSION
     )]
-    Version {
-        /// The checkpoint.
-        path: PathBuf,
-        /// Its version.
-        found: u32,
-    },
-    /// It ends too soon.
+    Version { path: PathBuf, found: u32 },
     #[error("the checkpoint {} is truncated: {found} bytes of {expected}", path.display())]
-    Truncated {
-        /// The checkpoint.
-        path: PathBuf,
-        /// Bytes that are there.
-        found: u64,
-        /// Bytes that it should have.
-        expected: u64,
-    },
-    /// It does not say what was written.
+    Truncated { path: PathBuf, found: u64, expected: u64 },
     #[error("the checkpoint {} is damaged: {what}", path.display())]
-    Damaged {
-        /// The checkpoint.
-        path: PathBuf,
-        /// What is wrong.
-        what: String,
-    },
-    /// A file of the run has lost something that was in it when the checkpoint was written.
+    Damaged { path: PathBuf, what: String },
     #[error(
         "{} has {found} bytes, fewer than the {expected} that the checkpoint {} counts on",
         file.display(), path.display()
     )]
-    File {
-        /// The checkpoint.
-        path: PathBuf,
-        /// The file.
-        file: PathBuf,
-        /// Its length; 0 if it is missing.
-        found: u64,
-        /// Its length at the checkpoint.
-        expected: u64,
-    },
-    /// It is of another scene or model.
+    File { path: PathBuf, file: PathBuf, found: u64, expected: u64 },
     #[error("the checkpoint {} is of another run: {}", path.display(), list(differences))]
-    Foreign {
-        /// The checkpoint.
-        path: PathBuf,
-        /// What differs, with both values.
-        differences: Vec<String>,
-    },
+    Foreign { path: PathBuf, differences: Vec<String> },
 }
 
 impl CheckpointError {
@@ -105,21 +60,5 @@ fn list(differences: &[String]) -> String {
     match differences.len().saturating_sub(MOST) {
         0 => shown,
         more => format!("{shown}; and {more} more"),
-    }
-}
-
-/// A checkpoint that cannot be written.
-#[derive(Debug, thiserror::Error)]
-#[error("{} cannot be written: {source}", path.display())]
-pub struct Unwritten {
-    /// The file.
-    pub path: PathBuf,
-    /// Why.
-    pub source: std::io::Error,
-}
-
-impl Unwritten {
-    pub(super) fn at(path: &Path) -> impl FnOnce(std::io::Error) -> Unwritten + '_ {
-        move |source| Unwritten { path: path.to_owned(), source }
     }
 }

@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Every key of a scene and of its model with its value, whatever the files look like otherwise: comments,
-/// the order of keys and the way numbers are written do not count.
+/// Every key of a scene and of its model with its value. Comments, the order of keys and number formats do
+/// not count.
 ///
 /// A key that names a file stands for what is in it. Titles and the interval of checkpoints are left out:
 /// they change nothing in a trajectory.
@@ -25,7 +25,7 @@ impl Identity {
     pub fn of(scene: &str, folder: &Path, precision: Precision, model: &Model) -> Identity {
         let model = model.source();
         let mut of_scene = keys(scene, folder, &["title", "model", "output.checkpoint", "precision"]);
-        // As it is, whether the file says so, the command line, or neither.
+        // The precision in use, whether the file, the command line or the default set it.
         of_scene.insert("precision".into(), format!("{:?}", precision.to_string()));
         let beside_model = Path::new(model.name()).parent().unwrap_or(Path::new(""));
         Identity {
@@ -59,7 +59,8 @@ fn keys(text: &str, folder: &Path, without: &[&str]) -> BTreeMap<String, String>
     let mut keys = BTreeMap::new();
     match text.parse::<toml::Table>() {
         Ok(table) => collect(&toml::Value::Table(table), "", folder, &mut keys),
-        // A scene has been read from this text: it is TOML. If it were not, it would still be itself.
+        // The scene was read from this text, so it is TOML; if parsing failed, the text itself would identify
+        // it.
         Err(_) => _ = keys.insert("text".into(), text.to_owned()),
     }
     keys.retain(|key, _| !without.contains(&key.as_str()));

@@ -12,8 +12,8 @@
 //! | 8 | length of the payload |
 //! | … | [`Checkpoint`] in the [postcard](https://postcard.jamesmunns.com/wire-format) format |
 //!
-//! Floating-point numbers are stored as their eight bytes. Postcard does not describe itself: whoever adds
-//! a field to [`Checkpoint`], or to what it holds, raises [`VERSION`].
+//! Floating-point numbers are stored as their eight bytes. Postcard is not self-describing: a change of
+//! [`Checkpoint`], or of what it holds, needs a new [`VERSION`].
 
 mod error;
 mod format;
@@ -21,7 +21,7 @@ mod identity;
 mod store;
 mod totals;
 
-pub use error::{CheckpointError, Unwritten};
+pub use error::CheckpointError;
 pub use format::VERSION;
 pub use identity::Identity;
 pub(crate) use store::{Found, Store};

@@ -1,8 +1,9 @@
 //! The checkpoints in the folder of a run.
 
-use super::{Checkpoint, CheckpointError, Unwritten, format};
+use super::{Checkpoint, CheckpointError, format};
+use crate::files::{WriteError, remove_if_there};
 use std::fs::File;
-use std::io::{self, ErrorKind};
+use std::io;
 use std::path::{Path, PathBuf};
 
 pub(super) const NEWEST: &str = "checkpoint";
@@ -40,13 +41,13 @@ impl Store {
     }
 
     /// Writes another one and keeps the newest as the one before. If that fails, those that are there stay.
-    pub fn write(&self, checkpoint: &Checkpoint) -> Result<(), Unwritten> {
+    pub fn write(&self, checkpoint: &Checkpoint) -> Result<(), WriteError> {
         let new = self.folder.join(UNFINISHED);
         let newest = self.path();
-        self.write_new(checkpoint, &new).map_err(|source| {
-            // What is there of it only takes space.
+        self.write_new(checkpoint, &new).map_err(|cause| {
+            // A partial file only takes space.
             let _ = std::fs::remove_file(&new);
-            Unwritten { path: newest, source }
+            WriteError { path: newest, cause }
         })
     }
 
@@ -59,13 +60,13 @@ impl Store {
         self.sync()
     }
 
-    /// Makes the newest one the one before, too: at no moment there is none.
+    /// Links the newest one as the one before, so that there is always at least one.
     fn keep_as_before(&self) -> io::Result<()> {
         let (newest, before) = (self.path(), self.folder.join(BEFORE));
         if !newest.exists() {
             return Ok(());
         }
-        absent_is_fine(std::fs::remove_file(&before))?;
+        remove_if_there(&before)?;
         // Where there are no hard links, a run killed now is left with `checkpoint.old` alone; that will do.
         std::fs::hard_link(&newest, &before).or_else(|_| std::fs::rename(&newest, &before))
     }
@@ -91,33 +92,33 @@ impl Store {
             Ok(checkpoint) => Ok(Some(Found { checkpoint, fallback: Some(newest) })),
             Err(error @ CheckpointError::Foreign { .. }) => Err(error),
             Err(_) if !self.exists() => Ok(None),
-            // A newest one that is not there says less.
+            // A missing newest one is less informative.
             Err(error) => Err(if self.path().exists() { newest } else { error }),
         }
     }
 
     /// Makes the one before the newest, so that the next one written will not push it out.
-    pub fn fall_back(&self) -> Result<(), Unwritten> {
+    pub fn fall_back(&self) -> Result<(), WriteError> {
         let newest = self.path();
         std::fs::rename(self.folder.join(BEFORE), &newest)
             .and_then(|()| self.sync())
-            .map_err(Unwritten::at(&newest))
+            .map_err(WriteError::at(&newest))
     }
 
     /// Removes all but the newest.
-    pub fn keep_newest(&self) -> Result<(), Unwritten> {
+    pub fn keep_newest(&self) -> Result<(), WriteError> {
         self.remove(&[UNFINISHED, BEFORE])
     }
 
     /// Removes all.
-    pub fn clear(&self) -> Result<(), Unwritten> {
+    pub fn clear(&self) -> Result<(), WriteError> {
         self.remove(&[UNFINISHED, BEFORE, NEWEST])
     }
 
-    fn remove(&self, names: &[&str]) -> Result<(), Unwritten> {
+    fn remove(&self, names: &[&str]) -> Result<(), WriteError> {
         for name in names {
             let path = self.folder.join(name);
-            absent_is_fine(std::fs::remove_file(&path)).map_err(Unwritten::at(&path))?;
+            remove_if_there(&path).map_err(WriteError::at(&path))?;
         }
         Ok(())
     }
@@ -125,12 +126,5 @@ impl Store {
     /// Brings names to the disk.
     fn sync(&self) -> io::Result<()> {
         File::open(&self.folder)?.sync_all()
-    }
-}
-
-fn absent_is_fine(result: io::Result<()>) -> io::Result<()> {
-    match result {
-        Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
-        other => other,
     }
 }

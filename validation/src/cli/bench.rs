@@ -63,8 +63,8 @@ fn or_default(given: &[NonZeroUsize], default: &[usize]) -> Vec<usize> {
 
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     if let Some(particles) = arguments.measure_memory {
-        let child = memory::child(particles).map_err(Failure::new)?;
-        println!("{}", serde_json::to_string(&child).map_err(Failure::new)?);
+        let child = memory::child(particles)?;
+        println!("{}", serde_json::to_string(&child)?);
         return Ok(Verdict::Good);
     }
     let full = arguments.full;
@@ -85,8 +85,8 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         lammps: arguments.lammps.clone(),
         out: arguments.out.clone(),
     };
-    let program = std::env::current_exe().map_err(Failure::new)?;
-    let outcome = measure(&options, &program, &Progress::new()).map_err(Failure::new)?;
+    let program = std::env::current_exe()?;
+    let outcome = measure(&options, &program, &Progress::new())?;
     println!("{}", page::speeds(&outcome).to_text());
     if let Some(note) = page::few(&outcome.options) {
         println!("{note}\n");

@@ -70,11 +70,11 @@ fn range(text: &str) -> Result<[f64; 2], String> {
 
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     let a = arguments;
-    let bad = |message: String| Failure::new(CalibrateError::Conditions(message));
+    let bad = |message: String| Failure::from(CalibrateError::Conditions(message));
     if !(a.tolerance > 0.0 && a.dt > 0.0 && a.tolerance.is_finite() && a.dt.is_finite()) {
         return Err(bad("tolerance and time step must be positive numbers".into()));
     }
-    let species = Model::open(&a.model).map_err(Failure::new)?.species().len();
+    let species = Model::open(&a.model)?.species().len();
     let shares = if a.composition.is_empty() { vec![1.0; species] } else { a.composition.clone() };
     let sum: f64 = shares.iter().sum();
     if shares.iter().any(|share| share.is_nan() || *share <= 0.0) || !sum.is_finite() {
@@ -96,9 +96,8 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
             threads: a.threads,
         },
     };
-    let found =
-        calibrate(&a.model, &options, &command(a), &mut |line| println!("{line}")).map_err(failure)?;
-    write_atomically(&a.out, found.text.as_bytes()).map_err(Failure::new)?;
+    let found = calibrate(&a.model, &options, &command(a), &mut |line| println!("{line}"))?;
+    write_atomically(&a.out, found.text.as_bytes())?;
     let mut table = Table::new(["density", "kT", "<n>", "<rho~>", "p wanted", "p measured", "off by"]);
     let pm = |v: &crate::calibrate::Value| format!("{:.5} ± {:.5}", v.value, v.error);
     for r in &found.residuals {
@@ -140,15 +139,6 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     println!("written to {}", a.out.display());
     write_json(json, &found)?;
     Ok(if found.converged { Verdict::Good } else { Verdict::CheckFailed })
-}
-
-/// What it wraps knows its line of a file, or that it stopped a run.
-fn failure(error: CalibrateError) -> Failure {
-    match error {
-        CalibrateError::File(error) => Failure::new(error),
-        CalibrateError::Run(error) => Failure::new(error),
-        other => Failure::new(other),
-    }
 }
 
 /// The command that does the same again.

@@ -39,24 +39,24 @@ pub fn per_species(given: &[f64], species: usize) -> Option<Vec<f64>> {
 }
 
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
-    let document = Document::open(&arguments.file).map_err(Failure::new)?;
+    let document = Document::open(&arguments.file)?;
     let mut too_far = None;
     let (model, kt, densities, steps) = if document.root().get("model").is_some() {
-        let scene = Scene::open(&arguments.file).map_err(Failure::new)?;
+        let scene = Scene::open(&arguments.file)?;
         let densities = scene.densities();
-        let range = scene.model.at(scene.kt).map_err(Failure::new)?.cutoff();
+        let range = scene.model.at(scene.kt)?.cutoff();
         let particles = scene.initial.parts().iter().map(|p| p.count).sum();
         too_far = reach::check(&scene.domain, scene.model.dimensions(), range, particles).err();
-        let steps = if too_far.is_none() { estimates(&scene).map_err(Failure::new)? } else { Vec::new() };
+        let steps = if too_far.is_none() { estimates(&scene)? } else { Vec::new() };
         (scene.model.clone(), scene.kt, Some(densities), steps)
     } else {
-        (Model::open(&arguments.file).map_err(Failure::new)?, 1.0, None, Vec::new())
+        (Model::open(&arguments.file)?, 1.0, None, Vec::new())
     };
     let conditions = Conditions {
         kt: arguments.kt.unwrap_or(kt),
         densities: per_species(&arguments.density, model.species().len()).or(densities),
     };
-    let mut findings = Findings { steps, ..check(&model, &conditions).map_err(Failure::new)? };
+    let mut findings = Findings { steps, ..check(&model, &conditions)? };
     if let Some(error) = too_far {
         findings.warnings.insert(
             0,

@@ -1,5 +1,6 @@
 //! Errors as a person sees them: what, where (with the line of the file), and what to do.
 
+use crate::calibrate::CalibrateError;
 use crate::crosscheck::ValidateError;
 use crate::run::RunError;
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
@@ -12,12 +13,13 @@ const LONGEST_LINE: usize = 2000;
 #[derive(Debug)]
 pub struct Failure(Box<dyn std::error::Error + Send + Sync + 'static>);
 
-impl Failure {
-    /// Bad input, or something missing.
-    pub fn new(error: impl std::error::Error + Send + Sync + 'static) -> Failure {
+impl<E: std::error::Error + Send + Sync + 'static> From<E> for Failure {
+    fn from(error: E) -> Failure {
         Failure(Box::new(error))
     }
+}
 
+impl Failure {
     /// 1 for a run that stopped on the way, 2 for bad input.
     pub fn exit_code(&self) -> u8 {
         if run_error(&*self.0).is_some_and(RunError::is_stop) { 1 } else { 2 }
@@ -52,18 +54,28 @@ impl Failure {
     }
 }
 
+/// What a transparent error wraps: its own `source` is the source of that.
+fn unwrapped<'a>(error: &'a (dyn std::error::Error + 'static)) -> &'a (dyn std::error::Error + 'static) {
+    match error.downcast_ref() {
+        Some(ValidateError::File(found)) => return found,
+        Some(ValidateError::Run(found)) => return found,
+        _ => {}
+    }
+    match error.downcast_ref() {
+        Some(CalibrateError::File(found)) => found,
+        Some(CalibrateError::Run(found)) => found,
+        _ => error,
+    }
+}
+
 /// The error about a model or scene file, wherever it is wrapped.
 fn file_error<'a>(error: &'a (dyn std::error::Error + 'static)) -> Option<&'a FileError> {
     let mut next = Some(error);
-    while let Some(error) = next {
-        if let Some(found) = error.downcast_ref::<FileError>() {
+    while let Some(error) = next.map(unwrapped) {
+        if let Some(RunError::File(found)) = error.downcast_ref() {
             return Some(found);
         }
-        // Transparent errors report the source of what they wrap, not the wrapped error itself.
-        if let Some(RunError::File(found)) = error.downcast_ref::<RunError>() {
-            return Some(found);
-        }
-        if let Some(ValidateError::File(found)) = error.downcast_ref::<ValidateError>() {
+        if let Some(found) = error.downcast_ref() {
             return Some(found);
         }
         next = error.source();
@@ -72,8 +84,5 @@ fn file_error<'a>(error: &'a (dyn std::error::Error + 'static)) -> Option<&'a Fi
 }
 
 fn run_error<'a>(error: &'a (dyn std::error::Error + 'static)) -> Option<&'a RunError> {
-    if let Some(ValidateError::Run(found)) = error.downcast_ref::<ValidateError>() {
-        return Some(found);
-    }
-    error.downcast_ref::<RunError>()
+    unwrapped(error).downcast_ref()
 }

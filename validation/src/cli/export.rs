@@ -55,8 +55,8 @@ pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
 }
 
 fn run_lammps(a: &LammpsArguments, json: Option<&Path>) -> Result<Verdict, Failure> {
-    let scene = Scene::open(&a.scene).map_err(Failure::new)?;
-    let files = deck::write(&scene, &a.out).map_err(Failure::new)?;
+    let scene = Scene::open(&a.scene)?;
+    let files = deck::write(&scene, &a.out)?;
     println!("written to {}; run it there:", a.out.display());
     println!("lmp -in {} -var plugin PATH/psidpdplugin.so", deck::SCRIPT);
     write_json(json, &json!({"folder": a.out, "files": files}))?;
@@ -64,14 +64,14 @@ fn run_lammps(a: &LammpsArguments, json: Option<&Path>) -> Result<Verdict, Failu
 }
 
 fn run_eam(a: &EamArguments, json: Option<&Path>) -> Result<Verdict, Failure> {
-    let model = Model::open(&a.model).map_err(Failure::new)?;
-    let fluid = model.at(a.kt).map_err(Failure::new)?;
+    let model = Model::open(&a.model)?;
+    let fluid = model.at(a.kt)?;
     let out = a.out.clone().unwrap_or_else(|| {
         let stem = a.model.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         PathBuf::from(format!("{stem}.eam.alloy"))
     });
     let grid = Grid { spacing: a.spacing, largest_density: a.largest_density, densities: a.densities };
-    eam::write(&fluid, &vec![1.0; fluid.species.len()], grid, &out).map_err(Failure::new)?;
+    eam::write(&fluid, &vec![1.0; fluid.species.len()], grid, &out)?;
     println!("{}", out.display());
     println!("pair_style eam/alloy\npair_coeff * * {} {}", out.display(), fluid.species.join(" "));
     write_json(json, &json!({"table": out, "species": fluid.species}))?;

@@ -33,15 +33,15 @@ struct Forces {
 }
 
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
-    let model = Model::open(&arguments.model).map_err(Failure::new)?;
-    let mut data = DataFile::read(&arguments.data).map_err(Failure::new)?;
+    let model = Model::open(&arguments.model)?;
+    let mut data = DataFile::read(&arguments.data)?;
     data.sort_by_id();
-    let state = State::from_data(&data, &model).map_err(Failure::new)?;
-    let mut simulation = Simulation::new(&model, arguments.kt, state, 1).map_err(Failure::new)?;
+    let state = State::from_data(&data, &model)?;
+    let mut simulation = Simulation::new(&model, arguments.kt, state, 1)?;
     // What others are compared with.
     simulation.use_reference_only(true);
     simulation.sum_all_densities(true);
-    simulation.compute(Want::TOTALS, None).map_err(Failure::new)?;
+    simulation.compute(Want::TOTALS, None)?;
     let width = simulation.local_densities().len() / simulation.len().max(1);
     let forces = Forces {
         energy: simulation.potential_energy(),

@@ -36,8 +36,8 @@ pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
     match verb {
         Verb::Install => {
             let spinner = progress.spinner("installing LAMMPS");
-            let host = install(&note).map_err(Failure::new)?;
-            let version = host.version().map_err(Failure::new)?;
+            let host = install(&note)?;
+            let version = host.version()?;
             spinner.finish();
             println!("LAMMPS {} in {}", version.name, host.root.display());
             println!("run it: {}", host.lmp.display());
@@ -48,11 +48,10 @@ pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
             let host = match lammps {
                 Some(place) => Host::at(place),
                 None => Host::find(),
-            }
-            .map_err(Failure::new)?;
-            let path = plugin::build(&host, &note).map_err(Failure::new)?;
-            plugin::check(&host, &path).map_err(Failure::new)?;
-            let built = plugin::built_for(&path).map_err(Failure::new)?;
+            }?;
+            let path = plugin::build(&host, &note)?;
+            plugin::check(&host, &path)?;
+            let built = plugin::built_for(&path)?;
             spinner.finish();
             println!("plugin for LAMMPS {}: {}", built.lammps_version, path.display());
             let launcher = plugin::launcher(&path);
@@ -78,8 +77,7 @@ fn convert_script(script: &Path, law: Law, out: Option<&Path>, json: Option<&Pat
     // Where it is if it has been built here; else a name to be filled in.
     let plugin = Some(base_dir().join(plugin::FILE_NAME)).filter(|p| p.is_file());
     let plugin = plugin.unwrap_or_else(|| plugin::FILE_NAME.into());
-    let (files, new) =
-        convert::files(script, law, &plugin.display().to_string(), out).map_err(Failure::new)?;
+    let (files, new) = convert::files(script, law, &plugin.display().to_string(), out)?;
     if out.is_none() {
         print!("{}", new.script);
     }

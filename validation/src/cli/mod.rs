@@ -10,8 +10,10 @@ mod check;
 mod diagnostic;
 mod export;
 mod forces;
+mod hardcases;
 mod lammps;
 mod new;
+mod pareto;
 mod report;
 mod reproduce;
 mod run;
@@ -42,6 +44,10 @@ enum Verb {
     Validate(validate::Arguments),
     /// Time LAMMPS, the plugin and the native runner side by side.
     Bench(bench::Arguments),
+    /// What a unit of simulated time costs with each integrator, time step and precision, and how far off its results are.
+    Pareto(pareto::Arguments),
+    /// Cases that are hard for a simulation: what must happen in each, and what did.
+    Hardcases(hardcases::Arguments),
     /// What a model or scene will compute, and what cannot work.
     Check(check::Arguments),
     /// Mean field: equation of state, critical point, spinodal, binodal, surface tension.
@@ -68,7 +74,7 @@ enum Verb {
     Lammps(lammps::Verb),
 }
 
-/// What a verb that could be carried out says.
+/// The outcome of a verb that could be carried out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Verdict {
     Good,
@@ -84,6 +90,8 @@ pub fn main() -> ExitCode {
     let outcome = match &arguments.verb {
         Verb::Validate(a) => validate::run(a, json),
         Verb::Bench(a) => bench::run(a, json),
+        Verb::Pareto(a) => pareto::run(a, json),
+        Verb::Hardcases(a) => hardcases::run(a, json),
         Verb::Check(a) => check::run(a, json),
         Verb::Theory(a) => theory::run(a, json),
         Verb::Export(a) => export::run(a, json),
@@ -111,7 +119,7 @@ pub fn main() -> ExitCode {
 /// Writes `value` to the file of `--json`, if there is one.
 fn write_json(json: Option<&Path>, value: &impl Serialize) -> Result<(), Failure> {
     let Some(path) = json else { return Ok(()) };
-    let mut text = serde_json::to_string_pretty(value).map_err(Failure::new)?;
+    let mut text = serde_json::to_string_pretty(value)?;
     text.push('\n');
-    crate::files::write_atomically(path, text.as_bytes()).map_err(Failure::new)
+    crate::files::write_atomically(path, text.as_bytes()).map_err(Failure::from)
 }

@@ -27,7 +27,7 @@ fn templates() -> String {
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     let chosen: Option<&Template> = TEMPLATES.iter().find(|t| t.name == arguments.template);
     let template = chosen.unwrap_or(&TEMPLATES[0]);
-    let [scene, model] = template.write(&arguments.name).map_err(Failure::new)?;
+    let [scene, model] = template.write(&arguments.name)?;
     println!("{}: {}", scene.display(), template.about);
     println!("{}: its model", model.display());
     println!("run it: psidpd run {} --out {}", scene.display(), scene.with_extension("").display());

@@ -12,7 +12,7 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
-    let page = write_run_report(&arguments.folder).map_err(Failure::new)?;
+    let page = write_run_report(&arguments.folder)?;
     println!("{}", page.display());
     write_json(json, &json!({"report": page}))?;
     Ok(Verdict::Good)

@@ -65,7 +65,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
                 good = false;
                 json!({ "id": case.id, "values": [], "pass": false, "stopped": why.to_string() })
             }
-            Err(why) => return Err(Failure::new(why)),
+            Err(why) => return Err(Failure::from(why)),
         };
         println!("  {:.0} s\n", begun.elapsed().as_secs_f64());
         results.push(result);
@@ -91,7 +91,7 @@ fn choose(ids: &[String]) -> Result<Vec<&'static Case>, Failure> {
             None => all.iter().copied().filter(|case| case.id.starts_with(&prefix)).collect(),
         };
         if some.is_empty() {
-            return Err(Failure::new(Unknown(id.clone())));
+            return Err(Unknown(id.clone()).into());
         }
         chosen.extend(
             some.into_iter().filter(|case| chosen.iter().all(|c| c.id != case.id)).collect::<Vec<_>>(),
@@ -130,10 +130,10 @@ fn show(outcome: &Outcome) {
 
 fn write_plots(outcome: &Outcome, folder: &Path) -> Result<(), Failure> {
     for (name, plot) in &outcome.plots {
-        let svg = plot.render().map_err(Failure::new)?;
-        let io = |source| Failure::new(PaperError::Io { path: folder.to_owned(), source });
+        let svg = plot.render()?;
+        let io = |source| Failure::from(PaperError::Io { path: folder.to_owned(), source });
         std::fs::create_dir_all(folder).map_err(io)?;
-        write_atomically(folder.join(format!("{name}.svg")), svg.as_bytes()).map_err(Failure::new)?;
+        write_atomically(folder.join(format!("{name}.svg")), svg.as_bytes())?;
     }
     Ok(())
 }

@@ -56,9 +56,9 @@ struct Report<'a> {
 
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     let Arguments { scene: path, out, resume, overwrite, threads, precision, report } = arguments;
-    let mut scene = Scene::open(path).map_err(Failure::new)?;
+    let mut scene = Scene::open(path)?;
     scene.precision = precision.or(scene.precision);
-    if let Some(warning) = calibration::missing(&scene.model.at(scene.kt).map_err(Failure::new)?) {
+    if let Some(warning) = calibration::missing(&scene.model.at(scene.kt)?) {
         warn(&warning.message);
     }
     let begin = match (resume, overwrite) {
@@ -66,9 +66,9 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         (_, true) => Begin::Overwrite,
         _ => Begin::New,
     };
-    let stop = watch_signals().map_err(Failure::new)?;
-    let mut runner = Runner::begin(&scene, out, begin).map_err(Failure::new)?;
-    runner.set_threads(*threads).map_err(Failure::new)?;
+    let stop = watch_signals()?;
+    let mut runner = Runner::begin(&scene, out, begin)?;
+    runner.set_threads(*threads)?;
     let total: u64 = scene.stages.iter().map(|s| s.steps).sum();
     let made = tell_start(runner.start(), begin, out, total);
     say(&format!("forces by {}", runner.evaluation()));
@@ -80,12 +80,12 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     bar.finish();
     if *report && outcome.as_ref().err().is_none_or(|e| e.is_stop()) {
         let page = write_run_report(out);
-        // A full disk has no room for a page either, and the run's own message says more.
+        // A full disk has no room for a page either, and the error of the run is more informative.
         if outcome.is_ok() {
-            page.map_err(Failure::new)?;
+            page?;
         }
     }
-    match outcome.map_err(Failure::new)? {
+    match outcome? {
         Outcome::Finished { summary, timing } => {
             say(&summary.to_string());
             if let Some(session) = timing.sessions.last().filter(|_| made < total) {
@@ -117,7 +117,7 @@ fn precision(name: &str) -> Result<Precision, String> {
     found.map(|(_, precision)| *precision).ok_or_else(|| "expected mixed or double".into())
 }
 
-/// Says what a run begins with, if that is not its beginning; gives the steps made.
+/// Reports where a resumed run begins, and returns the steps already made.
 fn tell_start(start: &Start, begin: Begin, out: &Path, total: u64) -> u64 {
     match start {
         Start::New if begin == Begin::Resume => {
@@ -150,7 +150,7 @@ fn watch_signals() -> std::io::Result<Arc<AtomicUsize>> {
     let stop = Arc::new(AtomicUsize::new(0));
     let stopping = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM] {
-        // In the order that they are to act: a second signal finds the flag that the first set.
+        // The order matters: the second signal finds the flag that the first set.
         flag::register_conditional_default(signal, stopping.clone())?;
         flag::register(signal, stopping.clone())?;
         flag::register_usize(signal, stop.clone(), signal as usize)?;
@@ -160,7 +160,7 @@ fn watch_signals() -> std::io::Result<Arc<AtomicUsize>> {
     Ok(stop)
 }
 
-/// Prints a line. A terminal or pipe that went away, as Ctrl-C makes it, is no reason to fail.
+/// Prints a line. A closed terminal or pipe, as after Ctrl-C, is no error.
 fn say(line: &str) {
     let _ = writeln!(std::io::stdout(), "{line}");
 }

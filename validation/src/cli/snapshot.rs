@@ -77,9 +77,8 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
             return Err(request(format!("--{name} must be a positive number, is {value}")));
         }
     }
-    let mut configuration =
-        Configuration::open(&a.file, a.frame.map_or(Which::Last, Which::Number)).map_err(Failure::new)?;
-    let model = a.model.as_deref().map(Model::open).transpose().map_err(Failure::new)?;
+    let mut configuration = Configuration::open(&a.file, a.frame.map_or(Which::Last, Which::Number))?;
+    let model = a.model.as_deref().map(Model::open).transpose()?;
     if let Some(model) = &model {
         configuration.name_species(model.species(), model.dimensions());
     }
@@ -100,19 +99,15 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
         let options = ParticleOptions { view: a.view.into(), slice: a.slice, radius: a.radius, size };
         Figure::particles(&title, &frame, &options)
     };
-    let bytes = if svg {
-        figure.render().map_err(Failure::new)?.into_bytes()
-    } else {
-        figure.image.to_png().map_err(Failure::new)?
-    };
-    write_atomically(&out, &bytes).map_err(Failure::new)?;
+    let bytes = if svg { figure.render()?.into_bytes() } else { figure.image.to_png()? };
+    write_atomically(&out, &bytes)?;
     println!("{}", out.display());
     write_json(json, &json!({"picture": out, "particles": frame.len(), "step": configuration.step}))?;
     Ok(Verdict::Good)
 }
 
 fn request(message: String) -> Failure {
-    Failure::new(OutputError::Request(message))
+    Failure::from(OutputError::Request(message))
 }
 
 fn index(name: &str, names: &[String]) -> Result<usize, Failure> {
@@ -124,7 +119,7 @@ fn index(name: &str, names: &[String]) -> Result<usize, Failure> {
 
 /// The weight function of the model's first density, with another range if one is given.
 fn kernel(a: &Arguments, model: Option<&Model>, dimensions: usize) -> Result<Kernel, Failure> {
-    let own = model.map(|m| m.at(1.0)).transpose().map_err(Failure::new)?;
+    let own = model.map(|m| m.at(1.0)).transpose()?;
     let own = own.and_then(|f| f.densities.first().map(|d| d.kernel));
     let kind = own.map_or(KernelKind::Quadratic, |k| k.kind());
     let range = a.range.or(own.map(|k| k.range())).unwrap_or(1.0);

@@ -35,18 +35,18 @@ fn or_reason<T>(answer: Result<T, TheoryError>, show: impl FnOnce(T) -> Value) -
 }
 
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
-    let model = Model::open(&arguments.model).map_err(Failure::new)?;
-    let fluid = model.at(arguments.kt).map_err(Failure::new)?;
-    let theory = MeanField::new(&fluid).map_err(Failure::new)?;
+    let model = Model::open(&arguments.model)?;
+    let fluid = model.at(arguments.kt)?;
+    let theory = MeanField::new(&fluid)?;
     let species = model.species().len();
     let densities =
         per_species(&arguments.density, species).unwrap_or_else(|| vec![3.0 / species as f64; species]);
     if densities.len() != species {
         let error = crate::check::CheckError::Densities { given: densities.len(), species };
-        return Err(Failure::new(error));
+        return Err(error.into());
     }
     let [low, high] = arguments.search[..] else {
-        return Err(Failure::new(TheoryError::NoCriticalPoint(0.0, 0.0)));
+        return Err(TheoryError::NoCriticalPoint(0.0, 0.0).into());
     };
     let range = [low * arguments.kt, high * arguments.kt];
     let total: f64 = densities.iter().sum();

@@ -17,7 +17,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     let progress = Progress::new();
     let options = Options { full: arguments.full, out: arguments.out.clone() };
-    let outcome = validate(&options, &progress).map_err(Failure::new)?;
+    let outcome = validate(&options, &progress)?;
     let results = &outcome.results;
     println!("{}", check_table(results).to_text());
     println!(

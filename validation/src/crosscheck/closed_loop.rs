@@ -32,16 +32,9 @@ pub struct Work {
 
 fn state_at(angle: f64) -> Result<State, ValidateError> {
     let third = [CENTRE[0] + RADIUS * angle.cos(), CENTRE[1] + RADIUS * angle.sin(), CENTRE[2]];
-    Ok(State {
-        domain: PeriodicBox::orthogonal([0.0; 3], [10.0; 3], [true; 3])
-            .map_err(|e| crate::run::RunError::State(e.to_string()))?,
-        mass: vec![1.0],
-        x: vec![REST[0], REST[1], third],
-        v: vec![[0.0; 3]; 3],
-        species: vec![0; 3],
-        tag: vec![1, 2, 3],
-        image: vec![[0; 3]; 3],
-    })
+    let domain = PeriodicBox::orthogonal([0.0; 3], [10.0; 3], [true; 3])
+        .map_err(|e| crate::run::RunError::State(e.to_string()))?;
+    Ok(State::at_rest(domain, vec![1.0], vec![REST[0], REST[1], third]))
 }
 
 fn around(mut force: impl FnMut(f64) -> Result<[f64; 3], ValidateError>) -> Result<Work, ValidateError> {

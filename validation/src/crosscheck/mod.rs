@@ -21,7 +21,7 @@ mod validate;
 
 pub use error::ValidateError;
 pub(crate) use validate::machine;
-pub use validate::{Options, Outcome, check_table, validate};
+pub use validate::{Options, check_table, validate};
 
 use crate::lammps::Host;
 use crate::report::Progress;

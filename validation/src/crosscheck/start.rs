@@ -2,11 +2,11 @@
 
 use super::ValidateError;
 use super::fluids::WarrenSet;
+use crate::particles::thermal_velocities;
 use crate::run::{Integrator, Simulation, State};
 use chacha20::ChaCha8Rng;
 use psidpd_core::engine::{PeriodicBox, Want};
 use rand::{RngExt, SeedableRng};
-use rand_distr::{Distribution, StandardNormal};
 
 /// A box and how much of it is filled along z.
 #[derive(Debug, Clone, Copy)]
@@ -39,27 +39,12 @@ pub fn equilibrated(
             [lx * u(), ly * u(), low + filling.thickness * u()]
         })
         .collect();
-    let mut v: Vec<[f64; 3]> =
-        (0..count).map(|_| std::array::from_fn(|_| StandardNormal.sample(&mut random))).collect();
-    for k in 0..3 {
-        let drift = v.iter().map(|v| v[k]).sum::<f64>() / count as f64;
-        v.iter_mut().for_each(|v| v[k] -= drift);
-    }
-    let state = State {
-        domain,
-        mass: vec![1.0],
-        species: vec![0; count],
-        tag: (1..=count as i32).collect(),
-        image: vec![[0; 3]; count],
-        x,
-        v,
-    };
+    let v = thermal_velocities(std::iter::repeat_n(1.0, count), 1.0, 3, &mut random);
+    let state = State { v, ..State::at_rest(domain, vec![1.0], x) };
     let mut simulation = Simulation::new(&set.shipped()?, 1.0, state, seed)?;
     for (dt, steps) in [(0.001, 100), (0.01, steps)] {
         simulation.prepare(dt, Want::FORCES)?;
-        for _ in 0..steps {
-            simulation.step(dt, Integrator::VelocityVerlet, Want::FORCES)?;
-        }
+        simulation.advance(steps, dt, Integrator::VelocityVerlet)?;
     }
     Ok(simulation.state())
 }

@@ -79,9 +79,7 @@ fn native(state: &State) -> Result<Vec<[f64; 3]>, ValidateError> {
     let model = SET6.model(ForceLaw::Conservative, GAMMA)?;
     let mut simulation = Simulation::new(&model, 1.0, state.clone(), SEED)?;
     simulation.prepare(DT, Want::FORCES)?;
-    for _ in 0..STEPS {
-        simulation.step(DT, Integrator::VelocityVerlet, Want::FORCES)?;
-    }
+    simulation.advance(STEPS, DT, Integrator::VelocityVerlet)?;
     let mut x = vec![[f64::NAN; 3]; state.len()];
     for (tag, position) in simulation.tags().iter().zip(simulation.positions()) {
         x[*tag as usize - 1] = *position;

@@ -33,48 +33,29 @@ impl Default for Grid {
 /// Why a fluid cannot be written as `eam/alloy`.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say it")]
 pub enum EamError {
-    /// More than one density needs a pass.
     #[error("psi is not linear in {0} and {1}: eam/alloy has one density only")]
     TwoDensities(String, String),
-    /// ψ tells species apart.
     #[error(
         "psi of {species} depends on the partial densities of {density}, not on their sum alone: eam/alloy has one \
          density that does not tell species apart"
     )]
-    PartialDensities {
-        /// Whose ψ.
-        species: String,
-        /// Which density.
-        density: String,
-    },
-    /// A correction depends on who feels the density.
+    PartialDensities { species: String, density: String },
     #[error("the correction of {0} is not the identity: eam/alloy has uncorrected densities")]
     Correction(String),
-    /// Bounds are met inside the table.
     #[error("{0} has bounds: a table cannot say that psi goes on beyond them; remove them or the export")]
     Bounds(String),
-    /// The dimension is fixed.
     #[error("eam/alloy is tabulated for three dimensions here, the model has two")]
     Flat,
-    /// A force law without a potential.
     #[error("the force law of this model has no potential")]
     NotConservative,
-    /// ψ is not finite at a density of the table.
     #[error("psi of {species} is not finite at density {density}: lower the largest density")]
-    Singular {
-        /// Whose ψ.
-        species: String,
-        /// Where.
-        density: f64,
-    },
-    /// A grid that is none.
+    Singular { species: String, density: f64 },
     #[error("the spacing, the largest density and the number of densities must be positive")]
     Grid,
-    /// A derivative grows beyond the limits of the formula engine.
     #[error(transparent)]
     TooLarge(#[from] TooLarge),
-    /// The file cannot be written.
     #[error(transparent)]
     Lammps(#[from] LammpsError),
 }
@@ -110,7 +91,7 @@ pub fn write(fluid: &Fluid, mass: &[f64], grid: Grid, path: &Path) -> Result<(),
     for (alpha, species) in fluid.species.iter().enumerate() {
         for k in 0..grid.densities {
             let density = k as f64 * drho;
-            // The table begins at n = 0, an isolated particle: a spline through infinity is none.
+            // The table begins at n = 0, an isolated particle, and a spline needs finite values.
             if !embedding(alpha, density).is_finite() {
                 return Err(EamError::Singular { species: species.clone(), density });
             }

@@ -6,7 +6,9 @@
 
 mod physics;
 
-use crate::run::{Counterpart, Integrator, RunError};
+use crate::integrator::{Counterpart, Integrator};
+use crate::particles::State;
+use crate::run::RunError;
 use crate::scene::{Scene, Stage};
 use physics::Physics;
 use psidpd_core::document::{Document, FileError};
@@ -32,74 +34,36 @@ const MOST_BODY_FORCES: usize = 9;
 /// Why a scene cannot be written as a deck.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say it")]
 pub enum DeckError {
-    /// LAMMPS has no such integrator.
     #[error(
         "stage \"{stage}\": integrator = \"{name}\" ({integrator}) has no counterpart in LAMMPS; a deck can have \
          velocity-verlet, and groot-warren with lambda = 0.5, which is the same"
     )]
-    Integrator {
-        /// Name of the stage.
-        stage: String,
-        /// Value of the key.
-        name: &'static str,
-        /// With its parameters.
-        integrator: Integrator,
-    },
-    /// The pair styles do not take this seed.
+    Integrator { stage: String, name: &'static str, integrator: Integrator },
     #[error("the seed must be at least 1 for the pair style, is {0}")]
     Seed(u64),
-    /// A stage is too long for one `run`.
     #[error("stage \"{stage}\": {steps} steps are more than one run of LAMMPS takes, {MOST_STEPS}")]
-    Steps {
-        /// Name of the stage.
-        stage: String,
-        /// Its steps.
-        steps: u64,
-    },
-    /// Halves of a box with tilt are not told by a coordinate.
+    Steps { stage: String, steps: u64 },
     #[error("reversed_along has no counterpart in a deck for a box with tilt")]
     Tilt,
-    /// LAMMPS has so many groups.
     #[error("{0} body forces need more groups than LAMMPS has: at most {MOST_BODY_FORCES} can be written")]
     BodyForces(usize),
-    /// The thermostat could not be cut out of the text of the model.
     #[error(
         "{}: cannot take the thermostat out for the stages without; write it as [[thermostat]] sections",
         model.display()
     )]
-    Thermostat {
-        /// The model file.
-        model: PathBuf,
-    },
-    /// What was written is another fluid.
+    Thermostat { model: PathBuf },
     #[error("{}: the copy in the deck is not the same fluid: the names of its tables are ambiguous", model.display())]
-    Copy {
-        /// The model file.
-        model: PathBuf,
-    },
-    /// Two tables would have one name.
+    Copy { model: PathBuf },
     #[error("{}: two tables would both become {} in the deck", model.display(), table.display())]
-    Tables {
-        /// The model file.
-        model: PathBuf,
-        /// The name.
-        table: PathBuf,
-    },
-    /// The model file, or its copy, is not right.
+    Tables { model: PathBuf, table: PathBuf },
     #[error(transparent)]
     File(#[from] FileError),
-    /// The start cannot be written.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// A file cannot be written.
     #[error("{} cannot be written: {source}", path.display())]
-    Output {
-        /// The file or folder.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
+    Output { path: PathBuf, source: std::io::Error },
 }
 
 /// Writes the deck of `scene` to the folder `out`, which is made if need be, and returns the names of its
@@ -134,7 +98,7 @@ pub fn write(scene: &Scene, out: &Path) -> Result<Vec<PathBuf>, DeckError> {
         files.push(MODEL_WITHOUT_THERMOSTAT.into());
     }
 
-    write_start(scene, &out.join(START))?;
+    write_start(scene, &scene.initial_state(), &out.join(START))?;
     save(&out.join(SCRIPT), &script(scene))?;
     Ok(files)
 }
@@ -252,8 +216,12 @@ fn compare(scene: &Scene, path: &Path, thermostat: bool) -> Result<bool, DeckErr
     Ok(true)
 }
 
-fn write_start(scene: &Scene, path: &Path) -> Result<(), DeckError> {
-    let mut data = scene.initial_state().to_data(&format!("psidpd: {}, step 0", one_line(&scene.title)));
+/// Writes a state as the start of a deck.
+///
+/// # Errors
+/// The file cannot be written.
+pub(crate) fn write_start(scene: &Scene, state: &State, path: &Path) -> Result<(), DeckError> {
+    let mut data = state.to_data(&format!("psidpd: {}, step 0", one_line(&scene.title)));
     data.sort_by_id();
     if scene.model.dimensions() == 2 {
         // LAMMPS wants the plane z = 0, and nothing depends on it.
@@ -264,6 +232,15 @@ fn write_start(scene: &Scene, path: &Path) -> Result<(), DeckError> {
         }
     }
     data.write(path).map_err(|e| DeckError::Run(e.into()))
+}
+
+/// The script of [`write`] alone.
+///
+/// # Errors
+/// The scene has no counterpart in LAMMPS.
+pub(crate) fn script_of(scene: &Scene) -> Result<String, DeckError> {
+    check(scene)?;
+    Ok(script(scene))
 }
 
 fn script(scene: &Scene) -> String {
@@ -328,8 +305,8 @@ fn write_script(scene: &Scene, s: &mut String) -> std::fmt::Result {
     writeln!(s, "\nwrite_data    final.data nocoeff")
 }
 
-/// A title fit for a comment: one line, without the character that goes on with the next, and without quotes, of which
-/// three make LAMMPS read on to the next three.
+/// A title for a comment: one line, without `&`, which continues a line, and without double quotes, since
+/// three of them begin a multi-line text in LAMMPS.
 fn one_line(text: &str) -> String {
     let plain = |c: char| match c {
         '&' => ' ',

@@ -12,8 +12,7 @@ pub struct LammpsLibrary {
         ) -> *mut ::std::os::raw::c_void,
         ::libloading::Error,
     >,
-    pub lammps_close:
-        Result<unsafe extern "C" fn(handle: *mut ::std::os::raw::c_void), ::libloading::Error>,
+    pub lammps_close: Result<unsafe extern "C" fn(handle: *mut ::std::os::raw::c_void), ::libloading::Error>,
     pub lammps_mpi_finalize: Result<unsafe extern "C" fn(), ::libloading::Error>,
     pub lammps_command: Result<
         unsafe extern "C" fn(
@@ -22,10 +21,8 @@ pub struct LammpsLibrary {
         ) -> *mut ::std::os::raw::c_char,
         ::libloading::Error,
     >,
-    pub lammps_get_natoms: Result<
-        unsafe extern "C" fn(handle: *mut ::std::os::raw::c_void) -> f64,
-        ::libloading::Error,
-    >,
+    pub lammps_get_natoms:
+        Result<unsafe extern "C" fn(handle: *mut ::std::os::raw::c_void) -> f64, ::libloading::Error>,
     pub lammps_get_thermo: Result<
         unsafe extern "C" fn(
             handle: *mut ::std::os::raw::c_void,
@@ -89,10 +86,7 @@ pub struct LammpsLibrary {
         ::libloading::Error,
     >,
     pub lammps_eval: Result<
-        unsafe extern "C" fn(
-            handle: *mut ::std::os::raw::c_void,
-            expr: *const ::std::os::raw::c_char,
-        ) -> f64,
+        unsafe extern "C" fn(handle: *mut ::std::os::raw::c_void, expr: *const ::std::os::raw::c_char) -> f64,
         ::libloading::Error,
     >,
     pub lammps_gather_atoms: Result<
@@ -137,8 +131,7 @@ pub struct LammpsLibrary {
         ) -> ::std::os::raw::c_int,
         ::libloading::Error,
     >,
-    pub lammps_free:
-        Result<unsafe extern "C" fn(ptr: *mut ::std::os::raw::c_void), ::libloading::Error>,
+    pub lammps_free: Result<unsafe extern "C" fn(ptr: *mut ::std::os::raw::c_void), ::libloading::Error>,
     pub lammps_has_error: Result<
         unsafe extern "C" fn(handle: *mut ::std::os::raw::c_void) -> ::std::os::raw::c_int,
         ::libloading::Error,
@@ -174,9 +167,7 @@ impl LammpsLibrary {
         let lammps_get_thermo = __library.get(b"lammps_get_thermo\0").map(|sym| *sym);
         let lammps_extract_box = __library.get(b"lammps_extract_box\0").map(|sym| *sym);
         let lammps_extract_setting = __library.get(b"lammps_extract_setting\0").map(|sym| *sym);
-        let lammps_extract_atom_datatype = __library
-            .get(b"lammps_extract_atom_datatype\0")
-            .map(|sym| *sym);
+        let lammps_extract_atom_datatype = __library.get(b"lammps_extract_atom_datatype\0").map(|sym| *sym);
         let lammps_extract_atom_size = __library.get(b"lammps_extract_atom_size\0").map(|sym| *sym);
         let lammps_extract_compute = __library.get(b"lammps_extract_compute\0").map(|sym| *sym);
         let lammps_extract_fix = __library.get(b"lammps_extract_fix\0").map(|sym| *sym);
@@ -188,9 +179,7 @@ impl LammpsLibrary {
         let lammps_has_style = __library.get(b"lammps_has_style\0").map(|sym| *sym);
         let lammps_free = __library.get(b"lammps_free\0").map(|sym| *sym);
         let lammps_has_error = __library.get(b"lammps_has_error\0").map(|sym| *sym);
-        let lammps_get_last_error_message = __library
-            .get(b"lammps_get_last_error_message\0")
-            .map(|sym| *sym);
+        let lammps_get_last_error_message = __library.get(b"lammps_get_last_error_message\0").map(|sym| *sym);
         Ok(LammpsLibrary {
             __library,
             lammps_open_no_mpi,
@@ -222,48 +211,30 @@ impl LammpsLibrary {
         argv: *mut *mut ::std::os::raw::c_char,
         ptr: *mut *mut ::std::os::raw::c_void,
     ) -> *mut ::std::os::raw::c_void {
-        (self
-            .lammps_open_no_mpi
-            .as_ref()
-            .expect("Expected function, got error."))(argc, argv, ptr)
+        (self.lammps_open_no_mpi.as_ref().expect("Expected function, got error."))(argc, argv, ptr)
     }
     pub unsafe fn lammps_close(&self, handle: *mut ::std::os::raw::c_void) {
-        (self
-            .lammps_close
-            .as_ref()
-            .expect("Expected function, got error."))(handle)
+        (self.lammps_close.as_ref().expect("Expected function, got error."))(handle)
     }
     pub unsafe fn lammps_mpi_finalize(&self) {
-        (self
-            .lammps_mpi_finalize
-            .as_ref()
-            .expect("Expected function, got error."))()
+        (self.lammps_mpi_finalize.as_ref().expect("Expected function, got error."))()
     }
     pub unsafe fn lammps_command(
         &self,
         handle: *mut ::std::os::raw::c_void,
         cmd: *const ::std::os::raw::c_char,
     ) -> *mut ::std::os::raw::c_char {
-        (self
-            .lammps_command
-            .as_ref()
-            .expect("Expected function, got error."))(handle, cmd)
+        (self.lammps_command.as_ref().expect("Expected function, got error."))(handle, cmd)
     }
     pub unsafe fn lammps_get_natoms(&self, handle: *mut ::std::os::raw::c_void) -> f64 {
-        (self
-            .lammps_get_natoms
-            .as_ref()
-            .expect("Expected function, got error."))(handle)
+        (self.lammps_get_natoms.as_ref().expect("Expected function, got error."))(handle)
     }
     pub unsafe fn lammps_get_thermo(
         &self,
         handle: *mut ::std::os::raw::c_void,
         keyword: *const ::std::os::raw::c_char,
     ) -> f64 {
-        (self
-            .lammps_get_thermo
-            .as_ref()
-            .expect("Expected function, got error."))(handle, keyword)
+        (self.lammps_get_thermo.as_ref().expect("Expected function, got error."))(handle, keyword)
     }
     pub unsafe fn lammps_extract_box(
         &self,
@@ -276,10 +247,7 @@ impl LammpsLibrary {
         pflags: *mut ::std::os::raw::c_int,
         boxflag: *mut ::std::os::raw::c_int,
     ) {
-        (self
-            .lammps_extract_box
-            .as_ref()
-            .expect("Expected function, got error."))(
+        (self.lammps_extract_box.as_ref().expect("Expected function, got error."))(
             handle, boxlo, boxhi, xy, yz, xz, pflags, boxflag,
         )
     }
@@ -288,20 +256,14 @@ impl LammpsLibrary {
         handle: *mut ::std::os::raw::c_void,
         keyword: *const ::std::os::raw::c_char,
     ) -> ::std::os::raw::c_int {
-        (self
-            .lammps_extract_setting
-            .as_ref()
-            .expect("Expected function, got error."))(handle, keyword)
+        (self.lammps_extract_setting.as_ref().expect("Expected function, got error."))(handle, keyword)
     }
     pub unsafe fn lammps_extract_atom_datatype(
         &self,
         handle: *mut ::std::os::raw::c_void,
         name: *const ::std::os::raw::c_char,
     ) -> ::std::os::raw::c_int {
-        (self
-            .lammps_extract_atom_datatype
-            .as_ref()
-            .expect("Expected function, got error."))(handle, name)
+        (self.lammps_extract_atom_datatype.as_ref().expect("Expected function, got error."))(handle, name)
     }
     pub unsafe fn lammps_extract_atom_size(
         &self,
@@ -309,10 +271,7 @@ impl LammpsLibrary {
         name: *const ::std::os::raw::c_char,
         type_: ::std::os::raw::c_int,
     ) -> ::std::os::raw::c_int {
-        (self
-            .lammps_extract_atom_size
-            .as_ref()
-            .expect("Expected function, got error."))(handle, name, type_)
+        (self.lammps_extract_atom_size.as_ref().expect("Expected function, got error."))(handle, name, type_)
     }
     pub unsafe fn lammps_extract_compute(
         &self,
@@ -321,10 +280,9 @@ impl LammpsLibrary {
         style: ::std::os::raw::c_int,
         type_: ::std::os::raw::c_int,
     ) -> *mut ::std::os::raw::c_void {
-        (self
-            .lammps_extract_compute
-            .as_ref()
-            .expect("Expected function, got error."))(handle, id, style, type_)
+        (self.lammps_extract_compute.as_ref().expect("Expected function, got error."))(
+            handle, id, style, type_,
+        )
     }
     pub unsafe fn lammps_extract_fix(
         &self,
@@ -335,20 +293,16 @@ impl LammpsLibrary {
         nrow: ::std::os::raw::c_int,
         ncol: ::std::os::raw::c_int,
     ) -> *mut ::std::os::raw::c_void {
-        (self
-            .lammps_extract_fix
-            .as_ref()
-            .expect("Expected function, got error."))(handle, id, style, type_, nrow, ncol)
+        (self.lammps_extract_fix.as_ref().expect("Expected function, got error."))(
+            handle, id, style, type_, nrow, ncol,
+        )
     }
     pub unsafe fn lammps_eval(
         &self,
         handle: *mut ::std::os::raw::c_void,
         expr: *const ::std::os::raw::c_char,
     ) -> f64 {
-        (self
-            .lammps_eval
-            .as_ref()
-            .expect("Expected function, got error."))(handle, expr)
+        (self.lammps_eval.as_ref().expect("Expected function, got error."))(handle, expr)
     }
     pub unsafe fn lammps_gather_atoms(
         &self,
@@ -358,10 +312,9 @@ impl LammpsLibrary {
         count: ::std::os::raw::c_int,
         data: *mut ::std::os::raw::c_void,
     ) {
-        (self
-            .lammps_gather_atoms
-            .as_ref()
-            .expect("Expected function, got error."))(handle, name, type_, count, data)
+        (self.lammps_gather_atoms.as_ref().expect("Expected function, got error."))(
+            handle, name, type_, count, data,
+        )
     }
     pub unsafe fn lammps_scatter_atoms(
         &self,
@@ -371,10 +324,9 @@ impl LammpsLibrary {
         count: ::std::os::raw::c_int,
         data: *mut ::std::os::raw::c_void,
     ) {
-        (self
-            .lammps_scatter_atoms
-            .as_ref()
-            .expect("Expected function, got error."))(handle, name, type_, count, data)
+        (self.lammps_scatter_atoms.as_ref().expect("Expected function, got error."))(
+            handle, name, type_, count, data,
+        )
     }
     pub unsafe fn lammps_gather(
         &self,
@@ -384,19 +336,12 @@ impl LammpsLibrary {
         count: ::std::os::raw::c_int,
         data: *mut ::std::os::raw::c_void,
     ) {
-        (self
-            .lammps_gather
-            .as_ref()
-            .expect("Expected function, got error."))(handle, name, type_, count, data)
+        (self.lammps_gather.as_ref().expect("Expected function, got error."))(
+            handle, name, type_, count, data,
+        )
     }
-    pub unsafe fn lammps_version(
-        &self,
-        handle: *mut ::std::os::raw::c_void,
-    ) -> ::std::os::raw::c_int {
-        (self
-            .lammps_version
-            .as_ref()
-            .expect("Expected function, got error."))(handle)
+    pub unsafe fn lammps_version(&self, handle: *mut ::std::os::raw::c_void) -> ::std::os::raw::c_int {
+        (self.lammps_version.as_ref().expect("Expected function, got error."))(handle)
     }
     pub unsafe fn lammps_has_style(
         &self,
@@ -404,25 +349,13 @@ impl LammpsLibrary {
         arg2: *const ::std::os::raw::c_char,
         arg3: *const ::std::os::raw::c_char,
     ) -> ::std::os::raw::c_int {
-        (self
-            .lammps_has_style
-            .as_ref()
-            .expect("Expected function, got error."))(arg1, arg2, arg3)
+        (self.lammps_has_style.as_ref().expect("Expected function, got error."))(arg1, arg2, arg3)
     }
     pub unsafe fn lammps_free(&self, ptr: *mut ::std::os::raw::c_void) {
-        (self
-            .lammps_free
-            .as_ref()
-            .expect("Expected function, got error."))(ptr)
+        (self.lammps_free.as_ref().expect("Expected function, got error."))(ptr)
     }
-    pub unsafe fn lammps_has_error(
-        &self,
-        handle: *mut ::std::os::raw::c_void,
-    ) -> ::std::os::raw::c_int {
-        (self
-            .lammps_has_error
-            .as_ref()
-            .expect("Expected function, got error."))(handle)
+    pub unsafe fn lammps_has_error(&self, handle: *mut ::std::os::raw::c_void) -> ::std::os::raw::c_int {
+        (self.lammps_has_error.as_ref().expect("Expected function, got error."))(handle)
     }
     pub unsafe fn lammps_get_last_error_message(
         &self,
@@ -430,9 +363,8 @@ impl LammpsLibrary {
         buffer: *mut ::std::os::raw::c_char,
         buf_size: ::std::os::raw::c_int,
     ) -> ::std::os::raw::c_int {
-        (self
-            .lammps_get_last_error_message
-            .as_ref()
-            .expect("Expected function, got error."))(handle, buffer, buf_size)
+        (self.lammps_get_last_error_message.as_ref().expect("Expected function, got error."))(
+            handle, buffer, buf_size,
+        )
     }
 }

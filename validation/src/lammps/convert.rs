@@ -1,7 +1,7 @@
 //! Rewrites scripts for LAMMPS's built-in `mdpd` to the pair style `mdpd/psi`.
 //!
-//! Only the commands that know of the built-in are changed; all other lines stay as they are, byte for byte. What
-//! cannot be said in the other style is left, and named.
+//! Only the commands that know of the built-in are changed; all other lines stay as they are, byte for byte.
+//! What has no counterpart is left unchanged and reported.
 
 use super::error::LammpsError;
 use super::text::{Problem, TextError};
@@ -203,7 +203,7 @@ impl Work<'_> {
         self.script += new.as_deref().unwrap_or(command.text);
     }
 
-    /// What is kept but may know of the built-in.
+    /// Reports commands that are kept but may depend on the built-in.
     fn look(&mut self, command: &Command, words: &[&str]) {
         match words {
             ["units", units] if *units != "lj" => {

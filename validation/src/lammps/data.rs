@@ -50,7 +50,7 @@ enum Style {
     Mdpd,
 }
 
-/// Sections that say nothing about where atoms are, and are passed over.
+/// Sections without positions, which are skipped.
 const IGNORED: [&str; 3] = ["Pair Coeffs", "PairIJ Coeffs", "Atom Type Labels"];
 /// Header counts of things other than atoms: these must be zero.
 const OTHERS: [&str; 8] =
@@ -352,7 +352,7 @@ impl<'a> Parser<'a> {
         start: usize,
         mut row: impl FnMut(usize, &[&'a str]) -> Result<T, TextError>,
     ) -> Result<Vec<T>, TextError> {
-        // The count is the file's claim: believe it for no more memory than the file has lines.
+        // The count comes from the file: reserve no more memory than the file has lines.
         let mut rows = Vec::with_capacity(count.min(self.lines.len()));
         let mut end = start;
         let mut words = Vec::new();

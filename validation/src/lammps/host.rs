@@ -194,7 +194,7 @@ impl Host {
             Some(used) => mpi::installed(&used, &root)?,
             None => Mpi::stubs(&include)?,
         };
-        // What the loader finds by itself needs no help, and what lies beside it must not be preferred.
+        // The loader finds system folders by itself, and other libraries there must not take precedence.
         let is_system = [Path::new("/usr/lib"), Path::new("/lib")].iter().any(|p| folder.starts_with(p));
         let library_path = if is_system { vec![] } else { vec![folder] };
         Ok(Host { kind, root, library, include, mpi_include, mpi_library, mpirun, lmp, library_path, python })
@@ -378,7 +378,7 @@ fn run_limited(command: &mut Command, limit: Duration) -> Result<Limited, Lammps
         // What MPICH leaves behind when a program on one rank aborts; under a launcher it cleans up itself.
         let _ = fs::remove_file(format!("/dev/shm/mpich_shm_{:x}_0", child.id()));
     }
-    // Both pipes end with the processes; a stray process that keeps one open shall not keep us.
+    // Both pipes end with the processes; do not wait long for a stray process that keeps one open.
     for _ in 0..2 {
         let _ = ended.recv_timeout(Duration::from_secs(5));
     }
@@ -388,7 +388,8 @@ fn run_limited(command: &mut Command, limit: Duration) -> Result<Limited, Lammps
     Ok(Limited { status, stdout: text(stdout), stderr: text(stderr), elapsed })
 }
 
-/// Stops a process and all it has started: first asks (an MPI launcher then stops its ranks), then insists.
+/// Stops a process and all it has started: first SIGTERM, upon which an MPI launcher stops its ranks, then
+/// SIGKILL.
 fn stop(child: &mut Child) {
     // The ranks of an MPI run have process groups of their own, so the group of the launcher is not all.
     let family = descendants(child.id());
@@ -409,7 +410,7 @@ fn stop(child: &mut Child) {
     }
     send(Signal::KILL);
     for process in &family {
-        // The number may belong to another process by now.
+        // The process id may have been reused.
         let same = Process::read(process.id).is_some_and(|now| now.started == process.started);
         if let (true, Some(pid)) = (same, Pid::from_raw(process.id as i32)) {
             let _ = kill_process(pid, Signal::KILL);

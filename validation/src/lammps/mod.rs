@@ -4,7 +4,6 @@
 //! [`Lammps`] runs one inside this process; [`plugin`] builds psidpd's pair styles for a host; [`data`], [`dump`] and
 //! [`setfl`] read and write LAMMPS's file formats; [`convert`] rewrites scripts for the built-in `mdpd`.
 
-#[rustfmt::skip]
 #[allow(dead_code, missing_docs, unsafe_op_in_unsafe_fn, clippy::all, clippy::undocumented_unsafe_blocks)]
 mod bindings;
 pub mod convert;

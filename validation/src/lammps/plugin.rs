@@ -11,6 +11,7 @@ use super::error::{LammpsError, tail};
 use super::host::{Host, HostKind, HostVersion};
 use super::install::{Lock, base_dir, checkout, venv_dir};
 use super::made_from;
+use crate::files::remove_if_there;
 
 /// The file [`build`] makes, which LAMMPS's `plugin load` takes.
 pub const FILE_NAME: &str = "psidpdplugin.so";
@@ -154,17 +155,8 @@ fn build_with(
     ));
     let out = cargo_command(cargo)
         // With the program, for the same features of what both need.
-        .args([
-            "build",
-            "--release",
-            "--lib",
-            "-p",
-            "psidpd",
-            "-p",
-            "psidpd-lammps",
-            "-p",
-            "psidpd-lammps-entry",
-        ])
+        .args(["build", "--release", "--lib", "-p", "psidpd", "-p", "psidpd-lammps"])
+        .args(["-p", "psidpd-lammps-entry"])
         .arg("--message-format=json-render-diagnostics")
         .arg("--target-dir")
         .arg(builds)
@@ -187,29 +179,19 @@ fn build_with(
     };
     let built = [(library("psidpdplugin")?, &plugin), (library("psidpd_styles")?, &styles)];
 
-    // A process that has the old plugin open keeps it; one that opens it now finds whole files. Without the note beside
-    // it a plugin is refused, so that an interruption never leaves a plugin with the wrong one.
+    // Renaming leaves an open plugin intact and shows others complete files only. A plugin without its note
+    // is refused, so an interruption cannot leave a plugin with a wrong note.
     let (temp, note) = (base.join("psidpdplugin.so.tmp"), note_of(&plugin));
     let text =
         serde_json::to_string_pretty(&built_for).map_err(|e| LammpsError::io("write", &note)(e.into()))?;
-    match fs::remove_file(&note) {
-        Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
-            return Err(LammpsError::io("remove", &note)(e));
-        }
-        _ => {}
-    }
+    remove_if_there(&note).map_err(LammpsError::io("remove", &note))?;
     for (from, to) in built {
         fs::copy(&from, &temp).map_err(LammpsError::io("copy", &from))?;
         fs::rename(&temp, to).map_err(LammpsError::io("write", to))?;
     }
     drop(shared);
     if version.plugins {
-        match fs::remove_file(&launcher) {
-            Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
-                return Err(LammpsError::io("remove", &launcher)(e));
-            }
-            _ => {}
-        }
+        remove_if_there(&launcher).map_err(LammpsError::io("remove", &launcher))?;
     } else {
         build_launcher(host, &compiler, root, &launcher)?;
     }
@@ -219,7 +201,7 @@ fn build_with(
     Ok(plugin)
 }
 
-/// cargo without what an enclosing cargo told this process about another package.
+/// cargo, without variables that an enclosing cargo set for another package.
 fn cargo_command(cargo: &OsString) -> Command {
     let mut command = Command::new(cargo);
     for (name, _) in std::env::vars_os() {

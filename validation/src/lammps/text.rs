@@ -13,59 +13,26 @@ pub struct TextError {
 /// What is wrong with a line of a text file.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say it")]
 pub enum Problem {
-    /// The file ends too early.
     #[error("the file ends where {0} should be")]
     Ended(String),
-    /// Something that must be there is not.
     #[error("there is no {0}")]
     Missing(String),
-    /// Not a number.
     #[error("'{text}' is not a number for {what}")]
-    NotNumber {
-        /// What the number means.
-        what: String,
-        /// What stands there.
-        text: String,
-    },
-    /// A number that cannot be.
+    NotNumber { what: String, text: String },
     #[error("{what} is {text}, but must be {allowed}")]
-    OutOfRange {
-        /// What the number means.
-        what: String,
-        /// What stands there.
-        text: String,
-        /// What may stand there.
-        allowed: String,
-    },
-    /// A line with the wrong number of columns.
+    OutOfRange { what: String, text: String, allowed: String },
     #[error("{found} columns where {expected} are expected")]
-    Columns {
-        /// How many it should have.
-        expected: String,
-        /// How many it has.
-        found: usize,
-    },
-    /// Too many or too few lines.
+    Columns { expected: String, found: usize },
     #[error("{what}: {found} lines, but {expected} were announced")]
-    Count {
-        /// What is counted.
-        what: String,
-        /// How many there should be.
-        expected: usize,
-        /// How many there are (at least).
-        found: usize,
-    },
-    /// Something twice.
+    Count { what: String, expected: usize, found: usize },
     #[error("{0} is given twice")]
     Duplicate(String),
-    /// Something that is not understood.
     #[error("'{0}' is not understood")]
     Unknown(String),
-    /// Something understood that cannot be represented.
     #[error("{0} cannot be read")]
     Unsupported(String),
-    /// The file cannot be read on.
     #[error("reading stops: {0}")]
     Read(String),
 }

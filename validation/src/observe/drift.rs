@@ -7,22 +7,12 @@ use super::statistics::{StatisticsError, estimate};
 
 /// Why a series has no drift.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages say it")]
 pub enum DriftError {
-    /// Not one value to each time.
     #[error("{times} times but {values} values")]
-    Lengths {
-        /// Number of times.
-        times: usize,
-        /// Number of values.
-        values: usize,
-    },
-    /// A time is not finite, or not later than the one before.
+    Lengths { times: usize, values: usize },
     #[error("time {index} is not a finite number later than the one before")]
-    Times {
-        /// Position of the first such time, from 0.
-        index: usize,
-    },
-    /// The values have no mean or error.
+    Times { index: usize },
     #[error(transparent)]
     Values(#[from] StatisticsError),
 }

@@ -19,31 +19,18 @@ const FLANK_BINS: usize = 6;
 
 /// Why there is no profile.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages say it")]
 pub enum ProfileError {
-    /// The box is not one.
     #[error("box length {length} and area {area} must be positive numbers")]
-    Box {
-        /// Length along z.
-        length: f64,
-        /// Cross-section.
-        area: f64,
-    },
-    /// No bins, or too many.
+    Box { length: f64, area: f64 },
     #[error("{0} bins; a profile has between 1 and {MAXIMUM_BINS}")]
     Bins(usize),
-    /// A coordinate is NaN or infinite.
     #[error("coordinate {index} of the frame is not a finite number")]
-    NonFinite {
-        /// Position of the first such coordinate, from 0.
-        index: usize,
-    },
-    /// The particles have no centre: there are none, or they are spread evenly.
+    NonFinite { index: usize },
     #[error("the frame has no slab to be centred on")]
     NoSlab,
-    /// No frame was added.
     #[error("no frames")]
     NoFrames,
-    /// The densities of a bin have no mean or error.
     #[error(transparent)]
     Statistics(#[from] StatisticsError),
 }

@@ -19,20 +19,12 @@ const NORMAL_DEGREES: f64 = 1e5;
 
 /// Why a series has no estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages say it")]
 pub enum StatisticsError {
-    /// The series is too short for an error bar to mean anything.
     #[error("{found} samples, but an error bar needs at least {MINIMUM_SAMPLES}")]
-    TooFew {
-        /// Samples in the series.
-        found: usize,
-    },
-    /// The series holds a NaN or an infinity.
+    TooFew { found: usize },
     #[error("sample {index} is not a finite number")]
-    NonFinite {
-        /// Position of the first such sample, from 0.
-        index: usize,
-    },
-    /// The sums exceed the range of the floating-point numbers.
+    NonFinite { index: usize },
     #[error("the samples are too large to be averaged")]
     Overflow,
 }

@@ -2,18 +2,10 @@
 
 /// Why a pressure record has no tension.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages say it")]
 pub enum TensionError {
-    /// The three components were not recorded equally often.
     #[error("the pressure components differ in length: {xx} xx, {yy} yy, {zz} zz")]
-    Lengths {
-        /// Samples of P_xx.
-        xx: usize,
-        /// Samples of P_yy.
-        yy: usize,
-        /// Samples of P_zz.
-        zz: usize,
-    },
-    /// The box has no length.
+    Lengths { xx: usize, yy: usize, zz: usize },
     #[error("the box length {0} along z is not a positive number")]
     BoxLength(f64),
 }

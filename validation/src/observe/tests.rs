@@ -5,12 +5,11 @@ use super::request::tables;
 use super::*;
 use crate::run::Simulation;
 use crate::scene::Scene;
+use crate::test_support::{self, IDEAL_MIXTURE, SET6};
 use psidpd_core::document::FileError;
 use psidpd_core::engine::Want;
 use psidpd_core::engine::reference::Evaluator;
 use std::path::Path;
-
-pub(super) const SET6: &str = include_str!("../../models/warren2003-set6.toml");
 
 /// Two species with a density, for keys.
 const MIXTURE: &str = r#"
@@ -24,14 +23,6 @@ A = "0.5*n^2"
 B = "0.5*n^2"
 "#;
 
-pub(super) const IDEAL: &str = r#"
-title = "ideal gas"
-species = ["A", "B"]
-[[thermostat]]
-gamma = 4.5
-range = 1.0
-"#;
-
 /// A scene of one stage, `steps` of it at `dt` = 0.01.
 pub(super) fn scene(
     model: &str,
@@ -40,15 +31,13 @@ pub(super) fn scene(
     steps: u64,
     observe: &str,
 ) -> Result<Scene, FileError> {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("m.toml"), model).unwrap();
     let text = format!(
         "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7\n[box]\nlengths = {lengths}\n\
          [initial]\nkind = \"lattice\"\ndensity = {density}\n\
          [[stage]]\nname = \"settle\"\nsteps = 100\ndt = 0.01\n\
          [[stage]]\nname = \"run\"\nsteps = {steps}\ndt = 0.01\n{observe}"
     );
-    Scene::parse("s.toml", &text, folder.path())
+    test_support::scene(model, &text)
 }
 
 fn observers(scene: &Scene) -> Observers {
@@ -114,7 +103,7 @@ fn errors_name_line_key_and_cause() {
         ("[observe]\nstages = []", 19, "names no stage"),
         ("[observe.temperature]\nskip = -1", 19, "whole number from 0"),
     ] {
-        let error = scene(IDEAL, "[5.0, 5.0, 5.0]", 3.0, 10, observe).unwrap_err();
+        let error = scene(IDEAL_MIXTURE, "[5.0, 5.0, 5.0]", 3.0, 10, observe).unwrap_err();
         assert!(error.to_string().contains(message), "{error}");
         assert_eq!(error.line(), line, "{error}");
     }
@@ -182,16 +171,13 @@ fn a_slab_of_liquid() {
     let text = |s: &str| {
         s.replace("\"lattice\"", "\"slab\"\nthickness = 5.0").replace("density = 5.9", "density = 6.0")
     };
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("m.toml"), SET6).unwrap();
-    let scene = Scene::parse(
-        "s.toml",
+    let scene = test_support::scene(
+        SET6,
         &text(&format!(
             "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7\n[box]\nlengths = [4.0, 4.0, 11.0]\n\
              [initial]\nkind = \"lattice\"\ndensity = 5.9\n[[stage]]\nname = \"settle\"\nsteps = 300\ndt = 0.01\n\
              [[stage]]\nname = \"run\"\nsteps = 1500\ndt = 0.01\n{observe}"
         )),
-        folder.path(),
     )
     .unwrap();
     let (_, all) = run(&scene);
@@ -231,7 +217,7 @@ fn a_slab_of_liquid() {
 fn profiles_of_a_known_flow() {
     let observe = "[observe]\nevery = 1\nstages = [\"settle\"]\nvelocity_profile = true\ntemperature_profile = true\n\
                    composition_profile = true\n[observe.density_profile]\naxis = \"x\"\nbins = 4\n";
-    let scene = scene(IDEAL, "[4.0, 4.0, 5.0]", 20.0, 10, observe).unwrap();
+    let scene = scene(IDEAL_MIXTURE, "[4.0, 4.0, 5.0]", 20.0, 10, observe).unwrap();
     let mut state = scene.initial_state();
     let n = state.len();
     for k in 0..n {
@@ -274,7 +260,7 @@ fn profiles_of_a_known_flow() {
 fn an_ideal_gas_has_no_structure() {
     let observe = "[observe]\nevery = 20\n[observe.rdf]\nbins = 50\nrange = 2.0\n\
                    [observe.structure_factor]\nrange = 12.0\nbins = 9\n";
-    let scene = scene(IDEAL, "[5.0, 5.0, 5.0]", 2.0, 4000, observe).unwrap();
+    let scene = scene(IDEAL_MIXTURE, "[5.0, 5.0, 5.0]", 2.0, 4000, observe).unwrap();
     let (_, all) = run(&scene);
     for (name, columns) in
         [("rdf", ["g", "g_A_A", "g_A_B", "g_B_B"]), ("structure_factor", ["s", "s_A_A", "s_A_B", "s_B_B"])]
@@ -303,13 +289,11 @@ fn an_ideal_gas_has_no_structure() {
 /// local: ⟨n⟩/ρ is [w g] but for the width of the shells.
 #[test]
 fn a_drop_of_liquid() {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("m.toml"), SET6).unwrap();
     let text = "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7\n[box]\nlengths = [11.0, 11.0, 11.0]\n\
          [initial]\nkind = \"random\"\ncount = 700\n[[stage]]\nname = \"settle\"\nsteps = 300\ndt = 0.01\n\
          [[stage]]\nname = \"run\"\nsteps = 1200\ndt = 0.01\n\
          [observe]\ndrop = true\nclusters = true\nlocal_density = true\nmsd = true\n";
-    let scene = Scene::parse("s.toml", text, folder.path()).unwrap();
+    let scene = test_support::scene(SET6, text).unwrap();
     let mut state = scene.initial_state();
     // A ball in a corner of the box: it goes through all of its faces.
     let side = (700.0f64 / 6.05).cbrt();

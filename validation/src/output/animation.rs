@@ -50,7 +50,7 @@ pub fn animation_url(png: &[u8]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::snapshot_name;
+    use super::super::snapshot::snapshot_name;
     use super::*;
 
     #[test]

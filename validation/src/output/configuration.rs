@@ -2,7 +2,6 @@ use super::{Frame, OutputError, read_xyz};
 use crate::lammps::LammpsError;
 use crate::lammps::data::DataFile;
 use crate::lammps::dump::{self, DumpReader};
-use crate::particles::State;
 use nalgebra::{Matrix3, Vector3};
 use psidpd_core::document::open_regular;
 use psidpd_core::engine::PeriodicBox;
@@ -72,21 +71,6 @@ impl Configuration {
             None
         };
         found.filter(|c| !c.x.is_empty()).ok_or_else(missing)
-    }
-
-    /// The state of a run; `names` are those of the model's species.
-    pub fn of_state(state: &State, names: &[String], dimensions: usize) -> Configuration {
-        Configuration {
-            step: None,
-            time: None,
-            dimensions,
-            domain: state.domain.clone(),
-            names: names.to_vec(),
-            x: state.x.clone(),
-            v: Some(state.v.clone()),
-            species: state.species.clone(),
-            tag: state.tag.clone(),
-        }
     }
 
     /// Takes names and dimensions from a model: files of LAMMPS know neither.
@@ -227,23 +211,28 @@ fn from_dump(frame: &dump::Frame) -> Result<Configuration, String> {
 mod tests {
     use super::*;
     use crate::lammps::dump::{Digits, DumpWriter, Snapshot};
+    use crate::particles::State;
 
     #[test]
     fn the_same_particles_come_out_of_every_format() {
         let folder = tempfile::tempdir().unwrap();
         let x = vec![[0.5, 1.0, 2.0], [3.0, 0.25, 1.0 / 3.0]];
         let v = vec![[0.1, 0.2, 0.3], [-1.0, 0.0, 1.0]];
-        let state = State {
-            domain: PeriodicBox::orthogonal([0.0, 0.0, -1.0], [4.0, 5.0, 6.0], [true; 3]).unwrap(),
-            mass: vec![1.0, 2.0],
+        let domain = PeriodicBox::orthogonal([0.0, 0.0, -1.0], [4.0, 5.0, 6.0], [true; 3]).unwrap();
+        let (species, tag, names) = (vec![0, 1], vec![5, 3], ["A".to_owned(), "B".to_owned()]);
+        let state = State::at_rest(domain.clone(), vec![1.0, 2.0], x.clone());
+        let state = State { v: v.clone(), species: species.clone(), tag: tag.clone(), ..state };
+        let direct = Configuration {
+            step: None,
+            time: None,
+            dimensions: 3,
+            domain,
+            names: names.to_vec(),
             x: x.clone(),
-            v: v.clone(),
-            species: vec![0, 1],
-            tag: vec![5, 3],
-            image: vec![[0; 3]; 2],
+            v: Some(v.clone()),
+            species,
+            tag,
         };
-        let names = ["A".to_owned(), "B".to_owned()];
-        let direct = Configuration::of_state(&state, &names, 3);
         let path = |name: &str| folder.path().join(name);
         state.to_data("title").write(&path("a.data")).unwrap();
         let mut file = std::fs::File::create(path("a.xyz")).unwrap();

@@ -10,13 +10,13 @@ mod configuration;
 mod error;
 mod frame;
 pub mod picture;
-mod snapshot;
+pub mod snapshot;
 mod xyz;
 
-pub use about::{About, AboutDensity, AboutStage, Column, THERMO};
+pub use about::{About, AboutDensity, AboutStage, THERMO};
 pub use animation::{animate, animation_url};
 pub use configuration::{Configuration, Which};
 pub use error::OutputError;
 pub use frame::Frame;
-pub use snapshot::{SNAPSHOTS, remove_snapshots, snapshot_name, write_snapshot};
+pub use snapshot::{remove_snapshots, write_snapshot};
 pub use xyz::{read_xyz, write_xyz};

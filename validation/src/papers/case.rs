@@ -39,7 +39,7 @@ impl Compared {
         let allowance = self.allowance.map_or(0.0, |(size, _)| size);
         let error = (self.measured.error.powi(2) + self.published.error.powi(2) + allowance.powi(2)).sqrt();
         let difference = self.measured.value - self.published.value;
-        // Numbers without errors agree or do not.
+        // Without errors only equal numbers agree.
         let right = match self.rule {
             Rule::Equal => difference == 0.0,
             Rule::AtLeast => difference >= 0.0,
@@ -48,7 +48,7 @@ impl Compared {
         if error == 0.0 && right { 0.0 } else { difference / error }
     }
 
-    /// Whether it agrees. What is not a number does not.
+    /// Whether it agrees. NaN does not.
     pub fn passes(&self) -> bool {
         let deviation = self.deviation();
         match self.rule {
@@ -73,7 +73,7 @@ impl Compared {
     }
 }
 
-/// What a case came to.
+/// The results of a case.
 #[derive(Debug, Clone, Default)]
 pub struct Outcome {
     /// The values.

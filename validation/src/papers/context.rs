@@ -19,25 +19,16 @@ pub enum Size {
 /// Why a case cannot be carried out.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say it")]
 pub enum PaperError {
-    /// A model or scene is wrong.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A run stopped.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// Theory has no answer.
     #[error(transparent)]
     Theory(#[from] TheoryError),
-    /// A file cannot be written.
     #[error("{path}: {source}")]
-    Io {
-        /// Which file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// A parameter that a case changes is not in its model.
+    Io { path: PathBuf, source: std::io::Error },
     #[error("the model has no parameter {0}")]
     Parameter(String),
 }

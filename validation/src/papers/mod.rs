@@ -15,7 +15,7 @@ mod trofimov;
 mod wang;
 mod warren;
 
-pub use case::{Compared, LIMIT, Outcome, Rule};
+pub use case::{Compared, Outcome, Rule};
 pub use context::{Context, PaperError, Size};
 
 /// A figure or table.

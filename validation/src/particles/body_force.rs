@@ -42,7 +42,7 @@ impl BodyForce {
     }
 }
 
-/// Adds the forces of `bodies` on all particles: what `on` tells of each, one after the other.
+/// Adds the forces of `bodies` on all particles; `on` computes the force of one of them on one particle.
 pub(crate) fn add<F>(bodies: &[BodyForce], pool: &Pool, force: &mut [[f64; 3]], on: F)
 where
     F: Fn(&BodyForce, usize) -> Option<[f64; 3]> + Sync,
@@ -80,17 +80,15 @@ pub struct Drive {
 mod tests {
     use crate::run::{Integrator, Simulation, State};
     use crate::scene::Scene;
+    use crate::test_support::{self, IDEAL_MIXTURE};
     use psidpd_core::engine::Want;
 
     /// A scene of two species without forces between particles, and what it starts from.
     fn scene(rest: &str) -> (Scene, State) {
-        let folder = tempfile::tempdir().unwrap();
-        let model = "title = \"ideal\"\nspecies = [\"A\", \"B\"]\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n";
-        std::fs::write(folder.path().join("m.toml"), model).unwrap();
         let text = format!(
             "model = \"m.toml\"\nkT = 1.0\nbox = [6, 6, 8]\ndensity = 3\nsteps = 1\n{rest}\n[masses]\nB = 3.0\n"
         );
-        let scene = Scene::parse("s.toml", &text, folder.path()).unwrap();
+        let scene = test_support::scene(IDEAL_MIXTURE, &text).unwrap();
         let state = scene.initial_state();
         (scene, state)
     }

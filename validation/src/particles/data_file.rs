@@ -113,7 +113,7 @@ impl State {
     }
 }
 
-/// Writes `state` as a data file, by tags, every number with the seventeen digits that bring it back unchanged.
+/// Writes `state` as a data file, by tags, with enough digits to restore the exact values.
 ///
 /// # Errors
 /// The file cannot be written.

@@ -5,6 +5,7 @@ mod box_by_edges;
 mod data_file;
 mod state;
 mod tags;
+mod thermal;
 
 pub(crate) use body_force::add as add_body_forces;
 pub use body_force::{BodyForce, Drive};
@@ -12,3 +13,4 @@ pub use data_file::{StateError, write_data};
 pub use state::State;
 pub use tags::Tags;
 pub(crate) use tags::order_of_tags;
+pub(crate) use thermal::thermal_velocities;

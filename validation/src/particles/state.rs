@@ -23,6 +23,20 @@ pub struct State {
 }
 
 impl State {
+    /// Particles of the first species at rest at `x`, with tags from 1; `mass` is that of each species.
+    pub fn at_rest(domain: PeriodicBox, mass: Vec<f64>, x: Vec<[f64; 3]>) -> State {
+        let count = x.len();
+        State {
+            domain,
+            mass,
+            x,
+            v: vec![[0.0; 3]; count],
+            species: vec![0; count],
+            tag: (1..).take(count).collect(),
+            image: vec![[0; 3]; count],
+        }
+    }
+
     /// How many particles there are.
     pub fn len(&self) -> usize {
         self.x.len()
@@ -31,6 +45,15 @@ impl State {
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.x.is_empty()
+    }
+
+    /// Takes over all particles of `other`, which is of the same box and masses, and keeps the memory.
+    pub(crate) fn copy_particles(&mut self, other: &State) {
+        self.x.clone_from(&other.x);
+        self.v.clone_from(&other.v);
+        self.species.clone_from(&other.species);
+        self.tag.clone_from(&other.tag);
+        self.image.clone_from(&other.image);
     }
 
     /// The first thing that makes this no state of a model with `species` species.

@@ -41,23 +41,14 @@ impl Tags {
 mod tests {
     use super::Tags;
     use crate::run::{Integrator, Simulation};
-    use crate::scene::Scene;
+    use crate::test_support::{SOFT, scene};
     use psidpd_core::engine::Want;
-
-    const MODEL: &str = "title = \"soft\"\nspecies = [\"A\"]\n[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\nstrength = 25\n\
-                         range = 1\n[[thermostat]]\ngamma = 4.5\nrange = 1\n";
 
     /// A frozen floor below a fluid, with a lid that reflects.
     const SCENE: &str = "model = \"m.toml\"\nkT = 1.0\ndensity = 3\nsteps = 1\n\
         [box]\nlengths = [5, 5, 7]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]\n\
         [[part]]\nshape = \"layer\"\nface = \"zlo\"\nthickness = 1\nlattice = \"fcc\"\nfrozen = true\n\
         [[part]]\nshape = \"rest\"\n";
-
-    fn scene() -> Scene {
-        let folder = tempfile::tempdir().unwrap();
-        std::fs::write(folder.path().join("m.toml"), MODEL).unwrap();
-        Scene::parse("s.toml", SCENE, folder.path()).unwrap()
-    }
 
     fn advance(run: &mut Simulation, steps: usize, integrator: Integrator) -> f64 {
         run.prepare_for(integrator, 0.01, Want::FORCES).unwrap();
@@ -71,7 +62,7 @@ mod tests {
 
     #[test]
     fn frozen_particles_stay_and_act() {
-        let scene = scene();
+        let scene = scene(SOFT, SCENE).unwrap();
         let state = scene.initial_state();
         for (_, integrator) in Integrator::ALL {
             let mut run = scene.simulation(state.clone()).unwrap();
@@ -103,7 +94,7 @@ mod tests {
     /// 10^8; the seed is fixed. Counted over all particles it would be 0.86.
     #[test]
     fn the_temperature_is_that_of_what_moves() {
-        let scene = scene();
+        let scene = scene(SOFT, SCENE).unwrap();
         let mut run = scene.simulation(scene.initial_state()).unwrap();
         advance(&mut run, 200, Integrator::VelocityVerlet);
         let mean = advance(&mut run, 1500, Integrator::VelocityVerlet);

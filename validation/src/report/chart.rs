@@ -61,7 +61,8 @@ pub(super) fn svg(
             .and_then(|()| Ok(area.present()?))
             .map_err(|e| ReportError::Plot(e.to_string()))?;
     }
-    // The root element comes from here: a size in pixels, whatever the drawing units, and a name for screen readers.
+    // Replace the root element: its size is in pixels, whatever the drawing units, and it has a name for
+    // screen readers.
     let body = drawn.find('>').and_then(|end| drawn.get(end + 1..));
     let body = body.ok_or_else(|| ReportError::Plot("the drawing has no root element".into()))?;
     Ok(format!(

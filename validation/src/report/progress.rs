@@ -52,13 +52,13 @@ impl Progress {
         let style = style(STEPS).progress_chars("━╸─").with_key(
             "rate",
             move |state: &ProgressState, to: &mut dyn std::fmt::Write| {
-                // A bar that cannot be drawn is none of the work's business.
+                // An error in drawing a bar must not stop the work.
                 let _ = to.write_str(&rate(state.per_sec(), particles));
             },
         );
         let bar = ProgressBar::with_draw_target(Some(steps), ProgressDrawTarget::hidden());
         let bar = self.add(bar, name, style);
-        // What others made says nothing of the speed: it is taken note of and forgotten.
+        // Steps of earlier sessions do not count for the speed.
         bar.inner.set_position(made);
         bar.inner.update(|_| ());
         bar.inner.reset_eta();
@@ -75,7 +75,7 @@ impl Progress {
     /// Prints a line above the bars; silent if standard error is no terminal.
     pub fn note(&self, line: &str) {
         if self.visible {
-            // A terminal that went away is no reason to stop the work.
+            // A closed terminal must not stop the work.
             let _ = self.bars.println(line);
         }
     }

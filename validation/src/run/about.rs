@@ -23,7 +23,7 @@ impl About {
         });
         let stages: Vec<AboutStage> = stages.collect();
         let [x, y, z] = scene.domain.periodic();
-        // A model that holds at no temperature of the scene has no scene.
+        // Reading the scene has checked the model at this temperature.
         let densities = scene.model.at(scene.kt).map(|f| f.densities).unwrap_or_default();
         About {
             program: format!("psidpd {}", env!("CARGO_PKG_VERSION")),

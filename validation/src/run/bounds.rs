@@ -1,19 +1,19 @@
-//! Where particles may be without anything to be done about it, and what is done beyond.
+//! The region in which a particle needs neither wrapping nor reflection, and the walls around it.
 
 use super::walls::Walls;
 use psidpd_core::engine::PeriodicBox;
 
-/// The inside of a box: along directions of periods, where [`PeriodicBox::wrap`] changes nothing; between walls,
-/// where they do not reflect.
+/// The inside of a box: along periodic directions, where [`PeriodicBox::wrap`] changes nothing; between
+/// walls, where nothing is reflected.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Bounds {
-    /// The lowest and the highest coordinate inside. In a box that leans nothing is known to be inside.
+    /// The lowest and the highest coordinate inside. In a tilted box no coordinate is known to be inside.
     pub low: [f64; 3],
     pub high: [f64; 3],
     pub walls: Walls,
 }
 
-/// Halvings of the last digit that are tried to find the end of a period.
+/// Floating-point numbers below the upper face that are tried.
 const TRIES: usize = 64;
 
 impl Bounds {

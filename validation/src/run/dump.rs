@@ -6,7 +6,7 @@ use std::io::{self, Write};
 /// are species from 1. Velocities that are not known are 0.
 ///
 /// # Errors
-/// `to` cannot be written. Boxes that are not along the axes cannot be told in this format.
+/// `to` cannot be written. Only boxes along the axes are supported.
 pub fn write_frame(frame: &Frame, to: &mut impl Write) -> io::Result<()> {
     let (origin, lengths) = (frame.domain.origin(), frame.domain.lengths());
     let ids: Vec<u32> = frame.tag.iter().map(|t| *t as u32).collect();

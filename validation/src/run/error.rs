@@ -1,4 +1,5 @@
-use crate::checkpoint::{CheckpointError, Unwritten};
+use crate::checkpoint::CheckpointError;
+use crate::files::WriteError;
 use crate::particles::StateError;
 use psidpd_core::document::FileError;
 use psidpd_core::engine::EngineError;
@@ -8,158 +9,78 @@ use std::path::{Path, PathBuf};
 /// Why a run cannot start, or stopped.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say it")]
 pub enum RunError {
-    /// The model or the scene does not hold at the temperature of a run.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A derivative of ψ is too large to compile.
     #[error(transparent)]
     TooLarge(#[from] TooLarge),
-    /// The particles are no valid state of the model.
     #[error("the initial state is not usable: {0}")]
     State(String),
-    /// Two images of a particle would share the noise of a pair.
     #[error(
         "the box is {height} wide between two faces, less than twice the range {range} of the \
          thermostat: a particle would meet two images of the same neighbour, and both pairs would \
          share their noise; use a larger box, or switch the thermostat off"
     )]
-    BoxTooNarrow {
-        /// The smallest width.
-        height: f64,
-        /// Range of the random force.
-        range: f64,
-    },
-    /// A range is many times the box.
+    BoxTooNarrow { height: f64, range: f64 },
     #[error(
         "the range {range} is {:.1} times the width {height} of the box between two faces: particles would meet \
          {images:.1e} images of each other, which take about {gigabytes:.1} GB; use a larger box or a shorter range",
         range / height
     )]
-    Reach {
-        /// The longest range of the model.
-        range: f64,
-        /// The smallest width.
-        height: f64,
-        /// How many images there would be.
-        images: f64,
-        /// What they would take.
-        gigabytes: f64,
-    },
-    /// A time step that is not a positive number.
+    Reach { range: f64, height: f64, images: f64, gigabytes: f64 },
     #[error("the time step must be a positive number, is {0}")]
     TimeStep(f64),
-    /// The forces of a step cannot be had.
     #[error("step {step}: {source}")]
-    Engine {
-        /// Number of the step.
-        step: u64,
-        /// What and which particle.
-        source: EngineError,
-    },
-    /// A velocity became NaN or infinite.
+    Engine { step: u64, source: EngineError },
     #[error(
         "step {step}: the velocity of particle {tag} is not finite: the time step is likely too large \
          for these forces"
     )]
-    Velocity {
-        /// Number of the step.
-        step: u64,
-        /// Which particle.
-        tag: i32,
-    },
-    /// A particle moved further than across the whole box in one step.
+    Velocity { step: u64, tag: i32 },
     #[error(
         "step {step}: particle {tag} moved {distance:.3e} in one step, further than across the box: \
          the time step is likely too large for these forces"
     )]
-    Runaway {
-        /// Number of the step.
-        step: u64,
-        /// Which particle.
-        tag: i32,
-        /// How far.
-        distance: f64,
-    },
-    /// The temperature is far from that of the thermostat, and stays there.
+    Runaway { step: u64, tag: i32, distance: f64 },
     #[error(
         "step {step}: the fluid has been hotter than 2 kT since step {since} and is at {ratio:.1} kT, though the thermostat \
          had time to cool it: dt = {dt} is likely too large for its forces with {integrator}; use a smaller dt, or an integrator \
          that bears larger ones (docs/integrators.md)"
     )]
-    TooHot {
-        /// Number of the step.
-        step: u64,
-        /// Step of the first sample that was too hot.
-        since: u64,
-        /// The temperature in units of that of the thermostat.
-        ratio: f64,
-        /// Δt.
-        dt: f64,
-        /// How steps are made.
-        integrator: String,
-    },
-    /// The physics of a run failed; the last good state is on disk.
+    TooHot { step: u64, since: u64, ratio: f64, dt: f64, integrator: String },
     #[error(
         "stage \"{stage}\" stopped: {cause}; the state of step {good} is in {}{}",
         saved.display(),
         if *checkpoint { ", and in the checkpoint beside it" } else { "" }
     )]
     Stopped {
-        /// Name of the stage.
         stage: String,
-        /// Why.
         #[source]
         cause: Box<RunError>,
-        /// Step of the last good state.
         good: u64,
-        /// Where it is.
         saved: PathBuf,
-        /// Whether it could also be written as a checkpoint.
         checkpoint: bool,
     },
-    /// A run could not write one of its files on the way.
     #[error("the run stopped after step {step}: {cause}")]
     Halted {
-        /// Step that the run had reached.
         step: u64,
-        /// Which file, and why.
         #[source]
         cause: Box<RunError>,
-        /// Step of the checkpoint that is on disk.
         checkpoint: Option<u64>,
     },
-    /// The folder holds a run that did not reach its end.
     #[error("{} holds a run that is not finished{}", folder.display(), reached(.step))]
-    Unfinished {
-        /// The folder.
-        folder: PathBuf,
-        /// The step that its checkpoint is of, if that can be read.
-        step: Option<u64>,
-    },
-    /// The folder is in use.
+    Unfinished { folder: PathBuf, step: Option<u64> },
     #[error("another run is writing to {}", folder.display())]
-    Busy {
-        /// The folder.
-        folder: PathBuf,
-    },
-    /// A run cannot be taken up again.
+    Busy { folder: PathBuf },
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
-    /// A data file cannot be written.
     #[error(transparent)]
     Lammps(#[from] crate::lammps::LammpsError),
-    /// A description or a picture of a run cannot be written.
     #[error(transparent)]
     Picture(#[from] crate::output::OutputError),
-    /// A file or folder cannot be written.
     #[error("{} cannot be written: {source}", path.display())]
-    Output {
-        /// The file or folder.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
+    Output { path: PathBuf, source: std::io::Error },
 }
 
 impl From<StateError> for RunError {
@@ -168,9 +89,9 @@ impl From<StateError> for RunError {
     }
 }
 
-impl From<Unwritten> for RunError {
-    fn from(Unwritten { path, source }: Unwritten) -> RunError {
-        RunError::Output { path, source }
+impl From<WriteError> for RunError {
+    fn from(WriteError { path, cause }: WriteError) -> RunError {
+        RunError::Output { path, source: cause }
     }
 }
 

@@ -17,7 +17,7 @@ impl Folder {
         let lock = File::open(path).map_err(RunError::output(path))?;
         match flock(&lock, FlockOperation::NonBlockingLockExclusive) {
             Err(rustix::io::Errno::WOULDBLOCK) => Err(RunError::Busy { folder: path.to_owned() }),
-            // Some file systems have no locks; they shall have runs.
+            // Some file systems have no locks: run there without one.
             _ => Ok(Folder { path: path.to_owned(), _lock: lock }),
         }
     }

@@ -5,6 +5,7 @@ use super::error::RunError;
 use super::growing::GrowingFile;
 use super::thermo::ThermoFile;
 use crate::checkpoint::Thermo;
+use crate::files::remove_if_there;
 use crate::observe::{Observation, write_csv, write_json};
 use crate::output::{About, Frame, remove_snapshots, write_xyz};
 use crate::scene::Scene;
@@ -19,7 +20,7 @@ const DUMP: &str = "dump.lammpstrj";
 /// The name of the extended XYZ file.
 const XYZ: &str = "trajectory.xyz";
 
-/// What a run writes at its end, however it ends.
+/// Files that are written when a run ends, finished or not.
 const LAST: [&str; 5] = ["final.data", "last-good.data", OBSERVABLES, "summary.json", "report.html"];
 
 /// What was observed.
@@ -60,7 +61,7 @@ impl Output {
         Ok(Output { thermo: thermo.transpose()?, dump: dump.transpose()?, xyz: xyz.transpose()? })
     }
 
-    /// Writes a row of totals, if they are wanted; says whether they are.
+    /// Writes a row of totals if the scene wants them, and returns whether it does.
     pub fn row(&mut self, thermo: &Thermo) -> Result<bool, RunError> {
         match &mut self.thermo {
             None => Ok(false),
@@ -132,14 +133,11 @@ fn remove_tables(folder: &Path) -> Result<(), RunError> {
     }
 }
 
-/// What an earlier run, or an earlier end of this one, left is not of this one.
+/// Removes files of an earlier run, or of an earlier end of this one.
 fn remove(folder: &Path, names: &[&str]) -> Result<(), RunError> {
     for name in names {
         let path = folder.join(name);
-        match std::fs::remove_file(&path) {
-            Err(error) if error.kind() != ErrorKind::NotFound => return Err(RunError::output(&path)(error)),
-            _ => {}
-        }
+        remove_if_there(&path).map_err(RunError::output(&path))?;
     }
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! Ranges beyond the box, which particles see as images of each other.
+//! Ranges longer than the box, for which particles interact with periodic images.
 
 use super::RunError;
 use psidpd_core::engine::PeriodicBox;
@@ -21,7 +21,7 @@ pub fn check(domain: &PeriodicBox, dimensions: usize, range: f64, particles: usi
     let mut copies = 1.0;
     let mut height = f64::INFINITY;
     for h in heights {
-        // Those that are wide enough for the range need no images.
+        // Directions wide enough for the range need no images.
         copies *= if 2.0 * range < h { 1.0 } else { 1.0 + 2.0 * range / h };
         height = height.min(h);
     }

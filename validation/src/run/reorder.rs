@@ -1,32 +1,32 @@
-//! Particles in memory as they are in space: neighbours find each other in the cache, and the engine reads and
-//! writes the host's arrays nearly from end to end.
+//! Keeps particles in memory in the order of their cells: neighbours share the cache, and the engine reads
+//! and writes the host's arrays almost sequentially.
 
 use psidpd_core::engine::{Pool, part};
 use std::iter::Map;
 use std::slice::Iter;
 
-/// Steps from one time to the next. Particles then have moved about a third of the range of their forces, mostly
-/// to a row of bins that is still near in memory.
+/// Steps between reorderings. In that time particles move about a third of the range of their forces, mostly
+/// into a cell column that is still near in memory.
 pub(crate) const INTERVAL: u64 = 32;
 
-/// Whether the particles are brought into order at the end of a step. It depends on nothing but its number, so
-/// that a run that goes on from a checkpoint does it at the same steps; these are odd, unlike those that
-/// observables are usually sampled at.
+/// Whether particles are reordered at the end of a step. That depends on the step number only, so that a
+/// resumed run reorders at the same steps. They are odd, because observables are usually sampled at even
+/// ones.
 pub(super) fn is_due(step: u64) -> bool {
     step % INTERVAL == 1
 }
 
-/// Reads whole numbers.
+/// Converts a scratch vector back to integers.
 type Whole = fn(&[f64; 3]) -> [i32; 3];
 
-/// Brings arrays into an order, one after the other through the same memory.
+/// Permutes arrays, one after the other through the same scratch memory.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Reordering {
     scratch: Vec<[f64; 3]>,
 }
 
 impl Reordering {
-    /// Puts vector `order[k]` at `k`. What is behind the vectors that `order` counts is lost.
+    /// Moves vector `order[k]` to `k`.
     pub fn vectors(&mut self, pool: &Pool, order: &[u32], vectors: &mut Vec<[f64; 3]>) {
         self.gather(pool, order, |k| vectors[k]);
         std::mem::swap(&mut self.scratch, vectors);

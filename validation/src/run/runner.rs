@@ -36,7 +36,7 @@ pub struct Progress<'a> {
     pub deviations: &'a [Deviation],
 }
 
-/// How a run deals with what is in its folder.
+/// What to do with an earlier run in the folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Begin {
     /// From the first step; a run that is not finished is left alone.
@@ -180,7 +180,7 @@ impl<'a> Runner<'a> {
         };
         let good = Checkpoint { program: PROGRAM.into(), ..good };
         let timing = Timing::read(folder.path());
-        // What the folder says of itself does not depend on where a run stopped.
+        // `about.json` does not depend on where a run stopped.
         if !folder.path().join("about.json").is_file() {
             About::of(scene).write(folder.path())?;
         }
@@ -265,7 +265,7 @@ fn usable(
     if !fits {
         return Err(CheckpointError::Damaged { path, what: "its parts do not fit together".into() });
     }
-    // A finished run needs its files no more; whoever wants room may have moved them.
+    // A finished run no longer needs its files; the user may have moved them.
     for (name, expected) in checkpoint.files.iter().filter(|_| !checkpoint.finished) {
         let file = out.join(name);
         let found = file.metadata().map_or(0, |m| m.len());

@@ -4,7 +4,7 @@ use serde::Serialize;
 use std::io::Write;
 use std::path::Path;
 
-/// What a run came to; also `summary.json`. The same however often the run was interrupted: times are in
+/// Summary of the results of a run; also `summary.json`. It does not depend on interruptions: times are in
 /// [`Timing`](super::Timing).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {

@@ -1,5 +1,6 @@
 use super::*;
 use crate::scene::Scene;
+use crate::test_support::{self, IDEAL, IDEAL_MIXTURE, SET6};
 use psidpd_core::document::FileError;
 use psidpd_core::engine::Want;
 use psidpd_core::model::Model;
@@ -9,16 +10,6 @@ mod integrators;
 mod order;
 mod resume;
 mod steps;
-
-const SET6: &str = include_str!("../../models/warren2003-set6.toml");
-
-const IDEAL: &str = r#"
-title = "ideal gas"
-species = ["A"]
-[[thermostat]]
-gamma = 4.5
-range = 1.0
-"#;
 
 const VAN_DER_WAALS: &str = r#"
 title = "flat van der Waals"
@@ -39,13 +30,11 @@ range = 1.0
 
 /// A scene of `model` in `lengths`, with the given stages and output.
 fn scene_of(model: &str, lengths: &str, density: f64, rest: &str) -> Result<Scene, FileError> {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("m.toml"), model).unwrap();
     let text = format!(
         "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7\n[box]\nlengths = {lengths}\n\
          [initial]\nkind = \"random\"\ndensity = {density}\n{rest}"
     );
-    Scene::parse("s.toml", &text, folder.path())
+    test_support::scene(model, &text)
 }
 
 const ONE_STAGE: &str =
@@ -59,11 +48,9 @@ fn simulation(model: &str, state: State) -> Simulation {
     Simulation::new(&Model::parse("m.toml", model).unwrap(), 1.0, state, 7).unwrap()
 }
 
-fn advance(simulation: &mut Simulation, steps: usize, dt: f64, integrator: Integrator) {
+fn advance(simulation: &mut Simulation, steps: u64, dt: f64, integrator: Integrator) {
     simulation.prepare(dt, Want::FORCES).unwrap();
-    for _ in 0..steps {
-        simulation.step(dt, integrator, Want::FORCES).unwrap();
-    }
+    simulation.advance(steps, dt, integrator).unwrap();
 }
 
 /// Set 6 in a small box, settled.
@@ -385,10 +372,10 @@ fn state_of_narrow() -> State {
 /// A heavy species moves as its mass says: the temperature is that of both.
 #[test]
 fn masses_count() {
-    let model = IDEAL.replace("[\"A\"]", "[\"A\", \"B\"]");
+    let model = IDEAL_MIXTURE;
     let rest = ONE_STAGE.to_owned() + "[masses]\nB = 5.0\n";
-    let state = scene_of(&model, "[4.0, 4.0, 4.0]", 4.0, &rest).unwrap().initial_state();
-    let mut run = simulation(&model, state);
+    let state = scene_of(model, "[4.0, 4.0, 4.0]", 4.0, &rest).unwrap().initial_state();
+    let mut run = simulation(model, state);
     advance(&mut run, 200, 0.02, Integrator::VelocityVerlet);
     let (mean, error) = mean_temperature(&mut run, 20, 50, 0.02);
     assert!((mean - 1.0).abs() < 6.0 * error + 0.005, "{mean} +- {error}");

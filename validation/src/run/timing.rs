@@ -1,4 +1,4 @@
-//! What a run took: apart from everything else that it writes, as no two runs take the same time.
+//! Wall times of a run, in a file of their own because they differ from run to run.
 
 use super::error::RunError;
 use serde::{Deserialize, Serialize};
@@ -16,7 +16,7 @@ pub struct Timing {
 pub struct Session {
     /// The step it began after.
     pub from_step: u64,
-    /// The last step that is told of.
+    /// The last step it counts.
     pub to_step: u64,
     /// Wall time from one to the other, output included, in seconds.
     pub wall_seconds: f64,
@@ -27,7 +27,7 @@ pub struct Session {
 impl Timing {
     pub(super) const NAME: &str = "timing.json";
 
-    /// What earlier sessions took; nothing if that is not known.
+    /// The times of earlier sessions; empty if they are unknown.
     pub(super) fn read(folder: &Path) -> Timing {
         let text = std::fs::read_to_string(folder.join(Self::NAME)).ok();
         text.and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_default()

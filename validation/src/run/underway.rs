@@ -99,7 +99,7 @@ impl<'a> Run<'a> {
             while self.position.done < stage.steps {
                 self.step(stage, progress)?;
                 let stop = stop.load(Ordering::Relaxed);
-                // At its last step a run has come to its end by itself.
+                // After its last step a run ends anyway.
                 if stop != 0 && self.simulation.step_number() < self.steps {
                     self.checkpoint()?;
                     let step = self.simulation.step_number();
@@ -124,7 +124,7 @@ impl<'a> Run<'a> {
         self.position.entered = true;
         if self.simulation.step_number() == 0 {
             self.report(stage, true, progress)?;
-            // What the disk thinks of this run is better known before the first step than later.
+            // Finds out before the first step whether checkpoints can be written.
             if self.scene.output.checkpoint != Some(0) {
                 self.checkpoint()?;
             }
@@ -162,7 +162,7 @@ impl<'a> Run<'a> {
             Some(interval) => every(interval, number),
             None => self.checkpointed.elapsed() >= self.interval,
         };
-        // A run that comes to its end writes one then.
+        // The end of a run writes its own.
         if due && number < self.steps { self.checkpoint() } else { Ok(()) }
     }
 
@@ -259,7 +259,7 @@ impl<'a> Run<'a> {
         self.tell_time(self.good.step)
     }
 
-    /// Writes what this session took up to `step`.
+    /// Writes the times of this session up to `step`.
     fn tell_time(&self, step: u64) -> Result<(), RunError> {
         self.timing_until(step).write(self.folder.path())
     }
@@ -273,7 +273,7 @@ impl<'a> Run<'a> {
             from_step,
             to_step: step,
             wall_seconds,
-            // A clock may stand still, and infinity is no JSON.
+            // The clock may not have advanced, and JSON has no infinity.
             particle_steps_per_second: made / wall_seconds.max(1e-9),
         });
         timing
@@ -283,7 +283,7 @@ impl<'a> Run<'a> {
     pub fn stop(&mut self, cause: RunError) -> RunError {
         let step = self.simulation.step_number();
         if cause.is_output() {
-            // There may be room for a newer checkpoint; if not, that of before is still there.
+            // A newer checkpoint may fit on the disk; if not, the old one is still there.
             if self.stored != Some(self.good.step) {
                 let _ = self.store_good();
             }
@@ -299,7 +299,7 @@ impl<'a> Run<'a> {
                 saved,
                 checkpoint,
             },
-            // The physics failed first, and says more.
+            // The physics failed first, and its error tells more.
             Err(_) => cause,
         }
     }

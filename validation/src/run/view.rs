@@ -1,4 +1,4 @@
-//! What others see of a simulation.
+//! Views of a simulation for observables and files.
 
 use super::simulation::Simulation;
 use crate::observe::frame::View;

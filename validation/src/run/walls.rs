@@ -55,29 +55,18 @@ impl Walls {
 #[cfg(test)]
 mod tests {
     use crate::run::{Integrator, Simulation, State};
+    use crate::test_support::{IDEAL, SOFT};
     use psidpd_core::engine::{PeriodicBox, Want};
     use psidpd_core::model::Model;
-
-    const IDEAL: &str = "title = \"ideal\"\nspecies = [\"A\"]\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n";
-
-    const SOFT: &str = "title = \"soft\"\nspecies = [\"A\"]\n[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\nstrength = 25\n\
-                        range = 1\n";
 
     fn state(periodic: [bool; 3], count: usize) -> State {
         // Points and velocities without pattern; the fractional parts of multiples of irrational numbers.
         let irrational = [2f64.sqrt(), 3f64.sqrt(), 5f64.sqrt(), 7f64.sqrt(), 11f64.sqrt(), 13f64.sqrt()];
         let part = |k: usize, c: usize| (k as f64 * irrational[c]).fract();
-        State {
-            domain: PeriodicBox::orthogonal([-1.0, 0.0, 2.0], [3.0, 4.0, 5.0], periodic).unwrap(),
-            mass: vec![1.0],
-            x: (0..count)
-                .map(|k| [3.0 * part(k, 0) - 1.0, 4.0 * part(k, 1), 2.0 + 5.0 * part(k, 2)])
-                .collect(),
-            v: (0..count).map(|k| std::array::from_fn(|c| 4.0 * part(k, 3 + c) - 2.0)).collect(),
-            species: vec![0; count],
-            tag: (1..=count as i32).collect(),
-            image: vec![[0; 3]; count],
-        }
+        let domain = PeriodicBox::orthogonal([-1.0, 0.0, 2.0], [3.0, 4.0, 5.0], periodic).unwrap();
+        let point = |k| [3.0 * part(k, 0) - 1.0, 4.0 * part(k, 1), 2.0 + 5.0 * part(k, 2)];
+        let v = (0..count).map(|k| std::array::from_fn(|c| 4.0 * part(k, 3 + c) - 2.0)).collect();
+        State { v, ..State::at_rest(domain, vec![1.0], (0..count).map(point).collect()) }
     }
 
     /// A free particle between two walls goes as the triangle wave of one that nothing stops.
@@ -89,9 +78,7 @@ mod tests {
             let mut run = Simulation::new(&model, 1.0, start.clone(), 1).unwrap();
             run.set_thermostat(false);
             run.prepare(0.01, Want::FORCES).unwrap();
-            for _ in 0..700 {
-                run.step(0.01, integrator, Want::FORCES).unwrap();
-            }
+            run.advance(700, 0.01, integrator).unwrap();
             let fold = |x: f64, low: f64, length: f64| {
                 let s = ((x - low) / length).rem_euclid(2.0);
                 (low + length * if s > 1.0 { 2.0 - s } else { s }, if s > 1.0 { -1.0 } else { 1.0 })
@@ -115,6 +102,7 @@ mod tests {
         let model = Model::parse("m", SOFT).unwrap();
         let deviation = |dt: f64| {
             let mut run = Simulation::new(&model, 1.0, state([false; 3], 180), 1).unwrap();
+            run.set_thermostat(false);
             run.prepare(dt, Want::TOTALS).unwrap();
             let energy = |run: &Simulation| run.potential_energy() + run.kinetic_energy();
             let first = energy(&run);

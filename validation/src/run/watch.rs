@@ -1,9 +1,9 @@
-//! Looks after the temperature of a run: warns where it leaves its target, and stops a run that is far off.
+//! Watches the temperature of a run: warns if it deviates from the target, and stops a run that is far off.
 //!
 //! The temperature is that of the relative velocities which drag and noise act on: a drop that flies, or a flow, has
 //! its thermal one. It is sampled a few times in a stage, and every [`INTERVAL`] steps in a long one, at less than a hundredth of the
 //! cost of the steps; what is sampled changes no step. The temperature of configurations, which errors of the
-//! forces change most, comes every [`RARE`] steps.
+//! forces change most, comes every [`RARE`] steps, and at the end of a stage of [`WORTH_A_LOOK`] or more.
 
 use super::error::RunError;
 use super::simulation::Simulation;
@@ -30,6 +30,10 @@ const IN_A_ROW: u64 = 4;
 
 /// Relative deviation that is not worth a warning.
 const TOLERANCE: f64 = 0.02;
+
+/// A stage of so many steps has a temperature of configurations at its end, even if it is short: where the thermostat keeps
+/// velocities right at any time step, nothing else shows that the step is too long.
+const WORTH_A_LOOK: u64 = 1000;
 
 /// How a temperature was measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -84,7 +88,7 @@ impl Watch {
     /// Whether a sample is due after step `done` of a stage.
     pub fn is_due(stage: &Stage, done: u64) -> bool {
         let interval = (stage.steps / SAMPLES).clamp(LEAST, INTERVAL);
-        stage.thermostat && (done.is_multiple_of(interval) || done.is_multiple_of(RARE))
+        stage.thermostat && (done.is_multiple_of(interval) || looks_at_forces(stage, done))
     }
 
     /// Takes a sample; the step must be at its end.
@@ -92,7 +96,7 @@ impl Watch {
         let Some(warmth) = simulation.warmth(stage.dt)? else { return Ok(()) };
         let ratio = warmth.kt / stage.kt;
         self.kinetic.push(ratio);
-        if done.is_multiple_of(RARE)
+        if looks_at_forces(stage, done)
             && let Some(sums) = configurational(simulation)
         {
             self.configurational.push(sums);
@@ -118,7 +122,7 @@ impl Watch {
         Ok(())
     }
 
-    /// What is to be said at the end of a stage.
+    /// Deviations to report at the end of a stage.
     pub fn deviations(&self, simulation: &Simulation, stage: &Stage) -> Vec<Deviation> {
         let deviation = |thermometer, [mean, error]: [f64; 2]| {
             let off = (mean - 1.0).abs() > TOLERANCE + 3.0 * error;
@@ -126,7 +130,7 @@ impl Watch {
         };
         let mut found = Vec::new();
         if stage.level.is_some() {
-            // A level of a ramp is on its way.
+            // A level of a ramp is not in equilibrium.
             return found;
         }
         let settled = &self.kinetic[self.kinetic.len() / 3..];
@@ -137,7 +141,7 @@ impl Watch {
         if !settled.is_empty() {
             let [squares, laplacians] =
                 [0, 1].map(|k| settled.iter().map(|s| s[k]).sum::<f64>() / settled.len() as f64);
-            // One sample has an error of its own: about that of so many free particles.
+            // The error of one sample is about that of as many free particles.
             let freedom = (simulation.dimensions() * simulation.mobile() * settled.len()) as f64;
             let mean = squares / laplacians / stage.kt;
             found
@@ -147,12 +151,19 @@ impl Watch {
     }
 }
 
-/// Mean and standard error.
+/// Whether a temperature of configurations is due.
+fn looks_at_forces(stage: &Stage, done: u64) -> bool {
+    let end = done == stage.steps && done >= WORTH_A_LOOK && stage.level.is_none();
+    done.is_multiple_of(RARE) || end
+}
+
+/// Mean and standard error, the latter larger for few samples, whose scatter says little of itself: 1.6 times for six of them, 1.2
+/// times for twenty. By Student's t three of these are then exceeded by chance once in two hundred stages.
 fn estimate(samples: &[f64]) -> [f64; 2] {
     let n = samples.len() as f64;
     let mean = samples.iter().sum::<f64>() / n;
     let variance = samples.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    [mean, (variance / n).sqrt()]
+    [mean, (1.0 + 3.0 / (n - 1.0)) * (variance / n).sqrt()]
 }
 
 /// `Σ F·F` and `Σ ∇²U`, if there is a temperature of configurations.
@@ -164,4 +175,19 @@ fn configurational(simulation: &Simulation) -> Option<[f64; 2]> {
     let evaluator = Evaluator::new(fluid).ok()?;
     let [squares, laplacians] = configurational::sums(&Frame::new(simulation.view(0.0), &evaluator));
     (laplacians > 0.0).then_some([squares, laplacians])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::estimate;
+
+    #[test]
+    fn few_samples_are_trusted_less() {
+        let samples = |n: usize| (0..n).map(|k| if k % 2 == 0 { 0.9 } else { 1.1 }).collect::<Vec<f64>>();
+        for (n, factor) in [(6, 1.6), (16, 1.2)] {
+            let [mean, error] = estimate(&samples(n));
+            let plain = 0.1 / (n as f64 - 1.0).sqrt();
+            assert!((mean - 1.0).abs() < 1e-12 && (error / plain - factor).abs() < 1e-12, "{n}: {error}");
+        }
+    }
 }

@@ -1,8 +1,12 @@
 //! Every key of the scene file, in one table: the JSON schema for editors and the reference
 //! `docs/scene-file.md` are written from it, and tests hold the reader to it.
 
+// A key takes a few lines here, and eight in the format of others.
+#[rustfmt::skip]
 mod particles;
+#[rustfmt::skip]
 mod run;
+#[rustfmt::skip]
 mod scene;
 
 pub use particles::{INITIAL, PART};
@@ -15,6 +19,7 @@ use psidpd_core::document::keys::{form_key, key};
 /// Every table, in the order of the documentation. What `[observe]` may have is described elsewhere.
 pub const TABLES: &[Table] = &[TOP, BOX, MASSES, INITIAL, PART, BODY_FORCE, STAGE, OUTPUT];
 
-fn axes() -> Vec<&'static str> {
-    super::number::AXES.iter().map(|(name, _)| *name).collect()
+/// The first of each pair.
+fn names<T>(all: &[(&'static str, T)]) -> Vec<&'static str> {
+    all.iter().map(|(name, _)| *name).collect()
 }

@@ -57,11 +57,11 @@ pub struct Scene {
     pub model_path: PathBuf,
     /// The model.
     pub model: Model,
-    /// kT, of the initial velocities and of every stage that does not say otherwise.
+    /// kT of the initial velocities, and the default of every stage.
     pub kt: f64,
     /// Seed of the initial state and of the noise.
     pub seed: u64,
-    /// In what a run computes pairs, if the scene says.
+    /// Precision of the pair forces of a run, if the scene gives it.
     pub precision: Option<Precision>,
     /// The box.
     pub domain: PeriodicBox,
@@ -146,7 +146,7 @@ impl Scene {
         fill::fill(self).0
     }
 
-    /// In what a run of the scene computes pairs: mixed precision unless it says otherwise.
+    /// Precision of the pair forces of a run; mixed by default.
     pub fn precision(&self) -> Precision {
         self.precision.unwrap_or_default()
     }
@@ -169,7 +169,7 @@ impl Scene {
         counts.into_iter().map(|n| n as f64 / volume).collect()
     }
 
-    /// Refuses parts in which particles cannot keep the distance they should.
+    /// Refuses parts without room for their particles at the minimum distance.
     fn check_room(&self, document: &Document) -> Result<(), FileError> {
         let apart =
             |p: &Part| matches!(p.arrangement, Arrangement::Random { min_distance } if min_distance > 0.0);

@@ -31,8 +31,8 @@ impl Format {
     }
 }
 
-/// The particles and the box of a file. `periodic` says what the box does at its faces; without it they do what they
-/// did before in a checkpoint, and data files are periodic.
+/// The particles and the box of a file. `periodic` sets the boundaries; if left out, a checkpoint keeps its
+/// own and data files are periodic.
 ///
 /// # Errors
 /// The file cannot be read, or is no state of `model`; in words.

@@ -2,7 +2,7 @@
 
 use super::number::positive;
 use super::ramp;
-use crate::run::{Integrator, THERMOSTAT_STEPS};
+use crate::integrator::{Integrator, THERMOSTAT_STEPS};
 use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
 use psidpd_core::engine::noise::Law;
 
@@ -43,7 +43,7 @@ const MOST_STEPS: u64 = 1 << 53;
 /// Δt of stages that give none.
 const DEFAULT_DT: f64 = 0.01;
 
-/// What stages do that do not say.
+/// Values of keys that a stage leaves out.
 #[derive(Debug, Clone, Copy)]
 struct Defaults {
     kt: f64,

@@ -43,18 +43,12 @@ pub const TEMPLATES: &[Template] = &[
 /// Why a template was not written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say it")]
 pub enum TemplateError {
-    /// Something else is there already.
     #[error("{} is there already: choose another name, or remove it", .0.display())]
     Exists(PathBuf),
-    /// A file cannot be written.
     #[error("{} cannot be written: {source}", path.display())]
-    Output {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
+    Output { path: PathBuf, source: std::io::Error },
 }
 
 impl Template {

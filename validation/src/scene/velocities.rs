@@ -1,14 +1,13 @@
 //! `velocities` of what is filled.
 
+use crate::particles::thermal_velocities;
 use chacha20::ChaCha8Rng;
 use psidpd_core::document::{FileError, Section};
-use rand_distr::{Distribution, StandardNormal};
 
 /// How particles move at the start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Velocities {
-    /// Maxwell's distribution at the temperature of the scene, with the momentum of the part taken out. The
-    /// velocities are not scaled: their temperature fluctuates as that of a canonical ensemble.
+    /// Maxwell's distribution at the temperature of the scene, with the momentum of the part taken out.
     #[default]
     Thermal,
     /// Not at all.
@@ -24,7 +23,7 @@ impl Velocities {
         }
     }
 
-    /// The same for a file, whose velocities may be kept: `None`, and what is meant by saying nothing if `keep`.
+    /// The same for a start from a file: `None` keeps its velocities, which is the default if `keep` is set.
     pub(super) fn read_or_keep(initial: &Section, keep: bool) -> Result<Option<Velocities>, FileError> {
         let names =
             [("thermal", Some(Velocities::Thermal)), ("zero", Some(Velocities::Zero)), ("keep", None)];
@@ -37,30 +36,14 @@ impl Velocities {
     /// Velocities of particles of the masses `mass`.
     pub(super) fn draw(
         self,
-        mass: impl Iterator<Item = f64> + Clone,
+        mass: impl Iterator<Item = f64>,
         kt: f64,
         dimensions: usize,
         random: &mut ChaCha8Rng,
     ) -> Vec<[f64; 3]> {
-        let mut v: Vec<[f64; 3]> = mass.clone().map(|_| [0.0; 3]).collect();
-        if self == Velocities::Zero {
-            return v;
+        match self {
+            Velocities::Thermal => thermal_velocities(mass, kt, dimensions, random),
+            Velocities::Zero => mass.map(|_| [0.0; 3]).collect(),
         }
-        let (mut momentum, mut total) = ([0.0; 3], 0.0);
-        for (v, m) in v.iter_mut().zip(mass) {
-            let width = (kt / m).sqrt();
-            for c in 0..dimensions {
-                let normal: f64 = StandardNormal.sample(random);
-                v[c] = width * normal;
-                momentum[c] += m * v[c];
-            }
-            total += m;
-        }
-        for v in &mut v {
-            for c in 0..dimensions {
-                v[c] -= momentum[c] / total;
-            }
-        }
-        v
     }
 }

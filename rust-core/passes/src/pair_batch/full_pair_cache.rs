@@ -12,9 +12,10 @@ use crate::ground::arithmetic::{Arithmetic, PackedParticle, PairVector};
 use crate::ground::terms::Pass;
 use crate::simd::{Isa, Reals, Scalar, Words};
 use psidpd_model::kernel::{Shape, ShapeVisitor};
+use std::mem::MaybeUninit;
 
 /// The pairs of a plane, field by field. The pairs of each batch begin with a whole vector of every field.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Default)]
 pub struct FullPairCache<T> {
     /// `r_i − r_j` ([`SEPARATION`]); the force that needs no density, over `r` ([`FORCE`]); `−w′(r)/r` of each density
     /// ([`WEIGHT_GRADIENT`]); last the pair weight, if virials are wanted.
@@ -39,10 +40,10 @@ pub const WEIGHT_GRADIENT: usize = 4;
 /// The bits of a code that tell the i-particle.
 pub const I_CODE_BITS: u32 = 4;
 
-/// Sixteen numbers.
-#[derive(Debug, Clone, Copy)]
+/// Sixteen numbers. Lanes behind the last pair of a batch may never be written, nor are they read then.
+#[derive(Debug)]
 #[repr(C, align(64))]
-pub struct CacheVector<T>([T; 16]);
+pub struct CacheVector<T>([MaybeUninit<T>; 16]);
 
 /// A batch in the cache.
 #[derive(Debug, Clone, Copy)]
@@ -84,24 +85,18 @@ impl<T: Scalar> FullPairCache<T> {
     }
 
     /// Makes room for `more` pairs, and a vector behind.
-    ///
-    /// # Safety
-    /// All vectors before the end have been written.
     #[inline(always)]
-    unsafe fn reserve(&mut self, more: usize) {
+    fn reserve(&mut self, more: usize) {
         let more = more / 16 + 2;
         if self.room - self.end < more {
-            // SAFETY: the caller upholds it.
-            unsafe { self.grow(more) }
+            self.grow(more);
         }
     }
 
-    /// # Safety
-    /// As [`FullPairCache::reserve`].
     #[cold]
     #[inline(never)]
-    unsafe fn grow(&mut self, more: usize) {
-        // SAFETY: vectors before the end are initialised, says the caller, and inside the capacity (`reserve`).
+    fn grow(&mut self, more: usize) {
+        // SAFETY: `end` is within the capacity of every field (`reserve`); vectors of `MaybeUninit` need not be written.
         unsafe {
             for field in &mut self.fields {
                 field.set_len(self.end);

@@ -11,7 +11,7 @@ use crate::simd::{Isa, OFFSET_BITS, Reals, Scalar, Words};
 use psidpd_model::kernel::{Shape, ShapeVisitor};
 
 /// What the first pass of a plane leaves for the second: a compact list for each density, or the full pair cache.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Default)]
 pub struct InRangePairs<T> {
     /// For each density a quad for each pair: `−w′ ê`, and a code of both particles.
     pub weight_gradients: Vec<QuadList<T>>,

@@ -1,7 +1,7 @@
 //! Random and dissipative forces of pairs.
 
 use crate::ground::arithmetic::PairVector;
-use crate::ground::species_pairs::{SpeciesPairTable, TableLookup};
+use crate::ground::species_pairs::{SpeciesPair, SpeciesPairTable, TableLookup};
 use crate::ground::terms::{Exponent, ThermostatTables};
 use crate::noise::{PAIR_ROUNDS, PARITY, PairNoise, ROTATIONS};
 use crate::simd::{Reals, Scalar, Words};
@@ -82,10 +82,53 @@ unsafe fn inject<W: Words>(x0: [W; 2], x1: [W; 2], schedule: &[W; 3], number: us
 pub struct ThermostatForce<'a, R: Reals> {
     gamma: TableLookup<R>,
     sigma: TableLookup<R>,
-    inverse_range: TableLookup<R>,
-    exponent: Power<'a, R::Scalar>,
+    weight: ThermostatWeight<'a, R>,
     /// Signed words of noise times this are `ξ dt^{−1/2}`.
     noise_scale: R,
+}
+
+/// The weight `w_R(r) = (1 − r/R)^e`, zero beyond the range, prepared for a loop over pairs.
+pub struct ThermostatWeight<'a, R: Reals> {
+    inverse_range: TableLookup<R>,
+    exponent: Power<'a, R::Scalar>,
+}
+
+impl<'a, R: Reals> ThermostatWeight<'a, R> {
+    /// # Safety
+    /// The contract of `simd`.
+    #[inline(always)]
+    pub unsafe fn new(
+        inverse_range: &SpeciesPairTable<R::Scalar>,
+        exponent: &'a Exponent<R::Scalar>,
+    ) -> ThermostatWeight<'a, R> {
+        ThermostatWeight {
+            // SAFETY: the caller upholds it.
+            inverse_range: unsafe { TableLookup::new(inverse_range) },
+            exponent: match exponent {
+                Exponent::One => Power::One,
+                Exponent::Two => Power::Two,
+                Exponent::Any(table) => Power::Any(table),
+            },
+        }
+    }
+
+    /// # Safety
+    /// The contract of `simd`.
+    #[inline(always)]
+    pub unsafe fn weight<const MULTISPECIES: bool>(&self, r: R, species_pair: SpeciesPair<R>) -> R {
+        // SAFETY: the caller upholds it.
+        unsafe {
+            let t = R::constant(1.0) - r * self.inverse_range.lookup::<MULTISPECIES>(species_pair);
+            let t = t.larger(R::constant(0.0));
+            match self.exponent {
+                Power::One => t,
+                Power::Two => t * t,
+                Power::Any(exponent) => {
+                    power(t, TableLookup::<R>::new(exponent).lookup::<MULTISPECIES>(species_pair))
+                }
+            }
+        }
+    }
 }
 
 /// The exponent of `w_R`, the power of `1 − r/R`.
@@ -105,12 +148,7 @@ impl<'a, R: Reals> ThermostatForce<'a, R> {
             ThermostatForce {
                 gamma: TableLookup::new(&tables.gamma),
                 sigma: TableLookup::new(&tables.sigma),
-                inverse_range: TableLookup::new(&tables.inverse_range),
-                exponent: match &tables.exponent {
-                    Exponent::One => Power::One,
-                    Exponent::Two => Power::Two,
-                    Exponent::Any(table) => Power::Any(table),
-                },
+                weight: ThermostatWeight::new(&tables.inverse_range, &tables.exponent),
                 noise_scale,
             }
         }
@@ -124,17 +162,8 @@ impl<'a, R: Reals> ThermostatForce<'a, R> {
     pub unsafe fn force<const MULTISPECIES: bool>(&self, pairs: &PairVector<R>, word: R::Words) -> R {
         // SAFETY: the caller upholds it.
         unsafe {
-            let (one, zero) = (R::constant(1.0), R::constant(0.0));
             let species_pair = pairs.species_pair;
-            let t = (one - pairs.geometry.r * self.inverse_range.lookup::<MULTISPECIES>(species_pair))
-                .larger(zero);
-            let w = match self.exponent {
-                Power::One => t,
-                Power::Two => t * t,
-                Power::Any(exponent) => {
-                    power(t, TableLookup::<R>::new(exponent).lookup::<MULTISPECIES>(species_pair))
-                }
-            };
+            let w = self.weight.weight::<MULTISPECIES>(pairs.geometry.r, species_pair);
             let xi = (R::of_signed(word) + R::constant(0.5))
                 * (self.noise_scale * self.sigma.lookup::<MULTISPECIES>(species_pair));
             w * (xi - self.gamma.lookup::<MULTISPECIES>(species_pair) * w * pairs.geometry.radial_velocity)

@@ -3,6 +3,8 @@
 pub mod buffers;
 pub mod data;
 pub mod first;
+pub mod list;
 pub mod second;
 pub mod second_cached;
 pub mod slopes;
+pub mod traversal;

@@ -5,13 +5,18 @@
 //! The crate `psidpd_passes` has the loops over cells and pairs, `psidpd_threads` the threads. Here are
 //!
 //! - [`terms`]: the plan as tables of numbers for those loops.
+//! - [`region`]: the region that is swept, and its cells.
 //! - [`workspace`]: arrays, sorting, ψ, and the scheduler that sends planes through the passes.
+//! - [`pair_lists`]: lists of the pairs in a range, for the thermostat apart from the forces.
 //! - [`Sweep`]: what hosts see.
 
+mod pair_lists;
+mod region;
 mod terms;
 mod times;
 mod workspace;
 
+pub(super) use pair_lists::{PairLists, PlanePairs};
 pub use psidpd_threads::{Pool, part};
 pub use times::Times;
 
@@ -30,10 +35,11 @@ use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::noise::PairNoise;
 use psidpd_passes::settings::{Precision, Settings};
 use psidpd_passes::tally::{Tally, Want};
+use region::{can_stretch, is_open, region};
 use std::sync::Arc;
 use std::time::Instant;
 use times::lap;
-use workspace::{ForceSink, Input, Workspace, extremes};
+use workspace::{ForceSink, Input, Workspace};
 
 /// Forces of one fluid. Without ghosts an evaluation is [`Sweep::evaluate`]. On a rank of a host with ghosts it is [`Sweep::first`], a round of slopes from owners to ghosts, and
 /// [`Sweep::second`].
@@ -177,7 +183,7 @@ impl Sweep {
     /// periods of twice the cut-off or more, and edges as LAMMPS has them, along the axes if some directions are open.
     pub fn fits(&self, domain: &PeriodicBox) -> bool {
         let geometry = BoxGeometry::of_box(domain, self.plan.dimensions);
-        is_open(domain, &self.plan)
+        is_open(domain, self.plan.dimensions)
             || geometry
                 .filter(can_stretch)
                 .is_some_and(|f| CellGrid::new(&f, cutoff(&self.plan), 1).is_some())
@@ -219,7 +225,7 @@ impl Sweep {
         let out = ForceSink::new(force, add, particles.tag);
         let tally = with!(&mut self.workspace, m => {
             let mut since = Instant::now();
-            let (geometry, grid) = region(set, plan, pool, domain, &input)?;
+            let (geometry, grid) = region(set, pool, (plan.dimensions, cutoff(plan)), domain, &input)?;
             m.sort_into_cells(pool, geometry, grid, &input)?;
             lap(&mut since, &mut times.sort);
             m.run_all(pool, plan, &input, out, times)?;
@@ -254,7 +260,7 @@ impl Sweep {
         let (plan, pool, times) = (&self.plan, &self.pool, &mut self.times);
         with!(&mut self.workspace, m => {
             let mut since = Instant::now();
-            let (geometry, grid) = region(set, plan, pool, domain, &input)?;
+            let (geometry, grid) = region(set, pool, (plan.dimensions, cutoff(plan)), domain, &input)?;
             m.sort_into_cells(pool, geometry, grid, &input)?;
             lap(&mut since, &mut times.sort);
             m.first(pool, plan, &input, times)?;
@@ -370,42 +376,6 @@ impl Sweep {
 /// How far particles reach. Where nothing acts at any distance they are sorted all the same.
 fn cutoff(plan: &Plan) -> f64 {
     if plan.cutoff > 0.0 { plan.cutoff } else { 1.0 }
-}
-
-/// Whether no direction is periodic: then edges do not matter.
-fn is_open(domain: &PeriodicBox, plan: &Plan) -> bool {
-    !domain.periodic()[..plan.dimensions].iter().any(|p| *p)
-}
-
-/// Whether a box geometry is still one when open directions are as long as they have to be: what leans along one is none.
-fn can_stretch(geometry: &BoxGeometry) -> bool {
-    geometry.is_fully_periodic() || !geometry.is_tilted()
-}
-
-/// The region to be swept, and its cells: all of the box along its periodic directions, along the others what the
-/// particles span, with room for ghosts within reach of them.
-fn region(
-    set: InstructionSet,
-    plan: &Plan,
-    pool: &Pool,
-    domain: &PeriodicBox,
-    input: &Input,
-) -> Result<(BoxGeometry, CellGrid), EngineError> {
-    let cutoff = cutoff(plan);
-    let mut geometry = BoxGeometry::of_box(domain, plan.dimensions);
-    if geometry.is_none_or(|geometry| !geometry.is_fully_periodic()) {
-        let margin = if input.particles.owned < input.particles.x.len() { cutoff } else { 0.0 };
-        let [low, high] = extremes(pool, set, input)?;
-        let (low, high) = (low.map(|x| x - margin), high.map(|x| x + margin));
-        geometry = match is_open(domain, plan) {
-            true => Some(BoxGeometry::enclosing(low, high, plan.dimensions, cutoff)),
-            false => geometry.filter(can_stretch).map(|geometry| geometry.stretched(low, high, cutoff)),
-        };
-    }
-    let count = input.particles.x.len();
-    let grid =
-        geometry.and_then(|geometry| CellGrid::new(&geometry, cutoff, count).map(|grid| (geometry, grid)));
-    grid.ok_or(EngineError::Host("the box is too narrow, or leans, for a sweep without images as ghosts"))
 }
 
 #[cfg(test)]

@@ -12,16 +12,16 @@ mod slopes;
 mod sorted_particles;
 mod thread_slab;
 
-pub use cell_order::extremes;
+pub use cell_order::{CellOrder, extremes};
 pub use forces::ForceSink;
 pub use input::Input;
+pub use sorted_particles::SortedParticles;
 
 use crate::engine::error::EngineError;
 use crate::engine::plan::Plan;
 use crate::engine::sweep::terms::terms;
 use crate::engine::sweep::times::Times;
 use accumulators::AccumulatorArrays;
-use cell_order::CellOrder;
 use excess::ExcessInput;
 use fluid::FluidConstants;
 use psidpd_passes::cells::sorted::SortedCells;
@@ -35,7 +35,7 @@ use psidpd_passes::plane::data::PassData;
 use psidpd_threads::Pool;
 use scheduler::{PassInput, Scheduler, thread_slabs};
 use slopes::SlopeArrays;
-use sorted_particles::{SharedParticles, SortedParticles};
+use sorted_particles::SharedParticles;
 use std::ops::Range;
 use thread_slab::{PlaneResults, ThreadSlab, ThreadState};
 

@@ -45,7 +45,7 @@ fn each(
     work: impl Fn(&mut Share) + Sync,
 ) -> f64 {
     let share = |((number, plane), part): ((usize, &Plane), _)| {
-        let own = plane.own.clone();
+        let own = plane.found.own.clone();
         Share { number, mass: &mass[own.clone()], p: &p[own], part }
     };
     let mut shares: Vec<Share> = planes.iter().enumerate().zip(parts).map(share).collect();
@@ -56,11 +56,11 @@ fn each(
 impl PairThermostat {
     /// The midpoint rule with noise; without, the implicit Euler rule of drag alone.
     pub(super) fn implicit(&mut self, pool: &Pool, v: &mut [[f64; 3]], noise: bool) -> [f64; 6] {
-        let PairThermostat { planes, cells, mass, sums, parts, kt, iterations, .. } = self;
+        let PairThermostat { planes, lists, mass, sums, parts, kt, iterations, .. } = self;
         let (planes, mass) = (&planes[..], &mass[..]);
         parts.resize_with(planes.len(), Part::default);
         let start = Terms { noise: if noise { kt.sqrt() } else { 0.0 }, drag: 1.0 };
-        sums.gather(&cells.order, v);
+        sums.gather(lists.order(), v);
         sums.compute(pool, planes, start);
         let first = each(pool, planes, mass, &sums.p, parts, |Share { number, mass, part, .. }| {
             part.residual.clear();
@@ -107,18 +107,18 @@ impl PairThermostat {
         }
         // A midpoint is half of the way.
         let factor = if noise { 2.0 } else { 1.0 };
-        let wants_virial = planes.iter().any(|plane| !plane.stretch.is_empty());
-        add_to_host(pool, &cells.place, &sums.p, 1.0, v);
+        let wants_virial = planes.iter().any(|plane| !plane.found.list.stretch.is_empty());
+        add_to_host(pool, lists.place(), &sums.p, 1.0, v);
         if !wants_virial {
-            add_to_host(pool, &cells.place, &sums.p, factor - 1.0, v);
+            add_to_host(pool, lists.place(), &sums.p, factor - 1.0, v);
             return [0.0; 6];
         }
         let solution = sums.p.clone();
-        sums.gather(&cells.order, v);
+        sums.gather(lists.order(), v);
         sums.close(planes);
         let scale = 2.0 / self.dt;
         let virial = virial(pool, planes, sums, Terms { noise: scale * start.noise, drag: scale });
-        add_to_host(pool, &cells.place, &solution, factor - 1.0, v);
+        add_to_host(pool, lists.place(), &solution, factor - 1.0, v);
         virial
     }
 }
@@ -129,7 +129,7 @@ fn direct(pool: &Pool, planes: &[Plane], mass: &[f64], sums: &mut Sums, parts: &
         .of_planes(planes)
         .into_iter()
         .zip(planes.iter().zip(parts))
-        .map(|(p, (plane, part))| (p, &mass[plane.own.clone()], &part.residual))
+        .map(|(p, (plane, part))| (p, &mass[plane.found.own.clone()], &part.residual))
         .collect();
     pool.each(&mut shares, |(p, mass, residual)| {
         for ((p, m), r) in p.iter_mut().zip(*mass).zip(*residual) {

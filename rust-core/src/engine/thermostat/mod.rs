@@ -10,13 +10,12 @@
 //! from which every update here is made: the drag is `−(2/Δt) g (g·v_ij)`, the noise `(2/Δt) √kT ξ g`. Since both
 //! come from the same `g`, single precision of `g` changes the friction by rounding, but not the equilibrium.
 //!
-//! [`PairThermostat::find_pairs`] finds the pairs (`cells`, `planes`), [`PairThermostat::draw`] their noise, and
+//! [`PairThermostat::find_pairs`] finds the pairs, by the search of the fast engine, [`PairThermostat::draw`] their noise, and
 //! [`PairThermostat::act`] changes velocities: `midpoint` for all pairs at once, `sequential` pair by pair.
 //! Results depend on positions, velocities and tags: not on the order of particles in memory, nor on the
 //! number of threads. A new update is a variant of [`Update`] and its rule in one of these files.
 
 mod bodies;
-mod cells;
 mod forces;
 mod midpoint;
 mod part;
@@ -30,13 +29,15 @@ mod tests;
 pub use bodies::Bodies;
 
 use super::error::EngineError;
+use super::particles::Particles;
 use super::plan::{Plan, ThermostatPlan};
-use super::sweep::Pool;
-use cells::Cells;
+use super::sweep::{PairLists, PlanePairs, Pool};
 use part::Part;
 use pass::Sums;
 use planes::Plane;
+use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::noise::{Law, PairNoise};
+use psidpd_passes::settings::Instructions;
 
 /// How velocities are changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,16 +58,17 @@ pub enum Update {
 }
 
 /// Drag and noise of one fluid, by pairs.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct PairThermostat {
     plan: ThermostatPlan,
     dimensions: usize,
     kt: f64,
     dt: f64,
-    cells: Cells,
+    lists: PairLists,
     planes: Vec<Plane>,
     /// By sorted particle.
     mass: Vec<f64>,
+    tag: Vec<u32>,
     sums: Sums,
     parts: Vec<Part>,
     iterations: usize,
@@ -74,17 +76,25 @@ pub struct PairThermostat {
     noise: [PairNoise; 2],
 }
 
+impl std::fmt::Debug for PairThermostat {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("PairThermostat").field("kt", &self.kt).field("dt", &self.dt).finish_non_exhaustive()
+    }
+}
+
 impl PairThermostat {
     /// The thermostat of a fluid at temperature `kt`; `None` if nothing drags.
-    pub fn new(plan: &Plan, kt: f64) -> Option<PairThermostat> {
+    pub fn new(plan: &Plan, kt: f64, instructions: Instructions) -> Option<PairThermostat> {
+        let set = InstructionSet::new(instructions).unwrap_or_else(InstructionSet::best);
         Some(PairThermostat {
             plan: plan.thermostat.clone()?,
             dimensions: plan.dimensions(),
             kt,
             dt: 0.0,
-            cells: Cells::default(),
+            lists: PairLists::new(set, plan.dimensions()),
             planes: Vec::new(),
             mass: Vec::new(),
+            tag: Vec::new(),
             sums: Sums::default(),
             parts: Vec::new(),
             iterations: 0,
@@ -105,17 +115,18 @@ impl PairThermostat {
         virial: bool,
     ) -> Result<(), EngineError> {
         self.dt = dt;
-        self.cells.sort(pool, bodies, self.dimensions, self.plan.longest)?;
+        let Bodies { domain, x, tag, species, mass, frozen } = *bodies;
+        let particles = Particles { x, tag, kind: species, owned: x.len() };
+        let (weights, range) = (planes::weights(&self.plan, dt), self.plan.longest);
+        self.lists.find(pool, domain, &particles, &weights, range, virial, &mut self.planes)?;
+        let order = self.lists.order().iter().map(|k| *k as usize);
+        self.tag.clear();
+        self.tag.extend(order.clone().map(|k| tag[k] as u32));
         self.mass.clear();
-        self.mass.extend(self.cells.order.iter().map(|k| {
-            let k = *k as usize;
-            let frozen = bodies.frozen.get(k).is_some_and(|frozen| *frozen);
-            if frozen { f64::INFINITY } else { bodies.mass[bodies.species[k] as usize] }
+        self.mass.extend(order.map(|k| {
+            let rests = frozen.get(k).is_some_and(|frozen| *frozen);
+            if rests { f64::INFINITY } else { mass[species[k] as usize] }
         }));
-        self.planes.resize_with(self.cells.planes(), Plane::default);
-        let (cells, scale) = (&self.cells, planes::Scale::new(&self.plan, dt));
-        let mut work: Vec<_> = self.planes.iter_mut().enumerate().collect();
-        pool.each(&mut work, |(number, plane)| plane.fill(cells, *number, &scale, virial));
         Ok(())
     }
 
@@ -123,7 +134,7 @@ impl PairThermostat {
     pub fn draw(&mut self, pool: &Pool, seed: u64, step: u64, stream: Stream, law: Law) {
         let noise = [0, 1].map(|k| PairNoise::of_stream(seed, step, 1 + 2 * stream.0 + k));
         self.noise = noise;
-        let tags = &self.cells.tag;
+        let tags = &self.tag;
         pool.each(&mut self.planes, |plane| plane.draw(tags, noise[0], law));
     }
 
@@ -141,15 +152,16 @@ impl PairThermostat {
     /// no pair is in range.
     pub fn warmth(&self, v: &[[f64; 3]]) -> Option<Warmth> {
         let moving = self.mass.iter().filter(|m| m.is_finite()).count();
+        let order = self.lists.order();
         let (mut squares, mut weights, mut rates) = (0.0, 0.0, 0.0);
         for plane in &self.planes {
-            for (i, ends) in plane.start.windows(2).enumerate() {
-                for pair in &plane.pairs[ends[0] as usize..ends[1] as usize] {
+            let PlanePairs { own, next, list } = &plane.found;
+            for (i, ends) in list.start.windows(2).enumerate() {
+                for pair in &list.pairs[ends[0] as usize..ends[1] as usize] {
                     let j = pair.j as usize;
-                    let j =
-                        j.checked_sub(plane.own.len()).map_or(plane.own.start + j, |k| plane.next.start + k);
-                    let i = plane.own.start + i;
-                    let (a, b) = (v[self.cells.order[i] as usize], v[self.cells.order[j] as usize]);
+                    let j = j.checked_sub(own.len()).map_or(own.start + j, |k| next.start + k);
+                    let i = own.start + i;
+                    let (a, b) = (v[order[i] as usize], v[order[j] as usize]);
                     let g = pair.g.map(f64::from);
                     let along: f64 = (0..3).map(|c| g[c] * (a[c] - b[c])).sum();
                     let inverse = 1.0 / self.mass[i] + 1.0 / self.mass[j];
@@ -174,7 +186,7 @@ impl PairThermostat {
 
     /// How many pairs are in range.
     pub fn pairs(&self) -> usize {
-        self.planes.iter().map(|plane| plane.pairs.len()).sum()
+        self.planes.iter().map(|plane| plane.found.list.pairs.len()).sum()
     }
 }
 

@@ -37,17 +37,17 @@ impl Sums {
 
     /// The vectors of each plane, to be written.
     pub fn of_planes<'a>(&'a mut self, planes: &[Plane]) -> Vec<&'a mut [Wide]> {
-        let count = planes.last().map_or(0, |plane| plane.own.end);
+        let count = planes.last().map_or(0, |plane| plane.found.own.end);
         self.p.truncate(count);
         let mut rest = &mut self.p[..];
-        planes.iter().map(|p| rest.split_off_mut(..p.own.len()).unwrap_or_default()).collect()
+        planes.iter().map(|p| rest.split_off_mut(..p.found.own.len()).unwrap_or_default()).collect()
     }
 
     /// Puts what the last plane sees of the first behind the others.
     pub fn close(&mut self, planes: &[Plane]) {
         let Some(last) = planes.last() else { return };
-        self.p.truncate(last.own.end);
-        self.p.extend_from_within(last.next.clone());
+        self.p.truncate(last.found.own.end);
+        self.p.extend_from_within(last.found.next.clone());
     }
 
     /// Computes the sums.
@@ -66,9 +66,9 @@ impl Sums {
             0 => planes.len() - 1,
             number => number - 1,
         };
-        let own = &self.of_plane[number][..planes[number].own.len()];
-        let from_below = match planes[below].next == planes[number].own {
-            true => &self.of_plane[below][planes[below].own.len()..],
+        let own = &self.of_plane[number][..planes[number].found.own.len()];
+        let from_below = match planes[below].found.next == planes[number].found.own {
+            true => &self.of_plane[below][planes[below].found.own.len()..],
             false => &[],
         };
         let zeros = std::iter::repeat(&[0.0; 4]);
@@ -96,7 +96,7 @@ impl Plane {
     #[inline(always)]
     fn add_portably(&self, p: &[Wide], terms: Terms, sums: &mut Vec<Wide>) {
         sums.clear();
-        sums.resize(self.own.len() + self.next.len(), [0.0; 4]);
+        sums.resize(self.found.own.len() + self.found.next.len(), [0.0; 4]);
         match terms.noise == 0.0 {
             true => self.add_pairs::<false>(p, terms, sums),
             false => self.add_pairs::<true>(p, terms, sums),
@@ -105,13 +105,13 @@ impl Plane {
 
     #[inline(always)]
     fn add_pairs<const NOISE: bool>(&self, p: &[Wide], Terms { noise, drag }: Terms, sums: &mut [Wide]) {
-        let p = &p[self.own.start..][..sums.len()];
-        for (i, ends) in self.start.windows(2).enumerate() {
+        let p = &p[self.found.own.start..][..sums.len()];
+        for (i, ends) in self.found.list.start.windows(2).enumerate() {
             let of_i = ends[0] as usize..ends[1] as usize;
             let at = p[i];
             let mut sum = [0.0; 4];
             let noises = if NOISE { &self.xi[of_i.clone()] } else { &[] };
-            for (k, pair) in self.pairs[of_i].iter().enumerate() {
+            for (k, pair) in self.found.list.pairs[of_i].iter().enumerate() {
                 let j = pair.j as usize;
                 let [x, y, z] = pair.g.map(f64::from);
                 let (g, other) = ([x, y, z, 0.0], p[j]);
@@ -134,18 +134,22 @@ impl Plane {
 
     /// `Σ r_ij ⊗ F_ij` of the same forces: xx, yy, zz, xy, xz, yz.
     pub fn virial(&self, p: &[Wide], Terms { noise, drag }: Terms) -> [f64; 6] {
-        let p = &p[self.own.start..];
+        let p = &p[self.found.own.start..];
         let mut virial = [0.0; 6];
-        if self.stretch.is_empty() {
+        if self.found.list.stretch.is_empty() {
             return virial;
         }
-        for (i, ends) in self.start.windows(2).enumerate() {
+        for (i, ends) in self.found.list.start.windows(2).enumerate() {
             for k in ends[0] as usize..ends[1] as usize {
-                let pair = &self.pairs[k];
+                let pair = &self.found.list.pairs[k];
                 let (g, other) = (pair.g.map(f64::from), p[pair.j as usize]);
                 let along: f64 = (0..3).map(|c| (p[i][c] - other[c]) * g[c]).sum();
                 let xi = self.xi.get(k).map_or(0.0, |xi| f64::from(*xi));
-                add_virial(&mut virial, g, (noise * xi - drag * along) * f64::from(self.stretch[k]));
+                add_virial(
+                    &mut virial,
+                    g,
+                    (noise * xi - drag * along) * f64::from(self.found.list.stretch[k]),
+                );
             }
         }
         virial
@@ -161,7 +165,7 @@ pub fn add_virial(virial: &mut [f64; 6], g: [f64; 3], factor: f64) {
 
 /// The virial of all planes, in their order.
 pub fn virial(pool: &Pool, planes: &[Plane], sums: &Sums, terms: Terms) -> [f64; 6] {
-    if planes.iter().all(|plane| plane.stretch.is_empty()) {
+    if planes.iter().all(|plane| plane.found.list.stretch.is_empty()) {
         return [0.0; 6];
     }
     let mut parts: Vec<_> = planes.iter().map(|plane| (plane, [0.0; 6])).collect();

@@ -59,7 +59,7 @@ pub fn lowe_andersen(pair: &Encounter) -> f64 {
 fn sets(planes: &[Plane]) -> [Vec<usize>; 3] {
     let count = planes.len();
     // The last sees the first, which may be of the same set.
-    let closes = count % 2 == 1 && count > 1 && !planes[count - 1].next.is_empty();
+    let closes = count % 2 == 1 && count > 1 && !planes[count - 1].found.next.is_empty();
     let paired = count - usize::from(closes);
     let last = if closes { vec![count - 1] } else { Vec::new() };
     [(0..paired).step_by(2).collect(), (1..paired).step_by(2).collect(), last]
@@ -79,7 +79,7 @@ struct Share<'a> {
 impl PairThermostat {
     /// Applies a rule to all pairs in turn.
     pub(super) fn in_turn(&mut self, pool: &Pool, v: &mut [[f64; 3]], update: Update) -> [f64; 6] {
-        let PairThermostat { planes, cells, mass, kt, dt, noise, .. } = self;
+        let PairThermostat { planes, lists, mass, kt, dt, noise, .. } = self;
         let (planes, mass, kt) = (&planes[..], &mass[..], *kt);
         let reversed = matches!(update, Update::Shardlow { reversed: true });
         let rule = match update {
@@ -88,7 +88,7 @@ impl PairThermostat {
             _ => ornstein_uhlenbeck,
         };
         let draws = update == Update::LoweAndersen;
-        let mut sorted: Vec<[f64; 3]> = cells.order.iter().map(|k| v[*k as usize]).collect();
+        let mut sorted: Vec<[f64; 3]> = lists.order().iter().map(|k| v[*k as usize]).collect();
         let mut virial = [0.0; 6];
         let mut sets = sets(planes);
         if reversed {
@@ -97,19 +97,19 @@ impl PairThermostat {
         for set in sets {
             let mut rest = &mut sorted[..];
             let mut slices: Vec<Option<&mut [[f64; 3]]>> =
-                planes.iter().map(|p| rest.split_off_mut(..p.own.len())).collect();
+                planes.iter().map(|p| rest.split_off_mut(..p.found.own.len())).collect();
             let mut shares: Vec<Share> = Vec::with_capacity(set.len());
             for number in set {
                 let plane = &planes[number];
                 let above = if number + 1 < planes.len() { number + 1 } else { 0 };
                 let own = slices[number].take().unwrap_or_default();
-                let next = if plane.next.is_empty() { None } else { slices[above].take() };
+                let next = if plane.found.next.is_empty() { None } else { slices[above].take() };
                 shares.push(Share {
                     plane,
                     own,
                     next: next.unwrap_or_default(),
-                    of_own: &mass[plane.own.clone()],
-                    of_next: &mass[plane.next.clone()],
+                    of_own: &mass[plane.found.own.clone()],
+                    of_next: &mass[plane.found.next.clone()],
                     chances: Vec::new(),
                     virial: [0.0; 6],
                 });
@@ -126,7 +126,7 @@ impl PairThermostat {
                 (0..6).for_each(|c| virial[c] += share.virial[c] / *dt);
             }
         }
-        for (k, v_sorted) in cells.order.iter().zip(sorted) {
+        for (k, v_sorted) in lists.order().iter().zip(sorted) {
             v[*k as usize] = v_sorted;
         }
         virial
@@ -136,10 +136,10 @@ impl PairThermostat {
 impl Share<'_> {
     fn update(&mut self, kt: f64, reversed: bool, rule: impl Fn(&Encounter) -> f64) {
         let plane = self.plane;
-        let rows = plane.start.len() - 1;
+        let rows = plane.found.list.start.len() - 1;
         for n in 0..rows {
             let i = if reversed { rows - 1 - n } else { n };
-            let of_i = plane.start[i] as usize..plane.start[i + 1] as usize;
+            let of_i = plane.found.list.start[i] as usize..plane.found.list.start[i + 1] as usize;
             for n in 0..of_i.len() {
                 let k = if reversed { of_i.end - 1 - n } else { of_i.start + n };
                 self.encounter(i, k, kt, &rule);
@@ -149,7 +149,7 @@ impl Share<'_> {
 
     #[inline(always)]
     fn encounter(&mut self, i: usize, k: usize, kt: f64, rule: &impl Fn(&Encounter) -> f64) {
-        let pair = &self.plane.pairs[k];
+        let pair = &self.plane.found.list.pairs[k];
         let (j, g) = (pair.j as usize, pair.g.map(f64::from));
         let (own, beyond) = (self.own.len(), j.wrapping_sub(self.own.len()));
         let (other, mass) = match j < own {
@@ -184,7 +184,7 @@ impl Share<'_> {
         for c in 0..3 {
             other[c] -= impulse * inverse[1] * g[c];
         }
-        if let Some(stretch) = self.plane.stretch.get(k) {
+        if let Some(stretch) = self.plane.found.list.stretch.get(k) {
             add_virial(&mut self.virial, g, impulse * f64::from(*stretch));
         }
     }

@@ -115,13 +115,14 @@ impl Meter for DensityField {
 
 #[cfg(test)]
 mod tests {
-    use crate::observe::tests::{IDEAL, find, run, scene};
+    use crate::observe::tests::{find, run, scene};
+    use crate::test_support::IDEAL_MIXTURE;
 
     /// The cells of a plane hold all particles, each in the cell it is in.
     #[test]
     fn every_particle_is_in_its_cell() {
         let observe = "[observe.density_field]\nbins = [4, 5]\nevery = 100\nstages = [\"settle\"]\n";
-        let scene = scene(IDEAL, "[4.0, 3.0, 5.0]", 5.0, 1, observe).unwrap();
+        let scene = scene(IDEAL_MIXTURE, "[4.0, 3.0, 5.0]", 5.0, 1, observe).unwrap();
         let mut shorter = scene.clone();
         shorter.stages.truncate(1);
         let (simulation, all) = run(&shorter);

@@ -154,7 +154,8 @@ impl Meter for Poiseuille {
 mod tests {
     use super::*;
     use crate::observe::meter::AnyMeter;
-    use crate::observe::tests::{IDEAL, scene};
+    use crate::observe::tests::scene;
+    use crate::test_support::IDEAL_MIXTURE;
     use rand::{SeedableRng, rngs::StdRng};
     use rand_distr::{Distribution, StandardNormal};
 
@@ -169,7 +170,7 @@ mod tests {
     #[test]
     fn a_known_flow() {
         let observe = "[observe.poiseuille]\naxis = \"z\"\nflow = \"x\"\nacceleration = 0.1\nbins = 20\n";
-        let scene = scene(IDEAL, "[4.0, 4.0, 6.0]", 3.0, 10, observe).unwrap();
+        let scene = scene(IDEAL_MIXTURE, "[4.0, 4.0, 6.0]", 3.0, 10, observe).unwrap();
         let AnyMeter::Poiseuille(mut m) = scene.observe.requests[0].meter.clone() else { panic!() };
         let mut rng = StdRng::seed_from_u64(3);
         let (eta, rho) = (0.8, 3.0);
@@ -193,6 +194,6 @@ mod tests {
     }
 
     fn scene_without() -> Result<crate::scene::Scene, FileError> {
-        scene(IDEAL, "[4.0, 4.0, 6.0]", 3.0, 10, "[observe]\npoiseuille = true\n")
+        scene(IDEAL_MIXTURE, "[4.0, 4.0, 6.0]", 3.0, 10, "[observe]\npoiseuille = true\n")
     }
 }

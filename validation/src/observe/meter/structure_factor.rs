@@ -193,17 +193,18 @@ impl Meter for StructureFactor {
 mod tests {
     use super::*;
     use crate::observe::meter::AnyMeter;
-    use crate::observe::tests::{IDEAL, scene};
+    use crate::observe::tests::scene;
     use crate::run::Simulation;
+    use crate::test_support::IDEAL_MIXTURE;
     use psidpd_core::engine::reference::Evaluator;
 
     /// A simple cubic lattice of 5³ in a box of 5³: S = N at multiples of 2π, 0 elsewhere.
     #[test]
     fn of_a_lattice() {
         let observe = "[observe.structure_factor]\nrange = 14.0\nbins = 2000\nvectors = 10000\n";
-        assert!(scene(IDEAL, "[5.0, 5.0, 5.0]", 1.0, 10, observe).is_err());
+        assert!(scene(IDEAL_MIXTURE, "[5.0, 5.0, 5.0]", 1.0, 10, observe).is_err());
         let observe = observe.replace("2000", "1000");
-        let scene = scene(IDEAL, "[5.0, 5.0, 5.0]", 1.0, 10, &observe).unwrap();
+        let scene = scene(IDEAL_MIXTURE, "[5.0, 5.0, 5.0]", 1.0, 10, &observe).unwrap();
         let simulation = Simulation::new(&scene.model, 1.0, scene.initial_state(), 1).unwrap();
         let fluid = Evaluator::new(simulation.model().at(1.0).unwrap()).unwrap();
         let AnyMeter::StructureFactor(mut meter) = scene.observe.requests[0].meter.clone() else { panic!() };

@@ -143,8 +143,9 @@ impl Meter for SurfaceTension {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::observe::tests::{SET6, scene};
+    use crate::observe::tests::scene;
     use crate::run::Simulation;
+    use crate::test_support::SET6;
     use psidpd_core::engine::reference::Evaluator;
 
     /// On a slab whose faces point any way: half the difference of the energies over the change of the

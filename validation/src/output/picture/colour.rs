@@ -26,11 +26,6 @@ pub fn mix(a: Rgb, b: Rgb, share: f64) -> Rgb {
     std::array::from_fn(|k| (f64::from(a[k]) * (1.0 - share) + f64::from(b[k]) * share).round() as u8)
 }
 
-/// As in SVG: `#rrggbb`.
-pub fn hex(colour: Rgb) -> String {
-    format!("#{:02x}{:02x}{:02x}", colour[0], colour[1], colour[2])
-}
-
 /// Dark blue over green to yellow: lightness grows with the value, so it can be read in grey too.
 const SCALE: [Rgb; 9] = [
     [0x35, 0x0A, 0x52],
@@ -76,6 +71,5 @@ mod tests {
             assert!((0..a).all(|b| of_species(a) != of_species(b)));
         }
         assert_eq!(of_species(7), of_species(0));
-        assert_eq!(hex([0, 114, 178]), "#0072b2");
     }
 }

@@ -13,4 +13,4 @@ pub use field::{Field, FieldOptions, paint_field};
 pub use image::Image;
 pub(crate) use image::data_url;
 pub use particles::{ParticleOptions, draw_particles};
-pub use projection::{Projection, View};
+pub use projection::View;

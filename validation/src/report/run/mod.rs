@@ -19,16 +19,10 @@ pub use series::Table as SeriesTable;
 
 /// Why a folder has no report.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages say it")]
 pub enum RunReportError {
-    /// A folder with nothing of a run in it.
     #[error("{} holds nothing of a run: none of {files} is there", folder.display())]
-    NoRun {
-        /// The folder.
-        folder: PathBuf,
-        /// What was looked for.
-        files: String,
-    },
-    /// The page cannot be made or written.
+    NoRun { folder: PathBuf, files: String },
     #[error(transparent)]
     Report(#[from] ReportError),
 }

@@ -1,5 +1,6 @@
 use super::*;
-use crate::output::{AboutDensity, AboutStage, Column};
+use crate::output::about::Column;
+use crate::output::{AboutDensity, AboutStage};
 
 /// The description of a run of two stages.
 pub fn about() -> About {
@@ -176,8 +177,11 @@ fn what_cannot_be_read_is_said_and_the_rest_is_shown() {
     }
     std::fs::create_dir(folder.path().join("snapshots")).unwrap();
     for step in [1, 2] {
-        std::fs::write(folder.path().join("snapshots").join(crate::output::snapshot_name(step)), "x")
-            .unwrap();
+        std::fs::write(
+            folder.path().join("snapshots").join(crate::output::snapshot::snapshot_name(step)),
+            "x",
+        )
+        .unwrap();
     }
     let (texts, page) = page(folder.path());
     let all = texts.join("\n");

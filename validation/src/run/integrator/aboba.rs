@@ -4,10 +4,11 @@
 //! x += ½Δt v;  v += ½Δt F/m;  thermostat for Δt;  v += ½Δt F/m;  x += ½Δt v
 //! ```
 //!
-//! The thermostat is exact for the Maxwell distribution, so that what is left is the error of the conservative force,
-//! of second order; an ideal gas has none. One evaluation of forces a step, and the thermostat acts at the same
-//! positions. These are in the middle of the step: energies and pressures that a run tells are computed anew at its end, which
-//! trajectories do not depend on. T_kin is that of the velocities at the end of the step, behind a kick.
+//! The thermostat is exact for the Maxwell distribution, so that what is left is the error of the
+//! conservative force, of second order; an ideal gas has none. One evaluation of forces a step, and the
+//! thermostat acts at the same positions. These are in the middle of the step: the energies and pressures
+//! that a run reports are computed anew at its end, which trajectories do not depend on. T_kin is that of the
+//! velocities at the end of the step, behind a kick.
 
 use super::{Coupling, RunError, Simulation, Want};
 

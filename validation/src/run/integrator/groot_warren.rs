@@ -9,9 +9,6 @@
 
 use super::{RunError, Simulation, Want};
 
-/// That of the paper.
-pub const LAMBDA: f64 = 0.65;
-
 pub fn step(system: &mut Simulation, dt: f64, want: Want, lambda: f64) -> Result<(), RunError> {
     system.predict(lambda, dt)?;
     system.forces_with_thermostat(dt, want)?;

@@ -1,8 +1,6 @@
-//! Integrators, each a composition of drift, kick, forces and thermostat, which are the operators of a simulation.
+//! The steps of integrators, each a composition of drift, kick, forces and thermostat, which are the operators of a simulation.
 //!
-//! An integrator is a file here, which states its step, what is exact in it and at which velocity the temperature is
-//! measured; its variant of [`Integrator`], with a line in [`Integrator::ALL`], and one in each of its short functions. Scene
-//! files, `about.json` and the export to LAMMPS take names and keys from there.
+//! A file here states one step, what is exact in it and at which velocity the temperature is measured.
 
 mod aboba;
 mod baoab;
@@ -17,173 +15,13 @@ mod shardlow;
 mod two_stage;
 mod velocity_verlet;
 
-pub use coupling::{Coupling, THERMOSTAT_STEPS};
-
 use super::error::RunError;
 use super::simulation::Simulation;
+use crate::integrator::{Coupling, Integrator};
 use psidpd_core::engine::Want;
 use psidpd_core::engine::noise::Law;
-use std::fmt;
-
-/// How a step is made.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub enum Integrator {
-    /// Velocity Verlet, as `fix nve` of LAMMPS: drag sees the half-step velocity.
-    #[default]
-    VelocityVerlet,
-    /// The modified velocity Verlet of Groot and Warren: drag sees the velocity predicted with λ.
-    GrootWarren {
-        /// λ.
-        lambda: f64,
-    },
-    /// Drag once more from the velocity at the end of the step.
-    DpdVv {
-        /// The noise.
-        noise: Law,
-    },
-    /// Drag from the velocity at the end of the step, which it makes.
-    SelfConsistent {
-        /// The noise.
-        noise: Law,
-    },
-    /// Pair by pair, half explicit and half implicit; then velocity Verlet.
-    ShardlowS1 {
-        /// The noise.
-        noise: Law,
-    },
-    /// The same by halves, before and after.
-    ShardlowS2 {
-        /// The noise.
-        noise: Law,
-    },
-    /// Velocity Verlet, then the Ornstein–Uhlenbeck process of each pair.
-    Peters {
-        /// The noise.
-        noise: Law,
-    },
-    /// Velocity Verlet, then new relative velocities for some pairs.
-    LoweAndersen,
-    /// Drift, kick, thermostat, kick, drift.
-    Aboba(Coupling),
-    /// Kick, drift, thermostat, drift, kick.
-    Baoab(Coupling),
-    /// Two kicks and a half in a step, then the thermostat.
-    TwoStage {
-        /// Share of a step in the first kick and in the last.
-        lambda: f64,
-        /// The thermostat.
-        coupling: Coupling,
-    },
-}
-
-/// What is known of an integrator's error in the temperature of configurations, for estimates: `a (ωΔt)⁴ + b κΔt`;
-/// `docs/integrators.md` has the runs.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Accuracy {
-    /// `a`.
-    pub stiffness: f64,
-    /// `b`.
-    pub drag: f64,
-}
-
-/// What LAMMPS has for an integrator.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Counterpart {
-    /// `fix nve`.
-    Nve,
-    /// Nothing.
-    None,
-}
 
 impl Integrator {
-    /// Names in scene files, and what they mean with all other keys left out.
-    pub const ALL: [(&str, Integrator); 11] = [
-        ("velocity-verlet", Integrator::VelocityVerlet),
-        ("groot-warren", Integrator::GrootWarren { lambda: groot_warren::LAMBDA }),
-        ("dpd-vv", Integrator::DpdVv { noise: Law::Gaussian }),
-        ("self-consistent", Integrator::SelfConsistent { noise: Law::Gaussian }),
-        ("shardlow-s1", Integrator::ShardlowS1 { noise: Law::Gaussian }),
-        ("shardlow-s2", Integrator::ShardlowS2 { noise: Law::Gaussian }),
-        ("peters", Integrator::Peters { noise: Law::Gaussian }),
-        ("lowe-andersen", Integrator::LoweAndersen),
-        ("aboba", Integrator::Aboba(Coupling::DEFAULT)),
-        ("baoab", Integrator::Baoab(Coupling::DEFAULT)),
-        ("two-stage", Integrator::TwoStage { lambda: two_stage::LAMBDA, coupling: Coupling::DEFAULT }),
-    ];
-
-    /// Its name.
-    pub fn name(&self) -> &'static str {
-        let kind = std::mem::discriminant(self);
-        Integrator::ALL
-            .iter()
-            .find(|(_, other)| std::mem::discriminant(other) == kind)
-            .map_or("", |found| found.0)
-    }
-
-    /// Its λ with the range that is allowed, if it has one.
-    pub fn lambda(&mut self) -> Option<(&mut f64, [f64; 2])> {
-        match self {
-            Integrator::GrootWarren { lambda } => Some((lambda, [0.0, 1.0])),
-            Integrator::TwoStage { lambda, .. } => Some((lambda, [0.0, 0.5])),
-            _ => None,
-        }
-    }
-
-    /// Its thermostat, if that is a choice of its own.
-    pub fn coupling(&mut self) -> Option<&mut Coupling> {
-        match self {
-            Integrator::Aboba(coupling) | Integrator::Baoab(coupling) => Some(coupling),
-            Integrator::TwoStage { coupling, .. } => Some(coupling),
-            _ => None,
-        }
-    }
-
-    /// The law of its noise, if that can be chosen: inside the forces it is uniform.
-    pub fn noise(&mut self) -> Option<&mut Law> {
-        match self {
-            Integrator::DpdVv { noise } | Integrator::SelfConsistent { noise } => Some(noise),
-            Integrator::ShardlowS1 { noise } | Integrator::ShardlowS2 { noise } => Some(noise),
-            Integrator::Peters { noise } => Some(noise),
-            other => other.coupling().map(|coupling| &mut coupling.noise),
-        }
-    }
-
-    /// Its errors, roughly: within a factor of three of those runs for one force a step, a guess from energies for two-stage.
-    pub fn accuracy(&self) -> Accuracy {
-        const ONE_FORCE: f64 = 5.0;
-        match self {
-            Integrator::VelocityVerlet => Accuracy { stiffness: ONE_FORCE, drag: 0.25 },
-            Integrator::GrootWarren { .. } => Accuracy { stiffness: ONE_FORCE, drag: 0.12 },
-            Integrator::TwoStage { .. } => Accuracy { stiffness: 0.008, drag: 0.0 },
-            _ => Accuracy { stiffness: ONE_FORCE, drag: 0.0 },
-        }
-    }
-
-    /// What LAMMPS has for it.
-    pub fn in_lammps(&self) -> Counterpart {
-        match self {
-            Integrator::VelocityVerlet => Counterpart::Nve,
-            Integrator::GrootWarren { lambda: 0.5 } => Counterpart::Nve,
-            _ => Counterpart::None,
-        }
-    }
-
-    /// Whether drag and noise act inside the forces; apart from them otherwise.
-    pub(super) fn drag_in_forces(self) -> bool {
-        matches!(
-            self,
-            Integrator::VelocityVerlet
-                | Integrator::GrootWarren { .. }
-                | Integrator::DpdVv { .. }
-                | Integrator::SelfConsistent { .. }
-        )
-    }
-
-    /// Whether the last forces of a step are those at its end.
-    pub(super) fn forces_at_end(self) -> bool {
-        !matches!(self, Integrator::Aboba(_))
-    }
-
     /// A step of `dt`, whose number is set. Of `want`, what is computed with the last forces.
     pub(super) fn step(self, system: &mut Simulation, dt: f64, want: Want) -> Result<(), RunError> {
         match self {
@@ -198,27 +36,6 @@ impl Integrator {
             Integrator::Aboba(coupling) => aboba::step(system, dt, want, coupling),
             Integrator::Baoab(coupling) => baoab::step(system, dt, want, coupling),
             Integrator::TwoStage { lambda, coupling } => two_stage::step(system, dt, want, lambda, coupling),
-        }
-    }
-}
-
-/// With all that differs from what its name alone means.
-impl fmt::Display for Integrator {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", self.name())?;
-        let mut this = *self;
-        if let Some((lambda, _)) = this.lambda() {
-            write!(f, ", lambda = {lambda}")?;
-        }
-        if let Some(coupling) = this.coupling() {
-            write!(f, ", thermostat_step = {}", coupling.name())?;
-            if coupling.every > 1 {
-                write!(f, ", thermostat_every = {}", coupling.every)?;
-            }
-        }
-        match this.noise() {
-            Some(Law::Uniform) => write!(f, ", noise = uniform"),
-            _ => Ok(()),
         }
     }
 }

@@ -11,14 +11,14 @@ const LANES: usize = 3 * GROUP;
 /// Coordinates of a vector.
 const WIDTH: usize = 4;
 
-/// Particles that are worth the call of a thread.
+/// Fewest particles for which another thread pays off.
 const WORTH: usize = 1024;
 
-/// Velocities whose squares are no infinities, for certain.
+/// Velocities below this have finite squares.
 const FINITE: f64 = 1e150;
 
 /// The particles that an integrator moves, without ghosts.
-pub struct Motion<'a> {
+pub struct Moving<'a> {
     pub x: &'a mut [[f64; 3]],
     pub v: &'a mut [[f64; 3]],
     pub f: &'a [[f64; 3]],
@@ -40,7 +40,7 @@ pub struct Kept {
     over_mass: Vec<f64>,
 }
 
-impl Motion<'_> {
+impl Moving<'_> {
     /// Makes room for velocities and forces of before.
     pub fn keep(&mut self) {
         self.kept.in_use = true;
@@ -59,7 +59,7 @@ impl Motion<'_> {
     }
 }
 
-/// What a particle that has moved may meet.
+/// What a moved particle is checked against.
 #[derive(Debug, Clone, Copy)]
 pub struct Surroundings<'a> {
     pub domain: &'a PeriodicBox,
@@ -73,7 +73,7 @@ pub struct Surroundings<'a> {
 pub struct Faults {
     /// Its velocity is too high, or no number.
     pub fast: Option<usize>,
-    /// No wall has kept it in.
+    /// It is beyond a wall even after reflection.
     pub escaped: Option<usize>,
 }
 
@@ -91,9 +91,9 @@ pub struct Part<'a> {
     faults: Faults,
 }
 
-/// Does `work` with all particles of `motion`.
-pub fn share<'a>(motion: Motion<'a>, pool: &Pool, work: impl Fn(&mut Part, &[f64]) + Sync) -> Faults {
-    let Motion { mut x, mut v, mut f, mut species, mut image, kept, .. } = motion;
+/// Does `work` with all particles of `moving`.
+pub fn share<'a>(moving: Moving<'a>, pool: &Pool, work: impl Fn(&mut Part, &[f64]) + Sync) -> Faults {
+    let Moving { mut x, mut v, mut f, mut species, mut image, kept, .. } = moving;
     let (kept_v, kept_f) = (&mut kept.v[..], &mut kept.f[..]);
     let [mut kept_v, mut kept_f] = if kept.in_use { [kept_v, kept_f] } else { Default::default() };
     let count = x.len();
@@ -256,7 +256,7 @@ where
     settle(&around, part.first, from, x_rest, v_rest, image_rest, &mut part.kept, &mut part.faults);
 }
 
-/// Looks at particles one by one, and puts those that are outside inside.
+/// Checks particles one by one, and reflects or wraps those outside.
 #[cold]
 #[inline(never)]
 #[expect(clippy::too_many_arguments)]

@@ -13,9 +13,6 @@
 
 use super::{Coupling, RunError, Simulation, Want};
 
-/// Small errors of averages in liquids of many-body DPD.
-pub const LAMBDA: f64 = 0.21;
-
 pub fn step(
     system: &mut Simulation,
     dt: f64,

@@ -1,6 +1,7 @@
 //! What each integrator promises.
 
 use super::*;
+use crate::integrator::Coupling;
 use psidpd_core::engine::thermostat::Update;
 
 /// Those that keep the Maxwell distribution of an ideal gas exactly, at any time step.
@@ -23,10 +24,10 @@ struct Gas {
 }
 
 fn ideal_gas(integrator: Integrator, dt: f64) -> Gas {
-    let model = IDEAL.replace("[\"A\"]", "[\"A\", \"B\"]");
+    let model = IDEAL_MIXTURE;
     let rest = ONE_STAGE.to_owned() + "[masses]\nB = 3.0\n";
-    let state = scene_of(&model, "[4.0, 5.0, 4.0]", 4.0, &rest).unwrap().initial_state();
-    let mut run = simulation(&model, state);
+    let state = scene_of(model, "[4.0, 5.0, 4.0]", 4.0, &rest).unwrap().initial_state();
+    let mut run = simulation(model, state);
     run.prepare_for(integrator, dt, Want::FORCES).unwrap();
     run.advance(30, dt, integrator).unwrap();
     let edges = [0.0, 0.4, 0.7, 1.0f64];

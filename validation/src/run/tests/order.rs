@@ -20,10 +20,7 @@ const CROWD: &str = "title = \"crowd\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7\n
     [output]\nthermo = 3\ndump = 19\n";
 
 fn crowd() -> Scene {
-    let folder = tempfile::tempdir().unwrap();
-    let model = IDEAL.replace("[\"A\"]", "[\"A\", \"B\"]");
-    std::fs::write(folder.path().join("m.toml"), model).unwrap();
-    Scene::parse("s.toml", CROWD, folder.path()).unwrap()
+    test_support::scene(IDEAL_MIXTURE, CROWD).unwrap()
 }
 
 /// Everything over particles by tag, as bits.
@@ -92,9 +89,7 @@ fn reordering_keeps_particles_whole() {
         // Later ones differ by rounding.
         let [mut kept, mut moved] = [kept, moved];
         for run in [&mut kept, &mut moved] {
-            for _ in 0..35 {
-                run.step(0.01, integrator, Want::FORCES).unwrap();
-            }
+            run.advance(35, 0.01, integrator).unwrap();
         }
         let d = difference(&kept, &moved);
         assert!(d < 1e-9, "{name}: {d}");

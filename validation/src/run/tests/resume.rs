@@ -46,9 +46,7 @@ const INTEGRATORS: &str = "\
 fn scenes() -> [Scene; 4] {
     let solid = scene_of(&bounded(), "[3.0, 3.0, 3.0]", 6.05, &format!("{STAGES}checkpoint = 4\n")).unwrap();
     let flat = scene_of(VAN_DER_WAALS, "[5.0, 5.0]", 12.0, STAGES).unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("m.toml"), SET6).unwrap();
-    let all = Scene::parse("s.toml", EVERYTHING, folder.path()).unwrap();
+    let all = test_support::scene(SET6, EVERYTHING).unwrap();
     [solid, flat, scene_of(SET6, "[3.0, 3.0, 3.0]", 6.05, INTEGRATORS).unwrap(), all]
 }
 

@@ -6,8 +6,7 @@ use psidpd_core::engine::PeriodicBox;
 
 /// A fluid of two masses, in a number of particles that is no multiple of four.
 fn start(masses: [f64; 2], edges: Matrix3<f64>) -> (Model, State) {
-    let two = IDEAL.replace("[\"A\"]", "[\"A\", \"B\"]");
-    let model = Model::parse("m.toml", if masses[0] == masses[1] { SET6 } else { &two }).unwrap();
+    let model = Model::parse("m.toml", if masses[0] == masses[1] { SET6 } else { IDEAL_MIXTURE }).unwrap();
     assert_eq!(model.species().len(), if masses[0] == masses[1] { 1 } else { 2 });
     let mut state = settled();
     assert_eq!(state.len() % 4, 3);

@@ -70,7 +70,7 @@ fn in_shape(cell: &Cell, count: usize, shape: &Shape, dimensions: usize) -> Vec<
     let [low, high] = shape.bounds(dimensions);
     let aspect: f64 = cell.edges[..dimensions].iter().product();
     let per_cell = shape.volume(dimensions) * cell.sites.len() as f64 / (count as f64 * aspect);
-    // A little too wide to begin with: surfaces may be lucky.
+    // Begin a little too wide: more sites than the volume suggests may lie inside.
     let mut spacing = 1.05 * per_cell.powf(1.0 / dimensions as f64);
     loop {
         let edge = cell.edges.map(|e| e * spacing);

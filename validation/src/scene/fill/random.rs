@@ -3,7 +3,7 @@ use crate::scene::shape::Shape;
 use chacha20::ChaCha8Rng;
 use rand::RngExt;
 
-/// How often a place is looked for before a region counts as full.
+/// Attempts at a position before a region counts as full.
 const ATTEMPTS: usize = 2000;
 
 /// A uniform point of `shape`.
@@ -17,8 +17,8 @@ pub fn point(shape: &Shape, dimensions: usize, random: &mut ChaCha8Rng) -> [f64;
     }
 }
 
-/// A uniform point of `shape` that has nothing within the distance of `near`, or one that has, if none is
-/// found.
+/// A uniform point of `shape` that is close to none of `near`; if none is found, the last attempt as the
+/// error.
 pub fn point_apart(
     shape: &Shape,
     dimensions: usize,

@@ -1,24 +1,14 @@
 //! What the box is filled with.
 
-use super::{Key, OPTIONAL, REQUIRED, Table, ValueKind, axes, form_key, key};
+use super::ValueKind::*;
+use super::{Key, OPTIONAL, REQUIRED, Table, form_key, key, names};
 use crate::scene::arrangement::{FLAT_LATTICES, LATTICES};
 use crate::scene::initial::KINDS;
-use crate::scene::shape::{SHAPES, faces};
-
-fn kinds() -> Vec<&'static str> {
-    KINDS.to_vec()
-}
-
-fn shapes() -> Vec<&'static str> {
-    SHAPES.to_vec()
-}
+use crate::scene::number::AXES;
+use crate::scene::shape::{FACES, SHAPES};
 
 fn lattices() -> Vec<&'static str> {
-    LATTICES.iter().chain(&FLAT_LATTICES).map(|(name, _)| *name).collect()
-}
-
-fn velocities() -> Vec<&'static str> {
-    vec!["thermal", "zero", "keep"]
+    [names(&LATTICES), names(&FLAT_LATTICES)].concat()
 }
 
 /// Kinds of `[initial]` that are filled.
@@ -37,16 +27,12 @@ pub const INITIAL: Table = Table {
     about: "One thing to start from: the whole box, a slab, a ball or a cylinder of fluid, or a state that another \
             run has left.",
     keys: &[
-        key(
-            "kind",
-            ValueKind::Choice(kinds),
-            REQUIRED,
+        key("kind", Choice(|| KINDS.to_vec()), REQUIRED,
             "`random`: the whole box, at random. `lattice`: the whole box, on a lattice, for fluids that must not \
              start with particles on top of each other. `slab`, `sphere`, `cylinder`: that region. `data`: a \
              LAMMPS data file with its box; types are species. `checkpoint`: a checkpoint, or the folder of a run, \
              with its box; the clock starts again at 0.",
-            "[initial]\nkind = \"lattice\"\ndensity = 3.0",
-        ),
+            "[initial]\nkind = \"lattice\"\ndensity = 3.0"),
         density(FILLED, "[initial]\nkind = \"random\"\ndensity = 3.0"),
         count(FILLED, "[initial]\nkind = \"random\"\ncount = 500"),
         composition(
@@ -65,31 +51,16 @@ pub const INITIAL: Table = Table {
         radius("[initial]\nkind = \"sphere\"\nradius = 3.0\ndensity = 3.0"),
         center("[initial]\nkind = \"sphere\"\nradius = 2.0\ncenter = [2.5, 3.0, 3.0]\ndensity = 3.0"),
         length("[initial]\nkind = \"cylinder\"\nradius = 2.0\nlength = 3.0\ndensity = 3.0"),
-        form_key(
-            SAVED,
-            "file",
-            ValueKind::File,
-            REQUIRED,
-            "The file.",
-            "[initial]\nkind = \"data\"\nfile = \"start.data\"",
-        ),
-        form_key(
-            SAVED,
-            "frozen_ids",
-            ValueKind::Ids,
-            OPTIONAL,
+        form_key(SAVED, "file", File, REQUIRED,
+            "The file.", "[initial]\nkind = \"data\"\nfile = \"start.data\""),
+        form_key(SAVED, "frozen_ids", Ids, OPTIONAL,
             "The particles that never move, by the ids of the file. Parts of a scene are numbered one after the \
              other, from 1.",
-            "[initial]\nkind = \"data\"\nfile = \"start.data\"\nfrozen_ids = [1, 2]",
-        ),
-        key(
-            "velocities",
-            ValueKind::Choice(velocities),
-            OPTIONAL,
-            "`thermal`: Maxwell's distribution at kT, without momentum in all. `zero`: none. `keep`, for a file \
-             only: those of the file. Thermal if left out, but for a checkpoint, which keeps its own.",
-            "[initial]\nkind = \"data\"\nfile = \"start.data\"\nvelocities = \"keep\"",
-        ),
+            "[initial]\nkind = \"data\"\nfile = \"start.data\"\nfrozen_ids = [1, 2]"),
+        key("velocities", Choice(|| vec!["thermal", "zero", "keep"]), OPTIONAL,
+            "`thermal`: Maxwell's distribution at kT, with zero total momentum. `zero`: none. `keep`, for a file \
+             only: those of the file. If left out, a checkpoint keeps its own velocities, and everything else is thermal.",
+            "[initial]\nkind = \"data\"\nfile = \"start.data\"\nvelocities = \"keep\""),
         velocity(
             FILLED,
             "[initial]\nkind = \"sphere\"\nradius = 2.0\ndensity = 3.0\nvelocity = [0.0, 0.0, -1.0]",
@@ -109,30 +80,18 @@ pub const PART: Table = Table {
             frozen layer; phases that have separated are parts of one species each. Particles are numbered part \
             by part.",
     keys: &[
-        key(
-            "shape",
-            ValueKind::Choice(shapes),
-            REQUIRED,
+        key("shape", Choice(|| SHAPES.to_vec()), REQUIRED,
             "`box`: between two corners. `slab`: across the box. `layer`: a slab at a face. `sphere`: a disc in two \
              dimensions. `cylinder`. `rest`: what the other parts leave of the box.",
-            "[[part]]\nshape = \"sphere\"\nradius = 2.0\ndensity = 6.0\n[[part]]\nshape = \"rest\"\ndensity = 0.1",
-        ),
-        key(
-            "name",
-            ValueKind::Text,
-            OPTIONAL,
+            "[[part]]\nshape = \"sphere\"\nradius = 2.0\ndensity = 6.0\n[[part]]\nshape = \"rest\"\ndensity = 0.1"),
+        key("name", Text, OPTIONAL,
             "What the part is called, for body forces; `part 1`, `part 2` … if left out.",
-            "[[part]]\nname = \"drop\"\nshape = \"sphere\"\nradius = 2.0\ndensity = 6.0",
-        ),
-        key(
-            "frozen",
-            ValueKind::Flag,
-            OPTIONAL,
+            "[[part]]\nname = \"drop\"\nshape = \"sphere\"\nradius = 2.0\ndensity = 6.0"),
+        key("frozen", Flag, OPTIONAL,
             "Whether its particles never move. They act on the others through every force, drag and noise included; \
              temperature and momentum are those of the others. False if left out.",
             "[[part]]\nshape = \"layer\"\nface = \"zlo\"\nthickness = 1.0\ndensity = 3.0\nfrozen = true\n\
-             [[part]]\nshape = \"rest\"\ndensity = 3.0",
-        ),
+             [[part]]\nshape = \"rest\"\ndensity = 3.0"),
         density(&[], "[[part]]\nshape = \"box\"\ndensity = 3.0"),
         count(&[], "[[part]]\nshape = \"box\"\ncount = 500"),
         composition(&[], "[[part]]\nshape = \"box\"\ndensity = 3.0\ncomposition = { A = 0.9, B = 0.1 }"),
@@ -143,22 +102,12 @@ pub const PART: Table = Table {
         ),
         lattice(&[], "[[part]]\nshape = \"sphere\"\nradius = 2.0\ndensity = 3.0\nlattice = \"bcc\""),
         min_distance(&[], "[[part]]\nshape = \"box\"\ndensity = 3.0\nmin_distance = 0.4"),
-        form_key(
-            &["box"],
-            "low",
-            ValueKind::Point,
-            OPTIONAL,
+        form_key(&["box"], "low", Point, OPTIONAL,
             "The lower corner; that of the box if left out.",
-            "[[part]]\nshape = \"box\"\nlow = [1.0, 1.0, 1.0]\ndensity = 3.0",
-        ),
-        form_key(
-            &["box"],
-            "high",
-            ValueKind::Point,
-            OPTIONAL,
+            "[[part]]\nshape = \"box\"\nlow = [1.0, 1.0, 1.0]\ndensity = 3.0"),
+        form_key(&["box"], "high", Point, OPTIONAL,
             "The upper corner; that of the box if left out.",
-            "[[part]]\nshape = \"box\"\nhigh = [6.0, 6.0, 3.0]\ndensity = 3.0",
-        ),
+            "[[part]]\nshape = \"box\"\nhigh = [6.0, 6.0, 3.0]\ndensity = 3.0"),
         axis(
             &["slab", "cylinder"],
             "[[part]]\nshape = \"cylinder\"\naxis = \"x\"\nradius = 2.0\ndensity = 3.0",
@@ -167,28 +116,18 @@ pub const PART: Table = Table {
             &["slab", "layer"],
             "[[part]]\nshape = \"layer\"\nface = \"xhi\"\nthickness = 2.0\ndensity = 3.0",
         ),
-        form_key(
-            &["layer"],
-            "face",
-            ValueKind::Choice(faces),
-            REQUIRED,
+        form_key(&["layer"], "face", Choice(|| names(&FACES)), REQUIRED,
             "The face it lies at.",
-            "[[part]]\nshape = \"layer\"\nface = \"zlo\"\nthickness = 1.0\ndensity = 3.0",
-        ),
+            "[[part]]\nshape = \"layer\"\nface = \"zlo\"\nthickness = 1.0\ndensity = 3.0"),
         at("[[part]]\nshape = \"slab\"\nthickness = 3.0\nat = 2.0\ndensity = 3.0"),
         radius("[[part]]\nshape = \"sphere\"\nradius = 2.0\ndensity = 3.0"),
         center(
             "[[part]]\nshape = \"cylinder\"\nradius = 2.0\nlength = 2.0\ncenter = [3.0, 3.0, 5.0]\ndensity = 3.0",
         ),
         length("[[part]]\nshape = \"cylinder\"\nradius = 2.0\nlength = 3.0\ndensity = 3.0"),
-        form_key(
-            &[],
-            "velocities",
-            ValueKind::Choice(part_velocities),
-            OPTIONAL,
-            "`thermal`: Maxwell's distribution at kT, without momentum in all. `zero`: none. Thermal if left out.",
-            "[[part]]\nshape = \"box\"\ndensity = 3.0\nvelocities = \"zero\"",
-        ),
+        form_key(&[], "velocities", Choice(|| vec!["thermal", "zero"]), OPTIONAL,
+            "`thermal`: Maxwell's distribution at kT, with zero total momentum. `zero`: none. Thermal if left out.",
+            "[[part]]\nshape = \"box\"\ndensity = 3.0\nvelocities = \"zero\""),
         velocity(
             &[],
             "[[part]]\nshape = \"sphere\"\nradius = 1.4\ncenter = [3.0, 3.0, 1.5]\ndensity = 3.0\nvelocity = [0.0, 0.0, 1.0]\n\
@@ -197,134 +136,70 @@ pub const PART: Table = Table {
     ],
 };
 
-fn part_velocities() -> Vec<&'static str> {
-    vec!["thermal", "zero"]
-}
-
 type Forms = &'static [&'static str];
 
 const fn density(forms: Forms, example: &'static str) -> Key {
-    form_key(
-        forms,
-        "density",
-        ValueKind::Positive,
-        OPTIONAL,
-        "Number density where it is filled; that of the scene if left out.",
-        example,
-    )
+    form_key(forms, "density", Positive, OPTIONAL,
+        "Number density where it is filled; that of the scene if left out.", example)
 }
 
 const fn count(forms: Forms, example: &'static str) -> Key {
-    form_key(
-        forms,
-        "count",
-        ValueKind::Count,
-        OPTIONAL,
-        "Number of particles, instead of a density.",
-        example,
-    )
+    form_key(forms, "count", Count, OPTIONAL, "Number of particles, instead of a density.", example)
 }
 
 const fn composition(forms: Forms, example: &'static str) -> Key {
-    form_key(
-        forms,
-        "composition",
-        ValueKind::Fractions,
-        OPTIONAL,
+    form_key(forms, "composition", Fractions, OPTIONAL,
         "Number fractions of the species, which add up to 1 and are mixed at random; equal shares if left out.",
-        example,
-    )
+        example)
 }
 
 const fn species(forms: Forms, example: &'static str) -> Key {
-    form_key(
-        forms,
-        "species",
-        ValueKind::Text,
-        OPTIONAL,
-        "The one species there, instead of a composition.",
-        example,
-    )
+    form_key(forms, "species", Text, OPTIONAL, "The one species there, instead of a composition.", example)
 }
 
 const fn lattice(forms: Forms, example: &'static str) -> Key {
-    form_key(
-        forms,
-        "lattice",
-        ValueKind::Choice(lattices),
-        OPTIONAL,
+    form_key(forms, "lattice", Choice(lattices), OPTIONAL,
         "The lattice that particles are put on: `sc`, `bcc`, `fcc`, or in two dimensions `square`, `hexagonal`. In a \
          block it is stretched to fit with whole cells. Sites left over are vacancies, spread evenly. At random \
          if left out; `sc` or `square` for `kind = \"lattice\"`.",
-        example,
-    )
+        example)
 }
 
 const fn min_distance(forms: Forms, example: &'static str) -> Key {
-    form_key(
-        forms,
-        "min_distance",
-        ValueKind::Positive,
-        OPTIONAL,
-        "The least distance of random particles from each other and from parts before: places nearer are thrown \
-         again. A scene whose particles find no place is refused; up to about 0.75 density^(-1/3), in two \
-         dimensions 0.7 density^(-1/2), they do.",
-        example,
-    )
+    form_key(forms, "min_distance", Positive, OPTIONAL,
+        "The least distance of random particles from each other and from parts before: closer positions are \
+         redrawn. A scene without room for its particles is refused; there is room up to about 0.75 density^(-1/3), \
+         in two dimensions 0.7 density^(-1/2).",
+        example)
 }
 
 const fn axis(forms: Forms, example: &'static str) -> Key {
-    form_key(
-        forms,
-        "axis",
-        ValueKind::Choice(axes),
-        OPTIONAL,
-        "Direction of the normal of a slab, of the axis of a cylinder; the last if left out.",
-        example,
-    )
+    form_key(forms, "axis", Choice(|| names(&AXES)), OPTIONAL,
+        "Direction of the normal of a slab, of the axis of a cylinder; the last if left out.", example)
 }
 
 const fn thickness(forms: Forms, example: &'static str) -> Key {
-    form_key(forms, "thickness", ValueKind::Positive, REQUIRED, "The thickness.", example)
+    form_key(forms, "thickness", Positive, REQUIRED, "The thickness.", example)
 }
 
 const fn at(example: &'static str) -> Key {
-    form_key(
-        &["slab"],
-        "at",
-        ValueKind::Number,
-        OPTIONAL,
-        "Where its middle is, along its normal; in the middle of the box if left out.",
-        example,
-    )
+    form_key(&["slab"], "at", Number, OPTIONAL,
+        "Where its middle is, along its normal; in the middle of the box if left out.", example)
 }
 
 const fn radius(example: &'static str) -> Key {
-    form_key(ROUND, "radius", ValueKind::Positive, REQUIRED, "The radius.", example)
+    form_key(ROUND, "radius", Positive, REQUIRED, "The radius.", example)
 }
 
 const fn center(example: &'static str) -> Key {
-    form_key(ROUND, "center", ValueKind::Point, OPTIONAL, "The middle; that of the box if left out.", example)
+    form_key(ROUND, "center", Point, OPTIONAL, "The middle; that of the box if left out.", example)
 }
 
 const fn length(example: &'static str) -> Key {
-    form_key(
-        &["cylinder"],
-        "length",
-        ValueKind::Positive,
-        OPTIONAL,
-        "The length; that of the box if left out.",
-        example,
-    )
+    form_key(&["cylinder"], "length", Positive, OPTIONAL, "The length; that of the box if left out.", example)
 }
 
 const fn velocity(forms: Forms, example: &'static str) -> Key {
-    form_key(
-        forms,
-        "velocity",
-        ValueKind::Point,
-        OPTIONAL,
-        "A velocity that all have in common, on top of their own.",
-        example,
-    )
+    form_key(forms, "velocity", Point, OPTIONAL,
+        "A velocity that is added to those of all its particles.", example)
 }

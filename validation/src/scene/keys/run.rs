@@ -1,7 +1,9 @@
 //! What is done with the particles, and what is written.
 
 use super::scene::{INTEGRATOR, LAMBDA, NOISE, THERMOSTAT_EVERY, THERMOSTAT_STEP};
-use super::{Key, OPTIONAL, REQUIRED, Table, ValueKind, axes, key};
+use super::ValueKind::*;
+use super::{Key, OPTIONAL, REQUIRED, Table, key, names};
+use crate::scene::number::AXES;
 
 /// `[[body_force]]`.
 pub const BODY_FORCE: Table = Table {
@@ -12,37 +14,21 @@ pub const BODY_FORCE: Table = Table {
     about: "An acceleration from outside; any number of them, which add up. Potential energies and virials do not \
             count it.",
     keys: &[
-        key(
-            "acceleration",
-            ValueKind::Point,
-            REQUIRED,
+        key("acceleration", Point, REQUIRED,
             "The acceleration; the force is the mass times this. Gravity, for example.",
-            "[[body_force]]\nacceleration = [0.0, 0.0, -0.02]",
-        ),
-        key(
-            "reversed_along",
-            ValueKind::Choice(axes),
-            OPTIONAL,
+            "[[body_force]]\nacceleration = [0.0, 0.0, -0.02]"),
+        key("reversed_along", Choice(|| names(&AXES)), OPTIONAL,
             "A direction along which the second half of the box has the opposite acceleration: two Poiseuille \
              flows side by side, without walls, whose profile gives the viscosity.",
-            "[[body_force]]\nacceleration = [0.02, 0.0, 0.0]\nreversed_along = \"z\"",
-        ),
-        key(
-            "species",
-            ValueKind::Names,
-            OPTIONAL,
+            "[[body_force]]\nacceleration = [0.02, 0.0, 0.0]\nreversed_along = \"z\""),
+        key("species", Names, OPTIONAL,
             "The species it acts on; all if left out.",
-            "[[body_force]]\nacceleration = [0.0, 0.0, -0.02]\nspecies = [\"B\"]",
-        ),
-        key(
-            "parts",
-            ValueKind::Names,
-            OPTIONAL,
+            "[[body_force]]\nacceleration = [0.0, 0.0, -0.02]\nspecies = [\"B\"]"),
+        key("parts", Names, OPTIONAL,
             "The parts whose particles it acts on, wherever they go; all if left out.",
             "[[body_force]]\nacceleration = [0.0, 0.0, -0.02]\nparts = [\"drop\"]\n\
              [[part]]\nname = \"drop\"\nshape = \"sphere\"\nradius = 2.0\ndensity = 6.0\n\
-             [[part]]\nshape = \"rest\"\ndensity = 0.1",
-        ),
+             [[part]]\nshape = \"rest\"\ndensity = 0.1"),
     ],
 };
 
@@ -84,61 +70,32 @@ pub const STAGE: Table = Table {
     forms: ("", &[]),
     about: "Parts of a run under conditions of their own, one after the other: instead of `steps`.",
     keys: &[
-        key(
-            "name",
-            ValueKind::Text,
-            REQUIRED,
-            "What the stage is called.",
-            "[[stage]]\nname = \"equilibrate\"\nsteps = 500",
-        ),
-        key(
-            "steps",
-            ValueKind::Count,
-            REQUIRED,
+        key("name", Text, REQUIRED,
+            "What the stage is called.", "[[stage]]\nname = \"equilibrate\"\nsteps = 500"),
+        key("steps", Count, REQUIRED,
             "How many steps, 1 at least.",
-            "[[stage]]\nname = \"equilibrate\"\nsteps = 500\n[[stage]]\nname = \"produce\"\nsteps = 2000",
-        ),
-        key(
-            "dt",
-            ValueKind::Positive,
-            OPTIONAL,
+            "[[stage]]\nname = \"equilibrate\"\nsteps = 500\n[[stage]]\nname = \"produce\"\nsteps = 2000"),
+        key("dt", Positive, OPTIONAL,
             "The time step; that of the top level if left out.",
-            "[[stage]]\nname = \"produce\"\nsteps = 1000\ndt = 0.005",
-        ),
+            "[[stage]]\nname = \"produce\"\nsteps = 1000\ndt = 0.005"),
         STAGE_INTEGRATOR,
         STAGE_LAMBDA,
         STAGE_THERMOSTAT_STEP,
         STAGE_THERMOSTAT_EVERY,
         STAGE_NOISE,
-        key(
-            "kT",
-            ValueKind::Temperature,
-            OPTIONAL,
+        key("kT", Temperature, OPTIONAL,
             "The temperature; that of the top level if left out. Two make a ramp, `[from, to]`, in levels of equal \
              steps; the last level is at `to`.",
-            "[[stage]]\nname = \"quench\"\nsteps = 1000\nkT = [2.0, 1.0]",
-        ),
-        key(
-            "levels",
-            ValueKind::Count,
-            OPTIONAL,
+            "[[stage]]\nname = \"quench\"\nsteps = 1000\nkT = [2.0, 1.0]"),
+        key("levels", Count, OPTIONAL,
             "How many levels a ramp has; 20 if left out.",
-            "[[stage]]\nname = \"quench\"\nsteps = 1000\nkT = [2.0, 1.0]\nlevels = 50",
-        ),
-        key(
-            "thermostat",
-            ValueKind::Flag,
-            OPTIONAL,
+            "[[stage]]\nname = \"quench\"\nsteps = 1000\nkT = [2.0, 1.0]\nlevels = 50"),
+        key("thermostat", Flag, OPTIONAL,
             "Whether dissipative and random forces act; true if left out.",
-            "[[stage]]\nname = \"alone\"\nsteps = 1000\nthermostat = false",
-        ),
-        key(
-            "body_forces",
-            ValueKind::Flag,
-            OPTIONAL,
+            "[[stage]]\nname = \"alone\"\nsteps = 1000\nthermostat = false"),
+        key("body_forces", Flag, OPTIONAL,
             "Whether body forces act; true if left out.",
-            "[[body_force]]\nacceleration = [0.0, 0.0, -0.02]\n[[stage]]\nname = \"settle\"\nsteps = 1000\nbody_forces = false",
-        ),
+            "[[body_force]]\nacceleration = [0.0, 0.0, -0.02]\n[[stage]]\nname = \"settle\"\nsteps = 1000\nbody_forces = false"),
     ],
 };
 
@@ -150,41 +107,18 @@ pub const OUTPUT: Table = Table {
     forms: ("", &[]),
     about: "What a run writes beside its final state.",
     keys: &[
-        key(
-            "thermo",
-            ValueKind::Count,
-            OPTIONAL,
-            "Steps between rows of totals; 100 if left out, 0 for none.",
-            "[output]\nthermo = 50",
-        ),
-        key(
-            "dump",
-            ValueKind::Count,
-            OPTIONAL,
-            "Steps between frames with every particle; 0, for none, if left out.",
-            "[output]\ndump = 500",
-        ),
-        key(
-            "xyz",
-            ValueKind::Count,
-            OPTIONAL,
+        key("thermo", Count, OPTIONAL,
+            "Steps between rows of totals; 100 if left out, 0 for none.", "[output]\nthermo = 50"),
+        key("dump", Count, OPTIONAL,
+            "Steps between frames with every particle; 0, for none, if left out.", "[output]\ndump = 500"),
+        key("xyz", Count, OPTIONAL,
             "Steps between frames with every particle as extended XYZ; 0, for none, if left out.",
-            "[output]\nxyz = 500",
-        ),
-        key(
-            "snapshot",
-            ValueKind::Count,
-            OPTIONAL,
-            "Steps between pictures of the particles; 0, for none, if left out.",
-            "[output]\nsnapshot = 1000",
-        ),
-        key(
-            "checkpoint",
-            ValueKind::Count,
-            OPTIONAL,
+            "[output]\nxyz = 500"),
+        key("snapshot", Count, OPTIONAL,
+            "Steps between pictures of the particles; 0, for none, if left out.", "[output]\nsnapshot = 1000"),
+        key("checkpoint", Count, OPTIONAL,
             "Steps between checkpoints, from which an interrupted run goes on; every ten minutes if left out, 0 for \
              none but at the end.",
-            "[output]\ncheckpoint = 10000",
-        ),
+            "[output]\ncheckpoint = 10000"),
     ],
 };

@@ -1,76 +1,37 @@
 //! Which fluid, in which box.
 
-use super::{Key, OPTIONAL, REQUIRED, Table, ValueKind, key};
-use crate::run::{Integrator, THERMOSTAT_STEPS};
+use super::ValueKind::*;
+use super::{Key, OPTIONAL, REQUIRED, Table, key, names};
+use crate::integrator::{Integrator, THERMOSTAT_STEPS};
 use crate::scene::domain::BOUNDARIES;
 use psidpd_core::engine::Precision;
 use psidpd_core::engine::noise::Law;
 
-fn boundaries() -> Vec<&'static str> {
-    BOUNDARIES.iter().map(|(name, _)| *name).collect()
-}
-
-fn integrators() -> Vec<&'static str> {
-    Integrator::ALL.iter().map(|(name, _)| *name).collect()
-}
-
-fn thermostat_steps() -> Vec<&'static str> {
-    THERMOSTAT_STEPS.iter().map(|(name, _)| *name).collect()
-}
-
-fn laws() -> Vec<&'static str> {
-    Law::ALL.iter().map(|(name, _)| *name).collect()
-}
-
-fn precisions() -> Vec<&'static str> {
-    Precision::ALL.iter().map(|(name, _)| *name).collect()
-}
-
-pub(super) const INTEGRATOR: Key = key(
-    "integrator",
-    ValueKind::Choice(integrators),
-    OPTIONAL,
+pub(super) const INTEGRATOR: Key = key("integrator", Choice(|| names(&Integrator::ALL)), OPTIONAL,
     "How a step is made; `velocity-verlet` if left out, in which the dissipative force sees the half-step \
      velocity, as in LAMMPS. `docs/integrators.md` states each, says what is exact in it and which step it allows.",
-    "integrator = \"groot-warren\"",
-);
+    "integrator = \"groot-warren\"");
 
-pub(super) const LAMBDA: Key = key(
-    "lambda",
-    ValueKind::Number,
-    OPTIONAL,
+pub(super) const LAMBDA: Key = key("lambda", Number, OPTIONAL,
     "The parameter of `groot-warren`, from 0 to 1, 0.65 if left out, which is velocity Verlet with 0.5; and that of \
      `two-stage`, from 0 to 0.5, 0.21 if left out.",
-    "integrator = \"groot-warren\"\nlambda = 0.5",
-);
+    "integrator = \"groot-warren\"\nlambda = 0.5");
 
-pub(super) const THERMOSTAT_STEP: Key = key(
-    "thermostat_step",
-    ValueKind::Choice(thermostat_steps),
-    OPTIONAL,
+pub(super) const THERMOSTAT_STEP: Key = key("thermostat_step", Choice(|| names(&THERMOSTAT_STEPS)), OPTIONAL,
     "The thermostat of `aboba`, `baoab` and `two-stage`; `midpoint` if left out: the implicit midpoint rule over all \
      pairs at once. `pairwise` is the exact Ornstein–Uhlenbeck process of one pair after the other.",
-    "integrator = \"aboba\"\nthermostat_step = \"pairwise\"",
-);
+    "integrator = \"aboba\"\nthermostat_step = \"pairwise\"");
 
-pub(super) const THERMOSTAT_EVERY: Key = key(
-    "thermostat_every",
-    ValueKind::Count,
-    OPTIONAL,
+pub(super) const THERMOSTAT_EVERY: Key = key("thermostat_every", Count, OPTIONAL,
     "Steps from one thermostat to the next in `aboba`, `baoab` and `two-stage`, each for as many time steps; 1 if left \
      out.",
-    "integrator = \"two-stage\"\nthermostat_every = 2",
-);
+    "integrator = \"two-stage\"\nthermostat_every = 2");
 
-pub(super) const NOISE: Key = key(
-    "noise",
-    ValueKind::Choice(laws),
-    OPTIONAL,
+pub(super) const NOISE: Key = key("noise", Choice(|| names(&Law::ALL)), OPTIONAL,
     "The law of the noise where it acts apart from the forces; `gaussian` if left out. With `uniform` the distribution of \
      velocities is not quite that of Maxwell at large time steps. The noise of `velocity-verlet` and \
      `groot-warren` is uniform, that of `lowe-andersen` Gaussian.",
-    "integrator = \"aboba\"\nnoise = \"uniform\"",
-);
+    "integrator = \"aboba\"\nnoise = \"uniform\"");
 
 /// The top level.
 pub const TOP: Table = Table {
@@ -81,69 +42,34 @@ pub const TOP: Table = Table {
     about: "Which fluid, how warm, in which box, for how long. A scene needs a model, kT, a box, something in it \
             (`density`, `[initial]` or `[[part]]`) and steps (`steps` or `[[stage]]`).",
     keys: &[
-        key(
-            "title",
-            ValueKind::Text,
-            OPTIONAL,
+        key("title", Text, OPTIONAL,
             "What the scene is called; the title of the model if left out.",
-            "title = \"A drop of Warren's liquid\"",
-        ),
-        key("model", ValueKind::File, REQUIRED, "The model file: the fluid.", "model = \"fluid.toml\""),
-        key(
-            "kT",
-            ValueKind::Positive,
-            REQUIRED,
+            "title = \"A drop of Warren's liquid\""),
+        key("model", File, REQUIRED, "The model file: the fluid.", "model = \"fluid.toml\""),
+        key("kT", Positive, REQUIRED,
             "The temperature: of the initial velocities, of the thermostat, and in the formulas of the model.",
-            "kT = 1.0",
-        ),
-        key(
-            "seed",
-            ValueKind::Count,
-            OPTIONAL,
+            "kT = 1.0"),
+        key("seed", Count, OPTIONAL,
             "Seed of the initial state and of the noise; 1 if left out. The same file gives the same run.",
-            "seed = 4711",
-        ),
-        key(
-            "box",
-            ValueKind::Box,
-            OPTIONAL,
+            "seed = 4711"),
+        key("box", Box, OPTIONAL,
             "The box, from the origin along the axes: one length for all edges, one for each, or a table. A start \
-             from a file has its box from there.",
-            "box = [8.0, 8.0, 16.0]",
-        ),
-        key(
-            "density",
-            ValueKind::Positive,
-            OPTIONAL,
+             from a file takes its box from there.",
+            "box = [8.0, 8.0, 16.0]"),
+        key("density", Positive, OPTIONAL,
             "Number density of everything that is filled and has no density or count of its own. Without \
              `[initial]` and `[[part]]` the whole box is filled, at random and with equal shares of the species.",
-            "density = 3.0",
-        ),
-        key(
-            "steps",
-            ValueKind::Count,
-            OPTIONAL,
-            "Steps of a run of one stage, named `produce`.",
-            "steps = 2000",
-        ),
-        key(
-            "equilibrate",
-            ValueKind::Count,
-            OPTIONAL,
-            "Steps of a stage `equilibrate` before it.",
-            "equilibrate = 500\nsteps = 2000",
-        ),
-        key("dt", ValueKind::Positive, OPTIONAL, "The time step; 0.01 if left out.", "dt = 0.02"),
+            "density = 3.0"),
+        key("steps", Count, OPTIONAL, "Steps of a run of one stage, named `produce`.", "steps = 2000"),
+        key("equilibrate", Count, OPTIONAL,
+            "Steps of a stage `equilibrate` before it.", "equilibrate = 500\nsteps = 2000"),
+        key("dt", Positive, OPTIONAL, "The time step; 0.01 if left out.", "dt = 0.02"),
         INTEGRATOR,
-        key(
-            "precision",
-            ValueKind::Choice(precisions),
-            OPTIONAL,
-            "In what `psidpd run` computes the forces of pairs; `mixed` if left out: single precision, with positions \
-             exact to 2⁻³² of the box and sums in double precision. The option `--precision` goes before it. A deck \
-             for LAMMPS has it if it is given; pair styles are in double precision otherwise.",
-            "precision = \"double\"",
-        ),
+        key("precision", Choice(|| names(&Precision::ALL)), OPTIONAL,
+            "Precision in which `psidpd run` computes pair forces; `mixed` if left out: single precision, with positions \
+             exact to 2⁻³² of the box and sums in double precision. The option `--precision` overrides it. A deck \
+             for LAMMPS takes it over if it is given; pair styles are in double precision otherwise.",
+            "precision = \"double\""),
         LAMBDA,
         THERMOSTAT_STEP,
         THERMOSTAT_EVERY,
@@ -159,22 +85,14 @@ pub const BOX: Table = Table {
     forms: ("", &[]),
     about: "The box, where it needs more than lengths.",
     keys: &[
-        key(
-            "lengths",
-            ValueKind::Lengths,
-            OPTIONAL,
+        key("lengths", Lengths, OPTIONAL,
             "Lengths of its edges; left out in a start from a file, needed otherwise.",
-            "[box]\nlengths = [8.0, 8.0, 16.0]",
-        ),
-        key(
-            "boundary",
-            ValueKind::EachOf(boundaries),
-            OPTIONAL,
+            "[box]\nlengths = [8.0, 8.0, 16.0]"),
+        key("boundary", EachOf(|| names(&BOUNDARIES)), OPTIONAL,
             "What happens at its faces; `periodic` if left out, or as it was in a checkpoint that is started from. A \
              face that reflects puts a particle as far inside as it was outside and reverses its velocity across the \
              face; nothing acts through it. For a wall of particles freeze a `layer` in front of it.",
-            "[box]\nlengths = [8.0, 8.0, 16.0]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]",
-        ),
+            "[box]\nlengths = [8.0, 8.0, 16.0]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]"),
     ],
 };
 
@@ -185,5 +103,5 @@ pub const MASSES: Table = Table {
     array: false,
     forms: ("", &[]),
     about: "Masses of the species; 1, or what a data file says, for those left out.",
-    keys: &[key("SPECIES", ValueKind::Positive, OPTIONAL, "The mass of a species.", "[masses]\nB = 2.0")],
+    keys: &[key("SPECIES", Positive, OPTIONAL, "The mass of a species.", "[masses]\nB = 2.0")],
 };

@@ -3,10 +3,10 @@
 mod overlap;
 mod read;
 
-pub use read::{SHAPES, Shapes, faces};
+pub use read::{FACES, SHAPES, Shapes};
 
-/// A region. Directions and lengths are those of a box along the axes; in two dimensions the third
-/// coordinate is not looked at.
+/// A region. Directions and lengths are those of a box along the axes; in two dimensions the third coordinate
+/// is ignored.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Shape {
     /// Between two corners.

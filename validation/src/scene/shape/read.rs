@@ -5,11 +5,6 @@ use crate::scene::number::{axis, positive, vector};
 use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
 use psidpd_core::engine::PeriodicBox;
 
-/// The names of the faces.
-pub fn faces() -> Vec<&'static str> {
-    FACES.iter().map(|(name, _)| *name).collect()
-}
-
 /// How far, as a share of the box, a region may reach beyond it by rounding.
 const ROUNDING: f64 = 1e-9;
 
@@ -17,7 +12,7 @@ const ROUNDING: f64 = 1e-9;
 pub const SHAPES: &[&str] = &["box", "slab", "layer", "sphere", "cylinder", "rest"];
 
 /// The faces of a box.
-const FACES: [(&str, (usize, bool)); 6] = [
+pub const FACES: [(&str, (usize, bool)); 6] = [
     ("xlo", (0, false)),
     ("xhi", (0, true)),
     ("ylo", (1, false)),

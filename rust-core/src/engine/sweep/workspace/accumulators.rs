@@ -1,21 +1,22 @@
-//! What pairs add to particles: forces and densities. Each plane has accumulators of its own, for its particles and those of
-//! the next, so that sums do not depend on which thread does which plane, nor when.
+//! Accumulators: the sums over pairs of forces and densities. Each plane has accumulators for its own particles and for
+//! those of the next plane. So the order of every sum is fixed, whichever thread does which plane.
 
 use super::cell_order::CellOrder;
 use psidpd_passes::pair_batch::accumulators::Accumulator;
 use std::ops::Range;
 
-/// Blocks of accumulators of a thread slab: those of its first two planes wait for all threads, three take turns.
+/// Blocks of accumulators of a thread slab. The blocks of its first two planes are kept until all threads are done; the
+/// other planes reuse three blocks in turn.
 const ACCUMULATOR_SLOTS: usize = 2 + TURNS;
 
-/// Planes whose accumulators are needed at once: when one is begun, the one before has no many-body forces yet, and
-/// what the one before that has added to this one is not with its force.
+/// Planes whose accumulators are needed at once. When a plane begins, the plane before still lacks its many-body forces, and
+/// what the plane before that one added to it is not yet part of the forces.
 const TURNS: usize = 3;
 
-/// The accumulators of all planes, those of a thread slab in one piece.
+/// The accumulators of all planes. Those of a thread slab are contiguous.
 #[derive(Default)]
 pub struct AccumulatorArrays {
-    /// What to add to the number of a particle to get that of its accumulator, for each plane.
+    /// For each plane: index of an accumulator minus index of its particle.
     offset: Vec<isize>,
     /// How many accumulators each thread slab has.
     slab_sizes: Vec<usize>,
@@ -45,7 +46,7 @@ pub struct Sums<'a> {
     quads: usize,
 }
 
-/// What has been added to some particles that follow each other, by the pairs of one plane.
+/// The sums of consecutive particles over the pairs of one plane.
 #[derive(Clone, Copy)]
 pub struct Added<'a> {
     pub forces: &'a [Accumulator],
@@ -86,7 +87,7 @@ impl AccumulatorArrays {
         self.densities.resize(self.quads * begin, Accumulator::default());
     }
 
-    /// Those of each thread slab.
+    /// Splits them by thread slab.
     pub fn split(&mut self) -> impl Iterator<Item = SlabSums<'_>> {
         let AccumulatorArrays { offset, slab_sizes, forces, densities, quads } = self;
         let (offset, quads) = (&offset[..], *quads);
@@ -102,7 +103,7 @@ impl AccumulatorArrays {
         })
     }
 
-    /// All of them, to read.
+    /// Read access to all accumulators.
     pub fn sums(&self) -> Sums<'_> {
         let AccumulatorArrays { offset, forces, densities, quads, .. } = self;
         Sums { forces, densities, offset, begin: 0, quads: *quads }
@@ -120,7 +121,7 @@ fn block_size(order: &CellOrder, plane: usize) -> usize {
 }
 
 impl SlabSums<'_> {
-    /// Those of a plane of the slab: of its particles, then of those of the next; of forces, and of densities.
+    /// The force and density accumulators of a plane: of its own particles, then of those of the next plane.
     pub fn of_plane(&mut self, order: &CellOrder, plane: usize) -> [&mut [Accumulator]; 2] {
         let first = (order.plane_start(plane) as isize + self.offset[plane]) as usize - self.begin;
         let range = first..first + block_size(order, plane);
@@ -128,7 +129,7 @@ impl SlabSums<'_> {
         [&mut self.forces[range.clone()], &mut self.densities[quads * range.start..quads * range.end]]
     }
 
-    /// To read.
+    /// Read access.
     pub fn sums(&self) -> Sums<'_> {
         let SlabSums { forces, densities, offset, begin, quads } = self;
         Sums { forces, densities, offset, begin: *begin, quads: *quads }

@@ -4,7 +4,7 @@ mod count;
 mod extremes;
 mod fractions;
 
-use super::input::Input;
+use super::input::{Input, VECTOR_PADDING};
 use crate::engine::error::EngineError;
 use crate::engine::vectors;
 use count::{Count, CountRange, NO_CELL};
@@ -24,6 +24,7 @@ pub use fractions::TWO_TO_32;
 const PREFETCH_THRESHOLD: usize = if cfg!(test) { 100 } else { 1 << 14 };
 
 /// Which particles are in which cell. Behind the last plane follow copies of the first, if planes are periodic.
+#[derive(Clone)]
 pub struct CellOrder {
     pub geometry: BoxGeometry,
     pub grid: CellGrid,
@@ -211,6 +212,12 @@ impl CellOrder {
     /// How many particles the plane behind `plane` has.
     pub fn next_plane(&self, plane: usize) -> usize {
         if plane + 1 < self.grid.planes { self.plane(plane + 1).1 } else { self.copies() }
+    }
+
+    /// The places that one of `threads` fills: from a whole vector on, and up to one, or to the last.
+    pub fn whole_vectors(&self, thread: usize, threads: usize) -> Range<usize> {
+        let vectors = part(self.particles().div_ceil(VECTOR_PADDING), thread, threads);
+        vectors.start * VECTOR_PADDING..(vectors.end * VECTOR_PADDING).min(self.particles())
     }
 
     /// Whether the first plane follows the last: periodic along the plane axis.

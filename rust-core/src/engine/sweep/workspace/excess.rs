@@ -12,23 +12,22 @@ use crate::engine::vectors::{self, Loop};
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::pair_batch::accumulators::Accumulator;
 
-/// Particles whose densities are gathered at a time: they stay in the first-level cache until ψ is evaluated, and
-/// make several blocks of lanes where not all take part.
+/// Particles whose densities are gathered at once: few enough to stay in the first-level cache until ψ is evaluated, and
+/// enough to fill several blocks of lanes where some particles take no part.
 pub const DENSITY_BLOCK: usize = 2 * LANES;
 
 /// What ψ is evaluated with.
 pub struct ExcessInput<'a> {
     pub plan: &'a Plan,
     pub tag: &'a [i32],
-    /// What a particle itself adds to the densities of the passes: `w(0)` of its species, or nothing. A row for each
-    /// species.
+    /// The self term of each density: `w(0)` for the particle's own species, else zero. One row for each species.
     self_weights: Vec<f64>,
     /// What is added beside pairs, a row for each owned particle in the host's order; empty if nothing is.
     added: &'a [f64],
 }
 
 impl<'a> ExcessInput<'a> {
-    /// None if ψ is zero whatever the densities are.
+    /// None if ψ is zero at all densities.
     pub fn new(plan: &'a Plan, input: &Input<'a>) -> Option<ExcessInput<'a>> {
         if plan.excess.iter().all(|e| matches!(e, ExcessPlan::Constant(0.0))) {
             return None;
@@ -60,7 +59,7 @@ impl<'a> ExcessInput<'a> {
     }
 }
 
-/// Some particles that follow each other, no more than [`DENSITY_BLOCK`].
+/// Up to [`DENSITY_BLOCK`] consecutive particles.
 pub struct DensityBlock<'a> {
     /// The first.
     pub first: usize,
@@ -103,7 +102,7 @@ impl DensityBlock<'_> {
     }
 }
 
-/// Densities of particles, `width` each, from what pairs have added, and what each particle adds itself.
+/// Densities of particles, `width` each: sums over pairs plus self terms.
 fn sum_densities(
     set: InstructionSet,
     width: usize,

@@ -1,4 +1,4 @@
-//! Forces in the host's order.
+//! Writes forces in the order of the host.
 
 use super::accumulators::Added;
 use crate::engine::vectors::{self, Loop};
@@ -6,11 +6,11 @@ use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::pair_batch::accumulators::Accumulator;
 use psidpd_threads::SharedSlice;
 
-/// Where the host wants forces.
+/// The host's array of forces.
 #[derive(Clone, Copy)]
 pub struct ForceSink<'a> {
     force: SharedSlice<'a, [f64; 3]>,
-    /// Whether they are added to what is there.
+    /// Whether forces are added to what the array holds.
     add: bool,
     tag: &'a [i32],
 }
@@ -43,13 +43,13 @@ impl<'a> ForceSink<'a> {
     }
 }
 
-/// Forces on the particles of one plane. Made by [`ForceSink::write`] alone, whose caller promises that nobody else writes
-/// the forces on them, and which has checked that there are forces on all owned particles.
+/// Forces on the particles of one plane. Only [`ForceSink::write`] makes it: its caller promises that no other thread writes
+/// these forces, and it has checked that the array has room for all owned particles.
 struct PlaneForces<'a> {
     /// The host's numbers of them.
     order: &'a [u32],
     owned: usize,
-    /// What the plane itself has added, and the plane before.
+    /// The sums over pairs of this plane, and of the plane before.
     here: &'a [Accumulator],
     before: Option<&'a [Accumulator]>,
     out: SharedSlice<'a, [f64; 3]>,

@@ -1,4 +1,4 @@
-//! What goes to the host and comes from it, in its own order.
+//! Exchange with the host, in the order of the host.
 
 use super::Workspace;
 use crate::engine::counts::PassCounts;
@@ -6,12 +6,12 @@ use psidpd_passes::compiled::PairPrecision;
 use psidpd_passes::tally::Tally;
 
 impl<P: PairPrecision> Workspace<P> {
-    /// The host's numbers of its particles in the order of cells.
+    /// The host's index of each particle, in the order of cells.
     pub fn order(&self) -> &[u32] {
         &self.order.order
     }
 
-    /// Slopes from the order of cells to the host's, those of particles it owns; entries of ghosts are unspecified.
+    /// Copies the slopes of owned particles to the order of the host; entries of ghosts are unspecified.
     pub fn slopes_to_host(&self, out: &mut Vec<f64>) {
         let (width, slopes) = (self.fluid.width(), self.slopes.rows());
         out.resize(width * self.order.all, 0.0);
@@ -32,7 +32,7 @@ impl<P: PairPrecision> Workspace<P> {
         }
     }
 
-    /// Slopes of ghosts from the host.
+    /// Takes the slopes of ghosts from the host.
     pub fn slopes_from_host(&mut self, slopes: &[f64]) {
         let width = self.fluid.width();
         for (s, (k, ghost)) in self.order.order.iter().zip(&self.particles.ghost).enumerate() {
@@ -87,7 +87,7 @@ impl<P: PairPrecision> Workspace<P> {
         sum
     }
 
-    /// What all threads have counted.
+    /// The counts of all threads.
     pub fn counts(&self) -> PassCounts {
         let mut sum = PassCounts::default();
         for state in &self.threads {

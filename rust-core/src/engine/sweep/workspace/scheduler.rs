@@ -1,16 +1,21 @@
-//! The passes, plane by plane, so that what a pass leaves for the next is used while it is still in the cache: all of
-//! them in one go where there are no ghosts, and then no more is kept than of a few planes; else up to ψ, and from the
-//! slopes of ghosts on.
+//! The scheduler runs the passes plane by plane, so that the results of one pass are still in the cache when the next
+//! pass reads them. Without ghosts all passes run in one go, and only a few planes are in memory at once. With ghosts an
+//! evaluation has two halves: up to ψ, and, when the host has sent the slopes of ghosts, the rest.
 //!
-//! Each thread does a slab of planes. ψ of a plane needs the first pass of that plane and of the one before; many-body
-//! forces need ψ of the plane and of the one behind; forces are complete after both passes of the plane and of the one
-//! before. The arrays in the order of cells are filled one plane ahead. Where slabs meet, planes wait for all threads.
+//! Each thread has a slab of planes. Dependencies between planes:
 //!
-//! Who accesses what: a [`ThreadSlab`] and its [`SlabSums`] hold what only its thread accesses. Two things are accessed
-//! by several threads. Packed particles are written by the thread of their slab, one plane ahead of its first pass, and
-//! read by it and, those of the slab's first plane and a vector behind, by the thread of the slab before: those places
-//! are filled before any pass begins. Slopes are written by the thread of their slab; those of its first plane are read by
-//! the thread of the slab before too, in a round of its own after all are written.
+//! - ψ of a plane needs the first pass over that plane and over the one before;
+//! - the second pass over a plane needs ψ of that plane and of the one behind;
+//! - forces of a plane need both passes over that plane and over the one before.
+//!
+//! Arrays in the order of cells are filled one plane ahead. The planes at the ends of slabs are finished when all threads
+//! have done their interiors.
+//!
+//! Which thread accesses what: a [`ThreadSlab`] and its [`SlabSums`] belong to one thread. Two arrays are shared.
+//! Packed particles are written by the thread of their slab, one plane ahead of its first pass. The thread of the slab
+//! before reads those of the slab's first plane and one vector behind: they are filled before any pass begins. Slopes are
+//! written by the thread of their slab. The thread of the slab before reads those of the first plane, in a separate round
+//! after all slopes are written.
 
 use super::accumulators::{SlabSums, Sums};
 use super::cell_order::CellOrder;
@@ -28,7 +33,7 @@ use psidpd_passes::plane::data::PassData;
 use std::ops::Range;
 use std::time::Instant;
 
-/// What all threads work with.
+/// The data that all threads share.
 pub struct Scheduler<'a, P: PairPrecision> {
     pub fluid: &'a FluidConstants<P::Scalar>,
     pub passes: Passes<P>,
@@ -38,7 +43,7 @@ pub struct Scheduler<'a, P: PairPrecision> {
     pub slopes: SharedSlopes<'a, P::Scalar>,
 }
 
-/// What the passes before the slopes are given.
+/// Input of the passes up to ψ.
 pub struct PassInput<'a> {
     pub input: &'a Input<'a>,
     /// None if ψ is zero.
@@ -68,14 +73,15 @@ pub fn thread_slabs(order: &CellOrder, threads: usize) -> Vec<Range<usize>> {
     (0..threads).map(slab).collect()
 }
 
-/// The last place before a plane, or behind all, from which on whole vectors are filled.
+/// The start of a plane, or the end of all, rounded down to a whole vector.
 fn vectors_before(order: &CellOrder, plane: usize) -> usize {
     order.plane_start(plane) / VECTOR_PADDING * VECTOR_PADDING
 }
 
-/// The places that the thread of a slab fills, as far as its first `planes` need them: all vectors that begin in them, the
-/// one across the beginning of the slab, and those behind, as neighbours are compared in sixteens, up to two of which begin
-/// behind the last. All of the slab's, if they stay in the cache.
+/// The places that the thread of a slab must have filled before it does its first `planes`: all vectors that begin in
+/// these planes, the vector across the start of the slab, and four behind, because the distance filter reads sixteen
+/// candidates at once and up to two such groups begin behind the last particle. If everything stays in the cache: all
+/// places of the slab.
 fn needed(order: &CellOrder, slab: &Range<usize>, planes: usize) -> Range<usize> {
     let (start, end) = (vectors_before(order, slab.start), vectors_before(order, slab.end));
     if !order.exceeds_cache() {
@@ -86,7 +92,8 @@ fn needed(order: &CellOrder, slab: &Range<usize>, planes: usize) -> Range<usize>
 }
 
 impl<P: PairPrecision> Scheduler<'_, P> {
-    /// Fills what the thread slab before needs of a thread slab, and, once, the last particles that are no whole vector.
+    /// Fills the places of a thread slab that the slab before reads; the first slab also fills the last particles, which are
+    /// no whole vector.
     pub fn fill_start(
         particles: &SharedParticles<P::PackedParticle>,
         fluid: &FluidConstants<P::Scalar>,
@@ -108,8 +115,9 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         lap(&mut since, &mut slab.state.times.sort);
     }
 
-    /// Arrays and first passes of a thread slab, and ψ of all its planes but the first; if forces have a place to go, the second
-    /// pass of those between, and the forces of those of them that are not next to the first.
+    /// Fills the arrays of a thread slab, does the first pass over all its planes and ψ of all but the first. Where forces
+    /// are wanted at once, also the second pass over the planes between the first and the last, and the forces of those that
+    /// are complete.
     ///
     /// # Safety
     /// The starts of all slabs are filled, and the copies of the first plane are there. Other threads do the same with
@@ -292,7 +300,7 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         };
     }
 
-    /// The forces of a plane, to the host, when all passes that add to it are done.
+    /// Writes the forces of a plane to the host; all passes that add to them are done.
     fn forces(&self, out: ForceSink, slab: &mut ThreadSlab<P::Scalar>, sums: Sums, plane: usize) {
         assert!(slab.planes.contains(&plane), "a plane of the slab");
         let particles = self.order.particles_of(&(plane..plane + 1));

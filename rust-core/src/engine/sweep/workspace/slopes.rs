@@ -14,14 +14,14 @@ pub struct SlopeArrays<T> {
     width: usize,
     /// A row for each particle.
     rows: Vec<f64>,
-    /// The same in the precision of pairs, if all pairs are cached: rows of eight slopes for all particles, then rows of the
+    /// Copies in the precision of pairs, for the full pair cache: rows of eight slopes for all particles, then rows of the
     /// next eight …
     packed: Vec<T>,
-    /// How many numbers there are from one row of the same particle to its next.
+    /// Distance from one row of eight of a particle to its next.
     stride: usize,
 }
 
-/// The same for the time of the passes: threads write those of their own slabs, and read there and one plane behind.
+/// The slopes while passes run: a thread writes those of its slab, and reads those of its slab and of the plane behind.
 #[derive(Clone, Copy)]
 pub struct SharedSlopes<'a, T> {
     width: usize,
@@ -39,7 +39,7 @@ impl<T: Scalar> SlopeArrays<T> {
             .resize(if packs { width.div_ceil(SLOPES_PER_BLOCK) * self.stride } else { 0 }, T::of(0.0));
     }
 
-    /// Those of the copies of the first plane.
+    /// Copies the slopes of the first plane behind the last particle.
     pub fn copy_first_plane(&mut self, order: &CellOrder) {
         let (width, n, copies) = (self.width, order.particles(), order.copies());
         self.rows.copy_within(..width * copies, width * n);
@@ -61,7 +61,7 @@ impl<T: Scalar> SlopeArrays<T> {
         }
     }
 
-    /// Lends them to the passes.
+    /// Lends the slopes to the passes.
     pub fn share(&mut self) -> SharedSlopes<'_, T> {
         SharedSlopes {
             width: self.width,

@@ -10,7 +10,7 @@ use psidpd_passes::ground::fixed_point::FixedPoint16;
 use psidpd_threads::SharedSlice;
 
 /// Arrays in the order of cells; copies of the first plane follow the last particle, then padding.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub struct SortedParticles<R> {
     /// Positions from the origin of the box.
     pub x: [Vec<f32>; 3],

@@ -1,4 +1,4 @@
-//! What is of one thread alone.
+//! The data that one thread has to itself.
 
 use super::cell_order::CellOrder;
 use crate::engine::error::EngineError;
@@ -11,7 +11,7 @@ use psidpd_passes::simd::Scalar;
 use psidpd_passes::tally::Tally;
 use std::ops::Range;
 
-/// Planes of a thread slab whose pairs are kept at once: its first, its last, and two between.
+/// Planes of a thread slab whose pairs are in memory at once: the first, the last, and two between.
 pub const KEPT_PLANES: usize = 4;
 
 /// What a thread keeps from one evaluation to the next.
@@ -41,10 +41,10 @@ impl<T: Scalar> ThreadState<T> {
     }
 }
 
-/// What the passes over a plane leave, plane by plane and particle by particle.
+/// Results of the passes: for each plane and for each particle.
 #[derive(Default)]
 pub struct PlaneResults<T> {
-    /// The pairs that are kept for the second pass: of all planes, or of some of each thread slab.
+    /// The pairs kept for the second pass: of all planes, or of a few planes of each thread slab.
     in_range: Vec<InRangePairs<T>>,
     keeps_all: bool,
     pub tallies: Vec<Tally>,
@@ -53,7 +53,7 @@ pub struct PlaneResults<T> {
     pub excess: Vec<f64>,
 }
 
-/// The planes of one thread, and all that no other thread accesses as long as it has them. There is one of each plane.
+/// The planes of one thread, and the data that only this thread accesses. Each plane is in exactly one slab.
 pub struct ThreadSlab<'a, T> {
     pub planes: Range<usize>,
     /// The first particle.
@@ -79,7 +79,7 @@ impl<T: Scalar> PlaneResults<T> {
         self.densities.resize(width * order.particles(), 0.0);
     }
 
-    /// Hands each thread the slab of its planes, with what is of them.
+    /// Splits planes and their results by thread.
     pub fn split<'a>(
         &'a mut self,
         order: &CellOrder,
@@ -121,7 +121,7 @@ fn take<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
 }
 
 impl<T> ThreadSlab<'_, T> {
-    /// What the passes over a plane of the slab work with and leave: buffers, pairs for the second pass, sums.
+    /// What a pass over a plane of the slab works with: buffers, the pairs for the second pass, energies and virials.
     pub fn plane(&mut self, plane: usize) -> (&mut PairBuffers<T>, &mut InRangePairs<T>, &mut Tally) {
         let number = plane - self.planes.start;
         let kept = match plane {

@@ -10,7 +10,7 @@ use std::ops::Range;
 /// The cell of particles that take no part.
 pub const NO_CELL: u32 = u32::MAX;
 
-/// What all threads count with.
+/// The input of all threads.
 pub struct Count<'a> {
     pub input: &'a Input<'a>,
     pub geometry: &'a BoxGeometry,
@@ -163,7 +163,7 @@ impl Count<'_> {
     }
 }
 
-/// What is wrong with a particle that cannot be sorted.
+/// The error for a particle that cannot be sorted.
 #[cold]
 #[inline(never)]
 fn fault_of(input: &Input, k: usize) -> EngineError {

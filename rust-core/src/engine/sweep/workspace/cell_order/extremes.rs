@@ -1,4 +1,4 @@
-//! How far particles reach.
+//! The lowest and highest coordinates of the particles.
 
 use crate::engine::error::EngineError;
 use crate::engine::sweep::workspace::input::Input;
@@ -12,7 +12,7 @@ const PARTICLES: usize = 4;
 /// Their coordinates.
 const COORDINATES: usize = 3 * PARTICLES;
 
-/// Beyond this a coordinate is none.
+/// A coordinate beyond this is an error.
 const ABSURD: f64 = 1e100;
 
 /// The lowest and the highest coordinates of the owned particles; the origin if there are none.

@@ -21,7 +21,7 @@ pub struct Fractions<'a> {
     inverse: [f64; 3],
     origin: [f64; COORDINATES],
     scale: [f64; COORDINATES],
-    /// Where fractions end that do not wrap.
+    /// The largest fraction along open directions, where fractions do not wrap.
     ends: [[f64; 2]; COORDINATES],
     is_open: bool,
     /// Cells along each axis, and from one to the next along it.
@@ -78,7 +78,7 @@ impl<'a> Fractions<'a> {
 
     // Neither of both is common: inlined they would keep the loops around them from becoming vectors.
 
-    /// Fractions in a box geometry that leans.
+    /// Fractions in a tilted box.
     #[inline(never)]
     fn tilt(&self, x: &[[f64; 3]; SORT_BLOCK], scaled: &mut [f64; COORDINATES]) {
         for (t, x) in scaled.as_chunks_mut::<3>().0.iter_mut().zip(x) {

@@ -1,0 +1,216 @@
+//! Lists the pairs of a plane within the range of the thermostat, for whoever changes velocities apart from the forces.
+
+use super::traversal::{BatchVisitor, each_batch};
+use crate::cells::sorted::SortedCells;
+use crate::ground::arithmetic::{Arithmetic, IParticles, Mixed, MixedParticle};
+use crate::ground::species_pairs::{SpeciesPair, SpeciesPairTable, TableLookup};
+use crate::ground::terms::Exponent;
+use crate::instruction_set::InstructionSet;
+use crate::pair_batch::batch::Batch;
+use crate::pair_batch::room::make_room;
+use crate::pair_batch::thermostat::ThermostatWeight;
+use crate::pair_search::buffers::SearchBuffers;
+use crate::simd::{Isa, Kernel, OFFSET_BITS, Reals, Words, run};
+use psidpd_model::kernel::Real;
+use psidpd_threads::SharedSlice;
+
+/// A pair: `g`, and the second particle.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(C, align(16))]
+pub struct Pair {
+    /// `ê √(½ Δt γ) w_R`, from the second particle to the first.
+    pub g: [f32; 3],
+    /// Counted from the first particle of the plane of the first particle on, through the next plane.
+    pub j: u32,
+}
+
+/// The pairs of a plane, those of one particle after those of another, in the order of cells.
+#[derive(Debug, Clone, Default)]
+pub struct PairList {
+    /// Where the pairs of each particle of the plane begin; one past the last.
+    pub start: Vec<u32>,
+    pub pairs: Vec<Pair>,
+    /// `r/|g|` of each pair; empty where nobody asked for it.
+    pub stretch: Vec<f32>,
+}
+
+/// What a pair is weighed with, by pairs of species.
+#[derive(Debug, Clone)]
+pub struct WeightTables {
+    pub species: usize,
+    /// `√(½ Δt γ)`; zero where nothing drags.
+    pub amplitude: SpeciesPairTable<f32>,
+    pub inverse_range: SpeciesPairTable<f32>,
+    pub exponent: Exponent<f32>,
+}
+
+/// Work space.
+#[derive(Debug, Default)]
+pub struct ListBuffers {
+    search: SearchBuffers,
+    i_particles: IParticles<f32>,
+    /// The i-particle of each pair of a batch that was kept.
+    i_in_batch: Vec<u32>,
+}
+
+/// Particles in the order of cells, and what their pairs are weighed with.
+#[derive(Clone, Copy)]
+pub struct ListInputs<'a> {
+    pub cells: SortedCells<'a>,
+    pub packed: SharedSlice<'a, MixedParticle>,
+    pub tables: &'a WeightTables,
+    /// Whether `r/|g|` is asked for.
+    pub with_stretch: bool,
+}
+
+/// Lists the pairs of particles of a plane with each other and with the next plane, each once.
+///
+/// # Safety
+/// Arrays are as [`SortedCells`] says, and all are filled; nobody writes them.
+pub unsafe fn list_pairs(
+    set: InstructionSet,
+    inputs: &ListInputs,
+    plane: usize,
+    buffers: &mut ListBuffers,
+    list: &mut PairList,
+) {
+    list.start.clear();
+    list.start.push(0);
+    list.pairs.clear();
+    list.stretch.clear();
+    let task = ListPairs { inputs, plane, buffers, list };
+    // SAFETY: the caller upholds it.
+    unsafe {
+        match inputs.tables.species {
+            1 => run(set, WithSpecies::<false>(task)),
+            _ => run(set, WithSpecies::<true>(task)),
+        }
+    }
+    // What was kept is `|g|/r`.
+    list.stretch.iter_mut().for_each(|factor| *factor = factor.recip());
+}
+
+struct ListPairs<'a> {
+    inputs: &'a ListInputs<'a>,
+    plane: usize,
+    buffers: &'a mut ListBuffers,
+    list: &'a mut PairList,
+}
+
+struct WithSpecies<'a, const MULTISPECIES: bool>(ListPairs<'a>);
+
+impl<const MULTISPECIES: bool> Kernel for WithSpecies<'_, MULTISPECIES> {
+    type Out = ();
+
+    #[inline(always)]
+    unsafe fn run<I: Isa>(self) {
+        let ListPairs { inputs, plane, buffers, list } = self.0;
+        let ListBuffers { search, i_particles, i_in_batch } = buffers;
+        // SAFETY: what is asked for is promised to `list_pairs`; a plane has a first column.
+        unsafe {
+            let first = inputs.cells.column(plane, 0)[0];
+            let metric = <Mixed as Arithmetic<I>>::metric(inputs.cells.geometry);
+            let mut lister =
+                Lister::<I, MULTISPECIES> { inputs, metric, first, i_particles, i_in_batch, list };
+            each_batch::<I, _>(&inputs.cells, plane, I::F32::LANES, search, &mut lister);
+        }
+    }
+}
+
+struct Lister<'a, I: Isa, const MULTISPECIES: bool> {
+    inputs: &'a ListInputs<'a>,
+    metric: <Mixed as Arithmetic<I>>::Metric,
+    /// The first particle of the plane.
+    first: usize,
+    i_particles: &'a mut IParticles<f32>,
+    i_in_batch: &'a mut Vec<u32>,
+    list: &'a mut PairList,
+}
+
+impl<I: Isa, const MULTISPECIES: bool> BatchVisitor<I> for Lister<'_, I, MULTISPECIES> {
+    #[inline(always)]
+    unsafe fn visit(&mut self, search: &SearchBuffers, slots: [usize; 2]) {
+        type W<I> = <<I as Isa>::F32 as Reals>::Words;
+        let members = slots[1] - slots[0];
+        let PairList { start, pairs, stretch } = &mut *self.list;
+        make_room(start, members);
+        // SAFETY: `packed` has a vector of padding behind the last particle (`SortedParticles::make_room`), lists of the batch
+        // are readable for a vector behind the last pair; there is room for all its pairs and a vector; of those that are
+        // written, `found` are initialised. The caller upholds the rest.
+        unsafe {
+            let Some(batch) = Batch::of_group(search, slots) else {
+                start.resize(start.len() + members, pairs.len() as u32);
+                return;
+            };
+            let tables = self.inputs.tables;
+            let weight = ThermostatWeight::<I::F32>::new(&tables.inverse_range, &tables.exponent);
+            let amplitude = TableLookup::<I::F32>::new(&tables.amplitude);
+            let packed = self.inputs.packed.as_ptr();
+            let i_particles = &mut *self.i_particles;
+            <Mixed as Arithmetic<I>>::load_i_particles(packed.add(batch.first), i_particles);
+            make_room(pairs, batch.count + 16);
+            if self.inputs.with_stretch {
+                make_room(stretch, batch.count + 16);
+            }
+            self.i_in_batch.resize(self.i_in_batch.len().max(batch.count + 16), 0);
+            let to_pairs = pairs.as_mut_ptr().add(pairs.len());
+            let to_stretch = stretch.as_mut_ptr().add(stretch.len());
+            let to_i = self.i_in_batch.as_mut_ptr();
+            let plane_first = W::<I>::splat((self.first as u32) << OFFSET_BITS);
+            let mut found = 0;
+            let mut k = 0;
+            while k < batch.count {
+                let i = W::<I>::load_bytes(batch.i_in_batch.as_ptr().add(k));
+                let j = batch.j_offsets.as_ptr().add(k);
+                let (geometry, tags) = <Mixed as Arithmetic<I>>::pair_geometry::<MULTISPECIES>(
+                    &self.metric,
+                    packed,
+                    i_particles,
+                    i,
+                    j,
+                    false,
+                );
+                let species_pair = if MULTISPECIES {
+                    let species_i = W::<I>::pick(i_particles.species.as_ptr(), i);
+                    SpeciesPair::new(species_i, tags.species_j, tables.species)
+                } else {
+                    SpeciesPair(i)
+                };
+                let w = weight.weight::<MULTISPECIES>(geometry.r, species_pair);
+                let factor = amplitude.lookup::<MULTISPECIES>(species_pair) * w * geometry.inverse;
+                let mut mask = I::F32::constant(0.0).mask_below(factor);
+                if batch.count - k < I::F32::LANES {
+                    mask &= (1 << (batch.count - k)) - 1;
+                }
+                let [dx, dy, dz] = geometry.d;
+                let j = W::<I>::load(j).sub(plane_first).shift_right::<OFFSET_BITS>();
+                let row = [
+                    (factor * dx).compress(mask),
+                    (factor * dy).compress(mask),
+                    (factor * dz).compress(mask),
+                    I::of_bits(j).compress(mask),
+                ];
+                I::F32::store_transposed(row, to_pairs.add(found).cast());
+                I::of_bits(i).compress(mask).store(to_i.add(found).cast());
+                if self.inputs.with_stretch {
+                    factor.compress(mask).store(to_stretch.add(found));
+                }
+                found += mask.count_ones() as usize;
+                k += I::F32::LANES;
+            }
+            let mut counts = [0; 16];
+            for i in self.i_in_batch.get_unchecked(..found) {
+                counts[*i as usize % 16] += 1;
+            }
+            let mut end = pairs.len() as u32;
+            for count in counts.get_unchecked(..members) {
+                end += count;
+                start.push(end);
+            }
+            pairs.set_len(pairs.len() + found);
+            if self.inputs.with_stretch {
+                stretch.set_len(stretch.len() + found);
+            }
+        }
+    }
+}

@@ -1,0 +1,71 @@
+//! The traversal of a plane: its search groups, and the batches of their pairs.
+
+use crate::cells::sorted::SortedCells;
+use crate::pair_search::buffers::SearchBuffers;
+use crate::pair_search::cell_ranges::{CellRanges, PlaneSearch, StencilColumns};
+use crate::pair_search::clusters::SEARCH_GROUP;
+use crate::pair_search::find::FindPairs;
+use crate::simd::{Isa, call};
+
+/// What is done with the pairs of a plane.
+pub trait BatchVisitor<I: Isa> {
+    /// Takes members `slots[0]..slots[1]` of a search group; to be inlined always.
+    ///
+    /// # Safety
+    /// The contract of `simd`; the group has been found, and has these members.
+    unsafe fn visit(&mut self, search: &SearchBuffers, slots: [usize; 2]);
+}
+
+/// Finds the pairs of the particles of `plane` with each other and with the next plane, and calls `visitor` for `lanes`
+/// i-particles after the other, in the order of cells; returns the number of search groups.
+///
+/// # Safety
+/// The contract of `simd`. Particles of the plane, of the next one and the padding behind are filled, and nobody writes
+/// them.
+#[inline(always)]
+pub unsafe fn each_batch<I: Isa, V: BatchVisitor<I>>(
+    cells: &SortedCells,
+    plane: usize,
+    lanes: usize,
+    buffers: &mut SearchBuffers,
+    visitor: &mut V,
+) -> u64 {
+    // SAFETY: columns are those of the grid, groups and batches those of a column; the caller upholds the rest.
+    unsafe {
+        let grid = cells.grid;
+        let search = PlaneSearch::new(cells, plane);
+        let mut ranges = CellRanges::default();
+        let mut groups = 0;
+        let mut column = 0;
+        while column < grid.columns_per_plane {
+            let stencil = StencilColumns::new(cells, &search, plane, column);
+            let [mut first, end] = cells.column(plane, column);
+            if !cells.ghosts.is_empty() && stencil.only_ghosts() {
+                first = end;
+            }
+            while first < end {
+                let count = SEARCH_GROUP.min(end - first);
+                groups += 1;
+                // A call: what finds pairs is the same in every pass on an instruction set.
+                call::<I, _>(FindPairs {
+                    cells,
+                    plane: &search,
+                    stencil: &stencil,
+                    ranges: &mut ranges,
+                    group: [first, count],
+                    batch_size: lanes,
+                    buffers,
+                });
+                let mut slot = 0;
+                while slot < count {
+                    let slots = [slot, count.min(slot + lanes)];
+                    visitor.visit(buffers, slots);
+                    slot = slots[1];
+                }
+                first += count;
+            }
+            column += 1;
+        }
+        groups
+    }
+}

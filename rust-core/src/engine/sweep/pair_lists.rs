@@ -1,0 +1,189 @@
+//! Lists of all pairs in the range of a thermostat, plane by plane, for whoever changes velocities apart from the forces.
+//!
+//! Particles are in the order of cells, and within a cell in that of their tags: the whole order depends on positions and
+//! tags alone.
+
+use super::region::region;
+use super::workspace::{CellOrder, Input, SortedParticles};
+use crate::engine::error::EngineError;
+use crate::engine::particles::Particles;
+use psidpd_passes::cells::sorted::SortedCells;
+use psidpd_passes::domain::PeriodicBox;
+use psidpd_passes::ground::arithmetic::MixedParticle;
+use psidpd_passes::instruction_set::InstructionSet;
+use psidpd_passes::plane::list::{ListBuffers, ListInputs, PairList, WeightTables, list_pairs};
+use psidpd_passes::tally::Want;
+use psidpd_threads::{Pool, part};
+use std::ops::Range;
+
+/// The pairs whose first particle is in one plane; the second is in the same plane or in the next.
+#[derive(Debug, Clone, Default)]
+pub struct PlanePairs {
+    /// The sorted particles of this plane, and of the next one.
+    pub own: Range<usize>,
+    pub next: Range<usize>,
+    pub list: PairList,
+}
+
+/// Sorted particles, and work space.
+pub struct PairLists {
+    set: InstructionSet,
+    dimensions: usize,
+    cells: CellOrder,
+    particles: SortedParticles<MixedParticle>,
+    buffers: Vec<ListBuffers>,
+    /// Sorted index by index of the host.
+    place: Vec<u32>,
+}
+
+impl Clone for PairLists {
+    /// The same order; work space of its own.
+    fn clone(&self) -> PairLists {
+        let PairLists { set, dimensions, cells, particles, place, .. } = self;
+        PairLists {
+            set: *set,
+            dimensions: *dimensions,
+            cells: cells.clone(),
+            particles: particles.clone(),
+            buffers: Vec::new(),
+            place: place.clone(),
+        }
+    }
+}
+
+impl PairLists {
+    pub fn new(set: InstructionSet, dimensions: usize) -> PairLists {
+        PairLists {
+            set,
+            dimensions,
+            cells: CellOrder::new(dimensions),
+            particles: SortedParticles::default(),
+            buffers: Vec::new(),
+            place: Vec::new(),
+        }
+    }
+
+    /// The host's index of each sorted particle.
+    pub fn order(&self) -> &[u32] {
+        &self.cells.order
+    }
+
+    /// The sorted index of each particle of the host.
+    pub fn place(&self) -> &[u32] {
+        &self.place
+    }
+
+    /// Finds the pairs of `particles`, whose kinds are species, within `range`: those of each plane of cells.
+    ///
+    /// # Errors
+    /// A position that is not finite; a box narrower than twice the range, or that leans along an open direction.
+    #[allow(clippy::too_many_arguments)]
+    pub fn find<'p, T: AsMut<PlanePairs> + Default + Send>(
+        &mut self,
+        pool: &Pool,
+        domain: &PeriodicBox,
+        particles: &Particles,
+        tables: &WeightTables,
+        range: f64,
+        with_stretch: bool,
+        planes: &'p mut Vec<T>,
+    ) -> Result<(), EngineError> {
+        let species: Vec<i32> = (0..tables.species as i32).collect();
+        let input = Input::new(particles, &[], &[], &species, &[], None, Want::FORCES);
+        let set = self.set;
+        let (geometry, mut grid) =
+            region(set, pool, (self.dimensions, range), domain, &input).map_err(|fault| match fault {
+                EngineError::Host(_) => EngineError::Host(
+                    "a box that is not wider than twice the range of its thermostat, or leans along an open side",
+                ),
+                other => other,
+            })?;
+        // Updates of one pair after the other go over planes that have no neighbour in common.
+        if geometry.periodic[grid.plane_axis] {
+            grid.planes = grid.planes.max(2);
+        }
+        self.cells.sort(pool, set, geometry, grid, &input)?;
+        self.sort_by_tags(pool, particles.tag);
+        self.fill(pool, &input, tables.species > 1);
+        planes.resize_with(grid.planes, T::default);
+        self.buffers.resize_with(pool.threads(), ListBuffers::default);
+        let cells = &self.cells;
+        let shared = self.particles.share();
+        let inputs = &ListInputs {
+            cells: SortedCells {
+                geometry: &cells.geometry,
+                grid: &cells.grid,
+                start: &cells.start,
+                x: shared.x,
+                fixed16: shared.fixed16,
+                fixed16_scale: shared.fixed16_scale,
+                ghosts: shared.ghosts,
+            },
+            packed: shared.packed,
+            tables,
+            with_stretch,
+        };
+        let (count, threads) = (grid.planes, pool.threads());
+        let mut rest = planes.iter_mut().enumerate();
+        let mut work: Vec<_> = self
+            .buffers
+            .iter_mut()
+            .enumerate()
+            .map(|(t, buffers)| {
+                (buffers, rest.by_ref().take(part(count, t, threads).len()).collect::<Vec<_>>())
+            })
+            .collect();
+        pool.each(&mut work, |(buffers, planes)| {
+            for (number, plane) in planes {
+                let plane = (*plane).as_mut();
+                plane.own = cells.particles_of(&(*number..*number + 1));
+                let next = if *number + 1 < count { *number + 1 } else { 0 };
+                let follows = *number + 1 < count || cells.is_periodic();
+                plane.next = if follows { cells.particles_of(&(next..next + 1)) } else { 0..0 };
+                // SAFETY: all places are filled, those of the copies too, and nobody writes them here.
+                unsafe { list_pairs(set, inputs, *number, buffers, &mut plane.list) };
+            }
+        });
+        Ok(())
+    }
+
+    /// Puts the particles of each cell into the order of their tags.
+    fn sort_by_tags(&mut self, pool: &Pool, tags: &[i32]) {
+        let CellOrder { start, order, grid, .. } = &mut self.cells;
+        let (cells, threads) = (grid.cell_count(), pool.threads());
+        let mut rest = &mut order[..];
+        let mut work: Vec<_> = (0..threads)
+            .map(|t| {
+                let starts = &start[part(cells, t, threads)];
+                let end = start[part(cells, t, threads).end] as usize;
+                let first = starts.first().map_or(end, |first| *first as usize);
+                (starts, end, rest.split_off_mut(..end - first).unwrap_or_default())
+            })
+            .collect();
+        pool.each(&mut work, |(starts, end, order)| {
+            let first = starts.first().map_or(*end, |first| *first as usize);
+            let ends = starts.iter().skip(1).map(|s| *s as usize).chain([*end]);
+            for (from, to) in starts.iter().map(|s| *s as usize).zip(ends).filter(|(from, to)| to - from > 1)
+            {
+                order[from - first..to - first].sort_unstable_by_key(|k| tags[*k as usize]);
+            }
+        });
+        self.place.resize(order.len(), 0);
+        for (sorted, k) in order.iter().enumerate() {
+            self.place[*k as usize] = sorted as u32;
+        }
+    }
+
+    /// Fills the arrays in the order of cells.
+    fn fill(&mut self, pool: &Pool, input: &Input, multispecies: bool) {
+        self.particles.make_room(&self.cells, multispecies);
+        let (set, cells, threads) = (self.set, &self.cells, pool.threads());
+        let shared = &self.particles.share();
+        let mut work: Vec<_> = (0..threads).map(|t| cells.whole_vectors(t, threads)).collect();
+        pool.each(&mut work, |places| {
+            // SAFETY: the places of threads are disjoint and begin at whole vectors; nobody reads them meanwhile.
+            unsafe { shared.fill(set, cells, input, places.clone()) };
+        });
+        self.particles.copy_first_plane(&self.cells);
+    }
+}

@@ -1,0 +1,41 @@
+use super::{Failure, write_json};
+use crate::hardcases::{self, Extent};
+use crate::report::Progress;
+use std::path::Path;
+
+/// Cases that are hard for a simulation: what must happen in each, and what did, by integrator and precision.
+///
+/// The exit code is 1 if something else happened. docs/hardcases.md has the cases.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Only the integrators that are recommended, velocity Verlet in both precisions, the others in mixed.
+    #[arg(long, conflicts_with = "full")]
+    quick: bool,
+    /// With runs of a million steps.
+    #[arg(long)]
+    full: bool,
+    /// In LAMMPS with the plugin too, which must be installed.
+    #[arg(long)]
+    lammps: bool,
+    /// Only cases, or groups of them, with these words in their names.
+    #[arg(long, value_name = "WORDS")]
+    only: Option<String>,
+}
+
+pub fn run(a: &Arguments, json: Option<&Path>) -> Result<super::Verdict, Failure> {
+    let extent = match (a.quick, a.full) {
+        (true, _) => Extent::Quick,
+        (_, true) => Extent::Full,
+        _ => Extent::All,
+    };
+    let found = hardcases::run(extent, a.lammps, a.only.as_deref(), &Progress::new())?;
+    println!("{}", hardcases::table(&found).to_text());
+    let wrong: Vec<_> = found.iter().filter(|v| v.wrong.is_some()).collect();
+    for v in &wrong {
+        let why = v.wrong.as_deref().unwrap_or_default();
+        println!("{}, {}, {}, {}: must be {}: {why}", v.case, v.host, v.integrator, v.precision, v.must);
+    }
+    println!("{} of {} as they must be", found.len() - wrong.len(), found.len());
+    write_json(json, &found)?;
+    Ok(if wrong.is_empty() { super::Verdict::Good } else { super::Verdict::CheckFailed })
+}

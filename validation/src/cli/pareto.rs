@@ -1,0 +1,80 @@
+use super::{Failure, Verdict, write_json};
+use crate::pareto::{self, Choice, Effort, Options, Pace, Tolerance, page};
+use crate::report::Progress;
+use crate::scene::Scene;
+use psidpd_core::engine::Pool;
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+
+/// What a unit of simulated time costs with each setting, and how far off its results are.
+///
+/// Errors are those of temperatures, pressure, g(r), diffusion and what the scene measures of interfaces. docs/pareto.md says
+/// how to read the table. The machine should be idle.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// The scene file.
+    scene: PathBuf,
+    /// What error is accepted, T=0.5% for one; KIND is T, p, rho, sigma, D or g; can be given several times.
+    #[arg(long, value_name = "KIND=BOUND", default_value = "T=1%")]
+    tolerance: Vec<Tolerance>,
+    /// Minutes that all of it may take, roughly; 20 with --full.
+    #[arg(long, value_name = "N", value_parser = minutes)]
+    minutes: Option<f64>,
+    /// Samples of every setting, whatever time they take, instead of as many as the minutes allow.
+    #[arg(long, value_name = "N", conflicts_with = "minutes")]
+    samples: Option<u64>,
+    /// All integrators, in both precisions.
+    #[arg(long)]
+    full: bool,
+    /// Thread counts of the native runner; default: 1 and 2.
+    #[arg(long, value_name = "N,…", value_delimiter = ',', value_parser = threads)]
+    threads: Vec<NonZeroUsize>,
+    /// Leave LAMMPS out, though it is installed.
+    #[arg(long)]
+    without_lammps: bool,
+    /// Folder for pareto.json and pareto.html.
+    #[arg(long, value_name = "DIR", default_value = "target/pareto")]
+    out: PathBuf,
+}
+
+fn minutes(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|e| format!("{e}"))?;
+    if value > 0.0 && value <= 1e5 { Ok(value) } else { Err("a positive number of minutes".into()) }
+}
+
+fn threads(text: &str) -> Result<NonZeroUsize, String> {
+    let count: NonZeroUsize = text.parse().map_err(|e| format!("{e}"))?;
+    if count.get() <= Pool::MOST { Ok(count) } else { Err(format!("at most {}", Pool::MOST)) }
+}
+
+pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
+    let scene = Scene::open(&a.scene)?;
+    let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+    let usual = [Some(NonZeroUsize::MIN), NonZeroUsize::new(2).filter(|_| cores > 1)];
+    let mut threads = a.threads.clone();
+    if threads.is_empty() {
+        threads.extend(usual.into_iter().flatten());
+    }
+    threads.sort_unstable();
+    threads.dedup();
+    let options = Options {
+        minutes: a.minutes.unwrap_or(if a.full { 20.0 } else { 3.0 }),
+        choice: if a.full { Choice::Full } else { Choice::Quick },
+        threads,
+        tolerances: a.tolerance.clone(),
+        lammps: !a.without_lammps,
+        fixed: a.samples.map(|n| (Effort::Samples(n), Pace { rounds: 5, seconds: 0.2 })),
+        out: a.out.clone(),
+    };
+    let outcome = pareto::run(&scene, &options, &Progress::new())?;
+    println!("{}", page::table(&outcome).to_text());
+    println!("{}\n", page::explanation(&outcome));
+    outcome.left_out.iter().for_each(|line| println!("{line}\n"));
+    if !outcome.drifts.is_empty() {
+        println!("energy without thermostat\n{}", page::drifts(&outcome).to_text());
+    }
+    println!("{}", page::recommendation(&outcome));
+    println!("report: {}", a.out.join("pareto.html").display());
+    write_json(json, &outcome)?;
+    Ok(Verdict::Good)
+}

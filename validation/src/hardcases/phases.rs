@@ -1,0 +1,44 @@
+//! Fluids where they cease to be simple.
+
+use super::case::{Case, Must, Run};
+use super::fluids::{LINEAR, SET6, VAN_DER_WAALS};
+
+const GROUP: &str = "phases";
+
+pub fn cases() -> Vec<Case> {
+    let case = |name, run, must| Case { group: GROUP, name, run, must, exact: None };
+    let run = |model: String, kt: f64, scene: &str, dt: f64| Run {
+        model,
+        kt,
+        scene: scene.into(),
+        data: None,
+        dt,
+        steps: [200, 400],
+    };
+    let bell = SET6.replace("kernel = \"quadratic\"", "kernel = \"bell\"");
+    // φ = a [A W(r, 0.8) − B W(r, 1)] attracts more than it repels, and has no thermodynamic limit.
+    let collapsing = "title = \"spline\"\nspecies = [\"F\"]\n[[pair]]\nbetween = [\"F\", \"F\"]\nform = \"spline\"\n\
+                      strength = 9.5\nA = 0.5\nB = 1.0\nrange_A = 0.8\nrange_B = 1.0\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n";
+    vec![
+        case(
+            "a quench far below the critical point",
+            run(VAN_DER_WAALS.into(), 0.3, "box = 4.0\ndensity = 20.0\n", 0.005),
+            Must::RightOrSaid(0.1),
+        ),
+        case(
+            "the linear kernel past freezing",
+            run(LINEAR.into(), 1.0, "box = 3.0\ndensity = 14.0\n", 0.01),
+            Must::RightOrSaid(0.06),
+        ),
+        case(
+            "the bell kernel, in which particles pair",
+            run(bell, 1.0, "box = 3.5\ndensity = 6.0\n", 0.005),
+            Must::RightOrSaid(0.06),
+        ),
+        case(
+            "a spline whose integral is negative: collapse",
+            run(collapsing.into(), 0.5, "box = 4.0\ndensity = 5.0\n", 0.005),
+            Must::RightOrSaid(0.1),
+        ),
+    ]
+}

@@ -1,0 +1,65 @@
+//! Formulas that are singular, and species that are not there.
+
+use super::case::{Case, Must, Run};
+use super::fluids::{HUGGINS, VAN_DER_WAALS};
+
+const GROUP: &str = "singular formulas";
+
+/// A fluid with a logarithm of its density and a quotient; `bounds` as in a model file.
+fn logarithm(bounds: &str) -> String {
+    format!(
+        "title = \"ln n\"\nspecies = [\"A\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1.0\n{bounds}\n\
+         [excess_free_energy]\nA = \"kT*ln(n) + 0.1/n\"\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n"
+    )
+}
+
+pub fn cases() -> Vec<Case> {
+    let case = |name, run, must| Case { group: GROUP, name, run, must, exact: None };
+    let flat = |model: String| Run {
+        model,
+        kt: 2.5,
+        // b n is 1.3 on average.
+        scene: "box = 3.0\ndensity = 80.0\n".into(),
+        data: None,
+        dt: 0.002,
+        steps: [50, 150],
+    };
+    let unbounded: String = VAN_DER_WAALS
+        .lines()
+        .filter(|l| !l.starts_with("bounds"))
+        .fold(String::new(), |all, l| all + l + "\n");
+    // Two particles in a large box, out of each other's reach.
+    let thin = |bounds: &str| Run {
+        model: logarithm(bounds),
+        kt: 1.0,
+        scene: "box = 20.0\n[initial]\nkind = \"lattice\"\ncount = 2\n".into(),
+        data: None,
+        dt: 0.01,
+        steps: [20, 40],
+    };
+    let huggins = |composition: &str, scene: &str| Run {
+        model: HUGGINS.into(),
+        kt: 1.0,
+        scene: format!("{scene}[initial]\nkind = \"lattice\"\n{composition}\n"),
+        data: None,
+        dt: 0.01,
+        steps: [100, 200],
+    };
+    vec![
+        case("bn beyond 1 where psi has a pole, no bounds", flat(unbounded), Must::Stops),
+        case("bn beyond 1, bounds", flat(VAN_DER_WAALS.into()), Must::Counted),
+        case("n = 0 with ln n and 1/n, no bounds", thin(""), Must::Stops),
+        case("n = 0 with ln n and 1/n, bounds", thin("bounds = [0.5, 20.0]"), Must::Counted),
+        case(
+            "n = 0 with ln n and 1/n, constant slope below the bound",
+            thin("bounds = [0.5, 20.0]\nbelow = \"constant\""),
+            Must::Counted,
+        ),
+        case("an evaporated Huggins particle", huggins("count = 2", "box = 20.0\n"), Must::RightOrSaid(1.1)),
+        case(
+            "a species absent from every neighbourhood",
+            huggins("density = 3.0\nspecies = \"A\"", "box = 4.0\n"),
+            Must::RightOrSaid(0.06),
+        ),
+    ]
+}

@@ -1,0 +1,71 @@
+//! Starts that are unusual, and boxes.
+
+use super::case::{Case, Must, Run};
+use super::fluids::{DPD, SET6, data};
+
+const GROUP: &str = "starts and boxes";
+
+pub fn cases() -> Vec<Case> {
+    let set6 = |scene: &str| Run {
+        model: SET6.into(),
+        kt: 1.0,
+        scene: scene.into(),
+        data: None,
+        dt: 0.005,
+        steps: [200, 400],
+    };
+    let case = |name, run, must| Case { group: GROUP, name, run, must, exact: None };
+    let from_data = |run: Run, x: &[[f64; 3]], edge: f64| Run {
+        data: Some(data(x, edge)),
+        scene: "[initial]\nkind = \"data\"\nfile = \"start.data\"\nvelocities = \"thermal\"\n".into(),
+        ..run
+    };
+    let dpd = Run { model: DPD.into(), dt: 0.02, ..set6("") };
+    // Every site of a lattice twice: 216 particles on 108 places.
+    let mut twice = Vec::new();
+    for k in 0..216usize {
+        let site = k / 2;
+        let [a, b, c] = [site % 6, site / 6 % 6, site / 36];
+        twice.push([a as f64 * 0.7 + 0.1, b as f64 * 0.7 + 0.1, c as f64 * 1.4 + 0.1]);
+    }
+    // On faces, edges and corners of the box, and in its middle.
+    let mut faces = Vec::new();
+    for k in 0..216usize {
+        let [a, b, c] = [k % 6, k / 6 % 6, k / 36];
+        let at = |i: usize| if i == 5 { 4.2f64.next_down() } else { i as f64 * 0.84 };
+        faces.push([at(a), at(b), at(c)]);
+    }
+    vec![
+        case(
+            "coincident particles: every place taken twice",
+            from_data(dpd.clone(), &twice, 4.2),
+            Must::Right(0.06),
+        ),
+        case(
+            "particles exactly on faces, edges and corners",
+            from_data(dpd.clone(), &faces, 4.2),
+            Must::Right(0.06),
+        ),
+        case(
+            "random overlapping start at three times the density of the liquid",
+            set6("box = 3.0\ndensity = 18.0\n"),
+            Must::RightOrSaid(0.1),
+        ),
+        case(
+            "a box barely two cut-offs wide",
+            Run { scene: "box = 2.02\ndensity = 3.0\n".into(), ..dpd.clone() },
+            Must::Right(0.06),
+        ),
+        case(
+            "a box less than two cut-offs wide",
+            Run { scene: "box = 1.9\ndensity = 3.0\n".into(), ..dpd.clone() },
+            Must::Refused,
+        ),
+        case(
+            "a lone particle",
+            set6("box = 4.0\n[initial]\nkind = \"random\"\ncount = 1\n"),
+            Must::Right(1.1),
+        ),
+        case("an empty box", set6("box = 4.0\n[initial]\nkind = \"random\"\ncount = 0\n"), Must::Refused),
+    ]
+}

@@ -1,0 +1,56 @@
+//! Steps that are long for the forces, the drag or the masses.
+
+use super::case::{Case, Must, Run};
+use super::fluids::{IDEAL, IDEAL_TWO, SET6, SPLINE};
+
+const GROUP: &str = "time steps and masses";
+
+pub fn cases() -> Vec<Case> {
+    let case = |name, run, must, exact| Case { group: GROUP, name, run, must, exact };
+    let liquid = |dt: f64| Run {
+        model: SET6.into(),
+        kt: 1.0,
+        scene: "box = 4.0\ndensity = 6.05\n".into(),
+        data: None,
+        dt,
+        steps: [200, 1000],
+    };
+    // γ Δt is told; Σ w² over neighbours is about 1.3 at this density.
+    let gas = |model: &str, dt: f64, rest: &str| Run {
+        model: model.into(),
+        kt: 1.0,
+        scene: format!("box = 4.0\ndensity = 3.0\n{rest}"),
+        data: None,
+        dt,
+        steps: [100, 400],
+    };
+    let strong = |gamma: f64| IDEAL.replace("gamma = 4.5", &format!("gamma = {gamma:?}"));
+    // The watch has more samples of a longer stage.
+    let long = |run: Run| Run { steps: [100, 3000], ..run };
+    let drops = "box = [7.0, 7.0, 12.0]\n[[part]]\nshape = \"sphere\"\nradius = 1.8\ncenter = [3.5, 3.5, 3.0]\n\
+                 density = 12.0\nvelocity = [0.0, 0.0, 8.0]\n[[part]]\nshape = \"sphere\"\nradius = 1.8\n\
+                 center = [3.5, 3.5, 9.0]\ndensity = 12.0\nvelocity = [0.0, 0.0, -8.0]\n";
+    let collision =
+        Run { model: SPLINE.into(), kt: 0.5, scene: drops.into(), data: None, dt: 0.005, steps: [600, 400] };
+    let cold =
+        Run { kt: 0.0, scene: "box = 4.0\ndensity = 3.0\n".into(), steps: [10, 10], ..gas(IDEAL, 0.01, "") };
+    let said = Must::RightOrSaid(0.06);
+    let right = |part: f64| Some(Must::Right(part));
+    vec![
+        case("the stability limit: dt = 0.04 in Warren's liquid", liquid(0.04), said, None),
+        case("past it: dt = 0.1", liquid(0.1), said, None),
+        case("far past it: dt = 0.5", liquid(0.5), said, None),
+        case("gamma dt = 1", long(gas(&strong(10.0), 0.1, "")), said, right(0.02)),
+        case("gamma dt = 100", long(gas(&strong(1000.0), 0.1, "")), said, right(0.02)),
+        // The heavy half keeps the velocities that it began with, which are 8 % of kT off by chance.
+        case(
+            "masses of 1 and 10^6",
+            gas(IDEAL_TWO, 0.02, "[masses]\nB = 1e6\n"),
+            Must::RightOrSaid(0.15),
+            right(0.15),
+        ),
+        case("masses of 1 and 10^-3", gas(IDEAL_TWO, 0.02, "[masses]\nB = 1e-3\n"), said, right(0.04)),
+        case("kT = 0", cold, Must::Refused, None),
+        case("a fast collision of drops", collision, Must::RightOrSaid(0.15), None),
+    ]
+}

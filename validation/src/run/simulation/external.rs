@@ -1,0 +1,100 @@
+//! Frozen particles and body forces: what acts on particles from outside the fluid.
+
+use super::Simulation;
+use super::particles::Particles;
+use crate::particles::{BodyForce, Tags, add_body_forces};
+use psidpd_core::engine::Pool;
+
+#[derive(Debug, Clone)]
+pub(super) struct External {
+    frozen_tags: Tags,
+    /// By particle; empty if none is frozen.
+    frozen: Vec<bool>,
+    /// Sum of the forces on the frozen particles, in the last evaluation.
+    support_force: [f64; 3],
+    body_forces: Vec<BodyForce>,
+}
+
+impl External {
+    pub fn none() -> External {
+        let frozen_tags = Tags::none();
+        External { frozen_tags, frozen: Vec::new(), support_force: [0.0; 3], body_forces: Vec::new() }
+    }
+
+    /// Which particles are frozen, one by one; empty if none is.
+    pub fn frozen(&self) -> &[bool] {
+        &self.frozen
+    }
+
+    /// Finds the frozen particles by their tags, whose order may have changed, and stops them.
+    pub fn find_frozen(&mut self, particles: &mut Particles) {
+        self.frozen.clear();
+        if self.frozen_tags.is_empty() {
+            return;
+        }
+        self.frozen.extend(particles.now().tag.iter().map(|tag| self.frozen_tags.contain(*tag)));
+        if !self.frozen.contains(&true) {
+            self.frozen.clear();
+        }
+        self.clear_frozen(particles.velocities_mut());
+    }
+
+    /// Sets the vectors of frozen particles to zero.
+    pub fn clear_frozen(&self, vectors: &mut [[f64; 3]]) {
+        for (vector, _) in vectors.iter_mut().zip(&self.frozen).filter(|(_, frozen)| **frozen) {
+            *vector = [0.0; 3];
+        }
+    }
+
+    /// Adds body forces; and takes all forces from what is frozen, so that every integrator leaves it alone.
+    pub fn add_forces(&mut self, particles: &mut Particles, pool: &Pool) {
+        let (state, force) = particles.forces_mut();
+        if !self.body_forces.is_empty() {
+            add_body_forces(&self.body_forces, pool, force, |body, k| {
+                let mass = state.mass[state.species[k] as usize];
+                let acts = body.acts_on(state.species[k], state.tag[k]);
+                acts.then(|| body.at(&state.domain, state.x[k]).map(|a| mass * a))
+            });
+        }
+        self.support_force = [0.0; 3];
+        for (force, _) in force.iter_mut().zip(&self.frozen).filter(|(_, frozen)| **frozen) {
+            for (sum, f) in self.support_force.iter_mut().zip(std::mem::take(force)) {
+                *sum += f;
+            }
+        }
+    }
+}
+
+impl Simulation {
+    /// Freezes the particles of these tags, and no others: they rest where they are, and act on the others.
+    /// Their temperature and momentum do not count.
+    pub fn set_frozen(&mut self, tags: &Tags) {
+        self.external.frozen_tags = tags.clone();
+        self.external.find_frozen(&mut self.particles);
+    }
+
+    /// Which particles are frozen, one by one; empty if none is.
+    pub fn frozen(&self) -> &[bool] {
+        &self.external.frozen
+    }
+
+    /// How many particles move.
+    pub fn mobile(&self) -> usize {
+        self.len() - self.frozen().iter().filter(|frozen| **frozen).count()
+    }
+
+    /// The sum of all forces on the frozen particles in the last evaluation: what holds them must balance it.
+    pub fn support_force(&self) -> [f64; 3] {
+        self.external.support_force
+    }
+
+    /// The body forces that act from the next evaluation of forces on.
+    pub fn set_body_forces(&mut self, forces: &[BodyForce]) {
+        self.external.body_forces = forces.to_vec();
+    }
+
+    /// Whether there are any.
+    pub fn has_body_forces(&self) -> bool {
+        !self.external.body_forces.is_empty()
+    }
+}

@@ -1,0 +1,171 @@
+//! Drift and kick, of which steps are composed.
+//!
+//! A kick that ends a step may be deferred: the next step, if it begins with the same kick and a drift, makes both
+//! in one loop, with the same bits.
+
+use super::super::bounds::Bounds;
+use super::super::integrator::parts::{Faults, Kept, Moving, Surroundings, drift, kick, share};
+use super::{RunError, Simulation};
+use psidpd_core::engine::{PeriodicBox, Pool};
+
+#[derive(Debug, Clone)]
+pub(super) struct Motion {
+    bounds: Bounds,
+    /// What Groot and Warren's step keeps over the evaluation of the forces.
+    kept: Kept,
+    /// The time of a kick that ends the present step and is still to be made.
+    deferred: Option<f64>,
+}
+
+impl Motion {
+    pub fn within(domain: &PeriodicBox, dimensions: usize) -> Motion {
+        Motion { bounds: Bounds::of(domain, dimensions), kept: Kept::default(), deferred: None }
+    }
+
+    pub fn is_at_end_of_step(&self) -> bool {
+        self.deferred.is_none()
+    }
+
+    pub fn forget_kick(&mut self) {
+        self.deferred = None;
+    }
+}
+
+impl Simulation {
+    /// `v += h f/m; x += dt v`, in one loop; particles are put back into the box.
+    pub(in crate::run) fn kick_and_drift(&mut self, h: f64, dt: f64) -> Result<(), RunError> {
+        let deferred = self.motion.deferred.take_if(|deferred| *deferred == h).is_some();
+        self.make_deferred_kick()?;
+        let faults = self.moving(Some(dt), |mut moving, around, pool| {
+            moving.keep_nothing();
+            moving.over_mass(|mass| h / mass);
+            share(moving, pool, |part, over_mass| {
+                if deferred {
+                    drift(part, over_mass, around, |x, v, f, over_mass| {
+                        let kick = over_mass * f;
+                        let v = v + kick + kick;
+                        (x + dt * v, v)
+                    });
+                } else {
+                    drift(part, over_mass, around, |x, v, f, over_mass| {
+                        let v = v + over_mass * f;
+                        (x + dt * v, v)
+                    });
+                }
+            })
+        });
+        self.refuse(faults, Some(dt), deferred)
+    }
+
+    /// `x += dt v`.
+    pub(in crate::run) fn drift(&mut self, dt: f64) -> Result<(), RunError> {
+        self.make_deferred_kick()?;
+        let faults = self.moving(Some(dt), |mut moving, around, pool| {
+            moving.keep_nothing();
+            moving.over_mass(|_| 0.0);
+            share(moving, pool, |part, over_mass| {
+                drift(part, over_mass, around, |x, v, _, _| (x + dt * v, v));
+            })
+        });
+        self.refuse(faults, Some(dt), false)
+    }
+
+    /// `v += h f/m`.
+    pub(in crate::run) fn kick(&mut self, h: f64) -> Result<(), RunError> {
+        self.make_deferred_kick()?;
+        let faults = self.moving(None, |mut moving, _, pool| {
+            moving.keep_nothing();
+            moving.over_mass(|mass| h / mass);
+            share(moving, pool, |part, over_mass| {
+                kick::<false, _>(part, over_mass, |v, f, _, over_mass| v + over_mass * f);
+            })
+        });
+        self.refuse(faults, None, false)
+    }
+
+    /// The same, left to the next step, or to whoever asks for velocities before.
+    pub(in crate::run) fn defer_kick(&mut self, h: f64) {
+        debug_assert!(self.motion.deferred.is_none());
+        self.motion.deferred = Some(h);
+    }
+
+    pub(super) fn make_deferred_kick(&mut self) -> Result<(), RunError> {
+        match self.motion.deferred.take() {
+            Some(h) => self.kick(h),
+            None => Ok(()),
+        }
+    }
+
+    /// `x += dt (v + ½dt f/m); v += λ dt f/m`; velocities and forces of before are kept.
+    pub(in crate::run) fn predict(&mut self, lambda: f64, dt: f64) -> Result<(), RunError> {
+        self.make_deferred_kick()?;
+        let faults = self.moving(Some(dt), |mut moving, around, pool| {
+            moving.keep();
+            moving.over_mass(|mass| dt / mass);
+            share(moving, pool, |part, over_mass| {
+                part.kept[0].copy_from_slice(part.v);
+                part.kept[1].copy_from_slice(part.f);
+                drift(part, over_mass, around, |x, v, f, over_mass| {
+                    (x + dt * (v + 0.5 * over_mass * f), v + lambda * over_mass * f)
+                });
+            })
+        });
+        self.refuse(faults, Some(dt), false)
+    }
+
+    /// `v = v₀ + ½dt (f₀ + f)/m` with what [`Simulation::predict`] has kept.
+    pub(in crate::run) fn correct(&mut self, dt: f64) -> Result<(), RunError> {
+        let faults = self.moving(None, |mut moving, _, pool| {
+            moving.over_mass(|mass| 0.5 * dt / mass);
+            share(moving, pool, |part, half| {
+                kick::<true, _>(part, half, |_, f, [before_v, before_f], half| {
+                    before_v + half * (before_f + f)
+                });
+            })
+        });
+        self.refuse(faults, None, false)
+    }
+
+    /// Calls `work` with what moves, what it may meet on the way, if there is a drift of `dt`, and the threads.
+    fn moving(
+        &mut self,
+        dt: Option<f64>,
+        work: impl FnOnce(Moving, Surroundings, &Pool) -> Faults,
+    ) -> Faults {
+        let Simulation { particles, motion, forces, .. } = self;
+        let (state, f) = particles.motion(dt.is_some());
+        let longest: f64 = state.domain.lengths().iter().map(|l| l * l).sum();
+        let limit = dt.map_or(f64::INFINITY, |dt| longest / (dt * dt));
+        let around = Surroundings { domain: &state.domain, bounds: &motion.bounds, limit };
+        let moving = Moving {
+            x: &mut state.x,
+            v: &mut state.v,
+            f,
+            species: &state.species,
+            image: &mut state.image,
+            mass: &state.mass,
+            kept: &mut motion.kept,
+        };
+        work(moving, around, forces.pool())
+    }
+
+    /// Refuses velocities that are not finite, or lead beyond the box within `dt`. Where the kick of the step before was
+    /// `deferred`, velocities that are not finite are that step's.
+    fn refuse(&self, faults: Faults, dt: Option<f64>, deferred: bool) -> Result<(), RunError> {
+        let Some(found) = faults.fast.or(faults.escaped) else { return Ok(()) };
+        let state = self.particles.now();
+        let speed = |k: usize| {
+            let v = state.v[k];
+            v[0].hypot(v[1]).hypot(v[2])
+        };
+        // The fastest is nearest to the cause; what is no number may have been made so by another.
+        let rank = |k: usize| if speed(k).is_nan() { f64::MAX } else { speed(k) };
+        let faster = |worst: usize, k: usize| if rank(k) > rank(worst) { k } else { worst };
+        let k = if faults.fast.is_some() { (0..state.len()).fold(found, faster) } else { found };
+        let (step, tag, speed) = (self.number, state.tag[k], speed(k));
+        match dt {
+            Some(dt) if speed.is_finite() => Err(RunError::Runaway { step, tag, distance: speed * dt }),
+            _ => Err(RunError::Velocity { step: step - u64::from(deferred), tag }),
+        }
+    }
+}

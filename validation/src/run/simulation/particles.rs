@@ -1,0 +1,187 @@
+//! What the particles are at the present step: where, how fast, and under which forces.
+
+use super::super::reorder::Reordering;
+use super::{RunError, Simulation};
+use crate::particles::State;
+use psidpd_core::engine::{PeriodicBox, Pool};
+use std::sync::OnceLock;
+
+#[derive(Debug, Clone)]
+pub(super) struct Particles {
+    state: State,
+    force: Vec<[f64; 3]>,
+    /// Counts changes of positions, and of their order.
+    moves: u64,
+    /// `Σ m v v` of the present velocities, once somebody has asked for it.
+    flux: OnceLock<[f64; 6]>,
+    /// `None` if particles stay in the order that they were given in.
+    reordering: Option<Reordering>,
+}
+
+impl Particles {
+    /// Particles without forces. Positions outside the box are wrapped into it.
+    ///
+    /// # Errors
+    /// `state` is no state of a model with so many species and dimensions.
+    pub fn new(mut state: State, species: usize, dimensions: usize) -> Result<Particles, RunError> {
+        if let Some(fault) = state.fault(species, dimensions) {
+            return Err(RunError::State(fault));
+        }
+        for (x, image) in state.x.iter_mut().zip(&mut state.image) {
+            state.domain.wrap(x, image);
+        }
+        let force = vec![[0.0; 3]; state.len()];
+        Ok(Particles { state, force, moves: 0, flux: OnceLock::new(), reordering: None })
+    }
+
+    /// Other particles in the same box, as they are: without wrapping.
+    pub fn replace(&mut self, state: &State, forces: &[[f64; 3]]) {
+        self.state.copy_particles(state);
+        self.force.clear();
+        self.force.extend_from_slice(forces);
+        // A start that failed has left none.
+        self.force.resize(state.len(), [0.0; 3]);
+        self.moves += 1;
+        self.flux.take();
+    }
+
+    pub fn now(&self) -> &State {
+        &self.state
+    }
+
+    pub fn forces(&self) -> &[[f64; 3]] {
+        &self.force
+    }
+
+    /// The particles, and their forces to be changed.
+    pub fn forces_mut(&mut self) -> (&State, &mut [[f64; 3]]) {
+        (&self.state, &mut self.force)
+    }
+
+    pub fn velocities_mut(&mut self) -> &mut [[f64; 3]] {
+        self.flux.take();
+        &mut self.state.v
+    }
+
+    /// The particles, to be moved or kicked by their forces.
+    pub fn motion(&mut self, moves: bool) -> (&mut State, &[[f64; 3]]) {
+        self.moves += u64::from(moves);
+        self.flux.take();
+        (&mut self.state, &self.force)
+    }
+
+    /// A number that changes with the positions.
+    pub fn moves(&self) -> u64 {
+        self.moves
+    }
+
+    /// Brings all arrays over particles into `order`, if they may be reordered.
+    pub fn reorder(&mut self, pool: &Pool, order: &[u32]) -> bool {
+        let Some(reordering) = &mut self.reordering else { return false };
+        let State { x, v, species, tag, image, .. } = &mut self.state;
+        if order.len() != x.len() {
+            return false;
+        }
+        self.moves += 1;
+        reordering.vectors(pool, order, x);
+        reordering.vectors(pool, order, v);
+        reordering.vectors(pool, order, &mut self.force);
+        let ordered = reordering.numbers(pool, order, |k| image[k]);
+        for (image, ordered) in image.iter_mut().zip(ordered) {
+            *image = ordered;
+        }
+        let ordered = reordering.numbers(pool, order, |k| [tag[k], species[k], 0]);
+        for (k, [of_tag, of_species, _]) in ordered.enumerate() {
+            (tag[k], species[k]) = (of_tag, of_species);
+        }
+        true
+    }
+
+    /// `Σ m v v`, in the order xx, yy, zz, xy, xz, yz.
+    pub fn momentum_flux(&self) -> [f64; 6] {
+        *self.flux.get_or_init(|| {
+            let mut sum = [0.0; 6];
+            for (v, s) in self.state.v.iter().zip(&self.state.species) {
+                let m = self.state.mass[*s as usize];
+                for (k, (a, b)) in [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)].into_iter().enumerate() {
+                    sum[k] += m * v[a] * v[b];
+                }
+            }
+            sum
+        })
+    }
+}
+
+impl Simulation {
+    /// Whether particles are brought, at the end of some steps, into an order in which those near each other in
+    /// space are so in memory, which is faster in large systems. Afterwards only its tag identifies a particle. Off
+    /// by default.
+    ///
+    /// The steps depend on their number only. Trajectories differ from those without by the rounding of sums.
+    pub fn set_reordering(&mut self, on: bool) {
+        self.particles.reordering = on.then(Reordering::default);
+    }
+
+    /// How many particles there are.
+    pub fn len(&self) -> usize {
+        self.particles.state.len()
+    }
+
+    /// Whether there are none: never.
+    pub fn is_empty(&self) -> bool {
+        self.particles.state.is_empty()
+    }
+
+    /// The box.
+    pub fn domain(&self) -> &PeriodicBox {
+        &self.particles.state.domain
+    }
+
+    /// Positions, in the box.
+    pub fn positions(&self) -> &[[f64; 3]] {
+        &self.particles.state.x
+    }
+
+    /// Velocities.
+    pub fn velocities(&self) -> &[[f64; 3]] {
+        debug_assert!(self.motion.is_at_end_of_step());
+        &self.particles.state.v
+    }
+
+    /// Forces of the last evaluation.
+    pub fn forces(&self) -> &[[f64; 3]] {
+        &self.particles.force
+    }
+
+    /// Species.
+    pub fn species(&self) -> &[i32] {
+        &self.particles.state.species
+    }
+
+    /// Tags.
+    pub fn tags(&self) -> &[i32] {
+        &self.particles.state.tag
+    }
+
+    /// Boxes travelled.
+    pub fn image_flags(&self) -> &[[i32; 3]] {
+        &self.particles.state.image
+    }
+
+    /// Mass of each species.
+    pub fn masses(&self) -> &[f64] {
+        &self.particles.state.mass
+    }
+
+    /// A copy of the particles.
+    pub fn state(&self) -> State {
+        debug_assert!(self.motion.is_at_end_of_step());
+        self.particles.state.clone()
+    }
+
+    /// Copies the particles into `state`, which is one of this simulation and keeps its memory.
+    pub fn copy_state(&self, state: &mut State) {
+        debug_assert!(self.motion.is_at_end_of_step());
+        state.copy_particles(&self.particles.state);
+    }
+}

@@ -1,0 +1,72 @@
+//! Energies, temperature and pressure of the present step.
+
+use super::Simulation;
+
+impl Simulation {
+    /// `U` of the last evaluation that wanted energies.
+    pub fn potential_energy(&self) -> f64 {
+        self.tally().energy()
+    }
+
+    /// `½ Σ m v²`.
+    pub fn kinetic_energy(&self) -> f64 {
+        let k = self.particles.momentum_flux();
+        0.5 * (k[0] + k[1] + k[2])
+    }
+
+    /// How many degrees of freedom the kinetic energy is shared by: `d` for each particle that moves, less one
+    /// for each direction along which the total momentum is conserved. Frozen particles conserve none of it,
+    /// walls not that across them.
+    pub fn degrees_of_freedom(&self) -> usize {
+        let conserved = match self.frozen().is_empty() {
+            true => self.domain().periodic()[..self.dimensions()].iter().filter(|p| **p).count(),
+            false => 0,
+        };
+        (self.dimensions() * self.mobile()).saturating_sub(conserved)
+    }
+
+    /// `kT` from the kinetic energy of the particles that move, as LAMMPS's `compute temp`; 0 without degrees
+    /// of freedom. A flow counts as heat.
+    pub fn temperature(&self) -> f64 {
+        match self.degrees_of_freedom() {
+            0 => 0.0,
+            freedom => 2.0 * self.kinetic_energy() / freedom as f64,
+        }
+    }
+
+    /// `Σ m v`.
+    pub fn momentum(&self) -> [f64; 3] {
+        let mut sum = [0.0; 3];
+        for (v, s) in self.velocities().iter().zip(self.species()) {
+            for c in 0..3 {
+                sum[c] += self.masses()[*s as usize] * v[c];
+            }
+        }
+        sum
+    }
+
+    fn over_volume(&self, virial: [f64; 6]) -> [f64; 6] {
+        let volume = self.domain().volume(self.dimensions());
+        let flux = self.particles.momentum_flux();
+        std::array::from_fn(|k| (flux[k] + virial[k]) / volume)
+    }
+
+    /// `(Σ m v v + W)/V` with the virial of all forces, thermostat included, as LAMMPS's
+    /// `compute pressure`; order xx, yy, zz, xy, xz, yz. Needs a virial.
+    pub fn pressure_tensor(&self) -> [f64; 6] {
+        self.over_volume(self.tally().total_virial())
+    }
+
+    /// The same with the virial of conservative forces alone, which has less noise.
+    ///
+    /// The two means differ by a term of order Δt: the drag of velocity Verlet sees the velocity that
+    /// brought particles to where they are, which is correlated with their distance.
+    pub fn conservative_pressure_tensor(&self) -> [f64; 6] {
+        self.over_volume(self.tally().virial)
+    }
+
+    /// The trace of a pressure tensor over the number of dimensions.
+    pub fn scalar_pressure(&self, tensor: [f64; 6]) -> f64 {
+        tensor[..self.dimensions()].iter().sum::<f64>() / self.dimensions() as f64
+    }
+}

@@ -1,0 +1,224 @@
+//! The thermostat apart from the forces, and how it goes together with them.
+
+use super::external::External;
+use super::forces::Forces;
+use super::particles::Particles;
+use super::{RunError, Simulation};
+use psidpd_core::engine::noise::Law;
+use psidpd_core::engine::thermostat::{Bodies, PairThermostat, Stream, Update, Warmth};
+use psidpd_core::engine::{Step, Want};
+
+#[derive(Debug, Clone)]
+pub(super) struct Thermostat {
+    on: bool,
+    /// `None` if the fluid has none.
+    pairs: Option<PairThermostat>,
+    /// Of which positions the pairs are known, for what time, and whether with distances.
+    found: Option<(u64, f64, bool)>,
+    /// Virial of the impulses in the present step.
+    impulse_virial: [f64; 6],
+    /// Whether drag and noise are among the present forces, where they act; `None` if nobody has asked for these forces.
+    in_forces: Option<bool>,
+    /// Of [`Simulation::with_forces_kept`].
+    kept_forces: Vec<[f64; 3]>,
+}
+
+/// One action of a thermostat apart from the forces.
+#[derive(Debug, Clone, Copy)]
+pub struct Heat {
+    pub update: Update,
+    /// The law of its noise.
+    pub noise: Law,
+    /// How long it acts.
+    pub time: f64,
+    pub stream: Stream,
+}
+
+impl Thermostat {
+    pub fn new(forces: &Forces) -> Thermostat {
+        let pairs = pairs_of(forces);
+        Thermostat {
+            on: true,
+            pairs,
+            found: None,
+            impulse_virial: [0.0; 6],
+            in_forces: None,
+            kept_forces: Vec::new(),
+        }
+    }
+
+    /// Takes over the temperature and the settings of `forces`.
+    pub fn follow(&mut self, forces: &Forces) {
+        self.pairs = pairs_of(forces);
+        self.found = None;
+    }
+
+    /// Whether the present forces are those that an integrator needs which has drag in them, or has not.
+    pub fn fits(&self, drag_in_forces: bool) -> bool {
+        !self.on || self.in_forces.is_none_or(|there| there == drag_in_forces)
+    }
+
+    /// Forgets what is known of forces.
+    pub fn forget_forces(&mut self) {
+        self.in_forces = None;
+    }
+
+    pub fn begin_step(&mut self) {
+        self.impulse_virial = [0.0; 6];
+    }
+
+    /// Virial of the impulses in the present step.
+    pub fn impulse_virial(&self) -> [f64; 6] {
+        self.impulse_virial
+    }
+
+    /// Finds the pairs for a time `dt`, and returns them if the thermostat acts.
+    fn find_pairs(
+        &mut self,
+        particles: &Particles,
+        external: &External,
+        forces: &Forces,
+        (dt, virial, number): (f64, bool, u64),
+    ) -> Result<Option<&mut PairThermostat>, RunError> {
+        let Some(pairs) = self.pairs.as_mut().filter(|_| self.on) else { return Ok(None) };
+        let found = Some((particles.moves(), dt, virial));
+        if self.found != found {
+            let state = particles.now();
+            forces.check_width(&state.domain)?;
+            let bodies = Bodies {
+                domain: &state.domain,
+                x: &state.x,
+                tag: &state.tag,
+                species: &state.species,
+                mass: &state.mass,
+                frozen: external.frozen(),
+            };
+            let failed = |source| RunError::Engine { step: number, source };
+            pairs.find_pairs(forces.pool(), &bodies, dt, virial).map_err(failed)?;
+            self.found = found;
+        }
+        Ok(Some(pairs))
+    }
+
+    /// Adds drag or noise to the forces, between the pairs that were found last.
+    fn add_pair_forces(
+        &mut self,
+        particles: &mut Particles,
+        external: &External,
+        forces: &Forces,
+        drag: bool,
+    ) {
+        let Some(pairs) = self.pairs.as_mut().filter(|_| self.on) else { return };
+        let (state, force) = particles.forces_mut();
+        let virial = pairs.add_forces(forces.pool(), &state.v, drag, !drag, force);
+        external.clear_frozen(force);
+        (0..6).for_each(|c| self.impulse_virial[c] += virial[c]);
+    }
+}
+
+fn pairs_of(forces: &Forces) -> Option<PairThermostat> {
+    PairThermostat::new(forces.plan(), forces.kt(), forces.settings().instructions)
+}
+
+impl Simulation {
+    /// Switches dissipative and random forces off, or on again.
+    pub fn set_thermostat(&mut self, on: bool) {
+        self.thermostat.on = on;
+    }
+
+    /// All forces at the present positions, drag at the present velocities and noise for a step of `dt` among them.
+    pub(in crate::run) fn forces_with_thermostat(&mut self, dt: f64, want: Want) -> Result<(), RunError> {
+        let step = Step { seed: self.seed, number: self.number, dt };
+        self.compute(want, self.thermostat.on.then_some(step))?;
+        self.external.add_forces(&mut self.particles, self.forces.pool());
+        self.thermostat.in_forces = Some(true);
+        Ok(())
+    }
+
+    /// All forces at the present positions but those of the thermostat.
+    pub(in crate::run) fn conservative_forces(&mut self, want: Want) -> Result<(), RunError> {
+        self.compute(want, None)?;
+        self.external.add_forces(&mut self.particles, self.forces.pool());
+        self.thermostat.in_forces = Some(false);
+        Ok(())
+    }
+
+    /// All forces at the present positions but drag, noise for a step of `dt` among them.
+    pub(in crate::run) fn forces_then_noise(
+        &mut self,
+        dt: f64,
+        want: Want,
+        noise: Law,
+    ) -> Result<(), RunError> {
+        self.conservative_forces(want)?;
+        let Simulation { particles, external, forces, thermostat, seed, number, .. } = self;
+        if let Some(pairs) = thermostat.find_pairs(particles, external, forces, (dt, want.virial, *number))? {
+            pairs.draw(forces.pool(), *seed, *number, Stream(0), noise);
+            thermostat.add_pair_forces(particles, external, forces, false);
+        }
+        thermostat.in_forces = Some(true);
+        Ok(())
+    }
+
+    /// Adds the drag at the present velocities to the forces; after [`Simulation::forces_then_noise`], whose pairs it takes.
+    pub(in crate::run) fn add_drag(&mut self) {
+        let Simulation { particles, external, forces, thermostat, .. } = self;
+        thermostat.add_pair_forces(particles, external, forces, true);
+    }
+
+    /// Changes velocities by the thermostat, if it acts.
+    pub(in crate::run) fn heat(&mut self, heat: Heat, want: Want, dt: f64) -> Result<(), RunError> {
+        self.make_deferred_kick()?;
+        let Simulation { particles, external, forces, thermostat, seed, number, .. } = self;
+        let what = (heat.time, want.virial, *number);
+        let Some(pairs) = thermostat.find_pairs(particles, external, forces, what)? else { return Ok(()) };
+        let pool = forces.pool();
+        pairs.draw(pool, *seed, *number, heat.stream, heat.noise);
+        let v = particles.velocities_mut();
+        let virial = pairs.act(pool, heat.update, v);
+        // The drag that an implicit step ends with is a force, which `add_drag` counts.
+        if heat.update != Update::ImplicitDrag {
+            // That of a mean force over the step.
+            for (sum, w) in thermostat.impulse_virial.iter_mut().zip(virial) {
+                *sum += w * heat.time / dt;
+            }
+        }
+        match not_finite(v) {
+            Some(k) => Err(RunError::Velocity { step: *number, tag: particles.now().tag[k] }),
+            None => Ok(()),
+        }
+    }
+
+    /// Calls `work` and takes back what it does to the forces, and to their virial.
+    pub(in crate::run) fn with_forces_kept(
+        &mut self,
+        work: impl FnOnce(&mut Simulation) -> Result<(), RunError>,
+    ) -> Result<(), RunError> {
+        let virial = self.thermostat.impulse_virial;
+        let mut kept = std::mem::take(&mut self.thermostat.kept_forces);
+        kept.clear();
+        kept.extend_from_slice(self.particles.forces());
+        let done = work(self);
+        self.particles.forces_mut().1.copy_from_slice(&kept);
+        self.thermostat.kept_forces = kept;
+        self.thermostat.impulse_virial = virial;
+        done
+    }
+
+    /// What the thermostat sees of the particles; `None` where it does not act, or sees none.
+    ///
+    /// # Errors
+    /// A position that is not finite.
+    pub fn warmth(&mut self, dt: f64) -> Result<Option<Warmth>, RunError> {
+        let Simulation { particles, external, forces, thermostat, number, .. } = self;
+        let pairs = thermostat.find_pairs(particles, external, forces, (dt, false, *number))?;
+        Ok(pairs.and_then(|pairs| pairs.warmth(&particles.now().v)))
+    }
+}
+
+/// The first velocity whose square is not finite.
+fn not_finite(v: &[[f64; 3]]) -> Option<usize> {
+    // One sum tells whether there is any.
+    let sum: f64 = v.iter().flatten().map(|v| v * v).sum();
+    if sum.is_finite() { None } else { v.iter().position(|v| !v.iter().all(|c| (c * c).is_finite())) }
+}
