@@ -134,7 +134,7 @@ fn no_files_of_the_engine_import_in_a_circle() {
 #[test]
 fn the_files_are_found() {
     let passes = sources("rust-core/passes");
-    assert!(passes.imports["plane::first"].contains("pair_search::find"));
+    assert!(passes.imports["plane::traversal"].contains("pair_search::find"));
     assert!(passes.imports["plane::first"].contains("tally"));
     let core = sources("rust-core");
     assert!(!core.imports.keys().any(|module| module.ends_with("tests")));

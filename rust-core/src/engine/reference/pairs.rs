@@ -29,6 +29,22 @@ pub struct PairList {
 }
 
 impl PairList {
+    /// Bytes held in arrays.
+    pub fn bytes(&self) -> usize {
+        fn of<T>(array: &Vec<T>) -> usize {
+            array.capacity() * size_of::<T>()
+        }
+        let PairList { i, j, species_i, species_j, d, r, factor, thermostat_factor } = self;
+        of(i)
+            + of(j)
+            + of(species_i)
+            + of(species_j)
+            + d.iter().map(of).sum::<usize>()
+            + of(r)
+            + of(factor)
+            + of(thermostat_factor)
+    }
+
     pub fn len(&self) -> usize {
         self.r.len()
     }

@@ -3,7 +3,6 @@
 
 use super::densities::add_density;
 use super::forces::{ForceInput, ForceOutput, add_forces};
-use super::memory::list_bytes;
 use super::pairs::{PairList, Pairs};
 use crate::engine::error::EngineError;
 use crate::engine::particles::Particles;
@@ -160,6 +159,6 @@ impl Corrections {
 
     /// Bytes held in arrays over pairs.
     pub fn memory(&self) -> usize {
-        list_bytes(&self.pairs)
+        self.pairs.bytes()
     }
 }

@@ -78,7 +78,7 @@ impl PairLists {
     /// # Errors
     /// A position that is not finite; a box narrower than twice the range, or that leans along an open direction.
     #[allow(clippy::too_many_arguments)]
-    pub fn find<'p, T: AsMut<PlanePairs> + Default + Send>(
+    pub fn find<T: AsMut<PlanePairs> + Default + Send>(
         &mut self,
         pool: &Pool,
         domain: &PeriodicBox,
@@ -86,7 +86,7 @@ impl PairLists {
         tables: &WeightTables,
         range: f64,
         with_stretch: bool,
-        planes: &'p mut Vec<T>,
+        planes: &mut Vec<T>,
     ) -> Result<(), EngineError> {
         let species: Vec<i32> = (0..tables.species as i32).collect();
         let input = Input::new(particles, &[], &[], &species, &[], None, Want::FORCES);

@@ -45,6 +45,12 @@ impl<'a> ExcessInput<'a> {
 
     /// Adds what is added beside pairs to the densities of particles with these numbers.
     fn add(&self, numbers: &[u32], width: usize, densities: &mut [f64]) {
+        if width == 1 {
+            for (k, n) in numbers.iter().zip(densities) {
+                *n += self.added.get(*k as usize).copied().unwrap_or_default();
+            }
+            return;
+        }
         for (k, row) in numbers.iter().zip(densities.chunks_exact_mut(width)) {
             // Ghosts have no row.
             let added = self.added.get(width * *k as usize..).unwrap_or_default();
