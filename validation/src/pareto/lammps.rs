@@ -5,7 +5,7 @@ use super::origin::Origin;
 use super::own_style::OwnStyle;
 use super::quantity::Quantities;
 use super::recommend::scene_of;
-use super::sample::{Effort, Sampled, interval_time, observe};
+use super::sample::{Effort, FAR_OFF, Sampled, interval_time, observe};
 use super::setting::{Host as Who, Physics, Setting};
 use crate::bench::log;
 use crate::export::lammps as deck;
@@ -101,7 +101,8 @@ impl Lammps {
             kinetic.push(&row[1..2]);
         }
         let mean = kinetic.mean(0);
-        if !(mean.value < 5.0 * origin.stage.kt) {
+        let bounded = mean.value < FAR_OFF * origin.stage.kt;
+        if !bounded {
             return Ok(Sampled::Unstable(format!(
                 "the temperature is {:.1} kT",
                 mean.value / origin.stage.kt

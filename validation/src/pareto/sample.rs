@@ -62,7 +62,7 @@ const FEWEST: u64 = 16;
 /// Samples of the cheap observables to one of the others.
 const RARELY: u64 = 3;
 /// A run is given up where it is hotter than this, in kT.
-const FAR_OFF: f64 = 5.0;
+pub const FAR_OFF: f64 = 5.0;
 
 /// What is observed: temperature of configurations, pressure, g(r) and diffusion, and what the scene itself asks of interfaces.
 ///
