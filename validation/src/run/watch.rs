@@ -183,7 +183,8 @@ mod tests {
 
     #[test]
     fn few_samples_are_trusted_less() {
-        let samples = |n: usize| (0..n).map(|k| if k.is_multiple_of(2) { 0.9 } else { 1.1 }).collect::<Vec<f64>>();
+        let samples =
+            |n: usize| (0..n).map(|k| if k.is_multiple_of(2) { 0.9 } else { 1.1 }).collect::<Vec<f64>>();
         for (n, factor) in [(6, 1.6), (16, 1.2)] {
             let [mean, error] = estimate(&samples(n));
             let plain = 0.1 / (n as f64 - 1.0).sqrt();
