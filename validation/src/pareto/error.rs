@@ -21,7 +21,7 @@ pub enum ParetoError {
         /// What was run.
         what: String,
         /// Why it stopped.
-        source: RunError,
+        source: Box<RunError>,
     },
     /// The reference is unstable.
     #[error("the reference, {what}, is unstable: {why}; lower the dt of the scene")]

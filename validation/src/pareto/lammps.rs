@@ -101,7 +101,9 @@ impl Lammps {
             kinetic.push(&row[1..2]);
         }
         let mean = kinetic.mean(0);
-        if !(mean.value < 5.0 * origin.stage.kt) {
+        let calm = mean.value < 5.0 * origin.stage.kt;
+        // What is no number is not calm.
+        if !calm {
             return Ok(Sampled::Unstable(format!(
                 "the temperature is {:.1} kT",
                 mean.value / origin.stage.kt

@@ -44,7 +44,7 @@ impl<'a> Origin<'a> {
         for (stage, mut steps) in stages {
             let failed = |source| ParetoError::Stopped {
                 what: format!("the start, stage \"{}\"", stage.name),
-                source,
+                source: Box::new(source),
             };
             scene.enter(stage, &mut run)?;
             run.prepare_for(stage.integrator, stage.dt, Want::FORCES).map_err(failed)?;

@@ -270,7 +270,7 @@ mod tests {
         let of = |g: Vec<f64>, e: f64| Structure { weights: vec![1.0; g.len()], errors: vec![e; g.len()], g };
         let n = 400;
         // Differences of ±2e as noise of two functions with errors e would on average, but for their spread.
-        let wobble = |k: usize| if k % 2 == 0 { 0.01 } else { -0.01 };
+        let wobble = |k: usize| if k.is_multiple_of(2) { 0.01 } else { -0.01 };
         let a = of((0..n).map(|k| 1.0 + 2f64.sqrt() * wobble(k)).collect(), 0.01);
         let b = of(vec![1.0; n], 0.01);
         let [d, error] = distance(&a, &b);

@@ -68,7 +68,7 @@ fn native(origin: &Origin, setting: &Setting, steps: u64) -> Result<f64, ParetoE
     let dt = origin.dt(physics);
     let mut run = origin.simulation(physics, setting.threads, true, Want::FORCES)?;
     let what = || format!("timing {} at dt = {dt}", physics.integrator);
-    let failed = |source| ParetoError::Stopped { what: what(), source };
+    let failed = |source| ParetoError::Stopped { what: what(), source: Box::new(source) };
     run.advance(CYCLE, dt, physics.integrator).map_err(failed)?;
     let begin = Instant::now();
     run.advance(steps, dt, physics.integrator).map_err(failed)?;
