@@ -124,9 +124,9 @@ pub fn judge(must: Must, found: &Found, mixed: bool) -> Result<(), String> {
         Found::Ended { warnings, .. } if !warnings.is_empty() => Err(warnings.join("; ")),
         Found::Ended { temperatures, momentum, .. } => {
             for [t, error] in temperatures {
-                // What is no number is not within either.
-                let within = (t - 1.0).abs() <= part + 4.0 * error;
-                if !within {
+                let near = (t - 1.0).abs() <= part + 4.0 * error;
+                // What is no number is not near.
+                if !near {
                     return Err(format!("a temperature of {t:.3} ± {error:.3} kT"));
                 }
             }

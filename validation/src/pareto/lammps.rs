@@ -101,8 +101,9 @@ impl Lammps {
             kinetic.push(&row[1..2]);
         }
         let mean = kinetic.mean(0);
-        let bounded = mean.value < FAR_OFF * origin.stage.kt;
-        if !bounded {
+        let calm = mean.value < FAR_OFF * origin.stage.kt;
+        // What is no number is not calm.
+        if !calm {
             return Ok(Sampled::Unstable(format!(
                 "the temperature is {:.1} kT",
                 mean.value / origin.stage.kt
