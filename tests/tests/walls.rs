@@ -15,6 +15,7 @@ const CORE: &[&[&str]] = &[
     &[
         "engine::counts",
         "engine::error",
+        "engine::fault",
         "engine::images",
         "engine::particles",
         "engine::path",

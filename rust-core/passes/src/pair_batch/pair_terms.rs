@@ -222,7 +222,7 @@ impl<R: Reals> Term<R> for SoftTerm<R> {
 /// Adds the forces of a soft term.
 ///
 /// # Safety
-/// As [`each`].
+/// As `each`.
 #[inline(always)]
 pub unsafe fn add_soft<R: Reals, const MULTISPECIES: bool, const TALLY: bool>(
     term: &Soft<R::Scalar>,
@@ -272,7 +272,7 @@ impl<R: Reals, S: Shape> Term<R> for LinearTerm<R, S> {
 /// Adds the forces of a density that every ψ is linear in.
 ///
 /// # Safety
-/// As [`each`].
+/// As `each`.
 #[inline(always)]
 pub unsafe fn add_linear<R: Reals, const MULTISPECIES: bool, const TALLY: bool>(
     term: &Linear<R::Scalar>,
@@ -365,7 +365,7 @@ impl<R: Reals> Term<R> for SplineTerm<R> {
 /// Adds the forces of spline potentials.
 ///
 /// # Safety
-/// As [`each`].
+/// As `each`.
 #[inline(always)]
 pub unsafe fn add_spline<R: Reals, const MULTISPECIES: bool, const TALLY: bool>(
     term: &Spline<R::Scalar>,
