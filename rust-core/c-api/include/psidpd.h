@@ -2,8 +2,8 @@
  *
  * SPDX-License-Identifier: GPL-2.0-or-later
  *
- * Made from rust-core/src/c_api/ by cbindgen; change it there, then run
- *     PSIDPD_UPDATE_HEADER=1 cargo test -p psidpd-core header
+ * Made from rust-core/c-api/src/ by cbindgen; change it there, then run
+ *     PSIDPD_UPDATE_HEADER=1 cargo test -p psidpd-c-api header
  *
  * Reduced units: lengths in r_c, masses in m, energies in the unit of the model file. r_ij = r_i - r_j.
  *

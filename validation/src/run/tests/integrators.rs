@@ -35,7 +35,7 @@ fn ideal_gas(integrator: Integrator, dt: f64) -> Gas {
     let blocks: Vec<[f64; 2]> = (0..20)
         .map(|block| {
             let mut sums = [0.0; 2];
-            for _ in 0..15 {
+            for _ in 0..24 {
                 run.step(dt, integrator, Want::FORCES).unwrap();
                 let masses: Vec<f64> = run.species().iter().map(|s| run.masses()[*s as usize]).collect();
                 let fourth: f64 = run
@@ -44,8 +44,8 @@ fn ideal_gas(integrator: Integrator, dt: f64) -> Gas {
                     .zip(masses)
                     .map(|(v, m)| v.iter().map(|c| (m * c * c).powi(2)).sum::<f64>())
                     .sum();
-                sums[0] += run.temperature() / 15.0;
-                sums[1] += fourth / (3 * run.len()) as f64 / 15.0;
+                sums[0] += run.temperature() / 24.0;
+                sums[1] += fourth / (3 * run.len()) as f64 / 24.0;
             }
             if block % 2 == 0 {
                 frames += 1.0;
