@@ -2,7 +2,7 @@
 //! around the forces: one thread, the same start every time.
 //!
 //! ```text
-//! valgrind --tool=callgrind --callgrind-out-file=steps.out target/release/examples/step_instructions 6050 40
+//! valgrind --tool=callgrind --callgrind-out-file=steps.out target/release/examples/step_instructions 6050 40 [INTEGRATOR]
 //! callgrind_annotate --inclusive=yes steps.out | grep -E 'Simulation::step|Sweep::evaluate'
 //! ```
 //!
@@ -15,10 +15,15 @@ use std::error::Error;
 use std::path::Path;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let arguments: Vec<u64> = std::env::args().skip(1).map(|a| a.parse()).collect::<Result<_, _>>()?;
-    let [particles, steps] = arguments[..] else {
-        return Err("usage: step_instructions PARTICLES STEPS".into());
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let (particles, steps, integrator) = match &arguments[..] {
+        [particles, steps] => (particles, steps, "velocity-verlet"),
+        [particles, steps, integrator] => (particles, steps, &integrator[..]),
+        _ => return Err("usage: step_instructions PARTICLES STEPS [INTEGRATOR]".into()),
     };
+    let (particles, steps): (u64, u64) = (particles.parse()?, steps.parse()?);
+    let known = Integrator::ALL.iter().find(|(name, _)| *name == integrator);
+    let integrator = known.ok_or("no such integrator")?.1;
     let length = (particles as f64 / 6.05).cbrt();
     let text = format!(
         "model = \"warren2003-set6.toml\"\nkT = 1.0\nbox = [{length}, {length}, {length}]\ndensity = 6.05\nsteps = 1\n"
@@ -33,7 +38,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     run.set_reordering(true);
     run.prepare(0.01, Want::FORCES)?;
     for _ in 0..steps {
-        run.step(0.01, Integrator::VelocityVerlet, Want::FORCES)?;
+        run.step(0.01, integrator, Want::FORCES)?;
     }
     println!("{} particles, kT = {}", run.len(), run.temperature());
     Ok(())
