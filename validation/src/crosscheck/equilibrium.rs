@@ -124,7 +124,7 @@ const QUANTITIES: [Quantity; 5] = [
     ("pressure", |m| &m.pressure, 0.13),
     ("energy", |m| &m.energy, 0.02),
     ("liquid density", |m| &m.liquid, 0.012),
-    ("surface tension", |m| &m.tension, 0.3),
+    ("surface tension", |m| &m.tension, 0.4),
 ];
 
 /// The quantities in which a run is held to another.

@@ -7,7 +7,7 @@
 //! shares what they have in common and works on blocks of particles at a time.
 //!
 //! ```
-//! use psidpd_core::model::expression::{Ast, Formula, Program, Variables};
+//! use psidpd_model::expression::{Ast, Formula, Program, Variables};
 //!
 //! // Warren's many-body term, ψ(n) = π r_d⁴ B n² / 30, and its slope.
 //! let ast = Ast::parse("pi/30 * rd^4 * B * n^2")?;
