@@ -212,6 +212,7 @@ fn a_checkpoint_that_cannot_be_written_leaves_what_is_there() {
     std::fs::create_dir(folder.path().join("checkpoint.new")).unwrap();
     let error = store.write(&checkpoint(2)).unwrap_err();
     assert_eq!(error.path, folder.path().join("checkpoint"), "{error}");
+    assert!(error.to_string().contains("cannot write"), "{error}");
     assert_eq!(store.find(any).unwrap().unwrap().checkpoint.step, 1);
 }
 

@@ -58,11 +58,13 @@ fn name(code: Code, law: ForceLaw) -> String {
 /// Runs the comparison.
 pub fn run(context: &Context) -> Result<Part, ValidateError> {
     let sets = [SET5, SET6];
-    let (edge, height, steps) = if context.full { (10.0, 24.0, 100_000) } else { (5.0, 14.0, 8_000) };
+    // A wide and thin slab: the error of the tension goes with the root of thickness over area.
+    let (edge, height, thickness, steps) =
+        if context.full { (10.0, 24.0, 12.0, 100_000) } else { (6.0, 12.0, 4.8, 8_000) };
     let length = Length { dt: 0.01, steps, sample: 10, averaged: true, frame: 25 };
     let mut starts = Vec::new();
     for set in &sets {
-        let filling = Filling { lengths: [edge, edge, height], thickness: 0.5 * height, density: set.liquid };
+        let filling = Filling { lengths: [edge, edge, height], thickness, density: set.liquid };
         starts.push(equilibrated(set, filling, 1000, SEED)?);
     }
     let made = context.progress.overall("equilibrium", steps * (sets.len() * RUNS.len()) as u64);
@@ -124,7 +126,7 @@ const QUANTITIES: [Quantity; 5] = [
     ("pressure", |m| &m.pressure, 0.13),
     ("energy", |m| &m.energy, 0.02),
     ("liquid density", |m| &m.liquid, 0.012),
-    ("surface tension", |m| &m.tension, 0.4),
+    ("surface tension", |m| &m.tension, 0.3),
 ];
 
 /// The quantities in which a run is held to another.

@@ -50,14 +50,21 @@ pub struct CellGrid {
     pub i_cluster_extent: f64,
 }
 
+/// Coordinates are in single precision, relative to the box: pairs are searched so much further, of cutoff and box together.
+const ROUNDING: f64 = 1e-6;
+
 impl CellGrid {
+    /// The largest cutoff that a box of this height has room for, whose longest edge is `longest`.
+    pub fn cutoff_within(height: f64, longest: f64) -> f64 {
+        (0.5 * height * (1.0 - 1e-12) - ROUNDING * longest) / (1.0 + ROUNDING)
+    }
+
     /// The grid for `count` particles; `None` if the box is so narrow along a period that a particle meets two images of
     /// another.
     pub fn new(geometry: &BoxGeometry, cutoff: f64, count: usize) -> Option<CellGrid> {
         let (column_axis, plane_axis) = if geometry.dimensions == 3 { (1, 2) } else { (2, 1) };
         let longest = geometry.length[..geometry.dimensions].iter().fold(0.0, |a: f64, b| a.max(*b));
-        // Coordinates are in single precision, relative to the box.
-        let search_cutoff = cutoff + 1e-6 * (cutoff + longest);
+        let search_cutoff = cutoff + ROUNDING * (cutoff + longest);
         for k in 0..geometry.dimensions {
             if geometry.periodic[k] && geometry.height(k) < 2.0 * search_cutoff {
                 return None;

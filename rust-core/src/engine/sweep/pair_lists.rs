@@ -10,6 +10,7 @@ use crate::engine::particles::Particles;
 use psidpd_passes::cells::sorted::SortedCells;
 use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::ground::arithmetic::MixedParticle;
+use psidpd_passes::ground::cell_grid::CellGrid;
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::plane::list::{ListBuffers, ListInputs, PairList, WeightTables, list_pairs};
 use psidpd_passes::tally::Want;
@@ -91,13 +92,8 @@ impl PairLists {
         let species: Vec<i32> = (0..tables.species as i32).collect();
         let input = Input::new(particles, &[], &[], &species, &[], None, Want::FORCES);
         let set = self.set;
-        let (geometry, mut grid) =
-            region(set, pool, (self.dimensions, range), domain, &input).map_err(|fault| match fault {
-                EngineError::Host(_) => EngineError::Host(
-                    "a box that is not wider than twice the range of its thermostat, or leans along an open side",
-                ),
-                other => other,
-            })?;
+        let range = self.range_within(domain, range)?;
+        let (geometry, mut grid) = region(set, pool, (self.dimensions, range), domain, &input)?;
         // Updates of one pair after the other go over planes that have no neighbour in common.
         if geometry.periodic[grid.plane_axis] {
             grid.planes = grid.planes.max(2);
@@ -145,6 +141,21 @@ impl PairLists {
             }
         });
         Ok(())
+    }
+
+    /// The range to search, a little less than `range` in a box that is just twice as wide: what is lost of a pair there, drag
+    /// and noise alike, is next to nothing.
+    fn range_within(&self, domain: &PeriodicBox, range: f64) -> Result<f64, EngineError> {
+        let longest =
+            (0..self.dimensions).map(|k| domain.edge(k).map(f64::abs).into_iter().fold(0.0, f64::max));
+        let longest = longest.fold(4.0 * range, f64::max);
+        let periodic = domain.periodic();
+        let heights = (0..self.dimensions).filter(|k| periodic[*k]).map(|k| domain.height(k));
+        let height = heights.fold(f64::INFINITY, f64::min);
+        if height < 2.0 * range * (1.0 - 1e-12) {
+            return Err(EngineError::Host("a box narrower than twice the range of its thermostat"));
+        }
+        Ok(range.min(CellGrid::cutoff_within(height, longest)))
     }
 
     /// Puts the particles of each cell into the order of their tags.

@@ -113,7 +113,7 @@ impl Cloud {
 
 fn clouds() -> Vec<(&'static str, Cloud)> {
     let straight = Matrix3::from_diagonal(&[3.0, 4.1, 5.3].into());
-    let narrow = Matrix3::from_diagonal_element(2.001);
+    let narrow = Matrix3::from_diagonal_element(2.0);
     let leaning = Matrix3::new(4.0, 1.3, -0.7, 0.0, 3.5, 0.9, 0.0, 0.0, 3.0);
     let flat = Matrix3::from_diagonal(&[6.0, 5.0, 1.0].into());
     vec![
