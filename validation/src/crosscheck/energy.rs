@@ -22,7 +22,7 @@ const HEATING: f64 = 0.1;
 
 /// Runs the comparison.
 pub fn run(context: &Context) -> Result<Part, ValidateError> {
-    let edge = if context.full { 12.0 } else { 7.0 };
+    let edge = if context.full { 12.0 } else { 5.2 };
     let filling = Filling { lengths: [edge; 3], thickness: edge, density: SET6.liquid };
     let state = equilibrated(&SET6, filling, 1500, SEED)?;
     let length = Length { dt: 0.001, steps: 10_000, sample: 50, averaged: false, frame: 0 };
