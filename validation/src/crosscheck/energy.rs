@@ -26,7 +26,7 @@ pub fn run(context: &Context) -> Result<Part, ValidateError> {
     let filling = Filling { lengths: [edge; 3], thickness: edge, density: SET6.liquid };
     let state = equilibrated(&SET6, filling, 1500, SEED)?;
     let length = Length { dt: 0.001, steps: 10_000, sample: 50, averaged: false, frame: 0 };
-    let codes = [Code::BuiltIn, Code::Psi, Code::PsiMixed, Code::Eam, Code::Native, Code::NativeMixed];
+    let codes = [Code::Native, Code::NativeMixed, Code::Psi, Code::PsiMixed, Code::BuiltIn, Code::Eam];
     let state = &state;
     let jobs: Vec<Job<Result<Trace, ValidateError>>> = codes
         .iter()

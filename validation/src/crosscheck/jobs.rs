@@ -6,11 +6,12 @@ use std::sync::Mutex;
 pub type Job<'a, T> = Box<dyn FnOnce() -> T + Send + 'a>;
 
 /// Carries out `jobs` on as many threads as there are cores, but never more than two: the machine
-/// may have other work. Results come in the order of the jobs.
+/// may have other work. The last begins first, so that the longest are best at the end. Results come in the order of the
+/// jobs.
 pub fn run<T: Send>(jobs: Vec<Job<'_, T>>) -> Vec<T> {
     let workers = std::thread::available_parallelism().map_or(1, |n| n.get().min(2));
     let count = jobs.len();
-    let queue = Mutex::new(jobs.into_iter().enumerate());
+    let queue = Mutex::new(jobs.into_iter().enumerate().rev());
     let done: Mutex<Vec<(usize, T)>> = Mutex::new(Vec::with_capacity(count));
     std::thread::scope(|scope| {
         for _ in 0..workers.min(count) {
