@@ -292,3 +292,118 @@ fn a_full_disk_leaves_the_last_good_state() {
     finished(&run(here, "later", &["--resume"]));
     assert_same(whole, &out);
 }
+
+/// Three hundred kills of a run that writes a checkpoint every step, so that many of them are in the middle of one. It takes
+/// a minute or more: `CONTRIBUTING.md` says when to run it.
+#[test]
+#[ignore = "a stress test of minutes: cargo test --release -p psidpd-tests --test resume -- --ignored"]
+fn a_run_killed_hundreds_of_times_ends_in_the_same_bytes() {
+    const KILLS: u32 = 300;
+    let folder = folder();
+    let here = folder.path();
+    let whole = whole();
+    std::fs::write(here.join("s.toml"), scene().replace("checkpoint = 100", "checkpoint = 1")).unwrap();
+    let out = here.join("killed");
+    let step_of = |out: &Path| {
+        let text = std::fs::read_to_string(out.join("timing.json")).unwrap_or_default();
+        text.rsplit("\"to_step\": ")
+            .next()
+            .and_then(|t| t.split(',').next()?.parse::<u64>().ok())
+            .unwrap_or(0)
+    };
+    let mut random = StdRng::seed_from_u64(21);
+    let (mut killed, mut within, mut runs, mut furthest) = (0, 0, 0, 0);
+    while killed < KILLS {
+        // Ended before its three hundred kills: over again.
+        if out.join("summary.json").exists() {
+            assert_same(whole, &out);
+            std::fs::remove_dir_all(&out).unwrap();
+            (runs, furthest) = (runs + 1, 0);
+        }
+        let threads = if killed % 2 == 0 { "1" } else { "2" };
+        let mut child = start(here, "s.toml", "killed", &["--resume", "--threads", threads]);
+        // From when it goes on: before that there is nothing new to break.
+        let begin = Instant::now();
+        while step_of(&out) <= furthest && begin.elapsed() < Duration::from_secs(60) {
+            if child.try_wait().unwrap().is_some() {
+                break;
+            }
+            std::thread::sleep(Duration::from_micros(200));
+        }
+        std::thread::sleep(Duration::from_micros(random.random_range(0..30_000)));
+        child.kill().unwrap();
+        let output = child.wait_with_output().unwrap();
+        if output.status.signal() == Some(9) {
+            killed += 1;
+            within += u32::from(out.join("checkpoint.new").exists());
+        } else {
+            finished(&output);
+        }
+        let step = step_of(&out);
+        assert!(step >= furthest, "step {step} after {furthest}");
+        furthest = step;
+    }
+    println!(
+        "{killed} kills, {within} of them while a checkpoint was written, over {runs} runs and part of another"
+    );
+    assert!(within >= KILLS / 20, "{within}");
+    finished(&run(here, "killed", &["--resume"]));
+    assert_same(whole, &out);
+}
+
+/// A file system in memory of its own, of a size in kilobytes; root alone can mount one.
+struct Disk(PathBuf);
+
+impl Disk {
+    fn mount(path: PathBuf, options: &str) -> Disk {
+        std::fs::create_dir_all(&path).unwrap();
+        let output =
+            Command::new("mount").args(["-t", "tmpfs", "-o", options, "tmpfs"]).arg(&path).output().unwrap();
+        assert!(output.status.success(), "this test must be run as root: {}", said(&output));
+        Disk(path)
+    }
+
+    fn grow(&self, options: &str) {
+        let options = format!("remount,{options}");
+        let output = Command::new("mount").args(["-o", &options]).arg(&self.0).output().unwrap();
+        assert!(output.status.success(), "{}", said(&output));
+    }
+}
+
+impl Drop for Disk {
+    fn drop(&mut self) {
+        let _ = Command::new("umount").arg(&self.0).status();
+    }
+}
+
+/// Disks that become full at other moments of a run: in tables, dumps, pictures, checkpoints, at the end. Each time the run
+/// stops with the name of a file, and goes on where it was when there is room.
+#[test]
+#[ignore = "needs root, to mount disks: cargo test --release -p psidpd-tests --test resume -- --ignored"]
+fn disks_of_any_size_leave_a_run_that_can_go_on() {
+    let folder = folder();
+    let here = folder.path();
+    let whole = whole();
+    let all: u64 = contents(whole).values().map(|bytes| bytes.len() as u64).sum();
+    let mut random = StdRng::seed_from_u64(22);
+    let (mut stopped, mut named) = (0, BTreeMap::new());
+    for k in 0..40 {
+        let kilobytes = random.random_range(16..all / 1024 + 200);
+        let disk = Disk::mount(here.join(format!("disk {k}")), &format!("size={kilobytes}k"));
+        let out = disk.0.join("out");
+        let output = run(here, out.to_str().unwrap(), &["--resume"]);
+        let words = said(&output);
+        if output.status.code() != Some(0) {
+            stopped += 1;
+            assert_eq!(output.status.code(), Some(1), "{kilobytes} kB: {words}");
+            assert!(words.contains("cannot be written") && words.contains("No space left"), "{words}");
+            let name = words.split(" cannot be written").next().unwrap().rsplit('/').next().unwrap();
+            *named.entry(name.to_owned()).or_insert(0) += 1;
+            disk.grow(&format!("size={}k", 4 * all / 1024 + 1000));
+            finished(&run(here, out.to_str().unwrap(), &["--resume"]));
+        }
+        assert_same(whole, &out);
+    }
+    println!("{stopped} of 40 disks became full, in {named:?}");
+    assert!(stopped >= 20 && named.len() >= 3, "{stopped} {named:?}");
+}

@@ -13,11 +13,12 @@ fn scenes(folder: &str) -> Vec<PathBuf> {
     found
 }
 
-/// A few steps of every stage of every quick scene and template.
+/// A few steps of every stage of every quick scene and template, with a sample of all that it observes at each of them.
 #[test]
 fn quick_scenes_run() {
     let paths = [scenes("scenes"), scenes("src/scene/templates")].concat();
     assert!(paths.len() > 35, "{}", paths.len());
+    let mut sampled = 0;
     for path in paths {
         let mut scene = open(&path);
         let cost: f64 = scene.stages.iter().map(|s| s.steps as f64).sum::<f64>()
@@ -27,12 +28,36 @@ fn quick_scenes_run() {
         for stage in &mut scene.stages {
             stage.steps = 2;
         }
+        for request in &mut scene.observe.requests {
+            (request.every, request.skip) = (1, 0);
+        }
         let out = tempfile::tempdir().unwrap();
         let summary =
             run_scene(&scene, out.path(), &mut |_| ()).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
         assert!(summary.last.temperature.is_finite() && summary.last.pressure.is_finite());
+        if scene.observe.requests.is_empty() {
+            continue;
+        }
+        let text = std::fs::read_to_string(out.path().join("observables.json")).unwrap();
+        let observed: Vec<serde_json::Value> = serde_json::from_str(&text).unwrap();
+        assert!(observed.len() >= scene.observe.requests.len(), "{}: {text}", path.display());
+        for observation in &observed {
+            // What needs a longer time than two steps says so in its note.
+            let (name, samples) = (&observation["name"], observation["samples"].as_u64().unwrap());
+            sampled += usize::from(samples > 0);
+            let told = observation["note"].as_str().is_some_and(|note| !note.is_empty());
+            assert!(
+                samples > 0 || told || LATE.contains(&name.as_str().unwrap()),
+                "{}: {name}",
+                path.display()
+            );
+        }
     }
+    assert!(sampled > 150, "{sampled}");
 }
+
+/// These have no sample after two steps.
+const LATE: [&str; 4] = ["diffusion", "msd", "viscosity", "stress_correlation"];
 
 /// Templates name their model as `psidpd new` writes it; the models are those that ship.
 fn open(path: &PathBuf) -> Scene {

@@ -23,6 +23,11 @@ pub enum CheckpointError {
         file.display(), path.display()
     )]
     File { path: PathBuf, file: PathBuf, found: u64, expected: u64 },
+    #[error(
+        "the first {length} bytes of {} are not those that the run has written before the checkpoint {}: the file was changed",
+        file.display(), path.display()
+    )]
+    Edited { path: PathBuf, file: PathBuf, length: u64 },
     #[error("the checkpoint {} is of another run: {}", path.display(), list(differences))]
     Foreign { path: PathBuf, differences: Vec<String> },
 }
@@ -47,6 +52,9 @@ impl CheckpointError {
             }
             CheckpointError::Version { .. } => {
                 "go on with the version of psidpd that wrote it, or start over with --overwrite"
+            }
+            CheckpointError::Edited { .. } => {
+                "put the file back as the run left it, or start over with --overwrite"
             }
             _ => "start over with --overwrite",
         }

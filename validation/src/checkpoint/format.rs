@@ -6,7 +6,7 @@ use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
 
 /// Version of the format. It grows whenever [`Checkpoint`] or anything that it holds changes.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 
 const MAGIC: [u8; 8] = *b"psidpdCK";
 const HEADER: usize = 24;
@@ -68,7 +68,11 @@ pub fn read(path: &Path) -> Result<Checkpoint, CheckpointError> {
     parse(&bytes, path)
 }
 
-fn parse(bytes: &[u8], path: &Path) -> Result<Checkpoint, CheckpointError> {
+/// Reads a checkpoint that is in memory; `path` stands for its file in messages.
+///
+/// # Errors
+/// It is no checkpoint, one of another version, or not whole.
+pub fn parse(bytes: &[u8], path: &Path) -> Result<Checkpoint, CheckpointError> {
     let path = path.to_owned();
     let found = bytes.len() as u64;
     // A run can be killed before the header is in place, but such a file never gets its name: what is

@@ -20,12 +20,14 @@ mod format;
 mod identity;
 mod store;
 mod totals;
+mod written;
 
 pub use error::CheckpointError;
-pub use format::VERSION;
+pub use format::{VERSION, parse};
 pub use identity::Identity;
 pub(crate) use store::{Found, Store};
 pub use totals::{Means, Sums, Thermo};
+pub use written::Written;
 
 use crate::particles::State;
 use serde::{Deserialize, Serialize};
@@ -57,8 +59,8 @@ pub struct Checkpoint {
     pub last: Option<Thermo>,
     /// Sums over the thermo rows of the stage.
     pub sums: Sums,
-    /// How long each file was that grows with the run, by its name.
-    pub files: BTreeMap<String, u64>,
+    /// What had been written to each file that grows with the run, by its name.
+    pub files: BTreeMap<String, Written>,
     /// What observables remember, in a format of their own; empty without any.
     pub observers: Vec<u8>,
 }

@@ -27,7 +27,7 @@ fn checkpoint(step: u64) -> Checkpoint {
         out_of_bounds: [u64::MAX, 0],
         last: None,
         sums: Sums::default(),
-        files: [("thermo.csv".to_owned(), 0)].into(),
+        files: [("thermo.csv".to_owned(), Written { length: 3, checksum: u32::MAX })].into(),
         observers: vec![1, 2, 3],
     }
 }

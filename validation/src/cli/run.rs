@@ -66,9 +66,10 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         (_, true) => Begin::Overwrite,
         _ => Begin::New,
     };
-    let stop = watch_signals()?;
     let mut runner = Runner::begin(&scene, out, begin)?;
     runner.set_threads(*threads)?;
+    // Until here there is nothing to lose, and a signal ends the program at once.
+    let stop = watch_signals()?;
     let total: u64 = scene.stages.iter().map(|s| s.steps).sum();
     let made = tell_start(runner.start(), begin, out, total);
     say(&format!("forces by {}", runner.evaluation()));

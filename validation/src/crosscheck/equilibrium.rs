@@ -266,30 +266,11 @@ fn report_set(
     }
     for ((code, law, _), m) in RUNS.iter().zip(measured) {
         if matches!(code, Code::Native | Code::Psi) {
-            let check = Check::at_most(
-                format!("nvt.{slug}.{}.thermostat", code.slug()),
-                "equilibrium",
-                format!("{}: temperature of {} against kT", set.name, name(*code, *law)),
-                m.temperature.mean - 1.0,
-                WARMER,
-            );
-            part.checks.push(check.with_error(m.temperature.error));
+            part.checks.push(against_kt(set, *code, *law, m));
         }
     }
     let native = &measured[NATIVE];
-    let mut published = |what: &str, found: &Estimate, (value, error): (f64, f64)| {
-        part.checks.push(Check::agreement(
-            format!("nvt.{slug}.published.{what}"),
-            "equilibrium",
-            format!("{}: {what} of native against Warren's Table 2, with his error and ours", set.name),
-            found.mean - value,
-            found.error.hypot(error),
-            PUBLISHED,
-            format!("{} ± {}", found.mean, found.error),
-        ));
-    };
-    published("density", &native.liquid, (set.liquid, set.liquid_error));
-    published("tension", native.conservative_tension.as_ref().unwrap_or(&native.tension), set.tension);
+    part.checks.extend(against_published(set, native));
     let built_in = &measured[BUILT_IN];
     part.checks.push(
         Check::at_least(
@@ -323,9 +304,80 @@ fn report_set(
     Ok(())
 }
 
+/// The temperature of a run against kT.
+fn against_kt(set: &WarrenSet, code: Code, law: ForceLaw, found: &Measured) -> Check {
+    Check::at_most(
+        format!("nvt.{}.{}.thermostat", set.name.replace(' ', ""), code.slug()),
+        "equilibrium",
+        format!("{}: temperature of {} against kT", set.name, name(code, law)),
+        found.temperature.mean - 1.0,
+        WARMER,
+    )
+    .with_error(found.temperature.error)
+}
+
+/// Density and tension of the native runner against Warren's.
+fn against_published(set: &WarrenSet, native: &Measured) -> [Check; 2] {
+    let published = |what: &str, found: &Estimate, (value, error): (f64, f64)| {
+        Check::agreement(
+            format!("nvt.{}.published.{what}", set.name.replace(' ', "")),
+            "equilibrium",
+            format!("{}: {what} of native against Warren's Table 2, with his error and ours", set.name),
+            found.mean - value,
+            found.error.hypot(error),
+            PUBLISHED,
+            format!("{} ± {}", found.mean, found.error),
+        )
+    };
+    let tension = native.conservative_tension.as_ref().unwrap_or(&native.tension);
+    [
+        published("density", &native.liquid, (set.liquid, set.liquid_error)),
+        published("tension", tension, set.tension),
+    ]
+}
+
 fn law_slug(law: ForceLaw) -> &'static str {
     match law {
         ForceLaw::Conservative => "conservative",
         ForceLaw::LucyLammps => "lucy",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::trace::native;
+    use super::*;
+    use psidpd_core::engine::Fault;
+
+    /// What is measured of a fluid fails the same checks if a force of the engine is 5 % wrong, in shorter runs than those of
+    /// `psidpd validate`. The virial moves no particle: `forces` has a check of it.
+    #[test]
+    fn physics_tells_of_faults() {
+        let (edge, height, thickness, steps) = (5.0, 12.0, 5.2, 2000);
+        let filling = Filling { lengths: [edge, edge, height], thickness, density: SET6.liquid };
+        let state = equilibrated(&SET6, filling, 600, SEED).unwrap();
+        let length = Length { dt: 0.01, steps, sample: 10, averaged: true, frame: 10 };
+        let setup = Setup {
+            gamma: GAMMA,
+            seed: SEED,
+            ..Setup::new(Code::NativeMixed, &SET6, ForceLaw::Conservative)
+        };
+        let failed = |fault: Option<Fault>| -> Vec<String> {
+            let trace = native(&setup, &state, length, fault, &|_| ()).unwrap();
+            let found = measure(&trace, edge, height).unwrap();
+            let mut checks = vec![against_kt(&SET6, Code::Native, ForceLaw::Conservative, &found)];
+            checks.extend(against_published(&SET6, &found));
+            checks.into_iter().filter(|c| !c.passed).map(|c| c.id).collect()
+        };
+        assert_eq!(failed(None), Vec::<String>::new());
+        for (fault, sign) in [
+            (Fault::PairForce, "nvt.set6.published.density"),
+            (Fault::ManyBodyForce, "nvt.set6.published.density"),
+            (Fault::Drag, "nvt.set6.native.thermostat"),
+            (Fault::Noise, "nvt.set6.native.thermostat"),
+        ] {
+            let failed = failed(Some(fault));
+            assert!(failed.iter().any(|id| id == sign), "{fault:?}: {failed:?}");
+        }
     }
 }

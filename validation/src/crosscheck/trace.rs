@@ -4,7 +4,7 @@ use super::codes::{Code, Setup};
 use super::{Context, ValidateError};
 use crate::lammps::dump;
 use crate::run::{Integrator, Simulation, State};
-use psidpd_core::engine::{Precision, Settings, Want};
+use psidpd_core::engine::{Fault, Precision, Settings, Want};
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -77,15 +77,17 @@ pub fn run(
     advance: &(dyn Fn(u64) + Sync),
 ) -> Result<Trace, ValidateError> {
     match setup.code {
-        Code::Native | Code::NativeMixed => native(setup, state, length, advance),
+        Code::Native | Code::NativeMixed => native(setup, state, length, None, advance),
         _ => lammps(context, setup, state, length, &context.work.join(name), advance),
     }
 }
 
-fn native(
+/// A run of the native runner; with a fault, of one that is wrong on purpose.
+pub(super) fn native(
     setup: &Setup,
     state: &State,
     length: Length,
+    fault: Option<Fault>,
     advance: &(dyn Fn(u64) + Sync),
 ) -> Result<Trace, ValidateError> {
     let model = setup.set.model(setup.law, setup.gamma)?;
@@ -93,6 +95,7 @@ fn native(
     if setup.code == Code::NativeMixed {
         simulation.set_settings(Settings { precision: Precision::Mixed, ..Settings::default() })?;
     }
+    fault.map_or(Ok(()), |fault| simulation.falsify(fault))?;
     let mut trace = Trace { particles: state.len(), ..Trace::default() };
     simulation.prepare(length.dt, Want::TOTALS)?;
     let (mut sum, mut count) = ([0.0; 16], 0.0);

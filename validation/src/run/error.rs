@@ -44,6 +44,10 @@ pub enum RunError {
     )]
     Runaway { step: u64, tag: i32, distance: f64 },
     #[error(
+        "step {step}: particle {tag} is more than 2^31 boxes away from where it began: they can no longer be counted"
+    )]
+    Uncounted { step: u64, tag: i32 },
+    #[error(
         "step {step}: the fluid has been hotter than 2 kT since step {since} and is at {ratio:.1} kT, though the thermostat \
          had time to cool it: dt = {dt} is likely too large for its forces with {integrator}; use a smaller dt, or an integrator \
          that bears larger ones (docs/integrators.md)"
@@ -105,6 +109,7 @@ impl RunError {
                 | RunError::Engine { .. }
                 | RunError::Velocity { .. }
                 | RunError::Runaway { .. }
+                | RunError::Uncounted { .. }
                 | RunError::TooHot { .. }
         )
     }

@@ -1,15 +1,16 @@
 use super::error::RunError;
+use crate::checkpoint::Written;
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// A file of a run that grows as the run goes: it knows its length, buffered bytes included, so that a
-/// checkpoint can say how much of it belongs to the steps made.
+/// A file of a run that grows as the run goes: it knows what was written to it, buffered bytes included, so that a
+/// checkpoint can say what of it belongs to the steps made.
 pub(super) struct GrowingFile {
     name: &'static str,
     path: PathBuf,
     out: BufWriter<File>,
-    length: u64,
+    written: Written,
 }
 
 impl GrowingFile {
@@ -17,20 +18,20 @@ impl GrowingFile {
     pub fn create(folder: &Path, name: &'static str) -> Result<GrowingFile, RunError> {
         let path = folder.join(name);
         let file = File::create(&path).map_err(RunError::output(&path))?;
-        Ok(GrowingFile { name, path, out: BufWriter::new(file), length: 0 })
+        Ok(GrowingFile { name, path, out: BufWriter::new(file), written: Written::default() })
     }
 
-    /// The file of a run that goes on, cut to `length`.
-    pub fn reopen(folder: &Path, name: &'static str, length: u64) -> Result<GrowingFile, RunError> {
+    /// The file of a run that goes on, cut to what was `written` at the checkpoint.
+    pub fn reopen(folder: &Path, name: &'static str, written: Written) -> Result<GrowingFile, RunError> {
         let path = folder.join(name);
         let open = || {
             let mut file = File::options().write(true).open(&path)?;
-            file.set_len(length)?;
+            file.set_len(written.length)?;
             file.seek(SeekFrom::End(0))?;
             Ok(file)
         };
         let file = open().map_err(RunError::output(&path))?;
-        Ok(GrowingFile { name, path, out: BufWriter::new(file), length })
+        Ok(GrowingFile { name, path, out: BufWriter::new(file), written })
     }
 
     /// Its name in the folder of the run.
@@ -38,9 +39,9 @@ impl GrowingFile {
         self.name
     }
 
-    /// How many bytes were written to it.
-    pub fn length(&self) -> u64 {
-        self.length
+    /// What was written to it.
+    pub fn written(&self) -> Written {
+        self.written
     }
 
     /// Writes with an error that names the file.
@@ -60,7 +61,7 @@ impl GrowingFile {
 impl Write for GrowingFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let count = self.out.write(bytes)?;
-        self.length += count as u64;
+        self.written.add(&bytes[..count]);
         Ok(count)
     }
 

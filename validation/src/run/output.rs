@@ -4,7 +4,7 @@ use super::dump::write_frame;
 use super::error::RunError;
 use super::growing::GrowingFile;
 use super::thermo::ThermoFile;
-use crate::checkpoint::Thermo;
+use crate::checkpoint::{Thermo, Written};
 use crate::files::remove_if_there;
 use crate::observe::{Observation, write_csv, write_json};
 use crate::output::{About, Frame, remove_snapshots, write_xyz};
@@ -50,14 +50,14 @@ impl Output {
         Ok(Output { thermo: thermo.transpose()?, dump: dump.transpose()?, xyz: xyz.transpose()? })
     }
 
-    /// The files of a run that goes on, cut to the `lengths` of its checkpoint.
-    pub fn reopen(folder: &Path, lengths: &BTreeMap<String, u64>) -> Result<Output, RunError> {
+    /// The files of a run that goes on, cut to what was `written` at its checkpoint.
+    pub fn reopen(folder: &Path, written: &BTreeMap<String, Written>) -> Result<Output, RunError> {
         remove(folder, &LAST)?;
         remove_tables(folder)?;
-        let length = |name: &str| lengths.get(name).copied();
-        let thermo = length(ThermoFile::NAME).map(|length| ThermoFile::reopen(folder, length));
-        let dump = length(DUMP).map(|length| GrowingFile::reopen(folder, DUMP, length));
-        let xyz = length(XYZ).map(|length| GrowingFile::reopen(folder, XYZ, length));
+        let written = |name: &str| written.get(name).copied();
+        let thermo = written(ThermoFile::NAME).map(|written| ThermoFile::reopen(folder, written));
+        let dump = written(DUMP).map(|written| GrowingFile::reopen(folder, DUMP, written));
+        let xyz = written(XYZ).map(|written| GrowingFile::reopen(folder, XYZ, written));
         Ok(Output { thermo: thermo.transpose()?, dump: dump.transpose()?, xyz: xyz.transpose()? })
     }
 
@@ -85,9 +85,9 @@ impl Output {
         }
     }
 
-    /// How long each file is.
-    pub fn lengths(&mut self) -> BTreeMap<String, u64> {
-        self.files().map(|file| (file.name().to_owned(), file.length())).collect()
+    /// What was written to each file.
+    pub fn written(&mut self) -> BTreeMap<String, Written> {
+        self.files().map(|file| (file.name().to_owned(), file.written())).collect()
     }
 
     /// Brings everything to the disk.

@@ -6,7 +6,9 @@ use super::summary::Summary;
 use super::timing::Timing;
 use super::underway::Run;
 use super::watch::Deviation;
-use crate::checkpoint::{Checkpoint, CheckpointError, Found, Identity, Position, Store, Sums, Thermo};
+use crate::checkpoint::{
+    Checkpoint, CheckpointError, Found, Identity, Position, Store, Sums, Thermo, Written,
+};
 use crate::observe::Observers;
 use crate::output::About;
 use crate::particles::State;
@@ -156,7 +158,7 @@ impl<'a> Runner<'a> {
                 .to_bytes(),
         };
         let mut output = Output::create(scene, out)?;
-        let good = Checkpoint { files: output.lengths(), ..good };
+        let good = Checkpoint { files: output.written(), ..good };
         let run = Run::new(scene, folder, store, simulation, Some(output), good, Timing::default())?;
         Ok(Runner { start: Start::New, run })
     }
@@ -269,8 +271,13 @@ fn usable(
     for (name, expected) in checkpoint.files.iter().filter(|_| !checkpoint.finished) {
         let file = out.join(name);
         let found = file.metadata().map_or(0, |m| m.len());
-        if found < *expected {
-            return Err(CheckpointError::File { path, file, found, expected: *expected });
+        let Written { length, .. } = *expected;
+        if found < length {
+            return Err(CheckpointError::File { path, file, found, expected: length });
+        }
+        // What cannot be read may still be written to: that is found out when it is opened.
+        if Written::of(&file, length).is_ok_and(|found| found != *expected) {
+            return Err(CheckpointError::Edited { path, file, length });
         }
     }
     Ok(())

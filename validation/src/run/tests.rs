@@ -175,6 +175,39 @@ fn image_flags_count_boxes() {
     }
 }
 
+/// Where counts of boxes end the run does, instead of counting no further.
+#[test]
+fn boxes_that_cannot_be_counted_stop_a_run() {
+    for (at, velocity) in [(i32::MAX - 1, 10.0), (i32::MIN + 1, -10.0)] {
+        let mut start = state_of(IDEAL, "[3.0, 3.0, 3.0]", 3.0);
+        start.v.fill([0.0; 3]);
+        (start.image[5][1], start.v[5][1]) = (at, velocity);
+        let tag = start.tag[5];
+        let mut run = simulation(IDEAL, start);
+        run.set_thermostat(false);
+        run.prepare(0.1, Want::FORCES).unwrap();
+        let error = run.advance(4, 0.1, Integrator::VelocityVerlet).unwrap_err();
+        assert!(matches!(error, RunError::Uncounted { tag: named, .. } if named == tag), "{error}");
+    }
+}
+
+/// Of several particles that are too fast the fastest is named, whatever their order.
+#[test]
+fn the_culprit_of_a_blow_up_is_named() {
+    for fastest in [3, 20, 77] {
+        let mut start = state_of(IDEAL, "[3.0, 3.0, 3.0]", 3.0);
+        start.v[1] = [200.0, 0.0, 0.0];
+        start.v[50] = [0.0, 300.0, 0.0];
+        start.v[fastest] = [0.0, 0.0, -1e9];
+        let tag = start.tag[fastest];
+        let mut run = simulation(IDEAL, start);
+        run.set_thermostat(false);
+        run.prepare(0.1, Want::FORCES).unwrap();
+        let error = run.step(0.1, Integrator::VelocityVerlet, Want::FORCES).unwrap_err();
+        assert!(matches!(error, RunError::Runaway { tag: named, .. } if named == tag), "{error}");
+    }
+}
+
 /// Temperature of a run in blocks: mean and its standard error.
 fn mean_temperature(run: &mut Simulation, blocks: usize, steps: usize, dt: f64) -> (f64, f64) {
     run.prepare(dt, Want::FORCES).unwrap();

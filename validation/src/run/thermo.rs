@@ -1,7 +1,7 @@
 use super::error::RunError;
 use super::growing::GrowingFile;
 use super::simulation::Simulation;
-use crate::checkpoint::Thermo;
+use crate::checkpoint::{Thermo, Written};
 use std::io::Write;
 use std::path::Path;
 
@@ -36,9 +36,9 @@ impl ThermoFile {
         Ok(this)
     }
 
-    /// The file of a run that goes on, cut to the `length` it had at the checkpoint.
-    pub fn reopen(folder: &Path, length: u64) -> Result<ThermoFile, RunError> {
-        GrowingFile::reopen(folder, Self::NAME, length).map(ThermoFile)
+    /// The file of a run that goes on, cut to what was `written` at the checkpoint.
+    pub fn reopen(folder: &Path, written: Written) -> Result<ThermoFile, RunError> {
+        GrowingFile::reopen(folder, Self::NAME, written).map(ThermoFile)
     }
 
     /// Writes a row, and makes it visible to whoever follows the file.

@@ -95,16 +95,15 @@ impl<'a> Run<'a> {
             let stage = &scene.stages[self.position.stage];
             if !self.position.entered {
                 self.enter(stage, progress)?;
+                // With many particles that takes as long as many steps of few.
+                if let Some(outcome) = self.interrupted(stop)? {
+                    return Ok(outcome);
+                }
             }
             while self.position.done < stage.steps {
                 self.step(stage, progress)?;
-                let stop = stop.load(Ordering::Relaxed);
-                // After its last step a run ends anyway.
-                if stop != 0 && self.simulation.step_number() < self.steps {
-                    self.checkpoint()?;
-                    let step = self.simulation.step_number();
-                    self.timing = self.timing_until(step);
-                    return Ok(Outcome::Interrupted { stop, step, steps: self.steps });
+                if let Some(outcome) = self.interrupted(stop)? {
+                    return Ok(outcome);
                 }
             }
             if self.position.stage + 1 == scene.stages.len() {
@@ -113,6 +112,21 @@ impl<'a> Run<'a> {
             let Position { stage, time, .. } = self.position;
             self.position = Position { stage: stage + 1, entered: false, done: 0, begin: time, time };
         }
+    }
+
+    /// Ends a run that is asked to stop, with a checkpoint.
+    fn interrupted(&mut self, stop: &AtomicUsize) -> Result<Option<Outcome>, RunError> {
+        let stop = stop.load(Ordering::Relaxed);
+        let step = self.simulation.step_number();
+        // After its last step a run ends anyway.
+        if stop == 0 || step >= self.steps {
+            return Ok(None);
+        }
+        if self.stored != Some(step) {
+            self.checkpoint()?;
+        }
+        self.timing = self.timing_until(step);
+        Ok(Some(Outcome::Interrupted { stop, step, steps: self.steps }))
     }
 
     /// Computes the forces that a stage starts with.
@@ -238,7 +252,7 @@ impl<'a> Run<'a> {
         self.good.sums = self.sums;
         self.good.observers = self.observers.to_bytes();
         if let Some(output) = &mut self.output {
-            self.good.files = output.lengths();
+            self.good.files = output.written();
         }
     }
 

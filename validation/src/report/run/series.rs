@@ -131,7 +131,7 @@ impl<'a> Curves<'a> {
         let (name, rows) = &self.stages[self.stages.len() - 1];
         format!(
             "{} rows. Means are over the {} rows of the last stage, “{name}”; their errors are one standard \
-             deviation of the mean, from blocking and from the autocorrelation time, the larger of the two. \
+             deviation of the mean, correlation of the rows taken into account. \
              Fewer than {MINIMUM_SAMPLES} rows have none. In the figures pale lines are single rows, strong \
              ones means from the start of each stage to there.",
             self.table.rows(),

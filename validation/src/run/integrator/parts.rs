@@ -75,6 +75,8 @@ pub struct Faults {
     pub fast: Option<usize>,
     /// It is beyond a wall even after reflection.
     pub escaped: Option<usize>,
+    /// It is more boxes away than can be counted.
+    pub uncounted: Option<usize>,
 }
 
 /// The particles of one thread.
@@ -124,6 +126,7 @@ pub fn share<'a>(moving: Moving<'a>, pool: &Pool, work: impl Fn(&mut Part, &[f64
     for share in &shares {
         faults.fast = faults.fast.or(share.faults.fast);
         faults.escaped = faults.escaped.or(share.faults.escaped);
+        faults.uncounted = faults.uncounted.or(share.faults.uncounted);
     }
     faults
 }
@@ -291,6 +294,9 @@ fn settle(
             }
         }
         around.domain.wrap(x, image);
+        if has_stopped_counting(image) {
+            faults.uncounted.get_or_insert(first + from + k);
+        }
     }
 }
 
@@ -354,6 +360,11 @@ fn group(vectors: &[[f64; 3]], g: usize) -> [f64; LANES] {
     let mut lanes = [0.0; LANES];
     lanes.copy_from_slice(vectors[GROUP * g..GROUP * (g + 1)].as_flattened());
     lanes
+}
+
+/// Whether counts of boxes have reached an end, where [`PeriodicBox::wrap`] stops counting.
+pub fn has_stopped_counting(image: &[i32; 3]) -> bool {
+    image.iter().any(|boxes| [i32::MIN, i32::MAX].contains(boxes))
 }
 
 /// Whether the square of a velocity is above `limit`, or no number.

@@ -158,8 +158,13 @@ impl Simulation {
     /// Refuses velocities that are not finite, or lead beyond the box within `dt`. Where the kick of the step before was
     /// `deferred`, velocities that are not finite are that step's.
     fn refuse(&self, faults: Faults, dt: Option<f64>, deferred: bool) -> Result<(), RunError> {
-        let Some(found) = faults.fast.or(faults.escaped) else { return Ok(()) };
         let state = self.particles.now();
+        let Some(found) = faults.fast.or(faults.escaped) else {
+            return match faults.uncounted {
+                Some(k) => Err(RunError::Uncounted { step: self.number, tag: state.tag[k] }),
+                None => Ok(()),
+            };
+        };
         let speed = |k: usize| {
             let v = state.v[k];
             v[0].hypot(v[1]).hypot(v[2])

@@ -1,5 +1,6 @@
 //! What the particles are at the present step: where, how fast, and under which forces.
 
+use super::super::integrator::parts::has_stopped_counting;
 use super::super::reorder::Reordering;
 use super::{RunError, Simulation};
 use crate::particles::State;
@@ -29,8 +30,7 @@ impl Particles {
         }
         for ((x, image), tag) in state.x.iter_mut().zip(&mut state.image).zip(&state.tag) {
             state.domain.wrap(x, image);
-            // Counts that end there have stopped counting.
-            if image.iter().any(|boxes| [i32::MIN, i32::MAX].contains(boxes)) {
+            if has_stopped_counting(image) {
                 return Err(RunError::State(format!("particle {tag} is more than 2^31 boxes away")));
             }
         }

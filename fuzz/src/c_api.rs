@@ -1,0 +1,199 @@
+use crate::bytes::Bytes;
+use psidpd_c::*;
+use std::ffi::{CStr, CString};
+use std::ptr::{null, null_mut};
+
+/// Most particles of a call.
+const MOST: usize = 12;
+
+/// Models that engines are made from, if not from the input's own text.
+const MODELS: [&str; 4] = [
+    "title = \"a\"\nspecies = [\"A\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n[excess_free_energy]\n\
+     A = \"n^2\"\n[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\nstrength = -5\nrange = 1\n\
+     [[thermostat]]\ngamma = 4.5\nrange = 1\n",
+    "title = \"b\"\nspecies = [\"A\", \"B\"]\n[density.n]\nkernel = \"lucy\"\nrange = 1\n[density.m]\n\
+     kernel = \"linear\"\nrange = 0.7\n[excess_free_energy]\nA = \"n_A*m_B + n^2\"\nB = \"ln(1 + n)\"\n\
+     [[thermostat]]\ngamma = 1\nrange = 1.2\n",
+    "title = \"c\"\ndimensions = 2\nspecies = [\"A\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n\
+     [excess_free_energy]\nA = \"-kT*ln(1 - 0.1*n) - n\"\n",
+    "title = \"d\"\nspecies = [\"A\"]\n[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"expression\"\nphi = \"1/r\"\nrange = 1\n",
+];
+
+/// Any numbers, in calls of any order, with pointers that are right or null: no call brings the program down, and those that
+/// fail say why.
+pub fn c_api(input: &[u8]) {
+    let mut bytes = Bytes(input);
+    let text = match bytes.below(5) {
+        4 => CString::new(bytes.0).unwrap_or_default(),
+        k => CString::new(MODELS[k]).unwrap_or_default(),
+    };
+    let mut model: *mut Model = null_mut();
+    // SAFETY: a text that ends with a zero byte, and a place to write to.
+    let status = unsafe { psidpd_model_parse(c"fuzz".as_ptr(), text.as_ptr(), &mut model) };
+    told(status);
+    if status != Status::Ok {
+        assert!(model.is_null());
+        return;
+    }
+    let settings =
+        Settings { precision: small(&mut bytes), instructions: small(&mut bytes), threads: bytes.below(4) };
+    let mut engine: *mut Engine = null_mut();
+    // SAFETY: a model that is alive until it is freed, once.
+    unsafe {
+        told(psidpd_engine_new_with(model, bytes.number(), &settings, &mut engine));
+        if engine.is_null() {
+            told(psidpd_engine_new(model, 1.0, &mut engine));
+        }
+        psidpd_model_free(model);
+    }
+    // Twenty calls reach every state, and take no time.
+    for _ in 0..20 {
+        if bytes.is_empty() {
+            break;
+        }
+        call(engine, &mut bytes);
+    }
+    // SAFETY: null, or an engine that is freed once.
+    unsafe { psidpd_engine_free(engine) };
+}
+
+/// From -1 to 6.
+fn small(bytes: &mut Bytes) -> i32 {
+    bytes.below(8) as i32 - 1
+}
+
+/// A failure has a message of its own.
+fn told(status: Status) {
+    assert!(status != Status::Panic, "{}", last_error());
+    if status != Status::Ok {
+        assert!(!last_error().is_empty());
+    }
+}
+
+fn last_error() -> String {
+    // SAFETY: valid until the next failing call on this thread.
+    unsafe { CStr::from_ptr(psidpd_last_error()) }.to_string_lossy().into_owned()
+}
+
+/// Particles with arrays of their own, exactly as long as they must be.
+struct Cloud {
+    owned: usize,
+    x: Vec<f64>,
+    v: Vec<f64>,
+    tag: Vec<i32>,
+    kind: Vec<i32>,
+    force: Vec<f64>,
+}
+
+impl Cloud {
+    fn new(bytes: &mut Bytes) -> Cloud {
+        let all = bytes.below(MOST + 1);
+        let x: Vec<f64> = (0..3 * all).map(|_| bytes.number()).collect();
+        let v: Vec<f64> = (0..3 * all).map(|_| bytes.number()).collect();
+        // Right, or any.
+        let numbered = bytes.byte() > 8;
+        let tag = (0..all).map(|k| if numbered { k as i32 + 1 } else { bytes.integer() }).collect();
+        let kind = (0..all).map(|_| if numbered { 0 } else { small(bytes) }).collect();
+        // One more than there are is an error that must be noticed.
+        let owned = bytes.below(all + 2);
+        Cloud { owned, force: vec![0.0; 3 * all], x, v, tag, kind }
+    }
+
+    fn particles(&self) -> Particles {
+        Particles {
+            owned: self.owned,
+            all: self.tag.len(),
+            x: self.x.as_ptr(),
+            tag: self.tag.as_ptr(),
+            kind: self.kind.as_ptr(),
+        }
+    }
+}
+
+fn call(engine: *mut Engine, bytes: &mut Bytes) {
+    let which = bytes.below(12);
+    let mut cloud = Cloud::new(bytes);
+    let step = Step { seed: u64::from(bytes.byte()), number: 3, dt: bytes.number() };
+    let step = if bytes.flag() { &raw const step } else { null() };
+    let want = u32::from(bytes.byte());
+    let v = if bytes.flag() { cloud.v.as_ptr() } else { null() };
+    let request = Request { particles: cloud.particles(), v, step, want };
+    let mut tally = Tally { excess: 0.0, pair: 0.0, virial: [0.0; 6], thermostat_virial: [0.0; 6] };
+    let newton = small(bytes);
+    let force = cloud.force.as_mut_ptr();
+    // SAFETY: the engine is null or alive; arrays are as long as the structures say, apart from each other, and alive until
+    // the end of this function; the others are null.
+    unsafe {
+        told(match which {
+            0 => psidpd_engine_densities(engine, &request.particles, newton),
+            1 => psidpd_engine_forces(engine, &request.particles, v, step, want, force, &mut tally),
+            2 | 3 => psidpd_engine_evaluate(engine, &domain(bytes), &request, force, &mut tally),
+            4 | 5 => {
+                let ghosts = cloud.tag.len().saturating_sub(cloud.owned);
+                let images: Vec<i32> = (0..ghosts).map(|_| i32::from(bytes.byte() > 128)).collect();
+                let image = if bytes.flag() { images.as_ptr() } else { null() };
+                let domain = domain(bytes);
+                let domain = if bytes.flag() { &raw const domain } else { null() };
+                let first = psidpd_engine_first(engine, domain, image, newton, &request);
+                told(first);
+                if bytes.flag() { psidpd_engine_second(engine, &request, force, null_mut()) } else { first }
+            }
+            6 => {
+                let count = bytes.below(9);
+                let [i, j] = [(); 2].map(|()| (0..count).map(|_| small(bytes)).collect::<Vec<i32>>());
+                let factor: Vec<f64> = (0..count).map(|_| bytes.number()).collect();
+                let factor = if bytes.flag() { factor.as_ptr() } else { null() };
+                let pairs = Pairs { count, i: i.as_ptr(), j: j.as_ptr(), factor };
+                let first = psidpd_engine_first_of_pairs(engine, &pairs, newton, &request);
+                told(first);
+                if bytes.flag() { psidpd_engine_second(engine, &request, force, &mut tally) } else { first }
+            }
+            7 => psidpd_engine_second(engine, &request, force, &mut tally),
+            8 => {
+                let species: Vec<i32> = (0..bytes.below(6)).map(|_| small(bytes)).collect();
+                psidpd_engine_map_kinds(engine, species.as_ptr(), species.len())
+            }
+            9 => psidpd_engine_sum_all_densities(engine, small(bytes)),
+            10 => {
+                let (mut slopes, mut length) = (null_mut(), 0);
+                let status = psidpd_engine_slopes(engine, &mut slopes, &mut length);
+                if status == Status::Ok {
+                    // What a host does with them: those of ghosts are written.
+                    for k in 0..length {
+                        *slopes.add(k) += bytes.number();
+                    }
+                }
+                status
+            }
+            _ => {
+                let get = [
+                    psidpd_engine_local_densities,
+                    psidpd_engine_particle_energy,
+                    psidpd_engine_particle_virial,
+                ];
+                let (mut numbers, mut length) = (null(), 0);
+                let status = get[bytes.below(3)](engine, &mut numbers, &mut length);
+                if status == Status::Ok {
+                    let _ = (0..length).map(|k| *numbers.add(k)).sum::<f64>();
+                }
+                status
+            }
+        });
+    }
+}
+
+fn domain(bytes: &mut Bytes) -> Domain {
+    let mut edges = [0.0; 9];
+    if bytes.byte() > 16 {
+        for k in [0, 4, 8] {
+            edges[k] = 2.5 + bytes.number().abs();
+        }
+    } else {
+        edges = std::array::from_fn(|_| bytes.number());
+    }
+    Domain {
+        origin: std::array::from_fn(|_| bytes.number()),
+        edges,
+        periodic: std::array::from_fn(|_| i32::from(bytes.flag())),
+    }
+}

@@ -1,0 +1,63 @@
+//! What has been written to a file that grows with a run.
+
+use crc32fast::Hasher;
+use serde::{Deserialize, Serialize};
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+
+/// The length and the CRC-32 of what a run has written to a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Written {
+    /// Bytes.
+    pub length: u64,
+    /// Their CRC-32. It tells of edits and of damage, not of forgery.
+    pub checksum: u32,
+}
+
+impl Written {
+    /// What the first `length` bytes of the file are, or all of them if there are fewer.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn of(path: &Path, length: u64) -> io::Result<Written> {
+        let mut file = File::open(path)?.take(length);
+        let mut written = Written::default();
+        let mut buffer = vec![0; 1 << 20];
+        loop {
+            match file.read(&mut buffer) {
+                Ok(0) => return Ok(written),
+                Ok(count) => written.add(&buffer[..count]),
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    /// Counts more bytes.
+    pub fn add(&mut self, bytes: &[u8]) {
+        let mut hasher = Hasher::new_with_initial_len(self.checksum, self.length);
+        hasher.update(bytes);
+        self.length += bytes.len() as u64;
+        self.checksum = hasher.finalize();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pieces_add_up_to_the_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("f");
+        let bytes: Vec<u8> = (0..2_500_000u32).map(|k| (k * k >> 3) as u8).collect();
+        std::fs::write(&path, &bytes).unwrap();
+        let mut written = Written::default();
+        bytes[..2_000_001].chunks(777).for_each(|piece| written.add(piece));
+        assert_eq!(written, Written { length: 2_000_001, checksum: crc32fast::hash(&bytes[..2_000_001]) });
+        assert_eq!(Written::of(&path, 2_000_001).unwrap(), written);
+        assert_eq!(Written::of(&path, u64::MAX).unwrap().length, 2_500_000);
+        assert!(Written::of(&folder.path().join("none"), 1).is_err());
+    }
+}
