@@ -54,7 +54,7 @@ const PASSES: &[&[&str]] = &[
 
 /// Rooms of the program. Those in one list may still import from each other.
 const PROGRAM: &[&[&str]] = &[
-    &["files", "lammps"],
+    &["files", "lammps", "least_squares"],
     &["particles"],
     // None of these knows of scenes or runs.
     &["checkpoint"],

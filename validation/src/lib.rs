@@ -11,6 +11,7 @@ mod files;
 mod hardcases;
 mod integrator;
 pub mod lammps;
+mod least_squares;
 pub mod observe;
 mod output;
 mod papers;

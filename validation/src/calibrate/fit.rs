@@ -1,6 +1,7 @@
 //! Fits of the corrected density `ρ̃(n)`, a polynomial, to what runs measured.
 
 use super::point::Point;
+use crate::least_squares::{least_squares_of_any, slopes};
 use nalgebra::{DMatrix, DVector};
 use psidpd_core::model::Polynomial;
 use serde::Serialize;
@@ -93,68 +94,31 @@ pub fn fit_pressure(
     degree: usize,
     hold: f64,
 ) -> Option<Fit> {
-    let mut c = start.0.clone();
-    c.resize(degree + 1, 0.0);
-    let strength = |c: &[f64], n: f64| {
-        let (value, derivative) = Polynomial(c.to_vec()).at(n);
-        slope(value) * derivative
-    };
-    let here: Vec<f64> = points.iter().map(|p| strength(&start.0, p.means[0].value)).collect();
-    let residuals = |c: &[f64]| -> Vec<f64> {
-        let pressures = points.iter().zip(targets).zip(&here).map(|((p, t), here)| {
-            let pressure = t.base + (p.pressure.value - t.base) * strength(c, p.means[0].value) / here;
-            (pressure - t.wanted) / t.scale
-        });
-        let holds =
-            points.iter().map(|p| hold * (Polynomial(c.to_vec()).at(p.means[0].value).0 / p.total - 1.0));
-        pressures.chain(holds).collect()
-    };
-    let size = |r: &[f64]| r.iter().map(|x| x * x).sum::<f64>();
     let largest = points.iter().map(|p| p.means[0].value).fold(0.0, f64::max);
     // Coefficients of powers of n over its largest value, which are of like size.
     let unit: Vec<f64> = (0..=degree).map(|m| largest.powi(m as i32).max(1e-12)).collect();
-    let jacobian = |c: &[f64], r: &[f64]| {
-        let mut j = DMatrix::zeros(r.len(), c.len());
-        for m in 0..c.len() {
-            let h = 1e-6 * largest / unit[m];
-            let mut moved = c.to_vec();
-            moved[m] += h;
-            for (k, (after, before)) in residuals(&moved).iter().zip(r).enumerate() {
-                j[(k, m)] = (after - before) / h / unit[m];
-            }
-        }
-        j
+    let polynomial = |c: &[f64]| Polynomial(c.iter().zip(&unit).map(|(c, unit)| c / unit).collect());
+    let strength = |polynomial: &Polynomial, n: f64| {
+        let (value, derivative) = polynomial.at(n);
+        slope(value) * derivative
     };
-    let mut r = residuals(&c);
-    let mut damping = 1e-3;
-    for _ in 0..200 {
-        let j = jacobian(&c, &r);
-        let gradient = j.transpose() * DVector::from_column_slice(&r);
-        let mut normal = j.transpose() * &j;
-        let trace = normal.trace().max(f64::MIN_POSITIVE);
-        (0..c.len()).for_each(|m| normal[(m, m)] += damping * trace);
-        let Some(step) = normal.lu().solve(&gradient) else { break };
-        let next: Vec<f64> = (0..c.len()).map(|m| c[m] - step[m] / unit[m]).collect();
-        let there = residuals(&next);
-        if there.iter().all(|x| x.is_finite()) && size(&there) < size(&r) {
-            let gain = size(&r) - size(&there);
-            (c, r) = (next, there);
-            damping = (0.2 * damping).max(1e-12);
-            if gain < 1e-10 * size(&r) {
-                break;
-            }
-        } else {
-            damping *= 10.0;
-            if damping > 1e9 {
-                break;
-            }
-        }
-    }
-    if !c.iter().chain(&r).all(|x| x.is_finite()) {
-        return None;
-    }
-    let inverse = jacobian(&c, &r).pseudo_inverse(1e-12).ok()?;
-    let errors = (0..c.len())
+    let here: Vec<f64> = points.iter().map(|p| strength(start, p.means[0].value)).collect();
+    let residuals = |c: &[f64]| {
+        let tried = polynomial(c);
+        let pressures = points.iter().zip(targets).zip(&here).map(|((p, t), here)| {
+            let pressure = t.base + (p.pressure.value - t.base) * strength(&tried, p.means[0].value) / here;
+            (pressure - t.wanted) / t.scale
+        });
+        let holds = points.iter().map(|p| hold * (tried.at(p.means[0].value).0 / p.total - 1.0));
+        let all: Vec<f64> = pressures.chain(holds).collect();
+        all.iter().all(|x| x.is_finite()).then_some(all)
+    };
+    let coefficient = |m: usize| start.0.get(m).copied().unwrap_or(0.0);
+    let from: Vec<f64> = (0..=degree).map(|m| coefficient(m) * unit[m]).collect();
+    let steps = vec![1e-6 * largest; degree + 1];
+    let (found, _) = least_squares_of_any(&from, &steps, residuals)?;
+    let inverse = slopes(&found, &steps, residuals)?.pseudo_inverse(1e-12).ok()?;
+    let errors = (0..=degree)
         .map(|m| {
             let variance: f64 = points
                 .iter()
@@ -165,5 +129,5 @@ pub fn fit_pressure(
             Some(variance.sqrt())
         })
         .collect();
-    Some(Fit { coefficients: c, errors })
+    Some(Fit { coefficients: polynomial(&found).0, errors })
 }

@@ -11,7 +11,6 @@ pub mod edges;
 pub mod flux;
 pub mod frame;
 pub mod keys;
-mod least_squares;
 pub mod meter;
 pub mod observation;
 pub mod observers;

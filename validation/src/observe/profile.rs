@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use serde::Serialize;
 
 use super::edges::{Edges, edges};
-use super::least_squares::least_squares;
 use super::statistics::{MINIMUM_SAMPLES, StatisticsError, estimate};
+use crate::least_squares::least_squares;
 
 /// The most bins a profile may have.
 pub const MAXIMUM_BINS: usize = 1 << 20;

@@ -8,7 +8,7 @@
 //!
 //! (Bashforth and Adams; in two dimensions dφ/ds = 1 − Bo z).
 
-use super::least_squares::least_squares;
+use crate::least_squares::least_squares;
 
 /// Steps of the integration per radius of the apex.
 const STEP: f64 = 0.01;

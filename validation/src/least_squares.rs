@@ -11,8 +11,18 @@ pub fn least_squares<const N: usize>(
     steps: [f64; N],
     residuals: impl Fn(&[f64]) -> Option<Vec<f64>>,
 ) -> Option<([f64; N], f64)> {
-    let count = residuals(&start)?.len();
-    let problem = Problem { at: DVector::from_column_slice(&start), steps, count, residuals };
+    let (at, sum) = least_squares_of_any(&start, &steps, residuals)?;
+    Some((std::array::from_fn(|k| at[k]), sum))
+}
+
+/// The same for any number of parameters.
+pub fn least_squares_of_any(
+    start: &[f64],
+    steps: &[f64],
+    residuals: impl Fn(&[f64]) -> Option<Vec<f64>>,
+) -> Option<(Vec<f64>, f64)> {
+    let count = residuals(start)?.len();
+    let problem = Problem { at: DVector::from_column_slice(start), steps, count, residuals };
     let search = LevenbergMarquardt::new().with_ftol(1e-14).with_xtol(1e-10).with_gtol(1e-14);
     let (found, report) = search.minimize(problem);
     // Where residuals have kinks the search may come to the least sum and not notice: what it found then counts too.
@@ -21,18 +31,34 @@ pub fn least_squares<const N: usize>(
             report.termination,
             TerminationReason::NoImprovementPossible(_) | TerminationReason::LostPatience
         );
-    found_it.then(|| (std::array::from_fn(|k| found.at[k]), 2.0 * report.objective_function))
+    found_it.then(|| (found.at.as_slice().to_vec(), 2.0 * report.objective_function))
 }
 
-struct Problem<const N: usize, F> {
+/// How residuals change with each parameter, by central differences over `steps`: a row for each residual.
+pub fn slopes(
+    at: &[f64],
+    steps: &[f64],
+    residuals: impl Fn(&[f64]) -> Option<Vec<f64>>,
+) -> Option<DMatrix<f64>> {
+    let beside = |k: usize, h: f64| {
+        let mut at = at.to_vec();
+        at[k] += h;
+        residuals(&at).map(DVector::from_vec)
+    };
+    let column = |(k, h): (usize, &f64)| Some((beside(k, *h)? - beside(k, -h)?) / (2.0 * h));
+    let columns: Vec<DVector<f64>> = steps.iter().enumerate().map(column).collect::<Option<_>>()?;
+    Some(DMatrix::from_columns(&columns))
+}
+
+struct Problem<'a, F> {
     at: DVector<f64>,
-    steps: [f64; N],
+    steps: &'a [f64],
     /// How many residuals there are.
     count: usize,
     residuals: F,
 }
 
-impl<const N: usize, F: Fn(&[f64]) -> Option<Vec<f64>>> LeastSquaresProblem<f64, Dyn, Dyn> for Problem<N, F> {
+impl<F: Fn(&[f64]) -> Option<Vec<f64>>> LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_, F> {
     type ResidualStorage = VecStorage<f64, Dyn, nalgebra::U1>;
     type JacobianStorage = VecStorage<f64, Dyn, Dyn>;
     type ParameterStorage = VecStorage<f64, Dyn, nalgebra::U1>;
@@ -52,19 +78,6 @@ impl<const N: usize, F: Fn(&[f64]) -> Option<Vec<f64>>> LeastSquaresProblem<f64,
     }
 
     fn jacobian(&self) -> Option<DMatrix<f64>> {
-        let mut slopes = DMatrix::zeros(self.count, N);
-        for (k, h) in self.steps.into_iter().enumerate() {
-            let beside = |h: f64| {
-                let mut at = self.at.clone();
-                at[k] += h;
-                (self.residuals)(at.as_slice())
-            };
-            for (slope, (up, down)) in
-                slopes.column_mut(k).iter_mut().zip(beside(h)?.iter().zip(&beside(-h)?))
-            {
-                *slope = (up - down) / (2.0 * h);
-            }
-        }
-        Some(slopes)
+        slopes(self.at.as_slice(), self.steps, &self.residuals)
     }
 }
