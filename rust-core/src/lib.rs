@@ -14,6 +14,10 @@
 //! Data flow: model file → [`model::Model`] → [`model::Fluid`] (at one kT) → [`engine::Plan`] →
 //! [`engine::Engine`].
 
+// What tests here share with those in `tests/` imports by this name.
+#[cfg(test)]
+extern crate self as psidpd_core;
+
 pub mod engine;
 pub mod maximum;
 pub mod memory;

@@ -1,10 +1,13 @@
 //! Random models: the engine against the plain reference, and both against the Hamiltonian.
 
 use proptest::prelude::*;
-use psidpd_core::engine::reference::{self, Reference};
-use psidpd_core::engine::{Images, Newton, Particles, PeriodicBox, Surroundings, Want};
+use psidpd_core::engine::reference;
+use psidpd_core::engine::{Images, Newton, Particles, PeriodicBox, Want};
 use psidpd_core::model::{ExcessFreeEnergy, Fluid, Model};
 use std::fmt::Write;
+use with_images::{Outcome, Owned};
+
+mod with_images;
 
 /// A stream of random numbers from a seed: shrinking a model's text would make another model.
 struct Random(u64);
@@ -179,40 +182,11 @@ fn configuration(random: &mut Random, fluid: &Fluid) -> Configuration {
     Configuration { species: (0..count).map(|_| random.below(fluid.species.len())).collect(), x, domain }
 }
 
-struct Outcome {
-    energy: f64,
-    forces: Vec<[f64; 3]>,
-    virial: [f64; 6],
-    densities: Vec<f64>,
-}
-
 fn run_engine(fluid: &Fluid, c: &Configuration, newton: Newton) -> Outcome {
-    let mut engine = Reference::new(fluid).unwrap();
-    let owned = c.x.len();
-    let mut images = Images::default();
-    let mut x = c.x.clone();
-    let mut tag: Vec<i32> = (1..=owned as i32).collect();
-    let mut kind: Vec<i32> = c.species.iter().map(|s| *s as i32).collect();
-    images.build(&c.domain, fluid.dimensions, fluid.cutoff(), owned, &mut x);
-    images.forward(1, &mut tag);
-    images.forward(1, &mut kind);
-    let particles = Particles { owned, x: &x, tag: &tag, kind: &kind };
-    engine.first(Surroundings::ghosts(newton), &particles, true).unwrap();
-    let width = engine.slope_width();
-    engine.slopes_mut().truncate(owned * width);
-    images.forward(width, engine.slopes_mut());
-    let mut forces = vec![[0.0; 3]; x.len()];
-    let tally = engine.second(&particles, &[], None, Want::ALL, &mut forces).unwrap();
-    if newton == Newton::On {
-        images.reverse(&mut forces);
-    }
-    forces.truncate(owned);
-    Outcome {
-        energy: tally.energy(),
-        forces,
-        virial: tally.virial,
-        densities: engine.local_densities().to_vec(),
-    }
+    let v = vec![[0.0; 3]; c.x.len()];
+    let tag: Vec<i32> = (1..=c.x.len() as i32).collect();
+    let owned = Owned { domain: &c.domain, x: &c.x, v: &v, species: &c.species, tag: &tag };
+    with_images::evaluate(fluid, owned, newton, None)
 }
 
 /// On which side of every kink everything is: pairs of the kinks of kernels and pair potentials,
@@ -307,11 +281,16 @@ fn equals_reference(seed: u64) {
     for newton in [Newton::On, Newton::Off] {
         let found = run_engine(&fluid, &c, newton);
         let scale = 1e-12 * truth.energy.abs().max(c.x.len() as f64);
-        assert!(close(found.energy, truth.energy, scale), "{} {}\n{text}", found.energy, truth.energy);
+        assert!(
+            close(found.tally.energy(), truth.energy, scale),
+            "{} {}\n{text}",
+            found.tally.energy(),
+            truth.energy
+        );
         for (f, g) in found.forces.iter().flatten().zip(truth.forces.iter().flatten()) {
             assert!(close(*f, *g, 1e-12 * largest), "force {f} {g}, largest {largest}\n{text}");
         }
-        for (f, g) in found.virial.iter().zip(truth.virial) {
+        for (f, g) in found.tally.virial.iter().zip(truth.virial) {
             assert!(close(*f, g, 1e-12 * size), "virial {f} {g}\n{text}");
         }
         for (f, g) in found.densities.iter().zip(truth.densities.iter().flatten()) {
@@ -340,7 +319,7 @@ fn is_gradient(seed: u64) -> usize {
             assert!(close(force, -found, 1e-7 * largest), "force {force} against {}\n{text}", -found);
         }
     }
-    let size = here.virial.iter().fold(1.0f64, |m, w| m.max(w.abs()));
+    let size = here.tally.virial.iter().fold(1.0f64, |m, w| m.max(w.abs()));
     for (w, a, b) in [(0, 0, 0), (1, 1, 1), (3, 0, 1)] {
         let found = difference(&fluid, &c, 5e-5, |h| {
             // x_a → x_a + h x_b, box and particles alike.
@@ -357,7 +336,7 @@ fn is_gradient(seed: u64) -> usize {
         });
         if let Some(found) = found {
             taken += 1;
-            let virial = here.virial[w];
+            let virial = here.tally.virial[w];
             assert!(close(virial, -found, 1e-7 * size), "virial {virial} against {}\n{text}", -found);
         }
     }
@@ -446,8 +425,8 @@ fn fast_engine_equals_plain_engine() {
         let c = wide_configuration(&mut random, &fluid);
         let truth = run_engine(&fluid, &c, Newton::On);
         let largest = truth.forces.iter().flatten().fold(1.0f64, |m, f| m.max(f.abs()));
-        let size = truth.virial.iter().fold(1.0f64, |m, w| m.max(w.abs()));
-        let energy = truth.energy.abs().max(c.x.len() as f64);
+        let size = truth.tally.virial.iter().fold(1.0f64, |m, w| m.max(w.abs()));
+        let energy = truth.tally.energy().abs().max(c.x.len() as f64);
         for (name, instructions) in Instructions::ALL {
             if !instructions.available() {
                 continue;
@@ -457,11 +436,15 @@ fn fast_engine_equals_plain_engine() {
                     let settings = Settings { precision, instructions, ..Settings::default() };
                     let (u, f, w) = run_sweep(&fluid, &c, settings, ghosts);
                     let what = format!("{name}, {precision}, ghosts {ghosts}, seed {seed}\n{text}");
-                    assert!(close(u, truth.energy, limit * energy), "energy {u} {}: {what}", truth.energy);
+                    assert!(
+                        close(u, truth.tally.energy(), limit * energy),
+                        "energy {u} {}: {what}",
+                        truth.tally.energy()
+                    );
                     for (f, g) in f.as_flattened().iter().zip(truth.forces.as_flattened()) {
                         assert!(close(*f, *g, limit * largest), "force {f} {g}, largest {largest}: {what}");
                     }
-                    for (w, v) in w.iter().zip(truth.virial) {
+                    for (w, v) in w.iter().zip(truth.tally.virial) {
                         assert!(close(*w, v, limit * size), "virial {w} {v}: {what}");
                     }
                 }

@@ -1,10 +1,13 @@
 //! Laws of stated slopes: the engine against the plain reference, and against ψ where the slopes have one.
 
-use psidpd_core::engine::reference::{self, Reference};
-use psidpd_core::engine::{Images, Newton, Particles, PeriodicBox, Plan, Surroundings, Want, noise};
+use psidpd_core::engine::reference;
+use psidpd_core::engine::{Newton, PeriodicBox, Plan, noise};
 use psidpd_core::maximum::largest;
 use psidpd_core::model::{Fluid, Model};
 use psidpd_core::theory::{MeanField, TheoryError};
+use with_images::Owned;
+
+mod with_images;
 
 const HEAD: &str = "title = \"t\"\nspecies = [\"A\", \"B\"]\n\
     [density.n]\nkernel = \"quadratic\"\nrange = 0.8\ncorrection = { \"A|B\" = [0.2, 1.1, 0.01] }\n\
@@ -33,27 +36,12 @@ fn configuration() -> (Vec<[f64; 3]>, Vec<usize>, PeriodicBox) {
 
 /// Energy and forces by the engine.
 fn engine(fluid: &Fluid, newton: Newton) -> (f64, Vec<[f64; 3]>) {
-    let (mut x, species, domain) = configuration();
-    let owned = x.len();
-    let mut engine = Reference::new(fluid).unwrap();
-    let mut images = Images::default();
-    let mut tag: Vec<i32> = (1..=owned as i32).collect();
-    let mut kind: Vec<i32> = species.iter().map(|s| *s as i32).collect();
-    images.build(&domain, 3, fluid.cutoff(), owned, &mut x);
-    images.forward(1, &mut tag);
-    images.forward(1, &mut kind);
-    let particles = Particles { owned, x: &x, tag: &tag, kind: &kind };
-    engine.first(Surroundings::ghosts(newton), &particles, true).unwrap();
-    let width = engine.slope_width();
-    engine.slopes_mut().truncate(owned * width);
-    images.forward(width, engine.slopes_mut());
-    let mut forces = vec![[0.0; 3]; x.len()];
-    let tally = engine.second(&particles, &[], None, Want::ALL, &mut forces).unwrap();
-    if newton == Newton::On {
-        images.reverse(&mut forces);
-    }
-    forces.truncate(owned);
-    (tally.energy(), forces)
+    let (x, species, domain) = configuration();
+    let v = vec![[0.0; 3]; x.len()];
+    let tag: Vec<i32> = (1..=x.len() as i32).collect();
+    let owned = Owned { domain: &domain, x: &x, v: &v, species: &species, tag: &tag };
+    let found = with_images::evaluate(fluid, owned, newton, None);
+    (found.tally.energy(), found.forces)
 }
 
 fn assert_close(a: &[[f64; 3]], b: &[[f64; 3]]) {

@@ -4,6 +4,10 @@ use super::reference::Reference;
 use super::*;
 use crate::maximum::largest;
 use crate::model::{Fluid, ForceLaw, Model, WarrenPair, warren_ab};
+use with_images::{Outcome, Owned};
+
+#[path = "../../tests/with_images/mod.rs"]
+mod with_images;
 
 /// A small reproducible stream of uniform numbers, from the noise generator itself.
 struct Uniform(u32);
@@ -46,59 +50,9 @@ fn configuration(count: usize, lengths: [f64; 3], species: usize, dimensions: us
     }
 }
 
-struct Outcome {
-    tally: Tally,
-    forces: Vec<[f64; 3]>,
-    densities: Vec<f64>,
-    energy: Vec<f64>,
-    virial: Vec<[f64; 6]>,
-    counts: PassCounts,
-    out_of_bounds: [u64; 2],
-}
-
 fn run_engine(fluid: &Fluid, c: &Configuration, newton: Newton, step: Option<Step>) -> Outcome {
-    let mut engine = Reference::new(fluid).unwrap();
-    let owned = c.x.len();
-    let mut images = Images::default();
-    let (mut x, mut v, mut tag) = (c.x.clone(), c.v.clone(), c.tag.clone());
-    let mut kind: Vec<i32> = c.species.iter().map(|s| *s as i32).collect();
-    images.build(&c.domain, fluid.dimensions, fluid.cutoff(), owned, &mut x);
-    images.forward(1, &mut v);
-    images.forward(1, &mut tag);
-    images.forward(1, &mut kind);
-    let particles = Particles { owned, x: &x, tag: &tag, kind: &kind };
-    engine.first(Surroundings::ghosts(newton), &particles, true).unwrap();
-    let width = engine.slope_width();
-    engine.slopes_mut().truncate(owned * width);
-    images.forward(width, engine.slopes_mut());
-    let mut forces = vec![[0.0; 3]; x.len()];
-    let tally = engine.second(&particles, &v, step, Want::ALL, &mut forces).unwrap();
-    let mut energy = engine.particle_energy().to_vec();
-    let mut virial = engine.particle_virial().to_vec();
-    if newton == Newton::On {
-        images.reverse(&mut forces);
-        // Bring energies and virials of ghosts home, three numbers at a time.
-        let mut low: Vec<[f64; 3]> = virial.iter().map(|w| [w[0], w[1], w[2]]).collect();
-        let mut high: Vec<[f64; 3]> = virial.iter().map(|w| [w[3], w[4], w[5]]).collect();
-        let mut e: Vec<[f64; 3]> = energy.iter().map(|e| [*e, 0.0, 0.0]).collect();
-        for list in [&mut low, &mut high, &mut e] {
-            images.reverse(list);
-        }
-        energy = e.iter().map(|e| e[0]).collect();
-        virial = low.iter().zip(&high).map(|(a, b)| [a[0], a[1], a[2], b[0], b[1], b[2]]).collect();
-    }
-    forces.truncate(owned);
-    energy.truncate(owned);
-    virial.truncate(owned);
-    Outcome {
-        tally,
-        forces,
-        densities: engine.local_densities().to_vec(),
-        energy,
-        virial,
-        counts: engine.counts(),
-        out_of_bounds: engine.out_of_bounds(),
-    }
+    let owned = Owned { domain: &c.domain, x: &c.x, v: &c.v, species: &c.species, tag: &c.tag };
+    with_images::evaluate(fluid, owned, newton, step)
 }
 
 fn warren(species: usize, law: ForceLaw) -> Fluid {
