@@ -6,6 +6,7 @@
 #include "atom.h"
 #include "domain.h"
 #include "lammps.h"
+#include "update.h"
 #include "utils.h"
 
 #include <cstring>
@@ -35,8 +36,11 @@ class PairDPDPsi : public PairPsi {
   rust::Box<Style> make_style(double kt) override
   {
     if (text.empty()) complain("no model: give one with 'pair_coeff * * MODEL.toml SPECIES ...'");
-    return style_from_text(source, text, kt, names, domain->dimension);
+    return style_from_text(source, text, update->unit_style, kt, names, domain->dimension);
   }
+
+  // The model has told which.
+  void check_units(const std::string &) override {}
 
   std::vector<std::string> coefficients() override
   {
@@ -88,7 +92,7 @@ void PairDPDPsi::coeff(int narg, char **arg)
   set_names({arg + 3, arg + narg});
   std::string trouble;
   try {
-    style.emplace(style_from_file(path, kt(), names, domain->dimension));
+    style.emplace(style_from_file(path, update->unit_style, kt(), names, domain->dimension));
     source = std::string((*style)->model_name());
     text = std::string((*style)->model_text());
   } catch (const std::exception &e) {

@@ -10,6 +10,7 @@
 #include "error.h"
 #include "fix.h"
 #include "force.h"
+#include "group.h"
 #include "memory.h"
 #include "modify.h"
 #include "neigh_list.h"
@@ -43,6 +44,9 @@ const char cite_psidpd[] =
     " author = {P. B. Warren},\n"
     " title = {Vapor-liquid coexistence in many-body dissipative particle dynamics},\n"
     " journal = {Phys.~Rev.~E},\n volume = 68,\n pages = 066702,\n year = 2003\n}\n\n";
+
+// Rules of neigh_modify for types and groups that a word has room for, with two sides each.
+constexpr int most_rules = 16;
 
 // LAMMPS keeps an array of triples in one block; an empty array has no first row.
 rust::Slice<const double> flat(double **rows, int count)
@@ -168,6 +172,9 @@ void PairPsi::refresh()
   if (style && !is_stale() && kt() == built_kt) return;
   if (!(temperature > 0.0) || !std::isfinite(temperature))
     stop("the temperature must be positive, found " + std::to_string(temperature));
+  // A new engine knows of no special pairs and exclusions.
+  told_special = SIZE_MAX;
+  told_marks = false;
   std::string trouble;
   try {
     if (!style || is_stale())
@@ -196,10 +203,11 @@ void PairPsi::init_style()
   if (is_scaled()) {
     if (atom->molecular == Atom::TEMPLATE) because("special_bonds with atom_style template");
     if (atom->map_style == Atom::MAP_NONE) because("special_bonds without an atom map");
-    if ((*style)->has_core()) because("special_bonds with a pair potential that is very large at contact");
     if (is_narrow()) because("special_bonds in a box narrower than twice the cut-off");
   }
-  if (has_exclusions()) because("neigh_modify exclude");
+  rules = neighbor->nex_type + neighbor->nex_group + neighbor->nex_mol;
+  if (neighbor->nex_type + neighbor->nex_group > most_rules || neighbor->nex_mol > 1)
+    because("more exclusions of neigh_modify than it can keep");
   if (neighbor->includegroup) because("neigh_modify include");
   // These exclude a group of their own, and say so only when pair styles have asked for their lists.
   for (int k = 0; k < modify->nfix; k++) {
@@ -236,6 +244,7 @@ std::string PairPsi::search()
     // The only style of a simulation without bonds: nobody else leaves forces on ghosts either.
     if (comm->nprocs > 1 && force->newton && force->pair == this && atom->molecular == Atom::ATOMIC)
       text += "\n  advice        'newton off' saves sending back forces on ghosts: this style leaves none there";
+    if (rules > 0) text += "\n  exclusions    pairs that neigh_modify excludes are left out";
     if (is_scaled())
       text += "\n  special bonds factors above 0 scale phi and w of bonded neighbors, not drag and noise; with 0 they do not "
               "interact\n  advice        in DPD 'special_bonds lj 1 1 1' is usual, bonded atoms interacting like all others";
@@ -245,24 +254,20 @@ std::string PairPsi::search()
       ": pairs that are not in it do not interact, special factors scale phi and w";
 }
 
+// Coefficients are in the units of the simulation. Those of SI leave the range of single precision.
+void PairPsi::check_units(const std::string &units)
+{
+  if (units != "real" && units != "metal")
+    stop("works in units lj, real and metal, found 'units " + units + "'");
+}
+
 void PairPsi::check_host()
 {
   if (strcmp(update->unit_style, "lj") != 0)
-    stop(std::string("works in reduced units, found 'units ") + update->unit_style + "': use 'units lj'");
+    check_units(update->unit_style);
   if (!atom->tag_enable) stop("needs atom IDs: remove 'atom_modify id no'");
   if ((*style)->needs_velocities() && !comm->ghost_velocity)
     stop("the thermostat needs velocities of ghost atoms: add 'comm_modify vel yes'");
-}
-
-// neighbor->exclude is set only later, by neighbor->init(). Types that another style of a hybrid has are its business.
-bool PairPsi::has_exclusions() const
-{
-  bool some = neighbor->nex_group > 0 || neighbor->nex_mol > 0;
-  for (int k = 0; k < neighbor->nex_type; k++) {
-    const auto [i, j] = std::minmax(neighbor->ex1_type[k], neighbor->ex2_type[k]);
-    some |= i >= 1 && j <= atom->ntypes && setflag[i][j];
-  }
-  return some;
 }
 
 bool PairPsi::is_scaled() const
@@ -317,7 +322,7 @@ void PairPsi::check_plane()
     mine[1] = std::max(mine[1], -z);
   }
   MPI_Allreduce(mine, all, 2, MPI_DOUBLE, MPI_MAX, world);
-  if (all[0] + all[1] > 1e-6)
+  if (all[0] + all[1] > 1e-6 * (*style)->cutoff())
     stop("in two dimensions all atoms must have the same z, found " + std::to_string(-all[1]) + " to " +
          std::to_string(all[0]) + ": use a box that is thinner than the lattice, or 'set group all z 0'");
 }
@@ -383,6 +388,7 @@ void PairPsi::find_special()
 {
   special.clear();
   special_owned = 0;
+  told_special = SIZE_MAX;
   if (!why_listed.empty() || !is_scaled()) return;
   const int owned = atom->nlocal;
   const int *next_image = atom->sametag;
@@ -404,6 +410,41 @@ void PairPsi::find_special()
   }
   special_owned = special.size();
   special.insert(special.end(), with_ghosts.begin(), with_ghosts.end());
+}
+
+// What neigh_modify excludes, as two words for each atom and ghost: sides of rules for types and groups, and the molecule.
+void PairPsi::find_exclusions()
+{
+  marks.clear();
+  told_marks = false;
+  const bool none = !why_listed.empty() || rules == 0;
+  const bool by_molecule = !none && neighbor->nex_mol > 0;
+  const int all = none ? 0 : atom->nlocal + atom->nghost;
+  for (int i = 0; i < all; i++) {
+    uint32_t sides = 0, bit = 1;
+    const auto add = [&](bool one, bool other) {
+      sides |= (one ? bit : 0) | (other ? bit << most_rules : 0);
+      bit <<= 1;
+    };
+    for (int k = 0; k < neighbor->nex_type; k++)
+      add(atom->type[i] == neighbor->ex1_type[k], atom->type[i] == neighbor->ex2_type[k]);
+    for (int k = 0; k < neighbor->nex_group; k++)
+      add(atom->mask[i] & group->bitmask[neighbor->ex1_group[k]], atom->mask[i] & group->bitmask[neighbor->ex2_group[k]]);
+    const bool counts = by_molecule && (atom->mask[i] & group->bitmask[neighbor->ex_mol_group[0]]);
+    marks.push_back(sides);
+    marks.push_back(counts ? static_cast<uint32_t>(atom->molecule[i]) + 1 : 0);
+  }
+  between_molecules = by_molecule && !neighbor->ex_mol_intra[0];
+}
+
+// Tells the engine of marks and the first so many special pairs, unless it knows them.
+void PairPsi::tell_special(size_t count)
+{
+  if (!told_marks) attempt([&] { (*style)->set_exclusions({marks.data(), marks.size()}, between_molecules); });
+  told_marks = true;
+  if (told_special == count) return;
+  attempt([&] { (*style)->set_special_pairs({special.data(), count}); });
+  told_special = count;
 }
 
 // Along periodic directions in which there is one rank only, all ghosts are images of what that rank has: the engine
@@ -486,12 +527,13 @@ void PairPsi::compute(int eflag, int vflag)
     check_plane();
     check_ghosts();
     if (domain->box_change) check_box();
-    if (why_listed.empty() && has_exclusions())
+    if (why_listed.empty() && neighbor->nex_type + neighbor->nex_group + neighbor->nex_mol != rules)
       stop("pairs were excluded after the style was set up, by a fix perhaps: run again");
     if (why_listed.empty() && is_scaled() && is_narrow())
       stop("the box has become narrower than twice the cut-off, where special_bonds needs a neighbor list: run again");
     find_images();
     find_special();
+    find_exclusions();
   }
 
   const size_t owned = atom->nlocal;
@@ -525,7 +567,7 @@ void PairPsi::compute(int eflag, int vflag)
   const Extent box = extent();
   strained = images.have_moved(atom, domain);
   const bool alone = !strained && is_alone(box) && attempt([&] { return fluid.fits(box, request); });
-  attempt([&] { fluid.set_special_pairs({special.data(), alone ? special_owned : special.size()}); });
+  tell_special(alone ? special_owned : special.size());
   Totals totals;
   if (alone) {
     totals = attempt([&] {
@@ -549,14 +591,15 @@ void PairPsi::compute(int eflag, int vflag)
   }
   if (vflag_global)
     for (int k = 0; k < 6; k++) virial[k] += totals.virial[k];
+  const double unit = fluid.energy_unit();
   if (eflag_atom) {
     const auto energy = fluid.particle_energy();
-    for (size_t i = 0; i < reach; i++) eatom[i] += energy[i];
+    for (size_t i = 0; i < reach; i++) eatom[i] += unit * energy[i];
   }
   if (vflag_atom) {
     const auto w = fluid.particle_virial();
     for (size_t i = 0; i < reach; i++)
-      for (int k = 0; k < 6; k++) vatom[i][k] += w[6 * i + k];
+      for (int k = 0; k < 6; k++) vatom[i][k] += unit * w[6 * i + k];
   }
 }
 
@@ -591,11 +634,12 @@ bool PairPsi::is_pair(int i, int j, int itype, int jtype, double rsq) const
   const int all = atom->nlocal + atom->nghost;
   if (i < 0 || j < 0 || i >= all || j >= all) return false;
   if (atom->type[i] != itype || atom->type[j] != jtype) return false;
+  const double range = (*style)->cutoff();
   double d[3];
   for (int k = 0; k < 3; k++) d[k] = atom->x[i][k] - atom->x[j][k];
   const auto agrees = [&] {
     const double here = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-    return std::fabs(here - rsq) <= 1e-9 * std::max(1.0, here);
+    return std::fabs(here - rsq) <= 1e-9 * std::max(range * range, here);
   };
   if (agrees()) return true;
   // Some callers have found the atom and take the nearest of its images.
@@ -645,14 +689,14 @@ void *PairPsi::extract_peratom(const char *what, int &columns)
   if (!density && strcmp(what, "psi") != 0) return nullptr;
   refresh();
   columns = 0;
-  if (!density) return attempt([&] { return const_cast<double *>((*style)->excess().data()); });
+  if (!density) return attempt([&] { return const_cast<double *>((*style)->excess_of_owned().data()); });
   const size_t width = (*style)->variables();
   if (width == 0) return nullptr;
   // Forces may not have needed all of them.
   const size_t all = atom->nlocal + atom->nghost;
-  attempt([&] { (*style)->set_special_pairs({special.data(), special.size()}); });
+  tell_special(special.size());
   attempt([&] { (*style)->sum_densities(atom->nlocal, flat(atom->x, all), {atom->tag, all}, {atom->type, all}); });
-  const auto densities = (*style)->local_densities();
+  const auto densities = (*style)->densities_of_owned();
   double *first = const_cast<double *>(densities.data());
   if (width == 1) return first;
   columns = static_cast<int>(width);
@@ -694,7 +738,7 @@ double PairPsi::memory_usage()
 {
   double bytes = Pair::memory_usage();
   bytes += (pair_i.capacity() + pair_j.capacity()) * sizeof(int32_t) + pair_factor.capacity() * sizeof(double);
-  bytes += special.capacity() * sizeof(SpecialPair);
+  bytes += special.capacity() * sizeof(SpecialPair) + marks.capacity() * sizeof(uint32_t);
   if (style) bytes += static_cast<double>((*style)->memory());
   return bytes;
 }

@@ -8,6 +8,7 @@
 #include "psidpd-lammps/src/bridge.rs.h"
 
 #include <array>
+#include <cstdint>
 #include <exception>
 #include <optional>
 #include <string>
@@ -55,6 +56,8 @@ class PairPsi : public LAMMPS_NS::Pair {
   virtual void restore(const std::vector<std::string> &texts) = 0;
   // Stops where the style does not fit the simulation.
   virtual void check_host();
+  // Stops where units are none that the style works in; those of lj always are.
+  virtual void check_units(const std::string &units);
 
   // Reads keywords and values from argument `first` on.
   void read_keywords(int first, int narg, char **arg);
@@ -91,14 +94,14 @@ class PairPsi : public LAMMPS_NS::Pair {
   // Whether atoms may see two images of each other.
   bool is_narrow() const;
   void find_special();
+  void find_exclusions();
+  void tell_special(size_t count);
   void forward();
   void check_box();
   void check_plane();
   void check_ghosts();
   void check_callers();
   void advise();
-  // Whether LAMMPS's neighbor list leaves out pairs of this style.
-  bool has_exclusions() const;
   // Whether a pair is one of the last evaluation.
   bool is_pair(int i, int j, int itype, int jtype, double rsq) const;
   std::string search();
@@ -146,6 +149,13 @@ class PairPsi : public LAMMPS_NS::Pair {
   // Bonded neighbors with a factor other than 1: the first so many are both atoms of this rank, the others have ghosts.
   std::vector<SpecialPair> special;
   size_t special_owned = 0;
+  // How many of them the engine knows; SIZE_MAX if those that it knows are old.
+  size_t told_special = SIZE_MAX;
+  // How many pairs of types, groups and molecules neigh_modify excluded when the style was set up, and who is of them.
+  int rules = 0;
+  std::vector<uint32_t> marks;
+  bool between_molecules = false;
+  bool told_marks = false;
 };
 
 }    // namespace psidpd

@@ -3,7 +3,7 @@
 use crate::style::{Style, StyleError, guard};
 use nalgebra::Matrix3;
 use psidpd_core::engine::{
-    Around, PairsOfHost, Path, PeriodicBox, SpecialPair, Step, Surroundings, Tally, Want,
+    Around, Mark, PairsOfHost, Path, PeriodicBox, SpecialPair, Step, Surroundings, Tally, Want,
 };
 use psidpd_core::model::{SplinePair, WarrenPair};
 
@@ -67,11 +67,17 @@ mod ffi {
     extern "Rust" {
         type Style;
 
-        fn style_from_file(path: &str, kt: f64, names: &Vec<String>, dimensions: usize)
-        -> Result<Box<Style>>;
+        fn style_from_file(
+            path: &str,
+            units: &str,
+            kt: f64,
+            names: &Vec<String>,
+            dimensions: usize,
+        ) -> Result<Box<Style>>;
         fn style_from_text(
             source: &str,
             text: &str,
+            units: &str,
             kt: f64,
             names: &Vec<String>,
             dimensions: usize,
@@ -104,10 +110,10 @@ mod ffi {
         fn noise_range(self: &Style) -> f64;
 
         fn configure(self: &mut Style, mixed: bool, threads: usize) -> Result<()>;
-        /// Whether close pairs have forces that cannot be taken away again without losing digits.
-        fn has_core(self: &Style) -> bool;
         /// Which pairs do not act at their full strength, unless LAMMPS lists pairs: for all that comes until the next call.
         fn set_special_pairs(self: &mut Style, pairs: &[SpecialPair]) -> Result<()>;
+        /// Which others do not interact: two words for each atom and ghost, the members of `Mark`, or none at all.
+        fn set_exclusions(self: &mut Style, marks: &[u32], between_molecules: bool) -> Result<()>;
 
         /// Whether this rank can do without images along the closed directions of a box, for what is asked for.
         fn fits(self: &Style, extent: &Extent, request: &Request) -> Result<bool>;
@@ -163,15 +169,17 @@ mod ffi {
             request: &Request,
             f: &mut [f64],
         ) -> Result<Totals>;
+        /// What energies and virials of particles are to be multiplied by.
+        fn energy_unit(self: &Style) -> f64;
         fn particle_energy(self: &Style) -> &[f64];
         /// Six numbers a particle.
         fn particle_virial(self: &Style) -> &[f64];
         /// Sums all densities at the positions of the last evaluation.
         fn sum_densities(self: &mut Style, owned: usize, x: &[f64], tag: &[i32], kind: &[i32]) -> Result<()>;
         /// Those of owned particles, a row of [`variables`] for each.
-        fn local_densities(self: &Style) -> &[f64];
+        fn densities_of_owned(self: &mut Style) -> &[f64];
         /// psi of owned particles.
-        fn excess(self: &mut Style) -> Result<&[f64]>;
+        fn excess_of_owned(self: &mut Style) -> Result<&[f64]>;
         fn style_single(
             style: &mut Style,
             kind_i: i32,
@@ -187,22 +195,24 @@ mod ffi {
 #[allow(clippy::ptr_arg)] // What the bridge passes.
 fn style_from_file(
     path: &str,
+    units: &str,
     kt: f64,
     names: &Vec<String>,
     dimensions: usize,
 ) -> Result<Box<Style>, StyleError> {
-    Style::from_file(path, kt, names, dimensions).map(Box::new)
+    Style::from_file(path, units, kt, names, dimensions).map(Box::new)
 }
 
 #[allow(clippy::ptr_arg)] // What the bridge passes.
 fn style_from_text(
     source: &str,
     text: &str,
+    units: &str,
     kt: f64,
     names: &Vec<String>,
     dimensions: usize,
 ) -> Result<Box<Style>, StyleError> {
-    Style::from_text(source, text, kt, names, dimensions).map(Box::new)
+    Style::from_text(source, text, units, kt, names, dimensions).map(Box::new)
 }
 
 fn spline_style(
@@ -267,7 +277,8 @@ fn style_evaluate(
     f: &mut [f64],
 ) -> Result<ffi::Totals, StyleError> {
     let (step, want) = wanted(request);
-    let tally = style.evaluate(&domain_of(extent)?, x, v, tag, kind, step, want, f)?;
+    let domain = style.scale().domain(domain_of(extent)?);
+    let tally = style.evaluate(&domain, x, v, tag, kind, step, want, f)?;
     Ok(totals(style, &tally))
 }
 
@@ -290,7 +301,7 @@ fn style_densities(
     request: &ffi::Request,
 ) -> Result<(), StyleError> {
     let (step, want) = wanted(request);
-    let domain = domain_of(extent)?;
+    let domain = style.scale().domain(domain_of(extent)?);
     style.densities(Around { domain: &domain, images }, owned, x, v, tag, kind, newton, step, want)
 }
 
@@ -351,10 +362,6 @@ impl Style {
         plan.densities().count() * plan.species().len()
     }
 
-    fn has_core(&self) -> bool {
-        self.engine().plan().has_core()
-    }
-
     fn set_special_pairs(&mut self, pairs: &[ffi::SpecialPair]) -> Result<(), StyleError> {
         // A number that is none is refused by the engine, as one behind the last.
         let number = |k: i32| u32::try_from(k).unwrap_or(u32::MAX);
@@ -365,9 +372,21 @@ impl Style {
         })
     }
 
+    fn set_exclusions(&mut self, marks: &[u32], between_molecules: bool) -> Result<(), StyleError> {
+        let (marks, _) = marks.as_chunks::<2>();
+        guard(|| {
+            let marks = marks.iter().map(|[sides, molecule]| Mark { sides: *sides, molecule: *molecule });
+            self.engine_mut().set_exclusions(marks, between_molecules);
+            Ok(())
+        })
+    }
+
     fn fits(&self, extent: &ffi::Extent, request: &ffi::Request) -> Result<bool, StyleError> {
         let (_, want) = wanted(request);
-        let path = |domain| self.engine().path_for(Surroundings::Box(&domain), want);
+        let path = |domain| {
+            let domain = self.scale().domain(domain);
+            self.engine().path_for(Surroundings::Box(&domain), want)
+        };
         guard(|| Ok(domain_of(extent).is_ok_and(|domain| path(domain) == Path::Sweep)))
     }
 
@@ -378,12 +397,16 @@ impl Style {
         })
     }
 
-    fn local_densities(&self) -> &[f64] {
-        self.engine().local_densities()
+    fn densities_of_owned(&mut self) -> &[f64] {
+        self.local_densities()
     }
 
-    fn excess(&mut self) -> Result<&[f64], StyleError> {
-        guard(|| Ok(self.engine_mut().excess()))
+    fn excess_of_owned(&mut self) -> Result<&[f64], StyleError> {
+        guard(|| Ok(self.excess()))
+    }
+
+    fn energy_unit(&self) -> f64 {
+        self.scale().energy
     }
 
     fn memory(&self) -> usize {
@@ -391,7 +414,7 @@ impl Style {
     }
 
     fn cutoff(&self) -> f64 {
-        self.engine().plan().cutoff()
+        self.scale().length * self.engine().plan().cutoff()
     }
 
     fn slope_width(&self) -> usize {
@@ -403,7 +426,7 @@ impl Style {
     }
 
     fn noise_range(&self) -> f64 {
-        self.engine().plan().noise_range().unwrap_or(0.0)
+        self.scale().length * self.engine().plan().noise_range().unwrap_or(0.0)
     }
 
     fn particle_energy(&self) -> &[f64] {

@@ -2,15 +2,17 @@
 //! this.
 //!
 //! - [`style`]: what a pair style asks of the engine, in safe Rust;
+//! - [`units`]: from the units of LAMMPS to those of a model;
 //! - [`bridge`]: the same for C++, by cxx: slices, strings and exceptions, checked at compile time;
 //! - `cpp/`: the pair styles that LAMMPS sees, compiled against the headers of one LAMMPS;
 //! - `table`: the styles, as the entry finds them.
 //!
-//! The engine keeps its own cells, and corrects pairs that `special_bonds` weakens; LAMMPS's neighbour list is requested
-//! only where it alone knows which pairs do not act: `neigh_modify exclude`.
+//! The engine keeps its own cells, and leaves out pairs that `special_bonds` weakens or `neigh_modify` excludes; LAMMPS's
+//! neighbour list is requested only where it alone knows which pairs act.
 
 pub mod bridge;
 pub mod style;
+pub mod units;
 
 #[cfg(lammps_host)]
 mod table;

@@ -1,5 +1,6 @@
 //! One pair style's engine, and the mapping from LAMMPS's types to species.
 
+use crate::units::Scale;
 use psidpd_core::engine::{
     Around, Engine, EngineError, Newton, PairsOfHost, Particles, Path as EnginePath, PeriodicBox, Pool,
     Precision, Reason, Request, Settings, Step, Surroundings, Tally, Want,
@@ -42,6 +43,8 @@ pub struct Style {
     kinds: Vec<i32>,
     /// What the letters of pair_coeff mean.
     letters: Option<&'static str>,
+    scale: Scale,
+    converted: Converted,
 }
 
 /// Coefficients of the types that have any, as a model takes them.
@@ -89,21 +92,91 @@ pub(crate) fn guard<T>(work: impl FnOnce() -> Result<T, StyleError>) -> Result<T
     })
 }
 
+/// Positions and velocities in units of the model, and results in those of LAMMPS.
+#[derive(Debug, Default)]
+struct Converted {
+    x: Vec<f64>,
+    v: Vec<f64>,
+    forces: Vec<f64>,
+    densities: Vec<f64>,
+    excess: Vec<f64>,
+}
+
+/// `numbers` times `factor`.
+fn times<'a>(numbers: &[f64], factor: f64, out: &'a mut Vec<f64>) -> &'a [f64] {
+    out.clear();
+    out.extend(numbers.iter().map(|x| x * factor));
+    out
+}
+
+impl Converted {
+    /// What LAMMPS has, as the model takes it.
+    fn take<'a>(&'a mut self, scale: &Scale, x: &'a [f64], v: &'a [f64], step: Option<Step>) -> Taken<'a> {
+        if scale.is_one() {
+            return Taken { x, v, step, forces: &mut self.forces };
+        }
+        Taken {
+            x: times(x, 1.0 / scale.length, &mut self.x),
+            v: times(v, 1.0 / scale.velocity(), &mut self.v),
+            step: step.map(|step| Step { dt: step.dt / scale.time, ..step }),
+            forces: &mut self.forces,
+        }
+    }
+}
+
+/// The same in units of the model, and room for forces.
+struct Taken<'a> {
+    x: &'a [f64],
+    v: &'a [f64],
+    step: Option<Step>,
+    forces: &'a mut Vec<f64>,
+}
+
+impl Taken<'_> {
+    /// Adds to `f` the forces that `evaluate` adds to what it is given, and returns its totals.
+    fn add_forces(
+        self,
+        scale: &Scale,
+        f: &mut [f64],
+        evaluate: impl FnOnce(&mut [[f64; 3]]) -> Result<Tally, EngineError>,
+    ) -> Result<Tally, StyleError> {
+        if scale.is_one() {
+            return Ok(evaluate(f.as_chunks_mut::<3>().0)?);
+        }
+        self.forces.clear();
+        self.forces.resize(f.len(), 0.0);
+        let mut tally = evaluate(self.forces.as_chunks_mut::<3>().0)?;
+        for (f, force) in f.iter_mut().zip(&*self.forces) {
+            *f += scale.force() * force;
+        }
+        tally.excess *= scale.energy;
+        tally.pair *= scale.energy;
+        tally.virial.iter_mut().chain(&mut tally.thermostat_virial).for_each(|w| *w *= scale.energy);
+        Ok(tally)
+    }
+}
+
 /// Three numbers per particle, as LAMMPS stores them.
 fn triples(flat: &[f64]) -> &[[f64; 3]] {
     flat.as_chunks::<3>().0
 }
 
 impl Style {
-    /// Reads a model file. `names` has the species of each LAMMPS type, in order, or `NULL` for types
+    /// Reads a model file, for a simulation in LAMMPS's `units` of that name; kT is in these. `names` has the species of each LAMMPS type, in order, or `NULL` for types
     /// that another style of a hybrid computes.
     ///
     /// # Errors
     /// Anything wrong in the file, its dimensions, or the names.
-    pub fn from_file(path: &str, kt: f64, names: &[String], dimensions: usize) -> Result<Style, StyleError> {
+    pub fn from_file(
+        path: &str,
+        units: &str,
+        kt: f64,
+        names: &[String],
+        dimensions: usize,
+    ) -> Result<Style, StyleError> {
         guard(|| {
             let model = Model::open(Path::new(path)).map_err(|e| StyleError(e.to_string()))?;
-            Style::new(model, kt, names, dimensions)
+            Style::in_units(model, units, kt, names, dimensions)
         })
     }
 
@@ -114,13 +187,14 @@ impl Style {
     pub fn from_text(
         source: &str,
         text: &str,
+        units: &str,
         kt: f64,
         names: &[String],
         dimensions: usize,
     ) -> Result<Style, StyleError> {
         guard(|| {
             let model = Model::parse(source, text).map_err(|e| StyleError(e.to_string()))?;
-            Style::new(model, kt, names, dimensions)
+            Style::in_units(model, units, kt, names, dimensions)
         })
     }
 
@@ -197,6 +271,18 @@ impl Style {
         Ok(Style { letters: Some(letters), ..Style::new(model, kt, &names, dimensions)? })
     }
 
+    fn in_units(
+        model: Model,
+        units: &str,
+        kt: f64,
+        names: &[String],
+        dimensions: usize,
+    ) -> Result<Style, StyleError> {
+        let scale = Scale::new(units, model.units())
+            .map_err(|text| StyleError(format!("{}: {text}", model.source().name())))?;
+        Ok(Style { scale, ..Style::new(model, kt / scale.energy, names, dimensions)? })
+    }
+
     fn new(model: Model, kt: f64, names: &[String], dimensions: usize) -> Result<Style, StyleError> {
         if model.dimensions() != dimensions {
             return Err(StyleError(format!(
@@ -224,7 +310,17 @@ impl Style {
         let settings = Settings { precision: Precision::Double, ..Settings::default() };
         let pool = Arc::new(Pool::new(settings.threads));
         let engine = engine_at(&model, kt, &kinds, settings, &pool)?;
-        Ok(Style { model, engine, settings, pool, kt, kinds, letters: None })
+        Ok(Style {
+            model,
+            engine,
+            settings,
+            pool,
+            kt,
+            kinds,
+            letters: None,
+            scale: Scale::ONE,
+            converted: Converted::default(),
+        })
     }
 
     /// Another temperature: the model's expressions see it, and the noise.
@@ -233,7 +329,7 @@ impl Style {
     /// A model that makes no fluid at this temperature.
     pub fn set_temperature(&mut self, kt: f64) -> Result<(), StyleError> {
         guard(|| {
-            self.kt = kt;
+            self.kt = kt / self.scale.energy;
             self.rebuild()
         })
     }
@@ -267,7 +363,12 @@ impl Style {
         &self.model
     }
 
-    /// The engine.
+    /// One unit of the model in units of LAMMPS.
+    pub fn scale(&self) -> Scale {
+        self.scale
+    }
+
+    /// The engine, which computes in units of the model.
     pub fn engine(&self) -> &Engine {
         &self.engine
     }
@@ -286,6 +387,13 @@ impl Style {
         let _ = writeln!(text, "psidpd: {} ({})", self.model.title(), self.model.source().name());
         if let Some(reference) = self.model.reference() {
             let _ = writeln!(text, "  reference     {reference}");
+        }
+        if !self.scale.is_one() {
+            let Scale { length, energy, time } = self.scale;
+            let _ = writeln!(
+                text,
+                "  units         the model's, whose length is {length:.6e} here, energy {energy:.6e}, time {time:.6e}"
+            );
         }
         for line in self.engine().plan().to_string().lines() {
             let _ = writeln!(text, "  {line}");
@@ -341,9 +449,11 @@ impl Style {
         f: &mut [f64],
     ) -> Result<Tally, StyleError> {
         guard(|| {
-            let particles = Particles { owned: tag.len(), x: triples(x), tag, kind };
-            let request = Request { particles, v: triples(v), step, want };
-            Ok(self.engine.forces(domain, &request, f.as_chunks_mut::<3>().0, true)?)
+            let Style { engine, scale, converted, .. } = self;
+            let taken = converted.take(scale, x, v, step);
+            let particles = Particles { owned: tag.len(), x: triples(taken.x), tag, kind };
+            let request = Request { particles, v: triples(taken.v), step: taken.step, want };
+            taken.add_forces(scale, f, |f| engine.forces(domain, &request, f, true))
         })
     }
 
@@ -367,9 +477,11 @@ impl Style {
     ) -> Result<(), StyleError> {
         guard(|| {
             let newton = if newton { Newton::On } else { Newton::Off };
-            let particles = Particles { owned, x: triples(x), tag, kind };
-            let request = Request { particles, v: triples(v), step, want };
-            Ok(self.engine.first(Surroundings::Ghosts(around, newton), &request)?)
+            let Style { engine, scale, converted, .. } = self;
+            let taken = converted.take(scale, x, v, step);
+            let particles = Particles { owned, x: triples(taken.x), tag, kind };
+            let request = Request { particles, v: triples(taken.v), step: taken.step, want };
+            Ok(engine.first(Surroundings::Ghosts(around, newton), &request)?)
         })
     }
 
@@ -388,10 +500,12 @@ impl Style {
     ) -> Result<(), StyleError> {
         guard(|| {
             let newton = if newton { Newton::On } else { Newton::Off };
-            let particles = Particles { owned, x: triples(x), tag, kind };
+            let Style { engine, scale, converted, .. } = self;
+            let taken = converted.take(scale, x, &[], None);
+            let particles = Particles { owned, x: triples(taken.x), tag, kind };
             // What LAMMPS wants of listed pairs it says with the forces.
             let request = Request { particles, v: &[], step: None, want: Want::FORCES };
-            Ok(self.engine.first(Surroundings::Listed(*listed, newton), &request)?)
+            Ok(engine.first(Surroundings::Listed(*listed, newton), &request)?)
         })
     }
 
@@ -412,11 +526,30 @@ impl Style {
         kind: &[i32],
     ) -> Result<(), StyleError> {
         guard(|| {
-            let particles = Particles { owned, x: triples(x), tag, kind };
+            let Style { engine, scale, converted, .. } = self;
+            let taken = converted.take(scale, x, &[], None);
+            let particles = Particles { owned, x: triples(taken.x), tag, kind };
             // LAMMPS has ghosts for all that is around its atoms, along periods too.
-            self.engine.sum_densities(Surroundings::ghosts(Newton::On), &particles)?;
+            engine.sum_densities(Surroundings::ghosts(Newton::On), &particles)?;
             Ok(())
         })
+    }
+
+    /// Local densities of owned particles, in numbers a volume of LAMMPS.
+    pub fn local_densities(&mut self) -> &[f64] {
+        if self.scale.is_one() {
+            return self.engine.local_densities();
+        }
+        let volume = self.scale.length.powi(self.model.dimensions() as i32);
+        times(self.engine.local_densities(), 1.0 / volume, &mut self.converted.densities)
+    }
+
+    /// ψ of owned particles, in LAMMPS's units of energy.
+    pub fn excess(&mut self) -> &[f64] {
+        if self.scale.is_one() {
+            return self.engine.excess();
+        }
+        times(self.engine.excess(), self.scale.energy, &mut self.converted.excess)
     }
 
     /// Energy of a pair of kinds at a distance, and the force along it; where energies belong to particles, with what
@@ -426,14 +559,18 @@ impl Style {
     /// A particle that was not there then.
     pub fn single(&mut self, kinds: [i32; 2], r: f64, particles: [i32; 2]) -> Result<(f64, f64), StyleError> {
         guard(|| {
+            let r = r / self.scale.length;
+            let Scale { energy, .. } = self.scale;
+            let force = self.scale.force();
+            let here = |(e, f): (f64, f64)| (energy * e, force * f);
             let width = self.engine().plan().slope_width();
             if width == 0 {
-                return Ok(self.engine.single(kinds, r, [0, 0]));
+                return Ok(here(self.engine.single(kinds, r, [0, 0])));
             }
             let known = self.engine.slopes_mut().len() / width;
             let known = |i: i32| usize::try_from(i).ok().filter(|i| *i < known);
             match particles.map(known) {
-                [Some(i), Some(j)] => Ok(self.engine.single(kinds, r, [i, j])),
+                [Some(i), Some(j)] => Ok(here(self.engine.single(kinds, r, [i, j]))),
                 _ => Err(StyleError::new(format!(
                     "asked for the pair of particles {} and {}, of which the last evaluation knows nothing",
                     particles[0], particles[1]
@@ -459,9 +596,11 @@ impl Style {
         f: &mut [f64],
     ) -> Result<Tally, StyleError> {
         guard(|| {
-            let particles = Particles { owned, x: triples(x), tag, kind };
-            let request = Request { particles, v: triples(v), step, want };
-            Ok(self.engine.second(&request, f.as_chunks_mut::<3>().0, true)?)
+            let Style { engine, scale, converted, .. } = self;
+            let taken = converted.take(scale, x, v, step);
+            let particles = Particles { owned, x: triples(taken.x), tag, kind };
+            let request = Request { particles, v: triples(taken.v), step: taken.step, want };
+            taken.add_forces(scale, f, |f| engine.second(&request, f, true))
         })
     }
 }
@@ -543,7 +682,7 @@ mod tests {
     fn mistakes_are_named() {
         assert!(style(&["C"], 3).unwrap_err().to_string().contains("no species \"C\"; the model has A, B"));
         assert!(style(&["A"], 2).unwrap_err().to_string().contains("dimensions = 3, the simulation has 2"));
-        let missing = Style::from_file("nowhere.toml", 1.0, &[], 3).unwrap_err();
+        let missing = Style::from_file("nowhere.toml", "lj", 1.0, &[], 3).unwrap_err();
         assert!(missing.to_string().contains("nowhere.toml: cannot be read"), "{missing}");
     }
 

@@ -102,19 +102,26 @@ fn forces_equal_the_native_engine() {
     host_common::forces_equal_the_native_engine(&debian.runs());
 }
 
-/// Its headers let nobody ask for a full list: the half list has all pairs with newton off, and the styles
-/// insist on that where they need one.
+/// Weakened and excluded pairs need no list. Its headers let nobody ask for a full one: the half list has all pairs with
+/// newton off, and the styles insist on that where they need one.
 #[test]
 #[ignore = "needs the LAMMPS of Debian: apt install lammps liblammps-dev python3-lammps"]
-fn pairs_of_the_half_list_are_the_full_ones() {
+fn weakened_and_excluded_pairs_are_the_formulas() {
     let debian = debian();
     let said = host_common::special_factors_and_exclusions(&debian.runs(), "off");
     assert!(said[0].contains("  special bonds factors"), "{}", said[0]);
-    assert!(said[1].contains("half neighbor list of LAMMPS, because of neigh_modify exclude"), "{}", said[1]);
+    assert!(said[1].contains("  exclusions    pairs"), "{}", said[1]);
     let folder = tempfile::tempdir().unwrap();
-    let [special, excluded] = host_common::weakened_decks("on", folder.path());
+    let [special, _] = host_common::weakened_decks("on", folder.path());
     debian.runs().outcome(&special, 1, folder.path()).unwrap();
-    let error = debian.runs().outcome(&excluded, 1, folder.path()).unwrap_err();
+    let narrow = |deck: &str| {
+        deck.replace("mdpd/psi 1.0 1.0 5", "mdpd/psi 1.0 3.0 5").replace("-40 25 0 1 0.75", "-4 2 0 3 0.75")
+    };
+    let [on, off] =
+        ["on", "off"].map(|newton| narrow(&host_common::weakened_decks(newton, folder.path())[0]));
+    let said = debian.runs().outcome(&off, 1, folder.path()).unwrap();
+    assert!(said.contains("half neighbor list of LAMMPS, because of special_bonds"), "{said}");
+    let error = debian.runs().outcome(&on, 1, folder.path()).unwrap_err();
     assert!(error.contains("this version of LAMMPS needs 'newton off'"), "{error}");
 }
 

@@ -345,14 +345,13 @@ fn special_bonds_and_exclusions() {
 }
 
 /// Corrected pairs of the fast sweep are the pairs of LAMMPS's list with their factors, drag, noise and pressure among
-/// what they give, for two species with two densities, and on every number of ranks. An exclusion of nothing asks for
-/// the list.
+/// what they give, for two species with two densities, and on every number of ranks.
 #[test]
 fn special_bonds_are_the_same_by_the_sweep_and_by_the_list() {
     let (_folder, data) = file(&chains(120));
     let (_model, model) = file(WIDE);
     let outcome = |listed: bool, precision: &str, newton: &str, special: &str, more: &str, ranks: usize| {
-        let list = if listed { "group nobody empty\nneigh_modify exclude group nobody nobody\n" } else { "" };
+        let list = if listed { self::listed() } else { String::new() };
         let script = format!(
             "newton {newton}\nunits lj\natom_style bond\natom_modify map yes\ncomm_modify vel yes\n\
              special_bonds lj {special}\nread_data \"{data}\"\nmass * 1\nvelocity all create 1.0 87 loop geom\n{}\
@@ -366,7 +365,7 @@ fn special_bonds_are_the_same_by_the_sweep_and_by_the_list() {
         let folder = tempfile::tempdir().unwrap();
         let frame = run_in(folder.path(), &script, ranks);
         let log = std::fs::read_to_string(folder.path().join("log.lammps")).unwrap();
-        assert_eq!(log.contains("because of neigh_modify exclude"), listed, "{log}");
+        assert_eq!(log.contains("because of more exclusions"), listed, "{log}");
         assert_eq!(log.contains("  special bonds factors"), !listed, "{log}");
         let totals = std::fs::read_to_string(folder.path().join("totals")).unwrap();
         let totals: Vec<f64> = totals.split_whitespace().map(|t| t.parse().unwrap()).collect();
@@ -392,38 +391,74 @@ fn special_bonds_are_the_same_by_the_sweep_and_by_the_list() {
     }
 }
 
-/// Pairs whose force is too large to be taken away again, and boxes in which a pair has two images, take the list.
+/// Boxes in which a pair has two images take the list.
 #[test]
 fn special_bonds_that_need_the_list() {
     let (_folder, data) = file(&chains(120));
-    let (_core, core) = file(
-        "title = \"core\"\nspecies = [\"A\"]\n[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"expression\"\n\
-         phi = \"(1 - r)^2/r\"\nrange = 1\n",
+    let folder = tempfile::tempdir().unwrap();
+    let script = format!(
+        "units lj\natom_style bond\ncomm_modify vel yes cutoff 3\nspecial_bonds lj 0 1 1\nread_data \"{data}\"\n\
+         mass * 1\n{}pair_style mdpd/psi 1.0 3.0 {SEED}\npair_coeff * * -4 2 0 3 0.75\nbond_style zero\nbond_coeff *\n\
+         fix 1 all nve\nrun 0\n",
+        load()
     );
-    for (range, style, why) in [
-        (
-            5.0,
-            format!("pair_style dpd/psi 1.0 {SEED}\npair_coeff * * \"{core}\" A A"),
-            "very large at contact",
-        ),
-        (
-            3.0,
-            format!("pair_style mdpd/psi 1.0 3.0 {SEED}\npair_coeff * * -4 2 0 3 0.75"),
-            "narrower than twice",
-        ),
-    ] {
-        let folder = tempfile::tempdir().unwrap();
+    run_in(folder.path(), &script, 1);
+    let log = std::fs::read_to_string(folder.path().join("log.lammps")).unwrap();
+    let why = "neighbor list of LAMMPS, because of special_bonds in a box narrower than twice the cut-off";
+    assert!(log.contains(why), "{log}");
+}
+
+/// Exclusions of types, groups and molecules are left out of the fast sweep, as of LAMMPS's list: drag, noise, pressure and
+/// energies of atoms, on every number of ranks, beside special factors that a changed temperature has not made it forget.
+#[test]
+fn exclusions_are_the_same_by_the_sweep_and_by_the_list() {
+    let (_folder, data) = file(&chains(120));
+    let (_model, model) = file(WIDE);
+    let outcome = |listed: bool, newton: &str, rules: &str, ranks: usize| {
+        let list = if listed { self::listed() } else { String::new() };
         let script = format!(
-            "units lj\natom_style bond\ncomm_modify vel yes cutoff {range}\nspecial_bonds lj 0 1 1\n\
-             read_data \"{data}\"\nmass * 1\n{}{style}\nbond_style zero\nbond_coeff *\nfix 1 all nve\nrun 0\n",
+            "newton {newton}\nunits lj\natom_style bond\natom_modify map yes\ncomm_modify vel yes\n\
+             special_bonds lj 0.3 0 1\nread_data \"{data}\"\nmass * 1\nvelocity all create 1.0 87 loop geom\n{}\
+             pair_style dpd/psi 1.0 {SEED}\npair_coeff * * \"{model}\" A B\nbond_style zero\nbond_coeff *\n\
+             group one id 1:150\ngroup two id 100:400\nneigh_modify {rules}\n{list}fix 1 all nve\ntimestep {DT}\n\
+             variable t equal ramp(1,1.2)\nfix 2 all adapt 1 pair dpd/psi T * * v_t\n\
+             compute e all pe/atom pair\ncompute sum all reduce sum c_e\nthermo_modify norm no\n\
+             thermo_style custom step pe pxx pyy pxy c_sum\nrun 3\n\
+             print \"$(pe:%.17g) $(pxx:%.17g) $(pyy:%.17g) $(pxy:%.17g) $(c_sum:%.17g)\" file totals\n",
             load()
         );
-        run_in(folder.path(), &script, 1);
+        let folder = tempfile::tempdir().unwrap();
+        let frame = run_in(folder.path(), &script, ranks);
         let log = std::fs::read_to_string(folder.path().join("log.lammps")).unwrap();
-        assert!(
-            log.contains("neighbor list of LAMMPS, because of special_bonds") && log.contains(why),
+        assert_eq!(
+            log.contains("exclusions    pairs that neigh_modify excludes are left out"),
+            !listed,
             "{log}"
         );
+        let totals = std::fs::read_to_string(folder.path().join("totals")).unwrap();
+        let totals: Vec<f64> = totals.split_whitespace().map(|t| t.parse().unwrap()).collect();
+        (frame, totals)
+    };
+    let plain = outcome(true, "on", "every 1", 1).0;
+    for rules in [
+        "exclude type 1 2",
+        "exclude type 1 1 exclude group one two",
+        "exclude molecule/intra one",
+        "exclude molecule/inter two exclude group one one",
+    ] {
+        let expected = outcome(true, "on", rules, 1);
+        assert!(difference(&plain.f, &expected.0.f) > 0.01, "{rules} matters");
+        for (newton, ranks) in [("on", 1), ("off", 2), ("on", 4)] {
+            let (frame, totals) = outcome(false, newton, rules, ranks);
+            let off = difference(&frame.f, &expected.0.f);
+            assert!(off < 1e-10, "{rules}, newton {newton}, {ranks} ranks: {off}");
+            for (a, b) in totals.iter().zip(&expected.1) {
+                assert!(
+                    (a - b).abs() < 1e-10 * largest(expected.1.iter().copied()),
+                    "{rules}, {ranks} ranks: {a} {b}"
+                );
+            }
+        }
     }
 }
 

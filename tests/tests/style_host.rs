@@ -331,7 +331,7 @@ fn leaving_out_images_changes_nothing() {
         let ranks = before.split_whitespace().skip_while(|w| *w != "processors").skip(1).take(3);
         let ranks = ranks.map(|n| n.parse::<usize>().unwrap()).product::<usize>().max(1);
         let here = run(&script(""), ranks);
-        let listed = run(&script("group none empty\nneigh_modify exclude group none none\n"), ranks);
+        let listed = run(&script(&listed()), ranks);
         let apart =
             [difference(&here.x, &listed.x), difference(&here.v, &listed.v), difference(&here.f, &listed.f)];
         assert!(apart.iter().all(|d| *d < 1e-9), "{before}, {region}, {more}: {apart:?}");

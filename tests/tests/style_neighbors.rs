@@ -29,13 +29,13 @@ fn shells(now: &Frame, domain: &PeriodicBox, [a, b]: [i32; 2], reach: f64) -> Ve
 /// count, wherever the style has its pairs from.
 #[test]
 fn radial_distributions_are_those_of_a_direct_count() {
-    let model = warren();
+    let (model, listed) = (warren(), listed());
     for (before, region, more) in [
         ("", "block 0 5 0 5 0 5", ""),
         ("newton off", "block 0 5 0 5 0 5", ""),
         ("", "prism 0 5 0 5 0 5 1 -1 1", ""),
         // The style's own pairs are LAMMPS's here, and no atom is excluded.
-        ("", "block 0 5 0 5 0 5", "group none empty\nneigh_modify exclude group none none"),
+        ("", "block 0 5 0 5 0 5", &listed),
     ] {
         let l = open(&format!(
             "{}pair_style dpd/psi 1.0 {SEED}\npair_coeff * * \"{model}\" F F\n{more}\n\

@@ -21,7 +21,7 @@ fn continuations() -> Vec<&'static str> {
 }
 
 /// Every table, in the order of the documentation.
-pub const TABLES: &[Table] = &[TOP, PARAMETERS, DENSITY, EXCESS, CURVES, PAIR, THERMOSTAT];
+pub const TABLES: &[Table] = &[TOP, UNITS, PARAMETERS, DENSITY, EXCESS, CURVES, PAIR, THERMOSTAT];
 
 /// The top level.
 pub const TOP: Table = Table {
@@ -43,6 +43,27 @@ pub const TOP: Table = Table {
         "species": ValueKind::Species, REQUIRED,
             "The species, 1 to 64. Their order is the order of every list of species in results."
             => "species = [\"A\", \"B\"]";
+    },
+};
+
+/// `[units]`.
+pub const UNITS: Table = Table {
+    path: "units",
+    title: "",
+    array: false,
+    forms: ("", &[]),
+    about: "What the numbers of the model stand for, in SI. LAMMPS's `dpd/psi` needs it in other units than `lj`; \
+            nothing else looks at it. The unit of time is `length sqrt(mass/energy)`.",
+    keys: keys! {
+        "length": ValueKind::Positive, REQUIRED,
+            "The unit of length in metres."
+            => "[units]\nlength = 7.11e-10\nmass = 1.5e-25\nenergy = 4.14e-21";
+        "mass": ValueKind::Positive, REQUIRED,
+            "The unit of mass in kilograms."
+            => "[units]\nlength = 1e-9\nmass = 3e-25\nenergy = 4.14e-21";
+        "energy": ValueKind::Positive, REQUIRED,
+            "The unit of energy in joules: `k_B` times 300 K, if one temperature of the model is 300 K."
+            => "[units]\nlength = 1e-9\nmass = 3e-25\nenergy = 4.14e-21";
     },
 };
 

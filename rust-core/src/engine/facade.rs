@@ -11,6 +11,7 @@ use super::surroundings::{Around, SpecialPair, Surroundings};
 use super::sweep::{Pool, Sweep, Times};
 use crate::model::Fluid;
 use crate::model::expression::TooLarge;
+use psidpd_passes::cells::excluded::Mark;
 use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::noise::PairNoise;
 use psidpd_passes::settings::Settings;
@@ -30,6 +31,8 @@ pub struct Engine {
     sweep: Sweep,
     reference_only: bool,
     special: Vec<SpecialPair>,
+    /// Whether the sweep has been told of them.
+    knows_special: bool,
     corrections: Corrections,
     /// That of the last evaluation.
     path: Option<Path>,
@@ -98,6 +101,7 @@ impl Engine {
             sweep: Sweep::of_plan(plan, settings, pool),
             reference_only: false,
             special: Vec::new(),
+            knows_special: true,
             corrections: Corrections::default(),
             path: None,
             excess: Vec::new(),
@@ -150,12 +154,18 @@ impl Engine {
     /// Which pairs do not act at their full strength in evaluations to come, until the host says otherwise or numbers its
     /// particles anew.
     ///
-    /// Within the cut-off two particles must meet in one image only. A sweep takes all pairs for ordinary ones and corrects
-    /// these, so that what they lack should not be much larger than other forces: see [`Plan::has_core`]. Pairs that the
-    /// host lists have their factors in its list, and no special ones beside them.
+    /// Within the cut-off two particles must meet in one image only. A sweep leaves these pairs out, and those with a factor
+    /// above 0 are added to it. Pairs that the host lists have their factors in its list, and no special ones beside them.
     pub fn set_special_pairs(&mut self, pairs: impl IntoIterator<Item = SpecialPair>) {
         self.special.clear();
         self.special.extend(pairs.into_iter().filter(|pair| pair.factor != 1.0));
+        self.knows_special = false;
+    }
+
+    /// Which pairs do not interact in evaluations to come beside special ones with a factor of 0: those that `marks` exclude,
+    /// one for each particle and ghost, if there are any; see [`Mark::excludes`]. Pairs that the host lists are not looked at.
+    pub fn set_exclusions(&mut self, marks: impl IntoIterator<Item = Mark>, between_molecules: bool) {
+        self.sweep.exclusions_mut().mark(marks, between_molecules);
     }
 
     /// Whether every evaluation is to be done by the reference: for tests, and to see what the sweep is worth.
@@ -258,7 +268,7 @@ impl Engine {
                 Ok(tally)
             }
             Path::Reference(_) => {
-                self.reference.set_special_pairs(&self.special);
+                self.reference.set_special_pairs(&self.special, self.sweep.exclusions());
                 self.reference.first(Surroundings::Box(domain), particles, want.densities)?;
                 self.finish(request, force, add)
             }
@@ -283,20 +293,35 @@ impl Engine {
                 self.sweep.first(around, particles, v, *step, *want)
             }
             _ => {
-                self.reference.set_special_pairs(&self.special);
+                self.reference.set_special_pairs(&self.special, self.sweep.exclusions());
                 self.reference.first(surroundings, particles, want.densities)
             }
         }
     }
 
-    /// What special pairs change in a sweep; the densities among it go there.
+    /// What special pairs add to a sweep, which leaves them out; their densities go there.
     fn find_corrections(&mut self, around: Around, particles: &Particles) -> Result<(), EngineError> {
         let Engine { reference, sweep, special, corrections, .. } = self;
-        let densities = sweep.added_densities_mut();
-        corrections.find(reference.plan(), special, around, particles, reference.kinds(), densities)
+        let (exclusions, densities) = sweep.beside_mut();
+        exclusions.check(particles.x.len())?;
+        let excluded = |i, j| exclusions.excludes(i, j);
+        corrections.find(
+            reference.plan(),
+            special,
+            excluded,
+            around,
+            particles,
+            reference.kinds(),
+            densities,
+        )?;
+        if !self.knows_special {
+            exclusions.set(special);
+            self.knows_special = true;
+        }
+        Ok(())
     }
 
-    /// Corrects the forces of a sweep, whose slopes are there; the difference in the totals.
+    /// Adds what special pairs do to the forces of a sweep, whose slopes are there; their share of the totals.
     fn correct(&self, request: &Request, force: &mut [[f64; 3]]) -> Result<Tally, EngineError> {
         let Request { particles, v, step, want } = request;
         let (plan, slopes) = (self.sweep.plan(), self.sweep.slopes());
@@ -401,7 +426,7 @@ impl Engine {
                 Ok(&self.densities)
             }
             Some(Path::Sweep) => {
-                self.reference.set_special_pairs(&self.special);
+                self.reference.set_special_pairs(&self.special, self.sweep.exclusions());
                 let all = self.reference.sum_all_densities(Some((surroundings, particles)))?;
                 self.densities.extend_from_slice(all);
                 Ok(&self.densities)

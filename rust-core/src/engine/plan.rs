@@ -4,7 +4,6 @@ use super::excess::ExcessPlan;
 use super::fault::Fault;
 use crate::model::expression::{Formula, TooLarge};
 use crate::model::kernel::Kernel;
-use crate::model::pair::PairForm;
 use crate::model::{Continuation, ExcessFreeEnergy, Fluid, PairTerm, WeightedDensity};
 use psidpd_passes::ground::cell_grid::SearchPlan;
 use std::fmt;
@@ -179,17 +178,6 @@ impl Plan {
     /// Whether ghosts need velocities.
     pub fn needs_velocities(&self) -> bool {
         self.thermostat.is_some()
-    }
-
-    /// Whether some pair potential is so large at contact, or has no value there, that its force on close pairs cannot be
-    /// taken away again without losing digits.
-    pub fn has_core(&self) -> bool {
-        const LARGE: f64 = 1e4;
-        let is_large = |term: &PairTerm| {
-            let (phi, slope) = term.potential.at(0.0);
-            !(phi.abs() <= LARGE && slope.abs() <= LARGE)
-        };
-        self.pairs.iter().any(is_large)
     }
 
     /// How many species have a ψ that depends on a density.

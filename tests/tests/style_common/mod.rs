@@ -52,6 +52,12 @@ pub fn load() -> String {
     format!("plugin load \"{}\"\n", lammps().1.display())
 }
 
+/// Exclusions of nothing, more of them than the styles keep: their pairs are those of LAMMPS's list then. For
+/// `neigh_modify`, behind a `group nobody empty`.
+pub fn listed() -> String {
+    format!("group nobody empty\nneigh_modify{}\n", " exclude group nobody nobody".repeat(17))
+}
+
 /// A box with particles of `types` types, before any pair style.
 pub fn particles(before_box: &str, region: &str, types: usize, count: usize) -> String {
     let set = if types > 1 { format!("set type 1 type/ratio {types} 0.4 8731\n") } else { String::new() };

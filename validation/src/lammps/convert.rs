@@ -206,8 +206,8 @@ impl Work<'_> {
     /// Reports commands that are kept but may depend on the built-in.
     fn look(&mut self, command: &Command, words: &[&str]) {
         match words {
-            ["units", units] if *units != "lj" => {
-                self.left(command, "the style works in reduced units: use 'units lj'");
+            ["units", units] if !["lj", "real", "metal"].contains(units) => {
+                self.left(command, "the style works in units lj, real and metal");
             }
             ["read_restart", ..] => {
                 self.left(
@@ -491,12 +491,12 @@ mod tests {
 
     #[test]
     fn what_is_left_is_said() {
-        let old = "units real\natom_style mdpd\nread_data $f\nread_restart r\ncompute n all property/atom rho\n\
+        let old = "units si\natom_style mdpd\nread_data $f\nread_restart r\ncompute n all property/atom rho\n\
             pair_style hybrid/overlay mdpd/rhosum mdpd 1 1 5\npair_coeff 1 1 mdpd -40 25 18 1 0.75\n\
             pair_coeff 1 2 mdpd -40 20 18 1 0.75\nfix 1 all mvv/dpd 0.65\npair_modify pair mdpd shift no\n";
         let left = texts(&script(old, Law::Conservative, "p.so").left);
         for said in [
-            "1: the style works in reduced units",
+            "1: the style works in units lj, real and metal",
             "3: the atoms of the file have a column",
             "4: a restart file",
             "5: there is no property rho",

@@ -7,6 +7,7 @@ mod interaction;
 mod names;
 mod number;
 mod table;
+mod units;
 
 use super::fluid::Fluid;
 use crate::document::{Document, FileError, FileErrorKind, Located, Section, Source};
@@ -18,6 +19,7 @@ use number::Number;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
+pub use units::Units;
 
 /// A model file, read and checked. The temperature is the host's: see [`Model::at`].
 #[derive(Debug, Clone)]
@@ -26,6 +28,7 @@ pub struct Model {
     title: String,
     reference: Option<String>,
     dimensions: usize,
+    units: Option<Units>,
     species: Vec<String>,
     parameters: BTreeMap<String, f64>,
     densities: Vec<DensityEntry>,
@@ -60,6 +63,7 @@ impl Model {
         let title = root.require("title")?.string()?.value;
         let reference = root.get("reference").map(|v| v.string()).transpose()?.map(|l| l.value);
         let dimensions = read_dimensions(&root)?;
+        let units = units::read(&root)?;
         let species = names::read_species(&root)?;
         let parameters = number::read_parameters(&root)?;
         let densities = density::read(&root, &species.value, &parameters)?;
@@ -72,6 +76,7 @@ impl Model {
             title,
             reference,
             dimensions,
+            units,
             species: species.value,
             parameters,
             densities,
@@ -98,6 +103,11 @@ impl Model {
     /// 2 or 3.
     pub fn dimensions(&self) -> usize {
         self.dimensions
+    }
+
+    /// What its numbers stand for, if it says so.
+    pub fn units(&self) -> Option<Units> {
+        self.units
     }
 
     /// The names of the species.

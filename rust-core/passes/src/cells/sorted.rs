@@ -1,5 +1,6 @@
 //! Positions in the order of cells.
 
+use super::excluded::Excluded;
 use super::ghosts::Ghosts;
 use crate::ground::box_geometry::BoxGeometry;
 use crate::ground::cell_grid::CellGrid;
@@ -23,6 +24,7 @@ pub struct SortedCells<'a> {
     pub fixed16: [SharedSlice<'a, u16>; 3],
     pub fixed16_scale: FixedPoint16,
     pub ghosts: Ghosts<'a>,
+    pub excluded: Excluded<'a>,
 }
 
 impl SortedCells<'_> {

@@ -6,6 +6,7 @@
 use super::buffers::SearchBuffers;
 use super::cell_ranges::SearchGroup;
 use super::clusters::{I_PER_MASK, MASKS_PER_CLUSTER, SLOT_BLOCK};
+use super::leave_out::leave_out;
 use crate::cells::sorted::SortedCells;
 use crate::simd::{BroadcastPair, Isa, OFFSET_BITS};
 
@@ -114,6 +115,9 @@ pub unsafe fn filter_by_distance<I: Isa, const SHIFTS: bool, const CLUSTER: usiz
                     pairs += I::expand_mask(j_bases, *masks, out.add(pairs));
                     pairs += I::expand_mask(j_bases.add(4), *masks.add(4), out.add(pairs));
                     block += 1;
+                }
+                if !cells.excluded.is_empty() {
+                    pairs = leave_out::<I>(&cells.excluded, first + member, out, [labelled, pairs]);
                 }
                 // Thirty-two at once; that is enough for most particles.
                 loop {

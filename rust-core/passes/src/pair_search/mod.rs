@@ -4,7 +4,8 @@
 //! 2. [`j_clusters`]: four or eight neighbouring i-particles form an i-cluster; the cell ranges of a cluster are cut into
 //!    j-clusters of sixteen particles;
 //! 3. [`distance_filter`]: each j-cluster is compared with its i-cluster in 16-bit fixed point, and the bits that remain
-//!    become the list of pairs.
+//!    become the list of pairs;
+//! 4. [`leave_out`]: where pairs are excluded, they are taken out of that list.
 
 pub mod buffers;
 pub mod cell_ranges;
@@ -12,3 +13,4 @@ pub mod clusters;
 pub mod distance_filter;
 pub mod find;
 pub mod j_clusters;
+pub mod leave_out;

@@ -341,6 +341,10 @@ impl Words for U32x8 {
         unsafe { U32x8(_mm256_srlv_epi32(self.0, _mm256_set1_epi32(BY as i32))) }
     }
     #[inline(always)]
+    unsafe fn mask_equal(self, other: Self) -> u32 {
+        unsafe { _mm256_movemask_ps(_mm256_castsi256_ps(_mm256_cmpeq_epi32(self.0, other.0))) as u32 }
+    }
+    #[inline(always)]
     unsafe fn load_bytes(p: *const u8) -> Self {
         unsafe { U32x8(_mm256_cvtepu8_epi32(_mm_loadl_epi64(p.cast()))) }
     }
@@ -396,6 +400,10 @@ impl Words for U32x4 {
     #[inline(always)]
     unsafe fn shift_right<const BY: u32>(self) -> Self {
         unsafe { U32x4(_mm_srlv_epi32(self.0, _mm_set1_epi32(BY as i32))) }
+    }
+    #[inline(always)]
+    unsafe fn mask_equal(self, other: Self) -> u32 {
+        unsafe { _mm_movemask_ps(_mm_castsi128_ps(_mm_cmpeq_epi32(self.0, other.0))) as u32 }
     }
     #[inline(always)]
     unsafe fn load_bytes(p: *const u8) -> Self {

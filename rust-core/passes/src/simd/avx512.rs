@@ -297,6 +297,10 @@ impl Words for U32x16 {
         unsafe { U32x16(_mm512_srlv_epi32(self.0, _mm512_set1_epi32(BY as i32))) }
     }
     #[inline(always)]
+    unsafe fn mask_equal(self, other: Self) -> u32 {
+        unsafe { _mm512_cmpeq_epi32_mask(self.0, other.0) as u32 }
+    }
+    #[inline(always)]
     unsafe fn load_bytes(p: *const u8) -> Self {
         unsafe { U32x16(_mm512_cvtepu8_epi32(_mm_loadu_si128(p.cast()))) }
     }

@@ -130,6 +130,8 @@ pub trait Words: Copy {
     unsafe fn max(self, other: Self) -> Self;
     unsafe fn rotate(self, by: u32) -> Self;
     unsafe fn shift_right<const BY: u32>(self) -> Self;
+    /// Bit `k` is set where lane `k` is that of `other`.
+    unsafe fn mask_equal(self, other: Self) -> u32;
     /// Bytes, widened.
     unsafe fn load_bytes(p: *const u8) -> Self;
     /// `table[which[k]]` in lane `k`, of a table of as many words as there are lanes.

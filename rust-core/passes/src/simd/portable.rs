@@ -241,6 +241,14 @@ impl Words for Lanes<u32> {
         Lanes(self.0.map(|x| x >> BY))
     }
     #[inline(always)]
+    unsafe fn mask_equal(self, other: Self) -> u32 {
+        let mut mask = 0;
+        for k in 0..LANES {
+            mask |= ((self.0[k] == other.0[k]) as u32) << k;
+        }
+        mask
+    }
+    #[inline(always)]
     unsafe fn load_bytes(p: *const u8) -> Self {
         Lanes(unsafe { p.cast::<[u8; LANES]>().read_unaligned() }.map(u32::from))
     }

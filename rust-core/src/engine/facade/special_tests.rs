@@ -2,8 +2,7 @@
 
 use super::tests::*;
 use super::*;
-use crate::engine::{Instructions, Newton, PairsOfHost, Precision};
-use crate::model::Model;
+use crate::engine::{Instructions, Mark, Newton, PairsOfHost, Precision};
 use std::collections::HashMap;
 use std::num::NonZeroUsize;
 
@@ -157,17 +156,66 @@ fn special_pairs_that_make_no_sense_are_refused() {
     assert!(engine.forces(&cloud.domain, &cloud.request(Want::FORCES), &mut force, false).is_ok());
 }
 
+/// Marks of kinds that do not meet, of molecules without pairs of their own, and of molecules that do not see each other.
 #[test]
-fn a_core_is_told_from_soft_potentials() {
-    let with = |form: &str| {
-        let text = format!(
-            "title = \"t\"\nspecies = [\"A\"]\n[[pair]]\nbetween = [\"A\", \"A\"]\nrange = 1\n{form}\n"
-        );
-        Plan::new(&Model::parse("t", &text).unwrap().at(1.0).unwrap()).unwrap().has_core()
-    };
-    assert!(!with("form = \"soft\"\nstrength = 25"));
-    assert!(!with("form = \"expression\"\nphi = \"20*(1 - r)^2\""));
-    assert!(with("form = \"expression\"\nphi = \"(1 - r)^2/r^6\""));
-    assert!(with("form = \"expression\"\nphi = \"(1 - r)^2/(r^6 + 1e-9)\""));
-    assert!(!engine(&warren()).plan().has_core());
+fn marked_particles_act_as_those_of_a_list_without_their_pairs() {
+    let want = Want { densities: true, ..Want::TOTALS };
+    let fluid = two_passes();
+    let cloud = Cloud::new([4.0, 3.5, 3.1], 260, fluid.species.len() as i32);
+    let count = cloud.x.len();
+    let factors = factors(&cloud);
+    let (all, images) = cloud.with_ghosts([true; 3]);
+    let owner: Vec<usize> = (0..all.x.len()).map(|k| images.owner_of(k)).collect();
+    let by_rule = |k: usize| Mark { sides: [1, 2 | 1 << 16, 1 << 17, 0][k % 4], molecule: 0 };
+    let by_molecule = |k: usize| Mark { sides: 0, molecule: (k / 5 % 7) as u32 };
+    let rules: [(&dyn Fn(usize) -> Mark, bool); 3] =
+        [(&by_rule, false), (&by_molecule, false), (&by_molecule, true)];
+    let plain = in_box(&mut engine(&fluid), &cloud, want);
+    for (mark, between) in rules {
+        let scale = |i: usize, j: usize| match mark(i).excludes(mark(j), between) {
+            true => 0.0,
+            false => factor(&factors, i, j),
+        };
+        let pairs = (0..count).flat_map(|i| (i + 1..all.x.len()).map(move |j| (i, j)));
+        let pairs: Vec<_> =
+            pairs.map(|(i, j)| (i, j, scale(i, owner[j]))).filter(|pair| pair.2 != 0.0).collect();
+        let [i, j] = [
+            pairs.iter().map(|p| p.0 as i32).collect::<Vec<_>>(),
+            pairs.iter().map(|p| p.1 as i32).collect(),
+        ];
+        let strengths: Vec<f64> = pairs.iter().map(|p| p.2).collect();
+        let listed = Surroundings::Listed(PairsOfHost { i: &i, j: &j, factor: &strengths }, Newton::Off);
+        let expected = with_ghosts(&mut engine(&fluid), listed, &all, &images, want);
+        assert!((plain.0.energy() / expected.0.energy() - 1.0).abs() > 1e-3);
+        for (name, instructions) in Instructions::ALL {
+            if !instructions.available() {
+                continue;
+            }
+            let threads = NonZeroUsize::new(2).unwrap();
+            let mut engine =
+                Engine::new(&fluid, Settings { precision: Precision::Double, instructions, threads })
+                    .unwrap();
+            engine.set_exclusions(owner.iter().map(|k| mark(*k)), between);
+            for reference_only in [false, true] {
+                println!("{name}, reference only: {reference_only}");
+                engine.use_reference_only(reference_only);
+                engine.set_special_pairs(special(&factors, count, &owner[..count]));
+                agree(&in_box(&mut engine, &cloud, want), &expected);
+                engine.set_special_pairs(special(&factors, count, &owner));
+                agree(
+                    &with_ghosts(&mut engine, Surroundings::ghosts(Newton::Off), &all, &images, want),
+                    &expected,
+                );
+            }
+            let too_few = engine.plan().species().len();
+            engine.set_exclusions((0..too_few).map(mark), between);
+            let mut force = vec![[0.0; 3]; count];
+            for reference_only in [false, true] {
+                engine.use_reference_only(reference_only);
+                assert!(
+                    engine.forces(&cloud.domain, &cloud.request(Want::FORCES), &mut force, false).is_err()
+                );
+            }
+        }
+    }
 }

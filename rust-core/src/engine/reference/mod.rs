@@ -35,6 +35,7 @@ pub use in_box::{Pair, for_each_pair};
 use super::counts::PassCounts;
 use super::error::EngineError;
 use super::excess_pass::{ExcessPass, Rows};
+use super::exclusions::Exclusions;
 use super::particles::{Particles, Step};
 use super::plan::Plan;
 use super::surroundings::{Around, Newton, SpecialPair, Surroundings};
@@ -64,6 +65,7 @@ pub struct Reference {
     box_search: BoxSearch,
     pairs: Pairs,
     special: Vec<SpecialPair>,
+    exclusions: Exclusions,
     species: Vec<i32>,
     /// Local densities of owned particles, density-major, [`Fluid::variables`] each.
     densities: Vec<f64>,
@@ -100,6 +102,7 @@ impl Reference {
             box_search: BoxSearch::default(),
             pairs: Pairs::default(),
             special: Vec::new(),
+            exclusions: Exclusions::default(),
             species: Vec::new(),
             densities: Vec::new(),
             has_all_densities: false,
@@ -149,8 +152,11 @@ impl Reference {
     }
 
     /// Which pairs do not act at their full strength in evaluations to come, by the host's numbers. Within the cut-off two
-    /// particles must meet in one image only. Pairs that a host lists have their factors in its list.
-    pub fn set_special_pairs(&mut self, special: &[SpecialPair]) {
+    /// particles must meet in one image only. The marks of `exclusions` leave out others. Pairs that a host lists have their
+    /// factors in its list.
+    pub(super) fn set_special_pairs(&mut self, special: &[SpecialPair], exclusions: &Exclusions) {
+        let marks = exclusions.marks().iter().copied();
+        self.exclusions.mark(marks, exclusions.between_molecules());
         self.special.clear();
         self.special.extend_from_slice(special);
     }
@@ -218,7 +224,8 @@ impl Reference {
                 add_listed(&listed, particles, species, dimensions, cutoff, pairs)?;
             }
         }
-        if !self.special.is_empty() {
+        if !self.special.is_empty() || !self.exclusions.marks().is_empty() {
+            self.exclusions.check(species.len())?;
             let domain = match surroundings {
                 Surroundings::Box(domain) => domain,
                 Surroundings::Ghosts(around, _) => around.domain,
@@ -226,7 +233,7 @@ impl Reference {
                     return Err(EngineError::Host("listed pairs have factors of their own"));
                 }
             };
-            scale(&mut self.pairs, &self.special, domain, dimensions, cutoff)?;
+            scale(&mut self.pairs, &self.special, &self.exclusions, domain, dimensions, cutoff)?;
         }
         self.counts.search += 1;
         Ok(())

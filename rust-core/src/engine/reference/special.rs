@@ -1,10 +1,11 @@
-//! Special pairs: their strengths in the lists of pairs of the reference, and what they change in a sweep, which takes
-//! every pair for an ordinary one.
+//! Special pairs: their strengths in the lists of pairs of the reference, and what they add to a sweep, which leaves them
+//! out.
 
 use super::densities::add_density;
 use super::forces::{ForceInput, ForceOutput, add_forces};
 use super::pairs::{PairList, Pairs};
 use crate::engine::error::EngineError;
+use crate::engine::exclusions::Exclusions;
 use crate::engine::particles::Particles;
 use crate::engine::plan::Plan;
 use crate::engine::surroundings::{Around, Newton, SpecialPair};
@@ -13,58 +14,63 @@ use psidpd_passes::noise::PairNoise;
 use psidpd_passes::tally::{Tally, Want};
 use std::collections::HashMap;
 
-/// Gives the special ones among pairs that have been found their strengths.
+/// Gives the special ones among pairs that have been found their strengths, and none to those that marks exclude.
 ///
 /// # Errors
 /// A box in which two particles meet in several images, of which it is not said which one is special.
 pub fn scale(
     pairs: &mut Pairs,
     special: &[SpecialPair],
+    exclusions: &Exclusions,
     domain: &PeriodicBox,
     dimensions: usize,
     cutoff: f64,
 ) -> Result<(), EngineError> {
-    if (0..dimensions).any(|k| domain.periodic()[k] && domain.height(k) < 2.0 * cutoff) {
+    if !special.is_empty() && (0..dimensions).any(|k| domain.periodic()[k] && domain.height(k) < 2.0 * cutoff)
+    {
         return Err(EngineError::Host("special pairs in a box narrower than twice the cut-off"));
     }
     let key = |i: u32, j: u32| (i.min(j), i.max(j));
     let factors: HashMap<_, _> = special.iter().map(|p| (key(p.i, p.j), p.factor)).collect();
     for list in pairs.lists_mut() {
-        let factor = |(i, j): (&u32, &u32)| factors.get(&key(*i, *j)).copied().unwrap_or(1.0);
+        let factor = |(i, j): (&u32, &u32)| match exclusions.excludes(*i as usize, *j as usize) {
+            true => 0.0,
+            false => factors.get(&key(*i, *j)).copied().unwrap_or(1.0),
+        };
         list.factor = list.i.iter().zip(&list.j).map(factor).collect();
         list.thermostat_factor = list.factor.iter().map(|f| if *f == 0.0 { 0.0 } else { 1.0 }).collect();
     }
     Ok(())
 }
 
-/// The difference that special pairs make to an evaluation in which all pairs acted at full strength: to densities before
-/// ψ is evaluated, and to forces and totals at the end.
+/// What special pairs add to an evaluation that leaves them out: to densities before ψ is evaluated, and to forces and totals
+/// at the end.
 #[derive(Debug, Clone, Default)]
 pub struct Corrections {
-    /// Special pairs within the cut-off, with what their strengths have too much.
+    /// Special pairs within the cut-off that do interact.
     pairs: PairList,
     owned: usize,
-    /// Whether there are some that do not interact at all.
-    excludes: bool,
 }
 
 impl Corrections {
-    /// Finds the special pairs that are within the cut-off, and what they change in the densities that forces need: for
-    /// each owned particle [`Plan::slope_width`] numbers, or none at all if nothing changes.
+    /// Finds the special pairs that are within the cut-off, and what they add to the densities that forces need: for
+    /// each owned particle [`Plan::slope_width`] numbers, or none at all if there is nothing to add.
     ///
     /// # Errors
     /// A pair of particles that are not there, or of none that is owned.
+    #[expect(clippy::too_many_arguments)] // What a host knows of its pairs.
     pub fn find(
         &mut self,
         plan: &Plan,
         special: &[SpecialPair],
+        excluded: impl Fn(usize, usize) -> bool,
         around: Around,
         particles: &Particles,
         species_of_type: &[i32],
         densities: &mut Vec<f64>,
     ) -> Result<(), EngineError> {
         self.pairs.clear();
-        (self.owned, self.excludes) = (particles.owned, false);
+        self.owned = particles.owned;
         densities.clear();
         let Particles { x, kind, owned, .. } = *particles;
         let Around { domain, images } = around;
@@ -77,6 +83,9 @@ impl Corrections {
             if i >= owned || j >= x.len() {
                 return Err(EngineError::Host("a special pair names a particle that is not there"));
             }
+            if pair.factor == 0.0 || excluded(i, j) {
+                continue;
+            }
             let mut d = std::array::from_fn(|c| x[i][c] - x[j][c]);
             // Within the cut-off there is one image at most.
             if square(&d) >= squared && is_periodic {
@@ -87,9 +96,8 @@ impl Corrections {
             if square(&d) < squared && !is_image && a >= 0 && b >= 0 {
                 d[2] *= depth;
                 self.pairs.push_of(i, j, d, [a, b]);
-                self.pairs.factor.push(pair.factor - 1.0);
-                self.pairs.thermostat_factor.push(if pair.factor == 0.0 { -1.0 } else { 0.0 });
-                self.excludes |= pair.factor == 0.0;
+                self.pairs.factor.push(pair.factor);
+                self.pairs.thermostat_factor.push(1.0);
             }
         }
         if self.pairs.len() > 0 {
@@ -103,12 +111,12 @@ impl Corrections {
         Ok(())
     }
 
-    /// Whether nothing changes.
+    /// Whether there is nothing to add.
     pub fn is_empty(&self) -> bool {
         self.pairs.len() == 0
     }
 
-    /// Adds what changes to the forces on owned particles, and returns what changes in the totals. A pair with a ghost
+    /// Adds the forces on owned particles, and returns the share of the totals. A pair with a ghost
     /// counts half, as in a sweep.
     ///
     /// # Errors
@@ -132,7 +140,7 @@ impl Corrections {
             slopes,
             v,
             tag: particles.tag,
-            thermostat: thermostat.filter(|_| self.excludes),
+            thermostat,
             want,
         };
         let mut output = ForceOutput {

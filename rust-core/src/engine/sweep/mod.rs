@@ -22,6 +22,7 @@ pub use times::Times;
 
 use super::counts::PassCounts;
 use super::error::EngineError;
+use super::exclusions::Exclusions;
 use super::particles::{Particles, Step};
 use super::plan::Plan;
 use super::surroundings::Around;
@@ -53,6 +54,8 @@ pub struct Sweep {
     /// What is added to the densities of owned particles in the evaluation to come, beside pairs: a row of
     /// [`Plan::slope_width`] for each, or nothing.
     added_densities: Vec<f64>,
+    /// Pairs that do not interact.
+    exclusions: Exclusions,
     /// In the host's order, where it has ghosts.
     slopes: Vec<f64>,
     owned: usize,
@@ -120,6 +123,7 @@ impl Sweep {
             workspace,
             species_of_type,
             added_densities: Vec::new(),
+            exclusions: Exclusions::default(),
             slopes: Vec::new(),
             owned: 0,
             all: 0,
@@ -173,10 +177,20 @@ impl Sweep {
         Ok(())
     }
 
-    /// What to add to the densities of owned particles in evaluations to come, beside pairs: a row of
-    /// [`Plan::slope_width`] for each, or nothing.
-    pub(super) fn added_densities_mut(&mut self) -> &mut Vec<f64> {
-        &mut self.added_densities
+    /// For evaluations to come: which pairs do not interact, and what to add to the densities of owned particles beside
+    /// pairs, a row of [`Plan::slope_width`] for each, or nothing.
+    pub(super) fn beside_mut(&mut self) -> (&mut Exclusions, &mut Vec<f64>) {
+        (&mut self.exclusions, &mut self.added_densities)
+    }
+
+    /// Which pairs do not interact.
+    pub(super) fn exclusions(&self) -> &Exclusions {
+        &self.exclusions
+    }
+
+    /// The same, to be changed.
+    pub(super) fn exclusions_mut(&mut self) -> &mut Exclusions {
+        &mut self.exclusions
     }
 
     /// Whether particles in `domain` meet one image only of each other, as a sweep without ghosts needs:
@@ -219,7 +233,8 @@ impl Sweep {
             return Err(EngineError::Host("the force array is too short"));
         }
         let input =
-            Input::new(particles, &[], v, &self.species_of_type, &self.added_densities, thermostat, want);
+            Input::new(particles, &[], v, &self.species_of_type, &self.added_densities, thermostat, want)
+                .excluding(&self.exclusions);
         let set = self.set;
         let (plan, pool, times) = (&self.plan, &self.pool, &mut self.times);
         let out = ForceSink::new(force, add, particles.tag);
@@ -255,7 +270,8 @@ impl Sweep {
             return Err(EngineError::Host("not as many ghosts as it was said of whether they are images"));
         }
         let input =
-            Input::new(particles, images, v, &self.species_of_type, &self.added_densities, thermostat, want);
+            Input::new(particles, images, v, &self.species_of_type, &self.added_densities, thermostat, want)
+                .excluding(&self.exclusions);
         let set = self.set;
         let (plan, pool, times) = (&self.plan, &self.pool, &mut self.times);
         with!(&mut self.workspace, m => {
@@ -369,7 +385,7 @@ impl Sweep {
     /// Bytes held in arrays over particles and pairs.
     pub fn memory(&self) -> usize {
         let numbers = self.slopes.capacity() + self.added_densities.capacity();
-        numbers * size_of::<f64>() + with!(&self.workspace, m => m.memory())
+        numbers * size_of::<f64>() + self.exclusions.bytes() + with!(&self.workspace, m => m.memory())
     }
 }
 

@@ -7,6 +7,7 @@ use super::region::region;
 use super::workspace::{CellOrder, Input, SortedParticles};
 use crate::engine::error::EngineError;
 use crate::engine::particles::Particles;
+use psidpd_passes::cells::excluded::Excluded;
 use psidpd_passes::cells::sorted::SortedCells;
 use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::ground::arithmetic::MixedParticle;
@@ -114,6 +115,7 @@ impl PairLists {
                 fixed16: shared.fixed16,
                 fixed16_scale: shared.fixed16_scale,
                 ghosts: shared.ghosts,
+                excluded: Excluded::default(),
             },
             packed: shared.packed,
             tables,

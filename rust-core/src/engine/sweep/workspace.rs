@@ -3,6 +3,7 @@
 mod accumulators;
 mod cell_order;
 mod excess;
+mod excluded_pairs;
 mod fluid;
 mod forces;
 mod host;
@@ -23,6 +24,7 @@ use crate::engine::sweep::terms::terms;
 use crate::engine::sweep::times::Times;
 use accumulators::AccumulatorArrays;
 use excess::ExcessInput;
+use excluded_pairs::ExcludedPairs;
 use fluid::FluidConstants;
 use psidpd_passes::cells::sorted::SortedCells;
 use psidpd_passes::compiled::{PairPrecision, Passes};
@@ -44,6 +46,7 @@ pub struct Workspace<P: PairPrecision> {
     fluid: FluidConstants<P::Scalar>,
     order: CellOrder,
     particles: SortedParticles<P::PackedParticle>,
+    excluded: ExcludedPairs,
     accumulators: AccumulatorArrays,
     slopes: SlopeArrays<P::Scalar>,
     results: PlaneResults<P::Scalar>,
@@ -63,6 +66,7 @@ impl<P: PairPrecision> Workspace<P> {
             fluid: FluidConstants { set, terms, variables },
             order: CellOrder::new(plan.dimensions),
             particles: SortedParticles::default(),
+            excluded: ExcludedPairs::default(),
             accumulators: AccumulatorArrays::default(),
             slopes: SlopeArrays::default(),
             results: PlaneResults::default(),
@@ -83,6 +87,7 @@ impl<P: PairPrecision> Workspace<P> {
         (self.thermostat, self.totals) = (input.thermostat, input.totals);
         self.order.sort(pool, self.fluid.set, geometry, grid, input)?;
         self.particles.make_room(&self.order, self.fluid.terms.species > 1);
+        self.excluded.fill(&self.order, input.exclusions);
         let packs = self.fluid.terms.full_cache;
         self.slopes.make_room(&self.order, self.fluid.width(), packs);
         Ok(())
@@ -198,14 +203,15 @@ impl<P: PairPrecision> Workspace<P> {
         planes: &[Range<usize>],
         work: impl FnOnce(&Scheduler<P>, &mut [ThreadSlab<P::Scalar>], &mut AccumulatorArrays),
     ) {
-        let Workspace { fluid, order, particles, accumulators, slopes, results, threads, .. } = self;
-        let particles = &particles.share();
+        let Workspace { fluid, order, particles, excluded, accumulators, slopes, results, threads, .. } =
+            self;
+        let (particles, excluded) = (&particles.share(), excluded.share());
         let slopes = slopes.share();
         let SharedParticles { x, fixed16_scale, fixed16, packed, species, ghosts } = *particles;
         let (geometry, grid, start) = (&order.geometry, &order.grid, &order.start[..]);
         let (terms, thermostat) = (&fluid.terms, self.thermostat);
         let data = PassData {
-            cells: SortedCells { geometry, grid, start, x, fixed16, fixed16_scale, ghosts },
+            cells: SortedCells { geometry, grid, start, x, fixed16, fixed16_scale, ghosts, excluded },
             inputs: PairInputs { geometry, terms, thermostat, packed, species, ghosts },
             slopes: slopes.slopes,
         };

@@ -110,6 +110,7 @@ impl<P: PairPrecision> Workspace<P> {
     pub fn memory(&self) -> usize {
         self.order.bytes()
             + self.particles.bytes()
+            + self.excluded.bytes()
             + self.accumulators.bytes()
             + self.results.bytes()
             + self.slopes.bytes()

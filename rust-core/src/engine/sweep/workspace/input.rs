@@ -1,3 +1,4 @@
+use crate::engine::exclusions::Exclusions;
 use crate::engine::particles::Particles;
 use psidpd_passes::noise::PairNoise;
 use psidpd_passes::tally::Want;
@@ -16,6 +17,8 @@ pub struct Input<'a> {
     pub species_of_type: &'a [i32],
     /// What is added to the densities of owned particles beside pairs, a row for each; empty if nothing is.
     pub added_densities: &'a [f64],
+    /// Pairs that do not interact.
+    pub exclusions: Option<&'a Exclusions>,
     pub thermostat: Option<(PairNoise, f64)>,
     pub totals: bool,
 }
@@ -36,9 +39,15 @@ impl<'a> Input<'a> {
             v,
             species_of_type,
             added_densities,
+            exclusions: None,
             thermostat,
             totals: want.energy || want.virial,
         }
+    }
+
+    /// The same without some pairs.
+    pub fn excluding(self, exclusions: &'a Exclusions) -> Input<'a> {
+        Input { exclusions: Some(exclusions), ..self }
     }
 
     /// The species of a particle, unless its type is unknown.

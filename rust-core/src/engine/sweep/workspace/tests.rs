@@ -53,6 +53,7 @@ impl Points {
             v: &[],
             species_of_type: &[-1, 0],
             added_densities: &[],
+            exclusions: None,
             thermostat: None,
             totals: false,
         }

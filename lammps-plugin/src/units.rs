@@ -1,0 +1,107 @@
+//! From the units of LAMMPS to those of a model.
+
+use psidpd_core::engine::PeriodicBox;
+use psidpd_core::model::Units;
+
+/// One unit of the model in units of LAMMPS.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scale {
+    /// That of length.
+    pub length: f64,
+    /// That of energy, and of virials.
+    pub energy: f64,
+    /// That of time.
+    pub time: f64,
+}
+
+/// Units of LAMMPS, in SI.
+struct HostUnits {
+    length: f64,
+    energy: f64,
+    time: f64,
+}
+
+/// Units of <https://docs.lammps.org/units.html>; those of velocities are length over time, of forces energy over length.
+fn host_units(name: &str) -> Option<HostUnits> {
+    const ANGSTROM: f64 = 1e-10;
+    // Per molecule; exact since 2019, as is the electronvolt.
+    const KILOCALORIE_PER_MOLE: f64 = 4184.0 / 6.022_140_76e23;
+    const ELECTRONVOLT: f64 = 1.602_176_634e-19;
+    match name {
+        "real" => Some(HostUnits { length: ANGSTROM, energy: KILOCALORIE_PER_MOLE, time: 1e-15 }),
+        "metal" => Some(HostUnits { length: ANGSTROM, energy: ELECTRONVOLT, time: 1e-12 }),
+        "si" => Some(HostUnits { length: 1.0, energy: 1.0, time: 1.0 }),
+        _ => None,
+    }
+}
+
+impl Scale {
+    /// A simulation in the units of the model, whatever they are.
+    pub const ONE: Scale = Scale { length: 1.0, energy: 1.0, time: 1.0 };
+
+    /// For a model of these units in a simulation in `units NAME`; what is wrong otherwise.
+    pub fn new(name: &str, units: Option<Units>) -> Result<Scale, String> {
+        if name == "lj" {
+            return Ok(Scale::ONE);
+        }
+        let Some(host) = host_units(name) else {
+            return Err(format!("a model works in units lj, real, metal and si, found 'units {name}'"));
+        };
+        let Some(Units { length, mass, energy }) = units else {
+            return Err(format!(
+                "'units {name}' needs a model that says what its numbers stand for: add a table [units] with length, \
+                 mass and energy in SI, or use 'units lj'"
+            ));
+        };
+        let time = length * (mass / energy).sqrt();
+        Ok(Scale { length: length / host.length, energy: energy / host.energy, time: time / host.time })
+    }
+
+    /// Whether nothing is to be converted.
+    pub fn is_one(&self) -> bool {
+        *self == Scale::ONE
+    }
+
+    /// That of velocity.
+    pub fn velocity(&self) -> f64 {
+        self.length / self.time
+    }
+
+    /// That of force.
+    pub fn force(&self) -> f64 {
+        self.energy / self.length
+    }
+
+    /// The box of LAMMPS, in units of the model.
+    pub fn domain(&self, domain: PeriodicBox) -> PeriodicBox {
+        if self.is_one() {
+            return domain;
+        }
+        let origin = domain.origin().map(|x| x / self.length);
+        let edges = [0, 1, 2].map(|k| domain.edge(k).map(|x| x / self.length));
+        let edges = nalgebra::Matrix3::from_fn(|row, column| edges[column][row]);
+        // A box that is one is one in any unit, but for numbers out of range.
+        PeriodicBox::new(origin, edges, domain.periodic()).unwrap_or(domain)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Argon: 120 K, 3.4 Å, 39.948 g/mol has a unit of time of 2.16 ps.
+    #[test]
+    fn units_of_argon() {
+        let units = Units { length: 3.405e-10, mass: 6.6335e-26, energy: 1.6540e-21 };
+        let real = Scale::new("real", Some(units)).unwrap();
+        assert!((real.length - 3.405).abs() < 1e-9 && (real.time / 2156.0 - 1.0).abs() < 1e-3, "{real:?}");
+        assert!((real.energy / 0.23806 - 1.0).abs() < 1e-3, "{real:?}");
+        let metal = Scale::new("metal", Some(units)).unwrap();
+        assert!((metal.time / 2.156 - 1.0).abs() < 1e-3 && (metal.energy / 0.010323 - 1.0).abs() < 1e-3);
+        let si = Scale::new("si", Some(units)).unwrap();
+        assert_eq!((si.length, si.energy), (units.length, units.energy));
+        assert_eq!(Scale::new("lj", None), Ok(Scale::ONE));
+        assert!(Scale::new("real", None).unwrap_err().contains("[units]"));
+        assert!(Scale::new("cgs", Some(units)).unwrap_err().contains("units lj, real, metal and si"));
+    }
+}

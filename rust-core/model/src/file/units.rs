@@ -1,0 +1,32 @@
+//! What the numbers of a model stand for.
+
+use crate::document::{FileError, FileErrorKind, Section};
+
+/// The units of a model, in SI. That of time is `length √(mass/energy)`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Units {
+    /// Metres.
+    pub length: f64,
+    /// Kilograms.
+    pub mass: f64,
+    /// Joules.
+    pub energy: f64,
+}
+
+/// Reads `[units]`, if it is there.
+pub fn read(root: &Section) -> Result<Option<Units>, FileError> {
+    let Some(value) = root.get("units") else {
+        return Ok(None);
+    };
+    let table = value.section()?;
+    let positive = |key: &str| {
+        let value = table.require(key)?;
+        match value.number()?.value {
+            number if number > 0.0 && number.is_finite() => Ok(number),
+            number => Err(value.error(FileErrorKind::Value(format!("must be positive, is {number}")))),
+        }
+    };
+    let units = Units { length: positive("length")?, mass: positive("mass")?, energy: positive("energy")? };
+    table.finish()?;
+    Ok(Some(units))
+}

@@ -1,0 +1,114 @@
+//! Pairs that a host leaves out.
+
+use super::error::EngineError;
+use super::surroundings::SpecialPair;
+use psidpd_passes::cells::excluded::Mark;
+
+/// Which particles form no pair with each other, by the host's numbers.
+#[derive(Debug, Clone, Default)]
+pub struct Exclusions {
+    /// Where the partners of each particle begin, one past the last at the end; empty if there are none.
+    start: Vec<u32>,
+    partners: Vec<u32>,
+    /// Of each particle; empty if no marks exclude.
+    marks: Vec<Mark>,
+    between_molecules: bool,
+}
+
+impl Exclusions {
+    /// Excludes by these marks from now on, at least as many as there are particles, or by none.
+    pub fn mark(&mut self, marks: impl IntoIterator<Item = Mark>, between_molecules: bool) {
+        self.marks.clear();
+        self.marks.extend(marks);
+        self.between_molecules = between_molecules;
+    }
+
+    /// Marks, and whether they keep molecules from each other.
+    pub fn marks(&self) -> &[Mark] {
+        &self.marks
+    }
+
+    pub fn between_molecules(&self) -> bool {
+        self.between_molecules
+    }
+
+    /// Whether marks exclude the pair of two particles.
+    pub fn excludes(&self, i: usize, j: usize) -> bool {
+        match (self.marks.get(i), self.marks.get(j)) {
+            (Some(a), Some(b)) => a.excludes(*b, self.between_molecules),
+            _ => false,
+        }
+    }
+
+    /// Stops if there are marks, but not for all of `count` particles.
+    pub fn check(&self, count: usize) -> Result<(), EngineError> {
+        match self.marks.len() {
+            1.. if self.marks.len() < count => Err(EngineError::Host("not as many marks as particles")),
+            _ => Ok(()),
+        }
+    }
+
+    /// Replaces all pairs by `pairs`, whatever their factors are.
+    pub fn set(&mut self, pairs: &[SpecialPair]) {
+        self.start.clear();
+        self.partners.clear();
+        let Some(most) = pairs.iter().map(|pair| pair.i.max(pair.j)).max() else { return };
+        // How many each has, then where they begin, and while they are filled in where the next one goes.
+        self.start.resize(most as usize + 2, 0);
+        for pair in pairs {
+            self.start[pair.i as usize] += 1;
+            self.start[pair.j as usize] += 1;
+        }
+        let mut sum = 0;
+        for start in &mut self.start {
+            sum += std::mem::replace(start, sum);
+        }
+        self.partners.resize(sum as usize, 0);
+        for pair in pairs {
+            for (i, j) in [(pair.i, pair.j), (pair.j, pair.i)] {
+                let next = &mut self.start[i as usize];
+                self.partners[*next as usize] = j;
+                *next += 1;
+            }
+        }
+        // Each is where the one behind it began.
+        self.start.copy_within(..most as usize + 1, 1);
+        self.start[0] = 0;
+    }
+
+    /// Whether pairs are excluded one by one.
+    pub fn has_partners(&self) -> bool {
+        !self.start.is_empty()
+    }
+
+    /// The particles that form no pair with `particle`.
+    pub fn of(&self, particle: u32) -> &[u32] {
+        match self.start.get(particle as usize..particle as usize + 2) {
+            Some([first, end]) => &self.partners[*first as usize..*end as usize],
+            _ => &[],
+        }
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        (self.start.capacity() + self.partners.capacity()) * size_of::<u32>()
+            + self.marks.capacity() * size_of::<Mark>()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn partners_are_there_from_both_sides() {
+        let pair = |i, j| SpecialPair { i, j, factor: 0.0 };
+        let mut exclusions = Exclusions::default();
+        exclusions.set(&[pair(2, 5), pair(0, 2), pair(5, 3)]);
+        let of = |particle| exclusions.of(particle).to_vec();
+        assert_eq!([of(0), of(1), of(2), of(3), of(4), of(5), of(6)].map(|p| p.len()), [1, 0, 2, 1, 0, 2, 0]);
+        assert_eq!((of(2), of(5), of(3)), (vec![5, 0], vec![2, 3], vec![5]));
+        exclusions.set(&[]);
+        assert!(!exclusions.has_partners() && exclusions.of(2).is_empty());
+    }
+}

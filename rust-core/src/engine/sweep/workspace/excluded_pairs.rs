@@ -1,0 +1,79 @@
+//! Excluded pairs in the order of cells.
+
+use super::cell_order::CellOrder;
+use crate::engine::exclusions::Exclusions;
+use psidpd_passes::cells::excluded::{Excluded, Mark};
+use psidpd_passes::simd::OFFSET_BITS;
+
+/// What each of the sorted particles forms no pair with.
+#[derive(Debug, Clone, Default)]
+pub struct ExcludedPairs {
+    start: Vec<u32>,
+    partners: Vec<u32>,
+    marks: Vec<Mark>,
+    between_molecules: bool,
+    /// The place of each of the host's particles.
+    place: Vec<u32>,
+}
+
+/// A particle that takes no part.
+const NOWHERE: u32 = u32::MAX;
+
+impl ExcludedPairs {
+    /// Finds the places of the partners of all particles, and sorts their marks.
+    pub fn fill(&mut self, order: &CellOrder, exclusions: Option<&Exclusions>) {
+        self.start.clear();
+        self.partners.clear();
+        self.marks.clear();
+        let Some(exclusions) = exclusions else { return };
+        if exclusions.has_partners() {
+            self.fill_partners(order, exclusions);
+        }
+        self.between_molecules = exclusions.between_molecules();
+        if let marks @ [_, ..] = exclusions.marks() {
+            self.marks
+                .extend(order.order.iter().map(|k| marks.get(*k as usize).copied().unwrap_or_default()));
+            self.marks.extend_from_within(..order.copies());
+        }
+    }
+
+    fn fill_partners(&mut self, order: &CellOrder, exclusions: &Exclusions) {
+        self.place.clear();
+        self.place.resize(order.all, NOWHERE);
+        for (place, k) in (0..).zip(&order.order) {
+            self.place[*k as usize] = place;
+        }
+        let (all, copies) = (order.particles() as u32, order.copies() as u32);
+        let last_plane = order.plane_start(order.grid.planes - 1);
+        self.start.push(0);
+        for (at, k) in order.order.iter().enumerate() {
+            for partner in exclusions.of(*k) {
+                let place = self.place.get(*partner as usize).copied().unwrap_or(NOWHERE);
+                if place == NOWHERE {
+                    continue;
+                }
+                self.partners.push(place << OFFSET_BITS);
+                if at >= last_plane && place < copies {
+                    self.partners.push((all + place) << OFFSET_BITS);
+                }
+            }
+            self.start.push(self.partners.len() as u32);
+        }
+    }
+
+    /// Lends the arrays to the passes.
+    pub fn share(&self) -> Excluded<'_> {
+        Excluded {
+            start: &self.start,
+            partners: &self.partners,
+            marks: &self.marks,
+            between_molecules: self.between_molecules,
+        }
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        (self.start.capacity() + self.partners.capacity() + self.place.capacity()) * size_of::<u32>()
+            + self.marks.capacity() * size_of::<Mark>()
+    }
+}
