@@ -44,7 +44,7 @@ pub fn coefficients(input: &[u8]) {
             let names: Vec<String> =
                 (0..types).map(|_| ["A", "B", "F", "NULL", ""][bytes.below(5)].to_owned()).collect();
             let text = String::from_utf8_lossy(bytes.0).into_owned();
-            Style::from_text("fuzz.toml", &text, kt, &names, dimensions)
+            Style::from_text("fuzz.toml", &text, "lj", kt, &names, dimensions)
         }
     };
     let Ok(mut style) = style else { return };
@@ -53,7 +53,7 @@ pub fn coefficients(input: &[u8]) {
     if form < 3 {
         let text = style.model().source().text().to_owned();
         let names = style.model().species().to_vec();
-        let again = Style::from_text("restart", &text, kt, &names, dimensions);
+        let again = Style::from_text("restart", &text, "lj", kt, &names, dimensions);
         let again = again.unwrap_or_else(|error| panic!("{error}\n{text}"));
         assert_eq!(again.engine().plan().cutoff(), style.engine().plan().cutoff());
     }

@@ -3,7 +3,8 @@
 
 use psidpd_core::model::Model;
 use psidpd_core::model::keys::{
-    CURVES, DENSITY, EXCESS, FORMS, PAIR, PARAMETERS, REQUIRED, TABLES, THERMOSTAT, TOP, Table, ValueKind,
+    CURVES, DENSITY, EXCESS, FORMS, PAIR, PARAMETERS, REQUIRED, TABLES, THERMOSTAT, TOP, Table, UNITS,
+    ValueKind,
 };
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
@@ -36,6 +37,7 @@ fn schema_of_value(kind: &ValueKind) -> Value {
             curve["oneOf"] = ["table", "pressure", "slopes"].map(|key| json!({ "required": [key] })).into();
             json!({ "anyOf": [{ "type": "string" }, curve] })
         }
+        ValueKind::Positive => json!({ "type": "number", "exclusiveMinimum": 0 }),
         other => panic!("no value of a model: {other:?}"),
     }
 }
@@ -79,6 +81,7 @@ fn schema() -> String {
         "anyOf": [{ "type": "number" }, { "type": "string", "minLength": 1 }]
     }});
     let properties = &mut root["properties"];
+    properties["units"] = object(&UNITS, None);
     properties["parameters"] = object(&PARAMETERS, None);
     properties["density"] = json!({ "type": "object", "description": DENSITY.about, "additionalProperties": object(&DENSITY, None) });
     properties["excess_free_energy"] = object(&EXCESS, None);
@@ -292,9 +295,15 @@ fn the_reader_knows_the_keys_of_the_table_and_no_others() {
     };
     let head = "title = \"t\"\nspecies = [\"A\"]\n";
     let mut top = listed(&TOP, None);
-    top.extend(["density", "excess_free_energy", "pair", "parameters", "thermostat"].map(str::to_owned));
+    top.extend(
+        ["density", "excess_free_energy", "pair", "parameters", "thermostat", "units"].map(str::to_owned),
+    );
     top.sort();
     assert_eq!(known(&format!("{head}zzz = 1")), top);
+    assert_eq!(
+        known(&format!("{head}[units]\nlength = 1\nmass = 1\nenergy = 1\nzzz = 1")),
+        listed(&UNITS, None)
+    );
     let density = "[density.n]\nkernel = \"lucy\"\nrange = 1\n";
     assert_eq!(known(&format!("{head}{density}zzz = 1")), listed(&DENSITY, None));
     assert_eq!(

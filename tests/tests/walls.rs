@@ -15,6 +15,7 @@ const CORE: &[&[&str]] = &[
     &[
         "engine::counts",
         "engine::error",
+        "engine::exclusions",
         "engine::fault",
         "engine::images",
         "engine::particles",
