@@ -36,6 +36,7 @@ fn main() {
             "cpp/pair_dpd_psi.cpp",
             "cpp/pair_mdpd_psi.cpp",
             "cpp/pair_dpd_spline.cpp",
+            "cpp/fix_splitting.cpp",
             "cpp/register.cpp",
         ])
         .include("cpp")

@@ -15,13 +15,13 @@ namespace psidpd {
 
 // forward_comm(Pair *) was called forward_comm_pair before 2022.
 template <class Comm>
-auto forward_slopes(Comm *comm, LAMMPS_NS::Pair *pair, int) -> decltype(comm->forward_comm(pair), void())
+auto forward_values(Comm *comm, LAMMPS_NS::Pair *pair, int) -> decltype(comm->forward_comm(pair), void())
 {
   comm->forward_comm(pair);
 }
 
 template <class Comm>
-auto forward_slopes(Comm *comm, LAMMPS_NS::Pair *pair, long) -> decltype(comm->forward_comm_pair(pair), void())
+auto forward_values(Comm *comm, LAMMPS_NS::Pair *pair, long) -> decltype(comm->forward_comm_pair(pair), void())
 {
   comm->forward_comm_pair(pair);
 }

@@ -1,6 +1,7 @@
 #include "pair_psi.h"
 
 #include "compat.h"
+#include "fix_splitting.h"
 #include "restart.h"
 
 #include "atom.h"
@@ -192,6 +193,7 @@ void PairPsi::refresh()
 void PairPsi::init_style()
 {
   refresh();
+  apart = FixSplitting::find(modify) != nullptr;
   check_host();
   check_callers();
   check_box();
@@ -221,7 +223,7 @@ void PairPsi::init_style()
     stop("with " + why_listed + " this version of LAMMPS needs 'newton off'");
 
   if (!described && comm->me == 0)
-    utils::logmesg(lmp, std::string((*style)->description(search(), !why_listed.empty())));
+    utils::logmesg(lmp, std::string((*style)->description(search(), !why_listed.empty(), apart)));
   if (!described) advise();
   described = true;
 }
@@ -266,7 +268,7 @@ void PairPsi::check_host()
   if (strcmp(update->unit_style, "lj") != 0)
     check_units(update->unit_style);
   if (!atom->tag_enable) stop("needs atom IDs: remove 'atom_modify id no'");
-  if ((*style)->needs_velocities() && !comm->ghost_velocity)
+  if ((*style)->needs_velocities() && !apart && !comm->ghost_velocity)
     stop("the thermostat needs velocities of ghost atoms: add 'comm_modify vel yes'");
 }
 
@@ -480,8 +482,18 @@ void PairPsi::find_images()
   if (none) return;
   carries = Carries::images;
   comm_forward = 1;
-  forward_slopes(comm, this, 0);
+  forward_values(comm, this, 0);
   carries = Carries::slopes;
+}
+
+// Which ghosts are images along closed directions. Where that is not known the box is opened, and all ghosts are taken.
+rust::Slice<const bool> PairPsi::left_out(Extent &extent, const Request &request) const
+{
+  // Only what was closed when ghosts were found has all its images told.
+  if (!strained && images.know(extent.closed, atom->nghost) && (*style)->fits(extent, request))
+    return {images.flags(), static_cast<size_t>(atom->nghost)};
+  extent.closed = {};
+  return {};
 }
 
 void PairPsi::find_densities(int all, const Request &request)
@@ -492,13 +504,8 @@ void PairPsi::find_densities(int all, const Request &request)
   const rust::Slice<const int32_t> kind{atom->type, static_cast<size_t>(all)};
   if (why_listed.empty()) {
     Extent extent = this->extent();
-    rust::Slice<const bool> left_out;
-    // Only what was closed when ghosts were found has all its images told.
-    if (!strained && images.know(extent.closed, atom->nghost) && (*style)->fits(extent, request))
-      left_out = {images.flags(), static_cast<size_t>(atom->nghost)};
-    else
-      extent.closed = {};
-    style_densities(**style, extent, left_out, owned, x, flat(atom->v, all), tag, kind, force->newton_pair,
+    const auto images = left_out(extent, request);
+    style_densities(**style, extent, images, owned, x, flat(atom->v, all), tag, kind, force->newton_pair,
                     request);
     return;
   }
@@ -515,7 +522,7 @@ void PairPsi::forward()
   const int most = force->pair == this ? width : 3;
   for (first_column = 0; first_column < width; first_column += comm_forward) {
     comm_forward = std::min(most, width - first_column);
-    forward_slopes(comm, this, 0);
+    forward_values(comm, this, 0);
   }
 }
 
@@ -547,7 +554,7 @@ void PairPsi::compute(int eflag, int vflag)
 
   Request request;
   // A minimiser goes downhill in U: drag and noise have no place there.
-  request.thermostat = fluid.needs_velocities() && update->whichflag != 2;
+  request.thermostat = fluid.needs_velocities() && !apart && update->whichflag != 2;
   request.seed = seed;
   request.step = static_cast<uint64_t>(update->ntimestep);
   request.dt = update->dt;
@@ -603,11 +610,88 @@ void PairPsi::compute(int eflag, int vflag)
   }
 }
 
+// Vectors from owners to ghosts.
+void PairPsi::forward_vectors()
+{
+  carries = Carries::vectors;
+  comm_forward = 3;
+  forward_values(comm, this, 0);
+  carries = Carries::slopes;
+}
+
+std::string PairPsi::why_not_apart() const
+{
+  if (!why_listed.empty()) return "pairs come from a neighbor list, because of " + why_listed;
+  if (rules > 0) return "neigh_modify excludes pairs, whose drag and noise would have to be left out";
+  const double *factor = force->special_lj;
+  if (is_scaled() && (factor[1] == 0.0 || factor[2] == 0.0 || factor[3] == 0.0))
+    return "special_bonds has factors of 0, for which drag and noise would have to be left out: use 'special_bonds lj "
+           "1 1 1'";
+  if (domain->deform_vremap) return "fix deform changes velocities at the edges of the box ('remap v')";
+  return {};
+}
+
+void PairPsi::heat(int groupbit, double time, bool uniform, bool wants_virial, double *virial)
+{
+  refresh();
+  const size_t owned = atom->nlocal;
+  const int all = atom->nlocal + atom->nghost;
+  masses.resize(owned);
+  for (size_t i = 0; i < owned; i++) {
+    const double mass = atom->rmass ? atom->rmass[i] : atom->mass[atom->type[i]];
+    masses[i] = (atom->mask[i] & groupbit) ? mass : HUGE_VAL;
+  }
+  Heat what;
+  what.seed = seed;
+  what.step = static_cast<uint64_t>(update->ntimestep);
+  what.uniform = uniform;
+  what.time = time;
+  what.virial = wants_virial;
+  Style &fluid = **style;
+  Extent box = extent();
+  const Request forces{};
+  const bool alone = !strained && is_alone(box) && attempt([&] { return fluid.fits(box, forces); });
+  rust::Slice<const bool> flags;
+  if (!alone) flags = attempt([&] { return left_out(box, forces); });
+  const size_t reach = alone ? owned : all;
+  const bool acts = attempt([&] {
+    return thermostat_pairs(fluid, box, flags, flat(atom->x, static_cast<int>(reach)), {atom->tag, reach},
+                            {atom->type, reach}, {masses.data(), owned}, what);
+  });
+  if (!acts) return;
+  rust::Slice<double> v;
+  if (owned > 0) v = {atom->v[0], 3 * owned};
+  std::array<double, 6> w{};
+  if (alone) {
+    w = attempt([&] { return thermostat_alone(fluid, v); });
+  } else {
+    vectors.resize(3 * static_cast<size_t>(all));
+    if (owned > 0) std::copy_n(atom->v[0], 3 * owned, vectors.begin());
+    forward_vectors();
+    const rust::Slice<double> shared{vectors.data(), vectors.size()};
+    Round round = attempt([&] { return thermostat_begin(fluid, {vectors.data(), vectors.size()}); });
+    while (round.wants != Wants::Nothing) {
+      double total = 0.0;
+      if (round.wants == Wants::Total)
+        MPI_Allreduce(&round.part, &total, 1, MPI_DOUBLE, MPI_SUM, world);
+      else
+        forward_vectors();
+      round = attempt([&] { return thermostat_go_on(fluid, total, shared, v); });
+    }
+    w = round.virial;
+  }
+  for (int k = 0; k < 6; k++) virial[k] += w[k];
+}
+
 int PairPsi::pack_forward_comm(int n, int *list, double *buf, int pbc_flag, int *pbc)
 {
   if (carries == Carries::images) {
     images.pack(n, list, buf, pbc_flag, pbc);
     return n;
+  }
+  if (carries == Carries::vectors) {
+    for (int i = 0; i < n; i++) buf = std::copy_n(&vectors[3 * list[i]], 3, buf);
+    return 3 * n;
   }
   const auto slopes = (*style)->slopes_mut();
   const size_t width = (*style)->slope_width();
@@ -620,6 +704,10 @@ void PairPsi::unpack_forward_comm(int n, int first, double *buf)
 {
   if (carries == Carries::images) {
     images.unpack(n, first, buf);
+    return;
+  }
+  if (carries == Carries::vectors) {
+    std::copy_n(buf, 3 * n, vectors.begin() + 3 * first);
     return;
   }
   auto slopes = (*style)->slopes_mut();
@@ -739,6 +827,7 @@ double PairPsi::memory_usage()
   double bytes = Pair::memory_usage();
   bytes += (pair_i.capacity() + pair_j.capacity()) * sizeof(int32_t) + pair_factor.capacity() * sizeof(double);
   bytes += special.capacity() * sizeof(SpecialPair) + marks.capacity() * sizeof(uint32_t);
+  bytes += (vectors.capacity() + masses.capacity()) * sizeof(double);
   if (style) bytes += static_cast<double>((*style)->memory());
   return bytes;
 }

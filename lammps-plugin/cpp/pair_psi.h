@@ -44,6 +44,14 @@ class PairPsi : public LAMMPS_NS::Pair {
   void unpack_forward_comm(int n, int first, double *buf) override;
   double memory_usage() override;
 
+  // For the fix that has drag and noise apart from the forces: what keeps it from acting, or nothing.
+  std::string why_not_apart() const;
+  // Changes the velocities of the atoms of a group by drag and noise that act for a time, at the positions where forces
+  // were last computed; adds the virial.
+  void heat(int groupbit, double time, bool uniform, bool wants_virial, double *virial);
+  // Iterations of the last time.
+  int iterations() { return style ? static_cast<int>((*style)->iterations()) : 0; }
+
  protected:
   // Reads the arguments of pair_style.
   virtual void read_settings(int narg, char **arg) = 0;
@@ -97,6 +105,8 @@ class PairPsi : public LAMMPS_NS::Pair {
   void find_exclusions();
   void tell_special(size_t count);
   void forward();
+  void forward_vectors();
+  rust::Slice<const bool> left_out(Extent &extent, const Request &request) const;
   void check_box();
   void check_plane();
   void check_ghosts();
@@ -129,14 +139,19 @@ class PairPsi : public LAMMPS_NS::Pair {
   bool described = false;
   std::vector<double *> density_rows;
 
-  // What a communication carries: columns of the slopes, or which ghosts are images.
-  enum class Carries { slopes, images };
+  // What a communication carries: columns of the slopes, which ghosts are images, or vectors.
+  enum class Carries { slopes, images, vectors };
   Carries carries = Carries::slopes;
   int first_column = 0;
 
   Images images;
   // Whether ghosts are elsewhere than their atoms say, in this evaluation.
   bool strained = false;
+
+  // Whether a fix has drag and noise.
+  bool apart = false;
+  // Of atoms and ghosts; masses of atoms.
+  std::vector<double> vectors, masses;
 
   // Atoms and ghosts of an evaluation that left no slopes of ghosts; those that single() has asked for are there.
   std::array<int, 2> without_slopes{-1, -1};

@@ -1,14 +1,21 @@
-/* Registers pair styles in a LAMMPS that has no plugin command. */
+/* Registers styles in a LAMMPS that has no plugin command. */
 
 #include "force.h"
 #include "lammps.h"
+#include "modify.h"
 
+#include <cstring>
 #include <string>
 
 using namespace LAMMPS_NS;
 
-extern "C" void psidpd_insert_style(void *lmp, const char *name, void *(*creator)(void *))
+// What LAMMPS's own plugin command stores: a creator of a pair style is called with the instance and returns a Pair, that
+// of a fix style with the arguments too and returns a Fix.
+extern "C" void psidpd_insert_style(void *lmp, const char *kind, const char *name, void (*creator)())
 {
-  // What LAMMPS's own plugin command stores: a creator is called with the instance and returns a Pair.
-  (*static_cast<LAMMPS *>(lmp)->force->pair_map)[name] = reinterpret_cast<Force::PairCreator>(creator);
+  auto *lammps = static_cast<LAMMPS *>(lmp);
+  if (strcmp(kind, "fix") == 0)
+    (*lammps->modify->fix_map)[name] = reinterpret_cast<Modify::FixCreator>(creator);
+  else
+    (*lammps->force->pair_map)[name] = reinterpret_cast<Force::PairCreator>(creator);
 }

@@ -1,11 +1,13 @@
-/* psidpd-lmp: LAMMPS with psidpd's pair styles, for a LAMMPS that has no plugins.
+/* psidpd-lmp: LAMMPS with psidpd's styles, for a LAMMPS that has no plugins.
 
    Takes the arguments of lmp and behaves as lmp does, under mpirun too. */
 
+#include "fix.h"
 #include "force.h"
 #include "input.h"
 #include "lammps.h"
 #include "library.h"
+#include "modify.h"
 #include "pointers.h"
 #include "utils.h"
 
@@ -54,9 +56,11 @@ const char *trouble = nullptr;  // why the styles could not be registered
   exit(1);
 }
 
-constexpr const char *STYLES[] = {"dpd/psi", "mdpd/psi", "dpd/spline"};
+// Kind and name of each.
+constexpr const char *STYLES[][2] = {
+    {"pair", "dpd/psi"}, {"pair", "mdpd/psi"}, {"pair", "dpd/spline"}, {"fix", "dpd/splitting"}};
 
-// 'plugin load .../psidpdplugin.so', 'plugin list' and 'plugin unload pair STYLE', so that a script for a LAMMPS with
+// 'plugin load .../psidpdplugin.so', 'plugin list' and 'plugin unload pair|fix STYLE', so that a script for a LAMMPS with
 // plugins runs here unchanged.
 // The same virtual functions, in the same order, as LAMMPS's class of commands, whose header is not
 // always installed.
@@ -75,11 +79,14 @@ class PluginCommand : protected Pointers {
       unload(arg[1], arg[2]);
     else
       leave("psidpd-lmp knows the plugin command as 'plugin load psidpdplugin.so', 'plugin list' and "
-            "'plugin unload pair STYLE' only");
+            "'plugin unload pair STYLE' or 'plugin unload fix STYLE' only");
   }
 
  private:
-  bool has(const char *name) const { return force->pair_map->count(name) > 0; }
+  bool has(const std::string &kind, const char *name) const
+  {
+    return kind == "fix" ? modify->fix_map->count(name) > 0 : force->pair_map->count(name) > 0;
+  }
 
   void load(const char *path)
   {
@@ -93,21 +100,27 @@ class PluginCommand : protected Pointers {
   {
     std::string text = "Currently loaded plugins\n";
     int number = 0;
-    for (const char *name : STYLES)
-      if (has(name)) text += "   " + std::to_string(++number) + ": pair style plugin " + name + "\n";
+    for (const auto &[kind, name] : STYLES)
+      if (has(kind, name)) text += "   " + std::to_string(++number) + ": " + kind + " style plugin " + name + "\n";
     utils::logmesg(lmp, text);
   }
 
   void unload(const std::string &kind, const char *name)
   {
     bool ours = false;
-    for (const char *known : STYLES) ours |= kind == "pair" && strcmp(known, name) == 0 && has(known);
+    for (const auto &[sort, known] : STYLES) ours |= kind == sort && strcmp(known, name) == 0 && has(kind, name);
     if (!ours) {
       utils::logmesg(lmp, "Ignoring unload of " + kind + " style " + name + ": not from a plugin\n");
       return;
     }
-    utils::logmesg(lmp, std::string("Unloading pair style ") + name + "\n");
-    // LAMMPS too forgets a style in use, alone or in a hybrid.
+    utils::logmesg(lmp, "Unloading " + kind + " style " + name + "\n");
+    // LAMMPS too forgets a style in use, a pair style alone or in a hybrid.
+    if (kind == "fix") {
+      for (int k = modify->nfix - 1; k >= 0; k--)
+        if (strcmp(modify->fix[k]->style, name) == 0) modify->delete_fix(k);
+      modify->fix_map->erase(name);
+      return;
+    }
     if (force->pair_match(name, 1)) force->create_pair("none", 0);
     force->pair_map->erase(name);
   }

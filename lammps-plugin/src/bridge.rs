@@ -1,7 +1,10 @@
 //! The style for C++. Errors arrive there as exceptions, panics as errors.
 
 use crate::style::{Style, StyleError, guard};
+use crate::thermostat::Noise;
 use nalgebra::Matrix3;
+use psidpd_core::engine::noise::Law;
+use psidpd_core::engine::thermostat::Need;
 use psidpd_core::engine::{
     Around, Mark, PairsOfHost, Path, PeriodicBox, SpecialPair, Step, Surroundings, Tally, Want,
 };
@@ -64,6 +67,34 @@ mod ffi {
         above: f64,
     }
 
+    /// What the thermostat of a step is made from.
+    struct Heat {
+        seed: u64,
+        step: u64,
+        /// Whether noise is uniform instead of Gaussian.
+        uniform: bool,
+        /// How long it acts.
+        time: f64,
+        virial: bool,
+    }
+
+    /// What the thermostat needs of the other ranks.
+    enum Wants {
+        /// Nothing: velocities are done.
+        Nothing,
+        /// The sum of a number.
+        Total,
+        /// The vectors of ghosts.
+        Ghosts,
+    }
+
+    struct Round {
+        wants: Wants,
+        part: f64,
+        /// At the end.
+        virial: [f64; 6],
+    }
+
     extern "Rust" {
         type Style;
 
@@ -100,7 +131,7 @@ mod ffi {
         fn set_temperature(self: &mut Style, kt: f64) -> Result<()>;
         fn model_text(self: &Style) -> String;
         fn model_name(self: &Style) -> String;
-        fn description(self: &Style, search: &str, listed: bool) -> String;
+        fn description(self: &Style, search: &str, listed: bool, apart: bool) -> String;
         fn cutoff(self: &Style) -> f64;
         fn slope_width(self: &Style) -> usize;
         /// The number of densities times species: no slope width is larger.
@@ -189,7 +220,75 @@ mod ffi {
             r: f64,
         ) -> Result<PairValue>;
         fn memory(self: &Style) -> usize;
+
+        /// Finds the pairs of the thermostat, and draws their noise; false if there is none.
+        #[allow(clippy::too_many_arguments)]
+        fn thermostat_pairs(
+            style: &mut Style,
+            extent: &Extent,
+            images: &[bool],
+            x: &[f64],
+            tag: &[i32],
+            kind: &[i32],
+            mass: &[f64],
+            heat: &Heat,
+        ) -> Result<bool>;
+        /// Changes the velocities of all atoms; the virial.
+        fn thermostat_alone(style: &mut Style, v: &mut [f64]) -> Result<[f64; 6]>;
+        /// The same with other ranks: begins with velocities of all atoms and ghosts.
+        fn thermostat_begin(style: &mut Style, vectors: &[f64]) -> Result<Round>;
+        fn thermostat_go_on(
+            style: &mut Style,
+            total: f64,
+            vectors: &mut [f64],
+            v: &mut [f64],
+        ) -> Result<Round>;
+        /// Of the last time that the thermostat has acted.
+        fn iterations(self: &mut Style) -> usize;
     }
+}
+
+#[allow(clippy::too_many_arguments)]
+fn thermostat_pairs(
+    style: &mut Style,
+    extent: &ffi::Extent,
+    images: &[bool],
+    x: &[f64],
+    tag: &[i32],
+    kind: &[i32],
+    mass: &[f64],
+    heat: &ffi::Heat,
+) -> Result<bool, StyleError> {
+    let ffi::Heat { seed, step, uniform, time, virial } = *heat;
+    let noise = Noise { seed, step, law: if uniform { Law::Uniform } else { Law::Gaussian } };
+    let domain = domain_of(extent)?;
+    style.find_thermostat_pairs(Around { domain: &domain, images }, x, tag, kind, mass, time, virial, noise)
+}
+
+fn thermostat_alone(style: &mut Style, v: &mut [f64]) -> Result<[f64; 6], StyleError> {
+    style.act_alone(v)
+}
+
+fn round(need: Need) -> ffi::Round {
+    let (wants, part, virial) = match need {
+        Need::Nothing(virial) => (ffi::Wants::Nothing, 0.0, virial),
+        Need::Total(part) => (ffi::Wants::Total, part, [0.0; 6]),
+        Need::Ghosts => (ffi::Wants::Ghosts, 0.0, [0.0; 6]),
+    };
+    ffi::Round { wants, part, virial }
+}
+
+fn thermostat_begin(style: &mut Style, vectors: &[f64]) -> Result<ffi::Round, StyleError> {
+    style.begin_rounds(vectors).map(round)
+}
+
+fn thermostat_go_on(
+    style: &mut Style,
+    total: f64,
+    vectors: &mut [f64],
+    v: &mut [f64],
+) -> Result<ffi::Round, StyleError> {
+    style.next_round(total, vectors, v).map(round)
 }
 
 #[allow(clippy::ptr_arg)] // What the bridge passes.

@@ -1,10 +1,11 @@
-//! psidpd pair styles for LAMMPS: `dpd/psi`, `mdpd/psi` and `dpd/spline`. LAMMPS loads the entry, in `entry/`, which loads
+//! psidpd pair styles for LAMMPS: `dpd/psi`, `mdpd/psi` and `dpd/spline`, and the fix style `dpd/splitting`. LAMMPS loads the entry, in `entry/`, which loads
 //! this.
 //!
 //! - [`style`]: what a pair style asks of the engine, in safe Rust;
+//! - [`thermostat`]: what the fix asks of it beside;
 //! - [`units`]: from the units of LAMMPS to those of a model;
 //! - [`bridge`]: the same for C++, by cxx: slices, strings and exceptions, checked at compile time;
-//! - `cpp/`: the pair styles that LAMMPS sees, compiled against the headers of one LAMMPS;
+//! - `cpp/`: the styles that LAMMPS sees, compiled against the headers of one LAMMPS;
 //! - `table`: the styles, as the entry finds them.
 //!
 //! The engine keeps its own cells, and leaves out pairs that `special_bonds` weakens or `neigh_modify` excludes; LAMMPS's
@@ -12,6 +13,7 @@
 
 pub mod bridge;
 pub mod style;
+pub mod thermostat;
 pub mod units;
 
 #[cfg(lammps_host)]

@@ -1,6 +1,7 @@
 //! One pair style's engine, and the mapping from LAMMPS's types to species.
 
 use crate::units::Scale;
+use psidpd_core::engine::thermostat::PairThermostat;
 use psidpd_core::engine::{
     Around, Engine, EngineError, Newton, PairsOfHost, Particles, Path as EnginePath, PeriodicBox, Pool,
     Precision, Reason, Request, Settings, Step, Surroundings, Tally, Want,
@@ -36,6 +37,8 @@ impl From<EngineError> for StyleError {
 pub struct Style {
     model: Model,
     engine: Engine,
+    /// Drag and noise apart from the forces, for the fix that asks for them; `None` if the model has none.
+    thermostat: Option<PairThermostat>,
     settings: Settings,
     pool: Arc<Pool>,
     kt: f64,
@@ -157,7 +160,7 @@ impl Taken<'_> {
 }
 
 /// Three numbers per particle, as LAMMPS stores them.
-fn triples(flat: &[f64]) -> &[[f64; 3]] {
+pub(crate) fn triples(flat: &[f64]) -> &[[f64; 3]] {
     flat.as_chunks::<3>().0
 }
 
@@ -310,9 +313,11 @@ impl Style {
         let settings = Settings { precision: Precision::Double, ..Settings::default() };
         let pool = Arc::new(Pool::new(settings.threads));
         let engine = engine_at(&model, kt, &kinds, settings, &pool)?;
+        let thermostat = PairThermostat::new(engine.plan(), kt, settings.instructions);
         Ok(Style {
             model,
             engine,
+            thermostat,
             settings,
             pool,
             kt,
@@ -336,6 +341,7 @@ impl Style {
 
     fn rebuild(&mut self) -> Result<(), StyleError> {
         self.engine = engine_at(&self.model, self.kt, &self.kinds, self.settings, &self.pool)?;
+        self.thermostat = PairThermostat::new(self.engine.plan(), self.kt, self.settings.instructions);
         Ok(())
     }
 
@@ -378,10 +384,15 @@ impl Style {
         &mut self.engine
     }
 
+    /// The thermostat apart from the forces, with the threads and the species of the types.
+    pub(crate) fn thermostat(&mut self) -> (Option<&mut PairThermostat>, &Pool, &[i32]) {
+        (self.thermostat.as_mut(), &self.pool, &self.kinds)
+    }
+
     /// For the log: what is computed, and what its letters mean.
     ///
-    /// `search` says where pairs come from, and whether LAMMPS lists them.
-    pub fn description(&self, search: &str, listed: bool) -> String {
+    /// `search` says where pairs come from, and whether LAMMPS lists them; `apart`, whether a fix has the thermostat.
+    pub fn description(&self, search: &str, listed: bool, apart: bool) -> String {
         let mut text = String::new();
         // Writing to a String cannot fail.
         let _ = writeln!(text, "psidpd: {} ({})", self.model.title(), self.model.source().name());
@@ -404,9 +415,14 @@ impl Style {
                  the fluid; the energy printed is not that of the forces\n",
             );
         }
-        text.push_str(
+        let drag = match apart {
+            true => "drag and noise are those of fix dpd/splitting",
+            false => "drag sees the half-step velocity",
+        };
+        let _ = writeln!(
+            text,
             "  conventions   number densities, [w] = 1, no self term unless the model says so; \
-             F = -dU/dr with U = sum psi + sum phi; drag sees the half-step velocity\n",
+             F = -dU/dr with U = sum psi + sum phi; {drag}"
         );
         if let Some(letters) = self.letters {
             let _ = writeln!(text, "  coefficients  {letters}");
@@ -669,8 +685,9 @@ mod tests {
             assert!((densities[1] - w).abs() < 1e-14 && densities[0] > 0.0, "{densities:?}");
             assert_eq!(s.engine().path(), Some(EnginePath::Sweep));
         }
-        let text = [false, true].map(|listed| s.description("", listed));
+        let text = [false, true].map(|listed| s.description("", listed, listed));
         assert!(text[0].contains("evaluation    cell sweep;"), "{}", text[0]);
+        assert!(text[0].contains("half-step") && text[1].contains("those of fix dpd/splitting"));
         assert!(
             text[1].contains("evaluation    reference evaluation, because the host lists"),
             "{}",

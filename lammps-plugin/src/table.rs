@@ -4,20 +4,34 @@
 mod contract;
 
 use contract::{BUILT, Creator, Style, Styles};
-use std::ffi::{CStr, c_char, c_void};
+use std::ffi::{CStr, c_char, c_int, c_void};
+
+/// What LAMMPS makes a pair style with.
+type MakePair = unsafe extern "C-unwind" fn(*mut c_void) -> *mut c_void;
+/// What it makes a fix with: with the arguments of the command.
+type MakeFix = unsafe extern "C-unwind" fn(*mut c_void, c_int, *mut *mut c_char) -> *mut c_void;
 
 unsafe extern "C-unwind" {
     fn psidpd_create_dpd_psi(lmp: *mut c_void) -> *mut c_void;
     fn psidpd_create_mdpd_psi(lmp: *mut c_void) -> *mut c_void;
     fn psidpd_create_dpd_spline(lmp: *mut c_void) -> *mut c_void;
-    fn psidpd_insert_style(lmp: *mut c_void, name: *const c_char, creator: Creator);
+    fn psidpd_create_dpd_splitting(lmp: *mut c_void, narg: c_int, arg: *mut *mut c_char) -> *mut c_void;
+    fn psidpd_insert_style(lmp: *mut c_void, kind: *const c_char, name: *const c_char, creator: Creator);
 }
 
-const fn style(name: &'static CStr, info: &'static CStr, creator: Creator) -> Style {
-    Style { name: name.as_ptr(), info: info.as_ptr(), creator }
+const fn style(name: &'static CStr, info: &'static CStr, creator: MakePair) -> Style {
+    // SAFETY: function pointers are alike; whoever calls this one takes it for what its kind says.
+    let creator = unsafe { std::mem::transmute::<MakePair, Creator>(creator) };
+    Style { kind: c"pair".as_ptr(), name: name.as_ptr(), info: info.as_ptr(), creator }
 }
 
-static STYLES: [Style; 3] = [
+const fn fix(name: &'static CStr, info: &'static CStr, creator: MakeFix) -> Style {
+    // SAFETY: as above.
+    let creator = unsafe { std::mem::transmute::<MakeFix, Creator>(creator) };
+    Style { kind: c"fix".as_ptr(), name: name.as_ptr(), info: info.as_ptr(), creator }
+}
+
+static STYLES: [Style; 4] = [
     style(c"dpd/psi", c"many-body DPD of any excess free energy", psidpd_create_dpd_psi),
     style(
         c"mdpd/psi",
@@ -25,6 +39,11 @@ static STYLES: [Style; 3] = [
         psidpd_create_mdpd_psi,
     ),
     style(c"dpd/spline", c"DPD with a repulsive-attractive spline potential", psidpd_create_dpd_spline),
+    fix(
+        c"dpd/splitting",
+        c"time integration with drag and noise apart from the forces",
+        psidpd_create_dpd_splitting,
+    ),
 ];
 
 static TABLE: Styles = Styles {

@@ -102,6 +102,17 @@ fn forces_equal_the_native_engine() {
     host_common::forces_equal_the_native_engine(&debian.runs());
 }
 
+#[test]
+#[ignore = "needs the LAMMPS of Debian: apt install lammps liblammps-dev python3-lammps"]
+fn splittings_are_the_native_ones() {
+    let debian = debian();
+    host_common::splittings_are_the_native_ones(&debian.runs());
+    let folder = tempfile::tempdir().unwrap();
+    let listed =
+        outcome(debian, "plugin list\nplugin unload fix dpd/splitting\nplugin list\n", 1, folder.path());
+    assert_eq!(listed.unwrap().matches("fix style plugin dpd/splitting").count(), 1);
+}
+
 /// Weakened and excluded pairs need no list. Its headers let nobody ask for a full one: the half list has all pairs with
 /// newton off, and the styles insist on that where they need one.
 #[test]

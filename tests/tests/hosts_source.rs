@@ -42,6 +42,12 @@ fn forces_equal_the_native_engine() {
     host_common::forces_equal_the_native_engine(&source().runs());
 }
 
+#[test]
+#[ignore = "needs a LAMMPS built from source, in PSIDPD_LAMMPS_SOURCE"]
+fn splittings_are_the_native_ones() {
+    host_common::splittings_are_the_native_ones(&source().runs());
+}
+
 /// Pairs that are weakened or excluded, with newton on and off.
 #[test]
 #[ignore = "needs a LAMMPS built from source, in PSIDPD_LAMMPS_SOURCE"]

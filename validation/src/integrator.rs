@@ -102,6 +102,8 @@ pub struct Accuracy {
 pub enum Counterpart {
     /// `fix nve`.
     Nve,
+    /// `fix dpd/splitting` of the plugin.
+    Splitting,
     /// Nothing.
     None,
 }
@@ -175,6 +177,11 @@ impl Integrator {
         match self {
             Integrator::VelocityVerlet => Counterpart::Nve,
             Integrator::GrootWarren { lambda: 0.5 } => Counterpart::Nve,
+            Integrator::Aboba(coupling) | Integrator::TwoStage { coupling, .. }
+                if coupling.update == Update::Midpoint =>
+            {
+                Counterpart::Splitting
+            }
             _ => Counterpart::None,
         }
     }

@@ -66,18 +66,18 @@ unsafe fn trouble(lmp: *mut c_void) -> Option<String> {
         return None;
     };
     Some(format!(
-        "The psidpd plugin was built for {built}, {here}: its pair styles are not loaded. \
+        "The psidpd plugin was built for {built}, {here}: its styles are not loaded. \
          Build the plugin for this LAMMPS with 'psidpd lammps plugin'."
     ))
 }
 
 fn not_loaded(reason: String) -> String {
     format!(
-        "The pair styles of psidpd are not loaded: {reason}. Build the plugin again with 'psidpd lammps plugin'."
+        "The styles of psidpd are not loaded: {reason}. Build the plugin again with 'psidpd lammps plugin'."
     )
 }
 
-/// Registers the pair styles in a LAMMPS that has no `plugin` command: call it with the handle of the
+/// Registers the styles in a LAMMPS that has no `plugin` command: call it with the handle of the
 /// library interface (in Python, `L.lmp`), and again after each `clear`.
 ///
 /// Returns null, or a text that says why nothing was registered; the text stays valid.
@@ -99,7 +99,7 @@ pub unsafe extern "C-unwind" fn psidpd_register(lmp: *mut c_void) -> *const c_ch
         Ok((table, styles)) => {
             for style in styles {
                 // SAFETY: an instance of the LAMMPS that the C++ was compiled for; it copies the name.
-                unsafe { (table.insert)(lmp, style.name, style.creator) };
+                unsafe { (table.insert)(lmp, style.kind, style.name, style.creator) };
             }
             std::ptr::null()
         }
@@ -112,7 +112,7 @@ pub unsafe extern "C-unwind" fn psidpd_register(lmp: *mut c_void) -> *const c_ch
 /// Of LAMMPS's library interface: stop on all ranks.
 const LMP_ERROR_ALL: c_int = 2;
 
-/// Registers the pair styles, unless this plugin was built for another LAMMPS.
+/// Registers the styles, unless this plugin was built for another LAMMPS.
 ///
 /// # Safety
 /// Called by LAMMPS's `plugin load`, with its own instance, the handle of this library and the
@@ -143,7 +143,7 @@ pub unsafe extern "C-unwind" fn lammpsplugin_init(
     for style in styles {
         let mut registration = Registration {
             version: version_text(),
-            style: c"pair".as_ptr(),
+            style: style.kind,
             name: style.name,
             info: style.info,
             author: c"the psidpd developers".as_ptr(),

@@ -2,13 +2,15 @@
 
 use std::ffi::{c_char, c_void};
 
-/// Makes a pair style for a LAMMPS instance.
-pub type Creator = unsafe extern "C-unwind" fn(*mut c_void) -> *mut c_void;
+/// Makes a style for a LAMMPS instance: its arguments are what LAMMPS calls a creator of its kind with.
+pub type Creator = unsafe extern "C-unwind" fn();
 
-/// One pair style. The texts are C strings that stay.
+/// One style. The texts are C strings that stay.
 #[repr(C)]
 pub struct Style {
-    /// As in `pair_style`.
+    /// `pair` or `fix`.
+    pub kind: *const c_char,
+    /// As in the commands `pair_style` and `fix`.
     pub name: *const c_char,
     /// What it is, for the log.
     pub info: *const c_char,
@@ -25,8 +27,8 @@ pub struct Styles {
     pub count: usize,
     /// The first.
     pub first: *const Style,
-    /// Puts a creator into the table of pair styles of a LAMMPS instance.
-    pub insert: unsafe extern "C-unwind" fn(*mut c_void, *const c_char, Creator),
+    /// Puts a creator into the table of styles of its kind of a LAMMPS instance: kind, name, creator.
+    pub insert: unsafe extern "C-unwind" fn(*mut c_void, *const c_char, *const c_char, Creator),
 }
 
 // SAFETY: all of it is immutable and lives as long as the process.

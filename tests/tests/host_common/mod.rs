@@ -143,3 +143,38 @@ pub fn special_factors_and_exclusions(runs: &Runs, newton: &str) -> [String; 2] 
     }
     on_one
 }
+
+/// Steps of the fix that integrates, in a deck that the program writes, are those of the native runner.
+pub fn splittings_are_the_native_ones(runs: &Runs) {
+    for (integrator, bounds) in [("two-stage", [1e-10, 3e-6]), ("aboba", [1e-10, 3e-6])] {
+        let folder = tempfile::tempdir().unwrap();
+        let scene = format!(
+            "title = \"steps\"\nmodel = \"{}\"\nkT = 1.0\nseed = 4\nprecision = \"double\"\n\
+             [box]\nlengths = [5.0, 4.0, 4.0]\n[initial]\nkind = \"random\"\ndensity = 6.0\n\
+             [[stage]]\nname = \"all\"\nsteps = 40\ndt = 0.005\nintegrator = \"{integrator}\"\n[output]\nthermo = 10\n",
+            model().display()
+        );
+        std::fs::write(folder.path().join("scene.toml"), scene).unwrap();
+        for arguments in ["run scene.toml --out native", "export lammps scene.toml --out deck"] {
+            let out = psidpd(folder.path(), &arguments.split(' ').collect::<Vec<_>>());
+            assert!(out.status.success(), "{}", said(&out));
+        }
+        let deck = folder.path().join("deck");
+        let script = std::fs::read_to_string(deck.join("in.lammps")).unwrap();
+        assert!(script.contains(&format!("dpd/splitting {integrator}")), "{script}");
+        // Here the styles come as the host has them.
+        let script = script.replace("plugin        load ${plugin}\n", &runs.load);
+        std::fs::write(deck.join("in.here"), script).unwrap();
+        for (ranks, bound) in [1, 2].into_iter().zip(bounds) {
+            let run = runs.host.run_script(ranks, &deck, Path::new("in.here"), &[], LIMIT);
+            run.unwrap_or_else(|e| panic!("{integrator}, {ranks} ranks: {e}"));
+            let [own, theirs] = ["native", "deck"].map(|of| {
+                let mut data = DataFile::read(&folder.path().join(of).join("final.data")).unwrap();
+                data.sort_by_id();
+                data.velocities.expect("velocities")
+            });
+            let apart = difference(&theirs, &own);
+            assert!(apart < bound, "{integrator}, {ranks} ranks: {apart:e}");
+        }
+    }
+}

@@ -12,6 +12,7 @@ use crate::run::RunError;
 use crate::scene::{Scene, Stage};
 use physics::Physics;
 use psidpd_core::document::{Document, FileError};
+use psidpd_core::engine::noise::Law;
 use psidpd_core::model::{Fluid, Model};
 use std::fmt::Write;
 use std::path::{Component, Path, PathBuf};
@@ -38,7 +39,8 @@ const MOST_BODY_FORCES: usize = 9;
 pub enum DeckError {
     #[error(
         "stage \"{stage}\": integrator = \"{name}\" ({integrator}) has no counterpart in LAMMPS; a deck can have \
-         velocity-verlet, and groot-warren with lambda = 0.5, which is the same"
+         velocity-verlet, groot-warren with lambda = 0.5, which is the same, and two-stage and aboba with \
+         thermostat_step = \"midpoint\""
     )]
     Integrator { stage: String, name: &'static str, integrator: Integrator },
     #[error("the seed must be at least 1 for the pair style, is {0}")]
@@ -264,7 +266,7 @@ fn write_script(scene: &Scene, s: &mut String) -> std::fmt::Result {
     writeln!(s, "read_data     {START}\n")?;
     writeln!(s, "# to be left out where LAMMPS has the styles already")?;
     writeln!(s, "plugin        load ${{plugin}}\n")?;
-    physics.write_motion(s)?;
+    physics.write_surroundings(s)?;
     writeln!(s)?;
     writeln!(s, "thermo_style  custom step time temp pe ke press pxx pyy pzz pxy pxz pyz")?;
     writeln!(s, "thermo_modify norm no format float %.17g")?;
@@ -293,6 +295,12 @@ fn write_script(scene: &Scene, s: &mut String) -> std::fmt::Result {
             writeln!(s, "pair_style    dpd/psi {:?} {}{precision}", stage.kt, scene.seed)?;
             writeln!(s, "pair_coeff    * * {model} {}", scene.model.species().join(" "))?;
         }
+        if before.is_none_or(|b| motion(&b.integrator) != motion(&stage.integrator)) {
+            if before.is_some() {
+                writeln!(s, "unfix         move")?;
+            }
+            writeln!(s, "fix           move {} {}", physics.mobile(), motion(&stage.integrator))?;
+        }
         match (before.is_some_and(|b| b.body_forces), stage.body_forces) {
             (false, true) => physics.write_body_forces(s)?,
             (true, false) => physics.write_end_of_body_forces(s)?,
@@ -303,6 +311,25 @@ fn write_script(scene: &Scene, s: &mut String) -> std::fmt::Result {
         before = Some(stage);
     }
     writeln!(s, "\nwrite_data    final.data nocoeff")
+}
+
+/// The style and the arguments of the fix that makes the steps.
+fn motion(integrator: &Integrator) -> String {
+    let mut integrator = *integrator;
+    if integrator.in_lammps() != Counterpart::Splitting {
+        return "nve".to_owned();
+    }
+    let mut text = format!("dpd/splitting {}", integrator.name());
+    if let Some((lambda, _)) = integrator.lambda() {
+        text += &format!(" lambda {lambda:?}");
+    }
+    if let Some(coupling) = integrator.coupling().filter(|coupling| coupling.every > 1) {
+        text += &format!(" every {}", coupling.every);
+    }
+    if let Some(Law::Uniform) = integrator.noise() {
+        text += " noise uniform";
+    }
+    text
 }
 
 /// A title for a comment: one line, without `&`, which continues a line, and without double quotes, since
@@ -328,6 +355,16 @@ fn output(path: &Path) -> impl FnOnce(std::io::Error) -> DeckError + '_ {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::integrator::Coupling;
+
+    #[test]
+    fn steps_become_arguments_of_a_fix() {
+        let coupling = Coupling { every: 3, noise: Law::Uniform, ..Coupling::DEFAULT };
+        let two_stage = Integrator::TwoStage { lambda: 0.2, coupling };
+        assert_eq!(motion(&two_stage), "dpd/splitting two-stage lambda 0.2 every 3 noise uniform");
+        assert_eq!(motion(&Integrator::Aboba(Coupling::DEFAULT)), "dpd/splitting aboba");
+        assert_eq!(motion(&Integrator::VelocityVerlet), "nve");
+    }
 
     #[test]
     fn the_thermostat_is_cut_out_and_what_follows_stays() {

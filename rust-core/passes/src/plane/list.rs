@@ -109,10 +109,12 @@ impl<const MULTISPECIES: bool> Kernel for WithSpecies<'_, MULTISPECIES> {
         // SAFETY: what is asked for is promised to `list_pairs`; a plane has a first column.
         unsafe {
             let first = inputs.cells.column(plane, 0)[0];
+            let end = inputs.cells.column(plane, inputs.cells.grid.columns_per_plane - 1)[1];
             let metric = <Mixed as Arithmetic<I>>::metric(inputs.cells.geometry);
             let mut lister =
                 Lister::<I, MULTISPECIES> { inputs, metric, first, i_particles, i_in_batch, list };
             each_batch::<I, _>(&inputs.cells, plane, I::F32::LANES, search, &mut lister);
+            lister.begin_at(end);
         }
     }
 }
@@ -127,11 +129,21 @@ struct Lister<'a, I: Isa, const MULTISPECIES: bool> {
     list: &'a mut PairList,
 }
 
+impl<I: Isa, const MULTISPECIES: bool> Lister<'_, I, MULTISPECIES> {
+    /// Gives the particles before `place` that nobody has visited no pairs: those of columns of ghosts.
+    #[inline(always)]
+    fn begin_at(&mut self, place: usize) {
+        let PairList { start, pairs, .. } = &mut *self.list;
+        start.resize(place - self.first + 1, pairs.len() as u32);
+    }
+}
+
 impl<I: Isa, const MULTISPECIES: bool> BatchVisitor<I> for Lister<'_, I, MULTISPECIES> {
     #[inline(always)]
     unsafe fn visit(&mut self, search: &SearchBuffers, slots: [usize; 2]) {
         type W<I> = <<I as Isa>::F32 as Reals>::Words;
         let members = slots[1] - slots[0];
+        self.begin_at(search.first + slots[0]);
         let PairList { start, pairs, stretch } = &mut *self.list;
         make_room(start, members);
         // SAFETY: `packed` has a vector of padding behind the last particle (`SortedParticles::make_room`), lists of the batch

@@ -7,6 +7,7 @@ use super::region::region;
 use super::workspace::{CellOrder, Input, SortedParticles};
 use crate::engine::error::EngineError;
 use crate::engine::particles::Particles;
+use crate::engine::surroundings::Around;
 use psidpd_passes::cells::excluded::Excluded;
 use psidpd_passes::cells::sorted::SortedCells;
 use psidpd_passes::domain::PeriodicBox;
@@ -34,9 +35,12 @@ pub struct PairLists {
     cells: CellOrder,
     particles: SortedParticles<MixedParticle>,
     buffers: Vec<ListBuffers>,
-    /// Sorted index by index of the host.
+    /// Sorted index by index of the host, or [`NOWHERE`].
     place: Vec<u32>,
 }
+
+/// The place of particles that take no part.
+pub const NOWHERE: u32 = u32::MAX;
 
 impl Clone for PairLists {
     /// The same order; work space of its own.
@@ -70,12 +74,18 @@ impl PairLists {
         &self.cells.order
     }
 
-    /// The sorted index of each particle of the host.
+    /// The sorted index of each particle of the host; [`NOWHERE`] for those that take no part.
     pub fn place(&self) -> &[u32] {
         &self.place
     }
 
-    /// Finds the pairs of `particles`, whose kinds are species, within `range`: those of each plane of cells.
+    /// Whether each sorted particle is a ghost; empty without ghosts.
+    pub fn ghosts(&self) -> &[bool] {
+        &self.particles.ghost
+    }
+
+    /// Finds the pairs of `particles` within `range`: those of each plane of cells, of two ghosts none. Kinds of a negative
+    /// species take no part.
     ///
     /// # Errors
     /// A position that is not finite; a box narrower than twice the range, or that leans along an open direction.
@@ -83,15 +93,15 @@ impl PairLists {
     pub fn find<T: AsMut<PlanePairs> + Default + Send>(
         &mut self,
         pool: &Pool,
-        domain: &PeriodicBox,
+        Around { domain, images }: Around,
         particles: &Particles,
+        species_of_kind: &[i32],
         tables: &WeightTables,
         range: f64,
         with_stretch: bool,
         planes: &mut Vec<T>,
     ) -> Result<(), EngineError> {
-        let species: Vec<i32> = (0..tables.species as i32).collect();
-        let input = Input::new(particles, &[], &[], &species, &[], None, Want::FORCES);
+        let input = Input::new(particles, images, &[], species_of_kind, &[], None, Want::FORCES);
         let set = self.set;
         let range = self.range_within(domain, range)?;
         let (geometry, mut grid) = region(set, pool, (self.dimensions, range), domain, &input)?;
@@ -181,7 +191,8 @@ impl PairLists {
                 order[from - first..to - first].sort_unstable_by_key(|k| tags[*k as usize]);
             }
         });
-        self.place.resize(order.len(), 0);
+        self.place.clear();
+        self.place.resize(tags.len(), NOWHERE);
         for (sorted, k) in order.iter().enumerate() {
             self.place[*k as usize] = sorted as u32;
         }

@@ -21,7 +21,7 @@ impl PairThermostat {
         let terms = Terms { noise, drag: if drag { factor } else { 0.0 } };
         sums.gather(lists.order(), v);
         sums.compute(pool, planes, terms);
-        let virial = virial(pool, planes, sums, terms);
+        let virial = virial(pool, planes, sums, lists.ghosts(), terms);
         // Frozen particles bear forces like others; whoever moves them does not.
         let all: Vec<Wide> = (0..planes.len()).flat_map(|number| sums.of(planes, number)).collect();
         add_to_host(pool, lists.place(), &all, 1.0, force);

@@ -17,7 +17,7 @@
 
 use super::PairThermostat;
 use super::part::Part;
-use super::pass::{Sums, Terms, Wide, add_to_host, virial};
+use super::pass::{Terms, Wide, add_to_host, virial};
 use super::planes::Plane;
 use crate::engine::sweep::Pool;
 
@@ -56,88 +56,116 @@ fn each(
 impl PairThermostat {
     /// The midpoint rule with noise; without, the implicit Euler rule of drag alone.
     pub(super) fn implicit(&mut self, pool: &Pool, v: &mut [[f64; 3]], noise: bool) -> [f64; 6] {
+        let first = self.begin(pool, v, noise);
+        self.direct(pool, 0.0);
+        let mut now = first;
+        while self.goes_on(now, first) {
+            let curvature = self.curvature(pool);
+            let next = self.descend(pool, now / curvature);
+            self.direct(pool, next / now);
+            now = next;
+        }
+        self.add_solution(pool, v);
+        let virial = if self.wants_virial { self.virial_at(pool, v, noise) } else { [0.0; 6] };
+        // A midpoint is half of the way.
+        if noise {
+            self.add_solution(pool, v);
+        }
+        virial
+    }
+
+    /// The first residual, from the velocities `v` of the host; the square of its norm. Of all sums here a rank has its share.
+    pub(super) fn begin(&mut self, pool: &Pool, v: &[[f64; 3]], noise: bool) -> f64 {
         let PairThermostat { planes, lists, mass, sums, parts, kt, iterations, .. } = self;
-        let (planes, mass) = (&planes[..], &mass[..]);
+        *iterations = 0;
         parts.resize_with(planes.len(), Part::default);
         let start = Terms { noise: if noise { kt.sqrt() } else { 0.0 }, drag: 1.0 };
         sums.gather(lists.order(), v);
         sums.compute(pool, planes, start);
-        let first = each(pool, planes, mass, &sums.p, parts, |Share { number, mass, part, .. }| {
+        each(pool, planes, mass, &sums.p, parts, |Share { number, mass, part, .. }| {
             part.residual.clear();
             part.residual.extend(sums.of(planes, *number));
             part.solution.clear();
             part.solution.resize(mass.len(), [0.0; 4]);
             part.sum = part.residual.iter().zip(*mass).map(|(r, m)| dot(r, r) / m).sum();
+        })
+    }
+
+    /// Whether another iteration follows, with the squares of the norm of the residual `now` and at `first`.
+    pub(super) fn goes_on(&self, now: f64, first: f64) -> bool {
+        now > TOLERANCE * TOLERANCE * first && self.iterations < MOST
+    }
+
+    /// Multiplies the direction by the matrix; their scalar product.
+    pub(super) fn curvature(&mut self, pool: &Pool) -> f64 {
+        let PairThermostat { planes, mass, sums, parts, iterations, .. } = self;
+        *iterations += 1;
+        sums.compute(pool, planes, Terms { noise: 0.0, drag: -1.0 });
+        each(pool, planes, mass, &sums.p, parts, |Share { number, mass, p, part }| {
+            part.image.clear();
+            part.sum = 0.0;
+            for ((p, m), drag) in p.iter().zip(*mass).zip(sums.of(planes, *number)) {
+                // What is frozen has no p, and that of ghosts is their owner's.
+                let inertia = if m.is_finite() { *m } else { 0.0 };
+                let image = [0, 1, 2, 3].map(|c| inertia * p[c] + drag[c]);
+                part.sum += if m.is_finite() { dot(p, &image) } else { 0.0 };
+                part.image.push(image);
+            }
+        })
+    }
+
+    /// Goes `alpha` along the direction; the square of the norm of the residual there.
+    pub(super) fn descend(&mut self, pool: &Pool, alpha: f64) -> f64 {
+        let PairThermostat { planes, mass, sums, parts, .. } = self;
+        each(pool, planes, mass, &sums.p, parts, |Share { mass, p, part, .. }| {
+            let Part { image, residual, solution, sum } = &mut **part;
+            *sum = 0.0;
+            for ((((image, r), s), p), m) in image.iter().zip(residual).zip(solution).zip(*p).zip(*mass) {
+                for c in 0..4 {
+                    s[c] += alpha * p[c];
+                    r[c] -= alpha * image[c];
+                }
+                *sum += dot(r, r) / m;
+            }
+        })
+    }
+
+    /// Makes the next direction, `p ← M⁻¹ r + beta p`.
+    pub(super) fn direct(&mut self, pool: &Pool, beta: f64) {
+        let PairThermostat { planes, mass, sums, parts, .. } = self;
+        let mut shares: Vec<_> = sums
+            .of_planes(planes)
+            .into_iter()
+            .zip(planes.iter().zip(parts))
+            .map(|(p, (plane, part))| (p, &mass[plane.found.own.clone()], &part.residual))
+            .collect();
+        pool.each(&mut shares, |(p, mass, residual)| {
+            for ((p, m), r) in p.iter_mut().zip(*mass).zip(*residual) {
+                for c in 0..4 {
+                    p[c] = r[c] / m + if beta == 0.0 { 0.0 } else { beta * p[c] };
+                }
+            }
         });
-        direct(pool, planes, mass, sums, parts, 0.0);
-        let mut now = first;
-        *iterations = 0;
-        while now > TOLERANCE * TOLERANCE * first && *iterations < MOST {
-            *iterations += 1;
-            sums.compute(pool, planes, Terms { noise: 0.0, drag: -1.0 });
-            let curvature = each(pool, planes, mass, &sums.p, parts, |Share { number, mass, p, part }| {
-                part.image.clear();
-                part.sum = 0.0;
-                for ((p, m), drag) in p.iter().zip(*mass).zip(sums.of(planes, *number)) {
-                    // What is frozen has no p.
-                    let inertia = if m.is_finite() { *m } else { 0.0 };
-                    let image = [0, 1, 2, 3].map(|c| inertia * p[c] + drag[c]);
-                    part.sum += dot(p, &image);
-                    part.image.push(image);
-                }
-            });
-            let alpha = now / curvature;
-            let next = each(pool, planes, mass, &sums.p, parts, |Share { mass, p, part, .. }| {
-                let Part { image, residual, solution, sum } = &mut **part;
-                *sum = 0.0;
-                for ((((image, r), s), p), m) in image.iter().zip(residual).zip(solution).zip(*p).zip(*mass) {
-                    for c in 0..4 {
-                        s[c] += alpha * p[c];
-                        r[c] -= alpha * image[c];
-                    }
-                    *sum += dot(r, r) / m;
-                }
-            });
-            direct(pool, planes, mass, sums, parts, next / now);
-            now = next;
-        }
-        let mut of_planes = sums.of_planes(planes);
-        for (p, part) in of_planes.iter_mut().zip(parts.iter()) {
+    }
+
+    /// Adds δ to the velocities `v`.
+    pub(super) fn add_solution(&mut self, pool: &Pool, v: &mut [[f64; 3]]) {
+        let PairThermostat { planes, lists, sums, parts, .. } = self;
+        for (p, part) in sums.of_planes(planes).iter_mut().zip(parts) {
             p.copy_from_slice(&part.solution);
         }
-        // A midpoint is half of the way.
-        let factor = if noise { 2.0 } else { 1.0 };
-        let wants_virial = planes.iter().any(|plane| !plane.found.list.stretch.is_empty());
         add_to_host(pool, lists.place(), &sums.p, 1.0, v);
-        if !wants_virial {
-            add_to_host(pool, lists.place(), &sums.p, factor - 1.0, v);
-            return [0.0; 6];
-        }
-        let solution = sums.p.clone();
+    }
+
+    /// The virial of drag at the velocities `v`, and of noise.
+    pub(super) fn virial_at(&mut self, pool: &Pool, v: &[[f64; 3]], noise: bool) -> [f64; 6] {
+        let PairThermostat { planes, lists, sums, kt, dt, .. } = self;
+        let scale = 2.0 / *dt;
+        let noise = if noise { scale * kt.sqrt() } else { 0.0 };
         sums.gather(lists.order(), v);
         sums.close(planes);
-        let scale = 2.0 / self.dt;
-        let virial = virial(pool, planes, sums, Terms { noise: scale * start.noise, drag: scale });
-        add_to_host(pool, lists.place(), &solution, factor - 1.0, v);
-        virial
+        virial(pool, planes, sums, lists.ghosts(), Terms { noise, drag: scale })
     }
-}
-
-/// Makes the next direction, `p ← M⁻¹ r + beta p`.
-fn direct(pool: &Pool, planes: &[Plane], mass: &[f64], sums: &mut Sums, parts: &[Part], beta: f64) {
-    let mut shares: Vec<_> = sums
-        .of_planes(planes)
-        .into_iter()
-        .zip(planes.iter().zip(parts))
-        .map(|(p, (plane, part))| (p, &mass[plane.found.own.clone()], &part.residual))
-        .collect();
-    pool.each(&mut shares, |(p, mass, residual)| {
-        for ((p, m), r) in p.iter_mut().zip(*mass).zip(*residual) {
-            for c in 0..4 {
-                p[c] = r[c] / m + if beta == 0.0 { 0.0 } else { beta * p[c] };
-            }
-        }
-    });
 }
 
 fn dot(a: &Wide, b: &Wide) -> f64 {

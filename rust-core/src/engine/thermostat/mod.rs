@@ -13,7 +13,7 @@
 //! [`PairThermostat::find_pairs`] finds the pairs, by the search of the fast engine, [`PairThermostat::draw`] their noise, and
 //! [`PairThermostat::act`] changes velocities: `midpoint` for all pairs at once, `sequential` pair by pair.
 //! Results depend on positions, velocities and tags: not on the order of particles in memory, nor on the
-//! number of threads. A new update is a variant of [`Update`] and its rule in one of these files.
+//! number of threads. On a rank with ghosts the midpoint rule goes on in rounds with the other ranks: `rank`. A new update is a variant of [`Update`] and its rule in one of these files.
 
 mod bodies;
 mod forces;
@@ -22,6 +22,8 @@ mod part;
 mod pass;
 mod planes;
 mod pulls;
+mod rank;
+mod round;
 mod sequential;
 
 #[cfg(test)]
@@ -29,10 +31,12 @@ mod tests;
 
 pub use bodies::Bodies;
 pub use pulls::Pull;
+pub use rank::{Need, Rank};
 
 use super::error::EngineError;
 use super::particles::Particles;
 use super::plan::{Plan, ThermostatPlan};
+use super::surroundings::Around;
 use super::sweep::{PairLists, PlanePairs, Pool};
 use part::Part;
 use pass::Sums;
@@ -40,6 +44,7 @@ use planes::Plane;
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::noise::{Law, PairNoise};
 use psidpd_passes::settings::Instructions;
+use round::Round;
 
 /// How velocities are changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,6 +81,10 @@ pub struct PairThermostat {
     /// By plane and pair, what `g` was multiplied by in turn, but for the noise; where distances are kept.
     impulses: Vec<Vec<f64>>,
     iterations: usize,
+    /// Whether distances are kept.
+    wants_virial: bool,
+    /// Where a solution in rounds with other ranks is.
+    round: Round,
     /// Of the pairs; of whatever else a rule draws.
     noise: [PairNoise; 2],
 }
@@ -103,6 +112,8 @@ impl PairThermostat {
             parts: Vec::new(),
             impulses: Vec::new(),
             iterations: 0,
+            wants_virial: false,
+            round: Round::default(),
             noise: [PairNoise::default(); 2],
         })
     }
@@ -119,19 +130,36 @@ impl PairThermostat {
         dt: f64,
         virial: bool,
     ) -> Result<(), EngineError> {
-        self.dt = dt;
         let Bodies { domain, x, tag, species, mass, frozen } = *bodies;
         let particles = Particles { x, tag, kind: species, owned: x.len() };
-        let (weights, range) = (planes::weights(&self.plan, dt), self.plan.longest);
-        self.lists.find(pool, domain, &particles, &weights, range, virial, &mut self.planes)?;
-        let order = self.lists.order().iter().map(|k| *k as usize);
-        self.tag.clear();
-        self.tag.extend(order.clone().map(|k| tag[k] as u32));
-        self.mass.clear();
-        self.mass.extend(order.map(|k| {
+        let kinds: Vec<i32> = (0..self.plan.gamma.len().isqrt() as i32).collect();
+        self.find(pool, Around { domain, images: &[] }, &particles, &kinds, dt, virial, |k| {
             let rests = frozen.get(k).is_some_and(|frozen| *frozen);
             if rests { f64::INFINITY } else { mass[species[k] as usize] }
-        }));
+        })
+    }
+
+    /// The same, with the mass of each particle of the host.
+    #[allow(clippy::too_many_arguments)]
+    fn find(
+        &mut self,
+        pool: &Pool,
+        around: Around,
+        particles: &Particles,
+        species_of_kind: &[i32],
+        dt: f64,
+        virial: bool,
+        mass: impl Fn(usize) -> f64,
+    ) -> Result<(), EngineError> {
+        (self.dt, self.wants_virial, self.round) = (dt, virial, Round::default());
+        let (weights, range) = (planes::weights(&self.plan, dt), self.plan.longest);
+        let PairThermostat { lists, planes, .. } = self;
+        lists.find(pool, around, particles, species_of_kind, &weights, range, virial, planes)?;
+        let order = self.lists.order().iter().map(|k| *k as usize);
+        self.tag.clear();
+        self.tag.extend(order.clone().map(|k| particles.tag[k] as u32));
+        self.mass.clear();
+        self.mass.extend(order.map(mass));
         Ok(())
     }
 

@@ -132,8 +132,10 @@ impl Plane {
         }
     }
 
-    /// `Σ r_ij ⊗ F_ij` of the same forces: xx, yy, zz, xy, xz, yz.
-    pub fn virial(&self, p: &[Wide], Terms { noise, drag }: Terms) -> [f64; 6] {
+    /// `Σ r_ij ⊗ F_ij` of the same forces: xx, yy, zz, xy, xz, yz; half of it for pairs with a ghost. `ghosts` may be empty.
+    pub fn virial(&self, p: &[Wide], ghosts: &[bool], Terms { noise, drag }: Terms) -> [f64; 6] {
+        let ghosts = ghosts.get(self.found.own.start..).unwrap_or_default();
+        let is_ghost = |k: usize| ghosts.get(k).is_some_and(|ghost| *ghost);
         let p = &p[self.found.own.start..];
         let mut virial = [0.0; 6];
         if self.found.list.stretch.is_empty() {
@@ -145,11 +147,9 @@ impl Plane {
                 let (g, other) = (pair.g.map(f64::from), p[pair.j as usize]);
                 let along: f64 = (0..3).map(|c| (p[i][c] - other[c]) * g[c]).sum();
                 let xi = self.xi.get(k).map_or(0.0, |xi| f64::from(*xi));
-                add_virial(
-                    &mut virial,
-                    g,
-                    (noise * xi - drag * along) * f64::from(self.found.list.stretch[k]),
-                );
+                let share = if is_ghost(i) || is_ghost(pair.j as usize) { 0.5 } else { 1.0 };
+                let stretch = share * f64::from(self.found.list.stretch[k]);
+                add_virial(&mut virial, g, (noise * xi - drag * along) * stretch);
             }
         }
         virial
@@ -164,12 +164,12 @@ pub fn add_virial(virial: &mut [f64; 6], g: [f64; 3], factor: f64) {
 }
 
 /// The virial of all planes, in their order.
-pub fn virial(pool: &Pool, planes: &[Plane], sums: &Sums, terms: Terms) -> [f64; 6] {
+pub fn virial(pool: &Pool, planes: &[Plane], sums: &Sums, ghosts: &[bool], terms: Terms) -> [f64; 6] {
     if planes.iter().all(|plane| plane.found.list.stretch.is_empty()) {
         return [0.0; 6];
     }
     let mut parts: Vec<_> = planes.iter().map(|plane| (plane, [0.0; 6])).collect();
-    pool.each(&mut parts, |(plane, virial)| *virial = plane.virial(&sums.p, terms));
+    pool.each(&mut parts, |(plane, virial)| *virial = plane.virial(&sums.p, ghosts, terms));
     let mut sum = [0.0; 6];
     for (_, virial) in parts {
         (0..6).for_each(|c| sum[c] += virial[c]);
@@ -177,7 +177,7 @@ pub fn virial(pool: &Pool, planes: &[Plane], sums: &Sums, terms: Terms) -> [f64;
     sum
 }
 
-/// Adds `factor` times what is in order of the cells to what is in the order of the host.
+/// Adds `factor` times what is in order of the cells to what is in the order of the host, for those that are there.
 pub fn add_to_host(pool: &Pool, place: &[u32], from: &[Wide], factor: f64, to: &mut [[f64; 3]]) {
     let (count, mut rest, threads) = (to.len(), to, pool.threads());
     let mut parts: Vec<_> = (0..threads)
@@ -188,8 +188,9 @@ pub fn add_to_host(pool: &Pool, place: &[u32], from: &[Wide], factor: f64, to: &
         .collect();
     pool.each(&mut parts, |(to, place)| {
         for (to, place) in to.iter_mut().zip(*place) {
-            let from = from[*place as usize];
-            (0..3).for_each(|c| to[c] += factor * from[c]);
+            if let Some(from) = from.get(*place as usize) {
+                (0..3).for_each(|c| to[c] += factor * from[c]);
+            }
         }
     });
 }

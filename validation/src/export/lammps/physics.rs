@@ -30,8 +30,13 @@ impl<'a> Physics<'a> {
         self.walls.map(|wall| if wall { "f" } else { "p" }).join(" ")
     }
 
-    /// Groups, and what moves particles.
-    pub fn write_motion(&self, s: &mut impl Write) -> Result {
+    /// The group of the particles that move.
+    pub fn mobile(&self) -> &'static str {
+        self.mobile
+    }
+
+    /// Groups, walls and the plane.
+    pub fn write_surroundings(&self, s: &mut impl Write) -> Result {
         if self.mobile == "mobile" {
             writeln!(
                 s,
@@ -41,7 +46,6 @@ impl<'a> Physics<'a> {
             writeln!(s, "group         mobile subtract all frozen")?;
             writeln!(s, "velocity      frozen set 0 0 0")?;
         }
-        writeln!(s, "fix           move {} nve", self.mobile)?;
         if self.walls != [false; 3] {
             let faces = (0..3).filter(|k| self.walls[*k]).map(|k| format!("{0}lo EDGE {0}hi EDGE", AXES[k]));
             writeln!(

@@ -1,0 +1,302 @@
+#include "fix_splitting.h"
+
+#include "pair_psi.h"
+
+#include "angle.h"
+#include "atom.h"
+#include "bond.h"
+#include "comm.h"
+#include "dihedral.h"
+#include "domain.h"
+#include "error.h"
+#include "force.h"
+#include "improper.h"
+#include "kspace.h"
+#include "modify.h"
+#include "neighbor.h"
+#include "update.h"
+#include "utils.h"
+
+#if __has_include("atom_vec.h")
+#include "atom_vec.h"
+#endif
+
+#include <cstring>
+
+using namespace LAMMPS_NS;
+using namespace FixConst;
+using namespace psidpd;
+
+namespace {
+
+// Share of a step in the first kick and in the last, as in the native runner: small errors of averages in liquids.
+constexpr double LAMBDA = 0.21;
+
+bool begins(const char *text, const char *with)
+{
+  return strncmp(text, with, strlen(with)) == 0;
+}
+
+}    // namespace
+
+FixSplitting::FixSplitting(LAMMPS *lmp, int narg, char **arg) : Fix(lmp, narg, arg), lambda(LAMBDA)
+{
+  time_integrate = 1;
+  dynamic_group_allow = 1;
+  // Iterations of the thermostat.
+  scalar_flag = 1;
+  global_freq = 1;
+  extscalar = 0;
+  // The virial of drag and noise.
+  virial_global_flag = 1;
+  thermo_virial = 1;
+
+  if (narg < 4) stop("expected 'two-stage' or 'aboba'");
+  const std::string name = arg[3];
+  if (name == "aboba")
+    scheme = Scheme::aboba;
+  else if (name != "two-stage")
+    stop("unknown splitting '" + name + "': expected 'two-stage' or 'aboba'");
+  for (int k = 4; k < narg; k += 2) {
+    const std::string key = arg[k];
+    if (k + 1 >= narg) stop("keyword '" + key + "' needs a value");
+    const std::string value = arg[k + 1];
+    if (key == "every") {
+      every = utils::bnumeric(FLERR, arg[k + 1], false, lmp);
+      if (every < 1) stop("every must be 1 or more, found " + value);
+    } else if (key == "lambda" && scheme == Scheme::two_stage) {
+      lambda = utils::numeric(FLERR, arg[k + 1], false, lmp);
+      if (!(lambda >= 0.0 && lambda <= 0.5)) stop("lambda must be from 0 to 0.5, found " + value);
+    } else if (key == "noise") {
+      if (value != "gaussian" && value != "uniform")
+        stop("unknown noise '" + value + "': expected 'gaussian' or 'uniform'");
+      uniform = value == "uniform";
+    } else {
+      stop("unknown keyword '" + key + "': expected 'every'" +
+           (scheme == Scheme::two_stage ? ", 'lambda'" : "") + " or 'noise'");
+    }
+  }
+}
+
+void FixSplitting::stop(const std::string &text, const char *file, int line)
+{
+  error->all(file, line, std::string("Fix ") + style + ": " + text);
+}
+
+FixSplitting *FixSplitting::find(const Modify *modify)
+{
+  for (int k = 0; k < modify->nfix; k++)
+    if (auto *fix = dynamic_cast<FixSplitting *>(modify->fix[k])) return fix;
+  return nullptr;
+}
+
+int FixSplitting::setmask()
+{
+  return INITIAL_INTEGRATE | FINAL_INTEGRATE;
+}
+
+PairPsi *FixSplitting::find_pair()
+{
+  PairPsi *found = nullptr;
+  for (const char *name : {"dpd/psi", "mdpd/psi", "dpd/spline"}) {
+    Pair *one = force->pair_match(name, 1, 0);
+    // A hybrid may have a style several times.
+    if (!one) one = force->pair_match(name, 1, 1);
+    if (!one) continue;
+    if (found || (force->pair_match(name, 1, 2) && force->pair != one))
+      stop("the thermostat of one pair style is all that it has, and there are several in the hybrid");
+    found = dynamic_cast<PairPsi *>(one);
+  }
+  if (!found) stop("needs pair_style dpd/psi, mdpd/psi or dpd/spline, whose thermostat it is");
+  return found;
+}
+
+void FixSplitting::init()
+{
+  pair = find_pair();
+  // Nothing moves by it while LAMMPS minimises.
+  if (update->whichflag == 2) return;
+  if (strcmp(update->integrate_style, "verlet") != 0)
+    stop(std::string("works with 'run_style verlet' only, found '") + update->integrate_style + "'");
+  const std::string why = pair->why_not_apart();
+  if (!why.empty()) stop(why + ": that cannot be had with drag and noise apart from the forces");
+  check_others();
+}
+
+// Whoever else moves atoms, or adds forces as if there were one evaluation a step.
+void FixSplitting::check_others()
+{
+  for (int k = 0; k < modify->nfix; k++) {
+    const Fix *other = modify->fix[k];
+    if (other == this) continue;
+    const std::string name = std::string("fix ") + other->id + " (" + other->style + ")";
+    if (dynamic_cast<const FixSplitting *>(other)) stop("there can be one only, and " + name + " is another");
+    if (other->time_integrate)
+      stop(name + " integrates too, and its atoms would be elsewhere when forces are computed: remove it; atoms that "
+                  "no fix integrates stay where they are");
+    for (const char *known : {"shake", "rattle", "langevin", "package_omp", "package_intel"}) {
+      if (!begins(other->style, known) && strcmp(other->id, known) != 0) continue;
+      stop(name + " expects one evaluation of forces in a step of velocity Verlet");
+    }
+  }
+}
+
+void FixSplitting::setup(int vflag)
+{
+  v_init(vflag);
+}
+
+void FixSplitting::initial_integrate(int vflag)
+{
+  vflag_of_step = vflag;
+  const double dt = update->dt;
+  if (scheme == Scheme::aboba) {
+    drift(0.5 * dt);
+    return;
+  }
+  kick(lambda * dt);
+  drift(0.5 * dt);
+  reflect();
+  follow();
+  compute_forces(0, 0);
+  kick((1.0 - 2.0 * lambda) * dt);
+  drift(0.5 * dt);
+}
+
+void FixSplitting::final_integrate()
+{
+  const double dt = update->dt;
+  v_init(vflag_of_step);
+  if (scheme == Scheme::two_stage) {
+    kick(lambda * dt);
+    act();
+    return;
+  }
+  kick(0.5 * dt);
+  act();
+  kick(0.5 * dt);
+  drift(0.5 * dt);
+  reflect();
+  // Who looks at ends of steps finds ghosts there; and energies, where they are asked for.
+  const bigint step = update->ntimestep;
+  const int eflag = (update->eflag_global == step ? 1 : 0) | (update->eflag_atom == step ? 2 : 0);
+  if (eflag || vflag_of_step) {
+    follow();
+    compute_forces(eflag, vflag_of_step);
+  } else {
+    comm->forward_comm();
+  }
+}
+
+double FixSplitting::compute_scalar()
+{
+  return pair ? pair->iterations() : 0.0;
+}
+
+void FixSplitting::kick(double h)
+{
+  double **v = atom->v, **f = atom->f;
+  const int owned = atom->nlocal;
+  for (int i = 0; i < owned; i++) {
+    if (!(atom->mask[i] & groupbit)) continue;
+    const double over_mass = h * force->ftm2v / (atom->rmass ? atom->rmass[i] : atom->mass[atom->type[i]]);
+    for (int k = 0; k < 3; k++) v[i][k] += over_mass * f[i][k];
+  }
+}
+
+void FixSplitting::drift(double h)
+{
+  double **x = atom->x, **v = atom->v;
+  const int owned = atom->nlocal;
+  for (int i = 0; i < owned; i++)
+    if (atom->mask[i] & groupbit)
+      for (int k = 0; k < 3; k++) x[i][k] += h * v[i][k];
+}
+
+// Other fixes that have a turn when atoms have moved, as those that make bonds, have it once a step.
+void FixSplitting::reflect()
+{
+  for (int k = 0; k < modify->nfix; k++)
+    if ((modify->fmask[k] & POST_INTEGRATE) && begins(modify->fix[k]->style, "wall/")) modify->fix[k]->post_integrate();
+}
+
+void FixSplitting::act()
+{
+  const bigint step = update->ntimestep;
+  if (step % every != 0) return;
+  double impulses[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+  const double times = static_cast<double>(every);
+  pair->heat(groupbit, times * update->dt, uniform, vflag_global != 0, impulses);
+  // That of a mean force over the step.
+  if (vflag_global)
+    for (int k = 0; k < 6; k++) virial[k] += times * impulses[k];
+}
+
+void FixSplitting::follow()
+{
+  int far = 0;
+  if (neighbor->dist_check) {
+    // This is not a step of its own: what LAMMPS counts as dangerous is not.
+    const bigint dangerous = neighbor->ndanger;
+    far = neighbor->check_distance();
+    neighbor->ndanger = dangerous;
+  }
+  if (far)
+    find_ghosts_anew();
+  else
+    comm->forward_comm();
+}
+
+// As at the beginning of a step in which LAMMPS builds lists anew, but for fixes that insert or remove atoms there: their
+// turn comes in that step.
+void FixSplitting::find_ghosts_anew()
+{
+  for (int k = 0; k < modify->nfix; k++) {
+    Fix *fix = modify->fix[k];
+    const bool due = fix->force_reneighbor && fix->next_reneighbor == update->ntimestep;
+    if ((modify->fmask[k] & PRE_EXCHANGE) && !due) fix->pre_exchange();
+  }
+  if (domain->triclinic) domain->x2lamda(atom->nlocal);
+  domain->pbc();
+  if (domain->box_change) {
+    domain->reset_box();
+    comm->setup();
+    if (neighbor->style) neighbor->setup_bins();
+  }
+  comm->exchange();
+  comm->borders();
+  if (domain->triclinic) domain->lamda2x(atom->nlocal + atom->nghost);
+  modify->pre_neighbor();
+  neighbor->build(1);
+  modify->post_neighbor();
+}
+
+void FixSplitting::compute_forces(int eflag, int vflag)
+{
+  const size_t reach = atom->nlocal + (force->newton ? atom->nghost : 0);
+  if (reach > 0) {
+    memset(&atom->f[0][0], 0, 3 * reach * sizeof(double));
+    if (atom->torque_flag) memset(&atom->torque[0][0], 0, 3 * reach * sizeof(double));
+#if __has_include("atom_vec.h")
+    // Forces on what atoms of some styles have beside positions; installed headers may not know of them.
+    if (atom->avec->forceclearflag) atom->avec->force_clear(0, reach * sizeof(double));
+#endif
+  }
+  modify->pre_force(vflag);
+  if (force->pair->compute_flag) force->pair->compute(eflag, vflag);
+  if (atom->molecular != Atom::ATOMIC) {
+    if (force->bond) force->bond->compute(eflag, vflag);
+    if (force->angle) force->angle->compute(eflag, vflag);
+    if (force->dihedral) force->dihedral->compute(eflag, vflag);
+    if (force->improper) force->improper->compute(eflag, vflag);
+  }
+  if (force->kspace && force->kspace->compute_flag) force->kspace->compute(eflag, vflag);
+  modify->pre_reverse(eflag, vflag);
+  if (force->newton) comm->reverse_comm();
+  modify->post_force(vflag);
+}
+
+extern "C" void *psidpd_create_dpd_splitting(void *lmp, int narg, char **arg)
+{
+  return static_cast<Fix *>(new FixSplitting(static_cast<LAMMPS *>(lmp), narg, arg));
+}

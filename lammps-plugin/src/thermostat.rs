@@ -1,0 +1,103 @@
+//! Drag and noise apart from the forces, for the fix that integrates: velocities of a rank's atoms by the midpoint rule.
+
+use crate::style::{Style, StyleError, guard, triples};
+use psidpd_core::engine::noise::Law;
+use psidpd_core::engine::thermostat::{Need, PairThermostat, Rank, Stream, Update};
+use psidpd_core::engine::{Around, Particles, Pool};
+
+/// What the noise of a step is made from.
+#[derive(Debug, Clone, Copy)]
+pub struct Noise {
+    /// Of the pair style.
+    pub seed: u64,
+    /// Number of the time step.
+    pub step: u64,
+    /// Its distribution.
+    pub law: Law,
+}
+
+impl Style {
+    /// Finds the pairs of the thermostat, and draws their noise; false if the model has none. `mass` are those of the owned
+    /// atoms, infinite for atoms that keep their velocities. With `virial` distances are kept.
+    ///
+    /// # Errors
+    /// As [`PairThermostat::find_pairs_of_rank`].
+    #[allow(clippy::too_many_arguments)]
+    pub fn find_thermostat_pairs(
+        &mut self,
+        around: Around,
+        x: &[f64],
+        tag: &[i32],
+        kind: &[i32],
+        mass: &[f64],
+        dt: f64,
+        virial: bool,
+        noise: Noise,
+    ) -> Result<bool, StyleError> {
+        guard(|| {
+            let (Some(thermostat), pool, kinds) = self.thermostat() else { return Ok(false) };
+            let particles = Particles { owned: mass.len(), x: triples(x), tag, kind };
+            let rank = Rank { around, particles, species_of_kind: kinds, mass };
+            thermostat.find_pairs_of_rank(pool, &rank, dt, virial)?;
+            thermostat.draw(pool, noise.seed, noise.step, Stream(0), noise.law);
+            Ok(true)
+        })
+    }
+
+    /// Changes the velocities of all atoms that pairs were found of, where a rank needs nothing of others; returns the virial.
+    ///
+    /// # Errors
+    /// A velocity that becomes no number.
+    pub fn act_alone(&mut self, v: &mut [f64]) -> Result<[f64; 6], StyleError> {
+        guard(|| {
+            let (Some(thermostat), pool, _) = self.thermostat() else { return Ok([0.0; 6]) };
+            let v = v.as_chunks_mut::<3>().0;
+            let virial = thermostat.act(pool, Update::Midpoint, v);
+            finite(v)?;
+            Ok(virial)
+        })
+    }
+
+    /// Begins on several ranks; `vectors` are the velocities of all atoms and ghosts.
+    ///
+    /// # Errors
+    /// Other atoms than pairs were found of.
+    pub fn begin_rounds(&mut self, vectors: &[f64]) -> Result<Need, StyleError> {
+        guard(|| {
+            let (Some(thermostat), pool, _) = self.thermostat() else { return Ok(Need::Nothing([0.0; 6])) };
+            Ok(thermostat.begin_midpoint(pool, triples(vectors))?)
+        })
+    }
+
+    /// Goes on when what was needed is there; in the end the velocities `v` of the rank's atoms are changed.
+    ///
+    /// # Errors
+    /// As [`PairThermostat::go_on`]; a velocity that becomes no number.
+    pub fn next_round(&mut self, total: f64, vectors: &mut [f64], v: &mut [f64]) -> Result<Need, StyleError> {
+        guard(|| {
+            let (Some(thermostat), pool, _) = self.thermostat() else { return Ok(Need::Nothing([0.0; 6])) };
+            let (vectors, v) = (vectors.as_chunks_mut::<3>().0, v.as_chunks_mut::<3>().0);
+            let need = thermostat.go_on(pool, total, vectors, v)?;
+            if let Need::Nothing(_) = need {
+                finite(v)?;
+            }
+            Ok(need)
+        })
+    }
+
+    /// How many iterations the last update took.
+    pub fn iterations(&mut self) -> usize {
+        self.thermostat().0.map_or(0, |thermostat| thermostat.iterations())
+    }
+}
+
+fn finite(v: &[[f64; 3]]) -> Result<(), StyleError> {
+    let sum: f64 = v.iter().flatten().map(|v| v * v).sum();
+    if sum.is_finite() {
+        return Ok(());
+    }
+    Err(StyleError::new(
+        "a velocity is no finite number behind the thermostat: the time step is too large, or the start overlaps"
+            .to_owned(),
+    ))
+}

@@ -1,0 +1,213 @@
+//! The midpoint rule on one of several ranks, whose ghosts stand for the particles of others.
+//!
+//! A pair of an owned particle and a ghost is computed on both ranks, its impulse given to the owned particle alone. The
+//! host and the rule take turns: the rule says what it [needs](Need), the host gets it from the other ranks and goes on.
+//! All ranks decide by the same sums, so that they need the same.
+
+use super::PairThermostat;
+use super::planes::Plane;
+use super::round::Round;
+use crate::engine::error::EngineError;
+use crate::engine::particles::Particles;
+use crate::engine::surroundings::Around;
+use crate::engine::sweep::Pool;
+
+/// The particles of a rank, owned ones first, and what is around them.
+#[derive(Debug, Clone, Copy)]
+pub struct Rank<'a> {
+    /// The box, at least twice as wide as the range along its periodic directions; which ghosts are images along them.
+    pub around: Around<'a>,
+    /// Owned particles and ghosts.
+    pub particles: Particles<'a>,
+    /// Species of each kind; negative for those that take no part.
+    pub species_of_kind: &'a [i32],
+    /// Mass of each owned particle; infinite if nothing changes its velocity.
+    pub mass: &'a [f64],
+}
+
+/// What the host has to do for the next round.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Need {
+    /// Nothing: velocities are done. With the virial of this rank's share, if distances were kept.
+    Nothing([f64; 6]),
+    /// The sum of this over all ranks.
+    Total(f64),
+    /// The vectors of ghosts from those of their owners.
+    Ghosts,
+}
+
+const CHANGED: EngineError = EngineError::Host("particles changed while their thermostat acted");
+
+impl PairThermostat {
+    /// Finds the pairs of a rank, as [`PairThermostat::find_pairs`].
+    ///
+    /// # Errors
+    /// As there; arrays of different lengths.
+    pub fn find_pairs_of_rank(
+        &mut self,
+        pool: &Pool,
+        rank: &Rank,
+        dt: f64,
+        virial: bool,
+    ) -> Result<(), EngineError> {
+        let Rank { around, particles, species_of_kind, mass } = *rank;
+        let all = particles.x.len();
+        if particles.tag.len() != all || particles.kind.len() != all || particles.owned > all {
+            return Err(EngineError::Host("particle arrays have different lengths"));
+        }
+        if mass.len() != particles.owned {
+            return Err(EngineError::Host("not as many masses as owned particles"));
+        }
+        if !around.images.is_empty() && around.images.len() != all - particles.owned {
+            return Err(EngineError::Host("not as many ghosts as it was said of whether they are images"));
+        }
+        if all > 1 << 26 {
+            return Err(EngineError::Host("more than 2^26 particles and ghosts on one rank"));
+        }
+        let species = self.plan.gamma.len().isqrt() as i32;
+        if species_of_kind.iter().any(|s| *s >= species) {
+            return Err(EngineError::Host("a type is mapped to a species the model does not have"));
+        }
+        // The owners of ghosts move them.
+        let mass = |k: usize| mass.get(k).copied().unwrap_or(f64::INFINITY);
+        self.find(pool, around, &particles, species_of_kind, dt, virial, mass)?;
+        self.agree_with_other_ranks(rank, dt);
+        Ok(())
+    }
+
+    /// Makes the vectors of pairs with a ghost those that the other rank finds: from coordinates that differ by a period, not
+    /// from fractions of a region that is this rank's own.
+    fn agree_with_other_ranks(&mut self, rank: &Rank, dt: f64) {
+        let PairThermostat { plan, lists, planes, .. } = self;
+        let (order, ghosts) = (lists.order(), lists.ghosts());
+        if ghosts.is_empty() {
+            return;
+        }
+        let Rank { around, particles, species_of_kind, .. } = *rank;
+        let species = plan.gamma.len().isqrt();
+        for Plane { found, .. } in planes {
+            for (i, ends) in found.list.start.windows(2).enumerate() {
+                let i = found.own.start + i;
+                for k in ends[0] as usize..ends[1] as usize {
+                    let pair = &mut found.list.pairs[k];
+                    let j = pair.j as usize;
+                    let j =
+                        j.checked_sub(found.own.len()).map_or(found.own.start + j, |k| found.next.start + k);
+                    if ghosts[i] == ghosts[j] {
+                        continue;
+                    }
+                    let of_host = [i, j].map(|k| order[k] as usize);
+                    let [a, b] = of_host.map(|k| species_of_kind[particles.kind[k] as usize] as usize);
+                    let law = a * species + b;
+                    let [x, y] = of_host.map(|k| particles.x[k]);
+                    let d = around.domain.minimum_image(x, y);
+                    let r = d.iter().map(|d| d * d).sum::<f64>().sqrt();
+                    let w = (1.0 - r / plan.range[law]).max(0.0).powf(plan.exponent[law]);
+                    let factor = (0.5 * dt * plan.gamma[law]).sqrt() * w / r;
+                    if factor > 0.0 && factor.is_finite() {
+                        pair.g = d.map(|d| (factor * d) as f32);
+                        if let Some(stretch) = found.list.stretch.get_mut(k) {
+                            *stretch = factor.recip() as f32;
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Begins the midpoint rule for the pairs and the noise there are. `vectors` are velocities of all particles, ghosts too.
+    ///
+    /// # Errors
+    /// Not as many vectors as there were particles.
+    pub fn begin_midpoint(&mut self, pool: &Pool, vectors: &[[f64; 3]]) -> Result<Need, EngineError> {
+        self.check(vectors)?;
+        self.round = Round::First;
+        Ok(Need::Total(self.begin(pool, vectors, true)))
+    }
+
+    /// Goes on when what was needed is there: a total, or the `vectors` of ghosts. `v` are the velocities of owned particles,
+    /// which the last round changes.
+    ///
+    /// # Errors
+    /// Nothing was needed; not as many vectors as there were particles.
+    pub fn go_on(
+        &mut self,
+        pool: &Pool,
+        total: f64,
+        vectors: &mut [[f64; 3]],
+        v: &mut [[f64; 3]],
+    ) -> Result<Need, EngineError> {
+        self.check(vectors)?;
+        if v.len() > vectors.len() {
+            return Err(CHANGED);
+        }
+        match self.round {
+            Round::Start => Err(EngineError::Host("a thermostat that was not begun goes on")),
+            Round::First => {
+                self.direct(pool, 0.0);
+                Ok(self.next_direction(pool, [total, total], vectors, v))
+            }
+            Round::Direction { first, now } => {
+                self.take_ghosts(vectors);
+                self.round = Round::Curvature { first, now };
+                Ok(Need::Total(self.curvature(pool)))
+            }
+            Round::Curvature { first, now } => {
+                self.round = Round::Residual { first, now };
+                Ok(Need::Total(self.descend(pool, now / total)))
+            }
+            Round::Residual { first, now } => {
+                self.direct(pool, total / now);
+                Ok(self.next_direction(pool, [first, total], vectors, v))
+            }
+            Round::Middle => {
+                let virial = self.virial_at(pool, vectors, true);
+                Ok(self.end(pool, v, virial))
+            }
+        }
+    }
+
+    fn check(&self, vectors: &[[f64; 3]]) -> Result<(), EngineError> {
+        if vectors.len() == self.lists.place().len() { Ok(()) } else { Err(CHANGED) }
+    }
+
+    /// Hands out the direction, or the solution if it is good enough.
+    fn next_direction(
+        &mut self,
+        pool: &Pool,
+        [first, now]: [f64; 2],
+        vectors: &mut [[f64; 3]],
+        v: &mut [[f64; 3]],
+    ) -> Need {
+        if self.goes_on(now, first) {
+            for (p, k) in self.sums.p.iter().zip(self.lists.order()) {
+                vectors[*k as usize] = [p[0], p[1], p[2]];
+            }
+            self.round = Round::Direction { first, now };
+            return Need::Ghosts;
+        }
+        self.add_solution(pool, v);
+        if self.wants_virial {
+            vectors[..v.len()].copy_from_slice(v);
+            self.round = Round::Middle;
+            return Need::Ghosts;
+        }
+        self.end(pool, v, [0.0; 6])
+    }
+
+    fn end(&mut self, pool: &Pool, v: &mut [[f64; 3]], virial: [f64; 6]) -> Need {
+        self.add_solution(pool, v);
+        self.round = Round::Start;
+        Need::Nothing(virial)
+    }
+
+    fn take_ghosts(&mut self, vectors: &[[f64; 3]]) {
+        let ghosts = self.lists.ghosts();
+        for ((p, k), ghost) in self.sums.p.iter_mut().zip(self.lists.order()).zip(ghosts) {
+            if *ghost {
+                let [x, y, z] = vectors[*k as usize];
+                *p = [x, y, z, 0.0];
+            }
+        }
+    }
+}

@@ -1,0 +1,245 @@
+//! The fix that integrates with drag and noise apart from the forces. That it makes the steps of the native runner is the
+//! business of `export_lammps.rs`; here, that ranks, ghosts and restarts do not matter, and what is refused.
+
+mod style_common;
+
+use style_common::*;
+
+/// Warren's liquid, so fast that ghosts are found anew in the middle of steps.
+fn deck(before_box: &str, fix: &str, dt: f64) -> String {
+    format!(
+        "{}pair_style dpd/psi 1.0 {SEED}\npair_coeff * * \"{}\" F F\nfix 1 all dpd/splitting {fix}\ntimestep {dt}\n\
+         thermo_modify norm no\n",
+        particles(before_box, "block 0 6 0 5 0 5", 2, 600),
+        warren()
+    )
+}
+
+/// From a data file, so that atoms have the same numbers on any ranks.
+fn from_data(folder: &std::path::Path, before_box: &str, fix: &str, dt: f64) -> String {
+    let data = folder.join("start.data");
+    if !data.exists() {
+        let settle = deck("", "two-stage", 0.005);
+        run(&format!("{settle}run 100\nreset_timestep 0\nwrite_data {} nocoeff\n", data.display()), 1);
+    }
+    format!(
+        "units lj\natom_style atomic\natom_modify map yes\n{before_box}\nread_data {}\n{}pair_style dpd/psi 1.0 {SEED}\n\
+         pair_coeff * * \"{}\" F F\nfix 1 all dpd/splitting {fix}\ntimestep {dt}\nthermo_modify norm no\n",
+        data.display(),
+        load(),
+        warren()
+    )
+}
+
+/// The same steps on one rank and on several, cut along other directions, with newton on and off, and with a skin that
+/// is used up within half a step; ghosts need no velocities.
+#[test]
+fn ranks_newton_and_skin_do_not_matter() {
+    let folder = tempfile::tempdir().unwrap();
+    for fix in ["two-stage", "aboba every 2", "two-stage every 3 lambda 0.25 noise uniform"] {
+        let truth = run(&format!("{}run 12\n", from_data(folder.path(), "", fix, 0.03)), 1);
+        for (ranks, head) in [
+            (1, "newton off\nneighbor 0.02 bin"),
+            (2, "newton on\nneighbor 0.02 bin"),
+            (2, "newton off\nneighbor 0.3 bin"),
+            (2, "newton on\ncomm_modify vel yes\nprocessors 1 1 *"),
+            (2, "comm_style tiled"),
+        ] {
+            let head = format!("{head}\nneigh_modify delay 0 every 1 check yes");
+            let other = run(&format!("{}run 12\n", from_data(folder.path(), &head, fix, 0.03)), ranks);
+            let length = [6.0, 5.0, 5.0];
+            for (a, b) in other.x.iter().zip(&truth.x) {
+                for c in 0..3 {
+                    let d = a[c] - b[c];
+                    let d = d - length[c] * (d / length[c]).round();
+                    assert!(d.abs() < 1e-5, "{fix}, {head}, {ranks} ranks: {a:?} {b:?}");
+                }
+            }
+            let apart = difference(&other.v, &truth.v);
+            assert!(apart < 1e-5, "{fix}, {head}, {ranks} ranks: {apart:e}");
+        }
+    }
+}
+
+/// Tilted boxes, on one rank and on two, and boxes barely two ranges wide.
+#[test]
+fn boxes_that_lean_and_narrow_ones() {
+    for (region, count, bound) in
+        [("prism 0 5 0 4 0 4 1.2 -0.5 0.7", 400, 1e-5), ("block 0 2.001 0 2.2 0 9", 200, 1e-5)]
+    {
+        let folder = tempfile::tempdir().unwrap();
+        let data = folder.path().join("start.data").display().to_string();
+        let style = format!("pair_style dpd/psi 1.0 {SEED}\npair_coeff * * \"{}\" F\n", warren());
+        let fix = "fix 1 all dpd/splitting two-stage\ntimestep 0.02\n";
+        run(
+            &format!("{}{style}{fix}run 20\nwrite_data {data} nocoeff\n", particles("", region, 1, count)),
+            1,
+        );
+        let script = format!("units lj\natom_style atomic\nread_data {data}\n{}{style}{fix}run 10\n", load());
+        let [one, two] = [1, 2].map(|ranks| run(&script, ranks));
+        let apart = difference(&two.v, &one.v);
+        assert!(apart < bound, "{region}: {apart:e}");
+    }
+}
+
+/// A rank without atoms takes part in all sums.
+#[test]
+fn a_rank_may_be_empty() {
+    let folder = tempfile::tempdir().unwrap();
+    let start = from_data(folder.path(), "processors 2 1 1", "two-stage", 0.01);
+    let script = format!("{start}change_box all x final -3 17\nrun 10\n");
+    let [one, two] = [1, 2].map(|ranks| run(&script.replace("2 1 1", &format!("{ranks} 1 1")), ranks));
+    let apart = difference(&two.v, &one.v);
+    assert!(apart < 1e-5, "{apart:e}");
+}
+
+/// A run that goes on from a restart file takes the steps of the unbroken run, with the thermostat at its own steps.
+#[test]
+fn a_restart_goes_on_as_the_unbroken_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let restart = folder.path().join("middle.restart").display().to_string();
+    for (ranks, fix) in [(1, "two-stage every 3"), (2, "two-stage every 3"), (2, "aboba")] {
+        let head = from_data(folder.path(), "", fix, 0.02);
+        let whole = run(&format!("{head}run 17\n"), ranks);
+        let split = run(&format!("{head}run 10\nwrite_restart {restart}\nrun 7\n"), ranks);
+        let going_on = run(
+            &format!(
+                "{}read_restart {restart}\nfix 1 all dpd/splitting {fix}\ntimestep 0.02\nrun 7\n",
+                load()
+            ),
+            ranks,
+        );
+        for other in [&split, &going_on] {
+            let apart = [difference(&other.v, &whole.v), difference(&other.f, &whole.f)];
+            assert!(apart.iter().all(|d| *d < 1e-5), "{fix}, {ranks} ranks: {apart:?}");
+        }
+    }
+}
+
+/// What is printed after a step is of its end: the same as computed there anew. The virial has the impulses beside.
+#[test]
+fn energies_are_those_of_ends_of_steps() {
+    for (fix, ranks_have) in [("two-stage", 33), ("aboba", 33)] {
+        let l = open(&deck("", fix, 0.02));
+        l.commands(&format!("run {ranks_have}")).unwrap();
+        let names = ["pe", "ke", "temp"];
+        let before = names.map(|name| l.thermo(name).unwrap());
+        let forces = frame(&l).f;
+        let press = l.thermo("press").unwrap();
+        l.commands("fix_modify 1 virial no\nrun 0").unwrap();
+        let after = names.map(|name| l.thermo(name).unwrap());
+        for (a, b) in before.iter().zip(after) {
+            assert!((a - b).abs() < 1e-9 * (1.0 + b.abs()), "{fix}: {before:?} {after:?}");
+        }
+        assert!(difference(&frame(&l).f, &forces) < 1e-9, "{fix}");
+        assert!((l.thermo("press").unwrap() - press).abs() > 1e-3, "{fix}: the impulses have no virial");
+    }
+}
+
+/// Temperature and momentum over a run with a large step, on two ranks; and the number of iterations.
+#[test]
+fn a_large_step_keeps_temperature_and_momentum() {
+    let folder = tempfile::tempdir().unwrap();
+    let script = format!(
+        "{}velocity all zero linear\nvariable px equal vcm(all,x)\nvariable py equal vcm(all,y)\n\
+         fix t all ave/time 1 500 500 c_thermo_temp\nfix n all ave/time 1 500 500 f_1\nrun 500\n\
+         print \"mean $(f_t) iterations $(f_n) drift $(abs(v_px)+abs(v_py):%.3e)\" file said.txt\n",
+        from_data(folder.path(), "", "two-stage", 0.05)
+    );
+    let script = script.replace("reset_timestep 0\n", "");
+    run_in(folder.path(), &script, 2);
+    let said = std::fs::read_to_string(folder.path().join("said.txt")).unwrap();
+    let words: Vec<f64> = said.split_whitespace().filter_map(|w| w.parse().ok()).collect();
+    let [mean, iterations, drift] = words[..] else { panic!("{said}") };
+    // The mean scatters by about half a percent: six times that.
+    assert!((mean - 1.0).abs() < 0.03, "{said}");
+    assert!((2.0..10.0).contains(&iterations), "{said}");
+    assert!(drift < 1e-9, "{said}");
+}
+
+/// Minimisers do what they do without the fix, and the pair style stays without drag.
+#[test]
+fn minimisation_is_not_affected() {
+    let minimise = "min_style cg\nminimize 0 1e-3 50 500\n";
+    let folder = tempfile::tempdir().unwrap();
+    let head = from_data(folder.path(), "", "two-stage", 0.01);
+    let with = run(&format!("{head}{minimise}"), 1);
+    let without = run(&format!("{head}unfix 1\n{minimise}"), 1);
+    assert!(difference(&with.x, &without.x) < 1e-9);
+    let start = run(&format!("{head}run 0\n"), 1);
+    assert!(difference(&with.x, &start.x) > 1e-4);
+}
+
+/// Each is one line, before any step.
+#[test]
+fn what_does_not_go_together_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let head = from_data(folder.path(), "", "two-stage", 0.01);
+    let fix = "fix 1 all dpd/splitting two-stage";
+    let style = head.lines().find(|l| l.starts_with("pair_style")).unwrap().to_owned();
+    let coeff = head.lines().find(|l| l.starts_with("pair_coeff")).unwrap().to_owned();
+    let with = |more: &str| head.clone() + more;
+    let instead = |fix_now: &str| head.replace(fix, fix_now);
+    let cases = [
+        (with("fix 2 all nve\n"), "fix 2 (nve) integrates too"),
+        (with("fix 2 all dpd/splitting aboba\n"), "there can be one only"),
+        (with("fix 2 all langevin 1 1 1 77\n"), "expects one evaluation of forces"),
+        (with("run_style respa 2 2\n"), "works with 'run_style verlet' only, found 'respa'"),
+        (with("neigh_modify exclude type 1 2\n"), "because of neigh_modify exclude"),
+        (
+            with("fix 2 all deform 1 xy erate 0.1 remap v\n")
+                .replace("read_data", "box tilt large\nread_data"),
+            "fix deform",
+        ),
+        (
+            head.replace(&style, "pair_style soft 1.0").replace(&coeff, "pair_coeff * * 25"),
+            "needs pair_style dpd/psi, mdpd/psi or dpd/spline",
+        ),
+        (instead("fix 1 all dpd/splitting"), "expected 'two-stage' or 'aboba'"),
+        (instead("fix 1 all dpd/splitting baoab"), "unknown splitting 'baoab'"),
+        (instead("fix 1 all dpd/splitting two-stage every"), "keyword 'every' needs a value"),
+        (instead("fix 1 all dpd/splitting two-stage every 0"), "every must be 1 or more, found 0"),
+        (instead("fix 1 all dpd/splitting two-stage lambda 0.6"), "lambda must be from 0 to 0.5, found 0.6"),
+        (
+            instead("fix 1 all dpd/splitting aboba lambda 0.2"),
+            "unknown keyword 'lambda': expected 'every' or 'noise'",
+        ),
+        (instead("fix 1 all dpd/splitting two-stage noise pink"), "unknown noise 'pink'"),
+    ];
+    for (script, message) in cases {
+        let script = match message {
+            "fix deform" => script.replace("fix 2", "change_box all triclinic\nfix 2"),
+            _ => script,
+        };
+        let path = folder.path().join("in.refused");
+        std::fs::write(&path, format!("{script}run 1\n")).unwrap();
+        let outcome = psidpd_tests::lammps().0.run_script(1, folder.path(), &path, &[], LIMIT);
+        let error = outcome.map(|run| run.stdout).expect_err(message).to_string();
+        assert!(error.contains(message), "{message}\nfound: {error}");
+    }
+}
+
+/// With factors between 0 and 1 bonded neighbours drag as others do; with 0 the fix is refused.
+#[test]
+fn bonded_neighbours() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("chains.data"), chains(60)).unwrap();
+    let script = |special: &str| {
+        format!(
+            "units lj\natom_style bond\nspecial_bonds lj {special}\nread_data {}\n{}pair_style mdpd/psi 1.0 1.0 {SEED}\n\
+             pair_coeff * * -40 25 18 1 0.75\nbond_style harmonic\nbond_coeff * 50 0.5\n\
+             fix 1 all dpd/splitting two-stage\ntimestep 0.005\nrun 10\n",
+            folder.path().join("chains.data").display(),
+            load()
+        )
+    };
+    for special in ["1 1 1", "0.5 1 0.8"] {
+        let [one, two] = [1, 2].map(|ranks| run(&script(special), ranks));
+        let apart = difference(&two.v, &one.v);
+        assert!(apart < 1e-5, "{special}: {apart:e}");
+    }
+    let path = folder.path().join("in.refused");
+    std::fs::write(&path, script("0 1 1")).unwrap();
+    let outcome = psidpd_tests::lammps().0.run_script(1, folder.path(), &path, &[], LIMIT);
+    assert!(outcome.expect_err("refused").to_string().contains("special_bonds has factors of 0"));
+}
