@@ -427,7 +427,7 @@ fn walls_frozen_particles_body_forces_and_a_ramp() {
 }
 
 /// On several ranks vectors between particles and ghosts are rounded to single precision otherwise than in one hand.
-const SPLITTING: [f64; 2] = [1e-10, 3e-6];
+const SPLITTING: [f64; 2] = [1e-10, 1e-5];
 
 /// A splitting with its keys, in all stages of a scene.
 fn with_integrator(scene: &str, lines: &str) -> String {

@@ -162,7 +162,7 @@ fn a_large_step_keeps_temperature_and_momentum() {
 fn minimisation_is_not_affected() {
     let minimise = "min_style cg\nminimize 0 1e-3 50 500\n";
     let folder = tempfile::tempdir().unwrap();
-    let head = from_data(folder.path(), "", "two-stage", 0.01);
+    let head = from_data(folder.path(), "comm_modify vel yes", "two-stage", 0.01);
     let with = run(&format!("{head}{minimise}"), 1);
     let without = run(&format!("{head}unfix 1\n{minimise}"), 1);
     assert!(difference(&with.x, &without.x) < 1e-9);
