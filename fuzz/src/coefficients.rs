@@ -48,7 +48,7 @@ pub fn coefficients(input: &[u8]) {
         }
     };
     let Ok(mut style) = style else { return };
-    assert!(!style.description("a fuzzer", false).is_empty());
+    assert!(!style.description("a fuzzer", false, true).is_empty());
     assert!(style.engine().plan().cutoff() >= 0.0);
     if form < 3 {
         let text = style.model().source().text().to_owned();

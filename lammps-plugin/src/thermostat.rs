@@ -2,8 +2,8 @@
 
 use crate::style::{Style, StyleError, guard, triples};
 use psidpd_core::engine::noise::Law;
-use psidpd_core::engine::thermostat::{Need, PairThermostat, Rank, Stream, Update};
-use psidpd_core::engine::{Around, Particles, Pool};
+use psidpd_core::engine::thermostat::{Need, Rank, Stream, Update};
+use psidpd_core::engine::{Around, Particles};
 
 /// What the noise of a step is made from.
 #[derive(Debug, Clone, Copy)]
@@ -21,7 +21,7 @@ impl Style {
     /// atoms, infinite for atoms that keep their velocities. With `virial` distances are kept.
     ///
     /// # Errors
-    /// As [`PairThermostat::find_pairs_of_rank`].
+    /// As [`find_pairs_of_rank`](psidpd_core::engine::thermostat::PairThermostat::find_pairs_of_rank).
     #[allow(clippy::too_many_arguments)]
     pub fn find_thermostat_pairs(
         &mut self,
@@ -72,7 +72,7 @@ impl Style {
     /// Goes on when what was needed is there; in the end the velocities `v` of the rank's atoms are changed.
     ///
     /// # Errors
-    /// As [`PairThermostat::go_on`]; a velocity that becomes no number.
+    /// As [`go_on`](psidpd_core::engine::thermostat::PairThermostat::go_on); a velocity that becomes no number.
     pub fn next_round(&mut self, total: f64, vectors: &mut [f64], v: &mut [f64]) -> Result<Need, StyleError> {
         guard(|| {
             let (Some(thermostat), pool, _) = self.thermostat() else { return Ok(Need::Nothing([0.0; 6])) };
