@@ -118,6 +118,8 @@ void FixSplitting::init()
   if (update->whichflag == 2) return;
   if (strcmp(update->integrate_style, "verlet") != 0)
     stop(std::string("works with 'run_style verlet' only, found '") + update->integrate_style + "'");
+  if (strcmp(update->unit_style, "lj") != 0)
+    stop(std::string("works with 'units lj' only, found 'units ") + update->unit_style + "'");
   const std::string why = pair->why_not_apart();
   if (!why.empty()) stop(why + ": that cannot be had with drag and noise apart from the forces");
   check_others();
