@@ -13,6 +13,8 @@ pub struct Exclusions {
     /// Of each particle; empty if no marks exclude.
     marks: Vec<Mark>,
     between_molecules: bool,
+    /// Whether some mark has a side, and whether some has a molecule.
+    kinds: [bool; 2],
 }
 
 impl Exclusions {
@@ -21,6 +23,12 @@ impl Exclusions {
         self.marks.clear();
         self.marks.extend(marks);
         self.between_molecules = between_molecules;
+        self.kinds = [self.marks.iter().any(|m| m.sides != 0), self.marks.iter().any(|m| m.molecule != 0)];
+    }
+
+    /// Whether some mark has a side, and whether some has a molecule.
+    pub fn kinds(&self) -> [bool; 2] {
+        self.kinds
     }
 
     /// Marks, and whether they keep molecules from each other.

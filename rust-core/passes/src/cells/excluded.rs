@@ -29,8 +29,9 @@ pub struct Excluded<'a> {
     /// Their indices in the order of cells, shifted by `OFFSET_BITS`. Of a partner that has a copy behind the last plane,
     /// both places, for particles of the last plane.
     pub partners: &'a [u32],
-    /// For each particle, and for the copies behind the last.
-    pub marks: &'a [Mark],
+    /// Of the marks of particles, and of the copies behind the last; empty where no rule counts, and no molecule.
+    pub sides: &'a [u32],
+    pub molecules: &'a [u32],
     /// Whether marks keep molecules from each other, and not the particles of one from each other.
     pub between_molecules: bool,
 }
@@ -39,7 +40,7 @@ impl Excluded<'_> {
     /// Whether all pairs count.
     #[inline(always)]
     pub fn is_empty(&self) -> bool {
-        self.start.is_empty() & self.marks.is_empty()
+        self.start.is_empty() & self.sides.is_empty() & self.molecules.is_empty()
     }
 
     /// The partners of particle `i`.

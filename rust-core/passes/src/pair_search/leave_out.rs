@@ -15,37 +15,46 @@ pub unsafe fn leave_out<I: Isa>(
     [from, to]: [usize; 2],
 ) -> usize {
     type W<I> = <<I as Isa>::F32 as Reals>::Words;
-    // SAFETY: what is written is not behind what has been read; marks are there for all particles and copies.
+    // SAFETY: a vector is written no further behind than it was read from; sides and molecules are there for all particles
+    // and copies, and lanes behind the last pair, which may hold anything, look up the last of them.
     unsafe {
-        let mut end = to;
         let partners = excluded.partners_of(i);
-        if !partners.is_empty() {
-            end = from;
-            let mut at = from;
-            while at < to {
-                let j = W::<I>::load(offsets.add(at));
-                let mut keep = u32::MAX >> (32 - I::F32::LANES.min(to - at));
-                for partner in partners {
-                    keep &= !j.mask_equal(W::<I>::splat(*partner));
-                }
-                I::of_bits(j).compress(keep).store(offsets.add(end).cast());
-                end += keep.count_ones() as usize;
-                at += I::F32::LANES;
-            }
+        // Without a side, or a molecule, a particle meets all.
+        let sides = excluded.sides.get(i).map_or(0, |sides| sides.rotate_left(16));
+        let molecule = excluded.molecules.get(i).copied().unwrap_or(0);
+        if partners.is_empty() & (sides == 0) & (molecule == 0) {
+            return to;
         }
-        if excluded.marks.is_empty() {
-            return end;
-        }
-        let own = *excluded.marks.get_unchecked(i);
-        let mut left = from;
+        let zero = W::<I>::splat(0);
+        let mut end = from;
         let mut at = from;
-        while at < end {
-            let j = *offsets.add(at);
-            let other = *excluded.marks.get_unchecked((j >> OFFSET_BITS) as usize);
-            *offsets.add(left) = j;
-            left += !own.excludes(other, excluded.between_molecules) as usize;
-            at += 1;
+        while at < to {
+            let j = W::<I>::load(offsets.add(at));
+            let mut keep = u32::MAX >> (32 - I::F32::LANES.min(to - at));
+            for partner in partners {
+                keep &= !j.mask_equal(W::<I>::splat(*partner));
+            }
+            if (sides != 0) | (molecule != 0) {
+                let place = j.shift_right::<OFFSET_BITS>();
+                if sides != 0 {
+                    let last = W::<I>::splat(excluded.sides.len() as u32 - 1);
+                    let others = W::<I>::lookup(excluded.sides.as_ptr(), place.min(last));
+                    keep &= !others.mask_common(W::<I>::splat(sides));
+                }
+                if molecule != 0 {
+                    let last = W::<I>::splat(excluded.molecules.len() as u32 - 1);
+                    let others = W::<I>::lookup(excluded.molecules.as_ptr(), place.min(last));
+                    let same = others.mask_equal(W::<I>::splat(molecule));
+                    keep &= match excluded.between_molecules {
+                        true => same | others.mask_equal(zero),
+                        false => !same,
+                    };
+                }
+            }
+            I::of_bits(j).compress(keep).store(offsets.add(end).cast());
+            end += keep.count_ones() as usize;
+            at += I::F32::LANES;
         }
-        left
+        end
     }
 }

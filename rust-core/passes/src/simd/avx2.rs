@@ -345,6 +345,14 @@ impl Words for U32x8 {
         unsafe { _mm256_movemask_ps(_mm256_castsi256_ps(_mm256_cmpeq_epi32(self.0, other.0))) as u32 }
     }
     #[inline(always)]
+    unsafe fn mask_common(self, other: Self) -> u32 {
+        unsafe { 0xff & !U32x8(_mm256_and_si256(self.0, other.0)).mask_equal(U32x8(_mm256_setzero_si256())) }
+    }
+    #[inline(always)]
+    unsafe fn lookup(table: *const u32, index: Self) -> Self {
+        unsafe { U32x8(_mm256_i32gather_epi32::<4>(table.cast(), index.0)) }
+    }
+    #[inline(always)]
     unsafe fn load_bytes(p: *const u8) -> Self {
         unsafe { U32x8(_mm256_cvtepu8_epi32(_mm_loadl_epi64(p.cast()))) }
     }
@@ -404,6 +412,14 @@ impl Words for U32x4 {
     #[inline(always)]
     unsafe fn mask_equal(self, other: Self) -> u32 {
         unsafe { _mm_movemask_ps(_mm_castsi128_ps(_mm_cmpeq_epi32(self.0, other.0))) as u32 }
+    }
+    #[inline(always)]
+    unsafe fn mask_common(self, other: Self) -> u32 {
+        unsafe { 0xf & !U32x4(_mm_and_si128(self.0, other.0)).mask_equal(U32x4(_mm_setzero_si128())) }
+    }
+    #[inline(always)]
+    unsafe fn lookup(table: *const u32, index: Self) -> Self {
+        unsafe { U32x4(_mm_i32gather_epi32::<4>(table.cast(), index.0)) }
     }
     #[inline(always)]
     unsafe fn load_bytes(p: *const u8) -> Self {

@@ -301,6 +301,14 @@ impl Words for U32x16 {
         unsafe { _mm512_cmpeq_epi32_mask(self.0, other.0) as u32 }
     }
     #[inline(always)]
+    unsafe fn mask_common(self, other: Self) -> u32 {
+        unsafe { _mm512_test_epi32_mask(self.0, other.0) as u32 }
+    }
+    #[inline(always)]
+    unsafe fn lookup(table: *const u32, index: Self) -> Self {
+        unsafe { U32x16(_mm512_i32gather_epi32::<4>(index.0, table.cast())) }
+    }
+    #[inline(always)]
     unsafe fn load_bytes(p: *const u8) -> Self {
         unsafe { U32x16(_mm512_cvtepu8_epi32(_mm_loadu_si128(p.cast()))) }
     }

@@ -132,6 +132,10 @@ pub trait Words: Copy {
     unsafe fn shift_right<const BY: u32>(self) -> Self;
     /// Bit `k` is set where lane `k` is that of `other`.
     unsafe fn mask_equal(self, other: Self) -> u32;
+    /// Bit `k` is set where lane `k` has a bit in common with that of `other`.
+    unsafe fn mask_common(self, other: Self) -> u32;
+    /// `table[index[k]]` in lane `k`.
+    unsafe fn lookup(table: *const u32, index: Self) -> Self;
     /// Bytes, widened.
     unsafe fn load_bytes(p: *const u8) -> Self;
     /// `table[which[k]]` in lane `k`, of a table of as many words as there are lanes.

@@ -249,6 +249,18 @@ impl Words for Lanes<u32> {
         mask
     }
     #[inline(always)]
+    unsafe fn mask_common(self, other: Self) -> u32 {
+        let mut mask = 0;
+        for k in 0..LANES {
+            mask |= ((self.0[k] & other.0[k] != 0) as u32) << k;
+        }
+        mask
+    }
+    #[inline(always)]
+    unsafe fn lookup(table: *const u32, index: Self) -> Self {
+        Lanes(index.0.map(|k| unsafe { *table.add(k as usize) }))
+    }
+    #[inline(always)]
     unsafe fn load_bytes(p: *const u8) -> Self {
         Lanes(unsafe { p.cast::<[u8; LANES]>().read_unaligned() }.map(u32::from))
     }

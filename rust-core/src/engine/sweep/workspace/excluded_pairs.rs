@@ -10,7 +10,8 @@ use psidpd_passes::simd::OFFSET_BITS;
 pub struct ExcludedPairs {
     start: Vec<u32>,
     partners: Vec<u32>,
-    marks: Vec<Mark>,
+    sides: Vec<u32>,
+    molecules: Vec<u32>,
     between_molecules: bool,
     /// The place of each of the host's particles.
     place: Vec<u32>,
@@ -24,16 +25,23 @@ impl ExcludedPairs {
     pub fn fill(&mut self, order: &CellOrder, exclusions: Option<&Exclusions>) {
         self.start.clear();
         self.partners.clear();
-        self.marks.clear();
+        self.sides.clear();
+        self.molecules.clear();
         let Some(exclusions) = exclusions else { return };
         if exclusions.has_partners() {
             self.fill_partners(order, exclusions);
         }
         self.between_molecules = exclusions.between_molecules();
-        if let marks @ [_, ..] = exclusions.marks() {
-            self.marks
-                .extend(order.order.iter().map(|k| marks.get(*k as usize).copied().unwrap_or_default()));
-            self.marks.extend_from_within(..order.copies());
+        let marks = exclusions.marks();
+        let [by_rule, by_molecule] = exclusions.kinds();
+        for (wanted, to, of) in [
+            (by_rule, &mut self.sides, (|mark| mark.sides) as fn(&Mark) -> u32),
+            (by_molecule, &mut self.molecules, |mark| mark.molecule),
+        ] {
+            if wanted {
+                to.extend(order.order.iter().map(|k| marks.get(*k as usize).map_or(0, of)));
+                to.extend_from_within(..order.copies());
+            }
         }
     }
 
@@ -66,14 +74,15 @@ impl ExcludedPairs {
         Excluded {
             start: &self.start,
             partners: &self.partners,
-            marks: &self.marks,
+            sides: &self.sides,
+            molecules: &self.molecules,
             between_molecules: self.between_molecules,
         }
     }
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        (self.start.capacity() + self.partners.capacity() + self.place.capacity()) * size_of::<u32>()
-            + self.marks.capacity() * size_of::<Mark>()
+        let held = [&self.start, &self.partners, &self.sides, &self.molecules, &self.place];
+        held.map(|numbers| numbers.capacity() * size_of::<u32>()).iter().sum()
     }
 }
