@@ -471,7 +471,8 @@ fn a_splitting_in_two_dimensions() {
 #[test]
 fn splittings_between_walls() {
     for integrator in ["two-stage", "aboba"] {
-        compare_within(&with_integrator(WALLS, &format!("integrator = \"{integrator}\"")), SPLITTING);
+        // Fast particles and 85 steps let that rounding grow; a pair that is lost makes 10⁻².
+        compare_within(&with_integrator(WALLS, &format!("integrator = \"{integrator}\"")), [1e-10, 1e-4]);
     }
 }
 
