@@ -7,6 +7,9 @@
 //! fixed seed Threefry permutes its counters, so no two steps share a key and, within a step, no two
 //! pairs share a counter.
 
+use crate::instruction_set::InstructionSet;
+use crate::simd::{Isa, Kernel, run};
+
 pub const ROTATIONS: [u32; 8] = [13, 15, 26, 6, 17, 29, 16, 24];
 pub const PARITY: u32 = 0x1BD1_1BDA;
 
@@ -93,37 +96,10 @@ impl PairNoise {
         PairNoise::new(seed, step | u64::from(stream) << 56)
     }
 
-    /// The noise of each pair of tags `a[k]`, `b[k]`, in single precision.
+    /// The noise of each pair of tags `a[k]`, `b[k]`, in single precision: the same bits on every instruction set.
     pub fn fill(&self, law: Law, a: &[u32], b: &[u32], xi: &mut [f32]) {
-        #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has AVX2.
-            return unsafe { self.fill_avx2(law, a, b, xi) };
-        }
-        self.fill_portably(law, a, b, xi);
-    }
-
-    /// The same operations in wider vectors; nothing is contracted, so the bits are the same.
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn fill_avx2(&self, law: Law, a: &[u32], b: &[u32], xi: &mut [f32]) {
-        self.fill_portably(law, a, b, xi);
-    }
-
-    #[inline(always)]
-    fn fill_portably(&self, law: Law, a: &[u32], b: &[u32], xi: &mut [f32]) {
-        match law {
-            Law::Gaussian => {
-                for ((xi, a), b) in xi.iter_mut().zip(a).zip(b) {
-                    *xi = normal(thirteen_rounds([*a.min(b), *a.max(b)], self.key));
-                }
-            }
-            Law::Uniform => {
-                for ((xi, a), b) in xi.iter_mut().zip(a).zip(b) {
-                    *xi = self.xi(*a, *b) as f32;
-                }
-            }
-        }
+        // SAFETY: the kernel asks for nothing but the processor.
+        unsafe { run(InstructionSet::best(), Fill { noise: *self, law, a, b, xi }) }
     }
 
     /// The key of the pairs of this step.
@@ -172,4 +148,31 @@ pub fn normal(words: [u32; 2]) -> f32 {
                     * (1.0 - q * (1.0 / 42.0) * (1.0 - q * (1.0 / 72.0) * (1.0 - q * (1.0 / 110.0)))));
     let sine = h * sine;
     (-2.0 * logarithm).max(0.0).sqrt() * (1.0 - 2.0 * sine * sine)
+}
+
+/// The noise of many pairs, in a loop that the compiler makes vectors of.
+struct Fill<'a> {
+    noise: PairNoise,
+    law: Law,
+    a: &'a [u32],
+    b: &'a [u32],
+    xi: &'a mut [f32],
+}
+
+impl Kernel for Fill<'_> {
+    type Out = ();
+
+    #[inline(always)]
+    unsafe fn run<I: Isa>(self) {
+        let Fill { noise, law, a, b, xi } = self;
+        let pairs = xi.iter_mut().zip(a).zip(b);
+        match law {
+            Law::Gaussian => {
+                pairs.for_each(|((xi, a), b)| {
+                    *xi = normal(thirteen_rounds([*a.min(b), *a.max(b)], noise.key))
+                });
+            }
+            Law::Uniform => pairs.for_each(|((xi, a), b)| *xi = noise.xi(*a, *b) as f32),
+        }
+    }
 }

@@ -173,6 +173,10 @@ pub trait Quad: Copy {
     unsafe fn sub(self, other: Self) -> Self;
     unsafe fn mul(self, other: Self) -> Self;
     unsafe fn load_f32(p: *const f32) -> Self;
+    /// The first three of four readable numbers, and 0.
+    unsafe fn load_three_f32(p: *const f32) -> Self;
+    /// `(x₀ + x₂) + (x₁ + x₃)`, four times.
+    unsafe fn total(self) -> Self;
 }
 
 /// An instruction set.

@@ -317,6 +317,16 @@ impl Quad for Four {
         let row = unsafe { p.cast::<[f32; 4]>().read_unaligned() };
         Four([row[0] as f64, row[1] as f64, row[2] as f64, row[3] as f64])
     }
+    #[inline(always)]
+    unsafe fn load_three_f32(p: *const f32) -> Self {
+        let row = unsafe { p.cast::<[f32; 3]>().read_unaligned() };
+        Four([row[0] as f64, row[1] as f64, row[2] as f64, 0.0])
+    }
+    #[inline(always)]
+    unsafe fn total(self) -> Self {
+        let [a, b, c, d] = self.0;
+        Four([(a + c) + (b + d); 4])
+    }
 }
 
 /// Distances of sixteen particles to a point; bits where their squares are below the limit.

@@ -40,6 +40,17 @@ impl Quad for Quad4 {
     unsafe fn load_f32(p: *const f32) -> Self {
         unsafe { Quad4(_mm256_cvtps_pd(_mm_loadu_ps(p))) }
     }
+    #[inline(always)]
+    unsafe fn load_three_f32(p: *const f32) -> Self {
+        unsafe { Quad4(_mm256_cvtps_pd(_mm_blend_ps::<0b1000>(_mm_loadu_ps(p), _mm_setzero_ps()))) }
+    }
+    #[inline(always)]
+    unsafe fn total(self) -> Self {
+        unsafe {
+            let halves = _mm256_add_pd(self.0, _mm256_permute2f128_pd::<0x01>(self.0, self.0));
+            Quad4(_mm256_add_pd(halves, _mm256_permute_pd::<0b0101>(halves)))
+        }
+    }
 }
 
 /// Operators, from intrinsics. They are safe functions because operators are; see the contract of the

@@ -15,12 +15,12 @@ impl PairThermostat {
         noise: bool,
         force: &mut [[f64; 3]],
     ) -> [f64; 6] {
-        let PairThermostat { planes, lists, sums, kt, dt, .. } = self;
+        let PairThermostat { planes, lists, set, sums, kt, dt, .. } = self;
         let factor = 2.0 / *dt;
         let noise = if noise { factor * kt.sqrt() } else { 0.0 };
         let terms = Terms { noise, drag: if drag { factor } else { 0.0 } };
         sums.gather(lists.order(), v);
-        sums.compute(pool, planes, terms);
+        sums.compute(pool, *set, planes, terms);
         let virial = virial(pool, planes, sums, lists.ghosts(), terms);
         // Frozen particles bear forces like others; whoever moves them does not.
         let all: Vec<Wide> = (0..planes.len()).flat_map(|number| sums.of(planes, number)).collect();

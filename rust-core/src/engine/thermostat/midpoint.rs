@@ -17,9 +17,12 @@
 
 use super::PairThermostat;
 use super::part::Part;
+use super::particle_loops::{Descend, Direct, Multiply};
 use super::pass::{Terms, Wide, add_to_host, virial};
 use super::planes::Plane;
 use crate::engine::sweep::Pool;
+use crate::engine::vectors;
+use std::ops::Range;
 
 /// Relative residual at which iterations end.
 pub const TOLERANCE: f64 = 1e-4;
@@ -30,7 +33,7 @@ const MOST: usize = 500;
 /// A plane at work.
 struct Share<'a> {
     number: usize,
-    mass: &'a [f64],
+    own: Range<usize>,
     p: &'a [Wide],
     part: &'a mut Part,
 }
@@ -39,14 +42,13 @@ struct Share<'a> {
 fn each(
     pool: &Pool,
     planes: &[Plane],
-    mass: &[f64],
     p: &[Wide],
     parts: &mut [Part],
     work: impl Fn(&mut Share) + Sync,
 ) -> f64 {
     let share = |((number, plane), part): ((usize, &Plane), _)| {
         let own = plane.found.own.clone();
-        Share { number, mass: &mass[own.clone()], p: &p[own], part }
+        Share { number, p: &p[own.clone()], own, part }
     };
     let mut shares: Vec<Share> = planes.iter().enumerate().zip(parts).map(share).collect();
     pool.each(&mut shares, work);
@@ -76,18 +78,19 @@ impl PairThermostat {
 
     /// The first residual, from the velocities `v` of the host; the square of its norm. Of all sums here a rank has its share.
     pub(super) fn begin(&mut self, pool: &Pool, v: &[[f64; 3]], noise: bool) -> f64 {
-        let PairThermostat { planes, lists, mass, sums, parts, kt, iterations, .. } = self;
+        let PairThermostat { planes, lists, set, inverse_mass, sums, parts, kt, iterations, .. } = self;
         *iterations = 0;
         parts.resize_with(planes.len(), Part::default);
         let start = Terms { noise: if noise { kt.sqrt() } else { 0.0 }, drag: 1.0 };
         sums.gather(lists.order(), v);
-        sums.compute(pool, planes, start);
-        each(pool, planes, mass, &sums.p, parts, |Share { number, mass, part, .. }| {
+        sums.compute(pool, *set, planes, start);
+        each(pool, planes, &sums.p, parts, |Share { number, own, part, .. }| {
             part.residual.clear();
             part.residual.extend(sums.of(planes, *number));
             part.solution.clear();
-            part.solution.resize(mass.len(), [0.0; 4]);
-            part.sum = part.residual.iter().zip(*mass).map(|(r, m)| dot(r, r) / m).sum();
+            part.solution.resize(own.len(), [0.0; 4]);
+            let inverse_mass = &inverse_mass[own.clone()];
+            part.sum = part.residual.iter().zip(inverse_mass).map(|(r, inverse)| dot(r, r) * inverse).sum();
         })
     }
 
@@ -98,54 +101,39 @@ impl PairThermostat {
 
     /// Multiplies the direction by the matrix; their scalar product.
     pub(super) fn curvature(&mut self, pool: &Pool) -> f64 {
-        let PairThermostat { planes, mass, sums, parts, iterations, .. } = self;
+        let PairThermostat { planes, set, mass, sums, parts, iterations, .. } = self;
         *iterations += 1;
-        sums.compute(pool, planes, Terms { noise: 0.0, drag: -1.0 });
-        each(pool, planes, mass, &sums.p, parts, |Share { number, mass, p, part }| {
-            part.image.clear();
-            part.sum = 0.0;
-            for ((p, m), drag) in p.iter().zip(*mass).zip(sums.of(planes, *number)) {
-                // What is frozen has no p, and that of ghosts is their owner's.
-                let inertia = if m.is_finite() { *m } else { 0.0 };
-                let image = [0, 1, 2, 3].map(|c| inertia * p[c] + drag[c]);
-                part.sum += if m.is_finite() { dot(p, &image) } else { 0.0 };
-                part.image.push(image);
-            }
+        sums.compute(pool, *set, planes, Terms { noise: 0.0, drag: -1.0 });
+        each(pool, planes, &sums.p, parts, |Share { number, own: range, p, part }| {
+            let [own, below] = sums.halves(planes, *number);
+            let mass = &mass[range.clone()];
+            part.sum = vectors::run(*set, Multiply { p, mass, own, below, image: &mut part.image });
         })
     }
 
     /// Goes `alpha` along the direction; the square of the norm of the residual there.
     pub(super) fn descend(&mut self, pool: &Pool, alpha: f64) -> f64 {
-        let PairThermostat { planes, mass, sums, parts, .. } = self;
-        each(pool, planes, mass, &sums.p, parts, |Share { mass, p, part, .. }| {
+        let PairThermostat { planes, set, inverse_mass, sums, parts, .. } = self;
+        each(pool, planes, &sums.p, parts, |Share { own, p, part, .. }| {
             let Part { image, residual, solution, sum } = &mut **part;
-            *sum = 0.0;
-            for ((((image, r), s), p), m) in image.iter().zip(residual).zip(solution).zip(*p).zip(*mass) {
-                for c in 0..4 {
-                    s[c] += alpha * p[c];
-                    r[c] -= alpha * image[c];
-                }
-                *sum += dot(r, r) / m;
-            }
+            let inverse_mass = &inverse_mass[own.clone()];
+            *sum = vectors::run(*set, Descend { alpha, p, inverse_mass, image, solution, residual });
         })
     }
 
     /// Makes the next direction, `p ← M⁻¹ r + beta p`.
     pub(super) fn direct(&mut self, pool: &Pool, beta: f64) {
-        let PairThermostat { planes, mass, sums, parts, .. } = self;
+        let PairThermostat { planes, set, inverse_mass, sums, parts, .. } = self;
         let mut shares: Vec<_> = sums
             .of_planes(planes)
             .into_iter()
             .zip(planes.iter().zip(parts))
-            .map(|(p, (plane, part))| (p, &mass[plane.found.own.clone()], &part.residual))
+            .map(|(p, (plane, part))| {
+                let inverse_mass = &inverse_mass[plane.found.own.clone()];
+                Some(Direct { beta, inverse_mass, residual: &part.residual, p })
+            })
             .collect();
-        pool.each(&mut shares, |(p, mass, residual)| {
-            for ((p, m), r) in p.iter_mut().zip(*mass).zip(*residual) {
-                for c in 0..4 {
-                    p[c] = r[c] / m + if beta == 0.0 { 0.0 } else { beta * p[c] };
-                }
-            }
-        });
+        pool.each(&mut shares, |share| share.take().map_or((), |direct| vectors::run(*set, direct)));
     }
 
     /// Adds δ to the velocities `v`.

@@ -19,6 +19,7 @@ mod bodies;
 mod forces;
 mod midpoint;
 mod part;
+mod particle_loops;
 mod pass;
 mod planes;
 mod pulls;
@@ -71,10 +72,13 @@ pub struct PairThermostat {
     dimensions: usize,
     kt: f64,
     dt: f64,
+    set: InstructionSet,
     lists: PairLists,
     planes: Vec<Plane>,
     /// By sorted particle.
     mass: Vec<f64>,
+    inverse_mass: Vec<f64>,
+    /// Behind them once more those of the first plane, which the last one sees.
     tag: Vec<u32>,
     sums: Sums,
     parts: Vec<Part>,
@@ -104,9 +108,11 @@ impl PairThermostat {
             dimensions: plan.dimensions(),
             kt,
             dt: 0.0,
+            set,
             lists: PairLists::new(set, plan.dimensions()),
             planes: Vec::new(),
             mass: Vec::new(),
+            inverse_mass: Vec::new(),
             tag: Vec::new(),
             sums: Sums::default(),
             parts: Vec::new(),
@@ -158,8 +164,13 @@ impl PairThermostat {
         let order = self.lists.order().iter().map(|k| *k as usize);
         self.tag.clear();
         self.tag.extend(order.clone().map(|k| particles.tag[k] as u32));
+        if let Some(last) = self.planes.last() {
+            self.tag.extend_from_within(last.found.next.clone());
+        }
         self.mass.clear();
         self.mass.extend(order.map(mass));
+        self.inverse_mass.clear();
+        self.inverse_mass.extend(self.mass.iter().map(|m| m.recip()));
         Ok(())
     }
 

@@ -5,16 +5,9 @@
 
 use super::planes::Plane;
 use crate::engine::sweep::{Pool, part};
-
-/// A vector with room to be a vector of the processor.
-pub type Wide = [f64; 4];
-
-/// `a` and `b`.
-#[derive(Debug, Clone, Copy)]
-pub struct Terms {
-    pub noise: f64,
-    pub drag: f64,
-}
+use psidpd_passes::instruction_set::InstructionSet;
+use psidpd_passes::plane::pair_sums::add_pairs;
+pub use psidpd_passes::plane::pair_sums::{Terms, Wide};
 
 /// What all planes add, and what they add it for.
 #[derive(Debug, Clone, Default)]
@@ -51,87 +44,44 @@ impl Sums {
     }
 
     /// Computes the sums.
-    pub fn compute(&mut self, pool: &Pool, planes: &[Plane], terms: Terms) {
+    pub fn compute(&mut self, pool: &Pool, set: InstructionSet, planes: &[Plane], terms: Terms) {
         self.close(planes);
         let Sums { p, of_plane } = self;
         of_plane.resize_with(planes.len(), Vec::new);
         let mut work: Vec<_> = planes.iter().zip(of_plane).collect();
         let p = &p[..];
-        pool.each(&mut work, |(plane, sums)| plane.add(p, terms, sums));
+        pool.each(&mut work, |(plane, sums)| {
+            let Plane { found, xi, .. } = plane;
+            let count = found.own.len() + found.next.len();
+            sums.clear();
+            sums.resize(count, [0.0; 4]);
+            add_pairs(set, &found.list, xi, terms, &p[found.own.start..][..count], sums);
+        });
     }
 
-    /// The sums of the particles of a plane.
-    pub fn of(&self, planes: &[Plane], number: usize) -> impl Iterator<Item = Wide> {
+    /// Of the particles of a plane, what pairs of that plane add, and what those of the plane below do: nothing, if that
+    /// does not see them.
+    pub fn halves(&self, planes: &[Plane], number: usize) -> [&[Wide]; 2] {
         let below = match number {
             0 => planes.len() - 1,
             number => number - 1,
         };
         let own = &self.of_plane[number][..planes[number].found.own.len()];
-        let from_below = match planes[below].found.next == planes[number].found.own {
-            true => &self.of_plane[below][planes[below].found.own.len()..],
-            false => &[],
-        };
+        match planes[below].found.next == planes[number].found.own {
+            true => [own, &self.of_plane[below][planes[below].found.own.len()..]],
+            false => [own, &[]],
+        }
+    }
+
+    /// The sums of the particles of a plane.
+    pub fn of(&self, planes: &[Plane], number: usize) -> impl Iterator<Item = Wide> {
+        let [own, below] = self.halves(planes, number);
         let zeros = std::iter::repeat(&[0.0; 4]);
-        own.iter().zip(from_below.iter().chain(zeros)).map(|(a, b)| [0, 1, 2, 3].map(|c| a[c] + b[c]))
+        own.iter().zip(below.iter().chain(zeros)).map(|(a, b)| [0, 1, 2, 3].map(|c| a[c] + b[c]))
     }
 }
 
 impl Plane {
-    fn add(&self, p: &[Wide], terms: Terms, sums: &mut Vec<Wide>) {
-        #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has AVX2.
-            return unsafe { self.add_avx2(p, terms, sums) };
-        }
-        self.add_portably(p, terms, sums);
-    }
-
-    /// The same operations in wider vectors; nothing is contracted, so the bits are the same.
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn add_avx2(&self, p: &[Wide], terms: Terms, sums: &mut Vec<Wide>) {
-        self.add_portably(p, terms, sums);
-    }
-
-    #[inline(always)]
-    fn add_portably(&self, p: &[Wide], terms: Terms, sums: &mut Vec<Wide>) {
-        sums.clear();
-        sums.resize(self.found.own.len() + self.found.next.len(), [0.0; 4]);
-        match terms.noise == 0.0 {
-            true => self.add_pairs::<false>(p, terms, sums),
-            false => self.add_pairs::<true>(p, terms, sums),
-        }
-    }
-
-    #[inline(always)]
-    fn add_pairs<const NOISE: bool>(&self, p: &[Wide], Terms { noise, drag }: Terms, sums: &mut [Wide]) {
-        let p = &p[self.found.own.start..][..sums.len()];
-        for (i, ends) in self.found.list.start.windows(2).enumerate() {
-            let of_i = ends[0] as usize..ends[1] as usize;
-            let at = p[i];
-            let mut sum = [0.0; 4];
-            let noises = if NOISE { &self.xi[of_i.clone()] } else { &[] };
-            for (k, pair) in self.found.list.pairs[of_i].iter().enumerate() {
-                let j = pair.j as usize;
-                let [x, y, z] = pair.g.map(f64::from);
-                let (g, other) = ([x, y, z, 0.0], p[j]);
-                let t: Wide = std::array::from_fn(|c| (at[c] - other[c]) * g[c]);
-                let along = (t[0] + t[2]) + (t[1] + t[3]);
-                let xi = if NOISE { noise * f64::from(noises[k]) } else { 0.0 };
-                let factor = xi - drag * along;
-                let push: Wide = g.map(|g| factor * g);
-                let to = &mut sums[j];
-                for c in 0..4 {
-                    sum[c] += push[c];
-                    to[c] -= push[c];
-                }
-            }
-            for c in 0..4 {
-                sums[i][c] += sum[c];
-            }
-        }
-    }
-
     /// `Σ r_ij ⊗ F_ij` of the same forces: xx, yy, zz, xy, xz, yz; half of it for pairs with a ghost. `ghosts` may be empty.
     pub fn virial(&self, p: &[Wide], ghosts: &[bool], Terms { noise, drag }: Terms) -> [f64; 6] {
         let ghosts = ghosts.get(self.found.own.start..).unwrap_or_default();

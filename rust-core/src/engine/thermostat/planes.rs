@@ -47,15 +47,11 @@ impl Plane {
         let Plane { found: PlanePairs { own, next, list }, xi, tags: [a, b] } = self;
         a.clear();
         b.clear();
-        let (of_own, of_next) = (&tags[own.clone()], &tags[next.clone()]);
-        for (tag, ends) in of_own.iter().zip(list.start.windows(2)) {
-            let pairs = &list.pairs[ends[0] as usize..ends[1] as usize];
-            a.resize(a.len() + pairs.len(), *tag);
-            b.extend(pairs.iter().map(|pair| match (pair.j as usize).checked_sub(of_own.len()) {
-                None => of_own[pair.j as usize],
-                Some(k) => of_next[k],
-            }));
+        let tags = &tags[own.start..][..own.len() + next.len()];
+        for (tag, ends) in tags.iter().zip(list.start.windows(2)) {
+            a.resize(ends[1] as usize, *tag);
         }
+        b.extend(list.pairs.iter().map(|pair| tags[pair.j as usize]));
         xi.resize(list.pairs.len(), 0.0);
         noise.fill(law, a, b, xi);
     }

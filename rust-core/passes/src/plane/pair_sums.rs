@@ -1,0 +1,84 @@
+//! Sums over the listed pairs of a plane.
+
+use super::list::PairList;
+use crate::instruction_set::InstructionSet;
+use crate::simd::{Isa, Kernel, Quad, run};
+
+/// A vector with room to be a vector of the processor; the fourth component is 0.
+pub type Wide = [f64; 4];
+
+/// What a pair is multiplied by: `a` and `b` of [`add_pairs`].
+#[derive(Debug, Clone, Copy)]
+pub struct Terms {
+    pub noise: f64,
+    pub drag: f64,
+}
+
+/// Adds `g (a ξ − b g·(p_i − p_j))` to particle `i` of every pair, and subtracts it from `j`. `p` and `sums` are of the
+/// particles of the plane, then of those of the next; without noise `xi` is not read. The result is the same to the last bit
+/// on every instruction set.
+///
+/// # Panics
+/// Arrays are too short for the list.
+pub fn add_pairs(
+    set: InstructionSet,
+    list: &PairList,
+    xi: &[f32],
+    terms: Terms,
+    p: &[Wide],
+    sums: &mut [Wide],
+) {
+    let task = AddPairs { list, xi, terms, p, sums };
+    // SAFETY: the kernels ask for nothing but the processor.
+    unsafe {
+        match terms.noise == 0.0 {
+            true => run(set, WithNoise::<false>(task)),
+            false => run(set, WithNoise::<true>(task)),
+        }
+    }
+}
+
+struct AddPairs<'a> {
+    list: &'a PairList,
+    xi: &'a [f32],
+    terms: Terms,
+    p: &'a [Wide],
+    sums: &'a mut [Wide],
+}
+
+struct WithNoise<'a, const NOISE: bool>(AddPairs<'a>);
+
+impl<const NOISE: bool> Kernel for WithNoise<'_, NOISE> {
+    type Out = ();
+
+    #[inline(always)]
+    unsafe fn run<I: Isa>(self) {
+        let AddPairs { list, xi, terms, p, sums } = self.0;
+        // SAFETY: vectors are loaded from and stored to arrays of four numbers; the three of `g` are followed by `j`, which is
+        // as large.
+        unsafe {
+            let minus_drag = I::Quad::splat(-terms.drag);
+            for (i, ends) in list.start.windows(2).enumerate() {
+                let of_i = ends[0] as usize..ends[1] as usize;
+                let noises = if NOISE { &xi[of_i.clone()] } else { &[] };
+                let at = I::Quad::load(p[i].as_ptr());
+                let mut sum = I::Quad::zero();
+                for (k, pair) in list.pairs[of_i].iter().enumerate() {
+                    let j = pair.j as usize;
+                    let g = I::Quad::load_three_f32((&raw const *pair).cast());
+                    let along = at.sub(I::Quad::load(p[j].as_ptr())).mul(g).total();
+                    let mut factor = minus_drag.mul(along);
+                    if NOISE {
+                        factor = factor.add(I::Quad::splat(terms.noise * f64::from(noises[k])));
+                    }
+                    let push = factor.mul(g);
+                    sum = sum.add(push);
+                    let to = sums[j].as_mut_ptr();
+                    I::Quad::load(to).sub(push).store(to);
+                }
+                let to = sums[i].as_mut_ptr();
+                I::Quad::load(to).add(sum).store(to);
+            }
+        }
+    }
+}
