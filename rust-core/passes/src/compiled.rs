@@ -44,13 +44,13 @@ impl PairPrecision for Mixed {
 
     #[inline(never)]
     unsafe fn first(passes: &Passes<Mixed>, pass: First<Mixed>) -> Tally {
-        // SAFETY: the caller upholds it.
+        // SAFETY: the scheduler makes a first pass when the plane and the next one are filled, and no other thread has its sums.
         unsafe { passes.first(pass) }
     }
 
     #[inline(never)]
     unsafe fn second(passes: &Passes<Mixed>, pass: Second<Mixed>) {
-        // SAFETY: the caller upholds it.
+        // SAFETY: the scheduler makes a second pass behind the first one of its plane, when slopes are there.
         unsafe { passes.second(pass) }
     }
 }
@@ -62,13 +62,13 @@ impl PairPrecision for Double {
 
     #[inline(never)]
     unsafe fn first(passes: &Passes<Double>, pass: First<Double>) -> Tally {
-        // SAFETY: the caller upholds it.
+        // SAFETY: the scheduler makes a first pass when the plane and the next one are filled, and no other thread has its sums.
         unsafe { passes.first(pass) }
     }
 
     #[inline(never)]
     unsafe fn second(passes: &Passes<Double>, pass: Second<Double>) {
-        // SAFETY: the caller upholds it.
+        // SAFETY: the scheduler makes a second pass behind the first one of its plane, when slopes are there.
         unsafe { passes.second(pass) }
     }
 }

@@ -186,7 +186,7 @@ impl<I: Isa> Arithmetic<I> for Mixed {
 
     #[inline(always)]
     unsafe fn load_i_particles(first: *const MixedParticle, i_particles: &mut IParticles<f32>) {
-        // SAFETY: the caller upholds the contract of `simd`: pointers are valid for a vector.
+        // SAFETY: packed particles and lists of pairs are padded to vectors (`SortedParticles::make_room`, `SearchBuffers`).
         unsafe {
             let [x, y, z, tag, u, v, w, species] =
                 I::load_transposed::<true>(first.cast(), IN_ORDER.as_ptr());
@@ -211,7 +211,7 @@ impl<I: Isa> Arithmetic<I> for Mixed {
         with_velocities: bool,
     ) -> (PairGeometry<I::F32>, PairTags<I::F32>) {
         type W<I> = <<I as Isa>::F32 as Reals>::Words;
-        // SAFETY: the caller upholds the contract of `simd`: pointers are valid for a vector.
+        // SAFETY: packed particles and lists of pairs are padded to vectors (`SortedParticles::make_room`, `SearchBuffers`).
         unsafe {
             let i_particles = &*i_particles;
             let [sx, sy, sz] = metric.scale;
@@ -251,7 +251,7 @@ impl<I: Isa> Arithmetic<I> for Mixed {
 
     #[inline(always)]
     unsafe fn load_transposed<const ALL: bool>(records: *const f32, j_offsets: *const u32) -> [I::F32; 8] {
-        // SAFETY: the caller upholds the contract of `simd`: pointers are valid for a vector.
+        // SAFETY: packed particles and lists of pairs are padded to vectors (`SortedParticles::make_room`, `SearchBuffers`).
         unsafe {
             let load_transposed = I::load_transposed::<ALL>(records.cast(), j_offsets);
             let mut numbers = [I::F32::constant(0.0); 8];
@@ -266,7 +266,7 @@ impl<I: Isa> Arithmetic<I> for Mixed {
 
     #[inline(always)]
     unsafe fn load_quad(p: *const f32) -> I::Quad {
-        // SAFETY: the caller upholds the contract of `simd`: pointers are valid for a vector.
+        // SAFETY: packed particles and lists of pairs are padded to vectors (`SortedParticles::make_room`, `SearchBuffers`).
         unsafe { <I::Quad as crate::simd::Quad>::load_f32(p) }
     }
 }
@@ -305,7 +305,7 @@ impl<I: Isa> Arithmetic<I> for Double {
 
     #[inline(always)]
     unsafe fn load_i_particles(first: *const DoubleParticle, i_particles: &mut IParticles<f64>) {
-        // SAFETY: the caller upholds the contract of `simd`: pointers are valid for a vector.
+        // SAFETY: packed particles and lists of pairs are padded to vectors (`SortedParticles::make_room`, `SearchBuffers`).
         unsafe {
             let [x, y, z, bits, u, v, w, _] =
                 I::load_transposed_wide::<true>(first.cast(), IN_ORDER.as_ptr());
@@ -330,7 +330,7 @@ impl<I: Isa> Arithmetic<I> for Double {
         j_offsets: *const u32,
         with_velocities: bool,
     ) -> (PairGeometry<I::F64>, PairTags<I::F64>) {
-        // SAFETY: the caller upholds the contract of `simd`: pointers are valid for a vector.
+        // SAFETY: packed particles and lists of pairs are padded to vectors (`SortedParticles::make_room`, `SearchBuffers`).
         unsafe {
             let i_particles = &*i_particles;
             let ([lx, ly, lz], [ix, iy, iz], [xy, xz, yz]) = (metric.length, metric.inverse, metric.tilt);
@@ -373,13 +373,13 @@ impl<I: Isa> Arithmetic<I> for Double {
 
     #[inline(always)]
     unsafe fn load_transposed<const ALL: bool>(records: *const f64, j_offsets: *const u32) -> [I::F64; 8] {
-        // SAFETY: the caller upholds the contract of `simd`: pointers are valid for a vector.
+        // SAFETY: packed particles and lists of pairs are padded to vectors (`SortedParticles::make_room`, `SearchBuffers`).
         unsafe { I::load_transposed_wide::<ALL>(records.cast(), j_offsets) }
     }
 
     #[inline(always)]
     unsafe fn load_quad(p: *const f64) -> I::Quad {
-        // SAFETY: the caller upholds the contract of `simd`: pointers are valid for a vector.
+        // SAFETY: packed particles and lists of pairs are padded to vectors (`SortedParticles::make_room`, `SearchBuffers`).
         unsafe { <I::Quad as crate::simd::Quad>::load(p) }
     }
 }

@@ -57,7 +57,7 @@ impl<R: Reals> SpeciesPair<R> {
     /// The contract of `simd`.
     #[inline(always)]
     pub unsafe fn new(species_i: R::Words, species_j: R::Words, species: usize) -> SpeciesPair<R> {
-        // SAFETY: the caller upholds it.
+        // SAFETY: arithmetic of vectors, which there are only below `simd::run`; nothing is read from memory.
         unsafe {
             let mut row = R::Words::splat(0);
             let mut k = 0;
@@ -114,6 +114,7 @@ impl<R: Reals> TableLookup<R> {
 /// The contract of `simd`. The table is padded to a vector, the indices are below its length.
 #[inline(always)]
 pub unsafe fn table_entry<R: Reals>(table: *const R::Scalar, index: R::Words, fits_vector: bool) -> R {
-    // SAFETY: the caller upholds it.
+    // SAFETY: a table that `SpeciesPairTable::new` has padded to a vector, and indices that `SpeciesPair::new` made of its
+    // species.
     unsafe { if fits_vector { R::pick(table, index) } else { R::lookup(table, index) } }
 }

@@ -32,7 +32,7 @@ pub unsafe fn evaluate<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const
     batch: Batch,
     tally: &mut Tally,
 ) {
-    // SAFETY: the caller upholds the contract, which is that of every step.
+    // SAFETY: every step reads and writes arrays of this batch, which `BatchBuffers::reserve` has padded to vectors.
     unsafe {
         measure_pairs::<I, A, MULTISPECIES>(inputs, constants, buffers, batch);
         let mut sums = PairSums::<A::Reals>::zero();
@@ -136,7 +136,7 @@ unsafe fn further_terms<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, cons
     sums: &mut PairSums<A::Reals>,
     tally: &mut Tally,
 ) {
-    // SAFETY: the caller upholds the contract of every term.
+    // SAFETY: every term reads and writes arrays of this batch, which `BatchBuffers::reserve` has padded to vectors.
     unsafe {
         let terms = inputs.terms;
         let vectors = batch.count.div_ceil(A::Reals::LANES);

@@ -63,7 +63,7 @@ pub struct CachedBatch {
 /// The field has room for it.
 #[inline(always)]
 unsafe fn at<T>(field: &mut Vec<CacheVector<T>>, end: usize) -> *mut T {
-    // SAFETY: the caller upholds the room.
+    // SAFETY: `reserve` has made room for whole vectors of the next batch in every field.
     unsafe { field.as_mut_ptr().add(end).cast() }
 }
 
@@ -116,7 +116,7 @@ impl<T: Scalar> FullPairCache<T> {
     /// There is such a field, with room for the vector.
     #[inline(always)]
     unsafe fn field(&mut self, field: usize) -> *mut T {
-        // SAFETY: the caller upholds it.
+        // SAFETY: fields are those that `clear` has made; `reserve` has made room in them.
         unsafe { at(self.fields.get_unchecked_mut(field), self.end) }
     }
 
@@ -218,8 +218,7 @@ impl<R: Reals> ShapeVisitor for WeightGradients<'_, R> {
     /// Writes `−w′(r)/r`, zero beyond the range and in padding lanes.
     #[inline(always)]
     fn visit<S: Shape>(self) {
-        // SAFETY: made by `append_to_cache` alone, whose caller upholds the contract of `simd`; there is room for whole
-        // vectors.
+        // SAFETY: `append_to_cache` has made room for whole vectors.
         unsafe {
             let range = R::splat(self.term.force_range);
             let inverse_range = R::splat(self.term.force_inverse_range);

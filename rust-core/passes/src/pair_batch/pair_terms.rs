@@ -35,7 +35,7 @@ impl<R: Reals> PairSums<R> {
 /// The contract of `simd`.
 #[inline(always)]
 pub unsafe fn add_virial<R: Reals>(f: R, d: [R; 3], sum: &mut [R; 6]) {
-    // SAFETY: the caller upholds the contract of `simd`.
+    // SAFETY: arithmetic of vectors, which there are only below `simd::run`; nothing is read from memory.
     unsafe {
         let fd = [f * d[0], f * d[1], f * d[2]];
         sum[0] = fd[0].mul_add(d[0], sum[0]);
@@ -152,7 +152,7 @@ unsafe fn each<R: Reals, const MULTISPECIES: bool, const TALLY: bool>(
     vectors: usize,
     energy: &mut R,
 ) {
-    // SAFETY: the caller upholds the contract of `simd`.
+    // SAFETY: all arrays of a batch are padded to whole vectors by `BatchBuffers::reserve`.
     unsafe {
         let p_pairs = buffers.pairs.as_ptr().cast::<PairVector<R>>();
         let p_force = buffers.conservative.as_mut_ptr();
@@ -185,7 +185,7 @@ struct SoftTerm<R: Reals> {
 impl<R: Reals> SoftTerm<R> {
     #[inline(always)]
     unsafe fn new(term: &Soft<R::Scalar>) -> Self {
-        // SAFETY: the caller upholds the contract of `simd`.
+        // SAFETY: tables are padded to a vector by `SpeciesPairTable::new`.
         unsafe {
             SoftTerm {
                 strength: TableLookup::new(&term.strength),
@@ -206,7 +206,7 @@ impl<R: Reals> Term<R> for SoftTerm<R> {
         pair_weight: R,
         energy: &mut R,
     ) -> R {
-        // SAFETY: the caller upholds the contract of `simd`.
+        // SAFETY: arithmetic of vectors, which there are only below `simd::run`; tables are padded.
         unsafe {
             let (one, zero) = (R::constant(1.0), R::constant(0.0));
             let t = (one - r * self.inverse_range.lookup::<MULTISPECIES>(species_pair)).larger(zero);
@@ -230,7 +230,7 @@ pub unsafe fn add_soft<R: Reals, const MULTISPECIES: bool, const TALLY: bool>(
     vectors: usize,
     energy: &mut R,
 ) {
-    // SAFETY: the caller upholds the contract of `simd`.
+    // SAFETY: tables are padded to a vector by `SpeciesPairTable::new`.
     unsafe { each::<R, MULTISPECIES, TALLY>(SoftTerm::<R>::new(term), buffers, vectors, energy) }
 }
 
@@ -254,7 +254,7 @@ impl<R: Reals, S: Shape> Term<R> for LinearTerm<R, S> {
         pair_weight: R,
         energy: &mut R,
     ) -> R {
-        // SAFETY: the caller upholds the contract of `simd`.
+        // SAFETY: tables are padded, and the rest is arithmetic of vectors.
         unsafe {
             let one = R::constant(1.0);
             if TALLY {
@@ -341,7 +341,7 @@ impl<R: Reals> Term<R> for SplineTerm<R> {
         pair_weight: R,
         energy: &mut R,
     ) -> R {
-        // SAFETY: the caller upholds the contract of `simd`.
+        // SAFETY: tables are padded, and the rest is arithmetic of vectors.
         unsafe {
             let (one, zero) = (R::constant(1.0), R::constant(0.0));
             let inverse_a = self.repulsion_inverse_range.lookup::<MULTISPECIES>(species_pair);
@@ -373,7 +373,7 @@ pub unsafe fn add_spline<R: Reals, const MULTISPECIES: bool, const TALLY: bool>(
     vectors: usize,
     energy: &mut R,
 ) {
-    // SAFETY: the caller upholds the contract of `simd`.
+    // SAFETY: tables are padded to a vector by `SpeciesPairTable::new`.
     unsafe {
         let term = SplineTerm::<R> {
             repulsion: TableLookup::new(&term.repulsion),

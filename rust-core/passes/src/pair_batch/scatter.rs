@@ -68,7 +68,8 @@ pub unsafe fn scatter_quads<I: Isa, A: Arithmetic<I>>(
     sign: [f64; 4],
     pairs: ScatterPairs,
 ) {
-    // SAFETY: the caller upholds it.
+    // SAFETY: the search lists particles of the plane and of the next, of which the scheduler has made accumulators;
+    // `BatchBuffers::reserve` and `second_pass_cached` leave room behind the last pair.
     unsafe {
         let sign = I::Quad::load(sign.as_ptr());
         let ScatterPairs { j_offsets, begin, first, members } = pairs;
@@ -118,7 +119,7 @@ pub unsafe fn scatter_quads<I: Isa, A: Arithmetic<I>>(
 /// The contract of `simd`.
 #[inline(always)]
 pub unsafe fn add_quad<Q: Quad>(p: *mut f64, x: Q) {
-    // SAFETY: the caller upholds it.
+    // SAFETY: `PlaneAccumulators::at` points to four numbers.
     unsafe { Q::load(p).add(x).store(p) }
 }
 

@@ -18,7 +18,7 @@ const _: () = assert!(PAIR_ROUNDS == 13);
 /// The contract of `simd`. Both arrays have room for two vectors behind the last pair.
 #[inline(always)]
 pub unsafe fn draw<W: Words>(noise: PairNoise, a: *mut u32, b: *const u32, count: usize) {
-    // SAFETY: the caller upholds it.
+    // SAFETY: `BatchBuffers::reserve` leaves room for two vectors behind the tags of the last pair.
     unsafe {
         let [k0, k1] = noise.key();
         let schedule = [W::splat(k0), W::splat(k1), W::splat(PARITY ^ k0 ^ k1)];
@@ -48,7 +48,7 @@ pub unsafe fn draw<W: Words>(noise: PairNoise, a: *mut u32, b: *const u32, count
 /// Four rounds of Threefry, with rotations from number `at` on.
 #[inline(always)]
 unsafe fn four_rounds<W: Words>(x0: [W; 2], x1: [W; 2], at: usize) -> ([W; 2], [W; 2]) {
-    // SAFETY: called by `draw` alone, whose caller upholds the contract of `simd`.
+    // SAFETY: arithmetic of vectors, which there are only below `simd::run`; nothing is read from memory.
     unsafe {
         let (x0, x1) = round(x0, x1, ROTATIONS[at]);
         let (x0, x1) = round(x0, x1, ROTATIONS[at + 1]);
@@ -59,7 +59,7 @@ unsafe fn four_rounds<W: Words>(x0: [W; 2], x1: [W; 2], at: usize) -> ([W; 2], [
 
 #[inline(always)]
 unsafe fn round<W: Words>([a0, b0]: [W; 2], [a1, b1]: [W; 2], by: u32) -> ([W; 2], [W; 2]) {
-    // SAFETY: called by `draw` alone, whose caller upholds the contract of `simd`.
+    // SAFETY: arithmetic of vectors, which there are only below `simd::run`; nothing is read from memory.
     unsafe {
         let x0 = [a0.add(a1), b0.add(b1)];
         let turned = [a1.rotate(by), b1.rotate(by)];
@@ -70,7 +70,7 @@ unsafe fn round<W: Words>([a0, b0]: [W; 2], [a1, b1]: [W; 2], by: u32) -> ([W; 2
 /// Adds the key after four rounds.
 #[inline(always)]
 unsafe fn inject<W: Words>(x0: [W; 2], x1: [W; 2], schedule: &[W; 3], number: usize) -> ([W; 2], [W; 2]) {
-    // SAFETY: called by `draw` alone, whose caller upholds the contract of `simd`.
+    // SAFETY: arithmetic of vectors, which there are only below `simd::run`; nothing is read from memory.
     unsafe {
         let first = schedule[number % 3];
         let second = schedule[(number + 1) % 3].add(W::splat(number as u32));
@@ -102,7 +102,7 @@ impl<'a, R: Reals> ThermostatWeight<'a, R> {
         exponent: &'a Exponent<R::Scalar>,
     ) -> ThermostatWeight<'a, R> {
         ThermostatWeight {
-            // SAFETY: the caller upholds it.
+            // SAFETY: tables are padded to a vector by `SpeciesPairTable::new`.
             inverse_range: unsafe { TableLookup::new(inverse_range) },
             exponent: match exponent {
                 Exponent::One => Power::One,
@@ -116,7 +116,7 @@ impl<'a, R: Reals> ThermostatWeight<'a, R> {
     /// The contract of `simd`.
     #[inline(always)]
     pub unsafe fn weight<const MULTISPECIES: bool>(&self, r: R, species_pair: SpeciesPair<R>) -> R {
-        // SAFETY: the caller upholds it.
+        // SAFETY: tables are padded to a vector by `SpeciesPairTable::new`.
         unsafe {
             let t = R::constant(1.0) - r * self.inverse_range.lookup::<MULTISPECIES>(species_pair);
             let t = t.larger(R::constant(0.0));
@@ -143,7 +143,7 @@ impl<'a, R: Reals> ThermostatForce<'a, R> {
     /// The contract of `simd`.
     #[inline(always)]
     pub unsafe fn new(tables: &'a ThermostatTables<R::Scalar>, noise_scale: R) -> Self {
-        // SAFETY: the caller upholds it.
+        // SAFETY: tables are padded to a vector by `SpeciesPairTable::new`.
         unsafe {
             ThermostatForce {
                 gamma: TableLookup::new(&tables.gamma),
@@ -160,7 +160,7 @@ impl<'a, R: Reals> ThermostatForce<'a, R> {
     /// The contract of `simd`.
     #[inline(always)]
     pub unsafe fn force<const MULTISPECIES: bool>(&self, pairs: &PairVector<R>, word: R::Words) -> R {
-        // SAFETY: the caller upholds it.
+        // SAFETY: tables are padded to a vector by `SpeciesPairTable::new`.
         unsafe {
             let species_pair = pairs.species_pair;
             let w = self.weight.weight::<MULTISPECIES>(pairs.geometry.r, species_pair);

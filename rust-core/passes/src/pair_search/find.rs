@@ -49,8 +49,8 @@ impl FindPairs<'_> {
     #[inline(always)]
     unsafe fn in_clusters<I: Isa, const CLUSTER: usize>(self) {
         let FindPairs { cells, plane, stencil, ranges, group: [first, count], batch_size, buffers } = self;
-        // SAFETY: the caller upholds the contract of `simd`; the group is not longer than `SEARCH_GROUP`, for which ranges
-        // and buffers have room.
+        // SAFETY: particles are padded by `SortedParticles::make_room`; the group is not longer than `SEARCH_GROUP`, for which
+        // ranges and buffers have room.
         unsafe {
             let flags = plane.cell_ranges::<I, CLUSTER>(cells, stencil, [first, count], ranges);
             let group = SearchGroup { plane, stencil, flags, first, count };

@@ -116,7 +116,7 @@ pub unsafe fn form_j_clusters<I: Isa, const GHOSTS: bool, const CLUSTER: usize>(
 /// `w` is below 5, `a` below the size of a search group.
 #[inline(always)]
 unsafe fn cell_of(indices: &CellIndices, w: usize, a: usize) -> usize {
-    // SAFETY: the caller upholds the bounds.
+    // SAFETY: both loops over stencil columns and over the particles of a group end below the sizes of these arrays.
     unsafe { *indices.get_unchecked(w).get_unchecked(a) as usize }
 }
 

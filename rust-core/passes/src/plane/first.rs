@@ -32,7 +32,7 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, con
 ) -> Tally {
     let (cells, inputs) = (&data.cells, &data.inputs);
     let passes = inputs.terms.passes.len();
-    // SAFETY: the plane is one of the grid; the caller upholds the rest.
+    // SAFETY: the plane is one of the grid; the scheduler has filled it and the next one.
     unsafe {
         if MULTISPECIES && inputs.caches_all_pairs() {
             in_range.full_cache.clear(passes, TALLY);

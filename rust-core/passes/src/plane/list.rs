@@ -79,7 +79,8 @@ pub unsafe fn list_pairs(
     list.pairs.clear();
     list.stretch.clear();
     let task = ListPairs { inputs, plane, buffers, list };
-    // SAFETY: the caller upholds it.
+    // SAFETY: `PairLists::find` sorts all particles of the box into the arrays before any plane is listed, and writes none
+    // of them then.
     unsafe {
         match inputs.tables.species {
             1 => run(set, WithSpecies::<false>(task)),

@@ -33,7 +33,7 @@ impl ISums {
     /// The contract of `simd`; `m` is below 16.
     #[inline(always)]
     unsafe fn take<Q: Quad>(&mut self, m: usize) -> Q {
-        // SAFETY: the caller upholds it.
+        // SAFETY: the loops over i-particles end at the members of a batch, at most sixteen.
         unsafe {
             let mut sums = [Q::zero(); TURNS];
             let mut p = 0;

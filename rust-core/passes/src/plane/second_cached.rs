@@ -25,7 +25,8 @@ pub unsafe fn second_pass_cached<I: Isa, A: Arithmetic<I>, const MULTISPECIES: b
     cache: &FullPairCache<A::Scalar>,
     virial: &mut [f64; 6],
 ) {
-    // SAFETY: work space has room for whole vectors of the largest batch, and a quad behind; the caller upholds the rest.
+    // SAFETY: work space has room for whole vectors of the largest batch, and a quad behind; the pairs are those that
+    // `append_to_cache` kept in this evaluation, slopes those that the scheduler has waited for.
     unsafe {
         let to = sums.forces();
         let room = cache.most / 16 + 2;
@@ -212,7 +213,8 @@ unsafe fn whole_forces<R: Reals, const TALLY: bool>(
     quads: *mut R::Scalar,
     virial: &mut [f64; 6],
 ) {
-    // SAFETY: the caller upholds it; with `TALLY` the last field is that of pair weights.
+    // SAFETY: a batch begins at a vector of its own in every field, and `quads` and `factors` are as long as the largest
+    // batch; with `TALLY` the last field is that of pair weights.
     unsafe {
         let [x, y, z] = [0, 1, 2].map(|c| pairs.field(SEPARATION + c));
         let force = pairs.field(FORCE);

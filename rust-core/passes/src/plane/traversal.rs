@@ -30,7 +30,7 @@ pub unsafe fn each_batch<I: Isa, V: BatchVisitor<I>>(
     buffers: &mut SearchBuffers,
     visitor: &mut V,
 ) -> u64 {
-    // SAFETY: columns are those of the grid, groups and batches those of a column; the caller upholds the rest.
+    // SAFETY: columns are those of the grid, groups and batches those of a column; particles behind them are padding.
     unsafe {
         let grid = cells.grid;
         let search = PlaneSearch::new(cells, plane);
