@@ -7,9 +7,6 @@
 //! fixed seed Threefry permutes its counters, so no two steps share a key and, within a step, no two
 //! pairs share a counter.
 
-use crate::instruction_set::InstructionSet;
-use crate::simd::{Isa, Kernel, run};
-
 pub const ROTATIONS: [u32; 8] = [13, 15, 26, 6, 17, 29, 16, 24];
 pub const PARITY: u32 = 0x1BD1_1BDA;
 
@@ -96,12 +93,6 @@ impl PairNoise {
         PairNoise::new(seed, step | u64::from(stream) << 56)
     }
 
-    /// The noise of each pair of tags `a[k]`, `b[k]`, in single precision: the same bits on every instruction set.
-    pub fn fill(&self, law: Law, a: &[u32], b: &[u32], xi: &mut [f32]) {
-        // SAFETY: the kernel asks for nothing but the processor.
-        unsafe { run(InstructionSet::best(), Fill { noise: *self, law, a, b, xi }) }
-    }
-
     /// The key of the pairs of this step.
     pub fn key(&self) -> [u32; 2] {
         self.key
@@ -148,31 +139,4 @@ pub fn normal(words: [u32; 2]) -> f32 {
                     * (1.0 - q * (1.0 / 42.0) * (1.0 - q * (1.0 / 72.0) * (1.0 - q * (1.0 / 110.0)))));
     let sine = h * sine;
     (-2.0 * logarithm).max(0.0).sqrt() * (1.0 - 2.0 * sine * sine)
-}
-
-/// The noise of many pairs, in a loop that the compiler makes vectors of.
-struct Fill<'a> {
-    noise: PairNoise,
-    law: Law,
-    a: &'a [u32],
-    b: &'a [u32],
-    xi: &'a mut [f32],
-}
-
-impl Kernel for Fill<'_> {
-    type Out = ();
-
-    #[inline(always)]
-    unsafe fn run<I: Isa>(self) {
-        let Fill { noise, law, a, b, xi } = self;
-        let pairs = xi.iter_mut().zip(a).zip(b);
-        match law {
-            Law::Gaussian => {
-                pairs.for_each(|((xi, a), b)| {
-                    *xi = normal(thirteen_rounds([*a.min(b), *a.max(b)], noise.key))
-                });
-            }
-            Law::Uniform => pairs.for_each(|((xi, a), b)| *xi = noise.xi(*a, *b) as f32),
-        }
-    }
 }

@@ -4,6 +4,7 @@ pub mod buffers;
 pub mod data;
 pub mod first;
 pub mod list;
+pub mod listed_noise;
 pub mod pair_sums;
 pub mod second;
 pub mod second_cached;
