@@ -1,9 +1,9 @@
-//! psidpd pair styles for LAMMPS: `dpd/psi`, `mdpd/psi` and `dpd/spline`, and the fix style `dpd/splitting`. LAMMPS loads the entry, in `entry/`, which loads
-//! this.
+//! psidpd pair styles for LAMMPS: `dpd/psi`, `mdpd/psi` and `dpd/spline`, and the fix style `dpd/splitting`. LAMMPS
+//! loads the entry, in `entry/`, which loads this.
 //!
 //! - [`style`]: what a pair style asks of the engine, in safe Rust;
 //! - [`thermostat`]: what the fix asks of it beside;
-//! - [`units`]: from the units of LAMMPS to those of a model;
+//! - [`units`]: one unit of a model in those of LAMMPS; `converted`: positions, velocities and forces from one to the other;
 //! - [`bridge`]: the same for C++, by cxx: slices, strings and exceptions, checked at compile time;
 //! - `cpp/`: the styles that LAMMPS sees, compiled against the headers of one LAMMPS;
 //! - `table`: the styles, as the entry finds them.
@@ -12,6 +12,7 @@
 //! neighbour list is requested only where it alone knows which pairs act.
 
 pub mod bridge;
+mod converted;
 pub mod style;
 pub mod thermostat;
 pub mod units;

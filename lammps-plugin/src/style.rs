@@ -1,5 +1,6 @@
 //! One pair style's engine, and the mapping from LAMMPS's types to species.
 
+use crate::converted::{Converted, times};
 use crate::units::Scale;
 use psidpd_core::engine::thermostat::PairThermostat;
 use psidpd_core::engine::{
@@ -95,78 +96,14 @@ pub(crate) fn guard<T>(work: impl FnOnce() -> Result<T, StyleError>) -> Result<T
     })
 }
 
-/// Positions and velocities in units of the model, and results in those of LAMMPS.
-#[derive(Debug, Default)]
-struct Converted {
-    x: Vec<f64>,
-    v: Vec<f64>,
-    forces: Vec<f64>,
-    densities: Vec<f64>,
-    excess: Vec<f64>,
-}
-
-/// `numbers` times `factor`.
-fn times<'a>(numbers: &[f64], factor: f64, out: &'a mut Vec<f64>) -> &'a [f64] {
-    out.clear();
-    out.extend(numbers.iter().map(|x| x * factor));
-    out
-}
-
-impl Converted {
-    /// What LAMMPS has, as the model takes it.
-    fn take<'a>(&'a mut self, scale: &Scale, x: &'a [f64], v: &'a [f64], step: Option<Step>) -> Taken<'a> {
-        if scale.is_one() {
-            return Taken { x, v, step, forces: &mut self.forces };
-        }
-        Taken {
-            x: times(x, 1.0 / scale.length, &mut self.x),
-            v: times(v, 1.0 / scale.velocity(), &mut self.v),
-            step: step.map(|step| Step { dt: step.dt / scale.time, ..step }),
-            forces: &mut self.forces,
-        }
-    }
-}
-
-/// The same in units of the model, and room for forces.
-struct Taken<'a> {
-    x: &'a [f64],
-    v: &'a [f64],
-    step: Option<Step>,
-    forces: &'a mut Vec<f64>,
-}
-
-impl Taken<'_> {
-    /// Adds to `f` the forces that `evaluate` adds to what it is given, and returns its totals.
-    fn add_forces(
-        self,
-        scale: &Scale,
-        f: &mut [f64],
-        evaluate: impl FnOnce(&mut [[f64; 3]]) -> Result<Tally, EngineError>,
-    ) -> Result<Tally, StyleError> {
-        if scale.is_one() {
-            return Ok(evaluate(f.as_chunks_mut::<3>().0)?);
-        }
-        self.forces.clear();
-        self.forces.resize(f.len(), 0.0);
-        let mut tally = evaluate(self.forces.as_chunks_mut::<3>().0)?;
-        for (f, force) in f.iter_mut().zip(&*self.forces) {
-            *f += scale.force() * force;
-        }
-        tally.excess *= scale.energy;
-        tally.pair *= scale.energy;
-        tally.virial.iter_mut().chain(&mut tally.thermostat_virial).for_each(|w| *w *= scale.energy);
-        Ok(tally)
-    }
-}
-
 /// Three numbers per particle, as LAMMPS stores them.
 pub(crate) fn triples(flat: &[f64]) -> &[[f64; 3]] {
     flat.as_chunks::<3>().0
 }
 
 impl Style {
-    /// Reads a model file, for a simulation in LAMMPS's `units` of that name; kT is in these. `names` has the species of each LAMMPS type, in order, or `NULL` for types
-    /// that another style of a hybrid computes.
+    /// Reads a model file, for a simulation in LAMMPS's `units` of that name; kT is in these. `names` has the species of each
+    /// LAMMPS type, in order, or `NULL` for types that another style of a hybrid computes.
     ///
     /// # Errors
     /// Anything wrong in the file, its dimensions, or the names.

@@ -42,8 +42,8 @@ use std::time::Instant;
 use times::lap;
 use workspace::{ForceSink, Input, Workspace};
 
-/// Forces of one fluid. Without ghosts an evaluation is [`Sweep::evaluate`]. On a rank of a host with ghosts it is [`Sweep::first`], a round of slopes from owners to ghosts, and
-/// [`Sweep::second`].
+/// Forces of one fluid. Without ghosts an evaluation is [`Sweep::evaluate`]. On a rank of a host with ghosts it is
+/// [`Sweep::first`], a round of slopes from owners to ghosts, and [`Sweep::second`].
 pub struct Sweep {
     plan: Plan,
     settings: Settings,

@@ -128,12 +128,11 @@ impl PairThermostat {
             .of_planes(planes)
             .into_iter()
             .zip(planes.iter().zip(parts))
-            .map(|(p, (plane, part))| {
-                let inverse_mass = &inverse_mass[plane.found.own.clone()];
-                Some(Direct { beta, inverse_mass, residual: &part.residual, p })
-            })
+            .map(|(p, (plane, part))| (p, &inverse_mass[plane.found.own.clone()], &part.residual[..]))
             .collect();
-        pool.each(&mut shares, |share| share.take().map_or((), |direct| vectors::run(*set, direct)));
+        pool.each(&mut shares, |(p, inverse_mass, residual)| {
+            vectors::run(*set, Direct { beta, inverse_mass, residual, p });
+        });
     }
 
     /// Adds δ to the velocities `v`.

@@ -13,7 +13,8 @@
 //! [`PairThermostat::find_pairs`] finds the pairs, by the search of the fast engine, [`PairThermostat::draw`] their noise, and
 //! [`PairThermostat::act`] changes velocities: `midpoint` for all pairs at once, `sequential` pair by pair.
 //! Results depend on positions, velocities and tags: not on the order of particles in memory, nor on the
-//! number of threads. On a rank with ghosts the midpoint rule goes on in rounds with the other ranks: `rank`. A new update is a variant of [`Update`] and its rule in one of these files.
+//! number of threads. On a rank with ghosts the midpoint rule goes on in rounds with the other ranks: `rank`. A new update is
+//! a variant of [`Update`] and its rule in one of these files.
 
 mod bodies;
 mod forces;

@@ -1,0 +1,75 @@
+//! What goes between LAMMPS and the model, from the units of one to those of the other.
+
+use crate::style::StyleError;
+use crate::units::Scale;
+use psidpd_core::engine::{EngineError, Step, Tally};
+
+/// Positions and velocities in units of the model, and results in those of LAMMPS.
+#[derive(Debug, Default)]
+pub struct Converted {
+    x: Vec<f64>,
+    v: Vec<f64>,
+    forces: Vec<f64>,
+    pub densities: Vec<f64>,
+    pub excess: Vec<f64>,
+}
+
+/// `numbers` times `factor`.
+pub fn times<'a>(numbers: &[f64], factor: f64, out: &'a mut Vec<f64>) -> &'a [f64] {
+    out.clear();
+    out.extend(numbers.iter().map(|x| x * factor));
+    out
+}
+
+impl Converted {
+    /// What LAMMPS has, as the model takes it.
+    pub fn take<'a>(
+        &'a mut self,
+        scale: &Scale,
+        x: &'a [f64],
+        v: &'a [f64],
+        step: Option<Step>,
+    ) -> Taken<'a> {
+        if scale.is_one() {
+            return Taken { x, v, step, forces: &mut self.forces };
+        }
+        Taken {
+            x: times(x, 1.0 / scale.length, &mut self.x),
+            v: times(v, 1.0 / scale.velocity(), &mut self.v),
+            step: step.map(|step| Step { dt: step.dt / scale.time, ..step }),
+            forces: &mut self.forces,
+        }
+    }
+}
+
+/// The same in units of the model, and room for forces.
+pub struct Taken<'a> {
+    pub x: &'a [f64],
+    pub v: &'a [f64],
+    pub step: Option<Step>,
+    forces: &'a mut Vec<f64>,
+}
+
+impl Taken<'_> {
+    /// Adds to `f` the forces that `evaluate` adds to what it is given, and returns its totals.
+    pub fn add_forces(
+        self,
+        scale: &Scale,
+        f: &mut [f64],
+        evaluate: impl FnOnce(&mut [[f64; 3]]) -> Result<Tally, EngineError>,
+    ) -> Result<Tally, StyleError> {
+        if scale.is_one() {
+            return Ok(evaluate(f.as_chunks_mut::<3>().0)?);
+        }
+        self.forces.clear();
+        self.forces.resize(f.len(), 0.0);
+        let mut tally = evaluate(self.forces.as_chunks_mut::<3>().0)?;
+        for (f, force) in f.iter_mut().zip(&*self.forces) {
+            *f += scale.force() * force;
+        }
+        tally.excess *= scale.energy;
+        tally.pair *= scale.energy;
+        tally.virial.iter_mut().chain(&mut tally.thermostat_virial).for_each(|w| *w *= scale.energy);
+        Ok(tally)
+    }
+}
