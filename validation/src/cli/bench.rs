@@ -85,7 +85,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         lammps: arguments.lammps.clone(),
         out: arguments.out.clone(),
     };
-    let program = std::env::current_exe()?;
+    let program = super::program()?;
     let outcome = measure(&options, &program, &Progress::new())?;
     println!("{}", page::speeds(&outcome).to_text());
     if let Some(note) = page::few(&outcome.options) {

@@ -27,6 +27,15 @@ impl Failure {
 
     /// For the terminal, with escape sequences for colour: an error about a file shows the line.
     pub fn render(&self) -> String {
+        self.rendered(&Renderer::styled())
+    }
+
+    /// The same as plain text.
+    pub fn plain(&self) -> String {
+        self.rendered(&Renderer::plain())
+    }
+
+    fn rendered(&self, renderer: &Renderer) -> String {
         let shows = |e: &&FileError| {
             let text = e.file().text();
             !text.is_empty() && text.lines().all(|line| line.len() <= LONGEST_LINE)
@@ -50,7 +59,7 @@ impl Failure {
         if let Some(help) = help.or_else(|| Some(file_error(&*self.0)?.help()?.to_string())) {
             report = report.element(Level::HELP.message(printable(&help)));
         }
-        Renderer::styled().render(&[report])
+        renderer.render(&[report])
     }
 }
 

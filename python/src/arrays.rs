@@ -1,0 +1,75 @@
+//! Arrays of numpy as slices.
+
+use crate::errors::wrong;
+use numpy::{PyArrayDyn, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+/// Numbers in one piece, in the order of C, as 64-bit floating point: those of `object` itself where they are so already,
+/// else a copy.
+///
+/// # Errors
+/// `object` is no array of real numbers.
+pub fn numbers<'py>(object: &Bound<'py, PyAny>, name: &str) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
+    as_array(object, name, "float64", "iuf", "real numbers")
+}
+
+/// Whole numbers in one piece, as 32-bit integers.
+///
+/// # Errors
+/// `object` is no array of whole numbers.
+pub fn integers<'py>(object: &Bound<'py, PyAny>, name: &str) -> PyResult<PyReadonlyArrayDyn<'py, i32>> {
+    let array = object.py().import("numpy")?.call_method1("asarray", (object,))?;
+    // Conversion would wrap what is too large.
+    let outside = array.getattr("dtype")?.getattr("kind")?.extract::<String>()? != "b"
+        && array.getattr("size")?.extract::<usize>()? > 0
+        && array.getattr("dtype")?.getattr("itemsize")?.extract::<usize>()? >= 4
+        && array.call_method0("max")?.gt(i32::MAX)?;
+    if outside {
+        return Err(wrong(format!("{name}: a number is too large")));
+    }
+    as_array(&array, name, "int32", "iu", "whole numbers")
+}
+
+fn as_array<'py, T: numpy::Element>(
+    object: &Bound<'py, PyAny>,
+    name: &str,
+    dtype: &str,
+    kinds: &str,
+    of: &str,
+) -> PyResult<PyReadonlyArrayDyn<'py, T>> {
+    if let Ok(array) = object.cast::<PyArrayDyn<T>>()
+        && array.is_c_contiguous()
+    {
+        return readonly(array, name);
+    }
+    let numpy = object.py().import("numpy")?;
+    let array = numpy.call_method1("asarray", (object,))?;
+    let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
+    let empty = array.getattr("size")?.extract::<usize>()? == 0;
+    if !kinds.contains(&kind) && !empty {
+        let dtype = array.getattr("dtype")?;
+        return Err(wrong(format!("{name} must be an array of {of}, has the type {dtype}")));
+    }
+    let options = PyDict::new(object.py());
+    options.set_item("dtype", dtype)?;
+    options.set_item("order", "C")?;
+    let array = numpy.call_method("asarray", (array,), Some(&options))?;
+    readonly(array.cast()?, name)
+}
+
+fn readonly<'py, T: numpy::Element>(
+    array: &Bound<'py, PyArrayDyn<T>>,
+    name: &str,
+) -> PyResult<PyReadonlyArrayDyn<'py, T>> {
+    use numpy::PyArrayMethods;
+    array.try_readonly().map_err(|_| wrong(format!("{name} is being written to")))
+}
+
+/// A shape as numpy writes it: `(3, 2)`, `(3,)`.
+pub fn shown(shape: &[usize]) -> String {
+    match shape {
+        [one] => format!("({one},)"),
+        all => format!("({})", all.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")),
+    }
+}

@@ -1,0 +1,219 @@
+//! Forces of configurations.
+
+use crate::arrays::{integers, numbers, shown};
+use crate::errors::{exception, wrong};
+use crate::model::Model;
+use nalgebra::Matrix3;
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
+use psidpd::run::check_reach;
+use psidpd_core::engine::{self, Evaluated, PeriodicBox, Pool, Precision, Settings};
+use pyo3::prelude::*;
+use std::num::NonZeroUsize;
+use std::sync::{Mutex, PoisonError};
+
+/// The conservative forces of a model at one temperature: Engine(model, kT).evaluate(x, box, types).
+///
+/// `precision` is "double", or "mixed" as runs have it by default; `threads` share the work. One evaluation at a time:
+/// other threads of Python wait for it.
+#[pyclass(frozen, module = "psidpd")]
+pub struct Engine {
+    engine: Mutex<engine::Engine>,
+    species: Vec<String>,
+    dimensions: usize,
+    cutoff: f64,
+    description: String,
+}
+
+/// What a configuration comes to.
+#[pyclass(frozen, get_all, module = "psidpd")]
+pub struct Evaluation {
+    /// The potential energy U = Σ ψ + Σ φ.
+    energy: f64,
+    /// Σ r_ij ⊗ F_ij, shape (6,): xx, yy, zz, xy, xz, yz.
+    virial: Py<PyArray1<f64>>,
+    /// Weighted local densities, without corrections, shape (N, densities × species): for each density of the model
+    /// one column for each species.
+    densities: Py<PyArray2<f64>>,
+    /// Forces, in the shape of the positions.
+    forces: Py<PyArray2<f64>>,
+}
+
+#[pymethods]
+impl Engine {
+    #[new]
+    #[pyo3(signature = (model, kT, *, precision = "double", threads = 1))]
+    #[allow(non_snake_case)]
+    fn new(model: &Model, kT: f64, precision: &str, threads: usize) -> PyResult<Engine> {
+        let fluid = model.model.at(kT).map_err(exception)?;
+        let settings = settings(precision, threads)?;
+        let engine = engine::Engine::new(&fluid, settings).map_err(exception)?;
+        Ok(Engine {
+            species: model.model.species().to_vec(),
+            dimensions: fluid.dimensions,
+            cutoff: engine.plan().cutoff(),
+            description: format!("{}\n{settings:?}", engine.plan()),
+            engine: Mutex::new(engine),
+        })
+    }
+
+    /// The longest range of any force.
+    #[getter]
+    fn cutoff(&self) -> f64 {
+        self.cutoff
+    }
+
+    /// Energy, virial, densities and conservative forces of particles in a box.
+    ///
+    /// x : array (N, 3), in two dimensions also (N, 2): positions, wrapped or not. 64-bit numbers in the order of C are
+    ///     not copied.
+    /// box : a length, three lengths (two in two dimensions), or a matrix whose rows are the edge vectors.
+    /// types : array (N,) of indices of species, from 0, or of their names; left out, all are of the first species.
+    /// periodic : which directions repeat, all if left out.
+    ///
+    /// Raises InputError for arrays that do not fit, and where the energy is not finite.
+    #[pyo3(signature = (x, r#box, types = None, *, periodic = None))]
+    fn evaluate(
+        &self,
+        py: Python,
+        x: &Bound<PyAny>,
+        r#box: &Bound<PyAny>,
+        types: Option<&Bound<PyAny>>,
+        periodic: Option<Vec<bool>>,
+    ) -> PyResult<Evaluation> {
+        let positions = numbers(x, "x")?;
+        let (count, width) = match *positions.shape() {
+            [count, 3] => (count, 3),
+            [count, 2] if self.dimensions == 2 => (count, 2),
+            _ => {
+                let shape = shown(positions.shape());
+                return Err(wrong(format!("x must have the shape (N, {}), has {shape}", self.dimensions)));
+            }
+        };
+        let flat: Vec<[f64; 3]>;
+        let points: &[[f64; 3]] = match width {
+            3 => positions.as_slice()?.as_chunks().0,
+            _ => {
+                flat = positions.as_slice()?.as_chunks().0.iter().map(|[x, y]| [*x, *y, 0.0]).collect();
+                &flat
+            }
+        };
+        let kinds = self.kinds(types, count)?;
+        let periodic = directions(periodic, self.dimensions)?;
+        let domain = self.domain(r#box, periodic)?;
+        check_reach(&domain, self.dimensions, self.cutoff, count).map_err(exception)?;
+        // The arrays of numpy are borrowed, and nobody else can borrow them to write; a thread that writes without asking
+        // changes what is computed, as with numpy's own functions.
+        let found = py.detach(|| {
+            let mut engine = self.engine.lock().unwrap_or_else(PoisonError::into_inner);
+            engine.evaluate(points, &domain, &kinds)
+        });
+        self.evaluation(py, found.map_err(exception)?, count, width)
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<psidpd.Engine\n{}>", self.description)
+    }
+}
+
+impl Engine {
+    fn kinds(&self, types: Option<&Bound<PyAny>>, count: usize) -> PyResult<Vec<i32>> {
+        let Some(types) = types else { return Ok(vec![0; count]) };
+        let kinds = match types.extract::<Vec<String>>() {
+            Ok(names) => names.iter().map(|name| self.index(name)).collect::<PyResult<Vec<i32>>>()?,
+            Err(_) => {
+                let types = integers(types, "types")?;
+                if types.shape() != [count] {
+                    let shape = shown(types.shape());
+                    return Err(wrong(format!(
+                        "types must have the shape ({count},), as many as positions; has {shape}"
+                    )));
+                }
+                types.as_slice()?.to_vec()
+            }
+        };
+        if kinds.len() != count {
+            return Err(wrong(format!("there are {count} positions and {} types", kinds.len())));
+        }
+        let last = self.species.len() - 1;
+        match kinds.iter().find(|kind| usize::try_from(**kind).map_or(true, |k| k > last)) {
+            Some(kind) => Err(wrong(format!(
+                "types: {kind} is no species; they count from 0 to {last}: {}",
+                self.species.join(", ")
+            ))),
+            None => Ok(kinds),
+        }
+    }
+
+    fn index(&self, name: &str) -> PyResult<i32> {
+        let found = self.species.iter().position(|s| s == name);
+        let known =
+            || wrong(format!("types: \"{name}\" is no species of this model: {}", self.species.join(", ")));
+        Ok(found.ok_or_else(known)? as i32)
+    }
+
+    fn domain(&self, object: &Bound<PyAny>, periodic: [bool; 3]) -> PyResult<PeriodicBox> {
+        let array = numbers(object, "box")?;
+        let given = array.as_slice()?;
+        let lengths = match (array.shape(), given) {
+            ([], [one]) | ([1], [one]) => [*one; 3],
+            ([3], [x, y, z]) => [*x, *y, *z],
+            ([2], [x, y]) if self.dimensions == 2 => [*x, *y, 1.0],
+            ([3, 3], all) => {
+                let edges = Matrix3::from_column_slice(all);
+                return PeriodicBox::new([0.0; 3], edges, periodic).map_err(|e| wrong(format!("box: {e}")));
+            }
+            (shape, _) => {
+                let shape = shown(shape);
+                return Err(wrong(format!(
+                    "box must be a length, three lengths or a 3 × 3 matrix, has the shape {shape}"
+                )));
+            }
+        };
+        PeriodicBox::orthogonal([0.0; 3], lengths, periodic).map_err(|e| wrong(format!("box: {e}")))
+    }
+
+    fn evaluation(&self, py: Python, found: Evaluated, count: usize, width: usize) -> PyResult<Evaluation> {
+        let Evaluated { energy, virial, densities, forces } = found;
+        let columns = densities.len().checked_div(count).unwrap_or(0);
+        let flat: Vec<f64> = match width {
+            3 => forces.into_flattened(),
+            _ => forces.iter().flat_map(|f| [f[0], f[1]]).collect(),
+        };
+        Ok(Evaluation {
+            energy,
+            virial: PyArray1::from_slice(py, &virial).unbind(),
+            densities: PyArray1::from_vec(py, densities).reshape([count, columns])?.unbind(),
+            forces: PyArray1::from_vec(py, flat).reshape([count, width])?.unbind(),
+        })
+    }
+}
+
+/// How forces are computed.
+///
+/// # Errors
+/// No such precision; too many threads, or none.
+pub fn settings(precision: &str, threads: usize) -> PyResult<Settings> {
+    let known = Precision::ALL.iter().find(|(name, _)| *name == precision);
+    let (_, precision) =
+        known.ok_or_else(|| wrong(format!("precision is \"mixed\" or \"double\", not \"{precision}\"")))?;
+    Ok(Settings { precision: *precision, threads: thread_count(threads)?, ..Settings::default() })
+}
+
+/// How many threads.
+///
+/// # Errors
+/// None, or more than there can be.
+pub fn thread_count(threads: usize) -> PyResult<NonZeroUsize> {
+    let count = NonZeroUsize::new(threads).filter(|n| n.get() <= Pool::MOST);
+    count.ok_or_else(|| wrong(format!("threads must be from 1 to {}, is {threads}", Pool::MOST)))
+}
+
+fn directions(given: Option<Vec<bool>>, dimensions: usize) -> PyResult<[bool; 3]> {
+    let all = [true, true, dimensions == 3];
+    match given.as_deref() {
+        None => Ok(all),
+        Some([x, y]) if dimensions == 2 => Ok([*x, *y, false]),
+        Some([x, y, z]) => Ok([*x, *y, *z && dimensions == 3]),
+        Some(other) => Err(wrong(format!("periodic must have {dimensions} entries, has {}", other.len()))),
+    }
+}

@@ -1,0 +1,40 @@
+//! psidpd for Python: the compiled part of the package `psidpd`, which adds what is easier said in Python.
+//!
+//! Arrays come and go without copies where numpy has them as 64-bit numbers in one piece. What takes long lets other
+//! threads of Python run. Errors are those of `psidpd.errors`, with the messages of the command line.
+
+mod arrays;
+mod engine;
+mod errors;
+mod model;
+mod phases;
+mod runs;
+
+use pyo3::prelude::*;
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+#[pymodule]
+mod _psidpd {
+    #[pymodule_export]
+    use super::engine::{Engine, Evaluation};
+    #[pymodule_export]
+    use super::model::Model;
+    #[pymodule_export]
+    use super::runs::{estimate, run_scene};
+    #[pymodule_export]
+    use super::{main, version};
+}
+
+/// Runs the program `psidpd` with these arguments, the first of them its name, and returns its exit code.
+/// `program` is a file that starts it.
+#[pyfunction]
+fn main(py: Python, program: PathBuf, arguments: Vec<OsString>) -> u8 {
+    py.detach(|| psidpd::cli::run(&program, arguments))
+}
+
+/// The version of psidpd.
+#[pyfunction]
+fn version() -> &'static str {
+    env!("CARGO_PKG_VERSION")
+}

@@ -1,0 +1,148 @@
+//! Models.
+
+use crate::arrays::{numbers, shown};
+use crate::errors::{exception, wrong};
+use crate::phases;
+use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
+use psidpd_core::model;
+use psidpd_core::theory::MeanField;
+use pyo3::prelude::*;
+use std::path::PathBuf;
+
+/// A fluid as a model file describes it: species, densities, excess free energies, pair potentials, thermostats.
+///
+/// `Model.from_file` and `Model.from_text` read one. The temperature is no part of it: whoever uses it gives kT.
+/// All numbers are in the reduced units of the model: lengths in r_c, masses in m, energies in the unit of kT.
+#[pyclass(frozen, module = "psidpd")]
+pub struct Model {
+    pub model: model::Model,
+}
+
+#[pymethods]
+impl Model {
+    /// Reads a model file.
+    ///
+    /// Raises InputError for anything wrong in it, with the line and the key.
+    #[staticmethod]
+    fn from_file(path: PathBuf) -> PyResult<Model> {
+        model::Model::open(&path).map(|model| Model { model }).map_err(exception)
+    }
+
+    /// Reads a model from a text, as a model file has it. Tables that it names are looked for from the present folder.
+    ///
+    /// Raises InputError for anything wrong in it, with the line and the key.
+    #[staticmethod]
+    #[pyo3(signature = (text, name = "model"))]
+    fn from_text(text: &str, name: &str) -> PyResult<Model> {
+        model::Model::parse(name, text).map(|model| Model { model }).map_err(exception)
+    }
+
+    /// What the file calls itself.
+    #[getter]
+    fn title(&self) -> &str {
+        self.model.title()
+    }
+
+    /// Where the model comes from, or None.
+    #[getter]
+    fn reference(&self) -> Option<&str> {
+        self.model.reference()
+    }
+
+    /// 2 or 3.
+    #[getter]
+    fn dimensions(&self) -> usize {
+        self.model.dimensions()
+    }
+
+    /// Names of the species.
+    #[getter]
+    fn species(&self) -> Vec<String> {
+        self.model.species().to_vec()
+    }
+
+    /// The constants of the file, by name.
+    #[getter]
+    fn parameters(&self) -> std::collections::BTreeMap<String, f64> {
+        self.model.parameters().clone()
+    }
+
+    /// The text of the file.
+    #[getter]
+    fn text(&self) -> &str {
+        self.model.source().text()
+    }
+
+    /// The pressure in mean field, in energy/length^d.
+    ///
+    /// `rho` is the number density: of one species a number or an array of any shape, and pressures come back in the same
+    /// shape; of S species an array whose last axis has S entries, and pressures come back without that axis. Mean
+    /// field leaves out correlations: a simulation differs where particles attract each other strongly.
+    ///
+    /// Raises InputError where the model has no pressure in mean field.
+    fn pressure<'py>(
+        &self,
+        rho: &Bound<'py, PyAny>,
+        #[allow(non_snake_case)] kT: f64,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let py = rho.py();
+        let theory = self.theory(kT)?;
+        let rho = numbers(rho, "rho")?;
+        let species = self.model.species().len();
+        let mut shape = rho.shape().to_vec();
+        if species > 1 && shape.pop() != Some(species) {
+            return Err(wrong(format!(
+                "rho has the shape {}, but its last axis must have {species} entries, one for each of {}",
+                shown(rho.shape()),
+                self.model.species().join(", ")
+            )));
+        }
+        let densities = rho.as_slice()?;
+        let pressures: Vec<f64> =
+            py.detach(|| densities.chunks_exact(species).map(|d| theory.pressure(d)).collect());
+        let found = PyArray1::from_vec(py, pressures).reshape(shape)?;
+        // A number for a number, as numpy's own functions have it.
+        found.get_item(())
+    }
+
+    /// Mean-field phases at kT, a number or several: a pandas DataFrame with one row for each kT.
+    ///
+    /// Of one species: densities `vapour` and `liquid` that coexist, their `pressure`, the densities `spinodal_low` and
+    /// `spinodal_high` between which the fluid is unstable, and the `tension` and `width` of the planar interface. Of two
+    /// species, at the total number density `density`: shares of the first species instead, `composition_low` and
+    /// `composition_high`. NaN stands for what there is not, and `note` says why.
+    ///
+    /// Raises InputError for more than two species, and where the model has no mean field.
+    #[pyo3(signature = (kT, density = None))]
+    fn phase_diagram<'py>(
+        &self,
+        #[allow(non_snake_case)] kT: &Bound<'py, PyAny>,
+        density: Option<f64>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let py = kT.py();
+        let temperatures = numbers(kT, "kT")?;
+        let temperatures = temperatures.as_slice()?;
+        let rows =
+            py.detach(|| temperatures.iter().map(|kt| phases::row(&self.model, *kt, density)).collect());
+        let rows: Vec<phases::Row> = Result::from_iter::<Vec<Result<_, _>>>(rows)?;
+        phases::frame(py, &rows)
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<psidpd.Model \"{}\", species {}>", self.model.title(), self.model.species().join(", "))
+    }
+
+    /// Models go to other processes as their text.
+    fn __reduce__<'py>(slf: &Bound<'py, Model>) -> PyResult<(Bound<'py, PyAny>, (String, String))> {
+        let source = slf.get().model.source();
+        let make = slf.get_type().getattr("from_text")?;
+        Ok((make, (source.text().to_owned(), source.name().to_owned())))
+    }
+}
+
+impl Model {
+    fn theory(&self, kt: f64) -> PyResult<MeanField> {
+        let fluid = self.model.at(kt).map_err(exception)?;
+        MeanField::new(&fluid).map_err(exception)
+    }
+}

@@ -1,0 +1,117 @@
+//! Runs of scenes.
+
+use crate::engine::{settings, thread_count};
+use crate::errors::{exception, wrong};
+use psidpd::observe;
+use psidpd::report::write_run_report;
+use psidpd::run::{Begin, Outcome, Runner};
+use psidpd::scene::Scene;
+use pyo3::exceptions::{PyKeyboardInterrupt, PyUserWarning};
+use pyo3::prelude::*;
+use std::ffi::CString;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+/// What stops a run: the number of SIGINT.
+const INTERRUPT: usize = 2;
+
+/// Time between looks for Ctrl-C, which Python keeps until it is asked.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// Runs a scene into the folder `out`: what `psidpd.run` does. The scene is the file `path`, or `text`, whose paths start
+/// from the folder `base`. `begin` is "new", "resume" or "overwrite".
+///
+/// Ctrl-C ends it after the present step, with a checkpoint, and raises KeyboardInterrupt.
+#[pyfunction]
+#[pyo3(signature = (path, text, base, out, threads, precision, begin, report))]
+#[allow(clippy::too_many_arguments, reason = "the Python function has defaults and keywords for them")]
+pub fn run_scene(
+    py: Python,
+    path: Option<PathBuf>,
+    text: Option<&str>,
+    base: PathBuf,
+    out: PathBuf,
+    threads: usize,
+    precision: Option<&str>,
+    begin: &str,
+    report: bool,
+) -> PyResult<()> {
+    let mut scene = match (path, text) {
+        (Some(path), _) => Scene::open(&path),
+        (None, text) => Scene::parse("scene", text.unwrap_or_default(), &base),
+    }
+    .map_err(exception)?;
+    if let Some(name) = precision {
+        scene.precision = Some(settings(name, 1)?.precision);
+    }
+    let threads = thread_count(threads)?;
+    let begin = match begin {
+        "new" => Begin::New,
+        "resume" => Begin::Resume,
+        "overwrite" => Begin::Overwrite,
+        other => {
+            return Err(wrong(format!("begin is \"new\", \"resume\" or \"overwrite\", not \"{other}\"")));
+        }
+    };
+    let mut raised = None;
+    let mut warnings = Vec::new();
+    let outcome = py.detach(|| {
+        let mut runner = Runner::begin(&scene, &out, begin)?;
+        runner.set_threads(threads)?;
+        let stop = AtomicUsize::new(0);
+        let mut looked = Instant::now();
+        let outcome = runner.run(&stop, &mut |progress| {
+            warnings.extend(progress.deviations.iter().map(ToString::to_string));
+            if looked.elapsed() < LOOK {
+                return;
+            }
+            looked = Instant::now();
+            if let Err(signal) = Python::attach(|py| py.check_signals()) {
+                raised = Some(signal);
+                stop.store(INTERRUPT, Ordering::Relaxed);
+            }
+        });
+        if report && outcome.as_ref().err().is_none_or(psidpd::run::RunError::is_stop) {
+            // The error of the run is more informative than one of the page.
+            let page = write_run_report(&out);
+            if outcome.is_ok() {
+                page?;
+            }
+        }
+        Ok::<_, psidpd::cli::Failure>(outcome?)
+    });
+    for warning in &warnings {
+        let text = CString::new(warning.replace('\0', " "))?;
+        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 2)?;
+    }
+    match (outcome.map_err(exception)?, raised) {
+        (Outcome::Finished { .. }, None) => Ok(()),
+        (Outcome::Interrupted { step, steps, .. }, Some(signal))
+            if signal.is_instance_of::<PyKeyboardInterrupt>(py) =>
+        {
+            Err(PyKeyboardInterrupt::new_err(format!(
+                "stopped after step {step} of {steps}; to go on: psidpd.run(…, out={:?}, resume=True)",
+                out.display().to_string()
+            )))
+        }
+        (_, Some(signal)) => Err(signal),
+        (Outcome::Interrupted { .. }, None) => Err(PyKeyboardInterrupt::new_err("stopped")),
+    }
+}
+
+/// Mean of a stationary series of correlated samples, and its standard error: (mean, error).
+///
+/// The error is NaN for fewer than 8 samples. See `docs/observables.md` for the method.
+#[pyfunction]
+pub fn estimate(series: &Bound<PyAny>) -> PyResult<(f64, f64)> {
+    let series = crate::arrays::numbers(series, "series")?;
+    let values = series.as_slice()?;
+    match observe::estimate(values) {
+        Ok(found) => Ok((found.mean, found.error)),
+        Err(observe::StatisticsError::TooFew { found }) if found > 0 => {
+            Ok((values.iter().sum::<f64>() / found as f64, f64::NAN))
+        }
+        Err(error) => Err(exception(error)),
+    }
+}
