@@ -4,7 +4,7 @@ mod engine;
 mod python;
 mod scripts;
 
-pub use scripts::{examples, readme_block};
+pub use scripts::{Block, blocks, examples, readme_block};
 
 pub use engine::{Engine, engine};
 pub use python::python;

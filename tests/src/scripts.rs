@@ -23,12 +23,37 @@ pub fn examples() -> Vec<PathBuf> {
 /// # Panics
 /// There is none.
 pub fn readme_block(language: &str, part: &str) -> String {
-    let text = std::fs::read_to_string(root().join("README.md")).expect("the README is there");
-    text.split("```")
-        .skip(1)
-        .step_by(2)
-        .filter_map(|b| b.strip_prefix(language))
-        .find(|b| b.contains(part))
-        .unwrap_or_else(|| panic!("no {language} block with {part}"))
-        .to_owned()
+    let all = blocks("README.md").into_iter();
+    let mut found = all.filter(|b| b.language == language).map(|b| b.text).filter(|text| text.contains(part));
+    found.next().unwrap_or_else(|| panic!("no {language} block with {part}"))
+}
+
+/// A fenced block of a page.
+pub struct Block {
+    /// What follows the fence.
+    pub language: String,
+    /// Its lines.
+    pub text: String,
+}
+
+/// The fenced blocks of a page of the checkout, in their order.
+///
+/// # Panics
+/// There is no such page.
+pub fn blocks(page: &str) -> Vec<Block> {
+    let text = std::fs::read_to_string(root().join(page)).unwrap_or_else(|e| panic!("{page}: {e}"));
+    let mut found = Vec::new();
+    let mut open: Option<Block> = None;
+    for line in text.lines() {
+        match (line.strip_prefix("```"), &mut open) {
+            (Some(language), None) => {
+                open = Some(Block { language: language.trim().into(), text: String::new() })
+            }
+            (Some(_), Some(_)) => found.extend(open.take()),
+            (None, Some(block)) => block.text += &format!("{line}\n"),
+            (None, None) => {}
+        }
+    }
+    assert!(open.is_none(), "{page}: a block has no end");
+    found
 }

@@ -1,0 +1,30 @@
+"""The Python of the pages runs as it stands, in the checkout; blocks of a page follow each other."""
+
+import os
+import re
+import subprocess
+import sys
+
+import pytest
+from conftest import ROOT
+
+PAGES = [page for page in [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))] if "```python" in page.read_text()]
+
+# Needs files of a run; tests/tests/read_back.rs reads them.
+ELSEWHERE = {"output.md"}
+
+
+@pytest.mark.parametrize("page", [p for p in PAGES if p.name not in ELSEWHERE], ids=lambda page: page.stem)
+def test_the_python_of_a_page_runs(page):
+    blocks = re.findall(r"^```python\n(.*?)^```", page.read_text(), re.M | re.S)
+    environment = dict(os.environ, MPLBACKEND="agg")
+    command = [sys.executable, "-c", "\n".join(blocks)]
+    run = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    # What a page says that a block prints.
+    if run.stdout:
+        assert run.stdout.strip() in page.read_text()
+
+
+def test_there_are_pages():
+    assert {"README.md", "python.md", "units.md"} <= {page.name for page in PAGES}

@@ -1,0 +1,138 @@
+//! The pages of `docs`: links lead somewhere, every page is in the book, and what a reader is told to paste works.
+
+use psidpd_tests::{Block, blocks, lammps, psidpd, root, said};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Component, Path, PathBuf};
+use std::time::Duration;
+
+/// Pages without a part in the book, whose links are looked at too.
+const BESIDE: [&str; 3] = ["README.md", "CONTRIBUTING.md", "lammps-plugin/README.md"];
+
+/// Pages whose blocks are files and commands, to be followed from the first to the last. Python is run by
+/// `python/tests/test_pages.py`; keys of models, scenes and observables have tests of their own.
+const FOLLOWED: [&str; 3] = ["docs/tutorial.md", "docs/choosing.md", "docs/recipes.md"];
+
+/// The pages of `docs`, by their paths in the checkout.
+fn pages() -> BTreeSet<String> {
+    let files = std::fs::read_dir(root().join("docs")).unwrap().map(|e| e.unwrap().file_name());
+    let names = files.map(|name| name.into_string().unwrap());
+    names.filter(|n| n.ends_with(".md")).map(|n| format!("docs/{n}")).collect()
+}
+
+/// Lines of a page that are text: without fenced blocks, and without what is in backquotes.
+fn prose(page: &str) -> Vec<String> {
+    let text = std::fs::read_to_string(root().join(page)).unwrap();
+    let mut fenced = false;
+    let mut lines = Vec::new();
+    for line in text.lines() {
+        if line.starts_with("```") {
+            fenced = !fenced;
+        } else if !fenced {
+            lines.push(line.split('`').step_by(2).collect());
+        }
+    }
+    lines
+}
+
+/// Targets of links and pictures, without those of the web.
+fn links(page: &str) -> Vec<String> {
+    let lines = prose(page);
+    let all =
+        lines.iter().flat_map(|line| line.split("](").skip(1).filter_map(|rest| rest.split(')').next()));
+    all.filter(|target| !target.contains("://")).map(str::to_owned).collect()
+}
+
+/// The names that headings have as places of their page: of mdBook and of forges alike.
+fn anchors(page: &str) -> BTreeSet<String> {
+    let text = std::fs::read_to_string(root().join(page)).unwrap();
+    let mut counts = BTreeMap::new();
+    let headings = text.lines().filter_map(|l| l.strip_prefix('#')).map(|l| l.trim_start_matches('#').trim());
+    headings
+        .map(|heading| {
+            let letters = heading.chars().filter(|c| c.is_alphanumeric() || " -_".contains(*c));
+            let name: String = letters.collect::<String>().to_lowercase().replace(' ', "-");
+            let count = counts.entry(name.clone()).and_modify(|n| *n += 1).or_insert(0);
+            if *count == 0 { name } else { format!("{name}-{count}") }
+        })
+        .collect()
+}
+
+/// `docs/../a` as `a`.
+fn plain(path: &Path) -> String {
+    let mut parts = PathBuf::new();
+    for part in path.components() {
+        match part {
+            Component::ParentDir => drop(parts.pop()),
+            other => parts.push(other),
+        }
+    }
+    parts.to_str().unwrap().to_owned()
+}
+
+#[test]
+fn links_lead_somewhere() {
+    let book = pages();
+    let mut wrong = Vec::new();
+    for page in book.iter().map(String::as_str).chain(BESIDE) {
+        for link in links(page) {
+            let (file, anchor) = link.split_once('#').unwrap_or((&link, ""));
+            let target = match file {
+                "" => page.to_owned(),
+                _ => plain(&Path::new(page).parent().unwrap().join(file)),
+            };
+            let exists = root().join(&target).exists();
+            let inside = !book.contains(page) || target.starts_with("docs/");
+            if !exists || !inside || !(anchor.is_empty() || anchors(&target).contains(anchor)) {
+                wrong.push(format!("{page}: {link}"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+fn every_page_is_in_the_book() {
+    let contents: BTreeSet<String> =
+        links("docs/SUMMARY.md").iter().map(|page| format!("docs/{page}")).collect();
+    let mut all = pages();
+    all.remove("docs/SUMMARY.md");
+    assert_eq!(contents, all);
+}
+
+/// Does what a page says in an empty folder. A block of TOML begins with the name of its file.
+fn follow(page: &str) {
+    let folder = tempfile::tempdir().unwrap();
+    for Block { language, text } in blocks(page) {
+        match language.as_str() {
+            "toml" => {
+                let name = text.lines().next().and_then(|l| l.strip_prefix("# ")).unwrap_or_default();
+                assert!(name.ends_with(".toml"), "{page}: a block does not name its file:\n{text}");
+                std::fs::write(folder.path().join(name), &text).unwrap();
+            }
+            "sh" => {
+                for line in text.lines() {
+                    let words: Vec<&str> = line.split_whitespace().collect();
+                    assert_eq!(words[0], "psidpd", "{page}: {line}");
+                    let output = psidpd(folder.path(), &words[1..]);
+                    assert!(output.status.success(), "{page}: {line}\n{}", said(&output));
+                }
+            }
+            "lammps" => {
+                let (host, plugin) = lammps();
+                let there = format!("\"{}\"", plugin.display());
+                let script = folder.path().join("in.page");
+                std::fs::write(&script, text.replace("target/lammps/psidpdplugin.so", &there)).unwrap();
+                let limit = Duration::from_secs(300);
+                let run = host.run_script(1, folder.path(), &script, &["-log", "none"], limit).unwrap();
+                assert!(run.stdout.contains("Loop time"), "{page}: {}", run.stdout);
+            }
+            "text" => {}
+            other => panic!("{page}: nothing follows blocks of {other}"),
+        }
+    }
+}
+
+#[test]
+fn pages_can_be_followed() {
+    FOLLOWED.iter().for_each(|page| follow(page));
+}
