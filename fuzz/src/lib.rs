@@ -3,13 +3,15 @@
 
 mod bytes;
 mod c_api;
+mod checkpoint;
 mod coefficients;
 mod files;
 mod scene;
 
 pub use c_api::c_api;
+pub use checkpoint::{checkpoint, checkpoint_of_a_run};
 pub use coefficients::coefficients;
-pub use files::{checkpoint, data, dump};
+pub use files::{data, dump};
 pub use scene::scene;
 
 use psidpd_core::engine::Plan;

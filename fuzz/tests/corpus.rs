@@ -2,7 +2,9 @@
 //! down, keep them busy, or eat memory.
 
 use proptest::prelude::*;
-use psidpd_fuzz_inputs::{c_api, checkpoint, coefficients, data, dump, expression, model, scene};
+use psidpd_fuzz_inputs::{
+    c_api, checkpoint, checkpoint_of_a_run, coefficients, data, dump, expression, model, scene,
+};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -183,7 +185,24 @@ fn dumps() {
 
 #[test]
 fn checkpoints() {
-    run(&corpus(&["fuzz/corpus/checkpoint"]), checkpoint);
+    run(&corpus(&["fuzz/corpus/checkpoint"]), |bytes| _ = checkpoint(bytes));
+}
+
+/// The checkpoints of the corpus are those of this version: with others nothing behind their first part would be tried.
+/// PSIDPD_UPDATE_CORPUS=1 writes them anew.
+#[test]
+fn checkpoints_of_the_corpus_are_read() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus/checkpoint");
+    for (name, steps) in [("run1.bin", 1), ("run2.bin", 8), ("run3.bin", 20)] {
+        let file = folder.join(name);
+        if std::env::var_os("PSIDPD_UPDATE_CORPUS").is_some() {
+            std::fs::write(&file, checkpoint_of_a_run(steps)).unwrap();
+        }
+        assert!(
+            checkpoint(&std::fs::read(&file).unwrap()),
+            "{name}: write it anew with PSIDPD_UPDATE_CORPUS=1"
+        );
+    }
 }
 
 #[test]

@@ -1,3 +1,5 @@
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|input: &[u8]| psidpd_fuzz_inputs::checkpoint(input));
+libfuzzer_sys::fuzz_target!(|input: &[u8]| {
+    psidpd_fuzz_inputs::checkpoint(input);
+});

@@ -22,8 +22,19 @@ pub struct Observers {
     fluid: Option<(f64, Evaluator)>,
 }
 
+/// Why [`Observers::restore`] cannot go on.
+#[derive(Debug, thiserror::Error)]
+pub enum RestoreError {
+    /// Not what [`Observers::to_bytes`] writes.
+    #[error(transparent)]
+    Bytes(#[from] postcard::Error),
+    /// Another list, or other settings.
+    #[error("the observables are not those of the scene")]
+    Others,
+}
+
 /// One observable.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Observer {
     every: u64,
     skip: u64,
@@ -32,7 +43,7 @@ struct Observer {
 }
 
 /// One observable in one stage.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Sampled {
     stage: String,
     meter: AnyMeter,
@@ -120,7 +131,7 @@ impl Observers {
         for observer in self.observers.iter_mut().filter(|o| due(o)) {
             for sampled in observer.stages.iter_mut().filter(|s| s.stage == stage) {
                 let taken = frame.as_ref().is_some_and(|frame| sampled.meter.sample(frame));
-                sampled.left_out += u64::from(!taken);
+                sampled.left_out = sampled.left_out.saturating_add(u64::from(!taken));
             }
         }
     }
@@ -131,12 +142,18 @@ impl Observers {
         postcard::to_allocvec(self).unwrap_or_default()
     }
 
-    /// What [`Observers::to_bytes`] wrote.
+    /// What [`Observers::to_bytes`] wrote, of a run in which these observables, that have seen nothing, are asked for.
     ///
     /// # Errors
-    /// The bytes are something else.
-    pub fn from_bytes(bytes: &[u8]) -> Result<Observers, postcard::Error> {
-        postcard::from_bytes(bytes)
+    /// The bytes are something else, or belong to other observables.
+    pub fn restore(&self, bytes: &[u8]) -> Result<Observers, RestoreError> {
+        let restored: Observers = postcard::from_bytes(bytes)?;
+        let mut forgetful = restored.observers.clone();
+        for sampled in forgetful.iter_mut().flat_map(|o| &mut o.stages) {
+            sampled.left_out = 0;
+            sampled.meter.forget();
+        }
+        if forgetful == self.observers { Ok(restored) } else { Err(RestoreError::Others) }
     }
 
     /// What was measured.

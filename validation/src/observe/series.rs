@@ -48,6 +48,7 @@ impl Measured {
 /// A block that is not complete at the end is left out of every mean. Sums go in the order of the
 /// samples, so a series that is written, read back and continued ends with the same bits.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Unchecked")]
 pub struct Series {
     width: usize,
     most: usize,
@@ -56,6 +57,37 @@ pub struct Series {
     pending: Vec<f64>,
     pending_samples: u64,
     rows: Vec<f64>,
+}
+
+/// What is read where a [`Series`] should be.
+#[derive(Deserialize)]
+struct Unchecked {
+    width: usize,
+    most: usize,
+    block: u64,
+    pending: Vec<f64>,
+    pending_samples: u64,
+    rows: Vec<f64>,
+}
+
+impl TryFrom<Unchecked> for Series {
+    type Error = &'static str;
+
+    fn try_from(read: Unchecked) -> Result<Series, &'static str> {
+        let Unchecked { width, most, block, pending, pending_samples, rows } = read;
+        let whole_rows = if width == 0 { rows.is_empty() } else { rows.len().is_multiple_of(width) };
+        let series = Series { width, most, block, pending, pending_samples, rows };
+        let even = most >= 2 && most.is_multiple_of(2);
+        let counted =
+            block.is_power_of_two() && block.checked_mul(most as u64).is_some() && pending_samples < block;
+        let started = series.pending.len() == if pending_samples == 0 { 0 } else { width };
+        let finite = series.rows.iter().chain(&series.pending).all(|x| x.is_finite());
+        if whole_rows && even && counted && started && finite && series.len() < most {
+            Ok(series)
+        } else {
+            Err("no series of samples")
+        }
+    }
 }
 
 impl Series {
@@ -94,6 +126,11 @@ impl Series {
             }
         }
         true
+    }
+
+    /// Forgets every sample.
+    pub fn clear(&mut self) {
+        *self = Series::with_rows(self.width, self.most);
     }
 
     fn halve(&mut self) {

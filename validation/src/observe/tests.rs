@@ -364,7 +364,7 @@ fn a_run_that_goes_on_ends_the_same() {
             whole.sample(simulation.view(time), &stage.name);
             parts.sample(simulation.view(time), &stage.name);
             if simulation.step_number().is_multiple_of(37) {
-                parts = Observers::from_bytes(&parts.to_bytes()).unwrap();
+                parts = observers(&scene).restore(&parts.to_bytes()).unwrap();
             }
         }
     }

@@ -58,7 +58,8 @@ impl<'a> Run<'a> {
         good: Checkpoint,
         timing: Timing,
     ) -> Result<Run<'a>, RunError> {
-        let observers = Observers::from_bytes(&good.observers).map_err(|error| CheckpointError::Damaged {
+        let unused = Observers::new(&scene.observe, scene.stages.iter().map(|s| s.name.as_str()));
+        let observers = unused.restore(&good.observers).map_err(|error| CheckpointError::Damaged {
             path: store.path(),
             what: format!("what was observed: {error}"),
         })?;

@@ -135,6 +135,10 @@ impl Meter for Clusters {
         self.series.push(&[frame.view.time, count, largest, mean])
     }
 
+    fn forget(&mut self) {
+        self.series.clear();
+    }
+
     fn finish(&self) -> Vec<Observation> {
         let names = ["count", "largest", "mean_size"];
         let mut scalar =

@@ -91,6 +91,10 @@ impl Meter for DensityField {
         self.series.push(&field)
     }
 
+    fn forget(&mut self) {
+        self.series.clear();
+    }
+
     fn finish(&self) -> Vec<Observation> {
         let cells = self.bins[0] * self.bins[1];
         let middle = |k: usize, bin: usize| self.origin[k] + (bin as f64 + 0.5) * self.width[k];

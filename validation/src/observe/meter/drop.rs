@@ -265,6 +265,11 @@ impl Meter for Drop {
         self.shells.push(&row) && self.size.push(&[frame.view.time, count, squares])
     }
 
+    fn forget(&mut self) {
+        self.shells.clear();
+        self.size.clear();
+    }
+
     fn finish(&self) -> Vec<Observation> {
         let rest = (self.dimensions - 1) as f64;
         let found = self.shells.jackknife_many(|means| {

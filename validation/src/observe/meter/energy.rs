@@ -47,6 +47,10 @@ impl Meter for Energy {
         self.series.push(&all)
     }
 
+    fn forget(&mut self) {
+        self.series.clear();
+    }
+
     fn finish(&self) -> Vec<Observation> {
         let mut out = Observation::new("energy", "Energy per particle", Kind::Scalar)
             .samples(self.series.samples())

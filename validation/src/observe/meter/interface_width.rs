@@ -47,6 +47,10 @@ impl Meter for InterfaceWidth {
         self.series.push(&counts)
     }
 
+    fn forget(&mut self) {
+        self.series.clear();
+    }
+
     fn finish(&self) -> Vec<Observation> {
         let centres = self.across.middles();
         let volume = self.across.bin_volume();

@@ -21,8 +21,10 @@ pub struct LocalDensity {
     species: Vec<String>,
     dimensions: usize,
     bins: usize,
-    /// The highest density of the histogram, once known.
+    /// The highest density of the histogram, if the scene says it.
     range: Option<f64>,
+    /// The same, once known.
+    found: Option<f64>,
     /// `[w]` in each shell of the kernel's range.
     shells: Vec<f64>,
     /// For each species the share of its particles in each bin and beyond; then for each (α, β) ⟨n_β⟩ at α,
@@ -91,6 +93,7 @@ impl Meter for LocalDensity {
             dimensions: fluid.dimensions,
             bins,
             range: options.positive("range")?,
+            found: None,
             shells: shell_integrals(&fluid.densities[density].kernel, fluid.dimensions),
             series: Series::new(kinds * (bins + 1) + 4 * kinds * kinds),
         })
@@ -106,7 +109,8 @@ impl Meter for LocalDensity {
         let totals: Vec<f64> =
             (0..species.len()).map(|i| (0..kinds).map(|b| at(i, b)).sum::<f64>()).collect();
         let largest = totals.iter().copied().fold(0.0, f64::max);
-        let range = *self.range.get_or_insert(if largest > 0.0 { 2.0 * largest } else { 1.0 });
+        let range = self.range.unwrap_or(if largest > 0.0 { 2.0 * largest } else { 1.0 });
+        let range = *self.found.get_or_insert(range);
         let mut numbers = vec![0.0f64; kinds];
         species.iter().for_each(|s| numbers[*s as usize] += 1.0);
         let mut row = vec![0.0; self.series.width()];
@@ -152,9 +156,14 @@ impl Meter for LocalDensity {
         self.series.push(&row)
     }
 
+    fn forget(&mut self) {
+        self.found = None;
+        self.series.clear();
+    }
+
     fn finish(&self) -> Vec<Observation> {
         let kinds = self.species.len();
-        let range = self.range.unwrap_or(1.0);
+        let range = self.found.unwrap_or(1.0);
         let width = range / self.bins as f64;
         let middles = (0..self.bins).map(|k| (k as f64 + 0.5) * width).collect();
         let mut curve = Observation::new(

@@ -58,6 +58,9 @@ pub trait Meter: Sized {
     /// Takes a sample; whether it could.
     fn sample(&mut self, frame: &Frame) -> bool;
 
+    /// Forgets every sample; what was read stays.
+    fn forget(&mut self);
+
     /// What came out.
     fn finish(&self) -> Vec<Observation>;
 }
@@ -98,6 +101,11 @@ macro_rules! meters {
             /// As [`Meter::sample`].
             pub fn sample(&mut self, frame: &Frame) -> bool {
                 match self { $(AnyMeter::$variant(meter) => meter.sample(frame)),+ }
+            }
+
+            /// As [`Meter::forget`].
+            pub fn forget(&mut self) {
+                match self { $(AnyMeter::$variant(meter) => meter.forget()),+ }
             }
 
             /// As [`Meter::finish`].

@@ -39,7 +39,7 @@ impl Clock {
             self.first = time;
         }
         self.last = time;
-        self.samples += 1;
+        self.samples = self.samples.saturating_add(1);
     }
 
     /// Time between samples; NaN with fewer than two.
@@ -94,13 +94,15 @@ impl Msd {
             }
             squares.iter_mut().zip(&numbers).for_each(|(sum, n)| *sum /= n.max(1.0));
             let lag = origin.curve.len() / kinds;
-            self.lags[lag].push(&squares);
+            if let Some(series) = self.lags.get_mut(lag) {
+                series.push(&squares);
+            }
             origin.curve.extend(squares);
         }
         let full = self.length * kinds;
         let from = self.length.div_ceil(2).min(self.length - 1);
         let weights = slope_weights(from, self.length);
-        for origin in self.origins.extract_if(.., |o| o.curve.len() == full) {
+        for origin in self.origins.extract_if(.., |o| o.curve.len() >= full) {
             let slope: Vec<f64> = (0..kinds)
                 .map(|s| (from..).zip(&weights).map(|(lag, w)| w * origin.curve[(lag - 1) * kinds + s]).sum())
                 .collect();
@@ -170,6 +172,13 @@ impl Meter for Msd {
         let species: Vec<i32> = order.iter().map(|k| view.species[*k]).collect();
         self.clock.tick(frame.view.time);
         self.record(x, &species, view.masses)
+    }
+
+    fn forget(&mut self) {
+        self.clock = Clock::default();
+        self.origins.clear();
+        self.lags.iter_mut().for_each(Series::clear);
+        self.diffusion.clear();
     }
 
     fn finish(&self) -> Vec<Observation> {

@@ -209,6 +209,10 @@ impl Meter for Pendant {
         self.series.push(&counts)
     }
 
+    fn forget(&mut self) {
+        self.series.clear();
+    }
+
     fn finish(&self) -> Vec<Observation> {
         let found = self.series.jackknife_many(|field| self.shape(field));
         let at = |k: usize| [found.get(k).copied().unwrap_or(Measured::NONE)];

@@ -130,6 +130,10 @@ impl Meter for Poiseuille {
         self.series.push(&sums)
     }
 
+    fn forget(&mut self) {
+        self.series.clear();
+    }
+
     fn finish(&self) -> Vec<Observation> {
         let found = self.series.jackknife_many(|means| self.fit(means));
         let at = |k: usize| found.get(k).copied().unwrap_or(Measured::NONE);

@@ -55,6 +55,10 @@ impl Meter for Pressure {
             .is_some_and(|carried| self.series.push(&[total, conservative, carried].concat()))
     }
 
+    fn forget(&mut self) {
+        self.series.clear();
+    }
+
     fn finish(&self) -> Vec<Observation> {
         let d = self.dimensions;
         let mut out = Observation::new("pressure", "Pressure", Kind::Scalar).samples(self.series.samples());

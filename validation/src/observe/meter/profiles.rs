@@ -110,6 +110,10 @@ impl Meter for DensityProfile {
         self.0.sample(frame)
     }
 
+    fn forget(&mut self) {
+        self.0.series.clear();
+    }
+
     fn finish(&self) -> Vec<Observation> {
         let (bins, volume) = (&self.0, self.0.across.bin_volume());
         let total = bins.linear(|n| n.iter().sum::<f64>() / volume);
@@ -146,6 +150,10 @@ impl Meter for CompositionProfile {
         self.0.sample(frame)
     }
 
+    fn forget(&mut self) {
+        self.0.series.clear();
+    }
+
     fn finish(&self) -> Vec<Observation> {
         let bins = &self.0;
         let mut out = bins.observation("composition_profile", "Composition profile");
@@ -178,6 +186,10 @@ impl Meter for TemperatureProfile {
 
     fn sample(&mut self, frame: &Frame) -> bool {
         self.0.sample(frame)
+    }
+
+    fn forget(&mut self) {
+        self.0.series.clear();
     }
 
     fn finish(&self) -> Vec<Observation> {
@@ -218,6 +230,10 @@ impl Meter for VelocityProfile {
 
     fn sample(&mut self, frame: &Frame) -> bool {
         self.0.sample(frame)
+    }
+
+    fn forget(&mut self) {
+        self.0.series.clear();
     }
 
     fn finish(&self) -> Vec<Observation> {

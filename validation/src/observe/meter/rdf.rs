@@ -85,6 +85,10 @@ impl Meter for Rdf {
         self.series.push(&counts)
     }
 
+    fn forget(&mut self) {
+        self.series.clear();
+    }
+
     fn finish(&self) -> Vec<Observation> {
         let width = self.range / self.bins as f64;
         let middles = (0..self.bins).map(|b| (b as f64 + 0.5) * width).collect();

@@ -79,6 +79,10 @@ impl Meter for StressProfile {
         self.pressures(frame).is_some_and(|sums| self.series.push(&sums))
     }
 
+    fn forget(&mut self) {
+        self.series.clear();
+    }
+
     fn finish(&self) -> Vec<Observation> {
         let column = |f: &dyn Fn(&[f64]) -> f64| -> Vec<Measured> {
             (0..self.across.bins)

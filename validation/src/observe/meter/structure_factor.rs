@@ -177,6 +177,10 @@ impl Meter for StructureFactor {
         self.series.push(&sums)
     }
 
+    fn forget(&mut self) {
+        self.series.clear();
+    }
+
     fn finish(&self) -> Vec<Observation> {
         let shells = self.lengths.len();
         let mut out = Observation::new("structure_factor", "Structure factor", Kind::Curve)

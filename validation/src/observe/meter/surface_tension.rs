@@ -126,6 +126,10 @@ impl Meter for SurfaceTension {
         self.series.push(&sample)
     }
 
+    fn forget(&mut self) {
+        self.series.clear();
+    }
+
     fn finish(&self) -> Vec<Observation> {
         let mut free_energy = self.series.mean(0);
         if !self.series.is_empty() {

@@ -48,6 +48,10 @@ impl Meter for Temperature {
         self.series.push(&[kinetic, squares, laplacian])
     }
 
+    fn forget(&mut self) {
+        self.series.clear();
+    }
+
     fn finish(&self) -> Vec<Observation> {
         let mut out = Observation::new("temperature", "Temperature kT", Kind::Scalar)
             .samples(self.series.samples())

@@ -117,6 +117,12 @@ impl Meter for Viscosity {
         self.record(frame.view.time, view.pressure, view.temperature)
     }
 
+    fn forget(&mut self) {
+        self.clock = Clock::default();
+        self.recent.clear();
+        self.series.clear();
+    }
+
     fn finish(&self) -> Vec<Observation> {
         let dt = self.clock.spacing();
         let kt = self.series.mean(self.length + 1).value;
