@@ -30,7 +30,12 @@ fn main() {
     build
         .files([
             "cpp/pair_psi.cpp",
+            "cpp/pair_psi_checks.cpp",
+            "cpp/pair_psi_compute.cpp",
+            "cpp/pair_psi_heat.cpp",
+            "cpp/pair_psi_left_out.cpp",
             "cpp/images.cpp",
+            "cpp/lost_atoms.cpp",
             "cpp/pair_table.cpp",
             "cpp/restart.cpp",
             "cpp/pair_dpd_psi.cpp",

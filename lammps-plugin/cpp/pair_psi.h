@@ -4,6 +4,7 @@
 #define PSIDPD_PAIR_PSI_H
 
 #include "images.h"
+#include "lost_atoms.h"
 #include "pair.h"
 #include "psidpd-lammps/src/bridge.rs.h"
 
@@ -110,6 +111,7 @@ class PairPsi : public LAMMPS_NS::Pair {
   void check_box();
   void check_plane();
   void check_ghosts();
+  void check_lost();
   void check_callers();
   void advise();
   // Whether a pair is one of the last evaluation.
@@ -144,6 +146,7 @@ class PairPsi : public LAMMPS_NS::Pair {
   Carries carries = Carries::slopes;
   int first_column = 0;
 
+  LostAtoms lost_atoms;
   Images images;
   // Whether ghosts are elsewhere than their atoms say, in this evaluation.
   bool strained = false;
@@ -166,6 +169,8 @@ class PairPsi : public LAMMPS_NS::Pair {
   size_t special_owned = 0;
   // How many of them the engine knows; SIZE_MAX if those that it knows are old.
   size_t told_special = SIZE_MAX;
+  // Rules of neigh_modify for types and groups that a word has room for, with two sides each.
+  static constexpr int most_rules = 16;
   // How many pairs of types, groups and molecules neigh_modify excluded when the style was set up, and who is of them.
   int rules = 0;
   std::vector<uint32_t> marks;

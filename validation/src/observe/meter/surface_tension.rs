@@ -127,6 +127,7 @@ impl Meter for SurfaceTension {
     }
 
     fn forget(&mut self) {
+        self.kt = 0.0;
         self.series.clear();
     }
 

@@ -1,0 +1,130 @@
+// What a simulation must be like for the style.
+
+#include "pair_psi.h"
+
+#include "atom.h"
+#include "bond.h"
+#include "comm.h"
+#include "domain.h"
+#include "fix.h"
+#include "force.h"
+#include "modify.h"
+#include "update.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+using namespace LAMMPS_NS;
+using namespace psidpd;
+
+namespace {
+
+// Distances between opposite faces of the box.
+void heights(const Domain *domain, double *height)
+{
+  const double *inverse = domain->h_inv;
+  height[0] = 1.0 / std::sqrt(inverse[0] * inverse[0] + inverse[5] * inverse[5] + inverse[4] * inverse[4]);
+  height[1] = 1.0 / std::sqrt(inverse[1] * inverse[1] + inverse[3] * inverse[3]);
+  height[2] = 1.0 / std::fabs(inverse[2]);
+}
+
+}    // namespace
+
+// Coefficients are in the units of the simulation. Those of SI leave the range of single precision.
+void PairPsi::check_units(const std::string &units)
+{
+  if (units != "real" && units != "metal")
+    stop("works in units lj, real and metal, found 'units " + units + "'");
+}
+
+void PairPsi::check_host()
+{
+  if (strcmp(update->unit_style, "lj") != 0)
+    check_units(update->unit_style);
+  if (!atom->tag_enable) stop("needs atom IDs: remove 'atom_modify id no'");
+  if ((*style)->needs_velocities() && !apart && !comm->ghost_velocity)
+    stop("the thermostat needs velocities of ghost atoms: add 'comm_modify vel yes'");
+}
+
+bool PairPsi::is_scaled() const
+{
+  const double *factor = force->special_lj;
+  return atom->molecular != Atom::ATOMIC && (factor[1] != 1.0 || factor[2] != 1.0 || factor[3] != 1.0);
+}
+
+bool PairPsi::is_narrow() const
+{
+  double height[3];
+  heights(domain, height);
+  for (int k = 0; k < domain->dimension; k++)
+    if (domain->periodicity[k] && height[k] < 2.0 * (*style)->cutoff()) return true;
+  return false;
+}
+
+// What works with energies of single pairs alone has nothing to work with where energies belong to particles.
+void PairPsi::check_callers()
+{
+  if ((*style)->slope_width() == 0) return;
+  for (int k = 0; k < modify->nfix; k++)
+    if (strncmp(modify->fix[k]->style, "bond/swap", 9) == 0)
+      stop("fix bond/swap decides on the energies of single pairs: it cannot be used with a many-body style");
+  for (const char *bond : {"special", "quartic"})
+    if (force->bond_match(bond))
+      stop(std::string("bond_style ") + bond + " adds or takes away the forces of single pairs: it cannot be used with "
+           "a many-body style");
+}
+
+// Two images of one pair would draw the same noise in a box shorter than twice its range.
+void PairPsi::check_box()
+{
+  const double range = (*style)->noise_range();
+  double height[3];
+  heights(domain, height);
+  for (int k = 0; k < domain->dimension; k++)
+    if (domain->periodicity[k] && height[k] < 2.0 * range)
+      stop("the box is " + std::to_string(height[k]) + " long in direction " + "xyz"[k] +
+           ", less than twice the range of the thermostat (" + std::to_string(range) +
+           "): images of a pair would share their noise; use a longer box");
+}
+
+// What a plane has no place for: older versions of LAMMPS fill several of them with a lattice.
+void PairPsi::check_plane()
+{
+  if (domain->dimension != 2) return;
+  double mine[2] = {-1e300, -1e300}, all[2];
+  for (int i = 0; i < atom->nlocal; i++) {
+    const double z = atom->x[i][2];
+    mine[0] = std::max(mine[0], z);
+    mine[1] = std::max(mine[1], -z);
+  }
+  MPI_Allreduce(mine, all, 2, MPI_DOUBLE, MPI_MAX, world);
+  if (all[0] + all[1] > 1e-6 * (*style)->cutoff())
+    stop("in two dimensions all atoms must have the same z, found " + std::to_string(-all[1]) + " to " +
+         std::to_string(all[0]) + ": use a box that is thinner than the lattice, or 'set group all z 0'");
+}
+
+void PairPsi::check_ghosts()
+{
+  if (comm->mode != Comm::SINGLE) return;
+  const double cutoff = (*style)->cutoff();
+  double height[3] = {1.0, 1.0, 1.0};
+  // In a triclinic box LAMMPS counts in fractions of the box.
+  if (domain->triclinic) heights(domain, height);
+  for (int k = 0; k < domain->dimension; k++) {
+    const double reach = comm->cutghost[k] * height[k];
+    if (reach < cutoff * (1.0 - 1e-12))
+      stop("ghost atoms reach " + std::to_string(reach) + ", the cut-off is " + std::to_string(cutoff) +
+           ": raise it with 'comm_modify cutoff'");
+  }
+}
+
+// LAMMPS stops or goes on as 'thermo_modify lost' says; styles cannot see which.
+void PairPsi::check_lost()
+{
+  const std::string text = lost_atoms.missing(atom, world);
+  if (!text.empty())
+    warn("at step " + std::to_string(update->ntimestep) + " " + text +
+         ": they went past all neighboring ranks, or out of a box that is not periodic, between two builds of lists; a "
+         "shorter timestep and 'neigh_modify every 1' help against the former");
+}

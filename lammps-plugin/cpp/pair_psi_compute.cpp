@@ -1,0 +1,292 @@
+// Forces, and what is known of atoms and pairs after them.
+
+#include "pair_psi.h"
+
+#include "compat.h"
+#include "slices.h"
+
+#include "atom.h"
+#include "comm.h"
+#include "domain.h"
+#include "force.h"
+#include "neighbor.h"
+#include "update.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+using namespace LAMMPS_NS;
+using namespace psidpd;
+
+// Along periodic directions in which there is one rank only, all ghosts are images of what that rank has: the engine
+// goes round the box there instead. Not where images move at another speed, nor where some have none.
+Extent PairPsi::extent() const
+{
+  Extent extent{};
+  std::copy_n(domain->boxlo, 3, extent.origin.begin());
+  std::copy_n(domain->h, 6, extent.edges.begin());
+  if (domain->deform_vremap || atom->firstgroupname) return extent;
+  if (comm->nprocs > 1 && comm->layout == Comm::LAYOUT_TILED) return extent;
+  for (int k = 0; k < domain->dimension; k++)
+    extent.closed[k] = domain->periodicity[k] && (comm->nprocs == 1 || comm->procgrid[k] == 1);
+  return extent;
+}
+
+// Whether all ghosts, if there are any, are images along closed directions.
+bool PairPsi::is_alone(const Extent &extent) const
+{
+  if (comm->nprocs > 1 || !why_listed.empty()) return false;
+  for (int k = 0; k < domain->dimension; k++)
+    if (domain->periodicity[k] && !extent.closed[k]) return false;
+  return true;
+}
+
+// Asks which ghosts are images along closed directions: who packs them knows.
+void PairPsi::find_images()
+{
+  const auto closed = extent().closed;
+  // All ranks agree on the box.
+  const bool none = !why_listed.empty() || closed == std::array<bool, 3>{};
+  images.begin(closed, atom->nlocal, none ? 0 : atom->nghost);
+  if (none) return;
+  carries = Carries::images;
+  comm_forward = 1;
+  forward_values(comm, this, 0);
+  carries = Carries::slopes;
+}
+
+// Which ghosts are images along closed directions. Where that is not known the box is opened, and all ghosts are taken.
+rust::Slice<const bool> PairPsi::left_out(Extent &extent, const Request &request) const
+{
+  // Only what was closed when ghosts were found has all its images told.
+  if (!strained && images.know(extent.closed, atom->nghost) && (*style)->fits(extent, request))
+    return {images.flags(), static_cast<size_t>(atom->nghost)};
+  extent.closed = {};
+  return {};
+}
+
+void PairPsi::find_densities(int all, const Request &request)
+{
+  const size_t owned = atom->nlocal;
+  const auto x = flat(atom->x, all);
+  const rust::Slice<const int32_t> tag{atom->tag, static_cast<size_t>(all)};
+  const rust::Slice<const int32_t> kind{atom->type, static_cast<size_t>(all)};
+  if (why_listed.empty()) {
+    Extent extent = this->extent();
+    const auto images = left_out(extent, request);
+    style_densities(**style, extent, images, owned, x, flat(atom->v, all), tag, kind, force->newton_pair,
+                    request);
+    return;
+  }
+  collect_pairs();
+  densities_of_pairs(**style, owned, x, tag, kind, force->newton_pair, {pair_i.data(), pair_i.size()},
+                     {pair_j.data(), pair_j.size()}, {pair_factor.data(), pair_factor.size()});
+}
+
+// Slopes from owners to ghosts.
+void PairPsi::forward()
+{
+  const int width = static_cast<int>((*style)->slope_width());
+  // Inside a hybrid LAMMPS has sized its buffers before it knew of our columns; those for positions fit.
+  const int most = force->pair == this ? width : 3;
+  for (first_column = 0; first_column < width; first_column += comm_forward) {
+    comm_forward = std::min(most, width - first_column);
+    forward_values(comm, this, 0);
+  }
+}
+
+void PairPsi::compute(int eflag, int vflag)
+{
+  ev_init(eflag, vflag);
+  refresh();
+  if (neighbor->ago == 0) {
+    check_plane();
+    check_ghosts();
+    check_lost();
+    if (domain->box_change) check_box();
+    if (why_listed.empty() && neighbor->nex_type + neighbor->nex_group + neighbor->nex_mol != rules)
+      stop("pairs were excluded after the style was set up, by a fix perhaps: run again");
+    if (why_listed.empty() && is_scaled() && is_narrow())
+      stop("the box has become narrower than twice the cut-off, where special_bonds needs a neighbor list: run again");
+    find_images();
+    find_special();
+    find_exclusions();
+  }
+
+  const size_t owned = atom->nlocal;
+  const int all = atom->nlocal + atom->nghost;
+  const bool newton = force->newton_pair;
+  const auto x = flat(atom->x, all);
+  const auto v = flat(atom->v, all);
+  const rust::Slice<const int32_t> tag{atom->tag, static_cast<size_t>(all)};
+  const rust::Slice<const int32_t> kind{atom->type, static_cast<size_t>(all)};
+  Style &fluid = **style;
+
+  Request request;
+  // A minimiser goes downhill in U: drag and noise have no place there.
+  request.thermostat = fluid.needs_velocities() && !apart && update->whichflag != 2;
+  request.seed = seed;
+  request.step = static_cast<uint64_t>(update->ntimestep);
+  request.dt = update->dt;
+  if (request.thermostat && !(update->dt > 0.0))
+    stop("the thermostat needs a timestep greater than 0, found " + std::to_string(update->dt));
+  if (num_tally_compute > 0)
+    stop("computes of the TALLY package get no pairs from it: use compute pe/atom, stress/atom, group/group or "
+         "pair/local");
+  request.energy = eflag_global != 0;
+  request.virial = vflag_global != 0;
+  request.particle_energy = eflag_atom != 0;
+  request.particle_virial = vflag_atom != 0;
+
+  const size_t reach = newton ? all : owned;
+  rust::Slice<double> f;
+  if (reach > 0) f = {atom->f[0], 3 * reach};
+  const Extent box = extent();
+  strained = images.have_moved(atom, domain);
+  const bool alone = !strained && is_alone(box) && attempt([&] { return fluid.fits(box, request); });
+  tell_special(alone ? special_owned : special.size());
+  Totals totals;
+  if (alone) {
+    totals = attempt([&] {
+      return style_evaluate(fluid, box, flat(atom->x, owned), flat(atom->v, owned), {atom->tag, owned},
+                            {atom->type, owned}, request, f);
+    });
+    without_slopes = {atom->nlocal, atom->nghost};
+  } else {
+    attempt([&] { find_densities(all, request); });
+    forward();
+    totals = attempt([&] { return style_forces(fluid, owned, x, v, tag, kind, request, f); });
+    without_slopes = {-1, -1};
+  }
+
+  if (eflag_global) {
+    eng_vdwl += totals.excess + totals.pair;
+    pvector[0] = totals.excess;
+    pvector[1] = totals.pair;
+    pvector[2] = totals.below;
+    pvector[3] = totals.above;
+  }
+  if (vflag_global)
+    for (int k = 0; k < 6; k++) virial[k] += totals.virial[k];
+  const double unit = fluid.energy_unit();
+  if (eflag_atom) {
+    const auto energy = fluid.particle_energy();
+    for (size_t i = 0; i < reach; i++) eatom[i] += unit * energy[i];
+  }
+  if (vflag_atom) {
+    const auto w = fluid.particle_virial();
+    for (size_t i = 0; i < reach; i++)
+      for (int k = 0; k < 6; k++) vatom[i][k] += unit * w[6 * i + k];
+  }
+}
+
+int PairPsi::pack_forward_comm(int n, int *list, double *buf, int pbc_flag, int *pbc)
+{
+  if (carries == Carries::images) {
+    images.pack(n, list, buf, pbc_flag, pbc);
+    return n;
+  }
+  if (carries == Carries::vectors) {
+    for (int i = 0; i < n; i++) buf = std::copy_n(&vectors[3 * list[i]], 3, buf);
+    return 3 * n;
+  }
+  const auto slopes = (*style)->slopes_mut();
+  const size_t width = (*style)->slope_width();
+  for (int i = 0; i < n; i++)
+    for (int k = 0; k < comm_forward; k++) *buf++ = slopes[list[i] * width + first_column + k];
+  return n * comm_forward;
+}
+
+void PairPsi::unpack_forward_comm(int n, int first, double *buf)
+{
+  if (carries == Carries::images) {
+    images.unpack(n, first, buf);
+    return;
+  }
+  if (carries == Carries::vectors) {
+    std::copy_n(buf, 3 * n, vectors.begin() + 3 * first);
+    return;
+  }
+  auto slopes = (*style)->slopes_mut();
+  const size_t width = (*style)->slope_width();
+  for (int i = first; i < first + n; i++)
+    for (int k = 0; k < comm_forward; k++) slopes[i * width + first_column + k] = *buf++;
+}
+
+// Whether atoms and ghosts, their types and their distance are those of the last evaluation.
+bool PairPsi::is_pair(int i, int j, int itype, int jtype, double rsq) const
+{
+  const int all = atom->nlocal + atom->nghost;
+  if (i < 0 || j < 0 || i >= all || j >= all) return false;
+  if (atom->type[i] != itype || atom->type[j] != jtype) return false;
+  const double range = (*style)->cutoff();
+  double d[3];
+  for (int k = 0; k < 3; k++) d[k] = atom->x[i][k] - atom->x[j][k];
+  const auto agrees = [&] {
+    const double here = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+    return std::fabs(here - rsq) <= 1e-9 * std::max(range * range, here);
+  };
+  if (agrees()) return true;
+  // Some callers have found the atom and take the nearest of its images.
+  const double *h = domain->h;
+  const double edge[3][3] = {{h[0], 0.0, 0.0}, {h[5], h[1], 0.0}, {h[4], h[3], h[2]}};
+  for (int k = 2; k >= 0; k--) {
+    if (!domain->periodicity[k]) continue;
+    const double n = std::round(d[k] / edge[k][k]);
+    for (int c = 0; c <= k; c++) d[c] -= n * edge[k][c];
+  }
+  return agrees();
+}
+
+// The energy is that of the terms that belong to pairs, without psi; the force is the whole conservative
+// one, with the densities of the last step. Drag and noise are left out, as in LAMMPS's other DPD styles.
+double PairPsi::single(int i, int j, int itype, int jtype, double rsq, double, double factor_lj, double &fforce)
+{
+  // Without densities a pair is a pair wherever its atoms are, and whether they are there at all.
+  const bool many_body = (*style)->slope_width() > 0;
+  if (many_body && !is_pair(i, j, itype, jtype, rsq))
+    stop_here("asked for the energy of a pair that is not there, as of an atom to be inserted or moved: where energies "
+              "belong to particles no single pair tells it; fix gcmc and fix widom need full_energy with a many-body "
+              "style, and pair_write cannot be used");
+  if (many_body && without_slopes == std::array<int, 2>{atom->nlocal, atom->nghost}) {
+    without_slopes = {-1, -1};
+    attempt([&] { (*style)->fetch_slopes(atom->nlocal + atom->nghost); });
+    forward();
+  }
+  const double r = std::sqrt(rsq);
+  const PairValue pair = attempt([&] { return style_single(**style, itype, jtype, i, j, r); });
+  fforce = r > 0.0 ? factor_lj * pair.force / r : 0.0;
+  return factor_lj * pair.energy;
+}
+
+void *PairPsi::extract(const char *what, int &dim)
+{
+  dim = 0;
+  if (strcmp(what, "T") == 0 || strcmp(what, "temperature") == 0) return &temperature;
+  return nullptr;
+}
+
+// "density" or "rho": local densities, one column for each density and species, in the order of the model
+// file; "psi": excess free energy of each atom.
+void *PairPsi::extract_peratom(const char *what, int &columns)
+{
+  const bool density = strcmp(what, "density") == 0 || strcmp(what, "rho") == 0;
+  if (!density && strcmp(what, "psi") != 0) return nullptr;
+  refresh();
+  columns = 0;
+  if (!density) return attempt([&] { return const_cast<double *>((*style)->excess_of_owned().data()); });
+  const size_t width = (*style)->variables();
+  if (width == 0) return nullptr;
+  // Forces may not have needed all of them.
+  const size_t all = atom->nlocal + atom->nghost;
+  tell_special(special.size());
+  attempt([&] { (*style)->sum_densities(atom->nlocal, flat(atom->x, all), {atom->tag, all}, {atom->type, all}); });
+  const auto densities = (*style)->densities_of_owned();
+  double *first = const_cast<double *>(densities.data());
+  if (width == 1) return first;
+  columns = static_cast<int>(width);
+  density_rows.resize(densities.size() / width + 1);
+  for (size_t i = 0; i < density_rows.size(); i++) density_rows[i] = first + i * width;
+  return density_rows.data();
+}

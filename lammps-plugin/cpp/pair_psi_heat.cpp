@@ -1,0 +1,90 @@
+// Drag and noise apart from the forces.
+
+#include "pair_psi.h"
+
+#include "compat.h"
+#include "slices.h"
+
+#include "atom.h"
+#include "domain.h"
+#include "force.h"
+#include "update.h"
+
+#include <algorithm>
+#include <cmath>
+
+using namespace LAMMPS_NS;
+using namespace psidpd;
+
+std::string PairPsi::why_not_apart() const
+{
+  if (!why_listed.empty()) return "pairs come from a neighbor list, because of " + why_listed;
+  if (rules > 0) return "neigh_modify excludes pairs, whose drag and noise would have to be left out";
+  const double *factor = force->special_lj;
+  if (is_scaled() && (factor[1] == 0.0 || factor[2] == 0.0 || factor[3] == 0.0))
+    return "special_bonds has factors of 0, for which drag and noise would have to be left out: use 'special_bonds lj "
+           "1 1 1'";
+  if (domain->deform_vremap) return "fix deform changes velocities at the edges of the box ('remap v')";
+  return {};
+}
+
+// Vectors from owners to ghosts.
+void PairPsi::forward_vectors()
+{
+  carries = Carries::vectors;
+  comm_forward = 3;
+  forward_values(comm, this, 0);
+  carries = Carries::slopes;
+}
+
+void PairPsi::heat(int groupbit, double time, bool uniform, bool wants_virial, double *virial)
+{
+  refresh();
+  const size_t owned = atom->nlocal;
+  const int all = atom->nlocal + atom->nghost;
+  masses.resize(owned);
+  for (size_t i = 0; i < owned; i++) {
+    const double mass = atom->rmass ? atom->rmass[i] : atom->mass[atom->type[i]];
+    masses[i] = (atom->mask[i] & groupbit) ? mass : HUGE_VAL;
+  }
+  Heat what;
+  what.seed = seed;
+  what.step = static_cast<uint64_t>(update->ntimestep);
+  what.uniform = uniform;
+  what.time = time;
+  what.virial = wants_virial;
+  Style &fluid = **style;
+  Extent box = extent();
+  const Request forces{};
+  const bool alone = !strained && is_alone(box) && attempt([&] { return fluid.fits(box, forces); });
+  rust::Slice<const bool> flags;
+  if (!alone) flags = attempt([&] { return left_out(box, forces); });
+  const size_t reach = alone ? owned : all;
+  const bool acts = attempt([&] {
+    return thermostat_pairs(fluid, box, flags, flat(atom->x, static_cast<int>(reach)), {atom->tag, reach},
+                            {atom->type, reach}, {masses.data(), owned}, what);
+  });
+  if (!acts) return;
+  rust::Slice<double> v;
+  if (owned > 0) v = {atom->v[0], 3 * owned};
+  std::array<double, 6> w{};
+  if (alone) {
+    w = attempt([&] { return thermostat_alone(fluid, v); });
+  } else {
+    vectors.resize(3 * static_cast<size_t>(all));
+    if (owned > 0) std::copy_n(atom->v[0], 3 * owned, vectors.begin());
+    forward_vectors();
+    const rust::Slice<double> shared{vectors.data(), vectors.size()};
+    Round round = attempt([&] { return thermostat_begin(fluid, {vectors.data(), vectors.size()}); });
+    while (round.wants != Wants::Nothing) {
+      double total = 0.0;
+      if (round.wants == Wants::Total)
+        MPI_Allreduce(&round.part, &total, 1, MPI_DOUBLE, MPI_SUM, world);
+      else
+        forward_vectors();
+      round = attempt([&] { return thermostat_go_on(fluid, total, shared, v); });
+    }
+    w = round.virial;
+  }
+  for (int k = 0; k < 6; k++) virial[k] += w[k];
+}
