@@ -93,7 +93,7 @@ fn cases_are_listed_and_theory_is_reproduced() {
     let here = folder.path();
     let list = json(here, &["reproduce", "--list"], 0);
     let cases = list["cases"].as_array().unwrap();
-    assert!(cases.len() >= 15, "{list}");
+    assert!(cases.len() >= 45, "{list}");
     for paper in ["pagonabarraga", "trofimov", "warren", "wang", "berendsen"] {
         assert!(cases.iter().any(|c| c["id"].as_str().unwrap().starts_with(paper)), "{paper}");
     }
@@ -105,7 +105,24 @@ fn cases_are_listed_and_theory_is_reproduced() {
     assert!((value["published"]["value"].as_f64().unwrap() - 8.0 / 27.0).abs() < 1e-12, "{value}");
     assert!((value["measured"]["value"].as_f64().unwrap() - 8.0 / 27.0).abs() < 1e-6, "{value}");
     assert!(here.join("out/quick/pagonabarraga-fig1/compressibility.svg").exists());
+    // Other cases of theory, and the shortest one that is measured.
+    for id in ["pagonabarraga-fig2", "trofimov-fig1", "wang-limit", "pagonabarraga-fig4"] {
+        let found = json(here, &["reproduce", id, "--out", "out"], 0);
+        assert_eq!(found["pass"], true, "{found}");
+    }
+    assert!(here.join("out/quick/pagonabarraga-fig4/rdf.svg").exists());
     let unknown = psidpd(here, &["reproduce", "newton-fig1"]);
     assert_eq!(unknown.status.code(), Some(2), "{}", said(&unknown));
     assert!(said(&unknown).contains("--list"), "{}", said(&unknown));
+}
+
+#[test]
+fn substances_without_parameters_are_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = psidpd(folder.path(), &["model", "from-eos", "phlogiston", "--out", "x.toml"]);
+    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+    assert!(said(&output).contains("water") && said(&output).contains("decane"), "{}", said(&output));
+    let output = psidpd(folder.path(), &["model", "from-eos", "decane", "--range", "1.5", "--out", "x.toml"]);
+    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+    assert!(said(&output).contains("range"), "{}", said(&output));
 }

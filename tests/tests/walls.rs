@@ -68,6 +68,7 @@ const PROGRAM: &[&[&str]] = &[
     &["report"],
     &["bulk"],
     &["calibrate"],
+    &["from_eos"],
     &["papers"],
     &["export"],
     &["crosscheck"],

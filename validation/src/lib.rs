@@ -8,6 +8,7 @@ pub mod cli;
 mod crosscheck;
 pub mod export;
 mod files;
+mod from_eos;
 mod hardcases;
 mod integrator;
 pub mod lammps;

@@ -2,6 +2,7 @@
 
 use crate::calibrate::CalibrateError;
 use crate::crosscheck::ValidateError;
+use crate::from_eos::FromEosError;
 use crate::run::RunError;
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use psidpd_core::document::{FileError, printable};
@@ -68,6 +69,12 @@ fn unwrapped<'a>(error: &'a (dyn std::error::Error + 'static)) -> &'a (dyn std::
     match error.downcast_ref() {
         Some(ValidateError::File(found)) => return found,
         Some(ValidateError::Run(found)) => return found,
+        _ => {}
+    }
+    match error.downcast_ref() {
+        Some(FromEosError::File(found)) => return found,
+        Some(FromEosError::Run(found)) => return found,
+        Some(FromEosError::Calibrate(found)) => return unwrapped(found),
         _ => {}
     }
     match error.downcast_ref() {

@@ -12,6 +12,7 @@ mod export;
 mod forces;
 mod hardcases;
 mod lammps;
+mod model;
 mod new;
 mod pareto;
 mod report;
@@ -58,6 +59,9 @@ enum Verb {
     Calibrate(calibrate::Arguments),
     /// Figures and tables of the papers: measured, and compared with what is published.
     Reproduce(reproduce::Arguments),
+    /// Make a model file of a real liquid.
+    #[command(subcommand)]
+    Model(model::Verb),
     /// Write a scene to begin with, and its model.
     New(new::Arguments),
     /// Run a scene natively.
@@ -124,6 +128,7 @@ fn carry_out(arguments: Arguments) -> u8 {
         Verb::Export(a) => export::run(a, json),
         Verb::Calibrate(a) => calibrate::run(a, json),
         Verb::Reproduce(a) => reproduce::run(a, json),
+        Verb::Model(a) => model::run(a, json),
         Verb::New(a) => new::run(a, json),
         Verb::Run(a) => run::run(a, json),
         Verb::Report(a) => report::run(a, json),

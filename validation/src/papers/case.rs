@@ -1,3 +1,4 @@
+use crate::bulk::Observed;
 use crate::observe::Measured;
 use crate::report::{Plot, Series, Style};
 use serde::Serialize;
@@ -138,6 +139,31 @@ impl Outcome {
         };
         self.plots.push((file, plot));
     }
+}
+
+/// a − b of independent values.
+pub fn difference(a: Measured, b: Measured) -> Measured {
+    Measured { value: a.value - b.value, error: a.error.hypot(b.error) }
+}
+
+/// a/b of independent values.
+pub fn ratio(a: Measured, b: Measured) -> Measured {
+    let value = a.value / b.value;
+    Measured { value, error: (a.error / b.value).hypot(value * b.error / b.value) }
+}
+
+/// A column of an observation against its abscissa; nothing where it was not observed.
+pub fn profile(observed: &Observed, name: &str, column: &str) -> Vec<(f64, Measured)> {
+    let Some(observation) = observed.get(name) else { return Vec::new() };
+    let (Some(x), Some(y)) = (&observation.x, observation.get(column)) else { return Vec::new() };
+    let values =
+        y.values.iter().zip(&y.errors).map(|(value, error)| Measured { value: *value, error: *error });
+    x.values.iter().copied().zip(values).collect()
+}
+
+/// A profile without its errors.
+pub fn bare(points: &[(f64, Measured)]) -> Vec<(f64, f64)> {
+    points.iter().map(|(x, y)| (*x, y.value)).collect()
 }
 
 /// A number that is exact, or has only rounding errors.

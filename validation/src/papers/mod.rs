@@ -27,8 +27,11 @@ pub struct Case {
     pub paper: &'static str,
     /// What is compared.
     pub what: &'static str,
-    run: fn(&Context) -> Result<Outcome, PaperError>,
+    run: Run,
 }
+
+/// What carries a case out.
+type Run = fn(&Context) -> Result<Outcome, PaperError>;
 
 impl Case {
     /// Runs the case.

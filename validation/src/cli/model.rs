@@ -1,0 +1,112 @@
+use super::{Failure, Verdict, write_json};
+use crate::bulk::Sampling;
+use crate::files::write_atomically;
+use crate::from_eos::{FromEosError, Options, Substance, from_eos};
+use crate::report::Table;
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+
+/// Make a model file.
+#[derive(Debug, clap::Subcommand)]
+pub enum Verb {
+    /// Of a real liquid, from its equation of state (PC-SAFT), with its units in SI.
+    ///
+    /// Density, compressibility and surface tension are those of the equation of state within the tolerance; exits
+    /// with 1 if not. Needs a psidpd that was built with `--features eos`.
+    FromEos(FromEos),
+}
+
+/// See [`Verb::FromEos`].
+#[derive(Debug, clap::Args)]
+pub struct FromEos {
+    /// Which substance: water, decane.
+    substance: String,
+    /// Temperature in K.
+    #[arg(long = "T", value_name = "KELVIN", default_value_t = 298.15)]
+    temperature: f64,
+    /// Molecules in a particle (N_m).
+    #[arg(long, value_name = "N", default_value_t = 1.0)]
+    molecules: f64,
+    /// Particles of the liquid in the cube of the unit of length.
+    #[arg(long, value_name = "RHO", default_value_t = 6.0)]
+    density: f64,
+    /// Range of the many-body repulsion, over that of the attraction.
+    #[arg(long, default_value_t = 0.75)]
+    range: f64,
+    /// Largest relative difference of the tension, and of pressures as in `calibrate`.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.05)]
+    tolerance: f64,
+    /// Steps of each run of the homogeneous liquid; the slab has eight times as many.
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(100..))]
+    steps: u64,
+    /// Time step.
+    #[arg(long, default_value_t = 0.01)]
+    dt: f64,
+    /// Seed of the starts and of the noise.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Threads that share the work.
+    #[arg(long, value_name = "N", default_value = "1")]
+    threads: NonZeroUsize,
+    /// Where the model file goes.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+}
+
+pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
+    let Verb::FromEos(a) = verb;
+    let positive = |x: f64| x > 0.0 && x.is_finite();
+    if ![a.temperature, a.molecules, a.density, a.tolerance, a.dt].into_iter().all(positive)
+        || !(a.range > 0.0 && a.range < 1.0)
+    {
+        let message = "numbers must be positive, and the range below 1";
+        return Err(FromEosError::Conditions(message.into()).into());
+    }
+    let options = Options {
+        temperature: a.temperature,
+        molecules: a.molecules,
+        density: a.density,
+        range: a.range,
+        tolerance: a.tolerance,
+        sampling: Sampling {
+            particles: 1000,
+            dt: a.dt,
+            equilibrate: 500,
+            steps: a.steps,
+            every: 20,
+            seed: a.seed,
+            threads: a.threads,
+        },
+    };
+    let command = format!(
+        "psidpd model from-eos {} --T {} --molecules {} --density {} --range {} --tolerance {} --steps {} --dt {} --seed {} --out {}",
+        a.substance,
+        a.temperature,
+        a.molecules,
+        a.density,
+        a.range,
+        a.tolerance,
+        a.steps,
+        a.dt,
+        a.seed,
+        a.out.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned()),
+    );
+    let substance = Substance::find(&a.substance)?;
+    let found = from_eos(&substance, &options, &command, &mut |line| println!("{line}"))?;
+    write_atomically(&a.out, found.text.as_bytes())?;
+    let mut table = Table::new(["", "equation of state", "model"]);
+    for c in &found.compared {
+        table.push([
+            c.name.to_owned(),
+            format!("{:.4}", c.wanted),
+            format!("{:.4} ± {:.4}", c.measured.value, c.measured.error),
+        ]);
+    }
+    println!("\n{}", table.to_text());
+    if !found.converged {
+        println!("the tolerance of {:.1} % is not met", 100.0 * a.tolerance);
+    }
+    println!("written to {}", a.out.display());
+    write_json(json, &found)?;
+    Ok(if found.converged { Verdict::Good } else { Verdict::CheckFailed })
+}

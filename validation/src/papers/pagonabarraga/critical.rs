@@ -1,0 +1,93 @@
+//! Figures 1 and 2: the van der Waals fluid in mean field.
+
+use super::VAN_DER_WAALS;
+use crate::papers::case::{Outcome, exact, line};
+use crate::papers::context::{Context, PaperError, mean_field, with_parameters};
+use psidpd_core::model::Model;
+use psidpd_core::theory::critical_point_of_model;
+
+/// x_c = b ρ_c and kT_c b/a, the paper's eqs (14)–(16).
+fn critical(alpha: f64) -> [f64; 2] {
+    // x_c = [α − 1 + √(1 + ⅔α + α²)]/(4α); 1/3 in the limit α → 0.
+    let x = if alpha == 0.0 {
+        1.0 / 3.0
+    } else {
+        (alpha - 1.0 + (1.0 + 2.0 / 3.0 * alpha + alpha * alpha).sqrt()) / (4.0 * alpha)
+    };
+    [x, x * (2.0 + 3.0 * alpha * x) * (1.0 - x).powi(2)]
+}
+
+pub fn fig1(_: &Context) -> Result<Outcome, PaperError> {
+    let mut outcome = Outcome::default();
+    let (b, a) = (0.016, 1.9 * 0.016);
+    let mut hot = Vec::new();
+    let mut lines = Vec::new();
+    for alpha in [0.0, 5.0] {
+        let text = with_parameters(VAN_DER_WAALS, &[("alpha3", alpha)])?;
+        let [x, t] = critical(alpha);
+        let (rho, kt) = (x / b, t * a / b);
+        let found = critical_point_of_model(&Model::parse("model.toml", &text)?, [0.2 * kt, 3.0 * kt])?;
+        outcome.equal(format!("kT_c b/a, alpha_3 = {alpha}"), exact(found.parameter * b / a), t, 1e-6 * t);
+        outcome.equal(format!("b rho_c, alpha_3 = {alpha}"), exact(found.density * b), x, 1e-4 * x);
+        let inverse = |share: f64, rho: f64| -> Result<f64, PaperError> {
+            Ok(rho * mean_field(&text, share * kt)?.pressure_slope(&[rho]))
+        };
+        let cold = 1.0 / inverse(0.8, rho)?;
+        outcome.at_most(format!("compressibility at 0.8 T_c and rho_c, alpha_3 = {alpha}"), exact(cold), 0.0);
+        hot.push(1.0 / inverse(1.1, rho)?);
+        let theory = mean_field(&text, 1.1 * kt)?;
+        let curve = line(0.2, 1.6, |s| 1.0 / (s * rho * theory.pressure_slope(&[s * rho])));
+        lines.push((if alpha == 0.0 { "alpha_3 = 0" } else { "alpha_3 = 5" }, curve));
+    }
+    outcome.at_most("compressibility at 1.1 T_c and rho_c: alpha_3 = 5 over 0", exact(hot[1] / hot[0]), 1.0);
+    outcome.plot("compressibility", "1.1 T_c", ["density over rho_c", "compressibility"], &[], &lines);
+    Ok(outcome)
+}
+
+/// Where a quantity that rises with temperature changes its sign, by bisection.
+fn root(mut low: f64, mut high: f64, f: impl Fn(f64) -> Result<f64, PaperError>) -> Result<f64, PaperError> {
+    for _ in 0..50 {
+        let middle = 0.5 * (low + high);
+        if f(middle)? > 0.0 { high = middle } else { low = middle }
+    }
+    Ok(0.5 * (low + high))
+}
+
+pub fn fig2(_: &Context) -> Result<Outcome, PaperError> {
+    let mut outcome = Outcome::default();
+    let (b, a) = (0.016, 1.9 * 0.016);
+    let mut lines = Vec::new();
+    for alpha in [0.0, 5.0] {
+        let text = with_parameters(VAN_DER_WAALS, &[("alpha3", alpha)])?;
+        // kT b/a of the equation of state with p = 0, and of the bracket of eq. (29) with no tension.
+        let pressure = |x: f64| (1.0 - x) * x * (1.0 + alpha * x);
+        let tension = |x: f64| (1.0 - x).powi(2) * (1.0 + 2.0 * alpha * x);
+        for x in [0.2, 0.4, 0.6] {
+            let at = [x / b];
+            let zero = |f: &dyn Fn(&psidpd_core::theory::MeanField) -> f64| {
+                root(1e-3, 10.0, |y| Ok(f(&mean_field(&text, y * a / b)?)))
+            };
+            let p = zero(&|theory| theory.pressure(&at))?;
+            let t = zero(&|theory| -theory.gradient_coefficients(&at)[0])?;
+            let of = format!("at b rho = {x}, alpha_3 = {alpha}");
+            outcome.equal(format!("kT b/a without pressure {of}"), exact(p), pressure(x), 1e-6);
+            outcome.equal(format!("kT b/a without tension {of}"), exact(t), tension(x), 1e-6);
+        }
+        // Stable fluids with a tension are between the lines, which cross where (1 − x)(1 + 2αx) = x(1 + αx).
+        let crossing = root(0.01, 0.99, |x| Ok(pressure(x) - tension(x)))?;
+        outcome.at_least(
+            format!("b rho up to which there is a tension, alpha_3 = {alpha}, over the critical one"),
+            exact(crossing / critical(alpha)[0]),
+            1.0,
+        );
+        let names = if alpha == 0.0 {
+            ["p = 0, alpha_3 = 0", "no tension, alpha_3 = 0"]
+        } else {
+            ["p = 0, alpha_3 = 5", "no tension, alpha_3 = 5"]
+        };
+        lines.push((names[0], line(0.0, 1.0, pressure)));
+        lines.push((names[1], line(0.0, 1.0, tension)));
+    }
+    outcome.plot("lines", "Pressure and tension vanish", ["b rho", "kT b/a"], &[], &lines);
+    Ok(outcome)
+}
