@@ -55,10 +55,8 @@ pub struct FromEos {
 
 pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
     let Verb::FromEos(a) = verb;
-    let positive = |x: f64| x > 0.0 && x.is_finite();
-    if ![a.temperature, a.molecules, a.density, a.tolerance, a.dt].into_iter().all(positive)
-        || !(a.range > 0.0 && a.range < 1.0)
-    {
+    let numbers = [a.temperature, a.molecules, a.density, a.tolerance, a.dt, a.range, 1.0 - a.range];
+    if !numbers.into_iter().all(|x| x > 0.0 && x.is_finite()) {
         let message = "numbers must be positive, and the range below 1";
         return Err(FromEosError::Conditions(message.into()).into());
     }

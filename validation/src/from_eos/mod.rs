@@ -32,6 +32,7 @@ use serde::Serialize;
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say it")]
 pub enum FromEosError {
+    #[cfg(not(feature = "eos"))]
     #[error("this psidpd was built without equations of state: cargo build --release --features eos")]
     NotBuilt,
     #[error("no parameters for {0}: there are {1}")]

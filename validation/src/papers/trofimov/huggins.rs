@@ -45,8 +45,8 @@ fn demixed(context: &Context, strength: f64) -> Result<Observed, PaperError> {
         "kT = 1.0\nseed = 1\nbox = [4.0, 4.0, 16.0]\ndensity = 16.0\ndt = 0.01\nequilibrate = 2500\nsteps = 3500\n\
          [[part]]\nshape = \"layer\"\nface = \"zlo\"\nthickness = 8.0\nspecies = \"A\"\nmin_distance = 0.2\n\
          [[part]]\nshape = \"layer\"\nface = \"zhi\"\nthickness = 8.0\nspecies = \"B\"\nmin_distance = 0.2\n\
-         [output]\nthermo = 0\n[observe]\nevery = 20\ntemperature = true\ndensity_profile = true\n\
-         composition_profile = true\n",
+         [output]\nthermo = 0\n[observe]\nevery = 20\ntemperature = true\ndensity_profile = { recentre = false }\n\
+         composition_profile = { recentre = false }\n",
         SCENE,
     );
     context.shipped(&format!("e{strength}"), &model, scene, &[])

@@ -9,8 +9,10 @@ use crate::papers::context::{Context, PaperError};
 
 /// Bins of the density profile.
 const BIN: f64 = 0.05;
-/// Their place in a set: name, model, temperatures with a density of the liquid to start from.
-const SETS: [(&str, &str, [(f64, f64); 3]); 2] = [
+/// A parameter set: name, model, and for each temperature a density of the liquid to start from.
+type Set = (&'static str, &'static str, [(f64, f64); 3]);
+
+const SETS: [Set; 2] = [
     ("set 5", SET5, [(0.5, 5.3), (1.0, 5.08), (2.0, 4.6)]),
     ("set 6", SET6, [(0.5, 6.3), (1.0, 6.05), (2.0, 5.6)]),
 ];
