@@ -30,9 +30,7 @@ pub fn tension(context: &Context) -> Result<Outcome, PaperError> {
 
 pub fn merge(context: &Context) -> Result<Outcome, PaperError> {
     let mut outcome = Outcome::default();
-    // The same Weber number. Small drops are stopped by the bath and have to find each other.
-    let changes: &[Change] = &[(&["steps"], 2500.into())];
-    let observed = context.shipped("collision", IMMISCIBLE, context.pick(SMALL, FULL), changes)?;
+    let observed = context.shipped("collision", IMMISCIBLE, context.pick(SMALL, FULL), &[])?;
     let series = |column| profile(&observed, "clusters_series", column);
     let largest = series("largest");
     let drops = context.pick(2.0_f64, 15.0).powi(3) * 10.0 * 8.0 / 3.0 * std::f64::consts::PI;
