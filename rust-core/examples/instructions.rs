@@ -25,7 +25,7 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(fault) => {
             eprintln!(
-                "{fault}\nusage: instructions mdpd|dpd|formula mixed|double portable|avx2|avx512 EVALUATIONS [ghosts]"
+                "{fault}\nusage: instructions mdpd|dpd|formula mixed|double portable|avx2|avx512|avx512-vbmi2 EVALUATIONS [ghosts]"
             );
             ExitCode::FAILURE
         }

@@ -65,7 +65,7 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(fault) => {
             eprintln!(
-                "{fault}\nusage: pace mdpd|dpd|formula mixed|double portable|avx2|avx512 THREADS PARTICLES [ghosts]"
+                "{fault}\nusage: pace mdpd|dpd|formula mixed|double portable|avx2|avx512|avx512-vbmi2 THREADS PARTICLES [ghosts]"
             );
             ExitCode::FAILURE
         }

@@ -15,7 +15,10 @@ const ROUNDS: u32 = 10;
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [fluid, precision, instructions, threads, size] = &arguments[..] else {
-        return Err("usage: step_pace mdpd|dpd|formula mixed|double portable|avx2|avx512 THREADS SIZE".into());
+        return Err(
+            "usage: step_pace mdpd|dpd|formula mixed|double portable|avx2|avx512|avx512-vbmi2 THREADS SIZE"
+                .into(),
+        );
     };
     let subject = SUBJECTS.into_iter().find(|s| s.name == fluid).ok_or("mdpd, dpd or formula")?;
     let precision = if precision == "double" { Precision::Double } else { Precision::Mixed };

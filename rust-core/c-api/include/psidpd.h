@@ -54,9 +54,14 @@
 #define PSIDPD_INSTRUCTIONS_AVX2 2
 
 /**
- * For psidpd_settings: AVX-512.
+ * For psidpd_settings: AVX-512 F, BW, DQ and VL.
  */
 #define PSIDPD_INSTRUCTIONS_AVX512 3
+
+/**
+ * For psidpd_settings: AVX-512 with VBMI2.
+ */
+#define PSIDPD_INSTRUCTIONS_AVX512_VBMI2 4
 
 /**
  * For `want`: compute the potential energy.

@@ -15,8 +15,10 @@ pub const PSIDPD_INSTRUCTIONS_BEST: i32 = 0;
 pub const PSIDPD_INSTRUCTIONS_PORTABLE: i32 = 1;
 /// For psidpd_settings: AVX2 and FMA.
 pub const PSIDPD_INSTRUCTIONS_AVX2: i32 = 2;
-/// For psidpd_settings: AVX-512.
+/// For psidpd_settings: AVX-512 F, BW, DQ and VL.
 pub const PSIDPD_INSTRUCTIONS_AVX512: i32 = 3;
+/// For psidpd_settings: AVX-512 with VBMI2.
+pub const PSIDPD_INSTRUCTIONS_AVX512_VBMI2: i32 = 4;
 
 /// How an engine computes. Results depend on the precision, and only by rounding on anything else; for any number of
 /// threads they are the same to the bit. With all bytes zero and one thread it is what psidpd_engine_new chooses.
@@ -59,6 +61,7 @@ impl Settings {
             PSIDPD_INSTRUCTIONS_PORTABLE => engine::Instructions::Portable,
             PSIDPD_INSTRUCTIONS_AVX2 => engine::Instructions::Avx2,
             PSIDPD_INSTRUCTIONS_AVX512 => engine::Instructions::Avx512,
+            PSIDPD_INSTRUCTIONS_AVX512_VBMI2 => engine::Instructions::Avx512Vbmi2,
             other => return Err(wrong("instructions", other)),
         };
         let threads = NonZeroUsize::new(self.threads).filter(|n| n.get() <= 4096).ok_or_else(|| {
@@ -78,6 +81,7 @@ impl Settings {
                 engine::Instructions::Portable => PSIDPD_INSTRUCTIONS_PORTABLE,
                 engine::Instructions::Avx2 => PSIDPD_INSTRUCTIONS_AVX2,
                 engine::Instructions::Avx512 => PSIDPD_INSTRUCTIONS_AVX512,
+                engine::Instructions::Avx512Vbmi2 => PSIDPD_INSTRUCTIONS_AVX512_VBMI2,
             },
             threads: settings.threads.get(),
         }

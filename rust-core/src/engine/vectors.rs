@@ -16,7 +16,7 @@ pub fn run<L: Loop>(set: InstructionSet, work: L) -> L::Out {
     match set.instructions() {
         // SAFETY: there is an `InstructionSet` only of what the processor has.
         #[cfg(target_arch = "x86_64")]
-        Instructions::Avx512 => unsafe { avx512(work) },
+        Instructions::Avx512 | Instructions::Avx512Vbmi2 => unsafe { avx512(work) },
         // SAFETY: there is an `InstructionSet` only of what the processor has.
         #[cfg(target_arch = "x86_64")]
         Instructions::Avx2 => unsafe { avx2(work) },

@@ -5,6 +5,7 @@ use super::ghosts::Ghosts;
 use crate::ground::box_geometry::BoxGeometry;
 use crate::ground::cell_grid::CellGrid;
 use crate::ground::fixed_point::FixedPoint16;
+use crate::instruction_set::InstructionSet;
 use psidpd_threads::SharedSlice;
 
 /// Everything that the pair search reads.
@@ -14,6 +15,8 @@ use psidpd_threads::SharedSlice;
 /// that whole vectors may be read there.
 #[derive(Clone, Copy)]
 pub struct SortedCells<'a> {
+    /// What the search runs on.
+    pub set: InstructionSet,
     pub geometry: &'a BoxGeometry,
     pub grid: &'a CellGrid,
     /// The first particle of each cell, and one past the last; then the same for the copy of the first plane.

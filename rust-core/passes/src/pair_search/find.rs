@@ -26,6 +26,7 @@ pub struct FindPairs<'a> {
 
 impl Kernel for FindPairs<'_> {
     type Out = ();
+    const VBMI2: bool = true;
 
     /// # Safety
     /// The contract of `simd`. The particles are of the column.

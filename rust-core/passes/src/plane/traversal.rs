@@ -5,7 +5,7 @@ use crate::pair_search::buffers::SearchBuffers;
 use crate::pair_search::cell_ranges::{CellRanges, PlaneSearch, StencilColumns};
 use crate::pair_search::clusters::SEARCH_GROUP;
 use crate::pair_search::find::FindPairs;
-use crate::simd::{Isa, call};
+use crate::simd::{Isa, run};
 
 /// What is done with the pairs of a plane.
 pub trait BatchVisitor<I: Isa> {
@@ -47,7 +47,7 @@ pub unsafe fn each_batch<I: Isa, V: BatchVisitor<I>>(
                 let count = SEARCH_GROUP.min(end - first);
                 groups += 1;
                 // A call: what finds pairs is the same in every pass on an instruction set.
-                call::<I, _>(FindPairs {
+                let find = FindPairs {
                     cells,
                     plane: &search,
                     stencil: &stencil,
@@ -55,7 +55,8 @@ pub unsafe fn each_batch<I: Isa, V: BatchVisitor<I>>(
                     group: [first, count],
                     batch_size: lanes,
                     buffers,
-                });
+                };
+                run(cells.set, find);
                 let mut slot = 0;
                 while slot < count {
                     let slots = [slot, count.min(slot + lanes)];

@@ -2,7 +2,6 @@
 
 use super::x86::{Quad4, operators};
 use super::{BroadcastPair, Isa, ORDINARY_F32, ORDINARY_F64, Reals, Words, record_at, wide_record_at};
-use crate::settings::Instructions;
 use crate::simd::OFFSET_BITS;
 use psidpd_model::kernel::Real;
 use std::arch::x86_64::*;
@@ -432,7 +431,6 @@ impl Words for U32x4 {
 }
 
 impl Isa for Avx2 {
-    const INSTRUCTIONS: Instructions = Instructions::Avx2;
     type F32 = F32x8;
     type F64 = F64x4;
     type Quad = Quad4;

@@ -1,16 +1,17 @@
-//! AVX-512 (F, BW, DQ, VL, VBMI2), with AVX2, FMA and BMI2.
+//! AVX-512 (F, BW, DQ, VL), with VBMI2 or without; with AVX2, FMA and BMI2.
 
 use super::avx2::U32x8;
 use super::x86::{Quad4, operators};
-use super::{BroadcastPair, Isa, ORDINARY_F32, ORDINARY_F64, Reals, Words, record_at, wide_record_at};
-use crate::settings::Instructions;
+use super::{
+    BroadcastPair, Isa, OFFSET_BITS, ORDINARY_F32, ORDINARY_F64, Reals, Words, record_at, wide_record_at,
+};
 use psidpd_model::kernel::Real;
 use std::arch::x86_64::*;
 use std::ops::{Add, Mul, Sub};
 
-/// The instruction set.
+/// The instruction set; `VBMI2` compresses bytes.
 #[derive(Clone, Copy)]
-pub struct Avx512;
+pub struct Avx512<const VBMI2: bool>;
 
 /// Sixteen `f32`.
 #[derive(Clone, Copy)]
@@ -401,8 +402,59 @@ unsafe fn places(j_bases: __m512, bits: __m128i, p: *mut u32) {
     }
 }
 
-impl Isa for Avx512 {
-    const INSTRUCTIONS: Instructions = Instructions::Avx512;
+/// [`Isa::expand_mask`] of all sixty-four bits at once.
+#[inline(always)]
+unsafe fn expand_bytes(j_bases: *const u32, mask: u64, p: *mut u32) -> usize {
+    unsafe {
+        // Bytes, in which the number of the base is below the bit's in its sixteen.
+        let packed = _mm512_maskz_compress_epi8(mask, _mm512_load_si512((&raw const PLACES).cast()));
+        let j_bases = _mm512_castsi512_ps(_mm512_broadcast_i32x4(_mm_loadu_si128(j_bases.cast())));
+        let count = mask.count_ones() as usize;
+        places(j_bases, _mm512_castsi512_si128(packed), p);
+        if count > 16 {
+            places(j_bases, _mm512_extracti32x4_epi32::<1>(packed), p.add(16));
+            if count > 32 {
+                places(j_bases, _mm512_extracti32x4_epi32::<2>(packed), p.add(32));
+                places(j_bases, _mm512_extracti32x4_epi32::<3>(packed), p.add(48));
+            }
+        }
+        count
+    }
+}
+
+/// Byte offsets of sixteen particles.
+static OFFSETS: Line<[u32; 16]> = Line(offsets());
+
+const fn offsets() -> [u32; 16] {
+    let mut offsets = [0; 16];
+    let mut k = 0;
+    while k < 16 {
+        offsets[k] = (k as u32) << OFFSET_BITS;
+        k += 1;
+    }
+    offsets
+}
+
+/// [`Isa::expand_mask`] of sixteen bits after sixteen.
+#[inline(always)]
+unsafe fn expand_words(j_bases: *const u32, mask: u64, p: *mut u32) -> usize {
+    unsafe {
+        let offsets = _mm512_load_si512((&raw const OFFSETS).cast());
+        let mut found = 0;
+        let mut k = 0;
+        while k < 4 {
+            let mask = (mask >> (16 * k)) as u16;
+            let base = _mm512_set1_epi32(*j_bases.add(k) as i32);
+            let packed = _mm512_maskz_compress_epi32(mask, _mm512_add_epi32(base, offsets));
+            _mm512_storeu_si512(p.add(found).cast(), packed);
+            found += mask.count_ones() as usize;
+            k += 1;
+        }
+        found
+    }
+}
+
+impl<const VBMI2: bool> Isa for Avx512<VBMI2> {
     type F32 = F32x16;
     type F64 = F64x8;
     type Quad = Quad4;
@@ -450,21 +502,7 @@ impl Isa for Avx512 {
     }
     #[inline(always)]
     unsafe fn expand_mask(j_bases: *const u32, mask: u64, p: *mut u32) -> usize {
-        unsafe {
-            // Bytes, in which the number of the base is below the bit's in its sixteen.
-            let packed = _mm512_maskz_compress_epi8(mask, _mm512_load_si512((&raw const PLACES).cast()));
-            let j_bases = _mm512_castsi512_ps(_mm512_broadcast_i32x4(_mm_loadu_si128(j_bases.cast())));
-            let count = mask.count_ones() as usize;
-            places(j_bases, _mm512_castsi512_si128(packed), p);
-            if count > 16 {
-                places(j_bases, _mm512_extracti32x4_epi32::<1>(packed), p.add(16));
-                if count > 32 {
-                    places(j_bases, _mm512_extracti32x4_epi32::<2>(packed), p.add(32));
-                    places(j_bases, _mm512_extracti32x4_epi32::<3>(packed), p.add(48));
-                }
-            }
-            count
-        }
+        unsafe { if VBMI2 { expand_bytes(j_bases, mask, p) } else { expand_words(j_bases, mask, p) } }
     }
     #[inline(always)]
     unsafe fn root_or_more(x: F32x16) -> F32x16 {

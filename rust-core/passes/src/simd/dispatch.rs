@@ -8,6 +8,8 @@ use crate::settings::Instructions;
 /// A piece of work that is written once for all instruction sets.
 pub trait Kernel {
     type Out;
+    /// Whether it is compiled with VBMI2 too, because it compresses bytes; what does not is compiled once for AVX-512.
+    const VBMI2: bool = false;
 
     /// The work, to be inlined always: what is not is compiled for the compiler's target.
     ///
@@ -25,26 +27,11 @@ pub unsafe fn run<K: Kernel>(set: InstructionSet, kernel: K) -> K::Out {
     match set.instructions() {
         // SAFETY: there is an `InstructionSet` only of what the processor has; the rest the caller promises.
         #[cfg(target_arch = "x86_64")]
-        Instructions::Avx512 => unsafe { avx512(kernel) },
+        Instructions::Avx512Vbmi2 if K::VBMI2 => unsafe { avx512_vbmi2(kernel) },
         // SAFETY: there is an `InstructionSet` only of what the processor has; the rest the caller promises.
         #[cfg(target_arch = "x86_64")]
-        Instructions::Avx2 => unsafe { avx2(kernel) },
-        // SAFETY: every processor has it; the rest the caller promises.
-        _ => unsafe { portable(kernel) },
-    }
-}
-
-/// Runs a kernel on the instruction set of the caller by a call: what several passes do is compiled once for all of them.
-///
-/// # Safety
-/// The caller runs on this instruction set, and what the kernel says of itself.
-#[inline(always)]
-pub unsafe fn call<I: Isa, K: Kernel>(kernel: K) -> K::Out {
-    match I::INSTRUCTIONS {
-        // SAFETY: the processor has what the caller runs on; the rest the caller promises.
-        #[cfg(target_arch = "x86_64")]
-        Instructions::Avx512 => unsafe { avx512(kernel) },
-        // SAFETY: the processor has what the caller runs on; the rest the caller promises.
+        Instructions::Avx512Vbmi2 | Instructions::Avx512 => unsafe { avx512(kernel) },
+        // SAFETY: there is an `InstructionSet` only of what the processor has; the rest the caller promises.
         #[cfg(target_arch = "x86_64")]
         Instructions::Avx2 => unsafe { avx2(kernel) },
         // SAFETY: every processor has it; the rest the caller promises.
@@ -67,9 +54,17 @@ unsafe fn avx2<K: Kernel>(kernel: K) -> K::Out {
 }
 
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx512vbmi2,avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
 #[inline(never)]
 unsafe fn avx512<K: Kernel>(kernel: K) -> K::Out {
     // SAFETY: the processor has the features of this function; the rest the caller promises.
-    unsafe { kernel.run::<super::avx512::Avx512>() }
+    unsafe { kernel.run::<super::avx512::Avx512<false>>() }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx512vbmi2,avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+#[inline(never)]
+unsafe fn avx512_vbmi2<K: Kernel>(kernel: K) -> K::Out {
+    // SAFETY: the processor has the features of this function; the rest the caller promises.
+    unsafe { kernel.run::<super::avx512::Avx512<true>>() }
 }

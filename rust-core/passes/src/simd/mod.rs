@@ -23,9 +23,8 @@ mod portable;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
-pub use dispatch::{Kernel, call, run};
+pub use dispatch::{Kernel, run};
 
-use crate::settings::Instructions;
 use psidpd_model::kernel::Real;
 
 /// Indices of particles are shifted by so many bits, to be byte offsets into accumulators and into packed particles of mixed
@@ -182,7 +181,6 @@ pub trait Quad: Copy {
 /// An instruction set.
 #[allow(clippy::missing_safety_doc)]
 pub trait Isa: Copy + Send + Sync + 'static {
-    const INSTRUCTIONS: Instructions;
     type F32: Reals<Scalar = f32>;
     type F64: Reals<Scalar = f64>;
     type Quad: Quad;

@@ -1,7 +1,6 @@
 //! Plain arrays, which the compiler vectorises for whatever the target has.
 
 use super::{BroadcastPair, Isa, ORDINARY_F32, ORDINARY_F64, Quad, Reals, Words, record_at, wide_record_at};
-use crate::settings::Instructions;
 use crate::simd::OFFSET_BITS;
 use psidpd_model::kernel::Real;
 use std::ops::{Add, Mul, Sub};
@@ -347,7 +346,6 @@ fn below(there: &[[u16; 16]; 3], two: &BroadcastPair, which: usize, limit: i16) 
 }
 
 impl Isa for Portable {
-    const INSTRUCTIONS: Instructions = Instructions::Portable;
     type F32 = Lanes<f32>;
     type F64 = Lanes<f64>;
     type Quad = Four;

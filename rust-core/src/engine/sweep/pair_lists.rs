@@ -118,6 +118,7 @@ impl PairLists {
         let shared = self.particles.share();
         let inputs = &ListInputs {
             cells: SortedCells {
+                set: self.set,
                 geometry: &cells.geometry,
                 grid: &cells.grid,
                 start: &cells.start,

@@ -77,7 +77,7 @@ fn settings(precision: Precision, instructions: Instructions, threads: usize) ->
 
 fn every() -> impl Iterator<Item = (Precision, Instructions)> {
     let precisions = [Precision::Mixed, Precision::Double];
-    let sets = [Instructions::Portable, Instructions::Avx2, Instructions::Avx512];
+    let sets = Instructions::ALL.map(|(_, set)| set);
     precisions.into_iter().flat_map(move |p| sets.into_iter().filter(|i| i.available()).map(move |i| (p, i)))
 }
 

@@ -211,7 +211,17 @@ impl<P: PairPrecision> Workspace<P> {
         let (geometry, grid, start) = (&order.geometry, &order.grid, &order.start[..]);
         let (terms, thermostat) = (&fluid.terms, self.thermostat);
         let data = PassData {
-            cells: SortedCells { geometry, grid, start, x, fixed16, fixed16_scale, ghosts, excluded },
+            cells: SortedCells {
+                set: fluid.set,
+                geometry,
+                grid,
+                start,
+                x,
+                fixed16,
+                fixed16_scale,
+                ghosts,
+                excluded,
+            },
             inputs: PairInputs { geometry, terms, thermostat, packed, species, ghosts },
             slopes: slopes.slopes,
         };
