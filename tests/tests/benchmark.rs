@@ -35,7 +35,7 @@ fn documented() -> BTreeSet<String> {
 #[test]
 fn a_small_benchmark_has_every_documented_field() {
     let folder = tempfile::tempdir().unwrap();
-    let arguments = "bench --sizes 500,700 --few-above 600 --rounds 2 --steps 20 --memory 20000 --threads 1,2 --out b --json c.json";
+    let arguments = "bench --all --sizes 500,700 --few-above 600 --rounds 2 --steps 20 --memory 20000 --threads 1,2 --out b --json c.json";
     let output = psidpd(folder.path(), &arguments.split(' ').collect::<Vec<_>>());
     assert_eq!(output.status.code(), Some(0), "{}", said(&output));
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();

@@ -213,7 +213,7 @@ fn whom_goals_name_is_timed_at_their_sizes() {
     };
     let timed = |fluid: &str, size: usize, code: &str| {
         let subject = SUBJECTS.iter().find(|s| s.name == fluid).unwrap();
-        let field = Field::of(size, size == SIZES[0], FEW_ABOVE);
+        let field = Field::of(size, size == SIZES[0], true, FEW_ABOVE);
         let code = named(code);
         SIZES.contains(&size) && contenders(subject, &choice, field).iter().any(|c| c.id() == code)
     };

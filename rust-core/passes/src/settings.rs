@@ -53,29 +53,31 @@ impl Instructions {
 
     /// Whether this processor has them.
     pub fn available(self) -> bool {
+        self.missing().is_empty()
+    }
+
+    /// What they need and this processor lacks.
+    pub fn missing(self) -> Vec<&'static str> {
         #[cfg(target_arch = "x86_64")]
         {
-            let avx2 = is_x86_feature_detected!("avx2")
-                && is_x86_feature_detected!("fma")
-                && is_x86_feature_detected!("bmi1")
-                && is_x86_feature_detected!("bmi2")
-                && is_x86_feature_detected!("lzcnt")
-                && is_x86_feature_detected!("popcnt");
-            let avx512 = is_x86_feature_detected!("avx512f")
-                && is_x86_feature_detected!("avx512bw")
-                && is_x86_feature_detected!("avx512dq")
-                && is_x86_feature_detected!("avx512vl");
-            let vbmi2 = is_x86_feature_detected!("avx512vbmi2");
-            match self {
-                Instructions::Portable => true,
-                Instructions::Avx2 => avx2,
-                Instructions::Avx512 => avx2 && avx512,
-                Instructions::Avx512Vbmi2 => avx2 && avx512 && vbmi2,
+            macro_rules! features {
+                ($($feature:tt)*) => { [$(($feature, is_x86_feature_detected!($feature))),*] };
             }
+            let avx2 = features!("avx2" "fma" "bmi1" "bmi2" "lzcnt" "popcnt");
+            let avx512 = features!("avx512f" "avx512bw" "avx512dq" "avx512vl");
+            let vbmi2 = features!("avx512vbmi2");
+            let needed = match self {
+                Instructions::Portable => vec![],
+                Instructions::Avx2 => avx2.to_vec(),
+                Instructions::Avx512 => [&avx2[..], &avx512].concat(),
+                Instructions::Avx512Vbmi2 => [&avx2[..], &avx512, &vbmi2].concat(),
+            };
+            needed.into_iter().filter(|(_, has)| !has).map(|(feature, _)| feature).collect()
         }
         #[cfg(not(target_arch = "x86_64"))]
-        {
-            self == Instructions::Portable
+        match self {
+            Instructions::Portable => vec![],
+            _ => vec!["x86-64"],
         }
     }
 

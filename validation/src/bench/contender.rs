@@ -133,6 +133,8 @@ pub fn reference(subject: &Subject) -> Option<Contender> {
 
 /// The words of the plugin's fastest setting on one thread, which is timed on several ranks.
 pub const MIXED: &str = "precision mixed";
+/// Those of its default.
+const DOUBLE: &str = "precision double";
 
 /// What a LAMMPS has, and what is asked for.
 #[derive(Debug, Clone, Default)]
@@ -162,6 +164,9 @@ pub enum Field {
     Everyone,
     /// All but the reference, whose cost per particle does not depend on the size.
     AllButPlain,
+    /// What a user chooses among: the built-in, the plugin in both precisions, on threads and on two ranks, the native
+    /// runner in both precisions with the best instructions.
+    User,
     /// Who was asked for by name, and of the others those that take few seconds or are compared with: the
     /// built-in, the plugin in mixed precision on one rank and two, the native runner in mixed precision with the
     /// best instructions; of the general fluid only the native runner.
@@ -169,12 +174,13 @@ pub enum Field {
 }
 
 impl Field {
-    /// Everyone at the smallest size, few at sizes above `few_above`.
-    pub fn of(size: usize, smallest: bool, few_above: usize) -> Field {
-        match (size > few_above, smallest) {
-            (true, _) => Field::Few,
-            (false, true) => Field::Everyone,
-            (false, false) => Field::AllButPlain,
+    /// Few at sizes above `few_above`. Below, with `every_code`, everyone at the smallest size.
+    pub fn of(size: usize, smallest: bool, every_code: bool, few_above: usize) -> Field {
+        match (size > few_above, every_code, smallest) {
+            (true, ..) => Field::Few,
+            (false, false, _) => Field::User,
+            (false, true, true) => Field::Everyone,
+            (false, true, false) => Field::AllButPlain,
         }
     }
 
@@ -182,6 +188,11 @@ impl Field {
         match (self, &contender.code) {
             (Field::Everyone, _) => true,
             (Field::AllButPlain, code) => *code != Code::Plain,
+            (Field::User, _) if contender.weak => false,
+            (Field::User, Code::Plugin(words)) => words != DOUBLE || choice.words.contains(words),
+            (Field::User, Code::Native(settings)) => settings.instructions == Instructions::best(),
+            (Field::User, Code::Eam | Code::Plain) => false,
+            (Field::User, _) => true,
             (Field::Few, Code::Plugin(words)) => {
                 (words == MIXED && reference(subject).is_some()) || choice.words.contains(words)
             }
@@ -211,7 +222,7 @@ fn everyone(subject: &Subject, choice: &Choice) -> Vec<Contender> {
     }
     let general = *subject != MDPD && *subject != DPD;
     let threads = choice.threads.iter().filter(|n| n.get() > 1 && !general);
-    let words = ["", MIXED, "precision double"].map(str::to_owned).into_iter();
+    let words = ["", MIXED, DOUBLE].map(str::to_owned).into_iter();
     let words = words.chain(threads.map(|n| format!("{MIXED} threads {n}"))).chain(choice.words.clone());
     all.extend(words.map(|words| Contender::alone(Code::Plugin(words))));
     if *subject == MDPD && choice.two_ranks {
@@ -272,9 +283,10 @@ mod tests {
 
     #[test]
     fn few_are_timed_in_large_boxes() {
-        assert_eq!(Field::of(10, true, 10), Field::Everyone);
-        assert_eq!(Field::of(10, false, 10), Field::AllButPlain);
-        assert_eq!([true, false].map(|smallest| Field::of(11, smallest, 10)), [Field::Few; 2]);
+        assert_eq!(Field::of(10, true, true, 10), Field::Everyone);
+        assert_eq!(Field::of(10, false, true, 10), Field::AllButPlain);
+        assert_eq!(Field::of(10, true, false, 10), Field::User);
+        assert_eq!([true, false].map(|smallest| Field::of(11, smallest, true, 10)), [Field::Few; 2]);
         let native = |threads| format!("native mixed {} {threads}", Instructions::best());
         let plugin = "plugin dpd/psi precision mixed".to_owned();
         let asked = "plugin dpd/psi precision double threads 3".to_owned();
@@ -294,6 +306,30 @@ mod tests {
             assert!(all.len() > most.len() && names(subject, Field::Few).iter().all(|n| most.contains(n)));
             all.retain(|name| name != "native plain");
             assert_eq!(all, most);
+        }
+    }
+
+    #[test]
+    fn a_user_sees_what_he_chooses_among() {
+        let best = Instructions::best();
+        for subject in &SUBJECTS {
+            let names = names(subject, Field::User);
+            assert!(
+                names.contains(&"plugin dpd/psi".to_owned())
+                    && names.contains(&format!("native double {best} 2"))
+            );
+            assert!(names.contains(&"plugin dpd/psi precision mixed threads 2".to_owned()));
+            let left_out = |name: &String| {
+                name.contains("weak")
+                    || name.contains("portable")
+                    || name.contains("eam")
+                    || name.contains("plain")
+            };
+            assert!(!names.iter().any(left_out), "{names:?}");
+            assert_eq!(
+                names.iter().filter(|name| name.contains("2 ranks")).count(),
+                2 * usize::from(*subject == MDPD)
+            );
         }
     }
 

@@ -51,6 +51,8 @@ pub struct Options {
     pub memory: Vec<usize>,
     /// Thread counts of the native runner.
     pub threads: Vec<NonZeroUsize>,
+    /// Every code, not only those of [`Field::User`].
+    pub every_code: bool,
     /// Above this size only the contenders of [`Field::Few`] are timed.
     pub few_above: usize,
     /// More words behind the seed of `pair_style dpd/psi`, each a contender.
@@ -123,7 +125,10 @@ pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Out
     time(options.rounds, &cases, &place, &mut entries, progress)?;
 
     let spinner = progress.spinner("memory and threads");
-    let memory = memory::measure(program, &options.memory)?;
+    let memory = match &options.memory[..] {
+        [] => Vec::new(),
+        sizes => memory::measure(program, sizes)?,
+    };
     let equal_bits = equal_bits(options, &cases)?;
     spinner.finish();
 
@@ -141,6 +146,7 @@ pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Out
                 .filter(|(_, i)| i.available())
                 .map(|(name, _)| name.to_owned())
                 .collect(),
+            better: better(),
             load,
         },
         lammps: LammpsFacts { version, missing },
@@ -149,6 +155,7 @@ pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Out
             rounds: options.rounds,
             seconds: options.seconds,
             steps: options.steps,
+            every_code: options.every_code,
             few_above: options.few_above,
             seed: start::SEED,
         },
@@ -225,7 +232,7 @@ fn entries(
             let pairs = start::pairs_per_particle(&start.state, cutoff);
             cases.insert((subject.name, size), Case { start, pairs });
             deck::prepare(place, &subject, subject == MDPD && choice.eam)?;
-            let field = Field::of(size, Some(size) == smallest, options.few_above);
+            let field = Field::of(size, Some(size) == smallest, options.every_code, options.few_above);
             for contender in contender::contenders(&subject, choice, field) {
                 entries.push(Entry {
                     subject,
@@ -479,6 +486,15 @@ fn equal_bits(options: &Options, cases: &Cases) -> Result<BTreeMap<String, bool>
         }
     }
     Ok(equal)
+}
+
+/// Instruction sets better than the one that the engine takes, each with what the processor lacks for it.
+fn better() -> Vec<String> {
+    Instructions::ALL
+        .into_iter()
+        .filter(|(_, i)| !i.available())
+        .map(|(name, i)| format!("{name} needs {}, which this processor lacks", i.missing().join(", ")))
+        .collect()
 }
 
 /// The system's mean number of busy processes over a minute.

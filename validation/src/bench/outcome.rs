@@ -39,6 +39,8 @@ pub struct Machine {
     pub cores: usize,
     /// Instruction sets that the engine has kernels for and the processor has, the best last.
     pub instructions: Vec<String>,
+    /// The other instruction sets, each with what the processor lacks for it.
+    pub better: Vec<String>,
     /// Processes that were running or waiting when the benchmark began, by the system's mean over a minute; above
     /// a few tenths figures are not to be trusted.
     pub load: Option<f64>,
@@ -66,6 +68,8 @@ pub struct Asked {
     pub steps: Option<u64>,
     /// Size above which few contenders are timed.
     pub few_above: usize,
+    /// Whether every code is timed in boxes up to that.
+    pub every_code: bool,
     /// Of starts and noise.
     pub seed: u64,
 }

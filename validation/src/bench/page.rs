@@ -1,7 +1,7 @@
 //! Results as tables and plots.
 
 use super::BenchError;
-use super::outcome::{Asked, Outcome, Run};
+use super::outcome::{Asked, Machine, Outcome, Run};
 use super::spread::Spread;
 use crate::report::{Item, Plot, Report, Section, Series, Style, Table};
 use psidpd_core::engine::Instructions;
@@ -38,6 +38,54 @@ pub fn few(options: &Asked) -> Option<String> {
         )
     })
 }
+
+/// The fastest setting natively and in LAMMPS, of each fluid at each size.
+pub fn fastest(outcome: &Outcome) -> Table {
+    let mut table =
+        Table::new(["fluid", "particles", "fastest natively", "10⁶/s", "fastest in LAMMPS", "10⁶/s"]);
+    for (fluid, size) in
+        outcome.fluids.iter().flat_map(|f| outcome.options.sizes.iter().map(|s| (f.name, *s)))
+    {
+        let of = |native: bool| {
+            let here = |r: &&Run| r.fluid == fluid && r.size == size && r.skin.is_none() == native;
+            let rate = |r: &Run| r.mega_particle_steps_per_second.median;
+            // In a box of its own size: one repeated for two ranks is another.
+            let runs = outcome.runs.iter().filter(here).filter(|r| !r.code.ends_with("weak"));
+            runs.max_by(|a, b| rate(a).total_cmp(&rate(b))).map(|r| (r, rate(r)))
+        };
+        let shown = |run: Option<(&Run, f64)>| match run {
+            Some((run, rate)) => [run.code.clone(), format!("{rate:.2}")],
+            None => ["–".to_owned(), "–".to_owned()],
+        };
+        let [native, lammps] = [true, false].map(of);
+        let Some(particles) = native.or(lammps).map(|(run, _)| run.particles) else { continue };
+        let [native, lammps] = [shown(native), shown(lammps)];
+        table.push([fluid.to_owned(), particles.to_string()].into_iter().chain(native).chain(lammps));
+    }
+    table
+}
+
+/// The instruction set that the engine takes, and why no better one.
+pub fn instructions(machine: &Machine) -> String {
+    let best = machine.instructions.last().map_or("none", String::as_str);
+    let takes = format!("the engine takes {best}");
+    std::iter::once(&takes).chain(&machine.better).map(String::as_str).collect::<Vec<_>>().join("; ")
+}
+
+/// Where the time goes natively, in the fastest precision on one thread.
+pub fn native_parts(outcome: &Outcome) -> Table {
+    let mixed = format!("native mixed {} 1", Instructions::best());
+    parts(outcome, |r| r.code == mixed, &NATIVE_PARTS)
+}
+
+/// Where the time goes in LAMMPS with the plugin, on one thread of one rank.
+pub fn plugin_parts(outcome: &Outcome) -> Table {
+    let mixed = "plugin dpd/psi precision mixed";
+    parts(outcome, |r| r.code == mixed, &LAMMPS_PARTS)
+}
+
+const NATIVE_PARTS: [&str; 6] = ["sort", "pairs", "psi", "many-body", "forces", "integrate"];
+const LAMMPS_PARTS: [&str; 6] = ["pair", "neigh", "comm", "output", "modify", "other"];
 
 /// Where the time goes, of the runs for which `wanted` says so.
 fn parts(outcome: &Outcome, wanted: impl Fn(&Run) -> bool, names: &[&str]) -> Table {
@@ -143,8 +191,7 @@ pub fn report(outcome: &Outcome) -> Result<String, BenchError> {
         speed.push(Item::Figure { svg, caption: String::new() });
     }
     speed.push(Item::Table(speeds(outcome)));
-    let native = ["sort", "pairs", "psi", "many-body", "forces", "integrate"];
-    let lammps = ["pair", "neigh", "comm", "output", "modify", "other"];
+    speed.push(Item::Table(fastest(outcome)));
     let section = |heading: &str, items: Vec<Item>| Section { heading: heading.into(), items };
     let sections = vec![
         section("Speed", speed),
@@ -157,14 +204,14 @@ pub fn report(outcome: &Outcome) -> Result<String, BenchError> {
                      Forces: back to the host's order. Integrate: all else."
                         .into(),
                 ),
-                Item::Table(parts(outcome, |r| r.instructions.is_some(), &native)),
+                Item::Table(parts(outcome, |r| r.instructions.is_some(), &NATIVE_PARTS)),
             ],
         ),
         section(
             "Where the time goes in LAMMPS",
             vec![
                 Item::Prose("Nanoseconds per particle and step, as LAMMPS accounts for them.".into()),
-                Item::Table(parts(outcome, |r| r.skin.is_some(), &lammps)),
+                Item::Table(parts(outcome, |r| r.skin.is_some(), &LAMMPS_PARTS)),
             ],
         ),
         section("Two MPI ranks", vec![Item::Table(scaling(outcome))]),
@@ -183,6 +230,7 @@ pub fn report(outcome: &Outcome) -> Result<String, BenchError> {
             ("not in this LAMMPS".into(), missing),
             ("machine".into(), outcome.machine.processor.clone()),
             ("instruction sets".into(), outcome.machine.instructions.join(", ")),
+            ("instructions".into(), instructions(&outcome.machine)),
             (
                 "load before".into(),
                 outcome.machine.load.map_or_else(|| "unknown".into(), |l| format!("{l:.2}")),

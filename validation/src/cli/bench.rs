@@ -4,16 +4,21 @@ use crate::report::Progress;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-/// Time LAMMPS, the plugin and the native runner side by side; a few minutes. Nothing else should run.
+/// Time LAMMPS, the plugin and the native runner side by side. Nothing else should run.
+///
+/// Says what this machine reaches, which settings are the fastest, and where the time goes.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// All sizes, more and longer rounds, memory of 3.75 million particles: by estimate half an hour.
     #[arg(long)]
     full: bool,
+    /// Every code and setting in five rounds, and memory: what the goals of the project are held against.
+    #[arg(long)]
+    all: bool,
     /// Particles of the many-body fluid in the boxes [default: 6050,48400; with --full also 387200].
     #[arg(long, value_name = "N,…", value_delimiter = ',', value_parser = at_least_one)]
     sizes: Vec<NonZeroUsize>,
-    /// Interleaved rounds [default: 5; with --full 7].
+    /// Interleaved rounds [default: 3; with --all 5, with --full 7].
     #[arg(long, value_name = "N")]
     rounds: Option<NonZeroUsize>,
     /// Seconds that a timed run may take; it makes at least 20 steps, the native runner 32 [default: 0.3; with --full
@@ -29,7 +34,7 @@ pub struct Arguments {
     /// Threads of the native runner.
     #[arg(long, value_name = "N,…", value_delimiter = ',', default_value = "1,2", value_parser = at_least_one)]
     threads: Vec<NonZeroUsize>,
-    /// Particles of the systems whose memory is measured [default: 1000000; with --full also 3750000].
+    /// Particles of the systems whose memory is measured [default: none; with --all 1000000; with --full also 3750000].
     #[arg(long, value_name = "N,…", value_delimiter = ',', value_parser = at_least_one)]
     memory: Vec<NonZeroUsize>,
     /// Time `pair_style dpd/psi` with these words behind the seed too, "precision double threads 2"; can be given
@@ -69,15 +74,20 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     }
     let full = arguments.full;
     let sizes = if full { &SIZES[..] } else { &SIZES[..2] };
-    let memory: &[usize] = if full { &[1_000_000, 3_750_000] } else { &[1_000_000] };
+    let (memory, rounds): (&[usize], usize) = match (full, arguments.all) {
+        (true, _) => (&[1_000_000, 3_750_000], 7),
+        (false, true) => (&[1_000_000], 5),
+        (false, false) => (&[], 3),
+    };
     let mut sizes = or_default(&arguments.sizes, sizes);
     sizes.sort_unstable();
     sizes.dedup();
     let options = Options {
         sizes,
-        rounds: arguments.rounds.map_or(if full { 7 } else { 5 }, NonZeroUsize::get),
+        rounds: arguments.rounds.map_or(rounds, NonZeroUsize::get),
         seconds: arguments.seconds.unwrap_or(if full { 0.5 } else { 0.3 }),
         steps: arguments.steps,
+        every_code: full || arguments.all,
         few_above: arguments.few_above,
         memory: or_default(&arguments.memory, memory),
         threads: arguments.threads.clone(),
@@ -88,6 +98,14 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     let program = super::program()?;
     let outcome = measure(&options, &program, &Progress::new())?;
     println!("{}", page::speeds(&outcome).to_text());
+    for (heading, table) in [
+        ("The fastest settings:", page::fastest(&outcome)),
+        ("Where the time goes natively, ns per particle and step:", page::native_parts(&outcome)),
+        ("Where it goes in LAMMPS with the plugin, ns per particle and step:", page::plugin_parts(&outcome)),
+    ] {
+        println!("{heading}\n\n{}", table.to_text());
+    }
+    println!("{}, {}\n", outcome.machine.processor, page::instructions(&outcome.machine));
     if let Some(note) = page::few(&outcome.options) {
         println!("{note}\n");
     }

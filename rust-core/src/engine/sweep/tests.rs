@@ -359,6 +359,22 @@ fn any_number_of_threads_gives_the_same_bits() {
     }
 }
 
+#[test]
+fn avx512_gives_the_same_bits_with_vbmi2_and_without() {
+    for fluid in [shipped("warren2003-set6.toml"), shipped("standard-dpd.toml"), many()] {
+        let sets = [Instructions::Avx512, Instructions::Avx512Vbmi2].into_iter().filter(|i| i.available());
+        let cloud = Cloud::new(boxes(3, 7.3).remove(0), 3, fluid.species.len(), 1500, 3);
+        let forces: Vec<_> = sets
+            .map(|i| {
+                let mut sweep = Sweep::new(&fluid, settings(Precision::Mixed, i, 1)).unwrap();
+                assert_eq!(sweep.settings().instructions, i);
+                swept(&mut sweep, &cloud, Want::TOTALS)
+            })
+            .collect();
+        assert!(forces.windows(2).all(|two| two[0] == two[1]));
+    }
+}
+
 /// Accumulators are used again as a sweep goes through its planes, and slabs of threads begin anywhere: boxes of a few
 /// planes and of many, full and nearly empty ones, swept by the same engines one after another.
 #[test]
