@@ -3,8 +3,8 @@
 
 use psidpd_core::model::Model;
 use psidpd_core::model::keys::{
-    CURVES, DENSITY, EXCESS, FORMS, PAIR, PARAMETERS, REQUIRED, TABLES, THERMOSTAT, TOP, Table, UNITS,
-    ValueKind,
+    CURVES, DENSITY, EXCESS, FORMS, LITERATURE, PAIR, PARAMETERS, REQUIRED, TABLES, THERMOSTAT, TOP, Table,
+    UNITS, ValueKind,
 };
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
@@ -38,6 +38,13 @@ fn schema_of_value(kind: &ValueKind) -> Value {
             json!({ "anyOf": [{ "type": "string" }, curve] })
         }
         ValueKind::Positive => json!({ "type": "number", "exclusiveMinimum": 0 }),
+        ValueKind::Words(words) if words.starts_with("array") => {
+            json!({ "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 })
+        }
+        ValueKind::Words(_) => json!({ "anyOf": [{ "type": "string" }, {
+            "type": "object", "properties": { "table": { "type": "string" } }, "required": ["table"],
+            "additionalProperties": false
+        }]}),
         other => panic!("no value of a model: {other:?}"),
     }
 }
@@ -89,6 +96,8 @@ fn schema() -> String {
     properties["pair"] = json!({ "type": "array", "description": PAIR.about, "items": { "oneOf": forms } });
     properties["thermostat"] =
         json!({ "type": "array", "description": THERMOSTAT.about, "items": object(&THERMOSTAT, None) });
+    properties["literature"] =
+        json!({ "type": "array", "description": LITERATURE.about, "items": object(&LITERATURE, None) });
     serde_json::to_string_pretty(&root).unwrap() + "\n"
 }
 
@@ -106,7 +115,7 @@ fn reference() -> String {
     for table in TABLES {
         let heading = match table.path {
             "" => "Top level".to_owned(),
-            "pair" | "thermostat" => format!("`[[{}]]`", table.path),
+            "pair" | "thermostat" | "literature" => format!("`[[{}]]`", table.path),
             path if path == CURVES.path => "`SPECIES = { … }` in `[excess_free_energy]`".to_owned(),
             path => format!("`[{path}]`"),
         };
@@ -182,6 +191,7 @@ fn validate(value: &Value, schema: &Value, root: &Value) -> Result<(), String> {
             },
             "const" => value == rule,
             "enum" => list(rule).contains(value),
+            "exclusiveMinimum" => value.as_f64().is_none_or(|x| x > rule.as_f64().unwrap()),
             "minLength" => value.as_str().is_none_or(|s| s.chars().count() >= count(rule)),
             "minItems" => value.as_array().is_none_or(|a| a.len() >= count(rule)),
             "maxItems" => value.as_array().is_none_or(|a| a.len() <= count(rule)),
@@ -296,7 +306,8 @@ fn the_reader_knows_the_keys_of_the_table_and_no_others() {
     let head = "title = \"t\"\nspecies = [\"A\"]\n";
     let mut top = listed(&TOP, None);
     top.extend(
-        ["density", "excess_free_energy", "pair", "parameters", "thermostat", "units"].map(str::to_owned),
+        ["density", "excess_free_energy", "literature", "pair", "parameters", "thermostat", "units"]
+            .map(str::to_owned),
     );
     top.sort();
     assert_eq!(known(&format!("{head}zzz = 1")), top);

@@ -21,7 +21,7 @@ fn continuations() -> Vec<&'static str> {
 }
 
 /// Every table, in the order of the documentation.
-pub const TABLES: &[Table] = &[TOP, UNITS, PARAMETERS, DENSITY, EXCESS, CURVES, PAIR, THERMOSTAT];
+pub const TABLES: &[Table] = &[TOP, UNITS, PARAMETERS, DENSITY, EXCESS, CURVES, PAIR, THERMOSTAT, LITERATURE];
 
 /// The top level.
 pub const TOP: Table = Table {
@@ -137,7 +137,7 @@ pub const EXCESS: Table = Table {
     forms: ("", &[]),
     about: "`psi`, the excess free energy per particle, of every species: energy units, and forces are \
             `-[dpsi_i/dn + dpsi_j/dn] w'(r)`. Formulas know the densities' variables, the parameters, `kT`, `pi`, \
-            `+ - * / ^`, `ln` (or `log`), `exp`, `sqrt`, `sin`, `cos`, `tanh`, `abs`, `min`, `max`. Left out \
+            `+ - * / ^` (or `**`), `ln` (or `log`: the natural logarithm), `log10`, `exp`, `sqrt`, `sin`, `cos`, `tanh`, `abs`, `min`, `max`. Left out \
             altogether, there is none; a species that has none beside others gets `\"0\"`.",
     keys: keys! {
         "SPECIES": ValueKind::Excess, OPTIONAL,
@@ -162,9 +162,10 @@ pub const CURVES: Table = Table {
              its exact slope; beyond the ends psi' goes on linearly. With `PSIDPD_TABLES_ANYWHERE=1` in the \
              environment the file may be anywhere."
             => "[excess_free_energy]\nA = { table = \"psi.csv\" }";
-        "pressure": ValueKind::Formula, OPTIONAL,
-            "The equation of state wanted, a formula of `rho` and `kT`, for one species: `psi' = (p - rho \
-             kT)/rho^2`. psi is its integral, by quadrature, from a density where it is finite."
+        "pressure": ValueKind::Words("string with a formula, or `{ table = \"FILE\" }`"), OPTIONAL,
+            "The equation of state wanted, for one species: a formula of `rho` and `kT`, or a table with rows of `rho` and \
+             `p`, measured at the kT of the run. `psi' = (p - rho kT)/rho^2`; psi is its integral, from a density where \
+             it is finite. Beyond the ends of a table psi' goes on linearly."
             => "[excess_free_energy]\nA = { pressure = \"rho*kT/(1 - 0.016*rho) - 0.03*rho^2\" }";
         "density": ValueKind::Text, OPTIONAL,
             "The density it depends on, needed where there are several."
@@ -267,3 +268,38 @@ pub const THERMOSTAT: Table = Table {
             => "[[thermostat]]\ngamma = 4.5\nrange = 1.0\nexponent = 0.5";
     },
 };
+
+/// `[[literature]]`.
+pub const LITERATURE: Table = Table {
+    path: "literature",
+    title: "",
+    array: true,
+    forms: ("", &[]),
+    about: "Measured values that were published for the fluid, by temperature: each a value and its error. Nothing is \
+            computed from them; `theory`, `run` and reports put them beside theory and what is measured.",
+    keys: keys! {
+        "kT": ValueKind::Positive, REQUIRED,
+            "The temperature."
+            => "[[literature]]\nkT = 1.0\ntension = [7.45, 0.04]";
+        "density": ValueKind::Positive, OPTIONAL,
+            "The number density that `pressure` belongs to."
+            => "[[literature]]\nkT = 1.0\ndensity = 3.0\npressure = [23.65, 0.05]";
+        "pressure": ValueKind::Words(ERROR), OPTIONAL,
+            "Pressure of the homogeneous fluid at `density`."
+            => "[[literature]]\nkT = 1.0\ndensity = 3.0\npressure = [23.65, 0.05]";
+        "liquid": ValueKind::Words(ERROR), OPTIONAL,
+            "Number density of the liquid beside its vapour."
+            => "[[literature]]\nkT = 1.0\nliquid = [6.05, 0.01]";
+        "vapour": ValueKind::Words(ERROR), OPTIONAL,
+            "Number density of the vapour."
+            => "[[literature]]\nkT = 0.5\nvapour = [0.03, 0.01]";
+        "tension": ValueKind::Words(ERROR), OPTIONAL,
+            "Surface tension."
+            => "[[literature]]\nkT = 1.0\ntension = [7.45, 0.04]";
+        "width": ValueKind::Words(ERROR), OPTIONAL,
+            "Width of the interface, `(rho_L - rho_V)/max|d rho/dz|`."
+            => "[[literature]]\nkT = 1.0\nwidth = [0.66, 0.03]";
+    },
+};
+
+const ERROR: &str = "array of a number and its error, which is above 0";

@@ -23,7 +23,7 @@ mod preset_lucy;
 mod preset_spline;
 mod presets;
 
-pub use file::{KNOWN_FUNCTIONS, Model, Units};
+pub use file::{KNOWN_FUNCTIONS, Model, Published, Units};
 pub use fluid::{
     Bounds, Continuation, ExcessFreeEnergy, Fluid, PairTerm, Polynomial, StatedSlopes, Thermostat,
     WeightedDensity,

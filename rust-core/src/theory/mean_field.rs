@@ -17,7 +17,7 @@ pub struct MeanField {
     pub(super) species: Vec<String>,
     pub(super) free_energy: FreeEnergy,
     /// What is added to the bulk density in variable `v` of `ψ_α`: the self term.
-    shift: Vec<Vec<f64>>,
+    pub(super) shift: Vec<Vec<f64>>,
     /// The variables of `ψ_α` for a particle without neighbours: its corrected densities.
     isolated: Vec<Vec<f64>>,
     /// `w` of each density.
@@ -25,9 +25,11 @@ pub struct MeanField {
     /// `φ` and the species it acts between.
     pub(super) pairs: Vec<([usize; 2], Radial)>,
     /// `[φ_αβ]`, row-major and symmetric.
-    pair_integrals: Vec<f64>,
+    pub(super) pair_integrals: Vec<f64>,
     /// The longest range of a density or a pair potential, and the shortest.
     pub(super) ranges: [f64; 2],
+    /// Whether a density is calibrated so that its mean is the bulk density.
+    pub(super) calibrated: bool,
 }
 
 impl MeanField {
@@ -110,6 +112,10 @@ impl MeanField {
             pairs,
             pair_integrals,
             ranges,
+            calibrated: fluid
+                .densities
+                .iter()
+                .any(|d| d.correction.iter().any(|c| *c != crate::model::Polynomial::identity())),
         })
     }
 
@@ -146,7 +152,7 @@ impl MeanField {
         self.psi_at(alpha, &self.isolated[alpha])
     }
 
-    fn psi_at(&self, alpha: usize, at: &[f64]) -> Psi {
+    pub(super) fn psi_at(&self, alpha: usize, at: &[f64]) -> Psi {
         let mut psi = self.free_energy.at(alpha, at);
         if !psi.value.is_finite() {
             // The derivatives of a logarithm go on where it does not.

@@ -22,6 +22,7 @@
 //! counts the self term.
 
 mod binary;
+mod correlations;
 mod free_energy;
 mod interface;
 mod limit;
@@ -34,6 +35,7 @@ mod singular;
 mod stability;
 
 pub use binary::{CompositionBinodal, CompositionCritical, composition_critical_point};
+pub use correlations::{Correlated, Correlations};
 pub use interface::Interface;
 pub use limit::{NoLimit, Structure, thermodynamic_limit};
 pub use mean_field::MeanField;

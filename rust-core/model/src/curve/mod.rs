@@ -1,6 +1,7 @@
 //! `ψ` as a function of one total density: a table, or an equation of state.
 
 mod pressure;
+pub mod pressure_table;
 mod spline;
 
 pub use pressure::Pressure;

@@ -1,5 +1,5 @@
 use super::printable::printable;
-use crate::expression::ExpressionError;
+use crate::expression::{ExpressionError, closest};
 use std::borrow::Cow;
 use std::fmt::{self, Write};
 use std::ops::Range;
@@ -104,7 +104,8 @@ pub struct FileError {
 impl FileError {
     /// An error at the bytes `span` of `source`, about `key` (dotted, may be empty).
     pub fn new(source: &Arc<Source>, span: Range<usize>, key: &str, kind: FileErrorKind) -> FileError {
-        FileError { source: Arc::clone(source), span, key: key.to_owned(), kind: Box::new(kind), help: None }
+        let help = suggestion(key, &kind);
+        FileError { source: Arc::clone(source), span, key: key.to_owned(), kind: Box::new(kind), help }
     }
 
     /// The same error with advice.
@@ -143,6 +144,16 @@ impl FileError {
     pub fn line(&self) -> usize {
         self.source.line_column(self.span.start).0
     }
+}
+
+/// The known name that was probably meant.
+fn suggestion(key: &str, kind: &FileErrorKind) -> Option<String> {
+    let (name, known) = match kind {
+        FileErrorKind::UnknownKey { known } => (key.rsplit('.').next().unwrap_or(key), known),
+        FileErrorKind::UnknownName { name, known, .. } => (name.as_str(), known),
+        _ => return None,
+    };
+    Some(format!("did you mean `{}`?", closest(name, known.split(", "))?))
 }
 
 /// The most characters of a message, and of a key in it: names may be as long as a file.

@@ -1,6 +1,8 @@
 //! The keys that a file may have, in tables. Schemas for editors and pages of documentation are written from
 //! them, and tests hold the readers to them.
 
+use super::{FileError, FileErrorKind, Section, Value};
+
 /// A table of a file, or of one of its tables.
 #[derive(Debug, Clone, Copy)]
 pub struct Table {
@@ -204,6 +206,60 @@ impl Table {
         }
         text
     }
+}
+
+/// What to say of a file with an error: of what is misspelt rather than of what is missing for it. `more` are tables that
+/// are described elsewhere.
+pub fn strangers_first(error: FileError, root: &Section, tables: &[Table], more: &[&str]) -> FileError {
+    match error.kind() {
+        // Of another file, or said already.
+        _ if error.file() != root.source().as_ref() => error,
+        FileErrorKind::UnknownKey { .. } => error,
+        _ => refuse_strangers(root, tables, more).err().unwrap_or(error),
+    }
+}
+
+fn refuse_strangers(root: &Section, tables: &[Table], more: &[&str]) -> Result<(), FileError> {
+    for table in tables {
+        let first = |path: &'static str| path.split('.').next().unwrap_or_default();
+        for section in sections(root, table.path) {
+            let form = section.get(table.forms.0).and_then(|v| v.as_str());
+            let form = form.filter(|name| table.forms.1.contains(name));
+            let mut known: Vec<&str> = table.keys_of(form).map(|k| k.name).collect();
+            if table.path.is_empty() {
+                known.extend(tables.iter().map(|t| first(t.path)).filter(|name| !name.is_empty()));
+                known.extend(more);
+            }
+            // Names of the user's.
+            if known.iter().any(|name| name.chars().all(|c| c.is_ascii_uppercase()) && name.len() > 1) {
+                continue;
+            }
+            known.sort_unstable();
+            known.dedup();
+            for (name, _) in section.entries() {
+                if !known.contains(&name.value.as_str()) {
+                    let kind = FileErrorKind::UnknownKey { known: known.join(", ") };
+                    return Err(name.error(section.source(), kind));
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The tables of a file at a path such as `density.NAME`.
+fn sections<'a>(root: &Section<'a>, path: &str) -> Vec<Section<'a>> {
+    let Some((first, rest)) = path.split_once('.').or((!path.is_empty()).then_some((path, ""))) else {
+        return root.again();
+    };
+    let inner = |value: Value<'a>| -> Vec<Section<'a>> {
+        let elements = value.as_array().unwrap_or_else(|| vec![value]);
+        elements.iter().filter_map(Value::as_section).flat_map(|s| sections(&s, rest)).collect()
+    };
+    if first.chars().all(|c| c.is_ascii_uppercase()) {
+        return root.entries().into_iter().flat_map(|(_, value)| inner(value)).collect();
+    }
+    root.get(first).map_or_else(Vec::new, inner)
 }
 
 /// Keys in short: `"name" [FORMS]: VALUE, NEED, "meaning" => "example";`. The forms are left out where all have the key.

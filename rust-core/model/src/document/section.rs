@@ -56,6 +56,11 @@ impl<'a> Section<'a> {
         Section { source, path, span, table, asked: RefCell::default() }
     }
 
+    /// The same section, of which nothing was asked yet.
+    pub(super) fn again(&self) -> Vec<Section<'a>> {
+        vec![Section::new(self.source, self.path.clone(), self.span.clone(), self.table)]
+    }
+
     /// The file this is a part of.
     pub fn source(&self) -> &'a Arc<Source> {
         self.source

@@ -17,7 +17,7 @@ pub const MAX_DEPTH: usize = 64;
 /// | numbers | `2`, `0.5`, `.5`, `1e-3` |
 /// | names | a letter or `_`, then letters, digits and `_`; `pi` is π |
 /// | operators, loosest first | `+ -`, then `* /`, then signs, then `^` |
-/// | functions | `ln` (or `log`), `exp`, `sqrt`, `sin`, `cos`, `tanh`, `abs`, `min(a, b)`, `max(a, b)` |
+/// | functions | `ln` (or `log`), `log10`, `exp`, `sqrt`, `sin`, `cos`, `tanh`, `abs`, `min(a, b)`, `max(a, b)` |
 ///
 /// `^` groups to the right and binds tighter than a sign on its left: `-x^2` is −(x²), `2^-1` is ½.
 /// There is no implied multiplication.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::Formula;
 use super::ast::{Action, Ast, Binary, Step};
 use super::error::{ErrorKind, ExpressionError, TooLarge};
-use super::function::Function;
+use super::function::{Function, Unary};
 use super::graph::{Graph, Id};
 use super::suggest::closest;
 
@@ -82,6 +82,11 @@ impl Compiler<'_> {
             (Action::Number(value), _) => graph.constant(*value),
             (Action::Negate, &[a]) => graph.negate(a),
             (Action::Call(Function::Unary(function)), &[a]) => graph.unary(*function, a),
+            (Action::Call(Function::Log10), &[a]) => {
+                let (natural, scale) =
+                    (graph.unary(Unary::Ln, a)?, graph.constant(std::f64::consts::LOG10_E)?);
+                graph.multiply(natural, scale)
+            }
             (Action::Call(Function::Min), &[a, b]) => graph.min(a, b),
             (Action::Call(Function::Max), &[a, b]) => graph.max(a, b),
             (Action::Binary(binary), &[a, b]) => match binary {

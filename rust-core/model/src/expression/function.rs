@@ -46,17 +46,20 @@ impl Unary {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Function {
     Unary(Unary),
+    /// The logarithm to the base 10.
+    Log10,
     Min,
     Max,
 }
 
 impl Function {
-    pub const ALL: [(&str, Function); 10] = [
+    pub const ALL: [(&str, Function); 11] = [
         ("abs", Function::Unary(Unary::Abs)),
         ("cos", Function::Unary(Unary::Cos)),
         ("exp", Function::Unary(Unary::Exp)),
         ("ln", Function::Unary(Unary::Ln)),
         ("log", Function::Unary(Unary::Ln)),
+        ("log10", Function::Log10),
         ("max", Function::Max),
         ("min", Function::Min),
         ("sin", Function::Unary(Unary::Sin)),
@@ -72,6 +75,7 @@ impl Function {
     pub fn name(self) -> &'static str {
         match self {
             Function::Unary(unary) => unary.name(),
+            Function::Log10 => "log10",
             Function::Min => "min",
             Function::Max => "max",
         }
@@ -79,7 +83,7 @@ impl Function {
 
     pub fn arguments(self) -> usize {
         match self {
-            Function::Unary(_) => 1,
+            Function::Unary(_) | Function::Log10 => 1,
             Function::Min | Function::Max => 2,
         }
     }

@@ -29,6 +29,8 @@ impl<'a> Lexer<'a> {
             return Ok(None);
         };
         let (token, length) = match first {
+            // As in Fortran and Python.
+            '*' if rest.starts_with("**") => (Token::Symbol('^'), 2),
             '+' | '-' | '*' | '/' | '^' | '(' | ')' | ',' => (Token::Symbol(first), 1),
             'a'..='z' | 'A'..='Z' | '_' => {
                 let length = leading(rest, |c| c.is_ascii_alphanumeric() || c == '_');

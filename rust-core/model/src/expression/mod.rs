@@ -42,6 +42,8 @@ mod program;
 mod simplify;
 mod suggest;
 
+pub(crate) use suggest::closest;
+
 pub use ast::{Ast, MAX_DEPTH, MAX_LENGTH};
 pub use compile::Variables;
 pub use display::Named;

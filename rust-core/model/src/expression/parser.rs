@@ -238,9 +238,29 @@ fn unknown(name: &str, span: Span) -> ExpressionError {
     let known = Function::ALL.map(|entry| entry.0);
     span.error(ErrorKind::UnknownFunction {
         name: name.to_owned(),
-        suggestion: closest(name, known),
+        suggestion: in_other_words(name).or_else(|| closest(name, known)),
         known: known.map(str::to_owned).to_vec(),
     })
+}
+
+/// How to write what other languages have a function for.
+fn in_other_words(name: &str) -> Option<String> {
+    let words = match name.to_ascii_lowercase().as_str() {
+        "pow" | "power" => "a^b",
+        "log2" => "ln(x)/ln(2)",
+        "log1p" => "ln(1 + x)",
+        "expm1" => "exp(x) - 1",
+        "cbrt" => "x^(1/3)",
+        "sqr" | "square" => "x^2",
+        "tan" => "sin(x)/cos(x)",
+        "sinh" => "(exp(x) - exp(-x))/2",
+        "cosh" => "(exp(x) + exp(-x))/2",
+        "fabs" => "abs(x)",
+        "fmin" => "min(a, b)",
+        "fmax" => "max(a, b)",
+        _ => return None,
+    };
+    Some(words.to_owned())
 }
 
 fn wrong_count(function: Function, found: usize, span: Span) -> ExpressionError {

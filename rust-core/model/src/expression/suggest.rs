@@ -1,10 +1,10 @@
 //! "Did you mean …?"
 
 /// The candidate that `name` is most likely a slip of, if any is close enough.
-pub(super) fn closest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<String> {
+pub fn closest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<String> {
     // One slip in a short name, two in a longer one: beyond that it is another name.
     let allowed = match name.len() {
-        0..=2 => 1,
+        0..=4 => 1,
         _ => 2,
     };
     candidates

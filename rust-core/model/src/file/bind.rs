@@ -5,6 +5,7 @@ use super::density::DensityEntry;
 use super::excess::ExcessEntry;
 use super::interaction::{PairEntry, PairFormEntry, ThermostatEntry};
 use super::number::formula_error;
+use crate::curve::pressure_table;
 use crate::curve::{Curve, CurveForm, Pressure, Spline};
 use crate::document::{FileError, FileErrorKind, Located, Source};
 use crate::expression::{Ast, ErrorKind, Expansion, ExpressionError, Formula, Variables};
@@ -85,6 +86,11 @@ fn bind_excess(
         }
         ExcessEntry::Slopes { slopes, energy } => {
             bind_slopes(slopes, energy.as_ref(), context, variables, densities).map(ExcessFreeEnergy::Slopes)
+        }
+        ExcessEntry::PressureTable { spline, density, key } => {
+            let psi = pressure_table::psi(spline, context.constants["kT"])
+                .map_err(|message| key.error(context.source, FileErrorKind::Value(message)))?;
+            Ok(ExcessFreeEnergy::Curve(Curve { density: *density, form: CurveForm::Table(Arc::new(psi)) }))
         }
         ExcessEntry::Pressure { formula: ast, density } => {
             let variables = Variables { count: 1, names: BTreeMap::from([("rho".to_owned(), vec![0])]) };

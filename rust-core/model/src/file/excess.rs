@@ -19,6 +19,8 @@ pub enum ExcessEntry {
     Table { spline: Arc<Spline>, density: usize },
     /// The pressure as a formula of one density's total.
     Pressure { formula: Located<Ast>, density: usize },
+    /// The pressure as a table of one density's total.
+    PressureTable { spline: Arc<Spline>, density: usize, key: Located<()> },
     /// Slopes that need have no ψ, by the names of the variables, and what is reported as energy.
     Slopes { slopes: Vec<(Located<String>, Located<Ast>)>, energy: Option<Located<Ast>> },
 }
@@ -82,6 +84,13 @@ fn read_curve(
             Ok(ExcessEntry::Table { spline: Arc::new(read_spline(&file, directory, ["n", "psi"])?), density })
         }
         (None, Some(pressure)) if species == 1 => {
+            if let Some(section) = pressure.as_section() {
+                let file = section.require("table")?;
+                let spline = Arc::new(read_spline(&file, directory, ["rho", "p"])?);
+                section.finish()?;
+                let key = Located { value: (), span: file.span(), key: file.key().to_owned() };
+                return Ok(ExcessEntry::PressureTable { spline, density, key });
+            }
             Ok(ExcessEntry::Pressure { formula: read_formula(&pressure, table.source())?, density })
         }
         (None, Some(pressure)) => Err(pressure

@@ -4,16 +4,19 @@ mod bind;
 mod density;
 mod excess;
 mod interaction;
+mod literature;
 mod names;
 mod number;
 mod table;
 mod units;
 
 use super::fluid::Fluid;
+use crate::document::keys::strangers_first;
 use crate::document::{Document, FileError, FileErrorKind, Located, Section, Source};
 use density::DensityEntry;
 use excess::ExcessEntry;
 use interaction::{PairEntry, ThermostatEntry};
+pub use literature::Published;
 pub use names::KNOWN_FUNCTIONS;
 use number::Number;
 use std::collections::BTreeMap;
@@ -29,6 +32,7 @@ pub struct Model {
     reference: Option<String>,
     dimensions: usize,
     units: Option<Units>,
+    literature: Vec<Published>,
     species: Vec<String>,
     parameters: BTreeMap<String, f64>,
     densities: Vec<DensityEntry>,
@@ -59,11 +63,17 @@ impl Model {
     }
 
     fn read(document: &Document) -> Result<Model, FileError> {
+        Model::of(document)
+            .map_err(|error| strangers_first(error, &document.root(), crate::keys::TABLES, &[]))
+    }
+
+    fn of(document: &Document) -> Result<Model, FileError> {
         let root = document.root();
         let title = root.require("title")?.string()?.value;
         let reference = root.get("reference").map(|v| v.string()).transpose()?.map(|l| l.value);
         let dimensions = read_dimensions(&root)?;
         let units = units::read(&root)?;
+        let literature = literature::read(&root)?;
         let species = names::read_species(&root)?;
         let parameters = number::read_parameters(&root)?;
         let densities = density::read(&root, &species.value, &parameters)?;
@@ -77,6 +87,7 @@ impl Model {
             reference,
             dimensions,
             units,
+            literature,
             species: species.value,
             parameters,
             densities,
@@ -108,6 +119,11 @@ impl Model {
     /// What its numbers stand for, if it says so.
     pub fn units(&self) -> Option<Units> {
         self.units
+    }
+
+    /// What was published for the fluid at a temperature.
+    pub fn published(&self, kt: f64) -> Option<&Published> {
+        self.literature.iter().find(|p| (p.kt - kt).abs() <= 1e-9 * kt)
     }
 
     /// The names of the species.

@@ -1,7 +1,8 @@
 use crate::document::{FileError, FileErrorKind, Located, Section};
 
 /// The functions of formulas; no parameter, density or species may take such a name.
-pub const KNOWN_FUNCTIONS: &[&str] = &["ln", "log", "exp", "sqrt", "sin", "cos", "tanh", "abs", "min", "max"];
+pub const KNOWN_FUNCTIONS: &[&str] =
+    &["ln", "log", "log10", "exp", "sqrt", "sin", "cos", "tanh", "abs", "min", "max"];
 
 /// Most species a model may have: every pair of them is stored.
 const MOST_SPECIES: usize = 64;

@@ -1,0 +1,54 @@
+//! Values that were published for the fluid, to be put beside what is measured.
+
+use crate::document::{FileError, FileErrorKind, Section};
+
+/// The quantities that may be stated.
+pub const QUANTITIES: [&str; 5] = ["pressure", "liquid", "vapour", "tension", "width"];
+
+/// What was published for one temperature.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Published {
+    /// kT.
+    pub kt: f64,
+    /// The number density that `pressure` belongs to.
+    pub density: Option<f64>,
+    /// Of [`QUANTITIES`]: name, value, error.
+    pub values: Vec<(&'static str, [f64; 2])>,
+}
+
+/// Reads `[[literature]]`.
+pub fn read(root: &Section) -> Result<Vec<Published>, FileError> {
+    let Some(list) = root.get("literature") else { return Ok(Vec::new()) };
+    let mut all = Vec::new();
+    for item in list.array()? {
+        let table = item.section()?;
+        let positive = |key: &str| {
+            let Some(value) = table.get(key) else { return Ok(None) };
+            match value.number()?.value {
+                x if x > 0.0 => Ok(Some(x)),
+                x => Err(value.error(FileErrorKind::Value(format!("must be positive, is {x}")))),
+            }
+        };
+        table.require("kT")?;
+        let kt = positive("kT")?.unwrap_or(f64::NAN);
+        let density = positive("density")?;
+        let mut values = Vec::new();
+        for name in QUANTITIES {
+            let Some(value) = table.get(name) else { continue };
+            let [x, error] = value.numbers("a value and its error")?;
+            if error <= 0.0 {
+                return Err(
+                    value.error(FileErrorKind::Value(format!("the error must be positive, is {error}")))
+                );
+            }
+            values.push((name, [x, error]));
+        }
+        if density.is_none() && values.iter().any(|(name, _)| *name == "pressure") {
+            let message = "a pressure needs the density that it belongs to".to_owned();
+            return Err(table.require("pressure")?.error(FileErrorKind::Value(message)));
+        }
+        table.finish()?;
+        all.push(Published { kt, density, values });
+    }
+    Ok(all)
+}
