@@ -37,6 +37,15 @@ fn a_scene_runs_and_leaves_what_it_says() {
     let json: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(folder.path().join("summary.json")).unwrap()).unwrap();
     assert_eq!(json["particles"], 387);
+    // The results are said, with errors, beside mean field; so are doubts: six rows are too few.
+    let words = said(&output);
+    for part in ["temperature", "pressure", "mean field", "note: too short for error bars: 5 rows"] {
+        assert!(words.contains(part), "{part}: {words}");
+    }
+    let values = json["headline"]["values"].as_array().unwrap();
+    let value = |name: &str| values.iter().find(|v| v["name"] == name).unwrap_or_else(|| panic!("{json}"));
+    assert!((value("density")["value"].as_f64().unwrap() - 387.0 / 64.0).abs() < 1e-12);
+    assert!((value("pressure")["mean_field"].as_f64().unwrap() - 219.0).abs() < 2.0, "{json}");
     // What a run ends with is where another can begin.
     let next = scene("").replace(
         "kind = \"lattice\"\ndensity = 6.05",
@@ -106,9 +115,38 @@ fn a_run_has_a_report_and_pictures() {
         run(&["snapshot", &file, "--density", "--view", "x", "--size", "64", "--out", "a.png"]);
         assert!(std::fs::read(here.join("a.png")).unwrap().starts_with(b"\x89PNG"));
     }
-    // A run into the same folder leaves nothing of the one before.
+    // A film has the frames of the dump; colours tell values, which --json names the ends of.
+    run(&["snapshot", "out/dump.lammpstrj", "--out", "film.gif", "--size", "64", "--json", "film.json"]);
+    assert!(std::fs::read(here.join("film.gif")).unwrap().starts_with(b"GIF89a"));
+    let told = |name: &str| -> serde_json::Value {
+        serde_json::from_str(&std::fs::read_to_string(here.join(name)).unwrap()).unwrap()
+    };
+    assert_eq!(told("film.json")["frames"], 3);
+    let mut ends = Vec::new();
+    for colour in ["density", "speed", "psi"] {
+        let arguments = ["snapshot", "out/final.data", "--model", &model(), "--kT", "1", "--colour", colour];
+        run(&[&arguments[..], &["--out", "c.svg", "--json", "c.json"]].concat());
+        assert!(std::fs::read_to_string(here.join("c.svg")).unwrap().contains("</svg>"));
+        let [low, high] = [0, 1].map(|k| told("c.json")["colours"][k].as_f64().unwrap());
+        assert!(0.0 <= low && low < high, "{colour}: {low} {high}");
+        ends.push([low, high]);
+    }
+    // psi = pi/30 rd^4 B n^2 at the densities of the first.
+    let psi = |n: f64| std::f64::consts::PI / 30.0 * 0.75f64.powi(4) * 25.0 * n * n;
+    for k in 0..2 {
+        assert!((ends[2][k] / psi(ends[0][k]) - 1.0).abs() < 1e-9, "{ends:?}");
+    }
+    // The species reach other programs by name.
+    assert!(std::fs::read_to_string(here.join("out/final.data")).unwrap().contains(" # F\n"));
+    // A finished run is not replaced unasked; a run that replaces it leaves nothing of it.
     let path = write(here, "scene.toml", &scene(""));
-    run(&["run", &path, "--out", "out"]);
+    let refused = psidpd(here, &["run", &path, "--out", "out"]);
+    assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
+    for words in ["finished run of another scene", "--overwrite"] {
+        assert!(said(&refused).contains(words), "{}", said(&refused));
+    }
+    assert!(here.join("out/report.html").exists());
+    run(&["run", &path, "--out", "out", "--overwrite"]);
     for file in ["report.html", "trajectory.xyz"] {
         assert!(!here.join("out").join(file).exists(), "{file}");
     }
@@ -120,9 +158,13 @@ fn a_run_has_a_report_and_pictures() {
         (vec!["report", "nowhere"], "nothing of a run"),
         (vec!["snapshot", "nowhere.data"], "nowhere.data"),
         (vec!["snapshot", "scene.toml"], "scene.toml"),
-        (vec!["snapshot", "out/final.data", "--out", "a.gif"], ".svg or .png"),
+        (vec!["snapshot", "out/final.data", "--out", "a.bmp"], ".svg or .png"),
         (vec!["snapshot", "out/final.data", "--slice", "0"], "--slice"),
-        (vec!["snapshot", "out/dump.lammpstrj", "--frame", "3"], "no frame 3"),
+        (vec!["snapshot", "out/final.data", "--colour", "psi"], "needs --model and --kT"),
+        (
+            vec!["snapshot", "out/dump.lammpstrj", "--frame", "3"],
+            "no frame 3; the first one is 0, the last one 2",
+        ),
         (vec!["snapshot", "out/final.data", "--density", "--species", "G"], "no species G"),
     ] {
         let output = psidpd(here, &arguments);
@@ -138,8 +180,15 @@ fn bad_input_is_named_with_file_line_and_key() {
     let here = folder.path();
     let good = scene("");
     let bad_model = write(here, "bad.toml", &std::fs::read_to_string(model()).unwrap().replace("n^2", "m^2"));
+    let power = std::fs::read_to_string(model()).unwrap().replace("n^2", "pow(n, 2)");
+    let power = write(here, "power.toml", &power);
     let scenes = [
-        (good.replace("dump = 25", "dump = 25\nthermos = 1"), "unknown key"),
+        (good.replace("dump = 25", "dump = 25\nthermos = 1"), "did you mean `thermo`?"),
+        // What is misspelt is told before what is missing for it.
+        (good.replace("density = 6.05", "densty = 6.05"), "did you mean `density`?"),
+        (good.replace("kT = 1.0", "KT = 1.0"), "did you mean `kT`?"),
+        (good.replace("kind = \"lattice\"", "kind = \"latice\""), "did you mean `lattice`?"),
+        (good.replace(&model(), &power), "did you mean `a^b`?"),
         (good.replace("kT = 1.0", "kT = 0"), "kT"),
         (good.replace("steps = 50", "steps = -5"), "stage"),
         (good.replace("dt = 0.01", "dt = 0"), "dt"),
@@ -236,7 +285,7 @@ fn evaluations_beyond_bounds_are_counted_and_reported() {
         serde_json::from_str(&std::fs::read_to_string(here.join("s.json")).unwrap()).unwrap();
     assert!(json["out_of_bounds"][1].as_u64().unwrap() > 0, "{json}");
     let free = write(here, "free.toml", &scene(""));
-    let output = psidpd(here, &["run", &free, "--out", "out"]);
+    let output = psidpd(here, &["run", &free, "--out", "free"]);
     assert!(!said(&output).contains("out of bounds"), "{}", said(&output));
 }
 
@@ -298,4 +347,41 @@ fn a_drop_that_heats_stops_its_run() {
     let calm = write(folder.path(), "calm.toml", &text.replace("dt = 0.3", "dt = 0.01"));
     let output = psidpd(folder.path(), &["run", &calm, "--out", "calm"]);
     assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+}
+
+/// Completions for a shell, and manual pages, know every verb.
+#[test]
+fn completions_and_manual_pages_know_the_verbs() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    for shell in ["bash", "zsh", "fish"] {
+        let output = psidpd(here, &["completions", shell]);
+        assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+        assert!(said(&output).contains("snapshot") && said(&output).contains("overwrite"), "{shell}");
+    }
+    let output = psidpd(here, &["man", "--out", "man"]);
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    for page in ["psidpd.1", "psidpd-run.1", "psidpd-sweep.1"] {
+        assert!(std::fs::read_to_string(here.join("man").join(page)).unwrap().contains(".TH"), "{page}");
+    }
+    assert!(std::fs::read_to_string(here.join("man/psidpd-run.1")).unwrap().contains("Examples"));
+}
+
+/// A model from a table of pressures has these pressures.
+#[test]
+fn a_table_of_pressures_makes_a_model() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let pressure = |rho: f64| 1.0 * rho + 2.0 * rho * rho + 0.1 * rho.powi(3);
+    let rows: String =
+        (1..=60).map(|k| 0.2 * f64::from(k)).map(|rho| format!("{rho},{}\n", pressure(rho))).collect();
+    write(here, "p.csv", &format!("rho,p\n{rows}"));
+    let text = "title = \"table\"\nspecies = [\"F\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n\
+                [excess_free_energy]\nF = { pressure = { table = \"p.csv\" } }\n";
+    write(here, "m.toml", text);
+    let output = psidpd(here, &["check", "m.toml", "--density", "5", "--json", "c.json"]);
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    let json: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(here.join("c.json")).unwrap()).unwrap();
+    assert!((json["pressure"].as_f64().unwrap() / pressure(5.0) - 1.0).abs() < 1e-6, "{json}");
 }

@@ -109,7 +109,8 @@ fn whole() -> &'static Path {
 
 /// An interrupted run: its folder, and what it said.
 fn interrupted(folder: &Path, out: &str, signal: Signal) -> (PathBuf, Output) {
-    let mut child = start(folder, "s.toml", out, &[]);
+    // The seed is that of the scene.
+    let mut child = start(folder, "s.toml", out, &["--threads", "2", "--set", "seed=3"]);
     let path = folder.join(out);
     wait_for(&mut child, &path.join("thermo.csv"), 10_000);
     send(&child, signal);
@@ -162,6 +163,7 @@ fn signals_stop_a_run_that_says_how_to_go_on() {
         let last = words.lines().last().unwrap();
         let (what, how) = last.split_once("; to go on: ").unwrap_or_else(|| panic!("{words}"));
         assert!(what.starts_with("stopped after step ") && what.ends_with(" of 1500"), "{what}");
+        assert!(how.contains("--resume --threads 2 --set seed=3"), "{how}");
         // Without --resume it is left alone.
         let again = run(here, &name, &[]);
         let words = said(&again);

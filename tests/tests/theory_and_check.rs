@@ -130,3 +130,60 @@ fn a_fluid_that_tables_cannot_say_is_refused_with_the_reason() {
     assert_eq!(output.status.code(), Some(2), "{}", said(&output));
     assert!(said(&output).contains("partial densities of n"), "{}", said(&output));
 }
+
+/// Of Warren's liquid mean field is wrong by a factor of nearly three: it is said, the estimate with correlations is near
+/// what Warren has, and short runs find it.
+#[test]
+fn theory_says_where_it_fails_and_measures() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let set6 = model("warren2003-set6.toml");
+    let run = ["theory", &set6, "--measure", "--steps", "300", "--report", "t.html"];
+    let found = json(here, &run, 0);
+    assert!(found["binodal"]["liquid"].as_f64().unwrap() < 2.5, "{found}");
+    let expected = found["correlated"]["liquid"].as_f64().unwrap();
+    assert!((expected - 6.05).abs() < 0.6, "{found}");
+    let doubts = found["doubts"].to_string();
+    for part in ["mean field is off here", "expected near 6.4", "square-gradient coefficient is negative"] {
+        assert!(doubts.contains(part), "{part}: {doubts}");
+    }
+    assert_eq!(found["published"]["tension"][0], 7.45);
+    let values = found["measured"][0]["values"].as_array().unwrap();
+    let value = |name: &str| values.iter().find(|v| v["name"] == name).and_then(|v| v["value"].as_f64());
+    assert!((value("liquid").unwrap() - 6.05).abs() < 0.4, "{found}");
+    assert!(value("tension").is_some_and(|t| t > 2.0), "{found}");
+    let page = std::fs::read_to_string(here.join("t.html")).unwrap();
+    for part in ["Phase diagram", "binodal", "Where mean field fails", "with correlations"] {
+        assert!(page.contains(part), "{part}");
+    }
+    // Several temperatures in one call, and no doubt where correlations change little.
+    let several = json(here, &["theory", &model("van-der-waals-3d.toml"), "--kT", "1.5,2"], 0);
+    assert_eq!(several["temperatures"].as_array().map(Vec::len), Some(2));
+    assert_eq!(several["temperatures"][1]["kT"], 2.0);
+    let doubts = several["temperatures"][1]["doubts"].to_string();
+    assert!(!doubts.contains("mean field is off here"), "{doubts}");
+    // A mixture has a diagram of compositions that names its species.
+    json(
+        here,
+        &["theory", &model("binary-2d.toml"), "--kT", "4", "--density", "10", "--report", "b.html"],
+        0,
+    );
+    let page = std::fs::read_to_string(here.join("b.html")).unwrap();
+    assert!(page.contains("Composition diagram") && page.contains("fraction of A"));
+}
+
+/// A check of a scene says what it takes and what phases to expect.
+#[test]
+fn check_tells_cost_and_phases() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = root().join("validation/scenes/warren-set6-slab.toml").display().to_string();
+    let found = json(folder.path(), &["check", &scene], 0);
+    let cost = &found["cost"];
+    assert_eq!(cost["steps"], 1300);
+    assert!(cost["particles"].as_u64().is_some_and(|n| (2900..3000).contains(&n)), "{cost}");
+    assert!(
+        cost["seconds"].as_f64().is_some_and(|s| s > 0.01) && cost["bytes"].as_f64().unwrap() > 2e7,
+        "{cost}"
+    );
+    assert!(found["theory"][0].as_str().unwrap().contains("with correlations"), "{found}");
+}

@@ -63,10 +63,13 @@ const PROGRAM: &[&[&str]] = &[
     &["output"],
     // Names and keys of integrators, which scenes and runs share.
     &["integrator"],
+    &["prediction"],
     &["scene"],
     &["run"],
     &["report"],
+    &["theory_page"],
     &["bulk"],
+    &["measure"],
     &["calibrate"],
     &["from_eos"],
     &["papers"],
@@ -76,6 +79,7 @@ const PROGRAM: &[&[&str]] = &[
     &["pareto"],
     &["hardcases"],
     &["check"],
+    &["sweep"],
     &["cli"],
     &[""],
 ];

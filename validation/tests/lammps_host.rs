@@ -252,6 +252,7 @@ fn lammps_reads_our_data_and_we_read_its() {
             tilt,
             types: 2,
             masses: vec![1.0, 2.5],
+            names: Vec::new(),
             atoms: (0..4)
                 .map(|i| Atom {
                     id: 4 - i,

@@ -1,3 +1,4 @@
+use super::cost::Cost;
 use super::timestep::StepEstimate;
 use psidpd_core::theory::Stability;
 use serde::Serialize;
@@ -23,6 +24,10 @@ pub struct Findings {
     pub stability: Option<Waves>,
     /// Time steps of a scene and their errors; estimates, and none for a model alone.
     pub steps: Vec<StepEstimate>,
+    /// What phases are expected, and where mean field fails.
+    pub theory: Vec<String>,
+    /// What a scene takes on this machine; none for a model alone.
+    pub cost: Option<Cost>,
     /// What cannot work, or may surprise.
     pub warnings: Vec<Warning>,
 }

@@ -2,13 +2,16 @@
 //! cannot work.
 
 pub mod calibration;
+mod cost;
 mod findings;
 mod timestep;
 mod warnings;
 
+pub use cost::{Cost, cost};
 pub use findings::{Findings, Severity, Warning};
 pub use timestep::estimates;
 
+use crate::prediction;
 use psidpd_core::engine::Plan;
 use psidpd_core::model::{Fluid, Model};
 use psidpd_core::theory::{MeanField, TheoryError};
@@ -72,6 +75,9 @@ pub fn check(model: &Model, conditions: &Conditions) -> Result<Findings, CheckEr
         stability: stability.map(Into::into),
         densities: conditions.densities.clone(),
         steps: Vec::new(),
+        cost: None,
+        theory: prediction::predict(&fluid, densities.and_then(|rho| (rho.len() == 1).then(|| rho[0])))
+            .map_or(Vec::new(), |p| p.summary()),
         warnings: warnings::all(&fluid, &state)?,
     })
 }

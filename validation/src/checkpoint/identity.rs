@@ -31,7 +31,7 @@ impl Identity {
         Identity {
             // The model is compared by itself, not by where it is.
             scene: of_scene,
-            model: keys(model.text(), beside_model, &["title", "reference"]),
+            model: keys(model.text(), beside_model, &["title", "reference", "literature"]),
         }
     }
 
@@ -63,7 +63,7 @@ fn keys(text: &str, folder: &Path, without: &[&str]) -> BTreeMap<String, String>
         // it.
         Err(_) => _ = keys.insert("text".into(), text.to_owned()),
     }
-    keys.retain(|key, _| !without.contains(&key.as_str()));
+    keys.retain(|key, _| !without.iter().any(|w| key == w || key.starts_with(&format!("{w}["))));
     keys
 }
 

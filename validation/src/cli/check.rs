@@ -1,9 +1,7 @@
-use super::{Failure, Verdict, write_json};
-use crate::check::{Conditions, Findings, Severity, Warning, check, estimates};
+use super::{Failure, Settings, Verdict, write_json};
+use crate::check::{Conditions, Cost, Findings, Severity, Warning, check, cost, estimates};
 use crate::run::reach;
-use crate::scene::Scene;
 use psidpd_core::document::Document;
-use psidpd_core::model::Model;
 use std::path::{Path, PathBuf};
 
 /// What a model or scene will compute, what mean field says of it, and what cannot work.
@@ -17,6 +15,8 @@ pub struct Arguments {
     /// Number density, total or one for each species, as 6.05 or 8,8.
     #[arg(long, value_name = "RHO", value_delimiter = ',', value_parser = number_density)]
     density: Vec<f64>,
+    #[command(flatten)]
+    settings: Settings,
 }
 
 /// A number density on the command line.
@@ -41,22 +41,24 @@ pub fn per_species(given: &[f64], species: usize) -> Option<Vec<f64>> {
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     let document = Document::open(&arguments.file)?;
     let mut too_far = None;
-    let (model, kt, densities, steps) = if document.root().get("model").is_some() {
-        let scene = Scene::open(&arguments.file)?;
+    let (model, kt, densities, steps, taken) = if document.root().get("model").is_some() {
+        let scene = arguments.settings.scene(&arguments.file)?;
         let densities = scene.densities();
         let range = scene.model.at(scene.kt)?.cutoff();
         let particles = scene.initial.parts().iter().map(|p| p.count).sum();
         too_far = reach::check(&scene.domain, scene.model.dimensions(), range, particles).err();
         let steps = if too_far.is_none() { estimates(&scene)? } else { Vec::new() };
-        (scene.model.clone(), scene.kt, Some(densities), steps)
+        let taken = if too_far.is_none() { cost(&scene).ok() } else { None };
+        (scene.model.clone(), scene.kt, Some(densities), steps, taken)
     } else {
-        (Model::open(&arguments.file)?, 1.0, None, Vec::new())
+        let (model, kt) = arguments.settings.model(&arguments.file)?;
+        (model, kt.unwrap_or(1.0), None, Vec::new(), None)
     };
     let conditions = Conditions {
         kt: arguments.kt.unwrap_or(kt),
         densities: per_species(&arguments.density, model.species().len()).or(densities),
     };
-    let mut findings = Findings { steps, ..check(&model, &conditions)? };
+    let mut findings = Findings { steps, cost: taken, ..check(&model, &conditions)? };
     if let Some(error) = too_far {
         findings.warnings.insert(
             0,
@@ -66,6 +68,19 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     print(&findings, model.species());
     write_json(json, &findings)?;
     Ok(if findings.works() { Verdict::Good } else { Verdict::CheckFailed })
+}
+
+fn memory(bytes: f64) -> String {
+    if bytes < 1e9 { format!("{:.0} MB", bytes / 1e6) } else { format!("{:.1} GB", bytes / 1e9) }
+}
+
+fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s < 120.0 => format!("{s:.0} s"),
+        s if s < 7200.0 => format!("{:.0} minutes", s / 60.0),
+        s if s < 172_800.0 => format!("{:.1} hours", s / 3600.0),
+        s => format!("{:.1} days", s / 86_400.0),
+    }
 }
 
 fn print(findings: &Findings, species: &[String]) {
@@ -92,6 +107,16 @@ fn print(findings: &Findings, species: &[String]) {
         println!("stability     {verdict}: smallest 1/S(k) is {:.5} {place}", s.min_inverse_s);
     } else if findings.densities.is_none() {
         println!("stability     give --density to have pressure and stability");
+    }
+    for line in &findings.theory {
+        println!("theory        {line}");
+    }
+    if let Some(Cost { particles, steps, bytes, seconds }) = findings.cost {
+        println!(
+            "takes         {particles} particles, {steps} steps: about {} of memory and {} on one thread of this machine",
+            memory(bytes),
+            duration(seconds)
+        );
     }
     for step in &findings.steps {
         println!(

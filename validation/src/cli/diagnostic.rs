@@ -4,6 +4,7 @@ use crate::calibrate::CalibrateError;
 use crate::crosscheck::ValidateError;
 use crate::from_eos::FromEosError;
 use crate::run::RunError;
+use crate::sweep::SweepError;
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use psidpd_core::document::{FileError, printable};
 
@@ -70,6 +71,9 @@ fn unwrapped<'a>(error: &'a (dyn std::error::Error + 'static)) -> &'a (dyn std::
         Some(ValidateError::File(found)) => return found,
         Some(ValidateError::Run(found)) => return found,
         _ => {}
+    }
+    if let Some(SweepError::File(found)) = error.downcast_ref() {
+        return found;
     }
     match error.downcast_ref() {
         Some(FromEosError::File(found)) => return found,

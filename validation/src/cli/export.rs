@@ -1,8 +1,6 @@
-use super::{Failure, Verdict, write_json};
+use super::{Failure, Settings, Verdict, write_json};
 use crate::export::eam::{self, Grid};
 use crate::export::lammps as deck;
-use crate::scene::Scene;
-use psidpd_core::model::Model;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -23,6 +21,8 @@ pub struct LammpsArguments {
     /// Folder for in.lammps, start.data, model.toml and the tables of the model.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    #[command(flatten)]
+    settings: Settings,
 }
 
 /// Arguments of `export eam`.
@@ -45,6 +45,8 @@ pub struct EamArguments {
     /// How many densities.
     #[arg(long, value_name = "N", default_value_t = Grid::default().densities)]
     densities: usize,
+    #[command(flatten)]
+    settings: Settings,
 }
 
 pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
@@ -55,7 +57,7 @@ pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
 }
 
 fn run_lammps(a: &LammpsArguments, json: Option<&Path>) -> Result<Verdict, Failure> {
-    let scene = Scene::open(&a.scene)?;
+    let scene = a.settings.scene(&a.scene)?;
     let files = deck::write(&scene, &a.out)?;
     println!("written to {}; run it there:", a.out.display());
     println!("lmp -in {} -var plugin PATH/psidpdplugin.so", deck::SCRIPT);
@@ -64,8 +66,8 @@ fn run_lammps(a: &LammpsArguments, json: Option<&Path>) -> Result<Verdict, Failu
 }
 
 fn run_eam(a: &EamArguments, json: Option<&Path>) -> Result<Verdict, Failure> {
-    let model = Model::open(&a.model)?;
-    let fluid = model.at(a.kt)?;
+    let (model, kt) = a.settings.model(&a.model)?;
+    let fluid = model.at(kt.unwrap_or(a.kt))?;
     let out = a.out.clone().unwrap_or_else(|| {
         let stem = a.model.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         PathBuf::from(format!("{stem}.eam.alloy"))

@@ -1,9 +1,8 @@
-use super::{Failure, Verdict, write_json};
+use super::{Failure, Settings, Verdict, write_json};
 use crate::lammps::DataFile;
 use crate::report::Table;
 use crate::run::{Simulation, State};
 use psidpd_core::engine::Want;
-use psidpd_core::model::Model;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -19,6 +18,8 @@ pub struct Arguments {
     /// kT.
     #[arg(long = "kT", value_name = "T", allow_negative_numbers = true)]
     kt: f64,
+    #[command(flatten)]
+    settings: Settings,
 }
 
 /// The contents of the file of `--json`.
@@ -33,11 +34,11 @@ struct Forces {
 }
 
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
-    let model = Model::open(&arguments.model)?;
+    let (model, kt) = arguments.settings.model(&arguments.model)?;
     let mut data = DataFile::read(&arguments.data)?;
     data.sort_by_id();
     let state = State::from_data(&data, &model)?;
-    let mut simulation = Simulation::new(&model, arguments.kt, state, 1)?;
+    let mut simulation = Simulation::new(&model, kt.unwrap_or(arguments.kt), state, 1)?;
     // What others are compared with.
     simulation.use_reference_only(true);
     simulation.sum_all_densities(true);

@@ -8,6 +8,7 @@ mod bench;
 mod calibrate;
 mod check;
 mod diagnostic;
+mod examples;
 mod export;
 mod forces;
 mod hardcases;
@@ -18,13 +19,17 @@ mod pareto;
 mod report;
 mod reproduce;
 mod run;
+mod settings;
+mod shell;
 mod snapshot;
+mod sweep;
 mod theory;
 mod validate;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 pub use diagnostic::Failure;
 use serde::Serialize;
+use settings::Settings;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -66,6 +71,8 @@ enum Verb {
     New(new::Arguments),
     /// Run a scene natively.
     Run(run::Arguments),
+    /// Run a scene at many values of its keys.
+    Sweep(sweep::Arguments),
     /// Make report.html of a run again, from the files in its folder.
     Report(report::Arguments),
     /// A picture of the particles, or of their density, in a data, dump or XYZ file.
@@ -78,6 +85,10 @@ enum Verb {
     /// Install LAMMPS into a local environment, or build the plugin for it.
     #[command(subcommand)]
     Lammps(lammps::Verb),
+    /// Print a script that completes verbs and options in a shell.
+    Completions(shell::Completions),
+    /// Write manual pages.
+    Man(shell::Man),
 }
 
 /// The outcome of a verb that could be carried out.
@@ -89,19 +100,26 @@ enum Verdict {
     Interrupted(u8),
 }
 
+/// The command line, with examples.
+fn command() -> clap::Command {
+    examples::add(Arguments::command())
+}
+
 /// A program that behaves as this one, where this is part of another.
 static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
 
 /// Runs the program.
 pub fn main() -> ExitCode {
-    ExitCode::from(carry_out(Arguments::parse()))
+    let arguments = Arguments::from_arg_matches(&command().get_matches());
+    ExitCode::from(carry_out(arguments.unwrap_or_else(|error| error.exit())))
 }
 
 /// Runs the program inside another, as Python, and returns the exit code. The first of the arguments is the name of the
 /// program; `program` is a file that starts it, for verbs that need processes of their own.
 pub fn run(program: &Path, arguments: impl IntoIterator<Item = OsString>) -> u8 {
     PROGRAM.get_or_init(|| program.to_owned());
-    match Arguments::try_parse_from(arguments) {
+    let matches = command().try_get_matches_from(arguments);
+    match matches.and_then(|matches| Arguments::from_arg_matches(&matches)) {
         Ok(arguments) => carry_out(arguments),
         Err(error) => {
             // A closed terminal or pipe is no error.
@@ -131,10 +149,13 @@ fn carry_out(arguments: Arguments) -> u8 {
         Verb::Model(a) => model::run(a, json),
         Verb::New(a) => new::run(a, json),
         Verb::Run(a) => run::run(a, json),
+        Verb::Sweep(a) => sweep::run(a, json),
         Verb::Report(a) => report::run(a, json),
         Verb::Snapshot(a) => snapshot::run(a, json),
         Verb::Forces(a) => forces::run(a, json),
         Verb::Lammps(a) => lammps::run(a, json),
+        Verb::Completions(a) => shell::completions(a),
+        Verb::Man(a) => shell::man(a, json),
     };
     match outcome {
         Ok(Verdict::Good) => 0,

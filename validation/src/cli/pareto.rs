@@ -1,7 +1,6 @@
-use super::{Failure, Verdict, write_json};
+use super::{Failure, Settings, Verdict, write_json};
 use crate::pareto::{self, Choice, Effort, Options, Pace, Tolerance, page};
 use crate::report::Progress;
-use crate::scene::Scene;
 use psidpd_core::engine::Pool;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -35,6 +34,8 @@ pub struct Arguments {
     /// Folder for pareto.json and pareto.html.
     #[arg(long, value_name = "DIR", default_value = "target/pareto")]
     out: PathBuf,
+    #[command(flatten)]
+    settings: Settings,
 }
 
 fn minutes(text: &str) -> Result<f64, String> {
@@ -48,7 +49,7 @@ fn threads(text: &str) -> Result<NonZeroUsize, String> {
 }
 
 pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
-    let scene = Scene::open(&a.scene)?;
+    let scene = a.settings.scene(&a.scene)?;
     let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
     let usual = [Some(NonZeroUsize::MIN), NonZeroUsize::new(2).filter(|_| cores > 1)];
     let mut threads = a.threads.clone();

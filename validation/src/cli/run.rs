@@ -1,8 +1,7 @@
-use super::{Failure, Verdict, write_json};
+use super::{Failure, Settings, Verdict, write_json};
 use crate::check::calibration;
-use crate::report::{Progress, write_run_report};
+use crate::report::{Headline, Progress, headline, write_run_report};
 use crate::run::{Begin, Outcome, Runner, Start, Summary, Timing};
-use crate::scene::Scene;
 use psidpd_core::engine::{Pool, Precision};
 use serde::Serialize;
 use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
@@ -27,7 +26,7 @@ pub struct Arguments {
     /// first step if there is none.
     #[arg(long, conflicts_with = "overwrite")]
     resume: bool,
-    /// Start over where a run waits to be taken up again.
+    /// Start over in a folder that holds a run, finished or not; what it left is deleted.
     #[arg(long)]
     overwrite: bool,
     /// Threads that share the work; what a run writes does not depend on their number.
@@ -39,9 +38,30 @@ pub struct Arguments {
     /// Make report.html at the end, also of a run that stopped.
     #[arg(long)]
     report: bool,
+    #[command(flatten)]
+    settings: Settings,
 }
 
-fn thread_count(text: &str) -> Result<NonZeroUsize, String> {
+impl Arguments {
+    /// The command that goes on with the run, with everything that was asked for.
+    fn to_resume(&self, json: Option<&Path>) -> String {
+        let mut words = vec![format!(
+            "psidpd run {} --out {} --resume",
+            quoted(&self.scene.display().to_string()),
+            quoted(&self.out.display().to_string())
+        )];
+        if self.threads.get() > 1 {
+            words.push(format!("--threads {}", self.threads));
+        }
+        words.extend(self.precision.map(|precision| format!("--precision {precision}")));
+        words.extend(self.settings.edits.iter().map(|e| format!("--set {}", quoted(&e.to_string()))));
+        words.extend(self.report.then(|| "--report".to_owned()));
+        words.extend(json.map(|path| format!("--json {}", quoted(&path.display().to_string()))));
+        words.join(" ")
+    }
+}
+
+pub fn thread_count(text: &str) -> Result<NonZeroUsize, String> {
     let count: NonZeroUsize = text.parse().map_err(|e| format!("{e}"))?;
     if count.get() <= Pool::MOST { Ok(count) } else { Err(format!("at most {}", Pool::MOST)) }
 }
@@ -52,11 +72,12 @@ struct Report<'a> {
     #[serde(flatten)]
     summary: &'a Summary,
     timing: &'a Timing,
+    headline: &'a Headline,
 }
 
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
-    let Arguments { scene: path, out, resume, overwrite, threads, precision, report } = arguments;
-    let mut scene = Scene::open(path)?;
+    let Arguments { scene: path, out, resume, overwrite, threads, precision, report, settings } = arguments;
+    let mut scene = settings.scene(path)?;
     scene.precision = precision.or(scene.precision);
     if let Some(warning) = calibration::missing(&scene.model.at(scene.kt)?) {
         warn(&warning.message);
@@ -97,16 +118,15 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
                     session.particle_steps_per_second
                 ));
             }
+            let found = headline(out);
+            say(&format!("\n{}", found.table().to_text()));
+            found.notes.iter().for_each(|note| say(&format!("note: {note}")));
             say(&format!("written to {}", out.display()));
-            write_json(json, &Report { summary: &summary, timing: &timing })?;
+            write_json(json, &Report { summary: &summary, timing: &timing, headline: &found })?;
             Ok(Verdict::Good)
         }
         Outcome::Interrupted { stop, step, steps } => {
-            say(&format!(
-                "stopped after step {step} of {steps}; to go on: psidpd run {} --out {} --resume",
-                quoted(path),
-                quoted(out)
-            ));
+            say(&format!("stopped after step {step} of {steps}; to go on: {}", arguments.to_resume(json)));
             Ok(Verdict::Interrupted(u8::try_from(stop).unwrap_or(0)))
         }
     }
@@ -147,7 +167,7 @@ fn tell_start(start: &Start, begin: Begin, out: &Path, total: u64) -> u64 {
 }
 
 /// A number that the first SIGINT or SIGTERM sets to its own; the second kills the program.
-fn watch_signals() -> std::io::Result<Arc<AtomicUsize>> {
+pub fn watch_signals() -> std::io::Result<Arc<AtomicUsize>> {
     let stop = Arc::new(AtomicUsize::new(0));
     let stopping = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM] {
@@ -170,12 +190,11 @@ fn warn(line: &str) {
     let _ = writeln!(std::io::stderr(), "warning: {line}");
 }
 
-/// A path as a shell takes it.
-fn quoted(path: &Path) -> String {
-    let text = path.display().to_string();
+/// A word as a shell takes it.
+pub fn quoted(text: &str) -> String {
     let plain = |c: char| c.is_alphanumeric() || "/._-+,=@%:".contains(c);
     if !text.is_empty() && text.chars().all(plain) {
-        text
+        text.to_owned()
     } else {
         format!("'{}'", text.replace('\'', r"'\''"))
     }

@@ -1,20 +1,21 @@
 use super::{Failure, Verdict, write_json};
 use crate::files::write_atomically;
-use crate::output::picture::{FieldOptions, ParticleOptions, View};
+use crate::output::picture::{FieldOptions, Image, ParticleOptions, View};
 use crate::output::{Configuration, OutputError, Which};
 use crate::report::Figure;
+use psidpd_core::engine::reference::{Evaluator, for_each_pair};
 use psidpd_core::model::Model;
 use psidpd_core::model::kernel::{Kernel, KernelKind};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// A picture of the particles, or of their density, in a data, dump or XYZ file.
+/// A picture of the particles, or of their density, in a data, dump or XYZ file; or a film of all its frames.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// A LAMMPS data file, a LAMMPS text dump or an extended XYZ file.
     file: PathBuf,
-    /// The picture: .png for the picture alone, .svg for one with axes and legend; default: the name of the
-    /// file with .svg.
+    /// The picture: .png for the picture alone, .svg for one with axes and legend, .gif for a film of the frames of the
+    /// file; default: the name of the file with .svg.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Which frame, from 0; default: the last.
@@ -32,6 +33,15 @@ pub struct Arguments {
     /// Radius of a particle.
     #[arg(long, value_name = "LENGTH")]
     radius: Option<f64>,
+    /// What colours of particles stand for; psi needs --model and --kT.
+    #[arg(long, value_enum, default_value_t = Colour::Species, conflicts_with = "density")]
+    colour: Colour,
+    /// kT, for the colours of psi.
+    #[arg(long = "kT", value_name = "T")]
+    kt: Option<f64>,
+    /// Most frames of a film, evenly chosen.
+    #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u16).range(2..=1000))]
+    frames: u16,
     /// The weighted local density in a plane through the middle of the box, instead of particles.
     #[arg(long)]
     density: bool,
@@ -44,6 +54,18 @@ pub struct Arguments {
     /// Most pixels in width and in height.
     #[arg(long, value_name = "PIXELS", default_value_t = 720, value_parser = clap::value_parser!(u32).range(16..=8192))]
     size: u32,
+}
+
+/// What the colour of a particle stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Colour {
+    Species,
+    /// The weighted local density at the particle, without itself.
+    Density,
+    /// The size of its velocity.
+    Speed,
+    /// Its excess free energy.
+    Psi,
 }
 
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
@@ -65,45 +87,140 @@ impl From<Eye> for View {
     }
 }
 
+/// Centiseconds that a film shows each frame.
+const DELAY: u16 = 12;
+
 pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     let out = a.out.clone().unwrap_or_else(|| a.file.with_extension("svg"));
-    let svg = match out.extension().and_then(|e| e.to_str()) {
-        Some("svg") => true,
-        Some("png") => false,
-        _ => return Err(request(format!("{}: pictures end in .svg or .png", out.display()))),
-    };
-    for (name, value) in [("slice", a.slice), ("radius", a.radius), ("range", a.range)] {
+    let kind = out.extension().and_then(|e| e.to_str()).unwrap_or("");
+    if !["svg", "png", "gif"].contains(&kind) {
+        return Err(request(format!("{}: pictures end in .svg or .png, films in .gif", out.display())));
+    }
+    for (name, value) in [("slice", a.slice), ("radius", a.radius), ("range", a.range), ("kT", a.kt)] {
         if let Some(value) = value.filter(|v| !(v.is_finite() && *v > 0.0)) {
             return Err(request(format!("--{name} must be a positive number, is {value}")));
         }
     }
-    let mut configuration = Configuration::open(&a.file, a.frame.map_or(Which::Last, Which::Number))?;
     let model = a.model.as_deref().map(Model::open).transpose()?;
-    if let Some(model) = &model {
-        configuration.name_species(model.species(), model.dimensions());
+    let open = |which| -> Result<Configuration, Failure> {
+        let mut configuration = Configuration::open(&a.file, which)?;
+        if let Some(model) = &model {
+            configuration.name_species(model.species(), model.dimensions());
+        }
+        Ok(configuration)
+    };
+    if kind == "gif" {
+        let last = Configuration::count(&a.file)?.saturating_sub(1);
+        let most = usize::from(a.frames).min(last + 1);
+        // The last one among them.
+        let chosen = (0..most).map(|k| (k * last) / (most - 1).max(1));
+        let frames = chosen.map(|k| open(Which::Number(k))).collect::<Result<Vec<_>, _>>()?;
+        let values = frames.iter().map(|f| values(a, model.as_ref(), f)).collect::<Result<Vec<_>, _>>()?;
+        let ends = ends(values.iter().flatten().flatten());
+        let images = frames
+            .iter()
+            .zip(&values)
+            .map(|(f, v)| Ok(figure(a, model.as_ref(), f, v.as_deref(), ends)?.image))
+            .collect::<Result<Vec<_>, Failure>>()?;
+        write_atomically(&out, &Image::to_gif(&images, DELAY).map_err(request)?)?;
+        println!("{}", out.display());
+        write_json(json, &json!({"film": out, "frames": images.len(), "colours": ends}))?;
+        return Ok(Verdict::Good);
     }
+    let configuration = open(a.frame.map_or(Which::Last, Which::Number))?;
+    let values = values(a, model.as_ref(), &configuration)?;
+    let ends = ends(values.iter().flatten());
+    let figure = figure(a, model.as_ref(), &configuration, values.as_deref(), ends)?;
+    let bytes = if kind == "svg" { figure.render()?.into_bytes() } else { figure.image.to_png()? };
+    write_atomically(&out, &bytes)?;
+    println!("{}", out.display());
+    let particles = configuration.x.len();
+    let colours = values.map(|_| ends);
+    write_json(
+        json,
+        &json!({"picture": out, "particles": particles, "step": configuration.step, "colours": colours}),
+    )?;
+    Ok(Verdict::Good)
+}
+
+/// The lowest and the highest of values.
+fn ends<'a>(values: impl Iterator<Item = &'a f64>) -> [f64; 2] {
+    values
+        .filter(|v| v.is_finite())
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(*v), high.max(*v)])
+}
+
+/// What the colours of particles stand for; nothing for species.
+fn values(
+    a: &Arguments,
+    model: Option<&Model>,
+    configuration: &Configuration,
+) -> Result<Option<Vec<f64>>, Failure> {
+    let frame = configuration.frame();
+    Ok(match a.colour {
+        Colour::Species => None,
+        Colour::Density => {
+            let kernel = kernel(a, model, frame.dimensions)?;
+            let mut n = vec![0.0; frame.len()];
+            for_each_pair(frame.x, frame.domain, frame.dimensions, kernel.range(), |p| {
+                let w = kernel.value(p.r);
+                n[p.i] += w;
+                n[p.j] += w;
+            });
+            Some(n)
+        }
+        Colour::Speed => {
+            let v = frame.v.ok_or_else(|| request("the file has no velocities".into()))?;
+            Some(v.iter().map(|v| (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()).collect())
+        }
+        Colour::Psi => {
+            let (Some(model), Some(kt)) = (model, a.kt) else {
+                return Err(request("--colour psi needs --model and --kT".into()));
+            };
+            let evaluator = Evaluator::new(model.at(kt)?)?;
+            if configuration.species.iter().any(|s| *s as usize >= model.species().len()) {
+                return Err(request(format!(
+                    "the model has {} species, the file more",
+                    model.species().len()
+                )));
+            }
+            let found = evaluator.evaluate(frame.x, frame.species, frame.domain);
+            Some(found.psi.iter().map(|psi| psi.value).collect())
+        }
+    })
+}
+
+fn figure(
+    a: &Arguments,
+    model: Option<&Model>,
+    configuration: &Configuration,
+    values: Option<&[f64]>,
+    ends: [f64; 2],
+) -> Result<Figure, Failure> {
     let frame = configuration.frame();
     let title = a.file.file_name().map_or(String::new(), |n| n.to_string_lossy().into_owned());
     let title = configuration.step.map_or(title.clone(), |step| format!("{title}, step {step}"));
     let size = [a.size as usize; 2];
-    let figure = if a.density {
+    if a.density {
         let options = FieldOptions {
             view: a.view.into(),
-            kernel: kernel(a, model.as_ref(), frame.dimensions)?,
+            kernel: kernel(a, model, frame.dimensions)?,
             species: a.species.as_deref().map(|name| index(name, frame.names)).transpose()?,
             size,
         };
         let label = a.species.as_ref().map_or("n".to_owned(), |s| format!("n_{s}"));
-        Figure::field(&title, &label, &frame, &options)
-    } else {
-        let options = ParticleOptions { view: a.view.into(), slice: a.slice, radius: a.radius, size };
-        Figure::particles(&title, &frame, &options)
+        return Ok(Figure::field(&title, &label, &frame, &options));
+    }
+    let options = ParticleOptions { view: a.view.into(), slice: a.slice, radius: a.radius, size };
+    let label = match a.colour {
+        Colour::Density => "n",
+        Colour::Speed => "speed",
+        Colour::Species | Colour::Psi => "ψ",
     };
-    let bytes = if svg { figure.render()?.into_bytes() } else { figure.image.to_png()? };
-    write_atomically(&out, &bytes)?;
-    println!("{}", out.display());
-    write_json(json, &json!({"picture": out, "particles": frame.len(), "step": configuration.step}))?;
-    Ok(Verdict::Good)
+    Ok(match values {
+        Some(values) => Figure::valued(&title, label, &frame, &options, values, ends),
+        None => Figure::particles(&title, &frame, &options),
+    })
 }
 
 fn request(message: String) -> Failure {

@@ -1,19 +1,32 @@
 use super::check::{number_density, per_species};
-use super::{Failure, Verdict, write_json};
-use crate::report::Table;
+use super::{Failure, Settings, Verdict, write_json};
+use crate::measure::{self, Effort};
+use crate::prediction::{Prediction, predict, published};
+use crate::report::quantity::with_error;
+use crate::report::{Headline, Table};
+use crate::theory_page::{self, Scope};
 use psidpd_core::model::Model;
 use psidpd_core::theory::{MeanField, TheoryError, composition_critical_point, critical_point_of_model};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// Mean field: equation of state, critical point, spinodal, binodal, surface tension.
+/// Mean field: equation of state, critical point, spinodal, binodal, surface tension; and how far to trust it.
+///
+/// Mean field leaves out correlations. Where they matter this verb says so, by how much, and what the fluid is expected to do;
+/// --measure runs it.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// The model file.
     model: PathBuf,
-    /// kT.
-    #[arg(long = "kT", value_name = "T", default_value_t = 1.0, allow_negative_numbers = true)]
-    kt: f64,
+    /// kT; several with commas.
+    #[arg(
+        long = "kT",
+        value_name = "T,…",
+        value_delimiter = ',',
+        default_value = "1",
+        allow_negative_numbers = true
+    )]
+    kt: Vec<f64>,
     /// Number density, total or one for each species: where a mixture is looked at, and the middle of the
     /// table of the equation of state.
     #[arg(long, value_name = "RHO", value_delimiter = ',', value_parser = number_density)]
@@ -24,6 +37,21 @@ pub struct Arguments {
     /// Range of kT in which a critical point is looked for, as multiples of kT.
     #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', num_args = 1..=2, default_values_t = [0.05, 20.0])]
     search: Vec<f64>,
+    /// Measure the fluid in short runs, and put that beside mean field: homogeneous at --density, and a slab of liquid if
+    /// there should be one. Some seconds for each kT.
+    #[arg(long)]
+    measure: bool,
+    /// Steps of each run of --measure.
+    #[arg(long, value_name = "N", default_value_t = 5000, value_parser = clap::value_parser!(u64).range(30..))]
+    steps: u64,
+    /// Time step of --measure.
+    #[arg(long, default_value_t = 0.01)]
+    dt: f64,
+    /// Write a page with plots: p(rho), phase diagram, tension and width over kT, compositions of a mixture.
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
+    #[command(flatten)]
+    settings: Settings,
 }
 
 /// An answer, or why there is none: no coexistence is an answer too.
@@ -35,12 +63,44 @@ fn or_reason<T>(answer: Result<T, TheoryError>, show: impl FnOnce(T) -> Value) -
 }
 
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
-    let model = Model::open(&arguments.model)?;
-    let fluid = model.at(arguments.kt)?;
+    let (model, set) = arguments.settings.model(&arguments.model)?;
+    let kts = set.map_or_else(|| arguments.kt.clone(), |kt| vec![kt]);
+    let (mut all, mut defined) = (Vec::new(), true);
+    let mut scope = Scope {
+        kts: &kts,
+        density: 3.0,
+        range: [f64::INFINITY, 0.0],
+        tension: Vec::new(),
+        doubts: Vec::new(),
+    };
+    for (k, kt) in kts.iter().enumerate() {
+        if k > 0 {
+            println!();
+        }
+        let (value, good) = one(arguments, &model, *kt, &mut scope)?;
+        all.push(value);
+        defined &= good;
+    }
+    if let Some(path) = &arguments.report {
+        let page = theory_page::page(&model, &scope)?.render();
+        crate::files::write_atomically(path, page.as_bytes())?;
+        println!("report: {}", path.display());
+    }
+    match all.as_slice() {
+        [single] => write_json(json, single)?,
+        several => write_json(json, &json!({"title": model.title(), "temperatures": several}))?,
+    }
+    Ok(if defined { Verdict::Good } else { Verdict::CheckFailed })
+}
+
+/// The answers at one temperature, and whether the pressure is defined.
+fn one(arguments: &Arguments, model: &Model, kt: f64, scope: &mut Scope) -> Result<(Value, bool), Failure> {
+    let fluid = model.at(kt)?;
     let theory = MeanField::new(&fluid)?;
     let species = model.species().len();
-    let densities =
-        per_species(&arguments.density, species).unwrap_or_else(|| vec![3.0 / species as f64; species]);
+    let prediction = predict(&fluid, arguments.density.first().copied());
+    let densities = per_species(&arguments.density, species)
+        .unwrap_or_else(|| vec![prediction.as_ref().map_or(3.0, |p| p.density) / species as f64; species]);
     if densities.len() != species {
         let error = crate::check::CheckError::Densities { given: densities.len(), species };
         return Err(error.into());
@@ -48,10 +108,12 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     let [low, high] = arguments.search[..] else {
         return Err(TheoryError::NoCriticalPoint(0.0, 0.0).into());
     };
-    let range = [low * arguments.kt, high * arguments.kt];
+    let range = [low * kt, high * kt];
     let total: f64 = densities.iter().sum();
+    scope.density = scope.density.max(total);
+    scope.range = [scope.range[0].min(range[0]), scope.range[1].max(range[1])];
 
-    println!("{} at kT = {}", model.title(), arguments.kt);
+    println!("{} at kT = {kt}", model.title());
     let mut table = Table::new(["density", "pressure", "dp/drho", "excess free energy per particle"]);
     let mut rows = Vec::new();
     for k in 1..=arguments.rows.min(10_000) {
@@ -74,7 +136,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
             (
                 "critical point",
                 or_reason(
-                    critical_point_of_model(&model, range),
+                    critical_point_of_model(model, range),
                     |c| json!({"kT": c.parameter, "density": c.density, "pressure": c.pressure}),
                 ),
             ),
@@ -127,12 +189,119 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     for (name, value) in &answers {
         println!("{name}: {}", shown(value));
     }
-    let mut all = json!({"title": model.title(), "kT": arguments.kt, "equation_of_state": rows});
+    let known = published(model, kt, Some(total));
+    scope.tension.extend(known.iter().filter(|p| p.0 == "tension").map(|p| (kt, p.1, "published")));
+    let measured = if arguments.measure {
+        measure(arguments, model, kt, &densities, prediction.as_ref())?
+    } else {
+        Vec::new()
+    };
+    let found = |name: &str| measured.iter().find_map(|h: &Headline| h.get(name));
+    if let Some(t) = found("tension") {
+        scope.tension.push((kt, [t.value, t.error.unwrap_or(f64::NAN)], "measured"));
+    }
+    if prediction.is_some() || !measured.is_empty() {
+        let table = beside(total, theory.pressure(&densities), prediction.as_ref(), &known, &measured);
+        println!("\n{}", table.to_text());
+    }
+    for note in measured.iter().flat_map(|h| &h.notes) {
+        println!("note: {note}");
+    }
+    let doubts = prediction.as_ref().map_or(Vec::new(), Prediction::doubts);
+    for doubt in &doubts {
+        println!("note: {doubt}");
+        scope.doubts.push(format!("kT = {kt}: {doubt}"));
+    }
+    let mut all = json!({"title": model.title(), "kT": kt, "equation_of_state": rows, "doubts": doubts});
+    if let Some(p) = &prediction {
+        all["correlated"] = json!({
+            "density": p.density,
+            "local_density": p.correlated.as_ref().map(|c| &c.mean_density),
+            "pressure": p.correlated.as_ref().map(|c| c.pressure),
+            "liquid": p.correlated_liquid,
+        });
+    }
+    all["published"] = known.iter().map(|(name, value)| (name.to_string(), json!(value))).collect();
+    if !measured.is_empty() {
+        all["measured"] = json!(measured);
+    }
     for (name, value) in answers {
         all[name.replace(' ', "_")] = value;
     }
-    write_json(json, &all)?;
-    Ok(if defined { Verdict::Good } else { Verdict::CheckFailed })
+    Ok((all, defined))
+}
+
+/// Short runs: the homogeneous fluid where a density was asked for or there is no liquid, and a slab of liquid.
+fn measure(
+    arguments: &Arguments,
+    model: &Model,
+    kt: f64,
+    densities: &[f64],
+    prediction: Option<&Prediction>,
+) -> Result<Vec<Headline>, Failure> {
+    let effort = Effort { steps: arguments.steps, dt: arguments.dt };
+    let liquid =
+        prediction.and_then(|p| p.correlated_liquid.or(p.phases.as_ref().ok().map(|phases| phases.liquid)));
+    let mut all = Vec::new();
+    if !arguments.density.is_empty() || liquid.is_none() {
+        all.push(measure::homogeneous(model, &arguments.model, kt, densities, effort)?);
+    }
+    if let Some(liquid) = liquid {
+        let mut slab = measure::slab(model, &arguments.model, kt, liquid, effort)?;
+        // Density and pressure of a box with vapour in it are those of nothing.
+        slab.values.retain(|v| !["density", "pressure"].contains(&v.name.as_str()));
+        all.push(slab);
+    }
+    Ok(all)
+}
+
+/// Mean field, mean field with correlations, what is published, what was measured.
+fn beside(
+    density: f64,
+    pressure: f64,
+    prediction: Option<&Prediction>,
+    known: &[(&'static str, [f64; 2])],
+    measured: &[Headline],
+) -> Table {
+    let phases = prediction.and_then(|p| p.phases.as_ref().ok());
+    let interface = prediction.and_then(|p| p.interface.as_ref().ok());
+    let correlated = prediction.and_then(|p| p.correlated.as_ref());
+    let rows = [
+        ("pressure", Some(pressure), correlated.map(|c| c.pressure)),
+        ("liquid", phases.map(|b| b.liquid), prediction.and_then(|p| p.correlated_liquid)),
+        ("vapour", phases.map(|b| b.vapour), None),
+        ("tension", interface.map(|i| i.tension), None),
+        ("width", interface.map(|i| i.width), None),
+    ];
+    let show = |x: Option<f64>| x.filter(|x| x.is_finite()).map_or(String::new(), |x| format!("{x:.4}"));
+    let mut header = vec!["", "mean field", "correlated"];
+    header.extend((!known.is_empty()).then_some("published"));
+    header.extend((!measured.is_empty()).then_some("measured"));
+    let mut table = Table::new(header);
+    let local = prediction.into_iter().flat_map(|p| {
+        let c = p.correlated.as_ref().map_or(&[][..], |c| &c.mean_density);
+        p.names.iter().zip(c).map(|(name, n)| (name.clone(), *n))
+    });
+    for (name, n) in local {
+        table.push([format!("<{name}> at density {density:.3}"), format!("{density:.4}"), format!("{n:.4}")]);
+    }
+    for (name, mean_field, with) in rows {
+        let published = known.iter().find(|k| k.0 == name).map(|k| with_error(k.1[0], Some(k.1[1])));
+        let value = measured.iter().find_map(|h| h.get(name)).map(|v| with_error(v.value, v.error));
+        let title =
+            if name == "pressure" { format!("pressure at density {density:.3}") } else { name.into() };
+        let mut row = vec![title, show(mean_field), show(with)];
+        if !known.is_empty() {
+            row.push(published.unwrap_or_default());
+        }
+        if !measured.is_empty() {
+            row.push(value.unwrap_or_default());
+        }
+        if row[1..].iter().any(|cell| !cell.is_empty()) {
+            table.push(row);
+        }
+    }
+    table
 }
 
 /// A value as a person reads it.

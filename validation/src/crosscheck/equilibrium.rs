@@ -238,7 +238,7 @@ fn report_set(
         String::new(),
         format!("{} ± {}", set.liquid, set.liquid_error),
         format!("{} ± {}", set.tension.0, set.tension.1),
-        String::new(),
+        format!("{} ± {}", set.width.0, set.width.1),
     ]);
     for ((code, law, other), m) in RUNS.iter().zip(measured) {
         let Some(other) = other else { continue };

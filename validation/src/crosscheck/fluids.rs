@@ -16,6 +16,8 @@ pub struct WarrenSet {
     pub liquid_error: f64,
     /// Surface tension and its error.
     pub tension: (f64, f64),
+    /// Width of the interface and its error.
+    pub width: (f64, f64),
     /// The shipped model file.
     pub file: &'static str,
 }
@@ -27,6 +29,7 @@ pub const SET5: WarrenSet = WarrenSet {
     liquid: 5.08,
     liquid_error: 0.01,
     tension: (4.95, 0.03),
+    width: (0.78, 0.05),
     file: include_str!("../../models/warren2003-set5.toml"),
 };
 
@@ -37,6 +40,7 @@ pub const SET6: WarrenSet = WarrenSet {
     liquid: 6.05,
     liquid_error: 0.01,
     tension: (7.45, 0.04),
+    width: (0.66, 0.03),
     file: include_str!("../../models/warren2003-set6.toml"),
 };
 

@@ -8,6 +8,7 @@
 
 pub mod closed_loop;
 pub mod codes;
+mod conclusion;
 pub mod energy;
 pub mod equilibrium;
 mod error;

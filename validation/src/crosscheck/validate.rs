@@ -1,4 +1,4 @@
-use super::{Context, Part, ValidateError, energy, equilibrium, forces, trajectory};
+use super::{Context, Part, ValidateError, conclusion, energy, equilibrium, forces, trajectory};
 use crate::files::write_atomically;
 use crate::lammps;
 use crate::report::{Item, Progress, Report, Results, Section, Table};
@@ -88,7 +88,7 @@ pub fn check_table(results: &Results) -> Table {
                 Some(error) => format!("{:.3e} ± {error:.1e}", check.value),
                 None => format!("{:.3e}", check.value),
             },
-            format!("{:.1e}", check.limit),
+            format!("{} {:.1e}", if check.at_least { "≥" } else { "≤" }, check.limit),
         ]);
     }
     table
@@ -96,6 +96,8 @@ pub fn check_table(results: &Results) -> Table {
 
 fn write(out: &Path, results: &Results, mut sections: Vec<Section>) -> Result<PathBuf, ValidateError> {
     write_atomically(out.join("results.json"), results.to_json()?.as_bytes())?;
+    sections.insert(0, conclusion::what_is_compared());
+    sections.insert(0, conclusion::section(results));
     sections.push(Section { heading: "Checks".into(), items: vec![Item::Table(check_table(results))] });
     let mut facts: Vec<(String, String)> = results.facts.clone().into_iter().collect();
     let seeds: Vec<String> = results.seeds.iter().map(u64::to_string).collect();

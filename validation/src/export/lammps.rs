@@ -169,7 +169,10 @@ fn tables(name: &str, text: &str) -> Result<Vec<String>, FileError> {
     let mut sections = Vec::new();
     if let Some(excess) = root.get("excess_free_energy").and_then(|v| v.as_section()) {
         let curves = excess.entries().into_iter().filter_map(|(_, value)| value.as_section());
-        sections.extend(curves.map(|curve| (curve, "table")));
+        for curve in curves {
+            let pressure = curve.get("pressure").and_then(|p| p.as_section());
+            sections.extend([curve].into_iter().chain(pressure).map(|table| (table, "table")));
+        }
     }
     for pair in root.get("pair").and_then(|v| v.as_array()).unwrap_or_default() {
         sections.extend(pair.as_section().map(|pair| (pair, "file")));

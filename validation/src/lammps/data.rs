@@ -22,6 +22,8 @@ pub struct DataFile {
     pub types: usize,
     /// Mass of each type; empty if the file gives none.
     pub masses: Vec<f64>,
+    /// Name of each type, which is written as a comment beside its mass and not read; may be empty.
+    pub names: Vec<String>,
     /// The atoms, in the order of the file.
     pub atoms: Vec<Atom>,
     /// Their velocities, in the order of `atoms`.
@@ -117,7 +119,9 @@ impl DataFile {
         if !self.masses.is_empty() {
             writeln!(out, "\nMasses\n")?;
             for (k, mass) in self.masses.iter().enumerate() {
-                writeln!(out, "{} {mass:.16e}", k + 1)?;
+                // As `write_data` puts labels there; OVITO shows them.
+                let name = self.names.get(k).map_or(String::new(), |name| format!(" # {name}"));
+                writeln!(out, "{} {mass:.16e}{name}", k + 1)?;
             }
         }
         if !self.atoms.is_empty() {
@@ -575,7 +579,7 @@ mod tests {
             types in Just(types),
         ) -> DataFile {
             DataFile {
-                title, tilt, types, atoms, velocities,
+                title, tilt, types, atoms, velocities, names: Vec::new(),
                 boxlo: lo,
                 boxhi: [lo[0] + size[0], lo[1] + size[1], lo[2] + size[2]],
                 masses: masses.map(|m| m[..types].to_vec()).unwrap_or_default(),

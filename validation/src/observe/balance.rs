@@ -99,7 +99,7 @@ fn a_drop_balances() {
     let scene = scene(
         "[9.0, 9.0, 9.0]",
         "kind = \"random\"\ncount = 400",
-        "[observe.drop]\nevery = 5\nbins = 40\nrange = 4.0",
+        "[observe.drop]\ndistance = 1.0\nevery = 5\nbins = 40\nrange = 4.0",
     );
     let mut state = scene.initial_state();
     let side = (400.0f64 / 6.05).cbrt();

@@ -108,8 +108,8 @@ raised where neighbouring stretches are correlated. Long
 series are kept as 256 to 511 block means (hanging drops 32 to 63, viscosities 64 to 127), so memory does not grow with the run; at the end the last block, if
 it is not complete, is left out. With fewer than 8 samples the error is the plain standard error.
 
-**Units** are those of the model: lengths in r_c, energies in the unit of kT, masses in m; "1" stands for a pure
-number. In two dimensions volumes are areas: densities count per r_c², pressures are forces per length, surface
+**Units** are those of the model: lengths in its unit of length ("length"), energies in the unit of kT, masses in m; "1" stands for a pure
+number. In two dimensions volumes are areas: densities count per length², pressures are forces per length, surface
 tensions are line tensions. Forces are those of the Hamiltonian, many-body terms included; drag and noise take
 part only where it says so.
 

@@ -219,7 +219,7 @@ mod tests {
 
     fn example(stage: &str) -> Observation {
         let mut o = Observation::new("rdf", "g(r)", Kind::Curve)
-            .against("r", "r_c", vec![0.5, 1.5])
+            .against("r", "length", vec![0.5, 1.5])
             .column("g", "1", [Measured { value: 1.0, error: 0.25 }, Measured::NONE])
             .samples(3)
             .note("one.")
@@ -239,7 +239,7 @@ mod tests {
             json[0],
             serde_json::json!({
                 "name": "rdf", "title": "g(r)", "stage": "a", "kind": "curve",
-                "x": { "name": "r", "unit": "r_c", "values": [0.5, 1.5] },
+                "x": { "name": "r", "unit": "length", "values": [0.5, 1.5] },
                 "columns": [{ "name": "g", "unit": "1", "values": [1.0, null], "errors": [0.25, null] }],
                 "samples": 3, "note": "one. two."
             })

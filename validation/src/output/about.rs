@@ -42,6 +42,20 @@ pub struct About {
     pub units: String,
     /// The columns of `thermo.csv`.
     pub thermo: Vec<Column>,
+    /// What theory and literature say of the fluid, to be put beside what is measured.
+    #[serde(default)]
+    pub expected: Vec<Expected>,
+}
+
+/// What is known of a quantity before it is measured.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Expected {
+    /// As in the results of a run: `pressure`, `liquid`, `vapour`, `tension`, `width`.
+    pub name: String,
+    /// What mean field says.
+    pub mean_field: Option<f64>,
+    /// What is published for this kT: value and error.
+    pub published: Option<[f64; 2]>,
 }
 
 /// A weighted local density of the model.

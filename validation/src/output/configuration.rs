@@ -47,20 +47,61 @@ impl Configuration {
     /// # Errors
     /// A file that cannot be read or is none of these, or a frame that it does not have.
     pub fn open(path: &Path, which: Which) -> Result<Configuration, OutputError> {
+        let number = match which {
+            Which::Last => None,
+            Which::Number(n) => Some(n),
+        };
+        if let Some(found) = Configuration::find(path, number)? {
+            return Ok(found);
+        }
+        let mut message = "there is no frame".to_owned();
+        if let Some(n) = number {
+            message += &format!(" {n}");
+            // Frames are whole up to the last one.
+            let (mut low, mut high) = (0, n);
+            while high - low > 1 {
+                let middle = low + (high - low) / 2;
+                match Configuration::find(path, Some(middle)) {
+                    Ok(Some(_)) => low = middle,
+                    _ => high = middle,
+                }
+            }
+            if n > 0 && matches!(Configuration::find(path, Some(low)), Ok(Some(_))) {
+                message += &format!("; the first one is 0, the last one {low}");
+            }
+        }
+        Err(OutputError::Content { path: path.to_owned(), message })
+    }
+
+    /// How many whole frames a file has.
+    ///
+    /// # Errors
+    /// As [`Configuration::open`].
+    pub fn count(path: &Path) -> Result<usize, OutputError> {
+        Configuration::open(path, Which::Last)?;
+        let mut above = 1;
+        while matches!(Configuration::find(path, Some(above)), Ok(Some(_))) {
+            above *= 2;
+        }
+        let mut low = above / 2;
+        while above - low > 1 {
+            let middle = low + (above - low) / 2;
+            match Configuration::find(path, Some(middle)) {
+                Ok(Some(_)) => low = middle,
+                _ => above = middle,
+            }
+        }
+        Ok(low + 1)
+    }
+
+    /// A frame by its number, or the last; `None` if the file does not have it.
+    fn find(path: &Path, number: Option<usize>) -> Result<Option<Configuration>, OutputError> {
         let content = |message: &str| OutputError::Content { path: path.to_owned(), message: message.into() };
         let mut file = BufReader::new(open_regular(path).map_err(OutputError::read(path))?);
         // Trajectories may be larger than memory: their frames are read one by one.
         let start = file.fill_buf().map_err(OutputError::read(path))?;
         let start = String::from_utf8_lossy(start);
         let first = start.lines().find(|l| !l.trim().is_empty()).unwrap_or("").trim().to_owned();
-        let number = match which {
-            Which::Last => None,
-            Which::Number(n) => Some(n),
-        };
-        let missing = || {
-            let which = number.map_or("no frame".into(), |n| format!("no frame {n}; the first one is 0"));
-            content(&format!("there is {which}"))
-        };
         let found = if first.starts_with("ITEM:") {
             last_or_nth(path, file, number)?.map(|f| from_dump(&f)).transpose().map_err(|m| content(&m))?
         } else if first.parse::<usize>().is_ok() {
@@ -70,7 +111,7 @@ impl Configuration {
         } else {
             None
         };
-        found.filter(|c| !c.x.is_empty()).ok_or_else(missing)
+        Ok(found.filter(|c| !c.x.is_empty()))
     }
 
     /// Takes names and dimensions from a model: files of LAMMPS know neither.

@@ -13,7 +13,7 @@ pub mod picture;
 pub mod snapshot;
 mod xyz;
 
-pub use about::{About, AboutDensity, AboutStage, THERMO};
+pub use about::{About, AboutDensity, AboutStage, Expected, THERMO};
 pub use animation::{animate, animation_url};
 pub use configuration::{Configuration, Which};
 pub use error::OutputError;

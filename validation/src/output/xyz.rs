@@ -1,8 +1,7 @@
 //! Extended XYZ: two lines of header and one line for each particle.
 //!
 //! Columns `species`, `pos`, `velo`, `id` are those of libAtoms and OVITO. Readers that know chemical
-//! elements only, ASE among them, take `Z` before `species`: it is the element of that name where every
-//! species of the model has the name of one, else the number of the species from 1.
+//! elements only, ASE among them, take `Z` before `species`: it is the number of the species, from 1.
 
 use super::{Configuration, Frame, OutputError};
 use nalgebra::{Matrix3, Vector3};
@@ -33,8 +32,7 @@ pub fn write_xyz(frame: &Frame, to: &mut impl Write) -> io::Result<()> {
         frame.time,
         frame.step
     )?;
-    let names: Vec<String> = frame.names.iter().map(|n| n.replace(char::is_whitespace, "_")).collect();
-    let numbers = element_numbers(frame.names);
+    let names: Vec<String> = frame.names.iter().map(|n| name_of(n)).collect();
     for i in 0..frame.len() {
         let species = frame.species[i] as usize;
         let [x, y, z] = frame.x[i];
@@ -42,7 +40,7 @@ pub fn write_xyz(frame: &Frame, to: &mut impl Write) -> io::Result<()> {
         if let Some([x, y, z]) = frame.v.map(|v| v[i]) {
             write!(to, "{x:?} {y:?} {z:?} ")?;
         }
-        writeln!(to, "{} {}", frame.tag[i], numbers[species])?;
+        writeln!(to, "{} {}", frame.tag[i], species + 1)?;
     }
     Ok(())
 }
@@ -53,11 +51,10 @@ const ELEMENTS: &str = "H He Li Be B C N O F Ne Na Mg Al Si P S Cl Ar K Ca Sc Ti
     Ho Er Tm Yb Lu Hf Ta W Re Os Ir Pt Au Hg Tl Pb Bi Po At Rn Fr Ra Ac Th Pa U Np Pu Am Cm Bk Cf Es Fm Md \
     No Lr Rf Db Sg Bh Hs Mt Ds Rg Cn Nh Fl Mc Lv Ts Og";
 
-/// Numbers for readers that know elements only: atomic numbers if every name is an element, else 1, 2, ….
-fn element_numbers(names: &[String]) -> Vec<usize> {
-    let element = |name: &String| ELEMENTS.split_whitespace().position(|e| e == name).map(|k| k + 1);
-    let known: Option<Vec<usize>> = names.iter().map(element).collect();
-    known.unwrap_or_else(|| (1..=names.len()).collect())
+/// A name without blanks, and none that a program would take for a chemical element: `F` is a fluid here, not fluorine.
+fn name_of(species: &str) -> String {
+    let name = species.replace(char::is_whitespace, "_");
+    if ELEMENTS.split_whitespace().any(|e| e.eq_ignore_ascii_case(&name)) { name + "_" } else { name }
 }
 
 /// A frame of an extended XYZ file; `None` if there is no such frame. `which` counts from 0; without it
@@ -177,6 +174,7 @@ fn parse_frame(comment: &str, rows: &[String]) -> Result<Configuration, Fault> {
             v.push(vector(at)?);
         }
         let name = species_at.map_or("X", |at| words[at]);
+        let name = name.strip_suffix('_').filter(|stem| name_of(stem) != *stem).unwrap_or(name);
         let species = this.names.iter().position(|n| n == name).unwrap_or_else(|| {
             this.names.push(name.to_owned());
             this.names.len() - 1
@@ -292,13 +290,17 @@ mod tests {
     }
 
     #[test]
-    fn elements_keep_their_numbers_and_other_names_get_some() {
-        let numbers =
-            |names: &[&str]| element_numbers(&names.iter().map(|n| (*n).to_owned()).collect::<Vec<_>>());
-        assert_eq!(numbers(&["F"]), [9]);
-        assert_eq!(numbers(&["O", "H", "Og"]), [8, 1, 118]);
-        assert_eq!(numbers(&["A", "B"]), [1, 2]);
-        assert_eq!(numbers(&["f"]), [1]);
+    fn no_name_is_that_of_an_element() {
+        for (name, written) in
+            [("F", "F_"), ("he", "he_"), ("A", "A"), ("oil phase", "oil_phase"), ("F_", "F_")]
+        {
+            assert_eq!(name_of(name), written);
+        }
+        let domain = PeriodicBox::orthogonal([0.0; 3], [4.0; 3], [true; 3]).unwrap();
+        let text = frame(&["F".to_owned(), "B2".to_owned()], &domain);
+        assert!(text.contains("\nF_ "), "{text}");
+        let read = read_xyz(Path::new("f"), text.as_bytes(), None).unwrap().unwrap();
+        assert!(read.names.contains(&"F".to_owned()), "{:?}", read.names);
     }
 
     #[test]

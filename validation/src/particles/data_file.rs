@@ -37,6 +37,7 @@ impl State {
             tilt: (tilt != [0.0; 3]).then_some(tilt),
             types: self.mass.len(),
             masses: self.mass.clone(),
+            names: Vec::new(),
             atoms: order
                 .clone()
                 .map(|k| Atom {
@@ -117,6 +118,6 @@ impl State {
 ///
 /// # Errors
 /// The file cannot be written.
-pub fn write_data(path: &Path, title: &str, state: &State) -> Result<(), LammpsError> {
-    state.to_data_by_tag(title).write(path)
+pub fn write_data(path: &Path, title: &str, state: &State, species: &[String]) -> Result<(), LammpsError> {
+    DataFile { names: species.to_vec(), ..state.to_data_by_tag(title) }.write(path)
 }

@@ -10,7 +10,7 @@ use super::text::{fit, width};
 use crate::output::Frame;
 use crate::output::picture::colour::{self, Rgb};
 use crate::output::picture::{
-    Field, FieldOptions, Image, ParticleOptions, View, draw_particles, paint_field,
+    Field, FieldOptions, Image, ParticleOptions, View, draw_coloured, draw_particles, paint_field,
 };
 
 /// A picture in an SVG document that needs nothing else.
@@ -61,6 +61,22 @@ impl Figure {
             None => Border::Arrows(view),
         };
         Figure { title: title.into(), image, border, legend: legend.collect(), bar: None }
+    }
+
+    /// The particles of a frame in the colours of values between two ends.
+    pub fn valued(
+        title: &str,
+        label: &str,
+        frame: &Frame,
+        options: &ParticleOptions,
+        values: &[f64],
+        [low, high]: [f64; 2],
+    ) -> Figure {
+        let span = if high > low { high - low } else { 1.0 };
+        let colours: Vec<Rgb> = values.iter().map(|v| colour::of_value((v - low) / span)).collect();
+        let plain = Figure::particles(title, frame, options);
+        let (image, _) = draw_coloured(frame, options, &colours);
+        Figure { image, legend: Vec::new(), bar: Some((low, low + span, label.into())), ..plain }
     }
 
     /// A weighted local density of a frame, colours from 0 to its highest value in the picture.

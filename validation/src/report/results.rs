@@ -26,6 +26,8 @@ pub struct Check {
     pub expected: Option<f64>,
     /// The bound on `value`.
     pub limit: f64,
+    /// Whether it is the least that passes; else it is the most, in size.
+    pub at_least: bool,
     /// The verdict.
     pub passed: bool,
     /// Anything the reader should know.
@@ -55,7 +57,8 @@ impl Check {
         limit: f64,
     ) -> Self {
         let passed = value.is_finite() && limit.is_finite() && value >= limit;
-        Self::judged(id.into(), section.into(), description.into(), value, limit, passed)
+        let check = Self::judged(id.into(), section.into(), description.into(), value, limit, passed);
+        Self { at_least: true, ..check }
     }
 
     /// Passes if a difference is within `z_limit` standard errors of zero:
@@ -105,6 +108,7 @@ impl Check {
             error: None,
             expected: None,
             limit,
+            at_least: false,
             passed,
             note: String::new(),
         }

@@ -2,6 +2,7 @@
 
 use crate::output::about::{Column, THERMO, UNITS};
 use crate::output::{About, AboutDensity, AboutStage};
+use crate::prediction;
 use crate::scene::Scene;
 
 impl About {
@@ -49,6 +50,11 @@ impl About {
             stages,
             units: UNITS.into(),
             thermo: THERMO.map(|c| column(c, scene.model.dimensions())).to_vec(),
+            expected: scene
+                .model
+                .at(scene.stages.last().map_or(scene.kt, |s| s.kt))
+                .map(|fluid| prediction::expected(&scene.model, &fluid, scene.uniform_density()))
+                .unwrap_or_default(),
         }
     }
 }

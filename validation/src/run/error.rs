@@ -75,6 +75,8 @@ pub enum RunError {
     },
     #[error("{} holds a run that is not finished{}", folder.display(), reached(.step))]
     Unfinished { folder: PathBuf, step: Option<u64> },
+    #[error("{} holds a finished run{}", folder.display(), if *other { " of another scene" } else { "" })]
+    Finished { folder: PathBuf, other: bool },
     #[error("another run is writing to {}", folder.display())]
     Busy { folder: PathBuf },
     #[error(transparent)]
@@ -134,6 +136,9 @@ impl RunError {
                 Some("there is no checkpoint yet: when the cause is gone, start over".into())
             }
             RunError::Unfinished { .. } => Some("go on with --resume, or start over with --overwrite".into()),
+            RunError::Finished { .. } => {
+                Some("choose another folder, or replace what is there with --overwrite".into())
+            }
             RunError::Busy { .. } => Some("wait for its end, or choose another folder".into()),
             RunError::Checkpoint(error) => Some(error.help().into()),
             _ => None,

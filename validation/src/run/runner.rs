@@ -41,7 +41,7 @@ pub struct Progress<'a> {
 /// What to do with an earlier run in the folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Begin {
-    /// From the first step; a run that is not finished is left alone.
+    /// From the first step, where there is no run yet.
     #[default]
     New,
     /// From the first step, whatever is there.
@@ -123,7 +123,8 @@ impl<'a> Runner<'a> {
     /// Prepares a run in the folder `out`, which is made if need be.
     ///
     /// # Errors
-    /// [`RunError::Unfinished`] for [`Begin::New`] where a run waits to be taken up again;
+    /// [`RunError::Unfinished`] for [`Begin::New`] where a run waits to be taken up again, [`RunError::Finished`] where
+    /// one has ended;
     /// [`RunError::Checkpoint`] for [`Begin::Resume`] if its checkpoints cannot be used;
     /// [`RunError::Busy`] if another run is on its way there; a model or initial state that does not work;
     /// a folder that cannot be written.
@@ -137,7 +138,7 @@ impl<'a> Runner<'a> {
             return Runner::resume(scene, folder, store, found);
         }
         if begin == Begin::New {
-            refuse_unfinished(&store, out)?;
+            refuse_other_runs(&store, &identity, out)?;
         }
         let state = scene.initial_state();
         let simulation = simulation(scene, state.clone())?;
@@ -283,14 +284,17 @@ fn usable(
     Ok(())
 }
 
-fn refuse_unfinished(store: &Store, out: &Path) -> Result<(), RunError> {
+/// A new run never replaces another.
+fn refuse_other_runs(store: &Store, identity: &Identity, out: &Path) -> Result<(), RunError> {
     if !store.exists() {
         return Ok(());
     }
-    let step = match store.find(|_| Ok(())) {
-        Ok(Some(found)) if found.checkpoint.finished => return Ok(()),
-        Ok(Some(found)) => Some(found.checkpoint.step),
-        _ => None,
-    };
-    Err(RunError::Unfinished { folder: out.to_owned(), step })
+    let folder = out.to_owned();
+    Err(match store.find(|_| Ok(())) {
+        Ok(Some(found)) if found.checkpoint.finished => {
+            RunError::Finished { folder, other: !identity.differences(&found.checkpoint.identity).is_empty() }
+        }
+        Ok(Some(found)) => RunError::Unfinished { folder, step: Some(found.checkpoint.step) },
+        _ => RunError::Unfinished { folder, step: None },
+    })
 }

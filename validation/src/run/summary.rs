@@ -48,17 +48,6 @@ impl std::fmt::Display for Summary {
                 100.0 * share
             )?;
         }
-        if let Some(m) = &self.means {
-            let n = self.particles as f64;
-            write!(
-                f,
-                "\nmeans of {} rows: temperature {:.4}, potential energy per particle {:.4}, pressure {:.4}",
-                m.rows,
-                m.temperature,
-                m.potential / n,
-                m.pressure
-            )?;
-        }
         Ok(())
     }
 }

@@ -307,7 +307,12 @@ impl<'a> Run<'a> {
         }
         let checkpoint = self.stored == Some(self.good.step) || self.store_good().is_ok();
         let saved = self.folder.path().join("last-good.data");
-        match write_data(&saved, &self.data_title(self.good.step), &self.good.state) {
+        match write_data(
+            &saved,
+            &self.data_title(self.good.step),
+            &self.good.state,
+            self.scene.model.species(),
+        ) {
             Ok(()) => RunError::Stopped {
                 stage: self.scene.stages[self.position.stage].name.clone(),
                 cause: Box::new(cause),
@@ -323,7 +328,7 @@ impl<'a> Run<'a> {
     fn finish(&mut self) -> Result<Outcome, RunError> {
         self.keep_state();
         let path = self.folder.path().join("final.data");
-        write_data(&path, &self.data_title(self.steps), &self.good.state)?;
+        write_data(&path, &self.data_title(self.steps), &self.good.state, self.scene.model.species())?;
         std::fs::File::open(&path).and_then(|file| file.sync_all()).map_err(RunError::output(&path))?;
         write_observations(self.folder.path(), &self.observers.finish())?;
         let summary = self.summary();

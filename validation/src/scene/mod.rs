@@ -15,6 +15,7 @@ mod arrangement;
 mod body_force;
 mod composition;
 mod domain;
+mod edits;
 mod fill;
 mod initial;
 pub mod keys;
@@ -31,6 +32,7 @@ mod velocities;
 
 pub use arrangement::{Arrangement, Lattice};
 pub use composition::Composition;
+pub use edits::{Edit, edit_model};
 pub use initial::Initial;
 pub use output::Output;
 pub use part::Part;
@@ -42,6 +44,7 @@ pub use velocities::Velocities;
 use crate::observe::{self, Observe};
 use crate::particles::{BodyForce, State, Tags};
 use number::positive;
+use psidpd_core::document::keys::strangers_first;
 use psidpd_core::document::{Document, FileError, FileErrorKind, Section, Source, Value};
 use psidpd_core::engine::{PeriodicBox, Plan, Precision};
 use psidpd_core::model::Model;
@@ -92,7 +95,26 @@ impl Scene {
     /// Anything wrong in either file, with its line and key.
     pub fn open(path: &Path) -> Result<Scene, FileError> {
         let base = path.parent().unwrap_or(Path::new(""));
-        Scene::read(&Document::open(path)?, base)
+        Scene::read(&Document::open(path)?, base, &[])
+    }
+
+    /// Reads a scene file and the model file it names, with other values for some of their keys.
+    ///
+    /// # Errors
+    /// As [`Scene::open`]; an edit that fits nowhere.
+    pub fn open_with(path: &Path, edits: &[Edit]) -> Result<Scene, FileError> {
+        if edits.is_empty() {
+            return Scene::open(path);
+        }
+        let base = path.parent().unwrap_or(Path::new(""));
+        let document = Document::open(path)?;
+        let model = document.root().get("model").and_then(|v| Document::open(&base.join(v.as_str()?)).ok());
+        let parameters = |name: &str| {
+            let known = model.as_ref().and_then(|m| m.root().get("parameters")?.as_section()?.get(name));
+            known.is_some()
+        };
+        let (text, of_model) = edits::edit_scene(document.source().text(), edits, &parameters)?;
+        Scene::read(&Document::parse(&path.display().to_string(), &text)?, base, &of_model)
     }
 
     /// Reads a scene from a text; `name` stands for the file in messages, and the model file is looked
@@ -101,13 +123,18 @@ impl Scene {
     /// # Errors
     /// As [`Scene::open`].
     pub fn parse(name: &str, text: &str, base: &Path) -> Result<Scene, FileError> {
-        Scene::read(&Document::parse(name, text)?, base)
+        Scene::read(&Document::parse(name, text)?, base, &[])
     }
 
-    fn read(document: &Document, base: &Path) -> Result<Scene, FileError> {
+    fn read(document: &Document, base: &Path, of_model: &[Edit]) -> Result<Scene, FileError> {
+        Scene::of(document, base, of_model)
+            .map_err(|error| strangers_first(error, &document.root(), keys::TABLES, &["observe"]))
+    }
+
+    fn of(document: &Document, base: &Path, of_model: &[Edit]) -> Result<Scene, FileError> {
         let root = document.root();
         let title = root.get("title").map(|value| value.string()).transpose()?;
-        let (model_path, model) = read_model(&root.require("model")?, base)?;
+        let (model_path, model) = read_model(&root.require("model")?, base, of_model)?;
         let kt = positive(&root.require("kT")?)?;
         let seed = root.get("seed").map_or(Ok(1), |value| value.count().map(|c| c.value))?;
         let precision = root.get("precision").map(|value| value.one_of("precision", &Precision::ALL));
@@ -169,6 +196,15 @@ impl Scene {
         counts.into_iter().map(|n| n as f64 / volume).collect()
     }
 
+    /// The number density of a scene that one fluid fills from face to face.
+    pub fn uniform_density(&self) -> Option<f64> {
+        let [part] = self.initial.parts() else { return None };
+        let volume = self.domain.volume(self.model.dimensions());
+        let fills = (part.shape.volume(self.model.dimensions()) / volume - 1.0).abs() < 1e-9;
+        (fills && self.domain.periodic()[..self.model.dimensions()].iter().all(|p| *p))
+            .then(|| part.count as f64 / volume)
+    }
+
     /// Refuses parts without room for their particles at the minimum distance.
     fn check_room(&self, document: &Document) -> Result<(), FileError> {
         let apart =
@@ -206,10 +242,14 @@ impl Scene {
     }
 }
 
-fn read_model(value: &Value, base: &Path) -> Result<(PathBuf, Model), FileError> {
+fn read_model(value: &Value, base: &Path, edits: &[Edit]) -> Result<(PathBuf, Model), FileError> {
     let name = value.string()?.value;
     let path = base.join(&name);
-    match Model::open(&path) {
+    let model = Model::open(&path).and_then(|model| match edits {
+        [] => Ok(model),
+        _ => Model::parse(&path.display().to_string(), &edit_model(model.source().text(), edits)?),
+    });
+    match model {
         Ok(model) => Ok((path, model)),
         Err(error) => match error.kind() {
             FileErrorKind::Unreadable(why) => {

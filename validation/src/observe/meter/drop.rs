@@ -1,5 +1,5 @@
 use super::Meter;
-use super::clusters::{DISTANCE, label, read_distance, sizes};
+use super::linked::{DISTANCE, Distance, Linked};
 use super::rdf::shell_volume;
 use crate::observe::flux::Carrier;
 use crate::observe::frame::Frame;
@@ -22,13 +22,13 @@ const CORE: usize = 5;
 /// Size and pressure of a drop.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Drop {
-    distance: f64,
+    distance: Distance,
     range: f64,
     bins: usize,
     dimensions: usize,
     /// Everything in the shells.
     shells: Series,
-    /// Time, particles in the drop, square of its radius of gyration.
+    /// Time, particles in the drop, square of its radius of gyration, 1 where it meets its own image.
     size: Series,
 }
 
@@ -123,6 +123,24 @@ impl Drop {
         sum / volume
     }
 
+    /// What is wrong with the drop.
+    fn doubts(&self, no_drop: bool) -> String {
+        let mut doubts = Vec::new();
+        let percolated = self.size.mean(3).value;
+        if percolated > 0.0 {
+            let distance = self.distance.value().unwrap_or(f64::NAN);
+            doubts.push(format!(
+                "In {:.0} % of the samples the largest cluster percolates: it meets its own image through the box, and is no \
+                 drop. Give a smaller `distance` than {distance:.3}, or a larger box.",
+                100.0 * percolated
+            ));
+        }
+        if no_drop {
+            doubts.push("The profile is not that of a drop in vapour.".into());
+        }
+        doubts.join(" ")
+    }
+
     fn shape(&self, means: &[f64]) -> Option<Shape> {
         let h = self.thickness();
         let density = |k: usize| means[k * WIDTH] / self.volume(k);
@@ -167,7 +185,8 @@ impl Meter for Drop {
                 (equimolar), `radius_gyration` = √((d + 2)/d ⟨R_g²⟩) of the cluster, `width` of the interface from a \
                 tanh fit as for a slab, `liquid` and `vapour` densities, `inside` and `outside` pressures (within \
                 half of the radius; beyond radius and two widths), `laplace` their difference, and `tension` = \
-                Δp R/(d − 1). Jackknife errors. `drop_series`: gyration radius and particles of the drop against \
+                Δp R/(d − 1). Jackknife errors. `distance` is the one that was used. A note says \
+                in how many samples the cluster met its own image. `drop_series`: gyration radius and particles of the drop against \
                 time.",
         keys: &[
             DISTANCE,
@@ -199,31 +218,28 @@ impl Meter for Drop {
         let bins = options.count("bins", 12, 10_000)?;
         let bins = bins.unwrap_or(((range / 0.1).ceil() as usize).clamp(12, 10_000));
         Ok(Drop {
-            distance: read_distance(options)?,
+            distance: Distance::read(options)?,
             range,
             bins,
             dimensions: options.place.fluid.dimensions,
             shells: Series::new(bins * WIDTH),
-            size: Series::new(3),
+            size: Series::new(4),
         })
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
         let view = frame.view;
         let (x, domain) = (view.x, view.domain);
-        let labels = label(x, domain, self.dimensions, self.distance, |_| true);
-        let sizes = sizes(&labels);
-        // Of equal clusters the first.
-        let Some(largest) = (0..sizes.len()).max_by_key(|k| (sizes[*k], usize::MAX - k)) else {
-            return false;
-        };
-        let member = |k: usize| labels[k] == Some(largest);
+        let distance = self.distance.at(x, domain, self.dimensions, |_| true);
+        let linked = Linked::new(x, domain, self.dimensions, distance, |_| true);
+        let Some(largest) = linked.largest() else { return false };
+        let member = |k: usize| linked.is_in(k, largest);
         let Some(centre) = circular_centre(x, domain, member) else { return false };
         let mut at: Vec<[f64; 3]> = x.iter().map(|x| domain.minimum_image(*x, centre)).collect();
         if self.dimensions == 2 {
             at.iter_mut().for_each(|x| x[2] = 0.0);
         }
-        let count = sizes[largest] as f64;
+        let count = linked.sizes[largest] as f64;
         let members = || at.iter().enumerate().filter(|(k, _)| member(*k)).map(|(_, x)| x);
         let mean: [f64; 3] = std::array::from_fn(|c| members().map(|x| x[c]).sum::<f64>() / count);
         let squares =
@@ -262,12 +278,14 @@ impl Meter for Drop {
         if !known {
             return false;
         }
-        self.shells.push(&row) && self.size.push(&[frame.view.time, count, squares])
+        let percolates = f64::from(u8::from(linked.percolates(largest)));
+        self.shells.push(&row) && self.size.push(&[frame.view.time, count, squares, percolates])
     }
 
     fn forget(&mut self) {
         self.shells.clear();
         self.size.clear();
+        self.distance.forget();
     }
 
     fn finish(&self) -> Vec<Observation> {
@@ -284,9 +302,9 @@ impl Meter for Drop {
         let samples = self.shells.samples();
         let scalar = Observation::new("drop", "Drop", Kind::Scalar)
             .samples(samples)
-            .column("radius", "r_c", at(0))
-            .column("radius_gyration", "r_c", [gyration])
-            .column("width", "r_c", at(1))
+            .column("radius", "length", at(0))
+            .column("radius_gyration", "length", [gyration])
+            .column("width", "length", at(1))
             .column("liquid", "1/volume", at(2))
             .column("vapour", "1/volume", at(3))
             .column("inside", "energy/volume", at(4))
@@ -294,7 +312,12 @@ impl Meter for Drop {
             .column("laplace", "energy/volume", at(6))
             .column("tension", "energy/area", at(7))
             .column("particles", "1", [self.size.mean(1)])
-            .note(if found.is_empty() { "The profile is not that of a drop in vapour." } else { "" });
+            .column(
+                "distance",
+                "length",
+                self.distance.value().map(|value| Measured { value, error: f64::NAN }),
+            )
+            .note(self.doubts(found.is_empty()));
         let middles = (0..self.bins).map(|k| (k as f64 + 0.5) * self.thickness()).collect();
         let column = |f: &dyn Fn(&[f64], f64) -> f64| -> Vec<Measured> {
             (0..self.bins)
@@ -302,7 +325,7 @@ impl Meter for Drop {
                 .collect()
         };
         let profile = Observation::new("drop_profile", "Radial profile of a drop", Kind::Profile)
-            .against("r", "r_c", middles)
+            .against("r", "length", middles)
             .samples(samples)
             .column("density", "1/volume", column(&|p, volume| p[0] / volume))
             .column("normal", "energy/volume", column(&|p, _| p[1] + p[3]))
@@ -312,7 +335,7 @@ impl Meter for Drop {
         let series = Observation::new("drop_series", "Size of the drop", Kind::Series)
             .against("time", "time", self.size.channel(0))
             .samples(self.size.samples())
-            .column("radius_gyration", "r_c", radius.map(unknown))
+            .column("radius_gyration", "length", radius.map(unknown))
             .column("particles", "1", self.size.channel(1).into_iter().map(unknown));
         vec![scalar, profile, series]
     }
@@ -360,12 +383,12 @@ mod tests {
     fn a_constructed_drop() {
         for dimensions in [2, 3] {
             let mut drop = Drop {
-                distance: 1.0,
+                distance: Distance::given(1.0),
                 range: 8.0,
                 bins: 80,
                 dimensions,
                 shells: Series::new(80 * WIDTH),
-                size: Series::new(3),
+                size: Series::new(4),
             };
             let (radius, d) = (4.0, 0.3);
             let rho = |r: f64| 3.1 - 2.9 * ((r - radius) / d).tanh();
@@ -378,7 +401,7 @@ mod tests {
                 row[k * WIDTH + 1..(k + 1) * WIDTH].copy_from_slice(&[0.2, 0.2, p - 0.2, p - 0.2]);
             }
             for k in 0..10 {
-                assert!(drop.shells.push(&row) && drop.size.push(&[f64::from(k), 100.0, 9.0]));
+                assert!(drop.shells.push(&row) && drop.size.push(&[f64::from(k), 100.0, 9.0, 0.0]));
             }
             let out = drop.finish();
             let get = |name: &str| out[0].scalar(name).unwrap().value;
@@ -391,6 +414,12 @@ mod tests {
             assert!((get("tension") - 2.0 * get("radius") / rest).abs() < 1e-2);
             let expected = 3.0 * ((dimensions as f64 + 2.0) / dimensions as f64).sqrt();
             assert!((get("radius_gyration") - expected).abs() < 1e-12);
+            assert_eq!(out[0].note, "");
+            for k in 10..20 {
+                assert!(drop.shells.push(&row) && drop.size.push(&[f64::from(k), 100.0, 9.0, 1.0]));
+            }
+            let note = &drop.finish()[0].note;
+            assert!(note.contains("In 50 % of the samples the largest cluster percolates"), "{note}");
         }
     }
 }

@@ -68,12 +68,12 @@ impl Meter for InterfaceWidth {
         vec![
             Observation::new("interface_width", "Interfaces of a slab", Kind::Scalar)
                 .samples(self.series.samples())
-                .column("width", "r_c", at(0))
+                .column("width", "length", at(0))
                 .column("liquid", "1/volume", at(1))
                 .column("vapour", "1/volume", at(2))
-                .column("thickness", "r_c", at(3))
-                .column("width_10_90", "r_c", at(4))
-                .column("width_slope", "r_c", at(5))
+                .column("thickness", "length", at(3))
+                .column("width_10_90", "length", at(4))
+                .column("width_slope", "length", at(5))
                 .note(if fit.is_empty() { "The profile is not that of a slab." } else { "" }),
         ]
     }

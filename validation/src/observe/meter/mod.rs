@@ -9,6 +9,7 @@ mod density_field;
 mod drop;
 mod energy;
 mod interface_width;
+mod linked;
 mod local_density;
 mod msd;
 mod pendant;

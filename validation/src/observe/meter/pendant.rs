@@ -1,6 +1,6 @@
 use super::Meter;
-use super::clusters::{DISTANCE, label, read_distance, sizes};
 use super::drop::circular_centre;
+use super::linked::{DISTANCE, Distance, Linked};
 use crate::observe::frame::Frame;
 use crate::observe::keys::{AXIS, Key, Need, Table, ValueKind, key};
 use crate::observe::observation::{Kind, Observation};
@@ -19,7 +19,7 @@ pub struct Pendant {
     axis: usize,
     /// Whether the apex is at the low end of the axis.
     hangs_down: bool,
-    distance: f64,
+    distance: Distance,
     dimensions: usize,
     /// Bins outwards and along the axis.
     bins: [usize; 2],
@@ -171,7 +171,7 @@ impl Meter for Pendant {
         Ok(Pendant {
             axis,
             hangs_down,
-            distance: read_distance(options)?,
+            distance: Distance::read(options)?,
             dimensions: d,
             bins,
             width: [outwards / bins[0] as f64, along / bins[1] as f64],
@@ -186,12 +186,10 @@ impl Meter for Pendant {
     fn sample(&mut self, frame: &Frame) -> bool {
         let view = frame.view;
         let (x, domain) = (view.x, view.domain);
-        let labels = label(x, domain, self.dimensions, self.distance, |_| true);
-        let sizes = sizes(&labels);
-        let Some(largest) = (0..sizes.len()).max_by_key(|k| (sizes[*k], usize::MAX - k)) else {
-            return false;
-        };
-        let Some(centre) = circular_centre(x, domain, |k| labels[k] == Some(largest)) else { return false };
+        let distance = self.distance.at(x, domain, self.dimensions, |_| true);
+        let linked = Linked::new(x, domain, self.dimensions, distance, |_| true);
+        let Some(largest) = linked.largest() else { return false };
+        let Some(centre) = circular_centre(x, domain, |k| linked.is_in(k, largest)) else { return false };
         let mut counts = vec![0.0; self.bins[0] * self.bins[1]];
         for x in x {
             let away = domain.minimum_image(*x, centre);
@@ -211,6 +209,7 @@ impl Meter for Pendant {
 
     fn forget(&mut self) {
         self.series.clear();
+        self.distance.forget();
     }
 
     fn finish(&self) -> Vec<Observation> {
@@ -220,11 +219,11 @@ impl Meter for Pendant {
         let mut scalar = Observation::new("pendant", "Hanging drop", Kind::Scalar)
             .samples(samples)
             .column("bond", "1", at(0))
-            .column("apex_radius", "r_c", at(1))
-            .column("apex", "r_c", at(2))
+            .column("apex_radius", "length", at(1))
+            .column("apex", "length", at(2))
             .column("capillary", "1/r_c^2", at(3))
             .column("liquid", "1/volume", at(4))
-            .column("residual", "r_c", at(5))
+            .column("residual", "length", at(5))
             .note(if found.is_empty() { "No drop fits the surface." } else { "" });
         if self.weight.is_some() {
             scalar = scalar.column("tension", "energy/area", at(6));
@@ -253,17 +252,17 @@ impl Meter for Pendant {
         let (z, radii): (Vec<f64>, Vec<Measured>) = surface.into_iter().unzip();
         out.push(
             Observation::new("pendant_profile", "Surface of a hanging drop", Kind::Profile)
-                .against("height", "r_c", z)
+                .against("height", "length", z)
                 .samples(samples)
-                .column("radius", "r_c", radii)
+                .column("radius", "length", radii)
                 .note(format!("The surface where the density is {level:.4}.")),
         );
         let cells = || (0..self.bins[1]).flat_map(|k| (0..self.bins[0]).map(move |j| (k, j)));
         out.push(
             Observation::new("pendant_field", "Density field of a hanging drop", Kind::Field)
                 .samples(samples)
-                .exact("r", "r_c", cells().map(|(_, j)| (j as f64 + 0.5) * self.width[0]))
-                .exact("z", "r_c", cells().map(|(k, _)| self.origin + (k as f64 + 0.5) * self.width[1]))
+                .exact("r", "length", cells().map(|(_, j)| (j as f64 + 0.5) * self.width[0]))
+                .exact("z", "length", cells().map(|(k, _)| self.origin + (k as f64 + 0.5) * self.width[1]))
                 .column("density", "1/volume", (0..field.len()).map(|k| self.series.mean(k))),
         );
         out
@@ -283,7 +282,7 @@ mod tests {
             let mut m = Pendant {
                 axis: 2,
                 hangs_down,
-                distance: 1.0,
+                distance: Distance::given(1.0),
                 dimensions: 3,
                 bins: [40, 80],
                 width: [0.25, 0.25],

@@ -146,7 +146,7 @@ impl Meter for Poiseuille {
                 .column("viscosity", "mass/(r_c time)", [at(0)])
                 .column("deviation", "1", [at(1)]),
             Observation::new("poiseuille_profile", "Poiseuille flow", Kind::Profile)
-                .against(self.across.name(), "r_c", self.across.middles())
+                .against(self.across.name(), "length", self.across.middles())
                 .samples(samples)
                 .column("velocity", "r_c/time", velocity)
                 .column("fit", "r_c/time", fit),

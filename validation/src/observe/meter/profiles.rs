@@ -69,7 +69,7 @@ impl Bins {
     fn observation(&self, name: &str, title: &str) -> Observation {
         let centred = if self.across.recentre { "Samples are centred." } else { "" };
         Observation::new(name, title, Kind::Profile)
-            .against(self.across.name(), "r_c", self.across.middles())
+            .against(self.across.name(), "length", self.across.middles())
             .samples(self.series.samples())
             .note(centred)
     }

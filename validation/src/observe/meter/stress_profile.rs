@@ -99,7 +99,7 @@ impl Meter for StressProfile {
         let unit = "energy/volume";
         let centred = if self.across.recentre { "Samples are centred." } else { "" };
         let profile = Observation::new("stress_profile", "Pressure tensor profile", Kind::Profile)
-            .against(self.across.name(), "r_c", self.across.middles())
+            .against(self.across.name(), "length", self.across.middles())
             .samples(self.series.samples())
             .column("normal", unit, column(&|p| p[0] + p[2]))
             .column("tangential", unit, column(&|p| p[1] + p[3]))

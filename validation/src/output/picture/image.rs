@@ -96,6 +96,30 @@ impl Image {
         Ok(bytes)
     }
 
+    /// As an animated GIF file that repeats for ever, each frame for `centiseconds`.
+    ///
+    /// # Errors
+    /// No images, images of different sizes, or of more than 65535 pixels in a row; in words.
+    pub fn to_gif(images: &[Image], centiseconds: u16) -> Result<Vec<u8>, String> {
+        let Some(first) = images.first() else { return Err("an animation without images".into()) };
+        if images.iter().any(|i| (i.width, i.height) != (first.width, first.height)) {
+            return Err("the images of an animation differ in size".into());
+        }
+        let side = |n: usize| u16::try_from(n).map_err(|_| "the images are too large for a GIF".to_owned());
+        let (width, height) = (side(first.width)?, side(first.height)?);
+        let mut bytes = Vec::new();
+        let mut encoder = gif::Encoder::new(&mut bytes, width, height, &[]).map_err(|e| e.to_string())?;
+        encoder.set_repeat(gif::Repeat::Infinite).map_err(|e| e.to_string())?;
+        for image in images {
+            // Each frame has a palette of its own, from a tenth of its pixels.
+            let mut frame = gif::Frame::from_rgb_speed(width, height, image.pixels.as_flattened(), 10);
+            frame.delay = centiseconds;
+            encoder.write_frame(&frame).map_err(|e| e.to_string())?;
+        }
+        drop(encoder);
+        Ok(bytes)
+    }
+
     /// Reads the first image of a PNG file with eight bits for red, green and blue, as
     /// [`Image::to_png`] writes it.
     ///
@@ -161,6 +185,23 @@ mod tests {
         }
         assert!(Image::to_apng(&[gradient(1), Image::filled(2, 2, [0; 3])], 10).is_err());
         assert!(Image::to_apng(&[], 10).is_err());
+    }
+
+    #[test]
+    fn a_gif_has_every_frame() {
+        let images = [[0, 0, 250], [250, 0, 0], [0, 250, 0]].map(|c| Image::filled(20, 10, c));
+        let bytes = Image::to_gif(&images, 12).unwrap();
+        let mut options = gif::DecodeOptions::new();
+        options.set_color_output(gif::ColorOutput::RGBA);
+        let mut decoder = options.read_info(&bytes[..]).unwrap();
+        for image in &images {
+            let frame = decoder.read_next_frame().unwrap().unwrap();
+            assert_eq!((frame.width, frame.height, frame.delay), (20, 10, 12));
+            let found = &frame.buffer[..3];
+            assert!(found.iter().zip(image.pixels[0]).all(|(a, b)| a.abs_diff(b) < 8), "{found:?}");
+        }
+        assert!(decoder.read_next_frame().unwrap().is_none());
+        assert!(Image::to_gif(&[], 10).is_err());
     }
 
     #[test]

@@ -12,5 +12,5 @@ mod projection;
 pub use field::{Field, FieldOptions, paint_field};
 pub use image::Image;
 pub(crate) use image::data_url;
-pub use particles::{ParticleOptions, draw_particles};
+pub use particles::{ParticleOptions, draw_coloured, draw_particles};
 pub use projection::View;

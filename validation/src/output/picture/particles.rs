@@ -39,6 +39,12 @@ const EDGE: Rgb = [0x70, 0x70, 0x70];
 /// Draws particles as shaded balls, nearer ones before farther ones, with the edges of the box. The middle of
 /// the foremost ball has exactly the colour of its species; farther ones fade.
 pub fn draw_particles(frame: &Frame, options: &ParticleOptions) -> (Image, Projection) {
+    let colours: Vec<Rgb> = frame.species.iter().map(|s| of_species(*s as usize)).collect();
+    draw_coloured(frame, options, &colours)
+}
+
+/// The same with a colour for each particle.
+pub fn draw_coloured(frame: &Frame, options: &ParticleOptions, colours: &[Rgb]) -> (Image, Projection) {
     let view = if frame.dimensions == 2 { View::Z } else { options.view };
     let radius = options.radius(frame).max(1e-9);
     // Along an axis the picture ends with the box; corners seen obliquely let particles stand out.
@@ -54,14 +60,13 @@ pub fn draw_particles(frame: &Frame, options: &ParticleOptions) -> (Image, Proje
     let pixels = (radius * projection.scale() * fine).max(0.75 * fine);
     let reach = pixels / fine / projection.scale();
     let fades = frame.dimensions == 3 && options.slice.is_none();
-    for (x, species) in frame.x.iter().zip(frame.species) {
+    for (x, colour) in frame.x.iter().zip(colours) {
         let toward = projection.toward(*x);
         if options.slice.is_some_and(|t| (toward - projection.middle()).abs() > 0.5 * t) {
             continue;
         }
         let ([across, down], near) = projection.place(*x);
-        let colour = of_species(*species as usize);
-        let colour = if fades { mix(colour, WHITE, 0.45 * (1.0 - near).clamp(0.0, 1.0)) } else { colour };
+        let colour = if fades { mix(*colour, WHITE, 0.45 * (1.0 - near).clamp(0.0, 1.0)) } else { *colour };
         canvas.ball([across * fine, down * fine], pixels, toward, reach, colour);
     }
     canvas.edges(frame, &projection);

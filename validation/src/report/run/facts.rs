@@ -84,7 +84,7 @@ fn lengths(about: &About) -> String {
     sides.join(" × ")
 }
 
-fn volume(about: &About) -> f64 {
+pub fn volume(about: &About) -> f64 {
     let [a, b, c] = about.box_edges;
     let cross = [b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]];
     (0..3).map(|k| a[k] * cross[k]).sum()

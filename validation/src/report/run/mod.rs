@@ -4,6 +4,7 @@
 //! no dump. The page then says what is not there.
 
 mod facts;
+mod headline;
 mod observables;
 mod series;
 mod state;
@@ -14,6 +15,7 @@ use crate::output::{About, OutputError};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
+pub use headline::{Headline, HeadlineValue, headline};
 pub use observables::{Observable, ObservableAxis, ObservableColumn};
 pub use series::Table as SeriesTable;
 
@@ -75,12 +77,22 @@ pub fn run_report(folder: &Path) -> Result<Report, RunReportError> {
         .map(|a| a.title.clone())
         .or_else(|| Some(summary.as_ref()?.get("title")?.as_str()?.to_owned()))
         .unwrap_or_else(|| folder.file_name().map_or("run".into(), |n| n.to_string_lossy().into_owned()));
+    let particles = summary.as_ref().and_then(|s| s.get("particles")?.as_f64());
+    let found = headline::gather(
+        about.as_ref(),
+        particles.or_else(|| Some(state.as_ref()?.configuration.x.len() as f64)),
+        table.as_ref(),
+        observables.as_deref().unwrap_or_default(),
+    );
     let mut sections = vec![
         state::section(folder, state.as_ref(), about.as_ref()),
         series::section(table.as_ref(), about.as_ref(), state.as_ref().map(|s| s.configuration.x.len())),
         observables::section(observables.as_deref()),
         files_section(folder),
     ];
+    if let Some(section) = found.section() {
+        sections.insert(0, section);
+    }
     if !notes.is_empty() {
         let text = notes.join("\n\n");
         let items = vec![Item::Prose(text)];

@@ -143,6 +143,12 @@ fn scalar_table(all: &[Observable]) -> Table {
 }
 
 impl Observable {
+    /// Value and error of a column of an observable that is a number.
+    pub fn scalar(&self, column: &str) -> Option<(f64, Option<f64>)> {
+        let found = self.columns.iter().find(|c| self.is_scalar() && c.name == column)?;
+        Some(((*found.values.first()?)?, found.errors.first().copied().flatten()))
+    }
+
     fn is_scalar(&self) -> bool {
         self.x.is_none() && self.kind != "field"
     }

@@ -74,6 +74,12 @@ pub fn section(table: Option<&Table>, about: Option<&About>, particles: Option<u
     Section { heading, items }
 }
 
+/// The rows of the last stage that has any.
+pub fn last_stage(table: &Table, about: Option<&About>) -> std::ops::Range<usize> {
+    let stages = Curves::of(table, about).stages;
+    stages[stages.len() - 1].1.clone()
+}
+
 /// The table with what is known of its rows.
 struct Curves<'a> {
     table: &'a Table,

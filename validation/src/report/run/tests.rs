@@ -30,6 +30,7 @@ pub fn about() -> About {
         stages: vec![stage("equilibrate", 0, 50), stage("produce", 50, 150)],
         units: "reduced".into(),
         thermo: vec![Column { name: "extra".into(), title: "Something else".into(), unit: "energy".into() }],
+        expected: Vec::new(),
     }
 }
 
@@ -49,10 +50,10 @@ const OBSERVABLES: &str = r#"[
     {"name": "g", "title": "Radial distribution", "stage": "produce", "kind": "curve",
      "x": {"name": "r", "unit": "length", "values": []}, "columns": [], "samples": 0, "note": null},
     {"name": "map", "title": "Density map", "stage": "produce", "kind": "field", "x": null, "columns": [
-     {"name": "x", "unit": "r_c", "values": [0, 0, 0, 1, 1, 1]}, {"name": "z", "unit": "r_c", "values": [0, 1, 2, 0, 1, 2]},
+     {"name": "x", "unit": "length", "values": [0, 0, 0, 1, 1, 1]}, {"name": "z", "unit": "length", "values": [0, 1, 2, 0, 1, 2]},
      {"name": "rho", "unit": "1", "values": [1, 2, 3, 4, 5, null], "errors": []}], "samples": 3, "note": ""},
     {"name": "surface", "title": "Points of a surface", "kind": "field", "x": null, "columns": [
-     {"name": "r", "unit": "r_c", "values": [0, 0.5, 2]}, {"name": "z", "unit": "r_c", "values": [4, 5, 7], "errors": [0.5, 0.5, 0.5]}]},
+     {"name": "r", "unit": "length", "values": [0, 0.5, 2]}, {"name": "z", "unit": "length", "values": [4, 5, 7], "errors": [0.5, 0.5, 0.5]}]},
     {"name": "flat", "title": "Bad map", "kind": "field", "columns": [{"name": "x", "values": [0, 1]}]}
 ]"#;
 

@@ -203,8 +203,17 @@ fn a_finished_run_is_left_as_it_is() {
     // Even where its largest file was taken away.
     std::fs::remove_file(out.join("dump.lammpstrj")).unwrap();
     assert_eq!(finished(&scene, out, Begin::Resume), summary);
-    // It may be made anew.
-    finished(&scene, out, Begin::New);
+    // It is made anew only when told to; by another scene too.
+    let left = contents(out);
+    let [first, second, ..] = scenes();
+    for (other, expected) in [(&first, false), (&second, true)] {
+        match Runner::begin(other, out, Begin::New).map(|_| ()) {
+            Err(RunError::Finished { other, .. }) => assert_eq!(other, expected),
+            found => panic!("{found:?}"),
+        }
+        assert!(contents(out) == left);
+    }
+    finished(&scene, out, Begin::Overwrite);
     assert!(contents(out) == before);
 }
 
@@ -294,7 +303,7 @@ fn files_that_became_shorter_are_noticed() {
     drop(runner);
     finished(&scene, &out, Begin::Resume);
     assert_same(&whole, &out, "the dump was cut");
-    interrupted(&scene, &out, Begin::New, 9);
+    interrupted(&scene, &out, Begin::Overwrite, 9);
     cut(length - 10);
     let before = contents(&out);
     let error = Runner::begin(&scene, &out, Begin::Resume).map(|_| ()).unwrap_err();

@@ -1,0 +1,34 @@
+use super::Failure;
+use crate::scene::{Edit, Scene, edit_model};
+use psidpd_core::document::{Document, FileError};
+use psidpd_core::model::Model;
+use std::path::Path;
+
+/// `--set`, which verbs share that take a scene or a model.
+#[derive(Debug, Clone, Default, clap::Args)]
+pub struct Settings {
+    /// Another value for a key of the scene or of its model: kT=0.9, density=3, stage.produce.dt=0.02,
+    /// model.parameters.A=-50; can be given several times.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub edits: Vec<Edit>,
+}
+
+impl Settings {
+    /// The scene in a file, with these values.
+    pub fn scene(&self, path: &Path) -> Result<Scene, Failure> {
+        Ok(Scene::open_with(path, &self.edits)?)
+    }
+
+    /// The model in a file, with these values, and kT if that is one of them.
+    pub fn model(&self, path: &Path) -> Result<(Model, Option<f64>), FileError> {
+        if self.edits.is_empty() {
+            return Ok((Model::open(path)?, None));
+        }
+        let (of_host, of_model): (Vec<_>, Vec<_>) = self.edits.iter().partition(|e| e.key() == "kT");
+        let of_model: Vec<Edit> = of_model.into_iter().cloned().collect();
+        let document = Document::open(path)?;
+        let text = edit_model(document.source().text(), &of_model)?;
+        let model = Model::parse(&path.display().to_string(), &text)?;
+        Ok((model, of_host.last().and_then(|e| e.number())))
+    }
+}

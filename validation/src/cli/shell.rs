@@ -1,0 +1,39 @@
+//! What a shell and `man` want to know of the program.
+
+use super::{Failure, Verdict, write_json};
+use clap_complete::Shell;
+use serde_json::json;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Print a script that completes verbs and options in a shell.
+#[derive(Debug, clap::Args)]
+pub struct Completions {
+    /// The shell.
+    #[arg(value_enum)]
+    shell: Shell,
+}
+
+/// Write manual pages: psidpd.1, and one for each verb.
+#[derive(Debug, clap::Args)]
+pub struct Man {
+    /// Folder for the pages; it is made if need be.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+pub fn completions(a: &Completions) -> Result<Verdict, Failure> {
+    let mut script = Vec::new();
+    clap_complete::generate(a.shell, &mut super::command(), "psidpd", &mut script);
+    // A closed pipe is no error.
+    let _ = std::io::stdout().write_all(&script);
+    Ok(Verdict::Good)
+}
+
+pub fn man(a: &Man, json: Option<&Path>) -> Result<Verdict, Failure> {
+    std::fs::create_dir_all(&a.out)?;
+    clap_mangen::generate_to(super::command(), &a.out)?;
+    println!("{}", a.out.join("psidpd.1").display());
+    write_json(json, &json!({"folder": a.out}))?;
+    Ok(Verdict::Good)
+}

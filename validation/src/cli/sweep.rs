@@ -1,0 +1,81 @@
+use super::run::{quoted, thread_count, watch_signals};
+use super::{Failure, Settings, Verdict, write_json};
+use crate::sweep::{self, Axis, Options};
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+
+/// Run a scene at many values of its keys, several runs at a time.
+///
+/// Each run has a folder of its own below DIR. A sweep that was interrupted goes on when it is started again; runs that are
+/// finished are taken as they are. sweep.csv has the results with errors, report.html plots of them.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// The scene file.
+    scene: PathBuf,
+    /// A key and its values, evenly spaced or a list; of several keys every combination is run.
+    #[arg(long, value_name = "KEY=LOW:HIGH:N", required = true)]
+    over: Vec<Axis>,
+    /// Folder for the runs, sweep.csv and report.html.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Runs side by side [default: processors / threads].
+    #[arg(long, value_name = "N")]
+    jobs: Option<NonZeroUsize>,
+    /// Threads of each run.
+    #[arg(long, value_name = "N", default_value = "1", value_parser = thread_count)]
+    threads: NonZeroUsize,
+    /// Start over where runs are, finished or not.
+    #[arg(long)]
+    overwrite: bool,
+    #[command(flatten)]
+    settings: Settings,
+}
+
+pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
+    let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+    let jobs = a.jobs.or(NonZeroUsize::new(cores / a.threads.get())).unwrap_or(NonZeroUsize::MIN);
+    let options = Options {
+        scene: a.scene.clone(),
+        edits: a.settings.edits.clone(),
+        axes: a.over.clone(),
+        out: a.out.clone(),
+        jobs,
+        threads: a.threads,
+        overwrite: a.overwrite,
+    };
+    let total: usize = a.over.iter().map(|axis| axis.edits.len()).product();
+    let stop = watch_signals()?;
+    let points = sweep::run(&options, &stop, &|point, ended| {
+        let edits: Vec<String> = point.edits.iter().map(ToString::to_string).collect();
+        let what = point.error.as_ref().map_or(String::new(), |e| format!(": {e}"));
+        println!("{ended} of {total}: {}{what}", edits.join(", "));
+    })?;
+    let title = a.scene.file_stem().map_or("sweep".into(), |n| n.to_string_lossy());
+    sweep::write(&options, &title, &points)?;
+    println!("\n{}", sweep::table(&a.over, &points).to_text());
+    println!("written to {}", a.out.join("sweep.csv").display());
+    println!("report: {}", a.out.join("report.html").display());
+    write_json(json, &points)?;
+    let signal = stop.load(Ordering::Relaxed);
+    if signal != 0 {
+        let finished = points.iter().filter(|p| p.finished).count();
+        println!("stopped with {finished} of {total} runs finished; to go on: {}", a.to_go_on(json));
+        return Ok(Verdict::Interrupted(u8::try_from(signal).unwrap_or(0)));
+    }
+    Ok(if points.iter().all(|p| p.finished) { Verdict::Good } else { Verdict::CheckFailed })
+}
+
+impl Arguments {
+    /// The command that goes on with the sweep.
+    fn to_go_on(&self, json: Option<&Path>) -> String {
+        let path = |path: &Path| quoted(&path.display().to_string());
+        let mut words = vec![format!("psidpd sweep {} --out {}", path(&self.scene), path(&self.out))];
+        words.extend(self.over.iter().map(|axis| format!("--over {}", quoted(&axis.text))));
+        words.extend(self.settings.edits.iter().map(|e| format!("--set {}", quoted(&e.to_string()))));
+        words.extend(self.jobs.map(|n| format!("--jobs {n}")));
+        words.extend((self.threads.get() > 1).then(|| format!("--threads {}", self.threads)));
+        words.extend(json.map(|file| format!("--json {}", path(file))));
+        words.join(" ")
+    }
+}
