@@ -223,9 +223,8 @@ fn refuse_strangers(root: &Section, tables: &[Table], more: &[&str]) -> Result<(
     for table in tables {
         let first = |path: &'static str| path.split('.').next().unwrap_or_default();
         for section in sections(root, table.path) {
-            let form = section.get(table.forms.0).and_then(|v| v.as_str());
-            let form = form.filter(|name| table.forms.1.contains(name));
-            let mut known: Vec<&str> = table.keys_of(form).map(|k| k.name).collect();
+            // A key of another form is not misspelt.
+            let mut known: Vec<&str> = table.keys.iter().map(|k| k.name).collect();
             if table.path.is_empty() {
                 known.extend(tables.iter().map(|t| first(t.path)).filter(|name| !name.is_empty()));
                 known.extend(more);

@@ -121,7 +121,7 @@ fn every_observable_and_every_series_is_shown_with_its_error() {
         "Radial distribution",
         "Density map",
         "Points of a surface",
-        "z [r_c]",
+        "z [length]",
         "Bad map: ",
         "Local density",
         "Local density of water",
