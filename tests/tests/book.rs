@@ -19,19 +19,17 @@ fn pages() -> BTreeSet<String> {
     names.filter(|n| n.ends_with(".md")).map(|n| format!("docs/{n}")).collect()
 }
 
-/// Lines of a page that are text: without fenced blocks, and without what is in backquotes.
+/// Paragraphs of a page: without fenced blocks, and without what is in backquotes, which may go over a line break.
 fn prose(page: &str) -> Vec<String> {
     let text = std::fs::read_to_string(root().join(page)).unwrap();
     let mut fenced = false;
-    let mut lines = Vec::new();
-    for line in text.lines() {
-        if line.starts_with("```") {
-            fenced = !fenced;
-        } else if !fenced {
-            lines.push(line.split('`').step_by(2).collect());
-        }
-    }
-    lines
+    let outside = |line: &&str| {
+        let fence = line.trim_start().starts_with("```");
+        fenced ^= fence;
+        !fence && !fenced
+    };
+    let lines: Vec<&str> = text.lines().filter(outside).collect();
+    lines.join("\n").split("\n\n").map(|paragraph| paragraph.split('`').step_by(2).collect()).collect()
 }
 
 /// Targets of links and pictures, without those of the web.
