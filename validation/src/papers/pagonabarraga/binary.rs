@@ -87,7 +87,7 @@ pub fn fig11(context: &Context) -> Result<Outcome, PaperError> {
     let (_, observed) = mixture(context)?;
     let layers = layers(&observed);
     let theory = mean_field(BINARY, KT)?;
-    let binodal = theory.composition_binodal_at_pressure(theory.pressure(&[0.5 * RHO; 2]))?;
+    let binodal = theory.composition_binodal(RHO)?;
     // "Goes basically to zero"; mean field has 2 %. One in a hundred can be read in the figure.
     outcome.equal("fraction of A where B is", layers.phases[1], binodal.composition[0], 0.01);
     outcome.equal("fraction of A where A is", layers.phases[0], binodal.composition[1], 0.01);

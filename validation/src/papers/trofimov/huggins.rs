@@ -72,10 +72,10 @@ fn phases(observed: &Observed) -> [Measured; 2] {
     }
 }
 
-/// Compositions of coexisting phases in mean field, at the pressure of the equimolar mixture.
+/// Compositions of coexisting phases in mean field at the density of the mixture, as the paper has its critical point.
 fn binodal(strength: f64) -> Result<[f64; 2], PaperError> {
     let theory = mean_field(&with_parameters(DEMIXING, &[("e_AA", strength)])?, 1.0)?;
-    Ok(theory.composition_binodal_at_pressure(theory.pressure(&[8.0, 8.0]))?.composition)
+    Ok(theory.composition_binodal(16.0)?.composition)
 }
 
 pub fn fig9(context: &Context) -> Result<Outcome, PaperError> {
