@@ -29,7 +29,7 @@ struct List {
 
 /// All that ship.
 fn all() -> Vec<Substance> {
-    let list: Result<List, _> = toml::from_str(include_str!("../../models/substances/pc-saft.toml"));
+    let list: Result<List, _> = toml::from_str(include_str!("../../substances/pc-saft.toml"));
     // The file is part of the program, and tested.
     list.map(|list| list.substance).unwrap_or_default()
 }
