@@ -47,7 +47,11 @@ pub fn coefficients(input: &[u8]) {
             Style::from_text("fuzz.toml", &text, "lj", kt, &names, dimensions)
         }
     };
-    let Ok(mut style) = style else { return };
+    let mut style = match style {
+        Ok(style) => style,
+        // Where panics are caught.
+        Err(error) => return assert!(!error.to_string().contains("internal error"), "{error}"),
+    };
     assert!(!style.description("a fuzzer", false, true).is_empty());
     assert!(style.engine().plan().cutoff() >= 0.0);
     if form < 3 {

@@ -62,15 +62,18 @@ struct Members<T> {
 }
 
 impl<T: Copy> Members<T> {
-    fn new(pairs: &[Option<T>], types: usize) -> Members<T> {
-        let given = |a: usize, b: usize| pairs.get(a.min(b) * types + a.max(b)).is_some_and(Option::is_some);
+    fn new(pairs: &[Option<T>], types: usize) -> Result<Members<T>, StyleError> {
+        if types.checked_mul(types) != Some(pairs.len()) {
+            return Err(StyleError(PresetError::Shape.to_string()));
+        }
+        let given = |a: usize, b: usize| pairs[a.min(b) * types + a.max(b)].is_some();
         let members: Vec<usize> = (0..types).filter(|a| (0..types).any(|b| given(*a, b))).collect();
         let row = |a: &usize| a * types;
-        Members {
+        Ok(Members {
             species: members.iter().copied().map(name_of_type).collect(),
             pairs: members.iter().flat_map(|a| members.iter().map(|b| pairs[row(a) + b])).collect(),
             types: members,
-        }
+        })
     }
 
     /// Types where a preset counts species.
@@ -154,7 +157,7 @@ impl Style {
         masses: Option<&[f64]>,
     ) -> Result<Style, StyleError> {
         guard(|| {
-            let members = Members::new(pairs, types);
+            let members = Members::new(pairs, types)?;
             let Members { species, pairs, .. } = &members;
             let (model, letters) = match masses {
                 None => (
@@ -189,7 +192,7 @@ impl Style {
         dimensions: usize,
     ) -> Result<Style, StyleError> {
         guard(|| {
-            let members = Members::new(pairs, types);
+            let members = Members::new(pairs, types)?;
             let model = spline_dpd(&members.species, &members.pairs, thermostat_range, dimensions)
                 .map_err(|e| members.error(e))?;
             let letters =
@@ -653,6 +656,10 @@ mod tests {
             let error = Style::from_coefficients(1.0, &table, 3, 3, masses).unwrap_err();
             assert!(error.to_string().contains("types 2 and 3"), "{error}");
             assert!(Style::from_coefficients(1.0, &[None], 1, 3, masses).is_err());
+            for other in [&table[..8], &[]] {
+                let error = Style::from_coefficients(1.0, other, 3, 3, masses).unwrap_err().to_string();
+                assert!(error.contains("expected coefficients for every pair"), "{error}");
+            }
         }
         let short = Style::from_coefficients(1.0, &table, 3, 3, Some(&[1.0])).unwrap_err();
         assert!(short.to_string().contains("as many masses"), "{short}");

@@ -53,7 +53,7 @@ fn deck() -> String {
 /// Plane Couette flow along x, by edges that move (Lees and Edwards 1972).
 fn flow() -> String {
     format!(
-        "{}fix flow all deform 1 xy erate {RATE} remap v\nrun 2500\nvariable eta equal -pxy/{RATE}\n\
+        "{}fix flow all deform 1 xy erate {RATE} remap v\nrun 3500\nvariable eta equal -pxy/{RATE}\n\
          fix eta all ave/time 1 {STEPS} {STEPS} v_eta file eta.txt\nrun {}\n",
         liquid(),
         BLOCKS * STEPS
