@@ -100,7 +100,7 @@ pub fn edit_scene(
 /// The text of a model with edits made. A name alone may be a parameter.
 ///
 /// # Errors
-/// As [`edit_scene`].
+/// As `edit_scene`.
 pub fn edit_model(text: &str, edits: &[Edit]) -> Result<String, FileError> {
     let mut document = parse(text);
     for edit in edits {
