@@ -12,7 +12,7 @@ pub struct Published {
     pub kt: f64,
     /// The number density that `pressure` belongs to.
     pub density: Option<f64>,
-    /// Of [`QUANTITIES`]: name, value, error.
+    /// Of `QUANTITIES`: name, value, error.
     pub values: Vec<(&'static str, [f64; 2])>,
 }
 
