@@ -4,6 +4,7 @@ use crate::observe::{Measured, Observation};
 use crate::report::Progress;
 use crate::run::{Begin, Outcome, RunError, Runner};
 use crate::scene::Scene;
+use psidpd_core::engine::Fault;
 use psidpd_core::model::Model;
 use std::fmt::Write;
 use std::num::NonZeroUsize;
@@ -99,8 +100,20 @@ impl Bulk<'_> {
 /// # Errors
 /// The run stops, or its files cannot be written or read.
 pub fn run(scene: &Scene, folder: &Path, begin: Begin, threads: NonZeroUsize) -> Result<Observed, RunError> {
+    run_with(scene, folder, begin, threads, None)
+}
+
+/// The same by an engine that is wrong on purpose, if there is a `fault`.
+pub(crate) fn run_with(
+    scene: &Scene,
+    folder: &Path,
+    begin: Begin,
+    threads: NonZeroUsize,
+    fault: Option<Fault>,
+) -> Result<Observed, RunError> {
     let mut runner = Runner::begin(scene, folder, begin)?;
     runner.set_threads(threads)?;
+    fault.map_or(Ok(()), |fault| runner.falsify(fault))?;
     let steps: u64 = scene.stages.iter().map(|s| s.steps).sum();
     let bar = Progress::new().steps(&scene.title, steps, 0, runner.particles());
     let never = AtomicUsize::new(0);

@@ -57,6 +57,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
             folder: folder.clone(),
             threads: arguments.threads,
             made: std::rc::Rc::clone(&made),
+            fault: None,
         };
         let begun = std::time::Instant::now();
         let result = match case.run(&context) {

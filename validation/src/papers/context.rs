@@ -2,6 +2,7 @@ use crate::bulk::{self, Bulk, Observed, Sampling};
 use crate::run::{Begin, RunError};
 use crate::scene::Scene;
 use psidpd_core::document::FileError;
+use psidpd_core::engine::Fault;
 use psidpd_core::model::Model;
 use psidpd_core::theory::{MeanField, TheoryError};
 use std::cell::RefCell;
@@ -47,6 +48,8 @@ pub struct Context {
     pub threads: NonZeroUsize,
     /// Folders of runs that were made in this call, which figures of the same runs share.
     pub made: Rc<RefCell<HashSet<PathBuf>>>,
+    /// What is wrong with the forces of its runs: for tests that values tell of it.
+    pub fault: Option<Fault>,
 }
 
 /// A change of a scene: the path of a key, through tables and by the number of an array's entry, and its value.
@@ -105,7 +108,7 @@ impl Context {
         };
         let bulk = Bulk { model: &model, kt: fluid.kt, densities, observe: fluid.observe, sampling };
         let folder = self.folder.join(name);
-        Ok(bulk::run(&bulk.scene(&path)?, &folder, self.begin(&folder), self.threads)?)
+        Ok(bulk::run_with(&bulk.scene(&path)?, &folder, self.begin(&folder), self.threads, self.fault)?)
     }
 
     /// Runs a scene, the text of which does not name its model.
@@ -115,7 +118,7 @@ impl Context {
         let scene =
             Scene::parse(&format!("{name}.scene.toml"), &text, path.parent().unwrap_or(Path::new("")))?;
         let folder = self.folder.join(name);
-        Ok(bulk::run(&scene, &folder, self.begin(&folder), self.threads)?)
+        Ok(bulk::run_with(&scene, &folder, self.begin(&folder), self.threads, self.fault)?)
     }
 
     /// Runs a scene of `scenes/full`, as it is at full size and with `changes` at quick size.

@@ -52,6 +52,38 @@ pub fn cases() -> Vec<&'static Case> {
 
 #[cfg(test)]
 mod tests {
+    use super::{Context, Size};
+    use psidpd_core::engine::Fault;
+    use std::num::NonZeroUsize;
+
+    /// The values that disagree in a case at its small size, with forces of which a term is 5 % too strong.
+    fn failing(id: &str, fault: Option<Fault>) -> Vec<String> {
+        let folder = tempfile::tempdir().unwrap();
+        let case = super::cases().into_iter().find(|case| case.id == id).unwrap();
+        let context = Context {
+            size: Size::Quick,
+            folder: folder.path().join(id),
+            threads: NonZeroUsize::MIN,
+            made: Default::default(),
+            fault,
+        };
+        let outcome = case.run(&context).unwrap();
+        outcome.values.iter().filter(|value| !value.passes()).map(|value| value.name.clone()).collect()
+    }
+
+    /// A tolerance that passes these would be too wide.
+    #[test]
+    fn cases_tell_of_faults() {
+        for (id, fault) in
+            [("pagonabarraga-fig3", Fault::ManyBodyForce), ("berendsen-water", Fault::PairForce)]
+        {
+            assert_eq!(failing(id, None), Vec::<String>::new(), "{id}");
+            assert_ne!(failing(id, Some(fault)), Vec::<String>::new(), "{id}: {fault:?}");
+        }
+        // The rest of this case does not depend on the noise: nothing else is wrong.
+        assert_eq!(failing("pagonabarraga-fig7", Some(Fault::Noise)), ["kinetic temperature"]);
+    }
+
     #[test]
     fn ids_are_unique_and_begin_with_their_paper() {
         let mut ids: Vec<&str> = super::cases().iter().map(|case| case.id).collect();

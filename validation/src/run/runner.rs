@@ -13,7 +13,7 @@ use crate::observe::Observers;
 use crate::output::About;
 use crate::particles::State;
 use crate::scene::Scene;
-use psidpd_core::engine::Settings;
+use psidpd_core::engine::{Fault, Settings};
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
 use std::path::Path;
@@ -209,6 +209,15 @@ impl<'a> Runner<'a> {
     pub fn set_threads(&mut self, threads: NonZeroUsize) -> Result<(), RunError> {
         let settings = self.run.simulation.settings();
         self.run.simulation.set_settings(Settings { threads, ..settings })
+    }
+
+    /// Makes forces wrong, as [`Simulation::falsify`]: call it last, for a run at one temperature.
+    ///
+    /// # Errors
+    /// As there.
+    #[doc(hidden)]
+    pub fn falsify(&mut self, fault: Fault) -> Result<(), RunError> {
+        self.run.simulation.falsify(fault)
     }
 
     /// How forces are computed, for people: see [`Simulation::evaluation`].
