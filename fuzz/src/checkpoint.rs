@@ -8,8 +8,11 @@ use std::path::Path;
 const MODEL: &str = "title = \"m\"\nspecies = [\"A\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n\
                      [excess_free_energy]\nA = \"n^2\"\n[[thermostat]]\ngamma = 4.5\nrange = 1\n";
 
+/// Bytes before what is written by postcard.
+const HEADER: usize = 24;
+
 /// The scene whose runs left the corpus, of `steps` steps: few particles and coarse observables, so that checkpoints are short.
-pub fn scene_of_checkpoints(steps: u64) -> String {
+fn scene_of_checkpoints(steps: u64) -> String {
     format!(
         r#"title = "c"
 model = "model.toml"
@@ -58,8 +61,6 @@ pub fn checkpoint_of_a_run(steps: u64) -> Vec<u8> {
     let file = std::fs::read(out.join("checkpoint")).expect("a checkpoint");
     file[HEADER..].to_vec()
 }
-
-const HEADER: usize = 24;
 
 /// Any bytes are a checkpoint or an error: as a file, and as what is in one whose header is right. What was read can be
 /// used, or is an error. Whether the second was read to its last part.

@@ -25,6 +25,14 @@ std::vector<uint64_t> present(const Atom *atom, MPI_Comm world, size_t words)
   return set;
 }
 
+// How many atoms LAMMPS counts that no rank has.
+bigint lost(const Atom *atom, MPI_Comm world)
+{
+  bigint here = atom->nlocal;
+  MPI_Allreduce(MPI_IN_PLACE, &here, 1, MPI_LMP_BIGINT, MPI_SUM, world);
+  return atom->natoms - here;
+}
+
 }    // namespace
 
 void LostAtoms::begin(const Atom *atom, MPI_Comm world)
@@ -34,14 +42,15 @@ void LostAtoms::begin(const Atom *atom, MPI_Comm world)
   MPI_Allreduce(MPI_IN_PLACE, &last, 1, MPI_LMP_BIGINT, MPI_MAX, world);
   const bigint words = last / 64 + 1;
   known = present(atom, world, words <= most_words * (atom->natoms + 1) ? static_cast<size_t>(words) : 0);
+  before = lost(atom, world);
   told = false;
 }
 
 std::string LostAtoms::missing(const Atom *atom, MPI_Comm world)
 {
-  bigint here = atom->nlocal;
-  MPI_Allreduce(MPI_IN_PLACE, &here, 1, MPI_LMP_BIGINT, MPI_SUM, world);
-  if (told || here >= atom->natoms) return {};
+  if (told) return {};
+  const bigint more = lost(atom, world) - before;
+  if (more <= 0) return {};
   told = true;
   const auto now = present(atom, world, known.size());
   std::string names;
@@ -51,7 +60,7 @@ std::string LostAtoms::missing(const Atom *atom, MPI_Comm world)
     if (!(known[tag / 64] & ~now[tag / 64] & bit) || ++count > most_named) continue;
     names += (names.empty() ? "" : ", ") + std::to_string(tag);
   }
-  std::string text = std::to_string(atom->natoms - here) + " of " + std::to_string(atom->natoms) + " atoms are lost";
+  std::string text = std::to_string(more) + " of " + std::to_string(atom->natoms) + " atoms are lost";
   if (count > 0) text += ", with the IDs " + names + (count > most_named ? " and others" : "");
   return text;
 }

@@ -3,6 +3,8 @@
 #ifndef PSIDPD_LOST_ATOMS_H
 #define PSIDPD_LOST_ATOMS_H
 
+#include "lmptype.h"
+
 #include <cstdint>
 #include <mpi.h>
 #include <string>
@@ -18,12 +20,14 @@ class LostAtoms {
  public:
   // Remembers the IDs of the atoms of all ranks.
   void begin(const LAMMPS_NS::Atom *atom, MPI_Comm world);
-  // The first time that there are fewer atoms than there should be: how many are lost, and which of those remembered.
+  // The first time that atoms are lost since then: how many, and which of those remembered.
   std::string missing(const LAMMPS_NS::Atom *atom, MPI_Comm world);
 
  private:
   // A bit for each ID; empty if IDs are too far apart.
   std::vector<uint64_t> known;
+  // How many LAMMPS still counts that were lost before.
+  LAMMPS_NS::bigint before = 0;
   bool told = false;
 };
 
