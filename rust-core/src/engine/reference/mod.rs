@@ -43,7 +43,7 @@ use crate::model::Fluid;
 use crate::model::expression::TooLarge;
 use densities::sum_densities;
 use forces::{ForceInput, ForceOutput, add_forces};
-use in_box::BoxSearch;
+use in_box::{BoxSearch, check_width};
 use listed::add_listed;
 use pairs::Pairs;
 use psidpd_passes::domain::PeriodicBox;
@@ -195,6 +195,7 @@ impl Reference {
                 if owned < x.len() {
                     return Err(EngineError::Host("where all particles are in hand there are no ghosts"));
                 }
+                check_width(owned, domain, dimensions, cutoff)?;
                 pairs.clear(owned, Newton::On);
                 box_search.find(x, owned, takes_part, domain, dimensions, cutoff, |i, j, d| {
                     pairs.push_in_box(i, j, d, species);
@@ -206,6 +207,7 @@ impl Reference {
                         "not as many ghosts as it was said of whether they are images",
                     ));
                 }
+                check_width(x.len(), domain, dimensions, cutoff)?;
                 pairs.clear(owned, newton);
                 let is_image = |k: usize| k >= owned && images.get(k - owned).is_some_and(|image| *image);
                 let takes_part = |k| takes_part(k) && !is_image(k);
