@@ -184,12 +184,10 @@ impl<R: Reals, const TALLY: bool> ShapeVisitor for SelectInRange<'_, R, TALLY> {
                 let mask = pairs.r.mask_below(range);
                 let g = factor * S::slope(pairs.r * inverse_range) * pairs.inverse;
                 let [dx, dy, dz] = pairs.d;
-                let (x, y, z) = ((g * dx).compress(mask), (g * dy).compress(mask), (g * dz).compress(mask));
-                R::store_transposed([x, y, z, code.compress(mask)], self.weight_gradients.add(found).cast());
+                R::store_rows([g * dx, g * dy, g * dz, code], mask, self.weight_gradients.add(found).cast());
                 if TALLY {
-                    let weight = R::load(self.pair_weight.add(v * R::LANES)).compress(mask);
-                    let (x, y, z) = (dx.compress(mask), dy.compress(mask), dz.compress(mask));
-                    R::store_transposed([x, y, z, weight], self.separations.add(found).cast());
+                    let weight = R::load(self.pair_weight.add(v * R::LANES));
+                    R::store_rows([dx, dy, dz, weight], mask, self.separations.add(found).cast());
                 }
                 found += mask.count_ones() as usize;
                 v += 1;

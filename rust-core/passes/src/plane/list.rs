@@ -197,13 +197,8 @@ impl<I: Isa, const MULTISPECIES: bool> BatchVisitor<I> for Lister<'_, I, MULTISP
                 }
                 let [dx, dy, dz] = geometry.d;
                 let j = W::<I>::load(j).sub(plane_first).shift_right::<OFFSET_BITS>();
-                let row = [
-                    (factor * dx).compress(mask),
-                    (factor * dy).compress(mask),
-                    (factor * dz).compress(mask),
-                    I::of_bits(j).compress(mask),
-                ];
-                I::F32::store_transposed(row, to_pairs.add(found).cast());
+                let columns = [factor * dx, factor * dy, factor * dz, I::of_bits(j)];
+                I::F32::store_rows(columns, mask, to_pairs.add(found).cast());
                 I::of_bits(i).compress(mask).store(to_i.add(found).cast());
                 if self.inputs.with_stretch {
                     factor.compress(mask).store(to_stretch.add(found));

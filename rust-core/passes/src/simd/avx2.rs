@@ -136,9 +136,9 @@ impl Reals for F32x8 {
         unsafe { F32x8(_mm256_i32gather_ps::<4>(table, index.0)) }
     }
     #[inline(always)]
-    unsafe fn store_transposed(load_transposed: [Self; 4], p: *mut f32) {
+    unsafe fn store_transposed(columns: [Self; 4], p: *mut f32) {
         unsafe {
-            let [a, b, c, d] = load_transposed;
+            let [a, b, c, d] = columns;
             let ab_low = _mm256_castps_pd(_mm256_unpacklo_ps(a.0, b.0));
             let ab_high = _mm256_castps_pd(_mm256_unpackhi_ps(a.0, b.0));
             let cd_low = _mm256_castps_pd(_mm256_unpacklo_ps(c.0, d.0));

@@ -102,9 +102,9 @@ impl Reals for F32x16 {
         unsafe { F32x16(_mm512_i32gather_ps::<4>(index.0, table.cast())) }
     }
     #[inline(always)]
-    unsafe fn store_transposed(load_transposed: [Self; 4], p: *mut f32) {
+    unsafe fn store_transposed(columns: [Self; 4], p: *mut f32) {
         unsafe {
-            let [a, b, c, d] = load_transposed;
+            let [a, b, c, d] = columns;
             let ab_low = _mm512_castps_pd(_mm512_unpacklo_ps(a.0, b.0));
             let ab_high = _mm512_castps_pd(_mm512_unpackhi_ps(a.0, b.0));
             let cd_low = _mm512_castps_pd(_mm512_unpacklo_ps(c.0, d.0));
@@ -232,9 +232,9 @@ impl Reals for F64x8 {
         unsafe { F64x8(_mm512_i32gather_pd::<8>(index.0, table.cast())) }
     }
     #[inline(always)]
-    unsafe fn store_transposed(load_transposed: [Self; 4], p: *mut f64) {
+    unsafe fn store_transposed(columns: [Self; 4], p: *mut f64) {
         unsafe {
-            let [a, b, c, d] = load_transposed;
+            let [a, b, c, d] = columns;
             let ab_low = _mm512_unpacklo_pd(a.0, b.0);
             let ab_high = _mm512_unpackhi_pd(a.0, b.0);
             let cd_low = _mm512_unpacklo_pd(c.0, d.0);

@@ -112,7 +112,12 @@ pub trait Reals: Real {
     /// `table[index[k]]` in lane `k`.
     unsafe fn lookup(table: *const Self::Scalar, index: Self::Words) -> Self;
     /// Writes four columns as rows of four.
-    unsafe fn store_transposed(load_transposed: [Self; 4], p: *mut Self::Scalar);
+    unsafe fn store_transposed(columns: [Self; 4], p: *mut Self::Scalar);
+    /// Writes the rows whose bits are set in `mask`, one after the other; may write anything up to where all would end.
+    #[inline(always)]
+    unsafe fn store_rows(columns: [Self; 4], mask: u32, p: *mut Self::Scalar) {
+        unsafe { Self::store_transposed(columns.map(|column| column.compress(mask)), p) }
+    }
 }
 
 /// A vector of unsigned words.

@@ -164,11 +164,18 @@ macro_rules! lanes {
                 Lanes(out)
             }
             #[inline(always)]
-            unsafe fn store_transposed(load_transposed: [Self; 4], p: *mut $scalar) {
+            unsafe fn store_transposed(columns: [Self; 4], p: *mut $scalar) {
+                unsafe { Self::store_rows(columns, !0, p) }
+            }
+            #[inline(always)]
+            unsafe fn store_rows(columns: [Self; 4], mask: u32, p: *mut $scalar) {
+                let mut place = 0;
                 for k in 0..LANES {
-                    for c in 0..4 {
-                        unsafe { *p.add(4 * k + c) = load_transposed[c].0[k] };
-                    }
+                    // A row at once: as vectors they need not go through memory number by number.
+                    unsafe {
+                        p.add(4 * place).cast::<[$scalar; 4]>().write(columns.map(|column| column.0[k]))
+                    };
+                    place += (mask >> k & 1) as usize;
                 }
             }
         }
@@ -331,18 +338,26 @@ impl Quad for Four {
 /// Distances of sixteen particles to a point; bits where their squares are below the limit.
 #[inline(always)]
 fn below(there: &[[u16; 16]; 3], two: &BroadcastPair, which: usize, limit: i16) -> u32 {
-    let mut sum = [0i32; 16];
-    for c in 0..3 {
-        for k in 0..16 {
-            let d = two.0[c][16 * which + k].wrapping_sub(there[c][k]) as i16 as i32;
-            sum[k] += (d * d) >> 16;
-        }
-    }
-    let mut mask = 0;
+    /// Aligned as what they are read as.
+    #[repr(align(16))]
+    struct Flags([u8; 16]);
+    let mut near = Flags([0; 16]);
     for k in 0..16 {
-        mask |= ((sum[k] < limit as i32) as u32) << k;
+        // The squares of all three coordinates have room in 16 bits without a sign.
+        let mut sum = 0;
+        for c in 0..3 {
+            let d = two.0[c][16 * which + k].wrapping_sub(there[c][k]) as i16;
+            sum += ((i32::from(d) * i32::from(d)) >> 16) as u16;
+        }
+        near.0[k] = (sum < limit as u16) as u8;
     }
-    mask
+    // Read as volatile: the compiler else makes each bit by itself, and no vector.
+    let eights = (&raw const near).cast::<u64>();
+    // SAFETY: sixteen bytes.
+    let eights = [unsafe { eights.read_volatile() }, unsafe { eights.add(1).read_volatile() }];
+    // A multiplication moves eight flags, each 0 or 1, together.
+    let bits = eights.map(|flags| (u64::from_le(flags).wrapping_mul(0x0102_0408_1020_4080) >> 56) as u32);
+    bits[0] | bits[1] << 8
 }
 
 impl Isa for Portable {
