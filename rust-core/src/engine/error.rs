@@ -1,3 +1,5 @@
+use super::reach::ReachError;
+
 /// Why an evaluation stopped. Tags are the particles' own numbers.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -45,21 +47,9 @@ pub enum EngineError {
         /// Its type.
         kind: i32,
     },
-    /// A box so narrow that its particles meet more images than memory holds.
-    #[error(
-        "{particles} particles in a box of {widths} meet about {pairs:.0e} images within the cut-off of {cutoff}: \
-         the box is too narrow"
-    )]
-    Narrow {
-        /// How many particles there are.
-        particles: usize,
-        /// Distances between the faces of the box.
-        widths: String,
-        /// The cut-off.
-        cutoff: f64,
-        /// Images, or pairs to be expected, whichever are more.
-        pairs: f64,
-    },
+    /// A range much longer than the box.
+    #[error(transparent)]
+    Reach(#[from] ReachError),
     /// Arrays of different lengths, or calls out of order: a fault of the host.
     #[error("host error: {0}")]
     Host(&'static str),

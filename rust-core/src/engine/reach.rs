@@ -1,35 +1,67 @@
 //! Ranges longer than the box, for which particles interact with periodic images.
 
-use super::RunError;
-use psidpd_core::engine::PeriodicBox;
+use psidpd_passes::domain::PeriodicBox;
 
 /// The most widths of a box that a range may have: 729 images of each particle in three dimensions.
 const MOST_WIDTHS: f64 = 4.0;
 
-/// The most images of all particles together.
-const MOST_IMAGES: f64 = 5e7;
+/// The most bytes that images and pairs may take.
+const MOST_BYTES: f64 = 7.5e9;
 
 /// Bytes of an image: position, velocity, force, densities and slopes, its places in the search.
-const BYTES: f64 = 150.0;
+const BYTES_OF_IMAGE: f64 = 150.0;
 
-/// Refuses ranges that are many times the box, before memory is taken for the images of `particles` particles.
+/// Bytes of a pair in a list.
+const BYTES_OF_PAIR: f64 = 60.0;
+
+/// A range so much longer than the box that images fill the memory.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error(
+    "the range {range} is {:.1} times the width {height} of the box between two faces: particles would meet \
+     {images:.1e} images of each other, which take about {gigabytes:.1} GB; use a larger box or a shorter range",
+    range / height
+)]
+pub struct ReachError {
+    range: f64,
+    height: f64,
+    images: f64,
+    gigabytes: f64,
+}
+
+/// Refuses ranges that are many times the box, before memory is taken for the images of `particles` particles and for
+/// their pairs.
 ///
 /// # Errors
-/// [`RunError::Reach`].
-pub fn check(domain: &PeriodicBox, dimensions: usize, range: f64, particles: usize) -> Result<(), RunError> {
+/// [`ReachError`].
+pub fn check_reach(
+    domain: &PeriodicBox,
+    dimensions: usize,
+    range: f64,
+    particles: usize,
+) -> Result<(), ReachError> {
     let heights = (0..dimensions).filter(|k| domain.periodic()[*k]).map(|k| domain.height(k));
     let mut copies = 1.0;
+    let mut within_range = 1.0;
     let mut height = f64::INFINITY;
     for h in heights {
+        let widths = 2.0 * range / h;
         // Directions wide enough for the range need no images.
-        copies *= if 2.0 * range < h { 1.0 } else { 1.0 + 2.0 * range / h };
+        copies *= if widths < 1.0 { 1.0 } else { 1.0 + widths };
+        within_range *= widths;
         height = height.min(h);
     }
-    let images = (copies - 1.0) * particles as f64;
-    if range <= MOST_WIDTHS * height && images <= MOST_IMAGES {
+    if copies == 1.0 {
         return Ok(());
     }
-    Err(RunError::Reach { range, height, images, gigabytes: 1e-9 * BYTES * images })
+    let particles = particles as f64;
+    let images = (copies - 1.0) * particles;
+    // Each once; of the cube around a particle the sphere.
+    let pairs = 0.5 * particles * particles * within_range * std::f64::consts::FRAC_PI_6;
+    let bytes = BYTES_OF_IMAGE * images + BYTES_OF_PAIR * pairs;
+    if range <= MOST_WIDTHS * height && bytes <= MOST_BYTES {
+        return Ok(());
+    }
+    Err(ReachError { range, height, images, gigabytes: 1e-9 * bytes })
 }
 
 #[cfg(test)]
@@ -42,12 +74,15 @@ mod tests {
             let edges = nalgebra::Matrix3::from_diagonal_element(edge);
             PeriodicBox::new([0.0; 3], edges, [periodic; 3]).unwrap()
         };
-        assert!(check(&cube(4.0, true), 3, 16.0, 400).is_ok());
-        let refused = check(&cube(4.0, true), 3, 20.0, 400).unwrap_err().to_string();
+        assert!(check_reach(&cube(4.0, true), 3, 16.0, 400).is_ok());
+        let refused = check_reach(&cube(4.0, true), 3, 20.0, 400).unwrap_err().to_string();
         assert!(refused.contains("range 20") && refused.contains("5.0 times"), "{refused}");
         // A few shells around very many particles.
-        assert!(check(&cube(4.0, true), 3, 12.0, 1_000_000).is_err());
-        assert!(check(&cube(400.0, true), 3, 1.0, 100_000_000).is_ok());
-        assert!(check(&cube(4.0, false), 3, 1e6, 400).is_ok());
+        assert!(check_reach(&cube(4.0, true), 3, 12.0, 1_000_000).is_err());
+        // A few images of many particles make very many pairs.
+        assert!(check_reach(&cube(4.0, true), 3, 12.0, 10_000).is_err());
+        assert!(check_reach(&cube(1e-9, true), 2, 1.0, 1).is_err());
+        assert!(check_reach(&cube(400.0, true), 3, 1.0, 100_000_000).is_ok());
+        assert!(check_reach(&cube(4.0, false), 3, 1e6, 400).is_ok());
     }
 }

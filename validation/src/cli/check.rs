@@ -1,7 +1,7 @@
 use super::{Failure, Settings, Verdict, write_json};
 use crate::check::{Conditions, Cost, Findings, Severity, Warning, check, cost, estimates};
-use crate::run::reach;
 use psidpd_core::document::Document;
+use psidpd_core::engine::check_reach;
 use std::path::{Path, PathBuf};
 
 /// What a model or scene will compute, what mean field says of it, and what cannot work.
@@ -46,7 +46,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         let densities = scene.densities();
         let range = scene.model.at(scene.kt)?.cutoff();
         let particles = scene.initial.parts().iter().map(|p| p.count).sum();
-        too_far = reach::check(&scene.domain, scene.model.dimensions(), range, particles).err();
+        too_far = check_reach(&scene.domain, scene.model.dimensions(), range, particles).err();
         let steps = if too_far.is_none() { estimates(&scene)? } else { Vec::new() };
         let taken = if too_far.is_none() { cost(&scene).ok() } else { None };
         (scene.model.clone(), scene.kt, Some(densities), steps, taken)

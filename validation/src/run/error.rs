@@ -2,7 +2,7 @@ use crate::checkpoint::CheckpointError;
 use crate::files::WriteError;
 use crate::particles::StateError;
 use psidpd_core::document::FileError;
-use psidpd_core::engine::EngineError;
+use psidpd_core::engine::{EngineError, ReachError};
 use psidpd_core::model::expression::TooLarge;
 use std::path::{Path, PathBuf};
 
@@ -23,12 +23,8 @@ pub enum RunError {
          share their noise; use a larger box, or switch the thermostat off"
     )]
     BoxTooNarrow { height: f64, range: f64 },
-    #[error(
-        "the range {range} is {:.1} times the width {height} of the box between two faces: particles would meet \
-         {images:.1e} images of each other, which take about {gigabytes:.1} GB; use a larger box or a shorter range",
-        range / height
-    )]
-    Reach { range: f64, height: f64, images: f64, gigabytes: f64 },
+    #[error(transparent)]
+    Reach(#[from] ReachError),
     #[error("the time step must be a positive number, is {0}")]
     TimeStep(f64),
     #[error("step {step}: {source}")]

@@ -1,7 +1,6 @@
 //! Every pair of particles in a box, images included.
 
 use super::search::CellSearch;
-use crate::engine::error::EngineError;
 use crate::engine::images::Images;
 use psidpd_passes::domain::PeriodicBox;
 
@@ -16,35 +15,6 @@ pub struct Pair {
     pub d: [f64; 3],
     /// Its length.
     pub r: f64,
-}
-
-/// Most images, and most pairs to be expected, in a box that is narrower than the cut-off: a gigabyte of them.
-const MOST_IN_NARROW_BOX: f64 = 1e7;
-
-/// Refuses boxes so narrow that the images of `count` particles would fill the memory.
-///
-/// # Errors
-/// [`EngineError::Narrow`].
-pub(super) fn check_width(
-    count: usize,
-    domain: &PeriodicBox,
-    dimensions: usize,
-    cutoff: f64,
-) -> Result<(), EngineError> {
-    let periodic = (0..dimensions).filter(|k| domain.periodic()[*k]);
-    let ratios: Vec<f64> = periodic.map(|k| cutoff / domain.height(k)).collect();
-    if ratios.iter().all(|ratio| *ratio <= 1.0) {
-        return Ok(());
-    }
-    let images = count as f64 * ratios.iter().map(|ratio| 2.0 * ratio + 1.0).product::<f64>();
-    let neighbours = count as f64 * ratios.iter().map(|ratio| 2.0 * ratio).product::<f64>();
-    let pairs = images.max(count as f64 * neighbours);
-    if pairs <= MOST_IN_NARROW_BOX {
-        return Ok(());
-    }
-    let widths = (0..dimensions).map(|k| format!("{:.3e}", domain.height(k)));
-    let widths = widths.collect::<Vec<_>>().join(" × ");
-    Err(EngineError::Narrow { particles: count, widths, cutoff, pairs })
 }
 
 /// Finds the pairs in a box of any width: images are points of the cell search.
@@ -217,21 +187,5 @@ mod tests {
         let domain = PeriodicBox::orthogonal([0.0; 3], [1.0; 3], [true; 3]).unwrap();
         for_each_pair(&[], &domain, 3, 1.0, |_| panic!());
         for_each_pair(&[[f64::NAN; 3], [0.5; 3]], &domain, 3, 0.9, |_| panic!());
-    }
-
-    /// Narrow boxes are worked out until their images no longer fit into memory; wide ones always, however many particles.
-    #[test]
-    fn boxes_too_narrow_are_refused() {
-        let cube = |l: f64| PeriodicBox::orthogonal([0.0; 3], [l; 3], [true; 3]).unwrap();
-        assert_eq!(check_width(100, &cube(0.5), 3, 1.0), Ok(()));
-        assert_eq!(check_width(1_000_000_000, &cube(1.0), 3, 1.0), Ok(()));
-        for (count, l, dimensions) in [(1, 1e-3, 3), (10_000, 0.5, 3), (10, 1e-300, 2)] {
-            let error = check_width(count, &cube(l), dimensions, 1.0).unwrap_err();
-            assert!(error.to_string().ends_with("the box is too narrow"), "{error}");
-        }
-        let thin = PeriodicBox::orthogonal([0.0; 3], [1e-9, 1e6, 1e6], [true; 3]).unwrap();
-        assert!(check_width(1, &thin, 3, 1.0).is_err());
-        let open = PeriodicBox::orthogonal([0.0; 3], [1e-9, 1e6, 1e6], [false, true, true]).unwrap();
-        assert_eq!(check_width(1, &open, 3, 1.0), Ok(()));
     }
 }

@@ -38,12 +38,13 @@ use super::excess_pass::{ExcessPass, Rows};
 use super::exclusions::Exclusions;
 use super::particles::{Particles, Step};
 use super::plan::Plan;
+use super::reach::check_reach;
 use super::surroundings::{Around, Newton, SpecialPair, Surroundings};
 use crate::model::Fluid;
 use crate::model::expression::TooLarge;
 use densities::sum_densities;
 use forces::{ForceInput, ForceOutput, add_forces};
-use in_box::{BoxSearch, check_width};
+use in_box::BoxSearch;
 use listed::add_listed;
 use pairs::Pairs;
 use psidpd_passes::domain::PeriodicBox;
@@ -195,7 +196,7 @@ impl Reference {
                 if owned < x.len() {
                     return Err(EngineError::Host("where all particles are in hand there are no ghosts"));
                 }
-                check_width(owned, domain, dimensions, cutoff)?;
+                check_reach(domain, dimensions, cutoff, owned)?;
                 pairs.clear(owned, Newton::On);
                 box_search.find(x, owned, takes_part, domain, dimensions, cutoff, |i, j, d| {
                     pairs.push_in_box(i, j, d, species);
@@ -207,7 +208,7 @@ impl Reference {
                         "not as many ghosts as it was said of whether they are images",
                     ));
                 }
-                check_width(x.len(), domain, dimensions, cutoff)?;
+                check_reach(domain, dimensions, cutoff, x.len())?;
                 pairs.clear(owned, newton);
                 let is_image = |k: usize| k >= owned && images.get(k - owned).is_some_and(|image| *image);
                 let takes_part = |k| takes_part(k) && !is_image(k);

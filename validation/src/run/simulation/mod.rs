@@ -15,7 +15,6 @@ mod thermostat;
 pub(super) use thermostat::Heat;
 
 use super::error::RunError;
-use super::reach;
 use super::reorder;
 use crate::integrator::Integrator;
 use crate::particles::State;
@@ -23,7 +22,7 @@ use external::External;
 use forces::Forces;
 use motion::Motion;
 use particles::Particles;
-use psidpd_core::engine::{Step, Want};
+use psidpd_core::engine::{Step, Want, check_reach};
 use psidpd_core::model::Model;
 use record::Record;
 use thermostat::Thermostat;
@@ -61,7 +60,7 @@ impl Simulation {
         let fluid = model.at(kt)?;
         let particles = Particles::new(state, fluid.species.len(), fluid.dimensions)?;
         let domain = &particles.now().domain;
-        reach::check(domain, fluid.dimensions, fluid.cutoff(), particles.now().len())?;
+        check_reach(domain, fluid.dimensions, fluid.cutoff(), particles.now().len())?;
         let motion = Motion::within(domain, fluid.dimensions);
         let forces = Forces::new(model, kt)?;
         Ok(Simulation {
