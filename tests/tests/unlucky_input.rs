@@ -112,6 +112,19 @@ fn more_than_a_machine_has_is_refused_with_a_number() {
         assert!(code == Some(1) && text.contains(times), "{text}");
         assert!(begun.elapsed() < Duration::from_secs(60));
     }
+    scene("1");
+    let box_of = |edge: &str| format!("0 {edge} xlo xhi\n0 {edge} ylo yhi\n0 {edge} zlo zhi\n");
+    let data = format!("t\n\n1 atoms\n1 atom types\n{}\nAtoms # atomic\n\n1 1 0 0 0\n", box_of("0.001"));
+    write(here, "d.data", &data);
+    for arguments in [
+        &["forces", "--model", "m.toml", "--data", "d.data", "--kT", "1"][..],
+        &["snapshot", "d.data", "--density", "--range", "1", "--out", "a.svg"],
+        &["snapshot", "d.data", "--colour", "density", "--range", "1", "--out", "a.svg"],
+        &["snapshot", "d.data", "--colour", "psi", "--model", "m.toml", "--kT", "1", "--out", "a.svg"],
+    ] {
+        let (text, code) = words(&psidpd(here, arguments));
+        assert!(code == Some(2) && text.contains("1000.0 times"), "{arguments:?}: {text}");
+    }
 }
 
 /// 64 species, each with a product of 64 factors.

@@ -1,8 +1,9 @@
 use super::{Failure, Verdict, write_json};
 use crate::files::write_atomically;
 use crate::output::picture::{FieldOptions, Image, ParticleOptions, View};
-use crate::output::{Configuration, OutputError, Which};
+use crate::output::{Configuration, Frame, OutputError, Which};
 use crate::report::Figure;
+use psidpd_core::engine::check_reach;
 use psidpd_core::engine::reference::{Evaluator, for_each_pair};
 use psidpd_core::model::Model;
 use psidpd_core::model::kernel::{Kernel, KernelKind};
@@ -27,9 +28,12 @@ pub struct Arguments {
     /// From where; two-dimensional systems are seen along z.
     #[arg(long, value_enum, default_value_t = Eye::Oblique)]
     view: Eye,
-    /// Shows only particles within this thickness around the middle of the box, along the line of sight.
+    /// Shows only particles in a slice of this thickness through the middle of the box, across the line of sight.
     #[arg(long, value_name = "LENGTH")]
     slice: Option<f64>,
+    /// How far in front of the middle the slice is, or the plane of --density; negative: behind it.
+    #[arg(long, value_name = "LENGTH", default_value_t = 0.0, allow_negative_numbers = true)]
+    offset: f64,
     /// Radius of a particle.
     #[arg(long, value_name = "LENGTH")]
     radius: Option<f64>,
@@ -101,6 +105,9 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
             return Err(request(format!("--{name} must be a positive number, is {value}")));
         }
     }
+    if !a.offset.is_finite() {
+        return Err(request(format!("--offset must be a number, is {}", a.offset)));
+    }
     let model = a.model.as_deref().map(Model::open).transpose()?;
     let open = |which| -> Result<Configuration, Failure> {
         let mut configuration = Configuration::open(&a.file, which)?;
@@ -161,6 +168,7 @@ fn values(
         Colour::Species => None,
         Colour::Density => {
             let kernel = kernel(a, model, frame.dimensions)?;
+            within_reach(&frame, kernel.range())?;
             let mut n = vec![0.0; frame.len()];
             for_each_pair(frame.x, frame.domain, frame.dimensions, kernel.range(), |p| {
                 let w = kernel.value(p.r);
@@ -177,7 +185,9 @@ fn values(
             let (Some(model), Some(kt)) = (model, a.kt) else {
                 return Err(request("--colour psi needs --model and --kT".into()));
             };
-            let evaluator = Evaluator::new(model.at(kt)?)?;
+            let fluid = model.at(kt)?;
+            within_reach(&frame, fluid.cutoff())?;
+            let evaluator = Evaluator::new(fluid)?;
             if configuration.species.iter().any(|s| *s as usize >= model.species().len()) {
                 return Err(request(format!(
                     "the model has {} species, the file more",
@@ -202,16 +212,20 @@ fn figure(
     let title = configuration.step.map_or(title.clone(), |step| format!("{title}, step {step}"));
     let size = [a.size as usize; 2];
     if a.density {
+        let kernel = kernel(a, model, frame.dimensions)?;
+        within_reach(&frame, kernel.range())?;
         let options = FieldOptions {
             view: a.view.into(),
-            kernel: kernel(a, model, frame.dimensions)?,
+            offset: a.offset,
+            kernel,
             species: a.species.as_deref().map(|name| index(name, frame.names)).transpose()?,
             size,
         };
         let label = a.species.as_ref().map_or("n".to_owned(), |s| format!("n_{s}"));
         return Ok(Figure::field(&title, &label, &frame, &options));
     }
-    let options = ParticleOptions { view: a.view.into(), slice: a.slice, radius: a.radius, size };
+    let options =
+        ParticleOptions { view: a.view.into(), slice: a.slice, offset: a.offset, radius: a.radius, size };
     let label = match a.colour {
         Colour::Density => "n",
         Colour::Speed => "speed",
@@ -221,6 +235,12 @@ fn figure(
         Some(values) => Figure::valued(&title, label, &frame, &options, values, ends),
         None => Figure::particles(&title, &frame, &options),
     })
+}
+
+/// Refuses ranges for which images would fill the memory.
+fn within_reach(frame: &Frame, range: f64) -> Result<(), Failure> {
+    check_reach(frame.domain, frame.dimensions, range, frame.len())
+        .map_err(|error| request(error.to_string()))
 }
 
 fn request(message: String) -> Failure {

@@ -9,6 +9,8 @@ use psidpd_core::model::kernel::{Kernel, KernelKind};
 pub struct FieldOptions {
     /// Along which direction the plane is seen that cuts the box in the middle; oblique counts as along y.
     pub view: View,
+    /// How far in front of the middle the plane is.
+    pub offset: f64,
     /// The weight function.
     pub kernel: Kernel,
     /// One species only, or all.
@@ -20,7 +22,7 @@ pub struct FieldOptions {
 impl FieldOptions {
     /// The density that `kernel` weighs, of all species, in the plane of x and z (in two dimensions x and y).
     pub fn new(kernel: Kernel) -> FieldOptions {
-        FieldOptions { view: View::Y, kernel, species: None, size: [0, 0] }
+        FieldOptions { view: View::Y, offset: 0.0, kernel, species: None, size: [0, 0] }
     }
 
     /// A density for models that have none: quadratic, of range 1.
@@ -56,7 +58,7 @@ impl Field {
         let range = options.kernel.range();
         let reach = range * projection.scale();
         // In two dimensions everything is in the plane, whatever z is.
-        let plane = if frame.dimensions == 2 { None } else { Some(projection.middle()) };
+        let plane = if frame.dimensions == 2 { None } else { Some(projection.middle() + options.offset) };
         for (x, species) in frame.x.iter().zip(frame.species) {
             if options.species.is_some_and(|s| s != *species as usize) {
                 continue;

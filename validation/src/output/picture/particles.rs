@@ -8,8 +8,10 @@ use crate::output::Frame;
 pub struct ParticleOptions {
     /// From where.
     pub view: View,
-    /// Shows only particles within this thickness around the middle of the box, along the line of sight.
+    /// Shows only particles in a slice of this thickness through the middle of the box, across the line of sight.
     pub slice: Option<f64>,
+    /// How far in front of the middle the slice is.
+    pub offset: f64,
     /// Radius of a particle, a length; without one, such that neighbours touch about.
     pub radius: Option<f64>,
     /// Most pixels in width and height; 0 for 720 by 640.
@@ -62,7 +64,8 @@ pub fn draw_coloured(frame: &Frame, options: &ParticleOptions, colours: &[Rgb]) 
     let fades = frame.dimensions == 3 && options.slice.is_none();
     for (x, colour) in frame.x.iter().zip(colours) {
         let toward = projection.toward(*x);
-        if options.slice.is_some_and(|t| (toward - projection.middle()).abs() > 0.5 * t) {
+        let from_slice = (toward - projection.middle() - options.offset).abs();
+        if options.slice.is_some_and(|thickness| from_slice > 0.5 * thickness) {
             continue;
         }
         let ([across, down], near) = projection.place(*x);
@@ -215,6 +218,11 @@ mod tests {
         let (image, projection) = draw_particles(&frame(&domain, 3, &names, &x, &[0, 1]), &options);
         assert!(distance(at(&image, projection.place(x[0]).0), of_species(0)) < 12);
         assert_eq!(at(&image, projection.place(x[1]).0), WHITE);
+        // The other one is 1.5 below the middle in y, and so in front of it.
+        let other = ParticleOptions { offset: 1.5, ..options };
+        let (image, projection) = draw_particles(&frame(&domain, 3, &names, &x, &[0, 1]), &other);
+        assert!(distance(at(&image, projection.place(x[1]).0), of_species(1)) < 12);
+        assert_eq!(at(&image, projection.place(x[0]).0), WHITE);
     }
 
     #[test]
