@@ -273,7 +273,10 @@ fn beside(
         ("tension", interface.map(|i| i.tension), None),
         ("width", interface.map(|i| i.width), None),
     ];
-    let show = |x: Option<f64>| x.filter(|x| x.is_finite()).map_or(String::new(), |x| format!("{x:.4}"));
+    // Rounded before it is written, and 0 added: a small negative number would be −0.0000.
+    let show = |x: Option<f64>| {
+        x.filter(|x| x.is_finite()).map_or(String::new(), |x| format!("{:.4}", (x * 1e4).round() / 1e4 + 0.0))
+    };
     let mut header = vec!["", "mean field", "correlated"];
     header.extend((!known.is_empty()).then_some("published"));
     header.extend((!measured.is_empty()).then_some("measured"));
