@@ -87,6 +87,25 @@ class Result:
         return self._json("summary.json")
 
     @property
+    def headline(self) -> DataFrame:
+        """The results that are looked for first, as `psidpd run` prints them at its end: a DataFrame by name.
+
+        Columns are `value`, `error` (one standard deviation; NaN where it is exact or not known), `unit`, `source`,
+        `mean_field`, `published` and `published_error`. `.attrs["notes"]` says what to know before using them: a series
+        that is too short, or drifts, a cluster that percolates, a drop that touches its image.
+        """
+        import pandas
+
+        values, notes = _psidpd.headline(self.folder)
+        columns = ["value", "error", "unit", "source", "mean_field", "published", "published_error"]
+        rows = {name: [*row, *(known or [None, None])] for name, *row, known in values}
+        table = pandas.DataFrame.from_dict(rows, orient="index", columns=columns)
+        numbers = [name for name in columns if name not in ("unit", "source")]
+        table = table.astype(dict.fromkeys(numbers, float))
+        table.attrs["notes"] = notes
+        return table
+
+    @property
     def thermo(self) -> DataFrame:
         """The totals of thermo.csv, a DataFrame with one row for every `thermo` steps. Units are in `.attrs["units"]`."""
         import pandas

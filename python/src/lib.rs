@@ -21,7 +21,7 @@ mod _psidpd {
     #[pymodule_export]
     use super::model::Model;
     #[pymodule_export]
-    use super::runs::{estimate, run_scene};
+    use super::runs::{estimate, headline_of, run_scene};
     #[pymodule_export]
     use super::{main, version};
 }

@@ -3,7 +3,7 @@
 use crate::engine::{settings, thread_count};
 use crate::errors::{exception, wrong};
 use psidpd::observe;
-use psidpd::report::write_run_report;
+use psidpd::report::{headline, write_run_report};
 use psidpd::run::{Begin, Outcome, Runner};
 use psidpd::scene::Scene;
 use pyo3::exceptions::{PyKeyboardInterrupt, PyUserWarning};
@@ -114,4 +114,18 @@ pub fn estimate(series: &Bound<PyAny>) -> PyResult<(f64, f64)> {
         }
         Err(error) => Err(exception(error)),
     }
+}
+
+/// A result of a run: name, value, error, unit, source, what mean field says, and what is published, with its error.
+type Found = (String, f64, Option<f64>, String, String, Option<f64>, Option<[f64; 2]>);
+
+/// The results of the run in a folder that are looked for first, and notes on them.
+#[pyfunction]
+#[pyo3(name = "headline")]
+pub fn headline_of(py: Python, folder: PathBuf) -> (Vec<Found>, Vec<String>) {
+    let all = py.detach(|| headline(&folder));
+    let values = all.values.into_iter();
+    let values =
+        values.map(|v| (v.name, v.value, v.error, v.unit, v.source, v.mean_field, v.published)).collect();
+    (values, all.notes)
 }

@@ -21,6 +21,15 @@ def test_a_run_is_that_of_the_command_line(tmp_path):
     subprocess.run(command, cwd=tmp_path, check=True, stdout=subprocess.DEVNULL)
     for name in ("thermo.csv", "final.data", "observables.json"):
         assert (tmp_path / "python" / name).read_bytes() == (tmp_path / "shell" / name).read_bytes()
+    # What the command prints at its end, and its notes: so short a run has some.
+    command = [sys.executable, "-m", "psidpd", "--json", "said.json", "run", "scene.toml", "--out", "again"]
+    subprocess.run(command, cwd=tmp_path, check=True, stdout=subprocess.DEVNULL)
+    said = json.loads((tmp_path / "said.json").read_text())["headline"]
+    headline = result.headline
+    assert list(headline.index) == [v["name"] for v in said["values"]] and "temperature" in headline.index
+    assert list(headline["value"]) == [v["value"] for v in said["values"]]
+    assert list(headline["unit"]) == [v["unit"] for v in said["values"]]
+    assert headline.attrs["notes"] == said["notes"] and said["notes"]
     thermo = result.thermo
     assert list(thermo["step"]) == list(range(0, 61, 5)) and thermo.attrs["units"]["pressure"]
     assert result.summary["steps"] == 60
