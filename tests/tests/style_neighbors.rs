@@ -3,6 +3,7 @@
 mod style_common;
 
 use psidpd_core::engine::PeriodicBox;
+use psidpd_core::maximum::largest;
 use psidpd_core::model::Model;
 use std::f64::consts::PI;
 use style_common::*;
@@ -69,6 +70,31 @@ fn radial_distributions_are_those_of_a_direct_count() {
             }
         }
     }
+}
+
+/// On one rank the style needs no ghosts: found anew every twentieth step only, when atoms have long left the box, they
+/// change neither energy nor pressure. Where it takes its pairs from LAMMPS's list they do.
+#[test]
+fn one_rank_needs_no_ghosts_in_time() {
+    let (model, listed) = (warren(), listed());
+    let run = |region: &str, more: &str, when: &str| {
+        let l = open(&format!(
+            "{}neighbor 0.2 bin\nneigh_modify delay 0 {when}\n\
+             pair_style dpd/psi 1.0 {SEED}\npair_coeff * * \"{model}\" F F\n{more}\n\
+             velocity all create 4.0 4711 loop geom\nfix 1 all nve\ntimestep {DT}\nrun 60\n",
+            particles("", region, 2, 700)
+        ));
+        ["pe", "ke", "press", "pxy"].map(|name| l.eval(name).unwrap())
+    };
+    let far = |region: &str, more: &str| {
+        let (often, seldom) = (run(region, more, "every 1 check yes"), run(region, more, "every 20 check no"));
+        largest(often.iter().zip(seldom).map(|(a, b)| (a - b).abs() / (1.0 + a.abs())))
+    };
+    for region in ["block 0 5 0 5 0 5", "prism 0 5 0 5 0 5 1 -1 1"] {
+        let far = far(region, "");
+        assert!(far < 1e-8, "{region}: {far:e}");
+    }
+    assert!(far("block 0 5 0 5 0 5", &listed) > 1e-6);
 }
 
 /// Ghosts that reach as far as each type needs: forces and trajectories are the same as with one reach, beside a

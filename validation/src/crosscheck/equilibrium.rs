@@ -70,7 +70,7 @@ pub fn run(context: &Context) -> Result<Part, ValidateError> {
     let sets = [SET5, SET6];
     // A wide and thin slab: the error of the tension goes with the root of thickness over area.
     let (edge, height, thickness, steps) =
-        if context.full { (10.0, 24.0, 12.0, 100_000) } else { (6.0, 12.0, 4.8, 8_000) };
+        if context.full { (10.0, 24.0, 12.0, 50_000) } else { (6.0, 12.0, 4.8, 8_000) };
     let length = Length { dt: 0.01, steps, sample: 10, averaged: true, frame: 25 };
     let mut starts = Vec::new();
     for set in &sets {
