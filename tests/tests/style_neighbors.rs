@@ -87,7 +87,8 @@ fn one_rank_needs_no_ghosts_in_time() {
         ["pe", "ke", "press", "pxy"].map(|name| l.eval(name).unwrap())
     };
     let far = |region: &str, more: &str| {
-        let (often, seldom) = (run(region, more, "every 1 check yes"), run(region, more, "every 20 check no"));
+        let (often, seldom) =
+            (run(region, more, "every 1 check yes"), run(region, more, "every 20 check no"));
         largest(often.iter().zip(seldom).map(|(a, b)| (a - b).abs() / (1.0 + a.abs())))
     };
     for region in ["block 0 5 0 5 0 5", "prism 0 5 0 5 0 5 1 -1 1"] {

@@ -126,7 +126,12 @@ fn show(outcome: &Outcome) {
             format!("{:.5} ± {:.5}", v.measured.value, v.measured.error),
             format!("{sign}{:.5} ± {:.5}", v.published.value, v.published.error),
             format!("{:+.2}", v.deviation()),
-            if v.passes() { "pass" } else { "fail" }.to_owned(),
+            match (v.passes(), v.is_vague()) {
+                (true, _) => "pass",
+                (false, true) => "fail: too vague",
+                (false, false) => "fail",
+            }
+            .to_owned(),
         ]);
     }
     println!("{}", table.to_text());

@@ -7,6 +7,10 @@ use serde_json::{Value, json};
 /// Largest deviation that agrees, in units of the combined error.
 pub const LIMIT: f64 = 3.0;
 
+/// Largest error of a measured value, as a share of the published one, where the published error is not larger: what is
+/// vaguer would agree with anything.
+pub const VAGUE: f64 = 0.2;
+
 /// How a value is compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -49,14 +53,19 @@ impl Compared {
         if error == 0.0 && right { 0.0 } else { difference / error }
     }
 
-    /// Whether it agrees. NaN does not.
+    /// Whether it agrees. NaN does not, nor what is too vague to disagree.
     pub fn passes(&self) -> bool {
         let deviation = self.deviation();
         match self.rule {
-            Rule::Equal => deviation.abs() <= LIMIT,
-            Rule::AtLeast => deviation >= -LIMIT,
-            Rule::AtMost => deviation <= LIMIT,
+            Rule::Equal => !self.is_vague() && deviation.abs() <= LIMIT,
+            Rule::AtLeast => deviation >= if self.is_vague() { 0.0 } else { -LIMIT },
+            Rule::AtMost => deviation <= if self.is_vague() { 0.0 } else { LIMIT },
         }
+    }
+
+    /// Whether its error is so large that it tells nothing.
+    pub fn is_vague(&self) -> bool {
+        self.measured.error > (VAGUE * self.published.value.abs()).max(self.published.error)
     }
 
     /// For JSON.
@@ -202,6 +211,11 @@ mod tests {
         };
         assert_eq!(exact(0.5).deviation(), 0.0);
         assert!(!exact(1.5).passes());
+        let vague =
+            |rule, value| Compared { measured: Measured { value, error: 400.0 }, ..compared(rule, 0.0) };
+        assert!(!vague(Rule::Equal, 10.0).passes() && vague(Rule::Equal, 10.0).deviation() == 0.0);
+        assert!(vague(Rule::AtLeast, 11.0).passes() && !vague(Rule::AtLeast, 9.0).passes());
+        assert!(vague(Rule::AtMost, 9.0).passes() && !vague(Rule::AtMost, 11.0).passes());
         assert!(!Outcome::default().passes(), "a case without values says nothing");
     }
 }
