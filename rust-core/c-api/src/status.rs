@@ -64,7 +64,7 @@ impl From<TooLarge> for Failure {
 impl From<EngineError> for Failure {
     fn from(error: EngineError) -> Failure {
         let status = match error {
-            EngineError::Host(_) => Status::InvalidArgument,
+            EngineError::Host(_) | EngineError::Reach(_) => Status::InvalidArgument,
             _ => Status::Engine,
         };
         Failure::new(status, error.to_string())
