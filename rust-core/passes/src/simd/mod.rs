@@ -116,7 +116,12 @@ pub trait Reals: Real {
     /// Writes the rows whose bits are set in `mask`, one after the other; may write anything up to where all would end.
     #[inline(always)]
     unsafe fn store_rows(columns: [Self; 4], mask: u32, p: *mut Self::Scalar) {
-        unsafe { Self::store_transposed(columns.map(|column| column.compress(mask)), p) }
+        // One by one: a closure over the columns would not be inlined, and so not be compiled for their instruction set.
+        let [a, b, c, d] = columns;
+        unsafe {
+            let columns = [a.compress(mask), b.compress(mask), c.compress(mask), d.compress(mask)];
+            Self::store_transposed(columns, p);
+        }
     }
 }
 
