@@ -17,18 +17,8 @@ const DROPS: [Drop; 4] = [
 
 fn hang(context: &Context, (name, model, scene, ..): Drop) -> Result<Observed, PaperError> {
     let context = context.shared("warren-pendant");
-    // A step that allows longer steps lets the drop come to rest in as many evaluations of forces.
-    let changes: &[Change] = &[
-        (&["dt"], 0.04.into()),
-        (&["integrator"], "two-stage".into()),
-        (&["stage", "0", "steps"], 500.into()),
-        (&["stage", "1", "steps"], 3000.into()),
-        (&["stage", "2", "steps"], 5000.into()),
-        (&["output", "dump"], 0.into()),
-        (&["observe", "every"], 20.into()),
-        (&["observe", "pendant", "skip"], 0.into()),
-        (&["observe", "density_field", "skip"], 0.into()),
-    ];
+    // As the paper has them, at the small size too: twenty seconds each. With a longer step the drop of set 5 falls.
+    let changes: &[Change] = &[(&["output", "dump"], 0.into())];
     context.shipped(name, model, scene, changes)
 }
 
