@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 /// Compare the codes; a few minutes on two cores.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Larger systems and longer runs: hours.
+    /// Larger systems and longer runs: about an hour.
     #[arg(long)]
     full: bool,
     /// Folder for report.html, results.json and the runs.
