@@ -20,6 +20,7 @@ const CORE: &[&[&str]] = &[
         "engine::images",
         "engine::particles",
         "engine::path",
+        "engine::reach",
         "engine::surroundings",
         "engine::vectors",
     ],
