@@ -226,6 +226,11 @@ impl<'a> Options<'a> {
         Ok(Some(value.one_of("species", &names)?.value))
     }
 
+    /// A species of the model, where other things than names may stand too.
+    pub fn as_species(&self, key: &str) -> Result<Option<usize>, FileError> {
+        if self.get(key).is_some_and(|value| value.as_str().is_some()) { self.species(key) } else { Ok(None) }
+    }
+
     /// One of some names.
     pub fn choice<T: Copy>(&self, key: &str, choices: &[(&str, T)]) -> Result<Option<T>, FileError> {
         self.get(key).map(|value| Ok(value.one_of("choice", choices)?.value)).transpose()

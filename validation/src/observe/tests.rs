@@ -253,6 +253,37 @@ fn profiles_of_a_known_flow() {
     assert!((sum / 4.0 - n as f64 / 80.0).abs() < 1e-12);
 }
 
+/// Two layers that fill the box drift through it: centred on one of them their profile is that of a frame.
+#[test]
+fn layers_that_drift_are_centred_on_a_species() {
+    let observe = "[observe]\nevery = 1\nstages = [\"settle\"]\ncomposition_profile = { bins = 20, recentre = \"B\" }\n";
+    let read = |observe: &str| scene(IDEAL_MIXTURE, "[4.0, 4.0, 5.0]", 20.0, 10, observe);
+    let scene = read(observe).unwrap();
+    let mut observers = observers(&scene);
+    for step in 0..7_u8 {
+        let mut state = scene.initial_state();
+        let shift = 0.137 * f64::from(step);
+        for k in 0..state.len() {
+            let from = (state.x[k][2] / 5.0 - shift).rem_euclid(1.0);
+            state.species[k] = i32::from(from < 0.5);
+        }
+        let mut simulation = Simulation::new(&scene.model, 1.0, state, 1).unwrap();
+        simulation.set_step_number(1 + u64::from(step));
+        observers.sample(simulation.view(0.01), "settle");
+    }
+    let all = observers.finish();
+    let profile = find(&all, "composition_profile");
+    assert_eq!(profile.note, "Samples are centred on one species.");
+    let b = &profile.get("fraction_B").unwrap().values;
+    // Layers of the lattice are 0.37 apart, three halves of a bin.
+    for (k, f) in b.iter().enumerate().filter(|(_, f)| f.is_finite()) {
+        let depth = (k as f64 - 9.5).abs();
+        assert!(if depth < 4.0 { *f == 1.0 } else { depth < 6.0 || *f == 0.0 }, "{k}: {f}");
+    }
+    let wrong = read(&observe.replace("\"B\"", "\"C\"")).unwrap_err().to_string();
+    assert!(wrong.contains('C') && wrong.contains("species"), "{wrong}");
+}
+
 /// Partial g and S of an ideal gas are 1, between unlike species S is 0: each of some 230 values within 5.5 of its
 /// errors, and their squares on average within what independent shells have. From 200 samples an error is known to
 /// 5 %, and 5 of them are exceeded by chance once in 10^6: a false alarm in 4000 seeds. The mean of nine squares, as of

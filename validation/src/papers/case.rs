@@ -170,6 +170,20 @@ pub fn profile(observed: &Observed, name: &str, column: &str) -> Vec<(f64, Measu
     x.values.iter().copied().zip(values).collect()
 }
 
+/// Means amid two layers that fill a periodic box, one of which is in the middle of the profile: over a quarter of the
+/// box amid the other, then amid this one.
+pub fn layers(profile: &[(f64, Measured)]) -> [Measured; 2] {
+    let count = profile.len();
+    let mean = |from: usize| {
+        let some: Vec<Measured> = profile.iter().cycle().skip(from).take(count / 4).map(|(_, c)| *c).collect();
+        let n = some.len() as f64;
+        let variance: f64 = some.iter().map(|c| c.error * c.error).sum();
+        // Neighbouring bins move together: their errors are not averaged out.
+        Measured { value: some.iter().map(|c| c.value).sum::<f64>() / n, error: (variance / n).sqrt() }
+    };
+    [mean(count - count / 8), mean(count / 2 - count / 8)]
+}
+
 /// A profile without its errors.
 pub fn bare(points: &[(f64, Measured)]) -> Vec<(f64, f64)> {
     points.iter().map(|(x, y)| (*x, y.value)).collect()

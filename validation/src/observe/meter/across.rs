@@ -10,6 +10,17 @@ use std::f64::consts::TAU;
 /// Below this the mean of the unit vectors exp(2πi s) has no direction.
 const LEAST_RESULTANT: f64 = 1e-10;
 
+/// What is put at the middle of each sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Centre {
+    /// Nothing: places are those of the box.
+    Box,
+    /// The centre of mass of all particles.
+    All,
+    /// That of the particles of one species.
+    Species(i32),
+}
+
 /// Bins along one direction of the box.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Across {
@@ -17,8 +28,8 @@ pub struct Across {
     pub axis: usize,
     /// How many bins.
     pub bins: usize,
-    /// Whether samples are centred.
-    pub recentre: bool,
+    /// What samples are centred on.
+    centre: Centre,
     /// Where the axis begins.
     origin: f64,
     /// Distance of the faces.
@@ -33,8 +44,16 @@ impl Across {
     pub fn read(options: &Options, centred: bool) -> Result<Across, FileError> {
         let mut across = Across::read_along(options, options.axis("axis")?)?;
         let preset = across.periodic && options.place.slab == Some(across.axis);
-        across.recentre = centred || options.flag("recentre")?.unwrap_or(preset);
-        if across.recentre && !across.periodic {
+        across.centre = if centred {
+            Centre::All
+        } else if let Some(species) = options.as_species("recentre")? {
+            Centre::Species(species as i32)
+        } else if options.flag("recentre")?.unwrap_or(preset) {
+            Centre::All
+        } else {
+            Centre::Box
+        };
+        if across.centre != Centre::Box && !across.periodic {
             return Err(options.error("recentre", "the box is not periodic along the axis"));
         }
         Ok(across)
@@ -56,7 +75,7 @@ impl Across {
         Across {
             axis,
             bins: 1,
-            recentre: false,
+            centre: Centre::Box,
             origin: domain.origin()[axis],
             height: domain.height(axis),
             volume: domain.volume(options.place.fluid.dimensions),
@@ -86,8 +105,17 @@ impl Across {
 
     /// The middles of the bins: from the centre if samples are centred.
     pub fn middles(&self) -> Vec<f64> {
-        let low = if self.recentre { -0.5 * self.height } else { self.origin };
+        let low = if self.centre == Centre::Box { self.origin } else { -0.5 * self.height };
         (0..self.bins).map(|k| low + (k as f64 + 0.5) * self.bin_height()).collect()
+    }
+
+    /// What a reader should know of the coordinate.
+    pub fn note(&self) -> &'static str {
+        match self.centre {
+            Centre::Box => "",
+            Centre::All => "Samples are centred.",
+            Centre::Species(_) => "Samples are centred on one species.",
+        }
     }
 
     /// The normal of the faces.
@@ -102,16 +130,23 @@ impl Across {
     pub fn fractions(&self, view: &View) -> Option<Vec<f64>> {
         let domain = view.domain;
         let mut s: Vec<f64> = view.x.iter().map(|x| domain.fraction(*x)[self.axis]).collect();
-        if !self.recentre {
+        let counts = |species: i32| match self.centre {
+            Centre::Box => false,
+            Centre::All => true,
+            Centre::Species(one) => species == one,
+        };
+        if self.centre == Centre::Box {
             return Some(s);
         }
-        let (mut sine, mut cosine) = (0.0, 0.0);
-        for s in &s {
+        let (mut sine, mut cosine, mut count) = (0.0, 0.0, 0.0);
+        for (s, _) in s.iter().zip(view.species).filter(|(_, species)| counts(**species)) {
             let (a, b) = (TAU * s).sin_cos();
             sine += a;
             cosine += b;
+            count += 1.0;
         }
-        if f64::hypot(sine, cosine) < LEAST_RESULTANT * s.len() as f64 {
+        // Nor has a species of which there are no particles.
+        if f64::hypot(sine, cosine) <= LEAST_RESULTANT * count {
             return None;
         }
         let centre = sine.atan2(cosine) / TAU;

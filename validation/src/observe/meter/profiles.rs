@@ -67,11 +67,10 @@ impl Bins {
 
     /// An empty observation against the coordinate.
     fn observation(&self, name: &str, title: &str) -> Observation {
-        let centred = if self.across.recentre { "Samples are centred." } else { "" };
         Observation::new(name, title, Kind::Profile)
             .against(self.across.name(), "length", self.across.middles())
             .samples(self.series.samples())
-            .note(centred)
+            .note(self.across.note())
     }
 
     /// A linear function of every bin.

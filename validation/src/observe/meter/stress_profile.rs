@@ -97,7 +97,6 @@ impl Meter for StressProfile {
         let integral = (0..self.across.bins)
             .map(|bin| self.series.linear(|row| 0.5 * (upto(row, bin) + upto(row, bin + 1))));
         let unit = "energy/volume";
-        let centred = if self.across.recentre { "Samples are centred." } else { "" };
         let profile = Observation::new("stress_profile", "Pressure tensor profile", Kind::Profile)
             .against(self.across.name(), "length", self.across.middles())
             .samples(self.series.samples())
@@ -106,7 +105,7 @@ impl Meter for StressProfile {
             .column("ideal", unit, column(&|p| p[0]))
             .column("difference", unit, column(&|p| p[0] + p[2] - p[1] - p[3]))
             .column("integral", "energy/area", integral)
-            .note(centred);
+            .note(self.across.note());
         let whole = Observation::new("stress_profile_integral", "Integral of P_N − P_T", Kind::Scalar)
             .samples(self.series.samples())
             .column("integral", "energy/area", [self.series.linear(|row| upto(row, self.across.bins))]);

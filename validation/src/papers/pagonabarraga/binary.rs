@@ -3,7 +3,7 @@
 use super::BINARY;
 use crate::bulk::Observed;
 use crate::observe::Measured;
-use crate::papers::case::{Outcome, bare, exact, profile, ratio};
+use crate::papers::case::{Outcome, bare, exact, layers, profile, ratio};
 use crate::papers::context::{Context, PaperError, mean_field};
 
 const SCENE: &str = include_str!("../../../scenes/full/binary-2d.toml");
@@ -25,29 +25,19 @@ fn mixture(context: &Context) -> Result<(Context, Observed), PaperError> {
     Ok((context, observed))
 }
 
-/// The fraction of A along y, with the layer of A, which begins at y = 0, and the places at which it is 10, 50
-/// and 90 % of the way from one phase to the other.
+/// The fraction of A along y, from the middle of its layer.
 struct Layers {
     fraction: Vec<(f64, Measured)>,
-    /// Fractions of A amid the layers of A and of B.
+    /// Fractions of A amid the layers of B and of A.
     phases: [Measured; 2],
     /// From 10 to 90 %, averaged over both interfaces.
     width: f64,
 }
 
-fn layers(observed: &Observed) -> Layers {
+fn composition(observed: &Observed) -> Layers {
     let fraction = profile(observed, "composition_profile", "fraction_A");
-    let count = fraction.len();
-    let mean = |from: usize, to: usize| {
-        let some: Vec<Measured> = fraction.iter().skip(from).take(to - from).map(|(_, c)| *c).collect();
-        let n = some.len() as f64;
-        let variance: f64 = some.iter().map(|c| c.error * c.error).sum();
-        // Neighbouring bins move together: their errors are not averaged out.
-        Measured { value: some.iter().map(|c| c.value).sum::<f64>() / n, error: (variance / n).sqrt() }
-    };
-    // The layers are halves of the box, y from 0 to 10 is that of A at the start.
-    let phases = [mean(count / 8, 3 * count / 8), mean(5 * count / 8, 7 * count / 8)];
-    let [a, b] = phases.map(|p| p.value);
+    let phases = layers(&fraction);
+    let [b, a] = phases.map(|p| p.value);
     let bin = fraction.get(1).map_or(f64::NAN, |(y, _)| y - fraction[0].0);
     let between = fraction.iter().filter(|(_, c)| (0.1..0.9).contains(&((c.value - b) / (a - b)))).count();
     Layers { phases, width: 0.5 * bin * between as f64, fraction }
@@ -57,7 +47,7 @@ pub fn fig10(context: &Context) -> Result<Outcome, PaperError> {
     let mut outcome = Outcome::default();
     let (context, observed) = mixture(context)?;
     outcome.equal("kinetic temperature", observed.temperature(), KT, 0.05);
-    let width = layers(&observed).width;
+    let width = composition(&observed).width;
     let mut lines = Vec::new();
     for (species, column) in [("A", "msd_A"), ("B", "msd_B")] {
         let msd = profile(&observed, "msd", column);
@@ -85,12 +75,12 @@ pub fn fig10(context: &Context) -> Result<Outcome, PaperError> {
 pub fn fig11(context: &Context) -> Result<Outcome, PaperError> {
     let mut outcome = Outcome::default();
     let (_, observed) = mixture(context)?;
-    let layers = layers(&observed);
+    let layers = composition(&observed);
     let theory = mean_field(BINARY, KT)?;
     let binodal = theory.composition_binodal(RHO)?;
     // "Goes basically to zero"; mean field has 2 %. One in a hundred can be read in the figure.
-    outcome.equal("fraction of A where B is", layers.phases[1], binodal.composition[0], 0.01);
-    outcome.equal("fraction of A where A is", layers.phases[0], binodal.composition[1], 0.01);
+    outcome.equal("fraction of A where B is", layers.phases[0], binodal.composition[0], 0.01);
+    outcome.equal("fraction of A where A is", layers.phases[1], binodal.composition[1], 0.01);
     // "Keeps its width within r_c".
     outcome.at_most("width from 10 to 90 %", exact(layers.width), 1.0);
     // The dip of the density "is not large compared with the typical fluctuations": of a square of edge r_c.

@@ -4,7 +4,7 @@ use super::{DEMIXING, HUGGINS, fluid};
 use crate::bulk::Observed;
 use crate::calibrate::Point;
 use crate::observe::Measured;
-use crate::papers::case::{Outcome, bare, exact, profile};
+use crate::papers::case::{Outcome, bare, exact, layers, profile};
 use crate::papers::context::{Context, PaperError, mean_field, with_parameters};
 
 pub fn table3(context: &Context) -> Result<Outcome, PaperError> {
@@ -45,31 +45,17 @@ fn demixed(context: &Context, strength: f64) -> Result<Observed, PaperError> {
         "kT = 1.0\nseed = 1\nbox = [4.0, 4.0, 16.0]\ndensity = 16.0\ndt = 0.01\nequilibrate = 2500\nsteps = 3500\n\
          [[part]]\nshape = \"layer\"\nface = \"zlo\"\nthickness = 8.0\nspecies = \"A\"\nmin_distance = 0.2\n\
          [[part]]\nshape = \"layer\"\nface = \"zhi\"\nthickness = 8.0\nspecies = \"B\"\nmin_distance = 0.2\n\
-         [output]\nthermo = 0\n[observe]\nevery = 20\ntemperature = true\ndensity_profile = { recentre = false }\n\
-         composition_profile = { recentre = false }\n",
+         [output]\nthermo = 0\n[observe]\nevery = 20\ntemperature = true\ndensity_profile = { recentre = \"A\" }\n\
+         composition_profile = { recentre = \"A\" }\n",
         SCENE,
     );
     context.shipped(&format!("e{strength}"), &model, scene, &[])
 }
 
-/// Fraction of A in either phase, from the quarters of the box that are purest.
+/// Fraction of A in the layer of B and in that of A, which is in the middle of the profile: a quarter of the box amid
+/// each.
 fn phases(observed: &Observed) -> [Measured; 2] {
-    let fraction = profile(observed, "composition_profile", "fraction_A");
-    let count = fraction.len();
-    let quarter = count / 4;
-    let mean = |from: usize| {
-        let some: Vec<Measured> = (from..from + quarter).map(|k| fraction[k % count].1).collect();
-        let n = quarter as f64;
-        let variance: f64 = some.iter().map(|c| c.error * c.error).sum();
-        // Neighbouring bins move together: their errors are not averaged out.
-        Measured { value: some.iter().map(|c| c.value).sum::<f64>() / n, error: (variance / n).sqrt() }
-    };
-    let mut all: Vec<Measured> = (0..count).map(mean).collect();
-    all.sort_by(|a, b| a.value.total_cmp(&b.value));
-    match all[..] {
-        [low, .., high] => [low, high],
-        _ => [Measured::NONE; 2],
-    }
+    layers(&profile(observed, "composition_profile", "fraction_A"))
 }
 
 /// Compositions of coexisting phases in mean field at the density of the mixture, as the paper has its critical point.
