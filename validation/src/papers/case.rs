@@ -175,7 +175,8 @@ pub fn profile(observed: &Observed, name: &str, column: &str) -> Vec<(f64, Measu
 pub fn layers(profile: &[(f64, Measured)]) -> [Measured; 2] {
     let count = profile.len();
     let mean = |from: usize| {
-        let some: Vec<Measured> = profile.iter().cycle().skip(from).take(count / 4).map(|(_, c)| *c).collect();
+        let some: Vec<Measured> =
+            profile.iter().cycle().skip(from).take(count / 4).map(|(_, c)| *c).collect();
         let n = some.len() as f64;
         let variance: f64 = some.iter().map(|c| c.error * c.error).sum();
         // Neighbouring bins move together: their errors are not averaged out.
