@@ -72,7 +72,7 @@ pub const CASES: &[Case] = &[
     ),
     case(
         "pagonabarraga-fig12",
-        "binary mixture: critical temperature and tension near it (theory)",
+        "binary mixture: critical temperature, tension of mean field near it, and measured",
         tension::fig12,
     ),
     case(
