@@ -1,6 +1,7 @@
 //! Loops over particles, compiled for the vectors of each instruction set.
 
 use psidpd_passes::instruction_set::InstructionSet;
+#[cfg(target_arch = "x86_64")]
 use psidpd_passes::settings::Instructions;
 
 /// A loop that the compiler makes vectors of. Nothing in it is contracted or put into another order: the results are

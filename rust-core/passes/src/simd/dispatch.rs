@@ -3,6 +3,7 @@
 use super::Isa;
 use super::portable::Portable;
 use crate::instruction_set::InstructionSet;
+#[cfg(target_arch = "x86_64")]
 use crate::settings::Instructions;
 
 /// A piece of work that is written once for all instruction sets.
