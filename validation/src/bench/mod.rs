@@ -4,6 +4,7 @@
 //! the machine down for a while slows them all; ratios are taken within a round. [`contender`] says who is timed,
 //! [`deck`] runs LAMMPS and [`native`] the runner.
 
+mod clock;
 pub mod contender;
 pub mod deck;
 mod error;
@@ -147,6 +148,7 @@ pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Out
                 .map(|(name, _)| name.to_owned())
                 .collect(),
             better: better(),
+            gigahertz: clock::gigahertz(),
             load,
         },
         lammps: LammpsFacts { version, missing },

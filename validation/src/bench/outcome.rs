@@ -41,6 +41,8 @@ pub struct Machine {
     pub instructions: Vec<String>,
     /// The other instruction sets, each with what the processor lacks for it.
     pub better: Vec<String>,
+    /// Gigahertz of the processor's time stamp counter, which cycles are counted by.
+    pub gigahertz: Option<f64>,
     /// Processes that were running or waiting when the benchmark began, by the system's mean over a minute; above
     /// a few tenths figures are not to be trusted.
     pub load: Option<f64>,

@@ -87,14 +87,28 @@ pub fn plugin_parts(outcome: &Outcome) -> Table {
 const NATIVE_PARTS: [&str; 6] = ["sort", "pairs", "psi", "many-body", "forces", "integrate"];
 const LAMMPS_PARTS: [&str; 6] = ["pair", "neigh", "comm", "output", "modify", "other"];
 
+/// What the cycles of the tables are, in words.
+pub fn cycles(machine: &Machine) -> String {
+    machine.gigahertz.map_or_else(
+        || "no counter of cycles on this machine".into(),
+        |clock| format!("cycles of the processor's nominal clock, {clock:.2} GHz by its time stamp counter"),
+    )
+}
+
 /// Where the time goes, of the runs for which `wanted` says so.
 fn parts(outcome: &Outcome, wanted: impl Fn(&Run) -> bool, names: &[&str]) -> Table {
-    let header = ["fluid", "particles", "code"].iter().chain(names).chain(&["all"]);
+    let header =
+        ["fluid", "particles", "code"].iter().chain(names).chain(&["all", "cycles", "cycles per pair"]);
+    let cycles = |nanoseconds: f64| match outcome.machine.gigahertz {
+        Some(clock) => format!("{:.0}", nanoseconds * clock),
+        None => "–".into(),
+    };
     let mut table = Table::new(header.map(|s| (*s).to_owned()));
     for run in outcome.runs.iter().filter(|r| wanted(r)) {
         let mut row = vec![run.fluid.to_owned(), run.particles.to_string(), run.code.clone()];
         row.extend(names.iter().map(|n| run.parts.get(*n).map_or_else(|| "–".into(), |t| format!("{t:.1}"))));
         row.push(format!("{:.1}", run.nanoseconds_per_particle_step));
+        row.extend([run.nanoseconds_per_particle_step, run.nanoseconds_per_pair].map(cycles));
         table.push(row);
     }
     table
@@ -231,6 +245,7 @@ pub fn report(outcome: &Outcome) -> Result<String, BenchError> {
             ("machine".into(), outcome.machine.processor.clone()),
             ("instruction sets".into(), outcome.machine.instructions.join(", ")),
             ("instructions".into(), instructions(&outcome.machine)),
+            ("cycles".into(), cycles(&outcome.machine)),
             (
                 "load before".into(),
                 outcome.machine.load.map_or_else(|| "unknown".into(), |l| format!("{l:.2}")),

@@ -105,7 +105,8 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     ] {
         println!("{heading}\n\n{}", table.to_text());
     }
-    println!("{}, {}\n", outcome.machine.processor, page::instructions(&outcome.machine));
+    let machine = &outcome.machine;
+    println!("{}, {}; {}\n", machine.processor, page::instructions(machine), page::cycles(machine));
     if let Some(note) = page::few(&outcome.options) {
         println!("{note}\n");
     }

@@ -1,0 +1,37 @@
+//! The clock that cycles are counted by.
+
+/// How long it is measured.
+#[cfg(target_arch = "x86_64")]
+const WHILE: std::time::Duration = std::time::Duration::from_millis(20);
+
+/// Gigahertz of the processor's time stamp counter, which ticks at one rate whatever clock the cores have at the time: cycles
+/// of the processor at its nominal clock. `None` where there is no such counter.
+#[cfg(target_arch = "x86_64")]
+pub fn gigahertz() -> Option<f64> {
+    // SAFETY: every processor of this architecture that runs Linux has the instruction.
+    let ticks = || unsafe { std::arch::x86_64::_rdtsc() };
+    let (begin, first) = (std::time::Instant::now(), ticks());
+    std::thread::sleep(WHILE);
+    let count = ticks().checked_sub(first)?;
+    let rate = 1e-9 * count as f64 / begin.elapsed().as_secs_f64();
+    // Beyond this it is not a clock of a processor.
+    (0.1..20.0).contains(&rate).then_some(rate)
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+pub fn gigahertz() -> Option<f64> {
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    /// Two measurements agree: a counter that is no clock would give two numbers.
+    #[test]
+    fn it_ticks_at_one_rate() {
+        let [a, b] = [(); 2].map(|()| super::gigahertz());
+        match (a, b) {
+            (Some(a), Some(b)) => assert!((a / b - 1.0).abs() < 0.05, "{a} {b}"),
+            other => assert_eq!(other, (None, None)),
+        }
+    }
+}
