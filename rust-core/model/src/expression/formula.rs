@@ -155,6 +155,22 @@ impl Formula {
     ///
     /// If the formula depends on a variable that `at` does not have.
     pub fn value(&self, at: &[f64]) -> f64 {
+        let values = self.values(at);
+        values[values.len() - 1]
+    }
+
+    /// The greatest magnitude among constants, variables and results of operations at a point, which scales how rounding
+    /// errors show in the value; of numbers alone, not of NaN.
+    ///
+    /// # Panics
+    ///
+    /// As [`value`](Self::value).
+    pub fn greatest(&self, at: &[f64]) -> f64 {
+        self.values(at).iter().fold(0.0, |most, value| value.abs().max(most))
+    }
+
+    /// Of every node.
+    fn values(&self, at: &[f64]) -> Vec<f64> {
         let mut values: Vec<f64> = Vec::with_capacity(self.nodes.len());
         for &node in self.nodes.iter() {
             let v = |id: Id| values[id.index()];
@@ -178,7 +194,7 @@ impl Formula {
             };
             values.push(value);
         }
-        values[values.len() - 1]
+        values
     }
 }
 
@@ -196,6 +212,14 @@ mod tests {
     fn slope(text: &str) -> String {
         let slope = formula(text).derivative(0).unwrap();
         slope.with_names(&["x", "y"]).to_string()
+    }
+
+    #[test]
+    fn the_greatest_number_on_the_way_is_found() {
+        assert_eq!(formula("tanh(1e20*x)").greatest(&[-3.0, 5.0]), 3e20);
+        assert_eq!(formula("x").greatest(&[-3.0, 5.0]), 3.0);
+        // Of numbers alone.
+        assert_eq!(formula("sqrt(x)").greatest(&[-3.0, 5.0]), 3.0);
     }
 
     #[test]
