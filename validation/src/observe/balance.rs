@@ -112,7 +112,7 @@ fn a_drop_balances() {
         simulation.advance(300, dt, Integrator::VelocityVerlet).unwrap();
     }
     let h = 0.1;
-    let residuals: Vec<f64> = stretches(&scene, &mut simulation, 25)
+    let residuals: Vec<f64> = stretches(&scene, &mut simulation, 32)
         .iter()
         .map(|out| {
             let profile = find(out, "drop_profile");
@@ -128,41 +128,4 @@ fn a_drop_balances() {
         .collect();
     let found = Measured::mean(&residuals);
     assert!(found.value.abs() < 6.0 * found.error && found.error < 0.18, "{found:?}");
-}
-
-/// Of sixteen runs of a liquid, errors that are reported over the spread of what they are errors of: by chance beyond these
-/// bounds for one quantity in 10⁴.
-#[test]
-fn errors_in_a_liquid_are_the_spread_over_seeds() {
-    let observe = "[observe]\nevery = 5\ntemperature = true\npressure = true\nenergy = true\n";
-    let scene = scene("[3.0, 3.0, 3.0]", "kind = \"lattice\"\ndensity = 6.05", observe);
-    let run = |seed: u64| {
-        let mut simulation = Simulation::new(&scene.model, 1.0, scene.initial_state(), seed).unwrap();
-        simulation.prepare(0.01, Want::FORCES).unwrap();
-        simulation.advance(300, 0.01, Integrator::VelocityVerlet).unwrap();
-        let mut observers = Observers::new(&scene.observe, ["run"]);
-        for _ in 0..300 {
-            simulation.record_flux(false);
-            simulation.advance(4, 0.01, Integrator::VelocityVerlet).unwrap();
-            simulation.record_flux(true);
-            simulation.step(0.01, Integrator::VelocityVerlet, Want::TOTALS).unwrap();
-            observers.sample(simulation.view(0.0), "run");
-        }
-        observers.finish()
-    };
-    let runs: Vec<Vec<Observation>> = (0..16).map(|seed| run(100 + seed)).collect();
-    for (observable, quantity) in [
-        ("temperature", "kinetic"),
-        ("pressure", "carried"),
-        ("pressure", "conservative"),
-        ("pressure", "total"),
-        ("energy", "potential"),
-    ] {
-        let found: Vec<Measured> =
-            runs.iter().map(|all| find(all, observable).scalar(quantity).unwrap()).collect();
-        let mean = found.iter().map(|m| m.value).sum::<f64>() / 16.0;
-        let spread = (found.iter().map(|m| (m.value - mean).powi(2)).sum::<f64>() / 15.0).sqrt();
-        let reported = found.iter().map(|m| m.error).sum::<f64>() / 16.0;
-        assert!((0.45..1.8).contains(&(spread / reported)), "{observable} {quantity}: {spread} {reported}");
-    }
 }

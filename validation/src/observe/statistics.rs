@@ -10,6 +10,12 @@ pub const MINIMUM_SAMPLES: usize = 8;
 /// fitted, which bounds the cost.
 const LONGEST: usize = 16_384;
 
+/// The longest blocks that autoregressions are fitted to, in samples, as a power of two.
+const BLOCKINGS: usize = 4;
+
+/// The fewest blocks that are fitted.
+const FEWEST_BLOCKS: usize = 24;
+
 /// Above this many degrees of freedom Student's t is the normal distribution
 /// to more digits than an error bar has.
 const NORMAL_DEGREES: f64 = 1e5;
@@ -54,15 +60,21 @@ impl Estimate {
 /// Mean and error bar of a stationary series.
 ///
 /// The variance of a mean of N samples is S(0)/N, with S(0) = C(0) + 2 Σ C(t)
-/// the spectrum at zero frequency. It is that of the autoregression
-/// x_t = −Σ a_k x_{t−k} + e_t which fits the series best, S(0) = ⟨e²⟩/(1 + Σ a_k)²,
-/// by Burg's recursion, of the order that the corrected information
-/// criterion of Akaike prefers (Hurvich and Tsai, Biometrika 76, 297 (1989)).
+/// the spectrum at zero frequency. That of an autoregression
+/// x_t = −Σ a_k x_{t−k} + e_t is S(0) = ⟨e²⟩/(1 + Σ a_k)². It is fitted by Burg's
+/// recursion, and S(0) averaged over its orders with the weights of the corrected information
+/// criterion of Akaike (Hurvich and Tsai, Biometrika 76, 297 (1989); Burnham and Anderson, Sociol.
+/// Methods Res. 33, 261 (2004)).
 /// A sum over ρ(t) up to a window, and blocks, do as well where ρ(t) decays;
 /// of series that swing, as pressures do, or whose samples make up for each other, they
 /// tell twice the error and more, unless the series is much longer than its swings.
 ///
-/// A correlation that is slower than the series is long, or weak and slow, is
+/// The criterion asks how well the next sample is predicted. A slow mode with a small share of the variance
+/// adds little to that, but much to the error of the mean. In means of blocks its share is larger. So the
+/// variance is the mean of those by the samples and by blocks of 2, 4, 8 and 16 of them, as long as there
+/// are 24 blocks.
+///
+/// A correlation that is slower than the series is long is
 /// not seen by this nor by any other estimate. No error is below s/N.
 ///
 /// # Errors
@@ -73,7 +85,7 @@ pub fn estimate(series: &[f64]) -> Result<Estimate, StatisticsError> {
     let deviations = Deviations::of(series)?;
     let n = series.len() as f64;
     let variance = sum_of_squares(&deviations.values) / (n - 1.0);
-    let error = autoregression(&deviations.values).max(variance.sqrt() / n);
+    let error = error_by_blocks(&deviations.values).max(variance.sqrt() / n);
     if !(error.is_finite() && variance.is_finite()) {
         return Err(StatisticsError::Overflow);
     }
@@ -188,27 +200,41 @@ fn halved(x: &[f64]) -> Vec<f64> {
     x.chunks_exact(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect()
 }
 
-/// Error of the mean by the autoregression that fits best.
-fn autoregression(deviations: &[f64]) -> f64 {
-    let mut coarse;
-    let mut x = deviations;
+/// Error of the mean, its square averaged over blocks of several lengths.
+fn error_by_blocks(deviations: &[f64]) -> f64 {
+    let mut x = deviations.to_vec();
     while x.len() > LONGEST {
-        coarse = halved(x);
-        x = &coarse;
+        x = halved(&x);
     }
+    let (mut sum, mut levels) = (0.0, 0.0);
+    for _ in 0..=BLOCKINGS {
+        let error = autoregression(&x);
+        (sum, levels) = (sum + error * error, levels + 1.0);
+        x = halved(&x);
+        if x.len() < FEWEST_BLOCKS {
+            break;
+        }
+    }
+    (sum / levels).sqrt()
+}
+
+/// Error of the mean by autoregressions of all orders, as likely as they are.
+fn autoregression(x: &[f64]) -> f64 {
     let count = x.len();
     let n = count as f64;
-    let largest = x.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    let mean = x.iter().sum::<f64>() / n;
+    let largest = x.iter().fold(0.0_f64, |most, x| most.max((x - mean).abs()));
     if largest == 0.0 {
         return 0.0;
     }
     // Squares of numbers near 1 neither overflow nor vanish.
-    let (mut forward, mut backward): (Vec<f64>, Vec<f64>) =
-        x.iter().map(|x| (x / largest, x / largest)).unzip();
+    let scaled = |x: &f64| (x - mean) / largest;
+    let (mut forward, mut backward): (Vec<f64>, Vec<f64>) = x.iter().map(|x| (scaled(x), scaled(x))).unzip();
     let highest = (count / 4).min((10.0 * n.log10()) as usize);
     let mut residue = sum_of_squares(&forward) / n;
     let mut coefficients: Vec<f64> = Vec::with_capacity(highest);
-    let (mut best, mut error) = (f64::INFINITY, 0.0);
+    // The criterion of each order, and the variance of the mean.
+    let mut orders: Vec<(f64, f64)> = Vec::with_capacity(highest + 1);
     for order in 0..=highest {
         if order > 0 {
             let pairs = || forward[order..].iter().zip(&backward[order - 1..count - 1]);
@@ -233,14 +259,20 @@ fn autoregression(deviations: &[f64]) -> f64 {
         }
         let parameters = (order + 1) as f64;
         let criterion = n * residue.ln() + 2.0 * parameters * n / (n - parameters - 1.0).max(1.0);
-        if criterion < best {
-            best = criterion;
-            let gain = 1.0 + coefficients.iter().sum::<f64>();
-            // The mean and the coefficients are fitted: that many samples tell nothing about the rest.
-            error = (residue * (1.0 + parameters / n) / n).sqrt() / gain.abs() * largest;
+        let gain = 1.0 + coefficients.iter().sum::<f64>();
+        // The mean and the coefficients are fitted: that many samples tell nothing about the rest.
+        let variance = residue * (1.0 + parameters / n) / n / (gain * gain);
+        if criterion.is_finite() && variance.is_finite() {
+            orders.push((criterion, variance));
         }
     }
-    error
+    let best = orders.iter().fold(f64::INFINITY, |least, (criterion, _)| least.min(*criterion));
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for (criterion, variance) in orders {
+        let weight = (0.5 * (best - criterion)).exp();
+        (sum, weights) = (sum + weight * variance, weights + weight);
+    }
+    (sum / weights).sqrt() * largest
 }
 
 /// P(|T| ≥ z) for z > 0 and a positive number of degrees of freedom.
@@ -338,7 +370,7 @@ mod tests {
         let sum = |a: Vec<f64>, b: Vec<f64>, share: f64| -> Vec<f64> {
             a.iter().zip(b).map(|(a, b)| a + share * b).collect()
         };
-        let cases: [(&str, Make); 9] = [
+        let cases: [(&str, Make); 11] = [
             ("independent", &|n, rng| autoregressive(0.0, n, rng)),
             ("fast", &|n, rng| autoregressive(0.5, n, rng)),
             ("slow", &|n, rng| autoregressive(0.9, n, rng)),
@@ -350,6 +382,15 @@ mod tests {
                 sum(swinging(0.95, 20.0, n, rng), autoregressive(0.0, n, rng), 5.0)
             }),
             ("both", &|n, rng| sum(autoregressive(0.8, n, rng), autoregressive(-0.5, n, rng), 1.0)),
+            // Modes that relax at the rates k² of diffusion: the velocity at a place in a fluid.
+            ("relaxing", &|n, rng| {
+                let rate = n as f64 / 32.0;
+                let modes = (1..8).map(|k| autoregressive((-f64::from(k * k) / rate).exp(), n, rng));
+                modes.reduce(|a, b| sum(a, b, 1.0)).unwrap_or_default()
+            }),
+            ("slow, with noise", &|n, rng| {
+                sum(autoregressive(0.0, n, rng), autoregressive((-32.0 / n as f64).exp(), n, rng), 0.33)
+            }),
         ];
         for (name, make) in cases {
             for n in [100, 511] {

@@ -298,7 +298,9 @@ impl Meter for Drop {
         });
         let at = |k: usize| [found.get(k).copied().unwrap_or(Measured::NONE)];
         let d = self.dimensions as f64;
-        let gyration = self.size.jackknife(|means| Some(((d + 2.0) / d * means[2]).sqrt()));
+        let squares = self.size.mean(2);
+        let radius = ((d + 2.0) / d * squares.value).sqrt();
+        let gyration = Measured { value: radius, error: 0.5 * radius * squares.error / squares.value };
         let samples = self.shells.samples();
         let scalar = Observation::new("drop", "Drop", Kind::Scalar)
             .samples(samples)
