@@ -10,6 +10,7 @@ use psidpd::observe::{Column, Kind, Observation};
 use psidpd::run::run_scene;
 use psidpd::scene::Scene;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
+use std::f64::consts::FRAC_1_SQRT_2;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Spread over error that error bars should have.
@@ -17,6 +18,11 @@ const BOUNDS: [f64; 2] = [0.8, 1.25];
 
 /// Probability that a check fails by chance if all true ratios are at one of the bounds; it is far less if they are near 1.
 const FALSE_ALARMS: f64 = 0.01;
+
+/// Sizes of noise: the root of a mean square of what is 0 but for noise. Their derivatives by the means are not those at the true
+/// means, where they vanish, and by them errors are √2 too large: of K numbers of unit variance the sum of squares has the
+/// variance 2K, and its derivatives make 4K of it.
+const NOISE: [&str; 2] = ["flow poiseuille.deviation", "pendant pendant.residual"];
 
 /// A scene whose runs differ in their seeds alone.
 struct Case {
@@ -298,7 +304,8 @@ fn check(found: &[Ratio], seeds: usize) {
             String::new()
         };
         println!("{:46} {:5.2}  {bins}", r.name, r.ratio);
-        if !(limits[0]..limits[1]).contains(&r.ratio) {
+        let expected = if NOISE.contains(&r.name.as_str()) { FRAC_1_SQRT_2 } else { 1.0 };
+        if !(limits[0]..limits[1]).contains(&(r.ratio / expected)) {
             outside.push(format!("{} {:.2}", r.name, r.ratio));
         }
     }
@@ -307,16 +314,18 @@ fn check(found: &[Ratio], seeds: usize) {
     assert!(outside.is_empty(), "{outside:?}");
 }
 
-/// A short liquid.
+/// Quantities that forget in a few samples, and velocities that do not: errors that took samples for independent ones
+/// would be half of what they should be.
 #[test]
-fn errors_in_a_liquid_are_the_spread_over_seeds() {
-    let found = ratios(&LIQUID, 24, Some(1000));
-    assert!(found.len() > 40);
+fn errors_of_short_runs_are_the_spread_over_seeds() {
+    let cases = [(LIQUID, 800), (FLOW, 2500)];
+    let found: Vec<Ratio> = cases.iter().flat_map(|(case, steps)| ratios(case, 24, Some(*steps))).collect();
+    assert!(found.len() > 50);
     check(&found, 24);
 }
 
 #[test]
-#[ignore = "six minutes: cargo test --release -p psidpd --test coverage -- --ignored --nocapture"]
+#[ignore = "three minutes of CPU: cargo test --release -p psidpd --test coverage -- --ignored --nocapture"]
 fn errors_are_the_spread_over_seeds() {
     let cases = [LIQUID, MIXED, SLAB, DROP, FLOW, PENDANT];
     let found: Vec<Ratio> = cases.iter().flat_map(|case| ratios(case, 64, None)).collect();
