@@ -19,8 +19,8 @@ const BOUNDS: [f64; 2] = [0.8, 1.25];
 /// Probability that a check fails by chance if all true ratios are at one of the bounds; it is far less if they are near 1.
 const FALSE_ALARMS: f64 = 0.01;
 
-/// Sizes of noise: the root of a mean square of what is 0 but for noise. Their derivatives by the means are not those at the true
-/// means, where they vanish, and by them errors are √2 too large: of K numbers of unit variance the sum of squares has the
+/// Sizes of noise: the root of a mean square of what is 0 but for noise. Their derivatives by the means are not those at
+/// the true means, where they vanish, and by them errors are √2 too large: of K numbers of unit variance the sum of squares has the
 /// variance 2K, and its derivatives make 4K of it.
 const NOISE: [&str; 2] = ["flow poiseuille.deviation", "pendant pendant.residual"];
 

@@ -219,8 +219,8 @@ impl Series {
     ///
     /// The series is cut into twenty to forty stretches, or as many as there are rows. The means are moved
     /// towards those of each stretch in turn; what that adds to the value makes a series, whose mean has the error of
-    /// [`estimate`], so stretches may be correlated. Of K stretches the step is 1/√K of the way: about one standard deviation of
-    /// the means. A function that jumps by a little, as a median or a fit to points that come and go, then changes
+    /// [`estimate`], so stretches may be correlated. Of K stretches the step is 1/√K of the way: about one standard
+    /// deviation of the means. A function that jumps by a little, as a median or a fit to points that come and go, then changes
     /// by what it varies from run to run. The smaller steps of leaving out a stretch make of such jumps twice the error.
     pub fn jackknife(&self, function: impl Fn(&[f64]) -> Option<f64>) -> Measured {
         self.jackknife_many(|means| function(means).map(|x| vec![x])).pop().unwrap_or(Measured::NONE)
@@ -359,8 +359,8 @@ mod tests {
         }
     }
 
-    /// Of series that swing, stretches make up for each other; and a median jumps. Leaving out one stretch in turn, as if they
-    /// were independent, makes the errors of both 1.4 to 2.2 times too large. The seed is fixed.
+    /// Of series that swing, stretches make up for each other; and a median jumps. Leaving out one stretch in turn, as if
+    /// they were independent, makes the errors of both 1.4 to 2.2 times too large. The seed is fixed.
     #[test]
     fn swings_and_jumps_have_no_larger_errors() {
         let mut rng = StdRng::seed_from_u64(83);
