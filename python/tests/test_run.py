@@ -119,7 +119,14 @@ def test_ctrl_c_ends_a_run_that_can_be_resumed(tmp_path):
         "    print(stop)\n"
         "    sys.exit(7)\n"
     )
-    run = subprocess.Popen([sys.executable, "-c", program], cwd=tmp_path, stdout=subprocess.PIPE, text=True)
+    run = subprocess.Popen(
+        [sys.executable, "-c", program],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        text=True,
+        # In the background of a script, programs are started deaf to it.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
     thermo = tmp_path / "out" / "thermo.csv"
     while not (thermo.is_file() and len(thermo.read_text().splitlines()) > 3):
         assert run.poll() is None
