@@ -110,8 +110,21 @@ static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
 
 /// Runs the program.
 pub fn main() -> ExitCode {
+    end_quietly_with_the_reader();
     let arguments = Arguments::from_arg_matches(&command().get_matches());
     ExitCode::from(carry_out(arguments.unwrap_or_else(|error| error.exit())))
+}
+
+/// A reader that has seen enough, as `| head`, ends the program; `println!` would report a panic.
+fn end_quietly_with_the_reader() {
+    let report = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        let message = panic.payload_as_str().unwrap_or_default();
+        if message.starts_with("failed printing to stdout") && message.contains("Broken pipe") {
+            std::process::exit(0);
+        }
+        report(panic);
+    }));
 }
 
 /// Runs the program inside another, as Python, and returns the exit code. The first of the arguments is the name of the

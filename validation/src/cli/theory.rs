@@ -189,6 +189,9 @@ fn one(arguments: &Arguments, model: &Model, kt: f64, scope: &mut Scope) -> Resu
     for (name, value) in &answers {
         println!("{name}: {}", shown(value));
     }
+    if species == 2 {
+        println!("composition and spinodal: the fraction of {}", model.species()[0]);
+    }
     let known = published(model, kt, Some(total));
     scope.tension.extend(known.iter().filter(|p| p.0 == "tension").map(|p| (kt, p.1, "published")));
     let measured = if arguments.measure {

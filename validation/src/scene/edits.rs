@@ -97,14 +97,28 @@ pub fn edit_scene(
     Ok((document.to_string(), of_model))
 }
 
-/// The text of a model with edits made. A name alone may be a parameter.
+/// The text of a model with edits made. A name alone may be a parameter; `model.` before a key, as in a scene, is allowed.
 ///
 /// # Errors
-/// As `edit_scene`.
+/// As `edit_scene`; a parameter that the model does not have, which would change nothing.
 pub fn edit_model(text: &str, edits: &[Edit]) -> Result<String, FileError> {
     let mut document = parse(text);
     for edit in edits {
-        set(&mut document, edit)?;
+        let mut edit = edit.clone();
+        if edit.path[0] == "model" && edit.path.len() > 1 {
+            edit.path.remove(0);
+        }
+        if let [table, name] = edit.path.as_slice()
+            && table == "parameters"
+        {
+            let table = document.get("parameters").and_then(Item::as_table_like);
+            let known: Vec<&str> = table.map_or_else(Vec::new, |t| t.iter().map(|(key, _)| key).collect());
+            if !known.contains(&name.as_str()) {
+                let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+                return Err(edit.error(format!("the model has no parameter {name}; its parameters: {known}")));
+            }
+        }
+        set(&mut document, &edit)?;
     }
     Ok(document.to_string())
 }
@@ -241,6 +255,15 @@ mod tests {
         assert!(text.contains("model = \"other.toml\""));
         let text = edit_model("species = [\"F\"]\n[parameters]\nA = -40.0\n", &model[..1]).unwrap();
         assert_eq!(text.parse::<toml::Table>().unwrap()["parameters"]["A"].as_integer(), Some(-50));
+    }
+
+    #[test]
+    fn parameters_of_a_model_must_be_there() {
+        let model = "species = [\"F\"]\n[parameters]\nA = -40.0\n";
+        let edit = |text: &str| edit_model(model, &[text.parse().unwrap()]).map_err(|e| e.to_string());
+        let table: toml::Table = edit("model.parameters.A=-50").unwrap().parse().unwrap();
+        assert_eq!(table["parameters"]["A"].as_integer(), Some(-50));
+        assert!(edit("parameters.AA=-50").unwrap_err().contains("its parameters: A"));
     }
 
     #[test]
