@@ -81,7 +81,7 @@ pub enum TheoryError {
     NoCoexistence,
     /// The gradient coefficient is not positive between the two phases, so that the square-gradient
     /// free energy favours interfaces (Pagonabarraga and Frenkel, text after eq. 30).
-    #[error("the square-gradient coefficient is {coefficient} at {at}: no stable planar interface")]
+    #[error("the square-gradient coefficient is {coefficient:.6} at {at:.6}: no stable planar interface")]
     GradientNotPositive {
         /// Density or composition.
         at: f64,

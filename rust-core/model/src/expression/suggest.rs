@@ -16,17 +16,19 @@ pub fn closest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         .map(|(_, candidate)| candidate.to_owned())
 }
 
-/// The edit distance, letters of the wrong case for free.
+/// The edit distance, letters of the wrong case for free; two neighbours in the wrong order are one slip.
 fn slips(a: &str, b: &str) -> usize {
-    let (a, b) = (a.to_ascii_lowercase(), b.to_ascii_lowercase());
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, x) in a.bytes().enumerate() {
-        let mut diagonal = i;
-        row[0] = i + 1;
-        for (j, y) in b.bytes().enumerate() {
-            let replace = diagonal + usize::from(x != y);
-            diagonal = row[j + 1];
-            row[j + 1] = replace.min(diagonal + 1).min(row[j] + 1);
+    let (a, b) = (a.to_ascii_lowercase().into_bytes(), b.to_ascii_lowercase().into_bytes());
+    let (mut before, mut row): (Vec<usize>, Vec<usize>) = (Vec::new(), (0..=b.len()).collect());
+    for i in 0..a.len() {
+        let two_before = std::mem::replace(&mut before, std::mem::replace(&mut row, vec![i + 1]));
+        for j in 0..b.len() {
+            let replace = before[j] + usize::from(a[i] != b[j]);
+            let mut least = replace.min(before[j + 1] + 1).min(row[j] + 1);
+            if i > 0 && j > 0 && (a[i], a[i - 1]) == (b[j - 1], b[j]) {
+                least = least.min(two_before[j - 1] + 1);
+            }
+            row.push(least);
         }
     }
     row[b.len()]
@@ -42,6 +44,8 @@ mod tests {
         assert_eq!(closest("alpha", known), Some("alpha3".into()));
         assert_eq!(closest("KT", known), Some("kT".into()));
         assert_eq!(closest("n_a", known), Some("n_A".into()));
+        assert_eq!(closest("Tk", known), Some("kT".into()));
+        assert_eq!(closest("kidn", ["kind", "radius"]), Some("kind".into()));
         assert_eq!(closest("temperature", known), None);
         assert_eq!(closest("x", ["n"]), None);
     }

@@ -91,7 +91,19 @@ fn read_curve(
                 let key = Located { value: (), span: file.span(), key: file.key().to_owned() };
                 return Ok(ExcessEntry::PressureTable { spline, density, key });
             }
-            Ok(ExcessEntry::Pressure { formula: read_formula(&pressure, table.source())?, density })
+            let names_file = |text: &str| {
+                let extension = Path::new(text).extension().and_then(|e| e.to_str());
+                extension.is_some_and(|e| e.bytes().all(|b| b.is_ascii_alphabetic()))
+            };
+            let formula = read_formula(&pressure, table.source()).map_err(|error| {
+                match pressure.as_str().is_some_and(names_file) {
+                    true => {
+                        error.with_help("p(rho) in a file is written { pressure = { table = \"p.csv\" } }")
+                    }
+                    false => error,
+                }
+            })?;
+            Ok(ExcessEntry::Pressure { formula, density })
         }
         (None, Some(pressure)) => Err(pressure
             .error(value("gives psi for a model of one species only"))

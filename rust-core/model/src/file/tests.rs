@@ -157,3 +157,16 @@ fn deep_nesting_is_an_error_not_an_overflow() {
     let dots = format!("title = \"t\"\nspecies{} = 1", ".a".repeat(100_000));
     assert!(error_of(&dots).to_string().contains("nest deeper"));
 }
+
+#[test]
+fn a_file_in_the_place_of_a_pressure_is_told_from_a_formula() {
+    let parse = |pressure: &str| {
+        let text = format!(
+            "title = \"t\"\nspecies = [\"F\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1.0\n\
+             [excess_free_energy]\nF = {{ pressure = \"{pressure}\" }}\n"
+        );
+        Model::parse("t.toml", &text).unwrap_err()
+    };
+    assert!(parse("p.csv").help().is_some_and(|help| help.contains("{ table = \"p.csv\" }")));
+    assert!(parse("rho*kT + $2.5").help().is_none_or(|help| !help.contains("table")));
+}

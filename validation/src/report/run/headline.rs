@@ -99,7 +99,7 @@ pub fn gather(
     };
     let from_rows = |name: &str| {
         let values = column(name)?;
-        let source = format!("thermo.csv, {} rows", values.len());
+        let source = format!("thermo.csv, {}", rows_in_words(values.len()));
         match estimate(values) {
             Ok(e) => Some((e.mean, Some(e.error), source)),
             Err(_) => Some((values.iter().sum::<f64>() / values.len() as f64, None, source)),
@@ -121,9 +121,9 @@ pub fn gather(
         let name = stage.map_or("run", |s| s.name.as_str());
         if rows.len() < MINIMUM_SAMPLES {
             note(format!(
-                "too short for error bars: {} rows of thermo.csv in stage \"{name}\", {MINIMUM_SAMPLES} are needed; write \
+                "too short for error bars: {} of thermo.csv in stage \"{name}\", {MINIMUM_SAMPLES} are needed; write \
                  rows more often (`thermo` in [output]) or make more steps",
-                rows.len()
+                rows_in_words(rows.len())
             ));
         }
         let few = thermo.iter().filter_map(|(key, title)| {
@@ -240,6 +240,10 @@ impl Headline {
         items.push(Item::Prose("Errors are one standard deviation of the mean.".into()));
         Some(Section { heading: "Results".into(), items })
     }
+}
+
+fn rows_in_words(count: usize) -> String {
+    if count == 1 { "1 row".to_owned() } else { format!("{count} rows") }
 }
 
 #[cfg(test)]
