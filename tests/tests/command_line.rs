@@ -385,3 +385,24 @@ fn a_table_of_pressures_makes_a_model() {
         serde_json::from_str(&std::fs::read_to_string(here.join("c.json")).unwrap()).unwrap();
     assert!((json["pressure"].as_f64().unwrap() / pressure(5.0) - 1.0).abs() < 1e-6, "{json}");
 }
+
+/// As `| head` does it: what is still to be printed is not wanted.
+#[test]
+fn a_reader_that_leaves_ends_the_program_quietly() {
+    use std::process::{Command, Stdio};
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    let mut program = Command::new(psidpd_tests::program());
+    let output = program.args(["theory", &model()]).stdout(writer).stderr(Stdio::piped()).output().unwrap();
+    assert!(output.status.success() && output.stderr.is_empty(), "{}", said(&output));
+}
+
+#[test]
+fn a_parameter_that_the_model_lacks_is_not_set() {
+    let folder = tempfile::tempdir().unwrap();
+    let theory = |set: &str| psidpd(folder.path(), &["theory", &model(), "--set", set]);
+    let misspelt = theory("parameters.AA=-50");
+    assert_eq!(misspelt.status.code(), Some(2), "{}", said(&misspelt));
+    assert!(said(&misspelt).contains("its parameters: A"), "{}", said(&misspelt));
+    assert!(theory("model.parameters.A=-50").status.success());
+}

@@ -112,7 +112,7 @@ fn a_drop_balances() {
         simulation.advance(300, dt, Integrator::VelocityVerlet).unwrap();
     }
     let h = 0.1;
-    let residuals: Vec<f64> = stretches(&scene, &mut simulation, 32)
+    let residuals: Vec<f64> = stretches(&scene, &mut simulation, 48)
         .iter()
         .map(|out| {
             let profile = find(out, "drop_profile");
