@@ -8,6 +8,7 @@ mod fluid;
 mod forces;
 mod host;
 mod input;
+mod prefetch;
 mod scheduler;
 mod slopes;
 mod sorted_particles;

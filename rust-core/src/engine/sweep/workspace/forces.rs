@@ -1,10 +1,13 @@
 //! Writes forces in the order of the host.
 
 use super::accumulators::Added;
+use super::cell_order::CellOrder;
+use super::prefetch::{PREFETCH_DISTANCE, prefetch};
 use crate::engine::vectors::{self, Loop};
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::pair_batch::accumulators::Accumulator;
 use psidpd_threads::SharedSlice;
+use std::ops::Range;
 
 /// The host's array of forces.
 #[derive(Clone, Copy)]
@@ -24,20 +27,23 @@ impl<'a> ForceSink<'a> {
     /// Writes forces on particles, or adds them to what is there; the lowest tag of those that are not finite.
     ///
     /// # Safety
-    /// No number is twice in `order`, and no other thread writes the forces on these particles.
+    /// No other thread writes the forces on these particles.
     pub unsafe fn write(
         self,
         set: InstructionSet,
-        order: &[u32],
-        owned: usize,
+        order: &CellOrder,
+        particles: Range<usize>,
         (here, before): (Added, Option<Added>),
     ) -> Option<i32> {
+        let (numbers, owned) = (&order.order[particles], order.owned);
         assert!(owned <= self.force.len(), "forces of all owned particles");
         let before = before.map(|before| before.forces);
-        let forces = PlaneForces { order, owned, here: here.forces, before, out: self.force };
-        let finite = match self.add {
-            true => vectors::run(set, WriteForces::<true>(&forces)),
-            false => vectors::run(set, WriteForces::<false>(&forces)),
+        let forces = PlaneForces { order: numbers, owned, here: here.forces, before, out: self.force };
+        let finite = match (self.add, order.exceeds_cache()) {
+            (true, true) => vectors::run(set, WriteForces::<true, true>(&forces)),
+            (true, false) => vectors::run(set, WriteForces::<true, false>(&forces)),
+            (false, true) => vectors::run(set, WriteForces::<false, true>(&forces)),
+            (false, false) => vectors::run(set, WriteForces::<false, false>(&forces)),
         };
         if finite { None } else { forces.lost(self.tag) }
     }
@@ -55,20 +61,20 @@ struct PlaneForces<'a> {
     out: SharedSlice<'a, [f64; 3]>,
 }
 
-/// Writes forces, or adds them to what is there; whether all are finite.
-struct WriteForces<'a, const ADD: bool>(&'a PlaneForces<'a>);
+/// Writes forces, or adds them to what is there, which is prefetched with `FAR`; whether all are finite.
+struct WriteForces<'a, const ADD: bool, const FAR: bool>(&'a PlaneForces<'a>);
 
-impl<const ADD: bool> Loop for WriteForces<'_, ADD> {
+impl<const ADD: bool, const FAR: bool> Loop for WriteForces<'_, ADD, FAR> {
     type Out = bool;
 
     #[inline(always)]
     fn run(self) -> bool {
         let PlaneForces { order, here, before, .. } = *self.0;
         match before {
-            None => self.0.write::<ADD>(order.iter().zip(here).map(|(k, here)| (*k, here.0))),
+            None => self.0.write::<ADD, FAR>(order.iter().zip(here).map(|(k, here)| (*k, here.0))),
             Some(before) => {
                 let pairs = order.iter().zip(here.iter().zip(before));
-                self.0.write::<ADD>(pairs.map(|(k, (here, before))| (*k, sum(here.0, before.0))))
+                self.0.write::<ADD, FAR>(pairs.map(|(k, (here, before))| (*k, sum(here.0, before.0))))
             }
         }
     }
@@ -76,10 +82,15 @@ impl<const ADD: bool> Loop for WriteForces<'_, ADD> {
 
 impl PlaneForces<'_> {
     #[inline(always)]
-    fn write<const ADD: bool>(&self, sums: impl Iterator<Item = (u32, [f64; 4])>) -> bool {
+    fn write<const ADD: bool, const FAR: bool>(&self, sums: impl Iterator<Item = (u32, [f64; 4])>) -> bool {
         let mut lost = false;
-        for (k, [x, y, z, _]) in sums {
+        let last = self.order.len().saturating_sub(1);
+        for (s, (k, [x, y, z, _])) in sums.enumerate() {
             let mut f = [x, y, z];
+            if FAR {
+                let next = self.order[(s + PREFETCH_DISTANCE).min(last)] as usize;
+                prefetch(self.out.as_ptr().wrapping_add(next));
+            }
             if k as usize >= self.owned {
                 continue;
             }

@@ -305,9 +305,8 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         assert!(slab.planes.contains(&plane), "a plane of the slab");
         let particles = self.order.particles_of(&(plane..plane + 1));
         let added = sums.of_particles(self.order, plane, particles.clone());
-        // SAFETY: an order has each particle once, those of this plane here; the plane is of this thread's slab alone.
-        let lost =
-            unsafe { out.write(self.fluid.set, &self.order.order[particles], self.order.owned, added) };
+        // SAFETY: an order has each particle once; the plane is of this thread's slab alone.
+        let lost = unsafe { out.write(self.fluid.set, self.order, particles, added) };
         slab.state.planes_written += 1;
         slab.state.lost = slab.state.lost.into_iter().chain(lost).min();
     }

@@ -3,6 +3,7 @@
 use super::SharedParticles;
 use crate::engine::sweep::workspace::cell_order::{CellOrder, TWO_TO_32};
 use crate::engine::sweep::workspace::input::{Input, VECTOR_PADDING};
+use crate::engine::sweep::workspace::prefetch::{PREFETCH_DISTANCE, prefetch};
 use crate::engine::vectors::{self, Loop};
 use psidpd_passes::ground::arithmetic::PackedParticle;
 use psidpd_passes::ground::box_geometry::BoxGeometry;
@@ -13,9 +14,6 @@ use std::ops::Range;
 /// Particles that are fetched before their coordinates are computed: loads of vectors wait for the numbers they are
 /// made of to arrive in the cache.
 const FILL_BLOCK: usize = 4 * VECTOR_PADDING;
-
-/// How many particles ahead the host's data of a particle are prefetched: the order of the host looks random.
-const PREFETCH_DISTANCE: usize = 64;
 
 impl<R: PackedParticle> SharedParticles<'_, R> {
     /// Fills places from a multiple of [`VECTOR_PADDING`] on, and up to one, or to the last. Behind the last whole
@@ -134,23 +132,6 @@ impl<R: PackedParticle> Fill<'_, R> {
             }
         }
     }
-}
-
-/// Prefetches a value, both its ends if they may be in two lines of the cache.
-#[inline(always)]
-fn prefetch<T>(value: *const T) {
-    #[cfg(all(target_arch = "x86_64", not(miri)))]
-    {
-        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-        // SAFETY: every x86-64 processor prefetches; nothing is read, and no address does harm.
-        unsafe { _mm_prefetch::<_MM_HINT_T0>(value.cast()) };
-        if size_of::<T>() > align_of::<T>() {
-            // SAFETY: every x86-64 processor prefetches; nothing is read, and no address does harm.
-            unsafe { _mm_prefetch::<_MM_HINT_T0>(value.cast::<i8>().wrapping_add(size_of::<T>() - 1)) };
-        }
-    }
-    #[cfg(not(all(target_arch = "x86_64", not(miri))))]
-    let _ = value;
 }
 
 /// How fractions become positions from the origin, and words of sixteen bits.
