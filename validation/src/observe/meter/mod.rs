@@ -6,6 +6,7 @@
 mod across;
 mod clusters;
 mod density_field;
+mod distances;
 mod drop;
 mod energy;
 mod interface_width;

@@ -1,4 +1,5 @@
 use super::Meter;
+use super::distances::{Shells, count};
 use super::species_pairs::SpeciesPairs;
 use crate::observe::frame::Frame;
 use crate::observe::keys::{Need, Table, ValueKind};
@@ -7,7 +8,6 @@ use crate::observe::request::Options;
 use crate::observe::series::Series;
 use psidpd_core::document::FileError;
 use psidpd_core::document::keys::keys;
-use psidpd_core::engine::reference::for_each_pair;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
@@ -66,11 +66,12 @@ impl Meter for Rdf {
     fn sample(&mut self, frame: &Frame) -> bool {
         let view = frame.view;
         let species = view.species;
-        let mut counts = vec![0.0; self.bins * self.pairs.len()];
-        for_each_pair(view.x, view.domain, self.dimensions, self.range, |p| {
-            let bin = ((p.r / self.range * self.bins as f64) as usize).min(self.bins - 1);
-            self.pairs.at(species[p.i], species[p.j]).for_each(|k| counts[k * self.bins + bin] += 1.0);
-        });
+        let kinds = view.model.species().len();
+        let shells = Shells { range: self.range, bins: self.bins };
+        let by_species = count(view.x, species, kinds, view.domain, self.dimensions, shells);
+        let all = (0..self.bins).map(|bin| by_species.iter().skip(bin).step_by(self.bins).sum::<u64>());
+        let of_species = if kinds > 1 { &by_species[..] } else { &[] };
+        let mut counts: Vec<f64> = all.chain(of_species.iter().copied()).map(|count| count as f64).collect();
         // Ideal pairs in a shell.
         let volume = frame.volume();
         let ideal = self.pairs.ideal_pairs(species);

@@ -1,0 +1,362 @@
+//! How many pairs of particles are how far apart.
+
+use psidpd_core::engine::PeriodicBox;
+use std::ops::Range;
+
+/// Rows of particles in a range: the narrower, the fewer pairs out of range are looked at.
+const ROWS_PER_RANGE: f64 = 3.0;
+
+/// Particles whose distances are found together, in vectors.
+const LANES: usize = 8;
+
+/// Shells beyond the range, in ranges: pairs that are looked at and are out of range are counted there, where nobody asks for
+/// them.
+const BEYOND: usize = 3;
+
+/// Equal shells of distance.
+#[derive(Debug, Clone, Copy)]
+pub struct Shells {
+    /// Up to which distance, at most half the height of the box along any period.
+    pub range: f64,
+    /// How many.
+    pub bins: usize,
+}
+
+/// Pairs in each shell: for each species `a` and each `b` from `a` on `bins` numbers. Particles without a finite position
+/// make no pairs.
+pub fn count(
+    x: &[[f64; 3]],
+    species: &[i32],
+    kinds: usize,
+    domain: &PeriodicBox,
+    dimensions: usize,
+    shells: Shells,
+) -> Vec<u64> {
+    let near = Near::new(domain, dimensions, shells);
+    let sorted = Sorted::new(x, species, &near);
+    let mut counts = Counts { numbers: vec![0; kinds * kinds * near.width], kinds, found: Vec::new() };
+    for (at, plane) in sorted.planes.iter().enumerate() {
+        for other_plane in &sorted.planes[at..] {
+            let apart = near.apart(1, &plane.across, &other_plane.across);
+            let same = std::ptr::eq(plane, other_plane);
+            for (at, row) in plane.rows.iter().enumerate() {
+                for other in &other_plane.rows[if same { at } else { 0 }..] {
+                    if let Some(chord) = near.chord(apart, near.apart(2, &row.across, &other.across)) {
+                        counts.add(&near, &sorted, [row, other], chord);
+                    }
+                }
+            }
+        }
+    }
+    let counts = counts.numbers;
+    let mut sums = Vec::with_capacity(shells.bins * kinds * (kinds + 1) / 2);
+    let row = |a: usize, b: usize| &counts[(a * kinds + b) * near.width..][..shells.bins];
+    for (a, b) in (0..kinds).flat_map(|a| (a..kinds).map(move |b| (a, b))) {
+        let other = (a != b).then(|| row(b, a));
+        sums.extend((0..shells.bins).map(|bin| row(a, b)[bin] + other.map_or(0, |other| other[bin])));
+    }
+    sums
+}
+
+/// The box and the shells, as the loop over pairs needs them.
+struct Near<'a> {
+    domain: &'a PeriodicBox,
+    dimensions: usize,
+    /// Edges: `edges[k][c]` is component c of edge k.
+    edges: [[f64; 3]; 3],
+    /// 1 along periods, else 0.
+    period: [f64; 3],
+    range: f64,
+    /// Distances of faces; infinite across the plane of two dimensions.
+    heights: [f64; 3],
+    /// Whether edges are along the axes, so that distances along them are the sides of right angles.
+    is_orthogonal: bool,
+    /// Shells of a unit of length.
+    per_length: f64,
+    /// Numbers that are counted for each pair of species.
+    width: usize,
+}
+
+/// From the least to the greatest of some fractions.
+#[derive(Clone, Copy)]
+struct Interval {
+    low: f64,
+    high: f64,
+}
+
+impl Interval {
+    fn of(fractions: impl Iterator<Item = f64> + Clone) -> Interval {
+        let low = fractions.clone().fold(f64::INFINITY, f64::min);
+        Interval { low, high: fractions.fold(f64::NEG_INFINITY, f64::max) }
+    }
+}
+
+/// Particles along the first edge, of which fractions along the others are near each other.
+struct Row {
+    particles: Range<usize>,
+    across: Interval,
+}
+
+/// Rows that are near each other.
+struct Plane {
+    rows: Vec<Row>,
+    across: Interval,
+}
+
+/// Particles in rows, within a row by the first fraction.
+struct Sorted {
+    /// Fractions of the box, and room for a vector.
+    s: [Vec<f64>; 3],
+    species: Vec<usize>,
+    /// Where the counts of each begin among those of the other's species.
+    offset: Vec<u32>,
+    planes: Vec<Plane>,
+}
+
+/// Pairs that were counted: for each species of one particle and of the other [`Near::width`] numbers.
+struct Counts {
+    numbers: Vec<u64>,
+    kinds: usize,
+    /// Where the pairs of a particle are counted.
+    found: Vec<u32>,
+}
+
+impl Counts {
+    /// Counts the pairs of particles of two rows, or of one.
+    fn add(&mut self, near: &Near, sorted: &Sorted, [row, other]: [&Row; 2], chord: f64) {
+        let mut window = Window::new(near, chord, &sorted.s[0], other.particles.clone());
+        for i in row.particles.clone() {
+            let of_species = self.kinds * near.width;
+            let numbers = &mut self.numbers[of_species * sorted.species[i]..][..of_species];
+            // In their own row those behind, so that each pair is met once.
+            let from = if std::ptr::eq(row, other) { i + 1 } else { 0 };
+            for span in window.around(sorted.s[0][i]) {
+                near.bins(sorted, i, from.max(span.start)..span.end, &mut self.found);
+                self.found.iter().for_each(|bin| numbers[*bin as usize] += 1);
+            }
+        }
+    }
+}
+
+impl<'a> Near<'a> {
+    fn new(domain: &'a PeriodicBox, dimensions: usize, shells: Shells) -> Near<'a> {
+        let periodic = domain.periodic();
+        Near {
+            domain,
+            dimensions,
+            edges: [0, 1, 2].map(|k| if k < dimensions { domain.edge(k) } else { [0.0; 3] }),
+            period: [0, 1, 2].map(|k| f64::from(u8::from(periodic[k] && k < dimensions))),
+            range: shells.range,
+            heights: [0, 1, 2].map(|k| if k < dimensions { domain.height(k) } else { f64::INFINITY }),
+            is_orthogonal: (0..3).all(|k| (0..3).all(|c| c == k || domain.edge(k)[c] == 0.0)),
+            per_length: shells.bins as f64 / shells.range,
+            width: (1 + BEYOND) * shells.bins,
+        }
+    }
+
+    /// How far apart particles in two intervals of fraction `k` are at least.
+    fn apart(&self, k: usize, a: &Interval, b: &Interval) -> f64 {
+        let between = (b.low - a.high).max(a.low - b.high);
+        let around = 1.0 + a.low.min(b.low) - a.high.max(b.high);
+        let least = if self.period[k] > 0.0 { between.min(around) } else { between };
+        if k < self.dimensions { least.max(0.0) * self.heights[k] } else { 0.0 }
+    }
+
+    /// How far apart along the first edge particles in range may be, if they are so far apart along the others.
+    fn chord(&self, second: f64, third: f64) -> Option<f64> {
+        match self.is_orthogonal {
+            true => Some(self.range * self.range - second * second - third * third)
+                .filter(|c| *c > 0.0)
+                .map(f64::sqrt),
+            false => (second.max(third) < self.range).then_some(self.range),
+        }
+    }
+
+    /// Finds where the pairs of `i` with the particles of a span are counted.
+    fn bins(&self, sorted: &Sorted, i: usize, span: Range<usize>, found: &mut Vec<u32>) {
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has it, as was asked just now.
+            return unsafe { self.bins_avx2(sorted, i, span, found) };
+        }
+        self.bins_of(sorted, i, span, found);
+    }
+
+    /// The same in vectors of four.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn bins_avx2(&self, sorted: &Sorted, i: usize, span: Range<usize>, found: &mut Vec<u32>) {
+        self.bins_of(sorted, i, span, found);
+    }
+
+    #[inline(always)]
+    fn bins_of(&self, sorted: &Sorted, i: usize, span: Range<usize>, found: &mut Vec<u32>) {
+        let own = [sorted.s[0][i], sorted.s[1][i], sorted.s[2][i]];
+        let [a, b, c] = self.edges;
+        let last = (self.width - 1) as f64;
+        found.clear();
+        for first in span.clone().step_by(LANES) {
+            let s = nearest(lanes(&sorted.s[0], first), own[0], self.period[0]);
+            let t = nearest(lanes(&sorted.s[1], first), own[1], self.period[1]);
+            let u = nearest(lanes(&sorted.s[2], first), own[2], self.period[2]);
+            let offset = lanes(&sorted.offset, first);
+            let mut bins = [0; LANES];
+            for k in 0..LANES {
+                let x = s[k] * a[0] + t[k] * b[0] + u[k] * c[0];
+                let y = s[k] * a[1] + t[k] * b[1] + u[k] * c[1];
+                let z = s[k] * a[2] + t[k] * b[2] + u[k] * c[2];
+                let bin = (x * x + y * y + z * z).sqrt() * self.per_length;
+                // SAFETY: no number, if it is one, is below 0 or above `last`, which is a number of shells.
+                let bin: i32 = unsafe { (if bin < last { bin } else { last }).to_int_unchecked() };
+                bins[k] = offset[k] + bin as u32;
+            }
+            found.extend_from_slice(&bins);
+        }
+        found.truncate(span.len());
+    }
+}
+
+/// [`LANES`] numbers from `first` on.
+#[inline(always)]
+fn lanes<T>(values: &[T], first: usize) -> &[T; LANES] {
+    values[first..].first_chunk().expect("room for a vector behind the last particle")
+}
+
+/// Fractions from `own` to the nearest images of others: the right ones within half a height.
+#[inline(always)]
+fn nearest(s: &[f64; LANES], own: f64, period: f64) -> [f64; LANES] {
+    let mut apart = [0.0; LANES];
+    for k in 0..LANES {
+        let d = s[k] - own;
+        let above = if d > 0.5 { period } else { 0.0 };
+        let below = if d < -0.5 { period } else { 0.0 };
+        apart[k] = d - above + below;
+    }
+    apart
+}
+
+/// Which particles of a row may be in range of another particle, as this one goes on along the first edge.
+struct Window<'a> {
+    /// Fractions.
+    s: &'a [f64],
+    row: Range<usize>,
+    reach: f64,
+    is_periodic: bool,
+    /// Where the particles of a span begin or end: those in range, and those in range round the box at either end.
+    at: [usize; 4],
+}
+
+impl<'a> Window<'a> {
+    fn new(near: &Near, chord: f64, s: &'a [f64], row: Range<usize>) -> Window<'a> {
+        let (reach, is_periodic) = (chord / near.heights[0], near.period[0] > 0.0);
+        Window { s, at: [row.start; 4], row, reach, is_periodic }
+    }
+
+    /// Spans of a row, which have no particle in common, around `s`: no less than the one before.
+    fn around(&mut self, s: f64) -> [Range<usize>; 3] {
+        let Window { reach, is_periodic, .. } = *self;
+        if is_periodic && 2.0 * reach >= 1.0 {
+            return [self.row.clone(), 0..0, 0..0];
+        }
+        let limits = [s - reach, s + reach, s + reach - 1.0, s - reach + 1.0];
+        for (at, limit) in self.at.iter_mut().zip(limits) {
+            while *at < self.row.end && self.s[*at] < limit {
+                *at += 1;
+            }
+        }
+        let [first, end, first_end, last] = self.at;
+        match is_periodic {
+            true => [self.row.start..first_end, first..end, last..self.row.end],
+            false => [first..end, 0..0, 0..0],
+        }
+    }
+}
+
+impl Sorted {
+    fn new(x: &[[f64; 3]], species: &[i32], near: &Near) -> Sorted {
+        let rows = [1, 2].map(|k| {
+            let rows = ROWS_PER_RANGE * near.heights[k] / near.range;
+            if k < near.dimensions { rows.clamp(1.0, x.len() as f64 + 1.0) as usize } else { 1 }
+        });
+        let finite = (0..x.len()).filter(|k| x[*k].iter().all(|c| c.is_finite()));
+        let mut particles: Vec<([usize; 2], [f64; 3], usize)> = finite
+            .map(|k| {
+                let s = near.domain.fraction(x[k]);
+                let s = [0, 1, 2].map(|c| if c < near.dimensions { s[c] } else { 0.0 });
+                let row = [0, 1].map(|c| ((s[c + 1] * rows[c] as f64) as usize).min(rows[c] - 1));
+                (row, s, species[k] as usize)
+            })
+            .collect();
+        particles.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1[0].total_cmp(&b.1[0])));
+        let mut first = 0;
+        let of_plane = |plane: &[([usize; 2], [f64; 3], usize)]| {
+            let rows = plane.chunk_by(|a, b| a.0 == b.0).map(|row| {
+                first += row.len();
+                Row {
+                    particles: first - row.len()..first,
+                    across: Interval::of(row.iter().map(|particle| particle.1[2])),
+                }
+            });
+            Plane { rows: rows.collect(), across: Interval::of(plane.iter().map(|particle| particle.1[1])) }
+        };
+        let planes = particles.chunk_by(|a, b| a.0[0] == b.0[0]).map(of_plane).collect();
+        // Vectors are read behind the last particle.
+        let padding = LANES - 1;
+        let fractions = |k: usize| particles.iter().map(move |particle| particle.1[k]);
+        let offsets = particles.iter().map(|particle| (particle.2 * near.width) as u32);
+        Sorted {
+            s: [0, 1, 2].map(|k| fractions(k).chain(std::iter::repeat_n(0.0, padding)).collect()),
+            offset: offsets.chain(std::iter::repeat_n(0, padding)).collect(),
+            species: particles.into_iter().map(|particle| particle.2).collect(),
+            planes,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Matrix3;
+    use psidpd_core::engine::reference::for_each_pair;
+    use rand::{RngExt, SeedableRng, rngs::StdRng};
+
+    /// By the search for pairs of any box.
+    #[test]
+    fn counts_are_those_of_single_pairs() {
+        let mut random = StdRng::seed_from_u64(3);
+        let skew = Matrix3::new(7.0, 1.0, 0.5, 0.0, 5.0, -1.0, 0.0, 0.0, 4.0);
+        let along = |a, b, c| Matrix3::new(a, 0.0, 0.0, 0.0, b, 0.0, 0.0, 0.0, c);
+        let cases = [
+            (along(4.0, 4.0, 4.0), [true; 3], 3, 2.0),
+            (along(9.0, 5.0, 4.0), [true; 3], 3, 0.9),
+            (along(9.0, 5.0, 4.0), [true, false, true], 3, 1.7),
+            (along(3.0, 4.0, 8.0), [false; 3], 3, 5.0),
+            (skew, [true; 3], 3, 1.5),
+            (along(12.0, 7.0, 1.0), [true, true, false], 2, 3.5),
+            (along(6.0, 12.0, 1.0), [false, true, false], 2, 0.7),
+        ];
+        for (edges, periodic, dimensions, range) in cases {
+            let domain = PeriodicBox::new([-1.0, 0.5, 2.0], edges, periodic).unwrap();
+            let mut place =
+                || domain.point([0, 1, 2].map(|k| if k < dimensions { random.random() } else { 0.0 }));
+            let mut x: Vec<[f64; 3]> = (0..400).map(|_| place()).collect();
+            x[17] = [f64::NAN; 3];
+            let species: Vec<i32> = (0..400).map(|k| k % 5 / 2).collect();
+            let shells = Shells { range, bins: 11 };
+            let mut expected = vec![0; 6 * 11];
+            for_each_pair(&x, &domain, dimensions, range, |p| {
+                let (a, b) = (species[p.i].min(species[p.j]), species[p.i].max(species[p.j]));
+                let kind = (a * 3 - a * (a + 1) / 2 + b) as usize;
+                expected[11 * kind + ((p.r / range * 11.0) as usize).min(10)] += 1;
+            });
+            assert!(expected.iter().sum::<u64>() > 400, "pairs to count");
+            assert_eq!(count(&x, &species, 3, &domain, dimensions, shells), expected, "{edges} {periodic:?}");
+        }
+    }
+
+    #[test]
+    fn nothing_makes_no_pairs() {
+        let domain = PeriodicBox::orthogonal([0.0; 3], [4.0; 3], [true; 3]).unwrap();
+        assert_eq!(count(&[], &[], 1, &domain, 3, Shells { range: 1.0, bins: 2 }), [0, 0]);
+    }
+}
