@@ -10,8 +10,9 @@ use std::alloc::{GlobalAlloc, Layout, System};
 /// A large page.
 const PAGE: usize = 2 << 20;
 
-/// Smaller arrays fit into few pages as they are, and would leave nearly all of a large one empty.
-const LARGE: usize = PAGE / 16;
+/// Smaller arrays fit into few pages as they are, and would leave most of a large one empty, all of which Linux clears when it
+/// gives it: observables allocate anew for each sample.
+const LARGE: usize = PAGE / 4;
 
 /// The allocator of the system, but that large arrays begin and end with large pages, and ask for them.
 pub struct LargePages;
