@@ -72,23 +72,24 @@ fn radial_distributions_are_those_of_a_direct_count() {
     }
 }
 
-/// On one rank the style needs no ghosts: found anew every twentieth step only, when atoms have long left the box, they
-/// change neither energy nor pressure. Where it takes its pairs from LAMMPS's list they do.
+/// On one rank the style needs no ghosts: found anew every twentieth step only, when atoms have long left the box, without a
+/// skin and with nothing sent back from them, they change neither energy nor pressure. Where it takes its pairs from
+/// LAMMPS's list they do.
 #[test]
 fn one_rank_needs_no_ghosts_in_time() {
     let (model, listed) = (warren(), listed());
-    let run = |region: &str, more: &str, when: &str| {
+    let run = |region: &str, more: &str, [before, skin, when]: [&str; 3]| {
         let l = open(&format!(
-            "{}neighbor 0.2 bin\nneigh_modify delay 0 {when}\n\
+            "{}neighbor {skin} bin\nneigh_modify delay 0 {when}\n\
              pair_style dpd/psi 1.0 {SEED}\npair_coeff * * \"{model}\" F F\n{more}\n\
              velocity all create 4.0 4711 loop geom\nfix 1 all nve\ntimestep {DT}\nrun 60\n",
-            particles("", region, 2, 700)
+            particles(before, region, 2, 700)
         ));
         ["pe", "ke", "press", "pxy"].map(|name| l.eval(name).unwrap())
     };
     let far = |region: &str, more: &str| {
-        let (often, seldom) =
-            (run(region, more, "every 1 check yes"), run(region, more, "every 20 check no"));
+        let often = run(region, more, ["newton on", "0.2", "every 1 check yes"]);
+        let seldom = run(region, more, ["newton off", "0.0", "every 20 check no"]);
         largest(often.iter().zip(seldom).map(|(a, b)| (a - b).abs() / (1.0 + a.abs())))
     };
     for region in ["block 0 5 0 5 0 5", "prism 0 5 0 5 0 5 1 -1 1"] {

@@ -84,6 +84,11 @@ impl Contender {
         !matches!(self.code, Code::Native(_) | Code::Plain)
     }
 
+    /// Whether it is the plugin on one rank, where it needs no ghosts: decks advise LAMMPS as its manual does.
+    pub fn needs_no_ghosts(&self) -> bool {
+        matches!(self.code, Code::Plugin(_)) && self.ranks == 1
+    }
+
     /// The settings of the native runner.
     pub fn settings(&self) -> Option<Settings> {
         match self.code {

@@ -47,13 +47,16 @@ pub fn deck(
     deck += accelerate;
     let data = if built_in { &start.data_mdpd } else { &start.data };
     let style = if built_in { "mdpd" } else { "atomic" };
+    // On one rank the styles need no ghosts: none that forces are sent back from, and none that are found in time.
+    let alone = contender.needs_no_ghosts();
+    if alone {
+        deck += "newton off\n";
+    }
     // Writing to a String cannot fail.
     let _ = write!(deck, "atom_style {style}\ncomm_modify vel yes\nread_data \"{}\"\n", data.display());
     if contender.copies() > 1 {
         let _ = writeln!(deck, "replicate {} 1 1", contender.copies());
     }
-    // On one rank the styles need no ghosts, and so none that are found in time.
-    let alone = matches!(contender.code, Code::Plugin(_)) && contender.ranks == 1;
     let when = if alone { "every 20 check no" } else { "every 1 check yes" };
     let _ = write!(deck, "neighbor {skin} bin\nneigh_modify delay 0 {when}\n");
     let species = subject.species.join(" ");

@@ -305,7 +305,8 @@ fn pace(options: &Options, cases: &Cases, place: &Place, entry: &mut Entry) -> R
     entry.length = if large { Length::of(FEWEST) } else { Length { warm_up: 20, steps: 60 } };
     let mut pace = Pace { skin: SKIN, seconds: f64::INFINITY };
     // The native runner has no skin but is tried as often, so that one disturbed run does not decide.
-    for skin in SKINS {
+    let skins = if entry.contender.needs_no_ghosts() { [0.0; SKINS.len()] } else { SKINS };
+    for skin in skins {
         let seconds = once(entry, cases, place, skin)?.0 / (entry.length.steps as f64 * entry.particles());
         if seconds < pace.seconds {
             pace = Pace { skin, seconds };
