@@ -2,6 +2,7 @@
 
 mod pressure;
 pub mod pressure_table;
+mod primitive;
 mod spline;
 
 pub use pressure::Pressure;
@@ -37,7 +38,6 @@ pub struct CurveBlock {
     /// `ψ″(n)`.
     pub curvature: Vec<f64>,
     work: Vec<f64>,
-    nodes: Vec<f64>,
     out: Vec<f64>,
 }
 

@@ -1,12 +1,13 @@
 use super::CurveBlock;
+use super::primitive::Primitive;
 use crate::expression::{Formula, Program, TooLarge};
 
 /// `ψ` from an equation of state: `ψ′(ρ) = (p(ρ) − ρkT)/ρ²` (the pressure of a fluid with excess free
 /// energy ψ per particle is `p = ρkT + ρ²ψ′`; Trofimov, Nies and Michels, section IV B).
 ///
 /// `ψ′` and `ψ″` are exact. `ψ` is the integral of `ψ′` from a density where it is finite, chosen once,
-/// by Gauss–Legendre quadrature on panels that are checked against their halves; it is undefined beyond
-/// a singularity of `ψ′`. Near `ρ = 0` a pressure that starts as that of an ideal gas is expanded in
+/// by Gauss–Legendre quadrature on panels that are checked against their halves, and within a panel by a polynomial; it is
+/// undefined beyond a singularity of `ψ′`. Near `ρ = 0` a pressure that starts as that of an ideal gas is expanded in
 /// powers of `ρ`, where the difference `p − ρkT` would lose its digits. Where the pressure has no such expansion,
 /// as with `ρ^2.6`, and `ψ′` has a limit nevertheless, it goes to it as a power of `ρ`.
 #[derive(Debug, Clone)]
@@ -17,6 +18,8 @@ pub struct Pressure {
     slope: Program,
     /// Where panels begin or end, rising, with ψ there.
     anchors: Vec<[f64; 2]>,
+    /// ψ in the panel behind each anchor, less ψ at the anchor.
+    panels: Vec<Primitive>,
     series: Option<Series>,
     tail: Option<Tail>,
 }
@@ -77,30 +80,32 @@ impl Pressure {
             program: Program::new(&[&slope, &curvature]),
             slope: Program::new(&[&slope]),
             anchors: Vec::new(),
+            panels: Vec::new(),
             series: Series::new(pressure, kt, start),
             tail: None,
         };
         let powers = (0..100).map(|k| start * 2f64.powi(if k % 2 == 0 { k / 2 } else { -(k + 1) / 2 }));
         let first = powers.into_iter().find(|n| curve.slope_at(*n).is_finite());
         if let Some(first) = first {
-            curve.anchors = curve.panels(first, -1.0, kt);
+            curve.anchors = curve.anchors_from(first, -1.0, kt);
             curve.anchors.reverse();
             curve.anchors.push([first, 0.0]);
-            let up = curve.panels(first, 1.0, kt);
+            let up = curve.anchors_from(first, 1.0, kt);
             curve.anchors.extend(up);
+            let slopes = |n: &[f64; _]| {
+                let mut out = [0.0; _];
+                curve.slope.eval_block(n.len(), n, &mut out, &mut Vec::new());
+                out
+            };
+            let panel = |ends: &[[f64; 2]]| Primitive::of(slopes, ends[0][0], ends[1][0]);
+            curve.panels = curve.anchors.windows(2).map(panel).collect();
         }
         if let Some(mut series) = curve.series.take() {
-            let mut block = CurveBlock::default();
-            block.resize(1);
-            curve.integrate(&[series.below], &mut block);
-            let constant = block.psi[0] - series.value(series.below);
+            let constant = curve.integral(series.below) - series.value(series.below);
             series.constant = if constant.is_finite() { constant } else { 0.0 };
             curve.series = Some(series);
         } else if let Some(mut tail) = Tail::find(&|n| curve.slope_at(n), start) {
-            let mut block = CurveBlock::default();
-            block.resize(1);
-            curve.integrate(&[tail.below], &mut block);
-            let constant = block.psi[0] - tail.value(tail.below);
+            let constant = curve.integral(tail.below) - tail.value(tail.below);
             tail.constant = if constant.is_finite() { constant } else { 0.0 };
             curve.tail = Some(tail);
         }
@@ -118,8 +123,8 @@ impl Pressure {
         out[0]
     }
 
-    /// Panels from `first` towards lower (`direction` −1) or higher densities: their far ends, with ψ.
-    fn panels(&self, first: f64, direction: f64, kt: f64) -> Vec<[f64; 2]> {
+    /// The far ends of panels from `first` towards lower (`direction` −1) or higher densities, with ψ there.
+    fn anchors_from(&self, first: f64, direction: f64, kt: f64) -> Vec<[f64; 2]> {
         let mut found: Vec<[f64; 2]> = Vec::new();
         let (mut from, mut psi, mut width) = (first, 0.0, WIDEST);
         while found.len() < MOST_PANELS && (from / first).ln().abs() < REACH && width > NARROWEST {
@@ -158,41 +163,21 @@ impl Pressure {
         ((to - from) * sum, (to - from).abs() * size)
     }
 
-    /// ψ of a block of densities, from the nearest anchor below; the slopes are scratch space.
-    fn integrate(&self, n: &[f64], to: &mut CurveBlock) {
-        let lanes = n.len();
-        let (nodes, weights) = RULE;
-        let CurveBlock { psi, slope: widths, work, nodes: at, out, .. } = to;
-        at.clear();
-        at.resize(POINTS * lanes, 1.0);
-        out.resize(POINTS * lanes, 0.0);
-        for (lane, n) in n.iter().enumerate() {
-            let after = self.anchors.partition_point(|a| a[0] <= *n);
-            let is_last = after == self.anchors.len();
-            match after.checked_sub(1).map(|k| self.anchors[k]) {
-                Some([from, value]) if !is_last || from == *n => {
-                    psi[lane] = value;
-                    widths[lane] = n - from;
-                    for (k, node) in nodes.iter().enumerate() {
-                        at[k * lanes + lane] = from + (n - from) * node;
-                    }
-                }
-                // Beyond what the panels reach there is a singularity, or nothing.
-                _ => (psi[lane], widths[lane]) = (f64::NAN, 0.0),
-            }
-        }
-        // There is one variable, so every point of the rule is a lane of its own.
-        self.slope.eval_block(POINTS * lanes, at, out, work);
-        for (values, weight) in out.chunks_exact(lanes).zip(weights) {
-            for lane in 0..lanes {
-                psi[lane] += widths[lane] * weight * values[lane];
-            }
+    /// ψ, from the nearest anchor below.
+    fn integral(&self, n: f64) -> f64 {
+        let after = self.anchors.partition_point(|a| a[0] <= n);
+        let Some([from, value]) = after.checked_sub(1).map(|k| self.anchors[k]) else { return f64::NAN };
+        match self.panels.get(after - 1) {
+            Some(panel) => value + panel.at(n),
+            None if from == n => value,
+            // Beyond what the panels reach there is a singularity, or nothing.
+            None => f64::NAN,
         }
     }
 
     /// See [`Curve::block`](super::Curve::block); the lists have the length of `n`.
     pub(super) fn block(&self, n: &[f64], to: &mut CurveBlock) {
-        self.integrate(n, to);
+        to.psi.iter_mut().zip(n).for_each(|(psi, n)| *psi = self.integral(*n));
         let lanes = n.len();
         to.out.resize(2 * lanes, 0.0);
         self.program.eval_block(lanes, n, &mut to.out, &mut to.work);
