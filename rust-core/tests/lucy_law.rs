@@ -62,8 +62,8 @@ fn equal_coefficients_report_the_energy_of_warren() {
     let x = [[0.0; 3], [0.3, 0.1, 0.2], [0.2, -0.3, 0.1]];
     let domain = PeriodicBox::orthogonal([-5.0; 3], [10.0; 3], [false; 3]).unwrap();
     let all = evaluate(&model.at(1.0).unwrap(), &x, &[0, 1, 1], &domain).unwrap();
-    let psi = |n: &Vec<f64>| PI / 30.0 * 0.75f64.powi(4) * 25.0 * (n[0] + n[1]).powi(2);
-    let mut energy: f64 = all.densities.iter().map(psi).sum();
+    let psi = |n: &[f64]| PI / 30.0 * 0.75f64.powi(4) * 25.0 * (n[0] + n[1]).powi(2);
+    let mut energy: f64 = all.densities.chunks_exact(2).map(psi).sum();
     for (i, j) in [(0, 1), (0, 2), (1, 2)] {
         let r = (0..3).map(|k| (x[i][k] - x[j][k]).powi(2)).sum::<f64>().sqrt();
         energy += -20.0 * (1.0 - r).powi(2);

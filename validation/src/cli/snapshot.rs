@@ -194,8 +194,7 @@ fn values(
                     model.species().len()
                 )));
             }
-            let found = evaluator.evaluate(frame.x, frame.species, frame.domain);
-            Some(found.psi.iter().map(|psi| psi.value).collect())
+            Some(evaluator.evaluate(frame.x, frame.species, frame.domain).psi.value)
         }
     })
 }

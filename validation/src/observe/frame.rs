@@ -114,3 +114,10 @@ impl<'a> Frame<'a> {
         self.view.domain.volume(self.view.dimensions)
     }
 }
+
+impl Drop for Frame<'_> {
+    fn drop(&mut self) {
+        let earlier = self.earlier.take().unwrap_or_default().into_iter().flatten();
+        self.evaluation.take().into_iter().chain(earlier).for_each(|done| self.evaluator.recycle(done));
+    }
+}

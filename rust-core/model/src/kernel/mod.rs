@@ -130,6 +130,7 @@ impl Kernel {
     }
 
     /// `w(r)`.
+    #[inline]
     pub fn value(&self, r: f64) -> f64 {
         struct At(f64);
         impl ShapeVisitor for At {
@@ -142,6 +143,7 @@ impl Kernel {
     }
 
     /// `w'(r)`, never positive for the kernels here.
+    #[inline]
     pub fn slope(&self, r: f64) -> f64 {
         struct At(f64);
         impl ShapeVisitor for At {
@@ -154,6 +156,7 @@ impl Kernel {
     }
 
     /// `w''(r)` within the range, 0 beyond: a jump of `w'` at the range does not count.
+    #[inline]
     pub fn curvature(&self, r: f64) -> f64 {
         struct At(f64);
         impl ShapeVisitor for At {

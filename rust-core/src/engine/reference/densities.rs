@@ -62,17 +62,16 @@ pub fn add_density(
             let factor = self.kernel.value_factor();
             let list = self.pairs;
             for k in 0..list.len() {
+                // Without a branch: of pairs in the cut-off half may be in this range, in no order.
                 let s = list.r[k] * inverse_range;
-                if s < 1.0 {
-                    let mut w = factor * S::value(s);
-                    if !list.factor.is_empty() {
-                        w *= list.factor[k];
-                    }
-                    let (i, j) = (list.i[k] as usize, list.j[k] as usize);
-                    self.n[i * self.width + self.offset + list.species_j[k] as usize] += w;
-                    if j < self.owned {
-                        self.n[j * self.width + self.offset + list.species_i[k] as usize] += w;
-                    }
+                let mut w = if s < 1.0 { factor * S::value(s) } else { 0.0 };
+                if !list.factor.is_empty() {
+                    w *= list.factor[k];
+                }
+                let (i, j) = (list.i[k] as usize, list.j[k] as usize);
+                self.n[i * self.width + self.offset + list.species_j[k] as usize] += w;
+                if j < self.owned {
+                    self.n[j * self.width + self.offset + list.species_i[k] as usize] += w;
                 }
             }
         }

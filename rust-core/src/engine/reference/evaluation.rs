@@ -6,15 +6,17 @@ use super::forces::{ForceInput, ForceOutput, add_forces};
 use super::free_energy::{FreeEnergies, Psi};
 use super::in_box::{BoxSearch, Pair, for_each_pair_by_brute_force};
 use super::pairs::Pairs;
+use super::sweep_pairs::SweepPairs;
 use crate::engine::particles::Step;
 use crate::engine::plan::Plan;
 use crate::engine::surroundings::Newton;
-use crate::model::Fluid;
 use crate::model::expression::TooLarge;
 use crate::model::pair::PairForm;
+use crate::model::{Fluid, PairTerm};
 use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::noise::PairNoise;
 use psidpd_passes::tally::{Tally, Want};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// A fluid at one temperature, ready to be evaluated.
 #[derive(Debug)]
@@ -23,6 +25,14 @@ pub struct Evaluator {
     /// With a pass for every density.
     plan: Plan,
     free_energies: FreeEnergies,
+    work: Mutex<Work>,
+}
+
+/// What finds pairs in wide boxes; arrays of pairs that nobody needs any more.
+#[derive(Debug)]
+struct Work {
+    search: SweepPairs,
+    spare: Vec<(Pairs, Vec<f64>)>,
 }
 
 /// Energy, densities, forces and virial of one configuration.
@@ -30,18 +40,16 @@ pub struct Evaluator {
 pub struct Evaluation {
     /// `U`.
     pub energy: f64,
-    /// Uncorrected local densities, one for each density and species, density-major, of each particle.
-    pub densities: Vec<Vec<f64>>,
+    /// Uncorrected local densities, one for each density and species, density-major, of one particle after the other.
+    pub densities: Vec<f64>,
     /// Conservative forces on the particles.
     pub forces: Vec<[f64; 3]>,
     /// `Σ r_ij ⊗ F_ij` of the conservative forces: xx, yy, zz, xy, xz, yz.
     pub virial: [f64; 6],
-    /// ψ of each particle with its derivatives.
-    pub psi: Vec<Psi>,
+    /// ψ of the particles with its derivatives.
+    pub psi: Psi,
     /// `Σ ψ` of the particles of each species.
     pub excess: Vec<f64>,
-    /// `Σ φ` of each pair term of the model.
-    pub pair_energies: Vec<f64>,
     pairs: Pairs,
     pair_forces: Vec<f64>,
 }
@@ -53,7 +61,8 @@ impl Evaluator {
     /// A derivative of ψ grows beyond the limits of the formula engine.
     pub fn new(fluid: Fluid) -> Result<Evaluator, TooLarge> {
         let free_energies = FreeEnergies::new(&fluid)?;
-        Ok(Evaluator { plan: Plan::whole(&fluid)?, free_energies, fluid })
+        let work = Mutex::new(Work { search: SweepPairs::new(&fluid), spare: Vec::new() });
+        Ok(Evaluator { plan: Plan::whole(&fluid)?, free_energies, work, fluid })
     }
 
     /// The fluid.
@@ -63,27 +72,56 @@ impl Evaluator {
 
     /// Evaluates particles at `x`, of a species each, in a box. What is not finite interacts with nothing.
     pub fn evaluate(&self, x: &[[f64; 3]], species: &[i32], domain: &PeriodicBox) -> Evaluation {
-        let mut pairs = Pairs::default();
-        pairs.clear(x.len(), Newton::On);
-        let (dimensions, range) = (self.fluid.dimensions, self.fluid.conservative_range());
-        let finite = |k: usize| x[k].iter().all(|c| c.is_finite());
-        BoxSearch::default().find(x, x.len(), finite, domain, dimensions, range, |i, j, d| {
-            pairs.push_in_box(i, j, d, species);
-        });
-        self.of_pairs(pairs, species)
+        let (pairs, pair_forces) = self.pairs(x, species, domain);
+        self.of_pairs(pairs, pair_forces, species)
     }
 
-    fn of_pairs(&self, pairs: Pairs, species: &[i32]) -> Evaluation {
-        let Evaluator { fluid, plan, free_energies } = self;
-        let (owned, variables) = (species.len(), fluid.variables());
-        let mut densities = vec![0.0; owned * variables];
-        sum_densities(&pairs, plan, 0..fluid.densities.len(), species, &mut densities);
-        let of = |k: usize| &densities[k * variables..(k + 1) * variables];
-        let psi: Vec<Psi> =
-            species.iter().enumerate().map(|(k, s)| free_energies.psi(fluid, *s as usize, of(k))).collect();
-        let slopes: Vec<f64> = psi.iter().flat_map(|psi| psi.slopes.iter().copied()).collect();
+    /// `U` alone.
+    pub fn energy(&self, x: &[[f64; 3]], species: &[i32], domain: &PeriodicBox) -> f64 {
+        let (pairs, pair_forces) = self.pairs(x, species, domain);
+        let (_, psi) = self.excess(&pairs, species);
+        let energy = psi.value.iter().sum::<f64>() + pair_energies(&pairs, &self.fluid).iter().sum::<f64>();
+        self.work().spare.push((pairs, pair_forces));
+        energy
+    }
+
+    /// Keeps the arrays of an evaluation for others: new ones cost more than what is written to them.
+    pub fn recycle(&self, evaluation: Evaluation) {
+        self.work().spare.push((evaluation.pairs, evaluation.pair_forces));
+    }
+
+    fn work(&self) -> MutexGuard<'_, Work> {
+        self.work.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The pairs, and room for their forces.
+    fn pairs(&self, x: &[[f64; 3]], species: &[i32], domain: &PeriodicBox) -> (Pairs, Vec<f64>) {
+        let mut work = self.work();
+        let (mut pairs, mut pair_forces) = work.spare.pop().unwrap_or_default();
+        pairs.clear(x.len(), Newton::On);
+        if !work.search.find(x, species, domain, &mut pairs) {
+            let (dimensions, range) = (self.fluid.dimensions, self.fluid.conservative_range());
+            let finite = |k: usize| x[k].iter().all(|c| c.is_finite());
+            BoxSearch::default().find(x, x.len(), finite, domain, dimensions, range, |i, j, d| {
+                pairs.push_in_box(i, j, d, species);
+            });
+        }
+        pair_forces.resize(pairs.force().len(), 0.0);
+        (pairs, pair_forces)
+    }
+
+    /// Densities and ψ of all particles.
+    fn excess(&self, pairs: &Pairs, species: &[i32]) -> (Vec<f64>, Psi) {
+        let Evaluator { fluid, plan, free_energies, .. } = self;
+        let mut densities = vec![0.0; species.len() * fluid.variables()];
+        sum_densities(pairs, plan, 0..fluid.densities.len(), species, &mut densities);
+        let psi = free_energies.psi(fluid, species, &densities);
+        (densities, psi)
+    }
+
+    fn of_pairs(&self, pairs: Pairs, mut pair_forces: Vec<f64>, species: &[i32]) -> Evaluation {
+        let (owned, (densities, psi)) = (species.len(), self.excess(&pairs, species));
         let mut forces = vec![[0.0; 3]; owned];
-        let mut pair_forces = vec![0.0; pairs.force().len()];
         let mut output = ForceOutput {
             force: &mut forces,
             particle_energy: &mut [],
@@ -92,11 +130,11 @@ impl Evaluator {
             tally: Tally::default(),
         };
         let input = ForceInput {
-            plan,
+            plan: &self.plan,
             list: pairs.force(),
             newton: Newton::On,
             owned,
-            slopes: &slopes,
+            slopes: &psi.slopes,
             v: &[],
             tag: &[],
             thermostat: None,
@@ -104,37 +142,41 @@ impl Evaluator {
         };
         add_forces(&input, &mut output);
         let tally = output.tally;
-        let mut excess = vec![0.0; fluid.species.len()];
-        for (psi, s) in psi.iter().zip(species) {
-            excess[*s as usize] += psi.value;
+        let mut excess = vec![0.0; self.fluid.species.len()];
+        for (value, s) in psi.value.iter().zip(species) {
+            excess[*s as usize] += value;
         }
-        let mut evaluation = Evaluation {
-            energy: excess.iter().sum::<f64>() + tally.pair,
-            densities: (0..owned).map(|k| of(k).to_vec()).collect(),
-            forces,
-            virial: tally.virial,
-            psi,
-            excess,
-            pair_energies: Vec::new(),
-            pairs,
-            pair_forces,
-        };
-        let energy_of = |term: &crate::model::PairTerm| {
-            let acting = evaluation.pairs().filter(|p| {
-                let [a, b] = [p.i, p.j].map(|k| species[k] as usize);
-                term.acts(a, b, p.r)
-            });
-            acting.map(|p| term.potential.at(p.r).0).sum()
-        };
-        evaluation.pair_energies = fluid.pairs.iter().map(energy_of).collect();
-        evaluation
+        let energy = excess.iter().sum::<f64>() + tally.pair;
+        Evaluation { energy, densities, forces, virial: tally.virial, psi, excess, pairs, pair_forces }
     }
+}
+
+/// `Σ φ` of each pair term of a fluid.
+fn pair_energies(pairs: &Pairs, fluid: &Fluid) -> Vec<f64> {
+    let list = pairs.force();
+    let energy_of = |term: &PairTerm| {
+        let acting = (0..list.len())
+            .filter(|k| term.acts(list.species_i[*k] as usize, list.species_j[*k] as usize, list.r[*k]));
+        acting.map(|k| term.potential.at(list.r[k]).0).sum()
+    };
+    fluid.pairs.iter().map(energy_of).collect()
 }
 
 impl Evaluation {
     /// `U`.
     pub fn energy(&self) -> f64 {
         self.energy
+    }
+
+    /// Uncorrected local densities of one particle.
+    pub fn densities_of(&self, particle: usize) -> &[f64] {
+        let variables = self.densities.len() / self.forces.len();
+        &self.densities[particle * variables..(particle + 1) * variables]
+    }
+
+    /// `Σ φ` of each pair term of the fluid.
+    pub fn pair_energies(&self, fluid: &Fluid) -> Vec<f64> {
+        pair_energies(&self.pairs, fluid)
     }
 
     /// Pairs in the range of the conservative interactions.
@@ -163,46 +205,49 @@ impl Evaluation {
     /// exact where no two particles see each other twice, in boxes at least twice the range wide.
     pub fn laplacians(&self, fluid: &Fluid, species: &[i32]) -> Vec<f64> {
         let (count, variables) = (fluid.species.len(), fluid.variables());
+        let Psi { slopes, second, .. } = &self.psi;
         let rest = (fluid.dimensions - 1) as f64;
-        let mut sum = vec![0.0; self.psi.len()];
+        let mut sum = vec![0.0; species.len()];
         // ∇_i n_iv
-        let mut gradients = vec![[0.0; 3]; self.psi.len() * variables];
+        let mut gradients = vec![[0.0; 3]; species.len() * variables];
         let mut slope = vec![0.0; fluid.densities.len()];
         for p in self.pairs().filter(|p| p.r > 0.0 && p.i != p.j) {
             let (a, b) = (species[p.i] as usize, species[p.j] as usize);
             let mut both = 0.0;
             for (d, density) in fluid.densities.iter().enumerate() {
                 slope[d] = density.kernel.slope(p.r);
+                if p.r >= density.kernel.range() {
+                    continue;
+                }
+                let (of_i, of_j) = (p.i * variables + d * count + b, p.j * variables + d * count + a);
+                let per_length = slope[d] / p.r;
                 for c in 0..3 {
-                    gradients[p.i * variables + d * count + b][c] += slope[d] * p.d[c] / p.r;
-                    gradients[p.j * variables + d * count + a][c] -= slope[d] * p.d[c] / p.r;
+                    gradients[of_i][c] += per_length * p.d[c];
+                    gradients[of_j][c] -= per_length * p.d[c];
                 }
-                let laplacian = density.kernel.curvature(p.r) + rest * slope[d] / p.r;
-                both +=
-                    (self.psi[p.i].slopes[d * count + b] + self.psi[p.j].slopes[d * count + a]) * laplacian;
+                let laplacian = density.kernel.curvature(p.r) + rest * per_length;
+                both += (slopes[of_i] + slopes[of_j]) * laplacian;
             }
-            for term in &fluid.pairs {
-                if term.acts(a, b, p.r) {
-                    both += term.potential.curvature(p.r) + rest * term.potential.at(p.r).1 / p.r;
-                }
+            for term in fluid.pairs.iter().filter(|term| term.acts(a, b, p.r)) {
+                both += term.potential.curvature(p.r) + rest * term.potential.at(p.r).1 / p.r;
             }
             sum[p.i] += both;
             sum[p.j] += both;
             // ψ of one as the other moves.
+            let [of_i, of_j] = [p.i, p.j].map(|k| &second[k * variables * variables..]);
             for (d, s) in slope.iter().enumerate() {
                 for (e, t) in slope.iter().enumerate() {
-                    let (v, u) = (d * count + b, e * count + b);
-                    sum[p.j] += self.psi[p.i].second[v * variables + u] * s * t;
-                    let (v, u) = (d * count + a, e * count + a);
-                    sum[p.i] += self.psi[p.j].second[v * variables + u] * s * t;
+                    sum[p.j] += of_i[(d * count + b) * variables + e * count + b] * s * t;
+                    sum[p.i] += of_j[(d * count + a) * variables + e * count + a] * s * t;
                 }
             }
         }
         for (i, sum) in sum.iter_mut().enumerate() {
-            for v in 0..variables {
-                for u in 0..variables {
-                    let (g, h) = (gradients[i * variables + v], gradients[i * variables + u]);
-                    *sum += self.psi[i].second[v * variables + u] * (g[0] * h[0] + g[1] * h[1] + g[2] * h[2]);
+            let gradients = &gradients[i * variables..(i + 1) * variables];
+            let second = second[i * variables * variables..].chunks_exact(variables.max(1));
+            for (g, row) in gradients.iter().zip(second) {
+                for (h, second) in gradients.iter().zip(row) {
+                    *sum += second * (g[0] * h[0] + g[1] * h[1] + g[2] * h[2]);
                 }
             }
         }
@@ -236,7 +281,8 @@ pub fn evaluate(
 ) -> Result<Evaluation, TooLarge> {
     let species: Vec<i32> = species.iter().map(|s| *s as i32).collect();
     let pairs = brute_force_pairs(fluid, x, &species, domain);
-    Ok(Evaluator::new(fluid.clone())?.of_pairs(pairs, &species))
+    let pair_forces = vec![0.0; pairs.force().len()];
+    Ok(Evaluator::new(fluid.clone())?.of_pairs(pairs, pair_forces, &species))
 }
 
 /// Dissipative and random forces, and their virial, over the same pairs.
@@ -345,7 +391,9 @@ A = { slopes = { n = "0.3*n" }, energy = "n^2" }
             let found = evaluator.evaluate(&x, &species, &domain);
             let indices: Vec<usize> = species.iter().map(|s| *s as usize).collect();
             let truth = evaluate(evaluator.fluid(), &x, &indices, &domain).unwrap();
-            let energies = found.excess.iter().chain(&found.pair_energies).sum::<f64>();
+            let energies = found.excess.iter().chain(&found.pair_energies(evaluator.fluid())).sum::<f64>();
+            let alone = evaluator.energy(&x, &species, &domain);
+            assert!((alone - truth.energy).abs() < 1e-11 * truth.energy.abs().max(1.0));
             assert!((energies - truth.energy).abs() < 1e-11 * truth.energy.abs().max(1.0));
             let scale = truth.forces.iter().flatten().fold(1.0f64, |m, f| m.max(f.abs()));
             assert!((found.energy() - truth.energy).abs() < 1e-11 * truth.energy.abs().max(1.0));

@@ -154,12 +154,12 @@ impl<const N: usize> ShapeVisitor for ManyBody<'_, '_, N> {
         let inverse_range = 1.0 / self.kernel.range();
         let factor = self.kernel.slope_factor();
         for k in self.begin..self.end {
+            // Without a branch: of pairs in the cut-off half may be in this range, in no order.
             let s = list.r[k] * inverse_range;
-            if s < 1.0 {
-                let here = list.i[k] as usize * width + offset + list.species_j[k] as usize;
-                let there = list.j[k] as usize * width + offset + list.species_i[k] as usize;
-                self.out[k - self.begin] -= (slopes[here] + slopes[there]) * (factor * S::slope(s));
-            }
+            let here = list.i[k] as usize * width + offset + list.species_j[k] as usize;
+            let there = list.j[k] as usize * width + offset + list.species_i[k] as usize;
+            let slope = if s < 1.0 { factor * S::slope(s) } else { 0.0 };
+            self.out[k - self.begin] -= (slopes[here] + slopes[there]) * slope;
         }
     }
 }
@@ -309,6 +309,7 @@ fn tally_virial(
     block: &Block<BLOCK>,
 ) {
     let list = input.list;
+    let mut virials = [[0.0; 6]; 2];
     for k in begin..end {
         let r = list.r[k];
         if r == 0.0 {
@@ -317,14 +318,12 @@ fn tally_virial(
         let (i, j) = (list.i[k] as usize, list.j[k] as usize);
         let d = [list.d[0][k], list.d[1][k], list.d[2][k]];
         let dyad = [d[0] * d[0], d[1] * d[1], d[2] * d[2], d[0] * d[1], d[0] * d[2], d[1] * d[2]];
-        let conservative = block.conservative[k - begin] / r;
-        let thermostat = block.thermostat[k - begin] / r;
-        if input.want.virial {
-            let share = share(input, j);
-            for c in 0..6 {
-                output.tally.virial[c] += share * conservative * dyad[c];
-                output.tally.thermostat_virial[c] += share * thermostat * dyad[c];
-            }
+        let (inverse, share) = (1.0 / r, share(input, j));
+        let conservative = block.conservative[k - begin] * inverse;
+        let thermostat = block.thermostat[k - begin] * inverse;
+        for c in 0..6 {
+            virials[0][c] += share * conservative * dyad[c];
+            virials[1][c] += share * thermostat * dyad[c];
         }
         if input.want.particle_virial {
             let half = 0.5 * (conservative + thermostat);
@@ -337,6 +336,12 @@ fn tally_virial(
             }
         }
     }
+    if input.want.virial {
+        let Tally { virial, thermostat_virial, .. } = &mut output.tally;
+        for (sum, of_block) in [virial, thermostat_virial].into_iter().zip(virials) {
+            sum.iter_mut().zip(of_block).for_each(|(sum, of_block)| *sum += of_block);
+        }
+    }
 }
 
 fn tally_energy(
@@ -347,13 +352,14 @@ fn tally_energy(
     block: &Block<BLOCK>,
 ) {
     let list = input.list;
+    let (mut excess, mut pair) = (0.0, 0.0);
     for k in begin..end {
         let (i, j) = (list.i[k] as usize, list.j[k] as usize);
         let at = k - begin;
         let both = input.newton == Newton::On || j < input.owned;
         let excess_j = if both { block.excess_j[at] } else { 0.0 };
-        output.tally.excess += block.excess_i[at] + excess_j;
-        output.tally.pair += share(input, j) * block.pair[at];
+        excess += block.excess_i[at] + excess_j;
+        pair += share(input, j) * block.pair[at];
         if input.want.particle_energy {
             output.particle_energy[i] += block.excess_i[at] + 0.5 * block.pair[at];
             if both {
@@ -361,4 +367,6 @@ fn tally_energy(
             }
         }
     }
+    output.tally.excess += excess;
+    output.tally.pair += pair;
 }

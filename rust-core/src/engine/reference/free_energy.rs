@@ -22,15 +22,25 @@ struct Excess {
     derivatives: RefCell<BTreeMap<Vec<u8>, Formula>>,
 }
 
-/// ψ of a particle with derivatives by its uncorrected densities.
+/// ψ of particles with derivatives by their uncorrected densities, one particle after the other.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Psi {
     /// ψ.
-    pub value: f64,
+    pub value: Vec<f64>,
     /// ∂ψ/∂n_v.
     pub slopes: Vec<f64>,
     /// ∂²ψ/∂n_v∂n_u, a full matrix by rows.
     pub second: Vec<f64>,
+}
+
+/// Arrays for what one particle needs.
+#[derive(Default)]
+struct Scratch {
+    /// Corrected densities, with their first two derivatives by the uncorrected ones.
+    corrected: Vec<[f64; 3]>,
+    at: Vec<f64>,
+    values: Vec<f64>,
+    work: Vec<f64>,
 }
 
 impl FreeEnergies {
@@ -63,79 +73,110 @@ impl FreeEnergies {
         Ok(FreeEnergies { species })
     }
 
-    /// ψ of a particle of species `alpha` at the uncorrected densities `n`, density-major.
-    pub fn psi(&self, fluid: &Fluid, alpha: usize, n: &[f64]) -> Psi {
+    /// ψ of particles of a species each, at their uncorrected densities, density-major.
+    pub fn psi(&self, fluid: &Fluid, species: &[i32], densities: &[f64]) -> Psi {
+        let (variables, mut scratch) = (fluid.variables(), Scratch::default());
+        let mut psi = Psi {
+            value: vec![0.0; species.len()],
+            slopes: vec![0.0; species.len() * variables],
+            second: vec![0.0; species.len() * variables * variables],
+        };
+        for (k, alpha) in species.iter().enumerate() {
+            let of = k * variables..(k + 1) * variables;
+            let second = of.start * variables..of.end * variables;
+            let (slopes, second) = (&mut psi.slopes[of.clone()], &mut psi.second[second]);
+            psi.value[k] = self.one(fluid, *alpha as usize, &densities[of], [slopes, second], &mut scratch);
+        }
+        psi
+    }
+
+    /// ψ of one particle; slopes and second derivatives are zeros at first.
+    fn one(
+        &self,
+        fluid: &Fluid,
+        alpha: usize,
+        n: &[f64],
+        [slopes, second]: [&mut [f64]; 2],
+        scratch: &mut Scratch,
+    ) -> f64 {
         let (count, variables) = (fluid.species.len(), n.len());
         let correction = |v: usize| &fluid.densities[v / count].correction[alpha * count + v % count];
-        let corrected: Vec<[f64; 3]> = (0..variables).map(|v| polynomial(&correction(v).0, n[v])).collect();
-        let at: Vec<f64> = corrected.iter().map(|c| c[0]).collect();
-        let mut psi = match &fluid.excess[alpha] {
+        scratch.corrected.clear();
+        scratch.corrected.extend((0..variables).map(|v| polynomial(&correction(v).0, n[v])));
+        scratch.at.clear();
+        scratch.at.extend(scratch.corrected.iter().map(|c| c[0]));
+        let at = &scratch.at[..];
+        let value = match &fluid.excess[alpha] {
             ExcessFreeEnergy::Curve(curve) => {
                 let range = curve.density * count..(curve.density + 1) * count;
                 let total = at[range.clone()].iter().sum();
-                let [value, slope, second] =
+                let [value, slope, curvature] =
                     continued_curve(|x| curve.at(x), fluid.densities[curve.density].bounds, total);
-                let mut psi =
-                    Psi { value, slopes: vec![0.0; variables], second: vec![0.0; variables * variables] };
                 for v in range.clone() {
-                    psi.slopes[v] = slope;
-                    range.clone().for_each(|u| psi.second[v * variables + u] = second);
+                    slopes[v] = slope;
+                    range.clone().for_each(|u| second[v * variables + u] = curvature);
                 }
-                psi
+                value
             }
-            ExcessFreeEnergy::Formula(_) => self.species[alpha].formula(fluid, &at),
+            ExcessFreeEnergy::Formula(_) => {
+                let Scratch { values, work, .. } = scratch;
+                self.species[alpha].formula(fluid, at, [slopes, second], [values, work])
+            }
             // No ψ: what is stated as energy and slopes. Nothing that needs second derivatives is measured then.
-            ExcessFreeEnergy::Slopes(law) => Psi {
-                value: law.energy.value(&at),
-                slopes: law.slopes.iter().map(|slope| slope.value(&at)).collect(),
-                second: vec![0.0; variables * variables],
-            },
+            ExcessFreeEnergy::Slopes(law) => {
+                slopes.iter_mut().zip(&law.slopes).for_each(|(to, slope)| *to = slope.value(at));
+                law.energy.value(at)
+            }
         };
+        let corrected = &scratch.corrected;
         for v in 0..variables {
             for u in 0..variables {
-                psi.second[v * variables + u] *= corrected[v][1] * corrected[u][1];
+                second[v * variables + u] *= corrected[v][1] * corrected[u][1];
             }
-            psi.second[v * variables + v] += psi.slopes[v] * corrected[v][2];
+            second[v * variables + v] += slopes[v] * corrected[v][2];
         }
-        psi.slopes.iter_mut().zip(&corrected).for_each(|(slope, c)| *slope *= c[1]);
-        psi
+        slopes.iter_mut().zip(corrected).for_each(|(slope, c)| *slope *= c[1]);
+        value
     }
 }
 
 impl Excess {
-    fn formula(&self, fluid: &Fluid, at: &[f64]) -> Psi {
+    fn formula(
+        &self,
+        fluid: &Fluid,
+        at: &[f64],
+        [slopes, second]: [&mut [f64]; 2],
+        [values, work]: [&mut Vec<f64>; 2],
+    ) -> f64 {
         let variables = at.len();
         let inside = (0..variables).all(|v| beyond(fluid, v, at).0 == 0.0);
-        let mut out =
-            Psi { value: 0.0, slopes: vec![0.0; variables], second: vec![0.0; variables * variables] };
         if let Some(program) = self.program.as_ref().filter(|_| inside) {
-            let mut values = vec![0.0; program.outputs()];
-            program.eval(at, &mut values, &mut Vec::new());
-            out.value = values[0];
-            out.slopes.copy_from_slice(&values[1..=variables]);
+            values.resize(program.outputs(), 0.0);
+            program.eval(at, values, work);
+            slopes.copy_from_slice(&values[1..=variables]);
             let mut next = 1 + variables;
             for v in 0..variables {
                 for u in v..variables {
-                    out.second[v * variables + u] = values[next];
-                    out.second[u * variables + v] = values[next];
+                    second[v * variables + u] = values[next];
+                    second[u * variables + v] = values[next];
                     next += 1;
                 }
             }
-            return out;
+            return values[0];
         }
         let mut order = vec![0u8; variables];
-        out.value = self.continued(fluid, &mut order.clone(), at, 0);
+        let value = self.continued(fluid, &mut order.clone(), at, 0);
         for v in 0..variables {
             order[v] += 1;
-            out.slopes[v] = self.continued(fluid, &mut order.clone(), at, 0);
+            slopes[v] = self.continued(fluid, &mut order.clone(), at, 0);
             for u in 0..variables {
                 order[u] += 1;
-                out.second[v * variables + u] = self.continued(fluid, &mut order.clone(), at, 0);
+                second[v * variables + u] = self.continued(fluid, &mut order.clone(), at, 0);
                 order[u] -= 1;
             }
             order[v] -= 1;
         }
-        out
+        value
     }
 
     /// The derivative `order` of ψ continued in the variables from `v` on: outside a bound ψ is
@@ -226,16 +267,16 @@ B = "n^3 + sqrt(n_A)*n_B^2"
         let energies = FreeEnergies::new(&fluid).unwrap();
         for alpha in 0..2 {
             for n in [[1.0, 1.2], [0.1, 1.0], [5.0, 0.2], [4.0, 6.0], [0.2, 0.1]] {
-                let psi = energies.psi(&fluid, alpha, &n);
+                let psi = energies.psi(&fluid, &[alpha], &n);
                 let h = 1e-5;
                 for v in 0..2 {
                     let moved = |h: f64| {
                         let mut n = n;
                         n[v] += h;
-                        energies.psi(&fluid, alpha, &n)
+                        energies.psi(&fluid, &[alpha], &n)
                     };
                     let (up, down) = (moved(h), moved(-h));
-                    let slope = (up.value - down.value) / (2.0 * h);
+                    let slope = (up.value[0] - down.value[0]) / (2.0 * h);
                     assert!((slope - psi.slopes[v]).abs() < 1e-7 * (1.0 + slope.abs()), "{alpha} {n:?} {v}");
                     for u in 0..2 {
                         let second = (up.slopes[u] - down.slopes[u]) / (2.0 * h);

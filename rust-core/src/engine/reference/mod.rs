@@ -25,6 +25,7 @@ mod pairs;
 mod search;
 mod single;
 mod special;
+mod sweep_pairs;
 
 pub(super) use special::Corrections;
 

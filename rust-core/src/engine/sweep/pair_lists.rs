@@ -28,6 +28,12 @@ pub struct PlanePairs {
     pub list: PairList,
 }
 
+impl AsMut<PlanePairs> for PlanePairs {
+    fn as_mut(&mut self) -> &mut PlanePairs {
+        self
+    }
+}
+
 /// Sorted particles, and work space.
 pub struct PairLists {
     set: InstructionSet,

@@ -166,24 +166,28 @@ impl Across {
     /// Shares a line from fraction `a` to `b` out over the bins it goes through.
     pub fn share(&self, a: f64, b: f64, mut visit: impl FnMut(usize, f64)) {
         let (low, high) = (a.min(b), a.max(b));
-        let length = high - low;
-        let count = self.bins as f64;
         // A line within a plane of the profile, or nearly so, is in one bin.
-        if length < 1e-14 {
+        if high - low < 1e-14 {
             if let Some(bin) = self.bin(0.5 * (low + high)) {
                 visit(bin, 1.0);
             }
             return;
         }
-        let mut k = (low * count).floor();
-        while k / count < high {
-            let overlap = ((k + 1.0) / count).min(high) - (k / count).max(low);
-            if overlap > 0.0
-                && let Some(bin) = self.bin((k + 0.5) / count)
-            {
-                visit(bin, overlap / length);
+        // In bins.
+        let (low, high) = (low * self.bins as f64, high * self.bins as f64);
+        let (first, bins) = (low.floor(), self.bins as i64);
+        let mut bin = if self.periodic { (first as i64).rem_euclid(bins) } else { first as i64 };
+        let (mut edge, per_length) = (first, 1.0 / (high - low));
+        while edge < high {
+            let part = (edge + 1.0).min(high) - edge.max(low);
+            if part > 0.0 && (0..bins).contains(&bin) {
+                visit(bin as usize, part * per_length);
             }
-            k += 1.0;
+            edge += 1.0;
+            bin += 1;
+            if self.periodic && bin == bins {
+                bin = 0;
+            }
         }
     }
 }

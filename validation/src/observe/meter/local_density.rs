@@ -105,7 +105,7 @@ impl Meter for LocalDensity {
         let fluid = frame.evaluator().fluid();
         let kinds = self.species.len();
         let density = &fluid.densities[self.density];
-        let at = |i: usize, beta: usize| evaluation.densities[i][self.density * kinds + beta];
+        let at = |i: usize, beta: usize| evaluation.densities_of(i)[self.density * kinds + beta];
         let totals: Vec<f64> =
             (0..species.len()).map(|i| (0..kinds).map(|b| at(i, b)).sum::<f64>()).collect();
         let largest = totals.iter().copied().fold(0.0, f64::max);

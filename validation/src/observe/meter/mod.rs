@@ -24,6 +24,7 @@ mod structure_factor;
 mod surface_tension;
 mod temperature;
 mod viscosity;
+mod waves;
 
 use super::frame::Frame;
 use super::keys::Table;

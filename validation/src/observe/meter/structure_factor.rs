@@ -1,5 +1,6 @@
 use super::Meter;
 use super::species_pairs::SpeciesPairs;
+use super::waves::waves;
 use crate::observe::frame::Frame;
 use crate::observe::keys::{Need, Table, ValueKind};
 use crate::observe::observation::{Kind, Observation};
@@ -128,42 +129,19 @@ impl Meter for StructureFactor {
         let (species, domain) = (view.species, view.domain);
         let numbers = self.pairs.numbers(species);
         let count = numbers.len();
-        // ρ(k) of each species.
-        let mut waves = vec![[0.0f64; 2]; self.vectors.len() * count];
-        let top: [usize; 3] = std::array::from_fn(|c| {
-            self.vectors.iter().map(|h| h[c].unsigned_abs() as usize).max().unwrap_or(0)
-        });
-        let mut powers: [Vec<[f64; 2]>; 3] = Default::default();
-        let times = |a: [f64; 2], b: [f64; 2]| [a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]];
-        for (x, kind) in view.x.iter().zip(species) {
-            let s = domain.fraction(*x);
-            for c in 0..3 {
-                let (sine, cosine) = (TAU * s[c]).sin_cos();
-                powers[c].clear();
-                powers[c].push([1.0, 0.0]);
-                for h in 0..top[c] {
-                    let next = times(powers[c][h], [cosine, sine]);
-                    powers[c].push(next);
-                }
-            }
-            let power = |c: usize, h: i32| {
-                let p = powers[c][h.unsigned_abs() as usize];
-                if h < 0 { [p[0], -p[1]] } else { p }
-            };
-            for (k, h) in self.vectors.iter().enumerate() {
-                let phase = times(times(power(0, h[0]), power(1, h[1])), power(2, h[2]));
-                let wave = &mut waves[k * count + *kind as usize];
-                wave[0] += phase[0];
-                wave[1] += phase[1];
-            }
-        }
+        let waves: Vec<Vec<[f64; 2]>> = (0..count as i32)
+            .map(|kind| {
+                let of_kind = view.x.iter().zip(species).filter(|(_, s)| **s == kind);
+                waves(of_kind.map(|(x, _)| domain.fraction(*x)), &self.vectors)
+            })
+            .collect();
         let shells = self.lengths.len();
         let mut sums = vec![0.0; shells * self.pairs.len()];
         for shell in 0..shells {
             let range = self.starts[shell]..self.starts[shell + 1];
             let share = range.len() as f64;
             for k in range {
-                let of = |a: usize| waves[k * count + a];
+                let of = |a: usize| waves[a][k];
                 let all = (0..count).map(of).fold([0.0; 2], |s, w| [s[0] + w[0], s[1] + w[1]]);
                 sums[shell] += (all[0] * all[0] + all[1] * all[1]) / species.len() as f64 / share;
                 for (p, (a, b)) in self.pairs.each().enumerate() {

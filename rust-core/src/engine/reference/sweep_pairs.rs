@@ -1,0 +1,189 @@
+//! The pairs of a box by the vectors of the sweep's search, measured in double precision.
+
+use super::pairs::Pairs;
+use crate::engine::particles::Particles;
+use crate::engine::surroundings::Around;
+use crate::engine::sweep::{PairLists, PlanePairs, Pool};
+use crate::model::Fluid;
+use psidpd_passes::domain::PeriodicBox;
+use psidpd_passes::ground::species_pairs::SpeciesPairTable;
+use psidpd_passes::ground::terms::Exponent;
+use psidpd_passes::instruction_set::InstructionSet;
+use psidpd_passes::plane::list::WeightTables;
+use std::num::NonZeroUsize;
+
+/// By how much further it is searched, so that no pair is lost by rounding to single precision.
+const MARGIN: f64 = 1e-5;
+
+/// Finds the pairs of a fluid in boxes at least twice as wide as their range.
+pub struct SweepPairs {
+    lists: PairLists,
+    pool: Pool,
+    dimensions: usize,
+    range: f64,
+    /// Weights that are greater than 0 within the range.
+    tables: WeightTables,
+    kinds: Vec<i32>,
+    tags: Vec<i32>,
+    planes: Vec<PlanePairs>,
+    /// Indices, places and fractions of particles in the order of cells, behind them once more those of the first plane.
+    sorted: Vec<(u32, [f64; 3], [f64; 3])>,
+}
+
+impl std::fmt::Debug for SweepPairs {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("SweepPairs").field("range", &self.range).finish_non_exhaustive()
+    }
+}
+
+impl SweepPairs {
+    /// The search for pairs in the range of the conservative interactions.
+    pub fn new(fluid: &Fluid) -> SweepPairs {
+        let (range, species) = (fluid.conservative_range(), fluid.species.len());
+        let inverse_range = 1.0 / (range * (1.0 + MARGIN));
+        SweepPairs {
+            lists: PairLists::new(InstructionSet::best(), fluid.dimensions),
+            pool: Pool::new(NonZeroUsize::MIN),
+            dimensions: fluid.dimensions,
+            range,
+            tables: WeightTables {
+                species,
+                amplitude: SpeciesPairTable::of(species * species, 1.0),
+                inverse_range: SpeciesPairTable::of(species * species, inverse_range as f32),
+                exponent: Exponent::One,
+            },
+            kinds: (0..species as i32).collect(),
+            tags: Vec::new(),
+            planes: Vec::new(),
+            sorted: Vec::new(),
+        }
+    }
+
+    /// Adds the pairs of particles at `x`; whether it can. It cannot where a particle may meet two images of another, or a
+    /// position is not finite.
+    pub fn find(&mut self, x: &[[f64; 3]], species: &[i32], domain: &PeriodicBox, pairs: &mut Pairs) -> bool {
+        let SweepPairs { lists, pool, dimensions, range, tables, kinds, tags, planes, sorted } = self;
+        let is_periodic = [0, 1, 2].map(|k| domain.periodic()[k] && k < *dimensions);
+        let search_range = *range * (1.0 + MARGIN);
+        let is_wide = |k: usize| !is_periodic[k] || domain.height(k) > 2.0 * search_range;
+        if !(*range > 0.0 && range.is_finite() && (0..3).all(is_wide)) {
+            return false;
+        }
+        tags.resize(x.len(), 0);
+        tags.iter_mut().zip(1..).for_each(|(tag, k)| *tag = k);
+        let particles = Particles { x, tag: tags, kind: species, owned: x.len() };
+        let around = Around { domain, images: &[] };
+        if lists.find(pool, around, &particles, kinds, tables, search_range, false, planes).is_err() {
+            return false;
+        }
+        let place = |k: &u32| {
+            let mut x = x[*k as usize];
+            domain.wrap(&mut x, &mut [0; 3]);
+            (*k, x, domain.fraction(x))
+        };
+        sorted.clear();
+        sorted.extend(lists.order().iter().map(place));
+        if let Some(last) = planes.last() {
+            sorted.extend_from_within(last.next.clone());
+        }
+        let period = is_periodic.map(|p| f64::from(u8::from(p)));
+        let edges = [0, 1, 2].map(|k| domain.edge(k));
+        pairs.reserve(planes.iter().map(|plane| plane.list.pairs.len()).sum());
+        for PlanePairs { own, next, list } in planes {
+            let sorted = &sorted[own.start..][..own.len() + next.len()];
+            for ((i, x, s), ends) in sorted.iter().zip(list.start.windows(2)) {
+                for pair in &list.pairs[ends[0] as usize..ends[1] as usize] {
+                    let (j, y, t) = &sorted[pair.j as usize];
+                    let periods = [0, 1, 2].map(|k| {
+                        let apart = s[k] - t[k];
+                        let above = if apart > 0.5 { period[k] } else { 0.0 };
+                        let below = if apart < -0.5 { period[k] } else { 0.0 };
+                        above - below
+                    });
+                    // Places first, so that those of close particles lose no digits.
+                    let d = [0, 1, 2].map(|c| {
+                        let apart = if c < *dimensions { x[c] - y[c] } else { 0.0 };
+                        apart
+                            - (periods[0] * edges[0][c] + periods[1] * edges[1][c] + periods[2] * edges[2][c])
+                    });
+                    if d[0] * d[0] + d[1] * d[1] + d[2] * d[2] < *range * *range {
+                        pairs.push_in_box(*i as usize, *j as usize, d, species);
+                    }
+                }
+            }
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::reference::for_each_pair;
+    use crate::engine::surroundings::Newton;
+    use crate::model::Model;
+    use nalgebra::Matrix3;
+    use psidpd_passes::noise::threefry2x32;
+
+    fn model(dimensions: usize) -> Fluid {
+        let text = format!(
+            "title = \"m\"\ndimensions = {dimensions}\nspecies = [\"A\", \"B\"]\n[density.n]\nkernel = \"lucy\"\nrange = 0.9\n\
+             [excess_free_energy]\nA = \"n^2\"\nB = \"n^3\"\n"
+        );
+        Model::parse("m.toml", &text).unwrap().at(1.0).unwrap()
+    }
+
+    /// Those of the search by cells and images, also of particles outside of the box, on one point, and next to each other.
+    #[test]
+    fn pairs_are_those_of_the_plain_search() {
+        let skew = Matrix3::new(4.0, 1.0, 0.5, 0.0, 5.0, -1.0, 0.0, 0.0, 3.0);
+        let boxes = [
+            (PeriodicBox::orthogonal([-1.0, 0.0, 2.0], [2.0, 4.0, 3.0], [true; 3]).unwrap(), 3),
+            (PeriodicBox::orthogonal([0.0; 3], [4.0, 3.0, 5.0], [true, false, true]).unwrap(), 3),
+            (PeriodicBox::new([1.0, 2.0, 3.0], skew, [true; 3]).unwrap(), 3),
+            (PeriodicBox::orthogonal([0.0, 0.0, -0.5], [5.0, 7.0, 1.0], [true; 3]).unwrap(), 2),
+        ];
+        let uniform = |k: u32| f64::from(threefry2x32::<20>([k, 0], [5, 9])[0]) / 4_294_967_296.0;
+        for (domain, dimensions) in boxes {
+            let fluid = model(dimensions);
+            let mut x: Vec<[f64; 3]> = (0..300)
+                .map(|k| {
+                    let s = [0, 1, 2].map(|c| uniform(3 * k + c));
+                    domain.point([s[0], s[1], if dimensions == 3 { s[2] } else { 0.5 }])
+                })
+                .collect();
+            (0..3).for_each(|c| x[3][c] += domain.edge(0)[c]);
+            x[11] = x[10];
+            x[21] = [x[20][0] + 1e-9, x[20][1], x[20][2]];
+            let species: Vec<i32> = (0..x.len() as i32).map(|k| k % 2).collect();
+            let mut pairs = Pairs::default();
+            pairs.clear(x.len(), Newton::On);
+            assert!(SweepPairs::new(&fluid).find(&x, &species, &domain, &mut pairs));
+            let list = pairs.force();
+            let signed =
+                |i: usize, j: usize, d: [f64; 3]| if i < j { (i, j, d) } else { (j, i, d.map(|c| -c)) };
+            let d = |k: usize| list.d.each_ref().map(|d| d[k]);
+            let mut found: Vec<_> =
+                (0..list.len()).map(|k| signed(list.i[k] as usize, list.j[k] as usize, d(k))).collect();
+            let mut expected = Vec::new();
+            for_each_pair(&x, &domain, dimensions, 0.9, |p| expected.push(signed(p.i, p.j, p.d)));
+            found.sort_by_key(|p| (p.0, p.1));
+            expected.sort_by_key(|p| (p.0, p.1));
+            assert!(expected.len() > 300 && found.len() == expected.len());
+            for (f, e) in found.iter().zip(&expected) {
+                let error = (0..3).map(|c| (f.2[c] - e.2[c]).abs()).fold(0.0, f64::max);
+                assert!((f.0, f.1) == (e.0, e.1) && error < 1e-14, "{f:?} {e:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_it_cannot_do_is_said() {
+        let (mut search, mut pairs) = (SweepPairs::new(&model(3)), Pairs::default());
+        let wide = PeriodicBox::orthogonal([0.0; 3], [4.0; 3], [true; 3]).unwrap();
+        let narrow = PeriodicBox::orthogonal([0.0; 3], [1.7, 4.0, 4.0], [true; 3]).unwrap();
+        assert!(!search.find(&[[0.5; 3]], &[0], &narrow, &mut pairs));
+        assert!(!search.find(&[[f64::NAN, 0.5, 0.5]], &[0], &wide, &mut pairs));
+        assert!(search.find(&[], &[], &wide, &mut pairs) && pairs.force().len() == 0);
+    }
+}

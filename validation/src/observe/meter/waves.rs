@@ -1,0 +1,107 @@
+//! Density waves of particles, several particles at a time.
+
+use std::f64::consts::TAU;
+
+/// `ρ(h) = Σ exp(2πi h·s)` over particles at fractions `s` of the box, real and imaginary part, for each `h` of `vectors`, whose
+/// first number must not be negative.
+pub fn waves(fractions: impl Iterator<Item = [f64; 3]>, vectors: &[[i32; 3]]) -> Vec<[f64; 2]> {
+    let top = [0, 1, 2].map(|c| vectors.iter().map(|h| h[c].unsigned_abs() as usize).max().unwrap_or(0));
+    let fractions: Vec<[f64; 3]> = fractions.collect();
+    let mut waves = vec![[[0.0; LANES]; 2]; vectors.len()];
+    for particles in fractions.chunks(LANES) {
+        add_waves(&Phases::new(particles, top), vectors, &mut waves);
+    }
+    waves.iter().map(|parts| parts.map(|part| part.iter().sum())).collect()
+}
+
+/// Particles whose waves are found together, in vectors.
+const LANES: usize = 8;
+
+/// Real and imaginary part of a complex number of each of some particles.
+type Complex = [[f64; LANES]; 2];
+
+/// `exp(2πi h s_c)` of some particles, for each direction c and each h from 0 on; 0 where there is no particle.
+struct Phases([Vec<Complex>; 3]);
+
+impl Phases {
+    fn new(particles: &[[f64; 3]], top: [usize; 3]) -> Phases {
+        Phases([0, 1, 2].map(|c| {
+            let [mut first, mut one] = [[[0.0; LANES]; 2]; 2];
+            for (k, s) in particles.iter().enumerate() {
+                (first[1][k], first[0][k]) = (TAU * s[c]).sin_cos();
+                one[0][k] = 1.0;
+            }
+            std::iter::successors(Some(one), |power| Some(times(power, &first, 1.0)))
+                .take(top[c] + 1)
+                .collect()
+        }))
+    }
+
+    fn at(&self, c: usize, h: i32) -> (&Complex, f64) {
+        (&self.0[c][h.unsigned_abs() as usize], if h < 0 { -1.0 } else { 1.0 })
+    }
+}
+
+/// `a b`, or `a b*` if `sign` is −1.
+#[inline(always)]
+fn times(a: &Complex, b: &Complex, sign: f64) -> Complex {
+    let mut product = [[0.0; LANES]; 2];
+    for k in 0..LANES {
+        let imaginary = sign * b[1][k];
+        product[0][k] = a[0][k] * b[0][k] - a[1][k] * imaginary;
+        product[1][k] = a[0][k] * imaginary + a[1][k] * b[0][k];
+    }
+    product
+}
+
+/// Adds what some particles add to the wave of each vector.
+fn add_waves(phases: &Phases, vectors: &[[i32; 3]], waves: &mut [Complex]) {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") {
+        // SAFETY: the processor has it, as was asked just now.
+        return unsafe { add_waves_avx2(phases, vectors, waves) };
+    }
+    add_waves_of(phases, vectors, waves);
+}
+
+/// The same in vectors of four.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn add_waves_avx2(phases: &Phases, vectors: &[[i32; 3]], waves: &mut [Complex]) {
+    add_waves_of(phases, vectors, waves);
+}
+
+#[inline(always)]
+fn add_waves_of(phases: &Phases, vectors: &[[i32; 3]], waves: &mut [Complex]) {
+    for (h, wave) in vectors.iter().zip(waves) {
+        let (first, _) = phases.at(0, h[0]);
+        let (second, sign) = phases.at(1, h[1]);
+        let product = times(first, second, sign);
+        let (third, sign) = phases.at(2, h[2]);
+        let product = times(&product, third, sign);
+        for part in 0..2 {
+            for k in 0..LANES {
+                wave[part][k] += product[part][k];
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng, rngs::StdRng};
+
+    #[test]
+    fn waves_are_sums_of_exponentials() {
+        let mut random = StdRng::seed_from_u64(5);
+        let fractions: Vec<[f64; 3]> = (0..LANES + 3).map(|_| random.random()).collect();
+        let vectors = [[0, 0, 1], [0, 3, -2], [1, -4, 0], [5, 2, 7]];
+        for (h, found) in vectors.iter().zip(waves(fractions.iter().copied(), &vectors)) {
+            let phase = |s: &[f64; 3]| TAU * (0..3).map(|c| f64::from(h[c]) * s[c]).sum::<f64>();
+            let expected = [f64::cos, f64::sin].map(|f| fractions.iter().map(|s| f(phase(s))).sum::<f64>());
+            assert!((0..2).all(|k| (found[k] - expected[k]).abs() < 1e-12), "{h:?}: {found:?} {expected:?}");
+        }
+        assert_eq!(waves(std::iter::empty(), &vectors), [[0.0; 2]; 4]);
+    }
+}
