@@ -129,18 +129,17 @@ impl Meter for LocalDensity {
         }
         // Pairs in a shell over those at g = 1, times the integral of w over it; and r w′ over pairs.
         let width = density.kernel.range() / SHELLS as f64;
+        let volume_of =
+            |k: usize| super::rdf::shell_volume(self.dimensions, k as f64 * width, (k + 1) as f64 * width);
+        let means: Vec<f64> = self.shells.iter().enumerate().map(|(k, w)| w / volume_of(k)).collect();
         for p in evaluation.pairs() {
             let (a, b) = (species[p.i] as usize, species[p.j] as usize);
+            let shell = means.get((p.r / width) as usize).copied().unwrap_or(0.0);
+            let slope = p.r * density.force_kernel.slope(p.r) / self.dimensions as f64;
             for (a, b) in [(a, b), (b, a)] {
-                let reference = numbers[a] * partners(a, b);
                 let mean = &mut rest[4 * (a * kinds + b)..4 * (a * kinds + b) + 4];
-                if let Some(w) = self.shells.get((p.r / width) as usize) {
-                    let shell = (p.r / width).floor();
-                    let volume =
-                        super::rdf::shell_volume(self.dimensions, shell * width, (shell + 1.0) * width);
-                    mean[2] += w / volume / reference;
-                }
-                mean[3] -= p.r * density.force_kernel.slope(p.r) / self.dimensions as f64 / reference;
+                mean[2] += shell;
+                mean[3] -= slope;
             }
         }
         for a in 0..kinds {
@@ -149,6 +148,7 @@ impl Meter for LocalDensity {
                 if partners(a, b) > 0.0 {
                     mean[1] = mean[0] / partners(a, b);
                 }
+                (2..4).for_each(|k| mean[k] /= numbers[a] * partners(a, b));
             }
         }
         // Species without particles have no distribution.
