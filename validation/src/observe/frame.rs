@@ -1,14 +1,16 @@
 //! One configuration as the observables see it: what several of them need is computed once.
 
 use super::flux::{Carrier, Flux, Line};
-use psidpd_core::engine::PeriodicBox;
 use psidpd_core::engine::reference::{Evaluation, Evaluator};
+use psidpd_core::engine::{PeriodicBox, Pool};
 use psidpd_core::model::Model;
 use std::cell::OnceCell;
 
 /// A configuration of particles, as whoever has them lends it to the observables.
 #[derive(Clone, Copy)]
 pub struct View<'a> {
+    /// Threads that share what takes long; what comes out does not depend on their number.
+    pub pool: &'a Pool,
     /// Number of the step.
     pub step: u64,
     /// Time since the start of the run.

@@ -116,11 +116,11 @@ cannot be seen in it, and what differs from the start, such as a support of part
 `cargo test --release -p psidpd --test coverage -- --ignored --nocapture`.
 
 **What a sample costs**, in steps of the run: of Warren's set 6, 6050 particles on one thread in mixed precision, `density_profile`,
-`density_field` and `interface_width` one or less, `msd` 1.4, `clusters` and `viscosity` 4, `pressure` 5, `energy` 15, `temperature` and
-`local_density` 19 (these four together 30, since they share an evaluation), `structure_factor` 33, `rdf` 38, `stress_profile` 40,
-`surface_tension` 52. They are computed plainly, in double precision on one thread, so that with samples at every tenth step
-such observables take most of a run. Samples that are closer than the quantity changes tell little more: where `every = 50` serves as well, a
-run with `temperature` and `rdf` is three times as fast.
+`density_field`, `interface_width` and `msd` one or less, `pressure`, `clusters` and `viscosity` 4, `energy` 6, `structure_factor` 7,
+`local_density` 9, `temperature` 10 (these two, `energy` and `pressure` together 18, since they share an evaluation), `surface_tension` 20,
+`stress_profile` 26, `rdf` up to half the box 37. They are computed in double precision; `rdf` and `structure_factor` share the
+threads of the run. With samples at every tenth step such observables take most of a run. Samples that are closer than the quantity
+changes tell little more: where `every = 50` serves as well, a run with `temperature` and `rdf` is three times as fast.
 
 **Units** are those of the model: lengths in its unit of length ("length"), energies in the unit of kT, masses in m; "1" stands for a pure
 number. In two dimensions volumes are areas: densities count per length², pressures are forces per length, surface

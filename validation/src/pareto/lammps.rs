@@ -12,6 +12,8 @@ use crate::export::lammps as deck;
 use crate::lammps::{self, Host, dump};
 use crate::observe::frame::View;
 use crate::observe::{Observers, Series};
+use psidpd_core::engine::Pool;
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -138,7 +140,9 @@ impl Lammps {
         let ids = frame.get("id").ok_or_else(missing)?;
         let tags: Vec<i32> = ids.iter().map(|id| *id as i32).collect();
         let (v, species) = (vec![[0.0; 3]; x.len()], vec![0; x.len()]);
+        let pool = Pool::new(NonZeroUsize::MIN);
         let view = View {
+            pool: &pool,
             step: (k as u64 + 1) * every,
             time: k as f64 * interval_time(origin),
             kt: origin.stage.kt,

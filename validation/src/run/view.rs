@@ -8,6 +8,7 @@ impl Simulation {
     /// The present step for observables; `time` is that since the start of the run.
     pub fn view(&self, time: f64) -> View<'_> {
         View {
+            pool: self.engine().pool(),
             step: self.step_number(),
             time,
             kt: self.kt(),

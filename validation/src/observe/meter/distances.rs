@@ -1,6 +1,6 @@
 //! How many pairs of particles are how far apart.
 
-use psidpd_core::engine::PeriodicBox;
+use psidpd_core::engine::{PeriodicBox, Pool};
 use std::ops::Range;
 
 /// Rows of particles in a range: the narrower, the fewer pairs out of range are looked at.
@@ -25,6 +25,7 @@ pub struct Shells {
 /// Pairs in each shell: for each species `a` and each `b` from `a` on `bins` numbers. Particles without a finite position
 /// make no pairs.
 pub fn count(
+    pool: &Pool,
     x: &[[f64; 3]],
     species: &[i32],
     kinds: usize,
@@ -34,21 +35,18 @@ pub fn count(
 ) -> Vec<u64> {
     let near = Near::new(domain, dimensions, shells);
     let sorted = Sorted::new(x, species, &near);
-    let mut counts = Counts { numbers: vec![0; kinds * kinds * near.width], kinds, found: Vec::new() };
-    for (at, plane) in sorted.planes.iter().enumerate() {
-        for other_plane in &sorted.planes[at..] {
-            let apart = near.apart(1, &plane.across, &other_plane.across);
-            let same = std::ptr::eq(plane, other_plane);
-            for (at, row) in plane.rows.iter().enumerate() {
-                for other in &other_plane.rows[if same { at } else { 0 }..] {
-                    if let Some(chord) = near.chord(apart, near.apart(2, &row.across, &other.across)) {
-                        counts.add(&near, &sorted, [row, other], chord);
-                    }
-                }
-            }
-        }
+    let planes = sorted.planes.len();
+    let pairs: Vec<[usize; 2]> = (0..planes).flat_map(|a| (a..planes).map(move |b| [a, b])).collect();
+    let of_none = Counts { numbers: vec![0; kinds * kinds * near.width], kinds, found: Vec::new() };
+    let mut shares: Vec<(usize, Counts)> = (0..pool.threads()).map(|t| (t, of_none.clone())).collect();
+    pool.each(&mut shares, |(t, counts)| {
+        let pairs = pairs.iter().skip(*t).step_by(pool.threads());
+        pairs.for_each(|pair| counts.add_planes(&near, &sorted, pair.map(|k| &sorted.planes[k])));
+    });
+    let mut counts = of_none.numbers;
+    for (_, share) in &shares {
+        counts.iter_mut().zip(&share.numbers).for_each(|(sum, number)| *sum += number);
     }
-    let counts = counts.numbers;
     let mut sums = Vec::with_capacity(shells.bins * kinds * (kinds + 1) / 2);
     let row = |a: usize, b: usize| &counts[(a * kinds + b) * near.width..][..shells.bins];
     for (a, b) in (0..kinds).flat_map(|a| (a..kinds).map(move |b| (a, b))) {
@@ -114,6 +112,7 @@ struct Sorted {
 }
 
 /// Pairs that were counted: for each species of one particle and of the other [`Near::width`] numbers.
+#[derive(Clone)]
 struct Counts {
     numbers: Vec<u64>,
     kinds: usize,
@@ -122,6 +121,19 @@ struct Counts {
 }
 
 impl Counts {
+    /// Counts the pairs of particles of two planes, or of one.
+    fn add_planes(&mut self, near: &Near, sorted: &Sorted, [plane, other_plane]: [&Plane; 2]) {
+        let apart = near.apart(1, &plane.across, &other_plane.across);
+        let same = std::ptr::eq(plane, other_plane);
+        for (at, row) in plane.rows.iter().enumerate() {
+            for other in &other_plane.rows[if same { at } else { 0 }..] {
+                if let Some(chord) = near.chord(apart, near.apart(2, &row.across, &other.across)) {
+                    self.add(near, sorted, [row, other], chord);
+                }
+            }
+        }
+    }
+
     /// Counts the pairs of particles of two rows, or of one.
     fn add(&mut self, near: &Near, sorted: &Sorted, [row, other]: [&Row; 2], chord: f64) {
         let mut window = Window::new(near, chord, &sorted.s[0], other.particles.clone());
@@ -319,6 +331,7 @@ mod tests {
     use nalgebra::Matrix3;
     use psidpd_core::engine::reference::for_each_pair;
     use rand::{RngExt, SeedableRng, rngs::StdRng};
+    use std::num::NonZeroUsize;
 
     /// By the search for pairs of any box.
     #[test]
@@ -350,13 +363,18 @@ mod tests {
                 expected[11 * kind + ((p.r / range * 11.0) as usize).min(10)] += 1;
             });
             assert!(expected.iter().sum::<u64>() > 400, "pairs to count");
-            assert_eq!(count(&x, &species, 3, &domain, dimensions, shells), expected, "{edges} {periodic:?}");
+            for threads in [1, 3] {
+                let pool = Pool::new(NonZeroUsize::new(threads).unwrap());
+                let found = count(&pool, &x, &species, 3, &domain, dimensions, shells);
+                assert_eq!(found, expected, "{edges} {periodic:?}");
+            }
         }
     }
 
     #[test]
     fn nothing_makes_no_pairs() {
         let domain = PeriodicBox::orthogonal([0.0; 3], [4.0; 3], [true; 3]).unwrap();
-        assert_eq!(count(&[], &[], 1, &domain, 3, Shells { range: 1.0, bins: 2 }), [0, 0]);
+        let alone = Pool::new(NonZeroUsize::MIN);
+        assert_eq!(count(&alone, &[], &[], 1, &domain, 3, Shells { range: 1.0, bins: 2 }), [0, 0]);
     }
 }

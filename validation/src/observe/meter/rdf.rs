@@ -68,7 +68,7 @@ impl Meter for Rdf {
         let species = view.species;
         let kinds = view.model.species().len();
         let shells = Shells { range: self.range, bins: self.bins };
-        let by_species = count(view.x, species, kinds, view.domain, self.dimensions, shells);
+        let by_species = count(view.pool, view.x, species, kinds, view.domain, self.dimensions, shells);
         let all = (0..self.bins).map(|bin| by_species.iter().skip(bin).step_by(self.bins).sum::<u64>());
         let of_species = if kinds > 1 { &by_species[..] } else { &[] };
         let mut counts: Vec<f64> = all.chain(of_species.iter().copied()).map(|count| count as f64).collect();

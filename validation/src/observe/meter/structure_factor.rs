@@ -132,7 +132,7 @@ impl Meter for StructureFactor {
         let waves: Vec<Vec<[f64; 2]>> = (0..count as i32)
             .map(|kind| {
                 let of_kind = view.x.iter().zip(species).filter(|(_, s)| **s == kind);
-                waves(of_kind.map(|(x, _)| domain.fraction(*x)), &self.vectors)
+                waves(view.pool, of_kind.map(|(x, _)| domain.fraction(*x)), &self.vectors)
             })
             .collect();
         let shells = self.lengths.len();

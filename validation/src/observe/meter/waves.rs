@@ -1,18 +1,32 @@
 //! Density waves of particles, several particles at a time.
 
+use psidpd_core::engine::Pool;
 use std::f64::consts::TAU;
 
 /// `ρ(h) = Σ exp(2πi h·s)` over particles at fractions `s` of the box, real and imaginary part, for each `h` of `vectors`, whose
 /// first number must not be negative.
-pub fn waves(fractions: impl Iterator<Item = [f64; 3]>, vectors: &[[i32; 3]]) -> Vec<[f64; 2]> {
+pub fn waves(pool: &Pool, fractions: impl Iterator<Item = [f64; 3]>, vectors: &[[i32; 3]]) -> Vec<[f64; 2]> {
     let top = [0, 1, 2].map(|c| vectors.iter().map(|h| h[c].unsigned_abs() as usize).max().unwrap_or(0));
     let fractions: Vec<[f64; 3]> = fractions.collect();
-    let mut waves = vec![[[0.0; LANES]; 2]; vectors.len()];
-    for particles in fractions.chunks(LANES) {
-        add_waves(&Phases::new(particles, top), vectors, &mut waves);
+    // Blocks do not depend on the number of threads, nor does the order of their sum.
+    let mut blocks: Vec<_> =
+        fractions.chunks(BLOCK).map(|block| (block, vec![[[0.0; LANES]; 2]; vectors.len()])).collect();
+    pool.each(&mut blocks, |(block, waves)| {
+        for particles in block.chunks(LANES) {
+            add_waves(&Phases::new(particles, top), vectors, waves);
+        }
+    });
+    let mut sums = vec![[0.0; 2]; vectors.len()];
+    for (_, waves) in &blocks {
+        for (sum, wave) in sums.iter_mut().zip(waves) {
+            (0..2).for_each(|k| sum[k] += wave[k].iter().sum::<f64>());
+        }
     }
-    waves.iter().map(|parts| parts.map(|part| part.iter().sum())).collect()
+    sums
 }
+
+/// Particles that a thread does at once.
+const BLOCK: usize = 1024;
 
 /// Particles whose waves are found together, in vectors.
 const LANES: usize = 8;
@@ -91,17 +105,21 @@ fn add_waves_of(phases: &Phases, vectors: &[[i32; 3]], waves: &mut [Complex]) {
 mod tests {
     use super::*;
     use rand::{RngExt, SeedableRng, rngs::StdRng};
+    use std::num::NonZeroUsize;
 
     #[test]
     fn waves_are_sums_of_exponentials() {
         let mut random = StdRng::seed_from_u64(5);
-        let fractions: Vec<[f64; 3]> = (0..LANES + 3).map(|_| random.random()).collect();
+        let fractions: Vec<[f64; 3]> = (0..2 * BLOCK + 3).map(|_| random.random()).collect();
         let vectors = [[0, 0, 1], [0, 3, -2], [1, -4, 0], [5, 2, 7]];
-        for (h, found) in vectors.iter().zip(waves(fractions.iter().copied(), &vectors)) {
+        let [alone, three] = [1, 3].map(|n| Pool::new(NonZeroUsize::new(n).unwrap()));
+        let found = waves(&alone, fractions.iter().copied(), &vectors);
+        assert_eq!(waves(&three, fractions.iter().copied(), &vectors), found);
+        for (h, found) in vectors.iter().zip(found) {
             let phase = |s: &[f64; 3]| TAU * (0..3).map(|c| f64::from(h[c]) * s[c]).sum::<f64>();
             let expected = [f64::cos, f64::sin].map(|f| fractions.iter().map(|s| f(phase(s))).sum::<f64>());
             assert!((0..2).all(|k| (found[k] - expected[k]).abs() < 1e-12), "{h:?}: {found:?} {expected:?}");
         }
-        assert_eq!(waves(std::iter::empty(), &vectors), [[0.0; 2]; 4]);
+        assert_eq!(waves(&three, std::iter::empty(), &vectors), [[0.0; 2]; 4]);
     }
 }
