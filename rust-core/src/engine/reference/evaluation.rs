@@ -406,6 +406,29 @@ A = { slopes = { n = "0.3*n" }, energy = "n^2" }
         }
     }
 
+    /// ψ has no finite slope where nobody is near: that is nothing to pairs out of the range of its density.
+    #[test]
+    fn pairs_out_of_range_of_a_density_feel_nothing_of_it() {
+        let model = r#"
+title = "m"
+species = ["A"]
+[density.n]
+kernel = "lucy"
+range = 0.5
+[excess_free_energy]
+A = "sqrt(n)"
+[[pair]]
+between = ["A", "A"]
+form = "soft"
+strength = 25.0
+range = 1.0
+"#;
+        let (evaluator, ..) = random(model, 13);
+        let domain = PeriodicBox::orthogonal([0.0; 3], [4.0; 3], [true; 3]).unwrap();
+        let found = evaluator.evaluate(&[[1.0; 3], [1.7, 1.0, 1.0]], &[0, 0], &domain);
+        assert!((found.forces[0][0] + 7.5).abs() < 1e-12 && found.forces[1][0] == -found.forces[0][0]);
+    }
+
     /// The Laplacian of U by the differences of forces.
     #[test]
     fn laplacians_are_divergences_of_forces() {

@@ -158,8 +158,9 @@ impl<const N: usize> ShapeVisitor for ManyBody<'_, '_, N> {
             let s = list.r[k] * inverse_range;
             let here = list.i[k] as usize * width + offset + list.species_j[k] as usize;
             let there = list.j[k] as usize * width + offset + list.species_i[k] as usize;
-            let slope = if s < 1.0 { factor * S::slope(s) } else { 0.0 };
-            self.out[k - self.begin] -= (slopes[here] + slopes[there]) * slope;
+            let force = (slopes[here] + slopes[there]) * (factor * S::slope(s));
+            // Where nobody is in range a slope of ψ may be infinite.
+            self.out[k - self.begin] -= if s < 1.0 { force } else { 0.0 };
         }
     }
 }

@@ -60,16 +60,6 @@ impl PairList {
         self.thermostat_factor.clear();
     }
 
-    /// Makes room for so many pairs more.
-    pub fn reserve(&mut self, count: usize) {
-        self.i.reserve(count);
-        self.j.reserve(count);
-        self.species_i.reserve(count);
-        self.species_j.reserve(count);
-        self.d.iter_mut().for_each(|d| d.reserve(count));
-        self.r.reserve(count);
-    }
-
     #[inline(always)]
     pub fn push(&mut self, i: usize, j: usize, d: [f64; 3], species: &[i32]) {
         self.push_of(i, j, d, [species[i], species[j]]);
@@ -95,11 +85,6 @@ impl Pairs {
         self.newton = newton;
         self.force.clear();
         self.density_only.clear();
-    }
-
-    /// Makes room for so many pairs more whose force is computed here.
-    pub fn reserve(&mut self, count: usize) {
-        self.force.reserve(count);
     }
 
     /// Adds the pair `a`, `b` with `d = r_a − r_b`; one of them is owned.

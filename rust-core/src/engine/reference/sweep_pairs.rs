@@ -88,7 +88,6 @@ impl SweepPairs {
         }
         let period = is_periodic.map(|p| f64::from(u8::from(p)));
         let edges = [0, 1, 2].map(|k| domain.edge(k));
-        pairs.reserve(planes.iter().map(|plane| plane.list.pairs.len()).sum());
         for PlanePairs { own, next, list } in planes {
             let sorted = &sorted[own.start..][..own.len() + next.len()];
             for ((i, x, s), ends) in sorted.iter().zip(list.start.windows(2)) {
