@@ -11,6 +11,9 @@ const GROOT_WARREN: f64 = 0.65;
 /// λ of the two-stage splitting with small errors of averages in liquids of many-body DPD.
 const TWO_STAGE: f64 = 0.21;
 
+/// λ and ξ with which the force-gradient step is of fourth order.
+const FORCE_GRADIENT: [f64; 2] = [1.0 / 6.0, 1.0 / 24.0];
+
 /// How a step is made.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Integrator {
@@ -57,6 +60,15 @@ pub enum Integrator {
     TwoStage {
         /// Share of a step in the first kick and in the last.
         lambda: f64,
+        /// The thermostat.
+        coupling: Coupling,
+    },
+    /// The same, its middle kick by forces at displaced positions.
+    ForceGradient {
+        /// Share of a step in the first kick and in the last.
+        lambda: f64,
+        /// ξ: the displacement is `ξ Δt² F/m`.
+        gradient: f64,
         /// The thermostat.
         coupling: Coupling,
     },
@@ -110,7 +122,7 @@ pub enum Counterpart {
 
 impl Integrator {
     /// Names in scene files, and what they mean with all other keys left out.
-    pub const ALL: [(&str, Integrator); 11] = [
+    pub const ALL: [(&str, Integrator); 12] = [
         ("velocity-verlet", Integrator::VelocityVerlet),
         ("groot-warren", Integrator::GrootWarren { lambda: GROOT_WARREN }),
         ("dpd-vv", Integrator::DpdVv { noise: Law::Gaussian }),
@@ -122,6 +134,14 @@ impl Integrator {
         ("aboba", Integrator::Aboba(Coupling::DEFAULT)),
         ("baoab", Integrator::Baoab(Coupling::DEFAULT)),
         ("two-stage", Integrator::TwoStage { lambda: TWO_STAGE, coupling: Coupling::DEFAULT }),
+        (
+            "force-gradient",
+            Integrator::ForceGradient {
+                lambda: FORCE_GRADIENT[0],
+                gradient: FORCE_GRADIENT[1],
+                coupling: Coupling::DEFAULT,
+            },
+        ),
     ];
 
     /// Its name.
@@ -137,7 +157,17 @@ impl Integrator {
     pub fn lambda(&mut self) -> Option<(&mut f64, [f64; 2])> {
         match self {
             Integrator::GrootWarren { lambda } => Some((lambda, [0.0, 1.0])),
-            Integrator::TwoStage { lambda, .. } => Some((lambda, [0.0, 0.5])),
+            Integrator::TwoStage { lambda, .. } | Integrator::ForceGradient { lambda, .. } => {
+                Some((lambda, [0.0, 0.5]))
+            }
+            _ => None,
+        }
+    }
+
+    /// Its ξ, if it has one.
+    pub fn gradient(&mut self) -> Option<&mut f64> {
+        match self {
+            Integrator::ForceGradient { gradient, .. } => Some(gradient),
             _ => None,
         }
     }
@@ -146,7 +176,9 @@ impl Integrator {
     pub fn coupling(&mut self) -> Option<&mut Coupling> {
         match self {
             Integrator::Aboba(coupling) | Integrator::Baoab(coupling) => Some(coupling),
-            Integrator::TwoStage { coupling, .. } => Some(coupling),
+            Integrator::TwoStage { coupling, .. } | Integrator::ForceGradient { coupling, .. } => {
+                Some(coupling)
+            }
             _ => None,
         }
     }
@@ -200,7 +232,9 @@ impl Integrator {
     /// For which part of a step each of its evaluations of forces acts, on average.
     pub(crate) fn force_shares(self) -> [f64; 2] {
         match self {
-            Integrator::TwoStage { lambda, .. } => [1.0 - 2.0 * lambda, 2.0 * lambda],
+            Integrator::TwoStage { lambda, .. } | Integrator::ForceGradient { lambda, .. } => {
+                [1.0 - 2.0 * lambda, 2.0 * lambda]
+            }
             _ => [1.0, 0.0],
         }
     }
@@ -218,6 +252,9 @@ impl fmt::Display for Integrator {
         let mut this = *self;
         if let Some((lambda, _)) = this.lambda() {
             write!(f, ", lambda = {lambda}")?;
+        }
+        if let Some(gradient) = this.gradient() {
+            write!(f, ", gradient = {gradient}")?;
         }
         if let Some(coupling) = this.coupling() {
             write!(f, ", thermostat_step = {}", coupling.name())?;

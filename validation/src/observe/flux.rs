@@ -8,18 +8,19 @@
 //! The random force, though it transfers momentum, is left out: it does not depend on the positions it acts at, so its mean
 //! is 0.
 
+use psidpd_core::engine::PeriodicBox;
 use psidpd_core::engine::reference::COMPONENTS;
 
-/// A straight line that momentum was carried along: to the mean pressure in a volume it adds `strength` `d ⊗ d`, divided by
-/// the volume, times its part in the volume.
+/// A straight line that momentum was carried along: to the mean pressure in a volume it adds `d ⊗ f`, divided by the volume,
+/// times its part in the volume.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Line {
     /// One end.
     pub from: [f64; 3],
     /// From the other end to this one.
     pub d: [f64; 3],
-    /// Of a pair its force over `d`.
-    pub strength: f64,
+    /// Of a pair the force on the particle at `from`. It is along `d` but in kicks by forces at displaced positions.
+    pub f: [f64; 3],
 }
 
 /// What a line belongs to.
@@ -49,12 +50,32 @@ pub struct Acted {
     pub share: f64,
     /// Their virial.
     pub virial: [f64; 6],
-    /// Positions and species, if they are not those at the end of the step.
-    pub at: Option<(Vec<[f64; 3]>, Vec<i32>)>,
+    /// Where the particles were, if not where they are at the end of the step.
+    pub at: Option<Place>,
+}
+
+/// Where particles were when forces acted on them.
+#[derive(Debug, Clone)]
+pub struct Place {
+    /// Positions.
+    pub x: Vec<[f64; 3]>,
+    /// Species.
+    pub species: Vec<i32>,
+    /// What the forces were computed at, if that was elsewhere.
+    pub displaced: Option<Displaced>,
+}
+
+/// Displaced positions, of the same particles.
+#[derive(Debug, Clone)]
+pub struct Displaced {
+    /// Positions, which no period is taken from.
+    pub x: Vec<[f64; 3]>,
+    /// A box that they are in along its directions with walls.
+    pub domain: PeriodicBox,
 }
 
 impl Flux {
-    /// `Σ strength d ⊗ d` of everything.
+    /// `Σ d ⊗ f` of everything, its symmetric part.
     pub fn sum(&self) -> [f64; 6] {
         let mut sum = [0.0; 6];
         for acted in &self.forces {
@@ -62,7 +83,7 @@ impl Flux {
         }
         for line in self.ways.iter().chain(&self.drag) {
             for (sum, (a, b)) in sum.iter_mut().zip(COMPONENTS) {
-                *sum += line.strength * line.d[a] * line.d[b];
+                *sum += 0.5 * (line.d[a] * line.f[b] + line.d[b] * line.f[a]);
             }
         }
         sum

@@ -1,6 +1,6 @@
 //! One configuration as the observables see it: what several of them need is computed once.
 
-use super::flux::{Carrier, Flux, Line};
+use super::flux::{Carrier, Flux, Line, Place};
 use psidpd_core::engine::reference::{Evaluation, Evaluator};
 use psidpd_core::engine::{PeriodicBox, Pool};
 use psidpd_core::model::Model;
@@ -84,13 +84,20 @@ impl<'a> Frame<'a> {
         let View { x, domain, .. } = self.view;
         let earlier = self.earlier.get_or_init(|| {
             let at = flux.forces.iter().map(|acted| acted.at.as_ref());
-            at.map(|at| at.map(|(x, species)| self.evaluator.evaluate(x, species, domain))).collect()
+            let evaluate = |place: &Place| match &place.displaced {
+                Some(to) => self.evaluator.evaluate(&to.x, &place.species, &to.domain),
+                None => self.evaluator.evaluate(&place.x, &place.species, domain),
+            };
+            at.map(|at| at.map(evaluate)).collect()
         });
         for (acted, earlier) in flux.forces.iter().zip(earlier) {
-            let x = acted.at.as_ref().map_or(x, |at| &at.0);
+            let x = acted.at.as_ref().map_or(x, |at| &at.x);
+            let displaced = acted.at.as_ref().and_then(|at| at.displaced.as_ref());
             for (pair, force) in earlier.as_ref().unwrap_or_else(|| self.evaluation()).pair_forces() {
-                let strength = acted.share * force / pair.r;
-                visit(Carrier::Pair, &Line { from: x[pair.i], d: pair.d, strength });
+                let f = pair.d.map(|d| acted.share * force / pair.r * d);
+                let back = |k: usize, c: usize| displaced.map_or(0.0, |to| to.x[k][c] - x[k][c]);
+                let d = std::array::from_fn(|c| pair.d[c] - (back(pair.i, c) - back(pair.j, c)));
+                visit(Carrier::Pair, &Line { from: x[pair.i], d, f });
             }
         }
         true

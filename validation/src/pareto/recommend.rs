@@ -16,6 +16,9 @@ pub fn scene_lines(dt: f64, setting: &Setting) -> String {
     if let Some((lambda, _)) = integrator.lambda() {
         let _ = writeln!(s, "lambda = {lambda}");
     }
+    if let Some(gradient) = integrator.gradient() {
+        let _ = writeln!(s, "gradient = {gradient}");
+    }
     if let Some(coupling) = integrator.coupling() {
         let _ = writeln!(s, "thermostat_step = \"{}\"", coupling.name());
         if coupling.every > 1 {

@@ -6,6 +6,7 @@ use psidpd_core::engine::Want;
 use psidpd_core::model::Model;
 use std::path::Path;
 
+mod force_gradient;
 mod integrators;
 mod order;
 mod resume;

@@ -168,6 +168,15 @@ fn read_integrator(section: &Section, default: Integrator) -> Result<Integrator,
             return Err(value.error(FileErrorKind::Value(message)));
         }
     }
+    if let Some(value) = section.get("gradient") {
+        let Some(gradient) = integrator.gradient() else {
+            return Err(has_none(&value, name, "gradient", |other| other.gradient().is_some()));
+        };
+        *gradient = value.number()?.value;
+        if !(0.0..=1.0).contains(gradient) {
+            return Err(value.error(FileErrorKind::Value(format!("must be from 0 to 1, is {gradient}"))));
+        }
+    }
     if let Some(value) = section.get("thermostat_step") {
         let Some(coupling) = integrator.coupling() else {
             return Err(has_none(&value, name, "thermostat_step", |other| other.coupling().is_some()));

@@ -60,14 +60,15 @@ pub(super) fn circular_centre(
 }
 
 /// Shares a line of length `r` from `from` to `from − d` out over spherical shells of equal thickness around the origin: for
-/// each shell the length of the line in it, and the part `∫ (ê·r̂)² dl` of it that is normal.
+/// each shell the length of the line in it, the part `∫ (ê·r̂)² dl` of it that is normal, and `∫ (ê·r̂)/|r| dl`, which counts
+/// what a force has across the line.
 fn share(
     d: [f64; 3],
     r: f64,
     from: [f64; 3],
     thickness: f64,
     bins: usize,
-    mut visit: impl FnMut(usize, f64, f64),
+    mut visit: impl FnMut(usize, f64, f64, f64),
 ) {
     let e = d.map(|c| -c / r);
     let start = from[0] * e[0] + from[1] * e[1] + from[2] * e[2];
@@ -85,7 +86,10 @@ fn share(
         for (low, high) in [(-outer, -inner), (inner, outer)] {
             let (low, high) = (low.max(start), high.min(end));
             if high > low {
-                visit(k, high - low, normal(high) - normal(low));
+                // A line through the centre has no force across it there.
+                let square = |u: f64| (b * b + u * u).max(f64::MIN_POSITIVE);
+                let across = 0.5 * (square(high) / square(low)).ln();
+                visit(k, high - low, normal(high) - normal(low), across);
             }
         }
     }
@@ -268,11 +272,16 @@ impl Meter for Drop {
             if self.dimensions == 2 {
                 from[2] = 0.0;
             }
-            let (force, at) = (line.strength * r, if carrier == Carrier::Particle { 1 } else { 3 });
-            share(line.d, r, from, thickness, bins, |shell, length, normal| {
+            let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+            let force = dot(line.d, line.f) / r;
+            // The foot of the perpendicular from the centre, along the force.
+            let foot = dot(from, line.f) - force * dot(from, line.d) / r;
+            let at = if carrier == Carrier::Particle { 1 } else { 3 };
+            share(line.d, r, from, thickness, bins, |shell, length, normal, across| {
                 let volume = self.volume(shell);
-                row[shell * WIDTH + at] += force * normal / volume;
-                row[shell * WIDTH + at + 1] += force * (length - normal) / rest / volume;
+                let radial = force * normal - foot * across;
+                row[shell * WIDTH + at] += radial / volume;
+                row[shell * WIDTH + at + 1] += (force * length - radial) / rest / volume;
             });
         });
         if !known {
@@ -357,7 +366,7 @@ mod tests {
             let d: [f64; 3] = std::array::from_fn(|_| rng.random::<f64>() - 0.5);
             let r = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
             let mut found = vec![[0.0; 2]; 40];
-            share(d, r, from, 0.1, 40, |k, length, normal| {
+            share(d, r, from, 0.1, 40, |k, length, normal, _| {
                 found[k][0] += length;
                 found[k][1] += normal;
             });

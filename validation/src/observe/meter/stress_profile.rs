@@ -33,9 +33,9 @@ impl StressProfile {
         let shift = fractions.first()? - view.domain.fraction(*view.x.first()?)[self.across.axis];
         let known = frame.lines(|carrier, line| {
             let n = along(line.d);
-            let square = line.d.iter().map(|d| d * d).sum::<f64>();
-            let normal = line.strength * n * n / volume;
-            let tangential = line.strength * (square - n * n) / rest / volume;
+            let whole: f64 = line.d.iter().zip(line.f).map(|(d, f)| d * f).sum();
+            let normal = n * along(line.f) / volume;
+            let tangential = whole / rest / volume - normal / rest;
             let from = view.domain.fraction(line.from)[self.across.axis] + shift;
             let at = if carrier == Carrier::Particle { 0 } else { 2 };
             self.across.share(from, from - n / self.across.height, |bin, share| {

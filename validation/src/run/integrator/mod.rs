@@ -6,6 +6,7 @@ mod aboba;
 mod baoab;
 mod coupling;
 mod dpd_vv;
+mod force_gradient;
 mod groot_warren;
 mod lowe_andersen;
 pub(super) mod parts;
@@ -35,6 +36,9 @@ impl Integrator {
             Integrator::LoweAndersen => lowe_andersen::step(system, dt, want),
             Integrator::Aboba(coupling) => aboba::step(system, dt, want, coupling),
             Integrator::Baoab(coupling) => baoab::step(system, dt, want, coupling),
+            Integrator::ForceGradient { lambda, gradient, coupling } => {
+                force_gradient::step(system, dt, want, [lambda, gradient], coupling)
+            }
             Integrator::TwoStage { lambda, coupling } => two_stage::step(system, dt, want, lambda, coupling),
         }
     }

@@ -40,6 +40,13 @@ pub struct Kept {
     over_mass: Vec<f64>,
 }
 
+impl Kept {
+    /// The first of the arrays that are kept, of as many vectors as there are particles behind a loop that kept it.
+    pub fn aside(&mut self) -> &mut Vec<[f64; 3]> {
+        &mut self.v
+    }
+}
+
 impl Moving<'_> {
     /// Makes room for velocities and forces of before.
     pub fn keep(&mut self) {
@@ -86,7 +93,7 @@ pub struct Part<'a> {
     pub x: &'a mut [[f64; 3]],
     pub v: &'a mut [[f64; 3]],
     pub f: &'a [[f64; 3]],
-    species: &'a [i32],
+    pub species: &'a [i32],
     image: &'a mut [[i32; 3]],
     /// Empty for integrators that keep nothing.
     pub kept: [&'a mut [[f64; 3]]; 2],

@@ -66,6 +66,11 @@ impl External {
 }
 
 impl Simulation {
+    /// Body forces, and none on what is frozen.
+    pub(super) fn add_external_forces(&mut self) {
+        self.external.add_forces(&mut self.particles, self.forces.pool());
+    }
+
     /// Freezes the particles of these tags, and no others: they rest where they are, and act on the others.
     /// Their temperature and momentum do not count.
     pub fn set_frozen(&mut self, tags: &Tags) {

@@ -4,6 +4,7 @@
 //! outside (`external`), the `forces` between them, the `thermostat` apart from these, and their `motion`. An integrator
 //! composes a step of the operators in `motion` and `thermostat`.
 
+mod displaced;
 mod external;
 mod forces;
 mod motion;

@@ -98,6 +98,32 @@ impl Simulation {
         }
     }
 
+    /// Puts particles at `x + c f/m` for an evaluation of forces there, without reflection; [`Simulation::step_back`] follows.
+    pub(super) fn displace(&mut self, c: f64) {
+        self.moving(None, |mut moving, around, pool| {
+            moving.keep();
+            moving.over_mass(|mass| c / mass);
+            let (low, high) = (around.bounds.low, around.bounds.high);
+            share(moving, pool, |part, over_mass| {
+                for (k, to) in part.kept[0].iter_mut().enumerate() {
+                    let m = over_mass[part.species[k] as usize];
+                    *to = std::array::from_fn(|c| part.x[k][c] + m * part.f[k][c]);
+                    let inside = |c: usize| (low[c]..=high[c]).contains(&to[c]);
+                    if !(inside(0) && inside(1) && inside(2)) {
+                        around.domain.wrap(to, &mut [0; 3]);
+                    }
+                }
+            })
+        });
+        self.step_back();
+    }
+
+    /// Exchanges the present positions for those that [`Simulation::displace`] has put aside, or the other way round.
+    pub(super) fn step_back(&mut self) {
+        let Simulation { particles, motion, .. } = self;
+        std::mem::swap(&mut particles.motion(false).0.x, motion.kept.aside());
+    }
+
     /// `x += dt (v + ½dt f/m); v += λ dt f/m`; velocities and forces of before are kept.
     pub(in crate::run) fn predict(&mut self, lambda: f64, dt: f64) -> Result<(), RunError> {
         self.make_deferred_kick()?;

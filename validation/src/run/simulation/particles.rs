@@ -74,6 +74,11 @@ impl Particles {
         (&mut self.state, &self.force)
     }
 
+    /// Puts the particles into another box, as they are, and returns the present one.
+    pub fn replace_domain(&mut self, domain: PeriodicBox) -> PeriodicBox {
+        std::mem::replace(&mut self.state.domain, domain)
+    }
+
     /// A number that changes with the positions.
     pub fn moves(&self) -> u64 {
         self.moves

@@ -2,7 +2,7 @@
 
 use super::Simulation;
 use crate::integrator::Integrator;
-use crate::observe::flux::{Acted, Flux, Line};
+use crate::observe::flux::{Acted, Displaced, Flux, Line, Place};
 use psidpd_core::engine::thermostat::Pull;
 
 /// What is recorded of the present step, which takes `dt`.
@@ -56,25 +56,27 @@ impl Simulation {
         if !self.is_recording() {
             return;
         }
-        let strengths: Vec<f64> = self.masses().iter().map(|m| m / h).collect();
+        let over_dt = self.record.as_deref().map_or(0.0, |record| 1.0 / record.dt);
         let ways: Vec<Line> = (0..self.len())
             .map(|k| {
-                let strength = strengths[self.species()[k] as usize];
-                Line { from: self.positions()[k], d: u(self, k).map(|u| h * u), strength }
+                let momentum = over_dt * self.masses()[self.species()[k] as usize];
+                let u = u(self, k);
+                Line { from: self.positions()[k], d: u.map(|u| h * u), f: u.map(|u| momentum * u) }
             })
             .collect();
-        if let Some(Record { dt, flux, .. }) = self.record.as_deref_mut() {
-            flux.ways.extend(ways.into_iter().map(|way| Line { strength: way.strength / *dt, ..way }));
+        if let Some(record) = self.record.as_deref_mut() {
+            record.flux.ways.extend(ways);
         }
     }
 
-    /// Conservative forces at the present positions.
-    pub(super) fn record_forces(&mut self) {
+    /// Conservative forces on particles at the present positions, with their virial; `displaced` is what they were computed
+    /// at, if that is elsewhere.
+    pub(super) fn record_forces(&mut self, virial: [f64; 6], displaced: Option<Displaced>) {
         if !self.is_recording() {
             return;
         }
-        let at = Some((self.positions().to_vec(), self.species().to_vec()));
-        let acted = Acted { share: 1.0, virial: self.tally().virial, at };
+        let place = Place { x: self.positions().to_vec(), species: self.species().to_vec(), displaced };
+        let acted = Acted { share: 1.0, virial, at: Some(place) };
         if let Some(record) = &mut self.record {
             record.flux.forces.push(acted);
         }
@@ -86,7 +88,7 @@ impl Simulation {
         record.flux.drag.extend(pulls.into_iter().map(|pull| Line {
             from: particles.now().x[pull.i],
             d: pull.d,
-            strength: share * pull.strength,
+            f: pull.d.map(|d| share * pull.strength * d),
         }));
     }
 }

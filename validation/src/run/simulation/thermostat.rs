@@ -130,9 +130,9 @@ impl Simulation {
     pub(in crate::run) fn forces_with_thermostat(&mut self, dt: f64, want: Want) -> Result<(), RunError> {
         let step = Step { seed: self.seed, number: self.number, dt };
         self.compute(self.wants(want), self.thermostat.on.then_some(step))?;
-        self.external.add_forces(&mut self.particles, self.forces.pool());
+        self.add_external_forces();
         self.thermostat.in_forces = Some(true);
-        self.record_forces();
+        self.record_forces(self.tally().virial, None);
         if self.is_recording() {
             let Simulation { particles, external, forces, thermostat, number, .. } = self;
             let pairs = thermostat.find_pairs(particles, external, forces, (dt, true, *number))?;
@@ -145,9 +145,9 @@ impl Simulation {
     /// All forces at the present positions but those of the thermostat.
     pub(in crate::run) fn conservative_forces(&mut self, want: Want) -> Result<(), RunError> {
         self.compute(self.wants(want), None)?;
-        self.external.add_forces(&mut self.particles, self.forces.pool());
+        self.add_external_forces();
         self.thermostat.in_forces = Some(false);
-        self.record_forces();
+        self.record_forces(self.tally().virial, None);
         Ok(())
     }
 

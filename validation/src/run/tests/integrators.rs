@@ -120,7 +120,8 @@ fn the_errors_of_the_others_show() {
     assert!((t - 1.0701).abs() < 6.0 * error.hypot(0.0012), "{t} +- {error}");
 }
 
-/// Deviations of the energy without thermostat, over several starts, at steps of 0.01 and an eighth of it.
+/// Deviations of the energy without thermostat, over several starts, at steps of 0.01 and an eighth of it. The force-gradient
+/// step is of higher order, how high the kinks of the forces of this fluid decide.
 #[test]
 fn without_thermostat_all_are_of_second_order() {
     let mut run = simulation(SET6, settled());
@@ -149,7 +150,8 @@ fn without_thermostat_all_are_of_second_order() {
         };
         let [coarse, fine] = [0.01, 0.00125].map(deviation);
         let order = (coarse / fine).log2() / 3.0;
-        assert!((1.7..2.4).contains(&order), "{name}: order {order}: {coarse} and {fine}");
+        let orders = if name == "force-gradient" { 1.7..4.4 } else { 1.7..2.4 };
+        assert!(orders.contains(&order), "{name}: order {order}: {coarse} and {fine}");
         // Two stages for twice the forces: the error of energy is less than half of that of the same forces.
         assert!(name != "two-stage" || coarse < 0.5 * 2e-3, "{coarse}");
     }
@@ -165,7 +167,7 @@ fn pressures_are_those_of_other_codes() {
     let start = state_of(DPD, "[4.0, 4.0, 4.0]", 3.0);
     for (name, integrator) in Integrator::ALL {
         let dt = match name {
-            "two-stage" => 0.04,
+            "two-stage" | "force-gradient" => 0.04,
             "velocity-verlet" | "groot-warren" => 0.01,
             _ => 0.02,
         };

@@ -1,6 +1,6 @@
 //! What is done with the particles, and what is written.
 
-use super::scene::{INTEGRATOR, LAMBDA, NOISE, THERMOSTAT_EVERY, THERMOSTAT_STEP};
+use super::scene::{GRADIENT, INTEGRATOR, LAMBDA, NOISE, THERMOSTAT_EVERY, THERMOSTAT_STEP};
 use super::ValueKind::*;
 use super::{Key, OPTIONAL, REQUIRED, Table, key, names};
 use crate::scene::number::AXES;
@@ -39,9 +39,15 @@ const STAGE_INTEGRATOR: Key = Key {
 };
 
 const STAGE_LAMBDA: Key = Key {
-    about: "The parameter of `groot-warren`, from 0 to 1, or of `two-stage`, from 0 to 0.5.",
+    about: "The parameter of `groot-warren`, from 0 to 1, or of `two-stage` and `force-gradient`, from 0 to 0.5.",
     example: "[[stage]]\nname = \"produce\"\nsteps = 1000\nintegrator = \"groot-warren\"\nlambda = 0.5",
     ..LAMBDA
+};
+
+const STAGE_GRADIENT: Key = Key {
+    about: "The parameter of `force-gradient`; as at the top level.",
+    example: "[[stage]]\nname = \"produce\"\nsteps = 1000\nintegrator = \"force-gradient\"\ngradient = 0.045",
+    ..GRADIENT
 };
 
 const STAGE_THERMOSTAT_STEP: Key = Key {
@@ -80,6 +86,7 @@ pub const STAGE: Table = Table {
             "[[stage]]\nname = \"produce\"\nsteps = 1000\ndt = 0.005"),
         STAGE_INTEGRATOR,
         STAGE_LAMBDA,
+        STAGE_GRADIENT,
         STAGE_THERMOSTAT_STEP,
         STAGE_THERMOSTAT_EVERY,
         STAGE_NOISE,

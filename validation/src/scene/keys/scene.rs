@@ -14,16 +14,21 @@ pub(super) const INTEGRATOR: Key = key("integrator", Choice(|| names(&Integrator
 
 pub(super) const LAMBDA: Key = key("lambda", Number, OPTIONAL,
     "The parameter of `groot-warren`, from 0 to 1, 0.65 if left out, which is velocity Verlet with 0.5; and that of \
-     `two-stage`, from 0 to 0.5, 0.21 if left out.",
+     `two-stage`, from 0 to 0.5, 0.21 if left out, and of `force-gradient`, 1/6 if left out.",
     "integrator = \"groot-warren\"\nlambda = 0.5");
 
+pub(super) const GRADIENT: Key = key("gradient", Number, OPTIONAL,
+    "The parameter ξ of `force-gradient`, from 0 to 1; 1/24 if left out, with which the step is of fourth order without \
+     thermostat.",
+    "integrator = \"force-gradient\"\ngradient = 0.045");
+
 pub(super) const THERMOSTAT_STEP: Key = key("thermostat_step", Choice(|| names(&THERMOSTAT_STEPS)), OPTIONAL,
-    "The thermostat of `aboba`, `baoab` and `two-stage`; `midpoint` if left out: the implicit midpoint rule over all \
+    "The thermostat of `aboba`, `baoab`, `two-stage` and `force-gradient`; `midpoint` if left out: the implicit midpoint rule over all \
      pairs at once. `pairwise` is the exact Ornstein–Uhlenbeck process of one pair after the other.",
     "integrator = \"aboba\"\nthermostat_step = \"pairwise\"");
 
 pub(super) const THERMOSTAT_EVERY: Key = key("thermostat_every", Count, OPTIONAL,
-    "Steps from one thermostat to the next in `aboba`, `baoab` and `two-stage`, each for as many time steps; 1 if left \
+    "Steps from one thermostat to the next in `aboba`, `baoab`, `two-stage` and `force-gradient`, each for as many time steps; 1 if left \
      out.",
     "integrator = \"two-stage\"\nthermostat_every = 2");
 
@@ -71,6 +76,7 @@ pub const TOP: Table = Table {
              for LAMMPS takes it over if it is given; pair styles are in double precision otherwise.",
             "precision = \"double\""),
         LAMBDA,
+        GRADIENT,
         THERMOSTAT_STEP,
         THERMOSTAT_EVERY,
         NOISE,
