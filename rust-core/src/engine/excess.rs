@@ -148,6 +148,13 @@ impl ExcessPlan {
         })
     }
 
+    /// Leaves the slopes out of evaluations to come, which are given no room for them.
+    pub fn leave_out_slopes(&mut self) {
+        if let ExcessPlan::Formula(plan) = self {
+            plan.program = Program::new(&[&plan.formula]);
+        }
+    }
+
     /// Writes ψ and its slopes for every lane: ψ of lane `l` is `psi[l]`, slope `k` is `slopes[k * lanes + l]`,
     /// as variable `v` is `at[v * lanes + l]`. Returns how many lanes had a variable below its bounds and how
     /// many one above.
@@ -324,6 +331,9 @@ impl FormulaPlan {
             let along = &along[..outside.len()];
             let coefficients = expansion.coefficients(&self.outputs[0], point, along);
             psi[lane] = continued(coefficients, outside, None);
+            if slopes.is_empty() {
+                continue;
+            }
             for (k, o) in outside.iter().enumerate() {
                 slopes[o.slope * lanes + lane] = continued(coefficients, outside, Some(k));
             }

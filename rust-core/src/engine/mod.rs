@@ -10,6 +10,7 @@
 //! noise          the random number of a pair
 //! sweep/         pairs from cells → densities → ψ′ → forces, by vector instructions and threads
 //! reference/     pairs from a list → densities → ψ′ → forces, in double precision, with values of single particles
+//! local_energy/  the energy by which one particle's move changes the whole, for Monte Carlo
 //! facade         Engine: chooses between the two for each evaluation, and says which and why (path)
 //! ```
 //!
@@ -25,6 +26,7 @@ mod exclusions;
 mod facade;
 mod fault;
 mod images;
+mod local_energy;
 mod particles;
 mod path;
 mod plan;
@@ -41,6 +43,7 @@ pub use facade::{Engine, Evaluated, Request};
 #[doc(hidden)]
 pub use fault::Fault;
 pub use images::Images;
+pub use local_energy::{LocalEnergy, NoEnergy};
 pub use particles::{Particles, Step};
 pub use path::{Path, Reason};
 pub use plan::Plan;

@@ -102,6 +102,12 @@ impl Plan {
         Plan { passes: Vec::new(), linear: Vec::new(), pairs: Vec::new(), ..self }
     }
 
+    /// The same for energies alone.
+    pub(super) fn without_slopes(mut self) -> Plan {
+        self.excess.iter_mut().for_each(ExcessPlan::leave_out_slopes);
+        self
+    }
+
     fn of_passes(fluid: &Fluid, passes: Vec<usize>, linear: Vec<LinearTerm>) -> Result<Plan, TooLarge> {
         let psi = |alpha| plan_excess(fluid, alpha, &passes);
         let excess = (0..fluid.species.len()).map(psi).collect::<Result<Vec<_>, _>>()?;

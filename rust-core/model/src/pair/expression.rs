@@ -6,6 +6,8 @@ use crate::expression::{Formula, Program, TooLarge};
 pub struct ExpressionPair {
     /// `φ`, `φ'` of the one variable `r`.
     program: Program,
+    /// `φ` alone.
+    energy: Program,
     range: f64,
 }
 
@@ -16,7 +18,7 @@ impl ExpressionPair {
     /// `φ` as a formula whose variable 0 is `r`, cut at `range`.
     pub fn new(phi: &Formula, range: f64) -> Result<ExpressionPair, TooLarge> {
         let slope = phi.derivative(0)?;
-        Ok(ExpressionPair { program: Program::new(&[phi, &slope]), range })
+        Ok(ExpressionPair { program: Program::new(&[phi, &slope]), energy: Program::new(&[phi]), range })
     }
 }
 
@@ -29,6 +31,12 @@ impl PairForm for ExpressionPair {
         let mut out = [0.0; 2];
         self.program.eval(&[r], &mut out, &mut Vec::new());
         (out[0], out[1])
+    }
+
+    fn energies(&self, r: &[f64], phi: &mut [f64], work: &mut Vec<f64>) {
+        for (r, phi) in r.chunks(LANES).zip(phi.chunks_mut(LANES)) {
+            self.energy.eval_block(r.len(), r, phi, work);
+        }
     }
 
     fn block(&self, r: &[f64], phi: &mut [f64], slope: &mut [f64]) {

@@ -33,6 +33,12 @@ pub trait PairForm {
         (8.0 * (slope(r + h) - slope(r - h)) - (slope(r + 2.0 * h) - slope(r - 2.0 * h))) / (12.0 * h)
     }
 
+    /// `φ` at every `r` of a block; all `r < range`. The slices have one length; `work` is scratch space.
+    fn energies(&self, r: &[f64], phi: &mut [f64], work: &mut Vec<f64>) {
+        let _ = work;
+        r.iter().zip(phi).for_each(|(r, phi)| *phi = self.at(*r).0);
+    }
+
     /// `φ` and `φ'` at every `r` of a block; all `r < range`. The slices have one length.
     fn block(&self, r: &[f64], phi: &mut [f64], slope: &mut [f64]) {
         for ((r, phi), slope) in r.iter().zip(phi).zip(slope) {
@@ -68,6 +74,10 @@ macro_rules! pair_table {
 
             fn curvature(&self, r: f64) -> f64 {
                 match self { $(PairPotential::$variant(form) => form.curvature(r)),+ }
+            }
+
+            fn energies(&self, r: &[f64], phi: &mut [f64], work: &mut Vec<f64>) {
+                match self { $(PairPotential::$variant(form) => form.energies(r, phi, work)),+ }
             }
 
             fn block(&self, r: &[f64], phi: &mut [f64], slope: &mut [f64]) {

@@ -1,0 +1,263 @@
+//! Particles in cells, kept while they move one by one.
+
+use crate::engine::vectors::{self, Loop};
+use psidpd_passes::domain::PeriodicBox;
+use psidpd_passes::instruction_set::InstructionSet;
+
+/// Particles of a block.
+const LANES: usize = 8;
+
+/// Cells per particle, at most: empty ones cost time too.
+const MOST_PER_PARTICLE: f64 = 4.0;
+
+/// Particles of a cell; the coordinates of places that are not taken are infinite.
+#[derive(Debug, Clone, Copy)]
+struct Block {
+    x: [[f64; LANES]; 3],
+    id: [u32; LANES],
+}
+
+impl Block {
+    const EMPTY: Block = Block { x: [[f64::INFINITY; LANES]; 3], id: [u32::MAX; LANES] };
+
+    fn put(&mut self, lane: usize, id: u32, x: [f64; 3]) {
+        self.id[lane] = id;
+        (0..3).for_each(|c| self.x[c][lane] = x[c]);
+    }
+}
+
+/// Cells no narrower than the range; along open directions the outer ones have no end.
+#[derive(Debug, Clone)]
+pub struct Cells {
+    domain: PeriodicBox,
+    edges: [[f64; 3]; 3],
+    periodic: [bool; 3],
+    dimensions: usize,
+    range: f64,
+    /// Cells in each direction.
+    count: [i32; 3],
+    /// How many cells away another may be that is in range.
+    reach: [i32; 3],
+    cells: Vec<Vec<Block>>,
+    /// Particles in each cell.
+    filled: Vec<u32>,
+    /// The cell of each particle, and its place there.
+    place: Vec<[u32; 2]>,
+}
+
+/// Particles within the range of one of two points.
+#[derive(Debug, Clone, Default)]
+pub struct Near {
+    /// How many.
+    pub count: usize,
+    pub id: Vec<u32>,
+    /// Their distances from the first point, then from the second; first their squares.
+    pub r: [Vec<f64>; 2],
+    /// Whether a particle may be there more than once.
+    pub repeats: bool,
+}
+
+impl Cells {
+    pub fn new(domain: &PeriodicBox, dimensions: usize, range: f64, particles: usize) -> Cells {
+        let heights = [0, 1, 2].map(|k| domain.height(k));
+        let most = MOST_PER_PARTICLE * particles as f64 + 64.0;
+        let counts = |width: f64| {
+            let count = |k: usize| if k < dimensions { (heights[k] / width).floor().max(1.0) } else { 1.0 };
+            [count(0), count(1), count(2)]
+        };
+        let shortest = heights[..dimensions].iter().fold(f64::INFINITY, |a, b| a.min(*b));
+        let mut width = if range > 0.0 { range * (1.0 + 1e-9) } else { shortest };
+        while counts(width).iter().product::<f64>() > most {
+            width *= 1.1;
+        }
+        let count = counts(width).map(|count| count as i32);
+        let reach = [0, 1, 2].map(|k| {
+            if k < dimensions { (range * (1.0 + 1e-9) * f64::from(count[k]) / heights[k]).ceil() as i32 } else { 0 }
+        });
+        let total = count.iter().map(|count| *count as usize).product();
+        Cells {
+            edges: [0, 1, 2].map(|k| domain.edge(k)),
+            periodic: [0, 1, 2].map(|k| k < dimensions && domain.periodic()[k]),
+            domain: domain.clone(),
+            dimensions,
+            range,
+            count,
+            reach,
+            cells: vec![Vec::new(); total],
+            filled: vec![0; total],
+            place: Vec::new(),
+        }
+    }
+
+    /// The box.
+    pub fn domain(&self) -> &PeriodicBox {
+        &self.domain
+    }
+
+    /// Puts particles at `x`, which are inside along periodic directions, into their cells.
+    pub fn fill(&mut self, x: &[[f64; 3]]) {
+        self.filled.fill(0);
+        self.cells.iter_mut().for_each(Vec::clear);
+        self.place.clear();
+        for (id, x) in x.iter().enumerate() {
+            let cell = self.cell(*x);
+            self.place.push([0; 2]);
+            self.insert(id as u32, *x, cell);
+        }
+    }
+
+    /// Moves a particle to `x`, inside along periodic directions.
+    pub fn change(&mut self, id: usize, x: [f64; 3]) {
+        let ([from, place], to) = (self.place[id], self.cell(x));
+        if from as usize == to {
+            let x = self.flat(x);
+            return self.cells[to][place as usize / LANES].put(place as usize % LANES, id as u32, x);
+        }
+        // The last one takes its place.
+        let blocks = &mut self.cells[from as usize];
+        self.filled[from as usize] -= 1;
+        let (place, last) = (place as usize, self.filled[from as usize] as usize);
+        let (block, lane) = (blocks[last / LANES], last % LANES);
+        blocks[place / LANES].put(place % LANES, block.id[lane], [0, 1, 2].map(|c| block.x[c][lane]));
+        blocks[last / LANES].put(lane, u32::MAX, [f64::INFINITY; 3]);
+        self.place[block.id[lane] as usize][1] = place as u32;
+        if lane == 0 {
+            blocks.pop();
+        }
+        self.insert(id as u32, x, to);
+    }
+
+    fn insert(&mut self, id: u32, x: [f64; 3], cell: usize) {
+        let (place, x) = (self.filled[cell] as usize, self.flat(x));
+        if place.is_multiple_of(LANES) {
+            self.cells[cell].push(Block::EMPTY);
+        }
+        self.cells[cell][place / LANES].put(place % LANES, id, x);
+        self.filled[cell] += 1;
+        self.place[id as usize] = [cell as u32, place as u32];
+    }
+
+    /// Without the coordinate that does not count.
+    fn flat(&self, x: [f64; 3]) -> [f64; 3] {
+        if self.dimensions == 2 { [x[0], x[1], 0.0] } else { x }
+    }
+
+    /// The cell of a point in each direction; outside the box along a periodic direction it is that of an image.
+    fn coordinates(&self, x: [f64; 3]) -> [i32; 3] {
+        let s = self.domain.fraction(x);
+        [0, 1, 2].map(|k| {
+            let cell = (s[k] * f64::from(self.count[k])).floor() as i32;
+            if self.periodic[k] { cell } else { cell.clamp(0, self.count[k] - 1) }
+        })
+    }
+
+    fn cell(&self, x: [f64; 3]) -> usize {
+        let c = self.coordinates(x);
+        let c = [0, 1, 2].map(|k| c[k].clamp(0, self.count[k] - 1) as usize);
+        let [nx, ny, _] = self.count.map(|count| count as usize);
+        c[0] + nx * (c[1] + ny * c[2])
+    }
+
+    /// Finds the particles within the range of `from`, which is inside along periodic directions, or of `to`, which may
+    /// be anywhere; but not the particle `but`.
+    pub fn near(&self, set: InstructionSet, [from, to]: [[f64; 3]; 2], but: usize, near: &mut Near) {
+        let (a, b) = (self.coordinates(from), self.coordinates(to));
+        let mut ends = [[0; 2]; 3];
+        near.repeats = false;
+        for k in 0..3 {
+            let (low, high) = (a[k].min(b[k]) - self.reach[k], a[k].max(b[k]) + self.reach[k]);
+            let last = self.count[k] - 1;
+            ends[k] = if self.periodic[k] { [low, high] } else { [low.max(0), high.min(last)] };
+            near.repeats |= self.periodic[k] && high - low > last;
+        }
+        near.count = 0;
+        let points = [self.flat(from), self.flat(to)];
+        vectors::run(set, Search { cells: self, points, ends, but: but as u32, near });
+    }
+}
+
+/// All blocks of a range of cells.
+struct Search<'a> {
+    cells: &'a Cells,
+    points: [[f64; 3]; 2],
+    ends: [[i32; 2]; 3],
+    but: u32,
+    near: &'a mut Near,
+}
+
+impl Loop for Search<'_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Search { cells, points: [a, b], ends, but, near } = self;
+        let square = cells.range * cells.range;
+        let [nx, ny, _] = cells.count.map(|count| count as usize);
+        let moved = |x: [f64; 3], k: usize, boxes: f64| [0, 1, 2].map(|c| x[c] - boxes * cells.edges[k][c]);
+        for z in ends[2][0]..=ends[2][1] {
+            let (z, boxes) = inside(z, cells.count[2]);
+            let (az, bz) = (moved(a, 2, boxes), moved(b, 2, boxes));
+            for y in ends[1][0]..=ends[1][1] {
+                let (y, boxes) = inside(y, cells.count[1]);
+                let (ay, by) = (moved(az, 1, boxes), moved(bz, 1, boxes));
+                for x in ends[0][0]..=ends[0][1] {
+                    let (x, boxes) = inside(x, cells.count[0]);
+                    let (a, b) = (moved(ay, 0, boxes), moved(by, 0, boxes));
+                    for block in &cells.cells[x + nx * (y + ny * z)] {
+                        look(block, a, b, square, but, near);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The cell that is the image of another, and how many boxes away it is.
+#[inline(always)]
+fn inside(mut cell: i32, count: i32) -> (usize, f64) {
+    let mut boxes = 0;
+    while cell < 0 {
+        (cell, boxes) = (cell + count, boxes - 1);
+    }
+    while cell >= count {
+        (cell, boxes) = (cell - count, boxes + 1);
+    }
+    // A particle there is at its own place plus so many edges: the points are moved the other way.
+    (cell as usize, f64::from(boxes))
+}
+
+/// Adds the particles of a block that are near one of two points.
+#[inline(always)]
+fn look(block: &Block, a: [f64; 3], b: [f64; 3], square: f64, but: u32, near: &mut Near) {
+    let distance = |p: [f64; 3], l: usize| {
+        let d = [0, 1, 2].map(|c: usize| p[c] - block.x[c][l]);
+        d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
+    };
+    let (mut before, mut after) = ([0.0; LANES], [0.0; LANES]);
+    for l in 0..LANES {
+        (before[l], after[l]) = (distance(a, l), distance(b, l));
+    }
+    let (mut id, mut r, mut count) = ([0; LANES], [[0.0; LANES]; 2], 0);
+    for l in 0..LANES {
+        let to = count % LANES;
+        (id[to], r[0][to], r[1][to]) = (block.id[l], before[l], after[l]);
+        count += usize::from((before[l].min(after[l]) < square) & (block.id[l] != but));
+    }
+    let start = near.count;
+    if near.id.len() < start + LANES {
+        near.grow();
+    }
+    near.id[start..start + LANES].copy_from_slice(&id);
+    near.r[0][start..start + LANES].copy_from_slice(&r[0]);
+    near.r[1][start..start + LANES].copy_from_slice(&r[1]);
+    near.count += count;
+}
+
+impl Near {
+    #[cold]
+    fn grow(&mut self) {
+        let room = 2 * self.id.len() + 16 * LANES;
+        self.id.resize(room, 0);
+        self.r.iter_mut().for_each(|r| r.resize(room, 0.0));
+    }
+}

@@ -1,0 +1,493 @@
+//! How the energy of a configuration changes where one particle moves: what Metropolis Monte Carlo needs.
+//!
+//! ```text
+//! U = Σ_i ψ_c(i)(ñ_i) + Σ_{i<j} φ(r_ij)
+//! ```
+//!
+//! A particle that moves changes the densities of its neighbours at the old place and at the new one, and the distances
+//! to them. Their ψ is evaluated anew, and nothing else.
+
+mod cells;
+
+use super::error::EngineError;
+use super::excess::ExcessWork;
+use super::particles::Particles;
+use super::plan::Plan;
+use super::vectors::{self, Loop};
+use crate::model::expression::TooLarge;
+use crate::model::kernel::{Kernel, Shape, ShapeVisitor};
+use crate::model::pair::PairForm;
+use crate::model::{Fluid, PairTerm};
+use cells::{Cells, Near};
+use psidpd_passes::domain::PeriodicBox;
+use psidpd_passes::instruction_set::InstructionSet;
+
+/// Particles whose ψ is evaluated together where all are.
+const LANES: usize = 128;
+
+/// Why a fluid has no such energy.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum NoEnergy {
+    /// Forces without a potential.
+    #[error(
+        "the forces of the model are no gradient of an energy: {0}; moves that are accepted by their energy need a psi, \
+         and force kernels that are those of the densities"
+    )]
+    NotConservative(String),
+    /// A derivative grows beyond the limits of the formula engine.
+    #[error(transparent)]
+    TooLarge(#[from] TooLarge),
+}
+
+/// The energy of one fluid in a box, as a function of where single particles are. Everything is in double precision.
+#[derive(Debug, Clone)]
+pub struct LocalEnergy {
+    plan: Plan,
+    range: f64,
+    set: InstructionSet,
+    cells: Option<Cells>,
+    x: Vec<[f64; 3]>,
+    species: Vec<i32>,
+    /// Densities that ψ depends on not linearly, one for each such density and species, of one particle after the other.
+    n: Vec<f64>,
+    psi: Vec<f64>,
+    /// What a particle has of its own density, by density: `w(0)`, and its own images.
+    own: Vec<f64>,
+    near: Near,
+    work: Work,
+    moved: Moved,
+}
+
+/// A particle that may be moved.
+#[derive(Debug, Clone, Default)]
+struct Moved {
+    particle: usize,
+    to: [f64; 3],
+    /// The particles whose ψ changes, itself among them, with their densities and ψ.
+    ids: Vec<u32>,
+    n: Vec<f64>,
+    psi: Vec<f64>,
+}
+
+/// Arrays for one change.
+#[derive(Debug, Clone)]
+struct Work {
+    /// Changes of densities, neighbour by neighbour, for each density.
+    change: Vec<f64>,
+    weights: [Vec<f64>; 2],
+    r: Vec<f64>,
+    phi: Vec<f64>,
+    at: Vec<f64>,
+    lanes: Vec<f64>,
+    members: Vec<u32>,
+    registers: Vec<f64>,
+    excess: ExcessWork,
+    /// The place of a particle among those whose ψ changes, where it may be met more than once.
+    slot: Vec<u32>,
+}
+
+impl LocalEnergy {
+    /// That of a fluid; it has no particles yet.
+    ///
+    /// # Errors
+    /// The fluid has no energy.
+    pub fn new(fluid: &Fluid) -> Result<LocalEnergy, NoEnergy> {
+        if let Some(species) = fluid.stated_slopes() {
+            return Err(NoEnergy::NotConservative(format!("the slopes of {species} are stated")));
+        }
+        if let Some(density) = fluid.densities.iter().find(|d| d.force_kernel != d.kernel) {
+            let what = format!("the density {} has another kernel for forces", density.name);
+            return Err(NoEnergy::NotConservative(what));
+        }
+        let set = InstructionSet::best();
+        Ok(LocalEnergy {
+            plan: Plan::new(fluid)?.without_slopes(),
+            range: fluid.conservative_range(),
+            set,
+            cells: None,
+            x: Vec::new(),
+            species: Vec::new(),
+            n: Vec::new(),
+            psi: Vec::new(),
+            own: Vec::new(),
+            near: Near::default(),
+            work: Work {
+                change: Vec::new(),
+                weights: Default::default(),
+                r: Vec::new(),
+                phi: Vec::new(),
+                at: Vec::new(),
+                lanes: Vec::new(),
+                members: Vec::new(),
+                registers: Vec::new(),
+                excess: ExcessWork::new(set),
+                slot: Vec::new(),
+            },
+            moved: Moved::default(),
+        })
+    }
+
+    /// Takes particles in, by their species, wrapped into the box, and computes everything from the beginning.
+    ///
+    /// # Errors
+    /// A position that is not finite; a ψ that is not a number, or infinitely low.
+    pub fn load(&mut self, domain: &PeriodicBox, particles: &Particles) -> Result<(), EngineError> {
+        let Particles { x, tag, kind, .. } = *particles;
+        if let Some(k) = x.iter().position(|x| !x.iter().all(|c| c.is_finite())) {
+            return Err(EngineError::Position { tag: tag[k] });
+        }
+        self.x.clear();
+        self.x.extend_from_slice(x);
+        self.species.clear();
+        self.species.extend_from_slice(kind);
+        let fits = |cells: &Cells| cells.domain() == domain && self.psi.len() == x.len();
+        if !self.cells.as_ref().is_some_and(fits) {
+            self.cells = Some(Cells::new(domain, self.plan.dimensions, self.range, x.len()));
+            self.own = own_densities(&self.plan, domain);
+        }
+        if let Some(cells) = &mut self.cells {
+            cells.fill(x);
+        }
+        let width = self.plan.slope_width();
+        self.n.clear();
+        self.n.resize(x.len() * width, 0.0);
+        self.psi.clear();
+        self.psi.resize(x.len(), 0.0);
+        self.work.slot.clear();
+        self.work.slot.resize(x.len(), u32::MAX);
+        for first in (0..x.len()).step_by(LANES) {
+            let block = first..(first + LANES).min(x.len());
+            self.moved.ids.clear();
+            self.moved.n.clear();
+            for k in block.clone() {
+                self.moved.ids.push(k as u32);
+                self.moved.n.resize((k - first + 1) * width, 0.0);
+                if width > 0 {
+                    self.find([x[k]; 2], k);
+                    self.densities_there(k, k - first);
+                }
+            }
+            self.evaluate_psi();
+            self.psi[block.clone()].copy_from_slice(&self.moved.psi);
+            self.n[block.start * width..block.end * width].copy_from_slice(&self.moved.n);
+        }
+        match self.psi.iter().position(|psi| psi.is_nan() || *psi == f64::NEG_INFINITY) {
+            Some(k) => Err(self.no_number(k, tag[k], &self.n[k * width..(k + 1) * width])),
+            None => Ok(()),
+        }
+    }
+
+    /// Positions, in the box.
+    pub fn positions(&self) -> &[[f64; 3]] {
+        &self.x
+    }
+
+    /// Densities that ψ depends on not linearly, of one particle after the other; [`Plan::density_passes`] says which.
+    pub fn densities(&self) -> &[f64] {
+        &self.n
+    }
+
+    /// By how much `U` changes if a particle goes to `to`; along periodic directions it may be outside of the box. `tag` is
+    /// told in errors.
+    ///
+    /// It is infinite where ψ of some particle becomes so, or, a pole behind it, is not a number at a higher density than
+    /// before; minus infinity where infinite energies are on both sides.
+    ///
+    /// # Errors
+    /// ψ becomes minus infinity, or is not a number at densities that are no higher than before.
+    pub fn change(&mut self, particle: usize, to: [f64; 3], tag: i32) -> Result<f64, EngineError> {
+        (self.moved.particle, self.moved.to) = (particle, to);
+        self.moved.ids.clear();
+        self.moved.n.clear();
+        self.moved.psi.clear();
+        if self.range == 0.0 {
+            return Ok(0.0);
+        }
+        self.find([self.x[particle], to], particle);
+        let pairs = self.pair_change(particle);
+        if self.plan.passes.is_empty() {
+            return Ok(if pairs.is_nan() { f64::NEG_INFINITY } else { pairs });
+        }
+        self.new_densities(particle);
+        self.evaluate_psi();
+        let Moved { ids, psi, .. } = &self.moved;
+        let excess: f64 = ids.iter().zip(psi).map(|(id, psi)| psi - self.psi[*id as usize]).sum();
+        let sum = pairs + excess;
+        if sum.is_finite() {
+            return Ok(sum);
+        }
+        self.not_finite(sum, tag)
+    }
+
+    /// What it means that an energy is not finite.
+    #[cold]
+    fn not_finite(&self, sum: f64, tag: i32) -> Result<f64, EngineError> {
+        let width = self.plan.slope_width();
+        for ((psi, n), id) in self.moved.psi.iter().zip(self.moved.n.chunks_exact(width)).zip(&self.moved.ids) {
+            let before = &self.n[*id as usize * width..][..width];
+            let is_higher = n.iter().sum::<f64>() > before.iter().sum::<f64>();
+            if *psi == f64::NEG_INFINITY || psi.is_nan() && !is_higher {
+                return Err(self.no_number(*id as usize, tag, n));
+            }
+            if psi.is_nan() {
+                return Ok(f64::INFINITY);
+            }
+        }
+        Ok(if sum.is_nan() { f64::NEG_INFINITY } else { sum })
+    }
+
+    fn no_number(&self, particle: usize, tag: i32, n: &[f64]) -> EngineError {
+        let densities: Vec<String> = n.iter().map(|n| format!("{n:.6}")).collect();
+        EngineError::ExcessFreeEnergy {
+            tag,
+            species: self.plan.species[self.species[particle] as usize].clone(),
+            densities: densities.join(", "),
+        }
+    }
+
+    /// Makes the last change, and counts in `image` the boxes that the particle crosses.
+    pub fn accept(&mut self, image: &mut [i32; 3]) {
+        let Some(cells) = &mut self.cells else { return };
+        let Moved { particle, to, ids, n, psi } = &self.moved;
+        let mut x = *to;
+        cells.domain().wrap(&mut x, image);
+        cells.change(*particle, x);
+        self.x[*particle] = x;
+        let width = self.plan.slope_width();
+        for ((id, psi), k) in ids.iter().zip(psi).zip(0..) {
+            let id = *id as usize;
+            self.psi[id] = *psi;
+            self.n[id * width..(id + 1) * width].copy_from_slice(&n[k * width..(k + 1) * width]);
+        }
+    }
+
+    /// Finds the neighbours at two points, and their distances.
+    fn find(&mut self, points: [[f64; 3]; 2], but: usize) {
+        let Some(cells) = &self.cells else { return };
+        cells.near(self.set, points, but, &mut self.near);
+        let Near { count, r: [before, after], .. } = &mut self.near;
+        vectors::run(self.set, Roots([&mut before[..*count], &mut after[..*count]]));
+    }
+
+    /// `Σ φ` at the new place less that at the old one, densities that ψ is linear in among it.
+    fn pair_change(&mut self, particle: usize) -> f64 {
+        let LocalEnergy { plan, near, work, species, set, .. } = self;
+        let (count, own) = (plan.species.len(), species[particle] as usize);
+        let mut sum = 0.0;
+        for term in &plan.linear {
+            let weights = weigh(*set, &term.kernel, near, &mut work.weights);
+            let pair = |other: usize| {
+                term.coefficients[own * count + other] + term.coefficients[other * count + own]
+            };
+            let [before, after] = weights;
+            sum += match count {
+                1 => pair(0) * (after.iter().sum::<f64>() - before.iter().sum::<f64>()),
+                _ => (0..near.count).map(|k| pair(species[near.id[k] as usize] as usize) * (after[k] - before[k])).sum(),
+            };
+        }
+        for PairTerm { between, potential } in &plan.pairs {
+            let other = match *between {
+                [a, b] if a == own => b,
+                [a, b] if b == own => a,
+                _ => continue,
+            };
+            let (range, found) = (potential.range(), near.count);
+            work.r.resize(2 * near.id.len(), 0.0);
+            work.phi.resize(2 * near.id.len(), 0.0);
+            // Those at the new place, then those at the old one.
+            let mut ends = [0; 2];
+            let mut end = 0;
+            for (side, r) in [&near.r[1], &near.r[0]].into_iter().enumerate() {
+                for k in 0..found {
+                    work.r[end] = r[k];
+                    let acts = count == 1 || species[near.id[k] as usize] as usize == other;
+                    end += usize::from((r[k] < range) & acts);
+                }
+                ends[side] = end;
+            }
+            let phi = &mut work.phi[..end];
+            potential.energies(&work.r[..end], phi, &mut work.registers);
+            sum += phi[..ends[0]].iter().sum::<f64>() - phi[ends[0]..].iter().sum::<f64>();
+        }
+        sum
+    }
+
+    /// The densities of a particle at the second point of the last search, as row `row` of the new ones.
+    fn densities_there(&mut self, particle: usize, row: usize) {
+        let LocalEnergy { plan, near, work, species, set, moved, own, .. } = self;
+        let (count, width) = (plan.species.len(), plan.slope_width());
+        let n = &mut moved.n[row * width..(row + 1) * width];
+        for (p, d) in plan.passes.iter().enumerate() {
+            let [_, after] = weigh(*set, &plan.densities[*d].kernel, near, &mut work.weights);
+            add_weights(after, near, species, &mut n[p * count..(p + 1) * count]);
+            n[p * count + species[particle] as usize] += own[p];
+        }
+    }
+
+    /// The densities that change, of whom they change, and those of the particle itself.
+    fn new_densities(&mut self, particle: usize) {
+        let LocalEnergy { plan, near, work, species, set, moved, own, n, .. } = self;
+        let (count, width, found) = (plan.species.len(), plan.slope_width(), near.count);
+        let kind = species[particle] as usize;
+        let passes = plan.passes.len();
+        work.change.resize(passes * near.id.len(), 0.0);
+        // The particle itself is the first row.
+        moved.ids.push(particle as u32);
+        moved.n.resize(width, 0.0);
+        for (p, d) in plan.passes.iter().enumerate() {
+            let [before, after] = weigh(*set, &plan.densities[*d].kernel, near, &mut work.weights);
+            add_weights(after, near, species, &mut moved.n[p * count..(p + 1) * count]);
+            moved.n[p * count + kind] += own[p];
+            let change = &mut work.change[p * found..(p + 1) * found];
+            for ((change, before), after) in change.iter_mut().zip(before).zip(after) {
+                *change = after - before;
+            }
+        }
+        for k in 0..found {
+            let changes = |p: usize| work.change[p * found + k];
+            if (0..passes).all(|p| changes(p) == 0.0) {
+                continue;
+            }
+            let id = near.id[k];
+            let row = match near.repeats && work.slot[id as usize] != u32::MAX {
+                true => work.slot[id as usize] as usize,
+                false => {
+                    moved.ids.push(id);
+                    moved.n.extend_from_slice(&n[id as usize * width..][..width]);
+                    moved.ids.len() - 1
+                }
+            };
+            if near.repeats {
+                work.slot[id as usize] = row as u32;
+            }
+            for p in 0..passes {
+                moved.n[row * width + p * count + kind] += changes(p);
+            }
+        }
+        if near.repeats {
+            moved.ids.iter().for_each(|id| work.slot[*id as usize] = u32::MAX);
+        }
+    }
+
+    /// ψ of the particles of `moved` at their densities there.
+    fn evaluate_psi(&mut self) {
+        let LocalEnergy { plan, work, species, moved, .. } = self;
+        let (count, width, all) = (plan.species.len(), plan.slope_width(), moved.ids.len());
+        moved.psi.clear();
+        moved.psi.resize(all, 0.0);
+        let variables = plan.densities.len() * count;
+        for (alpha, excess) in plan.excess.iter().enumerate() {
+            if count == 1 && variables == 1 && width == 1 && plan.densities[0].correction[0].is_identity() {
+                excess.evaluate(all, &moved.n, &mut moved.psi, &mut [], &mut work.excess);
+                continue;
+            }
+            work.members.clear();
+            let is_one = |row: &u32| species[moved.ids[*row as usize] as usize] == alpha as i32;
+            work.members.extend((0..all as u32).filter(is_one));
+            let lanes = work.members.len();
+            if lanes == 0 {
+                continue;
+            }
+            work.at.clear();
+            work.at.resize(variables * lanes, 0.0);
+            for (p, d) in plan.passes.iter().enumerate() {
+                for beta in 0..count {
+                    let at = &mut work.at[(d * count + beta) * lanes..][..lanes];
+                    for (at, row) in at.iter_mut().zip(&work.members) {
+                        *at = moved.n[*row as usize * width + p * count + beta];
+                    }
+                    let correction = &plan.densities[*d].correction[alpha * count + beta];
+                    if !correction.is_identity() {
+                        at.iter_mut().for_each(|at| *at = correction.at(*at).0);
+                    }
+                }
+            }
+            work.lanes.resize(lanes, 0.0);
+            excess.evaluate(lanes, &work.at, &mut work.lanes, &mut [], &mut work.excess);
+            for (row, psi) in work.members.iter().zip(&work.lanes) {
+                moved.psi[*row as usize] = *psi;
+            }
+        }
+    }
+}
+
+/// Adds weights to the densities of the species that they are of.
+fn add_weights(weights: &[f64], near: &Near, species: &[i32], n: &mut [f64]) {
+    match n {
+        [n] => *n += weights.iter().sum::<f64>(),
+        _ => weights.iter().zip(&near.id).for_each(|(w, id)| n[species[*id as usize] as usize] += w),
+    }
+}
+
+/// What each particle has of its own density: `w(0)` if it counts, and its images.
+fn own_densities(plan: &Plan, domain: &PeriodicBox) -> Vec<f64> {
+    let of = |d: &usize| {
+        let density = &plan.densities[*d];
+        let range = density.kernel.range();
+        let shells = [0, 1, 2].map(|k| match domain.periodic()[k] && k < plan.dimensions {
+            true => (range / domain.height(k)).ceil() as i32,
+            false => 0,
+        });
+        let mut sum = if density.includes_self { density.kernel.value(0.0) } else { 0.0 };
+        let shell = |k: usize| -shells[k]..=shells[k];
+        for s in shell(0).flat_map(|a| shell(1).flat_map(move |b| shell(2).map(move |c| [a, b, c]))) {
+            if s != [0; 3] {
+                let image = [0, 1, 2].map(|c| (0..3).map(|k| f64::from(s[k]) * domain.edge(k)[c]).sum::<f64>());
+                sum += density.kernel.value(image.iter().map(|c| c * c).sum::<f64>().sqrt());
+            }
+        }
+        sum
+    };
+    plan.passes.iter().map(of).collect()
+}
+
+/// Square roots in place.
+struct Roots<'a>([&'a mut [f64]; 2]);
+
+impl Loop for Roots<'_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.0.into_iter().flatten().for_each(|r| *r = r.sqrt());
+    }
+}
+
+/// The weights of a kernel at the distances that were found.
+fn weigh<'w>(set: InstructionSet, kernel: &Kernel, near: &Near, to: &'w mut [Vec<f64>; 2]) -> [&'w [f64]; 2] {
+    let count = near.count;
+    for (w, r) in to.iter_mut().zip(&near.r) {
+        w.resize(near.id.len(), 0.0);
+        kernel.kind().visit(Weights { set, kernel, r: &r[..count], w: &mut w[..count] });
+    }
+    to.each_ref().map(|w| &w[..count])
+}
+
+struct Weights<'a> {
+    set: InstructionSet,
+    kernel: &'a Kernel,
+    r: &'a [f64],
+    w: &'a mut [f64],
+}
+
+impl ShapeVisitor for Weights<'_> {
+    type Output = ();
+
+    fn visit<S: Shape>(self) {
+        struct OfShape<'a, S>(Weights<'a>, std::marker::PhantomData<S>);
+        impl<S: Shape> Loop for OfShape<'_, S> {
+            type Out = ();
+
+            #[inline(always)]
+            fn run(self) {
+                let Weights { kernel, r, w, .. } = self.0;
+                let (factor, inverse) = (kernel.value_factor(), 1.0 / kernel.range());
+                for (w, r) in w.iter_mut().zip(r) {
+                    let s = r * inverse;
+                    *w = if s < 1.0 { factor * S::value(s) } else { 0.0 };
+                }
+            }
+        }
+        vectors::run(self.set, OfShape::<S>(self, std::marker::PhantomData));
+    }
+}

@@ -1,0 +1,264 @@
+//! Changes of the energy by single moves, against the energy of the whole configuration.
+
+use nalgebra::Matrix3;
+use psidpd_core::engine::{EngineError, LocalEnergy, NoEnergy, Particles, PeriodicBox, noise, reference};
+use psidpd_core::model::{Fluid, Model};
+use std::path::Path;
+
+struct Uniform(u32);
+
+impl Uniform {
+    fn next(&mut self) -> f64 {
+        self.0 += 1;
+        f64::from(noise::threefry2x32::<20>([self.0, 0], [5, 9])[0]) / 4_294_967_296.0
+    }
+
+    fn point(&mut self, domain: &PeriodicBox, dimensions: usize) -> [f64; 3] {
+        let s = [self.next(), self.next(), if dimensions == 3 { self.next() } else { 0.5 }];
+        domain.point(s)
+    }
+}
+
+/// Particles, and the energy that follows them.
+struct Case {
+    fluid: Fluid,
+    domain: PeriodicBox,
+    x: Vec<[f64; 3]>,
+    kind: Vec<i32>,
+    tag: Vec<i32>,
+    local: LocalEnergy,
+    random: Uniform,
+}
+
+impl Case {
+    fn new(fluid: Fluid, domain: PeriodicBox, count: usize) -> Case {
+        let mut random = Uniform(17);
+        let mut local = LocalEnergy::new(&fluid).unwrap();
+        let kind: Vec<i32> = (0..count).map(|k| (k % fluid.species.len()) as i32).collect();
+        let tag: Vec<i32> = (1..=count as i32).collect();
+        // A start without singular energies.
+        for _ in 0..200 {
+            let x: Vec<_> = (0..count).map(|_| random.point(&domain, fluid.dimensions)).collect();
+            let particles = Particles { owned: count, x: &x, tag: &tag, kind: &kind };
+            if local.load(&domain, &particles).is_ok() && energy(&fluid, &x, &kind, &domain).is_finite() {
+                return Case { fluid, domain, x, kind, tag, local, random };
+            }
+        }
+        panic!("{}: no start", fluid.title);
+    }
+
+    /// A place anywhere, or near, perhaps outside of the box.
+    fn place(&mut self, particle: usize) -> [f64; 3] {
+        let far = self.random.next() < 0.3;
+        let to = self.random.point(&self.domain, self.fluid.dimensions);
+        if far { to } else { [0, 1, 2].map(|c| self.x[particle][c] + 0.3 * (to[c] - self.x[particle][c])) }
+    }
+
+    /// Makes trials, all of finite energy accepted, and holds their changes against whole energies.
+    fn check(&mut self, trials: usize) {
+        let whole = |x: &[[f64; 3]], case: &Case| energy(&case.fluid, x, &case.kind, &case.domain);
+        let mut before = whole(&self.x, self);
+        for trial in 0..trials {
+            let particle = (self.random.next() * self.x.len() as f64) as usize;
+            let mut to = self.place(particle);
+            if trial % 7 == 0 {
+                (0..3).for_each(|c| to[c] -= self.domain.edge(0)[c]);
+                if !self.domain.periodic()[0] {
+                    to = self.x[particle];
+                }
+            }
+            let Ok(change) = self.local.change(particle, to, self.tag[particle]) else { continue };
+            let mut x = self.x.clone();
+            self.domain.wrap(&mut to, &mut [0; 3]);
+            x[particle] = to;
+            let after = whole(&x, self);
+            if !after.is_finite() {
+                assert!(!change.is_finite(), "{}: {change} for {after}", self.fluid.title);
+                continue;
+            }
+            let scale = before.abs() + after.abs() + 1.0;
+            assert!(
+                (change - (after - before)).abs() < 1e-10 * scale,
+                "{}, trial {trial}: {change} for {} of {before}",
+                self.fluid.title,
+                after - before
+            );
+            self.local.accept(&mut [0; 3]);
+            (self.x, before) = (x, after);
+            assert_eq!(self.local.positions(), self.x);
+        }
+    }
+}
+
+fn energy(fluid: &Fluid, x: &[[f64; 3]], kind: &[i32], domain: &PeriodicBox) -> f64 {
+    let species: Vec<usize> = kind.iter().map(|k| *k as usize).collect();
+    reference::evaluate(fluid, x, &species, domain).unwrap().energy()
+}
+
+fn cube(edge: f64) -> PeriodicBox {
+    PeriodicBox::orthogonal([-1.0, 0.5, 2.0], [edge; 3], [true; 3]).unwrap()
+}
+
+/// Edges along the axes of a two- or three-dimensional model, so that `count` particles have the density of `density`.
+fn fitting(fluid: &Fluid, count: usize, density: f64) -> PeriodicBox {
+    cube((count as f64 / density).powf(1.0 / fluid.dimensions as f64))
+}
+
+fn shipped(name: &str) -> Fluid {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../validation/models").join(name);
+    Model::open(&path).unwrap().at(1.0).unwrap()
+}
+
+fn mixture(dimensions: usize) -> Fluid {
+    let text = format!(
+        r#"
+title = "mixture"
+dimensions = {dimensions}
+species = ["A", "B"]
+[density.n]
+kernel = "quadratic"
+range = 0.8
+self = true
+bounds = [0.8, 3.0]
+correction = {{ "A|A" = [0.1, 1.1, 0.02], "A|B" = [0.0, 1.0], "B|A" = [0.2, 0.9], "B|B" = [0.0, 1.0, 0.01] }}
+[density.m]
+kernel = "lucy"
+range = 1.0
+self = true
+[density.q]
+kernel = "wendland-c2"
+range = 0.7
+self = true
+[excess_free_energy]
+A = "kT*n_A*ln(n_A) + 0.3*n_A^2*n_B + m_B^3 + 0.7*q_A"
+B = "n_B^3 + sqrt(n_A)*m_A^2 + 0.4*q_A - 0.2*q_B"
+[[pair]]
+between = ["A", "B"]
+form = "soft"
+strength = 10
+range = 1
+[[pair]]
+between = ["B", "B"]
+form = "expression"
+phi = "3*(1 - r)^2*cos(r)"
+range = 0.9
+"#
+    );
+    Model::parse("m.toml", &text).unwrap_or_else(|e| panic!("{e}")).at(1.3).unwrap()
+}
+
+#[test]
+fn changes_are_those_of_the_whole_energy_in_every_model_that_ships() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../validation/models");
+    let mut names: Vec<_> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|e| e.unwrap().file_name().into_string().unwrap())
+        .filter(|name| name.ends_with(".toml"))
+        .collect();
+    names.sort();
+    assert!(names.len() > 20);
+    for name in names {
+        let fluid = shipped(&name);
+        let domain = fitting(&fluid, 90, if fluid.dimensions == 2 { 12.0 } else { 4.0 });
+        Case::new(fluid, domain, 90).check(40);
+    }
+}
+
+#[test]
+fn changes_are_those_of_the_whole_energy_in_every_box() {
+    let skew = Matrix3::new(4.0, 1.0, 0.5, 0.0, 5.0, -1.0, 0.0, 0.0, 3.0);
+    let open = |periodic| PeriodicBox::orthogonal([0.0; 3], [4.0, 3.0, 5.0], periodic).unwrap();
+    let boxes = [
+        PeriodicBox::new([1.0, 2.0, 3.0], skew, [true; 3]).unwrap(),
+        open([true, false, true]),
+        open([false; 3]),
+        cube(3.1),
+        // Narrower than the range, and than twice the range: particles meet images, and their own.
+        cube(0.9),
+        cube(1.7),
+        PeriodicBox::orthogonal([0.0; 3], [0.8, 6.0, 6.0], [true; 3]).unwrap(),
+    ];
+    for domain in boxes {
+        let count = (3.0 * domain.volume(3)).clamp(4.0, 150.0) as usize;
+        Case::new(mixture(3), domain, count).check(60);
+    }
+    let plane = PeriodicBox::orthogonal([0.0, 0.0, -0.5], [5.0, 7.0, 1.0], [true; 3]).unwrap();
+    Case::new(mixture(2), plane, 100).check(60);
+}
+
+#[test]
+fn after_many_moves_densities_are_those_from_the_beginning() {
+    for (fluid, domain, count) in [
+        (shipped("warren2003-set6.toml"), cube(4.0), 387),
+        (mixture(3), cube(3.1), 90),
+        (mixture(3), cube(1.5), 12),
+    ] {
+        let mut case = Case::new(fluid, domain, count);
+        let mut accepted = 0;
+        let mut image = [0; 3];
+        while accepted < 10_000 {
+            let particle = (case.random.next() * count as f64) as usize;
+            let to = case.place(particle);
+            if case.local.change(particle, to, 1).is_ok_and(f64::is_finite) {
+                case.local.accept(&mut image);
+                case.x[particle] = case.local.positions()[particle];
+                accepted += 1;
+            }
+        }
+        let followed = case.local.densities().to_vec();
+        let particles = Particles { owned: count, x: &case.x, tag: &case.tag, kind: &case.kind };
+        case.local.load(&case.domain, &particles).unwrap();
+        let error = followed.iter().zip(case.local.densities()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(error < 1e-9, "{}: {error}", case.fluid.title);
+        case.check(20);
+    }
+}
+
+/// An energy that is no number stops; one beyond a pole is refused as infinite; from an infinite one any finite is reached.
+#[test]
+fn energies_that_are_not_finite() {
+    let fluid = |psi: &str, pair: &str| {
+        let text = format!(
+            "title = \"m\"\nspecies = [\"A\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1.0\n\
+             [excess_free_energy]\nA = \"{psi}\"\n{pair}"
+        );
+        Model::parse("m.toml", &text).unwrap().at(1.0).unwrap()
+    };
+    let domain = cube(6.0);
+    let at = |r: f64| [[0.0, 1.0, 3.0], [r, 1.0, 3.0]];
+    let load = |fluid: &Fluid, r: f64| {
+        let mut local = LocalEnergy::new(fluid).unwrap();
+        let particles = Particles { owned: 2, x: &at(r), tag: &[7, 9], kind: &[0, 0] };
+        local.load(&domain, &particles).map(|()| local)
+    };
+    // w(0) is 2.4: a pole at n = 1, and a ψ of which an isolated particle has none.
+    let pole = fluid("-ln(1 - n) + ln(n + 1)", "");
+    assert_eq!(load(&pole, 0.9).unwrap().change(1, at(0.1)[1], 9).unwrap(), f64::INFINITY);
+    let stopped = load(&pole, 0.1).unwrap_err();
+    assert!(matches!(stopped, EngineError::ExcessFreeEnergy { tag: 7, .. }), "{stopped}");
+    let logarithm = fluid("n*ln(n)", "");
+    let stopped = load(&logarithm, 0.5).unwrap().change(1, at(2.0)[1], 9).unwrap_err();
+    assert!(matches!(stopped, EngineError::ExcessFreeEnergy { tag: 9, .. }), "{stopped}");
+    let stopped = load(&fluid("ln(n)", ""), 0.5).unwrap().change(1, at(2.0)[1], 9).unwrap_err();
+    assert!(matches!(stopped, EngineError::ExcessFreeEnergy { tag: 9, .. }), "{stopped}");
+    let overlap = fluid(
+        "0",
+        "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"expression\"\nphi = \"(1 - r)^2/r\"\nrange = 1.0\n",
+    );
+    assert_eq!(load(&overlap, 0.0).unwrap().change(1, at(0.1)[1], 9).unwrap(), f64::NEG_INFINITY);
+    assert_eq!(load(&overlap, 0.5).unwrap().change(1, at(0.0)[1], 9).unwrap(), f64::INFINITY);
+}
+
+#[test]
+fn laws_without_energy_are_refused() {
+    let head = "title = \"m\"\nspecies = [\"A\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1.0\n";
+    let texts = [
+        format!("{head}[excess_free_energy]\nA = {{ energy = \"n\", slopes = {{ n = \"n\" }} }}\n"),
+        format!("{head}force_kernel = \"lucy\"\n[excess_free_energy]\nA = \"n^2\"\n"),
+    ];
+    for (text, what) in texts.iter().zip(["slopes of A", "density n"]) {
+        let fluid = Model::parse("m.toml", text).unwrap_or_else(|e| panic!("{e}")).at(1.0).unwrap();
+        let refused = LocalEnergy::new(&fluid).unwrap_err();
+        assert!(matches!(&refused, NoEnergy::NotConservative(w) if w.contains(what)), "{refused}");
+    }
+}
