@@ -9,7 +9,8 @@ fn main() {
     let count = arguments.next().unwrap_or(3098.0) as usize;
     let edge = arguments.next().unwrap_or(8.0);
     let most = arguments.next().unwrap_or(0.15);
-    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../validation/models/warren2003-set6.toml");
+    let path =
+        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../validation/models/warren2003-set6.toml");
     let fluid = Model::open(&path).expect("a model").at(1.0).expect("a fluid");
     let domain = PeriodicBox::orthogonal([0.0; 3], [edge; 3], [true; 3]).expect("a box");
     let mut counter = 0u32;
@@ -41,6 +42,9 @@ fn main() {
         let x = local.positions().to_vec();
         local.load(&domain, &Particles { owned: count, x: &x, tag: &tag, kind: &kind }).expect("a state");
         let load = 1e9 * since.elapsed().as_secs_f64() / count as f64;
-        println!("{round}: {each:.0} ns a trial, {:.3} accepted, load {load:.0} ns a particle", f64::from(accepted) / trials);
+        println!(
+            "{round}: {each:.0} ns a trial, {:.3} accepted, load {load:.0} ns a particle",
+            f64::from(accepted) / trials
+        );
     }
 }

@@ -208,7 +208,8 @@ fn after_many_moves_densities_are_those_from_the_beginning() {
         let followed = case.local.densities().to_vec();
         let particles = Particles { owned: count, x: &case.x, tag: &case.tag, kind: &case.kind };
         case.local.load(&case.domain, &particles).unwrap();
-        let error = followed.iter().zip(case.local.densities()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let error =
+            followed.iter().zip(case.local.densities()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(error < 1e-9, "{}: {error}", case.fluid.title);
         case.check(20);
     }

@@ -72,6 +72,13 @@ pub enum Integrator {
         /// The thermostat.
         coupling: Coupling,
     },
+    /// Metropolis Monte Carlo: trial moves of single particles, no time.
+    MonteCarlo {
+        /// Sweeps of a step; a sweep has one trial for each particle that moves.
+        sweeps: u64,
+        /// The furthest that a trial goes along each direction; found while the run settles if left out.
+        max_move: Option<f64>,
+    },
 }
 
 /// Which thermostat a splitting has, and how often.
@@ -121,7 +128,7 @@ pub enum Counterpart {
 }
 
 impl Integrator {
-    /// Names in scene files, and what they mean with all other keys left out.
+    /// Those with a time step: names in scene files, and what they mean with all other keys left out.
     pub const ALL: [(&str, Integrator); 12] = [
         ("velocity-verlet", Integrator::VelocityVerlet),
         ("groot-warren", Integrator::GrootWarren { lambda: GROOT_WARREN }),
@@ -144,10 +151,22 @@ impl Integrator {
         ),
     ];
 
+    /// All names in scene files.
+    pub const NAMED: [(&str, Integrator); Integrator::ALL.len() + 1] = {
+        let monte_carlo = Integrator::MonteCarlo { sweeps: 1, max_move: None };
+        let mut named = [("monte-carlo", monte_carlo); Integrator::ALL.len() + 1];
+        let mut k = 0;
+        while k < Integrator::ALL.len() {
+            named[k] = Integrator::ALL[k];
+            k += 1;
+        }
+        named
+    };
+
     /// Its name.
     pub fn name(&self) -> &'static str {
         let kind = std::mem::discriminant(self);
-        Integrator::ALL
+        Integrator::NAMED
             .iter()
             .find(|(_, other)| std::mem::discriminant(other) == kind)
             .map_or("", |found| found.0)
@@ -170,6 +189,19 @@ impl Integrator {
             Integrator::ForceGradient { gradient, .. } => Some(gradient),
             _ => None,
         }
+    }
+
+    /// Sweeps of a step and the furthest move, if it makes trial moves.
+    pub fn trials(&mut self) -> Option<(&mut u64, &mut Option<f64>)> {
+        match self {
+            Integrator::MonteCarlo { sweeps, max_move } => Some((sweeps, max_move)),
+            _ => None,
+        }
+    }
+
+    /// Whether its steps take time.
+    pub fn has_time(&self) -> bool {
+        !matches!(self, Integrator::MonteCarlo { .. })
     }
 
     /// Its thermostat, if that is a choice of its own.
@@ -241,7 +273,7 @@ impl Integrator {
 
     /// Whether the last forces of a step are those at its end.
     pub(crate) fn forces_at_end(self) -> bool {
-        !matches!(self, Integrator::Aboba(_))
+        !matches!(self, Integrator::Aboba(_) | Integrator::MonteCarlo { .. })
     }
 }
 
@@ -260,6 +292,14 @@ impl fmt::Display for Integrator {
             write!(f, ", thermostat_step = {}", coupling.name())?;
             if coupling.every > 1 {
                 write!(f, ", thermostat_every = {}", coupling.every)?;
+            }
+        }
+        if let Some((sweeps, max_move)) = this.trials() {
+            if *sweeps > 1 {
+                write!(f, ", sweeps = {sweeps}")?;
+            }
+            if let Some(most) = max_move {
+                write!(f, ", max_move = {most}")?;
             }
         }
         match this.noise() {

@@ -59,7 +59,7 @@ pub struct StepEstimate {
 pub fn estimates(scene: &Scene) -> Result<Vec<StepEstimate>, RunError> {
     let mut found: Vec<StepEstimate> = Vec::new();
     let mut known: Vec<(f64, Option<[f64; 2]>)> = Vec::new();
-    for stage in &scene.stages {
+    for stage in scene.stages.iter().filter(|stage| stage.integrator.has_time()) {
         let sample = match known.iter().find(|(kt, _)| *kt == stage.kt) {
             Some((_, sample)) => *sample,
             None => {

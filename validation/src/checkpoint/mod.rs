@@ -53,6 +53,8 @@ pub struct Checkpoint {
     pub state: State,
     /// Forces of the present step, thermostat included: those that the next step begins with.
     pub forces: Vec<[f64; 3]>,
+    /// The furthest trial move that was found; `None` without Monte Carlo.
+    pub max_move: Option<f64>,
     /// Evaluations of ψ below and above the bounds of a density.
     pub out_of_bounds: [u64; 2],
     /// The last totals.

@@ -24,6 +24,7 @@ fn checkpoint(step: u64) -> Checkpoint {
             image: vec![[0, -1, i32::MIN]; 2],
         },
         forces: vec![HARD; 2],
+        max_move: Some(0.1),
         out_of_bounds: [u64::MAX, 0],
         last: None,
         sums: Sums::default(),

@@ -25,7 +25,7 @@ pub use drift::{Drift, DriftError, drift};
 pub use observation::{Abscissa, Column, Kind, Observation, write_csv, write_json};
 pub use observers::Observers;
 pub use profile::{DensityProfile, ProfileAccumulator, ProfileError, interface_width};
-pub use request::{Observe, Request, read};
+pub use request::{Observe, Request, StageNames, read};
 pub use series::{Measured, Series};
 pub use statistics::{Comparison, Estimate, StatisticsError, difference, estimate, threshold};
 pub use surface_tension::{TensionError, tension_series};

@@ -35,11 +35,20 @@ pub struct Place<'a> {
     /// The box.
     pub domain: &'a PeriodicBox,
     /// Names of the stages.
-    pub stages: &'a [&'a str],
+    pub stages: StageNames<'a>,
     /// The normal of the slab that the scene starts from.
     pub slab: Option<usize>,
     /// What drives two opposite flows.
     pub drive: Option<Drive>,
+}
+
+/// Names of the stages of a scene.
+#[derive(Debug, Clone)]
+pub struct StageNames<'a> {
+    /// All of them.
+    pub all: &'a [&'a str],
+    /// Those whose steps take no time.
+    pub timeless: Vec<&'a str>,
 }
 
 /// Reads `[observe]`; `slab` is the normal of the slab that the scene starts from, `drive` the body force that
@@ -52,15 +61,15 @@ pub fn read(
     model: &Model,
     kt: f64,
     domain: &PeriodicBox,
-    stages: &[&str],
+    stages: StageNames,
     slab: Option<usize>,
     drive: Option<Drive>,
 ) -> Result<Observe, FileError> {
     let Some(value) = root.get("observe") else { return Ok(Observe::default()) };
     let section = value.section()?;
     let fluid = model.at(kt)?;
+    let last: Vec<String> = stages.all.last().map(|s| (*s).to_owned()).into_iter().collect();
     let place = Place { fluid: &fluid, domain, stages, slab, drive };
-    let last: Vec<String> = stages.last().map(|s| (*s).to_owned()).into_iter().collect();
     let common = Common::read(&section, &place, Common { every: 10, skip: 0, stages: last })?;
     let mut observe = Observe::default();
     for kind in KINDS {
@@ -77,6 +86,13 @@ pub fn read(
         if kind.every_step && settings.every != 1 {
             let message = "needs every step: every must be 1 or left out".to_owned();
             return Err(options.at("every").error(FileErrorKind::Value(message)));
+        }
+        let is_timeless = |stage: &String| place.stages.timeless.contains(&stage.as_str());
+        if let Some(stage) = settings.stages.iter().find(|s| kind.of_motion && is_timeless(s)) {
+            let message =
+                format!("is of motion in time, which stage \"{stage}\", of monte-carlo, has none of");
+            let error = options.at("stages").error(FileErrorKind::Value(message));
+            return Err(error.with_help("observe a stage of an integrator with a time step"));
         }
         let meter = (kind.read)(&options)?;
         if let Some(section) = options.section.take() {
@@ -115,7 +131,7 @@ impl Common {
             common.skip = value.count()?.value;
         }
         if let Some(value) = section.get("stages") {
-            let known = place.stages;
+            let known = place.stages.all;
             common.stages.clear();
             for item in value.array()? {
                 let name = item.string()?.value;

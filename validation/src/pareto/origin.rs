@@ -31,7 +31,8 @@ impl<'a> Origin<'a> {
     /// # Errors
     /// There is no such stage, or the scene's own steps cannot be made.
     pub fn of(scene: &'a Scene, limit: Duration, threads: NonZeroUsize) -> Result<Origin<'a>, ParetoError> {
-        let measured = scene.stages.iter().rposition(|s| s.thermostat && s.level.is_none());
+        let measured =
+            scene.stages.iter().rposition(|s| s.thermostat && s.integrator.has_time() && s.level.is_none());
         let measured = measured.ok_or(ParetoError::NoStage)?;
         let stage = &scene.stages[measured];
         let settings = Settings { precision: Precision::Mixed, threads, ..Settings::default() };

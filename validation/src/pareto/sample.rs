@@ -5,7 +5,7 @@ use super::origin::Origin;
 use super::quantity::Quantities;
 use super::setting::{Host, INTERVAL, Physics};
 use crate::observe::meter::AnyMeter;
-use crate::observe::{Observe, Observers, Request, Series, read};
+use crate::observe::{Observe, Observers, Request, Series, StageNames, read};
 use crate::run::{RunError, Simulation};
 use psidpd_core::document::Document;
 use psidpd_core::engine::Want;
@@ -81,7 +81,7 @@ pub fn observe(origin: &Origin, every: u64, host: Host) -> Result<Observe, Paret
         &scene.model,
         stage.kt,
         &scene.domain,
-        &names,
+        StageNames { all: &names, timeless: Vec::new() },
         scene.initial.slab_axis(),
         None,
     )?;

@@ -13,4 +13,4 @@ pub use data_file::{StateError, write_data};
 pub use state::State;
 pub use tags::Tags;
 pub(crate) use tags::order_of_tags;
-pub(crate) use thermal::thermal_velocities;
+pub(crate) use thermal::{maxwell, thermal_velocities};

@@ -9,6 +9,17 @@ pub(crate) fn thermal_velocities(
     dimensions: usize,
     random: &mut ChaCha8Rng,
 ) -> Vec<[f64; 3]> {
+    maxwell(mass, kt, dimensions, [true; 3], random)
+}
+
+/// The same, with zero total momentum in the `conserved` directions only.
+pub(crate) fn maxwell(
+    mass: impl Iterator<Item = f64>,
+    kt: f64,
+    dimensions: usize,
+    conserved: [bool; 3],
+    random: &mut ChaCha8Rng,
+) -> Vec<[f64; 3]> {
     let (mut momentum, mut total) = ([0.0; 3], 0.0);
     let draw = |m: f64| {
         let mut v = [0.0; 3];
@@ -22,7 +33,7 @@ pub(crate) fn thermal_velocities(
     };
     let mut v: Vec<[f64; 3]> = mass.map(draw).collect();
     for v in &mut v {
-        for c in 0..dimensions {
+        for c in (0..dimensions).filter(|c| conserved[*c]) {
             v[c] -= momentum[c] / total;
         }
     }

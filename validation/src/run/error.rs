@@ -2,7 +2,7 @@ use crate::checkpoint::CheckpointError;
 use crate::files::WriteError;
 use crate::particles::StateError;
 use psidpd_core::document::FileError;
-use psidpd_core::engine::{EngineError, ReachError};
+use psidpd_core::engine::{EngineError, NoEnergy, ReachError};
 use psidpd_core::model::expression::TooLarge;
 use std::path::{Path, PathBuf};
 
@@ -23,6 +23,8 @@ pub enum RunError {
          share their noise; use a larger box, or switch the thermostat off"
     )]
     BoxTooNarrow { height: f64, range: f64 },
+    #[error(transparent)]
+    NoEnergy(#[from] NoEnergy),
     #[error(transparent)]
     Reach(#[from] ReachError),
     #[error("the time step must be a positive number, is {0}")]

@@ -151,6 +151,7 @@ impl<'a> Runner<'a> {
             position: Position::default(),
             forces: Vec::new(),
             state,
+            max_move: None,
             out_of_bounds: [0; 2],
             last: None,
             sums: Sums::default(),
@@ -171,6 +172,7 @@ impl<'a> Runner<'a> {
             scene.enter(stage, &mut simulation)?;
         }
         simulation.restore(good.step, &good.state, &good.forces, good.out_of_bounds);
+        simulation.set_max_move(good.max_move);
         if fallback.is_some() {
             store.fall_back()?;
         }

@@ -17,6 +17,15 @@ impl Scene {
         Ok(simulation)
     }
 
+    /// Whether the length of trial moves is still looked for before step `done` of stage `index`: in the first stage of
+    /// Monte Carlo, all levels of its ramp among it, or in the first quarter of the only one.
+    pub(super) fn settles(&self, index: usize, done: u64) -> bool {
+        let mut trials = self.stages.iter().filter(|stage| !stage.integrator.has_time());
+        let (Some(first), stage) = (trials.next(), &self.stages[index]) else { return false };
+        let is_only = trials.next().is_none();
+        !stage.integrator.has_time() && stage.name == first.name && (!is_only || done < stage.steps / 4)
+    }
+
     /// Sets the conditions of a stage: temperature, thermostat, body forces. The forces of the present step are
     /// to be computed anew then.
     ///

@@ -8,6 +8,7 @@ use std::path::Path;
 
 mod force_gradient;
 mod integrators;
+mod monte_carlo;
 mod order;
 mod resume;
 mod steps;

@@ -156,6 +156,7 @@ impl<'a> Run<'a> {
             want = Want { energy: true, virial: true, ..want };
         }
         self.simulation.record_flux(self.observers.wants_flux(number, &stage.name));
+        self.simulation.set_settling(self.scene.settles(self.position.stage, self.position.done));
         self.simulation.begin_step(stage.dt, stage.integrator, want)?;
         let is_last = self.position.done + 1 == stage.steps;
         let watched = Watch::is_due(stage, self.position.done + 1);
@@ -248,6 +249,7 @@ impl<'a> Run<'a> {
         self.simulation.copy_state(&mut self.good.state);
         self.good.forces.clear();
         self.good.forces.extend_from_slice(self.simulation.forces());
+        self.good.max_move = self.simulation.max_move();
         self.good.out_of_bounds = self.simulation.out_of_bounds();
         self.good.last = self.last;
         self.good.sums = self.sums;

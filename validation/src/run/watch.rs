@@ -55,13 +55,20 @@ pub struct Deviation {
     pub mean: f64,
     /// Its standard error.
     pub error: f64,
-    /// Δt.
-    pub dt: f64,
+    /// Δt; `None` where steps take no time.
+    pub dt: Option<f64>,
 }
 
 impl fmt::Display for Deviation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Deviation { stage, thermometer, mean, error, dt } = self;
+        let Some(dt) = dt else {
+            return write!(
+                f,
+                "stage \"{stage}\": the configurational temperature is {mean:.3} +- {error:.3} kT: trial moves are exact, so \
+                 likely the fluid has not come to rest; make more steps"
+            );
+        };
         let (what, cause) = match thermometer {
             Thermometer::Kinetic => ("kinetic", "the thermostat's and the forces' error at this step"),
             Thermometer::Configurational => ("configurational", "the forces' error at this step"),
@@ -93,6 +100,12 @@ impl Watch {
 
     /// Takes a sample; the step must be at its end.
     pub fn sample(&mut self, simulation: &mut Simulation, stage: &Stage, done: u64) -> Result<(), RunError> {
+        if !stage.integrator.has_time() {
+            // Velocities are drawn at kT.
+            let due = looks_at_forces(stage, done);
+            self.configurational.extend(due.then(|| configurational(simulation)).flatten());
+            return Ok(());
+        }
         let Some(warmth) = simulation.warmth(stage.dt)? else { return Ok(()) };
         let ratio = warmth.kt / stage.kt;
         self.kinetic.push(ratio);
@@ -124,9 +137,10 @@ impl Watch {
 
     /// Deviations to report at the end of a stage.
     pub fn deviations(&self, simulation: &Simulation, stage: &Stage) -> Vec<Deviation> {
+        let dt = stage.integrator.has_time().then_some(stage.dt);
         let deviation = |thermometer, [mean, error]: [f64; 2]| {
             let off = (mean - 1.0).abs() > TOLERANCE + 3.0 * error;
-            off.then(|| Deviation { stage: stage.name.clone(), thermometer, mean, error, dt: stage.dt })
+            off.then(|| Deviation { stage: stage.name.clone(), thermometer, mean, error, dt })
         };
         let mut found = Vec::new();
         if stage.level.is_some() {

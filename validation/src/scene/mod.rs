@@ -41,12 +41,12 @@ pub use stage::Stage;
 pub use template::{TEMPLATES, Template, TemplateError};
 pub use velocities::Velocities;
 
-use crate::observe::{self, Observe};
+use crate::observe::{self, Observe, StageNames};
 use crate::particles::{BodyForce, State, Tags};
 use number::positive;
 use psidpd_core::document::keys::strangers_first;
 use psidpd_core::document::{Document, FileError, FileErrorKind, Section, Source, Value};
-use psidpd_core::engine::{PeriodicBox, Plan, Precision};
+use psidpd_core::engine::{LocalEnergy, PeriodicBox, Plan, Precision};
 use psidpd_core::model::Model;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -143,7 +143,9 @@ impl Scene {
         let body_forces = body_force::read(&root, &model, &initial)?;
         let drive = body_forces.iter().find_map(BodyForce::drive);
         let names: Vec<&str> = stages.iter().map(|s| s.name.as_str()).collect();
-        let observe = observe::read(&root, &model, kt, &domain, &names, initial.slab_axis(), drive)?;
+        let timeless = stages.iter().filter(|s| !s.integrator.has_time()).map(|s| s.name.as_str()).collect();
+        let stages_of = StageNames { all: &names, timeless };
+        let observe = observe::read(&root, &model, kt, &domain, stages_of, initial.slab_axis(), drive)?;
         let scene = Scene {
             title: title.map_or_else(|| model.title().to_owned(), |t| t.value),
             model_path,
@@ -163,6 +165,7 @@ impl Scene {
             initial,
         };
         scene.check_noise(&root)?;
+        scene.check_trials(&root)?;
         root.finish()?;
         scene.check_room(document)?;
         Ok(scene)
@@ -235,8 +238,29 @@ impl Scene {
             let fluid = self.model.at(stage.kt)?;
             let plan =
                 Plan::new(&fluid).map_err(|e| root.error(FileErrorKind::Value(format!("the model: {e}"))))?;
-            let Some(range) = plan.noise_range().filter(|_| stage.thermostat) else { continue };
+            let has_noise = stage.thermostat && stage.integrator.has_time();
+            let Some(range) = plan.noise_range().filter(|_| has_noise) else { continue };
             domain::check_width(root, &self.domain, self.model.dimensions(), range)?;
+        }
+        Ok(())
+    }
+
+    /// Trial moves need an energy that knows all forces.
+    fn check_trials(&self, root: &Section) -> Result<(), FileError> {
+        for stage in self.stages.iter().filter(|stage| !stage.integrator.has_time()) {
+            let refuse = |message: String| {
+                let kind = FileErrorKind::Value(message);
+                stage::place_of_integrator(root, &stage.name)
+                    .map_or_else(|| root.error(kind.clone()), |v| v.error(kind.clone()))
+            };
+            if let Err(reason) = LocalEnergy::new(&self.model.at(stage.kt)?) {
+                return Err(refuse(format!("monte-carlo needs an energy: {reason}")));
+            }
+            if stage.body_forces && !self.body_forces.is_empty() {
+                let message =
+                    "monte-carlo needs an energy, and body forces have none in a periodic box".to_owned();
+                return Err(refuse(message).with_help("stages with body_forces = false have none"));
+            }
         }
         Ok(())
     }

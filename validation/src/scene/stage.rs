@@ -58,6 +58,15 @@ pub fn read(root: &Section, kt: f64) -> Result<Vec<Stage>, FileError> {
         dt: root.get("dt").map_or(Ok(DEFAULT_DT), |value| positive(&value))?,
         integrator: read_integrator(root, Integrator::default())?,
     };
+    let stages = read_all(root, defaults)?;
+    // Of a scene in which nothing takes time.
+    if let Some(dt) = root.get("dt").filter(|_| stages.iter().all(|stage| !stage.integrator.has_time())) {
+        return Err(no_time(&dt, "no dt"));
+    }
+    Ok(stages)
+}
+
+fn read_all(root: &Section, defaults: Defaults) -> Result<Vec<Stage>, FileError> {
     let (steps, equilibrate) = (root.get("steps"), root.get("equilibrate"));
     let Some(value) = root.get("stage") else { return read_short(root, steps, equilibrate, defaults) };
     if let Some(other) = steps.or(equilibrate) {
@@ -111,7 +120,7 @@ fn read_short(
             name: name.to_owned(),
             level: None,
             steps,
-            dt: defaults.dt,
+            dt: if defaults.integrator.has_time() { defaults.dt } else { 1.0 },
             integrator: defaults.integrator,
             kt: defaults.kt,
             thermostat: true,
@@ -138,23 +147,36 @@ fn read_one(section: &Section, defaults: Defaults) -> Result<Vec<Stage>, FileErr
     let name = section.require("name")?.string()?.value;
     let steps = read_steps(&section.require("steps")?)?;
     let flag = |key: &str| section.get(key).map_or(Ok(true), |v| v.boolean().map(|b| b.value));
+    let integrator = read_integrator(section, defaults.integrator)?;
+    let dt = section.get("dt").map_or(Ok(defaults.dt), |value| positive(&value))?;
     let stage = Stage {
         name,
         level: None,
         steps,
-        dt: section.get("dt").map_or(Ok(defaults.dt), |value| positive(&value))?,
-        integrator: read_integrator(section, defaults.integrator)?,
+        dt: if integrator.has_time() { dt } else { 1.0 },
+        integrator,
         kt: defaults.kt,
         thermostat: flag("thermostat")?,
         body_forces: flag("body_forces")?,
     };
+    if !integrator.has_time() {
+        if let Some(dt) = section.get("dt") {
+            return Err(no_time(&dt, "no dt"));
+        }
+        if !stage.thermostat {
+            return Err(no_time(
+                &section.require("thermostat")?,
+                "no thermostat to switch off: it samples at kT",
+            ));
+        }
+    }
     ramp::read(section, stage)
 }
 
 /// The integrator of a stage, or of the scene; `default` if it says nothing.
 fn read_integrator(section: &Section, default: Integrator) -> Result<Integrator, FileError> {
     let mut integrator = match section.get("integrator") {
-        Some(value) => value.one_of("integrator", &Integrator::ALL)?.value,
+        Some(value) => value.one_of("integrator", &Integrator::NAMED)?.value,
         None => default,
     };
     let name = integrator.name();
@@ -189,6 +211,18 @@ fn read_integrator(section: &Section, default: Integrator) -> Result<Integrator,
         };
         coupling.every = read_steps(&value)?;
     }
+    if let Some(value) = section.get("sweeps") {
+        let Some((sweeps, _)) = integrator.trials() else {
+            return Err(has_none(&value, name, "sweeps", |other| other.trials().is_some()));
+        };
+        *sweeps = read_steps(&value)?;
+    }
+    if let Some(value) = section.get("max_move") {
+        let Some((_, max_move)) = integrator.trials() else {
+            return Err(has_none(&value, name, "max_move", |other| other.trials().is_some()));
+        };
+        *max_move = Some(positive(&value)?);
+    }
     if let Some(value) = section.get("noise") {
         let Some(noise) = integrator.noise() else {
             return Err(has_none(&value, name, "noise", |other| other.noise().is_some()));
@@ -198,9 +232,22 @@ fn read_integrator(section: &Section, default: Integrator) -> Result<Integrator,
     Ok(integrator)
 }
 
+/// Where it is said how the steps of a stage are made.
+pub fn place_of_integrator<'a>(root: &Section<'a>, stage: &str) -> Option<Value<'a>> {
+    let tables = root.get("stage").and_then(|value| value.array().ok()).unwrap_or_default();
+    let mut sections = tables.iter().filter_map(|item| item.section().ok());
+    let own = sections.find(|s| s.get("name").is_some_and(|name| name.as_str() == Some(stage)));
+    own.and_then(|section| section.get("integrator")).or_else(|| root.get("integrator"))
+}
+
+/// The error of a key that trial moves have no use for.
+fn no_time(value: &Value, what: &str) -> FileError {
+    value.error(FileErrorKind::Value(format!("monte-carlo has {what}")))
+}
+
 /// The error of a key that an integrator does not have; it names those that do.
 fn has_none(value: &Value, name: &str, key: &str, has: fn(&mut Integrator) -> bool) -> FileError {
-    let mut owners = Vec::from(Integrator::ALL);
+    let mut owners = Vec::from(Integrator::NAMED);
     owners.retain_mut(|(_, integrator)| has(integrator));
     let owners: Vec<String> = owners.iter().map(|(name, _)| format!("\"{name}\"")).collect();
     let error = value.error(FileErrorKind::Value(format!("{name} has no {key}")));

@@ -72,7 +72,11 @@ impl Cells {
         }
         let count = counts(width).map(|count| count as i32);
         let reach = [0, 1, 2].map(|k| {
-            if k < dimensions { (range * (1.0 + 1e-9) * f64::from(count[k]) / heights[k]).ceil() as i32 } else { 0 }
+            if k < dimensions {
+                (range * (1.0 + 1e-9) * f64::from(count[k]) / heights[k]).ceil() as i32
+            } else {
+                0
+            }
         });
         let total = count.iter().map(|count| *count as usize).product();
         Cells {

@@ -127,6 +127,11 @@ impl LocalEnergy {
         })
     }
 
+    /// The longest range of its interactions; 0 for an ideal gas.
+    pub fn range(&self) -> f64 {
+        self.range
+    }
+
     /// Takes particles in, by their species, wrapped into the box, and computes everything from the beginning.
     ///
     /// # Errors
@@ -223,7 +228,8 @@ impl LocalEnergy {
     #[cold]
     fn not_finite(&self, sum: f64, tag: i32) -> Result<f64, EngineError> {
         let width = self.plan.slope_width();
-        for ((psi, n), id) in self.moved.psi.iter().zip(self.moved.n.chunks_exact(width)).zip(&self.moved.ids) {
+        for ((psi, n), id) in self.moved.psi.iter().zip(self.moved.n.chunks_exact(width)).zip(&self.moved.ids)
+        {
             let before = &self.n[*id as usize * width..][..width];
             let is_higher = n.iter().sum::<f64>() > before.iter().sum::<f64>();
             if *psi == f64::NEG_INFINITY || psi.is_nan() && !is_higher {
@@ -282,7 +288,9 @@ impl LocalEnergy {
             let [before, after] = weights;
             sum += match count {
                 1 => pair(0) * (after.iter().sum::<f64>() - before.iter().sum::<f64>()),
-                _ => (0..near.count).map(|k| pair(species[near.id[k] as usize] as usize) * (after[k] - before[k])).sum(),
+                _ => (0..near.count)
+                    .map(|k| pair(species[near.id[k] as usize] as usize) * (after[k] - before[k]))
+                    .sum(),
             };
         }
         for PairTerm { between, potential } in &plan.pairs {
@@ -432,7 +440,8 @@ fn own_densities(plan: &Plan, domain: &PeriodicBox) -> Vec<f64> {
         let shell = |k: usize| -shells[k]..=shells[k];
         for s in shell(0).flat_map(|a| shell(1).flat_map(move |b| shell(2).map(move |c| [a, b, c]))) {
             if s != [0; 3] {
-                let image = [0, 1, 2].map(|c| (0..3).map(|k| f64::from(s[k]) * domain.edge(k)[c]).sum::<f64>());
+                let image =
+                    [0, 1, 2].map(|c| (0..3).map(|k| f64::from(s[k]) * domain.edge(k)[c]).sum::<f64>());
                 sum += density.kernel.value(image.iter().map(|c| c * c).sum::<f64>().sqrt());
             }
         }

@@ -47,6 +47,9 @@ pub trait Meter: Sized {
     /// Whether a sample needs what carried momentum in its step.
     const NEEDS_FLUX: bool = false;
 
+    /// Whether it is of motion in time, which trial moves have none of.
+    const OF_MOTION: bool = false;
+
     /// Reads its settings.
     ///
     /// # Errors
@@ -77,6 +80,8 @@ pub struct MeterKind {
     pub every: Option<u64>,
     /// As [`Meter::EVERY_STEP`].
     pub every_step: bool,
+    /// As [`Meter::OF_MOTION`].
+    pub of_motion: bool,
     /// As [`Meter::read`].
     pub read: fn(&Options) -> Result<AnyMeter, FileError>,
 }
@@ -122,6 +127,7 @@ macro_rules! meters {
             table: &<$meter as Meter>::TABLE,
             every: <$meter as Meter>::EVERY,
             every_step: <$meter as Meter>::EVERY_STEP,
+            of_motion: <$meter as Meter>::OF_MOTION,
             read: |options| Ok(AnyMeter::$variant(Box::new(<$meter as Meter>::read(options)?))),
         }),+];
     };

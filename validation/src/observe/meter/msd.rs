@@ -139,6 +139,8 @@ impl Meter for Msd {
         },
     };
 
+    const OF_MOTION: bool = true;
+
     fn read(options: &Options) -> Result<Msd, FileError> {
         let fluid = options.place.fluid;
         let length = options.count("length", 2, 100_000)?.unwrap_or(100);

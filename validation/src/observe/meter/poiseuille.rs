@@ -94,6 +94,8 @@ impl Meter for Poiseuille {
         ],
     };
 
+    const OF_MOTION: bool = true;
+
     fn read(options: &Options) -> Result<Poiseuille, FileError> {
         let drive = options.place.drive;
         let missing = |key: &str| {

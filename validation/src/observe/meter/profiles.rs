@@ -223,6 +223,8 @@ impl Meter for VelocityProfile {
         keys: KEYS,
     };
 
+    const OF_MOTION: bool = true;
+
     fn read(options: &Options) -> Result<VelocityProfile, FileError> {
         Ok(VelocityProfile(Bins::read(options, true)?))
     }

@@ -98,6 +98,8 @@ impl Meter for Viscosity {
     const EVERY: Option<u64> = Some(1);
     const EVERY_STEP: bool = true;
 
+    const OF_MOTION: bool = true;
+
     fn read(options: &Options) -> Result<Viscosity, FileError> {
         let place = options.place;
         let dimensions = place.fluid.dimensions;

@@ -155,7 +155,8 @@ pub fn gather(
         }
     }
     let measured = all.values.iter().find(|v| v.name == "temperature");
-    if let (Some(s), Some(t)) = (stage.filter(|s| s.thermostat), measured)
+    if let (Some(s), Some(t)) =
+        (stage.filter(|s| s.thermostat && !s.integrator.starts_with("monte-carlo")), measured)
         && let Some(error) = t.error
         && (t.value - s.kt).abs() > (4.0 * error).max(0.01 * s.kt)
     {

@@ -9,6 +9,7 @@ mod dpd_vv;
 mod force_gradient;
 mod groot_warren;
 mod lowe_andersen;
+mod monte_carlo;
 pub(super) mod parts;
 mod peters;
 mod self_consistent;
@@ -40,6 +41,7 @@ impl Integrator {
                 force_gradient::step(system, dt, want, [lambda, gradient], coupling)
             }
             Integrator::TwoStage { lambda, coupling } => two_stage::step(system, dt, want, lambda, coupling),
+            Integrator::MonteCarlo { sweeps, max_move } => monte_carlo::step(system, want, sweeps, max_move),
         }
     }
 }

@@ -7,6 +7,7 @@
 mod displaced;
 mod external;
 mod forces;
+mod monte_carlo;
 mod motion;
 mod particles;
 mod record;
@@ -21,6 +22,7 @@ use crate::integrator::Integrator;
 use crate::particles::State;
 use external::External;
 use forces::Forces;
+use monte_carlo::MonteCarlo;
 use motion::Motion;
 use particles::Particles;
 use psidpd_core::engine::{Step, Want, check_reach};
@@ -43,6 +45,7 @@ pub struct Simulation {
     forces: Forces,
     thermostat: Thermostat,
     motion: Motion,
+    monte_carlo: MonteCarlo,
     seed: u64,
     number: u64,
     /// Whether the forces are those of other positions than the present ones.
@@ -70,6 +73,7 @@ impl Simulation {
             thermostat: Thermostat::new(&forces),
             forces,
             motion,
+            monte_carlo: MonteCarlo::default(),
             seed,
             number: 0,
             stale: false,
@@ -85,6 +89,7 @@ impl Simulation {
         if kt != self.kt() {
             self.forces.set_temperature(kt)?;
             self.thermostat.follow(&self.forces);
+            self.monte_carlo.forget_energy();
         }
         Ok(())
     }
@@ -194,7 +199,8 @@ impl Simulation {
         self.close_record(integrator);
         self.forces.add_thermostat_virial(self.thermostat.impulse_virial());
         self.stale = !integrator.forces_at_end();
-        if reorder::is_due(self.number) {
+        // The order of trials must not depend on where particles are.
+        if reorder::is_due(self.number) && integrator.has_time() {
             self.end_step()?;
             self.reorder();
         }

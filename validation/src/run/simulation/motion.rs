@@ -5,6 +5,7 @@
 
 use super::super::bounds::Bounds;
 use super::super::integrator::parts::{Faults, Kept, Moving, Surroundings, drift, kick, share};
+use super::super::walls::Walls;
 use super::{RunError, Simulation};
 use psidpd_core::engine::{PeriodicBox, Pool};
 
@@ -20,6 +21,10 @@ pub(super) struct Motion {
 impl Motion {
     pub fn within(domain: &PeriodicBox, dimensions: usize) -> Motion {
         Motion { bounds: Bounds::of(domain, dimensions), kept: Kept::default(), deferred: None }
+    }
+
+    pub fn walls(&self) -> Walls {
+        self.bounds.walls
     }
 
     pub fn is_at_end_of_step(&self) -> bool {

@@ -69,6 +69,20 @@ impl Simulation {
         }
     }
 
+    /// What particles carry with their present velocities, along ways too short for their place to matter.
+    pub(super) fn record_momenta(&mut self) {
+        const TIME: f64 = 1e-9;
+        let way = |k: usize| {
+            let momentum = self.masses()[self.species()[k] as usize] / TIME;
+            let v = self.particles.now().v[k];
+            Line { from: self.positions()[k], d: v.map(|v| TIME * v), f: v.map(|v| momentum * v) }
+        };
+        let ways: Vec<Line> = (0..self.len()).map(way).collect();
+        if let Some(record) = &mut self.record {
+            record.flux.ways = ways;
+        }
+    }
+
     /// Conservative forces on particles at the present positions, with their virial; `displaced` is what they were computed
     /// at, if that is elsewhere.
     pub(super) fn record_forces(&mut self, virial: [f64; 6], displaced: Option<Displaced>) {

@@ -43,11 +43,24 @@ const INTEGRATORS: &str = "\
     [[stage]]\nname = \"f\"\nsteps = 3\nintegrator = \"shardlow-s2\"\nnoise = \"uniform\"\n\
     [output]\nthermo = 2\ndump = 3\ncheckpoint = 4\n";
 
-fn scenes() -> [Scene; 4] {
+/// Trial moves before and after a step of time, whose length is found in the first stage.
+const TRIALS: &str = "title = \"trials\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7\ndensity = 6.05\n\
+    [box]\nlengths = [3.0, 3.0, 5.0]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]\n\
+    [[part]]\nshape = \"layer\"\nface = \"zlo\"\nthickness = 0.8\nlattice = \"fcc\"\nfrozen = true\n\
+    [[part]]\nshape = \"rest\"\n\
+    [[stage]]\nname = \"rest\"\nsteps = 7\nintegrator = \"monte-carlo\"\nkT = [1.5, 1.0]\nlevels = 3\n\
+    [[stage]]\nname = \"move\"\nsteps = 5\nintegrator = \"two-stage\"\ndt = 0.02\n\
+    [[stage]]\nname = \"run\"\nsteps = 9\nintegrator = \"monte-carlo\"\nsweeps = 3\n\
+    [output]\nthermo = 2\ndump = 3\nxyz = 4\nsnapshot = 10\ncheckpoint = 4\n\
+    [observe]\nevery = 2\nstages = [\"rest\", \"run\"]\nrdf = true\ntemperature = true\nstress_profile = true\n\
+    pressure = true\nsurface_tension = true\n";
+
+fn scenes() -> [Scene; 5] {
     let solid = scene_of(&bounded(), "[3.0, 3.0, 3.0]", 6.05, &format!("{STAGES}checkpoint = 4\n")).unwrap();
     let flat = scene_of(VAN_DER_WAALS, "[5.0, 5.0]", 12.0, STAGES).unwrap();
     let all = test_support::scene(SET6, EVERYTHING).unwrap();
-    [solid, flat, scene_of(SET6, "[3.0, 3.0, 3.0]", 6.05, INTEGRATORS).unwrap(), all]
+    let trials = test_support::scene(SET6, TRIALS).unwrap();
+    [solid, flat, trials, scene_of(SET6, "[3.0, 3.0, 3.0]", 6.05, INTEGRATORS).unwrap(), all]
 }
 
 /// Every file of a folder and the folders in it, but the one that tells times.
@@ -147,8 +160,8 @@ fn a_run_stopped_after_any_step_ends_in_the_same_bytes() {
 /// by a panic after every step, with its folder as it was at that moment.
 #[test]
 fn a_run_killed_after_any_step_ends_in_the_same_bytes() {
-    let [plain, _, many, everything] = scenes();
-    for scene in [plain, many, everything] {
+    let [plain, _, trials, many, everything] = scenes();
+    for scene in [plain, trials, many, everything] {
         killed_after_any_step(&scene);
     }
 }

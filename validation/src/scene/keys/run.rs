@@ -1,6 +1,8 @@
 //! What is done with the particles, and what is written.
 
-use super::scene::{GRADIENT, INTEGRATOR, LAMBDA, NOISE, THERMOSTAT_EVERY, THERMOSTAT_STEP};
+use super::scene::{
+    GRADIENT, INTEGRATOR, LAMBDA, MAX_MOVE, NOISE, SWEEPS, THERMOSTAT_EVERY, THERMOSTAT_STEP,
+};
 use super::ValueKind::*;
 use super::{Key, OPTIONAL, REQUIRED, Table, key, names};
 use crate::scene::number::AXES;
@@ -68,6 +70,18 @@ const STAGE_NOISE: Key = Key {
     ..NOISE
 };
 
+const STAGE_SWEEPS: Key = Key {
+    about: "Sweeps in a step of `monte-carlo`; as at the top level.",
+    example: "[[stage]]\nname = \"produce\"\nsteps = 1000\nintegrator = \"monte-carlo\"\nsweeps = 10",
+    ..SWEEPS
+};
+
+const STAGE_MAX_MOVE: Key = Key {
+    about: "The furthest trial move of `monte-carlo`; as at the top level.",
+    example: "[[stage]]\nname = \"produce\"\nsteps = 1000\nintegrator = \"monte-carlo\"\nmax_move = 0.1",
+    ..MAX_MOVE
+};
+
 /// `[[stage]]`.
 pub const STAGE: Table = Table {
     path: "stage",
@@ -90,6 +104,8 @@ pub const STAGE: Table = Table {
         STAGE_THERMOSTAT_STEP,
         STAGE_THERMOSTAT_EVERY,
         STAGE_NOISE,
+        STAGE_SWEEPS,
+        STAGE_MAX_MOVE,
         key("kT", Temperature, OPTIONAL,
             "The temperature; that of the top level if left out. Two make a ramp, `[from, to]`, in levels of equal \
              steps; the last level is at `to`.",

@@ -7,9 +7,10 @@ use crate::scene::domain::BOUNDARIES;
 use psidpd_core::engine::Precision;
 use psidpd_core::engine::noise::Law;
 
-pub(super) const INTEGRATOR: Key = key("integrator", Choice(|| names(&Integrator::ALL)), OPTIONAL,
+pub(super) const INTEGRATOR: Key = key("integrator", Choice(|| names(&Integrator::NAMED)), OPTIONAL,
     "How a step is made; `velocity-verlet` if left out, in which the dissipative force sees the half-step \
-     velocity, as in LAMMPS. `docs/integrators.md` states each, says what is exact in it and which step it allows.",
+     velocity, as in LAMMPS. `monte-carlo` makes trial moves without time. `docs/integrators.md` states each, says what is exact in \
+     it and which step it allows.",
     "integrator = \"groot-warren\"");
 
 pub(super) const LAMBDA: Key = key("lambda", Number, OPTIONAL,
@@ -37,6 +38,15 @@ pub(super) const NOISE: Key = key("noise", Choice(|| names(&Law::ALL)), OPTIONAL
      velocities is not quite that of Maxwell at large time steps. The noise of `velocity-verlet` and \
      `groot-warren` is uniform, that of `lowe-andersen` Gaussian.",
     "integrator = \"aboba\"\nnoise = \"uniform\"");
+
+pub(super) const SWEEPS: Key = key("sweeps", Count, OPTIONAL,
+    "Sweeps in a step of `monte-carlo`, each with one trial move for every particle that moves; 1 if left out.",
+    "integrator = \"monte-carlo\"\nsweeps = 10");
+
+pub(super) const MAX_MOVE: Key = key("max_move", Positive, OPTIONAL,
+    "The furthest that a trial move of `monte-carlo` goes along each direction. If left out it is found, for 40 % of accepted \
+     moves, in the first stage of Monte Carlo, or in the first quarter of the only one.",
+    "integrator = \"monte-carlo\"\nmax_move = 0.1");
 
 /// The top level.
 pub const TOP: Table = Table {
@@ -80,6 +90,8 @@ pub const TOP: Table = Table {
         THERMOSTAT_STEP,
         THERMOSTAT_EVERY,
         NOISE,
+        SWEEPS,
+        MAX_MOVE,
     ],
 };
 
