@@ -206,7 +206,7 @@ impl<'a> Run<'a> {
             if let Some(thermo) = &thermo {
                 self.last = Some(*thermo);
                 // The state a stage starts from is not of that stage.
-                if output.row(thermo)? && step > 0 {
+                if output.row(thermo)? && step > 0 && thermo.potential.is_finite() {
                     self.sums.add(thermo);
                 }
             }

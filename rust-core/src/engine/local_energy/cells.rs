@@ -61,22 +61,24 @@ impl Cells {
     pub fn new(domain: &PeriodicBox, dimensions: usize, range: f64, particles: usize) -> Cells {
         let heights = [0, 1, 2].map(|k| domain.height(k));
         let most = MOST_PER_PARTICLE * particles as f64 + 64.0;
+        // Of a cell as wide as the range, to rounding, the next but one is out of it.
+        const ROUNDING: f64 = 1e-12;
         let counts = |width: f64| {
-            let count = |k: usize| if k < dimensions { (heights[k] / width).floor().max(1.0) } else { 1.0 };
+            let count = |k: usize| match k < dimensions {
+                true => (heights[k] / width * (1.0 + ROUNDING)).floor().max(1.0),
+                false => 1.0,
+            };
             [count(0), count(1), count(2)]
         };
         let shortest = heights[..dimensions].iter().fold(f64::INFINITY, |a, b| a.min(*b));
-        let mut width = if range > 0.0 { range * (1.0 + 1e-9) } else { shortest };
+        let mut width = if range > 0.0 { range } else { shortest };
         while counts(width).iter().product::<f64>() > most {
             width *= 1.1;
         }
         let count = counts(width).map(|count| count as i32);
-        let reach = [0, 1, 2].map(|k| {
-            if k < dimensions {
-                (range * (1.0 + 1e-9) * f64::from(count[k]) / heights[k]).ceil() as i32
-            } else {
-                0
-            }
+        let reach = [0, 1, 2].map(|k| match k < dimensions {
+            true => (range * f64::from(count[k]) / heights[k] * (1.0 - ROUNDING)).ceil() as i32,
+            false => 0,
         });
         let total = count.iter().map(|count| *count as usize).product();
         Cells {
@@ -197,18 +199,17 @@ impl Loop for Search<'_> {
         let Search { cells, points: [a, b], ends, but, near } = self;
         let square = cells.range * cells.range;
         let [nx, ny, _] = cells.count.map(|count| count as usize);
-        let moved = |x: [f64; 3], k: usize, boxes: f64| [0, 1, 2].map(|c| x[c] - boxes * cells.edges[k][c]);
         for z in ends[2][0]..=ends[2][1] {
             let (z, boxes) = inside(z, cells.count[2]);
-            let (az, bz) = (moved(a, 2, boxes), moved(b, 2, boxes));
+            let points = moved([a, b], &cells.edges[2], boxes);
             for y in ends[1][0]..=ends[1][1] {
                 let (y, boxes) = inside(y, cells.count[1]);
-                let (ay, by) = (moved(az, 1, boxes), moved(bz, 1, boxes));
+                let points = moved(points, &cells.edges[1], boxes);
                 for x in ends[0][0]..=ends[0][1] {
                     let (x, boxes) = inside(x, cells.count[0]);
-                    let (a, b) = (moved(ay, 0, boxes), moved(by, 0, boxes));
+                    let points = moved(points, &cells.edges[0], boxes);
                     for block in &cells.cells[x + nx * (y + ny * z)] {
-                        look(block, a, b, square, but, near);
+                        look(block, &points, square, but, near);
                     }
                 }
             }
@@ -226,35 +227,47 @@ fn inside(mut cell: i32, count: i32) -> (usize, f64) {
     while cell >= count {
         (cell, boxes) = (cell - count, boxes + 1);
     }
-    // A particle there is at its own place plus so many edges: the points are moved the other way.
     (cell as usize, f64::from(boxes))
+}
+
+/// Points as seen from an image: instead of the particles there they are moved, and the other way.
+#[inline(always)]
+fn moved(mut points: [[f64; 3]; 2], edge: &[f64; 3], boxes: f64) -> [[f64; 3]; 2] {
+    if boxes != 0.0 {
+        for point in &mut points {
+            for c in 0..3 {
+                point[c] -= boxes * edge[c];
+            }
+        }
+    }
+    points
 }
 
 /// Adds the particles of a block that are near one of two points.
 #[inline(always)]
-fn look(block: &Block, a: [f64; 3], b: [f64; 3], square: f64, but: u32, near: &mut Near) {
-    let distance = |p: [f64; 3], l: usize| {
-        let d = [0, 1, 2].map(|c: usize| p[c] - block.x[c][l]);
-        d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
-    };
-    let (mut before, mut after) = ([0.0; LANES], [0.0; LANES]);
-    for l in 0..LANES {
-        (before[l], after[l]) = (distance(a, l), distance(b, l));
+fn look(block: &Block, points: &[[f64; 3]; 2], square: f64, but: u32, near: &mut Near) {
+    let mut r = [[0.0; LANES]; 2];
+    for (r, p) in r.iter_mut().zip(points) {
+        for l in 0..LANES {
+            let (x, y, z) = (p[0] - block.x[0][l], p[1] - block.x[1][l], p[2] - block.x[2][l]);
+            r[l] = x * x + y * y + z * z;
+        }
     }
-    let (mut id, mut r, mut count) = ([0; LANES], [[0.0; LANES]; 2], 0);
+    let mut found = 0u32;
     for l in 0..LANES {
-        let to = count % LANES;
-        (id[to], r[0][to], r[1][to]) = (block.id[l], before[l], after[l]);
-        count += usize::from((before[l].min(after[l]) < square) & (block.id[l] != but));
+        found |= u32::from((r[0][l] < square) | (r[1][l] < square)) << l;
     }
-    let start = near.count;
-    if near.id.len() < start + LANES {
+    if near.id.len() < near.count + LANES {
         near.grow();
     }
-    near.id[start..start + LANES].copy_from_slice(&id);
-    near.r[0][start..start + LANES].copy_from_slice(&r[0]);
-    near.r[1][start..start + LANES].copy_from_slice(&r[1]);
-    near.count += count;
+    while found != 0 {
+        let l = found.trailing_zeros() as usize % LANES;
+        found &= found - 1;
+        near.id[near.count] = block.id[l];
+        near.r[0][near.count] = r[0][l];
+        near.r[1][near.count] = r[1][l];
+        near.count += usize::from(block.id[l] != but);
+    }
 }
 
 impl Near {

@@ -62,6 +62,11 @@ impl Forces {
         Ok(())
     }
 
+    /// Makes the totals of the last evaluation infinite.
+    pub fn set_infinite(&mut self) {
+        self.tally = Tally { excess: f64::INFINITY, virial: [f64::INFINITY; 6], ..Tally::default() };
+    }
+
     /// Refuses boxes in which a particle meets two images of one neighbour within the range of the noise.
     pub fn check_width(&self, domain: &PeriodicBox) -> Result<(), RunError> {
         let Some(range) = self.plan().noise_range() else { return Ok(()) };

@@ -142,6 +142,9 @@ impl Simulation {
         self.end_step()?;
         self.thermostat.begin_step();
         self.stale = false;
+        if !integrator.has_time() {
+            return self.forces_or_infinite(want);
+        }
         match integrator.drag_in_forces() {
             true => self.forces_with_thermostat(dt, want),
             false => self.conservative_forces(want),
@@ -194,6 +197,7 @@ impl Simulation {
         }
         self.number += 1;
         self.thermostat.begin_step();
+        self.monte_carlo.begin_step(!integrator.has_time());
         self.open_record(dt);
         integrator.step(self, dt, want)?;
         self.close_record(integrator);
@@ -224,7 +228,10 @@ impl Simulation {
         if !self.stale {
             return Ok(());
         }
-        self.conservative_forces(want)?;
+        match self.monte_carlo.is_at_work() {
+            true => self.forces_or_infinite(want)?,
+            false => self.conservative_forces(want)?,
+        }
         self.stale = false;
         self.forces.add_thermostat_virial(self.thermostat.impulse_virial());
         Ok(())

@@ -4,7 +4,7 @@ use super::super::integrator::parts::has_stopped_counting;
 use super::{RunError, Simulation};
 use crate::particles::maxwell;
 use chacha20::ChaCha8Rng;
-use psidpd_core::engine::{self, LocalEnergy, Want};
+use psidpd_core::engine::{self, EngineError, LocalEnergy, Want};
 use rand::{RngExt, SeedableRng};
 
 /// Acceptance that the length of moves is set for.
@@ -20,11 +20,21 @@ pub(super) struct MonteCarlo {
     /// The furthest move that was found so far.
     found: Option<f64>,
     settling: bool,
+    /// Whether the present step is one of trial moves.
+    at_work: bool,
     /// Trials of the last step, and how many were accepted.
     trials: [u64; 2],
 }
 
 impl MonteCarlo {
+    pub fn is_at_work(&self) -> bool {
+        self.at_work
+    }
+
+    pub fn begin_step(&mut self, at_work: bool) {
+        self.at_work = at_work;
+    }
+
     pub fn forget_energy(&mut self) {
         self.energy = None;
     }
@@ -144,12 +154,25 @@ impl Simulation {
         moving.for_each(|(k, drawn)| v[k] = drawn);
     }
 
+    /// Forces and totals at the present positions. Where they are not finite the totals are infinite: trial moves lead away
+    /// from there.
+    pub(super) fn forces_or_infinite(&mut self, want: Want) -> Result<(), RunError> {
+        use EngineError::{ExcessFreeEnergy, Force};
+        match self.conservative_forces(want) {
+            Err(RunError::Engine { source: Force { .. } | ExcessFreeEnergy { .. }, .. }) => {
+                self.forces.set_infinite();
+                Ok(())
+            }
+            other => other,
+        }
+    }
+
     /// Records the momentum that particles carry at the end of a step, and the forces there.
     pub(in crate::run) fn record_rest(&mut self, want: Want) -> Result<(), RunError> {
         if !self.is_recording() {
             return Ok(());
         }
         self.record_momenta();
-        self.conservative_forces(want)
+        self.forces_or_infinite(want)
     }
 }

@@ -260,8 +260,11 @@ fn starts_without_energy() {
     let overlap = "title = \"m\"\nspecies = [\"A\"]\n[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"expression\"\n\
         phi = \"(1 - r)^2/r\"\nrange = 1.0\n";
     let mut run = simulation(overlap, pair([true; 3], [[0.5; 3]; 2]));
-    run.advance(10, 1.0, trials(10, Some(0.2))).unwrap();
-    assert_ne!(run.positions()[0], run.positions()[1]);
+    let integrator = trials(10, Some(0.2));
+    run.prepare_for(integrator, 1.0, Want::TOTALS).unwrap();
+    assert_eq!(run.potential_energy(), f64::INFINITY);
+    run.step(1.0, integrator, Want::TOTALS).unwrap();
+    assert!(run.potential_energy().is_finite() && run.positions()[0] != run.positions()[1]);
     let pole = "title = \"m\"\nspecies = [\"A\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1.0\n\
         [excess_free_energy]\nA = \"-ln(1 - n)\"\n";
     let mut run = simulation(pole, pair([true; 3], [[0.5; 3]; 2]));
