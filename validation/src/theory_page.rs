@@ -211,9 +211,11 @@ fn compositions(model: &Model, scope: &Scope) -> Result<Vec<Item>, ReportError> 
     let mut tension = Vec::new();
     for kt in below(critical.parameter) {
         let Some(theory) = model.at(kt).ok().and_then(|fluid| MeanField::new(&fluid).ok()) else { continue };
-        if let Ok(b) = theory.composition_binodal(scope.density) {
-            curves[0].push((b.composition[0], kt));
-            curves[1].push((b.composition[1], kt));
+        let c = critical.composition;
+        if let Ok(phases) = theory.coexistence([c * scope.density, (1.0 - c) * scope.density]) {
+            let [low, high] = phases.composition();
+            curves[0].push((low, kt));
+            curves[1].push((high, kt));
         }
         if let Some([low, high]) =
             theory.composition_spinodal(scope.density).ok().and_then(|s| s.first().copied())
@@ -241,7 +243,11 @@ fn compositions(model: &Model, scope: &Scope) -> Result<Vec<Item>, ReportError> 
         ],
         ..Plot::default()
     };
-    let caption = format!("The abscissa is the {of}; the total density is held.");
+    let caption = format!(
+        "The abscissa is the {of}. Binodal: phases of equal chemical potentials and pressure, of a mixture of this density and \
+         of the critical composition; their own densities differ. Spinodal: mixtures of this density in which waves of density \
+         and composition grow."
+    );
     let mut items = vec![figure(&diagram, &caption)?];
     if !tension.is_empty() {
         let plot = Plot {
@@ -251,7 +257,8 @@ fn compositions(model: &Model, scope: &Scope) -> Result<Vec<Item>, ReportError> 
             series: vec![line("", tension)],
             ..Plot::default()
         };
-        items.push(figure(&plot, "Square-gradient theory, Pagonabarraga and Frenkel, eqs. 36 to 41.")?);
+        items.push(figure(&plot, "Square-gradient theory, Pagonabarraga and Frenkel, eqs. 36 to 41, which hold the total density: only where phases of \
+             this density are in equilibrium.")?);
     }
     Ok(items)
 }

@@ -1,8 +1,6 @@
-use super::line::{Line, coexisting, least_stable, negative, unstable};
-use super::one_component::change_of_sign;
+use super::line::{Line, coexisting, negative, unstable};
 use super::search::{spaced, turning_point};
 use super::{MeanField, TheoryError};
-use crate::model::Fluid;
 
 /// Two phases of a binary mixture.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -11,21 +9,10 @@ pub struct CompositionBinodal {
     pub composition: [f64; 2],
     /// Total density of each phase.
     pub density: [f64; 2],
-    /// Pressure of each phase: equal, unless the densities were held equal instead.
+    /// Pressure of each phase; equal.
     pub pressure: [f64; 2],
     /// `μ_A − μ_B`, in both phases.
     pub exchange_potential: f64,
-}
-
-/// A critical point of demixing at a fixed total density.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CompositionCritical {
-    /// The control parameter there: kT, or whatever the fluids were made from.
-    pub parameter: f64,
-    /// Fraction of the first species.
-    pub composition: f64,
-    /// Pressure.
-    pub pressure: f64,
 }
 
 /// What a mixture keeps while its composition changes.
@@ -48,7 +35,10 @@ pub struct CompositionLine<'a> {
 const REACH: f64 = 30.0;
 const STEPS: usize = 1200;
 
-fn fractions(u: f64) -> [f64; 2] {
+/// Relative difference of pressures that are the same but for rounding.
+const SAME: f64 = 1e-7;
+
+pub(super) fn fractions(u: f64) -> [f64; 2] {
     [1.0 / (1.0 + (-u).exp()), 1.0 / (1.0 + u.exp())]
 }
 
@@ -231,13 +221,22 @@ impl MeanField {
     }
 
     /// Two phases of a binary mixture of one and the same total density, by the common tangent of
-    /// `f(c)`. Their pressures differ unless the mixture is symmetric, so this is for nearly
-    /// incompressible mixtures (Pagonabarraga–Frenkel sec. III B, "assuming that ρ is constant");
-    /// [`MeanField::composition_binodal_at_pressure`] does without the assumption.
+    /// `f(c)` (Pagonabarraga–Frenkel sec. III B, "assuming that ρ is constant"). They are in equilibrium where their
+    /// pressures are equal too, as in a symmetric mixture; [`MeanField::coexistence`] does without the assumption.
     ///
     /// # Errors
-    /// Not two species; [`TheoryError::NoCoexistence`].
+    /// Not two species; [`TheoryError::NoCoexistence`]; [`TheoryError::NotInEquilibrium`].
     pub fn composition_binodal(&self, density: f64) -> Result<CompositionBinodal, TheoryError> {
+        let found = self.common_tangent(density)?;
+        let [p, q] = found.pressure;
+        if (p - q).abs() > SAME * (p.abs() + q.abs() + density * self.kt) {
+            return Err(TheoryError::NotInEquilibrium { density, pressure: found.pressure });
+        }
+        Ok(found)
+    }
+
+    /// The common tangent of `f(c)` at a total density, whatever the pressures.
+    pub(super) fn common_tangent(&self, density: f64) -> Result<CompositionBinodal, TheoryError> {
         self.binodal_of(Held::Density(density))
     }
 
@@ -262,26 +261,4 @@ impl MeanField {
     pub(super) fn phases(&self, line: &dyn Line) -> Result<[f64; 2], TheoryError> {
         coexisting(line).ok_or(TheoryError::NoCoexistence)
     }
-}
-
-/// The critical point of demixing at a fixed total density, for a family of binary mixtures with any
-/// control parameter (kT, an interaction strength): where the smallest `∂²f/∂c²` over all compositions
-/// is zero. The mixture must be stable at one end of `range` and not at the other.
-///
-/// # Errors
-/// A fluid that cannot be had, not two species, or no such change.
-pub fn composition_critical_point(
-    fluid: &dyn Fn(f64) -> Result<Fluid, TheoryError>,
-    density: f64,
-    range: [f64; 2],
-) -> Result<CompositionCritical, TheoryError> {
-    let least = |parameter: f64| -> Result<(f64, f64), TheoryError> {
-        let theory = MeanField::new(&fluid(parameter)?)?;
-        theory.require_species(2)?;
-        Ok(least_stable(&CompositionLine::at_density(&theory, density)))
-    };
-    let parameter = change_of_sign(range, &|parameter| Ok(least(parameter)?.1 < 0.0))?;
-    let x = fractions(least(parameter)?.0);
-    let pressure = MeanField::new(&fluid(parameter)?)?.pressure(&x.map(|x| x * density));
-    Ok(CompositionCritical { parameter, composition: x[0], pressure })
 }

@@ -100,12 +100,13 @@ impl MeanField {
 
     /// The interface between two phases of a binary mixture whose total density is held constant, with
     /// `x` the fraction of the first species and `κ = ρ²(κ_AA − 2κ_AB + κ_BB)`.
-    /// Pagonabarraga–Frenkel eq. (36)–(41).
+    /// Pagonabarraga–Frenkel eq. (36)–(41). There is one only between phases in equilibrium.
     ///
     /// # Errors
-    /// Not two species, no coexistence, or a gradient coefficient that is not positive.
+    /// Not two species, no coexistence, [`TheoryError::NotInEquilibrium`], or a gradient coefficient that is not
+    /// positive.
     pub fn composition_interface(&self, density: f64, points: usize) -> Result<Interface, TheoryError> {
-        self.require_species(2)?;
+        self.composition_binodal(density)?;
         let line = CompositionLine::at_density(self, density);
         let phases = self.phases(&line)?;
         let kappa = |c: f64| {

@@ -59,14 +59,18 @@ pub fn negative(grid: &[f64], f: &dyn Fn(f64) -> f64) -> Vec<[f64; 2]> {
 
 /// The place and value of the smallest curvature.
 pub fn least_stable(line: &dyn Line) -> (f64, f64) {
-    let grid = line.grid();
-    let values: Vec<f64> = grid.iter().map(|u| line.curvature(*u)).collect();
+    smallest(&line.grid(), &|u| line.curvature(u))
+}
+
+/// The place and the smallest value of `f`, from a grid and then between its points.
+pub fn smallest(grid: &[f64], f: &dyn Fn(f64) -> f64) -> (f64, f64) {
+    let values: Vec<f64> = grid.iter().map(|u| f(*u)).collect();
     let best = (0..grid.len())
         .filter(|i| values[*i].is_finite())
         .min_by(|i, j| values[*i].total_cmp(&values[*j]))
         .unwrap_or(0);
     let (a, b) = (best.saturating_sub(1), (best + 1).min(grid.len() - 1));
-    let refined = minimum(grid[a], grid[b], |u| line.curvature(u));
+    let refined = minimum(grid[a], grid[b], f);
     if refined.1 <= values[best] { refined } else { (grid[best], values[best]) }
 }
 

@@ -22,7 +22,9 @@
 //! counts the self term.
 
 mod binary;
+mod coexistence;
 mod correlations;
+mod critical;
 mod free_energy;
 mod interface;
 mod limit;
@@ -34,8 +36,10 @@ mod search;
 mod singular;
 mod stability;
 
-pub use binary::{CompositionBinodal, CompositionCritical, composition_critical_point};
+pub use binary::CompositionBinodal;
+pub use coexistence::Coexistence;
 pub use correlations::{Correlated, Correlations};
+pub use critical::{CompositionCritical, composition_critical_point};
 pub use interface::Interface;
 pub use limit::{NoLimit, Structure, thermodynamic_limit};
 pub use mean_field::MeanField;
@@ -79,6 +83,18 @@ pub enum TheoryError {
     /// The fluid is stable everywhere, or a phase has no partner.
     #[error("no two phases coexist")]
     NoCoexistence,
+    /// The common tangent at one total density joins phases of different pressure.
+    #[error(
+        "with the total density held at {density} the two phases have pressures {:.6} and {:.6}: they are not in equilibrium",
+        pressure[0],
+        pressure[1]
+    )]
+    NotInEquilibrium {
+        /// The total density.
+        density: f64,
+        /// Of the two phases.
+        pressure: [f64; 2],
+    },
     /// The gradient coefficient is not positive between the two phases, so that the square-gradient
     /// free energy favours interfaces (Pagonabarraga and Frenkel, text after eq. 30).
     #[error("the square-gradient coefficient is {coefficient:.6} at {at:.6}: no stable planar interface")]

@@ -344,6 +344,73 @@ fn interface_of_the_van_der_waals_fluid() {
     assert!(matches!(cold, Err(TheoryError::GradientNotPositive { .. })), "{cold:?}");
 }
 
+/// With ψ linear, `f_αβ = kT δ_αβ/ρ_α + 2λ_αβ`. Its eigenvector v of eigenvalue zero has `v_A/v_B = −2λ/(kT/ρ_A + 2λ_A)`, and
+/// `Σ kT v³/ρ²` is zero on it at the critical point; together `λr − λ_A r³ = λr² − λ_B` with `r³ = ρ_A/ρ_B`.
+#[test]
+fn critical_point_of_an_asymmetric_mixture_is_where_both_phases_become_one() {
+    let (lambda, lambda_a, lambda_b, rho) = (1.0, 0.2, 0.4, 10.0);
+    let cubic = |r: f64| lambda * r - lambda_a * r.powi(3) - lambda * r * r + lambda_b;
+    let r = super::search::turning_point(0.5, 2.0, |r| cubic(r) > 0.0);
+    let composition = r.powi(3) / (1.0 + r.powi(3));
+    let kt = composition * rho * (2.0 * lambda / (r * r) - 2.0 * lambda_a);
+    let family = |kt: f64| Ok(mixture(3, lambda, lambda_a, lambda_b).at(kt)?);
+    let critical = composition_critical_point(&family, rho, [1.0, 50.0]).unwrap();
+    close(critical.parameter, kt, 1e-6);
+    close(critical.composition, composition, 1e-3);
+    assert!(critical.limit >= critical.parameter);
+    // Just below it the two phases are near it, and near each other.
+    let mf = theory(&mixture(3, lambda, lambda_a, lambda_b), kt * (1.0 - 1e-5));
+    let phases = mf.coexistence([composition * rho, (1.0 - composition) * rho]).unwrap();
+    let [low, high] = phases.composition();
+    assert!(high - low < 0.05 && low < composition && composition < high, "{phases:?}");
+}
+
+/// At a total density that is held, the phases of an asymmetric mixture are no phases: refused. Those of the mixture itself
+/// have potentials and pressure in common, and share its particles.
+#[test]
+fn phases_of_an_asymmetric_mixture_are_in_equilibrium_or_refused() {
+    let mf = theory(&mixture(3, 1.0, 0.2, 0.4), 2.0);
+    assert!(matches!(mf.composition_binodal(10.0), Err(TheoryError::NotInEquilibrium { .. })));
+    assert!(matches!(mf.composition_interface(10.0, 11), Err(TheoryError::NotInEquilibrium { .. })));
+    let overall = [5.0, 5.0];
+    let found = mf.coexistence(overall).unwrap();
+    let [p, q] = found.densities.map(|rho| mf.pressure(&rho));
+    close(p, q, 1e-9);
+    let [mu, nu] = found.densities.map(|rho| mf.chemical_potentials(&rho));
+    for s in 0..2 {
+        close(mu[s], nu[s], 1e-9);
+        let [first, second] = found.densities;
+        close(found.share * first[s] + (1.0 - found.share) * second[s], overall[s], 1e-9);
+    }
+    assert!((found.density()[0] - found.density()[1]).abs() > 0.1, "{found:?}");
+    let same = mf.composition_binodal_at_pressure(found.pressure).unwrap();
+    close(same.composition[0], found.composition()[0], 1e-7);
+    close(same.density[1], found.density()[1], 1e-7);
+    assert_eq!(found.more_stable, None);
+    // A symmetric mixture has what Pagonabarraga and Frenkel have, who hold the density.
+    let mf = theory(&mixture(2, 1.0, 0.2, 0.2), 4.0);
+    let (held, free) = (mf.composition_binodal(10.0).unwrap(), mf.coexistence([5.0, 5.0]).unwrap());
+    close(free.composition()[0], held.composition[0], 1e-9);
+    close(free.density()[0], 10.0, 1e-9);
+    close(free.pressure, held.pressure[0], 1e-9);
+    assert_eq!(
+        theory(&mixture(2, 1.0, 0.2, 0.2), 8.1).coexistence([5.0, 5.0]),
+        Err(TheoryError::NoCoexistence)
+    );
+}
+
+/// At ε_AA = 2.3 a thinner mixed phase is more stable than the two of density 16.
+#[test]
+fn a_third_phase_of_the_huggins_fluid_is_found() {
+    for (epsilon, metastable) in [(1.8, false), (2.0, false), (2.3, true)] {
+        let mf = theory(&huggins(epsilon), 1.0);
+        let held = mf.composition_binodal(16.0).unwrap();
+        let found = mf.settle([8.0, 8.0], held.composition.map(|c| [16.0 * c, 16.0 * (1.0 - c)])).unwrap();
+        close(found.composition()[0], held.composition[0], 1e-9);
+        assert_eq!(found.more_stable.is_some(), metastable, "{epsilon} {found:?}");
+    }
+}
+
 #[test]
 fn huggins_fluid() {
     let mf = theory(&huggins(1.6), 1.0);
