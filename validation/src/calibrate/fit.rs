@@ -20,6 +20,15 @@ impl Fit {
     pub fn polynomial(&self) -> Polynomial {
         Polynomial(self.coefficients.clone())
     }
+
+    /// Halfway to another polynomial, whose coefficients count as known.
+    pub fn halfway(&self, other: &Polynomial) -> Fit {
+        let middle = |(m, c): (usize, &f64)| 0.5 * (c + other.0.get(m).copied().unwrap_or(0.0));
+        Fit {
+            coefficients: self.coefficients.iter().enumerate().map(middle).collect(),
+            errors: self.errors.iter().map(|error| error.map(|error| 0.5 * error)).collect(),
+        }
+    }
 }
 
 /// The polynomial of `degree` with `⟨ρ̃(n)⟩ = ρ` at every point by least squares, all densities alike:

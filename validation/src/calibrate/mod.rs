@@ -10,6 +10,8 @@
 //! 3. If a pressure is still further from the wanted one than the tolerance, ρ̃ is fitted to the pressures
 //!    (one species only).
 //! 4. If this does not meet the tolerance, the same with a quadratic, and with a cubic ρ̃.
+//!
+//! A density whose run stops is left out, and said; see [`search`].
 
 mod fit;
 mod point;
@@ -18,7 +20,7 @@ mod text;
 
 pub use fit::{Fit, Target, fit_density};
 pub use point::Point;
-pub use search::{DUMMY_SLOPE, Goal, Round, Trial, Wish, search};
+pub use search::{Batch, DUMMY_SLOPE, Failed, Goal, Round, Trial, Wish, search};
 pub use text::with_correction;
 
 use crate::bulk::{Bulk, Sampling};
@@ -27,7 +29,8 @@ use psidpd_core::document::FileError;
 use psidpd_core::model::{Model, Polynomial};
 use psidpd_core::theory::{MeanField, TheoryError};
 use serde::Serialize;
-use std::path::Path;
+use std::cell::RefCell;
+use std::path::{Path, PathBuf};
 
 /// Why a model cannot be calibrated. A tolerance that is not met is no error.
 #[derive(Debug, thiserror::Error)]
@@ -50,6 +53,12 @@ pub enum CalibrateError {
     Conditions(String),
     #[error("the wanted pressure at density {0} is not a finite number: choose another range of densities")]
     NoTarget(f64),
+    #[error(
+        "{}: no correction could be measured at densities {low} to {high} ({}): use a smaller --dt, or a narrower --density range",
+        model.display(),
+        sentences(failed)
+    )]
+    Nothing { model: PathBuf, low: f64, high: f64, failed: Vec<Failed> },
     #[error("no folder for the runs: {0}")]
     Folder(#[from] std::io::Error),
 }
@@ -128,6 +137,8 @@ pub struct Calibration {
     pub rounds: Vec<Round>,
     /// Which of them was chosen.
     pub chosen: usize,
+    /// Densities that stopped under it: residuals and tolerance are about the others.
+    pub failed: Vec<Failed>,
     /// Wanted and measured under it.
     pub residuals: Vec<Residual>,
     /// The model file with it.
@@ -199,63 +210,78 @@ pub fn calibrate(
         .collect::<Result<Vec<_>, _>>()?;
     let folder = tempfile::tempdir()?;
     let observe = format!("local_density = {{ density = \"{name}\", bins = 1000 }}");
-    let mut measure = |trial: Trial| -> Result<Vec<Point>, CalibrateError> {
-        options
-            .densities
-            .iter()
-            .map(|total| {
-                let rho = per_species(*total);
-                let model = match trial {
-                    Trial::Corrected(polynomials) => {
-                        parse(&with_correction(&text, &name, species, polynomials, "")?)?
-                    }
-                    Trial::Constant => {
-                        let variables: Vec<String> = names
-                            .iter()
-                            .flat_map(|n| species.iter().map(move |s| format!("{n}_{s}")))
-                            .collect();
-                        let slopes: Vec<Vec<f64>> = (0..species.len())
-                            .map(|a| theory.excess_slopes(a, &rho).iter().map(|s| DUMMY_SLOPE * s).collect())
-                            .collect();
-                        let identity =
-                            with_correction(&text, &name, species, &vec![Polynomial::identity(); pairs], "")?;
-                        parse(&text::with_slopes(&identity, species, &variables, &slopes)?)?
-                    }
-                };
-                let bulk = Bulk {
-                    model: &model,
-                    kt: options.kt,
-                    densities: &rho,
-                    observe: &observe,
-                    sampling: options.sampling,
-                };
-                let observed = bulk.run(path, &folder.path().join("run"))?;
-                Ok(Point::of(&observed, species, &rho))
-            })
-            .collect()
-    };
-    told("measuring with rho~ = rho");
-    let (first_guess, first) = match measure(Trial::Constant) {
-        Ok(points) => ("constant", points),
-        Err(CalibrateError::Run(why)) => {
-            told(&format!("rho~ = rho does not run ({why}): measuring with rho~ = n"));
-            ("identity", measure(Trial::Corrected(&vec![Polynomial::identity(); pairs]))?)
+    let told = RefCell::new(told);
+    told.borrow_mut()("measuring with rho~ = rho");
+    let mut all_failed: Vec<Failed> = Vec::new();
+    let mut measure = |trial: Trial| -> Result<Batch, CalibrateError> {
+        let mut batch = Batch::default();
+        for (k, total) in options.densities.iter().enumerate() {
+            let rho = per_species(*total);
+            let model = match trial {
+                Trial::Corrected(polynomials) => {
+                    parse(&with_correction(&text, &name, species, polynomials, "")?)?
+                }
+                Trial::Constant => {
+                    let variables: Vec<String> =
+                        names.iter().flat_map(|n| species.iter().map(move |s| format!("{n}_{s}"))).collect();
+                    let slopes: Vec<Vec<f64>> = (0..species.len())
+                        .map(|a| theory.excess_slopes(a, &rho).iter().map(|s| DUMMY_SLOPE * s).collect())
+                        .collect();
+                    let identity =
+                        with_correction(&text, &name, species, &vec![Polynomial::identity(); pairs], "")?;
+                    parse(&text::with_slopes(&identity, species, &variables, &slopes)?)?
+                }
+            };
+            let bulk = Bulk {
+                model: &model,
+                kt: options.kt,
+                densities: &rho,
+                observe: &observe,
+                sampling: options.sampling,
+            };
+            match bulk.run(path, &folder.path().join("run")) {
+                Ok(observed) => {
+                    batch.points.push(Point::of(&observed, species, &rho));
+                    batch.of.push(k);
+                }
+                Err(why) if why.is_stop() => {
+                    let failed = Failed { density: *total, why: cause(&why).to_string() };
+                    told.borrow_mut()(&format!("density {total} is left out: {}", failed.why));
+                    batch.failed.push(failed);
+                }
+                Err(other) => return Err(other.into()),
+            }
         }
-        Err(other) => return Err(other),
+        all_failed.clone_from(&batch.failed);
+        Ok(batch)
     };
+    let asked = options.densities.len();
+    let (mut first_guess, mut first) = ("constant", measure(Trial::Constant)?);
+    if !first.usable(asked) {
+        told.borrow_mut()("rho~ = rho does not run: measuring with rho~ = n");
+        (first_guess, first) = ("identity", measure(Trial::Corrected(&vec![Polynomial::identity(); pairs]))?);
+    }
     let slope = |x: f64| theory.excess_slopes(0, &[x])[0];
     let wish = Wish {
         targets: &targets,
         slope: (species.len() == 1).then_some(&slope as &dyn Fn(f64) -> f64),
         tolerance: options.tolerance,
     };
-    let rounds = search(first, &wish, &mut measure, &mut |round| told(&line(round)))?;
-    let Some((chosen, best)) = rounds
-        .iter()
-        .enumerate()
-        .min_by(|(_, a), (_, b)| a.pressure_residual.total_cmp(&b.pressure_residual))
-    else {
-        return Err(CalibrateError::Conditions("too few densities for a fit".into()));
+    let rounds = if first.usable(asked) {
+        search(first, &wish, &mut measure, &mut |round| told.borrow_mut()(&line(round)))?
+    } else {
+        Vec::new()
+    };
+    // Where most densities run, and then where the pressure is nearest.
+    let better = |a: &Round, b: &Round| {
+        (a.failed.len().cmp(&b.failed.len())).then(a.pressure_residual.total_cmp(&b.pressure_residual))
+    };
+    let Some((chosen, best)) = rounds.iter().enumerate().min_by(|(_, a), (_, b)| better(a, b)) else {
+        if all_failed.is_empty() {
+            return Err(CalibrateError::Conditions("too few densities for a fit".into()));
+        }
+        let [low, high] = [options.densities[0], options.densities[asked - 1]];
+        return Err(CalibrateError::Nothing { model: path.to_owned(), low, high, failed: all_failed });
     };
     let last = rounds.len() - 1;
     let converged = rounds[last].meets(options.tolerance);
@@ -263,7 +289,8 @@ pub fn calibrate(
     let polynomials: Vec<Polynomial> = best.fits.iter().map(|f| rounded(&f.polynomial())).collect();
     let text =
         with_correction(&text, &name, species, &polynomials, &note(best, converged, options, command))?;
-    let residuals = best.points.iter().zip(&targets).map(|(p, t)| Residual {
+    let kept = best.batch.points.iter().zip(best.batch.of.iter().map(|k| &targets[*k]));
+    let residuals = kept.map(|(p, t)| Residual {
         density: p.total,
         temperature: p.temperature.into(),
         mean: p.means.iter().map(|m| (*m).into()).collect(),
@@ -281,11 +308,26 @@ pub fn calibrate(
         tolerance: options.tolerance,
         sampling: options.sampling,
         first_guess,
+        failed: best.failed.clone(),
         residuals: residuals.collect(),
         chosen,
         rounds,
         text,
     })
+}
+
+/// Why a run stopped, without the folder of it, which is gone.
+fn cause(error: &RunError) -> &RunError {
+    match error {
+        RunError::Stopped { cause: inner, .. } | RunError::Halted { cause: inner, .. } => cause(inner),
+        other => other,
+    }
+}
+
+/// One sentence for each density.
+fn sentences(failed: &[Failed]) -> String {
+    let each: Vec<String> = failed.iter().map(|f| format!("at {}: {}", f.density, f.why)).collect();
+    each.join("; ")
 }
 
 /// Drops digits below the accuracy of a calibration.
@@ -335,10 +377,15 @@ fn note(round: &Round, converged: bool, options: &Options, command: &str) -> Str
         [first, .., last] => format!("densities {first} to {last}"),
         [] => String::new(),
     };
+    let failed: Vec<String> = round.failed.iter().map(|f| f.density.to_string()).collect();
+    let without = match &failed[..] {
+        [] => String::new(),
+        some => format!("\nThe fluid does not run with it at density {}.", some.join(", ")),
+    };
     let verdict = if converged { "" } else { ", which is not the tolerance asked for" };
     format!(
         "Corrected density, found by\n  {command}\nAt kT = {} and {range} the pressure is the wanted one within {:.2} \
-         %{verdict}.",
+         %{verdict}.{without}",
         options.kt,
         100.0 * round.pressure_residual
     )

@@ -14,6 +14,37 @@ pub enum Trial<'a> {
     Corrected(&'a [Polynomial]),
 }
 
+/// A density whose run stopped, and why: left out of fits and residuals.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Failed {
+    /// Total number density.
+    pub density: f64,
+    /// Why the run stopped.
+    pub why: String,
+}
+
+/// What was measured under one correction.
+#[derive(Debug, Clone, Default)]
+pub struct Batch {
+    /// Of the densities whose runs came to their end.
+    pub points: Vec<Point>,
+    /// Which targets these are.
+    pub of: Vec<usize>,
+    /// The other densities.
+    pub failed: Vec<Failed>,
+}
+
+impl Batch {
+    /// Whether enough densities remain for a straight line, or the only one.
+    pub fn usable(&self, asked: usize) -> bool {
+        self.points.len() >= asked.min(2)
+    }
+
+    fn targets(&self, wish: &Wish) -> Vec<Target> {
+        self.of.iter().map(|k| wish.targets[*k]).collect()
+    }
+}
+
 /// ρ̃′ of the first guess ρ̃ = ρ (Trofimov, Nies and Michels, section IV B).
 pub const DUMMY_SLOPE: f64 = 1.05;
 
@@ -42,9 +73,13 @@ pub struct Round {
     pub pressure_residual: f64,
     /// Largest error of a pressure, over the same scale.
     pub pressure_error: f64,
+    /// Densities that stopped under it, which the residuals leave out.
+    pub failed: Vec<Failed>,
+    /// How often it was moved halfway back to the correction before it, because too few densities ran.
+    pub halved: usize,
     /// What was measured under it.
     #[serde(skip)]
-    pub points: Vec<Point>,
+    pub batch: Batch,
 }
 
 impl Round {
@@ -60,7 +95,7 @@ impl Round {
 /// What is asked for.
 #[derive(Clone, Copy)]
 pub struct Wish<'a> {
-    /// Target equation of state at the densities of the points.
+    /// Target equation of state at the densities asked for.
     pub targets: &'a [Target],
     /// ψ′ of one species; none for mixtures, whose pressures are not fitted.
     pub slope: Option<&'a dyn Fn(f64) -> f64>,
@@ -71,6 +106,9 @@ pub struct Wish<'a> {
 /// Fits of each degree to the same goal before the next degree or goal is tried.
 const ROUNDS: usize = 3;
 
+/// How often a correction under which too few densities run is moved halfway back.
+const HALVINGS: usize = 3;
+
 /// Weight of ⟨ρ̃⟩ = ρ against the pressures in the rounds that are fitted to pressures: lower in every round.
 const HOLDS: [f64; ROUNDS] = [0.5, 0.1, 0.02];
 
@@ -78,38 +116,54 @@ const HOLDS: [f64; ROUNDS] = [0.5, 0.1, 0.02];
 /// not known there.
 pub const HIGHEST_DEGREE: usize = 3;
 
-/// Looks for corrections from the first `points`, those of [`Trial::Constant`]. The last round is the one
-/// that meets the wish, if it is met.
+/// Looks for corrections from `first`, what was measured with [`Trial::Constant`]. The last round is the one that meets the
+/// wish, if it is met. A density that stops is left out of the round. Where too few are left, the correction is moved halfway
+/// back to the last one that ran, or to ρ̃ = n; if that does not help either, the rounds so far are all there are.
 ///
 /// # Errors
 /// Those of `measure`.
 pub fn search<E>(
-    first: Vec<Point>,
+    first: Batch,
     wish: &Wish,
-    measure: &mut dyn FnMut(Trial) -> Result<Vec<Point>, E>,
+    measure: &mut dyn FnMut(Trial) -> Result<Batch, E>,
     told: &mut dyn FnMut(&Round),
 ) -> Result<Vec<Round>, E> {
-    let pairs = first.first().map_or(0, |p| p.means.len());
-    let highest = if pairs == 1 { HIGHEST_DEGREE.min(first.len().saturating_sub(1)).max(1) } else { 1 };
+    let pairs = first.points.first().map_or(0, |p| p.means.len());
+    let asked = wish.targets.len();
+    let highest = if pairs == 1 { HIGHEST_DEGREE.min(asked.saturating_sub(1)).max(1) } else { 1 };
     let mut rounds: Vec<Round> = Vec::new();
-    let mut points = first;
+    let mut batch = first;
     for degree in 1..=highest {
         for goal in [Goal::Density, Goal::Pressure] {
             for hold in HOLDS {
+                let points = &batch.points;
                 let fits: Option<Vec<Fit>> = match (goal, wish.slope, rounds.last()) {
-                    (Goal::Density, ..) => {
-                        (0..pairs).map(|pair| fit_density(&points, pair, degree)).collect()
-                    }
-                    (Goal::Pressure, Some(slope), Some(last)) => {
+                    (Goal::Density, ..) => (0..pairs).map(|pair| fit_density(points, pair, degree)).collect(),
+                    (Goal::Pressure, Some(slope), Some(last)) if points.len() > degree || asked == 1 => {
                         let start = last.fits[0].polynomial();
-                        fit_pressure(&points, wish.targets, slope, &start, degree, hold).map(|fit| vec![fit])
+                        let targets = batch.targets(wish);
+                        fit_pressure(points, &targets, slope, &start, degree, hold).map(|fit| vec![fit])
                     }
                     (Goal::Pressure, ..) => None,
                 };
-                let Some(fits) = fits else { break };
-                let polynomials: Vec<Polynomial> = fits.iter().map(Fit::polynomial).collect();
-                points = measure(Trial::Corrected(&polynomials))?;
-                let round = assess(degree, goal, fits, points.clone(), wish);
+                let Some(mut fits) = fits else { break };
+                let mut halved = 0;
+                batch = loop {
+                    let polynomials: Vec<Polynomial> = fits.iter().map(Fit::polynomial).collect();
+                    let batch = measure(Trial::Corrected(&polynomials))?;
+                    if batch.usable(asked) {
+                        break batch;
+                    }
+                    if halved == HALVINGS {
+                        return Ok(rounds);
+                    }
+                    halved += 1;
+                    let back = |pair: usize| {
+                        rounds.last().map_or(Polynomial::identity(), |round| round.fits[pair].polynomial())
+                    };
+                    fits = fits.iter().enumerate().map(|(pair, fit)| fit.halfway(&back(pair))).collect();
+                };
+                let round = Round { halved, ..assess(degree, goal, fits, batch.clone(), wish) };
                 told(&round);
                 let met = round.meets(wish.tolerance);
                 let consistent = round.density_residual <= wish.tolerance;
@@ -126,7 +180,8 @@ pub fn search<E>(
     Ok(rounds)
 }
 
-fn assess(degree: usize, goal: Goal, fits: Vec<Fit>, points: Vec<Point>, wish: &Wish) -> Round {
+fn assess(degree: usize, goal: Goal, fits: Vec<Fit>, batch: Batch, wish: &Wish) -> Round {
+    let (points, targets) = (&batch.points, batch.targets(wish));
     let worst = |values: &mut dyn Iterator<Item = f64>| {
         // NaN counts as the largest deviation.
         values.fold(0.0f64, |worst, x| {
@@ -144,8 +199,10 @@ fn assess(degree: usize, goal: Goal, fits: Vec<Fit>, points: Vec<Point>, wish: &
             .enumerate()
             .map(|(pair, fit)| (p.corrected(pair, &fit.polynomial()).value / p.own[pair] - 1.0).abs())
     }));
-    let both = || points.iter().zip(wish.targets);
+    let both = || points.iter().zip(&targets);
     let pressure_residual = worst(&mut both().map(|(p, t)| ((p.pressure.value - t.wanted) / t.scale).abs()));
     let pressure_error = worst(&mut both().map(|(p, t)| p.pressure.error / t.scale));
-    Round { degree, goal, fits, density_residual, pressure_residual, pressure_error, points }
+    let failed = batch.failed.clone();
+    let halved = 0;
+    Round { degree, goal, fits, density_residual, pressure_residual, pressure_error, failed, halved, batch }
 }

@@ -1,6 +1,7 @@
 use super::search::HIGHEST_DEGREE;
 use super::*;
-use crate::observe::Measured;
+use crate::bulk::Observed;
+use crate::observe::{Kind, Measured, Observation};
 use std::convert::Infallible;
 
 /// A made-up fluid without noise: ψ′ = A n^(k−2), whose local density is a known function of ρ and of the
@@ -43,7 +44,28 @@ impl Made {
     }
 
     fn search(&self, densities: &[f64], tolerance: f64) -> Vec<Round> {
-        let all = |p: &Polynomial| densities.iter().map(|rho| self.point(*rho, p)).collect::<Vec<_>>();
+        self.search_where(densities, tolerance, &|_, _| true)
+    }
+
+    /// The same where only some densities run with a correction.
+    fn search_where(
+        &self,
+        densities: &[f64],
+        tolerance: f64,
+        runs: &dyn Fn(f64, &Polynomial) -> bool,
+    ) -> Vec<Round> {
+        let all = |p: &Polynomial| {
+            let mut batch = Batch::default();
+            for (k, rho) in densities.iter().enumerate() {
+                if runs(*rho, p) {
+                    batch.points.push(self.point(*rho, p));
+                    batch.of.push(k);
+                } else {
+                    batch.failed.push(Failed { density: *rho, why: "ran away".into() });
+                }
+            }
+            batch
+        };
         let targets = targets(densities);
         let wish = Wish { targets: &targets, slope: Some(&slope), tolerance };
         let measure = &mut |trial: Trial| -> Result<_, Infallible> {
@@ -99,6 +121,60 @@ fn one_density_fixes_the_offset() {
     let fit = fit_density(&[point], 0, 1).unwrap();
     assert!((fit.coefficients[0] - 1.57).abs() < 1e-12 && fit.coefficients[1] == 1.0);
     assert_eq!(fit.errors[1], None);
+}
+
+/// A density that always stops is left out of fits and residuals, and named; the others are fitted to their own targets.
+#[test]
+fn a_density_that_stops_is_left_out() {
+    let made = Made { hole: |rho| rho - (rho - 1.54) / 1.047, factor: 1.0 / 1.047 };
+    let rounds = made.search_where(&spaced(2.0, 10.0, 9), 0.001, &|rho, _| rho != 4.0);
+    let last = rounds.last().unwrap();
+    let c = &last.fits[0].coefficients;
+    assert!((c[0] - 1.54).abs() < 1e-9 && (c[1] - 1.047).abs() < 1e-9, "{c:?}");
+    assert!(last.meets(0.001) && last.batch.points.len() == 8);
+    assert_eq!(last.failed, [Failed { density: 4.0, why: "ran away".into() }]);
+}
+
+/// Where a correction runs nowhere it is moved halfway back; where that does not help, what was found before is kept.
+#[test]
+fn a_correction_that_does_not_run_is_damped() {
+    let made = Made { hole: |rho| rho - (rho - 1.6) / 1.2, factor: 1.0 };
+    let densities = spaced(2.0, 10.0, 9);
+    // From [0, 1] the fit is [1.6, 1.2]; offsets above 1 do not run.
+    let rounds = made.search_where(&densities, 0.001, &|_, p| p.0[0] < 1.0);
+    let c = &rounds[0].fits[0].coefficients;
+    assert!((c[0] - 0.8).abs() < 1e-9 && (c[1] - 1.1).abs() < 1e-9, "{c:?}");
+    assert_eq!(rounds[0].halved, 1);
+    let rounds = made.search_where(&densities, 0.001, &|_, p| *p == Polynomial::identity());
+    assert!(rounds.is_empty());
+}
+
+/// What a run observes of a distribution of the local density.
+fn histogram(centres: &[f64], masses: &[f64]) -> Observed {
+    let of = |values: &[f64]| values.to_vec();
+    let curve = Observation::new("local_density", "Local density", Kind::Curve)
+        .against("n", "1", of(centres))
+        .exact("F", "1", of(masses));
+    Observed(vec![curve])
+}
+
+/// Of a normal distribution in bins as wide as its standard deviation σ, the bins have the variance σ² + σ²/12.
+#[test]
+fn the_width_of_bins_is_no_spread_of_the_density() {
+    let (mean, sigma) = (5.0, 0.4);
+    let normal = |x: f64| (-0.5 * ((x - mean) / sigma).powi(2)).exp();
+    let centres: Vec<f64> = (0..25).map(|k| 0.1 + sigma * f64::from(k)).collect();
+    // The integral over a bin, by Simpson's rule in 100 pieces.
+    let of_bin = |centre: f64| -> f64 {
+        let h = sigma / 200.0;
+        let at = |k: i32| normal(centre + h * f64::from(k));
+        (0..100).map(|k| at(2 * k - 100) + 4.0 * at(2 * k - 99) + at(2 * k - 98)).sum()
+    };
+    let masses: Vec<f64> = centres.iter().map(|x| of_bin(*x)).collect();
+    let found = histogram(&centres, &masses);
+    let [second, third] = Point::of(&found, &["F".into()], &[5.0]).spread.unwrap();
+    assert!((second / (sigma * sigma) - 1.0).abs() < 1e-6, "{second}");
+    assert!(third.abs() < 1e-6, "{third}");
 }
 
 /// Errors of the coefficients are the scatter of fits to data with that noise.
