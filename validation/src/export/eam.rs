@@ -187,3 +187,41 @@ fn pair_energy(fluid: &Fluid, a: usize, b: usize, r: f64) -> f64 {
         .map(|p| p.potential.at(r).0)
         .sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use psidpd_core::model::Model;
+    use std::f64::consts::PI;
+
+    /// Where a particle counts itself, its embedding is at its neighbours' density and w(0) = 15/(2π): a formula and a curve.
+    #[test]
+    fn a_particle_that_counts_itself_has_its_own_density_in_the_table() {
+        let own = 15.0 / (2.0 * PI);
+        let folder = tempfile::tempdir().unwrap();
+        let grid = Grid { spacing: 0.01, largest_density: 40.0, densities: 41 };
+        for (psi, counted) in
+            [("\"n^2\"", true), ("\"n^2\"", false), ("{ pressure = \"rho*kT + 2*rho^3\" }", true)]
+        {
+            let text = format!(
+                "title = 't'\nspecies = ['F']\n[density.n]\nkernel = 'quadratic'\nrange = 1\nself = {counted}\n\
+                 [excess_free_energy]\nF = {psi}\n"
+            );
+            let fluid = Model::parse("m.toml", &text).unwrap().at(1.0).unwrap();
+            let path = folder.path().join("t.eam.alloy");
+            write(&fluid, &[1.0], grid, &path).unwrap();
+            let text = std::fs::read_to_string(&path).unwrap();
+            let values: Vec<f64> =
+                text.lines().skip(6).flat_map(str::split_whitespace).map(|x| x.parse().unwrap()).collect();
+            // ψ is n², or has the slope (p − ρkT)/ρ² = 2n.
+            let at = |n: f64| (n + if counted { own } else { 0.0 }).powi(2);
+            for k in 1..41 {
+                let (found, expected) = (values[k] - values[0], at(k as f64) - at(0.0));
+                assert!((found / expected - 1.0).abs() < 1e-6, "{psi} {k}: {found} {expected}");
+            }
+            if psi.contains("n^2") {
+                assert!((values[0] - at(0.0)).abs() < 1e-12, "{}", values[0]);
+            }
+        }
+    }
+}

@@ -113,6 +113,23 @@ mod tests {
         (Substance::find("decane").unwrap(), liquid, options)
     }
 
+    /// Six molecules of decane take 6/(5064.16 N_A) = 1.96740e-27 m³; the rest by hand from that and kT = 4.11641e-21 J.
+    #[test]
+    fn units_are_those_of_si() {
+        let (substance, liquid, options) = decane();
+        let units = Units::new(&substance, &liquid, &options);
+        let close =
+            |found: f64, expected: f64| assert!((found / expected - 1.0).abs() < 1e-4, "{found} {expected}");
+        close(units.length, 1.25303e-9);
+        close(units.pressure, 2.09231e6);
+        close(units.tension, 2.62176e-3);
+        // The tension that is wanted of the model, in its own unit.
+        close(liquid.tension / units.tension, 8.84711);
+        // The same in the file.
+        let text = model(&substance, &liquid, &units, &options, -40.0, "psidpd").unwrap();
+        assert!(text.contains("surface tension 2.6217") && text.contains("e-3 N/m"), "{text}");
+    }
+
     #[test]
     fn mean_field_has_the_pressures_and_the_compressibility_of_the_liquid() {
         let (substance, liquid, options) = decane();
