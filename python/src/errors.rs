@@ -1,5 +1,6 @@
 //! Errors of the library as exceptions.
 
+use psidpd::checkpoint::Caller;
 use psidpd::cli::Failure;
 use pyo3::prelude::*;
 
@@ -10,7 +11,7 @@ pyo3::import_exception!(psidpd.errors, RunStoppedError);
 /// 1, else [`InputError`].
 pub fn exception(error: impl Into<Failure>) -> PyErr {
     let failure = error.into();
-    let text = failure.plain();
+    let text = failure.plain(Caller::Python);
     let text = text.strip_prefix("error: ").unwrap_or(&text).to_owned();
     match failure.exit_code() {
         1 => RunStoppedError::new_err(text),

@@ -82,6 +82,13 @@ def test_errors_are_those_of_the_command_line(tmp_path):
         psidpd.run(text, out=tmp_path / "out", resume=True, overwrite=True)
 
 
+def test_advice_is_for_python(tmp_path):
+    psidpd.run(scene(2), out=tmp_path / "out")
+    with pytest.raises(psidpd.InputError, match="overwrite=True") as raised:
+        psidpd.run(scene(3), out=tmp_path / "out")
+    assert "--overwrite" not in str(raised.value)
+
+
 def test_a_run_that_stops_says_where(tmp_path):
     hot = scene(500).replace("steps = 500", "steps = 500\ndt = 0.5")
     with pytest.raises(psidpd.RunStoppedError, match="step"):

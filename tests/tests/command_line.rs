@@ -217,7 +217,7 @@ fn bad_input_is_named_with_file_line_and_key() {
     );
     assert!(forces("nowhere.toml", &data, "1").contains("nowhere.toml: cannot be read"));
     assert!(forces(&model(), "nowhere.data", "1").contains("nowhere.data"));
-    assert!(forces(&model(), &data, "-1").contains("must be a positive number"));
+    assert!(forces(&model(), &data, "-1").contains("a temperature is a positive number"));
     let two = write(
         here,
         "b.data",
@@ -405,4 +405,144 @@ fn a_parameter_that_the_model_lacks_is_not_set() {
     assert_eq!(misspelt.status.code(), Some(2), "{}", said(&misspelt));
     assert!(said(&misspelt).contains("its parameters: A"), "{}", said(&misspelt));
     assert!(theory("model.parameters.A=-50").status.success());
+}
+
+/// What a verb reads it does not write over, under whatever name, also where a model or a scene names it.
+#[test]
+fn no_verb_writes_over_what_it_reads() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let rows = "rho,p\n1,2\n2,6\n3,12\n4,20\n5,30\n6,42\n7,56\n8,72\n";
+    write(here, "p.csv", rows);
+    let table = "title = \"table\"\nspecies = [\"F\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n\
+                 [excess_free_energy]\nF = { pressure = { table = \"p.csv\" } }\n";
+    write(here, "m.toml", table);
+    let data = "one\n\n1 atoms\n1 atom types\n\n0 6 xlo xhi\n0 6 ylo yhi\n0 6 zlo zhi\n\nAtoms # atomic\n\n1 1 1.5 1.0 1.0\n";
+    write(here, "start.data", data);
+    let set6 = std::fs::read_to_string(model()).unwrap();
+    write(here, "set6.toml", &set6);
+    let scene = "title = \"s\"\nmodel = \"set6.toml\"\nkT = 1.0\nsteps = 1\ndt = 0.01\n[initial]\nkind = \"data\"\n\
+                 file = \"start.data\"\n";
+    write(here, "s.toml", scene);
+    std::os::unix::fs::symlink("m.toml", here.join("link")).unwrap();
+    for arguments in [
+        &["theory", "m.toml", "--json", "m.toml"][..],
+        &["theory", "m.toml", "--json", "link"],
+        &["theory", "m.toml", "--json", "./p.csv"],
+        &["theory", "m.toml", "--report", "m.toml"],
+        &["check", "m.toml", "--json", "m.toml"],
+        &["check", "s.toml", "--json", "set6.toml"],
+        &["check", "s.toml", "--json", "start.data"],
+        &["forces", "--model", "set6.toml", "--data", "start.data", "--kT", "1", "--json", "start.data"],
+        &["forces", "--model", "set6.toml", "--data", "start.data", "--kT", "1", "--json", "set6.toml"],
+        &["export", "eam", "set6.toml", "--out", "set6.toml"],
+        &["export", "lammps", "s.toml", "--out", "."],
+        &["calibrate", "m.toml", "--out", "m.toml"],
+        &["run", "s.toml", "--out", "out", "--json", "s.toml"],
+        &["snapshot", "start.data", "--out", "s.svg", "--json", "start.data"],
+    ] {
+        let output = psidpd(here, arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", said(&output));
+        assert!(said(&output).contains("would be written over"), "{arguments:?}: {}", said(&output));
+    }
+    for (name, text) in [("m.toml", table), ("start.data", data), ("set6.toml", &set6), ("s.toml", scene)] {
+        assert_eq!(std::fs::read_to_string(here.join(name)).unwrap(), text, "{name}");
+    }
+    // A deck beside the tables of its model leaves them as they are.
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    write(here, "p.csv", rows);
+    write(here, "mine.toml", &format!("{table}[[thermostat]]\ngamma = 4.5\nrange = 1\n"));
+    write(here, "mine.data", data);
+    write(here, "s.toml", &scene.replace("set6.toml", "mine.toml").replace("start.data", "mine.data"));
+    let output = psidpd(here, &["export", "lammps", "s.toml", "--out", "."]);
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    assert_eq!(std::fs::read_to_string(here.join("p.csv")).unwrap(), rows);
+}
+
+/// Errors name what is wrong: the option, the integer, the kind of file and its verb; advice fits the caller.
+#[test]
+fn errors_name_the_option_the_integer_and_the_kind_of_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let path = write(here, "scene.toml", &scene(""));
+    write(here, "exponent.toml", &scene("").replace("steps = 50", "steps = 1e4"));
+    write(here, "fraction.toml", &scene("").replace("steps = 50", "steps = 1.5"));
+    let (model, path) = (model(), path.as_str());
+    for (arguments, words) in [
+        (&["theory", &model, "--kT", "-1"][..], &["--kT", "a temperature is a positive number"][..]),
+        (&["check", &model, "--kT", "0"], &["--kT", "a temperature is a positive number"]),
+        (&["calibrate", &model, "--kT", "-1", "--out", "x.toml"], &["--kT"]),
+        (&["export", "eam", &model, "--kT", "-1"], &["--kT"]),
+        (&["theory", &model, "--set", "kT=-1"], &["kT=-1 of --set", "a positive number"]),
+        (&["check", "exponent.toml"], &["expected an integer: 10000, not 1e4"]),
+        (&["check", "fraction.toml"], &["expected an integer, not 1.5"]),
+        (&["run", &model, "--out", "o"], &["this is a model, and a scene is expected", "psidpd check"]),
+        (&["theory", path], &["this is a scene, and a model is expected", "psidpd run"]),
+    ] {
+        let output = psidpd(here, arguments);
+        let said = said(&output).replace('│', " ").split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+        for word in words {
+            assert!(said.contains(word), "{arguments:?}: {word}: {said}");
+        }
+        assert!(!said.contains("unknown key") && !said.contains("toml:1:1"), "{arguments:?}: {said}");
+    }
+}
+
+/// A fluid that runs away at some densities is calibrated with the others, and they are named; one that does at all of them
+/// is refused with the file, the densities and what to do.
+#[test]
+fn a_calibration_survives_densities_that_run_away() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    // Beyond density 8 the repulsion is that of a wall, for which the time step is too long.
+    let text = "title = \"wall\"\nspecies = [\"F\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n\
+                [excess_free_energy]\nF = { pressure = \"rho*kT + 5*rho^2 + 1e6*max(0, rho - 8)^3\" }\n\
+                [[thermostat]]\ngamma = 4.5\nrange = 1\n";
+    write(here, "m.toml", text);
+    let calibrate = |density: &str, dt: &str| {
+        let arguments = [
+            "calibrate",
+            "m.toml",
+            "--density",
+            density,
+            "--points",
+            "4",
+            "--particles",
+            "300",
+            "--steps",
+            "200",
+            "--equilibrate",
+            "100",
+            "--dt",
+            dt,
+            "--tolerance",
+            "0.5",
+            "--out",
+            "c.toml",
+            "--json",
+            "c.json",
+        ];
+        psidpd(here, &arguments)
+    };
+    let output = calibrate("3:12", "0.02");
+    let words = said(&output);
+    assert_eq!(output.status.code(), Some(0), "{words}");
+    let json: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(here.join("c.json")).unwrap()).unwrap();
+    let failed = json["failed"].as_array().unwrap();
+    assert!(failed.iter().any(|f| f["density"] == 12.0 && !f["why"].as_str().unwrap().is_empty()), "{json}");
+    assert!(words.contains("warning: at density 12 the run stopped"), "{words}");
+    assert!(std::fs::read_to_string(here.join("c.toml")).unwrap().contains("correction = ["));
+    let output = calibrate("12:15", "0.02");
+    let words = said(&output).split_whitespace().collect::<Vec<_>>().join(" ");
+    assert_eq!(output.status.code(), Some(2), "{words}");
+    for part in ["m.toml", "densities 12 to 15", "--dt", "--density"] {
+        assert!(words.contains(part), "{part}: {words}");
+    }
+    assert!(
+        !words.contains("/tmp") && !words.contains("--overwrite") && !words.contains("last-good"),
+        "{words}"
+    );
 }

@@ -32,31 +32,62 @@ pub enum CheckpointError {
     Foreign { path: PathBuf, differences: Vec<String> },
 }
 
+/// Who hears what can be done, and so how options are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Caller {
+    /// A verb with `--resume` and `--overwrite`.
+    Options,
+    /// A call in Python with `resume=True` and `overwrite=True`.
+    Python,
+    /// One that has neither.
+    #[default]
+    Neither,
+}
+
+impl Caller {
+    /// How to replace what is in a folder.
+    pub fn start_over(self) -> &'static str {
+        match self {
+            Caller::Options => "start over with --overwrite",
+            Caller::Python => "start over with overwrite=True",
+            Caller::Neither => "remove the folder to start over",
+        }
+    }
+
+    /// How to go on with a run.
+    pub fn go_on(self) -> &'static str {
+        match self {
+            Caller::Options => "go on with --resume",
+            Caller::Python => "go on with resume=True",
+            Caller::Neither => "go on with `psidpd run --resume`",
+        }
+    }
+}
+
 impl CheckpointError {
     pub(super) fn unreadable(path: &Path) -> impl FnOnce(std::io::Error) -> CheckpointError + '_ {
         move |source| CheckpointError::Unreadable { path: path.to_owned(), source }
     }
 
     /// There is none in `folder`.
-    pub(super) fn absent(folder: &Path) -> CheckpointError {
+    pub(crate) fn absent(folder: &Path) -> CheckpointError {
         let path = folder.join(super::store::NEWEST);
         let source = std::io::ErrorKind::NotFound.into();
         CheckpointError::Unreadable { path, source }
     }
 
     /// What can be done.
-    pub fn help(&self) -> &'static str {
+    pub fn help(&self, caller: Caller) -> String {
+        let over = caller.start_over();
         match self {
             CheckpointError::Foreign { .. } => {
-                "go on with the scene and model that the run was started with, or start over with --overwrite"
+                format!("go on with the scene and model that the run was started with, or {over}")
             }
             CheckpointError::Version { .. } => {
-                "go on with the version of psidpd that wrote it, or start over with --overwrite"
+                format!("go on with the version of psidpd that wrote it, or {over}")
             }
-            CheckpointError::Edited { .. } => {
-                "put the file back as the run left it, or start over with --overwrite"
-            }
-            _ => "start over with --overwrite",
+            CheckpointError::Edited { .. } => format!("put the file back as the run left it, or {over}"),
+            _ => over.into(),
         }
     }
 }

@@ -22,7 +22,7 @@ mod store;
 mod totals;
 mod written;
 
-pub use error::CheckpointError;
+pub use error::{Caller, CheckpointError};
 pub use format::{VERSION, parse};
 pub use identity::Identity;
 pub(crate) use store::{Found, Store};

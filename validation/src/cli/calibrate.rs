@@ -1,3 +1,5 @@
+use super::inputs::Files;
+use super::settings::temperature;
 use super::{Failure, Verdict, write_json};
 use crate::bulk::Sampling;
 use crate::calibrate::{CalibrateError, Options, calibrate, shown, spaced};
@@ -17,7 +19,7 @@ pub struct Arguments {
     /// The model file.
     model: PathBuf,
     /// kT.
-    #[arg(long = "kT", value_name = "T", default_value_t = 1.0)]
+    #[arg(long = "kT", value_name = "T", default_value_t = 1.0, allow_negative_numbers = true, value_parser = temperature)]
     kt: f64,
     /// Total number densities over which the pressure is to be right: LOW:HIGH, or one.
     #[arg(long, value_name = "LOW:HIGH", default_value = "3:10", value_parser = range)]
@@ -56,6 +58,13 @@ pub struct Arguments {
     /// Where the model file with its correction goes.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
+}
+
+impl Arguments {
+    /// What it reads and writes.
+    pub fn files(&self) -> Files {
+        Files::reads([&self.model]).writes([self.out.clone()])
+    }
 }
 
 fn range(text: &str) -> Result<[f64; 2], String> {
@@ -129,6 +138,13 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
                 r.density, r.temperature.value, a.kt
             );
         }
+    }
+    for failed in &found.failed {
+        println!(
+            "warning: at density {} the run stopped: {}; it is left out of the fit. A smaller --dt or a narrower --density \
+             range may help",
+            failed.density, failed.why
+        );
     }
     if !found.converged {
         println!(

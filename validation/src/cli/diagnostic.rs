@@ -1,6 +1,7 @@
 //! Errors as a person sees them: what, where (with the line of the file), and what to do.
 
 use crate::calibrate::CalibrateError;
+use crate::checkpoint::Caller;
 use crate::crosscheck::ValidateError;
 use crate::from_eos::FromEosError;
 use crate::run::RunError;
@@ -28,16 +29,16 @@ impl Failure {
     }
 
     /// For the terminal, with escape sequences for colour: an error about a file shows the line.
-    pub fn render(&self) -> String {
-        self.rendered(&Renderer::styled())
+    pub fn render(&self, caller: Caller) -> String {
+        self.rendered(&Renderer::styled(), caller)
     }
 
     /// The same as plain text.
-    pub fn plain(&self) -> String {
-        self.rendered(&Renderer::plain())
+    pub fn plain(&self, caller: Caller) -> String {
+        self.rendered(&Renderer::plain(), caller)
     }
 
-    fn rendered(&self, renderer: &Renderer) -> String {
+    fn rendered(&self, renderer: &Renderer, caller: Caller) -> String {
         let shows = |e: &&FileError| {
             let text = e.file().text();
             !text.is_empty() && text.lines().all(|line| line.len() <= LONGEST_LINE)
@@ -57,7 +58,7 @@ impl Failure {
             let place = AnnotationKind::Primary.span(e.span()).label("here");
             report = report.element(Snippet::source(text).path(name).annotation(place));
         }
-        let help = run_error(&*self.0).and_then(RunError::help).map(|help| help.to_string());
+        let help = run_error(&*self.0).and_then(|error| error.help(caller));
         if let Some(help) = help.or_else(|| Some(file_error(&*self.0)?.help()?.to_string())) {
             report = report.element(Level::HELP.message(printable(&help)));
         }

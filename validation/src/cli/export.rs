@@ -1,3 +1,5 @@
+use super::inputs::Files;
+use super::settings::temperature;
 use super::{Failure, Settings, Verdict, write_json};
 use crate::export::eam::{self, Grid};
 use crate::export::lammps as deck;
@@ -34,7 +36,7 @@ pub struct EamArguments {
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// kT.
-    #[arg(long = "kT", value_name = "T", default_value_t = 1.0, allow_negative_numbers = true)]
+    #[arg(long = "kT", value_name = "T", default_value_t = 1.0, allow_negative_numbers = true, value_parser = temperature)]
     kt: f64,
     /// Spacing in r.
     #[arg(long, value_name = "DR", default_value_t = Grid::default().spacing)]
@@ -47,6 +49,26 @@ pub struct EamArguments {
     densities: usize,
     #[command(flatten)]
     settings: Settings,
+}
+
+impl EamArguments {
+    /// Where the table goes.
+    fn table(&self) -> PathBuf {
+        self.out.clone().unwrap_or_else(|| {
+            let stem = self.model.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            PathBuf::from(format!("{stem}.eam.alloy"))
+        })
+    }
+}
+
+impl Verb {
+    /// What it reads and writes.
+    pub fn files(&self) -> Files {
+        match self {
+            Verb::Eam(a) => Files::reads([&a.model]).writes([a.table()]),
+            Verb::Lammps(a) => Files::reads([&a.scene]).writes(deck::FILES.map(|name| a.out.join(name))),
+        }
+    }
 }
 
 pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
@@ -68,10 +90,7 @@ fn run_lammps(a: &LammpsArguments, json: Option<&Path>) -> Result<Verdict, Failu
 fn run_eam(a: &EamArguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     let (model, kt) = a.settings.model(&a.model)?;
     let fluid = model.at(kt.unwrap_or(a.kt))?;
-    let out = a.out.clone().unwrap_or_else(|| {
-        let stem = a.model.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        PathBuf::from(format!("{stem}.eam.alloy"))
-    });
+    let out = a.table();
     let grid = Grid { spacing: a.spacing, largest_density: a.largest_density, densities: a.densities };
     eam::write(&fluid, &vec![1.0; fluid.species.len()], grid, &out)?;
     println!("{}", out.display());

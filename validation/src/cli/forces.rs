@@ -1,3 +1,5 @@
+use super::inputs::Files;
+use super::settings::temperature;
 use super::{Failure, Settings, Verdict, write_json};
 use crate::lammps::DataFile;
 use crate::report::Table;
@@ -16,10 +18,17 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     data: PathBuf,
     /// kT.
-    #[arg(long = "kT", value_name = "T", allow_negative_numbers = true)]
+    #[arg(long = "kT", value_name = "T", allow_negative_numbers = true, value_parser = temperature)]
     kt: f64,
     #[command(flatten)]
     settings: Settings,
+}
+
+impl Arguments {
+    /// What it reads and writes.
+    pub fn files(&self) -> Files {
+        Files::reads([&self.model, &self.data])
+    }
 }
 
 /// The contents of the file of `--json`.

@@ -1,3 +1,4 @@
+use super::inputs::Files;
 use super::{Failure, Verdict, write_json};
 use crate::lammps::convert::{self, Law};
 use crate::lammps::{Host, base_dir, install, plugin};
@@ -28,6 +29,16 @@ pub enum Verb {
         #[arg(long, value_name = "FILE")]
         out: Option<PathBuf>,
     },
+}
+
+impl Verb {
+    /// What it reads and writes.
+    pub fn files(&self) -> Files {
+        match self {
+            Verb::Convert { script, out, .. } => Files::reads([script]).writes(out.clone()),
+            Verb::Install | Verb::Plugin { .. } => Files::default(),
+        }
+    }
 }
 
 pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {

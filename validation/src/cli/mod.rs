@@ -12,6 +12,7 @@ mod examples;
 mod export;
 mod forces;
 mod hardcases;
+mod inputs;
 mod lammps;
 mod model;
 mod new;
@@ -26,8 +27,10 @@ mod sweep;
 mod theory;
 mod validate;
 
+use crate::checkpoint::Caller;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 pub use diagnostic::Failure;
+use inputs::Files;
 use serde::Serialize;
 use settings::Settings;
 use std::ffi::OsString;
@@ -149,7 +152,61 @@ fn program() -> std::io::Result<PathBuf> {
 
 fn carry_out(arguments: Arguments) -> u8 {
     let json = arguments.json.as_deref();
-    let outcome = match &arguments.verb {
+    let outcome = arguments
+        .verb
+        .files()
+        .check(json)
+        .map_err(Failure::from)
+        .and_then(|()| run_verb(&arguments.verb, json));
+    match outcome {
+        Ok(Verdict::Good) => 0,
+        Ok(Verdict::CheckFailed) => 1,
+        Ok(Verdict::Interrupted(signal)) => 128 + signal,
+        Err(failure) => {
+            anstream::eprintln!("{}", failure.render(arguments.verb.caller()));
+            failure.exit_code()
+        }
+    }
+}
+
+impl Verb {
+    /// What it reads and writes, where it reads files that a user names.
+    fn files(&self) -> Files {
+        match self {
+            Verb::Check(a) => a.files(),
+            Verb::Theory(a) => a.files(),
+            Verb::Calibrate(a) => a.files(),
+            Verb::Forces(a) => a.files(),
+            Verb::Export(a) => a.files(),
+            Verb::Run(a) => a.files(),
+            Verb::Sweep(a) => a.files(),
+            Verb::Pareto(a) => a.files(),
+            Verb::Snapshot(a) => a.files(),
+            Verb::Report(a) => a.files(),
+            Verb::Lammps(a) => a.files(),
+            // They read nothing that a user names.
+            Verb::Validate(_)
+            | Verb::Bench(_)
+            | Verb::Hardcases(_)
+            | Verb::Reproduce(_)
+            | Verb::Model(_)
+            | Verb::New(_)
+            | Verb::Completions(_)
+            | Verb::Man(_) => Files::default(),
+        }
+    }
+
+    /// Whether it has `--resume` and `--overwrite`.
+    fn caller(&self) -> Caller {
+        match self {
+            Verb::Run(_) | Verb::Sweep(_) => Caller::Options,
+            _ => Caller::Neither,
+        }
+    }
+}
+
+fn run_verb(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
+    match verb {
         Verb::Validate(a) => validate::run(a, json),
         Verb::Bench(a) => bench::run(a, json),
         Verb::Pareto(a) => pareto::run(a, json),
@@ -169,15 +226,6 @@ fn carry_out(arguments: Arguments) -> u8 {
         Verb::Lammps(a) => lammps::run(a, json),
         Verb::Completions(a) => shell::completions(a),
         Verb::Man(a) => shell::man(a, json),
-    };
-    match outcome {
-        Ok(Verdict::Good) => 0,
-        Ok(Verdict::CheckFailed) => 1,
-        Ok(Verdict::Interrupted(signal)) => 128 + signal,
-        Err(failure) => {
-            anstream::eprintln!("{}", failure.render());
-            failure.exit_code()
-        }
     }
 }
 

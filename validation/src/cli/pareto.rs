@@ -1,3 +1,4 @@
+use super::inputs::Files;
 use super::{Failure, Settings, Verdict, write_json};
 use crate::pareto::{self, Choice, Effort, Options, Pace, Tolerance, page};
 use crate::report::Progress;
@@ -46,6 +47,13 @@ fn minutes(text: &str) -> Result<f64, String> {
 fn threads(text: &str) -> Result<NonZeroUsize, String> {
     let count: NonZeroUsize = text.parse().map_err(|e| format!("{e}"))?;
     if count.get() <= Pool::MOST { Ok(count) } else { Err(format!("at most {}", Pool::MOST)) }
+}
+
+impl Arguments {
+    /// What it reads and writes.
+    pub fn files(&self) -> Files {
+        Files::reads([&self.scene]).writes(["pareto.json", "pareto.html"].map(|name| self.out.join(name)))
+    }
 }
 
 pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {

@@ -1,3 +1,4 @@
+use super::inputs::Files;
 use super::{Failure, Verdict, write_json};
 use crate::report::write_run_report;
 use serde_json::json;
@@ -9,6 +10,13 @@ pub struct Arguments {
     /// The folder of the run.
     #[arg(value_name = "DIR")]
     folder: PathBuf,
+}
+
+impl Arguments {
+    /// What it reads and writes.
+    pub fn files(&self) -> Files {
+        Files::reads(&["about.json", "thermo.csv", "observables.json"].map(|name| self.folder.join(name)))
+    }
 }
 
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {

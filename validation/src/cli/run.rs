@@ -1,6 +1,8 @@
+use super::inputs::Files;
 use super::{Failure, Settings, Verdict, write_json};
 use crate::check::calibration;
 use crate::report::{Headline, Progress, headline, write_run_report};
+use crate::run::FILES;
 use crate::run::{Begin, Outcome, Runner, Start, Summary, Timing};
 use psidpd_core::engine::{Pool, Precision};
 use serde::Serialize;
@@ -58,6 +60,13 @@ impl Arguments {
         words.extend(self.report.then(|| "--report".to_owned()));
         words.extend(json.map(|path| format!("--json {}", quoted(&path.display().to_string()))));
         words.join(" ")
+    }
+}
+
+impl Arguments {
+    /// What it reads and writes.
+    pub fn files(&self) -> Files {
+        Files::reads([&self.scene]).writes(FILES.map(|name| self.out.join(name)))
     }
 }
 

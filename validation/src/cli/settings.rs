@@ -1,8 +1,9 @@
 use super::Failure;
 use crate::scene::{Edit, Scene, edit_model};
-use psidpd_core::document::{Document, FileError};
+use psidpd_core::document::{Document, FileError, FileErrorKind, Source};
 use psidpd_core::model::Model;
 use std::path::Path;
+use std::sync::Arc;
 
 /// `--set`, which verbs share that take a scene or a model.
 #[derive(Debug, Clone, Default, clap::Args)]
@@ -29,6 +30,20 @@ impl Settings {
         let document = Document::open(path)?;
         let text = edit_model(document.source().text(), &of_model)?;
         let model = Model::parse(&path.display().to_string(), &text)?;
-        Ok((model, of_host.last().and_then(|e| e.number())))
+        let wrong = |e: &&Edit| {
+            let kind = FileErrorKind::Value(format!("{e} of --set: {POSITIVE}"));
+            FileError::new(&Arc::new(Source::new("--set", "")), 0..0, "kT", kind)
+        };
+        let positive =
+            |e: &&Edit| e.number().filter(|kt| *kt > 0.0 && kt.is_finite()).ok_or_else(|| wrong(e));
+        Ok((model, of_host.last().map(positive).transpose()?))
     }
+}
+
+const POSITIVE: &str = "a temperature is a positive number";
+
+/// A temperature on the command line.
+pub fn temperature(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|e| format!("{e}"))?;
+    if value > 0.0 && value.is_finite() { Ok(value) } else { Err(POSITIVE.into()) }
 }

@@ -1,3 +1,5 @@
+use super::inputs::Files;
+use super::settings::temperature;
 use super::{Failure, Verdict, write_json};
 use crate::files::write_atomically;
 use crate::output::picture::{FieldOptions, Image, ParticleOptions, View};
@@ -41,7 +43,7 @@ pub struct Arguments {
     #[arg(long, value_enum, default_value_t = Colour::Species, conflicts_with = "density")]
     colour: Colour,
     /// kT, for the colours of psi.
-    #[arg(long = "kT", value_name = "T")]
+    #[arg(long = "kT", value_name = "T", allow_negative_numbers = true, value_parser = temperature)]
     kt: Option<f64>,
     /// Most frames of a film, evenly chosen.
     #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u16).range(2..=1000))]
@@ -91,16 +93,28 @@ impl From<Eye> for View {
     }
 }
 
+impl Arguments {
+    /// What it reads and writes.
+    pub fn files(&self) -> Files {
+        Files::reads([&self.file].into_iter().chain(&self.model)).writes([self.picture()])
+    }
+
+    /// Where the picture goes.
+    fn picture(&self) -> PathBuf {
+        self.out.clone().unwrap_or_else(|| self.file.with_extension("svg"))
+    }
+}
+
 /// Centiseconds that a film shows each frame.
 const DELAY: u16 = 12;
 
 pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
-    let out = a.out.clone().unwrap_or_else(|| a.file.with_extension("svg"));
+    let out = a.picture();
     let kind = out.extension().and_then(|e| e.to_str()).unwrap_or("");
     if !["svg", "png", "gif"].contains(&kind) {
         return Err(request(format!("{}: pictures end in .svg or .png, films in .gif", out.display())));
     }
-    for (name, value) in [("slice", a.slice), ("radius", a.radius), ("range", a.range), ("kT", a.kt)] {
+    for (name, value) in [("slice", a.slice), ("radius", a.radius), ("range", a.range)] {
         if let Some(value) = value.filter(|v| !(v.is_finite() && *v > 0.0)) {
             return Err(request(format!("--{name} must be a positive number, is {value}")));
         }

@@ -1,3 +1,4 @@
+use super::inputs::Files;
 use super::run::{quoted, thread_count, watch_signals};
 use super::{Failure, Settings, Verdict, write_json};
 use crate::sweep::{self, Axis, Options};
@@ -30,6 +31,13 @@ pub struct Arguments {
     overwrite: bool,
     #[command(flatten)]
     settings: Settings,
+}
+
+impl Arguments {
+    /// What it reads and writes.
+    pub fn files(&self) -> Files {
+        Files::reads([&self.scene]).writes(["sweep.csv", "report.html"].map(|name| self.out.join(name)))
+    }
 }
 
 pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {

@@ -1,4 +1,6 @@
 use super::check::{number_density, per_species};
+use super::inputs::Files;
+use super::settings::temperature;
 use super::{Failure, Settings, Verdict, write_json};
 use crate::measure::{self, Effort};
 use crate::prediction::{Prediction, predict, published};
@@ -24,7 +26,8 @@ pub struct Arguments {
         value_name = "T,…",
         value_delimiter = ',',
         default_value = "1",
-        allow_negative_numbers = true
+        allow_negative_numbers = true,
+        value_parser = temperature
     )]
     kt: Vec<f64>,
     /// Number density, total or one for each species: where a mixture is looked at, and the middle of the
@@ -52,6 +55,47 @@ pub struct Arguments {
     report: Option<PathBuf>,
     #[command(flatten)]
     settings: Settings,
+}
+
+impl Arguments {
+    /// What it reads and writes.
+    pub fn files(&self) -> Files {
+        Files::reads([&self.model]).writes(self.report.clone())
+    }
+}
+
+/// What the answers for a mixture rest on.
+const ASSUMPTIONS: [(&str, &str); 4] = [
+    (
+        "critical point and spinodal",
+        "from the lowest eigenvalue of d2f/drho_a drho_b, in which composition and density change together; at the critical \
+         point f has no third derivative along its eigenvector",
+    ),
+    (
+        "coexistence",
+        "equal chemical potentials of every species and equal pressure; the phases share the particles of these densities",
+    ),
+    (
+        "binodal at this pressure",
+        "equal chemical potentials of every species and this pressure, that of the homogeneous mixture",
+    ),
+    (
+        "binodal and interface at this density",
+        "the total density is held, as in Pagonabarraga and Frenkel; given where the pressures of the phases are equal too, \
+         and of the interface only the composition changes across it",
+    ),
+];
+
+/// A sentence about rows with empty cells.
+fn without_numbers(densities: &[f64]) -> Option<String> {
+    let (first, last) = (densities.first()?, densities.last()?);
+    let place = if first == last { format!("{first:.6}") } else { format!("{first:.6} to {last:.6}") };
+    Some(match *last == 0.0 {
+        true => "an empty cell has no value: at density 0 there are no particles to share an energy".into(),
+        false => {
+            format!("an empty cell has no value: psi or its slope is no finite number at densities {place}")
+        }
+    })
 }
 
 /// An answer, or why there is none: no coexistence is an answer too.
@@ -115,20 +159,27 @@ fn one(arguments: &Arguments, model: &Model, kt: f64, scope: &mut Scope) -> Resu
 
     println!("{} at kT = {kt}", model.title());
     let mut table = Table::new(["density", "pressure", "dp/drho", "excess free energy per particle"]);
-    let mut rows = Vec::new();
+    let (mut rows, mut empty) = (Vec::new(), Vec::new());
     for k in 1..=arguments.rows.min(10_000) {
         let scale = 2.0 * k as f64 / arguments.rows as f64;
         let rho: Vec<f64> = densities.iter().map(|d| d * scale).collect();
         let (p, slope) = (theory.pressure(&rho), theory.pressure_slope(&rho));
         let f = theory.excess_free_energy_density(&rho) / (scale * total);
-        table.push([scale * total, p, slope, f].map(|x| format!("{x:.6}")));
+        let cell = |x: f64| if x.is_finite() { format!("{x:.6}") } else { String::new() };
+        if ![p, slope, f].iter().all(|x| x.is_finite()) {
+            empty.push(scale * total);
+        }
+        table.push([scale * total, p, slope, f].map(cell));
         rows.push(json!({"density": scale * total, "pressure": p, "pressure_slope": slope, "excess": f}));
     }
     println!("{}", table.to_text());
+    if let Some(line) = without_numbers(&empty) {
+        println!("{line}\n");
+    }
     let middle = theory.pressure(&densities);
     let defined = middle.is_finite();
     if !defined {
-        println!("at density {total} the pressure is {middle}: psi or its slope is no finite number there\n");
+        println!("at density {total} there is no pressure: psi or its slope is no finite number there\n");
     }
 
     let answers: Vec<(&str, Value)> = match species {
@@ -156,12 +207,20 @@ fn one(arguments: &Arguments, model: &Model, kt: f64, scope: &mut Scope) -> Resu
         2 => vec![
             (
                 "critical point at this density",
-                or_reason(
-                    composition_critical_point(&|kt| Ok(model.at(kt)?), total, range),
-                    |c| json!({"kT": c.parameter, "composition": c.composition, "pressure": c.pressure}),
-                ),
+                or_reason(composition_critical_point(&|kt| Ok(model.at(kt)?), total, range), |c| {
+                    json!({"kT": c.parameter, "composition": c.composition, "pressure": c.pressure,
+                               "stability_limit": c.limit})
+                }),
             ),
             ("spinodal at this density", or_reason(theory.composition_spinodal(total), |s| json!(s))),
+            (
+                "coexistence",
+                or_reason(theory.coexistence([densities[0], densities[1]]), |c| {
+                    json!({"composition": c.composition(), "density": c.density(), "pressure": c.pressure,
+                           "chemical_potentials": c.chemical_potentials, "share": c.share,
+                           "metastable": c.more_stable.is_some()})
+                }),
+            ),
             (
                 "binodal at this density",
                 or_reason(
@@ -191,6 +250,9 @@ fn one(arguments: &Arguments, model: &Model, kt: f64, scope: &mut Scope) -> Resu
     }
     if species == 2 {
         println!("composition and spinodal: the fraction of {}", model.species()[0]);
+        for (of, rests_on) in ASSUMPTIONS {
+            println!("{of}: {rests_on}");
+        }
     }
     let known = published(model, kt, Some(total));
     scope.tension.extend(known.iter().filter(|p| p.0 == "tension").map(|p| (kt, p.1, "published")));
@@ -227,6 +289,10 @@ fn one(arguments: &Arguments, model: &Model, kt: f64, scope: &mut Scope) -> Resu
     all["published"] = known.iter().map(|(name, value)| (name.to_string(), json!(value))).collect();
     if !measured.is_empty() {
         all["measured"] = json!(measured);
+    }
+    if species == 2 {
+        all["assumptions"] =
+            ASSUMPTIONS.iter().map(|(of, rests_on)| (of.replace(' ', "_"), json!(rests_on))).collect();
     }
     for (name, value) in answers {
         all[name.replace(' ', "_")] = value;
@@ -319,6 +385,8 @@ fn shown(value: &Value) -> String {
         },
         Value::Array(items) if items.is_empty() => "none".into(),
         Value::Array(items) => items.iter().map(shown).collect::<Vec<_>>().join(" .. "),
+        Value::Null => "without end".into(),
+        Value::Bool(yes) => if *yes { "yes" } else { "no" }.into(),
         Value::Number(n) => n.as_f64().map_or_else(|| n.to_string(), |x| format!("{x:.6}")),
         other => other.to_string(),
     }

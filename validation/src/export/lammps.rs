@@ -26,6 +26,9 @@ pub const MODEL: &str = "model.toml";
 /// The model of stages without thermostat.
 pub const MODEL_WITHOUT_THERMOSTAT: &str = "model-without-thermostat.toml";
 
+/// All of these.
+pub const FILES: [&str; 4] = [SCRIPT, START, MODEL, MODEL_WITHOUT_THERMOSTAT];
+
 /// Most steps of one `run` command.
 const MOST_STEPS: u64 = i32::MAX as u64;
 
@@ -84,7 +87,10 @@ pub fn write(scene: &Scene, out: &Path) -> Result<Vec<PathBuf>, DeckError> {
         if let Some(parent) = path.parent() {
             std::fs::create_dir_all(parent).map_err(output(parent))?;
         }
-        std::fs::copy(&from, &path).map_err(output(&path))?;
+        // A copy of a file onto itself would empty it.
+        if !path.canonicalize().is_ok_and(|there| from.canonicalize().is_ok_and(|here| here == there)) {
+            std::fs::copy(&from, &path).map_err(output(&path))?;
+        }
         files.push(to);
     }
     save(&out.join(MODEL), &text)?;

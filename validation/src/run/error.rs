@@ -1,4 +1,4 @@
-use crate::checkpoint::CheckpointError;
+use crate::checkpoint::{Caller, CheckpointError};
 use crate::files::WriteError;
 use crate::particles::StateError;
 use psidpd_core::document::FileError;
@@ -119,28 +119,26 @@ impl RunError {
         matches!(self, RunError::Output { .. } | RunError::Picture(_) | RunError::Lammps(_))
     }
 
-    /// What can be done about it, where that is not in the message.
-    pub fn help(&self) -> Option<String> {
-        match self {
-            RunError::Stopped { checkpoint: true, .. } => Some(
+    /// What the caller can do about it, where that is not in the message.
+    pub fn help(&self, caller: Caller) -> Option<String> {
+        let (over, go_on) = (caller.start_over(), caller.go_on());
+        Some(match self {
+            RunError::Stopped { checkpoint: true, .. } => format!(
                 "to try again from there, give another scene `[initial]` with `kind = \"checkpoint\"`, and a \
-                 smaller dt or softer forces; to start over, --overwrite"
-                    .into(),
+                 smaller dt or softer forces; or {over}"
             ),
-            RunError::Halted { checkpoint: Some(step), .. } => Some(format!(
-                "the checkpoint of step {step} is good: when the cause is gone, go on with --resume"
-            )),
+            RunError::Halted { checkpoint: Some(step), .. } => {
+                format!("the checkpoint of step {step} is good: when the cause is gone, {go_on}")
+            }
             RunError::Halted { checkpoint: None, .. } => {
-                Some("there is no checkpoint yet: when the cause is gone, start over".into())
+                "there is no checkpoint yet: when the cause is gone, start over".into()
             }
-            RunError::Unfinished { .. } => Some("go on with --resume, or start over with --overwrite".into()),
-            RunError::Finished { .. } => {
-                Some("choose another folder, or replace what is there with --overwrite".into())
-            }
-            RunError::Busy { .. } => Some("wait for its end, or choose another folder".into()),
-            RunError::Checkpoint(error) => Some(error.help().into()),
-            _ => None,
-        }
+            RunError::Unfinished { .. } => format!("{go_on}, or {over}"),
+            RunError::Finished { .. } => format!("choose another folder, or {over}"),
+            RunError::Busy { .. } => "wait for its end, or choose another folder".into(),
+            RunError::Checkpoint(error) => error.help(caller),
+            _ => return None,
+        })
     }
 
     pub(super) fn output(path: &Path) -> impl FnOnce(std::io::Error) -> RunError + '_ {
@@ -152,4 +150,30 @@ fn reached(step: &Option<u64>) -> String {
     step.map_or(" (its checkpoint cannot be read)".into(), |step| {
         format!(" (its checkpoint is of step {step})")
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Advice has the options of the caller and no others.
+    #[test]
+    fn advice_is_that_for_the_caller() {
+        let folder = PathBuf::from("f");
+        let errors = [
+            RunError::Finished { folder: folder.clone(), other: true },
+            RunError::Unfinished { folder, step: Some(3) },
+            RunError::Checkpoint(CheckpointError::absent(Path::new("f"))),
+        ];
+        for (caller, has, lacks) in [
+            (Caller::Options, "--overwrite", "overwrite=True"),
+            (Caller::Python, "overwrite=True", "--overwrite"),
+            (Caller::Neither, "remove the folder", "overwrite"),
+        ] {
+            for error in &errors {
+                let help = error.help(caller).unwrap();
+                assert!(help.contains(has) && !help.contains(lacks), "{caller:?}: {help}");
+            }
+        }
+    }
 }

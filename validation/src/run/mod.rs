@@ -30,6 +30,7 @@ pub use crate::integrator::Integrator;
 pub use crate::particles::{BodyForce, Drive, State, StateError, Tags, write_data};
 pub use dump::write_frame;
 pub use error::RunError;
+pub use output::FILES;
 pub(crate) use reorder::INTERVAL as REORDERING;
 pub use runner::{Begin, Outcome, Progress, Runner, Start, run_scene};
 pub use simulation::Simulation;

@@ -20,6 +20,9 @@ const DUMP: &str = "dump.lammpstrj";
 /// The name of the extended XYZ file.
 const XYZ: &str = "trajectory.xyz";
 
+/// Files of a run that a scene, or a user, may take for its input.
+pub const FILES: [&str; 5] = [ThermoFile::NAME, DUMP, XYZ, "final.data", "last-good.data"];
+
 /// Files that are written when a run ends, finished or not.
 const LAST: [&str; 5] = ["final.data", "last-good.data", OBSERVABLES, "summary.json", "report.html"];
 

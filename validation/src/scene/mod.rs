@@ -44,7 +44,7 @@ pub use velocities::Velocities;
 use crate::observe::{self, Observe, StageNames};
 use crate::particles::{BodyForce, State, Tags};
 use number::positive;
-use psidpd_core::document::keys::strangers_first;
+use psidpd_core::document::keys::{of_another_kind, strangers_first};
 use psidpd_core::document::{Document, FileError, FileErrorKind, Section, Source, Value};
 use psidpd_core::engine::{LocalEnergy, PeriodicBox, Plan, Precision};
 use psidpd_core::model::Model;
@@ -129,6 +129,7 @@ impl Scene {
     fn read(document: &Document, base: &Path, of_model: &[Edit]) -> Result<Scene, FileError> {
         Scene::of(document, base, of_model)
             .map_err(|error| strangers_first(error, &document.root(), keys::TABLES, &["observe"]))
+            .map_err(|error| no_scene(&document.root()).unwrap_or(error))
     }
 
     fn of(document: &Document, base: &Path, of_model: &[Edit]) -> Result<Scene, FileError> {
@@ -179,6 +180,28 @@ impl Scene {
     /// Precision of the pair forces of a run; mixed by default.
     pub fn precision(&self) -> Precision {
         self.precision.unwrap_or_default()
+    }
+
+    /// Number densities of the species in every part that moves, and of all these parts mixed, if there are several of more
+    /// than one species; else none.
+    pub fn mixtures(&self) -> Vec<Vec<f64>> {
+        let dimensions = self.model.dimensions();
+        let parts: Vec<_> = self.initial.parts().iter().filter(|p| !p.frozen && p.count > 0).collect();
+        let species = self.model.species().len();
+        if species < 2 || parts.len() < 2 {
+            return Vec::new();
+        }
+        let (mut counts, mut volume) = (vec![0.0; species], 0.0);
+        let mut all: Vec<Vec<f64>> = Vec::new();
+        for part in parts {
+            let here = part.shape.volume(dimensions);
+            let share = part.composition.share(part.count);
+            counts.iter_mut().zip(&share).for_each(|(sum, n)| *sum += *n as f64);
+            volume += here;
+            all.push(share.into_iter().map(|n| n as f64 / here).collect());
+        }
+        all.push(counts.into_iter().map(|n| n / volume).collect());
+        all
     }
 
     /// Number densities of the species where the fluid is: in the largest part that moves, or in the whole box
@@ -284,6 +307,15 @@ fn read_model(value: &Value, base: &Path, edits: &[Edit]) -> Result<(PathBuf, Mo
             _ => Err(error),
         },
     }
+}
+
+/// What is said of a model where a scene is expected: it names no model, and has what makes one.
+fn no_scene(root: &Section) -> Option<FileError> {
+    let of_model = ["species", "excess_free_energy", "density", "pair"];
+    let key = of_model.into_iter().find(|key| root.get(key).is_some())?;
+    let help = "a model goes to `psidpd check` or `theory`; a scene names it, model = \"FILE\", and `psidpd new` writes one";
+    let what = "this is a model, and a scene is expected";
+    root.get("model").is_none().then(|| of_another_kind(root, key, what).with_help(help))
 }
 
 #[cfg(test)]

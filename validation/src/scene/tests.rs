@@ -96,7 +96,7 @@ fn errors_name_line_key_and_cause() {
         ("A = 0.25, B", "A = 0.25, C", 10, "unknown species \"C\""),
         ("A = 0.25, B", "A = 0.5, B", 10, "add up to 1.25"),
         ("steps = 10", "steps = 0", 13, "stage[1].steps: must be at least 1"),
-        ("steps = 10", "steps = 1e3", 13, "expected a whole number"),
+        ("steps = 10", "steps = 1e3", 13, "expected an integer: 1000, not 1e3"),
         ("steps = 20", "steps = 9_100_000_000_000_000", 17, "steps in all"),
         ("dt = 0.02", "dt = 0", 18, "stage[2].dt: must be positive"),
         ("dt = 0.02", "dt = 0.02\nlamda = 1", 19, "stage[2].lamda: unknown key"),

@@ -6,6 +6,7 @@ mod page;
 pub use axis::Axis;
 pub use page::{page, table};
 
+use crate::checkpoint::Caller;
 use crate::files::write_atomically;
 use crate::report::{Headline, headline};
 use crate::run::{Begin, Outcome, RunError, Runner};
@@ -147,7 +148,7 @@ fn run_point(options: &Options, edits: &[Edit], stop: &AtomicUsize) -> Point {
     match attempt(options, &all, &folder, stop) {
         Ok(finished) => point.finished = finished,
         Err(error) => {
-            let help = error.help().map_or(String::new(), |help| format!(" ({help})"));
+            let help = error.help(Caller::Options).map_or(String::new(), |help| format!(" ({help})"));
             point.error = Some(format!("{error}{help}"));
         }
     }

@@ -219,6 +219,12 @@ pub fn strangers_first(error: FileError, root: &Section, tables: &[Table], more:
     }
 }
 
+/// An error at `key` of a file that is of another kind than the one asked for.
+pub fn of_another_kind(root: &Section, key: &str, what: &str) -> FileError {
+    let span = root.get(key).map_or(0..0, |value| value.span());
+    FileError::new(root.source(), span, key, FileErrorKind::Value(what.to_owned()))
+}
+
 fn refuse_strangers(root: &Section, tables: &[Table], more: &[&str]) -> Result<(), FileError> {
     for table in tables {
         let first = |path: &'static str| path.split('.').next().unwrap_or_default();

@@ -76,7 +76,7 @@ impl Node {
     /// What the value is called in messages.
     pub fn type_name(&self) -> &'static str {
         match self.content {
-            Content::Integer(..) => "a whole number",
+            Content::Integer(..) => "an integer",
             Content::Float(_) => "a number",
             Content::Text(_) => "a string",
             Content::Boolean(_) => "true or false",

@@ -183,7 +183,8 @@ impl<'a> Value<'a> {
                 Ok(value) => Ok(self.located(value)),
                 Err(_) => Err(self.error(FileErrorKind::Value("must be a whole number from 0".into()))),
             },
-            _ => Err(self.wrong("a whole number")),
+            Content::Float(x) => Err(self.error(FileErrorKind::Value(not_an_integer(x)))),
+            _ => Err(self.wrong("an integer")),
         }
     }
 
@@ -272,5 +273,15 @@ impl<'a> Value<'a> {
         <[f64; N]>::try_from(numbers).map_err(|_| {
             self.error(FileErrorKind::Value(format!("expected {expected}, found {} values", items.len())))
         })
+    }
+}
+
+/// What is said of a number with a point or an exponent where a count is expected; how to write it, if it is one.
+fn not_an_integer(written: &str) -> String {
+    const LARGEST: f64 = (1u64 << 53) as f64;
+    let value = written.replace('_', "").parse::<f64>().ok();
+    match value.filter(|x| x.fract() == 0.0 && (0.0..=LARGEST).contains(x)) {
+        Some(x) => format!("expected an integer: {x:.0}, not {written}"),
+        None => format!("expected an integer, not {written}"),
     }
 }

@@ -11,7 +11,7 @@ mod table;
 mod units;
 
 use super::fluid::Fluid;
-use crate::document::keys::strangers_first;
+use crate::document::keys::{of_another_kind, strangers_first};
 use crate::document::{Document, FileError, FileErrorKind, Located, Section, Source};
 use density::DensityEntry;
 use excess::ExcessEntry;
@@ -65,6 +65,7 @@ impl Model {
     fn read(document: &Document) -> Result<Model, FileError> {
         Model::of(document)
             .map_err(|error| strangers_first(error, &document.root(), crate::keys::TABLES, &[]))
+            .map_err(|error| no_model(&document.root()).unwrap_or(error))
     }
 
     fn of(document: &Document) -> Result<Model, FileError> {
@@ -180,3 +181,16 @@ fn species_index(
 
 #[cfg(test)]
 mod tests;
+
+/// What is said of a scene where a model is expected: it has keys of a scene, and none of what makes a model.
+fn no_model(root: &Section) -> Option<FileError> {
+    let of_model = ["species", "excess_free_energy", "density", "pair"];
+    let of_scene = ["model", "box", "stage", "steps", "initial", "part"];
+    let key = of_scene.into_iter().find(|key| root.get(key).is_some())?;
+    if of_model.into_iter().any(|key| root.get(key).is_some()) {
+        return None;
+    }
+    let help =
+        "a scene goes to `psidpd run`, `check` or `sweep`; its model is the file that its key `model` names";
+    Some(of_another_kind(root, key, "this is a scene, and a model is expected").with_help(help))
+}

@@ -240,8 +240,9 @@ impl<'a> Curves<'a> {
             let hidden = self.clip(plot);
             if hidden > 0 {
                 let space = if caption.is_empty() { "" } else { " " };
+                let points = if hidden == 1 { "point is" } else { "points are" };
                 *caption +=
-                    &format!("{space}{hidden} points far outside the range of the last stage are not shown.");
+                    &format!("{space}{hidden} {points} not shown: far outside the range of the last stage.");
             }
         }
         plots

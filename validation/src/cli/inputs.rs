@@ -1,0 +1,79 @@
+//! No verb writes over a file that it reads.
+
+use psidpd_core::document::{Document, Section, Value};
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+
+/// The files that a verb reads and writes, as its arguments name them.
+#[derive(Debug, Default)]
+pub struct Files {
+    reads: Vec<PathBuf>,
+    writes: Vec<PathBuf>,
+}
+
+/// A file that is read is to be written.
+#[derive(Debug, thiserror::Error)]
+#[error("{} is what this verb reads, and would be written over: choose another place for the results", .0.display())]
+pub struct WrittenOver(PathBuf);
+
+/// Models within scenes, and tables within models.
+const DEEPEST: usize = 2;
+
+impl Files {
+    /// Those that are read; of a scene and of a model also those that they name.
+    pub fn reads<'a>(paths: impl IntoIterator<Item = &'a PathBuf>) -> Files {
+        let mut reads = Vec::new();
+        paths.into_iter().for_each(|path| named(path, DEEPEST, &mut reads));
+        Files { reads, writes: Vec::new() }
+    }
+
+    /// With files that are written.
+    #[must_use]
+    pub fn writes(mut self, paths: impl IntoIterator<Item = PathBuf>) -> Files {
+        self.writes.extend(paths);
+        self
+    }
+
+    /// # Errors
+    /// A file is both.
+    pub fn check(self, json: Option<&Path>) -> Result<(), WrittenOver> {
+        let id =
+            |path: &Path| std::fs::metadata(path).ok().filter(|m| m.is_file()).map(|m| (m.dev(), m.ino()));
+        let read: Vec<_> = self.reads.iter().filter_map(|path| id(path)).collect();
+        let mut writes = self.writes.iter().map(PathBuf::as_path).chain(json);
+        let both = writes.find(|path| id(path).is_some_and(|id| read.contains(&id)));
+        both.map_or(Ok(()), |path| Err(WrittenOver(path.to_owned())))
+    }
+}
+
+/// Adds a file and, if it is TOML, the files that strings in it name.
+fn named(path: &Path, deeper: usize, all: &mut Vec<PathBuf>) {
+    all.push(path.to_owned());
+    if deeper == 0 || path.extension().is_none_or(|e| e != "toml") {
+        return;
+    }
+    let Ok(document) = Document::open(path) else { return };
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut names = Vec::new();
+    strings(&document.root(), &mut names);
+    for name in names {
+        let path = folder.join(name);
+        if path.is_file() && !all.contains(&path) {
+            named(&path, deeper - 1, all);
+        }
+    }
+}
+
+fn strings(section: &Section, all: &mut Vec<String>) {
+    section.entries().iter().for_each(|(_, value)| strings_of(value, all));
+}
+
+fn strings_of(value: &Value, all: &mut Vec<String>) {
+    if let Some(text) = value.as_str() {
+        all.push(text.to_owned());
+    }
+    value.as_array().unwrap_or_default().iter().for_each(|item| strings_of(item, all));
+    if let Some(section) = value.as_section() {
+        strings(&section, all);
+    }
+}
