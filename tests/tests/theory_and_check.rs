@@ -187,3 +187,113 @@ fn check_tells_cost_and_phases() {
     );
     assert!(found["theory"][0].as_str().unwrap().contains("with correlations"), "{found}");
 }
+
+/// A mixture whose species differ: with the total density held its phases have different pressures, so these are no phases.
+#[test]
+fn theory_refuses_phases_that_are_not_in_equilibrium() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "title = \"m\"\nspecies = [\"A\", \"B\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n\
+                [excess_free_energy]\nA = \"n_B + 0.2*n_A\"\nB = \"n_A + 0.4*n_B\"\n";
+    std::fs::write(folder.path().join("m.toml"), text).unwrap();
+    let found =
+        json(folder.path(), &["theory", "m.toml", "--kT", "2", "--density", "10", "--report", "t.html"], 0);
+    for key in ["binodal_at_this_density", "interface_at_this_density"] {
+        let why = found[key]["none"].as_str().unwrap_or_else(|| panic!("{found}"));
+        assert!(why.contains("not in equilibrium"), "{why}");
+    }
+    // ρ = (c ρ, (1 − c) ρ): μ_A − kT ln ρ_A = 2(ρ_B + λ_A ρ_A), and p = ρkT + 2ρ_A ρ_B + λ_A ρ_A² + λ_B ρ_B².
+    let phases = &found["coexistence"];
+    let [first, second] = [0, 1].map(|k| {
+        let c = phases["composition"][k].as_f64().unwrap();
+        let rho = phases["density"][k].as_f64().unwrap();
+        let (a, b) = (c * rho, (1.0 - c) * rho);
+        [
+            2.0 * a.ln() + 2.0 * (b + 0.2 * a),
+            2.0 * b.ln() + 2.0 * (a + 0.4 * b),
+            2.0 * rho + 2.0 * a * b + 0.2 * a * a + 0.4 * b * b,
+        ]
+    });
+    for (p, q) in first.iter().zip(second) {
+        assert!((p - q).abs() < 1e-8 * p.abs(), "{first:?} {second:?}");
+    }
+    assert!((phases["density"][0].as_f64().unwrap() - phases["density"][1].as_f64().unwrap()).abs() > 0.1);
+    assert!(found["assumptions"]["coexistence"].as_str().unwrap().contains("equal pressure"), "{found}");
+    // Where the paper's assumption holds, its numbers stay: kT_c = ρ(λ − λ_A).
+    let paper = json(folder.path(), &["theory", &model("binary-2d.toml"), "--kT", "4", "--density", "10"], 0);
+    let critical = &paper["critical_point_at_this_density"];
+    assert!((critical["kT"].as_f64().unwrap() - 8.0).abs() < 1e-9, "{critical}");
+    assert!(
+        (paper["interface_at_this_density"]["tension"].as_f64().unwrap() - 14.130244).abs() < 1e-5,
+        "{paper}"
+    );
+    let held = &paper["binodal_at_this_density"]["composition"][0];
+    let free = &paper["coexistence"]["composition"][0];
+    assert!((held.as_f64().unwrap() - free.as_f64().unwrap()).abs() < 1e-9, "{paper}");
+}
+
+/// No NaN and no infinity in the table: an empty cell, and a sentence.
+#[test]
+fn theory_leaves_cells_empty_where_there_is_no_number() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "title = \"t\"\nspecies = [\"F\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n\
+                [excess_free_energy]\nF = \"-kT*ln(1 - 0.1*n)\"\n";
+    std::fs::write(folder.path().join("pole.toml"), text).unwrap();
+    for (density, sentence) in
+        [("0", "at density 0 there are no particles"), ("8", "densities 10.666667 to 16.000000")]
+    {
+        let output = psidpd(folder.path(), &["theory", "pole.toml", "--density", density]);
+        let words = said(&output);
+        assert_eq!(output.status.code(), Some(0), "{words}");
+        assert!(!words.contains("NaN") && !words.contains("inf "), "{words}");
+        assert!(words.contains(sentence), "{words}");
+    }
+}
+
+/// What check says of a state that bounds make up, of a mixture in several parts, of ramps and of long steps.
+#[test]
+fn check_judges_every_part_and_says_what_is_wrong() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let beyond = json(here, &["check", &model("van-der-waals-3d.toml"), "--kT", "2", "--density", "500"], 1);
+    assert_eq!(beyond["warnings"][0]["id"], "singular", "{beyond}");
+    // Each part is a stable fluid of one species, their mixture is not.
+    let scene = |model: &str, stage: &str| {
+        let part = |low: f64, species: &str| {
+            format!(
+                "[[part]]\nshape = \"box\"\nlow = [{low:.1}, 0.0]\nhigh = [{:.1}, 6.0]\ndensity = 10.0\nspecies = \"{species}\"\n",
+                low + 6.0
+            )
+        };
+        format!(
+            "title = \"two\"\nmodel = \"{model}\"\nkT = 4.0\nbox = [12.0, 6.0]\n{stage}\n{}{}",
+            part(0.0, "A"),
+            part(6.0, "B")
+        )
+    };
+    std::fs::write(here.join("two.toml"), scene(&model("binary-2d.toml"), "dt = 0.01\nsteps = 10\n"))
+        .unwrap();
+    let found = json(here, &["check", "two.toml"], 0);
+    let spinodal = found["warnings"].as_array().unwrap().iter().find(|w| w["id"] == "spinodal");
+    let message = spinodal.unwrap_or_else(|| panic!("{found}"))["message"].to_string();
+    assert!(message.contains("A 5.0000, B 5.0000"), "{message}");
+    // A ramp: its first and last temperature. A step far too long: a warning, to two digits.
+    let set6 = model("warren2003-set6.toml");
+    let text = |dt: f64| {
+        format!(
+            "title = \"ramp\"\nmodel = \"{set6}\"\nkT = 1.0\n[box]\nlengths = [4.0, 4.0, 4.0]\n[initial]\n\
+             kind = \"lattice\"\ndensity = 6.05\n[[stage]]\nname = \"heat\"\nsteps = 40\ndt = {dt:?}\nkT = [1.0, 1.2]\n\
+             levels = 4\n"
+        )
+    };
+    std::fs::write(here.join("ramp.toml"), text(0.01)).unwrap();
+    let words = said(&psidpd(here, &["check", "ramp.toml"]));
+    assert_eq!(words.lines().filter(|line| line.starts_with("time step")).count(), 2, "{words}");
+    assert!(!words.contains("[time-step]"), "{words}");
+    std::fs::write(here.join("long.toml"), text(0.1)).unwrap();
+    let words = said(&psidpd(here, &["check", "long.toml"]));
+    let warning =
+        words.lines().find(|line| line.contains("[time-step]")).unwrap_or_else(|| panic!("{words}"));
+    let number = warning.split(" %").next().unwrap().rsplit(' ').next().unwrap();
+    let digits = number.trim_start_matches(['0', '.']).trim_end_matches('0').replace('.', "");
+    assert!(warning.starts_with("WARNING") && digits.len() <= 2, "{warning}");
+}

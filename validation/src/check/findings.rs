@@ -75,6 +75,19 @@ pub struct Warning {
 }
 
 impl Findings {
+    /// Adds warnings at other densities of the species, unless they are known.
+    pub fn add_at(&mut self, names: &[String], densities: &[f64], other: Vec<Warning>) {
+        let place: Vec<String> =
+            names.iter().zip(densities).map(|(name, rho)| format!("{name} {rho:.4}")).collect();
+        for warning in other.into_iter().filter(|w| w.severity >= Severity::Warning) {
+            if !self.warnings.iter().any(|w| w.id == warning.id && w.message.ends_with(&warning.message)) {
+                let message = format!("at densities {}: {}", place.join(", "), warning.message);
+                self.warnings.push(Warning { message, ..warning });
+            }
+        }
+        self.warnings.sort_by_key(|w| std::cmp::Reverse(w.severity));
+    }
+
     /// Whether the model can work at all.
     pub fn works(&self) -> bool {
         self.warnings.iter().all(|w| w.severity < Severity::Error)

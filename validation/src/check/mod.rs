@@ -9,7 +9,7 @@ mod warnings;
 
 pub use cost::{Cost, cost};
 pub use findings::{Findings, Severity, Warning};
-pub use timestep::estimates;
+pub use timestep::{StepEstimate, estimates};
 
 use crate::prediction;
 use psidpd_core::engine::Plan;

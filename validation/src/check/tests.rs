@@ -69,7 +69,11 @@ fn bounds_are_those_of_the_variable_and_must_exclude_the_pole() {
     assert_eq!(singular(&bounded(pole, "bounds = [0.05, 9.5]", ""), 5.0), [Note]);
     // Mean field knows how psi goes on.
     let beyond = found(&bounded(pole, "bounds = [0.05, 9.5]", ""), 1.0, Some(vec![12.0]));
-    assert!(beyond.works() && beyond.pressure.unwrap().is_finite(), "{beyond:?}");
+    assert!(beyond.pressure.unwrap().is_finite(), "{beyond:?}");
+    // But this is no fluid of that psi.
+    assert!(!beyond.works(), "{beyond:?}");
+    let beyond = beyond.warnings.iter().find(|w| w.id == "singular").unwrap();
+    assert!(beyond.severity == Error && beyond.message.contains("nothing but that"), "{beyond:?}");
     for (bounds, expected) in [("[0, 50]", Warning), ("[0.05, 50]", Note)] {
         assert_eq!(singular(&bounded("20*kT*ln(n)", &format!("bounds = {bounds}"), ""), 5.0), [expected]);
     }
@@ -119,4 +123,21 @@ fn a_plain_fluid_has_nothing_to_warn_of() {
     // α_MF = π/30: p = 3 + π/30 · 25 · 9
     let expected = 3.0 + std::f64::consts::PI / 30.0 * 225.0;
     assert!((findings.pressure.unwrap() - expected).abs() < 1e-9, "{findings:?}");
+}
+
+/// Advice for a fluid that clusters names a kernel only where the kernel is the cause.
+#[test]
+fn a_quadratic_kernel_is_not_advised_where_it_is_quadratic() {
+    let cluster = |kernel: &str| {
+        let text = format!(
+            "title = \"t\"\nspecies = [\"F\"]\n[density.n]\nkernel = \"{kernel}\"\nrange = 1\n\
+             [excess_free_energy]\nF = \"50*n\"\n[[pair]]\nbetween = [\"F\", \"F\"]\nform = \"expression\"\n\
+             phi = \"200*(1 - r)^2*(r - 0.3)\"\nrange = 1\n"
+        );
+        let findings = found(&text, 1.0, Some(vec![20.0]));
+        let warning = findings.warnings.iter().find(|w| w.id == "clustering");
+        warning.unwrap_or_else(|| panic!("{findings:?}")).message.clone()
+    };
+    assert!(cluster("bell").contains("positive definite kernel"));
+    assert!(!cluster("quadratic").contains("kernel"));
 }

@@ -41,7 +41,7 @@ pub fn all(fluid: &Fluid, state: &State) -> Result<Vec<Warning>, CheckError> {
     }
     found.extend(calibration::missing(fluid));
     found.extend(state.pressure.and_then(not_finite));
-    found.extend(state.stability.and_then(unstable));
+    found.extend(state.stability.and_then(|stability| unstable(fluid, stability)));
     found.extend(jumps(fluid));
     found.sort_by_key(|w| std::cmp::Reverse(w.severity));
     Ok(found)
@@ -143,7 +143,7 @@ fn singular(fluid: &Fluid, densities: Option<&[f64]>) -> Result<Vec<Warning>, Ch
             ),
             SingularityKind::Pole | SingularityKind::Edge => (
                 format!(
-                    "psi of {name} is singular at total density {:.4}, {:.1} times the mean",
+                    "psi of {name} is singular at total density {:.4}, {:.2} times the mean",
                     s.density,
                     s.density / total
                 ),
@@ -152,13 +152,17 @@ fn singular(fluid: &Fluid, densities: Option<&[f64]>) -> Result<Vec<Warning>, Ch
         };
         let inside = densities.is_some() && s.density > 0.0 && s.density <= total;
         let message = match (excluded, bounds.is_empty()) {
+            (true, _) if inside => format!(
+                "{what}: bounds of {} put another psi in its place, and this density is nothing but that; lower the density",
+                bounds.join(", ")
+            ),
             (true, _) => format!("{what}; the bounds of {} keep runs away from it", bounds.join(", ")),
             (false, true) => format!("{what}; {advice}"),
             (false, false) => format!("{what}; {advice} that leave it out: those of {} do not", bounds.join(", ")),
         };
         let severity = match (excluded, inside) {
-            (true, _) => Severity::Note,
-            (false, true) => Severity::Error,
+            (_, true) => Severity::Error,
+            (true, false) => Severity::Note,
             (false, false) => Severity::Warning,
         };
         Warning { id: "singular", severity, message }
@@ -178,7 +182,12 @@ fn bounds_of(fluid: &Fluid, species: usize) -> Vec<&str> {
     (0..fluid.densities.len()).filter(bounded).map(|d| fluid.densities[d].name.as_str()).collect()
 }
 
-fn unstable(stability: &Stability) -> Option<Warning> {
+/// Whether a kernel's transform may be negative, so that a strong repulsion makes particles cluster.
+fn may_cluster(kind: KernelKind) -> bool {
+    !matches!(kind, KernelKind::Quadratic | KernelKind::WendlandC2)
+}
+
+fn unstable(fluid: &Fluid, stability: &Stability) -> Option<Warning> {
     if stability.spinodal {
         return Some(Warning {
             id: "spinodal",
@@ -189,12 +198,16 @@ fn unstable(stability: &Stability) -> Option<Warning> {
         });
     }
     let k = stability.k_star.filter(|_| !stability.stable)?;
+    let kernel = match fluid.densities.iter().any(|density| may_cluster(density.kernel.kind())) {
+        true => "a positive definite kernel (quadratic, wendland-c2), ",
+        false => "",
+    };
     Some(Warning {
         id: "clustering",
         severity: Severity::Warning,
         message: format!(
             "in mean field S(k) diverges before this state is reached, at k* = {k:.3}: the fluid clusters or freezes with \
-             wavelength {:.3}; a positive definite kernel (quadratic, wendland-c2), a lower density or a higher kT avoids it",
+             wavelength {:.3}; {kernel}a lower density or a higher kT avoids it",
             TAU / k
         ),
     })

@@ -1,5 +1,7 @@
+use super::inputs::Files;
+use super::settings::temperature;
 use super::{Failure, Settings, Verdict, write_json};
-use crate::check::{Conditions, Cost, Findings, Severity, Warning, check, cost, estimates};
+use crate::check::{Conditions, Cost, Findings, Severity, StepEstimate, Warning, check, cost, estimates};
 use psidpd_core::document::Document;
 use psidpd_core::engine::check_reach;
 use std::path::{Path, PathBuf};
@@ -10,13 +12,20 @@ pub struct Arguments {
     /// A model file, or a scene file, which brings kT and densities along.
     file: PathBuf,
     /// kT; 1 if neither this nor a scene gives it.
-    #[arg(long = "kT", value_name = "T", allow_negative_numbers = true)]
+    #[arg(long = "kT", value_name = "T", allow_negative_numbers = true, value_parser = temperature)]
     kt: Option<f64>,
     /// Number density, total or one for each species, as 6.05 or 8,8.
     #[arg(long, value_name = "RHO", value_delimiter = ',', value_parser = number_density)]
     density: Vec<f64>,
     #[command(flatten)]
     settings: Settings,
+}
+
+impl Arguments {
+    /// What it reads and writes.
+    pub fn files(&self) -> Files {
+        Files::reads([&self.file])
+    }
 }
 
 /// A number density on the command line.
@@ -41,9 +50,13 @@ pub fn per_species(given: &[f64], species: usize) -> Option<Vec<f64>> {
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     let document = Document::open(&arguments.file)?;
     let mut too_far = None;
+    let mut mixtures = Vec::new();
     let (model, kt, densities, steps, taken) = if document.root().get("model").is_some() {
         let scene = arguments.settings.scene(&arguments.file)?;
         let densities = scene.densities();
+        if arguments.density.is_empty() {
+            mixtures = scene.mixtures();
+        }
         let range = scene.model.at(scene.kt)?.cutoff();
         let particles = scene.initial.parts().iter().map(|p| p.count).sum();
         too_far = check_reach(&scene.domain, scene.model.dimensions(), range, particles).err();
@@ -59,6 +72,15 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         densities: per_species(&arguments.density, model.species().len()).or(densities),
     };
     let mut findings = Findings { steps, cost: taken, ..check(&model, &conditions)? };
+    if let Some(warning) = too_long(&findings.steps) {
+        findings.warnings.push(warning);
+        findings.warnings.sort_by_key(|w| std::cmp::Reverse(w.severity));
+    }
+    mixtures.retain(|rho| Some(rho) != findings.densities.as_ref());
+    for rho in mixtures {
+        let other = check(&model, &Conditions { kt: conditions.kt, densities: Some(rho.clone()) })?;
+        findings.add_at(model.species(), &rho, other.warnings);
+    }
     if let Some(error) = too_far {
         findings.warnings.insert(
             0,
@@ -81,6 +103,47 @@ fn duration(seconds: f64) -> String {
         s if s < 172_800.0 => format!("{:.1} hours", s / 3600.0),
         s => format!("{:.1} days", s / 86_400.0),
     }
+}
+
+/// From this error of the configurational temperature on, a time step is warned of.
+const TOO_LONG: f64 = 0.1;
+
+/// The worst of time steps that are too long.
+fn too_long(steps: &[StepEstimate]) -> Option<Warning> {
+    let worst = steps.iter().filter(|s| s.error > TOO_LONG).max_by(|a, b| a.error.total_cmp(&b.error))?;
+    Some(Warning {
+        id: "time-step",
+        severity: Severity::Warning,
+        message: format!(
+            "dt = {} of stage \"{}\" puts the configurational temperature off by about {} %: use dt = {}, or an integrator \
+             that bears more (docs/integrators.md)",
+            worst.dt,
+            worst.stage,
+            two_digits(100.0 * worst.error),
+            two_digits(worst.one_percent)
+        ),
+    })
+}
+
+/// A number to two digits.
+fn two_digits(x: f64) -> String {
+    let digits = (1 - x.abs().max(1e-12).log10().floor() as i32).clamp(-300, 12);
+    let unit = 10f64.powi(digits);
+    format!("{:.*}", digits.max(0) as usize, (x * unit).round() / unit)
+}
+
+fn print_step(step: &StepEstimate, which: &str) {
+    println!(
+        "time step     {} of stage \"{}\"{which}, {}: configurational temperature off by about {} %, 1 % at dt = {} \
+         (estimate: frequency {:.1}, drag rate {:.2})",
+        step.dt,
+        step.stage,
+        step.integrator,
+        two_digits(100.0 * step.error),
+        two_digits(step.one_percent),
+        step.frequency,
+        step.drag
+    );
 }
 
 fn print(findings: &Findings, species: &[String]) {
@@ -118,18 +181,16 @@ fn print(findings: &Findings, species: &[String]) {
             duration(seconds)
         );
     }
-    for step in &findings.steps {
-        println!(
-            "time step     {} of stage \"{}\", {}: configurational temperature off by about {:.2} %, 1 % at dt = {:.3} \
-             (estimate: frequency {:.1}, drag rate {:.2})",
-            step.dt,
-            step.stage,
-            step.integrator,
-            100.0 * step.error,
-            step.one_percent,
-            step.frequency,
-            step.drag
-        );
+    for of_stage in
+        findings.steps.chunk_by(|a, b| (&a.stage, &a.integrator, a.dt) == (&b.stage, &b.integrator, b.dt))
+    {
+        match of_stage {
+            [first, .., last] => {
+                print_step(first, " (first of its temperatures)");
+                print_step(last, " (last)");
+            }
+            all => all.iter().for_each(|step| print_step(step, "")),
+        }
     }
     for warning in &findings.warnings {
         let kind = match warning.severity {
