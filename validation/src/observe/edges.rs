@@ -3,10 +3,12 @@
 /// What the flank of a slab or drop shows by itself, without a curve put through it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Edges {
-    /// Mean density inside, further from the interface than its width.
+    /// Mean density of the plateau inside.
     pub liquid: f64,
-    /// Mean density outside.
+    /// Mean density of the plateau outside.
     pub vapour: f64,
+    /// How far the densities inside and outside may be off because their plateaus are narrow; 0 where they are wide.
+    pub doubt: [f64; 2],
     /// Where the density is half way, from the centre.
     pub place: f64,
     /// Distance of the places where 90 % and 10 % of the way are left.
@@ -19,6 +21,31 @@ pub struct Edges {
 /// Bins that a flank must have.
 const FEWEST: usize = 6;
 
+/// How far a plateau is from the interface, in distances from 10 to 90 %. Layers near the surface of a liquid fade within
+/// less, and averages that include them are too high or too low.
+const LAYERS: f64 = 4.0;
+
+/// The least depth of a plateau in the flank, in the same unit.
+const DEPTH: f64 = 1.0;
+
+/// The density of a plateau: its mean, and how far that may be off.
+///
+/// `bins` go from the one farthest from the interface to the one nearest to it; each has the distance from the interface and
+/// the density. A plateau is narrow if less than [`DEPTH`] is left beyond [`LAYERS`]. Its density is then the mean over the
+/// farther half of the bins beyond one width, and the doubt the difference to the mean over all of these. `None` if not even
+/// a bin is beyond one width.
+fn plateau(bins: &[(f64, f64)], width: f64) -> Option<(f64, f64)> {
+    let beyond = |distance: f64| &bins[..bins.iter().take_while(|bin| bin.0 > distance).count()];
+    let mean = |bins: &[(f64, f64)]| bins.iter().map(|bin| bin.1).sum::<f64>() / bins.len() as f64;
+    let (far, near) = (beyond(LAYERS * width), beyond(width));
+    let deepest = bins.first()?.0;
+    if !far.is_empty() && deepest >= (LAYERS + DEPTH) * width {
+        return Some((mean(far), 0.0));
+    }
+    let half = mean(&near[..near.len().div_ceil(2)]);
+    (!near.is_empty()).then(|| (half, (half - mean(near)).abs()))
+}
+
 /// The edges of one flank: (distance from the centre, density), distances increasing by `height`. `None` where the density
 /// does not fall from the inside to the outside.
 pub fn edges(points: &[(f64, f64)], height: f64) -> Option<Edges> {
@@ -30,9 +57,10 @@ pub fn edges(points: &[(f64, f64)], height: f64) -> Option<Edges> {
     };
     let quarter = (points.len() / 4).max(1);
     let (mut liquid, mut vapour) = (mean(&points[..quarter]), mean(&points[points.len() - quarter..]));
+    let mut doubt = [f64::NAN; 2];
     let mut found = None;
     // The plateaus are known better once the interface between them is.
-    for _ in 0..3 {
+    for _ in 0..4 {
         if liquid.is_nan() || vapour.is_nan() || liquid <= vapour {
             return None;
         }
@@ -48,13 +76,14 @@ pub fn edges(points: &[(f64, f64)], height: f64) -> Option<Edges> {
         };
         let ten_ninety = outer - inner;
         let steepest = (liquid - vapour) / steepest(points, height, [inner, outer])?;
-        found = Some(Edges { liquid, vapour, place, ten_ninety, steepest });
-        let inside = points.iter().take_while(|p| p.0 < place - ten_ninety).count();
-        let outside = points.iter().take_while(|p| p.0 <= place + ten_ninety).count();
-        // An interface as wide as the flank leaves no plateau, and the quarters stand.
-        if inside > 0 && outside < points.len() {
-            (liquid, vapour) = (mean(&points[..inside]), mean(&points[outside..]));
-        }
+        found = Some(Edges { liquid, vapour, doubt, place, ten_ninety, steepest });
+        let inwards = points.iter().map(|p| (place - p.0, p.1)).collect::<Vec<_>>();
+        let outwards = points.iter().rev().map(|p| (p.0 - place, p.1)).collect::<Vec<_>>();
+        // An interface as wide as the flank leaves no plateau. The quarters stand, and all of the step is in doubt.
+        let step = liquid - vapour;
+        let (inside, inside_doubt) = plateau(&inwards, ten_ninety).unwrap_or((liquid, step));
+        let (outside, outside_doubt) = plateau(&outwards, ten_ninety).unwrap_or((vapour, step));
+        (liquid, vapour, doubt) = (inside, outside, [inside_doubt, outside_doubt]);
     }
     found
 }
@@ -114,6 +143,28 @@ mod tests {
         assert!((found.liquid - 5.9).abs() < 0.01 && (found.vapour - 0.1).abs() < 0.01, "{found:?}");
         assert!((found.ten_ninety - 2.0 * 0.8f64.atanh() * 0.6).abs() < 0.02, "{found:?}");
         assert!((found.steepest / 1.2 - 1.0).abs() < 0.04, "{found:?}");
+    }
+
+    /// Layers that fade into a plateau do not raise its density, wherever their crests are: a mean from one width on is off by
+    /// up to 2 %. A plateau that the layers leave no room for is in doubt by more than it is off.
+    #[test]
+    fn layers_are_no_part_of_a_plateau() {
+        for phase in [0.0, 1.0, 2.0, 3.0, 4.0, 5.0] {
+            let layered = |s: f64| {
+                let depth = 6.0 - s;
+                let layers = 1.5
+                    * (-depth.max(0.0) / 0.45).exp()
+                    * (std::f64::consts::TAU * depth / 0.85 + phase).cos();
+                3.0 - 3.0 * ((s - 6.0) / 0.25).tanh() + 0.5 * layers * (1.0 - ((s - 6.0) / 0.25).tanh())
+            };
+            let found = edges(&flank(240, 0.05, layered), 0.05).unwrap();
+            assert!((found.liquid - 6.0).abs() < 0.003, "{phase}: {found:?}");
+            assert!(found.vapour.abs() < 1e-6 && found.doubt == [0.0; 2], "{found:?}");
+            let narrow = |s: f64| layered(s + 4.5);
+            let found = edges(&flank(120, 0.05, narrow), 0.05).unwrap();
+            let off = (found.liquid - 6.0).abs();
+            assert!(found.doubt[0] > 0.0 && off < 5.0 * found.doubt[0] + 0.02, "{phase}: {found:?}");
+        }
     }
 
     /// A straight ramp and a liquid that is denser at its edge are no tangents, and have widths all the same.

@@ -218,7 +218,8 @@ fn mean_and_error(counts: &[f64]) -> Result<(f64, f64), StatisticsError> {
 ///
 /// s being the distance from the centre, averaged over the height of each bin
 /// so that coarse bins do not widen the interface. Its steepest slope, at s₀,
-/// is (ρ_L − ρ_V)/2d, so that w = 2d. Layering of the liquid is averaged over.
+/// is (ρ_L − ρ_V)/2d, so that w = 2d. Layers of the liquid are averaged over, so ρ_L of the fit is not that of the plateau;
+/// see [`slab_edges`].
 ///
 /// None if the profile is not that of a slab centred on 0: fewer than six bins
 /// to a flank, values that are not finite, no contrast of density, interfaces
@@ -262,6 +263,7 @@ pub fn slab_edges(profile: &DensityProfile) -> Option<Edges> {
     Some(Edges {
         liquid: 0.5 * (a.liquid + b.liquid),
         vapour: 0.5 * (a.vapour + b.vapour),
+        doubt: [0, 1].map(|side| 0.5 * (a.doubt[side] + b.doubt[side])),
         place: 0.5 * (a.place + b.place),
         ten_ninety: 0.5 * (a.ten_ninety + b.ten_ninety),
         steepest: 0.5 * (a.steepest + b.steepest),

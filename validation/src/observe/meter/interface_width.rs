@@ -25,12 +25,14 @@ impl Meter for InterfaceWidth {
         about: "w = (ρ_L − ρ_V)/max|dρ/dz|, as Warren, Phys. Rev. E 68, 066702 (2003), eq. 19, defines it, from a fit of \
                 (ρ_L + ρ_V)/2 − (ρ_L − ρ_V)/2 tanh((|z| − z₀)/d) to both flanks of the recentred density profile, \
                 averaged over each bin: w = 2d. Differences of neighbouring bins would overrate the slope in \
-                proportion to their noise. `width`, `liquid`, `vapour`, `thickness` (2 z₀). Where the interface is no such \
-                curve the fit misleads, so the profile's own widths are given too: `width_10_90`, between the places where \
+                proportion to their noise. `width`, `thickness` (2 z₀). `liquid` and `vapour` are not those of the fit, \
+                which averages over the layers near the surface: they are means of the profile over its plateaus, \
+                farther from each interface than four times `width_10_90`. Where less than a fifth such distance is \
+                left, a note says so and the error is larger. Where the interface is no tanh \
+                the fit misleads, so the profile's own widths are given too: `width_10_90`, between the places where \
                 10 and 90 % of the way between the plateaus are made (1.10 w of a tanh), and `width_slope`, w with the \
                 slope of a straight line through three tenths of the interface. If nothing can be fitted `width` has no \
-                value, and densities are those of the plateaus. Jackknife errors. No values if the profile is not that of \
-                one slab.",
+                value. Jackknife errors. No values if the profile is not that of one slab.",
         keys: &[AXIS, BINS],
     };
 
@@ -54,16 +56,38 @@ impl Meter for InterfaceWidth {
     fn finish(&self) -> Vec<Observation> {
         let centres = self.across.middles();
         let volume = self.across.bin_volume();
-        let fit = self.series.jackknife_many(|means| {
+        let profile = |means: &[f64]| {
             let density = means.iter().map(|n| n / volume).collect();
-            let profile = DensityProfile { centres: centres.clone(), density, error: Vec::new() };
+            DensityProfile { centres: centres.clone(), density, error: Vec::new() }
+        };
+        let mut fit = self.series.jackknife_many(|means| {
+            let profile = profile(means);
             let found = slab_edges(&profile)?;
-            let widths = [found.ten_ninety, found.steepest];
-            Some(match interface(&profile) {
-                Some(fit) => vec![fit.width, fit.liquid, fit.vapour, 2.0 * fit.place, widths[0], widths[1]],
-                None => vec![f64::NAN, found.liquid, found.vapour, 2.0 * found.place, widths[0], widths[1]],
-            })
+            let fit = interface(&profile);
+            let (width, place) = fit.map_or((f64::NAN, found.place), |fit| (fit.width, fit.place));
+            Some(vec![width, found.liquid, found.vapour, 2.0 * place, found.ten_ninety, found.steepest])
         });
+        let doubt = match fit.is_empty() {
+            true => [0.0; 2],
+            false => slab_edges(&profile(&self.series.means())).map_or([0.0; 2], |found| found.doubt),
+        };
+        for (measured, doubt) in fit.iter_mut().skip(1).zip(doubt) {
+            measured.error = measured.error.hypot(doubt);
+        }
+        let narrow: Vec<&str> = ["liquid", "vapour"]
+            .into_iter()
+            .zip(doubt)
+            .filter(|(_, doubt)| *doubt > 0.0)
+            .map(|d| d.0)
+            .collect();
+        let note = match (fit.is_empty(), narrow.is_empty()) {
+            (true, _) => "The profile is not that of a slab.".into(),
+            (_, true) => String::new(),
+            _ => format!(
+                "The plateau of the {} is narrow: its density may be off by layers of the surface, as its error says.",
+                narrow.join(" and of the ")
+            ),
+        };
         let at = |k: usize| [fit.get(k).copied().unwrap_or(Measured::NONE)];
         vec![
             Observation::new("interface_width", "Interfaces of a slab", Kind::Scalar)
@@ -74,7 +98,7 @@ impl Meter for InterfaceWidth {
                 .column("thickness", "length", at(3))
                 .column("width_10_90", "length", at(4))
                 .column("width_slope", "length", at(5))
-                .note(if fit.is_empty() { "The profile is not that of a slab." } else { "" }),
+                .note(note),
         ]
     }
 }
