@@ -4,6 +4,12 @@ use super::frame::Frame;
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::model::Fluid;
 
+/// Edge of a block of space, in ranges of the forces.
+const BLOCK: f64 = 1.5;
+
+/// The most blocks along a direction.
+const MOST_BLOCKS: usize = 8;
+
 /// Why there is none, if there is none.
 pub fn missing(fluid: &Fluid, domain: &PeriodicBox) -> Option<&'static str> {
     let periodic = domain.periodic();
@@ -22,14 +28,40 @@ pub fn missing(fluid: &Fluid, domain: &PeriodicBox) -> Option<&'static str> {
 
 /// `Σ F·F` and `Σ ∇²U` over the particles that move.
 pub fn sums(frame: &Frame) -> [f64; 2] {
+    let mut sums = [0.0; 2];
+    terms(frame, |_, term| (0..2).for_each(|c| sums[c] += term[c]));
+    sums
+}
+
+/// `F·F` and `∇²U` of each particle that moves, with its number.
+fn terms(frame: &Frame, mut visit: impl FnMut(usize, [f64; 2])) {
     let evaluation = frame.evaluation();
     let laplacians = evaluation.laplacians(frame.evaluator().fluid(), frame.view.species);
-    let mut sums = [0.0; 2];
     for (k, (f, l)) in evaluation.forces.iter().zip(laplacians).enumerate() {
         if frame.moves(k) {
-            sums[0] += f.iter().map(|f| f * f).sum::<f64>();
-            sums[1] += l;
+            visit(k, [f.iter().map(|f| f * f).sum(), l]);
         }
     }
-    sums
+}
+
+/// The same sums over blocks of space, of which there are some along each direction; a block without particles is left out.
+///
+/// Blocks are wider than the forces reach, so that what one says of the temperature depends little on the others. Their
+/// scatter tells the error of a single configuration.
+pub fn sums_of_blocks(frame: &Frame) -> Vec<[f64; 2]> {
+    let view = &frame.view;
+    let range = frame.evaluator().fluid().conservative_range().max(f64::MIN_POSITIVE);
+    let count: [usize; 3] = std::array::from_fn(|k| match k < view.dimensions {
+        true => ((view.domain.height(k) / (BLOCK * range)) as usize).clamp(1, MOST_BLOCKS),
+        false => 1,
+    });
+    let mut blocks = vec![None; count.iter().product()];
+    terms(frame, |particle, term| {
+        let s = view.domain.fraction(view.x[particle]);
+        let at: [usize; 3] = std::array::from_fn(|k| ((s[k] * count[k] as f64) as usize).min(count[k] - 1));
+        let block: &mut [f64; 2] =
+            blocks[(at[2] * count[1] + at[1]) * count[0] + at[0]].get_or_insert([0.0; 2]);
+        (0..2).for_each(|c| block[c] += term[c]);
+    });
+    blocks.into_iter().flatten().collect()
 }

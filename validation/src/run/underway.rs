@@ -234,7 +234,7 @@ impl<'a> Run<'a> {
             self.keep_state();
         }
         let deviations = match self.position.done == stage.steps {
-            true => self.watch.deviations(&self.simulation, stage),
+            true => self.watch.deviations(stage),
             false => Vec::new(),
         };
         let thermo = thermo.as_ref();
