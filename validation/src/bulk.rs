@@ -155,4 +155,9 @@ impl Observed {
     pub fn pressure(&self) -> Measured {
         self.scalar("pressure", "conservative")
     }
+
+    /// Pressure of the configurations, without the scatter of velocities.
+    pub fn configurational_pressure(&self) -> Measured {
+        self.scalar("pressure", "configurational")
+    }
 }

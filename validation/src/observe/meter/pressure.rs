@@ -15,7 +15,7 @@ const NAMES: [&str; 6] = ["xx", "yy", "zz", "xy", "xz", "yz"];
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Pressure {
     dimensions: usize,
-    /// Tensor of all forces, tensor of conservative forces, tensor of the momentum carried.
+    /// Tensor of all forces, tensor of conservative forces, tensor of the momentum carried, and the pressure of configurations.
     series: Series,
 }
 
@@ -32,15 +32,17 @@ impl Meter for Pressure {
                 `total` is (Σ m v v + W)/V with the velocities at the end of the step and the virial of all forces, \
                 noise included, as `pressure` in `thermo.csv`, as LAMMPS's `compute pressure` and its thermo output: in \
                 velocity Verlet too low by ¼ Δt² ⟨Σ f²/m⟩/(dV), which is of first order, as the random force is. \
-                `conservative` leaves drag and noise out of W; it has the least noise, and lacks drag as well. With \
-                `thermostat_every`, sample at steps of all phases.",
+                `conservative` leaves drag and noise out of W, and lacks drag as well. With \
+                `thermostat_every`, sample at steps of all phases. `configurational` is the scalar ρkT + tr W/(dV) of conservative \
+                forces with the kT of the stage: what configurations tell, without the scatter of velocities and their \
+                error at a time step, as a Monte Carlo run has it. In a dilute fluid it has much the least noise.",
         keys: &[],
     };
 
     const NEEDS_FLUX: bool = true;
 
     fn read(options: &Options) -> Result<Pressure, FileError> {
-        Ok(Pressure { dimensions: options.place.fluid.dimensions, series: Series::new(18) })
+        Ok(Pressure { dimensions: options.place.fluid.dimensions, series: Series::new(19) })
     }
 
     fn needs(&self) -> Want {
@@ -48,11 +50,14 @@ impl Meter for Pressure {
     }
 
     fn sample(&mut self, frame: &Frame) -> bool {
-        let total = frame.view.pressure;
-        let conservative = frame.view.conservative_pressure;
-        frame
-            .carried_pressure()
-            .is_some_and(|carried| self.series.push(&[total, conservative, carried].concat()))
+        let view = frame.view;
+        let (total, conservative) = (view.pressure, view.conservative_pressure);
+        let Some(carried) = frame.carried_pressure() else { return false };
+        let d = self.dimensions as f64;
+        let mobile = (0..view.x.len()).filter(|k| frame.moves(*k)).count() as f64;
+        let ideal = (mobile * view.kt - 2.0 / d * view.kinetic_energy) / frame.volume();
+        let configurational = conservative[..self.dimensions].iter().sum::<f64>() / d + ideal;
+        self.series.push(&[&total[..], &conservative, &carried, &[configurational]].concat())
     }
 
     fn forget(&mut self) {
@@ -66,6 +71,7 @@ impl Meter for Pressure {
             let trace = self.series.linear(|s| s[first..first + d].iter().sum::<f64>() / d as f64);
             out = out.column(what, "energy/volume", [trace]);
         }
+        out = out.column("configurational", "energy/volume", [self.series.mean(18)]);
         for (what, first) in [("carried", 12), ("conservative", 6), ("total", 0)] {
             let there = |k: &usize| d == 3 || [0, 1, 3].contains(k);
             for k in (0..6).filter(there) {
