@@ -11,6 +11,8 @@ use psidpd_core::engine::Want;
 use psidpd_core::engine::reference::Evaluator;
 use std::path::Path;
 
+mod known;
+
 /// Two species with a density, for keys.
 const MIXTURE: &str = r#"
 title = "mixture"
@@ -162,9 +164,9 @@ fn a_liquid_in_equilibrium() {
     }
 }
 
-/// A slab of liquid: the profile of the pressure tensor integrates to that of the box sample by sample, both
-/// routes to the tension agree, and it is Warren's within what a small and short run can tell (five errors and
-/// 10 %).
+/// A slab of liquid: the profile of the pressure tensor integrates to that of the box sample by sample. Both routes to the
+/// tension agree within five errors, as if they were independent, and so do tension, width and density with those of 60 000
+/// steps: 7.55(6), 0.338(4), 6.0726(9). Each of the four is exceeded by chance once in 10^6. The seed is fixed.
 #[test]
 fn a_slab_of_liquid() {
     let observe = "[observe]\nstress_profile = true\nsurface_tension = true\ninterface_width = true\n\
@@ -197,17 +199,18 @@ fn a_slab_of_liquid() {
     assert!((0.5 * integral.value - by_stress.value).abs() < 1e-9);
     assert!((0.5 * integral.error - by_stress.error).abs() < 1e-9);
     let by_area = tension.scalar("free_energy").unwrap();
-    assert!((by_area.value - by_stress.value).abs() < 0.5, "{by_area:?} {by_stress:?}");
-    assert!((by_stress.value - 7.45).abs() < 5.0 * by_stress.error + 0.75, "{by_stress:?}");
+    let together = by_area.error.hypot(by_stress.error);
+    assert!((by_area.value - by_stress.value).abs() < 5.0 * together, "{by_area:?} {by_stress:?}");
+    assert!((by_stress.value - 7.55).abs() < 5.0 * by_stress.error, "{by_stress:?}");
+    assert!(by_area.error < 0.4 && by_stress.error < 0.4, "{by_area:?} {by_stress:?}");
     let width = find(&all, "interface_width");
     let (w, liquid) = (width.scalar("width").unwrap(), width.scalar("liquid").unwrap());
-    // Warren has 0.66(3) in a larger box, whose capillary waves are longer. The steepest of the differences of
-    // bins 0.2 apart is no steeper than the noise of a bin makes it.
+    assert!((w.value - 0.338).abs() < 5.0 * w.error && w.error < 0.03, "{w:?}");
+    assert!((liquid.value - 6.0726).abs() < 5.0 * liquid.error && liquid.error < 0.05, "{liquid:?}");
+    // The steepest of the differences of bins 0.2 apart is as steep as the noise of a bin makes it.
     let rho = &density.get("density").unwrap().values;
     let steepest = rho.windows(3).map(|r| (r[2] - r[0]).abs() / 0.2).fold(0.0, f64::max);
-    let plain = liquid.value / steepest;
-    assert!(w.value > 0.25 && w.value < 0.69 && (w.value / plain - 1.0).abs() < 0.25, "{w:?} {plain}");
-    assert!((liquid.value - 6.05).abs() < 5.0 * liquid.error + 0.1, "{liquid:?}");
+    assert!((w.value * steepest / liquid.value - 1.0).abs() < 0.25, "{w:?} {steepest}");
     let temperature = find(&all, "temperature_profile").get("temperature").unwrap();
     let middle: f64 = temperature.values[45..65].iter().sum::<f64>() / 20.0;
     assert!((middle - 1.0).abs() < 0.05, "{middle}");
@@ -356,8 +359,9 @@ fn a_drop_of_liquid() {
     );
     assert!(get("particles").value > 660.0 && get("liquid").value > 5.8 && get("liquid").value < 6.6);
     let tension = get("tension");
-    assert!((tension.value - 7.45).abs() < 5.0 * tension.error + 1.5, "{tension:?}");
-    assert!(tension.error > 0.0 && tension.error < 1.5, "{tension:?}");
+    // Warren's for the plane; five errors of a drop are exceeded by chance once in 10^6.
+    assert!((tension.value - 7.45).abs() < 5.0 * tension.error, "{tension:?}");
+    assert!(tension.error > 0.0 && tension.error < 0.6, "{tension:?}");
     let clusters = find(&all, "clusters");
     assert!((clusters.scalar("largest").unwrap().value - get("particles").value).abs() < 1e-9);
     let local = find(&all, "local_density_means");

@@ -248,6 +248,27 @@ mod tests {
         }
     }
 
+    /// Of a lattice every particle has as many neighbours: 56 within 2.4 spacings in space, 20 in the plane. The distance
+    /// that is chosen is (2/ρ)^(1/3), in two dimensions (2.5/ρ)^(1/2).
+    #[test]
+    fn the_chosen_distance_of_a_lattice() {
+        use std::f64::consts::PI;
+        let volume = [PI * 1.2f64.powi(2), 4.0 / 3.0 * PI * 1.2f64.powi(3)];
+        for (dimensions, expected) in
+            [(2, (2.5 * volume[0] / 20.0).sqrt()), (3, (2.0 * volume[1] / 56.0).cbrt())]
+        {
+            let edge = if dimensions == 2 { 1.0 } else { 4.0 };
+            let domain =
+                PeriodicBox::orthogonal([0.0; 3], [4.0, 4.0, edge], [true, true, dimensions == 3]).unwrap();
+            let layers = if dimensions == 2 { 1 } else { 8 };
+            let x: Vec<[f64; 3]> =
+                (0..64 * layers).map(|k| [k % 8, k / 8 % 8, k / 64].map(|c| 0.5 * f64::from(c))).collect();
+            let mut distance = Distance { given: None, chosen: None, longest: 1.2 };
+            let chosen = distance.at(&x, &domain, dimensions, |_| true);
+            assert!((chosen - expected).abs() < 1e-12, "{dimensions}: {chosen} {expected}");
+        }
+    }
+
     /// A dense ball in a thin gas: the chosen distance links the ball and not the gas.
     #[test]
     fn the_chosen_distance_tells_liquid_from_vapour() {

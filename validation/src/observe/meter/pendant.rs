@@ -274,8 +274,8 @@ mod tests {
     use super::*;
     use crate::observe::young_laplace::contour;
 
-    /// A drop of a known shape, its density rounded over a few bins: Bond number, apex and tension come back,
-    /// whichever way it hangs.
+    /// A drop of a known shape, its density rounded over a few bins: Bond number, apex and tension come back to what bins of
+    /// a twentieth of its radius allow, 0.7 %, whichever way it hangs.
     #[test]
     fn a_constructed_drop() {
         for hangs_down in [true, false] {
@@ -311,11 +311,11 @@ mod tests {
             }
             let out = m.finish();
             let get = |name: &str| out[0].scalar(name).unwrap().value;
-            assert!((get("bond") - bond).abs() < 0.03, "{} {:?}", get("bond"), out[0]);
+            assert!((get("bond") / bond - 1.0).abs() < 0.015, "{} {:?}", get("bond"), out[0]);
             let height = if hangs_down { apex - 3.0 } else { 20.0 - apex - 3.0 };
-            assert!((get("apex_radius") / radius - 1.0).abs() < 0.04 && (get("apex") - height).abs() < 0.2);
+            assert!((get("apex_radius") / radius - 1.0).abs() < 0.005 && (get("apex") - height).abs() < 0.05);
             let tension = 6.0 * 0.02 / (bond / radius.powi(2));
-            assert!((get("tension") / tension - 1.0).abs() < 0.15, "{} {tension}", get("tension"));
+            assert!((get("tension") / tension - 1.0).abs() < 0.015, "{} {tension}", get("tension"));
             let profile = &out[1];
             assert!(profile.get("radius").unwrap().values.len() > 40);
             assert_eq!(out[2].columns[2].values.len(), 3200);

@@ -154,6 +154,15 @@ mod tests {
     use rand::{SeedableRng, rngs::StdRng};
     use rand_distr::{Distribution, StandardNormal};
 
+    /// Both ends of the trapezoid rule have half the weight.
+    #[test]
+    fn ends_of_integrals_have_half_the_weight() {
+        let row = [1.0, 2.0, 3.0, 4.0, 9.0];
+        for (lag, expected) in [(0, 0.0), (1, 1.5), (2, 4.0), (3, 7.5)] {
+            assert_eq!(Viscosity::integral(&row, lag, 0.5), 0.5 * expected, "{lag}");
+        }
+    }
+
     /// Stresses with the correlation s² a^t, isotropic and without trace, plus white noise of variance q²:
     /// η = V dt/kT [½ (s² + q²) + s² a/(1 − a)], less the tail beyond the longest lag. Within five errors, one
     /// alarm in 10^6; the seed is fixed.
