@@ -18,10 +18,6 @@ fn quantities(points: &[Point]) -> Vec<String> {
 /// A row for each run: the keys, each result with its error, whether it is finished, and how many notes there are.
 pub fn csv(axes: &[Axis], points: &[Point]) -> String {
     let names = quantities(points);
-    let quoted = |text: &str| match text.contains([',', '"', '\n']) {
-        true => format!("\"{}\"", text.replace('"', "\"\"")),
-        false => text.to_owned(),
-    };
     let mut header: Vec<String> = axes.iter().map(|a| quoted(&a.key)).collect();
     header.extend(names.iter().flat_map(|n| [n.clone(), format!("{n}_error")]));
     header.extend(["finished", "notes", "folder"].map(String::from));
@@ -39,6 +35,14 @@ pub fn csv(axes: &[Axis], points: &[Point]) -> String {
         text += &(row.join(",") + "\n");
     }
     text
+}
+
+/// A field of the table.
+pub(super) fn quoted(text: &str) -> String {
+    match text.contains([',', '"', '\n']) {
+        true => format!("\"{}\"", text.replace('"', "\"\"")),
+        false => text.to_owned(),
+    }
 }
 
 fn folder_name(p: &Point) -> String {
