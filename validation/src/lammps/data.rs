@@ -7,6 +7,9 @@ use std::path::Path;
 use super::error::LammpsError;
 use super::text::{Problem, TextError, finite, shown, whole};
 
+/// What comes before the directions that repeat, in a title.
+const BOUNDARY: &str = "; boundary ";
+
 /// The contents of a data file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct DataFile {
@@ -97,6 +100,28 @@ impl DataFile {
         let file = std::fs::File::create(path).map_err(LammpsError::io("write", path))?;
         let mut out = io::BufWriter::new(file);
         self.print(&mut out, style).and_then(|()| out.flush()).map_err(LammpsError::io("write", path))
+    }
+
+    /// Which directions repeat, if the title says so as [`DataFile::with_boundary`] makes it.
+    pub fn boundary(&self) -> Option<[bool; 3]> {
+        let (_, words) = self.title.rsplit_once(BOUNDARY)?;
+        let flags: Vec<bool> = words
+            .split_whitespace()
+            .map(|word| match word {
+                "p" => Some(true),
+                "f" => Some(false),
+                _ => None,
+            })
+            .collect::<Option<_>>()?;
+        flags.try_into().ok()
+    }
+
+    /// With the directions that repeat at the end of its title, a comment for LAMMPS, as its command `boundary` has them.
+    #[must_use]
+    pub fn with_boundary(mut self, periodic: [bool; 3]) -> DataFile {
+        let words = periodic.map(|p| if p { "p" } else { "f" }).join(" ");
+        self.title = format!("{}{BOUNDARY}{words}", self.title);
+        self
     }
 
     /// Writes a data file of `atom_style atomic` with 17 significant digits, so that reading it gives the same bits.

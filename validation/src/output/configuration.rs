@@ -195,15 +195,16 @@ fn type_names(types: usize) -> Vec<String> {
     (1..=types).map(|k| k.to_string()).collect()
 }
 
-/// A data file does not tell which directions repeat: all are taken to, except z of a flat one.
+/// A data file tells which directions repeat in its title, if at all: else all are taken to, except z of a flat one.
 fn from_data(data: &DataFile) -> Result<Configuration, String> {
     let x: Vec<[f64; 3]> = data.atoms.iter().map(|a| a.x).collect();
     let dimensions = dimensions_of(&x, [true, true, false]);
+    let periodic = data.boundary().unwrap_or([true, true, dimensions == 3]);
     Ok(Configuration {
         step: None,
         time: None,
         dimensions,
-        domain: domain(data.boxlo, data.boxhi, data.tilt, [true, true, dimensions == 3])?,
+        domain: domain(data.boxlo, data.boxhi, data.tilt, periodic)?,
         names: type_names(data.types),
         x,
         v: data.velocities.clone(),

@@ -16,7 +16,7 @@ pub struct StateError(pub String);
 
 impl State {
     /// The state as a data file of atom style `atomic`: types are species from 1; `title` becomes the
-    /// first line.
+    /// first line, and tells walls, which data files do not know.
     pub fn to_data(&self, title: &str) -> DataFile {
         self.to_data_in(0..self.len(), title)
     }
@@ -30,7 +30,7 @@ impl State {
         let origin = self.domain.origin();
         let edges = [0, 1, 2].map(|k| self.domain.edge(k));
         let tilt = [edges[1][0], edges[2][0], edges[2][1]];
-        DataFile {
+        let data = DataFile {
             title: title.to_owned(),
             boxlo: origin,
             boxhi: std::array::from_fn(|k| origin[k] + edges[k][k]),
@@ -48,16 +48,21 @@ impl State {
                 })
                 .collect(),
             velocities: Some(order.map(|k| self.v[k]).collect()),
-        }
+        };
+        // Nothing repeats across the plane of two dimensions, which is no wall.
+        let periodic = self.domain.periodic();
+        let is_flat = self.x.iter().all(|x| x[2] == self.x[0][2]);
+        let walls = !periodic[0] || !periodic[1] || !periodic[2] && !is_flat;
+        if walls { data.with_boundary(periodic) } else { data }
     }
 
-    /// The state of a data file, in a box periodic in every direction of the model; see
-    /// [`State::from_data_in`].
+    /// The state of a data file, in a box with the walls that its title tells, and else periodic in every direction of the
+    /// model; see [`State::from_data_in`].
     ///
     /// # Errors
     /// As [`State::from_data_in`].
     pub fn from_data(data: &DataFile, model: &Model) -> Result<State, StateError> {
-        State::from_data_in(data, model, [true, true, model.dimensions() == 3])
+        State::from_data_in(data, model, data.boundary().unwrap_or([true, true, model.dimensions() == 3]))
     }
 
     /// The state of a data file, in a box periodic in some directions; particles outside are put inside along

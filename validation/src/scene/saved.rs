@@ -32,7 +32,7 @@ impl Format {
 }
 
 /// The particles and the box of a file. `periodic` sets the boundaries; if left out, a checkpoint keeps its
-/// own and data files are periodic.
+/// own, and so does a data file that tells them; others are periodic.
 ///
 /// # Errors
 /// The file cannot be read, or is no state of `model`; in words.
@@ -45,7 +45,8 @@ pub fn open(
     match format {
         Format::Data => {
             let data = DataFile::read(path).map_err(|e| e.to_string())?;
-            State::from_data_in(&data, model, periodic.unwrap_or([true; 3])).map_err(|e| e.to_string())
+            let periodic = periodic.or(data.boundary()).unwrap_or([true; 3]);
+            State::from_data_in(&data, model, periodic).map_err(|e| e.to_string())
         }
         Format::Checkpoint => {
             let state = checkpoint::read_state(path).map_err(|e| e.to_string())?;

@@ -1,6 +1,7 @@
 //! Runs that are interrupted end as those that are not.
 
 use super::*;
+use crate::test_support::SOFT;
 use crate::run::checkpoint::{CheckpointError, Store, read_state};
 use psidpd_core::engine::Precision;
 use std::collections::BTreeMap;
@@ -462,4 +463,31 @@ fn a_start_that_fails_leaves_what_it_started_from() {
     assert_eq!(read_state(folder.path()).unwrap(), scene.initial_state());
     let again = until(&scene, folder.path(), Begin::Resume, u64::MAX).unwrap_err();
     assert_eq!(again.to_string(), error.to_string());
+}
+
+/// `final.data` of a box with walls tells them: a scene that starts from it has them, and so has a map of the density, in which a
+/// particle at one wall is not seen at the other.
+#[test]
+fn a_data_file_keeps_walls() {
+    use crate::output::{Configuration, Which};
+    let text = "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\ndensity = 3.0\ndt = 0.01\nsteps = 2\n[box]\nlengths = [4.0, 4.0, 5.0]\n\
+                boundary = [\"periodic\", \"periodic\", \"reflecting\"]\n";
+    let folder = tempfile::tempdir().unwrap();
+    run_scene(&test_support::scene(SOFT, text).unwrap(), folder.path(), &mut |_| ()).unwrap();
+    let file = folder.path().join("final.data");
+    let again = format!(
+        "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\ndt = 0.01\nsteps = 2\n[initial]\nkind = \"data\"\nfile = '{}'\n",
+        file.display()
+    );
+    let walls = [true, true, false];
+    let scene = test_support::scene(SOFT, &again).unwrap();
+    assert_eq!(scene.initial_state().domain.periodic(), walls);
+    assert_eq!(Configuration::open(&file, Which::Last).unwrap().domain.periodic(), walls);
+    let open = format!("{again}[box]\nboundary = [\"periodic\", \"periodic\", \"periodic\"]\n");
+    assert_eq!(test_support::scene(SOFT, &open).unwrap().initial_state().domain.periodic(), [true; 3]);
+    // One without walls says nothing, nor does the plane.
+    for (model, lengths) in [(SOFT, "[4.0, 4.0, 5.0]"), (VAN_DER_WAALS, "[6.0, 6.0]")] {
+        let data = scene_of(model, lengths, 3.0, ONE_STAGE).unwrap().initial_state().to_data("t");
+        assert_eq!((data.title.as_str(), data.boundary()), ("t", None));
+    }
 }

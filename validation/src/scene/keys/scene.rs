@@ -107,7 +107,7 @@ pub const BOX: Table = Table {
             "Lengths of its edges; left out in a start from a file, needed otherwise.",
             "[box]\nlengths = [8.0, 8.0, 16.0]"),
         key("boundary", EachOf(|| names(&BOUNDARIES)), OPTIONAL,
-            "What happens at its faces; `periodic` if left out, or as it was in a checkpoint that is started from. A \
+            "What happens at its faces; `periodic` if left out, or as it was in a checkpoint, or a `final.data`, that is started from. A \
              face that reflects puts a particle as far inside as it was outside and reverses its velocity across the \
              face; nothing acts through it. For a wall of particles freeze a `layer` in front of it.",
             "[box]\nlengths = [8.0, 8.0, 16.0]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]"),
