@@ -1,8 +1,8 @@
 //! Runs that are interrupted end as those that are not.
 
 use super::*;
-use crate::test_support::SOFT;
 use crate::run::checkpoint::{CheckpointError, Store, read_state};
+use crate::test_support::SOFT;
 use psidpd_core::engine::Precision;
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
