@@ -10,7 +10,7 @@ pub const MOST_ROWS: usize = 512;
 const STRETCHES: usize = 40;
 
 /// A value with one standard deviation of it; NaN where unknown.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Measured {
     /// The value.
     pub value: f64,

@@ -36,10 +36,11 @@ const SETTLE: u64 = 2;
 
 /// What is tried: the schemes differ in their conservative part alone.
 pub fn schemes() -> Vec<Physics> {
-    let wanted: [(&str, &[f64]); 3] = [
+    let wanted: [(&str, &[f64]); 4] = [
         ("velocity-verlet", &[0.5, 1.0, 2.0]),
         ("aboba", &[0.5, 1.0, 2.0]),
         ("two-stage", &[1.0, 2.0, 4.0, 6.0]),
+        ("force-gradient", &[1.0, 2.0, 4.0, 6.0]),
     ];
     let mut found = Vec::new();
     for (name, multiples) in wanted {

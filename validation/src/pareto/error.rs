@@ -33,10 +33,10 @@ pub enum ParetoError {
     },
     /// A tolerance for what the scene does not measure.
     #[error(
-        "--tolerance {0}: nothing of this kind was measured; a scene measures densities by interface_width or drop and the \
-         tension by surface_tension or drop, in its [observe]"
+        "--tolerance {0}: nothing of this name was measured; a scene measures densities by interface_width or drop, the \
+         tension by surface_tension or drop, and viscosities by viscosity or poiseuille, in its [observe]"
     )]
-    Unmeasured(&'static str),
+    Unmeasured(String),
     /// The scene or its model.
     #[error(transparent)]
     File(#[from] FileError),

@@ -1,49 +1,62 @@
 //! The settings that nothing beats, and the cheapest within tolerances.
 
 use super::outcome::Point;
-use super::quantity::Class;
+use super::quantity::Deviation;
 use super::setting::Host;
-use super::tolerance::Tolerance;
+use super::tolerance::{Tolerance, worst};
 
-/// Notes at each point for which kinds of error nothing is cheaper and better. Points of LAMMPS's own law are not on it: they
-/// are another fluid, with another reference.
-pub fn mark(points: &mut [Point]) {
-    for (_, class) in Class::ALL {
-        let places: Vec<Option<[f64; 2]>> = points
-            .iter()
-            .map(|p| {
-                let ours = p.host != Host::Lammps && p.unstable.is_none();
-                Some([p.cost.as_ref().filter(|_| ours)?.median, p.error(class)?.shown()])
-            })
-            .collect();
-        for (point, place) in points.iter_mut().zip(&places) {
-            let Some([cost, error]) = *place else { continue };
-            let beaten = places
-                .iter()
-                .flatten()
-                .any(|[c, e]| (*c < cost && *e <= error) || (*c <= cost && *e < error));
-            if !beaten {
-                point.front.push(class);
-            }
-        }
+/// Bound of every quantity where none is given.
+const USUAL: f64 = 0.01;
+
+/// Notes at each point its worst error, and whether nothing is cheaper with a smaller one. Points of LAMMPS's own law are not
+/// on the front: they are another fluid, with another reference.
+pub fn mark(points: &mut [Point], tolerances: &[Tolerance]) {
+    for point in &mut *points {
+        point.worst = worst(&point.errors, tolerances);
+    }
+    let places: Vec<Option<[f64; 2]>> = points
+        .iter()
+        .map(|p| {
+            let ours = p.code != Host::Lammps && p.stable;
+            Some([p.cost.as_ref().filter(|_| ours)?.value, p.worst.as_ref()?.ratio])
+        })
+        .collect();
+    for (point, place) in points.iter_mut().zip(&places) {
+        let Some([cost, error]) = *place else { continue };
+        let beats = |[c, e]: &[f64; 2]| (*c < cost && *e <= error) || (*c <= cost && *e < error);
+        point.front = !places.iter().flatten().any(beats);
     }
 }
 
 /// The cheapest point of `hosts` all of whose errors are within the tolerances.
 pub fn cheapest(points: &[Point], tolerances: &[Tolerance], hosts: &[Host]) -> Option<usize> {
-    let good = |p: &Point| {
-        hosts.contains(&p.host)
-            && p.unstable.is_none()
-            && tolerances.iter().all(|tolerance| p.is_within(tolerance) == Some(true))
-    };
-    let cost = |k: &usize| points[*k].cost.as_ref().map_or(f64::INFINITY, |cost| cost.median);
+    let good = |p: &Point| hosts.contains(&p.code) && p.stable && p.is_within(tolerances);
+    let cost = |k: &usize| points[*k].cost.as_ref().map_or(f64::INFINITY, |cost| cost.value);
     (0..points.len())
         .filter(|k| good(&points[*k]) && cost(k).is_finite())
         .min_by(|a, b| cost(a).total_cmp(&cost(b)))
 }
 
-/// A kind of tolerance that no point has errors of.
-pub fn unmeasured(points: &[Point], tolerances: &[Tolerance]) -> Option<&'static str> {
-    let measured = |class: Class| points.iter().any(|p| p.error(class).is_some());
-    tolerances.iter().find(|t| !measured(t.class)).map(|t| t.class.name())
+/// A tolerance that no point has errors of.
+pub fn unmeasured<'a>(points: &[Point], tolerances: &'a [Tolerance]) -> Option<&'a Tolerance> {
+    let measured = |t: &Tolerance| points.iter().flat_map(|p| &p.errors).any(|d| t.applies(d));
+    tolerances.iter().find(|t| !measured(t))
+}
+
+/// One percent for every quantity that most points resolve so well, and the names of the others.
+pub fn usual(points: &[Point]) -> (Vec<Tolerance>, Vec<String>) {
+    let mut names: Vec<&String> = Vec::new();
+    let native = || points.iter().filter(|p| p.code == Host::Native && p.stable);
+    for d in native().flat_map(|p| &p.errors) {
+        if !names.contains(&&d.name) {
+            names.push(&d.name);
+        }
+    }
+    let mostly = |name: &&String| {
+        let of: Vec<&Deviation> = native().flat_map(|p| &p.errors).filter(|d| d.name == **name).collect();
+        2 * of.iter().filter(|d| d.resolves(USUAL)).count() > of.len()
+    };
+    let (good, others): (Vec<&String>, Vec<&String>) = names.into_iter().partition(mostly);
+    let tolerance = |name: &String| Tolerance { name: name.clone(), bound: USUAL };
+    (good.into_iter().map(tolerance).collect(), others.into_iter().cloned().collect())
 }

@@ -3,9 +3,9 @@
 use super::ParetoError;
 use super::origin::Origin;
 use super::own_style::OwnStyle;
-use super::quantity::Quantities;
+use super::quantity::{Class, Quantities};
 use super::recommend::scene_of;
-use super::sample::{Effort, FAR_OFF, Sampled, interval_time, observe};
+use super::sample::{Effort, FAR_OFF, Sampled, observe};
 use super::setting::{Host as Who, Physics, Setting};
 use crate::bench::log;
 use crate::export::lammps as deck;
@@ -98,11 +98,11 @@ impl Lammps {
             }
             Err(other) => return Err(other),
         };
-        let mut kinetic = Series::new(1);
+        let mut sampled = Series::new(2);
         for row in rows(&text) {
-            kinetic.push(&row[1..2]);
+            sampled.push(&row[1..3]);
         }
-        let mean = kinetic.mean(0);
+        let mean = sampled.mean(0);
         let calm = mean.value < FAR_OFF * origin.stage.kt;
         // What is no number is not calm.
         if !calm {
@@ -111,25 +111,26 @@ impl Lammps {
                 mean.value / origin.stage.kt
             )));
         }
-        let observe = observe(origin, every, Who::Lammps)?;
+        let observe = observe(origin, every, Who::Lammps, true)?;
         let mut observers = Observers::new(&observe, [origin.stage.name.as_str()]);
         let path = self.work.join(name).join("frames.lammpstrj");
         for (k, frame) in dump::read(&path)?.iter().enumerate() {
-            self.show(origin, frame, k, every, &mut observers)?;
+            self.show(origin, frame, k, (every, every as f64 * origin.dt(physics)), &mut observers)?;
         }
         let _ = std::fs::remove_file(&path);
-        let quantities = Quantities::of(mean, &observers.finish(), origin.scene.model.dimensions());
-        let time = kinetic.samples() as f64 * interval_time(origin);
-        Ok(Sampled::Made { quantities: Box::new(quantities), samples: kinetic.samples(), time })
+        let means = [(Class::Temperature, "T_kin", mean), (Class::Pressure, "p_total", sampled.mean(1))];
+        let quantities = Quantities::of(means, &observers.finish(), origin.scene.model.dimensions());
+        let time = sampled.samples() as f64 * physics.interval() as f64 * origin.dt(physics);
+        Ok(Sampled::Made { quantities: Box::new(quantities), samples: sampled.samples(), time })
     }
 
-    /// Shows a frame of LAMMPS to observers, which look at positions alone.
+    /// Shows a frame of LAMMPS to observers, which look at positions alone; frames are `every` steps and a time `interval` apart.
     fn show(
         &self,
         origin: &Origin,
         frame: &dump::Frame,
         k: usize,
-        every: u64,
+        (every, interval): (u64, f64),
         observers: &mut Observers,
     ) -> Result<(), ParetoError> {
         let missing =
@@ -144,7 +145,7 @@ impl Lammps {
         let view = View {
             pool: &pool,
             step: (k as u64 + 1) * every,
-            time: k as f64 * interval_time(origin),
+            time: k as f64 * interval,
             kt: origin.stage.kt,
             model: &origin.scene.model,
             dimensions: origin.scene.model.dimensions(),

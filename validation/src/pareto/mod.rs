@@ -20,7 +20,7 @@ mod tolerance;
 
 use drift::EnergyDrift;
 pub use error::ParetoError;
-use outcome::{Outcome, Point, Reference};
+use outcome::{Cost, Outcome, Point, Recommended, Reference};
 use quantity::Deviation;
 pub use sample::Effort;
 pub use setting::Choice;
@@ -28,7 +28,6 @@ use setting::Host;
 pub use time::Pace;
 pub use tolerance::Tolerance;
 
-use crate::bench::Spread;
 use crate::crosscheck::jobs::{self, Job};
 use crate::crosscheck::machine;
 use crate::files::write_atomically;
@@ -54,7 +53,7 @@ pub struct Options {
     pub choice: Choice,
     /// Thread counts.
     pub threads: Vec<NonZeroUsize>,
-    /// Tolerances.
+    /// Tolerances; one percent of all that is resolved so well if there are none.
     pub tolerances: Vec<Tolerance>,
     /// Whether LAMMPS is asked too, if it is installed.
     pub lammps: bool,
@@ -107,16 +106,8 @@ pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Outc
     let physics = setting::physics(options.choice);
     let weights = physics.len() as f64 + REFERENCE;
     let effort = options.fixed.map_or(Effort::Seconds(WORKERS * share * seconds / weights), |fixed| fixed.0);
-    let (reference, sampled) = sample_all(&origin, &physics, effort, progress)?;
-    let reference_quantities = match &reference {
-        Sampled::Made { quantities, .. } => quantities.clone(),
-        Sampled::Unstable(why) => {
-            return Err(ParetoError::Reference {
-                what: what(&origin, &Physics::reference()),
-                why: why.clone(),
-            });
-        }
-    };
+    let (references, sampled) = sample_all(&origin, &physics, effort, progress)?;
+    let reference_quantities = references.quantities(&origin)?;
     let drifts = drifts(&origin, known, options, DRIFTS * WORKERS * seconds, progress)?;
 
     let mut points =
@@ -136,22 +127,30 @@ pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Outc
         }
     }
 
-    let stable: Vec<usize> = (0..points.len()).filter(|k| points[*k].unstable.is_none()).collect();
+    let stable: Vec<usize> = (0..points.len()).filter(|k| points[*k].stable).collect();
     let settings: Vec<Setting> = stable.iter().map(|k| points[*k].setting).collect();
     let slices = ((ROUNDS + 1) * settings.len().max(1)) as f64;
     let pace =
         options.fixed.map_or(Pace { rounds: ROUNDS, seconds: TIMING * seconds / slices }, |fixed| fixed.1);
     let costs = time::time(&origin, &settings, lammps.as_ref(), pace, progress)?;
     for (k, cost) in stable.into_iter().zip(costs) {
-        points[k].cost = Spread::of(&cost);
+        points[k].cost = Cost::of(&cost);
     }
-    front::mark(&mut points);
-
-    if let Some(class) = front::unmeasured(&points, &options.tolerances) {
-        return Err(ParetoError::Unmeasured(class));
+    let (tolerances, unresolved) = match &options.tolerances[..] {
+        [] => front::usual(&points),
+        asked => (asked.to_vec(), Vec::new()),
+    };
+    if let Some(tolerance) = front::unmeasured(&points, &tolerances) {
+        return Err(ParetoError::Unmeasured(tolerance.name.clone()));
+    }
+    front::mark(&mut points, &tolerances);
+    let (reference, reference_of_dynamics) = references.tell(&origin, known);
+    if let Err(why) = &references.configurations {
+        left_out
+            .push(format!("There is no Monte Carlo of this scene, so small steps are the reference: {why}."));
     }
     let mut outcome = Outcome {
-        format: 1,
+        format: 2,
         version: env!("CARGO_PKG_VERSION"),
         machine: machine(),
         scene: scene.title.clone(),
@@ -159,20 +158,18 @@ pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Outc
         particles: origin.state.len(),
         kt: origin.stage.kt,
         dt: origin.stage.dt,
-        temperature_is_known: known.kt.is_some(),
-        reference: reference_of(&origin, &Physics::reference(), &reference, known),
+        temperature_is_known: known.temperature,
+        reference,
+        reference_of_dynamics,
         lammps_reference,
         left_out,
         points,
         drifts,
-        tolerances: options.tolerances.clone(),
-        cheapest: None,
-        cheapest_in_lammps: None,
-        scene_lines: None,
-        lammps_lines: None,
-        lammps_refusal: None,
+        tolerances,
+        unresolved,
+        recommended: None,
     };
-    recommend(&origin, &mut outcome);
+    outcome.recommended = recommend(&origin, &outcome);
     let json = serde_json::to_string_pretty(&outcome)
         .map_err(|e| ParetoError::io(out.join("pareto.json"))(e.into()))?;
     write_atomically(out.join("pareto.json"), (json + "\n").as_bytes())?;
@@ -183,6 +180,9 @@ pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Outc
 /// A setting in words.
 fn what(origin: &Origin, physics: &Physics) -> String {
     let integrator = recommend::short(&physics.integrator);
+    if !physics.integrator.has_time() {
+        return integrator;
+    }
     format!("{integrator}, dt = {}, {} precision", origin.dt(physics), physics.precision)
 }
 
@@ -193,23 +193,58 @@ fn known(origin: &Origin) -> Result<Known, ParetoError> {
     let conservative = scene.model.at(stage.kt)?.is_conservative();
     let volume = origin.state.domain.volume(scene.model.dimensions());
     Ok(Known {
-        kt: (conservative && !flows).then_some(stage.kt),
+        kt: stage.kt,
+        temperature: conservative && !flows,
         ideal_pressure: origin.state.len() as f64 * stage.kt / volume,
     })
 }
 
-/// The reference, and every setting's run; two at once.
+/// What errors are held against.
+struct References {
+    /// Monte Carlo, or why there is none.
+    configurations: Result<Sampled, String>,
+    /// Small steps.
+    small_steps: Sampled,
+}
+
+impl References {
+    /// Their quantities: those of configurations from Monte Carlo, if there is one.
+    fn quantities(&self, origin: &Origin) -> Result<Quantities, ParetoError> {
+        let made = |sampled: &Sampled, physics: &Physics| match sampled {
+            Sampled::Made { quantities, .. } => Ok(quantities.as_ref().clone()),
+            Sampled::Unstable(why) => {
+                Err(ParetoError::Reference { what: what(origin, physics), why: why.clone() })
+            }
+        };
+        let small = made(&self.small_steps, &Physics::small_steps());
+        match &self.configurations {
+            Ok(sampled) => Ok(made(sampled, &Physics::reference())?.with_dynamics_of(small.ok().as_ref())),
+            Err(_) => small,
+        }
+    }
+
+    /// The reference, and that of diffusion and viscosities if it is another.
+    fn tell(&self, origin: &Origin, known: Known) -> (Reference, Option<Reference>) {
+        let small = reference_of(origin, &Physics::small_steps(), &self.small_steps, known);
+        match &self.configurations {
+            Ok(sampled) => (reference_of(origin, &Physics::reference(), sampled, known), Some(small)),
+            Err(_) => (small, None),
+        }
+    }
+}
+
+/// The references, and every setting's run; two at once.
 fn sample_all(
     origin: &Origin,
     physics: &[Physics],
     effort: Effort,
     progress: &Progress,
-) -> Result<(Sampled, Vec<Sampled>), ParetoError> {
-    let bar = progress.bar("errors", physics.len() as u64 + 1);
-    let reference = Physics::reference();
+) -> Result<(References, Vec<Sampled>), ParetoError> {
+    let bar = progress.bar("errors", physics.len() as u64 + 2);
+    let references = [Physics::reference(), Physics::small_steps()];
     let mut jobs: Vec<Job<Result<Sampled, ParetoError>>> = Vec::new();
-    for (k, physics) in std::iter::once(&reference).chain(physics).enumerate() {
-        let effort = if k == 0 { effort.times(REFERENCE) } else { effort };
+    for (k, physics) in references.iter().chain(physics).enumerate() {
+        let effort = if k < references.len() { effort.times(REFERENCE) } else { effort };
         let bar = bar.clone();
         jobs.push(Box::new(move || {
             let sampled = sample::sample(origin, physics, effort);
@@ -217,10 +252,13 @@ fn sample_all(
             sampled
         }));
     }
-    let mut found: Vec<Sampled> = jobs::run(jobs).into_iter().collect::<Result<_, _>>()?;
+    let mut found = jobs::run(jobs).into_iter();
+    // A model without energy, or a flow, has no Monte Carlo.
+    let configurations = found.next().map_or(Err(String::new()), |found| found.map_err(|e| e.to_string()));
+    let mut rest: Vec<Sampled> = found.collect::<Result<_, _>>()?;
     bar.finish();
-    let sampled = found.split_off(1);
-    Ok((found.swap_remove(0), sampled))
+    let sampled = rest.split_off(1);
+    Ok((References { configurations, small_steps: rest.swap_remove(0) }, sampled))
 }
 
 /// Energy without thermostat, where there is one that is conserved.
@@ -231,7 +269,7 @@ fn drifts(
     seconds: f64,
     progress: &Progress,
 ) -> Result<Vec<EnergyDrift>, ParetoError> {
-    if known.kt.is_none() || options.choice == Choice::Few {
+    if !known.temperature || options.choice == Choice::Few {
         return Ok(Vec::new());
     }
     let schemes = drift::schemes();
@@ -257,7 +295,7 @@ fn point(origin: &Origin, setting: Setting, sampled: &Sampled, errors: Vec<Devia
         Sampled::Unstable(why) => (0, 0.0, Some(why.clone())),
     };
     Point {
-        host: setting.host,
+        code: setting.host,
         integrator: recommend::short(&setting.physics.integrator),
         dt: origin.dt(&setting.physics),
         precision: setting.physics.precision.to_string(),
@@ -266,8 +304,10 @@ fn point(origin: &Origin, setting: Setting, sampled: &Sampled, errors: Vec<Devia
         samples,
         time,
         errors,
+        worst: None,
+        stable: unstable.is_none(),
         unstable,
-        front: Vec::new(),
+        front: false,
         setting,
     }
 }
@@ -289,7 +329,7 @@ fn native_points(
         let fewest = options.threads.iter().min().copied().unwrap_or(NonZeroUsize::MIN);
         let usual = match physics.integrator {
             Integrator::VelocityVerlet => physics.multiple == 1.0,
-            Integrator::TwoStage { .. } => physics.multiple >= 4.0,
+            Integrator::ForceGradient { .. } => physics.multiple >= 5.0,
             _ => false,
         };
         let matters = options.choice == Choice::Full || usual && physics.precision == Precision::Mixed;
@@ -306,11 +346,11 @@ fn native_points(
 /// The same steps by the plugin, where a deck can have them.
 fn plugin_points(origin: &Origin, points: &mut Vec<Point>) {
     let mut more: Vec<Point> = Vec::new();
-    for p in points.iter().filter(|p| p.unstable.is_none()) {
+    for p in points.iter().filter(|p| p.stable) {
         let setting = Setting { host: Host::Plugin, threads: NonZeroUsize::MIN, ..p.setting };
         let there = more.iter().any(|other| other.setting == setting);
         if !there && recommend::in_lammps(origin, &setting.physics) {
-            more.push(Point { host: Host::Plugin, threads: 1, setting, ..p.clone() });
+            more.push(Point { code: Host::Plugin, threads: 1, setting, ..p.clone() });
         }
     }
     points.extend(more);
@@ -355,7 +395,7 @@ fn own_points(
     let mut known = known;
     let (reference, first) = match (&sampled[0], own.is_another_law()) {
         (Sampled::Made { quantities, .. }, true) => {
-            known.kt = None;
+            known.temperature = false;
             (quantities.as_ref().clone(), 1)
         }
         (Sampled::Unstable(_), true) => return Ok(Some((None, Vec::new()))),
@@ -381,37 +421,33 @@ fn reference_of(origin: &Origin, physics: &Physics, sampled: &Sampled, known: Kn
         }
         Sampled::Unstable(_) => (Vec::new(), 0, 0.0),
     };
-    Reference { what: what(origin, physics), dt: origin.dt(physics), samples, time, values }
+    let dt = physics.integrator.has_time().then(|| origin.dt(physics));
+    Reference { what: what(origin, physics), dt, samples, time, values }
 }
 
-fn recommend(origin: &Origin, outcome: &mut Outcome) {
-    let best = |hosts: &[Host]| front::cheapest(&outcome.points, &outcome.tolerances, hosts);
-    let (cheapest, in_lammps) = (best(&[Host::Native]), best(&[Host::Plugin]));
-    outcome.cheapest = cheapest;
-    outcome.cheapest_in_lammps = in_lammps;
-    let Some(point) = cheapest.and_then(|k| outcome.points.get(k)) else { return };
-    let setting = point.setting;
-    let lines = recommend::lammps_lines(origin, &setting.physics);
-    let other = in_lammps.and_then(|k| outcome.points.get(k)).map(|p| p.setting.physics);
-    outcome.scene_lines = Some(recommend::scene_lines(origin.dt(&setting.physics), &setting));
-    match (lines, other) {
-        (Ok(lines), None) => outcome.lammps_lines = Some(lines),
-        (result, Some(other)) => {
-            outcome.lammps_refusal = result.err().map(|e| e.to_string());
-            outcome.lammps_lines = recommend::lammps_lines(origin, &other).ok();
-        }
-        (Err(refusal), None) => {
-            outcome.lammps_refusal = Some(refusal.to_string());
-            // Without LAMMPS here its cost is not known: the cheapest natively of what it can run.
-            let runs = |p: &&Point| recommend::in_lammps(origin, &p.setting.physics);
-            let within = |p: &&Point| outcome.tolerances.iter().all(|t| p.is_within(t) == Some(true));
-            let cost = |p: &&Point| p.cost.as_ref().map_or(f64::INFINITY, |c| c.median);
-            let native = outcome.points.iter().filter(|p| p.host == Host::Native && p.unstable.is_none());
-            let found = native.filter(runs).filter(within).min_by(|a, b| cost(a).total_cmp(&cost(b)));
-            outcome.lammps_lines =
-                found.and_then(|p| recommend::lammps_lines(origin, &p.setting.physics).ok());
-        }
-    }
+fn recommend(origin: &Origin, outcome: &Outcome) -> Option<Recommended> {
+    let Outcome { points, tolerances, .. } = outcome;
+    let best = front::cheapest(points, tolerances, &[Host::Native])?;
+    let timed = front::cheapest(points, tolerances, &[Host::Plugin]);
+    let setting = points[best].setting;
+    let same = recommend::lammps_lines(origin, &setting.physics);
+    let other = timed.or_else(|| {
+        // Without LAMMPS here its cost is not known: the cheapest natively of what it can run.
+        let runs: Vec<Point> =
+            points.iter().filter(|p| recommend::in_lammps(origin, &p.setting.physics)).cloned().collect();
+        let found = front::cheapest(&runs, tolerances, &[Host::Native])?;
+        points.iter().position(|p| *p == runs[found])
+    });
+    let (lammps, lammps_refusal) = match (same, other) {
+        (Ok(lines), None) => (Some(lines), None),
+        (same, Some(k)) => (
+            recommend::lammps_lines(origin, &points[k].setting.physics).ok(),
+            same.err().map(|e| e.to_string()),
+        ),
+        (Err(refusal), None) => (None, Some(refusal.to_string())),
+    };
+    let scene = recommend::scene_lines(origin.dt(&setting.physics), &setting);
+    Some(Recommended { point: best, scene, lammps, point_in_lammps: timed, lammps_refusal })
 }
 
 #[cfg(test)]

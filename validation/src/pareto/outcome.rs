@@ -1,9 +1,9 @@
 //! What `pareto.json` has.
 
 use super::drift::EnergyDrift;
-use super::quantity::{Class, Deviation};
+use super::quantity::{self, Class, Deviation};
 use super::setting::{Host, Setting};
-use super::tolerance::Tolerance;
+use super::tolerance::{self, Tolerance, Worst};
 use crate::bench::Spread;
 use serde::Serialize;
 
@@ -31,6 +31,8 @@ pub struct Outcome {
     pub temperature_is_known: bool,
     /// What errors are held against, with its own: of its temperatures, and in the errors of its values.
     pub reference: Reference,
+    /// What those of diffusion and viscosities are held against, if the reference has no time step.
+    pub reference_of_dynamics: Option<Reference>,
     /// That of LAMMPS's own style.
     pub lammps_reference: Option<Reference>,
     /// Why LAMMPS, or one of its styles, is not among the points.
@@ -39,17 +41,27 @@ pub struct Outcome {
     pub points: Vec<Point>,
     /// Energy without thermostat.
     pub drifts: Vec<EnergyDrift>,
-    /// What was asked for.
+    /// What was asked for; one percent of all that was resolved so well if nothing was.
+    #[serde(rename = "tolerance", serialize_with = "tolerance::by_name")]
     pub tolerances: Vec<Tolerance>,
-    /// The place in `points` of the cheapest setting within these.
-    pub cheapest: Option<usize>,
-    /// The same among what LAMMPS can run with the plugin.
-    pub cheapest_in_lammps: Option<usize>,
+    /// Quantities that are not judged, as most points do not resolve one percent of them.
+    pub unresolved: Vec<String>,
+    /// The cheapest setting within these.
+    pub recommended: Option<Recommended>,
+}
+
+/// The cheapest setting within tolerances.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Recommended {
+    /// Its place among the points.
+    pub point: usize,
     /// The lines of a scene.
-    pub scene_lines: Option<String>,
-    /// The lines of a LAMMPS script.
-    pub lammps_lines: Option<String>,
-    /// What LAMMPS cannot express.
+    pub scene: String,
+    /// The lines of a LAMMPS script: of the same steps, or of the cheapest that LAMMPS can make.
+    pub lammps: Option<String>,
+    /// The place of these among the points, if LAMMPS was timed.
+    pub point_in_lammps: Option<usize>,
+    /// What LAMMPS cannot express of the setting.
     pub lammps_refusal: Option<String>,
 }
 
@@ -58,21 +70,43 @@ pub struct Outcome {
 pub struct Reference {
     /// In words.
     pub what: String,
-    /// Δt.
-    pub dt: f64,
+    /// Δt, if it has one.
+    pub dt: Option<f64>,
     /// Samples.
     pub samples: u64,
-    /// Simulated time.
+    /// Simulated time; in Monte Carlo, sweeps.
     pub time: f64,
     /// Its values; errors of the temperatures where these are known.
+    #[serde(serialize_with = "quantity::by_name")]
     pub values: Vec<Deviation>,
+}
+
+/// Wall seconds for a unit of simulated time.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Cost {
+    /// The median over rounds.
+    pub value: f64,
+    /// Half of the difference between the slowest round and the fastest.
+    pub error: f64,
+    /// The fastest round.
+    pub min: f64,
+    /// The slowest round.
+    pub max: f64,
+}
+
+impl Cost {
+    /// Of rounds; `None` if there were none.
+    pub fn of(rounds: &[f64]) -> Option<Cost> {
+        let Spread { min, median, max } = Spread::of(rounds)?;
+        Some(Cost { value: median, error: 0.5 * (max - min), min, max })
+    }
 }
 
 /// One setting.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Point {
-    /// Who.
-    pub host: Host,
+    /// Who makes the steps.
+    pub code: Host,
     /// How a step is made.
     pub integrator: String,
     /// Δt.
@@ -81,18 +115,23 @@ pub struct Point {
     pub precision: String,
     /// Threads.
     pub threads: usize,
-    /// Wall seconds for a unit of simulated time, over the rounds; nothing where it is unstable.
-    pub cost: Option<Spread>,
+    /// Nothing where it is unstable.
+    pub cost: Option<Cost>,
     /// Samples.
     pub samples: u64,
     /// Simulated time that errors are from.
     pub time: f64,
-    /// Errors.
+    /// Errors, by quantity: `u` and temperatures in kT, pressures in ρkT, densities in that of the liquid, others relative.
+    #[serde(serialize_with = "quantity::by_name")]
     pub errors: Vec<Deviation>,
-    /// Why it has none.
+    /// The error that is most of its tolerance.
+    pub worst: Option<Worst>,
+    /// Whether the run was made to its end.
+    pub stable: bool,
+    /// Why not.
     pub unstable: Option<String>,
-    /// For which kinds it is on the front: nothing is cheaper with a smaller error.
-    pub front: Vec<Class>,
+    /// Whether nothing is cheaper with a smaller worst error.
+    pub front: bool,
     /// Its setting.
     #[serde(skip)]
     pub setting: Setting,
@@ -104,15 +143,19 @@ impl Point {
         self.errors.iter().filter(|d| d.class == class).max_by(|a, b| a.shown().total_cmp(&b.shown()))
     }
 
-    /// Whether all errors of a kind are within a bound, as far as is known; `None` if none was measured.
-    pub fn is_within(&self, tolerance: &Tolerance) -> Option<bool> {
-        let bound = self.errors.iter().filter(|d| d.class == tolerance.class).map(Deviation::bound);
-        bound.reduce(f64::max).map(|bound| bound <= tolerance.bound)
+    /// Whether all errors are within their bounds, two of their own added, as far as is known; false where nothing was measured
+    /// that is bound.
+    pub fn is_within(&self, tolerances: &[Tolerance]) -> bool {
+        !tolerances.is_empty()
+            && tolerances.iter().all(|t| {
+                let mut errors = self.errors.iter().filter(|d| t.applies(d)).peekable();
+                errors.peek().is_some() && errors.all(|d| d.bound() <= t.bound)
+            })
     }
 
     /// In words.
     pub fn name(&self) -> String {
-        let who = match self.host {
+        let who = match self.code {
             Host::Native => "native",
             Host::Plugin => "plugin",
             Host::Lammps => "lammps",

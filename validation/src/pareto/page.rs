@@ -8,18 +8,17 @@ use crate::report::{Item, Plot, Report, Section, Series, Style, Table};
 
 /// An error in percent with its own; what is not resolved as what it is likely to be below.
 fn shown(d: &Deviation) -> String {
-    let percent = |x: f64| 100.0 * x;
     if !d.resolved {
-        return format!("< {:.2}", percent(d.bound()));
+        return format!("< {:.2}", 100.0 * d.bound());
     }
     let sign = if d.class == Class::Structure {
         ""
-    } else if d.relative < 0.0 {
+    } else if d.value < 0.0 {
         "-"
     } else {
         "+"
     };
-    format!("{sign}{:.2} ± {:.2}", percent(d.relative.abs()), percent(d.uncertainty))
+    format!("{sign}{:.2} ± {:.2}", 100.0 * d.value.abs(), 100.0 * d.error)
 }
 
 /// The quantities that some point has an error of, in the order of the first that has them.
@@ -39,10 +38,10 @@ fn row(names: &[String], errors: &[Deviation]) -> Vec<String> {
 }
 
 fn reference_row(names: &[String], who: &str, reference: &Reference) -> Vec<String> {
-    let mut cells =
-        vec![who.to_owned(), format!("{}", reference.dt), String::new(), String::new(), String::new()];
+    let dt = reference.dt.map_or_else(|| "none".into(), |dt| dt.to_string());
+    let mut cells = vec![who.to_owned(), dt, String::new(), String::new(), String::new()];
     cells.extend(row(names, &reference.values));
-    cells.push(String::new());
+    cells.extend([String::new(), String::new()]);
     cells
 }
 
@@ -52,22 +51,26 @@ pub fn table(outcome: &Outcome) -> Table {
     let mut header: Vec<String> =
         ["setting", "dt", "precision", "threads", "s per time unit"].map(str::to_owned).to_vec();
     header.extend(names.iter().map(|name| format!("{name} %")));
-    header.push("front".into());
+    header.extend(["worst".into(), "front".into()]);
     let mut table = Table::new(header);
     let mut points: Vec<&Point> = outcome.points.iter().collect();
-    let cost = |p: &Point| p.cost.as_ref().map_or(f64::INFINITY, |c| c.median);
+    let cost = |p: &Point| p.cost.as_ref().map_or(f64::INFINITY, |c| c.value);
     points.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
     for p in points {
         let cost = match &p.cost {
-            Some(c) => format!("{:.4} ({:.4}–{:.4})", c.median, c.min, c.max),
+            Some(c) => format!("{:.4} ({:.4}–{:.4})", c.value, c.min, c.max),
             None => "unstable".into(),
         };
         let mut cells = vec![p.name(), format!("{}", p.dt), p.precision.clone(), p.threads.to_string(), cost];
         cells.extend(row(&names, &p.errors));
-        cells.push(p.front.iter().map(|c| c.name()).collect::<Vec<_>>().join(" "));
+        cells.push(p.worst.as_ref().map_or_else(String::new, |w| format!("{} {:.2}", w.quantity, w.ratio)));
+        cells.push(if p.front { "front".into() } else { String::new() });
         table.push(cells);
     }
     table.push(reference_row(&names, "the reference itself", &outcome.reference));
+    if let Some(reference) = &outcome.reference_of_dynamics {
+        table.push(reference_row(&names, "that of D and eta itself", reference));
+    }
     if let Some(reference) = &outcome.lammps_reference {
         table.push(reference_row(&names, "LAMMPS's reference itself", reference));
     }
@@ -94,78 +97,104 @@ pub fn drifts(outcome: &Outcome) -> Table {
     table
 }
 
-/// Error against cost for one kind of quantity; the front is a line.
-fn plot(outcome: &Outcome, class: Class) -> Option<Plot> {
-    let place = |p: &Point| Some((p.cost.as_ref()?.median, 100.0 * p.error(class)?.shown()));
-    let mut groups: Vec<String> = Vec::new();
-    let group = |p: &Point| match p.host {
+/// Who makes the steps, and what kind they are.
+fn group(p: &Point) -> String {
+    match p.code {
         Host::Native => p.integrator.split(',').next().unwrap_or_default().to_owned(),
         Host::Plugin => "plugin in LAMMPS".to_owned(),
         Host::Lammps => "LAMMPS's own style".to_owned(),
-    };
-    for p in &outcome.points {
-        if place(p).is_some() && !groups.contains(&group(p)) {
-            groups.push(group(p));
+    }
+}
+
+/// Points of error against cost, in groups; `error` and its bar are in percent or in units of a tolerance.
+fn groups(outcome: &Outcome, error: impl Fn(&Point) -> Option<[f64; 2]>) -> Vec<Series> {
+    let place = |p: &Point| Some((p.cost.as_ref()?.value, error(p)?[0]));
+    let shown: Vec<&Point> = outcome.points.iter().filter(|p| place(p).is_some()).collect();
+    let mut names: Vec<String> = Vec::new();
+    for p in &shown {
+        if !names.contains(&group(p)) {
+            names.push(group(p));
         }
     }
-    if groups.is_empty() {
-        return None;
-    }
-    let mut series = Vec::new();
-    let mut front: Vec<(f64, f64)> =
-        outcome.points.iter().filter(|p| p.front.contains(&class)).filter_map(place).collect();
-    front.sort_by(|a, b| a.0.total_cmp(&b.0));
-    for name in groups {
-        let own: Vec<&Point> =
-            outcome.points.iter().filter(|p| group(p) == name && place(p).is_some()).collect();
-        let bar = |p: &&Point| match p.error(class) {
-            Some(d) if d.resolved => 100.0 * d.uncertainty,
-            _ => f64::NAN,
-        };
-        series.push(Series {
-            name,
-            points: own.iter().filter_map(|p| place(p)).collect(),
-            errors: Some(own.iter().map(bar).collect()),
-            style: Style::Points,
-        });
-    }
-    series.push(Series { name: "front".into(), points: front, errors: None, style: Style::Line });
-    let levels = outcome.tolerances.iter().filter(|t| t.class == class);
-    Some(Plot {
-        title: format!("Error of {} against cost", class.name()),
+    let series = |name: String| {
+        let own: Vec<&&Point> = shown.iter().filter(|p| group(p) == name).collect();
+        let points = own.iter().filter_map(|p| place(p)).collect();
+        let errors = own.iter().map(|p| error(p).map_or(f64::NAN, |e| e[1])).collect();
+        Series { name, points, errors: Some(errors), style: Style::Points }
+    };
+    names.into_iter().map(series).collect()
+}
+
+fn plot(title: &str, y_label: String, series: Vec<Series>, levels: Vec<(f64, String)>) -> Plot {
+    Plot {
+        title: title.into(),
         x_label: "wall seconds per unit of simulated time".into(),
-        y_label: format!("error of {}, %", class.name()),
+        y_label,
         series,
         log_x: true,
         log_y: true,
-        levels: levels.map(|t| (100.0 * t.bound, "tolerance".to_owned())).collect(),
+        levels,
         marks: Vec::new(),
-    })
+    }
+}
+
+/// The worst error of every setting against its cost; the front is a line.
+fn plot_of_worst(outcome: &Outcome) -> Option<Plot> {
+    let error = |p: &Point| Some([p.worst.as_ref()?.ratio, f64::NAN]);
+    let mut series = groups(outcome, error);
+    if series.is_empty() {
+        return None;
+    }
+    let front = outcome.points.iter().filter(|p| p.front);
+    let mut points: Vec<(f64, f64)> =
+        front.filter_map(|p| Some((p.cost.as_ref()?.value, error(p)?[0]))).collect();
+    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    series.push(Series { name: "front".into(), points, errors: None, style: Style::Line });
+    let label = "worst error over its tolerance".to_owned();
+    Some(plot("Worst error against cost", label, series, vec![(1.0, "tolerance".into())]))
+}
+
+/// Error against cost for one kind of quantity.
+fn plot_of(outcome: &Outcome, class: Class) -> Option<Plot> {
+    let error = |p: &Point| {
+        let d = p.error(class)?;
+        Some([100.0 * d.shown(), if d.resolved { 100.0 * d.error } else { f64::NAN }])
+    };
+    let series = groups(outcome, error);
+    let title = format!("Error of {} against cost", class.name());
+    let levels = outcome.tolerances.iter().filter(|t| t.name == class.name());
+    let levels = levels.map(|t| (100.0 * t.bound, "tolerance".to_owned())).collect();
+    (!series.is_empty()).then(|| plot(&title, format!("error of {}, %", class.name()), series, levels))
 }
 
 /// What is recommended, in words.
 pub fn recommendation(outcome: &Outcome) -> String {
     let within: Vec<String> = outcome.tolerances.iter().map(ToString::to_string).collect();
     let within = within.join(", ");
-    let Some(best) = outcome.cheapest.and_then(|k| outcome.points.get(k)) else {
-        return format!(
+    let mut text = match &outcome.unresolved[..] {
+        [] => String::new(),
+        names => format!("Not judged, as most runs do not resolve 1 % of it: {}.\n\n", names.join(", ")),
+    };
+    let Some(best) = &outcome.recommended else {
+        text += &format!(
             "No setting has {within}, with twice the error of its error. Where errors in the table are not resolved, \
              longer runs (--minutes) may show one."
         );
+        return text;
     };
-    let seconds = best.cost.as_ref().map_or(f64::NAN, |c| c.median);
-    let mut text = format!(
+    let point = &outcome.points[best.point];
+    text += &format!(
         "The cheapest setting with {within}: {}, dt = {}, {} precision, {:.4} s per unit of simulated time.\n\n{}",
-        best.name(),
-        best.dt,
-        best.precision,
-        seconds,
-        outcome.scene_lines.as_deref().unwrap_or_default()
+        point.name(),
+        point.dt,
+        point.precision,
+        point.cost.as_ref().map_or(f64::NAN, |c| c.value),
+        best.scene
     );
-    if let Some(refusal) = &outcome.lammps_refusal {
+    if let Some(refusal) = &best.lammps_refusal {
         text += &format!("\nNot in LAMMPS: {refusal}.\n");
     }
-    match (&outcome.lammps_lines, outcome.cheapest_in_lammps.and_then(|k| outcome.points.get(k))) {
+    match (&best.lammps, best.point_in_lammps.and_then(|k| outcome.points.get(k))) {
         (Some(lines), Some(p)) => {
             text += &format!("\nIn LAMMPS, {}, dt = {}:\n\n{lines}", p.integrator, p.dt);
         }
@@ -181,12 +210,18 @@ pub fn explanation(outcome: &Outcome) -> String {
         true => "of the temperatures from kT",
         false => "of the kinetic temperature from that of the reference",
     };
+    let dynamics = match &outcome.reference_of_dynamics {
+        Some(r) => format!(", and those of D and eta from {}", r.what),
+        None => String::new(),
+    };
     format!(
-        "Errors are in percent: {temperature}, of pressure, densities, tension, diffusion and g(r) from the \
-         reference ({}, {} samples over {:.1} time units), whose own errors are in its row; \
-         ± is one standard deviation, and \"<\" an error below twice that, with what it is likely to be below. \
-         Points of the plugin have the errors of the native steps, which they are. Points of LAMMPS's own many-body \
-         style are another force law, held against small steps of its own; they are not on the front.",
+        "Errors are in percent: of u and of temperatures in percent of kT, of pressures of ρkT, of densities of the liquid's, of \
+         others of themselves. They are those {temperature}, of all else from the reference ({}, {} samples over {:.1} time \
+         units or sweeps){dynamics}; the references' own errors are in their rows. ± is one standard deviation, and \"<\" an \
+         error below twice that, with what it is likely to be below. \"worst\" is the error that is most of its tolerance. \
+         p_carried is the momentum that steps carry, which walls and coexisting phases feel. Points of the plugin have the \
+         errors of the native steps, which they are. Points of LAMMPS's own many-body style are another force law, held \
+         against small steps of its own; they are not on the front.",
         outcome.reference.what, outcome.reference.samples, outcome.reference.time
     )
 }
@@ -197,8 +232,9 @@ pub fn explanation(outcome: &Outcome) -> String {
 /// A plot cannot be drawn.
 pub fn report(outcome: &Outcome) -> Result<String, ParetoError> {
     let mut plots = Vec::new();
-    for (_, class) in Class::ALL {
-        if let Some(plot) = plot(outcome, class) {
+    let all = Class::ALL.into_iter().map(|(_, class)| plot_of(outcome, class));
+    for plot in std::iter::once(plot_of_worst(outcome)).chain(all) {
+        if let Some(plot) = plot {
             plots.push(Item::Figure {
                 svg: plot.render()?,
                 caption: "Without a bar: not resolved, at what the error is likely to be below.".into(),

@@ -1,26 +1,32 @@
 //! What errors are told of, and how large they are.
 
 use crate::observe::{Measured, Observation};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
-/// Kinds of quantities, each with one tolerance.
+/// Kinds of quantities.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub enum Class {
-    /// Kinetic and configurational temperature.
-    #[serde(rename = "T")]
-    Temperature,
-    /// Conservative pressure, in units of the larger of itself and ρ kT.
+    /// Energy of the particles, in kT for each.
+    #[serde(rename = "u")]
+    Energy,
+    /// Pressures of the conservative forces and of the momentum carried, in ρkT.
     #[serde(rename = "p")]
     Pressure,
+    /// Kinetic and configurational temperature, in kT.
+    #[serde(rename = "T")]
+    Temperature,
     /// Coexisting densities, in units of the liquid's.
     #[serde(rename = "rho")]
     Density,
-    /// Surface tension.
+    /// Surface tension, in units of itself.
     #[serde(rename = "sigma")]
     Tension,
-    /// Diffusion coefficient.
+    /// Diffusion coefficient, in units of itself.
     #[serde(rename = "D")]
     Diffusion,
+    /// Shear viscosity, in units of itself.
+    #[serde(rename = "eta")]
+    Viscosity,
     /// The distance of g(r): root mean square difference over root mean square, weighed by shells.
     #[serde(rename = "g")]
     Structure,
@@ -28,12 +34,14 @@ pub enum Class {
 
 impl Class {
     /// With the names on the command line.
-    pub const ALL: [(&'static str, Class); 6] = [
-        ("T", Class::Temperature),
+    pub const ALL: [(&'static str, Class); 8] = [
+        ("u", Class::Energy),
         ("p", Class::Pressure),
+        ("T", Class::Temperature),
         ("rho", Class::Density),
         ("sigma", Class::Tension),
         ("D", Class::Diffusion),
+        ("eta", Class::Viscosity),
         ("g", Class::Structure),
     ];
 
@@ -42,24 +50,32 @@ impl Class {
         Class::ALL.iter().find(|(_, class)| *class == self).map_or("", |found| found.0)
     }
 
-    /// All names.
-    pub fn names() -> String {
-        Class::ALL.map(|(name, _)| name).join(", ")
+    /// Whether it is a property of configurations alone, which a reference without a time step has.
+    pub fn is_of_configurations(self) -> bool {
+        !matches!(self, Class::Diffusion | Class::Viscosity)
     }
 }
 
 /// Where quantities are among the observations: class, name here, observation, column.
-const SCALARS: [(Class, &str, &str, &str); 9] = [
+const SCALARS: [(Class, &str, &str, &str); 12] = [
+    (Class::Pressure, "p_conservative", "pressure", "conservative"),
+    (Class::Pressure, "p_carried", "pressure", "carried"),
     (Class::Temperature, "T_conf", "temperature", "configurational"),
-    (Class::Pressure, "p", "pressure", "conservative"),
     (Class::Density, "rho_L", "interface_width", "liquid"),
     (Class::Density, "rho_V", "interface_width", "vapour"),
-    (Class::Density, "rho_L drop", "drop", "liquid"),
-    (Class::Density, "rho_V drop", "drop", "vapour"),
+    (Class::Density, "rho_L_drop", "drop", "liquid"),
+    (Class::Density, "rho_V_drop", "drop", "vapour"),
     (Class::Tension, "sigma", "surface_tension", "free_energy"),
-    (Class::Tension, "sigma stress", "surface_tension", "stress"),
-    (Class::Tension, "sigma drop", "drop", "tension"),
+    (Class::Tension, "sigma_stress", "surface_tension", "stress"),
+    (Class::Tension, "sigma_drop", "drop", "tension"),
+    (Class::Viscosity, "eta", "viscosity", "viscosity"),
+    (Class::Viscosity, "eta_flow", "poiseuille", "viscosity"),
 ];
+
+/// The names of quantities that a tolerance can be for.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    ["u", "T_kin", "p_total", "D", "g"].into_iter().chain(SCALARS.iter().map(|(_, name, ..)| *name))
+}
 
 /// A measured quantity.
 #[derive(Debug, Clone, PartialEq)]
@@ -93,10 +109,16 @@ pub struct Quantities {
 }
 
 impl Quantities {
-    /// From a kinetic temperature and what was observed.
-    pub fn of(kinetic: Measured, observations: &[Observation], dimensions: usize) -> Quantities {
-        let mut scalars =
-            vec![Quantity { class: Class::Temperature, name: "T_kin".into(), measured: kinetic }];
+    /// From what was measured at every sample, by class and name, and what was observed.
+    pub fn of(
+        sampled: impl IntoIterator<Item = (Class, &'static str, Measured)>,
+        observations: &[Observation],
+        dimensions: usize,
+    ) -> Quantities {
+        let mut scalars: Vec<Quantity> = sampled
+            .into_iter()
+            .map(|(class, name, measured)| Quantity { class, name: name.into(), measured })
+            .collect();
         let known = |m: &Measured| m.value.is_finite() && m.error.is_finite();
         for (class, name, of, column) in SCALARS {
             let found = observations.iter().find(|o| o.name == of).and_then(|o| o.scalar(column));
@@ -131,36 +153,45 @@ impl Quantities {
         same
     }
 
+    /// The same with the diffusion and viscosities of another run, if there is one.
+    #[must_use]
+    pub fn with_dynamics_of(mut self, other: Option<&Quantities>) -> Quantities {
+        self.scalars.retain(|q| q.class.is_of_configurations());
+        let theirs = other.iter().flat_map(|other| &other.scalars);
+        self.scalars.extend(theirs.filter(|q| !q.class.is_of_configurations()).cloned());
+        self
+    }
+
     /// A quantity by its name.
     pub fn get(&self, name: &str) -> Option<Measured> {
         self.scalars.iter().find(|q| q.name == name).map(|q| q.measured)
     }
 }
 
-/// What is known better than by measuring.
+/// What is known better than by measuring, and units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Known {
-    /// The temperature, where velocities must have Maxwell's distribution at it: no flow, forces with a potential.
-    pub kt: Option<f64>,
+    /// kT of the stage.
+    pub kt: f64,
+    /// Whether that is the temperature of velocities and configurations: no flow, forces with a potential.
+    pub temperature: bool,
     /// ρ kT.
     pub ideal_pressure: f64,
 }
 
-/// An error, in units of the quantity, with an error of its own.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// The error of a quantity, in the unit of its class, with an error of its own.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Deviation {
     /// Its kind.
     pub class: Class,
     /// Of which quantity.
     pub name: String,
-    /// Its value.
+    /// What was measured, in the unit of the model.
+    pub measured: Measured,
+    /// The error, with its sign.
     pub value: f64,
-    /// One standard deviation of that.
-    pub value_error: f64,
-    /// The relative error, with its sign.
-    pub relative: f64,
     /// One standard deviation of that, the reference's among it.
-    pub uncertainty: f64,
+    pub error: f64,
     /// Whether the error is larger than two of these.
     pub resolved: bool,
 }
@@ -169,21 +200,38 @@ pub struct Deviation {
 const MARGIN: f64 = 2.0;
 
 impl Deviation {
-    fn new(class: Class, name: &str, measured: Measured, relative: f64, uncertainty: f64) -> Deviation {
-        let Measured { value, error: value_error } = measured;
-        let resolved = relative.abs() > MARGIN * uncertainty;
-        Deviation { class, name: name.into(), value, value_error, relative, uncertainty, resolved }
+    fn new(class: Class, name: &str, measured: Measured, value: f64, error: f64) -> Deviation {
+        Deviation { class, name: name.into(), measured, value, error, resolved: value.abs() > MARGIN * error }
     }
 
     /// The largest error that is likely: what tolerances bound.
     pub fn bound(&self) -> f64 {
-        self.relative.abs() + MARGIN * self.uncertainty
+        self.value.abs() + MARGIN * self.error
     }
 
     /// Where it is on a plot: at its error, or if that is not resolved at what it may be.
     pub fn shown(&self) -> f64 {
-        if self.resolved { self.relative.abs() } else { self.bound() }
+        if self.resolved { self.value.abs() } else { self.bound() }
     }
+
+    /// Whether an error of `bound` would be resolved.
+    pub fn resolves(&self, bound: f64) -> bool {
+        MARGIN * self.error <= bound
+    }
+}
+
+/// By name; the order of the table is not kept.
+pub fn by_name<S: Serializer>(deviations: &[Deviation], serializer: S) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    struct Entry {
+        value: f64,
+        error: f64,
+        resolved: bool,
+        measured: Measured,
+    }
+    let entry =
+        |d: &Deviation| Entry { value: d.value, error: d.error, resolved: d.resolved, measured: d.measured };
+    serializer.collect_map(deviations.iter().map(|d| (&d.name, entry(d))))
 }
 
 /// The errors of `run` against what is known, and against `reference` otherwise.
@@ -196,29 +244,31 @@ pub fn deviations(run: &Quantities, reference: &Quantities, known: Known) -> Vec
         .fold(0.0, f64::max);
     let mut found = Vec::new();
     for Quantity { class, name, measured } in &run.scalars {
-        let exact = known.kt.filter(|_| *class == Class::Temperature);
-        let truth = match exact {
-            Some(value) => Some(Measured { value, error: 0.0 }),
-            None => reference.get(name),
+        let truth = match known.temperature && *class == Class::Temperature {
+            true => Some(Measured { value: known.kt, error: 0.0 }),
+            false => reference.get(name),
         };
         let Some(truth) = truth else { continue };
-        let scale = match class {
-            Class::Pressure => truth.value.abs().max(known.ideal_pressure),
+        let unit = match class {
+            Class::Energy | Class::Temperature => known.kt,
+            Class::Pressure => known.ideal_pressure,
             Class::Density => liquid,
             _ => truth.value.abs(),
         };
-        if scale > 0.0 && measured.error.is_finite() && truth.error.is_finite() {
-            let relative = (measured.value - truth.value) / scale;
-            let uncertainty = measured.error.hypot(truth.error) / scale;
-            found.push(Deviation::new(*class, name, *measured, relative, uncertainty));
+        if unit > 0.0 && measured.error.is_finite() && truth.error.is_finite() {
+            let value = (measured.value - truth.value) / unit;
+            let error = measured.error.hypot(truth.error) / unit;
+            found.push(Deviation::new(*class, name, *measured, value, error));
         }
     }
     if let (Some(a), Some(b)) = (&run.structure, &reference.structure)
         && a.g.len() == b.g.len()
     {
         let [distance, error] = distance(a, b);
-        let measured = Measured { value: distance, error };
-        found.push(Deviation::new(Class::Structure, "g(r)", measured, distance, error));
+        if distance.is_finite() && error.is_finite() {
+            let measured = Measured { value: distance, error };
+            found.push(Deviation::new(Class::Structure, "g", measured, distance, error));
+        }
     }
     found
 }
@@ -248,21 +298,47 @@ mod tests {
     use super::*;
 
     fn run(kinetic: f64, error: f64) -> Quantities {
-        Quantities::of(Measured { value: kinetic, error }, &[], 3)
+        Quantities::of([(Class::Temperature, "T_kin", Measured { value: kinetic, error })], &[], 3)
     }
 
     #[test]
     fn temperatures_are_held_against_what_is_known() {
-        let known = Known { kt: Some(2.0), ideal_pressure: 1.0 };
+        let known = Known { kt: 2.0, temperature: true, ideal_pressure: 1.0 };
         let found = deviations(&run(2.1, 0.01), &run(1.9, 0.5), known);
         assert_eq!(found.len(), 1);
-        assert!((found[0].relative - 0.05).abs() < 1e-12 && (found[0].uncertainty - 0.005).abs() < 1e-12);
+        assert!((found[0].value - 0.05).abs() < 1e-12 && (found[0].error - 0.005).abs() < 1e-12);
         assert!(found[0].resolved && (found[0].bound() - 0.06).abs() < 1e-12);
-        assert_eq!(found[0].shown(), found[0].relative.abs());
+        assert_eq!(found[0].shown(), found[0].value.abs());
+        assert!(found[0].resolves(0.0101) && !found[0].resolves(0.0099));
         // Against a reference both are uncertain.
-        let found = deviations(&run(2.1, 0.3), &run(2.0, 0.4), Known { kt: None, ..known });
-        assert!((found[0].uncertainty - 0.25).abs() < 1e-12 && !found[0].resolved);
+        let found = deviations(&run(2.1, 0.3), &run(2.0, 0.4), Known { temperature: false, ..known });
+        assert!((found[0].error - 0.25).abs() < 1e-12 && !found[0].resolved);
         assert_eq!(found[0].shown(), found[0].bound());
+    }
+
+    /// Energies are in kT, pressures in ρkT, densities in that of the liquid; diffusion is another run's.
+    #[test]
+    fn every_class_has_its_unit() {
+        let of = |u: f64, p: f64, liquid: f64, vapour: f64, d: f64| {
+            let exact = |value| Measured { value, error: 0.0 };
+            Quantities::of(
+                [
+                    (Class::Energy, "u", exact(u)),
+                    (Class::Pressure, "p_carried", exact(p)),
+                    (Class::Density, "rho_L", exact(liquid)),
+                    (Class::Density, "rho_V", exact(vapour)),
+                    (Class::Diffusion, "D", exact(d)),
+                ],
+                &[],
+                3,
+            )
+        };
+        let reference = of(-26.0, 1.0, 8.0, 0.5, 9.0).with_dynamics_of(Some(&of(0.0, 0.0, 0.0, 0.0, 4.0)));
+        let known = Known { kt: 2.0, temperature: true, ideal_pressure: 12.0 };
+        let found = deviations(&of(-25.0, 4.0, 8.4, 0.9, 5.0), &reference, known);
+        let values: Vec<f64> = found.iter().map(|d| d.value).collect();
+        let expected = [0.5, 0.25, 0.05, 0.05, 0.25];
+        assert!(values.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{values:?}");
     }
 
     #[test]

@@ -2,8 +2,8 @@
 
 use super::ParetoError;
 use super::origin::Origin;
-use super::quantity::Quantities;
-use super::setting::{Host, INTERVAL, Physics};
+use super::quantity::{Class, Quantities};
+use super::setting::{Host, Physics};
 use crate::observe::meter::AnyMeter;
 use crate::observe::{Observe, Observers, Request, Series, StageNames, read};
 use crate::run::{RunError, Simulation};
@@ -64,16 +64,18 @@ const RARELY: u64 = 3;
 /// A run is given up where it is hotter than this, in kT.
 pub const FAR_OFF: f64 = 5.0;
 
-/// What is observed: temperature of configurations, pressure, g(r) and diffusion, and what the scene itself asks of interfaces.
+/// What is observed: temperature of configurations, pressures, g(r) and diffusion, and what the scene itself asks of interfaces and
+/// viscosities. Without time there is neither diffusion nor viscosity.
 ///
 /// # Errors
 /// The model has none of these: never.
-pub fn observe(origin: &Origin, every: u64, host: Host) -> Result<Observe, ParetoError> {
+pub fn observe(origin: &Origin, every: u64, host: Host, has_time: bool) -> Result<Observe, ParetoError> {
     let (scene, stage) = (origin.scene, origin.stage);
     // Pressure and forces of LAMMPS's own law are not those of the model.
     let with_forces = host == Host::Native;
     let forces = if with_forces { "temperature = true\npressure = true\n" } else { "" };
-    let text = format!("[observe]\n{forces}rdf = {{ bins = 100 }}\nmsd = {{ length = 10, spacing = 2 }}\n");
+    let motion = if has_time { "msd = { length = 10, spacing = 2 }\n" } else { "" };
+    let text = format!("[observe]\n{forces}rdf = {{ bins = 100 }}\n{motion}");
     let document = Document::parse("pareto", &text)?;
     let names = [stage.name.as_str()];
     let mut found = read(
@@ -87,6 +89,7 @@ pub fn observe(origin: &Origin, every: u64, host: Host) -> Result<Observe, Paret
     )?;
     let own = scene.observe.requests.iter().filter(|request| match request.meter {
         AnyMeter::InterfaceWidth(_) => true,
+        AnyMeter::Viscosity(_) | AnyMeter::Poiseuille(_) => with_forces && has_time,
         AnyMeter::SurfaceTension(_) | AnyMeter::Drop(_) => with_forces,
         _ => false,
     });
@@ -99,7 +102,15 @@ pub fn observe(origin: &Origin, every: u64, host: Host) -> Result<Observe, Paret
                 request.meter,
                 AnyMeter::Pressure(_) | AnyMeter::Msd(_) | AnyMeter::InterfaceWidth(_)
             );
-            let every = if cheap || !with_forces { every } else { RARELY * every };
+            // Correlations in time are asked for at steps of the scene.
+            let own = matches!(request.meter, AnyMeter::Viscosity(_));
+            let every = if own {
+                request.every
+            } else if cheap || !with_forces {
+                every
+            } else {
+                RARELY * every
+            };
             Request { every, skip: 0, stages: vec![stage.name.clone()], ..request }
         })
         .collect();
@@ -114,9 +125,10 @@ pub fn sample(origin: &Origin, physics: &Physics, effort: Effort) -> Result<Samp
     let (dt, every) = (origin.dt(physics), physics.interval());
     let mut run = origin.simulation(physics, NonZeroUsize::MIN, true, Want::FORCES)?;
     let stage = origin.stage;
-    let observe = observe(origin, every, Host::Native)?;
+    let observe = observe(origin, every, Host::Native, physics.integrator.has_time())?;
     let mut observers = Observers::new(&observe, [stage.name.as_str()]);
-    let mut kinetic = Series::new(1);
+    let mut sampled = Series::new(2);
+    let per_particle = 1.0 / run.len() as f64;
     let begin = Instant::now();
     let mut settling = 0;
     let stopped = |error: RunError| Ok(Sampled::Unstable(error.to_string()));
@@ -130,7 +142,7 @@ pub fn sample(origin: &Origin, physics: &Physics, effort: Effort) -> Result<Samp
         }
     }
     let mut time = 0.0;
-    while kinetic.samples() < FEWEST || !effort.is_used(1.0, begin, settling + kinetic.samples()) {
+    while sampled.samples() < FEWEST || !effort.is_used(1.0, begin, settling + sampled.samples()) {
         run.record_flux(false);
         let made = run.advance(every - 1, dt, physics.integrator).and_then(|()| {
             run.record_flux(observers.wants_flux(run.step_number() + 1, &stage.name));
@@ -143,20 +155,16 @@ pub fn sample(origin: &Origin, physics: &Physics, effort: Effort) -> Result<Samp
             return Ok(hot);
         }
         time += dt * every as f64;
-        kinetic.push(&[run.temperature()]);
+        sampled.push(&[run.temperature(), per_particle * run.potential_energy()]);
         observers.sample(run.view(time), &stage.name);
     }
-    let quantities = Quantities::of(kinetic.mean(0), &observers.finish(), origin.scene.model.dimensions());
-    Ok(Sampled::Made { quantities: Box::new(quantities), samples: kinetic.samples(), time })
+    let means = [(Class::Temperature, "T_kin", sampled.mean(0)), (Class::Energy, "u", sampled.mean(1))];
+    let quantities = Quantities::of(means, &observers.finish(), origin.scene.model.dimensions());
+    Ok(Sampled::Made { quantities: Box::new(quantities), samples: sampled.samples(), time })
 }
 
 fn too_hot(run: &Simulation, kt: f64) -> Option<Sampled> {
     let ratio = run.temperature() / kt;
     (ratio > FAR_OFF)
         .then(|| Sampled::Unstable(format!("step {}: the temperature is {ratio:.1} kT", run.step_number())))
-}
-
-/// The time from one sample to the next.
-pub fn interval_time(origin: &Origin) -> f64 {
-    origin.stage.dt * INTERVAL as f64
 }
