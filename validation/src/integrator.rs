@@ -106,14 +106,24 @@ impl Coupling {
     }
 }
 
-/// What is known of an integrator's error in the temperature of configurations, for estimates: `a (ωΔt)⁴ + b κΔt`;
-/// `docs/integrators.md` has the runs.
+/// What is known of an integrator's errors, for estimates; `docs/integrators.md` has the runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Accuracy {
-    /// `a`.
-    pub stiffness: f64,
-    /// `b`.
-    pub drag: f64,
+    /// Of the temperature of configurations, relative: `a` and `b` of `a (ωΔt)⁴ + b κΔt`.
+    pub temperature: [f64; 2],
+    /// Of the pressure that steps carry, in ρkT: `a`, `b` and `c` of `a (ωΔt)² + b κΔt + c (ωΔt)⁴`.
+    pub pressure: [f64; 3],
+}
+
+impl Accuracy {
+    /// Errors at a step of `dt`: of the temperature of configurations, and in ρkT of the carried pressure, for forces of mean
+    /// square `frequency` ω and kinetic energy lost to drag at the rate κ.
+    pub fn errors(&self, dt: f64, frequency: f64, drag: f64) -> [f64; 2] {
+        let Accuracy { temperature: [stiffness, of_drag], pressure: [second, first, fourth] } = self;
+        let square = (frequency * dt).powi(2);
+        let temperature = stiffness * square * square + of_drag * drag * dt;
+        [temperature, second * square + first * drag * dt + fourth * square * square]
+    }
 }
 
 /// What LAMMPS has for an integrator.
@@ -225,15 +235,18 @@ impl Integrator {
         }
     }
 
-    /// Its errors, roughly: within a factor of three of those runs for one force a step, a guess from energies for two-stage.
+    /// Its errors, within a factor of three or so of those in standard DPD and in Warren's liquid.
     pub fn accuracy(&self) -> Accuracy {
-        const ONE_FORCE: f64 = 5.0;
-        match self {
-            Integrator::VelocityVerlet => Accuracy { stiffness: ONE_FORCE, drag: 0.25 },
-            Integrator::GrootWarren { .. } => Accuracy { stiffness: ONE_FORCE, drag: 0.12 },
-            Integrator::TwoStage { .. } => Accuracy { stiffness: 0.008, drag: 0.0 },
-            _ => Accuracy { stiffness: ONE_FORCE, drag: 0.0 },
-        }
+        let (temperature, pressure) = match self {
+            Integrator::VelocityVerlet => ([5.0, 0.25], [0.5, 0.75, 0.0]),
+            Integrator::GrootWarren { .. } => ([5.0, 0.12], [0.5, 0.75, 0.0]),
+            Integrator::DpdVv { .. } | Integrator::SelfConsistent { .. } => ([5.0, 0.0], [0.5, 0.75, 0.0]),
+            Integrator::TwoStage { .. } => ([0.01, 0.0], [0.1, 0.0, 0.0]),
+            Integrator::ForceGradient { .. } => ([0.01, 0.0], [0.0, 0.0, 0.01]),
+            Integrator::MonteCarlo { .. } => ([0.0; 2], [0.0; 3]),
+            _ => ([5.0, 0.0], [0.5, 0.0, 0.0]),
+        };
+        Accuracy { temperature, pressure }
     }
 
     /// What LAMMPS has for it.

@@ -7,16 +7,20 @@
 //! ```
 //!
 //! the mean square frequency of a particle in the force field of the others, and the rate at which drag takes
-//! its kinetic energy. The relative error of the configurational temperature is then about
+//! its kinetic energy. The relative error of the configurational temperature, and that of the pressure that steps carry in ρkT, are then
+//! about
 //!
 //! ```text
-//! a (ωΔt)⁴ + ¼ κΔt (drag inside the forces) or nothing of the latter (thermostat apart from them)
+//! a (ωΔt)⁴ + b κΔt,    a′ (ωΔt)² + b′ κΔt + c′ (ωΔt)⁴
 //! ```
 //!
-//! with `a` from runs of standard DPD and of Warren's liquid; `docs/integrators.md` has them.
+//! with factors of each integrator from runs of standard DPD and of Warren's liquid; `docs/integrators.md` has them. A liquid
+//! beside its vapour has the carried pressure of the vapour: it is thinner by the error over ρ ∂p/∂ρ, which a second sample
+//! gives, a little denser.
 
-use crate::integrator::{Accuracy, Integrator};
+use crate::integrator::Integrator;
 use crate::observe::configurational;
+use crate::observe::frame::Frame;
 use crate::run::{RunError, Simulation, State};
 use crate::scene::Scene;
 use psidpd_core::engine::noise::{Law, PairNoise};
@@ -48,7 +52,11 @@ pub struct StepEstimate {
     pub drag: f64,
     /// Relative error of the configurational temperature.
     pub error: f64,
-    /// The Δt at which that is 0.01.
+    /// Error of the pressure that steps carry, in ρkT.
+    pub carried: f64,
+    /// By how much of its density a liquid beside its vapour is too thin, if the fluid resists compression.
+    pub thinner: Option<f64>,
+    /// The Δt at which the larger of the first two is 0.01.
     pub one_percent: f64,
 }
 
@@ -58,7 +66,7 @@ pub struct StepEstimate {
 /// The model does not hold at a temperature.
 pub fn estimates(scene: &Scene) -> Result<Vec<StepEstimate>, RunError> {
     let mut found: Vec<StepEstimate> = Vec::new();
-    let mut known: Vec<(f64, Option<[f64; 2]>)> = Vec::new();
+    let mut known: Vec<(f64, Option<Sample>)> = Vec::new();
     for stage in scene.stages.iter().filter(|stage| stage.integrator.has_time()) {
         let sample = match known.iter().find(|(kt, _)| *kt == stage.kt) {
             Some((_, sample)) => *sample,
@@ -68,17 +76,20 @@ pub fn estimates(scene: &Scene) -> Result<Vec<StepEstimate>, RunError> {
                 sample
             }
         };
-        let Some([frequency, drag]) = sample else { continue };
+        let Some(Sample { frequency, drag, resistance }) = sample else { continue };
         let drag = if stage.thermostat { drag } else { 0.0 };
-        let of = |dt: f64| error(stage.integrator, dt, frequency, drag);
+        let of = |dt: f64| stage.integrator.accuracy().errors(dt, frequency, drag);
+        let [error, carried] = of(stage.dt);
         let estimate = StepEstimate {
             stage: stage.name.clone(),
             integrator: stage.integrator.to_string(),
             dt: stage.dt,
             frequency,
             drag,
-            error: of(stage.dt),
-            one_percent: longest(of),
+            error,
+            carried,
+            thinner: resistance.map(|resistance| carried * stage.kt / resistance),
+            one_percent: longest(|dt| of(dt).into_iter().fold(0.0, f64::max)),
         };
         let same = |other: &&StepEstimate| {
             other.integrator == estimate.integrator
@@ -91,12 +102,6 @@ pub fn estimates(scene: &Scene) -> Result<Vec<StepEstimate>, RunError> {
     Ok(found)
 }
 
-/// Relative error of the temperature of configurations.
-fn error(integrator: Integrator, dt: f64, frequency: f64, drag: f64) -> f64 {
-    let Accuracy { stiffness, drag: of_drag } = integrator.accuracy();
-    stiffness * (frequency * dt).powi(4) + of_drag * drag * dt
-}
-
 /// The Δt at which an error that grows is 0.01.
 fn longest(error: impl Fn(f64) -> f64) -> f64 {
     let [mut low, mut high] = [1e-9f64, 1e9];
@@ -107,10 +112,34 @@ fn longest(error: impl Fn(f64) -> f64) -> f64 {
     low
 }
 
-/// ω and κ of the fluid where it is densest.
-fn sampled(scene: &Scene, kt: f64) -> Result<Option<[f64; 2]>, RunError> {
-    let fluid = scene.model.at(kt)?;
+/// What is sampled of a fluid.
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    /// ω.
+    frequency: f64,
+    /// κ.
+    drag: f64,
+    /// ∂p/∂ρ at constant composition, if positive.
+    resistance: Option<f64>,
+}
+
+/// By how much the second sample is denser.
+const DENSER: f64 = 1.04;
+
+/// The fluid of a scene where it is densest.
+fn sampled(scene: &Scene, kt: f64) -> Result<Option<Sample>, RunError> {
     let densities = scene.densities();
+    let total: f64 = densities.iter().sum();
+    let denser: Vec<f64> = densities.iter().map(|rho| DENSER * rho).collect();
+    let Some([frequency, drag, pressure]) = at_densities(scene, kt, &densities)? else { return Ok(None) };
+    let compressed = at_densities(scene, kt, &denser)?.map(|[.., pressure]| pressure);
+    let resistance = compressed.map(|compressed| (compressed - pressure) / ((DENSER - 1.0) * total));
+    Ok(Some(Sample { frequency, drag, resistance: resistance.filter(|resistance| *resistance > 0.0) }))
+}
+
+/// ω, κ and the conservative pressure of a piece of the fluid.
+fn at_densities(scene: &Scene, kt: f64, densities: &[f64]) -> Result<Option<[f64; 3]>, RunError> {
+    let fluid = scene.model.at(kt)?;
     let total: f64 = densities.iter().sum();
     if total.is_nan() || total <= 0.0 {
         return Ok(None);
@@ -128,8 +157,7 @@ fn sampled(scene: &Scene, kt: f64) -> Result<Option<[f64; 2]>, RunError> {
     if configurational::missing(&fluid, &domain).is_some() {
         return Ok(None);
     }
-    let state = start(scene, domain, &densities, kt, dimensions);
-    let masses = state.mass.clone();
+    let state = start(scene, domain, densities, kt, dimensions);
     let mut run = Simulation::new(&scene.model, kt, state, scene.seed)?;
     // Short steps relax the random start.
     let dt = 0.25 * scene.stages.iter().map(|s| s.dt).fold(0.01, f64::min);
@@ -139,19 +167,19 @@ fn sampled(scene: &Scene, kt: f64) -> Result<Option<[f64; 2]>, RunError> {
         return Ok(None);
     }
     let Ok(evaluator) = Evaluator::new(fluid) else { return Ok(None) };
-    let (mut curvature, mut drag) = (0.0, 0.0);
+    let (mut square, mut drag, mut pressure) = (0.0, 0.0, 0.0);
     for _ in 0..SAMPLES {
-        if run.advance(BETWEEN, dt, integrator).is_err() {
+        let made =
+            run.advance(BETWEEN - 1, dt, integrator).and_then(|()| run.step(dt, integrator, Want::TOTALS));
+        if made.is_err() {
             return Ok(None);
         }
+        pressure += run.scalar_pressure(run.conservative_pressure_tensor());
         drag += run.warmth(dt)?.map_or(0.0, |warmth| warmth.rate);
-        let evaluation = evaluator.evaluate(run.positions(), run.species(), run.domain());
-        let laplacians = evaluation.laplacians(evaluator.fluid(), run.species());
-        let of = |(l, s): (f64, &i32)| l / masses[*s as usize];
-        curvature += laplacians.into_iter().zip(run.species()).map(of).sum::<f64>();
+        square += configurational::mean_square_frequency(&Frame::new(run.view(0.0), &evaluator));
     }
-    let count = (SAMPLES * dimensions * run.len()) as f64;
-    Ok(Some([(curvature / count).max(0.0).sqrt(), drag / SAMPLES as f64]))
+    let samples = SAMPLES as f64;
+    Ok(Some([(square / samples).max(0.0).sqrt(), drag / samples, pressure / samples]))
 }
 
 /// Particles at random, with thermal velocities.

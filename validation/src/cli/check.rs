@@ -110,16 +110,18 @@ const TOO_LONG: f64 = 0.1;
 
 /// The worst of time steps that are too long.
 fn too_long(steps: &[StepEstimate]) -> Option<Warning> {
-    let worst = steps.iter().filter(|s| s.error > TOO_LONG).max_by(|a, b| a.error.total_cmp(&b.error))?;
+    let error = |s: &StepEstimate| s.error.max(s.carried);
+    let worst = steps.iter().filter(|s| error(s) > TOO_LONG).max_by(|a, b| error(a).total_cmp(&error(b)))?;
     Some(Warning {
         id: "time-step",
         severity: Severity::Warning,
         message: format!(
-            "dt = {} of stage \"{}\" puts the configurational temperature off by about {} %: use dt = {}, or an integrator \
-             that bears more (docs/integrators.md)",
+            "dt = {} of stage \"{}\" puts the configurational temperature off by about {} % and the pressure that steps carry by \
+             {} % of rho kT: use dt = {}, or an integrator that bears more (docs/integrators.md)",
             worst.dt,
             worst.stage,
             two_digits(100.0 * worst.error),
+            two_digits(100.0 * worst.carried),
             two_digits(worst.one_percent)
         ),
     })
@@ -133,13 +135,18 @@ fn two_digits(x: f64) -> String {
 }
 
 fn print_step(step: &StepEstimate, which: &str) {
+    let thinner = step
+        .thinner
+        .map(|by| format!(", a liquid beside its vapour too thin by {} %", two_digits(100.0 * by)));
     println!(
-        "time step     {} of stage \"{}\"{which}, {}: configurational temperature off by about {} %, 1 % at dt = {} \
-         (estimate: frequency {:.1}, drag rate {:.2})",
+        "time step     {} of stage \"{}\"{which}, {}: configurational temperature off by about {} %, the pressure that steps \
+         carry by {} % of rho kT{}; 1 % of both at dt = {} (estimate: frequency {:.1}, drag rate {:.2})",
         step.dt,
         step.stage,
         step.integrator,
         two_digits(100.0 * step.error),
+        two_digits(100.0 * step.carried),
+        thinner.unwrap_or_default(),
         two_digits(step.one_percent),
         step.frequency,
         step.drag

@@ -3,7 +3,7 @@ use super::{Failure, Settings, Verdict, write_json};
 use crate::check::calibration;
 use crate::report::{Headline, Progress, headline, write_run_report};
 use crate::run::FILES;
-use crate::run::{Begin, Outcome, Runner, Start, Summary, Timing};
+use crate::run::{Advice, Begin, Outcome, Runner, Start, Summary, Timing};
 use psidpd_core::engine::{Pool, Precision};
 use serde::Serialize;
 use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
@@ -82,6 +82,7 @@ struct Report<'a> {
     summary: &'a Summary,
     timing: &'a Timing,
     headline: &'a Headline,
+    advice: Option<&'a Advice>,
 }
 
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
@@ -117,7 +118,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         }
     }
     match outcome? {
-        Outcome::Finished { summary, timing } => {
+        Outcome::Finished { summary, timing, advice } => {
             say(&summary.to_string());
             if let Some(session) = timing.sessions.last().filter(|_| made < total) {
                 say(&format!(
@@ -130,8 +131,12 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
             let found = headline(out);
             say(&format!("\n{}", found.table().to_text()));
             found.notes.iter().for_each(|note| say(&format!("note: {note}")));
+            advice.iter().for_each(|advice| say(&format!("note: {advice}")));
             say(&format!("written to {}", out.display()));
-            write_json(json, &Report { summary: &summary, timing: &timing, headline: &found })?;
+            write_json(
+                json,
+                &Report { summary: &summary, timing: &timing, headline: &found, advice: advice.as_ref() },
+            )?;
             Ok(Verdict::Good)
         }
         Outcome::Interrupted { stop, step, steps } => {

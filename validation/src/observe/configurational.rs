@@ -65,3 +65,10 @@ pub fn sums_of_blocks(frame: &Frame) -> Vec<[f64; 2]> {
     });
     blocks.into_iter().flatten().collect()
 }
+
+/// The mean square frequency of a particle in the field of the others, `⟨Σ ∇²U/m⟩/(dN)`.
+pub fn mean_square_frequency(frame: &Frame) -> f64 {
+    let laplacians = frame.evaluation().laplacians(frame.evaluator().fluid(), frame.view.species);
+    let sum: f64 = laplacians.into_iter().enumerate().map(|(k, l)| l / frame.mass(k)).sum();
+    sum / (frame.view.dimensions * frame.view.x.len()) as f64
+}

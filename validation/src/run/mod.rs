@@ -5,6 +5,7 @@
 //! can be stopped and taken up again by its [`checkpoint`]s; [`run_scene`] is one that nothing interrupts.
 
 mod about;
+mod advice;
 mod bounds;
 mod by_tag;
 mod dump;
@@ -28,6 +29,7 @@ mod watch;
 pub use crate::checkpoint::{self, Means, Sums, Thermo};
 pub use crate::integrator::Integrator;
 pub use crate::particles::{BodyForce, Drive, State, StateError, Tags, write_data};
+pub use advice::Advice;
 pub use dump::write_frame;
 pub use error::RunError;
 pub use output::FILES;

@@ -1,3 +1,4 @@
+use super::advice::Advice;
 use super::error::RunError;
 use super::folder::Folder;
 use super::output::Output;
@@ -78,6 +79,8 @@ pub enum Outcome {
         summary: Box<Summary>,
         /// What it took.
         timing: Timing,
+        /// A better step for its last stage, if it made steps.
+        advice: Option<Advice>,
     },
     /// It was asked to stop, and left a checkpoint.
     Interrupted {
@@ -245,7 +248,11 @@ impl<'a> Runner<'a> {
         let Runner { start, run } = self;
         if matches!(start, Start::Finished) {
             run.store.keep_newest()?;
-            return Ok(Outcome::Finished { summary: Box::new(run.summary()), timing: run.timing.clone() });
+            return Ok(Outcome::Finished {
+                summary: Box::new(run.summary()),
+                timing: run.timing.clone(),
+                advice: None,
+            });
         }
         run.go_on(stop, progress).map_err(|error| run.stop(error))
     }

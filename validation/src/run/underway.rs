@@ -1,3 +1,4 @@
+use super::advice::Advice;
 use super::by_tag::ByTag;
 use super::error::RunError;
 use super::folder::Folder;
@@ -339,7 +340,9 @@ impl<'a> Run<'a> {
         self.good.finished = true;
         self.store_good()?;
         self.store.keep_newest()?;
-        Ok(Outcome::Finished { summary: Box::new(summary), timing: self.timing_until(self.steps) })
+        let advice = self.scene.stages.last().and_then(|stage| Advice::of(&mut self.simulation, stage));
+        let timing = self.timing_until(self.steps);
+        Ok(Outcome::Finished { summary: Box::new(summary), timing, advice })
     }
 
     fn data_title(&self, step: u64) -> String {

@@ -210,7 +210,7 @@ fn a_finished_run_is_left_as_it_is() {
     let mut runner = Runner::begin(&scene, out, Begin::Resume).unwrap();
     assert!(matches!(runner.start(), Start::Finished));
     let outcome = runner.run(&AtomicUsize::new(0), &mut |_| panic!("no step is left")).unwrap();
-    let Outcome::Finished { summary: again, timing } = outcome else { panic!("{outcome:?}") };
+    let Outcome::Finished { summary: again, timing, .. } = outcome else { panic!("{outcome:?}") };
     assert_eq!((&*again, timing.sessions.len()), (&summary, 1));
     assert!(contents(out) == before);
     drop(runner);

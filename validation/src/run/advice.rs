@@ -1,0 +1,109 @@
+//! What a better step than velocity Verlet would save.
+
+use super::simulation::Simulation;
+use crate::integrator::{Coupling, Integrator};
+use crate::observe::configurational;
+use crate::observe::frame::Frame;
+use crate::scene::Stage;
+use psidpd_core::engine::reference::Evaluator;
+use serde::Serialize;
+use std::fmt;
+
+/// The step that is advised: λ that wins in liquids whose forces have kinks, the thermostat at every second step.
+const ADVISED: Integrator = Integrator::ForceGradient {
+    lambda: 0.17,
+    gradient: 1.0 / 24.0,
+    coupling: Coupling { every: 2, ..Coupling::DEFAULT },
+};
+
+/// Steps of velocity Verlet that take the time of one of these: three evaluations of forces, half a thermostat.
+const PRICE: f64 = 4.5;
+
+/// Most particles whose pairs are kept for it.
+const MOST: usize = 500_000;
+
+/// Errors above this are worth a line.
+const WORTH: f64 = 0.01;
+
+/// A better step for a stage of velocity Verlet, by estimates.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Advice {
+    /// Name of the stage.
+    pub stage: String,
+    /// Its Δt.
+    pub dt: f64,
+    /// Its errors: of the configurational temperature, and of the carried pressure in ρkT.
+    pub errors: [f64; 2],
+    /// The Δt of the better step.
+    pub better_dt: f64,
+    /// Its errors.
+    pub better_errors: [f64; 2],
+    /// The time it takes, in that of the stage.
+    pub time: f64,
+}
+
+impl Advice {
+    /// For a stage that has just ended, from the stiffness of the forces and the drag at its end; nothing where the step is good
+    /// enough or nothing is known of it.
+    pub fn of(simulation: &mut Simulation, stage: &Stage) -> Option<Advice> {
+        if stage.integrator != Integrator::VelocityVerlet || !stage.thermostat {
+            return None;
+        }
+        let drag = simulation.warmth(stage.dt).ok()??.rate;
+        let frequency = frequency(simulation)?;
+        // Weak drag bears shorter steps only: what the step does not conserve has to be carried off.
+        let reach = (0.75 + 0.4 * drag / frequency).min(1.25);
+        let better_dt = two_digits(reach / frequency);
+        let errors = stage.integrator.accuracy().errors(stage.dt, frequency, drag);
+        let better_errors = ADVISED.accuracy().errors(better_dt, frequency, drag);
+        let time = PRICE * stage.dt / better_dt;
+        let worst = |errors: [f64; 2]| errors[0].max(errors[1]);
+        let gains = worst(errors) > WORTH.max(worst(better_errors)) && time < 3.0;
+        gains.then(|| Advice {
+            stage: stage.name.clone(),
+            dt: stage.dt,
+            errors,
+            better_dt,
+            better_errors,
+            time,
+        })
+    }
+}
+
+/// The root mean square frequency of the particles, if forces have a Laplacian.
+fn frequency(simulation: &Simulation) -> Option<f64> {
+    let fluid = simulation.model().at(simulation.kt()).ok()?;
+    if simulation.len() > MOST || configurational::missing(&fluid, simulation.domain()).is_some() {
+        return None;
+    }
+    let evaluator = Evaluator::new(fluid).ok()?;
+    let square = configurational::mean_square_frequency(&Frame::new(simulation.view(0.0), &evaluator));
+    (square > 0.0).then(|| square.sqrt())
+}
+
+impl fmt::Display for Advice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Advice { stage, dt, errors, better_dt, better_errors, time } = self;
+        let percent = |x: f64| two_digits(100.0 * x);
+        let mut advised = ADVISED;
+        let lambda = advised.lambda().map_or(0.0, |(lambda, _)| *lambda);
+        write!(
+            f,
+            "stage \"{stage}\", velocity-verlet at dt = {dt}: by estimate the configurational temperature is off by {} %, and \
+             the pressure that steps carry, which sets the density of a liquid beside its vapour, by {} % of rho kT. \
+             integrator = \"{}\", lambda = {lambda}, thermostat_every = 2, dt = {better_dt} has {} and {} % in {} of the time; \
+             psidpd pareto measures it",
+            percent(errors[0]),
+            percent(errors[1]),
+            advised.name(),
+            percent(better_errors[0]),
+            percent(better_errors[1]),
+            two_digits(*time)
+        )
+    }
+}
+
+/// A positive number to two digits.
+fn two_digits(x: f64) -> f64 {
+    format!("{x:.1e}").parse().unwrap_or(x)
+}
