@@ -30,6 +30,8 @@ const CORE: &[&[&str]] = &[
     &["engine::sweep::terms", "engine::sweep::times"],
     &["engine::sweep::workspace"],
     &["engine::sweep"],
+    // One particle's move.
+    &["engine::local_energy"],
     // Sums over a list of pairs.
     &["engine::reference"],
     // The engine that hosts see.

@@ -9,8 +9,8 @@
 //! excess         ψ and its slopes for blocks of particles; excess_pass for all of them
 //! noise          the random number of a pair
 //! sweep/         pairs from cells → densities → ψ′ → forces, by vector instructions and threads
+//! local_energy/  how the energy changes where one particle moves, for Monte Carlo
 //! reference/     pairs from a list → densities → ψ′ → forces, in double precision, with values of single particles
-//! local_energy/  the energy by which one particle's move changes the whole, for Monte Carlo
 //! facade         Engine: chooses between the two for each evaluation, and says which and why (path)
 //! ```
 //!

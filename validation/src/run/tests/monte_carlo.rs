@@ -258,7 +258,7 @@ fn keys_without_meaning_are_refused_where_they_stand() {
 #[test]
 fn starts_without_energy() {
     let overlap = "title = \"m\"\nspecies = [\"A\"]\n[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"expression\"\n\
-        phi = \"(1 - r)^2/r\"\nrange = 1.0\n";
+        phi = \"(1 - r)^2/r^30\"\nrange = 1.0\n";
     let mut run = simulation(overlap, pair([true; 3], [[0.5; 3]; 2]));
     let integrator = trials(10, Some(0.2));
     run.prepare_for(integrator, 1.0, Want::TOTALS).unwrap();
