@@ -130,7 +130,7 @@ kernel = "wendland-c2"
 range = 0.7
 self = true
 [excess_free_energy]
-A = "kT*n_A*ln(n_A) + 0.3*n_A^2*n_B + m_B^3 + 0.7*q_A"
+A = "kT*n_A*ln(n_A) + 0.3*n_A^2*n_B + m_B^3 + 0.2*m_A^2 + 0.7*q_A"
 B = "n_B^3 + sqrt(n_A)*m_A^2 + 0.4*q_A - 0.2*q_B"
 [[pair]]
 between = ["A", "B"]
