@@ -95,7 +95,7 @@ impl Style {
         let settings = Settings { precision: Precision::Double, ..Settings::default() };
         let pool = Arc::new(Pool::new(settings.threads));
         let engine = engine_at(&model, kt, &kinds, settings, &pool)?;
-        let thermostat = PairThermostat::new(engine.plan(), kt, settings.instructions);
+        let thermostat = PairThermostat::new(engine.plan(), kt, &settings);
         Ok(Style {
             model,
             engine,
@@ -123,7 +123,7 @@ impl Style {
 
     fn rebuild(&mut self) -> Result<(), StyleError> {
         self.engine = engine_at(&self.model, self.kt, &self.kinds, self.settings, &self.pool)?;
-        self.thermostat = PairThermostat::new(self.engine.plan(), self.kt, self.settings.instructions);
+        self.thermostat = PairThermostat::new(self.engine.plan(), self.kt, &self.settings);
         Ok(())
     }
 

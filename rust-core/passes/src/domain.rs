@@ -71,6 +71,11 @@ impl PeriodicBox {
         self.edges.column(k).into_owned().into()
     }
 
+    /// The rows that make fractions of vectors.
+    pub fn inverse(&self) -> [[f64; 3]; 3] {
+        [0, 1, 2].map(|k| self.inverse.row(k).transpose().into())
+    }
+
     /// The lengths of the edges.
     pub fn lengths(&self) -> [f64; 3] {
         std::array::from_fn(|k| self.edges.column(k).norm())

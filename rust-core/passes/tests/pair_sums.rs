@@ -2,7 +2,7 @@
 
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::noise::threefry2x32;
-use psidpd_passes::plane::list::{Pair, PairList};
+use psidpd_passes::plane::list::{ExactPair, Pair, PairList};
 use psidpd_passes::plane::pair_sums::{Terms, Wide, add_pairs};
 use psidpd_passes::settings::Instructions;
 
@@ -29,16 +29,28 @@ fn vectors() -> Vec<Wide> {
     (0..ALL).map(|k| [uniform(3 * k), uniform(3 * k + 1), uniform(3 * k + 2), 0.0]).collect()
 }
 
+/// The same pairs in double precision.
+fn exact(mut list: PairList) -> PairList {
+    let more = |pair: &Pair| ExactPair { g: pair.g.map(|g| f64::from(g) * 1.1), j: pair.j.into() };
+    list.exact = list.pairs.iter().map(more).collect();
+    list
+}
+
 #[test]
 fn sums_are_those_of_a_plain_loop_to_the_last_bit() {
-    let (list, p) = (list(), vectors());
+    are_plain(&list());
+    are_plain(&exact(list()));
+}
+
+fn are_plain(list: &PairList) {
+    let p = vectors();
     let xi: Vec<f32> = (0..list.pairs.len()).map(|k| uniform(90_000 + k) as f32).collect();
     for terms in [Terms { noise: 0.0, drag: -1.0 }, Terms { noise: 1.3, drag: 0.7 }] {
         let mut plain = vec![[0.1; 3]; ALL];
         for (i, ends) in list.start.windows(2).enumerate() {
             let mut sum = [0.0; 3];
             for k in ends[0] as usize..ends[1] as usize {
-                let (g, j) = (list.pairs[k].g.map(f64::from), list.pairs[k].j as usize);
+                let (g, j) = (list.g(k), list.pairs[k].j as usize);
                 let t: [f64; 3] = std::array::from_fn(|c| (p[i][c] - p[j][c]) * g[c]);
                 let noise = if terms.noise == 0.0 { 0.0 } else { terms.noise * f64::from(xi[k]) };
                 let factor = noise - terms.drag * ((t[0] + t[2]) + t[1]);
@@ -52,7 +64,7 @@ fn sums_are_those_of_a_plain_loop_to_the_last_bit() {
         for (name, instructions) in Instructions::ALL {
             let Some(set) = InstructionSet::new(instructions) else { continue };
             let mut sums = vec![[0.1, 0.1, 0.1, 0.0]; ALL];
-            add_pairs(set, &list, &xi, terms, &p, &mut sums);
+            add_pairs(set, list, &xi, terms, &p, &mut sums);
             for (found, plain) in sums.iter().zip(&plain) {
                 assert_eq!(found[..3], plain[..], "{name}");
                 assert_eq!(found[3], 0.0, "{name}");

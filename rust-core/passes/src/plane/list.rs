@@ -24,14 +24,32 @@ pub struct Pair {
     pub j: u32,
 }
 
+/// The same in double precision.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(C, align(32))]
+pub struct ExactPair {
+    pub g: [f64; 3],
+    pub j: u64,
+}
+
 /// The pairs of a plane, those of one particle after those of another, in the order of cells.
 #[derive(Debug, Clone, Default)]
 pub struct PairList {
     /// Where the pairs of each particle of the plane begin; one past the last.
     pub start: Vec<u32>,
     pub pairs: Vec<Pair>,
+    /// The pairs once more, where they have been measured in double precision; empty otherwise.
+    pub exact: Vec<ExactPair>,
     /// `r/|g|` of each pair; empty where nobody asked for it.
-    pub stretch: Vec<f32>,
+    pub stretch: Vec<f64>,
+}
+
+impl PairList {
+    /// `g` of a pair, as precise as it is known.
+    #[inline(always)]
+    pub fn g(&self, k: usize) -> [f64; 3] {
+        self.exact.get(k).map_or_else(|| self.pairs[k].g.map(f64::from), |pair| pair.g)
+    }
 }
 
 /// What a pair is weighed with, by pairs of species.
@@ -51,6 +69,8 @@ pub struct ListBuffers {
     i_particles: IParticles<f32>,
     /// The i-particle of each pair of a batch that was kept.
     i_in_batch: Vec<u32>,
+    /// `|g|/r` of each pair, where it is asked for.
+    per_distance: Vec<f32>,
 }
 
 /// Particles in the order of cells, and what their pairs are weighed with.
@@ -77,7 +97,9 @@ pub unsafe fn list_pairs(
     list.start.clear();
     list.start.push(0);
     list.pairs.clear();
+    list.exact.clear();
     list.stretch.clear();
+    buffers.per_distance.clear();
     let task = ListPairs { inputs, plane, buffers, list };
     // SAFETY: `PairLists::find` sorts all particles of the box into the arrays before any plane is listed, and writes none
     // of them then.
@@ -87,8 +109,7 @@ pub unsafe fn list_pairs(
             _ => run(set, WithSpecies::<true>(task)),
         }
     }
-    // What was kept is `|g|/r`.
-    list.stretch.iter_mut().for_each(|factor| *factor = factor.recip());
+    list.stretch.extend(buffers.per_distance.iter().map(|factor| f64::from(factor.recip())));
 }
 
 struct ListPairs<'a> {
@@ -106,14 +127,21 @@ impl<const MULTISPECIES: bool> Kernel for WithSpecies<'_, MULTISPECIES> {
     #[inline(always)]
     unsafe fn run<I: Isa>(self) {
         let ListPairs { inputs, plane, buffers, list } = self.0;
-        let ListBuffers { search, i_particles, i_in_batch } = buffers;
+        let ListBuffers { search, i_particles, i_in_batch, per_distance } = buffers;
         // SAFETY: what is asked for is promised to `list_pairs`; a plane has a first column.
         unsafe {
             let first = inputs.cells.column(plane, 0)[0];
             let end = inputs.cells.column(plane, inputs.cells.grid.columns_per_plane - 1)[1];
             let metric = <Mixed as Arithmetic<I>>::metric(inputs.cells.geometry);
-            let mut lister =
-                Lister::<I, MULTISPECIES> { inputs, metric, first, i_particles, i_in_batch, list };
+            let mut lister = Lister::<I, MULTISPECIES> {
+                inputs,
+                metric,
+                first,
+                i_particles,
+                i_in_batch,
+                per_distance,
+                list,
+            };
             each_batch::<I, _>(&inputs.cells, plane, I::F32::LANES, search, &mut lister);
             lister.begin_at(end);
         }
@@ -127,6 +155,7 @@ struct Lister<'a, I: Isa, const MULTISPECIES: bool> {
     first: usize,
     i_particles: &'a mut IParticles<f32>,
     i_in_batch: &'a mut Vec<u32>,
+    per_distance: &'a mut Vec<f32>,
     list: &'a mut PairList,
 }
 
@@ -145,7 +174,8 @@ impl<I: Isa, const MULTISPECIES: bool> BatchVisitor<I> for Lister<'_, I, MULTISP
         type W<I> = <<I as Isa>::F32 as Reals>::Words;
         let members = slots[1] - slots[0];
         self.begin_at(search.first + slots[0]);
-        let PairList { start, pairs, stretch } = &mut *self.list;
+        let PairList { start, pairs, .. } = &mut *self.list;
+        let per_distance = &mut *self.per_distance;
         make_room(start, members);
         // SAFETY: `packed` has a vector of padding behind the last particle (`SortedParticles::make_room`), lists of the batch
         // are readable for a vector behind the last pair; there is room for all its pairs and a vector; of those that are
@@ -163,11 +193,11 @@ impl<I: Isa, const MULTISPECIES: bool> BatchVisitor<I> for Lister<'_, I, MULTISP
             <Mixed as Arithmetic<I>>::load_i_particles(packed.add(batch.first), i_particles);
             make_room(pairs, batch.count + 16);
             if self.inputs.with_stretch {
-                make_room(stretch, batch.count + 16);
+                make_room(per_distance, batch.count + 16);
             }
             self.i_in_batch.resize(self.i_in_batch.len().max(batch.count + 16), 0);
             let to_pairs = pairs.as_mut_ptr().add(pairs.len());
-            let to_stretch = stretch.as_mut_ptr().add(stretch.len());
+            let to_per_distance = per_distance.as_mut_ptr().add(per_distance.len());
             let to_i = self.i_in_batch.as_mut_ptr();
             let plane_first = W::<I>::splat((self.first as u32) << OFFSET_BITS);
             let mut found = 0;
@@ -201,7 +231,7 @@ impl<I: Isa, const MULTISPECIES: bool> BatchVisitor<I> for Lister<'_, I, MULTISP
                 I::F32::store_rows(columns, mask, to_pairs.add(found).cast());
                 I::of_bits(i).compress(mask).store(to_i.add(found).cast());
                 if self.inputs.with_stretch {
-                    factor.compress(mask).store(to_stretch.add(found));
+                    factor.compress(mask).store(to_per_distance.add(found));
                 }
                 found += mask.count_ones() as usize;
                 k += I::F32::LANES;
@@ -217,7 +247,7 @@ impl<I: Isa, const MULTISPECIES: bool> BatchVisitor<I> for Lister<'_, I, MULTISP
             }
             pairs.set_len(pairs.len() + found);
             if self.inputs.with_stretch {
-                stretch.set_len(stretch.len() + found);
+                per_distance.set_len(per_distance.len() + found);
             }
         }
     }

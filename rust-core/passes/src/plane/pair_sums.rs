@@ -1,6 +1,6 @@
 //! Sums over the listed pairs of a plane.
 
-use super::list::PairList;
+use super::list::{ExactPair, Pair, PairList};
 use crate::instruction_set::InstructionSet;
 use crate::simd::{Isa, Kernel, Quad, run};
 
@@ -28,44 +28,86 @@ pub fn add_pairs(
     p: &[Wide],
     sums: &mut [Wide],
 ) {
-    let task = AddPairs { list, xi, terms, p, sums };
+    match list.exact.is_empty() {
+        true => add(set, AddPairs { start: &list.start, pairs: &list.pairs, xi, terms, p, sums }),
+        false => add(set, AddPairs { start: &list.start, pairs: &list.exact, xi, terms, p, sums }),
+    }
+}
+
+fn add<P: Entry>(set: InstructionSet, task: AddPairs<P>) {
     // SAFETY: the kernels ask for nothing but the processor.
     unsafe {
-        match terms.noise == 0.0 {
-            true => run(set, WithNoise::<false>(task)),
-            false => run(set, WithNoise::<true>(task)),
+        match task.terms.noise == 0.0 {
+            true => run(set, WithNoise::<P, false>(task)),
+            false => run(set, WithNoise::<P, true>(task)),
         }
     }
 }
 
-struct AddPairs<'a> {
-    list: &'a PairList,
+/// A pair in either precision.
+trait Entry {
+    fn j(&self) -> usize;
+    /// `g`, and 0.
+    ///
+    /// # Safety
+    /// The contract of `simd`.
+    unsafe fn g<I: Isa>(&self) -> I::Quad;
+}
+
+impl Entry for Pair {
+    #[inline(always)]
+    fn j(&self) -> usize {
+        self.j as usize
+    }
+
+    #[inline(always)]
+    unsafe fn g<I: Isa>(&self) -> I::Quad {
+        // SAFETY: the three numbers of `g` are followed by `j`, which is as large.
+        unsafe { I::Quad::load_three_f32((&raw const *self).cast()) }
+    }
+}
+
+impl Entry for ExactPair {
+    #[inline(always)]
+    fn j(&self) -> usize {
+        self.j as usize
+    }
+
+    #[inline(always)]
+    unsafe fn g<I: Isa>(&self) -> I::Quad {
+        // SAFETY: the three numbers of `g` are followed by `j`, which is as large.
+        unsafe { I::Quad::load_three((&raw const *self).cast()) }
+    }
+}
+
+struct AddPairs<'a, P> {
+    start: &'a [u32],
+    pairs: &'a [P],
     xi: &'a [f32],
     terms: Terms,
     p: &'a [Wide],
     sums: &'a mut [Wide],
 }
 
-struct WithNoise<'a, const NOISE: bool>(AddPairs<'a>);
+struct WithNoise<'a, P, const NOISE: bool>(AddPairs<'a, P>);
 
-impl<const NOISE: bool> Kernel for WithNoise<'_, NOISE> {
+impl<P: Entry, const NOISE: bool> Kernel for WithNoise<'_, P, NOISE> {
     type Out = ();
 
     #[inline(always)]
     unsafe fn run<I: Isa>(self) {
-        let AddPairs { list, xi, terms, p, sums } = self.0;
-        // SAFETY: vectors are loaded from and stored to arrays of four numbers; the three of `g` are followed by `j`, which is
-        // as large.
+        let AddPairs { start, pairs, xi, terms, p, sums } = self.0;
+        // SAFETY: vectors are loaded from and stored to arrays of four numbers.
         unsafe {
             let minus_drag = I::Quad::splat(-terms.drag);
-            for (i, ends) in list.start.windows(2).enumerate() {
+            for (i, ends) in start.windows(2).enumerate() {
                 let of_i = ends[0] as usize..ends[1] as usize;
                 let noises = if NOISE { &xi[of_i.clone()] } else { &[] };
                 let at = I::Quad::load(p[i].as_ptr());
                 let mut sum = I::Quad::zero();
-                for (k, pair) in list.pairs[of_i].iter().enumerate() {
-                    let j = pair.j as usize;
-                    let g = I::Quad::load_three_f32((&raw const *pair).cast());
+                for (k, pair) in pairs[of_i].iter().enumerate() {
+                    let j = pair.j();
+                    let g = pair.g::<I>();
                     let along = at.sub(I::Quad::load(p[j].as_ptr())).mul(g).total();
                     let mut factor = minus_drag.mul(along);
                     if NOISE {

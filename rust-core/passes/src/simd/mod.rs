@@ -184,6 +184,8 @@ pub trait Quad: Copy {
     unsafe fn load_f32(p: *const f32) -> Self;
     /// The first three of four readable numbers, and 0.
     unsafe fn load_three_f32(p: *const f32) -> Self;
+    /// The first three of four readable numbers, and 0.
+    unsafe fn load_three(p: *const f64) -> Self;
     /// `(x₀ + x₂) + (x₁ + x₃)`, four times.
     unsafe fn total(self) -> Self;
 }

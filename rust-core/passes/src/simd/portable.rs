@@ -329,6 +329,11 @@ impl Quad for Four {
         Four([row[0] as f64, row[1] as f64, row[2] as f64, 0.0])
     }
     #[inline(always)]
+    unsafe fn load_three(p: *const f64) -> Self {
+        let [x, y, z] = unsafe { p.cast::<[f64; 3]>().read_unaligned() };
+        Four([x, y, z, 0.0])
+    }
+    #[inline(always)]
     unsafe fn total(self) -> Self {
         let [a, b, c, d] = self.0;
         Four([(a + c) + (b + d); 4])

@@ -45,6 +45,10 @@ impl Quad for Quad4 {
         unsafe { Quad4(_mm256_cvtps_pd(_mm_blend_ps::<0b1000>(_mm_loadu_ps(p), _mm_setzero_ps()))) }
     }
     #[inline(always)]
+    unsafe fn load_three(p: *const f64) -> Self {
+        unsafe { Quad4(_mm256_blend_pd::<0b1000>(_mm256_loadu_pd(p), _mm256_setzero_pd())) }
+    }
+    #[inline(always)]
     unsafe fn total(self) -> Self {
         unsafe {
             let halves = _mm256_add_pd(self.0, _mm256_permute2f128_pd::<0x01>(self.0, self.0));

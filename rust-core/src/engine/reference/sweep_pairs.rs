@@ -3,7 +3,7 @@
 use super::pairs::Pairs;
 use crate::engine::particles::Particles;
 use crate::engine::surroundings::Around;
-use crate::engine::sweep::{PairLists, PlanePairs, Pool};
+use crate::engine::sweep::{MARGIN, PairLists, Places, PlanePairs, Pool};
 use crate::model::Fluid;
 use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::ground::species_pairs::SpeciesPairTable;
@@ -11,9 +11,6 @@ use psidpd_passes::ground::terms::Exponent;
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::plane::list::WeightTables;
 use std::num::NonZeroUsize;
-
-/// By how much further it is searched, so that no pair is lost by rounding to single precision.
-const MARGIN: f64 = 1e-5;
 
 /// Finds the pairs of a fluid in boxes at least twice as wide as their range.
 pub struct SweepPairs {
@@ -26,8 +23,7 @@ pub struct SweepPairs {
     kinds: Vec<i32>,
     tags: Vec<i32>,
     planes: Vec<PlanePairs>,
-    /// Indices, places and fractions of particles in the order of cells, behind them once more those of the first plane.
-    sorted: Vec<(u32, [f64; 3], [f64; 3])>,
+    places: Places,
 }
 
 impl std::fmt::Debug for SweepPairs {
@@ -55,14 +51,14 @@ impl SweepPairs {
             kinds: (0..species as i32).collect(),
             tags: Vec::new(),
             planes: Vec::new(),
-            sorted: Vec::new(),
+            places: Places::default(),
         }
     }
 
     /// Adds the pairs of particles at `x`; whether it can. It cannot where a particle may meet two images of another, or a
     /// position is not finite.
     pub fn find(&mut self, x: &[[f64; 3]], species: &[i32], domain: &PeriodicBox, pairs: &mut Pairs) -> bool {
-        let SweepPairs { lists, pool, dimensions, range, tables, kinds, tags, planes, sorted } = self;
+        let SweepPairs { lists, pool, dimensions, range, tables, kinds, tags, planes, places } = self;
         let is_periodic = [0, 1, 2].map(|k| domain.periodic()[k] && k < *dimensions);
         let search_range = *range * (1.0 + MARGIN);
         let is_wide = |k: usize| !is_periodic[k] || domain.height(k) > 2.0 * search_range;
@@ -73,40 +69,21 @@ impl SweepPairs {
         tags.iter_mut().zip(1..).for_each(|(tag, k)| *tag = k);
         let particles = Particles { x, tag: tags, kind: species, owned: x.len() };
         let around = Around { domain, images: &[] };
-        if lists.find(pool, around, &particles, kinds, tables, search_range, false, planes).is_err() {
+        if lists.find(pool, around, &particles, kinds, tables, [*range, MARGIN], false, planes).is_err() {
             return false;
         }
-        let place = |k: &u32| {
-            let mut x = x[*k as usize];
-            domain.wrap(&mut x, &mut [0; 3]);
-            (*k, x, domain.fraction(x))
-        };
-        sorted.clear();
-        sorted.extend(lists.order().iter().map(place));
-        if let Some(last) = planes.last() {
-            sorted.extend_from_within(last.next.clone());
-        }
-        let period = is_periodic.map(|p| f64::from(u8::from(p)));
-        let edges = [0, 1, 2].map(|k| domain.edge(k));
-        for PlanePairs { own, next, list } in planes {
-            let sorted = &sorted[own.start..][..own.len() + next.len()];
-            for ((i, x, s), ends) in sorted.iter().zip(list.start.windows(2)) {
+        let copies = planes.last().map_or(0..0, |last| last.next.clone());
+        places.gather(*dimensions, domain, x, lists.order(), copies);
+        let (places, x, images) = (&*places, places.x(), places.images());
+        for PlanePairs { own, list, .. } in planes {
+            for (i, ends) in (own.start..).zip(list.start.windows(2)) {
                 for pair in &list.pairs[ends[0] as usize..ends[1] as usize] {
-                    let (j, y, t) = &sorted[pair.j as usize];
-                    let periods = [0, 1, 2].map(|k| {
-                        let apart = s[k] - t[k];
-                        let above = if apart > 0.5 { period[k] } else { 0.0 };
-                        let below = if apart < -0.5 { period[k] } else { 0.0 };
-                        above - below
-                    });
-                    // Places first, so that those of close particles lose no digits.
-                    let d = [0, 1, 2].map(|c| {
-                        let apart = if c < *dimensions { x[c] - y[c] } else { 0.0 };
-                        apart
-                            - (periods[0] * edges[0][c] + periods[1] * edges[1][c] + periods[2] * edges[2][c])
-                    });
+                    let j = own.start + pair.j as usize;
+                    let mut d = [0, 1, 2].map(|c| [x[i][c] - x[j][c]]);
+                    images.find_nearest(&mut d);
+                    let d = d.map(|[d]| d);
                     if d[0] * d[0] + d[1] * d[1] + d[2] * d[2] < *range * *range {
-                        pairs.push_in_box(*i as usize, *j as usize, d, species);
+                        pairs.push_in_box(places.host(i), places.host(j), d, species);
                     }
                 }
             }

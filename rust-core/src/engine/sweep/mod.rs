@@ -8,15 +8,18 @@
 //! - [`region`]: the region that is swept, and its cells.
 //! - [`workspace`]: arrays, sorting, ψ, and the scheduler that sends planes through the passes.
 //! - [`pair_lists`]: lists of the pairs in a range, for the thermostat apart from the forces.
+//! - [`places`]: those pairs measured in double precision.
 //! - [`Sweep`]: what hosts see.
 
 mod pair_lists;
+mod places;
 mod region;
 mod terms;
 mod times;
 mod workspace;
 
 pub(super) use pair_lists::{PairLists, PlanePairs};
+pub(super) use places::{Images, MARGIN, Places};
 pub use psidpd_threads::{Pool, part};
 pub use times::Times;
 

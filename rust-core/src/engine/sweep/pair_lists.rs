@@ -90,8 +90,8 @@ impl PairLists {
         &self.particles.ghost
     }
 
-    /// Finds the pairs of `particles` within `range`: those of each plane of cells, of two ghosts none. Kinds of a negative
-    /// species take no part.
+    /// Finds the pairs of `particles` within `range`, and a little further with a `margin`, a part of it, where the box is wide
+    /// enough: those of each plane of cells, of two ghosts none. Kinds of a negative species take no part.
     ///
     /// # Errors
     /// A position that is not finite; a box narrower than twice the range, or that leans along an open direction.
@@ -103,13 +103,13 @@ impl PairLists {
         particles: &Particles,
         species_of_kind: &[i32],
         tables: &WeightTables,
-        range: f64,
+        [range, margin]: [f64; 2],
         with_stretch: bool,
         planes: &mut Vec<T>,
     ) -> Result<(), EngineError> {
         let input = Input::new(particles, images, &[], species_of_kind, &[], None, Want::FORCES);
         let set = self.set;
-        let range = self.range_within(domain, range)?;
+        let range = self.range_within(domain, range, margin)?;
         let (geometry, mut grid) = region(set, pool, (self.dimensions, range), domain, &input)?;
         // Updates of one pair after the other go over planes that have no neighbour in common.
         if geometry.periodic[grid.plane_axis] {
@@ -164,7 +164,7 @@ impl PairLists {
 
     /// The range to search, a little less than `range` in a box that is just twice as wide: what is lost of a pair there, drag
     /// and noise alike, is next to nothing.
-    fn range_within(&self, domain: &PeriodicBox, range: f64) -> Result<f64, EngineError> {
+    fn range_within(&self, domain: &PeriodicBox, range: f64, margin: f64) -> Result<f64, EngineError> {
         let longest =
             (0..self.dimensions).map(|k| domain.edge(k).map(f64::abs).into_iter().fold(0.0, f64::max));
         let longest = longest.fold(4.0 * range, f64::max);
@@ -174,7 +174,7 @@ impl PairLists {
         if height < 2.0 * range * (1.0 - 1e-12) {
             return Err(EngineError::Host("a box narrower than twice the range of its thermostat"));
         }
-        Ok(range.min(CellGrid::cutoff_within(height, longest)))
+        Ok((range * (1.0 + margin)).min(CellGrid::cutoff_within(height, longest)))
     }
 
     /// Puts the particles of each cell into the order of their tags.

@@ -8,7 +8,8 @@
 //! ```
 //!
 //! from which every update here is made: the drag is `−(2/Δt) g (g·v_ij)`, the noise `(2/Δt) √kT ξ g`. Since both
-//! come from the same `g`, single precision of `g` changes the friction by rounding, but not the equilibrium.
+//! come from the same `g`, the single precision that it has in mixed precision changes the friction by rounding, but not the
+//! equilibrium.
 //!
 //! [`PairThermostat::find_pairs`] finds the pairs, by the search of the fast engine, [`PairThermostat::draw`] their noise, and
 //! [`PairThermostat::act`] changes velocities: `midpoint` for all pairs at once, `sequential` pair by pair.
@@ -18,6 +19,7 @@
 
 mod bodies;
 mod forces;
+mod measure;
 mod midpoint;
 mod part;
 mod particle_loops;
@@ -39,13 +41,13 @@ use super::error::EngineError;
 use super::particles::Particles;
 use super::plan::{Plan, ThermostatPlan};
 use super::surroundings::Around;
-use super::sweep::{PairLists, PlanePairs, Pool};
+use super::sweep::{MARGIN, PairLists, Places, PlanePairs, Pool};
 use part::Part;
 use pass::Sums;
 use planes::Plane;
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::noise::{Law, PairNoise};
-use psidpd_passes::settings::Instructions;
+use psidpd_passes::settings::{Precision, Settings};
 use round::Round;
 
 /// How velocities are changed.
@@ -76,6 +78,9 @@ pub struct PairThermostat {
     set: InstructionSet,
     lists: PairLists,
     planes: Vec<Plane>,
+    /// Whether pairs are measured in double precision.
+    is_exact: bool,
+    places: Places,
     /// By sorted particle.
     mass: Vec<f64>,
     inverse_mass: Vec<f64>,
@@ -101,9 +106,10 @@ impl std::fmt::Debug for PairThermostat {
 }
 
 impl PairThermostat {
-    /// The thermostat of a fluid at temperature `kt`; `None` if nothing drags.
-    pub fn new(plan: &Plan, kt: f64, instructions: Instructions) -> Option<PairThermostat> {
-        let set = InstructionSet::new(instructions).unwrap_or_else(InstructionSet::best);
+    /// The thermostat of a fluid at temperature `kt`; `None` if nothing drags. Of the settings it has instructions and
+    /// precision.
+    pub fn new(plan: &Plan, kt: f64, settings: &Settings) -> Option<PairThermostat> {
+        let set = InstructionSet::new(settings.instructions).unwrap_or_else(InstructionSet::best);
         Some(PairThermostat {
             plan: plan.thermostat.clone()?,
             dimensions: plan.dimensions(),
@@ -112,6 +118,8 @@ impl PairThermostat {
             set,
             lists: PairLists::new(set, plan.dimensions()),
             planes: Vec::new(),
+            is_exact: settings.precision == Precision::Double,
+            places: Places::default(),
             mass: Vec::new(),
             inverse_mass: Vec::new(),
             tag: Vec::new(),
@@ -159,9 +167,15 @@ impl PairThermostat {
         mass: impl Fn(usize) -> f64,
     ) -> Result<(), EngineError> {
         (self.dt, self.wants_virial, self.round) = (dt, virial, Round::default());
-        let (weights, range) = (planes::weights(&self.plan, dt), self.plan.longest);
+        let margin = if self.is_exact { MARGIN } else { 0.0 };
+        let weights = planes::weights(&self.plan, dt, margin);
+        let range = [self.plan.longest, margin];
+        let listed_virial = virial && !self.is_exact;
         let PairThermostat { lists, planes, .. } = self;
-        lists.find(pool, around, particles, species_of_kind, &weights, range, virial, planes)?;
+        lists.find(pool, around, particles, species_of_kind, &weights, range, listed_virial, planes)?;
+        if self.is_exact {
+            self.measure(pool, around.domain, particles, species_of_kind);
+        }
         let order = self.lists.order().iter().map(|k| *k as usize);
         self.tag.clear();
         self.tag.extend(order.clone().map(|k| particles.tag[k] as u32));
@@ -202,12 +216,12 @@ impl PairThermostat {
         for plane in &self.planes {
             let PlanePairs { own, next, list } = &plane.found;
             for (i, ends) in list.start.windows(2).enumerate() {
-                for pair in &list.pairs[ends[0] as usize..ends[1] as usize] {
-                    let j = pair.j as usize;
+                for k in ends[0] as usize..ends[1] as usize {
+                    let j = list.pairs[k].j as usize;
                     let j = j.checked_sub(own.len()).map_or(own.start + j, |k| next.start + k);
                     let i = own.start + i;
                     let (a, b) = (v[order[i] as usize], v[order[j] as usize]);
-                    let g = pair.g.map(f64::from);
+                    let g = list.g(k);
                     let along: f64 = (0..3).map(|c| g[c] * (a[c] - b[c])).sum();
                     let inverse = 1.0 / self.mass[i] + 1.0 / self.mass[j];
                     let square: f64 = g.iter().map(|g| g * g).sum();

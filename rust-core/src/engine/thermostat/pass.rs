@@ -94,11 +94,11 @@ impl Plane {
         for (i, ends) in self.found.list.start.windows(2).enumerate() {
             for k in ends[0] as usize..ends[1] as usize {
                 let pair = &self.found.list.pairs[k];
-                let (g, other) = (pair.g.map(f64::from), p[pair.j as usize]);
+                let (g, other) = (self.found.list.g(k), p[pair.j as usize]);
                 let along: f64 = (0..3).map(|c| (p[i][c] - other[c]) * g[c]).sum();
                 let xi = self.xi.get(k).map_or(0.0, |xi| f64::from(*xi));
                 let share = if is_ghost(i) || is_ghost(pair.j as usize) { 0.5 } else { 1.0 };
-                let stretch = share * f64::from(self.found.list.stretch[k]);
+                let stretch = share * self.found.list.stretch[k];
                 add_virial(&mut virial, g, (noise * xi - drag * along) * stretch);
             }
         }

@@ -46,10 +46,9 @@ impl PairThermostat {
             }
             for (i, ends) in list.start.windows(2).enumerate() {
                 for k in ends[0] as usize..ends[1] as usize {
-                    let (pair, stretch) = (&list.pairs[k], f64::from(list.stretch[k]));
-                    let j = pair.j as usize;
+                    let (j, stretch) = (list.pairs[k].j as usize, list.stretch[k]);
                     let j = j.checked_sub(own.len()).map_or(own.start + j, |k| next.start + k);
-                    let (i, g) = (own.start + i, pair.g.map(f64::from));
+                    let (i, g) = (own.start + i, list.g(k));
                     let strength = strength(i, j, number, k, g) / stretch;
                     pulls.push(Pull { i: order[i] as usize, d: g.map(|g| stretch * g), strength });
                 }

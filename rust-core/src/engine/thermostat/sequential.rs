@@ -156,8 +156,8 @@ impl Share<'_> {
 
     #[inline(always)]
     fn encounter(&mut self, i: usize, k: usize, kt: f64, rule: &impl Fn(&Encounter) -> f64) {
-        let pair = &self.plane.found.list.pairs[k];
-        let (j, g) = (pair.j as usize, pair.g.map(f64::from));
+        let list = &self.plane.found.list;
+        let (j, g) = (list.pairs[k].j as usize, list.g(k));
         let (own, beyond) = (self.own.len(), j.wrapping_sub(self.own.len()));
         let (other, mass) = match j < own {
             true => (self.own[j], self.of_own[j]),
@@ -193,7 +193,7 @@ impl Share<'_> {
             other[c] -= impulse * inverse[1] * g[c];
         }
         if let Some(stretch) = self.plane.found.list.stretch.get(k) {
-            add_virial(&mut self.virial, g, impulse * f64::from(*stretch));
+            add_virial(&mut self.virial, g, impulse * *stretch);
             self.impulses[k] = rule(&Encounter { xi: 0.0, ..encounter });
         }
     }

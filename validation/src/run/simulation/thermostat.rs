@@ -117,7 +117,7 @@ impl Thermostat {
 }
 
 fn pairs_of(forces: &Forces) -> Option<PairThermostat> {
-    PairThermostat::new(forces.plan(), forces.kt(), forces.settings().instructions)
+    PairThermostat::new(forces.plan(), forces.kt(), &forces.settings())
 }
 
 impl Simulation {

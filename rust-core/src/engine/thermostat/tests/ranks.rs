@@ -82,7 +82,7 @@ fn by_ranks(
                 species_of_kind: &kinds[..species + 1],
                 mass: &mass,
             };
-            let mut thermostat = thermostat(model, 1.0);
+            let mut thermostat = thermostat(model, 1.0, cloud.precision);
             thermostat.find_pairs_of_rank(&pool, &rank, DT, virial).unwrap();
             thermostat.draw(&pool, 11, 5, Stream(0), Law::Gaussian);
             let vectors: Vec<[f64; 3]> = all().map(|(k, _)| cloud.v[k]).collect();
@@ -152,9 +152,9 @@ fn ranks_do_what_one_does() {
             assert!(iterations.iter().all(|i| *i == one.iterations()), "{iterations:?}");
             let pairs = found.as_flattened().iter().zip(v.as_flattened());
             let most = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-            assert!(most < 1e-5, "cloud {number}, {ranks} ranks: {most:e}");
+            assert!(most < rounding(&cloud), "cloud {number}, {ranks} ranks: {most:e}");
             for (a, b) in w.iter().zip(virial) {
-                assert!((a - b).abs() < 1e-5 * (1.0 + v.len() as f64), "cloud {number}: {a} {b}");
+                assert!((a - b).abs() < rounding(&cloud) * (1.0 + v.len() as f64), "cloud {number}: {a} {b}");
             }
             if cloud.frozen.is_empty() {
                 for (p, q) in cloud.momentum(&found).into_iter().zip(cloud.momentum(&cloud.v)) {
@@ -178,7 +178,7 @@ fn ranks_refuse_what_does_not_fit() {
         species_of_kind: &[0],
         mass: &mass,
     };
-    let mut thermostat = thermostat(model, 1.0);
+    let mut thermostat = thermostat(model, 1.0, cloud.precision);
     let mut vectors = cloud.v.clone();
     let mut v = cloud.v[1..].to_vec();
     assert!(thermostat.go_on(&pool, 1.0, &mut vectors, &mut v).is_err());

@@ -1,0 +1,210 @@
+//! Pairs in double precision.
+//!
+//! Those of the search are in fractions of the region that a rank has, in single precision: two ranks have the vectors of a
+//! pair to 10⁻⁷. Measured by the coordinates of the host they agree to the rounding of double precision, and so do the
+//! pairs there are.
+
+use super::PairThermostat;
+use super::planes::Plane;
+use crate::engine::particles::Particles;
+use crate::engine::plan::ThermostatPlan;
+use crate::engine::sweep::{Images, Places, Pool};
+use crate::engine::vectors::{self, Loop};
+use psidpd_passes::domain::PeriodicBox;
+use psidpd_passes::plane::list::{ExactPair, PairList};
+
+/// Pairs that are measured at once.
+const BLOCK: usize = 64;
+
+/// `√(½ Δt γ)`, one over the range and the exponent of `w_R`, by pairs of species.
+struct Laws {
+    species: usize,
+    amplitude: Vec<f64>,
+    inverse_range: Vec<f64>,
+    exponent: Exponent,
+}
+
+/// The exponents.
+enum Exponent {
+    One,
+    Two,
+    Any(Vec<f64>),
+}
+
+impl PairThermostat {
+    /// Measures the pairs that were found, and leaves out those that are beyond their range.
+    pub(super) fn measure(
+        &mut self,
+        pool: &Pool,
+        domain: &PeriodicBox,
+        particles: &Particles,
+        species_of_kind: &[i32],
+    ) {
+        let PairThermostat { plan, dimensions, dt, set, lists, planes, places, wants_virial, .. } = self;
+        let copies = planes.last().map_or(0..0, |last| last.found.next.clone());
+        places.gather(*dimensions, domain, particles.x, lists.order(), copies);
+        let laws = Laws::new(plan, *dt);
+        let (places, set, with_stretch) = (&*places, *set, *wants_virial);
+        let law = |i: usize, j: usize| match laws.species {
+            1 => 0,
+            count => {
+                let [a, b] =
+                    [i, j].map(|k| species_of_kind[particles.kind[places.host(k)] as usize] as usize);
+                a * count + b
+            }
+        };
+        pool.each(planes, |plane| {
+            let mut block = Block::new(&laws);
+            plane.measure(places, with_stretch, &mut block, law, |block| {
+                vectors::run(set, Weigh { block, images: places.images(), laws: &laws });
+            });
+        });
+    }
+}
+
+impl Laws {
+    fn new(plan: &ThermostatPlan, dt: f64) -> Laws {
+        let acts = |e: f64| plan.exponent.iter().zip(&plan.gamma).all(|(x, gamma)| *gamma == 0.0 || *x == e);
+        Laws {
+            species: plan.gamma.len().isqrt(),
+            amplitude: plan.gamma.iter().map(|gamma| (0.5 * dt * gamma).sqrt()).collect(),
+            // Beyond a range of zero is every pair.
+            inverse_range: plan
+                .range
+                .iter()
+                .map(|r| if *r > 0.0 { 1.0 / r } else { f64::INFINITY })
+                .collect(),
+            exponent: match () {
+                () if acts(1.0) => Exponent::One,
+                () if acts(2.0) => Exponent::Two,
+                () => Exponent::Any(plan.exponent.clone()),
+            },
+        }
+    }
+}
+
+impl Plane {
+    /// Puts the pairs into blocks, which `weigh` gives factors, and keeps those that have one; `law` is of two sorted particles.
+    fn measure(
+        &mut self,
+        places: &Places,
+        with_stretch: bool,
+        block: &mut Block,
+        law: impl Fn(usize, usize) -> usize,
+        weigh: impl Fn(&mut Block),
+    ) {
+        let first = self.found.own.start;
+        let x = &places.x()[first..];
+        let PairList { start, pairs, exact, stretch } = &mut self.found.list;
+        exact.reserve(pairs.len());
+        // The row of the next pair, and how many are kept.
+        let (mut i, mut kept) = (0, 0);
+        for from in (0..pairs.len()).step_by(BLOCK) {
+            let to = pairs.len().min(from + BLOCK);
+            let mut row = i;
+            for (n, pair) in pairs[from..to].iter().enumerate() {
+                while from + n >= start[row + 1] as usize {
+                    row += 1;
+                }
+                let j = pair.j as usize;
+                let (a, b) = (x[row], x[j]);
+                (0..3).for_each(|c| block.d[c][n] = a[c] - b[c]);
+                block.law[n] = law(first + row, first + j);
+            }
+            weigh(block);
+            let [x, y, z] = &block.d;
+            for k in from..to {
+                while k >= start[i + 1] as usize {
+                    start[i + 1] = kept as u32;
+                    i += 1;
+                }
+                let (n, pair) = (k - from, pairs[k]);
+                let factor = block.factor[n];
+                // Not the other way round: what is no number is left out too.
+                let acts = factor > 0.0 && factor < f64::INFINITY;
+                if !acts {
+                    continue;
+                }
+                pairs[kept] = pair;
+                kept += 1;
+                exact.push(ExactPair { g: [factor * x[n], factor * y[n], factor * z[n]], j: pair.j.into() });
+                if with_stretch {
+                    stretch.push(factor.recip());
+                }
+            }
+        }
+        start[i + 1..].fill(kept as u32);
+        pairs.truncate(kept);
+    }
+}
+
+/// Pairs side by side.
+struct Block {
+    d: [[f64; BLOCK]; 3],
+    law: [usize; BLOCK],
+    amplitude: [f64; BLOCK],
+    inverse_range: [f64; BLOCK],
+    /// `√(½ Δt γ) w_R/r`; nothing, or no number, of pairs that there are none of.
+    factor: [f64; BLOCK],
+}
+
+impl Block {
+    /// With the first law for all.
+    fn new(laws: &Laws) -> Block {
+        Block {
+            d: [[0.0; BLOCK]; 3],
+            law: [0; BLOCK],
+            amplitude: [laws.amplitude[0]; BLOCK],
+            inverse_range: [laws.inverse_range[0]; BLOCK],
+            factor: [0.0; BLOCK],
+        }
+    }
+}
+
+/// Takes the nearest images, and weighs them.
+struct Weigh<'a> {
+    block: &'a mut Block,
+    images: Images,
+    laws: &'a Laws,
+}
+
+impl Loop for Weigh<'_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Weigh { block: Block { d, law, amplitude, inverse_range, factor }, images, laws } = self;
+        images.find_nearest(d);
+        if laws.species > 1 {
+            for n in 0..BLOCK {
+                (amplitude[n], inverse_range[n]) = (laws.amplitude[law[n]], laws.inverse_range[law[n]]);
+            }
+        }
+        let [x, y, z] = d;
+        for n in 0..BLOCK {
+            // The distance, for a moment.
+            factor[n] = (x[n] * x[n] + y[n] * y[n] + z[n] * z[n]).sqrt();
+        }
+        match &laws.exponent {
+            Exponent::One => {
+                for n in 0..BLOCK {
+                    let t = (1.0 - factor[n] * inverse_range[n]).max(0.0);
+                    factor[n] = amplitude[n] * t / factor[n];
+                }
+            }
+            Exponent::Two => {
+                for n in 0..BLOCK {
+                    let t = (1.0 - factor[n] * inverse_range[n]).max(0.0);
+                    factor[n] = amplitude[n] * t * t / factor[n];
+                }
+            }
+            Exponent::Any(exponent) => {
+                for n in 0..BLOCK {
+                    let t = 1.0 - factor[n] * inverse_range[n];
+                    let w = if t > 0.0 { t.powf(exponent[law[n]]) } else { 0.0 };
+                    factor[n] = amplitude[n] * w / factor[n];
+                }
+            }
+        }
+    }
+}
