@@ -42,6 +42,7 @@ fn main() {
             "cpp/pair_mdpd_psi.cpp",
             "cpp/pair_dpd_spline.cpp",
             "cpp/fix_splitting.cpp",
+            "cpp/fix_splitting_displaced.cpp",
             "cpp/register.cpp",
         ])
         .include("cpp")

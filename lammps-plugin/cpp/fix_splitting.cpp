@@ -21,6 +21,7 @@
 #include "atom_vec.h"
 #endif
 
+#include <cmath>
 #include <cstring>
 
 using namespace LAMMPS_NS;
@@ -29,8 +30,13 @@ using namespace psidpd;
 
 namespace {
 
-// Share of a step in the first kick and in the last, as in the native runner: small errors of averages in liquids.
-constexpr double LAMBDA = 0.21;
+// Shares of a step in the first kick and in the last, as in the native runner: small errors of averages in liquids with
+// two stages; of fourth order with the force gradient, beside its ξ.
+constexpr double LAMBDA_OF_TWO_STAGES = 0.21;
+constexpr double LAMBDA_OF_FOURTH_ORDER = 1.0 / 6.0;
+constexpr double GRADIENT_OF_FOURTH_ORDER = 1.0 / 24.0;
+
+const char SCHEMES[] = "'two-stage', 'force-gradient' or 'aboba'";
 
 bool begins(const char *text, const char *with)
 {
@@ -39,7 +45,8 @@ bool begins(const char *text, const char *with)
 
 }    // namespace
 
-FixSplitting::FixSplitting(LAMMPS *lmp, int narg, char **arg) : Fix(lmp, narg, arg), lambda(LAMBDA)
+FixSplitting::FixSplitting(LAMMPS *lmp, int narg, char **arg) :
+    Fix(lmp, narg, arg), lambda(LAMBDA_OF_TWO_STAGES), gradient(GRADIENT_OF_FOURTH_ORDER)
 {
   time_integrate = 1;
   dynamic_group_allow = 1;
@@ -51,12 +58,16 @@ FixSplitting::FixSplitting(LAMMPS *lmp, int narg, char **arg) : Fix(lmp, narg, a
   virial_global_flag = 1;
   thermo_virial = 1;
 
-  if (narg < 4) stop("expected 'two-stage' or 'aboba'");
+  if (narg < 4) stop(std::string("expected ") + SCHEMES);
   const std::string name = arg[3];
-  if (name == "aboba")
+  if (name == "aboba") {
     scheme = Scheme::aboba;
-  else if (name != "two-stage")
-    stop("unknown splitting '" + name + "': expected 'two-stage' or 'aboba'");
+  } else if (name == "force-gradient") {
+    scheme = Scheme::force_gradient;
+    lambda = LAMBDA_OF_FOURTH_ORDER;
+  } else if (name != "two-stage") {
+    stop("unknown splitting '" + name + "': expected " + SCHEMES);
+  }
   for (int k = 4; k < narg; k += 2) {
     const std::string key = arg[k];
     if (k + 1 >= narg) stop("keyword '" + key + "' needs a value");
@@ -64,18 +75,23 @@ FixSplitting::FixSplitting(LAMMPS *lmp, int narg, char **arg) : Fix(lmp, narg, a
     if (key == "every") {
       every = utils::bnumeric(FLERR, arg[k + 1], false, lmp);
       if (every < 1) stop("every must be 1 or more, found " + value);
-    } else if (key == "lambda" && scheme == Scheme::two_stage) {
+    } else if (key == "lambda" && scheme != Scheme::aboba) {
       lambda = utils::numeric(FLERR, arg[k + 1], false, lmp);
       if (!(lambda >= 0.0 && lambda <= 0.5)) stop("lambda must be from 0 to 0.5, found " + value);
+    } else if (key == "gradient" && scheme == Scheme::force_gradient) {
+      gradient = utils::numeric(FLERR, arg[k + 1], false, lmp);
+      if (!(gradient >= 0.0 && std::isfinite(gradient))) stop("gradient must be 0 or more, found " + value);
     } else if (key == "noise") {
       if (value != "gaussian" && value != "uniform")
         stop("unknown noise '" + value + "': expected 'gaussian' or 'uniform'");
       uniform = value == "uniform";
     } else {
       stop("unknown keyword '" + key + "': expected 'every'" +
-           (scheme == Scheme::two_stage ? ", 'lambda'" : "") + " or 'noise'");
+           (scheme != Scheme::aboba ? ", 'lambda'" : "") +
+           (scheme == Scheme::force_gradient ? ", 'gradient'" : "") + " or 'noise'");
     }
   }
+  if (scheme == Scheme::force_gradient) keep_shifts();
 }
 
 void FixSplitting::stop(const std::string &text, const char *file, int line)
@@ -161,6 +177,7 @@ void FixSplitting::initial_integrate(int vflag)
   reflect();
   follow();
   compute_forces(0, 0);
+  if (scheme == Scheme::force_gradient && gradient > 0.0) compute_displaced_forces();
   kick((1.0 - 2.0 * lambda) * dt);
   drift(0.5 * dt);
 }
@@ -169,7 +186,7 @@ void FixSplitting::final_integrate()
 {
   const double dt = update->dt;
   v_init(vflag_of_step);
-  if (scheme == Scheme::two_stage) {
+  if (scheme != Scheme::aboba) {
     kick(lambda * dt);
     act();
     return;
@@ -236,17 +253,21 @@ void FixSplitting::act()
 
 void FixSplitting::follow()
 {
-  int far = 0;
-  if (neighbor->dist_check) {
-    // This is not a step of its own: what LAMMPS counts as dangerous is not.
-    const bigint dangerous = neighbor->ndanger;
-    far = neighbor->check_distance();
-    neighbor->ndanger = dangerous;
-  }
-  if (far)
+  if (are_far())
     find_ghosts_anew();
   else
     comm->forward_comm();
+}
+
+// Whether atoms have gone too far since ghosts were last found, where LAMMPS is to look at that.
+bool FixSplitting::are_far()
+{
+  if (!neighbor->dist_check) return false;
+  // This is not a step of its own: what LAMMPS counts as dangerous is not.
+  const bigint dangerous = neighbor->ndanger;
+  const bool far = neighbor->check_distance();
+  neighbor->ndanger = dangerous;
+  return far;
 }
 
 // As at the beginning of a step in which LAMMPS builds lists anew, but for fixes that insert or remove atoms there: their

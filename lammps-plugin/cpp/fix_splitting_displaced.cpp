@@ -1,0 +1,99 @@
+// Forces at displaced positions, for the force-gradient step.
+
+#include "fix_splitting.h"
+
+#include "atom.h"
+#include "comm.h"
+#include "force.h"
+#include "memory.h"
+#include "neighbor.h"
+#include "update.h"
+
+#include <algorithm>
+
+using namespace LAMMPS_NS;
+using namespace psidpd;
+
+FixSplitting::~FixSplitting()
+{
+  if (!shifts) return;
+  atom->delete_callback(id, Atom::GROW);
+  memory->destroy(shifts);
+}
+
+void FixSplitting::keep_shifts()
+{
+  maxexchange = 3;
+  grow_arrays(atom->nmax);
+  atom->add_callback(Atom::GROW);
+}
+
+void FixSplitting::grow_arrays(int most)
+{
+  memory->grow(shifts, most, 3, "dpd/splitting:shifts");
+}
+
+void FixSplitting::copy_arrays(int from, int to, int)
+{
+  std::copy_n(shifts[from], 3, shifts[to]);
+}
+
+int FixSplitting::pack_exchange(int i, double *buf)
+{
+  std::copy_n(shifts[i], 3, buf);
+  return 3;
+}
+
+int FixSplitting::unpack_exchange(int i, double *buf)
+{
+  std::copy_n(buf, 3, shifts[i]);
+  return 3;
+}
+
+double FixSplitting::memory_usage()
+{
+  return (shifts ? 3.0 * atom->nmax : 0.0) * sizeof(double) + static_cast<double>(home.capacity()) * sizeof(double);
+}
+
+// Atoms never change ranks while they are displaced: behind a side that is not periodic they would be lost.
+void FixSplitting::compute_displaced_forces()
+{
+  double **f = atom->f;
+  const int owned = atom->nlocal;
+  const double far = gradient * update->dt * update->dt * force->ftm2v;
+  for (int i = 0; i < owned; i++) {
+    const double mass = atom->rmass ? atom->rmass[i] : atom->mass[atom->type[i]];
+    const double over_mass = (atom->mask[i] & groupbit) ? far / mass : 0.0;
+    for (int k = 0; k < 3; k++) shifts[i][k] = over_mass * f[i][k];
+  }
+  shift();
+  if (are_far()) {
+    restore();
+    find_ghosts_anew();
+    shift();
+    if (are_far())
+      stop("the forces of step " + std::to_string(update->ntimestep) +
+           " displace atoms by more than half the skin of " + std::to_string(neighbor->skin) +
+           ": use a wider skin (command 'neighbor') or a shorter timestep");
+  }
+  comm->forward_comm();
+  compute_forces(0, 0);
+  restore();
+}
+
+void FixSplitting::shift()
+{
+  double **x = atom->x;
+  const int owned = atom->nlocal;
+  home.resize(3 * static_cast<size_t>(owned));
+  for (int i = 0; i < owned; i++)
+    for (int k = 0; k < 3; k++) {
+      home[3 * static_cast<size_t>(i) + k] = x[i][k];
+      x[i][k] += shifts[i][k];
+    }
+}
+
+void FixSplitting::restore()
+{
+  if (!home.empty()) std::copy_n(home.begin(), home.size(), &atom->x[0][0]);
+}
