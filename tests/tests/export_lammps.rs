@@ -274,11 +274,7 @@ fn refusal(folder: &Path) -> String {
 
 /// Runs `scene` natively and as a deck, on one rank and on two, and compares every row and frame.
 fn compare(scene: &str) {
-    compare_within(scene, [1e-10, 1e-10]);
-}
-
-/// The same with the largest differences of coordinates on one rank and on two.
-fn compare_within(scene: &str, largest: [f64; 2]) {
+    let largest = 1e-10;
     let folder = folder(scene);
     let at = folder.path();
     let run = psidpd(at, &["run", "scenes/scene.toml", "--out", "native"]);
@@ -295,7 +291,7 @@ fn compare_within(scene: &str, largest: [f64; 2]) {
     // As for any path with a space: LAMMPS puts no variables in between quotes.
     let plugin = format!("\"{}\"", plugin.display());
     let arguments = ["-var", "plugin", &plugin];
-    for (ranks, largest) in [1, 2].into_iter().zip(largest) {
+    for ranks in [1, 2] {
         host.run_script(ranks, &deck, Path::new("in.lammps"), &arguments, Duration::from_secs(120)).unwrap();
         compare_frames(at, largest);
         compare_rows(at, 10.0 * largest);
@@ -426,9 +422,6 @@ fn walls_frozen_particles_body_forces_and_a_ramp() {
     compare(WALLS);
 }
 
-/// On several ranks vectors between particles and ghosts are rounded to single precision otherwise than in one hand.
-const SPLITTING: [f64; 2] = [1e-10, 1e-5];
-
 /// A splitting with its keys, in all stages of a scene.
 fn with_integrator(scene: &str, lines: &str) -> String {
     let scene = scene.replace("integrator = \"groot-warren\"\nlambda = 0.5\n", "");
@@ -444,12 +437,24 @@ fn with_integrator(scene: &str, lines: &str) -> String {
 
 #[test]
 fn two_stages_with_one_thermostat() {
-    compare_within(&with_integrator(ONE_SPECIES, "integrator = \"two-stage\""), SPLITTING);
+    compare(&with_integrator(ONE_SPECIES, "integrator = \"two-stage\""));
+}
+
+#[test]
+fn forces_at_displaced_positions() {
+    compare(&with_integrator(ONE_SPECIES, "integrator = \"force-gradient\""));
+}
+
+/// Two masses, displacements larger than they need be, and a thermostat now and then.
+#[test]
+fn displaced_masses() {
+    let lines = "integrator = \"force-gradient\"\nlambda = 0.17\ngradient = 0.2\nthermostat_every = 2";
+    compare(&with_integrator(TWO_SPECIES, lines));
 }
 
 #[test]
 fn forces_in_the_middle() {
-    compare_within(&with_integrator(ONE_SPECIES, "integrator = \"aboba\""), SPLITTING);
+    compare(&with_integrator(ONE_SPECIES, "integrator = \"aboba\""));
 }
 
 /// Stages with different temperatures, steps and integrators; one has no thermostat.
@@ -459,12 +464,14 @@ fn a_thermostat_at_every_third_step() {
     let scene = with_integrator(TWO_SPECIES, lines);
     let last = scene.rfind(lines).unwrap();
     let other = "integrator = \"aboba\"\nthermostat_every = 2";
-    compare_within(&format!("{}{other}{}", &scene[..last], &scene[last + lines.len()..]), SPLITTING);
+    compare(&format!("{}{other}{}", &scene[..last], &scene[last + lines.len()..]));
 }
 
 #[test]
 fn a_splitting_in_two_dimensions() {
-    compare_within(&with_integrator(FLAT, "integrator = \"two-stage\""), SPLITTING);
+    for integrator in ["two-stage", "force-gradient"] {
+        compare(&with_integrator(FLAT, &format!("integrator = \"{integrator}\"")));
+    }
 }
 
 /// Particles are reflected after either drift, and frozen ones drag.
@@ -473,8 +480,8 @@ fn splittings_between_walls() {
     // Half as many steps: among fast particles that rounding grows. A pair that is lost makes 10⁻².
     let short = [("steps = 25", "steps = 10"), ("steps = 15", "steps = 5"), ("steps = 20", "steps = 10")];
     let scene = short.iter().fold(WALLS.to_owned(), |scene, (long, short)| scene.replace(long, short));
-    for integrator in ["two-stage", "aboba"] {
-        compare_within(&with_integrator(&scene, &format!("integrator = \"{integrator}\"")), SPLITTING);
+    for integrator in ["two-stage", "force-gradient", "aboba"] {
+        compare(&with_integrator(&scene, &format!("integrator = \"{integrator}\"")));
     }
 }
 

@@ -254,7 +254,9 @@ impl Integrator {
         match self {
             Integrator::VelocityVerlet => Counterpart::Nve,
             Integrator::GrootWarren { lambda: 0.5 } => Counterpart::Nve,
-            Integrator::Aboba(coupling) | Integrator::TwoStage { coupling, .. }
+            Integrator::Aboba(coupling)
+            | Integrator::TwoStage { coupling, .. }
+            | Integrator::ForceGradient { coupling, .. }
                 if coupling.update == Update::Midpoint =>
             {
                 Counterpart::Splitting

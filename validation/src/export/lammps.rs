@@ -42,7 +42,7 @@ const MOST_BODY_FORCES: usize = 9;
 pub enum DeckError {
     #[error(
         "stage \"{stage}\": integrator = \"{name}\" ({integrator}) has no counterpart in LAMMPS; a deck can have \
-         velocity-verlet, groot-warren with lambda = 0.5, which is the same, and two-stage and aboba with \
+         velocity-verlet, groot-warren with lambda = 0.5, which is the same, and two-stage, force-gradient and aboba with \
          thermostat_step = \"midpoint\""
     )]
     Integrator { stage: String, name: &'static str, integrator: Integrator },
@@ -332,6 +332,9 @@ fn motion(integrator: &Integrator) -> String {
     if let Some((lambda, _)) = integrator.lambda() {
         text += &format!(" lambda {lambda:?}");
     }
+    if let Some(gradient) = integrator.gradient() {
+        text += &format!(" gradient {gradient:?}");
+    }
     if let Some(coupling) = integrator.coupling().filter(|coupling| coupling.every > 1) {
         text += &format!(" every {}", coupling.every);
     }
@@ -371,6 +374,11 @@ mod tests {
         let coupling = Coupling { every: 3, noise: Law::Uniform, ..Coupling::DEFAULT };
         let two_stage = Integrator::TwoStage { lambda: 0.2, coupling };
         assert_eq!(motion(&two_stage), "dpd/splitting two-stage lambda 0.2 every 3 noise uniform");
+        let force_gradient = Integrator::ForceGradient { lambda: 0.17, gradient: 0.04, coupling };
+        assert_eq!(
+            motion(&force_gradient),
+            "dpd/splitting force-gradient lambda 0.17 gradient 0.04 every 3 noise uniform"
+        );
         assert_eq!(motion(&Integrator::Aboba(Coupling::DEFAULT)), "dpd/splitting aboba");
         assert_eq!(motion(&Integrator::VelocityVerlet), "nve");
     }
