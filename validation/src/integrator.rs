@@ -298,10 +298,10 @@ impl fmt::Display for Integrator {
         write!(f, "{}", self.name())?;
         let mut this = *self;
         if let Some((lambda, _)) = this.lambda() {
-            write!(f, ", lambda = {lambda}")?;
+            write!(f, ", lambda = {}", six_digits(*lambda))?;
         }
-        if let Some(gradient) = this.gradient() {
-            write!(f, ", gradient = {gradient}")?;
+        if let Some(gradient) = this.gradient().filter(|gradient| **gradient != FORCE_GRADIENT[1]) {
+            write!(f, ", gradient = {}", six_digits(*gradient))?;
         }
         if let Some(coupling) = this.coupling() {
             write!(f, ", thermostat_step = {}", coupling.name())?;
@@ -322,4 +322,9 @@ impl fmt::Display for Integrator {
             _ => Ok(()),
         }
     }
+}
+
+/// A number without more digits than people read.
+fn six_digits(x: f64) -> f64 {
+    (x * 1e6).round() / 1e6
 }

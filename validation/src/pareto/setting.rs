@@ -43,8 +43,12 @@ pub struct Setting {
 pub const INTERVAL: u64 = 24;
 
 impl Physics {
-    /// Steps from one sample to the next: of every phase of a thermostat that acts at every k-th step, as many.
+    /// Steps from one sample to the next: of every phase of a thermostat that acts at every k-th step, as many. Without time one: it has
+    /// its sweeps.
     pub fn interval(&self) -> u64 {
+        if !self.integrator.has_time() {
+            return 1;
+        }
         let every = { self.integrator }.coupling().map_or(1, |coupling| coupling.every);
         let wanted = ((INTERVAL as f64 / self.multiple).round() as u64).max(1);
         (wanted..).find(|steps| greatest_common_divisor(*steps, every) == 1).unwrap_or(wanted)
@@ -64,7 +68,7 @@ impl Physics {
 }
 
 /// Sweeps of the reference between samples.
-const SWEEPS: u64 = 4;
+const SWEEPS: u64 = 3;
 
 fn greatest_common_divisor(a: u64, b: u64) -> u64 {
     if b == 0 { a } else { greatest_common_divisor(b, a % b) }
