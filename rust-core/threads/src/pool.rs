@@ -12,11 +12,11 @@ use std::cell::RefCell;
 use std::num::NonZeroUsize;
 use sync::{
     Arc, AtomicBool, AtomicUsize, Builder, Condvar, JoinHandle, Mutex, Ordering, spin_loop, thread_local,
-    yield_now,
 };
 
-/// Threads that do one piece of work together, many times a millisecond: they wait for the next piece by spinning for a
-/// while, then asleep.
+/// Threads that do one piece of work together, many times a millisecond: they wait for the next piece, and for each other, by
+/// spinning for a while, then asleep. Where there are more threads than processors for them they sleep at once, so that those
+/// that have work get the processors.
 ///
 /// Pieces of work never overlap: a second thread that calls [`Pool::run`] waits until the first is done. Work that calls
 /// [`Pool::run`] of the pool it runs on does all parts of the inner piece where it is.
@@ -47,10 +47,16 @@ struct Shared {
     /// Workers that sleep; changed with `work` locked, so that none is missed.
     asleep: AtomicUsize,
     called: Condvar,
+    /// Locked by a caller that goes to sleep, and by the last worker that is done before it wakes the caller.
+    waits: Mutex<()>,
+    done: Condvar,
+    /// How often a thread looks before it goes to sleep.
+    spins: usize,
 }
 
-/// How often a worker looks at the epoch before it goes to sleep: for some tens of microseconds.
-const SPINS: usize = if cfg!(any(loom, miri)) { 1 } else { 20_000 };
+/// How often a thread looks for work, or for the others, before it goes to sleep: for 50 to 200 microseconds, as long as a processor
+/// takes to pause.
+const SPINS: usize = if cfg!(any(loom, miri)) { 1 } else { 4000 };
 
 thread_local! {
     /// The pools whose work this thread is doing, each by the address of what its threads share.
@@ -73,6 +79,9 @@ impl Pool {
             work: Mutex::new(None),
             asleep: AtomicUsize::new(0),
             called: Condvar::new(),
+            waits: Mutex::new(()),
+            done: Condvar::new(),
+            spins: if threads.get() > processors() { 0 } else { SPINS },
         });
         let spawn = |number| {
             let shared = shared.clone();
@@ -177,15 +186,16 @@ struct Wait<'a>(&'a Shared);
 
 impl Drop for Wait<'_> {
     fn drop(&mut self) {
+        let busy = || self.0.busy.load(Ordering::Acquire) > 0;
         let mut spins = 0;
-        while self.0.busy.load(Ordering::Acquire) > 0 {
-            // With fewer processors than threads the worker may need this one.
-            if spins < SPINS {
-                spins += 1;
-                spin_loop();
-            } else {
-                spins = 0;
-                yield_now();
+        while busy() && spins < self.0.spins {
+            spins += 1;
+            spin_loop();
+        }
+        if busy() {
+            let mut waits = self.0.waits.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+            while busy() {
+                waits = self.0.done.wait(waits).unwrap_or_else(|poisoned| poisoned.into_inner());
             }
         }
     }
@@ -196,7 +206,7 @@ fn worker(shared: &Arc<Shared>, number: usize) {
     let mut seen = 0;
     loop {
         let mut spins = 0;
-        while shared.epoch.load(Ordering::Acquire) == seen && spins < SPINS {
+        while shared.epoch.load(Ordering::Acquire) == seen && spins < shared.spins {
             spins += 1;
             spin_loop();
         }
@@ -219,7 +229,11 @@ fn worker(shared: &Arc<Shared>, number: usize) {
         if std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| work(number))).is_err() {
             shared.failed.store(true, Ordering::Relaxed);
         }
-        shared.busy.fetch_sub(1, Ordering::Release);
+        if shared.busy.fetch_sub(1, Ordering::Release) == 1 {
+            // A caller that saw this worker busy is asleep once the lock can be had.
+            drop(shared.waits.lock());
+            shared.done.notify_one();
+        }
     }
 }
 
@@ -237,6 +251,12 @@ impl Drop for Pool {
             let _ = worker.join();
         }
     }
+}
+
+/// How many processors this process may use; more than any pool has where that is not known.
+#[must_use]
+pub fn processors() -> usize {
+    std::thread::available_parallelism().map_or(usize::MAX, NonZeroUsize::get)
 }
 
 /// The part of `count` things that thread `number` of `threads` does.

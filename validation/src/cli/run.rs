@@ -4,7 +4,7 @@ use crate::check::calibration;
 use crate::report::{Headline, Progress, headline, write_run_report};
 use crate::run::FILES;
 use crate::run::{Advice, Begin, Outcome, Runner, Start, Summary, Timing};
-use psidpd_core::engine::{Pool, Precision};
+use psidpd_core::engine::{Pool, Precision, processors};
 use serde::Serialize;
 use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::flag;
@@ -98,6 +98,12 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         _ => Begin::New,
     };
     let mut runner = Runner::begin(&scene, out, begin)?;
+    if threads.get() > processors() {
+        warn(&format!(
+            "{threads} threads on {} processors: more than there are make a run slower",
+            processors()
+        ));
+    }
     runner.set_threads(*threads)?;
     // Until here there is nothing to lose, and a signal ends the program at once.
     let stop = watch_signals()?;

@@ -6,7 +6,7 @@ mod threads {
     pub use std::hint::spin_loop;
     pub use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
     pub use std::sync::{Arc, Condvar, Mutex};
-    pub use std::thread::{Builder, JoinHandle, yield_now};
+    pub use std::thread::{Builder, JoinHandle};
     pub use std::thread_local;
 }
 
@@ -15,7 +15,7 @@ mod threads {
     pub use loom::hint::spin_loop;
     pub use loom::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
     pub use loom::sync::{Arc, Condvar, Mutex};
-    pub use loom::thread::{Builder, JoinHandle, yield_now};
+    pub use loom::thread::{Builder, JoinHandle};
     pub use loom::thread_local;
 }
 
