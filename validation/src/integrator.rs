@@ -242,7 +242,7 @@ impl Integrator {
             Integrator::GrootWarren { .. } => ([5.0, 0.12], [0.5, 0.75, 0.0]),
             Integrator::DpdVv { .. } | Integrator::SelfConsistent { .. } => ([5.0, 0.0], [0.5, 0.75, 0.0]),
             Integrator::TwoStage { .. } => ([0.01, 0.0], [0.1, 0.0, 0.0]),
-            Integrator::ForceGradient { .. } => ([0.01, 0.0], [0.0, 0.0, 0.01]),
+            Integrator::ForceGradient { .. } => ([0.006, 0.0], [0.0, 0.0, 0.006]),
             Integrator::MonteCarlo { .. } => ([0.0; 2], [0.0; 3]),
             _ => ([5.0, 0.0], [0.5, 0.0, 0.0]),
         };

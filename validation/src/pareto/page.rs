@@ -233,13 +233,11 @@ pub fn explanation(outcome: &Outcome) -> String {
 pub fn report(outcome: &Outcome) -> Result<String, ParetoError> {
     let mut plots = Vec::new();
     let all = Class::ALL.into_iter().map(|(_, class)| plot_of(outcome, class));
-    for plot in std::iter::once(plot_of_worst(outcome)).chain(all) {
-        if let Some(plot) = plot {
-            plots.push(Item::Figure {
-                svg: plot.render()?,
-                caption: "Without a bar: not resolved, at what the error is likely to be below.".into(),
-            });
-        }
+    for plot in std::iter::once(plot_of_worst(outcome)).chain(all).flatten() {
+        plots.push(Item::Figure {
+            svg: plot.render()?,
+            caption: "Without a bar: not resolved, at what the error is likely to be below.".into(),
+        });
     }
     let section = |heading: &str, items: Vec<Item>| Section { heading: heading.into(), items };
     let mut settings = vec![Item::Prose(explanation(outcome)), Item::Table(table(outcome))];
