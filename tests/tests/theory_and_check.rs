@@ -138,7 +138,7 @@ fn theory_says_where_it_fails_and_measures() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     let set6 = model("warren2003-set6.toml");
-    let run = ["theory", &set6, "--measure", "--steps", "300", "--report", "t.html"];
+    let run = ["theory", &set6, "--measure", "--steps", "800", "--report", "t.html"];
     let found = json(here, &run, 0);
     assert!(found["binodal"]["liquid"].as_f64().unwrap() < 2.5, "{found}");
     let expected = found["correlated"]["liquid"].as_f64().unwrap();
@@ -285,7 +285,7 @@ fn check_judges_every_part_and_says_what_is_wrong() {
              levels = 4\n"
         )
     };
-    std::fs::write(here.join("ramp.toml"), text(0.01)).unwrap();
+    std::fs::write(here.join("ramp.toml"), text(0.002)).unwrap();
     let words = said(&psidpd(here, &["check", "ramp.toml"]));
     assert_eq!(words.lines().filter(|line| line.starts_with("time step")).count(), 2, "{words}");
     assert!(!words.contains("[time-step]"), "{words}");
