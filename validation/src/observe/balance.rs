@@ -171,8 +171,8 @@ fn displaced_forces_carry_nothing_across_a_film() {
     assert!(elsewhere.value.abs() > 4.0 * elsewhere.error, "{elsewhere:?}");
 }
 
-/// A film that gravity presses on a wall carries at every height the weight of what is above, at the step of before. In the film that
-/// is some 10 for a weight of 19 on the wall; mirrored momentum of the wall is no part of it.
+/// A film that gravity presses on a wall carries at every height the weight of the particles above, with steps of [`LONG`]. In the
+/// middle of the film that is about 10; on the wall it is 19.
 #[test]
 fn a_film_on_a_wall_carries_its_weight() {
     const WEIGHT: f64 = 1.0;
