@@ -1,5 +1,5 @@
-use psidpd::lammps::data::DataFile;
-use psidpd::lammps::dump::DumpReader;
+use psidpd::formats::data::DataFile;
+use psidpd::formats::dump::DumpReader;
 
 /// Any text is a LAMMPS data file or an error; what was read and can be written is read again as the same.
 pub fn data(text: &str) {

@@ -14,6 +14,8 @@
 //! Data flow: model file → [`model::Model`] → [`model::Fluid`] (at one kT) → [`engine::Plan`] →
 //! [`engine::Engine`].
 
+#![warn(missing_docs)]
+
 // What tests here share with those in `tests/` imports by this name.
 #[cfg(test)]
 extern crate self as psidpd_core;

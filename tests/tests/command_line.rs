@@ -31,7 +31,7 @@ fn a_scene_runs_and_leaves_what_it_says() {
     let out = folder.path().join("out");
     let thermo = std::fs::read_to_string(out.join("thermo.csv")).unwrap();
     assert_eq!(thermo.lines().count(), 1 + 6, "{thermo}");
-    let frames = psidpd::lammps::dump::read(&out.join("dump.lammpstrj")).unwrap();
+    let frames = psidpd::formats::dump::read(&out.join("dump.lammpstrj")).unwrap();
     assert_eq!(frames.len(), 3);
     assert_eq!(frames[2].natoms, 387);
     let json: serde_json::Value =
@@ -241,7 +241,7 @@ fn a_run_that_stops_exits_with_one_and_keeps_the_last_good_state() {
     let words = said(&output);
     assert_eq!(output.status.code(), Some(1), "{words}");
     assert!(words.contains("time step is likely too large"), "{words}");
-    let saved = psidpd::lammps::DataFile::read(&folder.path().join("out/last-good.data")).unwrap();
+    let saved = psidpd::formats::DataFile::read(&folder.path().join("out/last-good.data")).unwrap();
     assert_eq!(saved.atoms.len(), 387);
 }
 

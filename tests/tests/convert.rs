@@ -2,7 +2,7 @@
 
 mod style_common;
 
-use psidpd::lammps::dump;
+use psidpd::formats::dump;
 use psidpd_tests::{lammps, psidpd, said};
 use std::path::Path;
 use style_common::{LIMIT, difference};

@@ -1,6 +1,6 @@
 //! Decks that `export lammps` writes: the trajectory of the scene, step by step.
 
-use psidpd::lammps::{DataFile, dump};
+use psidpd::formats::{DataFile, dump};
 use psidpd_core::maximum::largest;
 use psidpd_tests::{lammps, program, root, said};
 use std::path::Path;

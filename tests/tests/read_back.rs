@@ -6,7 +6,7 @@
 //! below 8, and pairs that are that near to the edge of a bin may be counted in the next one. LAMMPS sums the
 //! same doubles in another order: 10⁻¹¹ of the largest term.
 
-use psidpd::lammps::{DataFile, dump};
+use psidpd::formats::{DataFile, dump};
 use psidpd_core::maximum::largest;
 use psidpd_tests::{lammps, psidpd, python, said};
 use serde_json::Value;

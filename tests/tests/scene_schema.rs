@@ -135,7 +135,7 @@ fn reference() -> String {
         The examples below leave out what every scene needs. Their model has two species, `A` and `B`, in three\n\
         dimensions. In two dimensions everything that has a number for each direction has two, and there are no\n\
         cylinders. What is measured is in `[observe]`, which has [a page of its own](observables.md).\n\n\
-        This page is written from the tables of keys in `validation/src/scene/keys/`.\n"
+        This page is written from the tables of keys in `validation/dynamics/src/scene/keys/`.\n"
         .to_owned();
     // Writing to a String cannot fail.
     for table in TABLES {

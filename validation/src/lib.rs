@@ -1,32 +1,13 @@
-//! psidpd: native runner and cross-code validator.
-pub mod bench;
-mod bulk;
-mod calibrate;
-mod check;
-pub mod checkpoint;
+//! The program `psidpd`: its command line, and its parts by their names for the tests and for Python.
+
 pub mod cli;
-mod crosscheck;
-pub mod export;
-mod files;
-mod from_eos;
-mod hardcases;
-mod integrator;
-pub mod lammps;
-mod least_squares;
-mod measure;
-pub mod observe;
-mod output;
-mod papers;
-mod pareto;
-mod particles;
-mod prediction;
-pub mod report;
-pub mod run;
-pub mod scene;
-mod sweep;
-#[cfg(test)]
-mod test_support;
-mod theory_page;
+
+pub use psidpd_dynamics::{checkpoint, run, scene};
+pub use psidpd_experiments::bench;
+pub use psidpd_formats as formats;
+pub use psidpd_lammps_host::{self as lammps, export};
+pub use psidpd_observe as observe;
+pub use psidpd_report as report;
 
 #[global_allocator]
 static ALLOCATOR: psidpd_core::memory::LargePages = psidpd_core::memory::LargePages;

@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
-use psidpd::lammps::data::Atom;
-use psidpd::lammps::setfl::{Element, Setfl};
-use psidpd::lammps::{DataFile, Host, Lammps, LammpsError, dump, install};
+use psidpd::formats::data::Atom;
+use psidpd::formats::setfl::{Element, Setfl};
+use psidpd::formats::{DataFile, dump};
+use psidpd::lammps::{Host, Lammps, LammpsError, install};
 
 fn host() -> Host {
     install(&|_| {}).unwrap()

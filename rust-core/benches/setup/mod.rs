@@ -32,7 +32,7 @@ pub static SUBJECTS: [Subject; 3] = [
     },
     Subject {
         name: "formula",
-        text: include_str!("../../../validation/src/bench/two-species.toml"),
+        text: include_str!("../../../validation/experiments/src/bench/two-species.toml"),
         density: 6.05,
         dt: 0.01,
     },

@@ -4,6 +4,8 @@
 //! no panic leaves this module. What the functions do is in [`psidpd_core::model`] and [`psidpd_core::engine`];
 //! here are only checks and conversions.
 
+#![warn(missing_docs)]
+
 mod arguments;
 mod engine;
 mod evaluation;

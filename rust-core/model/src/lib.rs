@@ -10,6 +10,8 @@
 //! says. Densities are number densities. `r_ij = r_i − r_j`, `ê_ij = r_ij / r_ij`, and a positive force
 //! along `ê_ij` on `i` is repulsive. Per-species indices run in the order of `species`.
 
+#![warn(missing_docs)]
+
 pub mod curve;
 pub mod document;
 pub mod expression;

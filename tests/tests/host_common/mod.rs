@@ -3,7 +3,8 @@
 #![allow(dead_code)]
 
 use super::style_common::{chains, difference, scaled};
-use psidpd::lammps::{DataFile, Host, dump};
+use psidpd::formats::{DataFile, dump};
+use psidpd::lammps::Host;
 use psidpd_core::maximum::largest;
 use psidpd_tests::{psidpd, root, said};
 use std::path::{Path, PathBuf};

@@ -1,6 +1,6 @@
 use super::{Failure, Verdict, write_json};
-use crate::bench::{Options, contender::FEW_ABOVE, fluids::SIZES, memory, page, run as measure};
-use crate::report::Progress;
+use psidpd_experiments::bench::{Options, contender::FEW_ABOVE, fluids::SIZES, memory, page, run as measure};
+use psidpd_report::Progress;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 

@@ -1,11 +1,11 @@
 use super::inputs::Files;
 use super::settings::temperature;
 use super::{Failure, Verdict, write_json};
-use crate::bulk::Sampling;
-use crate::calibrate::{CalibrateError, Options, calibrate, shown, spaced};
-use crate::files::write_atomically;
-use crate::report::Table;
 use psidpd_core::model::Model;
+use psidpd_experiments::bulk::Sampling;
+use psidpd_experiments::calibrate::{CalibrateError, Options, calibrate, shown, spaced};
+use psidpd_formats::files::write_atomically;
+use psidpd_report::Table;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
@@ -108,7 +108,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     let found = calibrate(&a.model, &options, &command(a), &mut |line| println!("{line}"))?;
     write_atomically(&a.out, found.text.as_bytes())?;
     let mut table = Table::new(["density", "kT", "<n>", "<rho~>", "p wanted", "p measured", "off by"]);
-    let pm = |v: &crate::calibrate::Value| format!("{:.5} ± {:.5}", v.value, v.error);
+    let pm = |v: &psidpd_experiments::calibrate::Value| format!("{:.5} ± {:.5}", v.value, v.error);
     for r in &found.residuals {
         table.push([
             format!("{:.4}", r.density),

@@ -1,9 +1,11 @@
 use super::inputs::Files;
 use super::settings::temperature;
 use super::{Failure, Settings, Verdict, write_json};
-use crate::check::{Conditions, Cost, Findings, Severity, StepEstimate, Warning, check, cost, estimates};
 use psidpd_core::document::Document;
 use psidpd_core::engine::check_reach;
+use psidpd_experiments::check::{
+    Conditions, Cost, Findings, Severity, StepEstimate, Warning, check, cost, estimates,
+};
 use std::path::{Path, PathBuf};
 
 /// What a model or scene will compute, what mean field says of it, and what cannot work.

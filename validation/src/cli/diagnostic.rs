@@ -1,13 +1,13 @@
 //! Errors as a person sees them: what, where (with the line of the file), and what to do.
 
-use crate::calibrate::CalibrateError;
-use crate::checkpoint::Caller;
-use crate::crosscheck::ValidateError;
-use crate::from_eos::FromEosError;
-use crate::run::RunError;
-use crate::sweep::SweepError;
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use psidpd_core::document::{FileError, printable};
+use psidpd_dynamics::checkpoint::Caller;
+use psidpd_dynamics::run::RunError;
+use psidpd_experiments::calibrate::CalibrateError;
+use psidpd_experiments::crosscheck::ValidateError;
+use psidpd_experiments::from_eos::FromEosError;
+use psidpd_experiments::sweep::SweepError;
 
 /// The longest line, in bytes, that is shown with an error.
 const LONGEST_LINE: usize = 2000;

@@ -1,8 +1,8 @@
 use super::inputs::Files;
 use super::settings::temperature;
 use super::{Failure, Settings, Verdict, write_json};
-use crate::export::eam::{self, Grid};
-use crate::export::lammps as deck;
+use psidpd_lammps_host::export::eam::{self, Grid};
+use psidpd_lammps_host::export::lammps as deck;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 

@@ -1,10 +1,10 @@
 use super::inputs::Files;
 use super::settings::temperature;
 use super::{Failure, Settings, Verdict, write_json};
-use crate::lammps::DataFile;
-use crate::report::Table;
-use crate::run::{Simulation, State};
 use psidpd_core::engine::Want;
+use psidpd_dynamics::run::{Simulation, State};
+use psidpd_formats::data::DataFile;
+use psidpd_report::Table;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 

@@ -1,6 +1,6 @@
 use super::{Failure, write_json};
-use crate::hardcases::{self, Extent};
-use crate::report::Progress;
+use psidpd_experiments::hardcases::{self, Extent};
+use psidpd_report::Progress;
 use std::path::Path;
 
 /// Cases that are hard for a simulation: what must happen in each, and what did, by integrator and precision.

@@ -1,8 +1,8 @@
 use super::inputs::Files;
 use super::{Failure, Verdict, write_json};
-use crate::lammps::convert::{self, Law};
-use crate::lammps::{Host, LammpsError, base_dir, install, plugin};
-use crate::report::Progress;
+use psidpd_lammps_host::convert::{self, Law};
+use psidpd_lammps_host::{Host, LammpsError, base_dir, install, plugin};
+use psidpd_report::Progress;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 

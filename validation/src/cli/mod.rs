@@ -27,10 +27,10 @@ mod sweep;
 mod theory;
 mod validate;
 
-use crate::checkpoint::Caller;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 pub use diagnostic::Failure;
 use inputs::Files;
+use psidpd_dynamics::checkpoint::Caller;
 use serde::Serialize;
 use settings::Settings;
 use std::ffi::OsString;
@@ -234,5 +234,5 @@ fn write_json(json: Option<&Path>, value: &impl Serialize) -> Result<(), Failure
     let Some(path) = json else { return Ok(()) };
     let mut text = serde_json::to_string_pretty(value)?;
     text.push('\n');
-    crate::files::write_atomically(path, text.as_bytes()).map_err(Failure::from)
+    psidpd_formats::files::write_atomically(path, text.as_bytes()).map_err(Failure::from)
 }

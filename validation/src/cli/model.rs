@@ -1,8 +1,8 @@
 use super::{Failure, Verdict, write_json};
-use crate::bulk::Sampling;
-use crate::files::write_atomically;
-use crate::from_eos::{FromEosError, Options, Substance, from_eos};
-use crate::report::Table;
+use psidpd_experiments::bulk::Sampling;
+use psidpd_experiments::from_eos::{FromEosError, Options, Substance, from_eos};
+use psidpd_formats::files::write_atomically;
+use psidpd_report::Table;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 

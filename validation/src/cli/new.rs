@@ -1,5 +1,5 @@
 use super::{Failure, Verdict, write_json};
-use crate::scene::{TEMPLATES, Template};
+use psidpd_dynamics::scene::{TEMPLATES, Template};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 

@@ -1,8 +1,8 @@
 use super::inputs::Files;
 use super::{Failure, Settings, Verdict, write_json};
-use crate::pareto::{self, Choice, Effort, Options, Pace, Tolerance, page};
-use crate::report::Progress;
 use psidpd_core::engine::Pool;
+use psidpd_experiments::pareto::{self, Choice, Effort, Options, Pace, Tolerance, page};
+use psidpd_report::Progress;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 

@@ -1,6 +1,6 @@
 use super::inputs::Files;
 use super::{Failure, Verdict, write_json};
-use crate::report::write_run_report;
+use psidpd_report::write_run_report;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 

@@ -1,7 +1,7 @@
 use super::{Failure, Verdict, write_json};
-use crate::files::write_atomically;
-use crate::papers::{Case, Compared, Context, Outcome, PaperError, Size, cases};
-use crate::report::Table;
+use psidpd_experiments::papers::{Case, Compared, Context, Outcome, PaperError, Size, cases};
+use psidpd_formats::files::write_atomically;
+use psidpd_report::Table;
 use serde_json::{Value, json};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -113,7 +113,7 @@ fn result(case: &Case, outcome: &Outcome) -> Value {
 }
 
 fn show(outcome: &Outcome) {
-    use crate::papers::Rule;
+    use psidpd_experiments::papers::Rule;
     let mut table = Table::new(["value", "measured", "published", "deviation", ""]);
     for v in &outcome.values {
         let sign = match v.rule {

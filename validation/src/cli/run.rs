@@ -1,10 +1,10 @@
 use super::inputs::Files;
 use super::{Failure, Settings, Verdict, write_json};
-use crate::check::calibration;
-use crate::report::{Headline, Progress, headline, write_run_report};
-use crate::run::FILES;
-use crate::run::{Advice, Begin, Outcome, Runner, Start, Summary, Timing};
 use psidpd_core::engine::{Pool, Precision, processors};
+use psidpd_dynamics::run::FILES;
+use psidpd_dynamics::run::{Advice, Begin, Outcome, Runner, Start, Summary, Timing};
+use psidpd_experiments::check::calibration;
+use psidpd_report::{Headline, Progress, headline, write_run_report};
 use serde::Serialize;
 use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::flag;

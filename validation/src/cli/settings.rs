@@ -1,7 +1,7 @@
 use super::Failure;
-use crate::scene::{Edit, Scene, edit_model};
 use psidpd_core::document::{Document, FileError, FileErrorKind, Source};
 use psidpd_core::model::Model;
+use psidpd_dynamics::scene::{Edit, Scene, edit_model};
 use std::path::Path;
 use std::sync::Arc;
 

@@ -1,14 +1,14 @@
 use super::inputs::Files;
 use super::settings::temperature;
 use super::{Failure, Verdict, write_json};
-use crate::files::write_atomically;
-use crate::output::picture::{FieldOptions, Image, ParticleOptions, View};
-use crate::output::{Configuration, Frame, OutputError, Which};
-use crate::report::Figure;
 use psidpd_core::engine::check_reach;
 use psidpd_core::engine::reference::{Evaluator, for_each_pair};
 use psidpd_core::model::Model;
 use psidpd_core::model::kernel::{Kernel, KernelKind};
+use psidpd_formats::files::write_atomically;
+use psidpd_formats::{Configuration, FormatError, Frame, Which};
+use psidpd_pictures::{FieldOptions, Image, ParticleOptions, View};
+use psidpd_report::Figure;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -257,7 +257,7 @@ fn within_reach(frame: &Frame, range: f64) -> Result<(), Failure> {
 }
 
 fn request(message: String) -> Failure {
-    Failure::from(OutputError::Request(message))
+    Failure::from(FormatError::Request(message))
 }
 
 fn index(name: &str, names: &[String]) -> Result<usize, Failure> {

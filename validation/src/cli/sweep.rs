@@ -1,7 +1,7 @@
 use super::inputs::Files;
 use super::run::{quoted, thread_count, watch_signals};
 use super::{Failure, Settings, Verdict, write_json};
-use crate::sweep::{self, Axis, Options};
+use psidpd_experiments::sweep::{self, Axis, Options};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;

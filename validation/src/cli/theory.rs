@@ -2,13 +2,13 @@ use super::check::{number_density, per_species};
 use super::inputs::Files;
 use super::settings::temperature;
 use super::{Failure, Settings, Verdict, write_json};
-use crate::measure::{self, Effort};
-use crate::prediction::{Prediction, predict, published};
-use crate::report::quantity::with_error;
-use crate::report::{Headline, Table};
-use crate::theory_page::{self, Scope};
 use psidpd_core::model::Model;
 use psidpd_core::theory::{MeanField, TheoryError, composition_critical_point, critical_point_of_model};
+use psidpd_dynamics::prediction::{Prediction, predict, published};
+use psidpd_experiments::measure::{self, Effort};
+use psidpd_experiments::theory_page::{self, Scope};
+use psidpd_report::quantity::with_error;
+use psidpd_report::{Headline, Table};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -127,7 +127,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     }
     if let Some(path) = &arguments.report {
         let page = theory_page::page(&model, &scope)?.render();
-        crate::files::write_atomically(path, page.as_bytes())?;
+        psidpd_formats::files::write_atomically(path, page.as_bytes())?;
         println!("report: {}", path.display());
     }
     match all.as_slice() {
@@ -146,7 +146,7 @@ fn one(arguments: &Arguments, model: &Model, kt: f64, scope: &mut Scope) -> Resu
     let densities = per_species(&arguments.density, species)
         .unwrap_or_else(|| vec![prediction.as_ref().map_or(3.0, |p| p.density) / species as f64; species]);
     if densities.len() != species {
-        let error = crate::check::CheckError::Densities { given: densities.len(), species };
+        let error = psidpd_experiments::check::CheckError::Densities { given: densities.len(), species };
         return Err(error.into());
     }
     let [low, high] = arguments.search[..] else {

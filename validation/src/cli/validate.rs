@@ -1,6 +1,6 @@
 use super::{Failure, Verdict, write_json};
-use crate::crosscheck::{Options, check_table, validate};
-use crate::report::Progress;
+use psidpd_experiments::crosscheck::{Options, check_table, validate};
+use psidpd_report::Progress;
 use std::path::{Path, PathBuf};
 
 /// Compare the codes; a few minutes on two cores.

@@ -1,0 +1,102 @@
+use std::path::{Path, PathBuf};
+
+/// Why a checkpoint cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CheckpointError {
+    #[error("the checkpoint {} cannot be read: {source}", path.display())]
+    Unreadable { path: PathBuf, source: std::io::Error },
+    #[error("{} is no checkpoint of psidpd", path.display())]
+    Other { path: PathBuf },
+    #[error(
+        "the checkpoint {} is in version {found} of the format, and this program (psidpd {}) reads version {}",
+        path.display(), env!("CARGO_PKG_VERSION"), super::VERSION
+    )]
+    Version { path: PathBuf, found: u32 },
+    #[error("the checkpoint {} is truncated: {found} bytes of {expected}", path.display())]
+    Truncated { path: PathBuf, found: u64, expected: u64 },
+    #[error("the checkpoint {} is damaged: {what}", path.display())]
+    Damaged { path: PathBuf, what: String },
+    #[error(
+        "{} has {found} bytes, fewer than the {expected} that the checkpoint {} counts on",
+        file.display(), path.display()
+    )]
+    File { path: PathBuf, file: PathBuf, found: u64, expected: u64 },
+    #[error(
+        "the first {length} bytes of {} are not those that the run has written before the checkpoint {}: the file was changed",
+        file.display(), path.display()
+    )]
+    Edited { path: PathBuf, file: PathBuf, length: u64 },
+    #[error("the checkpoint {} is of another run: {}", path.display(), list(differences))]
+    Foreign { path: PathBuf, differences: Vec<String> },
+}
+
+/// Who hears what can be done, and so how options are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Caller {
+    /// A verb with `--resume` and `--overwrite`.
+    Options,
+    /// A call in Python with `resume=True` and `overwrite=True`.
+    Python,
+    /// One that has neither.
+    #[default]
+    Neither,
+}
+
+impl Caller {
+    /// How to replace what is in a folder.
+    pub fn start_over(self) -> &'static str {
+        match self {
+            Caller::Options => "start over with --overwrite",
+            Caller::Python => "start over with overwrite=True",
+            Caller::Neither => "remove the folder to start over",
+        }
+    }
+
+    /// How to go on with a run.
+    pub fn go_on(self) -> &'static str {
+        match self {
+            Caller::Options => "go on with --resume",
+            Caller::Python => "go on with resume=True",
+            Caller::Neither => "go on with `psidpd run --resume`",
+        }
+    }
+}
+
+impl CheckpointError {
+    pub(super) fn unreadable(path: &Path) -> impl FnOnce(std::io::Error) -> CheckpointError + '_ {
+        move |source| CheckpointError::Unreadable { path: path.to_owned(), source }
+    }
+
+    /// There is none in `folder`.
+    pub fn absent(folder: &Path) -> CheckpointError {
+        let path = folder.join(super::store::NEWEST);
+        let source = std::io::ErrorKind::NotFound.into();
+        CheckpointError::Unreadable { path, source }
+    }
+
+    /// What can be done.
+    pub fn help(&self, caller: Caller) -> String {
+        let over = caller.start_over();
+        match self {
+            CheckpointError::Foreign { .. } => {
+                format!("go on with the scene and model that the run was started with, or {over}")
+            }
+            CheckpointError::Version { .. } => {
+                format!("go on with the version of psidpd that wrote it, or {over}")
+            }
+            CheckpointError::Edited { .. } => format!("put the file back as the run left it, or {over}"),
+            _ => over.into(),
+        }
+    }
+}
+
+/// The first few differences.
+fn list(differences: &[String]) -> String {
+    const MOST: usize = 5;
+    let shown = differences.iter().take(MOST).cloned().collect::<Vec<_>>().join("; ");
+    match differences.len().saturating_sub(MOST) {
+        0 => shown,
+        more => format!("{shown}; and {more} more"),
+    }
+}

@@ -1,0 +1,330 @@
+//! Integrators by name, with their keys and what is known of each. The steps themselves are in `run/integrator/`.
+//!
+//! Scene files, `about.json` and the export to LAMMPS take names and keys from here.
+
+use psidpd_core::engine::noise::Law;
+use psidpd_core::engine::thermostat::Update;
+use std::fmt;
+
+/// λ in the paper of Groot and Warren.
+const GROOT_WARREN: f64 = 0.65;
+/// λ of the two-stage splitting with small errors of averages in liquids of many-body DPD.
+const TWO_STAGE: f64 = 0.21;
+
+/// λ and ξ with which the force-gradient step is of fourth order.
+const FORCE_GRADIENT: [f64; 2] = [1.0 / 6.0, 1.0 / 24.0];
+
+/// How a step is made.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Integrator {
+    /// Velocity Verlet, as `fix nve` of LAMMPS: drag sees the half-step velocity.
+    #[default]
+    VelocityVerlet,
+    /// The modified velocity Verlet of Groot and Warren: drag sees the velocity predicted with λ.
+    GrootWarren {
+        /// λ.
+        lambda: f64,
+    },
+    /// Drag once more from the velocity at the end of the step.
+    DpdVv {
+        /// The noise.
+        noise: Law,
+    },
+    /// Drag from the velocity at the end of the step, which it makes.
+    SelfConsistent {
+        /// The noise.
+        noise: Law,
+    },
+    /// Pair by pair, half explicit and half implicit; then velocity Verlet.
+    ShardlowS1 {
+        /// The noise.
+        noise: Law,
+    },
+    /// The same by halves, before and after.
+    ShardlowS2 {
+        /// The noise.
+        noise: Law,
+    },
+    /// Velocity Verlet, then the Ornstein–Uhlenbeck process of each pair.
+    Peters {
+        /// The noise.
+        noise: Law,
+    },
+    /// Velocity Verlet, then new relative velocities for some pairs.
+    LoweAndersen,
+    /// Drift, kick, thermostat, kick, drift.
+    Aboba(Coupling),
+    /// Kick, drift, thermostat, drift, kick.
+    Baoab(Coupling),
+    /// Two kicks and a half in a step, then the thermostat.
+    TwoStage {
+        /// Share of a step in the first kick and in the last.
+        lambda: f64,
+        /// The thermostat.
+        coupling: Coupling,
+    },
+    /// The same, its middle kick by forces at displaced positions.
+    ForceGradient {
+        /// Share of a step in the first kick and in the last.
+        lambda: f64,
+        /// ξ: the displacement is `ξ Δt² F/m`.
+        gradient: f64,
+        /// The thermostat.
+        coupling: Coupling,
+    },
+    /// Metropolis Monte Carlo: trial moves of single particles, no time.
+    MonteCarlo {
+        /// Sweeps of a step; a sweep has one trial for each particle that moves.
+        sweeps: u64,
+        /// The furthest that a trial goes along each direction; found while the run settles if left out.
+        max_move: Option<f64>,
+    },
+}
+
+/// Which thermostat a splitting has, and how often.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Coupling {
+    /// How velocities are changed.
+    pub update: Update,
+    /// It acts at every so many steps, for as many Δt.
+    pub every: u64,
+    /// The law of its noise.
+    pub noise: Law,
+}
+
+/// Names of the updates in scene files.
+pub const THERMOSTAT_STEPS: [(&str, Update); 2] =
+    [("midpoint", Update::Midpoint), ("pairwise", Update::OrnsteinUhlenbeck)];
+
+impl Coupling {
+    /// The midpoint rule at every step.
+    pub const DEFAULT: Coupling = Coupling { update: Update::Midpoint, every: 1, noise: Law::Gaussian };
+
+    /// The name of the update.
+    pub fn name(&self) -> &'static str {
+        THERMOSTAT_STEPS.iter().find(|(_, update)| *update == self.update).map_or("", |found| found.0)
+    }
+}
+
+/// What is known of an integrator's errors, for estimates; `docs/integrators.md` has the runs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Accuracy {
+    /// Of the temperature of configurations, relative: `a` and `b` of `a (ωΔt)⁴ + b κΔt`.
+    pub temperature: [f64; 2],
+    /// Of the pressure that steps carry, in ρkT: `a`, `b` and `c` of `a (ωΔt)² + b κΔt + c (ωΔt)⁴`.
+    pub pressure: [f64; 3],
+}
+
+impl Accuracy {
+    /// Errors at a step of `dt`: of the temperature of configurations, and in ρkT of the carried pressure, for forces of mean
+    /// square `frequency` ω and kinetic energy lost to drag at the rate κ.
+    pub fn errors(&self, dt: f64, frequency: f64, drag: f64) -> [f64; 2] {
+        let Accuracy { temperature: [stiffness, of_drag], pressure: [second, first, fourth] } = self;
+        let square = (frequency * dt).powi(2);
+        let temperature = stiffness * square * square + of_drag * drag * dt;
+        [temperature, second * square + first * drag * dt + fourth * square * square]
+    }
+}
+
+/// What LAMMPS has for an integrator.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Counterpart {
+    /// `fix nve`.
+    Nve,
+    /// `fix dpd/splitting` of the plugin.
+    Splitting,
+    /// Nothing.
+    None,
+}
+
+impl Integrator {
+    /// Those with a time step: names in scene files, and what they mean with all other keys left out.
+    pub const ALL: [(&str, Integrator); 12] = [
+        ("velocity-verlet", Integrator::VelocityVerlet),
+        ("groot-warren", Integrator::GrootWarren { lambda: GROOT_WARREN }),
+        ("dpd-vv", Integrator::DpdVv { noise: Law::Gaussian }),
+        ("self-consistent", Integrator::SelfConsistent { noise: Law::Gaussian }),
+        ("shardlow-s1", Integrator::ShardlowS1 { noise: Law::Gaussian }),
+        ("shardlow-s2", Integrator::ShardlowS2 { noise: Law::Gaussian }),
+        ("peters", Integrator::Peters { noise: Law::Gaussian }),
+        ("lowe-andersen", Integrator::LoweAndersen),
+        ("aboba", Integrator::Aboba(Coupling::DEFAULT)),
+        ("baoab", Integrator::Baoab(Coupling::DEFAULT)),
+        ("two-stage", Integrator::TwoStage { lambda: TWO_STAGE, coupling: Coupling::DEFAULT }),
+        (
+            "force-gradient",
+            Integrator::ForceGradient {
+                lambda: FORCE_GRADIENT[0],
+                gradient: FORCE_GRADIENT[1],
+                coupling: Coupling::DEFAULT,
+            },
+        ),
+    ];
+
+    /// All names in scene files.
+    pub const NAMED: [(&str, Integrator); Integrator::ALL.len() + 1] = {
+        let monte_carlo = Integrator::MonteCarlo { sweeps: 1, max_move: None };
+        let mut named = [("monte-carlo", monte_carlo); Integrator::ALL.len() + 1];
+        let mut k = 0;
+        while k < Integrator::ALL.len() {
+            named[k] = Integrator::ALL[k];
+            k += 1;
+        }
+        named
+    };
+
+    /// Its name.
+    pub fn name(&self) -> &'static str {
+        let kind = std::mem::discriminant(self);
+        Integrator::NAMED
+            .iter()
+            .find(|(_, other)| std::mem::discriminant(other) == kind)
+            .map_or("", |found| found.0)
+    }
+
+    /// Its λ with the range that is allowed, if it has one.
+    pub fn lambda(&mut self) -> Option<(&mut f64, [f64; 2])> {
+        match self {
+            Integrator::GrootWarren { lambda } => Some((lambda, [0.0, 1.0])),
+            Integrator::TwoStage { lambda, .. } | Integrator::ForceGradient { lambda, .. } => {
+                Some((lambda, [0.0, 0.5]))
+            }
+            _ => None,
+        }
+    }
+
+    /// Its ξ, if it has one.
+    pub fn gradient(&mut self) -> Option<&mut f64> {
+        match self {
+            Integrator::ForceGradient { gradient, .. } => Some(gradient),
+            _ => None,
+        }
+    }
+
+    /// Sweeps of a step and the furthest move, if it makes trial moves.
+    pub fn trials(&mut self) -> Option<(&mut u64, &mut Option<f64>)> {
+        match self {
+            Integrator::MonteCarlo { sweeps, max_move } => Some((sweeps, max_move)),
+            _ => None,
+        }
+    }
+
+    /// Whether its steps take time.
+    pub fn has_time(&self) -> bool {
+        !matches!(self, Integrator::MonteCarlo { .. })
+    }
+
+    /// Its thermostat, if that is a choice of its own.
+    pub fn coupling(&mut self) -> Option<&mut Coupling> {
+        match self {
+            Integrator::Aboba(coupling) | Integrator::Baoab(coupling) => Some(coupling),
+            Integrator::TwoStage { coupling, .. } | Integrator::ForceGradient { coupling, .. } => {
+                Some(coupling)
+            }
+            _ => None,
+        }
+    }
+
+    /// The law of its noise, if that can be chosen: inside the forces it is uniform.
+    pub fn noise(&mut self) -> Option<&mut Law> {
+        match self {
+            Integrator::DpdVv { noise } | Integrator::SelfConsistent { noise } => Some(noise),
+            Integrator::ShardlowS1 { noise } | Integrator::ShardlowS2 { noise } => Some(noise),
+            Integrator::Peters { noise } => Some(noise),
+            other => other.coupling().map(|coupling| &mut coupling.noise),
+        }
+    }
+
+    /// Its errors, within a factor of three or so of those in standard DPD and in Warren's liquid.
+    pub fn accuracy(&self) -> Accuracy {
+        let (temperature, pressure) = match self {
+            Integrator::VelocityVerlet => ([5.0, 0.25], [0.5, 0.75, 0.0]),
+            Integrator::GrootWarren { .. } => ([5.0, 0.12], [0.5, 0.75, 0.0]),
+            Integrator::DpdVv { .. } | Integrator::SelfConsistent { .. } => ([5.0, 0.0], [0.5, 0.75, 0.0]),
+            Integrator::TwoStage { .. } => ([0.01, 0.0], [0.1, 0.0, 0.0]),
+            Integrator::ForceGradient { .. } => ([0.006, 0.0], [0.0, 0.0, 0.006]),
+            Integrator::MonteCarlo { .. } => ([0.0; 2], [0.0; 3]),
+            _ => ([5.0, 0.0], [0.5, 0.0, 0.0]),
+        };
+        Accuracy { temperature, pressure }
+    }
+
+    /// What LAMMPS has for it.
+    pub fn in_lammps(&self) -> Counterpart {
+        match self {
+            Integrator::VelocityVerlet => Counterpart::Nve,
+            Integrator::GrootWarren { lambda: 0.5 } => Counterpart::Nve,
+            Integrator::Aboba(coupling)
+            | Integrator::TwoStage { coupling, .. }
+            | Integrator::ForceGradient { coupling, .. }
+                if coupling.update == Update::Midpoint =>
+            {
+                Counterpart::Splitting
+            }
+            _ => Counterpart::None,
+        }
+    }
+
+    /// Whether drag and noise act inside the forces; apart from them otherwise.
+    pub fn drag_in_forces(self) -> bool {
+        matches!(
+            self,
+            Integrator::VelocityVerlet
+                | Integrator::GrootWarren { .. }
+                | Integrator::DpdVv { .. }
+                | Integrator::SelfConsistent { .. }
+        )
+    }
+
+    /// For which part of a step each of its evaluations of forces acts, on average.
+    pub fn force_shares(self) -> [f64; 2] {
+        match self {
+            Integrator::TwoStage { lambda, .. } | Integrator::ForceGradient { lambda, .. } => {
+                [1.0 - 2.0 * lambda, 2.0 * lambda]
+            }
+            _ => [1.0, 0.0],
+        }
+    }
+
+    /// Whether the last forces of a step are those at its end.
+    pub fn forces_at_end(self) -> bool {
+        !matches!(self, Integrator::Aboba(_) | Integrator::MonteCarlo { .. })
+    }
+}
+
+/// With all that differs from what its name alone means.
+impl fmt::Display for Integrator {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.name())?;
+        let mut this = *self;
+        if let Some((lambda, _)) = this.lambda() {
+            write!(f, ", lambda = {}", six_digits(*lambda))?;
+        }
+        if let Some(gradient) = this.gradient().filter(|gradient| **gradient != FORCE_GRADIENT[1]) {
+            write!(f, ", gradient = {}", six_digits(*gradient))?;
+        }
+        if let Some(coupling) = this.coupling() {
+            write!(f, ", thermostat_step = {}", coupling.name())?;
+            if coupling.every > 1 {
+                write!(f, ", thermostat_every = {}", coupling.every)?;
+            }
+        }
+        if let Some((sweeps, max_move)) = this.trials() {
+            if *sweeps > 1 {
+                write!(f, ", sweeps = {sweeps}")?;
+            }
+            if let Some(most) = max_move {
+                write!(f, ", max_move = {most}")?;
+            }
+        }
+        match this.noise() {
+            Some(Law::Uniform) => write!(f, ", noise = uniform"),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// A number without more digits than people read.
+fn six_digits(x: f64) -> f64 {
+    (x * 1e6).round() / 1e6
+}

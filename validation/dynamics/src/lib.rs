@@ -1,0 +1,15 @@
+//! Molecular dynamics: particles, integrators, scenes, runs and their checkpoints.
+
+#[cfg(test)]
+extern crate self as psidpd_dynamics;
+
+pub mod checkpoint;
+pub mod integrator;
+#[cfg(test)]
+mod observed;
+pub mod particles;
+pub mod prediction;
+pub mod run;
+pub mod scene;
+#[cfg(test)]
+mod test_support;

@@ -1,0 +1,128 @@
+//! States as LAMMPS data files, to go on from, in either code.
+
+use super::state::State;
+use super::tags::order_of_tags;
+use nalgebra::{Matrix3, Vector3};
+use psidpd_core::engine::PeriodicBox;
+use psidpd_core::model::Model;
+use psidpd_formats::FormatError;
+use psidpd_formats::data::{Atom, DataFile};
+use std::path::Path;
+
+/// Particles that are no valid state of a model.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("the initial state is not usable: {0}")]
+pub struct StateError(pub String);
+
+impl State {
+    /// The state as a data file of atom style `atomic`: types are species from 1; `title` becomes the
+    /// first line, and tells walls, which data files do not know.
+    pub fn to_data(&self, title: &str) -> DataFile {
+        self.to_data_in(0..self.len(), title)
+    }
+
+    /// The same with the particles in the order of their tags.
+    pub fn to_data_by_tag(&self, title: &str) -> DataFile {
+        self.to_data_in(order_of_tags(&self.tag).into_iter(), title)
+    }
+
+    fn to_data_in(&self, order: impl Iterator<Item = usize> + Clone, title: &str) -> DataFile {
+        let origin = self.domain.origin();
+        let edges = [0, 1, 2].map(|k| self.domain.edge(k));
+        let tilt = [edges[1][0], edges[2][0], edges[2][1]];
+        let data = DataFile {
+            title: title.to_owned(),
+            boxlo: origin,
+            boxhi: std::array::from_fn(|k| origin[k] + edges[k][k]),
+            tilt: (tilt != [0.0; 3]).then_some(tilt),
+            types: self.mass.len(),
+            masses: self.mass.clone(),
+            names: Vec::new(),
+            atoms: order
+                .clone()
+                .map(|k| Atom {
+                    id: self.tag[k] as u32,
+                    kind: self.species[k] as u32 + 1,
+                    x: self.x[k],
+                    image: self.image[k],
+                })
+                .collect(),
+            velocities: Some(order.map(|k| self.v[k]).collect()),
+        };
+        // Nothing repeats across the plane of two dimensions, which is no wall.
+        let periodic = self.domain.periodic();
+        let is_flat = self.x.iter().all(|x| x[2] == self.x[0][2]);
+        let walls = !periodic[0] || !periodic[1] || !periodic[2] && !is_flat;
+        if walls { data.with_boundary(periodic) } else { data }
+    }
+
+    /// The state of a data file, in a box with the walls that its title tells, and else periodic in every direction of the
+    /// model; see [`State::from_data_in`].
+    ///
+    /// # Errors
+    /// As [`State::from_data_in`].
+    pub fn from_data(data: &DataFile, model: &Model) -> Result<State, StateError> {
+        State::from_data_in(data, model, data.boundary().unwrap_or([true, true, model.dimensions() == 3]))
+    }
+
+    /// The state of a data file, in a box periodic in some directions; particles outside are put inside along
+    /// these. Types are species from 1. Masses not given are 1, velocities not given are 0.
+    ///
+    /// # Errors
+    /// A type that the model has no species for, a tag beyond what LAMMPS counts, a box without volume, walls
+    /// of a box with tilt.
+    pub fn from_data_in(data: &DataFile, model: &Model, periodic: [bool; 3]) -> Result<State, StateError> {
+        let species = model.species().len();
+        let [xy, xz, yz] = data.tilt.unwrap_or([0.0; 3]);
+        let [lx, ly, lz]: [f64; 3] = std::array::from_fn(|k| data.boxhi[k] - data.boxlo[k]);
+        let edges = Matrix3::from_columns(&[
+            Vector3::new(lx, 0.0, 0.0),
+            Vector3::new(xy, ly, 0.0),
+            Vector3::new(xz, yz, lz),
+        ]);
+        let walls = periodic[..model.dimensions()].iter().any(|p| !p);
+        if walls && data.tilt.is_some_and(|tilt| tilt != [0.0; 3]) {
+            return Err(StateError("a box with tilt has no reflecting walls".into()));
+        }
+        let domain = PeriodicBox::new(data.boxlo, edges, periodic).map_err(|e| StateError(e.to_string()))?;
+        let mut state = State {
+            domain,
+            mass: vec![1.0; species],
+            x: Vec::new(),
+            v: data.velocities.clone().unwrap_or_else(|| vec![[0.0; 3]; data.atoms.len()]),
+            species: Vec::new(),
+            tag: Vec::new(),
+            image: Vec::new(),
+        };
+        for (mass, given) in state.mass.iter_mut().zip(&data.masses) {
+            *mass = *given;
+        }
+        for atom in &data.atoms {
+            let kind = atom.kind as usize;
+            if kind > species {
+                return Err(StateError(format!(
+                    "atom {} has type {kind}, the model has {species} species: {}",
+                    atom.id,
+                    model.species().join(", ")
+                )));
+            }
+            let tag = i32::try_from(atom.id)
+                .map_err(|_| StateError(format!("atom id {} is beyond what tags can count", atom.id)))?;
+            let (mut x, mut image) = (atom.x, atom.image);
+            state.domain.wrap(&mut x, &mut image);
+            state.x.push(x);
+            state.image.push(image);
+            state.species.push(kind as i32 - 1);
+            state.tag.push(tag);
+        }
+        Ok(state)
+    }
+}
+
+/// Writes `state` as a data file, by tags, with enough digits to restore the exact values.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_data(path: &Path, title: &str, state: &State, species: &[String]) -> Result<(), FormatError> {
+    DataFile { names: species.to_vec(), ..state.to_data_by_tag(title) }.write(path)
+}

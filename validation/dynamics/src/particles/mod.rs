@@ -1,0 +1,16 @@
+//! Particles, and what acts on some of them: the ground that scenes, runs and files stand on.
+
+mod body_force;
+mod box_by_edges;
+mod data_file;
+mod state;
+mod tags;
+mod thermal;
+
+pub use body_force::BodyForce;
+pub use body_force::add as add_body_forces;
+pub use data_file::{StateError, write_data};
+pub use state::State;
+pub use tags::Tags;
+pub use tags::order_of_tags;
+pub use thermal::{maxwell, thermal_velocities};

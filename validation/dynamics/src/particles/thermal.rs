@@ -1,0 +1,41 @@
+use chacha20::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// Velocities from Maxwell's distribution, of particles of the masses `mass`, with zero total momentum. They are not
+/// scaled: their temperature fluctuates as that of a canonical ensemble.
+pub fn thermal_velocities(
+    mass: impl Iterator<Item = f64>,
+    kt: f64,
+    dimensions: usize,
+    random: &mut ChaCha8Rng,
+) -> Vec<[f64; 3]> {
+    maxwell(mass, kt, dimensions, [true; 3], random)
+}
+
+/// The same, with zero total momentum in the `conserved` directions only.
+pub fn maxwell(
+    mass: impl Iterator<Item = f64>,
+    kt: f64,
+    dimensions: usize,
+    conserved: [bool; 3],
+    random: &mut ChaCha8Rng,
+) -> Vec<[f64; 3]> {
+    let (mut momentum, mut total) = ([0.0; 3], 0.0);
+    let draw = |m: f64| {
+        let mut v = [0.0; 3];
+        for c in 0..dimensions {
+            let normal: f64 = StandardNormal.sample(random);
+            v[c] = (kt / m).sqrt() * normal;
+            momentum[c] += m * v[c];
+        }
+        total += m;
+        v
+    };
+    let mut v: Vec<[f64; 3]> = mass.map(draw).collect();
+    for v in &mut v {
+        for c in (0..dimensions).filter(|c| conserved[*c]) {
+            v[c] -= momentum[c] / total;
+        }
+    }
+    v
+}

@@ -1,0 +1,165 @@
+//! What theory and literature say of a fluid before it runs, and how far theory can be trusted.
+
+use psidpd_core::model::{Fluid, Model};
+use psidpd_core::theory::{Binodal, Correlated, Interface, MeanField, TheoryError};
+use psidpd_formats::Expected;
+
+/// From this share of the density, or of the pressure, on, correlations are said to matter.
+const MATTERS: f64 = 0.1;
+
+/// How far beyond the liquid of mean field that of the correlated fluid is looked for.
+const BEYOND: f64 = 6.0;
+
+/// Mean field of a fluid of one species, and what correlations change in it.
+#[derive(Debug, Clone)]
+pub struct Prediction {
+    /// Density that it is about.
+    pub density: f64,
+    /// Whether that was asked for.
+    asked: bool,
+    /// Mean-field pressure there.
+    pub pressure: f64,
+    /// Mean local densities, and pressure, with correlations to first order; `None` where that does not apply.
+    pub correlated: Option<Correlated>,
+    /// Names of the local densities.
+    pub names: Vec<String>,
+    /// Vapour and liquid of mean field.
+    pub phases: Result<Binodal, TheoryError>,
+    /// Density of zero pressure with correlations to first order: about that of the liquid.
+    pub correlated_liquid: Option<f64>,
+    /// The interface of mean field.
+    pub interface: Result<Interface, TheoryError>,
+}
+
+/// The theory of a fluid at a number density; `None` without a mean field or with several species. Without a density it is
+/// about the liquid, or 3 if there is none.
+pub fn predict(fluid: &Fluid, density: Option<f64>) -> Option<Prediction> {
+    if fluid.species.len() != 1 || fluid.stated_slopes().is_some() {
+        return None;
+    }
+    let theory = MeanField::new(fluid).ok()?;
+    let correlations = theory.correlations().ok().flatten();
+    let phases = theory.binodal();
+    let correlated_liquid = phases
+        .as_ref()
+        .ok()
+        .and_then(|b| correlations.as_ref()?.zero_pressure_density([0.5 * b.liquid, BEYOND * b.liquid]));
+    let liquid = correlated_liquid.or(phases.as_ref().ok().map(|b| b.liquid));
+    let asked = density.is_some();
+    let density = density.or(liquid).unwrap_or(3.0);
+    Some(Prediction {
+        density,
+        asked,
+        pressure: theory.pressure(&[density]),
+        correlated: correlations.as_ref().and_then(|c| c.at(density)),
+        names: fluid.densities.iter().map(|d| d.name.clone()).collect(),
+        interface: theory.interface(201),
+        correlated_liquid,
+        phases,
+    })
+}
+
+impl Prediction {
+    /// The phases that are expected, then [`Prediction::doubts`].
+    pub fn summary(&self) -> Vec<String> {
+        let mut lines = Vec::new();
+        if let Ok(b) = &self.phases {
+            let (low, high) = (b.vapour, self.correlated_liquid.unwrap_or(b.liquid));
+            let expected = match self.density {
+                rho if rho <= low => "a vapour",
+                rho if rho >= high * (1.0 - MATTERS) => "a liquid, compressed or near coexistence",
+                _ => "vapour and liquid, where the box has room for both",
+            };
+            let correlated = match self.correlated_liquid {
+                Some(liquid) => format!(", or about {liquid:.3} with correlations"),
+                None => String::new(),
+            };
+            lines.push(format!(
+                "mean field has a vapour of density {:.4} and a liquid of {:.3}{correlated}; at {:.3} expect {expected}",
+                b.vapour, b.liquid, self.density
+            ));
+        } else {
+            lines.push("mean field has one phase at this temperature".into());
+        }
+        lines.extend(self.doubts());
+        lines
+    }
+
+    /// Where mean field fails for this fluid, and by how much; nothing where correlations change little.
+    pub fn doubts(&self) -> Vec<String> {
+        let mut doubts = Vec::new();
+        if let Some(c) = &self.correlated {
+            let rho = self.density;
+            for (name, n) in self.names.iter().zip(&c.mean_density) {
+                if (n / rho - 1.0).abs() > MATTERS {
+                    doubts.push(format!(
+                        "mean field is off here: it puts the local density {name} of every particle at the bulk density {rho:.3}; \
+                         with the correlations of neighbours, to first order, its mean is {n:.3} ({:+.0} %)",
+                        100.0 * (n / rho - 1.0)
+                    ));
+                }
+            }
+            let scale = self.pressure.abs().max(c.pressure.abs());
+            if self.asked && (self.pressure - c.pressure).abs() > MATTERS * scale {
+                doubts.push(format!(
+                    "at density {rho:.3} the pressure of mean field is {:.2}; correlations to first order make it {:.2}, and may \
+                     overshoot: the fluid is somewhere from one to the other",
+                    self.pressure, c.pressure
+                ));
+            }
+        }
+        if let (Ok(b), Some(liquid)) = (&self.phases, self.correlated_liquid)
+            && (liquid / b.liquid - 1.0).abs() > MATTERS
+        {
+            doubts.push(format!(
+                "the liquid that mean field puts at density {:.2} is expected near {liquid:.2} (zero pressure with correlations \
+                 to first order; tension and width of mean field belong to the wrong liquid)",
+                b.liquid
+            ));
+        }
+        if let Err(TheoryError::GradientNotPositive { at, .. }) = &self.interface {
+            doubts.push(format!(
+                "no planar interface from mean field: the square-gradient coefficient is negative at density {at:.2}, where the \
+                 many-body repulsion outweighs the attraction in gradients, so the expansion in gradients fails; this says \
+                 nothing of the fluid, which may have an interface. Remedy: measure it in a slab, theory --measure"
+            ));
+        }
+        doubts
+    }
+}
+
+/// What is to be put beside the measured results of a run at kT. `uniform` is the number density of a homogeneous fluid.
+pub fn expected(model: &Model, fluid: &Fluid, uniform: Option<f64>) -> Vec<Expected> {
+    let mut all: Vec<Expected> = Vec::new();
+    let mut add = |name: &str, mean_field: Option<f64>| {
+        let mean_field = mean_field.filter(|x| x.is_finite());
+        if mean_field.is_some() {
+            all.push(Expected { name: name.into(), mean_field, published: None });
+        }
+    };
+    if let Some(p) = predict(fluid, uniform) {
+        add("pressure", uniform.map(|_| p.pressure));
+        let phases = p.phases.as_ref().ok();
+        add("liquid", phases.map(|b| b.liquid));
+        add("vapour", phases.map(|b| b.vapour));
+        let interface = p.interface.as_ref().ok();
+        add("tension", interface.map(|i| i.tension));
+        add("width", interface.map(|i| i.width));
+    } else if let (Some(rho), 1, None) = (uniform, fluid.species.len(), fluid.stated_slopes()) {
+        add("pressure", MeanField::new(fluid).ok().map(|theory| theory.pressure(&[rho])));
+    }
+    for (name, value) in published(model, fluid.kt, uniform) {
+        match all.iter_mut().find(|e| e.name == name) {
+            Some(known) => known.published = Some(value),
+            None => all.push(Expected { name: name.into(), mean_field: None, published: Some(value) }),
+        }
+    }
+    all
+}
+
+/// What was published for a fluid; of the pressure only what belongs to its density.
+pub fn published(model: &Model, kt: f64, density: Option<f64>) -> Vec<(&'static str, [f64; 2])> {
+    let Some(found) = model.published(kt) else { return Vec::new() };
+    let same = found.density.zip(density).is_some_and(|(a, b)| (a / b - 1.0).abs() < 0.005);
+    found.values.iter().copied().filter(|(name, _)| *name != "pressure" || same).collect()
+}

@@ -1,0 +1,176 @@
+use crate::checkpoint::{Caller, CheckpointError};
+use crate::particles::StateError;
+use psidpd_core::document::FileError;
+use psidpd_core::engine::{EngineError, NoEnergy, ReachError};
+use psidpd_core::model::expression::TooLarge;
+use psidpd_formats::files::WriteError;
+use std::path::{Path, PathBuf};
+
+/// Why a run cannot start, or stopped.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RunError {
+    #[error(transparent)]
+    File(#[from] FileError),
+    #[error(transparent)]
+    TooLarge(#[from] TooLarge),
+    #[error("the initial state is not usable: {0}")]
+    State(String),
+    #[error(
+        "the box is {height} wide between two faces, less than twice the range {range} of the \
+         thermostat: a particle would meet two images of the same neighbour, and both pairs would \
+         share their noise; use a larger box, or switch the thermostat off"
+    )]
+    BoxTooNarrow { height: f64, range: f64 },
+    #[error(transparent)]
+    NoEnergy(#[from] NoEnergy),
+    #[error(transparent)]
+    Reach(#[from] ReachError),
+    #[error("the time step must be a positive number, is {0}")]
+    TimeStep(f64),
+    #[error("step {step}: {source}")]
+    Engine { step: u64, source: EngineError },
+    #[error(
+        "step {step}: the velocity of particle {tag} is not finite: the time step is likely too large \
+         for these forces"
+    )]
+    Velocity { step: u64, tag: i32 },
+    #[error(
+        "step {step}: particle {tag} moved {distance:.3e} in one step, further than across the box: \
+         the time step is likely too large for these forces"
+    )]
+    Runaway { step: u64, tag: i32, distance: f64 },
+    #[error(
+        "step {step}: particle {tag} is more than 2^31 boxes away from where it began: they can no longer be counted"
+    )]
+    Uncounted { step: u64, tag: i32 },
+    #[error(
+        "step {step}: the fluid has been hotter than 2 kT since step {since} and is at {ratio:.1} kT, though the thermostat \
+         had time to cool it: dt = {dt} is likely too large for its forces with {integrator}; use a smaller dt, or an integrator \
+         that bears larger ones (docs/integrators.md)"
+    )]
+    TooHot { step: u64, since: u64, ratio: f64, dt: f64, integrator: String },
+    #[error(
+        "stage \"{stage}\" stopped: {cause}; the state of step {good} is in {}{}",
+        saved.display(),
+        if *checkpoint { ", and in the checkpoint beside it" } else { "" }
+    )]
+    Stopped {
+        stage: String,
+        #[source]
+        cause: Box<RunError>,
+        good: u64,
+        saved: PathBuf,
+        checkpoint: bool,
+    },
+    #[error("the run stopped after step {step}: {cause}")]
+    Halted {
+        step: u64,
+        #[source]
+        cause: Box<RunError>,
+        checkpoint: Option<u64>,
+    },
+    #[error("{} holds a run that is not finished{}", folder.display(), reached(.step))]
+    Unfinished { folder: PathBuf, step: Option<u64> },
+    #[error("{} holds a finished run{}", folder.display(), if *other { " of another scene" } else { "" })]
+    Finished { folder: PathBuf, other: bool },
+    #[error("another run is writing to {}", folder.display())]
+    Busy { folder: PathBuf },
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
+    #[error(transparent)]
+    Format(#[from] psidpd_formats::FormatError),
+    #[error("{} cannot be written: {source}", path.display())]
+    Output { path: PathBuf, source: std::io::Error },
+}
+
+impl From<StateError> for RunError {
+    fn from(error: StateError) -> RunError {
+        RunError::State(error.0)
+    }
+}
+
+impl From<WriteError> for RunError {
+    fn from(WriteError { path, cause }: WriteError) -> RunError {
+        RunError::Output { path, source: cause }
+    }
+}
+
+impl RunError {
+    /// Whether a run stopped on its way, rather than could not start.
+    pub fn is_stop(&self) -> bool {
+        matches!(
+            self,
+            RunError::Stopped { .. }
+                | RunError::Halted { .. }
+                | RunError::Engine { .. }
+                | RunError::Velocity { .. }
+                | RunError::Runaway { .. }
+                | RunError::Uncounted { .. }
+                | RunError::TooHot { .. }
+        )
+    }
+
+    /// Whether a file is the trouble, not the physics.
+    pub(super) fn is_output(&self) -> bool {
+        matches!(self, RunError::Output { .. } | RunError::Format(_))
+    }
+
+    /// What the caller can do about it, where that is not in the message.
+    pub fn help(&self, caller: Caller) -> Option<String> {
+        let (over, go_on) = (caller.start_over(), caller.go_on());
+        Some(match self {
+            RunError::Stopped { checkpoint: true, .. } => format!(
+                "to try again from there, give another scene `[initial]` with `kind = \"checkpoint\"`, and a \
+                 smaller dt or softer forces; or {over}"
+            ),
+            RunError::Halted { checkpoint: Some(step), .. } => {
+                format!("the checkpoint of step {step} is good: when the cause is gone, {go_on}")
+            }
+            RunError::Halted { checkpoint: None, .. } => {
+                "there is no checkpoint yet: when the cause is gone, start over".into()
+            }
+            RunError::Unfinished { .. } => format!("{go_on}, or {over}"),
+            RunError::Finished { .. } => format!("choose another folder, or {over}"),
+            RunError::Busy { .. } => "wait for its end, or choose another folder".into(),
+            RunError::Checkpoint(error) => error.help(caller),
+            _ => return None,
+        })
+    }
+
+    pub(super) fn output(path: &Path) -> impl FnOnce(std::io::Error) -> RunError + '_ {
+        move |source| RunError::Output { path: path.to_owned(), source }
+    }
+}
+
+fn reached(step: &Option<u64>) -> String {
+    step.map_or(" (its checkpoint cannot be read)".into(), |step| {
+        format!(" (its checkpoint is of step {step})")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Advice has the options of the caller and no others.
+    #[test]
+    fn advice_is_that_for_the_caller() {
+        let folder = PathBuf::from("f");
+        let errors = [
+            RunError::Finished { folder: folder.clone(), other: true },
+            RunError::Unfinished { folder, step: Some(3) },
+            RunError::Checkpoint(CheckpointError::absent(Path::new("f"))),
+        ];
+        for (caller, has, lacks) in [
+            (Caller::Options, "--overwrite", "overwrite=True"),
+            (Caller::Python, "overwrite=True", "--overwrite"),
+            (Caller::Neither, "remove the folder", "overwrite"),
+        ] {
+            for error in &errors {
+                let help = error.help(caller).unwrap();
+                assert!(help.contains(has) && !help.contains(lacks), "{caller:?}: {help}");
+            }
+        }
+    }
+}

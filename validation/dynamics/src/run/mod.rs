@@ -1,0 +1,44 @@
+//! The native host: owns particles, makes their periodic images, integrates, and writes files.
+//!
+//! [`Simulation`] is the part without files: a [`State`], the engine, and steps. A [`Runner`]
+//! drives it through the stages of a [`Scene`](crate::scene::Scene), writes what the scene asks for, and
+//! can be stopped and taken up again by its [`checkpoint`]s; [`run_scene`] is one that nothing interrupts.
+
+mod about;
+mod advice;
+mod bounds;
+mod by_tag;
+mod dump;
+mod error;
+mod folder;
+mod growing;
+mod integrator;
+mod output;
+mod reorder;
+mod runner;
+mod scene;
+mod simulation;
+mod summary;
+mod thermo;
+mod timing;
+mod underway;
+mod view;
+mod walls;
+mod watch;
+
+pub use crate::checkpoint::{self, Means, Sums, Thermo};
+pub use crate::integrator::Integrator;
+pub use crate::particles::{BodyForce, State, StateError, Tags, write_data};
+pub use advice::Advice;
+pub use dump::write_frame;
+pub use error::RunError;
+pub use output::FILES;
+pub use reorder::INTERVAL as REORDERING;
+pub use runner::{Begin, Outcome, Progress, Runner, Start, run_scene};
+pub use simulation::Simulation;
+pub use summary::Summary;
+pub use timing::{Session, Timing};
+pub use watch::{Deviation, Thermometer};
+
+#[cfg(test)]
+mod tests;

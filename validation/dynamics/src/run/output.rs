@@ -1,0 +1,147 @@
+//! The files that a run leaves in its folder, checkpoints and times apart.
+
+use super::dump::write_frame;
+use super::error::RunError;
+use super::growing::GrowingFile;
+use super::thermo::ThermoFile;
+use crate::checkpoint::{Thermo, Written};
+use crate::scene::Scene;
+use psidpd_formats::files::remove_if_there;
+use psidpd_formats::{Frame, write_xyz};
+use psidpd_observe::{Observation, write_csv, write_json};
+use psidpd_pictures::remove_snapshots;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, ErrorKind};
+use std::path::Path;
+
+/// The name of the dump.
+const DUMP: &str = "dump.lammpstrj";
+
+/// The name of the extended XYZ file.
+const XYZ: &str = "trajectory.xyz";
+
+/// Files of a run that a scene, or a user, may take for its input.
+pub const FILES: [&str; 5] = [ThermoFile::NAME, DUMP, XYZ, "final.data", "last-good.data"];
+
+/// Files that are written when a run ends, finished or not.
+const LAST: [&str; 5] = ["final.data", "last-good.data", OBSERVABLES, "summary.json", "report.html"];
+
+/// What was observed.
+const OBSERVABLES: &str = "observables.json";
+
+/// The folder with the same as tables.
+const TABLES: &str = "observables";
+
+/// The files that grow as a run goes.
+pub(super) struct Output {
+    thermo: Option<ThermoFile>,
+    dump: Option<GrowingFile>,
+    xyz: Option<GrowingFile>,
+}
+
+impl Output {
+    /// Empty files, and a description of the run.
+    pub fn create(scene: &Scene, folder: &Path) -> Result<Output, RunError> {
+        remove(folder, &[ThermoFile::NAME, DUMP, XYZ])?;
+        remove(folder, &LAST)?;
+        remove_tables(folder)?;
+        remove_snapshots(folder)?;
+        super::about::about(scene).write(folder)?;
+        let thermo = (scene.output.thermo > 0).then(|| ThermoFile::create(folder));
+        let dump = (scene.output.dump > 0).then(|| GrowingFile::create(folder, DUMP));
+        let xyz = (scene.output.xyz > 0).then(|| GrowingFile::create(folder, XYZ));
+        Ok(Output { thermo: thermo.transpose()?, dump: dump.transpose()?, xyz: xyz.transpose()? })
+    }
+
+    /// The files of a run that goes on, cut to what was `written` at its checkpoint.
+    pub fn reopen(folder: &Path, written: &BTreeMap<String, Written>) -> Result<Output, RunError> {
+        remove(folder, &LAST)?;
+        remove_tables(folder)?;
+        let written = |name: &str| written.get(name).copied();
+        let thermo = written(ThermoFile::NAME).map(|written| ThermoFile::reopen(folder, written));
+        let dump = written(DUMP).map(|written| GrowingFile::reopen(folder, DUMP, written));
+        let xyz = written(XYZ).map(|written| GrowingFile::reopen(folder, XYZ, written));
+        Ok(Output { thermo: thermo.transpose()?, dump: dump.transpose()?, xyz: xyz.transpose()? })
+    }
+
+    /// Writes a row of totals if the scene wants them, and returns whether it does.
+    pub fn row(&mut self, thermo: &Thermo) -> Result<bool, RunError> {
+        match &mut self.thermo {
+            None => Ok(false),
+            Some(file) => file.row(thermo).map(|()| true),
+        }
+    }
+
+    /// Writes a frame of the dump.
+    pub fn frame(&mut self, frame: &Frame) -> Result<(), RunError> {
+        match &mut self.dump {
+            None => Ok(()),
+            Some(file) => file.attempt(|file| write_frame(frame, file)),
+        }
+    }
+
+    /// Writes a frame in extended XYZ.
+    pub fn xyz_frame(&mut self, frame: &Frame) -> Result<(), RunError> {
+        match &mut self.xyz {
+            None => Ok(()),
+            Some(file) => file.attempt(|file| write_xyz(frame, file)),
+        }
+    }
+
+    /// What was written to each file.
+    pub fn written(&mut self) -> BTreeMap<String, Written> {
+        self.files().map(|file| (file.name().to_owned(), file.written())).collect()
+    }
+
+    /// Brings everything to the disk.
+    pub fn sync(&mut self) -> Result<(), RunError> {
+        self.files().try_for_each(|file| file.sync())
+    }
+
+    fn files(&mut self) -> impl Iterator<Item = &mut GrowingFile> {
+        self.thermo.as_mut().map(ThermoFile::file).into_iter().chain(&mut self.dump).chain(&mut self.xyz)
+    }
+}
+
+/// Writes `observables.json` and the tables in `observables/`, if anything was observed, and brings them to the
+/// disk.
+pub(super) fn write_observations(folder: &Path, observations: &[Observation]) -> Result<(), RunError> {
+    if observations.is_empty() {
+        return Ok(());
+    }
+    let (json, tables) = (folder.join(OBSERVABLES), folder.join(TABLES));
+    write_csv(&tables, observations).map_err(RunError::output(&tables))?;
+    write_json(&json, observations)
+        .and_then(|()| File::open(&json)?.sync_all())
+        .map_err(RunError::output(&json))
+}
+
+/// Removes the tables of a run before, and their folder unless there is something else in it.
+fn remove_tables(folder: &Path) -> Result<(), RunError> {
+    let tables = folder.join(TABLES);
+    let remove = || -> io::Result<()> {
+        for entry in tables.read_dir()? {
+            let path = entry?.path();
+            if path.extension().is_some_and(|e| e == "csv") {
+                std::fs::remove_file(path)?;
+            }
+        }
+        std::fs::remove_dir(&tables)
+    };
+    match remove() {
+        Err(error) if !matches!(error.kind(), ErrorKind::NotFound | ErrorKind::DirectoryNotEmpty) => {
+            Err(RunError::output(&tables)(error))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Removes files of an earlier run, or of an earlier end of this one.
+fn remove(folder: &Path, names: &[&str]) -> Result<(), RunError> {
+    for name in names {
+        let path = folder.join(name);
+        remove_if_there(&path).map_err(RunError::output(&path))?;
+    }
+    Ok(())
+}

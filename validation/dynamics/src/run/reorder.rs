@@ -1,0 +1,83 @@
+//! Keeps particles in memory in the order of their cells: neighbours share the cache, and the engine reads
+//! and writes the host's arrays almost sequentially.
+
+use psidpd_core::engine::{Pool, part};
+use std::iter::Map;
+use std::slice::Iter;
+
+/// Steps between reorderings. In that time particles move about a third of the range of their forces, mostly
+/// into a cell column that is still near in memory.
+pub const INTERVAL: u64 = 32;
+
+/// Whether particles are reordered at the end of a step. That depends on the step number only, so that a
+/// resumed run reorders at the same steps. They are odd, because observables are usually sampled at even
+/// ones.
+pub(super) fn is_due(step: u64) -> bool {
+    step % INTERVAL == 1
+}
+
+/// Converts a scratch vector back to integers.
+type Whole = fn(&[f64; 3]) -> [i32; 3];
+
+/// Permutes arrays, one after the other through the same scratch memory.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Reordering {
+    scratch: Vec<[f64; 3]>,
+}
+
+impl Reordering {
+    /// Moves vector `order[k]` to `k`.
+    pub fn vectors(&mut self, pool: &Pool, order: &[u32], vectors: &mut Vec<[f64; 3]>) {
+        self.gather(pool, order, |k| vectors[k]);
+        std::mem::swap(&mut self.scratch, vectors);
+    }
+
+    /// Three whole numbers of each particle in that order.
+    pub fn numbers(
+        &mut self,
+        pool: &Pool,
+        order: &[u32],
+        get: impl Fn(usize) -> [i32; 3] + Sync,
+    ) -> Map<Iter<'_, [f64; 3]>, Whole> {
+        // A double holds every whole number of 32 bits.
+        self.gather(pool, order, |k| get(k).map(f64::from));
+        self.scratch.iter().map(|numbers| numbers.map(|number| number as i32))
+    }
+
+    fn gather(&mut self, pool: &Pool, order: &[u32], get: impl Fn(usize) -> [f64; 3] + Sync) {
+        self.scratch.resize(order.len(), [0.0; 3]);
+        let (mut rest, threads) = (&mut self.scratch[..], pool.threads());
+        let mut parts: Vec<_> = (0..threads)
+            .map(|number| {
+                let range = part(order.len(), number, threads);
+                (rest.split_off_mut(..range.len()).unwrap_or_default(), &order[range])
+            })
+            .collect();
+        pool.each(&mut parts, |(to, order)| {
+            for (to, k) in to.iter_mut().zip(*order) {
+                *to = get(*k as usize);
+            }
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::num::NonZeroUsize;
+
+    #[test]
+    fn arrays_are_gathered() {
+        let order = [2, 0, 3, 1];
+        for threads in [1, 3, 7] {
+            let pool = Pool::new(NonZeroUsize::new(threads).unwrap());
+            let mut reordering = Reordering::default();
+            let mut vectors: Vec<[f64; 3]> = (0..5).map(|k| [k as f64, 0.5, -1.0]).collect();
+            reordering.vectors(&pool, &order, &mut vectors);
+            assert_eq!(vectors, [2.0, 0.0, 3.0, 1.0].map(|k| [k, 0.5, -1.0]));
+            let numbers = [[i32::MAX, 1, 2], [i32::MIN, 3, 4], [5, 6, 7], [8, 9, 10]];
+            let found: Vec<_> = reordering.numbers(&pool, &order, |k| numbers[k]).collect();
+            assert_eq!(found, order.map(|k| numbers[k as usize]));
+        }
+    }
+}

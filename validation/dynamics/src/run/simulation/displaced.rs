@@ -1,0 +1,68 @@
+//! Forces at displaced positions, which stand for the gradient of the square of the forces.
+
+use super::{RunError, Simulation};
+use psidpd_core::engine::reference::COMPONENTS;
+use psidpd_core::engine::{PeriodicBox, Want};
+use psidpd_observe::flux::Displaced;
+
+impl Simulation {
+    /// Replaces the forces by `F(x̃)`, `x̃ = x + c F(x)/m`, for a kick of the particles at `x`.
+    ///
+    /// Two evaluations, of forces alone. Where momentum is recorded the second has a virial too: of forces `F̃` between the
+    /// particles at `x` that is `W(x̃) − Σ (x̃ − x) ⊗ F̃`, with the conservative part of `F̃`.
+    ///
+    /// # Errors
+    /// As [`Simulation::compute`], at either place.
+    pub(in crate::run) fn displaced_forces(&mut self, c: f64) -> Result<(), RunError> {
+        self.compute(Want::FORCES, None)?;
+        self.add_external_forces();
+        self.displace(c);
+        // Forces at displaced positions beyond a wall are not those at the wall.
+        let within = self.beyond_walls().map(|wide| self.particles.replace_domain(wide));
+        let made = self.compute(Want { virial: self.is_recording(), ..Want::FORCES }, None);
+        let wide = within.map(|within| self.particles.replace_domain(within));
+        if made.is_ok() && self.is_recording() {
+            let forces = self.forces().to_vec();
+            self.add_external_forces();
+            let x = self.positions().to_vec();
+            self.step_back();
+            let domain = wide.unwrap_or_else(|| self.domain().clone());
+            let virial = self.virial_from(&x, &forces);
+            self.record_forces(virial, Some(Displaced { x, domain }));
+            return Ok(());
+        }
+        self.add_external_forces();
+        self.step_back();
+        made
+    }
+
+    /// `W − Σ (x̃ − x) ⊗ F`, its symmetric part, of the last evaluation, made at `to`.
+    fn virial_from(&self, to: &[[f64; 3]], forces: &[[f64; 3]]) -> [f64; 6] {
+        let mut virial = self.tally().virial;
+        for ((to, x), f) in to.iter().zip(self.positions()).zip(forces) {
+            let d = self.domain().minimum_image(*to, *x);
+            for (sum, (a, b)) in virial.iter_mut().zip(COMPONENTS) {
+                *sum -= 0.5 * (d[a] * f[b] + d[b] * f[a]);
+            }
+        }
+        virial
+    }
+
+    /// A box that all positions are in along directions with walls, if there are walls.
+    fn beyond_walls(&self) -> Option<PeriodicBox> {
+        let (domain, dimensions) = (self.domain(), self.dimensions());
+        if domain.periodic()[..dimensions].iter().all(|periodic| *periodic) {
+            return None;
+        }
+        let (mut low, mut lengths) = (domain.origin(), domain.lengths());
+        for k in (0..dimensions).filter(|k| !domain.periodic()[*k]) {
+            let ends = self
+                .positions()
+                .iter()
+                .fold([low[k], low[k] + lengths[k]], |[a, b], x| [a.min(x[k]), b.max(x[k])]);
+            (low[k], lengths[k]) = (ends[0], ends[1] - ends[0]);
+        }
+        // Without walls that lean; what is not finite the evaluation refuses.
+        PeriodicBox::orthogonal(low, lengths, domain.periodic()).ok()
+    }
+}

@@ -1,0 +1,108 @@
+//! Records what carries momentum in a step, for observables.
+
+use super::Simulation;
+use crate::integrator::Integrator;
+use psidpd_core::engine::thermostat::Pull;
+use psidpd_observe::flux::{Acted, Displaced, Flux, Line, Place};
+
+/// What is recorded of the present step, which takes `dt`.
+#[derive(Debug, Clone, Default)]
+pub struct Record {
+    dt: f64,
+    flux: Flux,
+    /// Whether operators add to it.
+    open: bool,
+}
+
+impl Simulation {
+    /// Whether what carries momentum is recorded in the steps from now on. Trajectories do not depend on it.
+    pub fn record_flux(&mut self, on: bool) {
+        match on {
+            true => drop(self.record.get_or_insert_default()),
+            false => self.record = None,
+        }
+    }
+
+    /// What carried momentum in the present step, if that was recorded.
+    pub fn flux(&self) -> Option<&Flux> {
+        self.record.as_deref().filter(|record| record.dt > 0.0).map(|record| &record.flux)
+    }
+
+    pub(super) fn is_recording(&self) -> bool {
+        self.record.as_ref().is_some_and(|record| record.open)
+    }
+
+    pub(super) fn open_record(&mut self, dt: f64) {
+        if let Some(record) = &mut self.record {
+            **record = Record { dt, flux: Flux::default(), open: true };
+        }
+    }
+
+    pub(super) fn close_record(&mut self, integrator: Integrator) {
+        let Some(record) = self.record.as_mut().filter(|record| record.open) else { return };
+        record.open = false;
+        let forces = &mut record.flux.forces;
+        for (acted, share) in forces.iter_mut().zip(integrator.force_shares()) {
+            acted.share = share;
+        }
+        // No need to keep what is still there.
+        if let Some(last) = forces.last_mut().filter(|_| integrator.forces_at_end()) {
+            last.at = None;
+        }
+    }
+
+    /// The ways of all particles to where they are, for a time `h` with the velocities `u`.
+    pub(super) fn record_ways(&mut self, h: f64, u: impl Fn(&Simulation, usize) -> [f64; 3]) {
+        if !self.is_recording() {
+            return;
+        }
+        let over_dt = self.record.as_deref().map_or(0.0, |record| 1.0 / record.dt);
+        let ways: Vec<Line> = (0..self.len())
+            .map(|k| {
+                let momentum = over_dt * self.masses()[self.species()[k] as usize];
+                let u = u(self, k);
+                Line { from: self.positions()[k], d: u.map(|u| h * u), f: u.map(|u| momentum * u) }
+            })
+            .collect();
+        if let Some(record) = self.record.as_deref_mut() {
+            record.flux.ways.extend(ways);
+        }
+    }
+
+    /// What particles carry with their present velocities, along ways too short for their place to matter.
+    pub(super) fn record_momenta(&mut self) {
+        const TIME: f64 = 1e-9;
+        let way = |k: usize| {
+            let momentum = self.masses()[self.species()[k] as usize] / TIME;
+            let v = self.particles.now().v[k];
+            Line { from: self.positions()[k], d: v.map(|v| TIME * v), f: v.map(|v| momentum * v) }
+        };
+        let ways: Vec<Line> = (0..self.len()).map(way).collect();
+        if let Some(record) = &mut self.record {
+            record.flux.ways = ways;
+        }
+    }
+
+    /// Conservative forces on particles at the present positions, with their virial; `displaced` is what they were computed
+    /// at, if that is elsewhere.
+    pub(super) fn record_forces(&mut self, virial: [f64; 6], displaced: Option<Displaced>) {
+        if !self.is_recording() {
+            return;
+        }
+        let place = Place { x: self.positions().to_vec(), species: self.species().to_vec(), displaced };
+        let acted = Acted { share: 1.0, virial, at: Some(place) };
+        if let Some(record) = &mut self.record {
+            record.flux.forces.push(acted);
+        }
+    }
+
+    /// Pulls of drag for a part of the step.
+    pub(super) fn record_pulls(&mut self, share: f64, pulls: Vec<Pull>) {
+        let Simulation { record: Some(record), particles, .. } = self else { return };
+        record.flux.drag.extend(pulls.into_iter().map(|pull| Line {
+            from: particles.now().x[pull.i],
+            d: pull.d,
+            f: pull.d.map(|d| share * pull.strength * d),
+        }));
+    }
+}

@@ -1,0 +1,47 @@
+//! Views of a simulation for observables and files.
+
+use super::simulation::Simulation;
+use psidpd_formats::Frame;
+use psidpd_observe::frame::View;
+
+impl Simulation {
+    /// The present step for observables; `time` is that since the start of the run.
+    pub fn view(&self, time: f64) -> View<'_> {
+        View {
+            pool: self.engine().pool(),
+            step: self.step_number(),
+            time,
+            kt: self.kt(),
+            model: self.model(),
+            dimensions: self.dimensions(),
+            domain: self.domain(),
+            masses: self.masses(),
+            x: self.positions(),
+            v: self.velocities(),
+            images: self.image_flags(),
+            species: self.species(),
+            tags: self.tags(),
+            frozen: self.frozen(),
+            temperature: self.temperature(),
+            kinetic_energy: self.kinetic_energy(),
+            pressure: self.pressure_tensor(),
+            conservative_pressure: self.conservative_pressure_tensor(),
+            flux: self.flux(),
+        }
+    }
+
+    /// The present step for files and pictures; `time` is that since the start of the run.
+    pub fn frame(&self, time: f64) -> Frame<'_> {
+        Frame {
+            step: self.step_number(),
+            time,
+            dimensions: self.dimensions(),
+            domain: self.domain(),
+            names: self.model().species(),
+            x: self.positions(),
+            v: Some(self.velocities()),
+            species: self.species(),
+            tag: self.tags(),
+        }
+    }
+}

@@ -1,0 +1,322 @@
+//! Scene files: which fluid, in which box, from which start, for how many steps.
+//!
+//! ```toml
+//! model   = "../models/warren2003-set6.toml"   # relative to this file
+//! kT      = 1.0
+//! box     = 10.0                               # periodic; or [10.0, 10.0, 20.0]; or a table
+//! density = 6.05
+//! steps   = 1000
+//! ```
+//!
+//! `docs/scene-file.md` has every key; it is written from the table in [`keys`], and tests hold the reader to
+//! it.
+
+mod arrangement;
+mod body_force;
+mod composition;
+mod domain;
+mod edits;
+mod fill;
+mod initial;
+pub mod keys;
+mod masses;
+mod number;
+mod output;
+mod part;
+mod ramp;
+mod saved;
+mod shape;
+mod stage;
+mod template;
+mod velocities;
+
+pub use arrangement::{Arrangement, Lattice};
+pub use composition::Composition;
+pub use edits::{Edit, edit_model};
+pub use initial::Initial;
+pub use output::Output;
+pub use part::Part;
+pub use shape::Shape;
+pub use stage::Stage;
+pub use template::{TEMPLATES, Template, TemplateError};
+pub use velocities::Velocities;
+
+use crate::particles::{BodyForce, State, Tags};
+use number::positive;
+use psidpd_core::document::keys::{of_another_kind, strangers_first};
+use psidpd_core::document::{Document, FileError, FileErrorKind, Section, Source, Value};
+use psidpd_core::engine::{LocalEnergy, PeriodicBox, Plan, Precision};
+use psidpd_core::model::Model;
+use psidpd_observe::{self as observe, Observe, StageNames};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// A scene file with its model, read and checked.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    /// What the file calls itself.
+    pub title: String,
+    /// Where the model file is.
+    pub model_path: PathBuf,
+    /// The model.
+    pub model: Model,
+    /// kT of the initial velocities, and the default of every stage.
+    pub kt: f64,
+    /// Seed of the initial state and of the noise.
+    pub seed: u64,
+    /// Precision of the pair forces of a run, if the scene gives it.
+    pub precision: Option<Precision>,
+    /// The box.
+    pub domain: PeriodicBox,
+    /// Mass of each species.
+    pub mass: Vec<f64>,
+    /// The initial state.
+    pub initial: Initial,
+    /// The particles that never move.
+    pub frozen: Tags,
+    /// Body forces, in the stages that have them.
+    pub body_forces: Vec<BodyForce>,
+    /// What is done with it, in this order.
+    pub stages: Vec<Stage>,
+    /// What is written.
+    pub output: Output,
+    /// What is measured on the way.
+    pub observe: Observe,
+    /// The text of the file.
+    pub source: Arc<Source>,
+    /// Where paths in the file start from.
+    pub folder: PathBuf,
+}
+
+impl Scene {
+    /// Reads a scene file and the model file it names.
+    ///
+    /// # Errors
+    /// Anything wrong in either file, with its line and key.
+    pub fn open(path: &Path) -> Result<Scene, FileError> {
+        let base = path.parent().unwrap_or(Path::new(""));
+        Scene::read(&Document::open(path)?, base, &[])
+    }
+
+    /// Reads a scene file and the model file it names, with other values for some of their keys.
+    ///
+    /// # Errors
+    /// As [`Scene::open`]; an edit that fits nowhere.
+    pub fn open_with(path: &Path, edits: &[Edit]) -> Result<Scene, FileError> {
+        if edits.is_empty() {
+            return Scene::open(path);
+        }
+        let base = path.parent().unwrap_or(Path::new(""));
+        let document = Document::open(path)?;
+        let model = document.root().get("model").and_then(|v| Document::open(&base.join(v.as_str()?)).ok());
+        let parameters = |name: &str| {
+            let known = model.as_ref().and_then(|m| m.root().get("parameters")?.as_section()?.get(name));
+            known.is_some()
+        };
+        let (text, of_model) = edits::edit_scene(document.source().text(), edits, &parameters)?;
+        Scene::read(&Document::parse(&path.display().to_string(), &text)?, base, &of_model)
+    }
+
+    /// Reads a scene from a text; `name` stands for the file in messages, and the model file is looked
+    /// for in `base`.
+    ///
+    /// # Errors
+    /// As [`Scene::open`].
+    pub fn parse(name: &str, text: &str, base: &Path) -> Result<Scene, FileError> {
+        Scene::read(&Document::parse(name, text)?, base, &[])
+    }
+
+    fn read(document: &Document, base: &Path, of_model: &[Edit]) -> Result<Scene, FileError> {
+        Scene::of(document, base, of_model)
+            .map_err(|error| strangers_first(error, &document.root(), keys::TABLES, &["observe"]))
+            .map_err(|error| no_scene(&document.root()).unwrap_or(error))
+    }
+
+    fn of(document: &Document, base: &Path, of_model: &[Edit]) -> Result<Scene, FileError> {
+        let root = document.root();
+        let title = root.get("title").map(|value| value.string()).transpose()?;
+        let (model_path, model) = read_model(&root.require("model")?, base, of_model)?;
+        let kt = positive(&root.require("kT")?)?;
+        let seed = root.get("seed").map_or(Ok(1), |value| value.count().map(|c| c.value))?;
+        let precision = root.get("precision").map(|value| value.one_of("precision", &Precision::ALL));
+        let (initial, domain) = initial::read(&root, &model, base)?;
+        let stages = stage::read(&root, kt)?;
+        let body_forces = body_force::read(&root, &model, &initial)?;
+        let drive = body_forces.iter().find_map(BodyForce::drive);
+        let names: Vec<&str> = stages.iter().map(|s| s.name.as_str()).collect();
+        let timeless = stages.iter().filter(|s| !s.integrator.has_time()).map(|s| s.name.as_str()).collect();
+        let stages_of = StageNames { all: &names, timeless };
+        let observe = observe::read(&root, &model, kt, &domain, stages_of, initial.slab_axis(), drive)?;
+        let scene = Scene {
+            title: title.map_or_else(|| model.title().to_owned(), |t| t.value),
+            model_path,
+            kt,
+            seed,
+            precision: precision.transpose()?.map(|p| p.value),
+            mass: masses::read(&root, model.species(), &initial)?,
+            frozen: initial.frozen(),
+            body_forces,
+            output: output::read(&root)?,
+            observe,
+            source: root.source().clone(),
+            folder: base.to_owned(),
+            stages,
+            model,
+            domain,
+            initial,
+        };
+        scene.check_noise(&root)?;
+        scene.check_trials(&root)?;
+        root.finish()?;
+        scene.check_room(document)?;
+        Ok(scene)
+    }
+
+    /// The particles before the first step; the same for the same file.
+    pub fn initial_state(&self) -> State {
+        fill::fill(self).0
+    }
+
+    /// Precision of the pair forces of a run; mixed by default.
+    pub fn precision(&self) -> Precision {
+        self.precision.unwrap_or_default()
+    }
+
+    /// Number densities of the species in every part that moves, and of all these parts mixed, if there are several of more
+    /// than one species; else none.
+    pub fn mixtures(&self) -> Vec<Vec<f64>> {
+        let dimensions = self.model.dimensions();
+        let parts: Vec<_> = self.initial.parts().iter().filter(|p| !p.frozen && p.count > 0).collect();
+        let species = self.model.species().len();
+        if species < 2 || parts.len() < 2 {
+            return Vec::new();
+        }
+        let (mut counts, mut volume) = (vec![0.0; species], 0.0);
+        let mut all: Vec<Vec<f64>> = Vec::new();
+        for part in parts {
+            let here = part.shape.volume(dimensions);
+            let share = part.composition.share(part.count);
+            counts.iter_mut().zip(&share).for_each(|(sum, n)| *sum += *n as f64);
+            volume += here;
+            all.push(share.into_iter().map(|n| n as f64 / here).collect());
+        }
+        all.push(counts.into_iter().map(|n| n / volume).collect());
+        all
+    }
+
+    /// Number densities of the species where the fluid is: in the largest part that moves, or in the whole box
+    /// for a start from a file.
+    pub fn densities(&self) -> Vec<f64> {
+        let dimensions = self.model.dimensions();
+        let largest = self.initial.parts().iter().filter(|p| !p.frozen).max_by_key(|p| p.count);
+        let (counts, volume) = match (&self.initial, largest) {
+            (Initial::Parts(_), Some(part)) => {
+                (part.composition.share(part.count), part.shape.volume(dimensions))
+            }
+            _ => {
+                let mut counts = vec![0; self.model.species().len()];
+                self.initial_state().species.iter().for_each(|s| counts[*s as usize] += 1);
+                (counts, self.domain.volume(dimensions))
+            }
+        };
+        counts.into_iter().map(|n| n as f64 / volume).collect()
+    }
+
+    /// The number density of a scene that one fluid fills from face to face.
+    pub fn uniform_density(&self) -> Option<f64> {
+        let [part] = self.initial.parts() else { return None };
+        let volume = self.domain.volume(self.model.dimensions());
+        let fills = (part.shape.volume(self.model.dimensions()) / volume - 1.0).abs() < 1e-9;
+        (fills && self.domain.periodic()[..self.model.dimensions()].iter().all(|p| *p))
+            .then(|| part.count as f64 / volume)
+    }
+
+    /// Refuses parts without room for their particles at the minimum distance.
+    fn check_room(&self, document: &Document) -> Result<(), FileError> {
+        let apart =
+            |p: &Part| matches!(p.arrangement, Arrangement::Random { min_distance } if min_distance > 0.0);
+        if !self.initial.parts().iter().any(apart) {
+            return Ok(());
+        }
+        let Some(crowded) = fill::fill(self).1 else { return Ok(()) };
+        let root = document.root();
+        let section = match root.get("initial") {
+            Some(initial) => initial.section()?,
+            None => root.require("part")?.array()?[crowded.part].section()?,
+        };
+        let message = format!(
+            "only {} of {} particles found a place at this distance from all others",
+            crowded.placed,
+            self.initial.parts()[crowded.part].count
+        );
+        let error = section.require("min_distance")?.error(FileErrorKind::Value(message));
+        Err(error.with_help("use a smaller distance, or a lattice"))
+    }
+
+    /// The model must hold at every temperature, and the box must keep images apart that would share
+    /// their noise.
+    fn check_noise(&self, root: &Section) -> Result<(), FileError> {
+        self.model.at(self.kt)?;
+        for stage in &self.stages {
+            let fluid = self.model.at(stage.kt)?;
+            let plan =
+                Plan::new(&fluid).map_err(|e| root.error(FileErrorKind::Value(format!("the model: {e}"))))?;
+            let has_noise = stage.thermostat && stage.integrator.has_time();
+            let Some(range) = plan.noise_range().filter(|_| has_noise) else { continue };
+            domain::check_width(root, &self.domain, self.model.dimensions(), range)?;
+        }
+        Ok(())
+    }
+
+    /// Trial moves need an energy that knows all forces.
+    fn check_trials(&self, root: &Section) -> Result<(), FileError> {
+        for stage in self.stages.iter().filter(|stage| !stage.integrator.has_time()) {
+            let refuse = |message: String| {
+                let kind = FileErrorKind::Value(message);
+                stage::place_of_integrator(root, &stage.name)
+                    .map_or_else(|| root.error(kind.clone()), |v| v.error(kind.clone()))
+            };
+            if let Err(reason) = LocalEnergy::new(&self.model.at(stage.kt)?) {
+                return Err(refuse(format!("monte-carlo needs an energy: {reason}")));
+            }
+            if stage.body_forces && !self.body_forces.is_empty() {
+                let message =
+                    "monte-carlo needs an energy, and body forces have none in a periodic box".to_owned();
+                return Err(refuse(message).with_help("stages with body_forces = false have none"));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn read_model(value: &Value, base: &Path, edits: &[Edit]) -> Result<(PathBuf, Model), FileError> {
+    let name = value.string()?.value;
+    let path = base.join(&name);
+    let model = Model::open(&path).and_then(|model| match edits {
+        [] => Ok(model),
+        _ => Model::parse(&path.display().to_string(), &edit_model(model.source().text(), edits)?),
+    });
+    match model {
+        Ok(model) => Ok((path, model)),
+        Err(error) => match error.kind() {
+            FileErrorKind::Unreadable(why) => {
+                let kind =
+                    FileErrorKind::Value(format!("the model file {} cannot be read: {why}", path.display()));
+                Err(value.error(kind).with_help("the path is relative to the scene file"))
+            }
+            _ => Err(error),
+        },
+    }
+}
+
+/// What is said of a model where a scene is expected: it names no model, and has what makes one.
+fn no_scene(root: &Section) -> Option<FileError> {
+    let of_model = ["species", "excess_free_energy", "density", "pair"];
+    let key = of_model.into_iter().find(|key| root.get(key).is_some())?;
+    let help = "a model goes to `psidpd check` or `theory`; a scene names it, model = \"FILE\", and `psidpd new` writes one";
+    let what = "this is a model, and a scene is expected";
+    root.get("model").is_none().then(|| of_another_kind(root, key, what).with_help(help))
+}
+
+#[cfg(test)]
+mod tests;

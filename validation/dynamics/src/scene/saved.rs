@@ -1,0 +1,105 @@
+//! Starts from files that another run has left.
+
+use super::initial::Initial;
+use super::velocities::Velocities;
+use crate::checkpoint;
+use crate::particles::{State, Tags};
+use nalgebra::{Matrix3, Vector3};
+use psidpd_core::document::{FileError, FileErrorKind, Section};
+use psidpd_core::engine::PeriodicBox;
+use psidpd_core::model::Model;
+use psidpd_formats::data::DataFile;
+use std::path::Path;
+
+/// What a file is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// A LAMMPS data file.
+    Data,
+    /// A checkpoint, or the folder of a run that left one.
+    Checkpoint,
+}
+
+impl Format {
+    /// The format that a kind of `[initial]` stands for.
+    pub fn of(kind: &str) -> Option<Format> {
+        match kind {
+            "data" => Some(Format::Data),
+            "checkpoint" => Some(Format::Checkpoint),
+            _ => None,
+        }
+    }
+}
+
+/// The particles and the box of a file. `periodic` sets the boundaries; if left out, a checkpoint keeps its
+/// own, and so does a data file that tells them; others are periodic.
+///
+/// # Errors
+/// The file cannot be read, or is no state of `model`; in words.
+pub fn open(
+    format: Format,
+    path: &Path,
+    model: &Model,
+    periodic: Option<[bool; 3]>,
+) -> Result<State, String> {
+    match format {
+        Format::Data => {
+            let data = DataFile::read(path).map_err(|e| e.to_string())?;
+            let periodic = periodic.or(data.boundary()).unwrap_or([true; 3]);
+            State::from_data_in(&data, model, periodic).map_err(|e| e.to_string())
+        }
+        Format::Checkpoint => {
+            let state = checkpoint::read_state(path).map_err(|e| e.to_string())?;
+            let periodic = periodic.unwrap_or_else(|| state.domain.periodic());
+            let edges = Matrix3::from_columns(&[0, 1, 2].map(|k| Vector3::from(state.domain.edge(k))));
+            let domain =
+                PeriodicBox::new(state.domain.origin(), edges, periodic).map_err(|e| e.to_string())?;
+            let state = State { domain, ..state };
+            match state.fault(model.species().len(), model.dimensions()) {
+                Some(fault) => Err(format!("is no state of this model: {fault}")),
+                None => Ok(state),
+            }
+        }
+    }
+}
+
+/// Reads the keys of a start from a file, and the file.
+pub fn read(
+    section: &Section,
+    format: Format,
+    model: &Model,
+    base: &Path,
+    periodic: Option<[bool; 3]>,
+) -> Result<(Initial, PeriodicBox), FileError> {
+    let value = section.require("file")?;
+    let path = base.join(value.string()?.value);
+    let state = open(format, &path, model, periodic).map_err(|why| {
+        value.error(FileErrorKind::Value(why)).with_help("the path is relative to the scene file")
+    })?;
+    let initial = Initial::File {
+        velocities: Velocities::read_or_keep(section, format == Format::Checkpoint)?,
+        frozen: read_frozen(section, &state)?,
+        path,
+        state: Box::new(state.clone()),
+    };
+    Ok((initial, state.domain))
+}
+
+fn read_frozen(section: &Section, state: &State) -> Result<Tags, FileError> {
+    let Some(value) = section.get("frozen_ids") else { return Ok(Tags::none()) };
+    let wrong = |message: String| value.error(FileErrorKind::Value(message));
+    let ids: Vec<u64> =
+        value.array()?.iter().map(|v| v.count().map(|c| c.value)).collect::<Result<_, _>>()?;
+    let [first, last] = ids[..] else {
+        return Err(wrong(format!("expected the first and the last id, found {} values", ids.len())));
+    };
+    let (Ok(first), Ok(last)) = (i32::try_from(first), i32::try_from(last)) else {
+        return Err(wrong(format!("{last} is beyond what ids can count")));
+    };
+    let tags = Tags::Ranges(vec![first..=last]);
+    match state.tag.iter().filter(|t| tags.contain(**t)).count() {
+        0 => Err(wrong(format!("no particle of the file has an id from {first} to {last}"))),
+        all if all == state.len() => Err(wrong("every particle is frozen: nothing would move".into())),
+        _ => Ok(tags),
+    }
+}

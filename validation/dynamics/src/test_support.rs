@@ -1,0 +1,26 @@
+//! Models, and scenes of them, that several tests have.
+
+use crate::scene::Scene;
+use psidpd_core::document::FileError;
+
+/// Warren's liquid.
+pub const SET6: &str = include_str!("../../models/warren2003-set6.toml");
+
+/// A thermostat without other forces.
+pub const IDEAL: &str =
+    "title = \"ideal gas\"\nspecies = [\"A\"]\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n";
+
+/// The same, of two species.
+pub const IDEAL_MIXTURE: &str =
+    "title = \"ideal gas\"\nspecies = [\"A\", \"B\"]\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n";
+
+/// Standard DPD.
+pub const SOFT: &str = "title = \"soft\"\nspecies = [\"A\"]\n[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\nstrength = 25\n\
+                        range = 1\n[[thermostat]]\ngamma = 4.5\nrange = 1\n";
+
+/// A scene whose text calls its model `m.toml`.
+pub fn scene(model: &str, text: &str) -> Result<Scene, FileError> {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("m.toml"), model).unwrap();
+    Scene::parse("s.toml", text, folder.path())
+}

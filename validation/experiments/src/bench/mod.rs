@@ -1,0 +1,507 @@
+//! The benchmark: LAMMPS, the plugin and the native runner side by side.
+//!
+//! Every code starts from one state of each fluid and size and is timed in interleaved rounds, so that what slows
+//! the machine down for a while slows them all; ratios are taken within a round. [`contender`] says who is timed,
+//! [`deck`] runs LAMMPS and [`native`] the runner.
+
+mod clock;
+pub mod contender;
+pub mod deck;
+mod error;
+pub mod fluids;
+pub mod length;
+pub mod log;
+pub mod memory;
+pub mod native;
+pub mod outcome;
+pub mod page;
+mod spread;
+pub mod start;
+mod turns;
+
+pub use error::BenchError;
+pub use outcome::Outcome;
+pub use spread::Spread;
+
+use contender::{Choice, Contender, Field, Suffix};
+use deck::Place;
+use fluids::{MDPD, SUBJECTS, Subject};
+use length::{FEWEST, Length};
+use outcome::{Asked, FluidFacts, LammpsFacts, Machine, Run, Scaling};
+use psidpd_core::engine::{Instructions, Plan, Precision, Settings};
+use psidpd_formats::files::write_atomically;
+use psidpd_lammps_host::Host;
+use psidpd_report::Progress;
+use start::Start;
+use std::collections::{BTreeMap, BTreeSet};
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+
+/// What `psidpd bench` is asked for.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// Particles of the many-body fluid in the boxes.
+    pub sizes: Vec<usize>,
+    /// Rounds.
+    pub rounds: usize,
+    /// Seconds that a timed run may take, if that is enough for the fewest steps.
+    pub seconds: f64,
+    /// Steps of every run instead; then no skin is looked for either.
+    pub steps: Option<u64>,
+    /// Particles of the systems whose memory is measured.
+    pub memory: Vec<usize>,
+    /// Thread counts of the native runner.
+    pub threads: Vec<NonZeroUsize>,
+    /// Every code, not only those of [`Field::User`].
+    pub every_code: bool,
+    /// Above this size only the contenders of [`Field::Few`] are timed.
+    pub few_above: usize,
+    /// More words behind the seed of `pair_style dpd/psi`, each a contender.
+    pub words: Vec<String>,
+    /// Another LAMMPS than the one that `psidpd lammps install` puts in place.
+    pub lammps: Option<PathBuf>,
+    /// Folder for results, starts and decks.
+    pub out: PathBuf,
+}
+
+/// Skin of LAMMPS where none is looked for.
+const SKIN: f64 = 0.3;
+/// Skins that are tried.
+const SKINS: [f64; 4] = [0.2, 0.3, 0.4, 0.55];
+
+/// A contender with a fluid and a size, and what was measured so far.
+struct Entry {
+    subject: Subject,
+    size: usize,
+    contender: Contender,
+    length: Length,
+    skin: f64,
+    /// Seconds that a step is expected to take; none where steps are given.
+    step: Option<f64>,
+    seconds: Vec<f64>,
+    parts: Vec<BTreeMap<String, f64>>,
+    ghosts: Option<f64>,
+    builds: Option<u64>,
+}
+
+impl Entry {
+    /// Seconds that a run is expected to take; 1 where nothing is known. For the bar: LAMMPS starts in 0.2 s and
+    /// reads and sets up a particle in 10 µs, roughly.
+    fn weight(&self) -> f64 {
+        let begin = if self.contender.in_lammps() { 0.2 + 1e-5 * self.particles() } else { 0.0 };
+        self.step.map_or(1.0, |step| begin + step * self.length.all() as f64)
+    }
+
+    /// Particles that a step moves, copies included.
+    fn particles(&self) -> f64 {
+        (self.subject.particles(self.size) * self.contender.copies()) as f64
+    }
+}
+
+/// A fluid at a size.
+struct Case {
+    start: Start,
+    pairs: f64,
+}
+
+type Cases = BTreeMap<(&'static str, usize), Case>;
+
+/// Runs the benchmark and writes `bench.json` and `report.html`. `program` is psidpd itself, which is
+/// started to measure memory.
+///
+/// # Errors
+/// Something could not be run or written.
+pub fn run(options: &Options, program: &Path, progress: &Progress) -> Result<Outcome, BenchError> {
+    let load = load();
+    std::fs::create_dir_all(&options.out).map_err(BenchError::io(&options.out))?;
+    // LAMMPS runs in folders of its own: paths must not depend on ours.
+    let out = options.out.canonicalize().map_err(BenchError::io(&options.out))?;
+    let spinner = progress.spinner("LAMMPS and the plugin");
+    let (place, version) = place(options, &out, progress)?;
+    spinner.finish();
+
+    let (choice, missing) = choice(options, &place)?;
+    let (cases, mut entries) = entries(options, &choice, &place, &out, progress)?;
+    calibrate(options, &cases, &place, &mut entries, progress)?;
+    time(options.rounds, &cases, &place, &mut entries, progress)?;
+
+    let spinner = progress.spinner("memory and threads");
+    let memory = match &options.memory[..] {
+        [] => Vec::new(),
+        sizes => memory::measure(program, sizes)?,
+    };
+    let equal_bits = equal_bits(options, &cases)?;
+    spinner.finish();
+
+    let runs = runs(&entries, &cases);
+    let (fluids, slope_widths) = facts()?;
+    let scaling = scaling(&runs, &entries, slope_widths["mdpd"]);
+    let outcome = Outcome {
+        format: 3,
+        version: env!("CARGO_PKG_VERSION"),
+        machine: Machine {
+            processor: crate::crosscheck::machine(),
+            cores: std::thread::available_parallelism().map_or(1, NonZeroUsize::get),
+            instructions: Instructions::ALL
+                .into_iter()
+                .filter(|(_, i)| i.available())
+                .map(|(name, _)| name.to_owned())
+                .collect(),
+            better: better(),
+            gigahertz: clock::gigahertz(),
+            load,
+        },
+        lammps: LammpsFacts { version, missing },
+        options: Asked {
+            sizes: options.sizes.clone(),
+            rounds: options.rounds,
+            seconds: options.seconds,
+            steps: options.steps,
+            every_code: options.every_code,
+            few_above: options.few_above,
+            seed: start::SEED,
+        },
+        fluids,
+        runs,
+        scaling,
+        memory,
+        equal_bits,
+    };
+    write(&out, &outcome)?;
+    Ok(outcome)
+}
+
+fn write(out: &Path, outcome: &Outcome) -> Result<(), BenchError> {
+    let json = serde_json::to_string_pretty(outcome)
+        .map_err(|e| BenchError::io(out.join("bench.json"))(e.into()))?;
+    write_atomically(out.join("bench.json"), (json + "\n").as_bytes())?;
+    write_atomically(out.join("report.html"), page::report(outcome)?.as_bytes())?;
+    Ok(())
+}
+
+/// LAMMPS with the plugin, and its version in words.
+fn place(options: &Options, out: &Path, progress: &Progress) -> Result<(Place, String), BenchError> {
+    let note = |line: &str| progress.note(line);
+    let host = match &options.lammps {
+        Some(place) => Host::at(place)?,
+        None => psidpd_lammps_host::install(&note)?,
+    };
+    let version = host.version()?;
+    let plugin = psidpd_lammps_host::plugin::build(&host, &note)?;
+    psidpd_lammps_host::plugin::check(&host, &plugin)?;
+    // A LAMMPS without plugins has its own program with the styles in it.
+    let (host, load) = match psidpd_lammps_host::plugin::launcher(&plugin) {
+        Some(launcher) => (host.with_program(&launcher), None),
+        None => (host, Some(plugin)),
+    };
+    Ok((Place { host, plugin: load, work: out.join("runs") }, version.name))
+}
+
+/// Who can be timed here, and the styles that LAMMPS lacks.
+fn choice(options: &Options, place: &Place) -> Result<(Choice, Vec<String>), BenchError> {
+    let styles = deck::pair_styles(place)?;
+    let has = |name: &str| styles.contains(name);
+    let suffixes: Vec<Suffix> =
+        [Suffix::None, Suffix::Omp, Suffix::Intel].into_iter().filter(|s| has(s.style())).collect();
+    let wanted = ["mdpd", "eam/alloy", "dpd/tstat", "dpd", "dpd/omp", "dpd/intel"];
+    let missing = wanted.iter().filter(|s| !has(s)).map(|s| (*s).to_owned()).collect();
+    let choice = Choice {
+        built_in: has("mdpd") && has("mdpd/rhosum"),
+        eam: has("eam/alloy") && has("dpd/tstat"),
+        suffixes,
+        words: options.words.clone(),
+        threads: options.threads.clone(),
+        two_ranks: place.host.mpirun.is_some(),
+    };
+    Ok((choice, missing))
+}
+
+fn entries(
+    options: &Options,
+    choice: &Choice,
+    place: &Place,
+    out: &Path,
+    progress: &Progress,
+) -> Result<(Cases, Vec<Entry>), BenchError> {
+    let smallest = options.sizes.iter().min().copied();
+    let (mut cases, mut entries) = (Cases::new(), Vec::new());
+    for &size in &options.sizes {
+        for subject in SUBJECTS {
+            let spinner = progress.spinner(&format!("equilibrium: {}, {size}", subject.name));
+            let start = start::equilibrated(&subject, size, &out.join("starts"))?;
+            spinner.finish();
+            let cutoff = subject.model()?.at(1.0).map_err(BenchError::File)?.cutoff();
+            let pairs = start::pairs_per_particle(&start.state, cutoff);
+            cases.insert((subject.name, size), Case { start, pairs });
+            deck::prepare(place, &subject, subject == MDPD && choice.eam)?;
+            let field = Field::of(size, Some(size) == smallest, options.every_code, options.few_above);
+            for contender in contender::contenders(&subject, choice, field) {
+                entries.push(Entry {
+                    subject,
+                    size,
+                    contender,
+                    length: Length { warm_up: 5, steps: options.steps.unwrap_or(FEWEST) },
+                    skin: SKIN,
+                    step: None,
+                    seconds: Vec::new(),
+                    parts: Vec::new(),
+                    ghosts: None,
+                    builds: None,
+                });
+            }
+        }
+    }
+    Ok((cases, entries))
+}
+
+/// Speed and skin of a contender, measured at its smallest size and used for all.
+#[derive(Clone, Copy)]
+struct Pace {
+    skin: f64,
+    /// Seconds for a step of a particle.
+    seconds: f64,
+}
+
+/// Finds the pace of each contender and the fastest skin of those in LAMMPS, at the smallest size that has them, and
+/// steps that fill the time of a run: at all sizes, since neither depends much on the size.
+fn calibrate(
+    options: &Options,
+    cases: &Cases,
+    place: &Place,
+    entries: &mut [Entry],
+    progress: &Progress,
+) -> Result<(), BenchError> {
+    if options.steps.is_some() {
+        return Ok(());
+    }
+    let mut order: Vec<usize> = (0..entries.len()).collect();
+    order.sort_by_key(|k| entries[*k].size);
+    let key = |entry: &Entry| (entry.subject.name, entry.contender.id());
+    let all: BTreeSet<_> = entries.iter().map(key).collect();
+    let bar = progress.bar("calibration", all.len() as u64);
+    let mut paces = BTreeMap::new();
+    for k in order {
+        let entry = &mut entries[k];
+        let pace: Pace = match paces.get(&key(entry)) {
+            Some(pace) => *pace,
+            None => {
+                let pace = pace(options, cases, place, entry)?;
+                paces.insert(key(entry), pace);
+                bar.advance(1);
+                pace
+            }
+        };
+        let step = pace.seconds * entry.particles();
+        (entry.skin, entry.step) = (pace.skin, Some(step));
+        entry.length = Length::within(options.seconds, &entry.contender, step);
+    }
+    bar.finish();
+    Ok(())
+}
+
+fn pace(options: &Options, cases: &Cases, place: &Place, entry: &mut Entry) -> Result<Pace, BenchError> {
+    // Short runs scatter more than skins differ, but in a large box long runs would take minutes.
+    let large = entry.size > options.few_above;
+    entry.length = if large { Length::of(FEWEST) } else { Length { warm_up: 20, steps: 60 } };
+    let mut pace = Pace { skin: SKIN, seconds: f64::INFINITY };
+    // The native runner has no skin but is tried as often, so that one disturbed run does not decide.
+    let skins = if entry.contender.needs_no_ghosts() { [0.0; SKINS.len()] } else { SKINS };
+    for skin in skins {
+        let seconds = once(entry, cases, place, skin)?.0 / (entry.length.steps as f64 * entry.particles());
+        if seconds < pace.seconds {
+            pace = Pace { skin, seconds };
+        }
+    }
+    Ok(pace)
+}
+
+/// The rounds.
+fn time(
+    rounds: usize,
+    cases: &Cases,
+    place: &Place,
+    entries: &mut [Entry],
+    progress: &Progress,
+) -> Result<(), BenchError> {
+    let runs: Vec<_> = entries.iter().map(|e| (e.subject.name, e.size)).collect();
+    let mut order = turns::turns(&runs);
+    // By the time that runs are expected to take: one in a large box takes as long as many in a small one.
+    let all = rounds as f64 * entries.iter().map(Entry::weight).sum::<f64>();
+    let bar = progress.bar("rounds", all.ceil() as u64);
+    let mut done = 0.0;
+    for _ in 0..rounds {
+        for &k in &order {
+            measure(&mut entries[k], cases, place)?;
+            done += entries[k].weight();
+            bar.set(done as u64);
+        }
+        // Alternate the order, so that neighbours in time do not matter.
+        order.reverse();
+    }
+    bar.finish();
+    Ok(())
+}
+
+/// Seconds, seconds of the parts, ghosts and list builds.
+type Once = (f64, BTreeMap<String, f64>, Option<(f64, u64)>);
+
+fn once(entry: &Entry, cases: &Cases, place: &Place, skin: f64) -> Result<Once, BenchError> {
+    let start = &cases[&(entry.subject.name, entry.size)].start;
+    if entry.contender.in_lammps() {
+        let account = deck::run(place, &entry.subject, &entry.contender, start, skin, entry.length)?;
+        Ok((account.seconds, account.parts, Some((account.ghosts, account.builds))))
+    } else {
+        let measured = native::run(&entry.subject, &start.state, entry.contender.settings(), entry.length)?;
+        Ok((measured.seconds, measured.parts, None))
+    }
+}
+
+fn measure(entry: &mut Entry, cases: &Cases, place: &Place) -> Result<(), BenchError> {
+    let (seconds, parts, lammps) = once(entry, cases, place, entry.skin)?;
+    entry.seconds.push(seconds);
+    entry.parts.push(parts);
+    if let Some((ghosts, builds)) = lammps {
+        entry.ghosts = Some(ghosts);
+        entry.builds = Some(entry.builds.unwrap_or(0) + builds);
+    }
+    Ok(())
+}
+
+/// The median; 0 of nothing.
+fn median(values: &[f64]) -> f64 {
+    Spread::of(values).map_or(0.0, |s| s.median)
+}
+
+fn runs(entries: &[Entry], cases: &Cases) -> Vec<Run> {
+    let mut runs: Vec<Run> = entries
+        .iter()
+        .map(|entry| {
+            let case = &cases[&(entry.subject.name, entry.size)];
+            let particles = case.start.state.len() * entry.contender.copies();
+            let all = particles as f64 * entry.length.steps as f64;
+            let names = entry.parts.first().into_iter().flat_map(BTreeMap::keys);
+            let part = |name: &String| {
+                let of = |p: &BTreeMap<String, f64>| 1e9 * p.get(name).copied().unwrap_or(0.0) / all;
+                (name.clone(), median(&entry.parts.iter().map(of).collect::<Vec<_>>()))
+            };
+            let per_particle = 1e9 * median(&entry.seconds) / all;
+            let settings = entry.contender.settings();
+            let steps = entry.length.steps * entry.seconds.len() as u64;
+            let mut run = Run {
+                fluid: entry.subject.name,
+                size: entry.size,
+                code: entry.contender.id(),
+                particles,
+                pairs_per_particle: case.pairs,
+                ranks: entry.contender.ranks,
+                threads: entry.contender.threads(),
+                precision: entry.contender.precision(),
+                instructions: settings.map(|s| s.instructions.to_string()),
+                skin: entry.contender.in_lammps().then_some(entry.skin),
+                steps: entry.length.steps,
+                seconds: entry.seconds.clone(),
+                mega_particle_steps_per_second: Spread { min: 0.0, median: 0.0, max: 0.0 },
+                nanoseconds_per_particle_step: per_particle,
+                nanoseconds_per_pair: per_particle / case.pairs,
+                ratio_to_built_in: None,
+                parts: names.map(part).collect(),
+                ghosts: entry.ghosts,
+                steps_between_builds: entry.builds.map(|b| steps as f64 / b.max(1) as f64),
+            };
+            if let Some(rate) = Spread::of(&run.rates()) {
+                run.mega_particle_steps_per_second = rate;
+            }
+            run
+        })
+        .collect();
+    let ratios: Vec<Option<Spread>> = runs
+        .iter()
+        .zip(entries)
+        .map(|(run, entry)| {
+            let reference = contender::reference(&entry.subject)?.id();
+            let same = |r: &&Run| r.fluid == run.fluid && r.size == run.size && r.code == reference;
+            Spread::of_ratios(&run.rates(), &runs.iter().find(same)?.rates())
+        })
+        .collect();
+    for (run, ratio) in runs.iter_mut().zip(ratios) {
+        run.ratio_to_built_in = ratio;
+    }
+    runs
+}
+
+fn scaling(runs: &[Run], entries: &[Entry], slope_width: usize) -> Vec<Scaling> {
+    let of = |(run, entry): (&Run, &Entry)| {
+        let alone = Contender { ranks: 1, weak: false, ..entry.contender.clone() };
+        let same = |r: &&Run| r.fluid == run.fluid && r.size == run.size && r.code == alone.id();
+        let speed_up = Spread::of_ratios(&run.rates(), &runs.iter().find(same)?.rates())?;
+        let ranks = run.ranks as f64;
+        let plugin = matches!(entry.contender.code, contender::Code::Plugin(_));
+        let Spread { min, median, max } = speed_up;
+        Some(Scaling {
+            code: alone.id(),
+            kind: if entry.contender.weak { "weak" } else { "strong" },
+            size: run.size,
+            ranks: run.ranks,
+            speed_up,
+            efficiency: Spread { min: min / ranks, median: median / ranks, max: max / ranks },
+            ghosts: run.ghosts?,
+            bytes_per_step: plugin.then_some(run.ghosts? * bytes_per_ghost(slope_width)),
+            communication_microseconds: 1e-3 * run.parts.get("comm")? * run.particles as f64,
+        })
+    };
+    runs.iter().zip(entries).filter(|(run, _)| run.ranks > 1).filter_map(of).collect()
+}
+
+/// Bytes that LAMMPS sends for a ghost in a step: positions and velocities forward, slopes of ψ forward,
+/// forces back.
+fn bytes_per_ghost(slope_width: usize) -> f64 {
+    (6 + slope_width + 3) as f64 * 8.0
+}
+
+fn facts() -> Result<(Vec<FluidFacts>, BTreeMap<&'static str, usize>), BenchError> {
+    let mut widths = BTreeMap::new();
+    let mut facts = Vec::new();
+    for subject in &SUBJECTS {
+        let fluid = subject.model()?.at(1.0)?;
+        let plan = Plan::new(&fluid).map_err(|e| BenchError::Run(e.into()))?;
+        widths.insert(subject.name, plan.slope_width());
+        facts.push(FluidFacts {
+            name: subject.name,
+            title: subject.title,
+            density: subject.density,
+            dt: subject.dt,
+            slope_width: plan.slope_width(),
+        });
+    }
+    Ok((facts, widths))
+}
+
+fn equal_bits(options: &Options, cases: &Cases) -> Result<BTreeMap<String, bool>, BenchError> {
+    let smallest = options.sizes.iter().min().copied().unwrap_or_default();
+    let threads = [1, 2, 3].map(|n| NonZeroUsize::new(n).unwrap_or(NonZeroUsize::MIN));
+    let mut equal = BTreeMap::new();
+    for subject in &SUBJECTS {
+        let Some(case) = cases.get(&(subject.name, smallest)) else { continue };
+        for (name, precision) in Precision::ALL {
+            let settings = Settings { precision, ..Settings::default() };
+            let same = native::equal_on_threads(subject, &case.start.state, settings, &threads)?;
+            equal.insert(format!("{} {name}", subject.name), same);
+        }
+    }
+    Ok(equal)
+}
+
+/// Instruction sets better than the one that the engine takes, each with what the processor lacks for it.
+fn better() -> Vec<String> {
+    Instructions::ALL
+        .into_iter()
+        .filter(|(_, i)| !i.available())
+        .map(|(name, i)| format!("{name} needs {}, which this processor lacks", i.missing().join(", ")))
+        .collect()
+}
+
+/// The system's mean number of busy processes over a minute.
+fn load() -> Option<f64> {
+    let text = std::fs::read_to_string("/proc/loadavg").ok()?;
+    text.split_whitespace().next()?.parse().ok()
+}

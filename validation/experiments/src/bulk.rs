@@ -1,0 +1,163 @@
+//! A homogeneous fluid in a periodic box, run natively: what an equation of state is measured with.
+
+use psidpd_core::engine::Fault;
+use psidpd_core::model::Model;
+use psidpd_dynamics::run::{Begin, Outcome, RunError, Runner};
+use psidpd_dynamics::scene::Scene;
+use psidpd_observe::{Measured, Observation};
+use psidpd_report::Progress;
+use std::fmt::Write;
+use std::num::NonZeroUsize;
+use std::path::Path;
+use std::sync::atomic::AtomicUsize;
+
+/// How long a homogeneous fluid is run, and how large it is.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Sampling {
+    /// About how many particles; more if the box would be narrower than three times the longest range.
+    pub particles: usize,
+    /// Time step.
+    pub dt: f64,
+    /// Steps without measurement.
+    pub equilibrate: u64,
+    /// Steps with.
+    pub steps: u64,
+    /// Steps between samples.
+    pub every: u64,
+    /// Seed of the start and of the noise.
+    pub seed: u64,
+    /// Threads.
+    pub threads: NonZeroUsize,
+}
+
+/// A fluid at one temperature and density.
+#[derive(Debug)]
+pub struct Bulk<'a> {
+    /// The fluid. Its file is there: a scene names it.
+    pub model: &'a Model,
+    /// kT.
+    pub kt: f64,
+    /// Number density of each species.
+    pub densities: &'a [f64],
+    /// Lines of `[observe]`, beside temperature and pressure.
+    pub observe: &'a str,
+    /// Size and length.
+    pub sampling: Sampling,
+}
+
+impl Bulk<'_> {
+    /// The scene of the fluid: a lattice that melts, then the run.
+    ///
+    /// # Errors
+    /// The model does not hold at the temperature.
+    pub fn scene(&self, model_file: &Path) -> Result<Scene, RunError> {
+        let Sampling { particles, dt, equilibrate, steps, every, seed, .. } = self.sampling;
+        let d = self.model.dimensions();
+        let total: f64 = self.densities.iter().sum();
+        let narrowest = 3.0 * self.model.at(self.kt)?.cutoff();
+        let edge = (particles as f64 / total).powf(1.0 / d as f64).max(narrowest);
+        let file = std::path::absolute(model_file).unwrap_or_else(|_| model_file.to_owned());
+        let mut text = format!(
+            "title = \"{total} of {}\"\nmodel = {}\nkT = {:?}\nseed = {seed}\ndt = {dt:?}\nequilibrate = {equilibrate}\n\
+             steps = {steps}\nbox = {:?}\n[initial]\nkind = \"lattice\"\ndensity = {total:?}\n",
+            self.model.title().replace(['"', '\\'], "'"),
+            toml::Value::String(file.display().to_string()),
+            self.kt,
+            vec![edge; d],
+        );
+        if self.densities.len() > 1 {
+            let shares: Vec<String> = self
+                .model
+                .species()
+                .iter()
+                .zip(self.densities)
+                .map(|(name, rho)| format!("{name} = {:?}", rho / total))
+                .collect();
+            let _ = writeln!(text, "composition = {{ {} }}", shares.join(", "));
+        }
+        let _ = write!(
+            text,
+            "[observe]\nevery = {every}\ntemperature = true\npressure = true\n{}\n[output]\nthermo = 0\n",
+            self.observe
+        );
+        let mut scene = Scene::parse("bulk", &text, Path::new(""))?;
+        // A trial differs from its file, beside which tables are found.
+        scene.model = self.model.clone();
+        Ok(scene)
+    }
+
+    /// Runs the fluid in `folder`.
+    ///
+    /// # Errors
+    /// The run stops, or its files cannot be written.
+    pub fn run(&self, model_file: &Path, folder: &Path) -> Result<Observed, RunError> {
+        run(&self.scene(model_file)?, folder, Begin::Overwrite, self.sampling.threads)
+    }
+}
+
+/// Runs a scene in `folder` and reads what it observed.
+///
+/// # Errors
+/// The run stops, or its files cannot be written or read.
+pub fn run(scene: &Scene, folder: &Path, begin: Begin, threads: NonZeroUsize) -> Result<Observed, RunError> {
+    run_with(scene, folder, begin, threads, None)
+}
+
+/// The same by an engine that is wrong on purpose, if there is a `fault`.
+pub fn run_with(
+    scene: &Scene,
+    folder: &Path,
+    begin: Begin,
+    threads: NonZeroUsize,
+    fault: Option<Fault>,
+) -> Result<Observed, RunError> {
+    let mut runner = Runner::begin(scene, folder, begin)?;
+    runner.set_threads(threads)?;
+    fault.map_or(Ok(()), |fault| runner.falsify(fault))?;
+    let steps: u64 = scene.stages.iter().map(|s| s.steps).sum();
+    let bar = Progress::new().steps(&scene.title, steps, 0, runner.particles());
+    let never = AtomicUsize::new(0);
+    let outcome = loop {
+        match runner.run(&never, &mut |p| bar.set(p.step)) {
+            Ok(Outcome::Interrupted { .. }) => {}
+            other => break other,
+        }
+    };
+    bar.finish();
+    outcome?;
+    let path = folder.join("observables.json");
+    let failed = |source: std::io::Error| RunError::Output { path: path.clone(), source };
+    let text = std::fs::read_to_string(&path).map_err(failed)?;
+    serde_json::from_str(&text).map(Observed).map_err(|e| failed(e.into()))
+}
+
+/// What a run observed.
+#[derive(Debug, Clone)]
+pub struct Observed(pub Vec<Observation>);
+
+impl Observed {
+    /// An observation by its name.
+    pub fn get(&self, name: &str) -> Option<&Observation> {
+        self.0.iter().find(|o| o.name == name)
+    }
+
+    /// A number by the names of its observation and column; nothing known where there is none.
+    pub fn scalar(&self, name: &str, column: &str) -> Measured {
+        self.get(name).and_then(|o| o.scalar(column)).unwrap_or(Measured::NONE)
+    }
+
+    /// Kinetic temperature.
+    pub fn temperature(&self) -> Measured {
+        self.scalar("temperature", "kinetic")
+    }
+
+    /// Pressure of the conservative forces.
+    pub fn pressure(&self) -> Measured {
+        self.scalar("pressure", "conservative")
+    }
+
+    /// Pressure of the configurations, without the scatter of velocities.
+    pub fn configurational_pressure(&self) -> Measured {
+        self.scalar("pressure", "configurational")
+    }
+}

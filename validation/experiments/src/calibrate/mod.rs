@@ -1,0 +1,402 @@
+//! Trofimov's corrected density ρ̃(n): found by short runs at several densities.
+//!
+//! Correlations make the mean of the local density, ⟨n⟩, differ from the density ρ, and the pressure from
+//! the one that ψ was made for. A polynomial ρ̃(n) with ⟨ρ̃⟩ = ρ repairs both (S. Y. Trofimov, E. L. F. Nies,
+//! M. A. J. Michels, J. Chem. Phys. 117, 9383 (2002), eq. 35). ⟨n⟩ depends on ρ̃, so it is found by iteration:
+//!
+//! 1. ⟨n⟩(ρ) is measured with ρ̃ = ρ and ρ̃′ = 1.05, where the force of every pair has the constant strength
+//!    `2 · 1.05 ψ′(ρ)`; if such a fluid cannot run, with ρ̃ = n.
+//! 2. A linear ρ̃ is fitted to ρ(⟨n⟩), and the fluid is measured with it, until ⟨ρ̃⟩ = ρ.
+//! 3. If a pressure is still further from the wanted one than the tolerance, ρ̃ is fitted to the pressures
+//!    (one species only).
+//! 4. If this does not meet the tolerance, the same with a quadratic, and with a cubic ρ̃.
+//!
+//! A density whose run stops is left out, and said; see [`search`].
+
+mod fit;
+mod point;
+mod search;
+mod text;
+
+pub use fit::{Fit, Target, fit_density};
+pub use point::Point;
+pub use search::{Batch, DUMMY_SLOPE, Failed, Goal, Round, Trial, Wish, search};
+pub use text::with_correction;
+
+use crate::bulk::{Bulk, Sampling};
+use psidpd_core::document::FileError;
+use psidpd_core::model::{Model, Polynomial};
+use psidpd_core::theory::{MeanField, TheoryError};
+use psidpd_dynamics::run::RunError;
+use serde::Serialize;
+use std::cell::RefCell;
+use std::path::{Path, PathBuf};
+
+/// Why a model cannot be calibrated. A tolerance that is not met is no error.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CalibrateError {
+    #[error(transparent)]
+    File(#[from] FileError),
+    #[error(transparent)]
+    Theory(#[from] TheoryError),
+    #[error(transparent)]
+    Run(#[from] RunError),
+    #[error("the model file cannot be edited: {0}")]
+    Edit(#[from] toml_edit::TomlError),
+    #[error("the model has no [density.{0}]")]
+    NoSuchDensity(String),
+    #[error("the model has several densities ({0}): name the one to calibrate with --name")]
+    WhichDensity(String),
+    #[error("{0}")]
+    Conditions(String),
+    #[error("the wanted pressure at density {0} is not a finite number: choose another range of densities")]
+    NoTarget(f64),
+    #[error(
+        "{}: no correction could be measured at densities {low} to {high} ({}): use a smaller --dt, or a narrower --density range",
+        model.display(),
+        sentences(failed)
+    )]
+    Nothing { model: PathBuf, low: f64, high: f64, failed: Vec<Failed> },
+    #[error("no folder for the runs: {0}")]
+    Folder(#[from] std::io::Error),
+}
+
+/// What to calibrate.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// kT.
+    pub kt: f64,
+    /// Total number densities.
+    pub densities: Vec<f64>,
+    /// Share of each species.
+    pub composition: Vec<f64>,
+    /// Which density, if there are several.
+    pub name: Option<String>,
+    /// See [`Wish::tolerance`].
+    pub tolerance: f64,
+    /// Size and length of the runs.
+    pub sampling: Sampling,
+}
+
+/// One density, at the end.
+#[derive(Debug, Clone, Serialize)]
+pub struct Residual {
+    /// Total number density.
+    pub density: f64,
+    /// Kinetic temperature.
+    pub temperature: Value,
+    /// ⟨n⟩ for each (β at α).
+    pub mean: Vec<Value>,
+    /// ⟨ρ̃⟩ for each (β at α).
+    pub corrected: Vec<Value>,
+    /// The pressure that is wanted.
+    pub wanted: f64,
+    /// The pressure that was measured.
+    pub pressure: Value,
+    /// |p − p_wanted| over max(|p_wanted|, 0.1 ρ ∂p/∂ρ).
+    pub deviation: f64,
+}
+
+/// A value and its error, for JSON.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Value {
+    /// The value.
+    pub value: f64,
+    /// One standard deviation.
+    pub error: f64,
+}
+
+impl From<psidpd_observe::Measured> for Value {
+    fn from(m: psidpd_observe::Measured) -> Value {
+        Value { value: m.value, error: m.error }
+    }
+}
+
+/// How a calibration ended.
+#[derive(Debug, Clone, Serialize)]
+pub struct Calibration {
+    /// Title of the model.
+    pub title: String,
+    /// kT.
+    pub kt: f64,
+    /// The density whose correction it is.
+    pub density: String,
+    /// Its (α, β): the density of β felt by α, as `"β|α"`, in the order of the coefficients.
+    pub pairs: Vec<String>,
+    /// Whether the tolerance is met.
+    pub converged: bool,
+    /// The tolerance.
+    pub tolerance: f64,
+    /// Size and length of the runs.
+    pub sampling: Sampling,
+    /// The first guess that was measured: `"constant"` or `"identity"`.
+    pub first_guess: &'static str,
+    /// Every correction that was tried, in order; the last was chosen, or the best if none meets the tolerance.
+    pub rounds: Vec<Round>,
+    /// Which of them was chosen.
+    pub chosen: usize,
+    /// Densities that stopped under it: residuals and tolerance are about the others.
+    pub failed: Vec<Failed>,
+    /// Wanted and measured under it.
+    pub residuals: Vec<Residual>,
+    /// The model file with it.
+    #[serde(skip)]
+    pub text: String,
+}
+
+impl Calibration {
+    /// The correction that was chosen.
+    pub fn fits(&self) -> &[Fit] {
+        &self.rounds[self.chosen].fits
+    }
+}
+
+/// Pressures are compared with `max(|p|, SLOPE_SHARE ρ ∂p/∂ρ)`: where p goes through zero, a relative
+/// difference of the pressure means nothing, and one of a tenth of the bulk modulus is one of the density.
+const SLOPE_SHARE: f64 = 0.1;
+
+/// Calibrates the model in the file `path`; `command` goes into its comment.
+///
+/// # Errors
+/// See [`CalibrateError`].
+pub fn calibrate(
+    path: &Path,
+    options: &Options,
+    command: &str,
+    told: &mut dyn FnMut(&str),
+) -> Result<Calibration, CalibrateError> {
+    let model = Model::open(path)?;
+    let fluid = model.at(options.kt)?;
+    let names: Vec<String> = fluid.densities.iter().map(|d| d.name.clone()).collect();
+    let name = match (&options.name, &names[..]) {
+        (Some(name), _) if !names.contains(name) => return Err(CalibrateError::NoSuchDensity(name.clone())),
+        (Some(name), _) => name.clone(),
+        (None, [one]) => one.clone(),
+        (None, []) => return Err(CalibrateError::NoSuchDensity("n".into())),
+        (None, several) => return Err(CalibrateError::WhichDensity(several.join(", "))),
+    };
+    let species = model.species();
+    if options.composition.len() != species.len() {
+        let message =
+            format!("a composition of {} shares for {} species", options.composition.len(), species.len());
+        return Err(CalibrateError::Conditions(message));
+    }
+    let text = model.source().text().to_owned();
+    // ψ at the bulk density itself, whatever the file has for a correction or a self term.
+    let pairs = species.len() * species.len();
+    let trial = with_correction(&text, &name, species, &vec![Polynomial(vec![0.0, DUMMY_SLOPE]); pairs], "")?;
+    let parse = |text: &str| Model::parse(&path.display().to_string(), text);
+    let theory = MeanField::new(&parse(&trial)?.at(options.kt)?)?;
+    let per_species =
+        |total: f64| -> Vec<f64> { options.composition.iter().map(|share| share * total).collect() };
+    let targets = options
+        .densities
+        .iter()
+        .map(|total| {
+            let rho = per_species(*total);
+            let wanted = theory.pressure(&rho);
+            let scale = wanted.abs().max(SLOPE_SHARE * (total * theory.pressure_slope(&rho)).abs());
+            let slopes: f64 = match &rho[..] {
+                [rho] => rho * rho * theory.excess_slopes(0, &[*rho])[0],
+                _ => 0.0,
+            };
+            let finite = wanted.is_finite() && scale.is_finite() && scale > 0.0;
+            finite
+                .then_some(Target { wanted, base: wanted - slopes, scale })
+                .ok_or(CalibrateError::NoTarget(*total))
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    let folder = tempfile::tempdir()?;
+    let observe = format!("local_density = {{ density = \"{name}\", bins = 1000 }}");
+    let told = RefCell::new(told);
+    told.borrow_mut()("measuring with rho~ = rho");
+    let mut all_failed: Vec<Failed> = Vec::new();
+    let mut measure = |trial: Trial| -> Result<Batch, CalibrateError> {
+        let mut batch = Batch::default();
+        for (k, total) in options.densities.iter().enumerate() {
+            let rho = per_species(*total);
+            let model = match trial {
+                Trial::Corrected(polynomials) => {
+                    parse(&with_correction(&text, &name, species, polynomials, "")?)?
+                }
+                Trial::Constant => {
+                    let variables: Vec<String> =
+                        names.iter().flat_map(|n| species.iter().map(move |s| format!("{n}_{s}"))).collect();
+                    let slopes: Vec<Vec<f64>> = (0..species.len())
+                        .map(|a| theory.excess_slopes(a, &rho).iter().map(|s| DUMMY_SLOPE * s).collect())
+                        .collect();
+                    let identity =
+                        with_correction(&text, &name, species, &vec![Polynomial::identity(); pairs], "")?;
+                    parse(&text::with_slopes(&identity, species, &variables, &slopes)?)?
+                }
+            };
+            let bulk = Bulk {
+                model: &model,
+                kt: options.kt,
+                densities: &rho,
+                observe: &observe,
+                sampling: options.sampling,
+            };
+            match bulk.run(path, &folder.path().join("run")) {
+                Ok(observed) => {
+                    batch.points.push(Point::of(&observed, species, &rho));
+                    batch.of.push(k);
+                }
+                Err(why) if why.is_stop() => {
+                    let failed = Failed { density: *total, why: cause(&why).to_string() };
+                    told.borrow_mut()(&format!("density {total} is left out: {}", failed.why));
+                    batch.failed.push(failed);
+                }
+                Err(other) => return Err(other.into()),
+            }
+        }
+        all_failed.clone_from(&batch.failed);
+        Ok(batch)
+    };
+    let asked = options.densities.len();
+    let (mut first_guess, mut first) = ("constant", measure(Trial::Constant)?);
+    if !first.usable(asked) {
+        told.borrow_mut()("rho~ = rho does not run: measuring with rho~ = n");
+        (first_guess, first) = ("identity", measure(Trial::Corrected(&vec![Polynomial::identity(); pairs]))?);
+    }
+    let slope = |x: f64| theory.excess_slopes(0, &[x])[0];
+    let wish = Wish {
+        targets: &targets,
+        slope: (species.len() == 1).then_some(&slope as &dyn Fn(f64) -> f64),
+        tolerance: options.tolerance,
+    };
+    let rounds = if first.usable(asked) {
+        search(first, &wish, &mut measure, &mut |round| told.borrow_mut()(&line(round)))?
+    } else {
+        Vec::new()
+    };
+    // Where most densities run, and then where the pressure is nearest.
+    let better = |a: &Round, b: &Round| {
+        (a.failed.len().cmp(&b.failed.len())).then(a.pressure_residual.total_cmp(&b.pressure_residual))
+    };
+    let Some((chosen, best)) = rounds.iter().enumerate().min_by(|(_, a), (_, b)| better(a, b)) else {
+        if all_failed.is_empty() {
+            return Err(CalibrateError::Conditions("too few densities for a fit".into()));
+        }
+        let [low, high] = [options.densities[0], options.densities[asked - 1]];
+        return Err(CalibrateError::Nothing { model: path.to_owned(), low, high, failed: all_failed });
+    };
+    let last = rounds.len() - 1;
+    let converged = rounds[last].meets(options.tolerance);
+    let (chosen, best) = if converged { (last, &rounds[last]) } else { (chosen, best) };
+    let polynomials: Vec<Polynomial> = best.fits.iter().map(|f| rounded(&f.polynomial())).collect();
+    let text =
+        with_correction(&text, &name, species, &polynomials, &note(best, converged, options, command))?;
+    let kept = best.batch.points.iter().zip(best.batch.of.iter().map(|k| &targets[*k]));
+    let residuals = kept.map(|(p, t)| Residual {
+        density: p.total,
+        temperature: p.temperature.into(),
+        mean: p.means.iter().map(|m| (*m).into()).collect(),
+        corrected: (0..pairs).map(|k| p.corrected(k, &best.fits[k].polynomial()).into()).collect(),
+        wanted: t.wanted,
+        pressure: p.pressure.into(),
+        deviation: (p.pressure.value - t.wanted).abs() / t.scale,
+    });
+    Ok(Calibration {
+        title: model.title().to_owned(),
+        kt: options.kt,
+        density: name,
+        pairs: species.iter().flat_map(|a| species.iter().map(move |b| format!("{b}|{a}"))).collect(),
+        converged,
+        tolerance: options.tolerance,
+        sampling: options.sampling,
+        first_guess,
+        failed: best.failed.clone(),
+        residuals: residuals.collect(),
+        chosen,
+        rounds,
+        text,
+    })
+}
+
+/// Why a run stopped, without the folder of it, which is gone.
+fn cause(error: &RunError) -> &RunError {
+    match error {
+        RunError::Stopped { cause: inner, .. } | RunError::Halted { cause: inner, .. } => cause(inner),
+        other => other,
+    }
+}
+
+/// One sentence for each density.
+fn sentences(failed: &[Failed]) -> String {
+    let each: Vec<String> = failed.iter().map(|f| format!("at {}: {}", f.density, f.why)).collect();
+    each.join("; ")
+}
+
+/// Drops digits below the accuracy of a calibration.
+fn rounded(p: &Polynomial) -> Polynomial {
+    let round = |c: f64| {
+        let digits = 6 - c.abs().max(1e-12).log10().ceil() as i32;
+        let unit = 10f64.powi(digits);
+        (c * unit).round() / unit
+    };
+    Polynomial(p.0.iter().map(|c| round(*c)).collect())
+}
+
+fn line(round: &Round) -> String {
+    let degree = ["constant", "linear", "quadratic", "cubic"].get(round.degree).unwrap_or(&"");
+    let goal = match round.goal {
+        Goal::Density => "<rho~> = rho",
+        Goal::Pressure => "the pressure",
+    };
+    let fits: Vec<String> = round.fits.iter().map(shown).collect();
+    format!(
+        "{degree}, fitted to {goal}: {}; <rho~> within {:.2} %, pressure within {:.2} %",
+        fits.join("; "),
+        100.0 * round.density_residual,
+        100.0 * round.pressure_residual
+    )
+}
+
+/// A fit for people: `1.54(2) + 1.047(3) n`.
+pub fn shown(fit: &Fit) -> String {
+    let terms = fit.coefficients.iter().zip(&fit.errors).enumerate().map(|(m, (c, error))| {
+        let power = match m {
+            0 => String::new(),
+            1 => " n".into(),
+            m => format!(" n^{m}"),
+        };
+        match error {
+            Some(error) => format!("{c:.4} ± {error:.4}{power}"),
+            None => format!("{c:.4}{power}"),
+        }
+    });
+    terms.collect::<Vec<_>>().join(" + ")
+}
+
+fn note(round: &Round, converged: bool, options: &Options, command: &str) -> String {
+    let range = match &options.densities[..] {
+        [one] => format!("density {one}"),
+        [first, .., last] => format!("densities {first} to {last}"),
+        [] => String::new(),
+    };
+    let failed: Vec<String> = round.failed.iter().map(|f| f.density.to_string()).collect();
+    let without = match &failed[..] {
+        [] => String::new(),
+        some => format!("\nThe fluid does not run with it at density {}.", some.join(", ")),
+    };
+    let verdict = if converged { "" } else { ", which is not the tolerance asked for" };
+    format!(
+        "Corrected density, found by\n  {command}\nAt kT = {} and {range} the pressure is the wanted one within {:.2} \
+         %{verdict}.{without}",
+        options.kt,
+        100.0 * round.pressure_residual
+    )
+}
+
+/// Densities from `low` to `high`, evenly spaced.
+pub fn spaced(low: f64, high: f64, points: usize) -> Vec<f64> {
+    if low == high || points < 2 {
+        return vec![low];
+    }
+    (0..points).map(|k| low + (high - low) * k as f64 / (points - 1) as f64).collect()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,85 @@
+//! What can be known of a model before it runs: what will be computed, what mean field says, and what
+//! cannot work.
+
+pub mod calibration;
+mod cost;
+mod findings;
+mod timestep;
+mod warnings;
+
+pub use cost::{Cost, cost};
+pub use findings::{Findings, Severity, Warning};
+pub use timestep::{StepEstimate, estimates};
+
+use psidpd_core::engine::Plan;
+use psidpd_core::model::{Fluid, Model};
+use psidpd_core::theory::{MeanField, TheoryError};
+use psidpd_dynamics::prediction;
+
+/// The state at which a model is looked at.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Conditions {
+    /// kT.
+    pub kt: f64,
+    /// Number density of each species; `None` leaves out what depends on it.
+    pub densities: Option<Vec<f64>>,
+}
+
+/// Why a model cannot be checked.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CheckError {
+    #[error(transparent)]
+    File(#[from] psidpd_core::document::FileError),
+    #[error(transparent)]
+    TooLarge(#[from] psidpd_core::model::expression::TooLarge),
+    #[error(transparent)]
+    Theory(#[from] TheoryError),
+    #[error("{given} densities for {species} species")]
+    Densities { given: usize, species: usize },
+}
+
+/// Looks at `model` under `conditions`.
+///
+/// # Errors
+/// See [`CheckError`]; what is found is in the [`Findings`].
+pub fn check(model: &Model, conditions: &Conditions) -> Result<Findings, CheckError> {
+    let fluid: Fluid = model.at(conditions.kt)?;
+    if let Some(densities) = &conditions.densities
+        && densities.len() != fluid.species.len()
+    {
+        return Err(CheckError::Densities { given: densities.len(), species: fluid.species.len() });
+    }
+    let plan = Plan::new(&fluid)?;
+    // Mean field starts from a free energy, which a law of stated slopes does not have, and from integrals of the pair
+    // potentials, which those that rise too steeply do not have.
+    let (theory, no_theory) =
+        match fluid.stated_slopes().map_or_else(|| MeanField::new(&fluid).map(Some), |_| Ok(None)) {
+            Ok(theory) => (theory, None),
+            Err(reason @ (TheoryError::NotIntegrable(..) | TheoryError::TooLarge(_))) => (None, Some(reason)),
+            Err(other) => return Err(other.into()),
+        };
+    let densities = conditions.densities.as_deref();
+    let at = theory.as_ref().zip(densities);
+    let stability = at.map(|(theory, rho)| theory.stability(rho));
+    let pressure = at.map(|(theory, rho)| theory.pressure(rho));
+    let state = warnings::State { densities, pressure, stability: stability.as_ref(), no_theory };
+    Ok(Findings {
+        title: model.title().to_owned(),
+        reference: model.reference().map(str::to_owned),
+        plan: plan.to_string(),
+        kt: conditions.kt,
+        pressure,
+        pressure_slope: at.map(|(theory, rho)| theory.pressure_slope(rho)),
+        stability: stability.map(Into::into),
+        densities: conditions.densities.clone(),
+        steps: Vec::new(),
+        cost: None,
+        theory: prediction::predict(&fluid, densities.and_then(|rho| (rho.len() == 1).then(|| rho[0])))
+            .map_or(Vec::new(), |p| p.summary()),
+        warnings: warnings::all(&fluid, &state)?,
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,187 @@
+//! What the page of a validation begins with: its conclusion, and what is compared.
+
+use super::fluids::{A, GAMMA, RC, RD, SET5, SET6};
+use psidpd_report::{Item, Results, Section, Table};
+use serde_json::Value;
+
+/// Three sentences: whether the codes agree, how LAMMPS's `mdpd` differs, and how Warren's numbers compare.
+pub fn section(results: &Results) -> Section {
+    let failed = results.failed_count();
+    let worst = results
+        .checks
+        .iter()
+        .filter(|c| !c.at_least && c.limit > 0.0)
+        .map(|c| c.value.abs() / c.limit)
+        .fold(0.0, f64::max);
+    let codes = "the native runner, the plugin's two styles and the tables for eam/alloy";
+    let agree = if failed == 0 {
+        format!(
+            "All {} checks pass: {codes} are one fluid, with the same forces to rounding and the same equilibrium within \
+             error bars; the check that is closest to its bound is at {:.0} % of it.",
+            results.checks.len(),
+            100.0 * worst
+        )
+    } else {
+        let first = results.checks.iter().find(|c| !c.passed).map_or("", |c| c.description.as_str());
+        format!(
+            "{failed} of {} checks fail, first of all \"{first}\": do not rely on {codes} being one fluid before that is \
+             understood.",
+            results.checks.len()
+        )
+    };
+    let shift = |set: &str, what: &str| {
+        let of = |code: &str| number(results, &format!("nvt.{set}.{code}.{what}"), "mean");
+        Some(of("mdpd-lucy")? - of("native-conservative")?)
+    };
+    let shifts: Vec<String> = [("set5", "set 5"), ("set6", "set 6")]
+        .iter()
+        .filter_map(|(slug, name)| {
+            let (density, tension) = (shift(slug, "liquid-density")?, shift(slug, "surface-tension")?);
+            Some(format!("{name}: density {density:+.2}, tension {tension:+.2}"))
+        })
+        .collect();
+    let built_in = format!(
+        "LAMMPS's built-in mdpd computes another force, which is no gradient of an energy: with the thermostat off it heats, \
+         and its liquid is another one{}.",
+        if shifts.is_empty() { String::new() } else { format!(" ({})", shifts.join("; ")) }
+    );
+    let found = |set: &str, what: &str| {
+        let key = format!("nvt.{set}.native-conservative.{what}");
+        let (value, error) = (number(results, &key, "mean")?, number(results, &key, "error")?);
+        Some(psidpd_report::quantity::with_error(value, Some(error)))
+    };
+    let published: Vec<String> = [(SET5, "set5"), (SET6, "set6")]
+        .iter()
+        .filter_map(|(set, slug)| {
+            Some(format!(
+                "{}: liquid density {} (Warren {} ± {}), tension {} (Warren {} ± {})",
+                set.name,
+                found(slug, "liquid-density")?,
+                set.liquid,
+                set.liquid_error,
+                found(slug, "surface-tension")?,
+                set.tension.0,
+                set.tension.1
+            ))
+        })
+        .collect();
+    let warren = format!("Beside the published values the native runner has, {}.", published.join("; "));
+    Section {
+        heading: "Conclusion".into(),
+        items: vec![Item::Prose(format!("{agree}\n\n{built_in}\n\n{warren}"))],
+    }
+}
+
+fn number(results: &Results, key: &str, part: &str) -> Option<f64> {
+    results.values.get(key)?.get(part).and_then(Value::as_f64)
+}
+
+/// The fluid, its parameters, and the words of the page.
+pub fn what_is_compared() -> Section {
+    let mut sets =
+        Table::new(["set", "A", "B", "r_c", "r_d", "γ", "kT", "Warren: density", "tension", "width"]);
+    for set in [SET5, SET6] {
+        sets.push([
+            set.name.to_owned(),
+            A.to_string(),
+            set.b.to_string(),
+            RC.to_string(),
+            RD.to_string(),
+            GAMMA.to_string(),
+            "1".into(),
+            format!("{} ± {}", set.liquid, set.liquid_error),
+            format!("{} ± {}", set.tension.0, set.tension.1),
+            format!("{} ± {}", set.width.0, set.width.1),
+        ]);
+    }
+    let mut words = Table::new(["word", "what it means"]);
+    for (word, meaning) in [
+        (
+            "law conservative",
+            "Warren's force, the gradient of U: densities and forces of one kernel, w_d = 15/(2π r_d³) (1 − r/r_d)².",
+        ),
+        (
+            "law lucy",
+            "the force of LAMMPS's mdpd: densities with Lucy's kernel, 105/(16π r_d³) (1 + 3r/r_d)(1 − r/r_d)³, but forces \
+             with the slope of the quadratic one; the two do not belong to one energy. The plugin computes it too, to be \
+             compared with mdpd.",
+        ),
+        ("native", "the runner of psidpd, psidpd run."),
+        (
+            "dpd/psi, mdpd/psi",
+            "the pair styles of the plugin in LAMMPS: from a model file, and with mdpd's arguments.",
+        ),
+        ("eam/alloy", "LAMMPS's own pair style with tables of psi, w and phi from psidpd export eam."),
+        (
+            "newton on, off",
+            "LAMMPS's setting: with on, a pair between two ranks is computed once and its force sent; with off, on both \
+             ranks. Results must not differ.",
+        ),
+        ("ranks", "processes of MPI that share the box; a trajectory must not depend on their number."),
+        (
+            "≤, ≥",
+            "a bound marked ≤ is the largest size of the value that passes, one marked ≥ the smallest value: there it is an \
+             effect that must be seen.",
+        ),
+        (
+            "±",
+            "one standard error; a comparison passes if a difference as large as the one found is likely enough by chance.",
+        ),
+    ] {
+        words.push([word, meaning]);
+    }
+    Section {
+        heading: "What is compared".into(),
+        items: vec![
+            Item::Prose(
+                "U = Σ_i ψ(n_i) + Σ_{i<j} φ(r_ij), n_i = Σ_{j≠i} w_d(r_ij), ψ(n) = (π/30) r_d⁴ B n², \
+                 φ(r) = ½ A r_c (1 − r/r_c)².\n\n\
+                 F_ij = [A (1 − r/r_c) + B (ρ̄_i + ρ̄_j)(1 − r/r_d)] ê_ij, with Warren's ρ̄_i = n_i, each term within its \
+                 range; drag −γ (1 − r/r_c)² (ê·v) ê and noise of σ² = 2γkT. Lengths are in r_c, energies in kT, masses in m."
+                    .into(),
+            ),
+            Item::Table(sets),
+            Item::Table(words),
+        ],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use psidpd_report::Check;
+    use serde_json::json;
+
+    fn text(results: &Results) -> String {
+        section(results).items.iter().map(|item| format!("{item:?}")).collect()
+    }
+
+    #[test]
+    fn the_conclusion_is_that_of_the_checks() {
+        let mut results = Results::new("t", "v");
+        results.push(Check::at_most("a", "forces", "one", 0.5, 1.0));
+        for (key, mean) in [
+            ("nvt.set6.native-conservative.liquid-density", 6.06),
+            ("nvt.set6.native-conservative.surface-tension", 7.5),
+            ("nvt.set6.mdpd-lucy.liquid-density", 6.56),
+            ("nvt.set6.mdpd-lucy.surface-tension", 9.0),
+        ] {
+            results.record(key, json!({"mean": mean, "error": 0.02})).unwrap();
+        }
+        let good = text(&results);
+        for part in [
+            "All 1 checks pass",
+            "at 50 % of it",
+            "set 6: density +0.50, tension +1.50",
+            "6.060 ± 0.020 (Warren 6.05",
+        ] {
+            assert!(good.contains(part), "{part}: {good}");
+        }
+        results.push(Check::at_most("b", "forces", "two differ", 2.0, 1.0));
+        assert!(
+            text(&results).contains("1 of 2 checks fail, first of all \\\"two differ"),
+            "{}",
+            text(&results)
+        );
+    }
+}

@@ -1,0 +1,204 @@
+//! Energy against time without thermostat, and why the built-in's is not kept.
+
+use super::closed_loop;
+use super::codes::{Code, Setup};
+use super::fluids::SET6;
+use super::jobs::{self, Job};
+use super::start::{Filling, equilibrated};
+use super::trace::{Length, Trace, run as run_code};
+use super::{Context, Part, ValidateError};
+use psidpd_core::model::ForceLaw;
+use psidpd_observe::drift;
+use psidpd_report::{Check, Item, Plot, Section, Series, Style, Table};
+use serde_json::json;
+
+/// Seed of the start.
+pub const SEED: u64 = 20_010_703;
+
+/// Drift allowed over the run, in kT per particle.
+const LARGEST_DRIFT: f64 = 1e-4;
+/// Rise of the temperature that counts as heating.
+const HEATING: f64 = 0.1;
+
+/// Runs the comparison.
+pub fn run(context: &Context) -> Result<Part, ValidateError> {
+    let edge = if context.full { 12.0 } else { 5.2 };
+    let filling = Filling { lengths: [edge; 3], thickness: edge, density: SET6.liquid };
+    let state = equilibrated(&SET6, filling, 1500, SEED)?;
+    let length = Length { dt: 0.001, steps: 10_000, sample: 50, averaged: false, frame: 0 };
+    let codes = [Code::Native, Code::NativeMixed, Code::Psi, Code::PsiMixed, Code::BuiltIn, Code::Eam];
+    let state = &state;
+    let jobs: Vec<Job<Result<Trace, ValidateError>>> = codes
+        .iter()
+        .map(|&code| {
+            let bar = context.progress.bar(&format!("NVE: {}", code.label()), length.steps);
+            let job = move || {
+                let law = if code == Code::BuiltIn { ForceLaw::LucyLammps } else { ForceLaw::Conservative };
+                let setup = Setup::new(code, &SET6, law);
+                let trace = run_code(context, &setup, state, length, &format!("nve-{}", code.slug()), &|s| {
+                    bar.set(s)
+                });
+                bar.finish();
+                trace
+            };
+            Box::new(job) as Job<_>
+        })
+        .collect();
+    let traces = jobs::run(jobs).into_iter().collect::<Result<Vec<_>, _>>()?;
+    let mut part = Part::default();
+    let mut table = Table::new([
+        "code",
+        "energy drift, kT per particle",
+        "largest excursion",
+        "temperature, start",
+        "end",
+    ]);
+    let mut heat = Plot {
+        title: "Temperature without thermostat".into(),
+        x_label: "time".into(),
+        y_label: "kinetic temperature".into(),
+        ..Plot::default()
+    };
+    let mut energy = Plot {
+        title: "Total energy per particle, less its start".into(),
+        x_label: "time".into(),
+        y_label: "kT".into(),
+        ..Plot::default()
+    };
+    for (code, trace) in codes.iter().zip(&traces) {
+        let per_particle = trace.energy_per_particle();
+        let found = drift(&trace.time, &per_particle)?;
+        let duration = trace.time.last().copied().unwrap_or(0.0);
+        let net = found.slope * duration;
+        let ends = ends(&trace.temperature);
+        table.push([
+            code.label().to_owned(),
+            format!("{net:.1e}"),
+            format!("{:.1e}", found.largest),
+            format!("{:.3}", ends[0]),
+            format!("{:.3}", ends[1]),
+        ]);
+        let slug = code.slug();
+        part.values.push((
+            format!("nve.{slug}"),
+            json!({"drift": net, "largest": found.largest, "temperature_start": ends[0], "temperature_end": ends[1]}),
+        ));
+        if *code == Code::BuiltIn {
+            part.checks.push(Check::at_least(
+                "nve.mdpd.heating",
+                "energy",
+                "LAMMPS mdpd heats without thermostat (what the conservative law is there to avoid): rise of T",
+                ends[1] - ends[0],
+                HEATING,
+            ));
+        } else {
+            part.checks.push(Check::at_most(
+                format!("nve.{slug}.drift"),
+                "energy",
+                format!("{}: drift of U + K over {duration} time units, kT per particle", code.label()),
+                net,
+                LARGEST_DRIFT,
+            ));
+            let start = per_particle[0];
+            energy.series.push(Series {
+                name: code.label().into(),
+                points: trace.time.iter().zip(&per_particle).map(|(t, e)| (*t, e - start)).collect(),
+                errors: None,
+                style: Style::Line,
+            });
+        }
+        heat.series.push(Series {
+            name: code.label().into(),
+            points: trace.time.iter().copied().zip(trace.temperature.iter().copied()).collect(),
+            errors: None,
+            style: Style::Line,
+        });
+    }
+    part.section = Section {
+        heading: "Energy without thermostat".into(),
+        items: vec![
+            Item::Prose(format!(
+                "{} particles of set 6 at density {}, no drag, no noise, Δt = {}. The built-in's law is its own; its \
+                 energy is not shown in the second figure because what it tallies is not the potential of its forces.",
+                state.len(),
+                SET6.liquid,
+                length.dt
+            )),
+            Item::Table(table),
+            Item::Figure {
+                svg: heat.render()?,
+                caption: "The built-in heats; the other codes compute the gradient of an energy and keep it."
+                    .into(),
+            },
+            Item::Figure {
+                svg: energy.render()?,
+                caption: "What is left is the error of the integrator.".into(),
+            },
+        ],
+    };
+    add_loop(context, &mut part)?;
+    Ok(part)
+}
+
+/// Means of the first and the last twentieth of a series.
+fn ends(series: &[f64]) -> [f64; 2] {
+    let count = (series.len() / 20).max(1);
+    let mean = |s: &[f64]| s.iter().sum::<f64>() / s.len() as f64;
+    [mean(&series[..count]), mean(&series[series.len() - count..])]
+}
+
+fn add_loop(context: &Context, part: &mut Part) -> Result<(), ValidateError> {
+    use ForceLaw::{Conservative, LucyLammps};
+    let rows = [
+        ("native", "conservative", closed_loop::native(Conservative)?),
+        ("plugin dpd/psi", "conservative", closed_loop::lammps(context, Code::Psi, Conservative)?),
+        ("native", "Lucy", closed_loop::native(LucyLammps)?),
+        ("LAMMPS mdpd", "its own", closed_loop::lammps(context, Code::BuiltIn, LucyLammps)?),
+    ];
+    let mut table = Table::new(["code", "law", "work around the loop", "over the integral of |F|"]);
+    for (code, law, w) in rows {
+        table.push([
+            code.to_owned(),
+            law.to_owned(),
+            format!("{:.3e}", w.work),
+            format!("{:.1e}", w.work / w.scale),
+        ]);
+    }
+    let [native, plugin, lucy, built_in] = rows.map(|r| r.2);
+    for (id, what, w) in [("native", "native", native), ("psi", "plugin dpd/psi", plugin)] {
+        part.checks.push(Check::at_most(
+            format!("loop.{id}"),
+            "energy",
+            format!("{what}, conservative law: work around a closed loop, over the integral of |F|"),
+            w.work / w.scale,
+            1e-12,
+        ));
+    }
+    part.checks.push(Check::at_least(
+        "loop.mdpd",
+        "energy",
+        "LAMMPS mdpd: work around a closed loop, over the integral of |F| (a force with a potential does none)",
+        (built_in.work / built_in.scale).abs(),
+        1e-3,
+    ));
+    part.checks.push(Check::at_most(
+        "loop.lucy",
+        "energy",
+        "the Lucy law in the native engine does the same work as LAMMPS mdpd, relative",
+        (lucy.work - built_in.work) / built_in.work,
+        1e-9,
+    ));
+    part.values.push((
+        "loop".into(),
+        json!({"native": native.work, "plugin": plugin.work, "lucy": lucy.work, "mdpd": built_in.work}),
+    ));
+    part.section.items.push(Item::Prose(
+        "Why: two particles rest and a third goes once around a circle. A force with a potential does no work on \
+         the way. The built-in's density has the Lucy kernel and its force falls off linearly; the derivative of \
+         the one is not proportional to the other, which is the condition for a potential (Warren, eq. 10), and \
+         the force does work. A fluid full of such triples heats."
+            .into(),
+    ));
+    part.section.items.push(Item::Table(table));
+    Ok(())
+}

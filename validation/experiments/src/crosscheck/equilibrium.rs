@@ -1,0 +1,383 @@
+//! A slab in equilibrium: temperature, pressure, liquid density, energy and surface tension, with error
+//! bars, in every code.
+
+use super::codes::{Code, Setup};
+use super::fluids::{GAMMA, SET5, SET6, WarrenSet};
+use super::jobs::{self, Job};
+use super::start::{Filling, equilibrated};
+use super::trace::{Length, Trace, run as run_code};
+use super::{Context, Part, ValidateError};
+use psidpd_core::model::ForceLaw;
+use psidpd_observe::{Estimate, ProfileAccumulator, difference, estimate, interface_width, tension_series};
+use psidpd_report::{Check, Item, Plot, Section, Series, Style, Table};
+use serde_json::json;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Seeds of start and noise; every run has its own noise.
+pub const SEED: u64 = 20_020_922;
+
+/// Chance that any of the comparisons of equal fluids fails although nothing is wrong.
+pub const FALSE_ALARM: f64 = 1e-3;
+/// How far the temperature may be from kT. The time step shifts it by 0.004 here; a drag that is 5 % wrong would by 0.05, such
+/// a noise by 0.1.
+const WARMER: f64 = 0.02;
+/// How many errors, his and ours, a run may be from Warren's liquid density and surface tension.
+const PUBLISHED: f64 = 3.0;
+
+/// A code, its law, and the run it is compared with.
+type Run = (Code, ForceLaw, Option<usize>);
+
+const RUNS: [Run; 5] = [
+    (Code::Native, ForceLaw::Conservative, None),
+    (Code::Psi, ForceLaw::Conservative, Some(NATIVE)),
+    (Code::MdpdPsi, ForceLaw::LucyLammps, None),
+    (Code::BuiltIn, ForceLaw::LucyLammps, Some(MDPD_PSI)),
+    (Code::Eam, ForceLaw::Conservative, Some(NATIVE)),
+];
+const NATIVE: usize = 0;
+const MDPD_PSI: usize = 2;
+const BUILT_IN: usize = 3;
+
+/// The first of them, as many as a set has. Tables take longest: a quick validation makes one run with them.
+fn runs(set: &WarrenSet, full: bool) -> &'static [Run] {
+    if full || set.name == SET6.name { &RUNS } else { &RUNS[..=BUILT_IN] }
+}
+
+/// What is compared, with error bars.
+struct Measured {
+    temperature: Estimate,
+    pressure: Estimate,
+    energy: Estimate,
+    liquid: Estimate,
+    tension: Estimate,
+    /// By conservative forces alone, where the code tells; on every configuration that is the change of U with the area,
+    /// see `forces`.
+    conservative_tension: Option<Estimate>,
+    width: Option<f64>,
+    profile: Vec<(f64, f64)>,
+}
+
+fn name(code: Code, law: ForceLaw) -> String {
+    match (code, law) {
+        (Code::BuiltIn, _) => "LAMMPS mdpd".into(),
+        (code, ForceLaw::Conservative) => code.label().into(),
+        (code, ForceLaw::LucyLammps) => format!("{}, law lucy", code.label()),
+    }
+}
+
+/// Runs the comparison.
+pub fn run(context: &Context) -> Result<Part, ValidateError> {
+    let sets = [SET5, SET6];
+    // A wide and thin slab: the error of the tension goes with the root of thickness over area.
+    let (edge, height, thickness, steps) =
+        if context.full { (10.0, 24.0, 12.0, 50_000) } else { (6.0, 12.0, 4.8, 8_000) };
+    let length = Length { dt: 0.01, steps, sample: 10, averaged: true, frame: 25 };
+    let mut starts = Vec::new();
+    for set in &sets {
+        let filling = Filling { lengths: [edge, edge, height], thickness, density: set.liquid };
+        starts.push(equilibrated(set, filling, 1000, SEED)?);
+    }
+    let count: usize = sets.iter().map(|set| runs(set, context.full).len()).sum();
+    let made = context.progress.overall("equilibrium", steps * count as u64);
+    let made = &made;
+    let mut jobs: Vec<Job<Result<Trace, ValidateError>>> = Vec::new();
+    for (k, set) in sets.iter().enumerate() {
+        for (n, &(code, law, _)) in runs(set, context.full).iter().enumerate() {
+            let state = &starts[k];
+            let bar = context.progress.bar(&format!("NVT {}: {}", set.name, name(code, law)), steps);
+            jobs.push(Box::new(move || {
+                let seed = SEED + (10 * k + n) as u64;
+                let setup = Setup { gamma: GAMMA, seed, ..Setup::new(code, set, law) };
+                let folder = format!("nvt-{}-{}-{n}", set.name.replace(' ', ""), code.slug());
+                let before = AtomicU64::new(0);
+                let advance = |step: u64| {
+                    bar.set(step);
+                    made.advance(step.saturating_sub(before.fetch_max(step, Ordering::Relaxed)));
+                };
+                let trace = run_code(context, &setup, state, length, &folder, &advance);
+                advance(steps);
+                bar.finish();
+                trace
+            }));
+        }
+    }
+    let traces = jobs::run(jobs).into_iter().collect::<Result<Vec<_>, _>>()?;
+    let mut traces = traces.iter();
+    let mut part = Part {
+        section: Section {
+            heading: "A slab of liquid in equilibrium".into(),
+            items: vec![Item::Prose(format!(
+                "A slab of liquid with its vapour at kT = 1, γ = {GAMMA}, {edge} × {edge} × {height}, {steps} steps of \
+                 {} of which the first fifth is left out; seeds from {SEED}. Error bars are standard errors from the \
+                 autocorrelation of each series. Runs of equal law must agree: over all comparisons the chance of a \
+                 false alarm is {FALSE_ALARM}.",
+                length.dt
+            ))],
+        },
+        ..Part::default()
+    };
+    let comparisons = sets
+        .iter()
+        .flat_map(|set| runs(set, context.full))
+        .map(|(code, _, other)| compared(*code, *other).count())
+        .sum();
+    for set in &sets {
+        let measured = traces
+            .by_ref()
+            .take(runs(set, context.full).len())
+            .map(|t| measure(t, edge, height))
+            .collect::<Result<Vec<_>, _>>()?;
+        report_set(&mut part, set, &measured, comparisons)?;
+    }
+    Ok(part)
+}
+
+/// A quantity by name, and the largest error of a difference that is accepted: no comparison with a larger one could tell
+/// the two force laws apart, of which tensions differ by 1.4 and more and pressures by their share in it.
+type Quantity = (&'static str, fn(&Measured) -> &Estimate, f64);
+
+/// The quantities that equal fluids must agree in.
+const QUANTITIES: [Quantity; 5] = [
+    ("temperature", |m| &m.temperature, 0.005),
+    ("pressure", |m| &m.pressure, 0.13),
+    ("energy", |m| &m.energy, 0.02),
+    ("liquid density", |m| &m.liquid, 0.012),
+    ("surface tension", |m| &m.tension, 0.3),
+];
+
+/// The quantities in which a run is held to another.
+fn compared(code: Code, other: Option<usize>) -> impl Iterator<Item = Quantity> {
+    // The energy that the built-in tallies is not that of its forces, nor of any other.
+    QUANTITIES
+        .into_iter()
+        .filter(move |(what, ..)| other.is_some() && !(code == Code::BuiltIn && *what == "energy"))
+}
+
+fn measure(trace: &Trace, edge: f64, height: f64) -> Result<Measured, ValidateError> {
+    let of = |what: &str, series: &[f64]| {
+        let kept = &series[series.len() / 5..];
+        estimate(kept).map_err(|source| ValidateError::Statistics { what: what.to_owned(), source })
+    };
+    let bins = (height / 0.1).round() as usize;
+    let mut profile = ProfileAccumulator::new(height, bins, edge * edge)?;
+    for frame in &trace.frames[trace.frames.len() / 5..] {
+        profile.add(frame)?;
+    }
+    let liquid = profile.liquid_density(0.5 * (0.5 * height) - 2.0);
+    let shape = profile.finish()?;
+    let [xx, yy, zz, ..] = &trace.conservative;
+    let conservative_tension = match xx.is_empty() {
+        true => None,
+        false => Some(of("surface tension", &tension_series(height, xx, yy, zz)?)?),
+    };
+    let [xx, yy, zz, ..] = &trace.pressure;
+    let per_particle: Vec<f64> = trace.potential.iter().map(|u| u / trace.particles as f64).collect();
+    Ok(Measured {
+        temperature: of("temperature", &trace.temperature)?,
+        pressure: of("pressure", &trace.scalar_pressure())?,
+        energy: of("energy", &per_particle)?,
+        liquid: estimate(&liquid)
+            .map_err(|source| ValidateError::Statistics { what: "liquid density".into(), source })?,
+        tension: of("surface tension", &tension_series(height, xx, yy, zz)?)?,
+        conservative_tension,
+        width: interface_width(&shape),
+        profile: shape.centres.iter().copied().zip(shape.density.iter().copied()).collect(),
+    })
+}
+
+fn shown(e: &Estimate) -> String {
+    // Two digits of the error decide how many are worth showing.
+    let digits = (1.0 - e.error.log10().floor()).clamp(0.0, 8.0);
+    let digits = if digits.is_finite() { digits as usize } else { 4 };
+    format!("{:.*} ± {:.*}", digits, e.mean, digits, e.error)
+}
+
+fn report_set(
+    part: &mut Part,
+    set: &WarrenSet,
+    measured: &[Measured],
+    comparisons: usize,
+) -> Result<(), ValidateError> {
+    let slug = set.name.replace(' ', "");
+    let mut table = Table::new([
+        "code",
+        "temperature",
+        "pressure",
+        "energy",
+        "liquid density",
+        "surface tension",
+        "width",
+    ]);
+    let mut plot = Plot {
+        title: format!("Density profile, {}", set.name),
+        x_label: "z, from the middle of the slab".into(),
+        y_label: "number density".into(),
+        levels: vec![(set.liquid, format!("Warren: {}", set.liquid))],
+        ..Plot::default()
+    };
+    for ((code, law, _), m) in RUNS.iter().zip(measured) {
+        let mut row = vec![name(*code, *law)];
+        row.extend(QUANTITIES.iter().map(|(_, get, _)| shown(get(m))));
+        row.push(m.width.map_or_else(|| "–".into(), |w| format!("{w:.2}")));
+        table.push(row);
+        plot.series.push(Series {
+            name: name(*code, *law),
+            points: m.profile.clone(),
+            errors: None,
+            style: if *law == ForceLaw::Conservative { Style::Line } else { Style::Dashed },
+        });
+        for (what, get, _) in QUANTITIES {
+            let id = format!("nvt.{slug}.{}-{}.{}", code.slug(), law_slug(*law), what.replace(' ', "-"));
+            part.values.push((id, json!(get(m))));
+        }
+    }
+    table.push([
+        "Warren, Table 2".to_owned(),
+        String::new(),
+        String::new(),
+        String::new(),
+        format!("{} ± {}", set.liquid, set.liquid_error),
+        format!("{} ± {}", set.tension.0, set.tension.1),
+        format!("{} ± {}", set.width.0, set.width.1),
+    ]);
+    for ((code, law, other), m) in RUNS.iter().zip(measured) {
+        let Some(other) = other else { continue };
+        let (reference_code, reference_law, _) = RUNS[*other];
+        for (what, get, most) in compared(*code, Some(*other)) {
+            let comparison = difference(get(m), get(&measured[*other]));
+            let mut check = Check::agreement(
+                format!("nvt.{slug}.{}.{}", code.slug(), what.replace(' ', "-")),
+                "equilibrium",
+                format!(
+                    "{}: {what} of {} equals that of {}",
+                    set.name,
+                    name(*code, *law),
+                    name(reference_code, reference_law)
+                ),
+                comparison.delta,
+                comparison.error,
+                psidpd_observe::threshold(comparisons, FALSE_ALARM),
+                format!("z = {:.2}, p = {:.2}", comparison.z, comparison.p_value),
+            );
+            check.passed =
+                !comparison.exceeds(comparisons, FALSE_ALARM) && (0.0..most).contains(&comparison.error);
+            part.checks.push(check);
+        }
+    }
+    for ((code, law, _), m) in RUNS.iter().zip(measured) {
+        if matches!(code, Code::Native | Code::Psi) {
+            part.checks.push(against_kt(set, *code, *law, m));
+        }
+    }
+    let native = &measured[NATIVE];
+    part.checks.extend(against_published(set, native));
+    let built_in = &measured[BUILT_IN];
+    part.checks.push(
+        Check::at_least(
+            format!("nvt.{slug}.mdpd.shift"),
+            "equilibrium",
+            format!(
+                "{}: the built-in's law shifts the liquid density (another fluid than Warren's): by",
+                set.name
+            ),
+            built_in.liquid.mean - native.liquid.mean,
+            0.1,
+        )
+        .with_error(difference(&built_in.liquid, &native.liquid).error),
+    );
+    let apart = difference(&built_in.tension, &native.tension);
+    part.checks.push(Check::at_least(
+        format!("nvt.{slug}.mdpd.tension"),
+        "equilibrium",
+        format!("{}: the surface tension tells the two laws apart: difference over its error", set.name),
+        apart.z.abs(),
+        psidpd_observe::threshold(comparisons, FALSE_ALARM),
+    ));
+    part.section.items.push(Item::Table(table));
+    part.section.items.push(Item::Figure {
+        svg: plot.render()?,
+        caption: format!(
+            "{}: full lines are the conservative law, dashed lines the built-in's law, in the plugin and in mdpd.",
+            set.name
+        ),
+    });
+    Ok(())
+}
+
+/// The temperature of a run against kT.
+fn against_kt(set: &WarrenSet, code: Code, law: ForceLaw, found: &Measured) -> Check {
+    Check::at_most(
+        format!("nvt.{}.{}.thermostat", set.name.replace(' ', ""), code.slug()),
+        "equilibrium",
+        format!("{}: temperature of {} against kT", set.name, name(code, law)),
+        found.temperature.mean - 1.0,
+        WARMER,
+    )
+    .with_error(found.temperature.error)
+}
+
+/// Density and tension of the native runner against Warren's.
+fn against_published(set: &WarrenSet, native: &Measured) -> [Check; 2] {
+    let published = |what: &str, found: &Estimate, (value, error): (f64, f64)| {
+        Check::agreement(
+            format!("nvt.{}.published.{what}", set.name.replace(' ', "")),
+            "equilibrium",
+            format!("{}: {what} of native against Warren's Table 2, with his error and ours", set.name),
+            found.mean - value,
+            found.error.hypot(error),
+            PUBLISHED,
+            format!("{} ± {}", found.mean, found.error),
+        )
+    };
+    let tension = native.conservative_tension.as_ref().unwrap_or(&native.tension);
+    [
+        published("density", &native.liquid, (set.liquid, set.liquid_error)),
+        published("tension", tension, set.tension),
+    ]
+}
+
+fn law_slug(law: ForceLaw) -> &'static str {
+    match law {
+        ForceLaw::Conservative => "conservative",
+        ForceLaw::LucyLammps => "lucy",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::trace::native;
+    use super::*;
+    use psidpd_core::engine::Fault;
+
+    /// What is measured of a fluid fails the same checks if a force of the engine is 5 % wrong, in shorter runs than those of
+    /// `psidpd validate`. The virial moves no particle: `forces` has a check of it.
+    #[test]
+    fn physics_tells_of_faults() {
+        let (edge, height, thickness, steps) = (5.0, 12.0, 5.2, 2000);
+        let filling = Filling { lengths: [edge, edge, height], thickness, density: SET6.liquid };
+        let state = equilibrated(&SET6, filling, 600, SEED).unwrap();
+        let length = Length { dt: 0.01, steps, sample: 10, averaged: true, frame: 10 };
+        let setup = Setup {
+            gamma: GAMMA,
+            seed: SEED,
+            ..Setup::new(Code::NativeMixed, &SET6, ForceLaw::Conservative)
+        };
+        let failed = |fault: Option<Fault>| -> Vec<String> {
+            let trace = native(&setup, &state, length, fault, &|_| ()).unwrap();
+            let found = measure(&trace, edge, height).unwrap();
+            let mut checks = vec![against_kt(&SET6, Code::Native, ForceLaw::Conservative, &found)];
+            checks.extend(against_published(&SET6, &found));
+            checks.into_iter().filter(|c| !c.passed).map(|c| c.id).collect()
+        };
+        assert_eq!(failed(None), Vec::<String>::new());
+        for (fault, sign) in [
+            (Fault::PairForce, "nvt.set6.published.density"),
+            (Fault::ManyBodyForce, "nvt.set6.published.density"),
+            (Fault::Drag, "nvt.set6.native.thermostat"),
+            (Fault::Noise, "nvt.set6.native.thermostat"),
+        ] {
+            let failed = failed(Some(fault));
+            assert!(failed.iter().any(|id| id == sign), "{fault:?}: {failed:?}");
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! The same trajectory in both hosts: noise on, same seed, same integrator, on one rank and on two.
+
+use super::codes::{Code, Setup};
+use super::fluids::{GAMMA, SET6};
+use super::start::{Filling, equilibrated};
+use super::{Context, Part, ValidateError};
+use psidpd_core::engine::Want;
+use psidpd_core::maximum::largest;
+use psidpd_core::model::ForceLaw;
+use psidpd_dynamics::run::{Integrator, Simulation, State};
+use psidpd_formats::dump;
+use psidpd_report::{Check, Item, Section, Table};
+use serde_json::json;
+use std::time::Duration;
+
+/// Seed of start and noise.
+pub const SEED: u64 = 20_170_401;
+
+const STEPS: u64 = 50;
+const DT: f64 = 0.01;
+/// Largest distance of a particle's places in two codes.
+const LARGEST: f64 = 1e-10;
+
+/// Runs the comparison.
+pub fn run(context: &Context) -> Result<Part, ValidateError> {
+    let filling = Filling { lengths: [8.0, 8.0, 12.0], thickness: 6.0, density: SET6.liquid };
+    let state = equilibrated(&SET6, filling, 500, SEED)?;
+    let ours = native(&state)?;
+    let mut part = Part::default();
+    let mut table = Table::new(["code", "ranks", "newton", "largest distance from native"]);
+    for (code, ranks, newton) in [
+        (Code::Psi, 1, true),
+        (Code::Psi, 1, false),
+        (Code::Psi, 2, true),
+        (Code::Psi, 2, false),
+        (Code::MdpdPsi, 2, true),
+    ] {
+        let theirs = lammps(context, &state, code, ranks, newton)?;
+        let apart = |(a, b): (&[f64; 3], &[f64; 3])| {
+            state.domain.minimum_image(*a, *b).iter().map(|c| c * c).sum::<f64>()
+        };
+        let distance = largest(ours.iter().zip(&theirs).map(apart)).sqrt();
+        let newton = if newton { "on" } else { "off" };
+        table.push([
+            code.label().to_owned(),
+            ranks.to_string(),
+            newton.to_owned(),
+            format!("{distance:.1e}"),
+        ]);
+        let id = format!("trajectory.{}.{ranks}.newton-{newton}", code.slug());
+        part.values.push((id.clone(), json!(distance)));
+        part.checks.push(Check::at_most(
+            id,
+            "trajectory",
+            format!(
+                "{}, {ranks} rank(s), newton {newton}: positions after {STEPS} steps with noise",
+                code.label()
+            ),
+            distance,
+            LARGEST,
+        ));
+    }
+    part.section = Section {
+        heading: "One trajectory in both hosts".into(),
+        items: vec![
+            Item::Prose(format!(
+                "{} particles of set 6, {STEPS} steps of {DT} with drag and noise, seed {SEED}. The noise of a pair \
+                 depends on seed, step and the two tags only, so ranks, order and neighbour settings do not change it.",
+                state.len()
+            )),
+            Item::Table(table),
+        ],
+    };
+    Ok(part)
+}
+
+/// Positions by tag.
+fn native(state: &State) -> Result<Vec<[f64; 3]>, ValidateError> {
+    let model = SET6.model(ForceLaw::Conservative, GAMMA)?;
+    let mut simulation = Simulation::new(&model, 1.0, state.clone(), SEED)?;
+    simulation.prepare(DT, Want::FORCES)?;
+    simulation.advance(STEPS, DT, Integrator::VelocityVerlet)?;
+    let mut x = vec![[f64::NAN; 3]; state.len()];
+    for (tag, position) in simulation.tags().iter().zip(simulation.positions()) {
+        x[*tag as usize - 1] = *position;
+    }
+    Ok(x)
+}
+
+fn lammps(
+    context: &Context,
+    state: &State,
+    code: Code,
+    ranks: usize,
+    newton: bool,
+) -> Result<Vec<[f64; 3]>, ValidateError> {
+    let folder = context.work.join(format!("trajectory-{}-{ranks}-{newton}", code.slug()));
+    let setup = Setup { gamma: GAMMA, seed: SEED, newton, ..Setup::new(code, &SET6, ForceLaw::Conservative) };
+    let mut deck = setup.prepare(context, state, &folder, false)?;
+    deck.push_str(&format!(
+        "fix move all nve\ntimestep {DT}\nthermo {STEPS}\nrun {STEPS}\n\
+         write_dump all custom final.txt id x y z modify sort id format float %.17g\n"
+    ));
+    let script = folder.join("in.lammps");
+    std::fs::write(&script, deck).map_err(ValidateError::io(&script))?;
+    context.host.run_script(ranks, &folder, &script, &["-log", "log.lammps"], Duration::from_secs(300))?;
+    let path = folder.join("final.txt");
+    let frames = dump::read(&path)?;
+    frames.first().and_then(|f| f.vectors(["x", "y", "z"])).filter(|x| x.len() == state.len()).ok_or_else(
+        || ValidateError::Output {
+            path,
+            problem: format!("expected one frame of {} particles", state.len()),
+        },
+    )
+}

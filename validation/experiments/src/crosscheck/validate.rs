@@ -1,0 +1,130 @@
+use super::{Context, Part, ValidateError, conclusion, energy, equilibrium, forces, trajectory};
+use psidpd_formats::files::write_atomically;
+use psidpd_report::{Item, Progress, Report, Results, Section, Table};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// What `psidpd validate` is asked for.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// Larger systems and longer runs: hours instead of minutes.
+    pub full: bool,
+    /// Folder for `report.html`, `results.json` and what the runs leave.
+    pub out: PathBuf,
+}
+
+/// What came of it.
+#[derive(Debug)]
+pub struct Outcome {
+    /// Every check and number.
+    pub results: Results,
+    /// Where the report is.
+    pub report: PathBuf,
+}
+
+/// Installs what is missing, builds the plugin, runs every comparison and writes the report.
+///
+/// # Errors
+/// Something could not be run or written; checks that fail are in the results.
+pub fn validate(options: &Options, progress: &Progress) -> Result<Outcome, ValidateError> {
+    let start = Instant::now();
+    std::fs::create_dir_all(&options.out).map_err(ValidateError::io(&options.out))?;
+    // LAMMPS runs in folders of its own: paths must not depend on ours.
+    let out = options.out.canonicalize().map_err(ValidateError::io(&options.out))?;
+    let spinner = progress.spinner("LAMMPS");
+    let host = psidpd_lammps_host::install(&|line| progress.note(line))?;
+    let version = host.version()?;
+    spinner.finish();
+    let spinner = progress.spinner("plugin");
+    let plugin = psidpd_lammps_host::plugin::build(&host, &|line| progress.note(line))?;
+    psidpd_lammps_host::plugin::check(&host, &plugin)?;
+    spinner.finish();
+    let context =
+        Context { host: &host, plugin: &plugin, work: out.join("runs"), full: options.full, progress };
+
+    let mut results = Results::new("psidpd cross-code validation", env!("CARGO_PKG_VERSION"));
+    let facts = [
+        ("psidpd", env!("CARGO_PKG_VERSION").to_owned()),
+        ("LAMMPS", version.name.clone()),
+        ("mode", if options.full { "full" } else { "quick" }.to_owned()),
+        ("machine", machine()),
+    ];
+    results.facts = facts.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect();
+    results.seeds = vec![forces::SEED, energy::SEED, equilibrium::SEED, trajectory::SEED];
+    let mut sections = Vec::new();
+    type Run = fn(&Context) -> Result<Part, ValidateError>;
+    let parts: [(&str, Run); 4] = [
+        ("forces", forces::run),
+        ("trajectories", trajectory::run),
+        ("energy", energy::run),
+        ("equilibrium", equilibrium::run),
+    ];
+    for (name, run) in parts {
+        let spinner = progress.spinner(name);
+        let part = run(&context)?;
+        spinner.finish();
+        for check in part.checks {
+            results.push(check);
+        }
+        for (key, value) in part.values {
+            results.record(key, value)?;
+        }
+        sections.push(part.section);
+    }
+    results.facts.insert("wall time".into(), format!("{:.0} s", start.elapsed().as_secs_f64()));
+    let report = write(&out, &results, sections)?;
+    Ok(Outcome { results, report })
+}
+
+/// Every check as a table.
+pub fn check_table(results: &Results) -> Table {
+    let mut table = Table::new(["", "check", "value", "bound"]);
+    for check in &results.checks {
+        table.push([
+            if check.passed { "pass" } else { "FAIL" }.to_owned(),
+            check.description.clone(),
+            match check.error {
+                Some(error) => format!("{:.3e} ± {error:.1e}", check.value),
+                None => format!("{:.3e}", check.value),
+            },
+            format!("{} {:.1e}", if check.at_least { "≥" } else { "≤" }, check.limit),
+        ]);
+    }
+    table
+}
+
+fn write(out: &Path, results: &Results, mut sections: Vec<Section>) -> Result<PathBuf, ValidateError> {
+    write_atomically(out.join("results.json"), results.to_json()?.as_bytes())?;
+    sections.insert(0, conclusion::what_is_compared());
+    sections.insert(0, conclusion::section(results));
+    sections.push(Section { heading: "Checks".into(), items: vec![Item::Table(check_table(results))] });
+    let mut facts: Vec<(String, String)> = results.facts.clone().into_iter().collect();
+    let seeds: Vec<String> = results.seeds.iter().map(u64::to_string).collect();
+    facts.push(("seeds".into(), seeds.join(", ")));
+    let report = Report {
+        title: results.title.clone(),
+        subtitle: "Warren's many-body DPD fluid in the native runner, in the LAMMPS plugin, in LAMMPS's mdpd and as \
+                   eam/alloy tables"
+            .into(),
+        facts,
+        sections,
+        passed: results.passed_count(),
+        failed: results.failed_count(),
+    };
+    let path = out.join("report.html");
+    write_atomically(&path, report.render().as_bytes())?;
+    Ok(path)
+}
+
+/// The processor, where the system says.
+pub fn machine() -> String {
+    let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
+    let model = std::fs::read_to_string("/proc/cpuinfo")
+        .ok()
+        .and_then(|text| {
+            let line = text.lines().find(|l| l.starts_with("model name"))?;
+            Some(line.split(':').nth(1)?.trim().to_owned())
+        })
+        .unwrap_or_else(|| std::env::consts::ARCH.to_owned());
+    format!("{model}, {cores} core(s)")
+}

@@ -1,0 +1,262 @@
+//! A model of a real liquid from its equation of state.
+//!
+//! 1. The equation of state gives the saturated liquid at a temperature: density, compressibility, tension, and the
+//!    pressures of the compressed liquid ([`Liquid`]).
+//! 2. N_m molecules are a particle. The unit of length r_c puts the liquid at the number density asked for, the unit of
+//!    energy is kT ([`Units`]).
+//! 3. The fluid is Warren's: a soft attraction of strength A and range r_c, which makes the tension, and a ψ of shorter
+//!    range with the rest of the pressure (P. B. Warren, Phys. Rev. E 68, 066702 (2003)).
+//! 4. For some A the corrected density is found that gives the pressures (as `psidpd calibrate`), and the tension of a slab
+//!    is measured; A is sought by the secant through two of them, until the tension is that of the liquid.
+
+mod equation;
+mod fluid;
+mod slab;
+mod substance;
+mod units;
+
+pub use equation::Liquid;
+pub use substance::Substance;
+pub use units::Units;
+
+use crate::bulk::{Bulk, Sampling};
+use crate::calibrate::{CalibrateError, Options as Calibrate, Value, calibrate, spaced};
+use psidpd_core::document::FileError;
+use psidpd_core::model::Model;
+use psidpd_dynamics::run::RunError;
+use psidpd_observe::Measured;
+use serde::Serialize;
+
+/// Why there is no model.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum FromEosError {
+    #[cfg(not(feature = "eos"))]
+    #[error("this psidpd was built without equations of state: cargo build --release --features eos")]
+    NotBuilt,
+    #[error("no parameters for {0}: there are {1}")]
+    Substance(String, String),
+    #[error("the equation of state: {0}")]
+    Equation(String),
+    #[error("{0}")]
+    Conditions(String),
+    #[error(transparent)]
+    Calibrate(#[from] CalibrateError),
+    #[error(transparent)]
+    File(#[from] FileError),
+    #[error(transparent)]
+    Run(#[from] RunError),
+    #[error("no folder for the runs: {0}")]
+    Folder(#[from] std::io::Error),
+}
+
+/// What is asked for.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// Kelvin.
+    pub temperature: f64,
+    /// Molecules in a particle.
+    pub molecules: f64,
+    /// Particles in r_c³ of the liquid.
+    pub density: f64,
+    /// Range of ψ in r_c, below 1.
+    pub range: f64,
+    /// Largest relative difference of the tension, and of pressures as `calibrate` has it.
+    pub tolerance: f64,
+    /// Size and length of the runs.
+    pub sampling: Sampling,
+}
+
+/// A strength of the attraction that was tried.
+#[derive(Debug, Clone, Serialize)]
+pub struct Trial {
+    /// A.
+    pub attraction: f64,
+    /// Tension of the slab, in kT/r_c².
+    pub tension: Value,
+    /// Whether its pressures met the tolerance.
+    pub calibrated: bool,
+}
+
+/// A quantity of the equation of state and of the model, in SI units.
+#[derive(Debug, Clone, Serialize)]
+pub struct Compared {
+    /// What it is, with its unit.
+    pub name: &'static str,
+    /// By the equation of state.
+    pub wanted: f64,
+    /// Of the model.
+    pub measured: Value,
+}
+
+/// The model, and how it compares.
+#[derive(Debug, Clone, Serialize)]
+pub struct Found {
+    /// Name of the substance.
+    pub substance: String,
+    /// Kelvin.
+    pub temperature: f64,
+    /// Molecules in a particle.
+    pub molecules: f64,
+    /// The units of the model in SI.
+    pub units: Units,
+    /// Strengths that were tried; the last is that of the model.
+    pub trials: Vec<Trial>,
+    /// Density, compressibility and tension of the liquid.
+    pub compared: Vec<Compared>,
+    /// Whether pressures and tension meet the tolerance.
+    pub converged: bool,
+    /// The model file.
+    #[serde(skip)]
+    pub text: String,
+}
+
+/// Strengths that are tried at most.
+const TRIALS: usize = 5;
+
+/// Makes a model of `substance`.
+///
+/// # Errors
+/// See [`FromEosError`]; a tolerance that is not met is none.
+pub fn from_eos(
+    substance: &Substance,
+    options: &Options,
+    command: &str,
+    told: &mut dyn FnMut(&str),
+) -> Result<Found, FromEosError> {
+    let liquid = equation::liquid(substance, options.temperature)?;
+    let units = Units::new(substance, &liquid, options);
+    let wanted = liquid.tension / units.tension;
+    told(&format!(
+        "liquid of {:.1} kg/m3; r_c = {:.3} nm; wanted in reduced units: dp/drho = {:.1}, tension = {wanted:.2}",
+        liquid.density * substance.molar_mass,
+        units.length * 1e9,
+        1.0 / (liquid.compressibility * units.pressure * options.density),
+    ));
+    let folder = tempfile::tempdir()?;
+    let path = folder.path().join("trial.toml");
+    let mut trials: Vec<Trial> = Vec::new();
+    // Between these the tension of Warren's fluids is 5 to 15.
+    let mut attraction = -40.0;
+    loop {
+        let text = fluid::model(substance, &liquid, &units, options, attraction, command)?;
+        std::fs::write(&path, &text)?;
+        let calibration = calibrate(
+            &path,
+            &Calibrate {
+                kt: 1.0,
+                densities: spaced(options.density, 1.15 * options.density, 5),
+                composition: vec![1.0],
+                name: None,
+                tolerance: options.tolerance,
+                sampling: options.sampling,
+            },
+            command,
+            &mut |_| {},
+        )?;
+        std::fs::write(&path, &calibration.text)?;
+        let slab = slab::measure(&path, options, folder.path())?;
+        told(&format!(
+            "A = {attraction:.2}: tension {:.2} ± {:.2}, pressures {}met",
+            slab.tension.value,
+            slab.tension.error,
+            if calibration.converged { "" } else { "not " }
+        ));
+        trials.push(Trial { attraction, tension: slab.tension.into(), calibrated: calibration.converged });
+        let met = (slab.tension.value / wanted - 1.0).abs() <= options.tolerance;
+        let next = next(&trials, wanted);
+        if met || trials.len() == TRIALS || next.is_none() {
+            let (compressibility, by_eos) = compressibility(&path, &liquid, options, &units, folder.path())?;
+            let compared = vec![
+                Compared {
+                    name: "density, kg/m3",
+                    wanted: liquid.density * substance.molar_mass,
+                    measured: slab
+                        .liquid
+                        .times(liquid.density * substance.molar_mass / options.density)
+                        .into(),
+                },
+                Compared {
+                    name: "isothermal compressibility up to 5 % denser, 1/GPa",
+                    wanted: by_eos * 1e9,
+                    measured: compressibility.times(1e9).into(),
+                },
+                Compared {
+                    name: "surface tension, mN/m",
+                    wanted: liquid.tension * 1e3,
+                    measured: slab.tension.times(units.tension * 1e3).into(),
+                },
+            ];
+            return Ok(Found {
+                substance: substance.name.clone(),
+                temperature: options.temperature,
+                molecules: options.molecules,
+                units,
+                converged: met && calibration.converged,
+                trials,
+                compared,
+                text: calibration.text,
+            });
+        }
+        attraction = next.unwrap_or(attraction);
+    }
+}
+
+/// The next strength: a step that should change the tension as it must, then the secant. None if trials no longer
+/// tell where to go.
+fn next(trials: &[Trial], wanted: f64) -> Option<f64> {
+    let next = match trials {
+        [.., a, b] => {
+            let slope = (b.tension.value - a.tension.value) / (b.attraction - a.attraction);
+            b.attraction + (wanted - b.tension.value) / slope
+        }
+        // The tension grows about as the square of the strength.
+        [one] => one.attraction * (wanted / one.tension.value).abs().sqrt().clamp(0.6, 1.6),
+        [] => return None,
+    };
+    (next.is_finite() && (-200.0..-5.0).contains(&next)).then_some(next)
+}
+
+/// Δ ln ρ/Δp in 1/Pa between the liquid and its first compressed state, of the model and by the equation of state.
+fn compressibility(
+    path: &std::path::Path,
+    liquid: &Liquid,
+    options: &Options,
+    units: &Units,
+    folder: &std::path::Path,
+) -> Result<(Measured, f64), FromEosError> {
+    let model = Model::open(path)?;
+    let pressure = |rho: f64| -> Result<Measured, FromEosError> {
+        let sampling = Sampling { steps: 3 * options.sampling.steps, ..options.sampling };
+        let bulk = Bulk { model: &model, kt: 1.0, densities: &[rho], observe: "", sampling };
+        Ok(bulk.run(path, &folder.join("bulk"))?.pressure())
+    };
+    let Some((denser, compressed)) = liquid.compressed.first() else {
+        return Err(FromEosError::Equation("no pressures of the compressed liquid".into()));
+    };
+    let factor = denser / liquid.density;
+    let (a, b) = (pressure(options.density)?, pressure(factor * options.density)?);
+    let rise = (b.value - a.value) * units.pressure;
+    let error = a.error.hypot(b.error) * units.pressure;
+    let value = factor.ln() / rise;
+    Ok((Measured { value, error: value * error / rise }, factor.ln() / (compressed - liquid.pressure)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_strength_follows_the_tension() {
+        let trial = |attraction: f64, tension: f64| Trial {
+            attraction,
+            tension: Value { value: tension, error: 0.1 },
+            calibrated: true,
+        };
+        assert_eq!(next(&[trial(-40.0, 8.0)], 8.0), Some(-40.0));
+        assert!(next(&[trial(-40.0, 8.0)], 10.0).unwrap() < -40.0);
+        assert!((next(&[trial(-40.0, 8.0), trial(-50.0, 12.0)], 10.0).unwrap() + 45.0).abs() < 1e-9);
+        // Two equal tensions lead nowhere.
+        assert_eq!(next(&[trial(-40.0, 8.0), trial(-50.0, 8.0)], 10.0), None);
+    }
+}

@@ -1,0 +1,221 @@
+//! A hard case: a scene, and what must come of it.
+
+use psidpd_dynamics::integrator::Integrator;
+
+/// What must happen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Must {
+    /// The run ends without a warning, with temperatures within this part of kT and the momentum that it began with.
+    Right(f64),
+    /// That, or it says what is wrong: it warns of the temperature, or stops and names the step.
+    RightOrSaid(f64),
+    /// It ends, and has counted the evaluations beyond the bounds of a density.
+    Counted,
+    /// It stops and names the step and a particle.
+    Stops,
+    /// It is refused before its first step, with a reason.
+    Refused,
+    /// Engine and reference agree within this part of the largest force, in double precision; in mixed precision within
+    /// single precision's part.
+    Agrees(f64),
+    /// Momentum and, without thermostat, energy stay within this part of kT per particle.
+    Conserves(f64),
+}
+
+impl Must {
+    /// In words.
+    pub fn words(self) -> String {
+        match self {
+            Must::Right(_) => "right".into(),
+            Must::RightOrSaid(_) => "right, or warns or stops".into(),
+            Must::Counted => "bounded and counted".into(),
+            Must::Stops => "stops, names step and particle".into(),
+            Must::Refused => "refused with a reason".into(),
+            Must::Agrees(_) => "as the reference".into(),
+            Must::Conserves(_) => "conserved".into(),
+        }
+    }
+}
+
+/// What did.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Found {
+    /// It ended.
+    Ended {
+        /// Kinetic and configurational temperature in kT, each with its error, as far as they were measured.
+        temperatures: Vec<[f64; 2]>,
+        /// |Σ m v| over Σ m |v|.
+        momentum: f64,
+        /// Evaluations of ψ below and above bounds.
+        counted: [u64; 2],
+        /// What was warned of.
+        warnings: Vec<String>,
+    },
+    /// It stopped.
+    Stopped(String),
+    /// It did not begin.
+    Refused(String),
+    /// Largest difference of a force, over the largest force.
+    Differs(f64),
+    /// Energy per particle in kT, and momentum as above: changes.
+    Changed {
+        /// Energy.
+        energy: f64,
+        /// Momentum.
+        momentum: f64,
+    },
+}
+
+/// A run that a case is.
+#[derive(Debug, Clone, Default)]
+pub struct Run {
+    /// The model file.
+    pub model: String,
+    /// kT.
+    pub kt: f64,
+    /// The scene but for model, kT, integrator and stages.
+    pub scene: String,
+    /// A data file to start from, if there is one.
+    pub data: Option<String>,
+    /// Δt.
+    pub dt: f64,
+    /// Steps without measurement, and with.
+    pub steps: [u64; 2],
+}
+
+/// A case.
+#[derive(Debug, Clone)]
+pub struct Case {
+    /// The group.
+    pub group: &'static str,
+    /// The case, in words.
+    pub name: &'static str,
+    /// What is run.
+    pub run: Run,
+    /// What must happen.
+    pub must: Must,
+    /// The same for integrators that keep the Maxwell distribution of an ideal gas at any time step, if that is another.
+    pub exact: Option<Must>,
+}
+
+impl Case {
+    /// What must happen with an integrator.
+    pub fn must(&self, integrator: Integrator) -> Must {
+        let approximate = ["velocity-verlet", "groot-warren", "dpd-vv", "self-consistent"];
+        match self.exact {
+            Some(must) if !approximate.contains(&integrator.name()) => must,
+            _ => self.must,
+        }
+    }
+}
+
+/// How much momentum rounding may leave, of Σ m |v|.
+const ROUNDING: f64 = 1e-5;
+
+/// Single precision's part of the largest force: rounding of positions to 2⁻³² of the box and of forces.
+const SINGLE: f64 = 2e-5;
+
+/// Says what is wrong, if something is.
+///
+/// # Errors
+/// What did not happen that must.
+pub fn judge(must: Must, found: &Found, mixed: bool) -> Result<(), String> {
+    let right = |part: f64| match found {
+        Found::Ended { warnings, .. } if !warnings.is_empty() => Err(warnings.join("; ")),
+        Found::Ended { temperatures, momentum, .. } => {
+            for [t, error] in temperatures {
+                let near = (t - 1.0).abs() <= part + 4.0 * error;
+                // What is no number is not near.
+                if !near {
+                    return Err(format!("a temperature of {t:.3} ± {error:.3} kT"));
+                }
+            }
+            if *momentum > ROUNDING { Err(format!("momentum {momentum:.1e}")) } else { Ok(()) }
+        }
+        other => Err(said(other)),
+    };
+    match (must, found) {
+        (Must::Right(part), _) => right(part),
+        (Must::RightOrSaid(_), Found::Stopped(why)) if why.contains("step ") => Ok(()),
+        (Must::RightOrSaid(_), Found::Ended { warnings, .. }) if !warnings.is_empty() => Ok(()),
+        (Must::RightOrSaid(_), Found::Refused(why)) if !why.is_empty() => Ok(()),
+        (Must::RightOrSaid(part), _) => right(part),
+        (Must::Counted, Found::Ended { temperatures, counted, .. })
+            if counted.iter().sum::<u64>() > 0 && temperatures.iter().flatten().all(|t| t.is_finite()) =>
+        {
+            Ok(())
+        }
+        (Must::Stops, Found::Stopped(why)) if why.contains("step ") && why.contains("particle ") => Ok(()),
+        (Must::Refused, Found::Refused(why)) if !why.is_empty() => Ok(()),
+        (Must::Agrees(part), Found::Differs(d)) if *d <= if mixed { SINGLE } else { part } => Ok(()),
+        (Must::Conserves(part), Found::Changed { energy, momentum })
+            if energy.abs() <= part && *momentum <= ROUNDING =>
+        {
+            Ok(())
+        }
+        (_, other) => Err(said(other)),
+    }
+}
+
+/// What happened, in words.
+pub fn said(found: &Found) -> String {
+    match found {
+        Found::Ended { temperatures, momentum, counted, warnings } => {
+            let kinds = ["T_kin", "T_conf"];
+            let mut text: Vec<String> = temperatures
+                .iter()
+                .zip(kinds)
+                .map(|([t, e], kind)| format!("{kind} {t:.3} ± {e:.3}"))
+                .collect();
+            if *momentum > 1e-9 {
+                text.push(format!("momentum {momentum:.0e}"));
+            }
+            if counted.iter().sum::<u64>() > 0 {
+                text.push(format!("{} below, {} above bounds", counted[0], counted[1]));
+            }
+            if !warnings.is_empty() {
+                text.push(format!("warned {} times", warnings.len()));
+            }
+            text.join(", ")
+        }
+        Found::Stopped(why) => format!("stopped: {}", why.lines().next().unwrap_or_default()),
+        Found::Refused(why) => format!("refused: {}", why.lines().next().unwrap_or_default()),
+        Found::Differs(d) => format!("forces differ by {d:.1e}"),
+        Found::Changed { energy, momentum } => format!("energy {energy:+.1e} kT, momentum {momentum:.0e}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ended(t: f64, warnings: &[&str], counted: u64) -> Found {
+        Found::Ended {
+            temperatures: vec![[t, 0.001]],
+            momentum: 0.0,
+            counted: [0, counted],
+            warnings: warnings.iter().map(|w| (*w).to_owned()).collect(),
+        }
+    }
+
+    #[test]
+    fn silence_about_a_wrong_temperature_is_no_pass() {
+        let stopped = |why: &str| Found::Stopped(why.into());
+        assert!(judge(Must::Right(0.01), &ended(1.01, &[], 0), true).is_ok());
+        assert!(judge(Must::Right(0.01), &ended(1.1, &[], 0), true).is_err());
+        assert!(judge(Must::Right(0.01), &ended(f64::NAN, &[], 0), true).is_err());
+        assert!(judge(Must::Right(0.01), &ended(1.0, &["hot"], 0), true).is_err());
+        assert!(judge(Must::RightOrSaid(0.01), &ended(1.1, &[], 0), true).is_err());
+        assert!(judge(Must::RightOrSaid(0.01), &ended(1.1, &["hot"], 0), true).is_ok());
+        assert!(judge(Must::RightOrSaid(0.01), &stopped("step 5: no"), true).is_ok());
+        assert!(judge(Must::RightOrSaid(0.01), &stopped("no"), true).is_err());
+        assert!(judge(Must::Stops, &stopped("step 5: too hot"), true).is_err());
+        assert!(judge(Must::Stops, &stopped("step 5: particle 7 is"), true).is_ok());
+        assert!(judge(Must::Stops, &ended(1.0, &[], 0), true).is_err());
+        assert!(judge(Must::Counted, &ended(1.0, &[], 0), true).is_err());
+        assert!(judge(Must::Counted, &ended(1.0, &[], 3), true).is_ok());
+        assert!(judge(Must::Agrees(1e-12), &Found::Differs(1e-6), true).is_ok());
+        assert!(judge(Must::Agrees(1e-12), &Found::Differs(1e-6), false).is_err());
+        assert!(judge(Must::Conserves(0.1), &Found::Changed { energy: 0.2, momentum: 0.0 }, true).is_err());
+    }
+}

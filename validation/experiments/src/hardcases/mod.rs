@@ -1,0 +1,228 @@
+//! Hard cases: what must happen in each, and what did, by integrator and precision.
+//!
+//! A file for each group of cases; [`case`] says what a case is and judges, [`native`] and [`plugin`] carry it out.
+
+mod case;
+mod fluids;
+mod forces;
+mod long;
+mod native;
+mod phases;
+mod plugin;
+mod singular;
+mod starts;
+mod steps;
+
+use case::{Case, Must};
+
+use crate::crosscheck::jobs::{self, Job};
+use plugin::Plugin;
+use psidpd_core::document::FileError;
+use psidpd_core::engine::Precision;
+use psidpd_dynamics::integrator::Integrator;
+use psidpd_dynamics::run::RunError;
+use psidpd_lammps_host::LammpsError;
+use psidpd_report::{Progress, Table};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Why cases could not be carried out.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum HardCasesError {
+    /// A run failed for another reason than its physics.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// A model does not hold.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// LAMMPS is missing, or its files cannot be read.
+    #[error(transparent)]
+    Lammps(#[from] LammpsError),
+    #[error(transparent)]
+    Format(#[from] psidpd_formats::FormatError),
+    /// A file or folder cannot be written or read.
+    #[error("{path}: {source}")]
+    Io {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+}
+
+impl HardCasesError {
+    /// For `map_err` of file operations on `path`.
+    fn io(path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> HardCasesError {
+        let path = path.into();
+        move |source| HardCasesError::Io { path, source }
+    }
+}
+
+/// How much is tried.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Extent {
+    /// The integrators that are recommended, in mixed precision, and velocity Verlet in double.
+    Quick,
+    /// All integrators in both precisions.
+    All,
+    /// That, and 10⁶ steps.
+    Full,
+}
+
+/// What came of one case.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Verdict {
+    /// The group.
+    pub group: &'static str,
+    /// The case.
+    pub case: &'static str,
+    /// `native` or `plugin`.
+    pub host: &'static str,
+    /// The integrator.
+    pub integrator: &'static str,
+    /// In what pairs are computed.
+    pub precision: String,
+    /// What must happen.
+    pub must: String,
+    /// What did.
+    pub did: String,
+    /// Why that is not what must; nothing if it is.
+    pub wrong: Option<String>,
+}
+
+/// All cases.
+fn cases(extent: Extent) -> Vec<Case> {
+    let mut all = starts::cases();
+    all.extend(singular::cases());
+    all.extend(phases::cases());
+    all.extend(steps::cases());
+    all.extend(forces::cases());
+    all.extend(long::cases(extent == Extent::Full));
+    all
+}
+
+/// The settings in which cases are carried out.
+fn settings(extent: Extent) -> Vec<(Integrator, Precision)> {
+    let quick = ["velocity-verlet", "shardlow-s1", "aboba", "two-stage"];
+    let mut found = Vec::new();
+    for (name, integrator) in Integrator::ALL {
+        if extent != Extent::Quick || quick.contains(&name) {
+            found.push((integrator, Precision::Mixed));
+        }
+        if extent != Extent::Quick || name == "velocity-verlet" {
+            found.push((integrator, Precision::Double));
+        }
+    }
+    found
+}
+
+/// Carries out all cases; in LAMMPS too, if `lammps` is set.
+///
+/// # Errors
+/// Files cannot be written or read, or LAMMPS is asked for and missing.
+pub fn run(
+    extent: Extent,
+    lammps: bool,
+    only: Option<&str>,
+    progress: &Progress,
+) -> Result<Vec<Verdict>, HardCasesError> {
+    let folder = tempfile::tempdir().map_err(HardCasesError::io(std::env::temp_dir()))?;
+    let plugin = lammps.then(|| Plugin::open(&|line| progress.note(line))).transpose()?;
+    let mut cases = cases(extent);
+    cases.retain(|case| only.is_none_or(|words| case.name.contains(words) || case.group.contains(words)));
+    let mut jobs: Vec<Job<Result<Verdict, HardCasesError>>> = Vec::new();
+    for (k, case) in cases.iter().enumerate() {
+        let mut settings = settings(extent);
+        if let Must::Agrees(_) = case.must {
+            // No step is made.
+            settings.retain(|(integrator, _)| *integrator == Integrator::VelocityVerlet);
+        }
+        for (integrator, precision) in settings {
+            let place = folder.path().join(format!("{k}-{}-{precision}", integrator.name()));
+            jobs.push(Box::new(move || one(case, "native", integrator, precision, &place, None)));
+        }
+        if let Some((plugin, must)) = plugin.as_ref().zip(Plugin::must(case)) {
+            for precision in [Precision::Mixed, Precision::Double] {
+                let place = folder.path().join(format!("{k}-plugin-{precision}"));
+                let integrator = Integrator::VelocityVerlet;
+                let there = Some((plugin, must));
+                jobs.push(Box::new(move || one(case, "plugin", integrator, precision, &place, there)));
+            }
+        }
+    }
+    let bar = progress.bar("hard cases", jobs.len() as u64);
+    let jobs = jobs.into_iter().map(|job| {
+        let bar = bar.clone();
+        let counted: Job<Result<Verdict, HardCasesError>> = Box::new(move || {
+            let result = job();
+            bar.advance(1);
+            result
+        });
+        counted
+    });
+    let found = jobs::run(jobs.collect()).into_iter().collect();
+    bar.finish();
+    found
+}
+
+fn one(
+    case: &Case,
+    host: &'static str,
+    integrator: Integrator,
+    precision: Precision,
+    place: &Path,
+    plugin: Option<(&Plugin, Must)>,
+) -> Result<Verdict, HardCasesError> {
+    std::fs::create_dir_all(place).map_err(HardCasesError::io(place))?;
+    let (must, found) = match plugin {
+        Some((plugin, must)) => (must, plugin.carry_out(case, precision, place)?),
+        None => (case.must(integrator), native::carry_out(case, integrator, precision, place)?),
+    };
+    let _ = std::fs::remove_dir_all(place);
+    let wrong = case::judge(must, &found, precision == Precision::Mixed).err();
+    Ok(Verdict {
+        group: case.group,
+        case: case.name,
+        host,
+        integrator: integrator.name(),
+        precision: precision.to_string(),
+        must: must.words(),
+        did: case::said(&found),
+        wrong,
+    })
+}
+
+/// The results as a table.
+pub fn table(results: &[Verdict]) -> Table {
+    let mut table = Table::new(["case", "host", "integrator", "precision", "must be", "was", "verdict"]);
+    for r in results {
+        let verdict = if r.wrong.is_some() { "fail" } else { "pass" };
+        // Messages are long, and their beginning says what happened.
+        let did: String = r.did.chars().take(90).collect();
+        table.push([
+            r.case,
+            r.host,
+            r.integrator,
+            r.precision.as_str(),
+            r.must.as_str(),
+            did.as_str(),
+            verdict,
+        ]);
+    }
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What `psidpd hardcases --quick` does.
+    #[test]
+    fn every_case_does_what_it_must() {
+        let results = run(Extent::Quick, false, None, &Progress::new()).unwrap();
+        let wrong: Vec<&Verdict> = results.iter().filter(|r| r.wrong.is_some()).collect();
+        assert!(wrong.is_empty(), "{}\n{wrong:#?}", table(&results).to_text_with(false));
+        assert!(results.len() > 100);
+    }
+}

@@ -1,0 +1,78 @@
+//! A fluid measured in short runs, to be put beside its theory.
+
+use crate::bulk::{Bulk, Sampling};
+use psidpd_core::model::Model;
+use psidpd_dynamics::run::{RunError, run_scene};
+use psidpd_dynamics::scene::Scene;
+use psidpd_report::{Headline, headline};
+use std::num::NonZeroUsize;
+use std::path::Path;
+
+/// Steps and time step of each run.
+#[derive(Debug, Clone, Copy)]
+pub struct Effort {
+    /// Steps that are measured, after a third of them that are not.
+    pub steps: u64,
+    /// Time step.
+    pub dt: f64,
+}
+
+/// Particles in the homogeneous fluid.
+const PARTICLES: usize = 2000;
+
+/// The homogeneous fluid at a density.
+///
+/// # Errors
+/// The run stops, or cannot begin.
+pub fn homogeneous(
+    model: &Model,
+    file: &Path,
+    kt: f64,
+    densities: &[f64],
+    effort: Effort,
+) -> Result<Headline, RunError> {
+    let sampling = Sampling {
+        particles: PARTICLES,
+        dt: effort.dt,
+        equilibrate: effort.steps / 3,
+        steps: effort.steps,
+        every: 10,
+        seed: 1,
+        threads: NonZeroUsize::MIN,
+    };
+    let bulk = Bulk { model, kt, densities, observe: "", sampling };
+    in_a_folder(&bulk.scene(file)?)
+}
+
+/// A slab of liquid in its vapour, from a guess of the density of the liquid.
+///
+/// # Errors
+/// As [`homogeneous`].
+pub fn slab(model: &Model, file: &Path, kt: f64, liquid: f64, effort: Effort) -> Result<Headline, RunError> {
+    let range = model.at(kt)?.cutoff().max(1e-6);
+    let d = model.dimensions();
+    let mut edges = vec![7.0 * range; d];
+    edges[d - 1] = 20.0 * range;
+    let file = std::path::absolute(file).unwrap_or_else(|_| file.to_owned());
+    let text = format!(
+        "title = \"slab\"\nmodel = {}\nkT = {kt:?}\nbox = {edges:?}\n[initial]\nkind = \"slab\"\nthickness = {:?}\n\
+         density = {liquid:?}\n[[stage]]\nname = \"equilibrate\"\nsteps = {}\ndt = {dt:?}\n[[stage]]\nname = \"produce\"\n\
+         steps = {}\ndt = {dt:?}\n[output]\nthermo = 10\n[observe]\nevery = 10\ntemperature = true\n\
+         surface_tension = true\ninterface_width = true\n",
+        toml::Value::String(file.display().to_string()),
+        9.0 * range,
+        (effort.steps / 3).max(1),
+        effort.steps,
+        dt = effort.dt
+    );
+    let mut scene = Scene::parse("slab", &text, Path::new(""))?;
+    scene.model = model.clone();
+    in_a_folder(&scene)
+}
+
+fn in_a_folder(scene: &Scene) -> Result<Headline, RunError> {
+    let folder =
+        tempfile::tempdir().map_err(|source| RunError::Output { path: std::env::temp_dir(), source })?;
+    run_scene(scene, folder.path(), &mut |_| ())?;
+    Ok(headline(folder.path()))
+}

@@ -1,0 +1,78 @@
+//! Section 11.4: two liquids that do not mix, and drops that meet.
+
+use super::IMMISCIBLE;
+use crate::papers::case::{Outcome, bare, exact, profile};
+use crate::papers::context::{Change, Context, PaperError};
+
+const SMALL: &str = include_str!("../../../../scenes/drop-collision.toml");
+const FULL: &str = include_str!("../../../../scenes/full/drop-collision.toml");
+
+pub fn tension(context: &Context) -> Result<Outcome, PaperError> {
+    let mut outcome = Outcome::default();
+    let [edge, height] = context.pick([6.0, 12.0], [10.0, 20.0]);
+    let scene = format!(
+        "kT = 1.0\nseed = 1\nbox = [{edge:?}, {edge:?}, {height:?}]\ndensity = 10.0\ndt = 0.01\nequilibrate = {}\nsteps = {}\n\
+         [[part]]\nshape = \"layer\"\nface = \"zlo\"\nthickness = {half:?}\nspecies = \"D\"\n\
+         [[part]]\nshape = \"layer\"\nface = \"zhi\"\nthickness = {half:?}\nspecies = \"M\"\n\
+         [output]\nthermo = 0\n[observe]\nevery = 10\ntemperature = true\ncomposition_profile = {{ recentre = false }}\nsurface_tension = {{ axis = \"z\" }}\n",
+        context.pick(1500, 10_000),
+        context.pick(6000, 100_000),
+        half = 0.5 * height,
+    );
+    let observed = context.scene("layers", IMMISCIBLE, &scene)?;
+    // Printed without a digit after the point.
+    outcome.equal("tension by the stress", observed.scalar("surface_tension", "stress"), 28.0, 0.5);
+    outcome.equal("tension by the free energy", observed.scalar("surface_tension", "free_energy"), 28.0, 0.5);
+    let fraction = profile(&observed, "composition_profile", "fraction_D");
+    outcome.plot("fraction", "Two liquids", ["z", "fraction of D"], &[("fraction", fraction)], &[]);
+    Ok(outcome)
+}
+
+pub fn merge(context: &Context) -> Result<Outcome, PaperError> {
+    let mut outcome = Outcome::default();
+    let observed = context.shipped("collision", IMMISCIBLE, context.pick(SMALL, FULL), &[])?;
+    let series = |column| profile(&observed, "clusters_series", column);
+    let largest = series("largest");
+    let drops = context.pick(2.0_f64, 15.0).powi(3) * 10.0 * 8.0 / 3.0 * std::f64::consts::PI;
+    if let [(_, first), .., (_, last)] = largest[..] {
+        outcome.equal("largest drop over one drop, before", exact(2.0 * first.value / drops), 1.0, 0.02);
+        outcome.equal("largest drop over both, after", exact(last.value / drops), 1.0, 0.02);
+    }
+    outcome.plot(
+        "largest",
+        "Collision",
+        ["time", "particles of the largest drop"],
+        &[],
+        &[("largest", bare(&largest))],
+    );
+    Ok(outcome)
+}
+
+pub fn size(context: &Context) -> Result<Outcome, PaperError> {
+    let mut outcome = Outcome::default();
+    let box_: toml_edit::Value =
+        [60.0, 60.0, 104.1667].into_iter().map(|l| l / 100_f64.cbrt()).collect::<toml_edit::Array>().into();
+    let changes: &[Change] = &[(&["box"], box_)];
+    // A few steps of the scene, with nothing observed; at quick size one liquid fills a smaller box.
+    let head = FULL.split("[[part]]").next().unwrap_or(FULL).replace("steps   = 5000", "steps = 20");
+    let text = format!(
+        "{head}[initial]\nkind = \"lattice\"\nspecies = \"D\"\n[output]\nthermo = 20\n[observe]\nevery = 10\ntemperature = true\n"
+    );
+    let begun = std::time::Instant::now();
+    context.shipped("size", IMMISCIBLE, &text, changes)?;
+    let seconds = begun.elapsed().as_secs_f64();
+    let particles = context.pick(3.75e4, 3.75e6);
+    // What this process ever had, in GB: 3.75 million particles fit into the memory of a small computer.
+    let status = std::path::PathBuf::from("/proc/self/status");
+    let text = std::fs::read_to_string(&status).map_err(|source| PaperError::Io { path: status, source })?;
+    let peak = text
+        .lines()
+        .find_map(|line| line.strip_prefix("VmHWM:")?.split_whitespace().next()?.parse::<f64>().ok());
+    outcome.at_most("memory, GB", exact(peak.unwrap_or(f64::NAN) / 1e6), 4.0);
+    outcome.at_most(
+        "seconds for a step of 3.75 million particles",
+        exact(seconds / 20.0 * 3.75e6 / particles),
+        60.0,
+    );
+    Ok(outcome)
+}

@@ -1,0 +1,236 @@
+use crate::bulk::Observed;
+use psidpd_observe::Measured;
+use psidpd_report::{Plot, Series, Style};
+use serde::Serialize;
+use serde_json::{Value, json};
+
+/// Largest deviation that agrees, in units of the combined error.
+pub const LIMIT: f64 = 3.0;
+
+/// Largest error of a measured value, as a share of the published one, where the published error is not larger: what is
+/// vaguer would agree with anything.
+pub const VAGUE: f64 = 0.2;
+
+/// How a value is compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Rule {
+    /// With the published number.
+    Equal,
+    /// It is this or more.
+    AtLeast,
+    /// It is this or less.
+    AtMost,
+}
+
+/// A value beside the published one.
+#[derive(Debug, Clone)]
+pub struct Compared {
+    /// What it is.
+    pub name: String,
+    /// What was measured.
+    pub measured: Measured,
+    /// What is published, or follows from it.
+    pub published: Measured,
+    /// How they are compared.
+    pub rule: Rule,
+    /// A known difference, one standard deviation of it, and its reason.
+    pub allowance: Option<(f64, &'static str)>,
+}
+
+impl Compared {
+    /// The difference in units of the combined error.
+    pub fn deviation(&self) -> f64 {
+        let allowance = self.allowance.map_or(0.0, |(size, _)| size);
+        let error = (self.measured.error.powi(2) + self.published.error.powi(2) + allowance.powi(2)).sqrt();
+        let difference = self.measured.value - self.published.value;
+        // Without errors only equal numbers agree.
+        let right = match self.rule {
+            Rule::Equal => difference == 0.0,
+            Rule::AtLeast => difference >= 0.0,
+            Rule::AtMost => difference <= 0.0,
+        };
+        if error == 0.0 && right { 0.0 } else { difference / error }
+    }
+
+    /// Whether it agrees. NaN does not, nor what is too vague to disagree.
+    pub fn passes(&self) -> bool {
+        let deviation = self.deviation();
+        match self.rule {
+            Rule::Equal => !self.is_vague() && deviation.abs() <= LIMIT,
+            Rule::AtLeast => deviation >= if self.is_vague() { 0.0 } else { -LIMIT },
+            Rule::AtMost => deviation <= if self.is_vague() { 0.0 } else { LIMIT },
+        }
+    }
+
+    /// Whether its error is so large that it tells nothing.
+    pub fn is_vague(&self) -> bool {
+        self.measured.error > (VAGUE * self.published.value.abs()).max(self.published.error)
+    }
+
+    /// For JSON.
+    pub fn to_json(&self) -> Value {
+        let pair = |m: Measured| json!({ "value": m.value, "error": m.error });
+        json!({
+            "name": self.name,
+            "measured": pair(self.measured),
+            "published": pair(self.published),
+            "rule": self.rule,
+            "allowance": self.allowance.map(|(size, why)| json!({ "size": size, "why": why })),
+            "deviation": self.deviation(),
+            "pass": self.passes(),
+        })
+    }
+}
+
+/// The results of a case.
+#[derive(Debug, Clone, Default)]
+pub struct Outcome {
+    /// The values.
+    pub values: Vec<Compared>,
+    /// File names without extension, and plots.
+    pub plots: Vec<(&'static str, Plot)>,
+}
+
+impl Outcome {
+    /// Whether all values agree.
+    pub fn passes(&self) -> bool {
+        !self.values.is_empty() && self.values.iter().all(Compared::passes)
+    }
+
+    /// Adds a value that is to equal `value ± error`.
+    pub fn equal(&mut self, name: impl Into<String>, measured: Measured, value: f64, error: f64) {
+        self.add(name, measured, Rule::Equal, value, error);
+    }
+
+    /// Adds a value that is to be `value` or more.
+    pub fn at_least(&mut self, name: impl Into<String>, measured: Measured, value: f64) {
+        self.add(name, measured, Rule::AtLeast, value, 0.0);
+    }
+
+    /// Adds a value that is to be `value` or less.
+    pub fn at_most(&mut self, name: impl Into<String>, measured: Measured, value: f64) {
+        self.add(name, measured, Rule::AtMost, value, 0.0);
+    }
+
+    fn add(&mut self, name: impl Into<String>, measured: Measured, rule: Rule, value: f64, error: f64) {
+        let published = Measured { value, error };
+        self.values.push(Compared { name: name.into(), measured, published, rule, allowance: None });
+    }
+
+    /// Adds a plot of measured points beside a published line.
+    pub fn plot(
+        &mut self,
+        file: &'static str,
+        title: &str,
+        axes: [&str; 2],
+        measured: &[(&str, Vec<(f64, Measured)>)],
+        published: &[(&str, Vec<(f64, f64)>)],
+    ) {
+        let points = measured.iter().map(|(name, points)| Series {
+            name: (*name).into(),
+            points: points.iter().map(|(x, y)| (*x, y.value)).collect(),
+            errors: Some(points.iter().map(|(_, y)| y.error).collect()),
+            style: Style::Points,
+        });
+        let lines = published.iter().map(|(name, points)| Series {
+            name: (*name).into(),
+            points: points.clone(),
+            errors: None,
+            style: Style::Line,
+        });
+        let plot = Plot {
+            title: title.into(),
+            x_label: axes[0].into(),
+            y_label: axes[1].into(),
+            series: points.chain(lines).collect(),
+            ..Plot::default()
+        };
+        self.plots.push((file, plot));
+    }
+}
+
+/// a − b of independent values.
+pub fn difference(a: Measured, b: Measured) -> Measured {
+    Measured { value: a.value - b.value, error: a.error.hypot(b.error) }
+}
+
+/// a/b of independent values.
+pub fn ratio(a: Measured, b: Measured) -> Measured {
+    let value = a.value / b.value;
+    Measured { value, error: (a.error / b.value).hypot(value * b.error / b.value) }
+}
+
+/// A column of an observation against its abscissa; nothing where it was not observed.
+pub fn profile(observed: &Observed, name: &str, column: &str) -> Vec<(f64, Measured)> {
+    let Some(observation) = observed.get(name) else { return Vec::new() };
+    let (Some(x), Some(y)) = (&observation.x, observation.get(column)) else { return Vec::new() };
+    let values =
+        y.values.iter().zip(&y.errors).map(|(value, error)| Measured { value: *value, error: *error });
+    x.values.iter().copied().zip(values).collect()
+}
+
+/// Means amid two layers that fill a periodic box, one of which is in the middle of the profile: over a quarter of the
+/// box amid the other, then amid this one.
+pub fn layers(profile: &[(f64, Measured)]) -> [Measured; 2] {
+    let count = profile.len();
+    let mean = |from: usize| {
+        let some: Vec<Measured> =
+            profile.iter().cycle().skip(from).take(count / 4).map(|(_, c)| *c).collect();
+        let n = some.len() as f64;
+        let variance: f64 = some.iter().map(|c| c.error * c.error).sum();
+        // Neighbouring bins move together: their errors are not averaged out.
+        Measured { value: some.iter().map(|c| c.value).sum::<f64>() / n, error: (variance / n).sqrt() }
+    };
+    [mean(count - count / 8), mean(count / 2 - count / 8)]
+}
+
+/// A profile without its errors.
+pub fn bare(points: &[(f64, Measured)]) -> Vec<(f64, f64)> {
+    points.iter().map(|(x, y)| (*x, y.value)).collect()
+}
+
+/// A number that is exact, or has only rounding errors.
+pub fn exact(value: f64) -> Measured {
+    Measured { value, error: 0.0 }
+}
+
+/// A curve at 100 places.
+pub fn line(low: f64, high: f64, f: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
+    (0..=100).map(|k| low + (high - low) * f64::from(k) / 100.0).map(|x| (x, f(x))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn compared(rule: Rule, value: f64) -> Compared {
+        let measured = Measured { value, error: 0.3 };
+        let published = Measured { value: 10.0, error: 0.4 };
+        Compared { name: "x".into(), measured, published, rule, allowance: None }
+    }
+
+    #[test]
+    fn deviations_are_in_combined_errors_and_trends_have_one_side() {
+        assert!((compared(Rule::Equal, 11.0).deviation() - 2.0).abs() < 1e-12);
+        assert!(compared(Rule::Equal, 11.49).passes() && !compared(Rule::Equal, 8.49).passes());
+        assert!(compared(Rule::AtLeast, 20.0).passes() && !compared(Rule::AtLeast, 8.0).passes());
+        assert!(compared(Rule::AtMost, 2.0).passes() && !compared(Rule::AtMost, 12.0).passes());
+        assert!(!compared(Rule::AtMost, f64::NAN).passes());
+        let nothing = Compared { measured: Measured::NONE, ..compared(Rule::Equal, 0.0) };
+        assert!(!nothing.passes());
+        let exact = |value| Compared {
+            measured: Measured { value, error: 0.0 },
+            published: Measured { value: 1.0, error: 0.0 },
+            ..compared(Rule::AtMost, 0.0)
+        };
+        assert_eq!(exact(0.5).deviation(), 0.0);
+        assert!(!exact(1.5).passes());
+        let vague =
+            |rule, value| Compared { measured: Measured { value, error: 400.0 }, ..compared(rule, 0.0) };
+        assert!(!vague(Rule::Equal, 10.0).passes() && vague(Rule::Equal, 10.0).deviation() == 0.0);
+        assert!(vague(Rule::AtLeast, 11.0).passes() && !vague(Rule::AtLeast, 9.0).passes());
+        assert!(vague(Rule::AtMost, 9.0).passes() && !vague(Rule::AtMost, 11.0).passes());
+        assert!(!Outcome::default().passes(), "a case without values says nothing");
+    }
+}

@@ -1,0 +1,211 @@
+use crate::bulk::{self, Bulk, Observed, Sampling};
+use psidpd_core::document::FileError;
+use psidpd_core::engine::Fault;
+use psidpd_core::model::Model;
+use psidpd_core::theory::{MeanField, TheoryError};
+use psidpd_dynamics::run::{Begin, RunError};
+use psidpd_dynamics::scene::Scene;
+use std::cell::RefCell;
+use std::collections::HashSet;
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+
+/// How large the runs of a case are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Size {
+    /// Half an hour for all cases.
+    Quick,
+    /// Those of the papers. Runs that were interrupted go on.
+    Full,
+}
+
+/// Why a case cannot be carried out.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PaperError {
+    #[error(transparent)]
+    File(#[from] FileError),
+    #[error(transparent)]
+    Run(#[from] RunError),
+    #[error(transparent)]
+    Theory(#[from] TheoryError),
+    #[error("{path}: {source}")]
+    Io { path: PathBuf, source: std::io::Error },
+    #[error("the file has no {0}")]
+    Parameter(String),
+}
+
+/// Where and how a case runs.
+#[derive(Debug, Clone)]
+pub struct Context {
+    /// How large.
+    pub size: Size,
+    /// The folder of the case.
+    pub folder: PathBuf,
+    /// Threads of each run.
+    pub threads: NonZeroUsize,
+    /// Folders of runs that were made in this call, which figures of the same runs share.
+    pub made: Rc<RefCell<HashSet<PathBuf>>>,
+    /// What is wrong with the forces of its runs: for tests that values tell of it.
+    pub fault: Option<Fault>,
+}
+
+/// A change of a scene: the path of a key, through tables and by the number of an array's entry, and its value.
+pub type Change<'a> = (&'a [&'a str], toml_edit::Value);
+
+/// A homogeneous fluid of one species that a case measures.
+pub struct Fluid<'a> {
+    /// The model file.
+    pub model: &'a str,
+    /// kT.
+    pub kt: f64,
+    /// Time step.
+    pub dt: f64,
+    /// Edge of the box, at full size.
+    pub edge: f64,
+    /// Observables beside temperature and pressure.
+    pub observe: &'a str,
+}
+
+impl Context {
+    /// A number by size.
+    pub fn pick<T>(&self, quick: T, full: T) -> T {
+        match self.size {
+            Size::Quick => quick,
+            Size::Full => full,
+        }
+    }
+
+    fn begin(&self, run: &Path) -> Begin {
+        let fresh = self.made.borrow_mut().insert(run.to_owned());
+        if fresh { self.pick(Begin::Overwrite, Begin::Resume) } else { Begin::Resume }
+    }
+
+    fn write(&self, name: &str, model: &str) -> Result<PathBuf, PaperError> {
+        let path = self.folder.join(format!("{name}.model.toml"));
+        std::fs::create_dir_all(&self.folder)
+            .and_then(|()| std::fs::write(&path, model))
+            .map_err(|source| PaperError::Io { path: path.clone(), source })?;
+        Ok(path)
+    }
+
+    /// Measures a homogeneous fluid at partial densities.
+    pub fn bulk(&self, name: &str, fluid: &Fluid, densities: &[f64]) -> Result<Observed, PaperError> {
+        let path = self.write(name, fluid.model)?;
+        let model = Model::open(&path)?;
+        let total: f64 = densities.iter().sum();
+        let all = total * fluid.edge.powi(model.dimensions() as i32);
+        let sampling = Sampling {
+            particles: self.pick(all.min(1500.0), all) as usize,
+            dt: fluid.dt,
+            equilibrate: self.pick(400, 5000),
+            steps: self.pick(1600, 50_000),
+            every: 20,
+            seed: 1,
+            threads: self.threads,
+        };
+        let bulk = Bulk { model: &model, kt: fluid.kt, densities, observe: fluid.observe, sampling };
+        let folder = self.folder.join(name);
+        Ok(bulk::run_with(&bulk.scene(&path)?, &folder, self.begin(&folder), self.threads, self.fault)?)
+    }
+
+    /// Runs a scene, the text of which does not name its model.
+    pub fn scene(&self, name: &str, model: &str, scene: &str) -> Result<Observed, PaperError> {
+        let path = self.write(name, model)?;
+        let text = format!("model = \"{name}.model.toml\"\n{scene}");
+        let scene =
+            Scene::parse(&format!("{name}.scene.toml"), &text, path.parent().unwrap_or(Path::new("")))?;
+        let folder = self.folder.join(name);
+        Ok(bulk::run_with(&scene, &folder, self.begin(&folder), self.threads, self.fault)?)
+    }
+
+    /// Runs a scene of `scenes/full`, as it is at full size and with `changes` at quick size.
+    pub fn shipped(
+        &self,
+        name: &str,
+        model: &str,
+        scene: &str,
+        changes: &[Change],
+    ) -> Result<Observed, PaperError> {
+        self.scene(name, model, &edited(scene, self.pick(changes, &[]))?)
+    }
+
+    /// The same in a folder that several cases share: their runs are made once.
+    pub fn shared(&self, case: &str) -> Context {
+        let folder = self.folder.parent().map_or_else(|| self.folder.clone(), |all| all.join(case));
+        Context { folder, ..self.clone() }
+    }
+
+    /// Columns of `thermo.csv` of a run, by their names.
+    pub fn thermo<const N: usize>(
+        &self,
+        name: &str,
+        columns: [&str; N],
+    ) -> Result<Vec<[f64; N]>, PaperError> {
+        let path = self.folder.join(name).join("thermo.csv");
+        let text = std::fs::read_to_string(&path).map_err(|source| PaperError::Io { path, source })?;
+        let mut lines = text.lines();
+        let header: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
+        let at = columns.map(|c| header.iter().position(|h| *h == c).unwrap_or(usize::MAX));
+        let row = |line: &str| {
+            let cells: Vec<&str> = line.split(',').collect();
+            at.map(|k| cells.get(k).and_then(|cell| cell.parse().ok()).unwrap_or(f64::NAN))
+        };
+        Ok(lines.map(row).collect())
+    }
+}
+
+/// A scene without its model and with other values.
+fn edited(scene: &str, changes: &[Change]) -> Result<String, PaperError> {
+    let missing = |name: &str| PaperError::Parameter(name.to_owned());
+    let mut document: toml_edit::DocumentMut = scene.parse().map_err(|_| missing("scene"))?;
+    document.remove("model");
+    for (path, value) in changes {
+        let mut item = document.as_item_mut();
+        for step in *path {
+            item = match step.parse::<usize>() {
+                Ok(k) => item.get_mut(k).ok_or_else(|| missing(step))?,
+                Err(_) => &mut item[step],
+            };
+        }
+        *item = toml_edit::Item::Value(value.clone());
+    }
+    Ok(document.to_string())
+}
+
+/// Mean field of a model file.
+pub fn mean_field(model: &str, kt: f64) -> Result<MeanField, PaperError> {
+    Ok(MeanField::new(&Model::parse("model.toml", model)?.at(kt)?)?)
+}
+
+/// A model file with other parameters.
+pub fn with_parameters(model: &str, parameters: &[(&str, f64)]) -> Result<String, PaperError> {
+    let missing = |name: &str| PaperError::Parameter(name.to_owned());
+    let mut document: toml_edit::DocumentMut = model.parse().map_err(|_| missing("parameters"))?;
+    for (name, value) in parameters {
+        let entry = document.get_mut("parameters").and_then(|table| table.get_mut(name));
+        *entry.ok_or_else(|| missing(name))? = toml_edit::value(*value);
+    }
+    Ok(document.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scene_is_changed_where_the_path_leads_and_nowhere_else() {
+        let scene = "model = \"m.toml\"\nsteps = 1\n[[stage]]\nsteps = 2\n[[stage]]\nsteps = 3\n[output]\nthermo = 4\n";
+        let changes: [Change; 3] = [
+            (&["steps"], 10.into()),
+            (&["stage", "1", "steps"], 30.into()),
+            (&["output", "thermo"], 0.into()),
+        ];
+        let text = edited(scene, &changes).unwrap();
+        let expected = "steps = 10\n[[stage]]\nsteps = 2\n[[stage]]\nsteps = 30\n[output]\nthermo = 0\n";
+        assert_eq!(text, expected);
+        assert!(edited(scene, &[(&["stage", "2", "steps"], 1.into())]).is_err());
+        assert_eq!(edited(scene, &[]).unwrap(), scene.trim_start_matches("model = \"m.toml\"\n"));
+    }
+}

@@ -1,0 +1,172 @@
+//! Table 2, Figures 3 to 5: the interface between liquid and vapour.
+
+use super::state::eq18;
+use super::{SET5, SET6};
+use crate::bulk::Observed;
+use crate::papers::case::{Outcome, bare, difference, profile};
+use crate::papers::context::{Context, PaperError};
+use psidpd_observe::Measured;
+
+/// Bins of the density profile.
+const BIN: f64 = 0.05;
+/// A parameter set: name, model, and for each temperature a density of the liquid to start from.
+type Set = (&'static str, &'static str, [(f64, f64); 3]);
+
+const SETS: [Set; 2] = [
+    ("set 5", SET5, [(0.5, 5.3), (1.0, 5.08), (2.0, 4.6)]),
+    ("set 6", SET6, [(0.5, 6.3), (1.0, 6.05), (2.0, 5.6)]),
+];
+
+/// The slab of a set at a temperature.
+fn of_set(context: &Context, set: &str, model: &str, (kt, rho): (f64, f64)) -> Result<Observed, PaperError> {
+    slab(context, &format!("{}-kT{kt}", set.replace(' ', "")), model, kt, rho)
+}
+
+/// Eq. (19) with the slope between bins 0.25 wide, two apart: the largest of the profile and its mirror image.
+fn width_by_bins(observed: &Observed) -> Measured {
+    let density = profile(observed, "density_profile", "density");
+    let count = density.len();
+    let wide = (0.25 / BIN) as usize;
+    let mean = |from: usize| {
+        let bins = (from..from + wide)
+            .map(|k| 0.5 * (density[k % count].1.value + density[(2 * count - 1 - k) % count].1.value));
+        bins.sum::<f64>() / wide as f64
+    };
+    let steepest =
+        (0..count).map(|k| (mean(k) - mean(k + 2 * wide)).abs()).fold(0.0, f64::max) / (2.0 * 0.25);
+    let shape = |column| observed.scalar("interface_width", column);
+    let [liquid, vapour, fit] = ["liquid", "vapour", "width_slope"].map(shape);
+    let value = (liquid.value - vapour.value) / steepest;
+    // As well known, relatively, as the width from the slope of the fitted stretch.
+    Measured { value, error: value * fit.error / fit.value }
+}
+
+/// A slab between two surfaces; figures and the table share the runs.
+fn slab(context: &Context, name: &str, model: &str, kt: f64, rho: f64) -> Result<Observed, PaperError> {
+    let context = context.shared("warren-slab");
+    let [edge, height] = context.pick([7.0, 18.0], [10.0, 30.0]);
+    let scene = format!(
+        "title = \"slab\"\nkT = {kt:?}\nseed = 1\nbox = [{edge:?}, {edge:?}, {height:?}]\ndt = 0.01\nequilibrate = {}\n\
+         steps = {}\n[initial]\nkind = \"slab\"\naxis = \"z\"\nthickness = {:?}\ndensity = {rho:?}\n[output]\n\
+         thermo = 0\n[observe]\nevery = 10\ntemperature = true\ndensity_profile = {{ bins = {} }}\nsurface_tension = \
+         {{ every = 20 }}\ninterface_width = true\n",
+        context.pick(1500, 10_000),
+        context.pick(8000, 100_000),
+        0.5 * height,
+        (height / BIN) as u32,
+    );
+    context.scene(name, model, &scene)
+}
+
+pub fn table2(context: &Context) -> Result<Outcome, PaperError> {
+    let mut outcome = Outcome::default();
+    let printed = [
+        ("set 5", SET5, [5.08, 0.01], [0.78, 0.05], [4.95, 0.03]),
+        ("set 6", SET6, [6.05, 0.01], [0.66, 0.03], [7.45, 0.04]),
+    ];
+    for (set, model, liquid, width, tension) in printed {
+        let observed = of_set(context, set, model, (1.0, liquid[0]))?;
+        let shape = |column| observed.scalar("interface_width", column);
+        outcome.equal(format!("liquid density of {set}"), shape("liquid"), liquid[0], liquid[1]);
+        outcome.equal(format!("width of {set}"), shape("width"), width[0], width[1]);
+        let name = format!("width of {set}, slope between bins of 0.25");
+        outcome.equal(name, width_by_bins(&observed), width[0], width[1]);
+        let measured = observed.scalar("surface_tension", "stress");
+        outcome.equal(format!("tension of {set}"), measured, tension[0], tension[1]);
+    }
+    Ok(outcome)
+}
+
+pub fn fig3(context: &Context) -> Result<Outcome, PaperError> {
+    let mut outcome = Outcome::default();
+    let mut plotted = Vec::new();
+    for ((set, model, states), (b, printed)) in SETS.into_iter().zip([(40.0, 5.08), (25.0, 6.05)]) {
+        // Where eq. (18) has no pressure: "a good estimate of the density of the fluid phase".
+        let (mut low, mut high) = (4.5, 7.0);
+        for _ in 0..50 {
+            let middle = 0.5 * (low + high);
+            if eq18(-40.0, b, middle).value < 0.0 { low = middle } else { high = middle }
+        }
+        let slope = (eq18(-40.0, b, high + 0.01).value - eq18(-40.0, b, high - 0.01).value) / 0.02;
+        let root = Measured { value: high, error: eq18(-40.0, b, high).error / slope };
+        outcome.equal(format!("p = 0 of eq. (18), {set}"), root, printed, 0.01);
+        let mut gaps = Vec::new();
+        let mut ends = Vec::new();
+        for state in states {
+            let observed = of_set(context, set, model, state)?;
+            let [vapour, liquid] =
+                ["vapour", "liquid"].map(|column| observed.scalar("interface_width", column));
+            if state.0 <= 1.0 {
+                // "Virtually devoid of particles".
+                outcome.at_most(format!("density of the vapour of {set} at kT = {}", state.0), vapour, 0.05);
+            }
+            gaps.push(difference(liquid, vapour));
+            ends.extend([(vapour.value, state.0), (liquid.value, state.0)]);
+        }
+        for (pair, states) in gaps.windows(2).zip(states.windows(2)) {
+            let name = format!("growth of the gap of {set} from kT = {} to {}", states[0].0, states[1].0);
+            outcome.at_most(name, difference(pair[1], pair[0]), 0.0);
+        }
+        plotted.push((set, ends));
+    }
+    outcome.plot("tie-lines", "Vapour and liquid", ["density", "kT"], &[], &plotted);
+    Ok(outcome)
+}
+
+pub fn fig4(context: &Context) -> Result<Outcome, PaperError> {
+    let mut outcome = Outcome::default();
+    for (set, model, states) in SETS {
+        let mut lines = Vec::new();
+        for (state, name) in states.into_iter().zip(["kT = 0.5", "kT = 1", "kT = 2"]) {
+            let observed = of_set(context, set, model, state)?;
+            let density = profile(&observed, "density_profile", "density");
+            // Two bins together, and both sides: as wide as the layers are told apart.
+            let count = density.len();
+            let smooth: Vec<f64> = (0..count / 2 - 1)
+                .map(|k| {
+                    [k, k + 1, count - 1 - k, count - 2 - k].map(|k| density[k].1.value).iter().sum::<f64>()
+                        / 4.0
+                })
+                .collect();
+            let liquid = observed.scalar("interface_width", "liquid");
+            let highest = smooth.iter().copied().fold(0.0, f64::max);
+            let noise = density.iter().map(|(_, d)| d.error).fold(0.0, f64::max) / 2.0;
+            let excess = Measured { value: highest / liquid.value - 1.0, error: noise / liquid.value };
+            if state.0 < 0.75 {
+                outcome.equal(format!("height of the layers of {set}, {name}"), excess, 0.10, 0.01);
+            } else {
+                outcome.at_most(format!("height of the layers of {set}, {name}"), excess, 0.02);
+            }
+            lines.push((name, bare(&density)));
+        }
+        let file = if set == "set 5" { "profiles-set5" } else { "profiles-set6" };
+        outcome.plot(file, &format!("Warren, {set}"), ["z", "density"], &[], &lines);
+    }
+    Ok(outcome)
+}
+
+pub fn fig5(context: &Context) -> Result<Outcome, PaperError> {
+    let mut outcome = Outcome::default();
+    let mut plotted = Vec::new();
+    for (set, model, states) in SETS {
+        let (mut tensions, mut widths) = (Vec::new(), Vec::new());
+        for state in states {
+            let observed = of_set(context, set, model, state)?;
+            tensions.push((state.0, observed.scalar("surface_tension", "stress")));
+            widths.push((state.0, observed.scalar("interface_width", "width")));
+        }
+        for (t, w) in tensions.windows(2).zip(widths.windows(2)) {
+            let steps = format!("of {set} from kT = {} to {}", t[0].0, t[1].0);
+            outcome.at_most(format!("growth of the tension {steps}"), difference(t[1].1, t[0].1), 0.0);
+            outcome.at_least(format!("growth of the width {steps}"), difference(w[1].1, w[0].1), 0.0);
+        }
+        let names = if set == "set 5" {
+            ["tension, set 5", "width, set 5"]
+        } else {
+            ["tension, set 6", "width, set 6"]
+        };
+        plotted.extend([(names[0], tensions), (names[1], widths)]);
+    }
+    outcome.plot("temperature", "Warren", ["kT", "tension, width"], &plotted, &[]);
+    Ok(outcome)
+}

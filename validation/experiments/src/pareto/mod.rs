@@ -1,0 +1,454 @@
+//! Speed against error: what a unit of simulated time costs with each setting, and how far off its results are.
+//!
+//! [`setting`] says what is tried, [`origin`] where all begin, [`sample`] runs a setting for its errors and [`time`] all of them
+//! in turn for their cost; [`quantity`] holds results against the reference, [`front`] and [`recommend`] choose.
+
+mod drift;
+mod error;
+mod front;
+mod lammps;
+mod origin;
+mod outcome;
+mod own_style;
+pub mod page;
+mod quantity;
+mod recommend;
+mod sample;
+mod setting;
+mod time;
+mod tolerance;
+
+use drift::EnergyDrift;
+pub use error::ParetoError;
+use outcome::{Cost, Outcome, Point, Recommended, Reference};
+use quantity::Deviation;
+pub use sample::Effort;
+pub use setting::Choice;
+use setting::Host;
+pub use time::Pace;
+pub use tolerance::Tolerance;
+
+use crate::crosscheck::jobs::{self, Job};
+use crate::crosscheck::machine;
+use lammps::Lammps;
+use origin::Origin;
+use psidpd_core::engine::Precision;
+use psidpd_dynamics::integrator::Integrator;
+use psidpd_dynamics::scene::Scene;
+use psidpd_formats::files::write_atomically;
+use psidpd_report::Progress;
+use quantity::{Known, Quantities, deviations};
+use sample::Sampled;
+use setting::{Physics, Setting};
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// What `psidpd pareto` is asked for.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// Minutes that all of it may take, roughly.
+    pub minutes: f64,
+    /// Which settings.
+    pub choice: Choice,
+    /// Thread counts.
+    pub threads: Vec<NonZeroUsize>,
+    /// Tolerances; one percent of all that is resolved so well if there are none.
+    pub tolerances: Vec<Tolerance>,
+    /// Whether LAMMPS is asked too, if it is installed.
+    pub lammps: bool,
+    /// How much of each setting is sampled, and how it is timed; by the minutes if left out.
+    pub fixed: Option<(Effort, Pace)>,
+    /// Folder for `pareto.json` and `pareto.html`.
+    pub out: PathBuf,
+}
+
+/// Shares of the minutes. Sampling counts twice, as two runs go on at once.
+const START: f64 = 0.08;
+const SAMPLING: f64 = 0.42;
+const LAMMPS: f64 = 0.2;
+const DRIFTS: f64 = 0.08;
+const TIMING: f64 = 0.3;
+const WORKERS: f64 = 2.0;
+/// How much more of the reference is sampled than of others.
+const REFERENCE: f64 = 5.0;
+const ROUNDS: usize = 5;
+
+/// The runs of LAMMPS's own style, in units of the scene's Δt; the first is its reference.
+const OWN: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 3.0];
+
+/// Holds the settings of a scene against each other, and writes `pareto.json` and `pareto.html`.
+///
+/// # Errors
+/// The scene cannot be run with its own step, or something cannot be written.
+pub fn run(scene: &Scene, options: &Options, progress: &Progress) -> Result<Outcome, ParetoError> {
+    std::fs::create_dir_all(&options.out).map_err(ParetoError::io(&options.out))?;
+    let out = options.out.canonicalize().map_err(ParetoError::io(&options.out))?;
+    let seconds = 60.0 * options.minutes;
+    let all = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
+    let spinner = progress.spinner("start");
+    let origin = Origin::of(scene, Duration::from_secs_f64(START * seconds), all)?;
+    spinner.finish();
+    let known = known(&origin)?;
+    let mut left_out = Vec::new();
+    let lammps = match options.lammps {
+        true => match Lammps::open(&origin, &out.join("runs"), &|line| progress.note(line)) {
+            Ok(lammps) => Some(lammps),
+            Err(error) => {
+                left_out.push(format!("LAMMPS is not among the points: {error}."));
+                None
+            }
+        },
+        false => None,
+    };
+
+    let share = if lammps.is_some() { SAMPLING } else { SAMPLING + LAMMPS };
+    let physics = setting::physics(options.choice);
+    let weights = physics.len() as f64 + REFERENCE;
+    let effort = options.fixed.map_or(Effort::Seconds(WORKERS * share * seconds / weights), |fixed| fixed.0);
+    let (references, sampled) = sample_all(&origin, &physics, effort, progress)?;
+    let reference_quantities = references.quantities(&origin)?;
+    let drifts = drifts(&origin, known, options, DRIFTS * WORKERS * seconds, progress)?;
+
+    let mut points =
+        native_points(&origin, options, &physics, &sampled, |q| deviations(q, &reference_quantities, known));
+    let mut lammps_reference = None;
+    if let Some(lammps) = &lammps {
+        plugin_points(&origin, &mut points);
+        match own_points(&origin, lammps, LAMMPS * seconds, options, known, &reference_quantities, progress) {
+            Ok(Some((reference, own))) => {
+                lammps_reference = reference;
+                points.extend(own);
+            }
+            Ok(None) => {
+                left_out.push("LAMMPS has no style of its own for this fluid that is known here.".into())
+            }
+            Err(error) => left_out.push(format!("LAMMPS's own style is not among the points: {error}.")),
+        }
+    }
+
+    let stable: Vec<usize> = (0..points.len()).filter(|k| points[*k].stable).collect();
+    let settings: Vec<Setting> = stable.iter().map(|k| points[*k].setting).collect();
+    let slices = ((ROUNDS + 1) * settings.len().max(1)) as f64;
+    let pace =
+        options.fixed.map_or(Pace { rounds: ROUNDS, seconds: TIMING * seconds / slices }, |fixed| fixed.1);
+    let costs = time::time(&origin, &settings, lammps.as_ref(), pace, progress)?;
+    for (k, cost) in stable.into_iter().zip(costs) {
+        points[k].cost = Cost::of(&cost);
+    }
+    let (tolerances, unresolved) = match &options.tolerances[..] {
+        [] => front::usual(&points),
+        asked => (asked.to_vec(), Vec::new()),
+    };
+    if let Some(tolerance) = front::unmeasured(&points, &tolerances) {
+        return Err(ParetoError::Unmeasured(tolerance.name.clone()));
+    }
+    front::mark(&mut points, &tolerances);
+    let (reference, reference_of_dynamics) = references.tell(&origin, known);
+    if let Err(why) = &references.configurations {
+        left_out
+            .push(format!("There is no Monte Carlo of this scene, so small steps are the reference: {why}."));
+    }
+    let mut outcome = Outcome {
+        format: 2,
+        version: env!("CARGO_PKG_VERSION"),
+        machine: machine(),
+        scene: scene.title.clone(),
+        stage: origin.stage.name.clone(),
+        particles: origin.state.len(),
+        kt: origin.stage.kt,
+        dt: origin.stage.dt,
+        temperature_is_known: known.temperature,
+        reference,
+        reference_of_dynamics,
+        lammps_reference,
+        left_out,
+        points,
+        drifts,
+        tolerances,
+        unresolved,
+        recommended: None,
+    };
+    outcome.recommended = recommend(&origin, &outcome);
+    let json = serde_json::to_string_pretty(&outcome)
+        .map_err(|e| ParetoError::io(out.join("pareto.json"))(e.into()))?;
+    write_atomically(out.join("pareto.json"), (json + "\n").as_bytes())?;
+    write_atomically(out.join("pareto.html"), page::report(&outcome)?.as_bytes())?;
+    Ok(outcome)
+}
+
+/// A setting in words.
+fn what(origin: &Origin, physics: &Physics) -> String {
+    let integrator = recommend::short(&physics.integrator);
+    if !physics.integrator.has_time() {
+        return integrator;
+    }
+    format!("{integrator}, dt = {}, {} precision", origin.dt(physics), physics.precision)
+}
+
+/// Whether velocities have a distribution that is known, and what pressures are held against.
+fn known(origin: &Origin) -> Result<Known, ParetoError> {
+    let (scene, stage) = (origin.scene, origin.stage);
+    let flows = stage.body_forces && !scene.body_forces.is_empty();
+    let conservative = scene.model.at(stage.kt)?.is_conservative();
+    let volume = origin.state.domain.volume(scene.model.dimensions());
+    Ok(Known {
+        kt: stage.kt,
+        temperature: conservative && !flows,
+        ideal_pressure: origin.state.len() as f64 * stage.kt / volume,
+    })
+}
+
+/// What errors are held against.
+struct References {
+    /// Monte Carlo, or why there is none.
+    configurations: Result<Sampled, String>,
+    /// Small steps.
+    small_steps: Sampled,
+}
+
+impl References {
+    /// Their quantities: those of configurations from Monte Carlo, if there is one.
+    fn quantities(&self, origin: &Origin) -> Result<Quantities, ParetoError> {
+        let made = |sampled: &Sampled, physics: &Physics| match sampled {
+            Sampled::Made { quantities, .. } => Ok(quantities.as_ref().clone()),
+            Sampled::Unstable(why) => {
+                Err(ParetoError::Reference { what: what(origin, physics), why: why.clone() })
+            }
+        };
+        let small = made(&self.small_steps, &Physics::small_steps());
+        match &self.configurations {
+            Ok(sampled) => Ok(made(sampled, &Physics::reference())?.with_dynamics_of(small.ok().as_ref())),
+            Err(_) => small,
+        }
+    }
+
+    /// The reference, and that of diffusion and viscosities if it is another.
+    fn tell(&self, origin: &Origin, known: Known) -> (Reference, Option<Reference>) {
+        let small = reference_of(origin, &Physics::small_steps(), &self.small_steps, known);
+        match &self.configurations {
+            Ok(sampled) => (reference_of(origin, &Physics::reference(), sampled, known), Some(small)),
+            Err(_) => (small, None),
+        }
+    }
+}
+
+/// The references, and every setting's run; two at once.
+fn sample_all(
+    origin: &Origin,
+    physics: &[Physics],
+    effort: Effort,
+    progress: &Progress,
+) -> Result<(References, Vec<Sampled>), ParetoError> {
+    let bar = progress.bar("errors", physics.len() as u64 + 2);
+    let references = [Physics::reference(), Physics::small_steps()];
+    let mut jobs: Vec<Job<Result<Sampled, ParetoError>>> = Vec::new();
+    for (k, physics) in references.iter().chain(physics).enumerate() {
+        let effort = if k < references.len() { effort.times(REFERENCE) } else { effort };
+        let bar = bar.clone();
+        jobs.push(Box::new(move || {
+            let sampled = sample::sample(origin, physics, effort);
+            bar.advance(1);
+            sampled
+        }));
+    }
+    let mut found = jobs::run(jobs).into_iter();
+    // A model without energy, or a flow, has no Monte Carlo.
+    let configurations = found.next().map_or(Err(String::new()), |found| found.map_err(|e| e.to_string()));
+    let mut rest: Vec<Sampled> = found.collect::<Result<_, _>>()?;
+    bar.finish();
+    let sampled = rest.split_off(1);
+    Ok((References { configurations, small_steps: rest.swap_remove(0) }, sampled))
+}
+
+/// Energy without thermostat, where there is one that is conserved.
+fn drifts(
+    origin: &Origin,
+    known: Known,
+    options: &Options,
+    seconds: f64,
+    progress: &Progress,
+) -> Result<Vec<EnergyDrift>, ParetoError> {
+    if !known.temperature || options.choice == Choice::Few {
+        return Ok(Vec::new());
+    }
+    let schemes = drift::schemes();
+    let effort = Effort::Seconds(seconds / schemes.len() as f64);
+    let bar = progress.bar("energy", schemes.len() as u64);
+    let mut jobs: Vec<Job<Result<EnergyDrift, ParetoError>>> = Vec::new();
+    for scheme in &schemes {
+        let bar = bar.clone();
+        jobs.push(Box::new(move || {
+            let found = drift::drift(origin, scheme, effort);
+            bar.advance(1);
+            found
+        }));
+    }
+    let found = jobs::run(jobs).into_iter().collect();
+    bar.finish();
+    found
+}
+
+fn point(origin: &Origin, setting: Setting, sampled: &Sampled, errors: Vec<Deviation>) -> Point {
+    let (samples, time, unstable) = match sampled {
+        Sampled::Made { samples, time, .. } => (*samples, *time, None),
+        Sampled::Unstable(why) => (0, 0.0, Some(why.clone())),
+    };
+    Point {
+        code: setting.host,
+        integrator: recommend::short(&setting.physics.integrator),
+        dt: origin.dt(&setting.physics),
+        precision: setting.physics.precision.to_string(),
+        threads: setting.threads.get(),
+        cost: None,
+        samples,
+        time,
+        errors,
+        worst: None,
+        stable: unstable.is_none(),
+        unstable,
+        front: false,
+        setting,
+    }
+}
+
+/// A point of each run on one thread, and on more of those that matter most; errors do not depend on threads.
+fn native_points(
+    origin: &Origin,
+    options: &Options,
+    physics: &[Physics],
+    sampled: &[Sampled],
+    errors: impl Fn(&Quantities) -> Vec<Deviation>,
+) -> Vec<Point> {
+    let mut points = Vec::new();
+    for (physics, sampled) in physics.iter().zip(sampled) {
+        let errors = match sampled {
+            Sampled::Made { quantities, .. } => errors(quantities),
+            Sampled::Unstable(_) => Vec::new(),
+        };
+        let fewest = options.threads.iter().min().copied().unwrap_or(NonZeroUsize::MIN);
+        let usual = match physics.integrator {
+            Integrator::VelocityVerlet => physics.multiple == 1.0,
+            Integrator::ForceGradient { .. } => physics.multiple >= 5.0,
+            _ => false,
+        };
+        let matters = options.choice == Choice::Full || usual && physics.precision == Precision::Mixed;
+        for &threads in &options.threads {
+            if threads == fewest || (matters && matches!(sampled, Sampled::Made { .. })) {
+                let setting = Setting { host: Host::Native, physics: *physics, threads };
+                points.push(point(origin, setting, sampled, errors.clone()));
+            }
+        }
+    }
+    points
+}
+
+/// The same steps by the plugin, where a deck can have them.
+fn plugin_points(origin: &Origin, points: &mut Vec<Point>) {
+    let mut more: Vec<Point> = Vec::new();
+    for p in points.iter().filter(|p| p.stable) {
+        let setting = Setting { host: Host::Plugin, threads: NonZeroUsize::MIN, ..p.setting };
+        let there = more.iter().any(|other| other.setting == setting);
+        if !there && recommend::in_lammps(origin, &setting.physics) {
+            more.push(Point { code: Host::Plugin, threads: 1, setting, ..p.clone() });
+        }
+    }
+    points.extend(more);
+}
+
+type Own = (Option<Reference>, Vec<Point>);
+
+/// LAMMPS's own style.
+fn own_points(
+    origin: &Origin,
+    lammps: &Lammps,
+    seconds: f64,
+    options: &Options,
+    known: Known,
+    native: &Quantities,
+    progress: &Progress,
+) -> Result<Option<Own>, ParetoError> {
+    let Some(own) = lammps.own else { return Ok(None) };
+    let physics = OWN.map(|multiple| Physics {
+        integrator: Integrator::VelocityVerlet,
+        multiple,
+        precision: Precision::Double,
+    });
+    let setting = |physics: Physics| Setting { host: Host::Lammps, physics, threads: NonZeroUsize::MIN };
+    let step = lammps.time(origin, &setting(physics[2]), 40)?;
+    let effort = match options.fixed {
+        Some((Effort::Samples(n), _)) => Effort::Samples(n),
+        _ => Effort::Seconds(WORKERS * seconds / OWN.len() as f64),
+    };
+    let bar = progress.bar("LAMMPS's own style", OWN.len() as u64);
+    let mut jobs: Vec<Job<Result<Sampled, ParetoError>>> = Vec::new();
+    for (k, physics) in physics.iter().enumerate() {
+        let bar = bar.clone();
+        jobs.push(Box::new(move || {
+            let found = lammps.sample(origin, physics, effort, step, &format!("own-{k}"));
+            bar.advance(1);
+            found
+        }));
+    }
+    let sampled: Vec<Sampled> = jobs::run(jobs).into_iter().collect::<Result<_, _>>()?;
+    bar.finish();
+    let mut known = known;
+    let (reference, first) = match (&sampled[0], own.is_another_law()) {
+        (Sampled::Made { quantities, .. }, true) => {
+            known.temperature = false;
+            (quantities.as_ref().clone(), 1)
+        }
+        (Sampled::Unstable(_), true) => return Ok(Some((None, Vec::new()))),
+        (_, false) => (native.clone(), 0),
+    };
+    let mut points = Vec::new();
+    for (physics, sampled) in physics.iter().zip(&sampled).skip(first) {
+        let errors = match sampled {
+            Sampled::Made { quantities, .. } => deviations(quantities, &reference, known),
+            Sampled::Unstable(_) => Vec::new(),
+        };
+        points.push(point(origin, setting(*physics), sampled, errors));
+    }
+    let itself = own.is_another_law().then(|| reference_of(origin, &physics[0], &sampled[0], known));
+    Ok(Some((itself, points)))
+}
+
+/// A reference with its own errors: of temperatures from kT where that is known, statistical ones of all else.
+fn reference_of(origin: &Origin, physics: &Physics, sampled: &Sampled, known: Known) -> Reference {
+    let (values, samples, time) = match sampled {
+        Sampled::Made { quantities, samples, time } => {
+            (deviations(quantities, &quantities.as_if_exact(), known), *samples, *time)
+        }
+        Sampled::Unstable(_) => (Vec::new(), 0, 0.0),
+    };
+    let dt = physics.integrator.has_time().then(|| origin.dt(physics));
+    Reference { what: what(origin, physics), dt, samples, time, values }
+}
+
+fn recommend(origin: &Origin, outcome: &Outcome) -> Option<Recommended> {
+    let Outcome { points, tolerances, .. } = outcome;
+    let best = front::cheapest(points, tolerances, &[Host::Native])?;
+    let timed = front::cheapest(points, tolerances, &[Host::Plugin]);
+    let setting = points[best].setting;
+    let same = recommend::lammps_lines(origin, &setting.physics);
+    let other = timed.or_else(|| {
+        // Without LAMMPS here its cost is not known: the cheapest natively of what it can run.
+        let runs: Vec<Point> =
+            points.iter().filter(|p| recommend::in_lammps(origin, &p.setting.physics)).cloned().collect();
+        let found = front::cheapest(&runs, tolerances, &[Host::Native])?;
+        points.iter().position(|p| *p == runs[found])
+    });
+    let (lammps, lammps_refusal) = match (same, other) {
+        (Ok(lines), None) => (Some(lines), None),
+        (same, Some(k)) => (
+            recommend::lammps_lines(origin, &points[k].setting.physics).ok(),
+            same.err().map(|e| e.to_string()),
+        ),
+        (Err(refusal), None) => (None, Some(refusal.to_string())),
+    };
+    let scene = recommend::scene_lines(origin.dt(&setting.physics), &setting);
+    Some(Recommended { point: best, scene, lammps, point_in_lammps: timed, lammps_refusal })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,359 @@
+//! What errors are told of, and how large they are.
+
+use psidpd_observe::{Measured, Observation};
+use serde::{Serialize, Serializer};
+
+/// Kinds of quantities.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+pub enum Class {
+    /// Energy of the particles, in kT for each.
+    #[serde(rename = "u")]
+    Energy,
+    /// Pressures of the conservative forces and of the momentum carried, in ρkT.
+    #[serde(rename = "p")]
+    Pressure,
+    /// Kinetic and configurational temperature, in kT.
+    #[serde(rename = "T")]
+    Temperature,
+    /// Coexisting densities, in units of the liquid's.
+    #[serde(rename = "rho")]
+    Density,
+    /// Surface tension, in units of itself.
+    #[serde(rename = "sigma")]
+    Tension,
+    /// Diffusion coefficient, in units of itself.
+    #[serde(rename = "D")]
+    Diffusion,
+    /// Shear viscosity, in units of itself.
+    #[serde(rename = "eta")]
+    Viscosity,
+    /// The distance of g(r): root mean square difference over root mean square, weighed by shells.
+    #[serde(rename = "g")]
+    Structure,
+}
+
+impl Class {
+    /// With the names on the command line.
+    pub const ALL: [(&'static str, Class); 8] = [
+        ("u", Class::Energy),
+        ("p", Class::Pressure),
+        ("T", Class::Temperature),
+        ("rho", Class::Density),
+        ("sigma", Class::Tension),
+        ("D", Class::Diffusion),
+        ("eta", Class::Viscosity),
+        ("g", Class::Structure),
+    ];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        Class::ALL.iter().find(|(_, class)| *class == self).map_or("", |found| found.0)
+    }
+
+    /// Whether it is a property of configurations alone, which a reference without a time step has.
+    pub fn is_of_configurations(self) -> bool {
+        !matches!(self, Class::Diffusion | Class::Viscosity)
+    }
+}
+
+/// Where quantities are among the observations: class, name here, observation, column.
+const SCALARS: [(Class, &str, &str, &str); 12] = [
+    (Class::Pressure, "p_conservative", "pressure", "conservative"),
+    (Class::Pressure, "p_carried", "pressure", "carried"),
+    (Class::Temperature, "T_conf", "temperature", "configurational"),
+    (Class::Density, "rho_L", "interface_width", "liquid"),
+    (Class::Density, "rho_V", "interface_width", "vapour"),
+    (Class::Density, "rho_L_drop", "drop", "liquid"),
+    (Class::Density, "rho_V_drop", "drop", "vapour"),
+    (Class::Tension, "sigma", "surface_tension", "free_energy"),
+    (Class::Tension, "sigma_stress", "surface_tension", "stress"),
+    (Class::Tension, "sigma_drop", "drop", "tension"),
+    (Class::Viscosity, "eta", "viscosity", "viscosity"),
+    (Class::Viscosity, "eta_flow", "poiseuille", "viscosity"),
+];
+
+/// The names of quantities that a tolerance can be for.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    ["u", "T_kin", "p_total", "D", "g"].into_iter().chain(SCALARS.iter().map(|(_, name, ..)| *name))
+}
+
+/// A measured quantity.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Quantity {
+    /// Its kind.
+    pub class: Class,
+    /// Its name.
+    pub name: String,
+    /// Its value.
+    pub measured: Measured,
+}
+
+/// A radial distribution function, for distances.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Structure {
+    /// Weight of each shell.
+    pub weights: Vec<f64>,
+    /// Values.
+    pub g: Vec<f64>,
+    /// Their errors.
+    pub errors: Vec<f64>,
+}
+
+/// All that is known of one run.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Quantities {
+    /// Numbers.
+    pub scalars: Vec<Quantity>,
+    /// g(r) of all particles.
+    pub structure: Option<Structure>,
+}
+
+impl Quantities {
+    /// From what was measured at every sample, by class and name, and what was observed.
+    pub fn of(
+        sampled: impl IntoIterator<Item = (Class, &'static str, Measured)>,
+        observations: &[Observation],
+        dimensions: usize,
+    ) -> Quantities {
+        let mut scalars: Vec<Quantity> = sampled
+            .into_iter()
+            .map(|(class, name, measured)| Quantity { class, name: name.into(), measured })
+            .collect();
+        let known = |m: &Measured| m.value.is_finite() && m.error.is_finite();
+        for (class, name, of, column) in SCALARS {
+            let found = observations.iter().find(|o| o.name == of).and_then(|o| o.scalar(column));
+            if let Some(measured) = found.filter(known) {
+                scalars.push(Quantity { class, name: name.into(), measured });
+            }
+        }
+        for o in observations.iter().filter(|o| o.name == "diffusion") {
+            for c in &o.columns {
+                if let Some(measured) = o.scalar(&c.name).filter(known) {
+                    let name = c.name.replacen("diffusion", "D", 1);
+                    scalars.push(Quantity { class: Class::Diffusion, name, measured });
+                }
+            }
+        }
+        let rdf = observations.iter().find(|o| o.name == "rdf");
+        let structure = rdf.and_then(|o| {
+            let (r, g) = (&o.x.as_ref()?.values, o.get("g")?);
+            let weights = r.iter().map(|r| r.powi(dimensions as i32 - 1)).collect();
+            let good = g.values.iter().chain(&g.errors).all(|v| v.is_finite());
+            good.then(|| Structure { weights, g: g.values.clone(), errors: g.errors.clone() })
+        });
+        Quantities { scalars, structure }
+    }
+
+    /// The same values as if they were known without error.
+    #[must_use]
+    pub fn as_if_exact(&self) -> Quantities {
+        let mut same = self.clone();
+        same.scalars.iter_mut().for_each(|q| q.measured.error = 0.0);
+        same.structure.iter_mut().flat_map(|s| &mut s.errors).for_each(|e| *e = 0.0);
+        same
+    }
+
+    /// The same with the diffusion and viscosities of another run, if there is one.
+    #[must_use]
+    pub fn with_dynamics_of(mut self, other: Option<&Quantities>) -> Quantities {
+        self.scalars.retain(|q| q.class.is_of_configurations());
+        let theirs = other.iter().flat_map(|other| &other.scalars);
+        self.scalars.extend(theirs.filter(|q| !q.class.is_of_configurations()).cloned());
+        self
+    }
+
+    /// A quantity by its name.
+    pub fn get(&self, name: &str) -> Option<Measured> {
+        self.scalars.iter().find(|q| q.name == name).map(|q| q.measured)
+    }
+}
+
+/// What is known better than by measuring, and units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Known {
+    /// kT of the stage.
+    pub kt: f64,
+    /// Whether that is the temperature of velocities and configurations: no flow, forces with a potential.
+    pub temperature: bool,
+    /// ρ kT.
+    pub ideal_pressure: f64,
+}
+
+/// The error of a quantity, in the unit of its class, with an error of its own.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Deviation {
+    /// Its kind.
+    pub class: Class,
+    /// Of which quantity.
+    pub name: String,
+    /// What was measured, in the unit of the model.
+    pub measured: Measured,
+    /// The error, with its sign.
+    pub value: f64,
+    /// One standard deviation of that, the reference's among it.
+    pub error: f64,
+    /// Whether the error is larger than two of these.
+    pub resolved: bool,
+}
+
+/// How many standard deviations an error is taken to be larger than it was found, where it must be within bounds.
+const MARGIN: f64 = 2.0;
+
+impl Deviation {
+    fn new(class: Class, name: &str, measured: Measured, value: f64, error: f64) -> Deviation {
+        Deviation { class, name: name.into(), measured, value, error, resolved: value.abs() > MARGIN * error }
+    }
+
+    /// The largest error that is likely: what tolerances bound.
+    pub fn bound(&self) -> f64 {
+        self.value.abs() + MARGIN * self.error
+    }
+
+    /// Where it is on a plot: at its error, or if that is not resolved at what it may be.
+    pub fn shown(&self) -> f64 {
+        if self.resolved { self.value.abs() } else { self.bound() }
+    }
+
+    /// Whether an error of `bound` would be resolved.
+    pub fn resolves(&self, bound: f64) -> bool {
+        MARGIN * self.error <= bound
+    }
+}
+
+/// By name; the order of the table is not kept.
+pub fn by_name<S: Serializer>(deviations: &[Deviation], serializer: S) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    struct Entry {
+        value: f64,
+        error: f64,
+        resolved: bool,
+        measured: Measured,
+    }
+    let entry =
+        |d: &Deviation| Entry { value: d.value, error: d.error, resolved: d.resolved, measured: d.measured };
+    serializer.collect_map(deviations.iter().map(|d| (&d.name, entry(d))))
+}
+
+/// The errors of `run` against what is known, and against `reference` otherwise.
+pub fn deviations(run: &Quantities, reference: &Quantities, known: Known) -> Vec<Deviation> {
+    let liquid = reference
+        .scalars
+        .iter()
+        .filter(|q| q.class == Class::Density)
+        .map(|q| q.measured.value.abs())
+        .fold(0.0, f64::max);
+    let mut found = Vec::new();
+    for Quantity { class, name, measured } in &run.scalars {
+        let truth = match known.temperature && *class == Class::Temperature {
+            true => Some(Measured { value: known.kt, error: 0.0 }),
+            false => reference.get(name),
+        };
+        let Some(truth) = truth else { continue };
+        let unit = match class {
+            Class::Energy | Class::Temperature => known.kt,
+            Class::Pressure => known.ideal_pressure,
+            Class::Density => liquid,
+            _ => truth.value.abs(),
+        };
+        if unit > 0.0 && measured.error.is_finite() && truth.error.is_finite() {
+            let value = (measured.value - truth.value) / unit;
+            let error = measured.error.hypot(truth.error) / unit;
+            found.push(Deviation::new(*class, name, *measured, value, error));
+        }
+    }
+    if let (Some(a), Some(b)) = (&run.structure, &reference.structure)
+        && a.g.len() == b.g.len()
+    {
+        let [distance, error] = distance(a, b);
+        if distance.is_finite() && error.is_finite() {
+            let measured = Measured { value: distance, error };
+            found.push(Deviation::new(Class::Structure, "g", measured, distance, error));
+        }
+    }
+    found
+}
+
+/// `√(Σ w Δg² / Σ w g²)` without what noise adds to Δg², and its error. Shells are taken to be independent.
+fn distance(a: &Structure, b: &Structure) -> [f64; 2] {
+    let (mut square, mut variance, mut whole) = (0.0, 0.0, 0.0);
+    for k in 0..a.g.len() {
+        let (w, difference) = (a.weights[k], a.g[k] - b.g[k]);
+        let noise = a.errors[k].powi(2) + b.errors[k].powi(2);
+        square += w * (difference * difference - noise);
+        variance += w * w * (4.0 * (difference * difference - noise).max(0.0) * noise + 2.0 * noise * noise);
+        whole += w * b.g[k] * b.g[k];
+    }
+    if whole <= 0.0 {
+        return [f64::NAN; 2];
+    }
+    let (square, spread) = (square / whole, variance.sqrt() / whole);
+    let distance = square.max(0.0).sqrt();
+    // Far from zero the error of a square root, near it the root of the error.
+    let error = if square > spread { spread / (2.0 * distance) } else { spread.sqrt() };
+    [distance, error]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run(kinetic: f64, error: f64) -> Quantities {
+        Quantities::of([(Class::Temperature, "T_kin", Measured { value: kinetic, error })], &[], 3)
+    }
+
+    #[test]
+    fn temperatures_are_held_against_what_is_known() {
+        let known = Known { kt: 2.0, temperature: true, ideal_pressure: 1.0 };
+        let found = deviations(&run(2.1, 0.01), &run(1.9, 0.5), known);
+        assert_eq!(found.len(), 1);
+        assert!((found[0].value - 0.05).abs() < 1e-12 && (found[0].error - 0.005).abs() < 1e-12);
+        assert!(found[0].resolved && (found[0].bound() - 0.06).abs() < 1e-12);
+        assert_eq!(found[0].shown(), found[0].value.abs());
+        assert!(found[0].resolves(0.0101) && !found[0].resolves(0.0099));
+        // Against a reference both are uncertain.
+        let found = deviations(&run(2.1, 0.3), &run(2.0, 0.4), Known { temperature: false, ..known });
+        assert!((found[0].error - 0.25).abs() < 1e-12 && !found[0].resolved);
+        assert_eq!(found[0].shown(), found[0].bound());
+    }
+
+    /// Energies are in kT, pressures in ρkT, densities in that of the liquid; diffusion is another run's.
+    #[test]
+    fn every_class_has_its_unit() {
+        let of = |u: f64, p: f64, liquid: f64, vapour: f64, d: f64| {
+            let exact = |value| Measured { value, error: 0.0 };
+            Quantities::of(
+                [
+                    (Class::Energy, "u", exact(u)),
+                    (Class::Pressure, "p_carried", exact(p)),
+                    (Class::Density, "rho_L", exact(liquid)),
+                    (Class::Density, "rho_V", exact(vapour)),
+                    (Class::Diffusion, "D", exact(d)),
+                ],
+                &[],
+                3,
+            )
+        };
+        let reference = of(-26.0, 1.0, 8.0, 0.5, 9.0).with_dynamics_of(Some(&of(0.0, 0.0, 0.0, 0.0, 4.0)));
+        let known = Known { kt: 2.0, temperature: true, ideal_pressure: 12.0 };
+        let found = deviations(&of(-25.0, 4.0, 8.4, 0.9, 5.0), &reference, known);
+        let values: Vec<f64> = found.iter().map(|d| d.value).collect();
+        let expected = [0.5, 0.25, 0.05, 0.05, 0.25];
+        assert!(values.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{values:?}");
+    }
+
+    #[test]
+    fn noise_is_no_distance() {
+        let of = |g: Vec<f64>, e: f64| Structure { weights: vec![1.0; g.len()], errors: vec![e; g.len()], g };
+        let n = 400;
+        // Differences of ±2e as noise of two functions with errors e would on average, but for their spread.
+        let wobble = |k: usize| if k.is_multiple_of(2) { 0.01 } else { -0.01 };
+        let a = of((0..n).map(|k| 1.0 + 2f64.sqrt() * wobble(k)).collect(), 0.01);
+        let b = of(vec![1.0; n], 0.01);
+        let [d, error] = distance(&a, &b);
+        assert!(d < 1e-9 && error > 0.0, "{d} {error}");
+        // A shift by a tenth is seen as one.
+        let shifted = of(vec![1.1; n], 0.001);
+        let [d, error] = distance(&shifted, &of(vec![1.0; n], 0.001));
+        assert!((d - 0.1).abs() < 1e-3 && error < 1e-3, "{d} {error}");
+    }
+}

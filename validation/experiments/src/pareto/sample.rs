@@ -1,0 +1,170 @@
+//! A run of one setting, for what it measures.
+
+use super::ParetoError;
+use super::origin::Origin;
+use super::quantity::{Class, Quantities};
+use super::setting::{Host, Physics};
+use psidpd_core::document::Document;
+use psidpd_core::engine::Want;
+use psidpd_dynamics::run::{RunError, Simulation};
+use psidpd_observe::meter::AnyMeter;
+use psidpd_observe::{Observe, Observers, Request, Series, StageNames, read};
+use std::num::NonZeroUsize;
+use std::time::{Duration, Instant};
+
+/// How much is sampled.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Effort {
+    /// As much as the clock allows, of a reference so many times as much.
+    Seconds(f64),
+    /// So many samples.
+    Samples(u64),
+}
+
+impl Effort {
+    /// The same, `factor` times.
+    pub fn times(self, factor: f64) -> Effort {
+        match self {
+            Effort::Seconds(s) => Effort::Seconds(factor * s),
+            Effort::Samples(n) => Effort::Samples((factor * n as f64) as u64),
+        }
+    }
+
+    /// Whether a part of it is used up.
+    pub fn is_used(self, part: f64, begin: Instant, samples: u64) -> bool {
+        match self {
+            Effort::Seconds(s) => begin.elapsed() >= Duration::from_secs_f64(part * s),
+            Effort::Samples(n) => samples as f64 >= part * n as f64,
+        }
+    }
+}
+
+/// What a run came to.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Sampled {
+    /// It was made.
+    Made {
+        /// What it measured.
+        quantities: Box<Quantities>,
+        /// Samples of the kinetic temperature.
+        samples: u64,
+        /// Simulated time that they are spread over.
+        time: f64,
+    },
+    /// It stopped, or left its temperature far behind.
+    Unstable(String),
+}
+
+/// Part of a run that is left for it to settle.
+const SETTLE: f64 = 0.2;
+/// Fewest samples, whatever time they take.
+const FEWEST: u64 = 16;
+/// Samples of the cheap observables to one of the others.
+const RARELY: u64 = 3;
+/// A run is given up where it is hotter than this, in kT.
+pub const FAR_OFF: f64 = 5.0;
+
+/// What is observed: temperature of configurations, pressures, g(r) and diffusion, and what the scene itself asks of interfaces and
+/// viscosities. Without time there is neither diffusion nor viscosity.
+///
+/// # Errors
+/// The model has none of these: never.
+pub fn observe(origin: &Origin, every: u64, host: Host, has_time: bool) -> Result<Observe, ParetoError> {
+    let (scene, stage) = (origin.scene, origin.stage);
+    // Pressure and forces of LAMMPS's own law are not those of the model.
+    let with_forces = host == Host::Native;
+    let forces = if with_forces { "temperature = true\npressure = true\n" } else { "" };
+    let motion = if has_time { "msd = { length = 10, spacing = 2 }\n" } else { "" };
+    let text = format!("[observe]\n{forces}rdf = {{ bins = 100 }}\n{motion}");
+    let document = Document::parse("pareto", &text)?;
+    let names = [stage.name.as_str()];
+    let mut found = read(
+        &document.root(),
+        &scene.model,
+        stage.kt,
+        &scene.domain,
+        StageNames { all: &names, timeless: Vec::new() },
+        scene.initial.slab_axis(),
+        None,
+    )?;
+    let own = scene.observe.requests.iter().filter(|request| match request.meter {
+        AnyMeter::InterfaceWidth(_) => true,
+        AnyMeter::Viscosity(_) | AnyMeter::Poiseuille(_) => with_forces && has_time,
+        AnyMeter::SurfaceTension(_) | AnyMeter::Drop(_) => with_forces,
+        _ => false,
+    });
+    found.requests.extend(own.cloned());
+    found.requests = found
+        .requests
+        .into_iter()
+        .map(|request| {
+            let cheap = matches!(
+                request.meter,
+                AnyMeter::Pressure(_) | AnyMeter::Msd(_) | AnyMeter::InterfaceWidth(_)
+            );
+            // Correlations in time are asked for at steps of the scene.
+            let own = matches!(request.meter, AnyMeter::Viscosity(_));
+            let every = if own {
+                request.every
+            } else if cheap || !with_forces {
+                every
+            } else {
+                RARELY * every
+            };
+            Request { every, skip: 0, stages: vec![stage.name.clone()], ..request }
+        })
+        .collect();
+    Ok(found)
+}
+
+/// Makes a run.
+///
+/// # Errors
+/// It cannot begin.
+pub fn sample(origin: &Origin, physics: &Physics, effort: Effort) -> Result<Sampled, ParetoError> {
+    let (dt, every) = (origin.dt(physics), physics.interval());
+    let mut run = origin.simulation(physics, NonZeroUsize::MIN, true, Want::FORCES)?;
+    let stage = origin.stage;
+    let observe = observe(origin, every, Host::Native, physics.integrator.has_time())?;
+    let mut observers = Observers::new(&observe, [stage.name.as_str()]);
+    let mut sampled = Series::new(2);
+    let per_particle = 1.0 / run.len() as f64;
+    let begin = Instant::now();
+    let mut settling = 0;
+    let stopped = |error: RunError| Ok(Sampled::Unstable(error.to_string()));
+    while settling < FEWEST / 4 || !effort.is_used(SETTLE, begin, settling) {
+        if let Err(error) = run.advance(every, dt, physics.integrator) {
+            return stopped(error);
+        }
+        settling += 1;
+        if let Some(hot) = too_hot(&run, stage.kt) {
+            return Ok(hot);
+        }
+    }
+    let mut time = 0.0;
+    while sampled.samples() < FEWEST || !effort.is_used(1.0, begin, settling + sampled.samples()) {
+        run.record_flux(false);
+        let made = run.advance(every - 1, dt, physics.integrator).and_then(|()| {
+            run.record_flux(observers.wants_flux(run.step_number() + 1, &stage.name));
+            run.step(dt, physics.integrator, Want::TOTALS)
+        });
+        if let Err(error) = made {
+            return stopped(error);
+        }
+        if let Some(hot) = too_hot(&run, stage.kt) {
+            return Ok(hot);
+        }
+        time += dt * every as f64;
+        sampled.push(&[run.temperature(), per_particle * run.potential_energy()]);
+        observers.sample(run.view(time), &stage.name);
+    }
+    let means = [(Class::Temperature, "T_kin", sampled.mean(0)), (Class::Energy, "u", sampled.mean(1))];
+    let quantities = Quantities::of(means, &observers.finish(), origin.scene.model.dimensions());
+    Ok(Sampled::Made { quantities: Box::new(quantities), samples: sampled.samples(), time })
+}
+
+fn too_hot(run: &Simulation, kt: f64) -> Option<Sampled> {
+    let ratio = run.temperature() / kt;
+    (ratio > FAR_OFF)
+        .then(|| Sampled::Unstable(format!("step {}: the temperature is {ratio:.1} kT", run.step_number())))
+}

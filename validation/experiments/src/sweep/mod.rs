@@ -1,0 +1,274 @@
+//! One scene at many values of its keys: runs side by side, one table, one page.
+
+mod axis;
+mod page;
+
+pub use axis::Axis;
+pub use page::{page, table};
+
+use psidpd_core::document::FileError;
+use psidpd_dynamics::checkpoint::Caller;
+use psidpd_dynamics::run::{Begin, Outcome, RunError, Runner};
+use psidpd_dynamics::scene::{Edit, Scene};
+use psidpd_formats::files::write_atomically;
+use psidpd_report::{Headline, headline};
+use serde::Serialize;
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+/// What is swept, and how.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// The scene file.
+    pub scene: PathBuf,
+    /// Values that all runs have.
+    pub edits: Vec<Edit>,
+    /// The keys and their values.
+    pub axes: Vec<Axis>,
+    /// Folder of the runs, `sweep.csv` and `report.html`.
+    pub out: PathBuf,
+    /// How many runs go on side by side.
+    pub jobs: NonZeroUsize,
+    /// Threads of each.
+    pub threads: NonZeroUsize,
+    /// Whether runs that are there are replaced; else they go on, and finished ones are taken as they are.
+    pub overwrite: bool,
+}
+
+/// Why there is no sweep.
+#[derive(Debug, thiserror::Error)]
+pub enum SweepError {
+    #[error(transparent)]
+    File(#[from] FileError),
+    #[error("{points} runs are more than the {most} that a sweep may have: use fewer values")]
+    TooMany { points: usize, most: usize },
+    #[error(
+        "{} has the run {row}, which is none of this sweep and would be lost from the table: choose another folder, sweep over \
+         values with the old ones among them, or replace the table with --overwrite", path.display()
+    )]
+    OtherGrid { path: PathBuf, row: String },
+    #[error("{} cannot be written: {source}", path.display())]
+    Output { path: PathBuf, source: std::io::Error },
+    #[error(transparent)]
+    Report(#[from] psidpd_report::ReportError),
+}
+
+/// One run of a sweep.
+#[derive(Debug, Clone, Serialize)]
+pub struct Point {
+    /// Its keys with their values.
+    #[serde(serialize_with = "shown")]
+    pub edits: Vec<Edit>,
+    /// Its folder.
+    pub folder: PathBuf,
+    /// What it measured; nothing if it failed or was stopped.
+    pub headline: Headline,
+    /// Why it has no results.
+    pub error: Option<String>,
+    /// Whether it came to its end.
+    pub finished: bool,
+}
+
+fn shown<S: serde::Serializer>(edits: &[Edit], to: S) -> Result<S::Ok, S::Error> {
+    to.collect_map(edits.iter().map(|e| (e.key(), e.value())))
+}
+
+/// The table of a sweep, in its folder.
+const TABLE: &str = "sweep.csv";
+
+/// The most runs of a sweep.
+const MOST: usize = 10_000;
+
+/// Runs all points, each in its own folder, until they are done or `stop` is set. `tell` hears of each that ended, with how
+/// many have.
+///
+/// # Errors
+/// A scene that cannot be read with the first values; a folder that cannot be written. A run that fails is a [`Point`]
+/// with its error.
+pub fn run(
+    options: &Options,
+    stop: &AtomicUsize,
+    tell: &(dyn Fn(&Point, usize) + Sync),
+) -> Result<Vec<Point>, SweepError> {
+    let points = combinations(&options.axes)?;
+    // What is wrong with the scene itself is said at once, and not once for each run.
+    Scene::open_with(&options.scene, &[&options.edits[..], &points[0]].concat())?;
+    refuse_other_grid(options, &points)?;
+    std::fs::create_dir_all(&options.out)
+        .map_err(|source| SweepError::Output { path: options.out.clone(), source })?;
+    let (next, ended) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    let done: Mutex<Vec<Option<Point>>> = Mutex::new(vec![None; points.len()]);
+    let work = || {
+        loop {
+            let k = next.fetch_add(1, Ordering::Relaxed);
+            let Some(edits) = points.get(k).filter(|_| stop.load(Ordering::Relaxed) == 0) else { break };
+            let point = run_point(options, edits, stop);
+            if point.finished || point.error.is_some() {
+                tell(&point, ended.fetch_add(1, Ordering::Relaxed) + 1);
+            }
+            done.lock().unwrap_or_else(PoisonError::into_inner)[k] = Some(point);
+        }
+    };
+    std::thread::scope(|scope| {
+        for _ in 0..options.jobs.get().min(points.len()) {
+            scope.spawn(work);
+        }
+    });
+    Ok(done.into_inner().unwrap_or_else(PoisonError::into_inner).into_iter().flatten().collect())
+}
+
+/// Every value of every axis with every value of the others, the last axis fastest.
+fn combinations(axes: &[Axis]) -> Result<Vec<Vec<Edit>>, SweepError> {
+    let points = axes.iter().fold(1usize, |n, axis| n.saturating_mul(axis.edits.len()));
+    if points > MOST {
+        return Err(SweepError::TooMany { points, most: MOST });
+    }
+    let mut all = vec![Vec::new()];
+    for axis in axes {
+        all = all
+            .iter()
+            .flat_map(|point: &Vec<Edit>| {
+                axis.edits.iter().map(move |edit| [&point[..], std::slice::from_ref(edit)].concat())
+            })
+            .collect();
+    }
+    Ok(all)
+}
+
+/// A table of other runs is not replaced: every row must be a point of this sweep. Rows end with their folders.
+fn refuse_other_grid(options: &Options, points: &[Vec<Edit>]) -> Result<(), SweepError> {
+    let path = options.out.join(TABLE);
+    let Ok(text) = std::fs::read_to_string(&path) else { return Ok(()) };
+    let ends: Vec<String> = points.iter().map(|p| format!(",{}", page::quoted(&name(p)))).collect();
+    let stranger = text.lines().skip(1).find(|row| !ends.iter().any(|end| row.ends_with(end)));
+    match stranger.filter(|_| !options.overwrite) {
+        Some(row) => Err(SweepError::OtherGrid { path, row: row.to_owned() }),
+        None => Ok(()),
+    }
+}
+
+/// The name of a point's folder. Where a character cannot be in it, the name ends with a number made of the whole text, so that
+/// other values have other folders.
+fn name(edits: &[Edit]) -> String {
+    let text = edits.iter().map(ToString::to_string).collect::<Vec<_>>().join(",");
+    let is_plain = |c: char| c.is_alphanumeric() || "=.,+-_".contains(c);
+    let plain: String = text.chars().map(|c| if is_plain(c) { c } else { '_' }).collect();
+    if text == plain { plain } else { format!("{plain}-{:08x}", mixed(text.as_bytes())) }
+}
+
+/// Fowler, Noll and Vo's hash 1a of 32 bits: the same on every machine and in every version.
+fn mixed(bytes: &[u8]) -> u32 {
+    bytes.iter().fold(0x811c_9dc5, |hash, byte| (hash ^ u32::from(*byte)).wrapping_mul(0x0100_0193))
+}
+
+fn run_point(options: &Options, edits: &[Edit], stop: &AtomicUsize) -> Point {
+    let folder = options.out.join(name(edits));
+    let mut point = Point {
+        edits: edits.to_vec(),
+        folder: folder.clone(),
+        headline: Headline::default(),
+        error: None,
+        finished: false,
+    };
+    let all = [&options.edits[..], edits].concat();
+    match attempt(options, &all, &folder, stop) {
+        Ok(finished) => point.finished = finished,
+        Err(error) => {
+            let help = error.help(Caller::Options).map_or(String::new(), |help| format!(" ({help})"));
+            point.error = Some(format!("{error}{help}"));
+        }
+    }
+    if point.finished {
+        point.headline = headline(&folder);
+    }
+    point
+}
+
+fn attempt(options: &Options, edits: &[Edit], folder: &Path, stop: &AtomicUsize) -> Result<bool, RunError> {
+    let scene = Scene::open_with(&options.scene, edits)?;
+    let begin = if options.overwrite { Begin::Overwrite } else { Begin::Resume };
+    let mut runner = Runner::begin(&scene, folder, begin)?;
+    runner.set_threads(options.threads)?;
+    Ok(matches!(runner.run(stop, &mut |_| ())?, Outcome::Finished { .. }))
+}
+
+/// Writes `sweep.csv` and `report.html`.
+///
+/// # Errors
+/// A file cannot be written.
+pub fn write(options: &Options, title: &str, points: &[Point]) -> Result<(), SweepError> {
+    let to = |name: &str, text: String| {
+        let path = options.out.join(name);
+        write_atomically(&path, text.as_bytes())
+            .map_err(|e| SweepError::Output { path, source: std::io::Error::other(e) })
+    };
+    to(TABLE, page::csv(&options.axes, points))?;
+    to("report.html", page(title, &options.axes, points)?.render())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The table of other values stays, unless they are among the new ones or `overwrite` says so.
+    #[test]
+    fn a_table_of_other_values_is_not_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let axes = |texts: &[&str]| texts.iter().map(|a| a.parse().unwrap()).collect::<Vec<Axis>>();
+        let mut options = Options {
+            scene: PathBuf::new(),
+            edits: Vec::new(),
+            axes: axes(&["kT=0.5,1", "density=5,6"]),
+            out: folder.path().to_owned(),
+            jobs: NonZeroUsize::MIN,
+            threads: NonZeroUsize::MIN,
+            overwrite: false,
+        };
+        let point = |edits: &Vec<Edit>| Point {
+            edits: edits.clone(),
+            folder: options.out.join(name(edits)),
+            headline: Headline::default(),
+            error: None,
+            finished: true,
+        };
+        let points: Vec<Point> = combinations(&options.axes).unwrap().iter().map(point).collect();
+        write(&options, "t", &points).unwrap();
+        let try_over = |options: &mut Options, texts: &[&str]| {
+            options.axes = axes(texts);
+            refuse_other_grid(options, &combinations(&options.axes).unwrap()).map_err(|e| e.to_string())
+        };
+        assert_eq!(try_over(&mut options, &["kT=0.5,1", "density=5,6"]), Ok(()));
+        assert_eq!(try_over(&mut options, &["kT=0.5,1,2", "density=5,6"]), Ok(()));
+        let other = try_over(&mut options, &["kT=0.5,2", "density=5,6"]).unwrap_err();
+        assert!(other.contains("kT=1,density=5") && other.contains("--overwrite"), "{other}");
+        assert!(try_over(&mut options, &["density=5,6"]).is_err());
+        options.overwrite = true;
+        assert_eq!(try_over(&mut options, &["kT=2,3"]), Ok(()));
+    }
+
+    #[test]
+    fn points_are_all_combinations_with_folders_of_their_own() {
+        let axes: Vec<Axis> = ["kT=0.5:1.5:3", "integrator=aboba,baoab"].map(|a| a.parse().unwrap()).to_vec();
+        let points = combinations(&axes).unwrap();
+        let names: Vec<String> = points.iter().map(|p| name(p)).collect();
+        assert_eq!(
+            names[..3],
+            ["kT=0.5,integrator=aboba", "kT=0.5,integrator=baoab", "kT=1,integrator=aboba"]
+        );
+        assert_eq!(names.len(), 6);
+        // What cannot be in the name of a folder still keeps values apart.
+        let files: Vec<String> = ["model=a_b", "model=a/b", "model=a\"b", "model=a b"]
+            .map(|text| name(&[text.parse().unwrap()]))
+            .to_vec();
+        assert_eq!(files[0], "model=a_b");
+        assert!((0..4).all(|k| (0..k).all(|l| files[k] != files[l])), "{files:?}");
+        assert!(
+            files.iter().all(|f| f.starts_with("model=a_b") && !f.contains(['/', '"', ' '])),
+            "{files:?}"
+        );
+        let many: Axis = "kT=1:2:1000".parse().unwrap();
+        assert!(combinations(&[many.clone(), many]).unwrap_err().to_string().contains("1000000 runs"));
+    }
+}

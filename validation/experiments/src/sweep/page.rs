@@ -1,0 +1,145 @@
+//! The results of a sweep: a table for other programs, and a page.
+
+use super::{Axis, Point};
+use psidpd_report::quantity::with_error;
+use psidpd_report::{Item, Plot, Report, ReportError, Section, Series, Style, Table};
+
+/// Names of the results that any run has, in the order in which they come first.
+fn quantities(points: &[Point]) -> Vec<String> {
+    let mut names: Vec<String> = Vec::new();
+    for value in points.iter().flat_map(|p| &p.headline.values) {
+        if !names.contains(&value.name) {
+            names.push(value.name.clone());
+        }
+    }
+    names
+}
+
+/// A row for each run: the keys, each result with its error, whether it is finished, and how many notes there are.
+pub fn csv(axes: &[Axis], points: &[Point]) -> String {
+    let names = quantities(points);
+    let mut header: Vec<String> = axes.iter().map(|a| quoted(&a.key)).collect();
+    header.extend(names.iter().flat_map(|n| [n.clone(), format!("{n}_error")]));
+    header.extend(["finished", "notes", "folder"].map(String::from));
+    let mut text = header.join(",") + "\n";
+    for p in points {
+        let mut row: Vec<String> = p.edits.iter().map(|e| quoted(e.value())).collect();
+        for name in &names {
+            let value = p.headline.get(name);
+            row.push(value.map_or(String::new(), |v| format!("{:?}", v.value)));
+            row.push(value.and_then(|v| v.error).map_or(String::new(), |e| format!("{e:?}")));
+        }
+        row.push(p.finished.to_string());
+        row.push(p.headline.notes.len().to_string());
+        row.push(quoted(&folder_name(p)));
+        text += &(row.join(",") + "\n");
+    }
+    text
+}
+
+/// A field of the table.
+pub(super) fn quoted(text: &str) -> String {
+    match text.contains([',', '"', '\n']) {
+        true => format!("\"{}\"", text.replace('"', "\"\"")),
+        false => text.to_owned(),
+    }
+}
+
+fn folder_name(p: &Point) -> String {
+    p.folder.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// The same for people.
+pub fn table(axes: &[Axis], points: &[Point]) -> Table {
+    let names = quantities(points);
+    let keys = axes.iter().map(|a| a.key.clone());
+    let mut table = Table::new(keys.chain(names.iter().cloned()).chain(["notes".to_owned()]));
+    for p in points {
+        let mut row: Vec<String> = p.edits.iter().map(|e| e.value().to_owned()).collect();
+        row.extend(
+            names.iter().map(|n| p.headline.get(n).map_or(String::new(), |v| with_error(v.value, v.error))),
+        );
+        row.push(match (&p.error, p.finished, p.headline.notes.len()) {
+            (Some(_), _, _) => "failed".into(),
+            (None, false, _) => "stopped".into(),
+            (None, true, 0) => String::new(),
+            (None, true, n) => n.to_string(),
+        });
+        table.push(row);
+    }
+    table
+}
+
+/// A page with a plot of each result.
+///
+/// # Errors
+/// A plot cannot be drawn.
+pub fn page(title: &str, axes: &[Axis], points: &[Point]) -> Result<Report, ReportError> {
+    let mut sections =
+        vec![Section { heading: "Results".into(), items: vec![Item::Table(table(axes, points))] }];
+    let mut plots = Vec::new();
+    if let Some(x) = axes.iter().position(Axis::is_numeric) {
+        for name in quantities(points) {
+            let plot = plot(&name, x, axes, points);
+            plots.push(Item::Figure {
+                svg: plot.render()?,
+                caption: "Bars are one standard deviation.".into(),
+            });
+        }
+    }
+    if !plots.is_empty() {
+        sections.push(Section { heading: "Plots".into(), items: plots });
+    }
+    let mut notes = Table::new(["run", "note"]);
+    for p in points {
+        p.error.iter().chain(&p.headline.notes).for_each(|n| notes.push([folder_name(p), n.clone()]));
+    }
+    if !notes.rows.is_empty() {
+        sections.push(Section { heading: "Before you use them".into(), items: vec![Item::Table(notes)] });
+    }
+    let values = |a: &Axis| a.edits.iter().map(|e| e.value().to_owned()).collect::<Vec<_>>().join(", ");
+    let mut facts: Vec<(String, String)> = axes.iter().map(|a| (a.key.clone(), values(a))).collect();
+    let finished = points.iter().filter(|p| p.finished).count();
+    facts.push(("runs".into(), format!("{finished} of {} finished", points.len())));
+    Ok(Report { title: title.into(), subtitle: "psidpd sweep".into(), facts, sections, ..Report::default() })
+}
+
+/// One result against the axis `x`, a series for each combination of the values of the others.
+fn plot(name: &str, x: usize, axes: &[Axis], points: &[Point]) -> Plot {
+    let mut series: Vec<Series> = Vec::new();
+    let mut theory: Vec<(f64, f64)> = Vec::new();
+    let mut unit = String::new();
+    for p in points {
+        let (Some(at), Some(v)) = (p.edits[x].number(), p.headline.get(name)) else { continue };
+        unit.clone_from(&v.unit);
+        let others: Vec<String> =
+            p.edits.iter().enumerate().filter(|(k, _)| *k != x).map(|(_, e)| e.to_string()).collect();
+        let others = others.join(", ");
+        let of_these = match series.iter_mut().find(|s| s.name == others) {
+            Some(found) => found,
+            None => {
+                series.push(Series {
+                    name: others,
+                    errors: Some(Vec::new()),
+                    style: Style::Points,
+                    ..Series::default()
+                });
+                let last = series.len() - 1;
+                &mut series[last]
+            }
+        };
+        of_these.points.push((at, v.value));
+        if let Some(errors) = &mut of_these.errors {
+            errors.push(v.error.unwrap_or(f64::NAN));
+        }
+        theory.extend(v.mean_field.map(|y| (at, y)));
+    }
+    // Beside a single series, theory is one curve.
+    if series.len() == 1 && theory.len() > 1 {
+        theory.sort_by(|a, b| a.0.total_cmp(&b.0));
+        series[0].name = "measured".into();
+        series.push(Series { name: "mean field".into(), points: theory, errors: None, style: Style::Dashed });
+    }
+    let y_label = if unit.is_empty() { name.to_owned() } else { format!("{name} [{unit}]") };
+    Plot { title: name.to_owned(), x_label: axes[x].key.clone(), y_label, series, ..Plot::default() }
+}

@@ -1,0 +1,449 @@
+//! LAMMPS text dumps: reading any of `dump custom` and `dump atom`, writing `id type x y z vx vy vz`.
+
+use std::io::{self, BufRead, Write};
+use std::path::Path;
+
+use super::FormatError;
+use super::text::{Problem, TextError, any_f64, finite, shown, whole};
+
+/// One step of a dump.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Frame {
+    /// The time step.
+    pub step: i64,
+    /// The time, where the dump tells it.
+    pub time: Option<f64>,
+    /// Lower corner of the box (not of the box around a tilted box).
+    pub boxlo: [f64; 3],
+    /// Upper corner of the box.
+    pub boxhi: [f64; 3],
+    /// Tilt factors xy, xz, yz of a triclinic box.
+    pub tilt: Option<[f64; 3]>,
+    /// Boundary conditions as LAMMPS writes them: `pp pp ff`.
+    pub boundary: String,
+    /// Names of the columns.
+    pub columns: Vec<String>,
+    /// Number of atoms.
+    pub natoms: usize,
+    /// The table, row after row. A column of words (element, typelabel) holds NaN.
+    pub values: Vec<f64>,
+    /// The columns of words, by the number of the column.
+    pub words: Vec<(usize, Vec<String>)>,
+}
+
+impl Frame {
+    /// The rows of the table.
+    pub fn rows(&self) -> impl ExactSizeIterator<Item = &[f64]> {
+        self.values.chunks_exact(self.columns.len().max(1))
+    }
+
+    /// Where a column is.
+    pub fn column(&self, name: &str) -> Option<usize> {
+        self.columns.iter().position(|c| c == name)
+    }
+
+    /// The values of a column.
+    pub fn get(&self, name: &str) -> Option<Vec<f64>> {
+        let c = self.column(name)?;
+        Some(self.rows().map(|row| row[c]).collect())
+    }
+
+    /// The values of three columns, such as x, y and z.
+    pub fn vectors(&self, names: [&str; 3]) -> Option<Vec<[f64; 3]>> {
+        let [a, b, c] = [self.column(names[0])?, self.column(names[1])?, self.column(names[2])?];
+        Some(self.rows().map(|row| [row[a], row[b], row[c]]).collect())
+    }
+
+    /// Puts the rows in the order of the column `id`; false if there is none.
+    pub fn sort_by_id(&mut self) -> bool {
+        let Some(ids) = self.get("id") else {
+            return false;
+        };
+        let mut order: Vec<usize> = (0..ids.len()).collect();
+        order.sort_by(|&a, &b| ids[a].total_cmp(&ids[b]));
+        let width = self.columns.len();
+        let row = |i: &usize| &self.values[i * width..(i + 1) * width];
+        self.values = order.iter().flat_map(|i| row(i).to_vec()).collect();
+        for (_, words) in &mut self.words {
+            *words = order.iter().map(|&i| std::mem::take(&mut words[i])).collect();
+        }
+        true
+    }
+}
+
+/// The frames of a dump, one after the other. Ends after the first error.
+#[derive(Debug)]
+pub struct DumpReader<R> {
+    input: R,
+    line: usize,
+    text: String,
+    ended: bool,
+}
+
+/// All frames of a dump file.
+pub fn read(path: &Path) -> Result<Vec<Frame>, FormatError> {
+    let file = psidpd_core::document::open_regular(path).map_err(FormatError::io("read", path))?;
+    DumpReader::new(io::BufReader::new(file))
+        .collect::<Result<_, _>>()
+        .map_err(|source| FormatError::Text { path: path.to_owned(), source })
+}
+
+impl<R: BufRead> DumpReader<R> {
+    /// Reads from `input`.
+    pub fn new(input: R) -> Self {
+        DumpReader { input, line: 0, text: String::new(), ended: false }
+    }
+
+    /// Reads the next line; false at the end.
+    fn advance(&mut self) -> Result<bool, TextError> {
+        self.text.clear();
+        self.line += 1;
+        match self.input.read_line(&mut self.text) {
+            Ok(n) => Ok(n > 0),
+            Err(e) => Err(self.fail(Problem::Read(e.to_string()))),
+        }
+    }
+
+    fn expect(&mut self, what: &str) -> Result<(), TextError> {
+        if self.advance()? { Ok(()) } else { Err(self.fail(Problem::Ended(what.into()))) }
+    }
+
+    fn fail(&self, problem: Problem) -> TextError {
+        problem.at(self.line)
+    }
+
+    fn number(&mut self, what: &str, min: i64, max: i64) -> Result<i64, TextError> {
+        self.expect(what)?;
+        whole(self.text.trim(), what, min, max, self.line)
+    }
+
+    fn frame(&mut self) -> Result<Option<Frame>, TextError> {
+        let mut frame = Frame::default();
+        let (mut step, mut natoms, mut sides) = (None, None, false);
+        loop {
+            if !self.advance()? {
+                // Before the first item this is the end of the dump.
+                return match step {
+                    None => Ok(None),
+                    Some(_) => Err(self.fail(Problem::Ended("ITEM: ATOMS".into()))),
+                };
+            }
+            let text = self.text.trim().to_owned();
+            if text.is_empty() && step.is_none() {
+                continue;
+            }
+            let Some(item) = text.strip_prefix("ITEM:").map(str::trim) else {
+                return Err(self.fail(Problem::Unknown(shown(&text))));
+            };
+            if item == "TIMESTEP" {
+                if step.is_some() {
+                    return Err(self.fail(Problem::Missing("ITEM: ATOMS".into())));
+                }
+                step = Some(self.number("the time step", 0, i64::MAX)?);
+            } else if item == "UNITS" {
+                self.expect("the units")?;
+            } else if item == "TIME" {
+                self.expect("the time")?;
+                frame.time = Some(any_f64(self.text.trim(), "the time", self.line)?);
+            } else if item == "NUMBER OF ATOMS" {
+                natoms = Some(self.number("the number of atoms", 0, i64::MAX)? as usize);
+            } else if let Some(kind) = item.strip_prefix("BOX BOUNDS") {
+                self.bounds(kind.trim(), &mut frame)?;
+                sides = true;
+            } else if let Some(names) = item.strip_prefix("ATOMS") {
+                frame.columns = names.split_whitespace().map(Into::into).collect();
+                let missing = |what: &str| Problem::Missing(what.into());
+                frame.step = step.ok_or_else(|| self.fail(missing("ITEM: TIMESTEP")))?;
+                frame.natoms = natoms.ok_or_else(|| self.fail(missing("ITEM: NUMBER OF ATOMS")))?;
+                if !sides {
+                    return Err(self.fail(missing("ITEM: BOX BOUNDS")));
+                }
+                if frame.columns.is_empty() {
+                    return Err(self.fail(missing("name of a column")));
+                }
+                self.table(&mut frame)?;
+                return Ok(Some(frame));
+            } else {
+                return Err(self.fail(Problem::Unknown(shown(&text))));
+            }
+        }
+    }
+
+    fn bounds(&mut self, kind: &str, frame: &mut Frame) -> Result<(), TextError> {
+        if kind.starts_with("abc") {
+            return Err(self.fail(Problem::Unsupported("a general triclinic box".into())));
+        }
+        let tilted = kind.strip_prefix("xy xz yz");
+        frame.boundary = tilted.unwrap_or(kind).trim().into();
+        let expected = if tilted.is_some() { 3 } else { 2 };
+        let mut tilt = [0.0; 3];
+        for (d, tilt) in tilt.iter_mut().enumerate() {
+            self.expect("the box")?;
+            let words: Vec<&str> = self.text.split_whitespace().collect();
+            if words.len() != expected {
+                return Err(
+                    self.fail(Problem::Columns { expected: expected.to_string(), found: words.len() })
+                );
+            }
+            frame.boxlo[d] = finite(words[0], "the box", self.line)?;
+            frame.boxhi[d] = finite(words[1], "the box", self.line)?;
+            if expected == 3 {
+                *tilt = finite(words[2], "the tilt", self.line)?;
+            }
+        }
+        if tilted.is_some() {
+            // The dump gives the box around the tilted box.
+            let [xy, xz, yz] = tilt;
+            let x = [0.0, xy, xz, xy + xz];
+            frame.boxlo[0] -= x.into_iter().fold(0.0, f64::min);
+            frame.boxhi[0] -= x.into_iter().fold(0.0, f64::max);
+            frame.boxlo[1] -= yz.min(0.0);
+            frame.boxhi[1] -= yz.max(0.0);
+            frame.tilt = Some(tilt);
+        }
+        Ok(())
+    }
+
+    fn table(&mut self, frame: &mut Frame) -> Result<(), TextError> {
+        let width = frame.columns.len();
+        let is_word = |name: &String| name == "element" || name == "typelabel";
+        frame.words = (0..width).filter(|&c| is_word(&frame.columns[c])).map(|c| (c, Vec::new())).collect();
+        for _ in 0..frame.natoms {
+            self.expect("another atom")?;
+            let mut found = 0;
+            for word in self.text.split_whitespace() {
+                let Some(name) = frame.columns.get(found) else {
+                    found += 1;
+                    continue;
+                };
+                frame.values.push(if is_word(name) {
+                    if let Some((_, words)) = frame.words.iter_mut().find(|(c, _)| *c == found) {
+                        words.push(word.to_owned());
+                    }
+                    f64::NAN
+                } else {
+                    any_f64(word, name, self.line)?
+                });
+                found += 1;
+            }
+            if found != width {
+                return Err(self.fail(Problem::Columns { expected: width.to_string(), found }));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl<R: BufRead> Iterator for DumpReader<R> {
+    type Item = Result<Frame, TextError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.ended {
+            return None;
+        }
+        let frame = self.frame().transpose();
+        self.ended = !matches!(frame, Some(Ok(_)));
+        frame
+    }
+}
+
+/// Digits of a written dump.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Digits {
+    /// Six significant digits, as LAMMPS writes by default.
+    #[default]
+    Six,
+    /// Seventeen: reading gives the same bits.
+    All,
+}
+
+/// One step for [`DumpWriter`].
+#[derive(Debug, Clone, Copy)]
+pub struct Snapshot<'a> {
+    /// The time step.
+    pub step: i64,
+    /// Lower corner of the box.
+    pub boxlo: [f64; 3],
+    /// Upper corner of the box.
+    pub boxhi: [f64; 3],
+    /// Which directions are periodic.
+    pub periodic: [bool; 3],
+    /// Tags.
+    pub ids: &'a [u32],
+    /// Types, from 1.
+    pub kinds: &'a [u32],
+    /// Positions.
+    pub x: &'a [[f64; 3]],
+    /// Velocities.
+    pub v: &'a [[f64; 3]],
+}
+
+/// Writes frames with the columns `id type x y z vx vy vz`, as LAMMPS does.
+#[derive(Debug)]
+pub struct DumpWriter<W> {
+    out: W,
+    digits: Digits,
+}
+
+impl<W: Write> DumpWriter<W> {
+    /// Writes to `out`, which is best buffered.
+    pub fn new(out: W, digits: Digits) -> Self {
+        DumpWriter { out, digits }
+    }
+
+    /// Writes one step. Slices of different lengths are an error of kind `InvalidInput`.
+    pub fn write(&mut self, s: &Snapshot) -> io::Result<()> {
+        let n = s.ids.len();
+        if [s.kinds.len(), s.x.len(), s.v.len()] != [n; 3] {
+            return Err(io::Error::new(
+                io::ErrorKind::InvalidInput,
+                "ids, types, positions and velocities differ in number",
+            ));
+        }
+        let boundary = s.periodic.map(|p| if p { "pp" } else { "ff" }).join(" ");
+        let out = &mut self.out;
+        writeln!(out, "ITEM: TIMESTEP\n{}\nITEM: NUMBER OF ATOMS\n{n}", s.step)?;
+        writeln!(out, "ITEM: BOX BOUNDS {boundary}")?;
+        for d in 0..3 {
+            writeln!(out, "{:.16e} {:.16e}", s.boxlo[d], s.boxhi[d])?;
+        }
+        writeln!(out, "ITEM: ATOMS id type x y z vx vy vz")?;
+        for i in 0..n {
+            write!(out, "{} {}", s.ids[i], s.kinds[i])?;
+            for x in s.x[i].iter().chain(&s.v[i]) {
+                match self.digits {
+                    Digits::Six => write!(out, " {x:.5e}")?,
+                    Digits::All => write!(out, " {x:.16e}")?,
+                }
+            }
+            writeln!(out)?;
+        }
+        Ok(())
+    }
+
+    /// Gives the output back.
+    pub fn into_inner(self) -> W {
+        self.out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const TWO: &str = "ITEM: UNITS\nlj\nITEM: TIME\n0.5\nITEM: TIMESTEP\n10\nITEM: NUMBER OF ATOMS\n2\nITEM: BOX BOUNDS pp pp ff\n0 4\n-1 1\n0 3\n\
+        ITEM: ATOMS id element c_pea f_1[2]\n2 He 1.5 -2\n1 Xe nan 1e-3\n\
+        ITEM: TIMESTEP\n20\nITEM: NUMBER OF ATOMS\n0\nITEM: BOX BOUNDS xy xz yz pp pp pp\n-0.5 5 1\n0 4 -0.5\n0 4 0.25\nITEM: ATOMS id x y z\n";
+
+    fn read_all(text: &str) -> Result<Vec<Frame>, TextError> {
+        DumpReader::new(text.as_bytes()).collect()
+    }
+
+    #[test]
+    fn frames_of_any_columns() {
+        let mut frames = read_all(TWO).unwrap();
+        assert_eq!(frames.len(), 2);
+        let f = &mut frames[0];
+        assert_eq!((f.step, f.time, f.natoms), (10, Some(0.5), 2));
+        assert_eq!(f.boundary, "pp pp ff");
+        assert!(f.sort_by_id());
+        assert_eq!(f.get("id"), Some(vec![1.0, 2.0]));
+        assert_eq!(f.words[0].1, ["Xe", "He"]);
+        assert_eq!(f.get("f_1[2]"), Some(vec![1e-3, -2.0]));
+        assert!(f.get("c_pea").unwrap()[0].is_nan());
+        assert_eq!((f.get("vx"), f.vectors(["x", "y", "z"])), (None, None));
+        let t = &frames[1];
+        assert_eq!((t.step, t.natoms, t.rows().len()), (20, 0, 0));
+        assert_eq!((t.boxlo, t.boxhi), ([0.0, 0.0, 0.0], [4.0, 3.75, 4.0]));
+        assert_eq!(t.tilt, Some([1.0, -0.5, 0.25]));
+    }
+
+    #[test]
+    fn bad_dumps_are_refused_with_the_line() {
+        for (from, to, line, says) in [
+            ("10\n", "x\n", 6, "time step"),
+            ("\n2\n", "\n3\n", 16, "not a number"),
+            ("\n2\n", "\n1\n", 15, "1 Xe"),
+            ("\n2\n", "\n99999999999999999999\n", 8, "between"),
+            ("-1 1\n", "-1\n", 11, "columns"),
+            ("-1 1\n", "-1 inf\n", 11, "finite"),
+            ("1.5", "", 14, "3 columns where 4"),
+            ("1.5", "1 1", 14, "5 columns where 4"),
+            ("1.5", "1,5", 14, "c_pea"),
+            ("ITEM: NUMBER OF ATOMS\n2\n", "", 11, "NUMBER"),
+            ("ITEM: ATOMS id element c_pea f_1[2]", "ITEM: ATOMS", 13, "column"),
+            ("ITEM: TIME\n", "ITEM: WHAT\n", 3, "WHAT"),
+            ("BOUNDS pp", "BOUNDS abc origin pp", 9, "triclinic"),
+        ] {
+            assert!(TWO.contains(from), "{from}");
+            let e = read_all(&TWO.replacen(from, to, 1)).unwrap_err();
+            assert!(e.to_string().contains(says), "{from} -> {to}: {e}");
+            assert_eq!(e.line, line, "{from} -> {to}: {e}");
+        }
+        // A run that was killed while it wrote
+        let mut cut = DumpReader::new(&TWO.as_bytes()[..TWO.len() - 40]);
+        assert!(cut.next().unwrap().is_ok());
+        assert!(matches!(
+            cut.next().unwrap().unwrap_err().problem,
+            Problem::Ended(_) | Problem::Columns { .. }
+        ));
+        assert!(cut.next().is_none());
+        assert_eq!(read_all(""), Ok(vec![]));
+    }
+
+    #[test]
+    fn not_text_is_an_error() {
+        let mut r = DumpReader::new(&b"ITEM: TIMESTEP\n\xff\xfe\n"[..]);
+        assert!(matches!(r.next().unwrap().unwrap_err().problem, Problem::Read(_)));
+    }
+
+    proptest! {
+        #[test]
+        fn reading_what_was_written_gives_the_same_bits(
+            rows in prop::collection::vec((any::<u32>(), 1u32..5, prop::array::uniform3(any::<f64>()), prop::array::uniform3(any::<f64>())), 0..20),
+            step in 0i64..i64::MAX, lo in prop::array::uniform3(-1e9..1e9f64), periodic in any::<[bool; 3]>(),
+        ) {
+            let ids: Vec<u32> = rows.iter().map(|r| r.0).collect();
+            let kinds: Vec<u32> = rows.iter().map(|r| r.1).collect();
+            let x: Vec<_> = rows.iter().map(|r| r.2).collect();
+            let v: Vec<_> = rows.iter().map(|r| r.3).collect();
+            let s = Snapshot { step, boxlo: lo, boxhi: lo, periodic, ids: &ids, kinds: &kinds, x: &x, v: &v };
+            let mut w = DumpWriter::new(Vec::new(), Digits::All);
+            w.write(&s).unwrap();
+            w.write(&s).unwrap();
+            let frames = read_all(std::str::from_utf8(&w.into_inner()).unwrap()).unwrap();
+            prop_assert_eq!(frames.len(), 2);
+            for f in frames {
+                prop_assert_eq!((f.step, f.boxlo, f.natoms), (step, lo, ids.len()));
+                let (fx, fv) = (f.vectors(["x", "y", "z"]).unwrap(), f.vectors(["vx", "vy", "vz"]).unwrap());
+                for (a, b) in fx.iter().chain(&fv).flatten().zip(x.iter().chain(&v).flatten()) {
+                    prop_assert!(a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan());
+                }
+            }
+        }
+
+        #[test]
+        fn no_damage_makes_it_panic(at in 0usize..TWO.len(), with in "[ 0-9a-zA-Z:\n.+-]{0,4}", cut in 0usize..6) {
+            let mut s = TWO.to_owned();
+            s.replace_range(at..(at + cut).min(TWO.len()), &with);
+            let _ = read_all(&s);
+        }
+    }
+
+    #[test]
+    fn lengths_must_agree() {
+        let s = Snapshot {
+            step: 0,
+            boxlo: [0.0; 3],
+            boxhi: [1.0; 3],
+            periodic: [true; 3],
+            ids: &[1],
+            kinds: &[1],
+            x: &[[0.0; 3]],
+            v: &[],
+        };
+        let e = DumpWriter::new(Vec::new(), Digits::Six).write(&s);
+        assert_eq!(e.unwrap_err().kind(), io::ErrorKind::InvalidInput);
+    }
+}

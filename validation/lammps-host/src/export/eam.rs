@@ -1,0 +1,226 @@
+//! A fluid as tables for LAMMPS's `pair_style eam/alloy`, which every LAMMPS has.
+//!
+//! The energy of that style is `Σ_i F_a(ρ_i) + Σ_{i<j} φ_ab(r)`, `ρ_i = Σ_j f_b(r_ij)`: one density, that
+//! does not tell who feels it. ψ goes into `F`, the kernel into `f`; densities in which every ψ is linear
+//! are pair potentials and go into `φ`, with the pair terms of the model.
+
+use psidpd_core::engine::Plan;
+use psidpd_core::model::expression::{Formula, TooLarge};
+use psidpd_core::model::pair::PairForm;
+use psidpd_core::model::{ExcessFreeEnergy, Fluid};
+use psidpd_formats::FormatError;
+use psidpd_formats::setfl::{Element, Setfl};
+use std::path::Path;
+
+/// How fine the tables are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grid {
+    /// Spacing in r. A spline is exact but near kinks of w′ and φ′, where its error in the force is
+    /// proportional to the spacing.
+    pub spacing: f64,
+    /// Largest density in the table of F; LAMMPS goes on linearly beyond.
+    pub largest_density: f64,
+    /// Number of densities in the table.
+    pub densities: usize,
+}
+
+impl Default for Grid {
+    fn default() -> Grid {
+        Grid { spacing: 1e-4, largest_density: 100.0, densities: 10_001 }
+    }
+}
+
+/// Why a fluid cannot be written as `eam/alloy`.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum EamError {
+    #[error("psi is not linear in {0} and {1}: eam/alloy has one density only")]
+    TwoDensities(String, String),
+    #[error(
+        "psi of {species} depends on the partial densities of {density}, not on their sum alone: eam/alloy has one \
+         density that does not tell species apart"
+    )]
+    PartialDensities { species: String, density: String },
+    #[error("the correction of {0} is not the identity: eam/alloy has uncorrected densities")]
+    Correction(String),
+    #[error("{0} has bounds: a table cannot say that psi goes on beyond them; remove them or the export")]
+    Bounds(String),
+    #[error("eam/alloy is tabulated for three dimensions here, the model has two")]
+    Flat,
+    #[error("the force law of this model has no potential")]
+    NotConservative,
+    #[error("psi of {species} is not finite at density {density}: lower the largest density")]
+    Singular { species: String, density: f64 },
+    #[error("the spacing, the largest density and the number of densities must be positive")]
+    Grid,
+    #[error(transparent)]
+    TooLarge(#[from] TooLarge),
+    #[error(transparent)]
+    File(#[from] FormatError),
+}
+
+/// Writes the tables of `fluid`, whose species become elements of mass `mass`.
+///
+/// # Errors
+/// The fluid is more than one density per particle can say; see [`EamError`].
+pub fn write(fluid: &Fluid, mass: &[f64], grid: Grid, path: &Path) -> Result<(), EamError> {
+    if fluid.dimensions != 3 {
+        return Err(EamError::Flat);
+    }
+    if !fluid.is_conservative() {
+        return Err(EamError::NotConservative);
+    }
+    if !(grid.spacing > 0.0 && grid.largest_density > 0.0 && grid.densities > 4) {
+        return Err(EamError::Grid);
+    }
+    let plan = Plan::new(fluid)?;
+    let pass = match plan.density_passes() {
+        [] => None,
+        [d] => Some(*d),
+        [a, b, ..] => {
+            let name = |d: &usize| fluid.densities[*d].name.clone();
+            return Err(EamError::TwoDensities(name(a), name(b)));
+        }
+    };
+    if let Some(d) = pass {
+        check_density(fluid, d)?;
+    }
+    let drho = grid.largest_density / (grid.densities - 1) as f64;
+    let embedding = |alpha: usize, n: f64| embedding(fluid, alpha, pass, n);
+    for (alpha, species) in fluid.species.iter().enumerate() {
+        for k in 0..grid.densities {
+            let density = k as f64 * drho;
+            // The table begins at n = 0, an isolated particle, and a spline needs finite values.
+            if !embedding(alpha, density).is_finite() {
+                return Err(EamError::Singular { species: species.clone(), density });
+            }
+        }
+    }
+    let elements: Vec<Element> = fluid
+        .species
+        .iter()
+        .zip(mass)
+        .map(|(name, mass)| Element { name: name.clone(), mass: *mass })
+        .collect();
+    let cutoff = potential_range(fluid);
+    let table = Setfl {
+        title: &format!("psidpd: {} at kT = {}", fluid.title, fluid.kt),
+        elements: &elements,
+        nrho: grid.densities,
+        drho,
+        nr: (cutoff / grid.spacing).ceil() as usize + 6,
+        dr: grid.spacing,
+        cutoff,
+        embedding: &embedding,
+        density: &|_, r| pass.map_or(0.0, |d| fluid.densities[d].kernel.value(r)),
+        pair: &|a, b, r| plan.linear_pair_energy(a, b, r) + pair_energy(fluid, a, b, r),
+    };
+    Ok(table.write(path)?)
+}
+
+/// The longest range of the potential energy; thermostats may reach further.
+fn potential_range(fluid: &Fluid) -> f64 {
+    let densities = fluid.densities.iter().map(|d| d.kernel.range());
+    let pairs = fluid.pairs.iter().map(|p| p.potential.range());
+    densities.chain(pairs).fold(f64::MIN_POSITIVE, f64::max)
+}
+
+fn check_density(fluid: &Fluid, d: usize) -> Result<(), EamError> {
+    let density = &fluid.densities[d];
+    let count = fluid.species.len();
+    if density.correction.iter().any(|p| *p != psidpd_core::model::Polynomial::identity()) {
+        return Err(EamError::Correction(density.name.clone()));
+    }
+    if density.bounds.is_some() {
+        return Err(EamError::Bounds(density.name.clone()));
+    }
+    for (alpha, excess) in fluid.excess.iter().enumerate() {
+        // A curve is a function of the sum by construction.
+        let ExcessFreeEnergy::Formula(psi) = excess else { continue };
+        let slopes =
+            (0..count).map(|b| psi.derivative(d * count + b)).collect::<Result<Vec<Formula>, _>>()?;
+        if slopes.windows(2).any(|pair| pair[0] != pair[1]) {
+            return Err(EamError::PartialDensities {
+                species: fluid.species[alpha].clone(),
+                density: density.name.clone(),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// `F_α(n)`: ψ_α with the linear densities at zero, whose terms are pair potentials.
+fn embedding(fluid: &Fluid, alpha: usize, pass: Option<usize>, n: f64) -> f64 {
+    let count = fluid.species.len();
+    let own = |d: usize| {
+        let density = &fluid.densities[d];
+        if density.includes_self { density.kernel.value(0.0) } else { 0.0 }
+    };
+    match &fluid.excess[alpha] {
+        ExcessFreeEnergy::Formula(psi) => {
+            let at: Vec<f64> = (0..fluid.variables())
+                .map(|v| {
+                    let (d, beta) = (v / count, v % count);
+                    let here = if beta == alpha { own(d) } else { 0.0 };
+                    let correction = &fluid.densities[d].correction[alpha * count + beta];
+                    let neighbours = if pass == Some(d) && beta == 0 { n } else { 0.0 };
+                    correction.at(neighbours + here).0
+                })
+                .collect();
+            psi.value(&at)
+        }
+        // Refused before: it has no potential.
+        ExcessFreeEnergy::Slopes(law) => law.energy.value(&vec![0.0; fluid.variables()]),
+        ExcessFreeEnergy::Curve(curve) => {
+            curve.at(if pass == Some(curve.density) { n + own(curve.density) } else { own(curve.density) })[0]
+        }
+    }
+}
+
+fn pair_energy(fluid: &Fluid, a: usize, b: usize, r: f64) -> f64 {
+    fluid
+        .pairs
+        .iter()
+        .filter(|p| p.between == [a, b] || p.between == [b, a])
+        .filter(|p| r < p.potential.range())
+        .map(|p| p.potential.at(r).0)
+        .sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use psidpd_core::model::Model;
+    use std::f64::consts::PI;
+
+    /// Where a particle counts itself, its embedding is at its neighbours' density and w(0) = 15/(2π): a formula and a curve.
+    #[test]
+    fn a_particle_that_counts_itself_has_its_own_density_in_the_table() {
+        let own = 15.0 / (2.0 * PI);
+        let folder = tempfile::tempdir().unwrap();
+        let grid = Grid { spacing: 0.01, largest_density: 40.0, densities: 41 };
+        for (psi, counted) in
+            [("\"n^2\"", true), ("\"n^2\"", false), ("{ pressure = \"rho*kT + 2*rho^3\" }", true)]
+        {
+            let text = format!(
+                "title = 't'\nspecies = ['F']\n[density.n]\nkernel = 'quadratic'\nrange = 1\nself = {counted}\n\
+                 [excess_free_energy]\nF = {psi}\n"
+            );
+            let fluid = Model::parse("m.toml", &text).unwrap().at(1.0).unwrap();
+            let path = folder.path().join("t.eam.alloy");
+            write(&fluid, &[1.0], grid, &path).unwrap();
+            let text = std::fs::read_to_string(&path).unwrap();
+            let values: Vec<f64> =
+                text.lines().skip(6).flat_map(str::split_whitespace).map(|x| x.parse().unwrap()).collect();
+            // ψ is n², or has the slope (p − ρkT)/ρ² = 2n.
+            let at = |n: f64| (n + if counted { own } else { 0.0 }).powi(2);
+            for k in 1..41 {
+                let (found, expected) = (values[k] - values[0], at(k as f64) - at(0.0));
+                assert!((found / expected - 1.0).abs() < 1e-6, "{psi} {k}: {found} {expected}");
+            }
+            if psi.contains("n^2") {
+                assert!((values[0] - at(0.0)).abs() < 1e-12, "{}", values[0]);
+            }
+        }
+    }
+}

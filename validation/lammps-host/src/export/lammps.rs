@@ -1,0 +1,404 @@
+//! A scene as a LAMMPS input deck: start, model and script, for the pair style `dpd/psi`.
+//!
+//! The deck takes the steps of [`run_scene`](psidpd_dynamics::run::run_scene) with the same noise. The native
+//! runner computes the forces of the present step anew where a stage begins, as LAMMPS does where a `run`
+//! begins, and both key the noise of a step by its number, so stages become `run` commands.
+
+mod physics;
+
+use physics::Physics;
+use psidpd_core::document::{Document, FileError};
+use psidpd_core::engine::noise::Law;
+use psidpd_core::model::{Fluid, Model};
+use psidpd_dynamics::integrator::{Counterpart, Integrator};
+use psidpd_dynamics::particles::State;
+use psidpd_dynamics::run::RunError;
+use psidpd_dynamics::scene::{Scene, Stage};
+use std::fmt::Write;
+use std::path::{Component, Path, PathBuf};
+
+/// The script.
+pub const SCRIPT: &str = "in.lammps";
+/// The state it starts from.
+pub const START: &str = "start.data";
+/// The model.
+pub const MODEL: &str = "model.toml";
+/// The model of stages without thermostat.
+pub const MODEL_WITHOUT_THERMOSTAT: &str = "model-without-thermostat.toml";
+
+/// All of these.
+pub const FILES: [&str; 4] = [SCRIPT, START, MODEL, MODEL_WITHOUT_THERMOSTAT];
+
+/// Most steps of one `run` command.
+const MOST_STEPS: u64 = i32::MAX as u64;
+
+/// Each may need three of the 32 groups.
+const MOST_BODY_FORCES: usize = 9;
+
+/// Why a scene cannot be written as a deck.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DeckError {
+    #[error(
+        "stage \"{stage}\": integrator = \"{name}\" ({integrator}) has no counterpart in LAMMPS; a deck can have \
+         velocity-verlet, groot-warren with lambda = 0.5, which is the same, and two-stage, force-gradient and aboba with \
+         thermostat_step = \"midpoint\""
+    )]
+    Integrator { stage: String, name: &'static str, integrator: Integrator },
+    #[error("the seed must be at least 1 for the pair style, is {0}")]
+    Seed(u64),
+    #[error("stage \"{stage}\": {steps} steps are more than one run of LAMMPS takes, {MOST_STEPS}")]
+    Steps { stage: String, steps: u64 },
+    #[error("reversed_along has no counterpart in a deck for a box with tilt")]
+    Tilt,
+    #[error("{0} body forces need more groups than LAMMPS has: at most {MOST_BODY_FORCES} can be written")]
+    BodyForces(usize),
+    #[error(
+        "{}: cannot take the thermostat out for the stages without; write it as [[thermostat]] sections",
+        model.display()
+    )]
+    Thermostat { model: PathBuf },
+    #[error("{}: the copy in the deck is not the same fluid: the names of its tables are ambiguous", model.display())]
+    Copy { model: PathBuf },
+    #[error("{}: two tables would both become {} in the deck", model.display(), table.display())]
+    Tables { model: PathBuf, table: PathBuf },
+    #[error(transparent)]
+    File(#[from] FileError),
+    #[error(transparent)]
+    Run(#[from] RunError),
+    #[error("{} cannot be written: {source}", path.display())]
+    Output { path: PathBuf, source: std::io::Error },
+}
+
+/// Writes the deck of `scene` to the folder `out`, which is made if need be, and returns the names of its
+/// files.
+///
+/// # Errors
+/// The scene has no counterpart in LAMMPS, or a file cannot be written; see [`DeckError`].
+pub fn write(scene: &Scene, out: &Path) -> Result<Vec<PathBuf>, DeckError> {
+    check(scene)?;
+    std::fs::create_dir_all(out).map_err(output(out))?;
+    let mut files = vec![PathBuf::from(SCRIPT), PathBuf::from(START), PathBuf::from(MODEL)];
+
+    let (text, tables) = copy_of_model(scene)?;
+    for (from, to) in tables {
+        let path = out.join(&to);
+        if let Some(parent) = path.parent() {
+            std::fs::create_dir_all(parent).map_err(output(parent))?;
+        }
+        // A copy of a file onto itself would empty it.
+        if !path.canonicalize().is_ok_and(|there| from.canonicalize().is_ok_and(|here| here == there)) {
+            std::fs::copy(&from, &path).map_err(output(&path))?;
+        }
+        files.push(to);
+    }
+    save(&out.join(MODEL), &text)?;
+    compare(scene, &out.join(MODEL), true).and_then(|same| {
+        if same { Ok(()) } else { Err(DeckError::Copy { model: scene.model_path.clone() }) }
+    })?;
+    if scene.stages.iter().any(|s| !s.thermostat) {
+        let path = out.join(MODEL_WITHOUT_THERMOSTAT);
+        save(&path, &without_thermostat(&text))?;
+        if !compare(scene, &path, false).unwrap_or(false) {
+            return Err(DeckError::Thermostat { model: scene.model_path.clone() });
+        }
+        files.push(MODEL_WITHOUT_THERMOSTAT.into());
+    }
+
+    write_start(scene, &scene.initial_state(), &out.join(START))?;
+    save(&out.join(SCRIPT), &script(scene))?;
+    Ok(files)
+}
+
+fn check(scene: &Scene) -> Result<(), DeckError> {
+    if scene.seed == 0 {
+        return Err(DeckError::Seed(scene.seed));
+    }
+    let reversed = scene.body_forces.iter().any(|b| b.reversed_along.is_some());
+    let orthogonal = (0..3).all(|k| (0..3).all(|c| c == k || scene.domain.edge(k)[c] == 0.0));
+    if reversed && !orthogonal {
+        return Err(DeckError::Tilt);
+    }
+    if scene.body_forces.len() > MOST_BODY_FORCES {
+        return Err(DeckError::BodyForces(scene.body_forces.len()));
+    }
+    for stage in &scene.stages {
+        if stage.steps > MOST_STEPS {
+            return Err(DeckError::Steps { stage: stage.name.clone(), steps: stage.steps });
+        }
+        let integrator = stage.integrator;
+        if integrator.in_lammps() == Counterpart::None {
+            return Err(DeckError::Integrator {
+                stage: stage.name.clone(),
+                name: integrator.name(),
+                integrator,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// The text of the model with tables beside it, and which file becomes which.
+fn copy_of_model(scene: &Scene) -> Result<(String, Vec<(PathBuf, PathBuf)>), DeckError> {
+    let source = scene.model.source();
+    let mut text = source.text().to_owned();
+    let directory = scene.model_path.parent().unwrap_or(Path::new(""));
+    let mut copies: Vec<(PathBuf, PathBuf)> = Vec::new();
+    for name in tables(source.name(), source.text())? {
+        let path = Path::new(&name);
+        let from = directory.join(path);
+        let inside = path.components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
+        let to = match path.file_name() {
+            Some(file) if !inside => {
+                let short = file.to_string_lossy().into_owned();
+                for quote in ['"', '\''] {
+                    text = text.replace(&format!("{quote}{name}{quote}"), &format!("{quote}{short}{quote}"));
+                }
+                PathBuf::from(short)
+            }
+            _ => path.to_owned(),
+        };
+        match copies.iter().find(|(_, other)| *other == to) {
+            None => copies.push((from, to)),
+            Some((other, _)) if *other == from => {}
+            Some(_) => return Err(DeckError::Tables { model: scene.model_path.clone(), table: to }),
+        }
+    }
+    Ok((text, copies))
+}
+
+/// Names of the files that a model refers to, as it writes them.
+fn tables(name: &str, text: &str) -> Result<Vec<String>, FileError> {
+    let document = Document::parse(name, text)?;
+    let root = document.root();
+    let mut sections = Vec::new();
+    if let Some(excess) = root.get("excess_free_energy").and_then(|v| v.as_section()) {
+        let curves = excess.entries().into_iter().filter_map(|(_, value)| value.as_section());
+        for curve in curves {
+            let pressure = curve.get("pressure").and_then(|p| p.as_section());
+            sections.extend([curve].into_iter().chain(pressure).map(|table| (table, "table")));
+        }
+    }
+    for pair in root.get("pair").and_then(|v| v.as_array()).unwrap_or_default() {
+        sections.extend(pair.as_section().map(|pair| (pair, "file")));
+    }
+    let names = sections.iter().filter_map(|(section, key)| Some(section.get(key)?.as_str()?.to_owned()));
+    Ok(names.collect())
+}
+
+/// The text without its `[[thermostat]]` sections.
+fn without_thermostat(text: &str) -> String {
+    let mut inside = false;
+    let mut kept = String::from("# As model.toml, without drag and noise.\n");
+    for line in text.lines() {
+        if line.trim_start().starts_with('[') {
+            let header: String = line.chars().filter(|c| !c.is_whitespace()).collect();
+            inside = header.starts_with("[[thermostat]]");
+        }
+        if !inside {
+            kept.push_str(line);
+            kept.push('\n');
+        }
+    }
+    kept
+}
+
+/// Whether the model at `path` makes the fluids of the scene; without thermostat if `thermostat` is not set.
+fn compare(scene: &Scene, path: &Path, thermostat: bool) -> Result<bool, DeckError> {
+    let copy = Model::open(path)?;
+    let same = |a: &Fluid, b: &Fluid| {
+        let thermostats = match thermostat {
+            true => format!("{:?}", a.thermostats) == format!("{:?}", b.thermostats),
+            false => b.thermostats.iter().all(Option::is_none),
+        };
+        a.dimensions == b.dimensions
+            && a.species == b.species
+            && format!("{:?}", a.densities) == format!("{:?}", b.densities)
+            && format!("{:?}", a.excess) == format!("{:?}", b.excess)
+            && format!("{:?}", a.pairs) == format!("{:?}", b.pairs)
+            && thermostats
+    };
+    for stage in scene.stages.iter().filter(|s| s.thermostat == thermostat) {
+        if !same(&scene.model.at(stage.kt)?, &copy.at(stage.kt)?) {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// Writes a state as the start of a deck.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_start(scene: &Scene, state: &State, path: &Path) -> Result<(), DeckError> {
+    let mut data = state.to_data(&format!("psidpd: {}, step 0", one_line(&scene.title)));
+    data.sort_by_id();
+    if scene.model.dimensions() == 2 {
+        // LAMMPS wants the plane z = 0, and nothing depends on it.
+        (data.boxlo[2], data.boxhi[2]) = (-0.5, 0.5);
+        data.tilt = data.tilt.map(|[xy, _, _]| [xy, 0.0, 0.0]);
+        for atom in &mut data.atoms {
+            (atom.x[2], atom.image[2]) = (0.0, 0);
+        }
+    }
+    data.write(path).map_err(|e| DeckError::Run(e.into()))
+}
+
+/// The script of [`write`] alone.
+///
+/// # Errors
+/// The scene has no counterpart in LAMMPS.
+pub fn script_of(scene: &Scene) -> Result<String, DeckError> {
+    check(scene)?;
+    Ok(script(scene))
+}
+
+fn script(scene: &Scene) -> String {
+    let mut s = String::new();
+    // Writing to a String cannot fail.
+    let _ = write_script(scene, &mut s);
+    s
+}
+
+fn write_script(scene: &Scene, s: &mut String) -> std::fmt::Result {
+    let physics = Physics::of(scene);
+    writeln!(s, "# {}", one_line(&scene.title))?;
+    writeln!(s, "# lmp -in {SCRIPT} -var plugin PATH/psidpdplugin.so\n")?;
+    writeln!(s, "variable      plugin index psidpdplugin.so\n")?;
+    writeln!(s, "units         lj")?;
+    writeln!(s, "dimension     {}", scene.model.dimensions())?;
+    writeln!(s, "boundary      {}", physics.boundary())?;
+    writeln!(s, "atom_style    atomic")?;
+    writeln!(s, "newton        on")?;
+    writeln!(s, "comm_modify   vel yes")?;
+    writeln!(s, "read_data     {START}\n")?;
+    writeln!(s, "# to be left out where LAMMPS has the styles already")?;
+    writeln!(s, "plugin        load ${{plugin}}\n")?;
+    physics.write_surroundings(s)?;
+    writeln!(s)?;
+    writeln!(s, "thermo_style  custom step time temp pe ke press pxx pyy pzz pxy pxz pyz")?;
+    writeln!(s, "thermo_modify norm no format float %.17g")?;
+    physics.write_temperature(s)?;
+    writeln!(s, "thermo        {}", scene.output.thermo)?;
+    if scene.output.dump > 0 {
+        writeln!(
+            s,
+            "dump          frames all custom {} dump.lammpstrj id type x y z vx vy vz",
+            scene.output.dump
+        )?;
+        writeln!(s, "dump_modify   frames sort id format float %.17g")?;
+    }
+    let mut before: Option<&Stage> = None;
+    for stage in &scene.stages {
+        writeln!(s, "\n# {}", one_line(&stage.label()))?;
+        if let Integrator::GrootWarren { .. } = stage.integrator {
+            writeln!(s, "# groot-warren with lambda = 0.5 is velocity Verlet")?;
+        }
+        if before.is_none_or(|b| (b.kt, b.thermostat) != (stage.kt, stage.thermostat)) {
+            let model = if stage.thermostat { MODEL } else { MODEL_WITHOUT_THERMOSTAT };
+            if !stage.thermostat {
+                writeln!(s, "# thermostat = false: a copy of the model without drag and noise")?;
+            }
+            let precision = scene.precision.map_or(String::new(), |p| format!(" precision {p}"));
+            writeln!(s, "pair_style    dpd/psi {:?} {}{precision}", stage.kt, scene.seed)?;
+            writeln!(s, "pair_coeff    * * {model} {}", scene.model.species().join(" "))?;
+        }
+        if before.is_none_or(|b| motion(&b.integrator) != motion(&stage.integrator)) {
+            if before.is_some() {
+                writeln!(s, "unfix         move")?;
+            }
+            writeln!(s, "fix           move {} {}", physics.mobile(), motion(&stage.integrator))?;
+        }
+        match (before.is_some_and(|b| b.body_forces), stage.body_forces) {
+            (false, true) => physics.write_body_forces(s)?,
+            (true, false) => physics.write_end_of_body_forces(s)?,
+            _ => {}
+        }
+        writeln!(s, "timestep      {:?}", stage.dt)?;
+        writeln!(s, "run           {}", stage.steps)?;
+        before = Some(stage);
+    }
+    writeln!(s, "\nwrite_data    final.data nocoeff")
+}
+
+/// The style and the arguments of the fix that makes the steps.
+fn motion(integrator: &Integrator) -> String {
+    let mut integrator = *integrator;
+    if integrator.in_lammps() != Counterpart::Splitting {
+        return "nve".to_owned();
+    }
+    let mut text = format!("dpd/splitting {}", integrator.name());
+    if let Some((lambda, _)) = integrator.lambda() {
+        text += &format!(" lambda {lambda:?}");
+    }
+    if let Some(gradient) = integrator.gradient() {
+        text += &format!(" gradient {gradient:?}");
+    }
+    if let Some(coupling) = integrator.coupling().filter(|coupling| coupling.every > 1) {
+        text += &format!(" every {}", coupling.every);
+    }
+    if let Some(Law::Uniform) = integrator.noise() {
+        text += " noise uniform";
+    }
+    text
+}
+
+/// A title for a comment: one line, without `&`, which continues a line, and without double quotes, since
+/// three of them begin a multi-line text in LAMMPS.
+fn one_line(text: &str) -> String {
+    let plain = |c: char| match c {
+        '&' => ' ',
+        '"' => '\'',
+        c if c.is_control() => ' ',
+        c => c,
+    };
+    text.chars().map(plain).collect()
+}
+
+fn save(path: &Path, text: &str) -> Result<(), DeckError> {
+    std::fs::write(path, text).map_err(output(path))
+}
+
+fn output(path: &Path) -> impl FnOnce(std::io::Error) -> DeckError + '_ {
+    move |source| DeckError::Output { path: path.to_owned(), source }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use psidpd_dynamics::integrator::Coupling;
+
+    #[test]
+    fn steps_become_arguments_of_a_fix() {
+        let coupling = Coupling { every: 3, noise: Law::Uniform, ..Coupling::DEFAULT };
+        let two_stage = Integrator::TwoStage { lambda: 0.2, coupling };
+        assert_eq!(motion(&two_stage), "dpd/splitting two-stage lambda 0.2 every 3 noise uniform");
+        let force_gradient = Integrator::ForceGradient { lambda: 0.17, gradient: 0.04, coupling };
+        assert_eq!(
+            motion(&force_gradient),
+            "dpd/splitting force-gradient lambda 0.17 gradient 0.04 every 3 noise uniform"
+        );
+        assert_eq!(motion(&Integrator::Aboba(Coupling::DEFAULT)), "dpd/splitting aboba");
+        assert_eq!(motion(&Integrator::VelocityVerlet), "nve");
+    }
+
+    #[test]
+    fn the_thermostat_is_cut_out_and_what_follows_stays() {
+        let text = "title = \"t\"\n[[ thermostat ]] # one\ngamma = 1\n[[thermostat]]\ngamma = 2\n[[pair]]\nrange = 1\n";
+        let kept = without_thermostat(text);
+        assert_eq!(kept.lines().skip(1).collect::<Vec<_>>(), ["title = \"t\"", "[[pair]]", "range = 1"]);
+    }
+
+    #[test]
+    fn tables_are_found() {
+        let text =
+            "[excess_free_energy]\nA = { table = \"a.csv\" }\nB = \"n\"\n[[pair]]\nfile = \"sub/b.txt\"\n";
+        assert_eq!(tables("m.toml", text).unwrap(), ["a.csv", "sub/b.txt"]);
+    }
+
+    #[test]
+    fn titles_become_one_line() {
+        assert_eq!(one_line("a &\nrun 5"), "a   run 5");
+        assert_eq!(one_line("a \"\"\" b"), "a ''' b");
+    }
+}

@@ -1,0 +1,147 @@
+//! What acts on particles of a deck beside the forces between them: walls, frozen particles, body forces.
+
+use psidpd_dynamics::run::{BodyForce, Tags};
+use psidpd_dynamics::scene::Scene;
+use std::fmt::{Result, Write};
+
+/// Names of the directions.
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// The commands for what a scene has of this.
+pub struct Physics<'a> {
+    scene: &'a Scene,
+    dimensions: usize,
+    /// Which directions have walls.
+    walls: [bool; 3],
+    /// `all`, or what is not frozen.
+    mobile: &'static str,
+}
+
+impl<'a> Physics<'a> {
+    pub fn of(scene: &'a Scene) -> Physics<'a> {
+        let dimensions = scene.model.dimensions();
+        let walls = std::array::from_fn(|k| k < dimensions && !scene.domain.periodic()[k]);
+        let mobile = if scene.frozen.is_empty() { "all" } else { "mobile" };
+        Physics { scene, dimensions, walls, mobile }
+    }
+
+    /// The arguments of `boundary`.
+    pub fn boundary(&self) -> String {
+        self.walls.map(|wall| if wall { "f" } else { "p" }).join(" ")
+    }
+
+    /// The group of the particles that move.
+    pub fn mobile(&self) -> &'static str {
+        self.mobile
+    }
+
+    /// Groups, walls and the plane.
+    pub fn write_surroundings(&self, s: &mut impl Write) -> Result {
+        if self.mobile == "mobile" {
+            writeln!(
+                s,
+                "# frozen particles are not integrated: they keep their places, and velocities of zero"
+            )?;
+            writeln!(s, "group         frozen id {}", ids(&self.scene.frozen))?;
+            writeln!(s, "group         mobile subtract all frozen")?;
+            writeln!(s, "velocity      frozen set 0 0 0")?;
+        }
+        if self.walls != [false; 3] {
+            let faces = (0..3).filter(|k| self.walls[*k]).map(|k| format!("{0}lo EDGE {0}hi EDGE", AXES[k]));
+            writeln!(
+                s,
+                "fix           walls {} wall/reflect {}",
+                self.mobile,
+                faces.collect::<Vec<_>>().join(" ")
+            )?;
+        }
+        if self.dimensions == 2 {
+            writeln!(s, "fix           plane all enforce2d")?;
+        }
+        Ok(())
+    }
+
+    /// The temperature of what moves, with the degrees of freedom that it has.
+    pub fn write_temperature(&self, s: &mut impl Write) -> Result {
+        if self.mobile == "all" && self.walls == [false; 3] {
+            return Ok(());
+        }
+        let conserved = match self.mobile {
+            "all" => (0..self.dimensions).filter(|k| !self.walls[*k]).count(),
+            _ => 0,
+        };
+        writeln!(s, "# momentum is conserved along {conserved} directions only")?;
+        writeln!(s, "compute       warmth {} temp", self.mobile)?;
+        writeln!(s, "compute_modify warmth extra/dof {conserved}")?;
+        writeln!(s, "thermo_modify temp warmth")
+    }
+
+    /// Switches the body forces on.
+    pub fn write_body_forces(&self, s: &mut impl Write) -> Result {
+        for (k, force) in self.scene.body_forces.iter().enumerate() {
+            let name = format!("body{}", k + 1);
+            let group = self.write_group(s, &name, force)?;
+            let value = self.value(force);
+            for c in 0..self.dimensions {
+                writeln!(s, "variable      {name}{} atom {}", AXES[c], value(force.acceleration[c]))?;
+            }
+            let components = (0..3).map(|c| match c < self.dimensions {
+                true => format!("v_{name}{}", AXES[c]),
+                false => "0.0".to_owned(),
+            });
+            let components = components.collect::<Vec<_>>().join(" ");
+            writeln!(s, "fix           {name} {group} addforce {components}")?;
+        }
+        Ok(())
+    }
+
+    /// The formula of a component of the force, of the acceleration `a`.
+    fn value(&self, force: &BodyForce) -> impl Fn(f64) -> String {
+        let half = force.reversed_along.map(|k| {
+            let (origin, length) = (self.scene.domain.origin()[k], self.scene.domain.lengths()[k]);
+            // Particles may be out of the box by a little until LAMMPS puts them back.
+            let place = format!("({}-({origin:?}))/{length:?}", AXES[k]);
+            format!("*(1-2*({place}-floor({place})>=0.5))")
+        });
+        move |a| format!("mass*({a:?}){}", half.as_deref().unwrap_or_default())
+    }
+
+    /// The group that a body force acts on.
+    fn write_group(
+        &self,
+        s: &mut impl Write,
+        name: &str,
+        force: &BodyForce,
+    ) -> std::result::Result<String, std::fmt::Error> {
+        let mut group = self.mobile.to_owned();
+        if let Tags::Ranges(_) = &force.tags {
+            writeln!(s, "group         {name}ids id {}", ids(&force.tags))?;
+            group = format!("{name}ids");
+        }
+        if !force.species.is_empty() {
+            let types: Vec<String> = force.species.iter().map(|s| (s + 1).to_string()).collect();
+            writeln!(s, "group         {name}types type {}", types.join(" "))?;
+            writeln!(s, "group         {name}group intersect {group} {name}types")?;
+            group = format!("{name}group");
+        }
+        Ok(group)
+    }
+
+    /// Switches the body forces off.
+    pub fn write_end_of_body_forces(&self, s: &mut impl Write) -> Result {
+        for k in 1..=self.scene.body_forces.len() {
+            writeln!(s, "unfix         body{k}")?;
+        }
+        Ok(())
+    }
+}
+
+/// The ranges as arguments of `group id`.
+fn ids(tags: &Tags) -> String {
+    match tags {
+        Tags::All => "> 0".to_owned(),
+        Tags::Ranges(ranges) => {
+            ranges.iter().map(|r| format!("{}:{}", r.start(), r.end())).collect::<Vec<_>>().join(" ")
+        }
+    }
+}

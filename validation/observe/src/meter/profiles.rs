@@ -1,0 +1,250 @@
+//! Profiles of densities, composition, temperature and velocity along an axis.
+
+use super::Meter;
+use super::across::Across;
+use crate::frame::Frame;
+use crate::keys::{AXIS, BINS, RECENTRE, Table};
+use crate::observation::{Kind, Observation};
+use crate::request::Options;
+use crate::series::{Measured, Series};
+use psidpd_core::document::FileError;
+use serde::{Deserialize, Serialize};
+
+const KEYS: &[crate::keys::Key] = &[AXIS, BINS, RECENTRE];
+
+/// What all of them collect: in each bin the particles of each species, their mass, and the first and
+/// second moments of their velocities.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Bins {
+    across: Across,
+    species: Vec<String>,
+    dimensions: usize,
+    moments: bool,
+    series: Series,
+}
+
+impl Bins {
+    fn read(options: &Options, moments: bool) -> Result<Bins, FileError> {
+        let fluid = options.place.fluid;
+        let across = Across::read(options, false)?;
+        let mut this = Bins {
+            across,
+            species: fluid.species.clone(),
+            dimensions: fluid.dimensions,
+            moments,
+            series: Series::new(0),
+        };
+        this.series = Series::new(this.across.bins * this.width());
+        Ok(this)
+    }
+
+    /// Numbers to a bin: particles by species, then m, m v, m v², and the number of those that move.
+    fn width(&self) -> usize {
+        self.species.len() + if self.moments { 3 + self.dimensions } else { 0 }
+    }
+
+    fn sample(&mut self, frame: &Frame) -> bool {
+        let view = frame.view;
+        let Some(fractions) = self.across.fractions(&view) else { return false };
+        let (width, count) = (self.width(), self.species.len());
+        let mut sums = vec![0.0; self.across.bins * width];
+        for (k, s) in fractions.iter().enumerate() {
+            let Some(bin) = self.across.bin(*s) else { continue };
+            let at = &mut sums[bin * width..(bin + 1) * width];
+            at[view.species[k] as usize] += 1.0;
+            if self.moments && frame.moves(k) {
+                let (m, v) = (frame.mass(k), view.v[k]);
+                at[count] += m;
+                at[count + 2 + self.dimensions] += 1.0;
+                for c in 0..self.dimensions {
+                    at[count + 1 + c] += m * v[c];
+                    at[count + 1 + self.dimensions] += m * v[c] * v[c];
+                }
+            }
+        }
+        self.series.push(&sums)
+    }
+
+    /// An empty observation against the coordinate.
+    fn observation(&self, name: &str, title: &str) -> Observation {
+        Observation::new(name, title, Kind::Profile)
+            .against(self.across.name(), "length", self.across.middles())
+            .samples(self.series.samples())
+            .note(self.across.note())
+    }
+
+    /// A linear function of every bin.
+    fn linear(&self, f: impl Fn(&[f64]) -> f64) -> Vec<Measured> {
+        let width = self.width();
+        (0..self.across.bins).map(|b| self.series.linear(|row| f(&row[b * width..(b + 1) * width]))).collect()
+    }
+
+    /// A quotient of linear functions of every bin.
+    fn ratio(&self, f: impl Fn(&[f64]) -> f64, g: impl Fn(&[f64]) -> f64) -> Vec<Measured> {
+        let width = self.width();
+        let of = |row: &[f64], b: usize| row[b * width..(b + 1) * width].to_vec();
+        (0..self.across.bins).map(|b| self.series.ratio(|row| f(&of(row, b)), |row| g(&of(row, b)))).collect()
+    }
+}
+
+/// Number densities along an axis.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DensityProfile(Bins);
+
+impl Meter for DensityProfile {
+    const TABLE: Table = Table {
+        path: "density_profile",
+        title: "density along an axis",
+        array: false,
+        forms: ("", &[]),
+        about: "Number density in slices of the box: `density`, and `density_SPECIES` of each of several species.",
+        keys: KEYS,
+    };
+
+    fn read(options: &Options) -> Result<DensityProfile, FileError> {
+        Ok(DensityProfile(Bins::read(options, false)?))
+    }
+
+    fn sample(&mut self, frame: &Frame) -> bool {
+        self.0.sample(frame)
+    }
+
+    fn forget(&mut self) {
+        self.0.series.clear();
+    }
+
+    fn finish(&self) -> Vec<Observation> {
+        let (bins, volume) = (&self.0, self.0.across.bin_volume());
+        let total = bins.linear(|n| n.iter().sum::<f64>() / volume);
+        let mut out =
+            bins.observation("density_profile", "Density profile").column("density", "1/volume", total);
+        if bins.species.len() > 1 {
+            for (s, name) in bins.species.iter().enumerate() {
+                out = out.column(&format!("density_{name}"), "1/volume", bins.linear(|n| n[s] / volume));
+            }
+        }
+        vec![out]
+    }
+}
+
+/// Number fractions along an axis.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CompositionProfile(Bins);
+
+impl Meter for CompositionProfile {
+    const TABLE: Table = Table {
+        path: "composition_profile",
+        title: "composition along an axis",
+        array: false,
+        forms: ("", &[]),
+        about: "`fraction_SPECIES`: the mean number of particles of a species in a slice over that of all.",
+        keys: KEYS,
+    };
+
+    fn read(options: &Options) -> Result<CompositionProfile, FileError> {
+        Ok(CompositionProfile(Bins::read(options, false)?))
+    }
+
+    fn sample(&mut self, frame: &Frame) -> bool {
+        self.0.sample(frame)
+    }
+
+    fn forget(&mut self) {
+        self.0.series.clear();
+    }
+
+    fn finish(&self) -> Vec<Observation> {
+        let bins = &self.0;
+        let mut out = bins.observation("composition_profile", "Composition profile");
+        for (s, name) in bins.species.iter().enumerate() {
+            let fraction = bins.ratio(|n| n[s], |n| n.iter().sum());
+            out = out.column(&format!("fraction_{name}"), "1", fraction);
+        }
+        vec![out]
+    }
+}
+
+/// Kinetic temperature along an axis.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TemperatureProfile(Bins);
+
+impl Meter for TemperatureProfile {
+    const TABLE: Table = Table {
+        path: "temperature_profile",
+        title: "temperature along an axis",
+        array: false,
+        forms: ("", &[]),
+        about: "Kinetic kT in slices of the box, about the mean flow of the slice: \
+                (⟨Σ m v²⟩ − ⟨Σ m v⟩²/⟨Σ m⟩)/(d ⟨n⟩). Jackknife errors.",
+        keys: KEYS,
+    };
+
+    fn read(options: &Options) -> Result<TemperatureProfile, FileError> {
+        Ok(TemperatureProfile(Bins::read(options, true)?))
+    }
+
+    fn sample(&mut self, frame: &Frame) -> bool {
+        self.0.sample(frame)
+    }
+
+    fn forget(&mut self) {
+        self.0.series.clear();
+    }
+
+    fn finish(&self) -> Vec<Observation> {
+        let bins = &self.0;
+        let (width, count, d) = (bins.width(), bins.species.len(), bins.dimensions);
+        let temperature = bins.series.jackknife_many(|means| {
+            let of = |at: &[f64]| {
+                let flow: f64 = at[count + 1..count + 1 + d].iter().map(|p| p * p).sum::<f64>() / at[count];
+                (at[count + 1 + d] - flow) / (d as f64 * at[count + 2 + d])
+            };
+            Some(means.chunks_exact(width).map(of).collect())
+        });
+        vec![bins.observation("temperature_profile", "Temperature profile").column(
+            "temperature",
+            "energy",
+            temperature,
+        )]
+    }
+}
+
+/// Velocity along an axis.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct VelocityProfile(Bins);
+
+impl Meter for VelocityProfile {
+    const TABLE: Table = Table {
+        path: "velocity_profile",
+        title: "flow velocity along an axis",
+        array: false,
+        forms: ("", &[]),
+        about: "Momentum over mass of a slice, ⟨Σ m v⟩/⟨Σ m⟩: `velocity_x` and so on.",
+        keys: KEYS,
+    };
+
+    const OF_MOTION: bool = true;
+
+    fn read(options: &Options) -> Result<VelocityProfile, FileError> {
+        Ok(VelocityProfile(Bins::read(options, true)?))
+    }
+
+    fn sample(&mut self, frame: &Frame) -> bool {
+        self.0.sample(frame)
+    }
+
+    fn forget(&mut self) {
+        self.0.series.clear();
+    }
+
+    fn finish(&self) -> Vec<Observation> {
+        let bins = &self.0;
+        let count = bins.species.len();
+        let mut out = bins.observation("velocity_profile", "Velocity profile");
+        for (c, name) in ["x", "y", "z"].iter().enumerate().take(bins.dimensions) {
+            let velocity = bins.ratio(|at| at[count + 1 + c], |at| at[count]);
+            out = out.column(&format!("velocity_{name}"), "r_c/time", velocity);
+        }
+        vec![out]
+    }
+}

@@ -1,0 +1,104 @@
+use super::Meter;
+use super::distances::{Shells, count};
+use super::species_pairs::SpeciesPairs;
+use crate::frame::Frame;
+use crate::keys::{Need, Table, ValueKind};
+use crate::observation::{Kind, Observation};
+use crate::request::Options;
+use crate::series::Series;
+use psidpd_core::document::FileError;
+use psidpd_core::document::keys::keys;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
+
+/// Partial radial distribution functions.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Rdf {
+    range: f64,
+    bins: usize,
+    dimensions: usize,
+    pairs: SpeciesPairs,
+    series: Series,
+}
+
+/// Volume of the shell from `a` to `b`; in two dimensions its area.
+pub(super) fn shell_volume(dimensions: usize, a: f64, b: f64) -> f64 {
+    match dimensions {
+        2 => PI * (b * b - a * a),
+        _ => 4.0 / 3.0 * PI * (b * b * b - a * a * a),
+    }
+}
+
+impl Meter for Rdf {
+    const TABLE: Table = Table {
+        path: "rdf",
+        title: "radial distribution functions",
+        array: false,
+        forms: ("", &[]),
+        about: "Pairs in spherical shells (in two dimensions rings) over their number in an ideal gas of as many \
+                particles in the same box, N_A (N_A − 1)/2 or N_A N_B pairs in V: exactly 1 on average in an ideal \
+                gas. `g` of all particles, and `g_A_B` of each two of several species.",
+        keys: keys! {
+            "range": ValueKind::Words("positive number, at most half the box"), Need::Default("three times the range of the model, or half the box"),
+                "Up to which distance."
+                => "2.0";
+            "bins": ValueKind::Words("whole number from 1 to 10000"), Need::Default("as many as make them 0.02 wide, or a little less"),
+                "How many shells."
+                => "40";
+        },
+    };
+
+    fn read(options: &Options) -> Result<Rdf, FileError> {
+        let fluid = options.place.fluid;
+        let half = options.half_box();
+        let preset = if fluid.cutoff() > 0.0 { half.min(3.0 * fluid.cutoff()) } else { half };
+        let range = options.positive("range")?.unwrap_or(preset);
+        if range > half * (1.0 + 1e-12) {
+            return Err(options.error("range", format!("must not exceed half the box, {half}, is {range}")));
+        }
+        let bins = options.count("bins", 1, 10_000)?;
+        let bins = bins.unwrap_or(((range / 0.02).ceil() as usize).clamp(1, 10_000));
+        let pairs = SpeciesPairs::new(&fluid.species);
+        let series = Series::new(bins * pairs.len());
+        Ok(Rdf { range, bins, dimensions: fluid.dimensions, pairs, series })
+    }
+
+    fn sample(&mut self, frame: &Frame) -> bool {
+        let view = frame.view;
+        let species = view.species;
+        let kinds = view.model.species().len();
+        let shells = Shells { range: self.range, bins: self.bins };
+        let by_species = count(view.pool, view.x, species, kinds, view.domain, self.dimensions, shells);
+        let all = (0..self.bins).map(|bin| by_species.iter().skip(bin).step_by(self.bins).sum::<u64>());
+        let of_species = if kinds > 1 { &by_species[..] } else { &[] };
+        let mut counts: Vec<f64> = all.chain(of_species.iter().copied()).map(|count| count as f64).collect();
+        // Ideal pairs in a shell.
+        let volume = frame.volume();
+        let ideal = self.pairs.ideal_pairs(species);
+        for (k, counts) in counts.chunks_exact_mut(self.bins).enumerate() {
+            for (bin, count) in counts.iter_mut().enumerate() {
+                let edge = |b: usize| self.range * b as f64 / self.bins as f64;
+                let expected = ideal[k] * shell_volume(self.dimensions, edge(bin), edge(bin + 1)) / volume;
+                // Without pairs of a kind there is nothing to divide.
+                *count = if expected > 0.0 { *count / expected } else { 0.0 };
+            }
+        }
+        self.series.push(&counts)
+    }
+
+    fn forget(&mut self) {
+        self.series.clear();
+    }
+
+    fn finish(&self) -> Vec<Observation> {
+        let width = self.range / self.bins as f64;
+        let middles = (0..self.bins).map(|b| (b as f64 + 0.5) * width).collect();
+        let mut out = Observation::new("rdf", "Radial distribution function", Kind::Curve)
+            .against("r", "length", middles)
+            .samples(self.series.samples());
+        for (k, name) in self.pairs.names("g").iter().enumerate() {
+            out = out.column(name, "1", (0..self.bins).map(|b| self.series.mean(k * self.bins + b)));
+        }
+        vec![out]
+    }
+}

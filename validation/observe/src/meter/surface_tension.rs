@@ -1,0 +1,151 @@
+use super::Meter;
+use super::across::Across;
+use crate::frame::Frame;
+use crate::keys::{AXIS, Need, Table, ValueKind, key};
+use crate::observation::{Kind, Observation};
+use crate::request::Options;
+use crate::series::Series;
+use nalgebra::Matrix3;
+use psidpd_core::document::FileError;
+use psidpd_core::engine::{PeriodicBox, Want};
+use serde::{Deserialize, Serialize};
+
+/// The surface tension of interfaces normal to an axis.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SurfaceTension {
+    across: Across,
+    dimensions: usize,
+    interfaces: f64,
+    perturbation: f64,
+    kt: f64,
+    /// γ of the momentum carried and of the conservative stress, exp(−ΔU/kT) for more and for less area.
+    series: Series,
+}
+
+/// Fractional lengths of a box whose faces normal to `axis` have `1 + change` times the area, at the same
+/// volume.
+fn deformation(axis: usize, dimensions: usize, change: f64) -> [f64; 3] {
+    let rest = (1.0 + change).powf(1.0 / (dimensions - 1) as f64);
+    std::array::from_fn(|c| match c {
+        c if c == axis => 1.0 / (1.0 + change),
+        c if c < dimensions => rest,
+        _ => 1.0,
+    })
+}
+
+/// `U` of a configuration stretched with its box to `1 + change` times the area at constant volume.
+pub fn stretched_energy(frame: &Frame, axis: usize, change: f64) -> f64 {
+    let view = frame.view;
+    let domain = view.domain;
+    // The faces normal to a direction are those of the other two edges: edges are scaled, not directions.
+    let scale = deformation(axis, view.dimensions, change);
+    let edges = Matrix3::from_fn(|row, k| scale[k] * domain.edge(k)[row]);
+    let Ok(stretched) = PeriodicBox::new(domain.origin(), edges, domain.periodic()) else { return f64::NAN };
+    let x: Vec<[f64; 3]> = view.x.iter().map(|x| stretched.point(domain.fraction(*x))).collect();
+    frame.evaluator().energy(&x, view.species, &stretched)
+}
+
+impl Meter for SurfaceTension {
+    const TABLE: Table = Table {
+        path: "surface_tension",
+        title: "surface tension of a slab, by stress and by free energy",
+        array: false,
+        forms: ("", &[]),
+        about: "`stress` is (L/m)(P_N − P_T) with the flux of momentum that the integrator makes in the whole box, as \
+                `carried` of `pressure`, m the number of interfaces, P_T the mean of the other directions. \
+                `stress_conservative` has the velocities at the ends of steps and conservative forces alone. Both have \
+                the same limit as the time step goes to 0. `free_energy` is the \
+                test-area method (Gloor et al., J. Chem. Phys. 123, 134703 (2005)): configurations are stretched \
+                with their box at constant volume to 1 ± ε times the area, the many-body energy is computed anew, \
+                and γ = −kT [ln⟨exp(−ΔU₊/kT)⟩ − ln⟨exp(−ΔU₋/kT)⟩]/(2 m ε A) with the kT of the stage. The two \
+                routes agree in equilibrium, to the error of the time step. ε should be small enough that ΔU stays below kT. In two dimensions the area is a length.",
+        keys: &[
+            AXIS,
+            key(
+                "interfaces",
+                ValueKind::Words("whole number from 1 to 1000"),
+                Need::Default("2"),
+                "How many interfaces are normal to the axis.",
+                "1",
+            ),
+            key(
+                "perturbation",
+                ValueKind::Words("number from 1e-7 to 0.1"),
+                Need::Default("0.0001"),
+                "ε, the relative change of the area.",
+                "5e-4",
+            ),
+        ],
+    };
+
+    const NEEDS_FLUX: bool = true;
+
+    fn read(options: &Options) -> Result<SurfaceTension, FileError> {
+        let place = options.place;
+        let axis = options.axis("axis")?.or(place.slab).unwrap_or(place.fluid.dimensions - 1);
+        let lengths = place.domain.lengths();
+        if (0..place.fluid.dimensions)
+            .any(|k| (place.domain.height(k) - lengths[k]).abs() > 1e-9 * lengths[k])
+        {
+            return Err(options.error("axis", "the box must have right angles"));
+        }
+        if !place.fluid.is_conservative() {
+            return Err(options.error("", "a force of the model has no potential: there is no free energy"));
+        }
+        Ok(SurfaceTension {
+            across: Across::at(options, axis),
+            dimensions: place.fluid.dimensions,
+            interfaces: options.count("interfaces", 1, 1000)?.unwrap_or(2) as f64,
+            perturbation: options.number("perturbation", 1e-7, 0.1)?.unwrap_or(1e-4),
+            kt: 0.0,
+            series: Series::new(4),
+        })
+    }
+
+    fn needs(&self) -> Want {
+        Want::TOTALS
+    }
+
+    fn sample(&mut self, frame: &Frame) -> bool {
+        let (axis, view) = (self.across.axis, frame.view);
+        self.kt = view.kt;
+        let Some(carried) = frame.carried_pressure() else { return false };
+        let tension = |p: [f64; 6]| {
+            let others: f64 = (0..self.dimensions).filter(|c| *c != axis).map(|c| p[c]).sum();
+            let difference = p[axis] - others / (self.dimensions - 1) as f64;
+            self.across.height / self.interfaces * difference
+        };
+        let energy = frame.evaluation().energy;
+        let weight = |change: f64| (-(stretched_energy(frame, axis, change) - energy) / self.kt).exp();
+        let sample = [
+            tension(carried),
+            tension(view.conservative_pressure),
+            weight(self.perturbation),
+            weight(-self.perturbation),
+        ];
+        self.series.push(&sample)
+    }
+
+    fn forget(&mut self) {
+        self.kt = 0.0;
+        self.series.clear();
+    }
+
+    fn finish(&self) -> Vec<Observation> {
+        let mut free_energy = self.series.mean(0);
+        if !self.series.is_empty() {
+            let area = 2.0 * self.interfaces * self.perturbation * self.across.area();
+            let means = self.series.means();
+            free_energy.value = -self.kt * (means[2].ln() - means[3].ln()) / area;
+            let linear = |s: &[f64]| -self.kt * (s[2] / means[2] - s[3] / means[3]) / area;
+            free_energy.error = self.series.linear(linear).error;
+        }
+        vec![
+            Observation::new("surface_tension", "Surface tension", Kind::Scalar)
+                .samples(self.series.samples())
+                .column("stress", "energy/area", [self.series.mean(0)])
+                .column("stress_conservative", "energy/area", [self.series.mean(1)])
+                .column("free_energy", "energy/area", [free_energy]),
+        ]
+    }
+}

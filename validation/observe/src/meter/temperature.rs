@@ -1,0 +1,66 @@
+use super::Meter;
+use crate::configurational;
+use crate::frame::Frame;
+use crate::keys::Table;
+use crate::observation::{Kind, Observation};
+use crate::request::Options;
+use crate::series::Series;
+use psidpd_core::document::FileError;
+use serde::{Deserialize, Serialize};
+
+/// kT from velocities and from configurations.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Temperature {
+    /// Why there is no configurational temperature; empty if there is one.
+    missing: String,
+    /// Kinetic kT, `Σ F·F`, `−Σ ∇·F`.
+    series: Series,
+}
+
+impl Meter for Temperature {
+    const TABLE: Table = Table {
+        path: "temperature",
+        title: "temperature, kinetic and configurational",
+        array: false,
+        forms: ("", &[]),
+        about: "`kinetic` is 2K/f, f being d(N − 1) in a periodic box and without walls or frozen particles \
+                (`output.md`). `configurational` is ⟨Σ F·F⟩/⟨−Σ ∇·F⟩ with the conservative forces alone \
+                (Rugh; Butler et al., J. Chem. Phys. 109, 6519 (1998)), with ∇·F from the second derivatives of ψ, \
+                kernels and pair potentials; φ″ of formulas and tables is the five-point difference of the exact φ′. \
+                At large time steps the two err differently. There is no configurational temperature for a force \
+                that is no gradient, for one that jumps at its range (the linear kernel), and in boxes narrower \
+                than twice the range.",
+        keys: &[],
+    };
+
+    fn read(options: &Options) -> Result<Temperature, FileError> {
+        let missing = configurational::missing(options.place.fluid, options.place.domain).unwrap_or("");
+        let width = if missing.is_empty() { 3 } else { 1 };
+        Ok(Temperature { missing: missing.into(), series: Series::new(width) })
+    }
+
+    fn sample(&mut self, frame: &Frame) -> bool {
+        let kinetic = frame.view.temperature;
+        if !self.missing.is_empty() {
+            return self.series.push(&[kinetic]);
+        }
+        let [squares, laplacian] = configurational::sums(frame);
+        self.series.push(&[kinetic, squares, laplacian])
+    }
+
+    fn forget(&mut self) {
+        self.series.clear();
+    }
+
+    fn finish(&self) -> Vec<Observation> {
+        let mut out = Observation::new("temperature", "Temperature kT", Kind::Scalar)
+            .samples(self.series.samples())
+            .column("kinetic", "energy", [self.series.mean(0)]);
+        if self.missing.is_empty() {
+            out = out.column("configurational", "energy", [self.series.ratio(|s| s[1], |s| s[2])]);
+        } else {
+            out = out.note(format!("No configurational temperature: {}.", self.missing));
+        }
+        vec![out]
+    }
+}

@@ -1,0 +1,524 @@
+//! Density across a liquid slab, and the width of its interfaces.
+
+use std::f64::consts::TAU;
+
+use serde::Serialize;
+
+use super::edges::{Edges, edges};
+use super::statistics::{MINIMUM_SAMPLES, StatisticsError, estimate};
+use crate::least_squares::least_squares;
+
+/// The most bins a profile may have.
+pub const MAXIMUM_BINS: usize = 1 << 20;
+
+/// Below this the mean of the unit vectors exp(2πi z/L) has no direction.
+const LEAST_RESULTANT: f64 = 1e-10;
+
+/// The fewest bins a flank is fitted to.
+const FLANK_BINS: usize = 6;
+
+/// Why there is no profile.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum ProfileError {
+    #[error("box length {length} and area {area} must be positive numbers")]
+    Box { length: f64, area: f64 },
+    #[error("{0} bins; a profile has between 1 and {MAXIMUM_BINS}")]
+    Bins(usize),
+    #[error("coordinate {index} of the frame is not a finite number")]
+    NonFinite { index: usize },
+    #[error("the frame has no slab to be centred on")]
+    NoSlab,
+    #[error("no frames")]
+    NoFrames,
+    #[error(transparent)]
+    Statistics(#[from] StatisticsError),
+}
+
+/// Collects histograms of particle positions across a slab, each frame
+/// centred on its own slab so that drift does not smear the profile.
+#[derive(Debug, Clone)]
+pub struct ProfileAccumulator {
+    length: f64,
+    bins: usize,
+    area: f64,
+    frames: Vec<Vec<u32>>,
+}
+
+/// Number density against distance from the centre of the slab.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DensityProfile {
+    /// Middle of each bin from the centre of the slab, in (−L/2, L/2),
+    /// increasing and evenly spaced; a length (r_c).
+    pub centres: Vec<f64>,
+    /// Mean of n/(A h) over the frames, n particles being in the bin of
+    /// height h; number per volume (r_c⁻³).
+    pub density: Vec<f64>,
+    /// One standard deviation of `density` (r_c⁻³); 0 in a bin whose count
+    /// never changed.
+    pub error: Vec<f64>,
+}
+
+impl ProfileAccumulator {
+    /// An accumulator for a periodic box of `length` (r_c) along z and
+    /// cross-section `area` (r_c²), divided into `bins` of height
+    /// h = length/bins.
+    ///
+    /// # Errors
+    ///
+    /// A length or area that is not a positive number; no bins, or more than
+    /// [`MAXIMUM_BINS`].
+    pub fn new(length: f64, bins: usize, area: f64) -> Result<Self, ProfileError> {
+        let positive = |x: f64| x.is_finite() && x > 0.0;
+        if !(positive(length) && positive(area) && positive(length * area)) {
+            return Err(ProfileError::Box { length, area });
+        }
+        if bins == 0 || bins > MAXIMUM_BINS {
+            return Err(ProfileError::Bins(bins));
+        }
+        Ok(Self { length, bins, area, frames: Vec::new() })
+    }
+
+    /// Adds a frame, the `z` (r_c) of all its particles, wrapped or not.
+    ///
+    /// The centre is the circular mean c = (L/2π) arg Σ exp(2πi z/L), which
+    /// unlike the plain mean does not care where the boundary cuts the slab.
+    ///
+    /// # Errors
+    ///
+    /// A coordinate that is not finite, or particles without a centre. The
+    /// frame is then left out.
+    pub fn add(&mut self, z: &[f64]) -> Result<(), ProfileError> {
+        if let Some(index) = z.iter().position(|z| !z.is_finite()) {
+            return Err(ProfileError::NonFinite { index });
+        }
+        let (mut sine, mut cosine) = (0.0, 0.0);
+        for z in z {
+            let (s, c) = (TAU * (z / self.length).fract()).sin_cos();
+            sine += s;
+            cosine += c;
+        }
+        if z.is_empty() || f64::hypot(sine, cosine) / (z.len() as f64) < LEAST_RESULTANT {
+            return Err(ProfileError::NoSlab);
+        }
+        let centre = sine.atan2(cosine) / TAU;
+        let mut counts = vec![0_u32; self.bins];
+        for z in z {
+            // Fraction of the box, the centre at one half.
+            let place = ((z / self.length).fract() - centre + 0.5).rem_euclid(1.0);
+            let bin = ((place * self.bins as f64) as usize).min(self.bins - 1);
+            counts[bin] = counts[bin].saturating_add(1);
+        }
+        self.frames.push(counts);
+        Ok(())
+    }
+
+    /// Number of frames added.
+    #[must_use]
+    pub fn frames(&self) -> usize {
+        self.frames.len()
+    }
+
+    /// The mean profile with error bars.
+    ///
+    /// The error of a bin is that of [`estimate`] over the frames; with fewer
+    /// frames than that takes, the plain standard error s/√M; with one frame,
+    /// Poisson's √n/(A h).
+    ///
+    /// # Errors
+    ///
+    /// No frames, or densities too large to be averaged.
+    pub fn finish(&self) -> Result<DensityProfile, ProfileError> {
+        if self.frames.is_empty() {
+            return Err(ProfileError::NoFrames);
+        }
+        let height = self.length / self.bins as f64;
+        let volume = self.area * height;
+        let mut profile = DensityProfile {
+            centres: Vec::with_capacity(self.bins),
+            density: Vec::with_capacity(self.bins),
+            error: Vec::with_capacity(self.bins),
+        };
+        for bin in 0..self.bins {
+            let counts: Vec<f64> = self.frames.iter().map(|f| f64::from(f[bin])).collect();
+            let (mean, error) = mean_and_error(&counts)?;
+            let middle = bin as f64 + 0.5 - 0.5 * self.bins as f64;
+            profile.centres.push(middle * height);
+            profile.density.push(mean / volume);
+            profile.error.push(error / volume);
+        }
+        Ok(profile)
+    }
+
+    /// Number density (r_c⁻³) of each frame within `half_width` (r_c) of the
+    /// centre of the slab, N(|z| < half_width) / (2 A half_width).
+    ///
+    /// A bin that the limit cuts counts in proportion. A `half_width` above
+    /// L/2 counts as L/2; one that is not positive gives no densities.
+    #[must_use]
+    pub fn liquid_density(&self, half_width: f64) -> Vec<f64> {
+        if half_width > 0.0 { self.densities(0.0, half_width) } else { Vec::new() }
+    }
+
+    /// Number density (r_c⁻³) of each frame farther than `distance` (r_c) from
+    /// the centre of the slab, N(|z| > distance) / (A (L − 2 distance)).
+    ///
+    /// A bin that the limit cuts counts in proportion. A negative `distance`
+    /// counts as 0; one that leaves nothing of the box, or NaN, gives no
+    /// densities.
+    #[must_use]
+    pub fn vapour_density(&self, distance: f64) -> Vec<f64> {
+        if distance < 0.5 * self.length { self.densities(distance, 0.5 * self.length) } else { Vec::new() }
+    }
+
+    /// Density of each frame at inner < |z| < outer.
+    fn densities(&self, inner: f64, outer: f64) -> Vec<f64> {
+        let (inner, outer) = (inner.max(0.0), outer.min(0.5 * self.length));
+        let height = self.length / self.bins as f64;
+        let weights: Vec<f64> = (0..self.bins)
+            .map(|bin| {
+                let low = bin as f64 * height - 0.5 * self.length;
+                let high = low + height;
+                let overlap = |a: f64, b: f64| (high.min(b) - low.max(a)).max(0.0);
+                (overlap(inner, outer) + overlap(-outer, -inner)) / height
+            })
+            .collect();
+        // The sum of the weights rather than outer − inner: rounded alike.
+        let volume = self.area * height * weights.iter().sum::<f64>();
+        self.frames
+            .iter()
+            .map(|counts| {
+                let pairs = counts.iter().zip(&weights);
+                pairs.map(|(&n, w)| f64::from(n) * w).sum::<f64>() / volume
+            })
+            .collect()
+    }
+}
+
+fn mean_and_error(counts: &[f64]) -> Result<(f64, f64), StatisticsError> {
+    let frames = counts.len() as f64;
+    if counts.len() >= MINIMUM_SAMPLES {
+        let e = estimate(counts)?;
+        return Ok((e.mean, e.error));
+    }
+    let mean = counts.iter().sum::<f64>() / frames;
+    let squares: f64 = counts.iter().map(|n| (n - mean) * (n - mean)).sum();
+    let error = if counts.len() > 1 { (squares / (frames * (frames - 1.0))).sqrt() } else { mean.sqrt() };
+    Ok((mean, error))
+}
+
+/// Width of the interfaces (r_c) as Warren defines it in his eq. 19,
+/// w = (ρ_L − ρ_V) / max|dρ/dz|; the mean over the two flanks of the slab.
+///
+/// Differences of neighbouring bins would overrate the steepest slope in
+/// proportion to their noise. Instead each flank is fitted by least squares,
+/// all its bins alike, with
+///
+/// ρ(s) = (ρ_L + ρ_V)/2 − (ρ_L − ρ_V)/2 tanh((s − s₀)/d),
+///
+/// s being the distance from the centre, averaged over the height of each bin
+/// so that coarse bins do not widen the interface. Its steepest slope, at s₀,
+/// is (ρ_L − ρ_V)/2d, so that w = 2d. Layers of the liquid are averaged over, so ρ_L of the fit is not that of the plateau;
+/// see [`slab_edges`].
+///
+/// None if the profile is not that of a slab centred on 0: fewer than six bins
+/// to a flank, values that are not finite, no contrast of density, interfaces
+/// beyond the flank, as wide as the flank, or narrower than one bin.
+#[must_use]
+pub fn interface_width(profile: &DensityProfile) -> Option<f64> {
+    Some(interface(profile)?.width)
+}
+
+/// What [`interface_width`] fits to a flank.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Interface {
+    /// ρ_L.
+    pub liquid: f64,
+    /// ρ_V.
+    pub vapour: f64,
+    /// s₀, from the centre.
+    pub place: f64,
+    /// w = 2d.
+    pub width: f64,
+}
+
+/// The fit of [`interface_width`], the mean of both flanks; `None` as there.
+#[must_use]
+pub fn interface(profile: &DensityProfile) -> Option<Interface> {
+    let [a, b] = flanks(profile)?.map(|(points, height)| flank_interface(&points, height));
+    let (a, b) = (a?, b?);
+    Some(Interface {
+        liquid: 0.5 * (a.liquid + b.liquid),
+        vapour: 0.5 * (a.vapour + b.vapour),
+        place: 0.5 * (a.place + b.place),
+        width: 0.5 * (a.width + b.width),
+    })
+}
+
+/// What both flanks show by themselves, the mean of the two; see [`edges`].
+#[must_use]
+pub fn slab_edges(profile: &DensityProfile) -> Option<Edges> {
+    let [a, b] = flanks(profile)?.map(|(points, height)| edges(&points, height));
+    let (a, b) = (a?, b?);
+    Some(Edges {
+        liquid: 0.5 * (a.liquid + b.liquid),
+        vapour: 0.5 * (a.vapour + b.vapour),
+        doubt: [0, 1].map(|side| 0.5 * (a.doubt[side] + b.doubt[side])),
+        place: 0.5 * (a.place + b.place),
+        ten_ninety: 0.5 * (a.ten_ninety + b.ten_ninety),
+        steepest: 0.5 * (a.steepest + b.steepest),
+    })
+}
+
+/// Both flanks, (distance from the centre, density) with distances increasing, and the height of a bin.
+#[allow(clippy::type_complexity)]
+fn flanks(profile: &DensityProfile) -> Option<[(Vec<(f64, f64)>, f64); 2]> {
+    let (centres, density) = (&profile.centres, &profile.density);
+    if centres.len() != density.len() || centres.len() < 2 * FLANK_BINS {
+        return None;
+    }
+    if !centres.iter().chain(density).all(|x| x.is_finite()) {
+        return None;
+    }
+    let span = centres[centres.len() - 1] - centres[0];
+    let height = span / (centres.len() - 1) as f64;
+    if !(height.is_finite() && height > 0.0) {
+        return None;
+    }
+    let flank = |sign: f64| {
+        // A middle bin at 0 belongs to neither flank.
+        let mut points: Vec<(f64, f64)> = centres
+            .iter()
+            .zip(density)
+            .map(|(z, rho)| (sign * z, *rho))
+            .filter(|(s, _)| *s > 0.25 * height)
+            .collect();
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        (points, height)
+    };
+    Some([flank(1.0), flank(-1.0)])
+}
+
+/// The fit to one flank: (distance from the centre, density), distances increasing by `height`.
+pub(super) fn flank_interface(points: &[(f64, f64)], height: f64) -> Option<Interface> {
+    if points.len() < FLANK_BINS {
+        return None;
+    }
+    let extent = points[points.len() - 1].0 + 0.5 * height;
+    // In units of the bin height and the largest density.
+    let scale = points.iter().fold(0.0_f64, |m, p| m.max(p.1.abs()));
+    if scale == 0.0 {
+        return None;
+    }
+    let scaled: Vec<(f64, f64)> = points.iter().map(|(s, rho)| (s / height, rho / scale)).collect();
+    let extent = extent / height;
+    let free = fit_flank(&scaled, extent, true)?;
+    // A density is not negative, and where the curve would have it so the profile is no such curve.
+    let fit = if free[1] < 0.0 { fit_flank(&scaled, extent, false)? } else { free };
+    let width = 2.0 * fit[3].exp();
+    let slab = fit[0] > fit[1] && fit[2] > 0.0 && fit[2] < extent;
+    (slab && width >= 1.0 && width < extent).then_some(Interface {
+        liquid: fit[0] * scale,
+        vapour: fit[1] * scale,
+        place: fit[2] * height,
+        width: width * height,
+    })
+}
+
+/// The best (ρ_L, ρ_V, s₀, ln d), lengths in bins; ρ_V is 0 unless it is `free`.
+fn fit_flank(points: &[(f64, f64)], extent: f64, free: bool) -> Option<[f64; 4]> {
+    let quarter = (points.len() / 4).max(1);
+    let mean = |p: &[(f64, f64)]| p.iter().map(|p| p.1).sum::<f64>() / p.len() as f64;
+    let liquid = mean(&points[..quarter]);
+    let vapour = if free { mean(&points[points.len() - quarter..]) } else { 0.0 };
+    if liquid <= vapour {
+        return None;
+    }
+    // The step that holds as many particles.
+    let excess: f64 = points.iter().map(|p| p.1 - vapour).sum();
+    let step = (excess / (liquid - vapour)).clamp(0.0, extent);
+    let width = (0.1 * extent).max(1.0).ln();
+    let residuals = |[liquid, vapour, place, width]: [f64; 4]| {
+        // Steeper than a thousandth of a bin, or wider than any box, the model has stopped depending on d.
+        if !(-7.0..30.0).contains(&width) {
+            return None;
+        }
+        let d = width.exp();
+        let residual = |&(s, rho): &(f64, f64)| {
+            // Mean of tanh over the bin: d [ln cosh b − ln cosh a].
+            let mean = d * (ln_cosh((s + 0.5 - place) / d) - ln_cosh((s - 0.5 - place) / d));
+            0.5 * (liquid + vapour) - 0.5 * (liquid - vapour) * mean - rho
+        };
+        Some(points.iter().map(residual).collect())
+    };
+    if free {
+        let all = |p: &[f64]| residuals([p[0], p[1], p[2], p[3]]);
+        return Some(least_squares([liquid, vapour, step, width], [1e-6; 4], all)?.0);
+    }
+    let three = |p: &[f64]| residuals([p[0], 0.0, p[1], p[2]]);
+    let [liquid, place, width] = least_squares([liquid, step, width], [1e-6; 3], three)?.0;
+    Some([liquid, 0.0, place, width])
+}
+
+/// ln cosh x + ln 2; only differences of it are used.
+fn ln_cosh(x: f64) -> f64 {
+    x.abs() + (-2.0 * x.abs()).exp().ln_1p()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng, rngs::StdRng};
+
+    const LENGTH: f64 = 20.0;
+    const AREA: f64 = 25.0;
+
+    /// A slab of half-width 4 around `centre` with tanh flanks, liquid at 6
+    /// and vapour at 0.5, d = 0.4, by rejection; wrapped into the box.
+    fn slab(centre: f64, rng: &mut StdRng) -> Vec<f64> {
+        // As many trial points as would fill the box at density 6.
+        (0..3000)
+            .filter_map(|_| {
+                let s = LENGTH * (rng.random::<f64>() - 0.5);
+                let rho = 3.25 - 2.75 * ((s.abs() - 4.0) / 0.4).tanh();
+                (6.0 * rng.random::<f64>() < rho).then(|| (s + centre).rem_euclid(LENGTH))
+            })
+            .collect()
+    }
+
+    fn drifting(frames: usize) -> ProfileAccumulator {
+        let mut rng = StdRng::seed_from_u64(24);
+        let mut accumulator = ProfileAccumulator::new(LENGTH, 100, AREA).unwrap();
+        for frame in 0..frames {
+            // Several times through the boundary.
+            let centre = 0.37 * frame as f64;
+            accumulator.add(&slab(centre, &mut rng)).unwrap();
+        }
+        accumulator
+    }
+
+    /// Each density is within five of its own errors, a false alarm in 10⁶.
+    #[test]
+    fn drift_does_not_smear() {
+        let accumulator = drifting(200);
+        let liquid = estimate(&accumulator.liquid_density(2.5)).unwrap();
+        let vapour = estimate(&accumulator.vapour_density(6.3)).unwrap();
+        assert!((liquid.mean - 6.0).abs() < 5.0 * liquid.error, "{liquid:?}");
+        assert!((vapour.mean - 0.5).abs() < 5.0 * vapour.error, "{vapour:?}");
+        assert!(liquid.error < 0.03 && vapour.error < 0.01);
+        let profile = accumulator.finish().unwrap();
+        let mean = profile.density.iter().sum::<f64>() / 100.0;
+        let particles = accumulator.liquid_density(LENGTH);
+        let expected = particles.iter().sum::<f64>() / 200.0;
+        assert!((mean - expected).abs() < 1e-9);
+        let width = interface_width(&profile).unwrap();
+        // The centre of 1500 particles is only good to some hundredths.
+        assert!((width - 0.8).abs() < 0.06, "{width}");
+    }
+
+    #[test]
+    fn width_of_an_exact_profile() {
+        for bins in [60, 101, 400] {
+            let height = LENGTH / f64::from(bins);
+            let centres: Vec<f64> = (0..bins).map(|i| (f64::from(i) + 0.5) * height - 0.5 * LENGTH).collect();
+            let rho = |z: f64| 3.0 - 2.9 * ((z.abs() - 5.2) / 0.7).tanh();
+            let density = centres
+                .iter()
+                .map(|z| {
+                    let fine = (0..100).map(|k| rho(z + ((f64::from(k) + 0.5) / 100.0 - 0.5) * height));
+                    fine.sum::<f64>() / 100.0
+                })
+                .collect();
+            let profile = DensityProfile { error: vec![0.0; centres.len()], centres, density };
+            let width = interface_width(&profile).unwrap();
+            assert!((width - 1.4).abs() < 1e-3, "{bins}: {width}");
+        }
+    }
+
+    /// An interface with a foot that is cut off draws a tangent below zero; a density stays a density.
+    #[test]
+    fn densities_are_not_negative() {
+        let height = 0.1;
+        let centres: Vec<f64> = (0..200).map(|i| (f64::from(i) + 0.5) * height - 10.0).collect();
+        let rho = |z: f64| (6.0 * ((6.5 - z.abs()) / 3.0).clamp(0.0, 1.0)).powf(1.2);
+        let density = centres.iter().map(|z| rho(*z)).collect();
+        let profile = DensityProfile { error: Vec::new(), centres, density };
+        let found = interface(&profile).unwrap();
+        assert!(found.vapour >= 0.0 && found.liquid > 0.0, "{found:?}");
+        assert!(slab_edges(&profile).unwrap().vapour >= 0.0);
+    }
+
+    #[test]
+    fn few_frames_still_have_errors() {
+        for frames in [1, 3] {
+            let profile = drifting(frames).finish().unwrap();
+            let middle = profile.error[50];
+            // Poisson: 30 particles per bin.
+            let exact = (6.0 / 5.0 / frames as f64).sqrt();
+            assert!(middle > 0.05 * exact && middle < 3.0 * exact, "{middle}");
+        }
+    }
+
+    #[test]
+    fn no_slab_no_width() {
+        let flat = |rho: f64| DensityProfile {
+            centres: (0..40).map(|i| f64::from(i) - 19.5).collect(),
+            density: vec![rho; 40],
+            error: vec![0.0; 40],
+        };
+        for rho in [0.0, 3.0, f64::NAN] {
+            assert_eq!(interface_width(&flat(rho)), None);
+        }
+        let mut step = flat(0.0);
+        step.density[10..30].fill(6.0);
+        assert_eq!(interface_width(&step), None);
+        step.centres.fill(1.0);
+        assert_eq!(interface_width(&step), None);
+        step.density.clear();
+        assert_eq!(interface_width(&step), None);
+    }
+
+    #[test]
+    fn bad_input_is_refused() {
+        assert!(ProfileAccumulator::new(0.0, 10, 1.0).is_err());
+        assert!(ProfileAccumulator::new(1.0, 10, f64::NAN).is_err());
+        assert_eq!(ProfileAccumulator::new(1.0, 0, 1.0).err(), Some(ProfileError::Bins(0)));
+        let mut accumulator = ProfileAccumulator::new(4.0, 8, 1.0).unwrap();
+        assert_eq!(accumulator.finish(), Err(ProfileError::NoFrames));
+        assert_eq!(accumulator.add(&[]), Err(ProfileError::NoSlab));
+        assert_eq!(accumulator.add(&[0.0, 2.0]), Err(ProfileError::NoSlab));
+        assert_eq!(accumulator.add(&[0.0, f64::INFINITY]), Err(ProfileError::NonFinite { index: 1 }));
+        assert_eq!(accumulator.frames(), 0);
+        accumulator.add(&[1e300, -1e300, 0.3, 0.4]).unwrap();
+        assert!(accumulator.liquid_density(0.0).is_empty());
+        assert!(accumulator.liquid_density(f64::NAN).is_empty());
+        assert!(accumulator.vapour_density(2.0).is_empty());
+        assert!(accumulator.vapour_density(f64::NAN).is_empty());
+        assert_eq!(accumulator.liquid_density(9.0), vec![1.0]);
+        assert_eq!(accumulator.vapour_density(-1.0), vec![1.0]);
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn nothing_panics(
+            centres in proptest::collection::vec(proptest::num::f64::ANY, 12..40),
+            density in proptest::collection::vec(proptest::num::f64::ANY, 40),
+            z in proptest::collection::vec(-1e3_f64..1e3, 1..30),
+            length in proptest::num::f64::POSITIVE,
+            cut in proptest::num::f64::ANY,
+        ) {
+            let bins = centres.len();
+            let even = (0..bins).map(|i| i as f64 - 0.5 * (bins as f64 - 1.0)).collect();
+            for centres in [centres, even] {
+                let density = density[..bins].to_vec();
+                let _ = interface_width(&DensityProfile { centres, density, error: Vec::new() });
+            }
+            if let Ok(mut accumulator) = ProfileAccumulator::new(length, bins, 1.0) {
+                for _ in 0..9 {
+                    let _ = accumulator.add(&z);
+                }
+                let _ = accumulator.finish().map(|p| interface_width(&p));
+                let _ = (accumulator.liquid_density(cut), accumulator.vapour_density(cut));
+            }
+        }
+    }
+}

@@ -1,0 +1,88 @@
+use super::Image;
+use super::snapshot::SNAPSHOTS;
+use psidpd_formats::FormatError;
+use std::path::{Path, PathBuf};
+
+/// Most frames of an animation: of longer series every second, third, … is taken.
+const MOST: usize = 40;
+const PER_SECOND: u16 = 8;
+
+/// The snapshots in the folder of a run, in the order of their steps.
+pub(super) fn snapshots(folder: &Path) -> Vec<PathBuf> {
+    let Ok(entries) = std::fs::read_dir(folder.join(SNAPSHOTS)) else { return Vec::new() };
+    let mut paths: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
+    paths.retain(|p| {
+        let name = p.file_name().and_then(|n| n.to_str()).unwrap_or("");
+        name.starts_with("particles-") && name.ends_with(".png")
+    });
+    paths.sort();
+    paths
+}
+
+/// The snapshots of a run as one animated PNG of half their size; `None` with fewer than two. At most forty
+/// are shown, evenly chosen, the last one among them.
+///
+/// # Errors
+/// A snapshot that cannot be read, or differs in size from the others.
+pub fn animate(folder: &Path) -> Result<Option<Vec<u8>>, FormatError> {
+    let all = snapshots(folder);
+    if all.len() < 2 {
+        return Ok(None);
+    }
+    let stride = all.len().div_ceil(MOST);
+    let mut images = Vec::new();
+    for path in all.iter().rev().step_by(stride) {
+        let bytes = std::fs::read(path).map_err(FormatError::read(path))?;
+        let picture = |message: String| FormatError::Picture { path: path.clone(), message };
+        images.push(Image::from_png(&bytes).map_err(picture)?.reduced(2));
+    }
+    images.reverse();
+    let packed = Image::to_apng(&images, PER_SECOND);
+    packed
+        .map(Some)
+        .map_err(|e| FormatError::Picture { path: folder.join(SNAPSHOTS), message: e.to_string() })
+}
+
+/// An animation as the address of an image that is in the page itself.
+pub fn animation_url(png: &[u8]) -> String {
+    super::data_url(png)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::snapshot::snapshot_name;
+    use super::*;
+
+    #[test]
+    fn frames_are_in_order_and_end_with_the_last() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(animate(folder.path()).unwrap().is_none());
+        std::fs::create_dir(folder.path().join(SNAPSHOTS)).unwrap();
+        let write = |step: u64, image: Image| {
+            let path = folder.path().join(SNAPSHOTS).join(snapshot_name(step));
+            std::fs::write(path, image.to_png().unwrap()).unwrap();
+        };
+        let shade = |step: u64| [step as u8; 3];
+        for step in (0..90).rev() {
+            write(step, Image::filled(8, 4, shade(step)));
+        }
+        std::fs::write(folder.path().join(SNAPSHOTS).join("notes.txt"), "").unwrap();
+        let bytes = animate(folder.path()).unwrap().unwrap();
+        let mut reader = png::Decoder::new(std::io::Cursor::new(&bytes)).read_info().unwrap();
+        let frames = reader.info().animation_control.unwrap().num_frames;
+        assert_eq!(frames, 30);
+        let mut seen = Vec::new();
+        for _ in 0..frames {
+            let mut buffer = vec![0; reader.output_buffer_size().unwrap()];
+            let info = reader.next_frame(&mut buffer).unwrap();
+            assert_eq!((info.width, info.height), (4, 2));
+            seen.push(buffer[0]);
+        }
+        assert!(seen.windows(2).all(|w| w[0] < w[1]));
+        assert_eq!(seen.last(), Some(&89));
+        write(89, Image::filled(4, 4, shade(0)));
+        assert!(animate(folder.path()).unwrap_err().to_string().contains("differ in size"));
+        std::fs::write(folder.path().join(SNAPSHOTS).join(snapshot_name(89)), "no").unwrap();
+        assert!(animate(folder.path()).is_err());
+    }
+}

@@ -1,0 +1,43 @@
+use super::{ParticleOptions, draw_particles};
+use psidpd_formats::files::WriteError;
+use psidpd_formats::{FormatError, Frame};
+use std::path::{Path, PathBuf};
+
+/// The folder of snapshots in the folder of a run.
+pub const SNAPSHOTS: &str = "snapshots";
+
+/// The name of the snapshot of a step; names sort as steps do.
+pub fn snapshot_name(step: u64) -> String {
+    format!("particles-{step:010}.png")
+}
+
+/// Writes a picture of the particles into the folder of snapshots of a run, whole or not at all, and says
+/// where. The folder is made if need be.
+///
+/// # Errors
+/// The folder or the file cannot be written.
+pub fn write_snapshot(folder: &Path, frame: &Frame) -> Result<PathBuf, FormatError> {
+    let snapshots = folder.join(SNAPSHOTS);
+    std::fs::create_dir_all(&snapshots).map_err(|cause| WriteError { path: snapshots.clone(), cause })?;
+    let path = snapshots.join(snapshot_name(frame.step));
+    let (image, _) = draw_particles(frame, &ParticleOptions::default());
+    let png =
+        image.to_png().map_err(|e| FormatError::Picture { path: path.clone(), message: e.to_string() })?;
+    // Always by the same other name first: a run that is killed and taken up again leaves no trace of it.
+    let new = path.with_extension("png.new");
+    std::fs::write(&new, &png)
+        .and_then(|()| std::fs::rename(&new, &path))
+        .map_err(|cause| WriteError { path: path.clone(), cause })?;
+    Ok(path)
+}
+
+/// Removes the snapshots of an earlier run from the folder of a run.
+///
+/// # Errors
+/// One that cannot be removed.
+pub fn remove_snapshots(folder: &Path) -> Result<(), FormatError> {
+    for path in super::animation::snapshots(folder) {
+        std::fs::remove_file(&path).map_err(|cause| WriteError { path: path.clone(), cause })?;
+    }
+    Ok(())
+}

@@ -1,0 +1,14 @@
+//! The error type of this module.
+
+use psidpd_formats::files::WriteError;
+
+/// What can go wrong while making or writing a report.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    #[error("cannot draw the plot: {0}")]
+    Plot(String),
+    #[error("cannot convert results to or from JSON: {0}")]
+    Json(#[from] serde_json::Error),
+    #[error(transparent)]
+    Write(#[from] WriteError),
+}

@@ -1,0 +1,339 @@
+//! Plots of data as SVG, drawn by plotters.
+
+use plotters::element::DashedPathElement;
+use plotters::prelude::*;
+
+use super::ReportError;
+use super::chart::{Chart, Fallible, GREY, SMALL, chart, legend, note, pen, px, svg};
+use super::scale::Scale;
+use super::text::{fit, width};
+use psidpd_pictures::colour;
+
+/// How a series is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Style {
+    /// A line; errors appear as a band.
+    #[default]
+    Line,
+    /// Markers; errors appear as bars.
+    Points,
+    /// A dashed line; errors appear as a band.
+    Dashed,
+    /// A thin pale line, for single values behind their mean.
+    Faint,
+}
+
+/// One set of data.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Series {
+    /// Name in the legend; an empty one is left out.
+    pub name: String,
+    /// The data. Points that are not finite, or not positive on a logarithmic
+    /// axis, are skipped and interrupt a line.
+    pub points: Vec<(f64, f64)>,
+    /// Errors of the ordinates, one by one; missing, negative and non-finite
+    /// ones are not drawn.
+    pub errors: Option<Vec<f64>>,
+    /// How it is drawn.
+    pub style: Style,
+}
+
+/// A plot with linear or logarithmic axes.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Plot {
+    /// Title above the plot; may be empty.
+    pub title: String,
+    /// Label of the horizontal axis; may be empty.
+    pub x_label: String,
+    /// Label of the vertical axis; may be empty.
+    pub y_label: String,
+    /// The data, in order of drawing.
+    pub series: Vec<Series>,
+    /// Whether the horizontal axis is logarithmic.
+    pub log_x: bool,
+    /// Whether the vertical axis is logarithmic.
+    pub log_y: bool,
+    /// Horizontal reference lines with labels.
+    pub levels: Vec<(f64, String)>,
+    /// Vertical reference lines, such as the ends of stages, with labels above the plot.
+    pub marks: Vec<(f64, String)>,
+}
+
+const WIDTH: f64 = 720.0;
+const HEIGHT: f64 = 420.0;
+/// Most room for a name.
+const NAME: f64 = 260.0;
+
+/// The colour of the k-th series.
+fn colour_of(k: usize) -> RGBColor {
+    let [r, g, b] = colour::of_species(k);
+    RGBColor(r, g, b)
+}
+
+impl Series {
+    /// The error of a point, if it can be drawn.
+    fn error(&self, index: usize) -> Option<f64> {
+        let error = *self.errors.as_ref()?.get(index)?;
+        (error.is_finite() && error > 0.0).then_some(error)
+    }
+}
+
+/// A point that can be shown, and the lower and upper end of its error.
+#[derive(Clone, Copy)]
+struct Shown {
+    at: (f64, f64),
+    low: f64,
+    high: f64,
+}
+
+impl Plot {
+    /// Draws the plot as an SVG document without prolog, fit for embedding.
+    ///
+    /// # Errors
+    /// Plotters cannot draw it.
+    pub fn render(&self) -> Result<String, ReportError> {
+        let [x, y] = &self.scales();
+        svg(&self.title, [WIDTH, HEIGHT], "", |area| {
+            let top = if self.marks.is_empty() { 36.0 } else { 52.0 };
+            let mut chart = chart(area, [top, 20.0], [&self.x_label, &self.y_label], [x, y], true)?;
+            let runs: Vec<_> = self.series.iter().map(|s| runs(s, x, y)).collect();
+            // Errors are below all data.
+            for (k, (series, runs)) in self.series.iter().zip(&runs).enumerate() {
+                draw_errors(&mut chart, k, series, runs)?;
+            }
+            self.draw_references(&mut chart, x, y)?;
+            for (k, (series, runs)) in self.series.iter().zip(&runs).enumerate() {
+                draw_series(&mut chart, k, series, runs)?;
+            }
+            let names = self.series.iter().map(|s| &s.name).chain(self.levels.iter().map(|l| &l.1));
+            if names.into_iter().any(|name| !name.trim().is_empty()) {
+                legend(&mut chart, corner(&runs, x, y))?;
+            }
+            Ok(())
+        })
+    }
+
+    /// Axes with room for all that is shown. A point that cannot be shown must not widen the other axis.
+    fn scales(&self) -> [Scale; 2] {
+        let finite = |v: f64, log: bool| v.is_finite() && (!log || v > 0.0);
+        let mut xs: Vec<f64> = self.marks.iter().map(|mark| mark.0).collect();
+        let mut ys: Vec<f64> = self.levels.iter().map(|level| level.0).collect();
+        for series in &self.series {
+            for (k, &(x, y)) in series.points.iter().enumerate() {
+                if finite(x, self.log_x) && finite(y, self.log_y) {
+                    let error = series.error(k).unwrap_or(0.0);
+                    xs.push(x);
+                    ys.extend([y - error, y, y + error]);
+                }
+            }
+        }
+        [Scale::around(xs.into_iter(), self.log_x), Scale::around(ys.into_iter(), self.log_y)]
+    }
+
+    /// Horizontal lines named in the legend; vertical ones with names above them, as far as there is room.
+    fn draw_references(&self, chart: &mut Chart, x: &Scale, y: &Scale) -> Fallible {
+        let line = pen(GREY, 1.2);
+        let dotted = |ends: [(f64, f64); 2]| DashedPathElement::new(ends, px(2.0), px(3.0), line);
+        let (across, up) = (x.ends(), y.ends());
+        for (level, name) in self.levels.iter().filter(|(level, _)| y.clamp(*level).is_some()) {
+            let drawn = chart.draw_series([dotted([(across.0, *level), (across.1, *level)])])?;
+            let name = fit(name, SMALL, NAME);
+            if !name.trim().is_empty() {
+                let sample =
+                    move |(x, y)| DashedPathElement::new([(x, y), (x + px(24.0), y)], px(2.0), px(3.0), line);
+                drawn.label(name).legend(sample);
+            }
+        }
+        let mut free = f64::NEG_INFINITY;
+        let mut marks: Vec<_> = self.marks.iter().filter(|(mark, _)| x.clamp(*mark).is_some()).collect();
+        marks.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for (mark, name) in marks {
+            chart.draw_series([dotted([(*mark, up.0), (*mark, up.1)])])?;
+            let at = chart.backend_coord(&(*mark, up.1)).0 as f64 / px(1.0) as f64;
+            let name = fit(name, SMALL, NAME);
+            if at > free {
+                free = at + width(&name, SMALL) + 6.0;
+                chart.draw_series([note(&name, (*mark, up.1))])?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Uninterrupted runs of points that can be shown.
+fn runs(series: &Series, x: &Scale, y: &Scale) -> Vec<Vec<Shown>> {
+    let shown = |(k, &(a, b)): (usize, &(f64, f64))| {
+        let at = (x.clamp(a)?, y.clamp(b)?);
+        let error = series.error(k).unwrap_or(0.0);
+        let (low, high) =
+            (y.clamp(b - error).unwrap_or(y.ends().0), y.clamp(b + error).unwrap_or(y.ends().1));
+        Some(Shown { at, low, high })
+    };
+    let points: Vec<Option<Shown>> = series.points.iter().enumerate().map(shown).collect();
+    points
+        .split(Option::is_none)
+        .filter(|run| !run.is_empty())
+        .map(|run| run.iter().flatten().copied().collect())
+        .collect()
+}
+
+/// A band along a line, bars at single points.
+fn draw_errors(chart: &mut Chart, k: usize, series: &Series, runs: &[Vec<Shown>]) -> Fallible {
+    let colour = colour_of(k);
+    for run in runs {
+        if series.style == Style::Points || run.len() == 1 {
+            let bar = |s: &Shown| {
+                ErrorBar::new_vertical(s.at.0, s.low, s.at.1, s.high, pen(colour, 1.2), px(6.0) as u32)
+            };
+            chart.draw_series(run.iter().filter(|s| s.low < s.high).map(bar))?;
+        } else if run.iter().any(|s| s.low < s.high) {
+            let upper = run.iter().map(|s| (s.at.0, s.high));
+            let outline: Vec<_> = upper.chain(run.iter().rev().map(|s| (s.at.0, s.low))).collect();
+            chart.draw_series([Polygon::new(outline, colour.mix(0.18).filled())])?;
+        }
+    }
+    Ok(())
+}
+
+fn draw_series(chart: &mut Chart, k: usize, series: &Series, runs: &[Vec<Shown>]) -> Fallible {
+    let colour = colour_of(k);
+    let line = match series.style {
+        Style::Faint => pen(colour.mix(0.55), 1.0),
+        _ => pen(colour, 1.8),
+    };
+    let mut elements = Vec::new();
+    for run in runs {
+        let path: Vec<(f64, f64)> = run.iter().map(|s| s.at).collect();
+        match (series.style, path.as_slice()) {
+            (Style::Points, path) => elements.extend(path.iter().map(|at| marker(k, *at))),
+            (_, &[at]) => elements.push(Circle::new(at, px(2.0), colour.filled()).into_dyn()),
+            (style, _) => elements.push(stroke(path, style, line)),
+        }
+    }
+    let (drawn, style) = (chart.draw_series(elements)?, series.style);
+    let name = fit(&series.name, SMALL, NAME);
+    if !name.trim().is_empty() {
+        drawn.label(name).legend(move |(x, y)| match style {
+            Style::Points => marker(k, (x + px(12.0), y)),
+            style => stroke(vec![(x, y), (x + px(24.0), y)], style, line),
+        });
+    }
+    Ok(())
+}
+
+/// A line, dashed or not.
+fn stroke<'a, At: Clone + 'static>(
+    path: Vec<At>,
+    style: Style,
+    line: ShapeStyle,
+) -> DynElement<'static, SVGBackend<'a>, At> {
+    match style {
+        Style::Dashed => DashedPathElement::new(path, px(7.0), px(4.0), line).into_dyn(),
+        _ => PathElement::new(path, line).into_dyn(),
+    }
+}
+
+/// A marker whose shape, too, tells series apart.
+fn marker<'a, At: Clone + 'static>(k: usize, at: At) -> DynElement<'static, SVGBackend<'a>, At> {
+    let fill = colour_of(k).filled();
+    match k % 4 {
+        0 => Circle::new(at, px(3.2), fill).into_dyn(),
+        1 => TriangleMarker::new(at, px(4.0), fill).into_dyn(),
+        2 => Cross::new(at, px(3.0), pen(colour_of(k), 1.8)).into_dyn(),
+        _ => Circle::new(at, px(3.0), pen(colour_of(k), 1.4)).into_dyn(),
+    }
+}
+
+/// The corner where a legend covers the least of the data, lines between points included.
+fn corner(runs: &[Vec<Vec<Shown>>], x: &Scale, y: &Scale) -> SeriesLabelPosition {
+    use SeriesLabelPosition::{LowerLeft, LowerRight, UpperLeft, UpperRight};
+    let mut corners = [(0, UpperRight), (0, UpperLeft), (0, LowerRight), (0, LowerLeft)];
+    let place = |s: &Shown| (x.map(&s.at.0, (0, 100)), y.map(&s.at.1, (0, 100)));
+    for run in runs.iter().flatten() {
+        for (a, b) in run.iter().zip(run.iter().skip(1).chain(run.last())) {
+            let (a, b) = (place(a), place(b));
+            for t in 0..10 {
+                let at = ((10 - t) * a.0 + t * b.0, (10 - t) * a.1 + t * b.1);
+                corners[usize::from(at.0 < 500) + 2 * usize::from(at.1 < 600)].0 += 1;
+            }
+        }
+    }
+    corners.into_iter().min_by_key(|corner| corner.0).map_or(UpperRight, |corner| corner.1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn texts(svg: &str) -> Vec<String> {
+        let document = roxmltree::Document::parse(svg).unwrap();
+        let nodes = document.descendants().filter(|n| n.has_tag_name(("http://www.w3.org/2000/svg", "text")));
+        nodes.filter_map(|n| n.text().map(|t| t.trim().to_owned())).collect()
+    }
+
+    #[test]
+    fn everything_named_is_shown() {
+        let plot = Plot {
+            title: "Title".into(),
+            x_label: "time".into(),
+            y_label: "<script>alert(1)</script>".into(),
+            series: vec![
+                Series {
+                    name: "a & b".into(),
+                    points: vec![(0.0, 1.0), (f64::NAN, 2.0), (2.0, 3.0), (3.0, 2.0)],
+                    errors: Some(vec![0.5, 0.1]),
+                    style: Style::Line,
+                },
+                Series { name: "none".into(), ..Series::default() },
+            ],
+            levels: vec![(2.5, "level\0".into()), (f64::NAN, "hidden".into())],
+            marks: vec![(1.0, "mark".into()), (f64::NAN, "hidden".into())],
+            ..Plot::default()
+        };
+        let svg = plot.render().unwrap();
+        assert!(!svg.contains("<script") && !svg.contains("NaN"));
+        let texts = texts(&svg);
+        for text in ["Title", "time", "<script>alert(1)</script>", "a & b", "none", "mark", "level\u{FFFD}"] {
+            assert!(texts.iter().any(|t| t == text), "{text} is not in {texts:?}");
+        }
+        assert!(!texts.iter().any(|t| t == "hidden"));
+    }
+
+    #[test]
+    fn an_empty_plot_is_a_plot() {
+        let plot = Plot { log_y: true, ..Plot::default() };
+        assert!(texts(&plot.render().unwrap()).len() > 4);
+    }
+
+    fn style() -> impl Strategy<Value = Style> {
+        prop_oneof![Just(Style::Line), Just(Style::Points), Just(Style::Dashed), Just(Style::Faint)]
+    }
+
+    prop_compose! {
+        fn series()(
+            name in ".*",
+            points in prop::collection::vec(any::<(f64, f64)>(), 0..6),
+            errors in prop::option::of(prop::collection::vec(any::<f64>(), 0..8)),
+            style in style(),
+        ) -> Series {
+            Series { name, points, errors, style }
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn any_plot_is_well_formed(
+            labels in any::<(String, String, String)>(),
+            series in prop::collection::vec(series(), 0..10),
+            logs in any::<(bool, bool)>(),
+            levels in prop::collection::vec(any::<(f64, String)>(), 0..4),
+        ) {
+            let (title, x_label, y_label) = labels;
+            let marks = levels.clone();
+            let plot = Plot { title, x_label, y_label, series, log_x: logs.0, log_y: logs.1, levels, marks };
+            texts(&plot.render().unwrap());
+        }
+    }
+}

@@ -1,0 +1,309 @@
+//! The results of a run that are looked for first, and what is doubtful about them.
+
+use super::super::quantity::with_error;
+use super::super::{Item, Section, Table};
+use super::observables::Observable;
+use super::series::{self, last_stage};
+use psidpd_formats::{About, Expected};
+use psidpd_observe::drift::drift;
+use psidpd_observe::statistics::{MINIMUM_SAMPLES, estimate};
+use serde::Serialize;
+use std::path::Path;
+
+/// Fewer independent rows than this make error bars that are themselves uncertain by a fifth.
+const FEW: f64 = 12.0;
+
+/// How many of its errors the slope of a series must be from 0 to be called a drift, and in how many rows.
+const DRIFT: f64 = 4.0;
+const DRIFTING: usize = 20;
+
+/// What a run measured, in the order of interest.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Headline {
+    /// The values.
+    pub values: Vec<HeadlineValue>,
+    /// What a reader must know before using them.
+    pub notes: Vec<String>,
+}
+
+/// One of them.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct HeadlineValue {
+    /// `density`, `temperature`, `pressure`, `liquid`, `vapour`, `tension`, `width` or `radius`.
+    pub name: String,
+    /// The value.
+    pub value: f64,
+    /// One standard deviation; `None` where it is exact or not known.
+    pub error: Option<f64>,
+    /// Unit, of the length, energy and mass of the model.
+    pub unit: String,
+    /// Where it comes from.
+    pub source: String,
+    /// What mean field says, where it says anything.
+    pub mean_field: Option<f64>,
+    /// What is published for this fluid at this kT: value and error.
+    pub published: Option<[f64; 2]>,
+}
+
+/// The results of the run in a folder, as far as its files have them.
+pub fn headline(folder: &Path) -> Headline {
+    let about = About::read(folder).ok().flatten();
+    let table = series::Table::read(&folder.join("thermo.csv")).ok().flatten();
+    let observables = super::observables::read(&folder.join("observables.json")).ok().flatten();
+    let summary = super::json(&folder.join("summary.json")).ok().flatten();
+    let particles = summary.and_then(|s| s.get("particles")?.as_f64());
+    gather(about.as_ref(), particles, table.as_ref(), observables.as_deref().unwrap_or_default())
+}
+
+/// The same from files that were read.
+pub fn gather(
+    about: Option<&About>,
+    particles: Option<f64>,
+    table: Option<&series::Table>,
+    observables: &[Observable],
+) -> Headline {
+    let stage = about.and_then(|a| a.stages.last());
+    let mut all = Headline::default();
+    let of_stage = |o: &&Observable| stage.is_none_or(|s| o.stage == s.name) || o.stage.is_empty();
+    let scalar = |from: &[(&str, &str)]| {
+        from.iter().find_map(|(name, column)| {
+            let found = observables.iter().filter(of_stage).find(|o| o.name == *name)?;
+            let (value, error) = found.scalar(column)?;
+            Some((value, error, format!("{name}.{column}")))
+        })
+    };
+    let d = about.map_or(3, |a| a.dimensions);
+    let per_volume = format!("1/length^{d}");
+    let energy_density = format!("energy/length^{d}");
+    let per_area = format!("energy/length^{}", d - 1);
+    let mut add = |name: &str, unit: &str, found: Option<(f64, Option<f64>, String)>| {
+        let Some((value, error, source)) = found.filter(|f| f.0.is_finite()) else { return };
+        let expected = about.and_then(|a| a.expected.iter().find(|e| e.name == name));
+        all.values.push(HeadlineValue {
+            name: name.into(),
+            value,
+            error: error.filter(|e| e.is_finite() && *e > 0.0),
+            unit: unit.into(),
+            source,
+            mean_field: expected.and_then(|e: &Expected| e.mean_field),
+            published: expected.and_then(|e| e.published),
+        });
+    };
+    let volume = about.map(super::facts::volume);
+    let mean = particles.zip(volume).map(|(n, v)| (n / v, None, "all particles / volume of the box".into()));
+    add("density", &per_volume, mean);
+    let rows = table.map(|t| last_stage(t, about));
+    let column = |name: &str| {
+        let (table, rows) = table.zip(rows.clone())?;
+        table.get(name)?.get(rows)
+    };
+    let from_rows = |name: &str| {
+        let values = column(name)?;
+        let source = format!("thermo.csv, {}", rows_in_words(values.len()));
+        match estimate(values) {
+            Ok(e) => Some((e.mean, Some(e.error), source)),
+            Err(_) => Some((values.iter().sum::<f64>() / values.len() as f64, None, source)),
+        }
+    };
+    add("temperature", "energy", scalar(&[("temperature", "kinetic")]).or_else(|| from_rows("temperature")));
+    add("pressure", &energy_density, scalar(&[("pressure", "carried")]).or_else(|| from_rows("pressure")));
+    let both = |c| [("interface_width", c), ("drop", c)];
+    add("liquid", &per_volume, scalar(&both("liquid")));
+    add("vapour", &per_volume, scalar(&both("vapour")));
+    add("tension", &per_area, scalar(&[("surface_tension", "stress"), ("drop", "tension")]));
+    add("width", "length", scalar(&both("width")));
+    add("radius", "length", scalar(&[("drop", "radius")]));
+
+    let mut note = |text: String| all.notes.push(text);
+    let thermo =
+        [("temperature", "temperature"), ("potential", "potential energy"), ("pressure", "pressure")];
+    if let Some(rows) = rows.as_ref().filter(|rows| !rows.is_empty()) {
+        let name = stage.map_or("run", |s| s.name.as_str());
+        if rows.len() < MINIMUM_SAMPLES {
+            note(format!(
+                "too short for error bars: {} of thermo.csv in stage \"{name}\", {MINIMUM_SAMPLES} are needed; write \
+                 rows more often (`thermo` in [output]) or make more steps",
+                rows_in_words(rows.len())
+            ));
+        }
+        let few = thermo.iter().filter_map(|(key, title)| {
+            let worth = estimate(column(key)?).ok()?.effective();
+            (worth < FEW).then_some((worth, *title))
+        });
+        if let Some((worth, title)) = few.min_by(|a, b| a.0.total_cmp(&b.0)) {
+            note(format!(
+                "short: stage \"{name}\" has about {:.0} independent values of the {title}, so its error is itself uncertain by \
+                 {:.0} %; make more steps",
+                worth.max(1.0),
+                100.0 / (2.0 * worth.max(1.0)).sqrt()
+            ));
+        }
+    }
+    for (key, title) in thermo {
+        let Some(values) = column(key) else { continue };
+        let rows: Vec<f64> = (0..values.len()).map(|k| k as f64).collect();
+        if let Ok(d) = drift(&rows, values)
+            && d.slope.abs() > DRIFT * d.slope_error
+            && values.len() >= DRIFTING
+        {
+            let over = (values.len() - 1) as f64;
+            note(format!(
+                "drifting: over the last stage the {title} changes by {}; it is not in equilibrium: equilibrate longer, and do \
+                 not trust the errors",
+                with_error(d.slope * over, Some(d.slope_error * over))
+            ));
+        }
+    }
+    let measured = all.values.iter().find(|v| v.name == "temperature");
+    if let (Some(s), Some(t)) =
+        (stage.filter(|s| s.thermostat && !s.integrator.starts_with("monte-carlo")), measured)
+        && let Some(error) = t.error
+        && (t.value - s.kt).abs() > (4.0 * error).max(0.01 * s.kt)
+    {
+        let text = format!(
+            "the temperature is {:+.1} % off the kT = {} of its stage: a smaller time step than {} brings it nearer",
+            100.0 * (t.value / s.kt - 1.0),
+            s.kt,
+            s.dt
+        );
+        all.notes.push(text);
+    }
+    all.notes.extend(about.and_then(|a| image_of_drop(a, &all)));
+    for o in observables.iter().filter(of_stage) {
+        if let Some(text) = o.note.as_deref().filter(|text| !text.is_empty() && o.x.is_none()) {
+            all.notes.push(format!("{}: {text}", o.name));
+        }
+    }
+    all
+}
+
+/// A drop that feels its own image through a face of the box.
+fn image_of_drop(about: &About, found: &Headline) -> Option<String> {
+    let value = |name: &str| found.values.iter().find(|v| v.name == name).map(|v| v.value);
+    let reach = about.densities.iter().map(|d| d.range).fold(1.0, f64::max);
+    let extent = 2.0 * value("radius")? + value("width")?;
+    let length = |k: usize| about.box_edges[k].iter().map(|c| c * c).sum::<f64>().sqrt();
+    let narrow = (0..about.dimensions)
+        .filter(|k| about.box_periodic[*k])
+        .map(length)
+        .min_by(f64::total_cmp)
+        .filter(|length| length - extent < reach)?;
+    Some(format!(
+        "the drop touches its image: it is {extent:.2} across with its interface, in a box of {narrow:.2}; use a larger box"
+    ))
+}
+
+impl Headline {
+    /// The value of a name.
+    pub fn get(&self, name: &str) -> Option<&HeadlineValue> {
+        self.values.iter().find(|v| v.name == name)
+    }
+
+    /// A row for each value; columns of mean field and of what is published only if there is any.
+    pub fn table(&self) -> Table {
+        let mean_field = self.values.iter().any(|v| v.mean_field.is_some());
+        let published = self.values.iter().any(|v| v.published.is_some());
+        let mut header = vec!["result", "value ± error"];
+        header.extend(mean_field.then_some("mean field"));
+        header.extend(published.then_some("published"));
+        header.extend(["unit", "from"]);
+        let columns = header.len();
+        let mut table = Table::new(header);
+        for v in &self.values {
+            let mut row = vec![v.name.clone(), with_error(v.value, v.error)];
+            if mean_field {
+                row.push(v.mean_field.map_or(String::new(), |x| with_error(x, None)));
+            }
+            if published {
+                row.push(v.published.map_or(String::new(), |[x, e]| with_error(x, Some(e))));
+            }
+            row.extend([super::super::text::typeset(&v.unit), v.source.clone()]);
+            table.push(row);
+        }
+        use super::super::Align::{Left, Right};
+        table.align = vec![Left];
+        table.align.resize(columns - 2, Right);
+        table.align.extend([Left, Left]);
+        table
+    }
+
+    /// For the top of a page; `None` if nothing is known.
+    pub fn section(&self) -> Option<Section> {
+        if self.values.is_empty() && self.notes.is_empty() {
+            return None;
+        }
+        let mut items = vec![Item::Table(self.table())];
+        if !self.notes.is_empty() {
+            let mut notes = Table::new(["before you use them"]);
+            self.notes.iter().for_each(|n| notes.push([n.clone()]));
+            items.push(Item::Table(notes));
+        }
+        items.push(Item::Prose("Errors are one standard deviation of the mean.".into()));
+        Some(Section { heading: "Results".into(), items })
+    }
+}
+
+fn rows_in_words(count: usize) -> String {
+    if count == 1 { "1 row".to_owned() } else { format!("{count} rows") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table(values: &[f64]) -> series::Table {
+        let n = values.len();
+        series::Table {
+            header: ["step", "temperature", "potential", "pressure"].map(String::from).to_vec(),
+            columns: vec![
+                (1..=n).map(|k| k as f64).collect(),
+                vec![1.0; n],
+                values.to_vec(),
+                (0..n).map(|k| if k % 2 == 0 { 2.0 } else { 3.0 }).collect(),
+            ],
+        }
+    }
+
+    fn noise(k: usize) -> f64 {
+        (12.9898 * k as f64).sin().mul_add(43758.5453, 1e6).fract()
+    }
+
+    fn notes(values: &[f64]) -> String {
+        gather(None, None, Some(&table(values)), &[]).notes.join("\n")
+    }
+
+    #[test]
+    fn short_and_drifting_series_are_told_from_good_ones() {
+        let good: Vec<f64> = (0..400).map(noise).collect();
+        assert_eq!(notes(&good), "");
+        assert!(notes(&good[..5]).contains("too short for error bars"));
+        assert!(notes(&good[..9]).contains("short: "), "{}", notes(&good[..9]));
+        let drifting: Vec<f64> = (0..400).map(|k| noise(k) + 0.01 * k as f64).collect();
+        assert!(
+            notes(&drifting).contains("drifting: over the last stage the potential energy changes by "),
+            "{}",
+            notes(&drifting)
+        );
+    }
+
+    fn drop(radius: f64) -> Observable {
+        let column = |name: &str, value: f64| serde_json::json!({"name": name, "unit": "length", "values": [value], "errors": [0.1]});
+        serde_json::from_value(serde_json::json!({
+            "name": "drop", "kind": "scalar", "note": "It percolates.",
+            "columns": [column("radius", radius), column("width", 0.5), column("tension", 3.0)]
+        }))
+        .unwrap()
+    }
+
+    #[test]
+    fn a_drop_that_reaches_its_image_is_noticed() {
+        let about = super::super::tests::about();
+        let side = about.box_edges[0][0];
+        let found = |radius: f64| gather(Some(&about), Some(100.0), None, &[drop(radius)]);
+        assert!(found(0.48 * side).notes.iter().any(|n| n.contains("touches its image")));
+        let small = found(0.1 * side);
+        assert_eq!(small.notes, ["drop: It percolates."]);
+        assert_eq!(small.get("tension").map(|v| (v.value, v.error)), Some((3.0, Some(0.1))));
+        assert!(small.get("density").is_some_and(|v| v.error.is_none()));
+    }
+}

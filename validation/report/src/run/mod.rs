@@ -1,0 +1,155 @@
+//! The report of one run, from the files in its folder.
+//!
+//! A folder may lack any of them: a run that was stopped has no `summary.json`, a scene without `[output]`
+//! no dump. The page then says what is not there.
+
+mod facts;
+mod headline;
+mod observables;
+mod series;
+mod state;
+
+use super::{Item, Report, ReportError, Section};
+use psidpd_formats::files::write_atomically;
+use psidpd_formats::{About, FormatError};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+pub use headline::{Headline, HeadlineValue, headline};
+pub use observables::{Observable, ObservableAxis, ObservableColumn};
+pub use series::Table as SeriesTable;
+
+/// Why a folder has no report.
+#[derive(Debug, thiserror::Error)]
+pub enum RunReportError {
+    #[error("{} holds nothing of a run: none of {files} is there", folder.display())]
+    NoRun { folder: PathBuf, files: String },
+    #[error(transparent)]
+    Report(#[from] ReportError),
+}
+
+/// The files that a report is made from, and what they are.
+const FILES: [(&str, &str); 10] = [
+    ("about.json", "what was run: species, stages, units, columns of thermo.csv"),
+    ("thermo.csv", "totals every few steps"),
+    ("summary.json", "what the run came to"),
+    ("timing.json", "how long the run took"),
+    ("observables.json", "observables with their errors"),
+    ("observables", "the same, a CSV file for each"),
+    ("final.data", "the state after the last step: LAMMPS data file"),
+    ("dump.lammpstrj", "frames: LAMMPS text dump"),
+    ("trajectory.xyz", "frames: extended XYZ"),
+    ("snapshots", "pictures of the particles along the run"),
+];
+
+/// Makes `report.html` from the files in the folder of a run, and says where it is.
+///
+/// # Errors
+/// A folder without any of them; a page that cannot be written. A file that cannot be understood is no
+/// error: the page says what is wrong with it.
+pub fn write_run_report(folder: &Path) -> Result<PathBuf, RunReportError> {
+    let page = run_report(folder)?.render();
+    let path = folder.join("report.html");
+    write_atomically(&path, page.as_bytes()).map_err(ReportError::from)?;
+    Ok(path)
+}
+
+/// The report of the run in a folder.
+///
+/// # Errors
+/// A folder with nothing of a run in it.
+pub fn run_report(folder: &Path) -> Result<Report, RunReportError> {
+    if !FILES.iter().any(|(name, _)| folder.join(name).exists()) {
+        let files: Vec<&str> = FILES.iter().map(|f| f.0).collect();
+        return Err(RunReportError::NoRun { folder: folder.to_owned(), files: files.join(", ") });
+    }
+    let mut notes = Vec::new();
+    let about = keep(About::read(folder), &mut notes).flatten();
+    let summary = keep(json(&folder.join("summary.json")), &mut notes).flatten();
+    let timing = keep(json(&folder.join("timing.json")), &mut notes).flatten();
+    let table = keep(series::Table::read(&folder.join("thermo.csv")), &mut notes).flatten();
+    let observables = keep(observables::read(&folder.join("observables.json")), &mut notes).flatten();
+    let state = state::State::find(folder, about.as_ref(), &mut notes);
+
+    let title = about
+        .as_ref()
+        .map(|a| a.title.clone())
+        .or_else(|| Some(summary.as_ref()?.get("title")?.as_str()?.to_owned()))
+        .unwrap_or_else(|| folder.file_name().map_or("run".into(), |n| n.to_string_lossy().into_owned()));
+    let particles = summary.as_ref().and_then(|s| s.get("particles")?.as_f64());
+    let found = headline::gather(
+        about.as_ref(),
+        particles.or_else(|| Some(state.as_ref()?.configuration.x.len() as f64)),
+        table.as_ref(),
+        observables.as_deref().unwrap_or_default(),
+    );
+    let mut sections = vec![
+        state::section(folder, state.as_ref(), about.as_ref()),
+        series::section(table.as_ref(), about.as_ref(), state.as_ref().map(|s| s.configuration.x.len())),
+        observables::section(observables.as_deref()),
+        files_section(folder),
+    ];
+    if let Some(section) = found.section() {
+        sections.insert(0, section);
+    }
+    if !notes.is_empty() {
+        let text = notes.join("\n\n");
+        let items = vec![Item::Prose(text)];
+        sections.insert(0, Section { heading: "What could not be read".into(), items });
+    }
+    Ok(Report {
+        title,
+        subtitle: about.as_ref().map_or(String::new(), |a| format!("psidpd run of {}", a.model)),
+        facts: facts::facts(about.as_ref(), summary.as_ref(), timing.as_ref(), state.as_ref()),
+        sections,
+        passed: 0,
+        failed: 0,
+    })
+}
+
+/// A value, or a note of why there is none.
+fn keep<T>(result: Result<T, FormatError>, notes: &mut Vec<String>) -> Option<T> {
+    result.map_err(|e| notes.push(e.to_string())).ok()
+}
+
+/// A file's text; `None` if there is no such file.
+fn text(path: &Path) -> Result<Option<String>, FormatError> {
+    match std::fs::read_to_string(path) {
+        Ok(text) => Ok(Some(text)),
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(e) => Err(FormatError::read(path)(e)),
+    }
+}
+
+fn json(path: &Path) -> Result<Option<Value>, FormatError> {
+    let parse = |text: String| serde_json::from_str(&text);
+    text(path)?.map(parse).transpose().map_err(|cause| FormatError::Json { path: path.to_owned(), cause })
+}
+
+fn files_section(folder: &Path) -> Section {
+    let mut table = super::Table::new(["file", "what it is", "size"]);
+    let mut missing = Vec::new();
+    for (name, what) in FILES {
+        let path = folder.join(name);
+        match std::fs::metadata(&path) {
+            Ok(data) if data.is_file() => table.push([name.to_owned(), what.into(), size(data.len())]),
+            Ok(_) => table.push([format!("{name}/"), what.into(), String::new()]),
+            Err(_) => missing.push(format!("{name} ({what})")),
+        }
+    }
+    let mut items = vec![Item::Table(table)];
+    if !missing.is_empty() {
+        items.push(Item::Prose(format!("Not there: {}.", missing.join("; "))));
+    }
+    Section { heading: "Files".into(), items }
+}
+
+fn size(bytes: u64) -> String {
+    let units = ["B", "kB", "MB", "GB", "TB"];
+    let power = (bytes.max(1).ilog10() / 3).min(4);
+    let value = bytes as f64 / 1000f64.powi(power as i32);
+    if power == 0 { format!("{bytes} B") } else { format!("{value:.1} {}", units[power as usize]) }
+}
+
+#[cfg(test)]
+mod tests;
