@@ -1,6 +1,7 @@
 //! The style for C++. Errors arrive there as exceptions, panics as errors.
 
-use crate::style::{Style, StyleError, guard};
+use crate::error::StyleError;
+use crate::style::{Style, guard};
 use crate::thermostat::Noise;
 use nalgebra::Matrix3;
 use psidpd_core::engine::noise::Law;
@@ -361,7 +362,7 @@ fn wanted(request: &ffi::Request) -> (Option<Step>, Want) {
 fn domain_of(extent: &ffi::Extent) -> Result<PeriodicBox, StyleError> {
     let [xx, yy, zz, yz, xz, xy] = extent.edges;
     let edges = Matrix3::new(xx, xy, xz, 0.0, yy, yz, 0.0, 0.0, zz);
-    PeriodicBox::new(extent.origin, edges, extent.closed).map_err(|e| StyleError::new(e.to_string()))
+    PeriodicBox::new(extent.origin, edges, extent.closed).map_err(|e| StyleError(e.to_string()))
 }
 
 #[allow(clippy::too_many_arguments)]

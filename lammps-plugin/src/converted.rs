@@ -1,6 +1,6 @@
 //! What goes between LAMMPS and the model, from the units of one to those of the other.
 
-use crate::style::StyleError;
+use crate::error::StyleError;
 use crate::units::Scale;
 use psidpd_core::engine::{EngineError, Step, Tally};
 

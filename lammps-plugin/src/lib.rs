@@ -13,6 +13,7 @@
 
 pub mod bridge;
 mod converted;
+mod error;
 pub mod style;
 pub mod thermostat;
 pub mod units;

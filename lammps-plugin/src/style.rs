@@ -3,34 +3,18 @@
 mod model;
 
 use crate::converted::{Converted, times};
+use crate::error::StyleError;
 use crate::units::Scale;
 use psidpd_core::engine::thermostat::PairThermostat;
 use psidpd_core::engine::{
-    Around, Engine, EngineError, Newton, PairsOfHost, Particles, Path as EnginePath, PeriodicBox, Pool,
-    Precision, Reason, Request, Settings, Step, Surroundings, Tally, Want,
+    Around, Engine, Newton, PairsOfHost, Particles, Path as EnginePath, PeriodicBox, Pool, Precision, Reason,
+    Request, Settings, Step, Surroundings, Tally, Want,
 };
 use psidpd_core::model::Model;
 use std::fmt::Write;
 use std::num::NonZeroUsize;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
-
-/// What goes wrong, as the text that LAMMPS prints.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{0}")]
-pub struct StyleError(String);
-
-impl StyleError {
-    pub(crate) fn new(text: String) -> StyleError {
-        StyleError(text)
-    }
-}
-
-impl From<EngineError> for StyleError {
-    fn from(error: EngineError) -> StyleError {
-        StyleError(error.to_string())
-    }
-}
 
 /// A model at the style's temperature, ready to compute.
 #[derive(Debug)]
@@ -369,7 +353,7 @@ impl Style {
             let known = |i: i32| usize::try_from(i).ok().filter(|i| *i < known);
             match particles.map(known) {
                 [Some(i), Some(j)] => Ok(here(self.engine.single(kinds, r, [i, j]))),
-                _ => Err(StyleError::new(format!(
+                _ => Err(StyleError(format!(
                     "asked for the pair of particles {} and {}, of which the last evaluation knows nothing",
                     particles[0], particles[1]
                 ))),

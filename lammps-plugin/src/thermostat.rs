@@ -1,6 +1,7 @@
 //! Drag and noise apart from the forces, for the fix that integrates: velocities of a rank's atoms by the midpoint rule.
 
-use crate::style::{Style, StyleError, guard, triples};
+use crate::error::StyleError;
+use crate::style::{Style, guard, triples};
 use psidpd_core::engine::noise::Law;
 use psidpd_core::engine::thermostat::{Need, Rank, Stream, Update};
 use psidpd_core::engine::{Around, Particles};
@@ -96,7 +97,7 @@ fn finite(v: &[[f64; 3]]) -> Result<(), StyleError> {
     if sum.is_finite() {
         return Ok(());
     }
-    Err(StyleError::new(
+    Err(StyleError(
         "a velocity is no finite number behind the thermostat: the time step is too large, or the start overlaps"
             .to_owned(),
     ))

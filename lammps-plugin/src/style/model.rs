@@ -1,6 +1,7 @@
 //! The model of a style: a file, or the coefficients of `pair_coeff`.
 
-use super::{Style, StyleError, guard};
+use super::{Style, guard};
+use crate::error::StyleError;
 use crate::units::Scale;
 use psidpd_core::model::{
     ForceLaw, Model, PresetError, SplinePair, WarrenPair, lucy_mdpd, spline_dpd, warren_ab,

@@ -21,8 +21,6 @@ pub mod pair;
 
 mod file;
 mod fluid;
-mod preset_lucy;
-mod preset_spline;
 mod presets;
 
 pub use file::{KNOWN_FUNCTIONS, Model, Published, Units};
@@ -30,6 +28,7 @@ pub use fluid::{
     Bounds, Continuation, ExcessFreeEnergy, Fluid, PairTerm, Polynomial, StatedSlopes, Thermostat,
     WeightedDensity,
 };
-pub use preset_lucy::{lucy_mdpd, lucy_mdpd_text};
-pub use preset_spline::{SplinePair, spline_dpd, spline_dpd_text};
-pub use presets::{ForceLaw, PresetError, WarrenPair, warren_ab, warren_ab_text};
+pub use presets::{
+    ForceLaw, PresetError, SplinePair, WarrenPair, lucy_mdpd, lucy_mdpd_text, spline_dpd, spline_dpd_text,
+    warren_ab, warren_ab_text,
+};

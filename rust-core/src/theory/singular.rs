@@ -44,6 +44,24 @@ pub fn singular_densities(
     Ok((0..fluid.species.len()).flat_map(|alpha| along(&theory, alpha, composition, &grid)).collect())
 }
 
+impl MeanField {
+    /// The total densities that coexistence and stability are looked for at, for species in the
+    /// proportions of `composition`: logarithmic from `1e-6` to `1e6` particles in the cube of the
+    /// longest range, up to the first singularity of ψ and denser towards it.
+    pub(super) fn density_grid(&self, composition: &[f64]) -> Vec<f64> {
+        let unit = self.ranges[0].powi(-(self.dimensions as i32));
+        let (low, high) = ((1e-6 * unit).ln(), (1e6 * unit).ln());
+        let all: Vec<f64> = spaced(low, high, 1200).into_iter().map(f64::exp).collect();
+        let pole = first_along(self, composition, &all);
+        let Some(pole) = pole else {
+            return all;
+        };
+        let mut grid: Vec<f64> = all.into_iter().filter(|rho| *rho < 0.5 * pole).collect();
+        grid.extend((0..240).map(|i| pole * (1.0 - 0.5 * 2f64.powf(-(i as f64) / 8.0))));
+        grid
+    }
+}
+
 /// The first singularity above density zero along a composition.
 pub fn first_along(theory: &MeanField, composition: &[f64], grid: &[f64]) -> Option<f64> {
     (0..composition.len())

@@ -11,14 +11,16 @@ pub mod dump;
 mod error;
 pub mod files;
 mod frame;
+mod open;
 pub mod setfl;
 pub mod text;
 mod xyz;
 
 pub use about::{About, AboutDensity, AboutStage, Expected, THERMO};
-pub use configuration::{Configuration, Which};
+pub use configuration::Configuration;
 pub use data::DataFile;
 pub use error::FormatError;
 pub use files::WriteError;
 pub use frame::Frame;
+pub use open::Which;
 pub use xyz::{read_xyz, write_xyz};

@@ -13,7 +13,6 @@ use std::time::{Duration, Instant};
 use rustix::process::{Pid, Signal, kill_process, kill_process_group};
 
 use super::error::{LammpsError, tail};
-use super::install;
 use super::mpi::{self, Mpi};
 
 /// Where a LAMMPS comes from.
@@ -203,15 +202,6 @@ impl Host {
     /// The same LAMMPS, run by another program that takes the arguments of `lmp`.
     pub fn with_program(&self, program: &Path) -> Host {
         Host { lmp: program.to_owned(), ..self.clone() }
-    }
-
-    /// The LAMMPS in the virtual environment `PSIDPD_LAMMPS_VENV`, else the one that `psidpd lammps install` has put here.
-    pub fn find() -> Result<Host, LammpsError> {
-        if let Some(dir) = std::env::var_os("PSIDPD_LAMMPS_VENV").filter(|d| !d.is_empty()) {
-            return Host::from_venv(Path::new(&dir));
-        }
-        let path = install::venv_dir();
-        install::installed(&path).ok_or(LammpsError::NotInstalled { path })
     }
 
     /// The `lmp` that starts in a shell without further variables: in an environment the script in `bin`, which finds MPI.

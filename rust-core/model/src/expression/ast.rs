@@ -1,14 +1,7 @@
 //! A parsed expression, names not yet resolved.
 
-use super::error::{ExpressionError, Span};
+use super::error::Span;
 use super::function::Function;
-use super::parser;
-
-/// The longest text that is parsed, in bytes.
-pub const MAX_LENGTH: usize = 4096;
-
-/// The deepest nesting of parentheses, signs and powers that is parsed.
-pub const MAX_DEPTH: usize = 64;
 
 /// The syntax of an expression.
 ///
@@ -54,14 +47,6 @@ pub(super) enum Binary {
 }
 
 impl Ast {
-    /// Parses `text`.
-    ///
-    /// Any text at all may be given: longer than [`MAX_LENGTH`] or nested deeper than
-    /// [`MAX_DEPTH`] is an error like any other.
-    pub fn parse(text: &str) -> Result<Self, ExpressionError> {
-        parser::parse(text).map(|steps| Self { steps })
-    }
-
     /// The names that need a value, in the order of the text and as often as they occur, each
     /// with the byte at which it starts. Functions and `pi` are not among them.
     pub fn names(&self) -> impl Iterator<Item = (&str, usize)> {

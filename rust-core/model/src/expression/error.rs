@@ -2,8 +2,7 @@
 
 use thiserror::Error;
 
-use super::graph::MAX_NODES;
-use super::{MAX_DEPTH, MAX_LENGTH};
+use super::limits::{MAX_DEPTH, MAX_LENGTH, MAX_NODES};
 
 /// A stretch of the text, in bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

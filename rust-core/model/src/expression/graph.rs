@@ -4,9 +4,7 @@ use std::collections::HashMap;
 
 use super::error::TooLarge;
 use super::function::Unary;
-
-/// The most operations a formula may have, and a derivative may need on the way.
-pub const MAX_NODES: usize = 50_000;
+use super::limits::MAX_NODES;
 
 /// A node's place in its graph.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -7,7 +7,14 @@ use super::function::multiply_up;
 use super::graph::{Graph, Id, Node, as_quotient};
 use super::program::{Instruction, Operation, Output, Program};
 
-pub(super) fn lower(outputs: &[&Formula]) -> Program {
+impl Program {
+    /// Compiles `outputs`, whose values keep this order.
+    pub fn new(outputs: &[&Formula]) -> Self {
+        lower(outputs)
+    }
+}
+
+fn lower(outputs: &[&Formula]) -> Program {
     let mut graph = Graph::with_limit(usize::MAX);
     let mut roots = Vec::with_capacity(outputs.len());
     for formula in outputs {

@@ -36,6 +36,7 @@ mod formula;
 mod function;
 mod graph;
 mod lexer;
+mod limits;
 mod lower;
 mod parser;
 mod program;
@@ -44,11 +45,11 @@ mod suggest;
 
 pub(crate) use suggest::closest;
 
-pub use ast::{Ast, MAX_DEPTH, MAX_LENGTH};
+pub use ast::Ast;
 pub use compile::Variables;
 pub use display::Named;
 pub use error::{ErrorKind, ExpressionError, TooLarge};
 pub use expansion::Expansion;
 pub use formula::Formula;
-pub use graph::MAX_NODES;
+pub use limits::{MAX_DEPTH, MAX_LENGTH, MAX_NODES};
 pub use program::Program;

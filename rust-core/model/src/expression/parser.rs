@@ -2,13 +2,24 @@
 
 use std::f64::consts::PI;
 
-use super::ast::{Action, Binary, MAX_DEPTH, MAX_LENGTH, Step};
+use super::ast::{Action, Ast, Binary, Step};
 use super::error::{ErrorKind, ExpressionError, Span};
 use super::function::Function;
 use super::lexer::{Lexer, Token};
+use super::limits::{MAX_DEPTH, MAX_LENGTH};
 use super::suggest::closest;
 
-pub(super) fn parse(text: &str) -> Result<Vec<Step>, ExpressionError> {
+impl Ast {
+    /// Parses `text`.
+    ///
+    /// Any text at all may be given: longer than [`MAX_LENGTH`] or nested deeper than
+    /// [`MAX_DEPTH`] is an error like any other.
+    pub fn parse(text: &str) -> Result<Self, ExpressionError> {
+        parse(text).map(|steps| Self { steps })
+    }
+}
+
+fn parse(text: &str) -> Result<Vec<Step>, ExpressionError> {
     if text.len() > MAX_LENGTH {
         let mut offset = MAX_LENGTH;
         while !text.is_char_boundary(offset) {

@@ -1,8 +1,6 @@
 //! Formulas as a list of instructions.
 
-use super::Formula;
 use super::function::{Unary, select};
-use super::lower;
 
 /// Several formulas compiled for evaluation together.
 ///
@@ -94,11 +92,6 @@ pub(super) enum Output {
 }
 
 impl Program {
-    /// Compiles `outputs`, whose values keep this order.
-    pub fn new(outputs: &[&Formula]) -> Self {
-        lower::lower(outputs)
-    }
-
     /// How many values one evaluation gives.
     pub fn outputs(&self) -> usize {
         self.outputs.len()
@@ -237,7 +230,7 @@ fn zip(to: &mut [f64], a: &[f64], b: &[f64], f: impl Fn(f64, f64) -> f64) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Ast, Variables};
+    use super::super::{Ast, Formula, Variables};
     use super::*;
 
     fn formula(text: &str) -> Formula {

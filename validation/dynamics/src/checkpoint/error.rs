@@ -70,7 +70,7 @@ impl CheckpointError {
 
     /// There is none in `folder`.
     pub fn absent(folder: &Path) -> CheckpointError {
-        let path = folder.join(super::store::NEWEST);
+        let path = folder.join(super::NEWEST);
         let source = std::io::ErrorKind::NotFound.into();
         CheckpointError::Unreadable { path, source }
     }

@@ -34,6 +34,9 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 
+/// The name of the newest checkpoint in the folder of a run.
+const NEWEST: &str = "checkpoint";
+
 /// All that the rest of a run depends on, and that its files will tell.
 ///
 /// Particle arrays are in the order that the run had them in: sums of forces depend on it by rounding.

@@ -1,12 +1,11 @@
 //! The checkpoints in the folder of a run.
 
-use super::{Checkpoint, CheckpointError, format};
+use super::{Checkpoint, CheckpointError, NEWEST, format};
 use psidpd_formats::files::{WriteError, remove_if_there};
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 
-pub(super) const NEWEST: &str = "checkpoint";
 const BEFORE: &str = "checkpoint.old";
 const UNFINISHED: &str = "checkpoint.new";
 

@@ -2,14 +2,14 @@
 //! conservative forces alone are far from it. Errors are those of the mean of sixteen stretches of a run; six of
 //! them are exceeded by chance less than once in 10⁴ runs. The seeds are fixed.
 
-use psidpd_observe::frame::Frame;
 use super::find;
-use psidpd_observe::{Measured, Observation, Observers};
-use psidpd_core::engine::Want;
-use psidpd_core::engine::reference::Evaluator;
 use crate::run::{Integrator, Simulation};
 use crate::scene::Scene;
 use crate::test_support::SET6;
+use psidpd_core::engine::Want;
+use psidpd_core::engine::reference::Evaluator;
+use psidpd_observe::frame::Frame;
+use psidpd_observe::{Measured, Observation, Observers};
 
 const DT: f64 = 0.02;
 

@@ -1,15 +1,15 @@
 //! Observables of a few particles whose answers are known without the code.
 
+use crate::particles::State;
+use crate::run::Simulation;
+use crate::test_support::{self, IDEAL, IDEAL_MIXTURE, SET6, SOFT};
+use nalgebra::Matrix3;
+use psidpd_core::engine::PeriodicBox;
+use psidpd_core::engine::reference::Evaluator;
 use psidpd_observe::Observation;
 use psidpd_observe::flux::{Flux, Line};
 use psidpd_observe::frame::{Frame, View};
 use psidpd_observe::meter::AnyMeter;
-use nalgebra::Matrix3;
-use psidpd_core::engine::PeriodicBox;
-use psidpd_core::engine::reference::Evaluator;
-use crate::particles::State;
-use crate::run::Simulation;
-use crate::test_support::{self, IDEAL, IDEAL_MIXTURE, SET6, SOFT};
 use std::f64::consts::PI;
 
 /// Particles without forces in a plane.
@@ -202,7 +202,8 @@ fn the_density_of_a_slab_is_that_of_its_middle() {
     let middle = middle.iter().sum::<f64>() / middle.len() as f64;
     assert!((liquid.value - middle).abs() < 3.0 * liquid.error, "{liquid:?} {middle}");
     assert!(liquid.error < 0.003 && out.note.is_empty(), "{liquid:?} {}", out.note);
-    let shape = psidpd_observe::DensityProfile { centres: z.clone(), density: density.clone(), error: Vec::new() };
+    let shape =
+        psidpd_observe::DensityProfile { centres: z.clone(), density: density.clone(), error: Vec::new() };
     let fit = psidpd_observe::profile::interface(&shape).unwrap();
     assert!(fit.liquid - middle > 4.0 * liquid.error, "{fit:?} {middle} {liquid:?}");
 }

@@ -7,8 +7,8 @@ use psidpd_core::document::FileError;
 use psidpd_core::engine::Want;
 use psidpd_core::engine::reference::Evaluator;
 use psidpd_observe::frame::Frame;
-use psidpd_observe::meter::{AnyMeter, Meter};
 use psidpd_observe::meter::surface_tension::stretched_energy;
+use psidpd_observe::meter::{AnyMeter, Meter};
 use rand::{SeedableRng, rngs::StdRng};
 use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::TAU;
@@ -117,9 +117,6 @@ fn stretching_and_stress_agree_on_every_configuration() {
         let change =
             |h: f64| (stretched_energy(&frame, axis, h) - stretched_energy(&frame, axis, -h)) / (2.0 * h);
         let found = (4.0 * change(5e-5) - change(1e-4)) / 3.0;
-        assert!(
-            (found - expected).abs() < 1e-5 * expected.abs().max(100.0),
-            "{axis}: {found} {expected}"
-        );
+        assert!((found - expected).abs() < 1e-5 * expected.abs().max(100.0), "{axis}: {found} {expected}");
     }
 }

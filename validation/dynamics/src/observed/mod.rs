@@ -1,11 +1,11 @@
 //! Tests of observables in whole runs.
 
-use psidpd_core::document::FileError;
-use psidpd_core::engine::Want;
-use psidpd_core::engine::reference::Evaluator;
 use crate::run::Simulation;
 use crate::scene::Scene;
 use crate::test_support::{self, IDEAL_MIXTURE, SET6};
+use psidpd_core::document::FileError;
+use psidpd_core::engine::Want;
+use psidpd_core::engine::reference::Evaluator;
 use psidpd_observe::keys::COMMON;
 use psidpd_observe::request::tables;
 use psidpd_observe::*;

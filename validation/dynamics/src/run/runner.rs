@@ -1,15 +1,12 @@
-use super::advice::Advice;
 use super::error::RunError;
 use super::folder::Folder;
+use super::outcome::{Outcome, Progress};
 use super::output::Output;
 use super::simulation::Simulation;
 use super::summary::Summary;
 use super::timing::Timing;
 use super::underway::Run;
-use super::watch::Deviation;
-use crate::checkpoint::{
-    Checkpoint, CheckpointError, Found, Identity, Position, Store, Sums, Thermo, Written,
-};
+use crate::checkpoint::{Checkpoint, CheckpointError, Found, Identity, Position, Store, Sums, Written};
 use crate::particles::State;
 use crate::scene::Scene;
 use psidpd_core::engine::{Fault, Settings};
@@ -22,21 +19,6 @@ use std::time::Duration;
 
 /// The version of this program.
 const PROGRAM: &str = env!("CARGO_PKG_VERSION");
-
-/// Where a run is, after every step.
-#[derive(Debug, Clone, Copy)]
-pub struct Progress<'a> {
-    /// Name of the stage.
-    pub stage: &'a str,
-    /// Steps made, over all stages.
-    pub step: u64,
-    /// Steps to make, over all stages.
-    pub steps: u64,
-    /// The totals, on steps that have them.
-    pub thermo: Option<&'a Thermo>,
-    /// What is wrong with the temperatures of the stage, at its last step.
-    pub deviations: &'a [Deviation],
-}
 
 /// What to do with an earlier run in the folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -67,29 +49,6 @@ pub enum Start {
     },
     /// The end: there is nothing left to do.
     Finished,
-}
-
-/// How a run ended.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Outcome {
-    /// All steps are made.
-    Finished {
-        /// What it came to.
-        summary: Box<Summary>,
-        /// What it took.
-        timing: Timing,
-        /// A better step for its last stage, if it made steps.
-        advice: Option<Advice>,
-    },
-    /// It was asked to stop, and left a checkpoint.
-    Interrupted {
-        /// What it was told.
-        stop: usize,
-        /// Steps made.
-        step: u64,
-        /// Steps to make.
-        steps: u64,
-    },
 }
 
 /// Runs a scene from its first step to its last, whatever is in the folder `out`; see [`Runner`].

@@ -1,7 +1,7 @@
 //! `[[body_force]]`.
 
+use super::composition::unknown_species;
 use super::initial::Initial;
-use super::masses::unknown_species;
 use super::number::{axis, vector};
 use crate::particles::{BodyForce, Tags};
 use psidpd_core::document::{FileError, FileErrorKind, Section};

@@ -1,6 +1,5 @@
 //! `composition` and `species` of what is filled.
 
-use super::masses::unknown_species;
 use psidpd_core::document::{FileError, FileErrorKind, Section};
 
 /// Number fractions of the species; they add up to 1.
@@ -79,6 +78,11 @@ impl Composition {
         }
         shares
     }
+}
+
+/// The error of a name that is not one of the model's species.
+pub fn unknown_species(name: &str, species: &[String]) -> FileErrorKind {
+    FileErrorKind::UnknownName { what: "species", name: name.to_owned(), known: species.join(", ") }
 }
 
 #[cfg(test)]

@@ -86,7 +86,10 @@ pub fn read(root: &Section, model: &Model, base: &Path) -> Result<(Initial, Peri
             return Err(value.error(FileErrorKind::Value("the particles are those of the file".into())));
         }
         let periodic = domain::read_boundary_alone(root, dimensions)?;
-        saved::read(&section, format, model, base, periodic)?
+        let saved::Saved { path, state, velocities, frozen } =
+            saved::read(&section, format, model, base, periodic)?;
+        let domain = state.domain.clone();
+        (Initial::File { path, state: Box::new(state), velocities, frozen }, domain)
     } else {
         let domain = domain::read(root, dimensions)?;
         let common = Common::of(root, model, &domain)?;

@@ -1,8 +1,9 @@
 //! `[masses]`.
 
 use super::Initial;
+use super::composition::unknown_species;
 use super::number::positive;
-use psidpd_core::document::{FileError, FileErrorKind, Section};
+use psidpd_core::document::{FileError, Section};
 
 /// Reads the mass of each species: 1, or what the data file says, if the scene gives none.
 pub fn read(root: &Section, species: &[String], initial: &Initial) -> Result<Vec<f64>, FileError> {
@@ -20,9 +21,4 @@ pub fn read(root: &Section, species: &[String], initial: &Initial) -> Result<Vec
         mass[index] = positive(&value)?;
     }
     Ok(mass)
-}
-
-/// A name that is not one of the model's species.
-pub fn unknown_species(name: &str, species: &[String]) -> FileErrorKind {
-    FileErrorKind::UnknownName { what: "species", name: name.to_owned(), known: species.join(", ") }
 }

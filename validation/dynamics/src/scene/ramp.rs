@@ -3,7 +3,6 @@
 //! A level is a stage of its own, as psi may depend on kT: forces are computed anew where it begins, and a deck for
 //! LAMMPS has a `run` for it.
 
-use super::Stage;
 use super::number::positive;
 use psidpd_core::document::{FileError, FileErrorKind, Section};
 
@@ -12,9 +11,18 @@ const DEFAULT_LEVELS: u64 = 20;
 /// Most levels.
 const MOST_LEVELS: u64 = 1000;
 
-/// Reads the temperature of `stage`, and divides it into levels if it is a ramp. The last level is at the end
-/// of the ramp, the first one level after its start.
-pub fn read(section: &Section, stage: Stage) -> Result<Vec<Stage>, FileError> {
+/// Steps of a stage at one temperature.
+#[derive(Debug, Clone, Copy)]
+pub struct Level {
+    /// Which level of a ramp it is, from 1, of how many.
+    pub number: Option<[u64; 2]>,
+    pub steps: u64,
+    pub kt: f64,
+}
+
+/// Reads the temperature of a stage of `steps`, `scene_kt` if it has none, and divides it into levels if it is a ramp. The
+/// last level is at the end of the ramp, the first one level after its start.
+pub fn read(section: &Section, steps: u64, scene_kt: f64) -> Result<Vec<Level>, FileError> {
     let value = section.get("kT");
     let ramp = value.as_ref().and_then(|v| v.as_array());
     let levels = section.get("levels");
@@ -23,8 +31,8 @@ pub fn read(section: &Section, stage: Stage) -> Result<Vec<Stage>, FileError> {
             let message = "kT is one temperature, which has no levels".to_owned();
             return Err(levels.error(FileErrorKind::Value(message)).with_help("kT = [from, to] has"));
         }
-        let kt = value.map_or(Ok(stage.kt), |value| positive(&value))?;
-        return Ok(vec![Stage { kt, ..stage }]);
+        let kt = value.map_or(Ok(scene_kt), |value| positive(&value))?;
+        return Ok(vec![Level { number: None, steps, kt }]);
     };
     let ends: Vec<f64> = ends.iter().map(positive).collect::<Result<_, _>>()?;
     let [from, to] = ends[..] else {
@@ -32,21 +40,20 @@ pub fn read(section: &Section, stage: Stage) -> Result<Vec<Stage>, FileError> {
         return Err(section.require("kT")?.error(FileErrorKind::Value(message)));
     };
     let levels = match levels {
-        None => DEFAULT_LEVELS.min(stage.steps),
+        None => DEFAULT_LEVELS.min(steps),
         Some(value) => match value.count()?.value {
-            n if (1..=MOST_LEVELS.min(stage.steps)).contains(&n) => n,
+            n if (1..=MOST_LEVELS.min(steps)).contains(&n) => n,
             n => {
-                let most = MOST_LEVELS.min(stage.steps);
+                let most = MOST_LEVELS.min(steps);
                 return Err(value.error(FileErrorKind::Value(format!("must be from 1 to {most}, is {n}"))));
             }
         },
     };
-    let level = |k: u64| Stage {
-        level: Some([k, levels]),
+    let level = |k: u64| Level {
+        number: Some([k, levels]),
         // Whole numbers of steps that add up.
-        steps: stage.steps / levels + u64::from(k <= stage.steps % levels),
+        steps: steps / levels + u64::from(k <= steps % levels),
         kt: if k == levels { to } else { from + (to - from) * k as f64 / levels as f64 },
-        ..stage.clone()
     };
     Ok((1..=levels).map(level).collect())
 }

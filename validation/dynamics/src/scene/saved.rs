@@ -1,6 +1,5 @@
 //! Starts from files that another run has left.
 
-use super::initial::Initial;
 use super::velocities::Velocities;
 use crate::checkpoint;
 use crate::particles::{State, Tags};
@@ -9,7 +8,7 @@ use psidpd_core::document::{FileError, FileErrorKind, Section};
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::model::Model;
 use psidpd_formats::data::DataFile;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What a file is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -63,6 +62,15 @@ pub fn open(
     }
 }
 
+/// A start from a file.
+pub struct Saved {
+    pub path: PathBuf,
+    pub state: State,
+    /// `None` keeps those of the file.
+    pub velocities: Option<Velocities>,
+    pub frozen: Tags,
+}
+
 /// Reads the keys of a start from a file, and the file.
 pub fn read(
     section: &Section,
@@ -70,19 +78,18 @@ pub fn read(
     model: &Model,
     base: &Path,
     periodic: Option<[bool; 3]>,
-) -> Result<(Initial, PeriodicBox), FileError> {
+) -> Result<Saved, FileError> {
     let value = section.require("file")?;
     let path = base.join(value.string()?.value);
     let state = open(format, &path, model, periodic).map_err(|why| {
         value.error(FileErrorKind::Value(why)).with_help("the path is relative to the scene file")
     })?;
-    let initial = Initial::File {
+    Ok(Saved {
         velocities: Velocities::read_or_keep(section, format == Format::Checkpoint)?,
         frozen: read_frozen(section, &state)?,
         path,
-        state: Box::new(state.clone()),
-    };
-    Ok((initial, state.domain))
+        state,
+    })
 }
 
 fn read_frozen(section: &Section, state: &State) -> Result<Tags, FileError> {

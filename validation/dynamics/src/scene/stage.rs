@@ -170,7 +170,14 @@ fn read_one(section: &Section, defaults: Defaults) -> Result<Vec<Stage>, FileErr
             ));
         }
     }
-    ramp::read(section, stage)
+    let levels = ramp::read(section, stage.steps, stage.kt)?;
+    let at = |level: &ramp::Level| Stage {
+        level: level.number,
+        steps: level.steps,
+        kt: level.kt,
+        ..stage.clone()
+    };
+    Ok(levels.iter().map(at).collect())
 }
 
 /// The integrator of a stage, or of the scene; `default` if it says nothing.

@@ -1,7 +1,7 @@
 //! The direction that profiles go along.
 
 use crate::frame::View;
-use crate::request::Options;
+use crate::options::Options;
 use psidpd_core::document::FileError;
 use psidpd_core::engine::PeriodicBox;
 use serde::{Deserialize, Serialize};

@@ -2,7 +2,7 @@
 
 use super::rdf::shell_volume;
 use crate::keys::{Key, Need, ValueKind, key};
-use crate::request::Options;
+use crate::options::Options;
 use psidpd_core::document::FileError;
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::engine::reference::for_each_pair;

@@ -2,7 +2,7 @@ use super::Meter;
 use crate::frame::Frame;
 use crate::keys::{Need, Table, ValueKind};
 use crate::observation::{Kind, Observation};
-use crate::request::Options;
+use crate::options::Options;
 use crate::series::Series;
 use psidpd_core::document::keys::keys;
 use psidpd_core::document::{FileError, FileErrorKind};

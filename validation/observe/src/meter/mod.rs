@@ -29,7 +29,7 @@ mod waves;
 use super::frame::Frame;
 use super::keys::Table;
 use super::observation::Observation;
-use super::request::Options;
+use super::options::Options;
 use psidpd_core::document::FileError;
 use psidpd_core::engine::Want;
 use serde::{Deserialize, Serialize};

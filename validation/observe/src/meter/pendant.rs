@@ -4,7 +4,7 @@ use super::linked::{DISTANCE, Distance, Linked};
 use crate::frame::Frame;
 use crate::keys::{AXIS, Key, Need, Table, ValueKind, key};
 use crate::observation::{Kind, Observation};
-use crate::request::Options;
+use crate::options::Options;
 use crate::series::{Measured, Series};
 use crate::young_laplace::fit;
 use psidpd_core::document::FileError;

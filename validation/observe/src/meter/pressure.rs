@@ -2,7 +2,7 @@ use super::Meter;
 use crate::frame::Frame;
 use crate::keys::Table;
 use crate::observation::{Kind, Observation};
-use crate::request::Options;
+use crate::options::Options;
 use crate::series::Series;
 use psidpd_core::document::FileError;
 use psidpd_core::engine::Want;

@@ -5,7 +5,7 @@ use super::across::Across;
 use crate::frame::Frame;
 use crate::keys::{AXIS, BINS, RECENTRE, Table};
 use crate::observation::{Kind, Observation};
-use crate::request::Options;
+use crate::options::Options;
 use crate::series::{Measured, Series};
 use psidpd_core::document::FileError;
 use serde::{Deserialize, Serialize};

@@ -4,7 +4,7 @@ use super::species_pairs::SpeciesPairs;
 use crate::frame::Frame;
 use crate::keys::{Need, Table, ValueKind};
 use crate::observation::{Kind, Observation};
-use crate::request::Options;
+use crate::options::Options;
 use crate::series::Series;
 use psidpd_core::document::FileError;
 use psidpd_core::document::keys::keys;

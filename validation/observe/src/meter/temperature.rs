@@ -3,7 +3,7 @@ use crate::configurational;
 use crate::frame::Frame;
 use crate::keys::Table;
 use crate::observation::{Kind, Observation};
-use crate::request::Options;
+use crate::options::Options;
 use crate::series::Series;
 use psidpd_core::document::FileError;
 use serde::{Deserialize, Serialize};

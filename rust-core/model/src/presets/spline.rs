@@ -1,8 +1,8 @@
 //! DPD with a repulsive–attractive pair potential, from the coefficients of a LAMMPS style, written as
 //! a model file: `φ = a [A W(r, r_A) − B W(r, r_B)]`.
 
-use super::file::Model;
-use super::presets::PresetError;
+use super::coefficients::PresetError;
+use crate::file::Model;
 use std::fmt::Write;
 
 /// The coefficients of one pair of species.

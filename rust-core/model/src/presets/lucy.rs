@@ -9,8 +9,8 @@
 //! `B_ij` and `r_d,ij` are equal (Warren, Phys. Rev. E 87, 045303 (2013)), and with Lucy's kernel not even
 //! then.
 
-use super::file::Model;
-use super::presets::{PresetError, WarrenPair, pair_text, upper_triangle};
+use super::coefficients::{PresetError, WarrenPair, pair_text, upper_triangle};
+use crate::file::Model;
 use std::fmt::Write;
 
 /// Writes the model file of the law for species `species` of masses `masses`, with `pairs` a row-major

@@ -1,0 +1,14 @@
+//! What goes wrong, as text.
+
+use psidpd_core::engine::EngineError;
+
+/// What goes wrong, as the text that LAMMPS prints.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{0}")]
+pub struct StyleError(pub(crate) String);
+
+impl From<EngineError> for StyleError {
+    fn from(error: EngineError) -> StyleError {
+        StyleError(error.to_string())
+    }
+}

@@ -1,0 +1,83 @@
+//! The coefficients of pairs of species that LAMMPS users know, and what is wrong with them.
+
+use crate::document::FileError;
+use std::fmt::Write;
+
+/// The coefficients of one pair of species, as `pair_coeff` of LAMMPS's `mdpd` takes them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WarrenPair {
+    /// `A`, force; negative attracts.
+    pub a: f64,
+    /// `B`, force per density.
+    pub b: f64,
+    /// γ of the thermostat.
+    pub gamma: f64,
+    /// Range of the pair force and of the thermostat.
+    pub rc: f64,
+    /// Range of the density.
+    pub rd: f64,
+}
+
+/// Why coefficients make no model.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PresetError {
+    /// Species `i` and `j` (from 1) have no coefficients.
+    #[error("no coefficients for types {0} and {1}: there is no mixing, set them with pair_coeff")]
+    Missing(usize, usize),
+    /// Not a square table, or a table of nothing, or not as many masses.
+    #[error("expected coefficients for every pair of types, and as many masses as types")]
+    Shape,
+    /// `B` or `r_d` differ between pairs: Warren's no-go theorem, Phys. Rev. E 87, 045303 (2013).
+    #[error(
+        "{name} differs between type pairs ({first} and {second}): with one density that does not \
+         tell types apart no potential gives such forces (Warren, Phys. Rev. E 87, 045303); use one \
+         {name} for all pairs, or pair_style dpd/psi with a model file whose psi depends on the \
+         partial densities n_A, n_B, or 'law lucy' for the force of LAMMPS's mdpd, which has no potential"
+    )]
+    NoPotential {
+        /// `B` or `rd`.
+        name: &'static str,
+        /// One value.
+        first: f64,
+        /// Another.
+        second: f64,
+    },
+    /// A coefficient that the model file's reader refuses.
+    #[error(transparent)]
+    File(#[from] FileError),
+}
+
+/// The upper triangle of a row-major table of coefficients: species and what was given.
+pub(super) fn upper_triangle(
+    species: usize,
+    pairs: &[Option<WarrenPair>],
+) -> Result<Vec<(usize, usize, WarrenPair)>, PresetError> {
+    if species == 0 || pairs.len() != species * species {
+        return Err(PresetError::Shape);
+    }
+    let mut upper = Vec::new();
+    for i in 0..species {
+        for j in i..species {
+            let pair = pairs[i * species + j].ok_or(PresetError::Missing(i + 1, j + 1))?;
+            upper.push((i, j, pair));
+        }
+    }
+    Ok(upper)
+}
+
+/// Pair forces and thermostats, as a part of a model file.
+pub(super) fn pair_text(names: &[String], upper: &[(usize, usize, WarrenPair)]) -> String {
+    let mut text = String::new();
+    for (i, j, pair) in upper {
+        let between = format!("between = [{}, {}]", names[*i], names[*j]);
+        // Writing to a String cannot fail.
+        let _ = write!(
+            text,
+            "\n[[pair]]\n{between}\nform = \"soft\"\nstrength = {:?}\nrange = {:?}\n\n\
+             [[thermostat]]\n{between}\ngamma = {:?}\nrange = {:?}\n",
+            pair.a, pair.rc, pair.gamma, pair.rc,
+        );
+    }
+    text
+}

@@ -1,0 +1,11 @@
+//! Models from the coefficients of pair styles that LAMMPS users know, written as model files.
+
+mod coefficients;
+mod lucy;
+mod spline;
+mod warren;
+
+pub use coefficients::{PresetError, WarrenPair};
+pub use lucy::{lucy_mdpd, lucy_mdpd_text};
+pub use spline::{SplinePair, spline_dpd, spline_dpd_text};
+pub use warren::{ForceLaw, warren_ab, warren_ab_text};

@@ -1,0 +1,264 @@
+//! A configuration from a file of any of the formats.
+
+use super::configuration::dimensions_of;
+use super::{Configuration, FormatError, read_xyz};
+use crate::data::DataFile;
+use crate::dump::{self, DumpReader};
+use nalgebra::{Matrix3, Vector3};
+use psidpd_core::document::open_regular;
+use psidpd_core::engine::PeriodicBox;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+
+/// Which frame of a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Which {
+    /// The last one that is whole.
+    #[default]
+    Last,
+    /// By number, from 0.
+    Number(usize),
+}
+
+impl Configuration {
+    /// Reads a LAMMPS data file, a LAMMPS text dump or an extended XYZ file, told apart by what is in it.
+    ///
+    /// # Errors
+    /// A file that cannot be read or is none of these, or a frame that it does not have.
+    pub fn open(path: &Path, which: Which) -> Result<Configuration, FormatError> {
+        let number = match which {
+            Which::Last => None,
+            Which::Number(n) => Some(n),
+        };
+        if let Some(found) = Configuration::find(path, number)? {
+            return Ok(found);
+        }
+        let mut message = "there is no frame".to_owned();
+        if let Some(n) = number {
+            message += &format!(" {n}");
+            // Frames are whole up to the last one.
+            let (mut low, mut high) = (0, n);
+            while high - low > 1 {
+                let middle = low + (high - low) / 2;
+                match Configuration::find(path, Some(middle)) {
+                    Ok(Some(_)) => low = middle,
+                    _ => high = middle,
+                }
+            }
+            if n > 0 && matches!(Configuration::find(path, Some(low)), Ok(Some(_))) {
+                message += &format!("; the first one is 0, the last one {low}");
+            }
+        }
+        Err(FormatError::Content { path: path.to_owned(), message })
+    }
+
+    /// How many whole frames a file has.
+    ///
+    /// # Errors
+    /// As [`Configuration::open`].
+    pub fn count(path: &Path) -> Result<usize, FormatError> {
+        Configuration::open(path, Which::Last)?;
+        let mut above = 1;
+        while matches!(Configuration::find(path, Some(above)), Ok(Some(_))) {
+            above *= 2;
+        }
+        let mut low = above / 2;
+        while above - low > 1 {
+            let middle = low + (above - low) / 2;
+            match Configuration::find(path, Some(middle)) {
+                Ok(Some(_)) => low = middle,
+                _ => above = middle,
+            }
+        }
+        Ok(low + 1)
+    }
+
+    /// A frame by its number, or the last; `None` if the file does not have it.
+    fn find(path: &Path, number: Option<usize>) -> Result<Option<Configuration>, FormatError> {
+        let content = |message: &str| FormatError::Content { path: path.to_owned(), message: message.into() };
+        let mut file = BufReader::new(open_regular(path).map_err(FormatError::read(path))?);
+        // Trajectories may be larger than memory: their frames are read one by one.
+        let start = file.fill_buf().map_err(FormatError::read(path))?;
+        let start = String::from_utf8_lossy(start);
+        let first = start.lines().find(|l| !l.trim().is_empty()).unwrap_or("").trim().to_owned();
+        let found = if first.starts_with("ITEM:") {
+            last_or_nth(path, file, number)?.map(|f| from_dump(&f)).transpose().map_err(|m| content(&m))?
+        } else if first.parse::<usize>().is_ok() {
+            read_xyz(path, file, number)?
+        } else if number.is_none_or(|n| n == 0) {
+            Some(from_data(&DataFile::read(path)?).map_err(|m| content(&m))?)
+        } else {
+            None
+        };
+        Ok(found.filter(|c| !c.x.is_empty()))
+    }
+}
+
+/// Without a number, the last frame that is whole: a run that is still going may be in the middle of the
+/// next.
+fn last_or_nth(
+    path: &Path,
+    input: impl BufRead,
+    which: Option<usize>,
+) -> Result<Option<dump::Frame>, FormatError> {
+    let mut found = None;
+    for (number, frame) in DumpReader::new(input).enumerate() {
+        match frame {
+            Ok(frame) if which.is_none_or(|n| n == number) => {
+                found = Some(frame);
+                if which.is_some() {
+                    break;
+                }
+            }
+            Ok(_) => {}
+            Err(_) if which.is_none() && found.is_some() => break,
+            Err(source) => return Err(FormatError::Text { path: path.to_owned(), source }),
+        }
+    }
+    Ok(found)
+}
+
+fn domain(
+    lo: [f64; 3],
+    hi: [f64; 3],
+    tilt: Option<[f64; 3]>,
+    periodic: [bool; 3],
+) -> Result<PeriodicBox, String> {
+    let [xy, xz, yz] = tilt.unwrap_or([0.0; 3]);
+    let [lx, ly, lz]: [f64; 3] = std::array::from_fn(|k| hi[k] - lo[k]);
+    let edges = Matrix3::from_columns(&[
+        Vector3::new(lx, 0.0, 0.0),
+        Vector3::new(xy, ly, 0.0),
+        Vector3::new(xz, yz, lz),
+    ]);
+    PeriodicBox::new(lo, edges, periodic).map_err(|e| e.to_string())
+}
+
+fn type_names(types: usize) -> Vec<String> {
+    (1..=types).map(|k| k.to_string()).collect()
+}
+
+/// A data file tells which directions repeat in its title, if at all: else all are taken to, except z of a flat one.
+fn from_data(data: &DataFile) -> Result<Configuration, String> {
+    let x: Vec<[f64; 3]> = data.atoms.iter().map(|a| a.x).collect();
+    let dimensions = dimensions_of(&x, [true, true, false]);
+    let periodic = data.boundary().unwrap_or([true, true, dimensions == 3]);
+    Ok(Configuration {
+        step: None,
+        time: None,
+        dimensions,
+        domain: domain(data.boxlo, data.boxhi, data.tilt, periodic)?,
+        names: type_names(data.types),
+        x,
+        v: data.velocities.clone(),
+        species: data.atoms.iter().map(|a| a.kind as i32 - 1).collect(),
+        tag: data.atoms.iter().map(|a| a.id as i32).collect(),
+    })
+}
+
+fn from_dump(frame: &dump::Frame) -> Result<Configuration, String> {
+    let mut periodic = [true; 3];
+    for (flag, word) in periodic.iter_mut().zip(frame.boundary.split_whitespace()) {
+        *flag = word == "pp";
+    }
+    let domain = domain(frame.boxlo, frame.boxhi, frame.tilt, periodic)?;
+    let x = match (frame.vectors(["x", "y", "z"]), frame.vectors(["xu", "yu", "zu"])) {
+        (Some(x), _) | (None, Some(x)) => x,
+        _ => match frame.vectors(["xs", "ys", "zs"]) {
+            Some(s) => s.into_iter().map(|s| domain.point(s)).collect(),
+            None => return Err("the dump has no columns x y z, xu yu zu or xs ys zs".into()),
+        },
+    };
+    if x.iter().flatten().any(|c| !c.is_finite()) {
+        return Err("a position is not finite".into());
+    }
+    let count = x.len();
+    let types = frame.get("type").unwrap_or_else(|| vec![1.0; count]);
+    if types.iter().any(|t| !(1.0..=1e6).contains(t)) {
+        return Err("a type is not a number from 1".into());
+    }
+    let most = types.iter().fold(1.0, |a: f64, b| a.max(*b));
+    let tag = frame.get("id").unwrap_or_else(|| (1..=count).map(|k| k as f64).collect());
+    Ok(Configuration {
+        step: u64::try_from(frame.step).ok(),
+        time: frame.time,
+        dimensions: dimensions_of(&x, periodic),
+        domain,
+        names: type_names(most as usize),
+        x,
+        v: frame.vectors(["vx", "vy", "vz"]),
+        species: types.iter().map(|t| *t as i32 - 1).collect(),
+        tag: tag.iter().map(|t| *t as i32).collect(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::Atom;
+    use crate::dump::{Digits, DumpWriter, Snapshot};
+
+    #[test]
+    fn the_same_particles_come_out_of_every_format() {
+        let folder = tempfile::tempdir().unwrap();
+        let x = vec![[0.5, 1.0, 2.0], [3.0, 0.25, 1.0 / 3.0]];
+        let v = vec![[0.1, 0.2, 0.3], [-1.0, 0.0, 1.0]];
+        let domain = PeriodicBox::orthogonal([0.0, 0.0, -1.0], [4.0, 5.0, 6.0], [true; 3]).unwrap();
+        let (species, tag, names) = (vec![0, 1], vec![5, 3], ["A".to_owned(), "B".to_owned()]);
+        let atom = |k: usize| Atom { id: [5, 3][k], kind: [1, 2][k], x: x[k], image: [0; 3] };
+        let data = DataFile {
+            title: "title".into(),
+            boxlo: [0.0, 0.0, -1.0],
+            boxhi: [4.0, 5.0, 5.0],
+            tilt: None,
+            types: 2,
+            masses: vec![1.0, 2.0],
+            names: Vec::new(),
+            atoms: vec![atom(0), atom(1)],
+            velocities: Some(v.clone()),
+        };
+        let direct = Configuration {
+            step: None,
+            time: None,
+            dimensions: 3,
+            domain,
+            names: names.to_vec(),
+            x: x.clone(),
+            v: Some(v.clone()),
+            species,
+            tag,
+        };
+        let path = |name: &str| folder.path().join(name);
+        data.write(&path("a.data")).unwrap();
+        let mut file = std::fs::File::create(path("a.xyz")).unwrap();
+        super::super::write_xyz(&direct.frame(), &mut file).unwrap();
+        let mut writer = DumpWriter::new(std::fs::File::create(path("a.dump")).unwrap(), Digits::All);
+        for step in [0, 9] {
+            let (boxlo, boxhi) = ([0.0, 0.0, -1.0], [4.0, 5.0, 5.0]);
+            let (ids, kinds) = (&[5, 3][..], &[1, 2][..]);
+            writer
+                .write(&Snapshot { step, boxlo, boxhi, periodic: [true; 3], ids, kinds, x: &x, v: &v })
+                .unwrap();
+        }
+        drop(writer);
+        for name in ["a.data", "a.xyz", "a.dump"] {
+            let mut read = Configuration::open(&path(name), Which::Last).unwrap();
+            read.name_species(&names, 3);
+            read.step = None;
+            read.time = None;
+            assert_eq!(read, direct, "{name}");
+        }
+        assert_eq!(Configuration::open(&path("a.dump"), Which::Number(0)).unwrap().step, Some(0));
+        for name in ["a.data", "a.xyz", "a.dump"] {
+            let error = Configuration::open(&path(name), Which::Number(2)).unwrap_err().to_string();
+            assert!(error.contains("no frame 2"), "{error}");
+        }
+        let whole = std::fs::read(path("a.dump")).unwrap();
+        std::fs::write(path("cut.dump"), &whole[..whole.len() - 30]).unwrap();
+        assert_eq!(Configuration::open(&path("cut.dump"), Which::Last).unwrap().step, Some(0));
+        assert!(Configuration::open(&path("cut.dump"), Which::Number(1)).is_err());
+        assert!(Configuration::open(&path("none"), Which::Last).is_err());
+        std::fs::write(path("rubbish"), "what is this\n").unwrap();
+        assert!(Configuration::open(&path("rubbish"), Which::Last).is_err());
+    }
+}

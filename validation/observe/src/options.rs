@@ -1,0 +1,155 @@
+//! The keys of one observable in a scene, and what their values depend on.
+
+use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
+use psidpd_core::engine::PeriodicBox;
+use psidpd_core::model::Fluid;
+
+/// What the settings of an observable depend on.
+#[derive(Debug)]
+pub struct Place<'a> {
+    /// The model at the temperature of the scene.
+    pub fluid: &'a Fluid,
+    /// The box.
+    pub domain: &'a PeriodicBox,
+    /// Names of the stages.
+    pub stages: StageNames<'a>,
+    /// The normal of the slab that the scene starts from.
+    pub slab: Option<usize>,
+    /// What drives two opposite flows.
+    pub drive: Option<Drive>,
+}
+
+/// What drives two opposite flows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Drive {
+    /// The direction in which it is reversed.
+    pub across: usize,
+    /// Its own direction.
+    pub along: usize,
+    /// The acceleration in the lower half of the box.
+    pub acceleration: f64,
+}
+
+/// Names of the stages of a scene.
+#[derive(Debug, Clone)]
+pub struct StageNames<'a> {
+    /// All of them.
+    pub all: &'a [&'a str],
+    /// Those whose steps take no time.
+    pub timeless: Vec<&'a str>,
+}
+
+/// The table of one observable; without one (`name = true`) every key is left out.
+#[derive(Debug)]
+pub struct Options<'a> {
+    pub section: Option<Section<'a>>,
+    pub value: Value<'a>,
+    /// Where it is measured.
+    pub place: &'a Place<'a>,
+}
+
+impl<'a> Options<'a> {
+    /// The value of a key, or of the observable if the key is left out: for errors.
+    pub fn at(&self, key: &str) -> Value<'a> {
+        let own = if key.is_empty() { None } else { self.get(key) };
+        own.unwrap_or_else(|| self.value.clone())
+    }
+
+    fn get(&self, key: &str) -> Option<Value<'a>> {
+        self.section.as_ref()?.get(key)
+    }
+
+    /// A number above zero.
+    pub fn positive(&self, key: &str) -> Result<Option<f64>, FileError> {
+        let Some(value) = self.get(key) else { return Ok(None) };
+        let number = value.number()?.value;
+        if number > 0.0 {
+            Ok(Some(number))
+        } else {
+            Err(value.error(FileErrorKind::Value(format!("must be positive, is {number}"))))
+        }
+    }
+
+    /// A number from `low` to `high`.
+    pub fn number(&self, key: &str, low: f64, high: f64) -> Result<Option<f64>, FileError> {
+        let Some(value) = self.get(key) else { return Ok(None) };
+        let number = value.number()?.value;
+        if (low..=high).contains(&number) {
+            Ok(Some(number))
+        } else {
+            let message = format!("must be from {low} to {high}, is {number}");
+            Err(value.error(FileErrorKind::Value(message)))
+        }
+    }
+
+    /// A whole number from `low` to `high`.
+    pub fn count(&self, key: &str, low: u64, high: u64) -> Result<Option<usize>, FileError> {
+        let Some(value) = self.get(key) else { return Ok(None) };
+        let number = value.count()?.value;
+        if (low..=high).contains(&number) {
+            Ok(Some(number as usize))
+        } else {
+            let message = format!("must be from {low} to {high}, is {number}");
+            Err(value.error(FileErrorKind::Value(message)))
+        }
+    }
+
+    /// Two whole numbers from `low` to `high`.
+    pub fn counts(&self, key: &str, low: u64, high: u64) -> Result<Option<[usize; 2]>, FileError> {
+        let Some(value) = self.get(key) else { return Ok(None) };
+        let items = value.array()?;
+        let [a, b] = items.as_slice() else {
+            return Err(value.error(FileErrorKind::Value("expected two whole numbers".into())));
+        };
+        let read = |item: &Value| {
+            let number = item.count()?.value;
+            let message = format!("must be from {low} to {high}, is {number}");
+            let inside = (low..=high).contains(&number);
+            if inside { Ok(number as usize) } else { Err(item.error(FileErrorKind::Value(message))) }
+        };
+        Ok(Some([read(a)?, read(b)?]))
+    }
+
+    /// True or false.
+    pub fn flag(&self, key: &str) -> Result<Option<bool>, FileError> {
+        self.get(key).map(|value| Ok(value.boolean()?.value)).transpose()
+    }
+
+    /// A direction of space.
+    pub fn axis(&self, key: &str) -> Result<Option<usize>, FileError> {
+        let names = [("x", 0), ("y", 1), ("z", 2)];
+        let names = &names[..self.place.fluid.dimensions];
+        self.get(key).map(|value| Ok(value.one_of("axis", names)?.value)).transpose()
+    }
+
+    /// A species of the model.
+    pub fn species(&self, key: &str) -> Result<Option<usize>, FileError> {
+        let Some(value) = self.get(key) else { return Ok(None) };
+        let names: Vec<(&str, usize)> =
+            self.place.fluid.species.iter().enumerate().map(|(k, name)| (name.as_str(), k)).collect();
+        Ok(Some(value.one_of("species", &names)?.value))
+    }
+
+    /// A species of the model, where other things than names may stand too.
+    pub fn as_species(&self, key: &str) -> Result<Option<usize>, FileError> {
+        if self.get(key).is_some_and(|value| value.as_str().is_some()) { self.species(key) } else { Ok(None) }
+    }
+
+    /// One of some names.
+    pub fn choice<T: Copy>(&self, key: &str, choices: &[(&str, T)]) -> Result<Option<T>, FileError> {
+        self.get(key).map(|value| Ok(value.one_of("choice", choices)?.value)).transpose()
+    }
+
+    /// An error about a key, or about the observable if it is left out.
+    pub fn error(&self, key: &str, message: impl Into<String>) -> FileError {
+        self.at(key).error(FileErrorKind::Value(message.into()))
+    }
+
+    /// Half the smallest distance of two periodic faces of the box; of its faces, if none is periodic.
+    pub fn half_box(&self) -> f64 {
+        let (domain, d) = (self.place.domain, self.place.fluid.dimensions);
+        let periodic = domain.periodic();
+        let any = periodic[..d].contains(&true);
+        (0..d).filter(|k| periodic[*k] || !any).map(|k| 0.5 * domain.height(k)).fold(f64::INFINITY, f64::min)
+    }
+}
