@@ -126,6 +126,79 @@ fn force_gradient_steps_are_those_of_the_formula() {
     }
 }
 
+/// With keywords left out the fix takes the same steps, to the last bit, as with the documented values, and others with any other
+/// value.
+#[test]
+fn defaults_are_those_of_the_page() {
+    let page =
+        std::fs::read_to_string(psidpd_tests::root().join("lammps-plugin/doc/fix_dpd_splitting.md")).unwrap();
+    assert!(page.contains(
+        "## Default\n\nevery 1, lambda 0.21 with two-stage and 1/6 with force-gradient, gradient 1/24, noise gaussian\n"
+    ));
+    let folder = tempfile::tempdir().unwrap();
+    let end = |fix: &str| run(&format!("{}run 4\n", from_data(folder.path(), "", fix, 0.03)), 1).v;
+    let [sixth, part] = [1.0 / 6.0, 1.0 / 24.0];
+    for (scheme, documented, others) in [
+        (
+            "two-stage",
+            "every 1 lambda 0.21 noise gaussian".to_owned(),
+            vec!["lambda 0.2101", "every 2", "noise uniform"],
+        ),
+        (
+            "force-gradient",
+            format!("every 1 lambda {sixth} gradient {part} noise gaussian"),
+            vec!["lambda 0.1667", "gradient 0.0417"],
+        ),
+        ("aboba", "every 1 noise gaussian".to_owned(), vec!["every 2", "noise uniform"]),
+    ] {
+        let left_out = end(scheme);
+        assert!(left_out == end(&format!("{scheme} {documented}")), "{scheme}");
+        for other in others {
+            let apart = difference(&left_out, &end(&format!("{scheme} {other}")));
+            assert!(apart > 1e-9, "{scheme} {other}: {apart:e}");
+        }
+    }
+}
+
+/// Two atoms half a range apart, so slow that they stay there, and so cold that there is no noise: with x = DΔt/μ = 0.6 the
+/// midpoint rule leaves (1 − x/2)/(1 + x/2) of their relative velocity in a step, velocity Verlet, whose drag is
+/// that of half steps, (1 − x/2)² in the first and 1 − x in the others.
+#[test]
+fn the_drag_of_a_pair_is_that_of_the_formula() {
+    let (_folder, path) =
+        file("title = \"pair\"\nspecies = [\"A\", \"B\"]\n[[thermostat]]\ngamma = 6\nrange = 1\n");
+    let along = [1.0 / 3.0, 2.0 / 3.0, 2.0 / 3.0];
+    let near = along.map(|e| 2.0 - 0.5 * e);
+    for (fix, steps, left) in [
+        ("dpd/splitting two-stage", 3, (0.7f64 / 1.3).powi(3)),
+        ("dpd/splitting force-gradient every 2", 4, (0.4f64 / 1.6).powi(2)),
+        ("dpd/splitting aboba", 3, (0.7f64 / 1.3).powi(3)),
+        ("nve", 3, (0.7f64 * 0.4).powi(2)),
+    ] {
+        let script = format!(
+            "units lj\natom_style atomic\natom_modify map yes\ncomm_modify vel yes\nregion b block 0 4 0 4 0 4\n\
+             create_box 2 b\ncreate_atoms 1 single 2 2 2\ncreate_atoms 2 single {} {} {}\nmass 1 1\nmass 2 3\n{}\
+             pair_style dpd/psi 1e-60 {SEED}\npair_coeff * * \"{path}\" A B\ngroup first type 1\n\
+             velocity first set 3e-12 -1e-12 2e-12\nfix 1 all {fix}\ntimestep 0.3\nrun {steps}\n",
+            near[0],
+            near[1],
+            near[2],
+            load()
+        );
+        let end = run(&script, 1);
+        let start = [3e-12, -1e-12, 2e-12];
+        let u: f64 = (0..3).map(|c| start[c] * along[c]).sum();
+        for c in 0..3 {
+            let lost = (1.0 - left) * u * along[c];
+            let expected = [start[c] - 0.75 * lost, 0.25 * lost];
+            for k in 0..2 {
+                let off = (end.v[k][c] - expected[k]).abs();
+                assert!(off < 1e-10 * 1e-12, "{fix}: {:?}, {expected:?} along {c}", end.v);
+            }
+        }
+    }
+}
+
 /// A liquid with large displacements takes the same steps on any ranks.
 #[test]
 fn displaced_atoms_find_their_ghosts() {

@@ -6,6 +6,9 @@ use psidpd_core::engine::noise::Law;
 use psidpd_core::engine::thermostat::Update;
 use std::fmt;
 
+#[cfg(test)]
+mod tests;
+
 /// λ in the paper of Groot and Warren.
 const GROOT_WARREN: f64 = 0.65;
 /// λ of the two-stage splitting with small errors of averages in liquids of many-body DPD.

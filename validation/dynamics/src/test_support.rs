@@ -1,7 +1,7 @@
 //! Models, and scenes of them, that several tests have.
 
-use crate::scene::Scene;
 use psidpd_core::document::FileError;
+use psidpd_dynamics::scene::Scene;
 
 /// Warren's liquid.
 pub const SET6: &str = include_str!("../../models/warren2003-set6.toml");

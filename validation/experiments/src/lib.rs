@@ -12,3 +12,8 @@ pub mod papers;
 pub mod pareto;
 pub mod sweep;
 pub mod theory_page;
+
+#[cfg(test)]
+#[path = "../../dynamics/src/test_support.rs"]
+#[allow(dead_code, reason = "the tests of two crates share it")]
+mod test_support;

@@ -116,7 +116,8 @@ fn errors_name_line_key_and_cause() {
 /// Temperatures, pressures and energies of a liquid: thermostatted, both temperatures are kT; the parts of
 /// the energy add up to that of the engine. Within five errors, of which one in 10^6 is exceeded by chance,
 /// and the bias of the time step, which at 0.01 is a few thousandths in the kinetic temperature and 2 % in the
-/// configurational one.
+/// configurational one. Pressures are those of 30 000 steps at this density, −1.35(3) without and −0.95(6) with drag and noise, which
+/// velocity Verlet's half-step velocities make differ; Monte Carlo has −1.45 without a time step.
 #[test]
 fn a_liquid_in_equilibrium() {
     let scene = scene(
@@ -137,7 +138,8 @@ fn a_liquid_in_equilibrium() {
     }
     let pressure = find(&all, "pressure");
     let (p, q) = (pressure.scalar("conservative").unwrap(), pressure.scalar("total").unwrap());
-    assert!((p.value - q.value).abs() < 5.0 * q.error + 1.0 && p.error < q.error, "{p:?} {q:?}");
+    assert!((p.value + 1.35).abs() < 5.0 * p.error.hypot(0.03) && p.error < 0.15, "{p:?}");
+    assert!((q.value + 0.95).abs() < 5.0 * q.error.hypot(0.06) && q.error < 0.45, "{q:?}");
     let energy = find(&all, "energy");
     let parts: f64 = ["kinetic", "psi_F", "phi_1_F_F"].iter().map(|n| energy.scalar(n).unwrap().value).sum();
     assert!((parts - energy.scalar("total").unwrap().value).abs() < 1e-10);
@@ -166,7 +168,7 @@ fn a_slab_of_liquid() {
         &text(&format!(
             "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7\n[box]\nlengths = [4.0, 4.0, 11.0]\n\
              [initial]\nkind = \"lattice\"\ndensity = 5.9\n[[stage]]\nname = \"settle\"\nsteps = 300\ndt = 0.01\n\
-             [[stage]]\nname = \"run\"\nsteps = 1500\ndt = 0.01\n{observe}"
+             [[stage]]\nname = \"run\"\nsteps = 9000\ndt = 0.01\n{observe}"
         )),
     )
     .unwrap();
@@ -188,19 +190,20 @@ fn a_slab_of_liquid() {
     let by_area = tension.scalar("free_energy").unwrap();
     let together = by_area.error.hypot(by_stress.error);
     assert!((by_area.value - by_stress.value).abs() < 5.0 * together, "{by_area:?} {by_stress:?}");
-    assert!((by_stress.value - 7.55).abs() < 5.0 * by_stress.error, "{by_stress:?}");
-    assert!(by_area.error < 0.4 && by_stress.error < 0.4, "{by_area:?} {by_stress:?}");
+    assert!((by_stress.value - 7.55).abs() < 5.0 * by_stress.error.hypot(0.06), "{by_stress:?}");
+    assert!(by_area.error < 0.22 && by_stress.error < 0.22, "{by_area:?} {by_stress:?}");
     let width = find(&all, "interface_width");
     let (w, liquid) = (width.scalar("width").unwrap(), width.scalar("liquid").unwrap());
-    assert!((w.value - 0.338).abs() < 5.0 * w.error && w.error < 0.03, "{w:?}");
-    assert!((liquid.value - 6.0726).abs() < 5.0 * liquid.error && liquid.error < 0.05, "{liquid:?}");
-    // The steepest of the differences of bins 0.2 apart is as steep as the noise of a bin makes it.
+    assert!((w.value - 0.338).abs() < 5.0 * w.error.hypot(0.004) && w.error < 0.015, "{w:?}");
+    assert!((liquid.value - 6.0726).abs() < 5.0 * liquid.error && liquid.error < 0.01, "{liquid:?}");
+    // The steepest of the differences of bins 0.2 apart is that of a tanh profile of this width.
     let rho = &density.get("density").unwrap().values;
     let steepest = rho.windows(3).map(|r| (r[2] - r[0]).abs() / 0.2).fold(0.0, f64::max);
-    assert!((w.value * steepest / liquid.value - 1.0).abs() < 0.25, "{w:?} {steepest}");
+    let expected = liquid.value / 0.2 * (0.2 / w.value).tanh();
+    assert!((steepest / expected - 1.0).abs() < 0.05, "{w:?} {steepest}");
     let temperature = find(&all, "temperature_profile").get("temperature").unwrap();
     let middle: f64 = temperature.values[45..65].iter().sum::<f64>() / 20.0;
-    assert!((middle - 1.0).abs() < 0.05, "{middle}");
+    assert!((middle - 1.0).abs() < 0.02, "{middle}");
 }
 
 /// Profiles of an ideal gas whose species and velocities are put by hand.
@@ -307,13 +310,15 @@ fn an_ideal_gas_has_no_structure() {
     }
 }
 
-/// A small drop of Warren's liquid: Laplace's pressure, gyration and the parts of the pressure. And what is
-/// local: ⟨n⟩/ρ is [w g] but for the width of the shells.
+/// A small drop of Warren's liquid. Its radius is that of a sphere with as many particles at the density of its liquid, which is
+/// that of the plane, 6.06, and of 2γ/R over ∂p/∂ρ = 48 more. A tanh profile of width 2d has 5π²d²/(24R) more of the radius
+/// of gyration. The tension is Warren's for the plane. Five errors are exceeded by chance once in 10^6 each. And what
+/// is local: ⟨n⟩/ρ is [w g] but for the width of the shells.
 #[test]
 fn a_drop_of_liquid() {
     let text = "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7\n[box]\nlengths = [11.0, 11.0, 11.0]\n\
          [initial]\nkind = \"random\"\ncount = 700\n[[stage]]\nname = \"settle\"\nsteps = 300\ndt = 0.01\n\
-         [[stage]]\nname = \"run\"\nsteps = 1200\ndt = 0.01\n\
+         [[stage]]\nname = \"run\"\nsteps = 4800\ndt = 0.01\n\
          [observe]\ndrop = true\nclusters = true\nlocal_density = true\nmsd = true\n";
     let scene = test_support::scene(SET6, text).unwrap();
     let mut state = scene.initial_state();
@@ -337,20 +342,18 @@ fn a_drop_of_liquid() {
     let all = observers.finish();
     let drop = find(&all, "drop");
     let get = |name: &str| drop.scalar(name).unwrap();
-    let sphere = (3.0 / (4.0 * std::f64::consts::PI) * 690.0f64 / 6.15).cbrt();
-    assert!((get("radius").value - sphere).abs() < 0.1, "{:?} {sphere}", get("radius"));
-    assert!(
-        (get("radius_gyration").value - get("radius").value).abs() < 0.15,
-        "{:?}",
-        get("radius_gyration")
-    );
-    assert!(get("particles").value > 660.0 && get("liquid").value > 5.8 && get("liquid").value < 6.6);
-    let tension = get("tension");
-    // Warren's for the plane; five errors of a drop are exceeded by chance once in 10^6.
-    assert!((tension.value - 7.45).abs() < 5.0 * tension.error, "{tension:?}");
-    assert!(tension.error > 0.0 && tension.error < 0.6, "{tension:?}");
+    let [radius, gyration, width, liquid, particles, tension] =
+        ["radius", "radius_gyration", "width", "liquid", "particles", "tension"].map(get);
+    let sphere = (3.0 / (4.0 * std::f64::consts::PI) * particles.value / liquid.value).cbrt();
+    assert!((radius.value - sphere).abs() < 0.01, "{radius:?} {sphere}");
+    let more = 5.0 * std::f64::consts::PI.powi(2) / 96.0 * width.value.powi(2) / radius.value;
+    assert!((gyration.value - radius.value - more).abs() < 0.03, "{gyration:?} {radius:?} {more}");
+    let compressed = 6.06 + 2.0 * 7.45 / radius.value / 48.0;
+    assert!((liquid.value - compressed).abs() < 5.0 * liquid.error && liquid.error < 0.03, "{liquid:?}");
+    assert!(particles.value > 680.0, "{particles:?}");
+    assert!((tension.value - 7.45).abs() < 5.0 * tension.error && tension.error < 0.4, "{tension:?}");
     let clusters = find(&all, "clusters");
-    assert!((clusters.scalar("largest").unwrap().value - get("particles").value).abs() < 1e-9);
+    assert!((clusters.scalar("largest").unwrap().value - particles.value).abs() < 1e-9);
     let local = find(&all, "local_density_means");
     let (relative, wg) = (local.scalar("relative_F_F").unwrap(), local.scalar("wg_F_F").unwrap());
     assert!((relative.value / wg.value - 1.0).abs() < 2e-3, "{relative:?} {wg:?}");

@@ -10,6 +10,7 @@ mod force_gradient;
 mod integrators;
 mod monte_carlo;
 mod order;
+mod rates;
 mod resume;
 mod steps;
 
@@ -248,6 +249,7 @@ fn ideal_gas_stays_ideal() {
     let mut run = simulation(IDEAL, state_of(IDEAL, "[5.0, 5.0, 5.0]", 4.0));
     let (mean, error) = mean_temperature(&mut run, 20, 50, dt);
     assert!((mean - 1.0).abs() < 6.0 * error + 0.005, "{mean} +- {error}");
+    assert!(error < 0.01, "{error}");
     let edges = [0.0, 0.3, 0.6, 0.8, 1.0f64];
     let mut found = [0.0; 4];
     let snapshots = 10;
@@ -279,6 +281,7 @@ fn two_dimensions_stay_flat_and_warm() {
     advance(&mut run, 200, 0.01, Integrator::VelocityVerlet);
     let (mean, error) = mean_temperature(&mut run, 20, 50, 0.01);
     assert!((mean - 1.0).abs() < 6.0 * error + 0.01, "{mean} +- {error}");
+    assert!(error < 0.01, "{error}");
     assert!(run.positions().iter().all(|x| x[2] == 0.0));
     assert!(run.velocities().iter().all(|v| v[2] == 0.0));
     run.prepare(0.01, Want::TOTALS).unwrap();
@@ -414,5 +417,6 @@ fn masses_count() {
     advance(&mut run, 200, 0.02, Integrator::VelocityVerlet);
     let (mean, error) = mean_temperature(&mut run, 20, 50, 0.02);
     assert!((mean - 1.0).abs() < 6.0 * error + 0.005, "{mean} +- {error}");
+    assert!(error < 0.01, "{error}");
     assert!(run.momentum().iter().all(|p| p.abs() < 1e-10));
 }

@@ -196,6 +196,7 @@ fn pressures_are_those_of_other_codes() {
         assert!((p - 23.636).abs() < 6.0 * p_error + 0.03, "{name}: p = {p} +- {p_error}");
         assert!(p_error < 0.05, "{name}: {p_error}");
         assert!((t - 1.0).abs() < 6.0 * t_error + 0.02, "{name}: T = {t} +- {t_error}");
+        assert!(t_error < 0.01, "{name}: {t_error}");
     }
 }
 
