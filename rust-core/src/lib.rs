@@ -24,5 +24,6 @@ pub mod engine;
 pub mod maximum;
 pub mod memory;
 pub mod theory;
+pub mod truth;
 
 pub use psidpd_model::{self as model, document};

@@ -1,8 +1,9 @@
 //! Changes of the energy by single moves, against the energy of the whole configuration.
 
 use nalgebra::Matrix3;
-use psidpd_core::engine::{EngineError, LocalEnergy, NoEnergy, Particles, PeriodicBox, noise, reference};
+use psidpd_core::engine::{EngineError, LocalEnergy, NoEnergy, Particles, PeriodicBox, noise};
 use psidpd_core::model::{Fluid, Model};
+use psidpd_core::truth;
 use std::path::Path;
 
 struct Uniform(u32);
@@ -92,7 +93,7 @@ impl Case {
 
 fn energy(fluid: &Fluid, x: &[[f64; 3]], kind: &[i32], domain: &PeriodicBox) -> f64 {
     let species: Vec<usize> = kind.iter().map(|k| *k as usize).collect();
-    reference::evaluate(fluid, x, &species, domain).unwrap().energy()
+    truth::conservative(fluid, x, &species, domain).unwrap().energy
 }
 
 fn cube(edge: f64) -> PeriodicBox {

@@ -1,8 +1,8 @@
 //! The law of LAMMPS's `mdpd`, against its formula.
 
 use psidpd_core::engine::PeriodicBox;
-use psidpd_core::engine::reference::evaluate;
 use psidpd_core::model::{WarrenPair, lucy_mdpd};
+use psidpd_core::truth::conservative as evaluate;
 use std::f64::consts::PI;
 
 fn pair(a: f64, b: f64, rc: f64, rd: f64) -> Option<WarrenPair> {

@@ -1,9 +1,9 @@
 //! Random models: the engine against the plain reference, and both against the Hamiltonian.
 
 use proptest::prelude::*;
-use psidpd_core::engine::reference::{self, Evaluation};
 use psidpd_core::engine::{Images, Newton, Particles, PeriodicBox, Want};
 use psidpd_core::model::{ExcessFreeEnergy, Fluid, Model};
+use psidpd_core::truth::{self, Truth};
 use std::fmt::Write;
 use with_images::{Outcome, Owned};
 
@@ -191,13 +191,7 @@ fn run_engine(fluid: &Fluid, c: &Configuration, newton: Newton) -> Outcome {
 
 /// On which side of every kink everything is: pairs of the kinks of kernels and pair potentials,
 /// particles of their bounds and of the rows of their tables.
-fn sides(
-    fluid: &Fluid,
-    x: &[[f64; 3]],
-    c: &Configuration,
-    domain: &PeriodicBox,
-    here: &Evaluation,
-) -> Vec<i64> {
+fn sides(fluid: &Fluid, x: &[[f64; 3]], c: &Configuration, domain: &PeriodicBox, here: &Truth) -> Vec<i64> {
     let mut sides = Vec::new();
     let kinks = kinks(fluid);
     let images = if fluid.dimensions == 3 { -2..=2 } else { 0..=0 };
@@ -253,7 +247,7 @@ fn difference(
     let mut first = None;
     for (energy, step) in energies.iter_mut().zip([-2.0, -1.0, 0.0, 1.0, 2.0]) {
         let (x, domain) = moved(step * h);
-        let here = reference::evaluate(fluid, &x, &c.species, &domain).unwrap();
+        let here = truth::conservative(fluid, &x, &c.species, &domain).unwrap();
         *energy = here.energy;
         let sides = sides(fluid, &x, c, &domain, &here);
         if *first.get_or_insert_with(|| sides.clone()) != sides {
@@ -281,7 +275,7 @@ fn close(a: f64, b: f64, scale: f64) -> bool {
 fn equals_reference(seed: u64) {
     let (text, fluid, mut random) = load(seed);
     let c = configuration(&mut random, &fluid);
-    let truth = reference::evaluate(&fluid, &c.x, &c.species, &c.domain).unwrap();
+    let truth = truth::conservative(&fluid, &c.x, &c.species, &c.domain).unwrap();
     let largest = truth.forces.iter().flatten().fold(1.0f64, |m, f| m.max(f.abs()));
     let size = truth.virial.iter().fold(1.0f64, |m, w| m.max(w.abs()));
     for newton in [Newton::On, Newton::Off] {

@@ -1,10 +1,10 @@
 //! Laws of stated slopes: the engine against the plain reference, and against ψ where the slopes have one.
 
-use psidpd_core::engine::reference;
 use psidpd_core::engine::{Newton, PeriodicBox, Plan, noise};
 use psidpd_core::maximum::largest;
 use psidpd_core::model::{Fluid, Model};
 use psidpd_core::theory::{MeanField, TheoryError};
+use psidpd_core::truth;
 use with_images::Owned;
 
 mod with_images;
@@ -56,7 +56,7 @@ fn the_engine_computes_what_the_reference_does() {
     let (x, species, domain) = configuration();
     for law in [STATED, OTHER] {
         let fluid = fluid(law);
-        let truth = reference::evaluate(&fluid, &x, &species, &domain).unwrap();
+        let truth = truth::conservative(&fluid, &x, &species, &domain).unwrap();
         for newton in [Newton::On, Newton::Off] {
             let (energy, forces) = engine(&fluid, newton);
             assert!((energy / truth.energy - 1.0).abs() < 1e-12, "{energy} {}", truth.energy);

@@ -3,8 +3,9 @@
 
 #![cfg(unix)]
 
-use psidpd_core::engine::{PeriodicBox, Step, reference};
+use psidpd_core::engine::{PeriodicBox, Step};
 use psidpd_core::model::{ForceLaw, WarrenPair, warren_ab};
+use psidpd_core::truth;
 use psidpd_tests::{engine, root};
 use std::collections::BTreeMap;
 use std::env;
@@ -74,9 +75,8 @@ fn check_against_reference(printed: &BTreeMap<String, Vec<f64>>) {
     let species = vec![0; x.len()];
     let tag: Vec<i32> = (1..=x.len() as i32).collect();
     let step = Step { seed: 1 << 40, number: 77, dt: 0.01 };
-    let truth = reference::evaluate(&fluid, &x, &species, &domain).unwrap();
-    let (thermal, thermal_virial) =
-        reference::thermostat(&fluid, &x, &v, &tag, &species, &domain, step).unwrap();
+    let truth = truth::conservative(&fluid, &x, &species, &domain).unwrap();
+    let (thermal, thermal_virial) = truth::drag_and_noise(&fluid, &x, &v, &tag, &species, &domain, step);
 
     assert_close(&printed["density"], truth.densities.iter().copied(), "densities");
     for run in ["newton_off", "newton_on", "thermal"] {

@@ -3,8 +3,8 @@
 
 mod style_common;
 
-use psidpd_core::engine::reference::evaluate;
 use psidpd_core::model::Model;
+use psidpd_core::truth::conservative as evaluate;
 use style_common::*;
 
 /// Warren's liquid, so fast that ghosts are found anew in the middle of steps.

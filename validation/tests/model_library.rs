@@ -4,11 +4,12 @@
 use chacha20::ChaCha8Rng;
 use nalgebra::{Matrix3, Vector3};
 use psidpd::run::{Simulation, State};
-use psidpd_core::engine::{PeriodicBox, Want, reference};
+use psidpd_core::engine::{PeriodicBox, Want};
 use psidpd_core::maximum::largest;
 use psidpd_core::model::pair::{PairForm, PairPotential};
 use psidpd_core::model::{ExcessFreeEnergy, Fluid, Model};
 use psidpd_core::theory::{MeanField, Structure, thermodynamic_limit};
+use psidpd_core::truth;
 use rand::{RngExt, SeedableRng};
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
@@ -297,7 +298,7 @@ fn is_smooth(c: &Configuration, fluid: &Fluid, kinks: &[f64]) -> bool {
             }
         }
     }
-    let found = reference::evaluate(fluid, &c.x, &c.species, &c.domain).unwrap();
+    let found = truth::conservative(fluid, &c.x, &c.species, &c.domain).unwrap();
     let smooth = |(i, alpha): (usize, &usize)| {
         from_bounds(fluid, found.densities_of(i), *alpha).all(|d| d.abs() > 0.05)
     };
@@ -447,7 +448,7 @@ fn engine_equals_the_plain_evaluation() {
     for entry in LIBRARY {
         let fluid = entry.fluid();
         for c in [random(entry, &fluid), shaken(entry, &fluid)] {
-            let truth = reference::evaluate(&fluid, &c.x, &c.species, &c.domain).unwrap();
+            let truth = truth::conservative(&fluid, &c.x, &c.species, &c.domain).unwrap();
             let truth = Forces { energy: truth.energy, forces: truth.forces, virial: truth.virial };
             agree(entry.name, &forces(&entry.model(), entry.kt, &c), &truth, 1e-12);
         }
@@ -459,7 +460,7 @@ fn slope(fluid: &Fluid, c: &Configuration, moved: impl Fn(f64) -> Configuration)
     const H: f64 = 5e-5;
     let energy = |h: f64| {
         let m = moved(h);
-        reference::evaluate(fluid, &m.x, &c.species, &m.domain).unwrap().energy
+        truth::conservative(fluid, &m.x, &c.species, &m.domain).unwrap().energy
     };
     (8.0 * (energy(H) - energy(-H)) - (energy(2.0 * H) - energy(-2.0 * H))) / (12.0 * H)
 }
@@ -577,7 +578,7 @@ fn one_species_is_two_identical_species() {
         let fluid = two.at(entry.kt).unwrap();
         let c = shaken(entry, &fluid);
         let alone = Configuration { species: vec![0; c.x.len()], ..c.clone() };
-        let found = reference::evaluate(&entry.fluid(), &alone.x, &alone.species, &alone.domain).unwrap();
+        let found = truth::conservative(&entry.fluid(), &alone.x, &alone.species, &alone.domain).unwrap();
         let fluid = entry.fluid();
         let inside = |i| from_bounds(&fluid, found.densities_of(i), 0).all(|d| d < 0.0);
         assert!((0..alone.x.len()).all(inside), "{}", entry.name);

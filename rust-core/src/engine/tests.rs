@@ -4,6 +4,7 @@ use super::reference::Reference;
 use super::*;
 use crate::maximum::largest;
 use crate::model::{Fluid, ForceLaw, Model, WarrenPair, warren_ab};
+use crate::truth;
 use with_images::{Outcome, Owned};
 
 #[path = "../../tests/with_images/mod.rs"]
@@ -116,9 +117,9 @@ fn close(a: f64, b: f64, scale: f64, what: &str) {
 
 fn assert_matches_reference(fluid: &Fluid, c: &Configuration) {
     let step = Step { seed: 12, number: 77, dt: 0.01 };
-    let truth = reference::evaluate(fluid, &c.x, &c.species, &c.domain).unwrap();
+    let truth = truth::conservative(fluid, &c.x, &c.species, &c.domain).unwrap();
     let (thermal, thermal_virial) =
-        reference::thermostat(fluid, &c.x, &c.v, &c.tag, &c.species, &c.domain, step).unwrap();
+        truth::drag_and_noise(fluid, &c.x, &c.v, &c.tag, &c.species, &c.domain, step);
     let scale = largest(truth.forces.as_flattened());
     for newton in [Newton::On, Newton::Off] {
         let quiet = run_engine(fluid, c, newton, None);
@@ -191,7 +192,7 @@ fn the_energy_of_the_reference_is_the_hamiltonian() {
     {
         let c = configuration(60, lengths, fluid.species.len(), 3);
         let truth = hamiltonian(&fluid, &c);
-        let found = reference::evaluate(&fluid, &c.x, &c.species, &c.domain).unwrap().energy;
+        let found = truth::conservative(&fluid, &c.x, &c.species, &c.domain).unwrap().energy;
         assert!((found - truth).abs() < 1e-11 * truth.abs(), "{found} {truth}");
     }
 }
@@ -214,7 +215,7 @@ fn engine_equals_reference_for_a_mixture_of_everything() {
 fn engine_equals_reference_in_tiny_boxes() {
     let fluid = Model::parse("mixture", MIXTURE).unwrap().at(1.3).unwrap();
     let c = configuration(7, [0.9, 1.3, 0.6], 2, 3);
-    let truth = reference::evaluate(&fluid, &c.x, &c.species, &c.domain).unwrap();
+    let truth = truth::conservative(&fluid, &c.x, &c.species, &c.domain).unwrap();
     for newton in [Newton::On, Newton::Off] {
         let engine = run_engine(&fluid, &c, newton, None);
         close(engine.tally.energy(), truth.energy, truth.energy.abs(), "energy");
@@ -313,7 +314,7 @@ fn forces_and_virial_are_gradients_of_the_energy() {
 fn are_gradients(fluid: &Fluid) {
     let c = configuration(60, [2.3, 2.1, 2.5], 2, 3);
     let energy = |x: &[[f64; 3]], domain: &PeriodicBox| {
-        reference::evaluate(fluid, x, &c.species, domain).unwrap().energy
+        truth::conservative(fluid, x, &c.species, domain).unwrap().energy
     };
     let here = run_engine(fluid, &c, Newton::On, None);
     let scale = largest(here.forces.as_flattened());

@@ -4,10 +4,10 @@
 
 use nalgebra::Matrix3;
 use psidpd::lammps::Lammps;
-use psidpd_core::engine::reference::{Evaluation, evaluate, thermostat};
 use psidpd_core::engine::{PeriodicBox, Step};
 use psidpd_core::maximum::largest;
 use psidpd_core::model::Model;
+use psidpd_core::truth::{Truth, conservative, drag_and_noise};
 use psidpd_tests::{lammps, root};
 use std::ops::Deref;
 use std::path::Path;
@@ -161,16 +161,16 @@ pub fn domain(l: &Lammps) -> PeriodicBox {
 
 /// The plain evaluation of the model for the particles that LAMMPS has, types in the order of species;
 /// with drag and noise of `step` in the forces and the virial.
-pub fn truth(l: &Lammps, model: &Model, kt: f64, step: Option<u64>) -> Evaluation {
+pub fn truth(l: &Lammps, model: &Model, kt: f64, step: Option<u64>) -> Truth {
     let now = frame(l);
     let fluid = model.at(kt).unwrap();
     let species: Vec<usize> = now.kind.iter().map(|k| *k as usize - 1).collect();
     let domain = domain(l);
-    let mut all = evaluate(&fluid, &now.x, &species, &domain).unwrap();
+    let mut all = conservative(&fluid, &now.x, &species, &domain).unwrap();
     if let Some(number) = step {
         let tags: Vec<i32> = (1..=now.x.len() as i32).collect();
         let step = Step { seed: SEED, number, dt: DT };
-        let (f, w) = thermostat(&fluid, &now.x, &now.v, &tags, &species, &domain, step).unwrap();
+        let (f, w) = drag_and_noise(&fluid, &now.x, &now.v, &tags, &species, &domain, step);
         for (all, f) in all.forces.iter_mut().zip(&f) {
             (0..3).for_each(|k| all[k] += f[k]);
         }

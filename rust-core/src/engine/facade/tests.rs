@@ -277,7 +277,7 @@ fn a_configuration_is_evaluated_at_a_stroke() {
         let cloud = Cloud::new(lengths, 90, 2);
         let mut engine = engine(&fluid);
         let species: Vec<usize> = cloud.kind.iter().map(|k| *k as usize).collect();
-        let truth = crate::engine::reference::evaluate(&fluid, &cloud.x, &species, &cloud.domain).unwrap();
+        let truth = crate::truth::conservative(&fluid, &cloud.x, &species, &cloud.domain).unwrap();
         let mut x = cloud.x.clone();
         for (k, x) in x.iter_mut().enumerate() {
             (0..3).for_each(|c| x[c] += lengths[c] * ((k + c) % 3) as f64 - lengths[c]);

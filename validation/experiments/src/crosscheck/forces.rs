@@ -4,9 +4,10 @@ use super::codes::{Code, FINE, Setup};
 use super::fluids::{RC, RD, SET6};
 use super::start::{Filling, equilibrated};
 use super::{Context, Part, ValidateError};
-use psidpd_core::engine::{Fault, PeriodicBox, Precision, Settings, Step, Want, reference};
+use psidpd_core::engine::{Fault, PeriodicBox, Precision, Settings, Step, Want};
 use psidpd_core::maximum::largest;
 use psidpd_core::model::{ForceLaw, Model};
+use psidpd_core::truth;
 use psidpd_dynamics::run::{Simulation, State};
 use psidpd_lammps_host::Lammps;
 use psidpd_report::{Check, Item, Section, Table};
@@ -69,11 +70,11 @@ fn plain(model: &Model, state: &State, step: Option<Step>) -> Result<Point, Vali
     let mut x = state.x.clone();
     x.iter_mut().for_each(|x| domain.wrap(x, &mut [0; 3]));
     let species: Vec<usize> = state.species.iter().map(|s| *s as usize).collect();
-    let sums = reference::evaluate(&fluid, &x, &species, domain)?;
-    let energy = sums.energy();
+    let sums = truth::conservative(&fluid, &x, &species, domain)?;
+    let energy = sums.energy;
     let (mut forces, mut virial) = (sums.forces, sums.virial);
     if let Some(step) = step {
-        let (more, w) = reference::thermostat(&fluid, &x, &state.v, &state.tag, &species, domain, step)?;
+        let (more, w) = truth::drag_and_noise(&fluid, &x, &state.v, &state.tag, &species, domain, step);
         forces.as_flattened_mut().iter_mut().zip(more.as_flattened()).for_each(|(f, more)| *f += more);
         virial.iter_mut().zip(w).for_each(|(v, w)| *v += w);
     }
