@@ -195,11 +195,11 @@ impl Style {
         }
         let _ = writeln!(text, "  search        {search}");
         if listed {
-            let path = EnginePath::Reference(Reason::ListedPairs);
+            let path = EnginePath::PairSums(Reason::ListedPairs);
             let _ = writeln!(text, "  evaluation    {path}");
             text.push_str("  arithmetic    double precision, 1 thread a rank\n");
         } else {
-            let exception = EnginePath::Reference(Reason::ParticleValues);
+            let exception = EnginePath::PairSums(Reason::ParticleValues);
             let _ = writeln!(text, "  evaluation    {}; on some steps {exception}", EnginePath::Sweep);
             let Settings { precision, instructions, threads } = self.engine.settings();
             let faster = match precision {

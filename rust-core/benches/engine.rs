@@ -9,7 +9,7 @@ mod setup;
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use psidpd_core::engine::noise::PairNoise;
-use psidpd_core::engine::reference::Reference;
+use psidpd_core::engine::pair_sums::PairSums;
 use psidpd_core::engine::{Instructions, Particles, Precision, Step, Surroundings, Want};
 use psidpd_core::model::ExcessFreeEnergy;
 use psidpd_core::model::expression::{Formula, Program};
@@ -45,7 +45,7 @@ fn reference(c: &mut Criterion) {
     group.throughput(Throughput::Elements(COUNT as u64));
     for subject in &SUBJECTS {
         let fluid = subject.fluid();
-        let mut reference = Reference::new(&fluid).expect("a plan");
+        let mut reference = PairSums::new(&fluid).expect("a plan");
         let mut cloud = Cloud::new(subject, &fluid, COUNT);
         let mut number = 0;
         group.bench_function(subject.name, |b| {

@@ -50,7 +50,11 @@ fn densities_of_one_step_leave_later_steps_to_the_sweep() {
     let text = [false, true].map(|listed| s.description("", listed, listed));
     assert!(text[0].contains("evaluation    cell sweep;"), "{}", text[0]);
     assert!(text[0].contains("half-step") && text[1].contains("those of fix dpd/splitting"));
-    assert!(text[1].contains("evaluation    reference evaluation, because the host lists"), "{}", text[1]);
+    assert!(
+        text[1].contains("evaluation    sums over pairs one by one, because the host lists"),
+        "{}",
+        text[1]
+    );
 }
 
 #[test]

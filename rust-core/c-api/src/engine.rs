@@ -245,7 +245,7 @@ pub unsafe extern "C" fn psidpd_engine_path(
         out_text.put(engine.path_text.as_ptr());
         out.put(match path {
             engine::Path::Sweep => Path::Sweep,
-            engine::Path::Reference(_) => Path::Reference,
+            engine::Path::PairSums(_) => Path::Reference,
         });
         Ok(())
     })
@@ -426,9 +426,9 @@ pub unsafe extern "C" fn psidpd_engine_densities(
         engine.state = State::Nothing;
         let want = engine::Want { densities: engine.all_densities, ..engine::Want::FORCES };
         let request = engine::Request { particles, v: &[], step: None, want };
-        engine.engine.use_reference_only(true);
+        engine.engine.use_pair_sums_only(true);
         let found = engine.engine.first(engine::Surroundings::ghosts(newton), &request);
-        engine.engine.use_reference_only(false);
+        engine.engine.use_pair_sums_only(false);
         found?;
         engine.state = State::Densities;
         Ok(())

@@ -1,12 +1,12 @@
-//! All forces come from here: the engine chooses between the sweep and the reference, evaluation by evaluation.
+//! All forces come from here: the engine chooses between the sweep and the sums over pairs, evaluation by evaluation.
 
 use super::counts::PassCounts;
 use super::error::EngineError;
 use super::fault::Fault;
+use super::pair_sums::{Corrections, PairSums};
 use super::particles::{Particles, Step};
 use super::path::{Path, Reason};
 use super::plan::Plan;
-use super::reference::{Corrections, Reference};
 use super::surroundings::{Around, SpecialPair, Surroundings};
 use super::sweep::{Pool, Sweep, Times};
 use crate::model::Fluid;
@@ -27,9 +27,9 @@ use std::sync::Arc;
 /// Every evaluation takes the fastest [`Path`] that has what is wanted of it; the next one chooses anew.
 #[derive(Debug, Clone)]
 pub struct Engine {
-    reference: Reference,
+    pair_sums: PairSums,
     sweep: Sweep,
-    reference_only: bool,
+    pair_sums_only: bool,
     special: Vec<SpecialPair>,
     /// Whether the sweep has been told of them.
     knows_special: bool,
@@ -97,9 +97,9 @@ impl Engine {
 
     fn of_plan(plan: Plan, settings: Settings, pool: Arc<Pool>) -> Engine {
         Engine {
-            reference: Reference::of_plan(plan.clone()),
+            pair_sums: PairSums::of_plan(plan.clone()),
             sweep: Sweep::of_plan(plan, settings, pool),
-            reference_only: false,
+            pair_sums_only: false,
             special: Vec::new(),
             knows_special: true,
             corrections: Corrections::default(),
@@ -131,13 +131,13 @@ impl Engine {
 
     /// How often each pass has run.
     pub fn counts(&self) -> PassCounts {
-        self.reference.counts() + self.sweep.counts()
+        self.pair_sums.counts() + self.sweep.counts()
     }
 
     /// How many evaluations of ψ had a density below its bounds, and how many one above, since the
     /// engine was made. Only densities count that the particle's ψ depends on, not linearly.
     pub fn out_of_bounds(&self) -> [u64; 2] {
-        let (a, b) = (self.reference.out_of_bounds(), self.sweep.out_of_bounds());
+        let (a, b) = (self.pair_sums.out_of_bounds(), self.sweep.out_of_bounds());
         [a[0] + b[0], a[1] + b[1]]
     }
 
@@ -147,7 +147,7 @@ impl Engine {
     /// # Errors
     /// A species index out of range.
     pub fn map_kinds(&mut self, kinds: &[i32]) -> Result<(), EngineError> {
-        self.reference.map_kinds(kinds)?;
+        self.pair_sums.map_kinds(kinds)?;
         self.sweep.map_kinds(kinds)
     }
 
@@ -168,9 +168,9 @@ impl Engine {
         self.sweep.exclusions_mut().mark(marks, between_molecules);
     }
 
-    /// Whether every evaluation is to be done by the reference: for tests, and to see what the sweep is worth.
-    pub fn use_reference_only(&mut self, only: bool) {
-        self.reference_only = only;
+    /// Whether every evaluation is to be done by sums over pairs one by one: for tests, and to see what the sweep is worth.
+    pub fn use_pair_sums_only(&mut self, only: bool) {
+        self.pair_sums_only = only;
     }
 
     /// The way that the last evaluation went; `None` before the first.
@@ -181,18 +181,18 @@ impl Engine {
     /// The way that an evaluation of `want` would go.
     pub fn path_for(&self, surroundings: Surroundings, want: Want) -> Path {
         let fits = match surroundings {
-            Surroundings::Listed(..) => return Path::Reference(Reason::ListedPairs),
+            Surroundings::Listed(..) => return Path::PairSums(Reason::ListedPairs),
             Surroundings::Box(domain) => self.sweep.fits(domain),
             Surroundings::Ghosts(around, _) => self.sweep.fits(around.domain),
         };
-        if self.reference_only {
-            Path::Reference(Reason::Asked)
+        if self.pair_sums_only {
+            Path::PairSums(Reason::Asked)
         } else if want.of_particles() {
-            Path::Reference(Reason::ParticleValues)
+            Path::PairSums(Reason::ParticleValues)
         } else if want.densities && !self.sweep_has_all_densities() {
-            Path::Reference(Reason::Densities)
+            Path::PairSums(Reason::Densities)
         } else if !fits {
-            Path::Reference(Reason::Box)
+            Path::PairSums(Reason::Box)
         } else {
             Path::Sweep
         }
@@ -203,7 +203,7 @@ impl Engine {
         let Settings { precision, instructions, threads } = self.settings();
         match path {
             Path::Sweep => format!("{path}, {precision} precision, {instructions}, {threads} thread(s)"),
-            Path::Reference(_) => format!("{path}; double precision, 1 thread"),
+            Path::PairSums(_) => format!("{path}; double precision, 1 thread"),
         }
     }
 
@@ -267,9 +267,9 @@ impl Engine {
                 tally.virial.iter_mut().chain(&mut tally.thermostat_virial).for_each(|w| *w *= factor);
                 Ok(tally)
             }
-            Path::Reference(_) => {
-                self.reference.set_special_pairs(&self.special, self.sweep.exclusions());
-                self.reference.first(Surroundings::Box(domain), particles, want.densities)?;
+            Path::PairSums(_) => {
+                self.pair_sums.set_special_pairs(&self.special, self.sweep.exclusions());
+                self.pair_sums.first(Surroundings::Box(domain), particles, want.densities)?;
                 self.finish(request, force, add)
             }
         }
@@ -293,25 +293,25 @@ impl Engine {
                 self.sweep.first(around, particles, v, *step, *want)
             }
             _ => {
-                self.reference.set_special_pairs(&self.special, self.sweep.exclusions());
-                self.reference.first(surroundings, particles, want.densities)
+                self.pair_sums.set_special_pairs(&self.special, self.sweep.exclusions());
+                self.pair_sums.first(surroundings, particles, want.densities)
             }
         }
     }
 
     /// What special pairs add to a sweep, which leaves them out; their densities go there.
     fn find_corrections(&mut self, around: Around, particles: &Particles) -> Result<(), EngineError> {
-        let Engine { reference, sweep, special, corrections, .. } = self;
+        let Engine { pair_sums, sweep, special, corrections, .. } = self;
         let (exclusions, densities) = sweep.beside_mut();
         exclusions.check(particles.x.len())?;
         let excluded = |i, j| exclusions.excludes(i, j);
         corrections.find(
-            reference.plan(),
+            pair_sums.plan(),
             special,
             excluded,
             around,
             particles,
-            reference.kinds(),
+            pair_sums.kinds(),
             densities,
         )?;
         if !self.knows_special {
@@ -334,7 +334,7 @@ impl Engine {
     /// `∂ψ/∂n` of owned particles, then room for those of ghosts, [`Plan::slope_width`] each.
     pub fn slopes_mut(&mut self) -> &mut [f64] {
         match self.path {
-            Some(Path::Reference(_)) => self.reference.slopes_mut(),
+            Some(Path::PairSums(_)) => self.pair_sums.slopes_mut(),
             _ => self.sweep.slopes_mut(),
         }
     }
@@ -342,7 +342,7 @@ impl Engine {
     /// The second half of an evaluation: writes the forces to `force`, or adds them to what is there, and returns the
     /// totals that are wanted.
     ///
-    /// Forces on ghosts are the reference's only, if the host brings them home; the sweep leaves them alone, and the
+    /// Forces on ghosts are those of the sums over pairs only, if the host brings them home; the sweep leaves them alone, and the
     /// rank of the other particle computes its half of the pair, for which half of the energy and virial count here.
     ///
     /// # Errors
@@ -354,7 +354,7 @@ impl Engine {
         add: bool,
     ) -> Result<Tally, EngineError> {
         match self.path {
-            Some(Path::Reference(_)) => self.finish(request, force, add),
+            Some(Path::PairSums(_)) => self.finish(request, force, add),
             _ => {
                 let mut tally = self.sweep.second(&request.particles, force, add)?;
                 if !self.corrections.is_empty() {
@@ -375,13 +375,13 @@ impl Engine {
         path
     }
 
-    /// The second half of an evaluation by the reference.
+    /// The second half of an evaluation by sums over pairs.
     fn finish(&mut self, request: &Request, force: &mut [[f64; 3]], add: bool) -> Result<Tally, EngineError> {
         if !add {
             force.fill([0.0; 3]);
         }
         let Request { particles, v, step, want } = request;
-        self.reference.second(particles, v, *step, *want, force)
+        self.pair_sums.second(particles, v, *step, *want, force)
     }
 
     /// Keeps the densities of a sweep that wanted them.
@@ -393,10 +393,10 @@ impl Engine {
 
     /// Uncorrected local densities of owned particles in the last evaluation, one for each density and species,
     /// density-major. Unless they were wanted, or have been summed by [`Engine::sum_densities`], there are none after a
-    /// sweep, and zeros for those that no force needs after an evaluation by the reference.
+    /// sweep, and zeros for those that no force needs after an evaluation by sums over pairs.
     pub fn local_densities(&self) -> &[f64] {
         match self.path {
-            Some(Path::Reference(_)) => self.reference.local_densities(),
+            Some(Path::PairSums(_)) => self.pair_sums.local_densities(),
             _ => &self.densities,
         }
     }
@@ -415,7 +415,7 @@ impl Engine {
         let variables = self.plan().densities().count() * self.plan().species().len();
         match self.path {
             // The pairs are there still.
-            Some(Path::Reference(_)) => self.reference.sum_all_densities(None),
+            Some(Path::PairSums(_)) => self.pair_sums.sum_all_densities(None),
             _ if !self.densities.is_empty() => Ok(&self.densities),
             Some(Path::Sweep) if self.sweep_has_all_densities() => {
                 self.sweep.local_densities(&mut self.excess, &mut self.densities);
@@ -426,8 +426,8 @@ impl Engine {
                 Ok(&self.densities)
             }
             Some(Path::Sweep) => {
-                self.reference.set_special_pairs(&self.special, self.sweep.exclusions());
-                let all = self.reference.sum_all_densities(Some((surroundings, particles)))?;
+                self.pair_sums.set_special_pairs(&self.special, self.sweep.exclusions());
+                let all = self.pair_sums.sum_all_densities(Some((surroundings, particles)))?;
                 self.densities.extend_from_slice(all);
                 Ok(&self.densities)
             }
@@ -437,7 +437,7 @@ impl Engine {
     /// ψ of owned particles in the last evaluation, without the terms that act as pair potentials.
     pub fn excess(&mut self) -> &[f64] {
         match self.path {
-            Some(Path::Reference(_)) => self.reference.excess(),
+            Some(Path::PairSums(_)) => self.pair_sums.excess(),
             Some(Path::Sweep) if self.excess.is_empty() => {
                 self.sweep.local_densities(&mut self.excess, &mut Vec::new());
                 &self.excess
@@ -448,21 +448,21 @@ impl Engine {
 
     /// Energy of each particle and ghost, if the last evaluation wanted it: its ψ and half of its pair energies.
     pub fn particle_energy(&self) -> &[f64] {
-        self.reference.particle_energy()
+        self.pair_sums.particle_energy()
     }
 
     /// Virial of each particle and ghost, if the last evaluation wanted it: half of its pairs'.
     pub fn particle_virial(&self) -> &[[f64; 6]] {
-        self.reference.particle_virial()
+        self.pair_sums.particle_virial()
     }
 
     /// Brings the slopes of owned particles to [`Engine::slopes_mut`] after [`Engine::forces`], with room for `all`:
     /// for questions about single pairs, before which nobody needs them.
     pub fn fetch_slopes(&mut self, all: usize) {
         match self.path {
-            Some(Path::Reference(_)) => {
+            Some(Path::PairSums(_)) => {
                 let length = self.plan().slope_width() * all;
-                self.reference.slopes_mut().resize(length, 0.0);
+                self.pair_sums.slopes_mut().resize(length, 0.0);
             }
             _ => self.sweep.fetch_slopes(all),
         }
@@ -475,10 +475,10 @@ impl Engine {
     /// also has the many-body part, if slopes are there.
     pub fn single(&self, kinds: [i32; 2], r: f64, particles: [usize; 2]) -> (f64, f64) {
         let slopes = match self.path {
-            Some(Path::Reference(_)) => self.reference.slopes(),
+            Some(Path::PairSums(_)) => self.pair_sums.slopes(),
             _ => self.sweep.slopes(),
         };
-        self.reference.single_at(kinds, r, slopes, particles)
+        self.pair_sums.single_at(kinds, r, slopes, particles)
     }
 
     /// The host's numbers of its particles in the order of cells, an order to keep them in that makes sorting cheap;
@@ -491,7 +491,7 @@ impl Engine {
     pub fn memory(&self) -> usize {
         let held = self.excess.capacity() + self.densities.capacity();
         let special = self.special.capacity() * size_of::<SpecialPair>() + self.corrections.memory();
-        self.reference.memory() + self.sweep.memory() + special + held * size_of::<f64>()
+        self.pair_sums.memory() + self.sweep.memory() + special + held * size_of::<f64>()
     }
 }
 

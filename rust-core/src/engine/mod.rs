@@ -10,7 +10,7 @@
 //! noise          the random number of a pair
 //! sweep/         pairs from cells → densities → ψ′ → forces, by vector instructions and threads
 //! local_energy/  how the energy changes where one particle moves, for Monte Carlo
-//! reference/     pairs from a list → densities → ψ′ → forces, in double precision, with values of single particles
+//! pair_sums/     pairs from a list → densities → ψ′ → forces, in double precision, with values of single particles
 //! facade         Engine: chooses between the two for each evaluation, and says which and why (path)
 //! ```
 //!
@@ -27,11 +27,11 @@ mod facade;
 mod fault;
 mod images;
 mod local_energy;
+pub mod pair_sums;
 mod particles;
 mod path;
 mod plan;
 mod reach;
-pub mod reference;
 mod surroundings;
 mod sweep;
 pub mod thermostat;

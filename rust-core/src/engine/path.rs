@@ -7,8 +7,8 @@ use std::fmt;
 pub enum Path {
     /// By the sweep over cells: fast, by vector instructions and threads.
     Sweep,
-    /// By the reference, over a list of pairs, in double precision and on one thread: slower, for a reason.
-    Reference(Reason),
+    /// By sums over a list of pairs, in double precision and on one thread: slower, for a reason.
+    PairSums(Reason),
 }
 
 /// Why the sweep does not do an evaluation.
@@ -22,7 +22,7 @@ pub enum Reason {
     Densities,
     /// The box is narrower than twice the cut-off, or leans as no box of LAMMPS does.
     Box,
-    /// The host has asked for the reference.
+    /// The host has asked for it.
     Asked,
 }
 
@@ -30,7 +30,7 @@ impl fmt::Display for Path {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Path::Sweep => f.write_str("cell sweep"),
-            Path::Reference(reason) => write!(f, "reference evaluation, because {reason}"),
+            Path::PairSums(reason) => write!(f, "sums over pairs one by one, because {reason}"),
         }
     }
 }

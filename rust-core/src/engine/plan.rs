@@ -97,11 +97,6 @@ impl Plan {
         Plan::of_passes(fluid, (0..fluid.densities.len()).collect(), Vec::new())
     }
 
-    /// The same fluid with nothing but its thermostat.
-    pub(super) fn without_conservative_forces(self) -> Plan {
-        Plan { passes: Vec::new(), linear: Vec::new(), pairs: Vec::new(), ..self }
-    }
-
     /// The same for energies alone.
     pub(super) fn without_slopes(mut self) -> Plan {
         self.excess.iter_mut().for_each(ExcessPlan::leave_out_slopes);

@@ -1,6 +1,6 @@
 //! The engine against the plain reference, and both against the Hamiltonian.
 
-use super::reference::Reference;
+use super::pair_sums::PairSums;
 use super::*;
 use crate::maximum::largest;
 use crate::model::{Fluid, ForceLaw, Model, WarrenPair, warren_ab};
@@ -452,7 +452,7 @@ A = "pi/30*(-40)*n + pi*0.75^4/30*25*m^2"
 "#;
     let two = Model::parse("two", text).unwrap().at(1.0).unwrap();
     let c = configuration(300, [3.1, 4.0, 3.5], 1, 3);
-    let mut engine = Reference::new(&two).unwrap();
+    let mut engine = PairSums::new(&two).unwrap();
     assert_eq!(engine.slope_width(), 1);
     let a = run_engine(&two, &c, Newton::On, None);
     let b = run_engine(&warren(1, ForceLaw::Conservative), &c, Newton::On, None);
@@ -490,14 +490,14 @@ fn linear_psi_is_standard_dpd_and_needs_no_density_pass() {
         close(*f, *g, 1e3, "force");
     }
     assert_eq!(a.counts.excess, 0);
-    assert_eq!(Reference::new(&psi).unwrap().slope_width(), 0);
+    assert_eq!(PairSums::new(&psi).unwrap().slope_width(), 0);
 }
 
 #[test]
 fn trouble_is_an_error_that_names_the_particle() {
     let fluid = warren(1, ForceLaw::Conservative);
-    let mut engine = Reference::new(&fluid).unwrap();
-    let check = |engine: &mut Reference, x: [[f64; 3]; 2], tag: [i32; 2], kind: [i32; 2]| {
+    let mut engine = PairSums::new(&fluid).unwrap();
+    let check = |engine: &mut PairSums, x: [[f64; 3]; 2], tag: [i32; 2], kind: [i32; 2]| {
         let particles = Particles { owned: 2, x: &x, tag: &tag, kind: &kind };
         engine.first(Surroundings::ghosts(Newton::On), &particles, false)
     };
@@ -510,7 +510,7 @@ fn trouble_is_an_error_that_names_the_particle() {
 
     let text = "title = \"vdw\"\nspecies = [\"A\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n\
                 [excess_free_energy]\nA = \"-ln(1 - n)\"\n";
-    let mut engine = Reference::new(&Model::parse("vdw", text).unwrap().at(1.0).unwrap()).unwrap();
+    let mut engine = PairSums::new(&Model::parse("vdw", text).unwrap().at(1.0).unwrap()).unwrap();
     let on_top = [[0.0; 3], [0.0, 0.0, 0.0]];
     let error = check(&mut engine, on_top, [1, 2], [0, 0]).unwrap_err();
     assert!(matches!(error, EngineError::ExcessFreeEnergy { tag: 1, .. }), "{error}");
@@ -520,7 +520,7 @@ fn trouble_is_an_error_that_names_the_particle() {
 #[test]
 fn a_runaway_particle_costs_no_memory() {
     let fluid = warren(1, ForceLaw::Conservative);
-    let mut engine = Reference::new(&fluid).unwrap();
+    let mut engine = PairSums::new(&fluid).unwrap();
     let x = [[0.0; 3], [1e300, -1e250, 3e12], [0.4, 0.0, 0.0]];
     let particles = Particles { owned: 3, x: &x, tag: &[1, 2, 3], kind: &[0, 0, 0] };
     engine.first(Surroundings::ghosts(Newton::On), &particles, false).unwrap();
@@ -532,7 +532,7 @@ fn a_runaway_particle_costs_no_memory() {
 #[test]
 fn unmapped_kinds_are_ignored() {
     let fluid = warren(1, ForceLaw::Conservative);
-    let mut engine = Reference::new(&fluid).unwrap();
+    let mut engine = PairSums::new(&fluid).unwrap();
     engine.map_kinds(&[-1, 0, -1]).unwrap();
     let x = [[0.0; 3], [0.3, 0.0, 0.0], [0.0, 0.3, 0.0]];
     let particles = Particles { owned: 3, x: &x, tag: &[1, 2, 3], kind: &[1, 2, 1] };

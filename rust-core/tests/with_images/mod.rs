@@ -1,7 +1,7 @@
 //! The plain engine as a host with ghosts has it: periodic images as ghosts, slopes forwarded to them, forces, energies and
 //! virials brought home.
 
-use psidpd_core::engine::reference::Reference;
+use psidpd_core::engine::pair_sums::PairSums;
 use psidpd_core::engine::{
     Images, Newton, Particles, PassCounts, PeriodicBox, Step, Surroundings, Tally, Want,
 };
@@ -31,7 +31,7 @@ pub struct Outcome {
 
 /// One evaluation of everything, with drag and noise if there is a step.
 pub fn evaluate(fluid: &Fluid, c: Owned, newton: Newton, step: Option<Step>) -> Outcome {
-    let mut engine = Reference::new(fluid).unwrap();
+    let mut engine = PairSums::new(fluid).unwrap();
     let owned = c.x.len();
     let mut images = Images::default();
     let (mut x, mut v, mut tag) = (c.x.to_vec(), c.v.to_vec(), c.tag.to_vec());

@@ -9,7 +9,7 @@
 //! is 0.
 
 use psidpd_core::engine::PeriodicBox;
-use psidpd_core::engine::reference::COMPONENTS;
+use psidpd_core::engine::pair_sums::COMPONENTS;
 
 /// A straight line that momentum was carried along: to the mean pressure in a volume it adds `d ⊗ f`, divided by the volume,
 /// times its part in the volume.

@@ -1,7 +1,7 @@
 //! One configuration as the observables see it: what several of them need is computed once.
 
 use super::flux::{Carrier, Flux, Line, Place};
-use psidpd_core::engine::reference::{Evaluation, Evaluator};
+use psidpd_core::engine::pair_sums::{Evaluation, Evaluator};
 use psidpd_core::engine::{PeriodicBox, Pool};
 use psidpd_core::model::Model;
 use std::cell::OnceCell;

@@ -5,7 +5,7 @@ use super::meter::AnyMeter;
 use super::observation::Observation;
 use super::request::Observe;
 use psidpd_core::engine::Want;
-use psidpd_core::engine::reference::Evaluator;
+use psidpd_core::engine::pair_sums::Evaluator;
 use serde::{Deserialize, Serialize};
 
 /// The observables that a scene asks for, with what they have seen so far.

@@ -49,7 +49,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     let state = State::from_data(&data, &model)?;
     let mut simulation = Simulation::new(&model, kt.unwrap_or(arguments.kt), state, 1)?;
     // What others are compared with.
-    simulation.use_reference_only(true);
+    simulation.use_pair_sums_only(true);
     simulation.sum_all_densities(true);
     simulation.compute(Want::TOTALS, None)?;
     let width = simulation.local_densities().len() / simulation.len().max(1);

@@ -2,7 +2,7 @@ use super::inputs::Files;
 use super::settings::temperature;
 use super::{Failure, Verdict, write_json};
 use psidpd_core::engine::check_reach;
-use psidpd_core::engine::reference::{Evaluator, for_each_pair};
+use psidpd_core::engine::pair_sums::{Evaluator, for_each_pair};
 use psidpd_core::model::Model;
 use psidpd_core::model::kernel::{Kernel, KernelKind};
 use psidpd_formats::files::write_atomically;

@@ -69,12 +69,12 @@ fn special_pairs_act_as_listed_pairs_with_factors() {
                 }
                 let settings = Settings { precision: Precision::Double, instructions, threads };
                 let mut engine = Engine::new(&fluid, settings).unwrap();
-                for reference_only in [false, true] {
-                    println!("{name}, {threads} threads, reference only: {reference_only}");
-                    engine.use_reference_only(reference_only);
+                for pair_sums_only in [false, true] {
+                    println!("{name}, {threads} threads, reference only: {pair_sums_only}");
+                    engine.use_pair_sums_only(pair_sums_only);
                     engine.set_special_pairs(in_hand.iter().copied());
                     agree(&in_box(&mut engine, &cloud, want), &expected);
-                    assert_eq!(engine.path() == Some(Path::Sweep), !reference_only && fluid.variables() != 4);
+                    assert_eq!(engine.path() == Some(Path::Sweep), !pair_sums_only && fluid.variables() != 4);
                     let forces = in_box(&mut engine, &cloud, Want::TOTALS);
                     agree(&(forces.0, forces.1, vec![]), &(expected.0, expected.1.clone(), vec![]));
                     engine.set_special_pairs(with_images.iter().copied());
@@ -126,7 +126,7 @@ fn values_of_single_particles_and_densities_see_special_pairs() {
     let particles = cloud.request(Want::FORCES).particles;
     let densities = engine.sum_densities(Surroundings::Box(&cloud.domain), &particles).unwrap().to_vec();
     let (tally, _, expected) = in_box(&mut engine, &cloud, Want::ALL);
-    assert_eq!(engine.path(), Some(Path::Reference(Reason::ParticleValues)));
+    assert_eq!(engine.path(), Some(Path::PairSums(Reason::ParticleValues)));
     let energy: f64 = engine.particle_energy().iter().sum();
     for energy in [tally.energy(), energy] {
         assert!((energy / swept.energy() - 1.0).abs() < 1e-11, "{energy} {}", swept.energy());
@@ -196,9 +196,9 @@ fn marked_particles_act_as_those_of_a_list_without_their_pairs() {
                 Engine::new(&fluid, Settings { precision: Precision::Double, instructions, threads })
                     .unwrap();
             engine.set_exclusions(owner.iter().map(|k| mark(*k)), between);
-            for reference_only in [false, true] {
-                println!("{name}, reference only: {reference_only}");
-                engine.use_reference_only(reference_only);
+            for pair_sums_only in [false, true] {
+                println!("{name}, reference only: {pair_sums_only}");
+                engine.use_pair_sums_only(pair_sums_only);
                 engine.set_special_pairs(special(&factors, count, &owner[..count]));
                 agree(&in_box(&mut engine, &cloud, want), &expected);
                 engine.set_special_pairs(special(&factors, count, &owner));
@@ -210,8 +210,8 @@ fn marked_particles_act_as_those_of_a_list_without_their_pairs() {
             let too_few = engine.plan().species().len();
             engine.set_exclusions((0..too_few).map(mark), between);
             let mut force = vec![[0.0; 3]; count];
-            for reference_only in [false, true] {
-                engine.use_reference_only(reference_only);
+            for pair_sums_only in [false, true] {
+                engine.use_pair_sums_only(pair_sums_only);
                 assert!(
                     engine.forces(&cloud.domain, &cloud.request(Want::FORCES), &mut force, false).is_err()
                 );

@@ -130,7 +130,7 @@ fn every_evaluation_chooses_anew() {
     let densities = Want { densities: true, ..totals };
     let (wide, narrow) = ([4.0, 3.5, 3.1], [4.0, 1.9, 3.1]);
     let swept = Path::Sweep;
-    let plain = Path::Reference;
+    let plain = Path::PairSums;
     for (fluid, summed) in [(warren(), swept), (two_densities(), plain(Reason::Densities))] {
         let mut engine = engine(&fluid);
         assert_eq!(engine.path(), None);
@@ -152,10 +152,10 @@ fn every_evaluation_chooses_anew() {
             assert_eq!(engine.path(), Some(path));
             assert_eq!(engine.sweep.counts().force > before, path == swept, "{path}");
             assert_eq!(engine.order().is_some(), path == swept);
-            engine.use_reference_only(true);
+            engine.use_pair_sums_only(true);
             let mut expected = in_box(&mut engine, &cloud, want);
             assert_eq!(engine.path(), Some(plain(Reason::Asked)));
-            engine.use_reference_only(false);
+            engine.use_pair_sums_only(false);
             if !want.energy {
                 continue;
             }
@@ -168,7 +168,7 @@ fn every_evaluation_chooses_anew() {
     }
     assert_eq!(Path::Sweep.to_string(), "cell sweep");
     let text = plain(Reason::ListedPairs).to_string();
-    assert_eq!(text, "reference evaluation, because the host lists the pairs");
+    assert_eq!(text, "sums over pairs one by one, because the host lists the pairs");
 }
 
 #[test]
@@ -209,14 +209,14 @@ fn all_surroundings_give_the_same_forces() {
                     s[..2].iter().any(|s| !(0.0..1.0).contains(s))
                 })
                 .collect();
-            for reference_only in [false, true] {
-                engine.use_reference_only(reference_only);
+            for pair_sums_only in [false, true] {
+                engine.use_pair_sums_only(pair_sums_only);
                 for newton in [Newton::On, Newton::Off] {
                     let free = Surroundings::ghosts(newton);
                     agree(&with_ghosts(&mut engine, free, &all, &images, want), &expected);
                     let found = with_ghosts(&mut engine, free, &all, &images, Want::TOTALS);
                     let swept = engine.path() == Some(Path::Sweep);
-                    assert_eq!(swept, !reference_only);
+                    assert_eq!(swept, !pair_sums_only);
                     if swept {
                         agree(&found, &forces);
                     }
@@ -237,7 +237,7 @@ fn all_surroundings_give_the_same_forces() {
                         .unzip();
                     let listed = Surroundings::Listed(PairsOfHost { i: &i, j: &j, factor: &[] }, newton);
                     agree(&with_ghosts(&mut engine, listed, &all, &images, want), &expected);
-                    assert_eq!(engine.path(), Some(Path::Reference(Reason::ListedPairs)));
+                    assert_eq!(engine.path(), Some(Path::PairSums(Reason::ListedPairs)));
                 }
             }
         }
@@ -251,8 +251,8 @@ fn densities_can_be_asked_for_afterwards() {
         let cloud = Cloud::new([4.0, 3.5, 3.1], 200, fluid.species.len() as i32);
         let mut engine = engine(&fluid);
         let (_, _, expected) = in_box(&mut engine, &cloud, Want { densities: true, ..Want::TOTALS });
-        for reference_only in [false, true] {
-            engine.use_reference_only(reference_only);
+        for pair_sums_only in [false, true] {
+            engine.use_pair_sums_only(pair_sums_only);
             let (_, forces, _) = in_box(&mut engine, &cloud, Want::FORCES);
             let path = engine.path();
             let excess = engine.excess().to_vec();

@@ -1,4 +1,4 @@
-//! The fast engine: the same forces as [`Reference`](super::reference::Reference), by one traversal of all cells, without a
+//! The fast engine: the same forces as [`PairSums`](super::pair_sums::PairSums), by one traversal of all cells, without a
 //! neighbour list. `docs/engine.md` explains it with figures. At the speed of DPD particles a neighbour list would live a few
 //! steps and cost more than it saves.
 //!
@@ -163,12 +163,12 @@ impl Sweep {
         with!(&self.workspace, m => m.counts())
     }
 
-    /// As [`Reference::out_of_bounds`](super::reference::Reference::out_of_bounds).
+    /// As [`PairSums::out_of_bounds`](super::pair_sums::PairSums::out_of_bounds).
     pub fn out_of_bounds(&self) -> [u64; 2] {
         with!(&self.workspace, m => m.out_of_bounds())
     }
 
-    /// As [`Reference::map_kinds`](super::reference::Reference::map_kinds).
+    /// As [`PairSums::map_kinds`](super::pair_sums::PairSums::map_kinds).
     ///
     /// # Errors
     /// A species index out of range.
@@ -212,7 +212,7 @@ impl Sweep {
     ///
     /// `v` may be empty and `step` `None` where no thermostat acts; with `step` `None` only conservative
     /// forces are computed. Of `want`, the totals: what is asked for of each particle is the business
-    /// of [`Reference`](super::reference::Reference).
+    /// of [`PairSums`](super::pair_sums::PairSums).
     ///
     /// # Errors
     /// A position, ψ or a force that is not finite; then some forces may have been written. A tag or type out of range,
@@ -372,8 +372,8 @@ impl Sweep {
     }
 
     /// ψ and local densities of owned particles, in the host's order: as
-    /// [`Reference::excess`](super::reference::Reference::excess) and
-    /// [`Reference::local_densities`](super::reference::Reference::local_densities), those that forces do not need being zero.
+    /// [`PairSums::excess`](super::pair_sums::PairSums::excess) and
+    /// [`PairSums::local_densities`](super::pair_sums::PairSums::local_densities), those that forces do not need being zero.
     pub fn local_densities(&self, excess: &mut Vec<f64>, densities: &mut Vec<f64>) {
         let variables = self.plan.densities.len() * self.plan.species.len();
         with!(&self.workspace, m => m.to_host(variables, excess, densities));

@@ -1,5 +1,5 @@
 use super::*;
-use crate::engine::reference::Reference;
+use crate::engine::pair_sums::PairSums;
 use crate::engine::{Images, Instructions, Surroundings};
 use crate::maximum::largest;
 use crate::model::Model;
@@ -63,7 +63,7 @@ const STEP: Step = Step { seed: 11, number: 5, dt: 0.01 };
 
 /// Forces and totals by the reference.
 fn plain(fluid: &Fluid, cloud: &Cloud) -> (Vec<[f64; 3]>, Tally) {
-    let mut reference = Reference::new(fluid).unwrap();
+    let mut reference = PairSums::new(fluid).unwrap();
     let particles = cloud.particles();
     reference.first(Surroundings::Box(&cloud.domain), &particles, false).unwrap();
     let mut force = vec![[0.0; 3]; cloud.x.len()];

@@ -7,7 +7,7 @@ use crate::run::{Integrator, Simulation};
 use crate::scene::Scene;
 use crate::test_support::SET6;
 use psidpd_core::engine::Want;
-use psidpd_core::engine::reference::Evaluator;
+use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_observe::frame::Frame;
 use psidpd_observe::{Measured, Observation, Observers};
 

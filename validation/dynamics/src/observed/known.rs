@@ -5,7 +5,7 @@ use crate::run::Simulation;
 use crate::test_support::{self, IDEAL, IDEAL_MIXTURE, SET6, SOFT};
 use nalgebra::Matrix3;
 use psidpd_core::engine::PeriodicBox;
-use psidpd_core::engine::reference::Evaluator;
+use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_observe::Observation;
 use psidpd_observe::flux::{Flux, Line};
 use psidpd_observe::frame::{Frame, View};

@@ -5,7 +5,7 @@ use crate::run::Simulation;
 use crate::test_support::{IDEAL_MIXTURE, SET6};
 use psidpd_core::document::FileError;
 use psidpd_core::engine::Want;
-use psidpd_core::engine::reference::Evaluator;
+use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_observe::frame::Frame;
 use psidpd_observe::meter::surface_tension::stretched_energy;
 use psidpd_observe::meter::{AnyMeter, Meter};

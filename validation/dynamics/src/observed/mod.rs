@@ -5,7 +5,7 @@ use crate::scene::Scene;
 use crate::test_support::{self, IDEAL_MIXTURE, SET6};
 use psidpd_core::document::FileError;
 use psidpd_core::engine::Want;
-use psidpd_core::engine::reference::Evaluator;
+use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_observe::keys::COMMON;
 use psidpd_observe::request::tables;
 use psidpd_observe::*;

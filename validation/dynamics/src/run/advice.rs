@@ -3,7 +3,7 @@
 use super::simulation::Simulation;
 use crate::integrator::{Coupling, Integrator};
 use crate::scene::Stage;
-use psidpd_core::engine::reference::Evaluator;
+use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_observe::configurational;
 use psidpd_observe::frame::Frame;
 use serde::Serialize;

@@ -11,7 +11,7 @@
 use super::error::RunError;
 use super::simulation::Simulation;
 use crate::scene::Stage;
-use psidpd_core::engine::reference::Evaluator;
+use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_observe::configurational;
 use psidpd_observe::frame::Frame;
 use psidpd_observe::series::Series;

@@ -17,7 +17,7 @@ pub enum Code {
     Plugin(String),
     /// The native runner.
     Native(Settings),
-    /// The native runner with the reference evaluation.
+    /// The native runner with the sums over pairs one by one.
     Plain,
 }
 

@@ -30,7 +30,7 @@ fn simulation(
             simulation.set_settings(settings)?;
             simulation.set_reordering(true);
         }
-        None => simulation.use_reference_only(true),
+        None => simulation.use_pair_sums_only(true),
     }
     simulation.prepare(subject.dt, Want::FORCES)?;
     Ok(simulation)

@@ -19,7 +19,7 @@
 //! gives, a little denser.
 
 use psidpd_core::engine::noise::{Law, PairNoise};
-use psidpd_core::engine::reference::Evaluator;
+use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_core::engine::{PeriodicBox, Want};
 use psidpd_dynamics::integrator::Integrator;
 use psidpd_dynamics::run::{RunError, Simulation, State};

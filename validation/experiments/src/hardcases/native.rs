@@ -3,7 +3,7 @@
 use super::HardCasesError;
 use super::case::{Case, Found, Must, Run};
 use psidpd_core::document::FileError;
-use psidpd_core::engine::reference::Evaluator;
+use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_core::engine::{Precision, Settings, Want};
 use psidpd_dynamics::integrator::Integrator;
 use psidpd_dynamics::particles::State;

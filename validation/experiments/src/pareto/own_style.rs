@@ -2,7 +2,7 @@
 
 use super::ParetoError;
 use super::origin::Origin;
-use psidpd_core::engine::reference::Evaluator;
+use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_core::model::{Fluid, ForceLaw, Model, WarrenPair, warren_ab};
 use std::fmt::Write;
 

@@ -329,7 +329,7 @@ impl Sorted {
 mod tests {
     use super::*;
     use nalgebra::Matrix3;
-    use psidpd_core::engine::reference::for_each_pair;
+    use psidpd_core::engine::pair_sums::for_each_pair;
     use rand::{RngExt, SeedableRng, rngs::StdRng};
     use std::num::NonZeroUsize;
 

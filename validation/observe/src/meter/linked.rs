@@ -5,7 +5,7 @@ use crate::keys::{Key, Need, ValueKind, key};
 use crate::options::Options;
 use psidpd_core::document::FileError;
 use psidpd_core::engine::PeriodicBox;
-use psidpd_core::engine::reference::for_each_pair;
+use psidpd_core::engine::pair_sums::for_each_pair;
 use serde::{Deserialize, Serialize};
 
 /// Sets that are joined pair by pair, with the way from each member to the first one.

@@ -1,7 +1,7 @@
 //! Forces at displaced positions, which stand for the gradient of the square of the forces.
 
 use super::{RunError, Simulation};
-use psidpd_core::engine::reference::COMPONENTS;
+use psidpd_core::engine::pair_sums::COMPONENTS;
 use psidpd_core::engine::{PeriodicBox, Want};
 use psidpd_observe::flux::Displaced;
 

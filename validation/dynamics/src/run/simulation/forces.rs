@@ -15,7 +15,7 @@ pub(super) struct Forces {
     engine: Engine,
     tally: Tally,
     all_densities: bool,
-    reference_only: bool,
+    pair_sums_only: bool,
     /// What engines of earlier temperatures counted.
     earlier_out_of_bounds: [u64; 2],
 }
@@ -31,7 +31,7 @@ impl Forces {
             kt,
             tally: Tally::default(),
             all_densities: false,
-            reference_only: false,
+            pair_sums_only: false,
             earlier_out_of_bounds: [0; 2],
         })
     }
@@ -123,7 +123,7 @@ impl Forces {
     fn replace(&mut self, engine: Engine) {
         self.earlier_out_of_bounds = self.out_of_bounds();
         self.engine = engine;
-        self.engine.use_reference_only(self.reference_only);
+        self.engine.use_pair_sums_only(self.pair_sums_only);
     }
 
     fn out_of_bounds(&self) -> [u64; 2] {
@@ -215,9 +215,9 @@ impl Simulation {
     }
 
     /// Whether every evaluation is done by the reference, which is slower and in double precision.
-    pub fn use_reference_only(&mut self, only: bool) {
-        self.forces.reference_only = only;
-        self.forces.engine.use_reference_only(only);
+    pub fn use_pair_sums_only(&mut self, only: bool) {
+        self.forces.pair_sums_only = only;
+        self.forces.engine.use_pair_sums_only(only);
     }
 
     /// Energies and virials of the last evaluation, as far as they were wanted.

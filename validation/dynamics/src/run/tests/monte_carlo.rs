@@ -2,7 +2,7 @@
 
 use super::*;
 use psidpd_core::engine::PeriodicBox;
-use psidpd_core::engine::reference::Evaluator;
+use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_core::model::pair::PairForm;
 use psidpd_observe::configurational;
 use psidpd_observe::frame::Frame;

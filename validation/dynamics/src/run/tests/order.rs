@@ -131,7 +131,7 @@ fn reordering_keeps_the_physics() {
 fn the_reference_leaves_the_order_alone() {
     let mut run = simulation(SET6, settled());
     run.set_reordering(true);
-    run.use_reference_only(true);
+    run.use_pair_sums_only(true);
     advance(&mut run, 3, 0.01, Integrator::VelocityVerlet);
     assert!(run.tags().is_sorted());
 }

@@ -156,7 +156,7 @@ fn noise_has_the_variance_of_the_formula() {
     for (integrator, precision, plain) in double.chain(others) {
         let mut run = pairs(EDGE, 1e-20);
         run.set_settings(Settings { precision, ..run.settings() }).unwrap();
-        run.use_reference_only(plain);
+        run.use_pair_sums_only(plain);
         run.prepare_for(integrator, DT, Want::FORCES).unwrap();
         run.advance(SETTLE, DT, integrator).unwrap();
         let [mut noise, mut square] = [0.0; 2];

@@ -1,10 +1,10 @@
-use super::Reference;
+use super::PairSums;
 
 fn bytes<T>(array: &Vec<T>) -> usize {
     array.capacity() * size_of::<T>()
 }
 
-impl Reference {
+impl PairSums {
     /// Bytes held in arrays over particles and pairs, without the cells of the search.
     pub fn memory(&self) -> usize {
         self.pairs.force().bytes()

@@ -1,12 +1,12 @@
 //! One pair on its own, for hosts that ask about pairs.
 
-use super::Reference;
+use super::PairSums;
 use super::forces::{Block, ForceInput};
 use super::pairs::PairList;
 use crate::engine::surroundings::Newton;
 use psidpd_passes::tally::Want;
 
-impl Reference {
+impl PairSums {
     /// Pair energy, and conservative force along `ê_ij`, of the particles `i` and `j` at the distance
     /// `r`, of the given kinds.
     ///

@@ -48,7 +48,7 @@ pub fn add_listed(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::reference::Reference;
+    use crate::engine::pair_sums::PairSums;
     use crate::engine::{Around, Newton, PeriodicBox, Surroundings, Tally, Want};
     use crate::model::{ForceLaw, Model, WarrenPair, warren_ab};
 
@@ -66,13 +66,13 @@ mod tests {
 
     type Forces = (Tally, Vec<[f64; 3]>);
 
-    fn forces(engine: &mut Reference, particles: &Particles) -> Forces {
+    fn forces(engine: &mut PairSums, particles: &Particles) -> Forces {
         let mut f = vec![[0.0; 3]; particles.x.len()];
         let tally = engine.second(particles, &[], None, Want::TOTALS, &mut f).unwrap();
         (tally, f)
     }
 
-    fn search(engine: &mut Reference, particles: &Particles, newton: Newton) {
+    fn search(engine: &mut PairSums, particles: &Particles, newton: Newton) {
         let open = PeriodicBox::orthogonal([0.0; 3], [1.0; 3], [false; 3]).unwrap();
         let around = Around { domain: &open, images: &[] };
         engine.first(Surroundings::Ghosts(around, newton), particles, false).unwrap();
@@ -87,7 +87,7 @@ mod tests {
 
     #[test]
     fn all_pairs_listed_are_the_search_and_factors_scale() {
-        let mut engine = Reference::new(&model().at(1.0).unwrap()).unwrap();
+        let mut engine = PairSums::new(&model().at(1.0).unwrap()).unwrap();
         let x = points();
         let tag: Vec<i32> = (1..=60).collect();
         let kind = vec![0; 60];
@@ -121,7 +121,7 @@ mod tests {
                     let mut x = x.clone();
                     x[k][c] += h;
                     let moved = Particles { x: &x, ..particles };
-                    let mut engine = Reference::new(&model().at(1.0).unwrap()).unwrap();
+                    let mut engine = PairSums::new(&model().at(1.0).unwrap()).unwrap();
                     engine.first(Surroundings::Listed(listed, newton), &moved, false).unwrap();
                     forces(&mut engine, &moved).0.energy()
                 });
@@ -133,7 +133,7 @@ mod tests {
 
     #[test]
     fn single_pairs_add_up_to_the_forces() {
-        let mut engine = Reference::new(&model().at(1.0).unwrap()).unwrap();
+        let mut engine = PairSums::new(&model().at(1.0).unwrap()).unwrap();
         let x = points();
         let (tag, kind): (Vec<i32>, Vec<i32>) = ((1..=60).collect(), vec![0; 60]);
         let particles = Particles { owned: 60, x: &x, tag: &tag, kind: &kind };
@@ -162,7 +162,7 @@ mod tests {
 
     #[test]
     fn lists_that_make_no_sense_are_refused() {
-        let mut engine = Reference::new(&model().at(1.0).unwrap()).unwrap();
+        let mut engine = PairSums::new(&model().at(1.0).unwrap()).unwrap();
         let mut x = points();
         let (tag, kind): (Vec<i32>, Vec<i32>) = ((1..=60).collect(), vec![0; 60]);
         for (i, j, factor) in [(0, 60, 1.0), (50, 0, 1.0), (-1, 0, 1.0)] {

@@ -103,45 +103,51 @@ pub fn for_each_pair(
     });
 }
 
-/// The same by the definition: every particle with every image of every other, one after the other.
-///
-/// Particles must lie in the box along its periodic directions.
-pub fn for_each_pair_by_brute_force(
-    x: &[[f64; 3]],
-    domain: &PeriodicBox,
-    dimensions: usize,
-    cutoff: f64,
-    mut visit: impl FnMut(Pair),
-) {
-    // Particles that are both inside are at most this many boxes from their nearest images.
-    let shells = [0, 1, 2].map(|k| {
-        if domain.periodic()[k] && k < dimensions { (cutoff / domain.height(k)).ceil() as i32 + 1 } else { 0 }
-    });
-    let range = |k: usize| -shells[k]..=shells[k];
-    for (i, j) in (0..x.len()).flat_map(|i| (i..x.len()).map(move |j| (i, j))) {
-        for (a, b, c) in range(0).flat_map(|a| range(1).flat_map(move |b| range(2).map(move |c| (a, b, c)))) {
-            // Of a particle's own images +s and −s are one pair.
-            if i == j && (a, b, c) <= (0, 0, 0) {
-                continue;
-            }
-            let shift = [a, b, c].map(f64::from);
-            let d: [f64; 3] = std::array::from_fn(|m| {
-                let image: f64 = (0..3).map(|k| shift[k] * domain.edge(k)[m]).sum();
-                if m < dimensions { x[i][m] - x[j][m] + image } else { 0.0 }
-            });
-            let r = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
-            if r < cutoff {
-                visit(Pair { i, j, d, r });
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use nalgebra::Matrix3;
     use psidpd_passes::noise::threefry2x32;
+
+    /// Every pair by the definition: every particle with every image of every other, one after the other.
+    ///
+    /// Particles must lie in the box along its periodic directions.
+    fn for_each_pair_by_brute_force(
+        x: &[[f64; 3]],
+        domain: &PeriodicBox,
+        dimensions: usize,
+        cutoff: f64,
+        mut visit: impl FnMut(Pair),
+    ) {
+        // Particles that are both inside are at most this many boxes from their nearest images.
+        let shells = [0, 1, 2].map(|k| {
+            if domain.periodic()[k] && k < dimensions {
+                (cutoff / domain.height(k)).ceil() as i32 + 1
+            } else {
+                0
+            }
+        });
+        let range = |k: usize| -shells[k]..=shells[k];
+        for (i, j) in (0..x.len()).flat_map(|i| (i..x.len()).map(move |j| (i, j))) {
+            for (a, b, c) in
+                range(0).flat_map(|a| range(1).flat_map(move |b| range(2).map(move |c| (a, b, c))))
+            {
+                // Of a particle's own images +s and −s are one pair.
+                if i == j && (a, b, c) <= (0, 0, 0) {
+                    continue;
+                }
+                let shift = [a, b, c].map(f64::from);
+                let d: [f64; 3] = std::array::from_fn(|m| {
+                    let image: f64 = (0..3).map(|k| shift[k] * domain.edge(k)[m]).sum();
+                    if m < dimensions { x[i][m] - x[j][m] + image } else { 0.0 }
+                });
+                let r = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
+                if r < cutoff {
+                    visit(Pair { i, j, d, r });
+                }
+            }
+        }
+    }
 
     #[test]
     fn pairs_are_those_of_brute_force() {

@@ -1,4 +1,5 @@
-//! The reference: the Hamiltonian and its forces in double precision, as sums over a list of pairs.
+//! The Hamiltonian and its forces in double precision, as sums over a list of pairs: the engine where the sweep does not
+//! do an evaluation.
 //!
 //! ```text
 //! pairs        in_box (a box and its images), search (a rank and its ghosts), listed (the host's own)
@@ -10,9 +11,9 @@
 //! forces       F_ij = −[∂ψ_i/∂n_c(j) + ∂ψ_j/∂n_c(i)] w′ − φ′, drag and noise; energies, virials
 //! ```
 //!
-//! [`Reference`] goes through this once for a host. [`Evaluator`] does for whoever measures or tests: it leaves nothing
+//! [`PairSums`] goes through this once for a host. [`Evaluator`] does for whoever measures or tests: it leaves nothing
 //! out (every density is summed, no ψ is taken for a pair potential), and gives every pair with its force.
-//! [`evaluate`] finds the pairs by brute force. Everything faster is tested against it.
+//! Both are tested against [`crate::truth`], as everything faster is.
 
 mod densities;
 mod evaluation;
@@ -29,7 +30,7 @@ mod sweep_pairs;
 
 pub(super) use special::Corrections;
 
-pub use evaluation::{COMPONENTS, Evaluation, Evaluator, evaluate, thermostat};
+pub use evaluation::{COMPONENTS, Evaluation, Evaluator};
 pub use free_energy::Psi;
 pub use in_box::{Pair, for_each_pair};
 
@@ -57,10 +58,10 @@ use special::scale;
 /// The forces of one fluid over a list of pairs, with whatever can be asked for, and the arrays that computing them
 /// needs.
 ///
-/// An evaluation is [`Reference::first`], a round of slopes from owners to ghosts where there are ghosts, and
-/// [`Reference::second`].
+/// An evaluation is [`PairSums::first`], a round of slopes from owners to ghosts where there are ghosts, and
+/// [`PairSums::second`].
 #[derive(Debug, Clone)]
-pub struct Reference {
+pub struct PairSums {
     plan: Plan,
     kinds: Vec<i32>,
     search: CellSearch,
@@ -85,19 +86,19 @@ pub struct Reference {
     ready: bool,
 }
 
-impl Reference {
-    /// The reference for `fluid`; types are species indices until [`Reference::map_kinds`] says otherwise.
+impl PairSums {
+    /// The sums for `fluid`; types are species indices until [`PairSums::map_kinds`] says otherwise.
     ///
     /// # Errors
     /// As [`Plan::new`].
-    pub fn new(fluid: &Fluid) -> Result<Reference, TooLarge> {
-        Ok(Reference::of_plan(Plan::new(fluid)?))
+    pub fn new(fluid: &Fluid) -> Result<PairSums, TooLarge> {
+        Ok(PairSums::of_plan(Plan::new(fluid)?))
     }
 
-    /// The reference of a plan that is there already.
-    pub fn of_plan(plan: Plan) -> Reference {
+    /// The sums of a plan that is there already.
+    pub fn of_plan(plan: Plan) -> PairSums {
         let kinds = (0..plan.species.len() as i32).collect();
-        Reference {
+        PairSums {
             plan,
             kinds,
             search: CellSearch::default(),
@@ -130,7 +131,7 @@ impl Reference {
     }
 
     /// How many evaluations of ψ had a density below its bounds, and how many one above, since the
-    /// reference was made. Only densities count that the particle's ψ depends on, not linearly.
+    /// sums were made. Only densities count that the particle's ψ depends on, not linearly.
     pub fn out_of_bounds(&self) -> [u64; 2] {
         self.excess_pass.out_of_bounds
     }
@@ -188,7 +189,7 @@ impl Reference {
         self.take_species(particles)?;
         self.owned = particles.owned;
         let (dimensions, cutoff) = (self.plan.dimensions, self.plan.cutoff);
-        let Reference { pairs, species, search, box_search, .. } = self;
+        let PairSums { pairs, species, search, box_search, .. } = self;
         let Particles { x, tag, owned, .. } = *particles;
         let takes_part = |k: usize| species[k] >= 0;
         let is_closed = |domain: &PeriodicBox| domain.periodic()[..dimensions].contains(&true);
@@ -270,7 +271,7 @@ impl Reference {
 
     /// Sums the densities of the pairs that have been found.
     fn sum_densities(&mut self, all: bool) {
-        let Reference { plan, pairs, species, densities, counts, .. } = self;
+        let PairSums { plan, pairs, species, densities, counts, .. } = self;
         densities.clear();
         densities.resize(self.owned * plan.densities.len() * plan.species.len(), 0.0);
         let which = (0..plan.densities.len()).filter(|d| all || plan.passes.contains(d));
@@ -282,7 +283,7 @@ impl Reference {
     /// last. Forces can be computed after that only in the latter case.
     ///
     /// # Errors
-    /// As [`Reference::first`].
+    /// As [`PairSums::first`].
     pub fn sum_all_densities(
         &mut self,
         of: Option<(Surroundings, &Particles)>,
@@ -348,7 +349,7 @@ impl Reference {
     /// host brings them home.
     ///
     /// # Errors
-    /// A force that is not finite; arrays of other lengths than in [`Reference::first`].
+    /// A force that is not finite; arrays of other lengths than in [`PairSums::first`].
     pub fn second(
         &mut self,
         particles: &Particles,
@@ -421,12 +422,12 @@ impl Reference {
         }
     }
 
-    /// Energy of each particle and ghost, if the last [`Reference::second`] was asked for it.
+    /// Energy of each particle and ghost, if the last [`PairSums::second`] was asked for it.
     pub fn particle_energy(&self) -> &[f64] {
         &self.particle_energy
     }
 
-    /// Virial of each particle and ghost, if the last [`Reference::second`] was asked for it.
+    /// Virial of each particle and ghost, if the last [`PairSums::second`] was asked for it.
     pub fn particle_virial(&self) -> &[[f64; 6]] {
         &self.particle_virial
     }

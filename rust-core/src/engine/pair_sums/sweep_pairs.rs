@@ -95,7 +95,7 @@ impl SweepPairs {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::reference::for_each_pair;
+    use crate::engine::pair_sums::for_each_pair;
     use crate::engine::surroundings::Newton;
     use crate::model::Model;
     use nalgebra::Matrix3;

@@ -4,17 +4,15 @@
 use super::densities::sum_densities;
 use super::forces::{ForceInput, ForceOutput, add_forces};
 use super::free_energy::{FreeEnergies, Psi};
-use super::in_box::{BoxSearch, Pair, for_each_pair_by_brute_force};
+use super::in_box::{BoxSearch, Pair};
 use super::pairs::Pairs;
 use super::sweep_pairs::SweepPairs;
-use crate::engine::particles::Step;
 use crate::engine::plan::Plan;
 use crate::engine::surroundings::Newton;
 use crate::model::expression::TooLarge;
 use crate::model::pair::PairForm;
 use crate::model::{Fluid, PairTerm};
 use psidpd_passes::domain::PeriodicBox;
-use psidpd_passes::noise::PairNoise;
 use psidpd_passes::tally::{Tally, Want};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -258,72 +256,6 @@ impl Evaluation {
 /// Components of a symmetric tensor in their order.
 pub const COMPONENTS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
 
-/// Every pair of particles and images by brute force: both must be inside `domain` along its periodic directions.
-fn brute_force_pairs(fluid: &Fluid, x: &[[f64; 3]], species: &[i32], domain: &PeriodicBox) -> Pairs {
-    let mut pairs = Pairs::default();
-    pairs.clear(x.len(), Newton::On);
-    for_each_pair_by_brute_force(x, domain, fluid.dimensions, fluid.cutoff(), |p| {
-        pairs.push_in_box(p.i, p.j, p.d, species);
-    });
-    pairs
-}
-
-/// Evaluates `U` and its gradient for particles at `x`, inside `domain` along its periodic directions: the truth for
-/// tests. It takes time as the square of the number of particles.
-///
-/// # Errors
-/// A derivative of ψ grows beyond the limits of the formula engine.
-pub fn evaluate(
-    fluid: &Fluid,
-    x: &[[f64; 3]],
-    species: &[usize],
-    domain: &PeriodicBox,
-) -> Result<Evaluation, TooLarge> {
-    let species: Vec<i32> = species.iter().map(|s| *s as i32).collect();
-    let pairs = brute_force_pairs(fluid, x, &species, domain);
-    let pair_forces = vec![0.0; pairs.force().len()];
-    Ok(Evaluator::new(fluid.clone())?.of_pairs(pairs, pair_forces, &species))
-}
-
-/// Dissipative and random forces, and their virial, over the same pairs.
-///
-/// # Errors
-/// As [`evaluate`].
-pub fn thermostat(
-    fluid: &Fluid,
-    x: &[[f64; 3]],
-    v: &[[f64; 3]],
-    tag: &[i32],
-    species: &[usize],
-    domain: &PeriodicBox,
-    step: Step,
-) -> Result<(Vec<[f64; 3]>, [f64; 6]), TooLarge> {
-    let species: Vec<i32> = species.iter().map(|s| *s as i32).collect();
-    let pairs = brute_force_pairs(fluid, x, &species, domain);
-    let mut forces = vec![[0.0; 3]; x.len()];
-    let mut output = ForceOutput {
-        force: &mut forces,
-        particle_energy: &mut [],
-        particle_virial: &mut [],
-        pair_force: &mut [],
-        tally: Tally::default(),
-    };
-    let input = ForceInput {
-        plan: &Plan::new(fluid)?.without_conservative_forces(),
-        list: pairs.force(),
-        newton: Newton::On,
-        owned: x.len(),
-        slopes: &[],
-        v,
-        tag,
-        thermostat: Some((PairNoise::new(step.seed, step.number), 1.0 / step.dt.sqrt())),
-        want: Want::TOTALS,
-    };
-    add_forces(&input, &mut output);
-    let virial = output.tally.thermostat_virial;
-    Ok((forces, virial))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -385,12 +317,12 @@ A = { slopes = { n = "0.3*n" }, energy = "n^2" }
     }
 
     #[test]
-    fn a_search_finds_what_brute_force_does() {
+    fn an_evaluation_is_the_truth() {
         for model in MODELS.into_iter().chain([STATED]) {
             let (evaluator, x, species, domain) = random(model, 11);
             let found = evaluator.evaluate(&x, &species, &domain);
             let indices: Vec<usize> = species.iter().map(|s| *s as usize).collect();
-            let truth = evaluate(evaluator.fluid(), &x, &indices, &domain).unwrap();
+            let truth = crate::truth::conservative(evaluator.fluid(), &x, &indices, &domain).unwrap();
             let energies = found.excess.iter().chain(&found.pair_energies(evaluator.fluid())).sum::<f64>();
             let alone = evaluator.energy(&x, &species, &domain);
             assert!((alone - truth.energy).abs() < 1e-11 * truth.energy.abs().max(1.0));
