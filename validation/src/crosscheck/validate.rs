@@ -1,7 +1,11 @@
-use super::{Context, Part, ValidateError, conclusion, energy, equilibrium, forces, trajectory};
+use super::{
+    Context, Part, ValidateError, conclusion, energy, equilibrium, forces, mixture, observables, thermostat,
+    trajectory,
+};
 use crate::files::write_atomically;
 use crate::lammps;
 use crate::report::{Item, Progress, Report, Results, Section, Table};
+use psidpd_core::engine::Fault;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -12,6 +16,10 @@ pub struct Options {
     pub full: bool,
     /// Folder for `report.html`, `results.json` and what the runs leave.
     pub out: PathBuf,
+    /// The one comparison that is made, if not all are: for tests.
+    pub only: Option<&'static str>,
+    /// What is wrong with the native engine: for tests that checks tell of it.
+    pub fault: Option<Fault>,
 }
 
 /// What came of it.
@@ -40,8 +48,14 @@ pub fn validate(options: &Options, progress: &Progress) -> Result<Outcome, Valid
     let plugin = lammps::plugin::build(&host, &|line| progress.note(line))?;
     lammps::plugin::check(&host, &plugin)?;
     spinner.finish();
-    let context =
-        Context { host: &host, plugin: &plugin, work: out.join("runs"), full: options.full, progress };
+    let context = Context {
+        host: &host,
+        plugin: &plugin,
+        work: out.join("runs"),
+        full: options.full,
+        progress,
+        fault: options.fault,
+    };
 
     let mut results = Results::new("psidpd cross-code validation", env!("CARGO_PKG_VERSION"));
     let facts = [
@@ -51,16 +65,27 @@ pub fn validate(options: &Options, progress: &Progress) -> Result<Outcome, Valid
         ("machine", machine()),
     ];
     results.facts = facts.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect();
-    results.seeds = vec![forces::SEED, energy::SEED, equilibrium::SEED, trajectory::SEED];
+    results.seeds = vec![
+        forces::SEED,
+        energy::SEED,
+        equilibrium::SEED,
+        trajectory::SEED,
+        thermostat::SEED,
+        mixture::SEED,
+        observables::SEED,
+    ];
     let mut sections = Vec::new();
     type Run = fn(&Context) -> Result<Part, ValidateError>;
-    let parts: [(&str, Run); 4] = [
+    let parts: [(&str, Run); 7] = [
         ("forces", forces::run),
+        ("thermostat", thermostat::run),
+        ("mixture", mixture::run),
+        ("observables", observables::run),
         ("trajectories", trajectory::run),
         ("energy", energy::run),
         ("equilibrium", equilibrium::run),
     ];
-    for (name, run) in parts {
+    for (name, run) in parts.into_iter().filter(|(name, _)| options.only.is_none_or(|only| only == *name)) {
         let spinner = progress.spinner(name);
         let part = run(&context)?;
         spinner.finish();
