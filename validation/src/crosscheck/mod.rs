@@ -93,7 +93,9 @@ mod tests {
         let failed = |fault: Option<Fault>| -> Vec<String> {
             let (work, plugin) = (folder.path().to_owned(), Path::new(""));
             let context = Context { host: &host, plugin, work, full: false, progress: &progress, fault };
-            let parts = [thermostat::run(&context).unwrap(), mixture::run(&context).unwrap()];
+            let mut parts = vec![thermostat::run(&context).unwrap(), mixture::run(&context).unwrap()];
+            // Configurations of LAMMPS alone.
+            parts.extend(fault.is_none().then(|| observables::run(&context).unwrap()));
             let checks = parts.into_iter().flat_map(|part| part.checks);
             checks.filter(|check| !check.passed).map(|check| check.id).collect()
         };
