@@ -138,20 +138,26 @@ fn theory_says_where_it_fails_and_measures() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     let set6 = model("warren2003-set6.toml");
-    let run = ["theory", &set6, "--measure", "--steps", "800", "--report", "t.html"];
+    let run = ["theory", &set6, "--measure", "--steps", "3200", "--report", "t.html"];
     let found = json(here, &run, 0);
     assert!(found["binodal"]["liquid"].as_f64().unwrap() < 2.5, "{found}");
     let expected = found["correlated"]["liquid"].as_f64().unwrap();
-    assert!((expected - 6.05).abs() < 0.6, "{found}");
+    // By another quadrature of the same approximation, with g(r) in the integrals of the virial.
+    assert!((expected - 6.458).abs() < 0.002, "{found}");
     let doubts = found["doubts"].to_string();
     for part in ["mean field is off here", "expected near 6.4", "square-gradient coefficient is negative"] {
         assert!(doubts.contains(part), "{part}: {doubts}");
     }
     assert_eq!(found["published"]["tension"][0], 7.45);
     let values = found["measured"][0]["values"].as_array().unwrap();
-    let value = |name: &str| values.iter().find(|v| v["name"] == name).and_then(|v| v["value"].as_f64());
-    assert!((value("liquid").unwrap() - 6.05).abs() < 0.4, "{found}");
-    assert!(value("tension").is_some_and(|t| t > 2.0), "{found}");
+    // Warren's, four of his errors and ours: one run in 10⁴ is farther off by chance; the seed is fixed.
+    for (name, (published, its_error), most) in
+        [("liquid", (6.05, 0.01), 0.02), ("tension", (7.45, 0.04), 1.0)]
+    {
+        let found = values.iter().find(|v| v["name"] == name).unwrap_or_else(|| panic!("{found}"));
+        let [value, error] = ["value", "error"].map(|key| found[key].as_f64().unwrap());
+        assert!(error < most && (value - published).abs() < 4.0 * f64::hypot(error, its_error), "{found}");
+    }
     let page = std::fs::read_to_string(here.join("t.html")).unwrap();
     for part in ["Phase diagram", "binodal", "Where mean field fails", "with correlations"] {
         assert!(page.contains(part), "{part}");

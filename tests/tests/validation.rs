@@ -13,7 +13,7 @@ fn the_quick_validation_passes() {
     let results: serde_json::Value = serde_json::from_str(&text).unwrap();
     assert_eq!(results["passed"], true);
     let checks = results["checks"].as_array().unwrap();
-    for section in ["forces", "trajectory", "energy", "equilibrium"] {
+    for section in ["forces", "thermostat", "mixture", "observables", "trajectory", "energy", "equilibrium"] {
         assert!(checks.iter().any(|c| c["section"] == section), "no check of {section}");
     }
     let page = std::fs::read_to_string(folder.path().join("report/report.html")).unwrap();

@@ -1,4 +1,5 @@
 use super::{Failure, write_json};
+use psidpd_core::engine::Fault;
 use psidpd_experiments::hardcases::{self, Extent};
 use psidpd_report::Progress;
 use std::path::Path;
@@ -20,6 +21,9 @@ pub struct Arguments {
     /// Only cases, or groups of them, with these words in their names.
     #[arg(long, value_name = "WORDS")]
     only: Option<String>,
+    /// What is wrong with the engine, in tests.
+    #[arg(skip)]
+    pub(super) fault: Option<Fault>,
 }
 
 pub fn run(a: &Arguments, json: Option<&Path>) -> Result<super::Verdict, Failure> {
@@ -28,7 +32,7 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<super::Verdict, Failure
         (_, true) => Extent::Full,
         _ => Extent::All,
     };
-    let found = hardcases::run(extent, a.lammps, a.only.as_deref(), &Progress::new())?;
+    let found = hardcases::run(extent, a.lammps, a.only.as_deref(), a.fault, &Progress::new())?;
     println!("{}", hardcases::table(&found).to_text());
     let wrong: Vec<_> = found.iter().filter(|v| v.wrong.is_some()).collect();
     for v in &wrong {

@@ -236,3 +236,36 @@ fn write_json(json: Option<&Path>, value: &impl Serialize) -> Result<(), Failure
     text.push('\n');
     psidpd_formats::files::write_atomically(path, text.as_bytes()).map_err(Failure::from)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use psidpd_core::engine::Fault;
+
+    /// The exit code of a command line, with an engine of which a term is 5 % too strong if there is a fault.
+    fn exit_code(line: &str, fault: Option<Fault>) -> u8 {
+        let mut arguments = Arguments::try_parse_from(line.split(' ')).unwrap();
+        match &mut arguments.verb {
+            Verb::Validate(a) => (a.only, a.fault) = (Some("trajectories"), fault),
+            Verb::Hardcases(a) => a.fault = fault,
+            Verb::Reproduce(a) => a.fault = fault,
+            other => panic!("{other:?} has no engine to be wrong"),
+        }
+        carry_out(arguments)
+    }
+
+    /// What compares and judges exits with 1 for an engine that is wrong, and else with 0.
+    #[test]
+    fn a_wrong_engine_is_an_exit_code_of_1() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().display();
+        for (line, fault) in [
+            (format!("psidpd validate --out {out}"), Fault::PairForce),
+            ("psidpd hardcases --quick --only cancel".to_owned(), Fault::PairForce),
+            (format!("psidpd reproduce berendsen-water --out {out}"), Fault::PairForce),
+        ] {
+            assert_eq!(exit_code(&line, None), 0, "{line}");
+            assert_eq!(exit_code(&line, Some(fault)), 1, "{line}");
+        }
+    }
+}

@@ -1,4 +1,5 @@
 use super::{Failure, Verdict, write_json};
+use psidpd_core::engine::Fault;
 use psidpd_experiments::papers::{Case, Compared, Context, Outcome, PaperError, Size, cases};
 use psidpd_formats::files::write_atomically;
 use psidpd_report::Table;
@@ -28,6 +29,9 @@ pub struct Arguments {
     /// Threads of each run.
     #[arg(long, value_name = "N", default_value = "1")]
     threads: NonZeroUsize,
+    /// What is wrong with the engine, in tests.
+    #[arg(skip)]
+    pub(super) fault: Option<Fault>,
 }
 
 /// No case has this name.
@@ -57,7 +61,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
             folder: folder.clone(),
             threads: arguments.threads,
             made: std::rc::Rc::clone(&made),
-            fault: None,
+            fault: arguments.fault,
         };
         let begun = std::time::Instant::now();
         let result = match case.run(&context) {
@@ -121,10 +125,11 @@ fn show(outcome: &Outcome) {
             Rule::AtLeast => "≥ ",
             Rule::AtMost => "≤ ",
         };
+        let own = if v.own { " (own)" } else { "" };
         table.push([
             v.name.clone(),
             format!("{:.5} ± {:.5}", v.measured.value, v.measured.error),
-            format!("{sign}{:.5} ± {:.5}", v.published.value, v.published.error),
+            format!("{sign}{:.5} ± {:.5}{own}", v.published.value, v.published.error),
             format!("{:+.2}", v.deviation()),
             match (v.passes(), v.is_vague()) {
                 (true, _) => "pass",

@@ -1,4 +1,5 @@
 use super::{Failure, Verdict, write_json};
+use psidpd_core::engine::Fault;
 use psidpd_experiments::crosscheck::{Options, check_table, validate};
 use psidpd_report::Progress;
 use std::path::{Path, PathBuf};
@@ -12,11 +13,18 @@ pub struct Arguments {
     /// Folder for report.html, results.json and the runs.
     #[arg(long, value_name = "DIR", default_value = "target/validate")]
     out: PathBuf,
+    /// The one comparison that is made, in tests.
+    #[arg(skip)]
+    pub(super) only: Option<&'static str>,
+    /// What is wrong with the native engine, in tests.
+    #[arg(skip)]
+    pub(super) fault: Option<Fault>,
 }
 
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     let progress = Progress::new();
-    let options = Options { full: arguments.full, out: arguments.out.clone() };
+    let Arguments { full, ref out, only, fault } = *arguments;
+    let options = Options { full, out: out.clone(), only, fault };
     let outcome = validate(&options, &progress)?;
     let results = &outcome.results;
     println!("{}", check_table(results).to_text());

@@ -10,7 +10,7 @@ use super::fluids::SET6;
 use super::{Context, ValidateError};
 use psidpd_core::engine::{PeriodicBox, Want};
 use psidpd_core::model::ForceLaw;
-use psidpd_dynamics::run::{Simulation, State};
+use psidpd_dynamics::run::State;
 use std::f64::consts::TAU;
 
 /// Points on the circle.
@@ -50,10 +50,10 @@ fn around(mut force: impl FnMut(f64) -> Result<[f64; 3], ValidateError>) -> Resu
 }
 
 /// The work in the native engine.
-pub fn native(law: ForceLaw) -> Result<Work, ValidateError> {
+pub fn native(context: &Context, law: ForceLaw) -> Result<Work, ValidateError> {
     let model = SET6.model(law, 0.0)?;
     around(|angle| {
-        let mut simulation = Simulation::new(&model, 1.0, state_at(angle)?, 1)?;
+        let mut simulation = context.simulation(&model, 1.0, &state_at(angle)?, 1)?;
         simulation.compute(Want::FORCES, None)?;
         Ok(simulation.forces()[2])
     })

@@ -110,12 +110,7 @@ impl<'a> Setup<'a> {
                 "atomic"
             }
         };
-        let mut deck = format!(
-            "units lj\natom_style {atom_style}\natom_modify map array\nnewton {}\ncomm_modify vel yes\n\
-             read_data \"{}\"\nneighbor 0.3 bin\nneigh_modify delay 0 every 1 check yes\n",
-            if self.newton { "on" } else { "off" },
-            place("start.data"),
-        );
+        let mut deck = preamble(atom_style, self.newton, &place("start.data"));
         let (b, gamma, seed) = (self.set.b, self.gamma, self.seed);
         if matches!(self.code, Code::Psi | Code::PsiMixed | Code::MdpdPsi) {
             // Writing to a String cannot fail.
@@ -159,6 +154,15 @@ impl<'a> Setup<'a> {
         deck.push_str(&pair);
         Ok(deck)
     }
+}
+
+/// The commands up to the pair style.
+pub(super) fn preamble(atom_style: &str, newton: bool, data: &str) -> String {
+    let newton = if newton { "on" } else { "off" };
+    format!(
+        "units lj\natom_style {atom_style}\natom_modify map array\nnewton {newton}\ncomm_modify vel yes\n\
+         read_data \"{data}\"\nneighbor 0.3 bin\nneigh_modify delay 0 every 1 check yes\n"
+    )
 }
 
 /// ψ as embedding function, w as density and φ as pair potential of `eam/alloy`: LAMMPS's own route to

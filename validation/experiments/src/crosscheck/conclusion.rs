@@ -112,6 +112,7 @@ pub fn what_is_compared() -> Section {
             "the pair styles of the plugin in LAMMPS: from a model file, and with mdpd's arguments.",
         ),
         ("eam/alloy", "LAMMPS's own pair style with tables of psi, w and phi from psidpd export eam."),
+        ("dpd", "LAMMPS's own pair style for standard DPD, with its own drag and noise."),
         (
             "newton on, off",
             "LAMMPS's setting: with on, a pair between two ranks is computed once and its force sent; with off, on both \

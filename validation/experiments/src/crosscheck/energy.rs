@@ -150,9 +150,9 @@ fn ends(series: &[f64]) -> [f64; 2] {
 fn add_loop(context: &Context, part: &mut Part) -> Result<(), ValidateError> {
     use ForceLaw::{Conservative, LucyLammps};
     let rows = [
-        ("native", "conservative", closed_loop::native(Conservative)?),
+        ("native", "conservative", closed_loop::native(context, Conservative)?),
         ("plugin dpd/psi", "conservative", closed_loop::lammps(context, Code::Psi, Conservative)?),
-        ("native", "Lucy", closed_loop::native(LucyLammps)?),
+        ("native", "Lucy", closed_loop::native(context, LucyLammps)?),
         ("LAMMPS mdpd", "its own", closed_loop::lammps(context, Code::BuiltIn, LucyLammps)?),
     ];
     let mut table = Table::new(["code", "law", "work around the loop", "over the integral of |F|"]);

@@ -77,7 +77,7 @@ pub fn run(
     advance: &(dyn Fn(u64) + Sync),
 ) -> Result<Trace, ValidateError> {
     match setup.code {
-        Code::Native | Code::NativeMixed => native(setup, state, length, None, advance),
+        Code::Native | Code::NativeMixed => native(setup, state, length, context.fault, advance),
         _ => lammps(context, setup, state, length, &context.work.join(name), advance),
     }
 }

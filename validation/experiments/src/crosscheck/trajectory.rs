@@ -7,7 +7,7 @@ use super::{Context, Part, ValidateError};
 use psidpd_core::engine::Want;
 use psidpd_core::maximum::largest;
 use psidpd_core::model::ForceLaw;
-use psidpd_dynamics::run::{Integrator, Simulation, State};
+use psidpd_dynamics::run::{Integrator, State};
 use psidpd_formats::dump;
 use psidpd_report::{Check, Item, Section, Table};
 use serde_json::json;
@@ -25,7 +25,7 @@ const LARGEST: f64 = 1e-10;
 pub fn run(context: &Context) -> Result<Part, ValidateError> {
     let filling = Filling { lengths: [8.0, 8.0, 12.0], thickness: 6.0, density: SET6.liquid };
     let state = equilibrated(&SET6, filling, 500, SEED)?;
-    let ours = native(&state)?;
+    let ours = native(context, &state)?;
     let mut part = Part::default();
     let mut table = Table::new(["code", "ranks", "newton", "largest distance from native"]);
     for (code, ranks, newton) in [
@@ -75,9 +75,9 @@ pub fn run(context: &Context) -> Result<Part, ValidateError> {
 }
 
 /// Positions by tag.
-fn native(state: &State) -> Result<Vec<[f64; 3]>, ValidateError> {
+fn native(context: &Context, state: &State) -> Result<Vec<[f64; 3]>, ValidateError> {
     let model = SET6.model(ForceLaw::Conservative, GAMMA)?;
-    let mut simulation = Simulation::new(&model, 1.0, state.clone(), SEED)?;
+    let mut simulation = context.simulation(&model, 1.0, state, SEED)?;
     simulation.prepare(DT, Want::FORCES)?;
     simulation.advance(STEPS, DT, Integrator::VelocityVerlet)?;
     let mut x = vec![[f64::NAN; 3]; state.len()];

@@ -1,4 +1,8 @@
-use super::{Context, Part, ValidateError, conclusion, energy, equilibrium, forces, trajectory};
+use super::{
+    Context, Part, ValidateError, conclusion, energy, equilibrium, forces, mixture, observables, thermostat,
+    trajectory,
+};
+use psidpd_core::engine::Fault;
 use psidpd_formats::files::write_atomically;
 use psidpd_report::{Item, Progress, Report, Results, Section, Table};
 use std::path::{Path, PathBuf};
@@ -11,6 +15,10 @@ pub struct Options {
     pub full: bool,
     /// Folder for `report.html`, `results.json` and what the runs leave.
     pub out: PathBuf,
+    /// The one comparison that is made, if not all are: for tests.
+    pub only: Option<&'static str>,
+    /// What is wrong with the native engine: for tests that checks tell of it.
+    pub fault: Option<Fault>,
 }
 
 /// What came of it.
@@ -39,8 +47,14 @@ pub fn validate(options: &Options, progress: &Progress) -> Result<Outcome, Valid
     let plugin = psidpd_lammps_host::plugin::build(&host, &|line| progress.note(line))?;
     psidpd_lammps_host::plugin::check(&host, &plugin)?;
     spinner.finish();
-    let context =
-        Context { host: &host, plugin: &plugin, work: out.join("runs"), full: options.full, progress };
+    let context = Context {
+        host: &host,
+        plugin: &plugin,
+        work: out.join("runs"),
+        full: options.full,
+        progress,
+        fault: options.fault,
+    };
 
     let mut results = Results::new("psidpd cross-code validation", env!("CARGO_PKG_VERSION"));
     let facts = [
@@ -50,16 +64,27 @@ pub fn validate(options: &Options, progress: &Progress) -> Result<Outcome, Valid
         ("machine", machine()),
     ];
     results.facts = facts.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect();
-    results.seeds = vec![forces::SEED, energy::SEED, equilibrium::SEED, trajectory::SEED];
+    results.seeds = vec![
+        forces::SEED,
+        energy::SEED,
+        equilibrium::SEED,
+        trajectory::SEED,
+        thermostat::SEED,
+        mixture::SEED,
+        observables::SEED,
+    ];
     let mut sections = Vec::new();
     type Run = fn(&Context) -> Result<Part, ValidateError>;
-    let parts: [(&str, Run); 4] = [
+    let parts: [(&str, Run); 7] = [
         ("forces", forces::run),
+        ("thermostat", thermostat::run),
+        ("mixture", mixture::run),
+        ("observables", observables::run),
         ("trajectories", trajectory::run),
         ("energy", energy::run),
         ("equilibrium", equilibrium::run),
     ];
-    for (name, run) in parts {
+    for (name, run) in parts.into_iter().filter(|(name, _)| options.only.is_none_or(|only| only == *name)) {
         let spinner = progress.spinner(name);
         let part = run(&context)?;
         spinner.finish();

@@ -5,7 +5,8 @@ use psidpd_dynamics::integrator::Integrator;
 /// What must happen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Must {
-    /// The run ends without a warning, with temperatures within this part of kT and the momentum that it began with.
+    /// The run ends without a warning, without momentum, and with temperatures that are within this part of kT, and four
+    /// errors, of which none is larger than this part.
     Right(f64),
     /// That, or it says what is wrong: it warns of the temperature, or stops and names the step.
     RightOrSaid(f64),
@@ -125,12 +126,16 @@ pub fn judge(must: Must, found: &Found, mixed: bool) -> Result<(), String> {
         Found::Ended { temperatures, momentum, .. } => {
             for [t, error] in temperatures {
                 let near = (t - 1.0).abs() <= part + 4.0 * error;
-                // What is no number is not near.
+                // What is no number is not near, and an error that is none is not small.
                 if !near {
                     return Err(format!("a temperature of {t:.3} ± {error:.3} kT"));
                 }
+                let tells = *error <= part;
+                if !tells {
+                    return Err(format!("a temperature of {t:.3} ± {error:.3} kT tells too little"));
+                }
             }
-            if *momentum > ROUNDING { Err(format!("momentum {momentum:.1e}")) } else { Ok(()) }
+            if *momentum <= ROUNDING { Ok(()) } else { Err(format!("momentum {momentum:.1e}")) }
         }
         other => Err(said(other)),
     };
@@ -189,13 +194,46 @@ pub fn said(found: &Found) -> String {
 mod tests {
     use super::*;
 
+    /// A temperature with an error of a thousandth.
     fn ended(t: f64, warnings: &[&str], counted: u64) -> Found {
+        measured([t, 0.001], 0.0, warnings, counted)
+    }
+
+    fn measured(temperature: [f64; 2], momentum: f64, warnings: &[&str], counted: u64) -> Found {
         Found::Ended {
-            temperatures: vec![[t, 0.001]],
-            momentum: 0.0,
+            temperatures: vec![[1.0, 0.0], temperature],
+            momentum,
             counted: [0, counted],
             warnings: warnings.iter().map(|w| (*w).to_owned()).collect(),
         }
+    }
+
+    /// Of each bound what is just within, and what is just beyond.
+    #[test]
+    fn bounds_are_where_they_are_said_to_be() {
+        let right =
+            |must, t, error, momentum| judge(must, &measured([t, error], momentum, &[], 0), true).is_ok();
+        for must in [Must::Right(0.01), Must::RightOrSaid(0.01)] {
+            // A hundredth and four thousandths.
+            for side in [1.0, -1.0] {
+                assert!(right(must, 1.0 + side * 0.0139, 0.001, 0.0), "{must:?}");
+                assert!(!right(must, 1.0 + side * 0.0141, 0.001, 0.0), "{must:?}");
+            }
+            // An error of more than a hundredth would let 5 % pass.
+            assert!(right(must, 1.0, 0.0099, 0.0) && !right(must, 1.0, 0.0101, 0.0), "{must:?}");
+            assert!(!right(must, 1.0, f64::NAN, 0.0), "{must:?}");
+            // A start that drifts.
+            assert!(right(must, 1.0, 0.001, 0.99e-5) && !right(must, 1.0, 0.001, 1.01e-5), "{must:?}");
+            assert!(!right(must, 1.0, 0.001, f64::NAN), "{must:?}");
+        }
+        let agrees = |d, mixed| judge(Must::Agrees(1e-12), &Found::Differs(d), mixed).is_ok();
+        assert!(agrees(0.99e-12, false) && !agrees(1.01e-12, false) && !agrees(f64::NAN, false));
+        assert!(agrees(1.99e-5, true) && !agrees(2.01e-5, true));
+        let kept = |energy, momentum| {
+            judge(Must::Conserves(0.1), &Found::Changed { energy, momentum }, true).is_ok()
+        };
+        assert!(kept(0.099, 0.0) && kept(-0.099, 0.99e-5));
+        assert!(!kept(0.101, 0.0) && !kept(-0.101, 0.0) && !kept(0.0, 1.01e-5) && !kept(f64::NAN, 0.0));
     }
 
     #[test]

@@ -13,12 +13,11 @@ mod singular;
 mod starts;
 mod steps;
 
-use case::{Case, Must};
-
 use crate::crosscheck::jobs::{self, Job};
+use case::{Case, Must};
 use plugin::Plugin;
 use psidpd_core::document::FileError;
-use psidpd_core::engine::Precision;
+use psidpd_core::engine::{Fault, Precision};
 use psidpd_dynamics::integrator::Integrator;
 use psidpd_dynamics::run::RunError;
 use psidpd_lammps_host::LammpsError;
@@ -117,7 +116,7 @@ fn settings(extent: Extent) -> Vec<(Integrator, Precision)> {
     found
 }
 
-/// Carries out all cases; in LAMMPS too, if `lammps` is set.
+/// Carries out all cases; in LAMMPS too, if `lammps` is set. With a `fault` the native engine is wrong on purpose.
 ///
 /// # Errors
 /// Files cannot be written or read, or LAMMPS is asked for and missing.
@@ -125,6 +124,7 @@ pub fn run(
     extent: Extent,
     lammps: bool,
     only: Option<&str>,
+    fault: Option<Fault>,
     progress: &Progress,
 ) -> Result<Vec<Verdict>, HardCasesError> {
     let folder = tempfile::tempdir().map_err(HardCasesError::io(std::env::temp_dir()))?;
@@ -140,14 +140,14 @@ pub fn run(
         }
         for (integrator, precision) in settings {
             let place = folder.path().join(format!("{k}-{}-{precision}", integrator.name()));
-            jobs.push(Box::new(move || one(case, "native", integrator, precision, &place, None)));
+            jobs.push(Box::new(move || one(case, integrator, precision, &place, Host::Native(fault))));
         }
         if let Some((plugin, must)) = plugin.as_ref().zip(Plugin::must(case)) {
             for precision in [Precision::Mixed, Precision::Double] {
                 let place = folder.path().join(format!("{k}-plugin-{precision}"));
                 let integrator = Integrator::VelocityVerlet;
-                let there = Some((plugin, must));
-                jobs.push(Box::new(move || one(case, "plugin", integrator, precision, &place, there)));
+                let there = Host::Plugin(plugin, must);
+                jobs.push(Box::new(move || one(case, integrator, precision, &place, there)));
             }
         }
     }
@@ -166,18 +166,28 @@ pub fn run(
     found
 }
 
+/// Where a case is carried out.
+enum Host<'a> {
+    /// Natively; with a fault by a wrong engine.
+    Native(Option<Fault>),
+    /// In LAMMPS, where this must happen.
+    Plugin(&'a Plugin, Must),
+}
+
 fn one(
     case: &Case,
-    host: &'static str,
     integrator: Integrator,
     precision: Precision,
     place: &Path,
-    plugin: Option<(&Plugin, Must)>,
+    host: Host,
 ) -> Result<Verdict, HardCasesError> {
     std::fs::create_dir_all(place).map_err(HardCasesError::io(place))?;
-    let (must, found) = match plugin {
-        Some((plugin, must)) => (must, plugin.carry_out(case, precision, place)?),
-        None => (case.must(integrator), native::carry_out(case, integrator, precision, place)?),
+    let (host, must, found) = match host {
+        Host::Plugin(plugin, must) => ("plugin", must, plugin.carry_out(case, precision, place)?),
+        Host::Native(fault) => {
+            let found = native::carry_out(case, integrator, precision, place, fault)?;
+            ("native", case.must(integrator), found)
+        }
     };
     let _ = std::fs::remove_dir_all(place);
     let wrong = case::judge(must, &found, precision == Precision::Mixed).err();
@@ -220,7 +230,7 @@ mod tests {
     /// What `psidpd hardcases --quick` does.
     #[test]
     fn every_case_does_what_it_must() {
-        let results = run(Extent::Quick, false, None, &Progress::new()).unwrap();
+        let results = run(Extent::Quick, false, None, None, &Progress::new()).unwrap();
         let wrong: Vec<&Verdict> = results.iter().filter(|r| r.wrong.is_some()).collect();
         assert!(wrong.is_empty(), "{}\n{wrong:#?}", table(&results).to_text_with(false));
         assert!(results.len() > 100);

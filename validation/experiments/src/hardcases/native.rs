@@ -4,7 +4,7 @@ use super::HardCasesError;
 use super::case::{Case, Found, Must, Run};
 use psidpd_core::document::FileError;
 use psidpd_core::engine::pair_sums::Evaluator;
-use psidpd_core::engine::{Precision, Settings, Want};
+use psidpd_core::engine::{Fault, Precision, Settings, Want};
 use psidpd_dynamics::integrator::Integrator;
 use psidpd_dynamics::particles::State;
 use psidpd_dynamics::run::{Begin, Outcome, RunError, Runner, Simulation};
@@ -50,7 +50,7 @@ pub fn scene(
     Ok(Scene::open(&folder.join("scene.toml")))
 }
 
-/// Carries out a case in `folder`.
+/// Carries out a case in `folder`, with a wrong engine if there is a `fault`.
 ///
 /// # Errors
 /// Files cannot be written or read.
@@ -59,24 +59,26 @@ pub fn carry_out(
     integrator: Integrator,
     precision: Precision,
     folder: &Path,
+    fault: Option<Fault>,
 ) -> Result<Found, HardCasesError> {
     let scene = match scene(&case.run, integrator, precision, folder)? {
         Ok(scene) => scene,
         Err(refusal) => return Ok(Found::Refused(refusal.to_string())),
     };
     match case.must {
-        Must::Agrees(_) => forces(&scene),
-        Must::Conserves(_) => conserved(&scene, integrator),
-        _ => go(&scene, &folder.join("out")),
+        Must::Agrees(_) => forces(&scene, fault),
+        Must::Conserves(_) => conserved(&scene, integrator, fault),
+        _ => go(&scene, &folder.join("out"), fault),
     }
 }
 
 /// Runs a scene as `psidpd run` does.
-fn go(scene: &Scene, out: &Path) -> Result<Found, HardCasesError> {
+fn go(scene: &Scene, out: &Path, fault: Option<Fault>) -> Result<Found, HardCasesError> {
     let mut runner = match Runner::begin(scene, out, Begin::Overwrite) {
         Ok(runner) => runner,
         Err(refusal) => return Ok(Found::Refused(refusal.to_string())),
     };
+    fault.map_or(Ok(()), |fault| runner.falsify(fault))?;
     let mut warnings = Vec::new();
     let never = AtomicUsize::new(0);
     // An unusual start may be hot or cold until it has settled.
@@ -105,7 +107,8 @@ fn go(scene: &Scene, out: &Path) -> Result<Found, HardCasesError> {
     };
     // Particles out of each other's reach have the velocities that they began with.
     let alone = summary.particles < FEW;
-    let temperatures = ["kinetic", "configurational"].into_iter().filter_map(of).filter(|_| !alone);
+    let kinetic = of("kinetic").unwrap_or([f64::NAN; 2]);
+    let temperatures = std::iter::once(kinetic).chain(of("configurational")).filter(|_| !alone);
     let end = DataFile::read(&out.join("final.data"))?;
     Ok(Found::Ended {
         temperatures: temperatures.collect(),
@@ -128,8 +131,8 @@ fn momentum_of(state: &State) -> f64 {
 }
 
 /// The forces at the start against those of the reference.
-fn forces(scene: &Scene) -> Result<Found, HardCasesError> {
-    let mut run = simulation(scene, scene.initial_state())?;
+fn forces(scene: &Scene, fault: Option<Fault>) -> Result<Found, HardCasesError> {
+    let mut run = simulation(scene, scene.initial_state(), fault)?;
     run.set_thermostat(false);
     run.prepare(scene.stages[0].dt, Want::FORCES)?;
     let evaluator = Evaluator::new(scene.model.at(scene.kt)?).map_err(RunError::from)?;
@@ -140,17 +143,18 @@ fn forces(scene: &Scene) -> Result<Found, HardCasesError> {
     Ok(Found::Differs(differs))
 }
 
-fn simulation(scene: &Scene, state: State) -> Result<Simulation, RunError> {
+fn simulation(scene: &Scene, state: State, fault: Option<Fault>) -> Result<Simulation, RunError> {
     let mut run = scene.simulation(state)?;
     run.set_settings(Settings { precision: scene.precision(), ..Settings::default() })?;
+    fault.map_or(Ok(()), |fault| run.falsify(fault))?;
     run.set_reordering(true);
     Ok(run)
 }
 
 /// Energy and momentum after the first stage with thermostat and the second without.
-fn conserved(scene: &Scene, integrator: Integrator) -> Result<Found, HardCasesError> {
+fn conserved(scene: &Scene, integrator: Integrator, fault: Option<Fault>) -> Result<Found, HardCasesError> {
     let stopped = |error: RunError| Ok(Found::Stopped(error.to_string()));
-    let mut run = simulation(scene, scene.initial_state())?;
+    let mut run = simulation(scene, scene.initial_state(), fault)?;
     let [settle, measure] = [0, 1].map(|k| &scene.stages[k]);
     run.prepare_for(integrator, settle.dt, Want::FORCES)?;
     if let Err(error) = run.advance(settle.steps, settle.dt, integrator) {
@@ -167,5 +171,79 @@ fn conserved(scene: &Scene, integrator: Integrator) -> Result<Found, HardCasesEr
     match made {
         Ok(()) => Ok(Found::Changed { energy: energy(&run) - before, momentum: momentum_of(&run.state()) }),
         Err(error) => stopped(error),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Extent, cases};
+    use super::*;
+    use crate::test_support::IDEAL;
+
+    /// Masses of 1 and 3: 3 and −3 cancel, and both along x are the whole of Σ m |v|; at a right angle they are 1/√2 of it.
+    #[test]
+    fn momentum_is_a_share_of_what_it_could_be() {
+        let domain = psidpd_core::engine::PeriodicBox::orthogonal([0.0; 3], [5.0; 3], [true; 3]).unwrap();
+        let state = State::at_rest(domain, vec![1.0, 3.0], vec![[1.0; 3], [2.0; 3]]);
+        let of = |light: [f64; 3], heavy: [f64; 3]| {
+            momentum_of(&State { v: vec![light, heavy], species: vec![0, 1], ..state.clone() })
+        };
+        assert_eq!(of([3.0, 0.0, 0.0], [-1.0, 0.0, 0.0]), 0.0);
+        assert_eq!(of([3.0, 0.0, 0.0], [1.0, 0.0, 0.0]), 1.0);
+        assert!((of([3.0, 0.0, 0.0], [0.0, 1.0, 0.0]) - 0.5f64.sqrt()).abs() < 1e-15);
+        assert_eq!(of([0.0; 3], [0.0; 3]), 0.0);
+    }
+
+    /// A gas that drifts at a velocity of 0.05 has its temperature, which that raises by 0.05²/3; what gives it away is the
+    /// momentum alone: of ⟨|v|⟩ = √(8/π) and the drift it is 0.031, in any frame of 192 particles within a tenth.
+    #[test]
+    fn a_gas_that_drifts_is_not_right() {
+        let part =
+            "[[part]]\nshape = \"box\"\nlow = [0.0, 0.0, 0.0]\nhigh = [4.0, 4.0, 4.0]\ndensity = 3.0\n";
+        let must = super::super::case::Must::Right(0.04);
+        let judged = |drift: &str| {
+            let run = Run {
+                model: IDEAL.into(),
+                kt: 1.0,
+                scene: format!("box = 4.0\n{part}{drift}"),
+                data: None,
+                dt: 0.02,
+                steps: [200, 2000],
+            };
+            let case = Case { group: "tests", name: "drift", run, must, exact: None };
+            let folder = tempfile::tempdir().unwrap();
+            let integrator = Integrator::VelocityVerlet;
+            let found = carry_out(&case, integrator, Precision::Double, folder.path(), None).unwrap();
+            (super::super::case::judge(must, &found, false), found)
+        };
+        let (right, found) = judged("");
+        assert_eq!(right, Ok(()), "{found:?}");
+        let (wrong, found) = judged("velocity = [0.05, 0.0, 0.0]\n");
+        assert!(wrong.unwrap_err().starts_with("momentum"), "{found:?}");
+        let Found::Ended { momentum, .. } = found else { panic!("{found:?}") };
+        assert!((momentum / 0.0313 - 1.0).abs() < 0.1, "{momentum}");
+    }
+
+    /// An engine with a fault of 5 % does not do what it must, and one without does.
+    #[test]
+    fn faults_of_the_engine_show() {
+        let named = |words: &str| {
+            let found = cases(Extent::Quick).into_iter().find(|case| case.name.contains(words));
+            found.unwrap_or_else(|| panic!("{words}"))
+        };
+        for (words, fault) in [
+            ("close pairs, pair force", Fault::PairForce),
+            ("close pairs, many-body force", Fault::ManyBodyForce),
+            ("faces, edges and corners", Fault::Noise),
+        ] {
+            let case = named(words);
+            for fault in [None, Some(fault)] {
+                let folder = tempfile::tempdir().unwrap();
+                let integrator = Integrator::VelocityVerlet;
+                let found = carry_out(&case, integrator, Precision::Double, folder.path(), fault).unwrap();
+                let judged = super::super::case::judge(case.must, &found, false);
+                assert_eq!(judged.is_err(), fault.is_some(), "{words}: {fault:?}: {found:?}");
+            }
+        }
     }
 }

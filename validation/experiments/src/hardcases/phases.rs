@@ -15,6 +15,8 @@ pub fn cases() -> Vec<Case> {
         dt,
         steps: [200, 400],
     };
+    // What separates or freezes is hot until it has.
+    let long = |run: Run| Run { steps: [1000, 800], ..run };
     let bell = SET6.replace("kernel = \"quadratic\"", "kernel = \"bell\"");
     // φ = a [A W(r, 0.8) − B W(r, 1)] attracts more than it repels, and has no thermodynamic limit.
     let collapsing = "title = \"spline\"\nspecies = [\"F\"]\n[[pair]]\nbetween = [\"F\", \"F\"]\nform = \"spline\"\n\
@@ -22,12 +24,12 @@ pub fn cases() -> Vec<Case> {
     vec![
         case(
             "a quench far below the critical point",
-            run(VAN_DER_WAALS.into(), 0.3, "box = 4.0\ndensity = 20.0\n", 0.005),
+            long(run(VAN_DER_WAALS.into(), 0.3, "box = 4.0\ndensity = 20.0\n", 0.005)),
             Must::RightOrSaid(0.1),
         ),
         case(
             "the linear kernel past freezing",
-            run(LINEAR.into(), 1.0, "box = 3.0\ndensity = 14.0\n", 0.01),
+            long(run(LINEAR.into(), 1.0, "box = 3.0\ndensity = 14.0\n", 0.01)),
             Must::RightOrSaid(0.06),
         ),
         case(

@@ -31,7 +31,7 @@ pub fn cases() -> Vec<Case> {
                  density = 12.0\nvelocity = [0.0, 0.0, 8.0]\n[[part]]\nshape = \"sphere\"\nradius = 1.8\n\
                  center = [3.5, 3.5, 9.0]\ndensity = 12.0\nvelocity = [0.0, 0.0, -8.0]\n";
     let collision =
-        Run { model: SPLINE.into(), kt: 0.5, scene: drops.into(), data: None, dt: 0.005, steps: [600, 400] };
+        Run { model: SPLINE.into(), kt: 0.5, scene: drops.into(), data: None, dt: 0.005, steps: [1500, 800] };
     let cold =
         Run { kt: 0.0, scene: "box = 4.0\ndensity = 3.0\n".into(), steps: [10, 10], ..gas(IDEAL, 0.01, "") };
     let said = Must::RightOrSaid(0.06);

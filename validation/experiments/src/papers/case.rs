@@ -9,7 +9,7 @@ pub const LIMIT: f64 = 3.0;
 
 /// Largest error of a measured value, as a share of the published one, where the published error is not larger: what is
 /// vaguer would agree with anything.
-pub const VAGUE: f64 = 0.2;
+pub const VAGUE: f64 = 0.1;
 
 /// How a value is compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -30,10 +30,12 @@ pub struct Compared {
     pub name: String,
     /// What was measured.
     pub measured: Measured,
-    /// What is published, or follows from it.
+    /// What is published, or follows from it; or is our own.
     pub published: Measured,
     /// How they are compared.
     pub rule: Rule,
+    /// Whether what it is compared with is not published: another run of this program, or its mean field.
+    pub own: bool,
     /// A known difference, one standard deviation of it, and its reason.
     pub allowance: Option<(f64, &'static str)>,
 }
@@ -76,6 +78,7 @@ impl Compared {
             "measured": pair(self.measured),
             "published": pair(self.published),
             "rule": self.rule,
+            "own": self.own,
             "allowance": self.allowance.map(|(size, why)| json!({ "size": size, "why": why })),
             "deviation": self.deviation(),
             "pass": self.passes(),
@@ -103,6 +106,12 @@ impl Outcome {
         self.add(name, measured, Rule::Equal, value, error);
     }
 
+    /// Adds a value that is to equal another of this program: that of a run, or of its mean field.
+    pub fn own(&mut self, name: impl Into<String>, measured: Measured, own: Measured) {
+        self.equal(name, measured, own.value, own.error);
+        self.values.iter_mut().last().into_iter().for_each(|value| value.own = true);
+    }
+
     /// Adds a value that is to be `value` or more.
     pub fn at_least(&mut self, name: impl Into<String>, measured: Measured, value: f64) {
         self.add(name, measured, Rule::AtLeast, value, 0.0);
@@ -115,7 +124,14 @@ impl Outcome {
 
     fn add(&mut self, name: impl Into<String>, measured: Measured, rule: Rule, value: f64, error: f64) {
         let published = Measured { value, error };
-        self.values.push(Compared { name: name.into(), measured, published, rule, allowance: None });
+        self.values.push(Compared {
+            name: name.into(),
+            measured,
+            published,
+            rule,
+            own: false,
+            allowance: None,
+        });
     }
 
     /// Adds a plot of measured points beside a published line.
@@ -207,7 +223,30 @@ mod tests {
     fn compared(rule: Rule, value: f64) -> Compared {
         let measured = Measured { value, error: 0.3 };
         let published = Measured { value: 10.0, error: 0.4 };
-        Compared { name: "x".into(), measured, published, rule, allowance: None }
+        Compared { name: "x".into(), measured, published, rule, own: false, allowance: None }
+    }
+
+    /// Three errors of more than a tenth would let a value pass that is 30 % off. Where the published error is larger than
+    /// that, its own may be as large.
+    #[test]
+    fn an_error_of_more_than_a_tenth_is_too_vague() {
+        let of = |error: f64, published_error: f64| Compared {
+            measured: Measured { value: 10.0, error },
+            published: Measured { value: 10.0, error: published_error },
+            ..compared(Rule::Equal, 0.0)
+        };
+        assert!(of(0.99, 0.4).passes() && !of(1.01, 0.4).passes());
+        assert!(of(1.99, 2.0).passes() && !of(2.01, 2.0).passes());
+    }
+
+    #[test]
+    fn what_is_our_own_says_so() {
+        let mut outcome = Outcome::default();
+        outcome.equal("x", exact(1.0), 1.0, 0.1);
+        outcome.own("y", exact(1.0), Measured { value: 2.0, error: 0.1 });
+        let own: Vec<Value> = outcome.values.iter().map(|v| v.to_json()["own"].clone()).collect();
+        assert_eq!(own, [false, true]);
+        assert!(outcome.values[0].passes() && !outcome.values[1].passes());
     }
 
     #[test]

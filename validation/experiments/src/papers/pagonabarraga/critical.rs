@@ -73,13 +73,6 @@ pub fn fig2(_: &Context) -> Result<Outcome, PaperError> {
             outcome.equal(format!("kT b/a without pressure {of}"), exact(p), pressure(x), 1e-6);
             outcome.equal(format!("kT b/a without tension {of}"), exact(t), tension(x), 1e-6);
         }
-        // Stable fluids with a tension are between the lines, which cross where (1 − x)(1 + 2αx) = x(1 + αx).
-        let crossing = root(0.01, 0.99, |x| Ok(pressure(x) - tension(x)))?;
-        outcome.at_least(
-            format!("b rho up to which there is a tension, alpha_3 = {alpha}, over the critical one"),
-            exact(crossing / critical(alpha)[0]),
-            1.0,
-        );
         let names = if alpha == 0.0 {
             ["p = 0, alpha_3 = 0", "no tension, alpha_3 = 0"]
         } else {

@@ -59,7 +59,11 @@ pub const CASES: &[Case] = &[
         slab::fig7,
     ),
     case("pagonabarraga-fig8", "slab: densities of gas and liquid, and their profile", slab::fig8),
-    case("pagonabarraga-fig9", "slab: difference of the pressures, tension by three routes", slab::fig9),
+    case(
+        "pagonabarraga-fig9",
+        "slab: profile of the difference of the pressures, tension by two routes",
+        slab::fig9,
+    ),
     case(
         "pagonabarraga-fig10",
         "binary mixture at half of T_c: temperature and displacements of both species",

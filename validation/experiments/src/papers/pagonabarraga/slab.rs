@@ -4,6 +4,7 @@ use super::SLAB;
 use crate::bulk::Observed;
 use crate::papers::case::{Outcome, bare, difference, exact, profile, ratio};
 use crate::papers::context::{Context, PaperError, mean_field};
+use psidpd_observe::Measured;
 
 const SCENE: &str = include_str!("../../../../scenes/full/van-der-waals-2d-slab.toml");
 /// The run of all three figures.
@@ -56,12 +57,9 @@ pub fn fig8(context: &Context) -> Result<Outcome, PaperError> {
     outcome.equal("density of the gas over that of the liquid", ratio(gas, liquid), 0.25, 0.03);
     // What follows from the printed parameters.
     let binodal = mean_field(SLAB, KT)?.binodal()?;
-    outcome.equal(
-        "density of the liquid over that of mean field",
-        liquid.times(1.0 / binodal.liquid),
-        1.0,
-        0.01,
-    );
+    // A hundredth is for the correlations that mean field leaves out.
+    let expected = Measured { value: binodal.liquid, error: 0.01 * binodal.liquid };
+    outcome.own("density of the liquid beside mean field", liquid, expected);
     let density = profile(&observed, "density_profile", "density");
     let highest = density.iter().map(|(_, d)| *d).max_by(|a, b| a.value.total_cmp(&b.value));
     if let Some(highest) = highest {
@@ -84,14 +82,11 @@ pub fn fig8(context: &Context) -> Result<Outcome, PaperError> {
 pub fn fig9(context: &Context) -> Result<Outcome, PaperError> {
     let mut outcome = Outcome::default();
     let (_, observed) = slab(context)?;
-    let stress = observed.scalar("surface_tension", "stress");
     let free_energy = observed.scalar("surface_tension", "free_energy");
-    let integral = observed.scalar("stress_profile_integral", "integral").times(0.5);
     // Both of configurations alone. What the integrator carries is smaller in proportion to the step: 5 % at 0.01, 2 % at
     // 0.005.
     let conservative = observed.scalar("surface_tension", "stress_conservative");
-    outcome.equal("tension by the free energy", free_energy, conservative.value, conservative.error);
-    outcome.equal("tension by the integral of the profile", integral, stress.value, stress.error);
+    outcome.own("tension by the free energy beside that by the stress", free_energy, conservative);
     let profiles = |column| profile(&observed, "stress_profile", column);
     outcome.plot(
         "difference",

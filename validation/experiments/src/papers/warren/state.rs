@@ -8,8 +8,8 @@ use psidpd_observe::Measured;
 pub fn table1(context: &Context) -> Result<Outcome, PaperError> {
     let mut outcome = Outcome::default();
     let mut points = Vec::new();
-    let printed: [(f64, f64, f64); 4] =
-        [(0.65, 4.1, 0.1), (0.75, 3.07, 0.05), (0.85, 2.08, 0.05), (1.0, 1.29, 0.05)];
+    let printed: [(f64, f64, f64); 5] =
+        [(0.5, 4.0, 0.5), (0.65, 4.1, 0.1), (0.75, 3.07, 0.05), (0.85, 2.08, 0.05), (1.0, 1.29, 0.05)];
     // In the middle of the paper's ranges, A = 0–50 and B r_d⁴ = 0–10, and over its densities.
     let (a, many) = (25.0, 5.0);
     for (rd, value, error) in printed {
@@ -38,7 +38,8 @@ pub fn table1(context: &Context) -> Result<Outcome, PaperError> {
         points.push((rd, c));
     }
     let mut same = Vec::new();
-    for (rd, value, error) in [printed[0], printed[1], printed[3]] {
+    // At r_d = 0.5 no run is within 10 % of kT.
+    for (rd, value, error) in [printed[1], printed[2], printed[4]] {
         let (c, kept, all) = by_protocol(context, rd)?;
         outcome.equal(
             format!("c at r_d = {rd}, step 0.05, {kept} of {all} runs within 10 % of kT"),
@@ -161,7 +162,7 @@ pub fn fig1(context: &Context) -> Result<Outcome, PaperError> {
 }
 
 /// Eq. (18) and its error from those of α, c and d.
-pub fn eq18(a: f64, b: f64, rho: f64) -> Measured {
+fn eq18(a: f64, b: f64, rho: f64) -> Measured {
     let rd4 = 0.75f64.powi(4);
     let p = |alpha: f64, c: f64, d: f64| {
         rho + alpha * a * rho * rho + 2.0 * alpha * b * rd4 * (rho.powi(3) - c * rho * rho + d)
@@ -199,4 +200,21 @@ pub fn fig2(context: &Context) -> Result<Outcome, PaperError> {
         );
     }
     Ok(outcome)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By hand for set 6 at density 6: 2αBr_d⁴ = 1.59785, ρ³ − cρ² + d = 84.24, αAρ² = −145.44; the error of d alone
+    /// is 1.59785, those of c and α are 0.02 · 36 · 1.59785 and 0.001 (−1440 + 1332.7).
+    #[test]
+    fn eq_18_is_as_printed() {
+        let p = eq18(-40.0, 25.0, 6.0);
+        assert!((p.value - (6.0 - 145.44 + 134.6033)).abs() < 1e-3, "{p:?}");
+        assert!(
+            (p.error - (1.59785f64.powi(2) + 1.15045f64.powi(2) + 0.1073f64.powi(2)).sqrt()).abs() < 1e-3,
+            "{p:?}"
+        );
+    }
 }

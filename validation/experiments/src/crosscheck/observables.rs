@@ -1,0 +1,166 @@
+//! Distances and displacements: LAMMPS's `compute rdf` and `compute msd` beside `rdf` and `msd` of the same configurations.
+
+use super::codes::preamble;
+use super::{Context, Part, ValidateError};
+use psidpd_core::engine::Pool;
+use psidpd_dynamics::run::State;
+use psidpd_dynamics::scene::Scene;
+use psidpd_formats::dump;
+use psidpd_observe::frame::View;
+use psidpd_observe::{Observation, Observers};
+use psidpd_report::{Check, Item, Section, Table};
+use serde_json::json;
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Seed of velocities and noise.
+pub const SEED: u64 = 19_640_612;
+
+/// Steps between configurations.
+const EVERY: u64 = 10;
+/// Configurations after the first.
+const FRAMES: u64 = 40;
+const DT: f64 = 0.02;
+/// Of g(r).
+const RANGE: f64 = 2.0;
+const BINS: usize = 40;
+/// Largest relative difference. A pair that is counted in another shell makes 10⁻⁵.
+const LARGEST: f64 = 1e-9;
+
+/// Runs the comparison.
+pub fn run(context: &Context) -> Result<Part, ValidateError> {
+    let folder = context.work.join("observables");
+    std::fs::create_dir_all(&folder).map_err(ValidateError::io(&folder))?;
+    let scene = scene(&folder)?;
+    let state = scene.initial_state();
+    let [g, msd] = by_lammps(context, &state, &folder)?;
+    let observed = by_us(&scene, &state, &folder.join("frames.txt"))?;
+    let ours = |name: &str, column: &str| -> Vec<f64> {
+        let found = observed.iter().find(|o| o.name == name).and_then(|o| o.get(column));
+        found.map_or_else(Vec::new, |column| column.values.clone())
+    };
+    let mut part = Part::default();
+    let mut table = Table::new(["", "numbers", "largest of LAMMPS", "largest difference, relative"]);
+    for (name, label, ours, theirs) in
+        [("rdf", "compute rdf", ours("rdf", "g"), g), ("msd", "compute msd", ours("msd", "msd"), msd)]
+    {
+        let scale = theirs.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        let apart = psidpd_core::maximum::largest(ours.iter().zip(&theirs).map(|(a, b)| (a - b).abs()));
+        let apart = if ours.len() == theirs.len() && scale > 0.0 { apart / scale } else { f64::NAN };
+        table.push([
+            format!("{name}, {label}"),
+            theirs.len().to_string(),
+            format!("{scale:.4}"),
+            format!("{apart:.1e}"),
+        ]);
+        part.checks.push(Check::at_most(
+            format!("observables.{name}"),
+            "observables",
+            format!("{name} against LAMMPS's {label} of the same configurations, relative"),
+            apart,
+            LARGEST,
+        ));
+        part.values.push((format!("observables.{name}"), json!({"largest": scale, "difference": apart})));
+    }
+    part.section = Section {
+        heading: "Distances and displacements of the same configurations".into(),
+        items: vec![
+            Item::Prose(format!(
+                "LAMMPS runs {} particles of its own dpd, and dumps a configuration every {EVERY} steps: g(r) is the mean \
+                 over {} of them, in {BINS} shells up to {RANGE}, the displacements are those from the first.",
+                state.len(),
+                FRAMES + 1
+            )),
+            Item::Table(table),
+        ],
+    };
+    Ok(part)
+}
+
+/// The fluid, its start, and the observables.
+fn scene(folder: &Path) -> Result<Scene, ValidateError> {
+    let model = folder.join("model.toml");
+    std::fs::write(&model, include_str!("../../../models/standard-dpd.toml"))
+        .map_err(ValidateError::io(&model))?;
+    let text = format!(
+        "title = \"distances and displacements\"\nmodel = \"model.toml\"\nkT = 1.0\nseed = {SEED}\nbox = [5.0, 6.0, 7.0]\n\
+         density = 3.0\ndt = {DT}\nsteps = {steps}\n[observe]\nevery = {EVERY}\n\
+         rdf = {{ range = {RANGE:?}, bins = {BINS} }}\nmsd = {{ length = {FRAMES}, spacing = 100 }}\n",
+        steps = EVERY * (FRAMES + 1),
+    );
+    Ok(Scene::parse("scene.toml", &text, folder)?)
+}
+
+/// A table that LAMMPS wrote: without comments, and words that are no numbers.
+fn rows(path: &PathBuf) -> Result<Vec<Vec<f64>>, ValidateError> {
+    let text = std::fs::read_to_string(path).map_err(ValidateError::io(path))?;
+    let row = |line: &str| line.split_whitespace().filter_map(|w| w.parse().ok()).collect();
+    Ok(text.lines().filter(|l| !l.starts_with('#')).map(row).collect())
+}
+
+/// g of every shell, and the mean-square displacement of every configuration after the first.
+fn by_lammps(context: &Context, state: &State, folder: &Path) -> Result<[Vec<f64>; 2], ValidateError> {
+    state.to_data_by_tag("psidpd").write(&folder.join("start.data"))?;
+    let last = EVERY * (FRAMES + 1);
+    let deck = format!(
+        "{}pair_style dpd 1.0 1.0 {SEED}\npair_coeff 1 1 25.0 4.5\ncomm_modify cutoff {:?}\nfix move all nve\n\
+         timestep {DT}\nthermo 1000\nrun 200\nreset_timestep {EVERY}\ncompute g all rdf {BINS} cutoff {RANGE}\n\
+         fix g all ave/time {EVERY} {} {last} c_g[2] mode vector file rdf.txt format \" %.16g\"\ncompute m all msd\n\
+         fix m all ave/time {EVERY} 1 {EVERY} c_m[4] file msd.txt format \" %.16g\"\n\
+         dump frames all custom {EVERY} frames.txt id x y z ix iy iz\n\
+         dump_modify frames sort id format float %.17g\nrun {}\n",
+        preamble("atomic", true, "start.data"),
+        RANGE + 0.5,
+        FRAMES + 1,
+        EVERY * FRAMES,
+    );
+    let script = folder.join("in.lammps");
+    std::fs::write(&script, deck).map_err(ValidateError::io(&script))?;
+    context.host.run_script(1, folder, &script, &["-log", "log.lammps"], Duration::from_secs(300))?;
+    let [g, msd] = ["rdf.txt", "msd.txt"].map(|name| folder.join(name));
+    // A line with the step and the number of shells, and for each shell its number and g.
+    let shells = rows(&g)?.iter().skip(1).filter_map(|row| row.get(1).copied()).collect();
+    // Displacements of the first configuration from itself are none.
+    let squares = rows(&msd)?.iter().skip(1).filter_map(|row| row.get(1).copied()).collect();
+    Ok([shells, squares])
+}
+
+/// What the observables make of the configurations of a dump.
+fn by_us(scene: &Scene, state: &State, path: &Path) -> Result<Vec<Observation>, ValidateError> {
+    let missing =
+        || ValidateError::Output { path: path.into(), problem: "it has no columns of positions".into() };
+    let stage = scene.stages.last().map_or("", |stage| stage.name.as_str());
+    let mut observers = Observers::new(&scene.observe, [stage]);
+    let pool = Pool::new(NonZeroUsize::MIN);
+    for (k, frame) in dump::read(path)?.iter().enumerate() {
+        let x = frame.vectors(["x", "y", "z"]).ok_or_else(missing)?;
+        let images = frame.vectors(["ix", "iy", "iz"]).ok_or_else(missing)?;
+        let images: Vec<[i32; 3]> = images.iter().map(|i| i.map(|c| c as i32)).collect();
+        let tags: Vec<i32> = frame.get("id").ok_or_else(missing)?.iter().map(|id| *id as i32).collect();
+        let (v, species) = (vec![[0.0; 3]; x.len()], vec![0; x.len()]);
+        let view = View {
+            pool: &pool,
+            step: (k as u64 + 1) * EVERY,
+            time: k as f64 * EVERY as f64 * DT,
+            kt: scene.kt,
+            model: &scene.model,
+            dimensions: 3,
+            domain: &state.domain,
+            masses: &state.mass,
+            x: &x,
+            v: &v,
+            images: &images,
+            species: &species,
+            tags: &tags,
+            frozen: &[],
+            temperature: 0.0,
+            kinetic_energy: 0.0,
+            pressure: [0.0; 6],
+            conservative_pressure: [0.0; 6],
+            flux: None,
+        };
+        observers.sample(view, stage);
+    }
+    Ok(observers.finish())
+}

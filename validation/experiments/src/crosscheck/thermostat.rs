@@ -1,0 +1,203 @@
+//! Pair force, drag and noise against LAMMPS's own `dpd`, which shares no code with psidpd.
+
+use super::codes::preamble;
+use super::fluids::SET6;
+use super::forces::{open_deck, point, point_of};
+use super::start::{Filling, equilibrated};
+use super::{Context, Part, ValidateError};
+use psidpd_core::engine::{PeriodicBox, Step, Want};
+use psidpd_core::model::Model;
+use psidpd_dynamics::run::{RunError, State};
+use psidpd_observe::{Measured, threshold};
+use psidpd_report::quantity::with_error;
+use psidpd_report::{Check, Item, Section, Table};
+use serde_json::json;
+
+/// Seed of positions, velocities and noise.
+pub const SEED: u64 = 19_970_915;
+
+/// Largest relative difference of forces, energy and virial.
+const ROUNDING: f64 = 1e-12;
+/// kT of the drag alone: noise of σ² = 2γkT is far below its rounding.
+const COLD: f64 = 1e-40;
+const DT: f64 = 0.01;
+
+/// Pairs along each edge of the lattice of pairs, which are out of each other's reach.
+const PAIRS: usize = 12;
+const APART: f64 = 2.5;
+/// Distances of the two of a pair.
+const DISTANCES: [f64; 3] = [0.2, 0.5, 0.8];
+/// How often the noise of every pair is drawn.
+const DRAWS: u64 = 60;
+/// γ, kT and Δt of the noise.
+const SETTINGS: [[f64; 3]; 2] = [[4.5, 1.0, 0.01], [18.0, 0.5, 0.04]];
+/// Chance that any comparison of variances fails although nothing is wrong.
+const FALSE_ALARM: f64 = 1e-3;
+/// Largest error of a ratio of variances: noise that is 5 % too strong makes it 1.1.
+const VAGUE: f64 = 0.02;
+
+/// A fluid of LAMMPS's `dpd`.
+fn model(strength: f64, gamma: f64) -> Result<Model, ValidateError> {
+    let pair = format!(
+        "[[pair]]\nbetween = [\"F\", \"F\"]\nform = \"soft\"\nstrength = {strength:?}\nrange = 1.0\n"
+    );
+    let thermostat = format!("[[thermostat]]\ngamma = {gamma:?}\nrange = 1.0\n");
+    let text = format!(
+        "title = \"dpd\"\nspecies = [\"F\"]\n{}{}",
+        if strength == 0.0 { "" } else { &pair },
+        if gamma == 0.0 { "" } else { &thermostat }
+    );
+    Ok(Model::parse("dpd", &text)?)
+}
+
+/// The commands for it with these particles.
+fn deck(
+    context: &Context,
+    state: &State,
+    [strength, gamma, kt]: [f64; 3],
+    name: &str,
+) -> Result<String, ValidateError> {
+    let folder = context.work.join(name);
+    std::fs::create_dir_all(&folder).map_err(ValidateError::io(&folder))?;
+    let data = folder.join("start.data");
+    state.to_data("psidpd").write(&data)?;
+    let style = format!("pair_style dpd {kt:?} 1.0 {SEED}\npair_coeff 1 1 {strength:?} {gamma:?}\n");
+    Ok(preamble("atomic", true, &data.display().to_string()) + &style)
+}
+
+/// Runs the comparison.
+pub fn run(context: &Context) -> Result<Part, ValidateError> {
+    let mut part = Part::default();
+    let mut forces = Table::new(["", "force", "energy", "virial"]);
+    let filling = Filling { lengths: [6.0; 3], thickness: 6.0, density: SET6.liquid };
+    let state = equilibrated(&SET6, filling, 100, SEED)?;
+    let volume = state.domain.volume(3);
+    for (id, strength, gamma) in [("pair force", 25.0, 0.0), ("drag", 0.0, 18.0), ("both", 25.0, 4.5)] {
+        let kt = if gamma > 0.0 { COLD } else { 1.0 };
+        let theirs = deck(context, &state, [strength, gamma, 0.0], "dpd-forces")?;
+        let theirs = point(&open_deck(context, &theirs)?, volume)?;
+        let step = (gamma > 0.0).then_some(Step { seed: SEED, number: 0, dt: DT });
+        let ours = point_of(context.simulation(&model(strength, gamma)?, kt, &state, SEED)?, step)?;
+        let found = ours.against(&theirs);
+        // Drag has no energy.
+        let energy = (strength != 0.0).then_some(found.energy);
+        let shown = energy.map_or_else(|| "–".to_owned(), |e| format!("{e:.1e}"));
+        forces.push([id.to_owned(), format!("{:.1e}", found.force), shown, format!("{:.1e}", found.virial)]);
+        for (what, value) in
+            [("force", Some(found.force)), ("energy", energy), ("virial", Some(found.virial))]
+        {
+            part.checks.extend(value.map(|value| {
+                Check::at_most(
+                    format!("dpd.{}.{what}", id.replace(' ', "-")),
+                    "thermostat",
+                    format!("native, {id}: {what} against LAMMPS dpd at the same positions and velocities, relative"),
+                    value,
+                    ROUNDING,
+                )
+            }));
+        }
+    }
+    let noise = noise(context, &mut part)?;
+    part.section = Section {
+        heading: "Pair force, drag and noise of LAMMPS's dpd".into(),
+        items: vec![
+            Item::Prose(format!(
+                "{} particles of a liquid with their velocities, as a fluid of LAMMPS's own dpd: a = 25 without drag, drag \
+                 of γ = 18 at kT = 0, and both.",
+                state.len()
+            )),
+            Item::Table(forces),
+            Item::Prose(format!(
+                "Noise: {} pairs at rest and out of each other's reach, drawn {DRAWS} times by each code. The variance of \
+                 the force along a pair is 2γkT (1 − r/r_c)²/Δt; the table has it over that, so that each number should be 1. \
+                 Over all comparisons the chance of a false alarm is {FALSE_ALARM}.",
+                PAIRS.pow(3)
+            )),
+            Item::Table(noise),
+        ],
+    };
+    Ok(part)
+}
+
+/// The variances of the noise of both codes.
+fn noise(context: &Context, part: &mut Part) -> Result<Table, ValidateError> {
+    let state = pairs()?;
+    let mut table = Table::new(["γ", "kT", "Δt", "r", "native", "LAMMPS dpd"]);
+    let comparisons = 2 * SETTINGS.len() * DISTANCES.len();
+    for [gamma, kt, dt] in SETTINGS {
+        let mut simulation = context.simulation(&model(0.0, gamma)?, kt, &state, SEED)?;
+        let lammps = open_deck(context, &deck(context, &state, [0.0, gamma, kt], "dpd-noise")?)?;
+        lammps.command(&format!("timestep {dt:?}"))?;
+        let mut drawn: [[Vec<f64>; DISTANCES.len()]; 2] = Default::default();
+        for number in 0..DRAWS {
+            simulation.compute(Want::FORCES, Some(Step { seed: SEED, number, dt }))?;
+            let mut ours = vec![0.0; state.len()];
+            for (tag, force) in simulation.tags().iter().zip(simulation.forces()) {
+                ours[*tag as usize - 1] = force[0];
+            }
+            lammps.command("run 0 post no")?;
+            let theirs: Vec<f64> = lammps.gather("f", 3)?.into_iter().step_by(3).collect();
+            for (drawn, forces) in drawn.iter_mut().zip([ours, theirs]) {
+                for (pair, f) in forces.iter().step_by(2).enumerate() {
+                    let k = pair % DISTANCES.len();
+                    drawn[k].push(f * f * dt / (2.0 * gamma * kt * (1.0 - DISTANCES[k]).powi(2)));
+                }
+            }
+        }
+        for (k, r) in DISTANCES.into_iter().enumerate() {
+            let [ours, theirs] = [0, 1].map(|code: usize| independent_mean(&drawn[code][k]));
+            let error = ours.error.hypot(theirs.error);
+            let place = format!("γ = {gamma}, kT = {kt}, Δt = {dt}, r = {r}");
+            for (code, what, delta, error) in [
+                ("lammps", "that of LAMMPS dpd", ours.value - theirs.value, error),
+                ("formula", "2γkT (1 − r/r_c)²/Δt", ours.value - 1.0, ours.error),
+            ] {
+                let mut check = Check::agreement(
+                    format!("dpd.noise.{code}.{gamma}.{r}"),
+                    "thermostat",
+                    format!("native: variance of the noise against {what}, relative, at {place}"),
+                    delta,
+                    error,
+                    threshold(comparisons, FALSE_ALARM),
+                    "",
+                );
+                check.passed &= error < VAGUE;
+                part.checks.push(check);
+            }
+            part.values.push((
+                format!("dpd.noise.{gamma}.{r}"),
+                json!({"native": ours.value, "lammps": theirs.value, "error": error}),
+            ));
+            let shown = |m: Measured| with_error(m.value, Some(m.error));
+            table.push([
+                gamma.to_string(),
+                kt.to_string(),
+                dt.to_string(),
+                r.to_string(),
+                shown(ours),
+                shown(theirs),
+            ]);
+        }
+    }
+    Ok(table)
+}
+
+/// Mean of numbers that do not depend on each other.
+fn independent_mean(values: &[f64]) -> Measured {
+    let n = values.len() as f64;
+    let value = values.iter().sum::<f64>() / n;
+    let variance = values.iter().map(|x| (x - value).powi(2)).sum::<f64>() / (n - 1.0);
+    Measured { value, error: (variance / n).sqrt() }
+}
+
+/// Pairs along x at rest, with tags in turn.
+fn pairs() -> Result<State, ValidateError> {
+    let edge = PAIRS as f64 * APART;
+    let domain = PeriodicBox::orthogonal([0.0; 3], [edge; 3], [true; 3])
+        .map_err(|e| ValidateError::Run(RunError::State(e.to_string())))?;
+    let x = (0..PAIRS.pow(3)).flat_map(|k| {
+        let [x, y, z] = [k % PAIRS, k / PAIRS % PAIRS, k / PAIRS / PAIRS].map(|i| (i as f64 + 0.5) * APART);
+        [[x, y, z], [x + DISTANCES[k % DISTANCES.len()], y, z]]
+    });
+    Ok(State::at_rest(domain, vec![1.0], x.collect()))
+}
