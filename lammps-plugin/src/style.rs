@@ -7,11 +7,10 @@ use crate::units::Scale;
 use psidpd_core::engine::thermostat::PairThermostat;
 use psidpd_core::engine::{
     Around, Engine, EngineError, Newton, PairsOfHost, Particles, Path as EnginePath, PeriodicBox, Pool,
-    Precision, Reason, Request, Settings, Step, Surroundings, Tally, Want,
+    Precision, Reason, Request, Settings, Step, Surroundings, Tally, ThreadCount, Want,
 };
 use psidpd_core::model::Model;
 use std::fmt::Write;
-use std::num::NonZeroUsize;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
@@ -28,6 +27,12 @@ impl StyleError {
 
 impl From<EngineError> for StyleError {
     fn from(error: EngineError) -> StyleError {
+        StyleError(error.to_string())
+    }
+}
+
+impl From<ThreadCount> for StyleError {
+    fn from(error: ThreadCount) -> StyleError {
         StyleError(error.to_string())
     }
 }
@@ -130,11 +135,11 @@ impl Style {
     /// How forces are computed from now on: in mixed precision or in double, by so many threads.
     ///
     /// # Errors
-    /// None that [`Style::set_temperature`] did not have before.
+    /// No threads, or too many; else none that [`Style::set_temperature`] did not have before.
     pub fn configure(&mut self, mixed: bool, threads: usize) -> Result<(), StyleError> {
         guard(|| {
             let precision = if mixed { Precision::Mixed } else { Precision::Double };
-            let threads = NonZeroUsize::new(threads).unwrap_or(NonZeroUsize::MIN);
+            let threads = Pool::count(threads)?;
             if (precision, threads) == (self.settings.precision, self.settings.threads) {
                 return Ok(());
             }

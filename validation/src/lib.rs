@@ -14,6 +14,7 @@ mod integrator;
 pub mod lammps;
 mod least_squares;
 mod measure;
+mod memory;
 pub mod observe;
 mod output;
 mod papers;

@@ -184,7 +184,7 @@ fn place(options: &Options, out: &Path, progress: &Progress) -> Result<(Place, S
     let note = |line: &str| progress.note(line);
     let host = match &options.lammps {
         Some(place) => Host::at(place)?,
-        None => lammps::install(&note)?,
+        None => lammps::plugin::install_to_build(&note)?,
     };
     let version = host.version()?;
     let plugin = lammps::plugin::build(&host, &note)?;

@@ -1,3 +1,4 @@
+use super::say::{self, say};
 use super::{Failure, Verdict, write_json};
 use crate::crosscheck::{Options, check_table, validate};
 use crate::report::Progress;
@@ -19,8 +20,8 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     let options = Options { full: arguments.full, out: arguments.out.clone() };
     let outcome = validate(&options, &progress)?;
     let results = &outcome.results;
-    println!("{}", check_table(results).to_text());
-    println!(
+    say::table(&check_table(results));
+    say!(
         "\n{} passed, {} failed\nreport: {}",
         results.passed_count(),
         results.failed_count(),

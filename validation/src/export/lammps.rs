@@ -40,6 +40,8 @@ const MOST_BODY_FORCES: usize = 9;
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say it")]
 pub enum DeckError {
+    #[error(transparent)]
+    Memory(#[from] crate::memory::MemoryError),
     #[error(
         "stage \"{stage}\": integrator = \"{name}\" ({integrator}) has no counterpart in LAMMPS; a deck can have \
          velocity-verlet, groot-warren with lambda = 0.5, which is the same, and two-stage, force-gradient and aboba with \
@@ -106,6 +108,7 @@ pub fn write(scene: &Scene, out: &Path) -> Result<Vec<PathBuf>, DeckError> {
         files.push(MODEL_WITHOUT_THERMOSTAT.into());
     }
 
+    crate::memory::check(scene.initial.parts().iter().map(|part| part.count).sum())?;
     write_start(scene, &scene.initial_state(), &out.join(START))?;
     save(&out.join(SCRIPT), &script(scene))?;
     Ok(files)

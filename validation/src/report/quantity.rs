@@ -23,6 +23,22 @@ pub fn with_error(value: f64, error: Option<f64>) -> String {
     }
 }
 
+/// A number with so many decimals, or with an exponent where these would hide it: 0.250000, 1e-300.
+pub fn decimal(x: f64, places: usize) -> String {
+    let smallest = 0.5 * 10f64.powi(-(places as i32));
+    if x != 0.0 && x.is_finite() && !(smallest..1e15).contains(&x.abs()) {
+        format!("{x:.places$e}")
+    } else {
+        format!("{x:.places$}")
+    }
+}
+
+/// A number as short as it can be said, with an exponent where it is very great or very small: 0.25, 1e-300.
+pub fn number(x: f64) -> String {
+    let text = format!("{x:?}");
+    if text.contains('e') { text } else { x.to_string() }
+}
+
 fn plain(value: f64) -> String {
     if value == 0.0 {
         return "0".into();

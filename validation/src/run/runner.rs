@@ -1,7 +1,7 @@
 use super::advice::Advice;
 use super::error::RunError;
 use super::folder::Folder;
-use super::output::Output;
+use super::output::{Output, replaces};
 use super::simulation::Simulation;
 use super::summary::Summary;
 use super::timing::Timing;
@@ -10,10 +10,11 @@ use super::watch::Deviation;
 use crate::checkpoint::{
     Checkpoint, CheckpointError, Found, Identity, Position, Store, Sums, Thermo, Written,
 };
+use crate::memory;
 use crate::observe::Observers;
 use crate::output::About;
 use crate::particles::State;
-use crate::scene::Scene;
+use crate::scene::{Initial, Scene};
 use psidpd_core::engine::{Fault, Settings};
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
@@ -63,6 +64,8 @@ pub enum Start {
         /// The version of the program that wrote it, if that is another one: the steps that follow need not
         /// be to the last bit those that it would have made.
         program: Option<String>,
+        /// The instruction set that it was computed with, if that is another one: the same holds.
+        instructions: Option<String>,
         /// What is wrong with the newest checkpoint, if it is the one before.
         fallback: Option<CheckpointError>,
     },
@@ -143,11 +146,19 @@ impl<'a> Runner<'a> {
         if begin == Begin::New {
             refuse_other_runs(&store, &identity, out)?;
         }
+        if let Initial::File { path, .. } = &scene.initial
+            && replaces(out, path)
+        {
+            return Err(RunError::OwnInput { path: path.clone() });
+        }
+        let particles = scene.initial.parts().iter().map(|part| part.count).sum();
+        memory::check(particles)?;
         let state = scene.initial_state();
         let simulation = simulation(scene, state.clone())?;
         store.clear()?;
         let good = Checkpoint {
             program: PROGRAM.into(),
+            instructions: simulation.settings().instructions.to_string(),
             identity,
             finished: false,
             step: 0,
@@ -174,6 +185,7 @@ impl<'a> Runner<'a> {
         if let Some(stage) = scene.stages.get(good.position.stage) {
             scene.enter(stage, &mut simulation)?;
         }
+        let instructions = simulation.settings().instructions.to_string();
         simulation.restore(good.step, &good.state, &good.forces, good.out_of_bounds);
         simulation.set_max_move(good.max_move);
         if fallback.is_some() {
@@ -183,13 +195,14 @@ impl<'a> Runner<'a> {
             (Start::Finished, None)
         } else {
             let program = (good.program != PROGRAM).then(|| good.program.clone());
-            let start = Start::Resumed { step: good.step, program, fallback };
+            let instructions = (good.instructions != instructions).then(|| good.instructions.clone());
+            let start = Start::Resumed { step: good.step, program, instructions, fallback };
             (start, Some(Output::reopen(folder.path(), &good.files)?))
         };
-        let good = Checkpoint { program: PROGRAM.into(), ..good };
+        let good = Checkpoint { program: PROGRAM.into(), instructions, ..good };
         let timing = Timing::read(folder.path());
         // `about.json` does not depend on where a run stopped.
-        if !folder.path().join("about.json").is_file() {
+        if !good.finished && !folder.path().join("about.json").is_file() {
             About::of(scene).write(folder.path())?;
         }
         let mut run = Run::new(scene, folder, store, simulation, output, good, timing)?;
@@ -247,7 +260,8 @@ impl<'a> Runner<'a> {
     ) -> Result<Outcome, RunError> {
         let Runner { start, run } = self;
         if matches!(start, Start::Finished) {
-            run.store.keep_newest()?;
+            // What is left of checkpoints before does no harm, and the folder may be one that cannot be written.
+            let _ = run.store.keep_newest();
             return Ok(Outcome::Finished {
                 summary: Box::new(run.summary()),
                 timing: run.timing.clone(),
