@@ -64,6 +64,20 @@ mod tests {
     use super::*;
 
     #[test]
+    fn numbers_that_decimals_would_hide_have_exponents() {
+        for (x, shown, short) in [
+            (0.25, "0.250000", "0.25"),
+            (20.0, "20.000000", "20"),
+            (0.0, "0.000000", "0"),
+            (-1.3e-4, "-0.000130", "-0.00013"),
+            (1e-300, "1.000000e-300", "1e-300"),
+            (-2.5e300, "-2.500000e300", "-2.5e300"),
+        ] {
+            assert_eq!((decimal(x, 6).as_str(), number(x).as_str()), (shown, short));
+        }
+    }
+
+    #[test]
     fn errors_have_two_digits() {
         for (value, error, text) in [
             (7.4503, Some(0.0421), "7.450 ± 0.042"),
