@@ -201,9 +201,11 @@ impl<'a> Runner<'a> {
         };
         let good = Checkpoint { program: PROGRAM.into(), instructions, ..good };
         let timing = Timing::read(folder.path());
-        // `about.json` does not depend on where a run stopped.
-        if !good.finished && !folder.path().join("about.json").is_file() {
-            About::of(scene).write(folder.path())?;
+        // `about.json` does not depend on where a run stopped. The folder of a finished run may be one that cannot be written.
+        if !folder.path().join("about.json").is_file() {
+            About::of(scene)
+                .write(folder.path())
+                .or_else(|error| if good.finished { Ok(()) } else { Err(error) })?;
         }
         let mut run = Run::new(scene, folder, store, simulation, output, good, timing)?;
         run.stored = Some(run.good.step);
