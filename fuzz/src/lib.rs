@@ -6,12 +6,14 @@ mod c_api;
 mod checkpoint;
 mod coefficients;
 mod files;
+mod report;
 mod scene;
 
 pub use c_api::c_api;
 pub use checkpoint::{checkpoint, checkpoint_of_a_run};
 pub use coefficients::coefficients;
 pub use files::{data, dump};
+pub use report::report;
 pub use scene::scene;
 
 use psidpd_core::engine::Plan;

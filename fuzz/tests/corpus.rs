@@ -3,13 +3,13 @@
 
 use proptest::prelude::*;
 use psidpd_fuzz_inputs::{
-    c_api, checkpoint, checkpoint_of_a_run, coefficients, data, dump, expression, model, scene,
+    c_api, checkpoint, checkpoint_of_a_run, coefficients, data, dump, expression, model, report, scene,
 };
 use rustix::time::{ClockId, clock_gettime};
 use std::path::Path;
 use std::time::Duration;
 
-/// For each target: all together stay below 20 seconds of a processor.
+/// For each target: all together stay below 25 seconds of a processor.
 const BUDGET: Duration = Duration::from_secs(2);
 
 /// The longest that one text may take.
@@ -204,6 +204,11 @@ fn dumps() {
 #[test]
 fn checkpoints() {
     run(&corpus(&["fuzz/corpus/checkpoint"]), |bytes| _ = checkpoint(bytes));
+}
+
+#[test]
+fn folders_of_runs() {
+    texts(&["fuzz/corpus/report"], report);
 }
 
 /// The checkpoints of the corpus are those of this version: with others nothing behind their first part would be tried.

@@ -15,6 +15,7 @@
 #include "update.h"
 #include "utils.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
@@ -135,8 +136,7 @@ void PairPsi::read_keywords(int first, int narg, char **arg)
       mixed = value == "mixed";
     } else if (key == "threads") {
       const int count = utils::inumeric(FLERR, value.c_str(), false, lmp);
-      if (count < 1) stop("threads must be 1 or more, found " + value);
-      threads = count;
+      threads = std::max(count, 0);
     } else {
       stop("unknown keyword '" + key + "': expected " + keywords());
     }

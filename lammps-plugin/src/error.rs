@@ -1,6 +1,6 @@
 //! What goes wrong, as text.
 
-use psidpd_core::engine::EngineError;
+use psidpd_core::engine::{EngineError, ThreadCount};
 
 /// What goes wrong, as the text that LAMMPS prints.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -9,6 +9,12 @@ pub struct StyleError(pub(crate) String);
 
 impl From<EngineError> for StyleError {
     fn from(error: EngineError) -> StyleError {
+        StyleError(error.to_string())
+    }
+}
+
+impl From<ThreadCount> for StyleError {
+    fn from(error: ThreadCount) -> StyleError {
         StyleError(error.to_string())
     }
 }

@@ -12,7 +12,6 @@ use psidpd_core::engine::{
 };
 use psidpd_core::model::Model;
 use std::fmt::Write;
-use std::num::NonZeroUsize;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
@@ -114,11 +113,11 @@ impl Style {
     /// How forces are computed from now on: in mixed precision or in double, by so many threads.
     ///
     /// # Errors
-    /// None that [`Style::set_temperature`] did not have before.
+    /// No threads, or too many; else none that [`Style::set_temperature`] did not have before.
     pub fn configure(&mut self, mixed: bool, threads: usize) -> Result<(), StyleError> {
         guard(|| {
             let precision = if mixed { Precision::Mixed } else { Precision::Double };
-            let threads = NonZeroUsize::new(threads).unwrap_or(NonZeroUsize::MIN);
+            let threads = Pool::count(threads)?;
             if (precision, threads) == (self.settings.precision, self.settings.threads) {
                 return Ok(());
             }

@@ -203,8 +203,7 @@ pub fn settings(precision: &str, threads: usize) -> PyResult<Settings> {
 /// # Errors
 /// None, or more than there can be.
 pub fn thread_count(threads: usize) -> PyResult<NonZeroUsize> {
-    let count = NonZeroUsize::new(threads).filter(|n| n.get() <= Pool::MOST);
-    count.ok_or_else(|| wrong(format!("threads must be from 1 to {}, is {threads}", Pool::MOST)))
+    Pool::count(threads).map_err(|e| wrong(e.to_string()))
 }
 
 fn directions(given: Option<Vec<bool>>, dimensions: usize) -> PyResult<[bool; 3]> {

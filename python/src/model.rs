@@ -79,7 +79,7 @@ impl Model {
     /// shape; of S species an array whose last axis has S entries, and pressures come back without that axis. Mean
     /// field leaves out correlations: a simulation differs where particles attract each other strongly.
     ///
-    /// Raises InputError where the model has no pressure in mean field.
+    /// Raises InputError where the model has no pressure in mean field, and for densities below 0 or that are not finite.
     fn pressure<'py>(
         &self,
         rho: &Bound<'py, PyAny>,
@@ -98,6 +98,9 @@ impl Model {
             )));
         }
         let densities = rho.as_slice()?;
+        if let Some(rho) = densities.iter().find(|rho| !(**rho >= 0.0 && rho.is_finite())) {
+            return Err(wrong(format!("a density is a finite number that is not negative, not {rho}")));
+        }
         let pressures: Vec<f64> =
             py.detach(|| densities.chunks_exact(species).map(|d| theory.pressure(d)).collect());
         let found = PyArray1::from_vec(py, pressures).reshape(shape)?;

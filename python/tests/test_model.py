@@ -23,6 +23,9 @@ def test_pressure_is_the_formula_of_the_equation_of_state():
     # Other types, and arrays that are not in one piece.
     assert model.pressure(rho.T.astype(numpy.float32), 0.7) == pytest.approx(found.T, rel=1e-6)
     assert model.pressure(numpy.arange(1, 9)[::3], 0.7)[1] == pytest.approx(0.7 * 4 + 2.5 * 16)
+    for density in [-1.0, numpy.inf, numpy.nan]:
+        with pytest.raises(psidpd.InputError, match="finite number that is not negative"):
+            model.pressure(density, 0.7)
     assert model.parameters == {"k": 2.5} and model.species == ["F"] and model.dimensions == 3
 
 

@@ -80,7 +80,7 @@ fn mistakes_stop_with_one_clear_line() {
         (style, "pair_style dpd/psi 1.0 5 6".into(), "keyword '6' needs a value"),
         (style, "pair_style dpd/psi 1.0 5 law lucy".into(), "unknown keyword 'law': expected 'precision' or"),
         (style, "pair_style dpd/psi 1.0 5 precision single".into(), "unknown precision 'single'"),
-        (style, "pair_style dpd/psi 1.0 5 threads 0".into(), "threads must be 1 or more, found 0"),
+        (style, "pair_style dpd/psi 1.0 5 threads 0".into(), "threads must be from 1 to 1024, found 0"),
         (&coeff, "pair_coeff * * nowhere.toml F".into(), "nowhere.toml: cannot be read"),
         (&coeff, format!("pair_coeff * * {} F", bad.display()), "bad.toml:3: speceis: unknown key"),
         (&coeff, format!("pair_coeff * * {} F", flat.display()), "dimensions = 2, the simulation has 3"),

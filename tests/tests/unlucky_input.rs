@@ -68,6 +68,7 @@ fn pipes_are_no_input() {
         &["run", "pipe", "--out", "out"],
         &["forces", "--model", "m.toml", "--data", "pipe", "--kT", "1"],
         &["snapshot", "pipe", "--out", "a.svg"],
+        &["lammps", "convert", "pipe"],
     ] {
         let mut child = Command::new(program())
             .args(arguments)
@@ -102,7 +103,7 @@ fn more_than_a_machine_has_is_refused_with_a_number() {
     };
     scene("1");
     let (text, code) = words(&psidpd(here, &["run", "s.toml", "--out", "o", "--threads", "20000"]));
-    assert!(code == Some(2) && text.contains("at most 1024"), "{text}");
+    assert!(code == Some(2) && text.contains("from 1 to 1024"), "{text}");
     for (range, times) in [("20", "5.0 times"), ("1e6", "250000.0 times")] {
         scene(range);
         let begun = Instant::now();
@@ -209,4 +210,363 @@ fn tables_stay_in_the_folder_of_the_model() {
         let (text, code) = words(&check.output().unwrap());
         assert!(code == Some(2) && text.contains(message) && !text.contains("secret"), "{table}: {text}");
     }
+}
+
+const SCENE: &str =
+    "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nbox = [4.0, 4.0, 4.0]\ndensity = 3.0\nsteps = 20\n";
+
+/// A folder with a model, a many-body model, a scene and a finished run of it in `o`.
+fn with_a_run() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    write(here, "m.toml", SOFT);
+    std::fs::copy(psidpd_tests::root().join("validation/models/warren2003-set6.toml"), here.join("w.toml"))
+        .unwrap();
+    write(here, "s.toml", SCENE);
+    let output = psidpd(here, &["run", "s.toml", "--out", "o"]);
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    folder
+}
+
+fn split(line: &str) -> Vec<&str> {
+    line.split(' ').collect()
+}
+
+/// The verbs that `psidpd --help` tells.
+fn verbs() -> Vec<String> {
+    let help = said(&psidpd(Path::new("."), &["--help"]));
+    let list = help.split("Commands:").nth(1).unwrap().split("Options:").next().unwrap();
+    let lines = list.lines().filter(|line| line.starts_with("  ") && !line.starts_with("   "));
+    lines
+        .filter_map(|line| line.split_whitespace().next())
+        .filter(|verb| *verb != "help")
+        .map(str::to_owned)
+        .collect()
+}
+
+/// What cannot be said is an error. Verbs that take long say things as the others do.
+#[test]
+fn a_full_standard_output_is_an_error_of_every_verb() {
+    let folder = with_a_run();
+    let lines = [
+        "check m.toml",
+        "theory w.toml",
+        "reproduce --list",
+        "new x",
+        "run s.toml --out again",
+        "run s.toml --out o --resume",
+        "sweep s.toml --over kT=1:1.1:2 --out sweep",
+        "report o",
+        "snapshot o/final.data",
+        "forces --model m.toml --data o/final.data --kT 1",
+        "export eam w.toml --spacing 0.01",
+        "export lammps s.toml --out deck",
+        "completions bash",
+        "man --out man",
+        "calibrate w.toml --density 6:7 --points 2 --particles 200 --steps 100 --equilibrate 10 --tolerance 9 --out c.toml",
+        "--help",
+        "run --help",
+        "--version",
+    ];
+    write(folder.path(), "in.old", "pair_style hybrid/overlay mdpd/rhosum mdpd 1.0 1.0 9872598\n");
+    for line in lines.into_iter().chain(["lammps convert in.old"]) {
+        let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+        let mut program = Command::new(program());
+        let program =
+            program.args(split(line)).current_dir(folder.path()).stdout(full).stderr(Stdio::piped());
+        let (text, code) = words(&program.output().unwrap());
+        assert_eq!(code, Some(1), "{line}: {text}");
+        assert!(
+            text.contains("standard output cannot be written") && !text.contains("panicked"),
+            "{line}: {text}"
+        );
+    }
+    // Minutes, or LAMMPS, or a feature.
+    let long = ["validate", "bench", "pareto", "hardcases", "model"];
+    for verb in verbs() {
+        let tried = lines.iter().any(|line| line.split(' ').next() == Some(&verb)) || verb == "lammps";
+        assert!(tried != long.contains(&verb.as_str()), "{verb}");
+        let source = psidpd_tests::root().join("validation/src/cli").join(match verb.as_str() {
+            "completions" | "man" => "shell.rs".to_owned(),
+            verb => format!("{verb}.rs"),
+        });
+        let text = std::fs::read_to_string(&source).unwrap().replace("eprintln!(", "");
+        assert!(!text.contains("println!(") && !text.contains("print!("), "{}", source.display());
+    }
+}
+
+/// Every error about a file names it: one that is broken, empty, missing or a folder.
+#[test]
+fn errors_of_every_verb_name_the_file() {
+    let folder = with_a_run();
+    let here = folder.path();
+    let reads = [
+        "check F",
+        "theory F",
+        "calibrate F --out c.toml --density 5:6",
+        "run F --out out",
+        "sweep F --over kT=1:2:2 --out out",
+        "report F",
+        "snapshot F",
+        "forces --model F --data o/final.data --kT 1",
+        "forces --model m.toml --data F --kT 1",
+        "export eam F",
+        "export lammps F --out out",
+        "pareto F",
+        "lammps plugin --lammps F",
+        "bench --lammps F --out out",
+    ];
+    for (name, text) in
+        [("broken", Some("x = [[[\n\"")), ("empty", Some("")), ("missing", None), ("folder", None)]
+    {
+        if name == "folder" {
+            std::fs::create_dir(here.join(name)).unwrap();
+        }
+        if let Some(text) = text {
+            write(here, name, text);
+        }
+        for line in reads {
+            let line = line.replace('F', name);
+            let (text, code) = words(&psidpd(here, &split(&line)));
+            assert!(code == Some(2) && text.contains(name), "{line}: {code:?}: {text}");
+        }
+    }
+    for line in [
+        "lammps convert missing",
+        "lammps convert folder",
+        "check m.toml --json folder",
+        "theory w.toml --report folder",
+        "snapshot o/final.data --out folder/no/a.svg",
+        "export eam w.toml --spacing 0.01 --out folder",
+        "export lammps s.toml --out broken",
+        "run s.toml --out broken",
+        "man --out broken",
+        "new broken/x",
+    ] {
+        let (text, code) = words(&psidpd(here, &split(line)));
+        let name = if line.contains("folder") {
+            "folder"
+        } else if line.contains("missing") {
+            "missing"
+        } else {
+            "broken"
+        };
+        assert!(code == Some(2) && text.contains(name), "{line}: {code:?}: {text}");
+    }
+    // What is wrong in itself, without a word on files, too; and data with their line.
+    write(here, "narrow.toml", &SCENE.replace("4.0, 4.0, 4.0", "1.5, 4.0, 4.0"));
+    let data = "t\n\n1 atoms\n3 atom types\n\n0 6 xlo xhi\n0 6 ylo yhi\n0 6 zlo zhi\n\nAtoms # atomic\n\n7 3 0 0 0\n";
+    write(here, "types.data", data);
+    for (line, names) in [
+        ("run narrow.toml --out out", &["narrow.toml"][..]),
+        ("forces --model m.toml --data types.data --kT 1", &["types.data, line 12", "type 3"]),
+        ("export eam w.toml --spacing 1e-9", &["w.toml", "2.000e9 numbers"]),
+        ("export eam w.toml --densities 1000000000000", &["w.toml", "1.000e12 numbers"]),
+        ("calibrate w.toml --density 5:6 --out c.toml --threads 100000", &["from 1 to 1024"]),
+        ("reproduce --threads 100000", &["from 1 to 1024"]),
+        ("bench --threads 100000", &["from 1 to 1024"]),
+        ("pareto s.toml --threads 0", &["from 1 to 1024"]),
+        ("sweep s.toml --over kT=1:2:2 --out out --threads 100000", &["from 1 to 1024"]),
+    ] {
+        let (text, code) = words(&psidpd(here, &split(line)));
+        assert!(code == Some(2) && names.iter().all(|name| text.contains(name)), "{line}: {code:?}: {text}");
+    }
+}
+
+/// 87 million particles take 35 GB, and the shell allows 4.
+#[test]
+fn more_memory_than_there_is_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    write(here, "m.toml", SOFT);
+    write(here, "s.toml", &SCENE.replace("4.0, 4.0, 4.0", "307, 307, 307"));
+    for (line, code) in [("run s.toml --out o", 2), ("export lammps s.toml --out o", 2), ("check s.toml", 1)]
+    {
+        let mut shell = Command::new("sh");
+        shell
+            .args(["-c", &format!("ulimit -v 4000000; exec \"$0\" {line}")])
+            .arg(program())
+            .current_dir(here);
+        let (text, found) = words(&shell.output().unwrap());
+        assert_eq!(found, Some(code), "{line}: {text}");
+        assert!(
+            text.contains("86803329 particles need about 34.7 GB") && text.contains("ulimit -v"),
+            "{line}: {text}"
+        );
+    }
+}
+
+/// A drag whose forces no number can hold stops every integrator, at a step, for a reason.
+#[test]
+fn a_drag_beyond_numbers_stops_a_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    write(here, "m.toml", &SOFT.replace("gamma = 4.5", "gamma = 1e150"));
+    for integrator in
+        ["velocity-verlet", "aboba", "baoab", "two-stage", "force-gradient", "shardlow-s1", "dpd-vv"]
+    {
+        write(here, "s.toml", &format!("{SCENE}integrator = \"{integrator}\"\n[output]\nthermo = 5\n"));
+        let (text, code) = words(&psidpd(here, &["run", "s.toml", "--out", integrator]));
+        assert_eq!(code, Some(1), "{integrator}: {text}");
+        assert!(text.contains("stopped: step") && text.contains("is not finite"), "{integrator}: {text}");
+        let thermo = std::fs::read_to_string(here.join(integrator).join("thermo.csv")).unwrap();
+        assert!(!thermo.contains("NaN") && !thermo.contains("inf"), "{integrator}: {thermo}");
+    }
+}
+
+/// A new run deletes what the old one has left, and nothing else.
+#[test]
+fn a_new_run_deletes_nothing_of_the_user() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    write(here, "m.toml", SOFT);
+    let observed = format!("{SCENE}[observe]\nevery = 2\ntemperature = true\n");
+    write(here, "s.toml", &observed);
+    assert_eq!(psidpd(here, &["run", "s.toml", "--out", "o"]).status.code(), Some(0));
+    write(here, "o/observables/mine.csv", "mine");
+    write(here, "o/mine.data", "mine");
+    assert!(here.join("o/observables/temperature.csv").is_file());
+    write(here, "s.toml", SCENE);
+    let output = psidpd(here, &["run", "s.toml", "--out", "o", "--overwrite"]);
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    for name in ["o/observables/mine.csv", "o/mine.data"] {
+        assert_eq!(std::fs::read_to_string(here.join(name)).unwrap(), "mine", "{name}");
+    }
+    assert!(!here.join("o/observables/temperature.csv").exists());
+    // What a run starts from stays, under whatever name.
+    for (kind, file) in [("data", "o/final.data"), ("checkpoint", "o/checkpoint"), ("checkpoint", "o")] {
+        let initial = format!("[initial]\nkind = \"{kind}\"\nfile = \"{file}\"\n");
+        write(
+            here,
+            "next.toml",
+            &format!("title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nsteps = 5\n{initial}"),
+        );
+        let before = std::fs::read(here.join("o/checkpoint")).unwrap();
+        let (text, code) = words(&psidpd(here, &["run", "next.toml", "--out", "o", "--overwrite"]));
+        assert!(code == Some(2) && text.contains(file), "{file}: {text}");
+        assert_eq!(std::fs::read(here.join("o/checkpoint")).unwrap(), before, "{file}");
+        assert!(here.join("o/final.data").is_file());
+    }
+}
+
+/// A run that is finished has not failed to start, whatever cannot be written behind it.
+#[test]
+fn a_finished_run_stays_finished() {
+    let folder = with_a_run();
+    let here = folder.path();
+    let (text, code) = words(&psidpd(here, &["run", "s.toml", "--out", "p", "--json", "/dev/full"]));
+    assert!(
+        code == Some(1) && text.contains("the run in p is finished, but cannot write /dev/full"),
+        "{text}"
+    );
+    // Neither the page nor the old checkpoint can be touched, as on a disk that is only read.
+    std::fs::create_dir(here.join("o/report.html")).unwrap();
+    std::fs::create_dir(here.join("o/checkpoint.old")).unwrap();
+    let (text, code) = words(&psidpd(here, &["run", "s.toml", "--out", "o", "--resume", "--report"]));
+    assert_eq!(code, Some(0), "{text}");
+    assert!(
+        text.contains("is finished: nothing is left to do") && text.contains("warning: the run has no page"),
+        "{text}"
+    );
+}
+
+/// Names with escape sequences do nothing to a terminal, and commands that cannot be shown are left out.
+#[test]
+fn names_of_files_are_shown_without_escapes() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+    let folder = with_a_run();
+    let here = folder.path();
+    let bad = "a\u{1b}[31mb";
+    for arguments in [
+        &["new", bad][..],
+        &["run", "s.toml", "--out", bad],
+        &["report", bad],
+        &["man", "--out", bad],
+        &["export", "eam", "w.toml", "--spacing", "0.01", "--out", bad],
+        &["check", "no\u{1b}[31m.toml"],
+        &["forces", "--model", "m.toml", "--data", "no\u{1b}[31m", "--kT", "1"],
+    ] {
+        let output = psidpd(here, arguments);
+        assert!(
+            !said(&output).contains("\u{1b}[31m") && said(&output).contains("?[31m"),
+            "{arguments:?}: {}",
+            said(&output)
+        );
+    }
+    write(here, "long.toml", &SCENE.replace("steps = 20", "steps = 100000000"));
+    for (out, tells) in [(OsStr::from_bytes(b"plain"), true), (OsStr::from_bytes(b"\xff"), false)] {
+        let mut run = Command::new(program());
+        run.args(["run", "long.toml", "--out"]).arg(out).current_dir(here).stdout(Stdio::piped());
+        let child = run.spawn().unwrap();
+        let begun = Instant::now();
+        while !here.join(out).join("checkpoint").exists() {
+            assert!(begun.elapsed() < Duration::from_secs(30));
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        rustix::process::kill_process(rustix::process::Pid::from_child(&child), rustix::process::Signal::INT)
+            .unwrap();
+        let output = child.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(130));
+        assert!(said(&output).contains("stopped after step"), "{}", said(&output));
+        assert_eq!(
+            said(&output).contains("to go on: psidpd run long.toml --out plain --resume"),
+            tells,
+            "{}",
+            said(&output)
+        );
+    }
+}
+
+/// Outside a checkout there is no plugin to be built: nothing is downloaded for it.
+#[test]
+fn a_bench_without_sources_installs_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    std::fs::copy(program(), here.join("psidpd")).unwrap();
+    for verb in ["bench", "validate", "lammps plugin"] {
+        let mut command = Command::new(here.join("psidpd"));
+        command.args(split(verb)).current_dir(here).env("PSIDPD_LAMMPS_DIR", here.join("lammps"));
+        command.env_remove("PSIDPD_LAMMPS_VENV").env("PSIDPD_PYTHON", "/nowhere/python3");
+        let (text, code) = words(&command.output().unwrap());
+        assert!(code == Some(2) && text.contains("run from a checkout"), "{verb}: {text}");
+        assert!(!here.join("lammps").exists(), "{verb}");
+    }
+}
+
+/// Derived files go where the new script goes, and replace nothing unasked.
+#[test]
+fn a_converted_script_replaces_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    std::fs::create_dir_all(here.join("work")).unwrap();
+    std::fs::create_dir_all(here.join("d")).unwrap();
+    let data = "t\n\n1 atoms\n1 atom types\n\n0 6 xlo xhi\n0 6 ylo yhi\n0 6 zlo zhi\n\nAtoms # mdpd\n\n1 1 0 0 0 0\n";
+    write(here, "d/mdpd.data", data);
+    write(here, "d/mdpd.data.atomic", "mine");
+    let script = "units lj\natom_style mdpd\nread_data ../d/mdpd.data\npair_style hybrid/overlay mdpd/rhosum mdpd 1.0 1.0 9872598\n";
+    write(here, "work/in.old", script);
+    let convert = |more: &[&str]| {
+        words(&psidpd(here, &[&["lammps", "convert", "work/in.old", "--out", "new/in.new"], more].concat()))
+    };
+    std::fs::create_dir_all(here.join("new")).unwrap();
+    let (text, code) = convert(&[]);
+    assert_eq!(code, Some(0), "{text}");
+    assert!(std::fs::read_to_string(here.join("new/in.new")).unwrap().contains("mdpd.data.atomic\n"));
+    assert!(!std::fs::read_to_string(here.join("new/in.new")).unwrap().contains("../d"));
+    assert!(std::fs::read_to_string(here.join("new/mdpd.data.atomic")).unwrap().contains("1 1 0 0 0\n"));
+    for name in ["new/in.new", "new/mdpd.data.atomic"] {
+        write(here, name, "mine");
+        let (text, code) = convert(&[]);
+        assert!(code == Some(2) && text.contains("--overwrite"), "{text}");
+        assert_eq!(std::fs::read_to_string(here.join(name)).unwrap(), "mine");
+        let (text, code) = convert(&["--overwrite"]);
+        assert_eq!(code, Some(0), "{text}");
+        std::fs::remove_file(here.join("new/in.new")).unwrap();
+    }
+    assert_eq!(std::fs::read_to_string(here.join("d/mdpd.data.atomic")).unwrap(), "mine");
+    // An atom with too few columns, with file and line.
+    write(here, "d/mdpd.data", &data.replace("1 1 0 0 0 0", "1 1 0 0"));
+    let (text, code) = convert(&["--overwrite"]);
+    assert!(code == Some(2) && text.contains("mdpd.data: line 12"), "{text}");
 }

@@ -96,6 +96,10 @@ fn hostile_arguments_are_errors() {
     let open = PeriodicBox::orthogonal([0.0; 3], [3.0; 3], [false; 3]).unwrap();
     let closed = PeriodicBox::orthogonal([0.0; 3], [3.0; 3], [true; 3]).unwrap();
     let extremes = [i32::MIN, -1, 0, 1, 2, 3, i32::MAX];
+    for threads in [0, 1025, usize::MAX] {
+        let error = s.configure(false, threads).unwrap_err().to_string();
+        assert!(error.contains("from 1 to 1024"), "{error}");
+    }
     // Before any evaluation nobody is known.
     assert!(extremes.iter().all(|i| s.single([1, 1], 0.5, [*i, 0]).is_err()));
     let (x, v) = ([0.0, 0.0, 0.0, 0.5, 0.0, 0.0], [0.0; 6]);

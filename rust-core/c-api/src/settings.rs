@@ -2,7 +2,6 @@
 
 use crate::status::{Failure, Status};
 use psidpd_core::engine;
-use std::num::NonZeroUsize;
 
 /// For psidpd_settings: pairs in double precision.
 pub const PSIDPD_PRECISION_DOUBLE: i32 = 0;
@@ -64,10 +63,8 @@ impl Settings {
             PSIDPD_INSTRUCTIONS_AVX512_VBMI2 => engine::Instructions::Avx512Vbmi2,
             other => return Err(wrong("instructions", other)),
         };
-        let threads = NonZeroUsize::new(self.threads).filter(|n| n.get() <= 4096).ok_or_else(|| {
-            let text = format!("settings.threads is {}, not from 1 to 4096", self.threads);
-            Failure::new(Status::InvalidArgument, text)
-        })?;
+        let threads = engine::Pool::count(self.threads)
+            .map_err(|e| Failure::new(Status::InvalidArgument, format!("settings: {e}")))?;
         Ok(engine::Settings { precision, instructions, threads })
     }
 

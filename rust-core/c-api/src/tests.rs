@@ -213,3 +213,13 @@ fn handles_may_cross_threads() {
     shared::<Model>();
     shared::<Engine>();
 }
+
+/// The most threads of a pool, and one more.
+#[test]
+fn threads_are_those_of_a_pool() {
+    let settings = |threads| Settings { threads, ..Settings::DEFAULT }.checked();
+    assert_eq!(settings(1024).map(|s| s.threads.get()).ok(), Some(1024));
+    for threads in [0, 1025, usize::MAX] {
+        assert!(settings(threads).is_err(), "{threads}");
+    }
+}

@@ -55,7 +55,7 @@ pub use psidpd_passes::tally::{Tally, Want};
 pub use psidpd_threads::processors;
 pub use reach::{ReachError, check_reach};
 pub use surroundings::{Around, Newton, PairsOfHost, SpecialPair, Surroundings};
-pub use sweep::{Pool, Sweep, Times, part};
+pub use sweep::{Pool, Sweep, ThreadCount, Times, part};
 
 #[cfg(test)]
 mod tests;

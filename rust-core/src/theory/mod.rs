@@ -78,7 +78,7 @@ pub enum TheoryError {
         found: usize,
     },
     /// Nothing between the limits of the search changes from stable to unstable.
-    #[error("no critical point for control parameters between {0} and {1}")]
+    #[error("no critical point for control parameters between {0:?} and {1:?}")]
     NoCriticalPoint(f64, f64),
     /// The fluid is stable everywhere, or a phase has no partner.
     #[error("no two phases coexist")]

@@ -27,6 +27,18 @@ pub struct Pool {
     turn: Mutex<()>,
 }
 
+/// A number of threads that no pool has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ThreadCount(pub usize);
+
+impl std::fmt::Display for ThreadCount {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "threads must be from 1 to {}, found {}", Pool::MOST, self.0)
+    }
+}
+
+impl std::error::Error for ThreadCount {}
+
 /// A piece of work: called with the number of the thread. The pointer is only followed while [`Pool::run`], which
 /// holds the reference it came from, waits for the workers.
 #[derive(Clone, Copy)]
@@ -68,6 +80,14 @@ thread_local! {
 impl Pool {
     /// More than any machine has cores. Tens of thousands run into limits of the system that end the program.
     pub const MOST: usize = 1024;
+
+    /// A number of threads from outside, if a pool can have it.
+    ///
+    /// # Errors
+    /// None, or more than [`Pool::MOST`].
+    pub fn count(threads: usize) -> Result<NonZeroUsize, ThreadCount> {
+        NonZeroUsize::new(threads).filter(|n| n.get() <= Pool::MOST).ok_or(ThreadCount(threads))
+    }
 
     /// A pool of `threads`, the caller's among them; at most [`Pool::MOST`].
     pub fn new(threads: NonZeroUsize) -> Pool {

@@ -132,6 +132,30 @@ impl About {
         }
     }
 
+    /// What no run can have, if there is any of it: others may have written the file.
+    fn fault(&self) -> Option<String> {
+        let positive = |x: f64| x > 0.0 && x.is_finite();
+        let size = self.box_origin.iter().chain(self.box_edges.iter().flatten());
+        if !(2..=3).contains(&self.dimensions) {
+            Some(format!("dimensions is {}, and a fluid has 2 or 3", self.dimensions))
+        } else if self.species.is_empty() || self.masses.len() != self.species.len() {
+            Some(format!("there are {} species and {} masses", self.species.len(), self.masses.len()))
+        } else if !self.densities.iter().all(|d| positive(d.range)) {
+            Some("the range of a density is not a positive number".into())
+        } else if !size.into_iter().all(|x| x.abs() < 1e100) || !positive(self.volume()) {
+            Some("the box has no volume".into())
+        } else {
+            None
+        }
+    }
+
+    /// Of the box; its area in two dimensions.
+    pub fn volume(&self) -> f64 {
+        let [a, b, c] = self.box_edges;
+        let cross = [b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]];
+        (0..3).map(|k| a[k] * cross[k]).sum()
+    }
+
     /// Reads `about.json` of a folder; `None` if there is none.
     ///
     /// # Errors
@@ -142,7 +166,14 @@ impl About {
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
             Err(e) => Err(FormatError::read(&path)(e)),
             Ok(text) => {
-                serde_json::from_str(&text).map(Some).map_err(|cause| FormatError::Json { path, cause })
+                let about: About = match serde_json::from_str(&text) {
+                    Ok(about) => about,
+                    Err(cause) => return Err(FormatError::Json { path, cause }),
+                };
+                match about.fault() {
+                    Some(message) => Err(FormatError::Content { path, message }),
+                    None => Ok(Some(about)),
+                }
             }
         }
     }

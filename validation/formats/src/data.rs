@@ -74,6 +74,16 @@ impl DataFile {
             .map_err(|source| FormatError::Text { path: path.to_owned(), source })
     }
 
+    /// The line of an atom in a file, for messages, counted from 1.
+    pub fn line_of(path: &Path, id: u32) -> Option<usize> {
+        let text = String::from_utf8_lossy(&std::fs::read(path).ok()?).into_owned();
+        let first = |line: &str| line.split_whitespace().next().map(str::to_owned);
+        let atoms = text.lines().position(|line| first(line).as_deref() == Some("Atoms"))?;
+        let line =
+            text.lines().skip(atoms).position(|line| first(line).and_then(|w| w.parse().ok()) == Some(id))?;
+        Some(atoms + line + 1)
+    }
+
     /// Reads the text of a data file of `atom_style` atomic or mdpd, whose densities are passed over.
     ///
     /// The section Atoms may name its style in a comment, as LAMMPS writes it; without one it is atomic. Sections of pair

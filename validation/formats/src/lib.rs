@@ -11,6 +11,7 @@ pub mod dump;
 mod error;
 pub mod files;
 mod frame;
+pub mod memory;
 mod open;
 pub mod setfl;
 pub mod text;

@@ -7,6 +7,7 @@ use super::error::LammpsError;
 use psidpd_formats::FormatError;
 use psidpd_formats::text::{Problem, TextError};
 use std::collections::BTreeMap;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// The force law of the new script.
@@ -46,25 +47,25 @@ pub struct Converted {
 /// was written, and the new script with what is to know of it.
 ///
 /// # Errors
-/// A file that cannot be read or written, a data file with too few columns.
+/// A file that cannot be read or written, or is there already and not to be replaced; a data file with too few columns.
 pub fn files(
     old: &Path,
     law: Law,
     plugin: &str,
     out: Option<&Path>,
+    overwrite: bool,
 ) -> Result<(Vec<PathBuf>, Converted), LammpsError> {
-    let read = |path: &Path| std::fs::read_to_string(path).map_err(LammpsError::io("read", path));
-    let mut new = script(&read(old)?, law, plugin);
-    let mut written = Vec::new();
-    let mut write = |path: PathBuf, text: &str| {
-        std::fs::write(&path, text).map_err(LammpsError::io("write", &path))?;
-        written.push(path);
-        Ok::<(), LammpsError>(())
+    let read = |path: &Path| {
+        let mut text = String::new();
+        psidpd_core::document::open_regular(path)
+            .and_then(|mut file| file.read_to_string(&mut text))
+            .map_err(LammpsError::io("read", path))
+            .map(|_| text)
     };
+    let mut new = script(&read(old)?, law, plugin);
     let beside = |path: &Path, name: &str| path.parent().unwrap_or(Path::new("")).join(name);
-    if let Some(path) = out {
-        write(path.to_owned(), &new.script)?;
-    }
+    let mut results: Vec<(PathBuf, String)> =
+        out.map(|path| (path.to_owned(), new.script.clone())).into_iter().collect();
     for name in &new.data {
         // LAMMPS looks for it where it is started, most often beside the script.
         let from = beside(old, name);
@@ -72,7 +73,7 @@ pub fn files(
             Some(path) if from.is_file() => {
                 let text = data_file(&read(&from)?)
                     .map_err(|source| FormatError::Text { path: from.clone(), source })?;
-                write(beside(path, &format!("{name}{SUFFIX}")), &text)?;
+                results.push((beside(path, &without_column(name)), text));
             }
             _ => new.left.push(Note {
                 line: 0,
@@ -80,7 +81,24 @@ pub fn files(
             }),
         }
     }
-    Ok((written, new))
+    // All or nothing: what is there already may be somebody's work.
+    if let Some((path, _)) = results.iter().find(|(path, _)| !overwrite && path.is_file()) {
+        let path = path.display();
+        return Err(LammpsError::Request(format!(
+            "{path} is there already: replace it with --overwrite, or choose another --out"
+        )));
+    }
+    for (path, text) in &results {
+        psidpd_formats::files::write_atomically(path, text.as_bytes())
+            .map_err(|e| LammpsError::io("write", path)(e.cause))?;
+    }
+    Ok((results.into_iter().map(|(path, _)| path).collect(), new))
+}
+
+/// The name of a data file that is rewritten: in the folder of the new script, whatever folder the old one was in.
+fn without_column(name: &str) -> String {
+    let last = Path::new(name).file_name().map_or(name.into(), |last| last.to_string_lossy());
+    format!("{last}{SUFFIX}")
 }
 
 /// What is appended to the names of data files that are rewritten.
@@ -345,7 +363,11 @@ impl Work<'_> {
             );
             return None;
         }
-        let new = format!("{file}{SUFFIX}");
+        let new = without_column(file);
+        if self.data.iter().any(|other| other != file && without_column(other) == new) {
+            self.left(command, format!("{new} would be the new name of two data files: rename one of them"));
+            return None;
+        }
         self.data.push(file.to_owned());
         self.changed(command, format!("reads {new}, which has no column for the density"));
         let words: Vec<&str> = std::iter::once(new.as_str()).chain(rest.iter().copied()).collect();

@@ -80,6 +80,20 @@ pub fn launcher(plugin: &Path) -> Option<PathBuf> {
     Some(plugin.with_file_name(LAUNCHER)).filter(|p| p.is_file())
 }
 
+/// Installs LAMMPS as [`install`](super::install()) does, to build the plugin for it: where that cannot be built nothing is
+/// downloaded.
+pub fn install_to_build(progress: &dyn Fn(&str)) -> Result<Host, LammpsError> {
+    sources()?;
+    super::install(progress)
+}
+
+/// The checkout, with the sources of the plugin.
+fn sources() -> Result<PathBuf, LammpsError> {
+    let root = checkout().unwrap_or_else(|| PathBuf::from("."));
+    let manifest = root.join("lammps-plugin").join("Cargo.toml");
+    if manifest.is_file() { Ok(root) } else { Err(LammpsError::NoSources { path: manifest }) }
+}
+
 /// Builds the plugin against the headers of `host` for a LAMMPS of the given version, which the plugin will insist on,
 /// into the folder `base`.
 pub fn build_for(
@@ -88,11 +102,7 @@ pub fn build_for(
     base: &Path,
     progress: &dyn Fn(&str),
 ) -> Result<PathBuf, LammpsError> {
-    let root = checkout().unwrap_or_else(|| PathBuf::from("."));
-    let manifest = root.join("lammps-plugin").join("Cargo.toml");
-    if !manifest.is_file() {
-        return Err(LammpsError::NoSources { path: manifest });
-    }
+    let root = sources()?;
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     build_with(host, version, base, &builds_dir(&root), &root, &cargo, progress)
 }

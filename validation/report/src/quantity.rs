@@ -23,6 +23,22 @@ pub fn with_error(value: f64, error: Option<f64>) -> String {
     }
 }
 
+/// A number with so many decimals, or with an exponent where these would hide it: 0.250000, 1e-300.
+pub fn decimal(x: f64, places: usize) -> String {
+    let smallest = 0.5 * 10f64.powi(-(places as i32));
+    if x != 0.0 && x.is_finite() && !(smallest..1e15).contains(&x.abs()) {
+        format!("{x:.places$e}")
+    } else {
+        format!("{x:.places$}")
+    }
+}
+
+/// A number as short as it can be said, with an exponent where it is very great or very small: 0.25, 1e-300.
+pub fn number(x: f64) -> String {
+    let text = format!("{x:?}");
+    if text.contains('e') { text } else { x.to_string() }
+}
+
 fn plain(value: f64) -> String {
     if value == 0.0 {
         return "0".into();
@@ -46,6 +62,20 @@ fn minus(text: String) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_that_decimals_would_hide_have_exponents() {
+        for (x, shown, short) in [
+            (0.25, "0.250000", "0.25"),
+            (20.0, "20.000000", "20"),
+            (0.0, "0.000000", "0"),
+            (-1.3e-4, "-0.000130", "-0.00013"),
+            (1e-300, "1.000000e-300", "1e-300"),
+            (-2.5e300, "-2.500000e300", "-2.5e300"),
+        ] {
+            assert_eq!((decimal(x, 6).as_str(), number(x).as_str()), (shown, short));
+        }
+    }
 
     #[test]
     fn errors_have_two_digits() {

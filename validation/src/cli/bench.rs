@@ -1,3 +1,5 @@
+use super::run::thread_count;
+use super::say::{self, say};
 use super::{Failure, Verdict, write_json};
 use psidpd_experiments::bench::{Options, contender::FEW_ABOVE, fluids::SIZES, memory, page, run as measure};
 use psidpd_report::Progress;
@@ -32,7 +34,7 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value_t = FEW_ABOVE)]
     few_above: usize,
     /// Threads of the native runner.
-    #[arg(long, value_name = "N,…", value_delimiter = ',', default_value = "1,2", value_parser = at_least_one)]
+    #[arg(long, value_name = "N,…", value_delimiter = ',', default_value = "1,2", value_parser = thread_count)]
     threads: Vec<NonZeroUsize>,
     /// Particles of the systems whose memory is measured [default: none; with --all 1000000; with --full also 3750000].
     #[arg(long, value_name = "N,…", value_delimiter = ',', value_parser = at_least_one)]
@@ -69,7 +71,7 @@ fn or_default(given: &[NonZeroUsize], default: &[usize]) -> Vec<usize> {
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     if let Some(particles) = arguments.measure_memory {
         let child = memory::child(particles)?;
-        println!("{}", serde_json::to_string(&child)?);
+        say!("{}", serde_json::to_string(&child)?);
         return Ok(Verdict::Good);
     }
     let full = arguments.full;
@@ -97,26 +99,27 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     };
     let program = super::program()?;
     let outcome = measure(&options, &program, &Progress::new())?;
-    println!("{}", page::speeds(&outcome).to_text());
+    say::table(&page::speeds(&outcome));
     for (heading, table) in [
         ("The fastest settings:", page::fastest(&outcome)),
         ("Where the time goes natively, ns per particle and step:", page::native_parts(&outcome)),
         ("Where it goes in LAMMPS with the plugin, ns per particle and step:", page::plugin_parts(&outcome)),
     ] {
-        println!("{heading}\n\n{}", table.to_text());
+        say!("{heading}\n");
+        say::table(&table);
     }
     let machine = &outcome.machine;
-    println!("{}, {}; {}\n", machine.processor, page::instructions(machine), page::cycles(machine));
+    say!("{}, {}; {}\n", machine.processor, page::instructions(machine), page::cycles(machine));
     if let Some(note) = page::few(&outcome.options) {
-        println!("{note}\n");
+        say!("{note}\n");
     }
     if !outcome.lammps.missing.is_empty() {
-        println!("not in this LAMMPS: {}\n", outcome.lammps.missing.join(", "));
+        say!("not in this LAMMPS: {}\n", outcome.lammps.missing.join(", "));
     }
     if let Some(load) = outcome.machine.load.filter(|l| *l > 0.5) {
-        println!("the machine was busy before (load {load:.1}): do not trust these figures\n");
+        say!("the machine was busy before (load {load:.1}): do not trust these figures\n");
     }
-    println!("report: {}", arguments.out.join("report.html").display());
+    say!("report: {}", arguments.out.join("report.html").display());
     write_json(json, &outcome)?;
     Ok(Verdict::Good)
 }

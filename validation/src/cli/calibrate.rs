@@ -1,4 +1,6 @@
 use super::inputs::Files;
+use super::run::thread_count;
+use super::say::{self, say};
 use super::settings::temperature;
 use super::{Failure, Verdict, write_json};
 use psidpd_core::model::Model;
@@ -53,7 +55,7 @@ pub struct Arguments {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Threads that share the work.
-    #[arg(long, value_name = "N", default_value = "1")]
+    #[arg(long, value_name = "N", default_value = "1", value_parser = thread_count)]
     threads: NonZeroUsize,
     /// Where the model file with its correction goes.
     #[arg(long, value_name = "FILE")]
@@ -105,7 +107,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
             threads: a.threads,
         },
     };
-    let found = calibrate(&a.model, &options, &command(a), &mut |line| println!("{line}"))?;
+    let found = calibrate(&a.model, &options, &command(a), &mut |line| say!("{line}"))?;
     write_atomically(&a.out, found.text.as_bytes())?;
     let mut table = Table::new(["density", "kT", "<n>", "<rho~>", "p wanted", "p measured", "off by"]);
     let pm = |v: &psidpd_experiments::calibrate::Value| format!("{:.5} ± {:.5}", v.value, v.error);
@@ -120,39 +122,43 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
             format!("{:.2} %", 100.0 * r.deviation),
         ]);
     }
-    println!("\n{}", table.to_text());
+    say!("");
+    say::table(&table);
     for (pair, fit) in found.pairs.iter().zip(found.fits()) {
-        println!("rho~ {pair}: {}", shown(fit));
+        say!("rho~ {pair}: {}", shown(fit));
     }
     let best = &found.rounds[found.chosen];
     if best.pressure_error > 0.5 * a.tolerance {
-        println!(
+        say!(
             "error bars of the pressure reach {:.2} %, more than half of the tolerance: raise --steps or --particles",
             100.0 * best.pressure_error
         );
     }
     for r in &found.residuals {
         if (r.temperature.value / a.kt - 1.0).abs() > 0.02 {
-            println!(
+            say!(
                 "at density {} the temperature is {:.3}, not {}: a shorter time step (--dt) is in order",
-                r.density, r.temperature.value, a.kt
+                r.density,
+                r.temperature.value,
+                a.kt
             );
         }
     }
     for failed in &found.failed {
-        println!(
+        say!(
             "warning: at density {} the run stopped: {}; it is left out of the fit. A smaller --dt or a narrower --density \
              range may help",
-            failed.density, failed.why
+            failed.density,
+            failed.why
         );
     }
     if !found.converged {
-        println!(
+        say!(
             "no correction up to third order meets the tolerance of {:.2} %: narrow --density, or widen --tolerance",
             100.0 * a.tolerance
         );
     }
-    println!("written to {}", a.out.display());
+    say!("written to {}", a.out.display());
     write_json(json, &found)?;
     Ok(if found.converged { Verdict::Good } else { Verdict::CheckFailed })
 }

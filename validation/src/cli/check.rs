@@ -1,4 +1,5 @@
 use super::inputs::Files;
+use super::say::say;
 use super::settings::temperature;
 use super::{Failure, Settings, Verdict, write_json};
 use psidpd_core::document::Document;
@@ -6,6 +7,8 @@ use psidpd_core::engine::check_reach;
 use psidpd_experiments::check::{
     Conditions, Cost, Findings, Severity, StepEstimate, Warning, check, cost, estimates,
 };
+use psidpd_formats::memory::{self, shown};
+use psidpd_report::quantity::{decimal, number};
 use std::path::{Path, PathBuf};
 
 /// What a model or scene will compute, what mean field says of it, and what cannot work.
@@ -51,7 +54,7 @@ pub fn per_species(given: &[f64], species: usize) -> Option<Vec<f64>> {
 
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     let document = Document::open(&arguments.file)?;
-    let mut too_far = None;
+    let (mut too_far, mut too_large) = (None, None);
     let mut mixtures = Vec::new();
     let (model, kt, densities, steps, taken) = if document.root().get("model").is_some() {
         let scene = arguments.settings.scene(&arguments.file)?;
@@ -61,6 +64,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         }
         let range = scene.model.at(scene.kt)?.cutoff();
         let particles = scene.initial.parts().iter().map(|p| p.count).sum();
+        too_large = memory::check(particles).err();
         too_far = check_reach(&scene.domain, scene.model.dimensions(), range, particles).err();
         let steps = if too_far.is_none() { estimates(&scene)? } else { Vec::new() };
         let taken = if too_far.is_none() { cost(&scene).ok() } else { None };
@@ -83,6 +87,11 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         let other = check(&model, &Conditions { kt: conditions.kt, densities: Some(rho.clone()) })?;
         findings.add_at(model.species(), &rho, other.warnings);
     }
+    if let Some(error) = too_large {
+        findings
+            .warnings
+            .insert(0, Warning { id: "memory", severity: Severity::Error, message: error.to_string() });
+    }
     if let Some(error) = too_far {
         findings.warnings.insert(
             0,
@@ -92,10 +101,6 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     print(&findings, model.species());
     write_json(json, &findings)?;
     Ok(if findings.works() { Verdict::Good } else { Verdict::CheckFailed })
-}
-
-fn memory(bytes: f64) -> String {
-    if bytes < 1e9 { format!("{:.0} MB", bytes / 1e6) } else { format!("{:.1} GB", bytes / 1e9) }
 }
 
 fn duration(seconds: f64) -> String {
@@ -140,7 +145,7 @@ fn print_step(step: &StepEstimate, which: &str) {
     let thinner = step
         .thinner
         .map(|by| format!(", a liquid beside its vapour too thin by {} %", two_digits(100.0 * by)));
-    println!(
+    say!(
         "time step     {} of stage \"{}\"{which}, {}: configurational temperature off by about {} %, the pressure that steps \
          carry by {} % of rho kT{}; 1 % of both at dt = {} (estimate: frequency {:.1}, drag rate {:.2})",
         step.dt,
@@ -157,17 +162,20 @@ fn print_step(step: &StepEstimate, which: &str) {
 
 fn print(findings: &Findings, species: &[String]) {
     if let Some(reference) = &findings.reference {
-        println!("reference     {reference}");
+        say!("reference     {reference}");
     }
-    println!("{}", findings.plan);
-    println!("kT            {}", findings.kt);
+    say!("{}", findings.plan);
+    say!("kT            {}", number(findings.kt));
     if let Some(densities) = &findings.densities {
         let each: Vec<String> =
-            species.iter().zip(densities).map(|(s, rho)| format!("{s} {rho:.6}")).collect();
-        println!("densities     {}", each.join(", "));
+            species.iter().zip(densities).map(|(s, rho)| format!("{s} {}", decimal(*rho, 6))).collect();
+        say!("densities     {}", each.join(", "));
     }
     if let (Some(p), Some(slope)) = (findings.pressure, findings.pressure_slope) {
-        println!("mean field    pressure {p:.6}, dp/drho {slope:.6}");
+        let shown = |x: f64| {
+            if x.is_finite() { decimal(x, 6) } else { "none (psi is no finite number there)".into() }
+        };
+        say!("mean field    pressure {}, dp/drho {}", shown(p), shown(slope));
     }
     if let Some(s) = &findings.stability {
         let verdict = if s.stable { "stable" } else { "unstable" };
@@ -176,17 +184,17 @@ fn print(findings: &Findings, species: &[String]) {
             None if s.spinodal => "at k = 0".to_owned(),
             None => "(S(k) has no peak)".to_owned(),
         };
-        println!("stability     {verdict}: smallest 1/S(k) is {:.5} {place}", s.min_inverse_s);
+        say!("stability     {verdict}: smallest 1/S(k) is {:.5} {place}", s.min_inverse_s);
     } else if findings.densities.is_none() {
-        println!("stability     give --density to have pressure and stability");
+        say!("stability     give --density to have pressure and stability");
     }
     for line in &findings.theory {
-        println!("theory        {line}");
+        say!("theory        {line}");
     }
     if let Some(Cost { particles, steps, bytes, seconds }) = findings.cost {
-        println!(
+        say!(
             "takes         {particles} particles, {steps} steps: about {} of memory and {} on one thread of this machine",
-            memory(bytes),
+            shown(bytes),
             duration(seconds)
         );
     }
@@ -207,6 +215,6 @@ fn print(findings: &Findings, species: &[String]) {
             Severity::Warning => "WARNING",
             Severity::Note => "note",
         };
-        println!("{kind:<13} [{}] {}", warning.id, warning.message);
+        say!("{kind:<13} [{}] {}", warning.id, warning.message);
     }
 }

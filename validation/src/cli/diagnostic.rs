@@ -1,5 +1,7 @@
 //! Errors as a person sees them: what, where (with the line of the file), and what to do.
 
+use super::Lost;
+use super::run::Unwritten;
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use psidpd_core::document::{FileError, printable};
 use psidpd_dynamics::checkpoint::Caller;
@@ -8,24 +10,37 @@ use psidpd_experiments::calibrate::CalibrateError;
 use psidpd_experiments::crosscheck::ValidateError;
 use psidpd_experiments::from_eos::FromEosError;
 use psidpd_experiments::sweep::SweepError;
+use std::path::PathBuf;
 
 /// The longest line, in bytes, that is shown with an error.
 const LONGEST_LINE: usize = 2000;
 
 /// A verb that could not be carried out.
 #[derive(Debug)]
-pub struct Failure(Box<dyn std::error::Error + Send + Sync + 'static>);
+pub struct Failure {
+    error: Box<dyn std::error::Error + Send + Sync + 'static>,
+    /// The files that it was given.
+    inputs: Vec<String>,
+}
 
 impl<E: std::error::Error + Send + Sync + 'static> From<E> for Failure {
     fn from(error: E) -> Failure {
-        Failure(Box::new(error))
+        Failure { error: Box::new(error), inputs: Vec::new() }
     }
 }
 
 impl Failure {
-    /// 1 for a run that stopped on the way, 2 for bad input.
+    /// That of a verb that was given these files: they are told where the message names none of them.
+    #[must_use]
+    pub fn of(mut self, inputs: &[PathBuf]) -> Failure {
+        self.inputs = inputs.iter().map(|path| printable(&path.display().to_string())).collect();
+        self
+    }
+
+    /// 1 for a run that stopped on the way, and for results that are lost; 2 for bad input.
     pub fn exit_code(&self) -> u8 {
-        if run_error(&*self.0).is_some_and(RunError::is_stop) { 1 } else { 2 }
+        let stopped = run_error(&*self.error).is_some_and(RunError::is_stop);
+        if stopped || self.error.is::<Lost>() || self.error.is::<Unwritten>() { 1 } else { 2 }
     }
 
     /// For the terminal, with escape sequences for colour: an error about a file shows the line.
@@ -43,7 +58,7 @@ impl Failure {
             let text = e.file().text();
             !text.is_empty() && text.lines().all(|line| line.len() <= LONGEST_LINE)
         };
-        let located = file_error(&*self.0).filter(shows);
+        let located = file_error(&*self.error).filter(shows);
         // What was read stands in all of these as it was written.
         let text = located.map_or(String::new(), |e| printable(e.file().text()));
         let name = located.map_or("", |e| e.file().name());
@@ -51,16 +66,22 @@ impl Failure {
             // The place is shown with the line itself.
             Some(e) if e.key().is_empty() => e.kind().to_string(),
             Some(e) => format!("{}: {}", e.key(), e.kind()),
-            None => self.0.to_string(),
+            None => self.error.to_string(),
         };
         let mut report = Group::with_title(Level::ERROR.primary_title(printable(&title)));
         if let Some(e) = located {
             let place = AnnotationKind::Primary.span(e.span()).label("here");
             report = report.element(Snippet::source(text).path(name).annotation(place));
         }
-        let help = run_error(&*self.0).and_then(|error| error.help(caller));
-        if let Some(help) = help.or_else(|| Some(file_error(&*self.0)?.help()?.to_string())) {
+        let help = run_error(&*self.error).and_then(|error| error.help(caller));
+        if let Some(help) = help.or_else(|| Some(file_error(&*self.error)?.help()?.to_string())) {
             report = report.element(Level::HELP.message(printable(&help)));
+        }
+        let title = printable(&title);
+        if !self.inputs.is_empty()
+            && !self.inputs.iter().any(|input| [name, &title].iter().any(|t| t.contains(input)))
+        {
+            report = report.element(Level::NOTE.message(format!("in {}", self.inputs.join(", "))));
         }
         renderer.render(&[report])
     }

@@ -1,4 +1,5 @@
 use super::inputs::Files;
+use super::say::say;
 use super::settings::temperature;
 use super::{Failure, Settings, Verdict, write_json};
 use psidpd_lammps_host::export::eam::{self, Grid};
@@ -81,8 +82,8 @@ pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
 fn run_lammps(a: &LammpsArguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     let scene = a.settings.scene(&a.scene)?;
     let files = deck::write(&scene, &a.out)?;
-    println!("written to {}; run it there:", a.out.display());
-    println!("lmp -in {} -var plugin PATH/psidpdplugin.so", deck::SCRIPT);
+    say!("written to {}; run it there:", a.out.display());
+    say!("lmp -in {} -var plugin PATH/psidpdplugin.so", deck::SCRIPT);
     write_json(json, &json!({"folder": a.out, "files": files}))?;
     Ok(Verdict::Good)
 }
@@ -93,8 +94,8 @@ fn run_eam(a: &EamArguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     let out = a.table();
     let grid = Grid { spacing: a.spacing, largest_density: a.largest_density, densities: a.densities };
     eam::write(&fluid, &vec![1.0; fluid.species.len()], grid, &out)?;
-    println!("{}", out.display());
-    println!("pair_style eam/alloy\npair_coeff * * {} {}", out.display(), fluid.species.join(" "));
+    say!("{}", out.display());
+    say!("pair_style eam/alloy\npair_coeff * * {} {}", out.display(), fluid.species.join(" "));
     write_json(json, &json!({"table": out, "species": fluid.species}))?;
     Ok(Verdict::Good)
 }

@@ -1,8 +1,9 @@
 use super::inputs::Files;
+use super::say;
 use super::settings::temperature;
 use super::{Failure, Settings, Verdict, write_json};
 use psidpd_core::engine::Want;
-use psidpd_dynamics::run::{Simulation, State};
+use psidpd_dynamics::run::{Simulation, State, StateError};
 use psidpd_formats::data::DataFile;
 use psidpd_report::Table;
 use serde::Serialize;
@@ -31,6 +32,22 @@ impl Arguments {
     }
 }
 
+/// A data file that is no state of the model.
+#[derive(Debug, thiserror::Error)]
+#[error("{}{}: {error}", path.display(), line.map_or(String::new(), |line| format!(", line {line}")))]
+struct NoState {
+    path: PathBuf,
+    line: Option<usize>,
+    error: StateError,
+}
+
+impl NoState {
+    fn of(path: &Path, error: &StateError) -> NoState {
+        let line = error.atom.and_then(|id| DataFile::line_of(path, id));
+        NoState { path: path.to_owned(), line, error: error.clone() }
+    }
+}
+
 /// The contents of the file of `--json`.
 #[derive(Debug, Serialize)]
 struct Forces {
@@ -46,7 +63,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     let (model, kt) = arguments.settings.model(&arguments.model)?;
     let mut data = DataFile::read(&arguments.data)?;
     data.sort_by_id();
-    let state = State::from_data(&data, &model)?;
+    let state = State::from_data(&data, &model).map_err(|error| NoState::of(&arguments.data, &error))?;
     let mut simulation = Simulation::new(&model, kt.unwrap_or(arguments.kt), state, 1)?;
     // What others are compared with.
     simulation.use_pair_sums_only(true);
@@ -70,7 +87,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         table.push([format!("virial {name}"), format!("{w:.12e}")]);
     }
     table.push(["root mean square force".to_owned(), format!("{:.12e}", size.sqrt())]);
-    println!("{}", table.to_text());
+    say::table(&table);
     write_json(json, &forces)?;
     Ok(Verdict::Good)
 }

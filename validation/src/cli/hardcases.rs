@@ -1,3 +1,4 @@
+use super::say::{self, say};
 use super::{Failure, write_json};
 use psidpd_core::engine::Fault;
 use psidpd_experiments::hardcases::{self, Extent};
@@ -33,13 +34,13 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<super::Verdict, Failure
         _ => Extent::All,
     };
     let found = hardcases::run(extent, a.lammps, a.only.as_deref(), a.fault, &Progress::new())?;
-    println!("{}", hardcases::table(&found).to_text());
+    say::table(&hardcases::table(&found));
     let wrong: Vec<_> = found.iter().filter(|v| v.wrong.is_some()).collect();
     for v in &wrong {
         let why = v.wrong.as_deref().unwrap_or_default();
-        println!("{}, {}, {}, {}: must be {}: {why}", v.case, v.host, v.integrator, v.precision, v.must);
+        say!("{}, {}, {}, {}: must be {}: {why}", v.case, v.host, v.integrator, v.precision, v.must);
     }
-    println!("{} of {} as they must be", found.len() - wrong.len(), found.len());
+    say!("{} of {} as they must be", found.len() - wrong.len(), found.len());
     write_json(json, &found)?;
     Ok(if wrong.is_empty() { super::Verdict::Good } else { super::Verdict::CheckFailed })
 }

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 /// The files that a verb reads and writes, as its arguments name them.
 #[derive(Debug, Default)]
 pub struct Files {
+    given: Vec<PathBuf>,
     reads: Vec<PathBuf>,
     writes: Vec<PathBuf>,
 }
@@ -22,9 +23,15 @@ const DEEPEST: usize = 2;
 impl Files {
     /// Those that are read; of a scene and of a model also those that they name.
     pub fn reads<'a>(paths: impl IntoIterator<Item = &'a PathBuf>) -> Files {
+        let given: Vec<PathBuf> = paths.into_iter().cloned().collect();
         let mut reads = Vec::new();
-        paths.into_iter().for_each(|path| named(path, DEEPEST, &mut reads));
-        Files { reads, writes: Vec::new() }
+        given.iter().for_each(|path| named(path, DEEPEST, &mut reads));
+        Files { given, reads, writes: Vec::new() }
+    }
+
+    /// Those that are read, as the user named them.
+    pub fn given(&self) -> &[PathBuf] {
+        &self.given
     }
 
     /// With files that are written.
@@ -36,7 +43,7 @@ impl Files {
 
     /// # Errors
     /// A file is both.
-    pub fn check(self, json: Option<&Path>) -> Result<(), WrittenOver> {
+    pub fn check(&self, json: Option<&Path>) -> Result<(), WrittenOver> {
         let id =
             |path: &Path| std::fs::metadata(path).ok().filter(|m| m.is_file()).map(|m| (m.dev(), m.ino()));
         let read: Vec<_> = self.reads.iter().filter_map(|path| id(path)).collect();

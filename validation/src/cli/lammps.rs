@@ -1,5 +1,7 @@
 use super::inputs::Files;
+use super::say::{self, say};
 use super::{Failure, Verdict, write_json};
+use psidpd_core::document::printable;
 use psidpd_lammps_host::convert::{self, Law};
 use psidpd_lammps_host::{Host, LammpsError, base_dir, install, plugin};
 use psidpd_report::Progress;
@@ -28,6 +30,9 @@ pub enum Verb {
         /// Where the new script is written; data files come beside it. Default: the script to standard output.
         #[arg(long, value_name = "FILE")]
         out: Option<PathBuf>,
+        /// Replace files that are there already.
+        #[arg(long)]
+        overwrite: bool,
     },
 }
 
@@ -50,9 +55,9 @@ pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
             let host = install(&note)?;
             let version = host.version()?;
             spinner.finish();
-            println!("LAMMPS {} in {}", version.name, host.root.display());
+            say!("LAMMPS {} in {}", version.name, host.root.display());
             let lmp = host.lmp_by_hand();
-            println!("run it: {}", lmp.display());
+            say!("run it: {}", lmp.display());
             write_json(json, &json!({"root": host.root, "lmp": lmp, "version": version.number}))?;
         }
         Verb::Plugin { lammps } => {
@@ -60,7 +65,7 @@ pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
             let host = match lammps {
                 Some(place) => Host::at(place)?,
                 None => match Host::find() {
-                    Err(LammpsError::NotInstalled { .. }) => install(&note)?,
+                    Err(LammpsError::NotInstalled { .. }) => plugin::install_to_build(&note)?,
                     found => found?,
                 },
             };
@@ -68,38 +73,35 @@ pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
             plugin::check(&host, &path)?;
             let built = plugin::built_for(&path)?;
             spinner.finish();
-            println!("plugin for LAMMPS {}: {}", built.lammps_version, path.display());
+            say!("plugin for LAMMPS {}: {}", built.lammps_version, path.display());
             let launcher = plugin::launcher(&path);
             match &launcher {
-                None => println!("in a LAMMPS script: plugin load \"{}\"", path.display()),
+                None => say!("in a LAMMPS script: plugin load \"{}\"", path.display()),
                 Some(program) => {
-                    println!(
-                        "this LAMMPS loads no plugins; use this program in place of lmp, under mpirun too:"
-                    );
-                    println!("  {} -in SCRIPT", program.display());
-                    println!("in Python: psidpd_register() of the plugin; see lammps-plugin/README.md");
+                    say!("this LAMMPS loads no plugins; use this program in place of lmp, under mpirun too:");
+                    say!("  {} -in SCRIPT", program.display());
+                    say!("in Python: psidpd_register() of the plugin; see lammps-plugin/README.md");
                 }
             }
             let built = built.lammps_version;
             write_json(json, &json!({"plugin": path, "launcher": launcher, "lammps_version": built}))?;
         }
-        Verb::Convert { script, law, out } => convert_script(script, *law, out.as_deref(), json)?,
-    }
-    Ok(Verdict::Good)
-}
-
-fn convert_script(script: &Path, law: Law, out: Option<&Path>, json: Option<&Path>) -> Result<(), Failure> {
-    // Where it is if it has been built here; else a name to be filled in.
-    let plugin = Some(base_dir().join(plugin::FILE_NAME)).filter(|p| p.is_file());
-    let plugin = plugin.unwrap_or_else(|| plugin::FILE_NAME.into());
-    let (files, new) = convert::files(script, law, &plugin.display().to_string(), out)?;
-    if out.is_none() {
-        print!("{}", new.script);
-    }
-    for (what, notes) in [("changed", &new.changed), ("look at", &new.left)] {
-        for note in notes {
-            eprintln!("{what:8} line {:4}: {}", note.line, note.text);
+        Verb::Convert { script, law, out, overwrite } => {
+            // Where it is if it has been built here; else a name to be filled in.
+            let plugin = Some(base_dir().join(plugin::FILE_NAME)).filter(|p| p.is_file());
+            let plugin = plugin.unwrap_or_else(|| plugin::FILE_NAME.into());
+            let (files, new) =
+                convert::files(script, *law, &plugin.display().to_string(), out.as_deref(), *overwrite)?;
+            if out.is_none() {
+                say::bytes(new.script.as_bytes());
+            }
+            for (what, notes) in [("changed", &new.changed), ("look at", &new.left)] {
+                for note in notes {
+                    eprintln!("{what:8} line {:4}: {}", note.line, printable(&note.text));
+                }
+            }
+            write_json(json, &json!({"files": files, "changed": new.changed, "left": new.left}))?;
         }
     }
-    write_json(json, &json!({"files": files, "changed": new.changed, "left": new.left}))
+    Ok(Verdict::Good)
 }

@@ -1,7 +1,7 @@
 //! The command line: one file for each verb.
 //!
-//! Exit codes: 0 on success, 1 when a check fails or a run stops, 2 on bad input or when something that
-//! is needed is missing. A run that a signal stopped exits with 128 and the number of the signal: 130 for
+//! Exit codes: 0 on success, 1 when a check fails, a run stops, or results cannot be written though they are there, 2 on bad
+//! input or when something that is needed is missing. A run that a signal stopped exits with 128 and the number of the signal: 130 for
 //! Ctrl-C, 143 for SIGTERM.
 
 mod bench;
@@ -20,6 +20,7 @@ mod pareto;
 mod report;
 mod reproduce;
 mod run;
+mod say;
 mod settings;
 mod shell;
 mod snapshot;
@@ -31,9 +32,11 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 pub use diagnostic::Failure;
 use inputs::Files;
 use psidpd_dynamics::checkpoint::Caller;
+use psidpd_formats::files::WriteError;
 use serde::Serialize;
 use settings::Settings;
 use std::ffi::OsString;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::OnceLock;
@@ -113,34 +116,29 @@ static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
 
 /// Runs the program.
 pub fn main() -> ExitCode {
-    end_quietly_with_the_reader();
-    let arguments = Arguments::from_arg_matches(&command().get_matches());
-    ExitCode::from(carry_out(arguments.unwrap_or_else(|error| error.exit())))
-}
-
-/// A reader that has seen enough, as `| head`, ends the program; `println!` would report a panic.
-fn end_quietly_with_the_reader() {
-    let report = std::panic::take_hook();
-    std::panic::set_hook(Box::new(move |panic| {
-        let message = panic.payload_as_str().unwrap_or_default();
-        if message.starts_with("failed printing to stdout") && message.contains("Broken pipe") {
-            std::process::exit(0);
-        }
-        report(panic);
-    }));
+    ExitCode::from(with_arguments(std::env::args_os()))
 }
 
 /// Runs the program inside another, as Python, and returns the exit code. The first of the arguments is the name of the
 /// program; `program` is a file that starts it, for verbs that need processes of their own.
 pub fn run(program: &Path, arguments: impl IntoIterator<Item = OsString>) -> u8 {
     PROGRAM.get_or_init(|| program.to_owned());
+    with_arguments(arguments)
+}
+
+fn with_arguments(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let matches = command().try_get_matches_from(arguments);
     match matches.and_then(|matches| Arguments::from_arg_matches(&matches)) {
         Ok(arguments) => carry_out(arguments),
         Err(error) => {
+            let code = u8::try_from(error.exit_code()).unwrap_or(2);
             // A closed terminal or pipe is no error.
-            let _ = error.print();
-            u8::try_from(error.exit_code()).unwrap_or(2)
+            match error.print() {
+                Err(lost) if code == 0 && lost.kind() != ErrorKind::BrokenPipe => {
+                    complain(&Lost(lost).into(), Caller::Neither)
+                }
+                _ => code,
+            }
         }
     }
 }
@@ -152,22 +150,32 @@ fn program() -> std::io::Result<PathBuf> {
 
 fn carry_out(arguments: Arguments) -> u8 {
     let json = arguments.json.as_deref();
-    let outcome = arguments
-        .verb
-        .files()
+    let files = arguments.verb.files();
+    let outcome = files
         .check(json)
         .map_err(Failure::from)
-        .and_then(|()| run_verb(&arguments.verb, json));
+        .and_then(|()| run_verb(&arguments.verb, json))
+        .map_err(|failure| failure.of(files.given()))
+        .and_then(|verdict| say::lost().map_or(Ok(verdict), |cause| Err(Lost(cause).into())));
     match outcome {
         Ok(Verdict::Good) => 0,
         Ok(Verdict::CheckFailed) => 1,
         Ok(Verdict::Interrupted(signal)) => 128 + signal,
-        Err(failure) => {
-            anstream::eprintln!("{}", failure.render(arguments.verb.caller()));
-            failure.exit_code()
-        }
+        Err(failure) => complain(&failure, arguments.verb.caller()),
     }
 }
+
+/// Tells of a failure, and returns its exit code.
+fn complain(failure: &Failure, caller: Caller) -> u8 {
+    // Nobody is left to be told of an error here.
+    let _ = writeln!(anstream::stderr(), "{}", failure.render(caller));
+    failure.exit_code()
+}
+
+/// What was done is done, but nobody could be told all of it.
+#[derive(Debug, thiserror::Error)]
+#[error("standard output cannot be written, and a part of what was said is lost: {0}")]
+struct Lost(std::io::Error);
 
 impl Verb {
     /// What it reads and writes, where it reads files that a user names.
@@ -230,11 +238,10 @@ fn run_verb(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
 }
 
 /// Writes `value` to the file of `--json`, if there is one.
-fn write_json(json: Option<&Path>, value: &impl Serialize) -> Result<(), Failure> {
+fn write_json(json: Option<&Path>, value: &impl Serialize) -> Result<(), WriteError> {
     let Some(path) = json else { return Ok(()) };
-    let mut text = serde_json::to_string_pretty(value)?;
-    text.push('\n');
-    psidpd_formats::files::write_atomically(path, text.as_bytes()).map_err(Failure::from)
+    let text = serde_json::to_string_pretty(value).map_err(|e| WriteError::at(path)(e.into()))? + "\n";
+    psidpd_formats::files::write_atomically(path, text.as_bytes())
 }
 
 #[cfg(test)]

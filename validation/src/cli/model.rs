@@ -1,3 +1,5 @@
+use super::run::thread_count;
+use super::say::{self, say};
 use super::{Failure, Verdict, write_json};
 use psidpd_experiments::bulk::Sampling;
 use psidpd_experiments::from_eos::{FromEosError, Options, Substance, from_eos};
@@ -46,7 +48,7 @@ pub struct FromEos {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Threads that share the work.
-    #[arg(long, value_name = "N", default_value = "1")]
+    #[arg(long, value_name = "N", default_value = "1", value_parser = thread_count)]
     threads: NonZeroUsize,
     /// Where the model file goes.
     #[arg(long, value_name = "FILE")]
@@ -90,7 +92,7 @@ pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
         a.out.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned()),
     );
     let substance = Substance::find(&a.substance)?;
-    let found = from_eos(&substance, &options, &command, &mut |line| println!("{line}"))?;
+    let found = from_eos(&substance, &options, &command, &mut |line| say!("{line}"))?;
     write_atomically(&a.out, found.text.as_bytes())?;
     let mut table = Table::new(["", "equation of state", "model"]);
     for c in &found.compared {
@@ -100,11 +102,12 @@ pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
             format!("{:.4} ± {:.4}", c.measured.value, c.measured.error),
         ]);
     }
-    println!("\n{}", table.to_text());
+    say!("");
+    say::table(&table);
     if !found.converged {
-        println!("the tolerance of {:.1} % is not met", 100.0 * a.tolerance);
+        say!("the tolerance of {:.1} % is not met", 100.0 * a.tolerance);
     }
-    println!("written to {}", a.out.display());
+    say!("written to {}", a.out.display());
     write_json(json, &found)?;
     Ok(if found.converged { Verdict::Good } else { Verdict::CheckFailed })
 }

@@ -1,3 +1,4 @@
+use super::say::say;
 use super::{Failure, Verdict, write_json};
 use psidpd_dynamics::scene::{TEMPLATES, Template};
 use serde_json::json;
@@ -28,9 +29,9 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     let chosen: Option<&Template> = TEMPLATES.iter().find(|t| t.name == arguments.template);
     let template = chosen.unwrap_or(&TEMPLATES[0]);
     let [scene, model] = template.write(&arguments.name)?;
-    println!("{}: {}", scene.display(), template.about);
-    println!("{}: its model", model.display());
-    println!("run it: psidpd run {} --out {}", scene.display(), scene.with_extension("").display());
+    say!("{}: {}", scene.display(), template.about);
+    say!("{}: its model", model.display());
+    say!("run it: psidpd run {} --out {}", scene.display(), scene.with_extension("").display());
     write_json(json, &json!({"scene": scene, "model": model, "template": template.name}))?;
     Ok(Verdict::Good)
 }

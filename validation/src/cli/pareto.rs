@@ -1,6 +1,7 @@
 use super::inputs::Files;
+use super::run::thread_count;
+use super::say::{self, say};
 use super::{Failure, Settings, Verdict, write_json};
-use psidpd_core::engine::Pool;
 use psidpd_experiments::pareto::{self, Choice, Effort, Options, Pace, Tolerance, page};
 use psidpd_report::Progress;
 use std::num::NonZeroUsize;
@@ -28,7 +29,7 @@ pub struct Arguments {
     #[arg(long)]
     full: bool,
     /// Thread counts of the native runner; default: 1 and 2.
-    #[arg(long, value_name = "N,…", value_delimiter = ',', value_parser = threads)]
+    #[arg(long, value_name = "N,…", value_delimiter = ',', value_parser = thread_count)]
     threads: Vec<NonZeroUsize>,
     /// Leave LAMMPS out, though it is installed.
     #[arg(long)]
@@ -43,11 +44,6 @@ pub struct Arguments {
 fn minutes(text: &str) -> Result<f64, String> {
     let value: f64 = text.parse().map_err(|e| format!("{e}"))?;
     if value > 0.0 && value <= 1e5 { Ok(value) } else { Err("a positive number of minutes".into()) }
-}
-
-fn threads(text: &str) -> Result<NonZeroUsize, String> {
-    let count: NonZeroUsize = text.parse().map_err(|e| format!("{e}"))?;
-    if count.get() <= Pool::MOST { Ok(count) } else { Err(format!("at most {}", Pool::MOST)) }
 }
 
 impl Arguments {
@@ -77,14 +73,15 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
         out: a.out.clone(),
     };
     let outcome = pareto::run(&scene, &options, &Progress::new())?;
-    println!("{}", page::table(&outcome).to_text());
-    println!("{}\n", page::explanation(&outcome));
-    outcome.left_out.iter().for_each(|line| println!("{line}\n"));
+    say::table(&page::table(&outcome));
+    say!("{}\n", page::explanation(&outcome));
+    outcome.left_out.iter().for_each(|line| say!("{line}\n"));
     if !outcome.drifts.is_empty() {
-        println!("energy without thermostat\n{}", page::drifts(&outcome).to_text());
+        say!("energy without thermostat");
+        say::table(&page::drifts(&outcome));
     }
-    println!("{}", page::recommendation(&outcome));
-    println!("report: {}", a.out.join("pareto.html").display());
+    say!("{}", page::recommendation(&outcome));
+    say!("report: {}", a.out.join("pareto.html").display());
     write_json(json, &outcome)?;
     Ok(Verdict::Good)
 }

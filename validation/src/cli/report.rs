@@ -1,4 +1,5 @@
 use super::inputs::Files;
+use super::say::say;
 use super::{Failure, Verdict, write_json};
 use psidpd_report::write_run_report;
 use serde_json::json;
@@ -21,7 +22,7 @@ impl Arguments {
 
 pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     let page = write_run_report(&arguments.folder)?;
-    println!("{}", page.display());
+    say!("{}", page.display());
     write_json(json, &json!({"report": page}))?;
     Ok(Verdict::Good)
 }

@@ -1,3 +1,5 @@
+use super::run::thread_count;
+use super::say::{self, say};
 use super::{Failure, Verdict, write_json};
 use psidpd_core::engine::Fault;
 use psidpd_experiments::papers::{Case, Compared, Context, Outcome, PaperError, Size, cases};
@@ -27,7 +29,7 @@ pub struct Arguments {
     #[arg(long, value_name = "DIR", default_value = "target/reproduce")]
     out: PathBuf,
     /// Threads of each run.
-    #[arg(long, value_name = "N", default_value = "1")]
+    #[arg(long, value_name = "N", default_value = "1", value_parser = thread_count)]
     threads: NonZeroUsize,
     /// What is wrong with the engine, in tests.
     #[arg(skip)]
@@ -44,7 +46,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     if arguments.list {
         let mut table = Table::new(["id", "what"]);
         chosen.iter().for_each(|case| table.push([case.id, case.what]));
-        println!("{}", table.to_text());
+        say::table(&table);
         let entry = |case: &&Case| json!({ "id": case.id, "paper": case.paper, "what": case.what });
         write_json(json, &json!({ "cases": chosen.iter().map(entry).collect::<Vec<_>>() }))?;
         return Ok(Verdict::Good);
@@ -54,7 +56,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     let mut good = true;
     let made = std::rc::Rc::default();
     for case in &chosen {
-        println!("{}: {}", case.id, case.what);
+        say!("{}: {}", case.id, case.what);
         let folder = arguments.out.join(if arguments.full { "full" } else { "quick" }).join(case.id);
         let context = Context {
             size,
@@ -72,13 +74,13 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
                 result(case, &outcome)
             }
             Err(PaperError::Run(why)) if why.is_stop() => {
-                println!("  stopped: {why}");
+                say!("  stopped: {why}");
                 good = false;
                 json!({ "id": case.id, "values": [], "pass": false, "stopped": why.to_string() })
             }
             Err(why) => return Err(Failure::from(why)),
         };
-        println!("  {:.0} s\n", begun.elapsed().as_secs_f64());
+        say!("  {:.0} s\n", begun.elapsed().as_secs_f64());
         results.push(result);
     }
     match &results[..] {
@@ -139,9 +141,9 @@ fn show(outcome: &Outcome) {
             .to_owned(),
         ]);
     }
-    println!("{}", table.to_text());
+    say::table(&table);
     for (name, (size, why)) in outcome.values.iter().filter_map(|v| Some((&v.name, v.allowance?))) {
-        println!("  {name}: {size} allowed, {why}");
+        say!("  {name}: {size} allowed, {why}");
     }
 }
 

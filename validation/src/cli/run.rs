@@ -1,13 +1,17 @@
 use super::inputs::Files;
+use super::say::{self, whoever_listens as say};
 use super::{Failure, Settings, Verdict, write_json};
+use psidpd_core::document::printable;
 use psidpd_core::engine::{Pool, Precision, processors};
 use psidpd_dynamics::run::FILES;
 use psidpd_dynamics::run::{Advice, Begin, Outcome, Runner, Start, Summary, Timing};
 use psidpd_experiments::check::calibration;
+use psidpd_formats::files::WriteError;
 use psidpd_report::{Headline, Progress, headline, write_run_report};
 use serde::Serialize;
 use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::flag;
+use std::ffi::OsStr;
 use std::io::Write;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -45,21 +49,22 @@ pub struct Arguments {
 }
 
 impl Arguments {
-    /// The command that goes on with the run, with everything that was asked for.
-    fn to_resume(&self, json: Option<&Path>) -> String {
-        let mut words = vec![format!(
-            "psidpd run {} --out {} --resume",
-            quoted(&self.scene.display().to_string()),
-            quoted(&self.out.display().to_string())
-        )];
+    /// The command that goes on with the run, with everything that was asked for, if it can be shown.
+    fn to_resume(&self, json: Option<&Path>) -> Option<String> {
+        let mut words =
+            vec![format!("psidpd run {} --out {} --resume", quoted(&self.scene)?, quoted(&self.out)?)];
         if self.threads.get() > 1 {
             words.push(format!("--threads {}", self.threads));
         }
         words.extend(self.precision.map(|precision| format!("--precision {precision}")));
-        words.extend(self.settings.edits.iter().map(|e| format!("--set {}", quoted(&e.to_string()))));
+        for edit in &self.settings.edits {
+            words.push(format!("--set {}", quoted(edit.to_string())?));
+        }
         words.extend(self.report.then(|| "--report".to_owned()));
-        words.extend(json.map(|path| format!("--json {}", quoted(&path.display().to_string()))));
-        words.join(" ")
+        if let Some(file) = json {
+            words.push(format!("--json {}", quoted(file)?));
+        }
+        Some(words.join(" "))
     }
 }
 
@@ -70,9 +75,18 @@ impl Arguments {
     }
 }
 
+/// How many threads, on the command line.
 pub fn thread_count(text: &str) -> Result<NonZeroUsize, String> {
-    let count: NonZeroUsize = text.parse().map_err(|e| format!("{e}"))?;
-    if count.get() <= Pool::MOST { Ok(count) } else { Err(format!("at most {}", Pool::MOST)) }
+    let count = text.parse().map_err(|e| format!("{e}"))?;
+    Pool::count(count).map_err(|e| e.to_string())
+}
+
+/// A run is finished, and what it came to is lost.
+#[derive(Debug, thiserror::Error)]
+#[error("the run in {} is finished, but {cause}", folder.display())]
+pub struct Unwritten {
+    folder: PathBuf,
+    cause: WriteError,
 }
 
 /// What `--json` writes.
@@ -116,12 +130,12 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         p.deviations.iter().for_each(|deviation| warn(&deviation.to_string()));
     });
     bar.finish();
-    if *report && outcome.as_ref().err().is_none_or(|e| e.is_stop()) {
-        let page = write_run_report(out);
-        // A full disk has no room for a page either, and the error of the run is more informative.
-        if outcome.is_ok() {
-            page?;
-        }
+    // The run is what it is, with its page or without.
+    if *report
+        && outcome.as_ref().err().is_none_or(|e| e.is_stop())
+        && let Err(error) = write_run_report(out)
+    {
+        warn(&format!("the run has no page: {error}; to make it: psidpd report"));
     }
     match outcome? {
         Outcome::Finished { summary, timing, advice } => {
@@ -135,18 +149,20 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
                 ));
             }
             let found = headline(out);
-            say(&format!("\n{}", found.table().to_text()));
+            say("");
+            say::table_to_whoever_listens(&found.table());
             found.notes.iter().for_each(|note| say(&format!("note: {note}")));
             advice.iter().for_each(|advice| say(&format!("note: {advice}")));
             say(&format!("written to {}", out.display()));
-            write_json(
-                json,
-                &Report { summary: &summary, timing: &timing, headline: &found, advice: advice.as_ref() },
-            )?;
+            let results =
+                Report { summary: &summary, timing: &timing, headline: &found, advice: advice.as_ref() };
+            write_json(json, &results).map_err(|cause| Unwritten { folder: out.clone(), cause })?;
             Ok(Verdict::Good)
         }
         Outcome::Interrupted { stop, step, steps } => {
-            say(&format!("stopped after step {step} of {steps}; to go on: {}", arguments.to_resume(json)));
+            let command =
+                arguments.to_resume(json).map_or(String::new(), |line| format!("; to go on: {line}"));
+            say(&format!("stopped after step {step} of {steps}{command}"));
             Ok(Verdict::Interrupted(u8::try_from(stop).unwrap_or(0)))
         }
     }
@@ -170,7 +186,7 @@ fn tell_start(start: &Start, begin: Begin, out: &Path, total: u64) -> u64 {
             say(&format!("the run in {} is finished: nothing is left to do", out.display()));
             total
         }
-        Start::Resumed { step, program, fallback } => {
+        Start::Resumed { step, program, instructions, fallback } => {
             if let Some(why) = fallback {
                 warn(&format!("{why}; going on from the one before"));
             }
@@ -178,6 +194,12 @@ fn tell_start(start: &Start, begin: Begin, out: &Path, total: u64) -> u64 {
                 warn(&format!(
                     "the checkpoint is of psidpd {program}: what follows may differ in rounding from what that \
                      version would have computed"
+                ));
+            }
+            if let Some(instructions) = instructions {
+                warn(&format!(
+                    "the checkpoint was computed with {instructions}, which this run has not: what follows may differ in rounding, and \
+                     its files in their bytes"
                 ));
             }
             say(&format!("going on after step {step} of {total}"));
@@ -201,21 +223,17 @@ pub fn watch_signals() -> std::io::Result<Arc<AtomicUsize>> {
     Ok(stop)
 }
 
-/// Prints a line. A closed terminal or pipe, as after Ctrl-C, is no error.
-fn say(line: &str) {
-    let _ = writeln!(std::io::stdout(), "{line}");
-}
-
 fn warn(line: &str) {
-    let _ = writeln!(std::io::stderr(), "warning: {line}");
+    let _ = writeln!(std::io::stderr(), "warning: {}", printable(line));
 }
 
-/// A word as a shell takes it.
-pub fn quoted(text: &str) -> String {
+/// A word as a shell takes it; `None` if it cannot be shown, for it is no text or has control characters.
+pub fn quoted(word: impl AsRef<OsStr>) -> Option<String> {
+    let text = word.as_ref().to_str().filter(|text| printable(text) == *text && !text.contains('\n'))?;
     let plain = |c: char| c.is_alphanumeric() || "/._-+,=@%:".contains(c);
-    if !text.is_empty() && text.chars().all(plain) {
+    Some(if !text.is_empty() && text.chars().all(plain) {
         text.to_owned()
     } else {
         format!("'{}'", text.replace('\'', r"'\''"))
-    }
+    })
 }

@@ -1,9 +1,10 @@
 //! What a shell and `man` want to know of the program.
 
+use super::say::{self, say};
 use super::{Failure, Verdict, write_json};
 use clap_complete::Shell;
+use psidpd_formats::files::WriteError;
 use serde_json::json;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Print a script that completes verbs and options in a shell.
@@ -25,15 +26,15 @@ pub struct Man {
 pub fn completions(a: &Completions) -> Result<Verdict, Failure> {
     let mut script = Vec::new();
     clap_complete::generate(a.shell, &mut super::command(), "psidpd", &mut script);
-    // A closed pipe is no error.
-    let _ = std::io::stdout().write_all(&script);
+    say::bytes(&script);
     Ok(Verdict::Good)
 }
 
 pub fn man(a: &Man, json: Option<&Path>) -> Result<Verdict, Failure> {
-    std::fs::create_dir_all(&a.out)?;
-    clap_mangen::generate_to(super::command(), &a.out)?;
-    println!("{}", a.out.join("psidpd.1").display());
+    std::fs::create_dir_all(&a.out)
+        .and_then(|()| clap_mangen::generate_to(super::command(), &a.out))
+        .map_err(WriteError::at(&a.out))?;
+    say!("{}", a.out.join("psidpd.1").display());
     write_json(json, &json!({"folder": a.out}))?;
     Ok(Verdict::Good)
 }

@@ -1,4 +1,5 @@
 use super::inputs::Files;
+use super::say::say;
 use super::settings::temperature;
 use super::{Failure, Verdict, write_json};
 use psidpd_core::engine::check_reach;
@@ -144,7 +145,7 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
             .map(|(f, v)| Ok(figure(a, model.as_ref(), f, v.as_deref(), ends)?.image))
             .collect::<Result<Vec<_>, Failure>>()?;
         write_atomically(&out, &Image::to_gif(&images, DELAY).map_err(request)?)?;
-        println!("{}", out.display());
+        say!("{}", out.display());
         write_json(json, &json!({"film": out, "frames": images.len(), "colours": ends}))?;
         return Ok(Verdict::Good);
     }
@@ -154,7 +155,7 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     let figure = figure(a, model.as_ref(), &configuration, values.as_deref(), ends)?;
     let bytes = if kind == "svg" { figure.render()?.into_bytes() } else { figure.image.to_png()? };
     write_atomically(&out, &bytes)?;
-    println!("{}", out.display());
+    say!("{}", out.display());
     let particles = configuration.x.len();
     let colours = values.map(|_| ends);
     write_json(

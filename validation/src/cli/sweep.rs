@@ -1,5 +1,6 @@
 use super::inputs::Files;
 use super::run::{quoted, thread_count, watch_signals};
+use super::say::{self, say};
 use super::{Failure, Settings, Verdict, write_json};
 use psidpd_experiments::sweep::{self, Axis, Options};
 use std::num::NonZeroUsize;
@@ -21,7 +22,7 @@ pub struct Arguments {
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Runs side by side [default: processors / threads].
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = thread_count)]
     jobs: Option<NonZeroUsize>,
     /// Threads of each run.
     #[arg(long, value_name = "N", default_value = "1", value_parser = thread_count)]
@@ -57,33 +58,40 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     let points = sweep::run(&options, &stop, &|point, ended| {
         let edits: Vec<String> = point.edits.iter().map(ToString::to_string).collect();
         let what = point.error.as_ref().map_or(String::new(), |e| format!(": {e}"));
-        println!("{ended} of {total}: {}{what}", edits.join(", "));
+        say!("{ended} of {total}: {}{what}", edits.join(", "));
     })?;
     let title = a.scene.file_stem().map_or("sweep".into(), |n| n.to_string_lossy());
     sweep::write(&options, &title, &points)?;
-    println!("\n{}", sweep::table(&a.over, &points).to_text());
-    println!("written to {}", a.out.join("sweep.csv").display());
-    println!("report: {}", a.out.join("report.html").display());
+    say!("");
+    say::table(&sweep::table(&a.over, &points));
+    say!("written to {}", a.out.join("sweep.csv").display());
+    say!("report: {}", a.out.join("report.html").display());
     write_json(json, &points)?;
     let signal = stop.load(Ordering::Relaxed);
     if signal != 0 {
         let finished = points.iter().filter(|p| p.finished).count();
-        println!("stopped with {finished} of {total} runs finished; to go on: {}", a.to_go_on(json));
+        let command = a.to_go_on(json).map_or(String::new(), |line| format!("; to go on: {line}"));
+        say!("stopped with {finished} of {total} runs finished{command}");
         return Ok(Verdict::Interrupted(u8::try_from(signal).unwrap_or(0)));
     }
     Ok(if points.iter().all(|p| p.finished) { Verdict::Good } else { Verdict::CheckFailed })
 }
 
 impl Arguments {
-    /// The command that goes on with the sweep.
-    fn to_go_on(&self, json: Option<&Path>) -> String {
-        let path = |path: &Path| quoted(&path.display().to_string());
-        let mut words = vec![format!("psidpd sweep {} --out {}", path(&self.scene), path(&self.out))];
-        words.extend(self.over.iter().map(|axis| format!("--over {}", quoted(&axis.text))));
-        words.extend(self.settings.edits.iter().map(|e| format!("--set {}", quoted(&e.to_string()))));
+    /// The command that goes on with the sweep, if it can be shown.
+    fn to_go_on(&self, json: Option<&Path>) -> Option<String> {
+        let mut words = vec![format!("psidpd sweep {} --out {}", quoted(&self.scene)?, quoted(&self.out)?)];
+        for axis in &self.over {
+            words.push(format!("--over {}", quoted(&axis.text)?));
+        }
+        for edit in &self.settings.edits {
+            words.push(format!("--set {}", quoted(edit.to_string())?));
+        }
         words.extend(self.jobs.map(|n| format!("--jobs {n}")));
         words.extend((self.threads.get() > 1).then(|| format!("--threads {}", self.threads)));
-        words.extend(json.map(|file| format!("--json {}", path(file))));
-        words.join(" ")
+        if let Some(file) = json {
+            words.push(format!("--json {}", quoted(file)?));
+        }
+        Some(words.join(" "))
     }
 }

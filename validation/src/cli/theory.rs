@@ -1,5 +1,6 @@
 use super::check::{number_density, per_species};
 use super::inputs::Files;
+use super::say::{self, say};
 use super::settings::temperature;
 use super::{Failure, Settings, Verdict, write_json};
 use psidpd_core::model::Model;
@@ -7,7 +8,7 @@ use psidpd_core::theory::{MeanField, TheoryError, composition_critical_point, cr
 use psidpd_dynamics::prediction::{Prediction, predict, published};
 use psidpd_experiments::measure::{self, Effort};
 use psidpd_experiments::theory_page::{self, Scope};
-use psidpd_report::quantity::with_error;
+use psidpd_report::quantity::{decimal, number, with_error};
 use psidpd_report::{Headline, Table};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -119,7 +120,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     };
     for (k, kt) in kts.iter().enumerate() {
         if k > 0 {
-            println!();
+            say!("");
         }
         let (value, good) = one(arguments, &model, *kt, &mut scope)?;
         all.push(value);
@@ -128,7 +129,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     if let Some(path) = &arguments.report {
         let page = theory_page::page(&model, &scope)?.render();
         psidpd_formats::files::write_atomically(path, page.as_bytes())?;
-        println!("report: {}", path.display());
+        say!("report: {}", path.display());
     }
     match all.as_slice() {
         [single] => write_json(json, single)?,
@@ -157,7 +158,7 @@ fn one(arguments: &Arguments, model: &Model, kt: f64, scope: &mut Scope) -> Resu
     scope.density = scope.density.max(total);
     scope.range = [scope.range[0].min(range[0]), scope.range[1].max(range[1])];
 
-    println!("{} at kT = {kt}", model.title());
+    say!("{} at kT = {}", model.title(), number(kt));
     let mut table = Table::new(["density", "pressure", "dp/drho", "excess free energy per particle"]);
     let (mut rows, mut empty) = (Vec::new(), Vec::new());
     for k in 1..=arguments.rows.min(10_000) {
@@ -165,21 +166,24 @@ fn one(arguments: &Arguments, model: &Model, kt: f64, scope: &mut Scope) -> Resu
         let rho: Vec<f64> = densities.iter().map(|d| d * scale).collect();
         let (p, slope) = (theory.pressure(&rho), theory.pressure_slope(&rho));
         let f = theory.excess_free_energy_density(&rho) / (scale * total);
-        let cell = |x: f64| if x.is_finite() { format!("{x:.6}") } else { String::new() };
+        let cell = |x: f64| if x.is_finite() { decimal(x, 6) } else { String::new() };
         if ![p, slope, f].iter().all(|x| x.is_finite()) {
             empty.push(scale * total);
         }
         table.push([scale * total, p, slope, f].map(cell));
         rows.push(json!({"density": scale * total, "pressure": p, "pressure_slope": slope, "excess": f}));
     }
-    println!("{}", table.to_text());
+    say::table(&table);
     if let Some(line) = without_numbers(&empty) {
-        println!("{line}\n");
+        say!("{line}\n");
     }
     let middle = theory.pressure(&densities);
     let defined = middle.is_finite();
     if !defined {
-        println!("at density {total} there is no pressure: psi or its slope is no finite number there\n");
+        say!(
+            "at density {} there is no pressure: psi or its slope is no finite number there\n",
+            number(total)
+        );
     }
 
     let answers: Vec<(&str, Value)> = match species {
@@ -246,12 +250,12 @@ fn one(arguments: &Arguments, model: &Model, kt: f64, scope: &mut Scope) -> Resu
         _ => Vec::new(),
     };
     for (name, value) in &answers {
-        println!("{name}: {}", shown(value));
+        say!("{name}: {}", shown(value));
     }
     if species == 2 {
-        println!("composition and spinodal: the fraction of {}", model.species()[0]);
+        say!("composition and spinodal: the fraction of {}", model.species()[0]);
         for (of, rests_on) in ASSUMPTIONS {
-            println!("{of}: {rests_on}");
+            say!("{of}: {rests_on}");
         }
     }
     let known = published(model, kt, Some(total));
@@ -267,14 +271,15 @@ fn one(arguments: &Arguments, model: &Model, kt: f64, scope: &mut Scope) -> Resu
     }
     if prediction.is_some() || !measured.is_empty() {
         let table = beside(total, theory.pressure(&densities), prediction.as_ref(), &known, &measured);
-        println!("\n{}", table.to_text());
+        say!("");
+        say::table(&table);
     }
     for note in measured.iter().flat_map(|h| &h.notes) {
-        println!("note: {note}");
+        say!("note: {note}");
     }
     let doubts = prediction.as_ref().map_or(Vec::new(), Prediction::doubts);
     for doubt in &doubts {
-        println!("note: {doubt}");
+        say!("note: {doubt}");
         scope.doubts.push(format!("kT = {kt}: {doubt}"));
     }
     let mut all = json!({"title": model.title(), "kT": kt, "equation_of_state": rows, "doubts": doubts});
@@ -342,10 +347,7 @@ fn beside(
         ("tension", interface.map(|i| i.tension), None),
         ("width", interface.map(|i| i.width), None),
     ];
-    // Rounded before it is written, and 0 added: a small negative number would be −0.0000.
-    let show = |x: Option<f64>| {
-        x.filter(|x| x.is_finite()).map_or(String::new(), |x| format!("{:.4}", (x * 1e4).round() / 1e4 + 0.0))
-    };
+    let show = |x: Option<f64>| x.filter(|x| x.is_finite()).map_or(String::new(), |x| decimal(x, 4));
     let mut header = vec!["", "mean field", "correlated"];
     header.extend((!known.is_empty()).then_some("published"));
     header.extend((!measured.is_empty()).then_some("measured"));
@@ -387,7 +389,7 @@ fn shown(value: &Value) -> String {
         Value::Array(items) => items.iter().map(shown).collect::<Vec<_>>().join(" .. "),
         Value::Null => "without end".into(),
         Value::Bool(yes) => if *yes { "yes" } else { "no" }.into(),
-        Value::Number(n) => n.as_f64().map_or_else(|| n.to_string(), |x| format!("{x:.6}")),
+        Value::Number(n) => n.as_f64().map_or_else(|| n.to_string(), |x| decimal(x, 6)),
         other => other.to_string(),
     }
 }

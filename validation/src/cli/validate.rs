@@ -1,3 +1,4 @@
+use super::say::{self, say};
 use super::{Failure, Verdict, write_json};
 use psidpd_core::engine::Fault;
 use psidpd_experiments::crosscheck::{Options, check_table, validate};
@@ -27,8 +28,8 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     let options = Options { full, out: out.clone(), only, fault };
     let outcome = validate(&options, &progress)?;
     let results = &outcome.results;
-    println!("{}", check_table(results).to_text());
-    println!(
+    say::table(&check_table(results));
+    say!(
         "\n{} passed, {} failed\nreport: {}",
         results.passed_count(),
         results.failed_count(),

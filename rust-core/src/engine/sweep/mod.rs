@@ -20,7 +20,7 @@ mod workspace;
 
 pub(super) use pair_lists::{PairLists, PlanePairs};
 pub(super) use places::{Images, MARGIN, Places};
-pub use psidpd_threads::{Pool, part};
+pub use psidpd_threads::{Pool, ThreadCount, part};
 pub use times::Times;
 
 use super::counts::PassCounts;

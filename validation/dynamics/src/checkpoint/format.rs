@@ -6,7 +6,7 @@ use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
 
 /// Version of the format. It grows whenever [`Checkpoint`] or anything that it holds changes.
-pub const VERSION: u32 = 5;
+pub const VERSION: u32 = 6;
 
 const MAGIC: [u8; 8] = *b"psidpdCK";
 const HEADER: usize = 24;

@@ -44,6 +44,8 @@ const NEWEST: &str = "checkpoint";
 pub struct Checkpoint {
     /// Version of the program that wrote it.
     pub program: String,
+    /// The instruction set that its forces were computed with: sums of forces depend on it by rounding.
+    pub instructions: String,
     /// Of which scene and model.
     pub identity: Identity,
     /// Whether the run is at its end, and its files are all written.

@@ -24,6 +24,9 @@ pub struct Found {
 }
 
 impl Store {
+    /// The names of all.
+    pub const FILES: [&str; 3] = [UNFINISHED, BEFORE, NEWEST];
+
     /// Those in `folder`.
     pub fn new(folder: &Path) -> Store {
         Store { folder: folder.to_owned() }
@@ -111,7 +114,7 @@ impl Store {
 
     /// Removes all.
     pub fn clear(&self) -> Result<(), WriteError> {
-        self.remove(&[UNFINISHED, BEFORE, NEWEST])
+        self.remove(&Store::FILES)
     }
 
     fn remove(&self, names: &[&str]) -> Result<(), WriteError> {

@@ -8,6 +8,7 @@ const HARD: [f64; 3] = [-0.0, 5e-324, 0.1 + 0.2];
 
 fn checkpoint(step: u64) -> Checkpoint {
     Checkpoint {
+        instructions: "portable".into(),
         program: "1.2.3".into(),
         identity: Identity::default(),
         finished: false,

@@ -11,8 +11,19 @@ use std::path::Path;
 
 /// Particles that are no valid state of a model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("the initial state is not usable: {0}")]
-pub struct StateError(pub String);
+#[error("the initial state is not usable: {message}")]
+pub struct StateError {
+    /// What is wrong.
+    pub message: String,
+    /// The atom that is wrong, by its id, if it is one.
+    pub atom: Option<u32>,
+}
+
+impl StateError {
+    fn new(message: impl Into<String>) -> StateError {
+        StateError { message: message.into(), atom: None }
+    }
+}
 
 impl State {
     /// The state as a data file of atom style `atomic`: types are species from 1; `title` becomes the
@@ -82,9 +93,10 @@ impl State {
         ]);
         let walls = periodic[..model.dimensions()].iter().any(|p| !p);
         if walls && data.tilt.is_some_and(|tilt| tilt != [0.0; 3]) {
-            return Err(StateError("a box with tilt has no reflecting walls".into()));
+            return Err(StateError::new("a box with tilt has no reflecting walls"));
         }
-        let domain = PeriodicBox::new(data.boxlo, edges, periodic).map_err(|e| StateError(e.to_string()))?;
+        let domain =
+            PeriodicBox::new(data.boxlo, edges, periodic).map_err(|e| StateError::new(e.to_string()))?;
         let mut state = State {
             domain,
             mass: vec![1.0; species],
@@ -100,14 +112,17 @@ impl State {
         for atom in &data.atoms {
             let kind = atom.kind as usize;
             if kind > species {
-                return Err(StateError(format!(
+                let message = format!(
                     "atom {} has type {kind}, the model has {species} species: {}",
                     atom.id,
                     model.species().join(", ")
-                )));
+                );
+                return Err(StateError { message, atom: Some(atom.id) });
             }
-            let tag = i32::try_from(atom.id)
-                .map_err(|_| StateError(format!("atom id {} is beyond what tags can count", atom.id)))?;
+            let tag = i32::try_from(atom.id).map_err(|_| {
+                let message = format!("atom id {} is beyond what tags can count", atom.id);
+                StateError { message, atom: Some(atom.id) }
+            })?;
             let (mut x, mut image) = (atom.x, atom.image);
             state.domain.wrap(&mut x, &mut image);
             state.x.push(x);

@@ -4,6 +4,7 @@ use psidpd_core::document::FileError;
 use psidpd_core::engine::{EngineError, NoEnergy, ReachError};
 use psidpd_core::model::expression::TooLarge;
 use psidpd_formats::files::WriteError;
+use psidpd_formats::memory::MemoryError;
 use std::path::{Path, PathBuf};
 
 /// Why a run cannot start, or stopped.
@@ -35,6 +36,11 @@ pub enum RunError {
          for these forces"
     )]
     Velocity { step: u64, tag: i32 },
+    #[error(
+        "step {step}: the pressure of drag and noise is not finite: the drag is too strong for numbers, or the time step too large \
+         for it"
+    )]
+    Impulses { step: u64 },
     #[error(
         "step {step}: particle {tag} moved {distance:.3e} in one step, further than across the box: \
          the time step is likely too large for these forces"
@@ -74,6 +80,10 @@ pub enum RunError {
     Unfinished { folder: PathBuf, step: Option<u64> },
     #[error("{} holds a finished run{}", folder.display(), if *other { " of another scene" } else { "" })]
     Finished { folder: PathBuf, other: bool },
+    #[error("the run would replace {}, which its scene starts from", path.display())]
+    OwnInput { path: PathBuf },
+    #[error(transparent)]
+    Memory(#[from] MemoryError),
     #[error("another run is writing to {}", folder.display())]
     Busy { folder: PathBuf },
     #[error(transparent)]
@@ -86,7 +96,7 @@ pub enum RunError {
 
 impl From<StateError> for RunError {
     fn from(error: StateError) -> RunError {
-        RunError::State(error.0)
+        RunError::State(error.message)
     }
 }
 
@@ -105,6 +115,7 @@ impl RunError {
                 | RunError::Halted { .. }
                 | RunError::Engine { .. }
                 | RunError::Velocity { .. }
+                | RunError::Impulses { .. }
                 | RunError::Runaway { .. }
                 | RunError::Uncounted { .. }
                 | RunError::TooHot { .. }
@@ -132,6 +143,7 @@ impl RunError {
             }
             RunError::Unfinished { .. } => format!("{go_on}, or {over}"),
             RunError::Finished { .. } => format!("choose another folder, or {over}"),
+            RunError::OwnInput { .. } => "choose another folder, or start from a copy of the file".into(),
             RunError::Busy { .. } => "wait for its end, or choose another folder".into(),
             RunError::Checkpoint(error) => error.help(caller),
             _ => return None,

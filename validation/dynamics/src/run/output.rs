@@ -4,7 +4,7 @@ use super::dump::write_frame;
 use super::error::RunError;
 use super::growing::GrowingFile;
 use super::thermo::ThermoFile;
-use crate::checkpoint::{Thermo, Written};
+use crate::checkpoint::{Store, Thermo, Written};
 use crate::scene::Scene;
 use psidpd_formats::files::remove_if_there;
 use psidpd_formats::{Frame, write_xyz};
@@ -27,6 +27,14 @@ pub const FILES: [&str; 5] = [ThermoFile::NAME, DUMP, XYZ, "final.data", "last-g
 /// Files that are written when a run ends, finished or not.
 const LAST: [&str; 5] = ["final.data", "last-good.data", OBSERVABLES, "summary.json", "report.html"];
 
+/// Whether a new run in `folder` would remove or replace `input`, a file or the folder of another run.
+pub(super) fn replaces(folder: &Path, input: &Path) -> bool {
+    let (Ok(folder), Ok(input)) = (folder.canonicalize(), input.canonicalize()) else { return false };
+    let name = input.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+    let own = [&FILES[..], &LAST, &Store::FILES].concat();
+    input == folder || input.parent() == Some(&folder) && own.contains(&name)
+}
+
 /// What was observed.
 const OBSERVABLES: &str = "observables.json";
 
@@ -44,8 +52,8 @@ impl Output {
     /// Empty files, and a description of the run.
     pub fn create(scene: &Scene, folder: &Path) -> Result<Output, RunError> {
         remove(folder, &[ThermoFile::NAME, DUMP, XYZ])?;
-        remove(folder, &LAST)?;
         remove_tables(folder)?;
+        remove(folder, &LAST)?;
         remove_snapshots(folder)?;
         super::about::about(scene).write(folder)?;
         let thermo = (scene.output.thermo > 0).then(|| ThermoFile::create(folder));
@@ -56,8 +64,8 @@ impl Output {
 
     /// The files of a run that goes on, cut to what was `written` at its checkpoint.
     pub fn reopen(folder: &Path, written: &BTreeMap<String, Written>) -> Result<Output, RunError> {
-        remove(folder, &LAST)?;
         remove_tables(folder)?;
+        remove(folder, &LAST)?;
         let written = |name: &str| written.get(name).copied();
         let thermo = written(ThermoFile::NAME).map(|written| ThermoFile::reopen(folder, written));
         let dump = written(DUMP).map(|written| GrowingFile::reopen(folder, DUMP, written));
@@ -117,14 +125,18 @@ pub(super) fn write_observations(folder: &Path, observations: &[Observation]) ->
         .map_err(RunError::output(&json))
 }
 
-/// Removes the tables of a run before, and their folder unless there is something else in it.
+/// Removes the tables of a run before, those that its `observables.json` tells of, and their folder unless there is something
+/// else in it.
 fn remove_tables(folder: &Path) -> Result<(), RunError> {
     let tables = folder.join(TABLES);
+    let text = std::fs::read_to_string(folder.join(OBSERVABLES)).unwrap_or_default();
+    let all: Vec<Observation> = serde_json::from_str(&text).unwrap_or_default();
     let remove = || -> io::Result<()> {
-        for entry in tables.read_dir()? {
-            let path = entry?.path();
-            if path.extension().is_some_and(|e| e == "csv") {
-                std::fs::remove_file(path)?;
+        for observation in &all {
+            // A name from elsewhere may be that of a place.
+            let name = observation.file_name(&all);
+            if Path::new(&name).file_name() == Some(name.as_ref()) {
+                remove_if_there(&tables.join(name))?;
             }
         }
         std::fs::remove_dir(&tables)

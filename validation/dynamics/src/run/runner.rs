@@ -1,15 +1,17 @@
 use super::error::RunError;
 use super::folder::Folder;
 use super::outcome::{Outcome, Progress};
-use super::output::Output;
+use super::output::{Output, replaces};
 use super::simulation::Simulation;
 use super::summary::Summary;
 use super::timing::Timing;
 use super::underway::Run;
+
 use crate::checkpoint::{Checkpoint, CheckpointError, Found, Identity, Position, Store, Sums, Written};
 use crate::particles::State;
-use crate::scene::Scene;
+use crate::scene::{Initial, Scene};
 use psidpd_core::engine::{Fault, Settings};
+use psidpd_formats::memory;
 use psidpd_observe::Observers;
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
@@ -44,6 +46,8 @@ pub enum Start {
         /// The version of the program that wrote it, if that is another one: the steps that follow need not
         /// be to the last bit those that it would have made.
         program: Option<String>,
+        /// The instruction set that it was computed with, if that is another one: the same holds.
+        instructions: Option<String>,
         /// What is wrong with the newest checkpoint, if it is the one before.
         fallback: Option<CheckpointError>,
     },
@@ -101,11 +105,19 @@ impl<'a> Runner<'a> {
         if begin == Begin::New {
             refuse_other_runs(&store, &identity, out)?;
         }
+        if let Initial::File { path, .. } = &scene.initial
+            && replaces(out, path)
+        {
+            return Err(RunError::OwnInput { path: path.clone() });
+        }
+        let particles = scene.initial.parts().iter().map(|part| part.count).sum();
+        memory::check(particles)?;
         let state = scene.initial_state();
         let simulation = simulation(scene, state.clone())?;
         store.clear()?;
         let good = Checkpoint {
             program: PROGRAM.into(),
+            instructions: simulation.settings().instructions.to_string(),
             identity,
             finished: false,
             step: 0,
@@ -132,6 +144,7 @@ impl<'a> Runner<'a> {
         if let Some(stage) = scene.stages.get(good.position.stage) {
             scene.enter(stage, &mut simulation)?;
         }
+        let instructions = simulation.settings().instructions.to_string();
         simulation.restore(good.step, &good.state, &good.forces, good.out_of_bounds);
         simulation.set_max_move(good.max_move);
         if fallback.is_some() {
@@ -141,14 +154,17 @@ impl<'a> Runner<'a> {
             (Start::Finished, None)
         } else {
             let program = (good.program != PROGRAM).then(|| good.program.clone());
-            let start = Start::Resumed { step: good.step, program, fallback };
+            let instructions = (good.instructions != instructions).then(|| good.instructions.clone());
+            let start = Start::Resumed { step: good.step, program, instructions, fallback };
             (start, Some(Output::reopen(folder.path(), &good.files)?))
         };
-        let good = Checkpoint { program: PROGRAM.into(), ..good };
+        let good = Checkpoint { program: PROGRAM.into(), instructions, ..good };
         let timing = Timing::read(folder.path());
-        // `about.json` does not depend on where a run stopped.
+        // `about.json` does not depend on where a run stopped. The folder of a finished run may be one that cannot be written.
         if !folder.path().join("about.json").is_file() {
-            super::about::about(scene).write(folder.path())?;
+            super::about::about(scene)
+                .write(folder.path())
+                .or_else(|error| if good.finished { Ok(()) } else { Err(error) })?;
         }
         let mut run = Run::new(scene, folder, store, simulation, output, good, timing)?;
         run.stored = Some(run.good.step);
@@ -205,7 +221,8 @@ impl<'a> Runner<'a> {
     ) -> Result<Outcome, RunError> {
         let Runner { start, run } = self;
         if matches!(start, Start::Finished) {
-            run.store.keep_newest()?;
+            // What is left of checkpoints before does no harm, and the folder may be one that cannot be written.
+            let _ = run.store.keep_newest();
             return Ok(Outcome::Finished {
                 summary: Box::new(run.summary()),
                 timing: run.timing.clone(),

@@ -184,7 +184,7 @@ fn place(options: &Options, out: &Path, progress: &Progress) -> Result<(Place, S
     let note = |line: &str| progress.note(line);
     let host = match &options.lammps {
         Some(place) => Host::at(place)?,
-        None => psidpd_lammps_host::install(&note)?,
+        None => psidpd_lammps_host::plugin::install_to_build(&note)?,
     };
     let version = host.version()?;
     let plugin = psidpd_lammps_host::plugin::build(&host, &note)?;

@@ -3,6 +3,7 @@
 use crate::bulk::{Bulk, Sampling};
 use psidpd_dynamics::run::{Begin, RunError, Runner};
 use psidpd_dynamics::scene::Scene;
+use psidpd_formats::memory;
 use serde::Serialize;
 use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -20,12 +21,6 @@ pub struct Cost {
     /// Seconds of all steps on one thread, with what the last stage measures and writes; roughly.
     pub seconds: f64,
 }
-
-/// Bytes of a particle at the peak: 4 GB for ten million (docs/running.md).
-const BYTES: f64 = 400.0;
-
-/// Bytes of a process without particles.
-const PROGRAM: f64 = 2e7;
 
 /// Above so many particles a small box of the fluid is tried instead.
 const LARGE: usize = 300_000;
@@ -64,7 +59,7 @@ pub fn cost(scene: &Scene) -> Result<Cost, RunError> {
     } else {
         trial(scene)?
     };
-    Ok(Cost { particles, steps, bytes: PROGRAM + BYTES * particles as f64, seconds: each * steps as f64 })
+    Ok(Cost { particles, steps, bytes: memory::need(particles), seconds: each * steps as f64 })
 }
 
 /// Seconds of a step of the last stage.

@@ -40,7 +40,7 @@ pub fn validate(options: &Options, progress: &Progress) -> Result<Outcome, Valid
     // LAMMPS runs in folders of its own: paths must not depend on ours.
     let out = options.out.canonicalize().map_err(ValidateError::io(&options.out))?;
     let spinner = progress.spinner("LAMMPS");
-    let host = psidpd_lammps_host::install(&|line| progress.note(line))?;
+    let host = psidpd_lammps_host::plugin::install_to_build(&|line| progress.note(line))?;
     let version = host.version()?;
     spinner.finish();
     let spinner = progress.spinner("plugin");

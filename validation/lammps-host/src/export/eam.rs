@@ -30,6 +30,9 @@ impl Default for Grid {
     }
 }
 
+/// The most numbers of a file: one of half a gigabyte.
+const MOST: u32 = 20_000_000;
+
 /// Why a fluid cannot be written as `eam/alloy`.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -53,6 +56,10 @@ pub enum EamError {
     Singular { species: String, density: f64 },
     #[error("the spacing, the largest density and the number of densities must be positive")]
     Grid,
+    #[error(
+        "the tables would have {0:.3e} numbers, and {MOST} are the most: take a larger spacing or fewer densities"
+    )]
+    TooFine(f64),
     #[error(transparent)]
     TooLarge(#[from] TooLarge),
     #[error(transparent)]
@@ -85,6 +92,13 @@ pub fn write(fluid: &Fluid, mass: &[f64], grid: Grid, path: &Path) -> Result<(),
     if let Some(d) = pass {
         check_density(fluid, d)?;
     }
+    let (species, cutoff) = (fluid.species.len() as f64, potential_range(fluid));
+    let rows = cutoff / grid.spacing;
+    let numbers = species * (grid.densities as f64 + rows) + 0.5 * species * (species + 1.0) * rows;
+    // What is no number either.
+    if !(numbers <= f64::from(MOST)) {
+        return Err(EamError::TooFine(numbers));
+    }
     let drho = grid.largest_density / (grid.densities - 1) as f64;
     let embedding = |alpha: usize, n: f64| embedding(fluid, alpha, pass, n);
     for (alpha, species) in fluid.species.iter().enumerate() {
@@ -102,7 +116,6 @@ pub fn write(fluid: &Fluid, mass: &[f64], grid: Grid, path: &Path) -> Result<(),
         .zip(mass)
         .map(|(name, mass)| Element { name: name.clone(), mass: *mass })
         .collect();
-    let cutoff = potential_range(fluid);
     let table = Setfl {
         title: &format!("psidpd: {} at kT = {}", fluid.title, fluid.kt),
         elements: &elements,

@@ -39,6 +39,8 @@ const MOST_BODY_FORCES: usize = 9;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DeckError {
+    #[error(transparent)]
+    Memory(#[from] psidpd_formats::memory::MemoryError),
     #[error(
         "stage \"{stage}\": integrator = \"{name}\" ({integrator}) has no counterpart in LAMMPS; a deck can have \
          velocity-verlet, groot-warren with lambda = 0.5, which is the same, and two-stage, force-gradient and aboba with \
@@ -105,6 +107,7 @@ pub fn write(scene: &Scene, out: &Path) -> Result<Vec<PathBuf>, DeckError> {
         files.push(MODEL_WITHOUT_THERMOSTAT.into());
     }
 
+    psidpd_formats::memory::check(scene.initial.parts().iter().map(|part| part.count).sum())?;
     write_start(scene, &scene.initial_state(), &out.join(START))?;
     save(&out.join(SCRIPT), &script(scene))?;
     Ok(files)

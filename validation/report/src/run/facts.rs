@@ -26,7 +26,7 @@ pub fn facts(
     let number = |key: &str| summary.and_then(|s| s.get(key)).and_then(Value::as_f64);
     let particles = number("particles").or_else(|| Some(state?.configuration.x.len() as f64));
     if let Some(n) = particles {
-        let density = about.map(|a| n / volume(a)).filter(|d| d.is_finite());
+        let density = about.map(|a| n / a.volume()).filter(|d| d.is_finite());
         let density = density.map_or(String::new(), |d| format!(" (mean number density {d:.4})"));
         fact("particles", format!("{n}{density}"));
     }
@@ -82,10 +82,4 @@ fn lengths(about: &About) -> String {
         .map(|(e, periodic)| format!("{}{}", length(e), if periodic { "" } else { " (not periodic)" }))
         .collect();
     sides.join(" × ")
-}
-
-pub fn volume(about: &About) -> f64 {
-    let [a, b, c] = about.box_edges;
-    let cross = [b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]];
-    (0..3).map(|k| a[k] * cross[k]).sum()
 }

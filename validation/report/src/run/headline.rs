@@ -89,7 +89,7 @@ pub fn gather(
             published: expected.and_then(|e| e.published),
         });
     };
-    let volume = about.map(super::facts::volume);
+    let volume = about.map(About::volume);
     let mean = particles.zip(volume).map(|(n, v)| (n / v, None, "all particles / volume of the box".into()));
     add("density", &per_volume, mean);
     let rows = table.map(|t| last_stage(t, about));

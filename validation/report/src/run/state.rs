@@ -4,6 +4,7 @@ use super::super::figure::Figure;
 use super::super::text::escape;
 use super::super::{Item, Section};
 use psidpd_core::model::kernel::{Kernel, KernelKind};
+use psidpd_formats::memory;
 use psidpd_formats::{About, Configuration, Which};
 use psidpd_pictures::{FieldOptions, ParticleOptions, View};
 use psidpd_pictures::{animate, animation_url};
@@ -24,6 +25,16 @@ impl State {
             let path = folder.join(file);
             if !path.is_file() {
                 continue;
+            }
+            // A line of a data file becomes a number several times over. Frames of a dump are as large, and how many there are nobody
+            // knows before.
+            if file.ends_with(".data")
+                && let Ok(about_file) = path.metadata()
+                && let Err(error) =
+                    memory::fits(4.0 * about_file.len() as f64, || format!("{} needs", path.display()))
+            {
+                notes.push(format!("{error}; there are no pictures of it"));
+                return None;
             }
             match Configuration::open(&path, Which::Last) {
                 Ok(mut configuration) => {

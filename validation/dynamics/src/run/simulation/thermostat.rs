@@ -199,6 +199,9 @@ impl Simulation {
         let v = particles.velocities_mut();
         let before = recording.then(|| v.to_vec());
         let virial = pairs.act(pool, heat.update, v);
+        if !virial.iter().all(|w| w.is_finite()) {
+            return Err(RunError::Impulses { step: *number });
+        }
         let pulls = before.map_or(Vec::new(), |mut before| match heat.update {
             // Drag at the velocities in the middle.
             Update::Midpoint => {

@@ -1,7 +1,7 @@
 //! Runs that are interrupted end as those that are not.
 
 use super::*;
-use crate::run::checkpoint::{CheckpointError, Store, read_state};
+use crate::run::checkpoint::{Checkpoint, CheckpointError, Store, read_state};
 use crate::test_support::SOFT;
 use psidpd_core::engine::Precision;
 use std::collections::BTreeMap;
@@ -188,7 +188,7 @@ fn killed_after_any_step(scene: &Scene) {
         let out = folder.path().join(format!("{step}"));
         let runner = Runner::begin(scene, &out, Begin::Resume).unwrap();
         from.push(match runner.start() {
-            Start::Resumed { step, fallback: None, program: None } => *step,
+            Start::Resumed { step, fallback: None, program: None, instructions: None } => *step,
             Start::New => 0,
             other => panic!("{other:?}"),
         });
@@ -489,5 +489,24 @@ fn a_data_file_keeps_walls() {
     for (model, lengths) in [(SOFT, "[4.0, 4.0, 5.0]"), (VAN_DER_WAALS, "[6.0, 6.0]")] {
         let data = scene_of(model, lengths, 3.0, ONE_STAGE).unwrap().initial_state().to_data("t");
         assert_eq!((data.title.as_str(), data.boundary()), ("t", None));
+    }
+}
+
+/// A run that goes on with other instructions than it began with says so; one that goes on with the same does not.
+#[test]
+fn another_instruction_set_is_told() {
+    let [scene, ..] = scenes();
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path();
+    interrupted(&scene, out, Begin::New, 9);
+    let store = Store::new(out);
+    let found = store.find(|_| Ok(())).unwrap().unwrap().checkpoint;
+    for (named, told) in
+        [(found.instructions.clone(), None), ("an abacus".into(), Some("an abacus".to_owned()))]
+    {
+        store.write(&Checkpoint { instructions: named, ..found.clone() }).unwrap();
+        let runner = Runner::begin(&scene, out, Begin::Resume).unwrap();
+        let Start::Resumed { instructions, .. } = runner.start() else { panic!("{:?}", runner.start()) };
+        assert_eq!(*instructions, told);
     }
 }
