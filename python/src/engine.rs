@@ -1,14 +1,17 @@
 //! Forces of configurations.
 
 use crate::arrays::{integers, numbers, shown};
-use crate::errors::{exception, wrong};
+use crate::errors::{RunStoppedError, exception, wrong};
 use crate::model::Model;
 use nalgebra::Matrix3;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use psidpd_core::engine::{self, Evaluated, PeriodicBox, Pool, Precision, Settings, check_reach};
+use psidpd_core::model::Fluid;
 use pyo3::prelude::*;
+use pyo3::types::PyString;
 use std::num::NonZeroUsize;
-use std::sync::{Mutex, PoisonError};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Mutex, PoisonError, TryLockError};
 
 /// The conservative forces of a model at one temperature: Engine(model, kT).evaluate(x, box, types).
 ///
@@ -17,6 +20,10 @@ use std::sync::{Mutex, PoisonError};
 #[pyclass(frozen, module = "psidpd")]
 pub struct Engine {
     engine: Mutex<engine::Engine>,
+    /// What the engine is made of, and the process that has its threads.
+    fluid: Fluid,
+    settings: Settings,
+    process: AtomicU32,
     species: Vec<String>,
     dimensions: usize,
     cutoff: f64,
@@ -52,6 +59,9 @@ impl Engine {
             cutoff: engine.plan().cutoff(),
             description: format!("{}\n{settings:?}", engine.plan()),
             engine: Mutex::new(engine),
+            fluid,
+            settings,
+            process: AtomicU32::new(std::process::id()),
         })
     }
 
@@ -100,6 +110,7 @@ impl Engine {
         let periodic = directions(periodic, self.dimensions)?;
         let domain = self.domain(r#box, periodic)?;
         check_reach(&domain, self.dimensions, self.cutoff, count).map_err(exception)?;
+        self.follow_fork()?;
         // The arrays of numpy are borrowed, and nobody else can borrow them to write; a thread that writes without asking
         // changes what is computed, as with numpy's own functions.
         let found = py.detach(|| {
@@ -115,8 +126,37 @@ impl Engine {
 }
 
 impl Engine {
+    /// In a forked process, which has none of the engine's threads, makes the engine anew. Called with Python's lock held,
+    /// so by one thread at a time.
+    fn follow_fork(&self) -> PyResult<()> {
+        let here = std::process::id();
+        if self.process.load(Ordering::Relaxed) == here {
+            return Ok(());
+        }
+        // A thread that was evaluating when the process was forked has left the lock closed.
+        let mut engine = match self.engine.try_lock() {
+            Ok(engine) => engine,
+            Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
+            Err(TryLockError::WouldBlock) => {
+                return Err(RunStoppedError::new_err(
+                    "this process was forked while another thread evaluated forces with this Engine: make an Engine of its \
+                     own here, or start processes with multiprocessing.get_context(\"spawn\")",
+                ));
+            }
+        };
+        *engine = engine::Engine::new(&self.fluid, self.settings).map_err(exception)?;
+        self.process.store(here, Ordering::Relaxed);
+        Ok(())
+    }
+
     fn kinds(&self, types: Option<&Bound<PyAny>>, count: usize) -> PyResult<Vec<i32>> {
         let Some(types) = types else { return Ok(vec![0; count]) };
+        if types.is_instance_of::<PyString>() {
+            return Err(wrong(format!(
+                "types must have an index or a name of a species for each particle, as a list: is the one text {}",
+                types.repr()?
+            )));
+        }
         let kinds = match types.extract::<Vec<String>>() {
             Ok(names) => names.iter().map(|name| self.index(name)).collect::<PyResult<Vec<i32>>>()?,
             Err(_) => {

@@ -115,6 +115,10 @@ def test_two_dimensions(points):
         ((numpy.zeros((2, 3)), 4.0, [0.0, 0.5]), "whole numbers"),
         ((numpy.zeros((2, 3)), 4.0, [0, 2**33]), "too large"),
         ((numpy.zeros((2, 3)), 4.0, ["F", "G"]), '"G" is no species'),
+        ((numpy.zeros((2, 3)), 4.0, "F"), "a list: is the one text 'F'"),
+        ((numpy.zeros((2, 3)), 4.0, numpy.array("F")), "whole numbers"),
+        ((numpy.ma.masked_invalid([[0.0, 0.0, 0.0], [1.0, 1.0, numpy.nan]]), 4.0), "x is a masked array"),
+        ((numpy.zeros((2, 3)), 4.0, numpy.ma.array([0, 0], mask=[0, 1])), "types is a masked array"),
         ((numpy.full((2, 3), numpy.nan), 4.0), "position"),
     ],
 )
@@ -153,3 +157,51 @@ def test_threads_of_python_may_share_an_engine(warren, points):
     for worker in workers:
         worker.join()
     assert not wrong
+
+
+# Twenty seconds, then a signal ends what hangs.
+FORKED = """
+import os, signal, sys, threading, numpy, psidpd
+engine = psidpd.Engine(psidpd.Model.from_file(sys.argv[1]), 1.0, threads=2)
+x = numpy.random.default_rng(7).uniform(0.0, 8.0, (3000, 3))
+before = engine.evaluate(x, 8.0).forces
+child = os.fork()
+if child == 0:
+    signal.alarm(20)
+    same = numpy.allclose(engine.evaluate(x, 8.0).forces, before, rtol=1e-9)
+    tasks = len(os.listdir("/proc/self/task"))
+    del engine
+    os._exit(0 if same and tasks == 2 else 1)
+sys.exit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+"""
+
+
+def test_an_engine_of_several_threads_works_in_a_forked_process():
+    command = [sys.executable, "-c", FORKED, MODELS / "warren2003-set6.toml"]
+    assert subprocess.run(command).returncode == 0
+
+
+# Forks while a thread evaluates: the child cannot know in which state the engine is.
+FORKED_MEANWHILE = """
+import os, signal, sys, threading, time, numpy, psidpd
+engine = psidpd.Engine(psidpd.Model.from_file(sys.argv[1]), 1.0, threads=2)
+x = numpy.random.default_rng(7).uniform(0.0, 55.0, (1000000, 3))
+thread = threading.Thread(target=engine.evaluate, args=(x, 55.0))
+thread.start()
+time.sleep(0.2)
+child = os.fork()
+if child == 0:
+    signal.alarm(20)
+    try:
+        engine.evaluate(x[:10], 55.0)
+    except psidpd.RunStoppedError as error:
+        os._exit(0 if "spawn" in str(error) else 1)
+    os._exit(2)
+thread.join()
+sys.exit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+"""
+
+
+def test_an_engine_that_was_at_work_when_its_process_forked_says_so():
+    command = [sys.executable, "-W", "ignore", "-c", FORKED_MEANWHILE, MODELS / "warren2003-set6.toml"]
+    assert subprocess.run(command).returncode == 0

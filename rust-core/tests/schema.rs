@@ -14,10 +14,10 @@ fn schema_of_value(kind: &ValueKind) -> Value {
     let number = json!({ "$ref": "#/definitions/number" });
     let polynomial = json!({ "type": "array", "items": number, "minItems": 1, "maxItems": 16 });
     match kind {
-        ValueKind::Text | ValueKind::Formula | ValueKind::File => json!({ "type": "string" }),
+        ValueKind::Text | ValueKind::Formula | ValueKind::TableFile => json!({ "type": "string" }),
         ValueKind::Dimensions => json!({ "enum": [2, 3], "default": 3 }),
         ValueKind::Flag => json!({ "type": "boolean" }),
-        ValueKind::NumberOrFormula => number,
+        ValueKind::NumberOrFormula | ValueKind::Parameter => number,
         ValueKind::Bounds => json!({ "type": "array", "items": number, "minItems": 2, "maxItems": 2 }),
         ValueKind::Species => json!({
             "type": "array", "minItems": 1, "maxItems": 64, "uniqueItems": true,

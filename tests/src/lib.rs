@@ -2,9 +2,11 @@
 
 mod engine;
 mod python;
+mod results;
 mod scripts;
 
-pub use scripts::{Block, blocks, examples, readme_block};
+pub use results::Results;
+pub use scripts::{Block, blocks, examples, parts, readme_block};
 
 pub use engine::{Engine, engine};
 pub use python::python;

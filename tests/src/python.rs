@@ -39,7 +39,7 @@ pub fn python() -> &'static PathBuf {
         run(
             Command::new(&python)
                 .args(["-m", "pip", "--disable-pip-version-check", "--no-input", "install", "--progress-bar=off"])
-                .args(["--only-binary=:all:", "-r"])
+                .args(["--require-hashes", "--only-binary=:all:", "-r"])
                 .arg(&list),
             "the versions in tests/python/requirements.txt are for Python 3.10 to 3.13, from PyPI; PSIDPD_PYTHON \
              names another Python",

@@ -28,12 +28,34 @@ pub fn readme_block(language: &str, part: &str) -> String {
     found.next().unwrap_or_else(|| panic!("no {language} block with {part}"))
 }
 
-/// A fenced block of a page.
+/// A fenced block of a page, or the text before one.
 pub struct Block {
-    /// What follows the fence.
+    /// What follows the fence; empty for text.
     pub language: String,
     /// Its lines.
     pub text: String,
+}
+
+/// The fenced blocks of a page of the checkout and the text between them, in their order.
+///
+/// # Panics
+/// There is no such page.
+pub fn parts(page: &str) -> Vec<Block> {
+    let text = std::fs::read_to_string(root().join(page)).unwrap_or_else(|e| panic!("{page}: {e}"));
+    let mut found = Vec::new();
+    let mut part = Block { language: String::new(), text: String::new() };
+    for line in text.lines() {
+        if let Some(fence) = line.strip_prefix("```") {
+            let language = if part.language.is_empty() { fence.trim() } else { "" };
+            let next = Block { language: language.into(), text: String::new() };
+            found.push(std::mem::replace(&mut part, next));
+        } else {
+            part.text += &format!("{line}\n");
+        }
+    }
+    assert!(part.language.is_empty(), "{page}: a block has no end");
+    found.push(part);
+    found
 }
 
 /// The fenced blocks of a page of the checkout, in their order.
@@ -41,19 +63,5 @@ pub struct Block {
 /// # Panics
 /// There is no such page.
 pub fn blocks(page: &str) -> Vec<Block> {
-    let text = std::fs::read_to_string(root().join(page)).unwrap_or_else(|e| panic!("{page}: {e}"));
-    let mut found = Vec::new();
-    let mut open: Option<Block> = None;
-    for line in text.lines() {
-        match (line.strip_prefix("```"), &mut open) {
-            (Some(language), None) => {
-                open = Some(Block { language: language.trim().into(), text: String::new() })
-            }
-            (Some(_), Some(_)) => found.extend(open.take()),
-            (None, Some(block)) => block.text += &format!("{line}\n"),
-            (None, None) => {}
-        }
-    }
-    assert!(open.is_none(), "{page}: a block has no end");
-    found
+    parts(page).into_iter().filter(|part| !part.language.is_empty()).collect()
 }

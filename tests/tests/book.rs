@@ -1,6 +1,6 @@
 //! The pages of `docs`: links lead somewhere, every page is in the book, and what a reader is told to paste works.
 
-use psidpd_tests::{Block, blocks, lammps, psidpd, root, said};
+use psidpd_tests::{Block, Results, lammps, parts, psidpd, root, said};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Component, Path, PathBuf};
 use std::time::Duration;
@@ -97,10 +97,12 @@ fn every_page_is_in_the_book() {
     assert_eq!(contents, all);
 }
 
-/// Does what a page says in an empty folder. A block of TOML begins with the name of its file.
-fn follow(page: &str) {
+/// Does what a page says in an empty folder, and holds what it says of the results against them. A block of TOML begins with
+/// the name of its file. Returns how many numbers were held.
+fn follow(page: &str) -> usize {
     let folder = tempfile::tempdir().unwrap();
-    for Block { language, text } in blocks(page) {
+    let mut results = Results::default();
+    for Block { language, text } in parts(page) {
         match language.as_str() {
             "toml" => {
                 let name = text.lines().next().and_then(|l| l.strip_prefix("# ")).unwrap_or_default();
@@ -113,6 +115,9 @@ fn follow(page: &str) {
                     assert_eq!(words[0], "psidpd", "{page}: {line}");
                     let output = psidpd(folder.path(), &words[1..]);
                     assert!(output.status.success(), "{page}: {line}\n{}", said(&output));
+                    results.add(&output.stdout);
+                    let out = words.iter().position(|word| *word == "--out").map(|at| words[at + 1]);
+                    results.add_observables(&folder.path().join(out.unwrap_or_default()));
                 }
             }
             "lammps" => {
@@ -124,13 +129,39 @@ fn follow(page: &str) {
                 let run = host.run_script(1, folder.path(), &script, &["-log", "none"], limit).unwrap();
                 assert!(run.stdout.contains("Loop time"), "{page}: {}", run.stdout);
             }
-            "text" => {}
+            "text" => results.hold_lines(page, &text),
+            "" => results.hold_numbers(page, &text),
             other => panic!("{page}: nothing follows blocks of {other}"),
         }
     }
+    results.held
 }
 
 #[test]
 fn pages_can_be_followed() {
-    FOLLOWED.iter().for_each(|page| follow(page));
+    let held = FOLLOWED.map(follow);
+    // The numbers with errors of the tutorial: five of the slab, three of the drop.
+    assert_eq!(held, [8, 0, 0]);
+}
+
+/// A block and a number that no command has found are seen.
+#[test]
+fn a_page_that_says_something_else_is_seen() {
+    let results = || {
+        let mut results = Results::default();
+        results.add("liquid  16.136 ± 0.044  unit\n".as_bytes());
+        results
+    };
+    let seen = |hold: &dyn Fn(&mut Results)| {
+        let hold = std::panic::AssertUnwindSafe(|| hold(&mut results()));
+        std::panic::catch_unwind(hold).is_err()
+    };
+    for (text, wrong) in [("16.14(4)", false), ("16.3(1)", false), ("16.44(4)", true), ("16.14(20)", true)] {
+        assert_eq!(seen(&|results| results.hold_numbers("a page", text)), wrong, "{text}");
+    }
+    for (text, wrong) in
+        [("liquid 16.14 ± 0.04 unit", false), ("liquid 16.16 ± 0.04 unit", true), ("liquid", true)]
+    {
+        assert_eq!(seen(&|results| results.hold_lines("a page", text)), wrong, "{text}");
+    }
 }

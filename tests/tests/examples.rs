@@ -110,6 +110,7 @@ fn examples_of_the_manual_pages_are_accepted() {
         let (first, styles) = examples.split_once("\n\n").unwrap();
         let pair: Vec<&str> = first.lines().filter(|l| l.starts_with("pair_")).collect();
         let pair = pair.join("\n");
+        let load = first.lines().find(|l| l.starts_with("plugin ")).unwrap();
         for style in styles.split("\n\n") {
             let types = if style.contains(" A B") || style.contains("1 2") { 2 } else { 1 };
             let flat = style.contains("-2d");
@@ -117,10 +118,10 @@ fn examples_of_the_manual_pages_are_accepted() {
             let script = format!(
                 "units lj\ndimension {dimension}\ncomm_modify vel yes\nregion b block 0 5 0 5 {edge}\n\
                  create_box {types} b\ncreate_atoms 1 random 50 1 b\ncreate_atoms {types} random 50 2 b\n\
-                 mass * 1\nplugin load \"{}\"\n{pair}\n{style}\nrun 0\n",
-                plugin.display()
+                 mass * 1\n{load}\n{pair}\n{style}\nrun 0\n",
             );
             let folder = tempfile::tempdir().unwrap();
+            symlink(plugin, folder.path().join("psidpdplugin.so")).unwrap();
             let path = folder.path().join("in.page");
             std::fs::write(&path, &script).unwrap();
             for model in std::fs::read_dir(&models).unwrap().map(|e| e.unwrap().path()) {

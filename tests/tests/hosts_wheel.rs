@@ -126,6 +126,18 @@ fn the_loaded_file_needs_nothing_of_lammps() {
     std::fs::copy(plugin, &alone).unwrap();
     let error = outcome(&alone).unwrap_err();
     assert!(error.contains("psidpd-styles.so is not beside psidpdplugin.so"), "{error}");
+    // Styles that were cut short are named, at the end of the file and within its first lines.
+    let styles = plugin.with_file_name("psidpd-styles.so");
+    let bytes = std::fs::read(&styles).unwrap();
+    for left in [bytes.len() - 1, bytes.len() / 2, 10] {
+        std::fs::write(folder.path().join("psidpd-styles.so"), &bytes[..left]).unwrap();
+        let error = outcome(&alone).unwrap_err();
+        assert!(
+            error.contains(&format!("psidpd-styles.so was cut short: it has {left} bytes of")),
+            "{error}"
+        );
+    }
+    std::fs::remove_file(folder.path().join("psidpd-styles.so")).unwrap();
     // A link will do.
     std::fs::remove_file(&alone).unwrap();
     std::os::unix::fs::symlink(plugin, &alone).unwrap();

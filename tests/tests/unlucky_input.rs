@@ -2,7 +2,7 @@
 
 use psidpd_tests::{program, psidpd, said};
 use rustix::fs::{CWD, FileType, Mode, mknodat};
-use std::os::unix::fs::symlink;
+use std::os::unix::fs::{PermissionsExt, symlink};
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
@@ -569,4 +569,44 @@ fn a_converted_script_replaces_nothing() {
     write(here, "d/mdpd.data", &data.replace("1 1 0 0 0 0", "1 1 0 0"));
     let (text, code) = convert(&["--overwrite"]);
     assert!(code == Some(2) && text.contains("mdpd.data: line 12"), "{text}");
+}
+
+/// A stand-in for Python: pip notes its beginning and its end, with its process, and takes a second; what it has started
+/// takes another.
+const SLOW_PIP: &str = r#"#!/bin/sh
+[ "$1" = -c ] && exit 0
+if [ "$2" = venv ]; then mkdir -p "$3/bin"; cp "$0" "$3/bin/python"; exit 0; fi
+echo "begin $$" >> "$PSIDPD_LAMMPS_DIR/log"
+exec 3<&0
+sh -c 'sleep 2; echo "child $0" >> "$PSIDPD_LAMMPS_DIR/log"' $$ <&3 &
+sleep 1
+echo "end $$" >> "$PSIDPD_LAMMPS_DIR/log"
+wait
+exit 1
+"#;
+
+#[test]
+fn pip_ends_with_an_installation_that_is_killed_before_the_next_begins() {
+    let folder = tempfile::tempdir().unwrap();
+    let python = folder.path().join("python");
+    std::fs::write(&python, SLOW_PIP).unwrap();
+    std::fs::set_permissions(&python, std::fs::Permissions::from_mode(0o755)).unwrap();
+    let install = || {
+        let mut command = Command::new(program());
+        command.args(["lammps", "install"]).env("PSIDPD_PYTHON", &python);
+        command.env("PSIDPD_LAMMPS_DIR", folder.path()).stdout(Stdio::null()).stderr(Stdio::null());
+        command.spawn().unwrap()
+    };
+    let log = || std::fs::read_to_string(folder.path().join("log")).unwrap_or_default();
+    let mut first = install();
+    while !log().contains("begin") {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    first.kill().unwrap();
+    first.wait().unwrap();
+    install().wait().unwrap();
+    // The first pip is gone at once; what it had started ends before the second pip begins.
+    let log = log();
+    let words: Vec<&str> = log.lines().filter_map(|line| line.split(' ').next()).collect();
+    assert_eq!(words, ["begin", "child", "begin", "end", "child"], "{log}");
 }

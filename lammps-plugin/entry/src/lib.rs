@@ -3,7 +3,8 @@
 //!
 //! - `entry`: `lammpsplugin_init`, which `plugin load` calls, and `psidpd_register`, for a LAMMPS without plugins;
 //! - `styles`: loads the second file, whose contract is `table`;
-//! - `version`: LAMMPS's versions in words.
+//! - `version`: LAMMPS's versions in words;
+//! - `whole`: whether the second file has all its bytes.
 
 #[cfg(lammps_host)]
 mod entry;
@@ -13,3 +14,5 @@ mod styles;
 mod table;
 #[cfg(any(lammps_host, test))]
 mod version;
+#[cfg(lammps_host)]
+mod whole;

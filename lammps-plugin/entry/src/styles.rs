@@ -1,6 +1,7 @@
 //! The file with the styles, beside this one.
 
 use crate::table::{BUILT, Style, Styles};
+use crate::whole;
 use std::ffi::{CStr, CString, OsStr, c_char, c_int, c_void};
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
@@ -78,6 +79,11 @@ pub fn table() -> Result<&'static Styles, String> {
         .map(|folder| folder.join(FILE))
         .find(|path| path.is_file())
         .ok_or_else(|| format!("{FILE} is not beside psidpdplugin.so: the two belong together"))?;
+    if let Some((wanted, has)) = whole::sizes(&path)
+        && has < wanted
+    {
+        return Err(format!("{} was cut short: it has {has} bytes of {wanted}", path.display()));
+    }
     let name = CString::new(path.as_os_str().as_bytes()).map_err(|e| e.to_string())?;
     // SAFETY: the file is ours, and its initialisers are those of Rust and C++.
     let handle = unsafe { dlopen(name.as_ptr(), NOW) };

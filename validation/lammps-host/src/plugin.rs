@@ -34,6 +34,9 @@ pub struct BuiltFor {
     /// A digest of what it was made from: sources, headers, compilers' options. A build of the same changes nothing.
     #[serde(default)]
     pub made_from: String,
+    /// Sizes of the plugin and of the file with the styles, in bytes: a file that was cut short has another.
+    #[serde(default)]
+    pub sizes: [u64; 2],
 }
 
 impl BuiltFor {
@@ -43,6 +46,7 @@ impl BuiltFor {
             abi: version.abi.clone(),
             psidpd_version: env!("CARGO_PKG_VERSION").into(),
             made_from: String::new(),
+            sizes: [0; 2],
         }
     }
 
@@ -151,10 +155,13 @@ fn build_with(
     }
     let _lock = Lock::new(&base.join("plugin.lock"), waiting)?;
     let (plugin, styles, launcher) = (base.join(FILE_NAME), base.join(STYLES), base.join(LAUNCHER));
-    let built_for =
-        BuiltFor { made_from: made_from::digest(host, root, &compiler)?, ..BuiltFor::new(version) };
-    let whole = styles.is_file() && launcher.is_file() != version.plugins;
-    if whole && self::built_for(&plugin).is_ok_and(|old| old == built_for) {
+    let sizes = || [&plugin, &styles].map(|file| fs::metadata(file).map_or(0, |file| file.len()));
+    let mut built_for = BuiltFor {
+        made_from: made_from::digest(host, root, &compiler)?,
+        sizes: sizes(),
+        ..BuiltFor::new(version)
+    };
+    if launcher.is_file() != version.plugins && self::built_for(&plugin).is_ok_and(|old| old == built_for) {
         return Ok(plugin);
     }
     // Held until the library is copied: a build for another host replaces it.
@@ -192,14 +199,15 @@ fn build_with(
     // Renaming leaves an open plugin intact and shows others complete files only. A plugin without its note
     // is refused, so an interruption cannot leave a plugin with a wrong note.
     let (temp, note) = (base.join("psidpdplugin.so.tmp"), note_of(&plugin));
-    let text =
-        serde_json::to_string_pretty(&built_for).map_err(|e| LammpsError::io("write", &note)(e.into()))?;
     remove_if_there(&note).map_err(LammpsError::io("remove", &note))?;
     for (from, to) in built {
         fs::copy(&from, &temp).map_err(LammpsError::io("copy", &from))?;
         fs::rename(&temp, to).map_err(LammpsError::io("write", to))?;
     }
     drop(shared);
+    built_for.sizes = sizes();
+    let text =
+        serde_json::to_string_pretty(&built_for).map_err(|e| LammpsError::io("write", &note)(e.into()))?;
     if version.plugins {
         remove_if_there(&launcher).map_err(LammpsError::io("remove", &launcher))?;
     } else {
@@ -436,6 +444,9 @@ mod tests {
         fs::remove_file(base.join(STYLES)).unwrap();
         run(20210929).unwrap();
         assert_eq!(builds(), before + 3);
+        fs::write(base.join(STYLES), "sty").unwrap();
+        run(20210929).unwrap();
+        assert_eq!(fs::read_to_string(base.join(STYLES)).unwrap(), "styles");
     }
 
     /// Builds for several hosts at once, in one build folder, take turns until each has its own library.

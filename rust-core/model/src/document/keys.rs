@@ -90,10 +90,14 @@ pub enum ValueKind {
     Text,
     /// A string with the name of a file, relative to the file with the key.
     File,
+    /// The same of a table, which must not lie elsewhere.
+    TableFile,
     /// A number.
     Number,
     /// A number, or a string with a formula of the parameters and kT.
     NumberOrFormula,
+    /// A number, or a string with a formula of other parameters.
+    Parameter,
     /// A number above zero.
     Positive,
     /// A whole number from 0.
@@ -146,9 +150,11 @@ impl ValueKind {
         };
         let words = match self {
             ValueKind::Text => "string",
-            ValueKind::File => "name of a file in the folder of this one or below",
+            ValueKind::File => "name of a file, from the folder of this one on",
+            ValueKind::TableFile => "name of a file in the folder of this one or below",
             ValueKind::Number => "number",
             ValueKind::NumberOrFormula => "number, or string with a formula of the parameters and `kT`",
+            ValueKind::Parameter => "number, or string with a formula of other parameters",
             ValueKind::Positive => "number above 0",
             ValueKind::Count => "whole number from 0",
             ValueKind::Dimensions => "2 or 3",

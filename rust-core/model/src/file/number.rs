@@ -134,7 +134,15 @@ pub fn read_parameters(root: &Section) -> Result<BTreeMap<String, f64>, FileErro
     }
     for (name, value) in entries {
         check_identifier(&name, &section)?;
-        waiting.push((name.value, Number::read(&value, source)?));
+        let number = Number::read(&value, source)?;
+        if let Number::Formula(ast) = &number
+            && ast.value.names().any(|(name, _)| name == "kT")
+        {
+            let message =
+                "a parameter has one value at all temperatures: write kT where the parameter is used";
+            return Err(value.error(FileErrorKind::Value(message.into())));
+        }
+        waiting.push((name.value, number));
     }
     // Formulas may refer to each other: keep evaluating what can be until nothing is left.
     let names: BTreeSet<String> = waiting.iter().map(|(n, _)| n.clone()).collect();

@@ -128,6 +128,12 @@ fn parameters_may_be_formulas_in_any_order() {
 }
 
 #[test]
+fn parameters_know_no_temperature() {
+    let e = error_of("title = \"t\"\nspecies = [\"F\"]\n[parameters]\na = 2.0\nb = \"a*kT\"\n");
+    assert!(e.to_string().contains("parameters.b: a parameter has one value at all temperatures"), "{e}");
+}
+
+#[test]
 fn thermostats_replace_the_one_for_every_pair() {
     let text = r#"title = "t"
 species = ["A", "B"]

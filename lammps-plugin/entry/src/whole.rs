@@ -1,0 +1,21 @@
+//! Whether a library has all its bytes: the loader maps one that was cut short, and dies of a signal when it reads on.
+
+use std::io::Read;
+use std::path::Path;
+
+/// How many bytes a library should have at least, by the table of sections that linkers put at its end, and how many it
+/// has; None where it is no library of this kind of machine.
+pub fn sizes(path: &Path) -> Option<(u64, u64)> {
+    let mut head = [0; 64];
+    let mut file = std::fs::File::open(path).ok()?;
+    let has = file.metadata().ok()?.len();
+    if file.read_exact(&mut head).is_err() {
+        return Some((64, has));
+    }
+    if head[..5] != *b"\x7fELF\x02" {
+        return None;
+    }
+    let short = |at: usize| u64::from(u16::from_ne_bytes([head[at], head[at + 1]]));
+    let table = u64::from_ne_bytes(*head[40..].first_chunk()?);
+    Some((table.saturating_add(short(58) * short(60)), has))
+}

@@ -1,0 +1,47 @@
+//! `validation/lammps-host/src/bindings.rs` is what bindgen makes of LAMMPS's C library interface. Written anew by
+//!
+//! `PSIDPD_UPDATE_BINDINGS=1 cargo test --release -p psidpd-tests --test bindings -- --ignored`
+//!
+//! with libclang (Debian: `libclang1-14`; PyPI: `libclang`, with `LIBCLANG_PATH` set to its folder) and a C compiler's headers.
+
+use psidpd_tests::{lammps, root};
+use std::process::Command;
+
+/// What `Lammps` calls. A function that a LAMMPS version lacks does not prevent loading: it fails when called.
+const USED: &str = "lammps_(open_no_mpi|close|mpi_finalize|command|version|get_natoms|get_thermo|eval|extract_box|extract_setting\
+|extract_atom_datatype|extract_atom_size|extract_compute|extract_fix|gather_atoms|gather|scatter_atoms\
+|has_error|get_last_error_message|has_style|free)";
+
+#[test]
+#[ignore = "needs libclang; .ci/run runs it"]
+fn the_bindings_are_those_of_the_header() {
+    let header = lammps().0.include.join("library.h");
+    // libclang has no headers of a compiler: those of the C compiler here serve.
+    let headers = Command::new("cc").arg("-print-file-name=include").output().expect("there is a C compiler");
+    let headers = String::from_utf8(headers.stdout).unwrap();
+    let bindings = bindgen::Builder::default()
+        .header(header.to_str().expect("the path of the checkout is text"))
+        .clang_args(["-isystem", headers.trim()])
+        .allowlist_function(USED)
+        .allowlist_recursively(false)
+        .dynamic_library_name("LammpsLibrary")
+        .dynamic_link_require_all(false)
+        .generate_comments(false)
+        .layout_tests(false)
+        .raw_line("//! LAMMPS's C library interface, loaded at run time. Written by `tests/tests/bindings.rs`: do not edit.")
+        .generate()
+        .unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let made = folder.path().join("bindings.rs");
+    bindings.write_to_file(&made).unwrap();
+    let options = ["--edition", "2024", "--config-path"];
+    let formatted = Command::new("rustfmt").args(options).arg(root()).arg(&made).status();
+    assert!(formatted.expect("rustfmt starts").success());
+    let kept = root().join("validation/lammps-host/src/bindings.rs");
+    let made = std::fs::read_to_string(made).unwrap();
+    if std::env::var_os("PSIDPD_UPDATE_BINDINGS").is_some() {
+        std::fs::write(kept, made).unwrap();
+    } else {
+        assert_eq!(std::fs::read_to_string(kept).unwrap(), made, "PSIDPD_UPDATE_BINDINGS=1 writes them anew");
+    }
+}
