@@ -96,7 +96,7 @@ pub fn write(fluid: &Fluid, mass: &[f64], grid: Grid, path: &Path) -> Result<(),
     let rows = cutoff / grid.spacing;
     let numbers = species * (grid.densities as f64 + rows) + 0.5 * species * (species + 1.0) * rows;
     // What is no number either.
-    if !(numbers <= f64::from(MOST)) {
+    if numbers.is_nan() || numbers > f64::from(MOST) {
         return Err(EamError::TooFine(numbers));
     }
     let drho = grid.largest_density / (grid.densities - 1) as f64;
