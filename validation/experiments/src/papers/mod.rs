@@ -4,7 +4,7 @@
 //! text and tables of the papers; of a curve without numbers, the stated trend or the theory is compared.
 //!
 //! The rule is the same for every value: the deviation, in units of the combined error of both sides, is at most
-//! [`LIMIT`]; a trend counts on its wrong side only. A published number without an error bar has that of its last
+//! [`case::LIMIT`]; a trend counts on its wrong side only. A published number without an error bar has that of its last
 //! printed digit. What is known to differ is named as an allowance of that value, with its reason.
 
 mod berendsen;

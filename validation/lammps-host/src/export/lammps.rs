@@ -247,7 +247,7 @@ pub fn write_start(scene: &Scene, state: &State, path: &Path) -> Result<(), Deck
     data.write(path).map_err(|e| DeckError::Run(e.into()))
 }
 
-/// The script of [`write`] alone.
+/// The script of [`write()`] alone.
 ///
 /// # Errors
 /// The scene has no counterpart in LAMMPS.
