@@ -8,7 +8,7 @@
 //! ```
 //!
 //! with `ñ` the weighted (and, if the model says so, corrected) local densities. Forces, energy and
-//! virial all come from it; see [`engine::reference`] for the plain evaluation that everything faster
+//! virial all come from it; see [`truth`] for the theory written down once, which everything faster
 //! is tested against.
 //!
 //! Data flow: model file → [`model::Model`] → [`model::Fluid`] (at one kT) → [`engine::Plan`] →
