@@ -140,6 +140,33 @@ pub enum Counterpart {
     None,
 }
 
+/// The settings of an integrator, where it has them.
+pub struct Settings<'a> {
+    /// λ, and the range that is allowed.
+    pub lambda: Option<(&'a mut f64, [f64; 2])>,
+    /// ξ.
+    pub gradient: Option<&'a mut f64>,
+    /// The thermostat of a splitting, with the law of its noise.
+    pub coupling: Option<&'a mut Coupling>,
+    /// The law of the noise, where the thermostat is no choice.
+    pub noise: Option<&'a mut Law>,
+    /// Sweeps of a step and the furthest move.
+    pub trials: Option<(&'a mut u64, &'a mut Option<f64>)>,
+}
+
+/// What is known of an integrator apart from its step.
+#[derive(Debug, Clone, Copy)]
+pub struct Properties {
+    pub accuracy: Accuracy,
+    pub lammps: Counterpart,
+    /// Whether drag and noise act inside the forces.
+    pub drag_in_forces: bool,
+    /// For which part of a step each of its evaluations of forces acts, on average.
+    pub force_shares: [f64; 2],
+    /// Whether the last forces of a step are those at its end.
+    pub forces_at_end: bool,
+}
+
 impl Integrator {
     /// Those with a time step: names in scene files, and what they mean with all other keys left out.
     pub const ALL: [(&str, Integrator); 12] = [
@@ -185,113 +212,97 @@ impl Integrator {
             .map_or("", |found| found.0)
     }
 
-    /// Its λ with the range that is allowed, if it has one.
-    pub fn lambda(&mut self) -> Option<(&mut f64, [f64; 2])> {
+    /// The settings that a scene may give.
+    pub fn settings(&mut self) -> Settings<'_> {
+        let none = Settings { lambda: None, gradient: None, coupling: None, noise: None, trials: None };
         match self {
-            Integrator::GrootWarren { lambda } => Some((lambda, [0.0, 1.0])),
-            Integrator::TwoStage { lambda, .. } | Integrator::ForceGradient { lambda, .. } => {
-                Some((lambda, [0.0, 0.5]))
+            Integrator::VelocityVerlet | Integrator::LoweAndersen => none,
+            Integrator::GrootWarren { lambda } => Settings { lambda: Some((lambda, [0.0, 1.0])), ..none },
+            Integrator::DpdVv { noise }
+            | Integrator::SelfConsistent { noise }
+            | Integrator::ShardlowS1 { noise }
+            | Integrator::ShardlowS2 { noise }
+            | Integrator::Peters { noise } => Settings { noise: Some(noise), ..none },
+            Integrator::Aboba(coupling) | Integrator::Baoab(coupling) => {
+                Settings { coupling: Some(coupling), ..none }
             }
-            _ => None,
+            Integrator::TwoStage { lambda, coupling } => {
+                Settings { lambda: Some((lambda, [0.0, 0.5])), coupling: Some(coupling), ..none }
+            }
+            Integrator::ForceGradient { lambda, gradient, coupling } => Settings {
+                lambda: Some((lambda, [0.0, 0.5])),
+                gradient: Some(gradient),
+                coupling: Some(coupling),
+                ..none
+            },
+            Integrator::MonteCarlo { sweeps, max_move } => {
+                Settings { trials: Some((sweeps, max_move)), ..none }
+            }
         }
     }
 
-    /// Its ξ, if it has one.
-    pub fn gradient(&mut self) -> Option<&mut f64> {
-        match self {
-            Integrator::ForceGradient { gradient, .. } => Some(gradient),
-            _ => None,
-        }
+    /// The law of its noise, if that can be chosen: inside the forces it is uniform.
+    pub fn noise(&mut self) -> Option<&mut Law> {
+        let Settings { noise, coupling, .. } = self.settings();
+        noise.or(coupling.map(|coupling| &mut coupling.noise))
     }
 
-    /// Sweeps of a step and the furthest move, if it makes trial moves.
-    pub fn trials(&mut self) -> Option<(&mut u64, &mut Option<f64>)> {
+    /// What is known of it. Errors are right within a factor of three or so for standard DPD and Warren's liquid.
+    pub fn properties(&self) -> Properties {
+        // Drag and noise in the forces, forces at the end of a step.
+        let verlet = |drag: f64, lammps| Properties {
+            accuracy: Accuracy { temperature: [5.0, drag], pressure: [0.5, 0.75, 0.0] },
+            lammps,
+            drag_in_forces: true,
+            force_shares: [1.0, 0.0],
+            forces_at_end: true,
+        };
+        // Velocity Verlet with a thermostat apart from the forces, before or behind it.
+        let apart = Properties {
+            accuracy: Accuracy { temperature: [5.0, 0.0], pressure: [0.5, 0.0, 0.0] },
+            drag_in_forces: false,
+            ..verlet(0.0, Counterpart::None)
+        };
+        let splitting = |coupling: &Coupling| {
+            if coupling.update == Update::Midpoint { Counterpart::Splitting } else { Counterpart::None }
+        };
         match self {
-            Integrator::MonteCarlo { sweeps, max_move } => Some((sweeps, max_move)),
-            _ => None,
+            Integrator::VelocityVerlet => verlet(0.25, Counterpart::Nve),
+            Integrator::GrootWarren { lambda } => {
+                verlet(0.12, if *lambda == 0.5 { Counterpart::Nve } else { Counterpart::None })
+            }
+            Integrator::DpdVv { .. } | Integrator::SelfConsistent { .. } => verlet(0.0, Counterpart::None),
+            Integrator::ShardlowS1 { .. }
+            | Integrator::ShardlowS2 { .. }
+            | Integrator::Peters { .. }
+            | Integrator::LoweAndersen
+            | Integrator::Baoab(_) => apart,
+            Integrator::Aboba(coupling) => {
+                Properties { lammps: splitting(coupling), forces_at_end: false, ..apart }
+            }
+            Integrator::TwoStage { lambda, coupling } => Properties {
+                accuracy: Accuracy { temperature: [0.01, 0.0], pressure: [0.1, 0.0, 0.0] },
+                lammps: splitting(coupling),
+                force_shares: [1.0 - 2.0 * lambda, 2.0 * lambda],
+                ..apart
+            },
+            Integrator::ForceGradient { lambda, coupling, .. } => Properties {
+                accuracy: Accuracy { temperature: [0.006, 0.0], pressure: [0.0, 0.0, 0.006] },
+                lammps: splitting(coupling),
+                force_shares: [1.0 - 2.0 * lambda, 2.0 * lambda],
+                ..apart
+            },
+            Integrator::MonteCarlo { .. } => Properties {
+                accuracy: Accuracy { temperature: [0.0; 2], pressure: [0.0; 3] },
+                forces_at_end: false,
+                ..apart
+            },
         }
     }
 
     /// Whether its steps take time.
     pub fn has_time(&self) -> bool {
         !matches!(self, Integrator::MonteCarlo { .. })
-    }
-
-    /// Its thermostat, if that is a choice of its own.
-    pub fn coupling(&mut self) -> Option<&mut Coupling> {
-        match self {
-            Integrator::Aboba(coupling) | Integrator::Baoab(coupling) => Some(coupling),
-            Integrator::TwoStage { coupling, .. } | Integrator::ForceGradient { coupling, .. } => {
-                Some(coupling)
-            }
-            _ => None,
-        }
-    }
-
-    /// The law of its noise, if that can be chosen: inside the forces it is uniform.
-    pub fn noise(&mut self) -> Option<&mut Law> {
-        match self {
-            Integrator::DpdVv { noise } | Integrator::SelfConsistent { noise } => Some(noise),
-            Integrator::ShardlowS1 { noise } | Integrator::ShardlowS2 { noise } => Some(noise),
-            Integrator::Peters { noise } => Some(noise),
-            other => other.coupling().map(|coupling| &mut coupling.noise),
-        }
-    }
-
-    /// Its errors, within a factor of three or so of those in standard DPD and in Warren's liquid.
-    pub fn accuracy(&self) -> Accuracy {
-        let (temperature, pressure) = match self {
-            Integrator::VelocityVerlet => ([5.0, 0.25], [0.5, 0.75, 0.0]),
-            Integrator::GrootWarren { .. } => ([5.0, 0.12], [0.5, 0.75, 0.0]),
-            Integrator::DpdVv { .. } | Integrator::SelfConsistent { .. } => ([5.0, 0.0], [0.5, 0.75, 0.0]),
-            Integrator::TwoStage { .. } => ([0.01, 0.0], [0.1, 0.0, 0.0]),
-            Integrator::ForceGradient { .. } => ([0.006, 0.0], [0.0, 0.0, 0.006]),
-            Integrator::MonteCarlo { .. } => ([0.0; 2], [0.0; 3]),
-            _ => ([5.0, 0.0], [0.5, 0.0, 0.0]),
-        };
-        Accuracy { temperature, pressure }
-    }
-
-    /// What LAMMPS has for it.
-    pub fn in_lammps(&self) -> Counterpart {
-        match self {
-            Integrator::VelocityVerlet => Counterpart::Nve,
-            Integrator::GrootWarren { lambda: 0.5 } => Counterpart::Nve,
-            Integrator::Aboba(coupling)
-            | Integrator::TwoStage { coupling, .. }
-            | Integrator::ForceGradient { coupling, .. }
-                if coupling.update == Update::Midpoint =>
-            {
-                Counterpart::Splitting
-            }
-            _ => Counterpart::None,
-        }
-    }
-
-    /// Whether drag and noise act inside the forces; apart from them otherwise.
-    pub fn drag_in_forces(self) -> bool {
-        matches!(
-            self,
-            Integrator::VelocityVerlet
-                | Integrator::GrootWarren { .. }
-                | Integrator::DpdVv { .. }
-                | Integrator::SelfConsistent { .. }
-        )
-    }
-
-    /// For which part of a step each of its evaluations of forces acts, on average.
-    pub fn force_shares(self) -> [f64; 2] {
-        match self {
-            Integrator::TwoStage { lambda, .. } | Integrator::ForceGradient { lambda, .. } => {
-                [1.0 - 2.0 * lambda, 2.0 * lambda]
-            }
-            _ => [1.0, 0.0],
-        }
-    }
-
-    /// Whether the last forces of a step are those at its end.
-    pub fn forces_at_end(self) -> bool {
-        !matches!(self, Integrator::Aboba(_) | Integrator::MonteCarlo { .. })
     }
 }
 
@@ -300,19 +311,20 @@ impl fmt::Display for Integrator {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.name())?;
         let mut this = *self;
-        if let Some((lambda, _)) = this.lambda() {
+        let settings = this.settings();
+        if let Some((lambda, _)) = settings.lambda {
             write!(f, ", lambda = {}", six_digits(*lambda))?;
         }
-        if let Some(gradient) = this.gradient().filter(|gradient| **gradient != FORCE_GRADIENT[1]) {
+        if let Some(gradient) = settings.gradient.filter(|gradient| **gradient != FORCE_GRADIENT[1]) {
             write!(f, ", gradient = {}", six_digits(*gradient))?;
         }
-        if let Some(coupling) = this.coupling() {
+        if let Some(coupling) = settings.coupling {
             write!(f, ", thermostat_step = {}", coupling.name())?;
             if coupling.every > 1 {
                 write!(f, ", thermostat_every = {}", coupling.every)?;
             }
         }
-        if let Some((sweeps, max_move)) = this.trials() {
+        if let Some((sweeps, max_move)) = settings.trials {
             if *sweeps > 1 {
                 write!(f, ", sweeps = {sweeps}")?;
             }

@@ -49,6 +49,7 @@ use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::noise::{Law, PairNoise};
 use psidpd_passes::settings::{Precision, Settings};
 use round::Round;
+use sequential::{Order, lowe_andersen, ornstein_uhlenbeck, shardlow};
 
 /// How velocities are changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -203,7 +204,10 @@ impl PairThermostat {
         match update {
             Update::Midpoint => self.implicit(pool, v, true),
             Update::ImplicitDrag => self.implicit(pool, v, false),
-            other => self.in_turn(pool, v, other),
+            Update::OrnsteinUhlenbeck => self.in_turn(pool, v, ornstein_uhlenbeck, Order::Forward, false),
+            Update::Shardlow { reversed: false } => self.in_turn(pool, v, shardlow, Order::Forward, false),
+            Update::Shardlow { reversed: true } => self.in_turn(pool, v, shardlow, Order::Reversed, false),
+            Update::LoweAndersen => self.in_turn(pool, v, lowe_andersen, Order::Forward, true),
         }
     }
 

@@ -7,11 +7,18 @@
 //! With `u = ê·v_ij`, the reduced mass μ and `a = |g|²/μ = ½ΔtD/μ`, each rule makes a new `u′` that keeps the normal
 //! distribution of variance kT/μ, whatever Δt is.
 
+use super::PairThermostat;
 use super::pass::add_virial;
 use super::planes::Plane;
-use super::{PairThermostat, Update};
 use crate::engine::sweep::Pool;
 use psidpd_passes::noise::Law;
+
+/// The order in which the pairs come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Order {
+    Forward,
+    Reversed,
+}
 
 /// A pair in hand.
 #[derive(Debug, Clone, Copy)]
@@ -78,18 +85,19 @@ struct Share<'a> {
 }
 
 impl PairThermostat {
-    /// Applies a rule to all pairs in turn.
-    pub(super) fn in_turn(&mut self, pool: &Pool, v: &mut [[f64; 3]], update: Update) -> [f64; 6] {
+    /// Applies a rule to all pairs in turn; `draws` where it asks for a chance.
+    pub(super) fn in_turn(
+        &mut self,
+        pool: &Pool,
+        v: &mut [[f64; 3]],
+        rule: fn(&Encounter) -> f64,
+        order: Order,
+        draws: bool,
+    ) -> [f64; 6] {
         let PairThermostat { planes, lists, mass, kt, dt, noise, impulses, .. } = self;
         impulses.resize_with(planes.len(), Vec::new);
         let (planes, mass, kt) = (&planes[..], &mass[..], *kt);
-        let reversed = matches!(update, Update::Shardlow { reversed: true });
-        let rule = match update {
-            Update::Shardlow { .. } => shardlow,
-            Update::LoweAndersen => lowe_andersen,
-            _ => ornstein_uhlenbeck,
-        };
-        let draws = update == Update::LoweAndersen;
+        let reversed = order == Order::Reversed;
         let mut sorted: Vec<[f64; 3]> = lists.order().iter().map(|k| v[*k as usize]).collect();
         let mut virial = [0.0; 6];
         let mut sets = sets(planes);

@@ -36,8 +36,8 @@ fn defaults_are_those_of_the_manual() {
             let key = format!("`{key}` ");
             keys.iter().find_map(|text| text.strip_prefix(&key)).map(number)
         };
-        assert_eq!(integrator.lambda().map(|(lambda, _)| *lambda), stated("lambda"), "{name}");
-        assert_eq!(integrator.gradient().map(|gradient| *gradient), stated("gradient"), "{name}");
+        assert_eq!(integrator.settings().lambda.map(|(lambda, _)| *lambda), stated("lambda"), "{name}");
+        assert_eq!(integrator.settings().gradient.map(|gradient| *gradient), stated("gradient"), "{name}");
     }
 }
 
@@ -51,7 +51,7 @@ fn errors_are_those_of_the_manual() {
         let factors: Vec<f64> = row[1..].iter().map(|cell| number(cell)).collect();
         let [a, b, of_square, of_drag, of_fourth] = factors[..] else { panic!("{row:?}") };
         let expected = [16.0 * a + 3.0 * b, 4.0 * of_square + 3.0 * of_drag + 16.0 * of_fourth];
-        let found = integrator.accuracy().errors(0.5, 4.0, 6.0);
+        let found = integrator.properties().accuracy.errors(0.5, 4.0, 6.0);
         assert!((0..2).all(|k| (found[k] - expected[k]).abs() < 1e-12), "{name}: {found:?} {expected:?}");
     }
 }

@@ -58,8 +58,8 @@ impl Advice {
         // Weak drag bears shorter steps only: what the step does not conserve has to be carried off.
         let reach = (0.75 + 0.4 * drag / frequency).min(1.25);
         let better_dt = two_digits(reach / frequency);
-        let errors = stage.integrator.accuracy().errors(stage.dt, frequency, drag);
-        let better_errors = ADVISED.accuracy().errors(better_dt, frequency, drag);
+        let errors = stage.integrator.properties().accuracy.errors(stage.dt, frequency, drag);
+        let better_errors = ADVISED.properties().accuracy.errors(better_dt, frequency, drag);
         let time = PRICE * stage.dt / better_dt;
         let worst = |errors: [f64; 2]| errors[0].max(errors[1]);
         let gains = worst(errors) > WORTH.max(worst(better_errors)) && time < 3.0;
@@ -90,7 +90,7 @@ impl fmt::Display for Advice {
         let Advice { stage, dt, errors, better_dt, better_errors, time } = self;
         let percent = |x: f64| two_digits(100.0 * x);
         let mut advised = ADVISED;
-        let lambda = advised.lambda().map_or(0.0, |(lambda, _)| *lambda);
+        let lambda = advised.settings().lambda.map_or(0.0, |(lambda, _)| *lambda);
         write!(
             f,
             "stage \"{stage}\", velocity-verlet at dt = {dt}: by estimate the configurational temperature is off by {} %, and \

@@ -188,8 +188,8 @@ fn read_integrator(section: &Section, default: Integrator) -> Result<Integrator,
     };
     let name = integrator.name();
     if let Some(value) = section.get("lambda") {
-        let Some((lambda, [low, high])) = integrator.lambda() else {
-            return Err(has_none(&value, name, "lambda", |other| other.lambda().is_some()));
+        let Some((lambda, [low, high])) = integrator.settings().lambda else {
+            return Err(has_none(&value, name, "lambda", |other| other.settings().lambda.is_some()));
         };
         *lambda = value.number()?.value;
         if !(low..=high).contains(lambda) {
@@ -198,8 +198,8 @@ fn read_integrator(section: &Section, default: Integrator) -> Result<Integrator,
         }
     }
     if let Some(value) = section.get("gradient") {
-        let Some(gradient) = integrator.gradient() else {
-            return Err(has_none(&value, name, "gradient", |other| other.gradient().is_some()));
+        let Some(gradient) = integrator.settings().gradient else {
+            return Err(has_none(&value, name, "gradient", |other| other.settings().gradient.is_some()));
         };
         *gradient = value.number()?.value;
         if !(0.0..=1.0).contains(gradient) {
@@ -207,26 +207,30 @@ fn read_integrator(section: &Section, default: Integrator) -> Result<Integrator,
         }
     }
     if let Some(value) = section.get("thermostat_step") {
-        let Some(coupling) = integrator.coupling() else {
-            return Err(has_none(&value, name, "thermostat_step", |other| other.coupling().is_some()));
+        let Some(coupling) = integrator.settings().coupling else {
+            return Err(has_none(&value, name, "thermostat_step", |other| {
+                other.settings().coupling.is_some()
+            }));
         };
         coupling.update = value.one_of("thermostat_step", &THERMOSTAT_STEPS)?.value;
     }
     if let Some(value) = section.get("thermostat_every") {
-        let Some(coupling) = integrator.coupling() else {
-            return Err(has_none(&value, name, "thermostat_every", |other| other.coupling().is_some()));
+        let Some(coupling) = integrator.settings().coupling else {
+            return Err(has_none(&value, name, "thermostat_every", |other| {
+                other.settings().coupling.is_some()
+            }));
         };
         coupling.every = read_steps(&value)?;
     }
     if let Some(value) = section.get("sweeps") {
-        let Some((sweeps, _)) = integrator.trials() else {
-            return Err(has_none(&value, name, "sweeps", |other| other.trials().is_some()));
+        let Some((sweeps, _)) = integrator.settings().trials else {
+            return Err(has_none(&value, name, "sweeps", |other| other.settings().trials.is_some()));
         };
         *sweeps = read_steps(&value)?;
     }
     if let Some(value) = section.get("max_move") {
-        let Some((_, max_move)) = integrator.trials() else {
-            return Err(has_none(&value, name, "max_move", |other| other.trials().is_some()));
+        let Some((_, max_move)) = integrator.settings().trials else {
+            return Err(has_none(&value, name, "max_move", |other| other.settings().trials.is_some()));
         };
         *max_move = Some(positive(&value)?);
     }

@@ -78,7 +78,7 @@ pub fn estimates(scene: &Scene) -> Result<Vec<StepEstimate>, RunError> {
         };
         let Some(Sample { frequency, drag, resistance }) = sample else { continue };
         let drag = if stage.thermostat { drag } else { 0.0 };
-        let of = |dt: f64| stage.integrator.accuracy().errors(dt, frequency, drag);
+        let of = |dt: f64| stage.integrator.properties().accuracy.errors(dt, frequency, drag);
         let [error, carried] = of(stage.dt);
         let estimate = StepEstimate {
             stage: stage.name.clone(),

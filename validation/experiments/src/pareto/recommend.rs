@@ -13,13 +13,13 @@ pub fn scene_lines(dt: f64, setting: &Setting) -> String {
     let Physics { mut integrator, precision, .. } = setting.physics;
     let mut s = format!("dt = {}\nintegrator = \"{}\"\n", dt, integrator.name());
     // Writing to a String cannot fail.
-    if let Some((lambda, _)) = integrator.lambda() {
+    if let Some((lambda, _)) = integrator.settings().lambda {
         let _ = writeln!(s, "lambda = {lambda}");
     }
-    if let Some(gradient) = integrator.gradient() {
+    if let Some(gradient) = integrator.settings().gradient {
         let _ = writeln!(s, "gradient = {gradient}");
     }
-    if let Some(coupling) = integrator.coupling() {
+    if let Some(coupling) = integrator.settings().coupling {
         let _ = writeln!(s, "thermostat_step = \"{}\"", coupling.name());
         if coupling.every > 1 {
             let _ = writeln!(s, "thermostat_every = {}", coupling.every);

@@ -49,7 +49,7 @@ impl Physics {
         if !self.integrator.has_time() {
             return 1;
         }
-        let every = { self.integrator }.coupling().map_or(1, |coupling| coupling.every);
+        let every = { self.integrator }.settings().coupling.map_or(1, |coupling| coupling.every);
         let wanted = ((INTERVAL as f64 / self.multiple).round() as u64).max(1);
         (wanted..).find(|steps| greatest_common_divisor(*steps, every) == 1).unwrap_or(wanted)
     }
@@ -80,7 +80,7 @@ fn named(name: &str) -> Integrator {
 
 fn two_stage(every: u64) -> Integrator {
     let mut integrator = named("two-stage");
-    if let Some(coupling) = integrator.coupling() {
+    if let Some(coupling) = integrator.settings().coupling {
         *coupling = Coupling { every, ..*coupling };
     }
     integrator
@@ -173,7 +173,7 @@ mod tests {
     fn samples_are_at_all_phases() {
         for choice in [Choice::Few, Choice::Quick, Choice::Full] {
             for p in physics(choice) {
-                let every = { p.integrator }.coupling().map_or(1, |coupling| coupling.every);
+                let every = { p.integrator }.settings().coupling.map_or(1, |coupling| coupling.every);
                 let phases: std::collections::BTreeSet<u64> =
                     (1..=every).map(|k| k * p.interval() % every).collect();
                 assert_eq!(phases.len() as u64, every, "{p:?}");

@@ -133,7 +133,7 @@ fn lammps_lines_are_those_that_lammps_can_run() {
             integrator => {
                 assert_eq!(
                     lines.is_ok(),
-                    integrator.in_lammps() != psidpd_dynamics::integrator::Counterpart::None
+                    integrator.properties().lammps != psidpd_dynamics::integrator::Counterpart::None
                 )
             }
         }

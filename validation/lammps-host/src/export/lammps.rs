@@ -130,7 +130,7 @@ fn check(scene: &Scene) -> Result<(), DeckError> {
             return Err(DeckError::Steps { stage: stage.name.clone(), steps: stage.steps });
         }
         let integrator = stage.integrator;
-        if integrator.in_lammps() == Counterpart::None {
+        if integrator.properties().lammps == Counterpart::None {
             return Err(DeckError::Integrator {
                 stage: stage.name.clone(),
                 name: integrator.name(),
@@ -327,17 +327,17 @@ fn write_script(scene: &Scene, s: &mut String) -> std::fmt::Result {
 /// The style and the arguments of the fix that makes the steps.
 fn motion(integrator: &Integrator) -> String {
     let mut integrator = *integrator;
-    if integrator.in_lammps() != Counterpart::Splitting {
+    if integrator.properties().lammps != Counterpart::Splitting {
         return "nve".to_owned();
     }
     let mut text = format!("dpd/splitting {}", integrator.name());
-    if let Some((lambda, _)) = integrator.lambda() {
+    if let Some((lambda, _)) = integrator.settings().lambda {
         text += &format!(" lambda {lambda:?}");
     }
-    if let Some(gradient) = integrator.gradient() {
+    if let Some(gradient) = integrator.settings().gradient {
         text += &format!(" gradient {gradient:?}");
     }
-    if let Some(coupling) = integrator.coupling().filter(|coupling| coupling.every > 1) {
+    if let Some(coupling) = integrator.settings().coupling.filter(|coupling| coupling.every > 1) {
         text += &format!(" every {}", coupling.every);
     }
     if let Some(Law::Uniform) = integrator.noise() {

@@ -145,7 +145,7 @@ impl Simulation {
         if !integrator.has_time() {
             return self.forces_or_infinite(want);
         }
-        match integrator.drag_in_forces() {
+        match integrator.properties().drag_in_forces {
             true => self.forces_with_thermostat(dt, want),
             false => self.conservative_forces(want),
         }
@@ -191,7 +191,7 @@ impl Simulation {
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(RunError::TimeStep(dt));
         }
-        if !self.thermostat.fits(integrator.drag_in_forces()) {
+        if !self.thermostat.fits(integrator.properties().drag_in_forces) {
             // Forces of another integrator.
             self.prepare_for(integrator, dt, Want::FORCES)?;
         }
@@ -202,7 +202,7 @@ impl Simulation {
         integrator.step(self, dt, want)?;
         self.close_record(integrator);
         self.forces.add_thermostat_virial(self.thermostat.impulse_virial());
-        self.stale = !integrator.forces_at_end();
+        self.stale = !integrator.properties().forces_at_end;
         // The order of trials must not depend on where particles are.
         if reorder::is_due(self.number) && integrator.has_time() {
             self.end_step()?;

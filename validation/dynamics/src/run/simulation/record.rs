@@ -42,11 +42,11 @@ impl Simulation {
         let Some(record) = self.record.as_mut().filter(|record| record.open) else { return };
         record.open = false;
         let forces = &mut record.flux.forces;
-        for (acted, share) in forces.iter_mut().zip(integrator.force_shares()) {
+        for (acted, share) in forces.iter_mut().zip(integrator.properties().force_shares) {
             acted.share = share;
         }
         // No need to keep what is still there.
-        if let Some(last) = forces.last_mut().filter(|_| integrator.forces_at_end()) {
+        if let Some(last) = forces.last_mut().filter(|_| integrator.properties().forces_at_end) {
             last.at = None;
         }
     }

@@ -209,7 +209,7 @@ impl Simulation {
                 pairs.drags(&before)
             }
             Update::ImplicitDrag => pairs.drags(v),
-            _ => pairs.pulls(),
+            Update::OrnsteinUhlenbeck | Update::Shardlow { .. } | Update::LoweAndersen => pairs.pulls(),
         });
         // The drag that an implicit step ends with is a force, which `add_drag` counts.
         if heat.update != Update::ImplicitDrag {

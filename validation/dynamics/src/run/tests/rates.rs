@@ -108,9 +108,9 @@ fn relative_velocities_decay_by_the_formula() {
         run.restore(0, &State { v, ..state }, &[], [0; 2]);
         run.prepare_for(integrator, DT, Want::FORCES).unwrap();
         let start = dot(relative, ALONG);
-        let mut now = [start, if integrator.drag_in_forces() { -X * start } else { 0.0 }];
+        let mut now = [start, if integrator.properties().drag_in_forces { -X * start } else { 0.0 }];
         let mut it = integrator;
-        let every = it.coupling().map_or(1, |coupling| coupling.every);
+        let every = it.settings().coupling.map_or(1, |coupling| coupling.every);
         for step in 1..=6 {
             run.step(DT, integrator, Want::FORCES).unwrap();
             if step % every == 0 {
