@@ -1,5 +1,3 @@
-//! Models.
-
 use crate::arrays::{numbers, shown};
 use crate::errors::{exception, wrong};
 use crate::phases;
@@ -104,7 +102,7 @@ impl Model {
         let pressures: Vec<f64> =
             py.detach(|| densities.chunks_exact(species).map(|d| theory.pressure(d)).collect());
         let found = PyArray1::from_vec(py, pressures).reshape(shape)?;
-        // A number for a number, as numpy's own functions have it.
+        // A scalar argument gives a scalar result, as in numpy's own functions.
         found.get_item(())
     }
 
@@ -135,7 +133,7 @@ impl Model {
         format!("<psidpd.Model \"{}\", species {}>", self.model.title(), self.model.species().join(", "))
     }
 
-    /// Models go to other processes as their text.
+    /// A model is pickled as its text.
     fn __reduce__<'py>(slf: &Bound<'py, Model>) -> PyResult<(Bound<'py, PyAny>, (String, String))> {
         let source = slf.get().model.source();
         let make = slf.get_type().getattr("from_text")?;

@@ -1,4 +1,3 @@
-
 use super::Frame;
 use psidpd_core::engine::PeriodicBox;
 
