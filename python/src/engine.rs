@@ -30,7 +30,7 @@ pub struct Engine {
     description: String,
 }
 
-/// What a configuration comes to.
+/// The result of an evaluation.
 #[pyclass(frozen, get_all, module = "psidpd")]
 pub struct Evaluation {
     /// The potential energy U = Σ ψ + Σ φ.
@@ -77,7 +77,7 @@ impl Engine {
     ///     not copied.
     /// box : a length, three lengths (two in two dimensions), or a matrix whose rows are the edge vectors.
     /// types : array (N,) of indices of species, from 0, or of their names; left out, all are of the first species.
-    /// periodic : which directions repeat, all if left out.
+    /// periodic : the periodic directions, all if left out.
     ///
     /// Raises InputError for arrays that do not fit, and where the energy is not finite.
     #[pyo3(signature = (x, r#box, types = None, *, periodic = None))]
@@ -176,7 +176,7 @@ impl Engine {
         let last = self.species.len() - 1;
         match kinds.iter().find(|kind| usize::try_from(**kind).map_or(true, |k| k > last)) {
             Some(kind) => Err(wrong(format!(
-                "types: {kind} is no species; they count from 0 to {last}: {}",
+                "types: {kind} is not the number of a species; the numbers go from 0 to {last}: {}",
                 self.species.join(", ")
             ))),
             None => Ok(kinds),
@@ -186,7 +186,7 @@ impl Engine {
     fn index(&self, name: &str) -> PyResult<i32> {
         let found = self.species.iter().position(|s| s == name);
         let known =
-            || wrong(format!("types: \"{name}\" is no species of this model: {}", self.species.join(", ")));
+            || wrong(format!("types: \"{name}\" is not a species of this model: {}", self.species.join(", ")));
         Ok(found.ok_or_else(known)? as i32)
     }
 

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 
 /// A fluid as a model file describes it: species, densities, excess free energies, pair potentials, thermostats.
 ///
-/// `Model.from_file` and `Model.from_text` read one. The temperature is no part of it: whoever uses it gives kT.
+/// `Model.from_file` and `Model.from_text` read one. The temperature is not part of the model; its users give kT.
 /// All numbers are in the reduced units of the model: lengths in r_c, masses in m, energies in the unit of kT.
 #[pyclass(frozen, module = "psidpd")]
 pub struct Model {
@@ -26,7 +26,7 @@ impl Model {
         model::Model::open(&path).map(|model| Model { model }).map_err(exception)
     }
 
-    /// Reads a model from a text, as a model file has it. Tables that it names are looked for from the present folder.
+    /// Reads a model from a text, as a model file has it. Paths of tables in it are relative to the current folder.
     ///
     /// Raises InputError for anything wrong in it, with the line and the key.
     #[staticmethod]
@@ -35,19 +35,19 @@ impl Model {
         model::Model::parse(name, text).map(|model| Model { model }).map_err(exception)
     }
 
-    /// What the file calls itself.
+    /// The title in the file.
     #[getter]
     fn title(&self) -> &str {
         self.model.title()
     }
 
-    /// Where the model comes from, or None.
+    /// The source of the model, or None.
     #[getter]
     fn reference(&self) -> Option<&str> {
         self.model.reference()
     }
 
-    /// 2 or 3.
+    /// The number of dimensions, 2 or 3.
     #[getter]
     fn dimensions(&self) -> usize {
         self.model.dimensions()
@@ -111,7 +111,7 @@ impl Model {
     /// Of one species: densities `vapour` and `liquid` that coexist, their `pressure`, the densities `spinodal_low` and
     /// `spinodal_high` between which the fluid is unstable, and the `tension` and `width` of the planar interface. Of two
     /// species, at the total number density `density`: shares of the first species instead, `composition_low` and
-    /// `composition_high`. NaN stands for what there is not, and `note` says why.
+    /// `composition_high`. Missing values are NaN, and `note` says why.
     ///
     /// Raises InputError for more than two species, and where the model has no mean field.
     #[pyo3(signature = (kT, density = None))]

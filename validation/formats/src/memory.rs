@@ -55,7 +55,7 @@ fn limits() -> Vec<(f64, &'static str)> {
     let groups = read_to_string("/proc/self/cgroup").unwrap_or_default();
     let groups = groups.lines().flat_map(|line| left_in_groups(line, Path::new("/sys/fs/cgroup")));
     all.extend(
-        groups.map(|left| (left, "the control group of the process, as a container has it, allows no more")),
+        groups.map(|left| (left, "the control group of the process (as in a container) allows no more")),
     );
     all
 }

@@ -62,7 +62,7 @@ impl Setfl<'_> {
         }
         for (i, name) in names.iter().enumerate() {
             if name.is_empty() || name.contains(|c: char| c.is_whitespace() || c == '#') {
-                return invalid(format!("'{name}' is no name for an element: one word"));
+                return invalid(format!("'{name}' is not a valid element name: it must be one word"));
             }
             if names[..i].contains(name) {
                 return invalid(format!("element {name} is given twice"));

@@ -65,7 +65,7 @@ pub fn read(
         let is_timeless = |stage: &String| place.stages.timeless.contains(&stage.as_str());
         if let Some(stage) = settings.stages.iter().find(|s| kind.of_motion && is_timeless(s)) {
             let message =
-                format!("is of motion in time, which stage \"{stage}\", of monte-carlo, has none of");
+                format!("needs motion in time, but the integrator of stage \"{stage}\" is monte-carlo");
             let error = options.at("stages").error(FileErrorKind::Value(message));
             return Err(error.with_help("observe a stage of an integrator with a time step"));
         }
@@ -119,7 +119,7 @@ impl Common {
                 }
             }
             if common.stages.is_empty() {
-                return Err(value.error(FileErrorKind::Value("names no stage".into())));
+                return Err(value.error(FileErrorKind::Value("must name at least one stage".into())));
             }
         }
         Ok(common)

@@ -172,7 +172,7 @@ fn print(findings: &Findings, species: &[String]) {
     }
     if let (Some(p), Some(slope)) = (findings.pressure, findings.pressure_slope) {
         let shown = |x: f64| {
-            if x.is_finite() { decimal(x, 6) } else { "none (psi is no finite number there)".into() }
+            if x.is_finite() { decimal(x, 6) } else { "none (psi is not finite there)".into() }
         };
         say!("mean field    pressure {}, dp/drho {}", shown(p), shown(slope));
     }

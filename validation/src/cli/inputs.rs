@@ -14,7 +14,7 @@ pub struct Files {
 
 /// The error of an output file that is also an input file.
 #[derive(Debug, thiserror::Error)]
-#[error("{} is what this verb reads, and would be written over: choose another place for the results", .0.display())]
+#[error("{} is an input of this verb and would be overwritten: choose another place for the results", .0.display())]
 pub struct WrittenOver(PathBuf);
 
 /// The depth of references: a scene names a model, and a model names tables.

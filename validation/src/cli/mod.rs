@@ -173,7 +173,7 @@ fn complain(failure: &Failure, caller: Caller) -> u8 {
 
 /// The error of output that is lost although the work is done.
 #[derive(Debug, thiserror::Error)]
-#[error("standard output cannot be written, and a part of what was said is lost: {0}")]
+#[error("standard output cannot be written, and a part of the output is lost: {0}")]
 struct Lost(std::io::Error);
 
 impl Verb {

@@ -113,7 +113,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     let mut runner = Runner::begin(&scene, out, begin)?;
     if threads.get() > processors() {
         warn(&format!(
-            "{threads} threads on {} processors: more than there are make a run slower",
+            "{threads} threads on {} processors: more threads than processors make a run slower",
             processors()
         ));
     }

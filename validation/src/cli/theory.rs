@@ -93,7 +93,7 @@ fn without_numbers(densities: &[f64]) -> Option<String> {
     Some(match *last == 0.0 {
         true => "an empty cell has no value: at density 0 there are no particles to share an energy".into(),
         false => {
-            format!("an empty cell has no value: psi or its slope is no finite number at densities {place}")
+            format!("an empty cell has no value: psi or its slope is not finite at densities {place}")
         }
     })
 }
@@ -180,7 +180,7 @@ fn one(arguments: &Arguments, model: &Model, kt: f64, scope: &mut Scope) -> Resu
     let defined = middle.is_finite();
     if !defined {
         say!(
-            "at density {} there is no pressure: psi or its slope is no finite number there\n",
+            "at density {} there is no pressure: psi or its slope is not finite there\n",
             number(total)
         );
     }

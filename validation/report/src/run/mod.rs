@@ -22,7 +22,7 @@ pub use series::Table as SeriesTable;
 /// The reasons why a folder has no report.
 #[derive(Debug, thiserror::Error)]
 pub enum RunReportError {
-    #[error("{} holds nothing of a run: none of {files} is there", folder.display())]
+    #[error("{} is not the folder of a run: it has none of the files {files}", folder.display())]
     NoRun { folder: PathBuf, files: String },
     #[error(transparent)]
     Report(#[from] ReportError),
@@ -30,12 +30,12 @@ pub enum RunReportError {
 
 /// The files that a report is made from, with their descriptions.
 const FILES: [(&str, &str); 10] = [
-    ("about.json", "what was run: species, stages, units, columns of thermo.csv"),
+    ("about.json", "description of the run: species, stages, units, columns of thermo.csv"),
     ("thermo.csv", "totals every few steps"),
-    ("summary.json", "what the run came to"),
-    ("timing.json", "how long the run took"),
+    ("summary.json", "summary of results"),
+    ("timing.json", "duration of the run"),
     ("observables.json", "observables with their errors"),
-    ("observables", "the same, a CSV file for each"),
+    ("observables", "a CSV file for each observable"),
     ("final.data", "the state after the last step: LAMMPS data file"),
     ("dump.lammpstrj", "frames: LAMMPS text dump"),
     ("trajectory.xyz", "frames: extended XYZ"),
