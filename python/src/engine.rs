@@ -185,8 +185,9 @@ impl Engine {
 
     fn index(&self, name: &str) -> PyResult<i32> {
         let found = self.species.iter().position(|s| s == name);
-        let known =
-            || wrong(format!("types: \"{name}\" is not a species of this model: {}", self.species.join(", ")));
+        let known = || {
+            wrong(format!("types: \"{name}\" is not a species of this model: {}", self.species.join(", ")))
+        };
         Ok(found.ok_or_else(known)? as i32)
     }
 

@@ -147,7 +147,7 @@ mod tests {
     }
 
     /// Layers that decay into a plateau do not raise its density, at any phase of the layers. A mean from one width on would
-    /// be off by up to 2 %. If the layers leave no room for a plateau, its error is smaller than the stated uncertainty.
+    /// be off by up to 2 %. If the layers leave no room for a plateau, its error is at most five stated uncertainties and 0.02.
     #[test]
     fn layers_are_no_part_of_a_plateau() {
         for phase in [0.0, 1.0, 2.0, 3.0, 4.0, 5.0] {

@@ -4,7 +4,8 @@ use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt, TerminationRe
 use nalgebra::{DMatrix, DVector, Dyn, VecStorage};
 
 /// Finds the parameters with the least sum of squared residuals, and that sum. The search begins at `start`; slopes are
-/// differences over `steps`. The search avoids parameters without residuals. The result is `None` if there are no residuals.
+/// differences over `steps`. The search avoids parameters without residuals. The result is
+/// `None` if `start` has no residuals and if the search fails.
 pub fn least_squares<const N: usize>(
     start: [f64; N],
     steps: [f64; N],
@@ -14,7 +15,7 @@ pub fn least_squares<const N: usize>(
     Some((std::array::from_fn(|k| at[k]), sum))
 }
 
-/// Finds the least squares of [`least_squares`] for any number of parameters.
+/// Does the work of [`least_squares`] for any number of parameters.
 pub fn least_squares_of_any(
     start: &[f64],
     steps: &[f64],

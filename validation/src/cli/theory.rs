@@ -179,10 +179,7 @@ fn one(arguments: &Arguments, model: &Model, kt: f64, scope: &mut Scope) -> Resu
     let middle = theory.pressure(&densities);
     let defined = middle.is_finite();
     if !defined {
-        say!(
-            "at density {} there is no pressure: psi or its slope is not finite there\n",
-            number(total)
-        );
+        say!("at density {} there is no pressure: psi or its slope is not finite there\n", number(total));
     }
 
     let answers: Vec<(&str, Value)> = match species {

@@ -309,7 +309,7 @@ impl Sorted {
             Plane { rows: rows.collect(), across: Interval::of(plane.iter().map(|particle| particle.1[1])) }
         };
         let planes = particles.chunk_by(|a, b| a.0[0] == b.0[0]).map(of_plane).collect();
-        // Vectors read beyond the last particle.
+        // Vectors read beyond the last particle, so the arrays are padded.
         let padding = LANES - 1;
         let fractions = |k: usize| particles.iter().map(move |particle| particle.1[k]);
         let offsets = particles.iter().map(|particle| (particle.2 * near.width) as u32);

@@ -248,7 +248,7 @@ impl Meter for Drop {
         let mean: [f64; 3] = std::array::from_fn(|c| members().map(|x| x[c]).sum::<f64>() / count);
         let squares =
             members().map(|x| (0..3).map(|c| (x[c] - mean[c]).powi(2)).sum::<f64>()).sum::<f64>() / count;
-        // Correct the circular mean to the centre of mass of the members, whose images next to it are used.
+        // Move the origin from the circular mean to the centre of mass of the nearest images of the members.
         at.iter_mut().for_each(|x| (0..3).for_each(|c| x[c] -= mean[c]));
 
         let rest = (self.dimensions - 1) as f64;
