@@ -1,6 +1,6 @@
-//! Numbers out of bytes.
+//! Numbers from the bytes of an input.
 
-/// Bytes that are taken from the front; zeros when there are no more.
+/// A queue of bytes. An empty queue gives zeros.
 pub struct Bytes<'a>(pub &'a [u8]);
 
 impl Bytes<'_> {
@@ -12,12 +12,10 @@ impl Bytes<'_> {
         taken
     }
 
-    /// Whether nothing is left.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// A byte.
     pub fn byte(&mut self) -> u8 {
         u8::from_le_bytes(self.take())
     }
@@ -27,17 +25,16 @@ impl Bytes<'_> {
         usize::from(self.byte()) % n
     }
 
-    /// Yes or no.
     pub fn flag(&mut self) -> bool {
         self.byte() & 1 == 1
     }
 
-    /// Any integer.
+    /// Any 32-bit integer.
     pub fn integer(&mut self) -> i32 {
         i32::from_le_bytes(self.take())
     }
 
-    /// Mostly a number of the size that coefficients have, sometimes any.
+    /// Usually a number of the size of typical coefficients, sometimes any number.
     pub fn number(&mut self) -> f64 {
         match self.byte() {
             0..16 => f64::from_le_bytes(self.take()),

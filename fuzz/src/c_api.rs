@@ -3,10 +3,10 @@ use psidpd_c::*;
 use std::ffi::{CStr, CString};
 use std::ptr::{null, null_mut};
 
-/// Most particles of a call.
+/// The largest number of particles in a call.
 const MOST: usize = 12;
 
-/// Models that engines are made from, if not from the input's own text.
+/// Models for the engines, if the input has no text of its own.
 const MODELS: [&str; 4] = [
     "title = \"a\"\nspecies = [\"A\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n[excess_free_energy]\n\
      A = \"n^2\"\n[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\nstrength = -5\nrange = 1\n\
@@ -19,8 +19,8 @@ const MODELS: [&str; 4] = [
     "title = \"d\"\nspecies = [\"A\"]\n[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"expression\"\nphi = \"1/r\"\nrange = 1\n",
 ];
 
-/// Any numbers, in calls of any order, with pointers that are right or null: no call brings the program down, and those that
-/// fail say why.
+/// Makes calls in any order, with any numbers, and with pointers that are valid or null. No call ends the program, and each
+/// failing call sets an error message.
 pub fn c_api(input: &[u8]) {
     let mut bytes = Bytes(input);
     let text = match bytes.below(5) {
@@ -28,7 +28,7 @@ pub fn c_api(input: &[u8]) {
         k => CString::new(MODELS[k]).unwrap_or_default(),
     };
     let mut model: *mut Model = null_mut();
-    // SAFETY: a text that ends with a zero byte, and a place to write to.
+    // SAFETY: both texts end with a zero byte, and `model` is a place to write to.
     let status = unsafe { psidpd_model_parse(c"fuzz".as_ptr(), text.as_ptr(), &mut model) };
     told(status);
     if status != Status::Ok {
@@ -38,7 +38,7 @@ pub fn c_api(input: &[u8]) {
     let settings =
         Settings { precision: small(&mut bytes), instructions: small(&mut bytes), threads: bytes.below(4) };
     let mut engine: *mut Engine = null_mut();
-    // SAFETY: a model that is alive until it is freed, once.
+    // SAFETY: `model` is valid until it is freed once, at the end of this block.
     unsafe {
         told(psidpd_engine_new_with(model, bytes.number(), &settings, &mut engine));
         if engine.is_null() {
@@ -46,23 +46,23 @@ pub fn c_api(input: &[u8]) {
         }
         psidpd_model_free(model);
     }
-    // Twenty calls reach every state, and take no time.
+    // Twenty calls reach every state in a short time.
     for _ in 0..20 {
         if bytes.is_empty() {
             break;
         }
         call(engine, &mut bytes);
     }
-    // SAFETY: null, or an engine that is freed once.
+    // SAFETY: `engine` is null or valid, and is freed only here.
     unsafe { psidpd_engine_free(engine) };
 }
 
-/// From -1 to 6.
+/// A whole number from -1 to 6.
 fn small(bytes: &mut Bytes) -> i32 {
     bytes.below(8) as i32 - 1
 }
 
-/// A failure has a message of its own.
+/// Checks that a failed call has set a message.
 fn told(status: Status) {
     assert!(status != Status::Panic, "{}", last_error());
     if status != Status::Ok {
@@ -71,11 +71,11 @@ fn told(status: Status) {
 }
 
 fn last_error() -> String {
-    // SAFETY: valid until the next failing call on this thread.
+    // SAFETY: the C interface keeps this text valid until the next failing call on this thread.
     unsafe { CStr::from_ptr(psidpd_last_error()) }.to_string_lossy().into_owned()
 }
 
-/// Particles with arrays of their own, exactly as long as they must be.
+/// Particles with arrays of exactly the required length.
 struct Cloud {
     owned: usize,
     x: Vec<f64>,
@@ -90,11 +90,11 @@ impl Cloud {
         let all = bytes.below(MOST + 1);
         let x: Vec<f64> = (0..3 * all).map(|_| bytes.number()).collect();
         let v: Vec<f64> = (0..3 * all).map(|_| bytes.number()).collect();
-        // Right, or any.
+        // Tags and kinds are either correct or arbitrary.
         let numbered = bytes.byte() > 8;
         let tag = (0..all).map(|k| if numbered { k as i32 + 1 } else { bytes.integer() }).collect();
         let kind = (0..all).map(|_| if numbered { 0 } else { small(bytes) }).collect();
-        // One more than there are is an error that must be noticed.
+        // One owned particle too many is an error that the call must report.
         let owned = bytes.below(all + 2);
         Cloud { owned, force: vec![0.0; 3 * all], x, v, tag, kind }
     }
@@ -121,8 +121,8 @@ fn call(engine: *mut Engine, bytes: &mut Bytes) {
     let mut tally = Tally { excess: 0.0, pair: 0.0, virial: [0.0; 6], thermostat_virial: [0.0; 6] };
     let newton = small(bytes);
     let force = cloud.force.as_mut_ptr();
-    // SAFETY: the engine is null or alive; arrays are as long as the structures say, apart from each other, and alive until
-    // the end of this function; the others are null.
+    // SAFETY: the engine is null or valid. All arrays have the lengths that the structures state, do not overlap, and live
+    // until the end of this function. All other pointers are null.
     unsafe {
         told(match which {
             0 => psidpd_engine_densities(engine, &request.particles, newton),
@@ -158,7 +158,7 @@ fn call(engine: *mut Engine, bytes: &mut Bytes) {
                 let (mut slopes, mut length) = (null_mut(), 0);
                 let status = psidpd_engine_slopes(engine, &mut slopes, &mut length);
                 if status == Status::Ok {
-                    // What a host does with them: those of ghosts are written.
+                    // A host adds to the slopes and writes those of ghosts.
                     for k in 0..length {
                         *slopes.add(k) += bytes.number();
                     }

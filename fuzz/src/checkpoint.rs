@@ -8,10 +8,10 @@ use std::path::Path;
 const MODEL: &str = "title = \"m\"\nspecies = [\"A\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n\
                      [excess_free_energy]\nA = \"n^2\"\n[[thermostat]]\ngamma = 4.5\nrange = 1\n";
 
-/// Bytes before what is written by postcard.
+/// The number of bytes before the part that postcard writes.
 const HEADER: usize = 24;
 
-/// The scene whose runs left the corpus, of `steps` steps: few particles and coarse observables, so that checkpoints are short.
+/// The scene of the corpus, with `steps` steps. Few particles and coarse observables keep its checkpoints short.
 fn scene_of_checkpoints(steps: u64) -> String {
     format!(
         r#"title = "c"
@@ -46,13 +46,13 @@ local_density = {{ bins = 4 }}
     )
 }
 
-/// Reads the scene; its model is beside it, in `folder`.
+/// Reads the scene after writing its model into `folder`.
 fn read_scene(steps: u64, folder: &Path) -> Scene {
     std::fs::write(folder.join("model.toml"), MODEL).expect("a model");
     Scene::parse("c.toml", &scene_of_checkpoints(steps), folder).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// What is in the checkpoint, behind its header, at the end of a run of so many steps.
+/// The body of the checkpoint, without header, at the end of a run of `steps` steps.
 pub fn checkpoint_of_a_run(steps: u64) -> Vec<u8> {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let scene = read_scene(steps, folder.path());
@@ -62,8 +62,8 @@ pub fn checkpoint_of_a_run(steps: u64) -> Vec<u8> {
     file[HEADER..].to_vec()
 }
 
-/// Any bytes are a checkpoint or an error: as a file, and as what is in one whose header is right. What was read can be
-/// used, or is an error. Whether the second was read to its last part.
+/// Any bytes are a checkpoint or an error, both as a whole file and as the body of a file with a correct header. A checkpoint
+/// that was read can be used. Returns true if the second one was read to its end.
 pub fn checkpoint(bytes: &[u8]) -> bool {
     used(parse(bytes, Path::new("fuzz")).ok());
     let mut file = b"psidpdCK".to_vec();
@@ -74,7 +74,7 @@ pub fn checkpoint(bytes: &[u8]) -> bool {
     used(parse(&file, Path::new("fuzz")).ok())
 }
 
-/// Whether the observables are those of the scene.
+/// Uses a checkpoint. Returns true if its observables are those of the scene.
 fn used(checkpoint: Option<Checkpoint>) -> bool {
     thread_local!(static UNUSED: Observers = unused());
     let Some(checkpoint) = checkpoint else { return false };

@@ -2,13 +2,13 @@ use crate::bytes::Bytes;
 use psidpd_core::model::{SplinePair, WarrenPair};
 use psidpd_styles::style::Style;
 
-/// Any coefficients of the pair styles of LAMMPS make a style or an error, and so does any model file with any species; the
-/// text of a style's model, which restart files hold, makes the same style again.
+/// Any coefficients of LAMMPS's pair styles, and any model file with any species, make a style or an error. The text of a
+/// style's model, which restart files hold, makes the same style again.
 pub fn coefficients(input: &[u8]) {
     let mut bytes = Bytes(input);
     let (form, dimensions, kt) = (bytes.below(4), bytes.below(5), bytes.number());
     let types = bytes.below(5);
-    // Sometimes not as many as there should be.
+    // The number of coefficients is sometimes wrong.
     let count = if bytes.byte() == 0 { bytes.below(30) } else { types * types };
     let style = match form {
         0 | 1 => {
@@ -49,7 +49,7 @@ pub fn coefficients(input: &[u8]) {
     };
     let mut style = match style {
         Ok(style) => style,
-        // Where panics are caught.
+        // A caught panic is an internal error.
         Err(error) => return assert!(!error.to_string().contains("internal error"), "{error}"),
     };
     assert!(!style.description("a fuzzer", false, true).is_empty());

@@ -1,7 +1,7 @@
 use psidpd::formats::data::DataFile;
 use psidpd::formats::dump::DumpReader;
 
-/// Any text is a LAMMPS data file or an error; what was read and can be written is read again as the same.
+/// Any text is a LAMMPS data file or an error. A file that was read and can be written is read again as the same.
 pub fn data(text: &str) {
     let Ok(data) = DataFile::parse(text) else { return };
     let mut written = Vec::new();

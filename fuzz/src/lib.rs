@@ -1,5 +1,5 @@
-//! What is done with an input that may be anything, for each reader of the project: it is an error or it is read, and what is
-//! read can be used. Fuzzers call these functions (`libfuzzer/`), and so does a test, for a bounded time.
+//! The checks of each reader of the project with arbitrary input: the result is an error or an object that can be used.
+//! Fuzzers call these functions (`libfuzzer/`), and so does a test, for a bounded time.
 
 mod bytes;
 mod c_api;
@@ -31,8 +31,8 @@ pub fn model(text: &str) {
     }
 }
 
-/// Any text is a formula or an error; a formula has a value and a derivative, and evaluates the same one point at a time and
-/// expanded.
+/// Any text is a formula or an error. A formula has a value and a derivative, and gives the same results one point at a
+/// time and expanded.
 pub fn expression(text: &str) {
     let Ok(ast) = Ast::parse(text) else { return };
     let variables = Variables { count: 2, names: [("n".into(), vec![0, 1]), ("m".into(), vec![1])].into() };
@@ -45,7 +45,7 @@ pub fn expression(text: &str) {
     }
     let expanded = Expansion::default().coefficients(&formula, &[0.7, 1.3], &[1])[0];
     let both = value.abs() < 1e100 && expanded.is_finite();
-    // Great numbers that cancel leave their rounding errors.
+    // Large numbers that cancel leave their rounding errors.
     let error = 1e-6 * value.abs().max(1.0) + 1e-12 * formula.greatest(&[0.7, 1.3]);
     assert!(!both || (value - expanded).abs() <= error, "{value} {expanded}: {text}");
 }

@@ -1,6 +1,6 @@
 use psidpd::report::run_report;
 
-/// The files of a run that others may have written, each behind a line with its name.
+/// The files of a run that other programs may have written. In the input each follows a line with its name.
 const FILES: [&str; 6] =
     ["about.json", "summary.json", "timing.json", "observables.json", "thermo.csv", "final.data"];
 

@@ -4,15 +4,15 @@ use std::path::Path;
 use std::sync::OnceLock;
 use toml::Value;
 
-/// Largest number that stands for a length or a density, and for particles: what takes long is no fault.
+/// The largest allowed length or density. Larger scenes take too long, which is not an error.
 const LONGEST: f64 = 20.0;
 const MOST: f64 = 2000.0;
 
-/// A model beside the scene, which reads it as `model.toml`.
+/// The model of the scene, in the file `model.toml`.
 const MODEL: &str = "title = \"m\"\nspecies = [\"A\", \"B\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n\
                      [excess_free_energy]\nA = \"n^2\"\nB = \"n\"\n[[thermostat]]\ngamma = 4.5\nrange = 1\n";
 
-/// Any text is a scene or an error; a small one has particles.
+/// Any text is a scene or an error. A small scene has particles.
 pub fn scene(text: &str) {
     static FOLDER: OnceLock<tempfile::TempDir> = OnceLock::new();
     let folder = FOLDER.get_or_init(|| {
@@ -24,7 +24,7 @@ pub fn scene(text: &str) {
         let _ = Scene::parse("fuzz.toml", text, folder.path());
         return;
     };
-    // Other files than the model are whatever they are.
+    // Scenes that name other files than the model are skipped, because such files may have any content.
     if !is_small(&Value::Table(table.clone()), "")
         || table.get("model").is_some_and(|m| m.as_str() != Some("model.toml"))
     {

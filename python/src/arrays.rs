@@ -5,23 +5,23 @@ use numpy::{PyArrayDyn, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// Numbers in one piece, in the order of C, as 64-bit floating point: those of `object` itself where they are so already,
-/// else a copy.
+/// Contiguous 64-bit floating-point numbers in C order. An array that already has this form is borrowed; all others are
+/// copied.
 ///
 /// # Errors
-/// `object` is no array of real numbers.
+/// The function fails if `object` is not an array of real numbers.
 pub fn numbers<'py>(object: &Bound<'py, PyAny>, name: &str) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
     as_array(object, name, "float64", "iuf", "real numbers")
 }
 
-/// Whole numbers in one piece, as 32-bit integers.
+/// Contiguous 32-bit integers in C order.
 ///
 /// # Errors
-/// `object` is no array of whole numbers.
+/// The function fails if `object` is not an array of whole numbers.
 pub fn integers<'py>(object: &Bound<'py, PyAny>, name: &str) -> PyResult<PyReadonlyArrayDyn<'py, i32>> {
     refuse_masked(object, name)?;
     let array = object.py().import("numpy")?.call_method1("asarray", (object,))?;
-    // Conversion would wrap what is too large.
+    // The conversion of numpy would wrap numbers that are too large.
     let outside = "iu".contains(&array.getattr("dtype")?.getattr("kind")?.extract::<String>()?)
         && array.getattr("size")?.extract::<usize>()? > 0
         && array.getattr("dtype")?.getattr("itemsize")?.extract::<usize>()? >= 4
@@ -60,7 +60,7 @@ fn as_array<'py, T: numpy::Element>(
     readonly(array.cast()?, name)
 }
 
-/// What a mask hides would be computed with: numpy drops masks without a word.
+/// Refuses masked arrays. Numpy would drop the mask silently, and the hidden elements would enter the computation.
 fn refuse_masked(object: &Bound<PyAny>, name: &str) -> PyResult<()> {
     let masked = object.py().import("numpy.ma")?.call_method1("isMaskedArray", (object,))?;
     if masked.is_truthy()? {
@@ -79,7 +79,7 @@ fn readonly<'py, T: numpy::Element>(
     array.try_readonly().map_err(|_| wrong(format!("{name} is being written to")))
 }
 
-/// A shape as numpy writes it: `(3, 2)`, `(3,)`.
+/// A shape in the notation of numpy: `(3, 2)`, `(3,)`.
 pub fn shown(shape: &[usize]) -> String {
     match shape {
         [one] => format!("({one},)"),

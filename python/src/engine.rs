@@ -20,7 +20,7 @@ use std::sync::{Mutex, PoisonError, TryLockError};
 #[pyclass(frozen, module = "psidpd")]
 pub struct Engine {
     engine: Mutex<engine::Engine>,
-    /// What the engine is made of, and the process that has its threads.
+    /// The fluid and the settings serve to make the engine anew in a forked process; `process` owns its threads.
     fluid: Fluid,
     settings: Settings,
     process: AtomicU32,
@@ -30,7 +30,7 @@ pub struct Engine {
     description: String,
 }
 
-/// What a configuration comes to.
+/// The result of an evaluation.
 #[pyclass(frozen, get_all, module = "psidpd")]
 pub struct Evaluation {
     /// The potential energy U = Σ ψ + Σ φ.
@@ -77,7 +77,7 @@ impl Engine {
     ///     not copied.
     /// box : a length, three lengths (two in two dimensions), or a matrix whose rows are the edge vectors.
     /// types : array (N,) of indices of species, from 0, or of their names; left out, all are of the first species.
-    /// periodic : which directions repeat, all if left out.
+    /// periodic : the periodic directions, all if left out.
     ///
     /// Raises InputError for arrays that do not fit, and where the energy is not finite.
     #[pyo3(signature = (x, r#box, types = None, *, periodic = None))]
@@ -111,8 +111,8 @@ impl Engine {
         let domain = self.domain(r#box, periodic)?;
         check_reach(&domain, self.dimensions, self.cutoff, count).map_err(exception)?;
         self.follow_fork()?;
-        // The arrays of numpy are borrowed, and nobody else can borrow them to write; a thread that writes without asking
-        // changes what is computed, as with numpy's own functions.
+        // The arrays of numpy are borrowed, and no other borrow can write to them. A thread that writes without a borrow changes
+        // the result, as with numpy's own functions.
         let found = py.detach(|| {
             let mut engine = self.engine.lock().unwrap_or_else(PoisonError::into_inner);
             engine.evaluate(points, &domain, &kinds)
@@ -126,14 +126,14 @@ impl Engine {
 }
 
 impl Engine {
-    /// In a forked process, which has none of the engine's threads, makes the engine anew. Called with Python's lock held,
-    /// so by one thread at a time.
+    /// Makes the engine anew in a forked process, which has no threads of the engine. Python's lock is held, so only one
+    /// thread at a time runs this.
     fn follow_fork(&self) -> PyResult<()> {
         let here = std::process::id();
         if self.process.load(Ordering::Relaxed) == here {
             return Ok(());
         }
-        // A thread that was evaluating when the process was forked has left the lock closed.
+        // If a thread was evaluating during the fork, the lock stays closed in the new process.
         let mut engine = match self.engine.try_lock() {
             Ok(engine) => engine,
             Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
@@ -176,7 +176,7 @@ impl Engine {
         let last = self.species.len() - 1;
         match kinds.iter().find(|kind| usize::try_from(**kind).map_or(true, |k| k > last)) {
             Some(kind) => Err(wrong(format!(
-                "types: {kind} is no species; they count from 0 to {last}: {}",
+                "types: {kind} is not the number of a species; the numbers go from 0 to {last}: {}",
                 self.species.join(", ")
             ))),
             None => Ok(kinds),
@@ -185,8 +185,9 @@ impl Engine {
 
     fn index(&self, name: &str) -> PyResult<i32> {
         let found = self.species.iter().position(|s| s == name);
-        let known =
-            || wrong(format!("types: \"{name}\" is no species of this model: {}", self.species.join(", ")));
+        let known = || {
+            wrong(format!("types: \"{name}\" is not a species of this model: {}", self.species.join(", ")))
+        };
         Ok(found.ok_or_else(known)? as i32)
     }
 
@@ -227,10 +228,10 @@ impl Engine {
     }
 }
 
-/// How forces are computed.
+/// Makes the settings of an engine.
 ///
 /// # Errors
-/// No such precision; too many threads, or none.
+/// The function fails for an unknown precision and for an invalid number of threads.
 pub fn settings(precision: &str, threads: usize) -> PyResult<Settings> {
     let known = Precision::ALL.iter().find(|(name, _)| *name == precision);
     let (_, precision) =
@@ -238,10 +239,8 @@ pub fn settings(precision: &str, threads: usize) -> PyResult<Settings> {
     Ok(Settings { precision: *precision, threads: thread_count(threads)?, ..Settings::default() })
 }
 
-/// How many threads.
-///
 /// # Errors
-/// None, or more than there can be.
+/// The function fails for zero threads and for more threads than are allowed.
 pub fn thread_count(threads: usize) -> PyResult<NonZeroUsize> {
     Pool::count(threads).map_err(|e| wrong(e.to_string()))
 }

@@ -7,8 +7,8 @@ use pyo3::prelude::*;
 pyo3::import_exception!(psidpd.errors, InputError);
 pyo3::import_exception!(psidpd.errors, RunStoppedError);
 
-/// The exception for an error that psidpd would end with, with the same text: [`RunStoppedError`] where its exit code is
-/// 1, else [`InputError`].
+/// The exception for an error, with the text that psidpd would end with: [`RunStoppedError`] if the exit code is 1,
+/// else [`InputError`].
 pub fn exception(error: impl Into<Failure>) -> PyErr {
     let failure = error.into();
     let text = failure.plain(Caller::Python);
@@ -19,7 +19,7 @@ pub fn exception(error: impl Into<Failure>) -> PyErr {
     }
 }
 
-/// An argument that is wrong.
+/// The exception for a wrong argument.
 pub fn wrong(text: impl Into<String>) -> PyErr {
     InputError::new_err(text.into())
 }

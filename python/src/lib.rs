@@ -1,7 +1,7 @@
-//! psidpd for Python: the compiled part of the package `psidpd`, which adds what is easier said in Python.
+//! The compiled part of the Python package `psidpd`. The rest of the package is written in Python.
 //!
-//! Arrays come and go without copies where numpy has them as 64-bit numbers in one piece. What takes long lets other
-//! threads of Python run. Errors are those of `psidpd.errors`, with the messages of the command line.
+//! Contiguous arrays of 64-bit numbers are not copied. Long computations release Python's lock. Errors are those of
+//! `psidpd.errors`, with the messages of the command line.
 
 mod arrays;
 mod engine;

@@ -1,5 +1,3 @@
-//! Models.
-
 use crate::arrays::{numbers, shown};
 use crate::errors::{exception, wrong};
 use crate::phases;
@@ -11,7 +9,7 @@ use std::path::PathBuf;
 
 /// A fluid as a model file describes it: species, densities, excess free energies, pair potentials, thermostats.
 ///
-/// `Model.from_file` and `Model.from_text` read one. The temperature is no part of it: whoever uses it gives kT.
+/// `Model.from_file` and `Model.from_text` read one. The temperature is not part of the model; its users give kT.
 /// All numbers are in the reduced units of the model: lengths in r_c, masses in m, energies in the unit of kT.
 #[pyclass(frozen, module = "psidpd")]
 pub struct Model {
@@ -28,7 +26,7 @@ impl Model {
         model::Model::open(&path).map(|model| Model { model }).map_err(exception)
     }
 
-    /// Reads a model from a text, as a model file has it. Tables that it names are looked for from the present folder.
+    /// Reads a model from a text, as a model file has it. Paths of tables in it are relative to the current folder.
     ///
     /// Raises InputError for anything wrong in it, with the line and the key.
     #[staticmethod]
@@ -37,19 +35,19 @@ impl Model {
         model::Model::parse(name, text).map(|model| Model { model }).map_err(exception)
     }
 
-    /// What the file calls itself.
+    /// The title in the file.
     #[getter]
     fn title(&self) -> &str {
         self.model.title()
     }
 
-    /// Where the model comes from, or None.
+    /// The source of the model, or None.
     #[getter]
     fn reference(&self) -> Option<&str> {
         self.model.reference()
     }
 
-    /// 2 or 3.
+    /// The number of dimensions, 2 or 3.
     #[getter]
     fn dimensions(&self) -> usize {
         self.model.dimensions()
@@ -104,7 +102,7 @@ impl Model {
         let pressures: Vec<f64> =
             py.detach(|| densities.chunks_exact(species).map(|d| theory.pressure(d)).collect());
         let found = PyArray1::from_vec(py, pressures).reshape(shape)?;
-        // A number for a number, as numpy's own functions have it.
+        // A scalar argument gives a scalar result, as in numpy's own functions.
         found.get_item(())
     }
 
@@ -113,7 +111,7 @@ impl Model {
     /// Of one species: densities `vapour` and `liquid` that coexist, their `pressure`, the densities `spinodal_low` and
     /// `spinodal_high` between which the fluid is unstable, and the `tension` and `width` of the planar interface. Of two
     /// species, at the total number density `density`: shares of the first species instead, `composition_low` and
-    /// `composition_high`. NaN stands for what there is not, and `note` says why.
+    /// `composition_high`. Missing values are NaN, and `note` says why.
     ///
     /// Raises InputError for more than two species, and where the model has no mean field.
     #[pyo3(signature = (kT, density = None))]
@@ -135,7 +133,7 @@ impl Model {
         format!("<psidpd.Model \"{}\", species {}>", self.model.title(), self.model.species().join(", "))
     }
 
-    /// Models go to other processes as their text.
+    /// A model is pickled as its text.
     fn __reduce__<'py>(slf: &Bound<'py, Model>) -> PyResult<(Bound<'py, PyAny>, (String, String))> {
         let source = slf.get().model.source();
         let make = slf.get_type().getattr("from_text")?;

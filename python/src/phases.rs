@@ -1,4 +1,4 @@
-//! Phases in mean field, as rows of a table.
+//! Mean-field phases as rows of a table.
 
 use crate::errors::{exception, wrong};
 use psidpd_core::model::Model;
@@ -6,14 +6,14 @@ use psidpd_core::theory::{MeanField, TheoryError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-/// Named numbers, and what is to be said of them.
+/// Named numbers, and a note on missing ones.
 pub struct Row {
     values: Vec<(&'static str, f64)>,
     note: String,
 }
 
 impl Row {
-    /// Takes values out of an answer, or none and the reason.
+    /// Adds the values of an answer; if there is none, adds NaN and the reason.
     fn put<T>(
         &mut self,
         names: &[&'static str],
@@ -37,10 +37,10 @@ impl Row {
     }
 }
 
-/// The phases of `model` at one temperature; of two species at a total density.
+/// The phases of `model` at one temperature. Two species need a total density.
 ///
 /// # Errors
-/// No mean field; more than two species; two without a density.
+/// The function fails without a mean field, for more than two species, and for two species without a density.
 pub fn row(model: &Model, kt: f64, density: Option<f64>) -> PyResult<Row> {
     let theory = MeanField::new(&model.at(kt).map_err(exception)?).map_err(exception)?;
     let mut row = Row { values: vec![("kT", kt)], note: String::new() };
@@ -80,7 +80,7 @@ pub fn row(model: &Model, kt: f64, density: Option<f64>) -> PyResult<Row> {
 /// Rows as a pandas DataFrame.
 ///
 /// # Errors
-/// pandas is not there.
+/// The function fails if pandas is not installed.
 pub fn frame<'py>(py: Python<'py>, rows: &[Row]) -> PyResult<Bound<'py, PyAny>> {
     let list = PyList::empty(py);
     for row in rows {

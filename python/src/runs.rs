@@ -1,5 +1,3 @@
-//! Runs of scenes.
-
 use crate::engine::{settings, thread_count};
 use crate::errors::{exception, wrong};
 use psidpd::observe;
@@ -13,10 +11,10 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-/// What stops a run: the number of SIGINT.
+/// The number of the signal SIGINT.
 const INTERRUPT: usize = 2;
 
-/// Time between looks for Ctrl-C, which Python keeps until it is asked.
+/// The time between checks for Ctrl-C. Python reports the signal only when asked.
 const LOOK: Duration = Duration::from_millis(50);
 
 /// Runs a scene into the folder `out`: what `psidpd.run` does. The scene is the file `path`, or `text`, whose paths start
@@ -73,7 +71,7 @@ pub fn run_scene(
             }
         });
         if report && outcome.as_ref().err().is_none_or(psidpd::run::RunError::is_stop) {
-            // The error of the run is more informative than one of the page.
+            // If both fail, the error of the run is more informative than the error of the page.
             let page = write_run_report(&out);
             if outcome.is_ok() {
                 page?;
@@ -116,7 +114,7 @@ pub fn estimate(series: &Bound<PyAny>) -> PyResult<(f64, f64)> {
     }
 }
 
-/// A result of a run: name, value, error, unit, source, what mean field says, and what is published, with its error.
+/// A result of a run: name, value, error, unit, source, mean-field prediction, and published value with its error.
 type Found = (String, f64, Option<f64>, String, String, Option<f64>, Option<[f64; 2]>);
 
 /// The results of the run in a folder that are looked for first, and notes on them.

@@ -155,7 +155,7 @@ fn a_run_has_a_report_and_pictures() {
     assert!(std::fs::read_to_string(here.join("out/report.html")).unwrap().contains("no snapshots"));
 
     for (arguments, message) in [
-        (vec!["report", "nowhere"], "nothing of a run"),
+        (vec!["report", "nowhere"], "is not the folder of a run"),
         (vec!["snapshot", "nowhere.data"], "nowhere.data"),
         (vec!["snapshot", "scene.toml"], "scene.toml"),
         (vec!["snapshot", "out/final.data", "--out", "a.bmp"], ".svg or .png"),
@@ -448,7 +448,7 @@ fn no_verb_writes_over_what_it_reads() {
     ] {
         let output = psidpd(here, arguments);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", said(&output));
-        assert!(said(&output).contains("would be written over"), "{arguments:?}: {}", said(&output));
+        assert!(said(&output).contains("would be overwritten"), "{arguments:?}: {}", said(&output));
     }
     for (name, text) in [("m.toml", table), ("start.data", data), ("set6.toml", &set6), ("s.toml", scene)] {
         assert_eq!(std::fs::read_to_string(here.join(name)).unwrap(), text, "{name}");

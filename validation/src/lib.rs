@@ -1,4 +1,4 @@
-//! The program `psidpd`: its command line, and its parts by their names for the tests and for Python.
+//! The program `psidpd`: its command line, and its parts under their names for tests and Python.
 
 pub mod cli;
 

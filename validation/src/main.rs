@@ -1,5 +1,3 @@
-//! The `psidpd` program.
-
 use std::process::ExitCode;
 
 fn main() -> ExitCode {

@@ -1,106 +1,89 @@
-//! `about.json`: what was run, and what the columns of its series are.
+//! `about.json`: a description of a run, and of the columns of its series.
 
 use super::FormatError;
 use crate::files::write_atomically;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// What a run is, for whoever opens its folder: names, units, conventions.
+/// A description of a run for readers of its folder: names, units, conventions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct About {
-    /// What wrote the folder, with its version.
+    /// The program that wrote the folder, with its version.
     pub program: String,
-    /// Title of the scene.
     pub title: String,
-    /// Title of the model.
     pub model: String,
-    /// 2 or 3.
+    /// The number of dimensions is 2 or 3.
     pub dimensions: usize,
-    /// Names of the species; LAMMPS type k is the k-th.
+    /// Names of the species; LAMMPS type k is the k-th species.
     pub species: Vec<String>,
-    /// Mass of each species.
     pub masses: Vec<f64>,
-    /// The weighted local densities of the model.
     pub densities: Vec<AboutDensity>,
-    /// kT of the scene.
     #[serde(rename = "kT")]
     pub kt: f64,
-    /// Seed of the initial state and of the noise.
+    /// The seed serves the initial state and the noise.
     pub seed: u64,
-    /// In what the forces of pairs were computed; empty if it is not told.
+    /// The precision of the pair forces; empty in files that do not say it.
     #[serde(default)]
     pub precision: String,
-    /// Corner of the box.
     pub box_origin: [f64; 3],
-    /// The three edge vectors of the box. In two dimensions the third is a unit.
+    /// The three edge vectors of the box. In two dimensions the third has length 1.
     pub box_edges: [[f64; 3]; 3],
-    /// Which directions repeat.
     pub box_periodic: [bool; 3],
-    /// The stages in order.
     pub stages: Vec<AboutStage>,
-    /// What units the numbers are in.
     pub units: String,
-    /// The columns of `thermo.csv`.
+    /// Columns of `thermo.csv`.
     pub thermo: Vec<Column>,
-    /// What theory and literature say of the fluid, to be put beside what is measured.
+    /// Predictions of theory and published values for this fluid, to compare with the measured values.
     #[serde(default)]
     pub expected: Vec<Expected>,
 }
 
-/// What is known of a quantity before it is measured.
+/// The expected value of one quantity.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Expected {
-    /// As in the results of a run: `pressure`, `liquid`, `vapour`, `tension`, `width`.
+    /// The name is that in the results of a run: `pressure`, `liquid`, `vapour`, `tension`, `width`.
     pub name: String,
-    /// What mean field says.
+    /// The prediction of mean-field theory.
     pub mean_field: Option<f64>,
-    /// What is published for this kT: value and error.
+    /// The published value for this kT and its error.
     pub published: Option<[f64; 2]>,
 }
 
 /// A weighted local density of the model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AboutDensity {
-    /// Its name.
     pub name: String,
-    /// Its weight function.
     pub kernel: String,
-    /// Where that vanishes, a length.
+    /// The distance at which the weight function vanishes.
     pub range: f64,
 }
 
-/// A stage of the run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AboutStage {
-    /// Its name.
     pub name: String,
-    /// The number of the step it starts from.
+    /// The number of the step before the first step of the stage.
     pub begin: u64,
-    /// The number of its last step.
+    /// The number of the last step.
     pub end: u64,
-    /// Δt.
     pub dt: f64,
-    /// kT.
     #[serde(rename = "kT")]
     pub kt: f64,
-    /// Whether dissipative and random forces act.
+    /// True if dissipative and random forces act.
     pub thermostat: bool,
-    /// How a step is made.
     pub integrator: String,
 }
 
-/// A column of a series.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Column {
-    /// Its name in the header of the file.
+    /// The name in the header of the file.
     pub name: String,
-    /// What it is, in words.
+    /// A description in words.
     pub title: String,
-    /// Its unit, in terms of the length, energy and mass of the model; empty for a pure number.
+    /// The unit in terms of the length, energy and mass of the model; empty for a pure number.
     pub unit: String,
 }
 
-/// Name, meaning and unit of what `thermo.csv` can have.
+/// Name, meaning and unit of the columns that `thermo.csv` can have.
 pub const THERMO: [(&str, &str, &str); 12] = [
     ("step", "number of the step", ""),
     ("time", "time since the start of the run", "length (mass/energy)^(1/2)"),
@@ -116,14 +99,10 @@ pub const THERMO: [(&str, &str, &str); 12] = [
     ("pyz", "pressure tensor, yz", "energy/length^d"),
 ];
 
-/// What every number of a run is in.
 pub const UNITS: &str = "reduced: length, energy and mass are those of the model file";
 
 impl About {
     /// Writes `about.json` into the folder of a run.
-    ///
-    /// # Errors
-    /// The file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<(), FormatError> {
         let path = folder.join("about.json");
         match serde_json::to_string_pretty(self) {
@@ -132,7 +111,7 @@ impl About {
         }
     }
 
-    /// What no run can have, if there is any of it: others may have written the file.
+    /// The first value that no run can have, for another program may have written the file.
     fn fault(&self) -> Option<String> {
         let positive = |x: f64| x > 0.0 && x.is_finite();
         let size = self.box_origin.iter().chain(self.box_edges.iter().flatten());
@@ -149,17 +128,17 @@ impl About {
         }
     }
 
-    /// Of the box; its area in two dimensions.
+    /// The volume of the box; in two dimensions the area.
     pub fn volume(&self) -> f64 {
         let [a, b, c] = self.box_edges;
         let cross = [b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]];
         (0..3).map(|k| a[k] * cross[k]).sum()
     }
 
-    /// Reads `about.json` of a folder; `None` if there is none.
+    /// Reads `about.json` of a folder; `None` if the file does not exist.
     ///
     /// # Errors
-    /// A file that cannot be read, or is no such description.
+    /// The function fails if the file cannot be read or is not a description of a run.
     pub fn read(folder: &Path) -> Result<Option<About>, FormatError> {
         let path = folder.join("about.json");
         match std::fs::read_to_string(&path) {

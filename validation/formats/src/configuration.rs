@@ -1,35 +1,30 @@
-//! Particles at one step, as files have them.
-
 use super::Frame;
 use psidpd_core::engine::PeriodicBox;
 
-/// Particles at one step, read from a file.
+/// The particles at one step, read from a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Configuration {
-    /// Number of the step, where the file tells it.
+    /// The number of the step, if the file has it.
     pub step: Option<u64>,
-    /// Time since the start of the run, where the file tells it.
+    /// The time since the start of the run, if the file has it.
     pub time: Option<f64>,
-    /// 3, or 2 if nothing differs in z.
+    /// The number of dimensions is 2 if all particles have the same z, else 3.
     pub dimensions: usize,
-    /// The box.
     pub domain: PeriodicBox,
-    /// Names of the species; LAMMPS's types have numbers for names.
+    /// Names of the species. LAMMPS types are named by their numbers.
     pub names: Vec<String>,
-    /// Positions.
     pub x: Vec<[f64; 3]>,
-    /// Velocities, where the file has them.
+    /// Velocities, if the file has them.
     pub v: Option<Vec<[f64; 3]>>,
-    /// Species, from 0.
+    /// Species are counted from 0.
     pub species: Vec<i32>,
-    /// Tags.
     pub tag: Vec<i32>,
 }
 
 impl Configuration {
-    /// Takes names and dimensions from a model: files of LAMMPS know neither.
+    /// Takes names and dimensions from a model, because files of LAMMPS contain neither.
     pub fn name_species(&mut self, names: &[String], dimensions: usize) {
-        // Names that are no numbers are names already.
+        // Names that are not numbers come from the file and stay.
         if self.names.iter().all(|n| n.parse::<usize>().is_ok()) {
             for (name, given) in self.names.iter_mut().zip(names) {
                 name.clone_from(given);
@@ -42,7 +37,7 @@ impl Configuration {
         self.dimensions = dimensions;
     }
 
-    /// The same, borrowed.
+    /// Borrows the configuration as a frame.
     pub fn frame(&self) -> Frame<'_> {
         Frame {
             step: self.step.unwrap_or(0),
@@ -58,7 +53,7 @@ impl Configuration {
     }
 }
 
-/// 2 if every particle is at the same z of a box that does not repeat there, else 3.
+/// Returns 2 if all particles have the same z in a box that is not periodic along z, else 3.
 pub(super) fn dimensions_of(x: &[[f64; 3]], periodic: [bool; 3]) -> usize {
     let flat = !periodic[2] && x.iter().all(|p| p[2] == x[0][2]);
     if flat { 2 } else { 3 }

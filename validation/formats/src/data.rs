@@ -1,4 +1,4 @@
-//! LAMMPS data files with atoms as points.
+//! LAMMPS data files with point particles.
 
 use std::collections::{HashMap, HashSet};
 use std::io::{self, Read, Write};
@@ -7,64 +7,56 @@ use std::path::Path;
 use super::FormatError;
 use super::text::{Problem, TextError, finite, shown, whole};
 
-/// What comes before the directions that repeat, in a title.
+/// This text precedes the periodic directions in a title.
 const BOUNDARY: &str = "; boundary ";
 
-/// The contents of a data file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct DataFile {
-    /// The first line.
     pub title: String,
-    /// Lower corner of the box.
     pub boxlo: [f64; 3],
-    /// Upper corner of the box.
     pub boxhi: [f64; 3],
     /// Tilt factors xy, xz, yz of a triclinic box.
     pub tilt: Option<[f64; 3]>,
-    /// Number of atom types.
     pub types: usize,
-    /// Mass of each type; empty if the file gives none.
+    /// Mass of each type; empty if the file has no masses.
     pub masses: Vec<f64>,
-    /// Name of each type, which is written as a comment beside its mass and not read; may be empty.
+    /// Name of each type, which is written as a comment beside its mass and never read; may be empty.
     pub names: Vec<String>,
-    /// The atoms, in the order of the file.
+    /// Atoms are in the order of the file.
     pub atoms: Vec<Atom>,
-    /// Their velocities, in the order of `atoms`.
+    /// Velocities are in the order of `atoms`.
     pub velocities: Option<Vec<[f64; 3]>>,
 }
 
-/// One atom of a data file.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Atom {
-    /// Its tag, from 1.
+    /// Tags are counted from 1.
     pub id: u32,
-    /// Its type, from 1.
+    /// Types are counted from 1.
     pub kind: u32,
-    /// Where it is.
     pub x: [f64; 3],
-    /// How many boxes it has travelled.
+    /// The number of periods that the atom has crossed in each direction.
     pub image: [i32; 3],
 }
 
-/// Columns before the position in the section Atoms.
+/// The columns before the position in the section Atoms.
 #[derive(Clone, Copy, PartialEq)]
 enum Style {
-    /// id type x y z
+    /// The columns are id, type, x, y, z.
     Atomic,
-    /// id type rho x y z
+    /// The columns are id, type, rho, x, y, z.
     Mdpd,
 }
 
-/// Sections without positions, which are skipped.
+/// Sections without positions, which the reader skips.
 const IGNORED: [&str; 3] = ["Pair Coeffs", "PairIJ Coeffs", "Atom Type Labels"];
-/// Header counts of things other than atoms: these must be zero.
+/// Header counts of things other than atoms, which must be zero.
 const OTHERS: [&str; 8] =
     ["bonds", "angles", "dihedrals", "impropers", "ellipsoids", "lines", "triangles", "bodies"];
 const MAX_ID: i64 = i32::MAX as i64;
 const XYZ: [&str; 3] = ["x", "y", "z"];
 
 impl DataFile {
-    /// Reads a file.
     pub fn read(path: &Path) -> Result<DataFile, FormatError> {
         let mut bytes = Vec::new();
         psidpd_core::document::open_regular(path)
@@ -74,7 +66,7 @@ impl DataFile {
             .map_err(|source| FormatError::Text { path: path.to_owned(), source })
     }
 
-    /// The line of an atom in a file, for messages, counted from 1.
+    /// The line of an atom in a file, counted from 1, for messages.
     pub fn line_of(path: &Path, id: u32) -> Option<usize> {
         let text = String::from_utf8_lossy(&std::fs::read(path).ok()?).into_owned();
         let first = |line: &str| line.split_whitespace().next().map(str::to_owned);
@@ -84,10 +76,10 @@ impl DataFile {
         Some(atoms + line + 1)
     }
 
-    /// Reads the text of a data file of `atom_style` atomic or mdpd, whose densities are passed over.
+    /// Reads the text of a data file of `atom_style` atomic or mdpd. Densities of mdpd are skipped.
     ///
-    /// The section Atoms may name its style in a comment, as LAMMPS writes it; without one it is atomic. Sections of pair
-    /// coefficients and type labels are passed over; bonds and the like are errors.
+    /// A comment at the section Atoms may name its style, as LAMMPS writes it; the default is atomic. Sections of pair
+    /// coefficients and of type labels are skipped. Bonds, angles and the like are errors.
     pub fn parse(text: &str) -> Result<DataFile, TextError> {
         let mut parser = Parser::new(text);
         let mut data = DataFile { title: parser.title.to_owned(), ..DataFile::default() };
@@ -96,7 +88,6 @@ impl DataFile {
         Ok(data)
     }
 
-    /// Writes a file.
     pub fn write(&self, path: &Path) -> Result<(), FormatError> {
         self.save(path, Style::Atomic)
     }
@@ -112,7 +103,7 @@ impl DataFile {
         self.print(&mut out, style).and_then(|()| out.flush()).map_err(FormatError::io("write", path))
     }
 
-    /// Which directions repeat, if the title says so as [`DataFile::with_boundary`] makes it.
+    /// The periodic directions, if the title has them as [`DataFile::with_boundary`] writes them.
     pub fn boundary(&self) -> Option<[bool; 3]> {
         let (_, words) = self.title.rsplit_once(BOUNDARY)?;
         let flags: Vec<bool> = words
@@ -126,7 +117,7 @@ impl DataFile {
         flags.try_into().ok()
     }
 
-    /// With the directions that repeat at the end of its title, a comment for LAMMPS, as its command `boundary` has them.
+    /// Appends the periodic directions to the title in the notation of LAMMPS's command `boundary`. LAMMPS ignores the title.
     #[must_use]
     pub fn with_boundary(mut self, periodic: [bool; 3]) -> DataFile {
         let words = periodic.map(|p| if p { "p" } else { "f" }).join(" ");
@@ -136,7 +127,7 @@ impl DataFile {
 
     /// Writes a data file of `atom_style atomic` with 17 significant digits, so that reading it gives the same bits.
     ///
-    /// A line break in the title becomes a space. What LAMMPS could not read is an error of kind `InvalidInput`.
+    /// A line break in the title becomes a space. Data that LAMMPS cannot read are an error of kind `InvalidInput`.
     pub fn write_to(&self, out: &mut impl Write) -> io::Result<()> {
         self.print(out, Style::Atomic)
     }
@@ -154,7 +145,7 @@ impl DataFile {
         if !self.masses.is_empty() {
             writeln!(out, "\nMasses\n")?;
             for (k, mass) in self.masses.iter().enumerate() {
-                // As `write_data` puts labels there; OVITO shows them.
+                // `write_data` writes type labels in the same place; OVITO shows them.
                 let name = self.names.get(k).map_or(String::new(), |name| format!(" # {name}"));
                 writeln!(out, "{} {mass:.16e}{name}", k + 1)?;
             }
@@ -177,7 +168,7 @@ impl DataFile {
         Ok(())
     }
 
-    /// Puts atoms and velocities in the order of the tags.
+    /// Sorts atoms and velocities by tag.
     pub fn sort_by_id(&mut self) {
         let mut order: Vec<usize> = (0..self.atoms.len()).collect();
         order.sort_by_key(|&i| self.atoms[i].id);
@@ -187,7 +178,7 @@ impl DataFile {
         }
     }
 
-    /// What LAMMPS would refuse.
+    /// Checks for data that LAMMPS would refuse.
     fn check(&self) -> Result<(), String> {
         if (0..3).any(|d| !finite_box(self.boxlo[d], self.boxhi[d])) {
             return Err("the box is not finite, or has no extent".into());
@@ -229,7 +220,7 @@ fn finite_box(lo: f64, hi: f64) -> bool {
     lo.is_finite() && hi.is_finite() && lo < hi
 }
 
-/// A line that says something: its number, its words, its comment.
+/// A line that is not blank: its number, its words, its comment.
 struct Line<'a> {
     number: usize,
     text: &'a str,
@@ -259,7 +250,7 @@ impl<'a> Parser<'a> {
         Parser { title, lines, next: 0, last: text.lines().count().max(1), natoms: 0 }
     }
 
-    /// The next line if it begins with a number, as all but the names of sections do.
+    /// The next line if it begins with a number, as all lines do except names of sections.
     fn numeric(&mut self) -> Option<(usize, &'a str)> {
         let line = self.lines.get(self.next)?;
         let number = line.text.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c));
@@ -378,12 +369,12 @@ impl<'a> Parser<'a> {
         Ok(())
     }
 
-    /// A line of an ignored section.
+    /// Reads a line of an ignored section.
     fn label(&mut self) -> Option<()> {
         self.numeric().map(|_| ())
     }
 
-    /// Exactly `count` lines of a section.
+    /// Reads exactly `count` lines of a section.
     fn rows<T>(
         &mut self,
         what: &str,
@@ -391,7 +382,7 @@ impl<'a> Parser<'a> {
         start: usize,
         mut row: impl FnMut(usize, &[&'a str]) -> Result<T, TextError>,
     ) -> Result<Vec<T>, TextError> {
-        // The count comes from the file: reserve no more memory than the file has lines.
+        // The count comes from the file, so reserve no more memory than the file has lines.
         let mut rows = Vec::with_capacity(count.min(self.lines.len()));
         let mut end = start;
         let mut words = Vec::new();
@@ -515,7 +506,7 @@ mod tests {
         sorted.velocities.as_mut().unwrap().reverse();
         sorted.sort_by_id();
         assert_eq!(sorted, d);
-        // Windows line ends mean the same
+        // Windows line ends have the same meaning.
         assert_eq!(DataFile::parse(&SMALL.replace('\n', "\r\n")).unwrap(), d);
     }
 
@@ -557,7 +548,7 @@ mod tests {
             assert!(e.to_string().contains(says), "{from} -> {to}: {e}");
             assert_eq!(e.line, line, "{from} -> {to}: {e}");
         }
-        // Cut short before the last mass, a file is never taken for whole.
+        // A file that is cut before its last mass is an error.
         let whole = SMALL.rfind("1 1").unwrap();
         let section = SMALL.find("\n\nMasses").unwrap();
         for i in (0..section - 1).chain(section + 3..whole) {

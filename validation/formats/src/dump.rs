@@ -1,4 +1,4 @@
-//! LAMMPS text dumps: reading any of `dump custom` and `dump atom`, writing `id type x y z vx vy vz`.
+//! LAMMPS text dumps. The reader takes any `dump custom` and `dump atom`; the writer writes `id type x y z vx vy vz`.
 
 use std::io::{self, BufRead, Write};
 use std::path::Path;
@@ -6,43 +6,38 @@ use std::path::Path;
 use super::FormatError;
 use super::text::{Problem, TextError, any_f64, finite, shown, whole};
 
-/// One step of a dump.
+/// One frame of a dump.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Frame {
-    /// The time step.
     pub step: i64,
-    /// The time, where the dump tells it.
+    /// The time, if the dump has it.
     pub time: Option<f64>,
-    /// Lower corner of the box (not of the box around a tilted box).
+    /// Lower corner of the box, not of the bounding box of a tilted box.
     pub boxlo: [f64; 3],
-    /// Upper corner of the box.
+    /// Upper corner of the box, not of the bounding box of a tilted box.
     pub boxhi: [f64; 3],
     /// Tilt factors xy, xz, yz of a triclinic box.
     pub tilt: Option<[f64; 3]>,
-    /// Boundary conditions as LAMMPS writes them: `pp pp ff`.
+    /// Boundary conditions in the notation of LAMMPS: `pp pp ff`.
     pub boundary: String,
-    /// Names of the columns.
     pub columns: Vec<String>,
-    /// Number of atoms.
     pub natoms: usize,
     /// The table, row after row. A column of words (element, typelabel) holds NaN.
     pub values: Vec<f64>,
-    /// The columns of words, by the number of the column.
+    /// The columns of words, each with its column number.
     pub words: Vec<(usize, Vec<String>)>,
 }
 
 impl Frame {
-    /// The rows of the table.
     pub fn rows(&self) -> impl ExactSizeIterator<Item = &[f64]> {
         self.values.chunks_exact(self.columns.len().max(1))
     }
 
-    /// Where a column is.
+    /// The number of the column with this name.
     pub fn column(&self, name: &str) -> Option<usize> {
         self.columns.iter().position(|c| c == name)
     }
 
-    /// The values of a column.
     pub fn get(&self, name: &str) -> Option<Vec<f64>> {
         let c = self.column(name)?;
         Some(self.rows().map(|row| row[c]).collect())
@@ -54,7 +49,7 @@ impl Frame {
         Some(self.rows().map(|row| [row[a], row[b], row[c]]).collect())
     }
 
-    /// Puts the rows in the order of the column `id`; false if there is none.
+    /// Sorts the rows by the column `id`; returns false if the dump has no such column.
     pub fn sort_by_id(&mut self) -> bool {
         let Some(ids) = self.get("id") else {
             return false;
@@ -71,7 +66,7 @@ impl Frame {
     }
 }
 
-/// The frames of a dump, one after the other. Ends after the first error.
+/// An iterator over the frames of a dump, which ends after the first error.
 #[derive(Debug)]
 pub struct DumpReader<R> {
     input: R,
@@ -80,7 +75,6 @@ pub struct DumpReader<R> {
     ended: bool,
 }
 
-/// All frames of a dump file.
 pub fn read(path: &Path) -> Result<Vec<Frame>, FormatError> {
     let file = psidpd_core::document::open_regular(path).map_err(FormatError::io("read", path))?;
     DumpReader::new(io::BufReader::new(file))
@@ -89,12 +83,11 @@ pub fn read(path: &Path) -> Result<Vec<Frame>, FormatError> {
 }
 
 impl<R: BufRead> DumpReader<R> {
-    /// Reads from `input`.
     pub fn new(input: R) -> Self {
         DumpReader { input, line: 0, text: String::new(), ended: false }
     }
 
-    /// Reads the next line; false at the end.
+    /// Reads the next line; returns false at the end.
     fn advance(&mut self) -> Result<bool, TextError> {
         self.text.clear();
         self.line += 1;
@@ -122,7 +115,7 @@ impl<R: BufRead> DumpReader<R> {
         let (mut step, mut natoms, mut sides) = (None, None, false);
         loop {
             if !self.advance()? {
-                // Before the first item this is the end of the dump.
+                // The dump ends here if the end comes before the first item.
                 return match step {
                     None => Ok(None),
                     Some(_) => Err(self.fail(Problem::Ended("ITEM: ATOMS".into()))),
@@ -192,7 +185,7 @@ impl<R: BufRead> DumpReader<R> {
             }
         }
         if tilted.is_some() {
-            // The dump gives the box around the tilted box.
+            // The dump contains the bounding box of the tilted box.
             let [xy, xz, yz] = tilt;
             let x = [0.0, xy, xz, xy + xz];
             frame.boxlo[0] -= x.into_iter().fold(0.0, f64::min);
@@ -247,34 +240,26 @@ impl<R: BufRead> Iterator for DumpReader<R> {
     }
 }
 
-/// Digits of a written dump.
+/// The number of digits in a written dump.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Digits {
     /// Six significant digits, as LAMMPS writes by default.
     #[default]
     Six,
-    /// Seventeen: reading gives the same bits.
+    /// Seventeen significant digits, which restore the exact value.
     All,
 }
 
-/// One step for [`DumpWriter`].
 #[derive(Debug, Clone, Copy)]
 pub struct Snapshot<'a> {
-    /// The time step.
     pub step: i64,
-    /// Lower corner of the box.
     pub boxlo: [f64; 3],
-    /// Upper corner of the box.
     pub boxhi: [f64; 3],
-    /// Which directions are periodic.
     pub periodic: [bool; 3],
-    /// Tags.
     pub ids: &'a [u32],
-    /// Types, from 1.
+    /// Types are counted from 1.
     pub kinds: &'a [u32],
-    /// Positions.
     pub x: &'a [[f64; 3]],
-    /// Velocities.
     pub v: &'a [[f64; 3]],
 }
 
@@ -286,12 +271,12 @@ pub struct DumpWriter<W> {
 }
 
 impl<W: Write> DumpWriter<W> {
-    /// Writes to `out`, which is best buffered.
+    /// The output `out` should be buffered.
     pub fn new(out: W, digits: Digits) -> Self {
         DumpWriter { out, digits }
     }
 
-    /// Writes one step. Slices of different lengths are an error of kind `InvalidInput`.
+    /// Writes one frame. Slices of different lengths are an error of kind `InvalidInput`.
     pub fn write(&mut self, s: &Snapshot) -> io::Result<()> {
         let n = s.ids.len();
         if [s.kinds.len(), s.x.len(), s.v.len()] != [n; 3] {
@@ -321,7 +306,6 @@ impl<W: Write> DumpWriter<W> {
         Ok(())
     }
 
-    /// Gives the output back.
     pub fn into_inner(self) -> W {
         self.out
     }
@@ -381,7 +365,7 @@ mod tests {
             assert!(e.to_string().contains(says), "{from} -> {to}: {e}");
             assert_eq!(e.line, line, "{from} -> {to}: {e}");
         }
-        // A run that was killed while it wrote
+        // A killed run can leave a partial frame.
         let mut cut = DumpReader::new(&TWO.as_bytes()[..TWO.len() - 40]);
         assert!(cut.next().unwrap().is_ok());
         assert!(matches!(

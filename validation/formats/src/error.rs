@@ -28,12 +28,12 @@ pub enum FormatError {
 }
 
 impl FormatError {
-    /// For `map_err` on reading a file.
+    /// Makes the error of `map_err` for reading a file.
     pub fn read(path: &Path) -> impl FnOnce(std::io::Error) -> FormatError {
         FormatError::io("read", path)
     }
 
-    /// For `map_err` on file operations.
+    /// Makes the error of `map_err` for a file operation.
     pub fn io(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> FormatError {
         let path = path.to_owned();
         move |source| FormatError::Io { action, path, source }

@@ -5,25 +5,22 @@ use std::io::{self, ErrorKind, Write};
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
-/// A file that cannot be written.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write {}: {cause}", path.display())]
 pub struct WriteError {
-    /// The file.
     pub path: PathBuf,
-    /// Why.
     #[source]
     pub cause: std::io::Error,
 }
 
 impl WriteError {
-    /// For `map_err` on operations that write `path`.
+    /// Makes the error of `map_err` for operations that write `path`.
     pub fn at(path: &Path) -> impl FnOnce(io::Error) -> WriteError + '_ {
         move |cause| WriteError { path: path.to_owned(), cause }
     }
 }
 
-/// Writes a file so that readers see the old content or the new, never a part.
+/// Replaces a file so that readers see the old content or the new, never a part.
 ///
 /// The bytes go to a temporary file in the same folder, which is flushed to disk and then renamed over
 /// `path`. On failure nothing is left behind and an existing file keeps its content. If `path` is a symbolic
@@ -33,12 +30,12 @@ pub fn write_atomically(path: impl AsRef<Path>, bytes: &[u8]) -> Result<(), Writ
     write(path, bytes).map_err(WriteError::at(path))
 }
 
-/// Removes a file, which need not be there.
+/// Removes a file if it exists.
 pub fn remove_if_there(path: &Path) -> io::Result<()> {
     fs::remove_file(path).or_else(unless_missing)
 }
 
-/// Takes a missing file for success.
+/// Turns the error of a missing file into success.
 pub fn unless_missing(error: io::Error) -> io::Result<()> {
     if error.kind() == ErrorKind::NotFound { Ok(()) } else { Err(error) }
 }
@@ -60,10 +57,10 @@ fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     }
 }
 
-/// Where a file is to be made that is not there: at `path`, or where links that lead nowhere yet point to.
+/// The path at which to create a new file: `path` itself, or the target of dangling links.
 fn end_of_links(path: &Path) -> io::Result<PathBuf> {
     let mut path = path.to_owned();
-    // As many as Linux follows.
+    // Linux follows at most 40 links.
     for _ in 0..40 {
         match fs::read_link(&path) {
             Ok(target) => path = path.parent().unwrap_or(Path::new("")).join(target),
@@ -81,8 +78,8 @@ fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
     };
-    // Opened here, so that the user's mask decides the permissions as for any
-    // new file, and so that an error does not name the temporary file.
+    // The file is opened here for two reasons: the user's mask decides its permissions, and an error does not name the
+    // temporary file.
     let mut code = None;
     let open = |temporary: &Path| {
         let file = File::options().write(true).create_new(true).open(temporary);
@@ -131,7 +128,7 @@ mod tests {
         }
     }
 
-    /// The file that a link leads to is replaced, there or not, and the link stays.
+    /// The target of a link is replaced, or created if it does not exist, and the link stays.
     #[test]
     fn links_are_followed() {
         let folder = tempfile::tempdir().unwrap();

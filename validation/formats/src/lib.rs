@@ -1,8 +1,8 @@
-//! File formats: LAMMPS's data files, dumps and tables, extended XYZ, and what a run's folder tells of itself.
+//! File formats: LAMMPS's data files, dumps and tables, extended XYZ, and the description in the folder of a run.
 //!
-//! Nothing here knows how a run is made. Writers are functions of one [`Frame`] without memory between frames, so that a
-//! file that was cut back to the end of a frame can be continued. [`Configuration`] is a frame read from a file, of
-//! whichever of the formats that psidpd writes.
+//! This crate does not depend on how a run is made. A writer is a function of one [`Frame`] and has no memory between
+//! frames, so a file that was cut at the end of a frame can be continued. A [`Configuration`] is a frame that was read
+//! from a file in any format that psidpd writes.
 
 pub mod about;
 mod configuration;

@@ -1,17 +1,17 @@
-//! How much memory a run needs, and how much there is: what does not fit is refused before it is asked for, since the system ends
-//! a program that asks for too much.
+//! The memory that a run needs, and the memory that is available. A run that does not fit is refused before it asks for
+//! memory, because the system kills a program that asks for too much.
 
 use rustix::process::{Resource, getrlimit};
 use std::fs::read_to_string;
 use std::path::{Path, PathBuf};
 
-/// Bytes of a particle at the peak: 4 GB for ten million (docs/running.md).
+/// Bytes per particle at the peak: 4 GB for ten million particles (docs/running.md).
 const PARTICLE: f64 = 400.0;
 
 /// Bytes of a process without particles.
 const PROGRAM: f64 = 2e7;
 
-/// More memory than there is.
+/// The error of a need for more memory than is available.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{what} about {} of memory, and this process can have {}: {limit}", shown(*need), shown(*there))]
 pub struct MemoryError {
@@ -21,19 +21,17 @@ pub struct MemoryError {
     limit: &'static str,
 }
 
-/// Bytes that a run of so many particles needs, roughly.
+/// The approximate number of bytes that a run with this number of particles needs.
 pub fn need(particles: usize) -> f64 {
     PROGRAM + PARTICLE * particles as f64
 }
 
-/// # Errors
-/// A run of so many particles needs more than there is.
+/// Checks that a run with this number of particles fits into the memory.
 pub fn check(particles: usize) -> Result<(), MemoryError> {
     fits(need(particles), || format!("{particles} particles need"))
 }
 
-/// # Errors
-/// What needs so many bytes, called `what` with its verb, needs more than there is.
+/// Checks that `need` bytes fit into the memory. `what` makes the subject and verb of the error message.
 pub fn fits(need: f64, what: impl FnOnce() -> String) -> Result<(), MemoryError> {
     let least = limits().into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
     match least {
@@ -42,12 +40,12 @@ pub fn fits(need: f64, what: impl FnOnce() -> String) -> Result<(), MemoryError>
     }
 }
 
-/// A number of bytes for people.
+/// A number of bytes with a unit, for messages.
 pub fn shown(bytes: f64) -> String {
     if bytes < 1e9 { format!("{:.0} MB", bytes / 1e6) } else { format!("{:.1} GB", bytes / 1e9) }
 }
 
-/// What is still to be had, by each that limits it; those that do not say are left out.
+/// The available memory under each limit that the system tells.
 fn limits() -> Vec<(f64, &'static str)> {
     let machine = read_to_string("/proc/meminfo").ok().and_then(|text| left_on_machine(&text));
     let of_shell = getrlimit(Resource::As).current.map(|most| most as f64 - in_use().unwrap_or(0.0));
@@ -57,7 +55,7 @@ fn limits() -> Vec<(f64, &'static str)> {
     let groups = read_to_string("/proc/self/cgroup").unwrap_or_default();
     let groups = groups.lines().flat_map(|line| left_in_groups(line, Path::new("/sys/fs/cgroup")));
     all.extend(
-        groups.map(|left| (left, "the control group of the process, as a container has it, allows no more")),
+        groups.map(|left| (left, "the control group of the process (as in a container) allows no more")),
     );
     all
 }
@@ -68,7 +66,7 @@ fn in_use() -> Option<f64> {
     Some(pages * rustix::param::page_size() as f64)
 }
 
-/// Memory that is free or can be made so, and room on the swap device, of a text as `/proc/meminfo` has it.
+/// Free or reclaimable memory plus free swap space, from a text in the format of `/proc/meminfo`.
 fn left_on_machine(text: &str) -> Option<f64> {
     let kilobytes = |name: &str| -> Option<f64> {
         text.lines().find_map(|line| line.strip_prefix(name))?.split_whitespace().next()?.parse().ok()
@@ -76,11 +74,12 @@ fn left_on_machine(text: &str) -> Option<f64> {
     Some(1024.0 * (kilobytes("MemAvailable:")? + kilobytes("SwapFree:").unwrap_or(0.0)))
 }
 
-/// What a control group and those around it still allow; `line` is one of `/proc/self/cgroup`, `root` where groups are mounted.
+/// The memory that a control group and its ancestors still allow. `line` is one of `/proc/self/cgroup`; groups are mounted
+/// at `root`.
 fn left_in_groups(line: &str, root: &Path) -> Vec<f64> {
     let mut parts = line.splitn(3, ':').skip(1);
     let (Some(controllers), Some(group)) = (parts.next(), parts.next()) else { return Vec::new() };
-    // Version 2 has no controllers in the line, version 1 a tree for each.
+    // The line of version 2 has no controllers; version 1 has one tree for each controller.
     let (root, names) = match controllers {
         "" => (root.to_owned(), ["memory.max", "memory.current", "file "]),
         c if c.split(',').any(|c| c == "memory") => {
@@ -91,12 +90,12 @@ fn left_in_groups(line: &str, root: &Path) -> Vec<f64> {
     let number = |path: PathBuf| -> Option<f64> { read_to_string(path).ok()?.trim().parse().ok() };
     let left = |folder: PathBuf| -> Option<f64> {
         let (most, now) = (number(folder.join(names[0]))?, number(folder.join(names[1]))?);
-        // Pages of files are given up when memory is wanted.
+        // The system reclaims pages of files when a process needs memory.
         let stat = read_to_string(folder.join("memory.stat")).unwrap_or_default();
         let files = stat.lines().find_map(|line| line.strip_prefix(names[2])?.trim().parse().ok());
         Some((most - now + files.unwrap_or(0.0)).clamp(0.0, most))
     };
-    // Inside a container the path may be that outside of it: then the root is the group.
+    // Inside a container the path may be the path outside of it. Then the root is the group.
     Path::new(group.trim_start_matches('/')).ancestors().filter_map(|group| left(root.join(group))).collect()
 }
 
@@ -132,7 +131,7 @@ mod tests {
     #[test]
     fn what_does_not_fit_is_refused_with_both_numbers() {
         assert_eq!(check(1000), Ok(()));
-        // More than any address space has.
+        // No address space is this large.
         let text = check(usize::MAX).unwrap_err().to_string();
         assert!(
             text.contains("18446744073709551615 particles need about") && text.contains("GB of memory"),

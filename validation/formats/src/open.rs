@@ -1,4 +1,4 @@
-//! A configuration from a file of any of the formats.
+//! Reading a configuration from a file of any format.
 
 use super::configuration::dimensions_of;
 use super::{Configuration, FormatError, read_xyz};
@@ -10,21 +10,21 @@ use psidpd_core::engine::PeriodicBox;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
-/// Which frame of a file.
+/// The choice of a frame in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Which {
-    /// The last one that is whole.
+    /// The last complete frame.
     #[default]
     Last,
-    /// By number, from 0.
+    /// The frame with this number, counted from 0.
     Number(usize),
 }
 
 impl Configuration {
-    /// Reads a LAMMPS data file, a LAMMPS text dump or an extended XYZ file, told apart by what is in it.
+    /// Reads a LAMMPS data file, a LAMMPS text dump or an extended XYZ file; the content tells the format.
     ///
     /// # Errors
-    /// A file that cannot be read or is none of these, or a frame that it does not have.
+    /// The function fails if the file cannot be read, has another format or lacks the frame.
     pub fn open(path: &Path, which: Which) -> Result<Configuration, FormatError> {
         let number = match which {
             Which::Last => None,
@@ -36,7 +36,7 @@ impl Configuration {
         let mut message = "there is no frame".to_owned();
         if let Some(n) = number {
             message += &format!(" {n}");
-            // Frames are whole up to the last one.
+            // All frames before the last complete one are complete.
             let (mut low, mut high) = (0, n);
             while high - low > 1 {
                 let middle = low + (high - low) / 2;
@@ -52,10 +52,7 @@ impl Configuration {
         Err(FormatError::Content { path: path.to_owned(), message })
     }
 
-    /// How many whole frames a file has.
-    ///
-    /// # Errors
-    /// As [`Configuration::open`].
+    /// The number of complete frames in a file.
     pub fn count(path: &Path) -> Result<usize, FormatError> {
         Configuration::open(path, Which::Last)?;
         let mut above = 1;
@@ -73,11 +70,11 @@ impl Configuration {
         Ok(low + 1)
     }
 
-    /// A frame by its number, or the last; `None` if the file does not have it.
+    /// Finds a frame by its number, or the last frame; `None` if the file does not have it.
     fn find(path: &Path, number: Option<usize>) -> Result<Option<Configuration>, FormatError> {
         let content = |message: &str| FormatError::Content { path: path.to_owned(), message: message.into() };
         let mut file = BufReader::new(open_regular(path).map_err(FormatError::read(path))?);
-        // Trajectories may be larger than memory: their frames are read one by one.
+        // Trajectories may be larger than memory, so their frames are read one by one.
         let start = file.fill_buf().map_err(FormatError::read(path))?;
         let start = String::from_utf8_lossy(start);
         let first = start.lines().find(|l| !l.trim().is_empty()).unwrap_or("").trim().to_owned();
@@ -94,8 +91,7 @@ impl Configuration {
     }
 }
 
-/// Without a number, the last frame that is whole: a run that is still going may be in the middle of the
-/// next.
+/// Without a number this is the last complete frame, because a run that is still going may be in the middle of the next.
 fn last_or_nth(
     path: &Path,
     input: impl BufRead,
@@ -138,7 +134,7 @@ fn type_names(types: usize) -> Vec<String> {
     (1..=types).map(|k| k.to_string()).collect()
 }
 
-/// A data file tells which directions repeat in its title, if at all: else all are taken to, except z of a flat one.
+/// The title of a data file may name the periodic directions. Without them all are periodic, except z of a flat box.
 fn from_data(data: &DataFile) -> Result<Configuration, String> {
     let x: Vec<[f64; 3]> = data.atoms.iter().map(|a| a.x).collect();
     let dimensions = dimensions_of(&x, [true, true, false]);

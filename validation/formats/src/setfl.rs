@@ -1,19 +1,18 @@
 //! Tables for LAMMPS's `pair_style eam/alloy`, in the format called setfl.
 //!
-//! The energy of that style is Σ_i F_i(ρ_i) + ½ Σ_i≠j φ_ij(r), with ρ_i = Σ_j f_j(r): a many-body model with one density
-//! and no w(0) term, whose density does not depend on who feels it.
+//! The energy of that style is Σ_i F_i(ρ_i) + ½ Σ_i≠j φ_ij(r), with ρ_i = Σ_j f_j(r). This is a many-body model with
+//! one density and no w(0) term, in which the density does not depend on the species of particle i.
 
 use std::io::{self, Write};
 use std::path::Path;
 
 use super::FormatError;
 
-/// An element of a table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Element {
-    /// Its name, for `pair_coeff`: one word.
+    /// The name for `pair_coeff`, which must be one word.
     pub name: String,
-    /// Its mass, which LAMMPS takes over.
+    /// LAMMPS takes this mass over.
     pub mass: f64,
 }
 
@@ -22,32 +21,31 @@ pub type OfOne<'a> = &'a dyn Fn(usize, f64) -> f64;
 /// A function of (element, element, distance).
 pub type OfTwo<'a> = &'a dyn Fn(usize, usize, f64) -> f64;
 
-/// What a setfl file tabulates. Units are those of the simulation: nothing is converted.
+/// The functions of a setfl file, in the units of the simulation.
 pub struct Setfl<'a> {
-    /// A remark for the first line.
+    /// The remark in the first line.
     pub title: &'a str,
-    /// The elements; functions name them by their place here.
+    /// The arguments of the functions are indices into these elements.
     pub elements: &'a [Element],
-    /// Number of densities in the table; the first is 0.
+    /// The number of densities in the table; the first density is 0.
     pub nrho: usize,
-    /// Distance of the densities.
+    /// The spacing of the densities.
     pub drho: f64,
-    /// Number of distances in the table; the first is 0.
+    /// The number of distances in the table; the first distance is 0.
     pub nr: usize,
-    /// Step of the distances.
+    /// The spacing of the distances.
     pub dr: f64,
-    /// Beyond it, there is no force.
+    /// The force is zero beyond this distance.
     pub cutoff: f64,
-    /// F_a(ρ).
+    /// The function F_a(ρ).
     pub embedding: OfOne<'a>,
-    /// f_b(r): what an element adds to the density around it.
+    /// The function f_b(r): the contribution of an element to the density around it.
     pub density: OfOne<'a>,
-    /// φ_ab(r), symmetric in a and b.
+    /// The function φ_ab(r), symmetric in a and b.
     pub pair: OfTwo<'a>,
 }
 
 impl Setfl<'_> {
-    /// Writes a file.
     pub fn write(&self, path: &Path) -> Result<(), FormatError> {
         let mut text = Vec::new();
         self.write_to(&mut text)
@@ -55,7 +53,7 @@ impl Setfl<'_> {
             .map_err(FormatError::io("write", path))
     }
 
-    /// Writes the table with 17 significant digits. What LAMMPS could not use is an error of kind `InvalidInput`.
+    /// Writes the table with 17 significant digits. Values that LAMMPS cannot use are an error of kind `InvalidInput`.
     pub fn write_to(&self, out: &mut impl Write) -> io::Result<()> {
         let invalid = |text: String| Err(io::Error::new(io::ErrorKind::InvalidInput, text));
         let names: Vec<&str> = self.elements.iter().map(|e| e.name.as_str()).collect();
@@ -64,7 +62,7 @@ impl Setfl<'_> {
         }
         for (i, name) in names.iter().enumerate() {
             if name.is_empty() || name.contains(|c: char| c.is_whitespace() || c == '#') {
-                return invalid(format!("'{name}' is no name for an element: one word"));
+                return invalid(format!("'{name}' is not a valid element name: it must be one word"));
             }
             if names[..i].contains(name) {
                 return invalid(format!("element {name} is given twice"));
@@ -164,7 +162,7 @@ mod tests {
         assert_eq!(numbers(&lines[8..10])[5], 0.0);
         assert!(lines[10].starts_with("2 2.0"));
         assert_eq!(numbers(&lines[11..13])[1], 0.5);
-        // pairs AA, BA, BB
+        // The pairs are AA, BA, BB.
         let pairs = numbers(&lines[15..]);
         assert_eq!(pairs.len(), 18);
         assert_eq!((pairs[0], pairs[4]), (0.0, 1.0));

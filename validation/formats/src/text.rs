@@ -1,16 +1,13 @@
-//! What can be wrong with a text file in one of LAMMPS's formats, and reading its numbers.
+//! Errors in text files of LAMMPS's formats, and readers of their numbers.
 
-/// An error in a text file, with its line.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("line {line}: {problem}")]
 pub struct TextError {
-    /// Line number, from 1.
+    /// Line numbers are counted from 1.
     pub line: usize,
-    /// What is wrong there.
     pub problem: Problem,
 }
 
-/// What is wrong with a line of a text file.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Problem {
@@ -42,7 +39,7 @@ impl Problem {
     }
 }
 
-/// At most 40 characters of what stands in the file, for messages.
+/// At most 40 characters of `text`, for messages.
 pub fn shown(text: &str) -> String {
     let mut s: String = text.chars().take(40).collect();
     if s.len() < text.len() {
@@ -51,12 +48,11 @@ pub fn shown(text: &str) -> String {
     s
 }
 
-/// Any number, also nan and inf.
+/// Reads any number, including nan and inf.
 pub fn any_f64(text: &str, what: &str, line: usize) -> Result<f64, TextError> {
     text.parse().map_err(|_| Problem::NotNumber { what: what.into(), text: shown(text) }.at(line))
 }
 
-/// A finite number.
 pub fn finite(text: &str, what: &str, line: usize) -> Result<f64, TextError> {
     let x = any_f64(text, what, line)?;
     if x.is_finite() {
@@ -66,7 +62,7 @@ pub fn finite(text: &str, what: &str, line: usize) -> Result<f64, TextError> {
     }
 }
 
-/// A whole number between two bounds.
+/// Reads a whole number from `min` to `max`.
 pub fn whole(text: &str, what: &str, min: i64, max: i64, line: usize) -> Result<i64, TextError> {
     let number = |_| Problem::NotNumber { what: what.into(), text: shown(text) }.at(line);
     let n: i128 = text.parse().map_err(number)?;

@@ -1,7 +1,7 @@
 //! Extended XYZ: two lines of header and one line for each particle.
 //!
-//! Columns `species`, `pos`, `velo`, `id` are those of libAtoms and OVITO. Readers that know chemical
-//! elements only, ASE among them, take `Z` before `species`: it is the number of the species, from 1.
+//! The columns `species`, `pos`, `velo`, `id` have the names of libAtoms and OVITO. The column `Z` stands before `species`
+//! for readers such as ASE that take only chemical elements. It holds the number of the species, counted from 1.
 
 use super::{Configuration, FormatError, Frame};
 use nalgebra::{Matrix3, Vector3};
@@ -9,10 +9,7 @@ use psidpd_core::engine::PeriodicBox;
 use std::io::{self, BufRead, Write};
 use std::path::Path;
 
-/// Writes a frame in extended XYZ, every number with the digits that bring it back unchanged.
-///
-/// # Errors
-/// `to` cannot be written.
+/// Writes a frame in extended XYZ, every number with enough digits to restore the exact value.
 pub fn write_xyz(frame: &Frame, to: &mut impl Write) -> io::Result<()> {
     let flag = |periodic: bool| if periodic { "T" } else { "F" };
     let periodic = frame.periodic();
@@ -51,20 +48,20 @@ const ELEMENTS: &str = "H He Li Be B C N O F Ne Na Mg Al Si P S Cl Ar K Ca Sc Ti
     Ho Er Tm Yb Lu Hf Ta W Re Os Ir Pt Au Hg Tl Pb Bi Po At Rn Fr Ra Ac Th Pa U Np Pu Am Cm Bk Cf Es Fm Md \
     No Lr Rf Db Sg Bh Hs Mt Ds Rg Cn Nh Fl Mc Lv Ts Og";
 
-/// A name without blanks, and none that a program would take for a chemical element: `F` is a fluid here, not fluorine.
+/// A name without blanks that is not a chemical element: `F` is a fluid here, not fluorine.
 fn name_of(species: &str) -> String {
     let name = species.replace(char::is_whitespace, "_");
     if ELEMENTS.split_whitespace().any(|e| e.eq_ignore_ascii_case(&name)) { name + "_" } else { name }
 }
 
-/// A frame of an extended XYZ file; `None` if there is no such frame. `which` counts from 0; without it
-/// the last whole one is taken: a run that is still going may be in the middle of the next.
+/// Reads a frame of an extended XYZ file; `None` if the file does not have it. `which` is counted from 0. Without it
+/// the function takes the last complete frame, because a run that is still going may be in the middle of the next.
 ///
-/// Needs `Lattice` and a column `pos`; `species`, `velo`, `id`, `Origin`, `pbc`, `Time`, `Step` are used
-/// where they are. Species are numbered in the order of their first appearance in the frame.
+/// `Lattice` and a column `pos` are required; `species`, `velo`, `id`, `Origin`, `pbc`, `Time`, `Step` are optional.
+/// Species are numbered in the order of their first appearance in the frame.
 ///
 /// # Errors
-/// A line that is not what it should be; `path` stands for the file in messages.
+/// The function fails at a malformed line. Messages name the file by `path`.
 pub fn read_xyz(
     path: &Path,
     input: impl BufRead,
@@ -103,7 +100,7 @@ pub fn read_xyz(
     parse_found(path, found)
 }
 
-/// A frame from the number of its first line and all others.
+/// Parses a frame from the number of its first line and the text of all its lines.
 fn parse_found(
     path: &Path,
     found: Option<(usize, Vec<String>)>,
@@ -119,7 +116,7 @@ fn parse_found(
 
 type Fault = (usize, String);
 
-/// One frame; lines of faults count from 0 for the comment.
+/// Parses one frame. The line of a fault is counted from the comment, which is line 0.
 fn parse_frame(comment: &str, rows: &[String]) -> Result<Configuration, Fault> {
     let head = |message: &str| (0, message.to_owned());
     let pairs = key_values(comment);
@@ -187,7 +184,7 @@ fn parse_frame(comment: &str, rows: &[String]) -> Result<Configuration, Fault> {
     Ok(this)
 }
 
-/// The words of `key=value`, values perhaps in quotes.
+/// The pairs `key=value`; a value may be quoted.
 fn key_values(comment: &str) -> Vec<(String, String)> {
     let mut pairs = Vec::new();
     let mut rest = comment.trim();
@@ -204,7 +201,7 @@ fn key_values(comment: &str) -> Vec<(String, String)> {
     pairs
 }
 
-/// Name, first word and number of words of each column.
+/// The name, first word and number of words of each column.
 fn columns(properties: &str) -> Result<Vec<(String, usize, usize)>, String> {
     let words: Vec<&str> = properties.split(':').collect();
     let mut columns = Vec::new();
@@ -257,10 +254,10 @@ mod tests {
         assert_eq!(first.x, [[0.1, 1.0 / 3.0, 2.5e-9], [1.5, -0.0, 2.0]]);
         assert_eq!(first.v.unwrap(), [[1e-300, -1.0, 0.5], [0.0, 2.0, 1.0 / 7.0]]);
         assert_eq!(first.tag, [2, 1]);
-        // Numbered as they come.
+        // Species are numbered in the order of appearance.
         assert_eq!((first.names, first.species), (vec!["B".to_owned(), "A".to_owned()], vec![0, 1]));
         assert!(read_xyz(path, text.as_bytes(), Some(2)).unwrap().is_none());
-        // A run that is going on: the last whole frame.
+        // The last frame of a running simulation may be incomplete.
         let cut = &text.as_bytes()[..text.len() - 80];
         assert_eq!(read_xyz(path, cut, None).unwrap().unwrap().step, Some(7));
         assert!(read_xyz(path, cut, Some(1)).is_err());

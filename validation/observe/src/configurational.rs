@@ -1,16 +1,16 @@
-//! The temperature of configurations, `⟨Σ F·F⟩/⟨Σ ∇²U⟩` of conservative forces.
+//! The configurational temperature of conservative forces, `⟨Σ F·F⟩/⟨Σ ∇²U⟩`.
 
 use super::frame::Frame;
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::model::Fluid;
 
-/// Edge of a block of space, in ranges of the forces.
+/// The edge of a block of space, in ranges of the forces.
 const BLOCK: f64 = 1.5;
 
-/// The most blocks along a direction.
+/// The largest number of blocks along a direction.
 const MOST_BLOCKS: usize = 8;
 
-/// Why there is none, if there is none.
+/// The reason why the fluid has no configurational temperature; `None` if it has one.
 pub fn missing(fluid: &Fluid, domain: &PeriodicBox) -> Option<&'static str> {
     let periodic = domain.periodic();
     let heights = (0..fluid.dimensions).filter(|k| periodic[*k]).map(|k| domain.height(k));
@@ -26,14 +26,14 @@ pub fn missing(fluid: &Fluid, domain: &PeriodicBox) -> Option<&'static str> {
     }
 }
 
-/// `Σ F·F` and `Σ ∇²U` over the particles that move.
+/// `Σ F·F` and `Σ ∇²U` over the mobile particles.
 pub fn sums(frame: &Frame) -> [f64; 2] {
     let mut sums = [0.0; 2];
     terms(frame, |_, term| (0..2).for_each(|c| sums[c] += term[c]));
     sums
 }
 
-/// `F·F` and `∇²U` of each particle that moves, with its number.
+/// Visits `F·F` and `∇²U` of each mobile particle, with its index.
 fn terms(frame: &Frame, mut visit: impl FnMut(usize, [f64; 2])) {
     let evaluation = frame.evaluation();
     let laplacians = evaluation.laplacians(frame.evaluator().fluid(), frame.view.species);
@@ -44,10 +44,10 @@ fn terms(frame: &Frame, mut visit: impl FnMut(usize, [f64; 2])) {
     }
 }
 
-/// The same sums over blocks of space, of which there are some along each direction; a block without particles is left out.
+/// `Σ F·F` and `Σ ∇²U` for each block of space. Blocks without particles are left out.
 ///
-/// Blocks are wider than the forces reach, so that what one says of the temperature depends little on the others. Their
-/// scatter tells the error of a single configuration.
+/// Blocks are wider than the range of the forces, so their values are nearly independent. The scatter of the blocks
+/// gives the error of a single configuration.
 pub fn sums_of_blocks(frame: &Frame) -> Vec<[f64; 2]> {
     let view = &frame.view;
     let range = frame.evaluator().fluid().conservative_range().max(f64::MIN_POSITIVE);

@@ -1,11 +1,10 @@
-//! Drift of a quantity that ought to be conserved.
+//! Drift of a quantity that should be conserved.
 
 use psidpd_core::maximum::largest;
 use serde::Serialize;
 
 use super::statistics::{StatisticsError, estimate};
 
-/// Why a series has no drift.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum DriftError {
     #[error("{times} times but {values} values")]
@@ -16,21 +15,19 @@ pub enum DriftError {
     Values(#[from] StatisticsError),
 }
 
-/// Straight-line drift of a series in time.
+/// The straight-line drift of a series in time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Drift {
-    /// Least-squares slope b = Σ (tᵢ − t̄)(xᵢ − x̄) / Σ (tᵢ − t̄)², in the units
-    /// of the series per unit of time.
+    /// Least-squares slope b = Σ (tᵢ − t̄)(xᵢ − x̄) / Σ (tᵢ − t̄)², in the units of the series per unit of time.
     pub slope: f64,
     /// One standard deviation of the slope,
     /// √(2τ Σ rᵢ² / (N − 2) / Σ (tᵢ − t̄)²), in the units of the slope, where
     /// r are the residuals of the line and τ is their integrated
     /// autocorrelation time in samples.
     pub slope_error: f64,
-    /// Last value less the first, in the units of the series.
+    /// The last value minus the first, in the units of the series.
     pub net: f64,
-    /// Largest |xᵢ − x₀|, departure from the first value, in the units of the
-    /// series.
+    /// The largest departure from the first value, |xᵢ − x₀|, in the units of the series.
     pub largest: f64,
 }
 
@@ -41,7 +38,7 @@ pub struct Drift {
 ///
 /// # Errors
 ///
-/// Slices of different lengths, times that do not increase, and whatever
+/// The function fails for slices of different lengths, for times that do not increase, and for every series that
 /// [`estimate`] refuses.
 pub fn drift(times: &[f64], values: &[f64]) -> Result<Drift, DriftError> {
     if times.len() != values.len() {
@@ -94,10 +91,9 @@ mod tests {
         assert!((d.net + 49.0).abs() < 1e-12 && (d.largest - 49.0).abs() < 1e-12);
     }
 
-    /// Slopes of 300 driftless correlated series lie within two errors of
-    /// zero 286 ± 3.6 times if the error is exact; 265 also allows for the
-    /// line having taken some of the correlation out of the residuals. White
-    /// noise errors would give about 106.
+    /// Slopes of 300 driftless correlated series lie within two errors of zero 286 ± 3.6 times if the error is exact.
+    /// The limit of 265 also allows for the correlation that the fitted line removes from the residuals. Errors for
+    /// uncorrelated samples would give about 106.
     #[test]
     fn slope_errors_allow_for_correlation() {
         let mut rng = StdRng::seed_from_u64(23);

@@ -1,39 +1,39 @@
-//! Where the density across an interface crosses its levels, whatever its shape.
+//! The positions at which the density across an interface crosses its levels. No shape of the interface is assumed.
 
-/// What the flank of a slab or drop shows by itself, without a curve put through it.
+/// Properties of one flank of a slab or drop, without a fitted curve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Edges {
-    /// Mean density of the plateau inside.
+    /// Mean density of the inner plateau.
     pub liquid: f64,
-    /// Mean density of the plateau outside.
+    /// Mean density of the outer plateau.
     pub vapour: f64,
-    /// How far the densities inside and outside may be off because their plateaus are narrow; 0 where they are wide.
+    /// Uncertainty of the inner and the outer density because their plateaus are narrow; 0 for wide plateaus.
     pub doubt: [f64; 2],
-    /// Where the density is half way, from the centre.
+    /// The distance from the centre at which the density is halfway.
     pub place: f64,
-    /// Distance of the places where 90 % and 10 % of the way are left.
+    /// The distance between the positions at 90 % and 10 % of the density step.
     pub ten_ninety: f64,
-    /// `(ρ_L − ρ_V)/max|dρ/ds|`, the slope being that of a straight line through three tenths of the interface or three
-    /// bins: differences of neighbouring bins would overrate it in proportion to their noise.
+    /// The width `(ρ_L − ρ_V)/max|dρ/ds|`. The slope is that of a straight line through three tenths of the interface or
+    /// three bins, because differences of neighbouring bins would overrate the slope in proportion to their noise.
     pub steepest: f64,
 }
 
-/// Bins that a flank must have.
+/// The smallest number of bins in a flank.
 const FEWEST: usize = 6;
 
-/// How far a plateau is from the interface, in distances from 10 to 90 %. Layers near the surface of a liquid fade within
-/// less, and averages that include them are too high or too low.
+/// The distance of a plateau from the interface, in 10–90 % widths. Layers near the surface of a liquid decay within
+/// this distance. Averages that include them are too high or too low.
 const LAYERS: f64 = 4.0;
 
-/// The least depth of a plateau in the flank, in the same unit.
+/// The smallest depth of a plateau in the flank, in 10–90 % widths.
 const DEPTH: f64 = 1.0;
 
-/// The density of a plateau: its mean, and how far that may be off.
+/// The density of a plateau and its uncertainty.
 ///
-/// `bins` go from the one farthest from the interface to the one nearest to it; each has the distance from the interface and
-/// the density. A plateau is narrow if less than [`DEPTH`] is left beyond [`LAYERS`]. Its density is then the mean over the
-/// farther half of the bins beyond one width, and the doubt the difference to the mean over all of these. `None` if not even
-/// a bin is beyond one width.
+/// `bins` are ordered from the farthest from the interface to the nearest. Each bin has its distance from the interface
+/// and its density. A plateau is narrow if less than [`DEPTH`] remains beyond [`LAYERS`]. Then its density is the mean over
+/// the farther half of the bins beyond one width, and the uncertainty is the difference from the mean over all of these.
+/// The result is `None` if no bin is beyond one width.
 fn plateau(bins: &[(f64, f64)], width: f64) -> Option<(f64, f64)> {
     let beyond = |distance: f64| &bins[..bins.iter().take_while(|bin| bin.0 > distance).count()];
     let mean = |bins: &[(f64, f64)]| bins.iter().map(|bin| bin.1).sum::<f64>() / bins.len() as f64;
@@ -46,8 +46,8 @@ fn plateau(bins: &[(f64, f64)], width: f64) -> Option<(f64, f64)> {
     (!near.is_empty()).then(|| (half, (half - mean(near)).abs()))
 }
 
-/// The edges of one flank: (distance from the centre, density), distances increasing by `height`. `None` where the density
-/// does not fall from the inside to the outside.
+/// The edges of one flank, given as (distance from the centre, density) with distances that increase by `height`.
+/// The result is `None` if the density does not fall outwards.
 pub fn edges(points: &[(f64, f64)], height: f64) -> Option<Edges> {
     if points.len() < FEWEST || !points.iter().all(|p| p.0.is_finite() && p.1.is_finite()) {
         return None;
@@ -59,13 +59,13 @@ pub fn edges(points: &[(f64, f64)], height: f64) -> Option<Edges> {
     let (mut liquid, mut vapour) = (mean(&points[..quarter]), mean(&points[points.len() - quarter..]));
     let mut doubt = [f64::NAN; 2];
     let mut found = None;
-    // The plateaus are known better once the interface between them is.
+    // A better position of the interface gives better plateaus, so the search is repeated.
     for _ in 0..4 {
         if liquid.is_nan() || vapour.is_nan() || liquid <= vapour {
             return None;
         }
         let level = |part: f64| vapour + part * (liquid - vapour);
-        // The bin where a step would hold as many particles.
+        // A sharp step at this bin would hold as many particles.
         let excess: f64 = points.iter().map(|p| p.1 - vapour).sum();
         let step = ((excess / (liquid - vapour)).max(0.0) as usize).min(points.len() - 1);
         let inner = inwards(points, step, level(0.9))?;
@@ -79,7 +79,7 @@ pub fn edges(points: &[(f64, f64)], height: f64) -> Option<Edges> {
         found = Some(Edges { liquid, vapour, doubt, place, ten_ninety, steepest });
         let inwards = points.iter().map(|p| (place - p.0, p.1)).collect::<Vec<_>>();
         let outwards = points.iter().rev().map(|p| (p.0 - place, p.1)).collect::<Vec<_>>();
-        // An interface as wide as the flank leaves no plateau. The quarters stand, and all of the step is in doubt.
+        // An interface as wide as the flank leaves no plateau. Then the quarters are kept, and the whole step is uncertain.
         let step = liquid - vapour;
         let (inside, inside_doubt) = plateau(&inwards, ten_ninety).unwrap_or((liquid, step));
         let (outside, outside_doubt) = plateau(&outwards, ten_ninety).unwrap_or((vapour, step));
@@ -88,19 +88,19 @@ pub fn edges(points: &[(f64, f64)], height: f64) -> Option<Edges> {
     found
 }
 
-/// The place nearest to bin `from`, towards the centre, where the density has risen to `level`.
+/// The position nearest to bin `from`, towards the centre, at which the density has risen to `level`.
 fn inwards(points: &[(f64, f64)], from: usize, level: f64) -> Option<f64> {
     let above = points[..=from].iter().rposition(|p| p.1 >= level)?;
     Some(between(points, above, level))
 }
 
-/// The place nearest to bin `from`, away from the centre, where the density has fallen to `level`.
+/// The position nearest to bin `from`, away from the centre, at which the density has fallen to `level`.
 fn outwards(points: &[(f64, f64)], from: usize, level: f64) -> Option<f64> {
     let below = from + points[from..].iter().position(|p| p.1 <= level)?;
     if below == 0 { None } else { Some(between(points, below - 1, level)) }
 }
 
-/// Where the straight line from bin `k` to the next crosses `level`.
+/// The position at which the straight line from bin `k` to the next bin crosses `level`.
 fn between(points: &[(f64, f64)], k: usize, level: f64) -> f64 {
     let Some(next) = points.get(k + 1) else { return points[k].0 };
     let (fall, part) = (points[k].1 - next.1, points[k].1 - level);
@@ -111,7 +111,7 @@ fn between(points: &[(f64, f64)], k: usize, level: f64) -> f64 {
     }
 }
 
-/// The steepest fall of a line through some bins around any place of the interface.
+/// The steepest fall of a straight line through several bins, over all positions in the interface.
 fn steepest(points: &[(f64, f64)], height: f64, [inner, outer]: [f64; 2]) -> Option<f64> {
     let half = ((0.15 * (outer - inner) / height).round() as usize).max(1);
     let fall = |k: usize| {
@@ -134,7 +134,8 @@ mod tests {
         (0..bins).map(|k| (k as f64 + 0.5) * height).map(|s| (s, rho(s))).collect()
     }
 
-    /// A hyperbolic tangent of d has w = 2d, and 2 artanh(0.8) d from 10 to 90 %; the line takes 2 % off its slope.
+    /// A hyperbolic tangent of scale d has w = 2d, and 2 artanh(0.8) d from 10 to 90 %. The straight line underrates its slope
+    /// by 2 %.
     #[test]
     fn a_tanh_has_its_widths() {
         let points = flank(100, 0.1, |s| 3.0 - 2.9 * ((s - 5.0) / 0.6).tanh());
@@ -145,8 +146,8 @@ mod tests {
         assert!((found.steepest / 1.2 - 1.0).abs() < 0.04, "{found:?}");
     }
 
-    /// Layers that fade into a plateau do not raise its density, wherever their crests are: a mean from one width on is off by
-    /// up to 2 %. A plateau that the layers leave no room for is in doubt by more than it is off.
+    /// Layers that decay into a plateau do not raise its density, at any phase of the layers. A mean from one width on would
+    /// be off by up to 2 %. If the layers leave no room for a plateau, its error is at most five stated uncertainties and 0.02.
     #[test]
     fn layers_are_no_part_of_a_plateau() {
         for phase in [0.0, 1.0, 2.0, 3.0, 4.0, 5.0] {
@@ -167,7 +168,7 @@ mod tests {
         }
     }
 
-    /// A straight ramp and a liquid that is denser at its edge are no tangents, and have widths all the same.
+    /// A straight ramp and a liquid that is denser at its edge are not tangents, but have widths as well.
     #[test]
     fn other_shapes_have_widths_too() {
         let ramp = flank(100, 0.1, |s| 4.0 * ((6.0 - s) / 2.0).clamp(0.0, 1.0));

@@ -1,81 +1,77 @@
-//! What carried momentum in a step, as the integrator made it.
+//! The momentum transport in a step, as the integrator made it.
 //!
-//! A particle carries `m u` along its way, with the velocity `u` that moved it, and a pair the momentum that its force
-//! transfers, along the line between its particles. In a steady state these two add up to the same normal pressure
-//! everywhere, at any time step. Velocities at the ends of steps do not: in velocity Verlet they lack a kick by half of
+//! A particle carries `m u` along its path, with the velocity `u` that moved it. A pair carries the momentum that its force
+//! transfers, along the line between its particles. In a steady state the sum of both gives the same normal pressure
+//! everywhere, at any time step. The velocities at the ends of steps do not: in velocity Verlet they lack a kick by half of
 //! the forces, drag and noise included, so that `⟨Σ m v²⟩` is too small by `¼ Δt² ⟨Σ f²/m⟩`, a term of first order.
 //!
-//! The random force, though it transfers momentum, is left out: it does not depend on the positions it acts at, so its mean
+//! The random force transfers momentum too, but is left out: it does not depend on the positions, so its mean contribution
 //! is 0.
 
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::engine::pair_sums::COMPONENTS;
 
-/// A straight line that momentum was carried along: to the mean pressure in a volume it adds `d ⊗ f`, divided by the volume,
-/// times its part in the volume.
+/// A straight line of momentum transport. It adds `d ⊗ f` times its fraction in a volume, divided by that volume, to the
+/// mean pressure in the volume.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Line {
-    /// One end.
+    /// The first end of the line.
     pub from: [f64; 3],
-    /// From the other end to this one.
+    /// The vector from the other end to `from`.
     pub d: [f64; 3],
-    /// Of a pair the force on the particle at `from`. It is along `d` but in kicks by forces at displaced positions.
+    /// For a pair, the force on the particle at `from`. It is parallel to `d` except in kicks by forces at displaced positions.
     pub f: [f64; 3],
 }
 
-/// What a line belongs to.
+/// The carrier of the momentum of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Carrier {
-    /// A particle.
     Particle,
-    /// A pair.
     Pair,
 }
 
-/// What carried momentum in a step.
+/// The momentum transport in a step.
 #[derive(Debug, Clone, Default)]
 pub struct Flux {
-    /// The ways of the particles.
+    /// The paths of the particles.
     pub ways: Vec<Line>,
-    /// Drag of the pairs, averaged over the step.
+    /// The drag of the pairs, averaged over the step.
     pub drag: Vec<Line>,
-    /// Where conservative forces acted.
+    /// The positions at which conservative forces acted.
     pub forces: Vec<Acted>,
 }
 
 /// Conservative forces at positions of a step.
 #[derive(Debug, Clone)]
 pub struct Acted {
-    /// For which part of the step.
+    /// The fraction of the step for which these forces acted.
     pub share: f64,
-    /// Their virial.
+    /// The virial of these forces.
     pub virial: [f64; 6],
-    /// Where the particles were, if not where they are at the end of the step.
+    /// The positions of the particles, if they differ from those at the end of the step.
     pub at: Option<Place>,
 }
 
-/// Where particles were when forces acted on them.
+/// The positions of the particles at the time when forces acted on them.
 #[derive(Debug, Clone)]
 pub struct Place {
-    /// Positions.
     pub x: Vec<[f64; 3]>,
-    /// Species.
     pub species: Vec<i32>,
-    /// What the forces were computed at, if that was elsewhere.
+    /// The positions for which the forces were computed, if they were displaced.
     pub displaced: Option<Displaced>,
 }
 
-/// Displaced positions, of the same particles.
+/// Displaced positions of the same particles.
 #[derive(Debug, Clone)]
 pub struct Displaced {
-    /// Positions, which no period is taken from.
+    /// Positions, not wrapped into the box.
     pub x: Vec<[f64; 3]>,
-    /// A box that they are in along its directions with walls.
+    /// A box that contains the positions along its directions with walls.
     pub domain: PeriodicBox,
 }
 
 impl Flux {
-    /// `Σ d ⊗ f` of everything, its symmetric part.
+    /// The symmetric part of `Σ d ⊗ f` over all lines.
     pub fn sum(&self) -> [f64; 6] {
         let mut sum = [0.0; 6];
         for acted in &self.forces {

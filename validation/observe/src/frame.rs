@@ -1,4 +1,4 @@
-//! One configuration as the observables see it: what several of them need is computed once.
+//! One configuration for the observables. Quantities that several observables need are computed once.
 
 use super::flux::{Carrier, Flux, Line, Place};
 use psidpd_core::engine::pair_sums::{Evaluation, Evaluator};
@@ -6,66 +6,58 @@ use psidpd_core::engine::{PeriodicBox, Pool};
 use psidpd_core::model::Model;
 use std::cell::OnceCell;
 
-/// A configuration of particles, as whoever has them lends it to the observables.
+/// A configuration of particles that its owner lends to the observables.
 #[derive(Clone, Copy)]
 pub struct View<'a> {
-    /// Threads that share what takes long; what comes out does not depend on their number.
+    /// The threads that share long work; results do not depend on their number.
     pub pool: &'a Pool,
-    /// Number of the step.
     pub step: u64,
-    /// Time since the start of the run.
+    /// The time since the start of the run.
     pub time: f64,
-    /// kT.
     pub kt: f64,
-    /// The model.
     pub model: &'a Model,
-    /// 2 or 3.
+    /// The number of dimensions is 2 or 3.
     pub dimensions: usize,
-    /// The box.
     pub domain: &'a PeriodicBox,
-    /// Mass of each species.
     pub masses: &'a [f64],
-    /// Positions, in the box.
+    /// Positions are wrapped into the box.
     pub x: &'a [[f64; 3]],
-    /// Velocities.
     pub v: &'a [[f64; 3]],
-    /// Boxes travelled.
+    /// The numbers of periods that each particle has crossed.
     pub images: &'a [[i32; 3]],
-    /// Species, from 0.
+    /// Species are counted from 0.
     pub species: &'a [i32],
-    /// Tags, from 1.
+    /// Tags are counted from 1.
     pub tags: &'a [i32],
-    /// Which particles never move; empty if all do.
+    /// True for particles that never move; empty if all particles move.
     pub frozen: &'a [bool],
-    /// kT from the kinetic energy.
+    /// The kinetic temperature as kT.
     pub temperature: f64,
-    /// `½ Σ m v²`.
+    /// The kinetic energy `½ Σ m v²`.
     pub kinetic_energy: f64,
-    /// `(Σ m v v + W)/V`, where a virial was wanted; xx, yy, zz, xy, xz, yz.
+    /// The tensor `(Σ m v v + W)/V` in the order xx, yy, zz, xy, xz, yz, if the step requested a virial.
     pub pressure: [f64; 6],
-    /// The same with conservative forces alone.
+    /// The tensor of pressure with conservative forces only.
     pub conservative_pressure: [f64; 6],
-    /// What carried momentum in the step, where that was asked for.
+    /// The momentum transport in the step, if the step recorded it.
     pub flux: Option<&'a Flux>,
 }
 
-/// A configuration with what several observables compute from it.
+/// A configuration with cached results that several observables share.
 pub struct Frame<'a> {
-    /// The configuration.
     pub view: View<'a>,
     evaluator: &'a Evaluator,
     evaluation: OnceCell<Evaluation>,
-    /// Where forces acted at other positions than the present ones.
+    /// The evaluations of forces that acted at positions other than the present ones.
     earlier: OnceCell<Vec<Option<Evaluation>>>,
 }
 
 impl<'a> Frame<'a> {
-    /// A configuration of the fluid of `evaluator`.
+    /// The `evaluator` belongs to the fluid of the configuration.
     pub fn new(view: View<'a>, evaluator: &'a Evaluator) -> Frame<'a> {
         Frame { view, evaluator, evaluation: OnceCell::new(), earlier: OnceCell::new() }
     }
 
-    /// What evaluates its fluid.
     pub fn evaluator(&self) -> &'a Evaluator {
         self.evaluator
     }
@@ -76,7 +68,7 @@ impl<'a> Frame<'a> {
         self.evaluation.get_or_init(|| self.evaluator.evaluate(x, species, domain))
     }
 
-    /// Every line that momentum was carried along in the step; whether that is known.
+    /// Visits every line of momentum transport in the step; returns false if the step did not record them.
     pub fn lines(&self, mut visit: impl FnMut(Carrier, &Line)) -> bool {
         let Some(flux) = self.view.flux else { return false };
         flux.ways.iter().for_each(|line| visit(Carrier::Particle, line));
@@ -103,22 +95,21 @@ impl<'a> Frame<'a> {
         true
     }
 
-    /// The pressure tensor of the momentum that was carried, for the whole box; `None` if it is not known.
+    /// The pressure tensor of the momentum transport in the whole box; `None` if the step did not record it.
     pub fn carried_pressure(&self) -> Option<[f64; 6]> {
         Some(self.view.flux?.sum().map(|sum| sum / self.volume()))
     }
 
-    /// The mass of a particle.
     pub fn mass(&self, particle: usize) -> f64 {
         self.view.masses[self.view.species[particle] as usize]
     }
 
-    /// Whether a particle moves: frozen ones do not.
+    /// Returns false for frozen particles.
     pub fn moves(&self, particle: usize) -> bool {
         !self.view.frozen.get(particle).is_some_and(|frozen| *frozen)
     }
 
-    /// The volume; in two dimensions the area.
+    /// The volume of the box; in two dimensions the area.
     pub fn volume(&self) -> f64 {
         self.view.domain.volume(self.view.dimensions)
     }

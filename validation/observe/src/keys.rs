@@ -1,10 +1,10 @@
-//! Every key of `[observe]`, in tables that the reference `docs/observables.md` is written from and that
-//! a test holds the reader to.
+//! Tables of all keys of `[observe]`. They are the source of the reference `docs/observables.md`, and a test compares
+//! them with the reader.
 
 use psidpd_core::document::keys::keys;
 pub use psidpd_core::document::keys::{Key, Need, Table, ValueKind, key};
 
-/// The keys of `[observe]` itself, for every observable, and of each observable, for that alone.
+/// The keys of `[observe]` for every observable, and the keys that each observable has in addition.
 pub const COMMON: &[Key] = keys! {
     "every": ValueKind::Words("whole number from 1"), Need::Default("10"),
         "Steps between samples: those whose number is a multiple of it."
@@ -42,7 +42,7 @@ pub(super) const RECENTRE: Key = key(
     "true",
 );
 
-/// The reference of `[observe]`, as Markdown.
+/// The reference of `[observe]` as Markdown.
 pub fn reference(tables: &[&Table]) -> String {
     let mut out = String::from(INTRODUCTION);
     out.push_str("\n## Keys of every observable\n\n");
@@ -60,7 +60,7 @@ pub fn reference(tables: &[&Table]) -> String {
 fn list(out: &mut String, keys: &[Key]) {
     out.push_str("| key | value | if left out | meaning |\n|---|---|---|---|\n");
     for key in keys {
-        // A bar would end the cell.
+        // A vertical bar would end the cell.
         let [value, default, about] =
             [&key.value.describe(), key.default(), key.about].map(|text| text.replace('|', "\\|"));
         out.push_str(&format!("| `{}` | {value} | {default} | {about} |\n", key.name));

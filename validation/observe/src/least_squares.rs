@@ -1,11 +1,11 @@
-//! Least squares, by Levenberg and Marquardt's method.
+//! Least squares with the method of Levenberg and Marquardt.
 
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt, TerminationReason};
 use nalgebra::{DMatrix, DVector, Dyn, VecStorage};
 
-/// The parameters for which the residuals have the least sum of squares, searched from `start` on, and that sum.
-/// `steps` are the differences of parameters that slopes are taken over; parameters for which there are no residuals
-/// are not stepped to. `None` if there is nothing to fit.
+/// Finds the parameters with the least sum of squared residuals, and that sum. The search begins at `start`; slopes are
+/// differences over `steps`. The search avoids parameters without residuals. The result is
+/// `None` if `start` has no residuals and if the search fails.
 pub fn least_squares<const N: usize>(
     start: [f64; N],
     steps: [f64; N],
@@ -15,7 +15,7 @@ pub fn least_squares<const N: usize>(
     Some((std::array::from_fn(|k| at[k]), sum))
 }
 
-/// The same for any number of parameters.
+/// Does the work of [`least_squares`] for any number of parameters.
 pub fn least_squares_of_any(
     start: &[f64],
     steps: &[f64],
@@ -25,7 +25,7 @@ pub fn least_squares_of_any(
     let problem = Problem { at: DVector::from_column_slice(start), steps, count, residuals };
     let search = LevenbergMarquardt::new().with_ftol(1e-14).with_xtol(1e-10).with_gtol(1e-14);
     let (found, report) = search.minimize(problem);
-    // Where residuals have kinks the search may come to the least sum and not notice: what it found then counts too.
+    // Where residuals have kinks, the search may reach the least sum without noticing it. Such a result is accepted too.
     let found_it = report.termination.was_successful()
         || matches!(
             report.termination,
@@ -34,7 +34,7 @@ pub fn least_squares_of_any(
     found_it.then(|| (found.at.as_slice().to_vec(), 2.0 * report.objective_function))
 }
 
-/// How residuals change with each parameter, by central differences over `steps`: a row for each residual.
+/// The slopes of the residuals by central differences over `steps`: a row for each residual.
 pub fn slopes(
     at: &[f64],
     steps: &[f64],
@@ -53,7 +53,7 @@ pub fn slopes(
 struct Problem<'a, F> {
     at: DVector<f64>,
     steps: &'a [f64],
-    /// How many residuals there are.
+    /// The number of residuals.
     count: usize,
     residuals: F,
 }
@@ -72,7 +72,7 @@ impl<F: Fn(&[f64]) -> Option<Vec<f64>>> LeastSquaresProblem<f64, Dyn, Dyn> for P
     }
 
     fn residuals(&self) -> Option<DVector<f64>> {
-        // Far from everything, so that a shorter step is tried.
+        // Large residuals make the search try a shorter step.
         let found = (self.residuals)(self.at.as_slice()).unwrap_or_else(|| vec![1e100; self.count]);
         Some(DVector::from_vec(found))
     }

@@ -1,9 +1,9 @@
-//! Observables: read, never drive.
+//! Observables, which read a simulation and never change it.
 //!
-//! [`read`] reads what a scene asks for; [`Observers`] measures it as the run goes, each observable a
-//! [`meter`]; [`Observation`]s come out, with error bars. The rest are functions on recorded series and
-//! frames. All quantities are in the reduced units of the simulation (length r_c, energy k_B T, mass m),
-//! and no function panics, whatever it is given.
+//! [`read`] reads the requests of a scene. [`Observers`] measures them during the run; each observable is a
+//! [`meter`]. The results are [`Observation`]s with error bars. All other functions work on recorded series and
+//! frames. All quantities are in the reduced units of the simulation (length r_c, energy k_B T, mass m).
+//! No function panics on any input.
 
 pub mod configurational;
 pub mod drift;
@@ -38,7 +38,7 @@ mod tests {
     use super::{keys, request};
     use std::path::Path;
 
-    /// The reference is current; `PSIDPD_UPDATE_DOCS=1` writes it anew.
+    /// The reference in the documentation is current; `PSIDPD_UPDATE_DOCS=1` writes it anew.
     #[test]
     fn the_reference_is_current() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/observables.md");

@@ -1,75 +1,69 @@
-//! What an observable came to, and the files it is written to.
+//! The results of an observable, and the files that hold them.
 
 use super::series::Measured;
 use serde::{Deserialize, Serialize};
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-/// What an observation looks like on a plot.
+/// The form of an observation on a plot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
-    /// Numbers: every column has one value, and there is no `x`.
+    /// Single numbers: every column has one value, and there is no `x`.
     Scalar,
-    /// Along a coordinate in space.
+    /// Values along a coordinate in space.
     Profile,
-    /// Against anything else.
+    /// Values against any other quantity.
     Curve,
-    /// Against time.
+    /// Values against time.
     Series,
-    /// On points of space: the first columns are the coordinates, and there is no `x`.
+    /// Values at points of space: the first columns are the coordinates, and there is no `x`.
     Field,
 }
 
-/// The abscissa.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Abscissa {
-    /// Its name.
     pub name: String,
-    /// Its unit, of r_c, m, kT of the model; "1" for pure numbers.
+    /// The unit in r_c, m, kT of the model; "1" for pure numbers.
     pub unit: String,
-    /// Its values, increasing.
+    /// The values increase.
     pub values: Vec<f64>,
 }
 
 /// One quantity of an observation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Column {
-    /// Its name.
     pub name: String,
-    /// Its unit; "1" for pure numbers.
+    /// The unit in r_c, m, kT of the model; "1" for pure numbers.
     pub unit: String,
-    /// Its values; NaN, written as null, where there is none.
+    /// Unknown values are NaN, written as null.
     #[serde(with = "nullable")]
     pub values: Vec<f64>,
-    /// One standard deviation of each value; NaN, written as null, where it is not known.
+    /// One standard deviation of each value; NaN, written as null, if unknown.
     #[serde(with = "nullable")]
     pub errors: Vec<f64>,
 }
 
-/// What an observable measured in one stage.
+/// The result of an observable in one stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Observation {
-    /// Its name, unique within a stage; letters, digits and underscores.
+    /// The name, unique within a stage; letters, digits and underscores.
     pub name: String,
-    /// Its name for people.
+    /// The name for people.
     pub title: String,
-    /// The stage.
     pub stage: String,
-    /// Its shape.
     pub kind: Kind,
-    /// What the columns are plotted against, if anything.
+    /// The abscissa of the columns, if they have one.
     pub x: Option<Abscissa>,
-    /// The quantities.
     pub columns: Vec<Column>,
-    /// How many configurations it is the mean of.
+    /// The number of configurations in the mean.
     pub samples: u64,
-    /// What a reader must know.
+    /// Remarks for readers.
     pub note: String,
 }
 
 impl Observation {
-    /// An observation without columns yet.
+    /// An observation without columns.
     pub fn new(name: &str, title: &str, kind: Kind) -> Observation {
         Observation {
             name: name.into(),
@@ -83,14 +77,14 @@ impl Observation {
         }
     }
 
-    /// With an abscissa.
+    /// Adds an abscissa.
     #[must_use]
     pub fn against(mut self, name: &str, unit: &str, values: Vec<f64>) -> Observation {
         self.x = Some(Abscissa { name: name.into(), unit: unit.into(), values });
         self
     }
 
-    /// With one more column.
+    /// Adds a column.
     #[must_use]
     pub fn column(
         mut self,
@@ -103,20 +97,19 @@ impl Observation {
         self
     }
 
-    /// With one more column of values that are known.
+    /// Adds a column of exact values.
     #[must_use]
     pub fn exact(self, name: &str, unit: &str, values: impl IntoIterator<Item = f64>) -> Observation {
         self.column(name, unit, values.into_iter().map(|value| Measured { value, error: 0.0 }))
     }
 
-    /// With a number of samples.
     #[must_use]
     pub fn samples(mut self, samples: u64) -> Observation {
         self.samples = samples;
         self
     }
 
-    /// With a sentence more to its note.
+    /// Appends a sentence to the note.
     #[must_use]
     pub fn note(mut self, text: impl AsRef<str>) -> Observation {
         if !self.note.is_empty() && !text.as_ref().is_empty() {
@@ -126,24 +119,23 @@ impl Observation {
         self
     }
 
-    /// The column of a name.
     pub fn get(&self, column: &str) -> Option<&Column> {
         self.columns.iter().find(|c| c.name == column)
     }
 
-    /// Value and error of a column of one value.
+    /// The value and error of a column with one value.
     pub fn scalar(&self, column: &str) -> Option<Measured> {
         let c = self.get(column)?;
         Some(Measured { value: *c.values.first()?, error: *c.errors.first()? })
     }
 
-    /// Name of its CSV file in the folder `observables`: `NAME.csv`, or `NAME-STAGE.csv` if other stages
-    /// have it too.
+    /// The name of the CSV file in the folder `observables`: `NAME.csv`, or `NAME-STAGE.csv` if other stages have the
+    /// observable too.
     pub fn file_name(&self, all: &[Observation]) -> String {
         if all.iter().all(|o| o.name != self.name || o.stage == self.stage) {
             return format!("{}.csv", self.name);
         }
-        // Stages that differ only in what a file name cannot have keep apart by their place.
+        // Stages whose names differ only in characters that a file name cannot have are told apart by their index.
         let place = all.iter().filter(|o| o.name == self.name).position(|o| o.stage == self.stage);
         let plain = |c: char| if c.is_ascii_alphanumeric() || "._-".contains(c) { c } else { '_' };
         let stage: String = self.stage.chars().map(plain).collect();
@@ -174,19 +166,13 @@ impl Observation {
 }
 
 /// Writes observations as a JSON array.
-///
-/// # Errors
-/// The file cannot be written.
 pub fn write_json(path: &Path, observations: &[Observation]) -> std::io::Result<()> {
     let text = serde_json::to_string_pretty(observations)?;
     std::fs::write(path, text + "\n")
 }
 
-/// Writes each observation as a CSV file into `folder`, which is made if need be: the abscissa, then each
-/// column with its error; fields without a value are empty.
-///
-/// # Errors
-/// A file cannot be written.
+/// Writes each observation as a CSV file into `folder`, which is created if it does not exist. The columns are the
+/// abscissa, then each column with its error. Unknown values are empty fields.
 pub fn write_csv(folder: &Path, observations: &[Observation]) -> std::io::Result<()> {
     std::fs::create_dir_all(folder)?;
     for observation in observations {
@@ -198,7 +184,7 @@ pub fn write_csv(folder: &Path, observations: &[Observation]) -> std::io::Result
     Ok(())
 }
 
-/// Numbers that are not finite as null.
+/// Numbers that are not finite become null.
 mod nullable {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 

@@ -1,4 +1,4 @@
-//! The observables of a run on its way.
+//! The observables of a run while it is going.
 
 use super::frame::{Frame, View};
 use super::meter::AnyMeter;
@@ -8,37 +8,36 @@ use psidpd_core::engine::Want;
 use psidpd_core::engine::pair_sums::Evaluator;
 use serde::{Deserialize, Serialize};
 
-/// The observables that a scene asks for, with what they have seen so far.
+/// The requested observables of a scene with their samples so far.
 ///
-/// All of it can be written and read back: a run that goes on from there ends with the same bits.
+/// The whole state can be written and read back; a run that continues from it ends with the same bits.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct Observers {
     observers: Vec<Observer>,
     /// The present stage.
     stage: String,
-    /// The step before its first.
+    /// The step before the first step of the stage.
     start: u64,
     #[serde(skip)]
     fluid: Option<(f64, Evaluator)>,
 }
 
-/// Why [`Observers::restore`] cannot go on.
+/// The reasons why [`Observers::restore`] fails.
 #[derive(Debug, thiserror::Error)]
 pub enum RestoreError {
-    /// Not what [`Observers::to_bytes`] writes.
+    /// The bytes are not the output of [`Observers::to_bytes`].
     #[error(transparent)]
     Bytes(#[from] postcard::Error),
-    /// Another list, or other settings.
+    /// The bytes belong to another list of observables or to other settings.
     #[error("the observables are not those of the scene")]
     Others,
 }
 
-/// One observable.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Observer {
     every: u64,
     skip: u64,
-    /// The stages that are sampled, in their order in the run.
+    /// The sampled stages, in their order in the run.
     stages: Vec<Sampled>,
 }
 
@@ -47,14 +46,14 @@ struct Observer {
 struct Sampled {
     stage: String,
     meter: AnyMeter,
-    /// Samples left out, as something in them was not a finite number.
+    /// The number of samples that were left out because they contained NaN or infinity.
     left_out: u64,
 }
 
 impl Observers {
-    /// What is asked for in a run with these stages, before its first step.
+    /// The observables of a run with these stages, before its first step.
     pub fn new<'a>(observe: &Observe, stages: impl IntoIterator<Item = &'a str>) -> Observers {
-        // Stages may share a name.
+        // Several stages may share a name.
         let mut names: Vec<&str> = Vec::new();
         for stage in stages {
             if !names.contains(&stage) {
@@ -73,13 +72,13 @@ impl Observers {
         Observers { observers: observers.collect(), ..Observers::default() }
     }
 
-    /// What the forces of step `step` of stage `stage` must bring with them for [`Observers::sample`].
+    /// The quantities that the forces of step `step` of stage `stage` must provide for [`Observers::sample`].
     pub fn wants_in(&self, step: u64, stage: &str) -> Want {
         let in_stage = |o: &&Observer| o.stages.iter().any(|s| s.stage == stage);
         Self::needs(self.observers.iter().filter(in_stage), step)
     }
 
-    /// The same, whatever the stage.
+    /// The quantities that the forces of step `step` must provide, for any stage.
     pub fn wants(&self, step: u64) -> Want {
         Self::needs(self.observers.iter(), step)
     }
@@ -94,18 +93,18 @@ impl Observers {
         want
     }
 
-    /// Whether step `step` of stage `stage` must record what carries momentum.
+    /// Returns true if step `step` of stage `stage` must record the momentum transport.
     pub fn wants_flux(&self, step: u64, stage: &str) -> bool {
         let due = |o: &&Observer| step.is_multiple_of(o.every) && o.stages.iter().any(|s| s.stage == stage);
         self.observers.iter().filter(due).flat_map(|o| &o.stages).any(|s| s.meter.needs_flux())
     }
 
-    /// Whether [`Observers::sample`] may have something to do after step `step`.
+    /// Returns true if [`Observers::sample`] may have work after step `step`.
     pub fn may_sample(&self, step: u64, stage: &str) -> bool {
         self.stage != stage || self.observers.iter().any(|o| step.is_multiple_of(o.every))
     }
 
-    /// Samples what is due after a step.
+    /// Takes all samples that are due after a step.
     pub fn sample(&mut self, view: View, stage: &str) {
         let step = view.step;
         if self.stage != stage {
@@ -122,7 +121,7 @@ impl Observers {
             return;
         }
         if self.fluid.as_ref().is_none_or(|(kt, _)| *kt != view.kt) {
-            // The scene has tried every temperature of its stages.
+            // The scene has already evaluated the model at all temperatures of its stages.
             let fluid = view.model.at(view.kt).ok();
             let fluid = fluid.and_then(|fluid| Evaluator::new(fluid).ok());
             self.fluid = fluid.map(|fluid| (view.kt, fluid));
@@ -136,16 +135,16 @@ impl Observers {
         }
     }
 
-    /// All of it, for a checkpoint.
+    /// The whole state as bytes, for a checkpoint.
     pub fn to_bytes(&self) -> Vec<u8> {
-        // Nothing in it that postcard has no bytes for: tests write and read every observable.
+        // Postcard can write every part of the state; tests write and read every observable.
         postcard::to_allocvec(self).unwrap_or_default()
     }
 
-    /// What [`Observers::to_bytes`] wrote, of a run in which these observables, that have seen nothing, are asked for.
+    /// Reads the output of [`Observers::to_bytes`]. `self` must request the same observables and have no samples.
     ///
     /// # Errors
-    /// The bytes are something else, or belong to other observables.
+    /// The function fails for other bytes and for bytes of other observables.
     pub fn restore(&self, bytes: &[u8]) -> Result<Observers, RestoreError> {
         let restored: Observers = postcard::from_bytes(bytes)?;
         let mut forgetful = restored.observers.clone();
@@ -156,7 +155,7 @@ impl Observers {
         if forgetful == self.observers { Ok(restored) } else { Err(RestoreError::Others) }
     }
 
-    /// What was measured.
+    /// The results of all observables.
     pub fn finish(&self) -> Vec<Observation> {
         let mut all = Vec::new();
         for sampled in self.observers.iter().flat_map(|o| &o.stages) {

@@ -1,55 +1,50 @@
-//! The keys of one observable in a scene, and what their values depend on.
+//! The keys of one observable in a scene, and the facts on which their values depend.
 
 use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::model::Fluid;
 
-/// What the settings of an observable depend on.
+/// The facts on which the settings of an observable depend.
 #[derive(Debug)]
 pub struct Place<'a> {
-    /// The model at the temperature of the scene.
+    /// The fluid is the model at the temperature of the scene.
     pub fluid: &'a Fluid,
-    /// The box.
     pub domain: &'a PeriodicBox,
-    /// Names of the stages.
     pub stages: StageNames<'a>,
-    /// The normal of the slab that the scene starts from.
+    /// The normal of the slab in the initial state.
     pub slab: Option<usize>,
-    /// What drives two opposite flows.
+    /// The body force of two opposite flows.
     pub drive: Option<Drive>,
 }
 
-/// What drives two opposite flows.
+/// The body force of two opposite flows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Drive {
-    /// The direction in which it is reversed.
+    /// The direction along which the force is reversed.
     pub across: usize,
-    /// Its own direction.
+    /// The direction of the force.
     pub along: usize,
     /// The acceleration in the lower half of the box.
     pub acceleration: f64,
 }
 
-/// Names of the stages of a scene.
 #[derive(Debug, Clone)]
 pub struct StageNames<'a> {
-    /// All of them.
     pub all: &'a [&'a str],
-    /// Those whose steps take no time.
+    /// The stages whose steps take no time.
     pub timeless: Vec<&'a str>,
 }
 
-/// The table of one observable; without one (`name = true`) every key is left out.
+/// The table of one observable. The short form `name = true` sets no key.
 #[derive(Debug)]
 pub struct Options<'a> {
     pub section: Option<Section<'a>>,
     pub value: Value<'a>,
-    /// Where it is measured.
     pub place: &'a Place<'a>,
 }
 
 impl<'a> Options<'a> {
-    /// The value of a key, or of the observable if the key is left out: for errors.
+    /// The location for error messages: the value of a key, or the observable if the key is not set.
     pub fn at(&self, key: &str) -> Value<'a> {
         let own = if key.is_empty() { None } else { self.get(key) };
         own.unwrap_or_else(|| self.value.clone())
@@ -110,19 +105,17 @@ impl<'a> Options<'a> {
         Ok(Some([read(a)?, read(b)?]))
     }
 
-    /// True or false.
     pub fn flag(&self, key: &str) -> Result<Option<bool>, FileError> {
         self.get(key).map(|value| Ok(value.boolean()?.value)).transpose()
     }
 
-    /// A direction of space.
     pub fn axis(&self, key: &str) -> Result<Option<usize>, FileError> {
         let names = [("x", 0), ("y", 1), ("z", 2)];
         let names = &names[..self.place.fluid.dimensions];
         self.get(key).map(|value| Ok(value.one_of("axis", names)?.value)).transpose()
     }
 
-    /// A species of the model.
+    /// The index of a species of the model.
     pub fn species(&self, key: &str) -> Result<Option<usize>, FileError> {
         let Some(value) = self.get(key) else { return Ok(None) };
         let names: Vec<(&str, usize)> =
@@ -130,22 +123,22 @@ impl<'a> Options<'a> {
         Ok(Some(value.one_of("species", &names)?.value))
     }
 
-    /// A species of the model, where other things than names may stand too.
+    /// The index of a species of the model, for keys whose value may be something other than a name.
     pub fn as_species(&self, key: &str) -> Result<Option<usize>, FileError> {
         if self.get(key).is_some_and(|value| value.as_str().is_some()) { self.species(key) } else { Ok(None) }
     }
 
-    /// One of some names.
+    /// One of the given names.
     pub fn choice<T: Copy>(&self, key: &str, choices: &[(&str, T)]) -> Result<Option<T>, FileError> {
         self.get(key).map(|value| Ok(value.one_of("choice", choices)?.value)).transpose()
     }
 
-    /// An error about a key, or about the observable if it is left out.
+    /// An error about a key, or about the observable if the key is not set.
     pub fn error(&self, key: &str, message: impl Into<String>) -> FileError {
         self.at(key).error(FileErrorKind::Value(message.into()))
     }
 
-    /// Half the smallest distance of two periodic faces of the box; of its faces, if none is periodic.
+    /// Half the smallest distance of two periodic faces of the box; of all faces if none is periodic.
     pub fn half_box(&self) -> f64 {
         let (domain, d) = (self.place.domain, self.place.fluid.dimensions);
         let periodic = domain.periodic();

@@ -1,4 +1,4 @@
-//! Density across a liquid slab, and the width of its interfaces.
+//! The density across a liquid slab, and the width of its interfaces.
 
 use std::f64::consts::TAU;
 
@@ -8,16 +8,15 @@ use super::edges::{Edges, edges};
 use super::statistics::{MINIMUM_SAMPLES, StatisticsError, estimate};
 use crate::least_squares::least_squares;
 
-/// The most bins a profile may have.
+/// The largest number of bins of a profile.
 pub const MAXIMUM_BINS: usize = 1 << 20;
 
-/// Below this the mean of the unit vectors exp(2πi z/L) has no direction.
+/// If the mean of the unit vectors exp(2πi z/L) is shorter than this, it has no direction.
 const LEAST_RESULTANT: f64 = 1e-10;
 
-/// The fewest bins a flank is fitted to.
+/// The smallest number of bins to which a flank is fitted.
 const FLANK_BINS: usize = 6;
 
-/// Why there is no profile.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum ProfileError {
     #[error("box length {length} and area {area} must be positive numbers")]
@@ -34,8 +33,8 @@ pub enum ProfileError {
     Statistics(#[from] StatisticsError),
 }
 
-/// Collects histograms of particle positions across a slab, each frame
-/// centred on its own slab so that drift does not smear the profile.
+/// Collects histograms of particle positions across a slab. Each frame is centred on its own slab so that drift does not
+/// smear the profile.
 #[derive(Debug, Clone)]
 pub struct ProfileAccumulator {
     length: f64,
@@ -44,28 +43,24 @@ pub struct ProfileAccumulator {
     frames: Vec<Vec<u32>>,
 }
 
-/// Number density against distance from the centre of the slab.
+/// The number density against the distance from the centre of the slab.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DensityProfile {
-    /// Middle of each bin from the centre of the slab, in (−L/2, L/2),
-    /// increasing and evenly spaced; a length (r_c).
+    /// The middle of each bin from the centre of the slab, in (−L/2, L/2), increasing and evenly spaced; a length (r_c).
     pub centres: Vec<f64>,
-    /// Mean of n/(A h) over the frames, n particles being in the bin of
-    /// height h; number per volume (r_c⁻³).
+    /// The mean of n/(A h) over the frames for n particles in the bin of height h; number per volume (r_c⁻³).
     pub density: Vec<f64>,
-    /// One standard deviation of `density` (r_c⁻³); 0 in a bin whose count
-    /// never changed.
+    /// One standard deviation of `density` (r_c⁻³); 0 in a bin whose count never changed.
     pub error: Vec<f64>,
 }
 
 impl ProfileAccumulator {
-    /// An accumulator for a periodic box of `length` (r_c) along z and
-    /// cross-section `area` (r_c²), divided into `bins` of height
-    /// h = length/bins.
+    /// An accumulator for a periodic box of `length` (r_c) along z and cross-section `area` (r_c²), divided into `bins` of
+    /// height h = length/bins.
     ///
     /// # Errors
     ///
-    /// A length or area that is not a positive number; no bins, or more than
+    /// The function fails for a length or area that is not a positive number, for no bins, and for more than
     /// [`MAXIMUM_BINS`].
     pub fn new(length: f64, bins: usize, area: f64) -> Result<Self, ProfileError> {
         let positive = |x: f64| x.is_finite() && x > 0.0;
@@ -78,15 +73,14 @@ impl ProfileAccumulator {
         Ok(Self { length, bins, area, frames: Vec::new() })
     }
 
-    /// Adds a frame, the `z` (r_c) of all its particles, wrapped or not.
+    /// Adds a frame: the `z` (r_c) of all its particles, wrapped or unwrapped.
     ///
-    /// The centre is the circular mean c = (L/2π) arg Σ exp(2πi z/L), which
-    /// unlike the plain mean does not care where the boundary cuts the slab.
+    /// The centre is the circular mean c = (L/2π) arg Σ exp(2πi z/L). Unlike the plain mean it does not depend on where the
+    /// boundary cuts the slab.
     ///
     /// # Errors
     ///
-    /// A coordinate that is not finite, or particles without a centre. The
-    /// frame is then left out.
+    /// The function fails for a coordinate that is not finite, and for particles without a centre. Then the frame is left out.
     pub fn add(&mut self, z: &[f64]) -> Result<(), ProfileError> {
         if let Some(index) = z.iter().position(|z| !z.is_finite()) {
             return Err(ProfileError::NonFinite { index });
@@ -112,7 +106,6 @@ impl ProfileAccumulator {
         Ok(())
     }
 
-    /// Number of frames added.
     #[must_use]
     pub fn frames(&self) -> usize {
         self.frames.len()
@@ -120,13 +113,12 @@ impl ProfileAccumulator {
 
     /// The mean profile with error bars.
     ///
-    /// The error of a bin is that of [`estimate`] over the frames; with fewer
-    /// frames than that takes, the plain standard error s/√M; with one frame,
-    /// Poisson's √n/(A h).
+    /// The error of a bin is that of [`estimate`] over the frames. For fewer frames than [`estimate`] accepts it is the plain
+    /// standard error s/√M; for one frame it is Poisson's √n/(A h).
     ///
     /// # Errors
     ///
-    /// No frames, or densities too large to be averaged.
+    /// The function fails without frames, and for densities too large to be averaged.
     pub fn finish(&self) -> Result<DensityProfile, ProfileError> {
         if self.frames.is_empty() {
             return Err(ProfileError::NoFrames);
@@ -149,28 +141,27 @@ impl ProfileAccumulator {
         Ok(profile)
     }
 
-    /// Number density (r_c⁻³) of each frame within `half_width` (r_c) of the
-    /// centre of the slab, N(|z| < half_width) / (2 A half_width).
+    /// The number density (r_c⁻³) of each frame within `half_width` (r_c) of the centre of the slab,
+    /// N(|z| < half_width) / (2 A half_width).
     ///
-    /// A bin that the limit cuts counts in proportion. A `half_width` above
-    /// L/2 counts as L/2; one that is not positive gives no densities.
+    /// A bin that the limit cuts counts in proportion. A `half_width` above L/2 counts as L/2; one that is not positive gives
+    /// no densities.
     #[must_use]
     pub fn liquid_density(&self, half_width: f64) -> Vec<f64> {
         if half_width > 0.0 { self.densities(0.0, half_width) } else { Vec::new() }
     }
 
-    /// Number density (r_c⁻³) of each frame farther than `distance` (r_c) from
-    /// the centre of the slab, N(|z| > distance) / (A (L − 2 distance)).
+    /// The number density (r_c⁻³) of each frame farther than `distance` (r_c) from the centre of the slab,
+    /// N(|z| > distance) / (A (L − 2 distance)).
     ///
-    /// A bin that the limit cuts counts in proportion. A negative `distance`
-    /// counts as 0; one that leaves nothing of the box, or NaN, gives no
-    /// densities.
+    /// A bin that the limit cuts counts in proportion. A negative `distance` counts as 0; NaN, and a distance beyond the box,
+    /// give no densities.
     #[must_use]
     pub fn vapour_density(&self, distance: f64) -> Vec<f64> {
         if distance < 0.5 * self.length { self.densities(distance, 0.5 * self.length) } else { Vec::new() }
     }
 
-    /// Density of each frame at inner < |z| < outer.
+    /// The density of each frame at inner < |z| < outer.
     fn densities(&self, inner: f64, outer: f64) -> Vec<f64> {
         let (inner, outer) = (inner.max(0.0), outer.min(0.5 * self.length));
         let height = self.length / self.bins as f64;
@@ -182,7 +173,7 @@ impl ProfileAccumulator {
                 (overlap(inner, outer) + overlap(-outer, -inner)) / height
             })
             .collect();
-        // The sum of the weights rather than outer − inner: rounded alike.
+        // The sum of the weights has the same rounding as the counts; outer − inner does not.
         let volume = self.area * height * weights.iter().sum::<f64>();
         self.frames
             .iter()
@@ -206,42 +197,39 @@ fn mean_and_error(counts: &[f64]) -> Result<(f64, f64), StatisticsError> {
     Ok((mean, error))
 }
 
-/// Width of the interfaces (r_c) as Warren defines it in his eq. 19,
-/// w = (ρ_L − ρ_V) / max|dρ/dz|; the mean over the two flanks of the slab.
+/// The width of the interfaces (r_c) by Warren's definition (eq. 19), w = (ρ_L − ρ_V) / max|dρ/dz|; the mean over the two
+/// flanks of the slab.
 ///
-/// Differences of neighbouring bins would overrate the steepest slope in
-/// proportion to their noise. Instead each flank is fitted by least squares,
-/// all its bins alike, with
+/// Differences of neighbouring bins would overrate the steepest slope in proportion to their noise. Instead all bins of
+/// each flank are fitted by least squares, with equal weights, with
 ///
 /// ρ(s) = (ρ_L + ρ_V)/2 − (ρ_L − ρ_V)/2 tanh((s − s₀)/d),
 ///
-/// s being the distance from the centre, averaged over the height of each bin
-/// so that coarse bins do not widen the interface. Its steepest slope, at s₀,
-/// is (ρ_L − ρ_V)/2d, so that w = 2d. Layers of the liquid are averaged over, so ρ_L of the fit is not that of the plateau;
-/// see [`slab_edges`].
+/// where s is the distance from the centre. The curve is averaged over the height of each bin so that coarse bins do not
+/// widen the interface. Its steepest slope, at s₀, is (ρ_L − ρ_V)/2d, so that w = 2d. The fit averages over layers of the
+/// liquid, so its ρ_L is not that of the plateau; see [`slab_edges`].
 ///
-/// None if the profile is not that of a slab centred on 0: fewer than six bins
-/// to a flank, values that are not finite, no contrast of density, interfaces
-/// beyond the flank, as wide as the flank, or narrower than one bin.
+/// The result is `None` if the profile is not that of a slab centred on 0: fewer than six bins in a flank, values that are
+/// not finite, no contrast of density, and interfaces beyond the flank, as wide as the flank, or narrower than one bin.
 #[must_use]
 pub fn interface_width(profile: &DensityProfile) -> Option<f64> {
     Some(interface(profile)?.width)
 }
 
-/// What [`interface_width`] fits to a flank.
+/// The parameters that [`interface_width`] fits to a flank.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Interface {
-    /// ρ_L.
+    /// The density ρ_L.
     pub liquid: f64,
-    /// ρ_V.
+    /// The density ρ_V.
     pub vapour: f64,
-    /// s₀, from the centre.
+    /// The position s₀, from the centre.
     pub place: f64,
-    /// w = 2d.
+    /// The width w = 2d.
     pub width: f64,
 }
 
-/// The fit of [`interface_width`], the mean of both flanks; `None` as there.
+/// The fit of [`interface_width`], as the mean of both flanks; `None` under the same conditions.
 #[must_use]
 pub fn interface(profile: &DensityProfile) -> Option<Interface> {
     let [a, b] = flanks(profile)?.map(|(points, height)| flank_interface(&points, height));
@@ -254,7 +242,7 @@ pub fn interface(profile: &DensityProfile) -> Option<Interface> {
     })
 }
 
-/// What both flanks show by themselves, the mean of the two; see [`edges`].
+/// The edges of both flanks without a fitted curve, as the mean of both; see [`edges`].
 #[must_use]
 pub fn slab_edges(profile: &DensityProfile) -> Option<Edges> {
     let [a, b] = flanks(profile)?.map(|(points, height)| edges(&points, height));
@@ -269,7 +257,7 @@ pub fn slab_edges(profile: &DensityProfile) -> Option<Edges> {
     })
 }
 
-/// Both flanks, (distance from the centre, density) with distances increasing, and the height of a bin.
+/// Both flanks as (distance from the centre, density) with increasing distances, and the height of a bin.
 #[allow(clippy::type_complexity)]
 fn flanks(profile: &DensityProfile) -> Option<[(Vec<(f64, f64)>, f64); 2]> {
     let (centres, density) = (&profile.centres, &profile.density);
@@ -298,13 +286,13 @@ fn flanks(profile: &DensityProfile) -> Option<[(Vec<(f64, f64)>, f64); 2]> {
     Some([flank(1.0), flank(-1.0)])
 }
 
-/// The fit to one flank: (distance from the centre, density), distances increasing by `height`.
+/// The fit to one flank, given as (distance from the centre, density) with distances that increase by `height`.
 pub(super) fn flank_interface(points: &[(f64, f64)], height: f64) -> Option<Interface> {
     if points.len() < FLANK_BINS {
         return None;
     }
     let extent = points[points.len() - 1].0 + 0.5 * height;
-    // In units of the bin height and the largest density.
+    // The units are the bin height and the largest density.
     let scale = points.iter().fold(0.0_f64, |m, p| m.max(p.1.abs()));
     if scale == 0.0 {
         return None;
@@ -312,7 +300,7 @@ pub(super) fn flank_interface(points: &[(f64, f64)], height: f64) -> Option<Inte
     let scaled: Vec<(f64, f64)> = points.iter().map(|(s, rho)| (s / height, rho / scale)).collect();
     let extent = extent / height;
     let free = fit_flank(&scaled, extent, true)?;
-    // A density is not negative, and where the curve would have it so the profile is no such curve.
+    // A density is never negative. If the fitted ρ_V is, the fit is repeated with ρ_V = 0.
     let fit = if free[1] < 0.0 { fit_flank(&scaled, extent, false)? } else { free };
     let width = 2.0 * fit[3].exp();
     let slab = fit[0] > fit[1] && fit[2] > 0.0 && fit[2] < extent;
@@ -324,7 +312,7 @@ pub(super) fn flank_interface(points: &[(f64, f64)], height: f64) -> Option<Inte
     })
 }
 
-/// The best (ρ_L, ρ_V, s₀, ln d), lengths in bins; ρ_V is 0 unless it is `free`.
+/// The best (ρ_L, ρ_V, s₀, ln d) with lengths in bins; ρ_V is 0 unless it is `free`.
 fn fit_flank(points: &[(f64, f64)], extent: f64, free: bool) -> Option<[f64; 4]> {
     let quarter = (points.len() / 4).max(1);
     let mean = |p: &[(f64, f64)]| p.iter().map(|p| p.1).sum::<f64>() / p.len() as f64;
@@ -333,18 +321,18 @@ fn fit_flank(points: &[(f64, f64)], extent: f64, free: bool) -> Option<[f64; 4]>
     if liquid <= vapour {
         return None;
     }
-    // The step that holds as many particles.
+    // A sharp step that holds as many particles.
     let excess: f64 = points.iter().map(|p| p.1 - vapour).sum();
     let step = (excess / (liquid - vapour)).clamp(0.0, extent);
     let width = (0.1 * extent).max(1.0).ln();
     let residuals = |[liquid, vapour, place, width]: [f64; 4]| {
-        // Steeper than a thousandth of a bin, or wider than any box, the model has stopped depending on d.
+        // If d is below a thousandth of a bin or above any box, the curve no longer depends on d.
         if !(-7.0..30.0).contains(&width) {
             return None;
         }
         let d = width.exp();
         let residual = |&(s, rho): &(f64, f64)| {
-            // Mean of tanh over the bin: d [ln cosh b − ln cosh a].
+            // The mean of tanh over the bin: d [ln cosh b − ln cosh a].
             let mean = d * (ln_cosh((s + 0.5 - place) / d) - ln_cosh((s - 0.5 - place) / d));
             0.5 * (liquid + vapour) - 0.5 * (liquid - vapour) * mean - rho
         };
@@ -359,7 +347,7 @@ fn fit_flank(points: &[(f64, f64)], extent: f64, free: bool) -> Option<[f64; 4]>
     Some([liquid, 0.0, place, width])
 }
 
-/// ln cosh x + ln 2; only differences of it are used.
+/// The function ln cosh x + ln 2; callers use only differences of it.
 fn ln_cosh(x: f64) -> f64 {
     x.abs() + (-2.0 * x.abs()).exp().ln_1p()
 }
@@ -372,10 +360,10 @@ mod tests {
     const LENGTH: f64 = 20.0;
     const AREA: f64 = 25.0;
 
-    /// A slab of half-width 4 around `centre` with tanh flanks, liquid at 6
-    /// and vapour at 0.5, d = 0.4, by rejection; wrapped into the box.
+    /// A slab of half-width 4 around `centre` with tanh flanks, liquid at 6 and vapour at 0.5, d = 0.4, made by rejection and
+    /// wrapped into the box.
     fn slab(centre: f64, rng: &mut StdRng) -> Vec<f64> {
-        // As many trial points as would fill the box at density 6.
+        // The number of trial points would fill the box at density 6.
         (0..3000)
             .filter_map(|_| {
                 let s = LENGTH * (rng.random::<f64>() - 0.5);
@@ -389,7 +377,7 @@ mod tests {
         let mut rng = StdRng::seed_from_u64(24);
         let mut accumulator = ProfileAccumulator::new(LENGTH, 100, AREA).unwrap();
         for frame in 0..frames {
-            // Several times through the boundary.
+            // The centre crosses the boundary several times.
             let centre = 0.37 * frame as f64;
             accumulator.add(&slab(centre, &mut rng)).unwrap();
         }
@@ -411,7 +399,7 @@ mod tests {
         let expected = particles.iter().sum::<f64>() / 200.0;
         assert!((mean - expected).abs() < 1e-9);
         let width = interface_width(&profile).unwrap();
-        // The centre of 1500 particles is only good to some hundredths.
+        // The centre of 1500 particles is known only to some hundredths.
         assert!((width - 0.8).abs() < 0.06, "{width}");
     }
 
@@ -434,7 +422,7 @@ mod tests {
         }
     }
 
-    /// An interface with a foot that is cut off draws a tangent below zero; a density stays a density.
+    /// An interface whose foot is cut off asks for a tangent below zero; the fitted density stays at or above zero.
     #[test]
     fn densities_are_not_negative() {
         let height = 0.1;
@@ -452,7 +440,7 @@ mod tests {
         for frames in [1, 3] {
             let profile = drifting(frames).finish().unwrap();
             let middle = profile.error[50];
-            // Poisson: 30 particles per bin.
+            // Poisson statistics of 30 particles per bin.
             let exact = (6.0 / 5.0 / frames as f64).sqrt();
             assert!(middle > 0.05 * exact && middle < 3.0 * exact, "{middle}");
         }

@@ -1,4 +1,4 @@
-//! `[observe]` of a scene.
+//! The table `[observe]` of a scene.
 
 use super::keys::{COMMON, Table};
 use super::meter::{AnyMeter, KINDS};
@@ -7,31 +7,30 @@ use psidpd_core::document::{FileError, FileErrorKind, Section};
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::model::Model;
 
-/// What a scene asks to be observed.
+/// The requested observables of a scene.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Observe {
-    /// In the order of the reference.
+    /// Requests are in the order of the reference.
     pub requests: Vec<Request>,
 }
 
-/// One observable.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Request {
-    /// Steps between samples.
     pub every: u64,
-    /// Steps at the beginning of a stage without samples.
+    /// The number of steps at the beginning of a stage without samples.
     pub skip: u64,
-    /// The stages that are sampled.
+    /// The sampled stages.
     pub stages: Vec<String>,
-    /// What is measured, with its settings and no samples yet.
+    /// The observable with its settings and no samples.
     pub meter: AnyMeter,
 }
 
-/// Reads `[observe]`; `slab` is the normal of the slab that the scene starts from, `drive` the body force that
-/// drives two opposite flows, if there is one.
+/// Reads `[observe]`. `slab` is the normal of the slab in the initial state; `drive` is the body force of two opposite
+/// flows, if the scene has one.
 ///
 /// # Errors
-/// Unknown keys, values out of their domain, observables that the model or the box cannot have.
+/// The function fails for unknown keys, for values out of their domain, and for observables that are not defined for the
+/// model or the box.
 pub fn read(
     root: &Section,
     model: &Model,
@@ -66,7 +65,7 @@ pub fn read(
         let is_timeless = |stage: &String| place.stages.timeless.contains(&stage.as_str());
         if let Some(stage) = settings.stages.iter().find(|s| kind.of_motion && is_timeless(s)) {
             let message =
-                format!("is of motion in time, which stage \"{stage}\", of monte-carlo, has none of");
+                format!("needs motion in time, but the integrator of stage \"{stage}\" is monte-carlo");
             let error = options.at("stages").error(FileErrorKind::Value(message));
             return Err(error.with_help("observe a stage of an integrator with a time step"));
         }
@@ -120,7 +119,7 @@ impl Common {
                 }
             }
             if common.stages.is_empty() {
-                return Err(value.error(FileErrorKind::Value("names no stage".into())));
+                return Err(value.error(FileErrorKind::Value("must name at least one stage".into())));
             }
         }
         Ok(common)

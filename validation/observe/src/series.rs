@@ -1,29 +1,27 @@
-//! Series of vectors in bounded memory, with error bars for what is computed from their means.
+//! Series of vectors in bounded memory, with error bars for functions of their means.
 
 use super::statistics::{MINIMUM_SAMPLES, estimate};
 use serde::{Deserialize, Serialize};
 
-/// The most rows a [`Series`] keeps; even.
+/// The largest number of rows in a [`Series`], an even number.
 pub const MOST_ROWS: usize = 512;
 
-/// The most stretches of a [`Series::jackknife`].
+/// The largest number of stretches in a [`Series::jackknife`].
 const STRETCHES: usize = 40;
 
-/// A value with one standard deviation of it; NaN where unknown.
+/// A value with one standard deviation; NaN if unknown.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Measured {
-    /// The value.
     pub value: f64,
-    /// Its error.
     pub error: f64,
 }
 
 impl Measured {
-    /// Nothing is known.
+    /// An unknown value.
     pub const NONE: Measured = Measured { value: f64::NAN, error: f64::NAN };
 
-    /// Mean of a correlated series, with the error of [`estimate`]; of fewer samples than that takes, the
-    /// plain standard error s/√M; of one sample, none.
+    /// The mean of a correlated series with the error of [`estimate`]. For fewer samples than [`estimate`] accepts the error is
+    /// the plain standard error s/√M; for one sample it is unknown.
     pub fn mean(values: &[f64]) -> Measured {
         if let Ok(e) = estimate(values) {
             return Measured { value: e.mean, error: e.error };
@@ -35,31 +33,30 @@ impl Measured {
         Measured { value, error: if plain { (squares / (count * (count - 1.0))).sqrt() } else { f64::NAN } }
     }
 
-    /// The same in other units.
+    /// Multiplies value and error by a factor.
     #[must_use]
     pub fn times(self, factor: f64) -> Measured {
         Measured { value: self.value * factor, error: self.error * factor.abs() }
     }
 }
 
-/// A series of vectors of one width, as means of consecutive blocks: the samples themselves while there
-/// are no more than [`MOST_ROWS`]; then neighbouring blocks are averaged, and blocks are twice as long.
+/// A series of vectors of one width, stored as means of consecutive blocks. Up to [`MOST_ROWS`] samples each block is one
+/// sample. Then neighbouring blocks are averaged, and blocks become twice as long.
 ///
-/// A block that is not complete at the end is left out of every mean. Sums go in the order of the
-/// samples, so a series that is written, read back and continued ends with the same bits.
+/// An incomplete block at the end is left out of every mean. Sums are made in the order of the samples, so a series that is
+/// written, read back and continued ends with the same bits.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Unchecked")]
 pub struct Series {
     width: usize,
     most: usize,
-    /// Samples in a block.
     block: u64,
     pending: Vec<f64>,
     pending_samples: u64,
     rows: Vec<f64>,
 }
 
-/// What is read where a [`Series`] should be.
+/// The stored form of a [`Series`] before validation.
 #[derive(Deserialize)]
 struct Unchecked {
     width: usize,
@@ -96,15 +93,13 @@ impl Series {
         Series::with_rows(width, MOST_ROWS)
     }
 
-    /// A series that keeps fewer rows, for wide vectors. `most` is even.
+    /// A series with fewer rows, for wide vectors. `most` is even.
     pub fn with_rows(width: usize, most: usize) -> Series {
         let most = (most & !1).max(2);
         Series { width, most, block: 1, pending: Vec::new(), pending_samples: 0, rows: Vec::new() }
     }
 
-    /// Adds a sample, unless it has a number that is not finite, or another width.
-    ///
-    /// Whether it was added.
+    /// Adds a sample and returns true. A sample with another width, NaN or infinity is not added.
     pub fn push(&mut self, sample: &[f64]) -> bool {
         if sample.len() != self.width || self.width == 0 || !sample.iter().all(|x| x.is_finite()) {
             return false;
@@ -128,7 +123,6 @@ impl Series {
         true
     }
 
-    /// Forgets every sample.
     pub fn clear(&mut self) {
         *self = Series::with_rows(self.width, self.most);
     }
@@ -145,22 +139,21 @@ impl Series {
         self.block *= 2;
     }
 
-    /// Rows kept.
+    /// The number of stored rows.
     pub fn len(&self) -> usize {
         self.rows.len().checked_div(self.width).unwrap_or(0)
     }
 
-    /// Whether no row is kept.
     pub fn is_empty(&self) -> bool {
         self.rows.is_empty()
     }
 
-    /// Samples that the rows are the means of.
+    /// The number of samples in the rows.
     pub fn samples(&self) -> u64 {
         self.len() as u64 * self.block
     }
 
-    /// Numbers in a sample.
+    /// The number of components of a sample.
     pub fn width(&self) -> usize {
         self.width
     }
@@ -175,12 +168,12 @@ impl Series {
         self.rows().map(|row| row[k]).collect()
     }
 
-    /// Mean of component `k`.
+    /// The mean of component `k`.
     pub fn mean(&self, k: usize) -> Measured {
         Measured::mean(&self.channel(k))
     }
 
-    /// Means of all components.
+    /// The means of all components.
     pub fn means(&self) -> Vec<f64> {
         self.means_of(0..self.len())
     }
@@ -195,13 +188,13 @@ impl Series {
         sum
     }
 
-    /// Mean of a function linear in the samples.
+    /// The mean of a linear function of the samples.
     pub fn linear(&self, function: impl Fn(&[f64]) -> f64) -> Measured {
         let values: Vec<f64> = self.rows().map(function).collect();
         Measured::mean(&values)
     }
 
-    /// `⟨a⟩/⟨b⟩` of two functions linear in the samples, with the error of the mean of `(a − R b)/⟨b⟩`.
+    /// The ratio `⟨a⟩/⟨b⟩` of two linear functions of the samples. Its error is that of the mean of `(a − R b)/⟨b⟩`.
     pub fn ratio(&self, a: impl Fn(&[f64]) -> f64, b: impl Fn(&[f64]) -> f64) -> Measured {
         let tops: Vec<f64> = self.rows().map(a).collect();
         let bottoms: Vec<f64> = self.rows().map(b).collect();
@@ -214,26 +207,26 @@ impl Series {
         Measured { value, error: Measured::mean(&rest).error }
     }
 
-    /// A function of the means, with its error by the infinitesimal jackknife (Jaeckel, Bell Laboratories MM 72-1215-11
+    /// A function of the means with its error from the infinitesimal jackknife (Jaeckel, Bell Laboratories MM 72-1215-11
     /// (1972); Efron, The Jackknife, the Bootstrap and Other Resampling Plans (1982), chapter 6).
     ///
-    /// The series is cut into twenty to forty stretches, or as many as there are rows. The means are moved
-    /// towards those of each stretch in turn; what that adds to the value makes a series, whose mean has the error of
-    /// [`estimate`], so stretches may be correlated. Of K stretches the step is 1/√K of the way: about one standard
-    /// deviation of the means. A function that jumps by a little, as a median or a fit to points that come and go, then changes
-    /// by what it varies from run to run. The smaller steps of leaving out a stretch make of such jumps twice the error.
+    /// The series is cut into twenty to forty stretches, or into single rows if there are fewer. The means are moved towards
+    /// those of each stretch in turn. The changes of the value form a series, whose mean has the error of [`estimate`], so
+    /// stretches may be correlated. For K stretches the step is 1/√K of the distance, about one standard deviation of the
+    /// means. A function with small jumps, such as a median or a fit to a varying set of points, then changes by its
+    /// variation from run to run. The smaller steps of leaving out one stretch would double the error of such functions.
     pub fn jackknife(&self, function: impl Fn(&[f64]) -> Option<f64>) -> Measured {
         self.jackknife_many(|means| function(means).map(|x| vec![x])).pop().unwrap_or(Measured::NONE)
     }
 
-    /// The same for several functions at once; empty if they have no value at the means.
+    /// The jackknife of several functions at once; empty if they have no value at the means.
     pub fn jackknife_many(&self, function: impl Fn(&[f64]) -> Option<Vec<f64>>) -> Vec<Measured> {
         if self.is_empty() {
             return Vec::new();
         }
         let means = self.means();
         let Some(values) = function(&means) else { return Vec::new() };
-        // Of nearly equal lengths.
+        // The stretches have nearly equal lengths.
         let stretches = self.len().div_ceil(self.len().div_ceil(STRETCHES));
         let step = 1.0 / (stretches as f64).sqrt();
         let moved = |k: usize| {
@@ -265,8 +258,8 @@ mod tests {
     use rand::{SeedableRng, rngs::StdRng};
     use rand_distr::{Distribution, StandardNormal};
 
-    /// A series whose autocorrelation is ρ(t) = a^t: its mean has the variance (1 + a)/(1 − a)/N of the
-    /// stationary variance.
+    /// A series with the autocorrelation ρ(t) = a^t. The variance of its mean is (1 + a)/(1 − a)/N of the stationary
+    /// variance.
     fn exponential(a: f64, count: usize, rng: &mut StdRng) -> Vec<f64> {
         let mut x: f64 = StandardNormal.sample(rng);
         (0..count)
@@ -310,9 +303,9 @@ mod tests {
         assert_eq!(whole, parts);
     }
 
-    /// Mean, ratio and jackknife of 400 correlated series, 8000 samples each with a correlation time of
-    /// ten: the errors are those of theory within 10 % on average, and two of them cover the truth in
-    /// 95 % of the series: 380 ± 4.4, of which 355 is more than five deviations below. The seed is fixed.
+    /// Mean, ratio and jackknife of 400 correlated series of 8000 samples each with a correlation time of ten. The errors
+    /// agree with theory within 10 % on average. Intervals of two errors contain the true value in 95 % of the series:
+    /// 380 ± 4.4; the limit 355 is more than five deviations below. The seed is fixed.
     #[test]
     fn errors_of_correlated_series_are_right() {
         let mut rng = StdRng::seed_from_u64(81);
@@ -340,8 +333,8 @@ mod tests {
         assert!(sizes.iter().all(|s| (0.9..1.15).contains(s)), "{sizes:?}");
     }
 
-    /// Jackknife errors of series whose stretches are correlated: 100 samples with a correlation time of 4.5, stretches of
-    /// five. Without a look at the correlation they are 1.6 times too small. The seed is fixed.
+    /// Jackknife errors for correlated stretches: 100 samples with a correlation time of 4.5 in stretches of five. Errors that
+    /// ignore the correlation are 1.6 times too small. The seed is fixed.
     #[test]
     fn correlated_stretches_are_noticed() {
         let mut rng = StdRng::seed_from_u64(82);
@@ -359,8 +352,8 @@ mod tests {
         }
     }
 
-    /// Of series that swing, stretches make up for each other; and a median jumps. Leaving out one stretch in turn, as if
-    /// they were independent, makes the errors of both 1.4 to 2.2 times too large. The seed is fixed.
+    /// In an oscillating series stretches compensate for each other, and a median jumps. Errors that leave out one stretch in
+    /// turn and assume independence are 1.4 to 2.2 times too large for both. The seed is fixed.
     #[test]
     fn swings_and_jumps_have_no_larger_errors() {
         let mut rng = StdRng::seed_from_u64(83);

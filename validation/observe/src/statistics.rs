@@ -1,26 +1,23 @@
-//! Means of correlated series, their error bars, and comparisons of them.
+//! Means of correlated series, their error bars, and comparisons of means.
 
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
-/// The fewest samples [`estimate`] accepts.
+/// The smallest number of samples that [`estimate`] accepts.
 pub const MINIMUM_SAMPLES: usize = 8;
 
-/// Longer series are pre-averaged in blocks before an autoregression is
-/// fitted, which bounds the cost.
+/// Longer series are averaged in blocks before an autoregression is fitted, which bounds the cost.
 const LONGEST: usize = 16_384;
 
-/// The longest blocks that autoregressions are fitted to, in samples, as a power of two.
+/// The longest blocks to which autoregressions are fitted have 2 to this power samples.
 const BLOCKINGS: usize = 4;
 
-/// The fewest blocks that are fitted.
+/// The smallest number of blocks for a fit.
 const FEWEST_BLOCKS: usize = 24;
 
-/// Above this many degrees of freedom Student's t is the normal distribution
-/// to more digits than an error bar has.
+/// With more degrees of freedom Student's t equals the normal distribution to more digits than an error bar has.
 const NORMAL_DEGREES: f64 = 1e5;
 
-/// Why a series has no estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum StatisticsError {
     #[error("{found} samples, but an error bar needs at least {MINIMUM_SAMPLES}")]
@@ -31,55 +28,48 @@ pub enum StatisticsError {
     Overflow,
 }
 
-/// The mean of a stationary, possibly correlated series, with its error bar.
+/// The mean of a stationary, possibly correlated series with its error bar.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Estimate {
-    /// x̄ = (1/N) Σ xᵢ, in the units of the series.
+    /// The mean x̄ = (1/N) Σ xᵢ, in the units of the series.
     pub mean: f64,
-    /// One standard deviation of the mean, s √(2τ/N), in the units of the
-    /// series, with s² = Σ (xᵢ − x̄)² / (N − 1).
+    /// One standard deviation of the mean, s √(2τ/N), in the units of the series, with s² = Σ (xᵢ − x̄)² / (N − 1).
     pub error: f64,
-    /// N, the number of samples.
+    /// The number N of samples.
     pub samples: usize,
-    /// Integrated autocorrelation time τ = ½ + Σ_{t≥1} ρ(t), in samples;
-    /// ½ means independent samples, less that they make up for each other.
-    /// It is the τ that goes with `error`.
+    /// The integrated autocorrelation time τ = ½ + Σ_{t≥1} ρ(t) in samples that corresponds to `error`. It is ½ for
+    /// independent samples and less for anticorrelated ones.
     pub tau: f64,
 }
 
 impl Estimate {
-    /// Number of independent samples the error is known from, N / 2τ or N
-    /// (dimensionless).
+    /// The number of independent samples behind the error, N / 2τ or N (dimensionless).
     #[must_use]
     pub fn effective(&self) -> f64 {
         self.samples as f64 / (2.0 * self.tau).max(1.0)
     }
 }
 
-/// Mean and error bar of a stationary series.
+/// The mean and error bar of a stationary series.
 ///
-/// The variance of a mean of N samples is S(0)/N, with S(0) = C(0) + 2 Σ C(t)
-/// the spectrum at zero frequency. That of an autoregression
-/// x_t = −Σ a_k x_{t−k} + e_t is S(0) = ⟨e²⟩/(1 + Σ a_k)². It is fitted by Burg's
-/// recursion, and S(0) averaged over its orders with the weights of the corrected information
-/// criterion of Akaike (Hurvich and Tsai, Biometrika 76, 297 (1989); Burnham and Anderson, Sociol.
-/// Methods Res. 33, 261 (2004)).
-/// A sum over ρ(t) up to a window, and blocks, do as well where ρ(t) decays;
-/// of series that swing, as pressures do, or whose samples make up for each other, they
-/// tell twice the error and more, unless the series is much longer than its swings.
+/// The variance of a mean of N samples is S(0)/N, with S(0) = C(0) + 2 Σ C(t) the spectrum at zero frequency. An
+/// autoregression x_t = −Σ a_k x_{t−k} + e_t has S(0) = ⟨e²⟩/(1 + Σ a_k)². It is fitted by Burg's recursion, and S(0) is
+/// averaged over its orders with the weights of the corrected information criterion of Akaike (Hurvich and Tsai,
+/// Biometrika 76, 297 (1989); Burnham and Anderson, Sociol. Methods Res. 33, 261 (2004)).
+/// A sum over ρ(t) up to a window, or a mean over blocks, is equally good if ρ(t) decays. For oscillating series, such as
+/// pressures, and for anticorrelated samples these methods double the error or worse, unless the series is much longer
+/// than its oscillations.
 ///
-/// The criterion asks how well the next sample is predicted. A slow mode with a small share of the variance
-/// adds little to that, but much to the error of the mean. In means of blocks its share is larger. So the
-/// variance is the mean of those by the samples and by blocks of 2, 4, 8 and 16 of them, as long as there
-/// are 24 blocks.
+/// The criterion measures the prediction of the next sample. A slow mode with a small share of the variance contributes
+/// little to the prediction, but much to the error of the mean. Its share is larger in means of blocks. So the variance
+/// is averaged over fits to the samples and to blocks of 2, 4, 8 and 16 samples, as long as there are 24 blocks.
 ///
-/// A correlation that is slower than the series is long is
-/// not seen by this nor by any other estimate. No error is below s/N.
+/// No estimate detects a correlation time that exceeds the length of the series. No error is below s/N.
 ///
 /// # Errors
 ///
-/// Fewer than [`MINIMUM_SAMPLES`] samples, a sample that is not finite, or
-/// samples so large that their sums overflow.
+/// The function fails for fewer than [`MINIMUM_SAMPLES`] samples, for a sample that is not finite, and for samples so
+/// large that their sums overflow.
 pub fn estimate(series: &[f64]) -> Result<Estimate, StatisticsError> {
     let deviations = Deviations::of(series)?;
     let n = series.len() as f64;
@@ -92,27 +82,24 @@ pub fn estimate(series: &[f64]) -> Result<Estimate, StatisticsError> {
     Ok(Estimate { mean: deviations.mean, error, samples: series.len(), tau })
 }
 
-/// The difference of two independent estimates.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Comparison {
-    /// Δ = x̄_a − x̄_b, in the units of the estimates.
+    /// The difference Δ = x̄_a − x̄_b, in the units of the estimates.
     pub delta: f64,
-    /// σ = √(σ_a² + σ_b²), in the units of the estimates.
+    /// The error σ = √(σ_a² + σ_b²), in the units of the estimates.
     pub error: f64,
-    /// Δ/σ, dimensionless; infinite if Δ ≠ 0 and σ = 0, 0 if both are 0.
+    /// The ratio Δ/σ, dimensionless; infinite if Δ ≠ 0 and σ = 0, 0 if both are 0.
     pub z: f64,
-    /// Probability of a |Δ/σ| at least this large if the true means agree.
+    /// The probability of a |Δ/σ| at least this large if the true means agree.
     pub p_value: f64,
 }
 
 impl Comparison {
-    /// Whether the difference is significant among `checks` comparisons of
-    /// which, were all the true means equal, any at all should be significant
-    /// with probability `family_alarm` at most: p < family_alarm / checks.
+    /// Returns true if the difference is significant among `checks` comparisons. If all true means are equal, the probability
+    /// of any significant comparison is at most `family_alarm`: p < family_alarm / checks.
     ///
-    /// For long series this is |z| > [`threshold`]`(checks, family_alarm)`;
-    /// for short ones it allows for the error bars being uncertain themselves.
-    /// A comparison that is not a number is significant.
+    /// For long series the condition is |z| > [`threshold`]`(checks, family_alarm)`; for short ones it allows for the
+    /// uncertainty of the error bars. A comparison that is NaN is significant.
     #[must_use]
     pub fn exceeds(&self, checks: usize, family_alarm: f64) -> bool {
         self.p_value.is_nan() || self.p_value < family_alarm / checks.max(1) as f64
@@ -122,9 +109,8 @@ impl Comparison {
 /// Compares two independent estimates.
 ///
 /// The two-sided p-value is Student's, with Welch's degrees of freedom
-/// ν = (σ_a² + σ_b²)² / [σ_a⁴/(n_a − 1) + σ_b⁴/(n_b − 1)], where n is the
-/// number of independent samples, [`Estimate::effective`]; n − 1 is taken as
-/// 1 if it is less.
+/// ν = (σ_a² + σ_b²)² / [σ_a⁴/(n_a − 1) + σ_b⁴/(n_b − 1)]. Here n is the number of independent samples,
+/// [`Estimate::effective`]; n − 1 is at least 1.
 #[must_use]
 pub fn difference(a: &Estimate, b: &Estimate) -> Comparison {
     let delta = a.mean - b.mean;
@@ -146,23 +132,21 @@ pub fn difference(a: &Estimate, b: &Estimate) -> Comparison {
     Comparison { delta, error, z, p_value }
 }
 
-/// The limit on |z| (dimensionless) for `checks` comparisons of which any at
-/// all should exceed it by chance with probability `family_alarm` at most:
-/// Bonferroni's Φ⁻¹(1 − family_alarm / 2 checks).
+/// The limit on |z| (dimensionless) for `checks` comparisons. The probability that any of them exceeds it by chance is at
+/// most `family_alarm`: Bonferroni's Φ⁻¹(1 − family_alarm / 2 checks).
 ///
-/// No checks count as one; an alarm rate of 0 or less, or NaN, gives
-/// infinity, and one above 1 counts as 1.
+/// Zero checks count as one. An alarm rate that is NaN or not above 0 gives infinity; one above 1 counts as 1.
 #[must_use]
 pub fn threshold(checks: usize, family_alarm: f64) -> f64 {
     let tail = 0.5 * family_alarm.min(1.0) / checks.max(1) as f64;
     if family_alarm.is_nan() || tail <= 0.0 {
         return f64::INFINITY;
     }
-    // The lower tail, which unlike 1 − tail keeps its digits.
+    // The lower tail keeps its digits, unlike 1 − tail.
     (-Normal::standard().inverse_cdf(tail)).max(0.0)
 }
 
-/// A checked series less its mean.
+/// A validated series minus its mean.
 struct Deviations {
     mean: f64,
     values: Vec<f64>,
@@ -176,7 +160,7 @@ impl Deviations {
         if let Some(index) = series.iter().position(|x| !x.is_finite()) {
             return Err(StatisticsError::NonFinite { index });
         }
-        // Measured from the first sample, a constant series is exactly so.
+        // With the first sample as origin, a constant series has deviations of exactly 0.
         let origin = series[0];
         let mut values: Vec<f64> = series.iter().map(|x| x - origin).collect();
         let shift = values.iter().sum::<f64>() / values.len() as f64;
@@ -194,12 +178,12 @@ fn sum_of_squares(x: &[f64]) -> f64 {
     x.iter().map(|x| x * x).sum()
 }
 
-/// Averages of consecutive pairs; an odd last sample is left out.
+/// The averages of consecutive pairs; an odd last sample is left out.
 fn halved(x: &[f64]) -> Vec<f64> {
     x.chunks_exact(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect()
 }
 
-/// Error of the mean, its square averaged over blocks of several lengths.
+/// The error of the mean, with its square averaged over blocks of several lengths.
 fn error_by_blocks(deviations: &[f64]) -> f64 {
     let mut x = deviations.to_vec();
     while x.len() > LONGEST {
@@ -217,7 +201,7 @@ fn error_by_blocks(deviations: &[f64]) -> f64 {
     (sum / levels).sqrt()
 }
 
-/// Error of the mean by autoregressions of all orders, as likely as they are.
+/// The error of the mean from autoregressions of all orders, weighted by their likelihood.
 fn autoregression(x: &[f64]) -> f64 {
     let count = x.len();
     let n = count as f64;
@@ -226,7 +210,7 @@ fn autoregression(x: &[f64]) -> f64 {
     if largest == 0.0 {
         return 0.0;
     }
-    // Squares of numbers near 1 neither overflow nor vanish.
+    // Squares of numbers near 1 neither overflow nor underflow.
     let scaled = |x: &f64| (x - mean) / largest;
     let (mut forward, mut backward): (Vec<f64>, Vec<f64>) = x.iter().map(|x| (scaled(x), scaled(x))).unzip();
     let highest = (count / 4).min((10.0 * n.log10()) as usize);
@@ -240,7 +224,7 @@ fn autoregression(x: &[f64]) -> f64 {
             let product: f64 = pairs().map(|(f, b)| f * b).sum();
             let squares: f64 = pairs().map(|(f, b)| f * f + b * b).sum();
             let reflection = -2.0 * product / squares;
-            // What is predicted to the last bit needs no higher order, and its mean is known.
+            // A series that is predicted to the last bit needs no higher order, and its mean is exact.
             if reflection >= 1.0 {
                 return 0.0;
             }
@@ -259,7 +243,7 @@ fn autoregression(x: &[f64]) -> f64 {
         let parameters = (order + 1) as f64;
         let criterion = n * residue.ln() + 2.0 * parameters * n / (n - parameters - 1.0).max(1.0);
         let gain = 1.0 + coefficients.iter().sum::<f64>();
-        // The mean and the coefficients are fitted: that many samples tell nothing about the rest.
+        // The mean and the coefficients are fitted, so the sample size is reduced by their number.
         let variance = residue * (1.0 + parameters / n) / n / (gain * gain);
         if criterion.is_finite() && variance.is_finite() {
             orders.push((criterion, variance));
@@ -274,7 +258,7 @@ fn autoregression(x: &[f64]) -> f64 {
     (sum / weights).sqrt() * largest
 }
 
-/// P(|T| ≥ z) for z > 0 and a positive number of degrees of freedom.
+/// The probability P(|T| ≥ z) for z > 0 and a positive number of degrees of freedom.
 fn two_sided(z: f64, degrees: f64) -> f64 {
     if degrees < NORMAL_DEGREES
         && let Ok(student) = StudentsT::new(0.0, 1.0, degrees)
@@ -303,10 +287,9 @@ mod tests {
             .collect()
     }
 
-    /// Two-sigma intervals of 300 independent series hold the true mean
-    /// 286 ± 3.6 times if the error is exact. The limit of 272 is 3.9 of
-    /// those deviations below: a false alarm once in 10⁴ seeds. There is no
-    /// upper limit on the count; that is bounded through the mean error instead.
+    /// Two-sigma intervals of 300 independent series contain the true mean 286 ± 3.6 times if the error is exact. The limit
+    /// of 272 is 3.9 of these deviations below: a false alarm once in 10⁴ seeds. The count has no upper limit; the mean error
+    /// is limited instead.
     #[test]
     fn two_sigma_intervals_cover() {
         let mut rng = StdRng::seed_from_u64(20);
@@ -334,9 +317,8 @@ mod tests {
         assert!((e.effective() - 100_000.5 / e.tau).abs() < 1e-6);
     }
 
-    /// Equal true means: p-values are uniform, so of 1000 the number below
-    /// 0.05 is 50 ± 7 for exact errors, fewer for generous ones; 80 is more
-    /// than four deviations above.
+    /// Equal true means give uniform p-values. Of 1000 the number below 0.05 is 50 ± 7 for exact errors, and smaller for
+    /// overrated ones; 80 is more than four deviations above.
     #[test]
     fn p_values_raise_few_false_alarms() {
         let mut rng = StdRng::seed_from_u64(22);
@@ -349,9 +331,9 @@ mod tests {
         assert!((15..80).contains(&low), "{low}");
     }
 
-    /// Spread of means over the errors that are reported, of short series and of ones of the length that observables keep,
-    /// within the bounds that hold for observables; the spread of 400 means is known to 4 %, so that a bound is
-    /// crossed by chance, by a ratio of 1.15, less than once in 50 runs. The seed is fixed.
+    /// The spread of means divided by the reported errors, for short series and for series of the length that observables
+    /// keep, within the bounds that hold for observables. The spread of 400 means is known to 4 %, so a ratio crosses the
+    /// bound 1.15 by chance less than once in 50 runs. The seed is fixed.
     #[test]
     fn errors_are_the_spread_of_means() {
         let mut rng = StdRng::seed_from_u64(23);
@@ -381,7 +363,7 @@ mod tests {
                 sum(swinging(0.95, 20.0, n, rng), autoregressive(0.0, n, rng), 5.0)
             }),
             ("both", &|n, rng| sum(autoregressive(0.8, n, rng), autoregressive(-0.5, n, rng), 1.0)),
-            // Modes that relax at the rates k² of diffusion: the velocity at a place in a fluid.
+            // Modes that relax at the rates k² of diffusion, such as the velocity at a point in a fluid.
             ("relaxing", &|n, rng| {
                 let rate = n as f64 / 32.0;
                 let modes = (1..8).map(|k| autoregressive((-f64::from(k * k) / rate).exp(), n, rng));
@@ -437,7 +419,7 @@ mod tests {
 
     #[test]
     fn student_and_normal_tails() {
-        // Tabulated: t_{0.975} = 2.228 at 10 degrees, 1.960 at infinity.
+        // The tabulated value t_{0.975} is 2.228 at 10 degrees of freedom and 1.960 at infinity.
         assert!((two_sided(2.228, 10.0) - 0.05).abs() < 1e-4);
         assert!((two_sided(1.959_964, 1e9) - 0.05).abs() < 1e-6);
         assert!((two_sided(3.0, 0.99 * NORMAL_DEGREES) / two_sided(3.0, 1e9) - 1.0).abs() < 1e-3);

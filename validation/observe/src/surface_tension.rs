@@ -1,6 +1,5 @@
 //! Surface tension of a slab from the pressure tensor.
 
-/// Why a pressure record has no tension.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum TensionError {
     #[error("the pressure components differ in length: {xx} xx, {yy} yy, {zz} zz")]
@@ -9,17 +8,14 @@ pub enum TensionError {
     BoxLength(f64),
 }
 
-/// Surface tension at each sample,
-/// γ = (L_z/2) [P_zz − (P_xx + P_yy)/2], energy per area (k_B T / r_c²).
+/// The surface tension at each sample, γ = (L_z/2) [P_zz − (P_xx + P_yy)/2], energy per area (k_B T / r_c²).
 ///
-/// The slab lies normal to z in a periodic box and so has two interfaces,
-/// which share the excess: hence the half. `lz` is a length (r_c), the
-/// pressures are energies per volume (k_B T / r_c³). Samples that are not
-/// finite stay so.
+/// The slab lies normal to z in a periodic box and so has two interfaces, which share the excess: hence the half. `lz` is a
+/// length (r_c), the pressures are energies per volume (k_B T / r_c³). NaN and infinite samples give NaN or infinite tensions.
 ///
 /// # Errors
 ///
-/// Components of different lengths, or an `lz` that is not a positive number.
+/// The function fails for components of different lengths, and for an `lz` that is not a positive number.
 pub fn tension_series(lz: f64, pxx: &[f64], pyy: &[f64], pzz: &[f64]) -> Result<Vec<f64>, TensionError> {
     if !(lz.is_finite() && lz > 0.0) {
         return Err(TensionError::BoxLength(lz));

@@ -1,6 +1,7 @@
 //! Axisymmetric drops that hang under their weight.
 //!
-//! From the apex up, in units of the radius of curvature there, with φ the slope of the contour and s its length,
+//! The contour goes up from the apex. Lengths are in units of the radius of curvature there, φ is the slope of the contour
+//! and s its length:
 //!
 //! ```text
 //! dr/ds = cos φ    dz/ds = sin φ    dφ/ds = 2 − Bo z − sin φ / r    Bo = Δρ g R₀²/γ
@@ -10,24 +11,24 @@
 
 use crate::least_squares::least_squares;
 
-/// Steps of the integration per radius of the apex.
+/// The step of the integration, in radii of the apex.
 const STEP: f64 = 0.01;
 
 /// The longest contour, in radii of the apex.
 const LONGEST: f64 = 30.0;
 
-/// A point of a contour: radius, height above the apex, slope; lengths in radii of the apex.
+/// A point of a contour. Lengths are in radii of the apex.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point {
-    /// Distance from the axis.
+    /// The distance from the axis.
     pub r: f64,
-    /// Height above the apex.
+    /// The height above the apex.
     pub z: f64,
-    /// Angle of the contour with the horizontal.
+    /// The angle between the contour and the horizontal.
     pub phi: f64,
 }
 
-/// The contour of a drop of Bond number `bond` from its apex up to `height`, or to where it stops rising or
+/// The contour of a drop of Bond number `bond` from its apex up to `height`, or to the point where it stops rising or
 /// reaches the axis.
 pub fn contour(bond: f64, dimensions: usize, height: f64) -> Vec<Point> {
     let rest = (dimensions - 1) as f64;
@@ -65,17 +66,17 @@ pub fn contour(bond: f64, dimensions: usize, height: f64) -> Vec<Point> {
 /// The drop that fits a contour best.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fit {
-    /// Bond number Δρ g R₀²/γ, with the radius of the apex.
+    /// The Bond number Δρ g R₀²/γ, where R₀ is the radius of the apex.
     pub bond: f64,
-    /// R₀, the radius of curvature at the apex.
+    /// The radius of curvature R₀ at the apex.
     pub radius: f64,
-    /// Where the apex is.
+    /// The height of the apex.
     pub apex: f64,
-    /// Root of the mean square distance of the points from the contour.
+    /// The root mean square distance of the points from the contour.
     pub residual: f64,
 }
 
-/// Distances of points from the contour, to first order; `None` beyond its end.
+/// The distances of points from the contour, to first order; `None` if the contour has no points.
 fn residuals(points: &[(f64, f64)], dimensions: usize, p: &[f64]) -> Option<Vec<f64>> {
     let (bond, radius, apex) = (p[0], p[1].exp(), p[2]);
     let top = points.iter().map(|q| (q.1 - apex) / radius).fold(0.0, f64::max);
@@ -87,11 +88,11 @@ fn residuals(points: &[(f64, f64)], dimensions: usize, p: &[f64]) -> Option<Vec<
         .map(|&(r, z)| {
             let z = (z - apex) / radius;
             if z <= 0.0 || shape.len() < 2 {
-                // Below the apex.
+                // The point is below the apex.
                 return Some((z * radius).hypot(r));
             }
             if z > last.z {
-                // A contour that ends below a point is the farther off the more it lacks.
+                // For a point above the end of the contour, the missing height is added to the distance.
                 return Some((z - last.z) * radius + (r - last.r * radius).abs());
             }
             while next + 1 < shape.len() && shape[next].z < z {
@@ -102,7 +103,7 @@ fn residuals(points: &[(f64, f64)], dimensions: usize, p: &[f64]) -> Option<Vec<
             }
             let (a, b) = (shape[next - 1], shape[next]);
             let t = (z - a.z) / (b.z - a.z);
-            // Near the apex r goes as the root of z.
+            // Near the apex r is proportional to the square root of z.
             let there = if next == 1 { b.r * t.sqrt() } else { a.r + t * (b.r - a.r) };
             let phi = a.phi + t * (b.phi - a.phi);
             Some((r - there * radius) * phi.sin())
@@ -110,8 +111,9 @@ fn residuals(points: &[(f64, f64)], dimensions: usize, p: &[f64]) -> Option<Vec<
         .collect()
 }
 
-/// Fits Bond number, apex radius and apex to points (r, z) of a contour, z upwards from about the apex, by the
-/// squares of their distances from it. `None` with fewer than six points, or if nothing fits.
+/// Fits Bond number, apex radius and apex to points (r, z) of a contour, with z upwards from about the apex. The fit
+/// minimises the squared distances of the points from the contour. The result is `None` for fewer than six points and
+/// if no fit succeeds.
 pub fn fit(points: &[(f64, f64)], dimensions: usize) -> Option<Fit> {
     if points.len() < 6 || !points.iter().all(|p| p.0.is_finite() && p.1.is_finite() && p.0 >= 0.0) {
         return None;
@@ -125,7 +127,7 @@ pub fn fit(points: &[(f64, f64)], dimensions: usize) -> Option<Fit> {
         return None;
     }
     let cost = |p: &[f64; 3]| Some(residuals(&points, dimensions, p)?.iter().map(|r| r * r).sum::<f64>());
-    // Coarse start: the best of a grid.
+    // The coarse start is the best point of a grid.
     let mut best: Option<(f64, [f64; 3])> = None;
     for bond in [-0.2, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5] {
         for scale in [0.7, 0.85, 1.0, 1.2, 1.5] {
@@ -159,8 +161,8 @@ mod tests {
         }
     }
 
-    /// The first integral in two dimensions: 1 − cos φ = z − Bo z²/2; and in three dimensions the balance of
-    /// forces on the drop below z, r sin φ = r²(1 − Bo z/2) + Bo V/2π.
+    /// The first integral in two dimensions is 1 − cos φ = z − Bo z²/2. In three dimensions it is the balance of forces on the
+    /// drop below z, r sin φ = r²(1 − Bo z/2) + Bo V/2π.
     #[test]
     fn contours_balance_their_weight() {
         for p in contour(0.25, 2, 2.5) {
@@ -177,8 +179,8 @@ mod tests {
         }
     }
 
-    /// Noise of 2 % of the apex radius on 60 points: the Bond number comes back within 0.03, apex and radius
-    /// within 3 %, for 20 noises each: more than ten standard deviations of the mean. The seed is fixed.
+    /// With noise of 2 % of the apex radius on 60 points, the Bond number agrees within 0.03, apex and radius within 3 %, for 20
+    /// noises each. These limits are more than ten standard deviations of the mean. The seed is fixed.
     #[test]
     fn the_fit_recovers_the_bond_number() {
         let mut rng = StdRng::seed_from_u64(17);

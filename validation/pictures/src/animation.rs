@@ -3,15 +3,15 @@ use super::snapshot::{SNAPSHOTS, snapshots};
 use psidpd_formats::FormatError;
 use std::path::Path;
 
-/// Most frames of an animation: of longer series every second, third, … is taken.
+/// The largest number of frames of an animation. Longer series are thinned to every second, third, … frame.
 const MOST: usize = 40;
 const PER_SECOND: u16 = 8;
 
 /// The snapshots of a run as one animated PNG of half their size; `None` with fewer than two. At most forty
-/// are shown, evenly chosen, the last one among them.
+/// evenly spaced snapshots are shown, the last one among them.
 ///
 /// # Errors
-/// A snapshot that cannot be read, or differs in size from the others.
+/// The function fails if a snapshot cannot be read or differs in size from the others.
 pub fn animate(folder: &Path) -> Result<Option<Vec<u8>>, FormatError> {
     let all = snapshots(folder);
     if all.len() < 2 {
@@ -31,7 +31,7 @@ pub fn animate(folder: &Path) -> Result<Option<Vec<u8>>, FormatError> {
         .map_err(|e| FormatError::Picture { path: folder.join(SNAPSHOTS), message: e.to_string() })
 }
 
-/// An animation as the address of an image that is in the page itself.
+/// An animation as a data address, with the image in the page itself.
 pub fn animation_url(png: &[u8]) -> String {
     super::data_url(png)
 }

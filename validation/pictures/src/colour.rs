@@ -1,10 +1,10 @@
-//! Colours of species, and of values.
+//! Colours of species and of values.
 
-/// Red, green, blue.
+/// The parts are red, green, blue.
 pub type Rgb = [u8; 3];
 
-/// Okabe and Ito's colours for all kinds of sight, without the yellow, which is hard to see on white. The
-/// k-th species, as the k-th curve of a plot, has the k-th colour, from the start again after the last.
+/// Okabe and Ito's palette for colour-blind readers, without the yellow, which is hard to see on white. The k-th species
+/// and the k-th curve of a plot have the k-th colour. After the last colour the palette starts again.
 pub const PALETTE: [Rgb; 7] = [
     [0x00, 0x72, 0xB2],
     [0xD5, 0x5E, 0x00],
@@ -15,18 +15,17 @@ pub const PALETTE: [Rgb; 7] = [
     [0x00, 0x00, 0x00],
 ];
 
-/// The colour of a species.
 pub fn of_species(species: usize) -> Rgb {
     PALETTE[species % PALETTE.len()]
 }
 
-/// Between `a` (at 0) and `b` (at 1).
+/// Mixes `a` (share 0) and `b` (share 1).
 pub fn mix(a: Rgb, b: Rgb, share: f64) -> Rgb {
     let share = share.clamp(0.0, 1.0);
     std::array::from_fn(|k| (f64::from(a[k]) * (1.0 - share) + f64::from(b[k]) * share).round() as u8)
 }
 
-/// Dark blue over green to yellow: lightness grows with the value, so it can be read in grey too.
+/// The scale goes from dark blue over green to yellow. Lightness grows with the value, so it is legible in grey too.
 const SCALE: [Rgb; 9] = [
     [0x35, 0x0A, 0x52],
     [0x44, 0x33, 0x80],
@@ -39,7 +38,7 @@ const SCALE: [Rgb; 9] = [
     [0xFB, 0xE8, 0x45],
 ];
 
-/// The colour of a value between 0 and 1; what is outside has the colour of the nearer end.
+/// The colour of a value between 0 and 1. Values outside have the colour of the nearer end.
 pub fn of_value(value: f64) -> Rgb {
     if value.is_nan() {
         return [0xD0, 0xD0, 0xD0];
@@ -55,7 +54,7 @@ mod tests {
 
     #[test]
     fn lightness_grows_with_the_value() {
-        // Relative luminance, ITU-R BT.709.
+        // The relative luminance of ITU-R BT.709.
         let luminance = |c: Rgb| {
             let linear = c.map(|v| (f64::from(v) / 255.0).powf(2.2));
             0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]

@@ -4,28 +4,27 @@ use super::projection::{Projection, View};
 use psidpd_core::model::kernel::{Kernel, KernelKind};
 use psidpd_formats::Frame;
 
-/// What of a density is shown, and where.
+/// The choice of a density and of the plane on which it is shown.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FieldOptions {
-    /// Along which direction the plane is seen that cuts the box in the middle; oblique counts as along y.
+    /// The direction along which the plane is seen. The plane cuts the box in the middle. The oblique view counts as y.
     pub view: View,
-    /// How far in front of the middle the plane is.
+    /// The distance of the plane in front of the middle of the box.
     pub offset: f64,
-    /// The weight function.
     pub kernel: Kernel,
-    /// One species only, or all.
+    /// One species, or all species without a number.
     pub species: Option<usize>,
-    /// Most pixels in width and height; 0 for 720 by 640.
+    /// The largest width and height in pixels; 0 means 720 by 640.
     pub size: [usize; 2],
 }
 
 impl FieldOptions {
-    /// The density that `kernel` weighs, of all species, in the plane of x and z (in two dimensions x and y).
+    /// The density of all species with this kernel, in the plane of x and z (in two dimensions x and y).
     pub fn new(kernel: Kernel) -> FieldOptions {
         FieldOptions { view: View::Y, offset: 0.0, kernel, species: None, size: [0, 0] }
     }
 
-    /// A density for models that have none: quadratic, of range 1.
+    /// The density for models without one: the quadratic kernel of range 1.
     pub fn coarse(dimensions: usize) -> FieldOptions {
         FieldOptions::new(Kernel::new(KernelKind::Quadratic, 1.0, dimensions))
     }
@@ -34,17 +33,16 @@ impl FieldOptions {
 /// A weighted local density `n(r) = Σ_j w(|r − r_j|)` on the pixels of a plane.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Field {
-    /// Where the pixels are.
     pub projection: Projection,
-    /// Pixels in a row, and rows.
+    /// The number of pixels in a row, and the number of rows.
     pub size: [usize; 2],
     /// Number densities, row after row from the top; NaN outside the box.
     pub values: Vec<f64>,
 }
 
 impl Field {
-    /// The density of a frame in the plane through the middle of the box. Every particle counts, at the
-    /// place of a particle too, so this is the density that a further particle there would feel.
+    /// The density of a frame in the plane through the middle of the box. Every particle counts, also at its own
+    /// position, so this is the density that a further particle there would feel.
     pub fn of(frame: &Frame, options: &FieldOptions) -> Field {
         let view = match (frame.dimensions, options.view) {
             (2, _) => View::Z,
@@ -57,7 +55,7 @@ impl Field {
         let mut values = vec![0.0; width * height];
         let range = options.kernel.range();
         let reach = range * projection.scale();
-        // In two dimensions everything is in the plane, whatever z is.
+        // In two dimensions all particles are in the plane, for any z.
         let plane = if frame.dimensions == 2 { None } else { Some(projection.middle() + options.offset) };
         for (x, species) in frame.x.iter().zip(frame.species) {
             if options.species.is_some_and(|s| s != *species as usize) {
@@ -95,13 +93,13 @@ impl Field {
         Field { projection, size: [width, height], values }
     }
 
-    /// The largest value; 0 if there is none.
+    /// The largest value; 0 if the field has no value.
     pub fn max(&self) -> f64 {
         self.values.iter().fold(0.0, |a, b| if *b > a { *b } else { a })
     }
 }
 
-/// A particle and its images within `range` of the box.
+/// The positions of a particle and its images within `range` of the box.
 fn images(frame: &Frame, x: [f64; 3], range: f64) -> Vec<[f64; 3]> {
     let periodic = frame.domain.periodic();
     let s = frame.domain.fraction(x);
@@ -125,7 +123,7 @@ fn images(frame: &Frame, x: [f64; 3], range: f64) -> Vec<[f64; 3]> {
     all
 }
 
-/// A field as pixels: from the colour of `low` to that of `high`, grey outside the box.
+/// A field as pixels, from the colour of `low` to that of `high`, grey outside the box.
 pub fn paint_field(field: &Field, low: f64, high: f64) -> Image {
     let span = if high > low { high - low } else { 1.0 };
     let pixels: Vec<Rgb> = field.values.iter().map(|v| of_value((v - low) / span)).collect();
@@ -137,7 +135,7 @@ mod tests {
     use super::*;
     use psidpd_core::engine::PeriodicBox;
 
-    /// Against the sum over every image, at every pixel; the volume integral of one particle's density is 1.
+    /// Each pixel agrees with the sum over all images. The volume integral of one particle's density is 1.
     #[test]
     fn the_field_is_the_sum_over_all_images() {
         for dimensions in [2, 3] {

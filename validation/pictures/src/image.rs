@@ -1,30 +1,29 @@
 use super::colour::{Rgb, mix};
 use base64::Engine as _;
 
-/// Pixels, row after row from the top.
+/// Pixels are stored row after row from the top.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Image {
-    /// Pixels in a row.
+    /// The number of pixels in a row.
     pub width: usize,
-    /// Rows.
+    /// The number of rows.
     pub height: usize,
-    /// `width · height` colours.
+    /// The slice has `width · height` colours.
     pub pixels: Vec<Rgb>,
 }
 
 impl Image {
-    /// An image of one colour.
     pub fn filled(width: usize, height: usize, colour: Rgb) -> Image {
         Image { width, height, pixels: vec![colour; width * height] }
     }
 
-    /// The colour of a pixel, counted from the upper left; `None` outside.
+    /// The colour of a pixel, counted from the upper left; `None` outside the image.
     pub fn get(&self, x: usize, y: usize) -> Option<Rgb> {
         (x < self.width).then(|| self.pixels.get(y * self.width + x).copied())?
     }
 
-    /// Each square of `factor` by `factor` pixels averaged into one; what is left over at the right and
-    /// below is dropped.
+    /// Averages each square of `factor` by `factor` pixels into one. Incomplete squares at the right and at the bottom
+    /// are dropped.
     pub fn reduced(&self, factor: usize) -> Image {
         let factor = factor.max(1);
         let (width, height) = (self.width / factor, self.height / factor);
@@ -47,7 +46,7 @@ impl Image {
         Image { width, height, pixels }
     }
 
-    /// Mixes a colour into a pixel, if it is in the image.
+    /// Mixes a colour into a pixel. Pixels outside the image are ignored.
     pub(super) fn blend(&mut self, x: usize, y: usize, colour: Rgb, share: f64) {
         if x < self.width && y < self.height {
             let pixel = &mut self.pixels[y * self.width + x];
@@ -55,19 +54,19 @@ impl Image {
         }
     }
 
-    /// As a PNG file.
+    /// Encodes the image as a PNG file.
     ///
     /// # Errors
-    /// An image without pixels.
+    /// The function fails for an image without pixels.
     pub fn to_png(&self) -> Result<Vec<u8>, png::EncodingError> {
         Image::to_apng(std::slice::from_ref(self), 1)
     }
 
-    /// As an animated PNG file that repeats for ever, `per_second` frames in a second; of one image, as a
-    /// plain PNG. Programs that know plain PNG only show the first image.
+    /// Encodes an animated PNG file that repeats forever, with `per_second` frames in a second; one image gives a plain
+    /// PNG. Programs that support only plain PNG show the first image.
     ///
     /// # Errors
-    /// No images, or images of different sizes.
+    /// The function fails for no images or for images of different sizes.
     pub fn to_apng(images: &[Image], per_second: u16) -> Result<Vec<u8>, png::EncodingError> {
         let wrong = |what: &str| {
             png::EncodingError::IoError(std::io::Error::new(
@@ -96,10 +95,10 @@ impl Image {
         Ok(bytes)
     }
 
-    /// As an animated GIF file that repeats for ever, each frame for `centiseconds`.
+    /// Encodes an animated GIF file that repeats forever and shows each frame for `centiseconds`.
     ///
     /// # Errors
-    /// No images, images of different sizes, or of more than 65535 pixels in a row; in words.
+    /// The function fails for no images, for images of different sizes and for images wider than 65535 pixels.
     pub fn to_gif(images: &[Image], centiseconds: u16) -> Result<Vec<u8>, String> {
         let Some(first) = images.first() else { return Err("an animation without images".into()) };
         if images.iter().any(|i| (i.width, i.height) != (first.width, first.height)) {
@@ -111,7 +110,7 @@ impl Image {
         let mut encoder = gif::Encoder::new(&mut bytes, width, height, &[]).map_err(|e| e.to_string())?;
         encoder.set_repeat(gif::Repeat::Infinite).map_err(|e| e.to_string())?;
         for image in images {
-            // Each frame has a palette of its own, from a tenth of its pixels.
+            // Each frame has its own palette, from a tenth of its pixels.
             let mut frame = gif::Frame::from_rgb_speed(width, height, image.pixels.as_flattened(), 10);
             frame.delay = centiseconds;
             encoder.write_frame(&frame).map_err(|e| e.to_string())?;
@@ -120,11 +119,10 @@ impl Image {
         Ok(bytes)
     }
 
-    /// Reads the first image of a PNG file with eight bits for red, green and blue, as
-    /// [`Image::to_png`] writes it.
+    /// Reads the first image of a PNG file with eight bits for red, green and blue, as [`Image::to_png`] writes it.
     ///
     /// # Errors
-    /// Anything else, in words.
+    /// The function fails for any other file.
     pub fn from_png(bytes: &[u8]) -> Result<Image, String> {
         let decoder = png::Decoder::new(std::io::Cursor::new(bytes));
         let mut reader = decoder.read_info().map_err(|e| e.to_string())?;
@@ -138,16 +136,13 @@ impl Image {
         Ok(Image { width: info.width as usize, height: info.height as usize, pixels: pixels.to_vec() })
     }
 
-    /// As the address of an image that is in the page itself: `data:image/png;base64,…`.
-    ///
-    /// # Errors
-    /// As [`Image::to_png`].
+    /// The image as a data address: `data:image/png;base64,…`.
     pub fn to_data_url(&self) -> Result<String, png::EncodingError> {
         Ok(data_url(&self.to_png()?))
     }
 }
 
-/// The bytes of a PNG file as an address.
+/// A PNG file as a data address.
 pub fn data_url(png: &[u8]) -> String {
     format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(png))
 }
@@ -170,7 +165,7 @@ mod tests {
         assert!(Image::filled(0, 0, [0; 3]).to_png().is_err());
     }
 
-    /// The chunks that make an animation, and the frames as a decoder sees them.
+    /// The file has the chunks of an animation, and a decoder finds every frame.
     #[test]
     fn an_animation_has_every_frame() {
         let images = [gradient(1), gradient(2), gradient(3)];

@@ -1,7 +1,7 @@
-//! Pictures of particles and of fields, as pixels; snapshots of a run, and films of them.
+//! Pictures of particles and of fields as pixels, and snapshots and films of a run.
 //!
-//! A picture is seen from infinitely far, so that lengths in it are lengths in the box: [`View`] says from
-//! where, [`projection::Projection`] where a point of the box comes to lie.
+//! The viewpoint is at infinity, so that lengths in a picture are lengths in the box. [`View`] is the direction of view;
+//! [`projection::Projection`] maps points of the box to pixels.
 
 mod animation;
 pub mod colour;

@@ -3,18 +3,16 @@ use super::colour::{Rgb, mix, of_species};
 use super::projection::{Projection, View};
 use psidpd_formats::Frame;
 
-/// How particles are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ParticleOptions {
-    /// From where.
     pub view: View,
-    /// Shows only particles in a slice of this thickness through the middle of the box, across the line of sight.
+    /// The thickness of a slice through the middle of the box, across the line of sight. Only particles in it are shown.
     pub slice: Option<f64>,
-    /// How far in front of the middle the slice is.
+    /// The distance of the slice in front of the middle of the box.
     pub offset: f64,
-    /// Radius of a particle, a length; without one, such that neighbours touch about.
+    /// The radius of a particle as a length; the default makes neighbours almost touch.
     pub radius: Option<f64>,
-    /// Most pixels in width and height; 0 for 720 by 640.
+    /// The largest width and height in pixels; 0 means 720 by 640.
     pub size: [usize; 2],
 }
 
@@ -23,8 +21,8 @@ impl ParticleOptions {
         if self.size == [0, 0] { [720, 640] } else { self.size }
     }
 
-    /// The radius for a frame: 0.4 of the mean spacing, not more than 0.3 lengths of the model, for in a
-    /// box that is mostly empty the mean spacing is not that of neighbours.
+    /// The radius for a frame is 0.4 of the mean spacing, at most 0.3 lengths of the model. In a box that is mostly
+    /// empty the mean spacing is larger than the distance of neighbours.
     fn radius(&self, frame: &Frame) -> f64 {
         self.radius.unwrap_or_else(|| {
             let share = frame.domain.volume(frame.dimensions) / frame.len().max(1) as f64;
@@ -39,17 +37,17 @@ const WHITE: Rgb = [255; 3];
 const EDGE: Rgb = [0x70, 0x70, 0x70];
 
 /// Draws particles as shaded balls, nearer ones before farther ones, with the edges of the box. The middle of
-/// the foremost ball has exactly the colour of its species; farther ones fade.
+/// the foremost ball has exactly the colour of its species; farther balls fade.
 pub fn draw_particles(frame: &Frame, options: &ParticleOptions) -> (Image, Projection) {
     let colours: Vec<Rgb> = frame.species.iter().map(|s| of_species(*s as usize)).collect();
     draw_coloured(frame, options, &colours)
 }
 
-/// The same with a colour for each particle.
+/// Draws particles with one colour for each particle.
 pub fn draw_coloured(frame: &Frame, options: &ParticleOptions, colours: &[Rgb]) -> (Image, Projection) {
     let view = if frame.dimensions == 2 { View::Z } else { options.view };
     let radius = options.radius(frame).max(1e-9);
-    // Along an axis the picture ends with the box; corners seen obliquely let particles stand out.
+    // Along an axis the picture ends with the box. In the oblique view particles at corners extend beyond the box.
     let margin = if view == View::Oblique { radius } else { 0.0 };
     let projection = Projection::fit(frame.domain, frame.dimensions, view, options.size(), margin);
     let size = projection.size().map(|s| s * FINER);
@@ -58,7 +56,7 @@ pub fn draw_coloured(frame: &Frame, options: &ParticleOptions, colours: &[Rgb]) 
         depth: vec![f64::NEG_INFINITY; size[0] * size[1]],
     };
     let fine = FINER as f64;
-    // Below a pixel a particle would come and go with its place.
+    // A particle smaller than a pixel would flicker as it moves.
     let pixels = (radius * projection.scale() * fine).max(0.75 * fine);
     let reach = pixels / fine / projection.scale();
     let fades = frame.dimensions == 3 && options.slice.is_none();
@@ -78,12 +76,12 @@ pub fn draw_coloured(frame: &Frame, options: &ParticleOptions, colours: &[Rgb]) 
 
 struct Canvas {
     image: Image,
-    /// How far towards who looks the surface in each pixel is.
+    /// The position of the surface in each pixel along the line of sight; larger is nearer to the viewer.
     depth: Vec<f64>,
 }
 
 impl Canvas {
-    /// A ball of `radius` pixels at `at`, whose middle is `toward`; its front is `reach` (a length) nearer.
+    /// Draws a ball of `radius` pixels at `at`. Its middle is at depth `toward`; its front is `reach` (a length) nearer.
     fn ball(&mut self, at: [f64; 2], radius: f64, toward: f64, reach: f64, colour: Rgb) {
         let range = |middle: f64, most: usize| {
             let low = (middle - radius).floor().max(0.0) as usize;
@@ -109,7 +107,7 @@ impl Canvas {
         }
     }
 
-    /// The edges of the box, hidden where particles are before them.
+    /// Draws the edges of the box, hidden behind particles.
     fn edges(&mut self, frame: &Frame, projection: &Projection) {
         let fine = FINER as f64;
         for c in 0..1usize << frame.dimensions {
@@ -123,7 +121,7 @@ impl Canvas {
                     let point: [f64; 3] = std::array::from_fn(|k| a[k] + t * (b[k] - a[k]));
                     let [x, y] = projection.place(point).0.map(|c| c * fine);
                     let toward = projection.toward(point);
-                    // Two fine pixels wide, so that it is one at the end.
+                    // The line is two fine pixels wide, so it is one pixel wide in the reduced image.
                     for (dx, dy) in [(0.0, 0.0), (-1.0, 0.0), (0.0, -1.0), (-1.0, -1.0)] {
                         let x = (x + dx).clamp(0.0, (self.image.width - 1) as f64) as usize;
                         let y = (y + dy).clamp(0.0, (self.image.height - 1) as f64) as usize;
@@ -137,7 +135,7 @@ impl Canvas {
     }
 }
 
-/// Light from the upper left: a highlight there, shade on the other side; unchanged in the middle.
+/// Light from the upper left: a highlight there, shade on the other side, the unchanged colour in the middle.
 fn shade(colour: Rgb, nx: f64, ny: f64, nz: f64) -> Rgb {
     let light = -0.5 * nx - 0.62 * ny;
     let rim = 0.45 * (1.0 - nz).powi(2);
@@ -168,7 +166,7 @@ mod tests {
         image.get(place[0] as usize, place[1] as usize).unwrap()
     }
 
-    /// Largest difference of a colour's parts.
+    /// The largest difference of two colours in red, green or blue.
     fn distance(a: Rgb, b: Rgb) -> u8 {
         (0..3).map(|k| a[k].abs_diff(b[k])).max().unwrap()
     }
@@ -184,7 +182,7 @@ mod tests {
             let found = at(&image, projection.place(*x).0);
             assert!(distance(found, of_species(species)) < 12, "{found:?}");
         }
-        // A radius away there is background, half of it away there is not.
+        // One radius from the middle is background; half a radius from the middle is not.
         let [across, down] = projection.place(x[0]).0;
         let radius = 0.3 * projection.scale();
         assert_eq!(at(&image, [across + 1.1 * radius, down]), WHITE);
@@ -197,7 +195,7 @@ mod tests {
     fn nearer_particles_hide_farther_ones_whatever_their_order() {
         let domain = PeriodicBox::orthogonal([0.0; 3], [4.0; 3], [true; 3]).unwrap();
         let names = names();
-        // Seen along y from its lower end: the first is before the second.
+        // In the view along y from its lower end, the first particle is before the second.
         let near = [2.0, 0.0, 2.0];
         let far = [2.1, 3.0, 2.0];
         for (x, species) in [([near, far], [1, 0]), ([far, near], [0, 1])] {
@@ -218,7 +216,7 @@ mod tests {
         let (image, projection) = draw_particles(&frame(&domain, 3, &names, &x, &[0, 1]), &options);
         assert!(distance(at(&image, projection.place(x[0]).0), of_species(0)) < 12);
         assert_eq!(at(&image, projection.place(x[1]).0), WHITE);
-        // The other one is 1.5 below the middle in y, and so in front of it.
+        // The second particle is 1.5 below the middle in y, and so in front of it.
         let other = ParticleOptions { offset: 1.5, ..options };
         let (image, projection) = draw_particles(&frame(&domain, 3, &names, &x, &[0, 1]), &other);
         assert!(distance(at(&image, projection.place(x[1]).0), of_species(1)) < 12);

@@ -1,21 +1,21 @@
 use psidpd_core::engine::PeriodicBox;
 
-/// From where a box is seen. Two-dimensional boxes are always seen along z.
+/// The direction of view. Two-dimensional boxes are always seen along z.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum View {
-    /// From the front, the right and above: all three directions show, z is up.
+    /// The view from the front, the right and above: all three directions show, z is up.
     #[default]
     Oblique,
-    /// Along x: y to the right, z up.
+    /// The view along x: y to the right, z up.
     X,
-    /// Along y: x to the right, z up.
+    /// The view along y: x to the right, z up.
     Y,
-    /// Along z: x to the right, y up.
+    /// The view along z: x to the right, y up.
     Z,
 }
 
 impl View {
-    /// To the right, up, and towards who looks: an orthonormal right-handed set.
+    /// Unit vectors to the right, up and towards the viewer: an orthonormal right-handed set.
     pub(super) fn axes(self) -> [[f64; 3]; 3] {
         match self {
             View::X => [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]],
@@ -30,13 +30,13 @@ impl View {
         }
     }
 
-    /// Where x, y and z point to in the picture: to the right, and up.
+    /// The components of x, y and z in the picture, to the right and up.
     pub fn directions(self) -> [[f64; 2]; 3] {
         let [right, up, _] = self.axes();
         [0, 1, 2].map(|k| [right[k], up[k]])
     }
 
-    /// The names of the directions to the right and up; none when oblique.
+    /// The names of the directions to the right and up; none in the oblique view.
     pub fn names(self) -> Option<[&'static str; 2]> {
         match self {
             View::Oblique => None,
@@ -47,17 +47,17 @@ impl View {
     }
 }
 
-/// How points of a box become pixels.
+/// The mapping from points of a box to pixels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Projection {
     axes: [[f64; 3]; 3],
-    /// Left and lower end of the picture, in lengths along the first two axes.
+    /// The left and lower end of the picture, as lengths along the first two axes.
     low: [f64; 2],
-    /// Pixels in a unit of length.
+    /// The number of pixels in a unit of length.
     scale: f64,
     width: usize,
     height: usize,
-    /// Range of the box along the third axis, from back to front.
+    /// The range of the box along the third axis, from back to front.
     depth: [f64; 2],
 }
 
@@ -86,18 +86,18 @@ impl Projection {
         Projection { axes, low, scale, width: pixels[0], height: pixels[1], depth: range[2] }
     }
 
-    /// Pixels in a row, and rows.
+    /// The number of pixels in a row, and the number of rows.
     pub fn size(&self) -> [usize; 2] {
         [self.width, self.height]
     }
 
-    /// Pixels in a unit of length.
+    /// The number of pixels in a unit of length.
     pub fn scale(&self) -> f64 {
         self.scale
     }
 
-    /// Where a point comes to lie, in pixels from the upper left corner, and how near it is: from 0 at the
-    /// back of the box to 1 at its front.
+    /// The position of a point in pixels from the upper left corner, and its depth: 0 at the back of the box, 1 at its
+    /// front.
     pub fn place(&self, x: [f64; 3]) -> ([f64; 2], f64) {
         let [right, up, toward] = self.axes.map(|axis| dot(axis, x));
         let span = self.depth[1] - self.depth[0];
@@ -106,7 +106,7 @@ impl Projection {
         ([across, self.height as f64 - (up - self.low[1]) * self.scale], near)
     }
 
-    /// The middle plane's point at a place in pixels.
+    /// The point of the middle plane at a position in pixels.
     pub(super) fn back(&self, at: [f64; 2]) -> [f64; 3] {
         let right = self.low[0] + at[0] / self.scale;
         let up = self.low[1] + (self.height as f64 - at[1]) / self.scale;
@@ -114,17 +114,17 @@ impl Projection {
         std::array::from_fn(|k| right * self.axes[0][k] + up * self.axes[1][k] + toward * self.axes[2][k])
     }
 
-    /// How far along the line of sight the middle of the box is.
+    /// The coordinate of the middle of the box along the line of sight.
     pub(super) fn middle(&self) -> f64 {
         0.5 * (self.depth[0] + self.depth[1])
     }
 
-    /// How far along the line of sight a point is.
+    /// The coordinate of a point along the line of sight.
     pub(super) fn toward(&self, x: [f64; 3]) -> f64 {
         dot(self.axes[2], x)
     }
 
-    /// The ends of the shown range along the horizontal and the vertical.
+    /// The ends of the visible range along the horizontal and the vertical.
     pub fn ranges(&self) -> [[f64; 2]; 2] {
         let span = [self.width as f64 / self.scale, self.height as f64 / self.scale];
         [0, 1].map(|k| [self.low[k], self.low[k] + span[k]])
@@ -135,7 +135,7 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// The corners of a box, four in two dimensions.
+/// The corners of a box; in two dimensions four.
 pub(super) fn corners(domain: &PeriodicBox, dimensions: usize) -> impl Iterator<Item = [f64; 3]> + '_ {
     (0..1usize << dimensions).map(|c| domain.point([0, 1, 2].map(|k| ((c >> k) & 1) as f64)))
 }

@@ -3,19 +3,15 @@ use psidpd_formats::files::WriteError;
 use psidpd_formats::{FormatError, Frame};
 use std::path::{Path, PathBuf};
 
-/// The folder of snapshots in the folder of a run.
 pub const SNAPSHOTS: &str = "snapshots";
 
-/// The name of the snapshot of a step; names sort as steps do.
+/// The name of the snapshot of a step. The order of the names is the order of the steps.
 pub fn snapshot_name(step: u64) -> String {
     format!("particles-{step:010}.png")
 }
 
-/// Writes a picture of the particles into the folder of snapshots of a run, whole or not at all, and says
-/// where. The folder is made if need be.
-///
-/// # Errors
-/// The folder or the file cannot be written.
+/// Writes a picture of the particles into the folder of snapshots of a run, whole or not at all, and returns its path.
+/// The folder is created if it does not exist.
 pub fn write_snapshot(folder: &Path, frame: &Frame) -> Result<PathBuf, FormatError> {
     let snapshots = folder.join(SNAPSHOTS);
     std::fs::create_dir_all(&snapshots).map_err(|cause| WriteError { path: snapshots.clone(), cause })?;
@@ -23,7 +19,7 @@ pub fn write_snapshot(folder: &Path, frame: &Frame) -> Result<PathBuf, FormatErr
     let (image, _) = draw_particles(frame, &ParticleOptions::default());
     let png =
         image.to_png().map_err(|e| FormatError::Picture { path: path.clone(), message: e.to_string() })?;
-    // Always by the same other name first: a run that is killed and taken up again leaves no trace of it.
+    // A killed run leaves at most this file. The resumed run makes the same step and replaces it.
     let new = path.with_extension("png.new");
     std::fs::write(&new, &png)
         .and_then(|()| std::fs::rename(&new, &path))
@@ -32,9 +28,6 @@ pub fn write_snapshot(folder: &Path, frame: &Frame) -> Result<PathBuf, FormatErr
 }
 
 /// Removes the snapshots of an earlier run from the folder of a run.
-///
-/// # Errors
-/// One that cannot be removed.
 pub fn remove_snapshots(folder: &Path) -> Result<(), FormatError> {
     for path in snapshots(folder) {
         std::fs::remove_file(&path).map_err(|cause| WriteError { path: path.clone(), cause })?;

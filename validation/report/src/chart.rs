@@ -1,4 +1,4 @@
-//! What plots and pictures share: a drawing as SVG, and a chart with its axes in it.
+//! Drawing for plots and pictures: an SVG document, and a chart with its axes.
 
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -8,11 +8,11 @@ use super::ReportError;
 use super::scale::Scale;
 use super::text::{escape, fit, one_line};
 
-/// Drawing units per pixel: plotters has whole coordinates only.
+/// Drawing units per pixel. Plotters supports only whole coordinates.
 const UNITS: f64 = 10.0;
-/// Room for the numbers and the name of an axis on the left.
+/// The room for the numbers and the name of an axis on the left, in pixels.
 pub(super) const LEFT: f64 = 76.0;
-/// The same below.
+/// The room for the numbers and the name of an axis at the bottom, in pixels.
 pub(super) const BELOW: f64 = 52.0;
 pub(super) const SMALL: f64 = 12.0;
 const MEDIUM: f64 = 13.0;
@@ -25,24 +25,22 @@ pub(super) type Fallible = Result<(), Box<dyn std::error::Error>>;
 pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 pub(super) type Chart<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<Scale, Scale>>;
 
-/// A length in drawing units.
+/// Converts pixels to drawing units.
 pub(super) fn px(length: f64) -> i32 {
     (length * UNITS).round() as i32
 }
 
-/// A line of some width.
 pub(super) fn pen(colour: impl Color, width: f64) -> ShapeStyle {
     colour.stroke_width(px(width) as u32)
 }
 
-/// Text of some size.
 pub(super) fn font(size: f64, colour: RGBColor) -> TextStyle<'static> {
     // The backend divides sizes by 1.24. It needs no fonts: the viewer's sans-serif font shows the text.
     ("sans-serif", size * UNITS * 1.24).into_font().color(&colour)
 }
 
-/// What `draw` draws on an area of a size in pixels: an SVG document without prolog, fit for embedding. `below` is
-/// put under it.
+/// Draws on an area with a size in pixels. The result is an SVG document without prolog, fit for embedding. `below` is
+/// appended to the drawing.
 pub(super) fn svg(
     title: &str,
     [width, height]: [f64; 2],
@@ -61,8 +59,7 @@ pub(super) fn svg(
             .and_then(|()| Ok(area.present()?))
             .map_err(|e| ReportError::Plot(e.to_string()))?;
     }
-    // Replace the root element: its size is in pixels, whatever the drawing units, and it has a name for
-    // screen readers.
+    // Replace the root element: its size is in pixels instead of drawing units, and it has a name for screen readers.
     let body = drawn.find('>').and_then(|end| drawn.get(end + 1..));
     let body = body.ok_or_else(|| ReportError::Plot("the drawing has no root element".into()))?;
     Ok(format!(
@@ -75,7 +72,7 @@ pub(super) fn svg(
     ))
 }
 
-/// A chart that leaves `top` and `right` pixels of the area, with axes, and a grid if there is to be one.
+/// A chart with axes and an optional grid, which leaves `top` and `right` pixels of the area free.
 pub(super) fn chart<'a>(
     area: &Area<'a>,
     [top, right]: [f64; 2],
@@ -94,7 +91,7 @@ pub(super) fn chart<'a>(
     Ok(chart)
 }
 
-/// Numbers, ticks and names around a chart.
+/// Draws numbers, ticks and names around a chart.
 pub(super) fn axes(chart: &mut Chart, names: [&str; 2], scales: [&Scale; 2], grid: bool) -> Fallible {
     let (width, height) = chart.plotting_area().dim_in_pixel();
     let labels = |length: u32, each: i32| (length as usize / px(1.0) as usize / each as usize).clamp(3, 9);
@@ -117,7 +114,7 @@ pub(super) fn axes(chart: &mut Chart, names: [&str; 2], scales: [&Scale; 2], gri
     Ok(())
 }
 
-/// Names of what was drawn, in a corner.
+/// Draws a legend in a corner.
 pub(super) fn legend(chart: &mut Chart, position: SeriesLabelPosition) -> Fallible {
     chart
         .configure_series_labels()

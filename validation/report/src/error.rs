@@ -1,8 +1,6 @@
-//! The error type of this module.
-
 use psidpd_formats::files::WriteError;
 
-/// What can go wrong while making or writing a report.
+/// An error while a report is made or written.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
     #[error("cannot draw the plot: {0}")]

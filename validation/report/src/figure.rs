@@ -1,4 +1,4 @@
-//! Pictures made of pixels, with axes, legends and colour bars around them, as SVG.
+//! Pictures made of pixels, with axes, legends and colour bars, as SVG.
 
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -13,40 +13,39 @@ use psidpd_pictures::{
     Field, FieldOptions, Image, ParticleOptions, View, draw_coloured, draw_particles, paint_field,
 };
 
-/// A picture in an SVG document that needs nothing else.
+/// A picture in an SVG document without external resources.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
-    /// Title above the picture; may be empty.
+    /// The title above the picture; may be empty.
     pub title: String,
-    /// The picture.
     pub image: Image,
-    /// What surrounds it on the left and below.
+    /// The decoration on the left and below the picture.
     pub border: Border,
     /// Names and colours below the picture.
     pub legend: Vec<(String, Rgb)>,
-    /// Lowest value, highest value and label of a colour bar on the right.
+    /// The lowest value, the highest value and the label of a colour bar on the right.
     pub bar: Option<(f64, f64, String)>,
 }
 
-/// What tells directions and lengths.
+/// The decoration that shows directions and lengths.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Border {
     /// Axes with the names and the ends of the two directions.
     Axes([String; 2], [[f64; 2]; 2]),
-    /// Three small arrows.
+    /// Three small arrows for x, y and z.
     Arrows(View),
 }
 
-/// Above the picture.
+/// The room above the picture, in pixels.
 const TOP: f64 = 36.0;
-/// Width of a colour bar with its numbers and label.
+/// The width of a colour bar with its numbers and label, in pixels.
 const BAR: f64 = 90.0;
-/// Most room for a name of the legend.
+/// The largest room for a name of the legend, in pixels.
 const NAMES: f64 = 150.0;
 const CENTRE: Pos = Pos { h_pos: HPos::Center, v_pos: VPos::Center };
 
 impl Figure {
-    /// The particles of a frame.
+    /// Draws the particles of a frame.
     pub fn particles(title: &str, frame: &Frame, options: &ParticleOptions) -> Figure {
         let (image, projection) = draw_particles(frame, options);
         let view = if frame.dimensions == 2 { View::Z } else { options.view };
@@ -63,7 +62,7 @@ impl Figure {
         Figure { title: title.into(), image, border, legend: legend.collect(), bar: None }
     }
 
-    /// The particles of a frame in the colours of values between two ends.
+    /// Draws the particles of a frame in the colours of values between two ends.
     pub fn valued(
         title: &str,
         label: &str,
@@ -79,7 +78,7 @@ impl Figure {
         Figure { image, legend: Vec::new(), bar: Some((low, low + span, label.into())), ..plain }
     }
 
-    /// A weighted local density of a frame, colours from 0 to its highest value in the picture.
+    /// Draws a weighted local density of a frame, with colours from 0 to its highest value in the picture.
     pub fn field(title: &str, label: &str, frame: &Frame, options: &FieldOptions) -> Figure {
         let field = Field::of(frame, options);
         let view = match (frame.dimensions, options.view) {
@@ -98,10 +97,10 @@ impl Figure {
         }
     }
 
-    /// The document, without prolog, fit for embedding.
+    /// Makes the SVG document, without prolog, fit for embedding.
     ///
     /// # Errors
-    /// A picture without pixels.
+    /// The function fails for a picture without pixels.
     pub fn render(&self) -> Result<String, ReportError> {
         let png = self.image.to_data_url().map_err(|e| ReportError::Plot(e.to_string()))?;
         let (w, h) = (self.image.width as f64, self.image.height as f64);
@@ -138,7 +137,7 @@ impl Figure {
     }
 }
 
-/// A figure of values on a regular grid, row after row, the lowest first; `size` is columns and rows.
+/// A figure of values on a regular grid, row after row, the lowest row first; `size` is columns and rows.
 pub(super) fn field_of_values(
     title: &str,
     label: &str,
@@ -152,7 +151,7 @@ pub(super) fn field_of_values(
         .filter(|v| v.is_finite())
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
     let (low, high) = if high > low { (low, high) } else { (0.0, 1.0) };
-    // Rows come with the lowest first, and are to be seen with a side of about 500 pixels.
+    // The rows are given with the lowest first. The longer side gets about 500 pixels.
     let factor = (500 / size[0].max(size[1]).max(1)).max(1);
     let mut pixels = Vec::new();
     for y in 0..size[1] * factor {
@@ -174,7 +173,7 @@ fn rgb([r, g, b]: Rgb) -> RGBColor {
     RGBColor(r, g, b)
 }
 
-/// The colours from a lowest value to a highest, with numbers on the right.
+/// Draws the colours from a lowest value to a highest, with numbers on the right.
 fn bar(area: &Area, low: f64, high: f64, label: &str) -> Fallible {
     let (values, across) = (Scale::exact(low, high), Scale::exact(0.0, 1.0));
     let mut chart: Chart = ChartBuilder::on(area)
@@ -183,7 +182,7 @@ fn bar(area: &Area, low: f64, high: f64, label: &str) -> Fallible {
         .right_y_label_area_size(px(BAR - 16.0))
         .build_cartesian_2d(across.clone(), values.clone())?;
     let ends = values.ends();
-    // Each band goes from its own lower end to the top of the bar: the next one covers the rest, and no seams show.
+    // Each band goes from its own lower end to the top of the bar. The next band covers the rest, so no seams show.
     chart.draw_series((0..128).map(|k| {
         let from = f64::from(k) / 128.0;
         let colour = rgb(colour::of_value(from + 0.5 / 128.0)).filled();
@@ -192,7 +191,7 @@ fn bar(area: &Area, low: f64, high: f64, label: &str) -> Fallible {
     axes(&mut chart, ["", label], [&across, &values], false)
 }
 
-/// x, y and z as arrows from a point.
+/// Draws x, y and z as arrows from a point.
 fn arrows(area: &Area, view: View, [x, y]: [f64; 2]) -> Fallible {
     for ([right, up], name) in view.directions().into_iter().zip(["x", "y", "z"]) {
         let along = |length: f64| (px(x + length * right), px(y - length * up));
@@ -236,7 +235,7 @@ mod tests {
             assert!(found.iter().any(|t| t == text), "{text} is not in {found:?}");
         }
         assert!(svg.contains("href=\"data:image/png;base64,") && svg.to_lowercase().contains("#0072b2"));
-        // The picture in the document is the picture drawn.
+        // The embedded picture is the picture that was drawn.
         let document = roxmltree::Document::parse(&svg).unwrap();
         let image = document.descendants().find(|n| n.tag_name().name() == "image").unwrap();
         assert_eq!(image.attribute("width"), Some(px(oblique.image.width as f64).to_string().as_str()));

@@ -7,52 +7,46 @@ use super::text::escape;
 
 const STYLE: &str = include_str!("page.css");
 
-/// A report: one page without scripts or external resources, and at the same
-/// time well-formed XML.
+/// A report on one page without scripts or external resources. The page is also well-formed XML.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Report {
-    /// Title of the page.
     pub title: String,
-    /// Line below the title; may be empty.
+    /// The line below the title; may be empty.
     pub subtitle: String,
-    /// Names and values shown at the top: versions, machine, seeds.
+    /// Names and values at the top of the page: versions, machine, seeds.
     pub facts: Vec<(String, String)>,
-    /// The sections in order.
     pub sections: Vec<Section>,
-    /// Number of checks that passed.
+    /// The number of passed checks.
     pub passed: usize,
-    /// Number of checks that failed.
+    /// The number of failed checks.
     pub failed: usize,
 }
 
-/// A heading and what belongs to it.
+/// A heading with its content.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Section {
-    /// The heading.
     pub heading: String,
-    /// The content in order.
     pub items: Vec<Item>,
 }
 
-/// A piece of a section.
+/// One item of a section.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Item {
     /// Text; blank lines separate paragraphs.
     Prose(String),
     /// A table; cells that read "pass" or "fail" are coloured.
     Table(Table),
-    /// A figure.
     Figure {
-        /// The picture, from [`Plot::render`](super::Plot::render). It is put
-        /// into the page as it is, so it must come from a trusted source.
+        /// The picture from [`Plot::render`](super::Plot::render). It is inserted unescaped, so it must come from a trusted
+        /// source.
         svg: String,
-        /// Text below the picture; may be empty.
+        /// The text below the picture; may be empty.
         caption: String,
     },
 }
 
 impl Report {
-    /// The page. All text is escaped.
+    /// Makes the page. All text is escaped.
     pub fn render(&self) -> String {
         let title = escape(&self.title);
         let subtitle = some(&self.subtitle, |text| format!("<p class=\"subtitle\">{text}</p>\n"));
@@ -88,12 +82,12 @@ impl Report {
     }
 }
 
-/// `show` of each part, each on a line of its own.
+/// Writes `show` of each part on its own line.
 fn lines<T, S: Display>(parts: impl IntoIterator<Item = T>, show: impl Fn(T) -> S) -> String {
     parts.into_iter().map(|part| format!("{}\n", show(part))).collect()
 }
 
-/// `show` of the escaped text; nothing for no text.
+/// Writes `show` of the escaped text; empty text gives nothing.
 fn some(text: &str, show: impl Fn(String) -> String) -> String {
     if text.is_empty() { String::new() } else { show(escape(text)) }
 }
@@ -113,7 +107,7 @@ fn render_item(item: &Item) -> String {
     }
 }
 
-/// Rows are filled up to the full number of columns.
+/// Short rows are filled up to the full number of columns.
 fn render_table(table: &Table) -> String {
     let right: Vec<bool> = (0..table.column_count()).map(|c| table.is_right(c)).collect();
     let cells = |tag: &str, row: &[String]| -> String {

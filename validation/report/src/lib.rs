@@ -1,9 +1,7 @@
-//! Reports: checks and their results, tables, plots, a self-contained HTML
-//! page, and progress bars.
+//! Reports: checks and their results, tables, plots, a self-contained HTML page, and progress bars.
 //!
-//! Nothing here panics on any input: what cannot be shown (a NaN, a control
-//! character) is left out or replaced, and what can fail returns a
-//! [`ReportError`].
+//! No function panics on any input. Values that cannot be shown (a NaN, a control character) are left out or replaced, and
+//! failures return a [`ReportError`].
 
 mod chart;
 mod error;

@@ -9,7 +9,7 @@ use super::scale::Scale;
 use super::text::{fit, width};
 use psidpd_pictures::colour;
 
-/// How a series is drawn.
+/// The style of a series.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Style {
     /// A line; errors appear as a band.
@@ -26,32 +26,29 @@ pub enum Style {
 /// One set of data.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Series {
-    /// Name in the legend; an empty one is left out.
+    /// The name in the legend. A series without a name is not in the legend.
     pub name: String,
-    /// The data. Points that are not finite, or not positive on a logarithmic
-    /// axis, are skipped and interrupt a line.
+    /// Points that are not finite, and points that are not positive on a logarithmic axis, are skipped and interrupt a line.
     pub points: Vec<(f64, f64)>,
-    /// Errors of the ordinates, one by one; missing, negative and non-finite
-    /// ones are not drawn.
+    /// The errors of the ordinates. Missing, negative and non-finite errors are not drawn.
     pub errors: Option<Vec<f64>>,
-    /// How it is drawn.
     pub style: Style,
 }
 
 /// A plot with linear or logarithmic axes.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Plot {
-    /// Title above the plot; may be empty.
+    /// The title above the plot; may be empty.
     pub title: String,
-    /// Label of the horizontal axis; may be empty.
+    /// The label of the horizontal axis; may be empty.
     pub x_label: String,
-    /// Label of the vertical axis; may be empty.
+    /// The label of the vertical axis; may be empty.
     pub y_label: String,
-    /// The data, in order of drawing.
+    /// Series are drawn in this order.
     pub series: Vec<Series>,
-    /// Whether the horizontal axis is logarithmic.
+    /// True if the horizontal axis is logarithmic.
     pub log_x: bool,
-    /// Whether the vertical axis is logarithmic.
+    /// True if the vertical axis is logarithmic.
     pub log_y: bool,
     /// Horizontal reference lines with labels.
     pub levels: Vec<(f64, String)>,
@@ -61,10 +58,9 @@ pub struct Plot {
 
 const WIDTH: f64 = 720.0;
 const HEIGHT: f64 = 420.0;
-/// Most room for a name.
+/// The largest room for a name, in pixels.
 const NAME: f64 = 260.0;
 
-/// The colour of the k-th series.
 fn colour_of(k: usize) -> RGBColor {
     let [r, g, b] = colour::of_species(k);
     RGBColor(r, g, b)
@@ -78,7 +74,7 @@ impl Series {
     }
 }
 
-/// A point that can be shown, and the lower and upper end of its error.
+/// A point that can be shown, and the lower and upper end of its error bar.
 #[derive(Clone, Copy)]
 struct Shown {
     at: (f64, f64),
@@ -90,14 +86,14 @@ impl Plot {
     /// Draws the plot as an SVG document without prolog, fit for embedding.
     ///
     /// # Errors
-    /// Plotters cannot draw it.
+    /// The function fails if plotters cannot draw the plot.
     pub fn render(&self) -> Result<String, ReportError> {
         let [x, y] = &self.scales();
         svg(&self.title, [WIDTH, HEIGHT], "", |area| {
             let top = if self.marks.is_empty() { 36.0 } else { 52.0 };
             let mut chart = chart(area, [top, 20.0], [&self.x_label, &self.y_label], [x, y], true)?;
             let runs: Vec<_> = self.series.iter().map(|s| runs(s, x, y)).collect();
-            // Errors are below all data.
+            // Errors are drawn behind all data.
             for (k, (series, runs)) in self.series.iter().zip(&runs).enumerate() {
                 draw_errors(&mut chart, k, series, runs)?;
             }
@@ -113,7 +109,7 @@ impl Plot {
         })
     }
 
-    /// Axes with room for all that is shown. A point that cannot be shown must not widen the other axis.
+    /// Axes with room for all visible points. A point that cannot be shown must not widen the other axis.
     fn scales(&self) -> [Scale; 2] {
         let finite = |v: f64, log: bool| v.is_finite() && (!log || v > 0.0);
         let mut xs: Vec<f64> = self.marks.iter().map(|mark| mark.0).collect();
@@ -130,7 +126,7 @@ impl Plot {
         [Scale::around(xs.into_iter(), self.log_x), Scale::around(ys.into_iter(), self.log_y)]
     }
 
-    /// Horizontal lines named in the legend; vertical ones with names above them, as far as there is room.
+    /// Draws horizontal lines with names in the legend, and vertical lines with names above them if there is room.
     fn draw_references(&self, chart: &mut Chart, x: &Scale, y: &Scale) -> Fallible {
         let line = pen(GREY, 1.2);
         let dotted = |ends: [(f64, f64); 2]| DashedPathElement::new(ends, px(2.0), px(3.0), line);
@@ -177,7 +173,7 @@ fn runs(series: &Series, x: &Scale, y: &Scale) -> Vec<Vec<Shown>> {
         .collect()
 }
 
-/// A band along a line, bars at single points.
+/// Draws a band along a line, and bars at single points.
 fn draw_errors(chart: &mut Chart, k: usize, series: &Series, runs: &[Vec<Shown>]) -> Fallible {
     let colour = colour_of(k);
     for run in runs {
@@ -221,7 +217,7 @@ fn draw_series(chart: &mut Chart, k: usize, series: &Series, runs: &[Vec<Shown>]
     Ok(())
 }
 
-/// A line, dashed or not.
+/// A solid or dashed line.
 fn stroke<'a, At: Clone + 'static>(
     path: Vec<At>,
     style: Style,
@@ -233,7 +229,7 @@ fn stroke<'a, At: Clone + 'static>(
     }
 }
 
-/// A marker whose shape, too, tells series apart.
+/// A marker. Its shape depends on `k` too, so that series differ in more than colour.
 fn marker<'a, At: Clone + 'static>(k: usize, at: At) -> DynElement<'static, SVGBackend<'a>, At> {
     let fill = colour_of(k).filled();
     match k % 4 {
@@ -244,7 +240,7 @@ fn marker<'a, At: Clone + 'static>(k: usize, at: At) -> DynElement<'static, SVGB
     }
 }
 
-/// The corner where a legend covers the least of the data, lines between points included.
+/// The corner in which a legend covers the least of the data, including lines between points.
 fn corner(runs: &[Vec<Vec<Shown>>], x: &Scale, y: &Scale) -> SeriesLabelPosition {
     use SeriesLabelPosition::{LowerLeft, LowerRight, UpperLeft, UpperRight};
     let mut corners = [(0, UpperRight), (0, UpperLeft), (0, LowerRight), (0, LowerLeft)];

@@ -1,5 +1,3 @@
-//! Progress bars on the terminal.
-
 use std::borrow::Cow;
 use std::io::{IsTerminal, stderr};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -13,27 +11,26 @@ use super::text::one_line;
 
 const BAR: &str = "{prefix:24!} {bar:32.cyan/dim} {percent:>3}% {human_pos}/{human_len} \
                    {elapsed_precise:.dim} {eta:.dim} left";
-// Fits eighty columns; the bar gets what is left.
+// The line fits eighty columns; the bar gets the rest.
 const STEPS: &str =
     "{prefix:14!} {percent:>3}% {human_pos}/{human_len} {rate}, {eta} left {wide_bar:.cyan/dim}";
 const SPINNER: &str = "{prefix} {spinner:.cyan} {elapsed_precise:.dim}";
 
-/// A group of bars on standard error; silent if that is not a terminal.
+/// A group of bars on standard error. It prints nothing if standard error is not a terminal.
 #[derive(Debug, Clone)]
 pub struct Progress {
     bars: MultiProgress,
     visible: bool,
 }
 
-/// One bar or spinner of a [`Progress`]. Clones share the same bar, and may be
-/// sent to other threads. It disappears when finished or when the last clone
-/// is dropped.
+/// One bar or spinner of a [`Progress`]. Clones share the same bar, and may be sent to other threads. The bar disappears
+/// when it is finished and when the last clone is dropped.
 #[derive(Debug, Clone)]
 pub struct Bar {
     inner: ProgressBar,
 }
 
-/// How far work as a whole is, of which a line is printed every minute where no bar can be drawn.
+/// The progress of the whole work. Without a terminal it prints a line every minute instead of a bar.
 #[derive(Debug)]
 pub struct Overall {
     bar: Bar,
@@ -41,12 +38,12 @@ pub struct Overall {
     total: u64,
     made: AtomicU64,
     start: Instant,
-    /// Minutes that were told; none are where there is a bar.
+    /// The number of minutes at the last printed line; `None` if the bar is visible.
     told: Option<AtomicU64>,
 }
 
 impl Overall {
-    /// Counts `n` more.
+    /// Adds `n` to the count.
     pub fn advance(&self, n: u64) {
         self.bar.advance(n);
         let made = n + self.made.fetch_add(n, Ordering::Relaxed);
@@ -67,7 +64,7 @@ fn so_far(name: &str, made: u64, total: u64, elapsed: Duration) -> String {
 }
 
 impl Progress {
-    /// A new group, drawn only if standard error is a terminal.
+    /// A new group, visible only if standard error is a terminal.
     pub fn new() -> Self {
         let visible = stderr().is_terminal();
         let target = if visible { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
@@ -80,13 +77,13 @@ impl Progress {
         self.add(ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden()), name, style)
     }
 
-    /// Adds a bar for a run of `steps` steps of `particles` particles that has made `made` of them. It
-    /// tells the speed too: steps per second, and nanoseconds for each step of each particle.
+    /// Adds a bar for a run of `steps` steps of `particles` particles that has already made `made` of them. The bar also
+    /// shows the speed: steps per second, and nanoseconds for each step of each particle.
     pub fn steps(&self, name: &str, steps: u64, made: u64, particles: usize) -> Bar {
         let style = style(STEPS).progress_chars("━╸─").with_key(
             "rate",
             move |state: &ProgressState, to: &mut dyn std::fmt::Write| {
-                // An error in drawing a bar must not stop the work.
+                // An error while drawing a bar must not stop the work.
                 let _ = to.write_str(&rate(state.per_sec(), particles));
             },
         );
@@ -99,7 +96,7 @@ impl Progress {
         bar
     }
 
-    /// Adds a bar for work as a whole, of `total` parts.
+    /// Adds a bar for the whole work of `total` parts.
     pub fn overall(&self, name: &str, total: u64) -> Overall {
         Overall {
             bar: self.bar(name, total),
@@ -118,7 +115,7 @@ impl Progress {
         self.add(bar, name, style)
     }
 
-    /// Prints a line above the bars; silent if standard error is no terminal.
+    /// Prints a line above the bars. It prints nothing if standard error is not a terminal.
     pub fn note(&self, line: &str) {
         if self.visible {
             // A closed terminal must not stop the work.
@@ -126,7 +123,7 @@ impl Progress {
         }
     }
 
-    /// Prints a line above the bars, or by itself where there are none: for work that takes minutes.
+    /// Prints a line above the bars, or without bars by itself. It is meant for work that takes minutes.
     pub fn tell(&self, line: &str) {
         if self.visible {
             self.note(line);
@@ -142,7 +139,7 @@ impl Progress {
             .with_prefix(Cow::Owned(one_line(name)));
         let inner = self.bars.add(bar);
         if self.visible {
-            // Keeps the elapsed time moving through long steps.
+            // The elapsed time keeps moving through long steps.
             inner.enable_steady_tick(Duration::from_millis(120));
         }
         Bar { inner }
@@ -156,7 +153,7 @@ impl Default for Progress {
 }
 
 impl Bar {
-    /// Counts `n` more.
+    /// Adds `n` to the count.
     pub fn advance(&self, n: u64) {
         self.inner.inc(n);
     }
@@ -223,7 +220,7 @@ mod tests {
         assert_eq!((rate(0.0, 10), rate(f64::NAN, 0)), ("-".into(), "-".into()));
     }
 
-    /// A run that goes on from far ahead must not count what others made as its own speed.
+    /// A resumed run must not count the steps of earlier sessions for its speed.
     #[test]
     fn bars_start_where_a_run_does() {
         let bar = Progress::new().steps("run", 2_000_000, 1_000_000, 10);

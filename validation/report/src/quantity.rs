@@ -1,7 +1,7 @@
-//! Numbers with their errors, as text.
+//! Numbers with their errors as text.
 
-/// `7.450 ± 0.042`: the error with two digits, the value to the same place; with a power of ten outside
-/// 10⁻³ … 10⁶. Without an error (none, or no positive number) six digits.
+/// Formats as `7.450 ± 0.042`: the error has two digits, the value has the same decimals. Values outside 10⁻³ … 10⁶ get a
+/// power of ten. Without an error (none, or not a positive number) the value has six digits.
 pub fn with_error(value: f64, error: Option<f64>) -> String {
     if !value.is_finite() {
         return "—".into();
@@ -13,7 +13,7 @@ pub fn with_error(value: f64, error: Option<f64>) -> String {
     let (scale, power) = if (-3..6).contains(&top) { (1.0, None) } else { (10f64.powi(top), Some(top)) };
     let (value, error) = (value / scale, error / scale);
     let decimals = (1.0 - error.log10().floor()).clamp(0.0, 15.0) as usize;
-    // Rounding up, 0.0996 is 0.10: one digit less.
+    // The number 0.0996 is rounded up to 0.10, which has one digit less.
     let rounded: f64 = format!("{error:.decimals$}").parse().unwrap_or(error);
     let decimals = (1.0 - rounded.max(error).log10().floor()).clamp(0.0, 15.0) as usize;
     let text = format!("{} ± {error:.decimals$}", minus(format!("{value:.decimals$}")));
@@ -23,7 +23,7 @@ pub fn with_error(value: f64, error: Option<f64>) -> String {
     }
 }
 
-/// A number with so many decimals, or with an exponent where these would hide it: 0.250000, 1e-300.
+/// A number with `places` decimals, or with an exponent if the decimals would hide it: 0.250000, 1e-300.
 pub fn decimal(x: f64, places: usize) -> String {
     let smallest = 0.5 * 10f64.powi(-(places as i32));
     if x != 0.0 && x.is_finite() && !(smallest..1e15).contains(&x.abs()) {
@@ -33,7 +33,7 @@ pub fn decimal(x: f64, places: usize) -> String {
     }
 }
 
-/// A number as short as it can be said, with an exponent where it is very great or very small: 0.25, 1e-300.
+/// The shortest form of a number, with an exponent if it is very large or very small: 0.25, 1e-300.
 pub fn number(x: f64) -> String {
     let text = format!("{x:?}");
     if text.contains('e') { text } else { x.to_string() }

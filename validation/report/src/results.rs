@@ -7,35 +7,33 @@ use serde_json::Value;
 
 use super::ReportError;
 
-/// One check: a number held against a limit.
+/// One check: the comparison of a number with a limit.
 ///
 /// JSON has no NaN or infinity: a non-finite float is written as `null`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Check {
-    /// Short name, unique within the results.
+    /// The short name, unique within the results.
     pub id: String,
-    /// Heading under which the check is reported.
+    /// The heading under which the check is reported.
     pub section: String,
-    /// What is checked, in words.
     pub description: String,
-    /// What was found.
+    /// The measured value.
     pub value: f64,
-    /// Standard error of `value`, if it has one.
+    /// The standard error of `value`, if it has one.
     pub error: Option<f64>,
-    /// What `value` should be, if that is known.
+    /// The expected `value`, if it is known.
     pub expected: Option<f64>,
     /// The bound on `value`.
     pub limit: f64,
-    /// Whether it is the least that passes; else it is the most, in size.
+    /// True if `limit` is a lower bound on `value`; else it is an upper bound on the magnitude.
     pub at_least: bool,
-    /// The verdict.
     pub passed: bool,
-    /// Anything the reader should know.
+    /// Remarks for the reader.
     pub note: String,
 }
 
 impl Check {
-    /// Passes if `|value| <= limit`. A non-finite value or limit fails.
+    /// The check passes if `|value| <= limit`. A non-finite value or limit fails.
     pub fn at_most(
         id: impl Into<String>,
         section: impl Into<String>,
@@ -47,8 +45,7 @@ impl Check {
         Self::judged(id.into(), section.into(), description.into(), value, limit, passed)
     }
 
-    /// Passes if `value >= limit`, signs included. A non-finite value or limit
-    /// fails.
+    /// The check passes if `value >= limit`, signs included. A non-finite value or limit fails.
     pub fn at_least(
         id: impl Into<String>,
         section: impl Into<String>,
@@ -61,12 +58,10 @@ impl Check {
         Self { at_least: true, ..check }
     }
 
-    /// Passes if a difference is within `z_limit` standard errors of zero:
-    /// `|delta| <= z_limit * error`.
+    /// The check passes if a difference is within `z_limit` standard errors of zero: `|delta| <= z_limit * error`.
     ///
-    /// `value` is the difference, `expected` is 0 and `limit` is the product
-    /// `z_limit * error`, in the units of the difference. Anything non-finite,
-    /// and a negative error, fails.
+    /// `value` is the difference, `expected` is 0 and `limit` is the product `z_limit * error`, in the units of the difference.
+    /// Any non-finite argument and a negative error fail.
     pub fn agreement(
         id: impl Into<String>,
         section: impl Into<String>,
@@ -85,7 +80,7 @@ impl Check {
         check
     }
 
-    /// The same check with a standard error to show; the verdict stays.
+    /// Adds a standard error for display; the verdict stays.
     #[must_use]
     pub fn with_error(mut self, error: f64) -> Self {
         self.error = Some(error);
@@ -115,22 +110,20 @@ impl Check {
     }
 }
 
-/// Everything a run found out.
+/// The results of a run of checks.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Results {
-    /// What was run.
     pub title: String,
-    /// Version of the program.
     pub version: String,
     /// Circumstances: machine, versions, settings.
     pub facts: BTreeMap<String, String>,
     /// Seeds of the random numbers.
     pub seeds: Vec<u64>,
-    /// The checks, in the order they were made.
+    /// Checks are in the order in which they were made.
     pub checks: Vec<Check>,
-    /// Other findings, by name.
+    /// Other results by name.
     pub values: BTreeMap<String, Value>,
-    /// Whether there are checks and all passed; [`Results::push`] keeps it so.
+    /// True if there are checks and all passed; [`Results::push`] maintains this.
     pub passed: bool,
 }
 
@@ -154,24 +147,23 @@ impl Results {
         self.passed = self.failed_count() == 0;
     }
 
-    /// Records a finding under a name. Non-finite floats become `null`.
+    /// Records a result under a name. Non-finite floats become `null`.
     pub fn record(&mut self, name: impl Into<String>, value: impl Serialize) -> Result<(), ReportError> {
         self.values.insert(name.into(), serde_json::to_value(value)?);
         Ok(())
     }
 
-    /// How many checks passed.
+    /// The number of passed checks.
     pub fn passed_count(&self) -> usize {
         self.checks.iter().filter(|c| c.passed).count()
     }
 
-    /// How many checks failed.
+    /// The number of failed checks.
     pub fn failed_count(&self) -> usize {
         self.checks.len() - self.passed_count()
     }
 
-    /// Pretty-printed JSON with a final newline. Non-finite floats become
-    /// `null`; all others read back to the same bits.
+    /// Pretty-printed JSON with a final newline. Non-finite floats become `null`; all others read back to the same bits.
     pub fn to_json(&self) -> Result<String, ReportError> {
         Ok(serde_json::to_string_pretty(self)? + "\n")
     }

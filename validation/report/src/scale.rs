@@ -6,29 +6,29 @@ use std::ops::Range;
 
 use super::text::superscript;
 
-/// The range of an axis. Which kind it is shows only when the program runs, so one type has both.
+/// The range of an axis. One type serves both kinds, because the kind is chosen at run time.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Scale {
     range: Range<f64>,
     log: bool,
-    /// Labels of a linear axis are divided by this power of ten.
+    /// The labels of a linear axis are divided by this power of ten.
     power: i32,
 }
 
 impl Scale {
-    /// From `low` to `high`; ends that span no range get one of length 1.
+    /// A linear scale from `low` to `high`; ends that span no range get the range from 0 to 1.
     pub fn exact(low: f64, high: f64) -> Scale {
         let spread = high - low;
         let spans = spread.is_finite() && spread > 1e-9 * low.abs().max(high.abs());
         let range = if spans { low..high } else { 0.0..1.0 };
         let size = range.start.abs().max(range.end.abs());
-        // Powers of ten that are ordinary numbers.
+        // The powers of ten are limited so that they are normal numbers.
         let power = if size > 0.0 { (size.log10().floor() as i32).clamp(-290, 290) } else { 0 };
-        // Sizes of ordinary life are written out.
+        // Numbers of everyday size are written without a power of ten.
         Scale { range, log: false, power: if (-3..=4).contains(&power) { 0 } else { power } }
     }
 
-    /// With room for every value that can be shown.
+    /// A scale with room for every value that can be shown.
     pub fn around(values: impl Iterator<Item = f64>, log: bool) -> Scale {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
         for v in values.filter(|v| shows(*v, log)) {
@@ -44,7 +44,7 @@ impl Scale {
             }
             (true, false) => {
                 let size = low.abs().max(high.abs());
-                // A spread that is only rounding is no spread.
+                // A spread of the size of rounding errors counts as none.
                 let room = match high - low {
                     spread if spread > 1e-9 * size => 0.04 * spread,
                     _ if size > 0.0 => 0.1 * size,
@@ -60,7 +60,7 @@ impl Scale {
         shows(value, self.log).then(|| value.clamp(self.range.start, self.range.end))
     }
 
-    /// A name of what the axis shows, with the power of ten that its labels lack.
+    /// The name of the quantity, with the power of ten that the labels lack.
     pub fn name(&self, name: &str) -> String {
         match self.power {
             0 => name.to_owned(),
@@ -68,7 +68,7 @@ impl Scale {
         }
     }
 
-    /// The lower end and the upper.
+    /// The lower and the upper end.
     pub fn ends(&self) -> (f64, f64) {
         (self.range.start, self.range.end)
     }
@@ -78,12 +78,12 @@ impl Scale {
         (self.range.start / unit..self.range.end / unit).into()
     }
 
-    /// The logarithm of the axis, to the base of ten.
+    /// The axis in terms of decimal logarithms.
     fn logarithmic(&self) -> RangedCoordf64 {
         (self.range.start.log10()..self.range.end.log10()).into()
     }
 
-    /// Powers of ten; with their double and fivefold where there are few.
+    /// The powers of ten; if there are few, also 2 and 5 times them.
     fn decades(&self, most: usize) -> Vec<f64> {
         let (low, high) = (self.range.start.log10().floor() as i32, self.range.end.log10().ceil() as i32);
         let digits: &[f64] = if high - low <= 3 { &[1.0, 2.0, 5.0] } else { &[1.0] };
@@ -94,7 +94,7 @@ impl Scale {
     }
 }
 
-/// Whether a value has a place on an axis. Powers of ten near it must be ordinary numbers.
+/// Returns true if a value has a place on an axis. Powers of ten near it must be normal numbers.
 fn shows(value: f64, log: bool) -> bool {
     value.abs() < 1e250 && (!log || value > 1e-250)
 }
@@ -117,7 +117,7 @@ impl Ranged for Scale {
         if decades.len() > 2 {
             return decades;
         }
-        // Much less than a decade has ticks as on a linear axis.
+        // A range of much less than a decade has ticks as on a linear axis.
         let unit = 10f64.powi(self.power);
         self.linear().key_points(most).into_iter().map(|v| v * unit).collect()
     }
@@ -128,7 +128,7 @@ impl Ranged for Scale {
 }
 
 impl ValueFormatter<f64> for Scale {
-    /// As many digits as tell ticks apart.
+    /// Writes as many digits as the ticks need to differ.
     fn format_ext(&self, value: &f64) -> String {
         let unit = 10f64.powi(self.power);
         if self.log && !(1e-3..1e6).contains(value) {

@@ -4,7 +4,7 @@ use std::io::{IsTerminal, stdout};
 
 use super::text::{columns, one_line};
 
-/// How a column is aligned.
+/// The alignment of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Align {
     /// To the right if every cell that is not blank looks like a number.
@@ -23,7 +23,7 @@ pub struct Table {
     pub header: Vec<String>,
     /// The cells, row by row.
     pub rows: Vec<Vec<String>>,
-    /// Alignment by column; columns beyond its end are [`Align::Auto`].
+    /// The alignment of each column; columns beyond its end are [`Align::Auto`].
     pub align: Vec<Align>,
 }
 
@@ -33,14 +33,12 @@ impl Table {
         Self { header: header.into_iter().map(Into::into).collect(), rows: Vec::new(), align: Vec::new() }
     }
 
-    /// Adds a row.
     pub fn push<S: Into<String>>(&mut self, row: impl IntoIterator<Item = S>) {
         self.rows.push(row.into_iter().map(Into::into).collect());
     }
 
-    /// The table as lines for a terminal. If standard output is a terminal
-    /// (and `NO_COLOR` is not set) the header is bold and cells that read
-    /// "pass" or "fail" are coloured.
+    /// The table as lines for a terminal. If standard output is a terminal and `NO_COLOR` is not set, the header is bold and
+    /// cells that read "pass" or "fail" are coloured.
     pub fn to_text(&self) -> String {
         let no_color = std::env::var_os("NO_COLOR").is_some_and(|v| !v.is_empty());
         self.to_text_with(stdout().is_terminal() && !no_color)
@@ -91,12 +89,12 @@ impl Table {
         out
     }
 
-    /// Number of columns of the widest row or the header.
+    /// The number of columns of the header or of the widest row.
     pub(super) fn column_count(&self) -> usize {
         self.rows.iter().map(Vec::len).fold(self.header.len(), usize::max)
     }
 
-    /// Whether a column is aligned to the right.
+    /// Returns true if a column is aligned to the right.
     pub(super) fn is_right(&self, column: usize) -> bool {
         match self.align.get(column).copied().unwrap_or_default() {
             Align::Left => false,
@@ -116,7 +114,7 @@ impl Table {
     }
 }
 
-/// What a cell says about a check.
+/// The verdict in a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Verdict {
     Pass,
@@ -124,7 +122,7 @@ pub(super) enum Verdict {
 }
 
 impl Verdict {
-    /// Reads a cell, whatever its case.
+    /// Reads a cell in upper or lower case.
     pub fn of(cell: &str) -> Option<Self> {
         match cell.trim().to_ascii_lowercase().as_str() {
             "pass" | "passed" => Some(Self::Pass),
@@ -138,7 +136,7 @@ fn is_blank(cell: &str) -> bool {
     matches!(cell.trim(), "" | "-" | "–" | "—")
 }
 
-/// Whether a cell is a number, perhaps with an error or a percent sign.
+/// Returns true if a cell is a number, perhaps with an error or a percent sign.
 fn is_number(cell: &str) -> bool {
     let cell = cell.trim();
     if matches!(cell.to_ascii_lowercase().as_str(), "nan" | "inf" | "-inf" | "−inf") {

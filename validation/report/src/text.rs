@@ -1,8 +1,8 @@
-//! Text helpers shared by plots, tables and pages.
+//! Text for plots, tables and pages.
 
 use unicode_width::UnicodeWidthStr;
 
-/// Whether XML 1.0 allows the character in a document.
+/// Returns true if XML 1.0 allows the character in a document.
 fn allowed(c: char) -> bool {
     matches!(c, '\t' | '\n' | '\r') || (c >= ' ' && !matches!(c, '\u{FFFE}' | '\u{FFFF}'))
 }
@@ -12,7 +12,7 @@ pub(super) fn xml_safe(text: &str) -> String {
     text.chars().map(|c| if allowed(c) { c } else { char::REPLACEMENT_CHARACTER }).collect()
 }
 
-/// One line without control characters: white space collapses to spaces.
+/// One line without control characters: white space becomes single spaces.
 pub(super) fn one_line(text: &str) -> String {
     text.chars()
         .map(|c| match c {
@@ -28,12 +28,12 @@ pub(super) fn escape(text: &str) -> String {
     xml_safe(text).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
-/// Columns that the text takes in a terminal.
+/// The number of columns of the text in a terminal.
 pub(super) fn columns(text: &str) -> usize {
     UnicodeWidthStr::width(text)
 }
 
-/// Rough width of text in a proportional font, in units of `size`.
+/// The approximate width of text in a proportional font, in units of `size`.
 pub(super) fn width(text: &str, size: f64) -> f64 {
     0.56 * size * columns(text) as f64
 }
@@ -76,7 +76,7 @@ pub(super) fn superscript(n: i32) -> String {
         .collect()
 }
 
-/// Powers as superscripts: `r_c^-3` becomes `r_c⁻³`. Other exponents stay as they are.
+/// Powers as superscripts: `r_c^-3` becomes `r_c⁻³`. Other exponents stay unchanged.
 pub(super) fn typeset(text: &str) -> String {
     let mut out = String::new();
     let mut rest = text;

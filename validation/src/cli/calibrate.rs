@@ -63,7 +63,6 @@ pub struct Arguments {
 }
 
 impl Arguments {
-    /// What it reads and writes.
     pub fn files(&self) -> Files {
         Files::reads([&self.model]).writes([self.out.clone()])
     }
@@ -163,7 +162,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     Ok(if found.converged { Verdict::Good } else { Verdict::CheckFailed })
 }
 
-/// The command that does the same again.
+/// The command line that repeats the calibration.
 fn command(a: &Arguments) -> String {
     let [low, high] = a.density;
     let name = |path: &Path| path.file_name().map_or(String::new(), |n| n.to_string_lossy().into_owned());

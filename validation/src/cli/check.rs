@@ -27,13 +27,12 @@ pub struct Arguments {
 }
 
 impl Arguments {
-    /// What it reads and writes.
     pub fn files(&self) -> Files {
         Files::reads([&self.file])
     }
 }
 
-/// A number density on the command line.
+/// Parses a number density.
 pub fn number_density(text: &str) -> Result<f64, String> {
     let value: f64 = text.parse().map_err(|e| format!("{e}"))?;
     if value >= 0.0 && value.is_finite() {
@@ -43,7 +42,7 @@ pub fn number_density(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Number densities of the species: as given, or a total in equal shares.
+/// Number densities of the species: the given ones, or a given total in equal shares.
 pub fn per_species(given: &[f64], species: usize) -> Option<Vec<f64>> {
     match given {
         [] => None,
@@ -112,10 +111,10 @@ fn duration(seconds: f64) -> String {
     }
 }
 
-/// From this error of the configurational temperature on, a time step is warned of.
+/// The error of the configurational temperature above which a time step gives a warning.
 const TOO_LONG: f64 = 0.1;
 
-/// The worst of time steps that are too long.
+/// A warning about the worst of the time steps that are too long.
 fn too_long(steps: &[StepEstimate]) -> Option<Warning> {
     let error = |s: &StepEstimate| s.error.max(s.carried);
     let worst = steps.iter().filter(|s| error(s) > TOO_LONG).max_by(|a, b| error(a).total_cmp(&error(b)))?;
@@ -134,7 +133,7 @@ fn too_long(steps: &[StepEstimate]) -> Option<Warning> {
     })
 }
 
-/// A number to two digits.
+/// A number with two significant digits.
 fn two_digits(x: f64) -> String {
     let digits = (1 - x.abs().max(1e-12).log10().floor() as i32).clamp(-300, 12);
     let unit = 10f64.powi(digits);
@@ -173,7 +172,7 @@ fn print(findings: &Findings, species: &[String]) {
     }
     if let (Some(p), Some(slope)) = (findings.pressure, findings.pressure_slope) {
         let shown = |x: f64| {
-            if x.is_finite() { decimal(x, 6) } else { "none (psi is no finite number there)".into() }
+            if x.is_finite() { decimal(x, 6) } else { "none (psi is not finite there)".into() }
         };
         say!("mean field    pressure {}, dp/drho {}", shown(p), shown(slope));
     }

@@ -1,4 +1,4 @@
-//! Errors as a person sees them: what, where (with the line of the file), and what to do.
+//! Error messages for people: what is wrong, where (with the line of the file), and what to do.
 
 use super::Lost;
 use super::run::Unwritten;
@@ -15,11 +15,11 @@ use std::path::PathBuf;
 /// The longest line, in bytes, that is shown with an error.
 const LONGEST_LINE: usize = 2000;
 
-/// A verb that could not be carried out.
+/// The error of a verb.
 #[derive(Debug)]
 pub struct Failure {
     error: Box<dyn std::error::Error + Send + Sync + 'static>,
-    /// The files that it was given.
+    /// The input files of the verb.
     inputs: Vec<String>,
 }
 
@@ -30,25 +30,25 @@ impl<E: std::error::Error + Send + Sync + 'static> From<E> for Failure {
 }
 
 impl Failure {
-    /// That of a verb that was given these files: they are told where the message names none of them.
+    /// Adds the input files of the verb, which are shown if the message names none of them.
     #[must_use]
     pub fn of(mut self, inputs: &[PathBuf]) -> Failure {
         self.inputs = inputs.iter().map(|path| printable(&path.display().to_string())).collect();
         self
     }
 
-    /// 1 for a run that stopped on the way, and for results that are lost; 2 for bad input.
+    /// The exit code is 1 for a run that stopped and for lost results, 2 for bad input.
     pub fn exit_code(&self) -> u8 {
         let stopped = run_error(&*self.error).is_some_and(RunError::is_stop);
         if stopped || self.error.is::<Lost>() || self.error.is::<Unwritten>() { 1 } else { 2 }
     }
 
-    /// For the terminal, with escape sequences for colour: an error about a file shows the line.
+    /// Renders the error for the terminal, with escape sequences for colour. An error about a file shows the line.
     pub fn render(&self, caller: Caller) -> String {
         self.rendered(&Renderer::styled(), caller)
     }
 
-    /// The same as plain text.
+    /// Renders the error as plain text.
     pub fn plain(&self, caller: Caller) -> String {
         self.rendered(&Renderer::plain(), caller)
     }
@@ -59,11 +59,11 @@ impl Failure {
             !text.is_empty() && text.lines().all(|line| line.len() <= LONGEST_LINE)
         };
         let located = file_error(&*self.error).filter(shows);
-        // What was read stands in all of these as it was written.
+        // Text from a file may contain control characters, which are made printable in every part of the message.
         let text = located.map_or(String::new(), |e| printable(e.file().text()));
         let name = located.map_or("", |e| e.file().name());
         let title = match located {
-            // The place is shown with the line itself.
+            // The line itself shows the place.
             Some(e) if e.key().is_empty() => e.kind().to_string(),
             Some(e) => format!("{}: {}", e.key(), e.kind()),
             None => self.error.to_string(),
@@ -87,7 +87,7 @@ impl Failure {
     }
 }
 
-/// What a transparent error wraps: its own `source` is the source of that.
+/// The error inside a transparent error, whose own `source` skips that error.
 fn unwrapped<'a>(error: &'a (dyn std::error::Error + 'static)) -> &'a (dyn std::error::Error + 'static) {
     match error.downcast_ref() {
         Some(ValidateError::File(found)) => return found,
@@ -110,7 +110,7 @@ fn unwrapped<'a>(error: &'a (dyn std::error::Error + 'static)) -> &'a (dyn std::
     }
 }
 
-/// The error about a model or scene file, wherever it is wrapped.
+/// Finds the error about a model or scene file, wherever it is wrapped.
 fn file_error<'a>(error: &'a (dyn std::error::Error + 'static)) -> Option<&'a FileError> {
     let mut next = Some(error);
     while let Some(error) = next.map(unwrapped) {

@@ -1,6 +1,6 @@
-//! What `--help` shows below the options: commands as they are typed. A test parses each.
+//! The examples that `--help` shows below the options. A test parses each.
 
-/// Verbs, subverbs with a blank, and examples of each.
+/// Verbs (a subverb follows after a blank), and examples of each.
 const EXAMPLES: &[(&str, &[&str])] = &[
     ("validate", &["psidpd validate", "psidpd validate --full --out target/validate-full"]),
     ("bench", &["psidpd bench", "psidpd bench --sizes 6050 --threads 1,2 --json bench.json"]),
@@ -51,7 +51,7 @@ const EXAMPLES: &[(&str, &[&str])] = &[
     ("man", &["psidpd man --out ~/.local/share/man/man1"]),
 ];
 
-/// The command with its examples.
+/// Adds the examples to the help of each verb.
 pub fn add(command: clap::Command) -> clap::Command {
     EXAMPLES.iter().fold(command, |command, (verb, examples)| {
         let mut text = "Examples:\n".to_owned();

@@ -16,7 +16,6 @@ pub enum Verb {
     Lammps(LammpsArguments),
 }
 
-/// Arguments of `export lammps`.
 #[derive(Debug, clap::Args)]
 pub struct LammpsArguments {
     /// The scene file.
@@ -28,7 +27,6 @@ pub struct LammpsArguments {
     settings: Settings,
 }
 
-/// Arguments of `export eam`.
 #[derive(Debug, clap::Args)]
 pub struct EamArguments {
     /// The model file.
@@ -53,7 +51,7 @@ pub struct EamArguments {
 }
 
 impl EamArguments {
-    /// Where the table goes.
+    /// The file for the table.
     fn table(&self) -> PathBuf {
         self.out.clone().unwrap_or_else(|| {
             let stem = self.model.file_stem().unwrap_or_default().to_string_lossy().into_owned();
@@ -63,7 +61,6 @@ impl EamArguments {
 }
 
 impl Verb {
-    /// What it reads and writes.
     pub fn files(&self) -> Files {
         match self {
             Verb::Eam(a) => Files::reads([&a.model]).writes([a.table()]),

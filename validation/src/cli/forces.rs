@@ -26,13 +26,12 @@ pub struct Arguments {
 }
 
 impl Arguments {
-    /// What it reads and writes.
     pub fn files(&self) -> Files {
         Files::reads([&self.model, &self.data])
     }
 }
 
-/// A data file that is no state of the model.
+/// The error of a data file whose state does not fit the model.
 #[derive(Debug, thiserror::Error)]
 #[error("{}{}: {error}", path.display(), line.map_or(String::new(), |line| format!(", line {line}")))]
 struct NoState {
@@ -48,11 +47,11 @@ impl NoState {
     }
 }
 
-/// The contents of the file of `--json`.
+/// The content of the file of `--json`.
 #[derive(Debug, Serialize)]
 struct Forces {
     energy: f64,
-    /// xx, yy, zz, xy, xz, yz.
+    /// The components are in the order xx, yy, zz, xy, xz, yz.
     virial: [f64; 6],
     /// For each atom, in the order of the ids, each density of each species, density-major.
     density: Vec<Vec<f64>>,
@@ -65,7 +64,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     data.sort_by_id();
     let state = State::from_data(&data, &model).map_err(|error| NoState::of(&arguments.data, &error))?;
     let mut simulation = Simulation::new(&model, kt.unwrap_or(arguments.kt), state, 1)?;
-    // What others are compared with.
+    // Other codes are compared with the plain sum over pairs.
     simulation.use_pair_sums_only(true);
     simulation.sum_all_densities(true);
     simulation.compute(Want::TOTALS, None)?;

@@ -22,7 +22,7 @@ pub struct Arguments {
     /// Only cases, or groups of them, with these words in their names.
     #[arg(long, value_name = "WORDS")]
     only: Option<String>,
-    /// What is wrong with the engine, in tests.
+    /// Tests use this fault in the engine.
     #[arg(skip)]
     pub(super) fault: Option<Fault>,
 }

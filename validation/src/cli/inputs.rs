@@ -1,10 +1,10 @@
-//! No verb writes over a file that it reads.
+//! No verb overwrites a file that it reads.
 
 use psidpd_core::document::{Document, Section, Value};
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
-/// The files that a verb reads and writes, as its arguments name them.
+/// The input and output files of a verb.
 #[derive(Debug, Default)]
 pub struct Files {
     given: Vec<PathBuf>,
@@ -12,16 +12,16 @@ pub struct Files {
     writes: Vec<PathBuf>,
 }
 
-/// A file that is read is to be written.
+/// The error of an output file that is also an input file.
 #[derive(Debug, thiserror::Error)]
-#[error("{} is what this verb reads, and would be written over: choose another place for the results", .0.display())]
+#[error("{} is an input of this verb and would be overwritten: choose another place for the results", .0.display())]
 pub struct WrittenOver(PathBuf);
 
-/// Models within scenes, and tables within models.
+/// The depth of references: a scene names a model, and a model names tables.
 const DEEPEST: usize = 2;
 
 impl Files {
-    /// Those that are read; of a scene and of a model also those that they name.
+    /// Adds input files, and for scenes and models also the files that they name.
     pub fn reads<'a>(paths: impl IntoIterator<Item = &'a PathBuf>) -> Files {
         let given: Vec<PathBuf> = paths.into_iter().cloned().collect();
         let mut reads = Vec::new();
@@ -29,12 +29,12 @@ impl Files {
         Files { given, reads, writes: Vec::new() }
     }
 
-    /// Those that are read, as the user named them.
+    /// The input files as the user named them.
     pub fn given(&self) -> &[PathBuf] {
         &self.given
     }
 
-    /// With files that are written.
+    /// Adds output files.
     #[must_use]
     pub fn writes(mut self, paths: impl IntoIterator<Item = PathBuf>) -> Files {
         self.writes.extend(paths);
@@ -42,7 +42,7 @@ impl Files {
     }
 
     /// # Errors
-    /// A file is both.
+    /// The function fails if a file is both an input and an output.
     pub fn check(&self, json: Option<&Path>) -> Result<(), WrittenOver> {
         let id =
             |path: &Path| std::fs::metadata(path).ok().filter(|m| m.is_file()).map(|m| (m.dev(), m.ino()));
@@ -53,7 +53,7 @@ impl Files {
     }
 }
 
-/// Adds a file and, if it is TOML, the files that strings in it name.
+/// Adds a file; for a TOML file also the files named by strings in it.
 fn named(path: &Path, deeper: usize, all: &mut Vec<PathBuf>) {
     all.push(path.to_owned());
     if deeper == 0 || path.extension().is_none_or(|e| e != "toml") {

@@ -37,7 +37,6 @@ pub enum Verb {
 }
 
 impl Verb {
-    /// What it reads and writes.
     pub fn files(&self) -> Files {
         match self {
             Verb::Convert { script, out, .. } => Files::reads([script]).writes(out.clone()),
@@ -87,7 +86,7 @@ pub fn run(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
             write_json(json, &json!({"plugin": path, "launcher": launcher, "lammps_version": built}))?;
         }
         Verb::Convert { script, law, out, overwrite } => {
-            // Where it is if it has been built here; else a name to be filled in.
+            // The path of the plugin if it has been built here; else a placeholder.
             let plugin = Some(base_dir().join(plugin::FILE_NAME)).filter(|p| p.is_file());
             let plugin = plugin.unwrap_or_else(|| plugin::FILE_NAME.into());
             let (files, new) =

@@ -1,8 +1,8 @@
 //! The command line: one file for each verb.
 //!
-//! Exit codes: 0 on success, 1 when a check fails, a run stops, or results cannot be written though they are there, 2 on bad
-//! input or when something that is needed is missing. A run that a signal stopped exits with 128 and the number of the signal: 130 for
-//! Ctrl-C, 143 for SIGTERM.
+//! The exit code is 0 on success; 1 if a check fails, a run stops, or existing results cannot be written; 2 for bad input and
+//! for missing requirements. A run that a signal stopped exits with 128 plus the number of the signal: 130 for Ctrl-C, 143
+//! for SIGTERM.
 
 mod bench;
 mod calibrate;
@@ -97,12 +97,12 @@ enum Verb {
     Man(shell::Man),
 }
 
-/// The outcome of a verb that could be carried out.
+/// The outcome of a verb without an error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Verdict {
     Good,
     CheckFailed,
-    /// Stopped at a good point by this signal.
+    /// The run stopped after a complete step because of this signal.
     Interrupted(u8),
 }
 
@@ -111,16 +111,15 @@ fn command() -> clap::Command {
     examples::add(Arguments::command())
 }
 
-/// A program that behaves as this one, where this is part of another.
+/// The file that starts this program, if the program is part of another.
 static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
 
-/// Runs the program.
 pub fn main() -> ExitCode {
     ExitCode::from(with_arguments(std::env::args_os()))
 }
 
-/// Runs the program inside another, as Python, and returns the exit code. The first of the arguments is the name of the
-/// program; `program` is a file that starts it, for verbs that need processes of their own.
+/// Runs the program inside another one, such as Python, and returns the exit code. The first of the arguments is the name
+/// of the program; `program` is a file that starts it, for verbs that need processes of their own.
 pub fn run(program: &Path, arguments: impl IntoIterator<Item = OsString>) -> u8 {
     PROGRAM.get_or_init(|| program.to_owned());
     with_arguments(arguments)
@@ -132,7 +131,7 @@ fn with_arguments(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Ok(arguments) => carry_out(arguments),
         Err(error) => {
             let code = u8::try_from(error.exit_code()).unwrap_or(2);
-            // A closed terminal or pipe is no error.
+            // A closed terminal or pipe is not an error.
             match error.print() {
                 Err(lost) if code == 0 && lost.kind() != ErrorKind::BrokenPipe => {
                     complain(&Lost(lost).into(), Caller::Neither)
@@ -165,20 +164,20 @@ fn carry_out(arguments: Arguments) -> u8 {
     }
 }
 
-/// Tells of a failure, and returns its exit code.
+/// Reports a failure, and returns its exit code.
 fn complain(failure: &Failure, caller: Caller) -> u8 {
-    // Nobody is left to be told of an error here.
+    // If standard error is closed, the message has no reader.
     let _ = writeln!(anstream::stderr(), "{}", failure.render(caller));
     failure.exit_code()
 }
 
-/// What was done is done, but nobody could be told all of it.
+/// The error of output that is lost although the work is done.
 #[derive(Debug, thiserror::Error)]
-#[error("standard output cannot be written, and a part of what was said is lost: {0}")]
+#[error("standard output cannot be written, and a part of the output is lost: {0}")]
 struct Lost(std::io::Error);
 
 impl Verb {
-    /// What it reads and writes, where it reads files that a user names.
+    /// The input and output files, for verbs that read files named by the user.
     fn files(&self) -> Files {
         match self {
             Verb::Check(a) => a.files(),
@@ -192,7 +191,7 @@ impl Verb {
             Verb::Snapshot(a) => a.files(),
             Verb::Report(a) => a.files(),
             Verb::Lammps(a) => a.files(),
-            // They read nothing that a user names.
+            // These verbs read no files named by the user.
             Verb::Validate(_)
             | Verb::Bench(_)
             | Verb::Hardcases(_)
@@ -204,7 +203,7 @@ impl Verb {
         }
     }
 
-    /// Whether it has `--resume` and `--overwrite`.
+    /// Tells whether the verb has `--resume` and `--overwrite`.
     fn caller(&self) -> Caller {
         match self {
             Verb::Run(_) | Verb::Sweep(_) => Caller::Options,
@@ -237,7 +236,7 @@ fn run_verb(verb: &Verb, json: Option<&Path>) -> Result<Verdict, Failure> {
     }
 }
 
-/// Writes `value` to the file of `--json`, if there is one.
+/// Writes `value` to the file of `--json`, if the user named one.
 fn write_json(json: Option<&Path>, value: &impl Serialize) -> Result<(), WriteError> {
     let Some(path) = json else { return Ok(()) };
     let text = serde_json::to_string_pretty(value).map_err(|e| WriteError::at(path)(e.into()))? + "\n";
@@ -249,7 +248,7 @@ mod tests {
     use super::*;
     use psidpd_core::engine::Fault;
 
-    /// The exit code of a command line, with an engine of which a term is 5 % too strong if there is a fault.
+    /// The exit code of a command line. With a fault, a term of the engine is 5 % too strong.
     fn exit_code(line: &str, fault: Option<Fault>) -> u8 {
         let mut arguments = Arguments::try_parse_from(line.split(' ')).unwrap();
         match &mut arguments.verb {
@@ -261,7 +260,7 @@ mod tests {
         carry_out(arguments)
     }
 
-    /// What compares and judges exits with 1 for an engine that is wrong, and else with 0.
+    /// Every verb that compares results exits with 1 for a faulty engine, and with 0 for a correct one.
     #[test]
     fn a_wrong_engine_is_an_exit_code_of_1() {
         let folder = tempfile::tempdir().unwrap();

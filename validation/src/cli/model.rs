@@ -18,7 +18,6 @@ pub enum Verb {
     FromEos(FromEos),
 }
 
-/// See [`Verb::FromEos`].
 #[derive(Debug, clap::Args)]
 pub struct FromEos {
     /// Which substance: water, decane.

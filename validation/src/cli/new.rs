@@ -19,7 +19,7 @@ fn names() -> clap::builder::PossibleValuesParser {
     TEMPLATES.iter().map(|t| t.name).collect::<Vec<_>>().into()
 }
 
-/// A line for each template.
+/// The help text with a line for each template.
 fn templates() -> String {
     let lines = TEMPLATES.iter().map(|t| format!("  {:<14}{}\n", t.name, t.about));
     format!("Templates:\n{}", lines.collect::<String>())

@@ -47,7 +47,6 @@ fn minutes(text: &str) -> Result<f64, String> {
 }
 
 impl Arguments {
-    /// What it reads and writes.
     pub fn files(&self) -> Files {
         Files::reads([&self.scene]).writes(["pareto.json", "pareto.html"].map(|name| self.out.join(name)))
     }

@@ -14,7 +14,6 @@ pub struct Arguments {
 }
 
 impl Arguments {
-    /// What it reads and writes.
     pub fn files(&self) -> Files {
         Files::reads(&["about.json", "thermo.csv", "observables.json"].map(|name| self.folder.join(name)))
     }

@@ -31,12 +31,12 @@ pub struct Arguments {
     /// Threads of each run.
     #[arg(long, value_name = "N", default_value = "1", value_parser = thread_count)]
     threads: NonZeroUsize,
-    /// What is wrong with the engine, in tests.
+    /// Tests use this fault in the engine.
     #[arg(skip)]
     pub(super) fault: Option<Fault>,
 }
 
-/// No case has this name.
+/// The error of an unknown case.
 #[derive(Debug, thiserror::Error)]
 #[error("there is no case {0}: psidpd reproduce --list shows all")]
 struct Unknown(String);

@@ -49,7 +49,7 @@ pub struct Arguments {
 }
 
 impl Arguments {
-    /// The command that goes on with the run, with everything that was asked for, if it can be shown.
+    /// The command line that resumes the run with all its options, if it can be shown.
     fn to_resume(&self, json: Option<&Path>) -> Option<String> {
         let mut words =
             vec![format!("psidpd run {} --out {} --resume", quoted(&self.scene)?, quoted(&self.out)?)];
@@ -69,19 +69,18 @@ impl Arguments {
 }
 
 impl Arguments {
-    /// What it reads and writes.
     pub fn files(&self) -> Files {
         Files::reads([&self.scene]).writes(FILES.map(|name| self.out.join(name)))
     }
 }
 
-/// How many threads, on the command line.
+/// Parses a number of threads.
 pub fn thread_count(text: &str) -> Result<NonZeroUsize, String> {
     let count = text.parse().map_err(|e| format!("{e}"))?;
     Pool::count(count).map_err(|e| e.to_string())
 }
 
-/// A run is finished, and what it came to is lost.
+/// The error of a finished run whose results cannot be written.
 #[derive(Debug, thiserror::Error)]
 #[error("the run in {} is finished, but {cause}", folder.display())]
 pub struct Unwritten {
@@ -89,7 +88,7 @@ pub struct Unwritten {
     cause: WriteError,
 }
 
-/// What `--json` writes.
+/// The content of the file of `--json`.
 #[derive(Serialize)]
 struct Report<'a> {
     #[serde(flatten)]
@@ -114,12 +113,12 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     let mut runner = Runner::begin(&scene, out, begin)?;
     if threads.get() > processors() {
         warn(&format!(
-            "{threads} threads on {} processors: more than there are make a run slower",
+            "{threads} threads on {} processors: more threads than processors make a run slower",
             processors()
         ));
     }
     runner.set_threads(*threads)?;
-    // Until here there is nothing to lose, and a signal ends the program at once.
+    // Before this line a signal ends the program at once, because nothing can be lost yet.
     let stop = watch_signals()?;
     let total: u64 = scene.stages.iter().map(|s| s.steps).sum();
     let made = tell_start(runner.start(), begin, out, total);
@@ -130,7 +129,7 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
         p.deviations.iter().for_each(|deviation| warn(&deviation.to_string()));
     });
     bar.finish();
-    // The run is what it is, with its page or without.
+    // A failure to write the page does not change the outcome of the run.
     if *report
         && outcome.as_ref().err().is_none_or(|e| e.is_stop())
         && let Err(error) = write_run_report(out)
@@ -168,13 +167,12 @@ pub fn run(arguments: &Arguments, json: Option<&Path>) -> Result<Verdict, Failur
     }
 }
 
-/// A precision by its name.
 fn precision(name: &str) -> Result<Precision, String> {
     let found = Precision::ALL.iter().find(|(known, _)| *known == name);
     found.map(|(_, precision)| *precision).ok_or_else(|| "expected mixed or double".into())
 }
 
-/// Reports where a resumed run begins, and returns the steps already made.
+/// Reports where a resumed run begins, and returns the number of steps already made.
 fn tell_start(start: &Start, begin: Begin, out: &Path, total: u64) -> u64 {
     match start {
         Start::New if begin == Begin::Resume => {
@@ -208,7 +206,7 @@ fn tell_start(start: &Start, begin: Begin, out: &Path, total: u64) -> u64 {
     }
 }
 
-/// A number that the first SIGINT or SIGTERM sets to its own; the second kills the program.
+/// Returns a number that the first SIGINT or SIGTERM sets to its signal number. The second signal kills the program.
 pub fn watch_signals() -> std::io::Result<Arc<AtomicUsize>> {
     let stop = Arc::new(AtomicUsize::new(0));
     let stopping = Arc::new(AtomicBool::new(false));
@@ -218,7 +216,7 @@ pub fn watch_signals() -> std::io::Result<Arc<AtomicUsize>> {
         flag::register(signal, stopping.clone())?;
         flag::register_usize(signal, stop.clone(), signal as usize)?;
     }
-    // A file that grows beyond the limit of the system or the user is then an error like a full disk.
+    // Without this handler, a file beyond the size limit would kill the program instead of failing as on a full disk.
     flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)))?;
     Ok(stop)
 }
@@ -227,7 +225,7 @@ fn warn(line: &str) {
     let _ = writeln!(std::io::stderr(), "warning: {}", printable(line));
 }
 
-/// A word as a shell takes it; `None` if it cannot be shown, for it is no text or has control characters.
+/// A word quoted for a shell; `None` if it is not valid text or has control characters.
 pub fn quoted(word: impl AsRef<OsStr>) -> Option<String> {
     let text = word.as_ref().to_str().filter(|text| printable(text) == *text && !text.contains('\n'))?;
     let plain = |c: char| c.is_alphanumeric() || "/._-+,=@%:".contains(c);

@@ -1,4 +1,4 @@
-//! What is said on standard output.
+//! Standard output of the program.
 
 use psidpd_core::document::printable;
 use psidpd_report::Table;
@@ -6,11 +6,11 @@ use std::fmt::Arguments;
 use std::io::{self, ErrorKind, Write};
 use std::sync::Mutex;
 
-/// Why something that was said is lost: a full disk, most often.
+/// The first error of standard output, most often a full disk.
 static LOST: Mutex<Option<io::Error>> = Mutex::new(None);
 
-/// Says a line as `println!` does, but that names from outside do nothing to a terminal, and that what cannot be written is an
-/// error of the verb at its end. A reader that has seen enough, as `| head`, ends the program.
+/// Prints a line as `println!` does, with control characters made harmless. A write error becomes an error of the verb at
+/// its end. If the reader closes the pipe, as `| head` does, the program ends.
 macro_rules! say {
     ($($text:tt)*) => { $crate::cli::say::line(format_args!($($text)*)) };
 }
@@ -22,35 +22,35 @@ pub fn line(text: Arguments) {
     }
 }
 
-/// The same in a run, which goes on without a reader.
+/// Prints a line of a run, which continues if the reader closes the pipe.
 pub fn whoever_listens(text: &str) {
     let _ = write(format_args!("{text}"));
 }
 
-/// A table, whose cells are clean, with its colours.
+/// Prints a table with colours. Its cells have no control characters.
 pub fn table(table: &Table) {
     bytes((table.to_text() + "\n").as_bytes());
 }
 
-/// The same in a run.
+/// Prints a table of a run, which continues if the reader closes the pipe.
 pub fn table_to_whoever_listens(table: &Table) {
     let _ = keep(io::stdout().lock().write_all((table.to_text() + "\n").as_bytes()));
 }
 
-/// What other programs read: every byte as it is.
+/// Writes output for other programs, every byte unchanged.
 pub fn bytes(bytes: &[u8]) {
     if keep(io::stdout().lock().write_all(bytes)).is_err() {
         std::process::exit(0);
     }
 }
 
-/// The first error, if anything is lost.
+/// Flushes standard output, and returns the first error if any output is lost.
 pub fn lost() -> Option<io::Error> {
     let _ = keep(io::stdout().flush());
     LOST.lock().unwrap_or_else(|lock| lock.into_inner()).take()
 }
 
-/// Nobody reads on.
+/// The error of a pipe that its reader has closed.
 struct Left;
 
 fn write(text: Arguments) -> Result<(), Left> {

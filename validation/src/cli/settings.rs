@@ -5,7 +5,6 @@ use psidpd_dynamics::scene::{Edit, Scene, edit_model};
 use std::path::Path;
 use std::sync::Arc;
 
-/// `--set`, which verbs share that take a scene or a model.
 #[derive(Debug, Clone, Default, clap::Args)]
 pub struct Settings {
     /// Another value for a key of the scene or of its model: kT=0.9, density=3, stage.produce.dt=0.02,
@@ -15,12 +14,12 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// The scene in a file, with these values.
+    /// Reads a scene with these values.
     pub fn scene(&self, path: &Path) -> Result<Scene, Failure> {
         Ok(Scene::open_with(path, &self.edits)?)
     }
 
-    /// The model in a file, with these values, and kT if that is one of them.
+    /// Reads a model with these values. The second result is kT, if it is one of them.
     pub fn model(&self, path: &Path) -> Result<(Model, Option<f64>), FileError> {
         if self.edits.is_empty() {
             return Ok((Model::open(path)?, None));
@@ -42,7 +41,7 @@ impl Settings {
 
 const POSITIVE: &str = "a temperature is a positive number";
 
-/// A temperature on the command line.
+/// Parses a temperature.
 pub fn temperature(text: &str) -> Result<f64, String> {
     let value: f64 = text.parse().map_err(|e| format!("{e}"))?;
     if value > 0.0 && value.is_finite() { Ok(value) } else { Err(POSITIVE.into()) }

@@ -1,4 +1,4 @@
-//! What a shell and `man` want to know of the program.
+//! Shell completions and manual pages.
 
 use super::say::{self, say};
 use super::{Failure, Verdict, write_json};

@@ -95,18 +95,17 @@ impl From<Eye> for View {
 }
 
 impl Arguments {
-    /// What it reads and writes.
     pub fn files(&self) -> Files {
         Files::reads([&self.file].into_iter().chain(&self.model)).writes([self.picture()])
     }
 
-    /// Where the picture goes.
+    /// The file for the picture.
     fn picture(&self) -> PathBuf {
         self.out.clone().unwrap_or_else(|| self.file.with_extension("svg"))
     }
 }
 
-/// Centiseconds that a film shows each frame.
+/// The time in centiseconds for which a film shows each frame.
 const DELAY: u16 = 12;
 
 pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
@@ -134,7 +133,7 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     if kind == "gif" {
         let last = Configuration::count(&a.file)?.saturating_sub(1);
         let most = usize::from(a.frames).min(last + 1);
-        // The last one among them.
+        // The last frame is always chosen.
         let chosen = (0..most).map(|k| (k * last) / (most - 1).max(1));
         let frames = chosen.map(|k| open(Which::Number(k))).collect::<Result<Vec<_>, _>>()?;
         let values = frames.iter().map(|f| values(a, model.as_ref(), f)).collect::<Result<Vec<_>, _>>()?;
@@ -165,14 +164,14 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
     Ok(Verdict::Good)
 }
 
-/// The lowest and the highest of values.
+/// The lowest and the highest value.
 fn ends<'a>(values: impl Iterator<Item = &'a f64>) -> [f64; 2] {
     values
         .filter(|v| v.is_finite())
         .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(*v), high.max(*v)])
 }
 
-/// What the colours of particles stand for; nothing for species.
+/// The values that the colours of particles show; `None` for species.
 fn values(
     a: &Arguments,
     model: Option<&Model>,
@@ -251,7 +250,7 @@ fn figure(
     })
 }
 
-/// Refuses ranges for which images would fill the memory.
+/// Refuses ranges whose periodic images would fill the memory.
 fn within_reach(frame: &Frame, range: f64) -> Result<(), Failure> {
     check_reach(frame.domain, frame.dimensions, range, frame.len())
         .map_err(|error| request(error.to_string()))
@@ -268,7 +267,7 @@ fn index(name: &str, names: &[String]) -> Result<usize, Failure> {
         .ok_or_else(|| request(format!("no species {name}: there are {}", names.join(", "))))
 }
 
-/// The weight function of the model's first density, with another range if one is given.
+/// The weight function of the model's first density, with the range of the command line if given.
 fn kernel(a: &Arguments, model: Option<&Model>, dimensions: usize) -> Result<Kernel, Failure> {
     let own = model.map(|m| m.at(1.0)).transpose()?;
     let own = own.and_then(|f| f.densities.first().map(|d| d.kernel));

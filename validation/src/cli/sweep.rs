@@ -35,7 +35,6 @@ pub struct Arguments {
 }
 
 impl Arguments {
-    /// What it reads and writes.
     pub fn files(&self) -> Files {
         Files::reads([&self.scene]).writes(["sweep.csv", "report.html"].map(|name| self.out.join(name)))
     }
@@ -78,7 +77,7 @@ pub fn run(a: &Arguments, json: Option<&Path>) -> Result<Verdict, Failure> {
 }
 
 impl Arguments {
-    /// The command that goes on with the sweep, if it can be shown.
+    /// The command line that resumes the sweep, if it can be shown.
     fn to_go_on(&self, json: Option<&Path>) -> Option<String> {
         let mut words = vec![format!("psidpd sweep {} --out {}", quoted(&self.scene)?, quoted(&self.out)?)];
         for axis in &self.over {

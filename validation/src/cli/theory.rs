@@ -59,13 +59,12 @@ pub struct Arguments {
 }
 
 impl Arguments {
-    /// What it reads and writes.
     pub fn files(&self) -> Files {
         Files::reads([&self.model]).writes(self.report.clone())
     }
 }
 
-/// What the answers for a mixture rest on.
+/// The assumptions behind the answers for a mixture.
 const ASSUMPTIONS: [(&str, &str); 4] = [
     (
         "critical point and spinodal",
@@ -94,12 +93,12 @@ fn without_numbers(densities: &[f64]) -> Option<String> {
     Some(match *last == 0.0 {
         true => "an empty cell has no value: at density 0 there are no particles to share an energy".into(),
         false => {
-            format!("an empty cell has no value: psi or its slope is no finite number at densities {place}")
+            format!("an empty cell has no value: psi or its slope is not finite at densities {place}")
         }
     })
 }
 
-/// An answer, or why there is none: no coexistence is an answer too.
+/// An answer, or the reason why there is none. The absence of coexistence is an answer too.
 fn or_reason<T>(answer: Result<T, TheoryError>, show: impl FnOnce(T) -> Value) -> Value {
     match answer {
         Ok(found) => show(found),
@@ -180,10 +179,7 @@ fn one(arguments: &Arguments, model: &Model, kt: f64, scope: &mut Scope) -> Resu
     let middle = theory.pressure(&densities);
     let defined = middle.is_finite();
     if !defined {
-        say!(
-            "at density {} there is no pressure: psi or its slope is no finite number there\n",
-            number(total)
-        );
+        say!("at density {} there is no pressure: psi or its slope is not finite there\n", number(total));
     }
 
     let answers: Vec<(&str, Value)> = match species {
@@ -305,7 +301,7 @@ fn one(arguments: &Arguments, model: &Model, kt: f64, scope: &mut Scope) -> Resu
     Ok((all, defined))
 }
 
-/// Short runs: the homogeneous fluid where a density was asked for or there is no liquid, and a slab of liquid.
+/// Makes short runs: the homogeneous fluid if a density was given or there is no liquid, and a slab if there is a liquid.
 fn measure(
     arguments: &Arguments,
     model: &Model,
@@ -322,14 +318,14 @@ fn measure(
     }
     if let Some(liquid) = liquid {
         let mut slab = measure::slab(model, &arguments.model, kt, liquid, effort)?;
-        // Density and pressure of a box with vapour in it are those of nothing.
+        // The mean density and pressure of a box with liquid and vapour are not those of a phase.
         slab.values.retain(|v| !["density", "pressure"].contains(&v.name.as_str()));
         all.push(slab);
     }
     Ok(all)
 }
 
-/// Mean field, mean field with correlations, what is published, what was measured.
+/// A table of mean field, mean field with correlations, published values and measured values.
 fn beside(
     density: f64,
     pressure: f64,
@@ -378,7 +374,7 @@ fn beside(
     table
 }
 
-/// A value as a person reads it.
+/// A value as text for people.
 fn shown(value: &Value) -> String {
     match value {
         Value::Object(map) => match map.get("none").and_then(Value::as_str) {

@@ -14,10 +14,10 @@ pub struct Arguments {
     /// Folder for report.html, results.json and the runs.
     #[arg(long, value_name = "DIR", default_value = "target/validate")]
     out: PathBuf,
-    /// The one comparison that is made, in tests.
+    /// Tests make only this comparison.
     #[arg(skip)]
     pub(super) only: Option<&'static str>,
-    /// What is wrong with the native engine, in tests.
+    /// Tests use this fault in the native engine.
     #[arg(skip)]
     pub(super) fault: Option<Fault>,
 }

@@ -104,7 +104,7 @@ fn errors_name_line_key_and_cause() {
         ("[observe]\ntemperature = 3", 19, "expected true or false"),
         ("[observe]\nevery = 0", 19, "observe.every: must be at least 1"),
         ("[observe]\nstages = [\"runs\"]", 19, "unknown stage \"runs\""),
-        ("[observe]\nstages = []", 19, "names no stage"),
+        ("[observe]\nstages = []", 19, "must name at least one stage"),
         ("[observe.temperature]\nskip = -1", 19, "whole number from 0"),
     ] {
         let error = scene(IDEAL_MIXTURE, "[5.0, 5.0, 5.0]", 3.0, 10, observe).unwrap_err();

@@ -1,4 +1,4 @@
-//! The direction that profiles go along.
+//! The direction of profiles, with its bins.
 
 use crate::frame::View;
 use crate::options::Options;
@@ -7,40 +7,36 @@ use psidpd_core::engine::PeriodicBox;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
-/// Below this the mean of the unit vectors exp(2πi s) has no direction.
+/// If the mean of the unit vectors exp(2πi s) is shorter than this, it has no direction.
 const LEAST_RESULTANT: f64 = 1e-10;
 
-/// What is put at the middle of each sample.
+/// The point that is moved to the middle of the profile in each sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Centre {
-    /// Nothing: places are those of the box.
+    /// No point is moved: positions are those of the box.
     Box,
     /// The centre of mass of all particles.
     All,
-    /// That of the particles of one species.
+    /// The centre of mass of one species.
     Species(i32),
 }
 
 /// Bins along one direction of the box.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Across {
-    /// The direction.
     pub axis: usize,
-    /// How many bins.
     pub bins: usize,
-    /// What samples are centred on.
     centre: Centre,
-    /// Where the axis begins.
+    /// The lower end of the box along the axis.
     origin: f64,
-    /// Distance of the faces.
+    /// The distance of the two faces normal to the profile.
     pub height: f64,
-    /// Volume of the box.
     pub volume: f64,
     periodic: bool,
 }
 
 impl Across {
-    /// The bins of an observable; `centred` if they are always recentred.
+    /// Reads the bins of an observable; `centred` is true if its samples are always recentred.
     pub fn read(options: &Options, centred: bool) -> Result<Across, FileError> {
         let mut across = Across::read_along(options, options.axis("axis")?)?;
         let preset = across.periodic && options.place.slab == Some(across.axis);
@@ -59,8 +55,8 @@ impl Across {
         Ok(across)
     }
 
-    /// Bins that are never recentred, along `axis` or else the normal of the initial slab or the last
-    /// direction.
+    /// Reads bins that are never recentred. They lie along `axis`, else along the normal of the initial slab, else along the
+    /// last direction.
     pub fn read_along(options: &Options, axis: Option<usize>) -> Result<Across, FileError> {
         let axis = axis.or(options.place.slab).unwrap_or(options.place.fluid.dimensions - 1);
         let across = Across::at(options, axis);
@@ -69,7 +65,7 @@ impl Across {
         Ok(Across { bins, ..across })
     }
 
-    /// The direction alone, in one bin.
+    /// One bin over the whole direction.
     pub fn at(options: &Options, axis: usize) -> Across {
         let domain = options.place.domain;
         Across {
@@ -83,17 +79,15 @@ impl Across {
         }
     }
 
-    /// Height of a bin.
     pub fn bin_height(&self) -> f64 {
         self.height / self.bins as f64
     }
 
-    /// Volume of a bin.
     pub fn bin_volume(&self) -> f64 {
         self.volume / self.bins as f64
     }
 
-    /// Area of a face.
+    /// The area of a face.
     pub fn area(&self) -> f64 {
         self.volume / self.height
     }
@@ -103,13 +97,13 @@ impl Across {
         ["x", "y", "z"][self.axis]
     }
 
-    /// The middles of the bins: from the centre if samples are centred.
+    /// The middles of the bins, measured from the centre if samples are centred.
     pub fn middles(&self) -> Vec<f64> {
         let low = if self.centre == Centre::Box { self.origin } else { -0.5 * self.height };
         (0..self.bins).map(|k| low + (k as f64 + 0.5) * self.bin_height()).collect()
     }
 
-    /// What a reader should know of the coordinate.
+    /// A remark on the coordinate for readers.
     pub fn note(&self) -> &'static str {
         match self.centre {
             Centre::Box => "",
@@ -118,7 +112,7 @@ impl Across {
         }
     }
 
-    /// The normal of the faces.
+    /// The unit normal of the faces.
     pub fn normal(&self, domain: &PeriodicBox) -> [f64; 3] {
         let (a, b) = (domain.edge((self.axis + 1) % 3), domain.edge((self.axis + 2) % 3));
         let n = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -126,7 +120,7 @@ impl Across {
         n.map(|c| c / length)
     }
 
-    /// Where the particles are, as fractions of the height; `None` if they have no centre to be put at ½.
+    /// Positions of the particles as fractions of the height; `None` if the particles have no centre that could be moved to ½.
     pub fn fractions(&self, view: &View) -> Option<Vec<f64>> {
         let domain = view.domain;
         let mut s: Vec<f64> = view.x.iter().map(|x| domain.fraction(*x)[self.axis]).collect();
@@ -145,7 +139,7 @@ impl Across {
             cosine += b;
             count += 1.0;
         }
-        // Nor has a species of which there are no particles.
+        // A species without particles has no centre either.
         if f64::hypot(sine, cosine) <= LEAST_RESULTANT * count {
             return None;
         }
@@ -154,7 +148,7 @@ impl Across {
         Some(s)
     }
 
-    /// The bin of a fraction; `None` outside an open box.
+    /// The bin of a fraction; `None` outside a box that is not periodic.
     pub fn bin(&self, fraction: f64) -> Option<usize> {
         let s = if self.periodic { fraction.rem_euclid(1.0) } else { fraction };
         if !(0.0..=1.0).contains(&s) {
@@ -163,17 +157,17 @@ impl Across {
         Some(((s * self.bins as f64) as usize).min(self.bins - 1))
     }
 
-    /// Shares a line from fraction `a` to `b` out over the bins it goes through.
+    /// Divides a line from fraction `a` to `b` among the bins that it crosses.
     pub fn share(&self, a: f64, b: f64, mut visit: impl FnMut(usize, f64)) {
         let (low, high) = (a.min(b), a.max(b));
-        // A line within a plane of the profile, or nearly so, is in one bin.
+        // A line that is nearly parallel to the bins is in one bin.
         if high - low < 1e-14 {
             if let Some(bin) = self.bin(0.5 * (low + high)) {
                 visit(bin, 1.0);
             }
             return;
         }
-        // In bins.
+        // Convert the fractions to numbers of bins.
         let (low, high) = (low * self.bins as f64, high * self.bins as f64);
         let (first, bins) = (low.floor(), self.bins as i64);
         let mut bin = if self.periodic { (first as i64).rem_euclid(bins) } else { first as i64 };

@@ -8,14 +8,14 @@ use crate::series::{Measured, Series};
 use psidpd_core::document::FileError;
 use serde::{Deserialize, Serialize};
 
-/// Clusters by distance.
+/// Clusters of particles closer than a distance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Clusters {
     distance: Distance,
     species: Option<usize>,
     smallest: usize,
     dimensions: usize,
-    /// Time, number, size of the largest, mean size.
+    /// Time, number of clusters, size of the largest, mean size.
     series: Series,
 }
 

@@ -8,17 +8,16 @@ use psidpd_core::document::FileError;
 use psidpd_core::document::keys::keys;
 use serde::{Deserialize, Serialize};
 
-/// Rows of fields that are kept for error bars.
+/// The number of rows of fields that are kept for error bars.
 const ROWS: usize = 64;
 
-/// Mean density on a plane, averaged over the direction normal to it.
+/// The mean density on a plane, averaged over the direction normal to it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DensityField {
     axes: [usize; 2],
     bins: [usize; 2],
     origin: [f64; 2],
     width: [f64; 2],
-    /// Volume of a cell.
     volume: f64,
     species: Vec<String>,
     series: Series,
@@ -85,7 +84,6 @@ impl Meter for DensityField {
                 let place = (x[self.axes[k]] - self.origin[k]) / self.width[k];
                 (place.max(0.0) as usize).min(self.bins[k] - 1)
             });
-            // One species is all there is.
             field[*s as usize * cells + a * self.bins[1] + b] += 1.0 / self.volume;
         }
         self.series.push(&field)

@@ -1,29 +1,27 @@
-//! How many pairs of particles are how far apart.
+//! Histograms of the distances of particles.
 
 use psidpd_core::engine::{PeriodicBox, Pool};
 use std::ops::Range;
 
-/// Rows of particles in a range: the narrower, the fewer pairs out of range are looked at.
+/// Rows of particles per range. Narrower rows give fewer pairs beyond the range.
 const ROWS_PER_RANGE: f64 = 3.0;
 
-/// Particles whose distances are found together, in vectors.
+/// The number of distances in a vector.
 const LANES: usize = 8;
 
-/// Shells beyond the range, in ranges: pairs that are looked at and are out of range are counted there, where nobody asks for
-/// them.
+/// Shells beyond the range, in ranges. Pairs out of range are counted in these shells, which are never read.
 const BEYOND: usize = 3;
 
-/// Equal shells of distance.
+/// Shells of equal thickness.
 #[derive(Debug, Clone, Copy)]
 pub struct Shells {
-    /// Up to which distance, at most half the height of the box along any period.
+    /// The largest distance, at most half the height of the box along any period.
     pub range: f64,
-    /// How many.
     pub bins: usize,
 }
 
-/// Pairs in each shell: for each species `a` and each `b` from `a` on `bins` numbers. Particles without a finite position
-/// make no pairs.
+/// Pairs in each shell: `bins` numbers for each species `a` and each `b` from `a` on. Particles without a finite
+/// position make no pairs.
 pub fn count(
     pool: &Pool,
     x: &[[f64; 3]],
@@ -56,26 +54,26 @@ pub fn count(
     sums
 }
 
-/// The box and the shells, as the loop over pairs needs them.
+/// The box and the shells in the form that the loop over pairs needs.
 struct Near<'a> {
     domain: &'a PeriodicBox,
     dimensions: usize,
-    /// Edges: `edges[k][c]` is component c of edge k.
+    /// Component c of edge k is `edges[k][c]`.
     edges: [[f64; 3]; 3],
-    /// 1 along periods, else 0.
+    /// The period is 1 along periodic directions, else 0.
     period: [f64; 3],
     range: f64,
-    /// Distances of faces; infinite across the plane of two dimensions.
+    /// Distances of the faces; in two dimensions the third is infinite.
     heights: [f64; 3],
-    /// Whether edges are along the axes, so that distances along them are the sides of right angles.
+    /// True if the edges are parallel to the axes, so that squares of distances add up.
     is_orthogonal: bool,
-    /// Shells of a unit of length.
+    /// The number of shells in a unit of length.
     per_length: f64,
-    /// Numbers that are counted for each pair of species.
+    /// The number of counters for each pair of species.
     width: usize,
 }
 
-/// From the least to the greatest of some fractions.
+/// The least and the greatest of some fractions.
 #[derive(Clone, Copy)]
 struct Interval {
     low: f64,
@@ -89,39 +87,39 @@ impl Interval {
     }
 }
 
-/// Particles along the first edge, of which fractions along the others are near each other.
+/// Particles in a row along the first edge, with nearly equal fractions along the other edges.
 struct Row {
     particles: Range<usize>,
     across: Interval,
 }
 
-/// Rows that are near each other.
+/// Neighbouring rows.
 struct Plane {
     rows: Vec<Row>,
     across: Interval,
 }
 
-/// Particles in rows, within a row by the first fraction.
+/// Particles sorted into rows, and by the first fraction within a row.
 struct Sorted {
-    /// Fractions of the box, and room for a vector.
+    /// Fractions of the box, padded by the length of a vector.
     s: [Vec<f64>; 3],
     species: Vec<usize>,
-    /// Where the counts of each begin among those of the other's species.
+    /// For each particle, the offset of its species in the counts of another species.
     offset: Vec<u32>,
     planes: Vec<Plane>,
 }
 
-/// Pairs that were counted: for each species of one particle and of the other [`Near::width`] numbers.
+/// Counted pairs: [`Near::width`] numbers for each species of the first and of the second particle.
 #[derive(Clone)]
 struct Counts {
     numbers: Vec<u64>,
     kinds: usize,
-    /// Where the pairs of a particle are counted.
+    /// The counter of each pair of one particle.
     found: Vec<u32>,
 }
 
 impl Counts {
-    /// Counts the pairs of particles of two planes, or of one.
+    /// Counts the pairs between two planes, or within one plane.
     fn add_planes(&mut self, near: &Near, sorted: &Sorted, [plane, other_plane]: [&Plane; 2]) {
         let apart = near.apart(1, &plane.across, &other_plane.across);
         let same = std::ptr::eq(plane, other_plane);
@@ -134,13 +132,13 @@ impl Counts {
         }
     }
 
-    /// Counts the pairs of particles of two rows, or of one.
+    /// Counts the pairs between two rows, or within one row.
     fn add(&mut self, near: &Near, sorted: &Sorted, [row, other]: [&Row; 2], chord: f64) {
         let mut window = Window::new(near, chord, &sorted.s[0], other.particles.clone());
         for i in row.particles.clone() {
             let of_species = self.kinds * near.width;
             let numbers = &mut self.numbers[of_species * sorted.species[i]..][..of_species];
-            // In their own row those behind, so that each pair is met once.
+            // In its own row a particle is paired only with later ones, so that each pair is counted once.
             let from = if std::ptr::eq(row, other) { i + 1 } else { 0 };
             for span in window.around(sorted.s[0][i]) {
                 near.bins(sorted, i, from.max(span.start)..span.end, &mut self.found);
@@ -166,7 +164,7 @@ impl<'a> Near<'a> {
         }
     }
 
-    /// How far apart particles in two intervals of fraction `k` are at least.
+    /// The least distance of particles in two intervals of fraction `k`.
     fn apart(&self, k: usize, a: &Interval, b: &Interval) -> f64 {
         let between = (b.low - a.high).max(a.low - b.high);
         let around = 1.0 + a.low.min(b.low) - a.high.max(b.high);
@@ -174,7 +172,7 @@ impl<'a> Near<'a> {
         if k < self.dimensions { least.max(0.0) * self.heights[k] } else { 0.0 }
     }
 
-    /// How far apart along the first edge particles in range may be, if they are so far apart along the others.
+    /// The extent of the range along the first edge, for given distances along the other edges.
     fn chord(&self, second: f64, third: f64) -> Option<f64> {
         match self.is_orthogonal {
             true => Some(self.range * self.range - second * second - third * third)
@@ -184,17 +182,17 @@ impl<'a> Near<'a> {
         }
     }
 
-    /// Finds where the pairs of `i` with the particles of a span are counted.
+    /// Finds the counters of the pairs of `i` with the particles of a span.
     fn bins(&self, sorted: &Sorted, i: usize, span: Range<usize>, found: &mut Vec<u32>) {
         #[cfg(target_arch = "x86_64")]
         if is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has it, as was asked just now.
+            // SAFETY: the condition above holds only on a processor with AVX2.
             return unsafe { self.bins_avx2(sorted, i, span, found) };
         }
         self.bins_of(sorted, i, span, found);
     }
 
-    /// The same in vectors of four.
+    /// Does the work of `bins` with AVX2, in vectors of four numbers.
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
     fn bins_avx2(&self, sorted: &Sorted, i: usize, span: Range<usize>, found: &mut Vec<u32>) {
@@ -218,7 +216,7 @@ impl<'a> Near<'a> {
                 let y = s[k] * a[1] + t[k] * b[1] + u[k] * c[1];
                 let z = s[k] * a[2] + t[k] * b[2] + u[k] * c[2];
                 let bin = (x * x + y * y + z * z).sqrt() * self.per_length;
-                // SAFETY: no number, if it is one, is below 0 or above `last`, which is a number of shells.
+                // SAFETY: NaN compares as false and becomes `last`, so the value is from 0 to `last`, and `last` fits into `i32`.
                 let bin: i32 = unsafe { (if bin < last { bin } else { last }).to_int_unchecked() };
                 bins[k] = offset[k] + bin as u32;
             }
@@ -228,13 +226,13 @@ impl<'a> Near<'a> {
     }
 }
 
-/// [`LANES`] numbers from `first` on.
+/// The [`LANES`] numbers that begin at `first`.
 #[inline(always)]
 fn lanes<T>(values: &[T], first: usize) -> &[T; LANES] {
     values[first..].first_chunk().expect("room for a vector behind the last particle")
 }
 
-/// Fractions from `own` to the nearest images of others: the right ones within half a height.
+/// Fractions from `own` to the nearest images of others. They are correct within half a height.
 #[inline(always)]
 fn nearest(s: &[f64; LANES], own: f64, period: f64) -> [f64; LANES] {
     let mut apart = [0.0; LANES];
@@ -247,14 +245,13 @@ fn nearest(s: &[f64; LANES], own: f64, period: f64) -> [f64; LANES] {
     apart
 }
 
-/// Which particles of a row may be in range of another particle, as this one goes on along the first edge.
+/// The particles of a row that may be in range of another particle, which moves along the first edge.
 struct Window<'a> {
-    /// Fractions.
     s: &'a [f64],
     row: Range<usize>,
     reach: f64,
     is_periodic: bool,
-    /// Where the particles of a span begin or end: those in range, and those in range round the box at either end.
+    /// The ends of the spans: particles in range, and particles in range through either end of the periodic box.
     at: [usize; 4],
 }
 
@@ -264,7 +261,7 @@ impl<'a> Window<'a> {
         Window { s, at: [row.start; 4], row, reach, is_periodic }
     }
 
-    /// Spans of a row, which have no particle in common, around `s`: no less than the one before.
+    /// Disjoint spans of a row around `s`, which must not be less than in the call before.
     fn around(&mut self, s: f64) -> [Range<usize>; 3] {
         let Window { reach, is_periodic, .. } = *self;
         if is_periodic && 2.0 * reach >= 1.0 {
@@ -312,7 +309,7 @@ impl Sorted {
             Plane { rows: rows.collect(), across: Interval::of(plane.iter().map(|particle| particle.1[1])) }
         };
         let planes = particles.chunk_by(|a, b| a.0[0] == b.0[0]).map(of_plane).collect();
-        // Vectors are read behind the last particle.
+        // Vectors read beyond the last particle, so the arrays are padded.
         let padding = LANES - 1;
         let fractions = |k: usize| particles.iter().map(move |particle| particle.1[k]);
         let offsets = particles.iter().map(|particle| (particle.2 * near.width) as u32);
@@ -333,7 +330,7 @@ mod tests {
     use rand::{RngExt, SeedableRng, rngs::StdRng};
     use std::num::NonZeroUsize;
 
-    /// By the search for pairs of any box.
+    /// The counts agree with a search over all pairs, for any box.
     #[test]
     fn counts_are_those_of_single_pairs() {
         let mut random = StdRng::seed_from_u64(3);

@@ -13,26 +13,26 @@ use psidpd_core::engine::PeriodicBox;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
-/// Numbers to a shell: particles, then normal and tangential pressures of momenta and of forces.
+/// The numbers in a shell: particles, then normal and tangential pressures of momenta and of forces.
 const WIDTH: usize = 5;
 
-/// Shells next to the centre that are averaged before a profile is fitted: they hold few particles.
+/// The number of innermost shells that are averaged before a fit, because they hold few particles.
 const CORE: usize = 5;
 
-/// Size and pressure of a drop.
+/// The size and the pressure of a drop.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Drop {
     distance: Distance,
     range: f64,
     bins: usize,
     dimensions: usize,
-    /// Everything in the shells.
+    /// The sums in all shells.
     shells: Series,
-    /// Time, particles in the drop, square of its radius of gyration, 1 where it meets its own image.
+    /// Time, particles in the drop, square of its radius of gyration, and 1 if the drop meets its own image.
     size: Series,
 }
 
-/// Centre of some particles of a periodic box, the circular mean of each fractional coordinate.
+/// The centre of some particles of a periodic box, as the circular mean of each fractional coordinate.
 pub(super) fn circular_centre(
     x: &[[f64; 3]],
     domain: &PeriodicBox,
@@ -59,9 +59,9 @@ pub(super) fn circular_centre(
     (count > 0.0).then(|| domain.point(fraction))
 }
 
-/// Shares a line of length `r` from `from` to `from − d` out over spherical shells of equal thickness around the origin: for
-/// each shell the length of the line in it, the part `∫ (ê·r̂)² dl` of it that is normal, and `∫ (ê·r̂)/|r| dl`, which counts
-/// what a force has across the line.
+/// Divides a line of length `r` from `from` to `from − d` among spherical shells of equal thickness around the origin. The
+/// result for each shell is the length of the line in it, its normal part `∫ (ê·r̂)² dl`, and `∫ (ê·r̂)/|r| dl`, which
+/// weighs the component of a force across the line.
 fn share(
     d: [f64; 3],
     r: f64,
@@ -74,7 +74,7 @@ fn share(
     let start = from[0] * e[0] + from[1] * e[1] + from[2] * e[2];
     let end = start + r;
     let square = from[0] * from[0] + from[1] * from[1] + from[2] * from[2];
-    // Distance of the line from the centre.
+    // The distance of the line from the centre.
     let b = (square - start * start).max(0.0).sqrt();
     let nearest = if start * end < 0.0 { b } else { b.hypot(start.abs().min(end.abs())) };
     let farthest = b.hypot(start.abs().max(end.abs()));
@@ -86,7 +86,7 @@ fn share(
         for (low, high) in [(-outer, -inner), (inner, outer)] {
             let (low, high) = (low.max(start), high.min(end));
             if high > low {
-                // A line through the centre has no force across it there.
+                // A force on a line through the centre has no component across the line there.
                 let square = |u: f64| (b * b + u * u).max(f64::MIN_POSITIVE);
                 let across = 0.5 * (square(high) / square(low)).ln();
                 visit(k, high - low, normal(high) - normal(low), across);
@@ -95,7 +95,7 @@ fn share(
     }
 }
 
-/// What a mean profile says of a drop.
+/// Properties of a drop from its mean profile.
 struct Shape {
     radius: f64,
     width: f64,
@@ -114,7 +114,7 @@ impl Drop {
         shell_volume(self.dimensions, shell as f64 * self.thickness(), (shell + 1) as f64 * self.thickness())
     }
 
-    /// Mean over the shells with middles from `low` to `high`, by volume.
+    /// The mean over the shells with middles from `low` to `high`, weighted by volume.
     fn mean(&self, low: f64, high: f64, value: impl Fn(usize) -> f64) -> f64 {
         let (mut sum, mut volume) = (0.0, 0.0);
         for k in 0..self.bins {
@@ -127,7 +127,7 @@ impl Drop {
         sum / volume
     }
 
-    /// What is wrong with the drop.
+    /// Warnings about the drop.
     fn doubts(&self, no_drop: bool) -> String {
         let mut doubts = Vec::new();
         let percolated = self.size.mean(3).value;
@@ -248,7 +248,7 @@ impl Meter for Drop {
         let mean: [f64; 3] = std::array::from_fn(|c| members().map(|x| x[c]).sum::<f64>() / count);
         let squares =
             members().map(|x| (0..3).map(|c| (x[c] - mean[c]).powi(2)).sum::<f64>()).sum::<f64>() / count;
-        // From the circular mean to the centre of mass of the members next to it.
+        // Move the origin from the circular mean to the centre of mass of the nearest images of the members.
         at.iter_mut().for_each(|x| (0..3).for_each(|c| x[c] -= mean[c]));
 
         let rest = (self.dimensions - 1) as f64;
@@ -274,7 +274,7 @@ impl Meter for Drop {
             }
             let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
             let force = dot(line.d, line.f) / r;
-            // The foot of the perpendicular from the centre, along the force.
+            // The foot of the perpendicular from the centre to the line of the force.
             let foot = dot(from, line.f) - force * dot(from, line.d) / r;
             let at = if carrier == Carrier::Particle { 1 } else { 3 };
             share(line.d, r, from, thickness, bins, |shell, length, normal, across| {
@@ -357,7 +357,7 @@ mod tests {
     use super::*;
     use rand::{RngExt, SeedableRng, rngs::StdRng};
 
-    /// Lines through shells: their parts add up to the line, and to ∫ (ê·r̂)² by small steps.
+    /// The parts of lines in shells add up to the whole line, and to ∫ (ê·r̂)² by small steps.
     #[test]
     fn lines_are_shared_out() {
         let mut rng = StdRng::seed_from_u64(6);
@@ -389,7 +389,7 @@ mod tests {
         }
     }
 
-    /// A drop of known profile and pressures: all that is read off it.
+    /// A drop of known profile and pressures gives all its known properties.
     #[test]
     fn a_constructed_drop() {
         for dimensions in [2, 3] {
@@ -407,7 +407,7 @@ mod tests {
             for k in 0..80 {
                 let r = (k as f64 + 0.5) * 0.1;
                 row[k * WIDTH] = rho(r) * drop.volume(k);
-                // Isotropic, 2.5 inside and 0.5 outside, in two parts.
+                // The pressure is isotropic, 2.5 inside and 0.5 outside, in two contributions.
                 let p = 1.5 - ((r - radius) / d).tanh();
                 row[k * WIDTH + 1..(k + 1) * WIDTH].copy_from_slice(&[0.2, 0.2, p - 0.2, p - 0.2]);
             }
@@ -416,7 +416,7 @@ mod tests {
             }
             let out = drop.finish();
             let get = |name: &str| out[0].scalar(name).unwrap().value;
-            // Equimolar radius of a tanh profile: R, but for terms of second order in d/R.
+            // The equimolar radius of a tanh profile is R up to terms of second order in d/R.
             let rest = (dimensions - 1) as f64;
             let second = rest * std::f64::consts::PI.powi(2) / 24.0 * d * d / radius;
             assert!((get("radius") - radius - second).abs() < 3e-3, "{}", get("radius"));

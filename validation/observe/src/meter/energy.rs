@@ -7,11 +7,11 @@ use crate::series::Series;
 use psidpd_core::document::FileError;
 use serde::{Deserialize, Serialize};
 
-/// The energy by terms.
+/// The contributions to the energy.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Energy {
     names: Vec<String>,
-    /// Kinetic energy, then that of each name, per particle.
+    /// Kinetic energy per particle, then each named contribution per particle.
     series: Series,
 }
 

@@ -1,4 +1,4 @@
-//! Clusters of particles that are closer than some distance, and the choice of that distance.
+//! Clusters of particles that are closer than a distance, and the choice of that distance.
 
 use super::rdf::shell_volume;
 use crate::keys::{Key, Need, ValueKind, key};
@@ -8,12 +8,12 @@ use psidpd_core::engine::PeriodicBox;
 use psidpd_core::engine::pair_sums::for_each_pair;
 use serde::{Deserialize, Serialize};
 
-/// Sets that are joined pair by pair, with the way from each member to the first one.
+/// Sets that are joined pair by pair (union-find). Each member has the vector to its parent.
 struct Union {
     parent: Vec<usize>,
-    /// From the parent to the member, through whichever images of the box.
+    /// The vector from the parent to the member, across periodic images.
     way: Vec<[f64; 3]>,
-    /// Of roots: whether the set meets its own image.
+    /// For roots: true if the set meets its own image.
     percolates: Vec<bool>,
 }
 
@@ -24,7 +24,7 @@ impl Union {
             way = sum(way, self.way[root]);
             root = self.parent[root];
         }
-        // All members on the way point to the root from now on.
+        // All members on this path get the root as their parent.
         let mut k = k;
         while self.parent[k] != root && k != root {
             let (next, own) = (self.parent[k], self.way[k]);
@@ -35,21 +35,21 @@ impl Union {
         root
     }
 
-    /// Joins the sets of `a` and `b`; `d` leads from `b` to `a`.
+    /// Joins the sets of `a` and `b`; `d` is the vector from `b` to `a`.
     fn join(&mut self, a: usize, b: usize, d: [f64; 3]) {
         let (ra, rb) = (self.root(a), self.root(b));
         let from_root = |u: &Union, k: usize, root: usize| if k == root { [0.0; 3] } else { u.way[k] };
         let (wa, wb) = (from_root(self, a, ra), from_root(self, b, rb));
-        // From the root of b to the root of a.
+        // The vector from the root of b to the root of a.
         let between: [f64; 3] = std::array::from_fn(|c| wb[c] + d[c] - wa[c]);
         if ra == rb {
-            // Two ways to the same particle differ by edges of the box, or by rounding.
+            // Two vectors to the same particle differ by edges of the box or by rounding.
             let apart = between.iter().map(|c| c * c).sum::<f64>().sqrt();
             let length = d.iter().map(|c| c * c).sum::<f64>().sqrt();
             self.percolates[ra] |= apart > 1e-3 * length + 1e-9;
             return;
         }
-        // The smaller index is the name, so that names do not depend on the order of pairs.
+        // The smaller index becomes the root, so that roots do not depend on the order of pairs.
         let (first, second, way) = if ra < rb { (ra, rb, between.map(|c| -c)) } else { (rb, ra, between) };
         self.parent[second] = first;
         self.way[second] = way;
@@ -61,18 +61,18 @@ fn sum(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|c| a[c] + b[c])
 }
 
-/// Which cluster each particle is of.
+/// The clusters of a configuration.
 pub(super) struct Linked {
-    /// By particle: the first member of its cluster; `None` for particles that do not take part.
+    /// For each particle, the first member of its cluster; `None` for particles that do not take part.
     pub labels: Vec<Option<usize>>,
-    /// By cluster: how many members it has.
+    /// For each cluster, the number of its members.
     pub sizes: Vec<usize>,
-    /// By cluster: whether it goes through the periodic box and meets its own image.
+    /// For each cluster: true if it crosses the periodic box and meets its own image.
     percolates: Vec<bool>,
 }
 
 impl Linked {
-    /// Links particles closer than `distance`.
+    /// Links particles that are closer than `distance`.
     pub fn new(
         x: &[[f64; 3]],
         domain: &PeriodicBox,
@@ -94,17 +94,16 @@ impl Linked {
         Linked { labels, sizes, percolates: union.percolates }
     }
 
-    /// The largest cluster, of equal ones the first.
+    /// The largest cluster; of several equal ones the first.
     pub fn largest(&self) -> Option<usize> {
         (0..self.sizes.len()).max_by_key(|k| (self.sizes[*k], usize::MAX - k))
     }
 
-    /// Whether a particle is of a cluster.
     pub fn is_in(&self, particle: usize, cluster: usize) -> bool {
         self.labels[particle] == Some(cluster)
     }
 
-    /// Whether a cluster meets its own image.
+    /// Returns true if a cluster meets its own image.
     pub fn percolates(&self, cluster: usize) -> bool {
         self.percolates[cluster]
     }
@@ -120,18 +119,18 @@ pub(super) const DISTANCE: Key = key(
     "0.8",
 );
 
-/// ρ δ^d for linked particles of density ρ: more than the 0.65 (1.44 in two dimensions) at which particles without order
-/// are linked throughout, so that a liquid is one cluster, and little enough for a vapour of a third (half) of its
-/// density to fall apart.
+/// The value ρ δ^d of linked particles of density ρ. It is above the percolation threshold 0.65 (1.44 in two dimensions) of
+/// random particles, so that a liquid is one cluster. It is small enough that a vapour of a third (half) of the density
+/// of the liquid falls apart.
 const LINKED: [f64; 2] = [2.5, 2.0];
 
-/// The distance that makes clusters: given, or chosen at the first sample.
+/// The distance that defines clusters, given or chosen at the first sample.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Distance {
     given: Option<f64>,
-    /// What the first sample chose.
+    /// The choice made at the first sample.
     chosen: Option<f64>,
-    /// The longest that is chosen.
+    /// The longest distance that may be chosen.
     longest: f64,
 }
 
@@ -155,17 +154,17 @@ impl Distance {
         Distance { given: Some(value), chosen: None, longest: value }
     }
 
-    /// The distance, once there was a sample.
+    /// The distance; `None` before the first sample.
     pub fn value(&self) -> Option<f64> {
         self.given.or(self.chosen)
     }
 
-    /// Forgets what was chosen.
+    /// Forgets the choice.
     pub fn forget(&mut self) {
         self.chosen = None;
     }
 
-    /// The distance; the first call chooses it, for good, unless it was given.
+    /// The distance. Unless it was given, the first call chooses it for all later calls.
     pub fn at(
         &mut self,
         x: &[[f64; 3]],
@@ -223,9 +222,9 @@ mod tests {
             let mut found: Vec<usize> = linked.sizes.iter().copied().filter(|n| *n > 0).collect();
             found.sort_unstable();
             assert_eq!(found, [1, 1, 1, 8, 12]);
-            // The chain goes through a face of the box, and the ring closes: neither meets its image.
+            // The chain crosses a face of the box and the ring is closed, but neither meets its image.
             assert!(linked.percolates.iter().all(|p| !p));
-            // Without the seventh of the chain's particles it falls in two, and that one has no cluster.
+            // Without its seventh particle the chain is two clusters, and that particle is in no cluster.
             let cut = all.iter().position(|a| (a.0[0] - 8.0).abs() < 1e-9 && a.1 == 0).unwrap();
             let linked = Linked::new(&x, &domain, 3, 0.6, |k| k != cut);
             assert_eq!(linked.labels[cut], None);
@@ -248,8 +247,8 @@ mod tests {
         }
     }
 
-    /// Of a lattice every particle has as many neighbours: 56 within 2.4 spacings in space, 20 in the plane. The distance
-    /// that is chosen is (2/ρ)^(1/3), in two dimensions (2.5/ρ)^(1/2).
+    /// Every particle of a lattice has the same number of neighbours: 56 within 2.4 spacings in space, 20 in the plane. The
+    /// chosen distance is (2/ρ)^(1/3), in two dimensions (2.5/ρ)^(1/2).
     #[test]
     fn the_chosen_distance_of_a_lattice() {
         use std::f64::consts::PI;
@@ -269,7 +268,7 @@ mod tests {
         }
     }
 
-    /// A dense ball in a thin gas: the chosen distance links the ball and not the gas.
+    /// For a dense ball in a thin gas, the chosen distance links the ball and not the gas.
     #[test]
     fn the_chosen_distance_tells_liquid_from_vapour() {
         let domain = PeriodicBox::orthogonal([0.0; 3], [12.0; 3], [true; 3]).unwrap();
@@ -287,7 +286,7 @@ mod tests {
         let fluid_range = 1.8;
         let mut distance = Distance { given: None, chosen: None, longest: fluid_range };
         let chosen = distance.at(&x, &domain, 3, |_| true);
-        // ρ = 5.3 in the ball, and more in its densest tenth.
+        // The ball has ρ = 5.3, and more in its densest tenth.
         assert!(chosen > 0.55 && chosen < 0.8, "{chosen}");
         assert_eq!(distance.at(&x[..10], &domain, 3, |_| true), chosen);
         let linked = Linked::new(&x, &domain, 3, chosen, |_| true);
@@ -295,7 +294,7 @@ mod tests {
         let members = (0..inside).filter(|k| linked.is_in(*k, drop)).count();
         assert!(members > 590 && linked.sizes[drop] < 680, "{members} {}", linked.sizes[drop]);
         assert!(!linked.percolates(drop));
-        // The range of the interaction, the choice there was, links everything.
+        // The range of the interaction, the obvious distance, links everything.
         let wide = Linked::new(&x, &domain, 3, fluid_range, |_| true);
         assert!(wide.largest().is_some_and(|k| wide.sizes[k] > 950 && wide.percolates(k)));
     }

@@ -9,25 +9,25 @@ use psidpd_core::document::{FileError, FileErrorKind};
 use psidpd_core::model::kernel::Kernel;
 use serde::{Deserialize, Serialize};
 
-/// Shells of the pair distribution that `[w g]` is integrated over.
+/// The number of shells in the integral `[w g]` over the pair distribution.
 const SHELLS: usize = 200;
 
-/// Distribution of the local density, and the integrals of the kernel over g(r).
+/// The distribution of the local density, and the integrals of the kernel over g(r).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LocalDensity {
     name: String,
-    /// Place of the density in the model.
+    /// The index of the density in the model.
     density: usize,
     species: Vec<String>,
     dimensions: usize,
     bins: usize,
-    /// The highest density of the histogram, if the scene says it.
+    /// The highest density of the histogram, if the scene gives it.
     range: Option<f64>,
-    /// The same, once known.
+    /// The highest density of the histogram, as given or as found at the first sample.
     found: Option<f64>,
-    /// `[w]` in each shell of the kernel's range.
+    /// The integral `[w]` over each shell of the kernel's range.
     shells: Vec<f64>,
-    /// For each species the share of its particles in each bin and beyond; then for each (α, β) ⟨n_β⟩ at α,
+    /// For each species the fraction of its particles in each bin and beyond the last; then for each (α, β) ⟨n_β⟩ at α,
     /// ⟨n⟩/ρ, [w g], −[r w′ g]/d.
     series: Series,
 }
@@ -40,7 +40,7 @@ fn shell_integrals(kernel: &Kernel, dimensions: usize) -> Vec<f64> {
             2 => std::f64::consts::TAU * r,
             _ => 2.0 * std::f64::consts::TAU * r * r,
         };
-        // Up to the range from below, where the linear kernel's slope jumps.
+        // The range is approached from below, because the slope of the linear kernel jumps there.
         surface * kernel.value(r.min(kernel.range() * (1.0 - 1e-15)))
     };
     (0..SHELLS)
@@ -120,14 +120,14 @@ impl Meter for LocalDensity {
             histogram[*s as usize * (self.bins + 1) + bin] += 1.0 / numbers[*s as usize];
         }
         let volume = frame.volume();
-        // Partners of a particle of α, per volume.
+        // The number density of partners of a particle of α.
         let partners = |a: usize, b: usize| if a == b { numbers[b] - 1.0 } else { numbers[b] } / volume;
         for (i, s) in species.iter().enumerate() {
             for b in 0..kinds {
                 rest[4 * (*s as usize * kinds + b)] += at(i, b) / numbers[*s as usize];
             }
         }
-        // Pairs in a shell over those at g = 1, times the integral of w over it; and r w′ over pairs.
+        // The pairs in a shell divided by those at g = 1, times the integral of w over the shell; and r w′ summed over pairs.
         let width = density.kernel.range() / SHELLS as f64;
         let volume_of =
             |k: usize| super::rdf::shell_volume(self.dimensions, k as f64 * width, (k + 1) as f64 * width);
@@ -151,7 +151,7 @@ impl Meter for LocalDensity {
                 (2..4).for_each(|k| mean[k] /= numbers[a] * partners(a, b));
             }
         }
-        // Species without particles have no distribution.
+        // A species without particles has no distribution.
         row.iter_mut().filter(|x| !x.is_finite()).for_each(|x| *x = 0.0);
         self.series.push(&row)
     }

@@ -1,7 +1,6 @@
-//! The observables, one file each: settings, samples, results.
+//! The observables. Each file has the settings, samples and results of one.
 //!
-//! To add one: a file with a type that implements [`Meter`] and its table of keys, and a line in
-//! `meters!`.
+//! A new observable needs a file with a type that implements [`Meter`], its table of keys, and a line in `meters!`.
 
 mod across;
 mod clusters;
@@ -34,95 +33,82 @@ use psidpd_core::document::FileError;
 use psidpd_core::engine::Want;
 use serde::{Deserialize, Serialize};
 
-/// Something that is measured as a run goes. It is written to checkpoints, so it holds no number that is
-/// not finite.
+/// A measurement during a run. It is written to checkpoints, so it must not hold NaN or infinity.
 pub trait Meter: Sized {
-    /// Its keys.
+    /// The keys of the observable.
     const TABLE: Table;
-    /// Steps between samples if the observable itself does not say; `None` leaves that to `[observe]`.
+    /// The default number of steps between samples; `None` takes that of `[observe]`.
     const EVERY: Option<u64> = None;
-    /// Whether it must see every step.
+    /// True if the observable must see every step.
     const EVERY_STEP: bool = false;
 
-    /// Whether a sample needs what carried momentum in its step.
+    /// True if a sample needs the momentum transport of its step.
     const NEEDS_FLUX: bool = false;
 
-    /// Whether it is of motion in time, which trial moves have none of.
+    /// True if the observable needs motion in time, which Monte Carlo does not have.
     const OF_MOTION: bool = false;
 
-    /// Reads its settings.
+    /// Reads the settings of the observable.
     ///
     /// # Errors
-    /// Values out of their domain, or a model or a box that cannot have the observable.
+    /// The function fails for values out of their domain, and for a model or a box for which the observable is not defined.
     fn read(options: &Options) -> Result<Self, FileError>;
 
-    /// What the forces of a sampled step must bring with them.
+    /// The quantities that the forces of a sampled step must provide.
     fn needs(&self) -> Want {
         Want::FORCES
     }
 
-    /// Takes a sample; whether it could.
+    /// Takes a sample; returns false if the configuration allows none.
     fn sample(&mut self, frame: &Frame) -> bool;
 
-    /// Forgets every sample; what was read stays.
+    /// Forgets every sample and keeps the settings.
     fn forget(&mut self);
 
-    /// What came out.
+    /// The results.
     fn finish(&self) -> Vec<Observation>;
 }
 
-/// A kind of meter, for the reader.
+/// A kind of observable, for the reader.
 #[derive(Debug)]
 pub struct MeterKind {
-    /// Its keys.
     pub table: &'static Table,
-    /// As [`Meter::EVERY`].
     pub every: Option<u64>,
-    /// As [`Meter::EVERY_STEP`].
     pub every_step: bool,
-    /// As [`Meter::OF_MOTION`].
     pub of_motion: bool,
-    /// As [`Meter::read`].
     pub read: fn(&Options) -> Result<AnyMeter, FileError>,
 }
 
-/// The one list of observables, in the order of the reference.
+/// The only list of observables, in the order of the reference.
 macro_rules! meters {
     ($($variant:ident($meter:ty)),+ $(,)?) => {
-        /// An observable of any kind.
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
         pub enum AnyMeter {
             $(#[doc = concat!("See `", stringify!($meter), "`.")] $variant(Box<$meter>)),+
         }
 
         impl AnyMeter {
-            /// As [`Meter::needs`].
             pub fn needs(&self) -> Want {
                 match self { $(AnyMeter::$variant(meter) => meter.needs()),+ }
             }
 
-            /// As [`Meter::NEEDS_FLUX`].
             pub fn needs_flux(&self) -> bool {
                 match self { $(AnyMeter::$variant(_) => <$meter as Meter>::NEEDS_FLUX),+ }
             }
 
-            /// As [`Meter::sample`].
             pub fn sample(&mut self, frame: &Frame) -> bool {
                 match self { $(AnyMeter::$variant(meter) => meter.sample(frame)),+ }
             }
 
-            /// As [`Meter::forget`].
             pub fn forget(&mut self) {
                 match self { $(AnyMeter::$variant(meter) => meter.forget()),+ }
             }
 
-            /// As [`Meter::finish`].
             pub fn finish(&self) -> Vec<Observation> {
                 match self { $(AnyMeter::$variant(meter) => meter.finish()),+ }
             }
         }
 
-        /// Every kind of observable.
         pub const KINDS: &[MeterKind] = &[$(MeterKind {
             table: &<$meter as Meter>::TABLE,
             every: <$meter as Meter>::EVERY,

@@ -8,7 +8,7 @@ use psidpd_core::document::FileError;
 use psidpd_core::document::keys::keys;
 use serde::{Deserialize, Serialize};
 
-/// Mean-square displacement and diffusion by species.
+/// The mean-square displacement and the diffusion coefficient of each species.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Msd {
     species: Vec<String>,
@@ -18,13 +18,13 @@ pub struct Msd {
     remove_drift: bool,
     clock: Clock,
     origins: Vec<Origin>,
-    /// Square displacements of each species at each lag, from 1.
+    /// Square displacements of each species at each lag, from lag 1.
     lags: Vec<Series>,
-    /// Diffusion coefficients by origin.
+    /// Diffusion coefficients for each time origin.
     diffusion: Series,
 }
 
-/// Times of evenly spaced samples.
+/// The times of evenly spaced samples.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Clock {
     first: f64,
@@ -33,7 +33,7 @@ pub(super) struct Clock {
 }
 
 impl Clock {
-    /// One more sample.
+    /// Adds one sample.
     pub fn tick(&mut self, time: f64) {
         if self.samples == 0 {
             self.first = time;
@@ -42,18 +42,17 @@ impl Clock {
         self.samples = self.samples.saturating_add(1);
     }
 
-    /// Time between samples; NaN with fewer than two.
+    /// The time between samples; NaN with fewer than two.
     pub fn spacing(&self) -> f64 {
         (self.last - self.first) / self.samples.saturating_sub(1) as f64
     }
 
-    /// How many samples there were.
     pub fn samples(&self) -> u64 {
         self.samples
     }
 }
 
-/// A configuration that displacements are measured from.
+/// A configuration from which displacements are measured.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Origin {
     /// Unwrapped positions in the order of the tags.
@@ -251,14 +250,14 @@ mod tests {
         for (k, t) in times.iter().enumerate() {
             assert!((out[0].get("msd_A").unwrap().values[k] - 4.0 * t * t).abs() < 1e-9);
             assert!((out[0].get("msd_B").unwrap().values[k] - t * t).abs() < 1e-9);
-            // The centre moves at (2, 2, 0)/3 with masses 1 and 2.
+            // The centre of mass moves with velocity (2, 2, 0)/3 for masses 1 and 2.
             let rest = (16.0 + 4.0) / 9.0 * t * t;
             assert!((centred.finish()[0].get("msd_A").unwrap().values[k] - rest).abs() < 1e-9);
         }
     }
 
-    /// Random walks, steps of variance 2Dτ: D and the curve within five errors (one alarm in 10^6 each), and errors of the
-    /// size of the scatter over 40 walks, which is itself known to 11 %, within 40 %. The seed is fixed.
+    /// Random walks with steps of variance 2Dτ: D and the curve agree within five errors (one false alarm in 10^6 each). The
+    /// stated errors agree within 40 % with the scatter over 40 walks, which is itself known to 11 %. The seed is fixed.
     #[test]
     fn random_walks_diffuse() {
         let mut rng = StdRng::seed_from_u64(9);

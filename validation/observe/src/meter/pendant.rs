@@ -10,28 +10,28 @@ use crate::young_laplace::fit;
 use psidpd_core::document::FileError;
 use serde::{Deserialize, Serialize};
 
-/// Rows of density fields that are kept for error bars.
+/// The number of rows of density fields that are kept for error bars.
 const ROWS: usize = 64;
 
-/// The isosurface of the density of an axisymmetric drop, and its Bond number.
+/// The density isosurface of an axisymmetric drop, and its Bond number.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Pendant {
     axis: usize,
-    /// Whether the apex is at the low end of the axis.
+    /// True if the apex is at the low end of the axis.
     hangs_down: bool,
     distance: Distance,
     dimensions: usize,
-    /// Bins outwards and along the axis.
+    /// The numbers of bins in the radial direction and along the axis.
     bins: [usize; 2],
-    /// Their size.
+    /// The widths of the bins in the radial direction and along the axis.
     width: [f64; 2],
-    /// Where the box begins along the axis.
+    /// The lower end of the box along the axis.
     origin: f64,
-    /// The density of the surface.
+    /// The density on the isosurface.
     isodensity: Option<f64>,
-    /// Part of the drop's height that is fitted, from the apex.
+    /// The fraction of the drop's height that is fitted, from the apex.
     part: f64,
-    /// Weight of a particle.
+    /// The weight of a particle.
     weight: Option<f64>,
     series: Series,
 }
@@ -46,8 +46,8 @@ impl Pendant {
         across * self.width[1]
     }
 
-    /// Density of the liquid: half of the particles are in cells that are denser. Unlike the mean of a chosen
-    /// region this needs no knowledge of the shape, and unlike a maximum it does not follow the noise.
+    /// The density of the liquid: half of the particles are in denser bins. Unlike the mean of a chosen region this does not
+    /// depend on the shape, and unlike a maximum it does not follow the noise.
     fn liquid(&self, field: &[f64]) -> f64 {
         let particles = |k: usize| field[k] * self.volume(k % self.bins[0]);
         let mut cells: Vec<usize> = (0..field.len()).collect();
@@ -60,12 +60,12 @@ impl Pendant {
         median.map_or(f64::NAN, |k| field[k])
     }
 
-    /// The isosurface: (r, z), z along the axis from the box's origin, up from the apex.
+    /// The points (r, z) of the isosurface, with z measured along the axis from the origin of the box, up from the apex.
     fn surface(&self, field: &[f64], level: f64) -> Vec<(f64, f64)> {
         let mut points = Vec::new();
         for k in 0..self.bins[1] {
             let row = &field[k * self.bins[0]..(k + 1) * self.bins[0]];
-            // From outside in to the first bin of liquid, noise of the vapour included.
+            // The search goes inwards to the first bin of liquid. Noise of the vapour can end it early.
             let Some(j) = row.iter().rposition(|d| *d >= level) else { continue };
             if j + 1 == self.bins[0] {
                 continue;
@@ -79,7 +79,7 @@ impl Pendant {
         points
     }
 
-    /// Bond number, apex radius, apex, Bo/R₀², liquid density, residual, and tension if the weight is known.
+    /// The Bond number, apex radius, apex, Bo/R₀², liquid density, residual, and the tension if the weight is known.
     fn shape(&self, field: &[f64]) -> Option<Vec<f64>> {
         let liquid = self.liquid(field);
         let points = self.surface(field, self.isodensity.unwrap_or(0.5 * liquid));
@@ -234,7 +234,7 @@ impl Meter for Pendant {
         }
         let field = self.series.means();
         let level = self.isodensity.unwrap_or(0.5 * self.liquid(&field));
-        // The radius at each height that the mean surface has; its error by the jackknife.
+        // The radius of the mean surface at each height. Its error comes from the jackknife.
         let top = self.bins[1] as f64 * self.width[1];
         let heights: Vec<f64> = self.surface(&field, level).iter().map(|p| p.1).collect();
         let radii = self.series.jackknife_many(|field| {
@@ -274,8 +274,8 @@ mod tests {
     use super::*;
     use crate::young_laplace::contour;
 
-    /// A drop of a known shape, its density rounded over a few bins: Bond number, apex and tension come back to what bins of
-    /// a twentieth of its radius allow, 0.7 %, whichever way it hangs.
+    /// A drop of a known shape whose density is smoothed over a few bins. Bond number, apex and tension agree within 0.7 %, the
+    /// resolution of bins of a twentieth of the radius, for both orientations.
     #[test]
     fn a_constructed_drop() {
         for hangs_down in [true, false] {

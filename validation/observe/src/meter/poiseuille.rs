@@ -8,7 +8,7 @@ use crate::series::{Measured, Series};
 use psidpd_core::document::FileError;
 use serde::{Deserialize, Serialize};
 
-/// Viscosity from two opposite Poiseuille flows in a periodic box.
+/// The viscosity from two opposite Poiseuille flows in a periodic box.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Poiseuille {
     across: Across,
@@ -18,9 +18,9 @@ pub struct Poiseuille {
     pub series: Series,
 }
 
-/// Mean of z (D − z) over the bin from `a` to `b`, with the sign of its half, in a box from 0 to 2 D.
+/// The mean of z (D − z) over the bin from `a` to `b`, negated in the upper half, in a box from 0 to 2 D; `half` is D.
 fn parabola(a: f64, b: f64, half: f64) -> f64 {
-    // ∫ of the parabola that is antisymmetric about D, from 0.
+    // The integral from 0 of the parabola that is antisymmetric about D.
     let integral = |z: f64| {
         let of = |z: f64| half * z * z / 2.0 - z * z * z / 3.0;
         if z <= half { of(z) } else { of(half) - of(z - half) }
@@ -36,7 +36,7 @@ impl Poiseuille {
             .collect()
     }
 
-    /// Viscosity, and the root mean square deviation from the parabola over its top.
+    /// The viscosity, and the root mean square deviation from the parabola over its maximum.
     fn fit(&self, means: &[f64]) -> Option<Vec<f64>> {
         let shape = self.parabolas();
         let (mut vf, mut ff) = (0.0, 0.0);

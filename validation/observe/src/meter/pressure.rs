@@ -8,14 +8,14 @@ use psidpd_core::document::FileError;
 use psidpd_core::engine::Want;
 use serde::{Deserialize, Serialize};
 
-/// Names of the components of a pressure tensor.
+/// The names of the components of a pressure tensor.
 const NAMES: [&str; 6] = ["xx", "yy", "zz", "xy", "xz", "yz"];
 
 /// The pressure tensor of the whole box.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Pressure {
     dimensions: usize,
-    /// Tensor of all forces, tensor of conservative forces, tensor of the momentum carried, and the pressure of configurations.
+    /// Tensor of all forces, tensor of conservative forces, tensor of the momentum transport, and the configurational pressure.
     series: Series,
 }
 

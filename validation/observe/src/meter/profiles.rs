@@ -12,8 +12,8 @@ use serde::{Deserialize, Serialize};
 
 const KEYS: &[crate::keys::Key] = &[AXIS, BINS, RECENTRE];
 
-/// What all of them collect: in each bin the particles of each species, their mass, and the first and
-/// second moments of their velocities.
+/// The sums of all profiles: in each bin the particles of each species, their mass, and the first and second moments of
+/// their velocities.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Bins {
     across: Across,
@@ -38,7 +38,7 @@ impl Bins {
         Ok(this)
     }
 
-    /// Numbers to a bin: particles by species, then m, m v, m v², and the number of those that move.
+    /// The numbers in a bin: particles of each species, then m, m v, m v², and the number of mobile particles.
     fn width(&self) -> usize {
         self.species.len() + if self.moments { 3 + self.dimensions } else { 0 }
     }
@@ -65,7 +65,7 @@ impl Bins {
         self.series.push(&sums)
     }
 
-    /// An empty observation against the coordinate.
+    /// An observation against the coordinate, without columns.
     fn observation(&self, name: &str, title: &str) -> Observation {
         Observation::new(name, title, Kind::Profile)
             .against(self.across.name(), "length", self.across.middles())
@@ -73,13 +73,13 @@ impl Bins {
             .note(self.across.note())
     }
 
-    /// A linear function of every bin.
+    /// Evaluates a linear function of the sums for every bin.
     fn linear(&self, f: impl Fn(&[f64]) -> f64) -> Vec<Measured> {
         let width = self.width();
         (0..self.across.bins).map(|b| self.series.linear(|row| f(&row[b * width..(b + 1) * width]))).collect()
     }
 
-    /// A quotient of linear functions of every bin.
+    /// Evaluates a ratio of linear functions of the sums for every bin.
     fn ratio(&self, f: impl Fn(&[f64]) -> f64, g: impl Fn(&[f64]) -> f64) -> Vec<Measured> {
         let width = self.width();
         let of = |row: &[f64], b: usize| row[b * width..(b + 1) * width].to_vec();
@@ -164,7 +164,7 @@ impl Meter for CompositionProfile {
     }
 }
 
-/// Kinetic temperature along an axis.
+/// The kinetic temperature along an axis.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TemperatureProfile(Bins);
 
@@ -209,7 +209,7 @@ impl Meter for TemperatureProfile {
     }
 }
 
-/// Velocity along an axis.
+/// The velocity along an axis.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct VelocityProfile(Bins);
 

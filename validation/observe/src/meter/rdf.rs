@@ -21,7 +21,7 @@ pub struct Rdf {
     series: Series,
 }
 
-/// Volume of the shell from `a` to `b`; in two dimensions its area.
+/// The volume of the shell from `a` to `b`; in two dimensions the area.
 pub(super) fn shell_volume(dimensions: usize, a: f64, b: f64) -> f64 {
     match dimensions {
         2 => PI * (b * b - a * a),
@@ -72,14 +72,14 @@ impl Meter for Rdf {
         let all = (0..self.bins).map(|bin| by_species.iter().skip(bin).step_by(self.bins).sum::<u64>());
         let of_species = if kinds > 1 { &by_species[..] } else { &[] };
         let mut counts: Vec<f64> = all.chain(of_species.iter().copied()).map(|count| count as f64).collect();
-        // Ideal pairs in a shell.
+        // The number of pairs of an ideal gas in a shell.
         let volume = frame.volume();
         let ideal = self.pairs.ideal_pairs(species);
         for (k, counts) in counts.chunks_exact_mut(self.bins).enumerate() {
             for (bin, count) in counts.iter_mut().enumerate() {
                 let edge = |b: usize| self.range * b as f64 / self.bins as f64;
                 let expected = ideal[k] * shell_volume(self.dimensions, edge(bin), edge(bin + 1)) / volume;
-                // Without pairs of a kind there is nothing to divide.
+                // Kinds without pairs have no expected number to divide by.
                 *count = if expected > 0.0 { *count / expected } else { 0.0 };
             }
         }

@@ -1,32 +1,31 @@
-//! Numbering of pairs of species.
+//! Indices of pairs of species.
 
 use serde::{Deserialize, Serialize};
 
-/// All pairs, number 0, then those of each two species; that is all with one species.
+/// All pairs have index 0; the pairs of two given species follow. With one species there is only index 0.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SpeciesPairs {
     species: Vec<String>,
 }
 
 impl SpeciesPairs {
-    /// Of species of these names.
+    /// The `species` are names.
     pub fn new(species: &[String]) -> SpeciesPairs {
         SpeciesPairs { species: species.to_vec() }
     }
 
-    /// How many there are.
     pub fn len(&self) -> usize {
         let count = self.species.len();
         if count > 1 { 1 + count * (count + 1) / 2 } else { 1 }
     }
 
-    /// The species of each but the first.
+    /// The two species of each index from 1 on.
     pub fn each(&self) -> impl Iterator<Item = (usize, usize)> {
         let count = if self.species.len() > 1 { self.species.len() } else { 0 };
         (0..count).flat_map(move |a| (a..count).map(move |b| (a, b)))
     }
 
-    /// How many pairs of each kind particles of these species make.
+    /// The number of pairs of each kind among particles of these species.
     pub fn ideal_pairs(&self, species: &[i32]) -> Vec<f64> {
         let numbers = self.numbers(species);
         let n = species.len() as f64;
@@ -37,14 +36,13 @@ impl SpeciesPairs {
         all
     }
 
-    /// Particles of each species.
+    /// The number of particles of each species.
     pub fn numbers(&self, species: &[i32]) -> Vec<f64> {
         let mut numbers = vec![0.0; self.species.len()];
         species.iter().for_each(|s| numbers[*s as usize] += 1.0);
         numbers
     }
 
-    /// Names of columns.
     pub fn names(&self, what: &str) -> Vec<String> {
         let name = |(a, b): (usize, usize)| format!("{what}_{}_{}", self.species[a], self.species[b]);
         std::iter::once(what.to_owned()).chain(self.each().map(name)).collect()

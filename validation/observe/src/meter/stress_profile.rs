@@ -9,10 +9,10 @@ use crate::series::{Measured, Series};
 use psidpd_core::document::FileError;
 use serde::{Deserialize, Serialize};
 
-/// Numbers to a bin: normal and tangential, of momenta and of forces.
+/// The numbers in a bin: normal and tangential pressure of momenta, then of forces.
 const WIDTH: usize = 4;
 
-/// Irving and Kirkwood's pressure tensor along an axis.
+/// The pressure tensor of Irving and Kirkwood along an axis.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StressProfile {
     across: Across,
@@ -21,7 +21,7 @@ pub struct StressProfile {
 }
 
 impl StressProfile {
-    /// The sums of a configuration in every bin, as pressures.
+    /// The pressures of one configuration in every bin.
     fn pressures(&self, frame: &Frame) -> Option<Vec<f64>> {
         let view = frame.view;
         let fractions = self.across.fractions(&view)?;
@@ -29,7 +29,7 @@ impl StressProfile {
         let along = |v: [f64; 3]| v[0] * normal[0] + v[1] * normal[1] + v[2] * normal[2];
         let (volume, rest) = (self.across.bin_volume(), (self.dimensions - 1) as f64);
         let mut sums = vec![0.0; self.across.bins * WIDTH];
-        // Lines begin anywhere; the profile is centred as the particles are.
+        // Lines begin at any position, so they are shifted by as much as the particles.
         let shift = fractions.first()? - view.domain.fraction(*view.x.first()?)[self.across.axis];
         let known = frame.lines(|carrier, line| {
             let n = along(line.d);
@@ -93,7 +93,7 @@ impl Meter for StressProfile {
         let upto = |row: &[f64], bins: usize| -> f64 {
             row.chunks_exact(WIDTH).take(bins).map(|p| height * (p[0] + p[2] - p[1] - p[3])).sum()
         };
-        // Up to the middle of each bin.
+        // The integral goes up to the middle of each bin.
         let integral = (0..self.across.bins)
             .map(|bin| self.series.linear(|row| 0.5 * (upto(row, bin) + upto(row, bin + 1))));
         let unit = "energy/volume";

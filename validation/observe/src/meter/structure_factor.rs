@@ -12,23 +12,23 @@ use psidpd_core::engine::PeriodicBox;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
-/// Wave vectors that are looked at to choose from.
+/// The largest number of candidate wave vectors.
 const MOST_CANDIDATES: f64 = 2e7;
 
 /// Partial structure factors.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StructureFactor {
     pairs: SpeciesPairs,
-    /// Wave vectors in units of the reciprocal lattice, in shells of about one length.
+    /// Wave vectors in units of the reciprocal lattice, in shells of nearly equal length.
     pub vectors: Vec<[i32; 3]>,
-    /// Where each shell begins among the vectors, and one past the last.
+    /// The index of the first vector of each shell, and one past the last vector.
     pub starts: Vec<usize>,
-    /// Mean length of the vectors of each shell.
+    /// The mean length of the vectors of each shell.
     pub lengths: Vec<f64>,
     series: Series,
 }
 
-/// The reciprocal lattice, 2π times the rows of the inverse of the edges.
+/// The reciprocal lattice: 2π times the rows of the inverse of the edges.
 fn reciprocal(domain: &PeriodicBox) -> [[f64; 3]; 3] {
     std::array::from_fn(|k| {
         let (a, b, c) = (domain.edge(k), domain.edge((k + 1) % 3), domain.edge((k + 2) % 3));
@@ -95,7 +95,7 @@ impl Meter for StructureFactor {
             for y in -top[1]..=top[1] {
                 for z in -top[2]..=top[2] {
                     let h = [x, y, z];
-                    // One of ±k.
+                    // Only one of k and −k is used.
                     if h <= [0, 0, 0] {
                         continue;
                     }
@@ -147,7 +147,7 @@ impl Meter for StructureFactor {
                 for (p, (a, b)) in self.pairs.each().enumerate() {
                     let norm = (numbers[a] * numbers[b]).sqrt();
                     let product = of(a)[0] * of(b)[0] + of(a)[1] * of(b)[1];
-                    // A species without particles has no structure.
+                    // A species without particles has no structure factor.
                     sums[(1 + p) * shells + shell] += if norm > 0.0 { product / norm / share } else { 0.0 };
                 }
             }

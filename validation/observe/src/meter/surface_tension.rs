@@ -18,12 +18,11 @@ pub struct SurfaceTension {
     interfaces: f64,
     perturbation: f64,
     kt: f64,
-    /// γ of the momentum carried and of the conservative stress, exp(−ΔU/kT) for more and for less area.
+    /// γ from the momentum transport and from the conservative stress, and exp(−ΔU/kT) for more and for less area.
     series: Series,
 }
 
-/// Fractional lengths of a box whose faces normal to `axis` have `1 + change` times the area, at the same
-/// volume.
+/// The scale factors of a box whose faces normal to `axis` get `1 + change` times the area at constant volume.
 fn deformation(axis: usize, dimensions: usize, change: f64) -> [f64; 3] {
     let rest = (1.0 + change).powf(1.0 / (dimensions - 1) as f64);
     std::array::from_fn(|c| match c {
@@ -33,11 +32,11 @@ fn deformation(axis: usize, dimensions: usize, change: f64) -> [f64; 3] {
     })
 }
 
-/// `U` of a configuration stretched with its box to `1 + change` times the area at constant volume.
+/// The energy `U` of a configuration, scaled with its box to `1 + change` times the area at constant volume.
 pub fn stretched_energy(frame: &Frame, axis: usize, change: f64) -> f64 {
     let view = frame.view;
     let domain = view.domain;
-    // The faces normal to a direction are those of the other two edges: edges are scaled, not directions.
+    // The other two edges span the faces normal to a direction, so edges are scaled and not directions.
     let scale = deformation(axis, view.dimensions, change);
     let edges = Matrix3::from_fn(|row, k| scale[k] * domain.edge(k)[row]);
     let Ok(stretched) = PeriodicBox::new(domain.origin(), edges, domain.periodic()) else { return f64::NAN };

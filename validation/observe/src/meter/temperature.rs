@@ -8,10 +8,10 @@ use crate::series::Series;
 use psidpd_core::document::FileError;
 use serde::{Deserialize, Serialize};
 
-/// kT from velocities and from configurations.
+/// The kinetic and the configurational kT.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Temperature {
-    /// Why there is no configurational temperature; empty if there is one.
+    /// The reason why the fluid has no configurational temperature; empty if it has one.
     missing: String,
     /// Kinetic kT, `Σ F·F`, `−Σ ∇·F`.
     series: Series,

@@ -11,17 +11,17 @@ use psidpd_core::engine::Want;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
-/// Rows of correlation functions that are kept for error bars.
+/// The number of rows of correlation functions that are kept for error bars.
 const ROWS: usize = 128;
 
-/// Shear viscosity from the fluctuations of the stress.
+/// The shear viscosity from the fluctuations of the stress.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Viscosity {
     dimensions: usize,
     length: usize,
     volume: f64,
     clock: Clock,
-    /// The latest stresses, without trace: xx, yy, zz, xy, xz, yz.
+    /// The latest traceless stresses: xx, yy, zz, xy, xz, yz.
     recent: VecDeque<[f64; 6]>,
     /// The correlation at every lag, then the kinetic temperature.
     series: Series,
@@ -46,7 +46,7 @@ impl Viscosity {
         if self.recent.len() <= self.length {
             return true;
         }
-        // P:P is this many times the square of one off-diagonal component.
+        // P:P is `shears` times the mean square of one off-diagonal component.
         let shears = ((d - 1) * (d + 2)) as f64;
         let first = stress_of(&self.recent, 0);
         let mut row: Vec<f64> = self.recent.iter().map(|p| contraction(&first, p, d) / shears).collect();
@@ -55,7 +55,7 @@ impl Viscosity {
         self.series.push(&row)
     }
 
-    /// `∫₀^t C` by the trapezoid rule, V/kT left out.
+    /// `∫₀^t C` by the trapezoid rule, without the factor V/kT.
     fn integral(row: &[f64], lag: usize, dt: f64) -> f64 {
         if lag == 0 { 0.0 } else { dt * (0.5 * (row[0] + row[lag]) + row[1..lag].iter().sum::<f64>()) }
     }
@@ -163,9 +163,9 @@ mod tests {
         }
     }
 
-    /// Stresses with the correlation s² a^t, isotropic and without trace, plus white noise of variance q²:
-    /// η = V dt/kT [½ (s² + q²) + s² a/(1 − a)], less the tail beyond the longest lag. Within five errors, one
-    /// alarm in 10^6; the seed is fixed.
+    /// Isotropic traceless stresses with the correlation s² a^t plus white noise of variance q² give
+    /// η = V dt/kT [½ (s² + q²) + s² a/(1 − a)], less the tail beyond the longest lag. The result must agree within five
+    /// errors, one false alarm in 10^6; the seed is fixed.
     #[test]
     fn synthetic_stresses() {
         for dimensions in [2, 3] {

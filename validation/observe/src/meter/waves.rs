@@ -1,14 +1,14 @@
-//! Density waves of particles, several particles at a time.
+//! Density waves of particles, computed for several particles at a time.
 
 use psidpd_core::engine::Pool;
 use std::f64::consts::TAU;
 
-/// `ρ(h) = Σ exp(2πi h·s)` over particles at fractions `s` of the box, real and imaginary part, for each `h` of `vectors`, whose
-/// first number must not be negative.
+/// The sum `ρ(h) = Σ exp(2πi h·s)` over particles at fractions `s` of the box, real and imaginary part, for each `h` of
+/// `vectors`. The first component of each `h` must not be negative.
 pub fn waves(pool: &Pool, fractions: impl Iterator<Item = [f64; 3]>, vectors: &[[i32; 3]]) -> Vec<[f64; 2]> {
     let top = [0, 1, 2].map(|c| vectors.iter().map(|h| h[c].unsigned_abs() as usize).max().unwrap_or(0));
     let fractions: Vec<[f64; 3]> = fractions.collect();
-    // Blocks do not depend on the number of threads, nor does the order of their sum.
+    // The blocks and the order of their sum do not depend on the number of threads.
     let mut blocks: Vec<_> =
         fractions.chunks(BLOCK).map(|block| (block, vec![[[0.0; LANES]; 2]; vectors.len()])).collect();
     pool.each(&mut blocks, |(block, waves)| {
@@ -25,16 +25,16 @@ pub fn waves(pool: &Pool, fractions: impl Iterator<Item = [f64; 3]>, vectors: &[
     sums
 }
 
-/// Particles that a thread does at once.
+/// The number of particles in a block, which one thread takes at a time.
 const BLOCK: usize = 1024;
 
-/// Particles whose waves are found together, in vectors.
+/// The number of particles in a vector.
 const LANES: usize = 8;
 
-/// Real and imaginary part of a complex number of each of some particles.
+/// The real and the imaginary part of one complex number for each particle.
 type Complex = [[f64; LANES]; 2];
 
-/// `exp(2πi h s_c)` of some particles, for each direction c and each h from 0 on; 0 where there is no particle.
+/// The phases `exp(2πi h s_c)` of some particles, for each direction c and each h from 0 on; 0 in unused lanes.
 struct Phases([Vec<Complex>; 3]);
 
 impl Phases {
@@ -56,7 +56,7 @@ impl Phases {
     }
 }
 
-/// `a b`, or `a b*` if `sign` is −1.
+/// The product `a b`, or `a b*` if `sign` is −1.
 #[inline(always)]
 fn times(a: &Complex, b: &Complex, sign: f64) -> Complex {
     let mut product = [[0.0; LANES]; 2];
@@ -68,17 +68,17 @@ fn times(a: &Complex, b: &Complex, sign: f64) -> Complex {
     product
 }
 
-/// Adds what some particles add to the wave of each vector.
+/// Adds the contributions of some particles to the wave of each vector.
 fn add_waves(phases: &Phases, vectors: &[[i32; 3]], waves: &mut [Complex]) {
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx2") {
-        // SAFETY: the processor has it, as was asked just now.
+        // SAFETY: the condition above holds only on a processor with AVX2.
         return unsafe { add_waves_avx2(phases, vectors, waves) };
     }
     add_waves_of(phases, vectors, waves);
 }
 
-/// The same in vectors of four.
+/// Does the work of `add_waves` with AVX2, in vectors of four numbers.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 fn add_waves_avx2(phases: &Phases, vectors: &[[i32; 3]], waves: &mut [Complex]) {

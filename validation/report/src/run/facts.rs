@@ -4,7 +4,7 @@ use serde_json::Value;
 
 /// Names and values at the top of the page.
 ///
-/// `timing` has the sessions of a run that was taken up again; an older `summary` has one time.
+/// `timing` has the sessions of a resumed run; an older `summary` has one time.
 pub fn facts(
     about: Option<&About>,
     summary: Option<&Value>,
@@ -58,7 +58,7 @@ pub fn facts(
     facts
 }
 
-/// Wall time in seconds, and particle-steps per second.
+/// The wall time in seconds, and particle-steps per second.
 fn wall_time(summary: Option<&Value>, timing: Option<&Value>) -> Option<(f64, Option<f64>)> {
     let number = |value: &Value, key: &str| value.get(key).and_then(Value::as_f64);
     let Some(sessions) = timing.and_then(|t| t.get("sessions")).and_then(Value::as_array) else {

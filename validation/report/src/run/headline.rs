@@ -1,4 +1,4 @@
-//! The results of a run that are looked for first, and what is doubtful about them.
+//! The main results of a run, with warnings about them.
 
 use super::super::quantity::with_error;
 use super::super::{Item, Section, Table};
@@ -10,42 +10,40 @@ use psidpd_observe::statistics::{MINIMUM_SAMPLES, estimate};
 use serde::Serialize;
 use std::path::Path;
 
-/// Fewer independent rows than this make error bars that are themselves uncertain by a fifth.
+/// With fewer independent rows the error bars themselves are uncertain by a fifth.
 const FEW: f64 = 12.0;
 
-/// How many of its errors the slope of a series must be from 0 to be called a drift, and in how many rows.
+/// The slope of a series is called a drift if it differs from 0 by more than `DRIFT` of its errors, in at least `DRIFTING` rows.
 const DRIFT: f64 = 4.0;
 const DRIFTING: usize = 20;
 
-/// What a run measured, in the order of interest.
+/// The measured values of a run, the most important first.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Headline {
-    /// The values.
     pub values: Vec<HeadlineValue>,
-    /// What a reader must know before using them.
+    /// Warnings for users of the values.
     pub notes: Vec<String>,
 }
 
-/// One of them.
+/// One measured value.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HeadlineValue {
-    /// `density`, `temperature`, `pressure`, `liquid`, `vapour`, `tension`, `width` or `radius`.
+    /// The name is `density`, `temperature`, `pressure`, `liquid`, `vapour`, `tension`, `width` or `radius`.
     pub name: String,
-    /// The value.
     pub value: f64,
-    /// One standard deviation; `None` where it is exact or not known.
+    /// One standard deviation; `None` if the value is exact or the error is unknown.
     pub error: Option<f64>,
-    /// Unit, of the length, energy and mass of the model.
+    /// The unit in terms of the length, energy and mass of the model.
     pub unit: String,
-    /// Where it comes from.
+    /// The file or observable that the value comes from.
     pub source: String,
-    /// What mean field says, where it says anything.
+    /// The mean-field prediction, if there is one.
     pub mean_field: Option<f64>,
-    /// What is published for this fluid at this kT: value and error.
+    /// The published value for this fluid at this kT, and its error.
     pub published: Option<[f64; 2]>,
 }
 
-/// The results of the run in a folder, as far as its files have them.
+/// The results of the run in a folder, from the files that exist.
 pub fn headline(folder: &Path) -> Headline {
     let about = About::read(folder).ok().flatten();
     let table = series::Table::read(&folder.join("thermo.csv")).ok().flatten();
@@ -55,7 +53,7 @@ pub fn headline(folder: &Path) -> Headline {
     gather(about.as_ref(), particles, table.as_ref(), observables.as_deref().unwrap_or_default())
 }
 
-/// The same from files that were read.
+/// The results from the content of the files.
 pub fn gather(
     about: Option<&About>,
     particles: Option<f64>,
@@ -177,7 +175,7 @@ pub fn gather(
     all
 }
 
-/// A drop that feels its own image through a face of the box.
+/// The warning about a drop that interacts with its own image through a face of the box.
 fn image_of_drop(about: &About, found: &Headline) -> Option<String> {
     let value = |name: &str| found.values.iter().find(|v| v.name == name).map(|v| v.value);
     let reach = about.densities.iter().map(|d| d.range).fold(1.0, f64::max);
@@ -194,12 +192,11 @@ fn image_of_drop(about: &About, found: &Headline) -> Option<String> {
 }
 
 impl Headline {
-    /// The value of a name.
     pub fn get(&self, name: &str) -> Option<&HeadlineValue> {
         self.values.iter().find(|v| v.name == name)
     }
 
-    /// A row for each value; columns of mean field and of what is published only if there is any.
+    /// A table with a row for each value. The columns of mean field and of published values appear only if they have entries.
     pub fn table(&self) -> Table {
         let mean_field = self.values.iter().any(|v| v.mean_field.is_some());
         let published = self.values.iter().any(|v| v.published.is_some());
@@ -227,7 +224,7 @@ impl Headline {
         table
     }
 
-    /// For the top of a page; `None` if nothing is known.
+    /// A section for the top of a page; `None` without values and notes.
     pub fn section(&self) -> Option<Section> {
         if self.values.is_empty() && self.notes.is_empty() {
             return None;

@@ -1,7 +1,7 @@
 //! The report of one run, from the files in its folder.
 //!
-//! A folder may lack any of them: a run that was stopped has no `summary.json`, a scene without `[output]`
-//! no dump. The page then says what is not there.
+//! A folder may lack any of the files: a run that was stopped has no `summary.json`, a scene without `[output]` has no dump.
+//! The page then says what is missing.
 
 mod facts;
 mod headline;
@@ -19,34 +19,34 @@ pub use headline::{Headline, HeadlineValue, headline};
 pub use observables::{Observable, ObservableAxis, ObservableColumn};
 pub use series::Table as SeriesTable;
 
-/// Why a folder has no report.
+/// The reasons why a folder has no report.
 #[derive(Debug, thiserror::Error)]
 pub enum RunReportError {
-    #[error("{} holds nothing of a run: none of {files} is there", folder.display())]
+    #[error("{} is not the folder of a run: it has none of the files {files}", folder.display())]
     NoRun { folder: PathBuf, files: String },
     #[error(transparent)]
     Report(#[from] ReportError),
 }
 
-/// The files that a report is made from, and what they are.
+/// The files that a report is made from, with their descriptions.
 const FILES: [(&str, &str); 10] = [
-    ("about.json", "what was run: species, stages, units, columns of thermo.csv"),
+    ("about.json", "description of the run: species, stages, units, columns of thermo.csv"),
     ("thermo.csv", "totals every few steps"),
-    ("summary.json", "what the run came to"),
-    ("timing.json", "how long the run took"),
+    ("summary.json", "summary of results"),
+    ("timing.json", "duration of the run"),
     ("observables.json", "observables with their errors"),
-    ("observables", "the same, a CSV file for each"),
+    ("observables", "a CSV file for each observable"),
     ("final.data", "the state after the last step: LAMMPS data file"),
     ("dump.lammpstrj", "frames: LAMMPS text dump"),
     ("trajectory.xyz", "frames: extended XYZ"),
     ("snapshots", "pictures of the particles along the run"),
 ];
 
-/// Makes `report.html` from the files in the folder of a run, and says where it is.
+/// Makes `report.html` from the files in the folder of a run, and returns its path.
 ///
 /// # Errors
-/// A folder without any of them; a page that cannot be written. A file that cannot be understood is no
-/// error: the page says what is wrong with it.
+/// The function fails if the folder has none of the files, and if the page cannot be written. A file with invalid content is
+/// not an error: the page says what is wrong with it.
 pub fn write_run_report(folder: &Path) -> Result<PathBuf, RunReportError> {
     let page = run_report(folder)?.render();
     let path = folder.join("report.html");
@@ -57,7 +57,7 @@ pub fn write_run_report(folder: &Path) -> Result<PathBuf, RunReportError> {
 /// The report of the run in a folder.
 ///
 /// # Errors
-/// A folder with nothing of a run in it.
+/// The function fails if the folder has none of the files of a run.
 pub fn run_report(folder: &Path) -> Result<Report, RunReportError> {
     if !FILES.iter().any(|(name, _)| folder.join(name).exists()) {
         let files: Vec<&str> = FILES.iter().map(|f| f.0).collect();
@@ -107,12 +107,12 @@ pub fn run_report(folder: &Path) -> Result<Report, RunReportError> {
     })
 }
 
-/// A value, or a note of why there is none.
+/// A value; an error is added to the notes instead.
 fn keep<T>(result: Result<T, FormatError>, notes: &mut Vec<String>) -> Option<T> {
     result.map_err(|e| notes.push(e.to_string())).ok()
 }
 
-/// A file's text; `None` if there is no such file.
+/// The text of a file; `None` if the file does not exist.
 fn text(path: &Path) -> Result<Option<String>, FormatError> {
     match std::fs::read_to_string(path) {
         Ok(text) => Ok(Some(text)),

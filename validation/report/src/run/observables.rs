@@ -1,4 +1,4 @@
-//! `observables.json`: each observable as a number with its error, or as a plot.
+//! The content of `observables.json`: each observable as a number with its error, or as a plot.
 
 use super::super::figure::field_of_values;
 use super::super::quantity::with_error;
@@ -8,63 +8,58 @@ use psidpd_formats::FormatError;
 use serde::Deserialize;
 use std::path::Path;
 
-/// An observable of a stage, as `observables.json` lists it.
+/// An observable of a stage, as in `observables.json`.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Observable {
-    /// Its name, for machines.
+    /// The name for machines.
     pub name: String,
-    /// What it is, for people.
+    /// The name for people.
     #[serde(default)]
     pub title: String,
-    /// The stage it was measured in.
     #[serde(default)]
     pub stage: String,
-    /// scalar, profile, curve, series or field.
+    /// The kind is scalar, profile, curve, series or field.
     #[serde(default)]
     pub kind: String,
-    /// The abscissa; none for scalars and fields.
+    /// The abscissa; `None` for scalars and fields.
     #[serde(default)]
     pub x: Option<ObservableAxis>,
-    /// The values. Of a field the first columns are the coordinates of its points.
+    /// For a field the first columns are the coordinates of its points.
     #[serde(default)]
     pub columns: Vec<ObservableColumn>,
-    /// How many samples they are means of.
+    /// The number of samples in the means.
     #[serde(default)]
     pub samples: Option<f64>,
-    /// What else there is to know.
+    /// Remarks for readers.
     #[serde(default)]
     pub note: Option<String>,
 }
 
-/// An abscissa.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct ObservableAxis {
-    /// What it is.
     pub name: String,
-    /// Its unit; empty for a pure number.
+    /// The unit; empty for a pure number.
     #[serde(default)]
     pub unit: Option<String>,
-    /// Its values.
     pub values: Vec<Option<f64>>,
 }
 
 /// Values with errors.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct ObservableColumn {
-    /// What it is.
     pub name: String,
-    /// Its unit; empty for a pure number.
+    /// The unit; empty for a pure number.
     #[serde(default)]
     pub unit: Option<String>,
-    /// The values; null where there is none.
+    /// Unknown values are null.
     #[serde(deserialize_with = "one_or_many")]
     pub values: Vec<Option<f64>>,
-    /// One standard deviation of each.
+    /// One standard deviation of each value.
     #[serde(default, deserialize_with = "one_or_many")]
     pub errors: Vec<Option<f64>>,
 }
 
-/// A number counts as a list of one, null as an empty one.
+/// Reads a single number as a list of one number, and null as an empty list.
 fn one_or_many<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Vec<Option<f64>>, D::Error> {
     #[derive(Deserialize)]
     #[serde(untagged)]
@@ -80,13 +75,13 @@ fn one_or_many<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Vec<Option<f
     })
 }
 
-/// Reads the list; `None` if there is no such file.
+/// Reads the list; `None` if the file does not exist.
 pub fn read(path: &Path) -> Result<Option<Vec<Observable>>, FormatError> {
     let Some(text) = super::text(path)? else { return Ok(None) };
     serde_json::from_str(&text).map(Some).map_err(|cause| FormatError::Json { path: path.to_owned(), cause })
 }
 
-/// More points than this are a line with a band, fewer are points with bars.
+/// A curve with more points is a line with a band; one with fewer is points with bars.
 const SINGLE_POINTS: usize = 40;
 
 pub fn section(observables: Option<&[Observable]>) -> Section {
@@ -143,7 +138,7 @@ fn scalar_table(all: &[Observable]) -> Table {
 }
 
 impl Observable {
-    /// Value and error of a column of an observable that is a number.
+    /// The value and error of a column, if the observable is a single number.
     pub fn scalar(&self, column: &str) -> Option<(f64, Option<f64>)> {
         let found = self.columns.iter().find(|c| self.is_scalar() && c.name == column)?;
         Some(((*found.values.first()?)?, found.errors.first().copied().flatten()))
@@ -199,10 +194,10 @@ fn figure(o: &Observable, svg: Result<String, super::ReportError>) -> Item {
     }
 }
 
-/// Names of columns that are coordinates where they come first.
+/// Names that mark leading columns as coordinates.
 const COORDINATES: [&str; 4] = ["x", "y", "z", "r"];
 
-/// Values on a grid as a map, points that are on none as points.
+/// Draws values on a grid as a map, and other values as points.
 fn draw_field(o: &Observable, items: &mut Vec<Item>) {
     let coordinates = o.columns.iter().take_while(|c| COORDINATES.contains(&c.name.as_str())).count();
     let [first, second, ..] = o.columns.as_slice() else {
@@ -234,11 +229,11 @@ fn draw_field(o: &Observable, items: &mut Vec<Item>) {
     }
 }
 
-/// Points that are all the crossings of lines.
+/// Points that are all the crossings of vertical and horizontal lines.
 struct Grid {
     x: Vec<f64>,
     y: Vec<f64>,
-    /// Where in the picture each point is: row after row, the lowest first.
+    /// The index of each point in the picture: row after row, the lowest row first.
     place: Vec<usize>,
 }
 
@@ -273,7 +268,7 @@ fn draw_curve(o: &Observable, items: &mut Vec<Item>) {
     let Some(x) = &o.x else { return };
     let mut push = |svg| items.push(figure(o, svg));
     let xs = numbers(&x.values);
-    // One plot for each unit: a shared axis would mean nothing.
+    // Each unit gets its own plot, because a shared axis would be meaningless.
     let mut units: Vec<Option<&String>> = Vec::new();
     for c in &o.columns {
         let unit = c.unit.as_ref().filter(|u| !u.is_empty() && *u != "1");

@@ -7,21 +7,17 @@ use psidpd_formats::{About, FormatError, THERMO};
 use psidpd_observe::statistics::{MINIMUM_SAMPLES, estimate};
 use std::path::Path;
 
-/// A table of numbers: `thermo.csv`.
+/// The numbers of `thermo.csv`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
-    /// Names of the columns.
     pub header: Vec<String>,
-    /// The columns, all of one length. What is no number is NaN.
+    /// The columns have equal lengths. Entries that are not numbers become NaN.
     pub columns: Vec<Vec<f64>>,
 }
 
 impl Table {
-    /// Reads a file of comma-separated numbers with one line of names; `None` if there is no such file. A
-    /// last line that is not whole, as a run that was killed leaves it, is passed over.
-    ///
-    /// # Errors
-    /// A file that cannot be read.
+    /// Reads a file of comma-separated numbers with one line of names; `None` if the file does not exist. An incomplete last
+    /// line, which a killed run may leave, is ignored.
     pub fn read(path: &Path) -> Result<Option<Table>, FormatError> {
         let Some(text) = super::text(path)? else { return Ok(None) };
         let mut lines = text.lines().filter(|l| !l.trim().is_empty());
@@ -39,18 +35,16 @@ impl Table {
         Ok(Some(Table { header, columns }))
     }
 
-    /// A column.
     pub fn get(&self, name: &str) -> Option<&[f64]> {
         self.header.iter().position(|h| h == name).map(|k| self.columns[k].as_slice())
     }
 
-    /// How many rows there are.
     pub fn rows(&self) -> usize {
         self.columns.first().map_or(0, Vec::len)
     }
 }
 
-/// Most points of a curve: more cannot be seen.
+/// The largest number of points of a curve; more would not be visible.
 const POINTS: usize = 1200;
 
 pub fn section(table: Option<&Table>, about: Option<&About>, particles: Option<usize>) -> Section {
@@ -80,13 +74,13 @@ pub fn last_stage(table: &Table, about: Option<&About>) -> std::ops::Range<usize
     stages[stages.len() - 1].1.clone()
 }
 
-/// The table with what is known of its rows.
+/// The table with the properties of its rows.
 struct Curves<'a> {
     table: &'a Table,
     about: Option<&'a About>,
-    /// What the abscissa is, and its values.
+    /// The name and the values of the abscissa.
     x: (&'static str, Vec<f64>),
-    /// Rows of each stage, with its name.
+    /// The rows of each stage, with its name.
     stages: Vec<(String, std::ops::Range<usize>)>,
     drawn: Vec<&'a str>,
 }
@@ -101,7 +95,7 @@ impl<'a> Curves<'a> {
         let steps = table.get("step").map_or_else(count, <[f64]>::to_vec);
         let mut stages = Vec::new();
         for stage in about.map_or(&[][..], |a| &a.stages) {
-            // The state that a stage starts from is not of that stage.
+            // The initial state of a stage does not belong to that stage.
             let first = steps.partition_point(|s| *s <= stage.begin as f64);
             let end = steps.partition_point(|s| *s <= stage.end as f64);
             if end > first {
@@ -122,7 +116,7 @@ impl<'a> Curves<'a> {
         }
     }
 
-    /// What a column is, and its unit.
+    /// The title and the unit of a column.
     fn column(&self, name: &str) -> (String, String) {
         let told = self.about.and_then(|a| a.thermo.iter().find(|c| c.name == name));
         let known = THERMO.iter().find(|c| c.0 == name);
@@ -216,7 +210,7 @@ impl<'a> Curves<'a> {
         {
             let mut plot = self.empty(title, &self.label("running mean", names[0].0));
             for (name, label) in names {
-                // In two dimensions what has to do with z is zero.
+                // In two dimensions all components that involve z are zero.
                 if let Some(values) = self.take(name).filter(|v| v.iter().any(|p| *p != 0.0)) {
                     plot.series.push(Series {
                         name: label.into(),
@@ -248,10 +242,10 @@ impl<'a> Curves<'a> {
         plots
     }
 
-    /// Takes rows out of a plot that would leave no room for the last stage; says how many.
+    /// Removes rows from a plot that would leave no room for the last stage; returns their number.
     fn clip(&self, plot: &mut Plot) -> usize {
         let rows = &self.stages[self.stages.len() - 1].1;
-        // A single stage begins with its own way to equilibrium.
+        // A single stage begins with its own equilibration.
         let first = if self.stages.len() > 1 { rows.start } else { rows.start + rows.len() / 2 };
         let from = self.x.1[first];
         let late = |p: &&(f64, f64)| p.0 >= from && p.1.is_finite();
@@ -302,7 +296,7 @@ impl<'a> Curves<'a> {
         }
     }
 
-    /// Single rows, and their running mean.
+    /// Plots single rows and their running mean.
     fn plot(&self, title: &str, label: &str, values: &[f64]) -> Plot {
         let mut plot = self.empty(title, label);
         let rows: Vec<(f64, f64)> = self.x.1.iter().copied().zip(values.iter().copied()).collect();
@@ -320,7 +314,7 @@ impl<'a> Curves<'a> {
         plot
     }
 
-    /// Means from the start of each stage; stages are apart from each other.
+    /// Means from the start of each stage. A gap separates the stages.
     fn running(&self, values: &[f64]) -> Vec<(f64, f64)> {
         let mut points = Vec::new();
         for (_, rows) in &self.stages {
@@ -334,7 +328,7 @@ impl<'a> Curves<'a> {
                 stage.push((self.x.1[k], sum / count));
             }
             points.extend(thin(&stage));
-            // Not a number: the line ends here.
+            // A NaN ends the line here.
             points.push((f64::NAN, f64::NAN));
         }
         points.pop();
@@ -342,7 +336,7 @@ impl<'a> Curves<'a> {
     }
 }
 
-/// Of many points the lowest and the highest of each short piece, so that the curve looks as it was.
+/// Keeps the lowest and the highest point of each short piece of a long curve, so that the curve looks the same.
 fn thin(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     if points.len() <= POINTS {
         return points.to_vec();

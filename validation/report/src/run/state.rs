@@ -10,24 +10,23 @@ use psidpd_pictures::{FieldOptions, ParticleOptions, View};
 use psidpd_pictures::{animate, animation_url};
 use std::path::Path;
 
-/// The last state that a folder has.
+/// The last state in a folder.
 pub struct State {
-    /// The file it is from.
+    /// The name of the file with the state.
     pub file: &'static str,
-    /// The particles.
     pub configuration: Configuration,
 }
 
 impl State {
-    /// Looks in the files of a run, the latest first.
+    /// Searches the files of a run, the latest first.
     pub fn find(folder: &Path, about: Option<&About>, notes: &mut Vec<String>) -> Option<State> {
         for file in ["final.data", "last-good.data", "dump.lammpstrj", "trajectory.xyz"] {
             let path = folder.join(file);
             if !path.is_file() {
                 continue;
             }
-            // A line of a data file becomes a number several times over. Frames of a dump are as large, and how many there are nobody
-            // knows before.
+            // A line of a data file becomes several numbers in memory. Frames of a dump are as large, and their number is not
+            // known in advance.
             if file.ends_with(".data")
                 && let Ok(about_file) = path.metadata()
                 && let Err(error) =
@@ -113,7 +112,7 @@ fn figures(state: &State, about: Option<&About>, items: &mut Vec<Item>) {
     }
 }
 
-/// The first density of the model, or a quadratic one of range 1.
+/// The first density of the model, or a quadratic density of range 1.
 fn density(about: Option<&About>, dimensions: usize) -> (FieldOptions, String) {
     let own = about.and_then(|a| a.densities.first()).and_then(|d| {
         let kind = KernelKind::from_name(&d.kernel)?;

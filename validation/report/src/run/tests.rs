@@ -137,7 +137,7 @@ fn every_observable_and_every_series_is_shown_with_its_error() {
     ] {
         has(text);
     }
-    // Error bars of the profile: five points have them, each a stroke and two caps.
+    // Five points of the profile have error bars, each with a stroke and two caps.
     let start = page.find("<title>Density profile</title>").unwrap();
     let plot = &page[start..start + page[start..].find("</svg>").unwrap()];
     assert!(plot.matches("<polyline").count() + plot.matches("<line").count() >= 9, "{plot}");
