@@ -16,7 +16,7 @@ fn scenes(folder: &str) -> Vec<PathBuf> {
 /// A few steps of every stage of every quick scene and template, with a sample of all that it observes at each of them.
 #[test]
 fn quick_scenes_run() {
-    let paths = [scenes("scenes"), scenes("src/scene/templates")].concat();
+    let paths = [scenes("scenes"), scenes("dynamics/src/scene/templates")].concat();
     assert!(paths.len() > 35, "{}", paths.len());
     let mut sampled = 0;
     for path in paths {
