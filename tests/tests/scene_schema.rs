@@ -218,7 +218,7 @@ fn schema_and_reference_are_current() {
 
 /// Every scene that ships, quick and full-sized, and every template.
 fn scenes() -> Vec<PathBuf> {
-    let folders = ["scenes", "scenes/full", "src/scene/templates"].map(|f| root().join(f));
+    let folders = ["scenes", "scenes/full", "dynamics/src/scene/templates"].map(|f| root().join(f));
     let mut found: Vec<PathBuf> = folders
         .iter()
         .flat_map(|folder| std::fs::read_dir(folder).unwrap())
