@@ -3,8 +3,8 @@
 use super::HardCasesError;
 use super::case::{Case, Found, Must, Run};
 use psidpd_core::document::FileError;
-use psidpd_core::engine::pair_sums::Evaluator;
 use psidpd_core::engine::{Fault, Precision, Settings, Want};
+use psidpd_core::truth;
 use psidpd_dynamics::integrator::Integrator;
 use psidpd_dynamics::particles::State;
 use psidpd_dynamics::run::{Begin, Outcome, RunError, Runner, Simulation};
@@ -135,8 +135,10 @@ fn forces(scene: &Scene, fault: Option<Fault>) -> Result<Found, HardCasesError> 
     let mut run = simulation(scene, scene.initial_state(), fault)?;
     run.set_thermostat(false);
     run.prepare(scene.stages[0].dt, Want::FORCES)?;
-    let evaluator = Evaluator::new(scene.model.at(scene.kt)?).map_err(RunError::from)?;
-    let expected = evaluator.evaluate(run.positions(), run.species(), run.domain()).forces;
+    let species: Vec<usize> = run.species().iter().map(|s| *s as usize).collect();
+    let fluid = scene.model.at(scene.kt)?;
+    let truth = truth::conservative(&fluid, run.positions(), &species, run.domain());
+    let expected = truth.map_err(RunError::from)?.forces;
     let largest = expected.iter().flatten().fold(f64::MIN_POSITIVE, |m, c| m.max(c.abs()));
     let pairs = expected.iter().flatten().zip(run.forces().iter().flatten());
     let differs = pairs.map(|(a, b)| (a - b).abs() / largest).fold(0.0, f64::max);
