@@ -65,7 +65,7 @@ fn read_all(root: &Section, defaults: Defaults) -> Result<Vec<Stage>, FileError>
     let (steps, equilibrate) = (root.get("steps"), root.get("equilibrate"));
     let Some(value) = root.get("stage") else { return read_short(root, steps, equilibrate, defaults) };
     if let Some(other) = steps.or(equilibrate) {
-        let message = "there are [[stage]] tables too: give one of them".to_owned();
+        let message = "the scene has [[stage]] tables too: keep one of the two".to_owned();
         return Err(other.error(FileErrorKind::Value(message)));
     }
     let mut stages: Vec<Stage> = Vec::new();
