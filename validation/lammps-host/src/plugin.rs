@@ -364,8 +364,7 @@ mod tests {
         HostVersion { number, abi: "smallbig mpich".into(), name: "a test".into(), plugins: true }
     }
 
-    /// A stand-in for cargo: it makes two libraries of `text` in the build folder that its last two arguments
-    /// name.
+    /// A stand-in for cargo: it makes two libraries of `text` in the build folder that its last two arguments name.
     fn cargo(path: &Path, text: &str) {
         let message = |target: &str, files: &str| {
             format!(

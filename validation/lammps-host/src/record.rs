@@ -29,8 +29,7 @@ fn check_packages(packages: &Path) -> Result<(), LammpsError> {
     Ok(())
 }
 
-/// Checks one line, which has a file, its hash and its size; the last two are empty for files that Python
-/// creates.
+/// Checks one line, which has a file, its hash and its size; the last two are empty for files that Python creates.
 fn check_file(packages: &Path, line: &str) -> Result<(), LammpsError> {
     let mut fields = line.rsplitn(3, ',');
     let size: Option<u64> = fields.next().and_then(|size| size.parse().ok());

@@ -6,8 +6,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// The values of all keys of a scene and of its model. Comments, the order of keys and number formats do not
-/// count.
+/// The values of all keys of a scene and of its model. Comments, the order of keys and number formats do not count.
 ///
 /// A key that names a file has the content of the file as its value. Titles and the interval of checkpoints
 /// are left out: they change nothing in a trajectory.

@@ -39,8 +39,7 @@ impl Store {
         [NEWEST, BEFORE].iter().any(|name| self.folder.join(name).symlink_metadata().is_ok())
     }
 
-    /// Writes a new checkpoint and keeps the newest as the previous one. If that fails, the present
-    /// checkpoints stay.
+    /// Writes a new checkpoint and keeps the newest as the previous one. If that fails, the present checkpoints stay.
     pub fn write(&self, checkpoint: &Checkpoint) -> Result<(), WriteError> {
         let new = self.folder.join(UNFINISHED);
         let newest = self.path();
@@ -67,8 +66,7 @@ impl Store {
             return Ok(());
         }
         remove_if_there(&before)?;
-        // Without hard links the newest is renamed; a run killed now leaves `checkpoint.old` alone, which
-        // suffices.
+        // Without hard links the newest is renamed; a run killed now leaves `checkpoint.old` alone, which suffices.
         std::fs::hard_link(&newest, &before).or_else(|_| std::fs::rename(&newest, &before))
     }
 

@@ -1,7 +1,6 @@
-//! Balances of momentum from the observed stress. The time step is so long that velocities at the ends of
-//! steps and conservative forces alone miss the balance by far. Errors are those of the mean of sixteen
-//! stretches of a run; six standard errors are exceeded by chance less than once in 10⁴ runs. The seeds are
-//! fixed.
+//! Balances of momentum from the observed stress. The time step is so long that velocities at the ends of steps
+//! and conservative forces alone miss the balance by far. Errors are those of the mean of sixteen stretches of
+//! a run; six standard errors are exceeded by chance less than once in 10⁴ runs. The seeds are fixed.
 
 use super::find;
 use crate::run::{Integrator, Simulation};
@@ -25,8 +24,7 @@ fn scene(lengths: &str, initial: &str, observe: &str) -> Scene {
     Scene::parse("s.toml", &text, folder.path()).unwrap()
 }
 
-/// Observes sixteen stretches of a run of velocity Verlet. Each stretch has `samples` samples, one every
-/// fifth step.
+/// Observes sixteen stretches of a run of velocity Verlet. Each stretch has `samples` samples, one every fifth step.
 fn stretches(scene: &Scene, simulation: &mut Simulation, samples: usize) -> Vec<Vec<Observation>> {
     let integrator = Integrator::VelocityVerlet;
     let stretch = |_| {

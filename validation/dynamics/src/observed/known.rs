@@ -161,8 +161,7 @@ fn diffusion_knows_how_many_directions_there_are() {
     }
 }
 
-/// Soft spheres in a row, the middle one frozen: `F = a (1 − r)` and `∇²U = a − 2a (1 − r)/r` of the end
-/// particles alone.
+/// Soft spheres in a row, the middle one frozen: `F = a (1 − r)` and `∇²U = a − 2a (1 − r)/r` of the end particles alone.
 #[test]
 fn the_configurational_temperature_leaves_frozen_particles_out() {
     let x = [[1.0, 2.0, 2.0], [1.8, 2.0, 2.0], [2.7, 2.0, 2.0]];

@@ -90,8 +90,7 @@ fn of_a_lattice() {
         assert!((s[shell] - expected).abs() < 1e-9, "{shell}: {} {expected}", s[shell]);
         peaks += bragg;
     }
-    // Wave vectors ±(1,0,0), (1,1,0), (1,1,1), (2,0,0) and so on within 14/2π = 2.23: half of 6 + 12 + 8 + 6
-    // + 24 - ...
+    // Wave vectors ±(1,0,0), (1,1,0), (1,1,1), (2,0,0) and so on within 14/2π = 2.23: half of 6 + 12 + 8 + 6 + 24 - ...
     let within = (-3i32..=3)
         .flat_map(|x| (-3i32..=3).flat_map(move |y| (-3i32..=3).map(move |z| x * x + y * y + z * z)))
         .filter(|q| *q > 0 && f64::from(*q).sqrt() * TAU <= 14.0)

@@ -312,11 +312,10 @@ fn an_ideal_gas_has_no_structure() {
     }
 }
 
-/// A small drop of Warren's liquid. Its radius is that of a sphere with as many particles at the density of
-/// its liquid: 6.06 as in the plane, and more by 2γ/R over ∂p/∂ρ = 48. A tanh profile of width 2d adds
-/// 5π²d²/(24R) to the radius of gyration. The tension is Warren's for the plane. Each limit of five standard
-/// errors is exceeded by chance once in 10^6. The mean local density ⟨n⟩/ρ is [w g], but for the width of the
-/// shells.
+/// A small drop of Warren's liquid. Its radius is that of a sphere with as many particles at the density of its
+/// liquid: 6.06 as in the plane, and more by 2γ/R over ∂p/∂ρ = 48. A tanh profile of width 2d adds 5π²d²/(24R)
+/// to the radius of gyration. The tension is Warren's for the plane. Each limit of five standard errors is
+/// exceeded by chance once in 10^6. The mean local density ⟨n⟩/ρ is [w g], but for the width of the shells.
 #[test]
 fn a_drop_of_liquid() {
     let text = "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7\n[box]\nlengths = [11.0, 11.0, 11.0]\n\

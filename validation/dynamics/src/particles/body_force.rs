@@ -4,9 +4,8 @@ use super::tags::Tags;
 use psidpd_core::engine::{PeriodicBox, Pool, part};
 use psidpd_observe::Drive;
 
-/// A constant acceleration of some of the particles, as by gravity. Reversed in the upper half of the box
-/// along one direction, it drives two opposite Poiseuille flows (Backer et al., J. Chem. Phys. 122, 154503
-/// (2005)).
+/// A constant acceleration of some of the particles, as by gravity. Reversed in the upper half of the box along
+/// one direction, it drives two opposite Poiseuille flows (Backer et al., J. Chem. Phys. 122, 154503 (2005)).
 #[derive(Debug, Clone, PartialEq)]
 pub struct BodyForce {
     /// The acceleration; the force is the mass times the acceleration.
@@ -118,8 +117,7 @@ mod tests {
             let v: Vec<f64> = of.map(|k| run.velocities()[k][0]).collect();
             v.iter().sum::<f64>() / v.len() as f64
         };
-        // Without viscosity the means are 2 and -2; thermal velocities give the mean of 430 particles an
-        // error of 0.04.
+        // Without viscosity the means are 2 and -2; thermal velocities give the mean of 430 particles an error of 0.04.
         assert!(mean(false) > 0.5 && mean(true) < -0.5, "{} {}", mean(false), mean(true));
     }
 }

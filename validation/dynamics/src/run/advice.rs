@@ -9,8 +9,7 @@ use psidpd_observe::frame::Frame;
 use serde::Serialize;
 use std::fmt;
 
-/// The recommended step: its λ is the best in liquids whose forces have kinks; the thermostat acts at every
-/// second step.
+/// The recommended step: its λ is the best in liquids whose forces have kinks; the thermostat acts at every second step.
 const ADVISED: Integrator = Integrator::ForceGradient {
     lambda: 0.17,
     gradient: 1.0 / 24.0,
@@ -55,8 +54,7 @@ impl Advice {
         }
         let drag = simulation.warmth(stage.dt).ok()??.rate;
         let frequency = frequency(simulation)?;
-        // Weak drag needs shorter steps, because it removes little of the energy that the step does not
-        // conserve.
+        // Weak drag needs shorter steps, because it removes little of the energy that the step does not conserve.
         let reach = (0.75 + 0.4 * drag / frequency).min(1.25);
         let better_dt = two_digits(reach / frequency);
         let errors = stage.integrator.accuracy().errors(stage.dt, frequency, drag);

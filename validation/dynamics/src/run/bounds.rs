@@ -38,9 +38,8 @@ impl Bounds {
     }
 }
 
-/// The highest coordinate, not above `end`, whose fraction of an edge is below 1; the box has edges along the
-/// axes. Rounding decides which coordinate that is. Rounding preserves order, so all lower coordinates are
-/// inside too.
+/// The highest coordinate, not above `end`, whose fraction of an edge is below 1; the box has edges along the axes.
+/// Rounding decides which coordinate that is. Rounding preserves order, so all lower coordinates are inside too.
 fn last_inside(domain: &PeriodicBox, k: usize, mut end: f64) -> f64 {
     let mut point = domain.origin();
     for _ in 0..TRIES {

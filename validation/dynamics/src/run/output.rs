@@ -25,8 +25,7 @@ pub const FILES: [&str; 5] = [ThermoFile::NAME, DUMP, XYZ, "final.data", "last-g
 /// Files that are written when a run ends or stops.
 const LAST: [&str; 5] = ["final.data", "last-good.data", OBSERVABLES, "summary.json", "report.html"];
 
-/// Whether a new run in `folder` would remove or replace `input`, which is a file or the folder of another
-/// run.
+/// Whether a new run in `folder` would remove or replace `input`, which is a file or the folder of another run.
 pub(super) fn replaces(folder: &Path, input: &Path) -> bool {
     let (Ok(folder), Ok(input)) = (folder.canonicalize(), input.canonicalize()) else { return false };
     let name = input.file_name().and_then(|name| name.to_str()).unwrap_or_default();
@@ -61,8 +60,7 @@ impl Output {
         Ok(Output { thermo: thermo.transpose()?, dump: dump.transpose()?, xyz: xyz.transpose()? })
     }
 
-    /// Opens the files of a resumed run and truncates them to the bytes that were `written` at its
-    /// checkpoint.
+    /// Opens the files of a resumed run and truncates them to the bytes that were `written` at its checkpoint.
     pub fn reopen(folder: &Path, written: &BTreeMap<String, Written>) -> Result<Output, RunError> {
         remove_tables(folder)?;
         remove(folder, &LAST)?;
@@ -110,8 +108,7 @@ impl Output {
     }
 }
 
-/// Writes `observables.json` and the tables in `observables/`, if there are any observations, and syncs them
-/// to the disk.
+/// Writes `observables.json` and the tables in `observables/`, if there are any observations, and syncs them to the disk.
 pub(super) fn write_observations(folder: &Path, observations: &[Observation]) -> Result<(), RunError> {
     if observations.is_empty() {
         return Ok(());
@@ -130,8 +127,7 @@ fn remove_tables(folder: &Path) -> Result<(), RunError> {
     let all: Vec<Observation> = serde_json::from_str(&text).unwrap_or_default();
     let remove = || -> io::Result<()> {
         for observation in &all {
-            // A name in a file from elsewhere may be a path out of the folder, so only names without folders
-            // count.
+            // A name in a file from elsewhere may be a path out of the folder, so only names without folders count.
             let name = observation.file_name(&all);
             if Path::new(&name).file_name() == Some(name.as_ref()) {
                 remove_if_there(&tables.join(name))?;

@@ -9,9 +9,8 @@ use std::slice::Iter;
 /// into a cell column that is still close in memory.
 pub const INTERVAL: u64 = 32;
 
-/// Whether particles are reordered at the end of a step. The answer depends on the step number only, so that
-/// a resumed run reorders at the same steps. These numbers are odd, because observables usually sample at
-/// even ones.
+/// Whether particles are reordered at the end of a step. The answer depends on the step number only, so that a
+/// resumed run reorders at the same steps. These numbers are odd, because observables usually sample at even ones.
 pub(super) fn is_due(step: u64) -> bool {
     step % INTERVAL == 1
 }

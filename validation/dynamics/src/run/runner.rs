@@ -53,8 +53,7 @@ pub enum Start {
     Finished,
 }
 
-/// Runs a scene from its first step to its last and replaces an earlier run in the folder `out`; see
-/// [`Runner`].
+/// Runs a scene from its first step to its last and replaces an earlier run in the folder `out`; see [`Runner`].
 ///
 /// # Errors
 /// [`RunError::Stopped`] if the physics fails; [`RunError::Halted`] or [`RunError::Output`] if a file
@@ -158,8 +157,7 @@ impl<'a> Runner<'a> {
         };
         let good = Checkpoint { program: PROGRAM.into(), instructions, ..good };
         let timing = Timing::read(folder.path());
-        // `about.json` is independent of the step at which a run stopped. The folder of a finished run may be
-        // read-only.
+        // `about.json` is independent of the step at which a run stopped. The folder of a finished run may be read-only.
         if !folder.path().join("about.json").is_file() {
             super::about::about(scene)
                 .write(folder.path())
@@ -174,8 +172,7 @@ impl<'a> Runner<'a> {
         &self.start
     }
 
-    /// Sets the wall time between checkpoints for a scene without a step interval; the default is ten
-    /// minutes.
+    /// Sets the wall time between checkpoints for a scene without a step interval; the default is ten minutes.
     pub fn set_checkpoint_interval(&mut self, interval: Duration) {
         self.run.interval = interval;
     }
@@ -207,8 +204,7 @@ impl<'a> Runner<'a> {
         self.run.simulation.len()
     }
 
-    /// Makes the remaining steps. The run writes a checkpoint and ends after the first step at which `stop`
-    /// is not 0.
+    /// Makes the remaining steps. The run writes a checkpoint and ends after the first step at which `stop` is not 0.
     ///
     /// # Errors
     /// [`RunError::Stopped`] if the physics fails; [`RunError::Halted`] if a file cannot be written.
@@ -239,8 +235,7 @@ fn simulation(scene: &Scene, state: State) -> Result<Simulation, RunError> {
     Ok(simulation)
 }
 
-/// Checks that a run can continue from a checkpoint: it belongs to this scene, and the files hold the bytes
-/// that it records.
+/// Checks that a run can continue from a checkpoint: it belongs to this scene, and the files hold the bytes that it records.
 fn usable(
     checkpoint: &Checkpoint,
     identity: &Identity,

@@ -18,9 +18,8 @@ impl Scene {
         Ok(simulation)
     }
 
-    /// Whether the length of trial moves is still tuned before step `done` of stage `index`. It is tuned in
-    /// the first Monte Carlo stage, including all levels of a ramp; if that is the only one, in its first
-    /// quarter.
+    /// Whether the length of trial moves is still tuned before step `done` of stage `index`. It is tuned in the
+    /// first Monte Carlo stage, including all levels of a ramp; if that is the only one, in its first quarter.
     pub(super) fn settles(&self, index: usize, done: u64) -> bool {
         let mut trials = self.stages.iter().filter(|stage| !stage.integrator.has_time());
         let (Some(first), stage) = (trials.next(), &self.stages[index]) else { return false };

@@ -30,8 +30,7 @@ impl Walls {
     }
 
     /// Reflects a particle that crossed a face, and calls `turn` with each reversed direction. Velocities and
-    /// forces that an integrator has kept must be reversed too: its step began on the other side of the
-    /// mirror.
+    /// forces that an integrator has kept must be reversed too: its step began on the other side of the mirror.
     pub fn reflect(&self, x: &mut [f64; 3], mut turn: impl FnMut(usize)) {
         for (k, [low, high]) in self.faces.iter().enumerate().filter_map(|(k, f)| Some((k, (*f)?))) {
             if x[k] < low {
@@ -68,8 +67,7 @@ mod tests {
         State { v, ..State::at_rest(domain, vec![1.0], (0..count).map(point).collect()) }
     }
 
-    /// A free particle between two walls follows the triangle wave, the folded path of a particle without
-    /// walls.
+    /// A free particle between two walls follows the triangle wave, the folded path of a particle without walls.
     #[test]
     fn free_particles_bounce_to_and_fro() {
         let start = state([false, true, false], 200);
@@ -90,8 +88,7 @@ mod tests {
                     assert!((run.velocities()[k][c] - sign * start.v[k][c]).abs() < 1e-12);
                 }
             }
-            // Momentum is conserved along y alone, and each direction has its share of the degrees of
-            // freedom.
+            // Momentum is conserved along y alone, and each direction has its share of the degrees of freedom.
             assert_eq!(run.degrees_of_freedom(), 599);
         }
     }

@@ -1,5 +1,4 @@
-//! Watches the temperature of a run: warns if it deviates from its target, and stops a run that stays far too
-//! hot.
+//! Watches the temperature of a run: warns if it deviates from its target, and stops a run that stays far too hot.
 //!
 //! The temperature is that of the relative velocities which drag and noise act on, so the motion of a drop or
 //! a flow does not count. Each stage has a number of samples, a long stage one every [`INTERVAL`] steps, at a
@@ -28,17 +27,15 @@ const LEAST: u64 = 10;
 /// Target number of samples in a short stage.
 const SAMPLES: u64 = 24;
 
-/// Largest and smallest number of steps between configurational temperatures; one costs about as much as ten
-/// steps.
+/// Largest and smallest number of steps between configurational temperatures; one costs about as much as ten steps.
 const RARE: u64 = 1000;
 const LEAST_RARE: u64 = 250;
 
 /// Target number of configurational temperatures in a short stage.
 const LOOKS: u64 = 12;
 
-/// A run stops if it is hotter than this, in kT, for [`PATIENCE`] relaxation times and [`IN_A_ROW`] samples,
-/// and has not cooled to [`COOLER`] of its lowest temperature for as long. A start that cools, even slowly,
-/// continues.
+/// A run stops if it is hotter than this, in kT, for [`PATIENCE`] relaxation times and [`IN_A_ROW`] samples, and
+/// has not cooled to [`COOLER`] of its lowest temperature for as long. A start that cools, even slowly, continues.
 const FAR_OFF: f64 = 2.0;
 const PATIENCE: f64 = 10.0;
 const IN_A_ROW: u64 = 4;
@@ -146,8 +143,7 @@ impl Hot {
     }
 }
 
-/// Sums over the spatial blocks of one configuration: of `a` = Σ F·F and `b` = Σ ∇²U of each block, and of
-/// their products.
+/// Sums over the spatial blocks of one configuration: of `a` = Σ F·F and `b` = Σ ∇²U of each block, and of their products.
 #[derive(Debug, Clone, Copy)]
 struct Configurational {
     a: f64,
@@ -237,8 +233,7 @@ impl Watch {
             (Thermometer::Configurational, estimate_configurational(configurational, stage.kt), false),
         ];
         let deviation = |(thermometer, found, falls): (Thermometer, Option<Estimate>, bool)| {
-            // A falling temperature scatters by its trend; it counts as too high if every sample was too
-            // high.
+            // A falling temperature scatters by its trend; it counts as too high if every sample was too high.
             let Estimate { mean, error, .. } =
                 found.filter(|found| is_off(found) || falls && is_above(kinetic))?;
             Some(Deviation { stage: stage.name.clone(), thermometer, mean, error, falls, dt })
@@ -265,8 +260,7 @@ fn is_above(samples: &[f64]) -> bool {
     0.5f64.powi(samples.len() as i32) < ALARM && samples.iter().all(|ratio| *ratio > 1.0 + TOLERANCE)
 }
 
-/// Whether the mean of the later half of the samples is below that of the earlier half by more than two
-/// standard errors.
+/// Whether the mean of the later half of the samples is below that of the earlier half by more than two standard errors.
 fn falls(samples: &[f64]) -> bool {
     let half = |samples: &[f64]| {
         let n = samples.len() as f64;
@@ -292,8 +286,7 @@ fn estimate(samples: &[f64]) -> Option<Estimate> {
 }
 
 /// `Σ a/Σ b` in units of kT. The error of each configuration comes from its blocks, and their number sets the
-/// degrees of freedom of this error. The error of a long series is at least that from the scatter of the
-/// series.
+/// degrees of freedom of this error. The error of a long series is at least that from the scatter of the series.
 fn estimate_configurational(samples: &[Configurational], kt: f64) -> Option<Estimate> {
     let sum = |f: &dyn Fn(&Configurational) -> f64| samples.iter().map(f).sum::<f64>();
     let (a, b) = (sum(&|s| s.a), sum(&|s| s.b));
@@ -308,8 +301,7 @@ fn estimate_configurational(samples: &[Configurational], kt: f64) -> Option<Esti
     (error.is_finite() && error > 0.0).then_some(found)
 }
 
-/// The sums for a configurational temperature; `None` if the model has none or the blocks are too few for an
-/// error.
+/// The sums for a configurational temperature; `None` if the model has none or the blocks are too few for an error.
 fn configurational(simulation: &Simulation) -> Option<Configurational> {
     let fluid = simulation.model().at(simulation.kt()).ok()?;
     if simulation.has_body_forces() || configurational::missing(&fluid, simulation.domain()).is_some() {
@@ -388,8 +380,7 @@ mod tests {
         };
         for n in [4, 5, 12, 40] {
             let falling = (0..1000).filter(|_| falls(&scattered(&mut rng, n, 0.0))).count();
-            // Student's t of two degrees of freedom is above 2 in 9 % of the cases, the normal distribution
-            // in 2 %.
+            // Student's t of two degrees of freedom is above 2 in 9 % of the cases, the normal distribution in 2 %.
             assert!(falling < 150, "{n}: {falling}");
             assert!(falls(&scattered(&mut rng, n, 0.5)) && !falls(&scattered(&mut rng, n, -0.5)), "{n}");
         }

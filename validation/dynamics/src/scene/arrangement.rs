@@ -5,8 +5,7 @@ use psidpd_core::document::{FileError, FileErrorKind, Section};
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Arrangement {
-    /// At random: uniformly and independently, or at least `min_distance` from each other and from earlier
-    /// particles.
+    /// At random: uniformly and independently, or at least `min_distance` from each other and from earlier particles.
     Random {
         /// The minimum distance; 0 for independent particles.
         min_distance: f64,

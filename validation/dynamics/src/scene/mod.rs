@@ -8,8 +8,7 @@
 //! steps   = 1000
 //! ```
 //!
-//! `docs/scene-file.md` describes every key; it is written from the table in [`keys`], and tests compare the
-//! reader with it.
+//! `docs/scene-file.md` describes every key; it is written from the table in [`keys`], and tests compare the reader with it.
 
 mod arrangement;
 mod body_force;

@@ -23,8 +23,7 @@ impl Velocities {
         }
     }
 
-    /// Reads the velocities of a start from a file: `None` keeps those of the file, which is the default if
-    /// `keep` is set.
+    /// Reads the velocities of a start from a file: `None` keeps those of the file, which is the default if `keep` is set.
     pub(super) fn read_or_keep(initial: &Section, keep: bool) -> Result<Option<Velocities>, FileError> {
         let names =
             [("thermal", Some(Velocities::Thermal)), ("zero", Some(Velocities::Zero)), ("keep", None)];

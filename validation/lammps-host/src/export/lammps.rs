@@ -72,8 +72,7 @@ pub enum DeckError {
     Output { path: PathBuf, source: std::io::Error },
 }
 
-/// Writes the deck of `scene` to the folder `out`, which is created if it is missing, and returns the paths
-/// of its files.
+/// Writes the deck of `scene` to the folder `out`, which is created if it is missing, and returns the paths of its files.
 ///
 /// # Errors
 /// The scene has no counterpart in LAMMPS, or a file cannot be written; see [`DeckError`].
@@ -206,8 +205,7 @@ fn without_thermostat(text: &str) -> String {
     kept
 }
 
-/// Whether the model at `path` equals the fluids of the scene, without their thermostat if `thermostat` is
-/// false.
+/// Whether the model at `path` equals the fluids of the scene, without their thermostat if `thermostat` is false.
 fn compare(scene: &Scene, path: &Path, thermostat: bool) -> Result<bool, DeckError> {
     let copy = Model::open(path)?;
     let same = |a: &Fluid, b: &Fluid| {

@@ -18,8 +18,7 @@ impl Simulation {
         self.compute(Want::FORCES, None)?;
         self.add_external_forces();
         self.displace(c);
-        // A displaced particle may lie beyond a wall; its forces are those at its true position, not at the
-        // wall.
+        // A displaced particle may lie beyond a wall; its forces are those at its true position, not at the wall.
         let within = self.beyond_walls().map(|wide| self.particles.replace_domain(wide));
         let made = self.compute(Want { virial: self.is_recording(), ..Want::FORCES }, None);
         let wide = within.map(|within| self.particles.replace_domain(within));
@@ -64,8 +63,8 @@ impl Simulation {
                 .fold([low[k], low[k] + lengths[k]], |[a, b], x| [a.min(x[k]), b.max(x[k])]);
             (low[k], lengths[k]) = (ends[0], ends[1] - ends[0]);
         }
-        // Boxes with walls are never tilted. Positions that are not finite make this `None`; the evaluation
-        // then refuses them.
+        // Boxes with walls are never tilted. Positions that are not finite make this
+        // `None`; the evaluation then refuses them.
         PeriodicBox::orthogonal(low, lengths, domain.periodic()).ok()
     }
 }

@@ -26,8 +26,7 @@ impl External {
         &self.frozen
     }
 
-    /// Finds the frozen particles by their tags, because reordering moves them, and sets their velocities to
-    /// zero.
+    /// Finds the frozen particles by their tags, because reordering moves them, and sets their velocities to zero.
     pub fn find_frozen(&mut self, particles: &mut Particles) {
         self.frozen.clear();
         if self.frozen_tags.is_empty() {
@@ -88,8 +87,7 @@ impl Simulation {
         self.len() - self.frozen().iter().filter(|frozen| **frozen).count()
     }
 
-    /// The sum of all forces on the frozen particles in the last evaluation, which their support must
-    /// balance.
+    /// The sum of all forces on the frozen particles in the last evaluation, which their support must balance.
     pub fn support_force(&self) -> [f64; 3] {
         self.external.support_force
     }

@@ -1,5 +1,4 @@
-//! Forces between particles: the engine of one model at one temperature, and the totals of its last
-//! evaluation.
+//! Forces between particles: the engine of one model at one temperature, and the totals of its last evaluation.
 
 use super::particles::Particles;
 use super::{RunError, Simulation};

@@ -55,8 +55,7 @@ pub struct Simulation {
 }
 
 impl Simulation {
-    /// Creates a simulation of `model` at temperature `kt` from `state`, at step 0. Positions outside the box
-    /// are wrapped.
+    /// Creates a simulation of `model` at temperature `kt` from `state`, at step 0. Positions outside the box are wrapped.
     ///
     /// # Errors
     /// The model is invalid at `kt`, or `state` is invalid for it.
@@ -133,8 +132,7 @@ impl Simulation {
         self.prepare_for(Integrator::default(), dt, want)
     }
 
-    /// As [`Simulation::prepare`], for steps of `integrator`: without the thermostat, if that is not part of
-    /// its forces.
+    /// As [`Simulation::prepare`], for steps of `integrator`: without the thermostat, if that is not part of its forces.
     ///
     /// # Errors
     /// The errors of [`Simulation::step`].
@@ -151,8 +149,7 @@ impl Simulation {
         }
     }
 
-    /// Computes pair forces, without body forces: with the noise and drag of `step`, or conservative forces
-    /// only.
+    /// Computes pair forces, without body forces: with the noise and drag of `step`, or conservative forces only.
     ///
     /// # Errors
     /// The box is too narrow for the noise, or a position, ψ or a force is not finite.

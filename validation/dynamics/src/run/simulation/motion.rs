@@ -164,8 +164,7 @@ impl Simulation {
         self.refuse(faults, None, false)
     }
 
-    /// Calls `work` with the moving arrays, the box and its limits, and the threads; `dt` is the time of a
-    /// drift.
+    /// Calls `work` with the moving arrays, the box and its limits, and the threads; `dt` is the time of a drift.
     fn moving(
         &mut self,
         dt: Option<f64>,

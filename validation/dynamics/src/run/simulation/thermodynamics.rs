@@ -55,8 +55,7 @@ impl Simulation {
         self.over_volume(self.tally().total_virial())
     }
 
-    /// As [`Simulation::pressure_tensor`], with the virial of conservative forces alone, which has less
-    /// noise.
+    /// As [`Simulation::pressure_tensor`], with the virial of conservative forces alone, which has less noise.
     ///
     /// The two means differ by a term of order Δt: the drag of velocity Verlet uses the velocity that brought
     /// particles to their positions, which is correlated with their distance.

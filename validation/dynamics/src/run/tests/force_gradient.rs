@@ -19,8 +19,7 @@ fn forces_at(model: &Model, state: &State, x: Vec<[f64; 3]>) -> Vec<[f64; 3]> {
     there.forces().to_vec()
 }
 
-/// One step agrees with the formulas, whose forces are evaluated separately, in double precision with two
-/// masses.
+/// One step agrees with the formulas, whose forces are evaluated separately, in double precision with two masses.
 #[test]
 fn a_step_is_its_formulas() {
     let text = SET6

@@ -15,8 +15,8 @@ fn exact() -> Vec<Integrator> {
     all
 }
 
-/// Kinetic temperature, kurtosis of velocities and pairs in shells of an ideal gas of two masses, with their
-/// standard errors.
+/// Kinetic temperature, kurtosis of velocities and pairs in shells of an ideal gas of
+/// two masses, with their standard errors.
 struct Gas {
     temperature: [f64; 2],
     kurtosis: [f64; 2],
@@ -154,8 +154,8 @@ fn without_thermostat_all_are_of_second_order() {
         let order = (coarse / fine).log2() / 3.0;
         let orders = if name == "force-gradient" { 1.7..4.4 } else { 1.7..2.4 };
         assert!(orders.contains(&order), "{name}: order {order}: {coarse} and {fine}");
-        // The two-stage integrator evaluates forces twice; its error of the energy is less than half of that
-        // at the same cost.
+        // The two-stage integrator evaluates forces twice; its error of the energy is
+        // less than half of that at the same cost.
         assert!(name != "two-stage" || coarse < 0.5 * 2e-3, "{coarse}");
     }
 }
@@ -204,8 +204,7 @@ fn pressures_are_those_of_other_codes() {
     }
 }
 
-/// Consecutive steps with a deferred kick between them equal single steps. So do steps with energies at their
-/// ends.
+/// Consecutive steps with a deferred kick between them equal single steps. So do steps with energies at their ends.
 #[test]
 fn what_is_asked_for_changes_no_step() {
     let start = settled();

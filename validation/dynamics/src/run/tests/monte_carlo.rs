@@ -198,8 +198,7 @@ fn the_carried_pressure_is_the_conservative_one() {
 const SCENE: &str = "[[stage]]\nname = \"rest\"\nsteps = 6\nintegrator = \"monte-carlo\"\n\
     [[stage]]\nname = \"run\"\nsteps = 4\nintegrator = \"monte-carlo\"\nsweeps = 3\n[output]\nthermo = 2\ndump = 2\n";
 
-/// Results do not depend on threads; the length of moves is tuned in the first stage and constant in the
-/// second.
+/// Results do not depend on threads; the length of moves is tuned in the first stage and constant in the second.
 #[test]
 fn any_number_of_threads_writes_the_same_bytes() {
     let scene = scene_of(SET6, "[8.0, 8.0, 8.0]", 6.05, SCENE).unwrap();

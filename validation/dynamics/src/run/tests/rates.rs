@@ -40,8 +40,7 @@ fn with(update: Update, every: u64) -> Integrator {
     Integrator::Aboba(Coupling { update, every, ..Coupling::DEFAULT })
 }
 
-/// The factor by which a step scales `u` where drag and noise act at fixed positions; `None` for other
-/// integrators.
+/// The factor by which a step scales `u` where drag and noise act at fixed positions; `None` for other integrators.
 fn factor(integrator: Integrator, x: f64) -> Option<f64> {
     let midpoint = |x: f64| (1.0 - 0.5 * x) / (1.0 + 0.5 * x);
     match integrator {
@@ -58,8 +57,7 @@ fn factor(integrator: Integrator, x: f64) -> Option<f64> {
     }
 }
 
-/// Advances `u`, and the force along the pair times Δt/μ, by one step with a noise `xi` of variance 1; in
-/// units of √(kT/μ).
+/// Advances `u`, and the force along the pair times Δt/μ, by one step with a noise `xi` of variance 1; in units of √(kT/μ).
 fn one_step(integrator: Integrator, x: f64, [u, f]: [f64; 2], xi: f64) -> [f64; 2] {
     let noise = (2.0 * x).sqrt() * xi;
     let half = u + 0.5 * f;

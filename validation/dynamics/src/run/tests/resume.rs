@@ -260,8 +260,7 @@ fn an_unfinished_run_is_not_overwritten_by_mistake() {
     std::fs::remove_dir_all(folder.path().with_extension("whole")).unwrap();
 }
 
-/// A scene without a step interval gets checkpoints by the clock; one with the interval 0 gets none before
-/// the end.
+/// A scene without a step interval gets checkpoints by the clock; one with the interval 0 gets none before the end.
 #[test]
 fn checkpoints_come_when_they_are_due() {
     let [often, by_the_clock, ..] = scenes();

@@ -9,8 +9,7 @@ struct Cell {
 
 fn cell(lattice: Lattice) -> Cell {
     const HEXAGON: f64 = 1.732_050_807_568_877_2;
-    // Sites lie symmetrically in the cell, so that a lattice fits a block with equal margins at opposite
-    // faces.
+    // Sites lie symmetrically in the cell, so that a lattice fits a block with equal margins at opposite faces.
     let (edges, sites): (_, &[[f64; 3]]) = match lattice {
         Lattice::Simple => ([1.0; 3], &[[0.5, 0.5, 0.5]]),
         Lattice::Bcc => ([1.0; 3], &[[0.25, 0.25, 0.25], [0.75, 0.75, 0.75]]),

@@ -20,8 +20,7 @@ pub struct Crowded {
     pub placed: usize,
 }
 
-/// The initial state of a scene. The algorithm alone fixes the stream of the generator, so all machines give
-/// the same state.
+/// The initial state of a scene. The algorithm alone fixes the stream of the generator, so all machines give the same state.
 ///
 /// Particles of a crowded part are placed nevertheless, closer than their minimum distance; reading a
 /// [`Scene`] detects this and refuses the file.

@@ -11,8 +11,7 @@ pub struct Near<'a> {
 }
 
 impl<'a> Near<'a> {
-    /// Creates an empty set with cells for about `count` points; points closer than `distance` count as
-    /// close.
+    /// Creates an empty set with cells for about `count` points; points closer than `distance` count as close.
     pub fn new(domain: &'a PeriodicBox, dimensions: usize, distance: f64, count: usize) -> Near<'a> {
         let volume = domain.volume(dimensions);
         let edge = distance.max((volume / count.max(1) as f64).powf(1.0 / dimensions as f64));

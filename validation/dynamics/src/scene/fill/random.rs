@@ -17,8 +17,7 @@ pub fn point(shape: &Shape, dimensions: usize, random: &mut ChaCha8Rng) -> [f64;
     }
 }
 
-/// Draws a uniform point of `shape` that is close to no point of `near`; if none is found, the error holds
-/// the last attempt.
+/// Draws a uniform point of `shape` that is close to no point of `near`; if none is found, the error holds the last attempt.
 pub fn point_apart(
     shape: &Shape,
     dimensions: usize,

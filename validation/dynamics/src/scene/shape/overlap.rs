@@ -2,8 +2,7 @@
 
 use super::Shape;
 
-/// Depth, as a share of a length, that counts as touching: rounding can overlap regions that are meant to
-/// touch.
+/// Depth, as a share of a length, that counts as touching: rounding can overlap regions that are meant to touch.
 const TOUCH: f64 = 1e-9;
 
 impl Shape {
