@@ -531,5 +531,5 @@ fn an_inline_thermostat_is_refused_where_it_must_go() {
         .replace("species = [\"F\"]", "species = [\"F\"]\nthermostat = [{ gamma = 1.0, range = 1.0 }]");
     std::fs::write(folder.path().join("scenes/flat.toml"), inline).unwrap();
     let text = refusal(folder.path());
-    assert!(text.contains("cannot take the thermostat out"), "{text}");
+    assert!(text.contains("cannot remove the thermostat"), "{text}");
 }

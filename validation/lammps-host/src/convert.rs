@@ -335,7 +335,7 @@ impl Work<'_> {
         match rest.first().map(|lambda| lambda.parse::<f64>()) {
             None | Some(Ok(0.5)) => self.changed(command, "mvv/dpd with lambda = 0.5 is velocity Verlet"),
             _ => self
-                .left(command, format!("mvv/dpd had lambda = {}; fix nve is what it is with 0.5", rest[0])),
+                .left(command, format!("mvv/dpd had lambda = {}; fix nve corresponds to lambda = 0.5", rest[0])),
         }
         command.with("fix", &[id, group, "nve"])
     }

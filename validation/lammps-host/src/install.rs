@@ -292,7 +292,7 @@ mod tests {
         let host = install_into(&venv, &python, &|_| {}).unwrap();
         fs::write(&host.library, "who").unwrap();
         let said = installed(&venv).unwrap_err().to_string();
-        assert!(said.contains("liblammps.so has 3 bytes, was installed with 6"), "{said}");
+        assert!(said.contains("liblammps.so has 3 bytes instead of the 6 of its installation"), "{said}");
         install_into(&venv, &python, &|_| {}).unwrap();
         assert_eq!(fs::read_to_string(host.library).unwrap(), "whole\n");
     }

@@ -93,7 +93,7 @@ macro_rules! function {
 
 fn c_string(text: &str) -> Result<CString, LammpsError> {
     CString::new(text)
-        .map_err(|_| LammpsError::Request(format!("a zero byte in what LAMMPS is to be told: {text:?}")))
+        .map_err(|_| LammpsError::Request(format!("a text for LAMMPS contains a zero byte: {text:?}")))
 }
 
 /// The error message since the last query; `None` without an error.
@@ -386,7 +386,7 @@ impl Lammps {
             [b'd' | b'i', b'_', ..] => {
                 if (name.as_bytes()[0] == b'd') != real || width != 1 {
                     return Err(LammpsError::Request(format!(
-                        "'{name}' is not what was asked for: d_ is one double, i_ one integer"
+                        "'{name}' has another type or width than requested: d_ is one double, i_ one integer"
                     )));
                 }
                 true

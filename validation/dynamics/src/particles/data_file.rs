@@ -119,7 +119,7 @@ impl State {
                 return Err(StateError { message, atom: Some(atom.id) });
             }
             let tag = i32::try_from(atom.id).map_err(|_| {
-                let message = format!("atom id {} is beyond what tags can count", atom.id);
+                let message = format!("atom id {} exceeds the largest tag, 2147483647", atom.id);
                 StateError { message, atom: Some(atom.id) }
             })?;
             let (mut x, mut image) = (atom.x, atom.image);

@@ -58,7 +58,7 @@ impl State {
             return Some("there are no particles".into());
         }
         if count > i32::MAX as usize {
-            return Some(format!("{count} particles are more than tags can number"));
+            return Some(format!("{count} particles are more than the largest tag, 2147483647"));
         }
         if [self.v.len(), self.species.len(), self.tag.len(), self.image.len()].iter().any(|n| *n != count) {
             return Some("particle arrays have different lengths".into());

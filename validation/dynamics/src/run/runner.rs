@@ -187,9 +187,6 @@ impl<'a> Runner<'a> {
     }
 
     /// Makes forces wrong; see [`Simulation::falsify`]. Call it last, for a run at one temperature.
-    ///
-    /// # Errors
-    /// The errors of [`Simulation::falsify`].
     #[doc(hidden)]
     pub fn falsify(&mut self, fault: Fault) -> Result<(), RunError> {
         self.run.simulation.falsify(fault)

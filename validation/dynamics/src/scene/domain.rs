@@ -22,7 +22,7 @@ pub fn read(root: &Section, dimensions: usize) -> Result<PeriodicBox, FileError>
 /// Reads the boundary of a scene that has its box from a file; `None` if the scene gives no boundary.
 pub fn read_boundary_alone(root: &Section, dimensions: usize) -> Result<Option<[bool; 3]>, FileError> {
     let Some(value) = root.get("box") else { return Ok(None) };
-    let message = || "the box is that of the file: give no lengths".to_owned();
+    let message = || "the initial file gives the box: remove the lengths".to_owned();
     let section = value.as_section().ok_or_else(|| value.error(FileErrorKind::Value(message())))?;
     if let Some(lengths) = section.get("lengths") {
         return Err(lengths.error(FileErrorKind::Value(message())));

@@ -77,7 +77,7 @@ pub fn read(root: &Section, model: &Model, base: &Path) -> Result<(Initial, Peri
     }
     let initial = if let Some(format) = saved::Format::of(&kind) {
         if let Some(value) = root.get("density") {
-            return Err(value.error(FileErrorKind::Value("the particles are those of the file".into())));
+            return Err(value.error(FileErrorKind::Value("the initial file gives the particles: remove the density".into())));
         }
         let periodic = domain::read_boundary_alone(root, dimensions)?;
         let saved::Saved { path, state, velocities, frozen } =
@@ -99,7 +99,7 @@ fn read_without(root: &Section, model: &Model) -> Result<(Initial, PeriodicBox),
     let parts = root.get("part");
     let density = root.get("density");
     if parts.is_none() && density.is_none() {
-        let message = "nothing says what the box is filled with".to_owned();
+        let message = "the scene gives no particles".to_owned();
         let error = root.error(FileErrorKind::Value(message));
         return Err(error.with_help("give a density, [initial] or [[part]]"));
     }
@@ -128,7 +128,7 @@ fn read_one(kind: &str, key: &Value, section: &Section, common: &Common) -> Resu
     let mut part = common.fill(section, WHOLE.to_owned(), shape)?;
     if kind == "lattice" && section.get("lattice").is_none() {
         if let Some(value) = section.get("min_distance") {
-            let message = "the sites of a lattice are apart as they are".to_owned();
+            let message = "a lattice sets the distances of its sites: remove min_distance".to_owned();
             return Err(value.error(FileErrorKind::Value(message)));
         }
         part.arrangement = Arrangement::Lattice(Lattice::Simple);

@@ -109,9 +109,6 @@ impl Scene {
 
     /// Parses a scene from a text; messages use `name` as the name of the file, and the path of the model
     /// file starts from `base`.
-    ///
-    /// # Errors
-    /// The errors of [`Scene::open`].
     pub fn parse(name: &str, text: &str, base: &Path) -> Result<Scene, FileError> {
         Scene::read(&Document::parse(name, text)?, base, &[])
     }

@@ -164,7 +164,7 @@ impl<'a> Common<'a> {
         let mut rests = (0..shapes.len()).filter(|k| is_rest(&shapes[*k]));
         let Some(first) = rests.next() else { return Ok(()) };
         if let Some(second) = rests.next() {
-            let message = format!("part {} is the rest already", first + 1);
+            let message = format!("part {} is the rest already: a scene has one rest", first + 1);
             return Err(keys[second].error(FileErrorKind::Value(message)));
         }
         let all: Vec<Shape> = shapes.iter().filter(|s| !is_rest(s)).cloned().collect();
@@ -184,7 +184,7 @@ impl<'a> Common<'a> {
 /// Checks that a number of particles is at least one and at most the limit.
 fn check_count(count: f64, error: impl Fn(FileErrorKind) -> FileError) -> Result<usize, FileError> {
     if count < 1.0 {
-        return Err(error(FileErrorKind::Value("leaves the box without a particle".into())));
+        return Err(error(FileErrorKind::Value("gives less than one particle".into())));
     }
     if count > MOST_PARTICLES {
         let message = format!("{count:.3e} particles are too many: at most {MOST_PARTICLES:.0e}");

@@ -27,8 +27,8 @@ pub fn read(section: &Section, steps: u64, scene_kt: f64) -> Result<Vec<Level>, 
     let levels = section.get("levels");
     let Some(ends) = ramp else {
         if let Some(levels) = levels {
-            let message = "kT is one temperature, which has no levels".to_owned();
-            return Err(levels.error(FileErrorKind::Value(message)).with_help("kT = [from, to] has"));
+            let message = "only a ramp has levels, and kT is one temperature".to_owned();
+            return Err(levels.error(FileErrorKind::Value(message)).with_help("kT = [from, to] is a ramp"));
         }
         let kt = value.map_or(Ok(scene_kt), |value| positive(&value))?;
         return Ok(vec![Level { number: None, steps, kt }]);

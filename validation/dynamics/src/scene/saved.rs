@@ -98,7 +98,7 @@ fn read_frozen(section: &Section, state: &State) -> Result<Tags, FileError> {
         return Err(wrong(format!("expected the first and the last id, found {} values", ids.len())));
     };
     let (Ok(first), Ok(last)) = (i32::try_from(first), i32::try_from(last)) else {
-        return Err(wrong(format!("{last} is beyond what ids can count")));
+        return Err(wrong(format!("{last} exceeds the largest id, 2147483647")));
     };
     let tags = Tags::Ranges(vec![first..=last]);
     match state.tag.iter().filter(|t| tags.contain(**t)).count() {

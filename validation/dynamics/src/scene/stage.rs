@@ -105,7 +105,7 @@ fn read_short(
         Some(value) => value,
         None if equilibrate.is_some() => root.require("steps")?,
         None => {
-            let error = root.error(FileErrorKind::Value("nothing says how many steps to take".into()));
+            let error = root.error(FileErrorKind::Value("the scene gives no number of steps".into()));
             return Err(error.with_help("give steps, or [[stage]] tables"));
         }
     };

@@ -84,12 +84,12 @@ fn errors_name_line_key_and_cause() {
         ("5.0, 6.0, 7.0", "5.0, 1.9, 7.0", 6, "share their noise"),
         ("5.0, 6.0, 7.0", "5.0, 1e308, 1e308", 6, "span no volume"),
         ("\"random\"", "\"dat\"", 8, "unknown kind \"dat\""),
-        ("\"random\"", "\"data\"", 6, "box.lengths: the box is that of the file"),
+        ("\"random\"", "\"data\"", 6, "box.lengths: the initial file gives the box"),
         ("\"random\"", "\"slab\"", 7, "initial.thickness: is missing"),
         ("\"random\"", "\"slab\"\nthickness = 8", 9, "must not exceed the box"),
         ("\"random\"", "\"random\"\nthickness = 8", 9, "initial.thickness: unknown key"),
         ("density = 3.0", "density = -1", 9, "must be positive"),
-        ("density = 3.0", "density = 1e-9", 9, "without a particle"),
+        ("density = 3.0", "density = 1e-9", 9, "gives less than one particle"),
         ("density = 3.0", "count = 200_000_000", 9, "too many"),
         ("density = 3.0", "density = 3.0\ncount = 5", 10, "give one of them"),
         ("density = 3.0", "", 7, "needs a density or a count"),
@@ -313,7 +313,7 @@ fn errors_of_parts_name_line_key_and_cause() {
         ("lattice = \"fcc\"", "min_distance = 0.9", 16, "of 79 particles found a place"),
         ("species = \"A\"\nvelocity", "species = \"C\"\nvelocity", 25, "unknown species \"C\""),
         ("species = \"A\"\nvelocity", "density_ = 1\nvelocity", 25, "density_: unknown key"),
-        ("density = 4.0\nspecies = \"A\"\nvelocity", "density = 1e-3\nvelocity", 24, "without a particle"),
+        ("density = 4.0\nspecies = \"A\"\nvelocity", "density = 1e-3\nvelocity", 24, "gives less than one particle"),
         (
             "species = \"A\"\nvelocity",
             "species = \"A\"\nfrozen = true\nvelocity",
@@ -333,7 +333,7 @@ fn errors_of_parts_name_line_key_and_cause() {
         ("[\"periodic\", \"periodic\", \"reflecting\"]", "[\"periodic\"]", 7, "one for each of 3 directions"),
         ("steps = 10", "steps = 10\n[initial]\nkind = \"random\"", 10, "there is an [initial] too"),
         ("steps = 10", "equilibrate = 10", 1, "steps: is missing"),
-        ("steps = 10", "", 1, "nothing says how many steps"),
+        ("steps = 10", "", 1, "the scene gives no number of steps"),
     ];
     for (from, to, line, message) in cases {
         assert!(PARTS.contains(from), "{from}");
@@ -346,7 +346,7 @@ fn errors_of_parts_name_line_key_and_cause() {
         PARTS.replace("velocity = [0.0, 0.0, -0.5]", "frozen = true").replace("parts = [\"column\"]", "");
     assert!(parse(&frozen).unwrap_err().to_string().contains("every part is frozen"));
     let nothing = "model = \"mixture.toml\"\nkT = 1.0\nbox = 6\nsteps = 3\n";
-    assert!(parse(nothing).unwrap_err().to_string().contains("nothing says what the box is filled with"));
+    assert!(parse(nothing).unwrap_err().to_string().contains("the scene gives no particles"));
     let rests = nothing.to_owned() + "density = 1\n[[part]]\nshape = \"rest\"\n[[part]]\nshape = \"rest\"\n";
     assert!(parse(&rests).unwrap_err().to_string().contains("part 1 is the rest already"));
     let full = nothing.to_owned() + "density = 1\n[[part]]\nshape = \"box\"\n[[part]]\nshape = \"rest\"\n";
@@ -440,7 +440,7 @@ fn data_files_bring_box_and_frozen_particles() {
         ("[1, 79]", "[1, 900]", "nothing would move"),
         ("[1, 79]", "[1]", "the first and the last id"),
         ("start.data", "none.data", "none.data"),
-        ("steps = 3", "steps = 3\ndensity = 2.0", "the particles are those of the file"),
+        ("steps = 3", "steps = 3\ndensity = 2.0", "the initial file gives the particles"),
     ] {
         let error = Scene::parse("s.toml", &text.replace(from, to), folder.path()).unwrap_err();
         assert!(error.to_string().contains(message), "{error}");

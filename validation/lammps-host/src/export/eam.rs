@@ -45,7 +45,7 @@ pub enum EamError {
     PartialDensities { species: String, density: String },
     #[error("the correction of {0} is not the identity: eam/alloy has uncorrected densities")]
     Correction(String),
-    #[error("{0} has bounds: a table cannot say that psi goes on beyond them; remove them or the export")]
+    #[error("{0} has bounds, and a table cannot represent how psi continues beyond them: remove the bounds")]
     Bounds(String),
     #[error("eam/alloy is tabulated for three dimensions here, the model has two")]
     Flat,
@@ -56,7 +56,7 @@ pub enum EamError {
     #[error("the spacing, the largest density and the number of densities must be positive")]
     Grid,
     #[error(
-        "the tables would have {0:.3e} numbers, and {MOST} are the most: take a larger spacing or fewer densities"
+        "the tables would have {0:.3e} numbers, more than the limit of {MOST}: take a larger spacing or fewer densities"
     )]
     TooFine(f64),
     #[error(transparent)]

@@ -56,7 +56,7 @@ pub enum DeckError {
     #[error("{0} body forces need more groups than LAMMPS has: at most {MOST_BODY_FORCES} can be written")]
     BodyForces(usize),
     #[error(
-        "{}: cannot take the thermostat out for the stages without; write it as [[thermostat]] sections",
+        "{}: cannot remove the thermostat for the stages without one; write it as [[thermostat]] sections",
         model.display()
     )]
     Thermostat { model: PathBuf },

@@ -133,9 +133,6 @@ impl Forces {
 impl Simulation {
     /// Makes forces wrong until settings or the temperature are set: tests use it to check that errors of
     /// forces are noticed.
-    ///
-    /// # Errors
-    /// The errors of [`Simulation::set_settings`].
     #[doc(hidden)]
     pub fn falsify(&mut self, fault: Fault) -> Result<(), RunError> {
         let Forces { model, kt, engine, .. } = &self.forces;

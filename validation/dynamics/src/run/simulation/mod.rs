@@ -125,17 +125,11 @@ impl Simulation {
 
     /// Computes the forces of the present step at the present velocities, thermostat included. A run or a
     /// stage needs them before its first step.
-    ///
-    /// # Errors
-    /// The errors of [`Simulation::step`].
     pub fn prepare(&mut self, dt: f64, want: Want) -> Result<(), RunError> {
         self.prepare_for(Integrator::default(), dt, want)
     }
 
     /// As [`Simulation::prepare`], for steps of `integrator`: without the thermostat, if that is not part of its forces.
-    ///
-    /// # Errors
-    /// The errors of [`Simulation::step`].
     pub fn prepare_for(&mut self, integrator: Integrator, dt: f64, want: Want) -> Result<(), RunError> {
         self.end_step()?;
         self.thermostat.begin_step();
@@ -170,9 +164,6 @@ impl Simulation {
     }
 
     /// Makes steps of `dt` without totals.
-    ///
-    /// # Errors
-    /// The errors of [`Simulation::step`].
     pub fn advance(&mut self, steps: u64, dt: f64, integrator: Integrator) -> Result<(), RunError> {
         for _ in 0..steps {
             self.begin_step(dt, integrator, Want::FORCES)?;
@@ -182,9 +173,6 @@ impl Simulation {
 
     /// Makes a step except for its last kick, which the next step can include with the same bits. Until then,
     /// or until [`Simulation::end_step`], velocities are not those at the end of the step.
-    ///
-    /// # Errors
-    /// The errors of [`Simulation::step`].
     pub(super) fn begin_step(&mut self, dt: f64, integrator: Integrator, want: Want) -> Result<(), RunError> {
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(RunError::TimeStep(dt));
@@ -219,9 +207,6 @@ impl Simulation {
 
     /// Computes `want` at the end of the present step, if the integrator has computed forces at other
     /// positions only; trajectories do not depend on it.
-    ///
-    /// # Errors
-    /// The errors of [`Simulation::compute`].
     pub(super) fn refresh(&mut self, want: Want) -> Result<(), RunError> {
         if !self.stale {
             return Ok(());
