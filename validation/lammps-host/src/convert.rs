@@ -334,8 +334,10 @@ impl Work<'_> {
     fn integrator(&mut self, command: &Command, [id, group]: [&str; 2], rest: &[&str]) -> String {
         match rest.first().map(|lambda| lambda.parse::<f64>()) {
             None | Some(Ok(0.5)) => self.changed(command, "mvv/dpd with lambda = 0.5 is velocity Verlet"),
-            _ => self
-                .left(command, format!("mvv/dpd had lambda = {}; fix nve corresponds to lambda = 0.5", rest[0])),
+            _ => self.left(
+                command,
+                format!("mvv/dpd had lambda = {}; fix nve corresponds to lambda = 0.5", rest[0]),
+            ),
         }
         command.with("fix", &[id, group, "nve"])
     }

@@ -250,7 +250,10 @@ fn usable(
         && checkpoint.step == before + position.done
         && checkpoint.forces.len() == if position.entered { checkpoint.state.len() } else { 0 };
     if !fits {
-        return Err(CheckpointError::Damaged { path, what: "its step, stage and forces do not match".into() });
+        return Err(CheckpointError::Damaged {
+            path,
+            what: "its step, stage and forces do not match".into(),
+        });
     }
     // A finished run no longer needs its files; the user may have moved them.
     for (name, expected) in checkpoint.files.iter().filter(|_| !checkpoint.finished) {

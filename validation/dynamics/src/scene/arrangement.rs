@@ -45,7 +45,9 @@ impl Arrangement {
             (None, Some(value)) => Ok(Arrangement::Random { min_distance: positive(&value)? }),
             (Some(lattice), None) => Ok(Arrangement::Lattice(lattice.value)),
             (Some(_), Some(value)) => {
-                let message = "a lattice is given too, which sets the distances of its sites: give one of them".to_owned();
+                let message =
+                    "a lattice is given too, which sets the distances of its sites: give one of them"
+                        .to_owned();
                 Err(value.error(FileErrorKind::Value(message)))
             }
         }

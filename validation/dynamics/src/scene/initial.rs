@@ -77,7 +77,9 @@ pub fn read(root: &Section, model: &Model, base: &Path) -> Result<(Initial, Peri
     }
     let initial = if let Some(format) = saved::Format::of(&kind) {
         if let Some(value) = root.get("density") {
-            return Err(value.error(FileErrorKind::Value("the initial file gives the particles: remove the density".into())));
+            return Err(value.error(FileErrorKind::Value(
+                "the initial file gives the particles: remove the density".into(),
+            )));
         }
         let periodic = domain::read_boundary_alone(root, dimensions)?;
         let saved::Saved { path, state, velocities, frozen } =

@@ -313,7 +313,12 @@ fn errors_of_parts_name_line_key_and_cause() {
         ("lattice = \"fcc\"", "min_distance = 0.9", 16, "of 79 particles found a place"),
         ("species = \"A\"\nvelocity", "species = \"C\"\nvelocity", 25, "unknown species \"C\""),
         ("species = \"A\"\nvelocity", "density_ = 1\nvelocity", 25, "density_: unknown key"),
-        ("density = 4.0\nspecies = \"A\"\nvelocity", "density = 1e-3\nvelocity", 24, "gives less than one particle"),
+        (
+            "density = 4.0\nspecies = \"A\"\nvelocity",
+            "density = 1e-3\nvelocity",
+            24,
+            "gives less than one particle",
+        ),
         (
             "species = \"A\"\nvelocity",
             "species = \"A\"\nfrozen = true\nvelocity",
@@ -408,7 +413,7 @@ fn ramps_have_levels_that_add_up() {
     assert!(scene.stages[1..].iter().all(|s| s.name == "two"));
     let cases = [
         ("kT = 2.0", "kT = [2.0, 1.0]\nlevels = 21", 21, "must be from 1 to 20"),
-        ("kT = 2.0", "kT = 2.0\nlevels = 4", 21, "has no levels"),
+        ("kT = 2.0", "kT = 2.0\nlevels = 4", 21, "only a ramp has levels"),
         ("kT = 2.0", "kT = [2.0, 1.0, 3.0]", 20, "two of a ramp"),
         ("kT = 2.0", "kT = [2.0, 0.0]", 20, "must be positive"),
     ];

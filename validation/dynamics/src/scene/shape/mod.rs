@@ -10,28 +10,13 @@ pub use read::{FACES, SHAPES, Shapes};
 #[derive(Debug, Clone, PartialEq)]
 pub enum Shape {
     /// A block between two corners.
-    Block {
-        low: [f64; 3],
-        high: [f64; 3],
-    },
+    Block { low: [f64; 3], high: [f64; 3] },
     /// A ball; in two dimensions a disc.
-    Sphere {
-        center: [f64; 3],
-        radius: f64,
-    },
+    Sphere { center: [f64; 3], radius: f64 },
     /// A cylinder along an axis.
-    Cylinder {
-        axis: usize,
-        center: [f64; 3],
-        radius: f64,
-        length: f64,
-    },
+    Cylinder { axis: usize, center: [f64; 3], radius: f64, length: f64 },
     /// The part of a block that other regions, which do not overlap, leave free.
-    Rest {
-        low: [f64; 3],
-        high: [f64; 3],
-        others: Vec<Shape>,
-    },
+    Rest { low: [f64; 3], high: [f64; 3], others: Vec<Shape> },
 }
 
 impl Shape {
