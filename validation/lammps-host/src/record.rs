@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 /// library would kill by a signal every program that loads it.
 ///
 /// # Errors
-/// There is such a file.
+/// A file has another size, or the folder of packages cannot be read.
 pub(super) fn check(venv: &Path) -> Result<(), LammpsError> {
     let folders = fs::read_dir(venv.join("lib")).into_iter().flatten();
     let packages = folders.filter_map(|entry| Some(entry.ok()?.path().join("site-packages")));

@@ -101,7 +101,7 @@ fn written(value: &toml::Value) -> String {
     }
 }
 
-/// The hash of a file's content; `None` if the file cannot be read.
+/// The length and checksum of a file's content; `None` if the file cannot be read.
 fn content_of(path: &Path) -> Option<String> {
     let mut file = std::fs::File::open(path).ok().filter(|f| f.metadata().is_ok_and(|m| m.is_file()))?;
     let mut digest = Digest(crc32fast::Hasher::new());

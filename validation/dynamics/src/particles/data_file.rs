@@ -68,9 +68,6 @@ impl State {
 
     /// Converts a data file to a state. Walls come from its title; all other directions of the model are
     /// periodic. See [`State::from_data_in`].
-    ///
-    /// # Errors
-    /// As [`State::from_data_in`].
     pub fn from_data(data: &DataFile, model: &Model) -> Result<State, StateError> {
         State::from_data_in(data, model, data.boundary().unwrap_or([true, true, model.dimensions() == 3]))
     }

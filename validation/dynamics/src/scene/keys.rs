@@ -1,7 +1,7 @@
 //! The table of all keys of the scene file: the JSON schema for editors and the reference
 //! `docs/scene-file.md` are written from it, and tests compare the reader with it.
 
-// This layout takes three lines a key; rustfmt would take eight.
+// This layout takes a few lines for a key; rustfmt would take eight.
 #[rustfmt::skip]
 mod particles;
 #[rustfmt::skip]
