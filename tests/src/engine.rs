@@ -1,20 +1,19 @@
-//! What cargo makes of the core in release mode.
+//! Cargo's release build of the core.
 
 use crate::{root, said};
 use serde_json::Value;
 use std::path::PathBuf;
 use std::process::Command;
 
-/// Where cargo has put them.
+/// The paths of the build results.
 pub struct Engine {
-    /// The static library with the functions of `psidpd.h`.
     pub library: PathBuf,
-    /// The program that counts of instructions are made with.
+    /// The program that the tests count instructions of.
     pub instructions: PathBuf,
 }
 
-/// Builds the engine in release mode, whatever mode the tests are in, with the features that it has where the whole
-/// workspace is tested: there it is built already.
+/// Builds the engine in release mode, whatever the mode of the tests, with the features of the whole
+/// workspace, so that an earlier build of the workspace is reused.
 pub fn engine() -> Engine {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut build = Command::new(cargo);

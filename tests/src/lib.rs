@@ -1,4 +1,4 @@
-//! What the end-to-end tests share: the program, LAMMPS, and the plugin built for it.
+//! Shared parts of the end-to-end tests: the program, LAMMPS, and the plugin built for it.
 
 mod engine;
 mod python;
@@ -16,19 +16,16 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
 
-/// The top of the checkout.
+/// The top folder of the checkout.
 pub fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the tests are a folder of the checkout").to_owned()
 }
 
-/// The program, built with the tests.
-///
-/// # Panics
-/// It is not there: the caller is no integration test.
+/// The path of the program that was built with the tests; panics if the caller is not an integration test.
 pub fn program() -> &'static Path {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
     PROGRAM.get_or_init(|| {
-        // target/release/deps/this-test → target/release/psidpd-under-test
+        // The test is target/release/deps/this-test, and the program target/release/psidpd-under-test.
         let test = std::env::current_exe().expect("a test knows where it is");
         let folder = test.parent().and_then(Path::parent).expect("tests are built into target/PROFILE/deps");
         let program = folder.join("psidpd-under-test");
@@ -37,12 +34,11 @@ pub fn program() -> &'static Path {
     })
 }
 
-/// Runs the program in `folder`.
 pub fn psidpd(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(program()).args(arguments).current_dir(folder).output().expect("the program starts")
 }
 
-/// Runs the program in `folder`, which must exit with `code`, and reads what it writes to the file of `--json`.
+/// Runs the program in `folder`, checks that it exits with `code`, and parses the file that it writes for `--json`.
 pub fn json(folder: &Path, arguments: &[&str], code: i32) -> serde_json::Value {
     let output = psidpd(folder, &[arguments, &["--json", "out.json"]].concat());
     assert_eq!(output.status.code(), Some(code), "{}", said(&output));
@@ -55,7 +51,7 @@ pub fn said(output: &Output) -> String {
     format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr))
 }
 
-/// LAMMPS, installed if need be, and the plugin built for it.
+/// LAMMPS, installed if it is missing, and the plugin built for it.
 pub fn lammps() -> &'static (Host, PathBuf) {
     static LAMMPS: OnceLock<(Host, PathBuf)> = OnceLock::new();
     LAMMPS.get_or_init(|| {
@@ -65,9 +61,9 @@ pub fn lammps() -> &'static (Host, PathBuf) {
     })
 }
 
-/// What a run that must stop says. mpirun may lose the last words of a rank that aborts while it ends the
-/// others, so a run on several ranks is tried again, a few times, until they arrive; that it stops, and does
-/// not hang, must hold every time.
+/// The error text of a run that must stop. mpirun may lose the last output of a rank that aborts while mpirun
+/// ends the others, so a run on several ranks is repeated a few times until the text arrives. Every run must
+/// stop without a hang.
 pub fn last_words(ranks: usize, run: impl Fn() -> Result<String, String>) -> String {
     let mut said = String::new();
     for _ in 0..if ranks > 1 { 6 } else { 1 } {

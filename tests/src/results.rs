@@ -1,18 +1,18 @@
-//! What commands printed and wrote, for what a page says of it.
+//! The output of a page's commands, compared with the page's text.
 
 use std::path::Path;
 
-/// What the commands of a page have printed, and the values with errors that they have found.
+/// The printed lines of a page's commands, and the values with errors that they found.
 #[derive(Default)]
 pub struct Results {
     lines: Vec<String>,
     values: Vec<(f64, f64)>,
-    /// How many numbers of the page were held against values.
+    /// Number of the page's numbers that were compared with values.
     pub held: usize,
 }
 
 impl Results {
-    /// Adds what a command printed: its lines, and values that are followed by ± and an error.
+    /// Adds the printed lines of a command, and its values followed by ± and an error.
     pub fn add(&mut self, printed: &[u8]) {
         for line in String::from_utf8_lossy(printed).lines() {
             let words: Vec<&str> = line.split_whitespace().collect();
@@ -25,10 +25,7 @@ impl Results {
         }
     }
 
-    /// Adds the observables that a run wrote into its folder, if it wrote any.
-    ///
-    /// # Panics
-    /// They are not JSON.
+    /// Adds the observables that a run wrote into its folder, if there are any; panics if they are not JSON.
     pub fn add_observables(&mut self, folder: &Path) {
         let Ok(text) = std::fs::read_to_string(folder.join("observables.json")) else { return };
         let observables: serde_json::Value = serde_json::from_str(&text).expect("observables are JSON");
@@ -40,10 +37,7 @@ impl Results {
         }
     }
 
-    /// Every line of a block was printed, to the digits that the block has.
-    ///
-    /// # Panics
-    /// One was not.
+    /// Panics unless every line of a block was printed, up to one unit in the last digit of each number of the block.
     pub fn hold_lines(&self, page: &str, block: &str) {
         for line in block.lines().filter(|line| !line.trim().is_empty()) {
             let printed = self.lines.iter().any(|printed| same(line, printed));
@@ -51,11 +45,9 @@ impl Results {
         }
     }
 
-    /// Every number of a text with an error in its last digits, as 16.14(4), is a value that was found: within four errors of
-    /// both, which chance exceeds once in 16 000 numbers, and with an error of a third to three times as much.
-    ///
-    /// # Panics
-    /// One is not.
+    /// Panics unless every number of a text with an error in its last digits, as 16.14(4), agrees with a
+    /// found value: within four combined errors, which chance exceeds once in 16 000 numbers, and with a
+    /// ratio of the errors between a third and three.
     pub fn hold_numbers(&mut self, page: &str, text: &str) {
         for (shown, value, error) in with_errors(text) {
             let found = self.values.iter().any(|(v, e)| {
@@ -67,7 +59,7 @@ impl Results {
     }
 }
 
-/// Whether two lines have the same words, and numbers that agree within one in the last digit of the first.
+/// Whether two lines have the same words, and numbers that agree within one unit in the last digit of the first.
 fn same(shown: &str, printed: &str) -> bool {
     let (shown, printed): (Vec<&str>, Vec<&str>) =
         (shown.split_whitespace().collect(), printed.split_whitespace().collect());
@@ -81,13 +73,13 @@ fn same(shown: &str, printed: &str) -> bool {
     shown.len() == printed.len() && shown.iter().zip(&printed).all(|(a, b)| agree(a, b))
 }
 
-/// What one in the last digit of a number is.
+/// One unit in the last digit of a number.
 fn last_digit(number: &str) -> f64 {
     let digits = number.split_once('.').map_or(0, |(_, digits)| digits.len());
     10f64.powi(-(digits as i32))
 }
 
-/// The numbers of a text that have an error behind them in parentheses: as they are written, their value and error.
+/// The numbers of a text with an error in parentheses: their text, value and error.
 fn with_errors(text: &str) -> Vec<(String, f64, f64)> {
     let is_part = |c: char| c.is_ascii_digit() || ".-−".contains(c);
     let mut found = Vec::new();

@@ -1,9 +1,9 @@
-//! The LAMMPS scripts that users are shown.
+//! The LAMMPS scripts of the examples and the README.
 
 use crate::root;
 use std::path::PathBuf;
 
-/// The scripts in `lammps-plugin/examples`, each in its folder.
+/// The scripts in `lammps-plugin/examples`, each with its path.
 pub fn examples() -> Vec<PathBuf> {
     let folder = root().join("lammps-plugin/examples");
     let folders = std::fs::read_dir(folder).expect("the examples are there");
@@ -18,10 +18,7 @@ pub fn examples() -> Vec<PathBuf> {
     found
 }
 
-/// The first block of the README that is marked with `language` and contains `part`.
-///
-/// # Panics
-/// There is none.
+/// The first block of the README with this `language` that contains `part`; panics if there is none.
 pub fn readme_block(language: &str, part: &str) -> String {
     let all = blocks("README.md").into_iter();
     let mut found = all.filter(|b| b.language == language).map(|b| b.text).filter(|text| text.contains(part));
@@ -30,16 +27,13 @@ pub fn readme_block(language: &str, part: &str) -> String {
 
 /// A fenced block of a page, or the text before one.
 pub struct Block {
-    /// What follows the fence; empty for text.
+    /// The language after the fence; empty for text.
     pub language: String,
-    /// Its lines.
     pub text: String,
 }
 
-/// The fenced blocks of a page of the checkout and the text between them, in their order.
-///
-/// # Panics
-/// There is no such page.
+/// The fenced blocks of a page of the checkout and the text between them, in the order of the page; panics if
+/// there is no such page.
 pub fn parts(page: &str) -> Vec<Block> {
     let text = std::fs::read_to_string(root().join(page)).unwrap_or_else(|e| panic!("{page}: {e}"));
     let mut found = Vec::new();
@@ -58,10 +52,7 @@ pub fn parts(page: &str) -> Vec<Block> {
     found
 }
 
-/// The fenced blocks of a page of the checkout, in their order.
-///
-/// # Panics
-/// There is no such page.
+/// The fenced blocks of a page of the checkout, in their order; panics if there is no such page.
 pub fn blocks(page: &str) -> Vec<Block> {
     parts(page).into_iter().filter(|part| !part.language.is_empty()).collect()
 }

@@ -1,10 +1,10 @@
-//! The benchmark, as a user starts it, in miniature: figures mean nothing here, but they must all be there.
+//! The benchmark's command line with tiny cases: the figures mean nothing here, but all of them must be present.
 
 use psidpd_tests::{psidpd, root, said};
 use serde_json::Value;
 use std::collections::BTreeSet;
 
-/// Every path to a value, with `[]` for entries of lists and `<name>` for keys that are names themselves.
+/// Paths to all values, with `[]` for entries of lists and `<name>` for keys that are names themselves.
 fn paths(value: &Value, at: &str, into: &mut BTreeSet<String>) {
     let named = ["parts", "equal_bits"].iter().any(|map| at.ends_with(map));
     match value {
@@ -42,7 +42,7 @@ fn a_small_benchmark_has_every_documented_field() {
     let outcome: Value = serde_json::from_str(&read("b/bench.json")).unwrap();
     assert_eq!(serde_json::from_str::<Value>(&read("c.json")).unwrap(), outcome);
 
-    // Spreads are described once.
+    // The page describes the fields of spreads once.
     let mut found = BTreeSet::new();
     paths(&outcome, "", &mut found);
     found.retain(|path| ![".min", ".median", ".max"].iter().any(|end| path.ends_with(end)));
@@ -69,14 +69,14 @@ fn a_small_benchmark_has_every_documented_field() {
         assert!(run["mega_particle_steps_per_second"]["median"].as_f64().unwrap() > 0.0);
         assert!(!run["parts"].as_object().unwrap().is_empty());
     }
-    // Of the box that counts as large: few codes, but on both ranks.
+    // The large box has few codes, but each on both numbers of ranks.
     let large: Vec<&str> =
         runs.iter().filter(|r| r["size"] == 700).filter_map(|r| r["code"].as_str()).collect();
     assert!(large.contains(&"lammps mdpd") && large.contains(&"plugin dpd/psi precision mixed, 2 ranks"));
     assert!(large.len() < runs.len() / 3 && !large.contains(&"lammps eam/alloy"), "{large:?}");
     assert!(read("b/report.html").contains("In boxes of more than 600 particles"));
     assert!(outcome["equal_bits"].as_object().unwrap().values().all(|equal| *equal == true));
-    // What a particle takes cannot be less than its position, velocity and force.
+    // A particle needs at least its position, velocity and force.
     assert!(outcome["memory"][0]["bytes_per_particle"].as_f64().unwrap() > 72.0);
     assert!(read("b/report.html").contains("<svg"));
 }

@@ -1,13 +1,15 @@
-//! `validation/lammps-host/src/bindings.rs` is what bindgen makes of LAMMPS's C library interface. Written anew by
+//! `validation/lammps-host/src/bindings.rs` is bindgen's output for LAMMPS's C library interface. The command
 //!
 //! `PSIDPD_UPDATE_BINDINGS=1 cargo test --release -p psidpd-tests --test bindings -- --ignored`
 //!
-//! with libclang (Debian: `libclang1-14`; PyPI: `libclang`, with `LIBCLANG_PATH` set to its folder) and a C compiler's headers.
+//! writes it anew; it needs libclang (Debian: `libclang1-14`; PyPI: `libclang`, with `LIBCLANG_PATH` set to
+//! its folder) and the headers of a C compiler.
 
 use psidpd_tests::{lammps, root};
 use std::process::Command;
 
-/// What `Lammps` calls. A function that a LAMMPS version lacks does not prevent loading: it fails when called.
+/// The functions that `Lammps` calls. A function that a LAMMPS version lacks does not prevent loading: it
+/// fails when called.
 const USED: &str = "lammps_(open_no_mpi|close|mpi_finalize|command|version|get_natoms|get_thermo|eval|extract_box|extract_setting\
 |extract_atom_datatype|extract_atom_size|extract_compute|extract_fix|gather_atoms|gather|scatter_atoms\
 |has_error|get_last_error_message|has_style|free)";
@@ -16,7 +18,7 @@ const USED: &str = "lammps_(open_no_mpi|close|mpi_finalize|command|version|get_n
 #[ignore = "needs libclang; .ci/run runs it"]
 fn the_bindings_are_those_of_the_header() {
     let header = lammps().0.include.join("library.h");
-    // libclang has no headers of a compiler: those of the C compiler here serve.
+    // libclang has no compiler headers; those of the C compiler serve.
     let headers = Command::new("cc").arg("-print-file-name=include").output().expect("there is a C compiler");
     let headers = String::from_utf8(headers.stdout).unwrap();
     let bindings = bindgen::Builder::default()

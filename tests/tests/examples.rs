@@ -1,11 +1,11 @@
-//! The scripts in `lammps-plugin/examples`: every one runs, on one rank and on two.
+//! Every script in `lammps-plugin/examples` runs on one rank and on two.
 
 use psidpd_tests::{examples, lammps, root};
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Tables of thermo output, one for each run: columns and rows.
+/// Tables of thermo output with columns and rows, one for each run.
 fn tables(output: &str) -> Vec<(Vec<String>, Vec<Vec<f64>>)> {
     let mut tables = Vec::new();
     let mut lines = output.lines();
@@ -25,7 +25,7 @@ fn tables(output: &str) -> Vec<(Vec<String>, Vec<Vec<f64>>)> {
     tables
 }
 
-/// The potential energies of the first and of the last row, all rows checked.
+/// The potential energies of the first and of the last row, after a check of all rows.
 fn energies(script: &Path, output: &str) -> [f64; 2] {
     let tables = tables(output);
     assert!(!tables.is_empty(), "{}: no thermo output\n{output}", script.display());
@@ -50,16 +50,16 @@ fn examples_run_on_one_rank_and_on_two() {
     let arguments = [&arguments[..], &["-var", "steps", "50"]].concat();
     for script in scripts {
         let [one, two] = [1, 2].map(|ranks| {
-            // What scripts write stays out of the checkout.
+            // Output files of scripts stay out of the checkout.
             let folder = tempfile::tempdir().unwrap();
-            // LAMMPS puts no variables in between quotes: values with a space would fall apart.
+            // LAMMPS does not expand variables within quotes, so values with a space would be split.
             symlink(plugin, folder.path().join("psidpdplugin.so")).unwrap();
             symlink(root().join("validation/models"), folder.path().join("models")).unwrap();
             let run = host.run_script(ranks, folder.path(), &script, &arguments, Duration::from_secs(120));
             let run = run.unwrap_or_else(|e| panic!("{}, {ranks} ranks: {e}", script.display()));
             energies(&script, &run.stdout)
         });
-        // LAMMPS numbers new atoms by ranks, and the noise goes by number: only the start is the same.
+        // LAMMPS numbers new atoms by ranks, and the noise depends on these numbers: only the initial state agrees.
         for (k, largest) in [(0, 1e-6), (1, 0.05)] {
             let apart = (one[k] - two[k]).abs();
             assert!(apart < largest * (1.0 + one[k].abs()), "{}: {one:?} {two:?}", script.display());
@@ -67,7 +67,7 @@ fn examples_run_on_one_rank_and_on_two() {
     }
 }
 
-/// What a reader finds beside the scripts: a page, logs of both runs, and nobody's folders in them.
+/// Beside each script are a page and logs of both runs; the logs name no folder of their author.
 #[test]
 fn examples_have_pages_and_logs() {
     for script in examples() {
@@ -88,7 +88,7 @@ fn examples_have_pages_and_logs() {
             for path in ["/tmp", "/home", "/root", "/work", "/usr"] {
                 assert!(!text.contains(path), "{} has {path}", log.display());
             }
-            // The script has not changed since.
+            // The log shows that the script has not changed since the run.
             for line in std::fs::read_to_string(&script).unwrap().lines() {
                 assert!(text.contains(line.trim_end()), "{} lacks: {line}", log.display());
             }
@@ -96,7 +96,7 @@ fn examples_have_pages_and_logs() {
     }
 }
 
-/// The commands that the manual pages give as examples are accepted.
+/// LAMMPS accepts the example commands of the manual pages.
 #[test]
 fn examples_of_the_manual_pages_are_accepted() {
     let (host, plugin) = lammps();
@@ -106,7 +106,7 @@ fn examples_of_the_manual_pages_are_accepted() {
         let text = std::fs::read_to_string(root().join(format!("lammps-plugin/doc/{page}.md"))).unwrap();
         let (_, examples) = text.split_once("## Examples\n\n```text\n").unwrap();
         let (examples, _) = examples.split_once("```").unwrap();
-        // Paragraphs: one that loads the plugin, and has the pair style of a fix, then one style each.
+        // The first paragraph loads the plugin and has the pair style of a fix; the others have one style each.
         let (first, styles) = examples.split_once("\n\n").unwrap();
         let pair: Vec<&str> = first.lines().filter(|l| l.starts_with("pair_")).collect();
         let pair = pair.join("\n");

@@ -1,5 +1,5 @@
-//! Tables for LAMMPS's `eam/alloy`, written from a model, against the plugin's `dpd/psi` with the model
-//! itself: the same configuration in the same LAMMPS.
+//! Tables for LAMMPS's `eam/alloy`, written from a model, agree with the plugin's `dpd/psi` and the same
+//! model: the test compares one configuration in one LAMMPS.
 
 use psidpd::export::eam::{EamError, Grid, write};
 use psidpd::lammps::Lammps;
@@ -9,15 +9,14 @@ use psidpd_tests::{lammps, root};
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
-/// LAMMPS keeps the styles of loaded plugins for the whole process: closing one instance takes them from
-/// all.
+/// LAMMPS keeps the styles of loaded plugins for the whole process: closing one instance removes them from all.
 static ALONE: Mutex<()> = Mutex::new(());
 
 fn text(name: &str) -> String {
     std::fs::read_to_string(root().join(format!("validation/models/{name}.toml"))).unwrap()
 }
 
-/// Without the lines that start with `key`.
+/// Drops the lines that start with `key`.
 fn without(text: &str, key: &str) -> String {
     text.lines().filter(|line| !line.starts_with(key)).map(|line| format!("{line}\n")).collect()
 }
@@ -26,13 +25,13 @@ fn fluid(text: &str, kt: f64) -> Fluid {
     Model::parse("model.toml", text).unwrap_or_else(|e| panic!("{e}\n{text}")).at(kt).unwrap()
 }
 
-/// Energy, and forces by atom.
+/// The energy, and the forces by atom.
 fn point(lammps: &Lammps) -> (f64, Vec<f64>) {
     lammps.command("run 0 post no").unwrap();
     (lammps.thermo("pe").unwrap(), lammps.gather("f", 3).unwrap())
 }
 
-/// A fluid brought to equilibrium with the thermostat of `text`, and then both ways without it.
+/// Equilibrates a fluid with the thermostat of `text`, and then compares both styles without it.
 fn compare(text: &str, kt: f64, density: f64, grid: Grid) {
     let fluid = fluid(text, kt);
     let folder = tempfile::tempdir().unwrap();
@@ -108,7 +107,7 @@ fn two_species_that_feel_the_total_density() {
     compare(&text, 1.0, 5.0, grid);
 }
 
-/// What a table of one density cannot say is refused, not approximated.
+/// The export refuses models that a table of one density cannot represent.
 #[test]
 fn fluids_beyond_a_table_are_refused() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Decks that `export lammps` writes: the trajectory of the scene, step by step.
+//! The decks of `export lammps` give the trajectory of the scene, step by step.
 
 use psidpd::formats::{DataFile, dump};
 use psidpd_core::maximum::largest;
@@ -66,7 +66,7 @@ thermo = 5
 dump   = 10
 "#;
 
-/// kT in ψ, partial densities, a table beside the model.
+/// A mixture with kT in ψ, partial densities, and a table in the model's folder.
 const MIXTURE: &str = r#"
 title   = "mixture"
 species = ["A", "B"]
@@ -129,9 +129,9 @@ gamma = 1.0
 range = 1.0
 "#;
 
-/// A box of walls with a frozen floor and a frozen block, gravity on one part, a wind on one species of the
-/// other, a ramp, stages with and without thermostat and body forces. Hot enough that many particles reach the
-/// walls.
+/// A box of walls with a frozen floor and a frozen block, gravity on one part, a uniform force on one species
+/// of the other, a ramp, and stages with and without thermostat and body forces. The fluid is so hot that
+/// many particles reach the walls.
 const WALLS: &str = r#"
 title = "walls"
 model = "mixture.toml"
@@ -248,7 +248,7 @@ fn folder(scene: &str) -> tempfile::TempDir {
     folder
 }
 
-/// Runs the program, which may read the table beside the folder of scene and model.
+/// Runs the program with permission to read the table outside the folder of scene and model.
 fn psidpd(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(program())
         .args(arguments)
@@ -263,7 +263,7 @@ fn export(folder: &Path) -> Output {
     psidpd(folder, &["export", "lammps", "scenes/scene.toml", "--out", "deck", "--json", "deck.json"])
 }
 
-/// What a refused export says; long messages are wrapped and framed.
+/// The message of a refused export on one line; long messages are wrapped and framed.
 fn refusal(folder: &Path) -> String {
     let export = export(folder);
     let text = said(&export).replace('│', " ");
@@ -288,7 +288,7 @@ fn compare(scene: &str) {
         assert!(deck.join(file.as_str().unwrap()).is_file(), "{file}");
     }
     let (host, plugin) = lammps();
-    // As for any path with a space: LAMMPS puts no variables in between quotes.
+    // LAMMPS does not expand variables within quotes, so the value has quotes for paths with a space.
     let plugin = format!("\"{}\"", plugin.display());
     let arguments = ["-var", "plugin", &plugin];
     for ranks in [1, 2] {
@@ -299,7 +299,7 @@ fn compare(scene: &str) {
     }
 }
 
-/// A deck says what the scene says; in mixed precision both go on alike until rounding has grown.
+/// A deck has the settings of its scene; in mixed precision both trajectories agree until rounding has grown.
 #[test]
 fn precision_is_that_of_the_scene() {
     let style = |scene: &str| {
@@ -333,7 +333,7 @@ fn precision_is_that_of_the_scene() {
     assert!(off < 1e-6, "{off:e}");
 }
 
-/// The largest difference, by whole boxes where that is less.
+/// The largest component of the difference, modulo the box lengths.
 fn distance(a: [f64; 3], b: [f64; 3], length: [f64; 3]) -> f64 {
     largest((0..3).map(|c| {
         let d = a[c] - b[c];
@@ -363,7 +363,7 @@ fn compare_frames(at: &Path, bound: f64) {
     }
 }
 
-/// thermo.csv and the rows of the log.
+/// Compares thermo.csv with the rows of the log.
 fn compare_rows(at: &Path, bound: f64) {
     let numbers = |line: &str, separator: char| -> Option<Vec<f64>> {
         let fields = line.split(separator).filter(|f| !f.trim().is_empty());
@@ -376,7 +376,8 @@ fn compare_rows(at: &Path, bound: f64) {
     let ours: Vec<Vec<f64>> = csv.lines().skip(1).map(|l| numbers(l, ',').unwrap()).collect();
     assert!(ours.len() > 4);
     for row in &ours {
-        // The end of a stage, and the start of the next: the first has the forces of the native row.
+        // The log has a row for the end of a stage and one for the start of the next; the first has the
+        // forces of the native row.
         let other = theirs.iter().find(|r| r[0] == row[0]).unwrap_or_else(|| panic!("no row {}", row[0]));
         for (a, b) in row.iter().zip(other) {
             assert!((a - b).abs() <= bound * (1.0 + a.abs()), "{row:?}\n{other:?}");
@@ -422,7 +423,7 @@ fn walls_frozen_particles_body_forces_and_a_ramp() {
     compare(WALLS);
 }
 
-/// A splitting with its keys, in all stages of a scene.
+/// Sets an integrator with its keys in all stages of a scene.
 fn with_integrator(scene: &str, lines: &str) -> String {
     let scene = scene.replace("integrator = \"groot-warren\"\nlambda = 0.5\n", "");
     let scene: String = scene
@@ -445,7 +446,7 @@ fn forces_at_displaced_positions() {
     compare(&with_integrator(ONE_SPECIES, "integrator = \"force-gradient\""));
 }
 
-/// Two masses, displacements larger than they need be, and a thermostat now and then.
+/// Two masses, displacements larger than necessary, and a thermostat at every second step.
 #[test]
 fn displaced_masses() {
     let lines = "integrator = \"force-gradient\"\nlambda = 0.17\ngradient = 0.2\nthermostat_every = 2";
@@ -457,7 +458,7 @@ fn forces_in_the_middle() {
     compare(&with_integrator(ONE_SPECIES, "integrator = \"aboba\""));
 }
 
-/// Stages with different temperatures, steps and integrators; one has no thermostat.
+/// Stages differ in temperature, step and integrator; one has no thermostat.
 #[test]
 fn a_thermostat_at_every_third_step() {
     let lines = "integrator = \"two-stage\"\nlambda = 0.2\nthermostat_every = 3\nnoise = \"uniform\"";
@@ -474,10 +475,10 @@ fn a_splitting_in_two_dimensions() {
     }
 }
 
-/// Particles are reflected after either drift, and frozen ones drag.
+/// Particles are reflected after each drift, and frozen particles exert drag.
 #[test]
 fn splittings_between_walls() {
-    // Half as many steps: among fast particles that rounding grows. A pair that is lost makes 10⁻².
+    // The test has few steps, because rounding grows fast among fast particles. A lost pair would change forces by 10⁻².
     let short = [("steps = 25", "steps = 10"), ("steps = 15", "steps = 5"), ("steps = 20", "steps = 10")];
     let scene = short.iter().fold(WALLS.to_owned(), |scene, (long, short)| scene.replace(long, short));
     for integrator in ["two-stage", "force-gradient", "aboba"] {
@@ -521,7 +522,7 @@ fn what_has_no_counterpart_is_refused() {
     }
 }
 
-/// A thermostat that is not written as sections of its own cannot be cut out.
+/// The export cannot remove a thermostat that is not written in sections of its own.
 #[test]
 fn an_inline_thermostat_is_refused_where_it_must_go() {
     let folder = folder(&FLAT.replace("dt    = 0.005", "dt    = 0.005\nthermostat = false"));
@@ -530,5 +531,5 @@ fn an_inline_thermostat_is_refused_where_it_must_go() {
         .replace("species = [\"F\"]", "species = [\"F\"]\nthermostat = [{ gamma = 1.0, range = 1.0 }]");
     std::fs::write(folder.path().join("scenes/flat.toml"), inline).unwrap();
     let text = refusal(folder.path());
-    assert!(text.contains("cannot take the thermostat out"), "{text}");
+    assert!(text.contains("cannot remove the thermostat"), "{text}");
 }

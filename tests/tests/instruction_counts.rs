@@ -1,13 +1,13 @@
-//! How many instructions one step of one particle takes, counted by callgrind: unlike times, these do not depend
-//! on what else the machine does, so a regression of some percent shows.
+//! Instructions per step and particle, counted by callgrind: unlike times, counts do not depend on other load
+//! of the machine, so a regression of a few percent shows.
 //!
-//! Counts are held against `baselines/instructions.json`. After a change that is meant,
+//! Counts are compared with `baselines/instructions.json`. After an intended change,
 //!
 //! ```text
 //! PSIDPD_UPDATE_BASELINE=1 cargo test --release -p psidpd-tests --test instruction_counts
 //! ```
 //!
-//! writes it anew. Valgrind knows no AVX-512; its kernels come from the same source as those of AVX2.
+//! writes the file anew. Valgrind does not support AVX-512; its kernels have the same source as those of AVX2.
 
 use psidpd_tests::{engine, root, said};
 use serde_json::{Value, json};
@@ -15,20 +15,20 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Counts may differ from the baseline by this part of it: other versions of the compiler and the C library.
+/// Allowed relative deviation from the baseline, for other versions of the compiler and the C library.
 const TOLERANCE: f64 = 0.05;
-/// Evaluations in the two runs whose difference counts; the first ones only make room.
+/// Numbers of evaluations in the two runs whose difference counts; the first evaluations allocate memory.
 const EVALUATIONS: [u32; 2] = [2, 5];
 
 fn baseline() -> PathBuf {
     root().join("tests/baselines/instructions.json")
 }
 
-/// Particles, and instructions of a whole run.
+/// The number of particles, and the instructions of a whole run.
 fn count(program: &Path, case: &[&str], evaluations: u32) -> (f64, f64) {
     let mut run = Command::new("valgrind");
     run.args(["--tool=callgrind", "--callgrind-out-file=/dev/null"]).arg(program);
-    // Fluid, precision and instruction set; behind the number, whether there are ghosts.
+    // The arguments are fluid, precision and instruction set; after the number, whether there are ghosts.
     run.args(&case[..3]).arg(evaluations.to_string()).args(&case[3..]);
     let output = run.output().unwrap_or_else(|e| {
         panic!("valgrind does not start ({e}): install it (Debian: apt-get install valgrind)")
@@ -62,7 +62,7 @@ fn instructions_per_particle_and_step_stay_what_they_were() {
     for fluid in ["mdpd", "dpd", "formula"] {
         for precision in ["mixed", "double"] {
             for instructions in ["portable", "avx2"] {
-                // What ghosts take in addition hardly depends on the instruction set.
+                // The additional cost of ghosts hardly depends on the instruction set.
                 let ghosts = if instructions == "avx2" { &[false, true][..] } else { &[false] };
                 for ghosts in ghosts {
                     let mut case = vec![fluid, precision, instructions];
@@ -93,7 +93,7 @@ fn instructions_per_particle_and_step_stay_what_they_were() {
         .filter_map(|(case, count)| {
             let before = expected_counts[case].as_f64().unwrap_or(f64::NAN);
             let change = count / before - 1.0;
-            // Not the other way round: what is no number is a fault.
+            // This comparison makes NaN a failure; the reverse comparison would not.
             let good = change.abs() <= TOLERANCE;
             (!good).then(|| format!("{case}: {count} instead of {before} ({:+.1} %)", 100.0 * change))
         })

@@ -1,15 +1,15 @@
-//! `mdpd/psi … law lucy` against LAMMPS's own `mdpd` and `mdpd/rhosum`: strengths and ranges by pair of types,
-//! masses other than 1, two dimensions.
+//! `mdpd/psi … law lucy` agrees with LAMMPS's own `mdpd` and `mdpd/rhosum`: strengths and ranges by pair of
+//! types, masses other than 1, two dimensions.
 
 mod style_common;
 
 use std::fmt::Write;
 use style_common::*;
 
-/// `I J A B rc rd`, without drag: the two codes draw other noise.
+/// The values `I J A B rc rd`, without drag, because the two codes draw different noise.
 type Pair = (usize, usize, f64, f64, f64, f64);
 
-/// Everything differs by pair; two of three ranges of densities agree.
+/// All values differ by pair, except that two of three ranges of densities agree.
 const MIXED: [Pair; 3] =
     [(1, 1, -40.0, 25.0, 1.0, 0.75), (1, 2, -30.0, 20.0, 0.9, 0.6), (2, 2, -20.0, 12.5, 1.0, 0.75)];
 
@@ -34,7 +34,7 @@ fn built_in(pairs: &[Pair]) -> String {
     text
 }
 
-/// The deck without a run: atoms that both codes take.
+/// The deck without a run, with atoms for both codes.
 fn deck(before: &str, region: &str, masses: [f64; 2]) -> String {
     format!(
         "{}mass 1 {}\nmass 2 {}\n",
@@ -44,7 +44,7 @@ fn deck(before: &str, region: &str, masses: [f64; 2]) -> String {
     )
 }
 
-/// Forces and pressure of one style after no step.
+/// Forces and pressure of one style before the first step.
 fn at_rest(deck: &str, style: &str) -> (Frame, Vec<f64>) {
     let l = open(&format!(
         "{deck}{style}compute w all pressure NULL virial\nthermo_style custom step c_w[1]\nfix 1 all nve\nrun 0\n"
@@ -73,7 +73,7 @@ fn forces_are_the_built_ins() {
             for (a, b) in found.iter().zip(&pressure) {
                 assert!((a - b).abs() < 1e-10 * (1.0 + b.abs()), "{a} {b}\n{deck}");
             }
-            // A force law that the masses enter, and the coefficients.
+            // The masses enter the force law and the coefficients.
             let other = [masses[1], masses[0]];
             if masses[0] != masses[1] {
                 let (other, _) = at_rest(&self::deck(before, region, other), &ours(pairs));
@@ -83,10 +83,10 @@ fn forces_are_the_built_ins() {
     }
 }
 
-/// Ten steps without drag stay together to rounding, under MPI too.
+/// Ten steps without drag agree to rounding, under MPI too.
 #[test]
 fn short_trajectories_are_the_built_ins() {
-    // Which atom has which ID depends on the ranks that create them.
+    // The IDs of atoms depend on the ranks that create them.
     let folder = tempfile::tempdir().unwrap();
     let start = folder.path().join("start.data").display().to_string();
     open(&format!(
@@ -106,7 +106,7 @@ fn short_trajectories_are_the_built_ins() {
     }
 }
 
-/// Masses and coefficients that change between runs; a restart; the log says what it is.
+/// Masses and coefficients may change between runs and at a restart; the log names the law.
 #[test]
 fn changes_are_seen_and_kept() {
     let folder = tempfile::tempdir().unwrap();
@@ -130,7 +130,7 @@ fn changes_are_seen_and_kept() {
     }
 }
 
-/// Where a potential is asked for there is none, and the reason names the way out.
+/// The law has no potential; a request for one gets an error that names the alternative.
 #[test]
 fn the_conservative_law_refuses_with_the_reason() {
     let deck = deck("", "block 0 5 0 5 0 5", [1.0, 2.5]);

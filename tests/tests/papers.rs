@@ -1,4 +1,4 @@
-//! `calibrate` and `reproduce` as a user meets them.
+//! `calibrate` and `reproduce` on the command line.
 
 use psidpd_tests::{json, psidpd, said};
 use serde_json::Value;
@@ -16,7 +16,7 @@ fn a_target_pressure_is_met_after_calibration_and_missed_before() {
         let warnings = found["warnings"].as_array().unwrap();
         warnings.iter().map(|w| w["id"].as_str().unwrap().to_owned()).collect::<Vec<_>>()
     };
-    // psi' goes to 0 with the density: an isolated particle is nothing to warn of.
+    // psi' vanishes with the density, so there is no warning about isolated particles.
     assert_eq!(ids(&found), ["uncalibrated"], "{found}");
 
     let arguments = [
@@ -56,7 +56,7 @@ fn a_target_pressure_is_met_after_calibration_and_missed_before() {
     let found = json(here, &["check", "calibrated.toml", "--density", "4.5"], 0);
     assert!(ids(&found).is_empty(), "{found}");
 
-    // Without the correction the same runs miss it by a fifth, and the run says that it may.
+    // Without the correction the same runs miss the pressure by a fifth, and the output warns of that.
     let scene = "model = \"target.toml\"\nkT = 1.0\nbox = 5.0\ndensity = 4.5\ndt = 0.01\nequilibrate = 200\nsteps = 600\n\
                  [observe]\npressure = true\n";
     std::fs::write(here.join("scene.toml"), scene).unwrap();
@@ -101,11 +101,11 @@ fn cases_are_listed_and_theory_is_reproduced() {
     assert_eq!(found["id"], "pagonabarraga-fig1");
     assert_eq!(found["pass"], true, "{found}");
     let value = &found["values"][0];
-    // alpha_3 = 0 is van der Waals' own: kT_c b/a = 8/27.
+    // With alpha_3 = 0 the fluid is van der Waals' own: kT_c b/a = 8/27.
     assert!((value["published"]["value"].as_f64().unwrap() - 8.0 / 27.0).abs() < 1e-12, "{value}");
     assert!((value["measured"]["value"].as_f64().unwrap() - 8.0 / 27.0).abs() < 1e-6, "{value}");
     assert!(here.join("out/quick/pagonabarraga-fig1/compressibility.svg").exists());
-    // Other cases of theory, and the shortest one that is measured.
+    // Further cases of theory, and the shortest one with a measurement.
     for id in ["pagonabarraga-fig2", "trofimov-fig1", "wang-limit", "pagonabarraga-fig4"] {
         let found = json(here, &["reproduce", id, "--out", "out"], 0);
         assert_eq!(found["pass"], true, "{found}");

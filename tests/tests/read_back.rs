@@ -1,10 +1,10 @@
-//! Other programs read the files of a run: MDAnalysis, ASE and LAMMPS see the same particles, the same g(r)
+//! Other programs read the files of a run: MDAnalysis, ASE and LAMMPS find the same particles, the same g(r)
 //! and the same energies.
 //!
-//! Tolerances. ASE keeps doubles; it takes the coordinates of a dump to fractions of the box and back, hence
-//! 10⁻¹² for a dump and no difference for what it copies. MDAnalysis keeps single precision: 10⁻⁶ for numbers
-//! below 8, and pairs that are that near to the edge of a bin may be counted in the next one. LAMMPS sums the
-//! same doubles in another order: 10⁻¹¹ of the largest term.
+//! Tolerances: ASE keeps doubles and converts the coordinates of a dump to fractions of the box and back,
+//! hence 10⁻¹² for a dump and no difference for copied values. MDAnalysis keeps single precision: 10⁻⁶ for
+//! numbers below 8, and pairs that close to the edge of a bin may count in the next one. LAMMPS sums the same
+//! doubles in another order: 10⁻¹¹ of the largest term.
 
 use psidpd::formats::{DataFile, dump};
 use psidpd_core::maximum::largest;
@@ -39,7 +39,7 @@ strength = 20.0
 range    = 1.0
 "#;
 
-/// Without a thermostat, so that LAMMPS's pressure has no noise of its own step in it.
+/// A scene without a thermostat, so that LAMMPS's pressure has no noise of its own step.
 const SCENE: &str = r#"
 title = "for others to read"
 model = "model.toml"
@@ -148,7 +148,7 @@ fn mdanalysis_and_ase_see_the_same_particles() {
     assert_eq!(expected.iter().map(|e| e.step).collect::<Vec<_>>(), [0.0, 20.0, 40.0]);
     let count = expected[0].x.len();
     let ids: Vec<f64> = (1..=count).map(|k| k as f64).collect();
-    // B is boron, for ASE: the file has another name.
+    // ASE takes B for boron, so the file has another name.
     let names: Vec<&str> = expected[0].types.iter().map(|t| if *t == 1.0 { "A" } else { "B_" }).collect();
     assert!(names.contains(&"A") && names.contains(&"B_"));
 
@@ -166,7 +166,7 @@ fn mdanalysis_and_ase_see_the_same_particles() {
         assert_eq!(types, e.types);
         assert_eq!(numbers(&frame["box"]), [BOX[0], BOX[1], BOX[2], 90.0, 90.0, 90.0]);
 
-        // An XYZ file has no box for MDAnalysis.
+        // MDAnalysis reads no box from an XYZ file.
         let frame = &seen["mda_xyz"][k];
         assert_near(&at("mda_xyz x"), &vectors(&frame["x"]), &e.x, 1e-6);
         assert_eq!(words(&frame["names"]), names);
@@ -192,7 +192,7 @@ fn mdanalysis_and_ase_see_the_same_particles() {
     let mut data = DataFile::read(&out.join("final.data")).unwrap();
     data.sort_by_id();
     assert!(data.atoms.iter().any(|a| a.image != [0; 3]), "no particle has crossed the box");
-    // ASE puts particles where they are without the periodic box.
+    // ASE gives unwrapped positions.
     let unwrapped: Vec<[f64; 3]> =
         data.atoms.iter().map(|a| std::array::from_fn(|k| a.x[k] + f64::from(a.image[k]) * BOX[k])).collect();
     for (source, x, tolerance) in [("mda_data", &last.x, 1e-6), ("ase_data", &unwrapped, 1e-12)] {
@@ -220,8 +220,8 @@ fn mdanalysis_and_ase_see_the_same_particles() {
     assert_eq!(observed[0]["samples"], 1, "{observed}");
     let own = numbers(&observed[0]["columns"][0]["values"]);
     assert_eq!(own.len(), BINS);
-    // ASE takes each particle for one of its own neighbours' ideal gas, psidpd does not: N against N − 1. Bins that end where
-    // the lattice of the start has pairs may differ by one of them.
+    // ASE's ideal gas has N neighbours for each particle, psidpd's has N − 1. Bins with an edge at a pair
+    // distance of the initial lattice may differ by one pair.
     let finite = count as f64 / (count as f64 - 1.0);
     let theirs = numbers(&seen["ase_g"]);
     let differing = own.iter().zip(&theirs).filter(|(g, ase)| (**g - finite * **ase).abs() > 1e-9).count();
@@ -238,7 +238,7 @@ fn cell() -> Vec<[f64; 3]> {
     (0..3).map(|k| std::array::from_fn(|c| if c == k { BOX[k] } else { 0.0 })).collect()
 }
 
-/// Pairs by distance to the nearest image, each once.
+/// Counts pairs by distance to the nearest image, each once.
 fn count_pairs(x: &[[f64; 3]]) -> Vec<f64> {
     let mut bins = vec![0.0; BINS];
     for (i, a) in x.iter().enumerate() {
@@ -248,7 +248,7 @@ fn count_pairs(x: &[[f64; 3]]) -> Vec<f64> {
                 (d - BOX[k] * (d / BOX[k]).round()).powi(2)
             };
             let r = (square(0) + square(1) + square(2)).sqrt();
-            // As ASE does: the upper edge belongs to the bin.
+            // As in ASE, the upper edge belongs to the bin.
             let bin = (r / (RANGE / BINS as f64)).ceil() as usize;
             if (1..=BINS).contains(&bin) {
                 bins[bin - 1] += 1.0;
@@ -258,7 +258,7 @@ fn count_pairs(x: &[[f64; 3]]) -> Vec<f64> {
     bins
 }
 
-/// `read_data` of the last state and `rerun` of the dump, with the plugin's own forces.
+/// LAMMPS reads the last state by `read_data` and the dump by `rerun`, with the plugin's forces.
 #[test]
 fn lammps_finds_the_energies_of_the_series_again() {
     let folder = tempfile::tempdir().unwrap();
@@ -275,7 +275,7 @@ fn lammps_finds_the_energies_of_the_series_again() {
     };
     let data = head("read_data out/final.data\n");
     std::fs::write(here.join("in.data"), format!("{data}run 0\n")).unwrap();
-    // Where particles are comes from the dump alone; the data file names box, types and masses.
+    // Positions come from the dump alone; the data file gives box, types and masses.
     let rerun = format!("{data}rerun out/dump.lammpstrj dump x y z vx vy vz box yes\n");
     std::fs::write(here.join("in.rerun"), rerun).unwrap();
     let limit = Duration::from_secs(120);
@@ -295,7 +295,7 @@ fn lammps_finds_the_energies_of_the_series_again() {
         assert!(!rows.is_empty(), "{}", run.stdout);
         rows
     };
-    // step, time, temperature, potential, kinetic, pressure, six components
+    // The columns are step, time, temperature, potential, kinetic, pressure and six components.
     let thermo = std::fs::read_to_string(here.join("out/thermo.csv")).unwrap();
     let thermo: Vec<Vec<f64>> =
         thermo.lines().skip(1).map(|l| l.split(',').map(|w| w.parse().unwrap()).collect()).collect();
@@ -316,7 +316,7 @@ fn lammps_finds_the_energies_of_the_series_again() {
         compare(theirs, ours);
     }
     compare(&rows("in.data")[0], &thermo[2]);
-    // The data file is what the dump ends with.
+    // The data file holds the last frame of the dump.
     let data = DataFile::read(&here.join("out/final.data")).unwrap();
     let frames = dump::read(&here.join("out/dump.lammpstrj")).unwrap();
     let x: Vec<[f64; 3]> = data.atoms.iter().map(|a| a.x).collect();

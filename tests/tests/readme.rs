@@ -1,4 +1,4 @@
-//! What the README tells a user to paste works as it stands there.
+//! The commands and files of the README work as printed.
 
 use psidpd_tests::{blocks, lammps, psidpd, readme_block, root, said};
 use std::time::Duration;
@@ -9,7 +9,7 @@ fn the_lammps_script_runs_in_the_checkout() {
     let script = folder.path().join("in.readme");
     let (host, plugin) = lammps();
     let text = readme_block("lammps", "pair_style   dpd/psi");
-    // The plugin is where the README says, unless the environment moved it.
+    // The plugin is at the README's path, unless the environment moved it.
     std::fs::write(
         &script,
         text.replace("target/lammps/psidpdplugin.so", &format!("\"{}\"", plugin.display())),

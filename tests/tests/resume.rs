@@ -1,4 +1,4 @@
-//! Long runs as a user meets them: killed, interrupted, on a full disk, and taken up again.
+//! Long runs on the command line: killed, interrupted, on a full disk, and resumed.
 
 use psidpd::run::checkpoint::read_state;
 use psidpd_tests::{program, psidpd, root, said};
@@ -12,7 +12,7 @@ use std::process::{Child, Command, Output, Stdio};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-/// A frozen floor, a body force, a ramp, observables, and everything that a run writes.
+/// A scene with a frozen floor, a body force, a ramp, observables, and every kind of output.
 fn scene() -> String {
     let model = root().join("validation/models/warren2003-set6.toml");
     format!(
@@ -54,7 +54,7 @@ fn send(child: &Child, signal: Signal) {
     kill_process(Pid::from_child(child), signal).unwrap();
 }
 
-/// Waits until a file has so many bytes, or the program has ended.
+/// Waits until a file has `length` bytes, or the program has ended.
 fn wait_for(child: &mut Child, file: &Path, length: u64) {
     let begin = Instant::now();
     while file.metadata().map_or(0, |m| m.len()) < length && child.try_wait().unwrap().is_none() {
@@ -63,7 +63,7 @@ fn wait_for(child: &mut Child, file: &Path, length: u64) {
     }
 }
 
-/// Every file of a run and of the folders in it, but the one that tells times.
+/// Every file of a run and of its subfolders, except the one with wall times.
 fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut files = BTreeMap::new();
     for entry in std::fs::read_dir(folder).unwrap() {
@@ -92,7 +92,7 @@ fn finished(output: &Output) -> String {
     words
 }
 
-/// The run that nothing interrupts, made once.
+/// The run without interruption, made once.
 fn whole() -> &'static Path {
     static WHOLE: OnceLock<PathBuf> = OnceLock::new();
     WHOLE.get_or_init(|| {
@@ -107,9 +107,9 @@ fn whole() -> &'static Path {
     })
 }
 
-/// An interrupted run: its folder, and what it said.
+/// Interrupts a run, and returns its folder and output.
 fn interrupted(folder: &Path, out: &str, signal: Signal) -> (PathBuf, Output) {
-    // The seed is that of the scene.
+    // The seed equals that of the scene.
     let mut child = start(folder, "s.toml", out, &["--threads", "2", "--set", "seed=3"]);
     let path = folder.join(out);
     wait_for(&mut child, &path.join("thermo.csv"), 10_000);
@@ -122,7 +122,7 @@ fn a_run_killed_ten_times_ends_in_the_same_bytes() {
     let folder = folder();
     let here = folder.path();
     let whole = whole();
-    // Often enough that many moments are within the writing of one.
+    // Checkpoints are so frequent that many kills fall into the writing of one.
     std::fs::write(here.join("s.toml"), scene().replace("checkpoint = 100", "checkpoint = 10")).unwrap();
     let length = whole.join("thermo.csv").metadata().unwrap().len() as f64;
     let mut random = StdRng::seed_from_u64(20);
@@ -134,13 +134,13 @@ fn a_run_killed_ten_times_ends_in_the_same_bytes() {
         let threads = if k % 2 == 0 { "1" } else { "2" };
         let mut child = start(here, "s.toml", "killed", &["--resume", "--threads", threads]);
         wait_for(&mut child, &out.join("thermo.csv"), (moment * length) as u64);
-        // Between rows, within a checkpoint, or still before the first step.
+        // The kill falls between rows, within a checkpoint, or before the first step.
         std::thread::sleep(Duration::from_micros(random.random_range(0..8000)));
         child.kill().unwrap();
         let output = child.wait_with_output().unwrap();
         killed += u32::from(output.status.signal() == Some(9));
     }
-    // On a machine that is busy enough some may come too late: after the end.
+    // On a busy machine some kills may come after the end of the run.
     assert!(killed >= 8, "{killed} of 10 killed");
     let words = finished(&run(here, "killed", &["--resume"]));
     assert!(words.contains("going on after step "), "{words}");
@@ -164,7 +164,7 @@ fn signals_stop_a_run_that_says_how_to_go_on() {
         let (what, how) = last.split_once("; to go on: ").unwrap_or_else(|| panic!("{words}"));
         assert!(what.starts_with("stopped after step ") && what.ends_with(" of 1500"), "{what}");
         assert!(how.contains("--resume --threads 2 --set seed=3"), "{how}");
-        // Without --resume it is left alone.
+        // Without --resume the run is left unchanged.
         let again = run(here, &name, &[]);
         let words = said(&again);
         assert_eq!(again.status.code(), Some(2), "{words}");
@@ -181,7 +181,7 @@ fn signals_stop_a_run_that_says_how_to_go_on() {
     assert_same(whole, &out);
 }
 
-/// Both signals wait while the program is halted, so that the second finds the first before any step ends.
+/// The signals are sent while the program is stopped, so that both arrive before any step ends.
 #[test]
 fn a_second_signal_kills() {
     let folder = folder();
@@ -207,7 +207,7 @@ fn a_truncated_checkpoint_falls_back_to_the_one_before() {
     assert!(words.contains("checkpoint is truncated: 1000 bytes of "), "{words}");
     assert!(words.contains("going on from the one before"), "{words}");
     assert_same(whole, &out);
-    // With both gone wrong nothing is touched.
+    // With both checkpoints damaged no file changes.
     let out = interrupted(here, "both", Signal::INT).0;
     for name in ["checkpoint", "checkpoint.old"] {
         std::fs::File::options().write(true).open(out.join(name)).unwrap().set_len(1000).unwrap();
@@ -240,14 +240,14 @@ fn foreign_checkpoints_are_refused_with_what_differs() {
         let output = run(here, "out", &["--resume"]);
         let words = said(&output);
         assert_eq!(output.status.code(), Some(2), "{words}");
-        // The message may be broken into lines.
+        // The message may be wrapped into lines.
         let flat = words.split_whitespace().filter(|w| *w != "│").collect::<Vec<_>>().join(" ");
         assert!(flat.contains(differs), "{differs} is not in\n{words}");
         assert!(contents(&out) == before);
     }
 }
 
-/// Files that may not grow beyond some blocks of 512 bytes, as a disk that becomes full: the shell sets it.
+/// Limits the size of files to `blocks` of 512 bytes by the shell, which acts like a full disk.
 fn limited(folder: &Path, scene: &str, out: &str, blocks: u32) -> Output {
     let command = format!("ulimit -f {blocks}; exec \"$@\"");
     Command::new("sh")
@@ -265,7 +265,7 @@ fn a_full_disk_leaves_the_last_good_state() {
     let here = folder.path();
     let whole = whole();
     let out = here.join("full");
-    // Room for checkpoints, but not for the dump.
+    // The limit has room for checkpoints, but not for the dump.
     let output = limited(here, "s.toml", "full", 2000);
     let words = said(&output);
     assert_eq!(output.status.code(), Some(1), "{words}");
@@ -275,7 +275,7 @@ fn a_full_disk_leaves_the_last_good_state() {
     let words = finished(&run(here, "full", &["--resume"]));
     assert!(words.contains("going on after step "), "{words}");
     assert_same(whole, &out);
-    // No room for a single checkpoint: that is found out before the first step.
+    // The limit has no room for a single checkpoint, which is found before the first step.
     let slim = scene().replace("dump = 25\nxyz = 50\nsnapshot = 300\n", "");
     assert!(slim != scene());
     std::fs::write(here.join("slim.toml"), slim).unwrap();
@@ -285,7 +285,7 @@ fn a_full_disk_leaves_the_last_good_state() {
     assert!(words.contains("checkpoint cannot be written"), "{words}");
     assert!(words.contains("after step 0") && words.contains("no checkpoint yet"), "{words}");
     assert!(!here.join("none/checkpoint.new").exists());
-    // One that grew since: what is there stays good.
+    // A later checkpoint exceeds the limit; the earlier one stays valid.
     let out = interrupted(here, "later", Signal::INT).0;
     let before = std::fs::read(out.join("checkpoint")).unwrap();
     let output = limited(here, "s.toml", "later", 10);
@@ -295,8 +295,8 @@ fn a_full_disk_leaves_the_last_good_state() {
     assert_same(whole, &out);
 }
 
-/// Three hundred kills of a run that writes a checkpoint every step, so that many of them are in the middle of one. It takes
-/// a minute or more: `CONTRIBUTING.md` says when to run it.
+/// Kills a run three hundred times. It writes a checkpoint every step, so that many kills fall into the
+/// writing of one. The test takes a minute or more: `CONTRIBUTING.md` says when to run it.
 #[test]
 #[ignore = "a stress test of minutes: cargo test --release -p psidpd-tests --test resume -- --ignored"]
 fn a_run_killed_hundreds_of_times_ends_in_the_same_bytes() {
@@ -316,7 +316,7 @@ fn a_run_killed_hundreds_of_times_ends_in_the_same_bytes() {
     let mut random = StdRng::seed_from_u64(21);
     let (mut killed, mut within, mut runs, mut furthest) = (0, 0, 0, 0);
     while killed < KILLS {
-        // Ended before its three hundred kills: over again.
+        // The run ended before its three hundred kills and starts again.
         if out.join("summary.json").exists() {
             assert_same(whole, &out);
             std::fs::remove_dir_all(&out).unwrap();
@@ -324,7 +324,7 @@ fn a_run_killed_hundreds_of_times_ends_in_the_same_bytes() {
         }
         let threads = if killed % 2 == 0 { "1" } else { "2" };
         let mut child = start(here, "s.toml", "killed", &["--resume", "--threads", threads]);
-        // From when it goes on: before that there is nothing new to break.
+        // The time counts from the continuation of the run, because no file changes before.
         let begin = Instant::now();
         while step_of(&out) <= furthest && begin.elapsed() < Duration::from_secs(60) {
             if child.try_wait().unwrap().is_some() {
@@ -353,7 +353,7 @@ fn a_run_killed_hundreds_of_times_ends_in_the_same_bytes() {
     assert_same(whole, &out);
 }
 
-/// A file system in memory of its own, of a size in kilobytes; root alone can mount one.
+/// A file system in memory with a size in kilobytes; only root can mount one.
 struct Disk(PathBuf);
 
 impl Disk {
@@ -378,8 +378,8 @@ impl Drop for Disk {
     }
 }
 
-/// Disks that become full at other moments of a run: in tables, dumps, pictures, checkpoints, at the end. Each time the run
-/// stops with the name of a file, and goes on where it was when there is room.
+/// Disks fill up at different moments of a run: in tables, dumps, pictures, checkpoints, at the end. Each
+/// time the run stops with the name of a file, and continues when there is room.
 #[test]
 #[ignore = "needs root, to mount disks: cargo test --release -p psidpd-tests --test resume -- --ignored"]
 fn disks_of_any_size_leave_a_run_that_can_go_on() {

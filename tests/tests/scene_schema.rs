@@ -1,5 +1,5 @@
-//! The JSON schema and the reference of the scene file: written from the table of keys, current, and
-//! true of the reader.
+//! The JSON schema and the reference of the scene file are written from the table of keys, are current, and
+//! agree with the reader.
 
 use psidpd::observe;
 use psidpd::scene::Scene;
@@ -70,7 +70,7 @@ fn object(table: &Table, form: Option<&str>) -> Value {
     })
 }
 
-/// A table with a schema for each of its forms.
+/// The schema of a table, with one alternative for each of its forms.
 fn forms(table: &Table) -> Value {
     match table.forms.1 {
         [] => object(table, None),
@@ -78,7 +78,7 @@ fn forms(table: &Table) -> Value {
     }
 }
 
-/// `[observe]`: names and meanings; what values may be is said in words.
+/// The schema of `[observe]`: names and meanings; allowed values are described in words.
 fn observe() -> Value {
     let named = |keys: &[observe::keys::Key]| -> Map<String, Value> {
         let text = |k: &observe::keys::Key| {
@@ -160,7 +160,7 @@ const MIXTURE: &str =
 const DATA: &str = "three\n\n3 atoms\n2 atom types\n\n0 6 xlo xhi\n0 6 ylo yhi\n0 6 zlo zhi\n\nAtoms # atomic\n\n\
                     1 1 1 1 1\n2 2 2 2 2\n3 1 3 3 3\n";
 
-/// A folder with what the examples refer to.
+/// A folder with the files that the examples name.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("fluid.toml"), MIXTURE).unwrap();
@@ -171,7 +171,7 @@ fn folder() -> tempfile::TempDir {
     folder
 }
 
-/// A whole scene from an example.
+/// Completes an example to a whole scene.
 fn completed(example: &str) -> String {
     let has = |start: &str| example.lines().any(|l| l.starts_with(start));
     let mut text = String::new();
@@ -197,7 +197,7 @@ fn root() -> PathBuf {
     psidpd_tests::root().join("validation")
 }
 
-/// Compares a file with what it should be, or writes it if `PSIDPD_UPDATE_SCHEMA` is set.
+/// Compares a file with its expected text, or writes it if `PSIDPD_UPDATE_SCHEMA` is set.
 fn assert_current(file: &str, expected: &str) {
     let path = root().join(file);
     if std::env::var_os("PSIDPD_UPDATE_SCHEMA").is_some() {
@@ -230,7 +230,7 @@ fn scenes() -> Vec<PathBuf> {
     found
 }
 
-/// Which of these scenes the schema takes: what Python's `jsonschema` has against each, nothing where it is valid.
+/// The complaints of Python's `jsonschema` about each scene; empty for a valid one.
 fn complaints(scenes: &[String]) -> Vec<String> {
     let scenes: Vec<Value> = scenes.iter().map(|text| toml::from_str(text).unwrap()).collect();
     let folder = tempfile::tempdir().unwrap();
@@ -254,7 +254,7 @@ fn every_scene_is_valid_by_the_schema() {
     }
 }
 
-/// Examples load, and the schema takes them too.
+/// The reader and the schema accept the examples.
 #[test]
 fn every_example_of_the_reference_loads() {
     let page = std::fs::read_to_string(root().join("../docs/scene-file.md")).unwrap().replace("\r\n", "\n");
@@ -273,7 +273,7 @@ fn every_example_of_the_reference_loads() {
     assert_eq!(texts.len(), 1 + TABLES.iter().map(|t| t.keys.len()).sum::<usize>());
 }
 
-/// The schema finds what it can know of: unknown, missing and mistyped keys.
+/// The schema rejects unknown, missing and mistyped keys.
 #[test]
 fn the_schema_refuses_unknown_and_missing_keys() {
     let bad = [
@@ -300,7 +300,7 @@ fn the_schema_refuses_unknown_and_missing_keys() {
     }
 }
 
-/// The reader, asked for a key that is not there, lists those it knows: they are the table's.
+/// The reader's error for an unknown key lists the known keys, which are those of the table.
 #[test]
 fn the_reader_knows_the_keys_of_the_table_and_no_others() {
     let folder = folder();

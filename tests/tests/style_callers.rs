@@ -1,5 +1,5 @@
-//! Commands that look behind a pair style: Monte Carlo fixes, and those that ask for energies of single pairs or strain
-//! atoms and their images in a box that stays.
+//! Commands that use internals of a pair style: Monte Carlo fixes, and those that request energies of single
+//! pairs or strain atoms and their images in a constant box.
 
 mod style_common;
 
@@ -32,7 +32,7 @@ fn last_rows(script: &str, ranks: usize) -> Vec<Vec<f64>> {
     tables.iter().map(row).collect()
 }
 
-/// What a script says on `ranks` ranks, or its error.
+/// The output of a script on `ranks` ranks, or its error.
 fn outcome(script: &str, ranks: usize) -> Result<String, String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("in.lammps");
@@ -45,8 +45,8 @@ fn deck(more: &str) -> String {
     format!("{}{more}", particles("", "block 0 5 0 5 0 5", 1, 500))
 }
 
-/// Strains that leave the box as it is are seen: virials by differences are those of the forces, and elastic constants
-/// those of LAMMPS's `dpd`, on any number of ranks.
+/// Strains that keep the box unchanged have an effect: virials by differences equal those of the forces, and
+/// elastic constants equal those of LAMMPS's `dpd`, on any number of ranks.
 #[test]
 fn strained_ghosts_are_seen() {
     let (_soft, soft) = file(SOFT);
@@ -69,7 +69,7 @@ fn strained_ghosts_are_seen() {
         let of = |style: &str| format!("{start}{style}{columns}");
         let reference = of("pair_style dpd 1.0 1.0 5\npair_coeff 1 1 25 0\n");
         let reference = last_row(&reference, 1);
-        // Eight ranks on two cores wait for each other most of the time: once is enough.
+        // Eight ranks on two cores mostly wait for each other, so one case has them.
         let ranks: &[usize] =
             if (before, region) == ("", "block 0 5 0 5 0 5") { &[1, 2, 8] } else { &[1, 2] };
         for &ranks in ranks {
@@ -89,8 +89,8 @@ fn strained_ghosts_are_seen() {
     }
 }
 
-/// Where energies belong to particles, a fix that asks for the energy of a single pair stops with what it needs; with
-/// that it runs. Without densities it gets its answer.
+/// If energies belong to particles, a fix that requests the energy of a single pair stops with an error that
+/// names full_energy; with that keyword it runs. Without densities no keyword is needed.
 #[test]
 fn monte_carlo_needs_full_energies_of_many_bodies() {
     let many = format!("pair_style dpd/psi 1.0 5\npair_coeff * * \"{}\" F\n", warren());
@@ -112,7 +112,7 @@ fn monte_carlo_needs_full_energies_of_many_bodies() {
                 assert!(row.iter().all(|x| x.is_finite()), "{row:?}");
             }
         }
-        // What is left must have the energy that the same atoms have afresh: none of them may still be excluded.
+        // A new run with the remaining atoms must give the same energy: none of them may still be excluded.
         let both = ["", " full_energy"].map(|full| {
             let afresh = format!(
                 "write_data left.data nocoeff\nclear\nunits lj\natom_style atomic\ncomm_modify vel yes\n\
@@ -129,7 +129,7 @@ fn monte_carlo_needs_full_energies_of_many_bodies() {
             assert_eq!(run[2], fresh[2], "{fix}{full}");
             run.clone()
         });
-        // Test insertions are the same ones; gcmc draws other moves for each, with LAMMPS's own styles too.
+        // Test insertions are the same in both runs; gcmc draws different moves in each, with LAMMPS's own styles too.
         if fix.contains("widom") {
             for (a, b) in both[0].iter().zip(&both[1]) {
                 assert!((a - b).abs() < 1e-9 * (1.0 + a.abs()), "{fix}: {both:?}");
@@ -138,8 +138,7 @@ fn monte_carlo_needs_full_energies_of_many_bodies() {
     }
 }
 
-/// What replaces forces of pairs by others, or decides on energies of pairs alone, is refused by name where there are
-/// densities.
+/// With densities, commands that replace pair forces, or use pair energies alone, are refused by name.
 #[test]
 fn what_works_with_single_pairs_is_refused() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! Forces of the pair styles inside LAMMPS against the plain evaluation of the model: every box, every
-//! boundary, hybrids, and pairs that LAMMPS lists.
+//! Forces of the pair styles inside LAMMPS equal the reference evaluation of the model: every box, every
+//! boundary, hybrids, and pairs from LAMMPS's list.
 
 mod style_common;
 
@@ -10,7 +10,7 @@ use style_common::*;
 
 const CLOSE: f64 = 1e-10;
 
-/// Runs no step and compares forces, energy and virial; returns what was compared with.
+/// Compares forces, energy and virial before the first step; returns the reference values.
 fn compare(script: &str, model: &Model) {
     let l = open(&format!(
         "{script}\ncompute w all pressure NULL virial\nthermo_style custom step pe c_w[1]\nthermo_modify norm no lost ignore\n\
@@ -26,7 +26,7 @@ fn compare(script: &str, model: &Model) {
     let scale = largest(truth.virial);
     for (c, w) in truth.virial.iter().enumerate() {
         if model.dimensions() == 3 || [0, 1, 3].contains(&c) {
-            // In two dimensions LAMMPS leaves the zz, xz and yz components out.
+            // In two dimensions LAMMPS omits the zz, xz and yz components.
             let found = virial[c] * volume;
             assert!((found - w).abs() < 1e-9 * scale, "virial {c}: {found} {w}\n{script}");
         }
@@ -71,7 +71,7 @@ fn spline_style_names_mistakes() {
     refused("pair_coeff 1 1 1 2 1 0.8 0.0 4.5\nrun 0", "range_B");
 }
 
-/// Boxes, boundaries, newton, on one rank.
+/// Boxes, boundaries and newton settings on one rank.
 #[test]
 fn forces_are_the_models_in_every_box() {
     let model = Model::open(warren().as_ref()).unwrap();
@@ -117,7 +117,7 @@ fn wide_models_too() {
     // A hybrid forwards slopes in portions.
     let style = format!("pair_style hybrid dpd/psi 1.0 {SEED}\npair_coeff * * dpd/psi {path} A B");
     compare(&format!("{}{style}", particles("", "block 0 5 0 5 0 5", 2, 500)), &model);
-    // Excluding types that there are none of changes only where pairs come from.
+    // Excluding types without atoms changes only the source of the pairs.
     let style = format!(
         "pair_style dpd/psi 1.0 {SEED}\npair_coeff * * {path} A B\ngroup none empty\n\
          neigh_modify exclude group none none"
@@ -128,7 +128,7 @@ fn wide_models_too() {
     }
 }
 
-/// The same trajectory on one, two and four ranks, with sorting, in a skew box, newton on and off.
+/// Trajectories agree on one, two and four ranks, with sorting, in a tilted box, newton on and off.
 #[test]
 fn ranks_do_not_matter() {
     let (_folder, wide) = file(WIDE);
@@ -149,7 +149,7 @@ fn ranks_do_not_matter() {
             ),
         ),
     ] {
-        // Which atom has which ID depends on the ranks that create them.
+        // The IDs of atoms depend on the ranks that create them.
         let folder = tempfile::tempdir().unwrap();
         let start = folder.path().join("start.data").display().to_string();
         open(&format!(
@@ -177,8 +177,8 @@ fn ranks_do_not_matter() {
     }
 }
 
-/// Energies, stresses, densities and ψ of single atoms are the same on two ranks as on one, and add up to the totals; forces
-/// in mixed precision by two threads on each rank are those in double precision to rounding.
+/// Energies, stresses, densities and ψ of single atoms agree on one and two ranks and add up to the totals;
+/// forces in mixed precision with two threads per rank equal those in double precision to rounding.
 #[test]
 fn single_atoms_and_mixed_precision_on_two_ranks() {
     let (_folder, wide) = file(WIDE);
@@ -239,7 +239,7 @@ fn single_atoms_and_mixed_precision_on_two_ranks() {
         let (a, b) = (of(&one), of(&two));
         let scale = (a.iter().map(|x| x * x).sum::<f64>() / 700.0).sqrt();
         assert!(scale > 0.0, "{column}");
-        // Drag and noise of mixed precision have moved the atoms by two steps.
+        // Drag and noise of mixed precision have acted on the atoms for two steps.
         assert!(a.iter().zip(&b).all(|(a, b)| near(*a, *b, scale)), "{column}");
     }
 }
@@ -278,7 +278,7 @@ fn overlays_add_up() {
     assert!(apart < CLOSE, "{apart}");
 }
 
-/// In a hybrid, types of another style take no part: not in forces and not in densities.
+/// In a hybrid, types of another style contribute neither to forces nor to densities.
 #[test]
 fn other_styles_types_take_no_part() {
     let head = particles("", "block 0 5 0 5 0 5", 2, 500);
@@ -302,7 +302,7 @@ fn other_styles_types_take_no_part() {
     assert!(psi.f.iter().zip(&psi.kind).all(|(f, k)| *k == 1 || *f == [0.0; 3]));
 }
 
-/// Bonded neighbours at half and no strength; excluded types; the engine's pairs are LAMMPS's then.
+/// Bonded neighbours with factors of a half and zero, and excluded types; the engine's pairs then come from LAMMPS's list.
 #[test]
 fn special_bonds_and_exclusions() {
     let (_folder, data) = file(&chains(120));
@@ -344,8 +344,8 @@ fn special_bonds_and_exclusions() {
     }
 }
 
-/// Corrected pairs of the fast sweep are the pairs of LAMMPS's list with their factors, drag, noise and pressure among
-/// what they give, for two species with two densities, and on every number of ranks.
+/// Pairs that the fast sweep corrects equal those of LAMMPS's list with their factors, including drag, noise
+/// and pressure, for two species with two densities, and on every number of ranks.
 #[test]
 fn special_bonds_are_the_same_by_the_sweep_and_by_the_list() {
     let (_folder, data) = file(&chains(120));
@@ -391,7 +391,7 @@ fn special_bonds_are_the_same_by_the_sweep_and_by_the_list() {
     }
 }
 
-/// Boxes in which a pair has two images take the list.
+/// Boxes so narrow that a pair has two images use the list.
 #[test]
 fn special_bonds_that_need_the_list() {
     let (_folder, data) = file(&chains(120));
@@ -408,8 +408,9 @@ fn special_bonds_that_need_the_list() {
     assert!(log.contains(why), "{log}");
 }
 
-/// Exclusions of types, groups and molecules are left out of the fast sweep, as of LAMMPS's list: drag, noise, pressure and
-/// energies of atoms, on every number of ranks, beside special factors that a changed temperature has not made it forget.
+/// The fast sweep excludes types, groups and molecules exactly as LAMMPS's list does: drag, noise, pressure
+/// and energies of atoms agree on every number of ranks, together with special factors, which survive a
+/// change of temperature.
 #[test]
 fn exclusions_are_the_same_by_the_sweep_and_by_the_list() {
     let (_folder, data) = file(&chains(120));
@@ -462,7 +463,7 @@ fn exclusions_are_the_same_by_the_sweep_and_by_the_list() {
     }
 }
 
-/// The factors that a hybrid gives to one of its styles are that style's.
+/// The special factors that a hybrid gives to one of its styles apply to that style.
 #[test]
 fn a_hybrids_special_factors() {
     let (_folder, data) = file(&chains(120));
@@ -488,7 +489,7 @@ fn a_hybrids_special_factors() {
         let apart = difference(&frame(&hybrid).f, &alone.f);
         assert!(apart < CLOSE, "{special}: {apart}");
     }
-    // LAMMPS refuses what its list cannot know.
+    // LAMMPS refuses exclusions that its list cannot represent.
     let script = deck(
         "1 1 1",
         &format!(
@@ -512,7 +513,7 @@ fn special_factors_keep_the_potential() {
          {}pair_style dpd/psi 1.0 {SEED}\npair_coeff * * \"{}\" F F\nbond_style zero\nbond_coeff *\nfix 1 all nve\n\
          thermo_modify norm no\ncomm_modify vel yes\nmin_style quickmin\nminimize 0 0 0 0\nrun 0\n",
         load(),
-        // Without drag, as forces are compared with the energy.
+        // The model has no drag, because the test compares forces with the energy.
         quiet().1
     ));
     let start = frame(&l);
@@ -532,7 +533,7 @@ fn special_factors_keep_the_potential() {
     }
 }
 
-/// Warren's model without a thermostat, in a file that stays.
+/// Warren's model without a thermostat, in a file for all tests.
 fn quiet() -> &'static (tempfile::TempDir, String) {
     static QUIET: std::sync::OnceLock<(tempfile::TempDir, String)> = std::sync::OnceLock::new();
     QUIET.get_or_init(|| {
@@ -541,10 +542,10 @@ fn quiet() -> &'static (tempfile::TempDir, String) {
     })
 }
 
-/// Special factors and exclusions leave the temperature where the thermostat puts it: 1 in equilibrium.
-/// With 600 particles the temperature fluctuates by √(2/(3·600)) = 0.033 at one time, and by some 0.006
-/// in the mean over 12 time units, in which the thermostat forgets about thirty times; the time step adds
-/// 0.01. 0.04 is five times 0.006 and that.
+/// Special factors and exclusions leave the temperature at that of the thermostat, 1. With 600 particles the
+/// temperature fluctuates by √(2/(3·600)) = 0.033 at one time, and by about 0.006 in the mean over 12 time
+/// units, about thirty relaxation times of the thermostat. The time step adds 0.01. The limit 0.04 is five
+/// times 0.006, and 0.01.
 #[test]
 fn factors_do_not_shift_the_temperature() {
     let (_folder, data) = file(&chains(120));

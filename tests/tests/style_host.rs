@@ -1,5 +1,5 @@
-//! What else LAMMPS asks of a pair style: single pairs, quantities by name, computes, minimisers, boxes
-//! that change, and trouble.
+//! Further requests of LAMMPS to a pair style: single pairs, quantities by name, computes, minimisers, boxes
+//! that change, and errors.
 
 mod style_common;
 
@@ -20,7 +20,7 @@ fn psi() -> String {
     format!("pair_style dpd/psi 1.0 {SEED}\npair_coeff * * \"{}\" F\n", warren())
 }
 
-/// The forces of pairs, asked for one by one, add up to the forces; their virial is the virial.
+/// The forces of single pairs add up to the forces, and their virials to the virial.
 #[test]
 fn single_pairs_add_up() {
     let (_wide, wide) = file(WIDE);
@@ -55,13 +55,13 @@ fn single_pairs_add_up() {
             let close = |a: f64, b: f64, what: &str| {
                 assert!((a - b).abs() < 1e-9 * (1.0 + a.abs().max(b.abs())), "{what}: {a} {b}\n{style}");
             };
-            // Forces of one half on the other, by pairs, and the sum of the forces on it.
+            // Forces of one half on the other by pairs equal the sum of the forces on that half.
             let between = l.compute_vector("between").unwrap();
             let sum = l.compute_vector("f").unwrap();
             for k in 0..3 {
                 close(between[k], sum[k], "group/group");
             }
-            // compute pair: psi, then phi; and pair/local has what belongs to pairs.
+            // Compute pair gives psi, then phi; pair/local gives the part of the pairs.
             let parts = l.compute_vector("pair").unwrap();
             let pe = l.thermo("pe").unwrap();
             close(parts[0] + parts[1], pe, "compute pair");
@@ -85,7 +85,7 @@ fn single_pairs_add_up() {
     }
 }
 
-/// Local densities and psi by name, through LAMMPS's fix pair.
+/// LAMMPS's fix pair gets local densities and psi by name.
 #[test]
 fn densities_by_name() {
     let (_wide, wide) = file(WIDE);
@@ -109,7 +109,7 @@ fn densities_by_name() {
     assert!(n.iter().sum::<f64>() / n.len() as f64 > 1.0);
 }
 
-/// `fix adapt` changes the temperature and coefficients while running.
+/// `fix adapt` changes the temperature and coefficients during a run.
 #[test]
 fn adapted_styles_are_those_set_directly() {
     let mdpd = |t: &str, a: &str| {
@@ -131,7 +131,7 @@ fn adapted_styles_are_those_set_directly() {
     l.scatter("x", 3, &x).unwrap();
     l.scatter("v", 3, &v).unwrap();
     l.commands("reset_timestep 10\nrun 0").unwrap();
-    // Half-step velocities there, full-step ones here: compare without drag.
+    // The first run has half-step velocities and this one full-step velocities, so the comparison is without drag.
     let conservative = |l: &Only| {
         l.commands("pair_coeff * * -30 25 0 1 0.75\nrun 0").unwrap();
         frame(l).f
@@ -154,7 +154,7 @@ fn adapted_styles_are_those_set_directly() {
     assert!(error.contains("the temperature must be positive"), "{error}");
 }
 
-/// A model file whose psi has kT in it follows the temperature; pair_style again does the same.
+/// A model file with kT in psi follows the temperature, and so does a second pair_style.
 #[test]
 fn the_model_sees_the_new_temperature() {
     let text = "title = \"t\"\nspecies = [\"F\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n\
@@ -189,7 +189,7 @@ fn minimisers_go_downhill() {
     }
     let after = l.thermo("pe").unwrap();
     assert!(after < before, "{before} {after}");
-    // The same minimisation again gives the same, whatever the seed.
+    // A second minimisation gives the same result, whatever the seed.
     let x = frame(&l).x;
     drop(l);
     let l = open(&deck(&format!(
@@ -202,7 +202,7 @@ fn minimisers_go_downhill() {
     assert!(difference(&frame(&l).x, &x) < 1e-9);
 }
 
-/// Unload and reload, clear, several runs.
+/// The plugin can be unloaded and loaded again; `clear` and several runs work.
 #[test]
 fn the_plugin_goes_and_comes() {
     let script = deck(&format!("{}fix 1 all nve\ntimestep {DT}\nrun 5\n", psi()));
@@ -236,8 +236,8 @@ fn rerun_gives_the_same_energies() {
     assert!((l.thermo("press").unwrap() / press - 1.0).abs() < 1e-10);
 }
 
-/// Deforming boxes, walls, gravity, frozen particles, velocities set between runs: forces stay those of
-/// the model where the particles are.
+/// With deforming boxes, walls, gravity, frozen particles and velocities set between runs, forces are those
+/// of the model at the positions.
 #[test]
 fn other_fixes_are_honoured() {
     let model = Model::open(warren().as_ref()).unwrap();
@@ -272,15 +272,15 @@ fn other_fixes_are_honoured() {
     l.commands("velocity all create 3.0 99 loop geom").unwrap();
     check(&l, 20);
     drop(l);
-    // A box that becomes too short for the noise stops.
+    // A box that becomes too narrow for the noise stops the run.
     let l = open(&head("", "block 0 5 0 5 0 5"));
     let error = l.commands("fix d all deform 1 z final 0 1.5\nrun 100").unwrap_err().to_string();
     assert!(error.contains("less than twice the range of the thermostat"), "{error}");
 }
 
-/// Ghosts that are images of a rank's own atoms are left out where they are nothing else; where pairs come from LAMMPS's
-/// list none is. Trajectories are the same, in boxes that shear with velocities or without, shrink, are too narrow or
-/// open along some direction, and for ranks along any of them.
+/// Ghosts that are only images of a rank's own atoms are omitted, but not if pairs come from LAMMPS's list.
+/// Trajectories are the same in boxes that shear with or without velocities, that shrink, that are too
+/// narrow, or that are open along a direction, and for ranks along any direction.
 #[test]
 fn leaving_out_images_changes_nothing() {
     let (_folder, wide) = file(WIDE);
@@ -336,7 +336,7 @@ fn leaving_out_images_changes_nothing() {
     }
 }
 
-/// Trouble on one of several ranks stops all, with the step and the particle.
+/// An error on one of several ranks stops all, and names the step and the particle.
 #[test]
 fn trouble_is_named_on_every_rank() {
     let folder = tempfile::tempdir().unwrap();
@@ -346,7 +346,7 @@ fn trouble_is_named_on_every_rank() {
     let (_folder, singular) = file(singular);
     let singular_style = format!("pair_style dpd/psi 1.0 {SEED}\npair_coeff * * {singular} F\n");
     let cases = [
-        // Atoms gathered at one point of one rank: a density beyond the singularity.
+        // All atoms of one rank are at one point: the density is beyond the singularity.
         (
             format!(
                 "{singular_style}region corner block 0 1.5 0 1.5 0 1.5\ngroup c region corner\nfix 1 all nve\n\
@@ -375,7 +375,7 @@ fn trouble_is_named_on_every_rank() {
             });
             assert!(error.contains("ERROR") && !error.contains("imeout"), "{ranks}: {error}");
             assert!(error.contains(message), "{ranks}: {error}");
-            // The numbers are the trouble, not how they were come by.
+            // The message blames the numbers, not the formula that gave them.
             assert!(!error.contains("variable formula"), "{ranks}: {error}");
             if !message.is_empty() {
                 assert!(

@@ -1,5 +1,5 @@
-//! Valgrind over a short run of each style: no invalid access and no decision on what was never written has the
-//! plugin in its stack. What LAMMPS and MPI do among themselves is theirs.
+//! Valgrind over a short run of each style: no invalid access and no use of uninitialised memory has the
+//! plugin in its stack. Faults within LAMMPS and MPI alone do not count.
 
 use psidpd_tests::{lammps, root};
 use std::path::Path;
@@ -36,7 +36,7 @@ fn deck(plugin: &Path, style: &str) -> String {
          thermo 2\nthermo_style custom step pe press c_t\nrun 4\n\
          neigh_modify exclude type 1 1\nrun 2\n",
     );
-    // More exclusions than the style keeps: pairs of LAMMPS's list.
+    // With more exclusions than the style stores, pairs come from LAMMPS's list.
     text.push_str(&format!(
         "group none empty\nneigh_modify{}\nrun 2\n",
         " exclude group none none".repeat(17)
@@ -44,7 +44,7 @@ fn deck(plugin: &Path, style: &str) -> String {
     text
 }
 
-/// Memory faults in a log of valgrind: paragraphs that have the plugin in their stack.
+/// Memory faults in a log of valgrind: the paragraphs with the plugin in their stack.
 fn ours(log: &str) -> Vec<String> {
     let lines = log.lines().map(|l| l.splitn(3, "==").nth(2).unwrap_or(l).trim_end());
     let text = lines.collect::<Vec<_>>().join("\n");
@@ -57,7 +57,7 @@ fn ours(log: &str) -> Vec<String> {
         .collect()
 }
 
-/// Runs a script under valgrind on so many ranks: what LAMMPS says, and the logs of the ranks.
+/// Runs a script under valgrind on `ranks` ranks and returns LAMMPS's output and the logs of the ranks.
 fn under_valgrind(script: &Path, ranks: usize) -> (Output, Vec<String>) {
     let host = &lammps().0;
     let folder = script.parent().unwrap();
@@ -86,8 +86,8 @@ fn under_valgrind(script: &Path, ranks: usize) -> (Output, Vec<String>) {
     (output, logs.map(|p| std::fs::read_to_string(p).unwrap()).collect())
 }
 
-/// Whether a line of a stack names a function of the crates or a library of the plugin. A folder may be called anything:
-/// LAMMPS and MPI themselves lie below that of the checkout.
+/// Whether a line of a stack names a function of the crates or a library of the plugin. Folder names do not
+/// count: LAMMPS and MPI themselves may lie in a subfolder of the checkout.
 fn in_plugin(line: &str) -> bool {
     let (function, file) = line.split_once(" (in ").unwrap_or((line, ""));
     let file = Path::new(file.trim_end_matches(')')).file_name();

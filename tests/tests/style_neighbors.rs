@@ -1,4 +1,4 @@
-//! The styles beside what in LAMMPS has to do with neighbours: `compute rdf`, `comm_modify mode multi`.
+//! The styles together with LAMMPS's commands about neighbours: `compute rdf`, `comm_modify mode multi`.
 
 mod style_common;
 
@@ -10,7 +10,7 @@ use style_common::*;
 
 const BINS: usize = 20;
 
-/// How many ordered pairs of kinds `a`, `b` are in each shell of width `reach/BINS`; kind 0 is any.
+/// Numbers of ordered pairs of kinds `a`, `b` in shells of width `reach/BINS`; kind 0 is any.
 fn shells(now: &Frame, domain: &PeriodicBox, [a, b]: [i32; 2], reach: f64) -> Vec<f64> {
     let is = |i: usize, kind: i32| kind == 0 || now.kind[i] == kind;
     let mut found = vec![0.0; BINS];
@@ -26,8 +26,8 @@ fn shells(now: &Frame, domain: &PeriodicBox, [a, b]: [i32; 2], reach: f64) -> Ve
     found
 }
 
-/// `compute rdf` gets its pairs from a list of its own: g(r) and coordination numbers are those of a direct
-/// count, wherever the style has its pairs from.
+/// `compute rdf` gets its pairs from a list of its own: g(r) and coordination numbers equal those of a direct
+/// count, whatever the source of the style's pairs.
 #[test]
 fn radial_distributions_are_those_of_a_direct_count() {
     let (model, listed) = (warren(), listed());
@@ -35,7 +35,7 @@ fn radial_distributions_are_those_of_a_direct_count() {
         ("", "block 0 5 0 5 0 5", ""),
         ("newton off", "block 0 5 0 5 0 5", ""),
         ("", "prism 0 5 0 5 0 5 1 -1 1", ""),
-        // The style's own pairs are LAMMPS's here, and no atom is excluded.
+        // The style's pairs come from LAMMPS's list here, and no atom is excluded.
         ("", "block 0 5 0 5 0 5", &listed),
     ] {
         let l = open(&format!(
@@ -49,7 +49,7 @@ fn radial_distributions_are_those_of_a_direct_count() {
         let of = |kind: i32| now.kind.iter().filter(|k| kind == 0 || **k == kind).count() as f64;
         for (column, kinds) in [[0, 0], [1, 2], [2, 2]].into_iter().enumerate() {
             let [from, to] = kinds.map(of);
-            // A particle is no neighbour of its own.
+            // A particle is not its own neighbour.
             let others = if kinds[0] == kinds[1] { to - 1.0 } else { to };
             let counts = shells(&now, &domain, kinds, 1.0);
             assert!(counts.iter().sum::<f64>() > 100.0);
@@ -72,9 +72,9 @@ fn radial_distributions_are_those_of_a_direct_count() {
     }
 }
 
-/// On one rank the style needs no ghosts: found anew every twentieth step only, when atoms have long left the box, without a
-/// skin and with nothing sent back from them, they change neither energy nor pressure. Where it takes its pairs from
-/// LAMMPS's list they do.
+/// On one rank the style needs no ghosts. The test rebuilds them every twentieth step only, when atoms have
+/// long left the box, without a skin and without reverse communication: energy and pressure do not change.
+/// They do change if the style takes its pairs from LAMMPS's list.
 #[test]
 fn one_rank_needs_no_ghosts_in_time() {
     let (model, listed) = (warren(), listed());
@@ -99,8 +99,8 @@ fn one_rank_needs_no_ghosts_in_time() {
     assert!(far("block 0 5 0 5 0 5", &listed) > 1e-6);
 }
 
-/// Ghosts that reach as far as each type needs: forces and trajectories are the same as with one reach, beside a
-/// style of another range too.
+/// If the reach of ghosts depends on their types, forces and trajectories are the same as with one reach,
+/// also beside a style of another range.
 #[test]
 fn ghosts_by_type_are_enough() {
     let (_folder, wide) = file(WIDE);
@@ -121,7 +121,7 @@ fn ghosts_by_type_are_enough() {
         let apart = difference(&frame(&l).f, &truth.forces);
         assert!(apart < 1e-10, "{apart}");
         drop(l);
-        // A third type, of long range, so that the reaches differ.
+        // A third type of long range makes the reaches differ.
         let mixed = "set type 1 type/ratio 2 0.4 77\n";
         let beside = format!(
             "pair_style hybrid {psi} lj/cut 2.0\n\

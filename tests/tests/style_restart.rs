@@ -1,4 +1,4 @@
-//! Restarts and data files: settings and coefficients survive, and trajectories go on.
+//! Restarts and data files: settings and coefficients survive, and trajectories continue.
 
 mod style_common;
 
@@ -25,7 +25,7 @@ fn styles(model: &str) -> [(String, String); 4] {
     ]
 }
 
-/// The run that is split, and the run that goes on from its restart file without a pair_style.
+/// A divided run that continues from its restart file, without a pair_style, equals the unbroken one.
 #[test]
 fn a_restart_goes_on_as_the_split_run() {
     let folder = tempfile::tempdir().unwrap();
@@ -39,7 +39,7 @@ fn a_restart_goes_on_as_the_split_run() {
                 particles("", "block 0 5 0 5 0 5", 2, 400)
             );
             let split = run(&split, ranks);
-            // The restart file has the model itself.
+            // The restart file contains the model itself.
             std::fs::remove_file(&model).unwrap();
             for more in [
                 "",
@@ -55,7 +55,7 @@ fn a_restart_goes_on_as_the_split_run() {
     }
 }
 
-/// A hybrid's restart has the settings; LAMMPS asks for coefficients anew.
+/// A hybrid's restart file has the settings; LAMMPS requires the coefficients anew.
 #[test]
 fn hybrids_restart_too() {
     let folder = tempfile::tempdir().unwrap();
@@ -113,7 +113,7 @@ fn data_files_have_the_coefficients() {
     }
 }
 
-/// A restart file needs the plugin before it is read, and LAMMPS says so.
+/// The plugin must be loaded before a restart file is read, and LAMMPS's error says so.
 #[test]
 fn a_restart_without_the_plugin_says_so() {
     let folder = tempfile::tempdir().unwrap();

@@ -6,7 +6,7 @@ use psidpd_core::maximum::largest;
 use std::fmt::Write;
 use style_common::*;
 
-/// What the numbers of the model stand for, in SI.
+/// Units of the model in SI.
 const LENGTH: f64 = 7.11e-10;
 const MASS: f64 = 1.5e-25;
 const ENERGY: f64 = 4.11e-21;
@@ -64,7 +64,7 @@ const ALL: [Units; 4] = [
 ];
 
 impl Units {
-    /// The model's units of length, energy and time in these.
+    /// The model's units of length, energy and time in units of LAMMPS.
     fn of_model(&self) -> [f64; 3] {
         let time = LENGTH * (MASS / ENERGY).sqrt();
         let here = if self.name == "lj" { time } else { self.time };
@@ -72,7 +72,7 @@ impl Units {
     }
 }
 
-/// 500 particles in a box of 5 × 5 × 5, moving.
+/// A data file of 500 moving particles in a box of 5 × 5 × 5.
 fn data(units: &Units) -> String {
     let [length, _, time] = units.of_model();
     let mut word = 4711u64;
@@ -97,8 +97,8 @@ fn data(units: &Units) -> String {
     )
 }
 
-/// Positions and velocities after some steps, then energy, pressure, energies of atoms and the mean density, in units of the
-/// model; and the log.
+/// Positions and velocities after some steps; energy, pressure, energies of atoms and the mean density, in
+/// units of the model; and the log.
 fn outcome(units: &Units, style: &str, ranks: usize) -> (Frame, Vec<f64>, String) {
     let [length, energy, time] = units.of_model();
     let folder = tempfile::tempdir().unwrap();
@@ -128,7 +128,7 @@ fn outcome(units: &Units, style: &str, ranks: usize) -> (Frame, Vec<f64>, String
     (frame, totals.zip(here).map(|(t, unit)| t / unit).collect(), log)
 }
 
-/// As far as constants of LAMMPS are known: to six digits.
+/// Compares to six digits, the precision of LAMMPS's constants.
 fn agree(found: &(Frame, Vec<f64>, String), expected: &(Frame, Vec<f64>, String), what: &str) {
     let apart = [
         difference(&found.0.x, &expected.0.x),
@@ -141,8 +141,8 @@ fn agree(found: &(Frame, Vec<f64>, String), expected: &(Frame, Vec<f64>, String)
     }
 }
 
-/// A model that states its units moves in each of LAMMPS's as in its own: forces, drag and noise, energies, pressure,
-/// densities, and what belongs to single atoms.
+/// A model that states its units gives the same results in each of LAMMPS's units as in its own: forces, drag
+/// and noise, energies, pressure, densities, and values of single atoms.
 #[test]
 fn a_model_moves_the_same_in_all_units() {
     let (_folder, model) =
@@ -184,7 +184,7 @@ fn coefficients_are_in_the_units_of_the_simulation() {
     }
 }
 
-/// Units that nobody has stated, and those that the styles do not know.
+/// Models without units, and units that the styles do not support, are refused.
 #[test]
 fn other_units_are_refused() {
     let model = warren();

@@ -1,4 +1,4 @@
-//! The pair styles inside LAMMPS: what they do, and what they say when something is wrong.
+//! The pair styles inside LAMMPS: their results, and their errors.
 
 use psidpd::lammps::{HostVersion, plugin};
 use psidpd_tests::{lammps, root};
@@ -7,7 +7,7 @@ use std::time::Duration;
 
 const LIMIT: Duration = Duration::from_secs(120);
 
-/// A script that runs; tests change one thing in it.
+/// A valid script, of which each test changes one part.
 fn script(plugin: &Path) -> String {
     let model = root().join("validation/models/warren2003-set6.toml");
     format!(
@@ -20,7 +20,7 @@ fn script(plugin: &Path) -> String {
     )
 }
 
-/// Runs a script and returns LAMMPS's own words, or its error.
+/// Runs a script and returns LAMMPS's output, or its error.
 fn outcome(text: &str, ranks: usize) -> Result<String, String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("in.lammps");
@@ -48,7 +48,7 @@ fn a_script_runs_and_says_what_is_computed() {
     }
 }
 
-/// What is replaced, by what, and a part of the message that must follow. Each is one line.
+/// Each row has the text to replace, its replacement, and a part of the error. Each error is one line.
 #[test]
 fn mistakes_stop_with_one_clear_line() {
     let base = script(&lammps().1);
@@ -87,7 +87,7 @@ fn mistakes_stop_with_one_clear_line() {
         (&coeff, coeff.replace(" F", " G"), "no species \"G\"; the model has F"),
         (&coeff, format!("{coeff} F"), "a species (or NULL) for each of 1 atom types, found 5 arguments"),
         (&coeff, coeff.replace("* *", "1 1"), "must start with * *"),
-        // LAMMPS checks itself that coefficients were given at all.
+        // LAMMPS itself checks that coefficients are given.
         (&coeff, String::new(), "ERROR"),
         (&coeff, format!("pair_coeff * * {} F", singular.display()), "is not finite at local densities"),
         ("comm_modify vel yes", String::new(), "add 'comm_modify vel yes'"),
@@ -126,7 +126,7 @@ fn mistakes_stop_with_one_clear_line() {
     }
 }
 
-/// The place that LAMMPS names behind an error is that of the check, not one for all of them.
+/// LAMMPS's error names the source line of the failed check, which differs between checks.
 #[test]
 fn errors_name_the_place_of_the_check() {
     let base = script(&lammps().1);
@@ -143,7 +143,7 @@ fn errors_name_the_place_of_the_check() {
     }
 }
 
-/// What does nothing, or replaces something, is said once, where it is no error.
+/// Settings without effect, and replaced settings, give one warning and no error.
 #[test]
 fn what_does_nothing_is_said() {
     let base = script(&lammps().1);
@@ -157,17 +157,17 @@ fn what_does_nothing_is_said() {
     warned(&twice, "this pair_coeff replaces the model");
     warned(&format!("suffix omp\n{base}"), "the suffix has no effect");
     warned(&base.replace("psi 1.0 5", "psi 1.0 5 threads 600"), "threads 600 is more than the");
-    // A new pair_style begins anew.
+    // A second pair_style starts without the settings of the first.
     let style = "pair_style dpd/psi 1.0 5";
     let said = outcome(&format!("{base}{style}\n{coeff}\nrun 1\n"), 1).unwrap();
     assert!(!said.contains("WARNING: Pair style"), "{said}");
-    // The log says what there is.
+    // The log lists the settings.
     assert!(said.contains("'precision mixed' is faster"), "{said}");
     let mixed = outcome(&base.replace(style, &format!("{style} precision mixed")), 1).unwrap();
     assert!(mixed.contains("mixed precision") && !mixed.contains("is faster"), "{mixed}");
 }
 
-/// Two dimensions have no place for atoms above each other, whichever rank has them.
+/// In two dimensions atoms with different z are refused, whichever rank has them.
 #[test]
 fn atoms_out_of_the_plane_are_refused() {
     let flat = |more: &str| {
@@ -185,7 +185,7 @@ fn atoms_out_of_the_plane_are_refused() {
     }
 }
 
-/// One rank's trouble stops all of them, without a hang.
+/// An error on one rank stops all ranks, without a hang.
 #[test]
 fn trouble_on_one_rank_stops_two() {
     let lost = script(&lammps().1).replace("run 10", "set atom 1 vx 1e300\nrun 10");
@@ -193,7 +193,7 @@ fn trouble_on_one_rank_stops_two() {
     assert!(error.contains("ERROR"), "{error}");
 }
 
-/// LAMMPS says how many atoms are lost; the style says which, once, and not again in the next run.
+/// LAMMPS prints the number of lost atoms; the style prints their ids, once, and not again in the next run.
 #[test]
 fn lost_atoms_are_named() {
     let text = script(&lammps().1).replace("comm_modify", "boundary f p p\ncomm_modify").replace(
@@ -211,7 +211,7 @@ fn lost_atoms_are_named() {
     }
 }
 
-/// Different B for different pairs of types have no potential: refused, with the reason.
+/// If B differs between pairs of types there is no potential: the error says so.
 #[test]
 fn b_by_type_pair_is_refused_with_the_reason() {
     let text = script(&lammps().1)
@@ -236,8 +236,8 @@ fn b_by_type_pair_is_refused_with_the_reason() {
     assert!(outcome(&format!("{same}\n"), 1).is_ok());
 }
 
-/// The potential energy and pressure that LAMMPS prints are those of the native engine, which
-/// `validate` shows for the interior; here: hybrid, two runs, unload and reload do not disturb it.
+/// The potential energy and pressure that LAMMPS prints equal those of the native engine, which `validate`
+/// checks for single styles; here the styles are in a hybrid, run twice, and are loaded again.
 #[test]
 fn styles_survive_clear_and_reload() {
     let text = script(&lammps().1);
@@ -247,7 +247,7 @@ fn styles_survive_clear_and_reload() {
     assert_eq!(said.matches("Loop time").count(), 2, "{said}");
 }
 
-/// A plugin built for another LAMMPS says so and stops the script, before any of its code runs.
+/// A plugin built for another LAMMPS stops the script with an error before any of its code runs.
 #[test]
 fn a_plugin_for_another_lammps_is_refused() {
     let (host, ours) = lammps();
@@ -264,7 +264,7 @@ fn a_plugin_for_another_lammps_is_refused() {
     plugin::check(host, ours).unwrap();
 }
 
-/// `compute pair` counts, third and fourth, how often ψ went on below and above its bounds.
+/// The third and fourth values of `compute pair` count evaluations of ψ below and above its bounds.
 #[test]
 fn evaluations_beyond_bounds_are_counted() {
     let folder = tempfile::tempdir().unwrap();

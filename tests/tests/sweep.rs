@@ -1,4 +1,4 @@
-//! Values set from the command line, and many of them.
+//! Values set on the command line, and sweeps over several values.
 
 use psidpd_tests::{psidpd, root, said};
 use std::path::Path;
@@ -32,7 +32,7 @@ fn set_reaches_scene_and_model_in_every_verb() {
     let here = folder.path();
     let s = scene(here);
     let model = root().join("validation/models/warren2003-set6.toml").display().to_string();
-    // A run: its results are those of the other temperature, and --resume knows the difference.
+    // The results of a run are those of the other temperature, and --resume detects the difference.
     good(here, &["run", &s, "--out", "a", "--set", "kT=2", "--set", "steps=20", "--json", "a.json"]);
     let a = json(&here.join("a.json"));
     assert_eq!((&a["steps"], &json(&here.join("a/about.json"))["kT"]), (&20.into(), &2.0.into()));
@@ -46,7 +46,7 @@ fn set_reaches_scene_and_model_in_every_verb() {
         "{}",
         said(&other)
     );
-    // A parameter of the model, by its name alone and in full: the mean-field pressure follows.
+    // A parameter of the model, by its short and its full name, changes the mean-field pressure.
     let pressure = |arguments: &[&str]| {
         good(here, &[&["check"], arguments, &["--json", "c.json"]].concat());
         json(&here.join("c.json"))["pressure"].as_f64().unwrap()
@@ -94,7 +94,7 @@ fn a_sweep_leaves_a_table_and_a_page_and_goes_on() {
         assert!((number(row + 1, "density") - density).abs() < 0.01);
         assert!(number(row + 1, "pressure_error") > 0.0);
     }
-    // The run of one point alone is that of the sweep.
+    // A run of one point equals that point of the sweep.
     good(here, &["run", &s, "--out", "one", "--set", "kT=1", "--set", "density=6"]);
     let bytes = |name: &str| std::fs::read(here.join(name).join("thermo.csv")).unwrap();
     assert!(bytes("one") == bytes("w/kT=1,density=6"));
@@ -102,7 +102,7 @@ fn a_sweep_leaves_a_table_and_a_page_and_goes_on() {
     for text in ["pressure", "density=5", "<svg", "6 of 6 finished"] {
         assert!(page.contains(text), "{text}");
     }
-    // What is finished is not run again; what was lost is, and to the same bytes.
+    // A finished point is not run again; a lost one is run again, with the same bytes.
     let stamp =
         |name: &str| here.join("w").join(name).join("final.data").metadata().unwrap().modified().unwrap();
     let before = stamp("kT=0.8,density=5");
@@ -112,7 +112,7 @@ fn a_sweep_leaves_a_table_and_a_page_and_goes_on() {
     assert_eq!(stamp("kT=0.8,density=5"), before);
     assert!(bytes("w/kT=1.2,density=6") == lost);
     assert_eq!(std::fs::read_to_string(here.join("w/sweep.csv")).unwrap(), csv);
-    // A run that fails is told, and does not stop the others.
+    // A failed run is reported, and does not stop the others.
     let output = psidpd(here, &["sweep", &s, "--over", "dt=0.01,50", "--set", "steps=500", "--out", "f"]);
     assert_eq!(output.status.code(), Some(1), "{}", said(&output));
     assert!(said(&output).contains("dt=50: ") && said(&output).contains("failed"), "{}", said(&output));

@@ -1,4 +1,4 @@
-//! `check`, `theory` and `export eam` as a user meets them.
+//! `check`, `theory` and `export eam` on the command line.
 
 use psidpd_tests::{json, psidpd, root, said};
 use serde_json::Value;
@@ -14,12 +14,12 @@ fn check_says_what_is_computed_and_refuses_what_cannot_work() {
     let good = json(here, &["check", &model("warren2003-set6.toml"), "--density", "6.05"], 0);
     assert!(good["plan"].as_str().unwrap().contains("density pass  n: quadratic kernel"), "{good}");
     assert_eq!(good["warnings"].as_array().unwrap().len(), 0, "{good}");
-    // Warren eq. 16: p = ρkT + π/30 (A + 2 B r_d⁴ ρ) ρ²
+    // The pressure follows Warren eq. 16: p = ρkT + π/30 (A + 2 B r_d⁴ ρ) ρ²
     let rho: f64 = 6.05;
     let expected = rho + std::f64::consts::PI / 30.0 * (-40.0 + 50.0 * 0.75f64.powi(4) * rho) * rho * rho;
     assert!((good["pressure"].as_f64().unwrap() - expected).abs() < 1e-9 * expected);
 
-    // Set 6 without its many-body repulsion is an attraction and nothing else.
+    // Set 6 without its many-body repulsion is purely attractive.
     let text = std::fs::read_to_string(model("warren2003-set6.toml")).unwrap();
     std::fs::write(here.join("bad.toml"), text.replace("B  = 25.0", "B  = 0.0")).unwrap();
     let bad = json(here, &["check", "bad.toml", "--density", "6.05"], 1);
@@ -59,7 +59,7 @@ fn theory_gives_the_critical_point_and_the_binodal_of_van_der_waals() {
     assert!(hot["binodal"]["none"].is_string(), "{hot}");
 }
 
-/// Where ψ is no number, theory has no answer, and says so by its exit.
+/// If ψ is not a number, theory fails with exit code 1.
 #[test]
 fn theory_fails_where_psi_is_no_number() {
     let folder = tempfile::tempdir().unwrap();
@@ -79,7 +79,7 @@ fn theory_fails_where_psi_is_no_number() {
     }
 }
 
-/// Between zeros of det f, and not between those of f_AA − 2 f_AB + f_BB, which are at 0.146 and 0.854.
+/// The spinodal lies between the zeros of det f, not between those of f_AA − 2 f_AB + f_BB, which are 0.146 and 0.854.
 #[test]
 fn the_spinodal_of_a_mixture_is_where_its_determinant_vanishes() {
     let folder = tempfile::tempdir().unwrap();
@@ -90,7 +90,7 @@ fn the_spinodal_of_a_mixture_is_where_its_determinant_vanishes() {
     }
 }
 
-/// A law that is stated and has no ψ: said where it can be used, refused where a potential is asked for.
+/// A force law without ψ is named where it can be used, and refused where a potential is needed.
 #[test]
 fn a_law_without_potential_is_named_and_has_no_theory() {
     let folder = tempfile::tempdir().unwrap();
@@ -131,8 +131,8 @@ fn a_fluid_that_tables_cannot_say_is_refused_with_the_reason() {
     assert!(said(&output).contains("partial densities of n"), "{}", said(&output));
 }
 
-/// Of Warren's liquid mean field is wrong by a factor of nearly three: it is said, the estimate with correlations is near
-/// what Warren has, and short runs find it.
+/// Mean field is wrong by a factor of nearly three for Warren's liquid: the output says so, the estimate with
+/// correlations is close to Warren's value, and short runs confirm it.
 #[test]
 fn theory_says_where_it_fails_and_measures() {
     let folder = tempfile::tempdir().unwrap();
@@ -142,7 +142,7 @@ fn theory_says_where_it_fails_and_measures() {
     let found = json(here, &run, 0);
     assert!(found["binodal"]["liquid"].as_f64().unwrap() < 2.5, "{found}");
     let expected = found["correlated"]["liquid"].as_f64().unwrap();
-    // By another quadrature of the same approximation, with g(r) in the integrals of the virial.
+    // Another quadrature of the same approximation, with g(r) in the integrals of the virial, gives the reference value.
     assert!((expected - 6.458).abs() < 0.002, "{found}");
     let doubts = found["doubts"].to_string();
     for part in ["mean field is off here", "expected near 6.4", "square-gradient coefficient is negative"] {
@@ -150,7 +150,7 @@ fn theory_says_where_it_fails_and_measures() {
     }
     assert_eq!(found["published"]["tension"][0], 7.45);
     let values = found["measured"][0]["values"].as_array().unwrap();
-    // Warren's, four of his errors and ours: one run in 10⁴ is farther off by chance; the seed is fixed.
+    // The limit is four combined errors of Warren and of this run: one run in 10⁴ exceeds it by chance; the seed is fixed.
     for (name, (published, its_error), most) in
         [("liquid", (6.05, 0.01), 0.02), ("tension", (7.45, 0.04), 1.0)]
     {
@@ -162,7 +162,7 @@ fn theory_says_where_it_fails_and_measures() {
     for part in ["Phase diagram", "binodal", "Where mean field fails", "with correlations"] {
         assert!(page.contains(part), "{part}");
     }
-    // Several temperatures in one call, and no doubt where correlations change little.
+    // One call takes several temperatures, and warns of nothing where correlations change little.
     let several = json(here, &["theory", &model("van-der-waals-3d.toml"), "--kT", "1.5,2"], 0);
     assert_eq!(several["temperatures"].as_array().map(Vec::len), Some(2));
     assert_eq!(several["temperatures"][1]["kT"], 2.0);
@@ -178,7 +178,7 @@ fn theory_says_where_it_fails_and_measures() {
     assert!(page.contains("Composition diagram") && page.contains("fraction of A"));
 }
 
-/// A check of a scene says what it takes and what phases to expect.
+/// A check of a scene prints its cost and the expected phases.
 #[test]
 fn check_tells_cost_and_phases() {
     let folder = tempfile::tempdir().unwrap();
@@ -194,7 +194,8 @@ fn check_tells_cost_and_phases() {
     assert!(found["theory"][0].as_str().unwrap().contains("with correlations"), "{found}");
 }
 
-/// A mixture whose species differ: with the total density held its phases have different pressures, so these are no phases.
+/// In a mixture of different species, states of equal total density have different pressures, so they are not
+/// coexisting phases.
 #[test]
 fn theory_refuses_phases_that_are_not_in_equilibrium() {
     let folder = tempfile::tempdir().unwrap();
@@ -207,7 +208,8 @@ fn theory_refuses_phases_that_are_not_in_equilibrium() {
         let why = found[key]["none"].as_str().unwrap_or_else(|| panic!("{found}"));
         assert!(why.contains("not in equilibrium"), "{why}");
     }
-    // ρ = (c ρ, (1 − c) ρ): μ_A − kT ln ρ_A = 2(ρ_B + λ_A ρ_A), and p = ρkT + 2ρ_A ρ_B + λ_A ρ_A² + λ_B ρ_B².
+    // The densities are ρ = (c ρ, (1 − c) ρ): μ_A − kT ln ρ_A = 2(ρ_B + λ_A ρ_A), and p = ρkT + 2ρ_A ρ_B +
+    // λ_A ρ_A² + λ_B ρ_B².
     let phases = &found["coexistence"];
     let [first, second] = [0, 1].map(|k| {
         let c = phases["composition"][k].as_f64().unwrap();
@@ -224,7 +226,7 @@ fn theory_refuses_phases_that_are_not_in_equilibrium() {
     }
     assert!((phases["density"][0].as_f64().unwrap() - phases["density"][1].as_f64().unwrap()).abs() > 0.1);
     assert!(found["assumptions"]["coexistence"].as_str().unwrap().contains("equal pressure"), "{found}");
-    // Where the paper's assumption holds, its numbers stay: kT_c = ρ(λ − λ_A).
+    // Where the paper's assumption holds, the result is the paper's: kT_c = ρ(λ − λ_A).
     let paper = json(folder.path(), &["theory", &model("binary-2d.toml"), "--kT", "4", "--density", "10"], 0);
     let critical = &paper["critical_point_at_this_density"];
     assert!((critical["kT"].as_f64().unwrap() - 8.0).abs() < 1e-9, "{critical}");
@@ -237,7 +239,7 @@ fn theory_refuses_phases_that_are_not_in_equilibrium() {
     assert!((held.as_f64().unwrap() - free.as_f64().unwrap()).abs() < 1e-9, "{paper}");
 }
 
-/// No NaN and no infinity in the table: an empty cell, and a sentence.
+/// The table has an empty cell and a sentence instead of NaN or infinity.
 #[test]
 fn theory_leaves_cells_empty_where_there_is_no_number() {
     let folder = tempfile::tempdir().unwrap();
@@ -255,14 +257,14 @@ fn theory_leaves_cells_empty_where_there_is_no_number() {
     }
 }
 
-/// What check says of a state that bounds make up, of a mixture in several parts, of ramps and of long steps.
+/// Warnings of check about a state that bounds create, a mixture in several parts, ramps and long steps.
 #[test]
 fn check_judges_every_part_and_says_what_is_wrong() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     let beyond = json(here, &["check", &model("van-der-waals-3d.toml"), "--kT", "2", "--density", "500"], 1);
     assert_eq!(beyond["warnings"][0]["id"], "singular", "{beyond}");
-    // Each part is a stable fluid of one species, their mixture is not.
+    // Each part is a stable fluid of one species, but their mixture is unstable.
     let scene = |model: &str, stage: &str| {
         let part = |low: f64, species: &str| {
             format!(
@@ -282,7 +284,8 @@ fn check_judges_every_part_and_says_what_is_wrong() {
     let spinodal = found["warnings"].as_array().unwrap().iter().find(|w| w["id"] == "spinodal");
     let message = spinodal.unwrap_or_else(|| panic!("{found}"))["message"].to_string();
     assert!(message.contains("A 5.0000, B 5.0000"), "{message}");
-    // A ramp: its first and last temperature. A step far too long: a warning, to two digits.
+    // Check judges a ramp at its first and last temperature. It warns of a step far too long, and recommends
+    // one with two digits.
     let set6 = model("warren2003-set6.toml");
     let text = |dt: f64| {
         format!(

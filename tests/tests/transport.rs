@@ -1,6 +1,6 @@
-//! Diffusion and viscosity of a liquid against LAMMPS's own `dpd`, which shares no code with psidpd: its forces and its noise,
-//! its displacements, and its stress in a shear flow, for which nothing is correlated. Slabs and tensions are compared by
-//! `psidpd validate`.
+//! Diffusion and viscosity of a liquid agree with LAMMPS's own `dpd`, which shares no code with psidpd: its
+//! forces and its noise, its displacements, and its stress in a shear flow, which needs no correlation
+//! functions. `psidpd validate` compares slabs and tensions.
 
 use psidpd::lammps::install;
 use psidpd::observe::Measured;
@@ -10,7 +10,7 @@ use std::time::Duration;
 
 const EDGE: f64 = 7.0;
 const DT: f64 = 0.02;
-/// Blocks of a run of LAMMPS, and their steps.
+/// Number of blocks of a LAMMPS run, and their steps.
 const BLOCKS: usize = 24;
 const STEPS: usize = 2500;
 /// Steps of the native run: correlations of stresses are noisier than a mean stress.
@@ -29,7 +29,7 @@ fn scene() -> String {
     )
 }
 
-/// The liquid, at rest for 1500 steps; the box can be sheared.
+/// The liquid after 1500 steps at rest; the box can be sheared.
 fn liquid() -> String {
     format!(
         "units lj\natom_style atomic\ncomm_modify vel yes\nregion b prism 0 {EDGE} 0 {EDGE} 0 {EDGE} 0 0 0\n\
@@ -50,7 +50,7 @@ fn deck() -> String {
     )
 }
 
-/// Plane Couette flow along x, by edges that move (Lees and Edwards 1972).
+/// Plane Couette flow along x, driven by moving box edges (Lees and Edwards 1972).
 fn flow() -> String {
     format!(
         "{}fix flow all deform 1 xy erate {RATE} remap v\nrun 3500\nvariable eta equal -pxy/{RATE}\n\
@@ -60,7 +60,7 @@ fn flow() -> String {
     )
 }
 
-/// D and η of LAMMPS, with their errors from the blocks.
+/// D and η from LAMMPS, with errors from blocks.
 fn by_lammps(folder: &Path) -> [Measured; 2] {
     let host = install(&|line| eprintln!("{line}")).unwrap();
     for (name, text) in [("in.rest", deck()), ("in.flow", flow())] {
@@ -80,7 +80,7 @@ fn by_lammps(folder: &Path) -> [Measured; 2] {
     [Measured::mean(&diffusion), Measured::mean(&viscosity)]
 }
 
-/// Three combined errors each: one run in 200 with other seeds fails by chance.
+/// Each limit is three combined errors: one run in 200 with other seeds fails by chance.
 #[test]
 #[ignore = "minutes of LAMMPS: cargo test --release -p psidpd-tests --test transport -- --ignored"]
 fn diffusion_and_viscosity_are_those_of_lammps() {

@@ -1,4 +1,4 @@
-//! Files and arguments that nobody means well with, or that went wrong: they end with a message, soon, and touch nothing.
+//! Malicious or damaged files and arguments end soon with a message, and change no file.
 
 use psidpd_tests::{program, psidpd, said};
 use rustix::fs::{CWD, FileType, Mode, mknodat};
@@ -14,13 +14,13 @@ fn write(folder: &Path, name: &str, text: &str) {
     std::fs::write(folder.join(name), text).unwrap();
 }
 
-/// What the program says, with its lines put together, and its exit code.
+/// The output of the program on one line, and its exit code.
 fn words(output: &Output) -> (String, Option<i32>) {
     let text = said(output).replace(['│', '×'], " ");
     (text.split_whitespace().collect::<Vec<_>>().join(" "), output.status.code())
 }
 
-/// Results go through links and into pipes; nothing that is no file is replaced by one.
+/// Results follow links and go into pipes; only files are replaced by files.
 #[test]
 fn json_is_written_through_what_is_no_file() {
     let folder = tempfile::tempdir().unwrap();
@@ -35,7 +35,7 @@ fn json_is_written_through_what_is_no_file() {
         let text = std::fs::read_to_string(here.join("inner/real.json")).unwrap();
         serde_json::from_str::<serde_json::Value>(&text).unwrap();
     }
-    // A pipe, and a file that the output was sent to: what was said before stays.
+    // With a pipe, or a file as standard output, earlier output is kept.
     let output = psidpd(here, &["check", "m.toml", "--json", "/dev/stdout"]);
     assert_eq!(output.status.code(), Some(0), "{}", said(&output));
     let all = std::fs::File::create(here.join("all.txt")).unwrap();
@@ -55,7 +55,7 @@ fn json_is_written_through_what_is_no_file() {
     assert!(!std::fs::metadata("/dev/null").unwrap().is_file());
 }
 
-/// A pipe without a writer would be waited for.
+/// Opening a pipe without a writer would block.
 #[test]
 fn pipes_are_no_input() {
     let folder = tempfile::tempdir().unwrap();
@@ -151,7 +151,7 @@ fn many_species_are_looked_at_in_a_moment() {
     }
 }
 
-/// What is in a file is shown, and does nothing else to a terminal.
+/// Control characters in a file are shown, and do not reach the terminal.
 #[test]
 fn messages_are_plain_and_short() {
     let folder = tempfile::tempdir().unwrap();
@@ -179,8 +179,8 @@ fn messages_are_plain_and_short() {
     }
 }
 
-/// A model may come from anywhere: tables are read from its folder, unless the user says otherwise, and nothing in them is
-/// shown.
+/// A model may come from anywhere: it can name tables in its own folder only, unless the user allows more,
+/// and errors do not show the contents of other files.
 #[test]
 fn tables_stay_in_the_folder_of_the_model() {
     let folder = tempfile::tempdir().unwrap();
@@ -232,7 +232,7 @@ fn split(line: &str) -> Vec<&str> {
     line.split(' ').collect()
 }
 
-/// The verbs that `psidpd --help` tells.
+/// The verbs that `psidpd --help` lists.
 fn verbs() -> Vec<String> {
     let help = said(&psidpd(Path::new("."), &["--help"]));
     let list = help.split("Commands:").nth(1).unwrap().split("Options:").next().unwrap();
@@ -244,7 +244,7 @@ fn verbs() -> Vec<String> {
         .collect()
 }
 
-/// What cannot be said is an error. Verbs that take long say things as the others do.
+/// Failing to write to standard output is an error. The source of slow verbs shows that they print in the same way.
 #[test]
 fn a_full_standard_output_is_an_error_of_every_verb() {
     let folder = with_a_run();
@@ -281,7 +281,7 @@ fn a_full_standard_output_is_an_error_of_every_verb() {
             "{line}: {text}"
         );
     }
-    // Minutes, or LAMMPS, or a feature.
+    // These verbs take minutes, or need LAMMPS or a feature.
     let long = ["validate", "bench", "pareto", "hardcases", "model"];
     for verb in verbs() {
         let tried = lines.iter().any(|line| line.split(' ').next() == Some(&verb)) || verb == "lammps";
@@ -295,7 +295,7 @@ fn a_full_standard_output_is_an_error_of_every_verb() {
     }
 }
 
-/// Every error about a file names it: one that is broken, empty, missing or a folder.
+/// Every error about a file names it: a damaged, empty or missing file, or a folder.
 #[test]
 fn errors_of_every_verb_name_the_file() {
     let folder = with_a_run();
@@ -353,7 +353,7 @@ fn errors_of_every_verb_name_the_file() {
         };
         assert!(code == Some(2) && text.contains(name), "{line}: {code:?}: {text}");
     }
-    // What is wrong in itself, without a word on files, too; and data with their line.
+    // Invalid settings give an error without a sentence about files, and invalid data names its line.
     write(here, "narrow.toml", &SCENE.replace("4.0, 4.0, 4.0", "1.5, 4.0, 4.0"));
     let data = "t\n\n1 atoms\n3 atom types\n\n0 6 xlo xhi\n0 6 ylo yhi\n0 6 zlo zhi\n\nAtoms # atomic\n\n7 3 0 0 0\n";
     write(here, "types.data", data);
@@ -396,7 +396,7 @@ fn more_memory_than_there_is_is_refused() {
     }
 }
 
-/// A drag whose forces no number can hold stops every integrator, at a step, for a reason.
+/// A drag whose forces overflow stops every integrator, with the step and the reason.
 #[test]
 fn a_drag_beyond_numbers_stops_a_run() {
     let folder = tempfile::tempdir().unwrap();
@@ -414,7 +414,7 @@ fn a_drag_beyond_numbers_stops_a_run() {
     }
 }
 
-/// A new run deletes what the old one has left, and nothing else.
+/// A new run deletes the files of the old run, and no others.
 #[test]
 fn a_new_run_deletes_nothing_of_the_user() {
     let folder = tempfile::tempdir().unwrap();
@@ -433,7 +433,7 @@ fn a_new_run_deletes_nothing_of_the_user() {
         assert_eq!(std::fs::read_to_string(here.join(name)).unwrap(), "mine", "{name}");
     }
     assert!(!here.join("o/observables/temperature.csv").exists());
-    // What a run starts from stays, under whatever name.
+    // The input of a run is kept, under whatever name.
     for (kind, file) in [("data", "o/final.data"), ("checkpoint", "o/checkpoint"), ("checkpoint", "o")] {
         let initial = format!("[initial]\nkind = \"{kind}\"\nfile = \"{file}\"\n");
         write(
@@ -449,7 +449,7 @@ fn a_new_run_deletes_nothing_of_the_user() {
     }
 }
 
-/// A run that is finished has not failed to start, whatever cannot be written behind it.
+/// A run that has finished has not failed to start, even if a later file cannot be written.
 #[test]
 fn a_finished_run_stays_finished() {
     let folder = with_a_run();
@@ -459,7 +459,7 @@ fn a_finished_run_stays_finished() {
         code == Some(1) && text.contains("the run in p is finished, but cannot write /dev/full"),
         "{text}"
     );
-    // Neither the page nor the old checkpoint can be touched, as on a disk that is only read.
+    // Neither the report nor the old checkpoint can be changed, as on a read-only disk.
     std::fs::create_dir(here.join("o/report.html")).unwrap();
     std::fs::create_dir(here.join("o/checkpoint.old")).unwrap();
     let (text, code) = words(&psidpd(here, &["run", "s.toml", "--out", "o", "--resume", "--report"]));
@@ -470,7 +470,7 @@ fn a_finished_run_stays_finished() {
     );
 }
 
-/// Names with escape sequences do nothing to a terminal, and commands that cannot be shown are left out.
+/// Names with escape sequences do not affect a terminal, and commands that cannot be shown are omitted.
 #[test]
 fn names_of_files_are_shown_without_escapes() {
     use std::ffi::OsStr;
@@ -518,7 +518,7 @@ fn names_of_files_are_shown_without_escapes() {
     }
 }
 
-/// Outside a checkout there is no plugin to be built: nothing is downloaded for it.
+/// Outside a checkout no plugin can be built, and nothing is downloaded for it.
 #[test]
 fn a_bench_without_sources_installs_nothing() {
     let folder = tempfile::tempdir().unwrap();
@@ -534,7 +534,7 @@ fn a_bench_without_sources_installs_nothing() {
     }
 }
 
-/// Derived files go where the new script goes, and replace nothing unasked.
+/// Derived files go to the folder of the new script, and replace others on request only.
 #[test]
 fn a_converted_script_replaces_nothing() {
     let folder = tempfile::tempdir().unwrap();
@@ -565,14 +565,14 @@ fn a_converted_script_replaces_nothing() {
         std::fs::remove_file(here.join("new/in.new")).unwrap();
     }
     assert_eq!(std::fs::read_to_string(here.join("d/mdpd.data.atomic")).unwrap(), "mine");
-    // An atom with too few columns, with file and line.
+    // An atom line with too few columns gives an error with file and line.
     write(here, "d/mdpd.data", &data.replace("1 1 0 0 0 0", "1 1 0 0"));
     let (text, code) = convert(&["--overwrite"]);
     assert!(code == Some(2) && text.contains("mdpd.data: line 12"), "{text}");
 }
 
-/// A stand-in for Python: pip notes its beginning and its end, with its process, and takes a second; what it has started
-/// takes another.
+/// A stand-in for Python: pip logs its start and its end with its process id, and takes a second; a child
+/// process of it takes another second.
 const SLOW_PIP: &str = r#"#!/bin/sh
 [ "$1" = -c ] && exit 0
 if [ "$2" = venv ]; then mkdir -p "$3/bin"; cp "$0" "$3/bin/python"; exit 0; fi
@@ -605,7 +605,7 @@ fn pip_ends_with_an_installation_that_is_killed_before_the_next_begins() {
     first.kill().unwrap();
     first.wait().unwrap();
     install().wait().unwrap();
-    // The first pip is gone at once; what it had started ends before the second pip begins.
+    // The first pip ends at once; its child ends before the second pip begins.
     let log = log();
     let words: Vec<&str> = log.lines().filter_map(|line| line.split(' ').next()).collect();
     assert_eq!(words, ["begin", "child", "begin", "end", "child"], "{log}");

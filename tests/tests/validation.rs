@@ -1,9 +1,9 @@
-//! The main job, as a user starts it.
+//! The quick validation on the command line.
 
 use psidpd_tests::{psidpd, said};
 
-/// Every check of the quick validation passes. Its statistical checks together raise a false alarm once
-/// in a thousand runs, and its seeds are fixed.
+/// Every check of the quick validation passes. Its statistical checks together raise a false alarm once in a
+/// thousand runs, and its seeds are fixed.
 #[test]
 fn the_quick_validation_passes() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,7 +1,7 @@
-//! The architecture within crates: no file imports from a room above its own, and no files import from each other in a
-//! circle. Which crate may import from which its `Cargo.toml` says.
+//! The architecture within crates: no file imports from a room above its own, and no files import from each
+//! other in a circle. A crate's `Cargo.toml` limits its imports from other crates.
 //!
-//! A room is a folder or a file. Rooms are listed from the ground up.
+//! A room is a folder or a file. Rooms are listed from the lowest to the highest.
 
 mod walls_imports;
 
@@ -12,7 +12,7 @@ use walls_imports::Crate;
 const CORE: &[&[&str]] = &[
     &["memory"],
     &["theory"],
-    // What the engine stands on.
+    // The foundations of the engine.
     &[
         "engine::counts",
         "engine::error",
@@ -31,20 +31,19 @@ const CORE: &[&[&str]] = &[
     &["engine::sweep::terms", "engine::sweep::times"],
     &["engine::sweep::workspace"],
     &["engine::sweep"],
-    // One particle's move.
+    // The move of a single particle.
     &["engine::local_energy"],
     // Sums over a list of pairs.
     &["engine::reference"],
-    // The engine that hosts see.
+    // The engine as hosts use it.
     &["engine::facade"],
     &["engine"],
     &[""],
 ];
 
-/// Rooms of psidpd-model; what this crate and psidpd-passes may import from other crates the compiler keeps.
+/// Rooms of psidpd-model; the compiler limits the imports of this crate and psidpd-passes from other crates.
 const MODEL: &[&[&str]] = &[&["expression"], &["document"], &[""]];
 
-/// Rooms of psidpd-passes.
 const PASSES: &[&[&str]] = &[
     &["domain", "instruction_set", "noise", "settings", "tally"],
     &["simd"],
@@ -57,7 +56,7 @@ const PASSES: &[&[&str]] = &[
     &[""],
 ];
 
-/// The crates in which not even a folder's root and its files may import from each other.
+/// The crates in which even the root of a folder and its files may not import from each other.
 const ENGINE: &[&str] = &["rust-core", "rust-core/passes", "rust-core/threads", "rust-core/c-api"];
 
 /// The crates whose files must not import from each other in a circle.

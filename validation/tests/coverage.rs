@@ -1,10 +1,9 @@
-//! Error bars held against what they are errors of: the spread of results over seeds. Every observable that has errors is
-//! in one of the scenes.
+//! Error bars compared with the spread of results over seeds. Every observable with errors is in one of the scenes.
 //!
-//! Of each column that is the standard deviation of the results over the root mean square of the errors. It should be
-//! within [`BOUNDS`], and a check fails if it is so far beyond that chance cannot explain it: (n − 1) times the square of
-//! the quotient of measured and true ratio is χ² with n − 1 degrees of freedom for n seeds. Bins of a profile count as one
-//! column: the mean of their squares, which varies no more than that of a single bin.
+//! The ratio of a column is the standard deviation of its results over the root mean square of its errors. It
+//! should be within [`BOUNDS`], and a check fails if it is farther outside than chance explains: for n seeds, (n
+//! − 1) times the square of the quotient of measured and true ratio is χ² with n − 1 degrees of freedom. Bins of
+//! a profile count as one column: the mean of their squares, which varies no more than that of a single bin.
 
 use psidpd::observe::{Column, Kind, Observation};
 use psidpd::run::run_scene;
@@ -13,22 +12,22 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::f64::consts::FRAC_1_SQRT_2;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Spread over error that error bars should have.
+/// Bounds of the ratio of spread to error.
 const BOUNDS: [f64; 2] = [0.8, 1.25];
 
-/// Probability that a check fails by chance if all true ratios are at one of the bounds; it is far less if they are near 1.
+/// Probability of a false alarm of a check if all true ratios are at one of the bounds; it is far less if they are near 1.
 const FALSE_ALARMS: f64 = 0.01;
 
-/// Sizes of noise: the root of a mean square of what is 0 but for noise. Their derivatives by the means are not those at
-/// the true means, where they vanish, and by them errors are √2 too large: of K numbers of unit variance the sum of squares has the
-/// variance 2K, and its derivatives make 4K of it.
+/// Observables that are the root mean square of a quantity whose true value is 0. Their derivatives are taken
+/// at the measured means instead of the true means, where they vanish, which makes errors √2 too large: the
+/// sum of squares of K numbers of unit variance has the variance 2K, and these derivatives give 4K.
 const NOISE: [&str; 2] = ["flow poiseuille.deviation", "pendant pendant.residual"];
 
 /// A scene whose runs differ in their seeds alone.
 struct Case {
     name: &'static str,
     model: &'static str,
-    /// All of the scene but title, model and seed; the last table is `[observe]`.
+    /// The scene without title, model and seed; its last table is `[observe]`.
     text: &'static str,
 }
 
@@ -150,7 +149,7 @@ drop = { distance = 0.8, bins = 40 }
 "#,
 };
 
-/// The slowest mode of its velocities has the relaxation time ρL²/(4π²η) = 3.3, which is 1/24 of the run.
+/// The slowest mode of the flow's velocities has the relaxation time ρL²/(4π²η) = 3.3, which is 1/24 of the run.
 const FLOW: Case = Case {
     name: "flow",
     model: STANDARD,
@@ -170,7 +169,7 @@ temperature_profile = { bins = 12 }
 "#,
 };
 
-/// Its support is a lattice: particles put there at random would differ from run to run, and the drop with them.
+/// The support of the drop is a lattice: random positions would differ from run to run, and so would the drop.
 const PENDANT: Case = Case {
     name: "pendant",
     model: WARREN,
@@ -207,7 +206,7 @@ pendant = { skip = 4000, weight = 0.15, bins = [8, 20] }
 "#,
 };
 
-/// What the runs of a scene measured, by seed; with other than its own steps in the last stage, if told.
+/// The observations of a scene's runs, by seed; `steps` replaces the steps of the last stage.
 fn runs(case: &Case, seeds: usize, steps: Option<u64>) -> Vec<Vec<Observation>> {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("m.toml"), case.model).unwrap();
@@ -239,17 +238,17 @@ fn runs(case: &Case, seeds: usize, steps: Option<u64>) -> Vec<Vec<Observation>> 
     all.into_iter().map(|(_, observed)| observed).collect()
 }
 
-/// Spread over error of a column.
+/// The ratio of spread to error of a column.
 struct Ratio {
     name: String,
-    /// The root of the mean of the squares over bins.
+    /// The root of the mean square over bins.
     ratio: f64,
-    /// The least and the most of single bins.
+    /// The smallest and the largest ratio of single bins.
     range: [f64; 2],
     bins: usize,
 }
 
-/// `None` if no value of the column has an error in every run.
+/// Computes the ratio; `None` if no value of the column has an error in every run.
 fn ratio(name: String, columns: &[&Column]) -> Option<Ratio> {
     let n = columns.len() as f64;
     let bins = columns.iter().map(|c| c.values.len()).min().unwrap_or(0);
@@ -271,7 +270,7 @@ fn ratios(case: &Case, seeds: usize, steps: Option<u64>) -> Vec<Ratio> {
     let all = runs(case, seeds, steps);
     let mut found = Vec::new();
     for (k, observation) in all[0].iter().enumerate().filter(|(_, o)| o.kind != Kind::Series) {
-        // The heights at which a hanging drop has a surface are those of its run.
+        // The heights at which a hanging drop has a surface differ between runs.
         let place = |run: &Vec<Observation>| run[k].x.as_ref().map(|x| x.values.clone());
         if all.iter().any(|run| place(run) != place(&all[0])) {
             println!("{} {}: values are at other places in each run", case.name, observation.name);
@@ -285,7 +284,7 @@ fn ratios(case: &Case, seeds: usize, steps: Option<u64>) -> Vec<Ratio> {
     found
 }
 
-/// Prints the ratios, and fails if one is beyond the bounds and chance.
+/// Prints the ratios, and fails if one exceeds the bounds by more than chance explains.
 fn check(found: &[Ratio], seeds: usize) {
     let free = (seeds - 1) as f64;
     let chi = ChiSquared::new(free).unwrap();
@@ -314,8 +313,8 @@ fn check(found: &[Ratio], seeds: usize) {
     assert!(outside.is_empty(), "{outside:?}");
 }
 
-/// Quantities that forget in a few samples, and velocities that do not: errors that took samples for independent ones
-/// would be half of what they should be.
+/// Quantities with short and with long correlation times: errors for independent samples would be half as
+/// large as they should be.
 #[test]
 fn errors_of_short_runs_are_the_spread_over_seeds() {
     let cases = [(LIQUID, 800), (FLOW, 2500)];

@@ -1,10 +1,10 @@
-//! The project's own goals of speed and memory, `goals.toml`, held against what `psidpd bench` measured:
+//! The project's goals for speed and memory, `goals.toml`, compared with the results of `psidpd bench`:
 //!
 //! ```sh
 //! cargo test --release -p psidpd --test goals -- --ignored --nocapture
 //! ```
 //!
-//! reads `target/bench/bench.json`, or the file that `PSIDPD_BENCH` names.
+//! This command reads `target/bench/bench.json`, or the file that `PSIDPD_BENCH` names.
 
 use psidpd::bench::Spread;
 use psidpd::report::Table;
@@ -21,7 +21,7 @@ struct Goals {
     goal: Vec<Goal>,
 }
 
-/// See `goals.toml`.
+/// A goal of `goals.toml`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Goal {
@@ -54,7 +54,7 @@ enum Quantity {
     EqualBits,
 }
 
-/// What goals need of `bench.json`.
+/// The part of `bench.json` that goals need.
 #[derive(Default, Deserialize)]
 struct Bench {
     runs: Vec<Run>,
@@ -87,13 +87,13 @@ fn read(text: &str) -> Vec<Goal> {
     goals
 }
 
-/// The name of a code, `best` being the best instructions here.
+/// The name of a code, with `best` replaced by the best instruction set of this machine.
 fn named(code: &str) -> String {
     code.replace(" best ", &format!(" {} ", Instructions::best()))
 }
 
 impl Goal {
-    /// What was measured, by size; 0 where the goal has none.
+    /// The measured values by size; 0 stands for goals without a size.
     fn by_size(&self, bench: &Bench) -> BTreeMap<usize, Spread> {
         match self.quantity {
             Quantity::Speed | Quantity::SpeedPerPair => {
@@ -130,13 +130,13 @@ impl Goal {
         Spread::of_ratios(&own, &best)
     }
 
-    /// The worst of the sizes that were measured.
+    /// The worst value of the measured sizes.
     fn worst(&self, bench: &Bench) -> Option<f64> {
         let medians = self.by_size(bench).into_values().map(|s| s.median);
         medians.reduce(if self.at_least.is_some() { f64::min } else { f64::max })
     }
 
-    /// Whether the worst size meets the goal; `None` if nothing was measured.
+    /// Whether the worst size meets the goal; `None` without a measurement.
     fn met(&self, bench: &Bench) -> Option<bool> {
         let worst = self.worst(bench)?;
         Some(
@@ -146,7 +146,7 @@ impl Goal {
     }
 }
 
-/// For an idle machine: a goal that is missed at a size that was measured fails.
+/// On an idle machine a goal that is missed at a measured size fails.
 #[test]
 #[ignore = "reads what `psidpd bench` measured"]
 fn the_last_bench_meets_its_goals() {
@@ -198,7 +198,7 @@ fn nothing_is_met_that_was_not_measured() {
     assert!(goals.iter().all(|g| g.met(&Bench::default()).is_none()));
 }
 
-/// Goals and the choice of contenders fit together at the sizes of `--full`: everyone a goal names is timed.
+/// Every code that a goal names is timed at the sizes of `--full`.
 #[test]
 fn whom_goals_name_is_timed_at_their_sizes() {
     use psidpd::bench::contender::{Choice, FEW_ABOVE, Field, Suffix, contenders};
@@ -217,7 +217,7 @@ fn whom_goals_name_is_timed_at_their_sizes() {
         let code = named(code);
         SIZES.contains(&size) && contenders(subject, &choice, field).iter().any(|c| c.id() == code)
     };
-    // Not every processor has AVX2.
+    // Some processors have no AVX2.
     let portable = |code: &str| code.replace(" avx2 ", " portable ");
     for goal in read(SHIPPED) {
         if !matches!(goal.quantity, Quantity::Speed | Quantity::SpeedPerPair) {
@@ -234,7 +234,7 @@ fn whom_goals_name_is_timed_at_their_sizes() {
     }
 }
 
-/// The worst size counts, and of the others the fastest in each round.
+/// The worst size counts, and of the other codes the fastest in each round.
 #[test]
 fn speed_is_held_against_the_fastest_at_the_worst_size() {
     let goal = goal(
@@ -262,7 +262,7 @@ fn per_pair_and_across_sizes() {
         "speed per pair",
         "fluid = \"formula\"\nsizes = [10]\ncode = \"c\"\nagainst = [\"c\"]\nagainst_fluid = \"mdpd\"\nat_least = 0.6",
     );
-    // Twice the time for twice the pairs is as fast.
+    // Twice the time for twice the pairs is equal speed per pair.
     let bench = timed([run("formula", 10, "c", &[2.0], 20.0), run("mdpd", 10, "c", &[1.0], 10.0)]);
     assert_eq!(pairs.worst(&bench), Some(1.0));
     let sizes = goal(
@@ -273,7 +273,7 @@ fn per_pair_and_across_sizes() {
     assert_eq!(sizes.met(&bench), Some(true), "0.8 of the speed");
     bench.runs.pop();
     assert_eq!(sizes.met(&bench), None, "nothing to hold it against");
-    // A round in which all is half as fast changes nothing; rounds are not mixed.
+    // A round at half the speed for all codes changes nothing; rounds are not mixed.
     let bench = timed([run("mdpd", 40, "c", &[5.0, 10.0], 1.0), run("mdpd", 10, "c", &[1.0, 2.0], 1.0)]);
     assert_eq!(sizes.by_size(&bench)[&40], Spread { min: 0.8, median: 0.8, max: 0.8 });
 }

@@ -1,4 +1,4 @@
-//! The installed LAMMPS: in this process, as a program, and with our files.
+//! The installed LAMMPS within this process, as a program, and with psidpd's files.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -49,7 +49,7 @@ fn forces_energies_and_properties_by_atom_id() {
     assert_eq!(kinds.iter().filter(|&&k| k == 1).count(), 60);
     assert_eq!(l.gather_ints("image", 3).unwrap().len(), 300);
 
-    // The pair style's formula, from the positions.
+    // The forces follow the pair style's formula at these positions.
     let (x, f) = (l.gather("x", 3).unwrap(), l.gather("f", 3).unwrap());
     let (mut energy, mut worst) = (0.0, 0.0f64);
     for i in 0..100 {
@@ -82,7 +82,7 @@ fn forces_energies_and_properties_by_atom_id() {
     assert!((mean - l.thermo("press").unwrap()).abs() < 1e-12);
     assert_eq!(l.eval("2*3").unwrap(), 6.0);
 
-    // Other positions, the same numbers back.
+    // Scattered positions are read back unchanged.
     let moved: Vec<f64> = x.iter().map(|x| (x + 0.125).rem_euclid(5.0)).collect();
     l.scatter("x", 3, &moved).unwrap();
     assert_eq!(l.gather("x", 3).unwrap(), moved);
@@ -125,7 +125,7 @@ fn wrong_requests_are_errors_and_leave_lammps_usable() {
     assert!(l.compute_scalar("nosuch").is_err() && l.compute_vector("s").is_err());
     assert_eq!(l.gather("c_st", 6).unwrap().len(), 600);
 
-    // With a hole in the ids there is no order by id.
+    // With a gap in the ids, values cannot be sorted by id.
     l.commands("group g id 50\ndelete_atoms group g compress no").unwrap();
     assert!(l.gather("x", 3).is_err());
 
@@ -224,7 +224,7 @@ fn failures_of_the_program_are_told() {
         assert!(matches!(e, LammpsError::Timeout { .. }), "{e}");
         assert!(start.elapsed() < Duration::from_secs(8));
     }
-    // None of the ranks is still at work.
+    // No rank is still running.
     let busy = std::fs::read_dir("/proc")
         .unwrap()
         .flatten()
@@ -234,7 +234,7 @@ fn failures_of_the_program_are_told() {
     assert!(e.unwrap_err().to_string().contains("none.in"));
 }
 
-/// Positions up to rounding: in a tilted box LAMMPS goes through fractional ones.
+/// Compares positions up to rounding: in a tilted box LAMMPS converts to fractional coordinates and back.
 fn close(a: &[f64], b: &[f64]) -> bool {
     a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-14)
 }
@@ -299,7 +299,7 @@ fn lammps_reads_our_data_and_we_read_its() {
         assert!(close(&frame.boxlo, &sorted.boxlo) && close(&frame.boxhi, &sorted.boxhi));
     }
 
-    // The style with a density in the file.
+    // The script uses the style with a density in the file.
     l.commands(&format!(
         "clear\nunits lj\natom_style mdpd\nregion b block 0 4 0 4 0 4\ncreate_box 1 b\ncreate_atoms 1 random 30 5 NULL\n\
          mass 1 1.0\nwrite_data {}",

@@ -1,5 +1,4 @@
-//! Every file of `validation/models`: that it says what its opening comment promises, and that the forces
-//! are those of its energy.
+//! Every file of `validation/models` has the properties in its opening comment, and its forces are those of its energy.
 
 use chacha20::ChaCha8Rng;
 use nalgebra::{Matrix3, Vector3};
@@ -15,7 +14,7 @@ use std::collections::BTreeSet;
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
-/// A model, where it is looked at, and the pressure that is wanted there in mean field.
+/// A model, the temperature and densities of its test, and the expected mean-field pressure there.
 struct Entry {
     name: &'static str,
     kt: f64,
@@ -28,8 +27,8 @@ fn van_der_waals(kt: f64, rho: f64, b: f64) -> f64 {
     rho * kt / (1.0 - b * rho) - a * rho * rho - alpha3 * a * b * rho.powi(3)
 }
 
-/// `½[φ]ρ²` of a soft pair potential is `(π/30) a ρ²`, which the simulations of Groot and Warren lower to
-/// 0.101 a ρ².
+/// The term `½[φ]ρ²` of a soft pair potential is `(π/30) a ρ²`, which the simulations of Groot and Warren
+/// lower to 0.101 a ρ².
 fn warren(kt: f64, rho: f64, b: f64) -> f64 {
     rho * kt + PI / 30.0 * (-40.0 * rho * rho + 2.0 * b * 0.75f64.powi(4) * rho.powi(3))
 }
@@ -107,7 +106,7 @@ const LIBRARY: &[Entry] = &[
         densities: &[4.0],
         pressure: |kt, r| r[0] * kt + 10.0 * r[0].powi(3),
     },
-    // The calibration of a corrected density is for ⟨ρ̃⟩ = ρ, which the theory takes as given.
+    // The calibration of a corrected density holds for ⟨ρ̃⟩ = ρ, which the theory assumes.
     Entry {
         name: "power-law-k3-corrected",
         kt: 1.0,
@@ -208,7 +207,7 @@ impl Entry {
     }
 }
 
-/// Particles in a slanted periodic box.
+/// Particles in a tilted periodic box.
 #[derive(Clone)]
 struct Configuration {
     domain: PeriodicBox,
@@ -216,7 +215,7 @@ struct Configuration {
     species: Vec<usize>,
 }
 
-/// How far a step of the differences moves two particles from or towards each other at most.
+/// Largest change of the distance of two particles by a step of the differences.
 const MARGIN: f64 = 1.1e-4;
 
 /// Distances at which an energy of the library is not smooth.
@@ -250,8 +249,8 @@ fn mix(count: usize, densities: &[f64]) -> Vec<usize> {
     (0..count).map(|k| ends.iter().position(|end| at(k) <= *end).unwrap_or(0)).collect()
 }
 
-/// Particles anywhere, at the density of `entry`: but no two on one point, where densities have a cusp,
-/// and nothing so close to a kink that a difference would reach over it.
+/// Random particles at the density of `entry`. No two coincide, where densities have a cusp, and no distance
+/// is so close to a kink that a difference would cross it.
 fn random(entry: &Entry, fluid: &Fluid) -> Configuration {
     let mut rng = ChaCha8Rng::seed_from_u64(2002);
     let domain = empty_box(fluid, 45.0 / entry.density());
@@ -305,7 +304,7 @@ fn is_smooth(c: &Configuration, fluid: &Fluid, kinks: &[f64]) -> bool {
     c.species.iter().enumerate().all(smooth)
 }
 
-/// How far the densities of a particle are from their bounds: negative if inside.
+/// Distances of a particle's densities from their bounds; negative inside.
 fn from_bounds<'a>(fluid: &'a Fluid, n: &'a [f64], alpha: usize) -> impl Iterator<Item = f64> + 'a {
     let count = fluid.species.len();
     fluid.densities.iter().enumerate().flat_map(move |(d, density)| {
@@ -321,7 +320,7 @@ fn from_bounds<'a>(fluid: &'a Fluid, n: &'a [f64], alpha: usize) -> impl Iterato
     })
 }
 
-/// Particles on a square or cubic lattice, shaken a little.
+/// Particles on a slightly disordered square or cubic lattice.
 fn shaken(entry: &Entry, fluid: &Fluid) -> Configuration {
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     let d = fluid.dimensions;
@@ -348,7 +347,7 @@ struct Forces {
     virial: [f64; 6],
 }
 
-/// What the native host computes.
+/// The forces of the native host.
 fn forces(model: &Model, kt: f64, c: &Configuration) -> Forces {
     let count = c.x.len();
     let state = State {
@@ -407,7 +406,7 @@ fn every_file_is_in_the_table_and_opens_with_a_comment() {
     }
 }
 
-/// Every scene names a model that exists and holds at its temperature.
+/// Every scene names an existing model that is valid at its temperature.
 #[test]
 fn every_scene_opens() {
     let scenes = folder().with_file_name("scenes");
@@ -508,8 +507,8 @@ fn forces_and_virials_are_derivatives_of_the_energy() {
     }
 }
 
-/// Pagonabarraga and Frenkel's section II A, Trofimov's eq. (23): ψ = (π/30) a n with the quadratic kernel
-/// is standard DPD of strength a. With their fitted α = 0.101 for π/30 the strength is 24.1, not 25.
+/// Pagonabarraga and Frenkel's section II A, Trofimov's eq. (23): ψ = (π/30) a n with the quadratic kernel is
+/// standard DPD of strength a. With their fitted α = 0.101 for π/30 the strength is 24.1, not 25.
 #[test]
 fn psi_linear_in_the_density_is_standard_dpd() {
     for (name, slope) in [("groot-warren-quadratic", 0.101 * 25.0), ("power-law-k2", 10.0)] {
@@ -521,7 +520,7 @@ fn psi_linear_in_the_density_is_standard_dpd() {
     }
 }
 
-/// Warren's eq. (15), one free energy of two densities, against his eq. (12), forces of two ranges.
+/// Warren's eq. (15), one free energy of two densities, agrees with his eq. (12), forces of two ranges.
 #[test]
 fn two_densities_are_a_density_and_a_pair_potential() {
     let entry = LIBRARY.iter().find(|e| e.name == "warren2003-set6-two-densities").unwrap();
@@ -530,8 +529,8 @@ fn two_densities_are_a_density_and_a_pair_potential() {
     agree(entry.name, &forces(&entry.model(), 1.0, &c), &forces(&set6, 1.0, &c), 1e-13);
 }
 
-/// The text of a model of one species, for two with the same interactions; the densities must be within
-/// bounds, which hold for each species of a formula.
+/// Rewrites a model of one species for two species with the same interactions; the densities must be within
+/// bounds, which apply to each species of a formula.
 fn for_two_species(text: &str, name: &str) -> String {
     let mut two = String::new();
     let (mut section, mut pair) = (String::new(), String::new());
@@ -554,7 +553,7 @@ fn for_two_species(text: &str, name: &str) -> String {
         } else if section == "[excess_free_energy]" && line.starts_with(&format!("{name} =")) {
             two += &format!("X{}\nY{}\n", &line[name.len()..], &line[name.len()..]);
         } else if let Some(list) = line.strip_prefix("correction = [") {
-            // ρ̃ of a sum is the sum of the ρ̃, so the constant is shared between the two.
+            // The value ρ̃ of a sum is the sum of the values ρ̃, so each species has half of the constant.
             let (constant, rest) = list.split_once(',').unwrap();
             two += &format!("correction = [{:?},{rest}\n", constant.parse::<f64>().unwrap() / 2.0);
         } else if line != "[end]" {
@@ -569,7 +568,7 @@ fn one_species_is_two_identical_species() {
     let mut done = 0;
     for entry in LIBRARY.iter().filter(|e| e.densities.len() == 1) {
         let text = text(entry.name);
-        // A pressure is for one species only.
+        // Only models of one species can have a pressure.
         if text.contains("pressure = \"") {
             continue;
         }
@@ -589,10 +588,10 @@ fn one_species_is_two_identical_species() {
 }
 
 /// The mean-field pressure of every model is the closed form of its paper. The papers' numbers: 969.4 for
-/// Huggins at density 16 (969.44 here; their run has 954.5); αaρ² with the fitted α = 0.101 for standard DPD,
-/// where the mean field has π/30 = 0.1047; Warren's fit of the many-body term, 2αBr_d⁴(ρ³ − cρ² + d), has the
-/// 2(π/30)Br_d⁴ρ³ of mean field as its leading term; the van der Waals curve fitted to the spline fluid, 8.21
-/// at density 10, is nothing that mean field gives: ∫φ nearly vanishes there and the pressure would be 10.3.
+/// Huggins at density 16 (969.44 here; their run has 954.5). For standard DPD αaρ² with the fitted α = 0.101,
+/// where mean field has π/30 = 0.1047. Warren's fit of the many-body term, 2αBr_d⁴(ρ³ − cρ² + d), has the
+/// 2(π/30)Br_d⁴ρ³ of mean field as its leading term. The van der Waals curve fitted to the spline fluid, 8.21
+/// at density 10, differs from mean field: ∫φ nearly vanishes there and the pressure would be 10.3.
 #[test]
 fn mean_field_pressures_have_their_closed_form() {
     for entry in LIBRARY {
@@ -614,7 +613,7 @@ fn mean_field_pressures_have_their_closed_form() {
 const SPLINE: &str = "title = \"spline\"\nspecies = [\"F\"]\n[[pair]]\nbetween = [\"F\", \"F\"]\nform = \"spline\"\n\
                       strength = 1.0\nA = FIRST\nB = 9.5\nrange_A = 0.8\nrange_B = 1.0\n";
 
-/// Wang and Chen print 17.0 in their section 3, where ∫φ < 0; with 19.0 it is positive.
+/// Wang and Chen print 17.0 in their section 3, where ∫φ < 0; with 19.0 the integral is positive.
 #[test]
 fn a_fluid_without_thermodynamic_limit_is_found_and_none_is_in_the_library() {
     let limit = |fluid: &Fluid| thermodynamic_limit(fluid).unwrap();
@@ -625,7 +624,7 @@ fn a_fluid_without_thermodynamic_limit_is_found_and_none_is_in_the_library() {
     for entry in LIBRARY {
         match limit(&entry.fluid()) {
             Ok(()) => {}
-            // Many particles to a site of some lattice: see the comment in the file.
+            // This fluid collapses to many particles per site of a lattice: see the comment in the file.
             Err(collapse) => assert!(entry.name == "spline-eos" && !collapse.is_uniform(), "{collapse}"),
         }
     }

@@ -1,4 +1,4 @@
-//! The scenes that ship: all can be read, the quick ones run, the full ones have the sizes of the papers.
+//! The shipped scenes: all can be read, the quick ones run, the full ones have the sizes of the papers.
 
 use psidpd::run::run_scene;
 use psidpd::scene::Scene;
@@ -13,7 +13,7 @@ fn scenes(folder: &str) -> Vec<PathBuf> {
     found
 }
 
-/// A few steps of every stage of every quick scene and template, with a sample of all that it observes at each of them.
+/// Runs a few steps of every stage of every quick scene and template, with a sample of all observables at each step.
 #[test]
 fn quick_scenes_run() {
     let paths = [scenes("scenes"), scenes("dynamics/src/scene/templates")].concat();
@@ -23,7 +23,7 @@ fn quick_scenes_run() {
         let mut scene = open(&path);
         let cost: f64 = scene.stages.iter().map(|s| s.steps as f64).sum::<f64>()
             * scene.initial.parts().iter().map(|p| p.count as f64).sum::<f64>();
-        // Particle-steps of a minute, at the speed of one core.
+        // A minute allows this many particle-steps on one core.
         assert!(cost < 2e7, "{}: {cost:e} particle-steps are not quick", path.display());
         for stage in &mut scene.stages {
             stage.steps = 2;
@@ -42,7 +42,7 @@ fn quick_scenes_run() {
         let observed: Vec<serde_json::Value> = serde_json::from_str(&text).unwrap();
         assert!(observed.len() >= scene.observe.requests.len(), "{}: {text}", path.display());
         for observation in &observed {
-            // What needs a longer time than two steps says so in its note.
+            // The note of an observable says if it needs more than two steps.
             let (name, samples) = (&observation["name"], observation["samples"].as_u64().unwrap());
             sampled += usize::from(samples > 0);
             let told = observation["note"].as_str().is_some_and(|note| !note.is_empty());
@@ -56,10 +56,10 @@ fn quick_scenes_run() {
     assert!(sampled > 150, "{sampled}");
 }
 
-/// These have no sample after two steps.
+/// These observables have no sample after two steps.
 const LATE: [&str; 4] = ["diffusion", "msd", "viscosity", "stress_correlation"];
 
-/// Templates name their model as `psidpd new` writes it; the models are those that ship.
+/// Templates name their model as `psidpd new` writes it; their models are among the shipped ones.
 fn open(path: &PathBuf) -> Scene {
     if !path.display().to_string().contains("templates") {
         return Scene::open(path).unwrap_or_else(|e| panic!("{e}"));
@@ -99,7 +99,7 @@ fn full_scenes_have_the_sizes_of_the_papers() {
     assert_eq!(found, counts.len());
 }
 
-/// The largest scene fits into memory: 3.75 million particles, where the papers have them.
+/// The largest scene, 3.75 million particles as in the papers, fits into memory.
 #[test]
 fn the_largest_scene_can_be_filled() {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("scenes/full/drop-collision.toml");

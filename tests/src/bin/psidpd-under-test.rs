@@ -1,5 +1,5 @@
-//! The `psidpd` program, as a program of this package: cargo builds those with the tests of their own package only,
-//! and a second build of `psidpd` would compile all it depends on once more, with other features.
+//! The `psidpd` program as a program of this package. Cargo builds programs only for the tests of their own
+//! package, and a second build of `psidpd` would compile all its dependencies again with other features.
 
 use std::process::ExitCode;
 

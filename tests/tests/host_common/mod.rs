@@ -1,4 +1,4 @@
-//! What every host that runs scripts must do.
+//! Tests that every host of scripts must pass.
 
 #![allow(dead_code)]
 
@@ -29,12 +29,12 @@ pub fn script(model: &Path) -> String {
 /// A LAMMPS that runs scripts with the styles.
 pub struct Runs {
     pub host: Host,
-    /// The command that loads them; empty where none is needed.
+    /// The command that loads the styles; empty where none is needed.
     pub load: String,
 }
 
 impl Runs {
-    /// Runs a script and returns what it says, or its error.
+    /// Runs a script and returns its output, or its error.
     pub fn outcome(&self, text: &str, ranks: usize, folder: &Path) -> Result<String, String> {
         let path = folder.join("in.lammps");
         std::fs::write(&path, format!("{}{text}", self.load)).unwrap();
@@ -45,7 +45,7 @@ impl Runs {
     }
 }
 
-/// Positions and forces by ID in a dump of `x y z fx fy fz`.
+/// Positions and forces, sorted by ID, from a dump of `x y z fx fy fz`.
 pub fn read_forces(path: &Path) -> [Vec<[f64; 3]>; 2] {
     let frame = dump::read(path).unwrap().pop().unwrap();
     [["x", "y", "z"], ["fx", "fy", "fz"]].map(|names| frame.vectors(names).unwrap())
@@ -56,7 +56,7 @@ pub fn energy(said: &str) -> f64 {
     said.lines().find_map(|l| l.strip_prefix("energy ")).expect(said).trim().parse().unwrap()
 }
 
-/// Without drag and noise, LAMMPS's forces are those of the native engine to rounding.
+/// Without drag and noise, LAMMPS's forces equal those of the native engine to rounding.
 pub fn forces_equal_the_native_engine(runs: &Runs) {
     let folder = tempfile::tempdir().unwrap();
     let text = std::fs::read_to_string(model()).unwrap();
@@ -74,7 +74,7 @@ pub fn forces_equal_the_native_engine(runs: &Runs) {
         let [positions, forces] = read_forces(&folder.path().join("forces.dump"));
         assert_eq!(forces.len(), 600);
 
-        // The positions of the dump, for those are the ones that the forces belong to.
+        // The forces belong to the positions in the dump.
         let mut data = DataFile::read(&folder.path().join("atoms.data")).unwrap();
         data.sort_by_id();
         for (atom, x) in data.atoms.iter_mut().zip(&positions) {
@@ -104,8 +104,8 @@ pub fn forces_equal_the_native_engine(runs: &Runs) {
 const DUMP: &str = "dump d all custom 1 forces.dump id type x y z fx fy fz\n\
     dump_modify d sort id format float %.17g\nrun 0\nvariable u equal pe*atoms\nprint \"energy $(v_u:%.17g)\"\n";
 
-/// Chains with weakened bonded neighbours; and with types that do not see each other: the pairs are those of LAMMPS's
-/// list then.
+/// Decks with chains whose bonded neighbours interact weakly, and with types that exclude each other: the
+/// pairs then come from LAMMPS's list.
 pub fn weakened_decks(newton: &str, folder: &Path) -> [String; 2] {
     std::fs::write(folder.join("chains.data"), chains(120)).unwrap();
     let deck = |special: &str, more: &str| {
@@ -118,7 +118,8 @@ pub fn weakened_decks(newton: &str, folder: &Path) -> [String; 2] {
     [deck("0.5 0.0 0.8", ""), deck("1 1 1", "neigh_modify exclude type 1 2\n")]
 }
 
-/// Their forces and energies, by the formulas, on one rank and on several; returns what each said on one.
+/// Compares the forces and energies of these decks with the formulas, on one rank and on several; returns the
+/// outputs on one rank.
 pub fn special_factors_and_exclusions(runs: &Runs, newton: &str) -> [String; 2] {
     let folder = tempfile::tempdir().unwrap();
     let factor = |i: usize, j: usize| match i.abs_diff(j) {
@@ -145,7 +146,7 @@ pub fn special_factors_and_exclusions(runs: &Runs, newton: &str) -> [String; 2] 
     on_one
 }
 
-/// Steps of the fix that integrates, in a deck that the program writes, are those of the native runner.
+/// The fix that integrates, in a deck that the program writes, takes the steps of the native runner.
 pub fn splittings_are_the_native_ones(runs: &Runs) {
     for integrator in ["two-stage", "force-gradient", "aboba"] {
         let folder = tempfile::tempdir().unwrap();
@@ -163,7 +164,7 @@ pub fn splittings_are_the_native_ones(runs: &Runs) {
         let deck = folder.path().join("deck");
         let script = std::fs::read_to_string(deck.join("in.lammps")).unwrap();
         assert!(script.contains(&format!("dpd/splitting {integrator}")), "{script}");
-        // Here the styles come as the host has them.
+        // The host loads the styles in its own way.
         let script = script.replace("plugin        load ${plugin}\n", &runs.load);
         std::fs::write(deck.join("in.here"), script).unwrap();
         for ranks in [1, 2] {

@@ -1,4 +1,4 @@
-//! Decks for the pair styles, and what they are compared with.
+//! Decks for the pair styles, and their reference values.
 
 #![allow(dead_code)]
 
@@ -23,7 +23,7 @@ pub fn warren() -> String {
     root().join("validation/models/warren2003-set6.toml").display().to_string()
 }
 
-/// Two species and two densities, none of them linear: four slopes a particle.
+/// Two species and two nonlinear densities, which give four slopes per particle.
 pub const WIDE: &str = "title = \"wide\"\nspecies = [\"A\", \"B\"]\n\
     [density.n]\nkernel = \"quadratic\"\nrange = 0.75\n\
     [density.m]\nkernel = \"lucy\"\nrange = 0.9\n\
@@ -38,7 +38,7 @@ pub const FLAT: &str = "title = \"flat\"\ndimensions = 2\nspecies = [\"F\"]\n\
     [[pair]]\nbetween = [\"F\", \"F\"]\nform = \"soft\"\nstrength = -20\nrange = 1\n\
     [[thermostat]]\ngamma = 4.5\nrange = 1\n";
 
-/// A text in a file, and its path.
+/// Writes a text to a file, and returns its path.
 pub fn file(text: &str) -> (tempfile::TempDir, String) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("model.toml");
@@ -52,8 +52,8 @@ pub fn load() -> String {
     format!("plugin load \"{}\"\n", lammps().1.display())
 }
 
-/// Exclusions of nothing, more of them than the styles keep: their pairs are those of LAMMPS's list then. For
-/// `neigh_modify`, behind a `group nobody empty`.
+/// Exclusions of an empty group, more than the styles store, so that pairs come from LAMMPS's list. The text
+/// is for `neigh_modify`, after a `group nobody empty`.
 pub fn listed() -> String {
     format!("group nobody empty\nneigh_modify{}\n", " exclude group nobody nobody".repeat(17))
 }
@@ -69,12 +69,12 @@ pub fn particles(before_box: &str, region: &str, types: usize, count: usize) -> 
     )
 }
 
-/// Lines of three numbers.
+/// Splits a list into triples.
 pub fn triples(flat: Vec<f64>) -> Vec<[f64; 3]> {
     flat.as_chunks::<3>().0.to_vec()
 }
 
-/// What LAMMPS has after a run.
+/// The state of LAMMPS after a run.
 #[derive(Debug, Clone)]
 pub struct Frame {
     pub kind: Vec<i32>,
@@ -83,8 +83,8 @@ pub struct Frame {
     pub f: Vec<[f64; 3]>,
 }
 
-/// The one LAMMPS of this process that has the plugin: closing one unloads plugins from all, so they
-/// take turns. Opening a second one in the same thread waits for ever.
+/// The only LAMMPS of this process with the plugin: closing one unloads plugins from all, so tests take
+/// turns. Opening a second one in the same thread deadlocks.
 pub struct Only {
     lammps: Lammps,
     _turn: MutexGuard<'static, ()>,
@@ -97,7 +97,7 @@ impl Deref for Only {
     }
 }
 
-/// A LAMMPS in this process that has carried out a script.
+/// Opens a LAMMPS in this process and executes a script.
 pub fn open(script: &str) -> Only {
     static TURN: Mutex<()> = Mutex::new(());
     let turn = TURN.lock().unwrap_or_else(|e| e.into_inner());
@@ -115,12 +115,12 @@ pub fn frame(l: &Lammps) -> Frame {
     }
 }
 
-/// Runs a script as a program on `ranks` ranks and returns the end.
+/// Runs a script as a program on `ranks` ranks and returns the last frame.
 pub fn run(script: &str, ranks: usize) -> Frame {
     run_in(tempfile::tempdir().unwrap().path(), script, ranks)
 }
 
-/// The same in a folder.
+/// As `run`, in the given folder.
 pub fn run_in(folder: &Path, script: &str, ranks: usize) -> Frame {
     let path = folder.join("in.lammps");
     let dump =
@@ -151,7 +151,7 @@ pub fn difference(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
     largest(a.iter().zip(b).map(far)) / rms
 }
 
-/// The box that LAMMPS has.
+/// The box of LAMMPS.
 pub fn domain(l: &Lammps) -> PeriodicBox {
     let b = l.simulation_box().unwrap();
     let [xy, xz, yz] = b.tilt;
@@ -159,8 +159,8 @@ pub fn domain(l: &Lammps) -> PeriodicBox {
     PeriodicBox::new(b.lo, Matrix3::new(s[0], xy, xz, 0.0, s[1], yz, 0.0, 0.0, s[2]), b.periodic).unwrap()
 }
 
-/// The plain evaluation of the model for the particles that LAMMPS has, types in the order of species;
-/// with drag and noise of `step` in the forces and the virial.
+/// The reference evaluation of the model for LAMMPS's particles, with types in the order of species; forces
+/// and virial include drag and noise of `step`.
 pub fn truth(l: &Lammps, model: &Model, kt: f64, step: Option<u64>) -> Truth {
     let now = frame(l);
     let fluid = model.at(kt).unwrap();
@@ -179,8 +179,7 @@ pub fn truth(l: &Lammps, model: &Model, kt: f64, step: Option<u64>) -> Truth {
     all
 }
 
-/// Chains of five particles with harmonic bonds as a data file, types 1 and 2 along each chain, in a box
-/// of length 5.
+/// A data file of chains of five particles with harmonic bonds, types 1 and 2 along each chain, in a box of length 5.
 pub fn chains(count: usize) -> String {
     let (mut atoms, mut bonds) = (String::new(), String::new());
     let mut word = 12_345u64;
@@ -208,7 +207,7 @@ pub fn chains(count: usize) -> String {
     )
 }
 
-/// Energy and conservative forces of Warren's fluid with a strength for each pair, by the formulas.
+/// Energy and conservative forces, by the formulas, of Warren's fluid with a strength for each pair.
 pub fn scaled(x: &[[f64; 3]], length: f64, strength: impl Fn(usize, usize) -> f64) -> (f64, Vec<[f64; 3]>) {
     let model = Model::open(warren().as_ref()).unwrap();
     let fluid = model.at(1.0).unwrap();

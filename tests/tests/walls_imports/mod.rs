@@ -1,5 +1,5 @@
-//! Which file of a crate imports from which, read from `use` statements and paths. Paths in the arguments of macros are
-//! not seen.
+//! Imports between the files of a crate, read from `use` statements and paths. Paths in the arguments of
+//! macros are not read.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -10,16 +10,16 @@ pub struct Crate {
     pub imports: BTreeMap<String, BTreeSet<String>>,
 }
 
-/// A path of this crate, from its root, that a file names.
+/// A path within this crate that a file names, from the crate's root.
 struct Named {
     path: Vec<String>,
-    /// The name by which a `pub use` passes it on.
+    /// The name by which a `pub use` re-exports the path.
     passed_on_as: Option<String>,
 }
 
-/// Reads the paths of one file, without what is compiled for tests.
+/// Reads the paths of one file, without code for tests.
 struct File {
-    /// Where the file is in the crate, and the modules within the file around what is read.
+    /// The module path of the file, and of the modules around the present place in it.
     module: Vec<String>,
     children: Vec<String>,
     named: Vec<Named>,
@@ -36,8 +36,8 @@ impl Crate {
         Crate { imports }
     }
 
-    /// The same, with a file and those of the modules below it taken for one where the file imports from them: what a
-    /// parent gathers may name what the parent defines.
+    /// Drops the imports of a file from modules below it: a parent may collect its children, which use the
+    /// parent's definitions.
     pub fn without_gathering(mut self) -> Crate {
         for (from, to) in &mut self.imports {
             to.retain(|to| !to.starts_with(&format!("{from}::")));
@@ -70,7 +70,7 @@ impl Crate {
     }
 }
 
-/// Reads a file and those of the modules that it declares, which lie in `folder`.
+/// Reads a file and the files of the modules that it declares, which lie in `folder`.
 fn read(path: &Path, folder: &Path, module: Vec<String>, files: &mut BTreeMap<String, File>) {
     let text = std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     let syntax = syn::parse_file(&text).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
@@ -96,11 +96,11 @@ fn read(path: &Path, folder: &Path, module: Vec<String>, files: &mut BTreeMap<St
     files.insert(module.join("::"), file);
 }
 
-/// The files that the names of `file` come from, not those that pass them on.
+/// The files that define the names in `file`, not those that re-export them.
 fn imports(name: &str, file: &File, files: &BTreeMap<String, File>) -> BTreeSet<String> {
     let of = |named: &Named| {
         let to = resolve(&named.path, files, 0);
-        // A module may show the names of its children; what the root itself holds are macros.
+        // A module may re-export the names of its children; the root itself holds macros only.
         let shows_child =
             named.passed_on_as.is_some() && (name.is_empty() || to.starts_with(&format!("{name}::")));
         (to != name && !to.is_empty() && !shows_child).then_some(to)
@@ -126,7 +126,7 @@ fn resolve(path: &[String], files: &BTreeMap<String, File>, depth: usize) -> Str
 }
 
 impl File {
-    /// Notes a path as it is written, if it is one of this crate.
+    /// Records a path as it is written, if it belongs to this crate.
     fn note(&mut self, written: &[String], passed_on_as: Option<String>) {
         let up = written.iter().take_while(|s| *s == "super").count();
         let (base, rest) = match written[0].as_str() {
@@ -140,7 +140,7 @@ impl File {
         self.named.push(Named { path, passed_on_as });
     }
 
-    /// Notes every path of the tree of a `use` statement.
+    /// Records every path of the tree of a `use` statement.
     fn note_tree(&mut self, tree: &syn::UseTree, before: &[String], public: bool) {
         let with = |name: &syn::Ident| before.iter().cloned().chain([name.to_string()]).collect::<Vec<_>>();
         match tree {
@@ -196,7 +196,7 @@ impl<'ast> Visit<'ast> for File {
     }
 }
 
-/// Whether something is compiled for tests alone.
+/// Whether an item is compiled for tests alone.
 fn is_for_tests(attributes: &[syn::Attribute]) -> bool {
     attributes.iter().any(|attribute| match &attribute.meta {
         syn::Meta::List(list) if list.path.is_ident("cfg") => {

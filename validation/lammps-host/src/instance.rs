@@ -1,4 +1,4 @@
-//! LAMMPS inside this process.
+//! LAMMPS within this process.
 
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::path::PathBuf;
@@ -11,7 +11,7 @@ use super::bindings::LammpsLibrary;
 use super::error::LammpsError;
 use super::host::Host;
 
-// The C interface's numbers for what to extract (enumerations of library.h).
+// Constants of the C interface, from the enumerations of library.h.
 const INT: c_int = 0;
 const INT_2D: c_int = 1;
 const DOUBLE: c_int = 2;
@@ -23,14 +23,14 @@ const TYPE_VECTOR: c_int = 1;
 const SIZE_VECTOR: c_int = 3;
 const SIZE_COLS: c_int = 5;
 
-/// The library stays loaded as long as the process: MPI and LAMMPS's plugins do not survive unloading.
+/// The library of the process. It is never unloaded, because MPI and LAMMPS's plugins do not survive that.
 struct Loaded {
     path: PathBuf,
     functions: LammpsLibrary,
 }
 
 static LOADED: OnceLock<Loaded> = OnceLock::new();
-/// Held during every call: neither LAMMPS nor MPI, as LAMMPS starts it, may be called from two threads at once.
+/// The lock of every call: only one thread at a time may call LAMMPS and its MPI.
 static CALLS: Mutex<()> = Mutex::new(());
 
 fn exclusive() -> MutexGuard<'static, ()> {
@@ -41,12 +41,13 @@ unsafe extern "C" {
     fn atexit(function: extern "C" fn()) -> c_int;
 }
 
-/// Ends MPI once, when the process ends: without it, MPICH leaves its shared memory behind.
+/// Finalises MPI once at the end of the process; otherwise MPICH leaves its shared memory behind.
 extern "C" fn finalize_mpi() {
-    // A thread that is inside LAMMPS while the process ends: leave everything as it is.
+    // Another thread may be inside LAMMPS while the process ends; MPI must then stay as it is.
     let Ok(_guard) = CALLS.try_lock() else { return };
     if let Some(Ok(finalize)) = LOADED.get().map(|l| l.functions.lammps_mpi_finalize.as_ref()) {
-        // SAFETY: LAMMPS itself checks that MPI is initialised and not yet finalised; nobody else is in a call.
+        // SAFETY: `finalize` is LAMMPS's own function, which checks that MPI is initialised and not yet
+        // finalised; the guard keeps other threads out of LAMMPS.
         unsafe { finalize() }
     }
 }
@@ -60,26 +61,27 @@ fn load(host: &Host, _guard: &MutexGuard<()>) -> Result<&'static LammpsLibrary, 
         };
     }
     let open = |path: &PathBuf| {
-        // SAFETY: these are LAMMPS and the MPI it was linked with; their initialisers ask for nothing beforehand.
-        // Global, so that plugins find LAMMPS's symbols and LAMMPS finds this MPI.
+        // SAFETY: `host` names LAMMPS's library and its MPI, whose initialisers have no preconditions. The
+        // symbols are global, so that plugins find those of LAMMPS and LAMMPS finds those of this MPI.
         unsafe { Library::open(Some(path), RTLD_NOW | RTLD_GLOBAL) }
             .map_err(|e| LammpsError::Load { path: path.clone(), reason: e.to_string() })
     };
-    // MPI stays loaded for good.
+    // MPI is never unloaded.
     if let Some(mpi) = &host.mpi_library {
         std::mem::forget(open(mpi)?);
     }
     let library = libloading::Library::from(open(&host.library)?);
-    // SAFETY: the functions have the types of LAMMPS's own header; their names tell them.
+    // SAFETY: `bindings.rs` has the types of LAMMPS's header, and LAMMPS's C interface keeps the type of a
+    // function of one name.
     let functions = unsafe { LammpsLibrary::from_library(library) }
         .map_err(|e| LammpsError::Load { path: host.library.clone(), reason: e.to_string() })?;
     let loaded = LOADED.get_or_init(|| Loaded { path: host.library.clone(), functions });
-    // SAFETY: registers a function that lives as long as the process and unwinds never.
+    // SAFETY: `finalize_mpi` lives as long as the process and never unwinds.
     unsafe { atexit(finalize_mpi) };
     Ok(&loaded.functions)
 }
 
-/// A function of the library, or an error if this version of LAMMPS has none.
+/// A function of the library, or an error if this version of LAMMPS lacks it.
 macro_rules! function {
     ($library:expr, $name:ident) => {
         match &$library.$name {
@@ -91,47 +93,43 @@ macro_rules! function {
 
 fn c_string(text: &str) -> Result<CString, LammpsError> {
     CString::new(text)
-        .map_err(|_| LammpsError::Request(format!("a zero byte in what LAMMPS is to be told: {text:?}")))
+        .map_err(|_| LammpsError::Request(format!("a text for LAMMPS contains a zero byte: {text:?}")))
 }
 
-/// What LAMMPS says went wrong since it was asked last; None if nothing did.
+/// The error message since the last query; `None` without an error.
 fn last_error(library: &LammpsLibrary, handle: *mut c_void) -> Option<String> {
     let has = library.lammps_has_error.as_ref().ok()?;
     let get = library.lammps_get_last_error_message.as_ref().ok()?;
-    // SAFETY: the handle is LAMMPS's or null, for which recent versions keep a message of their own.
+    // SAFETY: the callers pass null or a handle that LAMMPS returned and that is not closed; LAMMPS accepts both.
     if unsafe { has(handle) } == 0 {
         return None;
     }
     let mut buffer: [c_char; 2048] = [0; 2048];
-    // SAFETY: LAMMPS writes at most as many characters as the buffer has.
+    // SAFETY: `buffer` is writable, and LAMMPS writes at most as many characters as the given length.
     unsafe { get(handle, buffer.as_mut_ptr(), buffer.len() as c_int) };
     buffer[2047] = 0;
-    // SAFETY: the buffer ends with a zero.
+    // SAFETY: the last element of `buffer` is zero, set by the line above.
     let text = unsafe { CStr::from_ptr(buffer.as_ptr()) };
     Some(text.to_string_lossy().trim().to_owned())
 }
 
-/// The simulation box.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SimulationBox {
-    /// Lower corner.
     pub lo: [f64; 3],
-    /// Upper corner.
     pub hi: [f64; 3],
-    /// Tilt factors xy, xz, yz.
     pub tilt: [f64; 3],
-    /// Which directions are periodic.
     pub periodic: [bool; 3],
 }
 
-/// A LAMMPS in this process, on one MPI rank.
+/// A LAMMPS instance in this process, on one MPI rank.
 ///
-/// Several may be open at once, on any threads: their calls take turns. Dropping one closes it; MPI ends with the process.
+/// Several instances may be open on any threads: their calls take turns. Dropping an instance closes it; MPI
+/// ends with the process.
 pub struct Lammps {
     library: &'static LammpsLibrary,
-    /// Not sent between threads.
+    /// The raw pointer keeps the instance on its thread.
     handle: *mut c_void,
-    /// LAMMPS may keep pointers to its arguments.
+    /// LAMMPS may keep pointers to its arguments, so they live as long as the instance.
     _args: Vec<CString>,
 }
 
@@ -145,14 +143,14 @@ impl Drop for Lammps {
     fn drop(&mut self) {
         let _guard = exclusive();
         if let Ok(close) = &self.library.lammps_close {
-            // SAFETY: the handle came from LAMMPS and is not used again.
+            // SAFETY: LAMMPS returned the handle to `open`, and `drop` is its last use.
             unsafe { close(self.handle) }
         }
     }
 }
 
 impl Lammps {
-    /// Starts LAMMPS with `-log none -screen none -nocite` and further arguments, which override these.
+    /// Starts LAMMPS with `-log none -screen none -nocite` and `args`, which override these options.
     pub fn open(host: &Host, args: &[&str]) -> Result<Lammps, LammpsError> {
         let guard = exclusive();
         let library = load(host, &guard)?;
@@ -170,7 +168,8 @@ impl Lammps {
         let argv = argv.into_iter().map(c_string).collect::<Result<Vec<_>, _>>()?;
         let mut pointers: Vec<*mut c_char> = argv.iter().map(|a| a.as_ptr().cast_mut()).collect();
         pointers.push(null_mut());
-        // SAFETY: as many arguments as counted, ended by a null; LAMMPS does not write to them, and they outlive it.
+        // SAFETY: `pointers` has `argv.len()` pointers to C strings and a null at its end; LAMMPS does not
+        // write to the strings, and `_args` keeps them as long as the instance.
         let handle = unsafe { open(argv.len() as c_int, pointers.as_mut_ptr(), null_mut()) };
         if handle.is_null() {
             return Err(LammpsError::Lammps {
@@ -182,7 +181,7 @@ impl Lammps {
         Ok(Lammps { library, handle, _args: argv })
     }
 
-    /// Calls the library and asks for LAMMPS's errors afterwards.
+    /// Calls the library and then checks for errors of LAMMPS.
     fn call<T>(&self, doing: &str, f: impl FnOnce() -> T) -> Result<T, LammpsError> {
         let _guard = exclusive();
         let result = f();
@@ -192,18 +191,19 @@ impl Lammps {
         }
     }
 
-    /// Carries out one command of the input language.
+    /// Executes one command of the input language.
     pub fn command(&self, command: &str) -> Result<(), LammpsError> {
         let f = function!(self.library, lammps_command)?;
         let text = c_string(command)?;
-        // SAFETY: an open LAMMPS and a C string; what it returns belongs to LAMMPS.
+        // SAFETY: `open` made the handle, which only `drop` closes; `c_string` made `text`. The returned
+        // pointer belongs to LAMMPS and is dropped.
         self.call(command, || unsafe {
             f(self.handle, text.as_ptr());
         })
     }
 
-    /// Carries out commands, one to a line, up to the first that fails. `&` at a line's end continues it, as do triple
-    /// quotes; `jump` needs a file.
+    /// Executes commands, one per line, up to the first error. `&` at the end of a line continues it, as do
+    /// triple quotes; `jump` needs a file.
     pub fn commands(&self, commands: &str) -> Result<(), LammpsError> {
         split_commands(commands).iter().try_for_each(|c| self.command(c))
     }
@@ -211,24 +211,23 @@ impl Lammps {
     /// The version as a number: 20250722.
     pub fn version(&self) -> Result<i32, LammpsError> {
         let f = function!(self.library, lammps_version)?;
-        // SAFETY: an open LAMMPS.
+        // SAFETY: `open` made the handle, which only `drop` closes.
         self.call("asking for the version", || unsafe { f(self.handle) })
     }
 
-    /// Whether this LAMMPS has a style: `has_style("pair", "mdpd")`.
+    /// Whether this LAMMPS has a style, for example `has_style("pair", "mdpd")`.
     pub fn has_style(&self, category: &str, name: &str) -> Result<bool, LammpsError> {
         let f = function!(self.library, lammps_has_style)?;
         let (c, n) = (c_string(category)?, c_string(name)?);
-        // SAFETY: an open LAMMPS and two C strings.
+        // SAFETY: `open` made the handle, which only `drop` closes; `c_string` made both strings.
         self.call(&format!("looking for {category} style {name}"), || unsafe {
             f(self.handle, c.as_ptr(), n.as_ptr()) == 1
         })
     }
 
-    /// The number of atoms.
     pub fn natoms(&self) -> Result<usize, LammpsError> {
         let f = function!(self.library, lammps_get_natoms)?;
-        // SAFETY: an open LAMMPS.
+        // SAFETY: `open` made the handle, which only `drop` closes.
         let n = self.call("counting atoms", || unsafe { f(self.handle) })?;
         Ok(n as usize)
     }
@@ -239,12 +238,12 @@ impl Lammps {
             return Err(LammpsError::Request(format!("'{name}' is no name of a thermodynamic quantity")));
         }
         if self.library.lammps_eval.is_ok() {
-            // The other function gives 0 for names that LAMMPS does not know.
+            // `lammps_get_thermo` returns 0 for unknown names, so compound names are evaluated as expressions.
             return self.eval(name);
         }
         let f = function!(self.library, lammps_get_thermo)?;
         let text = c_string(name)?;
-        // SAFETY: an open LAMMPS and a C string.
+        // SAFETY: `open` made the handle, which only `drop` closes; `c_string` made `text`.
         self.call(name, || unsafe { f(self.handle, text.as_ptr()) })
     }
 
@@ -252,19 +251,18 @@ impl Lammps {
     pub fn eval(&self, expression: &str) -> Result<f64, LammpsError> {
         let f = function!(self.library, lammps_eval)?;
         let text = c_string(expression)?;
-        // SAFETY: an open LAMMPS and a C string.
+        // SAFETY: `open` made the handle, which only `drop` closes; `c_string` made `text`.
         self.call(expression, || unsafe { f(self.handle, text.as_ptr()) })
     }
 
-    /// A setting such as `box_exist` or `nlocal`, by the names of LAMMPS's `lammps_extract_setting`; −1 if unknown.
+    /// A setting such as `box_exist` or `nlocal`, with the names of `lammps_extract_setting`; −1 if it is unknown.
     pub fn setting(&self, name: &str) -> Result<i32, LammpsError> {
         let f = function!(self.library, lammps_extract_setting)?;
         let text = c_string(name)?;
-        // SAFETY: an open LAMMPS and a C string.
+        // SAFETY: `open` made the handle, which only `drop` closes; `c_string` made `text`.
         self.call(name, || unsafe { f(self.handle, text.as_ptr()) })
     }
 
-    /// The simulation box.
     pub fn simulation_box(&self) -> Result<SimulationBox, LammpsError> {
         if self.setting("box_exist")? != 1 {
             return Err(LammpsError::Request("LAMMPS has no box yet".into()));
@@ -273,18 +271,19 @@ impl Lammps {
         let (mut lo, mut hi, mut tilt) = ([0.0; 3], [0.0; 3], [0.0; 3]);
         let (mut periodic, mut changes): ([c_int; 3], c_int) = ([0; 3], 0);
         let [xy, xz, yz] = &mut tilt;
-        // SAFETY: an open LAMMPS with a box; the arrays have the lengths that the function fills. Its order is xy, yz, xz.
+        // SAFETY: `open` made the handle, which only `drop` closes; the check above ensures that a box exists.
+        // The arrays have the lengths that the function fills, and its tilt factors are in the order xy, yz, xz.
         self.call("extracting the box", || unsafe {
             f(self.handle, lo.as_mut_ptr(), hi.as_mut_ptr(), xy, yz, xz, periodic.as_mut_ptr(), &mut changes)
         })?;
         Ok(SimulationBox { lo, hi, tilt, periodic: periodic.map(|p| p != 0) })
     }
 
-    /// Refuses a request for a property of atoms with another type or width than it has: LAMMPS does not check this.
+    /// Refuses a request for an atom property with a wrong type or width, which LAMMPS does not check.
     fn check_property(&self, name: &str, width: usize, real: bool) -> Result<(), LammpsError> {
         let datatype = function!(self.library, lammps_extract_atom_datatype)?;
         let text = c_string(name)?;
-        // SAFETY: an open LAMMPS and a C string.
+        // SAFETY: `open` made the handle, which only `drop` closes; `c_string` made `text`.
         let kind = self.call(name, || unsafe { datatype(self.handle, text.as_ptr()) })?;
         let (kind_is_real, two) = match kind {
             INT => (false, false),
@@ -313,29 +312,29 @@ impl Lammps {
             (true, "mu") => 4,
             (true, _) => {
                 let size = function!(self.library, lammps_extract_atom_size)?;
-                // SAFETY: an open LAMMPS and a C string.
+                // SAFETY: `open` made the handle, which only `drop` closes; `c_string` made `text`.
                 self.call(name, || unsafe { size(self.handle, text.as_ptr(), SIZE_COLS) })?.max(0) as usize
             }
         };
         if width == columns { Ok(()) } else { Err(wrong_width(name, width, columns)) }
     }
 
-    /// Refuses a request for a per-atom compute or fix of another width than it has.
+    /// Refuses a request for a per-atom compute or fix with a wrong width.
     fn check_columns(&self, name: &str, width: usize) -> Result<(), LammpsError> {
         let id = c_string(&name[2..])?;
         let size = if name.starts_with("c_") {
             let f = function!(self.library, lammps_extract_compute)?;
-            // SAFETY: an open LAMMPS and a C string.
+            // SAFETY: `open` made the handle, which only `drop` closes; `c_string` made `id`.
             self.call(name, || unsafe { f(self.handle, id.as_ptr(), STYLE_ATOM, SIZE_COLS) })?
         } else {
             let f = function!(self.library, lammps_extract_fix)?;
-            // SAFETY: an open LAMMPS and a C string.
+            // SAFETY: `open` made the handle, which only `drop` closes; `c_string` made `id`.
             self.call(name, || unsafe { f(self.handle, id.as_ptr(), STYLE_ATOM, SIZE_COLS, 0, 0) })?
         };
         if size.is_null() {
             return Err(LammpsError::Request(format!("no per-atom values '{name}'")));
         }
-        // SAFETY: for this request the pointer is to LAMMPS's own int.
+        // SAFETY: LAMMPS answers this request with a pointer to an int of its own; the check above excludes null.
         let columns = unsafe { *size.cast::<c_int>() }.max(0) as usize;
         if width == columns.max(1) && !(width == 1 && columns == 1) {
             Ok(())
@@ -344,11 +343,11 @@ impl Lammps {
         }
     }
 
-    /// Values of all atoms, by atom id: a property (`x`, `v`, `f`, `rho` …), a compute (`c_ID`), a fix (`f_ID`) or a
-    /// `fix property/atom` (`d_NAME`); `width` values to an atom.
+    /// Values of all atoms, sorted by atom id: a property (`x`, `v`, `f`, `rho` …), a compute (`c_ID`), a fix
+    /// (`f_ID`) or a `fix property/atom` (`d_NAME`); each atom has `width` values.
     ///
-    /// Ids must run from 1 to the number of atoms. Computes that LAMMPS tallies during a step, such as `pe/atom`, need an
-    /// output of that step that asks for them, for example `compute reduce sum` in `thermo_style`.
+    /// The ids must run from 1 to the number of atoms. Computes that LAMMPS tallies during a step, such as `pe/atom`,
+    /// need an output of that step that requests them, for example `compute reduce sum` in `thermo_style`.
     pub fn gather(&self, name: &str, width: usize) -> Result<Vec<f64>, LammpsError> {
         let unset = f64::from_bits(0x7ff8_7073_6964_7064);
         let all = self.gather_any(name, width, true, unset)?;
@@ -358,7 +357,7 @@ impl Lammps {
         Ok(all)
     }
 
-    /// Integers of all atoms, by atom id: `id`, `type`, `image` (one word with `width` 1, three with 3), `i_NAME` …
+    /// Integers of all atoms, sorted by atom id: `id`, `type`, `image` (one word with `width` 1, three with 3), `i_NAME` …
     pub fn gather_ints(&self, name: &str, width: usize) -> Result<Vec<i32>, LammpsError> {
         let all = self.gather_any(name, width, false, i32::MIN)?;
         if all.iter().all(|x| *x == i32::MIN) && !all.is_empty() {
@@ -367,7 +366,7 @@ impl Lammps {
         Ok(all)
     }
 
-    /// `T` is f64 where `real`, else i32.
+    /// The type `T` must be f64 if `real` is set, else i32.
     fn gather_any<T: Copy>(
         &self,
         name: &str,
@@ -387,7 +386,7 @@ impl Lammps {
             [b'd' | b'i', b'_', ..] => {
                 if (name.as_bytes()[0] == b'd') != real || width != 1 {
                     return Err(LammpsError::Request(format!(
-                        "'{name}' is not what was asked for: d_ is one double, i_ one integer"
+                        "'{name}' has another type or width than requested: d_ is one double, i_ one integer"
                     )));
                 }
                 true
@@ -404,15 +403,16 @@ impl Lammps {
         };
         let mut all = vec![unset; self.natoms()? * width];
         let kind = c_int::from(real);
-        // SAFETY: an open LAMMPS; it fills natoms × width values of the type that `kind` says, which is T, and the checks
-        // above have made sure that its own array is that wide.
+        // SAFETY: `open` made the handle, which only `drop` closes; `c_string` made `text`. LAMMPS fills
+        // natoms × width values of the type that `kind` names, which is `T`; the checks above ensure that its
+        // own array has this width.
         self.call(&format!("gathering {name}"), || unsafe {
             f(self.handle, text.as_ptr(), kind, width as c_int, all.as_mut_ptr().cast())
         })?;
         Ok(all)
     }
 
-    /// Sets a property of all atoms from values by atom id. LAMMPS needs `atom_modify map yes` for it.
+    /// Sets a property of all atoms from values sorted by atom id. LAMMPS needs `atom_modify map yes` for this.
     pub fn scatter(&self, name: &str, width: usize, values: &[f64]) -> Result<(), LammpsError> {
         let f = function!(self.library, lammps_scatter_atoms)?;
         self.check_property(name, width, true)?;
@@ -424,7 +424,8 @@ impl Lammps {
             )));
         }
         let text = c_string(name)?;
-        // SAFETY: an open LAMMPS; it reads natoms × width doubles and writes none.
+        // SAFETY: `open` made the handle, which only `drop` closes; `c_string` made `text`. LAMMPS reads
+        // natoms × width doubles, the checked length of `values`, and does not write to them.
         self.call(&format!("scattering {name}"), || unsafe {
             f(self.handle, text.as_ptr(), 1, width as c_int, values.as_ptr().cast_mut().cast())
         })
@@ -433,7 +434,7 @@ impl Lammps {
     fn extract_compute(&self, id: &str, what: c_int) -> Result<*mut c_void, LammpsError> {
         let f = function!(self.library, lammps_extract_compute)?;
         let text = c_string(id)?;
-        // SAFETY: an open LAMMPS and a C string.
+        // SAFETY: `open` made the handle, which only `drop` closes; `c_string` made `text`.
         let found = self.call(&format!("computing {id}"), || unsafe {
             f(self.handle, text.as_ptr(), STYLE_GLOBAL, what)
         })?;
@@ -443,19 +444,18 @@ impl Lammps {
         Ok(found)
     }
 
-    /// The global scalar of a compute.
     pub fn compute_scalar(&self, id: &str) -> Result<f64, LammpsError> {
         let value = self.extract_compute(id, TYPE_SCALAR)?;
-        // SAFETY: for a scalar the pointer is to LAMMPS's own double.
+        // SAFETY: LAMMPS answers a request for a scalar with a pointer to a double of its own;
+        // `extract_compute` has refused null.
         Ok(unsafe { *value.cast::<f64>() })
     }
 
-    /// The global vector of a compute.
     pub fn compute_vector(&self, id: &str) -> Result<Vec<f64>, LammpsError> {
         let values = self.extract_compute(id, TYPE_VECTOR)?.cast::<f64>();
         let size = self.extract_compute(id, SIZE_VECTOR)?;
-        // SAFETY: for the size the pointer is to LAMMPS's own int; the vector has that many doubles, and no call that could
-        // change it comes between.
+        // SAFETY: LAMMPS answers a request for the size with a pointer to an int of its own, and the vector
+        // has that many doubles; no call that could change the vector comes in between.
         let slice = unsafe {
             let n = (*size.cast::<c_int>()).max(0) as usize;
             std::slice::from_raw_parts(values, n)
@@ -475,7 +475,7 @@ fn not_gathered(name: &str) -> LammpsError {
     }
 }
 
-/// Commands of a text: continued lines joined, empty lines and comments left out.
+/// Splits a text into commands: joins continued lines, and drops empty lines and comments.
 fn split_commands(text: &str) -> Vec<String> {
     let mut commands = Vec::new();
     let mut open = String::new();

@@ -1,9 +1,9 @@
-//! LAMMPS as a host: installing it, running it as a program or in this process, building the plugin for it, and writing
-//! scenes and scripts for it.
+//! LAMMPS as a host: installs it, runs it as a program or within this process, builds the plugin for it, and
+//! writes scenes and scripts for it.
 //!
-//! [`install()`] puts a pinned LAMMPS into the build folder; [`Host`] says where the parts of an installed LAMMPS are;
-//! [`Lammps`] runs one inside this process; [`plugin`] builds psidpd's pair styles for a host; [`export`] writes scenes
-//! and models for it; [`convert`] rewrites scripts for the built-in `mdpd`.
+//! [`install()`] puts a pinned LAMMPS into the build folder; [`Host`] has the paths of an installed LAMMPS;
+//! [`Lammps`] runs one within this process; [`plugin`] builds psidpd's pair styles for a host; [`export`]
+//! writes scenes and models for it; [`convert`] rewrites scripts for the built-in `mdpd`.
 
 #[allow(dead_code, unsafe_op_in_unsafe_fn, clippy::all, clippy::undocumented_unsafe_blocks)]
 mod bindings;

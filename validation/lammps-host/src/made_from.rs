@@ -1,4 +1,4 @@
-//! What a plugin is made from, as a digest: the same digest means the same plugin.
+//! The digest of a plugin's sources: equal digests mean equal plugins.
 
 use super::error::LammpsError;
 use super::host::Host;
@@ -7,7 +7,7 @@ use std::fs;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 
-/// Folders and files of the checkout that go into a plugin.
+/// Folders and files of the checkout that a plugin is built from.
 const SOURCES: [&str; 11] = [
     "Cargo.toml",
     "Cargo.lock",
@@ -36,8 +36,8 @@ pub(super) fn digest(host: &Host, root: &Path, compiler: &[String]) -> Result<St
     for part in SOURCES.iter().chain(&CPP) {
         add(&root.join(part), &root.join(part), &mut hasher)?;
     }
-    // Of a source tree the headers of its own, without those of packages below; of MPI one, whose folder may have those of
-    // everything.
+    // Of a source tree only its own headers count, without those of packages in subfolders. Of MPI only
+    // `mpi.h` counts, because its folder may hold headers of other software.
     let entries = fs::read_dir(&host.include).map_err(LammpsError::io("read", &host.include))?;
     let files = entries.filter_map(|e| Some(e.ok()?.path()));
     let headers: BTreeSet<PathBuf> = files.filter(|p| p.extension().is_some_and(|e| e == "h")).collect();
@@ -48,14 +48,14 @@ pub(super) fn digest(host: &Host, root: &Path, compiler: &[String]) -> Result<St
     Ok(format!("{:016x}", hasher.finish()))
 }
 
-/// Adds a file, or all files in a folder, by their names below `top` and what is in them.
+/// Adds a file, or all files in a folder, by their contents and their names relative to `top`.
 fn add(top: &Path, path: &Path, hasher: &mut DefaultHasher) -> Result<(), LammpsError> {
     if path.is_dir() {
         let entries = fs::read_dir(path).map_err(LammpsError::io("read", path))?;
         let inside: BTreeSet<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
         return inside.iter().try_for_each(|path| add(top, path, hasher));
     }
-    // The build works without a missing part.
+    // The build works without a missing part, so the part counts as empty.
     let text = fs::read(path).unwrap_or_default();
     path.strip_prefix(top).unwrap_or(path).hash(hasher);
     text.hash(hasher);

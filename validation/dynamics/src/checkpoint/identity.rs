@@ -6,36 +6,35 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Every key of a scene and of its model with its value. Comments, the order of keys and number formats do
-/// not count.
+/// The values of all keys of a scene and of its model. Comments, the order of keys and number formats do not count.
 ///
-/// A key that names a file stands for what is in it. Titles and the interval of checkpoints are left out:
-/// they change nothing in a trajectory.
+/// A key that names a file has the content of the file as its value. Titles and the interval of checkpoints
+/// are left out: they change nothing in a trajectory.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Identity {
     scene: BTreeMap<String, String>,
     model: BTreeMap<String, String>,
 }
 
-/// Keys that name files, in whatever table.
+/// Keys that name files, in any table.
 const FILES: [&str; 2] = ["file", "table"];
 
 impl Identity {
-    /// That of a scene with a text, whose paths start from `folder`, run in some precision.
+    /// The identity of a scene: `scene` is its text, and its paths start from `folder`.
     pub fn of(scene: &str, folder: &Path, precision: Precision, model: &Model) -> Identity {
         let model = model.source();
         let mut of_scene = keys(scene, folder, &["title", "model", "output.checkpoint", "precision"]);
-        // The precision in use, whether the file, the command line or the default set it.
+        // The precision in use can come from the file, the command line or the default.
         of_scene.insert("precision".into(), format!("{:?}", precision.to_string()));
         let beside_model = Path::new(model.name()).parent().unwrap_or(Path::new(""));
         Identity {
-            // The model is compared by itself, not by where it is.
+            // The content of the model is compared, not its path.
             scene: of_scene,
             model: keys(model.text(), beside_model, &["title", "reference", "literature"]),
         }
     }
 
-    /// What is different now from what was `before`, key by key with both values.
+    /// The keys whose values differ from those in `before`, each with both values.
     pub fn differences(&self, before: &Identity) -> Vec<String> {
         let pairs = [("", &self.scene, &before.scene), ("the model's ", &self.model, &before.model)];
         let mut found = Vec::new();
@@ -59,8 +58,8 @@ fn keys(text: &str, folder: &Path, without: &[&str]) -> BTreeMap<String, String>
     let mut keys = BTreeMap::new();
     match text.parse::<toml::Table>() {
         Ok(table) => collect(&toml::Value::Table(table), "", folder, &mut keys),
-        // The scene was read from this text, so it is TOML; if parsing failed, the text itself would identify
-        // it.
+        // A scene has been parsed before, so its text is TOML. If parsing failed, the text itself would
+        // identify the scene.
         Err(_) => _ = keys.insert("text".into(), text.to_owned()),
     }
     keys.retain(|key, _| !without.iter().any(|w| key == w || key.starts_with(&format!("{w}["))));
@@ -89,11 +88,11 @@ fn collect(value: &toml::Value, path: &str, folder: &Path, keys: &mut BTreeMap<S
     }
 }
 
-/// A value that is no table, in one way only.
+/// Writes equal values (not tables) as equal texts.
 fn written(value: &toml::Value) -> String {
     match value {
         toml::Value::Integer(x) => format!("{x}"),
-        // 1 and 1.0 are the same number.
+        // The numbers 1 and 1.0 are equal.
         toml::Value::Float(x) => format!("{x}"),
         toml::Value::Array(items) => {
             format!("[{}]", items.iter().map(written).collect::<Vec<_>>().join(", "))
@@ -102,7 +101,7 @@ fn written(value: &toml::Value) -> String {
     }
 }
 
-/// A file by its content; `None` if it cannot be read.
+/// The length and checksum of a file's content; `None` if the file cannot be read.
 fn content_of(path: &Path) -> Option<String> {
     let mut file = std::fs::File::open(path).ok().filter(|f| f.metadata().is_ok_and(|m| m.is_file()))?;
     let mut digest = Digest(crc32fast::Hasher::new());

@@ -1,8 +1,8 @@
-//! Checkpoints: all that the rest of a run depends on, in one file.
+//! Checkpoints: one file holds all data that the rest of a run depends on.
 //!
-//! A run keeps two of them in its folder, `checkpoint` and `checkpoint.old`, the one before. A new one is
-//! written beside them, brought to the disk and renamed, so that a run killed at any moment, or a machine
-//! that loses its power, leaves one that is whole. The file is
+//! A run keeps two checkpoints in its folder, the newest in `checkpoint` and the previous one in
+//! `checkpoint.old`. A new checkpoint is written to a third file, synced to the disk and renamed, so that one
+//! whole checkpoint survives a kill or a power failure at any moment. The layout of the file is
 //!
 //! | bytes | what |
 //! |---|---|
@@ -34,66 +34,60 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// The name of the newest checkpoint in the folder of a run.
 const NEWEST: &str = "checkpoint";
 
-/// All that the rest of a run depends on, and that its files will tell.
+/// All data that the rest of a run depends on, and that its files will tell.
 ///
-/// Particle arrays are in the order that the run had them in: sums of forces depend on it by rounding.
+/// Particle arrays keep the order of the run: sums of forces depend on it by rounding.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Checkpoint {
-    /// Version of the program that wrote it.
+    /// Version of the program that wrote the checkpoint.
     pub program: String,
-    /// The instruction set that its forces were computed with: sums of forces depend on it by rounding.
+    /// The instruction set of the pair forces: sums of forces depend on it by rounding.
     pub instructions: String,
-    /// Of which scene and model.
     pub identity: Identity,
-    /// Whether the run is at its end, and its files are all written.
+    /// Whether the run has ended, with all its files written.
     pub finished: bool,
     /// Number of the present step; it keys the noise.
     pub step: u64,
-    /// Where that is in the stages.
+    /// The place of the present step in the stages.
     pub position: Position,
-    /// The particles.
     pub state: State,
-    /// Forces of the present step, thermostat included: those that the next step begins with.
+    /// Forces of the present step, thermostat included: the next step begins with them.
     pub forces: Vec<[f64; 3]>,
-    /// The furthest trial move that was found; `None` without Monte Carlo.
+    /// The largest displacement of a trial move, as tuned so far; `None` without Monte Carlo.
     pub max_move: Option<f64>,
     /// Evaluations of ψ below and above the bounds of a density.
     pub out_of_bounds: [u64; 2],
-    /// The last totals.
+    /// The totals of the last thermo row.
     pub last: Option<Thermo>,
     /// Sums over the thermo rows of the stage.
     pub sums: Sums,
-    /// What had been written to each file that grows with the run, by its name.
+    /// The length and checksum of each file that grows with the run, by the file's name.
     pub files: BTreeMap<String, Written>,
-    /// What observables remember, in a format of their own; empty without any.
+    /// The accumulated data of observables, in a format of their own; empty without observables.
     pub observers: Vec<u8>,
 }
 
-/// Where in its stages a run is.
+/// The place of a run in its stages.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Position {
-    /// Index of the stage.
     pub stage: usize,
-    /// Whether the forces that the stage starts with have been computed.
+    /// Whether the initial forces of the stage have been computed.
     pub entered: bool,
-    /// Steps of the stage that are made.
+    /// Number of completed steps of the stage.
     pub done: u64,
-    /// Time at which the stage began.
     pub begin: f64,
-    /// The present time.
     pub time: f64,
 }
 
-/// The particles of a checkpoint, for another run to start from. `path` is the checkpoint, or the folder
-/// of a run: then `checkpoint` in it is read, or, if that is damaged, `checkpoint.old`.
+/// Reads the particles of a checkpoint as the start of another run. `path` is a checkpoint, or the folder of
+/// a run: then `checkpoint` in it is read, or, if that is damaged, `checkpoint.old`.
 ///
-/// Whether the particles are a state of a model is for the caller to check, as for any other state.
+/// The caller checks whether the particles fit a model, as for any other state.
 ///
 /// # Errors
-/// There is no checkpoint, it is damaged, or of another version of the format.
+/// There is no checkpoint, it is damaged, or it has another version of the format.
 pub fn read_state(path: &Path) -> Result<State, CheckpointError> {
     let checkpoint = if path.is_dir() {
         Store::new(path).find(|_| Ok(()))?.ok_or_else(|| CheckpointError::absent(path))?.checkpoint

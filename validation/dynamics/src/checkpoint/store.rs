@@ -9,45 +9,42 @@ use std::path::{Path, PathBuf};
 const BEFORE: &str = "checkpoint.old";
 const UNFINISHED: &str = "checkpoint.new";
 
-/// The checkpoints in a folder.
 #[derive(Debug, Clone)]
 pub struct Store {
     folder: PathBuf,
 }
 
-/// A checkpoint that can be used.
 #[derive(Debug)]
 pub struct Found {
     pub checkpoint: Checkpoint,
-    /// Why it is the one before the newest; `None` if it is the newest.
+    /// The reason why the newest checkpoint was not used; `None` if it was.
     pub fallback: Option<CheckpointError>,
 }
 
 impl Store {
-    /// The names of all.
+    /// The names of all checkpoint files, the unfinished one included.
     pub const FILES: [&str; 3] = [UNFINISHED, BEFORE, NEWEST];
 
-    /// Those in `folder`.
     pub fn new(folder: &Path) -> Store {
         Store { folder: folder.to_owned() }
     }
 
-    /// The newest one.
+    /// The path of the newest checkpoint.
     pub fn path(&self) -> PathBuf {
         self.folder.join(NEWEST)
     }
 
-    /// Whether there is any.
+    /// Whether any checkpoint is there.
     pub fn exists(&self) -> bool {
         [NEWEST, BEFORE].iter().any(|name| self.folder.join(name).symlink_metadata().is_ok())
     }
 
-    /// Writes another one and keeps the newest as the one before. If that fails, those that are there stay.
+    /// Writes a new checkpoint and keeps the newest as the previous one. If that fails, the present checkpoints stay.
     pub fn write(&self, checkpoint: &Checkpoint) -> Result<(), WriteError> {
         let new = self.folder.join(UNFINISHED);
         let newest = self.path();
         self.write_new(checkpoint, &new).map_err(|cause| {
-            // A partial file only takes space.
+            // A partial file only takes space, so failing to remove it is harmless.
             let _ = std::fs::remove_file(&new);
             WriteError { path: newest, cause }
         })
@@ -62,21 +59,22 @@ impl Store {
         self.sync()
     }
 
-    /// Links the newest one as the one before, so that there is always at least one.
+    /// Links the newest checkpoint as the previous one, so that one is always there.
     fn keep_as_before(&self) -> io::Result<()> {
         let (newest, before) = (self.path(), self.folder.join(BEFORE));
         if !newest.exists() {
             return Ok(());
         }
         remove_if_there(&before)?;
-        // Where there are no hard links, a run killed now is left with `checkpoint.old` alone; that will do.
+        // Without hard links the newest is renamed; a run killed now leaves `checkpoint.old` alone, which suffices.
         std::fs::hard_link(&newest, &before).or_else(|_| std::fs::rename(&newest, &before))
     }
 
-    /// The newest checkpoint that is whole and that `usable` agrees with; `None` if there is none at all.
+    /// Finds the newest checkpoint that is whole and that `usable` accepts; `None` if there is no checkpoint.
     ///
     /// # Errors
-    /// What is wrong with the newest one, if the one before will not do either; a foreign one.
+    /// The fault of the newest checkpoint, if the previous one cannot be used either; a checkpoint of another
+    /// run.
     pub fn find(
         &self,
         usable: impl Fn(&Checkpoint) -> Result<(), CheckpointError>,
@@ -94,12 +92,12 @@ impl Store {
             Ok(checkpoint) => Ok(Some(Found { checkpoint, fallback: Some(newest) })),
             Err(error @ CheckpointError::Foreign { .. }) => Err(error),
             Err(_) if !self.exists() => Ok(None),
-            // A missing newest one is less informative.
+            // That the newest checkpoint is missing says less than the fault of the previous one.
             Err(error) => Err(if self.path().exists() { newest } else { error }),
         }
     }
 
-    /// Makes the one before the newest, so that the next one written will not push it out.
+    /// Makes the previous checkpoint the newest, so that the next write does not replace it.
     pub fn fall_back(&self) -> Result<(), WriteError> {
         let newest = self.path();
         std::fs::rename(self.folder.join(BEFORE), &newest)
@@ -107,12 +105,12 @@ impl Store {
             .map_err(WriteError::at(&newest))
     }
 
-    /// Removes all but the newest.
+    /// Removes all checkpoint files but the newest.
     pub fn keep_newest(&self) -> Result<(), WriteError> {
         self.remove(&[UNFINISHED, BEFORE])
     }
 
-    /// Removes all.
+    /// Removes all checkpoint files.
     pub fn clear(&self) -> Result<(), WriteError> {
         self.remove(&Store::FILES)
     }
@@ -125,7 +123,7 @@ impl Store {
         Ok(())
     }
 
-    /// Brings names to the disk.
+    /// Syncs the folder, so that its file names survive a power failure.
     fn sync(&self) -> io::Result<()> {
         File::open(&self.folder)?.sync_all()
     }

@@ -3,7 +3,7 @@ use crate::scene::Scene;
 use psidpd_core::engine::PeriodicBox;
 use std::io::{self, Cursor, Seek, SeekFrom, Write};
 
-/// Numbers that a format may get wrong.
+/// Numbers that a conversion may get wrong.
 const HARD: [f64; 3] = [-0.0, 5e-324, 0.1 + 0.2];
 
 fn checkpoint(step: u64) -> Checkpoint {
@@ -61,7 +61,7 @@ fn every_bit_comes_back() {
     assert_eq!(read_state(&path).unwrap(), written.state);
 }
 
-/// A file that was cut at any length, or that has any bit wrong, is refused, and says what it is.
+/// A file truncated at any length, or with any bit changed, is refused, and the error names the fault.
 #[test]
 fn no_damage_goes_unnoticed() {
     let folder = tempfile::tempdir().unwrap();
@@ -104,7 +104,7 @@ fn no_damage_goes_unnoticed() {
     assert!(matches!(error, CheckpointError::Unreadable { .. }), "{error}");
 }
 
-/// What postcard takes for a checkpoint need not be one: lengths beyond the end, boxes that are none.
+/// A payload that postcard accepts can still be invalid: lengths beyond the end, boxes without volume.
 #[test]
 fn payloads_that_are_none_are_damage() {
     let folder = tempfile::tempdir().unwrap();
@@ -127,7 +127,7 @@ fn payloads_that_are_none_are_damage() {
     }
 }
 
-/// A disk with room for so many bytes.
+/// A disk with room for `room` bytes.
 struct Disk {
     room: usize,
     file: Cursor<Vec<u8>>,
@@ -174,28 +174,28 @@ fn the_one_before_is_kept_and_found() {
     store.write(&checkpoint(2)).unwrap();
     let step = |store: &Store| store.find(any).unwrap().unwrap().checkpoint.step;
     assert_eq!(step(&store), 2);
-    // Killed while the next one was written
+    // The run was killed while it wrote the next checkpoint.
     std::fs::write(folder.path().join("checkpoint.new"), "psid").unwrap();
     assert_eq!(step(&store), 2);
-    // Killed between two renamings, where there are no hard links
+    // The run was killed between two renamings, on a disk without hard links.
     let (newest, old) = (store.path(), folder.path().join("checkpoint.old"));
     let (second, first) = (std::fs::read(&newest).unwrap(), std::fs::read(&old).unwrap());
     std::fs::remove_file(&newest).unwrap();
     assert!(store.exists());
     assert_eq!(step(&store), 1);
-    // Cut
+    // The newest checkpoint is truncated.
     std::fs::write(&newest, &second[..second.len() - 3]).unwrap();
     let found = store.find(any).unwrap().unwrap();
     assert_eq!(found.checkpoint.step, 1);
     assert!(matches!(found.fallback, Some(CheckpointError::Truncated { .. })));
     assert_eq!(read_state(folder.path()).unwrap(), checkpoint(1).state);
     assert!(matches!(read_state(&newest), Err(CheckpointError::Truncated { .. })));
-    // The damaged one must not push the good one out.
+    // The damaged checkpoint must not replace the good one.
     store.fall_back().unwrap();
     assert_eq!(std::fs::read(&newest).unwrap(), first);
     store.write(&checkpoint(3)).unwrap();
     assert_eq!((step(&store), std::fs::read(&old).unwrap() == first), (3, true));
-    // Both
+    // Both checkpoints are damaged.
     std::fs::write(&newest, "x").unwrap();
     std::fs::write(&old, &first[..30]).unwrap();
     assert!(matches!(store.find(any), Err(CheckpointError::Other { .. })));
@@ -210,7 +210,7 @@ fn a_checkpoint_that_cannot_be_written_leaves_what_is_there() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::new(folder.path());
     store.write(&checkpoint(1)).unwrap();
-    // In the way of the new one: root writes to any folder, but not through one that is a file's name.
+    // A folder has the name of the new checkpoint: unlike the permissions of a folder, this stops root too.
     std::fs::create_dir(folder.path().join("checkpoint.new")).unwrap();
     let error = store.write(&checkpoint(2)).unwrap_err();
     assert_eq!(error.path, folder.path().join("checkpoint"), "{error}");
@@ -256,7 +256,7 @@ fn what_differs_is_named() {
         assert!(SCENE.contains(from), "{from}");
         identity(&SCENE.replace(from, to), MODEL, PSI).differences(&good)
     };
-    // The look of a file, titles and the interval of checkpoints make no other run.
+    // The layout of a file, its title and the interval of checkpoints do not change the identity.
     for (from, to) in [
         ("kT = 1.0", "kT = 1 # the same"),
         ("kT = 1.0\nseed = 7", "seed = 7\nkT = 1e0"),

@@ -5,40 +5,35 @@ use serde::{Deserialize, Serialize};
 /// One row of totals.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Thermo {
-    /// Number of the step.
     pub step: u64,
-    /// Time since the start of the run.
     pub time: f64,
     /// kT from the kinetic energy.
     pub temperature: f64,
-    /// `U`.
+    /// The energy `U` of the conservative forces.
     pub potential: f64,
-    /// `½ Σ m v²`.
+    /// The kinetic energy `½ Σ m v²`.
     pub kinetic: f64,
-    /// A third (in two dimensions half) of the trace of `tensor`.
+    /// The pressure: a third (in two dimensions half) of the trace of `tensor`.
     pub pressure: f64,
-    /// xx, yy, zz, xy, xz, yz; thermostat forces included.
+    /// The pressure tensor in the order xx, yy, zz, xy, xz, yz, thermostat forces included.
     pub tensor: [f64; 6],
-    /// The pressure with conservative forces alone.
+    /// The pressure of the conservative forces alone.
     pub conservative_pressure: f64,
 }
 
-/// Plain means over thermo rows.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Means {
-    /// How many rows.
+    /// Number of rows.
     pub rows: u64,
-    /// Of kT.
+    /// Mean kT.
     pub temperature: f64,
-    /// Of the potential energy.
     pub potential: f64,
-    /// Of the pressure.
     pub pressure: f64,
-    /// Of the pressure of conservative forces.
+    /// Mean pressure of the conservative forces alone.
     pub conservative_pressure: f64,
 }
 
-/// Sums over thermo rows, from which their means come: a checkpoint can hold them.
+/// Sums over thermo rows; a checkpoint holds them.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Sums {
     rows: u64,
@@ -49,7 +44,7 @@ pub struct Sums {
 }
 
 impl Sums {
-    /// Counts another row.
+    /// Adds a row.
     pub fn add(&mut self, t: &Thermo) {
         self.rows += 1;
         self.temperature += t.temperature;

@@ -1,4 +1,4 @@
-//! What has been written to a file that grows with a run.
+//! The record of what a run has written to a file.
 
 use crc32fast::Hasher;
 use serde::{Deserialize, Serialize};
@@ -6,17 +6,17 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-/// The length and the CRC-32 of what a run has written to a file.
+/// The length and the CRC-32 of the bytes that a run has written to a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Written {
-    /// Bytes.
+    /// Number of bytes.
     pub length: u64,
-    /// Their CRC-32. It tells of edits and of damage, not of forgery.
+    /// CRC-32 of the bytes. It reveals edits and damage, not forgery.
     pub checksum: u32,
 }
 
 impl Written {
-    /// What the first `length` bytes of the file are, or all of them if there are fewer.
+    /// The record of the first `length` bytes of a file, or of all its bytes if there are fewer.
     ///
     /// # Errors
     /// The file cannot be read.
@@ -34,7 +34,7 @@ impl Written {
         }
     }
 
-    /// Counts more bytes.
+    /// Appends `bytes` to the record.
     pub fn add(&mut self, bytes: &[u8]) {
         let mut hasher = Hasher::new_with_initial_len(self.checksum, self.length);
         hasher.update(bytes);

@@ -1,6 +1,6 @@
-//! Momentum balances in what the observables tell of stress, at a time step so long that velocities at the ends of steps and
-//! conservative forces alone are far from it. Errors are those of the mean of sixteen stretches of a run; six of
-//! them are exceeded by chance less than once in 10⁴ runs. The seeds are fixed.
+//! Balances of momentum from the observed stress. The time step is so long that velocities at the ends of steps
+//! and conservative forces alone miss the balance by far. Errors are those of the mean of sixteen stretches of
+//! a run; six standard errors are exceeded by chance less than once in 10⁴ runs. The seeds are fixed.
 
 use super::find;
 use crate::run::{Integrator, Simulation};
@@ -13,7 +13,7 @@ use psidpd_observe::{Measured, Observation, Observers};
 
 const DT: f64 = 0.02;
 
-/// Warren's set 6, whose vapour is as thin as nothing.
+/// A scene of Warren's set 6, whose vapour has almost no density.
 fn scene(lengths: &str, initial: &str, observe: &str) -> Scene {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("m.toml"), SET6.replace("gamma = 18.0", "gamma = 12.0")).unwrap();
@@ -24,7 +24,7 @@ fn scene(lengths: &str, initial: &str, observe: &str) -> Scene {
     Scene::parse("s.toml", &text, folder.path()).unwrap()
 }
 
-/// Observes sixteen stretches of a run of velocity Verlet, each of `samples` every fifth step.
+/// Observes sixteen stretches of a run of velocity Verlet. Each stretch has `samples` samples, one every fifth step.
 fn stretches(scene: &Scene, simulation: &mut Simulation, samples: usize) -> Vec<Vec<Observation>> {
     let integrator = Integrator::VelocityVerlet;
     let stretch = |_| {
@@ -41,8 +41,9 @@ fn stretches(scene: &Scene, simulation: &mut Simulation, samples: usize) -> Vec<
     (0..16).map(stretch).collect()
 }
 
-/// Across a film without vapour nothing is carried, whatever the integrator. Conservative stress is off by 0.5 with
-/// velocity Verlet, which the test must be able to see, and by 0.25 and more with most others.
+/// A film without vapour transmits no normal stress, whatever the integrator. The conservative stress alone
+/// is wrong by 0.5 with velocity Verlet, which the test must be able to see, and by 0.25 and more with most
+/// other integrators.
 #[test]
 fn what_is_carried_across_a_film_is_nothing() {
     let scene = scene("[3.0, 3.0, 7.0]", "kind = \"slab\"\nthickness = 3.2\ndensity = 6.0", "");
@@ -71,8 +72,8 @@ fn what_is_carried_across_a_film_is_nothing() {
     }
 }
 
-/// In a slab P_N is the same in the liquid as in the vapour. With velocities at the ends of steps and conservative forces it
-/// differs by 1.1.
+/// In a slab the normal pressure P_N is equal in the liquid and in the vapour. With velocities at the ends of
+/// steps and conservative forces alone the two values differ by 1.1.
 #[test]
 fn normal_pressure_is_the_same_everywhere() {
     let slab = "kind = \"slab\"\nthickness = 4.0\ndensity = 6.0";
@@ -92,8 +93,8 @@ fn normal_pressure_is_the_same_everywhere() {
     assert!(found.value.abs() < 6.0 * found.error && found.error < 0.16, "{found:?}");
 }
 
-/// In a drop `r² P_N` grows as `∫ 2 r P_T dr`: between the liquid and the vapour, where nothing is left. With velocities at
-/// the ends of steps and conservative forces the two differ by 1.1 in the liquid.
+/// In a drop `r² P_N` grows as `∫ 2 r P_T dr` from the vapour to the liquid, so the difference of the two
+/// vanishes. With velocities at the ends of steps and conservative forces alone it is 1.1 in the liquid.
 #[test]
 fn a_drop_balances() {
     let scene = scene(
@@ -130,7 +131,7 @@ fn a_drop_balances() {
     assert!(found.value.abs() < 6.0 * found.error && found.error < 0.18, "{found:?}");
 }
 
-/// The force-gradient step at three times the step, with the λ that is advised.
+/// Three times the time step of the other tests; the force-gradient integrator uses its recommended λ.
 const LONG: f64 = 0.06;
 
 fn force_gradient() -> Integrator {
@@ -138,8 +139,9 @@ fn force_gradient() -> Integrator {
     Integrator::ForceGradient { lambda: 0.17, gradient: 1.0 / 24.0, coupling }
 }
 
-/// Forces of the middle kick are computed at displaced positions and act at the present ones. Counted where they were
-/// computed they would carry 0.3 across a film without vapour, which the test must be able to see.
+/// Forces of the middle kick are computed at displaced positions and act at the present positions. Counted at
+/// the displaced positions they would transmit a stress of 0.3 across a film without vapour, which the test
+/// must be able to see.
 #[test]
 fn displaced_forces_carry_nothing_across_a_film() {
     let scene = scene("[3.0, 3.0, 7.0]", "kind = \"slab\"\nthickness = 3.2\ndensity = 6.0", "");
@@ -171,8 +173,8 @@ fn displaced_forces_carry_nothing_across_a_film() {
     assert!(elsewhere.value.abs() > 4.0 * elsewhere.error, "{elsewhere:?}");
 }
 
-/// A film that gravity presses on a wall carries at every height the weight of the particles above, with steps of [`LONG`]. In the
-/// middle of the film that is about 10; on the wall it is 19.
+/// A film that gravity presses on a wall carries at every height the weight of the particles above it, with
+/// steps of [`LONG`]. The pressure is about 10 in the middle of the film and 19 on the wall.
 #[test]
 fn a_film_on_a_wall_carries_its_weight() {
     const WEIGHT: f64 = 1.0;
@@ -201,7 +203,7 @@ fn a_film_on_a_wall_carries_its_weight() {
             }
             let out = observers.finish();
             let normal = &find(&out, "stress_profile").get("normal").unwrap().values;
-            // From 0.8 to 2.6: neither at the wall nor at the free surface.
+            // Heights from 0.8 to 2.6 lie neither at the wall nor at the free surface.
             let bins = 4..13;
             let count = bins.len() as f64;
             bins.map(|k| normal[k] - WEIGHT * above[k] / 9.0).sum::<f64>() / count

@@ -12,11 +12,11 @@ use psidpd_observe::frame::{Frame, View};
 use psidpd_observe::meter::AnyMeter;
 use std::f64::consts::PI;
 
-/// Particles without forces in a plane.
+/// A model of particles without forces in a plane.
 const FLAT: &str =
     "title = \"flat\"\ndimensions = 2\nspecies = [\"A\"]\n[[thermostat]]\ngamma = 4.5\nrange = 1.0\n";
 
-/// Particles that an observable is shown.
+/// Particles and an observable that samples them.
 struct Shown {
     simulation: Simulation,
     fluid: Evaluator,
@@ -24,7 +24,7 @@ struct Shown {
 }
 
 impl Shown {
-    /// The first observable of `observe`, and particles at rest at `x` in a box of `lengths`.
+    /// Sets up the first observable of `observe` and particles at rest at `x` in a box of `lengths`.
     fn new(model: &str, kt: f64, lengths: &[f64], x: &[[f64; 3]], observe: &str) -> Shown {
         let text = format!(
             "title = \"t\"\nmodel = \"m.toml\"\nkT = {kt:?}\nseed = 1\nbox = {lengths:?}\ndensity = 1.0\ndt = 0.01\nsteps = 10\n\
@@ -38,7 +38,7 @@ impl Shown {
         Shown { simulation, fluid, meter: scene.observe.requests[0].meter.clone() }
     }
 
-    /// Takes a sample of the particles as `change` shows them.
+    /// Takes a sample of the particles after `change` has edited their view.
     fn sample<'a>(&'a mut self, change: impl FnOnce(View<'a>) -> View<'a>) {
         let view = change(self.simulation.view(0.0));
         assert!(self.meter.sample(&Frame::new(view, &self.fluid)));
@@ -53,8 +53,9 @@ fn value(observation: &Observation, column: &str) -> f64 {
     observation.get(column).unwrap().values[0]
 }
 
-/// Two pairs of soft spheres, one at the distance r along the normal and one out of range: `U = a (1 − r)²/2` of the first
-/// becomes that of r/(1 ± ε), and the tension is −kT ln of the ratio of the mean Boltzmann factors over 2 m ε A.
+/// Two pairs of soft spheres: one at distance r along the normal, one out of range. The energy `U = a (1 −
+/// r)²/2` of the first changes to that at r/(1 ± ε), and the tension is −kT ln of the ratio of the mean
+/// Boltzmann factors over 2 m ε A.
 #[test]
 fn the_tension_by_free_energy_knows_temperature_and_interfaces() {
     let (kt, change, r, area) = (2.0, 0.1, 0.5, 16.0);
@@ -79,7 +80,7 @@ fn the_tension_by_free_energy_knows_temperature_and_interfaces() {
     }
 }
 
-/// In a plane there is one direction along the interface, in space there are two, the mean of which is P_T.
+/// One direction lies along the interface in a plane, two directions in space; P_T is their mean.
 #[test]
 fn the_tangential_pressure_is_the_mean_of_the_other_directions() {
     let flux = Flux {
@@ -105,8 +106,8 @@ fn the_tangential_pressure_is_the_mean_of_the_other_directions() {
     }
 }
 
-/// Three particles of two species, all within the one shell of volume s: of N_A (N_A − 1)/2 pairs of equals and N_A N_B of
-/// others each is there, where V/s would be.
+/// Three particles of two species, all within one shell of volume s. Each of the N_A (N_A − 1)/2 pairs of
+/// equals and of the N_A N_B pairs of unlike particles counts V/s.
 #[test]
 fn correlations_of_few_particles_count_pairs_and_not_squares() {
     let x = [[1.0, 1.0, 1.0], [1.5, 1.0, 1.0], [1.0, 1.6, 1.0]];
@@ -118,7 +119,7 @@ fn correlations_of_few_particles_count_pairs_and_not_squares() {
         let found = value(&out[0], column);
         assert!((found / expected - share).abs() < 1e-12, "{column}: {found} {expected}");
     }
-    // Waves of a half and of a whole turn between the two of species A: |1 ± 1|²/2.
+    // Waves of half a turn and of one turn between the two particles of species A give |1 ± 1|²/2.
     let x = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]];
     let observe =
         format!("structure_factor = {{ range = {:?}, bins = 1, vectors = 1 }}", 2.0 * PI / 4.0 + 1e-9);
@@ -129,7 +130,7 @@ fn correlations_of_few_particles_count_pairs_and_not_squares() {
     assert!((value(&shown.finish()[0], "s") - 1.0).abs() < 1e-12);
 }
 
-/// A particle that went round the box along its second edge is that edge away from where it began, tilt and all.
+/// A particle that went round the box along its second edge is displaced by that edge, tilt included.
 #[test]
 fn a_displacement_round_a_tilted_box_is_its_edge() {
     let mut shown =
@@ -144,7 +145,7 @@ fn a_displacement_round_a_tilted_box_is_its_edge() {
     assert_eq!(found, &[1.5 * 1.5 + 36.0, 9.5 * 9.5 + 4.0 + 49.0]);
 }
 
-/// Square displacements of 1, 2, 3, 4 at half a unit of time each: D is their slope 2 over 2d.
+/// Mean square displacements of 1, 2, 3, 4 at intervals of half a time unit: D is their slope 2 over 2d.
 #[test]
 fn diffusion_knows_how_many_directions_there_are() {
     let cases: [(&str, &[f64], f64); 2] = [(FLAT, &[6.0, 6.0], 2.0), (IDEAL, &[6.0, 6.0, 6.0], 3.0)];
@@ -160,7 +161,7 @@ fn diffusion_knows_how_many_directions_there_are() {
     }
 }
 
-/// Soft spheres in a row, the middle one frozen: `F = a (1 − r)` and `∇²U = a − 2a (1 − r)/r` of those at the ends alone.
+/// Soft spheres in a row, the middle one frozen: `F = a (1 − r)` and `∇²U = a − 2a (1 − r)/r` of the end particles alone.
 #[test]
 fn the_configurational_temperature_leaves_frozen_particles_out() {
     let x = [[1.0, 2.0, 2.0], [1.8, 2.0, 2.0], [2.7, 2.0, 2.0]];
@@ -173,7 +174,7 @@ fn the_configurational_temperature_leaves_frozen_particles_out() {
     assert!((found - expected).abs() < 1e-9, "{found} {expected}");
 }
 
-/// Pairs a hundredth nearer than the distance are of one cluster, those a hundredth farther are not.
+/// Pairs a hundredth closer than the distance are of one cluster, pairs a hundredth farther are not.
 #[test]
 fn clusters_have_the_distance_that_they_are_given() {
     let x = [[1.0, 1.0, 1.0], [1.792, 1.0, 1.0], [3.0, 3.0, 3.0], [3.0, 3.808, 3.0]];
@@ -183,9 +184,10 @@ fn clusters_have_the_distance_that_they_are_given() {
     assert_eq!((value(&out[0], "count"), value(&out[0], "largest")), (3.0, 2.0));
 }
 
-/// The density of a slab is that of its plateau, as the middle of the profile shows it: they have the samples of the middle
-/// in common, so that the difference has about the error of the plateau, and three of them are exceeded by chance once in
-/// 400 seeds. The tanh fit, which has the layers in it, is farther off. The seed is fixed.
+/// The liquid density of a slab is the density of its plateau, which is the middle of the profile. Both
+/// values share the samples of the middle, so that their difference has about the error of the plateau; three
+/// standard errors are exceeded by chance once in 400 seeds. The tanh fit includes the interfaces and
+/// deviates more. The seed is fixed.
 #[test]
 fn the_density_of_a_slab_is_that_of_its_middle() {
     let text = "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 5\nbox = [6.0, 6.0, 14.0]\ndt = 0.01\nequilibrate = 500\n\
@@ -208,13 +210,13 @@ fn the_density_of_a_slab_is_that_of_its_middle() {
     assert!(fit.liquid - middle > 4.0 * liquid.error, "{fit:?} {middle} {liquid:?}");
 }
 
-/// Of a pair of soft spheres the pressure of configurations is NkT/V + r F/(3V), whatever their velocities are.
+/// The configurational pressure of a pair of soft spheres is NkT/V + r F/(3V), whatever their velocities.
 #[test]
 fn the_pressure_of_configurations_leaves_velocities_out() {
     let x = [[1.0, 2.0, 2.0], [1.8, 2.0, 2.0]];
     let mut shown = Shown::new(SOFT, 1.5, &[4.0, 4.0, 5.0], &x, "pressure = true");
     let flux = Flux::default();
-    // ½ Σ m v² = 7 makes 14/V of the trace, and the virial is r F = 0.8 · 25 · 0.2.
+    // `½ Σ m v² = 7` adds 14/V to the trace, and the virial is r F = 0.8 · 25 · 0.2.
     let part = (14.0 / 3.0 + 4.0 / 3.0) / 80.0;
     let conservative = [part, part, part, 0.0, 0.0, 0.0];
     shown.sample(|view| View {

@@ -13,7 +13,7 @@ use rand::{SeedableRng, rngs::StdRng};
 use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::TAU;
 
-/// The cells of a plane hold all particles, each in the cell it is in.
+/// The cells of a plane hold all particles, each in its own cell.
 #[test]
 fn every_particle_is_in_its_cell() {
     let observe = "[observe.density_field]\nbins = [4, 5]\nevery = 100\nstages = [\"settle\"]\n";
@@ -37,7 +37,8 @@ fn every_particle_is_in_its_cell() {
     }
 }
 
-/// The parabola of a known viscosity with noise: within five errors, an alarm in 10^6; the seed is fixed.
+/// The parabola of a known viscosity with noise is fitted within five standard errors, a false alarm in 10^6;
+/// the seed is fixed.
 #[test]
 fn a_known_flow() {
     let observe = "[observe.poiseuille]\naxis = \"z\"\nflow = \"x\"\nacceleration = 0.1\nbins = 20\n";
@@ -68,7 +69,7 @@ fn scene_without() -> Result<crate::scene::Scene, FileError> {
     scene(IDEAL_MIXTURE, "[4.0, 4.0, 6.0]", 3.0, 10, "[observe]\npoiseuille = true\n")
 }
 
-/// A simple cubic lattice of 5³ in a box of 5³: S = N at multiples of 2π, 0 elsewhere.
+/// A simple cubic lattice of 5³ sites in a box of 5³ has S = N at multiples of 2π and 0 elsewhere.
 #[test]
 fn of_a_lattice() {
     let observe = "[observe.structure_factor]\nrange = 14.0\nbins = 2000\nvectors = 10000\n";
@@ -89,7 +90,7 @@ fn of_a_lattice() {
         assert!((s[shell] - expected).abs() < 1e-9, "{shell}: {} {expected}", s[shell]);
         peaks += bragg;
     }
-    // ±(1,0,0), (1,1,0), (1,1,1), (2,0,0) and so on within 14/2π = 2.23: half of 6 + 12 + 8 + 6 + 24 - ...
+    // Wave vectors ±(1,0,0), (1,1,0), (1,1,1), (2,0,0) and so on within 14/2π = 2.23: half of 6 + 12 + 8 + 6 + 24 - ...
     let within = (-3i32..=3)
         .flat_map(|x| (-3i32..=3).flat_map(move |y| (-3i32..=3).map(move |z| x * x + y * y + z * z)))
         .filter(|q| *q > 0 && f64::from(*q).sqrt() * TAU <= 14.0)
@@ -97,8 +98,8 @@ fn of_a_lattice() {
     assert_eq!(2 * peaks, within);
 }
 
-/// On a slab whose faces point any way: half the difference of the energies over the change of the
-/// area is the virial part of the stress tension, to second order in the perturbation.
+/// For a slab of any orientation, half the difference of the energies over the change of the area is the
+/// virial part of the stress tension, to second order in the perturbation.
 #[test]
 fn stretching_and_stress_agree_on_every_configuration() {
     let scene = scene(SET6, "[3.0, 3.5, 9.0]", 2.5, 10, "").unwrap();
@@ -112,7 +113,7 @@ fn stretching_and_stress_agree_on_every_configuration() {
     let virial = frame.evaluation().virial;
     for axis in 0..3 {
         let others: f64 = (0..3).filter(|c| *c != axis).map(|c| virial[c]).sum();
-        // dU/d ln A, from ∂U/∂ε_cc = −W_cc.
+        // The derivative dU/d ln A follows from ∂U/∂ε_cc = −W_cc.
         let expected = virial[axis] - 0.5 * others;
         let change =
             |h: f64| (stretched_energy(&frame, axis, h) - stretched_energy(&frame, axis, -h)) / (2.0 * h);

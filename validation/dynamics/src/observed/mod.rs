@@ -14,7 +14,7 @@ mod balance;
 mod known;
 mod meters;
 
-/// Two species with a density, for keys.
+/// Two species with a density, for tests of keys.
 const MIXTURE: &str = r#"
 title = "mixture"
 species = ["A", "B"]
@@ -26,7 +26,7 @@ A = "0.5*n^2"
 B = "0.5*n^2"
 "#;
 
-/// A scene of one stage, `steps` of it at `dt` = 0.01.
+/// A scene with one stage of `steps` steps at `dt` = 0.01.
 pub(super) fn scene(
     model: &str,
     lengths: &str,
@@ -47,7 +47,6 @@ fn observers(scene: &Scene) -> Observers {
     Observers::new(&scene.observe, scene.stages.iter().map(|s| s.name.as_str()))
 }
 
-/// Runs a scene without files.
 pub(super) fn run(scene: &Scene) -> (Simulation, Vec<Observation>) {
     let mut simulation = Simulation::new(&scene.model, scene.kt, scene.initial_state(), scene.seed).unwrap();
     let mut observers = observers(scene);
@@ -76,7 +75,7 @@ fn every_key_is_read_and_no_other() {
             let example = key.example.replace("produce", "run");
             let mut observe = format!("[observe.{}]\n{} = {example}\n", table.path, key.name);
             if table.path == "poiseuille" {
-                // Without a body force in the scene it needs three keys.
+                // Without a body force in the scene, `poiseuille` needs three keys.
                 for other in table.keys.iter().filter(|k| k.name != "bins" && k.name != key.name) {
                     observe += &format!("{} = {}\n", other.name, other.example);
                 }
@@ -113,11 +112,12 @@ fn errors_name_line_key_and_cause() {
     }
 }
 
-/// Temperatures, pressures and energies of a liquid: thermostatted, both temperatures are kT; the parts of
-/// the energy add up to that of the engine. Within five errors, of which one in 10^6 is exceeded by chance,
-/// and the bias of the time step, which at 0.01 is a few thousandths in the kinetic temperature and 2 % in the
-/// configurational one. Pressures are those of 30 000 steps at this density, −1.35(3) without and −0.95(6) with drag and noise, which
-/// velocity Verlet's half-step velocities make differ; Monte Carlo has −1.45 without a time step.
+/// Temperatures, pressures and energies of a liquid. With a thermostat both temperatures are kT, and the
+/// parts of the energy add up to the engine's energy. Limits are five standard errors, of which one in 10^6
+/// is exceeded by chance, and the bias of the time step, which at 0.01 is a few thousandths in the kinetic
+/// temperature and 2 % in the configurational one. Pressures are those of 30 000 steps at this density,
+/// −1.35(3) without and −0.95(6) with drag and noise; the two differ because of velocity Verlet's half-step
+/// velocities. Monte Carlo has −1.45 without a time step.
 #[test]
 fn a_liquid_in_equilibrium() {
     let scene = scene(
@@ -143,7 +143,7 @@ fn a_liquid_in_equilibrium() {
     let energy = find(&all, "energy");
     let parts: f64 = ["kinetic", "psi_F", "phi_1_F_F"].iter().map(|n| energy.scalar(n).unwrap().value).sum();
     assert!((parts - energy.scalar("total").unwrap().value).abs() < 1e-10);
-    // One frame against the engine.
+    // One frame is compared with the engine.
     simulation.prepare(0.01, Want::TOTALS).unwrap();
     let fluid = Evaluator::new(simulation.model().at(1.0).unwrap()).unwrap();
     let frame = frame::Frame::new(simulation.view(0.0), &fluid);
@@ -153,9 +153,10 @@ fn a_liquid_in_equilibrium() {
     }
 }
 
-/// A slab of liquid: the profile of the pressure tensor integrates to that of the box sample by sample. Both routes to the
-/// tension agree within five errors, as if they were independent, and so do tension, width and density with those of 60 000
-/// steps: 7.55(6), 0.338(4), 6.0726(9). Each of the four is exceeded by chance once in 10^6. The seed is fixed.
+/// A slab of liquid: the profile of the pressure tensor integrates to the tensor of the box, sample by
+/// sample. Both routes to the tension agree within five standard errors, as if they were independent. So do
+/// tension, width and density with their values from 60 000 steps: 7.55(6), 0.338(4), 6.0726(9). Each of the
+/// four limits is exceeded by chance once in 10^6. The seed is fixed.
 #[test]
 fn a_slab_of_liquid() {
     let observe = "[observe]\nstress_profile = true\nsurface_tension = true\ninterface_width = true\n\
@@ -196,7 +197,7 @@ fn a_slab_of_liquid() {
     let (w, liquid) = (width.scalar("width").unwrap(), width.scalar("liquid").unwrap());
     assert!((w.value - 0.338).abs() < 5.0 * w.error.hypot(0.004) && w.error < 0.015, "{w:?}");
     assert!((liquid.value - 6.0726).abs() < 5.0 * liquid.error && liquid.error < 0.01, "{liquid:?}");
-    // The steepest of the differences of bins 0.2 apart is that of a tanh profile of this width.
+    // The steepest difference of bins 0.2 apart is that of a tanh profile of this width.
     let rho = &density.get("density").unwrap().values;
     let steepest = rho.windows(3).map(|r| (r[2] - r[0]).abs() / 0.2).fold(0.0, f64::max);
     let expected = liquid.value / 0.2 * (0.2 / w.value).tanh();
@@ -206,7 +207,7 @@ fn a_slab_of_liquid() {
     assert!((middle - 1.0).abs() < 0.02, "{middle}");
 }
 
-/// Profiles of an ideal gas whose species and velocities are put by hand.
+/// Profiles of an ideal gas with species and velocities set by hand.
 #[test]
 fn profiles_of_a_known_flow() {
     let observe = "[observe]\nevery = 1\nstages = [\"settle\"]\nvelocity_profile = true\ntemperature_profile = true\n\
@@ -230,14 +231,14 @@ fn profiles_of_a_known_flow() {
     let x = &velocity.get("velocity_x").unwrap().values;
     let filled = z.iter().zip(x).filter(|(_, v)| v.is_finite());
     assert!(filled.clone().count() >= 10);
-    // A layer of the lattice has one velocity and as many + as −, but for one particle.
+    // Each layer of the lattice has one velocity and as many + as −, but for one particle.
     assert!(filled.clone().all(|(z, v)| (v - (std::f64::consts::TAU * z / 5.0).sin()).abs() < 0.1));
     let composition = find(&all, "composition_profile");
     let a = &composition.get("fraction_A").unwrap().values;
     assert!(
         a[..25].iter().all(|f| f.is_nan() || *f == 1.0) && a[25..].iter().all(|f| f.is_nan() || *f == 0.0)
     );
-    // About the flow the temperature is m (1/2)² in one of three directions.
+    // Relative to the flow the temperature is m (1/2)² in one of three directions.
     let t = &find(&all, "temperature_profile").get("temperature").unwrap().values;
     assert!(t.iter().all(|t| t.is_nan() || (t - 0.25 / 3.0).abs() < 2e-3), "{t:?}");
     let density = find(&all, "density_profile");
@@ -246,7 +247,7 @@ fn profiles_of_a_known_flow() {
     assert!((sum / 4.0 - n as f64 / 80.0).abs() < 1e-12);
 }
 
-/// Two layers that fill the box drift through it: centred on one of them their profile is that of a frame.
+/// Two layers that fill the box drift through it; a profile centred on one of them is that of a single frame.
 #[test]
 fn layers_that_drift_are_centred_on_a_species() {
     let observe = "[observe]\nevery = 1\nstages = [\"settle\"]\ncomposition_profile = { bins = 20, recentre = \"B\" }\n";
@@ -268,7 +269,7 @@ fn layers_that_drift_are_centred_on_a_species() {
     let profile = find(&all, "composition_profile");
     assert_eq!(profile.note, "Samples are centred on one species.");
     let b = &profile.get("fraction_B").unwrap().values;
-    // Layers of the lattice are 0.37 apart, three halves of a bin.
+    // Layers of the lattice are 0.37 apart, one and a half bins.
     for (k, f) in b.iter().enumerate().filter(|(_, f)| f.is_finite()) {
         let depth = (k as f64 - 9.5).abs();
         assert!(if depth < 4.0 { *f == 1.0 } else { depth < 6.0 || *f == 0.0 }, "{k}: {f}");
@@ -277,10 +278,11 @@ fn layers_that_drift_are_centred_on_a_species() {
     assert!(wrong.contains('C') && wrong.contains("species"), "{wrong}");
 }
 
-/// Partial g and S of an ideal gas are 1, between unlike species S is 0: each of some 230 values within 5.5 of its
-/// errors, and their squares on average within what independent shells have. From 200 samples an error is known to
-/// 5 %, and 5 of them are exceeded by chance once in 10^6: a false alarm in 4000 seeds. The mean of nine squares, as of
-/// χ² with nine degrees of freedom, is above 3.8 or below 0.05 for one seed in 10^4. The seed is fixed.
+/// The partial g and S of an ideal gas are 1; S of unlike species is 0. Each of some 230 values lies within
+/// 5.5 standard errors, and the mean of their squares is that of independent shells. From 200 samples an
+/// error is known to 5 %, and 5 of them are exceeded by chance once in 10^6: a false alarm in 4000 seeds. The
+/// mean of nine squares, as of χ² with nine degrees of freedom, is above 3.8 or below 0.05 for one seed in
+/// 10^4. The seed is fixed.
 #[test]
 fn an_ideal_gas_has_no_structure() {
     let observe = "[observe]\nevery = 20\n[observe.rdf]\nbins = 50\nrange = 2.0\n\
@@ -297,7 +299,7 @@ fn an_ideal_gas_has_no_structure() {
             let c = out.get(column).unwrap();
             let mut chi = 0.0;
             for (v, e) in c.values.iter().zip(&c.errors) {
-                // No pair at all in the smallest shells: Poisson's probability of that is not small.
+                // The smallest shells may have no pair: Poisson's probability of that is not small.
                 if *e == 0.0 {
                     continue;
                 }
@@ -310,10 +312,10 @@ fn an_ideal_gas_has_no_structure() {
     }
 }
 
-/// A small drop of Warren's liquid. Its radius is that of a sphere with as many particles at the density of its liquid, which is
-/// that of the plane, 6.06, and of 2γ/R over ∂p/∂ρ = 48 more. A tanh profile of width 2d has 5π²d²/(24R) more of the radius
-/// of gyration. The tension is Warren's for the plane. Five errors are exceeded by chance once in 10^6 each. And what
-/// is local: ⟨n⟩/ρ is [w g] but for the width of the shells.
+/// A small drop of Warren's liquid. Its radius is that of a sphere with as many particles at the density of its
+/// liquid: 6.06 as in the plane, and more by 2γ/R over ∂p/∂ρ = 48. A tanh profile of width 2d adds 5π²d²/(24R)
+/// to the radius of gyration. The tension is Warren's for the plane. Each limit of five standard errors is
+/// exceeded by chance once in 10^6. The mean local density ⟨n⟩/ρ is [w g], but for the width of the shells.
 #[test]
 fn a_drop_of_liquid() {
     let text = "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7\n[box]\nlengths = [11.0, 11.0, 11.0]\n\
@@ -322,7 +324,7 @@ fn a_drop_of_liquid() {
          [observe]\ndrop = true\nclusters = true\nlocal_density = true\nmsd = true\n";
     let scene = test_support::scene(SET6, text).unwrap();
     let mut state = scene.initial_state();
-    // A ball in a corner of the box: it goes through all of its faces.
+    // The drop lies in a corner of the box, so it crosses all faces.
     let side = (700.0f64 / 6.05).cbrt();
     for x in &mut state.x {
         *x = x.map(|c| (c / 11.0 - 0.5) * side);
@@ -363,7 +365,7 @@ fn a_drop_of_liquid() {
     assert!(find(&all, "diffusion").scalar("diffusion").unwrap().value > 0.0);
 }
 
-/// The checkpoint of a run in the middle: the rest of the run ends with the same bits.
+/// A run resumed from a checkpoint in its middle ends with the same bits.
 #[test]
 fn a_run_that_goes_on_ends_the_same() {
     let mut observe = String::from("[observe]\nevery = 3\nstages = [\"settle\", \"run\"]\n");
@@ -398,7 +400,8 @@ fn a_run_that_goes_on_ends_the_same() {
     assert!(whole.finish().iter().any(|o| o.stage == "settle"));
 }
 
-/// A run writes what it measured, as JSON and tables; the same scene the same bytes; no scene without `[observe]`.
+/// A run writes its measurements as JSON and tables; the same scene writes the same bytes; a scene without
+/// `[observe]` writes none.
 #[test]
 fn a_run_writes_what_it_measured() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,31 +1,30 @@
-//! Accelerations that act on particles one by one.
+//! Accelerations of single particles.
 
 use super::tags::Tags;
 use psidpd_core::engine::{PeriodicBox, Pool, part};
 use psidpd_observe::Drive;
 
-/// A constant acceleration of some of the particles, as gravity; or one that is reversed in the upper half of
-/// the box along some direction, which drives two opposite Poiseuille flows (Backer et al., J. Chem. Phys.
-/// 122, 154503 (2005)).
+/// A constant acceleration of some of the particles, as by gravity. Reversed in the upper half of the box along
+/// one direction, it drives two opposite Poiseuille flows (Backer et al., J. Chem. Phys. 122, 154503 (2005)).
 #[derive(Debug, Clone, PartialEq)]
 pub struct BodyForce {
-    /// The acceleration; the force is the mass times this.
+    /// The acceleration; the force is the mass times the acceleration.
     pub acceleration: [f64; 3],
-    /// Direction along which the second half of the box has the opposite acceleration.
+    /// Direction along which the upper half of the box has the opposite acceleration.
     pub reversed_along: Option<usize>,
-    /// The species it acts on; empty for all.
+    /// The species it acts on; empty for all species.
     pub species: Vec<i32>,
-    /// The particles it acts on, of these species.
+    /// The particles of these species that it acts on.
     pub tags: Tags,
 }
 
 impl BodyForce {
-    /// Whether it acts on a particle.
+    /// Whether the body force acts on a particle.
     pub fn acts_on(&self, species: i32, tag: i32) -> bool {
         (self.species.is_empty() || self.species.contains(&species)) && self.tags.contain(tag)
     }
 
-    /// What it drives, if it is reversed, along one direction and acts on every particle.
+    /// The flow that the force drives, if it is reversed, along one direction and acts on every particle.
     pub fn drive(&self) -> Option<Drive> {
         let across = self.reversed_along?;
         let mut directions = (0..3).filter(|k| self.acceleration[*k] != 0.0);
@@ -34,7 +33,7 @@ impl BodyForce {
         all.then_some(Drive { across, along, acceleration: self.acceleration[along] })
     }
 
-    /// The acceleration at `x`, which lies in the box.
+    /// The acceleration at the point `x` in the box.
     pub fn at(&self, domain: &PeriodicBox, x: [f64; 3]) -> [f64; 3] {
         match self.reversed_along {
             Some(k) if domain.fraction(x)[k] >= 0.5 => self.acceleration.map(|a| -a),
@@ -43,7 +42,7 @@ impl BodyForce {
     }
 }
 
-/// Adds the forces of `bodies` on all particles; `on` computes the force of one of them on one particle.
+/// Adds the forces of `bodies` to `force`; `on` computes the force of one body on one particle.
 pub fn add<F>(bodies: &[BodyForce], pool: &Pool, force: &mut [[f64; 3]], on: F)
 where
     F: Fn(&BodyForce, usize) -> Option<[f64; 3]> + Sync,
@@ -73,7 +72,7 @@ mod tests {
     use crate::test_support::{self, IDEAL_MIXTURE};
     use psidpd_core::engine::Want;
 
-    /// A scene of two species without forces between particles, and what it starts from.
+    /// A scene of two species without pair forces, and its initial state.
     fn scene(rest: &str) -> (Scene, State) {
         let text = format!(
             "model = \"m.toml\"\nkT = 1.0\nbox = [6, 6, 8]\ndensity = 3\nsteps = 1\n{rest}\n[masses]\nB = 3.0\n"
@@ -94,7 +93,7 @@ mod tests {
         run
     }
 
-    /// Species of any mass fall alike, and those that no force is for do not.
+    /// Species of any mass fall alike, and species without a body force do not fall.
     #[test]
     fn gravity_is_an_acceleration() {
         let both = "[[body_force]]\nacceleration = [0, 0, -2]\n[[body_force]]\nacceleration = [1, 0, 0]\nspecies = [\"B\"]\n";
@@ -108,8 +107,7 @@ mod tests {
         assert!(run.tally().virial.iter().all(|w| *w == 0.0));
     }
 
-    /// Opposite accelerations in the two halves keep the momentum of each instant near its share of particles,
-    /// and drive the halves apart.
+    /// Opposite accelerations of the two halves drive them apart.
     #[test]
     fn halves_go_opposite_ways() {
         let (scene, state) = scene("[[body_force]]\nacceleration = [5, 0, 0]\nreversed_along = \"z\"\n");
@@ -119,7 +117,7 @@ mod tests {
             let v: Vec<f64> = of.map(|k| run.velocities()[k][0]).collect();
             v.iter().sum::<f64>() / v.len() as f64
         };
-        // Without viscosity 2 and -2; thermal velocities give the mean of 430 particles an error of 0.04.
+        // Without viscosity the means are 2 and -2; thermal velocities give the mean of 430 particles an error of 0.04.
         assert!(mean(false) > 0.5 && mean(true) < -0.5, "{} {}", mean(false), mean(true));
     }
 }

@@ -1,4 +1,4 @@
-//! A box as its origin, its edges and its directions, for serde. The rest of it follows from these by the
+//! Serialises a box as its origin, edges and periodic directions. All other fields follow from these by the
 //! same operations, hence with the same bits.
 
 use nalgebra::Matrix3;

@@ -1,4 +1,4 @@
-//! States as LAMMPS data files, to go on from, in either code.
+//! States as LAMMPS data files, from which psidpd and LAMMPS can both start.
 
 use super::state::State;
 use super::tags::order_of_tags;
@@ -9,13 +9,12 @@ use psidpd_formats::FormatError;
 use psidpd_formats::data::{Atom, DataFile};
 use std::path::Path;
 
-/// Particles that are no valid state of a model.
+/// The error of particles that are no valid state of a model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("the initial state is not usable: {message}")]
 pub struct StateError {
-    /// What is wrong.
     pub message: String,
-    /// The atom that is wrong, by its id, if it is one.
+    /// The id of the faulty atom, if the fault is in one.
     pub atom: Option<u32>,
 }
 
@@ -26,13 +25,13 @@ impl StateError {
 }
 
 impl State {
-    /// The state as a data file of atom style `atomic`: types are species from 1; `title` becomes the
-    /// first line, and tells walls, which data files do not know.
+    /// Converts the state to a data file of atom style `atomic`. Types are species from 1; `title` becomes
+    /// the first line, to which walls are added, because data files have no key for them.
     pub fn to_data(&self, title: &str) -> DataFile {
         self.to_data_in(0..self.len(), title)
     }
 
-    /// The same with the particles in the order of their tags.
+    /// As [`State::to_data`], with the particles in the order of their tags.
     pub fn to_data_by_tag(&self, title: &str) -> DataFile {
         self.to_data_in(order_of_tags(&self.tag).into_iter(), title)
     }
@@ -60,28 +59,25 @@ impl State {
                 .collect(),
             velocities: Some(order.map(|k| self.v[k]).collect()),
         };
-        // Nothing repeats across the plane of two dimensions, which is no wall.
+        // The third direction of a plane has no images, but no wall either.
         let periodic = self.domain.periodic();
         let is_flat = self.x.iter().all(|x| x[2] == self.x[0][2]);
         let walls = !periodic[0] || !periodic[1] || !periodic[2] && !is_flat;
         if walls { data.with_boundary(periodic) } else { data }
     }
 
-    /// The state of a data file, in a box with the walls that its title tells, and else periodic in every direction of the
-    /// model; see [`State::from_data_in`].
-    ///
-    /// # Errors
-    /// As [`State::from_data_in`].
+    /// Converts a data file to a state. Walls come from its title; all other directions of the model are
+    /// periodic. See [`State::from_data_in`].
     pub fn from_data(data: &DataFile, model: &Model) -> Result<State, StateError> {
         State::from_data_in(data, model, data.boundary().unwrap_or([true, true, model.dimensions() == 3]))
     }
 
-    /// The state of a data file, in a box periodic in some directions; particles outside are put inside along
-    /// these. Types are species from 1. Masses not given are 1, velocities not given are 0.
+    /// Converts a data file to a state in a box with the given periodic directions; particles outside are
+    /// wrapped along these. Types are species from 1. Missing masses are 1, missing velocities are 0.
     ///
     /// # Errors
-    /// A type that the model has no species for, a tag beyond what LAMMPS counts, a box without volume, walls
-    /// of a box with tilt.
+    /// A type is not a species of the model, a tag is larger than LAMMPS can count, the box has no volume, or
+    /// a tilted box has walls.
     pub fn from_data_in(data: &DataFile, model: &Model, periodic: [bool; 3]) -> Result<State, StateError> {
         let species = model.species().len();
         let [xy, xz, yz] = data.tilt.unwrap_or([0.0; 3]);
@@ -120,7 +116,7 @@ impl State {
                 return Err(StateError { message, atom: Some(atom.id) });
             }
             let tag = i32::try_from(atom.id).map_err(|_| {
-                let message = format!("atom id {} is beyond what tags can count", atom.id);
+                let message = format!("atom id {} exceeds the largest tag, 2147483647", atom.id);
                 StateError { message, atom: Some(atom.id) }
             })?;
             let (mut x, mut image) = (atom.x, atom.image);
@@ -134,10 +130,7 @@ impl State {
     }
 }
 
-/// Writes `state` as a data file, by tags, with enough digits to restore the exact values.
-///
-/// # Errors
-/// The file cannot be written.
+/// Writes `state` as a data file in the order of tags, with enough digits to restore the exact values.
 pub fn write_data(path: &Path, title: &str, state: &State, species: &[String]) -> Result<(), FormatError> {
     DataFile { names: species.to_vec(), ..state.to_data_by_tag(title) }.write(path)
 }

@@ -1,4 +1,4 @@
-//! Particles, and what acts on some of them: the ground that scenes, runs and files stand on.
+//! Particles and body forces, which scenes, runs and files build on.
 
 mod body_force;
 mod box_by_edges;

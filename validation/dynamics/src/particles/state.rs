@@ -2,28 +2,25 @@ use super::box_by_edges;
 use psidpd_core::engine::PeriodicBox;
 use serde::{Deserialize, Serialize};
 
-/// Particles in their box: all that a trajectory starts from, and all that it leaves.
+/// The particles in their box: all that a trajectory starts from and ends with.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct State {
-    /// The box. In two dimensions its third edge is a unit, and nothing depends on it.
+    /// The box. In two dimensions its third edge has length 1, and nothing depends on it.
     #[serde(with = "box_by_edges")]
     pub domain: PeriodicBox,
-    /// Mass of each species, in the order of the model.
     pub mass: Vec<f64>,
-    /// Positions.
     pub x: Vec<[f64; 3]>,
-    /// Velocities.
     pub v: Vec<[f64; 3]>,
-    /// Species, from 0, in the order of the model.
+    /// Species indices from 0, in the order of the model.
     pub species: Vec<i32>,
-    /// Numbers that stay with the particles, from 1, each once.
+    /// Unique numbers from 1 that stay with the particles.
     pub tag: Vec<i32>,
-    /// How many boxes a particle has travelled in each direction.
+    /// Number of box edges that a particle has travelled in each direction.
     pub image: Vec<[i32; 3]>,
 }
 
 impl State {
-    /// Particles of the first species at rest at `x`, with tags from 1; `mass` is that of each species.
+    /// Particles of the first species at rest at `x`, with tags from 1; `mass` has one entry per species.
     pub fn at_rest(domain: PeriodicBox, mass: Vec<f64>, x: Vec<[f64; 3]>) -> State {
         let count = x.len();
         State {
@@ -37,17 +34,15 @@ impl State {
         }
     }
 
-    /// How many particles there are.
     pub fn len(&self) -> usize {
         self.x.len()
     }
 
-    /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.x.is_empty()
     }
 
-    /// Takes over all particles of `other`, which is of the same box and masses, and keeps the memory.
+    /// Copies all particles of `other`, which has the same box and masses, and reuses the memory.
     pub fn copy_particles(&mut self, other: &State) {
         self.x.clone_from(&other.x);
         self.v.clone_from(&other.v);
@@ -56,14 +51,14 @@ impl State {
         self.image.clone_from(&other.image);
     }
 
-    /// The first thing that makes this no state of a model with `species` species.
+    /// Describes the first fault that makes this an invalid state of a model with `species` species.
     pub fn fault(&self, species: usize, dimensions: usize) -> Option<String> {
         let count = self.x.len();
         if count == 0 {
             return Some("there are no particles".into());
         }
         if count > i32::MAX as usize {
-            return Some(format!("{count} particles are more than tags can number"));
+            return Some(format!("{count} particles are more than the largest tag, 2147483647"));
         }
         if [self.v.len(), self.species.len(), self.tag.len(), self.image.len()].iter().any(|n| *n != count) {
             return Some("particle arrays have different lengths".into());
@@ -95,7 +90,7 @@ impl State {
         tags.windows(2).find(|w| w[0] == w[1]).map(|w| format!("tag {} is given twice", w[0]))
     }
 
-    /// Whether a point is inside, along the directions that are not periodic.
+    /// Whether a point lies between the walls of all directions that are not periodic.
     fn is_between_walls(&self, x: [f64; 3], dimensions: usize) -> bool {
         let (origin, lengths) = (self.domain.origin(), self.domain.lengths());
         (0..dimensions)

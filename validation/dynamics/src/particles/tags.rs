@@ -1,29 +1,25 @@
 use std::ops::RangeInclusive;
 
-/// The particles in the order of their tags, which files have them in.
+/// Indices of the particles in the order of their tags, which files use.
 pub fn order_of_tags(tags: &[i32]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..tags.len()).collect();
     order.sort_unstable_by_key(|k| tags[*k]);
     order
 }
 
-/// A set of particles, by their tags.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum Tags {
-    /// Every particle.
     #[default]
     All,
-    /// Those of these ranges.
+    /// The particles whose tags lie in these ranges.
     Ranges(Vec<RangeInclusive<i32>>),
 }
 
 impl Tags {
-    /// No particle.
     pub fn none() -> Tags {
         Tags::Ranges(Vec::new())
     }
 
-    /// Whether a tag is in the set.
     pub fn contain(&self, tag: i32) -> bool {
         match self {
             Tags::All => true,
@@ -31,7 +27,6 @@ impl Tags {
         }
     }
 
-    /// Whether no tag can be in the set.
     pub fn is_empty(&self) -> bool {
         matches!(self, Tags::Ranges(ranges) if ranges.iter().all(RangeInclusive::is_empty))
     }
@@ -44,7 +39,7 @@ mod tests {
     use crate::test_support::{SOFT, scene};
     use psidpd_core::engine::Want;
 
-    /// A frozen floor below a fluid, with a lid that reflects.
+    /// A frozen floor below a fluid, and a reflecting lid.
     const SCENE: &str = "model = \"m.toml\"\nkT = 1.0\ndensity = 3\nsteps = 1\n\
         [box]\nlengths = [5, 5, 7]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]\n\
         [[part]]\nshape = \"layer\"\nface = \"zlo\"\nthickness = 1\nlattice = \"fcc\"\nfrozen = true\n\
@@ -73,11 +68,11 @@ mod tests {
                 assert_eq!(rests, run.frozen()[k], "{k}");
             }
             assert_eq!(run.degrees_of_freedom(), 3 * 450);
-            // The fluid, of pressure about 23.7 and 25 units of area, presses the floor down.
+            // The fluid presses the floor down; its pressure is about 23.7 and the area is 25.
             let force = run.support_force();
             assert!(force[2] < -300.0, "{force:?}");
         }
-        // The forces on the fluid are those of particles that are all there.
+        // The forces on the fluid equal those without frozen particles.
         let mut free = scene.simulation(state.clone()).unwrap();
         free.set_frozen(&Tags::none());
         let mut run = scene.simulation(state).unwrap();
@@ -89,9 +84,10 @@ mod tests {
         assert!(run.forces()[..75].iter().all(|f| *f == [0.0; 3]));
     }
 
-    /// The mean of 1500 steps of 1350 degrees of freedom, correlated over less than 50 steps: a standard error
-    /// below 0.008. Six of them, and as much for the bias of the time step, fail by chance less than once in
-    /// 10^8; the seed is fixed. Counted over all particles it would be 0.86.
+    /// The temperature is the mean of 1500 steps of 1350 degrees of freedom, correlated over less than 50
+    /// steps: its standard error is below 0.008. Six standard errors, and as much for the bias of the time
+    /// step, fail by chance less than once in 10^8; the seed is fixed. Counted over all particles the
+    /// temperature would be 0.86.
     #[test]
     fn the_temperature_is_that_of_what_moves() {
         let scene = scene(SOFT, SCENE).unwrap();

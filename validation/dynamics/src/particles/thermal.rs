@@ -1,8 +1,8 @@
 use chacha20::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// Velocities from Maxwell's distribution, of particles of the masses `mass`, with zero total momentum. They are not
-/// scaled: their temperature fluctuates as that of a canonical ensemble.
+/// Draws velocities of particles of masses `mass` from Maxwell's distribution, with zero total momentum. The
+/// velocities are not scaled: their temperature fluctuates as that of a canonical ensemble.
 pub fn thermal_velocities(
     mass: impl Iterator<Item = f64>,
     kt: f64,
@@ -12,7 +12,7 @@ pub fn thermal_velocities(
     maxwell(mass, kt, dimensions, [true; 3], random)
 }
 
-/// The same, with zero total momentum in the `conserved` directions only.
+/// As [`thermal_velocities`], with zero total momentum in the `conserved` directions only.
 pub fn maxwell(
     mass: impl Iterator<Item = f64>,
     kt: f64,

@@ -1,11 +1,10 @@
-//! The description of a run, for its folder.
+//! The description of a run in `about.json`.
 
 use crate::prediction;
 use crate::scene::Scene;
 use psidpd_formats::about::{Column, THERMO, UNITS};
 use psidpd_formats::{About, AboutDensity, AboutStage};
 
-/// The description of a scene.
 pub fn about(scene: &Scene) -> About {
     let mut begin = 0;
     let stages = scene.stages.iter().map(|s| {
@@ -23,7 +22,7 @@ pub fn about(scene: &Scene) -> About {
     });
     let stages: Vec<AboutStage> = stages.collect();
     let [x, y, z] = scene.domain.periodic();
-    // Reading the scene has checked the model at this temperature.
+    // Reading the scene has checked the model at this temperature, so the default is never used.
     let densities = scene.model.at(scene.kt).map(|f| f.densities).unwrap_or_default();
     About {
         program: format!("psidpd {}", env!("CARGO_PKG_VERSION")),

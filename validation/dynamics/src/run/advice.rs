@@ -1,4 +1,4 @@
-//! What a better step than velocity Verlet would save.
+//! Advice about an integrator with larger steps than velocity Verlet.
 
 use super::simulation::Simulation;
 use crate::integrator::{Coupling, Integrator};
@@ -9,53 +9,52 @@ use psidpd_observe::frame::Frame;
 use serde::Serialize;
 use std::fmt;
 
-/// The step that is advised: λ that wins in liquids whose forces have kinks, the thermostat at every second step.
+/// The recommended step: its λ is the best in liquids whose forces have kinks; the thermostat acts at every second step.
 const ADVISED: Integrator = Integrator::ForceGradient {
     lambda: 0.17,
     gradient: 1.0 / 24.0,
     coupling: Coupling { every: 2, ..Coupling::DEFAULT },
 };
 
-/// Steps of velocity Verlet that take the time of one of these: three evaluations of forces, half a thermostat.
+/// Cost of a recommended step in steps of velocity Verlet: three evaluations of forces and half a thermostat.
 const PRICE: f64 = 4.5;
 
-/// Most particles whose pairs are kept for it.
+/// Largest number of particles for which the stiffness is computed, because the computation stores all pairs.
 const MOST: usize = 500_000;
 
-/// Errors above this are worth a line.
+/// Smallest relative error that deserves advice.
 const WORTH: f64 = 0.01;
 
-/// A better step for a stage of velocity Verlet, by estimates.
+/// Estimated errors and cost of a better step for a stage of velocity Verlet.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Advice {
-    /// Name of the stage.
     pub stage: String,
-    /// Its Δt.
+    /// The time step Δt of the stage.
     pub dt: f64,
-    /// Its errors: of the configurational temperature, and of the carried pressure in ρkT.
+    /// The errors of the stage: of the configurational temperature, and of the carried pressure in ρkT.
     pub errors: [f64; 2],
-    /// The Δt of the better step.
+    /// The time step Δt of the better step.
     pub better_dt: f64,
-    /// Its errors.
+    /// The errors of the better step, in the order of `errors`.
     pub better_errors: [f64; 2],
-    /// The time it takes, in that of the stage.
+    /// The wall time of the better step relative to that of the stage.
     pub time: f64,
 }
 
 impl Advice {
-    /// For a stage that has just ended, from the stiffness of the forces and the drag at its end; nothing where the step is good
-    /// enough or nothing is known of it.
+    /// Advice for a stage that has just ended, from the stiffness of the forces and the drag at its end;
+    /// `None` where the step is accurate enough or no estimate exists.
     pub fn of(simulation: &mut Simulation, stage: &Stage) -> Option<Advice> {
         if stage.integrator != Integrator::VelocityVerlet || !stage.thermostat {
             return None;
         }
-        // Beside frozen walls the better step is not understood, and a flow is hot by itself.
+        // The estimate does not hold beside frozen walls, and a driven flow is hot by itself.
         if simulation.has_body_forces() || !simulation.frozen().is_empty() {
             return None;
         }
         let drag = simulation.warmth(stage.dt).ok()??.rate;
         let frequency = frequency(simulation)?;
-        // Weak drag bears shorter steps only: what the step does not conserve has to be carried off.
+        // Weak drag needs shorter steps, because it removes little of the energy that the step does not conserve.
         let reach = (0.75 + 0.4 * drag / frequency).min(1.25);
         let better_dt = two_digits(reach / frequency);
         let errors = stage.integrator.properties().accuracy.errors(stage.dt, frequency, drag);
@@ -74,7 +73,7 @@ impl Advice {
     }
 }
 
-/// The root mean square frequency of the particles, if forces have a Laplacian.
+/// The root mean square frequency of the particles; `None` if the forces have no Laplacian.
 fn frequency(simulation: &Simulation) -> Option<f64> {
     let fluid = simulation.model().at(simulation.kt()).ok()?;
     if simulation.len() > MOST || configurational::missing(&fluid, simulation.domain()).is_some() {
@@ -107,7 +106,7 @@ impl fmt::Display for Advice {
     }
 }
 
-/// A positive number to two digits.
+/// Rounds a positive number to two digits.
 fn two_digits(x: f64) -> f64 {
     format!("{x:.1e}").parse().unwrap_or(x)
 }
@@ -129,8 +128,8 @@ mod tests {
         Advice::of(&mut run, &scene.stages[0])
     }
 
-    /// Warren's liquid has ω about 18 and κ about 22. At 0.01 the carried pressure was measured to be 17 % of ρkT off, and the better step
-    /// to be good at 0.07.
+    /// Warren's liquid has ω about 18 and κ about 22. Measurements at Δt = 0.01 gave an error of the carried
+    /// pressure of 17 % of ρkT, and good results of the better step at 0.07.
     #[test]
     fn a_better_step_is_named_where_there_is_one() {
         let found = advice("dt = 0.01\n").unwrap();

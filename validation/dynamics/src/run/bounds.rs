@@ -3,21 +3,21 @@
 use super::walls::Walls;
 use psidpd_core::engine::PeriodicBox;
 
-/// The inside of a box: along periodic directions, where [`PeriodicBox::wrap`] changes nothing; between
-/// walls, where nothing is reflected.
+/// The inside of a box: the coordinates that [`PeriodicBox::wrap`] does not change along periodic directions,
+/// and those between walls along the others.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Bounds {
-    /// The lowest and the highest coordinate inside. In a tilted box no coordinate is known to be inside.
+    /// The lowest and the highest coordinate inside. A tilted box has no such interval, so none of its
+    /// coordinates count as inside.
     pub low: [f64; 3],
     pub high: [f64; 3],
     pub walls: Walls,
 }
 
-/// Floating-point numbers below the upper face that are tried.
+/// Number of floating-point numbers below the upper face that are tried.
 const TRIES: usize = 64;
 
 impl Bounds {
-    /// Those of a box.
     pub fn of(domain: &PeriodicBox, dimensions: usize) -> Bounds {
         let walls = Walls::of(domain, dimensions);
         let mut bounds = Bounds { low: [f64::NEG_INFINITY; 3], high: [f64::INFINITY; 3], walls };
@@ -38,8 +38,8 @@ impl Bounds {
     }
 }
 
-/// The highest coordinate, not above `end`, whose fraction of a box along the axes is below 1: rounding decides
-/// where that is, and since it keeps the order of numbers all that are lower are inside, too.
+/// The highest coordinate, not above `end`, whose fraction of an edge is below 1; the box has edges along the axes.
+/// Rounding decides which coordinate that is. Rounding preserves order, so all lower coordinates are inside too.
 fn last_inside(domain: &PeriodicBox, k: usize, mut end: f64) -> f64 {
     let mut point = domain.origin();
     for _ in 0..TRIES {

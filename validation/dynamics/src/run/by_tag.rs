@@ -1,10 +1,10 @@
-//! Particles as files have them.
+//! Particles in the order of files.
 
 use super::simulation::Simulation;
 use crate::particles::order_of_tags;
 use psidpd_formats::Frame;
 
-/// A copy of the particles of one step in the order of their tags.
+/// A copy of the particles of one step, sorted by their tags.
 #[derive(Debug, Clone, Default)]
 pub(super) struct ByTag {
     x: Vec<[f64; 3]>,
@@ -14,7 +14,7 @@ pub(super) struct ByTag {
 }
 
 impl ByTag {
-    /// The present particles, if they are in another order.
+    /// Copies and sorts the present particles; `None` if they are sorted already.
     pub fn of(simulation: &Simulation) -> Option<ByTag> {
         if simulation.tags().is_sorted() {
             return None;
@@ -28,7 +28,6 @@ impl ByTag {
         })
     }
 
-    /// A frame with these particles.
     pub fn frame<'a>(&'a self, simulation: &'a Simulation, time: f64) -> Frame<'a> {
         Frame {
             x: &self.x,

@@ -7,7 +7,7 @@ use psidpd_formats::files::WriteError;
 use psidpd_formats::memory::MemoryError;
 use std::path::{Path, PathBuf};
 
-/// Why a run cannot start, or stopped.
+/// The reason why a run did not start or stopped.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RunError {
@@ -37,8 +37,8 @@ pub enum RunError {
     )]
     Velocity { step: u64, tag: i32 },
     #[error(
-        "step {step}: the pressure of drag and noise is not finite: the drag is too strong for numbers, or the time step too large \
-         for it"
+        "step {step}: the pressure of drag and noise is not finite: the drag is too strong for double precision, or \
+         the time step too large for the drag"
     )]
     Impulses { step: u64 },
     #[error(
@@ -47,7 +47,7 @@ pub enum RunError {
     )]
     Runaway { step: u64, tag: i32, distance: f64 },
     #[error(
-        "step {step}: particle {tag} is more than 2^31 boxes away from where it began: they can no longer be counted"
+        "step {step}: particle {tag} is more than 2^31 boxes away from its start, beyond the largest box count"
     )]
     Uncounted { step: u64, tag: i32 },
     #[error(
@@ -107,7 +107,7 @@ impl From<WriteError> for RunError {
 }
 
 impl RunError {
-    /// Whether a run stopped on its way, rather than could not start.
+    /// Whether a run stopped after its start; otherwise it did not start.
     pub fn is_stop(&self) -> bool {
         matches!(
             self,
@@ -122,12 +122,12 @@ impl RunError {
         )
     }
 
-    /// Whether a file is the trouble, not the physics.
+    /// Whether writing a file failed, in contrast to the physics.
     pub(super) fn is_output(&self) -> bool {
         matches!(self, RunError::Output { .. } | RunError::Format(_))
     }
 
-    /// What the caller can do about it, where that is not in the message.
+    /// Advice that the message does not contain.
     pub fn help(&self, caller: Caller) -> Option<String> {
         let (over, go_on) = (caller.start_over(), caller.go_on());
         Some(match self {
@@ -165,7 +165,7 @@ fn reached(step: &Option<u64>) -> String {
 mod tests {
     use super::*;
 
-    /// Advice has the options of the caller and no others.
+    /// Advice names the options of its caller and no others.
     #[test]
     fn advice_is_that_for_the_caller() {
         let folder = PathBuf::from("f");

@@ -3,21 +3,20 @@ use rustix::fs::{FlockOperation, flock};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-/// The folder of a run, which no other run may write to at the same time. The lock ends with the process,
-/// however that ends.
+/// The folder of a run, locked against other runs. The lock ends with the process, even if that is killed.
 pub(super) struct Folder {
     path: PathBuf,
     _lock: File,
 }
 
 impl Folder {
-    /// Makes the folder if need be, and locks it.
+    /// Creates the folder if it is missing, and locks it.
     pub fn open(path: &Path) -> Result<Folder, RunError> {
         std::fs::create_dir_all(path).map_err(RunError::output(path))?;
         let lock = File::open(path).map_err(RunError::output(path))?;
         match flock(&lock, FlockOperation::NonBlockingLockExclusive) {
             Err(rustix::io::Errno::WOULDBLOCK) => Err(RunError::Busy { folder: path.to_owned() }),
-            // Some file systems have no locks: run there without one.
+            // Some file systems have no locks; a run there has none.
             _ => Ok(Folder { path: path.to_owned(), _lock: lock }),
         }
     }

@@ -4,8 +4,8 @@ use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// A file of a run that grows as the run goes: it knows what was written to it, buffered bytes included, so that a
-/// checkpoint can say what of it belongs to the steps made.
+/// A file that grows during a run. It records what was written to it, buffered bytes included, so that a
+/// checkpoint can state which part belongs to the completed steps.
 pub(super) struct GrowingFile {
     name: &'static str,
     path: PathBuf,
@@ -14,14 +14,14 @@ pub(super) struct GrowingFile {
 }
 
 impl GrowingFile {
-    /// An empty file `name` in `folder`.
+    /// Creates an empty file `name` in `folder`.
     pub fn create(folder: &Path, name: &'static str) -> Result<GrowingFile, RunError> {
         let path = folder.join(name);
         let file = File::create(&path).map_err(RunError::output(&path))?;
         Ok(GrowingFile { name, path, out: BufWriter::new(file), written: Written::default() })
     }
 
-    /// The file of a run that goes on, cut to what was `written` at the checkpoint.
+    /// Opens the file of a resumed run and truncates it to the bytes that were `written` at the checkpoint.
     pub fn reopen(folder: &Path, name: &'static str, written: Written) -> Result<GrowingFile, RunError> {
         let path = folder.join(name);
         let open = || {
@@ -34,22 +34,21 @@ impl GrowingFile {
         Ok(GrowingFile { name, path, out: BufWriter::new(file), written })
     }
 
-    /// Its name in the folder of the run.
+    /// The file's name in the folder of the run.
     pub fn name(&self) -> &'static str {
         self.name
     }
 
-    /// What was written to it.
     pub fn written(&self) -> Written {
         self.written
     }
 
-    /// Writes with an error that names the file.
+    /// Calls `write`; an error names the file.
     pub fn attempt(&mut self, write: impl FnOnce(&mut Self) -> io::Result<()>) -> Result<(), RunError> {
         write(self).map_err(|source| RunError::Output { path: self.path.clone(), source })
     }
 
-    /// Brings all of it to the disk.
+    /// Writes the buffer and syncs the file to the disk.
     pub fn sync(&mut self) -> Result<(), RunError> {
         self.attempt(|file| {
             file.out.flush()?;

@@ -1,8 +1,8 @@
 //! The native host: owns particles, makes their periodic images, integrates, and writes files.
 //!
-//! [`Simulation`] is the part without files: a [`State`], the engine, and steps. A [`Runner`]
-//! drives it through the stages of a [`Scene`](crate::scene::Scene), writes what the scene asks for, and
-//! can be stopped and taken up again by its [`checkpoint`]s; [`run_scene`] is one that nothing interrupts.
+//! [`Simulation`] is the part without files: a [`State`], the engine and the steps. A [`Runner`] drives a
+//! simulation through the stages of a [`Scene`](crate::scene::Scene), writes the requested files, and can
+//! stop and resume by its [`checkpoint`]s; [`run_scene`] runs a scene without interruption.
 
 mod about;
 mod advice;

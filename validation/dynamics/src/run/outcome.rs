@@ -1,4 +1,4 @@
-//! What a run tells its caller: where it is, and how it ended.
+//! Reports to the caller of a run: its progress, and its outcome.
 
 use super::advice::Advice;
 use super::summary::Summary;
@@ -6,40 +6,36 @@ use super::timing::Timing;
 use super::watch::Deviation;
 use crate::checkpoint::Thermo;
 
-/// Where a run is, after every step.
+/// The progress of a run after a step.
 #[derive(Debug, Clone, Copy)]
 pub struct Progress<'a> {
-    /// Name of the stage.
     pub stage: &'a str,
-    /// Steps made, over all stages.
+    /// Completed steps of all stages.
     pub step: u64,
-    /// Steps to make, over all stages.
+    /// Total steps of all stages.
     pub steps: u64,
-    /// The totals, on steps that have them.
+    /// The totals, if the step computed them.
     pub thermo: Option<&'a Thermo>,
-    /// What is wrong with the temperatures of the stage, at its last step.
+    /// Wrong temperatures of the stage; filled at its last step only.
     pub deviations: &'a [Deviation],
 }
 
-/// How a run ended.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outcome {
-    /// All steps are made.
+    /// The run has completed all steps.
     Finished {
-        /// What it came to.
         summary: Box<Summary>,
-        /// What it took.
         timing: Timing,
-        /// A better step for its last stage, if it made steps.
+        /// A better step for the last stage; `None` if this call made no steps or has no advice.
         advice: Option<Advice>,
     },
-    /// It was asked to stop, and left a checkpoint.
+    /// The run stopped on request and left a checkpoint.
     Interrupted {
-        /// What it was told.
+        /// The value of the stop request.
         stop: usize,
-        /// Steps made.
+        /// Completed steps.
         step: u64,
-        /// Steps to make.
+        /// Total steps.
         steps: u64,
     },
 }

@@ -1,4 +1,4 @@
-//! The files that a run leaves in its folder, checkpoints and times apart.
+//! The files of a run in its folder, except checkpoints and `timing.json`.
 
 use super::dump::write_frame;
 use super::error::RunError;
@@ -15,19 +15,17 @@ use std::fs::File;
 use std::io::{self, ErrorKind};
 use std::path::Path;
 
-/// The name of the dump.
 const DUMP: &str = "dump.lammpstrj";
 
-/// The name of the extended XYZ file.
 const XYZ: &str = "trajectory.xyz";
 
-/// Files of a run that a scene, or a user, may take for its input.
+/// Files of a run that a scene or a user may use as input.
 pub const FILES: [&str; 5] = [ThermoFile::NAME, DUMP, XYZ, "final.data", "last-good.data"];
 
-/// Files that are written when a run ends, finished or not.
+/// Files that are written when a run ends or stops.
 const LAST: [&str; 5] = ["final.data", "last-good.data", OBSERVABLES, "summary.json", "report.html"];
 
-/// Whether a new run in `folder` would remove or replace `input`, a file or the folder of another run.
+/// Whether a new run in `folder` would remove or replace `input`, which is a file or the folder of another run.
 pub(super) fn replaces(folder: &Path, input: &Path) -> bool {
     let (Ok(folder), Ok(input)) = (folder.canonicalize(), input.canonicalize()) else { return false };
     let name = input.file_name().and_then(|name| name.to_str()).unwrap_or_default();
@@ -35,13 +33,13 @@ pub(super) fn replaces(folder: &Path, input: &Path) -> bool {
     input == folder || input.parent() == Some(&folder) && own.contains(&name)
 }
 
-/// What was observed.
+/// The file of observables.
 const OBSERVABLES: &str = "observables.json";
 
-/// The folder with the same as tables.
+/// The folder with the tables of observables.
 const TABLES: &str = "observables";
 
-/// The files that grow as a run goes.
+/// The files that grow during a run.
 pub(super) struct Output {
     thermo: Option<ThermoFile>,
     dump: Option<GrowingFile>,
@@ -49,7 +47,7 @@ pub(super) struct Output {
 }
 
 impl Output {
-    /// Empty files, and a description of the run.
+    /// Creates empty files, and a description of the run.
     pub fn create(scene: &Scene, folder: &Path) -> Result<Output, RunError> {
         remove(folder, &[ThermoFile::NAME, DUMP, XYZ])?;
         remove_tables(folder)?;
@@ -62,7 +60,7 @@ impl Output {
         Ok(Output { thermo: thermo.transpose()?, dump: dump.transpose()?, xyz: xyz.transpose()? })
     }
 
-    /// The files of a run that goes on, cut to what was `written` at its checkpoint.
+    /// Opens the files of a resumed run and truncates them to the bytes that were `written` at its checkpoint.
     pub fn reopen(folder: &Path, written: &BTreeMap<String, Written>) -> Result<Output, RunError> {
         remove_tables(folder)?;
         remove(folder, &LAST)?;
@@ -73,7 +71,7 @@ impl Output {
         Ok(Output { thermo: thermo.transpose()?, dump: dump.transpose()?, xyz: xyz.transpose()? })
     }
 
-    /// Writes a row of totals if the scene wants them, and returns whether it does.
+    /// Writes a row of totals if one is due, and returns whether it was.
     pub fn row(&mut self, thermo: &Thermo) -> Result<bool, RunError> {
         match &mut self.thermo {
             None => Ok(false),
@@ -81,7 +79,6 @@ impl Output {
         }
     }
 
-    /// Writes a frame of the dump.
     pub fn frame(&mut self, frame: &Frame) -> Result<(), RunError> {
         match &mut self.dump {
             None => Ok(()),
@@ -89,7 +86,6 @@ impl Output {
         }
     }
 
-    /// Writes a frame in extended XYZ.
     pub fn xyz_frame(&mut self, frame: &Frame) -> Result<(), RunError> {
         match &mut self.xyz {
             None => Ok(()),
@@ -97,12 +93,12 @@ impl Output {
         }
     }
 
-    /// What was written to each file.
+    /// The record of each file.
     pub fn written(&mut self) -> BTreeMap<String, Written> {
         self.files().map(|file| (file.name().to_owned(), file.written())).collect()
     }
 
-    /// Brings everything to the disk.
+    /// Syncs all files to the disk.
     pub fn sync(&mut self) -> Result<(), RunError> {
         self.files().try_for_each(|file| file.sync())
     }
@@ -112,8 +108,7 @@ impl Output {
     }
 }
 
-/// Writes `observables.json` and the tables in `observables/`, if anything was observed, and brings them to the
-/// disk.
+/// Writes `observables.json` and the tables in `observables/`, if there are any observations, and syncs them to the disk.
 pub(super) fn write_observations(folder: &Path, observations: &[Observation]) -> Result<(), RunError> {
     if observations.is_empty() {
         return Ok(());
@@ -125,15 +120,14 @@ pub(super) fn write_observations(folder: &Path, observations: &[Observation]) ->
         .map_err(RunError::output(&json))
 }
 
-/// Removes the tables of a run before, those that its `observables.json` tells of, and their folder unless there is something
-/// else in it.
+/// Removes the tables that `observables.json` of an earlier run names, and their folder if it is then empty.
 fn remove_tables(folder: &Path) -> Result<(), RunError> {
     let tables = folder.join(TABLES);
     let text = std::fs::read_to_string(folder.join(OBSERVABLES)).unwrap_or_default();
     let all: Vec<Observation> = serde_json::from_str(&text).unwrap_or_default();
     let remove = || -> io::Result<()> {
         for observation in &all {
-            // A name from elsewhere may be that of a place.
+            // A name in a file from elsewhere may be a path out of the folder, so only names without folders count.
             let name = observation.file_name(&all);
             if Path::new(&name).file_name() == Some(name.as_ref()) {
                 remove_if_there(&tables.join(name))?;
@@ -149,7 +143,7 @@ fn remove_tables(folder: &Path) -> Result<(), RunError> {
     }
 }
 
-/// Removes files of an earlier run, or of an earlier end of this one.
+/// Removes files of an earlier run, or of an earlier stop of this run.
 fn remove(folder: &Path, names: &[&str]) -> Result<(), RunError> {
     for name in names {
         let path = folder.join(name);

@@ -1,17 +1,16 @@
-//! Keeps particles in memory in the order of their cells: neighbours share the cache, and the engine reads
-//! and writes the host's arrays almost sequentially.
+//! Sorts particles in memory by their cells: neighbours share the cache, and the engine reads and writes the
+//! host's arrays almost sequentially.
 
 use psidpd_core::engine::{Pool, part};
 use std::iter::Map;
 use std::slice::Iter;
 
 /// Steps between reorderings. In that time particles move about a third of the range of their forces, mostly
-/// into a cell column that is still near in memory.
+/// into a cell column that is still close in memory.
 pub const INTERVAL: u64 = 32;
 
-/// Whether particles are reordered at the end of a step. That depends on the step number only, so that a
-/// resumed run reorders at the same steps. They are odd, because observables are usually sampled at even
-/// ones.
+/// Whether particles are reordered at the end of a step. The answer depends on the step number only, so that a
+/// resumed run reorders at the same steps. These numbers are odd, because observables usually sample at even ones.
 pub(super) fn is_due(step: u64) -> bool {
     step % INTERVAL == 1
 }
@@ -19,27 +18,27 @@ pub(super) fn is_due(step: u64) -> bool {
 /// Converts a scratch vector back to integers.
 type Whole = fn(&[f64; 3]) -> [i32; 3];
 
-/// Permutes arrays, one after the other through the same scratch memory.
+/// Permutes arrays through one scratch array.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Reordering {
     scratch: Vec<[f64; 3]>,
 }
 
 impl Reordering {
-    /// Moves vector `order[k]` to `k`.
+    /// Moves vector `order[k]` to index `k`.
     pub fn vectors(&mut self, pool: &Pool, order: &[u32], vectors: &mut Vec<[f64; 3]>) {
         self.gather(pool, order, |k| vectors[k]);
         std::mem::swap(&mut self.scratch, vectors);
     }
 
-    /// Three whole numbers of each particle in that order.
+    /// Moves the three integers of particle `order[k]` to index `k`.
     pub fn numbers(
         &mut self,
         pool: &Pool,
         order: &[u32],
         get: impl Fn(usize) -> [i32; 3] + Sync,
     ) -> Map<Iter<'_, [f64; 3]>, Whole> {
-        // A double holds every whole number of 32 bits.
+        // A double holds every 32-bit integer exactly.
         self.gather(pool, order, |k| get(k).map(f64::from));
         self.scratch.iter().map(|numbers| numbers.map(|number| number as i32))
     }

@@ -19,43 +19,41 @@ use std::path::Path;
 use std::sync::atomic::AtomicUsize;
 use std::time::Duration;
 
-/// The version of this program.
 const PROGRAM: &str = env!("CARGO_PKG_VERSION");
 
-/// What to do with an earlier run in the folder.
+/// The treatment of an earlier run in the folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Begin {
-    /// From the first step, where there is no run yet.
+    /// Start at the first step, in a folder without a run.
     #[default]
     New,
-    /// From the first step, whatever is there.
+    /// Start at the first step, and replace an earlier run.
     Overwrite,
-    /// From the last checkpoint; from the first step if there is none.
+    /// Continue from the last checkpoint; start at the first step if there is none.
     Resume,
 }
 
-/// What a run begins with.
+/// The start of a run.
 #[derive(Debug)]
 pub enum Start {
-    /// The initial state.
     New,
-    /// A checkpoint.
+    /// The state of a checkpoint.
     Resumed {
-        /// Its step.
+        /// The step of the checkpoint.
         step: u64,
-        /// The version of the program that wrote it, if that is another one: the steps that follow need not
-        /// be to the last bit those that it would have made.
+        /// The version of the program that wrote the checkpoint, if it differs from this program: later steps
+        /// can differ in rounding.
         program: Option<String>,
-        /// The instruction set that it was computed with, if that is another one: the same holds.
+        /// The instruction set that the run used before, if it differs: later steps can differ in rounding.
         instructions: Option<String>,
-        /// What is wrong with the newest checkpoint, if it is the one before.
+        /// The fault of the newest checkpoint, if the run continues from the previous one.
         fallback: Option<CheckpointError>,
     },
-    /// The end: there is nothing left to do.
+    /// The run has finished: no step is left.
     Finished,
 }
 
-/// Runs a scene from its first step to its last, whatever is in the folder `out`; see [`Runner`].
+/// Runs a scene from its first step to its last and replaces an earlier run in the folder `out`; see [`Runner`].
 ///
 /// # Errors
 /// [`RunError::Stopped`] if the physics fails; [`RunError::Halted`] or [`RunError::Output`] if a file
@@ -72,27 +70,26 @@ pub fn run_scene(scene: &Scene, out: &Path, progress: &mut dyn FnMut(Progress)) 
 
 /// A run of a scene in a folder.
 ///
-/// It writes `thermo.csv` and `dump.lammpstrj` as it goes, `final.data` and `summary.json` at its end, and
-/// every now and then a [`Checkpoint`], from which it can go on bit for bit: what is in these files, and in
-/// the checkpoint of a finished run, does not depend on how often it was interrupted, or at which moment.
-/// Wall times are in `timing.json` alone.
+/// A runner writes `thermo.csv` and `dump.lammpstrj` during the run, `final.data` and `summary.json` at its
+/// end, and a [`Checkpoint`] at intervals. A run resumed from a checkpoint continues bit for bit: the
+/// contents of these files, and of the checkpoint of a finished run, do not depend on the number or times of
+/// interruptions. Wall times are in `timing.json` alone.
 ///
-/// If the physics fails on the way, the last good state, that of the last checkpoint, thermo row or start of
-/// a stage, is written to `last-good.data` and as a checkpoint.
+/// If the physics fails, the last good state is written to `last-good.data` and as a checkpoint. That is the
+/// state of the last checkpoint, thermo row or start of a stage.
 pub struct Runner<'a> {
     start: Start,
     run: Run<'a>,
 }
 
 impl<'a> Runner<'a> {
-    /// Prepares a run in the folder `out`, which is made if need be.
+    /// Prepares a run in the folder `out`, which is created if it is missing.
     ///
     /// # Errors
-    /// [`RunError::Unfinished`] for [`Begin::New`] where a run waits to be taken up again, [`RunError::Finished`] where
-    /// one has ended;
-    /// [`RunError::Checkpoint`] for [`Begin::Resume`] if its checkpoints cannot be used;
-    /// [`RunError::Busy`] if another run is on its way there; a model or initial state that does not work;
-    /// a folder that cannot be written.
+    /// [`RunError::Unfinished`] for [`Begin::New`] in the folder of an interrupted run;
+    /// [`RunError::Finished`] in that of a finished run; [`RunError::Checkpoint`] for [`Begin::Resume`] if
+    /// its checkpoints cannot be used; [`RunError::Busy`] if another run is writing there; an invalid model
+    /// or initial state; a folder that cannot be written.
     pub fn begin(scene: &'a Scene, out: &Path, begin: Begin) -> Result<Runner<'a>, RunError> {
         let folder = Folder::open(out)?;
         let store = Store::new(out);
@@ -160,7 +157,7 @@ impl<'a> Runner<'a> {
         };
         let good = Checkpoint { program: PROGRAM.into(), instructions, ..good };
         let timing = Timing::read(folder.path());
-        // `about.json` does not depend on where a run stopped. The folder of a finished run may be one that cannot be written.
+        // `about.json` is independent of the step at which a run stopped. The folder of a finished run may be read-only.
         if !folder.path().join("about.json").is_file() {
             super::about::about(scene)
                 .write(folder.path())
@@ -171,46 +168,40 @@ impl<'a> Runner<'a> {
         Ok(Runner { start, run })
     }
 
-    /// What it begins with.
     pub fn start(&self) -> &Start {
         &self.start
     }
 
-    /// Sets the time between checkpoints, ten minutes, for a scene that does not give steps between them.
+    /// Sets the wall time between checkpoints for a scene without a step interval; the default is ten minutes.
     pub fn set_checkpoint_interval(&mut self, interval: Duration) {
         self.run.interval = interval;
     }
 
-    /// Sets how many threads share the work: one, unless told otherwise. What a run writes does not depend on it.
+    /// Sets the number of threads; the default is one. The output of a run does not depend on it.
     ///
     /// # Errors
-    /// The model does not hold at the present temperature: never, since it did before.
+    /// The model is invalid at the present temperature; this cannot happen, because it was valid before.
     pub fn set_threads(&mut self, threads: NonZeroUsize) -> Result<(), RunError> {
         let settings = self.run.simulation.settings();
         self.run.simulation.set_settings(Settings { threads, ..settings })
     }
 
-    /// Makes forces wrong, as [`Simulation::falsify`]: call it last, for a run at one temperature.
-    ///
-    /// # Errors
-    /// As there.
+    /// Makes forces wrong; see [`Simulation::falsify`]. Call it last, for a run at one temperature.
     #[doc(hidden)]
     pub fn falsify(&mut self, fault: Fault) -> Result<(), RunError> {
         self.run.simulation.falsify(fault)
     }
 
-    /// How forces are computed, for people: see [`Simulation::evaluation`].
+    /// Describes the evaluation of the forces for people; see [`Simulation::evaluation`].
     pub fn evaluation(&self) -> String {
         self.run.simulation.evaluation()
     }
 
-    /// How many particles there are.
     pub fn particles(&self) -> usize {
         self.run.simulation.len()
     }
 
-    /// Makes the steps that are left. At the end of the first step that finds `stop` other than 0, the run
-    /// writes a checkpoint and ends.
+    /// Makes the remaining steps. The run writes a checkpoint and ends after the first step at which `stop` is not 0.
     ///
     /// # Errors
     /// [`RunError::Stopped`] if the physics fails; [`RunError::Halted`] if a file cannot be written.
@@ -221,7 +212,7 @@ impl<'a> Runner<'a> {
     ) -> Result<Outcome, RunError> {
         let Runner { start, run } = self;
         if matches!(start, Start::Finished) {
-            // What is left of checkpoints before does no harm, and the folder may be one that cannot be written.
+            // Leftover checkpoints are harmless, and the folder may be read-only, so an error is ignored.
             let _ = run.store.keep_newest();
             return Ok(Outcome::Finished {
                 summary: Box::new(run.summary()),
@@ -233,7 +224,7 @@ impl<'a> Runner<'a> {
     }
 }
 
-/// The simulation of a scene in the precision that its runs have, free to reorder particles.
+/// The simulation of a scene in its precision, with reordering of particles.
 fn simulation(scene: &Scene, state: State) -> Result<Simulation, RunError> {
     let mut simulation = scene.simulation(state)?;
     simulation.set_settings(Settings { precision: scene.precision(), ..simulation.settings() })?;
@@ -241,7 +232,7 @@ fn simulation(scene: &Scene, state: State) -> Result<Simulation, RunError> {
     Ok(simulation)
 }
 
-/// Whether a run can go on from a checkpoint: it is of this scene, and the files have what it counts on.
+/// Checks that a run can continue from a checkpoint: it belongs to this scene, and the files hold the bytes that it records.
 fn usable(
     checkpoint: &Checkpoint,
     identity: &Identity,
@@ -259,7 +250,10 @@ fn usable(
         && checkpoint.step == before + position.done
         && checkpoint.forces.len() == if position.entered { checkpoint.state.len() } else { 0 };
     if !fits {
-        return Err(CheckpointError::Damaged { path, what: "its parts do not fit together".into() });
+        return Err(CheckpointError::Damaged {
+            path,
+            what: "its step, stage and forces do not match".into(),
+        });
     }
     // A finished run no longer needs its files; the user may have moved them.
     for (name, expected) in checkpoint.files.iter().filter(|_| !checkpoint.finished) {
@@ -269,7 +263,7 @@ fn usable(
         if found < length {
             return Err(CheckpointError::File { path, file, found, expected: length });
         }
-        // What cannot be read may still be written to: that is found out when it is opened.
+        // A file that cannot be read may still be writable; opening it for writing decides.
         if Written::of(&file, length).is_ok_and(|found| found != *expected) {
             return Err(CheckpointError::Edited { path, file, length });
         }
@@ -277,7 +271,7 @@ fn usable(
     Ok(())
 }
 
-/// A new run never replaces another.
+/// Returns an error if a new run would replace another.
 fn refuse_other_runs(store: &Store, identity: &Identity, out: &Path) -> Result<(), RunError> {
     if !store.exists() {
         return Ok(());

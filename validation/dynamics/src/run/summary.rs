@@ -4,17 +4,16 @@ use serde::Serialize;
 use std::io::Write;
 use std::path::Path;
 
-/// Summary of the results of a run; also `summary.json`. It does not depend on interruptions: times are in
-/// [`Timing`](super::Timing).
+/// Summary of the results of a run, also written to `summary.json`. It does not depend on interruptions:
+/// times are in [`Timing`](super::Timing).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
-    /// Title of the scene.
     pub title: String,
-    /// How many particles.
+    /// Number of particles.
     pub particles: usize,
-    /// Steps made, over all stages.
+    /// Completed steps of all stages.
     pub steps: u64,
-    /// Evaluations of ψ that met a density below its bounds, and above them.
+    /// Number of evaluations of ψ at a density below and above its bounds.
     pub out_of_bounds: [u64; 2],
     /// Totals after the last step.
     pub last: Thermo,
@@ -34,7 +33,7 @@ impl Summary {
     }
 }
 
-/// For the end of a run in a terminal.
+/// Formats the summary for a terminal.
 impl std::fmt::Display for Summary {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}: {} particles, {} steps", self.title, self.particles, self.steps)?;

@@ -31,7 +31,7 @@ gamma = 1.0
 range = 1.0
 "#;
 
-/// A scene of `model` in `lengths`, with the given stages and output.
+/// A scene of `model` in a box of `lengths`, with the given stages and output.
 fn scene_of(model: &str, lengths: &str, density: f64, rest: &str) -> Result<Scene, FileError> {
     let text = format!(
         "title = \"t\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7\n[box]\nlengths = {lengths}\n\
@@ -56,15 +56,15 @@ fn advance(simulation: &mut Simulation, steps: u64, dt: f64, integrator: Integra
     simulation.advance(steps, dt, integrator).unwrap();
 }
 
-/// Set 6 in a small box, settled.
+/// An equilibrated state of set 6 in a small box.
 fn settled() -> State {
     let mut simulation = simulation(SET6, state_of(SET6, "[4.0, 4.0, 4.0]", 6.05));
     advance(&mut simulation, 300, 0.01, Integrator::VelocityVerlet);
     simulation.state()
 }
 
-/// Deviations of the energy over half a unit of time, over several starts: a force with kinks, at the
-/// ranges and where particles pass through each other, makes single ones scatter about the trend.
+/// Deviations of the energy over half a time unit, over several starts: forces have kinks, at their ranges
+/// and where particles pass through each other, which make single deviations scatter about the trend.
 #[test]
 fn energy_is_conserved_to_second_order() {
     let mut run = simulation(SET6, settled());
@@ -107,7 +107,7 @@ fn momentum_is_conserved() {
     }
 }
 
-/// Largest difference of positions and velocities, particles matched by tag.
+/// Largest difference of positions and velocities; particles are matched by tag.
 fn difference(a: &Simulation, b: &Simulation) -> f64 {
     let mut at = vec![0; b.len() + 1];
     for (k, tag) in b.tags().iter().enumerate() {
@@ -142,7 +142,7 @@ fn groot_warren_with_one_half_is_velocity_verlet() {
 fn the_order_of_particles_does_not_matter() {
     let start = settled();
     let n = start.len();
-    // 211 is prime and does not divide the number of particles: a permutation.
+    // The factor 211 is prime and does not divide the number of particles, so this is a permutation.
     assert_ne!(n % 211, 0);
     let order: Vec<usize> = (0..n).map(|k| (k * 211 + 5) % n).collect();
     let shuffled = State {
@@ -160,7 +160,7 @@ fn the_order_of_particles_does_not_matter() {
     assert!(d < 1e-10, "{d}");
 }
 
-/// Unwrapped positions move on smoothly when particles cross the faces of the box.
+/// Unwrapped positions are continuous when particles cross the faces of the box.
 #[test]
 fn image_flags_count_boxes() {
     let start = state_of(IDEAL, "[3.0, 3.0, 3.0]", 3.0);
@@ -178,7 +178,7 @@ fn image_flags_count_boxes() {
     }
 }
 
-/// Where counts of boxes end the run does, instead of counting no further.
+/// The run stops at the limit of box counts instead of counting wrong.
 #[test]
 fn boxes_that_cannot_be_counted_stop_a_run() {
     for (at, velocity) in [(i32::MAX - 1, 10.0), (i32::MIN + 1, -10.0)] {
@@ -194,7 +194,7 @@ fn boxes_that_cannot_be_counted_stop_a_run() {
     }
 }
 
-/// Of several particles that are too fast the fastest is named, whatever their order.
+/// The error names the fastest of several runaway particles, whatever their order.
 #[test]
 fn the_culprit_of_a_blow_up_is_named() {
     for fastest in [3, 20, 77] {
@@ -211,7 +211,7 @@ fn the_culprit_of_a_blow_up_is_named() {
     }
 }
 
-/// Temperature of a run in blocks: mean and its standard error.
+/// Mean temperature of a run in blocks, with its standard error.
 fn mean_temperature(run: &mut Simulation, blocks: usize, steps: usize, dt: f64) -> (f64, f64) {
     run.prepare(dt, Want::FORCES).unwrap();
     let means: Vec<f64> = (0..blocks)
@@ -230,8 +230,8 @@ fn mean_temperature(run: &mut Simulation, blocks: usize, steps: usize, dt: f64) 
     (mean, (variance / n).sqrt())
 }
 
-/// Student's t with 19 degrees of freedom beyond 6: less than once in 10^5, and the seed is fixed.
-/// The bias of the time step, a few thousandths here, is allowed for.
+/// Student's t with 19 degrees of freedom exceeds 6 less than once in 10^5 seeds; the seed is fixed. The
+/// limit includes the bias of the time step, a few thousandths here.
 #[test]
 fn thermostat_holds_the_temperature_of_the_liquid() {
     let mut run = simulation(SET6, settled());
@@ -240,9 +240,10 @@ fn thermostat_holds_the_temperature_of_the_liquid() {
     assert!(error < 0.01, "{error}");
 }
 
-/// Without conservative forces the thermostat must leave particles uncorrelated: temperature as above;
-/// the numbers of pairs in four shells are Poisson counts summed over snapshots far apart, and beyond
-/// five standard deviations four of them are less than once in 10^5. The seed is fixed.
+/// Without conservative forces the thermostat must leave particles uncorrelated. The limits of the
+/// temperature are those of the previous test. The numbers of pairs in four shells are Poisson counts summed
+/// over snapshots far apart; one of the four exceeds five standard deviations less than once in 10^5 seeds.
+/// The seed is fixed.
 #[test]
 fn ideal_gas_stays_ideal() {
     let (length, dt) = (5.0f64, 0.02);
@@ -314,7 +315,7 @@ fn the_same_scene_writes_the_same_bytes() {
     let text = String::from_utf8(a.0[0].clone()).unwrap();
     assert_eq!(text.lines().count(), 6);
     assert!(text.starts_with("step,time,temperature,potential,kinetic,pressure,pxx"));
-    // A run that starts over leaves nothing of the one before.
+    // A new run removes all files of the previous run.
     std::fs::write(a.1.join("last-good.data"), "old").unwrap();
     run_scene(&scene, &a.1, &mut |_| ()).unwrap();
     assert!(!a.1.join("last-good.data").exists());
@@ -329,8 +330,8 @@ fn the_same_scene_writes_the_same_bytes() {
     assert!(data.contains("\nAtoms # atomic\n\n1 1 "));
 }
 
-/// Two stages under the same conditions are one: the noise of a step is keyed by its number, and the
-/// forces that a stage starts with differ only by the velocities that drag sees.
+/// Two stages at the same settings equal one stage: the noise of a step is keyed by its number, and the
+/// forces at the start of a stage differ only by the velocities in the drag.
 #[test]
 fn stages_without_thermostat_continue_each_other() {
     let stage = |name: &str, steps: u64| {
@@ -393,7 +394,7 @@ fn states_that_are_none_are_refused() {
     assert!(matches!(run.prepare(0.0, Want::FORCES), Err(RunError::TimeStep(_))));
 }
 
-/// Below twice the range of the noise a box is refused, but only while there is noise.
+/// A box narrower than twice the range of the noise is refused, but only while there is noise.
 #[test]
 fn narrow_boxes_are_refused_with_noise_alone() {
     let mut narrow = simulation(IDEAL, state_of_narrow());
@@ -407,7 +408,7 @@ fn state_of_narrow() -> State {
     scene_of(IDEAL, "[4.0, 4.0, 1.5]", 3.0, &rest).unwrap().initial_state()
 }
 
-/// A heavy species moves as its mass says: the temperature is that of both.
+/// Particles move by the mass of their species: both species have the same temperature.
 #[test]
 fn masses_count() {
     let model = IDEAL_MIXTURE;

@@ -6,7 +6,7 @@ use std::io::Write;
 use std::path::Path;
 
 impl Thermo {
-    /// The totals of the last step, which must have been computed with
+    /// The totals of the last step, whose evaluation must have used
     /// [`Want::TOTALS`](psidpd_core::engine::Want::TOTALS).
     pub fn of(simulation: &Simulation, time: f64) -> Thermo {
         let tensor = simulation.pressure_tensor();
@@ -23,11 +23,10 @@ impl Thermo {
     }
 }
 
-/// `thermo.csv`.
+/// The file of totals.
 pub(super) struct ThermoFile(GrowingFile);
 
 impl ThermoFile {
-    /// The name of the file in the folder of a run.
     pub const NAME: &str = "thermo.csv";
 
     pub fn create(folder: &Path) -> Result<ThermoFile, RunError> {
@@ -36,19 +35,18 @@ impl ThermoFile {
         Ok(this)
     }
 
-    /// The file of a run that goes on, cut to what was `written` at the checkpoint.
+    /// Opens the file of a resumed run and truncates it to the bytes that were `written` at the checkpoint.
     pub fn reopen(folder: &Path, written: Written) -> Result<ThermoFile, RunError> {
         GrowingFile::reopen(folder, Self::NAME, written).map(ThermoFile)
     }
 
-    /// Writes a row, and makes it visible to whoever follows the file.
+    /// Writes a row and flushes it, so that other programs can follow the file.
     pub fn row(&mut self, t: &Thermo) -> Result<(), RunError> {
         let numbers = [t.time, t.temperature, t.potential, t.kinetic, t.pressure];
         let columns: Vec<String> = numbers.iter().chain(&t.tensor).map(|x| format!("{x:?}")).collect();
         self.line(&format!("{},{}", t.step, columns.join(",")))
     }
 
-    /// The file.
     pub fn file(&mut self) -> &mut GrowingFile {
         &mut self.0
     }

@@ -4,30 +4,30 @@ use super::error::RunError;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// `timing.json`: the sessions of a run, one more each time it is taken up again.
+/// The contents of `timing.json`: one session for the start and each resumption of a run.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Timing {
-    /// The sessions. Of one that was killed, the part up to its last checkpoint.
+    /// The sessions; a killed session is listed up to its last checkpoint.
     pub sessions: Vec<Session>,
 }
 
-/// A part of a run that went without interruption.
+/// An uninterrupted part of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Session {
-    /// The step it began after.
+    /// The step after which the session began.
     pub from_step: u64,
-    /// The last step it counts.
+    /// The last step of the session.
     pub to_step: u64,
-    /// Wall time from one to the other, output included, in seconds.
+    /// Wall time of the session, output included, in seconds.
     pub wall_seconds: f64,
-    /// Particles times steps over that time.
+    /// Particles times steps over the wall time.
     pub particle_steps_per_second: f64,
 }
 
 impl Timing {
     pub(super) const NAME: &str = "timing.json";
 
-    /// The times of earlier sessions; empty if they are unknown.
+    /// Reads the times of earlier sessions; empty if the file cannot be read.
     pub(super) fn read(folder: &Path) -> Timing {
         let text = std::fs::read_to_string(folder.join(Self::NAME)).ok();
         text.and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_default()

@@ -17,35 +17,35 @@ use psidpd_pictures::write_snapshot;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-/// Time between checkpoints of scenes that do not say.
+/// Wall time between checkpoints of scenes without a step interval.
 const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(600);
 
-/// A run on its way.
+/// A run in progress.
 pub(super) struct Run<'a> {
     scene: &'a Scene,
     folder: Folder,
     pub store: Store,
     pub simulation: Simulation,
-    /// `None` if the run is finished.
+    /// The open files; `None` if the run is finished.
     output: Option<Output>,
-    /// A state to fall back to.
+    /// The last good state, which a failed run saves.
     pub good: Checkpoint,
     /// The step of the checkpoint on disk.
     pub stored: Option<u64>,
     position: Position,
-    /// Steps to make, over all stages.
+    /// Total steps of all stages.
     steps: u64,
     sums: Sums,
     last: Option<Thermo>,
     observers: Observers,
-    /// Over the present stage, since this session began.
+    /// The watch over the present stage since the start of this session.
     watch: Watch,
     pub timing: Timing,
-    /// The step that this session began after, and when.
+    /// The step and the time at which this session began.
     began: (u64, Instant),
-    /// When the last checkpoint was written.
+    /// The time of the last checkpoint.
     checkpointed: Instant,
-    /// Time between checkpoints, if there are no steps between them.
+    /// Wall time between checkpoints, if the scene gives no steps between them.
     pub interval: Duration,
 }
 
@@ -62,7 +62,7 @@ impl<'a> Run<'a> {
         let unused = Observers::new(&scene.observe, scene.stages.iter().map(|s| s.name.as_str()));
         let observers = unused.restore(&good.observers).map_err(|error| CheckpointError::Damaged {
             path: store.path(),
-            what: format!("what was observed: {error}"),
+            what: format!("its observables: {error}"),
         })?;
         let now = Instant::now();
         Ok(Run {
@@ -97,7 +97,8 @@ impl<'a> Run<'a> {
             let stage = &scene.stages[self.position.stage];
             if !self.position.entered {
                 self.enter(stage, progress)?;
-                // With many particles that takes as long as many steps of few.
+                // With many particles the first forces take as long as many steps of few, so a stop request
+                // is checked here too.
                 if let Some(outcome) = self.interrupted(stop)? {
                     return Ok(outcome);
                 }
@@ -116,11 +117,11 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Ends a run that is asked to stop, with a checkpoint.
+    /// Ends a run on a stop request, with a checkpoint.
     fn interrupted(&mut self, stop: &AtomicUsize) -> Result<Option<Outcome>, RunError> {
         let stop = stop.load(Ordering::Relaxed);
         let step = self.simulation.step_number();
-        // After its last step a run ends anyway.
+        // The run ends after its last step anyway.
         if stop == 0 || step >= self.steps {
             return Ok(None);
         }
@@ -131,7 +132,7 @@ impl<'a> Run<'a> {
         Ok(Some(Outcome::Interrupted { stop, step, steps: self.steps }))
     }
 
-    /// Computes the forces that a stage starts with.
+    /// Computes the forces before the first step of a stage.
     fn enter(&mut self, stage: &Stage, progress: &mut dyn FnMut(Progress)) -> Result<(), RunError> {
         self.sums = Sums::default();
         self.watch = Watch::default();
@@ -140,7 +141,7 @@ impl<'a> Run<'a> {
         self.position.entered = true;
         if self.simulation.step_number() == 0 {
             self.report(stage, true, progress)?;
-            // Finds out before the first step whether checkpoints can be written.
+            // A test of writing a checkpoint before the first step reveals a full or read-only disk early.
             if self.scene.output.checkpoint != Some(0) {
                 self.checkpoint()?;
             }
@@ -180,7 +181,7 @@ impl<'a> Run<'a> {
             Some(interval) => every(interval, number),
             None => self.checkpointed.elapsed() >= self.interval,
         };
-        // The end of a run writes its own.
+        // The end of a run writes its own checkpoint.
         if due && number < self.steps { self.checkpoint() } else { Ok(()) }
     }
 
@@ -188,13 +189,13 @@ impl<'a> Run<'a> {
         every(self.scene.output.thermo, step) || step == self.steps
     }
 
-    /// Whether the particles at the end of a step are written.
+    /// Whether the particles at the end of a step are written to a file.
     fn writes(&self, step: u64) -> bool {
         let due = &self.scene.output;
         [due.dump, due.xyz, due.snapshot].into_iter().any(|interval| every(interval, step))
     }
 
-    /// Writes what is due after a step.
+    /// Writes the output due after a step.
     fn report(
         &mut self,
         stage: &Stage,
@@ -206,7 +207,7 @@ impl<'a> Run<'a> {
         if let Some(output) = &mut self.output {
             if let Some(thermo) = &thermo {
                 self.last = Some(*thermo);
-                // The state a stage starts from is not of that stage.
+                // The initial state of a run is not counted in the means of its stage.
                 if output.row(thermo)? && step > 0 && thermo.potential.is_finite() {
                     self.sums.add(thermo);
                 }
@@ -243,7 +244,7 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Makes the present state the one to fall back to. Everything due at this step must be written.
+    /// Keeps the present state as the last good one. The output of this step must be written already.
     fn keep_state(&mut self) {
         self.good.step = self.simulation.step_number();
         self.good.position = self.position;
@@ -260,7 +261,6 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Writes a checkpoint of the present state.
     fn checkpoint(&mut self) -> Result<(), RunError> {
         self.simulation.end_step()?;
         self.keep_state();
@@ -268,7 +268,7 @@ impl<'a> Run<'a> {
     }
 
     fn store_good(&mut self) -> Result<(), RunError> {
-        // A checkpoint counts on what is in the files.
+        // A checkpoint records the contents of the files, so they are synced first.
         if let Some(output) = &mut self.output {
             output.sync()?;
         }
@@ -298,11 +298,11 @@ impl<'a> Run<'a> {
         timing
     }
 
-    /// Saves what is left of a run that failed.
+    /// Saves the last good state of a failed run.
     pub fn stop(&mut self, cause: RunError) -> RunError {
         let step = self.simulation.step_number();
         if cause.is_output() {
-            // A newer checkpoint may fit on the disk; if not, the old one is still there.
+            // A newer checkpoint may fit on the disk; if not, the old one remains.
             if self.stored != Some(self.good.step) {
                 let _ = self.store_good();
             }
@@ -323,7 +323,7 @@ impl<'a> Run<'a> {
                 saved,
                 checkpoint,
             },
-            // The physics failed first, and its error tells more.
+            // The physics failed first, and its error is more informative.
             Err(_) => cause,
         }
     }
@@ -336,7 +336,7 @@ impl<'a> Run<'a> {
         write_observations(self.folder.path(), &self.observers.finish())?;
         let summary = self.summary();
         summary.write(&self.folder.path().join("summary.json"))?;
-        // From here on the run is finished, whatever happens.
+        // From here on the run is finished, even if a later write fails.
         self.good.finished = true;
         self.store_good()?;
         self.store.keep_newest()?;

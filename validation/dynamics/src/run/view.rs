@@ -5,7 +5,7 @@ use psidpd_formats::Frame;
 use psidpd_observe::frame::View;
 
 impl Simulation {
-    /// The present step for observables; `time` is that since the start of the run.
+    /// The present step as observables see it; `time` is measured from the start of the run.
     pub fn view(&self, time: f64) -> View<'_> {
         View {
             pool: self.engine().pool(),
@@ -30,7 +30,7 @@ impl Simulation {
         }
     }
 
-    /// The present step for files and pictures; `time` is that since the start of the run.
+    /// The present step for files and pictures; `time` is measured from the start of the run.
     pub fn frame(&self, time: f64) -> Frame<'_> {
         Frame {
             step: self.step_number(),

@@ -2,12 +2,12 @@
 
 use psidpd_core::engine::PeriodicBox;
 
-/// The faces of the directions that are not periodic: a particle beyond one is put as far inside as it was
-/// outside, and the component of its velocity across the face is reversed, as `fix wall/reflect` of LAMMPS
-/// does. The box must be along the axes.
+/// The faces of the directions that are not periodic. A particle beyond a face is mirrored to the inside, and
+/// the component of its velocity across the face is reversed, as in LAMMPS's `fix wall/reflect`. The box must
+/// have edges along the axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Walls {
-    /// Lower and upper face of each direction that reflects.
+    /// Lower and upper face of each reflecting direction.
     faces: [Option<[f64; 2]>; 3],
 }
 
@@ -20,19 +20,17 @@ impl Walls {
         Walls { faces: [face(0), face(1), face(2)] }
     }
 
-    /// Whether there is one.
     pub fn any(&self) -> bool {
         self.faces.iter().any(Option::is_some)
     }
 
-    /// Lower and upper face of each direction that reflects.
+    /// Lower and upper face of each reflecting direction.
     pub fn faces(&self) -> [Option<[f64; 2]>; 3] {
         self.faces
     }
 
-    /// Reflects a particle that went through a face, and calls `turn` with each direction that turns round. What
-    /// an integrator has kept of the particle's velocity and force must turn with its velocity: its step began
-    /// on the other side of the mirror.
+    /// Reflects a particle that crossed a face, and calls `turn` with each reversed direction. Velocities and
+    /// forces that an integrator has kept must be reversed too: its step began on the other side of the mirror.
     pub fn reflect(&self, x: &mut [f64; 3], mut turn: impl FnMut(usize)) {
         for (k, [low, high]) in self.faces.iter().enumerate().filter_map(|(k, f)| Some((k, (*f)?))) {
             if x[k] < low {
@@ -46,7 +44,7 @@ impl Walls {
         }
     }
 
-    /// Whether a particle is outside all the same: it went further than across the box.
+    /// Whether a particle is outside even after reflection, because it moved further than across the box.
     pub fn has_escaped(&self, x: &[f64; 3]) -> bool {
         (0..3).any(|k| self.faces[k].is_some_and(|[low, high]| !(low..=high).contains(&x[k])))
     }
@@ -60,7 +58,7 @@ mod tests {
     use psidpd_core::model::Model;
 
     fn state(periodic: [bool; 3], count: usize) -> State {
-        // Points and velocities without pattern; the fractional parts of multiples of irrational numbers.
+        // Fractional parts of multiples of irrational numbers give points and velocities without a pattern.
         let irrational = [2f64.sqrt(), 3f64.sqrt(), 5f64.sqrt(), 7f64.sqrt(), 11f64.sqrt(), 13f64.sqrt()];
         let part = |k: usize, c: usize| (k as f64 * irrational[c]).fract();
         let domain = PeriodicBox::orthogonal([-1.0, 0.0, 2.0], [3.0, 4.0, 5.0], periodic).unwrap();
@@ -69,7 +67,7 @@ mod tests {
         State { v, ..State::at_rest(domain, vec![1.0], (0..count).map(point).collect()) }
     }
 
-    /// A free particle between two walls goes as the triangle wave of one that nothing stops.
+    /// A free particle between two walls follows the triangle wave, the folded path of a particle without walls.
     #[test]
     fn free_particles_bounce_to_and_fro() {
         let start = state([false, true, false], 200);
@@ -90,13 +88,13 @@ mod tests {
                     assert!((run.velocities()[k][c] - sign * start.v[k][c]).abs() < 1e-12);
                 }
             }
-            // Momentum is kept along y alone, and each direction has its share of the degrees of freedom.
+            // Momentum is conserved along y alone, and each direction has its share of the degrees of freedom.
             assert_eq!(run.degrees_of_freedom(), 599);
         }
     }
 
-    /// Walls do no work in the limit of short steps. Energy is kept to first order only: the force across a face
-    /// turns round where a particle is mirrored, and a step that meets the face cannot tell where in it.
+    /// Walls do no work in the limit of short steps. Energy is conserved to first order only: the force
+    /// across a face changes sign at the reflection, and a step does not resolve the time of the reflection.
     #[test]
     fn energy_is_kept_between_walls() {
         let model = Model::parse("m", SOFT).unwrap();

@@ -1,12 +1,13 @@
-//! Watches the temperature of a run: warns if it deviates from the target, and stops a run that is far off and does not cool.
+//! Watches the temperature of a run: warns if it deviates from its target, and stops a run that stays far too hot.
 //!
-//! The temperature is that of the relative velocities which drag and noise act on: a drop that flies, or a flow, has
-//! its thermal one. It is sampled some times in a stage, and every [`INTERVAL`] steps in a long one, at a hundredth of the
-//! cost of the steps; what is sampled changes no step. The temperature of configurations, which errors of the
-//! forces change most, comes every [`RARE`] steps, more often in a stage that is short but has [`WORTH_A_LOOK`] steps or more.
+//! The temperature is that of the relative velocities which drag and noise act on, so the motion of a drop or
+//! a flow does not count. Each stage has a number of samples, a long stage one every [`INTERVAL`] steps, at a
+//! hundredth of the cost of the steps; sampling changes no step. The configurational temperature, which is
+//! most sensitive to errors of the forces, is sampled every [`RARE`] steps, more often in a shorter stage of
+//! at least [`WORTH_A_LOOK`] steps.
 //!
-//! A stage in equilibrium at its temperature is warned of by chance once in [`ALARM`]⁻¹ = 1000 stages for each thermometer,
-//! and less often as its mean must also be off by [`TOLERANCE`].
+//! A stage in equilibrium raises a false alarm once in [`ALARM`]⁻¹ = 1000 stages for each thermometer, and
+//! less often because its mean must also deviate by more than [`TOLERANCE`].
 
 use super::error::RunError;
 use super::simulation::Simulation;
@@ -19,42 +20,42 @@ use psidpd_observe::statistics::MINIMUM_SAMPLES;
 use psidpd_observe::{Estimate, difference};
 use std::fmt;
 
-/// Most steps from sample to sample, and fewest.
+/// Largest and smallest number of steps between samples.
 const INTERVAL: u64 = 250;
 const LEAST: u64 = 10;
 
-/// Samples of a stage that is too short for more.
+/// Target number of samples in a short stage.
 const SAMPLES: u64 = 24;
 
-/// Most steps between temperatures of configurations, and fewest: one costs about as much as ten steps.
+/// Largest and smallest number of steps between configurational temperatures; one costs about as much as ten steps.
 const RARE: u64 = 1000;
 const LEAST_RARE: u64 = 250;
 
-/// Temperatures of configurations in a stage that is too short for more.
+/// Target number of configurational temperatures in a short stage.
 const LOOKS: u64 = 12;
 
-/// A run stops where it is hotter than this, in kT, for [`PATIENCE`] relaxation times and [`IN_A_ROW`] samples, and has not
-/// cooled to [`COOLER`] of its lowest temperature for as long: a start that is cooled, or cools slowly, is not stopped.
+/// A run stops if it is hotter than this, in kT, for [`PATIENCE`] relaxation times and [`IN_A_ROW`] samples, and
+/// has not cooled to [`COOLER`] of its lowest temperature for as long. A start that cools, even slowly, continues.
 const FAR_OFF: f64 = 2.0;
 const PATIENCE: f64 = 10.0;
 const IN_A_ROW: u64 = 4;
 const COOLER: f64 = 0.9;
 
-/// Relative deviation that is not worth a warning.
+/// Relative deviation that causes no warning.
 const TOLERANCE: f64 = 0.02;
 
-/// How often chance may take a mean farther off than that, for each thermometer of a stage.
+/// Probability of a false alarm for each thermometer of a stage.
 const ALARM: f64 = 1e-3;
 
-/// Errors of temperatures of configurations over those that blocks would have which are independent: blocks share the pairs
-/// across their faces. Measured 1.0 to 1.2 in Warren's set 6 and standard DPD.
+/// Ratio of the true error of a configurational temperature to the error from blocks taken as independent:
+/// blocks share the pairs across their faces. Measured 1.0 to 1.2 in Warren's set 6 and standard DPD.
 const FACES: f64 = 1.2;
 
-/// A stage of so many steps has temperatures of configurations, even if it is short: where the thermostat keeps
-/// velocities right at any time step, nothing else shows that the step is too long.
+/// A stage of at least this many steps is sampled for its configurational temperature. If the thermostat
+/// keeps velocities right at any time step, only this temperature reveals a step that is too long.
 const WORTH_A_LOOK: u64 = 1000;
 
-/// How a temperature was measured.
+/// The method of measuring a temperature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Thermometer {
     /// From relative velocities of pairs.
@@ -63,20 +64,18 @@ pub enum Thermometer {
     Configurational,
 }
 
-/// A temperature that is not that of its stage.
+/// A temperature that deviates from that of its stage.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Deviation {
-    /// Name of the stage.
     pub stage: String,
-    /// How it was measured.
     pub thermometer: Thermometer,
     /// Mean over the last two thirds of the stage, in units of kT.
     pub mean: f64,
-    /// Its standard error.
+    /// Standard error of the mean.
     pub error: f64,
-    /// Whether it was still falling when the stage ended.
+    /// Whether the temperature was still falling at the end of the stage.
     pub falls: bool,
-    /// Δt; `None` where steps take no time.
+    /// The time step; `None` for Monte Carlo.
     pub dt: Option<f64>,
 }
 
@@ -109,43 +108,42 @@ impl fmt::Display for Deviation {
     }
 }
 
-/// The watch over one stage.
 #[derive(Debug, Default)]
 pub(super) struct Watch {
-    /// Of each sample, in units of kT.
+    /// The kinetic temperature of each sample, in units of kT.
     kinetic: Vec<f64>,
     configurational: Vec<Configurational>,
     hot: Option<Hot>,
 }
 
-/// Samples in a row that were too hot.
+/// Consecutive samples that were too hot.
 #[derive(Debug, Clone, Copy)]
 struct Hot {
-    /// The step of the first.
+    /// The step of the first hot sample.
     since: u64,
     count: u64,
-    /// The lowest temperature among them, and its step.
+    /// The lowest temperature among the samples, and its step.
     lowest: f64,
     at: u64,
 }
 
 impl Hot {
-    /// With one more sample, or from one on.
+    /// Adds a sample to the hot ones, or starts with it.
     fn with(before: Option<Hot>, ratio: f64, done: u64) -> Hot {
         let Some(hot) = before else { return Hot { since: done, count: 1, lowest: ratio, at: done } };
         let (lowest, at) = if ratio < COOLER * hot.lowest { (ratio, done) } else { (hot.lowest, hot.at) };
         Hot { count: hot.count + 1, lowest, at, ..hot }
     }
 
-    /// Steps without a lower temperature; 0 for a fluid that still cools, however slowly: the lowest temperature came in the
-    /// later half of the time.
+    /// Number of steps without a lower temperature. It is 0 for a fluid that still cools, even slowly, that
+    /// is if the lowest temperature came in the later half of the time.
     fn steps(&self, done: u64) -> u64 {
         let without = done - self.at;
         if 2 * without < done - self.since { 0 } else { without }
     }
 }
 
-/// Sums over the blocks of space of one configuration: of `a` = Σ F·F and `b` = Σ ∇²U of each, and of their products.
+/// Sums over the spatial blocks of one configuration: of `a` = Σ F·F and `b` = Σ ∇²U of each block, and of their products.
 #[derive(Debug, Clone, Copy)]
 struct Configurational {
     a: f64,
@@ -153,7 +151,7 @@ struct Configurational {
     aa: f64,
     ab: f64,
     bb: f64,
-    /// How many blocks there are, those with little of the sum counting less.
+    /// Effective number of blocks; blocks with a small share of the sum count less.
     blocks: f64,
 }
 
@@ -170,7 +168,7 @@ impl Configurational {
         }
     }
 
-    /// Variance of `a − ratio b`, as its blocks scatter.
+    /// Variance of `a − ratio b`, from the scatter of its blocks.
     fn variance(&self, ratio: f64) -> f64 {
         let squares = self.aa - 2.0 * ratio * self.ab + ratio * ratio * self.bb;
         let mean = (self.a - ratio * self.b) / self.blocks;
@@ -179,16 +177,15 @@ impl Configurational {
 }
 
 impl Watch {
-    /// Whether a sample is due after step `done` of a stage.
     pub fn is_due(stage: &Stage, done: u64) -> bool {
         let interval = (stage.steps / SAMPLES).clamp(LEAST, INTERVAL);
         stage.thermostat && (done.is_multiple_of(interval) || looks_at_forces(stage, done))
     }
 
-    /// Takes a sample; the step must be at its end.
+    /// Takes a sample; the step must be complete.
     pub fn sample(&mut self, simulation: &mut Simulation, stage: &Stage, done: u64) -> Result<(), RunError> {
         if !stage.integrator.has_time() {
-            // Velocities are drawn at kT.
+            // Monte Carlo draws velocities at kT, so their temperature reveals no error.
             let due = looks_at_forces(stage, done);
             self.configurational.extend(due.then(|| configurational(simulation)).flatten());
             return Ok(());
@@ -222,7 +219,6 @@ impl Watch {
         Ok(())
     }
 
-    /// Deviations to report at the end of a stage.
     pub fn deviations(&self, stage: &Stage) -> Vec<Deviation> {
         if stage.level.is_some() {
             // A level of a ramp is not in equilibrium.
@@ -237,7 +233,7 @@ impl Watch {
             (Thermometer::Configurational, estimate_configurational(configurational, stage.kt), false),
         ];
         let deviation = |(thermometer, found, falls): (Thermometer, Option<Estimate>, bool)| {
-            // The scatter of what falls is its trend; that it was never as low as it should be tells.
+            // A falling temperature scatters by its trend; it counts as too high if every sample was too high.
             let Estimate { mean, error, .. } =
                 found.filter(|found| is_off(found) || falls && is_above(kinetic))?;
             Some(Deviation { stage: stage.name.clone(), thermometer, mean, error, falls, dt })
@@ -246,25 +242,25 @@ impl Watch {
     }
 }
 
-/// Whether a temperature of configurations is due.
+/// Whether a configurational temperature is due.
 fn looks_at_forces(stage: &Stage, done: u64) -> bool {
     let interval = (stage.steps / LOOKS).clamp(LEAST_RARE, RARE);
     stage.steps >= WORTH_A_LOOK && stage.level.is_none() && done.is_multiple_of(interval)
 }
 
-/// Whether a temperature in units of kT is off by more than [`TOLERANCE`] and chance.
+/// Whether a temperature in units of kT deviates by more than [`TOLERANCE`] and chance.
 fn is_off(found: &Estimate) -> bool {
     let beyond = Estimate { mean: (found.mean - 1.0).abs() - TOLERANCE, ..*found };
     let nothing = Estimate { mean: 0.0, error: 0.0, ..*found };
     beyond.mean > 0.0 && difference(&beyond, &nothing).exceeds(1, ALARM)
 }
 
-/// Whether all of so many temperatures are too high that it is no chance.
+/// Whether all samples are too high, and are too many for that to be chance.
 fn is_above(samples: &[f64]) -> bool {
     0.5f64.powi(samples.len() as i32) < ALARM && samples.iter().all(|ratio| *ratio > 1.0 + TOLERANCE)
 }
 
-/// Whether the later half of some temperatures is below the earlier by more than two standard errors.
+/// Whether the mean of the later half of the samples is below that of the earlier half by more than two standard errors.
 fn falls(samples: &[f64]) -> bool {
     let half = |samples: &[f64]| {
         let n = samples.len() as f64;
@@ -277,7 +273,7 @@ fn falls(samples: &[f64]) -> bool {
     earlier.len() > 1 && before - after > 2.0 * (variance + other).sqrt()
 }
 
-/// Mean of the samples with its standard error, which knows of correlation where there are enough of them.
+/// Mean of the samples with its standard error; the error includes correlations if there are enough samples.
 fn estimate(samples: &[f64]) -> Option<Estimate> {
     if let Ok(found) = psidpd_observe::estimate(samples) {
         return Some(found);
@@ -289,8 +285,8 @@ fn estimate(samples: &[f64]) -> Option<Estimate> {
     (samples.len() >= 4 && mean.is_finite()).then_some(plain)
 }
 
-/// `Σ a/Σ b` in units of kT. The error of one configuration is that of its blocks; how well that is known, their number
-/// tells. Of a series it is at least that of the series.
+/// `Σ a/Σ b` in units of kT. The error of each configuration comes from its blocks, and their number sets the
+/// degrees of freedom of this error. The error of a long series is at least that from the scatter of the series.
 fn estimate_configurational(samples: &[Configurational], kt: f64) -> Option<Estimate> {
     let sum = |f: &dyn Fn(&Configurational) -> f64| samples.iter().map(f).sum::<f64>();
     let (a, b) = (sum(&|s| s.a), sum(&|s| s.b));
@@ -305,7 +301,7 @@ fn estimate_configurational(samples: &[Configurational], kt: f64) -> Option<Esti
     (error.is_finite() && error > 0.0).then_some(found)
 }
 
-/// The sums of a temperature of configurations, if there is one and enough blocks to tell its error.
+/// The sums for a configurational temperature; `None` if the model has none or the blocks are too few for an error.
 fn configurational(simulation: &Simulation) -> Option<Configurational> {
     let fluid = simulation.model().at(simulation.kt()).ok()?;
     if simulation.has_body_forces() || configurational::missing(&fluid, simulation.domain()).is_some() {
@@ -326,7 +322,7 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
     use std::sync::atomic::AtomicUsize;
 
-    /// Runs a scene and says what its watch found.
+    /// Runs a scene and returns the deviations that its watch found.
     fn watched(model: &str, text: &str) -> Result<Vec<Deviation>, RunError> {
         let text =
             format!("title = \"t\"\nmodel = \"m.toml\"\n{text}\n[output]\nthermo = 0\ncheckpoint = 0\n");
@@ -341,7 +337,7 @@ mod tests {
         }
     }
 
-    /// Temperatures in a row, at every tenth of a step's worth of patience: how many there are until the run would stop.
+    /// The number of temperatures, one every ten steps, until a run with a patience of 200 steps would stop.
     fn stopped_after(temperatures: impl Iterator<Item = f64>) -> Option<usize> {
         let mut hot = None;
         temperatures.enumerate().find_map(|(k, ratio)| {
@@ -351,8 +347,8 @@ mod tests {
         })
     }
 
-    /// What is steady, grows, or cools and then stays hot is stopped; what cools exponentially, as a power of the time or in
-    /// bursts is not.
+    /// A run with steady, growing, or cooling and then steady high temperatures stops. A run that cools
+    /// exponentially, as a power of time or in bursts continues.
     #[test]
     fn only_what_stays_hot_is_stopped() {
         let mut rng = StdRng::seed_from_u64(5);
@@ -391,8 +387,8 @@ mod tests {
         assert!(!falls(&[3.0, 2.0, 1.0]) && !falls(&[]));
     }
 
-    /// Of 4000 means of independent numbers that are right 4 are off by chance in the limit of a small tolerance. The
-    /// tolerance of 2 % and errors of 1 % leave fewer.
+    /// Of 4000 correct means of independent numbers 4 raise a false alarm in the limit of a small tolerance.
+    /// The tolerance of 2 % with errors of 1 % leaves fewer.
     #[test]
     fn chance_is_allowed_for() {
         let mut rng = StdRng::seed_from_u64(4);
@@ -414,9 +410,9 @@ mod tests {
         assert!(is_off(&far), "{far:?}");
     }
 
-    /// Forty seeds of a slab in the plane, where ∇²U nearly cancels and single configurations scatter by 15 %, and twenty of a
-    /// small one of Warren's set 6: each would warn by chance once in 500 stages, and of sixty one warns in 12 % of the cases,
-    /// two in 1 %.
+    /// Forty seeds of a slab in the plane, where ∇²U nearly cancels and single configurations scatter by 15
+    /// %, and twenty of a small slab of Warren's set 6. Each seed raises a false alarm once in 500 stages;
+    /// among sixty seeds one alarm has a probability of 12 %, two of 1 %.
     #[test]
     fn small_slabs_raise_no_false_alarm() {
         let plane = include_str!("../../../models/van-der-waals-2d-slab.toml");
@@ -439,7 +435,7 @@ mod tests {
         assert!(warned.len() <= 1, "{warned:?}");
     }
 
-    /// Velocity Verlet at 0.02 has 10 % too much in Warren's set 6, which a stage of 1500 steps shows.
+    /// Velocity Verlet at Δt = 0.02 is 10 % too hot in Warren's set 6, which a stage of 1500 steps reveals.
     #[test]
     fn forces_that_heat_are_warned_of() {
         let text = "kT = 1.0\nseed = 1\nbox = [7.0, 7.0, 7.0]\ndensity = 6.05\ndt = 0.02\nequilibrate = 200\nsteps = 1500\n";
@@ -452,8 +448,8 @@ mod tests {
         );
     }
 
-    /// A random start at next to no temperature has 10^5 times kT at first, and cools for longer than any number of
-    /// relaxation times; it is not stopped, however short its steps are, and it is said that it still falls.
+    /// A random start at a tiny kT has 10^5 kT at first, and cools for longer than any number of relaxation
+    /// times. However short its steps are, it does not stop, and the warning says that it still falls.
     #[test]
     fn a_start_that_cools_is_not_stopped() {
         for (dt, steps) in [(0.04, 800), (0.02, 1600), (0.01, 3200)] {
@@ -468,7 +464,8 @@ mod tests {
         }
     }
 
-    /// A step far beyond what the forces bear heats a liquid and keeps it hot: the run stops with step and cause.
+    /// A time step far too long for the forces heats a liquid and keeps it hot: the run stops with an error
+    /// that names step and cause.
     #[test]
     fn a_step_that_is_too_long_is_stopped() {
         let text = "kT = 1.0\nseed = 1\nbox = 4.0\ndensity = 6.05\ndt = 0.04\nsteps = 4000\n";

@@ -1,22 +1,21 @@
-//! `lattice` and `min_distance`: how particles are arranged where they are put.
+//! `lattice` and `min_distance`: the arrangement of particles in a region.
 
 use super::number::positive;
 use psidpd_core::document::{FileError, FileErrorKind, Section};
 
-/// How particles are arranged in a region.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Arrangement {
-    /// Uniformly and independently, or at least so far from each other and from what is there already.
+    /// At random: uniformly and independently, or at least `min_distance` from each other and from earlier particles.
     Random {
-        /// The distance; 0 for independent particles.
+        /// The minimum distance; 0 for independent particles.
         min_distance: f64,
     },
-    /// On a lattice that fits the region; see [`Lattice`].
+    /// On a lattice that fits the region.
     Lattice(Lattice),
 }
 
-/// A lattice. In a block it is stretched to fit with whole cells; elsewhere its sites inside are taken. Sites
-/// left over are vacancies, spread evenly.
+/// A lattice. In a block it is stretched to fit with whole cells; in other regions the sites inside are used.
+/// Surplus sites are vacancies, spread evenly.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Lattice {
     /// Simple cubic; square in two dimensions.
@@ -29,15 +28,15 @@ pub enum Lattice {
     Hexagonal,
 }
 
-/// Names in three dimensions.
+/// Names of lattices in three dimensions.
 pub const LATTICES: [(&str, Lattice); 3] =
     [("sc", Lattice::Simple), ("bcc", Lattice::Bcc), ("fcc", Lattice::Fcc)];
-/// Names in two dimensions.
+/// Names of lattices in two dimensions.
 pub const FLAT_LATTICES: [(&str, Lattice); 2] =
     [("square", Lattice::Simple), ("hexagonal", Lattice::Hexagonal)];
 
 impl Arrangement {
-    /// Reads the arrangement; random if the file says nothing.
+    /// Reads the arrangement; random by default.
     pub(super) fn read(section: &Section, dimensions: usize) -> Result<Arrangement, FileError> {
         let names: &[(&str, Lattice)] = if dimensions == 2 { &FLAT_LATTICES } else { &LATTICES };
         let lattice = section.get("lattice").map(|v| v.one_of("lattice", names)).transpose()?;
@@ -46,7 +45,9 @@ impl Arrangement {
             (None, Some(value)) => Ok(Arrangement::Random { min_distance: positive(&value)? }),
             (Some(lattice), None) => Ok(Arrangement::Lattice(lattice.value)),
             (Some(_), Some(value)) => {
-                let message = "a lattice is given too: its sites are apart as they are".to_owned();
+                let message =
+                    "a lattice is given too, which sets the distances of its sites: give one of them"
+                        .to_owned();
                 Err(value.error(FileErrorKind::Value(message)))
             }
         }

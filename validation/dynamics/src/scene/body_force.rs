@@ -1,4 +1,4 @@
-//! `[[body_force]]`.
+//! `[[body_force]]`: accelerations of some of the particles.
 
 use super::composition::unknown_species;
 use super::initial::Initial;
@@ -7,7 +7,6 @@ use crate::particles::{BodyForce, Tags};
 use psidpd_core::document::{FileError, FileErrorKind, Section};
 use psidpd_core::model::Model;
 
-/// Reads every body force of a scene.
 pub fn read(root: &Section, model: &Model, initial: &Initial) -> Result<Vec<BodyForce>, FileError> {
     let Some(value) = root.get("body_force") else { return Ok(Vec::new()) };
     let mut forces = Vec::new();

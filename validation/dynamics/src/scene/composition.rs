@@ -1,4 +1,4 @@
-//! `composition` and `species` of what is filled.
+//! `composition` and `species` of a filled region.
 
 use psidpd_core::document::{FileError, FileErrorKind, Section};
 
@@ -7,7 +7,7 @@ use psidpd_core::document::{FileError, FileErrorKind, Section};
 pub struct Composition(pub(super) Vec<f64>);
 
 impl Composition {
-    /// Reads the fractions, equal ones if the file gives none; species that are not named have none.
+    /// Reads the fractions; equal ones if the file gives none. Species without an entry get none.
     pub(super) fn read(initial: &Section, species: &[String]) -> Result<Composition, FileError> {
         let count = species.len();
         if let Some(value) = initial.get("species") {
@@ -46,7 +46,6 @@ impl Composition {
         Ok(Composition(fractions))
     }
 
-    /// Equal shares.
     pub(super) fn equal(count: usize) -> Composition {
         Composition(vec![1.0 / count as f64; count])
     }
@@ -56,15 +55,15 @@ impl Composition {
         &self.0
     }
 
-    /// `count` particles shared out: whole numbers that add up to `count`, each less than one from its
-    /// share.
+    /// Divides `count` particles among the species: whole numbers that add up to `count`, each less than one
+    /// from its exact share.
     pub fn share(&self, count: usize) -> Vec<usize> {
         let exact: Vec<f64> = self.0.iter().map(|f| f * count as f64).collect();
         let mut shares: Vec<usize> = exact.iter().map(|e| *e as usize).collect();
         let mut order: Vec<usize> = (0..shares.len()).collect();
         let rest = |k: &usize| exact[*k] - exact[*k].floor();
         order.sort_by(|a, b| rest(b).total_cmp(&rest(a)));
-        // Rounding of the fractions can leave the sum off by a few in either direction.
+        // Rounding of the fractions can leave the sum too small or too large by a few particles.
         let mut turn = order.iter().cycle().filter(|k| self.0[**k] > 0.0);
         while shares.iter().sum::<usize>() < count {
             if let Some(k) = turn.next() {
@@ -80,7 +79,7 @@ impl Composition {
     }
 }
 
-/// The error of a name that is not one of the model's species.
+/// The error for a name that is not a species of the model.
 pub fn unknown_species(name: &str, species: &[String]) -> FileErrorKind {
     FileErrorKind::UnknownName { what: "species", name: name.to_owned(), known: species.join(", ") }
 }

@@ -1,13 +1,13 @@
-//! `[box]`, or `box = …`.
+//! `[box]`, or `box = …`: the lengths and boundaries of the box.
 
 use super::number::positive;
 use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
 use psidpd_core::engine::PeriodicBox;
 
-/// What happens to a particle at a face.
+/// The names of boundaries, and whether they are periodic.
 pub const BOUNDARIES: [(&str, bool); 2] = [("periodic", true), ("reflecting", false)];
 
-/// Reads the box. In two dimensions particles are at z = 0, in the middle of a third edge of 1.
+/// Reads the box. In two dimensions particles lie at z = 0, in the middle of a third edge of length 1.
 pub fn read(root: &Section, dimensions: usize) -> Result<PeriodicBox, FileError> {
     let value = root.require("box")?;
     let Some(section) = value.as_section() else {
@@ -19,10 +19,10 @@ pub fn read(root: &Section, dimensions: usize) -> Result<PeriodicBox, FileError>
     build(&lengths, dimensions, periodic.unwrap_or([true; 3]))
 }
 
-/// The boundary alone, if it is given: of a scene that has its box from a file.
+/// Reads the boundary of a scene that has its box from a file; `None` if the scene gives no boundary.
 pub fn read_boundary_alone(root: &Section, dimensions: usize) -> Result<Option<[bool; 3]>, FileError> {
     let Some(value) = root.get("box") else { return Ok(None) };
-    let message = || "the box is that of the file: give no lengths".to_owned();
+    let message = || "the initial file gives the box: remove the lengths".to_owned();
     let section = value.as_section().ok_or_else(|| value.error(FileErrorKind::Value(message())))?;
     if let Some(lengths) = section.get("lengths") {
         return Err(lengths.error(FileErrorKind::Value(message())));
@@ -42,7 +42,7 @@ fn build(value: &Value, dimensions: usize, periodic: [bool; 3]) -> Result<Period
         .map_err(|e| value.error(FileErrorKind::Value(e.to_string())))
 }
 
-/// Lengths one by one, or one for all.
+/// Reads one length for each direction, or one for all.
 fn read_lengths(value: &Value, dimensions: usize) -> Result<[f64; 3], FileError> {
     let third = |z: f64| if dimensions == 2 { 1.0 } else { z };
     if value.as_number().is_some() {
@@ -73,7 +73,7 @@ fn read_boundary(section: &Section, dimensions: usize) -> Result<Option<[bool; 3
     Ok(Some(periodic))
 }
 
-/// Refuses a box in which two images of a particle would share the noise of a pair.
+/// Refuses a box so narrow that two images of a particle would share the noise of a pair.
 pub fn check_width(
     root: &Section,
     domain: &PeriodicBox,

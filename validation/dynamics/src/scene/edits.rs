@@ -1,4 +1,4 @@
-//! Other values for keys of a scene or model, as `--set KEY=VALUE` gives them.
+//! Replacement values for keys of a scene or model, as `--set KEY=VALUE` gives them.
 
 use super::keys::TABLES;
 use psidpd_core::document::{FileError, FileErrorKind, Source};
@@ -10,9 +10,9 @@ use toml_edit::{DocumentMut, Item, TableLike, Value, value};
 
 /// A key and its new value.
 ///
-/// `kT`, `density`, `stage.produce.dt`, `part.1.radius`, `model.parameters.A`: tables of an array go by their `name` or
-/// their number, from 1. A name alone is a key of the top level, or of the one table that has it, or of all stages that
-/// have it, or a parameter of the model.
+/// Examples are `kT`, `density`, `stage.produce.dt`, `part.1.radius` and `model.parameters.A`. A table of an
+/// array is addressed by its `name` or by its number, from 1. A key without a path is a key of the top level,
+/// or of the one table that has it, or of all stages that have it, or a parameter of the model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Edit {
     text: String,
@@ -42,22 +42,21 @@ impl std::fmt::Display for Edit {
 }
 
 impl Edit {
-    /// The key, as it was written.
+    /// The key as the user wrote it.
     pub fn key(&self) -> &str {
         self.text.split('=').next().unwrap_or_default()
     }
 
-    /// The value, as it was written.
+    /// The value as the user wrote it.
     pub fn value(&self) -> &str {
         &self.value
     }
 
-    /// The number, if the value is one.
     pub fn number(&self) -> Option<f64> {
         self.value.parse().ok()
     }
 
-    /// What does not look like TOML is a string.
+    /// Parses the value; a value that is not TOML is a string.
     fn item(&self) -> Item {
         Value::from_str(&self.value).map_or_else(|_| value(self.value.as_str()), Item::Value)
     }
@@ -68,10 +67,10 @@ impl Edit {
     }
 }
 
-/// The edits of a model among those of a scene, and the text of the scene with the others made.
+/// Splits off the edits of the model, and applies the others to the text of the scene.
 ///
 /// # Errors
-/// A key that is in several places; a table that is not there.
+/// A key that is in several places, or a table that does not exist.
 pub fn edit_scene(
     text: &str,
     edits: &[Edit],
@@ -97,10 +96,11 @@ pub fn edit_scene(
     Ok((document.to_string(), of_model))
 }
 
-/// The text of a model with edits made. A name alone may be a parameter; `model.` before a key, as in a scene, is allowed.
+/// Applies edits to the text of a model. A key without a path may be a parameter; the prefix `model.` is
+/// allowed, as in a scene.
 ///
 /// # Errors
-/// As `edit_scene`; a parameter that the model does not have, which would change nothing.
+/// The errors of `edit_scene`, and a parameter that the model does not have, which would change nothing.
 pub fn edit_model(text: &str, edits: &[Edit]) -> Result<String, FileError> {
     let mut document = parse(text);
     for edit in edits {
@@ -123,19 +123,19 @@ pub fn edit_model(text: &str, edits: &[Edit]) -> Result<String, FileError> {
     Ok(document.to_string())
 }
 
-/// What is no TOML stays as it is: the reader says what is wrong with it.
+/// Parses the text. Invalid TOML stays unedited, so that the reader reports its error.
 fn parse(text: &str) -> DocumentMut {
     text.parse().unwrap_or_default()
 }
 
-/// What the top level of a file may have.
+/// The keys that the top level of a file may have.
 fn roots(tables: &[psidpd_core::document::keys::Table], more: &[&'static str]) -> BTreeSet<&'static str> {
     let first = |path: &'static str| path.split('.').next().unwrap_or_default();
     let top = tables.iter().filter(|t| t.path.is_empty()).flat_map(|t| t.keys.iter().map(|k| k.name));
     top.chain(tables.iter().map(|t| first(t.path))).chain(more.iter().copied()).collect()
 }
 
-/// The paths at which a file has a key, the top level first.
+/// The paths of the tables that have a key, the top level first.
 fn places(document: &DocumentMut, key: &str) -> Vec<Vec<String>> {
     let mut found = Vec::new();
     collect(document.as_table(), key, &mut Vec::new(), &mut found);
@@ -239,7 +239,7 @@ mod tests {
         assert_eq!(table["stage"][0]["dt"].as_float(), Some(0.02));
         assert_eq!(table["seed"].as_integer(), Some(5));
         assert_eq!(table["output"]["thermo"].as_integer(), Some(1));
-        // A key of every stage, and a string without quotes.
+        // The edits set a key of all stages, and a string without quotes.
         let table: toml::Table = edited(&["steps=3", "integrator=aboba"]).unwrap().0.parse().unwrap();
         assert_eq!(table["stage"][0]["steps"].as_integer(), Some(3));
         assert_eq!(table["stage"][1]["steps"].as_integer(), Some(3));

@@ -1,4 +1,4 @@
-//! Where a scene starts from: `[initial]`, `[[part]]`, or the density at the top level.
+//! The start of a scene: `[initial]`, `[[part]]`, or the density at the top level.
 
 use super::arrangement::{Arrangement, Lattice};
 use super::domain;
@@ -12,26 +12,22 @@ use psidpd_core::engine::PeriodicBox;
 use psidpd_core::model::Model;
 use std::path::{Path, PathBuf};
 
-/// Where a scene starts from.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Initial {
-    /// Regions filled with particles, by description. Their tags follow each other, from 1.
+    /// Regions filled with particles. Their tags are consecutive, from 1.
     Parts(Vec<Part>),
-    /// A data file or a checkpoint: particles and box. Velocities are drawn anew unless they are kept.
+    /// A data file or a checkpoint with particles and box. Velocities are drawn anew unless they are kept.
     File {
-        /// Where it is.
         path: PathBuf,
-        /// What it holds.
         state: Box<State>,
-        /// `None` keeps those of the file.
+        /// The distribution of new velocities; `None` keeps the velocities of the file.
         velocities: Option<Velocities>,
-        /// The particles that never move.
         frozen: Tags,
     },
 }
 
 impl Initial {
-    /// The parts, if there are any.
+    /// The parts; empty for a start from a file.
     pub fn parts(&self) -> &[Part] {
         match self {
             Initial::Parts(parts) => parts,
@@ -39,12 +35,12 @@ impl Initial {
         }
     }
 
-    /// The normal of the first slab that moves, if there is one.
+    /// The normal of the first slab that is not frozen, if there is one.
     pub fn slab_axis(&self) -> Option<usize> {
         self.parts().iter().filter(|part| !part.frozen).find_map(|part| part.normal)
     }
 
-    /// The tags of the parts that `wanted` holds for.
+    /// The tags of the particles in the parts for which `wanted` holds.
     pub fn tags_of(&self, wanted: impl Fn(&Part) -> bool) -> Tags {
         let mut first = 1;
         let mut ranges = Vec::new();
@@ -58,7 +54,6 @@ impl Initial {
         Tags::Ranges(ranges)
     }
 
-    /// The tags of the particles that never move.
     pub fn frozen(&self) -> Tags {
         match self {
             Initial::Parts(_) => self.tags_of(|part| part.frozen),
@@ -67,10 +62,9 @@ impl Initial {
     }
 }
 
-/// Kinds of `[initial]`.
 pub const KINDS: &[&str] = &["random", "lattice", "slab", "sphere", "cylinder", "data", "checkpoint"];
 
-/// Reads the initial state, and the box: from `box`, or from the file.
+/// Reads the initial state, and the box, which is given by `box` or by the initial file.
 pub fn read(root: &Section, model: &Model, base: &Path) -> Result<(Initial, PeriodicBox), FileError> {
     let dimensions = model.dimensions();
     let section = root.get("initial").map(|value| value.section()).transpose()?;
@@ -83,7 +77,9 @@ pub fn read(root: &Section, model: &Model, base: &Path) -> Result<(Initial, Peri
     }
     let initial = if let Some(format) = saved::Format::of(&kind) {
         if let Some(value) = root.get("density") {
-            return Err(value.error(FileErrorKind::Value("the particles are those of the file".into())));
+            return Err(value.error(FileErrorKind::Value(
+                "the initial file gives the particles: remove the density".into(),
+            )));
         }
         let periodic = domain::read_boundary_alone(root, dimensions)?;
         let saved::Saved { path, state, velocities, frozen } =
@@ -100,12 +96,12 @@ pub fn read(root: &Section, model: &Model, base: &Path) -> Result<(Initial, Peri
     Ok(initial)
 }
 
-/// Parts, or the whole box at the density of the scene.
+/// Reads a scene without `[initial]`: from its parts, or as the whole box at the density of the scene.
 fn read_without(root: &Section, model: &Model) -> Result<(Initial, PeriodicBox), FileError> {
     let parts = root.get("part");
     let density = root.get("density");
     if parts.is_none() && density.is_none() {
-        let message = "nothing says what the box is filled with".to_owned();
+        let message = "the scene gives no particles".to_owned();
         let error = root.error(FileErrorKind::Value(message));
         return Err(error.with_help("give a density, [initial] or [[part]]"));
     }
@@ -134,7 +130,7 @@ fn read_one(kind: &str, key: &Value, section: &Section, common: &Common) -> Resu
     let mut part = common.fill(section, WHOLE.to_owned(), shape)?;
     if kind == "lattice" && section.get("lattice").is_none() {
         if let Some(value) = section.get("min_distance") {
-            let message = "the sites of a lattice are apart as they are".to_owned();
+            let message = "a lattice sets the distances of its sites: remove min_distance".to_owned();
             return Err(value.error(FileErrorKind::Value(message)));
         }
         part.arrangement = Arrangement::Lattice(Lattice::Simple);

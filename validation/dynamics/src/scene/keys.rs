@@ -1,7 +1,7 @@
-//! Every key of the scene file, in one table: the JSON schema for editors and the reference
-//! `docs/scene-file.md` are written from it, and tests hold the reader to it.
+//! The table of all keys of the scene file: the JSON schema for editors and the reference
+//! `docs/scene-file.md` are written from it, and tests compare the reader with it.
 
-// A key takes a few lines here, and eight in the format of others.
+// This layout takes a few lines for a key; rustfmt would take eight.
 #[rustfmt::skip]
 mod particles;
 #[rustfmt::skip]
@@ -16,10 +16,10 @@ pub use scene::{BOX, MASSES, TOP};
 pub use psidpd_core::document::keys::{Key, OPTIONAL, REQUIRED, Table, ValueKind};
 use psidpd_core::document::keys::{form_key, key};
 
-/// Every table, in the order of the documentation. What `[observe]` may have is described elsewhere.
+/// All tables in the order of the documentation, except those of `[observe]`.
 pub const TABLES: &[Table] = &[TOP, BOX, MASSES, INITIAL, PART, BODY_FORCE, STAGE, OUTPUT];
 
-/// The first of each pair.
+/// The names in a list of pairs.
 fn names<T>(all: &[(&'static str, T)]) -> Vec<&'static str> {
     all.iter().map(|(name, _)| *name).collect()
 }

@@ -1,11 +1,11 @@
-//! `[masses]`.
+//! `[masses]`: the mass of each species.
 
 use super::Initial;
 use super::composition::unknown_species;
 use super::number::positive;
 use psidpd_core::document::{FileError, Section};
 
-/// Reads the mass of each species: 1, or what the data file says, if the scene gives none.
+/// Reads the masses; by default those of the data file, or 1.
 pub fn read(root: &Section, species: &[String], initial: &Initial) -> Result<Vec<f64>, FileError> {
     let mut mass = match initial {
         Initial::Parts(_) => vec![1.0; species.len()],

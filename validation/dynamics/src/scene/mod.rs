@@ -1,4 +1,4 @@
-//! Scene files: which fluid, in which box, from which start, for how many steps.
+//! Scene files, which state the fluid, the box, the initial state and the number of steps.
 //!
 //! ```toml
 //! model   = "../models/warren2003-set6.toml"   # relative to this file
@@ -8,8 +8,7 @@
 //! steps   = 1000
 //! ```
 //!
-//! `docs/scene-file.md` has every key; it is written from the table in [`keys`], and tests hold the reader to
-//! it.
+//! `docs/scene-file.md` describes every key; it is written from the table in [`keys`], and tests compare the reader with it.
 
 mod arrangement;
 mod body_force;
@@ -51,40 +50,31 @@ use psidpd_observe::{self as observe, Observe, StageNames};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A scene file with its model, read and checked.
 #[derive(Debug, Clone)]
 pub struct Scene {
-    /// What the file calls itself.
     pub title: String,
-    /// Where the model file is.
     pub model_path: PathBuf,
-    /// The model.
     pub model: Model,
     /// kT of the initial velocities, and the default of every stage.
     pub kt: f64,
     /// Seed of the initial state and of the noise.
     pub seed: u64,
-    /// Precision of the pair forces of a run, if the scene gives it.
+    /// Precision of the pair forces, if the scene gives it.
     pub precision: Option<Precision>,
-    /// The box.
     pub domain: PeriodicBox,
-    /// Mass of each species.
+    /// Mass of each species, in the order of the model.
     pub mass: Vec<f64>,
-    /// The initial state.
     pub initial: Initial,
-    /// The particles that never move.
     pub frozen: Tags,
-    /// Body forces, in the stages that have them.
+    /// Body forces; they act in the stages that enable them.
     pub body_forces: Vec<BodyForce>,
-    /// What is done with it, in this order.
+    /// The stages in the order of the run.
     pub stages: Vec<Stage>,
-    /// What is written.
     pub output: Output,
-    /// What is measured on the way.
+    /// The requested observables.
     pub observe: Observe,
-    /// The text of the file.
     pub source: Arc<Source>,
-    /// Where paths in the file start from.
+    /// The folder from which paths in the file start.
     pub folder: PathBuf,
 }
 
@@ -92,16 +82,16 @@ impl Scene {
     /// Reads a scene file and the model file it names.
     ///
     /// # Errors
-    /// Anything wrong in either file, with its line and key.
+    /// Any fault in either file, with its line and key.
     pub fn open(path: &Path) -> Result<Scene, FileError> {
         let base = path.parent().unwrap_or(Path::new(""));
         Scene::read(&Document::open(path)?, base, &[])
     }
 
-    /// Reads a scene file and the model file it names, with other values for some of their keys.
+    /// Reads a scene file and the model file it names, after edits of their keys.
     ///
     /// # Errors
-    /// As [`Scene::open`]; an edit that fits nowhere.
+    /// The errors of [`Scene::open`], and an edit that matches no key.
     pub fn open_with(path: &Path, edits: &[Edit]) -> Result<Scene, FileError> {
         if edits.is_empty() {
             return Scene::open(path);
@@ -117,11 +107,8 @@ impl Scene {
         Scene::read(&Document::parse(&path.display().to_string(), &text)?, base, &of_model)
     }
 
-    /// Reads a scene from a text; `name` stands for the file in messages, and the model file is looked
-    /// for in `base`.
-    ///
-    /// # Errors
-    /// As [`Scene::open`].
+    /// Parses a scene from a text; messages use `name` as the name of the file, and the path of the model
+    /// file starts from `base`.
     pub fn parse(name: &str, text: &str, base: &Path) -> Result<Scene, FileError> {
         Scene::read(&Document::parse(name, text)?, base, &[])
     }
@@ -172,18 +159,18 @@ impl Scene {
         Ok(scene)
     }
 
-    /// The particles before the first step; the same for the same file.
+    /// The particles before the first step; a function of the file alone.
     pub fn initial_state(&self) -> State {
         fill::fill(self).0
     }
 
-    /// Precision of the pair forces of a run; mixed by default.
+    /// Precision of the pair forces; mixed by default.
     pub fn precision(&self) -> Precision {
         self.precision.unwrap_or_default()
     }
 
-    /// Number densities of the species in every part that moves, and of all these parts mixed, if there are several of more
-    /// than one species; else none.
+    /// Number densities of the species in every part that is not frozen. Several such parts with more than
+    /// one species add the densities of all parts mixed; without them the list is empty.
     pub fn mixtures(&self) -> Vec<Vec<f64>> {
         let dimensions = self.model.dimensions();
         let parts: Vec<_> = self.initial.parts().iter().filter(|p| !p.frozen && p.count > 0).collect();
@@ -204,8 +191,8 @@ impl Scene {
         all
     }
 
-    /// Number densities of the species where the fluid is: in the largest part that moves, or in the whole box
-    /// for a start from a file.
+    /// Number densities of the species in the fluid: in the largest part that is not frozen, or in the whole
+    /// box for a start from a file.
     pub fn densities(&self) -> Vec<f64> {
         let dimensions = self.model.dimensions();
         let largest = self.initial.parts().iter().filter(|p| !p.frozen).max_by_key(|p| p.count);
@@ -222,7 +209,7 @@ impl Scene {
         counts.into_iter().map(|n| n as f64 / volume).collect()
     }
 
-    /// The number density of a scene that one fluid fills from face to face.
+    /// The number density of a scene that one fluid fills from face to face; `None` for other scenes.
     pub fn uniform_density(&self) -> Option<f64> {
         let [part] = self.initial.parts() else { return None };
         let volume = self.domain.volume(self.model.dimensions());
@@ -253,8 +240,8 @@ impl Scene {
         Err(error.with_help("use a smaller distance, or a lattice"))
     }
 
-    /// The model must hold at every temperature, and the box must keep images apart that would share
-    /// their noise.
+    /// Checks that the model is valid at every temperature, and that the box is so wide that no two images
+    /// share the noise of a pair.
     fn check_noise(&self, root: &Section) -> Result<(), FileError> {
         self.model.at(self.kt)?;
         for stage in &self.stages {
@@ -268,7 +255,7 @@ impl Scene {
         Ok(())
     }
 
-    /// Trial moves need an energy that knows all forces.
+    /// Checks that the energy includes all forces, which trial moves need.
     fn check_trials(&self, root: &Section) -> Result<(), FileError> {
         for stage in self.stages.iter().filter(|stage| !stage.integrator.has_time()) {
             let refuse = |message: String| {
@@ -309,7 +296,7 @@ fn read_model(value: &Value, base: &Path, edits: &[Edit]) -> Result<(PathBuf, Mo
     }
 }
 
-/// What is said of a model where a scene is expected: it names no model, and has what makes one.
+/// The error of a model file given as a scene: it names no model and has keys of a model.
 fn no_scene(root: &Section) -> Option<FileError> {
     let of_model = ["species", "excess_free_energy", "density", "pair"];
     let key = of_model.into_iter().find(|key| root.get(key).is_some())?;

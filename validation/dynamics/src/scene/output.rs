@@ -1,20 +1,20 @@
-//! `[output]`.
+//! `[output]`: the files that a run writes.
 
 use psidpd_core::document::{FileError, Section};
 
-/// What a run writes beside its final state.
+/// The output of a run beside its final state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Output {
-    /// Steps between rows of `thermo.csv`; 0 for none.
+    /// Steps between rows of `thermo.csv`; 0 writes none.
     pub thermo: u64,
-    /// Steps between frames of `dump.lammpstrj`; 0 for none.
+    /// Steps between frames of `dump.lammpstrj`; 0 writes none.
     pub dump: u64,
-    /// Steps between frames of `trajectory.xyz`; 0 for none.
+    /// Steps between frames of `trajectory.xyz`; 0 writes none.
     pub xyz: u64,
-    /// Steps between pictures in `snapshots/`; 0 for none.
+    /// Steps between pictures in `snapshots/`; 0 writes none.
     pub snapshot: u64,
-    /// Steps between checkpoints; 0 for none but at the end of a run, however it ends. By default they
-    /// come every ten minutes.
+    /// Steps between checkpoints; 0 writes one at the end of a run only, even of a run that stops early. By
+    /// default one is written every ten minutes.
     pub checkpoint: Option<u64>,
 }
 
@@ -24,7 +24,6 @@ impl Default for Output {
     }
 }
 
-/// Reads what is written.
 pub fn read(root: &Section) -> Result<Output, FileError> {
     let mut output = Output::default();
     let Some(value) = root.get("output") else { return Ok(output) };

@@ -1,4 +1,4 @@
-//! `[[part]]`: regions filled with particles, of which drops, columns, supports and walls are made.
+//! `[[part]]`: regions filled with particles, such as drops, columns, supports and walls.
 
 use super::arrangement::Arrangement;
 use super::composition::Composition;
@@ -9,53 +9,46 @@ use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::model::Model;
 
-/// Most particles that a scene may ask for.
+/// Largest number of particles of a scene.
 const MOST_PARTICLES: f64 = 1e8;
 
-/// The name of what fills a box without parts.
+/// The name of the part that fills a box without parts.
 pub const WHOLE: &str = "fluid";
 
-/// A region and the particles in it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Part {
-    /// What it is called.
     pub name: String,
-    /// Where it is.
     pub shape: Shape,
-    /// Its normal, if it is a slab across the box.
+    /// The normal of a slab across the box; `None` for other shapes.
     pub normal: Option<usize>,
-    /// How many particles.
     pub count: usize,
-    /// Of which species.
     pub composition: Composition,
-    /// How they are arranged.
     pub arrangement: Arrangement,
-    /// How they move among themselves.
+    /// The velocities of particles relative to the part.
     pub velocities: Velocities,
-    /// How they move together.
+    /// The velocity of the part.
     pub velocity: [f64; 3],
-    /// Whether they never move.
+    /// Whether the particles never move.
     pub frozen: bool,
 }
 
-/// What parts of one scene have in common.
+/// Data that all parts of a scene share.
 pub struct Common<'a> {
-    /// The model.
     pub model: &'a Model,
-    /// The box.
+    /// The reader of regions in the box.
     pub shapes: Shapes<'a>,
     /// The density of the scene, for parts that give neither density nor count.
     pub density: Option<f64>,
 }
 
 impl<'a> Common<'a> {
-    /// What the parts of the scene `root` have in common.
+    /// Collects the shared data of the scene `root`.
     pub fn of(root: &Section, model: &'a Model, domain: &'a PeriodicBox) -> Result<Common<'a>, FileError> {
         let density = root.get("density").map(|value| positive(&value)).transpose()?;
         Ok(Common { model, shapes: Shapes { dimensions: model.dimensions(), domain }, density })
     }
 
-    /// Reads the particles of a region, except whether they are frozen; `what` names it.
+    /// Reads the particles of a region, except whether they are frozen; `name` is the name of the part.
     pub fn fill(&self, section: &Section, name: String, shape: Shape) -> Result<Part, FileError> {
         let dimensions = self.shapes.dimensions;
         Ok(Part {
@@ -71,7 +64,7 @@ impl<'a> Common<'a> {
         })
     }
 
-    /// The whole box at the density of the scene, given by `value`, in equal shares of the species.
+    /// Fills the whole box at the density of the scene, given by `value`, with equal shares of the species.
     pub fn everywhere(&self, value: &Value, density: f64) -> Result<Part, FileError> {
         let shape = self.shapes.whole();
         let count = (density * shape.volume(self.shapes.dimensions)).round();
@@ -108,7 +101,7 @@ impl<'a> Common<'a> {
         }
     }
 
-    /// Reads every `[[part]]`.
+    /// Reads all `[[part]]` tables.
     pub fn parts(&self, value: &Value) -> Result<Vec<Part>, FileError> {
         let sections: Vec<Section> = value.array()?.iter().map(Value::section).collect::<Result<_, _>>()?;
         let keys: Vec<Value> = sections.iter().map(|s| s.require("shape")).collect::<Result<_, _>>()?;
@@ -165,13 +158,13 @@ impl<'a> Common<'a> {
         Ok(())
     }
 
-    /// Tells the rest what it is the rest of.
+    /// Gives each part of kind `rest` the list of all other regions.
     fn leave_the_rest(&self, keys: &[Value], shapes: &mut [Shape]) -> Result<(), FileError> {
         let is_rest = |s: &Shape| matches!(s, Shape::Rest { .. });
         let mut rests = (0..shapes.len()).filter(|k| is_rest(&shapes[*k]));
         let Some(first) = rests.next() else { return Ok(()) };
         if let Some(second) = rests.next() {
-            let message = format!("part {} is the rest already", first + 1);
+            let message = format!("part {} is the rest already: a scene has one rest", first + 1);
             return Err(keys[second].error(FileErrorKind::Value(message)));
         }
         let all: Vec<Shape> = shapes.iter().filter(|s| !is_rest(s)).cloned().collect();
@@ -188,10 +181,10 @@ impl<'a> Common<'a> {
     }
 }
 
-/// A number of particles, if there is one at least and not too many.
+/// Checks that a number of particles is at least one and at most the limit.
 fn check_count(count: f64, error: impl Fn(FileErrorKind) -> FileError) -> Result<usize, FileError> {
     if count < 1.0 {
-        return Err(error(FileErrorKind::Value("leaves the box without a particle".into())));
+        return Err(error(FileErrorKind::Value("gives less than one particle".into())));
     }
     if count > MOST_PARTICLES {
         let message = format!("{count:.3e} particles are too many: at most {MOST_PARTICLES:.0e}");

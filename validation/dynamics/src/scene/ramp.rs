@@ -1,35 +1,34 @@
-//! `kT = [from, to]` of a stage: a temperature that rises or falls in equal levels.
+//! `kT = [from, to]` of a stage: a temperature that changes in equal levels.
 //!
-//! A level is a stage of its own, as psi may depend on kT: forces are computed anew where it begins, and a deck for
-//! LAMMPS has a `run` for it.
+//! Each level is a stage of its own, because ψ may depend on kT: forces are computed anew at its start, and a
+//! LAMMPS input has a `run` for it.
 
 use super::number::positive;
 use psidpd_core::document::{FileError, FileErrorKind, Section};
 
-/// Levels of a ramp that does not say.
+/// Number of levels of a ramp without `levels`.
 const DEFAULT_LEVELS: u64 = 20;
-/// Most levels.
+/// Largest number of levels.
 const MOST_LEVELS: u64 = 1000;
 
-/// Steps of a stage at one temperature.
 #[derive(Debug, Clone, Copy)]
 pub struct Level {
-    /// Which level of a ramp it is, from 1, of how many.
+    /// Number of the level in a ramp, from 1, and number of levels; `None` without a ramp.
     pub number: Option<[u64; 2]>,
     pub steps: u64,
     pub kt: f64,
 }
 
-/// Reads the temperature of a stage of `steps`, `scene_kt` if it has none, and divides it into levels if it is a ramp. The
-/// last level is at the end of the ramp, the first one level after its start.
+/// Reads the temperature of a stage of `steps` steps; the default is `scene_kt`. A ramp is divided into
+/// levels: the first is one level after the start of the ramp, the last is at its end.
 pub fn read(section: &Section, steps: u64, scene_kt: f64) -> Result<Vec<Level>, FileError> {
     let value = section.get("kT");
     let ramp = value.as_ref().and_then(|v| v.as_array());
     let levels = section.get("levels");
     let Some(ends) = ramp else {
         if let Some(levels) = levels {
-            let message = "kT is one temperature, which has no levels".to_owned();
-            return Err(levels.error(FileErrorKind::Value(message)).with_help("kT = [from, to] has"));
+            let message = "only a ramp has levels, and kT is one temperature".to_owned();
+            return Err(levels.error(FileErrorKind::Value(message)).with_help("kT = [from, to] is a ramp"));
         }
         let kt = value.map_or(Ok(scene_kt), |value| positive(&value))?;
         return Ok(vec![Level { number: None, steps, kt }]);
@@ -51,7 +50,7 @@ pub fn read(section: &Section, steps: u64, scene_kt: f64) -> Result<Vec<Level>, 
     };
     let level = |k: u64| Level {
         number: Some([k, levels]),
-        // Whole numbers of steps that add up.
+        // Whole numbers of steps, which add up to the steps of the stage.
         steps: steps / levels + u64::from(k <= steps % levels),
         kt: if k == levels { to } else { from + (to - from) * k as f64 / levels as f64 },
     };

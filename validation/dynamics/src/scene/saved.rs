@@ -1,4 +1,4 @@
-//! Starts from files that another run has left.
+//! Starts from files of another run.
 
 use super::velocities::Velocities;
 use crate::checkpoint;
@@ -10,17 +10,15 @@ use psidpd_core::model::Model;
 use psidpd_formats::data::DataFile;
 use std::path::{Path, PathBuf};
 
-/// What a file is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
-    /// A LAMMPS data file.
     Data,
-    /// A checkpoint, or the folder of a run that left one.
+    /// A checkpoint, or the folder of a run with a checkpoint.
     Checkpoint,
 }
 
 impl Format {
-    /// The format that a kind of `[initial]` stands for.
+    /// The format of a kind of `[initial]`.
     pub fn of(kind: &str) -> Option<Format> {
         match kind {
             "data" => Some(Format::Data),
@@ -30,11 +28,11 @@ impl Format {
     }
 }
 
-/// The particles and the box of a file. `periodic` sets the boundaries; if left out, a checkpoint keeps its
-/// own, and so does a data file that tells them; others are periodic.
+/// Reads the particles and the box of a file. `periodic` sets the boundaries. Without it, a checkpoint keeps
+/// its boundaries, and so does a data file that names walls; other data files are periodic.
 ///
 /// # Errors
-/// The file cannot be read, or is no state of `model`; in words.
+/// The file cannot be read, or is not a state of `model`; the error is its message.
 pub fn open(
     format: Format,
     path: &Path,
@@ -62,11 +60,10 @@ pub fn open(
     }
 }
 
-/// A start from a file.
 pub struct Saved {
     pub path: PathBuf,
     pub state: State,
-    /// `None` keeps those of the file.
+    /// The distribution of new velocities; `None` keeps the velocities of the file.
     pub velocities: Option<Velocities>,
     pub frozen: Tags,
 }
@@ -101,7 +98,7 @@ fn read_frozen(section: &Section, state: &State) -> Result<Tags, FileError> {
         return Err(wrong(format!("expected the first and the last id, found {} values", ids.len())));
     };
     let (Ok(first), Ok(last)) = (i32::try_from(first), i32::try_from(last)) else {
-        return Err(wrong(format!("{last} is beyond what ids can count")));
+        return Err(wrong(format!("{last} exceeds the largest id, 2147483647")));
     };
     let tags = Tags::Ranges(vec![first..=last]);
     match state.tag.iter().filter(|t| tags.contain(**t)).count() {

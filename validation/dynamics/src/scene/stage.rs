@@ -1,4 +1,4 @@
-//! `[[stage]]`, or `steps` at the top level.
+//! `[[stage]]`, or `steps` at the top level: the stages of a run.
 
 use super::number::positive;
 use super::ramp;
@@ -6,29 +6,24 @@ use crate::integrator::{Integrator, THERMOSTAT_STEPS};
 use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
 use psidpd_core::engine::noise::Law;
 
-/// A part of a run under one set of conditions.
+/// A part of a run at constant settings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stage {
-    /// Its name; levels of one ramp share it.
+    /// The name of the stage; all levels of a ramp share it.
     pub name: String,
-    /// Which level of a ramp it is, from 1, of how many.
+    /// Number of the level in a ramp, from 1, and number of levels; `None` without a ramp.
     pub level: Option<[u64; 2]>,
-    /// How many steps.
     pub steps: u64,
-    /// Δt.
+    /// The time step Δt.
     pub dt: f64,
-    /// How a step is made.
     pub integrator: Integrator,
-    /// kT.
     pub kt: f64,
-    /// Whether dissipative and random forces act.
     pub thermostat: bool,
-    /// Whether body forces act.
     pub body_forces: bool,
 }
 
 impl Stage {
-    /// What it is called in comments: "quench (3 of 20)" for a level of a ramp.
+    /// The name in comments and messages: "quench (3 of 20)" for a level of a ramp.
     pub fn label(&self) -> String {
         match self.level {
             Some([level, levels]) => format!("{} ({level} of {levels})", self.name),
@@ -37,13 +32,13 @@ impl Stage {
     }
 }
 
-/// Most steps of a run: step numbers stay exact in every format that tells them.
+/// Largest number of steps of a run: up to it, step numbers are exact in every output format.
 const MOST_STEPS: u64 = 1 << 53;
 
-/// Δt of stages that give none.
+/// The time step Δt of stages without `dt`.
 const DEFAULT_DT: f64 = 0.01;
 
-/// Values of keys that a stage leaves out.
+/// Defaults of keys that a stage leaves out.
 #[derive(Debug, Clone, Copy)]
 struct Defaults {
     kt: f64,
@@ -51,7 +46,7 @@ struct Defaults {
     integrator: Integrator,
 }
 
-/// Reads the stages; `kt` is the temperature of those that do not say.
+/// Reads the stages; `kt` is the default of their temperature.
 pub fn read(root: &Section, kt: f64) -> Result<Vec<Stage>, FileError> {
     let defaults = Defaults {
         kt,
@@ -59,7 +54,7 @@ pub fn read(root: &Section, kt: f64) -> Result<Vec<Stage>, FileError> {
         integrator: read_integrator(root, Integrator::default())?,
     };
     let stages = read_all(root, defaults)?;
-    // Of a scene in which nothing takes time.
+    // A scene whose integrators have no time step must have no `dt`.
     if let Some(dt) = root.get("dt").filter(|_| stages.iter().all(|stage| !stage.integrator.has_time())) {
         return Err(no_time(&dt, "no dt"));
     }
@@ -70,7 +65,7 @@ fn read_all(root: &Section, defaults: Defaults) -> Result<Vec<Stage>, FileError>
     let (steps, equilibrate) = (root.get("steps"), root.get("equilibrate"));
     let Some(value) = root.get("stage") else { return read_short(root, steps, equilibrate, defaults) };
     if let Some(other) = steps.or(equilibrate) {
-        let message = "there are [[stage]] tables too: give one of them".to_owned();
+        let message = "the scene has [[stage]] tables too: keep one of the two".to_owned();
         return Err(other.error(FileErrorKind::Value(message)));
     }
     let mut stages: Vec<Stage> = Vec::new();
@@ -99,7 +94,7 @@ fn read_all(root: &Section, defaults: Defaults) -> Result<Vec<Stage>, FileError>
     Ok(stages)
 }
 
-/// `steps`, after as many as `equilibrate` says.
+/// Reads `steps`, and `equilibrate` for a stage before it.
 fn read_short(
     root: &Section,
     steps: Option<Value>,
@@ -110,7 +105,7 @@ fn read_short(
         Some(value) => value,
         None if equilibrate.is_some() => root.require("steps")?,
         None => {
-            let error = root.error(FileErrorKind::Value("nothing says how many steps to take".into()));
+            let error = root.error(FileErrorKind::Value("the scene gives no number of steps".into()));
             return Err(error.with_help("give steps, or [[stage]] tables"));
         }
     };
@@ -134,7 +129,7 @@ fn read_short(
 fn read_steps(value: &Value) -> Result<u64, FileError> {
     match value.count()?.value {
         0 => Err(value.error(FileErrorKind::Value("must be at least 1".into()))),
-        // Half, as there may be two.
+        // Each of two stages may have half of the largest number of steps.
         steps if steps > MOST_STEPS / 2 => {
             Err(value.error(FileErrorKind::Value(format!("more than {MOST_STEPS} steps in all"))))
         }
@@ -142,7 +137,7 @@ fn read_steps(value: &Value) -> Result<u64, FileError> {
     }
 }
 
-/// The stages that one table makes: as many as its ramp has levels.
+/// Reads the stages of one table: a ramp makes one stage for each level.
 fn read_one(section: &Section, defaults: Defaults) -> Result<Vec<Stage>, FileError> {
     let name = section.require("name")?.string()?.value;
     let steps = read_steps(&section.require("steps")?)?;
@@ -180,7 +175,7 @@ fn read_one(section: &Section, defaults: Defaults) -> Result<Vec<Stage>, FileErr
     Ok(levels.iter().map(at).collect())
 }
 
-/// The integrator of a stage, or of the scene; `default` if it says nothing.
+/// Reads the integrator of a stage or of the scene; `default` if the file gives none.
 fn read_integrator(section: &Section, default: Integrator) -> Result<Integrator, FileError> {
     let mut integrator = match section.get("integrator") {
         Some(value) => value.one_of("integrator", &Integrator::NAMED)?.value,
@@ -243,7 +238,7 @@ fn read_integrator(section: &Section, default: Integrator) -> Result<Integrator,
     Ok(integrator)
 }
 
-/// Where it is said how the steps of a stage are made.
+/// The value that sets the integrator of a stage, for error messages.
 pub fn place_of_integrator<'a>(root: &Section<'a>, stage: &str) -> Option<Value<'a>> {
     let tables = root.get("stage").and_then(|value| value.array().ok()).unwrap_or_default();
     let mut sections = tables.iter().filter_map(|item| item.section().ok());
@@ -251,12 +246,12 @@ pub fn place_of_integrator<'a>(root: &Section<'a>, stage: &str) -> Option<Value<
     own.and_then(|section| section.get("integrator")).or_else(|| root.get("integrator"))
 }
 
-/// The error of a key that trial moves have no use for.
+/// The error of a time setting in a Monte Carlo stage.
 fn no_time(value: &Value, what: &str) -> FileError {
     value.error(FileErrorKind::Value(format!("monte-carlo has {what}")))
 }
 
-/// The error of a key that an integrator does not have; it names those that do.
+/// The error of a key that an integrator does not have; its help lists the integrators that have it.
 fn has_none(value: &Value, name: &str, key: &str, has: fn(&mut Integrator) -> bool) -> FileError {
     let mut owners = Vec::from(Integrator::NAMED);
     owners.retain_mut(|(_, integrator)| has(integrator));

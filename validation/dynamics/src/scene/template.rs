@@ -1,19 +1,16 @@
-//! Scenes to begin with: a commented scene file and its model.
+//! Templates for `psidpd new`: a commented scene file and its model.
 
 use std::path::{Path, PathBuf};
 
-/// A scene to begin with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Template {
-    /// Its name.
     pub name: &'static str,
-    /// What it is, in a line.
+    /// A description in one line.
     pub about: &'static str,
-    /// The scene file, which names its model as a file beside it.
+    /// The text of the scene file, which names its model as a file beside it.
     pub scene: &'static str,
-    /// The name of the model file.
     pub model_name: &'static str,
-    /// The model file.
+    /// The text of the model file.
     pub model: &'static str,
 }
 
@@ -29,7 +26,6 @@ macro_rules! template {
     };
 }
 
-/// All of them.
 pub const TEMPLATES: &[Template] = &[
     template!("bulk", "standard-dpd", "a bulk fluid"),
     template!("slab", "warren2003-set6", "a slab of liquid between two surfaces"),
@@ -40,7 +36,7 @@ pub const TEMPLATES: &[Template] = &[
     template!("channel", "standard-dpd", "a flow between walls of frozen particles"),
 ];
 
-/// Why a template was not written.
+/// The reason why a template was not written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TemplateError {
@@ -51,11 +47,11 @@ pub enum TemplateError {
 }
 
 impl Template {
-    /// Writes the scene to `path`, with `.toml` if that has no extension, and its model beside it, unless the same
-    /// model is there. Returns both paths, the scene's first.
+    /// Writes the scene to `path`, with `.toml` if the path has no extension, and its model beside it, unless
+    /// the same model is there. Returns the paths of the scene and of the model.
     ///
     /// # Errors
-    /// One of the files is there and has other contents, or cannot be written; see [`TemplateError`]. Nothing is
+    /// One of the files exists with other contents, or cannot be written; see [`TemplateError`]. Nothing is
     /// overwritten.
     pub fn write(&self, path: &Path) -> Result<[PathBuf; 2], TemplateError> {
         let scene = match path.extension() {
@@ -80,7 +76,7 @@ impl Template {
     }
 }
 
-/// Writes a file that must not be there.
+/// Writes a file that must not exist.
 fn create(path: &Path, text: &str) -> Result<(), TemplateError> {
     use std::io::Write;
     let file = std::fs::OpenOptions::new().write(true).create_new(true).open(path);
@@ -118,7 +114,7 @@ mod tests {
         let [scene, model] = TEMPLATES[0].write(&path).unwrap();
         assert_eq!(scene, path);
         assert!(matches!(TEMPLATES[0].write(&path), Err(TemplateError::Exists(p)) if p == path));
-        // The same model serves another scene.
+        // Another scene uses the same model.
         TEMPLATES[0].write(&folder.path().join("other")).unwrap();
         std::fs::write(&model, "changed").unwrap();
         assert!(

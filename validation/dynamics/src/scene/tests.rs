@@ -69,7 +69,7 @@ fn reads_the_schema() {
     assert_eq!(two.integrator, crate::run::Integrator::GrootWarren { lambda: 0.65 });
 }
 
-/// What is replaced, by what, on which line the error is, and a part of its message.
+/// Each row has the text to replace, its replacement, the line of the error, and a part of its message.
 #[test]
 fn errors_name_line_key_and_cause() {
     let cases = [
@@ -84,12 +84,12 @@ fn errors_name_line_key_and_cause() {
         ("5.0, 6.0, 7.0", "5.0, 1.9, 7.0", 6, "share their noise"),
         ("5.0, 6.0, 7.0", "5.0, 1e308, 1e308", 6, "span no volume"),
         ("\"random\"", "\"dat\"", 8, "unknown kind \"dat\""),
-        ("\"random\"", "\"data\"", 6, "box.lengths: the box is that of the file"),
+        ("\"random\"", "\"data\"", 6, "box.lengths: the initial file gives the box"),
         ("\"random\"", "\"slab\"", 7, "initial.thickness: is missing"),
         ("\"random\"", "\"slab\"\nthickness = 8", 9, "must not exceed the box"),
         ("\"random\"", "\"random\"\nthickness = 8", 9, "initial.thickness: unknown key"),
         ("density = 3.0", "density = -1", 9, "must be positive"),
-        ("density = 3.0", "density = 1e-9", 9, "without a particle"),
+        ("density = 3.0", "density = 1e-9", 9, "gives less than one particle"),
         ("density = 3.0", "count = 200_000_000", 9, "too many"),
         ("density = 3.0", "density = 3.0\ncount = 5", 10, "give one of them"),
         ("density = 3.0", "", 7, "needs a density or a count"),
@@ -150,8 +150,8 @@ fn thermal_velocities_have_no_momentum_and_about_the_temperature() {
         let momentum: f64 = (0..state.len()).map(|k| mass(k) * state.v[k][c]).sum();
         assert!(momentum.abs() < 1e-10);
     }
-    // 2K/kT is chi-squared with 3(N - 1) degrees of freedom; five standard deviations fail by chance
-    // less than once in 10^6, and the seed is fixed.
+    // The ratio 2K/kT is chi-squared with 3(N - 1) degrees of freedom; five standard deviations fail by
+    // chance less than once in 10^6, and the seed is fixed.
     let freedom = 3.0 * (state.len() - 1) as f64;
     let twice_kinetic: f64 =
         (0..state.len()).map(|k| mass(k) * state.v[k].iter().map(|v| v * v).sum::<f64>()).sum();
@@ -208,7 +208,7 @@ fn five_lines_are_a_scene() {
     assert_eq!((first.name.as_str(), first.steps), ("equilibrate", 5));
     assert_eq!((second.steps, second.dt), (40, 0.02));
     assert_eq!(second.integrator, crate::run::Integrator::GrootWarren { lambda: 0.65 });
-    // A start that says how replaces the one that does not, at the same density.
+    // `[initial]` with a sphere replaces the random start at the same density.
     let ball = text.to_owned() + "[initial]\nkind = \"sphere\"\nradius = 2.0\n";
     let scene = parse(&ball).unwrap();
     assert_eq!(
@@ -264,7 +264,7 @@ fn parts_fill_their_regions_and_nothing_else() {
     assert_eq!(scene.domain.periodic(), [true, true, false]);
     let state = scene.initial_state();
     let counts: Vec<usize> = scene.initial.parts().iter().map(|p| p.count).collect();
-    // 4 × 2.5² π, 4 × 2² 5 π, 4 × 64
+    // The volumes are 2.5² π, 2² 5 π and 64, at density 4.
     assert_eq!(counts, [79, 251, 256]);
     assert_eq!(state.len(), 586);
     let mut first = 0;
@@ -282,7 +282,7 @@ fn parts_fill_their_regions_and_nothing_else() {
             && !gravity.acts_on(0, 79)
             && !gravity.acts_on(1, 400)
     );
-    // The column moves as one, on top of velocities without momentum.
+    // The column moves as one body, with thermal velocities of zero total momentum.
     let drift: f64 = state.v[79..330].iter().map(|v| v[2]).sum::<f64>() / 251.0;
     assert!((drift + 0.5).abs() < 1e-12);
 }
@@ -313,7 +313,12 @@ fn errors_of_parts_name_line_key_and_cause() {
         ("lattice = \"fcc\"", "min_distance = 0.9", 16, "of 79 particles found a place"),
         ("species = \"A\"\nvelocity", "species = \"C\"\nvelocity", 25, "unknown species \"C\""),
         ("species = \"A\"\nvelocity", "density_ = 1\nvelocity", 25, "density_: unknown key"),
-        ("density = 4.0\nspecies = \"A\"\nvelocity", "density = 1e-3\nvelocity", 24, "without a particle"),
+        (
+            "density = 4.0\nspecies = \"A\"\nvelocity",
+            "density = 1e-3\nvelocity",
+            24,
+            "gives less than one particle",
+        ),
         (
             "species = \"A\"\nvelocity",
             "species = \"A\"\nfrozen = true\nvelocity",
@@ -333,7 +338,7 @@ fn errors_of_parts_name_line_key_and_cause() {
         ("[\"periodic\", \"periodic\", \"reflecting\"]", "[\"periodic\"]", 7, "one for each of 3 directions"),
         ("steps = 10", "steps = 10\n[initial]\nkind = \"random\"", 10, "there is an [initial] too"),
         ("steps = 10", "equilibrate = 10", 1, "steps: is missing"),
-        ("steps = 10", "", 1, "nothing says how many steps"),
+        ("steps = 10", "", 1, "the scene gives no number of steps"),
     ];
     for (from, to, line, message) in cases {
         assert!(PARTS.contains(from), "{from}");
@@ -346,14 +351,14 @@ fn errors_of_parts_name_line_key_and_cause() {
         PARTS.replace("velocity = [0.0, 0.0, -0.5]", "frozen = true").replace("parts = [\"column\"]", "");
     assert!(parse(&frozen).unwrap_err().to_string().contains("every part is frozen"));
     let nothing = "model = \"mixture.toml\"\nkT = 1.0\nbox = 6\nsteps = 3\n";
-    assert!(parse(nothing).unwrap_err().to_string().contains("nothing says what the box is filled with"));
+    assert!(parse(nothing).unwrap_err().to_string().contains("the scene gives no particles"));
     let rests = nothing.to_owned() + "density = 1\n[[part]]\nshape = \"rest\"\n[[part]]\nshape = \"rest\"\n";
     assert!(parse(&rests).unwrap_err().to_string().contains("part 1 is the rest already"));
     let full = nothing.to_owned() + "density = 1\n[[part]]\nshape = \"box\"\n[[part]]\nshape = \"rest\"\n";
     assert!(parse(&full).unwrap_err().to_string().contains("there is no rest"));
 }
 
-/// Two drops that fly at each other in a bath: who is where, and how fast.
+/// Two drops that fly at each other in a bath: species, places and velocities are those of the file.
 #[test]
 fn drops_in_a_bath() {
     let text = "model = \"mixture.toml\"\nkT = 1.0\nbox = [8, 8, 14]\ndensity = 5\nsteps = 3\n\
@@ -387,7 +392,7 @@ fn random_particles_keep_their_distance() {
     let apart = SCENE.replace("density = 3.0", "density = 3.0\nmin_distance = 0.5");
     assert!(nearest(SCENE) < 0.2);
     assert!(nearest(&apart) >= 0.5);
-    // What a page of the reference says can be had: 0.75 and 0.7 of the mean distance.
+    // The documentation promises these minimum distances: 0.75 and 0.7 of the mean distance.
     let full = SCENE.replace("density = 3.0", "density = 3.0\nmin_distance = 0.52");
     assert!(nearest(&full) >= 0.52);
     let flat = SCENE
@@ -408,7 +413,7 @@ fn ramps_have_levels_that_add_up() {
     assert!(scene.stages[1..].iter().all(|s| s.name == "two"));
     let cases = [
         ("kT = 2.0", "kT = [2.0, 1.0]\nlevels = 21", 21, "must be from 1 to 20"),
-        ("kT = 2.0", "kT = 2.0\nlevels = 4", 21, "has no levels"),
+        ("kT = 2.0", "kT = 2.0\nlevels = 4", 21, "only a ramp has levels"),
         ("kT = 2.0", "kT = [2.0, 1.0, 3.0]", 20, "two of a ramp"),
         ("kT = 2.0", "kT = [2.0, 0.0]", 20, "must be positive"),
     ];
@@ -440,14 +445,14 @@ fn data_files_bring_box_and_frozen_particles() {
         ("[1, 79]", "[1, 900]", "nothing would move"),
         ("[1, 79]", "[1]", "the first and the last id"),
         ("start.data", "none.data", "none.data"),
-        ("steps = 3", "steps = 3\ndensity = 2.0", "the particles are those of the file"),
+        ("steps = 3", "steps = 3\ndensity = 2.0", "the initial file gives the particles"),
     ] {
         let error = Scene::parse("s.toml", &text.replace(from, to), folder.path()).unwrap_err();
         assert!(error.to_string().contains(message), "{error}");
     }
 }
 
-/// A run that starts from the checkpoint of another has its particles, where and as fast as they were.
+/// A run that starts from the checkpoint of another has the same positions and velocities.
 #[test]
 fn checkpoints_bring_all_but_the_clock() {
     let folder = folder();
@@ -461,7 +466,7 @@ fn checkpoints_bring_all_but_the_clock() {
     assert_eq!(scene.initial_state(), last);
     let file = Scene::parse("s.toml", &text.replace("\"run\"", "\"run/checkpoint\""), folder.path()).unwrap();
     assert_eq!(file.initial_state(), last);
-    // Walls stay where they were unless the scene says otherwise.
+    // Walls keep their places unless the scene gives others.
     let box_of = "[box]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]\n";
     let plain = Scene::parse("s.toml", &text.replace(box_of, ""), folder.path()).unwrap();
     assert_eq!(plain.domain, last.domain);
@@ -478,7 +483,7 @@ fn checkpoints_bring_all_but_the_clock() {
     }
 }
 
-/// Frozen particles, walls, body forces and a ramp go on bit for bit from any step.
+/// Frozen particles, walls, body forces and a ramp continue bit for bit from any step.
 #[test]
 fn an_interrupted_run_of_parts_goes_on_to_the_same_bytes() {
     use crate::run::{Begin, Runner};

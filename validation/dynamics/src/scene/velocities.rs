@@ -1,16 +1,16 @@
-//! `velocities` of what is filled.
+//! `velocities` of a filled region or of a start from a file.
 
 use crate::particles::thermal_velocities;
 use chacha20::ChaCha8Rng;
 use psidpd_core::document::{FileError, Section};
 
-/// How particles move at the start.
+/// The distribution of the initial velocities.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Velocities {
-    /// Maxwell's distribution at the temperature of the scene, with the momentum of the part taken out.
+    /// Maxwell's distribution at the temperature of the scene, with zero total momentum of the part.
     #[default]
     Thermal,
-    /// Not at all.
+    /// All particles at rest.
     Zero,
 }
 
@@ -23,7 +23,7 @@ impl Velocities {
         }
     }
 
-    /// The same for a start from a file: `None` keeps its velocities, which is the default if `keep` is set.
+    /// Reads the velocities of a start from a file: `None` keeps those of the file, which is the default if `keep` is set.
     pub(super) fn read_or_keep(initial: &Section, keep: bool) -> Result<Option<Velocities>, FileError> {
         let names =
             [("thermal", Some(Velocities::Thermal)), ("zero", Some(Velocities::Zero)), ("keep", None)];
@@ -33,7 +33,7 @@ impl Velocities {
         }
     }
 
-    /// Velocities of particles of the masses `mass`.
+    /// Draws velocities of particles of the masses `mass`.
     pub(super) fn draw(
         self,
         mass: impl Iterator<Item = f64>,

@@ -1,8 +1,8 @@
-//! A fluid as tables for LAMMPS's `pair_style eam/alloy`, which every LAMMPS has.
+//! Export of a fluid as tables for LAMMPS's `pair_style eam/alloy`, which most LAMMPS builds have.
 //!
-//! The energy of that style is `Σ_i F_a(ρ_i) + Σ_{i<j} φ_ab(r)`, `ρ_i = Σ_j f_b(r_ij)`: one density, that
-//! does not tell who feels it. ψ goes into `F`, the kernel into `f`; densities in which every ψ is linear
-//! are pair potentials and go into `φ`, with the pair terms of the model.
+//! The energy of that style is `Σ_i F_a(ρ_i) + Σ_{i<j} φ_ab(r)`, `ρ_i = Σ_j f_b(r_ij)`: one density, whose
+//! kernel depends on the neighbour's species alone. ψ becomes `F` and the kernel becomes `f`. Densities in
+//! which every ψ is linear are pair potentials and go into `φ`, with the pair terms of the model.
 
 use psidpd_core::engine::Plan;
 use psidpd_core::model::expression::{Formula, TooLarge};
@@ -12,15 +12,14 @@ use psidpd_formats::FormatError;
 use psidpd_formats::setfl::{Element, Setfl};
 use std::path::Path;
 
-/// How fine the tables are.
+/// The resolution of the tables.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grid {
-    /// Spacing in r. A spline is exact but near kinks of w′ and φ′, where its error in the force is
+    /// Spacing in r. A spline is accurate except near kinks of w′ and φ′, where its error of the force is
     /// proportional to the spacing.
     pub spacing: f64,
-    /// Largest density in the table of F; LAMMPS goes on linearly beyond.
+    /// Largest density in the table of F; beyond it LAMMPS extrapolates linearly.
     pub largest_density: f64,
-    /// Number of densities in the table.
     pub densities: usize,
 }
 
@@ -30,10 +29,10 @@ impl Default for Grid {
     }
 }
 
-/// The most numbers of a file: one of half a gigabyte.
+/// Largest number of values in a file, which has then half a gigabyte.
 const MOST: u32 = 20_000_000;
 
-/// Why a fluid cannot be written as `eam/alloy`.
+/// The reason why a fluid has no form as `eam/alloy`.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum EamError {
@@ -46,7 +45,7 @@ pub enum EamError {
     PartialDensities { species: String, density: String },
     #[error("the correction of {0} is not the identity: eam/alloy has uncorrected densities")]
     Correction(String),
-    #[error("{0} has bounds: a table cannot say that psi goes on beyond them; remove them or the export")]
+    #[error("{0} has bounds, and a table cannot represent how psi continues beyond them: remove the bounds")]
     Bounds(String),
     #[error("eam/alloy is tabulated for three dimensions here, the model has two")]
     Flat,
@@ -57,7 +56,7 @@ pub enum EamError {
     #[error("the spacing, the largest density and the number of densities must be positive")]
     Grid,
     #[error(
-        "the tables would have {0:.3e} numbers, and {MOST} are the most: take a larger spacing or fewer densities"
+        "the tables would have {0:.3e} numbers, more than the limit of {MOST}: take a larger spacing or fewer densities"
     )]
     TooFine(f64),
     #[error(transparent)]
@@ -66,10 +65,10 @@ pub enum EamError {
     File(#[from] FormatError),
 }
 
-/// Writes the tables of `fluid`, whose species become elements of mass `mass`.
+/// Writes the tables of `fluid`; `mass` holds the masses of its species, which become elements.
 ///
 /// # Errors
-/// The fluid is more than one density per particle can say; see [`EamError`].
+/// `eam/alloy` cannot represent the fluid, or the file cannot be written; see [`EamError`].
 pub fn write(fluid: &Fluid, mass: &[f64], grid: Grid, path: &Path) -> Result<(), EamError> {
     if fluid.dimensions != 3 {
         return Err(EamError::Flat);
@@ -95,7 +94,6 @@ pub fn write(fluid: &Fluid, mass: &[f64], grid: Grid, path: &Path) -> Result<(),
     let (species, cutoff) = (fluid.species.len() as f64, potential_range(fluid));
     let rows = cutoff / grid.spacing;
     let numbers = species * (grid.densities as f64 + rows) + 0.5 * species * (species + 1.0) * rows;
-    // What is no number either.
     if numbers.is_nan() || numbers > f64::from(MOST) {
         return Err(EamError::TooFine(numbers));
     }
@@ -148,7 +146,7 @@ fn check_density(fluid: &Fluid, d: usize) -> Result<(), EamError> {
         return Err(EamError::Bounds(density.name.clone()));
     }
     for (alpha, excess) in fluid.excess.iter().enumerate() {
-        // A curve is a function of the sum by construction.
+        // A curve is a function of the summed density by definition.
         let ExcessFreeEnergy::Formula(psi) = excess else { continue };
         let slopes =
             (0..count).map(|b| psi.derivative(d * count + b)).collect::<Result<Vec<Formula>, _>>()?;
@@ -162,7 +160,7 @@ fn check_density(fluid: &Fluid, d: usize) -> Result<(), EamError> {
     Ok(())
 }
 
-/// `F_α(n)`: ψ_α with the linear densities at zero, whose terms are pair potentials.
+/// `F_α(n)`: ψ_α with the linear densities at zero; their terms are pair potentials.
 fn embedding(fluid: &Fluid, alpha: usize, pass: Option<usize>, n: f64) -> f64 {
     let count = fluid.species.len();
     let own = |d: usize| {
@@ -182,7 +180,7 @@ fn embedding(fluid: &Fluid, alpha: usize, pass: Option<usize>, n: f64) -> f64 {
                 .collect();
             psi.value(&at)
         }
-        // Refused before: it has no potential.
+        // This case was refused earlier, because the law has no potential.
         ExcessFreeEnergy::Slopes(law) => law.energy.value(&vec![0.0; fluid.variables()]),
         ExcessFreeEnergy::Curve(curve) => {
             curve.at(if pass == Some(curve.density) { n + own(curve.density) } else { own(curve.density) })[0]
@@ -206,7 +204,8 @@ mod tests {
     use psidpd_core::model::Model;
     use std::f64::consts::PI;
 
-    /// Where a particle counts itself, its embedding is at its neighbours' density and w(0) = 15/(2π): a formula and a curve.
+    /// If particles count themselves, the embedding is that at the neighbours' density plus w(0) = 15/(2π).
+    /// The test uses a formula and a curve.
     #[test]
     fn a_particle_that_counts_itself_has_its_own_density_in_the_table() {
         let own = 15.0 / (2.0 * PI);

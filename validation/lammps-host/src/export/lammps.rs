@@ -1,8 +1,8 @@
-//! A scene as a LAMMPS input deck: start, model and script, for the pair style `dpd/psi`.
+//! Export of a scene as a LAMMPS input deck for the pair style `dpd/psi`: initial state, model and script.
 //!
-//! The deck takes the steps of [`run_scene`](psidpd_dynamics::run::run_scene) with the same noise. The native
-//! runner computes the forces of the present step anew where a stage begins, as LAMMPS does where a `run`
-//! begins, and both key the noise of a step by its number, so stages become `run` commands.
+//! The deck makes the same steps as [`run_scene`](psidpd_dynamics::run::run_scene), with the same noise. The
+//! native runner computes the forces of the present step anew at the start of a stage, as LAMMPS does at the
+//! start of a `run`. Both key the noise of a step by its number, so stages become `run` commands.
 
 mod physics;
 
@@ -17,25 +17,25 @@ use psidpd_dynamics::scene::{Scene, Stage};
 use std::fmt::Write;
 use std::path::{Component, Path, PathBuf};
 
-/// The script.
+/// The name of the script.
 pub const SCRIPT: &str = "in.lammps";
-/// The state it starts from.
+/// The name of the initial state.
 pub const START: &str = "start.data";
-/// The model.
+/// The name of the model.
 pub const MODEL: &str = "model.toml";
-/// The model of stages without thermostat.
+/// The name of the model for stages without a thermostat.
 pub const MODEL_WITHOUT_THERMOSTAT: &str = "model-without-thermostat.toml";
 
-/// All of these.
+/// The names of all files.
 pub const FILES: [&str; 4] = [SCRIPT, START, MODEL, MODEL_WITHOUT_THERMOSTAT];
 
-/// Most steps of one `run` command.
+/// Largest number of steps of one `run` command.
 const MOST_STEPS: u64 = i32::MAX as u64;
 
-/// Each may need three of the 32 groups.
+/// Largest number of body forces: each may need three of LAMMPS's 32 groups.
 const MOST_BODY_FORCES: usize = 9;
 
-/// Why a scene cannot be written as a deck.
+/// The reason why a scene has no deck.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DeckError {
@@ -56,7 +56,7 @@ pub enum DeckError {
     #[error("{0} body forces need more groups than LAMMPS has: at most {MOST_BODY_FORCES} can be written")]
     BodyForces(usize),
     #[error(
-        "{}: cannot take the thermostat out for the stages without; write it as [[thermostat]] sections",
+        "{}: cannot remove the thermostat for the stages without one; write it as [[thermostat]] sections",
         model.display()
     )]
     Thermostat { model: PathBuf },
@@ -72,8 +72,7 @@ pub enum DeckError {
     Output { path: PathBuf, source: std::io::Error },
 }
 
-/// Writes the deck of `scene` to the folder `out`, which is made if need be, and returns the names of its
-/// files.
+/// Writes the deck of `scene` to the folder `out`, which is created if it is missing, and returns the paths of its files.
 ///
 /// # Errors
 /// The scene has no counterpart in LAMMPS, or a file cannot be written; see [`DeckError`].
@@ -88,7 +87,7 @@ pub fn write(scene: &Scene, out: &Path) -> Result<Vec<PathBuf>, DeckError> {
         if let Some(parent) = path.parent() {
             std::fs::create_dir_all(parent).map_err(output(parent))?;
         }
-        // A copy of a file onto itself would empty it.
+        // Copying a file onto itself would empty it.
         if !path.canonicalize().is_ok_and(|there| from.canonicalize().is_ok_and(|here| here == there)) {
             std::fs::copy(&from, &path).map_err(output(&path))?;
         }
@@ -141,7 +140,7 @@ fn check(scene: &Scene) -> Result<(), DeckError> {
     Ok(())
 }
 
-/// The text of the model with tables beside it, and which file becomes which.
+/// The text of the model with its tables in the same folder, and the source and target of each copied table.
 fn copy_of_model(scene: &Scene) -> Result<(String, Vec<(PathBuf, PathBuf)>), DeckError> {
     let source = scene.model.source();
     let mut text = source.text().to_owned();
@@ -170,7 +169,7 @@ fn copy_of_model(scene: &Scene) -> Result<(String, Vec<(PathBuf, PathBuf)>), Dec
     Ok((text, copies))
 }
 
-/// Names of the files that a model refers to, as it writes them.
+/// Names of the tables of a model, as the model writes them.
 fn tables(name: &str, text: &str) -> Result<Vec<String>, FileError> {
     let document = Document::parse(name, text)?;
     let root = document.root();
@@ -206,7 +205,7 @@ fn without_thermostat(text: &str) -> String {
     kept
 }
 
-/// Whether the model at `path` makes the fluids of the scene; without thermostat if `thermostat` is not set.
+/// Whether the model at `path` equals the fluids of the scene, without their thermostat if `thermostat` is false.
 fn compare(scene: &Scene, path: &Path, thermostat: bool) -> Result<bool, DeckError> {
     let copy = Model::open(path)?;
     let same = |a: &Fluid, b: &Fluid| {
@@ -229,15 +228,12 @@ fn compare(scene: &Scene, path: &Path, thermostat: bool) -> Result<bool, DeckErr
     Ok(true)
 }
 
-/// Writes a state as the start of a deck.
-///
-/// # Errors
-/// The file cannot be written.
+/// Writes a state as the initial state of a deck; fails if the file cannot be written.
 pub fn write_start(scene: &Scene, state: &State, path: &Path) -> Result<(), DeckError> {
     let mut data = state.to_data(&format!("psidpd: {}, step 0", one_line(&scene.title)));
     data.sort_by_id();
     if scene.model.dimensions() == 2 {
-        // LAMMPS wants the plane z = 0, and nothing depends on it.
+        // LAMMPS requires the plane z = 0, and nothing depends on the third edge.
         (data.boxlo[2], data.boxhi[2]) = (-0.5, 0.5);
         data.tilt = data.tilt.map(|[xy, _, _]| [xy, 0.0, 0.0]);
         for atom in &mut data.atoms {
@@ -247,7 +243,7 @@ pub fn write_start(scene: &Scene, state: &State, path: &Path) -> Result<(), Deck
     data.write(path).map_err(|e| DeckError::Run(e.into()))
 }
 
-/// The script of [`write()`] alone.
+/// The script that [`write()`] writes, alone.
 ///
 /// # Errors
 /// The scene has no counterpart in LAMMPS.
@@ -324,7 +320,7 @@ fn write_script(scene: &Scene, s: &mut String) -> std::fmt::Result {
     writeln!(s, "\nwrite_data    final.data nocoeff")
 }
 
-/// The style and the arguments of the fix that makes the steps.
+/// The style and the arguments of the fix that integrates.
 fn motion(integrator: &Integrator) -> String {
     let mut integrator = *integrator;
     if integrator.properties().lammps != Counterpart::Splitting {
@@ -346,8 +342,8 @@ fn motion(integrator: &Integrator) -> String {
     text
 }
 
-/// A title for a comment: one line, without `&`, which continues a line, and without double quotes, since
-/// three of them begin a multi-line text in LAMMPS.
+/// Makes a title fit for a comment: one line, without `&`, which continues a line, and without double quotes,
+/// because three of them begin a multi-line text in LAMMPS.
 fn one_line(text: &str) -> String {
     let plain = |c: char| match c {
         '&' => ' ',

@@ -1,4 +1,4 @@
-//! A fluid in the formats of other codes.
+//! Exports to the formats of other codes.
 
 pub mod eam;
 pub mod lammps;

@@ -1,4 +1,4 @@
-//! Forces at displaced positions, which stand for the gradient of the square of the forces.
+//! Forces at displaced positions, which approximate the gradient of the squared forces.
 
 use super::{RunError, Simulation};
 use psidpd_core::engine::pair_sums::COMPONENTS;
@@ -8,16 +8,17 @@ use psidpd_observe::flux::Displaced;
 impl Simulation {
     /// Replaces the forces by `F(x̃)`, `x̃ = x + c F(x)/m`, for a kick of the particles at `x`.
     ///
-    /// Two evaluations, of forces alone. Where momentum is recorded the second has a virial too: of forces `F̃` between the
-    /// particles at `x` that is `W(x̃) − Σ (x̃ − x) ⊗ F̃`, with the conservative part of `F̃`.
+    /// The two evaluations compute forces alone. If momentum is recorded, the second computes a virial too.
+    /// The virial of forces `F̃` between the particles at `x` is `W(x̃) − Σ (x̃ − x) ⊗ F̃`, with the
+    /// conservative part of `F̃`.
     ///
     /// # Errors
-    /// As [`Simulation::compute`], at either place.
+    /// The errors of [`Simulation::compute`], at either set of positions.
     pub(in crate::run) fn displaced_forces(&mut self, c: f64) -> Result<(), RunError> {
         self.compute(Want::FORCES, None)?;
         self.add_external_forces();
         self.displace(c);
-        // Forces at displaced positions beyond a wall are not those at the wall.
+        // A displaced particle may lie beyond a wall; its forces are those at its true position, not at the wall.
         let within = self.beyond_walls().map(|wide| self.particles.replace_domain(wide));
         let made = self.compute(Want { virial: self.is_recording(), ..Want::FORCES }, None);
         let wide = within.map(|within| self.particles.replace_domain(within));
@@ -36,7 +37,7 @@ impl Simulation {
         made
     }
 
-    /// `W − Σ (x̃ − x) ⊗ F`, its symmetric part, of the last evaluation, made at `to`.
+    /// The symmetric part of `W − Σ (x̃ − x) ⊗ F` of the last evaluation, whose positions were `to`.
     fn virial_from(&self, to: &[[f64; 3]], forces: &[[f64; 3]]) -> [f64; 6] {
         let mut virial = self.tally().virial;
         for ((to, x), f) in to.iter().zip(self.positions()).zip(forces) {
@@ -48,7 +49,7 @@ impl Simulation {
         virial
     }
 
-    /// A box that all positions are in along directions with walls, if there are walls.
+    /// A box that holds all positions along directions with walls; `None` without walls.
     fn beyond_walls(&self) -> Option<PeriodicBox> {
         let (domain, dimensions) = (self.domain(), self.dimensions());
         if domain.periodic()[..dimensions].iter().all(|periodic| *periodic) {
@@ -62,7 +63,8 @@ impl Simulation {
                 .fold([low[k], low[k] + lengths[k]], |[a, b], x| [a.min(x[k]), b.max(x[k])]);
             (low[k], lengths[k]) = (ends[0], ends[1] - ends[0]);
         }
-        // Without walls that lean; what is not finite the evaluation refuses.
+        // Boxes with walls are never tilted. Positions that are not finite make this
+        // `None`; the evaluation then refuses them.
         PeriodicBox::orthogonal(low, lengths, domain.periodic()).ok()
     }
 }

@@ -1,4 +1,4 @@
-//! Frozen particles and body forces: what acts on particles from outside the fluid.
+//! Frozen particles and body forces, which act on the fluid from outside.
 
 use super::Simulation;
 use super::particles::Particles;
@@ -8,9 +8,9 @@ use psidpd_core::engine::Pool;
 #[derive(Debug, Clone)]
 pub(super) struct External {
     frozen_tags: Tags,
-    /// By particle; empty if none is frozen.
+    /// Whether each particle is frozen; empty if none is.
     frozen: Vec<bool>,
-    /// Sum of the forces on the frozen particles, in the last evaluation.
+    /// Sum of the forces on the frozen particles in the last evaluation.
     support_force: [f64; 3],
     body_forces: Vec<BodyForce>,
 }
@@ -21,12 +21,12 @@ impl External {
         External { frozen_tags, frozen: Vec::new(), support_force: [0.0; 3], body_forces: Vec::new() }
     }
 
-    /// Which particles are frozen, one by one; empty if none is.
+    /// Whether each particle is frozen; empty if none is.
     pub fn frozen(&self) -> &[bool] {
         &self.frozen
     }
 
-    /// Finds the frozen particles by their tags, whose order may have changed, and stops them.
+    /// Finds the frozen particles by their tags, because reordering moves them, and sets their velocities to zero.
     pub fn find_frozen(&mut self, particles: &mut Particles) {
         self.frozen.clear();
         if self.frozen_tags.is_empty() {
@@ -39,14 +39,13 @@ impl External {
         self.clear_frozen(particles.velocities_mut());
     }
 
-    /// Sets the vectors of frozen particles to zero.
     pub fn clear_frozen(&self, vectors: &mut [[f64; 3]]) {
         for (vector, _) in vectors.iter_mut().zip(&self.frozen).filter(|(_, frozen)| **frozen) {
             *vector = [0.0; 3];
         }
     }
 
-    /// Adds body forces; and takes all forces from what is frozen, so that every integrator leaves it alone.
+    /// Adds body forces, and sets all forces on frozen particles to zero, so that no integrator moves them.
     pub fn add_forces(&mut self, particles: &mut Particles, pool: &Pool) {
         let (state, force) = particles.forces_mut();
         if !self.body_forces.is_empty() {
@@ -66,39 +65,38 @@ impl External {
 }
 
 impl Simulation {
-    /// Body forces, and none on what is frozen.
+    /// Adds body forces, and sets the forces on frozen particles to zero.
     pub(super) fn add_external_forces(&mut self) {
         self.external.add_forces(&mut self.particles, self.forces.pool());
     }
 
-    /// Freezes the particles of these tags, and no others: they rest where they are, and act on the others.
-    /// Their temperature and momentum do not count.
+    /// Freezes exactly the particles of these tags: they stay at rest and act on the others. Temperature and
+    /// momentum exclude them.
     pub fn set_frozen(&mut self, tags: &Tags) {
         self.external.frozen_tags = tags.clone();
         self.external.find_frozen(&mut self.particles);
     }
 
-    /// Which particles are frozen, one by one; empty if none is.
+    /// Whether each particle is frozen; empty if none is.
     pub fn frozen(&self) -> &[bool] {
         &self.external.frozen
     }
 
-    /// How many particles move.
+    /// Number of particles that are not frozen.
     pub fn mobile(&self) -> usize {
         self.len() - self.frozen().iter().filter(|frozen| **frozen).count()
     }
 
-    /// The sum of all forces on the frozen particles in the last evaluation: what holds them must balance it.
+    /// The sum of all forces on the frozen particles in the last evaluation, which their support must balance.
     pub fn support_force(&self) -> [f64; 3] {
         self.external.support_force
     }
 
-    /// The body forces that act from the next evaluation of forces on.
+    /// Sets the body forces, from the next evaluation of forces on.
     pub fn set_body_forces(&mut self, forces: &[BodyForce]) {
         self.external.body_forces = forces.to_vec();
     }
 
-    /// Whether there are any.
     pub fn has_body_forces(&self) -> bool {
         !self.external.body_forces.is_empty()
     }

@@ -1,4 +1,4 @@
-//! Forces between the particles: the engine of one model at one temperature, and the totals of its last evaluation.
+//! Forces between particles: the engine of one model at one temperature, and the totals of its last evaluation.
 
 use super::particles::Particles;
 use super::{RunError, Simulation};
@@ -16,13 +16,12 @@ pub(super) struct Forces {
     tally: Tally,
     all_densities: bool,
     pair_sums_only: bool,
-    /// What engines of earlier temperatures counted.
+    /// Evaluations of ψ below and above density bounds, counted by engines of earlier temperatures.
     earlier_out_of_bounds: [u64; 2],
 }
 
 impl Forces {
-    /// # Errors
-    /// The model does not hold at `kt`.
+    /// Creates the forces; fails if the model is invalid at `kt`.
     pub fn new(model: &Model, kt: f64) -> Result<Forces, RunError> {
         let settings = Settings { precision: Precision::Double, ..Settings::default() };
         Ok(Forces {
@@ -36,8 +35,8 @@ impl Forces {
         })
     }
 
-    /// Computes forces between particles, with noise and drag of `step`, or conservative ones only; no body forces.
-    /// Errors name the step by its `number`.
+    /// Computes pair forces, without body forces: with the noise and drag of `step`, or conservative forces
+    /// only. Errors name the step by its `number`.
     pub fn compute(
         &mut self,
         particles: &mut Particles,
@@ -62,18 +61,18 @@ impl Forces {
         Ok(())
     }
 
-    /// Makes the totals of the last evaluation infinite.
+    /// Sets the totals of the last evaluation to infinity.
     pub fn set_infinite(&mut self) {
         self.tally = Tally { excess: f64::INFINITY, virial: [f64::INFINITY; 6], ..Tally::default() };
     }
 
-    /// Refuses boxes in which a particle meets two images of one neighbour within the range of the noise.
+    /// Refuses boxes so narrow that a particle has two images of one neighbour within the range of the noise.
     pub fn check_width(&self, domain: &PeriodicBox) -> Result<(), RunError> {
         let Some(range) = self.plan().noise_range() else { return Ok(()) };
         let periodic = domain.periodic();
         let heights = (0..self.plan().dimensions()).filter(|k| periodic[*k]).map(|k| domain.height(k));
         let height = heights.fold(f64::INFINITY, f64::min);
-        // Widths come from an inverse matrix: leave room for its rounding.
+        // Heights are computed from an inverse matrix; the limit leaves room for its rounding.
         if height < 2.0 * range * (1.0 - 1e-12) {
             Err(RunError::BoxTooNarrow { height, range })
         } else {
@@ -81,7 +80,7 @@ impl Forces {
         }
     }
 
-    /// Adds the virial of impulses that the thermostat gave apart from the forces.
+    /// Adds the virial of thermostat impulses that are not part of the forces.
     pub fn add_thermostat_virial(&mut self, virial: [f64; 6]) {
         (0..6).for_each(|c| self.tally.thermostat_virial[c] += virial[c]);
     }
@@ -102,7 +101,7 @@ impl Forces {
         self.kt
     }
 
-    /// The order of the particles in the last sweep, if there was one.
+    /// The order of the particles in the last sweep; `None` before a sweep.
     pub fn order(&self) -> Option<&[u32]> {
         self.engine.order()
     }
@@ -111,8 +110,7 @@ impl Forces {
         self.earlier_out_of_bounds = earlier;
     }
 
-    /// # Errors
-    /// The model does not hold at `kt`.
+    /// Changes the temperature; fails if the model is invalid at `kt`.
     pub fn set_temperature(&mut self, kt: f64) -> Result<(), RunError> {
         let (settings, pool) = (self.engine.settings(), self.engine.pool().clone());
         self.replace(Engine::with_pool(&self.model.at(kt)?, settings, pool)?);
@@ -133,10 +131,8 @@ impl Forces {
 }
 
 impl Simulation {
-    /// Makes forces wrong from now on, until settings or the temperature are set: for tests that others notice it.
-    ///
-    /// # Errors
-    /// As [`Simulation::set_settings`].
+    /// Makes forces wrong until settings or the temperature are set: tests use it to check that errors of
+    /// forces are noticed.
     #[doc(hidden)]
     pub fn falsify(&mut self, fault: Fault) -> Result<(), RunError> {
         let Forces { model, kt, engine, .. } = &self.forces;
@@ -145,10 +141,10 @@ impl Simulation {
         Ok(())
     }
 
-    /// Settings for the evaluations to come; by default double precision on one thread.
+    /// Sets the settings of later evaluations; the default is double precision on one thread.
     ///
     /// # Errors
-    /// The model does not hold at the present temperature: never, since it did before.
+    /// The model is invalid at the present temperature; this cannot happen, because it was valid before.
     pub fn set_settings(&mut self, settings: Settings) -> Result<(), RunError> {
         let Forces { model, kt, .. } = &self.forces;
         self.forces.replace(Engine::new(&model.at(*kt)?, settings)?);
@@ -156,71 +152,68 @@ impl Simulation {
         Ok(())
     }
 
-    /// How forces are computed.
+    /// The settings of the evaluations.
     pub fn settings(&self) -> Settings {
         self.forces.settings()
     }
 
-    /// The engine, for what it can tell of itself.
+    /// The engine, for its diagnostics.
     pub fn engine(&self) -> &Engine {
         &self.forces.engine
     }
 
-    /// The path of steps that want forces only, for people.
+    /// Describes for people how steps that need forces only are evaluated.
     pub fn evaluation(&self) -> String {
         let Forces { engine, all_densities, .. } = &self.forces;
         let want = Want { densities: *all_densities, ..Want::FORCES };
         engine.describe(engine.path_for(Surroundings::Box(self.domain()), want))
     }
 
-    /// The model.
     pub fn model(&self) -> &Model {
         &self.forces.model
     }
 
-    /// kT.
     pub fn kt(&self) -> f64 {
         self.forces.kt
     }
 
-    /// The plan of the engine.
     pub fn plan(&self) -> &Plan {
         self.forces.plan()
     }
 
-    /// 2 or 3.
+    /// Number of dimensions, 2 or 3.
     pub fn dimensions(&self) -> usize {
         self.forces.plan().dimensions()
     }
 
-    /// How many evaluations of ψ met a density below its bounds, and above them.
+    /// Number of evaluations of ψ at a density below and above its bounds.
     pub fn out_of_bounds(&self) -> [u64; 2] {
         self.forces.out_of_bounds()
     }
 
-    /// How often each pass of the engine has run, since the temperature was last changed.
+    /// Number of runs of each pass of the engine since the last change of temperature.
     pub fn counts(&self) -> PassCounts {
         self.forces.engine.counts()
     }
 
-    /// Local densities of the particles in the last evaluation, if [`Simulation::sum_all_densities`] asked for them: one
-    /// for each density and species, density-major.
+    /// Local densities of the particles in the last evaluation, if [`Simulation::sum_all_densities`] enabled
+    /// them: one for each density and species, density-major.
     pub fn local_densities(&self) -> &[f64] {
         self.forces.engine.local_densities()
     }
 
-    /// Whether evaluations compute every density of the model.
+    /// Sets whether evaluations compute every density of the model.
     pub fn sum_all_densities(&mut self, all: bool) {
         self.forces.all_densities = all;
     }
 
-    /// Whether every evaluation is done by the reference, which is slower and in double precision.
+    /// Sets whether the pair sums do every evaluation; they are slower and use double precision.
     pub fn use_pair_sums_only(&mut self, only: bool) {
         self.forces.pair_sums_only = only;
         self.forces.engine.use_pair_sums_only(only);
     }
 
-    /// Energies and virials of the last evaluation, as far as they were wanted.
+    /// Energies and virials of the last evaluation, as far as it computed them.
     pub fn tally(&self) -> &Tally {
         &self.forces.tally
     }

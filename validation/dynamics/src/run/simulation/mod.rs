@@ -1,8 +1,8 @@
-//! Particles in a box, moved step by step.
+//! Particles in a box, moved in steps.
 //!
-//! Each file has one part of a simulation, and what can be asked of it: the `particles`, what acts on them from
-//! outside (`external`), the `forces` between them, the `thermostat` apart from these, and their `motion`. An integrator
-//! composes a step of the operators in `motion` and `thermostat`.
+//! Each file has one part of a simulation with its methods: the `particles`, the `external` forces on them,
+//! the `forces` between them, the `thermostat` where it is not part of these forces, and the `motion`. An
+//! integrator composes a step of the operators in `motion` and `thermostat`.
 
 mod displaced;
 mod external;
@@ -30,14 +30,14 @@ use psidpd_core::model::Model;
 use record::Record;
 use thermostat::Thermostat;
 
-/// Particles in a box, and the forces of one fluid on them.
+/// Particles in a box, with the forces of one fluid.
 ///
-/// Every buffer is kept from step to step.
+/// All buffers are reused from step to step.
 ///
-/// Directions of the box that are not periodic have walls that reflect.
+/// Directions that are not periodic have reflecting walls.
 ///
-/// Pair noise is keyed by the number of the step whose forces it is in: the forces before the first
-/// step are those of step 0, and step `n` ends with forces of number `n`, as in LAMMPS.
+/// Pair noise is keyed by the number of the step whose forces contain it: the forces before the first step
+/// have number 0, and step `n` ends with forces of number `n`, as in LAMMPS.
 #[derive(Debug, Clone)]
 pub struct Simulation {
     particles: Particles,
@@ -48,18 +48,17 @@ pub struct Simulation {
     monte_carlo: MonteCarlo,
     seed: u64,
     number: u64,
-    /// Whether the forces are those of other positions than the present ones.
+    /// Whether the forces belong to other positions than the present ones.
     stale: bool,
-    /// What carries momentum in the present step, if somebody wants to know.
+    /// The transport of momentum in the present step; `None` without recording.
     record: Option<Box<Record>>,
 }
 
 impl Simulation {
-    /// A simulation of `model` at temperature `kt` from `state`, at step 0. Positions outside the box
-    /// are wrapped into it.
+    /// Creates a simulation of `model` at temperature `kt` from `state`, at step 0. Positions outside the box are wrapped.
     ///
     /// # Errors
-    /// The model does not hold at `kt`, or `state` is no state of it.
+    /// The model is invalid at `kt`, or `state` is invalid for it.
     pub fn new(model: &Model, kt: f64, state: State, seed: u64) -> Result<Simulation, RunError> {
         let fluid = model.at(kt)?;
         let particles = Particles::new(state, fluid.species.len(), fluid.dimensions)?;
@@ -81,10 +80,10 @@ impl Simulation {
         })
     }
 
-    /// Another temperature for the thermostat and for every formula with kT.
+    /// Sets the temperature of the thermostat and of every formula with kT.
     ///
     /// # Errors
-    /// The model does not hold at `kt`.
+    /// The model is invalid at `kt`.
     pub fn set_temperature(&mut self, kt: f64) -> Result<(), RunError> {
         if kt != self.kt() {
             self.forces.set_temperature(kt)?;
@@ -94,21 +93,20 @@ impl Simulation {
         Ok(())
     }
 
-    /// The number of the present step.
     pub fn step_number(&self) -> u64 {
         self.number
     }
 
-    /// Sets it, for a run that goes on from step `number`.
+    /// Sets the number of the present step, for a resumed run.
     pub fn set_step_number(&mut self, number: u64) {
         self.number = number;
     }
 
-    /// Takes up a run where a checkpoint left it: after step `number`, with the forces of that step, so
-    /// that the next step is bit for bit the one that would have followed. Unlike [`Simulation::new`] it
-    /// wraps no position: one that rounding left on a face must stay there.
+    /// Restores a run from a checkpoint after step `number`, with the forces of that step: the next step is
+    /// bit for bit the one of a run without interruption. Unlike [`Simulation::new`] it wraps no position,
+    /// because one that rounding left on a face must stay there.
     ///
-    /// `state` must be of the particles, the box and the masses that the simulation was made with.
+    /// `state` must have the particles, the box and the masses of this simulation.
     pub(super) fn restore(
         &mut self,
         number: u64,
@@ -125,19 +123,13 @@ impl Simulation {
         self.stale = false;
     }
 
-    /// Computes the forces of the present step at the present velocities, thermostat included, as a run or a stage
-    /// needs before its first step.
-    ///
-    /// # Errors
-    /// As [`Simulation::step`].
+    /// Computes the forces of the present step at the present velocities, thermostat included. A run or a
+    /// stage needs them before its first step.
     pub fn prepare(&mut self, dt: f64, want: Want) -> Result<(), RunError> {
         self.prepare_for(Integrator::default(), dt, want)
     }
 
-    /// The same for steps of an integrator: without the thermostat, if it acts apart from the forces there.
-    ///
-    /// # Errors
-    /// As [`Simulation::step`].
+    /// As [`Simulation::prepare`], for steps of `integrator`: without the thermostat, if that is not part of its forces.
     pub fn prepare_for(&mut self, integrator: Integrator, dt: f64, want: Want) -> Result<(), RunError> {
         self.end_step()?;
         self.thermostat.begin_step();
@@ -151,30 +143,27 @@ impl Simulation {
         }
     }
 
-    /// Computes forces between particles, with noise and drag of `step`, or conservative ones only; no body
-    /// forces.
+    /// Computes pair forces, without body forces: with the noise and drag of `step`, or conservative forces only.
     ///
     /// # Errors
-    /// The box is too narrow for the noise, or a position, ψ or force is not finite.
+    /// The box is too narrow for the noise, or a position, ψ or a force is not finite.
     pub fn compute(&mut self, want: Want, step: Option<Step>) -> Result<(), RunError> {
         self.forces.compute(&mut self.particles, want, step, self.number)
     }
 
-    /// One step of `dt`. The forces of the step before must be there: see [`Simulation::prepare_for`].
+    /// Makes one step of `dt`. The forces of the previous step must be present: see
+    /// [`Simulation::prepare_for`].
     ///
     /// # Errors
-    /// A position, velocity or force that is not finite, ψ singular, or a particle that moved further
-    /// than across the box.
+    /// A position, velocity or force is not finite, ψ is singular, or a particle moved further than across
+    /// the box.
     pub fn step(&mut self, dt: f64, integrator: Integrator, want: Want) -> Result<(), RunError> {
         self.begin_step(dt, integrator, want)?;
         self.end_step()?;
         if want == Want::FORCES { Ok(()) } else { self.refresh(want) }
     }
 
-    /// Steps of `dt` that nothing is wanted of.
-    ///
-    /// # Errors
-    /// As [`Simulation::step`].
+    /// Makes steps of `dt` without totals.
     pub fn advance(&mut self, steps: u64, dt: f64, integrator: Integrator) -> Result<(), RunError> {
         for _ in 0..steps {
             self.begin_step(dt, integrator, Want::FORCES)?;
@@ -182,17 +171,14 @@ impl Simulation {
         self.end_step()
     }
 
-    /// A step but for a kick that may as well be made when the next begins, with the same bits: until then, or until
-    /// [`Simulation::end_step`], velocities are not those at the end of the step.
-    ///
-    /// # Errors
-    /// As [`Simulation::step`].
+    /// Makes a step except for its last kick, which the next step can include with the same bits. Until then,
+    /// or until [`Simulation::end_step`], velocities are not those at the end of the step.
     pub(super) fn begin_step(&mut self, dt: f64, integrator: Integrator, want: Want) -> Result<(), RunError> {
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(RunError::TimeStep(dt));
         }
         if !self.thermostat.fits(integrator.properties().drag_in_forces) {
-            // Forces of another integrator.
+            // The present forces belong to another integrator.
             self.prepare_for(integrator, dt, Want::FORCES)?;
         }
         self.number += 1;
@@ -203,7 +189,7 @@ impl Simulation {
         self.close_record(integrator);
         self.forces.add_thermostat_virial(self.thermostat.impulse_virial());
         self.stale = !integrator.properties().forces_at_end;
-        // The order of trials must not depend on where particles are.
+        // The order of trials must not depend on positions.
         if reorder::is_due(self.number) && integrator.has_time() {
             self.end_step()?;
             self.reorder();
@@ -211,19 +197,16 @@ impl Simulation {
         Ok(())
     }
 
-    /// Ends the step that [`Simulation::begin_step`] has begun, if it is not at its end.
+    /// Completes the step that [`Simulation::begin_step`] began, if its last kick is missing.
     ///
     /// # Errors
-    /// A velocity that is not finite.
+    /// A velocity is not finite.
     pub(super) fn end_step(&mut self) -> Result<(), RunError> {
         self.make_deferred_kick()
     }
 
-    /// Computes what is wanted at the end of the present step, where the integrator has computed forces at other positions
-    /// only; trajectories do not depend on it.
-    ///
-    /// # Errors
-    /// As [`Simulation::compute`].
+    /// Computes `want` at the end of the present step, if the integrator has computed forces at other
+    /// positions only; trajectories do not depend on it.
     pub(super) fn refresh(&mut self, want: Want) -> Result<(), RunError> {
         if !self.stale {
             return Ok(());
@@ -237,7 +220,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Brings all arrays over particles into the order of the last sweep, if there was one.
+    /// Sorts all particle arrays into the order of the last sweep, if there was one.
     fn reorder(&mut self) {
         let Some(order) = self.forces.order() else { return };
         if self.particles.reorder(self.forces.pool(), order) {

@@ -1,4 +1,4 @@
-//! Trial moves of single particles, which the energy decides on.
+//! Trial moves of single particles; the energy decides on their acceptance.
 
 use super::super::integrator::parts::has_stopped_counting;
 use super::{RunError, Simulation};
@@ -7,22 +7,22 @@ use chacha20::ChaCha8Rng;
 use psidpd_core::engine::{self, EngineError, LocalEnergy, Want};
 use rand::{RngExt, SeedableRng};
 
-/// Acceptance that the length of moves is set for.
+/// The acceptance that tuning of the move length aims at.
 const ACCEPTANCE: f64 = 0.4;
 
-/// Sweeps after which densities are summed anew, so that rounding does not add up.
+/// Sweeps between fresh sums of the densities, which limit the growth of rounding errors.
 const RENEWED: u64 = 100;
 
 #[derive(Debug, Clone, Default)]
 pub(super) struct MonteCarlo {
-    /// Of the present temperature.
+    /// The energy at the present temperature.
     energy: Option<Box<LocalEnergy>>,
-    /// The furthest move that was found so far.
+    /// The largest displacement along a direction, as tuned so far.
     found: Option<f64>,
     settling: bool,
-    /// Whether the present step is one of trial moves.
+    /// Whether the present step makes trial moves.
     at_work: bool,
-    /// Trials of the last step, and how many were accepted.
+    /// Numbers of trials and of accepted trials in the last step.
     trials: [u64; 2],
 }
 
@@ -41,28 +41,28 @@ impl MonteCarlo {
 }
 
 impl Simulation {
-    /// Whether the length of moves is still looked for in the steps to come.
+    /// Sets whether later steps tune the length of moves.
     pub fn set_settling(&mut self, settling: bool) {
         self.monte_carlo.settling = settling;
     }
 
-    /// The furthest move along each direction that was found, for checkpoints.
+    /// The tuned largest displacement along each direction, for checkpoints.
     pub fn max_move(&self) -> Option<f64> {
         self.monte_carlo.found
     }
 
-    /// Sets it, for a run that goes on.
+    /// Sets the largest displacement, for a resumed run.
     pub fn set_max_move(&mut self, found: Option<f64>) {
         self.monte_carlo.found = found;
     }
 
-    /// Part of the trials that the last step accepted; 0 before the first.
+    /// Share of accepted trials in the last step; 0 before the first.
     pub fn acceptance(&self) -> f64 {
         let [trials, accepted] = self.monte_carlo.trials;
         accepted as f64 / trials.max(1) as f64
     }
 
-    /// Random numbers of the present step.
+    /// The random generator of the present step.
     pub(in crate::run) fn random_of_step(&self) -> ChaCha8Rng {
         let mut seed = [0; 32];
         seed[..8].copy_from_slice(&self.seed.to_le_bytes());
@@ -71,7 +71,7 @@ impl Simulation {
         ChaCha8Rng::from_seed(seed)
     }
 
-    /// Makes one trial for each particle that moves, `sweeps` times.
+    /// Makes `sweeps` trials for each particle that is not frozen.
     pub(in crate::run) fn make_sweeps(
         &mut self,
         random: &mut ChaCha8Rng,
@@ -136,8 +136,8 @@ impl Simulation {
         Ok(())
     }
 
-    /// Draws the velocities of the particles that move from Maxwell's distribution, as many degrees of freedom as
-    /// [`Simulation::degrees_of_freedom`] counts.
+    /// Draws the velocities of the mobile particles from Maxwell's distribution, with the degrees of freedom
+    /// that [`Simulation::degrees_of_freedom`] counts.
     pub(in crate::run) fn draw_velocities(&mut self, random: &mut ChaCha8Rng) {
         let (kt, dimensions) = (self.kt(), self.dimensions());
         let conserved = self.frozen().is_empty();
@@ -154,8 +154,8 @@ impl Simulation {
         moving.for_each(|(k, drawn)| v[k] = drawn);
     }
 
-    /// Forces and totals at the present positions. Where they are not finite the totals are infinite: trial moves lead away
-    /// from there.
+    /// Computes forces and totals at the present positions. If they are not finite the totals become
+    /// infinite: trial moves then leave these positions.
     pub(super) fn forces_or_infinite(&mut self, want: Want) -> Result<(), RunError> {
         use EngineError::{ExcessFreeEnergy, Force};
         match self.conservative_forces(want) {
@@ -167,7 +167,7 @@ impl Simulation {
         }
     }
 
-    /// Records the momentum that particles carry at the end of a step, and the forces there.
+    /// Records the momentum of the particles at the end of a step, and the forces there.
     pub(in crate::run) fn record_rest(&mut self, want: Want) -> Result<(), RunError> {
         if !self.is_recording() {
             return Ok(());

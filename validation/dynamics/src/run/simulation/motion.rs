@@ -1,7 +1,7 @@
-//! Drift and kick, of which steps are composed.
+//! Drift and kick, the operators of which steps are composed.
 //!
-//! A kick that ends a step may be deferred: the next step, if it begins with the same kick and a drift, makes both
-//! in one loop, with the same bits.
+//! A kick that ends a step may be deferred: if the next step begins with the same kick and a drift, one loop
+//! makes both, with the same bits.
 
 use super::super::bounds::Bounds;
 use super::super::integrator::parts::{Faults, Kept, Moving, Surroundings, drift, kick, share};
@@ -12,9 +12,9 @@ use psidpd_core::engine::{PeriodicBox, Pool};
 #[derive(Debug, Clone)]
 pub(super) struct Motion {
     bounds: Bounds,
-    /// What Groot and Warren's step keeps over the evaluation of the forces.
+    /// Data that Groot and Warren's step keeps during the evaluation of the forces.
     kept: Kept,
-    /// The time of a kick that ends the present step and is still to be made.
+    /// The duration of a deferred kick at the end of the present step.
     deferred: Option<f64>,
 }
 
@@ -37,7 +37,7 @@ impl Motion {
 }
 
 impl Simulation {
-    /// `v += h f/m; x += dt v`, in one loop; particles are put back into the box.
+    /// Kick and drift in one loop: `v += h f/m; x += dt v`; particles are then put back into the box.
     pub(in crate::run) fn kick_and_drift(&mut self, h: f64, dt: f64) -> Result<(), RunError> {
         let deferred = self.motion.deferred.take_if(|deferred| *deferred == h).is_some();
         self.make_deferred_kick()?;
@@ -63,7 +63,7 @@ impl Simulation {
         self.refuse(faults, Some(dt), deferred)
     }
 
-    /// `x += dt v`.
+    /// Drift: `x += dt v`.
     pub(in crate::run) fn drift(&mut self, dt: f64) -> Result<(), RunError> {
         self.make_deferred_kick()?;
         let faults = self.moving(Some(dt), |mut moving, around, pool| {
@@ -77,7 +77,7 @@ impl Simulation {
         self.refuse(faults, Some(dt), false)
     }
 
-    /// `v += h f/m`.
+    /// Kick: `v += h f/m`.
     pub(in crate::run) fn kick(&mut self, h: f64) -> Result<(), RunError> {
         self.make_deferred_kick()?;
         let faults = self.moving(None, |mut moving, _, pool| {
@@ -90,7 +90,7 @@ impl Simulation {
         self.refuse(faults, None, false)
     }
 
-    /// The same, left to the next step, or to whoever asks for velocities before.
+    /// Defers a kick to the next step, or to the next use of velocities.
     pub(in crate::run) fn defer_kick(&mut self, h: f64) {
         debug_assert!(self.motion.deferred.is_none());
         self.motion.deferred = Some(h);
@@ -103,7 +103,8 @@ impl Simulation {
         }
     }
 
-    /// Puts particles at `x + c f/m` for an evaluation of forces there, without reflection; [`Simulation::step_back`] follows.
+    /// Puts particles at `x + c f/m` for an evaluation of forces, without reflection;
+    /// [`Simulation::step_back`] follows.
     pub(super) fn displace(&mut self, c: f64) {
         self.moving(None, |mut moving, around, pool| {
             moving.keep();
@@ -123,13 +124,13 @@ impl Simulation {
         self.step_back();
     }
 
-    /// Exchanges the present positions for those that [`Simulation::displace`] has put aside, or the other way round.
+    /// Exchanges the present positions for those that [`Simulation::displace`] has put aside, or the reverse.
     pub(super) fn step_back(&mut self) {
         let Simulation { particles, motion, .. } = self;
         std::mem::swap(&mut particles.motion(false).0.x, motion.kept.aside());
     }
 
-    /// `x += dt (v + ½dt f/m); v += λ dt f/m`; velocities and forces of before are kept.
+    /// Predictor: `x += dt (v + ½dt f/m); v += λ dt f/m`; the previous velocities and forces are kept.
     pub(in crate::run) fn predict(&mut self, lambda: f64, dt: f64) -> Result<(), RunError> {
         self.make_deferred_kick()?;
         let faults = self.moving(Some(dt), |mut moving, around, pool| {
@@ -150,7 +151,7 @@ impl Simulation {
         self.refuse(faults, Some(dt), false)
     }
 
-    /// `v = v₀ + ½dt (f₀ + f)/m` with what [`Simulation::predict`] has kept.
+    /// Corrector: `v = v₀ + ½dt (f₀ + f)/m` with the values that [`Simulation::predict`] has kept.
     pub(in crate::run) fn correct(&mut self, dt: f64) -> Result<(), RunError> {
         let faults = self.moving(None, |mut moving, _, pool| {
             moving.over_mass(|mass| 0.5 * dt / mass);
@@ -163,7 +164,7 @@ impl Simulation {
         self.refuse(faults, None, false)
     }
 
-    /// Calls `work` with what moves, what it may meet on the way, if there is a drift of `dt`, and the threads.
+    /// Calls `work` with the moving arrays, the box and its limits, and the threads; `dt` is the time of a drift.
     fn moving(
         &mut self,
         dt: Option<f64>,
@@ -186,8 +187,8 @@ impl Simulation {
         work(moving, around, forces.pool())
     }
 
-    /// Refuses velocities that are not finite, or lead beyond the box within `dt`. Where the kick of the step before was
-    /// `deferred`, velocities that are not finite are that step's.
+    /// Refuses velocities that are not finite, or that lead beyond the box within `dt`. If the kick of the
+    /// previous step was `deferred`, velocities that are not finite belong to that step.
     fn refuse(&self, faults: Faults, dt: Option<f64>, deferred: bool) -> Result<(), RunError> {
         let state = self.particles.now();
         let Some(found) = faults.fast.or(faults.escaped) else {
@@ -200,7 +201,7 @@ impl Simulation {
             let v = state.v[k];
             v[0].hypot(v[1]).hypot(v[2])
         };
-        // The fastest is nearest to the cause; what is no number may have been made so by another.
+        // The fastest particle is closest to the cause; a NaN may be the consequence of another particle.
         let rank = |k: usize| if speed(k).is_nan() { f64::MAX } else { speed(k) };
         let faster = |worst: usize, k: usize| if rank(k) > rank(worst) { k } else { worst };
         let k = if faults.fast.is_some() { (0..state.len()).fold(found, faster) } else { found };

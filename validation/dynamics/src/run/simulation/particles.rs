@@ -1,4 +1,4 @@
-//! What the particles are at the present step: where, how fast, and under which forces.
+//! The state of the particles at the present step, and the forces on them.
 
 use super::super::integrator::parts::has_stopped_counting;
 use super::super::reorder::Reordering;
@@ -11,19 +11,19 @@ use std::sync::OnceLock;
 pub(super) struct Particles {
     state: State,
     force: Vec<[f64; 3]>,
-    /// Counts changes of positions, and of their order.
+    /// Counts changes of the positions and of their order.
     moves: u64,
-    /// `Σ m v v` of the present velocities, once somebody has asked for it.
+    /// `Σ m v v` of the present velocities, cached at the first request.
     flux: OnceLock<[f64; 6]>,
-    /// `None` if particles stay in the order that they were given in.
+    /// Scratch memory for reordering; `None` if particles keep their order.
     reordering: Option<Reordering>,
 }
 
 impl Particles {
-    /// Particles without forces. Positions outside the box are wrapped into it.
+    /// Creates particles with zero forces. Positions outside the box are wrapped.
     ///
     /// # Errors
-    /// `state` is no state of a model with so many species and dimensions.
+    /// `state` is invalid for a model with these numbers of species and dimensions.
     pub fn new(mut state: State, species: usize, dimensions: usize) -> Result<Particles, RunError> {
         if let Some(fault) = state.fault(species, dimensions) {
             return Err(RunError::State(fault));
@@ -38,12 +38,12 @@ impl Particles {
         Ok(Particles { state, force, moves: 0, flux: OnceLock::new(), reordering: None })
     }
 
-    /// Other particles in the same box, as they are: without wrapping.
+    /// Replaces the particles, without wrapping; the box stays.
     pub fn replace(&mut self, state: &State, forces: &[[f64; 3]]) {
         self.state.copy_particles(state);
         self.force.clear();
         self.force.extend_from_slice(forces);
-        // A start that failed has left none.
+        // A failed start has left no forces.
         self.force.resize(state.len(), [0.0; 3]);
         self.moves += 1;
         self.flux.take();
@@ -57,7 +57,7 @@ impl Particles {
         &self.force
     }
 
-    /// The particles, and their forces to be changed.
+    /// The particles and mutable forces.
     pub fn forces_mut(&mut self) -> (&State, &mut [[f64; 3]]) {
         (&self.state, &mut self.force)
     }
@@ -67,14 +67,14 @@ impl Particles {
         &mut self.state.v
     }
 
-    /// The particles, to be moved or kicked by their forces.
+    /// Mutable particles and their forces, for a drift or kick; `moves` says whether positions change.
     pub fn motion(&mut self, moves: bool) -> (&mut State, &[[f64; 3]]) {
         self.moves += u64::from(moves);
         self.flux.take();
         (&mut self.state, &self.force)
     }
 
-    /// Puts the particles into another box, as they are, and returns the present one.
+    /// Puts the particles into another box without wrapping, and returns the present box.
     pub fn replace_domain(&mut self, domain: PeriodicBox) -> PeriodicBox {
         std::mem::replace(&mut self.state.domain, domain)
     }
@@ -84,7 +84,7 @@ impl Particles {
         self.moves
     }
 
-    /// Brings all arrays over particles into `order`, if they may be reordered.
+    /// Sorts all particle arrays into `order`, if reordering is on.
     pub fn reorder(&mut self, pool: &Pool, order: &[u32]) -> bool {
         let Some(reordering) = &mut self.reordering else { return false };
         let State { x, v, species, tag, image, .. } = &mut self.state;
@@ -122,57 +122,50 @@ impl Particles {
 }
 
 impl Simulation {
-    /// Whether particles are brought, at the end of some steps, into an order in which those near each other in
-    /// space are so in memory, which is faster in large systems. Afterwards only its tag identifies a particle. Off
-    /// by default.
+    /// Sets whether some steps end with a sort that puts neighbours in space close in memory, which is faster
+    /// in large systems. Afterwards only its tag identifies a particle. The default is off.
     ///
-    /// The steps depend on their number only. Trajectories differ from those without by the rounding of sums.
+    /// The steps that sort depend on their number only. Trajectories differ by the rounding of sums.
     pub fn set_reordering(&mut self, on: bool) {
         self.particles.reordering = on.then(Reordering::default);
     }
 
-    /// How many particles there are.
     pub fn len(&self) -> usize {
         self.particles.state.len()
     }
 
-    /// Whether there are none: never.
+    /// Always false: a simulation has at least one particle.
     pub fn is_empty(&self) -> bool {
         self.particles.state.is_empty()
     }
 
-    /// The box.
     pub fn domain(&self) -> &PeriodicBox {
         &self.particles.state.domain
     }
 
-    /// Positions, in the box.
+    /// Positions, wrapped into the box.
     pub fn positions(&self) -> &[[f64; 3]] {
         &self.particles.state.x
     }
 
-    /// Velocities.
     pub fn velocities(&self) -> &[[f64; 3]] {
         debug_assert!(self.motion.is_at_end_of_step());
         &self.particles.state.v
     }
 
-    /// Forces of the last evaluation.
     pub fn forces(&self) -> &[[f64; 3]] {
         &self.particles.force
     }
 
-    /// Species.
     pub fn species(&self) -> &[i32] {
         &self.particles.state.species
     }
 
-    /// Tags.
     pub fn tags(&self) -> &[i32] {
         &self.particles.state.tag
     }
 
-    /// Boxes travelled.
+    /// Number of box edges travelled in each direction.
     pub fn image_flags(&self) -> &[[i32; 3]] {
         &self.particles.state.image
     }
@@ -182,13 +175,12 @@ impl Simulation {
         &self.particles.state.mass
     }
 
-    /// A copy of the particles.
     pub fn state(&self) -> State {
         debug_assert!(self.motion.is_at_end_of_step());
         self.particles.state.clone()
     }
 
-    /// Copies the particles into `state`, which is one of this simulation and keeps its memory.
+    /// Copies the particles into `state`, which belongs to this simulation, and reuses its memory.
     pub fn copy_state(&self, state: &mut State) {
         debug_assert!(self.motion.is_at_end_of_step());
         state.copy_particles(&self.particles.state);

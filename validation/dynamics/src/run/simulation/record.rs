@@ -1,21 +1,21 @@
-//! Records what carries momentum in a step, for observables.
+//! Records the transport of momentum in a step, for observables.
 
 use super::Simulation;
 use crate::integrator::Integrator;
 use psidpd_core::engine::thermostat::Pull;
 use psidpd_observe::flux::{Acted, Displaced, Flux, Line, Place};
 
-/// What is recorded of the present step, which takes `dt`.
+/// The transport of momentum in the present step, whose length is `dt`.
 #[derive(Debug, Clone, Default)]
 pub struct Record {
     dt: f64,
     flux: Flux,
-    /// Whether operators add to it.
+    /// Whether operators may add to the record.
     open: bool,
 }
 
 impl Simulation {
-    /// Whether what carries momentum is recorded in the steps from now on. Trajectories do not depend on it.
+    /// Sets whether later steps record the transport of momentum. Trajectories do not depend on it.
     pub fn record_flux(&mut self, on: bool) {
         match on {
             true => drop(self.record.get_or_insert_default()),
@@ -23,7 +23,7 @@ impl Simulation {
         }
     }
 
-    /// What carried momentum in the present step, if that was recorded.
+    /// The transport of momentum in the present step, if it was recorded.
     pub fn flux(&self) -> Option<&Flux> {
         self.record.as_deref().filter(|record| record.dt > 0.0).map(|record| &record.flux)
     }
@@ -45,13 +45,13 @@ impl Simulation {
         for (acted, share) in forces.iter_mut().zip(integrator.properties().force_shares) {
             acted.share = share;
         }
-        // No need to keep what is still there.
+        // The last forces belong to the present positions, so their copy is not needed.
         if let Some(last) = forces.last_mut().filter(|_| integrator.properties().forces_at_end) {
             last.at = None;
         }
     }
 
-    /// The ways of all particles to where they are, for a time `h` with the velocities `u`.
+    /// Records the paths of all particles to their present positions, for a time `h` with the velocities `u`.
     pub(super) fn record_ways(&mut self, h: f64, u: impl Fn(&Simulation, usize) -> [f64; 3]) {
         if !self.is_recording() {
             return;
@@ -69,7 +69,8 @@ impl Simulation {
         }
     }
 
-    /// What particles carry with their present velocities, along ways too short for their place to matter.
+    /// Records the momentum that particles carry with their present velocities, along paths so short that
+    /// their place does not matter.
     pub(super) fn record_momenta(&mut self) {
         const TIME: f64 = 1e-9;
         let way = |k: usize| {
@@ -83,8 +84,8 @@ impl Simulation {
         }
     }
 
-    /// Conservative forces on particles at the present positions, with their virial; `displaced` is what they were computed
-    /// at, if that is elsewhere.
+    /// Records the conservative forces on particles at the present positions, with their virial; `displaced`
+    /// holds the positions of the evaluation, if they differ.
     pub(super) fn record_forces(&mut self, virial: [f64; 6], displaced: Option<Displaced>) {
         if !self.is_recording() {
             return;
@@ -96,7 +97,7 @@ impl Simulation {
         }
     }
 
-    /// Pulls of drag for a part of the step.
+    /// Records the drag forces of pairs during a part `share` of the step.
     pub(super) fn record_pulls(&mut self, share: f64, pulls: Vec<Pull>) {
         let Simulation { record: Some(record), particles, .. } = self else { return };
         record.flux.drag.extend(pulls.into_iter().map(|pull| Line {

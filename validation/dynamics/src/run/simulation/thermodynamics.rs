@@ -3,20 +3,19 @@
 use super::Simulation;
 
 impl Simulation {
-    /// `U` of the last evaluation that wanted energies.
+    /// `U` of the last evaluation that computed energies.
     pub fn potential_energy(&self) -> f64 {
         self.tally().energy()
     }
 
-    /// `½ Σ m v²`.
     pub fn kinetic_energy(&self) -> f64 {
         let k = self.particles.momentum_flux();
         0.5 * (k[0] + k[1] + k[2])
     }
 
-    /// How many degrees of freedom the kinetic energy is shared by: `d` for each particle that moves, less one
-    /// for each direction along which the total momentum is conserved. Frozen particles conserve none of it,
-    /// walls not that across them.
+    /// Number of degrees of freedom of the kinetic energy: `d` for each mobile particle, less one for each
+    /// direction along which the total momentum is conserved. Frozen particles break all conservation, walls
+    /// that of the direction across them.
     pub fn degrees_of_freedom(&self) -> usize {
         let conserved = match self.frozen().is_empty() {
             true => self.domain().periodic()[..self.dimensions()].iter().filter(|p| **p).count(),
@@ -25,7 +24,7 @@ impl Simulation {
         (self.dimensions() * self.mobile()).saturating_sub(conserved)
     }
 
-    /// `kT` from the kinetic energy of the particles that move, as LAMMPS's `compute temp`; 0 without degrees
+    /// `kT` from the kinetic energy of the mobile particles, as in LAMMPS's `compute temp`; 0 without degrees
     /// of freedom. A flow counts as heat.
     pub fn temperature(&self) -> f64 {
         match self.degrees_of_freedom() {
@@ -34,7 +33,6 @@ impl Simulation {
         }
     }
 
-    /// `Σ m v`.
     pub fn momentum(&self) -> [f64; 3] {
         let mut sum = [0.0; 3];
         for (v, s) in self.velocities().iter().zip(self.species()) {
@@ -51,21 +49,20 @@ impl Simulation {
         std::array::from_fn(|k| (flux[k] + virial[k]) / volume)
     }
 
-    /// `(Σ m v v + W)/V` with the virial of all forces, thermostat included, as LAMMPS's
-    /// `compute pressure`; order xx, yy, zz, xy, xz, yz. Needs a virial.
+    /// `(Σ m v v + W)/V` with the virial of all forces, thermostat included, as in LAMMPS's `compute
+    /// pressure`; order xx, yy, zz, xy, xz, yz. The last evaluation must have computed a virial.
     pub fn pressure_tensor(&self) -> [f64; 6] {
         self.over_volume(self.tally().total_virial())
     }
 
-    /// The same with the virial of conservative forces alone, which has less noise.
+    /// As [`Simulation::pressure_tensor`], with the virial of conservative forces alone, which has less noise.
     ///
-    /// The two means differ by a term of order Δt: the drag of velocity Verlet sees the velocity that
-    /// brought particles to where they are, which is correlated with their distance.
+    /// The two means differ by a term of order Δt: the drag of velocity Verlet uses the velocity that brought
+    /// particles to their positions, which is correlated with their distance.
     pub fn conservative_pressure_tensor(&self) -> [f64; 6] {
         self.over_volume(self.tally().virial)
     }
 
-    /// The trace of a pressure tensor over the number of dimensions.
     pub fn scalar_pressure(&self, tensor: [f64; 6]) -> f64 {
         tensor[..self.dimensions()].iter().sum::<f64>() / self.dimensions() as f64
     }

@@ -1,4 +1,4 @@
-//! The force-gradient step: its formulas, its order, and what it keeps.
+//! The force-gradient step: its formulas, its order and its conserved quantities.
 
 use super::*;
 use crate::integrator::Coupling;
@@ -12,14 +12,14 @@ fn force_gradient(lambda: f64, gradient: f64) -> Integrator {
     Integrator::ForceGradient { lambda, gradient, coupling: Coupling::DEFAULT }
 }
 
-/// Conservative forces on particles of set 6 or an ideal mixture elsewhere.
+/// Conservative forces on particles of set 6 or of an ideal mixture at other positions.
 fn forces_at(model: &Model, state: &State, x: Vec<[f64; 3]>) -> Vec<[f64; 3]> {
     let mut there = Simulation::new(model, 1.0, State { x, ..state.clone() }, 7).unwrap();
     there.compute(Want::FORCES, None).unwrap();
     there.forces().to_vec()
 }
 
-/// One step against the formulas, with forces evaluated apart, in double precision and two masses.
+/// One step agrees with the formulas, whose forces are evaluated separately, in double precision with two masses.
 #[test]
 fn a_step_is_its_formulas() {
     let text = SET6
@@ -57,8 +57,8 @@ fn a_step_is_its_formulas() {
     }
 }
 
-/// Without thermostat, for a fluid whose forces are smooth, deviations of the energy fall with the fourth power of the step; with
-/// another λ or ξ with the second.
+/// Without a thermostat, for a fluid with smooth forces, deviations of the energy fall with the fourth power
+/// of the step; with another λ or ξ they fall with the second power.
 #[test]
 fn it_is_of_fourth_order_for_smooth_forces() {
     let mut begin = simulation(SMOOTH, state_of(SMOOTH, "[4.0, 4.0, 4.0]", 4.0));
@@ -94,12 +94,12 @@ fn it_is_of_fourth_order_for_smooth_forces() {
     }
 }
 
-/// Linear momentum is kept to rounding; angular momentum is not, unlike with undisplaced forces: what a step adds to it falls with
-/// the displacement and the kick, by Δt³ and more. Steps with reversed velocities lead back.
+/// Linear momentum is conserved to rounding. Angular momentum is not, unlike with undisplaced forces: its
+/// change in a step falls with the displacement and the kick, by Δt³ and more. Steps are time-reversible.
 #[test]
 fn it_keeps_momentum_and_is_reversible_but_not_angular_momentum() {
     let whole = settled();
-    // A drop in the middle of a wide box, so that nothing crosses a face.
+    // A drop in the middle of a wide box, so that no particle crosses a face.
     let near = |x: &[f64; 3]| (0..3).all(|c| (x[c] - 2.0).abs() < 1.5);
     let keep: Vec<usize> = (0..whole.len()).filter(|k| near(&whole.x[*k])).collect();
     let domain = PeriodicBox::orthogonal([-8.0; 3], [20.0; 3], [true; 3]).unwrap();
@@ -145,7 +145,7 @@ fn it_keeps_momentum_and_is_reversible_but_not_angular_momentum() {
     }
 }
 
-/// ξ = 0 is the two-stage step, in a box that leans too, but for the rounding of sums.
+/// With ξ = 0 the step equals the two-stage step up to the rounding of sums, in a tilted box too.
 #[test]
 fn without_displacement_it_is_the_two_stage_step() {
     let start = settled();
@@ -159,8 +159,8 @@ fn without_displacement_it_is_the_two_stage_step() {
     assert!(a == b);
 }
 
-/// A displaced evaluation is made beyond a wall, not at it: with a mirrored copy of the fluid moved by a box length the
-/// forces are those of the same particles in an open box.
+/// A displaced evaluation uses positions beyond a wall, not at it: the forces equal those of the same
+/// particles in an open box, with a mirrored copy of the fluid moved by a box length.
 #[test]
 fn particles_are_displaced_beyond_walls() {
     let model = Model::parse("m.toml", SMOOTH).unwrap();
@@ -177,7 +177,7 @@ fn particles_are_displaced_beyond_walls() {
         assert_eq!(run.positions(), x);
         run.forces().to_vec()
     });
-    // The first particle is pushed out by a force of 17 and more: to −0.04 or beyond.
+    // A force of at least 17 pushes the first particle out, to −0.04 or beyond.
     assert!(near[0][0] < -1.0, "{near:?}");
     for (a, b) in near.iter().flatten().zip(far.iter().flatten()) {
         assert!((a - b).abs() < 1e-6 * near[0][0].abs(), "{near:?} {far:?}");

@@ -1,10 +1,10 @@
-//! What each integrator promises.
+//! Properties that the documentation claims for each integrator.
 
 use super::*;
 use crate::integrator::Coupling;
 use psidpd_core::engine::thermostat::Update;
 
-/// Those that keep the Maxwell distribution of an ideal gas exactly, at any time step.
+/// The integrators that conserve the Maxwell distribution of an ideal gas exactly, at any time step.
 fn exact() -> Vec<Integrator> {
     let pairwise = Coupling { update: Update::OrnsteinUhlenbeck, ..Coupling::DEFAULT };
     let rare = Coupling { every: 3, ..Coupling::DEFAULT };
@@ -15,11 +15,12 @@ fn exact() -> Vec<Integrator> {
     all
 }
 
-/// T_kin, kurtosis of velocities and pairs in shells of an ideal gas of two masses, with their standard errors.
+/// Kinetic temperature, kurtosis of velocities and pairs in shells of an ideal gas of
+/// two masses, with their standard errors.
 struct Gas {
     temperature: [f64; 2],
     kurtosis: [f64; 2],
-    /// By shell, in standard deviations.
+    /// Deviations of the numbers of pairs in shells, in standard deviations.
     shells: [f64; 3],
 }
 
@@ -82,9 +83,10 @@ fn count_pairs(run: &Simulation, edges: &[f64; 4], found: &mut [f64; 3]) {
     }
 }
 
-/// At Δt = 0.2, ten times what velocity Verlet bears. Student's t of 19 degrees of freedom beyond 6 is rarer than
-/// once in 10^5, beyond five standard deviations so is a shell: 45 numbers fail by chance less than once in 2000 seeds,
-/// and the seed is fixed. ⟨v⁴⟩ of N particles without momentum is below 3 kT²/m² by 2/N of it, 0.02 here.
+/// The test uses Δt = 0.2, ten times the limit of velocity Verlet. Student's t of 19 degrees of freedom
+/// exceeds 6 less than once in 10^5 seeds, and so does a shell exceed five standard deviations: 45 numbers
+/// fail by chance less than once in 2000 seeds, and the seed is fixed. ⟨v⁴⟩ of N particles with zero total
+/// momentum is below 3 kT²/m² by the fraction 2/N, 0.02 here.
 #[test]
 fn the_maxwell_distribution_is_exact_at_long_steps() {
     for integrator in exact() {
@@ -97,8 +99,8 @@ fn the_maxwell_distribution_is_exact_at_long_steps() {
     }
 }
 
-/// The others have errors that are known, at Δt = 0.05 and γρ∫w²/(3m) = 2.51 for mass 1. Beyond six standard errors of
-/// these bands by chance less than once in 10^5.
+/// The other integrators have known errors at Δt = 0.05 and γρ∫w²/(3m) = 2.51 for mass 1. A temperature
+/// exceeds these bands by six standard errors less than once in 10^5 seeds.
 #[test]
 fn the_errors_of_the_others_show() {
     for (name, integrator) in Integrator::ALL {
@@ -113,15 +115,15 @@ fn the_errors_of_the_others_show() {
         assert!(off > low - 6.0 * error && off < high + 6.0 * error, "{integrator}: {t} +- {error}");
         assert!(error < 0.01, "{integrator}: {error}");
     }
-    // At twice the step what is wrong shows beyond six standard errors, and is what 2048 particles of both masses had in
-    // 4000 steps: 1.0701(12). (With mass 1 alone they had 1.1086(9).)
+    // At twice the step the error exceeds six standard errors, and agrees with that of 2048 particles of both
+    // masses in 4000 steps: 1.0701(12). (With mass 1 alone the temperature was 1.1086(9).)
     let [t, error] = ideal_gas(Integrator::VelocityVerlet, 0.1).temperature;
     assert!(t - 1.0 > 6.0 * error, "{t} +- {error}");
     assert!((t - 1.0701).abs() < 6.0 * error.hypot(0.0012), "{t} +- {error}");
 }
 
-/// Deviations of the energy without thermostat, over several starts, at steps of 0.01 and an eighth of it. The force-gradient
-/// step is of higher order, how high the kinks of the forces of this fluid decide.
+/// Deviations of the energy without a thermostat, over several starts, at steps of 0.01 and an eighth of it.
+/// The force-gradient step has a higher order, which depends on the kinks of this fluid's forces.
 #[test]
 fn without_thermostat_all_are_of_second_order() {
     let mut run = simulation(SET6, settled());
@@ -152,14 +154,16 @@ fn without_thermostat_all_are_of_second_order() {
         let order = (coarse / fine).log2() / 3.0;
         let orders = if name == "force-gradient" { 1.7..4.4 } else { 1.7..2.4 };
         assert!(orders.contains(&order), "{name}: order {order}: {coarse} and {fine}");
-        // Two stages for twice the forces: the error of energy is less than half of that of the same forces.
+        // The two-stage integrator evaluates forces twice; its error of the energy is
+        // less than half of that at the same cost.
         assert!(name != "two-stage" || coarse < 0.5 * 2e-3, "{coarse}");
     }
 }
 
-/// Mean pressure and temperature of standard DPD, a = 25, ρ = 3, kT = 1: 23.637(2) by Lowe–Andersen and 23.635(2) by
-/// Shardlow's method at Δt = 0.02, in the example programs of Allen and Tildesley. Blocks give the standard errors, of
-/// 0.05 or less; with 0.03 for the differences of finite steps, six of them are exceeded by chance once in 10^5 per case.
+/// Mean pressure and temperature of standard DPD, a = 25, ρ = 3, kT = 1. The example programs of Allen and
+/// Tildesley give 23.637(2) by Lowe–Andersen and 23.635(2) by Shardlow's method at Δt = 0.02. Blocks give
+/// standard errors of at most 0.05. Six standard errors, plus 0.03 for the differences of finite steps, are
+/// exceeded by chance once in 10^5 per case.
 #[test]
 fn pressures_are_those_of_other_codes() {
     const DPD: &str = "title = \"dpd\"\nspecies = [\"A\"]\n[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\n\
@@ -200,8 +204,7 @@ fn pressures_are_those_of_other_codes() {
     }
 }
 
-/// Steps in a row, between which a kick is deferred, are the same as single ones; so are steps at whose ends energies are
-/// asked for.
+/// Consecutive steps with a deferred kick between them equal single steps. So do steps with energies at their ends.
 #[test]
 fn what_is_asked_for_changes_no_step() {
     let start = settled();
@@ -221,14 +224,14 @@ fn what_is_asked_for_changes_no_step() {
             assert!(single.state() == row.state(), "{name}");
             assert!(single.state() == asked.state(), "{name}");
         }
-        // Energies are those of the positions at the end.
+        // Energies belong to the positions at the end of the step.
         let energy = asked.potential_energy();
         asked.compute(Want::TOTALS, None).unwrap();
         assert!((energy - asked.potential_energy()).abs() < 1e-9 * energy.abs(), "{name}");
     }
 }
 
-/// Forces that were prepared for another integrator are computed anew.
+/// Forces prepared for another integrator are computed anew.
 #[test]
 fn integrators_may_follow_each_other() {
     let start = settled();
@@ -245,8 +248,8 @@ fn integrators_may_follow_each_other() {
     }
 }
 
-/// As large steps as a tenth of the box, and still to the last bit the same in a box that leans, between walls, with frozen
-/// particles and unequal masses: the pairs of the thermostat are all there is.
+/// Steps of a tenth of the box give the same bits in a tilted box, and between walls, with frozen particles
+/// and unequal masses: the thermostat finds all its pairs.
 #[test]
 fn noise_of_pairs_acts_at_every_kth_step() {
     let mut run = simulation(IDEAL, state_of(IDEAL, "[4.0, 4.0, 4.0]", 3.0));

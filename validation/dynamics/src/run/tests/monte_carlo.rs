@@ -1,4 +1,4 @@
-//! Trial moves sample the canonical distribution, and go on where they stopped.
+//! Trial moves sample the canonical distribution, and resume where they stopped.
 
 use super::*;
 use psidpd_core::engine::PeriodicBox;
@@ -13,14 +13,14 @@ fn trials(sweeps: u64, max_move: Option<f64>) -> Integrator {
     Integrator::MonteCarlo { sweeps, max_move }
 }
 
-/// ψ and φ of two particles.
+/// A model of two particles with ψ and φ.
 const PAIR: &str = "title = \"two\"\nspecies = [\"A\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 0.9\n\
     [excess_free_energy]\nA = \"0.4*n^2\"\n\
     [[pair]]\nbetween = [\"A\", \"A\"]\nform = \"soft\"\nstrength = -8\nrange = 1\n";
-/// Edge of their box.
+/// Edge length of the box.
 const EDGE: f64 = 2.4;
 
-/// Their energy, by the model alone.
+/// The energy of the two particles at distance `r`, from the model alone.
 fn energy(r: f64) -> f64 {
     let fluid = Model::parse("m.toml", PAIR).unwrap().at(1.0).unwrap();
     let n = fluid.densities[0].kernel.value(r);
@@ -33,14 +33,14 @@ fn pair(periodic: [bool; 3], x: [[f64; 3]; 2]) -> State {
     State::at_rest(domain, vec![1.0], x.to_vec())
 }
 
-/// χ² of counts beside what is expected, up to a factor.
+/// χ² of counts for expected weights, whose common factor is fitted.
 fn chi_square(counts: &[f64], weights: &[f64]) -> f64 {
     let factor = counts.iter().sum::<f64>() / weights.iter().sum::<f64>();
     counts.iter().zip(weights).map(|(n, w)| (n - factor * w).powi(2) / (factor * w)).sum()
 }
 
-/// The distance of two particles has the distribution r² exp(−U(r)/kT). With eleven bins χ² is above 35.6 once in 10⁴ seeds, if
-/// samples are independent: moves as long as half the box forget where they came from in 40 trials.
+/// The distance of two particles has the distribution r² exp(−U(r)/kT). With eleven bins χ² is above 35.6
+/// once in 10⁴ seeds, if samples are independent: moves up to half the box lose their memory in 40 trials.
 #[test]
 fn two_particles_have_their_boltzmann_distribution() {
     let kt = 0.3;
@@ -63,13 +63,13 @@ fn two_particles_have_their_boltzmann_distribution() {
     weights[bins] = EDGE.powi(3) - 4.0 / 3.0 * PI * half.powi(3);
     let chi = chi_square(&counts, &weights);
     assert!(chi < 35.6, "{chi}: {counts:?} {weights:?}");
-    // Without the energy it is far off.
+    // Without the energy the distribution differs widely.
     let free: Vec<f64> = (0..bins).map(|k| ((k + 1) as f64).powi(3) - (k as f64).powi(3)).collect();
     assert!(chi_square(&counts[..bins], &free) > 1000.0);
 }
 
-/// One particle near a frozen one on a wall: the density across the box is ∫∫ exp(−U/kT), also next to the walls, that short
-/// moves often meet. With eight bins χ² is above 29.9 once in 10⁴ seeds.
+/// One particle near a frozen one on a wall: the density across the box is ∫∫ exp(−U/kT), also next to the
+/// walls, which short moves often hit. With eight bins χ² is above 29.9 once in 10⁴ seeds.
 #[test]
 fn walls_turn_nothing_away_that_belongs_there() {
     let kt = 0.3;
@@ -84,7 +84,7 @@ fn walls_turn_nothing_away_that_belongs_there() {
         counts[(run.positions()[1][2] / EDGE * 8.0) as usize] += 1.0;
         heat += run.temperature() / 10_000.0;
     }
-    // Nothing keeps the momentum: 30 000 squares of velocities, whose mean is off by 4 % once in 10⁶.
+    // No momentum is conserved: the mean of 30 000 squared velocities deviates by 4 % once in 10⁶ seeds.
     assert!((heat / kt - 1.0).abs() < 0.04, "{heat}");
     let (mut weights, fine) = ([0.0; 8], 80);
     let at = |k: usize| EDGE * (k as f64 + 0.5) / fine as f64;
@@ -100,7 +100,8 @@ fn walls_turn_nothing_away_that_belongs_there() {
     assert!(chi < 29.9, "{chi}: {counts:?} {weights:?}");
 }
 
-/// Means and standard errors of 20 blocks: T_conf, U per particle, conservative pressure, kT of the velocities.
+/// Means and standard errors of 20 blocks: configurational temperature, energy per particle, conservative
+/// pressure, and kT from the velocities.
 fn averages(run: &mut Simulation, integrator: Integrator, steps: usize) -> [[f64; 2]; 4] {
     let evaluator = Evaluator::new(run.model().at(run.kt()).unwrap()).unwrap();
     let blocks: Vec<[f64; 4]> = (0..20)
@@ -125,7 +126,7 @@ fn averages(run: &mut Simulation, integrator: Integrator, steps: usize) -> [[f64
     })
 }
 
-/// Settles a state by trial moves, and finds their length.
+/// Equilibrates a state by trial moves, and tunes their length.
 fn at_rest(model: &str, state: State, kt: f64, sweeps: u64) -> Simulation {
     let mut run = Simulation::new(&Model::parse("m.toml", model).unwrap(), kt, state, 11).unwrap();
     run.set_settling(true);
@@ -139,8 +140,9 @@ fn within(found: [f64; 2], expected: f64, error: f64) {
     assert!((value - expected).abs() < 5.0 * own.hypot(error), "{value} +- {own}, not {expected}");
 }
 
-/// Beside another program's Monte Carlo of the same liquid, ρ = 3098/8³: u = −13.0796(6), conservative pressure −1.259(10). Student's
-/// t of 19 degrees of freedom is beyond 5 once in 10⁴, so that the test fails by chance for one seed in 2500.
+/// The reference is another program's Monte Carlo of the same liquid, ρ = 3098/8³: u = −13.0796(6),
+/// conservative pressure −1.259(10). Student's t of 19 degrees of freedom exceeds 5 once in 10⁴ seeds, so
+/// that the test fails by chance for one seed in 2500.
 #[test]
 fn warrens_liquid_has_its_energy_and_pressure() {
     let count = 400;
@@ -157,7 +159,8 @@ fn warrens_liquid_has_its_energy_and_pressure() {
     assert!(t_conf[1] < 0.01 && u[1] < 0.02 && p[1] < 0.3, "{t_conf:?} {u:?} {p:?}");
 }
 
-/// The temperature of configurations in two dimensions, of a mixture, and between walls. False alarms as above.
+/// The configurational temperature in two dimensions, of a mixture, and between walls. The rate of false
+/// alarms per value is that of the previous test.
 #[test]
 fn configurations_have_the_temperature_of_other_fluids() {
     let flat = state_of(VAN_DER_WAALS, "[5.0, 5.0]", 12.0);
@@ -173,7 +176,7 @@ fn configurations_have_the_temperature_of_other_fluids() {
     }
 }
 
-/// What carries momentum is conservative forces and velocities at the end of a step, in a slab too.
+/// Momentum is transported by conservative forces and by the velocities at the end of a step, in a slab too.
 #[test]
 fn the_carried_pressure_is_the_conservative_one() {
     let text = "title = \"s\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 3\nbox = [3.0, 3.0, 6.0]\nsteps = 3\n\
@@ -195,7 +198,7 @@ fn the_carried_pressure_is_the_conservative_one() {
 const SCENE: &str = "[[stage]]\nname = \"rest\"\nsteps = 6\nintegrator = \"monte-carlo\"\n\
     [[stage]]\nname = \"run\"\nsteps = 4\nintegrator = \"monte-carlo\"\nsweeps = 3\n[output]\nthermo = 2\ndump = 2\n";
 
-/// Nothing depends on threads; the length of moves is found in the first stage and kept in the second.
+/// Results do not depend on threads; the length of moves is tuned in the first stage and constant in the second.
 #[test]
 fn any_number_of_threads_writes_the_same_bytes() {
     let scene = scene_of(SET6, "[8.0, 8.0, 8.0]", 6.05, SCENE).unwrap();
@@ -257,7 +260,7 @@ fn keys_without_meaning_are_refused_where_they_stand() {
     assert!(error.contains("needs an energy") && error.contains("s.toml:"), "{error}");
 }
 
-/// Where energies are infinite any finite one is taken; where they are no numbers the run stops.
+/// Trial moves accept any finite energy after an infinite one; a NaN stops the run.
 #[test]
 fn starts_without_energy() {
     let overlap = "title = \"m\"\nspecies = [\"A\"]\n[[pair]]\nbetween = [\"A\", \"A\"]\nform = \"expression\"\n\

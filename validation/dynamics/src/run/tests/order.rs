@@ -1,11 +1,11 @@
-//! What the order of particles in memory, and the number of threads that share them, may not change.
+//! Results that must not depend on the order of particles in memory or on the number of threads.
 
 use super::*;
 use psidpd_core::engine::{Precision, Settings};
 use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Two species of different mass in a box with walls and a frozen floor, enough for several threads.
+/// Two species of different mass in a box with walls and a frozen floor, large enough for several threads.
 const CROWD: &str = "title = \"crowd\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7\ndensity = 4\n\
     [box]\nlengths = [9.0, 9.0, 12.0]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]\n\
     [masses]\nB = 3.0\n\
@@ -23,7 +23,7 @@ fn crowd() -> Scene {
     test_support::scene(IDEAL_MIXTURE, CROWD).unwrap()
 }
 
-/// Everything over particles by tag, as bits.
+/// All data of the particles by tag, as bits.
 fn by_tag(run: &Simulation) -> Vec<(i32, [u64; 9], [i32; 4], bool)> {
     let mut all: Vec<_> = (0..run.len())
         .map(|k| {
@@ -56,7 +56,7 @@ fn whole_runs_have_the_same_bytes_on_any_number_of_threads() {
         (files(&out), checkpoint)
     });
     assert!(one == two && one == five);
-    // Files have particles by tag, whatever the order in memory.
+    // Files list particles by tag, whatever their order in memory.
     let dump = String::from_utf8(one.0[1].clone()).unwrap();
     for frame in dump.split("vz\n").skip(1) {
         let ids: Vec<u32> = frame.lines().map_while(|l| l.split(' ').next()?.parse().ok()).collect();
@@ -70,7 +70,7 @@ fn whole_runs_have_the_same_bytes_on_any_number_of_threads() {
     assert!((0..state.len()).all(|k| velocities[state.tag[k] as usize - 1] == state.v[k]));
 }
 
-/// Reordering moves every number of a particle to the same place, and changes none.
+/// Reordering moves all numbers of a particle to the same index, and changes none.
 #[test]
 fn reordering_keeps_particles_whole() {
     let scene = crowd();
@@ -86,7 +86,7 @@ fn reordering_keeps_particles_whole() {
         assert!(kept.tags().is_sorted() && !moved.tags().is_sorted());
         assert!(by_tag(&kept) == by_tag(&moved), "{name}");
         assert!(kept.frozen().iter().any(|f| *f));
-        // Later ones differ by rounding.
+        // Later positions differ by rounding.
         let [mut kept, mut moved] = [kept, moved];
         for run in [&mut kept, &mut moved] {
             run.advance(35, 0.01, integrator).unwrap();
@@ -114,7 +114,7 @@ fn reordering_keeps_the_physics() {
             run
         });
         assert!(!moved.tags().is_sorted());
-        // Rounding of single precision, relative to forces of order 10², grows along with the steps.
+        // Rounding of single precision, relative to forces of order 10², grows with the number of steps.
         let tolerance = if precision == Precision::Double { 1e-9 } else { 1e-3 };
         let d = difference(&kept, &moved);
         assert!(d < tolerance, "{d}");
@@ -126,7 +126,7 @@ fn reordering_keeps_the_physics() {
     }
 }
 
-/// Where nothing is swept there is no order to take.
+/// The pair sums have no sweep, hence no order of particles.
 #[test]
 fn the_reference_leaves_the_order_alone() {
     let mut run = simulation(SET6, settled());
@@ -136,7 +136,7 @@ fn the_reference_leaves_the_order_alone() {
     assert!(run.tags().is_sorted());
 }
 
-/// Stopped before, at and between steps with a reordering, a run ends in the same bytes.
+/// A run stopped before, at and between steps with a reordering ends with the same bytes.
 #[test]
 fn a_run_goes_on_between_reorderings() {
     let scene = crowd();

@@ -1,8 +1,8 @@
-//! Drag and noise of pairs of particles that are alone, against the formula of each integrator.
+//! Drag and noise of isolated pairs of particles, compared with the formula of each integrator.
 //!
-//! Every particle has one partner, half a range away, and no other particle within the range. Velocities are so small that
-//! distances stay what they are. The relative velocity `u` along a pair then follows a linear recurrence with one number,
-//! x = DΔt/μ.
+//! Every particle has one partner, at half the range, and no other particle within the range. Velocities are
+//! so small that distances stay constant. The relative velocity `u` along a pair then follows a linear
+//! recurrence with one parameter, x = DΔt/μ.
 
 use super::*;
 use crate::integrator::Coupling;
@@ -10,20 +10,19 @@ use psidpd_core::engine::thermostat::Update;
 use psidpd_core::engine::{PeriodicBox, Precision, Settings};
 
 const PAIRS: &str = "title = \"pairs\"\nspecies = [\"A\", \"B\"]\n[[thermostat]]\ngamma = 6\nrange = 1\n";
-/// Of the species, with the reduced mass 3/4.
+/// Masses of the species; the reduced mass is 3/4.
 const MASS: [f64; 2] = [1.0, 3.0];
 const REDUCED: f64 = 0.75;
 const DT: f64 = 0.3;
-/// x: half a range away the drag is D = 6 (1 − ½)² = 3/2.
+/// The parameter x: at half the range the drag is D = 6 (1 − ½)² = 3/2.
 const X: f64 = 1.5 * DT / REDUCED;
-/// The direction of every pair.
 const ALONG: [f64; 3] = [1.0 / 3.0, 2.0 / 3.0, 2.0 / 3.0];
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|c| a[c] * b[c]).sum()
 }
 
-/// `edge`³ pairs, the particles of a pair one after the other.
+/// A simulation of `edge`³ pairs; the two particles of a pair are consecutive.
 fn pairs(edge: usize, kt: f64) -> Simulation {
     let domain = PeriodicBox::orthogonal([0.0; 3], [2.0 * edge as f64; 3], [true; 3]).unwrap();
     let x: Vec<[f64; 3]> = (0..edge.pow(3))
@@ -41,7 +40,7 @@ fn with(update: Update, every: u64) -> Integrator {
     Integrator::Aboba(Coupling { update, every, ..Coupling::DEFAULT })
 }
 
-/// What a step leaves of `u` where drag and noise act at fixed positions; `None` for the other integrators.
+/// The factor by which a step scales `u` where drag and noise act at fixed positions; `None` for other integrators.
 fn factor(integrator: Integrator, x: f64) -> Option<f64> {
     let midpoint = |x: f64| (1.0 - 0.5 * x) / (1.0 + 0.5 * x);
     match integrator {
@@ -58,7 +57,7 @@ fn factor(integrator: Integrator, x: f64) -> Option<f64> {
     }
 }
 
-/// `u`, and the force along the pair times Δt/μ, one step later, with a noise `xi` of variance 1; in units of √(kT/μ).
+/// Advances `u`, and the force along the pair times Δt/μ, by one step with a noise `xi` of variance 1; in units of √(kT/μ).
 fn one_step(integrator: Integrator, x: f64, [u, f]: [f64; 2], xi: f64) -> [f64; 2] {
     let noise = (2.0 * x).sqrt() * xi;
     let half = u + 0.5 * f;
@@ -86,13 +85,13 @@ fn one_step(integrator: Integrator, x: f64, [u, f]: [f64; 2], xi: f64) -> [f64; 
     }
 }
 
-/// All but Lowe and Andersen's, which has no formula for a single pair.
+/// All integrators except Lowe and Andersen's, which has no formula for a single pair.
 fn linear() -> impl Iterator<Item = Integrator> {
     Integrator::ALL.into_iter().map(|(_, it)| it).filter(|it| *it != Integrator::LoweAndersen)
 }
 
-/// Without noise, at a temperature whose noise is far below rounding. Drag leaves the mean velocity of a pair, and what is
-/// across it, alone.
+/// The temperature is so low that noise is far below rounding. Drag does not change the mean velocity of a
+/// pair or its transverse relative velocity.
 #[test]
 fn relative_velocities_decay_by_the_formula() {
     let more = [with(Update::OrnsteinUhlenbeck, 1), with(Update::Midpoint, 3)];
@@ -139,14 +138,15 @@ fn along(run: &Simulation) -> Vec<[f64; 2]> {
 }
 
 const EDGE: usize = 16;
-/// Steps that are looked at, after [`SETTLE`] others from rest.
+/// Steps that the test samples, after [`SETTLE`] others from rest.
 const STEPS: usize = 48;
 const SETTLE: u64 = 10;
 
-/// What a step adds to what drag leaves is the noise, of the variance 2kT D Δt/μ² before the step does with it what it does;
-/// and `u` has the variance that follows, kT/μ where drag and noise act at fixed positions. The first variance, of 196 608
-/// independent numbers, has a standard error of 0.32 % at most, and the second one, of numbers with a correlation of 0.55
-/// from step to step, of 0.45 %. Six of them are exceeded by chance less than once in 10^8. An amplitude 2 % off is 4 %.
+/// A step adds noise to the damped `u`: its variance is 2kT D Δt/μ² times the response of the step. `u` has
+/// the stationary variance of the recurrence, kT/μ where drag and noise act at fixed positions. The first
+/// variance, of 196 608 independent numbers, has a standard error of at most 0.32 %. The second, of numbers
+/// with a correlation of 0.55 from step to step, has one of 0.45 %. Six standard errors are exceeded by
+/// chance less than once in 10^8. An amplitude wrong by 2 % changes both variances by 4 %.
 #[test]
 fn noise_has_the_variance_of_the_formula() {
     let double =
@@ -171,7 +171,7 @@ fn noise_has_the_variance_of_the_formula() {
             before = after;
         }
         let count = (EDGE.pow(3) * STEPS) as f64;
-        // What a noise of 1 does, in its step and in those that follow.
+        // The response to a noise of 1, in its step and in later ones.
         let mut response = one_step(integrator, X, [0.0; 2], 1.0);
         let of_noise = response[0].powi(2);
         let mut of_all = 0.0;
@@ -187,9 +187,10 @@ fn noise_has_the_variance_of_the_formula() {
     }
 }
 
-/// Lowe and Andersen's: with the probability 1 − exp(−x) a pair gets a new `u` of variance kT/μ, and else keeps its velocities
-/// to the last bit. The share of 196 608 has a standard error of 0.0011, the variance of 0.43 %; six of them are exceeded by
-/// chance less than once in 10^8. A rate 5 % off changes the share by 0.016.
+/// Lowe and Andersen's integrator: with the probability 1 − exp(−x) a pair gets a new `u` of variance kT/μ;
+/// otherwise its velocities keep their bits. The share of 196 608 pairs has a standard error of 0.0011, the
+/// variance one of 0.43 %; six standard errors are exceeded by chance less than once in 10^8. A rate wrong by
+/// 5 % changes the share by 0.016.
 #[test]
 fn relative_velocities_are_drawn_anew_at_the_rate_of_drag() {
     let mut run = pairs(EDGE, 1e-20);

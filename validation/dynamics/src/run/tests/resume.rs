@@ -1,4 +1,4 @@
-//! Runs that are interrupted end as those that are not.
+//! Interrupted runs end like runs without interruption.
 
 use super::*;
 use crate::run::checkpoint::{Checkpoint, CheckpointError, Store, read_state};
@@ -16,12 +16,12 @@ const STAGES: &str = "\
     [output]\nthermo = 2\ndump = 3\n";
 const STEPS: u64 = 21;
 
-/// Set 6 with densities that the liquid goes beyond, so that there is something to count.
+/// Set 6 with density bounds that the liquid exceeds, so that the counts are not zero.
 fn bounded() -> String {
     SET6.replace("range  = \"rd\"", "range  = \"rd\"\nbounds = [0.5, 4.5]")
 }
 
-/// A frozen floor, a body force, a ramp, and everything that a scene can write.
+/// A frozen floor, a body force, a ramp and every kind of output.
 const EVERYTHING: &str = "title = \"all\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7\ndensity = 6.05\nprecision = \"double\"\n\
     [box]\nlengths = [3.0, 3.0, 5.0]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]\n\
     [[part]]\nshape = \"layer\"\nface = \"zlo\"\nthickness = 0.8\nlattice = \"fcc\"\nfrozen = true\n\
@@ -34,7 +34,7 @@ const EVERYTHING: &str = "title = \"all\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 
     [observe]\nevery = 2\nstages = [\"cool\", \"run\"]\nrdf = true\ntemperature = true\nstress_profile = true\n\
     velocity_profile = true\npressure = true\nmsd = { every = 1, length = 4 }\nclusters = { skip = 3 }\n";
 
-/// One integrator after the other.
+/// Stages with one integrator after the other.
 const INTEGRATORS: &str = "\
     [[stage]]\nname = \"a\"\nsteps = 5\ndt = 0.02\nintegrator = \"aboba\"\nthermostat_every = 2\n\
     [[stage]]\nname = \"b\"\nsteps = 4\ndt = 0.03\nintegrator = \"two-stage\"\n\
@@ -44,7 +44,7 @@ const INTEGRATORS: &str = "\
     [[stage]]\nname = \"f\"\nsteps = 3\nintegrator = \"shardlow-s2\"\nnoise = \"uniform\"\n\
     [output]\nthermo = 2\ndump = 3\ncheckpoint = 4\n";
 
-/// Trial moves before and after a step of time, whose length is found in the first stage.
+/// Trial moves before and after a stage with time steps; the first stage tunes their length.
 const TRIALS: &str = "title = \"trials\"\nmodel = \"m.toml\"\nkT = 1.0\nseed = 7\ndensity = 6.05\n\
     [box]\nlengths = [3.0, 3.0, 5.0]\nboundary = [\"periodic\", \"periodic\", \"reflecting\"]\n\
     [[part]]\nshape = \"layer\"\nface = \"zlo\"\nthickness = 0.8\nlattice = \"fcc\"\nfrozen = true\n\
@@ -64,7 +64,7 @@ fn scenes() -> [Scene; 5] {
     [solid, flat, trials, scene_of(SET6, "[3.0, 3.0, 3.0]", 6.05, INTEGRATORS).unwrap(), all]
 }
 
-/// Every file of a folder and the folders in it, but the one that tells times.
+/// Every file of a folder and of its subfolders, except the one with wall times.
 fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut files = BTreeMap::new();
     for entry in std::fs::read_dir(folder).unwrap() {
@@ -87,7 +87,7 @@ fn assert_same(a: &Path, b: &Path, when: &str) {
     }
 }
 
-/// Runs until `at`, asks to stop there, and gives the outcome.
+/// Runs to step `at`, requests a stop there, and returns the outcome.
 fn until(scene: &Scene, out: &Path, begin: Begin, at: u64) -> Result<Outcome, RunError> {
     let stop = AtomicUsize::new(0);
     Runner::begin(scene, out, begin)?.run(&stop, &mut |p| {
@@ -136,14 +136,14 @@ fn a_run_stopped_after_any_step_ends_in_the_same_bytes() {
             all.to_vec()
         };
         assert_eq!(names, expected);
-        // Of many particles the first forces take long: before the first step as well.
+        // With many particles the first forces take long: the stop requests include step 0.
         for step in 0..STEPS {
             let out = folder.path().join(format!("{step}"));
             interrupted(&scene, &out, Begin::New, step);
             assert_eq!(finished(&scene, &out, Begin::Resume), summary, "step {step}");
             assert_same(&whole, &out, &format!("step {step}"));
         }
-        // After each of them, one after the other
+        // The run stops after every step in turn.
         let out = folder.path().join("often");
         for step in 1..STEPS {
             interrupted(&scene, &out, Begin::Resume, step);
@@ -157,8 +157,8 @@ fn a_run_stopped_after_any_step_ends_in_the_same_bytes() {
     }
 }
 
-/// A run that is killed loses the steps since its last checkpoint, and what it wrote in them: here killed
-/// by a panic after every step, with its folder as it was at that moment.
+/// A killed run loses the steps since its last checkpoint, and their output. Here a panic kills the run after
+/// every step, and the folder stays as it was at that moment.
 #[test]
 fn a_run_killed_after_any_step_ends_in_the_same_bytes() {
     let [plain, _, trials, many, everything] = scenes();
@@ -196,7 +196,7 @@ fn killed_after_any_step(scene: &Scene) {
         finished(scene, &out, Begin::Resume);
         assert_same(&whole, &out, &format!("killed after {step} reports"));
     }
-    // A step is reported before its checkpoint is written.
+    // Progress reports precede the checkpoint of their step.
     assert_eq!(from, [0, 0, 0, 0, 0, 4, 4, 4, 4, 8, 8, 8, 8, 12, 12, 12, 12, 16, 16, 16, 16, 20]);
 }
 
@@ -214,10 +214,10 @@ fn a_finished_run_is_left_as_it_is() {
     assert_eq!((&*again, timing.sessions.len()), (&summary, 1));
     assert!(contents(out) == before);
     drop(runner);
-    // Even where its largest file was taken away.
+    // A finished run stays finished without its largest file.
     std::fs::remove_file(out.join("dump.lammpstrj")).unwrap();
     assert_eq!(finished(&scene, out, Begin::Resume), summary);
-    // It is made anew only when told to; by another scene too.
+    // A new run, even of another scene, replaces a finished one on request only.
     let left = contents(out);
     let [first, second, ..] = scenes();
     for (other, expected) in [(&first, false), (&second, true)] {
@@ -260,7 +260,7 @@ fn an_unfinished_run_is_not_overwritten_by_mistake() {
     std::fs::remove_dir_all(folder.path().with_extension("whole")).unwrap();
 }
 
-/// A scene that does not say gets checkpoints by the clock; one that says 0 gets none on the way.
+/// A scene without a step interval gets checkpoints by the clock; one with the interval 0 gets none before the end.
 #[test]
 fn checkpoints_come_when_they_are_due() {
     let [often, by_the_clock, ..] = scenes();
@@ -295,14 +295,15 @@ fn one_folder_holds_one_run_at_a_time() {
     finished(&scene, folder.path(), Begin::New);
 }
 
-/// Files that lost what a checkpoint counts on: the one before will do if it can, else nothing is touched.
+/// If files lost bytes that a checkpoint records, the run continues from the previous checkpoint; if that
+/// fails too, no file changes.
 #[test]
 fn files_that_became_shorter_are_noticed() {
     let [scene, ..] = scenes();
     let folder = tempfile::tempdir().unwrap();
     let (whole, out) = (folder.path().join("whole"), folder.path().join("out"));
     run_scene(&scene, &whole, &mut |_| ()).unwrap();
-    // Checkpoints of steps 8 and 9, with a frame between them.
+    // The run has checkpoints of steps 8 and 9, with a frame between them.
     interrupted(&scene, &out, Begin::New, 9);
     let dump = out.join("dump.lammpstrj");
     let length = dump.metadata().unwrap().len();
@@ -325,7 +326,7 @@ fn files_that_became_shorter_are_noticed() {
     assert!(contents(&out) == before);
 }
 
-/// Files of the same length, with other bytes in what a checkpoint counts on, or behind that.
+/// Files of the same length with other bytes, within the recorded part or behind it.
 #[test]
 fn files_that_were_edited_are_noticed() {
     let [scene, ..] = scenes();
@@ -344,14 +345,14 @@ fn files_that_were_edited_are_noticed() {
         assert!(matches!(&error, RunError::Checkpoint(CheckpointError::Edited { .. })), "{error}");
         assert!(error.to_string().contains(name), "{error}");
         assert!(contents(&out) == before);
-        // As it was, with what steps after the checkpoint may have left.
+        // The file has its recorded bytes, and some that steps after the checkpoint may have left.
         std::fs::write(&path, [&bytes[..], b"more"].concat()).unwrap();
         finished(&scene, &out, Begin::Resume);
         assert_same(&whole, &out, name);
     }
 }
 
-/// What a run says of itself is written again if it is gone.
+/// A missing `about.json` is written again.
 #[test]
 fn a_description_that_is_gone_comes_back() {
     let [scene, ..] = scenes();
@@ -362,7 +363,7 @@ fn a_description_that_is_gone_comes_back() {
     std::fs::remove_file(out.join("about.json")).unwrap();
     finished(&scene, &out, Begin::Resume);
     assert_same(&whole, &out, "without about.json");
-    // Of a finished run as well.
+    // A missing `about.json` of a finished run is written again too.
     std::fs::remove_file(out.join("about.json")).unwrap();
     finished(&scene, &out, Begin::Resume);
     assert_same(&whole, &out, "finished, without about.json");
@@ -391,7 +392,7 @@ fn other_scenes_do_not_go_on_from_a_checkpoint() {
     );
 }
 
-/// Not the number of threads, but the precision: it tells one run from another.
+/// The identity of a run includes the precision, and excludes the number of threads.
 #[test]
 fn threads_change_no_byte_and_precision_is_part_of_a_run() {
     for scene in scenes() {
@@ -404,7 +405,7 @@ fn threads_change_no_byte_and_precision_is_part_of_a_run() {
             out
         });
         assert_same(&one, &two, "threads");
-        // From a checkpoint with another number of threads, too.
+        // A checkpoint with another number of threads also works.
         let three = folder.path().join("3");
         interrupted(&scene, &three, Begin::New, 10);
         let mut runner = Runner::begin(&scene, &three, Begin::Resume).unwrap();
@@ -421,7 +422,7 @@ fn threads_change_no_byte_and_precision_is_part_of_a_run() {
         assert!(error.contains("precision is "), "{error}");
         finished(&other, &out, Begin::Overwrite);
         assert!(contents(&out)["thermo.csv"] != contents(&one)["thermo.csv"]);
-        // Said or meant is the same.
+        // Stating the default precision changes nothing.
         let out = folder.path().join("said");
         interrupted(&scene, &out, Begin::New, 10);
         let said = Scene { precision: Some(scene.precision()), ..scene.clone() };
@@ -430,7 +431,7 @@ fn threads_change_no_byte_and_precision_is_part_of_a_run() {
     }
 }
 
-/// The checkpoint of a run that blew up is of the last good state, and leads to the same end again.
+/// The checkpoint of a diverged run holds the last good state, and resuming it leads to the same error.
 #[test]
 fn a_blow_up_leaves_a_checkpoint() {
     let rest = "[[stage]]\nname = \"fine\"\nsteps = 25\ndt = 0.01\n\
@@ -444,13 +445,13 @@ fn a_blow_up_leaves_a_checkpoint() {
     assert_eq!(state.to_data_by_tag(&data.title), data);
     let again = until(&scene, folder.path(), Begin::Resume, u64::MAX).unwrap_err();
     assert_eq!(again.to_string(), error.to_string());
-    // With a smaller step it goes on.
+    // With a smaller step the run continues.
     let mut run = simulation(SET6, state);
     advance(&mut run, 20, 0.01, Integrator::VelocityVerlet);
     assert!((0.5..2.0).contains(&run.temperature()), "{}", run.temperature());
 }
 
-/// If the very first forces cannot be had, the checkpoint is of the initial state.
+/// If the first forces fail, the checkpoint holds the initial state.
 #[test]
 fn a_start_that_fails_leaves_what_it_started_from() {
     let rest = "[[stage]]\nname = \"one\"\nsteps = 5\ndt = 0.01\n[output]\nthermo = 1\ndump = 1\n";
@@ -465,8 +466,8 @@ fn a_start_that_fails_leaves_what_it_started_from() {
     assert_eq!(again.to_string(), error.to_string());
 }
 
-/// `final.data` of a box with walls tells them: a scene that starts from it has them, and so has a map of the density, in which a
-/// particle at one wall is not seen at the other.
+/// `final.data` of a box with walls names them. A scene that starts from the file has these walls, and so
+/// does a map of the density, where a particle at one wall does not appear at the other.
 #[test]
 fn a_data_file_keeps_walls() {
     use psidpd_formats::{Configuration, Which};
@@ -485,14 +486,14 @@ fn a_data_file_keeps_walls() {
     assert_eq!(Configuration::open(&file, Which::Last).unwrap().domain.periodic(), walls);
     let open = format!("{again}[box]\nboundary = [\"periodic\", \"periodic\", \"periodic\"]\n");
     assert_eq!(test_support::scene(SOFT, &open).unwrap().initial_state().domain.periodic(), [true; 3]);
-    // One without walls says nothing, nor does the plane.
+    // A box without walls has no entry for them, nor does a plane.
     for (model, lengths) in [(SOFT, "[4.0, 4.0, 5.0]"), (VAN_DER_WAALS, "[6.0, 6.0]")] {
         let data = scene_of(model, lengths, 3.0, ONE_STAGE).unwrap().initial_state().to_data("t");
         assert_eq!((data.title.as_str(), data.boundary()), ("t", None));
     }
 }
 
-/// A run that goes on with other instructions than it began with says so; one that goes on with the same does not.
+/// A run resumed with another instruction set reports that; one resumed with the same set does not.
 #[test]
 fn another_instruction_set_is_told() {
     let [scene, ..] = scenes();

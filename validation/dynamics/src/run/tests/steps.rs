@@ -1,10 +1,10 @@
-//! A step is what its formulas say, to the last bit, one particle after the other.
+//! A step equals its formulas to the last bit, particle by particle.
 
 use super::*;
 use nalgebra::Matrix3;
 use psidpd_core::engine::PeriodicBox;
 
-/// A fluid of two masses, in a number of particles that is no multiple of four.
+/// A fluid of two masses, whose number of particles is not a multiple of four.
 fn start(masses: [f64; 2], edges: Matrix3<f64>) -> (Model, State) {
     let model = Model::parse("m.toml", if masses[0] == masses[1] { SET6 } else { IDEAL_MIXTURE }).unwrap();
     assert_eq!(model.species().len(), if masses[0] == masses[1] { 1 } else { 2 });
@@ -62,7 +62,7 @@ fn steps_are_their_formulas() {
     }
 }
 
-/// Steps that leave the end of their work to the next are the same to the last bit, whatever comes between.
+/// Steps with a deferred kick give the same bits, whatever happens between them.
 #[test]
 fn steps_in_a_row_are_steps_one_by_one() {
     let (model, state) = start([1.0, 2.5], Matrix3::from_diagonal_element(4.0));
@@ -81,7 +81,7 @@ fn steps_in_a_row_are_steps_one_by_one() {
             row.advance(steps, dt, integrator).unwrap();
             assert!(single.state() == row.state());
         }
-        // A step of another length, or forces once more, end what is under way.
+        // A step of another length, or another evaluation of forces, completes a deferred kick.
         for dt in [0.01, 0.02, 0.01] {
             single.step(dt, integrator, Want::FORCES).unwrap();
             row.begin_step(dt, integrator, Want::FORCES).unwrap();
@@ -93,7 +93,7 @@ fn steps_in_a_row_are_steps_one_by_one() {
     }
 }
 
-/// Counts of boxes hold 2³¹: who is farther away is refused, not counted wrong.
+/// Counts of boxes are limited to 2³¹: a particle farther away is refused, not counted wrong.
 #[test]
 fn particles_beyond_all_counts_are_refused() {
     let mut state = state_of(IDEAL, "[4.0, 4.0, 4.0]", 1.0);

@@ -1,7 +1,7 @@
 use crate::scene::Lattice;
 use crate::scene::shape::Shape;
 
-/// The cell of a lattice: edges relative to each other, and sites in fractions of it.
+/// The unit cell of a lattice: relative lengths of its edges, and its sites in fractions of the edges.
 struct Cell {
     edges: [f64; 3],
     sites: &'static [[f64; 3]],
@@ -9,7 +9,7 @@ struct Cell {
 
 fn cell(lattice: Lattice) -> Cell {
     const HEXAGON: f64 = 1.732_050_807_568_877_2;
-    // Sites lie symmetrically in the cell, so that a lattice fits a block with the same margins all round.
+    // Sites lie symmetrically in the cell, so that a lattice fits a block with equal margins at opposite faces.
     let (edges, sites): (_, &[[f64; 3]]) = match lattice {
         Lattice::Simple => ([1.0; 3], &[[0.5, 0.5, 0.5]]),
         Lattice::Bcc => ([1.0; 3], &[[0.25, 0.25, 0.25], [0.75, 0.75, 0.75]]),
@@ -21,7 +21,7 @@ fn cell(lattice: Lattice) -> Cell {
     Cell { edges, sites }
 }
 
-/// `count` sites of a lattice in `shape`; what vacancies there are, are spread evenly.
+/// Returns `count` sites of a lattice in `shape`; vacancies are spread evenly.
 pub fn points(lattice: Lattice, count: usize, shape: &Shape, dimensions: usize) -> Vec<[f64; 3]> {
     let cell = cell(lattice);
     let sites = match shape {
@@ -32,7 +32,8 @@ pub fn points(lattice: Lattice, count: usize, shape: &Shape, dimensions: usize) 
     (0..count).map(|k| sites[(k as u128 * total / count as u128) as usize]).collect()
 }
 
-/// Sites of whole cells that fill a block, as near to their proportions as whole numbers allow; at least `count`.
+/// The sites of whole cells that fill a block, at least `count`. Cells keep their proportions as nearly as
+/// whole numbers allow.
 fn in_block(cell: &Cell, count: usize, low: [f64; 3], high: [f64; 3], dimensions: usize) -> Vec<[f64; 3]> {
     let lengths: [f64; 3] = std::array::from_fn(|k| high[k] - low[k]);
     let cells = cells(cell, count, lengths, dimensions);
@@ -47,7 +48,7 @@ fn in_block(cell: &Cell, count: usize, low: [f64; 3], high: [f64; 3], dimensions
     sites
 }
 
-/// Numbers of cells along the edges, with at least `count` sites in all.
+/// Numbers of cells along the edges, with at least `count` sites in total.
 fn cells(cell: &Cell, count: usize, lengths: [f64; 3], dimensions: usize) -> [usize; 3] {
     let per_cell = cell.sites.len();
     let ratio = |k: usize| lengths[k] / cell.edges[k];
@@ -65,12 +66,12 @@ fn cells(cell: &Cell, count: usize, lengths: [f64; 3], dimensions: usize) -> [us
     cells
 }
 
-/// Sites inside a shape, of the widest lattice (to one part in a hundred) that has `count` there.
+/// The sites inside a shape, of the widest lattice (within 1 %) with at least `count` sites there.
 fn in_shape(cell: &Cell, count: usize, shape: &Shape, dimensions: usize) -> Vec<[f64; 3]> {
     let [low, high] = shape.bounds(dimensions);
     let aspect: f64 = cell.edges[..dimensions].iter().product();
     let per_cell = shape.volume(dimensions) * cell.sites.len() as f64 / (count as f64 * aspect);
-    // Begin a little too wide: more sites than the volume suggests may lie inside.
+    // The search begins with a spacing 5 % too wide: more sites than the volume suggests may lie inside.
     let mut spacing = 1.05 * per_cell.powf(1.0 / dimensions as f64);
     loop {
         let edge = cell.edges.map(|e| e * spacing);
@@ -126,7 +127,7 @@ mod tests {
         assert_eq!(all.len(), 1234);
     }
 
-    /// Nearest distances of the lattices at density 1, in periodic boxes they fit, or nearly.
+    /// The lattices have their known nearest distances at density 1, in periodic boxes that they fit closely.
     #[test]
     fn lattices_have_their_nearest_distances() {
         let cases = [

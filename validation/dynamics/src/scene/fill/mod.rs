@@ -1,4 +1,4 @@
-//! Initial states from their description.
+//! Initial states from scenes.
 
 mod lattice;
 mod near;
@@ -11,19 +11,19 @@ use near::Near;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 
-/// A part without room for its particles at their minimum distance.
+/// The error of a part that has no room for its particles at their minimum distance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Crowded {
-    /// Which part.
+    /// Index of the part.
     pub part: usize,
-    /// How many particles found a position.
+    /// Number of particles that found a position.
     pub placed: usize,
 }
 
-/// The initial state of a scene. The generator's stream is fixed by its algorithm, not by the machine.
+/// The initial state of a scene. The algorithm alone fixes the stream of the generator, so all machines give the same state.
 ///
-/// Particles of a crowded part are placed all the same, closer than they should be; reading a [`Scene`]
-/// checks for this and refuses the file.
+/// Particles of a crowded part are placed nevertheless, closer than their minimum distance; reading a
+/// [`Scene`] detects this and refuses the file.
 pub fn fill(scene: &Scene) -> (State, Option<Crowded>) {
     let mut random = ChaCha8Rng::seed_from_u64(scene.seed);
     match &scene.initial {
@@ -40,7 +40,7 @@ pub fn fill(scene: &Scene) -> (State, Option<Crowded>) {
     }
 }
 
-/// Sets velocities of frozen particles to zero, and subtracts the mean velocity of the others.
+/// Sets the velocities of frozen particles to zero, and subtracts the mean velocity of all other particles.
 fn rest(state: &mut State, scene: &Scene) {
     if scene.frozen.is_empty() {
         return;
@@ -85,7 +85,7 @@ fn place(scene: &Scene, parts: &[Part], random: &mut ChaCha8Rng) -> (State, Opti
     (state, crowded)
 }
 
-/// Adds the particles of one part, and returns how many found a position.
+/// Adds the particles of one part, and returns the number that found a position.
 fn place_one(scene: &Scene, part: &Part, state: &mut State, random: &mut ChaCha8Rng) -> usize {
     let (count, dimensions) = (part.count, scene.model.dimensions());
     let mut species: Vec<i32> = Vec::with_capacity(count);

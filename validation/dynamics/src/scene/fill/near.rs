@@ -1,6 +1,6 @@
 use psidpd_core::engine::PeriodicBox;
 
-/// Points in cells, to ask whether one is near another.
+/// Points sorted into cells, for fast searches of neighbours.
 #[derive(Debug, Clone)]
 pub struct Near<'a> {
     domain: &'a PeriodicBox,
@@ -11,7 +11,7 @@ pub struct Near<'a> {
 }
 
 impl<'a> Near<'a> {
-    /// No points yet, with cells for about `count`; points closer than `distance` count as close.
+    /// Creates an empty set with cells for about `count` points; points closer than `distance` count as close.
     pub fn new(domain: &'a PeriodicBox, dimensions: usize, distance: f64, count: usize) -> Near<'a> {
         let volume = domain.volume(dimensions);
         let edge = distance.max((volume / count.max(1) as f64).powf(1.0 / dimensions as f64));
@@ -24,7 +24,7 @@ impl<'a> Near<'a> {
         Near { domain, dimensions, distance, cells, points }
     }
 
-    /// The cell of a point, which is inside of the box or of one of its images.
+    /// The cell of a point, which lies in the box or in one of its images.
     fn cell(&self, x: [f64; 3]) -> [i64; 3] {
         let s = self.domain.fraction(x);
         std::array::from_fn(|k| match k < self.dimensions {
@@ -38,13 +38,12 @@ impl<'a> Near<'a> {
         at[0] + self.cells[0] * (at[1] + self.cells[1] * at[2])
     }
 
-    /// Adds a point.
     pub fn push(&mut self, x: [f64; 3]) {
         let index = self.index(self.cell(x));
         self.points[index].push(x);
     }
 
-    /// Whether a point, or an image of one, is near `x`.
+    /// Whether a point or one of its images is close to `x`.
     pub fn is_close(&self, x: [f64; 3]) -> bool {
         let here = self.cell(x);
         let reach = |k: usize| if k < self.dimensions { -1..=1 } else { 0..=0 };

@@ -3,10 +3,10 @@ use crate::scene::shape::Shape;
 use chacha20::ChaCha8Rng;
 use rand::RngExt;
 
-/// Attempts at a position before a region counts as full.
+/// Number of attempts at a position before a region counts as full.
 const ATTEMPTS: usize = 2000;
 
-/// A uniform point of `shape`.
+/// Draws a uniform point of `shape`.
 pub fn point(shape: &Shape, dimensions: usize, random: &mut ChaCha8Rng) -> [f64; 3] {
     let [low, high] = shape.bounds(dimensions);
     loop {
@@ -17,8 +17,7 @@ pub fn point(shape: &Shape, dimensions: usize, random: &mut ChaCha8Rng) -> [f64;
     }
 }
 
-/// A uniform point of `shape` that is close to none of `near`; if none is found, the last attempt as the
-/// error.
+/// Draws a uniform point of `shape` that is close to no point of `near`; if none is found, the error holds the last attempt.
 pub fn point_apart(
     shape: &Shape,
     dimensions: usize,

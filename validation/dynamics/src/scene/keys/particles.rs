@@ -1,4 +1,4 @@
-//! What the box is filled with.
+//! Keys of the initial particles.
 
 use super::ValueKind::*;
 use super::{Key, OPTIONAL, REQUIRED, Table, form_key, key, names};
@@ -11,14 +11,12 @@ fn lattices() -> Vec<&'static str> {
     [names(&LATTICES), names(&FLAT_LATTICES)].concat()
 }
 
-/// Kinds of `[initial]` that are filled.
+/// Kinds of `[initial]` that fill a region.
 const FILLED: &[&str] = &["random", "lattice", "slab", "sphere", "cylinder"];
-/// Kinds that come from a file.
+/// Kinds of `[initial]` that read a file.
 const SAVED: &[&str] = &["data", "checkpoint"];
-/// Shapes that have a centre.
 const ROUND: &[&str] = &["sphere", "cylinder"];
 
-/// `[initial]`.
 pub const INITIAL: Table = Table {
     path: "initial",
     title: "",
@@ -68,7 +66,6 @@ pub const INITIAL: Table = Table {
     ],
 };
 
-/// `[[part]]`.
 pub const PART: Table = Table {
     path: "part",
     title: "",

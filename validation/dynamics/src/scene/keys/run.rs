@@ -1,4 +1,4 @@
-//! What is done with the particles, and what is written.
+//! Keys of body forces, stages and output.
 
 use super::scene::{
     GRADIENT, INTEGRATOR, LAMBDA, MAX_MOVE, NOISE, SWEEPS, THERMOSTAT_EVERY, THERMOSTAT_STEP,
@@ -7,7 +7,6 @@ use super::ValueKind::*;
 use super::{Key, OPTIONAL, REQUIRED, Table, key, names};
 use crate::scene::number::AXES;
 
-/// `[[body_force]]`.
 pub const BODY_FORCE: Table = Table {
     path: "body_force",
     title: "",
@@ -82,7 +81,6 @@ const STAGE_MAX_MOVE: Key = Key {
     ..MAX_MOVE
 };
 
-/// `[[stage]]`.
 pub const STAGE: Table = Table {
     path: "stage",
     title: "",
@@ -122,7 +120,6 @@ pub const STAGE: Table = Table {
     ],
 };
 
-/// `[output]`.
 pub const OUTPUT: Table = Table {
     path: "output",
     title: "",

@@ -1,4 +1,4 @@
-//! Which fluid, in which box.
+//! Keys of the top level, the box and the masses.
 
 use super::ValueKind::*;
 use super::{Key, OPTIONAL, REQUIRED, Table, key, names};
@@ -48,7 +48,6 @@ pub(super) const MAX_MOVE: Key = key("max_move", Positive, OPTIONAL,
      moves, in the first stage of Monte Carlo, or in the first quarter of the only one.",
     "integrator = \"monte-carlo\"\nmax_move = 0.1");
 
-/// The top level.
 pub const TOP: Table = Table {
     path: "",
     title: "",
@@ -95,7 +94,6 @@ pub const TOP: Table = Table {
     ],
 };
 
-/// `[box]`.
 pub const BOX: Table = Table {
     path: "box",
     title: "",
@@ -114,7 +112,6 @@ pub const BOX: Table = Table {
     ],
 };
 
-/// `[masses]`.
 pub const MASSES: Table = Table {
     path: "masses",
     title: "",

@@ -5,48 +5,21 @@ mod read;
 
 pub use read::{FACES, SHAPES, Shapes};
 
-/// A region. Directions and lengths are those of a box along the axes; in two dimensions the third coordinate
-/// is ignored.
+/// A region. Directions and lengths are those of a box with edges along the axes; in two dimensions the third
+/// coordinate is ignored.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Shape {
-    /// Between two corners.
-    Block {
-        /// The lower corner.
-        low: [f64; 3],
-        /// The upper corner.
-        high: [f64; 3],
-    },
+    /// A block between two corners.
+    Block { low: [f64; 3], high: [f64; 3] },
     /// A ball; in two dimensions a disc.
-    Sphere {
-        /// Its centre.
-        center: [f64; 3],
-        /// Its radius.
-        radius: f64,
-    },
+    Sphere { center: [f64; 3], radius: f64 },
     /// A cylinder along an axis.
-    Cylinder {
-        /// Direction of its axis.
-        axis: usize,
-        /// Its middle.
-        center: [f64; 3],
-        /// Its radius.
-        radius: f64,
-        /// Its length.
-        length: f64,
-    },
-    /// What other regions, which do not overlap, leave of a block.
-    Rest {
-        /// Lower corner of the block.
-        low: [f64; 3],
-        /// Upper corner of the block.
-        high: [f64; 3],
-        /// The others.
-        others: Vec<Shape>,
-    },
+    Cylinder { axis: usize, center: [f64; 3], radius: f64, length: f64 },
+    /// The part of a block that other regions, which do not overlap, leave free.
+    Rest { low: [f64; 3], high: [f64; 3], others: Vec<Shape> },
 }
 
 impl Shape {
-    /// The volume, in two dimensions the area.
     pub fn volume(&self, dimensions: usize) -> f64 {
         use std::f64::consts::PI;
         match self {
@@ -61,7 +34,7 @@ impl Shape {
         }
     }
 
-    /// The corners of the smallest block around it.
+    /// The corners of the smallest block around the region.
     pub fn bounds(&self, dimensions: usize) -> [[f64; 3]; 2] {
         match self {
             Shape::Block { low, high } | Shape::Rest { low, high, .. } => [*low, *high],
@@ -76,7 +49,7 @@ impl Shape {
         }
     }
 
-    /// Whether a point is in it.
+    /// Whether a point lies in the region.
     pub fn contains(&self, x: [f64; 3], dimensions: usize) -> bool {
         match self {
             Shape::Block { low, high } => (0..dimensions).all(|k| (low[k]..=high[k]).contains(&x[k])),
@@ -99,7 +72,7 @@ impl Shape {
 mod tests {
     use super::*;
 
-    /// Volumes against the share of a grid of points inside.
+    /// Volumes agree with the share of grid points inside.
     #[test]
     fn volumes_are_those_of_the_points_inside() {
         let ball = Shape::Sphere { center: [2.0, 2.5, 3.0], radius: 1.5 };

@@ -1,13 +1,12 @@
-//! Whether two regions have more than their surfaces in common: exact for every pair of kinds.
+//! Exact tests whether the interiors of two regions overlap, for every pair of kinds.
 
 use super::Shape;
 
-/// How deep, as a share of a length, regions may be in each other before they count as overlapping: rounding
-/// of what is meant to touch.
+/// Depth, as a share of a length, that counts as touching: rounding can overlap regions that are meant to touch.
 const TOUCH: f64 = 1e-9;
 
 impl Shape {
-    /// Whether the two regions overlap. The rest overlaps with nothing.
+    /// Whether the two regions overlap. A region of kind `Rest` overlaps with nothing.
     pub fn overlaps(&self, other: &Shape, dimensions: usize) -> bool {
         use Shape::{Block, Cylinder, Rest, Sphere};
         match (self, other) {
@@ -46,7 +45,8 @@ impl Shape {
                 Cylinder { axis: i, center: a, radius: r, length: l },
                 Cylinder { axis: j, center: b, radius: s, length: m },
             ) => {
-                // With k across both axes: where along k each has points within the length of the other.
+                // Direction k is normal to both axes: each interval along k holds the points of one cylinder
+                // that lie within the length of the other.
                 let k = 3 - i - j;
                 let reach = |radius: f64, away: f64| (radius * radius - away * away).max(0.0).sqrt();
                 let first = reach(*r, beyond(a[*j], b[*j] - 0.5 * m, b[*j] + 0.5 * m));
@@ -61,7 +61,7 @@ fn less(a: f64, b: f64) -> bool {
     a < b - TOUCH * (a.abs() + b.abs())
 }
 
-/// How far `x` is outside of an interval.
+/// The distance of `x` from an interval; 0 inside.
 fn beyond(x: f64, low: f64, high: f64) -> f64 {
     (low - x).max(x - high).max(0.0)
 }
@@ -112,7 +112,7 @@ mod tests {
     }
 
     proptest! {
-        /// Projections onto the two shapes in turn come together if and only if the shapes meet.
+        /// Alternating projections onto the two shapes converge to one point if and only if the shapes meet.
         #[test]
         fn overlap_is_what_projections_find(a in shapes(), b in shapes()) {
             let mut x = [3.0; 3];
@@ -122,7 +122,7 @@ mod tests {
                 x = nearest(&b, y);
                 gap = norm((0..3).map(|k| x[k] - y[k]));
             }
-            // Shapes that nearly touch come together too slowly to tell.
+            // Shapes that nearly touch converge too slowly for a decision.
             prop_assume!(!(1e-9..1e-2).contains(&gap));
             prop_assert_eq!(a.overlaps(&b, 3), gap <= 1e-9);
             prop_assert_eq!(b.overlaps(&a, 3), gap <= 1e-9);

@@ -5,13 +5,12 @@ use crate::scene::number::{axis, positive, vector};
 use psidpd_core::document::{FileError, FileErrorKind, Section, Value};
 use psidpd_core::engine::PeriodicBox;
 
-/// How far, as a share of the box, a region may reach beyond it by rounding.
+/// Share of the box by which a region may reach beyond it, because of rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// Names of the kinds of a `[[part]]`.
 pub const SHAPES: &[&str] = &["box", "slab", "layer", "sphere", "cylinder", "rest"];
 
-/// The faces of a box.
+/// The names of the faces of a box: axis, and whether the face is the upper one.
 pub const FACES: [(&str, (usize, bool)); 6] = [
     ("xlo", (0, false)),
     ("xhi", (0, true)),
@@ -21,23 +20,20 @@ pub const FACES: [(&str, (usize, bool)); 6] = [
     ("zhi", (2, true)),
 ];
 
-/// Reads regions of one box.
 pub struct Shapes<'a> {
-    /// 2 or 3.
+    /// Number of dimensions, 2 or 3.
     pub dimensions: usize,
-    /// The box.
     pub domain: &'a PeriodicBox,
 }
 
 impl Shapes<'_> {
-    /// The whole box.
     pub fn whole(&self) -> Shape {
         let (low, lengths) = (self.domain.origin(), self.domain.lengths());
         Shape::Block { low, high: std::array::from_fn(|k| low[k] + lengths[k]) }
     }
 
-    /// The region named `kind`, whose keys are in `section`; `key` is what an error about it points at. What
-    /// others leave is the whole box as yet: see [`Shape::Rest`].
+    /// Reads the region named `kind`, whose keys are in `section`; errors point at `key`. A region of kind
+    /// `rest` is the whole box until the other regions are known: see [`Shape::Rest`].
     pub fn read(&self, kind: &str, key: &Value, section: &Section) -> Result<Shape, FileError> {
         let shape = match kind {
             "box" => self.read_block(section)?,
@@ -67,7 +63,7 @@ impl Shapes<'_> {
         Ok(shape)
     }
 
-    /// The normal of a region that reaches across the box in all directions but one.
+    /// The normal of a region that spans the box in all directions but one.
     pub fn normal(&self, shape: &Shape) -> Option<usize> {
         let Shape::Block { low, high } = shape else { return None };
         let lengths = self.domain.lengths();

@@ -1,19 +1,18 @@
-//! What acts on particles of a deck beside the forces between them: walls, frozen particles, body forces.
+//! Walls, frozen particles and body forces of a deck.
 
 use psidpd_dynamics::run::{BodyForce, Tags};
 use psidpd_dynamics::scene::Scene;
 use std::fmt::{Result, Write};
 
-/// Names of the directions.
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// The commands for what a scene has of this.
+/// Writes the commands for walls, frozen particles and body forces of a scene.
 pub struct Physics<'a> {
     scene: &'a Scene,
     dimensions: usize,
-    /// Which directions have walls.
+    /// Whether each direction has walls.
     walls: [bool; 3],
-    /// `all`, or what is not frozen.
+    /// The group of mobile particles: `all` if none is frozen.
     mobile: &'static str,
 }
 
@@ -30,12 +29,12 @@ impl<'a> Physics<'a> {
         self.walls.map(|wall| if wall { "f" } else { "p" }).join(" ")
     }
 
-    /// The group of the particles that move.
+    /// The group of mobile particles.
     pub fn mobile(&self) -> &'static str {
         self.mobile
     }
 
-    /// Groups, walls and the plane.
+    /// Writes the groups, the walls, and the fix of two dimensions.
     pub fn write_surroundings(&self, s: &mut impl Write) -> Result {
         if self.mobile == "mobile" {
             writeln!(
@@ -61,7 +60,7 @@ impl<'a> Physics<'a> {
         Ok(())
     }
 
-    /// The temperature of what moves, with the degrees of freedom that it has.
+    /// Writes the temperature of the mobile particles, with their degrees of freedom.
     pub fn write_temperature(&self, s: &mut impl Write) -> Result {
         if self.mobile == "all" && self.walls == [false; 3] {
             return Ok(());
@@ -76,7 +75,7 @@ impl<'a> Physics<'a> {
         writeln!(s, "thermo_modify temp warmth")
     }
 
-    /// Switches the body forces on.
+    /// Writes the fixes of the body forces.
     pub fn write_body_forces(&self, s: &mut impl Write) -> Result {
         for (k, force) in self.scene.body_forces.iter().enumerate() {
             let name = format!("body{}", k + 1);
@@ -95,18 +94,18 @@ impl<'a> Physics<'a> {
         Ok(())
     }
 
-    /// The formula of a component of the force, of the acceleration `a`.
+    /// Returns the formula of a force component for its acceleration.
     fn value(&self, force: &BodyForce) -> impl Fn(f64) -> String {
         let half = force.reversed_along.map(|k| {
             let (origin, length) = (self.scene.domain.origin()[k], self.scene.domain.lengths()[k]);
-            // Particles may be out of the box by a little until LAMMPS puts them back.
+            // Particles may be slightly outside the box until LAMMPS wraps them.
             let place = format!("({}-({origin:?}))/{length:?}", AXES[k]);
             format!("*(1-2*({place}-floor({place})>=0.5))")
         });
         move |a| format!("mass*({a:?}){}", half.as_deref().unwrap_or_default())
     }
 
-    /// The group that a body force acts on.
+    /// Writes the group that a body force acts on.
     fn write_group(
         &self,
         s: &mut impl Write,
@@ -127,7 +126,7 @@ impl<'a> Physics<'a> {
         Ok(group)
     }
 
-    /// Switches the body forces off.
+    /// Writes the commands that remove the body forces.
     pub fn write_end_of_body_forces(&self, s: &mut impl Write) -> Result {
         for k in 1..=self.scene.body_forces.len() {
             writeln!(s, "unfix         body{k}")?;
