@@ -65,7 +65,8 @@ class PairMDPDPsi : public PairTable {
   bool is_stale() override { return PairTable::is_stale() || masses() != built_masses; }
 
  private:
-  // The built-in weighs densities by the masses of the neighbours' types; none count without 'law lucy'.
+  // LAMMPS's mdpd weighs densities by the masses of the neighbours' types. Without 'law lucy' there are
+  // no such weights.
   std::vector<double> masses() const
   {
     if (!lucy || !atom->mass) return {};
