@@ -1,5 +1,5 @@
 //! Many-body dissipative particle dynamics from excess free energies: the model file, and the engine
-//! that both hosts, LAMMPS and the native runner, get their forces from.
+//! that computes forces for both hosts, LAMMPS and the native runner.
 //!
 //! The Hamiltonian is
 //!
@@ -16,7 +16,7 @@
 
 #![warn(missing_docs)]
 
-// What tests here share with those in `tests/` imports by this name.
+// Modules shared with the tests in `tests/` import the crate by this name.
 #[cfg(test)]
 extern crate self as psidpd_core;
 
