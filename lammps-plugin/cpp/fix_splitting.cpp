@@ -197,8 +197,7 @@ void FixSplitting::final_integrate()
   kick(0.5 * dt);
   drift(0.5 * dt);
   reflect();
-  // Fixes and computes that read the state at the end of a step find ghosts and, where asked for,
-  // energies there.
+  // Fixes and computes that read the state at the end of a step find ghosts and, where asked for, energies there.
   const bigint step = update->ntimestep;
   const int eflag = (update->eflag_global == step ? 1 : 0) | (update->eflag_atom == step ? 2 : 0);
   if (eflag || vflag_of_step) {
@@ -261,8 +260,7 @@ void FixSplitting::follow()
     comm->forward_comm();
 }
 
-// Whether atoms have moved too far since ghosts were last found. False if LAMMPS does not check
-// distances.
+// Whether atoms have moved too far since ghosts were last found. False if LAMMPS does not check distances.
 bool FixSplitting::are_far()
 {
   if (!neighbor->dist_check) return false;

@@ -56,8 +56,7 @@ class FixSplitting : public LAMMPS_NS::Fix {
   void drift(double h);
   // Lets fixes of walls reflect atoms that have moved, in addition to their own call.
   void reflect();
-  // Updates positions of ghosts, and finds new ghosts where atoms have moved too far since the last
-  // search.
+  // Updates positions of ghosts, and finds new ghosts where atoms have moved too far since the last search.
   void follow();
   bool are_far();
   void find_ghosts_anew();

@@ -19,8 +19,7 @@ class Images {
   // Starts a communication that carries one number for each ghost. Stores along which directions this
   // rank has all of the box, and how many atoms and ghosts it has.
   void begin(const std::array<bool, 3> &closed, int owned, int ghosts);
-  // LAMMPS's communication calls these. The rank itself packs and unpacks images along closed
-  // directions.
+  // LAMMPS's communication calls these. The rank itself packs and unpacks images along closed directions.
   void pack(int n, const int *list, double *buf, int pbc_flag, const int *pbc);
   void unpack(int n, int first, const double *buf);
 
@@ -34,8 +33,7 @@ class Images {
   bool have_moved(const LAMMPS_NS::Atom *atom, const LAMMPS_NS::Domain *domain) const;
 
  private:
-  // A ghost, the atom that it is an image of, and the number of periods between them: x, y, z, yz, xz,
-  // xy.
+  // A ghost, the atom that it is an image of, and the number of periods between them: x, y, z, yz, xz, xy.
   struct Watched {
     int ghost, of;
     std::array<int, 6> periods;

@@ -20,8 +20,7 @@ class LostAtoms {
  public:
   // Remembers the IDs of the atoms of all ranks.
   void begin(const LAMMPS_NS::Atom *atom, MPI_Comm world);
-  // Describes lost atoms at the first call after a loss: their number, and the remembered IDs among
-  // them.
+  // Describes lost atoms at the first call after a loss: their number, and the remembered IDs among them.
   std::string missing(const LAMMPS_NS::Atom *atom, MPI_Comm world);
 
  private:

@@ -65,8 +65,7 @@ class PairMDPDPsi : public PairTable {
   bool is_stale() override { return PairTable::is_stale() || masses() != built_masses; }
 
  private:
-  // LAMMPS's mdpd weighs densities by the masses of the neighbours' types. Without 'law lucy' there are
-  // no such weights.
+  // LAMMPS's mdpd weighs densities by the masses of the neighbours' types. Without 'law lucy' there are no such weights.
   std::vector<double> masses() const
   {
     if (!lucy || !atom->mass) return {};

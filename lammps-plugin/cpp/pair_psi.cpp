@@ -120,8 +120,7 @@ void PairPsi::read_seed(const char *arg)
   seed = static_cast<uint64_t>(value);
 }
 
-// Reads the keywords that all styles share, at the end of pair_style; the other keywords belong to one
-// style.
+// Reads the keywords that all styles share, at the end of pair_style; the other keywords belong to one style.
 void PairPsi::read_keywords(int first, int narg, char **arg)
 {
   mixed = false;
@@ -195,16 +194,14 @@ void PairPsi::init_style()
   if (neighbor->nex_type + neighbor->nex_group > most_rules || neighbor->nex_mol > 1)
     because("more exclusions of neigh_modify than it can keep");
   if (neighbor->includegroup) because("neigh_modify include");
-  // These fixes exclude a group of their own, and do so only after pair styles have requested their
-  // lists.
+  // These fixes exclude a group of their own, and do so only after pair styles have requested their lists.
   for (int k = 0; k < modify->nfix; k++) {
     const char *fix = modify->fix[k]->style;
     for (const char *known : {"gcmc", "widom", "charge/regulation"})
       if (strcmp(fix, known) == 0) because(std::string("fix ") + known);
   }
   if (!why_listed.empty()) full_list = request_list(neighbor, this, instance_me, 0);
-  // With newton off a half list contains the pairs of owned atoms with ghosts on both sides, which is
-  // sufficient.
+  // With newton off a half list contains the pairs of owned atoms with ghosts on both sides, which is sufficient.
   if (!why_listed.empty() && !full_list && force->newton_pair)
     stop("with " + why_listed + " this version of LAMMPS needs 'newton off'");
 

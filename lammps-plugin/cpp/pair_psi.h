@@ -155,8 +155,7 @@ class PairPsi : public LAMMPS_NS::Pair {
   // Vectors of atoms and ghosts; masses of atoms.
   std::vector<double> vectors, masses;
 
-  // Numbers of atoms and ghosts of an evaluation without slopes of ghosts; single() computes those that
-  // it needs.
+  // Numbers of atoms and ghosts of an evaluation without slopes of ghosts; single() computes those that it needs.
   std::array<int, 2> without_slopes{-1, -1};
 
   // Why pairs come from LAMMPS's neighbor list; empty if the engine finds them.
@@ -172,8 +171,7 @@ class PairPsi : public LAMMPS_NS::Pair {
   size_t told_special = SIZE_MAX;
   // Most rules of neigh_modify for types and groups: a word has room for the two sides of each.
   static constexpr int most_rules = 16;
-  // Number of pairs of types, groups and molecules that neigh_modify excluded at setup, and the marks
-  // of their members.
+  // Number of pairs of types, groups and molecules that neigh_modify excluded at setup, and the marks of their members.
   int rules = 0;
   std::vector<uint32_t> marks;
   bool between_molecules = false;

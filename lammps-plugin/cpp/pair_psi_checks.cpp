@@ -31,8 +31,7 @@ void heights(const Domain *domain, double *height)
 
 }    // namespace
 
-// Coefficients are in the units of the simulation. Those in SI units leave the range of single
-// precision.
+// Coefficients are in the units of the simulation. Those in SI units leave the range of single precision.
 void PairPsi::check_units(const std::string &units)
 {
   if (units != "real" && units != "metal")

@@ -90,8 +90,7 @@ void PairPsi::find_densities(int all, const Request &request)
 void PairPsi::forward()
 {
   const int width = static_cast<int>((*style)->slope_width());
-  // Inside a hybrid LAMMPS has sized its buffers before it knew the number of our columns; its buffers
-  // fit positions.
+  // Inside a hybrid LAMMPS has sized its buffers before it knew the number of our columns; its buffers fit positions.
   const int most = force->pair == this ? width : 3;
   for (first_column = 0; first_column < width; first_column += comm_forward) {
     comm_forward = std::min(most, width - first_column);
@@ -242,9 +241,8 @@ bool PairPsi::is_pair(int i, int j, int itype, int jtype, double rsq) const
   return agrees();
 }
 
-// Returns the energy of the terms that belong to pairs, without psi; the force is the whole
-// conservative force, with the densities of the last step. Drag and noise are left out, as in LAMMPS's
-// other DPD styles.
+// Returns the energy of the terms that belong to pairs, without psi; the force is the whole conservative
+// force, with the densities of the last step. Drag and noise are left out, as in LAMMPS's other DPD styles.
 double PairPsi::single(int i, int j, int itype, int jtype, double rsq, double, double factor_lj, double &fforce)
 {
   // Without densities a pair's energy depends on its distance alone, and not on the last evaluation.

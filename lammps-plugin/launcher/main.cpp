@@ -60,10 +60,9 @@ const char *trouble = nullptr;  // why the styles could not be registered
 constexpr const char *STYLES[][2] = {
     {"pair", "dpd/psi"}, {"pair", "mdpd/psi"}, {"pair", "dpd/spline"}, {"fix", "dpd/splitting"}};
 
-// 'plugin load .../psidpdplugin.so', 'plugin list' and 'plugin unload pair|fix STYLE', so that a script for a LAMMPS with
-// plugins runs here unchanged.
-// The class has the same virtual functions, in the same order, as LAMMPS's class of commands, whose
-// header is not always installed.
+// 'plugin load .../psidpdplugin.so', 'plugin list' and 'plugin unload pair|fix STYLE', so that a script
+// for a LAMMPS with plugins runs here unchanged. The class has the same virtual functions, in the same
+// order, as LAMMPS's class of commands, whose header is not always installed.
 class PluginCommand : protected Pointers {
  public:
   explicit PluginCommand(LAMMPS *lmp) : Pointers(lmp) {}
@@ -147,8 +146,7 @@ void LAMMPS::post_create()
 int main(int argc, char **argv)
 {
   MPI_Init(&argc, &argv);
-  // The library allocates the instance, whose size it knows; nothing here reads it before the versions
-  // agree.
+  // The library allocates the instance, whose size it knows; nothing here reads it before the versions agree.
   void *handle = nullptr;
   try {
     handle = lammps_open(argc, argv, MPI_COMM_WORLD, nullptr);

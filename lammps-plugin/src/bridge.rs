@@ -142,15 +142,12 @@ mod ffi {
         fn noise_range(self: &Style) -> f64;
 
         fn configure(self: &mut Style, mixed: bool, threads: usize) -> Result<()>;
-        /// Sets the pairs with reduced strength for all later evaluations, unless LAMMPS lists the
-        /// pairs.
+        /// Sets the pairs with reduced strength for all later evaluations, unless LAMMPS lists the pairs.
         fn set_special_pairs(self: &mut Style, pairs: &[SpecialPair]) -> Result<()>;
-        /// Sets excluded pairs by two words for each atom and ghost, the members of `Mark`; an empty
-        /// slice excludes none.
+        /// Sets excluded pairs by two words for each atom and ghost, the members of `Mark`; an empty slice excludes none.
         fn set_exclusions(self: &mut Style, marks: &[u32], between_molecules: bool) -> Result<()>;
 
-        /// Whether this rank can compute the request without images along the closed directions of the
-        /// box.
+        /// Whether this rank can compute the request without images along the closed directions of the box.
         fn fits(self: &Style, extent: &Extent, request: &Request) -> Result<bool>;
         /// Computes all forces, without ghosts.
         #[allow(clippy::too_many_arguments)]
@@ -191,8 +188,7 @@ mod ffi {
             factor: &[f64],
         ) -> Result<()>;
         fn slopes_mut(self: &mut Style) -> &mut [f64];
-        /// Copies slopes of owned particles after an evaluation without ghosts, and makes room for
-        /// those of ghosts.
+        /// Copies slopes of owned particles after an evaluation without ghosts, and makes room for those of ghosts.
         fn fetch_slopes(self: &mut Style, all: usize) -> Result<()>;
         #[allow(clippy::too_many_arguments)]
         fn style_forces(
@@ -205,8 +201,7 @@ mod ffi {
             request: &Request,
             f: &mut [f64],
         ) -> Result<Totals>;
-        /// One unit of energy of the model in the units of LAMMPS; multiply energies and virials of
-        /// particles by it.
+        /// One unit of energy of the model in the units of LAMMPS; multiply energies and virials of particles by it.
         fn energy_unit(self: &Style) -> f64;
         fn particle_energy(self: &Style) -> &[f64];
         /// Virials, six numbers for each particle.
@@ -227,8 +222,7 @@ mod ffi {
         ) -> Result<PairValue>;
         fn memory(self: &Style) -> usize;
 
-        /// Finds the pairs of the thermostat and draws their noise; returns false if the model has no
-        /// thermostat.
+        /// Finds the pairs of the thermostat and draws their noise; returns false if the model has no thermostat.
         #[allow(clippy::too_many_arguments)]
         fn thermostat_pairs(
             style: &mut Style,

@@ -293,8 +293,7 @@ impl Style {
         self.engine.slopes_mut()
     }
 
-    /// Sums every density of the model at the positions of the last evaluation, also those that it did
-    /// not need.
+    /// Sums every density of the model at the positions of the last evaluation, also those that it did not need.
     ///
     /// # Errors
     /// Fails as [`Engine::sum_densities`].
@@ -352,7 +351,7 @@ impl Style {
             match particles.map(known) {
                 [Some(i), Some(j)] => Ok(here(self.engine.single(kinds, r, [i, j]))),
                 _ => Err(StyleError(format!(
-                    "asked for the pair of particles {} and {}, of which the last evaluation knows nothing",
+                    "asked for the pair of particles {} and {}, which the last evaluation did not both contain",
                     particles[0], particles[1]
                 ))),
             }

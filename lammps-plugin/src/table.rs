@@ -20,15 +20,13 @@ unsafe extern "C-unwind" {
 }
 
 const fn style(name: &'static CStr, info: &'static CStr, creator: MakePair) -> Style {
-    // SAFETY: all function pointers have one size; LAMMPS calls this one by the signature that `kind`
-    // states.
+    // SAFETY: all function pointers have one size; LAMMPS calls this one by the signature that `kind` states.
     let creator = unsafe { std::mem::transmute::<MakePair, Creator>(creator) };
     Style { kind: c"pair".as_ptr(), name: name.as_ptr(), info: info.as_ptr(), creator }
 }
 
 const fn fix(name: &'static CStr, info: &'static CStr, creator: MakeFix) -> Style {
-    // SAFETY: all function pointers have one size; LAMMPS calls this one by the signature that `kind`
-    // states.
+    // SAFETY: all function pointers have one size; LAMMPS calls this one by the signature that `kind` states.
     let creator = unsafe { std::mem::transmute::<MakeFix, Creator>(creator) };
     Style { kind: c"fix".as_ptr(), name: name.as_ptr(), info: info.as_ptr(), creator }
 }

@@ -1,5 +1,5 @@
-//! Drag and noise apart from the forces, for the fix that integrates: updates velocities of a rank's
-//! atoms by the midpoint rule.
+//! Drag and noise apart from the forces, for the fix that integrates: updates velocities of a
+//! rank's atoms by the midpoint rule.
 
 use crate::error::StyleError;
 use crate::style::{Style, guard, triples};
@@ -46,8 +46,7 @@ impl Style {
         })
     }
 
-    /// Changes the velocities of all atoms of the last search for pairs, on one rank alone; returns the
-    /// virial.
+    /// Changes the velocities of all atoms of the last search for pairs, on one rank alone; returns the virial.
     ///
     /// # Errors
     /// Fails if a velocity is not finite.
@@ -72,12 +71,10 @@ impl Style {
         })
     }
 
-    /// Continues with what the last round asked for; the last round changes the velocities `v` of the
-    /// rank's atoms.
+    /// Continues with what the last round asked for; the last round changes the velocities `v` of the rank's atoms.
     ///
     /// # Errors
-    /// Fails as [`go_on`](psidpd_core::engine::thermostat::PairThermostat::go_on), and if a velocity is
-    /// not finite.
+    /// Fails as [`go_on`](psidpd_core::engine::thermostat::PairThermostat::go_on), and if a velocity is not finite.
     pub fn next_round(&mut self, total: f64, vectors: &mut [f64], v: &mut [f64]) -> Result<Need, StyleError> {
         guard(|| {
             let (Some(thermostat), pool, _) = self.thermostat() else { return Ok(Need::Nothing([0.0; 6])) };
@@ -102,7 +99,7 @@ fn finite(v: &[[f64; 3]]) -> Result<(), StyleError> {
         return Ok(());
     }
     Err(StyleError(
-        "a velocity is no finite number behind the thermostat: the time step is too large, or the start overlaps"
+        "a velocity is not finite after the thermostat: the time step is too large, or the start overlaps"
             .to_owned(),
     ))
 }

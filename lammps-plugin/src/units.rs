@@ -19,8 +19,7 @@ struct HostUnits {
     time: f64,
 }
 
-/// Units of <https://docs.lammps.org/units.html>: velocities are in length over time, forces in energy
-/// over length.
+/// Units of <https://docs.lammps.org/units.html>: velocities are in length over time, forces in energy over length.
 fn host_units(name: &str) -> Option<HostUnits> {
     const ANGSTROM: f64 = 1e-10;
     // Energies are per molecule; the constants are exact since 2019, as is the electronvolt.

@@ -7,9 +7,8 @@
 //! U = Σ_i ψ_c(i)(ñ_i) + Σ_{i<j} φ_c(i)c(j)(r_ij)
 //! ```
 //!
-//! with `ñ` the weighted (and, if the model says so, corrected) local densities. Forces, energy and
-//! virial all come from it; see [`truth`] for the theory written down once, which everything faster
-//! is tested against.
+//! with `ñ` the weighted (and, if the model says so, corrected) local densities. Forces, energy and virial all come
+//! from it; tests compare the engine with the plain evaluation in [`truth`].
 //!
 //! Data flow: model file → [`model::Model`] → [`model::Fluid`] (at one kT) → [`engine::Plan`] →
 //! [`engine::Engine`].

@@ -10,13 +10,11 @@ use std::alloc::{GlobalAlloc, Layout, System};
 /// Size of a large page in bytes.
 const PAGE: usize = 2 << 20;
 
-/// Least size of an array in large pages. A smaller array fits into few small pages and would leave
-/// most of a large page empty, all of which Linux clears when it is allocated; observables allocate
-/// arrays for each sample.
+/// Least size of an array in large pages. A smaller array fits into few small pages and would leave most of a large
+/// page empty, all of which Linux clears when it is allocated; observables allocate arrays for each sample.
 const LARGE: usize = PAGE / 4;
 
-/// The allocator of the system, except that large arrays begin and end at large pages, and ask for
-/// them.
+/// The allocator of the system, except that large arrays begin and end at large pages, and ask for them.
 pub struct LargePages;
 
 /// The layout of a large array in large pages; `None` for other arrays.
@@ -33,8 +31,7 @@ fn in_pages(layout: Layout) -> Option<Layout> {
 unsafe impl GlobalAlloc for LargePages {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         let Some(pages) = in_pages(layout) else {
-            // SAFETY: the caller promises a layout of more than zero bytes, as the system's allocator
-            // requires.
+            // SAFETY: the caller promises a layout of more than zero bytes, as the system's allocator requires.
             return unsafe { System.alloc(layout) };
         };
         // SAFETY: a large layout has more than zero bytes.
@@ -42,24 +39,23 @@ unsafe impl GlobalAlloc for LargePages {
         #[cfg(target_os = "linux")]
         if !memory.is_null() {
             use rustix::mm::{Advice, madvise};
-            // Without large pages the program is slower, but correct. SAFETY: the advice does not
-            // change the contents of memory.
+            // Without large pages the program is slower, but correct.
+            // SAFETY: the advice does not change the contents of memory.
             let _ = unsafe { madvise(memory.cast(), pages.size(), Advice::LinuxHugepage) };
         }
         memory
     }
 
     unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
-        // SAFETY: the caller promises the layout given to `alloc`, so that this is the layout given to
-        // the system's allocator.
+        // SAFETY: the caller promises the layout given to `alloc`, so that this is the layout
+        // given to the system's allocator.
         unsafe { System.dealloc(memory, in_pages(layout).unwrap_or(layout)) }
     }
 
     unsafe fn realloc(&self, memory: *mut u8, layout: Layout, size: usize) -> *mut u8 {
         if layout.size() < LARGE && size < LARGE {
-            // SAFETY: both sizes are small, so that the memory is the system's with this layout; the
-            // caller promises that it is allocated, and a size above zero that does not overflow when
-            // rounded up to the alignment.
+            // SAFETY: both sizes are small, so that the memory is the system's with this layout; the caller promises
+            // that it is allocated, and a size above zero that does not overflow when rounded up to the alignment.
             return unsafe { System.realloc(memory, layout, size) };
         }
         // SAFETY: the caller promises a size above zero that does not overflow when rounded up to the
@@ -93,8 +89,7 @@ mod tests {
             [1, 1000, LARGE - 8, LARGE, LARGE + 8, PAGE, PAGE + 8, 3 * PAGE, LARGE, 64, 5 * PAGE + 16];
         for align in [1, 8, 64, 4096] {
             let layout = |size| Layout::from_size_align(size, align).unwrap();
-            // SAFETY: sizes are not zero, each layout is that of the allocation; contents are written
-            // before they are read.
+            // SAFETY: sizes are not zero, each layout is that of the allocation; contents are written before they are read.
             unsafe {
                 let mut memory = LargePages.alloc(layout(sizes[0]));
                 for of in 0..sizes.len() {

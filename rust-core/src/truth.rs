@@ -1,9 +1,8 @@
 //! The plain reference: the theory written down once, which tests compare all faster code with.
 //!
 //! Plain loops over all pairs of particles and their images, in double precision, in the order of the
-//! formulas. This module shares no code with the engine; it uses only the formulas of the model (`w`,
-//! `w′`, `φ`, `φ′`, ψ and its symbolic derivatives). Its time grows as the square of the number of
-//! particles.
+//! formulas. This module shares no code with the engine; it uses only the formulas of the model (`w`, `w′`,
+//! `φ`, `φ′`, ψ and its symbolic derivatives). Its time grows as the square of the number of particles.
 //!
 //! ```text
 //! n_β,i = Σ_j w(r_ij) over j of species β        ñ = ρ̃(n)        U = Σ_i ψ_i(ñ_i) + Σ_pairs φ(r)
@@ -24,8 +23,7 @@ pub struct Truth {
     pub energy: f64,
     /// ψ of each particle.
     pub excess: Vec<f64>,
-    /// Uncorrected local densities, one for each density and species, density-major, particle by
-    /// particle.
+    /// Uncorrected local densities, one for each density and species, density-major, particle by particle.
     pub densities: Vec<f64>,
     /// Conservative forces.
     pub forces: Vec<[f64; 3]>,
@@ -123,8 +121,7 @@ pub fn drag_and_noise(
     (forces, virial)
 }
 
-/// Adds the force of one neighbour along `ê = d/r`, and half its virial. A pair at zero distance has no
-/// direction.
+/// Adds the force of one neighbour along `ê = d/r`, and half its virial. A pair at zero distance has no direction.
 fn add(on: &mut [f64; 3], virial: &mut [f64; 6], d: [f64; 3], r: f64, force: f64) {
     if r > 0.0 {
         for (k, (a, b)) in [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)].into_iter().enumerate() {
@@ -207,8 +204,7 @@ fn free_energy(fluid: &Fluid, alpha: usize, n: &[f64]) -> Result<(f64, Vec<f64>)
     Ok((psi, slopes))
 }
 
-/// The nearest value within the bounds, the distance of `x` from it, and the highest power of this
-/// distance in ψ.
+/// The nearest value within the bounds, the distance of `x` from it, and the highest power of this distance in ψ.
 fn bounded(x: f64, bounds: Option<Bounds>) -> (f64, f64, usize) {
     match bounds {
         Some(bounds) if x < bounds.low => (bounds.low, x - bounds.low, bounds.order(x - bounds.low)),

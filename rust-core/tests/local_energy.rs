@@ -100,8 +100,8 @@ fn cube(edge: f64) -> PeriodicBox {
     PeriodicBox::orthogonal([-1.0, 0.5, 2.0], [edge; 3], [true; 3]).unwrap()
 }
 
-/// A box with edges along the axes for a two- or three-dimensional model, in which `count` particles
-/// have the density `density`.
+/// A box with edges along the axes for a two- or three-dimensional model, in which `count`
+/// particles have the density `density`.
 fn fitting(fluid: &Fluid, count: usize, density: f64) -> PeriodicBox {
     cube((count as f64 / density).powf(1.0 / fluid.dimensions as f64))
 }
@@ -175,8 +175,8 @@ fn changes_are_those_of_the_whole_energy_in_every_box() {
         open([true, false, true]),
         open([false; 3]),
         cube(3.1),
-        // The box is narrower than the range, or than twice the range: particles are near images of
-        // others and of themselves.
+        // The box is narrower than the range, or than twice the range: particles are near
+        // images of others and of themselves.
         cube(0.9),
         cube(1.7),
         PeriodicBox::orthogonal([0.0; 3], [0.8, 6.0, 6.0], [true; 3]).unwrap(),
@@ -218,8 +218,8 @@ fn after_many_moves_densities_are_those_from_the_beginning() {
     }
 }
 
-/// An energy that is NaN is an error; one beyond a pole is refused as infinite; from an infinite energy
-/// any finite one is accepted.
+/// An energy that is NaN is an error; one beyond a pole is refused as infinite; from an infinite
+/// energy any finite one is accepted.
 #[test]
 fn energies_that_are_not_finite() {
     let fluid = |psi: &str, pair: &str| {

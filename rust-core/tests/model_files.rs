@@ -1,5 +1,4 @@
-//! Loads model files that are valid, and refuses invalid ones with the message that each of them
-//! states.
+//! Loads model files that are valid, and refuses invalid ones with the message that each of them states.
 
 use psidpd_core::document::FileError;
 use psidpd_core::engine::Plan;

@@ -9,8 +9,7 @@ use with_images::{Outcome, Owned};
 
 mod with_images;
 
-/// Random numbers from a seed; the test does not shrink a model, as a shorter text would be another
-/// model.
+/// Random numbers from a seed; the test does not shrink a model, as a shorter text would be another model.
 struct Random(u64);
 
 impl Random {
@@ -90,8 +89,7 @@ fn model_text(random: &mut Random) -> String {
                 let _ = writeln!(text, "correction = {{ \"{a}|{b}\" = {one}{other} }}");
             }
         }
-        // Every bounded variable triples the number of terms of the reference, whose derivatives are
-        // symbolic.
+        // Every bounded variable triples the number of terms of the reference, whose derivatives are symbolic.
         if bounded + species.len() <= 4 && random.below(3) > 0 {
             bounded += species.len();
             let typical = 4.0 / species.len() as f64;
@@ -301,8 +299,7 @@ fn equals_reference(seed: u64) {
     }
 }
 
-/// Compares forces with differences of the energy; returns the number of differences that crossed no
-/// kink.
+/// Compares forces with differences of the energy; returns the number of differences that crossed no kink.
 fn is_gradient(seed: u64) -> usize {
     let (text, fluid, mut random) = load(seed);
     let c = configuration(&mut random, &fluid);

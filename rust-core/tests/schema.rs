@@ -1,5 +1,5 @@
-//! Checks that the JSON schema and the reference of the model file are current with the table of keys,
-//! and agree with the reader.
+//! Checks that the JSON schema and the reference of the model file are current with the table of
+//! keys, and agree with the reader.
 
 use psidpd_core::model::Model;
 use psidpd_core::model::keys::{
@@ -163,8 +163,7 @@ fn schema_and_reference_are_current() {
     assert_current("../docs/model-file.md", &reference());
 }
 
-/// Checks a value by the part of JSON Schema (draft 7) that the schema uses; panics at an unknown
-/// keyword.
+/// Checks a value by the part of JSON Schema (draft 7) that the schema uses; panics at an unknown keyword.
 fn validate(value: &Value, schema: &Value, root: &Value) -> Result<(), String> {
     let rules = match schema {
         Value::Bool(true) => return Ok(()),

@@ -1,5 +1,4 @@
-//! Tests laws of stated slopes: compares the engine with the plain reference, and with ψ if the slopes
-//! are those of one.
+//! Tests laws of stated slopes: compares the engine with the plain reference, and with ψ if the slopes are those of one.
 
 use psidpd_core::engine::{Newton, PeriodicBox, Plan, noise};
 use psidpd_core::maximum::largest;

@@ -98,8 +98,7 @@ pub unsafe extern "C-unwind" fn psidpd_register(lmp: *mut c_void) -> *const c_ch
     match table {
         Ok((table, styles)) => {
             for style in styles {
-                // SAFETY: `trouble` found that the C++ was compiled for this LAMMPS; the function
-                // copies the name.
+                // SAFETY: `trouble` found that the C++ was compiled for this LAMMPS; the function copies the name.
                 unsafe { (table.insert)(lmp, style.kind, style.name, style.creator) };
             }
             std::ptr::null()
@@ -156,8 +155,7 @@ pub unsafe extern "C-unwind" fn lammpsplugin_init(
     }
 }
 
-/// The version in the words that LAMMPS prints of itself; LAMMPS prints a note where it differs from
-/// its own.
+/// The version in the words that LAMMPS prints of itself; LAMMPS prints a note where it differs from its own.
 fn version_text() -> *const c_char {
     static TEXT: OnceLock<CString> = OnceLock::new();
     let words = || BUILT_FOR.parse().map_or_else(|_| BUILT_FOR.to_owned(), version::in_words);
@@ -171,8 +169,7 @@ fn version_text() -> *const c_char {
 unsafe fn refuse(lmp: *mut c_void, text: String) {
     let Ok(text) = CString::new(text) else { return };
     let Some(error) = styles::symbol(c"lammps_error") else {
-        // An old library has no such function: without the styles the script stops at its pair_style
-        // command.
+        // An old library has no such function: without the styles the script stops at its pair_style command.
         eprintln!("ERROR: {}", text.to_string_lossy());
         return;
     };

@@ -1,6 +1,5 @@
-//! The file that LAMMPS loads. It links to the C library only, so that any LAMMPS can load it and learn
-//! which LAMMPS the styles were built for. The styles are in a second file beside it, which links to
-//! the C++ of that LAMMPS.
+//! The file that LAMMPS loads. It links to the C library only, so that any LAMMPS can load it and learn which LAMMPS
+//! the styles were built for. The styles are in a second file beside it, which links to the C++ of that LAMMPS.
 //!
 //! - `entry`: `lammpsplugin_init`, which `plugin load` calls, and `psidpd_register`, for a LAMMPS without plugins;
 //! - `styles`: loads the second file, whose contract is `table`;

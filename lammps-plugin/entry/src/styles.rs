@@ -35,8 +35,7 @@ pub fn symbol(name: &CStr) -> Option<*mut c_void> {
     (!found.is_null()).then_some(found)
 }
 
-/// The folders that may contain this library: of its path as loaded, and of the path with links
-/// resolved.
+/// The folders that may contain this library: of its path as loaded, and of the path with links resolved.
 fn folders() -> Vec<PathBuf> {
     let mut place = Place {
         file: std::ptr::null(),
@@ -65,8 +64,7 @@ fn last_error() -> String {
     unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned()
 }
 
-/// The styles. Call this only where they were built for the LAMMPS of this process: they need its
-/// symbols.
+/// The styles. Call this only where they were built for the LAMMPS of this process: they need its symbols.
 pub fn load() -> Result<&'static [Style], String> {
     table().map(|table| {
         // SAFETY: the second file states the length of its static array, and is never unloaded.

@@ -2,8 +2,7 @@
 
 use std::ffi::{c_char, c_void};
 
-/// Makes a style for a LAMMPS instance. The real signature is that of LAMMPS's creators of the style's
-/// kind.
+/// Makes a style for a LAMMPS instance. The real signature is that of LAMMPS's creators of the style's kind.
 pub type Creator = unsafe extern "C-unwind" fn();
 
 /// A style. Its texts are static C strings.

@@ -1,5 +1,4 @@
-//! Checks whether a library is complete: the loader maps a file that was cut short, and crashes when it
-//! reads past its end.
+//! Checks whether a library is complete: the loader maps a file that was cut short, and crashes when it reads past its end.
 
 use std::io::Read;
 use std::path::Path;

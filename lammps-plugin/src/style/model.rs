@@ -45,9 +45,8 @@ fn name_of_type(index: usize) -> String {
 }
 
 impl Style {
-    /// Reads a model file for a simulation in LAMMPS's units `units`, in which kT is given. `names` has
-    /// the species of each LAMMPS type, in order, or `NULL` for types that another style of a hybrid
-    /// computes.
+    /// Reads a model file for a simulation in LAMMPS's units `units`, in which kT is given. `names` has the
+    /// species of each LAMMPS type, in order, or `NULL` for types that another style of a hybrid computes.
     ///
     /// # Errors
     /// Fails for any error in the file, and for wrong dimensions or names.
@@ -121,8 +120,7 @@ impl Style {
         })
     }
 
-    /// Spline DPD; `pairs` is a table as for [`Style::from_coefficients`], in which pairs of types may
-    /// be missing.
+    /// Spline DPD; `pairs` is a table as for [`Style::from_coefficients`], in which pairs of types may be missing.
     ///
     /// # Errors
     /// Fails for coefficients that define no valid model.

@@ -82,8 +82,7 @@ pub struct Cloud {
 }
 
 impl Cloud {
-    /// Puts `count` particles on a disturbed lattice, which resembles a fluid more than random points
-    /// do.
+    /// Puts `count` particles on a disturbed lattice, which resembles a fluid more than random points do.
     pub fn new(subject: &Subject, fluid: &Fluid, count: usize) -> Cloud {
         let edge = (count as f64 / subject.density).cbrt();
         let side = (count as f64).cbrt().ceil() as usize;
@@ -191,8 +190,7 @@ impl Rank {
         }
     }
 
-    /// One evaluation of all forces, with noise; `between` is called before and after slopes go to
-    /// ghosts.
+    /// One evaluation of all forces, with noise; `between` is called before and after slopes go to ghosts.
     pub fn evaluate(&mut self, sweep: &mut Sweep, mut between: impl FnMut()) {
         self.cloud.step.number += 1;
         let owned = self.cloud.x.len();

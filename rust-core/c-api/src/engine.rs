@@ -39,8 +39,7 @@ pub struct Particles {
     pub owned: usize,
     /// Number of all particles, ghosts included.
     pub all: usize,
-    /// Positions, `3 * all` numbers: x, y, z of the first, of the second, ... Ghosts are at the
-    /// position of their image.
+    /// Positions, `3 * all` numbers: x, y, z of the first, of the second, ... Ghosts are at the position of their image.
     pub x: *const f64,
     /// Particle numbers from 1 that never change, `all` of them; an image has its owner's.
     pub tag: *const i32,
@@ -62,8 +61,7 @@ pub struct Step {
 
 /// Sums over the particles and pairs of one host or rank; the sums of all ranks add up.
 ///
-/// Virials are sums of r_ij (x) F_ij: xx, yy, zz, xy, xz, yz. Entries that were not asked for are
-/// unspecified.
+/// Virials are sums of r_ij (x) F_ij: xx, yy, zz, xy, xz, yz. Entries that were not asked for are unspecified.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct Tally {
@@ -118,8 +116,8 @@ pub(super) unsafe fn particles_of<'a>(particles: &Particles) -> Result<engine::P
         let text = format!("particles: {owned} are owned, but there are only {all}");
         return Err(Failure::new(Status::InvalidArgument, text));
     }
-    // SAFETY: the caller promises null or arrays of these lengths that nobody writes to; a vector is
-    // three consecutive numbers.
+    // SAFETY: the caller promises null or arrays of these lengths that nobody writes to; a
+    // vector is three consecutive numbers.
     unsafe {
         Ok(engine::Particles {
             owned,
@@ -143,8 +141,7 @@ pub(super) fn step_of(step: Step) -> Result<engine::Step, Failure> {
 /// does not need the model any more.
 ///
 /// The engine computes in double precision on one thread, with the best instruction set of the
-/// processor; see
-/// psidpd_engine_new_with.
+/// processor; see psidpd_engine_new_with.
 ///
 /// # Errors
 /// PSIDPD_STATUS_MODEL if `kt` is not a positive number, or the model is not finite at it.
@@ -154,8 +151,7 @@ pub(super) fn step_of(step: Step) -> Result<engine::Step, Failure> {
 /// `model` is NULL or a model that has not been freed; `engine` can be written to.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn psidpd_engine_new(model: *const Model, kt: f64, engine: *mut *mut Engine) -> Status {
-    // SAFETY: the caller promises that `model` is null or not freed and that `engine` can be written
-    // to.
+    // SAFETY: the caller promises that `model` is null or not freed and that `engine` can be written to.
     guard(|| unsafe { Engine::make(model, kt, Settings::DEFAULT, engine) })
 }
 
@@ -173,8 +169,7 @@ pub unsafe extern "C" fn psidpd_engine_new_with(
     settings: *const Settings,
     engine: *mut *mut Engine,
 ) -> Status {
-    // SAFETY: the caller promises that each pointer is null or valid: a model, settings, and a place
-    // for the engine.
+    // SAFETY: the caller promises that each pointer is null or valid: a model, settings, and a place for the engine.
     guard(|| unsafe { Engine::make(model, kt, copied(settings, "settings")?, engine) })
 }
 
@@ -187,8 +182,7 @@ impl Engine {
         settings: Settings,
         engine: *mut *mut Engine,
     ) -> Result<(), Failure> {
-        // SAFETY: the caller promises that `model` is null or not freed and that `engine` is null or
-        // can be written to.
+        // SAFETY: the caller promises that `model` is null or not freed and that `engine` is null or can be written to.
         let (model, out) = unsafe { (shared(model, "model")?, Output::new(engine, "engine")?) };
         let engine = engine::Engine::new(&model.model.at(kt)?, settings.checked()?)?;
         let plan_text = c_text(&engine.plan().to_string());
@@ -221,17 +215,15 @@ impl Engine {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn psidpd_engine_settings(engine: *const Engine, settings: *mut Settings) -> Status {
     guard(|| {
-        // SAFETY: the caller promises that `engine` is null or not freed and that `settings` can be
-        // written to.
+        // SAFETY: the caller promises that `engine` is null or not freed and that `settings` can be written to.
         let (engine, out) = unsafe { (shared(engine, "engine")?, Output::new(settings, "settings")?) };
         out.put(Settings::of(engine.engine.settings()));
         Ok(())
     })
 }
 
-/// Puts in `*path` the path that the last evaluation took, a psidpd_path, and in `*text` its
-/// description with the
-/// reason; valid until the next psidpd_engine_path of this engine, and until the engine is freed.
+/// Puts in `*path` the path that the last evaluation took, a psidpd_path, and in `*text` its description with
+/// the reason; valid until the next psidpd_engine_path of this engine, and until the engine is freed.
 ///
 /// # Errors
 /// PSIDPD_STATUS_CALL_ORDER before the first evaluation. PSIDPD_STATUS_NULL_POINTER.
@@ -245,8 +237,7 @@ pub unsafe extern "C" fn psidpd_engine_path(
     text: *mut *const c_char,
 ) -> Status {
     guard(|| {
-        // SAFETY: the caller promises that `engine` is null or not freed and that `path` and `text` can
-        // be written to.
+        // SAFETY: the caller promises that `engine` is null or not freed and that `path` and `text` can be written to.
         let (engine, out, out_text) =
             unsafe { (exclusive(engine, "engine")?, Output::new(path, "path")?, Output::new(text, "text")?) };
         let path = engine.engine.path();
@@ -286,8 +277,7 @@ pub unsafe extern "C" fn psidpd_engine_free(engine: *mut Engine) {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn psidpd_engine_cutoff(engine: *const Engine, cutoff: *mut f64) -> Status {
     guard(|| {
-        // SAFETY: the caller promises that `engine` is null or not freed and that `cutoff` can be
-        // written to.
+        // SAFETY: the caller promises that `engine` is null or not freed and that `cutoff` can be written to.
         let (engine, out) = unsafe { (shared(engine, "engine")?, Output::new(cutoff, "cutoff")?) };
         out.put(engine.engine.plan().cutoff());
         Ok(())
@@ -305,8 +295,7 @@ pub unsafe extern "C" fn psidpd_engine_cutoff(engine: *const Engine, cutoff: *mu
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn psidpd_engine_slope_width(engine: *const Engine, width: *mut usize) -> Status {
     guard(|| {
-        // SAFETY: the caller promises that `engine` is null or not freed and that `width` can be
-        // written to.
+        // SAFETY: the caller promises that `engine` is null or not freed and that `width` can be written to.
         let (engine, out) = unsafe { (shared(engine, "engine")?, Output::new(width, "width")?) };
         out.put(engine.engine.plan().slope_width());
         Ok(())
@@ -324,8 +313,7 @@ pub unsafe extern "C" fn psidpd_engine_slope_width(engine: *const Engine, width:
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn psidpd_engine_needs_velocities(engine: *const Engine, needs: *mut i32) -> Status {
     guard(|| {
-        // SAFETY: the caller promises that `engine` is null or not freed and that `needs` can be
-        // written to.
+        // SAFETY: the caller promises that `engine` is null or not freed and that `needs` can be written to.
         let (engine, out) = unsafe { (shared(engine, "engine")?, Output::new(needs, "needs")?) };
         out.put(engine.engine.plan().needs_velocities().into());
         Ok(())
@@ -343,8 +331,7 @@ pub unsafe extern "C" fn psidpd_engine_needs_velocities(engine: *const Engine, n
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn psidpd_engine_noise_range(engine: *const Engine, range: *mut f64) -> Status {
     guard(|| {
-        // SAFETY: the caller promises that `engine` is null or not freed and that `range` can be
-        // written to.
+        // SAFETY: the caller promises that `engine` is null or not freed and that `range` can be written to.
         let (engine, out) = unsafe { (shared(engine, "engine")?, Output::new(range, "range")?) };
         out.put(engine.engine.plan().noise_range().unwrap_or(0.0));
         Ok(())
@@ -361,8 +348,7 @@ pub unsafe extern "C" fn psidpd_engine_noise_range(engine: *const Engine, range:
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn psidpd_engine_plan_text(engine: *const Engine, text: *mut *const c_char) -> Status {
     guard(|| {
-        // SAFETY: the caller promises that `engine` is null or not freed and that `text` can be written
-        // to.
+        // SAFETY: the caller promises that `engine` is null or not freed and that `text` can be written to.
         let (engine, out) = unsafe { (shared(engine, "engine")?, Output::new(text, "text")?) };
         out.put(engine.plan_text.as_ptr());
         Ok(())
@@ -384,16 +370,14 @@ pub unsafe extern "C" fn psidpd_engine_map_kinds(
     length: usize,
 ) -> Status {
     guard(|| {
-        // SAFETY: the caller promises that `engine` is null or not freed and that `species` has
-        // `length` entries.
+        // SAFETY: the caller promises that `engine` is null or not freed and that `species` has `length` entries.
         let (engine, species) = unsafe { (exclusive(engine, "engine")?, array(species, length, "species")?) };
         Ok(engine.engine.map_kinds(species)?)
     })
 }
 
-/// Sets whether psidpd_engine_densities sums every density of the model (1) or only those that forces
-/// need
-/// (0, the default).
+/// Sets whether psidpd_engine_densities sums every density of the model (1) or only those
+/// that forces need (0, the default).
 ///
 /// # Errors
 /// PSIDPD_STATUS_INVALID_ARGUMENT if `all` is neither. PSIDPD_STATUS_NULL_POINTER.
@@ -414,8 +398,7 @@ pub unsafe extern "C" fn psidpd_engine_sum_all_densities(engine: *mut Engine, al
 /// owned particles.
 ///
 /// The call does not say what psidpd_engine_forces will be asked for, so it uses the reference path, on
-/// one thread.
-/// psidpd_engine_evaluate and psidpd_engine_first, which are told at once, can be faster.
+/// one thread. psidpd_engine_evaluate and psidpd_engine_first, which are told at once, can be faster.
 ///
 /// With `newton` 1, each pair is computed once over all ranks and images, and the host adds forces on
 /// ghosts back to their owners; with 0, pairs with ghosts are computed on both sides and ghosts get no
@@ -437,8 +420,7 @@ pub unsafe extern "C" fn psidpd_engine_densities(
     newton: i32,
 ) -> Status {
     guard(|| {
-        // SAFETY: the caller promises that `engine` is null or not freed and that `particles` is null
-        // or a structure.
+        // SAFETY: the caller promises that `engine` is null or not freed and that `particles` is null or a structure.
         let (engine, particles) =
             unsafe { (exclusive(engine, "engine")?, particles_of(&copied(particles, "particles")?)?) };
         let newton = if flag(newton, "newton")? { engine::Newton::On } else { engine::Newton::Off };
@@ -472,8 +454,7 @@ pub unsafe extern "C" fn psidpd_engine_slopes(
     length: *mut usize,
 ) -> Status {
     guard(|| {
-        // SAFETY: the caller promises that `engine` is null or not freed and that `slopes` and `length`
-        // can be written to.
+        // SAFETY: the caller promises that `engine` is null or not freed and that `slopes` and `length` can be written to.
         let (engine, out, out_length) = unsafe {
             (exclusive(engine, "engine")?, Output::new(slopes, "slopes")?, Output::new(length, "length")?)
         };
@@ -516,8 +497,7 @@ pub unsafe extern "C" fn psidpd_engine_forces(
     tally: *mut Tally,
 ) -> Status {
     guard(|| {
-        // SAFETY: the caller promises that `engine` is null or not freed and that `particles` is null
-        // or a structure.
+        // SAFETY: the caller promises that `engine` is null or not freed and that `particles` is null or a structure.
         let (engine, lists) = unsafe { (exclusive(engine, "engine")?, copied(particles, "particles")?) };
         engine.require(&[State::Densities], "psidpd_engine_densities")?;
         let want = want_of(want, WANT_FORCES)?;
@@ -534,8 +514,7 @@ pub unsafe extern "C" fn psidpd_engine_forces(
             // SAFETY: the caller promises that `tally`, which is not null here, can be written to.
             Some(unsafe { Output::new(tally, "tally")? })
         };
-        // SAFETY: the caller promises arrays as long as `particles` says, and that `force` overlaps
-        // none of the others.
+        // SAFETY: the caller promises arrays as long as `particles` says, and that `force` overlaps none of the others.
         let (particles, v, force) = unsafe { arrays_of(engine, &lists, v, step, force)? };
         let request = engine::Request { particles, v, step, want };
         // If the evaluation panics the engine has no results; after an error the state is set below.
@@ -584,12 +563,11 @@ pub(super) unsafe fn arrays_of<'a>(
         &[]
     } else {
         check_apart(force, v, lists.all, "force and v")?;
-        // SAFETY: the caller promises `3 * lists.all` numbers at `v`; a vector is three consecutive
-        // numbers.
+        // SAFETY: the caller promises `3 * lists.all` numbers at `v`; a vector is three consecutive numbers.
         unsafe { array(v.cast::<[f64; 3]>(), lists.all, "v")? }
     };
-    // SAFETY: the caller promises `3 * lists.all` numbers at `force`; `check_apart` found that it
-    // overlaps neither `x` nor `v`.
+    // SAFETY: the caller promises `3 * lists.all` numbers at `force`; `check_apart` found that
+    // it overlaps neither `x` nor `v`.
     let force = unsafe { array_mut(force.cast::<[f64; 3]>(), lists.all, "force")? };
     Ok((particles, v, force))
 }
@@ -612,8 +590,7 @@ pub unsafe extern "C" fn psidpd_engine_local_densities(
     densities: *mut *const f64,
     length: *mut usize,
 ) -> Status {
-    // SAFETY: the caller promises that `engine` is null or not freed and that `densities` and `length`
-    // can be written to.
+    // SAFETY: the caller promises that `engine` is null or not freed and that `densities` and `length` can be written to.
     unsafe { give(engine, |engine| engine.local_densities(), densities, length) }
 }
 
@@ -634,8 +611,7 @@ pub unsafe extern "C" fn psidpd_engine_particle_energy(
     energies: *mut *const f64,
     length: *mut usize,
 ) -> Status {
-    // SAFETY: the caller promises that `engine` is null or not freed and that `energies` and `length`
-    // can be written to.
+    // SAFETY: the caller promises that `engine` is null or not freed and that `energies` and `length` can be written to.
     unsafe { give(engine, |engine| engine.particle_energy(), energies, length) }
 }
 
@@ -655,8 +631,7 @@ pub unsafe extern "C" fn psidpd_engine_particle_virial(
     virials: *mut *const f64,
     length: *mut usize,
 ) -> Status {
-    // SAFETY: the caller promises that `engine` is null or not freed and that `virials` and `length`
-    // can be written to.
+    // SAFETY: the caller promises that `engine` is null or not freed and that `virials` and `length` can be written to.
     unsafe { give(engine, |engine| engine.particle_virial().as_flattened(), virials, length) }
 }
 
@@ -671,8 +646,7 @@ unsafe fn give(
     length: *mut usize,
 ) -> Status {
     guard(|| {
-        // SAFETY: the caller promises that `engine` is null or not freed and that `values` and `length`
-        // can be written to.
+        // SAFETY: the caller promises that `engine` is null or not freed and that `values` and `length` can be written to.
         let (engine, out, out_length) = unsafe {
             (
                 shared(engine, "engine")?,

@@ -74,15 +74,13 @@ impl Request {
     /// The pointers are null or at arrays as long as they must be, which nobody writes to during `'a`.
     unsafe fn checked<'a>(&self, engine: &Engine) -> Result<engine::Request<'a>, Failure> {
         let step = self.step()?;
-        // SAFETY: the caller promises that the pointers in `self.particles` are null or arrays of these
-        // lengths.
+        // SAFETY: the caller promises that the pointers in `self.particles` are null or arrays of these lengths.
         let particles = unsafe { particles_of(&self.particles)? };
         let thermal = step.is_some() && engine.engine.plan().needs_velocities();
         let v = if self.v.is_null() && !thermal {
             &[]
         } else {
-            // SAFETY: the caller promises `3 * all` numbers at `v`; a vector is three consecutive
-            // numbers.
+            // SAFETY: the caller promises `3 * all` numbers at `v`; a vector is three consecutive numbers.
             unsafe { array(self.v.cast::<[f64; 3]>(), self.particles.all, "request.v")? }
         };
         Ok(engine::Request { particles, v, step, want: want_of(self.want, WANT_ALL)? })
@@ -92,8 +90,7 @@ impl Request {
         if self.step.is_null() {
             return Ok(None);
         }
-        // SAFETY: the callers of `step` and of `checked` promise that a pointer that is not null is at
-        // a step.
+        // SAFETY: the callers of `step` and of `checked` promise that a pointer that is not null is at a step.
         Ok(Some(step_of(unsafe { copied(self.step, "request.step")? })?))
     }
 }
@@ -122,8 +119,7 @@ pub unsafe extern "C" fn psidpd_engine_evaluate(
     tally: *mut Tally,
 ) -> Status {
     guard(|| {
-        // SAFETY: the caller promises that `engine` is null or not freed and that the other pointers
-        // are null or valid.
+        // SAFETY: the caller promises that `engine` is null or not freed and that the other pointers are null or valid.
         let (engine, domain, given, out) = unsafe {
             (
                 exclusive(engine, "engine")?,
@@ -134,8 +130,7 @@ pub unsafe extern "C" fn psidpd_engine_evaluate(
         };
         let want = want_of(given.want, WANT_ALL)?;
         let step = given.step()?;
-        // SAFETY: the caller promises arrays as long as `request` says, and that `force` overlaps none
-        // of the others.
+        // SAFETY: the caller promises arrays as long as `request` says, and that `force` overlaps none of the others.
         let (particles, v, force) = unsafe { arrays_of(engine, &given.particles, given.v, step, force)? };
         let request = engine::Request { particles, v, step, want };
         engine.state = State::Nothing;
@@ -152,12 +147,9 @@ pub unsafe extern "C" fn psidpd_engine_evaluate(
 /// request, when psidpd_engine_slopes have been copied from owners to ghosts.
 ///
 /// `box` may be NULL: then ghosts stand for everything beyond the owned particles. Along a periodic
-/// edge of the box the host
-/// owns all of it, and the engine applies the period; `image` has 1 for each ghost that is the image of
-/// another particle
-/// along such an edge, which the engine leaves out, and 0 for the others, `particles.all -
-/// particles.owned` of them. It may
-/// be NULL if there is no such image.
+/// edge of the box the host owns all of it, and the engine applies the period; `image` has 1 for each
+/// ghost that is the image of another particle along such an edge, which the engine leaves out, and 0
+/// for the others, `particles.all - particles.owned` of them. It may be NULL if there is no such image.
 ///
 /// With `newton` 1 the host adds forces on ghosts back to their owners, and every pair is computed once over all ranks; with
 /// 0 ghosts get no forces. Either way the sweep computes pairs with ghosts on both sides and leaves ghosts without forces.
@@ -178,8 +170,7 @@ pub unsafe extern "C" fn psidpd_engine_first(
     request: *const Request,
 ) -> Status {
     guard(|| {
-        // SAFETY: the caller promises that `engine` is null or not freed and that `request` is null or
-        // a request.
+        // SAFETY: the caller promises that `engine` is null or not freed and that `request` is null or a request.
         let (engine, given) = unsafe { (exclusive(engine, "engine")?, copied(request, "request")?) };
         let domain = if r#box.is_null() {
             PeriodicBox::OPEN
@@ -214,14 +205,12 @@ pub unsafe extern "C" fn psidpd_engine_first_of_pairs(
     request: *const Request,
 ) -> Status {
     guard(|| {
-        // SAFETY: the caller promises that `engine` is null or not freed and that `pairs` and `request`
-        // are null or valid.
+        // SAFETY: the caller promises that `engine` is null or not freed and that `pairs` and `request` are null or valid.
         let (engine, pairs, given) =
             unsafe { (exclusive(engine, "engine")?, copied(pairs, "pairs")?, copied(request, "request")?) };
         let Pairs { count, i, j, factor } = pairs;
         let factors = if factor.is_null() { 0 } else { count };
-        // SAFETY: the caller promises that the arrays of the request and of `pairs` are as long as
-        // these say.
+        // SAFETY: the caller promises that the arrays of the request and of `pairs` are as long as these say.
         let (request, listed) = unsafe {
             let i = array(i, count, "pairs.i")?;
             let j = array(j, count, "pairs.j")?;
@@ -248,15 +237,13 @@ pub unsafe extern "C" fn psidpd_engine_second(
     tally: *mut Tally,
 ) -> Status {
     guard(|| {
-        // SAFETY: the caller promises that `engine` is null or not freed and that the other pointers
-        // are null or valid.
+        // SAFETY: the caller promises that `engine` is null or not freed and that the other pointers are null or valid.
         let (engine, given, out) =
             unsafe { (exclusive(engine, "engine")?, copied(request, "request")?, optional(tally)?) };
         engine.require(&[State::First], "psidpd_engine_first")?;
         let want = want_of(given.want, WANT_ALL)?;
         let step = given.step()?;
-        // SAFETY: the caller promises arrays as long as `request` says, and that `force` overlaps none
-        // of the others.
+        // SAFETY: the caller promises arrays as long as `request` says, and that `force` overlaps none of the others.
         let (particles, v, force) = unsafe { arrays_of(engine, &given.particles, given.v, step, force)? };
         let request = engine::Request { particles, v, step, want };
         engine.state = State::Nothing;

@@ -20,9 +20,8 @@ pub const PSIDPD_INSTRUCTIONS_AVX512: i32 = 3;
 pub const PSIDPD_INSTRUCTIONS_AVX512_VBMI2: i32 = 4;
 
 /// The settings of an engine. Results depend on the precision; instruction sets change them by rounding
-/// errors only, and
-/// the number of threads does not change a bit. All bytes zero and one thread are the settings of
-/// psidpd_engine_new.
+/// errors only, and the number of threads does not change a bit. All bytes zero and one thread are the
+/// settings of psidpd_engine_new.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct Settings {
@@ -50,7 +49,10 @@ impl Settings {
 
     pub(super) fn checked(self) -> Result<engine::Settings, Failure> {
         let wrong = |what: &str, value: i32| {
-            Failure::new(Status::InvalidArgument, format!("settings.{what} is {value}, which is none"))
+            Failure::new(
+                Status::InvalidArgument,
+                format!("settings.{what} is {value}, which is not a valid value"),
+            )
         };
         let precision = match self.precision {
             PSIDPD_PRECISION_DOUBLE => engine::Precision::Double,

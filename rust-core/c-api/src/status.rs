@@ -87,8 +87,8 @@ fn record(text: &str) {
     let _ = LAST_ERROR.try_with(|last| *last.borrow_mut() = text);
 }
 
-/// Does `work`, and turns errors and panics into a status. Errors become text inside `work`, so that a
-/// panic there is caught too.
+/// Does `work`, and turns errors and panics into a status. Errors become text inside `work`, so
+/// that a panic there is caught too.
 pub(super) fn guard(work: impl FnOnce() -> Result<(), Failure>) -> Status {
     // State that a panic leaves incomplete is either discarded or, in an engine, marked as not ready.
     let outcome = catch_unwind(AssertUnwindSafe(|| match work() {

@@ -60,8 +60,7 @@ fn exported() -> Vec<String> {
     names
 }
 
-/// Every function occurs in the header once, after a comment of its own that names its errors, if it
-/// has any.
+/// Every function occurs in the header once, after a comment of its own that names its errors, if it has any.
 #[test]
 fn every_function_is_documented() {
     let header = header();
@@ -151,8 +150,7 @@ fn impossible_pointers_and_lengths_are_refused() {
     let x = [0.0, 0.0, 0.0, 0.5, 0.0, 0.0];
     let (tag, kind) = ([1, 2], [0, 0]);
     let good = Particles { owned: 2, all: 2, x: x.as_ptr(), tag: tag.as_ptr(), kind: kind.as_ptr() };
-    // SAFETY: handles are alive, arrays as long as stated; the functions refuse the others before they
-    // read them.
+    // SAFETY: handles are alive, arrays as long as stated; the functions refuse the others before they read them.
     unsafe {
         let mut title = null();
         assert_eq!(psidpd_model_title(model, &mut title), Status::Ok);

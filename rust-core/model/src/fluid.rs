@@ -44,8 +44,7 @@ impl Fluid {
         densities.chain(self.pairs.iter().map(|p| p.potential.range())).fold(0.0, f64::max)
     }
 
-    /// Whether some force jumps at its range, where `∇·F` has a delta function that samples of
-    /// configurations miss.
+    /// Whether some force jumps at its range, where `∇·F` has a delta function that samples of configurations miss.
     pub fn force_jumps(&self) -> bool {
         let jumps = |inner: f64, scale: f64| inner.abs() > 1e-6 * scale;
         let at_range = |range: f64| range * (1.0 - 1e-9);
@@ -64,8 +63,8 @@ impl Fluid {
         self.densities.iter().all(|d| d.force_kernel == d.kernel) && self.stated_slopes().is_none()
     }
 
-    /// The first species whose force is stated and not derived from a ψ, if there is one: mean field
-    /// then has no free energy.
+    /// The first species whose force is stated and not derived from a ψ, if there is one: mean
+    /// field then has no free energy.
     pub fn stated_slopes(&self) -> Option<&str> {
         let stated = self.excess.iter().position(|e| matches!(e, ExcessFreeEnergy::Slopes(_)))?;
         Some(&self.species[stated])
@@ -75,17 +74,16 @@ impl Fluid {
 /// A weighted local density `n_β,i = Σ_{j≠i, c(j)=β} w(r_ij)`.
 #[derive(Debug, Clone)]
 pub struct WeightedDensity {
-    /// Its name in the model file.
+    /// Name of the density in the model file.
     pub name: String,
-    /// `w`.
+    /// Weight function `w`.
     pub kernel: Kernel,
     /// The kernel whose slope is the force law: `kernel` itself, unless the model file asks for a law
     /// without a potential, as LAMMPS's `mdpd` does.
     pub force_kernel: Kernel,
     /// Whether a particle's own `w(0)` contributes to its density of its own species.
     pub includes_self: bool,
-    /// Correction `ρ̃(n)` of Trofimov et al. for (species that feels, species whose density it is),
-    /// row-major.
+    /// Correction `ρ̃(n)` of Trofimov et al. for (species that feels, species whose density it is), row-major.
     pub correction: Vec<Polynomial>,
     /// Bounds of the corrected density; ψ is continued outside.
     pub bounds: Option<Bounds>,
@@ -118,10 +116,9 @@ pub enum Continuation {
     /// ψ′ keeps its slope at the bound.
     #[default]
     Linear,
-    /// ψ′ keeps its value at the bound: particles in thin regions repel each other as in standard DPD,
-    /// by a pair force `−(ψ_i′ + ψ_j′) w′` that no longer depends on the density. Trofimov, Nies and
-    /// Michels, J. Chem. Phys. 117, 9383 (2002), sections IV A and V, suggest this where ψ is singular
-    /// at low density.
+    /// ψ′ keeps its value at the bound: particles in thin regions repel each other as in standard DPD, by a
+    /// pair force `−(ψ_i′ + ψ_j′) w′` that no longer depends on the density. Trofimov, Nies and Michels, J.
+    /// Chem. Phys. 117, 9383 (2002), sections IV A and V, suggest this where ψ is singular at low density.
     Constant,
 }
 
@@ -201,14 +198,12 @@ pub enum ExcessFreeEnergy {
 pub struct StatedSlopes {
     /// Formula for the reported energy of a particle, of the corrected densities.
     pub energy: Formula,
-    /// The slopes `s`, one for each of the [`Fluid::variables`], as formulas of the corrected
-    /// densities.
+    /// The slopes `s`, one for each of the [`Fluid::variables`], as formulas of the corrected densities.
     pub slopes: Vec<Formula>,
 }
 
 impl StatedSlopes {
-    /// Whether the energy or a slope depends on variable `v`, or the force of that variable is not
-    /// zero.
+    /// Whether the energy or a slope depends on variable `v`, or the force of that variable is not zero.
     pub fn depends_on(&self, v: usize) -> bool {
         let acts = self.slopes[v].is_constant() != Some(0.0);
         acts || self.energy.depends_on(v) || self.slopes.iter().any(|s| s.depends_on(v))

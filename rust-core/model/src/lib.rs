@@ -1,8 +1,7 @@
 //! The model file, which describes one fluid for every host.
 //!
-//! A [`Model`] is a file that has been read and checked; [`Model::at`] applies a temperature and
-//! returns a [`Fluid`], which consists of numbers and compiled formulas. The engine, the theory and the
-//! exports use the fluid.
+//! A [`Model`] is a file that has been read and checked; [`Model::at`] applies a temperature and returns a [`Fluid`],
+//! which consists of numbers and compiled formulas. The engine, the theory and the exports use the fluid.
 //!
 //! # Units and signs
 //!

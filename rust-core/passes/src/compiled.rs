@@ -15,8 +15,7 @@ use std::marker::PhantomData;
 
 /// A precision of pairs.
 ///
-/// The passes are compiled in this crate: its two methods are not generic, so that no other crate
-/// compiles them again.
+/// The passes are compiled in this crate: its two methods are not generic, so that no other crate compiles them again.
 pub trait PairPrecision: Send + Sync + Sized + 'static {
     /// Type of the numbers that pairs are computed in.
     type Scalar: Scalar;
@@ -52,8 +51,7 @@ impl PairPrecision for Mixed {
 
     #[inline(never)]
     unsafe fn second(passes: &Passes<Mixed>, pass: Second<Mixed>) {
-        // SAFETY: the scheduler starts a second pass after the first pass of its plane, when slopes are
-        // complete.
+        // SAFETY: the scheduler starts a second pass after the first pass of its plane, when slopes are complete.
         unsafe { passes.second(pass) }
     }
 }
@@ -72,8 +70,7 @@ impl PairPrecision for Double {
 
     #[inline(never)]
     unsafe fn second(passes: &Passes<Double>, pass: Second<Double>) {
-        // SAFETY: the scheduler starts a second pass after the first pass of its plane, when slopes are
-        // complete.
+        // SAFETY: the scheduler starts a second pass after the first pass of its plane, when slopes are complete.
         unsafe { passes.second(pass) }
     }
 }
@@ -98,8 +95,7 @@ impl<P: PairPrecision> Passes<P> {
     /// The caller fulfils the contract of [`first_pass`].
     #[inline(always)]
     unsafe fn first(&self, pass: First<P>) -> Tally {
-        // SAFETY: the caller fulfils the contract of `first_pass`; `set` exists only for instructions
-        // of this processor.
+        // SAFETY: the caller fulfils the contract of `first_pass`; `set` exists only for instructions of this processor.
         unsafe {
             match (self.multispecies, self.tally) {
                 (false, false) => run(self.set, With::<_, false, false>(pass)),
@@ -116,8 +112,7 @@ impl<P: PairPrecision> Passes<P> {
     /// The caller fulfils the contract of [`second_pass`].
     #[inline(always)]
     unsafe fn second(&self, pass: Second<P>) {
-        // SAFETY: the caller fulfils the contract of `second_pass`; `set` exists only for instructions
-        // of this processor.
+        // SAFETY: the caller fulfils the contract of `second_pass`; `set` exists only for instructions of this processor.
         unsafe {
             match (self.multispecies, self.tally) {
                 (false, false) => run(self.set, With::<_, false, false>(pass)),

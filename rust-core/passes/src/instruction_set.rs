@@ -1,7 +1,6 @@
 use super::settings::Instructions;
 
-/// An instruction set that this processor has: the owner of a value may run code that is compiled for
-/// it.
+/// An instruction set that this processor has: the owner of a value may run code that is compiled for it.
 ///
 /// [`Instructions`] is what a user asks for; [`InstructionSet::new`] also asks the processor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -4,8 +4,7 @@
 //! `psidpd-core` sorts particles, distributes the planes over threads, evaluates ψ, and calls
 //! [`compiled`] for each plane; `docs/engine.md` explains all of it with figures.
 //!
-//! Modules from the lowest level upwards; a file imports from its own module and from those above it in
-//! this list:
+//! Modules from the lowest level upwards; a file imports from its own module and from those above it in this list:
 //!
 //! - [`domain`], [`noise`], [`settings`], [`instruction_set`], [`tally`]: definitions that the whole
 //! engine shares.

@@ -87,8 +87,7 @@ impl PairNoise {
         PairNoise { key: threefry2x32::<20>(split(step), split(seed)) }
     }
 
-    /// One of several independent noises of a step: `stream` 0 is that of [`PairNoise::new`]. Steps are
-    /// below 2⁵⁶.
+    /// One of several independent noises of a step: `stream` 0 is that of [`PairNoise::new`]. Steps are below 2⁵⁶.
     pub fn of_stream(seed: u64, step: u64, stream: u8) -> PairNoise {
         PairNoise::new(seed, step | u64::from(stream) << 56)
     }
@@ -105,8 +104,7 @@ impl PairNoise {
     #[inline(always)]
     pub fn xi(&self, tag_i: u32, tag_j: u32) -> f64 {
         let word = thirteen_rounds([tag_i.min(tag_j), tag_i.max(tag_j)], self.key)[0];
-        // The number (word + 1/2) / 2^31 − 1 lies symmetrically in (−1, 1), so that the mean is exactly
-        // zero.
+        // The number (word + 1/2) / 2^31 − 1 lies symmetrically in (−1, 1), so that the mean is exactly zero.
         const SQRT_3: f64 = 1.732_050_807_568_877_2;
         (word as f64 + 0.5) * (SQRT_3 / (1u64 << 31) as f64) - SQRT_3
     }
@@ -114,8 +112,8 @@ impl PairNoise {
 
 /// A normal number from two words, by the transform of Box and Muller; its magnitude is below 5.9.
 ///
-/// Logarithm and cosine are series, exact to single precision, so that a loop vectorises and gives the
-/// same bits everywhere.
+/// Logarithm and cosine are series, exact to single precision, so that a loop vectorises and
+/// gives the same bits everywhere.
 #[inline(always)]
 pub fn normal(words: [u32; 2]) -> f32 {
     use std::f32::consts::{FRAC_PI_2, LN_2};

@@ -99,8 +99,7 @@ impl fmt::Display for Instructions {
     }
 }
 
-/// Settings of the computation of forces; only the precision changes results, and only by rounding
-/// errors.
+/// Settings of the computation of forces; only the precision changes results, and only by rounding errors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Settings {
     /// Precision of pair arithmetic.

@@ -27,8 +27,7 @@ fn symmetric_in_the_pair_and_different_for_every_part_of_the_key() {
     assert_ne!(noise.xi(3, 5), PairNoise::new(7, 11 | 1 << 40).xi(3, 5));
 }
 
-/// Correlation of two series of unit-variance numbers, in standard deviations of this estimate for
-/// independent series.
+/// Correlation of two series of unit-variance numbers, in standard deviations of this estimate for independent series.
 fn correlation_in_sigmas(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0f64);
     for (a, b) in pairs {
@@ -38,9 +37,8 @@ fn correlation_in_sigmas(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
     sum / count.sqrt()
 }
 
-/// Tests mean, variance and the correlations that a bad key would cause. The twelve statistics are
-/// standard normal for correct noise; |z| < 5 fails by chance once in 1.4·10⁵ runs, and the seed is
-/// fixed.
+/// Tests mean, variance and the correlations that a bad key would cause. The twelve statistics are standard
+/// normal for correct noise; |z| < 5 fails by chance once in 1.4·10⁵ runs, and the seed is fixed.
 #[test]
 fn moments_and_independence_of_steps_tags_and_seeds() {
     let seed = 20_031;
@@ -76,8 +74,7 @@ fn moments_and_independence_of_steps_tags_and_seeds() {
 }
 
 /// Tests mean, variance, skewness, kurtosis and the correlations of normal noise within a step; each
-/// statistic is standard normal, and nine of them exceed 5 less than once in 10⁵ runs. The seed is
-/// fixed.
+/// statistic is standard normal, and nine of them exceed 5 less than once in 10⁵ runs. The seed is fixed.
 #[test]
 fn normal_noise_is_normal() {
     let n = 200_000u32;

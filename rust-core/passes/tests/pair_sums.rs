@@ -1,5 +1,4 @@
-//! Tests the values of sums over listed pairs, and that they have the same bits on every instruction
-//! set.
+//! Tests the values of sums over listed pairs, and that they have the same bits on every instruction set.
 
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::noise::threefry2x32;

@@ -5,12 +5,10 @@ use super::excess::{ExcessPlan, ExcessWork};
 use super::plan::Plan;
 use psidpd_passes::instruction_set::InstructionSet;
 
-/// Number of particles in an evaluation of ψ: enough to amortise the interpreter, few enough for the
-/// first-level cache.
+/// Number of particles in an evaluation of ψ: enough to amortise the interpreter, few enough for the first-level cache.
 pub const LANES: usize = 128;
 
-/// Most particles in an evaluation if some are skipped: larger, so that few particles are left for a
-/// second evaluation.
+/// Most particles in an evaluation if some are skipped: larger, so that few particles are left for a second evaluation.
 const LISTED: usize = LANES + LANES / 2;
 
 /// Scratch arrays for evaluating ψ in lanes, and counts.

@@ -7,8 +7,7 @@ use psidpd_passes::cells::excluded::Mark;
 /// The excluded pairs of particles, by the host's numbers.
 #[derive(Debug, Clone, Default)]
 pub struct Exclusions {
-    /// Index of each particle's first partner; the last entry is one past the last. Empty without
-    /// partners.
+    /// Index of each particle's first partner; the last entry is one past the last. Empty without partners.
     start: Vec<u32>,
     partners: Vec<u32>,
     /// Marks of all particles; empty if no marks exclude pairs.
@@ -52,7 +51,9 @@ impl Exclusions {
     /// Fails if there are marks, but fewer than `count`.
     pub fn check(&self, count: usize) -> Result<(), EngineError> {
         match self.marks.len() {
-            1.. if self.marks.len() < count => Err(EngineError::Host("not as many marks as particles")),
+            1.. if self.marks.len() < count => {
+                Err(EngineError::Host("marks must have one entry per particle and ghost"))
+            }
             _ => Ok(()),
         }
     }

@@ -1,5 +1,4 @@
-//! The engine, which computes all forces and chooses between the sweep and the sums over pairs for each
-//! evaluation.
+//! The engine, which computes all forces and chooses between the sweep and the sums over pairs for each evaluation.
 
 use super::counts::PassCounts;
 use super::error::EngineError;
@@ -21,9 +20,8 @@ use std::sync::Arc;
 
 /// The forces of one fluid on the particles of a host.
 ///
-/// [`Engine::forces`] evaluates particles without ghosts. With ghosts, or with pairs that the host
-/// lists, the host calls [`Engine::first`], copies [`Engine::slopes_mut`] from owners to ghosts, and
-/// calls [`Engine::second`].
+/// [`Engine::forces`] evaluates particles without ghosts. With ghosts, or with pairs that the host lists, the host
+/// calls [`Engine::first`], copies [`Engine::slopes_mut`] from owners to ghosts, and calls [`Engine::second`].
 ///
 /// Every evaluation takes the fastest [`Path`] that can compute its request.
 #[derive(Debug, Clone)]
@@ -49,8 +47,7 @@ pub struct Request<'a> {
     pub particles: Particles<'a>,
     /// Velocities of particles and ghosts; may be empty if no thermostat acts.
     pub v: &'a [[f64; 3]],
-    /// Seed, number and length of the time step, for the thermostat; `None` for conservative forces
-    /// only.
+    /// Seed, number and length of the time step, for the thermostat; `None` for conservative forces only.
     pub step: Option<Step>,
     /// The results to compute besides forces.
     pub want: Want,
@@ -153,8 +150,7 @@ impl Engine {
         self.sweep.map_kinds(kinds)
     }
 
-    /// Sets the pairs with reduced strength for later evaluations, until the host changes them or
-    /// renumbers its particles.
+    /// Sets the pairs with reduced strength for later evaluations, until the host changes them or renumbers its particles.
     ///
     /// Within the cut-off two particles must meet in one image only. A sweep leaves these pairs out,
     /// and those with a factor above 0 are then added. Pairs that the host lists have factors in its
@@ -172,8 +168,7 @@ impl Engine {
         self.sweep.exclusions_mut().mark(marks, between_molecules);
     }
 
-    /// Restricts all evaluations to sums over pairs, for tests and for measurements of the sweep's
-    /// speed-up.
+    /// Restricts all evaluations to sums over pairs, for tests and for measurements of the sweep's speed-up.
     pub fn use_pair_sums_only(&mut self, only: bool) {
         self.pair_sums_only = only;
     }
@@ -280,8 +275,7 @@ impl Engine {
         }
     }
 
-    /// The first half of an evaluation, which needs no slopes of ghosts. The second half has the same
-    /// `request`.
+    /// The first half of an evaluation, which needs no slopes of ghosts. The second half has the same `request`.
     ///
     /// # Errors
     /// Fails for a position or ψ that is not finite, a tag or type out of range, arrays of different
@@ -305,8 +299,7 @@ impl Engine {
         }
     }
 
-    /// Computes the contributions of special pairs to a sweep, which leaves them out, and adds those to
-    /// the densities.
+    /// Computes the contributions of special pairs to a sweep, which leaves them out, and adds those to the densities.
     fn find_corrections(&mut self, around: Around, particles: &Particles) -> Result<(), EngineError> {
         let Engine { pair_sums, sweep, special, corrections, .. } = self;
         let (exclusions, densities) = sweep.beside_mut();
@@ -328,8 +321,8 @@ impl Engine {
         Ok(())
     }
 
-    /// Adds the forces of special pairs to those of a sweep, whose slopes are complete; returns their
-    /// contribution to the totals.
+    /// Adds the forces of special pairs to those of a sweep, whose slopes are complete; returns
+    /// their contribution to the totals.
     fn correct(&self, request: &Request, force: &mut [[f64; 3]]) -> Result<Tally, EngineError> {
         let Request { particles, v, step, want } = request;
         let (plan, slopes) = (self.sweep.plan(), self.sweep.slopes());
@@ -339,8 +332,7 @@ impl Engine {
         self.corrections.add_forces(plan, slopes, particles, v, thermostat, *want, force)
     }
 
-    /// Slopes `∂ψ/∂n` of owned particles, followed by room for those of ghosts, [`Plan::slope_width`]
-    /// each.
+    /// Slopes `∂ψ/∂n` of owned particles, followed by room for those of ghosts, [`Plan::slope_width`] each.
     pub fn slopes_mut(&mut self) -> &mut [f64] {
         match self.path {
             Some(Path::PairSums(_)) => self.pair_sums.slopes_mut(),
@@ -348,8 +340,8 @@ impl Engine {
         }
     }
 
-    /// The second half of an evaluation: writes the forces to `force`, or adds them to it, and returns
-    /// the requested totals.
+    /// The second half of an evaluation: writes the forces to `force`, or adds them to it,
+    /// and returns the requested totals.
     ///
     /// Only the sums over pairs compute forces on ghosts, if the host returns these to their owners.
     /// The sweep leaves ghosts without forces: the rank of the other particle computes the pair too,
@@ -457,14 +449,12 @@ impl Engine {
         }
     }
 
-    /// Energy of each particle and ghost, if the last evaluation was asked for it: its ψ and half of
-    /// its pair energies.
+    /// Energy of each particle and ghost, if the last evaluation was asked for it: its ψ and half of its pair energies.
     pub fn particle_energy(&self) -> &[f64] {
         self.pair_sums.particle_energy()
     }
 
-    /// Virial of each particle and ghost, if the last evaluation was asked for it: half of the virials
-    /// of its pairs.
+    /// Virial of each particle and ghost, if the last evaluation was asked for it: half of the virials of its pairs.
     pub fn particle_virial(&self) -> &[[f64; 6]] {
         self.pair_sums.particle_virial()
     }

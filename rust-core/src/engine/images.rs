@@ -35,8 +35,7 @@ impl Images {
             let margin = cutoff / domain.height(k);
             let shells = margin.ceil() as i32;
             let edge = domain.edge(k);
-            // Images in one direction have images in the next direction, so that corners are filled
-            // too.
+            // Images in one direction have images in the next direction, so that corners are filled too.
             for index in 0..x.len() {
                 let here = x[index];
                 let s = domain.fraction(here)[k];

@@ -20,10 +20,9 @@ pub enum Reason {
     ParticleValues,
     /// A density is requested that no force needs.
     Densities,
-    /// The box is narrower than twice the cut-off, or its edges have another orientation than those of
-    /// LAMMPS.
+    /// The box is narrower than twice the cut-off, or its edges have another orientation than those of LAMMPS.
     Box,
-    /// The host has asked for it.
+    /// The host has disabled the sweep.
     Asked,
 }
 

@@ -18,8 +18,7 @@ pub struct Plan {
     pub(super) dimensions: usize,
     pub(super) cutoff: f64,
     pub(super) densities: Vec<WeightedDensity>,
-    /// Indices of the densities in which some ψ is not linear; their order is that of the variables of
-    /// `excess`.
+    /// Indices of the densities in which some ψ is not linear; their order is that of the variables of `excess`.
     pub(super) passes: Vec<usize>,
     pub(super) linear: Vec<LinearTerm>,
     pub(super) excess: Vec<ExcessPlan>,
@@ -57,14 +56,12 @@ pub struct ThermostatPlan {
 pub enum PairStorage {
     /// For each density, a compact list of the pairs within its range.
     InRange,
-    /// A cache of all pairs with their separations and forces: each force is added once, in the second
-    /// pass.
+    /// A cache of all pairs with their separations and forces: each force is added once, in the second pass.
     FullCache,
 }
 
 impl PairStorage {
-    /// The full cache is faster if a density's range exceeds this fraction of the cutoff; otherwise the
-    /// list is short.
+    /// The full cache is faster if a density's range exceeds this fraction of the cutoff; otherwise the list is short.
     pub const FULL_CACHE_FROM: f64 = 0.7;
 }
 
@@ -163,8 +160,7 @@ impl Plan {
         Some(if full { PairStorage::FullCache } else { PairStorage::InRange })
     }
 
-    /// The potential energy of a pair of species `a` and `b` at `r` from densities that every ψ is
-    /// linear in.
+    /// The potential energy of a pair of species `a` and `b` at `r` from densities that every ψ is linear in.
     pub fn linear_pair_energy(&self, a: usize, b: usize, r: f64) -> f64 {
         let count = self.species.len();
         self.linear
@@ -195,8 +191,8 @@ impl Plan {
     }
 }
 
-/// `∂ψ_α/∂ñ_v` for every species and variable; `None` for curves and for stated slopes, which cannot be
-/// treated as pair potentials.
+/// `∂ψ_α/∂ñ_v` for every species and variable; `None` for curves and for stated slopes, which
+/// cannot be treated as pair potentials.
 fn slopes(fluid: &Fluid) -> Result<Vec<Vec<Option<Formula>>>, TooLarge> {
     fluid
         .excess

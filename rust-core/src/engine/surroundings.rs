@@ -7,8 +7,7 @@ use psidpd_passes::domain::PeriodicBox;
 pub enum Surroundings<'a> {
     /// There are no ghosts: the engine applies the periods of the box.
     Box(&'a PeriodicBox),
-    /// The particles are those of a rank, and ghosts stand for all particles beyond it that interact
-    /// with them.
+    /// The particles are those of a rank, and ghosts stand for all particles beyond it that interact with them.
     Ghosts(Around<'a>, Newton),
     /// The host lists the pairs that interact, including pairs with ghosts.
     Listed(PairsOfHost<'a>, Newton),
@@ -35,8 +34,7 @@ pub struct Around<'a> {
 /// Whether the host adds forces on ghosts back to their owners.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Newton {
-    /// The host adds them: each pair is computed once over all ranks, and its force is added to both
-    /// particles.
+    /// The host adds them: each pair is computed once over all ranks, and its force is added to both particles.
     #[default]
     On,
     /// The host does not: a pair of an owned particle and a ghost is computed on both sides, and its
@@ -52,8 +50,7 @@ pub enum Newton {
 pub struct SpecialPair {
     /// The host's number of the first particle, an owned one.
     pub i: u32,
-    /// The host's number of the second particle. If it is a ghost, the rank of its owner has the same
-    /// pair too.
+    /// The host's number of the second particle. If it is a ghost, the rank of its owner has the same pair too.
     pub j: u32,
     /// Factor of the conservative interaction.
     pub factor: f64,

@@ -210,8 +210,7 @@ fn engine_equals_reference_for_a_mixture_of_everything() {
     assert_matches_reference(&fluid, &configuration(250, [3.1, 4.0, 3.5], 2, 3));
 }
 
-/// In boxes narrower than the cut-off a particle is near several images of its neighbours and of
-/// itself.
+/// In boxes narrower than the cut-off a particle is near several images of its neighbours and of itself.
 #[test]
 fn engine_equals_reference_in_tiny_boxes() {
     let fluid = Model::parse("mixture", MIXTURE).unwrap().at(1.3).unwrap();

@@ -8,8 +8,7 @@ use psidpd_passes::settings::Instructions;
 /// have the same bits on every instruction set.
 pub trait Loop {
     type Out;
-    /// Runs the loop. Implementations must be inlined: other functions are compiled for the compiler's
-    /// target.
+    /// Runs the loop. Implementations must be inlined: other functions are compiled for the compiler's target.
     fn run(self) -> Self::Out;
 }
 

@@ -210,8 +210,7 @@ impl MeanField {
         Ok(regions.into_iter().map(|ends| ends.map(|u| line.x(u))).collect())
     }
 
-    /// The unstable fractions among mixtures of one pressure, on the branch that is densest in the
-    /// equimolar mixture.
+    /// The unstable fractions among mixtures of one pressure, on the branch that is densest in the equimolar mixture.
     ///
     /// # Errors
     /// Fails for other than two species.
@@ -222,9 +221,8 @@ impl MeanField {
     }
 
     /// Two phases of a binary mixture with the same total density, by the common tangent of `f(c)`
-    /// (Pagonabarraga–Frenkel sec. III B, "assuming that ρ is constant"). They are in equilibrium if
-    /// their pressures are equal too, as in a symmetric mixture; [`MeanField::coexistence`] does not
-    /// need the assumption.
+    /// (Pagonabarraga–Frenkel sec. III B, "assuming that ρ is constant"). They are in equilibrium if their
+    /// pressures are equal too, as in a symmetric mixture; [`MeanField::coexistence`] does not need the assumption.
     ///
     /// # Errors
     /// Fails for other than two species, and with [`TheoryError::NoCoexistence`] or
@@ -243,9 +241,8 @@ impl MeanField {
         self.binodal_of(Held::Density(density))
     }
 
-    /// Two phases of a binary mixture with the pressure `pressure` and equal chemical potentials: the
-    /// common tangent of the Gibbs free energy per particle, on the branch that is densest in the
-    /// equimolar mixture.
+    /// Two phases of a binary mixture with the pressure `pressure` and equal chemical potentials: the common
+    /// tangent of the Gibbs free energy per particle, on the branch that is densest in the equimolar mixture.
     ///
     /// # Errors
     /// Fails for other than two species, and with [`TheoryError::NoCoexistence`].

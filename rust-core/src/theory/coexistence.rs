@@ -16,8 +16,7 @@ pub struct Coexistence {
     pub chemical_potentials: [f64; 2],
     /// The fraction of the volume in the first phase.
     pub share: f64,
-    /// Densities of a phase that is more stable than both at these potentials, if one was found: then
-    /// both are metastable.
+    /// Densities of a phase that is more stable than both at these potentials, if one was found: then both are metastable.
     pub more_stable: Option<[f64; 2]>,
 }
 
@@ -41,13 +40,11 @@ impl Coexistence {
 }
 
 impl MeanField {
-    /// The two phases that a binary mixture of number densities `overall` separates into: both have
-    /// equal chemical potentials of each species and equal pressure, and their volumes add up to the
-    /// overall densities. Neither density nor pressure is fixed, so that the result holds for
-    /// compressible mixtures.
+    /// The two phases that a binary mixture of number densities `overall` separates into: both have equal
+    /// chemical potentials of each species and equal pressure, and their volumes add up to the overall
+    /// densities. Neither density nor pressure is fixed, so that the result holds for compressible mixtures.
     ///
-    /// Each phase is stable by itself. A grid of compositions and densities is searched for a more
-    /// stable third phase.
+    /// Each phase is stable by itself. A grid of compositions and densities is searched for a more stable third phase.
     ///
     /// # Errors
     /// Fails for other than two species, and with [`TheoryError::NoCoexistence`].
@@ -63,8 +60,7 @@ impl MeanField {
             let found = self.composition_binodal_at_pressure(self.pressure(&overall)).ok()?;
             Some([0, 1].map(|k| of_fraction(found.composition[k], found.density[k])))
         };
-        // Newton's method starts from the mixture itself, with phases that differ in composition, in
-        // density, or in both.
+        // Newton's method starts from the mixture itself, with phases that differ in composition, in density, or in both.
         let ways = [[1.0, -1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]];
         let apart = ways.iter().flat_map(|way| {
             let phase = move |distance: f64| [0, 1].map(|k| overall[k] * (distance * way[k]).exp());

@@ -35,8 +35,7 @@ pub struct Correlated {
 }
 
 impl MeanField {
-    /// The correlations of one component. `None` if the model has a calibrated density, which includes
-    /// them.
+    /// The correlations of one component. `None` if the model has a calibrated density, which includes them.
     ///
     /// # Errors
     /// Fails for more than one species.

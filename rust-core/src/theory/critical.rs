@@ -1,5 +1,4 @@
-//! Critical points of binary mixtures, where a homogeneous mixture becomes unstable and the two phases
-//! merge.
+//! Critical points of binary mixtures, where a homogeneous mixture becomes unstable and the two phases merge.
 
 use super::binary::{CompositionLine, fractions};
 use super::line::{Line, negative, smallest};
@@ -28,8 +27,7 @@ const STEP: f64 = 1e-6;
 /// A third derivative below this counts as zero, in units of that of an ideal mixture.
 const ZERO: f64 = 1e-3;
 
-/// The ends of an unstable interval of compositions, and the third derivative of f at each along the
-/// unstable direction.
+/// The ends of an unstable interval of compositions, and the third derivative of f at each along the unstable direction.
 #[derive(Clone, Copy)]
 struct Ends {
     u: [f64; 2],
@@ -37,8 +35,7 @@ struct Ends {
 }
 
 impl Ends {
-    /// Whether f decreases into the interval from both ends, as on a spinodal with one phase on each
-    /// side.
+    /// Whether f decreases into the interval from both ends, as on a spinodal with one phase on each side.
     fn ordinary(&self) -> bool {
         self.third[0] < 0.0 && self.third[1] > 0.0
     }
@@ -76,8 +73,7 @@ pub fn composition_critical_point(
         let pressure = theory(parameter)?.pressure(&x.map(|x| x * density));
         Ok(CompositionCritical { parameter, composition: x[0], pressure, limit })
     };
-    // The steps go to the unstable side, until the third derivatives at both ends are those of an
-    // ordinary spinodal.
+    // The steps go to the unstable side, until the third derivatives at both ends are those of an ordinary spinodal.
     let side = if least(limit * (1.0 - STEP))?.1 < 0.0 { -1.0 } else { 1.0 };
     let ends = |parameter: f64, near: [f64; 2]| theory(parameter).map(|theory| theory.ends(density, near));
     let (mut before, mut near, mut step) = (limit, [at_limit; 2], STEP);

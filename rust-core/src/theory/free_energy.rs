@@ -139,8 +139,7 @@ impl FreeEnergy {
         strays.iter().for_each(|s| edge[s.variable] -= s.beyond);
         let along: Vec<usize> = strays.iter().map(|s| s.variable).collect();
         let mut expansion = Expansion::default();
-        // Derivatives with respect to strays are those of the polynomial, the others those of its
-        // coefficients.
+        // Derivatives with respect to strays are those of the polynomial, the others those of its coefficients.
         let mut derivative = |by: &[usize]| -> f64 {
             let others: Vec<usize> = by.iter().copied().filter(|v| !along.contains(v)).collect();
             let output = match others[..] {

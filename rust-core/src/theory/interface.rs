@@ -24,9 +24,8 @@ pub struct Interface {
 }
 
 impl MeanField {
-    /// The moments `[r²w]` and `[r⁴w]` of each density, in the order of the model. With `z` a vector,
-    /// these are `[z²w]` and `[z⁴w]` of Pagonabarraga and Frenkel; `n = ρ + [z²w]/(2d) ∇²ρ` (their eq.
-    /// 27).
+    /// The moments `[r²w]` and `[r⁴w]` of each density, in the order of the model. With `z` a vector, these
+    /// are `[z²w]` and `[z⁴w]` of Pagonabarraga and Frenkel; `n = ρ + [z²w]/(2d) ∇²ρ` (their eq. 27).
     pub fn kernel_moments(&self) -> Vec<[f64; 2]> {
         self.kernels.iter().map(|w| [w.moment(2), w.moment(4)]).collect()
     }
@@ -87,12 +86,10 @@ impl MeanField {
     }
 
     /// The interface between vapour and liquid of one component, with a profile of `points` points.
-    /// Pagonabarraga–Frenkel eq. (29); their eq. (30) approximates the tension for phases of nearly
-    /// equal density.
+    /// Pagonabarraga–Frenkel eq. (29); their eq. (30) approximates the tension for phases of nearly equal density.
     ///
     /// # Errors
-    /// Fails for more than one species, without coexistence, and for a gradient coefficient that is not
-    /// positive.
+    /// Fails for more than one species, without coexistence, and for a gradient coefficient that is not positive.
     pub fn interface(&self, points: usize) -> Result<Interface, TheoryError> {
         self.require_species(1)?;
         let line = DensityLine::new(self);
@@ -147,8 +144,7 @@ fn planar(
             return Err(TheoryError::GradientNotPositive { at, coefficient });
         }
     }
-    // W is the height above the double tangent, or the double integral of f″ where that is a difference
-    // of large numbers.
+    // W is the height above the double tangent, or the double integral of f″ where that is a difference of large numbers.
     let height = |theta: f64| {
         let x = place(theta);
         let u = line.u(x);

@@ -9,8 +9,7 @@ use nalgebra::{DMatrix, DVector};
 pub enum Structure {
     /// The particles are spread evenly.
     Uniform,
-    /// The particles are on the sites of a simple cubic (square in two dimensions) lattice, any number
-    /// on each.
+    /// The particles are on the sites of a simple cubic (square in two dimensions) lattice, any number on each.
     Cubic {
         /// Distance of nearest neighbours.
         spacing: f64,
@@ -20,8 +19,7 @@ pub enum Structure {
         /// Distance of nearest neighbours.
         spacing: f64,
     },
-    /// The particles are on the sites of a close-packed (face-centred cubic; triangular in two
-    /// dimensions) lattice.
+    /// The particles are on the sites of a close-packed (face-centred cubic; triangular in two dimensions) lattice.
     ClosePacked {
         /// Distance of nearest neighbours.
         spacing: f64,
@@ -46,16 +44,15 @@ pub struct NoLimit {
     pub pair: f64,
     /// The density (particles on a site) up to which the energy was followed.
     pub density: f64,
-    /// Energy per particle there.
+    /// Energy per particle at this density.
     pub energy: f64,
 }
 
-/// Searches for a collapse: arrangements in which the energy per particle `Σ_α x_α ψ_α + ½ n Σ_αβ x_α
-/// x_β [φ_αβ]` goes to minus infinity with the density `n`, faster than a logarithm. Such a fluid has
-/// no thermodynamic limit (D. Ruelle, *Statistical Mechanics*, sec. 3.2; for soft potentials A. A.
-/// Louis et al., Phys. Rev. E 62, 7961 (2000)), and its simulation eventually collapses. `∫φ < 0` is
-/// the plainest case; a ψ that grows faster than `n`, or that becomes infinite at a finite density,
-/// prevents the collapse.
+/// Searches for a collapse: arrangements in which the energy per particle `Σ_α x_α ψ_α + ½ n Σ_αβ x_α x_β
+/// [φ_αβ]` goes to minus infinity with the density `n`, faster than a logarithm. Such a fluid has no
+/// thermodynamic limit (D. Ruelle, *Statistical Mechanics*, sec. 3.2; for soft potentials A. A. Louis et al.,
+/// Phys. Rev. E 62, 7961 (2000)), and its simulation eventually collapses. `∫φ < 0` is the plainest case; a ψ
+/// that grows faster than `n`, or that becomes infinite at a finite density, prevents the collapse.
 ///
 /// The search covers the uniform fluid and lattices whose sites take any number of particles, at 60
 /// spacings up to the range of the potentials, each in many compositions, including all at which the
@@ -63,10 +60,9 @@ pub struct NoLimit {
 /// species it covers 12 spacings and mixtures of two or of all species. The growth of ψ is judged
 /// numerically, from its values up to `1e8` particles in the volume of the interaction.
 ///
-/// The test is necessary, not sufficient: `Ok` means that none of these arrangements collapses, not
-/// that none exists, and says nothing about time scales. With lattices it does find potentials of
-/// positive integral that still have an unbounded arrangement. Beyond the bounds of a density ψ is
-/// continued as in a run.
+/// The test is necessary, not sufficient: `Ok` means that none of these arrangements collapses, not that none
+/// exists, and says nothing about time scales. With lattices it does find potentials of positive integral
+/// that still have an unbounded arrangement. Beyond the bounds of a density ψ is continued as in a run.
 ///
 /// # Errors
 /// Fails as [`MeanField::new`]; the inner result is the answer.

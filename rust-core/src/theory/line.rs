@@ -9,8 +9,7 @@ pub trait Line {
     fn x(&self, u: f64) -> f64;
     /// The parameter `u(x)`.
     fn u(&self, x: f64) -> f64;
-    /// The curvature `g″(x)`, times a positive factor that makes it 1 for an ideal gas or an ideal
-    /// mixture.
+    /// The curvature `g″(x)`, times a positive factor that makes it 1 for an ideal gas or an ideal mixture.
     fn curvature(&self, u: f64) -> f64;
     /// The slope `g′(x)`, which is equal in two coexisting phases.
     fn slope(&self, u: f64) -> f64;

@@ -34,8 +34,7 @@ impl MeanField {
     /// Derives the theory of `fluid`.
     ///
     /// # Errors
-    /// Fails for a pair potential without an integral, and for a free energy too large to be
-    /// differentiated twice.
+    /// Fails for a pair potential without an integral, and for a free energy too large to be differentiated twice.
     pub fn new(fluid: &Fluid) -> Result<MeanField, TheoryError> {
         let count = fluid.species.len();
         let d = fluid.dimensions;
@@ -235,8 +234,7 @@ impl MeanField {
         p
     }
 
-    /// Second derivatives `∂²f_ex/∂ρ_s∂ρ_t = ∂ψ_s/∂ρ_t + ∂ψ_t/∂ρ_s + Σ_α ρ_α ∂²ψ_α/∂ρ_s∂ρ_t + [φ_st]`,
-    /// row-major.
+    /// Second derivatives `∂²f_ex/∂ρ_s∂ρ_t = ∂ψ_s/∂ρ_t + ∂ψ_t/∂ρ_s + Σ_α ρ_α ∂²ψ_α/∂ρ_s∂ρ_t + [φ_st]`, row-major.
     pub fn excess_second_derivatives(&self, densities: &[f64]) -> Vec<f64> {
         self.interaction_kernel(densities, 0.0)
     }

@@ -15,11 +15,10 @@
 //!
 //! # Corrected densities
 //!
-//! Trofimov et al., J. Chem. Phys. 117, 9383 (2002), calibrate `ρ̃(n)` so that the mean of the
-//! corrected density is the bulk density, `⟨ρ̃⟩ = ρ`. The theory assumes an exact calibration: where a
-//! model has a correction, ψ is evaluated at the bulk densities themselves, and the correction is not
-//! used. Without a correction the variable is `ρ_β`, plus `w(0)` for a particle's own species where the
-//! model includes the self term.
+//! Trofimov et al., J. Chem. Phys. 117, 9383 (2002), calibrate `ρ̃(n)` so that the mean of the corrected density is
+//! the bulk density, `⟨ρ̃⟩ = ρ`. The theory assumes an exact calibration: where a model has a correction, ψ is
+//! evaluated at the bulk densities themselves, and the correction is not used. Without a correction the variable is
+//! `ρ_β`, plus `w(0)` for a particle's own species where the model includes the self term.
 
 mod binary;
 mod coexistence;
@@ -56,8 +55,7 @@ pub enum TheoryError {
     /// The model is not valid at the requested temperature.
     #[error(transparent)]
     File(#[from] FileError),
-    /// The model states the force of a species, which may have no potential (Warren, Phys. Rev. E 87,
-    /// 045303 (2013)).
+    /// The model states the force of a species, which may have no potential (Warren, Phys. Rev. E 87, 045303 (2013)).
     #[error(
         "species {0} has stated slopes and no excess free energy: mean field has nothing to start from; \
          write psi as a formula of the densities if the force has one"

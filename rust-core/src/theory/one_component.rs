@@ -85,8 +85,7 @@ impl MeanField {
         Ok(regions.into_iter().map(|[a, b]| [a.exp(), b.exp()]).collect())
     }
 
-    /// Vapour and liquid of equal pressure and chemical potential, for one component: the first pair in
-    /// order of density.
+    /// Vapour and liquid of equal pressure and chemical potential, for one component: the first pair in order of density.
     ///
     /// # Errors
     /// Fails for more than one species, and with [`TheoryError::NoCoexistence`].

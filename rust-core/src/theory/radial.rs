@@ -175,8 +175,7 @@ mod tests {
                 if k == 0.0 { 4.0 * PI / 3.0 } else { 4.0 * PI * (k.sin() - k * k.cos()) / k.powi(3) };
             assert!((ball.transform(k) - exact).abs() < 1e-11, "{k}");
         }
-        // The integral ∫_0^1 2πr (1 − r²) J_0(kr) dr = 4π J_2(k)/k² has the small-k expansion π/2 (1 −
-        // k²/12).
+        // The integral ∫_0^1 2πr (1 − r²) J_0(kr) dr = 4π J_2(k)/k² has the small-k expansion π/2 (1 − k²/12).
         let cap = Radial::new(2, 1.0, |r| 1.0 - r * r).unwrap();
         assert!((cap.transform(1e-3) - 0.5 * PI * (1.0 - 1e-6 / 12.0)).abs() < 1e-12);
     }

@@ -9,13 +9,11 @@ use nalgebra::DMatrix;
 pub struct Stability {
     /// Whether the eigenvalue is positive at every `k`; false also where ψ is singular.
     pub stable: bool,
-    /// Whether the eigenvalue is not positive as `k → 0`: inside the spinodal the fluid separates into
-    /// phases.
+    /// Whether the eigenvalue is not positive as `k → 0`: inside the spinodal the fluid separates into phases.
     pub spinodal: bool,
-    /// The wave number of the smallest eigenvalue, if that is not `k = 0` and the eigenvalue is below
-    /// 1, its value for an ideal gas and at `k → ∞`. In a stable fluid this is the main peak of the
-    /// structure factor; in an unstable one it is the wavelength `2π/k*` at which the fluid clusters or
-    /// freezes.
+    /// The wave number of the smallest eigenvalue, if that is not `k = 0` and the eigenvalue is below 1, its
+    /// value for an ideal gas and at `k → ∞`. In a stable fluid this is the main peak of the structure
+    /// factor; in an unstable one it is the wavelength `2π/k*` at which the fluid clusters or freezes.
     pub k_star: Option<f64>,
     /// The smallest eigenvalue over `k`, including the limit 1 at `k → ∞`.
     pub min_inverse_s: f64,
@@ -60,8 +58,8 @@ impl MeanField {
     /// for an ideal gas: `S⁻¹_st(k) = δ_st + β √(ρ_s ρ_t) C_st(k)`, row-major. For one species
     /// `S(k)⁻¹ = 1 + βρ[φ̂(k) + 2ψ′ŵ(k) + ρψ″ŵ(k)²]`, whose limit at `k → 0` is `β ∂p/∂ρ`.
     ///
-    /// This is the second functional derivative of the free energy of [the module](super), in the
-    /// random-phase approximation.
+    /// This is the second functional derivative of the free energy of [the module](super), in
+    /// the random-phase approximation.
     pub fn inverse_structure_factor(&self, densities: &[f64], k: f64) -> Vec<f64> {
         let count = self.species.len();
         let mut s = self.interaction_kernel(densities, k);

@@ -199,8 +199,8 @@ fn second_moments_of_the_kernels() {
         );
         theory(&model(&text), 1.0).kernel_moments()[0]
     };
-    // The moment [r²w] of the quadratic kernel is 2/7 R² in space and 1/5 R² in the plane; that of the
-    // linear kernel 2/5 and 3/10.
+    // The moment [r²w] of the quadratic kernel is 2/7 R² in space and 1/5 R² in the plane; that of
+    // the linear kernel 2/5 and 3/10.
     close(moments("quadratic", 3, 1.3)[0], 2.0 / 7.0 * 1.69, 1e-13);
     close(moments("quadratic", 2, 1.3)[0], 0.2 * 1.69, 1e-13);
     close(moments("linear", 3, 1.0)[0], 0.4, 1e-13);

@@ -81,8 +81,8 @@ thread_local! {
 }
 
 impl Pool {
-    /// Largest number of threads, more than machines have cores. Tens of thousands exceed limits of the
-    /// system and end the program.
+    /// Largest number of threads, more than machines have cores. Tens of thousands exceed limits of
+    /// the system and end the program.
     pub const MOST: usize = 1024;
 
     /// Checks a number of threads from outside.
@@ -162,8 +162,8 @@ impl Pool {
         }
         let (threads, things) = (self.threads(), SharedSlice::new(things));
         self.run(&|t| {
-            // SAFETY: `run` calls this once for each number of a thread, and `part` makes ranges of
-            // different numbers disjoint.
+            // SAFETY: `run` calls this once for each number of a thread, and `part` makes
+            // ranges of different numbers disjoint.
             let part = unsafe { things.slice_mut(part(things.len(), t, threads)) };
             part.iter_mut().for_each(&work);
         });

@@ -3,9 +3,8 @@ use std::ops::Range;
 
 /// A slice whose elements are divided among several threads.
 ///
-/// While it lives the slice is mutably borrowed, so that no other code accesses the elements, and a
-/// `Vec` behind them is not reallocated. Callers of the unsafe functions promise which thread accesses
-/// which elements.
+/// While it lives the slice is mutably borrowed, so that no other code accesses the elements, and a `Vec` behind
+/// them is not reallocated. Callers of the unsafe functions promise which thread accesses which elements.
 pub struct SharedSlice<'a, T> {
     first: *mut T,
     len: usize,
@@ -82,8 +81,8 @@ impl<'a, T> SharedSlice<'a, T> {
         T: Sync,
     {
         assert!(range.start <= range.end && range.end <= self.len, "a range of the slice");
-        // SAFETY: the range is in the slice, which is borrowed for `'a`; the caller promises that no
-        // thread writes these elements.
+        // SAFETY: the range is in the slice, which is borrowed for `'a`; the caller promises that
+        // no thread writes these elements.
         unsafe { std::slice::from_raw_parts(self.first.add(range.start), range.len()) }
     }
 }

@@ -23,12 +23,10 @@ fn a_forked_process_does_all_the_work_and_ends() {
         sum.into_inner()
     };
     assert_eq!(sum(), 6);
-    // SAFETY: the child takes no lock that another thread may have held: it allocates nothing, uses the
-    // pool, and ends.
+    // SAFETY: the child takes no lock that another thread may have held: it allocates nothing, uses the pool, and ends.
     let child = unsafe { fork() };
     if child == 0 {
-        // SAFETY: `alarm` takes a number. The signal ends a child that hangs, and then its status is
-        // not 0.
+        // SAFETY: `alarm` takes a number. The signal ends a child that hangs, and then its status is not 0.
         unsafe { alarm(20) };
         let right = sum() == 6;
         drop(pool);

@@ -24,8 +24,7 @@ pub struct Pressure {
     tail: Option<Tail>,
 }
 
-/// `ψ′ = limit + factor ρ^power` below some density: there the formula itself loses its digits, and is
-/// 0/0 at ρ = 0.
+/// `ψ′ = limit + factor ρ^power` below some density: there the formula itself loses its digits, and is 0/0 at ρ = 0.
 #[derive(Debug, Clone, Copy)]
 struct Tail {
     below: f64,
@@ -123,8 +122,7 @@ impl Pressure {
         out[0]
     }
 
-    /// The far ends of panels from `first` towards lower (`direction` −1) or higher densities, and ψ
-    /// there.
+    /// The far ends of panels from `first` towards lower (`direction` −1) or higher densities, and ψ there.
     fn anchors_from(&self, first: f64, direction: f64, kt: f64) -> Vec<[f64; 2]> {
         let mut found: Vec<[f64; 2]> = Vec::new();
         let (mut from, mut psi, mut width) = (first, 0.0, WIDEST);
@@ -377,8 +375,7 @@ mod tests {
         assert!(slope.abs() < 1e-9, "{slope}");
         for n in [1e-9, 1e-6, 9.9e-5, 1.01e-4, 0.01, 3.0f64] {
             let [psi, slope, _] = broken.at(n);
-            // The slope has the digits that `p − ρkT` has where the tail begins, and ψ the digits of
-            // its constant.
+            // The slope has the digits that `p − ρkT` has where the tail begins, and ψ the digits of its constant.
             let expected = 0.9 * n.powf(0.6);
             assert!((slope - expected).abs() < 1e-6 * expected + 1e-10, "{n}: {slope}");
             let expected = 0.9 / 1.6 * n.powf(1.6);

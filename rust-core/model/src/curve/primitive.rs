@@ -2,8 +2,7 @@
 
 use std::f64::consts::PI;
 
-/// Number of points of the function's values: about as accurate as Gauss's quadrature with half as
-/// many.
+/// Number of points of the function's values: about as accurate as Gauss's quadrature with half as many.
 const POINTS: usize = 15;
 
 /// Number of partial sums that are independent of each other.

@@ -19,8 +19,7 @@ impl Source {
         Source { name: name.to_owned(), text: text.to_owned(), quoted: true }
     }
 
-    /// Keeps a text whose lines messages number but never show: a model file may name any file as a
-    /// table.
+    /// Keeps a text whose lines messages number but never show: a model file may name any file as a table.
     pub fn unquoted(name: &str, text: &str) -> Source {
         Source { quoted: false, ..Source::new(name, text) }
     }

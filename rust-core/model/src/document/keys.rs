@@ -14,8 +14,7 @@ pub struct Table {
     pub array: bool,
     /// Purpose of the table.
     pub about: &'static str,
-    /// The key whose value decides which other keys the table has, and its values; empty if there is
-    /// none.
+    /// The key whose value decides which other keys the table has, and its values; empty if there is none.
     pub forms: (&'static str, &'static [&'static str]),
     /// The keys of the table.
     pub keys: &'static [Key],
@@ -215,8 +214,7 @@ impl Table {
     }
 }
 
-/// Reports a misspelt key before a key that is missing because of it. `more` are tables that are
-/// described elsewhere.
+/// Reports a misspelt key before a key that is missing because of it. `more` are tables that are described elsewhere.
 pub fn strangers_first(error: FileError, root: &Section, tables: &[Table], more: &[&str]) -> FileError {
     match error.kind() {
         // The error is about another file, or already names the key.
@@ -274,8 +272,8 @@ fn sections<'a>(root: &Section<'a>, path: &str) -> Vec<Section<'a>> {
     root.get(first).map_or_else(Vec::new, inner)
 }
 
-/// Declares keys in short: `"name" [FORMS]: VALUE, NEED, "meaning" => "example";`. The forms are left
-/// out where all have the key.
+/// Declares keys in short: `"name" [FORMS]: VALUE, NEED, "meaning" => "example";`. The forms are
+/// left out where all have the key.
 #[macro_export]
 macro_rules! keys {
     ($($name:literal $([$forms:expr])?: $value:expr, $need:expr, $about:expr => $example:expr;)*) => {

@@ -48,8 +48,7 @@ impl Document {
         Ok(document)
     }
 
-    /// Reads a text; `name` stands for the file in messages, and other files are searched in its
-    /// folder.
+    /// Reads a text; `name` stands for the file in messages, and other files are searched in its folder.
     ///
     /// # Errors
     /// Fails if the text is not TOML or nests too deeply.

@@ -7,8 +7,7 @@ pub fn is_control(c: char) -> bool {
         || matches!(c, '\u{200E}' | '\u{200F}' | '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}')
 }
 
-/// Replaces control characters by visible characters of the same length in bytes, so that offsets into
-/// the text stay valid.
+/// Replaces control characters by visible characters of the same length in bytes, so that offsets into the text stay valid.
 pub fn printable(text: &str) -> String {
     let shown = |c: char| match (is_control(c), c.len_utf8()) {
         (false, _) => c,

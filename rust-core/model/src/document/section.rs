@@ -276,8 +276,7 @@ impl<'a> Value<'a> {
     }
 }
 
-/// The message for a number with a point or an exponent where a count is expected; it shows the
-/// integer, if there is one.
+/// The message for a number with a point or an exponent where a count is expected; it shows the integer, if there is one.
 fn not_an_integer(written: &str) -> String {
     const LARGEST: f64 = (1u64 << 53) as f64;
     let value = written.replace('_', "").parse::<f64>().ok();

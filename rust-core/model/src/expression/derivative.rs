@@ -9,8 +9,7 @@ type Built = Result<Id, TooLarge>;
 impl Graph {
     /// The derivative of `root` with respect to a variable.
     ///
-    /// The derivative visits the graph from the leaves upwards, so that every shared part is
-    /// differentiated once.
+    /// The derivative visits the graph from the leaves upwards, so that every shared part is differentiated once.
     pub fn differentiate(&mut self, root: Id, variable: u32) -> Built {
         let zero = self.constant(0.0)?;
         let mut slopes: Vec<Id> = Vec::with_capacity(root.index() + 1);

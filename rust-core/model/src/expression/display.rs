@@ -5,8 +5,7 @@ use std::fmt::{self, Display, Formatter};
 use super::Formula;
 use super::graph::{Id, Node, as_quotient};
 
-/// A formula with more operations than this, written out, prints shared parts by name instead of
-/// repeating them.
+/// A formula with more operations than this, written out, prints shared parts by name instead of repeating them.
 const LONGEST: usize = 200;
 
 /// A formula that prints with names for its variables.

@@ -7,9 +7,8 @@ use super::graph::{Id, Node};
 
 /// Work space for expanding formulas to second order in each of several variables.
 ///
-/// The coefficients of `f(x + ε)` in `Π ε_k^{m_k}`, `m_k = 0, 1, 2`, are `Π (1/m_k!) ∂^{m_k}/∂x_k^{m_k}
-/// f`, mixed derivatives included. Evaluating the formula with polynomials in place of numbers, without
-/// every `ε_k³`, yields them.
+/// The coefficients of `f(x + ε)` in `Π ε_k^{m_k}`, `m_k = 0, 1, 2`, are `Π (1/m_k!) ∂^{m_k}/∂x_k^{m_k} f`, mixed
+/// derivatives included. Evaluating the formula with polynomials in place of numbers, without every `ε_k³`, yields them.
 #[derive(Debug, Clone, Default)]
 pub struct Expansion {
     /// For each number of variables the products of monomials that are kept.
@@ -35,8 +34,7 @@ impl Expansion {
     ///
     /// # Panics
     ///
-    /// Panics if `along` has more than [`Expansion::MOST`] variables, or if `at` lacks a variable of
-    /// the formula.
+    /// Panics if `along` has more than [`Expansion::MOST`] variables, or if `at` lacks a variable of the formula.
     pub fn coefficients(&mut self, formula: &Formula, at: &[f64], along: &[usize]) -> &[f64] {
         let count = along.len();
         assert!(count <= Self::MOST, "expansion in too many variables");
@@ -151,8 +149,8 @@ impl Algebra<'_> {
 
     /// Computes `f(a)` for a function whose Taylor coefficients at a number are written by `series`.
     fn compose(&mut self, a: &[f64], out: &mut [f64], series: impl Fn(f64, &mut [f64])) {
-        // Each ε_k that occurs has powers up to the second, so that at most this many factors of the
-        // other terms of `a` survive.
+        // Each ε_k that occurs has powers up to the second, so that at most this many factors of
+        // the other terms of `a` survive.
         let occurs = |k: u32| {
             let place = 3usize.pow(k);
             a.iter().enumerate().any(|(index, c)| !(index / place).is_multiple_of(3) && *c != 0.0)

@@ -148,8 +148,7 @@ impl Formula {
         Ok(Self::from_nodes(graph.extract(places[places.len() - 1])))
     }
 
-    /// The value at a point, for occasional use; a [`Program`](super::Program) computes the same bits
-    /// faster.
+    /// The value at a point, for occasional use; a [`Program`](super::Program) computes the same bits faster.
     ///
     /// # Panics
     ///

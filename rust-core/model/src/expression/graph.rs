@@ -93,8 +93,7 @@ impl Node {
 
 /// Matches `c · x⁻ⁿ`, which costs one division instead of a division and a product.
 ///
-/// Returns c, x and n. All code that evaluates or prints a graph calls this function, so that all of it
-/// agrees.
+/// Returns c, x and n. All code that evaluates or prints a graph calls this function, so that all of it agrees.
 pub(super) fn as_quotient(nodes: &[Node], node: Node) -> Option<(f64, Id, i32)> {
     let Node::Multiply(factor, power) = node else {
         return None;

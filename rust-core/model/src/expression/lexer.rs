@@ -65,8 +65,7 @@ fn leading(text: &str, belongs: impl Fn(char) -> bool) -> usize {
     text.find(|c| !belongs(c)).unwrap_or(text.len())
 }
 
-/// The length of a number such as `12`, `1.5`, `.5`, `2.` or `1.5e-3`; an `e` without digits is not
-/// part of it.
+/// The length of a number such as `12`, `1.5`, `.5`, `2.` or `1.5e-3`; an `e` without digits is not part of it.
 fn number_length(text: &str) -> usize {
     let digits = |at: usize| leading(&text[at..], |c| c.is_ascii_digit());
     let mut end = digits(0);

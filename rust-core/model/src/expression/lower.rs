@@ -188,8 +188,7 @@ fn allocate(variables: usize, code: &[Instruction], mut outputs: Vec<Output>) ->
         if last_use[instruction.to].is_none() {
             continue;
         }
-        // The register is taken before those of the operands are released, so that it differs from
-        // theirs.
+        // The register is taken before those of the operands are released, so that it differs from theirs.
         let to = free.pop().unwrap_or_else(|| {
             registers += 1;
             registers - 1

@@ -12,8 +12,8 @@ use super::suggest::closest;
 impl Ast {
     /// Parses an expression.
     ///
-    /// The text may be anything: a text longer than [`MAX_LENGTH`] or nested deeper than [`MAX_DEPTH`]
-    /// is an error like any other.
+    /// The text may be anything: a text longer than [`MAX_LENGTH`] or nested deeper than
+    /// [`MAX_DEPTH`] is an error like any other.
     pub fn parse(text: &str) -> Result<Self, ExpressionError> {
         parse(text).map(|steps| Self { steps })
     }
@@ -65,8 +65,7 @@ impl Waiting {
         }
     }
 
-    /// Whether it adds a level of nesting; other operators are written out before those of equal
-    /// precedence.
+    /// Whether it adds a level of nesting; other operators are written out before those of equal precedence.
     fn nests(self) -> bool {
         !matches!(self, Waiting::Callee(..)) && !matches!(self.strength(), 1 | 2)
     }

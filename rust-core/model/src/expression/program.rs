@@ -4,10 +4,9 @@ use super::function::{Unary, select};
 
 /// Several formulas compiled for evaluation together.
 ///
-/// A program computes shared parts once and leaves out unused parts. Integer powers are products; every
-/// other power is [`f64::powf`]. A block evaluation runs each instruction over all lanes before the
-/// next, which spreads the cost of interpreting, and plain loops vectorise. One point and a block give
-/// the same bits.
+/// A program computes shared parts once and leaves out unused parts. Integer powers are products; every other
+/// power is [`f64::powf`]. A block evaluation runs each instruction over all lanes before the next, which
+/// spreads the cost of interpreting, and plain loops vectorise. One point and a block give the same bits.
 #[derive(Debug, Clone)]
 pub struct Program {
     /// One more than the largest index of a variable in use.
@@ -17,7 +16,7 @@ pub struct Program {
     pub(super) outputs: Vec<Output>,
 }
 
-/// One operation: `registers[to] = operation(from)`.
+/// An instruction `registers[to] = operation(from)`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Instruction {
     pub operation: Operation,
@@ -113,8 +112,7 @@ impl Program {
     ///
     /// # Panics
     ///
-    /// Panics if `at` is shorter than [`variables`](Self::variables) or `out` than
-    /// [`outputs`](Self::outputs).
+    /// Panics if `at` is shorter than [`variables`](Self::variables) or `out` than [`outputs`](Self::outputs).
     pub fn eval(&self, at: &[f64], out: &mut [f64], work: &mut Vec<f64>) {
         self.eval_block(1, at, out, work);
     }
@@ -141,8 +139,8 @@ impl Program {
     ///
     /// # Panics
     ///
-    /// Panics if `at` is shorter than `lanes` times [`variables`](Self::variables), or if a slice of
-    /// `out` has another length.
+    /// Panics if `at` is shorter than `lanes` times [`variables`](Self::variables), or if a
+    /// slice of `out` has another length.
     #[inline(always)]
     pub fn eval_block_into<'o>(
         &self,

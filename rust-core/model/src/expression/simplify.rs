@@ -1,9 +1,8 @@
 //! Arithmetic on graph nodes that omits needless operations.
 //!
-//! A term is treated as `coefficient · rest`. Coefficients are multiplied and divided as numbers and
-//! kept in front, so that `2 * (c * n)` is one product, and like terms are summed. Only operations with
-//! a finite result are folded; `1/0` stays a node that evaluates to an infinity. `0 * x` is zero for
-//! every x.
+//! A term is treated as `coefficient · rest`. Coefficients are multiplied and divided as numbers and kept in
+//! front, so that `2 * (c * n)` is one product, and like terms are summed. Only operations with a finite
+//! result are folded; `1/0` stays a node that evaluates to an infinity. `0 * x` is zero for every x.
 
 use super::error::TooLarge;
 use super::function::{Unary, integer_power, select};

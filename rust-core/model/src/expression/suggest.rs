@@ -16,8 +16,7 @@ pub fn closest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         .map(|(_, candidate)| candidate.to_owned())
 }
 
-/// The edit distance; wrong case counts nothing, and two neighbouring letters in the wrong order are
-/// one slip.
+/// The edit distance; wrong case counts nothing, and two neighbouring letters in the wrong order are one slip.
 fn slips(a: &str, b: &str) -> usize {
     let (a, b) = (a.to_ascii_lowercase().into_bytes(), b.to_ascii_lowercase().into_bytes());
     let (mut before, mut row): (Vec<usize>, Vec<usize>) = (Vec::new(), (0..=b.len()).collect());

@@ -21,8 +21,7 @@ pub enum ExcessEntry {
     Pressure { formula: Located<Ast>, density: usize },
     /// The pressure as a table of one density's total.
     PressureTable { spline: Arc<Spline>, density: usize, key: Located<()> },
-    /// Slopes that may have no ψ, by the names of the variables, and the formula that is reported as
-    /// energy.
+    /// Slopes that may have no ψ, by the names of the variables, and the formula that is reported as energy.
     Slopes { slopes: Vec<(Located<String>, Located<Ast>)>, energy: Option<Located<Ast>> },
 }
 

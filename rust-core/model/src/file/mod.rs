@@ -53,8 +53,7 @@ impl Model {
         Model::read(&Document::open(path)?)
     }
 
-    /// Reads a model from a text; `name` stands for the file in messages, and tables are searched in
-    /// its folder.
+    /// Reads a model from a text; `name` stands for the file in messages, and tables are searched in its folder.
     ///
     /// # Errors
     /// Fails as [`Model::open`].
@@ -145,8 +144,7 @@ impl Model {
     /// The fluid at temperature `kt`, in energy units of the file.
     ///
     /// # Errors
-    /// Fails if `kt` is not a positive number, or if a formula or number is not finite at this
-    /// temperature.
+    /// Fails if `kt` is not a positive number, or if a formula or number is not finite at this temperature.
     pub fn at(&self, kt: f64) -> Result<Fluid, FileError> {
         bind::bind(self, kt)
     }
@@ -183,8 +181,7 @@ fn species_index(
 #[cfg(test)]
 mod tests;
 
-/// The error for a scene where a model is expected: the file has keys of a scene, and none that define
-/// a model.
+/// The error for a scene where a model is expected: the file has keys of a scene, and none that define a model.
 fn no_model(root: &Section) -> Option<FileError> {
     let of_model = ["species", "excess_free_energy", "density", "pair"];
     let of_scene = ["model", "box", "stage", "steps", "initial", "part"];

@@ -144,8 +144,7 @@ pub fn read_parameters(root: &Section) -> Result<BTreeMap<String, f64>, FileErro
         }
         waiting.push((name.value, number));
     }
-    // Formulas may refer to each other: each pass evaluates those whose parameters are known, until
-    // none is left.
+    // Formulas may refer to each other: each pass evaluates those whose parameters are known, until none is left.
     let names: BTreeSet<String> = waiting.iter().map(|(n, _)| n.clone()).collect();
     while !waiting.is_empty() {
         let before = waiting.len();

@@ -59,8 +59,7 @@ macro_rules! kernel_table {
                 match self { $(KernelKind::$shape => $shape::NAME),+ }
             }
 
-            /// Calls `visitor` with the shape as a type, so that the visitor is compiled for each
-            /// shape.
+            /// Calls `visitor` with the shape as a type, so that the visitor is compiled for each shape.
             #[inline(always)]
             pub fn visit<V: ShapeVisitor>(self, visitor: V) -> V::Output {
                 match self { $(KernelKind::$shape => visitor.visit::<$shape>()),+ }
@@ -156,8 +155,7 @@ impl Kernel {
         if r < self.range { self.slope_factor * self.kind.visit(At(r / self.range)) } else { 0.0 }
     }
 
-    /// The curvature `w''(r)` within the range, 0 beyond; a jump of `w'` at the range does not
-    /// contribute.
+    /// The curvature `w''(r)` within the range, 0 beyond; a jump of `w'` at the range does not contribute.
     #[inline]
     pub fn curvature(&self, r: f64) -> f64 {
         struct At(f64);

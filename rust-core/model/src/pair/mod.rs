@@ -33,8 +33,7 @@ pub trait PairForm {
         (8.0 * (slope(r + h) - slope(r - h)) - (slope(r + 2.0 * h) - slope(r - 2.0 * h))) / (12.0 * h)
     }
 
-    /// Computes `φ` at every `r` of a block; all `r < range`. The slices have one length; `work` is
-    /// scratch space.
+    /// Computes `φ` at every `r` of a block; all `r < range`. The slices have one length; `work` is scratch space.
     fn energies(&self, r: &[f64], phi: &mut [f64], work: &mut Vec<f64>) {
         let _ = work;
         r.iter().zip(phi).for_each(|(r, phi)| *phi = self.at(*r).0);

@@ -28,8 +28,7 @@ pub enum PresetError {
     /// The table is not square or empty, or the number of masses differs from that of types.
     #[error("expected coefficients for every pair of types, and as many masses as types")]
     Shape,
-    /// `B` or `r_d` differ between pairs, which Warren's no-go theorem excludes (Phys. Rev. E 87,
-    /// 045303 (2013)).
+    /// `B` or `r_d` differ between pairs, which Warren's no-go theorem excludes (Phys. Rev. E 87, 045303 (2013)).
     #[error(
         "{name} differs between type pairs ({first} and {second}): with one density that does not \
          tell types apart no potential gives such forces (Warren, Phys. Rev. E 87, 045303); use one \

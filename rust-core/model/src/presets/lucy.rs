@@ -1,14 +1,12 @@
-//! The force law of LAMMPS's `mdpd` and `mdpd/rhosum`, written as a model file, for comparison with
-//! them.
+//! The force law of LAMMPS's `mdpd` and `mdpd/rhosum`, written as a model file, for comparison with them.
 //!
 //! ```text
 //! F_ij = A_ij (1 − r/r_c,ij) + B_ij (ρ_i + ρ_j)(1 − r/r_d,ij)
 //! ρ_i  = Σ_j m_j w(r_ij; r_d,ij),   w(r; h) = 105/(16π h³) (1 + 3r/h)(1 − r/h)³, in two dimensions too
 //! ```
 //!
-//! `ρ` is a mass density summed over all types, so that these forces have no potential unless all
-//! `B_ij` and `r_d,ij` are equal (Warren, Phys. Rev. E 87, 045303 (2013)); with Lucy's kernel they
-//! never have one.
+//! `ρ` is a mass density summed over all types, so that these forces have no potential unless all `B_ij` and
+//! `r_d,ij` are equal (Warren, Phys. Rev. E 87, 045303 (2013)); with Lucy's kernel they never have one.
 
 use super::coefficients::{PresetError, WarrenPair, pair_text, upper_triangle};
 use crate::file::Model;
@@ -105,8 +103,7 @@ fn strength(pair: WarrenPair, dimensions: usize) -> String {
 /// Builds the model of [`lucy_mdpd_text`].
 ///
 /// # Errors
-/// Fails as [`lucy_mdpd_text`]; also for a range that is not positive, a negative γ, or more than 16
-/// different `r_d`.
+/// Fails as [`lucy_mdpd_text`]; also for a range that is not positive, a negative γ, or more than 16 different `r_d`.
 pub fn lucy_mdpd(
     species: &[String],
     pairs: &[Option<WarrenPair>],

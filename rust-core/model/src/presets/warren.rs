@@ -1,9 +1,8 @@
 //! Warren's A/B model from the coefficients of LAMMPS's `mdpd`, written as a model file.
 //!
-//! The force of LAMMPS's `mdpd` is `A w_c(r) ê + B (n_i + n_j) w_d(r) ê` with `w_c = 1 − r/r_c`, `w_d =
-//! 1 − r/r_d`. With the quadratic kernel it is the gradient of `φ = ½ A r_c (1 − r/r_c)²` and `ψ = c_d
-//! r_d^{d+1} B n²`, `c_3 = π/30`, `c_2 = π/24` (Warren eq. 13–15), since `−w′` is then `(1 − r/r_d) /
-//! (2 c_d r_d^{d+1})`.
+//! The force of LAMMPS's `mdpd` is `A w_c(r) ê + B (n_i + n_j) w_d(r) ê` with `w_c = 1 − r/r_c`, `w_d = 1 − r/r_d`.
+//! With the quadratic kernel it is the gradient of `φ = ½ A r_c (1 − r/r_c)²` and `ψ = c_d r_d^{d+1} B n²`, `c_3 =
+//! π/30`, `c_2 = π/24` (Warren eq. 13–15), since `−w′` is then `(1 − r/r_d) / (2 c_d r_d^{d+1})`.
 
 use super::coefficients::{PresetError, WarrenPair, pair_text, upper_triangle};
 use super::lucy::lucy_mdpd_text;
@@ -15,8 +14,8 @@ use std::fmt::Write;
 pub enum ForceLaw {
     /// The density has the quadratic kernel: the force has a potential (Warren eq. 10).
     Conservative,
-    /// The density has the Lucy kernel, as in LAMMPS's `mdpd/rhosum`, for masses of 1: the force has no
-    /// potential, and heats.
+    /// The density has the Lucy kernel, as in LAMMPS's `mdpd/rhosum`, for masses of 1: the
+    /// force has no potential, and heats.
     LucyLammps,
 }
 

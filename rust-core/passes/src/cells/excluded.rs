@@ -29,8 +29,8 @@ pub struct Excluded<'a> {
     /// Partners' indices in the order of cells, shifted by `OFFSET_BITS`. For particles of the last
     /// plane, a partner with a copy behind that plane is listed at both indices.
     pub partners: &'a [u32],
-    /// Rules' bits of the particles, followed by those of the copies behind the last plane; empty
-    /// without rules and molecules.
+    /// Rules' bits of the particles, followed by those of the copies behind the last plane;
+    /// empty without rules and molecules.
     pub sides: &'a [u32],
     pub molecules: &'a [u32],
     /// Whether molecules exclude pairs between them instead of pairs within one.
@@ -53,8 +53,7 @@ impl Excluded<'_> {
         if self.start.is_empty() {
             return &[];
         }
-        // SAFETY: `ExcludedPairs` gives `start` an entry for each particle and one more, none beyond
-        // the partners.
+        // SAFETY: `ExcludedPairs` gives `start` an entry for each particle and one more, none beyond the partners.
         unsafe {
             let [first, end] = [*self.start.get_unchecked(i), *self.start.get_unchecked(i + 1)];
             self.partners.get_unchecked(first as usize..end as usize)

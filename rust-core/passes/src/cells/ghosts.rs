@@ -26,8 +26,8 @@ impl Ghosts<'_> {
         self.flags.is_empty()
     }
 
-    /// The weight of a pair on this rank: 1, or ½ if either particle is a ghost. The rank that owns the
-    /// ghost counts the other half.
+    /// The weight of a pair on this rank: 1, or ½ if either particle is a ghost. The rank that owns
+    /// the ghost counts the other half.
     pub fn pair_weight(&self, i: usize, j: usize) -> f64 {
         if self.is_empty() {
             return 1.0;

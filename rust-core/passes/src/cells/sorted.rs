@@ -19,8 +19,8 @@ pub struct SortedCells<'a> {
     pub set: InstructionSet,
     pub geometry: &'a BoxGeometry,
     pub grid: &'a CellGrid,
-    /// Index of the first particle of each cell, and one past the last particle; then the same for the
-    /// copy of the first plane.
+    /// Index of the first particle of each cell, and one past the last particle; then the same
+    /// for the copy of the first plane.
     pub start: &'a [u32],
     /// Positions relative to the origin of the box geometry.
     pub x: [SharedSlice<'a, f32>; 3],
@@ -45,8 +45,7 @@ impl SortedCells<'_> {
     #[inline(always)]
     pub unsafe fn column(&self, plane: usize, column: usize) -> [usize; 2] {
         let cell = self.first_cell(plane, column);
-        // SAFETY: sorting gives `start` an entry for each cell and one more; the caller promises a
-        // column of the grid.
+        // SAFETY: sorting gives `start` an entry for each cell and one more; the caller promises a column of the grid.
         unsafe {
             let end = *self.start.get_unchecked(cell + self.grid.cells_per_column);
             [*self.start.get_unchecked(cell) as usize, end as usize]

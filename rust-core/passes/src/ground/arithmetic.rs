@@ -5,8 +5,7 @@ use super::species_pairs::SpeciesPair;
 use crate::simd::{Isa, OFFSET_BITS, Reals, Scalar, Words};
 use psidpd_model::kernel::Real;
 
-/// The i-particles of a batch, field by field. Pairs pick fields of their i-particle from a vector
-/// register.
+/// The i-particles of a batch, field by field. Pairs pick fields of their i-particle from a vector register.
 #[derive(Debug, Clone, Copy, Default)]
 #[repr(C, align(64))]
 pub struct IParticles<T> {
@@ -88,9 +87,8 @@ pub trait Arithmetic<I: Isa>: 'static {
     unsafe fn load_transposed_in_order(records: *const Self::Scalar, count: usize) -> [Self::Reals; 8] {
         type W<I, A> = <<A as Arithmetic<I>>::Reals as Reals>::Words;
         let mut offsets = [0; 16];
-        // SAFETY: `IN_ORDER` and `offsets` are as long as a vector, and all offsets are among the
-        // `count` records that the caller promises. Records behind these may belong to another thread,
-        // which may be writing them.
+        // SAFETY: `IN_ORDER` and `offsets` are as long as a vector, and all offsets are among the `count` records
+        // that the caller promises. Records behind these may belong to another thread, which may be writing them.
         unsafe {
             let last = W::<I, Self>::splat(((count - 1) << OFFSET_BITS) as u32);
             W::<I, Self>::load(IN_ORDER.as_ptr()).min(last).store(offsets.as_mut_ptr());
@@ -187,8 +185,8 @@ impl<I: Isa> Arithmetic<I> for Mixed {
 
     #[inline(always)]
     unsafe fn load_i_particles(first: *const MixedParticle, i_particles: &mut IParticles<f32>) {
-        // SAFETY: `SortedParticles::make_room` pads packed particles and `SearchBuffers` pads lists of
-        // pairs to whole vectors.
+        // SAFETY: `SortedParticles::make_room` pads packed particles and `SearchBuffers` pads
+        // lists of pairs to whole vectors.
         unsafe {
             let [x, y, z, tag, u, v, w, species] =
                 I::load_transposed::<true>(first.cast(), IN_ORDER.as_ptr());
@@ -213,8 +211,8 @@ impl<I: Isa> Arithmetic<I> for Mixed {
         with_velocities: bool,
     ) -> (PairGeometry<I::F32>, PairTags<I::F32>) {
         type W<I> = <<I as Isa>::F32 as Reals>::Words;
-        // SAFETY: `SortedParticles::make_room` pads packed particles and `SearchBuffers` pads lists of
-        // pairs to whole vectors.
+        // SAFETY: `SortedParticles::make_room` pads packed particles and `SearchBuffers` pads
+        // lists of pairs to whole vectors.
         unsafe {
             let i_particles = &*i_particles;
             let [sx, sy, sz] = metric.scale;
@@ -254,8 +252,8 @@ impl<I: Isa> Arithmetic<I> for Mixed {
 
     #[inline(always)]
     unsafe fn load_transposed<const ALL: bool>(records: *const f32, j_offsets: *const u32) -> [I::F32; 8] {
-        // SAFETY: `SortedParticles::make_room` pads packed particles and `SearchBuffers` pads lists of
-        // pairs to whole vectors.
+        // SAFETY: `SortedParticles::make_room` pads packed particles and `SearchBuffers` pads
+        // lists of pairs to whole vectors.
         unsafe {
             let load_transposed = I::load_transposed::<ALL>(records.cast(), j_offsets);
             let mut numbers = [I::F32::constant(0.0); 8];
@@ -270,8 +268,8 @@ impl<I: Isa> Arithmetic<I> for Mixed {
 
     #[inline(always)]
     unsafe fn load_quad(p: *const f32) -> I::Quad {
-        // SAFETY: `SortedParticles::make_room` pads packed particles and `SearchBuffers` pads lists of
-        // pairs to whole vectors.
+        // SAFETY: `SortedParticles::make_room` pads packed particles and `SearchBuffers` pads
+        // lists of pairs to whole vectors.
         unsafe { <I::Quad as crate::simd::Quad>::load_f32(p) }
     }
 }
@@ -310,8 +308,8 @@ impl<I: Isa> Arithmetic<I> for Double {
 
     #[inline(always)]
     unsafe fn load_i_particles(first: *const DoubleParticle, i_particles: &mut IParticles<f64>) {
-        // SAFETY: `SortedParticles::make_room` pads packed particles and `SearchBuffers` pads lists of
-        // pairs to whole vectors.
+        // SAFETY: `SortedParticles::make_room` pads packed particles and `SearchBuffers` pads
+        // lists of pairs to whole vectors.
         unsafe {
             let [x, y, z, bits, u, v, w, _] =
                 I::load_transposed_wide::<true>(first.cast(), IN_ORDER.as_ptr());
@@ -336,8 +334,8 @@ impl<I: Isa> Arithmetic<I> for Double {
         j_offsets: *const u32,
         with_velocities: bool,
     ) -> (PairGeometry<I::F64>, PairTags<I::F64>) {
-        // SAFETY: `SortedParticles::make_room` pads packed particles and `SearchBuffers` pads lists of
-        // pairs to whole vectors.
+        // SAFETY: `SortedParticles::make_room` pads packed particles and `SearchBuffers` pads
+        // lists of pairs to whole vectors.
         unsafe {
             let i_particles = &*i_particles;
             let ([lx, ly, lz], [ix, iy, iz], [xy, xz, yz]) = (metric.length, metric.inverse, metric.tilt);
@@ -380,15 +378,15 @@ impl<I: Isa> Arithmetic<I> for Double {
 
     #[inline(always)]
     unsafe fn load_transposed<const ALL: bool>(records: *const f64, j_offsets: *const u32) -> [I::F64; 8] {
-        // SAFETY: `SortedParticles::make_room` pads packed particles and `SearchBuffers` pads lists of
-        // pairs to whole vectors.
+        // SAFETY: `SortedParticles::make_room` pads packed particles and `SearchBuffers` pads
+        // lists of pairs to whole vectors.
         unsafe { I::load_transposed_wide::<ALL>(records.cast(), j_offsets) }
     }
 
     #[inline(always)]
     unsafe fn load_quad(p: *const f64) -> I::Quad {
-        // SAFETY: `SortedParticles::make_room` pads packed particles and `SearchBuffers` pads lists of
-        // pairs to whole vectors.
+        // SAFETY: `SortedParticles::make_room` pads packed particles and `SearchBuffers` pads
+        // lists of pairs to whole vectors.
         unsafe { <I::Quad as crate::simd::Quad>::load(p) }
     }
 }

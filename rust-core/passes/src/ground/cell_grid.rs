@@ -7,9 +7,8 @@ use super::box_geometry::BoxGeometry;
 pub struct SearchPlan {
     /// Number of cells along x in one cutoff.
     pub cells_per_cutoff: f64,
-    /// Below this number of particles per cutoff along a column of cells, i-clusters have eight
-    /// particles, else four: the cell ranges of eight then are still about sixteen particles long, the
-    /// size of a j-cluster.
+    /// Below this number of particles per cutoff along a column of cells, i-clusters have eight particles, else
+    /// four: the cell ranges of eight then are still about sixteen particles long, the size of a j-cluster.
     pub sparse: f64,
 }
 
@@ -51,8 +50,7 @@ pub struct CellGrid {
     pub i_cluster_extent: f64,
 }
 
-/// Coordinates are in single precision, relative to the box: the search distance grows by this fraction
-/// of cutoff and box.
+/// Coordinates are in single precision, relative to the box: the search distance grows by this fraction of cutoff and box.
 const ROUNDING: f64 = 1e-6;
 
 impl CellGrid {
@@ -61,8 +59,8 @@ impl CellGrid {
         (0.5 * height * (1.0 - 1e-12) - ROUNDING * longest) / (1.0 + ROUNDING)
     }
 
-    /// The grid for `count` particles; `None` if the box is so narrow along a period that a particle is
-    /// near two images of another.
+    /// The grid for `count` particles; `None` if the box is so narrow along a period that a
+    /// particle is near two images of another.
     pub fn new(geometry: &BoxGeometry, cutoff: f64, count: usize) -> Option<CellGrid> {
         let (column_axis, plane_axis) = if geometry.dimensions == 3 { (1, 2) } else { (2, 1) };
         let longest = geometry.length[..geometry.dimensions].iter().fold(0.0, |a: f64, b| a.max(*b));
@@ -74,8 +72,7 @@ impl CellGrid {
         }
         let plan = SearchPlan::DEFAULT;
         let most = (4 * count + 64) as f64;
-        // The width is that of the cutoff minus rounding: pairs in the last 10⁻⁹ of the cutoff may be
-        // missed.
+        // The width is that of the cutoff minus rounding: pairs in the last 10⁻⁹ of the cutoff may be missed.
         let mut width = cutoff * (1.0 - 1e-9);
         loop {
             let along = |axis: usize, width: f64| {

@@ -1,5 +1,4 @@
-//! 16-bit fixed-point coordinates for the distance filter. Rounding makes the filter pass too many
-//! pairs, never too few.
+//! 16-bit fixed-point coordinates for the distance filter. Rounding makes the filter pass too many pairs, never too few.
 
 use super::box_geometry::BoxGeometry;
 use super::cell_grid::CellGrid;
@@ -9,8 +8,7 @@ use super::cell_grid::CellGrid;
 pub struct FixedPoint16 {
     /// Units per length. Coordinates wrap; compared particles are less than half a turn apart.
     pub per_length: f64,
-    /// A pair may be within the cutoff if the high halves of its squared coordinate differences sum to
-    /// less than this.
+    /// A pair may be within the cutoff if the high halves of its squared coordinate differences sum to less than this.
     pub limit: i16,
 }
 
@@ -31,15 +29,13 @@ impl FixedPoint16 {
         ];
         let furthest = furthest.into_iter().fold(0.0, f64::max);
         let per_length = 32_000.0 / furthest;
-        // Two positions and a shift are rounded: a coordinate difference has an error of up to 1.5
-        // units.
+        // Two positions and a shift are rounded: a coordinate difference has an error of up to 1.5 units.
         let limit = grid.search_cutoff * per_length + 1.5 * 3f64.sqrt();
         FixedPoint16 { per_length, limit: (limit * limit / 65_536.0) as i16 + 1 }
     }
 
-    /// The lengths of the edges in units, if the edges are along the axes and the lengths fit into 31
-    /// bits. A fraction of the box times its edge is the coordinate, with an error below one unit plus
-    /// half the fraction.
+    /// The lengths of the edges in units, if the edges are along the axes and the lengths fit into 31 bits. A
+    /// fraction of the box times its edge is the coordinate, with an error below one unit plus half the fraction.
     pub fn edge_words(&self, geometry: &BoxGeometry) -> Option<[u32; 3]> {
         let words = geometry.length.map(|l| (l * self.per_length).round());
         let few = words.iter().all(|w| *w < 2_147_483_648.0);
@@ -57,8 +53,8 @@ impl FixedPoint16 {
     /// The coordinate is finite and within 2⁴⁰ cutoffs.
     #[inline(always)]
     pub unsafe fn coordinate(&self, x: f64) -> u16 {
-        // SAFETY: a unit is at least 2⁻¹⁴ cutoffs; the caller promises `x` within 2⁴⁰ cutoffs, so the
-        // number of units fits 64 bits.
+        // SAFETY: a unit is at least 2⁻¹⁴ cutoffs; the caller promises `x` within 2⁴⁰ cutoffs, so
+        // the number of units fits 64 bits.
         unsafe { (x * self.per_length).to_int_unchecked::<i64>() as u16 }
     }
 }

@@ -93,8 +93,7 @@ impl<R: Reals> TableLookup<R> {
     /// The caller fulfils the contract of `simd`, and passes pairs of the table's species.
     #[inline(always)]
     pub unsafe fn lookup<const MULTISPECIES: bool>(&self, species_pair: SpeciesPair<R>) -> R {
-        // SAFETY: the caller promises indices below the number of entries; `SpeciesPairTable::new` pads
-        // tables to a vector.
+        // SAFETY: the caller promises indices below the number of entries; `SpeciesPairTable::new` pads tables to a vector.
         unsafe {
             if !MULTISPECIES {
                 self.first
@@ -111,8 +110,7 @@ impl<R: Reals> TableLookup<R> {
 /// inlined lack the target features.
 ///
 /// # Safety
-/// The caller fulfils the contract of `simd`. The table is padded to a vector, the indices are below
-/// its length.
+/// The caller fulfils the contract of `simd`. The table is padded to a vector, the indices are below its length.
 #[inline(always)]
 pub unsafe fn table_entry<R: Reals>(table: *const R::Scalar, index: R::Words, fits_vector: bool) -> R {
     // SAFETY: `SpeciesPairTable::new` has padded the table to a vector, and `SpeciesPair::new` computes

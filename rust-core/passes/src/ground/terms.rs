@@ -20,8 +20,7 @@ pub struct Terms<T> {
     /// Whether all pairs go to the full pair cache. Only loops compiled for several species check it,
     /// so that it costs nothing with one density and one species.
     pub full_cache: bool,
-    /// For each species: 1 where the i-particle is of this species and 0 elsewhere, and the same for
-    /// the j-particle.
+    /// For each species: 1 where the i-particle is of this species and 0 elsewhere, and the same for the j-particle.
     pub is_species: Vec<[SpeciesPairTable<T>; 2]>,
 }
 

@@ -6,23 +6,20 @@
 use crate::simd::OFFSET_BITS;
 use std::marker::PhantomData;
 
-/// Four sums of one particle: the force, and the density if there is one variable. The alignment keeps
-/// each within one cache line.
+/// Four sums of one particle: the force, and the density if there is one variable. The alignment
+/// keeps each within one cache line.
 #[derive(Debug, Clone, Copy, Default)]
 #[repr(C, align(32))]
 pub struct Accumulator(pub [f64; 4]);
 
 const _: () = assert!(size_of::<Accumulator>() == 1 << OFFSET_BITS);
 
-/// The sums of the pairs of one plane: accumulators of its particles, followed by those of the next
-/// plane.
+/// The sums of the pairs of one plane: accumulators of its particles, followed by those of the next plane.
 #[derive(Clone, Copy)]
 pub struct PlaneSums<'a> {
-    /// Address that the accumulator of particle 0 would have in this plane: force, and density if there
-    /// is one variable.
+    /// Address that the accumulator of particle 0 would have in this plane: force, and density if there is one variable.
     forces: *mut f64,
-    /// Address of density sums as for `forces`, if there are several variables: `variables` numbers
-    /// each, padded to quads.
+    /// Address of density sums as for `forces`, if there are several variables: `variables` numbers each, padded to quads.
     densities: *mut f64,
     /// Number of densities of each particle: one for each density pass and species.
     pub variables: usize,

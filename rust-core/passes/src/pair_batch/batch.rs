@@ -15,8 +15,7 @@ pub struct Batch<'a> {
     pub begin: &'a [u32],
     /// The i-particle of each pair, counted from `first`; readable for one vector beyond the last pair.
     pub i_in_batch: &'a [u8],
-    /// The j-particle of each pair: its index shifted by [`OFFSET_BITS`]; readable for one vector
-    /// beyond the last pair.
+    /// The j-particle of each pair: its index shifted by [`OFFSET_BITS`]; readable for one vector beyond the last pair.
     pub j_offsets: &'a [u32],
 }
 
@@ -27,8 +26,8 @@ impl<'a> Batch<'a> {
     /// The pairs of the group have been found, and the group has those members.
     #[inline(always)]
     pub unsafe fn of_group(search: &'a SearchBuffers, slots: [usize; 2]) -> Option<Batch<'a>> {
-        // SAFETY: the search has written an entry of `begin` for each member and one more; its entries
-        // are indices of pairs.
+        // SAFETY: the search has written an entry of `begin` for each member and one more;
+        // its entries are indices of pairs.
         unsafe {
             let begin = search.begin.get_unchecked(slots[0]..slots[1] + 1);
             let members = slots[1] - slots[0];

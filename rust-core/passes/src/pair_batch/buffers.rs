@@ -10,8 +10,7 @@ use crate::simd::Scalar;
 #[repr(C, align(64))]
 pub struct CacheLines<T>([[T; 4]; 16]);
 
-/// Arrays over the pairs of one batch. All begin with its first pair, and have room for whole vectors
-/// beyond the last one.
+/// Arrays over the pairs of one batch. All begin with its first pair, and have room for whole vectors beyond the last one.
 #[derive(Debug)]
 pub struct BatchBuffers<T> {
     pub i_particles: IParticles<T>,

@@ -19,12 +19,10 @@ use psidpd_model::kernel::Real;
 /// Evaluates a batch in short loops over vectors of pairs: in one long loop the processor would work on
 /// one vector at a time, and wait for each of its results.
 ///
-/// Writes quads of forces and weights to the buffers, and appends to `in_range` the pairs that the
-/// second pass needs.
+/// Writes quads of forces and weights to the buffers, and appends to `in_range` the pairs that the second pass needs.
 ///
 /// # Safety
-/// The caller fulfils the contract of `simd`. The buffers have room for the batch, and contain its
-/// i-particles.
+/// The caller fulfils the contract of `simd`. The buffers have room for the batch, and contain its i-particles.
 #[inline(always)]
 pub unsafe fn evaluate<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool>(
     inputs: &PairInputs<A::Scalar, A::PackedParticle>,
@@ -34,8 +32,7 @@ pub unsafe fn evaluate<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const
     batch: Batch,
     tally: &mut Tally,
 ) {
-    // SAFETY: every step reads and writes arrays of this batch, which `BatchBuffers::reserve` has
-    // padded to vectors.
+    // SAFETY: every step reads and writes arrays of this batch, which `BatchBuffers::reserve` has padded to vectors.
     unsafe {
         measure_pairs::<I, A, MULTISPECIES>(inputs, constants, buffers, batch);
         let mut sums = PairSums::<A::Reals>::zero();

@@ -17,13 +17,12 @@ use std::mem::MaybeUninit;
 /// The pairs of a plane, field by field. The pairs of each batch begin with a whole vector of every field.
 #[derive(Debug, Default)]
 pub struct FullPairCache<T> {
-    /// `r_i − r_j` ([`SEPARATION`]); the force that needs no density, over `r` ([`FORCE`]); `−w′(r)/r` of each density
-    /// ([`WEIGHT_GRADIENT`]); last the pair weight, if virials are wanted.
+    /// Separation `r_i − r_j` ([`SEPARATION`]); force without density terms, over `r` ([`FORCE`]); `−w′(r)/r` of each
+    /// density ([`WEIGHT_GRADIENT`]); last the pair weight, if virials are wanted.
     pub fields: Vec<Vec<CacheVector<T>>>,
     /// Index of the j-particle, shifted by `OFFSET_BITS`.
     pub j_offsets: Vec<CacheVector<u32>>,
-    /// The i-particle, counted in its batch; above [`I_CODE_BITS`] the pair of species, if there are
-    /// several.
+    /// The i-particle, counted in its batch; above [`I_CODE_BITS`] the pair of species, if there are several.
     pub codes: Vec<CacheVector<u32>>,
     pub batches: Vec<CachedBatch>,
     /// Number of vectors in each field.
@@ -64,8 +63,7 @@ pub struct CachedBatch {
 /// The field has room for it.
 #[inline(always)]
 unsafe fn at<T>(field: &mut Vec<CacheVector<T>>, end: usize) -> *mut T {
-    // SAFETY: the caller promises room; `reserve` makes room for whole vectors of the next batch in
-    // every field.
+    // SAFETY: the caller promises room; `reserve` makes room for whole vectors of the next batch in every field.
     unsafe { field.as_mut_ptr().add(end).cast() }
 }
 
@@ -98,8 +96,7 @@ impl<T: Scalar> FullPairCache<T> {
     #[cold]
     #[inline(never)]
     fn grow(&mut self, more: usize) {
-        // SAFETY: `end` is within the capacity of every field (`reserve`); elements of `MaybeUninit`
-        // may stay unwritten.
+        // SAFETY: `end` is within the capacity of every field (`reserve`); elements of `MaybeUninit` may stay unwritten.
         unsafe {
             for field in &mut self.fields {
                 field.set_len(self.end);
@@ -123,8 +120,7 @@ impl<T: Scalar> FullPairCache<T> {
         unsafe { at(self.fields.get_unchecked_mut(field), self.end) }
     }
 
-    /// Counts the pairs of a batch that were written beyond the last pair, and one unspecified vector
-    /// after them.
+    /// Counts the pairs of a batch that were written beyond the last pair, and one unspecified vector after them.
     #[inline(always)]
     fn add(&mut self, batch: Batch) {
         let mut begin = [0; 17];

@@ -1,5 +1,4 @@
-//! The pairs within the range of each density: the first pass lists them, the second computes their
-//! many-body forces.
+//! The pairs within the range of each density: the first pass lists them, the second computes their many-body forces.
 
 use super::batch::Batch;
 use super::buffers::BatchBuffers;
@@ -11,8 +10,7 @@ use crate::ground::terms::Pass;
 use crate::simd::{Isa, OFFSET_BITS, Reals, Scalar, Words};
 use psidpd_model::kernel::{Shape, ShapeVisitor};
 
-/// The output of the first pass of a plane for the second: a compact list for each density, or the full
-/// pair cache.
+/// The output of the first pass of a plane for the second: a compact list for each density, or the full pair cache.
 #[derive(Debug, Default)]
 pub struct InRangePairs<T> {
     /// For each density and pair a quad: `−w′ ê`, and a code of both particles.
@@ -122,8 +120,7 @@ impl<T: Scalar> InRangePairs<T> {
     }
 }
 
-/// Writes the pairs of a batch within the range of each density after the last pair; `buffers.found`
-/// counts them.
+/// Writes the pairs of a batch within the range of each density after the last pair; `buffers.found` counts them.
 ///
 /// # Safety
 /// The caller fulfils the contract of `simd`. The buffers contain the distances of the batch;

@@ -8,8 +8,7 @@ use crate::ground::terms::Pass;
 use crate::simd::{Isa, Reals, Scalar};
 use psidpd_model::kernel::{Shape, ShapeVisitor};
 
-/// Computes `−w(r)` of all pairs for each density; the scatter loops subtract these from both
-/// particles.
+/// Computes `−w(r)` of all pairs for each density; the scatter loops subtract these from both particles.
 ///
 /// # Safety
 /// The caller fulfils the contract of `simd`. The buffers contain the distances of the batch.

@@ -68,8 +68,7 @@ pub unsafe fn sum_lanes<R: Reals>(x: R) -> f64 {
 /// forces over `r` to `conservative` instead.
 ///
 /// # Safety
-/// The caller fulfils the contract of `simd`. The buffers contain distances, noise and weights of the
-/// batch.
+/// The caller fulfils the contract of `simd`. The buffers contain distances, noise and weights of the batch.
 #[inline(always)]
 pub unsafe fn forces<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool>(
     inputs: &PairInputs<A::Scalar, A::PackedParticle>,
@@ -299,8 +298,7 @@ impl<R: Reals, const MULTISPECIES: bool, const TALLY: bool> ShapeVisitor
 
     #[inline(always)]
     fn visit<S: Shape>(self) {
-        // SAFETY: `add_linear` alone creates this visitor, and its caller fulfils the contract of
-        // `each`.
+        // SAFETY: `add_linear` alone creates this visitor, and its caller fulfils the contract of `each`.
         unsafe {
             let term = LinearTerm::<R, S> {
                 species_pair: self.term.kernel,

@@ -19,8 +19,7 @@ pub unsafe fn scalar_fallback<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool
     batch: Batch,
     tally: &mut Tally,
 ) {
-    // SAFETY: a vector is an array of its lanes, and `BatchBuffers` has a vector for every pair of the
-    // batch.
+    // SAFETY: a vector is an array of its lanes, and `BatchBuffers` has a vector for every pair of the batch.
     unsafe {
         let pairs = buffers.pairs.as_ptr().cast::<PairVector<A::Reals>>();
         for k in 0..batch.count {
@@ -31,8 +30,7 @@ pub unsafe fn scalar_fallback<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool
     // With one species all entries stay zero.
     if MULTISPECIES && inputs.terms.species > 1 {
         for k in 0..batch.count {
-            // SAFETY: `SortedParticles::make_room` makes an entry for each particle if there are
-            // several species.
+            // SAFETY: `SortedParticles::make_room` makes an entry for each particle if there are several species.
             let [a, b] = batch.pair(k).map(|i| unsafe { *inputs.species.at(i) } as usize);
             buffers.fallback.species_pair[k] = (a * inputs.terms.species + b) as u32;
         }

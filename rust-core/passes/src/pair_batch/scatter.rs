@@ -12,11 +12,9 @@ use psidpd_model::kernel::Real;
 /// Pairs sorted by their i-particles.
 #[derive(Clone, Copy)]
 pub struct ScatterPairs {
-    /// The j-particle of each pair: its index shifted by `OFFSET_BITS`; the list has one more entry
-    /// after the last pair.
+    /// The j-particle of each pair: its index shifted by `OFFSET_BITS`; the list has one more entry after the last pair.
     pub j_offsets: *const u32,
-    /// Index of the first pair of each i-particle, and one past the last pair of the last one; the
-    /// first index may be any.
+    /// Index of the first pair of each i-particle, and one past the last pair of the last one; the first index may be any.
     pub begin: *const u32,
     /// First i-particle.
     pub first: usize,
@@ -34,8 +32,7 @@ impl From<Batch<'_>> for ScatterPairs {
 /// Adds the forces of a batch, and the weights if there is one density.
 ///
 /// # Safety
-/// The caller fulfils the contract of `simd`. The sums are those of the batch's plane, and the buffers
-/// contain its quads.
+/// The caller fulfils the contract of `simd`. The sums are those of the batch's plane, and the buffers contain its quads.
 #[inline(always)]
 pub unsafe fn scatter_forces<I: Isa, A: Arithmetic<I>>(
     sums: PlaneSums,
@@ -131,13 +128,12 @@ pub unsafe fn add_quad<Q: Quad>(p: *mut f64, x: Q) {
 struct WeightSource<T> {
     /// The negative weights of its density.
     weights: *const T,
-    /// Tables over pairs of species: 1 where the i-particle, or the j-particle, is of the variable's
-    /// species.
+    /// Tables over pairs of species: 1 where the i-particle, or the j-particle, is of the variable's species.
     is_species: [*const T; 2],
 }
 
-/// Adds weights where there are several variables: one for each density and species of the other
-/// particle, four in each quad.
+/// Adds weights where there are several variables: one for each density and species of the
+/// other particle, four in each quad.
 ///
 /// # Safety
 /// The caller fulfils the contract of [`scatter_forces`]; the buffers contain the weights of the batch.

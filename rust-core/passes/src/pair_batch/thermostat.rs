@@ -15,8 +15,7 @@ const _: () = assert!(PAIR_ROUNDS == 13);
 /// The words replace the first tags.
 ///
 /// # Safety
-/// The caller fulfils the contract of `simd`. Both arrays have room for two vectors after the last
-/// pair.
+/// The caller fulfils the contract of `simd`. Both arrays have room for two vectors after the last pair.
 #[inline(always)]
 pub unsafe fn draw<W: Words>(noise: PairNoise, a: *mut u32, b: *const u32, count: usize) {
     // SAFETY: `BatchBuffers::reserve` leaves room for two vectors after the tags of the last pair.

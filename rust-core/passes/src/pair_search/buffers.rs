@@ -20,8 +20,7 @@ pub struct SearchBuffers {
     pub j_cluster_count: usize,
     /// Candidate masks of i-particles five to eight, for each j-cluster.
     pub high_candidates: Vec<u64>,
-    /// For each block of slots the positions of its i-cluster, each repeated sixteen times, with one
-    /// entry for each mask.
+    /// For each block of slots the positions of its i-cluster, each repeated sixteen times, with one entry for each mask.
     pub i_positions: Vec<[BroadcastPair; 2]>,
     /// For each block of slots the masks of i-particles one to four, then of five to eight.
     pub masks: Vec<u64>,

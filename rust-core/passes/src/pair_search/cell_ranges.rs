@@ -1,5 +1,4 @@
-//! The cells in which an i-particle searches partners: those within the cutoff sphere, column by
-//! column.
+//! The cells in which an i-particle searches partners: those within the cutoff sphere, column by column.
 
 use super::clusters::SEARCH_GROUP;
 use crate::cells::sorted::SortedCells;
@@ -7,8 +6,7 @@ use crate::ground::box_geometry::BoxGeometry;
 use crate::simd::{Isa, Reals};
 use psidpd_model::kernel::Real;
 
-/// The five columns of the half stencil: the particle's own, the next of its plane, and three of the
-/// next plane.
+/// The five columns of the half stencil: the particle's own, the next of its plane, and three of the next plane.
 pub struct StencilColumns {
     /// The number of the particle's own column in its plane.
     number: usize,
@@ -16,8 +14,8 @@ pub struct StencilColumns {
     pub start: [*const u32; 5],
     /// 1 for columns that exist, 0 for those beyond an open side.
     present: [f32; 5],
-    /// Periodic shift of positions in the previous, the same and the next period along x: entry `w + 5
-    /// (period + 1)` for column `w`.
+    /// Periodic shift of positions in the previous, the same and the next period along x: entry `w
+    /// + 5 (period + 1)` for column `w`.
     pub shift: [[u32; 3]; 15],
     /// Whether a column lies across a period in the direction of `column_axis`.
     pub wraps: bool,
@@ -160,8 +158,7 @@ impl PlaneSearch {
         }
     }
 
-    /// Finds the cell ranges of `count` i-particles, beginning with `first`, in i-clusters of
-    /// `CLUSTER`.
+    /// Finds the cell ranges of `count` i-particles, beginning with `first`, in i-clusters of `CLUSTER`.
     ///
     /// # Safety
     /// The caller fulfils the contract of `simd`. The particles are of one column of this plane, at
@@ -174,8 +171,7 @@ impl PlaneSearch {
         [first, count]: [usize; 2],
         out: &mut CellRanges,
     ) -> RangeFlags {
-        // SAFETY: the caller promises the particles; vectors that reach beyond the last one are loaded
-        // from `lanes`.
+        // SAFETY: the caller promises the particles; vectors that reach beyond the last one are loaded from `lanes`.
         unsafe {
             let mut flags = RangeFlags::default();
             let mut at = 0;
@@ -199,12 +195,10 @@ impl PlaneSearch {
         }
     }
 
-    /// Finds the cell ranges of a vector of i-particles at `x`, `y`, `z`, which begins at member `at`
-    /// of the group.
+    /// Finds the cell ranges of a vector of i-particles at `x`, `y`, `z`, which begins at member `at` of the group.
     ///
     /// # Safety
-    /// The caller fulfils the contract of `simd`. `at` is a multiple of the number of lanes, below
-    /// [`SEARCH_GROUP`].
+    /// The caller fulfils the contract of `simd`. `at` is a multiple of the number of lanes, below [`SEARCH_GROUP`].
     #[inline(always)]
     unsafe fn ranges_of_vector<I: Isa, const CLUSTER: usize>(
         &self,
@@ -215,8 +209,7 @@ impl PlaneSearch {
         out: &mut CellRanges,
         flags: &mut RangeFlags,
     ) {
-        // SAFETY: the number of lanes divides `SEARCH_GROUP`, so that a vector at `at` is inside the
-        // arrays of `out`.
+        // SAFETY: the number of lanes divides `SEARCH_GROUP`, so that a vector at `at` is inside the arrays of `out`.
         unsafe {
             let zero = I::F32::constant(0.0);
             let longest = I::F32::splat(self.half_range);

@@ -11,12 +11,12 @@ use super::leave_out::leave_out;
 use crate::cells::sorted::SortedCells;
 use crate::simd::{BroadcastPair, Isa, OFFSET_BITS};
 
-/// Lists the pairs of a search group, those of one i-particle after those of another; batches have `batch_size`
-/// Lists the pairs of a search group, one i-particle after the other; a batch has `batch_size`
-/// i-particles, a power of two.
+/// Lists the pairs of a search group, those of one i-particle after those of another; batches have
+/// `batch_size` Lists the pairs of a search group, one i-particle after the other; a batch has
+/// `batch_size` i-particles, a power of two.
 /// # Safety
-/// The caller fulfils the contract of `simd`. The buffers contain the clusters of the group, formed
-/// with the same `CLUSTER`.
+/// The caller fulfils the contract of `simd`. The buffers contain the clusters of the group,
+/// formed with the same `CLUSTER`.
 #[inline(always)]
 pub unsafe fn filter_by_distance<I: Isa, const SHIFTS: bool, const CLUSTER: usize>(
     cells: &SortedCells,
@@ -36,8 +36,7 @@ pub unsafe fn filter_by_distance<I: Isa, const SHIFTS: bool, const CLUSTER: usiz
         let (masks, j_bases) = (buffers.masks.as_mut_ptr(), buffers.j_bases.as_mut_ptr());
         let masks_each = const { CLUSTER / I_PER_MASK };
         let i_clusters = buffers.i_cluster_count;
-        // Positions of the i-particles are repeated for sixteen candidates; slots without a j-cluster
-        // get empty masks.
+        // Positions of the i-particles are repeated for sixteen candidates; slots without a j-cluster get empty masks.
         let mut t = 0;
         while t < i_clusters {
             let cluster = buffers.i_clusters.get_unchecked(t);
@@ -63,8 +62,7 @@ pub unsafe fn filter_by_distance<I: Isa, const SHIFTS: bool, const CLUSTER: usiz
             }
             t += 1;
         }
-        // One loop computes all masks, another lists the pairs: in one loop the two would wait for each
-        // other.
+        // One loop computes all masks, another lists the pairs: in one loop the two would wait for each other.
         let limit = cells.fixed16_scale.limit;
         let (j_clusters, high) = (buffers.j_clusters.as_ptr(), buffers.high_candidates.as_ptr());
         let mut c = 0;

@@ -1,5 +1,4 @@
-//! Divides the cell ranges of i-clusters into j-clusters of sixteen candidates, with a bit for each
-//! possible pair.
+//! Divides the cell ranges of i-clusters into j-clusters of sixteen candidates, with a bit for each possible pair.
 
 use super::buffers::SearchBuffers;
 use super::cell_ranges::{CellIndices, CellRanges, SearchGroup};
@@ -10,8 +9,7 @@ use crate::simd::{Isa, Reals};
 /// Forms the i-clusters and j-clusters of a search group. Up to `CLUSTER` consecutive particles form an i-cluster.
 ///
 /// # Safety
-/// The caller fulfils the contract of `simd`. `ranges` are those of the group, found with the same
-/// `CLUSTER`.
+/// The caller fulfils the contract of `simd`. `ranges` are those of the group, found with the same `CLUSTER`.
 #[inline(always)]
 pub unsafe fn form_j_clusters<I: Isa, const GHOSTS: bool, const CLUSTER: usize>(
     cells: &SortedCells,
@@ -163,8 +161,8 @@ const fn members() -> [[u64; MASKS_PER_CLUSTER]; MASKS_PER_CLUSTER * I_PER_MASK 
     table
 }
 
-/// Candidate bits of the first `n` of thirty-two particles, for each of four members: in the first
-/// j-cluster, and in the second.
+/// Candidate bits of the first `n` of thirty-two particles, for each of four members: in the
+/// first j-cluster, and in the second.
 static FIRST_BITS: [[u64; 2]; 33] = first_bits();
 
 const ONE_SLOT: u32 = 1 << 8;
@@ -172,8 +170,7 @@ const ONE_SLOT: u32 = 1 << 8;
 /// The lowest bit of each member.
 const EACH: u64 = 0x0001_0001_0001_0001;
 
-/// In the j-cluster that begins after the first member, the bits of particles after each member: every
-/// pair is found once.
+/// In the j-cluster that begins after the first member, the bits of particles after each member: every pair is found once.
 const LATER: [u64; MASKS_PER_CLUSTER] = [0xfff8_fffc_fffe_ffff, 0xff80_ffc0_ffe0_fff0];
 
 const fn first_bits() -> [[u64; 2]; 33] {
@@ -187,9 +184,8 @@ const fn first_bits() -> [[u64; 2]; 33] {
     table
 }
 
-/// Appends the j-clusters of the particles `first..end`, and at least one in the own column; returns
-/// the new number of j-clusters. `shift` is the index of the periodic shift, which modulo 5 is the
-/// stencil column.
+/// Appends the j-clusters of the particles `first..end`, and at least one in the own column; returns the new
+/// number of j-clusters. `shift` is the index of the periodic shift, which modulo 5 is the stencil column.
 ///
 /// # Safety
 /// Particles up to `end + 16` are inside the padding of `SortedParticles::make_room`.
@@ -246,8 +242,7 @@ fn and(a: [u64; MASKS_PER_CLUSTER], b: [u64; MASKS_PER_CLUSTER]) -> [u64; MASKS_
     std::array::from_fn(|f| a[f] & b[f])
 }
 
-/// Candidate bits of pairs with at least one owned particle; `owned` has a bit for each of the sixteen
-/// candidates.
+/// Candidate bits of pairs with at least one owned particle; `owned` has a bit for each of the sixteen candidates.
 #[inline(always)]
 fn not_both_ghosts(ghosts: [u64; MASKS_PER_CLUSTER], owned: u32) -> [u64; MASKS_PER_CLUSTER] {
     let owned = EACH * u64::from(owned);

@@ -3,12 +3,10 @@
 use crate::cells::excluded::Excluded;
 use crate::simd::{Isa, OFFSET_BITS, Reals, Words};
 
-/// Removes the excluded pairs of particle `i` from `offsets[from..to]`, and returns the new end of the
-/// list.
+/// Removes the excluded pairs of particle `i` from `offsets[from..to]`, and returns the new end of the list.
 ///
 /// # Safety
-/// The caller fulfils the contract of `simd`. A vector at each pair may be read and written; `i` and
-/// the j-particles exist.
+/// The caller fulfils the contract of `simd`. A vector at each pair may be read and written; `i` and the j-particles exist.
 #[inline(always)]
 pub unsafe fn leave_out<I: Isa>(
     excluded: &Excluded,
@@ -17,9 +15,8 @@ pub unsafe fn leave_out<I: Isa>(
     [from, to]: [usize; 2],
 ) -> usize {
     type W<I> = <<I as Isa>::F32 as Reals>::Words;
-    // SAFETY: each vector is written at or before the address that it was read from; sides and
-    // molecules have entries for all particles and copies, and the look-up clamps padding lanes to the
-    // last entry.
+    // SAFETY: each vector is written at or before the address that it was read from; sides and molecules have
+    // entries for all particles and copies, and the look-up clamps padding lanes to the last entry.
     unsafe {
         let partners = excluded.partners_of(i);
         // A particle without a side or a molecule is excluded from no pair.

@@ -1,5 +1,4 @@
-//! Lists the pairs of a plane within the range of the thermostat, for integrators that apply it apart
-//! from the forces.
+//! Lists the pairs of a plane within the range of the thermostat, for integrators that apply it apart from the forces.
 
 use super::traversal::{BatchVisitor, each_batch};
 use crate::cells::sorted::SortedCells;
@@ -21,8 +20,7 @@ use psidpd_threads::SharedSlice;
 pub struct Pair {
     /// Vector `ê √(½ Δt γ) w_R` from the second particle to the first.
     pub g: [f32; 3],
-    /// Index of the second particle, counted from the first particle of the first particle's plane,
-    /// through the next plane.
+    /// Index of the second particle, counted from the first particle of the first particle's plane, through the next plane.
     pub j: u32,
 }
 
@@ -162,8 +160,7 @@ struct Lister<'a, I: Isa, const MULTISPECIES: bool> {
 }
 
 impl<I: Isa, const MULTISPECIES: bool> Lister<'_, I, MULTISPECIES> {
-    /// Gives no pairs to the particles before `place` that were not visited: they are in columns of
-    /// ghosts.
+    /// Gives no pairs to the particles before `place` that were not visited: they are in columns of ghosts.
     #[inline(always)]
     fn begin_at(&mut self, place: usize) {
         let PairList { start, pairs, .. } = &mut *self.list;

@@ -75,8 +75,7 @@ impl Entry for ExactPair {
 
     #[inline(always)]
     unsafe fn g<I: Isa>(&self) -> I::Quad {
-        // SAFETY: `j` follows the three numbers of `g`, and the size of the structure is that of four
-        // numbers.
+        // SAFETY: `j` follows the three numbers of `g`, and the size of the structure is that of four numbers.
         unsafe { I::Quad::load_three((&raw const *self).cast()) }
     }
 }

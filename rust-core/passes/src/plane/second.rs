@@ -1,5 +1,5 @@
-//! The second pass over a plane: the many-body forces `−(∂ψ_i/∂n + ∂ψ_j/∂n) w′ ê` of the pairs that the
-//! first pass has listed.
+//! The second pass over a plane: the many-body forces `−(∂ψ_i/∂n + ∂ψ_j/∂n) w′ ê` of the pairs
+//! that the first pass has listed.
 
 use super::data::PassData;
 use super::second_cached::second_pass_cached;
@@ -9,8 +9,7 @@ use crate::pair_batch::in_range_pairs::{I_CODE_BITS, InRangePairs};
 use crate::pair_batch::scatter::add_quad;
 use crate::simd::{Isa, OFFSET_BITS, Quad, Scalar};
 
-/// Number of accumulators of each i-particle that are used in turn: four hide the latency of the
-/// addition.
+/// Number of accumulators of each i-particle that are used in turn: four hide the latency of the addition.
 const TURNS: usize = 4;
 
 /// Sums over the pairs of up to sixteen i-particles. All are zero between batches.
@@ -61,9 +60,8 @@ pub unsafe fn second_pass<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, co
     in_range: &InRangePairs<A::Scalar>,
     virial: &mut [f64; 6],
 ) {
-    // SAFETY: the first pass has listed `found` pairs of each density for each batch; codes name
-    // particles of the plane and of the next one, which have accumulators, slopes and species; the
-    // caller promises the rest.
+    // SAFETY: the first pass has listed `found` pairs of each density for each batch; codes name particles of the
+    // plane and of the next one, which have accumulators, slopes and species; the caller promises the rest.
     unsafe {
         if MULTISPECIES && data.inputs.caches_all_pairs() {
             return second_pass_cached::<I, A, MULTISPECIES, TALLY>(data, sums, &in_range.full_cache, virial);

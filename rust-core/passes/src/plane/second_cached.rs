@@ -26,8 +26,7 @@ pub unsafe fn second_pass_cached<I: Isa, A: Arithmetic<I>, const MULTISPECIES: b
     virial: &mut [f64; 6],
 ) {
     // SAFETY: scratch arrays have room for whole vectors of the largest batch, and a quad more;
-    // `append_to_cache` stored the pairs in this evaluation, and the scheduler has waited for the
-    // slopes.
+    // `append_to_cache` stored the pairs in this evaluation, and the scheduler has waited for the slopes.
     unsafe {
         let to = sums.forces();
         let room = cache.most / 16 + 2;
@@ -81,8 +80,7 @@ impl<T> CachedPairs<'_, T> {
     /// The cache has this field.
     #[inline(always)]
     unsafe fn field(&self, field: usize) -> *const T {
-        // SAFETY: every field contains the vectors of a batch; the caller promises that the field
-        // exists.
+        // SAFETY: every field contains the vectors of a batch; the caller promises that the field exists.
         unsafe { self.cache.fields.get_unchecked(field).as_ptr().add(self.batch.vector).cast() }
     }
 
@@ -117,8 +115,7 @@ struct ISlopes<T>([[T; 16]; SLOPES_PER_BLOCK]);
 /// = 4` there are at most two species.
 ///
 /// # Safety
-/// The caller fulfils the contract of [`second_pass_cached`]; `factors` has room for the vectors of the
-/// batch.
+/// The caller fulfils the contract of [`second_pass_cached`]; `factors` has room for the vectors of the batch.
 #[inline(always)]
 unsafe fn find_factors<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const N: usize>(
     data: &PassData<A::Scalar, A::PackedParticle>,
@@ -162,8 +159,7 @@ unsafe fn find_factors<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const
             };
             let mut factor = if first == 0 { zero } else { A::Reals::load(factors.add(k)) };
             if MULTISPECIES && N == 4 {
-                // The sum over the densities of each species is computed first, and then selected by
-                // species.
+                // The sum over the densities of each species is computed first, and then selected by species.
                 let (mut from_i, mut from_j) = ([zero; 2], [zero; 2]);
                 let mut c = 0;
                 while c < N {
@@ -210,8 +206,7 @@ unsafe fn find_factors<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const
 /// Writes quads of whole forces, and adds the virial of the many-body part.
 ///
 /// # Safety
-/// The caller fulfils the contract of `simd`; `factors` and `quads` have room for the vectors of the
-/// batch.
+/// The caller fulfils the contract of `simd`; `factors` and `quads` have room for the vectors of the batch.
 #[inline(always)]
 unsafe fn whole_forces<R: Reals, const TALLY: bool>(
     pairs: &CachedPairs<R::Scalar>,

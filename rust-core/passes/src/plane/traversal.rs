@@ -16,9 +16,8 @@ pub trait BatchVisitor<I: Isa> {
     unsafe fn visit(&mut self, search: &SearchBuffers, slots: [usize; 2]);
 }
 
-/// Finds the pairs of the particles of `plane` with each other and with the next plane, and calls
-/// `visitor` for successive sets of `lanes` i-particles, in the order of cells; returns the number of
-/// search groups.
+/// Finds the pairs of the particles of `plane` with each other and with the next plane, and calls `visitor`
+/// for successive sets of `lanes` i-particles, in the order of cells; returns the number of search groups.
 ///
 /// # Safety
 /// The caller fulfils the contract of `simd`. Particles of the plane, of the next one and the padding

@@ -480,8 +480,7 @@ impl Isa for Avx2 {
     #[inline(always)]
     unsafe fn transpose_masks(masks: *mut u64) {
         unsafe {
-            // The words are interleaved in halves, words 0 of both masks, words 1, …; then the halves
-            // are joined.
+            // The words are interleaved in halves, words 0 of both masks, words 1, …; then the halves are joined.
             let words = _mm256_setr_epi8(
                 0, 1, 8, 9, 2, 3, 10, 11, 4, 5, 12, 13, 6, 7, 14, 15, 0, 1, 8, 9, 2, 3, 10, 11, 4, 5, 12, 13,
                 6, 7, 14, 15,

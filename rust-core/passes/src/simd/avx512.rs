@@ -239,8 +239,8 @@ impl Reals for F64x8 {
             let ab_high = _mm512_unpackhi_pd(a.0, b.0);
             let cd_low = _mm512_unpacklo_pd(c.0, d.0);
             let cd_high = _mm512_unpackhi_pd(c.0, d.0);
-            // The quarters of the low vectors contain lanes 0,2,4,6 of the columns, those of the high
-            // vectors lanes 1,3,5,7.
+            // The quarters of the low vectors contain lanes 0,2,4,6 of the columns, those of
+            // the high vectors lanes 1,3,5,7.
             let first = _mm512_setr_epi64(0, 1, 8, 9, 2, 3, 10, 11);
             let second = _mm512_setr_epi64(4, 5, 12, 13, 6, 7, 14, 15);
             let even01 = _mm512_permutex2var_pd(ab_low, first, cd_low);
@@ -369,8 +369,7 @@ const fn turned() -> [u16; 32] {
     from
 }
 
-/// For each bit of a mask of sixty-four: four times its number within its sixteen, plus the number of
-/// the sixteen.
+/// For each bit of a mask of sixty-four: four times its number within its sixteen, plus the number of the sixteen.
 static PLACES: Line<[u8; 64]> = Line(bit_places());
 
 const fn bit_places() -> [u8; 64] {
@@ -398,8 +397,7 @@ unsafe fn places(j_bases: __m512, bits: __m128i, p: *mut u32) {
         let base = _mm512_castps_si512(_mm512_permutevar_ps(j_bases, code));
         let place = _mm512_slli_epi32::<3>(_mm512_and_si512(code, _mm512_set1_epi32(0x3c)));
         let sum = _mm512_add_epi32(base, place);
-        // The vector is stored in halves: a whole store across cache lines takes more than twice as
-        // long.
+        // The vector is stored in halves: a whole store across cache lines takes more than twice as long.
         _mm256_storeu_si256(p.cast(), _mm512_castsi512_si256(sum));
         _mm256_storeu_si256(p.add(8).cast(), _mm512_extracti64x4_epi64::<1>(sum));
     }
@@ -546,8 +544,8 @@ impl<const VBMI2: bool> Isa for Avx512<VBMI2> {
             let (mut v, mut w) = ([_mm512_setzero_si512(); 4], [_mm512_setzero_si512(); 4]);
             let mut k = 0;
             while k < 4 {
-                // Masked broadcasts from memory write a quarter each: they are loads, while insertions
-                // need the shuffle port.
+                // Masked broadcasts from memory write a quarter each: they are loads, while
+                // insertions need the shuffle port.
                 let [low, high] = row(base, offsets, k);
                 let (low, high) = (_mm512_castsi128_si512(low), _mm512_castsi128_si512(high));
                 let [a, b] = row(base, offsets, k + 4);

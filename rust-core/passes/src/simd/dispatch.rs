@@ -9,12 +9,10 @@ use crate::settings::Instructions;
 /// A piece of work that is written once for all instruction sets.
 pub trait Kernel {
     type Out;
-    /// Whether the kernel is also compiled with VBMI2, which compresses bytes; other kernels are
-    /// compiled once for AVX-512.
+    /// Whether the kernel is also compiled with VBMI2, which compresses bytes; other kernels are compiled once for AVX-512.
     const VBMI2: bool = false;
 
-    /// Does the work. Implementations must be inlined: other functions are compiled for the compiler's
-    /// target.
+    /// Does the work. Implementations must be inlined: other functions are compiled for the compiler's target.
     ///
     /// # Safety
     /// The processor has the instruction set, and the caller fulfils the contract of the kernel.
@@ -40,8 +38,7 @@ pub unsafe fn run<K: Kernel>(set: InstructionSet, kernel: K) -> K::Out {
         // fulfils the kernel's contract.
         #[cfg(target_arch = "x86_64")]
         Instructions::Avx2 => unsafe { avx2(kernel) },
-        // SAFETY: every processor has the target's instructions; the caller fulfils the kernel's
-        // contract.
+        // SAFETY: every processor has the target's instructions; the caller fulfils the kernel's contract.
         _ => unsafe { portable(kernel) },
     }
 }
@@ -56,8 +53,7 @@ unsafe fn portable<K: Kernel>(kernel: K) -> K::Out {
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
 #[inline(never)]
 unsafe fn avx2<K: Kernel>(kernel: K) -> K::Out {
-    // SAFETY: `run` calls this only on processors with these features; its caller fulfils the kernel's
-    // contract.
+    // SAFETY: `run` calls this only on processors with these features; its caller fulfils the kernel's contract.
     unsafe { kernel.run::<super::avx2::Avx2>() }
 }
 
@@ -65,8 +61,7 @@ unsafe fn avx2<K: Kernel>(kernel: K) -> K::Out {
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
 #[inline(never)]
 unsafe fn avx512<K: Kernel>(kernel: K) -> K::Out {
-    // SAFETY: `run` calls this only on processors with these features; its caller fulfils the kernel's
-    // contract.
+    // SAFETY: `run` calls this only on processors with these features; its caller fulfils the kernel's contract.
     unsafe { kernel.run::<super::avx512::Avx512<false>>() }
 }
 
@@ -74,7 +69,6 @@ unsafe fn avx512<K: Kernel>(kernel: K) -> K::Out {
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx512vbmi2,avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
 #[inline(never)]
 unsafe fn avx512_vbmi2<K: Kernel>(kernel: K) -> K::Out {
-    // SAFETY: `run` calls this only on processors with these features; its caller fulfils the kernel's
-    // contract.
+    // SAFETY: `run` calls this only on processors with these features; its caller fulfils the kernel's contract.
     unsafe { kernel.run::<super::avx512::Avx512<true>>() }
 }

@@ -107,19 +107,18 @@ pub trait Reals: Real {
     unsafe fn mask_below(self, other: Self) -> u32;
     /// Moves the lanes of `mask` to the first lanes; the others are unspecified.
     unsafe fn compress(self, mask: u32) -> Self;
-    /// `table[which[k]]` in lane `k`, for a table with as many numbers as there are lanes. Higher bits
-    /// of `which` are ignored.
+    /// `table[which[k]]` in lane `k`, for a table with as many numbers as there are lanes.
+    /// Higher bits of `which` are ignored.
     unsafe fn pick(table: *const Self::Scalar, which: Self::Words) -> Self;
     /// Loads `table[index[k]]` into lane `k`.
     unsafe fn lookup(table: *const Self::Scalar, index: Self::Words) -> Self;
     /// Writes four columns as rows of four.
     unsafe fn store_transposed(columns: [Self; 4], p: *mut Self::Scalar);
-    /// Writes the rows whose bits are set in `mask` one after the other; may overwrite the room of all
-    /// four rows.
+    /// Writes the rows whose bits are set in `mask` one after the other; may overwrite the room of all four rows.
     #[inline(always)]
     unsafe fn store_rows(columns: [Self; 4], mask: u32, p: *mut Self::Scalar) {
-        // Each row is written by itself: a closure over the columns would not be inlined and compiled
-        // for the instruction set.
+        // Each row is written by itself: a closure over the columns would not be inlined and
+        // compiled for the instruction set.
         let [a, b, c, d] = columns;
         unsafe {
             let columns = [a.compress(mask), b.compress(mask), c.compress(mask), d.compress(mask)];
@@ -162,8 +161,7 @@ pub struct BroadcastPair(pub [[u16; 32]; 3]);
 
 /// The address of row `k` of those at `offsets`.
 ///
-/// The read is volatile: otherwise the compiler loads offsets as vectors, and extracts their lanes one
-/// by one.
+/// The read is volatile: otherwise the compiler loads offsets as vectors, and extracts their lanes one by one.
 #[inline(always)]
 unsafe fn record_at(base: *const u8, offsets: *const u32, k: usize) -> *const u8 {
     unsafe { base.add(offsets.add(k).read_volatile() as usize) }
@@ -211,28 +209,24 @@ pub trait Isa: Copy + Send + Sync + 'static {
     ) -> u64;
     /// Writes one word sixteen times.
     unsafe fn broadcast16(x: u16, p: *mut u16);
-    /// Transposes eight masks, in each of which four particles have sixteen bits: first the bits of the
-    /// first particle in the first four masks, then those of the second …, then the same of the other
-    /// four masks.
+    /// Transposes eight masks, in each of which four particles have sixteen bits: first the bits of the first
+    /// particle in the first four masks, then those of the second …, then the same of the other four masks.
     unsafe fn transpose_masks(masks: *mut u64);
-    /// Writes `j_bases[k / 16] + 32 (k % 16)` for each set bit `k`, and returns their number; may write
-    /// sixteen elements more.
+    /// Writes `j_bases[k / 16] + 32 (k % 16)` for each set bit `k`, and returns their number;
+    /// may write sixteen elements more.
     unsafe fn expand_mask(j_bases: *const u32, mask: u64, p: *mut u32) -> usize;
     /// An upper bound of √x, at most 1/1000 too large; zero for negative numbers.
     unsafe fn root_or_more(x: Self::F32) -> Self::F32;
-    /// The first, the least, and the greatest of each `CLUSTER` lanes, four or eight, copied to all of
-    /// them.
+    /// The first, the least, and the greatest of each `CLUSTER` lanes, four or eight, copied to all of them.
     unsafe fn cluster_first<const CLUSTER: usize>(x: Self::F32) -> Self::F32;
     unsafe fn cluster_least<const CLUSTER: usize>(x: Self::F32) -> Self::F32;
     unsafe fn cluster_greatest<const CLUSTER: usize>(x: Self::F32) -> Self::F32;
-    /// The columns of rows of eight words, `offsets` bytes after `base`; without `ALL` only the first
-    /// four.
+    /// The columns of rows of eight words, `offsets` bytes after `base`; without `ALL` only the first four.
     unsafe fn load_transposed<const ALL: bool>(
         base: *const u8,
         offsets: *const u32,
     ) -> [<Self::F32 as Reals>::Words; 8];
-    /// The columns of rows of eight numbers, twice `offsets` bytes after `base`; without `ALL` only the
-    /// first four.
+    /// The columns of rows of eight numbers, twice `offsets` bytes after `base`; without `ALL` only the first four.
     unsafe fn load_transposed_wide<const ALL: bool>(base: *const u8, offsets: *const u32) -> [Self::F64; 8];
     /// Reinterprets bits as numbers.
     unsafe fn of_bits(words: <Self::F32 as Reals>::Words) -> Self::F32;

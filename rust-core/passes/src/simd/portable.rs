@@ -171,8 +171,7 @@ macro_rules! lanes {
             unsafe fn store_rows(columns: [Self; 4], mask: u32, p: *mut $scalar) {
                 let mut place = 0;
                 for k in 0..LANES {
-                    // A row is loaded at once: as a vector it does not pass through memory number by
-                    // number.
+                    // A row is loaded at once: as a vector it does not pass through memory number by number.
                     unsafe {
                         p.add(4 * place).cast::<[$scalar; 4]>().write(columns.map(|column| column.0[k]))
                     };
@@ -341,8 +340,7 @@ impl Quad for Four {
     }
 }
 
-/// Compares distances of sixteen particles to a point; a bit is set where the square is below the
-/// limit.
+/// Compares distances of sixteen particles to a point; a bit is set where the square is below the limit.
 #[inline(always)]
 fn below(there: &[[u16; 16]; 3], two: &BroadcastPair, which: usize, limit: i16) -> u32 {
     /// An array aligned for reads of eight bytes.

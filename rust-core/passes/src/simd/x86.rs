@@ -57,8 +57,7 @@ impl Quad for Quad4 {
     }
 }
 
-/// Defines operators by intrinsics. They are safe functions because operators are; the module above
-/// states the contract.
+/// Defines operators by intrinsics. They are safe functions because operators are; the module above states the contract.
 macro_rules! operators {
     ($vector:ident, $constant:ident as $scalar:ty, $add:ident, $sub:ident, $mul:ident, $max:ident) => {
         impl Add for $vector {

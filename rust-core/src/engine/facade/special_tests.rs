@@ -156,8 +156,7 @@ fn special_pairs_that_make_no_sense_are_refused() {
     assert!(engine.forces(&cloud.domain, &cloud.request(Want::FORCES), &mut force, false).is_ok());
 }
 
-/// Marks of types that exclude each other, of molecules without internal pairs, and of molecules that
-/// exclude each other.
+/// Marks of types that exclude each other, of molecules without internal pairs, and of molecules that exclude each other.
 #[test]
 fn marked_particles_act_as_those_of_a_list_without_their_pairs() {
     let want = Want { densities: true, ..Want::TOTALS };

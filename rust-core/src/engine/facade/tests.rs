@@ -188,8 +188,7 @@ fn energies_and_virials_of_particles_add_up() {
     }
 }
 
-/// Tests ghosts with and without images along closed directions, in boxes that do and do not fit a
-/// sweep, and listed pairs.
+/// Tests ghosts with and without images along closed directions, in boxes that do and do not fit a sweep, and listed pairs.
 #[test]
 fn all_surroundings_give_the_same_forces() {
     for fluid in [warren(), two_densities(), two_passes()] {
@@ -232,8 +231,7 @@ fn all_surroundings_give_the_same_forces() {
                         &with_ghosts(&mut engine, surroundings, &along_z, &images_along_z, want),
                         &expected,
                     );
-                    // If forces on ghosts return to their owners half of the pairs with ghosts are
-                    // redundant, but harmless.
+                    // If forces on ghosts return to their owners half of the pairs with ghosts are redundant, but harmless.
                     let (i, j): (Vec<i32>, Vec<i32>) = (0..cloud.x.len() as i32)
                         .flat_map(|i| (i + 1..all.x.len() as i32).map(move |j| (i, j)))
                         .unzip();

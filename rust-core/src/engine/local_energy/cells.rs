@@ -147,8 +147,7 @@ impl Cells {
         if self.dimensions == 2 { [x[0], x[1], 0.0] } else { x }
     }
 
-    /// The cell of a point in each direction; a point outside the box along a periodic direction has
-    /// that of an image.
+    /// The cell of a point in each direction; a point outside the box along a periodic direction has that of an image.
     fn coordinates(&self, x: [f64; 3]) -> [i32; 3] {
         let s = self.domain.fraction(x);
         [0, 1, 2].map(|k| {

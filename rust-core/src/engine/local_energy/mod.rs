@@ -39,8 +39,8 @@ pub enum NoEnergy {
     TooLarge(#[from] TooLarge),
 }
 
-/// The energy of one fluid in a box, as a function of the positions of single particles. All arithmetic
-/// is in double precision.
+/// The energy of one fluid in a box, as a function of the positions of single particles. All
+/// arithmetic is in double precision.
 #[derive(Debug, Clone)]
 pub struct LocalEnergy {
     plan: Plan,
@@ -49,8 +49,7 @@ pub struct LocalEnergy {
     cells: Option<Cells>,
     x: Vec<[f64; 3]>,
     species: Vec<i32>,
-    /// Densities that ψ depends on nonlinearly, one for each such density and species, particle by
-    /// particle.
+    /// Densities that ψ depends on nonlinearly, one for each such density and species, particle by particle.
     n: Vec<f64>,
     psi: Vec<f64>,
     /// Each particle's contribution to its own density, by density: `w(0)`, and its own images.
@@ -189,8 +188,7 @@ impl LocalEnergy {
         &self.x
     }
 
-    /// Densities that ψ depends on nonlinearly, particle by particle; [`Plan::density_passes`] lists
-    /// them.
+    /// Densities that ψ depends on nonlinearly, particle by particle; [`Plan::density_passes`] lists them.
     pub fn densities(&self) -> &[f64] {
         &self.n
     }
@@ -202,8 +200,7 @@ impl LocalEnergy {
     /// number at a higher density than before; it is minus infinity where both energies are infinite.
     ///
     /// # Errors
-    /// Fails if ψ becomes minus infinity, or is not a number at densities that are no higher than
-    /// before.
+    /// Fails if ψ becomes minus infinity, or is not a number at densities that are no higher than before.
     pub fn change(&mut self, particle: usize, to: [f64; 3], tag: i32) -> Result<f64, EngineError> {
         (self.moved.particle, self.moved.to) = (particle, to);
         self.moved.ids.clear();
@@ -324,8 +321,7 @@ impl LocalEnergy {
         sum
     }
 
-    /// The densities of a particle at the second point of the last search, as row `row` of the new
-    /// densities.
+    /// The densities of a particle at the second point of the last search, as row `row` of the new densities.
     fn densities_there(&mut self, particle: usize, row: usize) {
         let LocalEnergy { plan, near, work, species, set, moved, own, .. } = self;
         let (count, width) = (plan.species.len(), plan.slope_width());
@@ -337,8 +333,7 @@ impl LocalEnergy {
         }
     }
 
-    /// The densities that change, the particles that they belong to, and the densities of the moved
-    /// particle.
+    /// The densities that change, the particles that they belong to, and the densities of the moved particle.
     fn new_densities(&mut self, particle: usize) {
         let LocalEnergy { plan, near, work, species, set, moved, own, n, .. } = self;
         let (count, width, found) = (plan.species.len(), plan.slope_width(), near.count);

@@ -5,8 +5,8 @@ use crate::engine::plan::Plan;
 use crate::model::kernel::{Kernel, Shape, ShapeVisitor};
 
 /// Sums the densities `which` of every owned particle to `n`, which has
-/// [`Fluid::variables`](crate::model::Fluid::variables) numbers for each, density-major. Returns the
-/// number of sums over pairs.
+/// [`Fluid::variables`](crate::model::Fluid::variables) numbers for each, density-major. Returns
+/// the number of sums over pairs.
 pub fn sum_densities(
     pairs: &Pairs,
     plan: &Plan,
@@ -36,8 +36,8 @@ pub fn sum_densities(
 
 /// Adds the contributions of a list's pairs to one density of every owned particle.
 ///
-/// `n` has `width` numbers for each owned particle, with species running fastest; the numbers of this
-/// density begin at `offset`.
+/// `n` has `width` numbers for each owned particle, with species running fastest; the numbers of
+/// this density begin at `offset`.
 pub fn add_density(
     pairs: &PairList,
     kernel: &Kernel,
@@ -63,8 +63,7 @@ pub fn add_density(
             let factor = self.kernel.value_factor();
             let list = self.pairs;
             for k in 0..list.len() {
-                // The loop has no branch: about half of the pairs in the cut-off are in this range, in
-                // no order.
+                // The loop has no branch: about half of the pairs in the cut-off are in this range, in no order.
                 let s = list.r[k] * inverse_range;
                 let mut w = if s < 1.0 { factor * S::value(s) } else { 0.0 };
                 if !list.factor.is_empty() {

@@ -37,8 +37,7 @@ struct Work {
 pub struct Evaluation {
     /// Potential energy `U`.
     pub energy: f64,
-    /// Uncorrected local densities, one for each density and species, density-major, particle by
-    /// particle.
+    /// Uncorrected local densities, one for each density and species, density-major, particle by particle.
     pub densities: Vec<f64>,
     /// Conservative forces on the particles.
     pub forces: Vec<[f64; 3]>,
@@ -68,8 +67,8 @@ impl Evaluator {
         &self.fluid
     }
 
-    /// Evaluates particles at `x`, with one species each, in a box. Particles at positions that are not
-    /// finite do not interact.
+    /// Evaluates particles at `x`, with one species each, in a box. Particles at positions that
+    /// are not finite do not interact.
     pub fn evaluate(&self, x: &[[f64; 3]], species: &[i32], domain: &PeriodicBox) -> Evaluation {
         let (pairs, pair_forces) = self.pairs(x, species, domain);
         self.of_pairs(pairs, pair_forces, species)
@@ -201,8 +200,7 @@ impl Evaluation {
     /// Σ_i [ψ_i,vu ∇_k n_iv·∇_k n_iu + ψ_i,v ∇_k² n_iv] + Σ_j ∇² φ(r_kj)
     /// ```
     ///
-    /// The result is exact where each two particles form one pair, in boxes at least twice the range
-    /// wide.
+    /// The result is exact where each two particles form one pair, in boxes at least twice the range wide.
     pub fn laplacians(&self, fluid: &Fluid, species: &[i32]) -> Vec<f64> {
         let (count, variables) = (fluid.species.len(), fluid.variables());
         let Psi { slopes, second, .. } = &self.psi;
@@ -340,8 +338,7 @@ A = { slopes = { n = "0.3*n" }, energy = "n^2" }
         }
     }
 
-    /// ψ has no finite slope for an isolated particle, which must not affect pairs out of the range of
-    /// its density.
+    /// ψ has no finite slope for an isolated particle, which must not affect pairs out of the range of its density.
     #[test]
     fn pairs_out_of_range_of_a_density_feel_nothing_of_it() {
         let model = r#"

@@ -33,8 +33,7 @@ pub struct ForceOutput<'a> {
     pub force: &'a mut [[f64; 3]],
     pub particle_energy: &'a mut [f64],
     pub particle_virial: &'a mut [[f64; 6]],
-    /// The conservative force of each pair along `ê_ij`, positive if repulsive; empty if it is not
-    /// wanted.
+    /// The conservative force of each pair along `ê_ij`, positive if repulsive; empty if it is not wanted.
     pub pair_force: &'a mut [f64],
     pub tally: Tally,
 }
@@ -96,8 +95,7 @@ impl<const N: usize> Block<N> {
         }
     }
 
-    /// Computes the conservative forces of the pairs `begin` to `end`, at most `N`, and their energies
-    /// if asked for.
+    /// Computes the conservative forces of the pairs `begin` to `end`, at most `N`, and their energies if asked for.
     pub fn conserve(&mut self, input: &ForceInput, begin: usize, end: usize, energies: bool) {
         self.conservative.fill(0.0);
         if energies {
@@ -156,8 +154,7 @@ impl<const N: usize> ShapeVisitor for ManyBody<'_, '_, N> {
         let inverse_range = 1.0 / self.kernel.range();
         let factor = self.kernel.slope_factor();
         for k in self.begin..self.end {
-            // The loop has no branch: about half of the pairs in the cut-off are in this range, in no
-            // order.
+            // The loop has no branch: about half of the pairs in the cut-off are in this range, in no order.
             let s = list.r[k] * inverse_range;
             let here = list.i[k] as usize * width + offset + list.species_j[k] as usize;
             let there = list.j[k] as usize * width + offset + list.species_i[k] as usize;

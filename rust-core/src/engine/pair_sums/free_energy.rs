@@ -15,8 +15,8 @@ pub struct FreeEnergies {
 /// The free energy ψ of one species.
 #[derive(Debug)]
 struct Excess {
-    /// Computes ψ, its slopes, then its second derivatives row by row, the upper triangle; `None` for a
-    /// curve and for stated slopes.
+    /// Computes ψ, its slopes, then its second derivatives row by row, the upper triangle; `None`
+    /// for a curve and for stated slopes.
     program: Option<Program>,
     /// Derivatives by the order in each variable; used for variables out of bounds.
     derivatives: RefCell<BTreeMap<Vec<u8>, Formula>>,
@@ -122,8 +122,7 @@ impl FreeEnergies {
                 let Scratch { values, work, .. } = scratch;
                 self.species[alpha].formula(fluid, at, [slopes, second], [values, work])
             }
-            // There is no ψ: the energy and the slopes are stated. Measurements of such models need no
-            // second derivatives.
+            // There is no ψ: the energy and the slopes are stated. Measurements of such models need no second derivatives.
             ExcessFreeEnergy::Slopes(law) => {
                 slopes.iter_mut().zip(&law.slopes).for_each(|(to, slope)| *to = slope.value(at));
                 law.energy.value(at)
@@ -245,8 +244,7 @@ mod tests {
     use super::*;
     use crate::model::Model;
 
-    /// Compares slopes and second derivatives with differences, within bounds, beyond one and beyond
-    /// both.
+    /// Compares slopes and second derivatives with differences, within bounds, beyond one and beyond both.
     #[test]
     fn derivatives_of_psi_are_derivatives() {
         let model = Model::parse(

@@ -27,9 +27,8 @@ pub struct BoxSearch {
 }
 
 impl BoxSearch {
-    /// Calls `visit` with `i`, `j` and `r_i − r_j` of every pair closer than `cutoff`, each once, in an
-    /// order that depends on the positions alone. `i ≤ j`; a pair of a particle with its own image has
-    /// `i = j`.
+    /// Calls `visit` with `i`, `j` and `r_i − r_j` of every pair closer than `cutoff`, each once, in an order
+    /// that depends on the positions alone. `i ≤ j`; a pair of a particle with its own image has `i = j`.
     ///
     /// In boxes narrower than twice the cut-off a particle may be near several images of another, and
     /// its own: each is a pair. Particles after the first `owned` are ghosts: two ghosts form no pair.

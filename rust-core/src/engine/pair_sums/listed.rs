@@ -26,7 +26,7 @@ pub fn add_listed(
     for (k, (i, j)) in i.iter().zip(*j).enumerate() {
         let (i, j) = (*i as usize, *j as usize);
         if i >= particles.owned || j >= particles.x.len() {
-            return Err(EngineError::Host("a pair list names a particle that is not there"));
+            return Err(EngineError::Host("a pair list names a particle that does not exist"));
         }
         if species[i] < 0 || species[j] < 0 {
             continue;

@@ -1,5 +1,5 @@
-//! The Hamiltonian and its forces in double precision, as sums over a list of pairs, for evaluations
-//! that the sweep cannot do.
+//! The Hamiltonian and its forces in double precision, as sums over a list of pairs, for
+//! evaluations that the sweep cannot do.
 //!
 //! ```text
 //! pairs        in_box (a box and its images), search (a rank and its ghosts), listed (the host's own)
@@ -55,11 +55,10 @@ use psidpd_passes::tally::{Tally, Want};
 use search::CellSearch;
 use special::scale;
 
-/// The forces of one fluid over a list of pairs, with all results that a host may ask for, and the
-/// arrays of the computation.
+/// The forces of one fluid over a list of pairs, with all results that a host may ask for, and
+/// the arrays of the computation.
 ///
-/// An evaluation is [`PairSums::first`], copying slopes from owners to ghosts if there are any, and
-/// [`PairSums::second`].
+/// An evaluation is [`PairSums::first`], copying slopes from owners to ghosts if there are any, and [`PairSums::second`].
 #[derive(Debug, Clone)]
 pub struct PairSums {
     plan: Plan,
@@ -87,8 +86,7 @@ pub struct PairSums {
 }
 
 impl PairSums {
-    /// Creates the sums for `fluid`; types are species indices unless [`PairSums::map_kinds`] maps
-    /// them.
+    /// Creates the sums for `fluid`; types are species indices unless [`PairSums::map_kinds`] maps them.
     ///
     /// # Errors
     /// Fails as [`Plan::new`].
@@ -197,7 +195,9 @@ impl PairSums {
         match surroundings {
             Surroundings::Box(domain) => {
                 if owned < x.len() {
-                    return Err(EngineError::Host("ghosts are not allowed in an evaluation of the whole box"));
+                    return Err(EngineError::Host(
+                        "ghosts are not allowed in an evaluation of the whole box",
+                    ));
                 }
                 check_reach(domain, dimensions, cutoff, owned)?;
                 pairs.clear(owned, Newton::On);
@@ -207,9 +207,7 @@ impl PairSums {
             }
             Surroundings::Ghosts(Around { domain, images }, newton) if is_closed(domain) => {
                 if !images.is_empty() && images.len() != x.len() - owned {
-                    return Err(EngineError::Host(
-                        "`images` must have one entry per ghost",
-                    ));
+                    return Err(EngineError::Host("`images` must have one entry per ghost"));
                 }
                 check_reach(domain, dimensions, cutoff, x.len())?;
                 pairs.clear(owned, newton);
@@ -345,13 +343,11 @@ impl PairSums {
 
     /// Adds the forces to `force` and returns the requested totals.
     ///
-    /// `v` may be empty and `step` `None` if no thermostat acts; with `step` `None` only conservative
-    /// forces are computed. Under [`Newton::On`] forces on ghosts are added too, and the host returns
-    /// them to the owners.
+    /// `v` may be empty and `step` `None` if no thermostat acts; with `step` `None` only conservative forces are
+    /// computed. Under [`Newton::On`] forces on ghosts are added too, and the host returns them to the owners.
     ///
     /// # Errors
-    /// Fails for a force that is not finite, and for arrays of other lengths than in
-    /// [`PairSums::first`].
+    /// Fails for a force that is not finite, and for arrays of other lengths than in [`PairSums::first`].
     pub fn second(
         &mut self,
         particles: &Particles,
@@ -367,7 +363,7 @@ impl PairSums {
         let newton = self.pairs.newton();
         let needed = if newton == Newton::On { all } else { self.owned };
         if !self.ready {
-            return Err(EngineError::Host("forces without densities of the same configuration"));
+            return Err(EngineError::Host("the second half of an evaluation needs the first half before it"));
         }
         if self.slopes.len() != all * self.plan.slope_width() {
             return Err(EngineError::Host("slopes were not forwarded to every ghost"));

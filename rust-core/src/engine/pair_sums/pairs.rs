@@ -96,15 +96,13 @@ impl Pairs {
         list.push(i, j, d, species);
     }
 
-    /// Adds a pair of two owned particles in a box, of which the second may be an image, with `d = r_i
-    /// − r_j`.
+    /// Adds a pair of two owned particles in a box, of which the second may be an image, with `d = r_i − r_j`.
     #[inline(always)]
     pub fn push_in_box(&mut self, i: usize, j: usize, d: [f64; 3], species: &[i32]) {
         self.force.push(i, j, d, species);
     }
 
-    /// Adds a pair as [`Pairs::push`], with a factor. Either all pairs are added by this function or
-    /// none.
+    /// Adds a pair as [`Pairs::push`], with a factor. Either all pairs are added by this function or none.
     pub fn push_scaled(
         &mut self,
         a: usize,

@@ -23,12 +23,10 @@ pub struct CellSearch {
 const OUTSIDE: u32 = u32::MAX;
 
 impl CellSearch {
-    /// Calls `visit` with `a`, `b` and `x_a − x_b` of every pair of points closer than `cutoff`, each
-    /// once, in an order that depends on the points alone. One of the two is among the first `owned`,
-    /// and neither is left out.
+    /// Calls `visit` with `a`, `b` and `x_a − x_b` of every pair of points closer than `cutoff`, each once, in an
+    /// order that depends on the points alone. One of the two is among the first `owned`, and neither is left out.
     ///
-    /// Points that are not left out must have finite coordinates. In two dimensions the third
-    /// coordinate is ignored.
+    /// Points that are not left out must have finite coordinates. In two dimensions the third coordinate is ignored.
     pub fn find(
         &mut self,
         x: &[[f64; 3]],
@@ -64,8 +62,8 @@ impl CellSearch {
         if count == 0 {
             return 0;
         }
-        // The number of cells is limited by that of particles: a few distant particles must not cause a
-        // grid of empty cells.
+        // The number of cells is limited by that of particles: a few distant particles must
+        // not cause a grid of empty cells.
         let most = (4 * count + 64) as f64;
         let mut width = [cutoff; 3];
         loop {

@@ -7,12 +7,12 @@ use crate::engine::surroundings::Newton;
 use psidpd_passes::tally::Want;
 
 impl PairSums {
-    /// Pair energy, and conservative force along `ê_ij`, of the particles `i` and `j` at the distance
-    /// `r`, of the given kinds.
+    /// Pair energy, and conservative force along `ê_ij`, of the particles `i` and `j` at the
+    /// distance `r`, with the given types.
+    ///
     /// The energy is that of the terms that belong to pairs: `φ`, and ψ where it is linear in a
     /// density. The force includes the many-body part, with the slopes of ψ at the densities of the
     /// last evaluation; without these (`None`, or particles that were not evaluated) it does not.
-    /// last evaluation; without those (`None`, or particles that were not there) it has not.
     pub fn single(&self, kinds: [i32; 2], r: f64, particles: Option<[usize; 2]>) -> (f64, f64) {
         match particles {
             Some(particles) => self.single_at(kinds, r, &self.slopes, particles),

@@ -1,5 +1,4 @@
-//! Special pairs: their factors in the lists of pairs, and their contributions to a sweep, which leaves
-//! them out.
+//! Special pairs: their factors in the lists of pairs, and their contributions to a sweep, which leaves them out.
 
 use super::densities::add_density;
 use super::forces::{ForceInput, ForceOutput, add_forces};

@@ -2,8 +2,7 @@
 //! all cells, without a neighbour list. `docs/engine.md` explains it with figures. DPD particles move
 //! so fast that a neighbour list would be valid for a few steps only and cost more than it saves.
 //!
-//! The crate `psidpd_passes` contains the loops over cells and pairs, `psidpd_threads` the threads.
-//! This module contains
+//! The crate `psidpd_passes` contains the loops over cells and pairs, `psidpd_threads` the threads. This module contains
 //!
 //! - [`terms`]: the plan as tables of numbers for those loops.
 //! - [`region`]: the region of the sweep, and its cells.
@@ -218,9 +217,8 @@ impl Sweep {
     /// [`PairSums`](super::pair_sums::PairSums) computes energies and virials of single particles.
     ///
     /// # Errors
-    /// Fails for a position, ψ or force that is not finite, when some forces may have been written;
-    /// also for a tag or type out of range, arrays of different lengths, ghosts, and a box that does
-    /// not fit.
+    /// Fails for a position, ψ or force that is not finite, when some forces may have been written; also for
+    /// a tag or type out of range, arrays of different lengths, ghosts, and a box that does not fit.
     #[allow(clippy::too_many_arguments)]
     pub fn evaluate(
         &mut self,
@@ -327,8 +325,8 @@ impl Sweep {
         self.plan.slope_width()
     }
 
-    /// Slopes `∂ψ/∂n` of owned particles, followed by those of ghosts, after [`Sweep::first`]; empty
-    /// after [`Sweep::evaluate`].
+    /// Slopes `∂ψ/∂n` of owned particles, followed by those of ghosts, after [`Sweep::first`];
+    /// empty after [`Sweep::evaluate`].
     pub fn slopes(&self) -> &[f64] {
         &self.slopes
     }
@@ -345,8 +343,8 @@ impl Sweep {
         &mut self.slopes
     }
 
-    /// Adds many-body forces; writes all forces on owned particles to `force`, or adds them to it, and
-    /// returns the requested totals.
+    /// Adds many-body forces; writes all forces on owned particles to `force`, or adds them to it,
+    /// and returns the requested totals.
     ///
     /// A pair of an owned particle and a ghost is computed for the owned particle alone, with half of
     /// its energy and virial: the rank of the ghost computes the other half.
@@ -360,7 +358,7 @@ impl Sweep {
         add: bool,
     ) -> Result<Tally, EngineError> {
         if !std::mem::take(&mut self.ready) {
-            return Err(EngineError::Host("forces without densities of the same configuration"));
+            return Err(EngineError::Host("the second half of an evaluation needs the first half before it"));
         }
         if particles.x.len() != self.all || particles.owned != self.owned || force.len() < self.owned {
             return Err(EngineError::Host("particles changed between densities and forces"));
@@ -378,8 +376,8 @@ impl Sweep {
 
     /// ψ and local densities of owned particles in the host's order, as
     /// [`PairSums::excess`](super::pair_sums::PairSums::excess) and
-    /// [`PairSums::local_densities`](super::pair_sums::PairSums::local_densities); densities that
-    /// forces do not need are zero.
+    /// [`PairSums::local_densities`](super::pair_sums::PairSums::local_densities); densities
+    /// that forces do not need are zero.
     pub fn local_densities(&self, excess: &mut Vec<f64>, densities: &mut Vec<f64>) {
         let variables = self.plan.densities.len() * self.plan.species.len();
         with!(&self.workspace, m => m.to_host(variables, excess, densities));

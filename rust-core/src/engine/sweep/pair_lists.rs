@@ -1,8 +1,7 @@
-//! Lists of all pairs in the range of a thermostat, plane by plane, for integrators that apply it apart
-//! from the forces.
+//! Lists of all pairs in the range of a thermostat, plane by plane, for integrators that apply it apart from the forces.
 //!
-//! Particles are in the order of cells, and within a cell in the order of their tags: the order depends
-//! on positions and tags alone.
+//! Particles are in the order of cells, and within a cell in the order of their tags: the order
+//! depends on positions and tags alone.
 
 use super::region::region;
 use super::workspace::{CellOrder, Input, SortedParticles};
@@ -96,8 +95,8 @@ impl PairLists {
     /// negative species are left out.
     ///
     /// # Errors
-    /// Fails for a position that is not finite, and for a box narrower than twice the range or skew
-    /// along an open direction.
+    /// Fails for a position that is not finite, and for a box narrower than twice the range
+    /// or skew along an open direction.
     #[allow(clippy::too_many_arguments)]
     pub fn find<T: AsMut<PlanePairs> + Default + Send>(
         &mut self,
@@ -114,8 +113,8 @@ impl PairLists {
         let set = self.set;
         let range = self.range_within(domain, range, margin)?;
         let (geometry, mut grid) = region(set, pool, (self.dimensions, range), domain, &input)?;
-        // Updates of single pairs need an even number of planes, so that planes updated at once have no
-        // neighbour in common.
+        // Updates of single pairs need an even number of planes, so that planes updated at
+        // once have no neighbour in common.
         if geometry.periodic[grid.plane_axis] {
             grid.planes = grid.planes.max(2);
         }
@@ -159,8 +158,7 @@ impl PairLists {
                 let next = if *number + 1 < count { *number + 1 } else { 0 };
                 let follows = *number + 1 < count || cells.is_periodic();
                 plane.next = if follows { cells.particles_of(&(next..next + 1)) } else { 0..0 };
-                // SAFETY: `fill` has filled all particles and copies above, and no thread writes them
-                // here.
+                // SAFETY: `fill` has filled all particles and copies above, and no thread writes them here.
                 unsafe { list_pairs(set, inputs, *number, buffers, &mut plane.list) };
             }
         });

@@ -10,8 +10,7 @@ pub const MARGIN: f64 = 1e-5;
 /// Adding and subtracting this constant rounds a number, alike on all instruction sets.
 const ROUND: f64 = 6_755_399_441_055_744.0;
 
-/// Positions of the sorted particles, followed by those of the first plane's copies, for pairs of the
-/// last plane.
+/// Positions of the sorted particles, followed by those of the first plane's copies, for pairs of the last plane.
 #[derive(Debug, Clone, Default)]
 pub struct Places {
     x: Vec<[f64; 3]>,

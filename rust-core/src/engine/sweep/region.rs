@@ -13,15 +13,13 @@ pub fn is_open(domain: &PeriodicBox, dimensions: usize) -> bool {
     !domain.periodic()[..dimensions].iter().any(|p| *p)
 }
 
-/// Whether open directions of a box geometry can be extended; a box that is skew along an open
-/// direction cannot.
+/// Whether open directions of a box geometry can be extended; a box that is skew along an open direction cannot.
 pub fn can_stretch(geometry: &BoxGeometry) -> bool {
     geometry.is_fully_periodic() || !geometry.is_tilted()
 }
 
-/// The region in which a sweep searches pairs within `cutoff`, and its cells: all of the box along
-/// periodic directions, and along the others the extent of the particles, with room for ghosts within
-/// reach.
+/// The region in which a sweep searches pairs within `cutoff`, and its cells: all of the box along periodic
+/// directions, and along the others the extent of the particles, with room for ghosts within reach.
 pub fn region(
     set: InstructionSet,
     pool: &Pool,

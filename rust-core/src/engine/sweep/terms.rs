@@ -61,8 +61,7 @@ pub fn terms<T: Scalar>(plan: &Plan) -> Terms<T> {
     terms
 }
 
-/// The reciprocal of a range. A range of zero gives a number so large that every pair is beyond the
-/// range.
+/// The reciprocal of a range. A range of zero gives a number so large that every pair is beyond the range.
 fn inverse(range: f64) -> f64 {
     if range > 0.0 { 1.0 / range } else { f64::from(f32::MAX) }
 }

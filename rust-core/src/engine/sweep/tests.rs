@@ -232,8 +232,7 @@ range = 1.0
 exponent = 2
 "#;
 
-/// A fluid with three species and three densities, two of which have the same range: more slopes than
-/// are read at once.
+/// A fluid with three species and three densities, two of which have the same range: more slopes than are read at once.
 const WIDE: &str = r#"
 title = "nine slopes"
 species = ["A", "B", "C"]

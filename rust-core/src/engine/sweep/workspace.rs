@@ -136,8 +136,7 @@ impl<P: PairPrecision> Workspace<P> {
         self.finish(times)
     }
 
-    /// Does the steps after [`Workspace::first`] and [`Workspace::slopes_from_host`]: the second pass,
-    /// and the forces.
+    /// Does the steps after [`Workspace::first`] and [`Workspace::slopes_from_host`]: the second pass, and the forces.
     ///
     /// # Errors
     /// Fails for a force that is not finite, and names the lowest tag.
@@ -146,8 +145,8 @@ impl<P: PairPrecision> Workspace<P> {
         let planes = thread_slabs(&self.order, pool.threads());
         self.on_slabs(&planes, |scheduler, slabs, accumulators| {
             let mut work: Vec<_> = slabs.iter_mut().zip(accumulators.split()).collect();
-            // SAFETY: `first` has computed the slopes of all particles; `copy_first_plane` has just
-            // copied those of the copies.
+            // SAFETY: `first` has computed the slopes of all particles; `copy_first_plane` has
+            // just copied those of the copies.
             pool.each(&mut work, |(slab, sums)| unsafe { scheduler.second_of_all(out, slab, sums) });
             drop(work);
             let sums = accumulators.sums();
@@ -186,8 +185,7 @@ impl<P: PairPrecision> Workspace<P> {
         let input = &PassInput { input, excess, out };
         self.on_slabs(planes, |scheduler, slabs, accumulators| {
             let mut work: Vec<_> = slabs.iter_mut().zip(accumulators.split()).collect();
-            // SAFETY: `fill_start` has filled the starts of all slabs, and the copies exist; no other
-            // work runs.
+            // SAFETY: `fill_start` has filled the starts of all slabs, and the copies exist; no other work runs.
             pool.each(&mut work, |(slab, sums)| unsafe { scheduler.interior(input, slab, sums) });
             drop(work);
             let sums = accumulators.sums();
@@ -235,8 +233,7 @@ impl<P: PairPrecision> Workspace<P> {
         work(scheduler, &mut slabs, accumulators);
     }
 
-    /// Adds the times of the caller's thread; fails for a force that is not finite, and names the
-    /// lowest tag.
+    /// Adds the times of the caller's thread; fails for a force that is not finite, and names the lowest tag.
     fn finish(&mut self, times: &mut Times) -> Result<(), EngineError> {
         if let Some(state) = self.threads.first_mut() {
             *times += std::mem::take(&mut state.times);

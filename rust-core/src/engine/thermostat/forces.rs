@@ -5,8 +5,8 @@ use super::pass::{Terms, Wide, add_to_host, virial};
 use crate::engine::sweep::Pool;
 
 impl PairThermostat {
-    /// Adds drag at the velocities `v`, or the random force, or both, to `force`; returns their virial,
-    /// if distances were stored.
+    /// Adds drag at the velocities `v`, or the random force, or both, to `force`; returns their
+    /// virial, if distances were stored.
     pub fn add_forces(
         &mut self,
         pool: &Pool,

@@ -85,13 +85,11 @@ pub struct PairThermostat {
     /// Mass of each sorted particle.
     mass: Vec<f64>,
     inverse_mass: Vec<f64>,
-    /// Tag of each sorted particle, followed by those of the first plane's copies, for the pairs of the
-    /// last plane.
+    /// Tag of each sorted particle, followed by those of the first plane's copies, for the pairs of the last plane.
     tag: Vec<u32>,
     sums: Sums,
     parts: Vec<Part>,
-    /// Factor of `g` in the impulse of each pair, without its own noise, by plane; used if distances
-    /// are stored.
+    /// Factor of `g` in the impulse of each pair, without its own noise, by plane; used if distances are stored.
     impulses: Vec<Vec<f64>>,
     iterations: usize,
     /// Whether distances are stored.
@@ -254,11 +252,10 @@ impl PairThermostat {
 /// Temperature of the particles as the thermostat measures it, and its rate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Warmth {
-    /// kT of the relative velocities along pairs, `Σ D μ u²/Σ D`: flow on scales beyond the range
-    /// hardly contributes.
+    /// kT of the relative velocities along pairs, `Σ D μ u²/Σ D`: flow on scales beyond the range hardly contributes.
     pub kt: f64,
-    /// The rate at which drag alone removes kinetic energy from uncorrelated particles, `2 Σ D/μ` over
-    /// the degrees of freedom.
+    /// The rate at which drag alone removes kinetic energy from uncorrelated particles, `2 Σ
+    /// D/μ` over the degrees of freedom.
     pub rate: f64,
 }
 

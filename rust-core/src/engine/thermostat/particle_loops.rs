@@ -36,8 +36,8 @@ impl Loop for Multiply<'_> {
     }
 }
 
-/// Computes `solution ← solution + alpha p` and `residual ← residual − alpha image`; returns `r · M⁻¹
-/// r` of the new residual.
+/// Computes `solution ← solution + alpha p` and `residual ← residual − alpha image`;
+/// returns `r · M⁻¹ r` of the new residual.
 pub struct Descend<'a> {
     pub alpha: f64,
     pub p: &'a [Wide],

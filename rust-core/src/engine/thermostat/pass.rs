@@ -12,8 +12,7 @@ pub use psidpd_passes::plane::pair_sums::{Terms, Wide};
 /// The vectors of the particles, and the sums over their pairs.
 #[derive(Debug, Clone, Default)]
 pub struct Sums {
-    /// Vector of each sorted particle, followed by those of the first plane's copies, for the pairs of
-    /// the last plane.
+    /// Vector of each sorted particle, followed by those of the first plane's copies, for the pairs of the last plane.
     pub p: Vec<Wide>,
     /// Sums by plane: of its own particles, then of those of the next.
     of_plane: Vec<Vec<Wide>>,
@@ -82,8 +81,8 @@ impl Sums {
 }
 
 impl Plane {
-    /// Virial `Σ r_ij ⊗ F_ij` of the same forces: xx, yy, zz, xy, xz, yz; half of it for pairs with a
-    /// ghost. `ghosts` may be empty.
+    /// Virial `Σ r_ij ⊗ F_ij` of the same forces: xx, yy, zz, xy, xz, yz; half of it for pairs with
+    /// a ghost. `ghosts` may be empty.
     pub fn virial(&self, p: &[Wide], ghosts: &[bool], Terms { noise, drag }: Terms) -> [f64; 6] {
         let ghosts = ghosts.get(self.found.own.start..).unwrap_or_default();
         let is_ghost = |k: usize| ghosts.get(k).is_some_and(|ghost| *ghost);
@@ -128,8 +127,7 @@ pub fn virial(pool: &Pool, planes: &[Plane], sums: &Sums, ghosts: &[bool], terms
     sum
 }
 
-/// Adds `factor` times sorted vectors to vectors in the order of the host, for particles that are not
-/// left out.
+/// Adds `factor` times sorted vectors to vectors in the order of the host, for particles that are not left out.
 pub fn add_to_host(pool: &Pool, place: &[u32], from: &[Wide], factor: f64, to: &mut [[f64; 3]]) {
     let (count, mut rest, threads) = (to.len(), to, pool.threads());
     let mut parts: Vec<_> = (0..threads)

@@ -23,8 +23,8 @@ impl AsMut<PlanePairs> for Plane {
     }
 }
 
-/// The amplitude `√(½ Δt γ)`, the inverse range, which is extended by `margin`, and the exponent of
-/// `w_R`, by pairs of species.
+/// The amplitude `√(½ Δt γ)`, the inverse range, which is extended by `margin`, and the
+/// exponent of `w_R`, by pairs of species.
 pub fn weights(plan: &ThermostatPlan, dt: f64, margin: f64) -> WeightTables {
     let table =
         |values: &[f64], of: &dyn Fn(f64) -> f64| SpeciesPairTable::new(values.iter().map(|x| of(*x) as f32));

@@ -18,8 +18,7 @@ pub struct Pull {
 }
 
 impl PairThermostat {
-    /// Drag at the velocities `v`, in the particle order of the last search for pairs. Empty if
-    /// distances were not stored.
+    /// Drag at the velocities `v`, in the particle order of the last search for pairs. Empty if distances were not stored.
     pub fn drags(&self, v: &[[f64; 3]]) -> Vec<Pull> {
         let order = self.lists.order();
         self.pulls_by(|i, j, _, _, g| {

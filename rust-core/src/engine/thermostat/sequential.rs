@@ -30,8 +30,7 @@ pub struct Encounter {
 }
 
 impl Encounter {
-    /// The factor of `g` in the impulse on the first particle that changes `u` to `factor u + noise
-    /// √(kT/μ) ξ`.
+    /// The factor of `g` in the impulse on the first particle that changes `u` to `factor u + noise √(kT/μ) ξ`.
     #[inline(always)]
     fn impulse(&self, factor_less_one: f64, noise: f64) -> f64 {
         self.mu * (factor_less_one * self.along / self.square)
@@ -39,8 +38,7 @@ impl Encounter {
     }
 }
 
-/// The rule `u′ = c u + √(kT/μ (1 − c²)) ξ`, `c = exp(−DΔt/μ)`: exact for a single pair; Peters's
-/// scheme II.
+/// The rule `u′ = c u + √(kT/μ (1 − c²)) ξ`, `c = exp(−DΔt/μ)`: exact for a single pair; Peters's scheme II.
 pub fn ornstein_uhlenbeck(pair: &Encounter) -> f64 {
     let less_one = (-2.0 * pair.a).exp_m1();
     pair.impulse(less_one, (-(-4.0 * pair.a).exp_m1()).sqrt())
@@ -57,8 +55,7 @@ pub fn lowe_andersen(pair: &Encounter) -> f64 {
     if pair.chance < -(-2.0 * pair.a).exp_m1() { pair.impulse(-1.0, 1.0) } else { 0.0 }
 }
 
-/// Sets of planes that are updated at once, one set after the other: no two planes of a set are
-/// neighbours.
+/// Sets of planes that are updated at once, one set after the other: no two planes of a set are neighbours.
 fn sets(planes: &[Plane]) -> [Vec<usize>; 3] {
     let count = planes.len();
     // The last plane has pairs with the first, which may be in the same set.

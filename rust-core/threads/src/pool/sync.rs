@@ -1,5 +1,4 @@
-//! The primitives of the pool: the standard library's, or loom's in a test that explores all orders of
-//! the threads.
+//! The primitives of the pool: the standard library's, or loom's in a test that explores all orders of the threads.
 
 #[cfg(not(loom))]
 mod threads {

@@ -22,8 +22,7 @@ gamma = 4.5
 range = 1.0
 "#;
 
-/// Two species with three densities and all pairs cached; the same with pairs in range only; and one
-/// species.
+/// Two species with three densities and all pairs cached; the same with pairs in range only; and one species.
 fn fluids() -> [Fluid; 3] {
     [MANY, SHORT, ONE].map(|text| Model::parse("test", text).unwrap().at(0.7).unwrap())
 }

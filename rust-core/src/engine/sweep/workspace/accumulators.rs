@@ -1,6 +1,5 @@
-//! Accumulators: the sums over pairs of forces and densities. Each plane has accumulators for its own
-//! particles and for those of the next plane, so that the order of every sum is fixed, whichever thread
-//! works on a plane.
+//! Accumulators: the sums over pairs of forces and densities. Each plane has accumulators for its own particles and
+//! for those of the next plane, so that the order of every sum is fixed, whichever thread works on a plane.
 
 use super::cell_order::CellOrder;
 use psidpd_passes::pair_batch::accumulators::Accumulator;
@@ -10,9 +9,8 @@ use std::ops::Range;
 /// all threads are done; the other planes reuse three blocks in turn.
 const ACCUMULATOR_SLOTS: usize = 2 + TURNS;
 
-/// Number of planes whose accumulators are needed at once. When a plane begins, the previous plane
-/// still lacks its many-body forces, and the additions of the plane before that to it are not yet part
-/// of the forces.
+/// Number of planes whose accumulators are needed at once. When a plane begins, the previous plane still lacks its
+/// many-body forces, and the additions of the plane before that to it are not yet part of the forces.
 const TURNS: usize = 3;
 
 /// The accumulators of all planes. Those of a thread slab are contiguous.
@@ -139,8 +137,7 @@ impl SlabSums<'_> {
 }
 
 impl<'a> Sums<'a> {
-    /// The sums of particles of a plane: over the pairs of that plane, and over those of the previous
-    /// plane.
+    /// The sums of particles of a plane: over the pairs of that plane, and over those of the previous plane.
     pub fn of_particles(
         &self,
         order: &CellOrder,

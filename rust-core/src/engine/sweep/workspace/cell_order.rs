@@ -20,8 +20,7 @@ use std::ops::Range;
 pub use extremes::extremes;
 pub use fractions::TWO_TO_32;
 
-/// Up to this number of particles all arrays stay in the cache, and nothing is prefetched; lowered in
-/// tests.
+/// Up to this number of particles all arrays stay in the cache, and nothing is prefetched; lowered in tests.
 const PREFETCH_THRESHOLD: usize = if cfg!(test) { 100 } else { 1 << 14 };
 
 /// The particles of each cell. If planes are periodic, copies of the first plane follow the last plane.
@@ -31,8 +30,7 @@ pub struct CellOrder {
     pub grid: CellGrid,
     /// Fractions of the box geometry of the host's particles, in units of 2⁻³².
     pub fixed32: Vec<[u32; 3]>,
-    /// Index of the first particle of each cell, including the copies; the last entry is one past the
-    /// last particle.
+    /// Index of the first particle of each cell, including the copies; the last entry is one past the last particle.
     pub start: Vec<u32>,
     /// The host's number of each sorted particle; each number occurs at most once.
     pub order: Vec<u32>,
@@ -41,8 +39,7 @@ pub struct CellOrder {
     pub all: usize,
     /// Cell of each of the host's particles.
     cell: Vec<u32>,
-    /// Number of particles of each cell: by thread while counting, then the start of each thread's
-    /// particles.
+    /// Number of particles of each cell: by thread while counting, then the start of each thread's particles.
     counts: Vec<u32>,
 }
 
@@ -95,8 +92,7 @@ impl CellOrder {
         Ok(())
     }
 
-    /// Computes the cell of each particle, and for each thread the number of its particles in each
-    /// cell.
+    /// Computes the cell of each particle, and for each thread the number of its particles in each cell.
     fn count(&mut self, pool: &Pool, set: InstructionSet, input: &Input) -> Result<(), EngineError> {
         let threads = pool.threads();
         let count = &Count {
@@ -176,10 +172,9 @@ impl CellOrder {
                 if *to == NO_CELL {
                     continue;
                 }
-                // SAFETY: `CountRange` gives all other particles a cell of the grid. Each thread has as
-                // many places in a cell as it has counted particles there, beginning where `sum_counts`
-                // says, so that no two particles have the same place, and all places are below the
-                // number of particles.
+                // SAFETY: `CountRange` gives all other particles a cell of the grid. Each thread has as many places
+                // in a cell as it has counted particles there, beginning where `sum_counts` says, so that no two
+                // particles have the same place, and all places are below the number of particles.
                 unsafe {
                     let next = counts.get_unchecked_mut(*to as usize);
                     *order.at(*next as usize) = k as u32;
@@ -220,8 +215,7 @@ impl CellOrder {
         if plane + 1 < self.grid.planes { self.plane(plane + 1).1 } else { self.copies() }
     }
 
-    /// The range of indices that one of `threads` threads fills: from one whole vector to another, or
-    /// to the last.
+    /// The range of indices that one of `threads` threads fills: from one whole vector to another, or to the last.
     pub fn whole_vectors(&self, thread: usize, threads: usize) -> Range<usize> {
         let vectors = part(self.particles().div_ceil(VECTOR_PADDING), thread, threads);
         vectors.start * VECTOR_PADDING..(vectors.end * VECTOR_PADDING).min(self.particles())

@@ -12,9 +12,8 @@ use crate::engine::vectors::{self, Loop};
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::pair_batch::accumulators::Accumulator;
 
-/// Number of particles whose densities are gathered at once: few enough to stay in the first-level
-/// cache until ψ is evaluated, and enough to fill several blocks of lanes where some particles are left
-/// out.
+/// Number of particles whose densities are gathered at once: few enough to stay in the first-level cache
+/// until ψ is evaluated, and enough to fill several blocks of lanes where some particles are left out.
 pub const DENSITY_BLOCK: usize = 2 * LANES;
 
 /// The input of the evaluation of ψ.
@@ -23,8 +22,7 @@ pub struct ExcessInput<'a> {
     pub tag: &'a [i32],
     /// The self term of each density: `w(0)` for the particle's own species, else zero. One row for each species.
     self_weights: Vec<f64>,
-    /// Additions to the densities, a row for each owned particle in the host's order; empty if there
-    /// are none.
+    /// Additions to the densities, a row for each owned particle in the host's order; empty if there are none.
     added: &'a [f64],
 }
 

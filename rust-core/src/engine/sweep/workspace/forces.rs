@@ -24,8 +24,7 @@ impl<'a> ForceSink<'a> {
         ForceSink { force: SharedSlice::new(force), add, tag }
     }
 
-    /// Writes forces on particles or adds them to those in the array; returns the lowest tag whose
-    /// force is not finite.
+    /// Writes forces on particles or adds them to those in the array; returns the lowest tag whose force is not finite.
     ///
     /// # Safety
     /// No other thread writes the forces on these particles.
@@ -50,9 +49,8 @@ impl<'a> ForceSink<'a> {
     }
 }
 
-/// Forces on the particles of one plane. Only [`ForceSink::write`] creates it: its caller promises that
-/// no other thread writes these forces, and it has checked that the array has room for all owned
-/// particles.
+/// Forces on the particles of one plane. Only [`ForceSink::write`] creates it: its caller promises that no
+/// other thread writes these forces, and it has checked that the array has room for all owned particles.
 struct PlaneForces<'a> {
     /// The host's numbers of the particles.
     order: &'a [u32],
@@ -63,8 +61,7 @@ struct PlaneForces<'a> {
     out: SharedSlice<'a, [f64; 3]>,
 }
 
-/// Writes forces, or adds them to those in the array, which are prefetched with `FAR`; returns whether
-/// all are finite.
+/// Writes forces, or adds them to those in the array, which are prefetched with `FAR`; returns whether all are finite.
 struct WriteForces<'a, const ADD: bool, const FAR: bool>(&'a PlaneForces<'a>);
 
 impl<const ADD: bool, const FAR: bool> Loop for WriteForces<'_, ADD, FAR> {
@@ -99,8 +96,8 @@ impl PlaneForces<'_> {
             }
             let finite = x.is_finite() & y.is_finite() & z.is_finite();
             lost |= !finite;
-            // SAFETY: `PlaneForces` contains an owned particle's number, for which the array has room
-            // and no other thread writes.
+            // SAFETY: `PlaneForces` contains an owned particle's number, for which the array has
+            // room and no other thread writes.
             unsafe {
                 let out = self.out.at(k as usize);
                 if ADD {

@@ -1,7 +1,6 @@
-//! The scheduler runs the passes plane by plane, so that the results of one pass are still in the cache
-//! when the next pass reads them. Without ghosts all passes run together, and only a few planes are in
-//! memory at once. With ghosts an evaluation has two halves: up to ψ, and, after the host has sent the
-//! slopes of ghosts, the rest.
+//! The scheduler runs the passes plane by plane, so that the results of one pass are still in the cache when the
+//! next pass reads them. Without ghosts all passes run together, and only a few planes are in memory at once. With
+//! ghosts an evaluation has two halves: up to ψ, and, after the host has sent the slopes of ghosts, the rest.
 //!
 //! Each thread has a slab of planes. Dependencies between planes:
 //!
@@ -53,8 +52,7 @@ pub struct PassInput<'a> {
     pub out: Option<ForceSink<'a>>,
 }
 
-/// The planes of each of `threads` threads, divided so that all slabs have about the same number of
-/// pairs.
+/// The planes of each of `threads` threads, divided so that all slabs have about the same number of pairs.
 pub fn thread_slabs(order: &CellOrder, threads: usize) -> Vec<Range<usize>> {
     let planes = order.grid.planes;
     let mean = order.particles() as f64 / planes as f64;
@@ -105,9 +103,8 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         is_first: bool,
     ) {
         let mut since = Instant::now();
-        // SAFETY: different slabs have disjoint particles, and each slab has one thread. The particles
-        // after the last whole vector are in no slab; one thread fills them. No pass reads any before
-        // this is done.
+        // SAFETY: different slabs have disjoint particles, and each slab has one thread. The particles after
+        // the last whole vector are in no slab; one thread fills them. No pass reads any before this is done.
         unsafe {
             if is_first {
                 let rest = vectors_before(order, order.grid.planes)..order.particles();
@@ -132,8 +129,8 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         let mut filled = needed(self.order, &planes, 1).end;
         for plane in planes.clone() {
             let end = needed(self.order, &planes, plane - planes.start + 2).end;
-            // SAFETY: the range contains particles of this slab after those filled at the start: no
-            // other thread accesses them.
+            // SAFETY: the range contains particles of this slab after those filled at the
+            // start: no other thread accesses them.
             unsafe { self.particles.fill(self.fluid.set, self.order, input.input, filled..end) };
             filled = end;
             lap(&mut since, &mut slab.state.times.sort);
@@ -142,8 +139,7 @@ impl<P: PairPrecision> Scheduler<'_, P> {
             unsafe { self.first(slab, sums, plane) };
             lap(&mut since, &mut slab.state.times.first);
             if plane > planes.start {
-                // SAFETY: only this thread's second pass reads slopes of a plane that is not the first
-                // of its slab.
+                // SAFETY: only this thread's second pass reads slopes of a plane that is not the first of its slab.
                 unsafe { self.excess(input, slab, sums.sums(), plane) };
                 lap(&mut since, &mut slab.state.times.excess);
             }
@@ -160,12 +156,10 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         }
     }
 
-    /// Evaluates ψ of the first plane of a thread slab, to which the last plane of another slab
-    /// contributes.
+    /// Evaluates ψ of the first plane of a thread slab, to which the last plane of another slab contributes.
     ///
     /// # Safety
-    /// The interior of all slabs is done. Other threads run the same function for other slabs, and
-    /// nothing else.
+    /// The interior of all slabs is done. Other threads run the same function for other slabs, and nothing else.
     pub unsafe fn excess_of_first(&self, input: &PassInput, slab: &mut ThreadSlab<P::Scalar>, sums: Sums) {
         let mut since = Instant::now();
         if !slab.planes.is_empty() {
@@ -175,8 +169,8 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         lap(&mut since, &mut slab.state.times.excess);
     }
 
-    /// Does the second pass of the first and of the last plane of a thread slab, and the forces of the
-    /// second and of the last.
+    /// Does the second pass of the first and of the last plane of a thread slab, and the forces
+    /// of the second and of the last.
     ///
     /// # Safety
     /// All slopes are complete, including those of the copies, and no thread writes any.
@@ -229,8 +223,7 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         }
     }
 
-    /// Writes the forces of the first plane of a thread slab, to which the last plane of another slab
-    /// contributes.
+    /// Writes the forces of the first plane of a thread slab, to which the last plane of another slab contributes.
     pub fn forces_of_first(&self, out: ForceSink, slab: &mut ThreadSlab<P::Scalar>, sums: Sums) {
         let mut since = Instant::now();
         if !slab.planes.is_empty() {

@@ -21,8 +21,7 @@ pub struct SlopeArrays<T> {
     stride: usize,
 }
 
-/// The slopes while passes run: a thread writes those of its slab, and reads those of its slab and of
-/// the next plane.
+/// The slopes while passes run: a thread writes those of its slab, and reads those of its slab and of the next plane.
 #[derive(Clone, Copy)]
 pub struct SharedSlopes<'a, T> {
     width: usize,
@@ -98,8 +97,7 @@ impl<'a, T: Scalar> SharedSlopes<'a, T> {
         let Slopes { packed, stride, .. } = self.slopes;
         let mut first = SLOPES_PER_BLOCK * particles.start;
         for eight in 0..packed.len() / stride {
-            // SAFETY: the caller promises that no other thread accesses the packed rows of these
-            // particles.
+            // SAFETY: the caller promises that no other thread accesses the packed rows of these particles.
             let to = unsafe { packed.slice_mut(first..first + SLOPES_PER_BLOCK * particles.len()) };
             match self.width {
                 2 => pack_few::<2, T>(slopes, to),
@@ -112,8 +110,7 @@ impl<'a, T: Scalar> SharedSlopes<'a, T> {
     }
 }
 
-/// Packs slopes, `width` of each particle, into row `eight`, which has eight slopes or the remaining
-/// ones.
+/// Packs slopes, `width` of each particle, into row `eight`, which has eight slopes or the remaining ones.
 fn pack<T: Scalar>(width: usize, eight: usize, slopes: &[f64], to: &mut [T]) {
     for (to, slopes) in to.as_chunks_mut::<SLOPES_PER_BLOCK>().0.iter_mut().zip(slopes.chunks_exact(width)) {
         for (to, slope) in to.iter_mut().zip(&slopes[SLOPES_PER_BLOCK * eight..]) {

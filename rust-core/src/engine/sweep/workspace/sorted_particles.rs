@@ -25,8 +25,7 @@ pub struct SortedParticles<R> {
     owned_of_column: Vec<OwnedOfColumn>,
 }
 
-/// The arrays while passes run: threads fill the particles of their own slabs, and read these and one
-/// plane more.
+/// The arrays while passes run: threads fill the particles of their own slabs, and read these and one plane more.
 pub struct SharedParticles<'a, R> {
     pub x: [SharedSlice<'a, f32>; 3],
     pub fixed16_scale: FixedPoint16,
@@ -55,8 +54,7 @@ impl<R: PackedParticle> SortedParticles<R> {
         self.find_owned(order);
     }
 
-    /// If there are ghosts, finds their flags, and the owned particles of each column, including the
-    /// copies.
+    /// If there are ghosts, finds their flags, and the owned particles of each column, including the copies.
     fn find_owned(&mut self, order: &CellOrder) {
         self.owned_of_column.clear();
         self.owned_bits.clear();

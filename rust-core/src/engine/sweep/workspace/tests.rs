@@ -69,8 +69,7 @@ fn workspace<P: PairPrecision>(dimensions: usize, set: InstructionSet, threads: 
     Workspace::new(&Plan::new(&fluid).unwrap(), set, threads)
 }
 
-/// Box geometries, each with points that reach beyond it by fractions of the edges, and the number of
-/// owned points.
+/// Box geometries, each with points that reach beyond it by fractions of the edges, and the number of owned points.
 fn geometries() -> Vec<(BoxGeometry, Points, usize)> {
     let straight = Matrix3::from_diagonal(&[9.0, 7.0, 8.0].into());
     let leaning = Matrix3::new(9.0, 1.5, -2.0, 0.0, 7.0, 0.7, 0.0, 0.0, 8.0);
@@ -128,8 +127,7 @@ fn sorted<P: PairPrecision>(
     workspace
 }
 
-/// Checks that all particles that are not left out occur once, in the cell of their position, with the
-/// right coordinates.
+/// Checks that all particles that are not left out occur once, in the cell of their position, with the right coordinates.
 fn is_sorted<P: PairPrecision>(workspace: &Workspace<P>, points: &Points, owned: usize) {
     let (geometry, grid, n) = (&workspace.order.geometry, &workspace.order.grid, workspace.order.particles());
     let takes_part = |k: &usize| points.kind[*k] == 1 && (*k < owned || geometry.contains(&points.x[*k]));

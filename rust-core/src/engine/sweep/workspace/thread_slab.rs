@@ -11,8 +11,7 @@ use psidpd_passes::simd::Scalar;
 use psidpd_passes::tally::Tally;
 use std::ops::Range;
 
-/// Number of planes of a thread slab whose pairs are in memory at once: the first, the last, and two
-/// between.
+/// Number of planes of a thread slab whose pairs are in memory at once: the first, the last, and two between.
 pub const KEPT_PLANES: usize = 4;
 
 /// The state of a thread that lasts from one evaluation to the next.
@@ -69,8 +68,7 @@ pub struct ThreadSlab<'a, T> {
 }
 
 impl<T: Scalar> PlaneResults<T> {
-    /// Makes room for all particles of an order, `width` densities each, and for the pairs of all
-    /// planes or of a few.
+    /// Makes room for all particles of an order, `width` densities each, and for the pairs of all planes or of a few.
     pub fn make_room(&mut self, order: &CellOrder, slabs: usize, width: usize, keeps_all: bool) {
         let kept = if keeps_all { order.grid.planes } else { KEPT_PLANES * slabs };
         self.keeps_all = keeps_all;
@@ -123,8 +121,7 @@ fn take<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
 }
 
 impl<T> ThreadSlab<'_, T> {
-    /// The buffers of a pass over a plane of the slab, its pairs for the second pass, and its energies
-    /// and virials.
+    /// The buffers of a pass over a plane of the slab, its pairs for the second pass, and its energies and virials.
     pub fn plane(&mut self, plane: usize) -> (&mut PairBuffers<T>, &mut InRangePairs<T>, &mut Tally) {
         let number = plane - self.planes.start;
         let kept = match plane {

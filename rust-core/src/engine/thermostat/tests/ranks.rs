@@ -3,8 +3,7 @@
 use super::*;
 use crate::engine::surroundings::Around;
 
-/// The particles of one rank: the host's numbers of owned particles and of the owners of ghosts, and
-/// the ghosts' periods.
+/// The particles of one rank: the host's numbers of owned particles and of the owners of ghosts, and the ghosts' periods.
 struct Piece {
     owned: Vec<usize>,
     ghosts: Vec<(usize, [f64; 3])>,

@@ -75,8 +75,7 @@ impl Loop for CountRange<'_> {
 }
 
 impl Count<'_> {
-    /// All types from this one on have a species; hosts that number types from one have no species for
-    /// type zero.
+    /// All types from this one on have a species; hosts that number types from one have no species for type zero.
     pub fn first_kind(input: &Input) -> u32 {
         input.species_of_type.iter().rposition(|s| *s < 0).map_or(0, |last| last as u32 + 1)
     }

@@ -76,8 +76,7 @@ impl<'a> Fractions<'a> {
         far == 0
     }
 
-    // Both cases are rare: inlined, the two functions would prevent the loops around them from
-    // vectorising.
+    // Both cases are rare: inlined, the two functions would prevent the loops around them from vectorising.
 
     /// Corrects fractions in a tilted box.
     #[inline(never)]

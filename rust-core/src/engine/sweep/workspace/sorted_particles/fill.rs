@@ -20,8 +20,7 @@ impl<R: PackedParticle> SharedParticles<'_, R> {
     /// the last particle. Whole vectors are written beyond the last.
     ///
     /// # Safety
-    /// No other thread accesses these places meanwhile, nor, if they include the last particle, those
-    /// after it.
+    /// No other thread accesses these places meanwhile, nor, if they include the last particle, those after it.
     pub unsafe fn fill(&self, set: InstructionSet, order: &CellOrder, input: &Input, places: Range<usize>) {
         let (moving, multispecies) = (input.thermostat.is_some(), !self.species.is_empty());
         assert!(places.end <= order.particles(), "places of particles");
@@ -173,8 +172,7 @@ impl<'a> Coordinates<'a> {
             Coordinates::Orthogonal { scale, edge_words } => {
                 for c in 0..3 {
                     for (lane, u) in u[c][..VECTOR_PADDING].iter().enumerate() {
-                        // The fraction is halved, as vectors convert signed numbers only: 24 bits are
-                        // left either way.
+                        // The fraction is halved, as vectors convert signed numbers only: 24 bits are left either way.
                         x[c][lane] = (*u >> 1) as i32 as f32 * scale[c];
                         fixed16[c][lane] = ((*u as u64 * edge_words[c] as u64) >> 32) as u16;
                     }
@@ -185,8 +183,7 @@ impl<'a> Coordinates<'a> {
                     let point = geometry.point(&[0, 1, 2].map(|c| u[c][lane] as f64 / TWO_TO_32));
                     for c in 0..3 {
                         x[c][lane] = point[c] as f32;
-                        // SAFETY: the point is in the box, whose fractions `Fractions` has computed
-                        // from finite positions.
+                        // SAFETY: the point is in the box, whose fractions `Fractions` has computed from finite positions.
                         fixed16[c][lane] = unsafe { fixed16_scale.coordinate(point[c]) };
                     }
                 }
