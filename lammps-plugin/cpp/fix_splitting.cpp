@@ -121,7 +121,7 @@ PairPsi *FixSplitting::find_pair()
     if (!one) one = force->pair_match(name, 1, 1);
     if (!one) continue;
     if (found || (force->pair_match(name, 1, 2) && force->pair != one))
-      stop("the thermostat of one pair style is all that it has, and there are several in the hybrid");
+      stop("uses the thermostat of one pair style, and the hybrid contains several");
     found = dynamic_cast<PairPsi *>(one);
   }
   if (!found) stop("needs pair_style dpd/psi, mdpd/psi or dpd/spline, whose thermostat it is");
@@ -138,7 +138,7 @@ void FixSplitting::init()
   if (strcmp(update->unit_style, "lj") != 0)
     stop(std::string("works with 'units lj' only, found 'units ") + update->unit_style + "'");
   const std::string why = pair->why_not_apart();
-  if (!why.empty()) stop(why + ": that cannot be had with drag and noise apart from the forces");
+  if (!why.empty()) stop(why + ": not supported with drag and noise apart from the forces");
   check_others();
 }
 
@@ -149,7 +149,7 @@ void FixSplitting::check_others()
     const Fix *other = modify->fix[k];
     if (other == this) continue;
     const std::string name = std::string("fix ") + other->id + " (" + other->style + ")";
-    if (dynamic_cast<const FixSplitting *>(other)) stop("there can be one only, and " + name + " is another");
+    if (dynamic_cast<const FixSplitting *>(other)) stop("only one such fix is allowed, and there is also " + name);
     if (other->time_integrate)
       stop(name + " integrates too, and its atoms would be elsewhere when forces are computed: remove it; atoms that "
                   "no fix integrates stay where they are");

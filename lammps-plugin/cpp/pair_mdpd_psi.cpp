@@ -57,7 +57,7 @@ class PairMDPDPsi : public PairTable {
   rust::Box<Style> make_from(double kt, rust::Slice<const Coefficients> pairs) override
   {
     if (lucy && !atom->mass)
-      complain("'law lucy' weighs densities by the masses of types, which this atom style has not");
+      complain("'law lucy' weighs densities by the masses of types, which this atom style does not have");
     built_masses = masses();
     return warren_style(kt, pairs, atom->ntypes, domain->dimension, {built_masses.data(), built_masses.size()});
   }

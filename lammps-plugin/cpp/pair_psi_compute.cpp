@@ -248,8 +248,8 @@ double PairPsi::single(int i, int j, int itype, int jtype, double rsq, double, d
   // Without densities a pair's energy depends on its distance alone, and not on the last evaluation.
   const bool many_body = (*style)->slope_width() > 0;
   if (many_body && !is_pair(i, j, itype, jtype, rsq))
-    stop_here("asked for the energy of a pair that is not there, as of an atom to be inserted or moved: where energies "
-              "belong to particles no single pair tells it; fix gcmc and fix widom need full_energy with a many-body "
+    stop_here("asked for the energy of a pair that the last evaluation does not contain, as of an atom to be inserted or "
+              "moved: a many-body energy is no sum over pairs; fix gcmc and fix widom need full_energy with a many-body "
               "style, and pair_write cannot be used");
   if (many_body && without_slopes == std::array<int, 2>{atom->nlocal, atom->nghost}) {
     without_slopes = {-1, -1};

@@ -55,6 +55,7 @@ impl Images {
         if index < self.owned { index } else { self.owner[index - self.owned] as usize }
     }
 
+    /// The number of ghosts.
     pub fn ghosts(&self) -> usize {
         self.owner.len()
     }

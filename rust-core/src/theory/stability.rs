@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 /// Whether a homogeneous fluid is stable against waves of density and composition.
 ///
-/// All from the smallest eigenvalue of `S(k)⁻¹`, see [`MeanField::inverse_structure_factor`].
+/// The fields derive from the smallest eigenvalue of `S(k)⁻¹`, see [`MeanField::inverse_structure_factor`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stability {
     /// Whether the eigenvalue is positive at every `k`; false also where ψ is singular.

@@ -121,6 +121,7 @@ impl Pool {
         self.process != std::process::id()
     }
 
+    /// The number of threads, including the caller's.
     pub fn threads(&self) -> usize {
         1 + self.workers.len()
     }

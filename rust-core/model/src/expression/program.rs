@@ -31,33 +31,33 @@ pub(super) struct Instruction {
 /// Operations on operands a, b … and a constant c.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) enum Operation {
-    /// constant c
+    /// Sets the constant c.
     Set,
-    /// sum a + b
+    /// Computes a + b.
     Add,
-    /// difference a − b
+    /// Computes a − b.
     Subtract,
-    /// product a · b
+    /// Computes a · b.
     Multiply,
-    /// quotient a / b
+    /// Computes a / b.
     Divide,
-    /// negative −a
+    /// Computes −a.
     Negate,
-    /// sum c + a
+    /// Computes c + a.
     Shift,
-    /// difference c − a
+    /// Computes c − a.
     SubtractFrom,
-    /// product c · a
+    /// Computes c · a.
     Scale,
-    /// quotient c / a
+    /// Computes c / a.
     DivideInto,
-    /// power a ^ b
+    /// Computes a ^ b.
     Power,
-    /// power a ^ c
+    /// Computes a ^ c.
     PowerConstant,
-    /// function f(a)
+    /// Computes a function f(a).
     Unary(Unary),
-    /// c if a ≤ b, and d otherwise
+    /// Selects c if a ≤ b, and d otherwise.
     Select,
 }
 

@@ -16,6 +16,7 @@ use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::tally::{Tally, Want};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+/// Evaluates configurations of one fluid at one temperature.
 #[derive(Debug)]
 pub struct Evaluator {
     fluid: Fluid,

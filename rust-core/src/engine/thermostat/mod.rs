@@ -190,6 +190,7 @@ impl PairThermostat {
         Ok(())
     }
 
+    /// Draws the noise of the pairs of the last search.
     pub fn draw(&mut self, pool: &Pool, seed: u64, step: u64, stream: Stream, law: Law) {
         let noise = [0, 1].map(|k| PairNoise::of_stream(seed, step, 1 + 2 * stream.0 + k));
         self.noise = noise;
