@@ -1,7 +1,7 @@
 //! Compiles the C++ pair styles against one LAMMPS.
 //!
-//! Without `PSIDPD_LAMMPS_INCLUDE` no LAMMPS is at hand: only the Rust side is built, so that the
-//! workspace builds and tests anywhere, and the library has no `lammpsplugin_init`.
+//! Without `PSIDPD_LAMMPS_INCLUDE` there are no LAMMPS headers: only the Rust side is built, so that
+//! the workspace builds and tests anywhere, and the library has no `lammpsplugin_init`.
 
 use std::env;
 use std::path::PathBuf;
@@ -23,7 +23,7 @@ fn main() {
         .expect("PSIDPD_LAMMPS_VERSION: the number that lammps_version() of the host returns, like 20250722");
     println!("cargo::rustc-cfg=lammps_host");
     println!("cargo::rustc-env=PSIDPD_LAMMPS_VERSION={version}");
-    // LAMMPS really unloads plugins, and a Rust library must not be.
+    // LAMMPS unloads plugins with dlclose, and a Rust library must stay loaded.
     println!("cargo::rustc-link-arg-cdylib=-Wl,-z,nodelete");
 
     let mut build = cxx_build::bridge("src/bridge.rs");
@@ -50,9 +50,9 @@ fn main() {
         .define("LAMMPS_SMALLBIG", None)
         .define("MPICH_SKIP_MPICXX", None)
         .define("OMPI_SKIP_MPICXX", None);
-    // The host's headers are not ours to warn about.
+    // Warnings in the host's headers are not shown.
     build.flag("-isystem").flag(lammps.as_os_str());
-    // Debian 12 packages the headers without the fmt that they include.
+    // Debian 12 packages LAMMPS's headers without the fmt headers that they include.
     if !lammps.join("fmt/format.h").is_file() {
         build.include("compat");
     }

@@ -30,8 +30,9 @@ using namespace psidpd;
 
 namespace {
 
-// Shares of a step in the first kick and in the last, as in the native runner: small errors of averages in liquids with
-// two stages; of fourth order with the force gradient, beside its ξ.
+// Shares of a step in the first kick and in the last, as in the native runner. With two stages the
+// share makes the errors of averages in liquids small; with the force gradient it makes the scheme of
+// fourth order, together with ξ.
 constexpr double LAMBDA_OF_TWO_STAGES = 0.21;
 constexpr double LAMBDA_OF_FOURTH_ORDER = 1.0 / 6.0;
 constexpr double GRADIENT_OF_FOURTH_ORDER = 1.0 / 24.0;
@@ -50,11 +51,11 @@ FixSplitting::FixSplitting(LAMMPS *lmp, int narg, char **arg) :
 {
   time_integrate = 1;
   dynamic_group_allow = 1;
-  // Iterations of the thermostat.
+  // compute_scalar() returns the iterations of the thermostat.
   scalar_flag = 1;
   global_freq = 1;
   extscalar = 0;
-  // The virial of drag and noise.
+  // compute_vector() and the global virial contain the virial of drag and noise.
   virial_global_flag = 1;
   thermo_virial = 1;
 
@@ -116,11 +117,11 @@ PairPsi *FixSplitting::find_pair()
   PairPsi *found = nullptr;
   for (const char *name : {"dpd/psi", "mdpd/psi", "dpd/spline"}) {
     Pair *one = force->pair_match(name, 1, 0);
-    // A hybrid may have a style several times.
+    // A hybrid may contain one style several times.
     if (!one) one = force->pair_match(name, 1, 1);
     if (!one) continue;
     if (found || (force->pair_match(name, 1, 2) && force->pair != one))
-      stop("the thermostat of one pair style is all that it has, and there are several in the hybrid");
+      stop("uses the thermostat of one pair style, and the hybrid contains several");
     found = dynamic_cast<PairPsi *>(one);
   }
   if (!found) stop("needs pair_style dpd/psi, mdpd/psi or dpd/spline, whose thermostat it is");
@@ -130,25 +131,25 @@ PairPsi *FixSplitting::find_pair()
 void FixSplitting::init()
 {
   pair = find_pair();
-  // Nothing moves by it while LAMMPS minimises.
+  // The fix moves no atom while LAMMPS minimises.
   if (update->whichflag == 2) return;
   if (strcmp(update->integrate_style, "verlet") != 0)
     stop(std::string("works with 'run_style verlet' only, found '") + update->integrate_style + "'");
   if (strcmp(update->unit_style, "lj") != 0)
     stop(std::string("works with 'units lj' only, found 'units ") + update->unit_style + "'");
   const std::string why = pair->why_not_apart();
-  if (!why.empty()) stop(why + ": that cannot be had with drag and noise apart from the forces");
+  if (!why.empty()) stop(why + ": not supported with drag and noise apart from the forces");
   check_others();
 }
 
-// Whoever else moves atoms, or adds forces as if there were one evaluation a step.
+// Stops at fixes that also move atoms, or that expect one evaluation of forces in each step.
 void FixSplitting::check_others()
 {
   for (int k = 0; k < modify->nfix; k++) {
     const Fix *other = modify->fix[k];
     if (other == this) continue;
     const std::string name = std::string("fix ") + other->id + " (" + other->style + ")";
-    if (dynamic_cast<const FixSplitting *>(other)) stop("there can be one only, and " + name + " is another");
+    if (dynamic_cast<const FixSplitting *>(other)) stop("only one such fix is allowed, and there is also " + name);
     if (other->time_integrate)
       stop(name + " integrates too, and its atoms would be elsewhere when forces are computed: remove it; atoms that "
                   "no fix integrates stay where they are");
@@ -196,7 +197,7 @@ void FixSplitting::final_integrate()
   kick(0.5 * dt);
   drift(0.5 * dt);
   reflect();
-  // Who looks at ends of steps finds ghosts there; and energies, where they are asked for.
+  // Fixes and computes that read the state at the end of a step find ghosts and, where asked for, energies there.
   const bigint step = update->ntimestep;
   const int eflag = (update->eflag_global == step ? 1 : 0) | (update->eflag_atom == step ? 2 : 0);
   if (eflag || vflag_of_step) {
@@ -232,7 +233,7 @@ void FixSplitting::drift(double h)
       for (int k = 0; k < 3; k++) x[i][k] += h * v[i][k];
 }
 
-// Other fixes that have a turn when atoms have moved, as those that make bonds, have it once a step.
+// Other fixes that act after atoms have moved, like those that make bonds, act once a step.
 void FixSplitting::reflect()
 {
   for (int k = 0; k < modify->nfix; k++)
@@ -246,7 +247,7 @@ void FixSplitting::act()
   double impulses[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
   const double times = static_cast<double>(every);
   pair->heat(groupbit, times * update->dt, uniform, vflag_global != 0, impulses);
-  // That of a mean force over the step.
+  // The virial is that of the mean force over the step.
   if (vflag_global)
     for (int k = 0; k < 6; k++) virial[k] += times * impulses[k];
 }
@@ -259,19 +260,19 @@ void FixSplitting::follow()
     comm->forward_comm();
 }
 
-// Whether atoms have gone too far since ghosts were last found, where LAMMPS is to look at that.
+// Whether atoms have moved too far since ghosts were last found. False if LAMMPS does not check distances.
 bool FixSplitting::are_far()
 {
   if (!neighbor->dist_check) return false;
-  // This is not a step of its own: what LAMMPS counts as dangerous is not.
+  // This check is not part of a step of LAMMPS: its count of dangerous builds stays as it was.
   const bigint dangerous = neighbor->ndanger;
   const bool far = neighbor->check_distance();
   neighbor->ndanger = dangerous;
   return far;
 }
 
-// As at the beginning of a step in which LAMMPS builds lists anew, but for fixes that insert or remove atoms there: their
-// turn comes in that step.
+// Does what LAMMPS does at the beginning of a step with new lists, without the fixes that insert or
+// remove atoms: these act at their own step.
 void FixSplitting::find_ghosts_anew()
 {
   for (int k = 0; k < modify->nfix; k++) {
@@ -301,7 +302,7 @@ void FixSplitting::compute_forces(int eflag, int vflag)
     memset(&atom->f[0][0], 0, 3 * reach * sizeof(double));
     if (atom->torque_flag) memset(&atom->torque[0][0], 0, 3 * reach * sizeof(double));
 #if __has_include("atom_vec.h")
-    // Forces on what atoms of some styles have beside positions; installed headers may not know of them.
+    // Some atom styles have forces on more than positions, which installed headers may not declare.
     if (atom->avec->forceclearflag) atom->avec->force_clear(0, reach * sizeof(double));
 #endif
   }

@@ -27,7 +27,7 @@ class FixSplitting : public LAMMPS_NS::Fix {
   FixSplitting(const FixSplitting &) = delete;
   FixSplitting &operator=(const FixSplitting &) = delete;
 
-  // The fix of this style that there is, if any.
+  // The fix of this style in the simulation, or null.
   static FixSplitting *find(const LAMMPS_NS::Modify *modify);
 
   int setmask() override;
@@ -37,7 +37,7 @@ class FixSplitting : public LAMMPS_NS::Fix {
   void final_integrate() override;
   double compute_scalar() override;
 
-  // Shifts go with their atoms to other ranks.
+  // Shifts move with their atoms to other ranks.
   void grow_arrays(int most) override;
   void copy_arrays(int from, int to, int delflag) override;
   int pack_exchange(int i, double *buf) override;
@@ -47,40 +47,40 @@ class FixSplitting : public LAMMPS_NS::Fix {
  private:
   [[noreturn]] void stop(const std::string &text, const char *file = __builtin_FILE(), int line = __builtin_LINE());
   void check_others();
-  // The pair style whose thermostat this is.
+  // The pair style whose drag and noise this fix applies.
   PairPsi *find_pair();
 
   // v += h f/m of the atoms of the group.
   void kick(double h);
-  // x += h v of the same.
+  // x += h v of the atoms of the group.
   void drift(double h);
-  // Lets walls reflect what has moved, beside their own turn.
+  // Lets fixes of walls reflect atoms that have moved, in addition to their own call.
   void reflect();
-  // Brings ghosts to where their atoms are, with new ones where atoms have gone too far since the last were found.
+  // Updates positions of ghosts, and finds new ghosts where atoms have moved too far since the last search.
   void follow();
   bool are_far();
   void find_ghosts_anew();
-  // x += ξΔt² f/m of the atoms of the group, all forces there, and x as before.
+  // Moves the atoms of the group by ξΔt² f/m, computes all forces there, and restores x.
   void compute_displaced_forces();
   void keep_shifts();
-  // Adds the shifts to x, which restore() takes back.
+  // Adds the shifts to x; restore() subtracts them.
   void shift();
   void restore();
-  // All forces at the present positions, as a step of run_style verlet computes them.
+  // Computes all forces at the present positions, as a step of run_style verlet does.
   void compute_forces(int eflag, int vflag);
   void act();
 
   enum class Scheme { two_stage, force_gradient, aboba };
   Scheme scheme = Scheme::two_stage;
   double lambda;
-  // ξ.
+  // Coefficient ξ of the force gradient.
   double gradient;
   LAMMPS_NS::bigint every = 1;
   bool uniform = false;
   PairPsi *pair = nullptr;
-  // Of the present step.
+  // Flag of the virial of the present step.
   int vflag_of_step = 0;
-  // Of force-gradient, for each atom: how far it is displaced, and where it was.
+  // For force-gradient: the displacement of each atom, and its position before.
   double **shifts = nullptr;
   std::vector<double> home;
 };

@@ -55,7 +55,7 @@ double FixSplitting::memory_usage()
   return (shifts ? 3.0 * atom->nmax : 0.0) * sizeof(double) + static_cast<double>(home.capacity()) * sizeof(double);
 }
 
-// Atoms never change ranks while they are displaced: behind a side that is not periodic they would be lost.
+// Displaced atoms never change ranks: LAMMPS would lose them behind a side that is not periodic.
 void FixSplitting::compute_displaced_forces()
 {
   double **f = atom->f;

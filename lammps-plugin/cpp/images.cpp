@@ -11,7 +11,7 @@ using namespace psidpd;
 
 namespace {
 
-// How many images of each side are watched.
+// Number of images that are watched on each side.
 constexpr int SAMPLE = 4;
 
 }    // namespace
@@ -63,7 +63,7 @@ bool Images::have_moved(const Atom *atom, const Domain *domain) const
     const auto &p = one.periods;
     const double *ghost = atom->x[one.ghost], *of = atom->x[one.of];
     const double apart[3] = {p[0] * h[0] + p[5] * h[5] + p[4] * h[4], p[1] * h[1] + p[3] * h[3], p[2] * h[2]};
-    // Not a number is elsewhere too.
+    // A distance that is not a number counts as moved.
     for (int k = 0; k < 3; k++)
       if (!(std::fabs(ghost[k] - of[k] - apart[k]) <= near)) return true;
   }

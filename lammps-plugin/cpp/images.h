@@ -16,24 +16,24 @@ namespace psidpd {
 
 class Images {
  public:
-  // Begins anew, before a communication that carries one number for each ghost: along which directions this rank has
-  // all of the box, and how many atoms and ghosts it has.
+  // Starts a communication that carries one number for each ghost. Stores along which directions this
+  // rank has all of the box, and how many atoms and ghosts it has.
   void begin(const std::array<bool, 3> &closed, int owned, int ghosts);
-  // What the communication calls. Images along closed directions are packed and unpacked by the rank itself.
+  // LAMMPS's communication calls these. The rank itself packs and unpacks images along closed directions.
   void pack(int n, const int *list, double *buf, int pbc_flag, const int *pbc);
   void unpack(int n, int first, const double *buf);
 
-  // Whether what was told is of so many ghosts, and of these closed directions.
+  // Whether the stored flags belong to this number of ghosts and to these closed directions.
   bool know(const std::array<bool, 3> &closed, int ghosts) const { return closed == along && ghosts == told; }
   // For each ghost whether it is an image along a closed direction.
   const bool *flags() const { return image.get(); }
 
-  // Whether images are elsewhere than a period from their atoms: some commands strain atoms and ghosts, and leave
-  // the box as it is. A few of every side are looked at.
+  // Whether an image is no longer a period from its atom: some commands strain atoms and ghosts, and
+  // keep the box. Only a few images of each side are checked.
   bool have_moved(const LAMMPS_NS::Atom *atom, const LAMMPS_NS::Domain *domain) const;
 
  private:
-  // A ghost, what it is an image of, and how many periods apart they are: x, y, z, yz, xz, xy.
+  // A ghost, the atom that it is an image of, and the number of periods between them: x, y, z, yz, xz, xy.
   struct Watched {
     int ghost, of;
     std::array<int, 6> periods;
@@ -43,7 +43,7 @@ class Images {
   int told = 0, owned = 0, room = 0;
   std::unique_ptr<bool[]> image;
   std::vector<Watched> watched;
-  // Those of the swap that is being packed, numbered from the first ghost of it.
+  // Images of the swap that is being packed, numbered from the first ghost of it.
   std::vector<Watched> packed;
 };
 

@@ -10,10 +10,10 @@ using namespace psidpd;
 namespace {
 
 constexpr size_t most_named = 5;
-// Words of the set of IDs for each atom, at most.
+// The set of IDs has at most this many words for each atom.
 constexpr bigint most_words = 4;
 
-// The atoms of all ranks, as a set of so many words.
+// The IDs of the atoms of all ranks, as a set of bits in `words` words.
 std::vector<uint64_t> present(const Atom *atom, MPI_Comm world, size_t words)
 {
   std::vector<uint64_t> set(words, 0);
@@ -25,7 +25,7 @@ std::vector<uint64_t> present(const Atom *atom, MPI_Comm world, size_t words)
   return set;
 }
 
-// How many atoms LAMMPS counts that no rank has.
+// Number of atoms that LAMMPS counts and that no rank has.
 bigint lost(const Atom *atom, MPI_Comm world)
 {
   bigint here = atom->nlocal;

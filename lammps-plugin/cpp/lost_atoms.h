@@ -20,13 +20,13 @@ class LostAtoms {
  public:
   // Remembers the IDs of the atoms of all ranks.
   void begin(const LAMMPS_NS::Atom *atom, MPI_Comm world);
-  // The first time that atoms are lost since then: how many, and which of those remembered.
+  // Describes lost atoms at the first call after a loss: their number, and the remembered IDs among them.
   std::string missing(const LAMMPS_NS::Atom *atom, MPI_Comm world);
 
  private:
   // A bit for each ID; empty if IDs are too far apart.
   std::vector<uint64_t> known;
-  // How many LAMMPS still counts that were lost before.
+  // Number of atoms that were lost before begin() and that LAMMPS still counts.
   LAMMPS_NS::bigint before = 0;
   bool told = false;
 };

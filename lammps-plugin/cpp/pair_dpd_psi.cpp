@@ -39,7 +39,7 @@ class PairDPDPsi : public PairPsi {
     return style_from_text(source, text, update->unit_style, kt, names, domain->dimension);
   }
 
-  // The model has told which.
+  // The engine has checked the units of the model.
   void check_units(const std::string &) override {}
 
   std::vector<std::string> coefficients() override
@@ -68,9 +68,9 @@ class PairDPDPsi : public PairPsi {
       for (int j = i; j <= atom->ntypes; j++) setflag[i][j] = given[i - 1] != "NULL" && given[j - 1] != "NULL";
   }
 
-  // Whether pair_coeff has come since pair_style.
+  // Whether pair_coeff has been read since pair_style.
   bool given = false;
-  // The model file, which a restart file carries along.
+  // The model file; restart files contain its text.
   std::string source, text;
   rust::Vec<rust::String> names;
 };
@@ -86,7 +86,7 @@ void PairDPDPsi::coeff(int narg, char **arg)
   if (!allocated) allocate();
   if (given) warn(std::string("this pair_coeff replaces the model ") + source + " of the one before");
 
-  // As other styles with files: here, or where LAMMPS_POTENTIALS says.
+  // The file is searched as other styles do: in the working folder, then in LAMMPS_POTENTIALS.
   std::string path = utils::get_potential_file_path(arg[2]);
   if (path.empty()) path = arg[2];
   set_names({arg + 3, arg + narg});
@@ -100,7 +100,7 @@ void PairDPDPsi::coeff(int narg, char **arg)
   }
   if (!trouble.empty()) stop(trouble);
   given = true;
-  // Built anew with all that belongs to it.
+  // init_style() builds a new engine from the new model.
   style.reset();
 }
 

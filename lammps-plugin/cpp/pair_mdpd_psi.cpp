@@ -57,7 +57,7 @@ class PairMDPDPsi : public PairTable {
   rust::Box<Style> make_from(double kt, rust::Slice<const Coefficients> pairs) override
   {
     if (lucy && !atom->mass)
-      complain("'law lucy' weighs densities by the masses of types, which this atom style has not");
+      complain("'law lucy' weighs densities by the masses of types, which this atom style does not have");
     built_masses = masses();
     return warren_style(kt, pairs, atom->ntypes, domain->dimension, {built_masses.data(), built_masses.size()});
   }
@@ -65,7 +65,7 @@ class PairMDPDPsi : public PairTable {
   bool is_stale() override { return PairTable::is_stale() || masses() != built_masses; }
 
  private:
-  // The built-in weighs densities by the masses of the neighbours' types; none count without 'law lucy'.
+  // LAMMPS's mdpd weighs densities by the masses of the neighbours' types. Without 'law lucy' there are no such weights.
   std::vector<double> masses() const
   {
     if (!lucy || !atom->mass) return {};

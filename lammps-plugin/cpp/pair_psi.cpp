@@ -49,7 +49,7 @@ PairPsi::PairPsi(LAMMPS *lmp, const char *name) : Pair(lmp), name(name)
   single_enable = 1;
   restartinfo = 1;
   manybody_flag = 1;
-  // The virial is summed pair by pair: it needs no forces on ghosts.
+  // The engine sums the virial pair by pair: LAMMPS needs no forces on ghosts for it.
   no_virial_fdotr_compute = 1;
   nextra = 4;
   pvector = new double[nextra];
@@ -76,7 +76,7 @@ void PairPsi::warn(const std::string &text, const char *file, int line)
   if (comm->me == 0) error->warning(file, line, "Pair style " + name + ": " + text);
 }
 
-// Trouble on one rank stops all: the text names the particle.
+// An error on one rank stops all ranks: the text names the particle.
 void PairPsi::stop_here(const std::string &text, const char *file, int line)
 {
   error->one(file, line, "Pair style " + name + " at step " + std::to_string(update->ntimestep) + ": " + text);
@@ -120,7 +120,7 @@ void PairPsi::read_seed(const char *arg)
   seed = static_cast<uint64_t>(value);
 }
 
-// Keywords of every style, at the end of pair_style; the others are the style's own.
+// Reads the keywords that all styles share, at the end of pair_style; the other keywords belong to one style.
 void PairPsi::read_keywords(int first, int narg, char **arg)
 {
   mixed = false;
@@ -149,13 +149,13 @@ void PairPsi::settings(int narg, char **arg)
   arguments.assign(arg, arg + narg);
 }
 
-// Builds the engine, or brings it up to date: fix adapt may have changed what it was built with.
+// Builds the engine, or updates it: fix adapt may have changed its coefficients or the temperature.
 void PairPsi::refresh()
 {
   if (style && !is_stale() && kt() == built_kt) return;
   if (!(temperature > 0.0) || !std::isfinite(temperature))
     stop("the temperature must be positive, found " + std::to_string(temperature));
-  // A new engine knows of no special pairs and exclusions.
+  // A new engine has no special pairs and no exclusions.
   told_special = SIZE_MAX;
   told_marks = false;
   std::string trouble;
@@ -180,7 +180,7 @@ void PairPsi::init_style()
   check_callers();
   check_box();
   lost_atoms.begin(atom, world);
-  // Buffers are sized by this; what is sent later is never more.
+  // LAMMPS sizes its buffers by this; later communications never send more.
   comm_forward = static_cast<int>((*style)->variables());
 
   why_listed.clear();
@@ -194,14 +194,14 @@ void PairPsi::init_style()
   if (neighbor->nex_type + neighbor->nex_group > most_rules || neighbor->nex_mol > 1)
     because("more exclusions of neigh_modify than it can keep");
   if (neighbor->includegroup) because("neigh_modify include");
-  // These exclude a group of their own, and say so only when pair styles have asked for their lists.
+  // These fixes exclude a group of their own, and do so only after pair styles have requested their lists.
   for (int k = 0; k < modify->nfix; k++) {
     const char *fix = modify->fix[k]->style;
     for (const char *known : {"gcmc", "widom", "charge/regulation"})
       if (strcmp(fix, known) == 0) because(std::string("fix ") + known);
   }
   if (!why_listed.empty()) full_list = request_list(neighbor, this, instance_me, 0);
-  // With newton off a half list has the pairs of owned atoms with ghosts on both sides, which will do.
+  // With newton off a half list contains the pairs of owned atoms with ghosts on both sides, which is sufficient.
   if (!why_listed.empty() && !full_list && force->newton_pair)
     stop("with " + why_listed + " this version of LAMMPS needs 'newton off'");
 
@@ -211,7 +211,7 @@ void PairPsi::init_style()
   described = true;
 }
 
-// What has been asked for and does nothing, or less than nothing.
+// Warns of settings that have no effect, or that slow the run down.
 void PairPsi::advise()
 {
   if (lmp->suffix_enable)
@@ -226,7 +226,7 @@ std::string PairPsi::search()
 {
   if (why_listed.empty()) {
     std::string text = "own cell list every step; no neighbor list is requested";
-    // The only style of a simulation without bonds: nobody else leaves forces on ghosts either.
+    // Without bonds and other styles nothing else leaves forces on ghosts.
     if (comm->nprocs > 1 && force->newton && force->pair == this && atom->molecular == Atom::ATOMIC)
       text += "\n  advice        'newton off' saves sending back forces on ghosts: this style leaves none there";
     if (rules > 0) text += "\n  exclusions    pairs that neigh_modify excludes are left out";
@@ -248,7 +248,7 @@ double PairPsi::init_one(int i, int j)
   return (*style)->cutoff();
 }
 
-// The temperature may have been changed since pair_style gave it.
+// Writes the present temperature, which may have changed since pair_style gave it.
 void PairPsi::write_restart_settings(FILE *fp)
 {
   auto now = arguments;

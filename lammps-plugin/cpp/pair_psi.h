@@ -33,7 +33,7 @@ class PairPsi : public LAMMPS_NS::Pair {
   double single(int i, int j, int itype, int jtype, double rsq, double factor_coul, double factor_lj,
                 double &fforce) override;
   void *extract(const char *what, int &dim) override;
-  // Older versions of LAMMPS do not know it: no override.
+  // Older versions of LAMMPS do not declare this function: it has no override.
   virtual void *extract_peratom(const char *what, int &columns);
 
   void write_restart(FILE *fp) override;
@@ -45,46 +45,45 @@ class PairPsi : public LAMMPS_NS::Pair {
   void unpack_forward_comm(int n, int first, double *buf) override;
   double memory_usage() override;
 
-  // For the fix that has drag and noise apart from the forces: what keeps it from acting, or nothing.
+  // Why the fix that applies drag and noise apart from the forces cannot act; empty if it can.
   std::string why_not_apart() const;
-  // Changes the velocities of the atoms of a group by drag and noise that act for a time, at the positions where forces
-  // were last computed; adds the virial.
+  // Applies drag and noise for a time to the velocities of the atoms of a group, at the positions where
+  // forces were last computed; adds the virial.
   void heat(int groupbit, double time, bool uniform, bool wants_virial, double *virial);
-  // Iterations of the last time.
+  // Iterations of the thermostat in its last update.
   int iterations() { return style ? static_cast<int>((*style)->iterations()) : 0; }
 
  protected:
-  // Reads the arguments of pair_style.
   virtual void read_settings(int narg, char **arg) = 0;
-  // Builds the engine from what pair_coeff has given; may throw what the engine says.
+  // Builds the engine from the coefficients of pair_coeff; may throw an error of the engine.
   virtual rust::Box<Style> make_style(double kt) = 0;
-  // Whether coefficients differ from those the engine was built with.
+  // Whether coefficients differ from those that the engine was built with.
   virtual bool is_stale() { return false; }
-  // What pair_coeff has given, for restart files.
+  // The coefficients of pair_coeff, for restart files.
   virtual std::vector<std::string> coefficients() = 0;
   virtual void restore(const std::vector<std::string> &texts) = 0;
-  // Stops where the style does not fit the simulation.
+  // Stops if the style does not fit the simulation.
   virtual void check_host();
-  // Stops where units are none that the style works in; those of lj always are.
+  // Stops at units that the style does not support; it always supports lj.
   virtual void check_units(const std::string &units);
 
   // Reads keywords and values from argument `first` on.
   void read_keywords(int first, int narg, char **arg);
-  // Takes a keyword of the style's own.
+  // Reads a keyword of this style alone; returns whether it is known.
   virtual bool read_keyword(const std::string & /*key*/, const std::string & /*value*/) { return false; }
-  // What keywords there are, for messages.
+  // Names of the keywords, for messages.
   virtual std::string keywords() const { return "'precision' or 'threads'"; }
 
   void allocate();
-  // Temperature and seed of pair_style, checked.
+  // Read and check the temperature and the seed of pair_style.
   void read_temperature(const char *arg);
   void read_seed(const char *arg);
   double kt() const;
-  // Stops with "Pair style NAME: text", on all ranks; LAMMPS adds the place.
+  // Stops with "Pair style NAME: text", on all ranks; LAMMPS adds the file and the line.
   [[noreturn]] void stop(const std::string &text, const char *file = __builtin_FILE(), int line = __builtin_LINE());
-  // Says on one rank "Pair style NAME: text", with the place.
+  // Warns on one rank with "Pair style NAME: text", with the file and the line.
   void warn(const std::string &text, const char *file = __builtin_FILE(), int line = __builtin_LINE());
-  // Throws the text, for what make_style finds wrong.
+  // Throws the text, for errors that make_style finds.
   [[noreturn]] static void complain(const std::string &text);
 
   const std::string name;
@@ -98,7 +97,7 @@ class PairPsi : public LAMMPS_NS::Pair {
   void find_images();
   void find_densities(int all, const Request &request);
   void collect_pairs();
-  // Whether special_bonds gives bonded neighbors other factors than 1.
+  // Whether special_bonds gives bonded neighbors factors other than 1.
   bool is_scaled() const;
   // Whether atoms may see two images of each other.
   bool is_narrow() const;
@@ -114,12 +113,12 @@ class PairPsi : public LAMMPS_NS::Pair {
   void check_lost();
   void check_callers();
   void advise();
-  // Whether a pair is one of the last evaluation.
+  // Whether the last evaluation contained this pair.
   bool is_pair(int i, int j, int itype, int jtype, double rsq) const;
   std::string search();
   [[noreturn]] void stop_here(const std::string &text, const char *file = __builtin_FILE(),
                               int line = __builtin_LINE());
-  // Runs `work` and stops here with what it throws, once nothing of it is left on the stack.
+  // Runs `work`; stops with the text of its error, after the stack of `work` has been unwound.
   template <class Work>
   auto attempt(Work work, const char *file = __builtin_FILE(), int line = __builtin_LINE())
   {
@@ -141,22 +140,22 @@ class PairPsi : public LAMMPS_NS::Pair {
   bool described = false;
   std::vector<double *> density_rows;
 
-  // What a communication carries: columns of the slopes, which ghosts are images, or vectors.
+  // Content of a communication: columns of the slopes, flags of images, or vectors.
   enum class Carries { slopes, images, vectors };
   Carries carries = Carries::slopes;
   int first_column = 0;
 
   LostAtoms lost_atoms;
   Images images;
-  // Whether ghosts are elsewhere than their atoms say, in this evaluation.
+  // Whether ghosts are away from the images of their atoms, in this evaluation.
   bool strained = false;
 
-  // Whether a fix has drag and noise.
+  // Whether a fix applies drag and noise.
   bool apart = false;
-  // Of atoms and ghosts; masses of atoms.
+  // Vectors of atoms and ghosts; masses of atoms.
   std::vector<double> vectors, masses;
 
-  // Atoms and ghosts of an evaluation that left no slopes of ghosts; those that single() has asked for are there.
+  // Numbers of atoms and ghosts of an evaluation without slopes of ghosts; single() computes those that it needs.
   std::array<int, 2> without_slopes{-1, -1};
 
   // Why pairs come from LAMMPS's neighbor list; empty if the engine finds them.
@@ -164,14 +163,15 @@ class PairPsi : public LAMMPS_NS::Pair {
   bool full_list = true;
   std::vector<int32_t> pair_i, pair_j;
   std::vector<double> pair_factor;
-  // Bonded neighbors with a factor other than 1: the first so many are both atoms of this rank, the others have ghosts.
+  // Bonded neighbors with a factor other than 1. In the first `special_owned` pairs both atoms are of
+  // this rank; the others have ghosts.
   std::vector<SpecialPair> special;
   size_t special_owned = 0;
-  // How many of them the engine knows; SIZE_MAX if those that it knows are old.
+  // Number of special pairs that the engine has; SIZE_MAX if its pairs are outdated.
   size_t told_special = SIZE_MAX;
-  // Rules of neigh_modify for types and groups that a word has room for, with two sides each.
+  // Most rules of neigh_modify for types and groups: a word has room for the two sides of each.
   static constexpr int most_rules = 16;
-  // How many pairs of types, groups and molecules neigh_modify excluded when the style was set up, and who is of them.
+  // Number of pairs of types, groups and molecules that neigh_modify excluded at setup, and the marks of their members.
   int rules = 0;
   std::vector<uint32_t> marks;
   bool between_molecules = false;

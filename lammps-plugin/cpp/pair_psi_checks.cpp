@@ -1,4 +1,4 @@
-// What a simulation must be like for the style.
+// Checks that the simulation fits the style.
 
 #include "pair_psi.h"
 
@@ -31,7 +31,7 @@ void heights(const Domain *domain, double *height)
 
 }    // namespace
 
-// Coefficients are in the units of the simulation. Those of SI leave the range of single precision.
+// Coefficients are in the units of the simulation. Those in SI units leave the range of single precision.
 void PairPsi::check_units(const std::string &units)
 {
   if (units != "real" && units != "metal")
@@ -62,7 +62,7 @@ bool PairPsi::is_narrow() const
   return false;
 }
 
-// What works with energies of single pairs alone has nothing to work with where energies belong to particles.
+// Stops at callers that need energies of single pairs: a many-body energy belongs to particles.
 void PairPsi::check_callers()
 {
   if ((*style)->slope_width() == 0) return;
@@ -88,7 +88,7 @@ void PairPsi::check_box()
            "): images of a pair would share their noise; use a longer box");
 }
 
-// What a plane has no place for: older versions of LAMMPS fill several of them with a lattice.
+// Stops at atoms off the plane: older versions of LAMMPS fill several planes with a lattice.
 void PairPsi::check_plane()
 {
   if (domain->dimension != 2) return;
@@ -109,7 +109,7 @@ void PairPsi::check_ghosts()
   if (comm->mode != Comm::SINGLE) return;
   const double cutoff = (*style)->cutoff();
   double height[3] = {1.0, 1.0, 1.0};
-  // In a triclinic box LAMMPS counts in fractions of the box.
+  // In a triclinic box LAMMPS gives lengths as fractions of the box.
   if (domain->triclinic) heights(domain, height);
   for (int k = 0; k < domain->dimension; k++) {
     const double reach = comm->cutghost[k] * height[k];
@@ -119,7 +119,7 @@ void PairPsi::check_ghosts()
   }
 }
 
-// LAMMPS stops or goes on as 'thermo_modify lost' says; styles cannot see which.
+// 'thermo_modify lost' decides whether LAMMPS stops or continues; a style cannot read it.
 void PairPsi::check_lost()
 {
   const std::string text = lost_atoms.missing(atom, world);

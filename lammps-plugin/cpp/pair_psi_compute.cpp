@@ -1,4 +1,4 @@
-// Forces, and what is known of atoms and pairs after them.
+// Forces, and the values of atoms and pairs that are available after them.
 
 #include "pair_psi.h"
 
@@ -19,8 +19,9 @@
 using namespace LAMMPS_NS;
 using namespace psidpd;
 
-// Along periodic directions in which there is one rank only, all ghosts are images of what that rank has: the engine
-// goes round the box there instead. Not where images move at another speed, nor where some have none.
+// Along a periodic direction with one rank only, all ghosts are images of this rank's atoms: the engine
+// applies the period there instead. The exceptions are images that move at another speed, and boxes
+// where some images do not exist.
 Extent PairPsi::extent() const
 {
   Extent extent{};
@@ -33,7 +34,7 @@ Extent PairPsi::extent() const
   return extent;
 }
 
-// Whether all ghosts, if there are any, are images along closed directions.
+// Whether all ghosts are images along closed directions.
 bool PairPsi::is_alone(const Extent &extent) const
 {
   if (comm->nprocs > 1 || !why_listed.empty()) return false;
@@ -42,11 +43,11 @@ bool PairPsi::is_alone(const Extent &extent) const
   return true;
 }
 
-// Asks which ghosts are images along closed directions: who packs them knows.
+// Asks the rank that packs a ghost whether it is an image along a closed direction.
 void PairPsi::find_images()
 {
   const auto closed = extent().closed;
-  // All ranks agree on the box.
+  // All ranks have the same box and so decide alike.
   const bool none = !why_listed.empty() || closed == std::array<bool, 3>{};
   images.begin(closed, atom->nlocal, none ? 0 : atom->nghost);
   if (none) return;
@@ -56,10 +57,11 @@ void PairPsi::find_images()
   carries = Carries::slopes;
 }
 
-// Which ghosts are images along closed directions. Where that is not known the box is opened, and all ghosts are taken.
+// Flags of the ghosts that are images along closed directions. Where these are not known, the box is
+// opened and all ghosts are used.
 rust::Slice<const bool> PairPsi::left_out(Extent &extent, const Request &request) const
 {
-  // Only what was closed when ghosts were found has all its images told.
+  // Images are flagged only along directions that were closed when ghosts were found.
   if (!strained && images.know(extent.closed, atom->nghost) && (*style)->fits(extent, request))
     return {images.flags(), static_cast<size_t>(atom->nghost)};
   extent.closed = {};
@@ -84,11 +86,11 @@ void PairPsi::find_densities(int all, const Request &request)
                      {pair_j.data(), pair_j.size()}, {pair_factor.data(), pair_factor.size()});
 }
 
-// Slopes from owners to ghosts.
+// Sends slopes from owners to ghosts.
 void PairPsi::forward()
 {
   const int width = static_cast<int>((*style)->slope_width());
-  // Inside a hybrid LAMMPS has sized its buffers before it knew of our columns; those for positions fit.
+  // Inside a hybrid LAMMPS has sized its buffers before it knew the number of our columns; its buffers fit positions.
   const int most = force->pair == this ? width : 3;
   for (first_column = 0; first_column < width; first_column += comm_forward) {
     comm_forward = std::min(most, width - first_column);
@@ -124,7 +126,7 @@ void PairPsi::compute(int eflag, int vflag)
   Style &fluid = **style;
 
   Request request;
-  // A minimiser goes downhill in U: drag and noise have no place there.
+  // A minimiser follows the gradient of U, to which drag and noise do not belong.
   request.thermostat = fluid.needs_velocities() && !apart && update->whichflag != 2;
   request.seed = seed;
   request.step = static_cast<uint64_t>(update->ntimestep);
@@ -214,7 +216,7 @@ void PairPsi::unpack_forward_comm(int n, int first, double *buf)
     for (int k = 0; k < comm_forward; k++) slopes[i * width + first_column + k] = *buf++;
 }
 
-// Whether atoms and ghosts, their types and their distance are those of the last evaluation.
+// Whether the atoms, their types and their distance are those of the last evaluation.
 bool PairPsi::is_pair(int i, int j, int itype, int jtype, double rsq) const
 {
   const int all = atom->nlocal + atom->nghost;
@@ -228,7 +230,7 @@ bool PairPsi::is_pair(int i, int j, int itype, int jtype, double rsq) const
     return std::fabs(here - rsq) <= 1e-9 * std::max(range * range, here);
   };
   if (agrees()) return true;
-  // Some callers have found the atom and take the nearest of its images.
+  // Some callers pass the atom and mean its nearest image.
   const double *h = domain->h;
   const double edge[3][3] = {{h[0], 0.0, 0.0}, {h[5], h[1], 0.0}, {h[4], h[3], h[2]}};
   for (int k = 2; k >= 0; k--) {
@@ -239,15 +241,15 @@ bool PairPsi::is_pair(int i, int j, int itype, int jtype, double rsq) const
   return agrees();
 }
 
-// The energy is that of the terms that belong to pairs, without psi; the force is the whole conservative
-// one, with the densities of the last step. Drag and noise are left out, as in LAMMPS's other DPD styles.
+// Returns the energy of the terms that belong to pairs, without psi; the force is the whole conservative
+// force, with the densities of the last step. Drag and noise are left out, as in LAMMPS's other DPD styles.
 double PairPsi::single(int i, int j, int itype, int jtype, double rsq, double, double factor_lj, double &fforce)
 {
-  // Without densities a pair is a pair wherever its atoms are, and whether they are there at all.
+  // Without densities a pair's energy depends on its distance alone, and not on the last evaluation.
   const bool many_body = (*style)->slope_width() > 0;
   if (many_body && !is_pair(i, j, itype, jtype, rsq))
-    stop_here("asked for the energy of a pair that is not there, as of an atom to be inserted or moved: where energies "
-              "belong to particles no single pair tells it; fix gcmc and fix widom need full_energy with a many-body "
+    stop_here("asked for the energy of a pair that the last evaluation does not contain, as of an atom to be inserted or "
+              "moved: a many-body energy is no sum over pairs; fix gcmc and fix widom need full_energy with a many-body "
               "style, and pair_write cannot be used");
   if (many_body && without_slopes == std::array<int, 2>{atom->nlocal, atom->nghost}) {
     without_slopes = {-1, -1};
@@ -278,7 +280,7 @@ void *PairPsi::extract_peratom(const char *what, int &columns)
   if (!density) return attempt([&] { return const_cast<double *>((*style)->excess_of_owned().data()); });
   const size_t width = (*style)->variables();
   if (width == 0) return nullptr;
-  // Forces may not have needed all of them.
+  // Forces may not have needed all densities.
   const size_t all = atom->nlocal + atom->nghost;
   tell_special(special.size());
   attempt([&] { (*style)->sum_densities(atom->nlocal, flat(atom->x, all), {atom->tag, all}, {atom->type, all}); });

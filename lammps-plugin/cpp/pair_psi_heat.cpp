@@ -28,7 +28,7 @@ std::string PairPsi::why_not_apart() const
   return {};
 }
 
-// Vectors from owners to ghosts.
+// Sends vectors from owners to ghosts.
 void PairPsi::forward_vectors()
 {
   carries = Carries::vectors;

@@ -13,7 +13,7 @@
 using namespace LAMMPS_NS;
 using namespace psidpd;
 
-// The pairs of LAMMPS's list, each of two owned atoms once.
+// Reads the pairs of LAMMPS's list; a pair of two owned atoms occurs once.
 void PairPsi::collect_pairs()
 {
   const double *special = force->special_lj;
@@ -28,7 +28,7 @@ void PairPsi::collect_pairs()
       const int entry = list->firstneigh[i][jj];
       const int j = entry & NEIGHMASK;
       if (full_list && j < owned && j < i) continue;
-      // A factor of 0 is an exclusion, as where LAMMPS leaves the pair out of the list.
+      // A factor of 0 is an exclusion, as where LAMMPS leaves the pair out of its list.
       const double factor = special[sbmask(entry)];
       if (factor == 0.0) continue;
       pair_i.push_back(i);
@@ -38,8 +38,8 @@ void PairPsi::collect_pairs()
   }
 }
 
-// Each pair of bonded neighbors once, if both are of this rank; else with all ghosts of the second, of which the engine
-// takes the one that is near.
+// Collects each pair of bonded neighbors once if both atoms are of this rank, and otherwise with all
+// ghosts of the second atom; the engine uses the nearest ghost.
 void PairPsi::find_special()
 {
   special.clear();
@@ -55,7 +55,7 @@ void PairPsi::find_special()
     const int *count = atom->nspecial[i];
     for (int k = 0; k < count[2]; k++) {
       const double factor = factors[k < count[0] ? 0 : k < count[1] ? 1 : 2];
-      // In a ring a neighbor may be one in two ways: the shorter counts.
+      // In a ring two atoms may be neighbors along two paths: the shorter path counts.
       if (factor == 1.0 || std::find(neighbors, neighbors + k, neighbors[k]) != neighbors + k) continue;
       for (int j = atom->map(neighbors[k]); j >= 0; j = next_image[j])
         if (j >= owned)
@@ -68,7 +68,8 @@ void PairPsi::find_special()
   special.insert(special.end(), with_ghosts.begin(), with_ghosts.end());
 }
 
-// What neigh_modify excludes, as two words for each atom and ghost: sides of rules for types and groups, and the molecule.
+// Collects the exclusions of neigh_modify as two words for each atom and ghost: sides of rules for
+// types and groups, and the molecule.
 void PairPsi::find_exclusions()
 {
   marks.clear();
@@ -93,7 +94,7 @@ void PairPsi::find_exclusions()
   between_molecules = by_molecule && !neighbor->ex_mol_intra[0];
 }
 
-// Tells the engine of marks and the first so many special pairs, unless it knows them.
+// Passes the marks and the first `count` special pairs to the engine, unless it has them.
 void PairPsi::tell_special(size_t count)
 {
   if (!told_marks) attempt([&] { (*style)->set_exclusions({marks.data(), marks.size()}, between_molecules); });

@@ -114,7 +114,7 @@ void *PairTable::extract(const char *what, int &dim)
   return PairPsi::extract(what, dim);
 }
 
-// "1 2 -40 25 18 1 0.75"
+// Coefficients as text, such as "1 2 -40 25 18 1 0.75".
 std::string PairTable::words(int i, int j) const
 {
   std::string line = std::to_string(i) + " " + std::to_string(j);

@@ -9,7 +9,7 @@ namespace psidpd {
 
 class PairTable : public PairPsi {
  public:
-  // The names of the coefficients, at most six, in the order of pair_coeff.
+  // Takes the names of the coefficients, at most six, in the order of pair_coeff.
   PairTable(LAMMPS_NS::LAMMPS *lmp, const char *name, std::vector<std::string> names);
   ~PairTable() override;
 
@@ -23,7 +23,7 @@ class PairTable : public PairPsi {
   std::vector<std::string> coefficients() override;
   void restore(const std::vector<std::string> &texts) override;
 
-  // Complains if coefficients of one pair are not good.
+  // Throws an error if the coefficients of one pair are invalid.
   virtual void check(const Coefficients &given) = 0;
   virtual rust::Box<Style> make_from(double kt, rust::Slice<const Coefficients> pairs) = 0;
   rust::Box<Style> make_style(double kt) final;
@@ -36,7 +36,7 @@ class PairTable : public PairPsi {
   std::vector<Coefficients> table() const;
 
   const std::vector<std::string> names;
-  // One table of types for each coefficient, as fix adapt changes them.
+  // One table of types for each coefficient; fix adapt changes its entries.
   std::vector<double **> value;
   std::vector<Coefficients> built;
 };

@@ -9,8 +9,8 @@
 
 using namespace LAMMPS_NS;
 
-// What LAMMPS's own plugin command stores: a creator of a pair style is called with the instance and returns a Pair, that
-// of a fix style with the arguments too and returns a Fix.
+// Does what LAMMPS's own plugin command does: stores a creator. LAMMPS calls the creator of a pair style with
+// the instance, and it returns a Pair; that of a fix style also takes the arguments, and returns a Fix.
 extern "C" void psidpd_insert_style(void *lmp, const char *kind, const char *name, void (*creator)())
 {
   auto *lammps = static_cast<LAMMPS *>(lmp);

@@ -27,7 +27,7 @@ void psidpd::write_texts(FILE *fp, const std::vector<std::string> &texts)
 
 namespace {
 
-// Longer than any text that is written: what is not ours shall not fill the memory.
+// Longer than any text that is written: a foreign file must not fill the memory.
 constexpr int LONGEST = 1 << 25;
 
 int read_int(FILE *fp, LAMMPS *lmp)

@@ -11,13 +11,13 @@
 
 namespace psidpd {
 
-// Seventeen digits: reading the text gives the same number back.
+// Writes seventeen digits: reading the text restores the exact value.
 std::string exact(double value);
 
-// Called on rank 0 alone, which has the file open.
+// Rank 0 alone calls this; it has the file open.
 void write_texts(FILE *fp, const std::vector<std::string> &texts);
 
-// Called on all ranks; rank 0 has the file open.
+// All ranks call this; rank 0 has the file open.
 std::vector<std::string> read_texts(FILE *fp, LAMMPS_NS::LAMMPS *lmp);
 
 }    // namespace psidpd

@@ -1,4 +1,5 @@
-//! Tells the entry for which LAMMPS and MPI the styles beside it are compiled; the variables are those of the styles.
+//! Passes to the entry the LAMMPS and the MPI that the styles are compiled for; the environment
+//! variables are those of the styles' build.
 
 use std::env;
 use std::path::PathBuf;
@@ -13,12 +14,12 @@ fn main() {
         return;
     };
     let mpi = env::var_os("PSIDPD_MPI_INCLUDE").map(|folder| PathBuf::from(folder).join("mpi.h"));
-    // Not every mpi.h is UTF-8.
+    // An mpi.h may contain bytes that are not UTF-8.
     let mpi = mpi.and_then(|header| std::fs::read(header).ok()).unwrap_or_default();
     let kind = if String::from_utf8_lossy(&mpi).contains("OPEN_MPI") { "openmpi" } else { "other" };
     println!("cargo::rustc-cfg=lammps_host");
     println!("cargo::rustc-env=PSIDPD_LAMMPS_VERSION={version}");
     println!("cargo::rustc-env=PSIDPD_MPI={kind}");
-    // LAMMPS really unloads plugins, and a Rust library must not be.
+    // LAMMPS unloads plugins with dlclose, and a Rust library must stay loaded.
     println!("cargo::rustc-link-arg-cdylib=-Wl,-z,nodelete");
 }

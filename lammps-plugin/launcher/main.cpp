@@ -23,10 +23,10 @@
 
 using namespace LAMMPS_NS;
 
-// Of the plugin.
+// Defined by the plugin.
 extern "C" const char *psidpd_register(void *lmp);
 
-// library.h declares it for some settings of the host only.
+// library.h declares lammps_open for some settings of the host only.
 extern "C" void *lammps_open(int argc, char **argv, MPI_Comm comm, void **ptr);
 
 namespace {
@@ -46,7 +46,7 @@ const char *trouble = nullptr;  // why the styles could not be registered
   exit(1);
 }
 
-// LAMMPS has reported the error itself. One that only some ranks have must stop the others.
+// LAMMPS has printed the error. An error on some ranks only must stop the other ranks.
 [[noreturn]] void stop(const std::exception &e)
 {
   fflush(nullptr);
@@ -56,14 +56,13 @@ const char *trouble = nullptr;  // why the styles could not be registered
   exit(1);
 }
 
-// Kind and name of each.
+// Kind and name of each style.
 constexpr const char *STYLES[][2] = {
     {"pair", "dpd/psi"}, {"pair", "mdpd/psi"}, {"pair", "dpd/spline"}, {"fix", "dpd/splitting"}};
 
-// 'plugin load .../psidpdplugin.so', 'plugin list' and 'plugin unload pair|fix STYLE', so that a script for a LAMMPS with
-// plugins runs here unchanged.
-// The same virtual functions, in the same order, as LAMMPS's class of commands, whose header is not
-// always installed.
+// 'plugin load .../psidpdplugin.so', 'plugin list' and 'plugin unload pair|fix STYLE', so that a script
+// for a LAMMPS with plugins runs here unchanged. The class has the same virtual functions, in the same
+// order, as LAMMPS's class of commands, whose header is not always installed.
 class PluginCommand : protected Pointers {
  public:
   explicit PluginCommand(LAMMPS *lmp) : Pointers(lmp) {}
@@ -114,7 +113,7 @@ class PluginCommand : protected Pointers {
       return;
     }
     utils::logmesg(lmp, "Unloading " + kind + " style " + name + "\n");
-    // LAMMPS too forgets a style in use, a pair style alone or in a hybrid.
+    // LAMMPS too removes a style that is in use, be it a pair style alone or in a hybrid.
     if (kind == "fix") {
       for (int k = modify->nfix - 1; k >= 0; k--)
         if (strcmp(modify->fix[k]->style, name) == 0) modify->delete_fix(k);
@@ -133,8 +132,8 @@ Command *create_plugin_command(LAMMPS *lmp)
 
 }    // namespace
 
-// LAMMPS calls this when it has made its parts, at the start and after 'clear'. The dynamic linker
-// prefers the program's definition to the library's; that is called first.
+// LAMMPS calls this after it has created its classes, at the start and after 'clear'. The dynamic
+// linker prefers this definition to the library's, which this function calls first.
 void LAMMPS::post_create()
 {
   using Function = void (*)(LAMMPS *);
@@ -147,7 +146,7 @@ void LAMMPS::post_create()
 int main(int argc, char **argv)
 {
   MPI_Init(&argc, &argv);
-  // Opened by the library, which knows its size; nothing here looks into it before the versions agree.
+  // The library allocates the instance, whose size it knows; nothing here reads it before the versions agree.
   void *handle = nullptr;
   try {
     handle = lammps_open(argc, argv, MPI_COMM_WORLD, nullptr);

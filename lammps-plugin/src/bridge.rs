@@ -1,4 +1,4 @@
-//! The style for C++. Errors arrive there as exceptions, panics as errors.
+//! The style's interface to C++. Errors and panics arrive there as exceptions.
 
 use crate::error::StyleError;
 use crate::style::{Style, guard};
@@ -16,28 +16,28 @@ mod ffi {
     /// Coefficients of one pair of types, in the order of `pair_coeff`.
     #[derive(Clone, Copy, PartialEq)]
     struct Coefficients {
-        /// Whether they were given.
+        /// Whether pair_coeff set them.
         set: bool,
         value: [f64; 6],
     }
 
-    /// Energy of a pair, and the force along the line from the second to the first.
+    /// Energy of a pair, and the force along the line from the second particle to the first.
     struct PairValue {
         energy: f64,
         force: f64,
     }
 
-    /// The box of LAMMPS.
+    /// The box as LAMMPS stores it.
     #[derive(Clone, Copy)]
     struct Extent {
         origin: [f64; 3],
-        /// xx, yy, zz, yz, xz, xy.
+        /// Edges xx, yy, zz, yz, xz, xy.
         edges: [f64; 6],
-        /// Periodic directions that this rank has all of.
+        /// Periodic directions along which this rank has all of the box.
         closed: [bool; 3],
     }
 
-    /// A pair that does not act at its full strength: an atom, and another or a ghost of it.
+    /// A pair with reduced strength: an atom, and another atom or ghost.
     #[derive(Clone, Copy)]
     struct SpecialPair {
         i: i32,
@@ -45,9 +45,9 @@ mod ffi {
         factor: f64,
     }
 
-    /// What a step asks for.
+    /// What an evaluation is asked to compute.
     struct Request {
-        /// Dissipative and random forces?
+        /// Whether to compute dissipative and random forces.
         thermostat: bool,
         seed: u64,
         step: u64,
@@ -58,7 +58,7 @@ mod ffi {
         particle_virial: bool,
     }
 
-    /// Energies and the virial of all forces, of one rank.
+    /// Energies of one rank, and the virial of all its forces.
     struct Totals {
         excess: f64,
         pair: f64,
@@ -68,31 +68,31 @@ mod ffi {
         above: f64,
     }
 
-    /// What the thermostat of a step is made from.
+    /// Input of the thermostat in one step.
     struct Heat {
         seed: u64,
         step: u64,
         /// Whether noise is uniform instead of Gaussian.
         uniform: bool,
-        /// How long it acts.
+        /// Time for which the thermostat acts.
         time: f64,
         virial: bool,
     }
 
-    /// What the thermostat needs of the other ranks.
+    /// What the thermostat needs from the other ranks.
     enum Wants {
-        /// Nothing: velocities are done.
+        /// Nothing: the velocities are final.
         Nothing,
-        /// The sum of a number.
+        /// A sum over all ranks.
         Total,
-        /// The vectors of ghosts.
+        /// Vectors of the ghosts.
         Ghosts,
     }
 
     struct Round {
         wants: Wants,
         part: f64,
-        /// At the end.
+        /// Virial of drag and noise, set at the end.
         virial: [f64; 6],
     }
 
@@ -135,21 +135,21 @@ mod ffi {
         fn description(self: &Style, search: &str, listed: bool, apart: bool) -> String;
         fn cutoff(self: &Style) -> f64;
         fn slope_width(self: &Style) -> usize;
-        /// The number of densities times species: no slope width is larger.
+        /// The number of densities times the number of species: the largest slope width.
         fn variables(self: &Style) -> usize;
         fn needs_velocities(self: &Style) -> bool;
-        /// 0 if no noise is drawn.
+        /// Range of the noise; 0 without noise.
         fn noise_range(self: &Style) -> f64;
 
         fn configure(self: &mut Style, mixed: bool, threads: usize) -> Result<()>;
-        /// Which pairs do not act at their full strength, unless LAMMPS lists pairs: for all that comes until the next call.
+        /// Sets the pairs with reduced strength for all later evaluations, unless LAMMPS lists the pairs.
         fn set_special_pairs(self: &mut Style, pairs: &[SpecialPair]) -> Result<()>;
-        /// Which others do not interact: two words for each atom and ghost, the members of `Mark`, or none at all.
+        /// Sets excluded pairs by two words for each atom and ghost, the members of `Mark`; an empty slice excludes none.
         fn set_exclusions(self: &mut Style, marks: &[u32], between_molecules: bool) -> Result<()>;
 
-        /// Whether this rank can do without images along the closed directions of a box, for what is asked for.
+        /// Whether this rank can compute the request without images along the closed directions of the box.
         fn fits(self: &Style, extent: &Extent, request: &Request) -> Result<bool>;
-        /// All forces, without ghosts.
+        /// Computes all forces, without ghosts.
         #[allow(clippy::too_many_arguments)]
         fn style_evaluate(
             style: &mut Style,
@@ -161,7 +161,7 @@ mod ffi {
             request: &Request,
             f: &mut [f64],
         ) -> Result<Totals>;
-        /// `images` are ghosts to be left out: see `Around`.
+        /// `images` flags ghosts to be left out: see `Around`.
         #[allow(clippy::too_many_arguments)]
         fn style_densities(
             style: &mut Style,
@@ -188,7 +188,7 @@ mod ffi {
             factor: &[f64],
         ) -> Result<()>;
         fn slopes_mut(self: &mut Style) -> &mut [f64];
-        /// Slopes of owned particles after an evaluation without ghosts, and room for others.
+        /// Copies slopes of owned particles after an evaluation without ghosts, and makes room for those of ghosts.
         fn fetch_slopes(self: &mut Style, all: usize) -> Result<()>;
         #[allow(clippy::too_many_arguments)]
         fn style_forces(
@@ -201,16 +201,16 @@ mod ffi {
             request: &Request,
             f: &mut [f64],
         ) -> Result<Totals>;
-        /// What energies and virials of particles are to be multiplied by.
+        /// One unit of energy of the model in the units of LAMMPS; multiply energies and virials of particles by it.
         fn energy_unit(self: &Style) -> f64;
         fn particle_energy(self: &Style) -> &[f64];
-        /// Six numbers a particle.
+        /// Virials, six numbers for each particle.
         fn particle_virial(self: &Style) -> &[f64];
         /// Sums all densities at the positions of the last evaluation.
         fn sum_densities(self: &mut Style, owned: usize, x: &[f64], tag: &[i32], kind: &[i32]) -> Result<()>;
-        /// Those of owned particles, a row of [`variables`] for each.
+        /// Densities of owned particles, a row of [`variables`] for each.
         fn densities_of_owned(self: &mut Style) -> &[f64];
-        /// psi of owned particles.
+        /// ψ of owned particles.
         fn excess_of_owned(self: &mut Style) -> Result<&[f64]>;
         fn style_single(
             style: &mut Style,
@@ -222,7 +222,7 @@ mod ffi {
         ) -> Result<PairValue>;
         fn memory(self: &Style) -> usize;
 
-        /// Finds the pairs of the thermostat, and draws their noise; false if there is none.
+        /// Finds the pairs of the thermostat and draws their noise; returns false if the model has no thermostat.
         #[allow(clippy::too_many_arguments)]
         fn thermostat_pairs(
             style: &mut Style,
@@ -234,9 +234,9 @@ mod ffi {
             mass: &[f64],
             heat: &Heat,
         ) -> Result<bool>;
-        /// Changes the velocities of all atoms; the virial.
+        /// Changes the velocities of all atoms, and returns the virial.
         fn thermostat_alone(style: &mut Style, v: &mut [f64]) -> Result<[f64; 6]>;
-        /// The same with other ranks: begins with velocities of all atoms and ghosts.
+        /// Begins the thermostat on several ranks, with velocities of all atoms and ghosts.
         fn thermostat_begin(style: &mut Style, vectors: &[f64]) -> Result<Round>;
         fn thermostat_go_on(
             style: &mut Style,
@@ -244,7 +244,7 @@ mod ffi {
             vectors: &mut [f64],
             v: &mut [f64],
         ) -> Result<Round>;
-        /// Of the last time that the thermostat has acted.
+        /// Iterations of the thermostat in its last update.
         fn iterations(self: &mut Style) -> usize;
     }
 }
@@ -292,7 +292,7 @@ fn thermostat_go_on(
     style.next_round(total, vectors, v).map(round)
 }
 
-#[allow(clippy::ptr_arg)] // What the bridge passes.
+#[allow(clippy::ptr_arg)] // cxx passes a reference to a vector.
 fn style_from_file(
     path: &str,
     units: &str,
@@ -303,7 +303,7 @@ fn style_from_file(
     Style::from_file(path, units, kt, names, dimensions).map(Box::new)
 }
 
-#[allow(clippy::ptr_arg)] // What the bridge passes.
+#[allow(clippy::ptr_arg)] // cxx passes a reference to a vector.
 fn style_from_text(
     source: &str,
     text: &str,
@@ -358,7 +358,7 @@ fn wanted(request: &ffi::Request) -> (Option<Step>, Want) {
     (request.thermostat.then_some(step), want)
 }
 
-/// The box, periodic along the closed directions only.
+/// The box, with periods along the closed directions only.
 fn domain_of(extent: &ffi::Extent) -> Result<PeriodicBox, StyleError> {
     let [xx, yy, zz, yz, xz, xy] = extent.edges;
     let edges = Matrix3::new(xx, xy, xz, 0.0, yy, yz, 0.0, 0.0, zz);
@@ -463,7 +463,7 @@ impl Style {
     }
 
     fn set_special_pairs(&mut self, pairs: &[ffi::SpecialPair]) -> Result<(), StyleError> {
-        // A number that is none is refused by the engine, as one behind the last.
+        // The engine refuses a negative index as it does one that is too large.
         let number = |k: i32| u32::try_from(k).unwrap_or(u32::MAX);
         let pairs = pairs.iter().map(|p| SpecialPair { i: number(p.i), j: number(p.j), factor: p.factor });
         guard(|| {

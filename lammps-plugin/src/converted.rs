@@ -1,4 +1,4 @@
-//! What goes between LAMMPS and the model, from the units of one to those of the other.
+//! Converts positions, velocities and results between the units of LAMMPS and those of the model.
 
 use crate::error::StyleError;
 use crate::units::Scale;
@@ -14,7 +14,6 @@ pub struct Converted {
     pub excess: Vec<f64>,
 }
 
-/// `numbers` times `factor`.
 pub fn times<'a>(numbers: &[f64], factor: f64, out: &'a mut Vec<f64>) -> &'a [f64] {
     out.clear();
     out.extend(numbers.iter().map(|x| x * factor));
@@ -22,7 +21,7 @@ pub fn times<'a>(numbers: &[f64], factor: f64, out: &'a mut Vec<f64>) -> &'a [f6
 }
 
 impl Converted {
-    /// What LAMMPS has, as the model takes it.
+    /// Converts positions and velocities of LAMMPS to units of the model.
     pub fn take<'a>(
         &'a mut self,
         scale: &Scale,
@@ -42,7 +41,7 @@ impl Converted {
     }
 }
 
-/// The same in units of the model, and room for forces.
+/// Positions and velocities in units of the model, and room for forces.
 pub struct Taken<'a> {
     pub x: &'a [f64],
     pub v: &'a [f64],
@@ -51,7 +50,7 @@ pub struct Taken<'a> {
 }
 
 impl Taken<'_> {
-    /// Adds to `f` the forces that `evaluate` adds to what it is given, and returns its totals.
+    /// Runs `evaluate` on forces in units of the model, adds them to `f`, and returns its totals.
     pub fn add_forces(
         self,
         scale: &Scale,

@@ -1,8 +1,8 @@
-//! What goes wrong, as text.
+//! The error type of the styles.
 
 use psidpd_core::engine::{EngineError, ThreadCount};
 
-/// What goes wrong, as the text that LAMMPS prints.
+/// An error, as the text that LAMMPS prints.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{0}")]
 pub struct StyleError(pub(crate) String);

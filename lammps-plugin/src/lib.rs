@@ -1,12 +1,13 @@
 //! psidpd pair styles for LAMMPS: `dpd/psi`, `mdpd/psi` and `dpd/spline`, and the fix style `dpd/splitting`. LAMMPS
 //! loads the entry, in `entry/`, which loads this.
 //!
-//! - [`style`]: what a pair style asks of the engine, in safe Rust;
-//! - [`thermostat`]: what the fix asks of it beside;
-//! - [`units`]: one unit of a model in those of LAMMPS; `converted`: positions, velocities and forces from one to the other;
-//! - [`bridge`]: the same for C++, by cxx: slices, strings and exceptions, checked at compile time;
+//! - [`style`]: one pair style's engine, in safe Rust;
+//! - [`thermostat`]: drag and noise for the fix;
+//! - [`units`]: one unit of a model in those of LAMMPS; `converted`: conversion of positions,
+//! velocities and forces;
+//! - [`bridge`]: the interface to C++, by cxx: slices, strings and exceptions, checked at compile time;
 //! - `cpp/`: the styles that LAMMPS sees, compiled against the headers of one LAMMPS;
-//! - `table`: the styles, as the entry finds them.
+//! - `table`: the table of styles that the entry reads.
 //!
 //! The engine keeps its own cells, and leaves out pairs that `special_bonds` weakens or `neigh_modify` excludes; LAMMPS's
 //! neighbour list is requested only where it alone knows which pairs act.

@@ -1,4 +1,4 @@
-//! One pair style's engine, and the mapping from LAMMPS's types to species.
+//! The engine of one pair style, and the mapping from LAMMPS's types to species.
 
 mod model;
 
@@ -20,20 +20,20 @@ use std::sync::Arc;
 pub struct Style {
     model: Model,
     engine: Engine,
-    /// Drag and noise apart from the forces, for the fix that asks for them; `None` if the model has none.
+    /// Drag and noise apart from the forces, for the fix; `None` if the model has no thermostat.
     thermostat: Option<PairThermostat>,
     settings: Settings,
     pool: Arc<Pool>,
     kt: f64,
-    /// Species of each type, from 0; LAMMPS counts types from 1.
+    /// Species of each type, from 0; entry 0 is unused, as LAMMPS counts types from 1.
     kinds: Vec<i32>,
-    /// What the letters of pair_coeff mean.
+    /// Meaning of the letters of pair_coeff, for the log.
     letters: Option<&'static str>,
     scale: Scale,
     converted: Converted,
 }
 
-/// Runs `work` and turns a panic into an error: nothing may unwind into LAMMPS.
+/// Runs `work` and turns a panic into an error: a panic must not unwind into LAMMPS.
 pub(crate) fn guard<T>(work: impl FnOnce() -> Result<T, StyleError>) -> Result<T, StyleError> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
         let text = panic
@@ -45,7 +45,7 @@ pub(crate) fn guard<T>(work: impl FnOnce() -> Result<T, StyleError>) -> Result<T
     })
 }
 
-/// Three numbers per particle, as LAMMPS stores them.
+/// Views a flat array as vectors of three numbers, as LAMMPS stores them.
 pub(crate) fn triples(flat: &[f64]) -> &[[f64; 3]] {
     flat.as_chunks::<3>().0
 }
@@ -93,10 +93,10 @@ impl Style {
         })
     }
 
-    /// Another temperature: the model's expressions see it, and the noise.
+    /// Changes the temperature, on which the model's expressions and the noise depend.
     ///
     /// # Errors
-    /// A model that makes no fluid at this temperature.
+    /// Fails if the model is not valid at this temperature.
     pub fn set_temperature(&mut self, kt: f64) -> Result<(), StyleError> {
         guard(|| {
             self.kt = kt / self.scale.energy;
@@ -110,10 +110,10 @@ impl Style {
         Ok(())
     }
 
-    /// How forces are computed from now on: in mixed precision or in double, by so many threads.
+    /// Sets the precision, mixed or double, and the number of threads.
     ///
     /// # Errors
-    /// No threads, or too many; else none that [`Style::set_temperature`] did not have before.
+    /// Fails for zero or too many threads, and as [`Style::set_temperature`].
     pub fn configure(&mut self, mixed: bool, threads: usize) -> Result<(), StyleError> {
         guard(|| {
             let precision = if mixed { Precision::Mixed } else { Precision::Double };
@@ -129,7 +129,6 @@ impl Style {
         })
     }
 
-    /// The model.
     pub fn model(&self) -> &Model {
         &self.model
     }
@@ -139,12 +138,11 @@ impl Style {
         self.scale
     }
 
-    /// The engine, which computes in units of the model.
+    /// The engine; it computes in units of the model.
     pub fn engine(&self) -> &Engine {
         &self.engine
     }
 
-    /// The engine.
     pub fn engine_mut(&mut self) -> &mut Engine {
         &mut self.engine
     }
@@ -154,7 +152,7 @@ impl Style {
         (self.thermostat.as_mut(), &self.pool, &self.kinds)
     }
 
-    /// For the log: what is computed, and what its letters mean.
+    /// Describes the computation, and the letters of the coefficients, for the log.
     ///
     /// `search` says where pairs come from, and whether LAMMPS lists them; `apart`, whether a fix has the thermostat.
     pub fn description(&self, search: &str, listed: bool, apart: bool) -> String {
@@ -213,10 +211,10 @@ impl Style {
         text
     }
 
-    /// All forces on particles in a box that this rank has all of, added to `f`.
+    /// Adds to `f` all forces on particles in a box that this rank has all of.
     ///
     /// # Errors
-    /// As [`Engine::forces`].
+    /// Fails as [`Engine::forces`].
     #[allow(clippy::too_many_arguments)]
     pub fn evaluate(
         &mut self,
@@ -238,11 +236,11 @@ impl Style {
         })
     }
 
-    /// The first half of an evaluation, over the `owned` first particles of arrays as LAMMPS has them: pairs,
-    /// forces that need no density, densities, ψ and slopes.
+    /// First half of an evaluation, over the first `owned` particles of LAMMPS's arrays: pairs, forces
+    /// that need no density, densities, ψ and slopes.
     ///
     /// # Errors
-    /// As [`Engine::first`].
+    /// Fails as [`Engine::first`].
     #[allow(clippy::too_many_arguments)]
     pub fn densities(
         &mut self,
@@ -266,10 +264,10 @@ impl Style {
         })
     }
 
-    /// As [`Style::densities`], with pairs listed by LAMMPS.
+    /// First half of an evaluation, as [`Style::densities`], with pairs that LAMMPS lists.
     ///
     /// # Errors
-    /// As [`Engine::first`].
+    /// Fails as [`Engine::first`].
     pub fn densities_of_pairs(
         &mut self,
         owned: usize,
@@ -284,21 +282,21 @@ impl Style {
             let Style { engine, scale, converted, .. } = self;
             let taken = converted.take(scale, x, &[], None);
             let particles = Particles { owned, x: triples(taken.x), tag, kind };
-            // What LAMMPS wants of listed pairs it says with the forces.
+            // For listed pairs the request for energies and virials comes with the second half.
             let request = Request { particles, v: &[], step: None, want: Want::FORCES };
             Ok(engine.first(Surroundings::Listed(*listed, newton), &request)?)
         })
     }
 
-    /// `∂ψ/∂n` of owned particles, then room for ghosts.
+    /// `∂ψ/∂n` of owned particles, followed by room for those of ghosts.
     pub fn slopes_mut(&mut self) -> &mut [f64] {
         self.engine.slopes_mut()
     }
 
-    /// Sums every density of the model at the positions of the last evaluation, those that it did not need too.
+    /// Sums every density of the model at the positions of the last evaluation, also those that it did not need.
     ///
     /// # Errors
-    /// As [`Engine::sum_densities`].
+    /// Fails as [`Engine::sum_densities`].
     pub fn sum_densities(
         &mut self,
         owned: usize,
@@ -310,13 +308,13 @@ impl Style {
             let Style { engine, scale, converted, .. } = self;
             let taken = converted.take(scale, x, &[], None);
             let particles = Particles { owned, x: triples(taken.x), tag, kind };
-            // LAMMPS has ghosts for all that is around its atoms, along periods too.
+            // LAMMPS has ghosts on all sides of its atoms, also across periods.
             engine.sum_densities(Surroundings::ghosts(Newton::On), &particles)?;
             Ok(())
         })
     }
 
-    /// Local densities of owned particles, in numbers a volume of LAMMPS.
+    /// Local densities of owned particles, per unit volume of LAMMPS.
     pub fn local_densities(&mut self) -> &[f64] {
         if self.scale.is_one() {
             return self.engine.local_densities();
@@ -333,11 +331,11 @@ impl Style {
         times(self.engine.excess(), self.scale.energy, &mut self.converted.excess)
     }
 
-    /// Energy of a pair of kinds at a distance, and the force along it; where energies belong to particles, with what
-    /// these two had in the last evaluation.
+    /// Energy of a pair of the given types at a distance, and the force along it. A many-body force
+    /// uses the slopes that the two particles had in the last evaluation.
     ///
     /// # Errors
-    /// A particle that was not there then.
+    /// Fails for a particle that was not in the last evaluation.
     pub fn single(&mut self, kinds: [i32; 2], r: f64, particles: [i32; 2]) -> Result<(f64, f64), StyleError> {
         guard(|| {
             let r = r / self.scale.length;
@@ -353,17 +351,17 @@ impl Style {
             match particles.map(known) {
                 [Some(i), Some(j)] => Ok(here(self.engine.single(kinds, r, [i, j]))),
                 _ => Err(StyleError(format!(
-                    "asked for the pair of particles {} and {}, of which the last evaluation knows nothing",
+                    "asked for the pair of particles {} and {}, which the last evaluation did not both contain",
                     particles[0], particles[1]
                 ))),
             }
         })
     }
 
-    /// Adds forces to `f`.
+    /// Second half of an evaluation: adds the forces to `f`.
     ///
     /// # Errors
-    /// As [`Engine::second`].
+    /// Fails as [`Engine::second`].
     #[allow(clippy::too_many_arguments)]
     pub fn forces(
         &mut self,

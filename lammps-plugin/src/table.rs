@@ -1,4 +1,4 @@
-//! The styles, as the entry finds them.
+//! The table of styles that the entry reads.
 
 #[path = "../entry/src/table.rs"]
 mod contract;
@@ -6,9 +6,9 @@ mod contract;
 use contract::{BUILT, Creator, Style, Styles};
 use std::ffi::{CStr, c_char, c_int, c_void};
 
-/// What LAMMPS makes a pair style with.
+/// Signature of the function by which LAMMPS makes a pair style.
 type MakePair = unsafe extern "C-unwind" fn(*mut c_void) -> *mut c_void;
-/// What it makes a fix with: with the arguments of the command.
+/// Signature of the function by which LAMMPS makes a fix, with the arguments of the command.
 type MakeFix = unsafe extern "C-unwind" fn(*mut c_void, c_int, *mut *mut c_char) -> *mut c_void;
 
 unsafe extern "C-unwind" {
@@ -20,13 +20,13 @@ unsafe extern "C-unwind" {
 }
 
 const fn style(name: &'static CStr, info: &'static CStr, creator: MakePair) -> Style {
-    // SAFETY: function pointers are alike; whoever calls this one takes it for what its kind says.
+    // SAFETY: all function pointers have one size; LAMMPS calls this one by the signature that `kind` states.
     let creator = unsafe { std::mem::transmute::<MakePair, Creator>(creator) };
     Style { kind: c"pair".as_ptr(), name: name.as_ptr(), info: info.as_ptr(), creator }
 }
 
 const fn fix(name: &'static CStr, info: &'static CStr, creator: MakeFix) -> Style {
-    // SAFETY: as above.
+    // SAFETY: all function pointers have one size; LAMMPS calls this one by the signature that `kind` states.
     let creator = unsafe { std::mem::transmute::<MakeFix, Creator>(creator) };
     Style { kind: c"fix".as_ptr(), name: name.as_ptr(), info: info.as_ptr(), creator }
 }
@@ -53,7 +53,6 @@ static TABLE: Styles = Styles {
     insert: psidpd_insert_style,
 };
 
-/// The table of the styles.
 #[unsafe(no_mangle)]
 pub extern "C" fn psidpd_styles() -> *const Styles {
     &raw const TABLE

@@ -1,4 +1,5 @@
-//! Drag and noise apart from the forces, for the fix that integrates: velocities of a rank's atoms by the midpoint rule.
+//! Drag and noise apart from the forces, for the fix that integrates: updates velocities of a
+//! rank's atoms by the midpoint rule.
 
 use crate::error::StyleError;
 use crate::style::{Style, guard, triples};
@@ -6,23 +7,23 @@ use psidpd_core::engine::noise::Law;
 use psidpd_core::engine::thermostat::{Need, Rank, Stream, Update};
 use psidpd_core::engine::{Around, Particles};
 
-/// What the noise of a step is made from.
+/// Parameters of the noise of one step.
 #[derive(Debug, Clone, Copy)]
 pub struct Noise {
-    /// Of the pair style.
+    /// Seed of the pair style.
     pub seed: u64,
-    /// Number of the time step.
     pub step: u64,
-    /// Its distribution.
     pub law: Law,
 }
 
 impl Style {
-    /// Finds the pairs of the thermostat, and draws their noise; false if the model has none. `mass` are those of the owned
-    /// atoms, infinite for atoms that keep their velocities. With `virial` distances are kept.
+    /// Finds the pairs of the thermostat and draws their noise; returns false if the model has no
+    /// thermostat. `mass` has the masses of owned atoms, infinite for atoms that keep their velocities.
+    /// With `virial` pair distances are stored.
     ///
     /// # Errors
-    /// As [`find_pairs_of_rank`](psidpd_core::engine::thermostat::PairThermostat::find_pairs_of_rank).
+    /// Fails as
+    /// [`find_pairs_of_rank`](psidpd_core::engine::thermostat::PairThermostat::find_pairs_of_rank).
     #[allow(clippy::too_many_arguments)]
     pub fn find_thermostat_pairs(
         &mut self,
@@ -45,10 +46,10 @@ impl Style {
         })
     }
 
-    /// Changes the velocities of all atoms that pairs were found of, where a rank needs nothing of others; returns the virial.
+    /// Changes the velocities of all atoms of the last search for pairs, on one rank alone; returns the virial.
     ///
     /// # Errors
-    /// A velocity that becomes no number.
+    /// Fails if a velocity is not finite.
     pub fn act_alone(&mut self, v: &mut [f64]) -> Result<[f64; 6], StyleError> {
         guard(|| {
             let (Some(thermostat), pool, _) = self.thermostat() else { return Ok([0.0; 6]) };
@@ -59,10 +60,10 @@ impl Style {
         })
     }
 
-    /// Begins on several ranks; `vectors` are the velocities of all atoms and ghosts.
+    /// Begins the update on several ranks; `vectors` are the velocities of all atoms and ghosts.
     ///
     /// # Errors
-    /// Other atoms than pairs were found of.
+    /// Fails if the atoms are not those of the last search for pairs.
     pub fn begin_rounds(&mut self, vectors: &[f64]) -> Result<Need, StyleError> {
         guard(|| {
             let (Some(thermostat), pool, _) = self.thermostat() else { return Ok(Need::Nothing([0.0; 6])) };
@@ -70,10 +71,10 @@ impl Style {
         })
     }
 
-    /// Goes on when what was needed is there; in the end the velocities `v` of the rank's atoms are changed.
+    /// Continues with what the last round asked for; the last round changes the velocities `v` of the rank's atoms.
     ///
     /// # Errors
-    /// As [`go_on`](psidpd_core::engine::thermostat::PairThermostat::go_on); a velocity that becomes no number.
+    /// Fails as [`go_on`](psidpd_core::engine::thermostat::PairThermostat::go_on), and if a velocity is not finite.
     pub fn next_round(&mut self, total: f64, vectors: &mut [f64], v: &mut [f64]) -> Result<Need, StyleError> {
         guard(|| {
             let (Some(thermostat), pool, _) = self.thermostat() else { return Ok(Need::Nothing([0.0; 6])) };
@@ -86,7 +87,7 @@ impl Style {
         })
     }
 
-    /// How many iterations the last update took.
+    /// Number of iterations of the last update.
     pub fn iterations(&mut self) -> usize {
         self.thermostat().0.map_or(0, |thermostat| thermostat.iterations())
     }
@@ -98,7 +99,7 @@ fn finite(v: &[[f64; 3]]) -> Result<(), StyleError> {
         return Ok(());
     }
     Err(StyleError(
-        "a velocity is no finite number behind the thermostat: the time step is too large, or the start overlaps"
+        "a velocity is not finite after the thermostat: the time step is too large, or the start overlaps"
             .to_owned(),
     ))
 }

@@ -6,11 +6,9 @@ use psidpd_core::model::Units;
 /// One unit of the model in units of LAMMPS.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scale {
-    /// That of length.
     pub length: f64,
-    /// That of energy, and of virials.
+    /// Unit of energy and of virials.
     pub energy: f64,
-    /// That of time.
     pub time: f64,
 }
 
@@ -21,10 +19,10 @@ struct HostUnits {
     time: f64,
 }
 
-/// Units of <https://docs.lammps.org/units.html>; those of velocities are length over time, of forces energy over length.
+/// Units of <https://docs.lammps.org/units.html>: velocities are in length over time, forces in energy over length.
 fn host_units(name: &str) -> Option<HostUnits> {
     const ANGSTROM: f64 = 1e-10;
-    // Per molecule; exact since 2019, as is the electronvolt.
+    // Energies are per molecule; the constants are exact since 2019, as is the electronvolt.
     const KILOCALORIE_PER_MOLE: f64 = 4184.0 / 6.022_140_76e23;
     const ELECTRONVOLT: f64 = 1.602_176_634e-19;
     match name {
@@ -36,10 +34,10 @@ fn host_units(name: &str) -> Option<HostUnits> {
 }
 
 impl Scale {
-    /// A simulation in the units of the model, whatever they are.
+    /// The simulation uses the units of the model.
     pub const ONE: Scale = Scale { length: 1.0, energy: 1.0, time: 1.0 };
 
-    /// For a model of these units in a simulation in `units NAME`; what is wrong otherwise.
+    /// The scale of a model in a simulation in `units NAME`, or the reason why there is none.
     pub fn new(name: &str, units: Option<Units>) -> Result<Scale, String> {
         if name == "lj" {
             return Ok(Scale::ONE);
@@ -57,22 +55,20 @@ impl Scale {
         Ok(Scale { length: length / host.length, energy: energy / host.energy, time: time / host.time })
     }
 
-    /// Whether nothing is to be converted.
+    /// Whether all units are equal, so that nothing is converted.
     pub fn is_one(&self) -> bool {
         *self == Scale::ONE
     }
 
-    /// That of velocity.
     pub fn velocity(&self) -> f64 {
         self.length / self.time
     }
 
-    /// That of force.
     pub fn force(&self) -> f64 {
         self.energy / self.length
     }
 
-    /// The box of LAMMPS, in units of the model.
+    /// Converts the box of LAMMPS to units of the model.
     pub fn domain(&self, domain: PeriodicBox) -> PeriodicBox {
         if self.is_one() {
             return domain;
@@ -80,7 +76,7 @@ impl Scale {
         let origin = domain.origin().map(|x| x / self.length);
         let edges = [0, 1, 2].map(|k| domain.edge(k).map(|x| x / self.length));
         let edges = nalgebra::Matrix3::from_fn(|row, column| edges[column][row]);
-        // A box that is one is one in any unit, but for numbers out of range.
+        // A valid box stays valid in other units, unless its lengths leave the range of numbers.
         PeriodicBox::new(origin, edges, domain.periodic()).unwrap_or(domain)
     }
 }

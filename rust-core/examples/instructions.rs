@@ -6,10 +6,10 @@
 //!     target/release/examples/instructions mdpd mixed avx2 8
 //! ```
 //!
-//! With `ghosts` as last word they are the evaluations of a rank that has ghosts along z.
+//! With `ghosts` as last word the particles are those of a rank that has ghosts along z.
 //!
-//! Counts of runs of different length differ by what the additional evaluations take. It prints the number of
-//! particles, and a sum of forces, so that nothing is optimised away.
+//! The difference between runs of different length is the cost of the additional evaluations. The
+//! program prints the number of particles and a sum of forces, so that the compiler removes nothing.
 
 #[path = "../benches/setup/mod.rs"]
 mod setup;

@@ -1,5 +1,5 @@
-//! What an evaluation of forces saves when a scene does not need a part of it: nanoseconds for each particle, with the part
-//! and without it, in alternation, the fastest of several rounds.
+//! Measures what an evaluation of forces saves when a scene does not need a part of it: nanoseconds for
+//! each particle, with the part and without it, in alternation, the fastest of several rounds.
 //!
 //! `cargo run --release -p psidpd-core --example left_out`
 
@@ -9,7 +9,7 @@ use std::time::Instant;
 
 const COUNT: usize = 6050;
 const DENSITY: f64 = 6.05;
-/// Evaluations of a round, and rounds.
+/// Number of evaluations in a round, and of rounds.
 const EVALUATIONS: u32 = 40;
 const ROUNDS: usize = 15;
 
@@ -34,7 +34,7 @@ fn model(species: usize, psi: &str, gamma: f64, dimensions: usize) -> String {
     text
 }
 
-/// Particles in a box, or in the plane z = 0, and what is asked for.
+/// Particles in a box, or in the plane z = 0, and the requested results.
 struct Case {
     sweep: Sweep,
     domain: PeriodicBox,

@@ -1,9 +1,9 @@
-//! Times the parts of evaluations of forces, in nanoseconds for each particle and step: the fastest of several
-//! rounds, after the fluid has come to rest.
+//! Times the parts of evaluations of forces, in nanoseconds for each particle and step: the fastest of
+//! several rounds, after the fluid has come to equilibrium.
 //!
 //! `cargo run --release -p psidpd-core --example pace mdpd mixed avx512 1 6050`
 //!
-//! With `ghosts` as last word it is the evaluations of a rank that has ghosts along z.
+//! With `ghosts` as last word the evaluations are those of a rank that has ghosts along z.
 
 #[path = "../benches/setup/mod.rs"]
 mod setup;
@@ -13,23 +13,23 @@ use setup::{Cloud, Rank, choose};
 use std::process::ExitCode;
 use std::time::Instant;
 
-/// As both hosts have it.
+/// Both hosts use this allocator.
 #[global_allocator]
 static ALLOCATOR: psidpd_core::memory::LargePages = psidpd_core::memory::LargePages;
 
-/// Steps before the first round, steps of a round, rounds.
+/// Number of steps before the first round, of steps in a round, and of rounds.
 const BEFORE: u32 = 150;
 const STEPS: u32 = 50;
 const ROUNDS: u32 = 12;
 
-/// A box, or a rank's part of one.
+/// All of a box, or a rank's part of it.
 enum Any {
     Cloud(Box<Cloud>),
     Rank(Box<Rank>),
 }
 
 impl Any {
-    /// One step; the seconds that all but the evaluation took.
+    /// Does one step; returns the seconds spent outside the evaluation.
     fn step(&mut self, sweep: &mut Sweep) -> f64 {
         let mut since = Instant::now();
         match self {

@@ -1,5 +1,5 @@
 //! Many-body dissipative particle dynamics from excess free energies: the model file, and the engine
-//! that both hosts, LAMMPS and the native runner, get their forces from.
+//! that computes forces for both hosts, LAMMPS and the native runner.
 //!
 //! The Hamiltonian is
 //!
@@ -7,16 +7,15 @@
 //! U = Σ_i ψ_c(i)(ñ_i) + Σ_{i<j} φ_c(i)c(j)(r_ij)
 //! ```
 //!
-//! with `ñ` the weighted (and, if the model says so, corrected) local densities. Forces, energy and
-//! virial all come from it; see [`truth`] for the theory written down once, which everything faster
-//! is tested against.
+//! with `ñ` the weighted (and, if the model says so, corrected) local densities. Forces, energy and virial all come
+//! from it; tests compare the engine with the plain evaluation in [`truth`].
 //!
 //! Data flow: model file → [`model::Model`] → [`model::Fluid`] (at one kT) → [`engine::Plan`] →
 //! [`engine::Engine`].
 
 #![warn(missing_docs)]
 
-// What tests here share with those in `tests/` imports by this name.
+// Modules shared with the tests in `tests/` import the crate by this name.
 #[cfg(test)]
 extern crate self as psidpd_core;
 

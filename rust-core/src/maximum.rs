@@ -1,9 +1,9 @@
-//! The largest of some numbers, for checks: what is not a number is never passed over.
+//! The largest of some numbers, for checks, in which NaN counts.
 
 use std::borrow::Borrow;
 
-/// The largest absolute value. NaN if one of the numbers is NaN, which `f64::max` would pass over, or if there are none: an
-/// assertion that differences are below a limit then fails.
+/// The largest absolute value. NaN if one of the numbers is NaN, which `f64::max` would ignore, or if
+/// there are no numbers: an assertion that differences are below a limit then fails.
 pub fn largest(values: impl IntoIterator<Item = impl Borrow<f64>>) -> f64 {
     let larger = |a: f64, b: f64| if a.is_nan() || a > b { a } else { b };
     values.into_iter().map(|x| x.borrow().abs()).reduce(larger).unwrap_or(f64::NAN)

@@ -1,23 +1,23 @@
-//! Large arrays in large pages.
+//! Allocates large arrays in large pages.
 //!
-//! A step goes through some twenty arrays over all particles, at many places of each at once: more pages of 4 KiB than
-//! a processor keeps the addresses of, from some ten thousand particles on. Where Linux leaves the choice to programs
-//! (`/sys/kernel/mm/transparent_hugepage/enabled` says `madvise`, as most distributions have it), it gives pages of
-//! 2 MiB to those that ask.
+//! A step accesses some twenty arrays over all particles, each at many places at once. From some ten
+//! thousand particles on, these are more pages of 4 KiB than the processor's address cache holds. Where
+//! Linux leaves the choice to programs (`/sys/kernel/mm/transparent_hugepage/enabled` says `madvise`,
+//! as in most distributions), it gives pages of 2 MiB to programs that ask for them.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 
-/// A large page.
+/// Size of a large page in bytes.
 const PAGE: usize = 2 << 20;
 
-/// Smaller arrays fit into few pages as they are, and would leave most of a large one empty, all of which Linux clears when it
-/// gives it: observables allocate anew for each sample.
+/// Least size of an array in large pages. A smaller array fits into few small pages and would leave most of a large
+/// page empty, all of which Linux clears when it is allocated; observables allocate arrays for each sample.
 const LARGE: usize = PAGE / 4;
 
-/// The allocator of the system, but that large arrays begin and end with large pages, and ask for them.
+/// The allocator of the system, except that large arrays begin and end at large pages, and ask for them.
 pub struct LargePages;
 
-/// How a large array is allocated; `None` for others.
+/// The layout of a large array in large pages; `None` for other arrays.
 fn in_pages(layout: Layout) -> Option<Layout> {
     if layout.size() < LARGE {
         return None;
@@ -26,40 +26,41 @@ fn in_pages(layout: Layout) -> Option<Layout> {
     Layout::from_size_align(size, layout.align().max(PAGE)).ok()
 }
 
-// SAFETY: memory is the system's, of the same layout when it is allocated and when it is given back: that is a function
-// of the layout alone.
+// SAFETY: all memory is the system allocator's, which gets the same layout at allocation and release:
+// it is a function of the caller's layout alone.
 unsafe impl GlobalAlloc for LargePages {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         let Some(pages) = in_pages(layout) else {
-            // SAFETY: the caller promises a layout of more than zero bytes, as the system's allocator asks.
+            // SAFETY: the caller promises a layout of more than zero bytes, as the system's allocator requires.
             return unsafe { System.alloc(layout) };
         };
-        // SAFETY: a large layout is of more than zero bytes.
+        // SAFETY: a large layout has more than zero bytes.
         let memory = unsafe { System.alloc(pages) };
         #[cfg(target_os = "linux")]
         if !memory.is_null() {
             use rustix::mm::{Advice, madvise};
-            // Without large pages everything works as well.
-            // SAFETY: advice changes nothing that a program sees.
+            // Without large pages the program is slower, but correct.
+            // SAFETY: the advice does not change the contents of memory.
             let _ = unsafe { madvise(memory.cast(), pages.size(), Advice::LinuxHugepage) };
         }
         memory
     }
 
     unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
-        // SAFETY: the caller promises the layout that `alloc` had, so this is the one that the system's allocator had.
+        // SAFETY: the caller promises the layout given to `alloc`, so that this is the layout
+        // given to the system's allocator.
         unsafe { System.dealloc(memory, in_pages(layout).unwrap_or(layout)) }
     }
 
     unsafe fn realloc(&self, memory: *mut u8, layout: Layout, size: usize) -> *mut u8 {
         if layout.size() < LARGE && size < LARGE {
-            // SAFETY: small before and after, so it is the system's with this very layout; the caller promises that it is
-            // allocated, and a size above zero that does not overflow when rounded up to the alignment.
+            // SAFETY: both sizes are small, so that the memory is the system's with this layout; the caller promises
+            // that it is allocated, and a size above zero that does not overflow when rounded up to the alignment.
             return unsafe { System.realloc(memory, layout, size) };
         }
-        // SAFETY: the caller promises a size above zero that does not overflow when rounded up to the alignment, so `new` is
-        // a layout; `to` has `size` bytes, `memory` those of `layout`, and they do not overlap; `memory` is given back with
-        // the layout that it was allocated with.
+        // SAFETY: the caller promises a size above zero that does not overflow when rounded up to the
+        // alignment, so that `new` is a layout; `to` has `size` bytes, `memory` those of `layout`, and
+        // they do not overlap; `memory` is released with the layout of its allocation.
         unsafe {
             let new = Layout::from_size_align_unchecked(size, layout.align());
             if let (Some(old), Some(new)) = (in_pages(layout), in_pages(new))
@@ -81,14 +82,14 @@ unsafe impl GlobalAlloc for LargePages {
 mod tests {
     use super::*;
 
-    /// Arrays that grow and shrink over the limits keep what is in them, and begin where their alignment says.
+    /// Arrays that grow and shrink across the limits keep their contents and their alignment.
     #[test]
     fn arrays_keep_their_contents() {
         let sizes =
             [1, 1000, LARGE - 8, LARGE, LARGE + 8, PAGE, PAGE + 8, 3 * PAGE, LARGE, 64, 5 * PAGE + 16];
         for align in [1, 8, 64, 4096] {
             let layout = |size| Layout::from_size_align(size, align).unwrap();
-            // SAFETY: sizes are not zero, layouts those of before; contents are written before they are read.
+            // SAFETY: sizes are not zero, each layout is that of the allocation; contents are written before they are read.
             unsafe {
                 let mut memory = LargePages.alloc(layout(sizes[0]));
                 for of in 0..sizes.len() {

@@ -1,8 +1,8 @@
-//! The theory, written down once: what everything that is fast is compared with.
+//! The plain reference: the theory written down once, which tests compare all faster code with.
 //!
-//! Plain loops over all pairs of particles and their images, in double precision, in the order of the formulas. Nothing
-//! here is shared with a path that a host takes; from the model come the formulas alone (`w`, `w′`, `φ`, `φ′`, ψ and its
-//! symbolic derivatives). It takes time as the square of the number of particles.
+//! Plain loops over all pairs of particles and their images, in double precision, in the order of the
+//! formulas. This module shares no code with the engine; it uses only the formulas of the model (`w`, `w′`,
+//! `φ`, `φ′`, ψ and its symbolic derivatives). Its time grows as the square of the number of particles.
 //!
 //! ```text
 //! n_β,i = Σ_j w(r_ij) over j of species β        ñ = ρ̃(n)        U = Σ_i ψ_i(ñ_i) + Σ_pairs φ(r)
@@ -19,11 +19,11 @@ use crate::model::{Bounds, ExcessFreeEnergy, Fluid};
 /// Energy, densities, forces and virial of one configuration.
 #[derive(Debug, Clone)]
 pub struct Truth {
-    /// `U`.
+    /// Potential energy `U`.
     pub energy: f64,
     /// ψ of each particle.
     pub excess: Vec<f64>,
-    /// Uncorrected local densities, one for each density and species, density-major, of one particle after the other.
+    /// Uncorrected local densities, one for each density and species, density-major, particle by particle.
     pub densities: Vec<f64>,
     /// Conservative forces.
     pub forces: Vec<[f64; 3]>,
@@ -39,10 +39,10 @@ impl Truth {
     }
 }
 
-/// `U` and its gradient for particles at `x`, inside `domain` along its periodic directions.
+/// Computes `U` and its gradient for particles at `x`, inside `domain` along its periodic directions.
 ///
 /// # Errors
-/// A derivative of ψ grows beyond the limits of formulas.
+/// Fails if a derivative of ψ grows beyond the limits of formulas.
 pub fn conservative(
     fluid: &Fluid,
     x: &[[f64; 3]],
@@ -112,7 +112,7 @@ pub fn drag_and_noise(
         let w = (1.0 - r / law.range).powf(law.exponent);
         let towards: f64 = (0..3).map(|c| d[c] / r * (v[i][c] - v[j][c])).sum();
         let tags = [tag[i].min(tag[j]) as u32, tag[i].max(tag[j]) as u32];
-        // Uniform on (−√3, √3), of unit variance.
+        // The noise is uniform on (−√3, √3), with unit variance.
         let xi = 3f64.sqrt() * ((f64::from(threefry(13, tags, key)[0]) + 0.5) / 2f64.powi(31) - 1.0);
         let sigma = (2.0 * law.gamma * fluid.kt).sqrt();
         let force = sigma * w * xi / step.dt.sqrt() - law.gamma * w * w * towards;
@@ -121,7 +121,7 @@ pub fn drag_and_noise(
     (forces, virial)
 }
 
-/// Adds the force of one neighbour along `ê = d/r`, and half its virial. Particles on one point have no direction.
+/// Adds the force of one neighbour along `ê = d/r`, and half its virial. A pair at zero distance has no direction.
 fn add(on: &mut [f64; 3], virial: &mut [f64; 6], d: [f64; 3], r: f64, force: f64) {
     if r > 0.0 {
         for (k, (a, b)) in [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)].into_iter().enumerate() {
@@ -131,8 +131,8 @@ fn add(on: &mut [f64; 3], virial: &mut [f64; 6], d: [f64; 3], r: f64, force: f64
     }
 }
 
-/// Calls `visit` with `i`, `j`, `r_i − r_j` and its length for every particle `i` and every other particle, or image of
-/// any, `j` that is closer than `range`.
+/// Calls `visit` with `i`, `j`, `r_i − r_j` and the distance for every particle `i` and every other
+/// particle or image `j` closer than `range`.
 fn for_each_neighbour(
     fluid: &Fluid,
     x: &[[f64; 3]],
@@ -143,7 +143,7 @@ fn for_each_neighbour(
     let dimensions = fluid.dimensions;
     let most = [0, 1, 2].map(|k| {
         let repeats = k < dimensions && domain.periodic()[k];
-        // Two particles that are inside are less than one height apart.
+        // Two particles inside the box are less than one height apart.
         if repeats { (range / domain.height(k)).ceil() as i32 } else { 0 }
     });
     for (i, j) in (0..x.len()).flat_map(|i| (0..x.len()).map(move |j| (i, j))) {
@@ -183,7 +183,7 @@ fn free_energy(fluid: &Fluid, alpha: usize, n: &[f64]) -> Result<(f64, Vec<f64>)
             (continued(psi, &corrected, &bounds, 0, None)?, (0..n.len()).map(by).collect::<Result<_, _>>()?)
         }
         ExcessFreeEnergy::Curve(curve) => {
-            // Of the total density, in which it is bounded.
+            // The bounds apply to the total density.
             let own = |v: usize| v / count == curve.density;
             let total: f64 = (0..n.len()).filter(|v| own(*v)).map(|v| corrected[v]).sum();
             let (inside, beyond, order) = bounded(total, fluid.densities[curve.density].bounds);
@@ -204,7 +204,7 @@ fn free_energy(fluid: &Fluid, alpha: usize, n: &[f64]) -> Result<(f64, Vec<f64>)
     Ok((psi, slopes))
 }
 
-/// The nearest value within bounds, how far `x` is beyond it, and the highest power of that in ψ.
+/// The nearest value within the bounds, the distance of `x` from it, and the highest power of this distance in ψ.
 fn bounded(x: f64, bounds: Option<Bounds>) -> (f64, f64, usize) {
     match bounds {
         Some(bounds) if x < bounds.low => (bounds.low, x - bounds.low, bounds.order(x - bounds.low)),
@@ -213,8 +213,8 @@ fn bounded(x: f64, bounds: Option<Bounds>) -> (f64, f64, usize) {
     }
 }
 
-/// ψ, or its derivative by one variable, as it goes on beyond the bounds of its variables, from the `v`-th on: a series in
-/// each, `ψ + δ ψ_v + ½ δ² ψ_vv`, as [`Bounds`] says.
+/// ψ, or its derivative with respect to one variable, continued beyond the bounds of the variables from
+/// the `v`-th on: a series `ψ + δ ψ_v + ½ δ² ψ_vv` in each, as in [`Bounds`].
 fn continued(
     psi: &Formula,
     x: &[f64],
@@ -247,7 +247,7 @@ fn continued(
     Ok(sum)
 }
 
-/// Threefry-2x32 (Salmon, Moraes, Dror and Shaw, SC'11).
+/// The Threefry-2x32 generator (Salmon, Moraes, Dror and Shaw, SC'11).
 fn threefry(rounds: usize, counter: [u32; 2], key: [u32; 2]) -> [u32; 2] {
     const ROTATIONS: [u32; 8] = [13, 15, 26, 6, 17, 29, 16, 24];
     let keys = [key[0], key[1], 0x1BD1_1BDA ^ key[0] ^ key[1]];

@@ -1,4 +1,4 @@
-//! Changes of the energy by single moves, against the energy of the whole configuration.
+//! Compares energy changes of single moves with the energy of the whole configuration.
 
 use nalgebra::Matrix3;
 use psidpd_core::engine::{EngineError, LocalEnergy, NoEnergy, Particles, PeriodicBox, noise};
@@ -20,7 +20,7 @@ impl Uniform {
     }
 }
 
-/// Particles, and the energy that follows them.
+/// Particles, and the energy that is updated with them.
 struct Case {
     fluid: Fluid,
     domain: PeriodicBox,
@@ -37,7 +37,7 @@ impl Case {
         let mut local = LocalEnergy::new(&fluid).unwrap();
         let kind: Vec<i32> = (0..count).map(|k| (k % fluid.species.len()) as i32).collect();
         let tag: Vec<i32> = (1..=count as i32).collect();
-        // A start without singular energies.
+        // The start must have no infinite energies.
         for _ in 0..200 {
             let x: Vec<_> = (0..count).map(|_| random.point(&domain, fluid.dimensions)).collect();
             let particles = Particles { owned: count, x: &x, tag: &tag, kind: &kind };
@@ -48,14 +48,14 @@ impl Case {
         panic!("{}: no start", fluid.title);
     }
 
-    /// A place anywhere, or near, perhaps outside of the box.
+    /// A new place, either anywhere or near the old one, perhaps outside the box.
     fn place(&mut self, particle: usize) -> [f64; 3] {
         let far = self.random.next() < 0.3;
         let to = self.random.point(&self.domain, self.fluid.dimensions);
         if far { to } else { [0, 1, 2].map(|c| self.x[particle][c] + 0.3 * (to[c] - self.x[particle][c])) }
     }
 
-    /// Makes trials, all of finite energy accepted, and holds their changes against whole energies.
+    /// Makes trial moves, accepts all of finite energy, and compares their changes with whole energies.
     fn check(&mut self, trials: usize) {
         let whole = |x: &[[f64; 3]], case: &Case| energy(&case.fluid, x, &case.kind, &case.domain);
         let mut before = whole(&self.x, self);
@@ -100,7 +100,8 @@ fn cube(edge: f64) -> PeriodicBox {
     PeriodicBox::orthogonal([-1.0, 0.5, 2.0], [edge; 3], [true; 3]).unwrap()
 }
 
-/// Edges along the axes of a two- or three-dimensional model, so that `count` particles have the density of `density`.
+/// A box with edges along the axes for a two- or three-dimensional model, in which `count`
+/// particles have the density `density`.
 fn fitting(fluid: &Fluid, count: usize, density: f64) -> PeriodicBox {
     cube((count as f64 / density).powf(1.0 / fluid.dimensions as f64))
 }
@@ -174,7 +175,8 @@ fn changes_are_those_of_the_whole_energy_in_every_box() {
         open([true, false, true]),
         open([false; 3]),
         cube(3.1),
-        // Narrower than the range, and than twice the range: particles meet images, and their own.
+        // The box is narrower than the range, or than twice the range: particles are near
+        // images of others and of themselves.
         cube(0.9),
         cube(1.7),
         PeriodicBox::orthogonal([0.0; 3], [0.8, 6.0, 6.0], [true; 3]).unwrap(),
@@ -216,7 +218,8 @@ fn after_many_moves_densities_are_those_from_the_beginning() {
     }
 }
 
-/// An energy that is no number stops; one beyond a pole is refused as infinite; from an infinite one any finite is reached.
+/// An energy that is NaN is an error; one beyond a pole is refused as infinite; from an infinite
+/// energy any finite one is accepted.
 #[test]
 fn energies_that_are_not_finite() {
     let fluid = |psi: &str, pair: &str| {
@@ -233,7 +236,7 @@ fn energies_that_are_not_finite() {
         let particles = Particles { owned: 2, x: &at(r), tag: &[7, 9], kind: &[0, 0] };
         local.load(&domain, &particles).map(|()| local)
     };
-    // w(0) is 2.4: a pole at n = 1, and a ψ of which an isolated particle has none.
+    // w(0) is 2.4: one ψ has a pole at n = 1, the other has no finite energy for an isolated particle.
     let pole = fluid("-ln(1 - n) + ln(n + 1)", "");
     assert_eq!(load(&pole, 0.9).unwrap().change(1, at(0.1)[1], 9).unwrap(), f64::INFINITY);
     let stopped = load(&pole, 0.1).unwrap_err();

@@ -1,4 +1,4 @@
-//! The law of LAMMPS's `mdpd`, against its formula.
+//! Compares the law of LAMMPS's `mdpd` with its formula.
 
 use psidpd_core::engine::PeriodicBox;
 use psidpd_core::model::{WarrenPair, lucy_mdpd};
@@ -9,7 +9,7 @@ fn pair(a: f64, b: f64, rc: f64, rd: f64) -> Option<WarrenPair> {
     Some(WarrenPair { a, b, gamma: 4.5, rc, rd })
 }
 
-/// Three particles, and the law as it is written above.
+/// Compares the forces on three particles with the law as it is written above.
 #[test]
 fn forces_are_those_of_the_formula() {
     let table =
@@ -54,7 +54,7 @@ fn forces_are_those_of_the_formula() {
     }
 }
 
-/// Where everything is equal the reported energy is Warren's ψ at these densities.
+/// If all coefficients are equal the reported energy is Warren's ψ at these densities.
 #[test]
 fn equal_coefficients_report_the_energy_of_warren() {
     let names = ["A".into(), "B".into()];

@@ -1,4 +1,4 @@
-//! Model files that must load, and files that must not, each with what the message must say.
+//! Loads model files that are valid, and refuses invalid ones with the message that each of them states.
 
 use psidpd_core::document::FileError;
 use psidpd_core::engine::Plan;
@@ -29,7 +29,7 @@ fn good_models_load_at_any_temperature_and_make_engines() {
     }
 }
 
-/// What the comment `# key: text` at the top of a bad file asks for.
+/// The text that the comment `# key: text` at the top of an invalid file requires.
 fn wanted<'a>(text: &'a str, key: &str) -> Option<&'a str> {
     text.lines()
         .take_while(|line| line.starts_with('#'))

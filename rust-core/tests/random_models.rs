@@ -1,4 +1,4 @@
-//! Random models: the engine against the plain reference, and both against the Hamiltonian.
+//! Compares the engine with the plain reference for random models, and both with the Hamiltonian.
 
 use proptest::prelude::*;
 use psidpd_core::engine::{Images, Newton, Particles, PeriodicBox, Want};
@@ -9,7 +9,7 @@ use with_images::{Outcome, Owned};
 
 mod with_images;
 
-/// A stream of random numbers from a seed: shrinking a model's text would make another model.
+/// Random numbers from a seed; the test does not shrink a model, as a shorter text would be another model.
 struct Random(u64);
 
 impl Random {
@@ -38,7 +38,7 @@ impl Random {
     }
 }
 
-/// A smooth function of the variables, neither fast nor large.
+/// A smooth function of the variables with moderate values and slopes.
 fn expression(random: &mut Random, variables: &[String], depth: usize) -> String {
     if depth == 0 {
         return format!("{}*{}", random.number(0.1, 0.5), random.pick(variables));
@@ -89,7 +89,7 @@ fn model_text(random: &mut Random) -> String {
                 let _ = writeln!(text, "correction = {{ \"{a}|{b}\" = {one}{other} }}");
             }
         }
-        // Every bounded variable triples the terms of the reference, whose derivatives are symbolic.
+        // Every bounded variable triples the number of terms of the reference, whose derivatives are symbolic.
         if bounded + species.len() <= 4 && random.below(3) > 0 {
             bounded += species.len();
             let typical = 4.0 / species.len() as f64;
@@ -189,8 +189,8 @@ fn run_engine(fluid: &Fluid, c: &Configuration, newton: Newton) -> Outcome {
     with_images::evaluate(fluid, owned, newton, None)
 }
 
-/// On which side of every kink everything is: pairs of the kinks of kernels and pair potentials,
-/// particles of their bounds and of the rows of their tables.
+/// The side of every kink: for pairs the kinks of kernels and pair potentials, for particles those of
+/// bounds and of the rows of tables.
 fn sides(fluid: &Fluid, x: &[[f64; 3]], c: &Configuration, domain: &PeriodicBox, here: &Truth) -> Vec<i64> {
     let mut sides = Vec::new();
     let kinks = kinks(fluid);
@@ -236,7 +236,7 @@ fn sides(fluid: &Fluid, x: &[[f64; 3]], c: &Configuration, domain: &PeriodicBox,
     sides
 }
 
-/// The fourth-order central difference of the energy, or `None` if it reaches across a kink.
+/// The fourth-order central difference of the energy, or `None` if it crosses a kink.
 fn difference(
     fluid: &Fluid,
     c: &Configuration,
@@ -267,7 +267,7 @@ fn load(seed: u64) -> (String, Fluid, Random) {
     (text, fluid, random)
 }
 
-/// `a = b` to a fraction of `scale`.
+/// Whether `a` and `b` differ by a small fraction of `scale`.
 fn close(a: f64, b: f64, scale: f64) -> bool {
     (a - b).abs() <= scale
 }
@@ -299,7 +299,7 @@ fn equals_reference(seed: u64) {
     }
 }
 
-/// How many of the differences could be taken.
+/// Compares forces with differences of the energy; returns the number of differences that crossed no kink.
 fn is_gradient(seed: u64) -> usize {
     let (text, fluid, mut random) = load(seed);
     let c = configuration(&mut random, &fluid);
@@ -322,7 +322,7 @@ fn is_gradient(seed: u64) -> usize {
     let size = here.tally.virial.iter().fold(1.0f64, |m, w| m.max(w.abs()));
     for (w, a, b) in [(0, 0, 0), (1, 1, 1), (3, 0, 1)] {
         let found = difference(&fluid, &c, 5e-5, |h| {
-            // x_a → x_a + h x_b, box and particles alike.
+            // The strain x_a → x_a + h x_b acts on the box and the particles.
             let strain = |p: [f64; 3]| {
                 let mut q = p;
                 q[a] += h * p[b];
@@ -359,7 +359,7 @@ fn forces_and_virials_are_gradients() {
     assert!(taken > 120, "{taken}");
 }
 
-/// A box that a sweep goes round in, or with room for ghosts around it.
+/// Particles in a box wide enough for a sweep with periods, and with room for ghosts.
 fn wide_configuration(random: &mut Random, fluid: &Fluid) -> Configuration {
     let flat = fluid.dimensions == 2;
     let mut edge = || fluid.cutoff() * random.within(2.7, 3.2);
@@ -378,7 +378,7 @@ fn wide_configuration(random: &mut Random, fluid: &Fluid) -> Configuration {
     Configuration { species: (0..count).map(|_| random.below(fluid.species.len())).collect(), x, domain }
 }
 
-/// Energy, forces and virial of the fast engine: in the box itself, and in open space with ghosts for what is beyond it.
+/// Energy, forces and virial of the sweep: in the box itself, and in open space with ghosts.
 fn run_sweep(
     fluid: &Fluid,
     c: &Configuration,
@@ -415,8 +415,9 @@ fn run_sweep(
     (tally.energy(), forces, tally.virial)
 }
 
-/// Every instruction set and precision, in the box and with ghosts, against the plain engine, which the test above holds to
-/// the reference. In mixed precision a force may be off by some millionths of the largest.
+/// Compares every instruction set and precision, in the box and with ghosts, with the sums over pairs,
+/// which the test above compares with the reference. In mixed precision the error of a force is some
+/// millionths of the largest force.
 #[test]
 fn fast_engine_equals_plain_engine() {
     use psidpd_core::engine::{Instructions, Precision, Settings};

@@ -1,5 +1,5 @@
-//! The JSON schema and the reference of the model file: written from the table of keys, current, and
-//! true of the reader.
+//! Checks that the JSON schema and the reference of the model file are current with the table of
+//! keys, and agree with the reader.
 
 use psidpd_core::model::Model;
 use psidpd_core::model::keys::{
@@ -55,7 +55,7 @@ fn object(table: &Table, form: Option<&str>) -> Value {
     let mut any_name = json!(false);
     for key in table.keys_of(form) {
         let mut schema = schema_of_value(&key.value);
-        // Siblings of a reference are ignored by old readers of schemas.
+        // Old readers of schemas ignore siblings of a reference.
         if schema.get("$ref").is_some() {
             schema = json!({ "allOf": [schema] });
         }
@@ -124,7 +124,7 @@ fn reference() -> String {
     text
 }
 
-/// A whole model from an example.
+/// Completes an example to a whole model.
 fn completed(example: &str) -> String {
     let has = |start: &str| example.lines().any(|l| l.starts_with(start));
     let mut text = String::new();
@@ -144,7 +144,7 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Compares a file with what it should be, or writes it if `PSIDPD_UPDATE_SCHEMA` is set.
+/// Compares a file with its expected text, or writes it if `PSIDPD_UPDATE_SCHEMA` is set.
 fn assert_current(file: &str, expected: &str) {
     let path = root().join(file);
     if std::env::var_os("PSIDPD_UPDATE_SCHEMA").is_some() {
@@ -163,8 +163,7 @@ fn schema_and_reference_are_current() {
     assert_current("../docs/model-file.md", &reference());
 }
 
-/// Checks a value by the part of JSON Schema (draft 7) that the schema uses; a keyword that is not
-/// known here is a panic.
+/// Checks a value by the part of JSON Schema (draft 7) that the schema uses; panics at an unknown keyword.
 fn validate(value: &Value, schema: &Value, root: &Value) -> Result<(), String> {
     let rules = match schema {
         Value::Bool(true) => return Ok(()),
@@ -227,7 +226,7 @@ fn validate(value: &Value, schema: &Value, root: &Value) -> Result<(), String> {
     Ok(())
 }
 
-/// Every model file of the project that must load.
+/// All valid model files of the project.
 fn models() -> Vec<PathBuf> {
     let folders = [root().join("tests/models/good"), root().join("../validation/models")];
     let mut found: Vec<PathBuf> = folders
@@ -253,7 +252,7 @@ fn every_model_is_valid_by_the_schema() {
     }
 }
 
-/// The schema finds what it can know of: unknown, missing and mistyped keys.
+/// The schema refuses unknown, missing and mistyped keys.
 #[test]
 fn the_schema_refuses_unknown_and_missing_keys() {
     let schema: Value = serde_json::from_str(&schema()).unwrap();
@@ -290,7 +289,7 @@ fn every_example_of_the_reference_loads() {
     assert_eq!(count, TABLES.iter().map(|t| t.keys.len()).sum::<usize>());
 }
 
-/// The reader, asked for a key that is not there, lists those it knows: they are the table's.
+/// For an unknown key the reader's error lists the known keys, which must be those of the table.
 #[test]
 fn the_reader_knows_the_keys_of_the_table_and_no_others() {
     let known = |text: &str| -> Vec<String> {

@@ -1,4 +1,4 @@
-//! Laws of stated slopes: the engine against the plain reference, and against ψ where the slopes have one.
+//! Tests laws of stated slopes: compares the engine with the plain reference, and with ψ if the slopes are those of one.
 
 use psidpd_core::engine::{Newton, PeriodicBox, Plan, noise};
 use psidpd_core::maximum::largest;
@@ -16,11 +16,11 @@ const HEAD: &str = "title = \"t\"\nspecies = [\"A\", \"B\"]\n\
     [[pair]]\nbetween = [\"A\", \"B\"]\nform = \"soft\"\nstrength = 10\nrange = 1\n\
     [excess_free_energy]\nA = \"n_A*n_B + 0.1*m^2 + 0.7*q\"\n";
 
-/// ψ of species B, and the slopes it has.
+/// ψ of species B, and the same law as stated slopes.
 const FORMULA: &str = "B = \"kT*n_A^2*m_B + 0.3*m_A + 0.2*n\"\n";
 const STATED: &str = "B = { energy = \"kT*n_A^2*m_B + 0.3*m_A + 0.2*n\", \
     slopes = { n_A = \"2*kT*n_A*m_B + 0.2\", n_B = \"0.2\", m_A = \"0.3\", m_B = \"kT*n_A^2\" } }\n";
-/// No gradient of anything.
+/// Slopes that are the gradient of no function.
 const OTHER: &str = "B = { energy = \"n_A\", slopes = { n = \"0.4*m_A\", m_B = \"n_A*n_B + 0.1\" } }\n";
 
 fn fluid(psi_of_b: &str) -> Fluid {
@@ -34,7 +34,7 @@ fn configuration() -> (Vec<[f64; 3]>, Vec<usize>, PeriodicBox) {
     (x, (0..150).map(|k| k % 2).collect(), domain)
 }
 
-/// Energy and forces by the engine.
+/// Energy and forces of the engine.
 fn engine(fluid: &Fluid, newton: Newton) -> (f64, Vec<[f64; 3]>) {
     let (x, species, domain) = configuration();
     let v = vec![[0.0; 3]; x.len()];
@@ -73,7 +73,7 @@ fn the_slopes_of_a_psi_give_its_forces() {
     assert_close(&forces, &of_psi);
 }
 
-/// The plan says what it is, and mean field refuses it.
+/// The plan reports a law without potential, and mean field refuses it.
 #[test]
 fn nobody_takes_it_for_a_free_energy() {
     let fluid = fluid(OTHER);
@@ -81,13 +81,13 @@ fn nobody_takes_it_for_a_free_energy() {
     assert_eq!(fluid.stated_slopes(), Some("B"));
     let plan = Plan::new(&fluid).unwrap().to_string();
     assert!(plan.contains("slope of B    n_A: ") && plan.contains("NOT CONSERVATIVE"), "{plan}");
-    // Every ψ is linear in q: it needs no pass, stated slopes elsewhere or not.
+    // Every ψ is linear in q, which needs no pass, also with stated slopes in other densities.
     assert!(plan.contains("psi is linear in q"), "{plan}");
     assert_eq!(MeanField::new(&fluid).unwrap_err(), TheoryError::NoFreeEnergy("B".into()));
     assert!(self::fluid(FORMULA).is_conservative());
 }
 
-/// Where nothing is stated to act, no density is summed for it.
+/// If all stated slopes are zero, no density is summed.
 #[test]
 fn a_law_of_zeros_needs_no_pass() {
     let text = "title = \"t\"\nspecies = [\"A\"]\n[density.n]\nkernel = \"lucy\"\nrange = 1\n\

@@ -393,7 +393,7 @@ fn what_does_not_go_together_is_refused() {
     let instead = |fix_now: &str| head.replace(fix, fix_now);
     let cases = [
         (with("fix 2 all nve\n"), "fix 2 (nve) integrates too"),
-        (with("fix 2 all dpd/splitting aboba\n"), "there can be one only"),
+        (with("fix 2 all dpd/splitting aboba\n"), "only one such fix is allowed"),
         (with("fix 2 all langevin 1 1 1 77\n"), "expects one evaluation of forces"),
         (with("run_style respa 2 2\n"), "works with 'run_style verlet' only, found 'respa'"),
         (

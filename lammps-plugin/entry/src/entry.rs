@@ -1,8 +1,8 @@
-//! What registers the styles: `lammpsplugin_init`, which `plugin load` calls, and `psidpd_register` for a
-//! LAMMPS that has no plugins.
+//! The functions that register the styles: `lammpsplugin_init`, which `plugin load` calls, and
+//! `psidpd_register` for a LAMMPS without plugins.
 //!
-//! The structure that the former fills is LAMMPS's plugin interface, version one. Functions of LAMMPS are looked up when
-//! they are needed, by their names in its C interface.
+//! `lammpsplugin_init` fills LAMMPS's plugin structure, version one. Functions of LAMMPS are looked up
+//! when they are needed, by their names in its C interface.
 
 use crate::styles;
 use crate::table::Creator;
@@ -10,7 +10,7 @@ use crate::version;
 use std::ffi::{CString, c_char, c_int, c_void};
 use std::sync::OnceLock;
 
-/// The LAMMPS the styles were compiled for, as `lammps_version()` counts: 20250722.
+/// The LAMMPS that the styles were compiled for, as `lammps_version()` counts: 20250722.
 const BUILT_FOR: &str = env!("PSIDPD_LAMMPS_VERSION");
 
 /// LAMMPS's description of a plugin style.
@@ -30,12 +30,12 @@ type Version = unsafe extern "C-unwind" fn(*mut c_void) -> c_int;
 type Setting = unsafe extern "C-unwind" fn(*mut c_void, *const c_char) -> c_int;
 type Error = unsafe extern "C-unwind" fn(*mut c_void, c_int, *const c_char);
 
-/// The LAMMPS that a plugin was built for, as a number and in words.
+/// Names a LAMMPS version as a number and in words.
 fn named(number: &str) -> String {
     number.parse().map_or_else(|_| number.to_owned(), |n| format!("{n} ({})", version::in_words(n)))
 }
 
-/// Why this plugin must not touch that LAMMPS; None if it was compiled for it.
+/// Why this plugin must not run in the LAMMPS at `lmp`; None if it was compiled for it.
 ///
 /// # Safety
 /// `lmp` is a LAMMPS instance.
@@ -50,7 +50,7 @@ unsafe fn trouble(lmp: *mut c_void) -> Option<String> {
     };
     // SAFETY: these functions have these signatures in every LAMMPS library.
     let version = unsafe { std::mem::transmute::<*mut c_void, Version>(version) };
-    // SAFETY: as above.
+    // SAFETY: `lammps_extract_setting` has this signature in every LAMMPS library.
     let setting = unsafe { std::mem::transmute::<*mut c_void, Setting>(setting) };
     // SAFETY: `lmp` is a LAMMPS instance, whose layout its own functions know.
     let (host, tag) = unsafe { (version(lmp), setting(lmp, c"tagint".as_ptr())) };
@@ -60,7 +60,7 @@ unsafe fn trouble(lmp: *mut c_void) -> Option<String> {
     } else if tag != 4 {
         ("32-bit atom IDs".to_owned(), format!("this LAMMPS has {}-bit ones", 8 * tag))
     } else if openmpi != (env!("PSIDPD_MPI") == "openmpi") {
-        // Handles differ in size, and with them the layout of everything in LAMMPS that holds one.
+        // MPI handles differ in size, and so does the layout of every LAMMPS class that holds one.
         ("another MPI than this LAMMPS uses".to_owned(), "the two do not mix".to_owned())
     } else {
         return None;
@@ -89,7 +89,7 @@ pub unsafe extern "C-unwind" fn psidpd_register(lmp: *mut c_void) -> *const c_ch
     let table = if lmp.is_null() {
         Err("psidpd_register: no LAMMPS instance".to_owned())
     } else {
-        // SAFETY: the caller's promise.
+        // SAFETY: the caller promises that `lmp` is null or an instance; null was refused above.
         match unsafe { trouble(lmp) } {
             Some(text) => Err(text),
             None => styles::table().and_then(|table| Ok((table, styles::load()?))).map_err(not_loaded),
@@ -98,7 +98,7 @@ pub unsafe extern "C-unwind" fn psidpd_register(lmp: *mut c_void) -> *const c_ch
     match table {
         Ok((table, styles)) => {
             for style in styles {
-                // SAFETY: an instance of the LAMMPS that the C++ was compiled for; it copies the name.
+                // SAFETY: `trouble` found that the C++ was compiled for this LAMMPS; the function copies the name.
                 unsafe { (table.insert)(lmp, style.kind, style.name, style.creator) };
             }
             std::ptr::null()
@@ -109,7 +109,7 @@ pub unsafe extern "C-unwind" fn psidpd_register(lmp: *mut c_void) -> *const c_ch
     }
 }
 
-/// Of LAMMPS's library interface: stop on all ranks.
+/// Constant of LAMMPS's library interface: stop on all ranks.
 const LMP_ERROR_ALL: c_int = 2;
 
 /// Registers the styles, unless this plugin was built for another LAMMPS.
@@ -123,7 +123,7 @@ pub unsafe extern "C-unwind" fn lammpsplugin_init(
     handle: *mut c_void,
     register: *mut c_void,
 ) {
-    // SAFETY: LAMMPS passes its own instance.
+    // SAFETY: LAMMPS passes its own instance to this function.
     let found = match unsafe { trouble(lmp) } {
         Some(text) => Err(text),
         None => styles::load().map_err(not_loaded),
@@ -131,7 +131,7 @@ pub unsafe extern "C-unwind" fn lammpsplugin_init(
     let styles = match found {
         Ok(styles) => styles,
         Err(text) => {
-            // SAFETY: as above.
+            // SAFETY: LAMMPS passes its own instance to this function.
             unsafe { refuse(lmp, text) };
             return;
         }
@@ -155,28 +155,28 @@ pub unsafe extern "C-unwind" fn lammpsplugin_init(
     }
 }
 
-/// The version in LAMMPS's own words, which prints a note where they differ from its own.
+/// The version in the words that LAMMPS prints of itself; LAMMPS prints a note where it differs from its own.
 fn version_text() -> *const c_char {
     static TEXT: OnceLock<CString> = OnceLock::new();
     let words = || BUILT_FOR.parse().map_or_else(|_| BUILT_FOR.to_owned(), version::in_words);
     TEXT.get_or_init(|| CString::new(words()).unwrap_or_default()).as_ptr()
 }
 
-/// Says why nothing is loaded, and stops the script if the host can be stopped.
+/// Prints why the styles are not loaded, and stops the script if the host can be stopped.
 ///
 /// # Safety
 /// `lmp` is a LAMMPS instance.
 unsafe fn refuse(lmp: *mut c_void, text: String) {
     let Ok(text) = CString::new(text) else { return };
     let Some(error) = styles::symbol(c"lammps_error") else {
-        // An old library: without the styles the script stops at its pair_style command.
+        // An old library has no such function: without the styles the script stops at its pair_style command.
         eprintln!("ERROR: {}", text.to_string_lossy());
         return;
     };
     // SAFETY: the symbol has this signature in every LAMMPS that has it.
     let error = unsafe { std::mem::transmute::<*mut c_void, Error>(error) };
-    // LAMMPS throws; the text leaks once, for nothing of ours may unwind it.
+    // LAMMPS throws an exception here, which must not unwind Rust values: the text leaks once.
     let text = text.into_raw();
-    // SAFETY: `lmp` is a LAMMPS instance, the text is a C string.
+    // SAFETY: the caller promises that `lmp` is an instance; the text is a C string.
     unsafe { error(lmp, LMP_ERROR_ALL, text) };
 }

@@ -1,10 +1,10 @@
-//! The file that LAMMPS loads. It needs nothing but C when it is loaded, so that any LAMMPS can load it and be told for
-//! which one the styles were built; those are in a second file beside it, which needs the C++ of that LAMMPS.
+//! The file that LAMMPS loads. It links to the C library only, so that any LAMMPS can load it and learn which LAMMPS
+//! the styles were built for. The styles are in a second file beside it, which links to the C++ of that LAMMPS.
 //!
 //! - `entry`: `lammpsplugin_init`, which `plugin load` calls, and `psidpd_register`, for a LAMMPS without plugins;
 //! - `styles`: loads the second file, whose contract is `table`;
-//! - `version`: LAMMPS's versions in words;
-//! - `whole`: whether the second file has all its bytes.
+//! - `version`: the date of a LAMMPS version in words;
+//! - `whole`: checks whether the second file is complete.
 
 #[cfg(lammps_host)]
 mod entry;

@@ -1,40 +1,38 @@
-//! What the file with the styles has for the entry: the table that its `psidpd_styles` returns.
+//! The contract between the entry and the file with the styles: the table that `psidpd_styles` returns.
 
 use std::ffi::{c_char, c_void};
 
-/// Makes a style for a LAMMPS instance: its arguments are what LAMMPS calls a creator of its kind with.
+/// Makes a style for a LAMMPS instance. The real signature is that of LAMMPS's creators of the style's kind.
 pub type Creator = unsafe extern "C-unwind" fn();
 
-/// One style. The texts are C strings that stay.
+/// A style. Its texts are static C strings.
 #[repr(C)]
 pub struct Style {
-    /// `pair` or `fix`.
+    /// Command of the style: `pair` or `fix`.
     pub kind: *const c_char,
-    /// As in the commands `pair_style` and `fix`.
+    /// Name of the style in the commands `pair_style` and `fix`.
     pub name: *const c_char,
-    /// What it is, for the log.
+    /// Description of the style, for the log.
     pub info: *const c_char,
-    /// What makes it.
     pub creator: Creator,
 }
 
-/// All of them.
 #[repr(C)]
 pub struct Styles {
-    /// For which LAMMPS and by which psidpd they were built: [`BUILT`].
+    /// The LAMMPS and the psidpd version of the build: [`BUILT`].
     pub built: *const c_char,
-    /// How many styles there are.
+    /// Number of styles.
     pub count: usize,
-    /// The first.
+    /// First element of an array of `count` styles.
     pub first: *const Style,
-    /// Puts a creator into the table of styles of its kind of a LAMMPS instance: kind, name, creator.
+    /// Registers a creator in a LAMMPS instance: arguments are instance, kind, name and creator.
     pub insert: unsafe extern "C-unwind" fn(*mut c_void, *const c_char, *const c_char, Creator),
 }
 
-// SAFETY: all of it is immutable and lives as long as the process.
+// SAFETY: a style is immutable, and its pointers lead to statics.
 unsafe impl Sync for Style {}
-// SAFETY: as above.
+// SAFETY: the table is immutable, and its pointers lead to statics.
 unsafe impl Sync for Styles {}
 
-/// What the two files must agree in.
+/// The versions in which the two files must agree.
 pub const BUILT: &str = concat!(env!("PSIDPD_LAMMPS_VERSION"), " ", env!("CARGO_PKG_VERSION"), "\0");

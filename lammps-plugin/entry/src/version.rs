@@ -3,7 +3,7 @@
 const MONTHS: [&str; 12] =
     ["Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec"];
 
-/// A version number in the words that LAMMPS prints of itself; the number where it is no date.
+/// The version as LAMMPS prints it, or the number if it is no date.
 pub fn in_words(number: u32) -> String {
     let (year, month, day) = (number / 10_000, number / 100 % 100, number % 100);
     match (month as usize).checked_sub(1).and_then(|m| MONTHS.get(m)) {

@@ -1,10 +1,10 @@
-//! Whether a library has all its bytes: the loader maps one that was cut short, and dies of a signal when it reads on.
+//! Checks whether a library is complete: the loader maps a file that was cut short, and crashes when it reads past its end.
 
 use std::io::Read;
 use std::path::Path;
 
-/// How many bytes a library should have at least, by the table of sections that linkers put at its end, and how many it
-/// has; None where it is no library of this kind of machine.
+/// The least size in bytes that the section table at the end of a library asks for, and the size of the
+/// file; None if it is no library for this kind of machine.
 pub fn sizes(path: &Path) -> Option<(u64, u64)> {
     let mut head = [0; 64];
     let mut file = std::fs::File::open(path).ok()?;

@@ -8,13 +8,13 @@ use psidpd_core::model::{
 };
 use std::path::Path;
 
-/// Coefficients of the types that have any, as a model takes them.
+/// Coefficients of those types that have any, in the form that presets take.
 struct Members<T> {
-    /// The types, from 0: the others are another style's of a hybrid.
+    /// The types, from 0; other types belong to another style of a hybrid.
     types: Vec<usize>,
-    /// Their species.
+    /// Species names of the types.
     species: Vec<String>,
-    /// A row-major table over them, of which the upper triangle counts.
+    /// A row-major table over the types; only the upper triangle is read.
     pairs: Vec<Option<T>>,
 }
 
@@ -33,7 +33,7 @@ impl<T: Copy> Members<T> {
         })
     }
 
-    /// Types where a preset counts species.
+    /// Converts an error of a preset, which counts species, to one that counts types.
     fn error(&self, error: PresetError) -> StyleError {
         let PresetError::Missing(i, j) = error else { return StyleError(error.to_string()) };
         StyleError(PresetError::Missing(self.types[i - 1] + 1, self.types[j - 1] + 1).to_string())
@@ -45,11 +45,11 @@ fn name_of_type(index: usize) -> String {
 }
 
 impl Style {
-    /// Reads a model file, for a simulation in LAMMPS's `units` of that name; kT is in these. `names` has the species of each
-    /// LAMMPS type, in order, or `NULL` for types that another style of a hybrid computes.
+    /// Reads a model file for a simulation in LAMMPS's units `units`, in which kT is given. `names` has the
+    /// species of each LAMMPS type, in order, or `NULL` for types that another style of a hybrid computes.
     ///
     /// # Errors
-    /// Anything wrong in the file, its dimensions, or the names.
+    /// Fails for any error in the file, and for wrong dimensions or names.
     pub fn from_file(
         path: &str,
         units: &str,
@@ -63,10 +63,10 @@ impl Style {
         })
     }
 
-    /// As [`Style::from_file`], with the text of a model file; `source` stands for the file in messages.
+    /// Reads the text of a model file, as [`Style::from_file`]; `source` names the file in messages.
     ///
     /// # Errors
-    /// As [`Style::from_file`].
+    /// Fails as [`Style::from_file`].
     pub fn from_text(
         source: &str,
         text: &str,
@@ -81,14 +81,14 @@ impl Style {
         })
     }
 
-    /// Warren's A/B model of the coefficients of LAMMPS's `mdpd`; `pairs` is a row-major table over
-    /// types of which the upper triangle is read.
+    /// Warren's A/B model with the coefficients of LAMMPS's `mdpd`; `pairs` is a row-major table over
+    /// types, of which the upper triangle is read.
     ///
     /// With `masses`, one for each type, the force law is that of LAMMPS's `mdpd`, whose densities are weighed
     /// by them and which has no potential.
     ///
     /// # Errors
-    /// Coefficients that make no model, or none that has a potential.
+    /// Fails for coefficients that define no valid model, or none with a potential.
     pub fn from_coefficients(
         kt: f64,
         pairs: &[Option<WarrenPair>],
@@ -120,10 +120,10 @@ impl Style {
         })
     }
 
-    /// Spline DPD; `pairs` as for [`Style::from_coefficients`], but pairs of types may be left out.
+    /// Spline DPD; `pairs` is a table as for [`Style::from_coefficients`], in which pairs of types may be missing.
     ///
     /// # Errors
-    /// Coefficients that make no model.
+    /// Fails for coefficients that define no valid model.
     pub fn from_spline_coefficients(
         kt: f64,
         pairs: &[Option<SplinePair>],

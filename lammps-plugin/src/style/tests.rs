@@ -23,12 +23,12 @@ fn types_map_to_species_by_name() {
     s.densities(around, 2, &x, &[], &[1, 2], &[1, 3], true, None, Want::FORCES).unwrap();
     s.forces(2, &x, &[], &[1, 2], &[1, 3], None, Want::FORCES, &mut f).unwrap();
     assert_eq!(f, [-12.5, 0.0, 0.0, 12.5, 0.0, 0.0]);
-    // Without ghosts, added to what is there.
+    // Without ghosts, forces are added to those in `f`.
     s.evaluate(&open, &x, &[], &[1, 2], &[1, 3], None, Want::FORCES, &mut f).unwrap();
     assert_eq!(f, [-25.0, 0.0, 0.0, 25.0, 0.0, 0.0]);
 }
 
-/// Somebody who looks at densities that no force needs slows no later step down.
+/// A request for densities that no force needs does not slow later steps down.
 #[test]
 fn densities_of_one_step_leave_later_steps_to_the_sweep() {
     let text = "title = \"t\"\nspecies = [\"A\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n\
@@ -87,7 +87,7 @@ fn types_without_coefficients_take_no_part() {
     assert!(short.to_string().contains("as many masses"), "{short}");
 }
 
-/// Whatever a host passes: an answer or an error.
+/// Arguments that no host should pass give an answer or an error.
 #[test]
 fn hostile_arguments_are_errors() {
     let many = "title = \"t\"\nspecies = [\"A\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 1\n\
@@ -100,7 +100,7 @@ fn hostile_arguments_are_errors() {
         let error = s.configure(false, threads).unwrap_err().to_string();
         assert!(error.contains("from 1 to 1024"), "{error}");
     }
-    // Before any evaluation nobody is known.
+    // Before the first evaluation no particle is known.
     assert!(extremes.iter().all(|i| s.single([1, 1], 0.5, [*i, 0]).is_err()));
     let (x, v) = ([0.0, 0.0, 0.0, 0.5, 0.0, 0.0], [0.0; 6]);
     let step = Some(Step { seed: 1, number: 1, dt: 0.01 });
@@ -140,7 +140,7 @@ fn hostile_arguments_are_errors() {
     assert!(s.evaluate(&closed, &x, &v, &[0, -2], &[1, 1], step, Want::FORCES, &mut f).is_err());
     let wild = [f64::NAN, 0.0, 0.0, f64::INFINITY, 0.0, 1e300];
     assert!(s.evaluate(&closed, &wild, &v, &[1, 2], &[1, 1], step, Want::FORCES, &mut f).is_err());
-    // And it goes on.
+    // The style still works after these errors.
     s.evaluate(&closed, &x, &v, &[1, 2], &[1, 1], step, Want::FORCES, &mut f).unwrap();
 }
 

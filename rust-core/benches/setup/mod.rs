@@ -7,12 +7,11 @@ use psidpd_core::model::{Fluid, Model};
 
 /// A fluid and its number density.
 pub struct Subject {
-    /// For the names of measurements.
+    /// Name in the names of measurements.
     pub name: &'static str,
     text: &'static str,
-    /// Number density.
     pub density: f64,
-    /// Δt.
+    /// Time step.
     pub dt: f64,
 }
 
@@ -45,7 +44,7 @@ impl Subject {
     }
 }
 
-/// A fluid, a precision and an instruction set that this processor has, by their names.
+/// Finds a fluid, a precision and an instruction set of this processor by their names.
 #[allow(dead_code)] // Not every user of this module is told these.
 pub fn choose(
     fluid: &str,
@@ -65,31 +64,25 @@ pub fn choose(
     Ok((subject, precision, set))
 }
 
-/// A number from 0 to 1, the same everywhere.
+/// A reproducible pseudo-random number from 0 to 1.
 pub fn uniform(k: usize) -> f64 {
     f64::from(noise::threefry2x32::<20>([k as u32, 0], [5, 9])[0]) / 4_294_967_296.0
 }
 
-/// Particles in a cubic box, and where their forces go.
+/// Particles in a cubic box, and their forces.
 pub struct Cloud {
-    /// The box.
     pub domain: PeriodicBox,
     edge: f64,
-    /// Positions.
     pub x: Vec<[f64; 3]>,
-    /// Velocities.
     pub v: Vec<[f64; 3]>,
-    /// Tags.
     pub tag: Vec<i32>,
-    /// Species.
     pub kind: Vec<i32>,
-    /// Forces.
     pub force: Vec<[f64; 3]>,
     step: Step,
 }
 
 impl Cloud {
-    /// `count` particles of `fluid` on a disturbed lattice, which is nearer to a fluid than points at random.
+    /// Puts `count` particles on a disturbed lattice, which resembles a fluid more than random points do.
     pub fn new(subject: &Subject, fluid: &Fluid, count: usize) -> Cloud {
         let edge = (count as f64 / subject.density).cbrt();
         let side = (count as f64).cbrt().ceil() as usize;
@@ -111,7 +104,7 @@ impl Cloud {
         }
     }
 
-    /// Moves particles along their velocities by one step: forces of the lattice would heat it.
+    /// Moves particles along their velocities by one step: forces on a lattice would heat it.
     pub fn drift(&mut self) {
         for (x, v) in self.x.iter_mut().zip(&self.v) {
             for c in 0..3 {
@@ -125,7 +118,7 @@ impl Cloud {
         }
     }
 
-    /// Gives the particles what a step's forces do.
+    /// Applies the forces of a step to the velocities.
     #[allow(dead_code)] // Not every user of this module moves particles so.
     pub fn kick(&mut self) {
         for (v, f) in self.v.iter_mut().zip(&self.force) {
@@ -135,7 +128,7 @@ impl Cloud {
         }
     }
 
-    /// One evaluation of all forces, noise among them.
+    /// One evaluation of all forces, with noise.
     pub fn evaluate(&mut self, sweep: &mut Sweep) {
         self.step.number += 1;
         let particles = Particles { owned: self.x.len(), x: &self.x, tag: &self.tag, kind: &self.kind };
@@ -153,10 +146,10 @@ impl Cloud {
     }
 }
 
-/// The particles of a rank that has all of a box but along z, where there are images of its own as ghosts.
-#[allow(dead_code)] // As above.
+/// Particles of a rank that has all of the box, with ghosts along z, which are its own images.
+#[allow(dead_code)] // Some targets that include this module do not use it.
 pub struct Rank {
-    /// The box, and owned particles.
+    /// The box and the owned particles.
     pub cloud: Cloud,
     around: PeriodicBox,
     along: PeriodicBox,
@@ -168,9 +161,9 @@ pub struct Rank {
     slopes: Vec<f64>,
 }
 
-#[allow(dead_code)] // As above.
+#[allow(dead_code)] // Some targets that include this module do not use it.
 impl Rank {
-    /// As [`Cloud::new`]; ghosts are found by [`Rank::find_ghosts`].
+    /// Creates the particles as [`Cloud::new`]; [`Rank::find_ghosts`] adds ghosts.
     pub fn new(subject: &Subject, fluid: &Fluid, count: usize) -> Rank {
         let cloud = Cloud::new(subject, fluid, count);
         let part = |periodic| PeriodicBox::orthogonal([0.0; 3], [cloud.edge; 3], periodic).expect("a box");
@@ -197,7 +190,7 @@ impl Rank {
         }
     }
 
-    /// One evaluation of all forces, noise among them; `between` hears when slopes go to ghosts, and when they are there.
+    /// One evaluation of all forces, with noise; `between` is called before and after slopes go to ghosts.
     pub fn evaluate(&mut self, sweep: &mut Sweep, mut between: impl FnMut()) {
         self.cloud.step.number += 1;
         let owned = self.cloud.x.len();
@@ -215,8 +208,8 @@ impl Rank {
     }
 }
 
-/// The fast engine on one thread.
-#[allow(dead_code)] // As above.
+/// The sweep on one thread.
+#[allow(dead_code)] // Some targets that include this module do not use it.
 pub fn sweep(fluid: &Fluid, precision: Precision, instructions: Instructions) -> Sweep {
     let settings = Settings { precision, instructions, ..Settings::default() };
     Sweep::new(fluid, settings).expect("a plan")

@@ -44,7 +44,7 @@
 #define PSIDPD_INSTRUCTIONS_BEST 0
 
 /**
- * For psidpd_settings: whatever the library was compiled for.
+ * For psidpd_settings: the instruction set that the library was compiled for.
  */
 #define PSIDPD_INSTRUCTIONS_PORTABLE 1
 
@@ -89,7 +89,7 @@
 #define PSIDPD_WANT_DENSITIES 16
 
 /**
- * What a call came to. The values keep their meaning in every version; later versions may add some.
+ * The outcome of a call. The values keep their meaning in every version; later versions may add some.
  */
 enum psidpd_status
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -97,15 +97,15 @@ enum psidpd_status
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
   /**
-   * Done.
+   * The call succeeded.
    */
   PSIDPD_STATUS_OK = 0,
   /**
-   * An argument out of its domain: a length, an index, a flag, a text that is not UTF-8.
+   * An argument is out of its domain: a length, an index, a flag, a text that is not UTF-8.
    */
   PSIDPD_STATUS_INVALID_ARGUMENT = 1,
   /**
-   * A pointer that must not be null is.
+   * A pointer that must not be null is null.
    */
   PSIDPD_STATUS_NULL_POINTER = 2,
   /**
@@ -113,20 +113,20 @@ enum psidpd_status
    */
   PSIDPD_STATUS_FILE = 3,
   /**
-   * A model file says something that makes no model, or none at this temperature.
+   * A model file does not define a valid model, or not at this temperature.
    */
   PSIDPD_STATUS_MODEL = 4,
   /**
-   * Forces cannot be computed for these particles: a position, a tag, a type, psi or a force is not
-   * what it must be. The message names the particle.
+   * Forces cannot be computed for these particles: a position, tag, type, psi or force is invalid.
+   * The message names the particle.
    */
   PSIDPD_STATUS_ENGINE = 5,
   /**
-   * A call that must come after another one that has not been made, or has failed.
+   * A call that must precede this one has not been made, or has failed.
    */
   PSIDPD_STATUS_CALL_ORDER = 6,
   /**
-   * A fault in this library. An engine can be used again after psidpd_engine_densities.
+   * An internal error of this library. psidpd_engine_densities makes the engine usable again.
    */
   PSIDPD_STATUS_PANIC = 255,
 };
@@ -139,7 +139,7 @@ typedef int32_t psidpd_status;
 #endif // __cplusplus
 
 /**
- * Which way an evaluation went.
+ * The path that an evaluation took.
  */
 enum psidpd_path
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -147,11 +147,11 @@ enum psidpd_path
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
   /**
-   * By the sweep over cells: vector instructions, threads.
+   * The sweep over cells, with vector instructions and threads.
    */
   PSIDPD_PATH_SWEEP = 0,
   /**
-   * By the reference, over a list of pairs, in double precision and on one thread.
+   * The reference, over a list of pairs, in double precision and on one thread.
    */
   PSIDPD_PATH_REFERENCE = 1,
 };
@@ -175,8 +175,9 @@ typedef struct psidpd_engine psidpd_engine;
 typedef struct psidpd_model psidpd_model;
 
 /**
- * How an engine computes. Results depend on the precision, and only by rounding on anything else; for any number of
- * threads they are the same to the bit. With all bytes zero and one thread it is what psidpd_engine_new chooses.
+ * The settings of an engine. Results depend on the precision; instruction sets change them by rounding
+ * errors only, and the number of threads does not change a bit. All bytes zero and one thread are the
+ * settings of psidpd_engine_new.
  */
 typedef struct psidpd_settings {
   /**
@@ -184,33 +185,33 @@ typedef struct psidpd_settings {
    */
   int32_t precision;
   /**
-   * PSIDPD_INSTRUCTIONS_...; one that the processor lacks becomes the best that it has.
+   * PSIDPD_INSTRUCTIONS_...; the best set of the processor replaces one that it lacks.
    */
   int32_t instructions;
   /**
-   * Threads that share the work, from 1.
+   * Number of threads, from 1.
    */
   size_t threads;
 } psidpd_settings;
 
 /**
- * Particles of one host or rank: owned ones first, then ghosts.
+ * Particles of one host or rank: owned particles first, then ghosts.
  */
 typedef struct psidpd_particles {
   /**
-   * How many are owned.
+   * Number of owned particles.
    */
   size_t owned;
   /**
-   * How many there are, ghosts included.
+   * Number of all particles, ghosts included.
    */
   size_t all;
   /**
-   * Positions, `3 * all`: x, y, z of the first, of the second, ... Ghosts are where their image is.
+   * Positions, `3 * all` numbers: x, y, z of the first, of the second, ... Ghosts are at the position of their image.
    */
   const double *x;
   /**
-   * Numbers that stay with the particles, from 1, `all` of them; images share their owner's.
+   * Particle numbers from 1 that never change, `all` of them; an image has its owner's.
    */
   const int32_t *tag;
   /**
@@ -220,7 +221,7 @@ typedef struct psidpd_particles {
 } psidpd_particles;
 
 /**
- * What the thermostat of a step is keyed and scaled by.
+ * Seed, number and length of the time step, on which the thermostat depends.
  */
 typedef struct psidpd_step {
   /**
@@ -240,7 +241,7 @@ typedef struct psidpd_step {
 /**
  * Sums over the particles and pairs of one host or rank; the sums of all ranks add up.
  *
- * Virials are sums of r_ij (x) F_ij: xx, yy, zz, xy, xz, yz. What was not asked for means nothing.
+ * Virials are sums of r_ij (x) F_ij: xx, yy, zz, xy, xz, yz. Entries that were not asked for are unspecified.
  */
 typedef struct psidpd_tally {
   /**
@@ -266,7 +267,7 @@ typedef struct psidpd_tally {
  */
 typedef struct psidpd_box {
   /**
-   * The corner.
+   * Position of the box's corner.
    */
   double origin[3];
   /**
@@ -281,11 +282,11 @@ typedef struct psidpd_box {
 } psidpd_box;
 
 /**
- * What an evaluation is given, and what is wanted of it.
+ * The input of an evaluation, and the results that it should compute.
  */
 typedef struct psidpd_request {
   /**
-   * The particles.
+   * Owned particles and ghosts.
    */
   struct psidpd_particles particles;
   /**
@@ -294,7 +295,7 @@ typedef struct psidpd_request {
    */
   const double *v;
   /**
-   * What the thermostat needs; NULL for conservative forces only.
+   * Seed, number and length of the time step, for the thermostat; NULL for conservative forces only.
    */
   const struct psidpd_step *step;
   /**
@@ -309,19 +310,19 @@ typedef struct psidpd_request {
  */
 typedef struct psidpd_pairs {
   /**
-   * How many there are.
+   * Number of pairs.
    */
   size_t count;
   /**
-   * The first particle of each, owned: its place in the arrays, from 0.
+   * Array index, from 0, of the first particle of each pair, which is owned.
    */
   const int32_t *i;
   /**
-   * The second.
+   * Array index of the second particle of each pair.
    */
   const int32_t *j;
   /**
-   * By how much each pair's conservative interaction is scaled; NULL if all have their full strength.
+   * Factor of each pair's conservative interaction; NULL if all factors are 1.
    */
   const double *factor;
 } psidpd_pairs;
@@ -331,13 +332,13 @@ extern "C" {
 #endif // __cplusplus
 
 /**
- * The PSIDPD_ABI_VERSION that the library was built with. A program must refuse to go on if it
+ * The PSIDPD_ABI_VERSION that the library was built with. A program must stop if it
  * differs from the one in its header.
  */
 uint32_t psidpd_abi_version(void);
 
 /**
- * The version of the library, as "1.2.3"; valid for ever.
+ * The version of the library, such as "1.2.3"; always valid.
  */
 const char *psidpd_version(void);
 
@@ -385,7 +386,7 @@ psidpd_status psidpd_model_parse(const char *name, const char *text, struct psid
 void psidpd_model_free(struct psidpd_model *model);
 
 /**
- * Puts in `*title` what the model calls itself; valid until the model is freed.
+ * Puts in `*title` the model's title; valid until the model is freed.
  *
  * # Errors
  * PSIDPD_STATUS_NULL_POINTER.
@@ -435,8 +436,8 @@ psidpd_status psidpd_model_species_name(const struct psidpd_model *model,
  * `*engine`, to be freed with psidpd_engine_free. If it fails, `*engine` is left alone. The engine
  * does not need the model any more.
  *
- * It computes in double precision on one thread, with the best instruction set there is; see
- * psidpd_engine_new_with.
+ * The engine computes in double precision on one thread, with the best instruction set of the
+ * processor; see psidpd_engine_new_with.
  *
  * # Errors
  * PSIDPD_STATUS_MODEL if `kt` is not a positive number, or the model is not finite at it.
@@ -450,10 +451,10 @@ psidpd_status psidpd_engine_new(const struct psidpd_model *model,
                                 struct psidpd_engine **engine);
 
 /**
- * As psidpd_engine_new, with settings of the host's.
+ * As psidpd_engine_new, with the host's settings.
  *
  * # Errors
- * As psidpd_engine_new; PSIDPD_STATUS_INVALID_ARGUMENT for settings that are none.
+ * As psidpd_engine_new; PSIDPD_STATUS_INVALID_ARGUMENT for invalid settings.
  *
  * # Safety
  * As psidpd_engine_new; `settings` is NULL or at settings.
@@ -476,8 +477,8 @@ psidpd_status psidpd_engine_settings(const struct psidpd_engine *engine,
                                      struct psidpd_settings *settings);
 
 /**
- * Puts in `*path` the way that the last evaluation went, a psidpd_path, and in `*text` the same for people, with the
- * reason; valid until the next psidpd_engine_path of this engine, and until the engine is freed.
+ * Puts in `*path` the path that the last evaluation took, a psidpd_path, and in `*text` its description with
+ * the reason; valid until the next psidpd_engine_path of this engine, and until the engine is freed.
  *
  * # Errors
  * PSIDPD_STATUS_CALL_ORDER before the first evaluation. PSIDPD_STATUS_NULL_POINTER.
@@ -490,7 +491,7 @@ psidpd_status psidpd_engine_path(struct psidpd_engine *engine,
                                  const char **text);
 
 /**
- * Frees an engine, and with it all that it has given out; NULL is ignored.
+ * Frees an engine and all arrays and texts that it has given out; NULL is ignored.
  *
  * # Safety
  * `engine` is NULL or an engine that has not been freed, and no other thread is using it.
@@ -547,7 +548,7 @@ psidpd_status psidpd_engine_needs_velocities(const struct psidpd_engine *engine,
 psidpd_status psidpd_engine_noise_range(const struct psidpd_engine *engine, double *range);
 
 /**
- * Puts in `*text` what the engine computes, for people, in lines; valid until the engine is freed.
+ * Puts in `*text` a description of the computation, in lines; valid until the engine is freed.
  *
  * # Errors
  * PSIDPD_STATUS_NULL_POINTER.
@@ -572,8 +573,8 @@ psidpd_status psidpd_engine_map_kinds(struct psidpd_engine *engine,
                                       size_t length);
 
 /**
- * Whether psidpd_engine_densities sums every density of the model (1) or only those that forces need
- * (0, and so at first).
+ * Sets whether psidpd_engine_densities sums every density of the model (1) or only those
+ * that forces need (0, the default).
  *
  * # Errors
  * PSIDPD_STATUS_INVALID_ARGUMENT if `all` is neither. PSIDPD_STATUS_NULL_POINTER.
@@ -588,8 +589,8 @@ psidpd_status psidpd_engine_sum_all_densities(struct psidpd_engine *engine,
  * First half of an evaluation: finds pairs, sums local densities, evaluates psi and its slopes for
  * owned particles.
  *
- * It is not known yet what will be wanted: this goes the way of the reference, on one thread. What is told beforehand,
- * with psidpd_engine_evaluate or psidpd_engine_first, can be faster.
+ * The call does not say what psidpd_engine_forces will be asked for, so it uses the reference path, on
+ * one thread. psidpd_engine_evaluate and psidpd_engine_first, which are told at once, can be faster.
  *
  * With `newton` 1, each pair is computed once over all ranks and images, and the host adds forces on
  * ghosts back to their owners; with 0, pairs with ghosts are computed on both sides and ghosts get no
@@ -710,7 +711,7 @@ psidpd_status psidpd_engine_particle_virial(const struct psidpd_engine *engine,
  * All forces on particles in a box of their own, without ghosts: adds them to `force`, `3 * particles.all` numbers, and
  * puts in `*tally` the sums that are wanted. `tally` may be NULL.
  *
- * Positions may be anywhere: along periodic edges they are those of an image.
+ * Positions may be outside the box: along periodic edges they stand for an image.
  *
  * # Errors
  * PSIDPD_STATUS_ENGINE for a position, psi or force that is not finite, a tag below 1, a type that is not mapped;
@@ -733,10 +734,10 @@ psidpd_status psidpd_engine_evaluate(struct psidpd_engine *engine,
  * First half of an evaluation with ghosts: all that needs no slopes of ghosts. psidpd_engine_second follows, with the same
  * request, when psidpd_engine_slopes have been copied from owners to ghosts.
  *
- * `box` may be NULL: then ghosts stand for everything beyond the owned particles. Where it is periodic the host has all of it
- * along that edge, and the engine goes round it; `image` has 1 for each ghost that is the image of another particle along
- * such an edge, which takes no part, and 0 for the others, `particles.all - particles.owned` of them. It may be NULL if
- * there is none.
+ * `box` may be NULL: then ghosts stand for everything beyond the owned particles. Along a periodic
+ * edge of the box the host owns all of it, and the engine applies the period; `image` has 1 for each
+ * ghost that is the image of another particle along such an edge, which the engine leaves out, and 0
+ * for the others, `particles.all - particles.owned` of them. It may be NULL if there is no such image.
  *
  * With `newton` 1 the host adds forces on ghosts back to their owners, and every pair is computed once over all ranks; with
  * 0 ghosts get no forces. Either way the sweep computes pairs with ghosts on both sides and leaves ghosts without forces.

@@ -1,4 +1,4 @@
-//! Checks of what comes from C.
+//! Checks of the arguments that C callers pass.
 
 use crate::status::{Failure, Status};
 use std::ffi::{CStr, c_char};
@@ -7,7 +7,7 @@ fn null(name: &str) -> Failure {
     Failure::new(Status::NullPointer, format!("{name} is NULL"))
 }
 
-/// Fails for pointers that no object of type `T` can be at.
+/// Fails for pointers that are null or not aligned for a `T`.
 fn check<T>(pointer: *const T, name: &str) -> Result<(), Failure> {
     if pointer.is_null() {
         return Err(null(name));
@@ -44,7 +44,7 @@ pub(super) unsafe fn copied<T: Copy>(pointer: *const T, name: &str) -> Result<T,
     Ok(unsafe { pointer.read() })
 }
 
-/// A place to put a result, which may hold nothing yet.
+/// A place for a result, which may be uninitialised.
 pub(super) struct Output<T>(*mut T);
 
 impl<T> Output<T> {
@@ -56,7 +56,7 @@ impl<T> Output<T> {
     }
 
     pub fn put(self, value: T) {
-        // SAFETY: `new` has checked the pointer, and was promised that it can be written to.
+        // SAFETY: `new` has checked the pointer; its caller promised that it can be written to.
         unsafe { self.0.write(value) }
     }
 }
@@ -70,7 +70,7 @@ fn check_array<T>(pointer: *const T, length: usize, name: &str) -> Result<(), Fa
     }
 }
 
-/// An array of `length`; null will do if that is zero.
+/// An array of `length` elements; the pointer may be null if that is zero.
 ///
 /// # Safety
 /// `pointer` is null or at `length` times `T` that nobody writes to during `'a`.
@@ -84,7 +84,7 @@ pub(super) unsafe fn array<'a, T>(pointer: *const T, length: usize, name: &str) 
     Ok(unsafe { std::slice::from_raw_parts(pointer, length) })
 }
 
-/// As [`array`], to write to.
+/// A writable array, as [`array`].
 ///
 /// # Safety
 /// `pointer` is null or at `length` times `T` that nobody else reads or writes during `'a`.
@@ -102,7 +102,7 @@ pub(super) unsafe fn array_mut<'a, T>(
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer, length) })
 }
 
-/// Fails if `length` vectors at `a` and at `b` have a byte in common.
+/// Fails if the `length` vectors at `a` overlap those at `b`.
 pub(super) fn check_apart(a: *const f64, b: *const f64, length: usize, what: &str) -> Result<(), Failure> {
     let bytes = length.saturating_mul(size_of::<[f64; 3]>());
     if bytes > 0 && a.addr().abs_diff(b.addr()) < bytes {
@@ -111,7 +111,7 @@ pub(super) fn check_apart(a: *const f64, b: *const f64, length: usize, what: &st
     Ok(())
 }
 
-/// A text that ends with a zero byte, as UTF-8.
+/// A UTF-8 text that ends with a zero byte.
 ///
 /// # Safety
 /// `pointer` is null or at bytes that end with a zero and that nobody writes to during `'a`.
@@ -124,14 +124,14 @@ pub(super) unsafe fn text<'a>(pointer: *const c_char, name: &str) -> Result<&'a 
 }
 
 /// # Safety
-/// As [`text`].
+/// `pointer` is null or at bytes that end with a zero and that nobody writes to during `'a`.
 pub(super) unsafe fn c_str<'a>(pointer: *const c_char, name: &str) -> Result<&'a CStr, Failure> {
     check(pointer, name)?;
     // SAFETY: `check` found it not null; the caller promises bytes up to a zero that nobody writes to during `'a`.
     Ok(unsafe { CStr::from_ptr(pointer) })
 }
 
-/// 0 or 1.
+/// Reads a flag, which must be 0 or 1.
 pub(super) fn flag(value: i32, name: &str) -> Result<bool, Failure> {
     match value {
         0 => Ok(false),

@@ -1,4 +1,4 @@
-//! Engines.
+//! Engines, which compute forces.
 
 use crate::arguments::{Output, array, array_mut, check_apart, copied, exclusive, flag, shared};
 use crate::model::Model;
@@ -13,41 +13,41 @@ pub struct Engine {
     pub(super) engine: engine::Engine,
     plan_text: CString,
     path_text: CString,
-    /// For psidpd_engine_densities.
+    /// The setting of psidpd_engine_sum_all_densities.
     all_densities: bool,
     pub(super) state: State,
 }
 
-/// What an engine has computed.
+/// The results that an engine holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum State {
-    /// Nothing, or nothing since a call failed.
+    /// No results, or none since a call failed.
     Nothing,
-    /// psidpd_engine_densities: psidpd_engine_forces may follow.
+    /// Results of psidpd_engine_densities: psidpd_engine_forces may follow.
     Densities,
-    /// psidpd_engine_first: psidpd_engine_second may follow.
+    /// Results of psidpd_engine_first: psidpd_engine_second may follow.
     First,
-    /// A whole evaluation.
+    /// Results of a whole evaluation.
     Whole,
 }
 
-/// Particles of one host or rank: owned ones first, then ghosts.
+/// Particles of one host or rank: owned particles first, then ghosts.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct Particles {
-    /// How many are owned.
+    /// Number of owned particles.
     pub owned: usize,
-    /// How many there are, ghosts included.
+    /// Number of all particles, ghosts included.
     pub all: usize,
-    /// Positions, `3 * all`: x, y, z of the first, of the second, ... Ghosts are where their image is.
+    /// Positions, `3 * all` numbers: x, y, z of the first, of the second, ... Ghosts are at the position of their image.
     pub x: *const f64,
-    /// Numbers that stay with the particles, from 1, `all` of them; images share their owner's.
+    /// Particle numbers from 1 that never change, `all` of them; an image has its owner's.
     pub tag: *const i32,
     /// Types, `all` of them: species indices from 0, unless psidpd_engine_map_kinds says otherwise.
     pub kind: *const i32,
 }
 
-/// What the thermostat of a step is keyed and scaled by.
+/// Seed, number and length of the time step, on which the thermostat depends.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct Step {
@@ -61,7 +61,7 @@ pub struct Step {
 
 /// Sums over the particles and pairs of one host or rank; the sums of all ranks add up.
 ///
-/// Virials are sums of r_ij (x) F_ij: xx, yy, zz, xy, xz, yz. What was not asked for means nothing.
+/// Virials are sums of r_ij (x) F_ij: xx, yy, zz, xy, xz, yz. Entries that were not asked for are unspecified.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct Tally {
@@ -86,13 +86,13 @@ pub const PSIDPD_WANT_PARTICLE_VIRIAL: u32 = 8;
 /// For `want` of a psidpd_request: sum every density of the model, also those that no force needs.
 pub const PSIDPD_WANT_DENSITIES: u32 = 16;
 
-/// What a call that gives numbers of all kinds can be asked for.
+/// The bits of `want` that a whole evaluation accepts.
 pub(super) const WANT_ALL: u32 = WANT_FORCES | PSIDPD_WANT_DENSITIES;
-/// What psidpd_engine_forces can be asked for.
+/// The bits of `want` that psidpd_engine_forces accepts.
 const WANT_FORCES: u32 =
     PSIDPD_WANT_ENERGY | PSIDPD_WANT_VIRIAL | PSIDPD_WANT_PARTICLE_ENERGY | PSIDPD_WANT_PARTICLE_VIRIAL;
 
-/// What the bits of `want` stand for.
+/// Translates the bits of `want`; fails for bits outside `known`.
 pub(super) fn want_of(bits: u32, known: u32) -> Result<engine::Want, Failure> {
     if bits & !known != 0 {
         return Err(Failure::new(Status::InvalidArgument, format!("want has unknown bits: {bits:#x}")));
@@ -116,7 +116,8 @@ pub(super) unsafe fn particles_of<'a>(particles: &Particles) -> Result<engine::P
         let text = format!("particles: {owned} are owned, but there are only {all}");
         return Err(Failure::new(Status::InvalidArgument, text));
     }
-    // SAFETY: as this function's own section says; a vector is three consecutive numbers.
+    // SAFETY: the caller promises null or arrays of these lengths that nobody writes to; a
+    // vector is three consecutive numbers.
     unsafe {
         Ok(engine::Particles {
             owned,
@@ -139,8 +140,8 @@ pub(super) fn step_of(step: Step) -> Result<engine::Step, Failure> {
 /// `*engine`, to be freed with psidpd_engine_free. If it fails, `*engine` is left alone. The engine
 /// does not need the model any more.
 ///
-/// It computes in double precision on one thread, with the best instruction set there is; see
-/// psidpd_engine_new_with.
+/// The engine computes in double precision on one thread, with the best instruction set of the
+/// processor; see psidpd_engine_new_with.
 ///
 /// # Errors
 /// PSIDPD_STATUS_MODEL if `kt` is not a positive number, or the model is not finite at it.
@@ -150,14 +151,14 @@ pub(super) fn step_of(step: Step) -> Result<engine::Step, Failure> {
 /// `model` is NULL or a model that has not been freed; `engine` can be written to.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn psidpd_engine_new(model: *const Model, kt: f64, engine: *mut *mut Engine) -> Status {
-    // SAFETY: as this function's own section says.
+    // SAFETY: the caller promises that `model` is null or not freed and that `engine` can be written to.
     guard(|| unsafe { Engine::make(model, kt, Settings::DEFAULT, engine) })
 }
 
-/// As psidpd_engine_new, with settings of the host's.
+/// As psidpd_engine_new, with the host's settings.
 ///
 /// # Errors
-/// As psidpd_engine_new; PSIDPD_STATUS_INVALID_ARGUMENT for settings that are none.
+/// As psidpd_engine_new; PSIDPD_STATUS_INVALID_ARGUMENT for invalid settings.
 ///
 /// # Safety
 /// As psidpd_engine_new; `settings` is NULL or at settings.
@@ -168,7 +169,7 @@ pub unsafe extern "C" fn psidpd_engine_new_with(
     settings: *const Settings,
     engine: *mut *mut Engine,
 ) -> Status {
-    // SAFETY: as this function's own section says.
+    // SAFETY: the caller promises that each pointer is null or valid: a model, settings, and a place for the engine.
     guard(|| unsafe { Engine::make(model, kt, copied(settings, "settings")?, engine) })
 }
 
@@ -181,7 +182,7 @@ impl Engine {
         settings: Settings,
         engine: *mut *mut Engine,
     ) -> Result<(), Failure> {
-        // SAFETY: as the caller promises.
+        // SAFETY: the caller promises that `model` is null or not freed and that `engine` is null or can be written to.
         let (model, out) = unsafe { (shared(model, "model")?, Output::new(engine, "engine")?) };
         let engine = engine::Engine::new(&model.model.at(kt)?, settings.checked()?)?;
         let plan_text = c_text(&engine.plan().to_string());
@@ -195,7 +196,7 @@ impl Engine {
         Ok(())
     }
 
-    /// Fails unless what is needed has been computed.
+    /// Fails unless the engine is in one of these states.
     pub(super) fn require(&self, any_of: &[State], call: &str) -> Result<(), Failure> {
         if any_of.contains(&self.state) {
             return Ok(());
@@ -214,15 +215,15 @@ impl Engine {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn psidpd_engine_settings(engine: *const Engine, settings: *mut Settings) -> Status {
     guard(|| {
-        // SAFETY: as this function's own section says.
+        // SAFETY: the caller promises that `engine` is null or not freed and that `settings` can be written to.
         let (engine, out) = unsafe { (shared(engine, "engine")?, Output::new(settings, "settings")?) };
         out.put(Settings::of(engine.engine.settings()));
         Ok(())
     })
 }
 
-/// Puts in `*path` the way that the last evaluation went, a psidpd_path, and in `*text` the same for people, with the
-/// reason; valid until the next psidpd_engine_path of this engine, and until the engine is freed.
+/// Puts in `*path` the path that the last evaluation took, a psidpd_path, and in `*text` its description with
+/// the reason; valid until the next psidpd_engine_path of this engine, and until the engine is freed.
 ///
 /// # Errors
 /// PSIDPD_STATUS_CALL_ORDER before the first evaluation. PSIDPD_STATUS_NULL_POINTER.
@@ -236,7 +237,7 @@ pub unsafe extern "C" fn psidpd_engine_path(
     text: *mut *const c_char,
 ) -> Status {
     guard(|| {
-        // SAFETY: as this function's own section says.
+        // SAFETY: the caller promises that `engine` is null or not freed and that `path` and `text` can be written to.
         let (engine, out, out_text) =
             unsafe { (exclusive(engine, "engine")?, Output::new(path, "path")?, Output::new(text, "text")?) };
         let path = engine.engine.path();
@@ -251,7 +252,7 @@ pub unsafe extern "C" fn psidpd_engine_path(
     })
 }
 
-/// Frees an engine, and with it all that it has given out; NULL is ignored.
+/// Frees an engine and all arrays and texts that it has given out; NULL is ignored.
 ///
 /// # Safety
 /// `engine` is NULL or an engine that has not been freed, and no other thread is using it.
@@ -276,7 +277,7 @@ pub unsafe extern "C" fn psidpd_engine_free(engine: *mut Engine) {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn psidpd_engine_cutoff(engine: *const Engine, cutoff: *mut f64) -> Status {
     guard(|| {
-        // SAFETY: as this function's own section says.
+        // SAFETY: the caller promises that `engine` is null or not freed and that `cutoff` can be written to.
         let (engine, out) = unsafe { (shared(engine, "engine")?, Output::new(cutoff, "cutoff")?) };
         out.put(engine.engine.plan().cutoff());
         Ok(())
@@ -294,7 +295,7 @@ pub unsafe extern "C" fn psidpd_engine_cutoff(engine: *const Engine, cutoff: *mu
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn psidpd_engine_slope_width(engine: *const Engine, width: *mut usize) -> Status {
     guard(|| {
-        // SAFETY: as this function's own section says.
+        // SAFETY: the caller promises that `engine` is null or not freed and that `width` can be written to.
         let (engine, out) = unsafe { (shared(engine, "engine")?, Output::new(width, "width")?) };
         out.put(engine.engine.plan().slope_width());
         Ok(())
@@ -312,7 +313,7 @@ pub unsafe extern "C" fn psidpd_engine_slope_width(engine: *const Engine, width:
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn psidpd_engine_needs_velocities(engine: *const Engine, needs: *mut i32) -> Status {
     guard(|| {
-        // SAFETY: as this function's own section says.
+        // SAFETY: the caller promises that `engine` is null or not freed and that `needs` can be written to.
         let (engine, out) = unsafe { (shared(engine, "engine")?, Output::new(needs, "needs")?) };
         out.put(engine.engine.plan().needs_velocities().into());
         Ok(())
@@ -330,14 +331,14 @@ pub unsafe extern "C" fn psidpd_engine_needs_velocities(engine: *const Engine, n
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn psidpd_engine_noise_range(engine: *const Engine, range: *mut f64) -> Status {
     guard(|| {
-        // SAFETY: as this function's own section says.
+        // SAFETY: the caller promises that `engine` is null or not freed and that `range` can be written to.
         let (engine, out) = unsafe { (shared(engine, "engine")?, Output::new(range, "range")?) };
         out.put(engine.engine.plan().noise_range().unwrap_or(0.0));
         Ok(())
     })
 }
 
-/// Puts in `*text` what the engine computes, for people, in lines; valid until the engine is freed.
+/// Puts in `*text` a description of the computation, in lines; valid until the engine is freed.
 ///
 /// # Errors
 /// PSIDPD_STATUS_NULL_POINTER.
@@ -347,7 +348,7 @@ pub unsafe extern "C" fn psidpd_engine_noise_range(engine: *const Engine, range:
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn psidpd_engine_plan_text(engine: *const Engine, text: *mut *const c_char) -> Status {
     guard(|| {
-        // SAFETY: as this function's own section says.
+        // SAFETY: the caller promises that `engine` is null or not freed and that `text` can be written to.
         let (engine, out) = unsafe { (shared(engine, "engine")?, Output::new(text, "text")?) };
         out.put(engine.plan_text.as_ptr());
         Ok(())
@@ -369,14 +370,14 @@ pub unsafe extern "C" fn psidpd_engine_map_kinds(
     length: usize,
 ) -> Status {
     guard(|| {
-        // SAFETY: as this function's own section says.
+        // SAFETY: the caller promises that `engine` is null or not freed and that `species` has `length` entries.
         let (engine, species) = unsafe { (exclusive(engine, "engine")?, array(species, length, "species")?) };
         Ok(engine.engine.map_kinds(species)?)
     })
 }
 
-/// Whether psidpd_engine_densities sums every density of the model (1) or only those that forces need
-/// (0, and so at first).
+/// Sets whether psidpd_engine_densities sums every density of the model (1) or only those
+/// that forces need (0, the default).
 ///
 /// # Errors
 /// PSIDPD_STATUS_INVALID_ARGUMENT if `all` is neither. PSIDPD_STATUS_NULL_POINTER.
@@ -386,7 +387,7 @@ pub unsafe extern "C" fn psidpd_engine_map_kinds(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn psidpd_engine_sum_all_densities(engine: *mut Engine, all: i32) -> Status {
     guard(|| {
-        // SAFETY: as this function's own section says.
+        // SAFETY: the caller promises that `engine` is null or not freed.
         let engine = unsafe { exclusive(engine, "engine")? };
         engine.all_densities = flag(all, "all")?;
         Ok(())
@@ -396,8 +397,8 @@ pub unsafe extern "C" fn psidpd_engine_sum_all_densities(engine: *mut Engine, al
 /// First half of an evaluation: finds pairs, sums local densities, evaluates psi and its slopes for
 /// owned particles.
 ///
-/// It is not known yet what will be wanted: this goes the way of the reference, on one thread. What is told beforehand,
-/// with psidpd_engine_evaluate or psidpd_engine_first, can be faster.
+/// The call does not say what psidpd_engine_forces will be asked for, so it uses the reference path, on
+/// one thread. psidpd_engine_evaluate and psidpd_engine_first, which are told at once, can be faster.
 ///
 /// With `newton` 1, each pair is computed once over all ranks and images, and the host adds forces on
 /// ghosts back to their owners; with 0, pairs with ghosts are computed on both sides and ghosts get no
@@ -419,7 +420,7 @@ pub unsafe extern "C" fn psidpd_engine_densities(
     newton: i32,
 ) -> Status {
     guard(|| {
-        // SAFETY: as this function's own section says.
+        // SAFETY: the caller promises that `engine` is null or not freed and that `particles` is null or a structure.
         let (engine, particles) =
             unsafe { (exclusive(engine, "engine")?, particles_of(&copied(particles, "particles")?)?) };
         let newton = if flag(newton, "newton")? { engine::Newton::On } else { engine::Newton::Off };
@@ -453,7 +454,7 @@ pub unsafe extern "C" fn psidpd_engine_slopes(
     length: *mut usize,
 ) -> Status {
     guard(|| {
-        // SAFETY: as this function's own section says.
+        // SAFETY: the caller promises that `engine` is null or not freed and that `slopes` and `length` can be written to.
         let (engine, out, out_length) = unsafe {
             (exclusive(engine, "engine")?, Output::new(slopes, "slopes")?, Output::new(length, "length")?)
         };
@@ -496,7 +497,7 @@ pub unsafe extern "C" fn psidpd_engine_forces(
     tally: *mut Tally,
 ) -> Status {
     guard(|| {
-        // SAFETY: as this function's own section says.
+        // SAFETY: the caller promises that `engine` is null or not freed and that `particles` is null or a structure.
         let (engine, lists) = unsafe { (exclusive(engine, "engine")?, copied(particles, "particles")?) };
         engine.require(&[State::Densities], "psidpd_engine_densities")?;
         let want = want_of(want, WANT_FORCES)?;
@@ -504,19 +505,19 @@ pub unsafe extern "C" fn psidpd_engine_forces(
         let step = if step.is_null() {
             None
         } else {
-            // SAFETY: as this function's own section says.
+            // SAFETY: the caller promises that `step`, which is not null here, is a step.
             Some(step_of(unsafe { copied(step, "step")? })?)
         };
         let out = if tally.is_null() {
             None
         } else {
-            // SAFETY: as this function's own section says.
+            // SAFETY: the caller promises that `tally`, which is not null here, can be written to.
             Some(unsafe { Output::new(tally, "tally")? })
         };
-        // SAFETY: as this function's own section says.
+        // SAFETY: the caller promises arrays as long as `particles` says, and that `force` overlaps none of the others.
         let (particles, v, force) = unsafe { arrays_of(engine, &lists, v, step, force)? };
         let request = engine::Request { particles, v, step, want };
-        // A panic leaves it so; an error does not.
+        // If the evaluation panics the engine has no results; after an error the state is set below.
         engine.state = State::Nothing;
         let sums = engine.engine.second(&request, force, true);
         engine.state = State::Densities;
@@ -539,10 +540,10 @@ impl Tally {
     }
 }
 
-/// The arrays of an evaluation.
+/// Particles, velocities and forces of an evaluation.
 type Arrays<'a> = (engine::Particles<'a>, &'a [[f64; 3]], &'a mut [[f64; 3]]);
 
-/// The arrays that forces are computed from, and the one that they go to, checked as far as they can be.
+/// Checks, as far as possible, the arrays that forces are computed from and the array of forces.
 ///
 /// # Safety
 /// The pointers in `lists` are null or at arrays as long as it says; `v` is null or at `3 * lists.all` numbers, and so is
@@ -555,17 +556,18 @@ pub(super) unsafe fn arrays_of<'a>(
     force: *mut f64,
 ) -> Result<Arrays<'a>, Failure> {
     check_apart(force, lists.x, lists.all, "force and particles.x")?;
-    // SAFETY: as the caller promises.
+    // SAFETY: the caller promises that the pointers in `lists` are null or arrays of these lengths.
     let particles = unsafe { particles_of(lists)? };
     let thermal = step.is_some() && engine.engine.plan().needs_velocities();
     let v = if v.is_null() && !thermal {
         &[]
     } else {
         check_apart(force, v, lists.all, "force and v")?;
-        // SAFETY: as the caller promises; a vector is three consecutive numbers.
+        // SAFETY: the caller promises `3 * lists.all` numbers at `v`; a vector is three consecutive numbers.
         unsafe { array(v.cast::<[f64; 3]>(), lists.all, "v")? }
     };
-    // SAFETY: as the caller promises; that it overlaps neither `x` nor `v` has been checked.
+    // SAFETY: the caller promises `3 * lists.all` numbers at `force`; `check_apart` found that
+    // it overlaps neither `x` nor `v`.
     let force = unsafe { array_mut(force.cast::<[f64; 3]>(), lists.all, "force")? };
     Ok((particles, v, force))
 }
@@ -588,7 +590,7 @@ pub unsafe extern "C" fn psidpd_engine_local_densities(
     densities: *mut *const f64,
     length: *mut usize,
 ) -> Status {
-    // SAFETY: as this function's own section says.
+    // SAFETY: the caller promises that `engine` is null or not freed and that `densities` and `length` can be written to.
     unsafe { give(engine, |engine| engine.local_densities(), densities, length) }
 }
 
@@ -609,7 +611,7 @@ pub unsafe extern "C" fn psidpd_engine_particle_energy(
     energies: *mut *const f64,
     length: *mut usize,
 ) -> Status {
-    // SAFETY: as this function's own section says.
+    // SAFETY: the caller promises that `engine` is null or not freed and that `energies` and `length` can be written to.
     unsafe { give(engine, |engine| engine.particle_energy(), energies, length) }
 }
 
@@ -629,7 +631,7 @@ pub unsafe extern "C" fn psidpd_engine_particle_virial(
     virials: *mut *const f64,
     length: *mut usize,
 ) -> Status {
-    // SAFETY: as this function's own section says.
+    // SAFETY: the caller promises that `engine` is null or not freed and that `virials` and `length` can be written to.
     unsafe { give(engine, |engine| engine.particle_virial().as_flattened(), virials, length) }
 }
 
@@ -644,7 +646,7 @@ unsafe fn give(
     length: *mut usize,
 ) -> Status {
     guard(|| {
-        // SAFETY: as this function's own section says.
+        // SAFETY: the caller promises that `engine` is null or not freed and that `values` and `length` can be written to.
         let (engine, out, out_length) = unsafe {
             (
                 shared(engine, "engine")?,

@@ -1,4 +1,4 @@
-//! Evaluations that are told beforehand what is wanted of them.
+//! Evaluations whose request states at once what to compute.
 
 use crate::arguments::{Output, array, copied, exclusive, flag};
 use crate::engine::{
@@ -12,7 +12,7 @@ use psidpd_core::engine::{self, Around, DomainError, Newton, PairsOfHost, Period
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct Domain {
-    /// The corner.
+    /// Position of the box's corner.
     pub origin: [f64; 3],
     /// The edges: x, y, z of the first, of the second, of the third. The first should be along x and the second in the
     /// plane of x and y; others are slower. In two dimensions the third is (0, 0, 1).
@@ -21,16 +21,16 @@ pub struct Domain {
     pub periodic: [i32; 3],
 }
 
-/// What an evaluation is given, and what is wanted of it.
+/// The input of an evaluation, and the results that it should compute.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct Request {
-    /// The particles.
+    /// Owned particles and ghosts.
     pub particles: Particles,
     /// Velocities, `3 * particles.all`; may be NULL without a step, or if there is no thermostat (see
     /// psidpd_engine_needs_velocities).
     pub v: *const f64,
-    /// What the thermostat needs; NULL for conservative forces only.
+    /// Seed, number and length of the time step, for the thermostat; NULL for conservative forces only.
     pub step: *const Step,
     /// 0, or PSIDPD_WANT_... joined by `|`.
     pub want: u32,
@@ -41,13 +41,13 @@ pub struct Request {
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct Pairs {
-    /// How many there are.
+    /// Number of pairs.
     pub count: usize,
-    /// The first particle of each, owned: its place in the arrays, from 0.
+    /// Array index, from 0, of the first particle of each pair, which is owned.
     pub i: *const i32,
-    /// The second.
+    /// Array index of the second particle of each pair.
     pub j: *const i32,
-    /// By how much each pair's conservative interaction is scaled; NULL if all have their full strength.
+    /// Factor of each pair's conservative interaction; NULL if all factors are 1.
     pub factor: *const f64,
 }
 
@@ -68,19 +68,19 @@ fn invalid(error: DomainError) -> Failure {
 }
 
 impl Request {
-    /// Without the places that forces go to.
+    /// Checks the request, except for the arrays that forces are added to.
     ///
     /// # Safety
     /// The pointers are null or at arrays as long as they must be, which nobody writes to during `'a`.
     unsafe fn checked<'a>(&self, engine: &Engine) -> Result<engine::Request<'a>, Failure> {
         let step = self.step()?;
-        // SAFETY: as the caller promises.
+        // SAFETY: the caller promises that the pointers in `self.particles` are null or arrays of these lengths.
         let particles = unsafe { particles_of(&self.particles)? };
         let thermal = step.is_some() && engine.engine.plan().needs_velocities();
         let v = if self.v.is_null() && !thermal {
             &[]
         } else {
-            // SAFETY: as the caller promises; a vector is three consecutive numbers.
+            // SAFETY: the caller promises `3 * all` numbers at `v`; a vector is three consecutive numbers.
             unsafe { array(self.v.cast::<[f64; 3]>(), self.particles.all, "request.v")? }
         };
         Ok(engine::Request { particles, v, step, want: want_of(self.want, WANT_ALL)? })
@@ -90,7 +90,7 @@ impl Request {
         if self.step.is_null() {
             return Ok(None);
         }
-        // SAFETY: `checked` and its callers promise that it is at a step.
+        // SAFETY: the callers of `step` and of `checked` promise that a pointer that is not null is at a step.
         Ok(Some(step_of(unsafe { copied(self.step, "request.step")? })?))
     }
 }
@@ -98,7 +98,7 @@ impl Request {
 /// All forces on particles in a box of their own, without ghosts: adds them to `force`, `3 * particles.all` numbers, and
 /// puts in `*tally` the sums that are wanted. `tally` may be NULL.
 ///
-/// Positions may be anywhere: along periodic edges they are those of an image.
+/// Positions may be outside the box: along periodic edges they stand for an image.
 ///
 /// # Errors
 /// PSIDPD_STATUS_ENGINE for a position, psi or force that is not finite, a tag below 1, a type that is not mapped;
@@ -119,7 +119,7 @@ pub unsafe extern "C" fn psidpd_engine_evaluate(
     tally: *mut Tally,
 ) -> Status {
     guard(|| {
-        // SAFETY: as this function's own section says.
+        // SAFETY: the caller promises that `engine` is null or not freed and that the other pointers are null or valid.
         let (engine, domain, given, out) = unsafe {
             (
                 exclusive(engine, "engine")?,
@@ -130,7 +130,7 @@ pub unsafe extern "C" fn psidpd_engine_evaluate(
         };
         let want = want_of(given.want, WANT_ALL)?;
         let step = given.step()?;
-        // SAFETY: as this function's own section says.
+        // SAFETY: the caller promises arrays as long as `request` says, and that `force` overlaps none of the others.
         let (particles, v, force) = unsafe { arrays_of(engine, &given.particles, given.v, step, force)? };
         let request = engine::Request { particles, v, step, want };
         engine.state = State::Nothing;
@@ -146,10 +146,10 @@ pub unsafe extern "C" fn psidpd_engine_evaluate(
 /// First half of an evaluation with ghosts: all that needs no slopes of ghosts. psidpd_engine_second follows, with the same
 /// request, when psidpd_engine_slopes have been copied from owners to ghosts.
 ///
-/// `box` may be NULL: then ghosts stand for everything beyond the owned particles. Where it is periodic the host has all of it
-/// along that edge, and the engine goes round it; `image` has 1 for each ghost that is the image of another particle along
-/// such an edge, which takes no part, and 0 for the others, `particles.all - particles.owned` of them. It may be NULL if
-/// there is none.
+/// `box` may be NULL: then ghosts stand for everything beyond the owned particles. Along a periodic
+/// edge of the box the host owns all of it, and the engine applies the period; `image` has 1 for each
+/// ghost that is the image of another particle along such an edge, which the engine leaves out, and 0
+/// for the others, `particles.all - particles.owned` of them. It may be NULL if there is no such image.
 ///
 /// With `newton` 1 the host adds forces on ghosts back to their owners, and every pair is computed once over all ranks; with
 /// 0 ghosts get no forces. Either way the sweep computes pairs with ghosts on both sides and leaves ghosts without forces.
@@ -170,18 +170,18 @@ pub unsafe extern "C" fn psidpd_engine_first(
     request: *const Request,
 ) -> Status {
     guard(|| {
-        // SAFETY: as this function's own section says.
+        // SAFETY: the caller promises that `engine` is null or not freed and that `request` is null or a request.
         let (engine, given) = unsafe { (exclusive(engine, "engine")?, copied(request, "request")?) };
         let domain = if r#box.is_null() {
             PeriodicBox::OPEN
         } else {
-            // SAFETY: as this function's own section says.
+            // SAFETY: the caller promises that `box`, which is not null here, is a box.
             unsafe { copied(r#box, "box")? }.domain()?
         };
-        // SAFETY: as this function's own section says.
+        // SAFETY: the caller promises that the arrays of the request are as long as it says.
         let request = unsafe { given.checked(engine)? };
         let ghosts = if image.is_null() { 0 } else { given.particles.all - given.particles.owned };
-        // SAFETY: as this function's own section says.
+        // SAFETY: the caller promises that `image` is null or has an entry for each ghost.
         let told = unsafe { array(image, ghosts, "image")? };
         let images = told.iter().map(|i| flag(*i, "image")).collect::<Result<Vec<bool>, _>>()?;
         let around = Around { domain: &domain, images: &images };
@@ -205,12 +205,12 @@ pub unsafe extern "C" fn psidpd_engine_first_of_pairs(
     request: *const Request,
 ) -> Status {
     guard(|| {
-        // SAFETY: as this function's own section says.
+        // SAFETY: the caller promises that `engine` is null or not freed and that `pairs` and `request` are null or valid.
         let (engine, pairs, given) =
             unsafe { (exclusive(engine, "engine")?, copied(pairs, "pairs")?, copied(request, "request")?) };
         let Pairs { count, i, j, factor } = pairs;
         let factors = if factor.is_null() { 0 } else { count };
-        // SAFETY: as this function's own section says.
+        // SAFETY: the caller promises that the arrays of the request and of `pairs` are as long as these say.
         let (request, listed) = unsafe {
             let i = array(i, count, "pairs.i")?;
             let j = array(j, count, "pairs.j")?;
@@ -237,13 +237,13 @@ pub unsafe extern "C" fn psidpd_engine_second(
     tally: *mut Tally,
 ) -> Status {
     guard(|| {
-        // SAFETY: as this function's own section says.
+        // SAFETY: the caller promises that `engine` is null or not freed and that the other pointers are null or valid.
         let (engine, given, out) =
             unsafe { (exclusive(engine, "engine")?, copied(request, "request")?, optional(tally)?) };
         engine.require(&[State::First], "psidpd_engine_first")?;
         let want = want_of(given.want, WANT_ALL)?;
         let step = given.step()?;
-        // SAFETY: as this function's own section says.
+        // SAFETY: the caller promises arrays as long as `request` says, and that `force` overlaps none of the others.
         let (particles, v, force) = unsafe { arrays_of(engine, &given.particles, given.v, step, force)? };
         let request = engine::Request { particles, v, step, want };
         engine.state = State::Nothing;
@@ -273,6 +273,6 @@ unsafe fn optional(tally: *mut Tally) -> Result<Option<Output<Tally>>, Failure> 
     if tally.is_null() {
         return Ok(None);
     }
-    // SAFETY: as the caller promises.
+    // SAFETY: the caller promises that `tally`, which is not null here, can be written to.
     Ok(Some(unsafe { Output::new(tally, "tally")? }))
 }

@@ -1,8 +1,8 @@
 //! The C interface, declared in `include/psidpd.h`: models and engines behind opaque handles.
 //!
-//! Every function that can fail returns a [`Status`] and leaves a message in [`psidpd_last_error`];
-//! no panic leaves this module. What the functions do is in [`psidpd_core::model`] and [`psidpd_core::engine`];
-//! here are only checks and conversions.
+//! Every function that can fail returns a [`Status`] and leaves a message in [`psidpd_last_error`]; no
+//! panic leaves this module. The computations are in [`psidpd_core::model`] and
+//! [`psidpd_core::engine`]; this module checks and converts arguments and results.
 
 #![warn(missing_docs)]
 

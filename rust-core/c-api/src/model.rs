@@ -1,4 +1,4 @@
-//! Models.
+//! Models, which are read from model files.
 
 use crate::arguments::{Output, c_str, shared, text};
 use crate::status::{Failure, Status, c_text, guard};
@@ -45,7 +45,7 @@ fn path_of(path: &CStr) -> Result<PathBuf, Failure> {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn psidpd_model_open(path: *const c_char, model: *mut *mut Model) -> Status {
     guard(|| {
-        // SAFETY: as this function's own section says.
+        // SAFETY: the caller promises that `path` is null or ends with a zero byte and that `model` can be written to.
         let (path, out) = unsafe { (c_str(path, "path")?, Output::new(model, "model")?) };
         out.put(Model::boxed(model::Model::open(&path_of(path)?)?));
         Ok(())
@@ -68,7 +68,8 @@ pub unsafe extern "C" fn psidpd_model_parse(
     model: *mut *mut Model,
 ) -> Status {
     guard(|| {
-        // SAFETY: as this function's own section says.
+        // SAFETY: the caller promises that `name` and `text` are null or end with a zero byte and
+        // that `model` can be written to.
         let (name, text, out) =
             unsafe { (self::text(name, "name")?, self::text(text, "text")?, Output::new(model, "model")?) };
         out.put(Model::boxed(model::Model::parse(name, text)?));
@@ -92,7 +93,7 @@ pub unsafe extern "C" fn psidpd_model_free(model: *mut Model) {
     });
 }
 
-/// Puts in `*title` what the model calls itself; valid until the model is freed.
+/// Puts in `*title` the model's title; valid until the model is freed.
 ///
 /// # Errors
 /// PSIDPD_STATUS_NULL_POINTER.
@@ -102,7 +103,7 @@ pub unsafe extern "C" fn psidpd_model_free(model: *mut Model) {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn psidpd_model_title(model: *const Model, title: *mut *const c_char) -> Status {
     guard(|| {
-        // SAFETY: as this function's own section says.
+        // SAFETY: the caller promises that `model` is null or not freed and that `title` can be written to.
         let (model, out) = unsafe { (shared(model, "model")?, Output::new(title, "title")?) };
         out.put(model.title.as_ptr());
         Ok(())
@@ -119,7 +120,7 @@ pub unsafe extern "C" fn psidpd_model_title(model: *const Model, title: *mut *co
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn psidpd_model_dimensions(model: *const Model, dimensions: *mut usize) -> Status {
     guard(|| {
-        // SAFETY: as this function's own section says.
+        // SAFETY: the caller promises that `model` is null or not freed and that `dimensions` can be written to.
         let (model, out) = unsafe { (shared(model, "model")?, Output::new(dimensions, "dimensions")?) };
         out.put(model.model.dimensions());
         Ok(())
@@ -136,7 +137,7 @@ pub unsafe extern "C" fn psidpd_model_dimensions(model: *const Model, dimensions
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn psidpd_model_species_count(model: *const Model, count: *mut usize) -> Status {
     guard(|| {
-        // SAFETY: as this function's own section says.
+        // SAFETY: the caller promises that `model` is null or not freed and that `count` can be written to.
         let (model, out) = unsafe { (shared(model, "model")?, Output::new(count, "count")?) };
         out.put(model.species.len());
         Ok(())
@@ -157,7 +158,7 @@ pub unsafe extern "C" fn psidpd_model_species_name(
     name: *mut *const c_char,
 ) -> Status {
     guard(|| {
-        // SAFETY: as this function's own section says.
+        // SAFETY: the caller promises that `model` is null or not freed and that `name` can be written to.
         let (model, out) = unsafe { (shared(model, "model")?, Output::new(name, "name")?) };
         let name = model.species.get(index).ok_or_else(|| {
             let text = format!("there is no species {index}: the model has {}", model.species.len());

@@ -1,4 +1,4 @@
-//! How an engine computes.
+//! Settings of an engine: precision, instruction set and threads.
 
 use crate::status::{Failure, Status};
 use psidpd_core::engine;
@@ -10,7 +10,7 @@ pub const PSIDPD_PRECISION_MIXED: i32 = 1;
 
 /// For psidpd_settings: the best instruction set that the processor has.
 pub const PSIDPD_INSTRUCTIONS_BEST: i32 = 0;
-/// For psidpd_settings: whatever the library was compiled for.
+/// For psidpd_settings: the instruction set that the library was compiled for.
 pub const PSIDPD_INSTRUCTIONS_PORTABLE: i32 = 1;
 /// For psidpd_settings: AVX2 and FMA.
 pub const PSIDPD_INSTRUCTIONS_AVX2: i32 = 2;
@@ -19,26 +19,27 @@ pub const PSIDPD_INSTRUCTIONS_AVX512: i32 = 3;
 /// For psidpd_settings: AVX-512 with VBMI2.
 pub const PSIDPD_INSTRUCTIONS_AVX512_VBMI2: i32 = 4;
 
-/// How an engine computes. Results depend on the precision, and only by rounding on anything else; for any number of
-/// threads they are the same to the bit. With all bytes zero and one thread it is what psidpd_engine_new chooses.
+/// The settings of an engine. Results depend on the precision; instruction sets change them by rounding
+/// errors only, and the number of threads does not change a bit. All bytes zero and one thread are the
+/// settings of psidpd_engine_new.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct Settings {
     /// PSIDPD_PRECISION_...
     pub precision: i32,
-    /// PSIDPD_INSTRUCTIONS_...; one that the processor lacks becomes the best that it has.
+    /// PSIDPD_INSTRUCTIONS_...; the best set of the processor replaces one that it lacks.
     pub instructions: i32,
-    /// Threads that share the work, from 1.
+    /// Number of threads, from 1.
     pub threads: usize,
 }
 
-/// Which way an evaluation went.
+/// The path that an evaluation took.
 #[repr(i32)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Path {
-    /// By the sweep over cells: vector instructions, threads.
+    /// The sweep over cells, with vector instructions and threads.
     Sweep = 0,
-    /// By the reference, over a list of pairs, in double precision and on one thread.
+    /// The reference, over a list of pairs, in double precision and on one thread.
     Reference = 1,
 }
 
@@ -48,7 +49,10 @@ impl Settings {
 
     pub(super) fn checked(self) -> Result<engine::Settings, Failure> {
         let wrong = |what: &str, value: i32| {
-            Failure::new(Status::InvalidArgument, format!("settings.{what} is {value}, which is none"))
+            Failure::new(
+                Status::InvalidArgument,
+                format!("settings.{what} is {value}, which is not a valid value"),
+            )
         };
         let precision = match self.precision {
             PSIDPD_PRECISION_DOUBLE => engine::Precision::Double,

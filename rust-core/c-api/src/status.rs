@@ -1,4 +1,4 @@
-//! Status codes, the last error, and the wall that no panic gets through.
+//! Status codes, the last error, and the guard that stops panics.
 
 use psidpd_core::document::{FileError, FileErrorKind};
 use psidpd_core::engine::EngineError;
@@ -8,31 +8,31 @@ use std::cell::RefCell;
 use std::ffi::{CString, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// What a call came to. The values keep their meaning in every version; later versions may add some.
+/// The outcome of a call. The values keep their meaning in every version; later versions may add some.
 #[must_use]
 #[repr(i32)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Status {
-    /// Done.
+    /// The call succeeded.
     Ok = 0,
-    /// An argument out of its domain: a length, an index, a flag, a text that is not UTF-8.
+    /// An argument is out of its domain: a length, an index, a flag, a text that is not UTF-8.
     InvalidArgument = 1,
-    /// A pointer that must not be null is.
+    /// A pointer that must not be null is null.
     NullPointer = 2,
     /// A file cannot be read.
     File = 3,
-    /// A model file says something that makes no model, or none at this temperature.
+    /// A model file does not define a valid model, or not at this temperature.
     Model = 4,
-    /// Forces cannot be computed for these particles: a position, a tag, a type, psi or a force is not
-    /// what it must be. The message names the particle.
+    /// Forces cannot be computed for these particles: a position, tag, type, psi or force is invalid.
+    /// The message names the particle.
     Engine = 5,
-    /// A call that must come after another one that has not been made, or has failed.
+    /// A call that must precede this one has not been made, or has failed.
     CallOrder = 6,
-    /// A fault in this library. An engine can be used again after psidpd_engine_densities.
+    /// An internal error of this library. psidpd_engine_densities makes the engine usable again.
     Panic = 255,
 }
 
-/// A status that is not [`Status::Ok`], and its message.
+/// A status other than [`Status::Ok`], and its message.
 #[derive(Debug)]
 pub(super) struct Failure {
     status: Status,
@@ -75,22 +75,22 @@ thread_local! {
     static LAST_ERROR: RefCell<CString> = RefCell::default();
 }
 
-/// A text as C has it; a zero byte, which would end it, becomes U+FFFD.
+/// Converts a text to a C string; a zero byte, which would end it, becomes U+FFFD.
 pub(super) fn c_text(text: &str) -> CString {
-    // Without zero bytes this cannot fail.
+    // A text without zero bytes always converts.
     CString::new(text.replace('\0', "\u{fffd}")).unwrap_or_default()
 }
 
 fn record(text: &str) {
     let text = c_text(text);
-    // A thread that is ending, and has no last error any more, has nobody to read it either.
+    // If the thread is ending and its last error is gone, no caller can read the message.
     let _ = LAST_ERROR.try_with(|last| *last.borrow_mut() = text);
 }
 
-/// Does `work`, and turns errors and panics into a status. Errors are turned into text inside `work`, behind
-/// the same wall.
+/// Does `work`, and turns errors and panics into a status. Errors become text inside `work`, so
+/// that a panic there is caught too.
 pub(super) fn guard(work: impl FnOnce() -> Result<(), Failure>) -> Status {
-    // What a panic leaves half done is either thrown away or, in an engine, marked as not ready.
+    // State that a panic leaves incomplete is either discarded or, in an engine, marked as not ready.
     let outcome = catch_unwind(AssertUnwindSafe(|| match work() {
         Ok(()) => Status::Ok,
         Err(Failure { status, text }) => {
@@ -100,7 +100,7 @@ pub(super) fn guard(work: impl FnOnce() -> Result<(), Failure>) -> Status {
     }));
     outcome.unwrap_or_else(|payload| {
         let recorded = catch_unwind(AssertUnwindSafe(|| record(&panic_text(payload.as_ref()))));
-        // The payload is anything at all, so dropping it may panic once more.
+        // Dropping the payload, which may be of any type, could panic again.
         std::mem::forget(payload);
         if let Err(again) = recorded {
             std::mem::forget(again);

@@ -1,4 +1,4 @@
-//! The header, and what no C program can bring about.
+//! Checks of the header, and of errors that no C program can cause.
 
 use crate::status::{Failure, Status, guard};
 use crate::*;
@@ -6,12 +6,12 @@ use std::ffi::CStr;
 use std::path::Path;
 use std::ptr::{null, null_mut};
 
-/// In the order of the header.
+/// Source files in the order of the header.
 const SOURCES: [&str; 6] =
     ["version.rs", "status.rs", "model.rs", "settings.rs", "engine.rs", "evaluation.rs"];
 
 fn last_error() -> String {
-    // SAFETY: valid until the next failing call on this thread.
+    // SAFETY: the text is valid until the next failing call on this thread.
     unsafe { CStr::from_ptr(psidpd_last_error()) }.to_str().unwrap().to_owned()
 }
 
@@ -25,7 +25,7 @@ fn header() -> String {
     String::from_utf8(text).unwrap()
 }
 
-/// Set `PSIDPD_UPDATE_HEADER=1` to write it.
+/// The environment variable `PSIDPD_UPDATE_HEADER=1` writes the header.
 #[test]
 fn header_is_current() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("include/psidpd.h");
@@ -44,7 +44,7 @@ fn header_is_current() {
     );
 }
 
-/// The functions of the sources that the linker sees.
+/// The exported functions in the sources.
 fn exported() -> Vec<String> {
     let mut names = Vec::new();
     for file in SOURCES {
@@ -60,7 +60,7 @@ fn exported() -> Vec<String> {
     names
 }
 
-/// Every function is in the header, once, behind a comment of its own that names its errors, if it has any.
+/// Every function occurs in the header once, after a comment of its own that names its errors, if it has any.
 #[test]
 fn every_function_is_documented() {
     let header = header();
@@ -79,7 +79,7 @@ fn every_function_is_documented() {
     }
 }
 
-/// Programs are compiled against these numbers.
+/// Programs are compiled with these numbers.
 #[test]
 fn status_values_are_what_they_always_were() {
     let values = [
@@ -106,7 +106,7 @@ fn panics_become_a_status_and_a_message() {
     let fixed_text = last_error();
     let made = guard(|| panic!("number {}", 7));
     let made_text = last_error();
-    /// A payload that panics when it is dropped.
+    /// A panic payload that panics when it is dropped.
     struct Spiteful;
     impl Drop for Spiteful {
         fn drop(&mut self) {
@@ -133,7 +133,7 @@ fn messages_belong_to_threads_and_survive_zero_bytes_and_successes() {
 
 fn model(text: &CStr) -> *mut Model {
     let mut model = null_mut();
-    // SAFETY: the texts end with zero bytes, and the place can be written to.
+    // SAFETY: the texts end with zero bytes, and `model` can be written to.
     let status = unsafe { psidpd_model_parse(c"test".as_ptr(), text.as_ptr(), &mut model) };
     assert_eq!(status, Status::Ok, "{}", last_error());
     model
@@ -142,8 +142,7 @@ fn model(text: &CStr) -> *mut Model {
 const TEXT: &CStr = c"title = \"a fluid\"\nspecies = [\"A\"]\n[density.n]\nkernel = \"quadratic\"\n\
     range = 1\n[excess_free_energy]\nA = \"n^2\"\n";
 
-/// Addresses that no array can be at, and lengths that none can have, are found out before they are
-/// used.
+/// Addresses and lengths that no array can have are refused before they are used.
 #[test]
 fn impossible_pointers_and_lengths_are_refused() {
     let model = model(TEXT);
@@ -151,7 +150,7 @@ fn impossible_pointers_and_lengths_are_refused() {
     let x = [0.0, 0.0, 0.0, 0.5, 0.0, 0.0];
     let (tag, kind) = ([1, 2], [0, 0]);
     let good = Particles { owned: 2, all: 2, x: x.as_ptr(), tag: tag.as_ptr(), kind: kind.as_ptr() };
-    // SAFETY: handles are alive, arrays as long as stated; where they are not, that is what is refused.
+    // SAFETY: handles are alive, arrays as long as stated; the functions refuse the others before they read them.
     unsafe {
         let mut title = null();
         assert_eq!(psidpd_model_title(model, &mut title), Status::Ok);
@@ -177,7 +176,7 @@ fn impossible_pointers_and_lengths_are_refused() {
         assert_eq!(forces(&good, force.as_mut_ptr()), Status::Ok);
         assert!(force[0] < 0.0 && force[0] == -force[3]);
 
-        // What failed once is not ready, and is again after the next success.
+        // After a failure the engine is not ready; after the next success it is.
         let nowhere = [f64::NAN, 0.0, 0.0, 0.5, 0.0, 0.0];
         let lost = Particles { x: nowhere.as_ptr(), ..good };
         assert_eq!(psidpd_engine_densities(engine, &lost, 1), Status::Engine);
@@ -206,7 +205,7 @@ fn no_particles_need_no_arrays() {
     }
 }
 
-/// The header allows models to be shared, and engines to move, between threads.
+/// The header allows threads to share models and to pass engines on.
 #[test]
 fn handles_may_cross_threads() {
     fn shared<T: Send + Sync>() {}
@@ -214,7 +213,7 @@ fn handles_may_cross_threads() {
     shared::<Engine>();
 }
 
-/// The most threads of a pool, and one more.
+/// The limits are the most threads of a pool, and one thread more.
 #[test]
 fn threads_are_those_of_a_pool() {
     let settings = |threads| Settings { threads, ..Settings::DEFAULT }.checked();

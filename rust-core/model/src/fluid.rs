@@ -6,19 +6,19 @@ use super::pair::{PairForm, PairPotential};
 /// A model at one temperature: numbers and compiled formulas only.
 #[derive(Debug, Clone)]
 pub struct Fluid {
-    /// What the model file calls itself.
+    /// The title in the model file.
     pub title: String,
-    /// Where the model comes from.
+    /// The publication that the model comes from.
     pub reference: Option<String>,
-    /// 2 or 3.
+    /// Number of dimensions, 2 or 3.
     pub dimensions: usize,
-    /// kT, energy.
+    /// Temperature kT, in energy.
     pub kt: f64,
     /// The names of the species; their order is the order of every per-species index.
     pub species: Vec<String>,
     /// The weighted local densities.
     pub densities: Vec<WeightedDensity>,
-    /// `ψ_α`, one for each species.
+    /// `ψ_α` of each species.
     pub excess: Vec<ExcessFreeEnergy>,
     /// The pair potentials.
     pub pairs: Vec<PairTerm>,
@@ -27,12 +27,12 @@ pub struct Fluid {
 }
 
 impl Fluid {
-    /// How many variables ψ has: one for each density and species, density-major.
+    /// The number of variables of ψ: one for each density and species, density-major.
     pub fn variables(&self) -> usize {
         self.densities.len() * self.species.len()
     }
 
-    /// The longest range of anything in the fluid; 0 for an ideal gas without thermostat.
+    /// The longest range of all terms; 0 for an ideal gas without thermostat.
     pub fn cutoff(&self) -> f64 {
         let thermostats = self.thermostats.iter().flatten().map(|t| t.range);
         thermostats.fold(self.conservative_range(), f64::max)
@@ -44,7 +44,7 @@ impl Fluid {
         densities.chain(self.pairs.iter().map(|p| p.potential.range())).fold(0.0, f64::max)
     }
 
-    /// Whether some force jumps at its range, where `∇·F` is a delta function that no configuration shows.
+    /// Whether some force jumps at its range, where `∇·F` has a delta function that samples of configurations miss.
     pub fn force_jumps(&self) -> bool {
         let jumps = |inner: f64, scale: f64| inner.abs() > 1e-6 * scale;
         let at_range = |range: f64| range * (1.0 - 1e-9);
@@ -57,14 +57,14 @@ impl Fluid {
         self.densities.iter().any(|d| kernel(&d.kernel)) || self.pairs.iter().any(|p| pair(&p.potential))
     }
 
-    /// Whether the force of every density is the gradient of its own kernel, and its strength that of
-    /// a ψ, so that a potential exists (Warren eq. 10).
+    /// Whether the force of every density is the gradient of its own kernel, and its strength the slope
+    /// of a ψ, so that a potential exists (Warren eq. 10).
     pub fn is_conservative(&self) -> bool {
         self.densities.iter().all(|d| d.force_kernel == d.kernel) && self.stated_slopes().is_none()
     }
 
-    /// The first species whose force is stated and not derived from a ψ, if there is one: mean field
-    /// has nothing to start from then.
+    /// The first species whose force is stated and not derived from a ψ, if there is one: mean
+    /// field then has no free energy.
     pub fn stated_slopes(&self) -> Option<&str> {
         let stated = self.excess.iter().position(|e| matches!(e, ExcessFreeEnergy::Slopes(_)))?;
         Some(&self.species[stated])
@@ -74,22 +74,22 @@ impl Fluid {
 /// A weighted local density `n_β,i = Σ_{j≠i, c(j)=β} w(r_ij)`.
 #[derive(Debug, Clone)]
 pub struct WeightedDensity {
-    /// Its name in the model file.
+    /// Name of the density in the model file.
     pub name: String,
-    /// `w`.
+    /// Weight function `w`.
     pub kernel: Kernel,
-    /// The kernel whose slope is the force law: `kernel` itself, unless the model file asks for a
-    /// law that has no potential, as LAMMPS's `mdpd` does.
+    /// The kernel whose slope is the force law: `kernel` itself, unless the model file asks for a law
+    /// without a potential, as LAMMPS's `mdpd` does.
     pub force_kernel: Kernel,
-    /// Whether `w(0)` counts in a particle's density of its own species.
+    /// Whether a particle's own `w(0)` contributes to its density of its own species.
     pub includes_self: bool,
-    /// `ρ̃(n)` of Trofimov et al. for (species that feels, species whose density it is), row-major.
+    /// Correction `ρ̃(n)` of Trofimov et al. for (species that feels, species whose density it is), row-major.
     pub correction: Vec<Polynomial>,
-    /// Outside these values of the corrected density ψ is continued.
+    /// Bounds of the corrected density; ψ is continued outside.
     pub bounds: Option<Bounds>,
 }
 
-/// Where ψ is used as written, and how it goes on outside.
+/// The interval where ψ is used as written, and its continuation outside.
 ///
 /// For a variable `x` out of `[low, high]`, with `x_c` the nearer bound and `δ = x − x_c`,
 ///
@@ -97,29 +97,28 @@ pub struct WeightedDensity {
 /// ψ(x) = ψ(x_c) + δ ∂ψ/∂x(x_c) + ½ δ² ∂²ψ/∂x²(x_c)
 /// ```
 ///
-/// so ψ′ goes on linearly; below `low` the last term is left out if ψ′ is to stay constant. With
-/// several variables out of bounds the rule is applied to each in turn, in any order. A table or an
+/// so that ψ′ continues linearly; below `low` the last term is left out if ψ′ is to stay constant. With
+/// several variables out of bounds the rule applies to each in turn, in any order. A table or an
 /// equation of state is bounded in the total density it depends on, a formula in each partial density.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds {
     /// The lowest value at which ψ is used as written.
     pub low: f64,
-    /// The highest.
+    /// The highest value at which ψ is used as written.
     pub high: f64,
-    /// How ψ′ goes on below `low`.
+    /// The continuation of ψ′ below `low`.
     pub below: Continuation,
 }
 
-/// How ψ′ goes on below the lower bound of a density.
+/// The continuation of ψ′ below the lower bound of a density.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Continuation {
-    /// With its slope at the bound.
+    /// ψ′ keeps its slope at the bound.
     #[default]
     Linear,
-    /// As it is at the bound: particles in thin regions push each other as in standard DPD, by a pair
-    /// force `−(ψ_i′ + ψ_j′) w′` that no longer depends on the density. The way out that Trofimov,
-    /// Nies and Michels, J. Chem. Phys. 117, 9383 (2002), sections IV A and V, suggest where ψ is
-    /// singular at low density.
+    /// ψ′ keeps its value at the bound: particles in thin regions repel each other as in standard DPD, by a
+    /// pair force `−(ψ_i′ + ψ_j′) w′` that no longer depends on the density. Trofimov, Nies and Michels, J.
+    /// Chem. Phys. 117, 9383 (2002), sections IV A and V, suggest this where ψ is singular at low density.
     Constant,
 }
 
@@ -134,7 +133,7 @@ impl Bounds {
         x.clamp(self.low, self.high)
     }
 
-    /// `δ = x − x_c`: negative below, positive above, 0 within.
+    /// The excess `δ = x − x_c`: negative below the bounds, positive above, 0 within.
     pub fn beyond(&self, x: f64) -> f64 {
         if x < self.low {
             x - self.low
@@ -151,29 +150,29 @@ impl Bounds {
 pub struct Polynomial(pub Vec<f64>);
 
 impl Polynomial {
-    /// `x`.
+    /// The polynomial `x`.
     pub fn identity() -> Polynomial {
         Polynomial(vec![0.0, 1.0])
     }
 
-    /// Whether it is `x`.
+    /// Whether the polynomial is `x`.
     pub fn is_identity(&self) -> bool {
         self.0 == [0.0, 1.0]
     }
 
-    /// Value and slope at `x`.
+    /// The value and the slope at `x`.
     pub fn at(&self, x: f64) -> (f64, f64) {
         self.0.iter().rev().fold((0.0, 0.0), |(value, slope), c| (value * x + c, slope * x + value))
     }
 
-    /// [`Polynomial::at`] of every `x`, which becomes the value there, with the slopes in `slope`.
+    /// Replaces every `x` by the value there, and writes the slopes to `slope`.
     pub fn block(&self, x: &mut [f64], slope: &mut [f64]) {
         for (x, slope) in x.iter_mut().zip(slope) {
             (*x, *slope) = self.at(*x);
         }
     }
 
-    /// The slope if the polynomial is linear.
+    /// The slope, if the polynomial is linear.
     pub fn constant_slope(&self) -> Option<f64> {
         match self.0.get(2..) {
             Some(rest) if rest.iter().any(|c| *c != 0.0) => None,
@@ -185,26 +184,26 @@ impl Polynomial {
 /// The excess free energy per particle of one species.
 #[derive(Debug, Clone)]
 pub enum ExcessFreeEnergy {
-    /// A formula of the [`Fluid::variables`] corrected densities.
+    /// A formula of the corrected densities, one for each of the [`Fluid::variables`].
     Formula(Formula),
     /// A function of the total corrected density `Σ_β ñ_β` of one of the densities.
     Curve(Curve),
-    /// None: the slopes are stated, and need be those of no ψ.
+    /// No ψ: the model states slopes, which may be those of no function.
     Slopes(StatedSlopes),
 }
 
-/// A many-body force that is stated, and need not have a potential: on the pair `i`, `j` it is
-/// `−[s_i,c(j) + s_j,c(i)] w′(r) ê`, with `s` in the place of `∂ψ/∂ñ`.
+/// A stated many-body force, which may have no potential: on the pair `i`, `j` it is `−[s_i,c(j) +
+/// s_j,c(i)] w′(r) ê`, with `s` in place of `∂ψ/∂ñ`.
 #[derive(Debug, Clone)]
 pub struct StatedSlopes {
-    /// What is reported as a particle's energy, of the [`Fluid::variables`] corrected densities.
+    /// Formula for the reported energy of a particle, of the corrected densities.
     pub energy: Formula,
-    /// `s`, one for each of the variables, of the same.
+    /// The slopes `s`, one for each of the [`Fluid::variables`], as formulas of the corrected densities.
     pub slopes: Vec<Formula>,
 }
 
 impl StatedSlopes {
-    /// Whether the energy, or any slope, depends on variable `v`, or the force acts through it.
+    /// Whether the energy or a slope depends on variable `v`, or the force of that variable is not zero.
     pub fn depends_on(&self, v: usize) -> bool {
         let acts = self.slopes[v].is_constant() != Some(0.0);
         acts || self.energy.depends_on(v) || self.slopes.iter().any(|s| s.depends_on(v))
@@ -214,25 +213,24 @@ impl StatedSlopes {
 /// A pair potential and the species it acts between.
 #[derive(Debug, Clone)]
 pub struct PairTerm {
-    /// The two species.
+    /// Indices of the two species.
     pub between: [usize; 2],
-    /// `φ`.
+    /// The potential `φ`.
     pub potential: PairPotential,
 }
 
 impl PairTerm {
-    /// Whether it acts on a pair of species `a` and `b` at the distance `r`.
+    /// Whether the potential acts on a pair of species `a` and `b` at the distance `r`.
     pub fn acts(&self, a: usize, b: usize, r: f64) -> bool {
         (self.between == [a, b] || self.between == [b, a]) && r < self.potential.range()
     }
 }
 
-/// Dissipative and random force of one pair of species:
-/// `F^D = −γ w_R² (ê·v_ij) ê`, `F^R = σ w_R ξ dt^{-1/2} ê`, `σ² = 2γkT`,
-/// `w_R = (1 − r/range)^exponent`.
+/// The dissipative and random force of a pair of species: `F^D = −γ w_R² (ê·v_ij) ê`, `F^R = σ w_R ξ
+/// dt^{-1/2} ê`, `σ² = 2γkT`, `w_R = (1 − r/range)^exponent`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Thermostat {
-    /// γ, mass over time.
+    /// Drag coefficient γ, in mass over time.
     pub gamma: f64,
     /// Range of `w_R`.
     pub range: f64,

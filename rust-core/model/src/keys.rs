@@ -1,5 +1,5 @@
-//! Every key of the model file, in one table: the JSON schema for editors and the reference
-//! `docs/model-file.md` are written from it, and tests hold the reader to it.
+//! Every key of the model file, as tables: the JSON schema for editors and the reference
+//! `docs/model-file.md` are generated from them, and tests compare the reader with them.
 
 use super::kernel::KernelKind;
 use crate::document::keys::keys;
@@ -23,7 +23,7 @@ fn continuations() -> Vec<&'static str> {
 /// Every table, in the order of the documentation.
 pub const TABLES: &[Table] = &[TOP, UNITS, PARAMETERS, DENSITY, EXCESS, CURVES, PAIR, THERMOSTAT, LITERATURE];
 
-/// The top level.
+/// Keys at the top level of the file.
 pub const TOP: Table = Table {
     path: "",
     title: "",
@@ -46,7 +46,7 @@ pub const TOP: Table = Table {
     },
 };
 
-/// `[units]`.
+/// Keys of `[units]`.
 pub const UNITS: Table = Table {
     path: "units",
     title: "",
@@ -67,7 +67,7 @@ pub const UNITS: Table = Table {
     },
 };
 
-/// `[parameters]`.
+/// Keys of `[parameters]`.
 pub const PARAMETERS: Table = Table {
     path: "parameters",
     title: "",
@@ -83,7 +83,7 @@ pub const PARAMETERS: Table = Table {
     },
 };
 
-/// `[density.NAME]`.
+/// Keys of `[density.NAME]`.
 pub const DENSITY: Table = Table {
     path: "density.NAME",
     title: "",
@@ -130,7 +130,7 @@ pub const DENSITY: Table = Table {
     },
 };
 
-/// `[excess_free_energy]`.
+/// Keys of `[excess_free_energy]`.
 pub const EXCESS: Table = Table {
     path: "excess_free_energy",
     title: "",
@@ -148,7 +148,7 @@ pub const EXCESS: Table = Table {
     },
 };
 
-/// What may stand in the braces of an excess free energy.
+/// Keys in the braces of an excess free energy.
 pub const CURVES: Table = Table {
     path: "excess_free_energy.SPECIES",
     title: "",
@@ -189,7 +189,7 @@ pub const CURVES: Table = Table {
     },
 };
 
-/// `[[pair]]`.
+/// Keys of `[[pair]]`.
 pub const PAIR: Table = Table {
     path: "pair",
     title: "",
@@ -244,7 +244,7 @@ pub const PAIR: Table = Table {
     },
 };
 
-/// `[[thermostat]]`.
+/// Keys of `[[thermostat]]`.
 pub const THERMOSTAT: Table = Table {
     path: "thermostat",
     title: "",
@@ -270,7 +270,7 @@ pub const THERMOSTAT: Table = Table {
     },
 };
 
-/// `[[literature]]`.
+/// Keys of `[[literature]]`.
 pub const LITERATURE: Table = Table {
     path: "literature",
     title: "",

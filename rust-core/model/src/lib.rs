@@ -1,14 +1,13 @@
-//! The model file: one fluid, every host.
+//! The model file, which describes one fluid for every host.
 //!
-//! A [`Model`] is a file that has been read and checked; [`Model::at`] puts in the temperature and
-//! gives a [`Fluid`], which is all numbers and compiled formulas and is what the engine, the theory
-//! and the exports work from.
+//! A [`Model`] is a file that has been read and checked; [`Model::at`] applies a temperature and returns a [`Fluid`],
+//! which consists of numbers and compiled formulas. The engine, the theory and the exports use the fluid.
 //!
 //! # Units and signs
 //!
-//! Reduced units throughout: lengths in r_c, masses in m, energies in whatever makes kT what the host
-//! says. Densities are number densities. `r_ij = r_i − r_j`, `ê_ij = r_ij / r_ij`, and a positive force
-//! along `ê_ij` on `i` is repulsive. Per-species indices run in the order of `species`.
+//! All units are reduced: lengths in r_c, masses in m, energies in the unit of the host's kT. Densities
+//! are number densities. `r_ij = r_i − r_j`, `ê_ij = r_ij / r_ij`, and a positive force along `ê_ij` on
+//! `i` is repulsive. Indices of species follow the order of `species`.
 
 #![warn(missing_docs)]
 

@@ -1,4 +1,4 @@
-//! The passes over a plane, for a precision, on an instruction set.
+//! The passes over a plane, compiled for each precision and instruction set.
 
 use crate::ground::arithmetic::{Arithmetic, Double, DoubleParticle, Mixed, MixedParticle, PackedParticle};
 use crate::ground::terms::Terms;
@@ -15,25 +15,25 @@ use std::marker::PhantomData;
 
 /// A precision of pairs.
 ///
-/// The passes are compiled with this crate: its two methods are no templates, so that no other crate compiles them again.
+/// The passes are compiled in this crate: its two methods are not generic, so that no other crate compiles them again.
 pub trait PairPrecision: Send + Sync + Sized + 'static {
-    /// What pairs are computed in.
+    /// Type of the numbers that pairs are computed in.
     type Scalar: Scalar;
-    /// What is kept of a particle.
+    /// Type of a packed particle.
     type PackedParticle: PackedParticle;
     /// The arithmetic on an instruction set.
     type On<I: Isa>: Arithmetic<I, Scalar = Self::Scalar, PackedParticle = Self::PackedParticle>;
 
-    /// The first pass over a plane.
+    /// Does the first pass over a plane.
     ///
     /// # Safety
-    /// As [`first_pass`].
+    /// The caller fulfils the contract of [`first_pass`].
     unsafe fn first(passes: &Passes<Self>, pass: First<Self>) -> Tally;
 
-    /// The second pass over a plane.
+    /// Does the second pass over a plane.
     ///
     /// # Safety
-    /// As [`second_pass`].
+    /// The caller fulfils the contract of [`second_pass`].
     unsafe fn second(passes: &Passes<Self>, pass: Second<Self>);
 }
 
@@ -44,13 +44,14 @@ impl PairPrecision for Mixed {
 
     #[inline(never)]
     unsafe fn first(passes: &Passes<Mixed>, pass: First<Mixed>) -> Tally {
-        // SAFETY: the scheduler makes a first pass when the plane and the next one are filled, and no other thread has its sums.
+        // SAFETY: the scheduler starts a first pass after it has filled this plane and the next, and
+        // lets no other thread have its sums.
         unsafe { passes.first(pass) }
     }
 
     #[inline(never)]
     unsafe fn second(passes: &Passes<Mixed>, pass: Second<Mixed>) {
-        // SAFETY: the scheduler makes a second pass behind the first one of its plane, when slopes are there.
+        // SAFETY: the scheduler starts a second pass after the first pass of its plane, when slopes are complete.
         unsafe { passes.second(pass) }
     }
 }
@@ -62,13 +63,14 @@ impl PairPrecision for Double {
 
     #[inline(never)]
     unsafe fn first(passes: &Passes<Double>, pass: First<Double>) -> Tally {
-        // SAFETY: the scheduler makes a first pass when the plane and the next one are filled, and no other thread has its sums.
+        // SAFETY: the scheduler starts a first pass after it has filled this plane and the next, and
+        // lets no other thread have its sums.
         unsafe { passes.first(pass) }
     }
 
     #[inline(never)]
     unsafe fn second(passes: &Passes<Double>, pass: Second<Double>) {
-        // SAFETY: the scheduler makes a second pass behind the first one of its plane, when slopes are there.
+        // SAFETY: the scheduler starts a second pass after the first pass of its plane, when slopes are complete.
         unsafe { passes.second(pass) }
     }
 }
@@ -76,9 +78,8 @@ impl PairPrecision for Double {
 /// The passes of one fluid.
 pub struct Passes<P> {
     set: InstructionSet,
-    /// Whether loops are needed that know species, or that cache all pairs.
+    /// Whether the loops must distinguish species, or cache all pairs.
     multispecies: bool,
-    /// Whether energies and virials are wanted.
     tally: bool,
     precision: PhantomData<P>,
 }
@@ -88,13 +89,13 @@ impl<P: PairPrecision> Passes<P> {
         Passes { set, multispecies: terms.species > 1 || terms.full_cache, tally, precision: PhantomData }
     }
 
-    /// The loops of the first pass for this fluid.
+    /// Runs the loops of the first pass for this fluid.
     ///
     /// # Safety
-    /// As [`first_pass`].
+    /// The caller fulfils the contract of [`first_pass`].
     #[inline(always)]
     unsafe fn first(&self, pass: First<P>) -> Tally {
-        // SAFETY: `first_pass` asks for no more than this function does.
+        // SAFETY: the caller fulfils the contract of `first_pass`; `set` exists only for instructions of this processor.
         unsafe {
             match (self.multispecies, self.tally) {
                 (false, false) => run(self.set, With::<_, false, false>(pass)),
@@ -105,13 +106,13 @@ impl<P: PairPrecision> Passes<P> {
         }
     }
 
-    /// The loops of the second pass for this fluid.
+    /// Runs the loops of the second pass for this fluid.
     ///
     /// # Safety
-    /// As [`second_pass`].
+    /// The caller fulfils the contract of [`second_pass`].
     #[inline(always)]
     unsafe fn second(&self, pass: Second<P>) {
-        // SAFETY: `second_pass` asks for no more than this function does.
+        // SAFETY: the caller fulfils the contract of `second_pass`; `set` exists only for instructions of this processor.
         unsafe {
             match (self.multispecies, self.tally) {
                 (false, false) => run(self.set, With::<_, false, false>(pass)),
@@ -123,10 +124,10 @@ impl<P: PairPrecision> Passes<P> {
     }
 }
 
-/// A pass, compiled with species or without, with energies and virials or without.
+/// A pass, compiled with or without species, and with or without energies and virials.
 struct With<K, const MULTISPECIES: bool, const TALLY: bool>(K);
 
-/// A plane, as the first pass takes it.
+/// Arguments of the first pass over a plane.
 pub struct First<'a, P: PairPrecision> {
     pub data: &'a PassData<'a, P::Scalar, P::PackedParticle>,
     pub plane: usize,
@@ -143,12 +144,12 @@ impl<P: PairPrecision, const MULTISPECIES: bool, const TALLY: bool> Kernel
     #[inline(always)]
     unsafe fn run<I: Isa>(self) -> Tally {
         let First { data, plane, sums, buffers, in_range } = self.0;
-        // SAFETY: what `first_pass` asks for is promised to `PairPrecision::first`.
+        // SAFETY: the caller of `PairPrecision::first` fulfils the contract of `first_pass`.
         unsafe { first_pass::<I, P::On<I>, MULTISPECIES, TALLY>(data, plane, sums, buffers, in_range) }
     }
 }
 
-/// A plane, as the second pass takes it.
+/// Arguments of the second pass over a plane.
 pub struct Second<'a, P: PairPrecision> {
     pub data: &'a PassData<'a, P::Scalar, P::PackedParticle>,
     pub sums: PlaneSums<'a>,
@@ -164,7 +165,7 @@ impl<P: PairPrecision, const MULTISPECIES: bool, const TALLY: bool> Kernel
     #[inline(always)]
     unsafe fn run<I: Isa>(self) {
         let Second { data, sums, in_range, virial } = self.0;
-        // SAFETY: what `second_pass` asks for is promised to `PairPrecision::second`.
+        // SAFETY: the caller of `PairPrecision::second` fulfils the contract of `second_pass`.
         unsafe { second_pass::<I, P::On<I>, MULTISPECIES, TALLY>(data, sums, in_range, virial) }
     }
 }

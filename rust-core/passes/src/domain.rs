@@ -9,7 +9,7 @@ pub struct PeriodicBox {
     periodic: [bool; 3],
 }
 
-/// A box that is none.
+/// The error of an invalid box.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DomainError {
     /// An edge or the origin is not finite, or the edges span no volume.
@@ -26,10 +26,10 @@ impl PeriodicBox {
         periodic: [false; 3],
     };
 
-    /// A box from `origin` with the columns of `edges` as edge vectors.
+    /// Builds a box at `origin` with the columns of `edges` as edge vectors.
     ///
     /// # Errors
-    /// Edges that are not finite, or span no positive volume.
+    /// Fails for edges that are not finite, or span no positive volume.
     pub fn new(
         origin: [f64; 3],
         edges: Matrix3<f64>,
@@ -46,10 +46,10 @@ impl PeriodicBox {
         }
     }
 
-    /// A box with edges along the axes.
+    /// Builds a box with edges along the axes.
     ///
     /// # Errors
-    /// A length that is not positive and finite.
+    /// Fails for a length that is not positive and finite.
     pub fn orthogonal(
         origin: [f64; 3],
         lengths: [f64; 3],
@@ -61,32 +61,29 @@ impl PeriodicBox {
         PeriodicBox::new(origin, Matrix3::from_diagonal(&Vector3::from(lengths)), periodic)
     }
 
-    /// The corner that fractional coordinates start at.
+    /// The corner where fractional coordinates are zero.
     pub fn origin(&self) -> [f64; 3] {
         self.origin.into()
     }
 
-    /// Edge vector `k`.
     pub fn edge(&self, k: usize) -> [f64; 3] {
         self.edges.column(k).into_owned().into()
     }
 
-    /// The rows that make fractions of vectors.
+    /// The rows that turn a vector into fractional coordinates.
     pub fn inverse(&self) -> [[f64; 3]; 3] {
         [0, 1, 2].map(|k| self.inverse.row(k).transpose().into())
     }
 
-    /// The lengths of the edges.
     pub fn lengths(&self) -> [f64; 3] {
         std::array::from_fn(|k| self.edges.column(k).norm())
     }
 
-    /// Which directions are periodic.
     pub fn periodic(&self) -> [bool; 3] {
         self.periodic
     }
 
-    /// The volume; in two dimensions the area, taking the third edge for a unit.
+    /// The volume; in two dimensions the area, with the third edge taken as a unit.
     pub fn volume(&self, dimensions: usize) -> f64 {
         match dimensions {
             2 => self.edges.column(0).cross(&self.edges.column(1)).norm(),
@@ -99,7 +96,6 @@ impl PeriodicBox {
         1.0 / self.inverse.row(k).norm()
     }
 
-    /// Fractional coordinates.
     pub fn fraction(&self, x: [f64; 3]) -> [f64; 3] {
         (self.inverse * (Vector3::from(x) - self.origin)).into()
     }
@@ -109,7 +105,7 @@ impl PeriodicBox {
         (self.origin + self.edges * Vector3::from(s)).into()
     }
 
-    /// Puts `x` into the box along its periodic directions and counts the boxes crossed in `image`.
+    /// Moves `x` into the box along its periodic directions and counts the crossed boxes in `image`.
     pub fn wrap(&self, x: &mut [f64; 3], image: &mut [i32; 3]) {
         let s = self.fraction(*x);
         for k in 0..3 {

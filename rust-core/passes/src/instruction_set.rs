@@ -1,8 +1,8 @@
 use super::settings::Instructions;
 
-/// An instruction set that this processor has: whoever holds one may run code that is compiled for it.
+/// An instruction set that this processor has: the owner of a value may run code that is compiled for it.
 ///
-/// [`Instructions`] says what a user asks for; this is made of it only where the processor was asked too.
+/// [`Instructions`] is what a user asks for; [`InstructionSet::new`] also asks the processor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct InstructionSet(Instructions);
 
@@ -12,12 +12,11 @@ impl InstructionSet {
         instructions.available().then_some(InstructionSet(instructions))
     }
 
-    /// The best that the processor has.
+    /// The best instruction set that the processor has.
     pub fn best() -> InstructionSet {
         InstructionSet(Instructions::best())
     }
 
-    /// Which instructions these are.
     pub fn instructions(self) -> Instructions {
         self.0
     }

@@ -1,12 +1,13 @@
-//! The loops of the fast engine over cells and pairs, compiled for each instruction set and precision.
+//! The loops of the sweep over cells and pairs, compiled for each instruction set and precision.
 //!
-//! A crate of its own: these loops take the compiler most of its time, and change rarely. `psidpd-core` sorts particles,
-//! shares the planes out among threads, evaluates ψ, and calls [`compiled`] for each plane; `docs/engine.md` explains the
-//! whole with figures.
+//! This is a crate of its own because its loops take most of the compile time and change rarely.
+//! `psidpd-core` sorts particles, distributes the planes over threads, evaluates ψ, and calls
+//! [`compiled`] for each plane; `docs/engine.md` explains all of it with figures.
 //!
-//! Rooms, from the ground up; a file imports from its own room and from those above it in this list:
+//! Modules from the lowest level upwards; a file imports from its own module and from those above it in this list:
 //!
-//! - [`domain`], [`noise`], [`settings`], [`instruction_set`], [`tally`]: what all of the engine means by these words.
+//! - [`domain`], [`noise`], [`settings`], [`instruction_set`], [`tally`]: definitions that the whole
+//! engine shares.
 //! - [`simd`]: vectors of each instruction set.
 //! - [`ground`]: box geometry, cell grid, fixed-point coordinates, packed particles, tables of terms.
 //! - [`cells`]: the particles in the order of cells.

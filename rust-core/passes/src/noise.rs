@@ -1,4 +1,4 @@
-//! Counter-based pair noise: a number for each (seed, step, lower tag, higher tag), whoever asks.
+//! Counter-based pair noise: a number for each (seed, step, lower tag, higher tag), on any rank.
 //!
 //! No state is carried from pair to pair, so the noise does not depend on the order of pairs, on
 //! ranks, on threads or on the skin, and both hosts draw the same numbers. The generator is
@@ -10,10 +10,10 @@
 pub const ROTATIONS: [u32; 8] = [13, 15, 26, 6, 17, 29, 16, 24];
 pub const PARITY: u32 = 0x1BD1_1BDA;
 
-/// Rounds of the number of a pair.
+/// Number of Threefry rounds for a pair.
 pub const PAIR_ROUNDS: usize = 13;
 
-/// Threefry-2x32 of `ROUNDS` rounds.
+/// The Threefry-2x32 generator with `ROUNDS` rounds.
 #[inline(always)]
 pub fn threefry2x32<const ROUNDS: usize>(counter: [u32; 2], key: [u32; 2]) -> [u32; 2] {
     let schedule = [key[0], key[1], PARITY ^ key[0] ^ key[1]];
@@ -31,7 +31,7 @@ pub fn threefry2x32<const ROUNDS: usize>(counter: [u32; 2], key: [u32; 2]) -> [u
     [x0, x1]
 }
 
-/// [`threefry2x32`] of thirteen rounds without a loop, so that a loop around it becomes one of vectors.
+/// [`threefry2x32`] with thirteen rounds and without a loop, so that a loop around it vectorises.
 #[inline(always)]
 pub fn thirteen_rounds(counter: [u32; 2], [k0, k1]: [u32; 2]) -> [u32; 2] {
     let k2 = PARITY ^ k0 ^ k1;
@@ -60,18 +60,18 @@ fn inject([x0, x1]: [u32; 2], first: u32, second: u32, number: u32) -> [u32; 2] 
     [x0.wrapping_add(first), x1.wrapping_add(second).wrapping_add(number)]
 }
 
-/// The law of the noise of a pair; zero mean and unit variance in either case.
+/// The distribution of the noise of a pair; either has zero mean and unit variance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Law {
-    /// Normal.
+    /// The normal distribution.
     #[default]
     Gaussian,
-    /// Uniform on (−√3, √3).
+    /// The uniform distribution on (−√3, √3).
     Uniform,
 }
 
 impl Law {
-    /// Names and values.
+    /// Names and values of the distributions.
     pub const ALL: [(&str, Law); 2] = [("gaussian", Law::Gaussian), ("uniform", Law::Uniform)];
 }
 
@@ -82,7 +82,6 @@ pub struct PairNoise {
 }
 
 impl PairNoise {
-    /// The noise of step `step` under `seed`.
     pub fn new(seed: u64, step: u64) -> PairNoise {
         let split = |x: u64| [x as u32, (x >> 32) as u32];
         PairNoise { key: threefry2x32::<20>(split(step), split(seed)) }
@@ -98,30 +97,30 @@ impl PairNoise {
         self.key
     }
 
-    /// `ξ_ij = ξ_ji`: zero mean, unit variance, uniform on (−√3, √3).
+    /// The noise `ξ_ij = ξ_ji`: zero mean, unit variance, uniform on (−√3, √3).
     ///
     /// A uniform number serves as well as a Gaussian one: only its first two moments enter the
     /// fluctuation–dissipation relation, and a sum over neighbours is near Gaussian anyway.
     #[inline(always)]
     pub fn xi(&self, tag_i: u32, tag_j: u32) -> f64 {
         let word = thirteen_rounds([tag_i.min(tag_j), tag_i.max(tag_j)], self.key)[0];
-        // (word + 1/2) / 2^31 − 1 lies symmetrically in (−1, 1), so the mean is exactly zero.
+        // The number (word + 1/2) / 2^31 − 1 lies symmetrically in (−1, 1), so that the mean is exactly zero.
         const SQRT_3: f64 = 1.732_050_807_568_877_2;
         (word as f64 + 0.5) * (SQRT_3 / (1u64 << 31) as f64) - SQRT_3
     }
 }
 
-/// A normal number from two words, by the transform of Box and Muller; below 5.9 in magnitude.
+/// A normal number from two words, by the transform of Box and Muller; its magnitude is below 5.9.
 ///
-/// Logarithm and cosine are their series, exact to single precision, so that a loop becomes one of vectors and
+/// Logarithm and cosine are series, exact to single precision, so that a loop vectorises and
 /// gives the same bits everywhere.
 #[inline(always)]
 pub fn normal(words: [u32; 2]) -> f32 {
     use std::f32::consts::{FRAC_PI_2, LN_2};
-    // In (0, 1), and in (−1, 1).
+    // `u` is in (0, 1), and `turn` in (−1, 1).
     let u = ((words[0] >> 8) as i32 as f32 + 0.5) * (1.0 / 16_777_216.0);
     let turn = ((words[1] >> 8) as i32 as f32 + 0.5) * (1.0 / 8_388_608.0) - 1.0;
-    // u = m 2^e with m from √½ to √2, and ln m = 2 artanh s.
+    // With u = m 2^e and m from √½ to √2, ln m = 2 artanh s.
     let bits = u.to_bits() as i32;
     let e = (bits - std::f32::consts::FRAC_1_SQRT_2.to_bits() as i32) >> 23;
     let m = f32::from_bits((bits - (e << 23)) as u32);
@@ -129,7 +128,7 @@ pub fn normal(words: [u32; 2]) -> f32 {
     let q = s * s;
     let series = 1.0 + q * (1.0 / 3.0 + q * (1.0 / 5.0 + q * (1.0 / 7.0 + q * (1.0 / 9.0))));
     let logarithm = 2.0 * s * series + e as f32 * LN_2;
-    // cos 2h = 1 − 2 sin² h.
+    // The cosine is cos 2h = 1 − 2 sin² h.
     let h = FRAC_PI_2 * turn;
     let q = h * h;
     let sine = 1.0

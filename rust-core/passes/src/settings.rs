@@ -1,13 +1,13 @@
 use std::fmt;
 use std::num::NonZeroUsize;
 
-/// In what the arithmetic of pairs is done. Positions and velocities of the host, sums over pairs, ψ and
-/// totals are in double precision in either case.
+/// The precision of the arithmetic of pairs. Positions and velocities of the host, sums over pairs, ψ
+/// and totals are always in double precision.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Precision {
-    /// Pairs in single precision: positions as 32-bit fractions of the box, so that differences are exact
-    /// to 2⁻³² of it everywhere. In a liquid with interfaces, the largest error of a force on a particle
-    /// is 1.7·10⁻⁶ of the rms force.
+    /// Pairs in single precision. Positions are 32-bit fractions of the box, so that differences are
+    /// exact to 2⁻³² of the box everywhere. In a liquid with interfaces, the largest error of a force
+    /// on a particle is 1.7·10⁻⁶ of the rms force.
     #[default]
     Mixed,
     /// Pairs in double precision.
@@ -15,7 +15,7 @@ pub enum Precision {
 }
 
 impl Precision {
-    /// All, with their names.
+    /// All precisions, with their names.
     pub const ALL: [(&'static str, Precision); 2] =
         [("mixed", Precision::Mixed), ("double", Precision::Double)];
 }
@@ -29,21 +29,21 @@ impl fmt::Display for Precision {
     }
 }
 
-/// Which instructions the kernels are compiled for.
+/// The instructions that the kernels are compiled for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Instructions {
-    /// Whatever the compiler's target has.
+    /// The instructions of the compiler's target.
     Portable,
     /// AVX2 and FMA.
     Avx2,
     /// AVX-512 F, BW, DQ and VL: Intel's servers since Skylake-X, Cascade Lake among them.
     Avx512,
-    /// The same, and VBMI2, which compresses bytes: Intel's since Ice Lake, AMD's since Zen 4.
+    /// AVX-512 as above, and VBMI2, which compresses bytes: Intel's since Ice Lake, AMD's since Zen 4.
     Avx512Vbmi2,
 }
 
 impl Instructions {
-    /// All, with their names, the slowest first.
+    /// All instruction sets, with their names, the slowest first.
     pub const ALL: [(&'static str, Instructions); 4] = [
         ("portable", Instructions::Portable),
         ("avx2", Instructions::Avx2),
@@ -51,12 +51,12 @@ impl Instructions {
         ("avx512-vbmi2", Instructions::Avx512Vbmi2),
     ];
 
-    /// Whether this processor has them.
+    /// Whether this processor has these instructions.
     pub fn available(self) -> bool {
         self.missing().is_empty()
     }
 
-    /// What they need and this processor lacks.
+    /// The features that these instructions need and this processor lacks.
     pub fn missing(self) -> Vec<&'static str> {
         #[cfg(target_arch = "x86_64")]
         {
@@ -81,7 +81,7 @@ impl Instructions {
         }
     }
 
-    /// The best that this processor has.
+    /// The best instruction set of this processor.
     pub fn best() -> Instructions {
         let mut available = Instructions::ALL.into_iter().map(|(_, i)| i).filter(|i| i.available());
         available.next_back().unwrap_or(Instructions::Portable)
@@ -99,14 +99,14 @@ impl fmt::Display for Instructions {
     }
 }
 
-/// How forces are computed; what they are depends on the precision alone, and not on it but for rounding.
+/// Settings of the computation of forces; only the precision changes results, and only by rounding errors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Settings {
     /// Precision of pair arithmetic.
     pub precision: Precision,
-    /// Instruction set; one that the processor lacks falls back to the best it has.
+    /// Instruction set; the best set of the processor replaces one that it lacks.
     pub instructions: Instructions,
-    /// Threads that share the work. Results are bitwise the same for any number of them.
+    /// Number of threads. Results are bitwise the same for any number.
     pub threads: NonZeroUsize,
 }
 

@@ -1,22 +1,20 @@
 use std::ops::AddAssign;
 
-/// What a step asks for beside forces. Nothing that is not asked for is computed.
+/// The results that a step should compute besides forces. Other results are not computed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Want {
-    /// The potential energy.
     pub energy: bool,
-    /// The virial.
     pub virial: bool,
     /// Energy of each particle: its ψ and half of its pair energies.
     pub particle_energy: bool,
-    /// Virial of each particle: half of its pairs'.
+    /// Virial of each particle: half of the virials of its pairs.
     pub particle_virial: bool,
     /// Every density of the model for each particle, also those that no force needs.
     pub densities: bool,
 }
 
 impl Want {
-    /// Forces alone.
+    /// Computes forces only.
     pub const FORCES: Want = Want {
         energy: false,
         virial: false,
@@ -24,13 +22,13 @@ impl Want {
         particle_virial: false,
         densities: false,
     };
-    /// Energy and virial of the whole.
+    /// Computes the total energy and virial.
     pub const TOTALS: Want = Want { energy: true, virial: true, ..Want::FORCES };
-    /// Everything.
+    /// Computes all results.
     pub const ALL: Want =
         Want { particle_energy: true, particle_virial: true, densities: true, ..Want::TOTALS };
 
-    /// What either of two asks for.
+    /// The results that either of the two asks for.
     pub fn or(self, other: Want) -> Want {
         Want {
             energy: self.energy || other.energy,
@@ -41,7 +39,7 @@ impl Want {
         }
     }
 
-    /// Whether energies or virials are asked for of each particle.
+    /// Whether energies or virials of each particle are asked for.
     pub fn of_particles(self) -> bool {
         self.particle_energy || self.particle_virial
     }
@@ -52,9 +50,9 @@ impl Want {
 /// Virials are `Σ r_ij ⊗ F_ij` in the order xx, yy, zz, xy, xz, yz, so that `p = ρkT + tr W/(dV)`.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Tally {
-    /// `Σ_i ψ`.
+    /// Sum of the excess free energies, `Σ_i ψ`.
     pub excess: f64,
-    /// `Σ_{i<j} φ`.
+    /// Sum of the pair energies, `Σ_{i<j} φ`.
     pub pair: f64,
     /// Virial of the conservative forces.
     pub virial: [f64; 6],

@@ -1,4 +1,4 @@
-//! The geometry of the swept region, against the box.
+//! Compares the box geometry of the sweep with the periodic box.
 
 use nalgebra::Matrix3;
 use psidpd_passes::domain::*;

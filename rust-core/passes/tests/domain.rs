@@ -1,4 +1,4 @@
-//! Boxes, wrapping and images.
+//! Tests of boxes, wrapping and images.
 
 use nalgebra::Matrix3;
 use psidpd_passes::domain::*;

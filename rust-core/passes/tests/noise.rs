@@ -1,4 +1,4 @@
-//! The noise of pairs: known answers, moments, independence, the normal law.
+//! Tests of the noise of pairs: known answers, moments, independence, the normal distribution.
 
 use psidpd_passes::noise::*;
 
@@ -27,8 +27,7 @@ fn symmetric_in_the_pair_and_different_for_every_part_of_the_key() {
     assert_ne!(noise.xi(3, 5), PairNoise::new(7, 11 | 1 << 40).xi(3, 5));
 }
 
-/// Correlation of two series of unit-variance numbers, in standard deviations of its own
-/// distribution under independence.
+/// Correlation of two series of unit-variance numbers, in standard deviations of this estimate for independent series.
 fn correlation_in_sigmas(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0f64);
     for (a, b) in pairs {
@@ -38,9 +37,8 @@ fn correlation_in_sigmas(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
     sum / count.sqrt()
 }
 
-/// Mean, variance and the correlations that a bad key would show. Twelve numbers, each standard
-/// normal if the noise is what it should be; |z| < 5 fails by chance once in 1.4·10⁵ runs, and
-/// the seed is fixed.
+/// Tests mean, variance and the correlations that a bad key would cause. The twelve statistics are standard
+/// normal for correct noise; |z| < 5 fails by chance once in 1.4·10⁵ runs, and the seed is fixed.
 #[test]
 fn moments_and_independence_of_steps_tags_and_seeds() {
     let seed = 20_031;
@@ -53,7 +51,7 @@ fn moments_and_independence_of_steps_tags_and_seeds() {
     let mean: f64 = draws.iter().sum::<f64>() / count;
     let variance: f64 = draws.iter().map(|x| x * x).sum::<f64>() / count;
     let fourth: f64 = draws.iter().map(|x| x.powi(4)).sum::<f64>() / count;
-    // Var(ξ²) = 9/5 − 1; Var(ξ⁴) = 9 − 81/25 for the uniform law of unit variance.
+    // For the uniform distribution of unit variance Var(ξ²) = 9/5 − 1 and Var(ξ⁴) = 9 − 81/25.
     let mut z = vec![
         mean * count.sqrt(),
         (variance - 1.0) * (count / 0.8).sqrt(),
@@ -65,7 +63,7 @@ fn moments_and_independence_of_steps_tags_and_seeds() {
     z.push(correlation_in_sigmas((1..=n).map(|t| (now.xi(t, t + 7), other_seed.xi(t, t + 7)))));
     z.push(correlation_in_sigmas((1..=n).map(|t| (now.xi(t, n), next.xi(t + 1, n)))));
     z.push(correlation_in_sigmas((1..=n).map(|t| (now.xi(2 * t, 5), now.xi(2 * t + 1, 5)))));
-    // Over steps, for one pair: what Brownian motion sees.
+    // The noise of one pair over steps, which Brownian motion depends on.
     let at = |s: u64| PairNoise::new(seed, s).xi(17, 4711);
     for lag in 1..=3 {
         z.push(correlation_in_sigmas((0..n as u64).map(|s| (at(s), at(s + lag)))));
@@ -75,9 +73,8 @@ fn moments_and_independence_of_steps_tags_and_seeds() {
     }
 }
 
-/// Mean, variance, skewness, kurtosis and the correlations within a step of normal noise; each statistic is standard
-/// normal, and nine of them beyond 5 are rarer than once in 10^5. The seed is fixed. Six moments agree because the
-/// law does.
+/// Tests mean, variance, skewness, kurtosis and the correlations of normal noise within a step; each
+/// statistic is standard normal, and nine of them exceed 5 less than once in 10⁵ runs. The seed is fixed.
 #[test]
 fn normal_noise_is_normal() {
     let n = 200_000u32;
@@ -90,7 +87,7 @@ fn normal_noise_is_normal() {
     assert!(xi == back);
     let count = f64::from(n);
     let moment = |power: i32| xi.iter().map(|x| f64::from(*x).powi(power)).sum::<f64>() / count;
-    // Variances of powers of a normal number: (2k − 1)!! − ((k − 1)!!)².
+    // The variances of powers of a normal number are (2k − 1)!! − ((k − 1)!!)².
     let mut z = vec![
         moment(1) * count.sqrt(),
         (moment(2) - 1.0) * (count / 2.0).sqrt(),
@@ -104,7 +101,7 @@ fn normal_noise_is_normal() {
         noise.fill(Law::Gaussian, &a, &b, &mut xi);
         xi
     };
-    // ξ_ij with ξ_ik, and with ξ_jk.
+    // The correlations of ξ_ij with ξ_ik, and with ξ_jk.
     let wide = |x: &f32| f64::from(*x);
     let (second, first) = (of(2), of(1));
     z.push(correlation_in_sigmas(xi.iter().map(wide).zip(second.iter().map(wide))));
@@ -121,7 +118,7 @@ fn normal_noise_is_normal() {
     assert!((0..n as usize).all(|k| other[k] == noise.xi(a[k], b[k]) as f32));
 }
 
-/// Box and Muller's transform, in double precision.
+/// Compares with Box and Muller's transform in double precision.
 #[test]
 fn normal_numbers_are_those_of_the_transform() {
     let mut words = [1u32, 77];

@@ -1,4 +1,4 @@
-//! Sums over listed pairs: what they are, and the same bits on every instruction set.
+//! Tests the values of sums over listed pairs, and that they have the same bits on every instruction set.
 
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::noise::threefry2x32;
@@ -29,7 +29,7 @@ fn vectors() -> Vec<Wide> {
     (0..ALL).map(|k| [uniform(3 * k), uniform(3 * k + 1), uniform(3 * k + 2), 0.0]).collect()
 }
 
-/// The same pairs in double precision.
+/// Converts the pairs to double precision.
 fn exact(mut list: PairList) -> PairList {
     let more = |pair: &Pair| ExactPair { g: pair.g.map(|g| f64::from(g) * 1.1), j: pair.j.into() };
     list.exact = list.pairs.iter().map(more).collect();

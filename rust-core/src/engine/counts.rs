@@ -1,19 +1,19 @@
-/// How often each pass has run: proof that what a fluid does not need is left out.
+/// Number of runs of each pass; tests check that a fluid runs no needless pass.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct PassCounts {
-    /// Pair searches.
+    /// Number of pair searches.
     pub search: u64,
-    /// Sums over pairs of one density.
+    /// Number of sums over pairs of one density.
     pub density: u64,
-    /// Evaluations of ψ over all owned particles.
+    /// Number of evaluations of ψ over all owned particles.
     pub excess: u64,
-    /// Force passes.
+    /// Number of force passes.
     pub force: u64,
-    /// Force passes that drew noise.
+    /// Number of force passes that drew noise.
     pub noise: u64,
-    /// Force passes that summed energies.
+    /// Number of force passes that summed energies.
     pub energy: u64,
-    /// Force passes that summed virials.
+    /// Number of force passes that summed virials.
     pub virial: u64,
 }
 

@@ -1,6 +1,6 @@
 use super::reach::ReachError;
 
-/// Why an evaluation stopped. Tags are the particles' own numbers.
+/// Reasons why an evaluation stopped. Tags are the host's numbers of particles.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum EngineError {
@@ -9,7 +9,7 @@ pub enum EngineError {
         "the position of particle {tag} is not finite: the time step is likely too large for these forces"
     )]
     Position {
-        /// Which particle.
+        /// Tag of the particle.
         tag: i32,
     },
     /// ψ or its derivative is NaN or infinite.
@@ -18,11 +18,11 @@ pub enum EngineError {
          [{densities}]: psi is singular there; set bounds on the density, or lower the time step"
     )]
     ExcessFreeEnergy {
-        /// Which particle.
+        /// Tag of the particle.
         tag: i32,
-        /// Its species.
+        /// Name of the particle's species.
         species: String,
-        /// Its corrected densities, density-major.
+        /// Corrected densities of the particle, density-major.
         densities: String,
     },
     /// A force is NaN or infinite.
@@ -30,27 +30,27 @@ pub enum EngineError {
         "the force on particle {tag} is not finite: particles overlap too much for this model or time step"
     )]
     Force {
-        /// Which particle.
+        /// Tag of the particle.
         tag: i32,
     },
-    /// A tag that is not positive: pair noise is keyed by tags.
+    /// A tag is not positive; the noise of a pair depends on its tags.
     #[error("particle tags must be positive, found {tag}")]
     Tag {
-        /// The tag.
+        /// The invalid tag.
         tag: i32,
     },
-    /// A particle of a kind that was not mapped to a species.
+    /// A particle has a type without a species.
     #[error("particle {tag} has type {kind}, which is not mapped to a species")]
     Kind {
-        /// Which particle.
+        /// Tag of the particle.
         tag: i32,
-        /// Its type.
+        /// Type of the particle.
         kind: i32,
     },
-    /// A range much longer than the box.
+    /// A range is much longer than the box.
     #[error(transparent)]
     Reach(#[from] ReachError),
-    /// Arrays of different lengths, or calls out of order: a fault of the host.
+    /// The host has passed arrays of different lengths, or made calls in the wrong order.
     #[error("host error: {0}")]
     Host(&'static str),
 }

@@ -6,10 +6,10 @@ use crate::model::expression::{Expansion, Formula, Program, TooLarge};
 use crate::model::{Bounds, Fluid, StatedSlopes};
 use psidpd_passes::instruction_set::InstructionSet;
 
-/// `ψ_α` of the densities that need a pass.
+/// `ψ_α` as a function of the densities with a pass.
 #[derive(Debug, Clone)]
 pub enum ExcessPlan {
-    /// No variables are left.
+    /// ψ does not depend on any density with a pass.
     Constant(f64),
     /// A formula of several variables.
     Formula(FormulaPlan),
@@ -17,12 +17,12 @@ pub enum ExcessPlan {
     Curve(CurvePlan),
 }
 
-/// A curve and the variables it sums.
+/// A curve, and the variables whose sum is its argument.
 #[derive(Debug, Clone)]
 pub struct CurvePlan {
     pub curve: Curve,
     species: usize,
-    /// Its density's place among the passes: where its slopes go.
+    /// Index of its density among the passes, by which its slopes are stored.
     pass: usize,
     bounds: Option<Bounds>,
 }
@@ -31,26 +31,26 @@ pub struct CurvePlan {
 #[derive(Debug, Clone)]
 pub struct FormulaPlan {
     pub formula: Formula,
-    /// ψ, then ∂ψ/∂ñ for each variable of the passes.
+    /// Computes ψ, then ∂ψ/∂ñ for each variable of the passes.
     program: Program,
     outputs: Vec<Formula>,
-    /// The variables of the slopes.
+    /// Variable of each slope.
     variables: Vec<usize>,
     bounded: Vec<BoundedVariable>,
-    /// Whether the slopes are stated, and not those of `formula`.
+    /// Whether the slopes are stated in the model, and not derived from `formula`.
     stated: bool,
 }
 
-/// A variable beyond whose bounds ψ goes on linearly or quadratically.
+/// A variable with bounds, beyond which ψ continues linearly or quadratically.
 #[derive(Debug, Clone)]
 struct BoundedVariable {
     variable: usize,
-    /// Its place among the slopes.
+    /// Index of its slope.
     slope: usize,
     bounds: Bounds,
 }
 
-/// Work space of [`ExcessPlan::evaluate`].
+/// Scratch arrays of [`ExcessPlan::evaluate`].
 #[derive(Debug, Clone)]
 pub struct ExcessWork {
     set: InstructionSet,
@@ -58,9 +58,9 @@ pub struct ExcessWork {
     point: Vec<f64>,
     expansion: Expansion,
     outside: Vec<Outside>,
-    /// Lanes and bounded variables, lane by lane, that are out of bounds.
+    /// Pairs of a lane and a variable out of bounds, lane by lane.
     strays: Vec<Stray>,
-    /// The variables, those out of bounds moved to them; of use if there are strays.
+    /// The variables, moved to their bounds if out of them; used only if there are strays.
     moved: Vec<f64>,
     totals: Vec<f64>,
     beyond: Vec<f64>,
@@ -75,7 +75,7 @@ struct Stray {
     beyond: f64,
 }
 
-/// The same within a lane: `ε = beyond` up to `order`.
+/// A stray within a lane: `ε = beyond`, up to the power `order`.
 #[derive(Debug, Clone, Copy)]
 struct Outside {
     slope: usize,
@@ -84,10 +84,10 @@ struct Outside {
 }
 
 impl ExcessPlan {
-    /// The plan of `psi` of species `alpha`, with slopes for `variables`.
+    /// Plans `psi` of species `alpha`, with slopes for `variables`.
     ///
     /// # Errors
-    /// A derivative grows beyond the limits of the formula engine.
+    /// Fails if a derivative grows beyond the limits of the formula engine.
     pub fn of_formula(fluid: &Fluid, psi: Formula, variables: &[usize]) -> Result<ExcessPlan, TooLarge> {
         if let Some(value) = psi.is_constant() {
             return Ok(ExcessPlan::Constant(value));
@@ -102,7 +102,7 @@ impl ExcessPlan {
             .enumerate()
             .filter_map(|(slope, &variable)| {
                 let bounds = fluid.densities[variable / count].bounds?;
-                // What is linear goes on as it is.
+                // A linear ψ needs no continuation.
                 outputs[1 + slope].is_constant().is_none().then_some(BoundedVariable {
                     variable,
                     slope,
@@ -120,7 +120,7 @@ impl ExcessPlan {
         }))
     }
 
-    /// The plan of a law of stated slopes.
+    /// Plans a law of stated slopes.
     pub fn of_slopes(law: &StatedSlopes, variables: &[usize]) -> ExcessPlan {
         let acts = law.slopes.iter().any(|s| s.is_constant() != Some(0.0));
         if let (false, Some(value)) = (acts, law.energy.is_constant()) {
@@ -138,7 +138,7 @@ impl ExcessPlan {
         })
     }
 
-    /// The plan of a curve, whose density is one of `passes`.
+    /// Plans a curve, whose density is one of `passes`.
     pub fn of_curve(fluid: &Fluid, curve: Curve, passes: &[usize]) -> ExcessPlan {
         ExcessPlan::Curve(CurvePlan {
             species: fluid.species.len(),
@@ -148,16 +148,16 @@ impl ExcessPlan {
         })
     }
 
-    /// Leaves the slopes out of evaluations to come, which are given no room for them.
+    /// Omits the slopes from later evaluations, whose callers give no room for them.
     pub fn leave_out_slopes(&mut self) {
         if let ExcessPlan::Formula(plan) = self {
             plan.program = Program::new(&[&plan.formula]);
         }
     }
 
-    /// Writes ψ and its slopes for every lane: ψ of lane `l` is `psi[l]`, slope `k` is `slopes[k * lanes + l]`,
-    /// as variable `v` is `at[v * lanes + l]`. Returns how many lanes had a variable below its bounds and how
-    /// many one above.
+    /// Writes ψ and its slopes for every lane: ψ of lane `l` is `psi[l]`, slope `k` is `slopes[k *
+    /// lanes + l]`, and variable `v` is `at[v * lanes + l]`. Returns the numbers of lanes with a
+    /// variable below its bounds, and above.
     pub fn evaluate(
         &self,
         lanes: usize,
@@ -180,7 +180,7 @@ impl ExcessPlan {
 }
 
 impl ExcessWork {
-    /// For an instruction set that is available.
+    /// Creates scratch arrays for an instruction set.
     pub fn new(set: InstructionSet) -> ExcessWork {
         ExcessWork {
             set,
@@ -196,7 +196,7 @@ impl ExcessWork {
         }
     }
 
-    /// Where a formula was last evaluated, having been asked for at `at`.
+    /// The densities at which a formula was last evaluated when it was asked for `at`.
     pub fn evaluated_at<'a>(&'a self, at: &'a [f64]) -> &'a [f64] {
         if self.strays.is_empty() { at } else { &self.moved }
     }
@@ -250,7 +250,7 @@ impl CurvePlan {
 }
 
 impl FormulaPlan {
-    /// Variables and their slopes, if these are stated and act.
+    /// Variables and their slopes, if these are stated and not zero.
     pub fn stated_slopes(&self) -> Option<impl Iterator<Item = (usize, &Formula)>> {
         let acting = |(_, slope): &(usize, &Formula)| slope.is_constant() != Some(0.0);
         self.stated.then(|| self.variables.iter().copied().zip(&self.outputs[1..]).filter(acting))
@@ -266,7 +266,7 @@ impl FormulaPlan {
     ) -> [u64; 2] {
         let within = |b: &BoundedVariable| {
             let values = &at[b.variable * lanes..][..lanes];
-            // No early return: the loop vectorises.
+            // The loop has no early return, so that it vectorises.
             !values.iter().fold(false, |out, x| out | (*x < b.bounds.low) | (*x > b.bounds.high))
         };
         let moves = !self.bounded.iter().all(within);
@@ -287,7 +287,7 @@ impl FormulaPlan {
         count
     }
 
-    /// Moves variables to their bounds and lists which, lane by lane.
+    /// Moves variables to their bounds and lists them, lane by lane.
     fn clamp(&self, lanes: usize, at: &mut [f64], strays: &mut Vec<Stray>) -> [u64; 2] {
         for (bounded, variable) in self.bounded.iter().enumerate() {
             let values = &mut at[variable.variable * lanes..][..lanes];
@@ -308,7 +308,7 @@ impl FormulaPlan {
         count
     }
 
-    /// Replaces ψ and slopes in the lanes that were moved by the continuation from the bounds.
+    /// Replaces ψ and slopes in the moved lanes by the continuation from the bounds.
     ///
     /// With the operator `E_k ψ = ψ + δ_k ψ_k + ½ δ_k² ψ_kk` at the bound for each variable out of
     /// bounds, ψ becomes `E_1 E_2 … ψ`; these commute with each other and with the slopes along the
@@ -347,7 +347,7 @@ impl FormulaPlan {
     }
 }
 
-/// All outputs of a program.
+/// Evaluates all outputs of a program.
 struct EvaluateBlock<'a, O> {
     program: &'a Program,
     lanes: usize,
@@ -365,7 +365,7 @@ impl<'o, O: Iterator<Item = &'o mut [f64]>> Loop for EvaluateBlock<'_, O> {
     }
 }
 
-/// `Σ c_m Π δ_k^{m_k}`, or its derivative by the `δ` of one variable.
+/// The sum `Σ c_m Π δ_k^{m_k}`, or its derivative with respect to one variable's `δ`.
 fn continued(coefficients: &[f64], outside: &[Outside], derivative: Option<usize>) -> f64 {
     let mut sum = 0.0;
     for (index, coefficient) in coefficients.iter().enumerate() {

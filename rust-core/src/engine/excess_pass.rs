@@ -1,17 +1,17 @@
-//! ψ and its slopes, particle by particle, between the two passes over pairs.
+//! Evaluates ψ and its slopes for all particles, between the two passes over pairs.
 
 use super::error::EngineError;
 use super::excess::{ExcessPlan, ExcessWork};
 use super::plan::Plan;
 use psidpd_passes::instruction_set::InstructionSet;
 
-/// Particles per evaluation of ψ: enough to hide the interpreter, few enough for the first-level cache.
+/// Number of particles in an evaluation of ψ: enough to amortise the interpreter, few enough for the first-level cache.
 pub const LANES: usize = 128;
 
-/// Most of them where not all take part: half of some have a species about, and few should be left over.
+/// Most particles in an evaluation if some are skipped: larger, so that few particles are left for a second evaluation.
 const LISTED: usize = LANES + LANES / 2;
 
-/// Scratch for evaluating ψ in lanes, and what was counted.
+/// Scratch arrays for evaluating ψ in lanes, and counts.
 #[derive(Debug, Clone)]
 pub struct ExcessPass {
     at: Vec<f64>,
@@ -19,29 +19,29 @@ pub struct ExcessPass {
     psi: Vec<f64>,
     slopes: Vec<f64>,
     work: ExcessWork,
-    /// Evaluations below and above the bounds of a density.
+    /// Number of evaluations below and above the bounds of a density.
     pub out_of_bounds: [u64; 2],
-    /// Evaluations of a ψ that depends on a density, each of a block of particles.
+    /// Number of evaluations of a ψ that depends on a density, each of a block of particles.
     pub evaluations: u64,
 }
 
-/// Numbers of consecutive particles, a row for each, `first` being the number of the one that the first row is of.
+/// Arrays over consecutive particles, with a row for each; the first row is that of particle `first`.
 pub struct Rows<'a> {
     pub first: usize,
-    /// Which variable of ψ each column of the densities is.
+    /// Variable of ψ in each column of the densities.
     pub columns: &'a [usize],
     pub densities: &'a [f64],
-    /// A number for each particle.
+    /// Excess free energy of each particle.
     pub excess: &'a mut [f64],
     pub slopes: &'a mut [f64],
 }
 
-/// The rows that the lanes of one evaluation are of.
+/// The rows of the lanes of one evaluation.
 #[derive(Debug, Clone, Copy)]
 enum Lanes<'a> {
-    /// One after the other.
+    /// Consecutive rows.
     Run { first: usize, count: usize },
-    /// Ascending, with others between.
+    /// Ascending rows that are not consecutive.
     Listed(&'a [u32]),
 }
 
@@ -69,7 +69,7 @@ impl<'a> Lanes<'a> {
         }
     }
 
-    /// Calls `f` with each lane and its row, in a loop of its own for each kind.
+    /// Calls `f` with each lane and its row, in a separate loop for each variant.
     #[inline(always)]
     fn each(&self, mut f: impl FnMut(usize, usize)) {
         match *self {
@@ -88,7 +88,7 @@ impl Default for ExcessPass {
 }
 
 impl ExcessPass {
-    /// With loops for an instruction set; the numbers are the same with any.
+    /// Creates a pass with loops for an instruction set; results do not depend on it.
     pub fn new(set: InstructionSet) -> ExcessPass {
         ExcessPass {
             at: Vec::new(),
@@ -101,8 +101,8 @@ impl ExcessPass {
         }
     }
 
-    /// Evaluates ψ and its slopes for the particles of `rows`; `species` is negative for those that have
-    /// none, and `None` if all are of the only one; `tag` names them in errors.
+    /// Evaluates ψ and its slopes for the particles of `rows`. `species` is negative for particles
+    /// without a species, and `None` if there is one species only; `tag` names particles in errors.
     pub fn run(
         &mut self,
         plan: &Plan,
@@ -136,8 +136,8 @@ impl ExcessPass {
         Ok(())
     }
 
-    /// ψ_α and its slopes, by the chain rule through ρ̃. Numbers that lie in `rows` as they are needed are
-    /// taken from there and written there.
+    /// Evaluates ψ_α and its slopes, by the chain rule through ρ̃. Where the layout of `rows` allows
+    /// it, reads and writes them in place.
     fn evaluate(
         &mut self,
         plan: &Plan,
@@ -233,7 +233,7 @@ impl ExcessPass {
     }
 }
 
-/// Writes rows of densities to the columns of `at` that they are of: few columns, row by row.
+/// Copies rows of densities to the columns of `at`: a few columns, row by row.
 fn gather<const W: usize>(lanes: Lanes, rows: &Rows, at: &mut [f64]) {
     let n = lanes.count();
     let mut columns: [&mut [f64]; W] = std::array::from_fn(|_| &mut [][..]);
@@ -249,13 +249,13 @@ fn gather<const W: usize>(lanes: Lanes, rows: &Rows, at: &mut [f64]) {
     lanes.each(|lane, row| {
         let densities = &densities[row];
         for c in 0..W {
-            // SAFETY: the columns have as many numbers as there are lanes.
+            // SAFETY: `gather` gives every column as many numbers as there are lanes.
             unsafe { *columns[c].get_unchecked_mut(lane) = densities[c] };
         }
     });
 }
 
-/// The same of any number of columns, one after the other.
+/// Copies rows as `gather`, with any number of columns, column by column.
 fn gather_any(lanes: Lanes, rows: &Rows, at: &mut [f64]) {
     let (n, width) = (lanes.count(), rows.columns.len());
     for (column, &v) in rows.columns.iter().enumerate() {
@@ -264,7 +264,7 @@ fn gather_any(lanes: Lanes, rows: &Rows, at: &mut [f64]) {
     }
 }
 
-/// Writes columns as rows: few columns, row by row.
+/// Copies columns to rows: a few columns, row by row.
 fn spread<const W: usize>(lanes: Lanes, columns: &[f64], rows: &mut [f64]) {
     let n = lanes.count();
     let columns: [&[f64]; W] = std::array::from_fn(|c| &columns[c * n..][..n]);
@@ -272,20 +272,20 @@ fn spread<const W: usize>(lanes: Lanes, columns: &[f64], rows: &mut [f64]) {
     lanes.each(|lane, row| {
         let row = &mut rows[row];
         for c in 0..W {
-            // SAFETY: the columns have as many numbers as there are lanes.
+            // SAFETY: `spread` gives every column as many numbers as there are lanes.
             row[c] = unsafe { *columns[c].get_unchecked(lane) };
         }
     });
 }
 
-/// The same of any number of columns, one after the other.
+/// Copies columns as `spread`, with any number of columns, column by column.
 fn spread_any(lanes: Lanes, columns: &[f64], rows: &mut [f64], width: usize) {
     for (k, column) in columns.chunks_exact(lanes.count()).enumerate() {
         lanes.each(|lane, row| rows[row * width + k] = column[lane]);
     }
 }
 
-/// The first `count` numbers of `scratch`, whatever they are, which grows if it has not as many.
+/// The first `count` numbers of `scratch`, with unspecified values; `scratch` grows if it is shorter.
 fn room(scratch: &mut Vec<f64>, count: usize) -> &mut [f64] {
     if scratch.len() < count {
         scratch.resize(count, 0.0);
@@ -298,14 +298,14 @@ fn first_fault(psi: &[f64], slopes: &[f64]) -> Option<usize> {
     if (sum(psi) + sum(slopes)).is_finite() {
         return None;
     }
-    // None, if it is only the sum.
+    // There may be no such lane, if only the sum overflows.
     let faulty = |lane: &usize| {
         !psi[*lane].is_finite() || slopes.iter().skip(*lane).step_by(psi.len()).any(|s| !s.is_finite())
     };
     (0..psi.len()).find(faulty)
 }
 
-/// The sum in any order, so that it vectorises.
+/// Sums in any order, so that the loop vectorises.
 fn sum(values: &[f64]) -> f64 {
     let (chunks, rest) = values.as_chunks::<8>();
     let mut sums = [0.0; 8];
@@ -323,7 +323,7 @@ mod tests {
     use crate::engine::{Around, Images, Instructions, Particles, PeriodicBox, Settings, Sweep, Want};
     use crate::model::Model;
 
-    /// Rows of `count` particles of a fluid: densities that differ, and room.
+    /// Rows of `count` particles of a fluid, with different densities, and room for results.
     struct Case {
         plan: Plan,
         columns: Vec<usize>,
@@ -352,7 +352,7 @@ mod tests {
             Case { plan, columns, densities, species }
         }
 
-        /// ψ and slopes, with what was there before.
+        /// Evaluates ψ and slopes; returns them with the numbers that were there before.
         fn run(&self, pass: &mut ExcessPass, alike: bool) -> Result<(Vec<f64>, Vec<f64>), EngineError> {
             let count = self.species.len();
             let mut excess = vec![7.0; count];
@@ -369,7 +369,7 @@ mod tests {
             Ok((excess, slopes))
         }
 
-        /// The same, for one particle after another.
+        /// Evaluates one particle after another.
         fn one_by_one(&self, pass: &mut ExcessPass) -> (Vec<f64>, Vec<f64>) {
             let (width, mut excess, mut slopes) = (self.columns.len(), vec![], vec![]);
             for (k, densities) in self.densities.chunks_exact(width).enumerate() {
@@ -431,7 +431,7 @@ mod tests {
         let mut case = Case::new(&["A"], &text, 2 * LANES);
         let expected = case.run(&mut ExcessPass::default(), true).unwrap();
         for k in (0..case.species.len()).filter(|k| k % 3 == 1) {
-            // ψ is not finite there.
+            // At this density ψ is not finite.
             (case.species[k], case.densities[k]) = (-1, 0.0);
         }
         let (excess, slopes) = case.run(&mut ExcessPass::default(), false).unwrap();
@@ -467,7 +467,7 @@ mod tests {
         assert_eq!(excess.iter().sum::<f64>(), f64::INFINITY);
     }
 
-    /// Particles of a species without ψ have the places of others a step later.
+    /// Particles of a species without ψ take the places of other particles in the next step.
     #[test]
     fn a_species_without_psi_keeps_nothing_of_the_step_before() {
         for constant in ["0", "1.5"] {

@@ -1,24 +1,24 @@
-//! Pairs that a host leaves out.
+//! Pairs that a host excludes.
 
 use super::error::EngineError;
 use super::surroundings::SpecialPair;
 use psidpd_passes::cells::excluded::Mark;
 
-/// Which particles form no pair with each other, by the host's numbers.
+/// The excluded pairs of particles, by the host's numbers.
 #[derive(Debug, Clone, Default)]
 pub struct Exclusions {
-    /// Where the partners of each particle begin, one past the last at the end; empty if there are none.
+    /// Index of each particle's first partner; the last entry is one past the last. Empty without partners.
     start: Vec<u32>,
     partners: Vec<u32>,
-    /// Of each particle; empty if no marks exclude.
+    /// Marks of all particles; empty if no marks exclude pairs.
     marks: Vec<Mark>,
     between_molecules: bool,
-    /// Whether some mark has a side, and whether some has a molecule.
+    /// Whether any mark has a side, and whether any has a molecule.
     kinds: [bool; 2],
 }
 
 impl Exclusions {
-    /// Excludes by these marks from now on, at least as many as there are particles, or by none.
+    /// Sets the marks, at least as many as there are particles, or none.
     pub fn mark(&mut self, marks: impl IntoIterator<Item = Mark>, between_molecules: bool) {
         self.marks.clear();
         self.marks.extend(marks);
@@ -31,7 +31,7 @@ impl Exclusions {
         self.kinds
     }
 
-    /// Marks, and whether they keep molecules from each other.
+    /// The marks, and whether they exclude pairs between molecules.
     pub fn marks(&self) -> &[Mark] {
         &self.marks
     }
@@ -48,20 +48,23 @@ impl Exclusions {
         }
     }
 
-    /// Stops if there are marks, but not for all of `count` particles.
+    /// Fails if there are marks, but fewer than `count`.
     pub fn check(&self, count: usize) -> Result<(), EngineError> {
         match self.marks.len() {
-            1.. if self.marks.len() < count => Err(EngineError::Host("not as many marks as particles")),
+            1.. if self.marks.len() < count => {
+                Err(EngineError::Host("marks must have one entry per particle and ghost"))
+            }
             _ => Ok(()),
         }
     }
 
-    /// Replaces all pairs by `pairs`, whatever their factors are.
+    /// Replaces all excluded pairs by `pairs`, and ignores their factors.
     pub fn set(&mut self, pairs: &[SpecialPair]) {
         self.start.clear();
         self.partners.clear();
         let Some(most) = pairs.iter().map(|pair| pair.i.max(pair.j)).max() else { return };
-        // How many each has, then where they begin, and while they are filled in where the next one goes.
+        // The array first has the number of partners of each particle, then their start, and the next
+        // free index while it is filled.
         self.start.resize(most as usize + 2, 0);
         for pair in pairs {
             self.start[pair.i as usize] += 1;
@@ -79,12 +82,12 @@ impl Exclusions {
                 *next += 1;
             }
         }
-        // Each is where the one behind it began.
+        // After filling, each entry is the start of the next particle: the array moves by one.
         self.start.copy_within(..most as usize + 1, 1);
         self.start[0] = 0;
     }
 
-    /// Whether pairs are excluded one by one.
+    /// Whether single pairs are excluded.
     pub fn has_partners(&self) -> bool {
         !self.start.is_empty()
     }
@@ -97,7 +100,7 @@ impl Exclusions {
         }
     }
 
-    /// Bytes held.
+    /// Size in bytes.
     pub fn bytes(&self) -> usize {
         (self.start.capacity() + self.partners.capacity()) * size_of::<u32>()
             + self.marks.capacity() * size_of::<Mark>()

@@ -1,4 +1,4 @@
-//! All forces come from here: the engine chooses between the sweep and the sums over pairs, evaluation by evaluation.
+//! The engine, which computes all forces and chooses between the sweep and the sums over pairs for each evaluation.
 
 use super::counts::PassCounts;
 use super::error::EngineError;
@@ -20,74 +20,73 @@ use std::sync::Arc;
 
 /// The forces of one fluid on the particles of a host.
 ///
-/// Where all particles are in hand, an evaluation is [`Engine::forces`]. For a rank with ghosts, and for pairs that the
-/// host lists, it is [`Engine::first`], a round of [`Engine::slopes_mut`] from owners to ghosts, and
-/// [`Engine::second`].
+/// [`Engine::forces`] evaluates particles without ghosts. With ghosts, or with pairs that the host lists, the host
+/// calls [`Engine::first`], copies [`Engine::slopes_mut`] from owners to ghosts, and calls [`Engine::second`].
 ///
-/// Every evaluation takes the fastest [`Path`] that has what is wanted of it; the next one chooses anew.
+/// Every evaluation takes the fastest [`Path`] that can compute its request.
 #[derive(Debug, Clone)]
 pub struct Engine {
     pair_sums: PairSums,
     sweep: Sweep,
     pair_sums_only: bool,
     special: Vec<SpecialPair>,
-    /// Whether the sweep has been told of them.
+    /// Whether the sweep has the special pairs.
     knows_special: bool,
     corrections: Corrections,
-    /// That of the last evaluation.
+    /// Path of the last evaluation.
     path: Option<Path>,
-    /// ψ of owned particles and densities in the last evaluation, as far as they have been fetched.
+    /// ψ of owned particles and their densities in the last evaluation, if they have been fetched.
     excess: Vec<f64>,
     densities: Vec<f64>,
 }
 
-/// What an evaluation is given, and what is wanted of it.
+/// The input of an evaluation, and the results that it should compute.
 #[derive(Debug, Clone, Copy)]
 pub struct Request<'a> {
-    /// The particles.
+    /// Owned particles and ghosts.
     pub particles: Particles<'a>,
-    /// Their velocities, and those of ghosts; may be empty where no thermostat acts.
+    /// Velocities of particles and ghosts; may be empty if no thermostat acts.
     pub v: &'a [[f64; 3]],
-    /// What the thermostat needs; `None` for conservative forces only.
+    /// Seed, number and length of the time step, for the thermostat; `None` for conservative forces only.
     pub step: Option<Step>,
-    /// What is wanted beside forces.
+    /// The results to compute besides forces.
     pub want: Want,
 }
 
-/// One configuration in a box, evaluated without a thermostat.
+/// Results for one configuration in a box, without a thermostat.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Evaluated {
     /// The potential energy `U`, in the energy unit of the model.
     pub energy: f64,
-    /// `Σ r_ij ⊗ F_ij`: xx, yy, zz, xy, xz, yz.
+    /// Virial `Σ r_ij ⊗ F_ij`: xx, yy, zz, xy, xz, yz.
     pub virial: [f64; 6],
-    /// Uncorrected local densities, of each particle one for each density and species, density-major.
+    /// Uncorrected local densities; each particle has one for each density and species, density-major.
     pub densities: Vec<f64>,
     /// The force on each particle.
     pub forces: Vec<[f64; 3]>,
 }
 
 impl Engine {
-    /// An engine for `fluid`; types are species indices until [`Engine::map_kinds`] says otherwise.
+    /// Creates an engine for `fluid`; types are species indices unless [`Engine::map_kinds`] maps them.
     ///
     /// # Errors
-    /// As [`Plan::new`].
+    /// Fails as [`Plan::new`].
     pub fn new(fluid: &Fluid, settings: Settings) -> Result<Engine, TooLarge> {
         Engine::with_pool(fluid, settings, Arc::new(Pool::new(settings.threads)))
     }
 
-    /// The same, with threads that are there already and that others may use too.
+    /// Creates an engine with a given thread pool, which others may use too.
     ///
     /// # Errors
-    /// As [`Plan::new`].
+    /// Fails as [`Plan::new`].
     pub fn with_pool(fluid: &Fluid, settings: Settings, pool: Arc<Pool>) -> Result<Engine, TooLarge> {
         Ok(Engine::of_plan(Plan::new(fluid)?, settings, pool))
     }
 
-    /// An engine whose sweep is wrong: for tests that others notice it.
+    /// Creates an engine with a faulty sweep, for tests that a check finds the fault.
     ///
     /// # Errors
-    /// As [`Plan::new`].
+    /// Fails as [`Plan::new`].
     #[doc(hidden)]
     pub fn with_fault(fluid: &Fluid, settings: Settings, fault: Fault) -> Result<Engine, TooLarge> {
         let mut plan = Plan::new(fluid)?;
@@ -109,76 +108,77 @@ impl Engine {
         }
     }
 
-    /// The plan.
+    /// The plan of the fluid's passes.
     pub fn plan(&self) -> &Plan {
         self.sweep.plan()
     }
 
-    /// How the sweep computes, with the instruction set in use.
+    /// The settings of the sweep, with the instruction set in use.
     pub fn settings(&self) -> Settings {
         self.sweep.settings()
     }
 
-    /// The threads.
+    /// The pool of threads.
     pub fn pool(&self) -> &Arc<Pool> {
         self.sweep.pool()
     }
 
-    /// Where the time of sweeps went.
+    /// Times of the parts of sweeps.
     pub fn times(&self) -> Times {
         self.sweep.times()
     }
 
-    /// How often each pass has run.
+    /// Number of runs of each pass.
     pub fn counts(&self) -> PassCounts {
         self.pair_sums.counts() + self.sweep.counts()
     }
 
-    /// How many evaluations of ψ had a density below its bounds, and how many one above, since the
-    /// engine was made. Only densities count that the particle's ψ depends on, not linearly.
+    /// Numbers of evaluations of ψ with a density below its bounds, and above, since the engine was
+    /// made. Only densities that the particle's ψ depends on nonlinearly count.
     pub fn out_of_bounds(&self) -> [u64; 2] {
         let (a, b) = (self.pair_sums.out_of_bounds(), self.sweep.out_of_bounds());
         [a[0] + b[0], a[1] + b[1]]
     }
 
     /// Maps the host's types to species: entry `kind` is the species of type `kind`, negative for
-    /// particles that take no part.
+    /// particles that do not interact.
     ///
     /// # Errors
-    /// A species index out of range.
+    /// Fails for a species index out of range.
     pub fn map_kinds(&mut self, kinds: &[i32]) -> Result<(), EngineError> {
         self.pair_sums.map_kinds(kinds)?;
         self.sweep.map_kinds(kinds)
     }
 
-    /// Which pairs do not act at their full strength in evaluations to come, until the host says otherwise or numbers its
-    /// particles anew.
+    /// Sets the pairs with reduced strength for later evaluations, until the host changes them or renumbers its particles.
     ///
-    /// Within the cut-off two particles must meet in one image only. A sweep leaves these pairs out, and those with a factor
-    /// above 0 are added to it. Pairs that the host lists have their factors in its list, and no special ones beside them.
+    /// Within the cut-off two particles must meet in one image only. A sweep leaves these pairs out,
+    /// and those with a factor above 0 are then added. Pairs that the host lists have factors in its
+    /// list; special pairs do not apply to them.
     pub fn set_special_pairs(&mut self, pairs: impl IntoIterator<Item = SpecialPair>) {
         self.special.clear();
         self.special.extend(pairs.into_iter().filter(|pair| pair.factor != 1.0));
         self.knows_special = false;
     }
 
-    /// Which pairs do not interact in evaluations to come beside special ones with a factor of 0: those that `marks` exclude,
-    /// one for each particle and ghost, if there are any; see [`Mark::excludes`]. Pairs that the host lists are not looked at.
+    /// Sets `marks` that exclude pairs from later evaluations, in addition to special pairs with a
+    /// factor of 0: one mark for each particle and ghost, or none; see [`Mark::excludes`]. Marks do not
+    /// apply to pairs that the host lists.
     pub fn set_exclusions(&mut self, marks: impl IntoIterator<Item = Mark>, between_molecules: bool) {
         self.sweep.exclusions_mut().mark(marks, between_molecules);
     }
 
-    /// Whether every evaluation is to be done by sums over pairs one by one: for tests, and to see what the sweep is worth.
+    /// Restricts all evaluations to sums over pairs, for tests and for measurements of the sweep's speed-up.
     pub fn use_pair_sums_only(&mut self, only: bool) {
         self.pair_sums_only = only;
     }
 
-    /// The way that the last evaluation went; `None` before the first.
+    /// The path that the last evaluation took; `None` before the first.
     pub fn path(&self) -> Option<Path> {
         self.path
     }
 
-    /// The way that an evaluation of `want` would go.
+    /// The path that an evaluation of `want` would take.
     pub fn path_for(&self, surroundings: Surroundings, want: Want) -> Path {
         let fits = match surroundings {
             Surroundings::Listed(..) => return Path::PairSums(Reason::ListedPairs),
@@ -198,7 +198,7 @@ impl Engine {
         }
     }
 
-    /// A path for people, with what it computes by: "cell sweep, mixed precision, avx2, 2 threads".
+    /// Describes a path and its settings: "cell sweep, mixed precision, avx2, 2 threads".
     pub fn describe(&self, path: Path) -> String {
         let Settings { precision, instructions, threads } = self.settings();
         match path {
@@ -215,10 +215,10 @@ impl Engine {
 
     /// Energy, virial, densities and conservative forces of particles at `x`, of a type each, in a box.
     ///
-    /// Positions may be anywhere: along periodic directions of the box they are those of an image.
+    /// Positions may be outside the box: along periodic directions they stand for an image.
     ///
     /// # Errors
-    /// As [`Engine::forces`]; also types that are not as many as positions.
+    /// Fails as [`Engine::forces`], and if the numbers of types and positions differ.
     pub fn evaluate(
         &mut self,
         x: &[[f64; 3]],
@@ -240,12 +240,12 @@ impl Engine {
         })
     }
 
-    /// All forces on particles in a box of their own: writes them to `force`, or adds them to what is there, and
-    /// returns the totals that are wanted.
+    /// Computes all forces on particles in a box without ghosts, writes them to `force` or adds them to
+    /// it, and returns the requested totals.
     ///
     /// # Errors
-    /// A position, ψ or a force that is not finite; then some forces may have been written. A tag or type out of
-    /// range, arrays of different lengths, ghosts.
+    /// Fails for a position, ψ or force that is not finite, when some forces may have been written;
+    /// also for a tag or type out of range, arrays of different lengths, and ghosts.
     pub fn forces(
         &mut self,
         domain: &PeriodicBox,
@@ -275,11 +275,11 @@ impl Engine {
         }
     }
 
-    /// The first half of an evaluation: all that needs no slopes of ghosts. The second has the same `request`.
+    /// The first half of an evaluation, which needs no slopes of ghosts. The second half has the same `request`.
     ///
     /// # Errors
-    /// A position or ψ that is not finite, a tag or type out of range, arrays of different lengths, listed pairs of
-    /// particles that are not there.
+    /// Fails for a position or ψ that is not finite, a tag or type out of range, arrays of different
+    /// lengths, and listed pairs of particles that do not exist.
     pub fn first(&mut self, surroundings: Surroundings, request: &Request) -> Result<(), EngineError> {
         let Request { particles, v, step, want } = request;
         match (self.begin(surroundings, *want), surroundings) {
@@ -299,7 +299,7 @@ impl Engine {
         }
     }
 
-    /// What special pairs add to a sweep, which leaves them out; their densities go there.
+    /// Computes the contributions of special pairs to a sweep, which leaves them out, and adds those to the densities.
     fn find_corrections(&mut self, around: Around, particles: &Particles) -> Result<(), EngineError> {
         let Engine { pair_sums, sweep, special, corrections, .. } = self;
         let (exclusions, densities) = sweep.beside_mut();
@@ -321,7 +321,8 @@ impl Engine {
         Ok(())
     }
 
-    /// Adds what special pairs do to the forces of a sweep, whose slopes are there; their share of the totals.
+    /// Adds the forces of special pairs to those of a sweep, whose slopes are complete; returns
+    /// their contribution to the totals.
     fn correct(&self, request: &Request, force: &mut [[f64; 3]]) -> Result<Tally, EngineError> {
         let Request { particles, v, step, want } = request;
         let (plan, slopes) = (self.sweep.plan(), self.sweep.slopes());
@@ -331,7 +332,7 @@ impl Engine {
         self.corrections.add_forces(plan, slopes, particles, v, thermostat, *want, force)
     }
 
-    /// `∂ψ/∂n` of owned particles, then room for those of ghosts, [`Plan::slope_width`] each.
+    /// Slopes `∂ψ/∂n` of owned particles, followed by room for those of ghosts, [`Plan::slope_width`] each.
     pub fn slopes_mut(&mut self) -> &mut [f64] {
         match self.path {
             Some(Path::PairSums(_)) => self.pair_sums.slopes_mut(),
@@ -339,14 +340,15 @@ impl Engine {
         }
     }
 
-    /// The second half of an evaluation: writes the forces to `force`, or adds them to what is there, and returns the
-    /// totals that are wanted.
+    /// The second half of an evaluation: writes the forces to `force`, or adds them to it,
+    /// and returns the requested totals.
     ///
-    /// Forces on ghosts are those of the sums over pairs only, if the host brings them home; the sweep leaves them alone, and the
-    /// rank of the other particle computes its half of the pair, for which half of the energy and virial count here.
+    /// Only the sums over pairs compute forces on ghosts, if the host returns these to their owners.
+    /// The sweep leaves ghosts without forces: the rank of the other particle computes the pair too,
+    /// and this rank counts half of its energy and virial.
     ///
     /// # Errors
-    /// A force that is not finite; arrays of other lengths than in [`Engine::first`].
+    /// Fails for a force that is not finite, and for arrays of other lengths than in [`Engine::first`].
     pub fn second(
         &mut self,
         request: &Request,
@@ -384,16 +386,17 @@ impl Engine {
         self.pair_sums.second(particles, v, *step, *want, force)
     }
 
-    /// Keeps the densities of a sweep that wanted them.
+    /// Stores the densities of a sweep that was asked for them.
     fn fetch(&mut self, want: Want) {
         if want.densities {
             self.sweep.local_densities(&mut self.excess, &mut self.densities);
         }
     }
 
-    /// Uncorrected local densities of owned particles in the last evaluation, one for each density and species,
-    /// density-major. Unless they were wanted, or have been summed by [`Engine::sum_densities`], there are none after a
-    /// sweep, and zeros for those that no force needs after an evaluation by sums over pairs.
+    /// Uncorrected local densities of owned particles in the last evaluation, one for each density and
+    /// species, density-major. If the request did not include densities and [`Engine::sum_densities`]
+    /// was not called, the slice is empty after a sweep, and has zeros for densities that no force
+    /// needs after an evaluation by sums over pairs.
     pub fn local_densities(&self) -> &[f64] {
         match self.path {
             Some(Path::PairSums(_)) => self.pair_sums.local_densities(),
@@ -401,12 +404,12 @@ impl Engine {
         }
     }
 
-    /// Every density of the model in the last evaluation, for `particles` that have not moved since: sums those that it
-    /// did not want. Before the first evaluation they are zero. Forces, slopes and the paths of later evaluations are
-    /// what they are without.
+    /// Every density of the model in the last evaluation, for `particles` that have not moved since;
+    /// sums those that it did not compute. Before the first evaluation they are zero. Forces, slopes
+    /// and the paths of later evaluations do not change.
     ///
     /// # Errors
-    /// As [`Engine::first`].
+    /// Fails as [`Engine::first`].
     pub fn sum_densities(
         &mut self,
         surroundings: Surroundings,
@@ -414,7 +417,7 @@ impl Engine {
     ) -> Result<&[f64], EngineError> {
         let variables = self.plan().densities().count() * self.plan().species().len();
         match self.path {
-            // The pairs are there still.
+            // The list of pairs still exists.
             Some(Path::PairSums(_)) => self.pair_sums.sum_all_densities(None),
             _ if !self.densities.is_empty() => Ok(&self.densities),
             Some(Path::Sweep) if self.sweep_has_all_densities() => {
@@ -446,18 +449,18 @@ impl Engine {
         }
     }
 
-    /// Energy of each particle and ghost, if the last evaluation wanted it: its ψ and half of its pair energies.
+    /// Energy of each particle and ghost, if the last evaluation was asked for it: its ψ and half of its pair energies.
     pub fn particle_energy(&self) -> &[f64] {
         self.pair_sums.particle_energy()
     }
 
-    /// Virial of each particle and ghost, if the last evaluation wanted it: half of its pairs'.
+    /// Virial of each particle and ghost, if the last evaluation was asked for it: half of the virials of its pairs.
     pub fn particle_virial(&self) -> &[[f64; 6]] {
         self.pair_sums.particle_virial()
     }
 
-    /// Brings the slopes of owned particles to [`Engine::slopes_mut`] after [`Engine::forces`], with room for `all`:
-    /// for questions about single pairs, before which nobody needs them.
+    /// Copies the slopes of owned particles to [`Engine::slopes_mut`] after [`Engine::forces`], with
+    /// room for `all`; [`Engine::single`] needs them.
     pub fn fetch_slopes(&mut self, all: usize) {
         match self.path {
             Some(Path::PairSums(_)) => {
@@ -471,8 +474,8 @@ impl Engine {
     /// Pair energy, and conservative force along `ê_ij`, of particles `i` and `j` of the given types at the distance
     /// `r`, with the slopes of ψ in the last evaluation.
     ///
-    /// The energy is that of the terms that belong to pairs: `φ`, and ψ where it is linear in a density. The force
-    /// also has the many-body part, if slopes are there.
+    /// The energy is that of the terms that belong to pairs: `φ`, and ψ where it is linear in a
+    /// density. The force includes the many-body part, if slopes are available.
     pub fn single(&self, kinds: [i32; 2], r: f64, particles: [usize; 2]) -> (f64, f64) {
         let slopes = match self.path {
             Some(Path::PairSums(_)) => self.pair_sums.slopes(),
@@ -481,13 +484,13 @@ impl Engine {
         self.pair_sums.single_at(kinds, r, slopes, particles)
     }
 
-    /// The host's numbers of its particles in the order of cells, an order to keep them in that makes sorting cheap;
-    /// `None` if the last evaluation was not swept.
+    /// The host's numbers of its particles in the order of cells; a host that keeps its particles in
+    /// this order makes sorting cheap. `None` if the last evaluation was no sweep.
     pub fn order(&self) -> Option<&[u32]> {
         (self.path == Some(Path::Sweep)).then(|| self.sweep.order())
     }
 
-    /// Bytes held in arrays over particles and pairs.
+    /// Size in bytes of the arrays over particles and pairs.
     pub fn memory(&self) -> usize {
         let held = self.excess.capacity() + self.densities.capacity();
         let special = self.special.capacity() * size_of::<SpecialPair>() + self.corrections.memory();

@@ -1,26 +1,26 @@
-//! Engines that are wrong on purpose.
+//! Engines with deliberate faults, for tests.
 
 /// A term of the sweep that is 5 % too strong: for tests that the checks of a validation can fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fault {
     /// Forces of soft pair potentials.
     PairForce,
-    /// Forces by ψ.
+    /// Many-body forces, which derive from ψ.
     ManyBodyForce,
-    /// γ in the forces.
+    /// Drag coefficient γ of the forces.
     Drag,
-    /// σ in the forces.
+    /// Noise amplitude σ of the forces.
     Noise,
     /// The virial of all forces.
     Virial,
 }
 
 impl Fault {
-    /// All of them.
+    /// The list of all faults.
     pub const ALL: [Fault; 5] =
         [Fault::PairForce, Fault::ManyBodyForce, Fault::Drag, Fault::Noise, Fault::Virial];
 
-    /// What to multiply `term` by in an engine that has the fault `in_it`.
+    /// The factor of `term` in an engine with the fault `in_it`.
     pub(super) fn factor(term: Fault, in_it: Option<Fault>) -> f64 {
         if in_it == Some(term) { 1.05 } else { 1.0 }
     }

@@ -1,13 +1,13 @@
 use psidpd_passes::domain::PeriodicBox;
 
-/// The periodic images of a host's own particles, as ghosts: what LAMMPS's communication does on one
-/// rank, for the native runner.
+/// The periodic images of a host's own particles, as ghosts. The native runner uses them as LAMMPS uses
+/// its communication on one rank.
 ///
-/// Ghosts follow the owned particles in every array, so the engine sees open space.
+/// Ghosts follow the owned particles in every array, so that the engine computes in open space.
 #[derive(Debug, Clone, Default)]
 pub struct Images {
     owned: usize,
-    /// For each ghost the owned particle it is an image of.
+    /// Owned particle of each ghost.
     owner: Vec<u32>,
 }
 
@@ -35,7 +35,7 @@ impl Images {
             let margin = cutoff / domain.height(k);
             let shells = margin.ceil() as i32;
             let edge = domain.edge(k);
-            // Images in one direction are imaged again in the next, so corners fill up.
+            // Images in one direction have images in the next direction, so that corners are filled too.
             for index in 0..x.len() {
                 let here = x[index];
                 let s = domain.fraction(here)[k];
@@ -50,18 +50,18 @@ impl Images {
         }
     }
 
-    /// The particle that `index` is, or is an image of.
+    /// The owned particle whose index or image's index is `index`.
     pub(super) fn owner_of(&self, index: usize) -> usize {
         if index < self.owned { index } else { self.owner[index - self.owned] as usize }
     }
 
-    /// How many ghosts there are.
+    /// The number of ghosts.
     pub fn ghosts(&self) -> usize {
         self.owner.len()
     }
 
-    /// Copies a per-particle quantity of `width` numbers from owners to their ghosts; `values` holds
-    /// owned particles and is grown to hold the ghosts.
+    /// Copies `width` numbers per particle from owners to their ghosts; `values` contains owned
+    /// particles and grows by the ghosts.
     pub fn forward<T: Copy + Default>(&self, width: usize, values: &mut Vec<T>) {
         values.resize((self.owned + self.owner.len()) * width, T::default());
         let (own, ghosts) = values.split_at_mut(self.owned * width);

@@ -1,7 +1,7 @@
-//! Forces, energies and virials: what all hosts share.
+//! Computes forces, energies and virials for all hosts.
 //!
-//! [`Engine`] is what a host sees: LAMMPS, the native runner, the C interface. It gives particles, what is around them
-//! and what it [wants](Want), and gets forces. The way of a number, each file using those above it only:
+//! Hosts use [`Engine`]: LAMMPS, the native runner, the C interface. A host passes particles, their surroundings
+//! and the results that it [wants](Want), and receives forces. Each file uses only files above it in this list:
 //!
 //! ```text
 //! domain, particles, surroundings, settings    what is given
@@ -14,9 +14,9 @@
 //! facade         Engine: chooses between the two for each evaluation, and says which and why (path)
 //! ```
 //!
-//! Both do the same sums: local densities `n` over pairs, `ψ` and `∂ψ/∂n` of each particle, then the force of each pair
-//! `−[∂ψ_i/∂n + ∂ψ_j/∂n] w′ − φ′`, drag and noise. Where ghosts stand for particles of other ranks the slopes travel
-//! from owners to ghosts in between, so that an evaluation has two halves.
+//! Both compute the same sums: local densities `n` over pairs, `ψ` and `∂ψ/∂n` of each particle, then the force of
+//! each pair `−[∂ψ_i/∂n + ∂ψ_j/∂n] w′ − φ′`, drag and noise. Where ghosts stand for particles of other ranks, the
+//! host copies slopes from owners to ghosts in between, so that an evaluation has two halves.
 
 mod counts;
 mod error;

@@ -1,28 +1,28 @@
-//! Which way an evaluation goes, and why.
+//! The path of an evaluation, and the reason for it.
 
 use std::fmt;
 
-/// How an evaluation is done.
+/// The path of an evaluation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Path {
-    /// By the sweep over cells: fast, by vector instructions and threads.
+    /// The sweep over cells, with vector instructions and threads.
     Sweep,
-    /// By sums over a list of pairs, in double precision and on one thread: slower, for a reason.
+    /// Sums over a list of pairs, in double precision and on one thread: slower, for the given reason.
     PairSums(Reason),
 }
 
-/// Why the sweep does not do an evaluation.
+/// Reasons why the sweep cannot do an evaluation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Reason {
     /// The host lists the pairs that interact.
     ListedPairs,
-    /// Energies or virials of single particles are wanted.
+    /// Energies or virials of single particles are requested.
     ParticleValues,
-    /// A density is wanted that no force needs.
+    /// A density is requested that no force needs.
     Densities,
-    /// The box is narrower than twice the cut-off, or leans as no box of LAMMPS does.
+    /// The box is narrower than twice the cut-off, or its edges have another orientation than those of LAMMPS.
     Box,
-    /// The host has asked for it.
+    /// The host has disabled the sweep.
     Asked,
 }
 

@@ -1,4 +1,4 @@
-//! What a fluid needs computed, worked out once.
+//! The passes that a fluid needs, derived once.
 
 use super::excess::ExcessPlan;
 use super::fault::Fault;
@@ -10,21 +10,21 @@ use std::fmt;
 
 /// The passes, kernels and ranges of one fluid.
 ///
-/// A density in which every ψ is linear is no many-body term: its force is a pair force
-/// `−(c_αβ + c_βα) w′(r)`, `c_αβ = ∂ψ_α/∂n_β`, and needs no density pass.
+/// A density in which every ψ is linear is no many-body term: its force is a pair force `−(c_αβ + c_βα)
+/// w′(r)`, `c_αβ = ∂ψ_α/∂n_β`, and needs no density pass.
 #[derive(Debug, Clone)]
 pub struct Plan {
     pub(super) species: Vec<String>,
     pub(super) dimensions: usize,
     pub(super) cutoff: f64,
     pub(super) densities: Vec<WeightedDensity>,
-    /// Densities that some ψ is not linear in; their order is that of the variables of `excess`.
+    /// Indices of the densities in which some ψ is not linear; their order is that of the variables of `excess`.
     pub(super) passes: Vec<usize>,
     pub(super) linear: Vec<LinearTerm>,
     pub(super) excess: Vec<ExcessPlan>,
     pub(super) pairs: Vec<PairTerm>,
     pub(super) thermostat: Option<ThermostatPlan>,
-    /// Of the sweep; for tests.
+    /// Deliberate fault of the sweep, for tests.
     pub(super) fault: Option<Fault>,
     title: String,
     conservative: bool,
@@ -36,7 +36,7 @@ pub struct LinearTerm {
     pub density: usize,
     pub kernel: Kernel,
     pub force_kernel: Kernel,
-    /// `c_αβ`, row-major.
+    /// Coefficients `c_αβ`, row-major.
     pub coefficients: Vec<f64>,
 }
 
@@ -44,32 +44,32 @@ pub struct LinearTerm {
 #[derive(Debug, Clone)]
 pub struct ThermostatPlan {
     pub gamma: Vec<f64>,
-    /// `√(2γkT)`.
+    /// Noise amplitude `√(2γkT)`.
     pub sigma: Vec<f64>,
     pub range: Vec<f64>,
     pub exponent: Vec<f64>,
     pub longest: f64,
 }
 
-/// Where the first pass over pairs keeps those that the second one needs.
+/// Storage of the pairs that the first pass finds for the second.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PairStorage {
-    /// A compact list for each density of the pairs within its range.
+    /// For each density, a compact list of the pairs within its range.
     InRange,
     /// A cache of all pairs with their separations and forces: each force is added once, in the second pass.
     FullCache,
 }
 
 impl PairStorage {
-    /// The full cache pays if a density reaches further than this part of the cutoff; else the list is short.
+    /// The full cache is faster if a density's range exceeds this fraction of the cutoff; otherwise the list is short.
     pub const FULL_CACHE_FROM: f64 = 0.7;
 }
 
 impl Plan {
-    /// Works out the plan of a fluid.
+    /// Derives the plan of a fluid.
     ///
     /// # Errors
-    /// A derivative of ψ grows beyond the limits of the formula engine.
+    /// Fails if a derivative of ψ grows beyond the limits of the formula engine.
     pub fn new(fluid: &Fluid) -> Result<Plan, TooLarge> {
         let slopes = slopes(fluid)?;
         let mut passes = Vec::new();
@@ -89,15 +89,15 @@ impl Plan {
         Plan::of_passes(fluid, passes, linear)
     }
 
-    /// The plan of a fluid that leaves nothing out: every density has a pass, and no ψ is taken for a pair potential.
+    /// Derives a plan in which every density has a pass, and no ψ is treated as a pair potential.
     ///
     /// # Errors
-    /// As [`Plan::new`].
+    /// Fails as [`Plan::new`].
     pub fn whole(fluid: &Fluid) -> Result<Plan, TooLarge> {
         Plan::of_passes(fluid, (0..fluid.densities.len()).collect(), Vec::new())
     }
 
-    /// The same for energies alone.
+    /// Removes the slopes from the plan, for energies alone.
     pub(super) fn without_slopes(mut self) -> Plan {
         self.excess.iter_mut().for_each(ExcessPlan::leave_out_slopes);
         self
@@ -122,12 +122,12 @@ impl Plan {
         })
     }
 
-    /// Longest range of any force; particles further apart do not see each other.
+    /// Longest range of all forces; particles further apart do not interact.
     pub fn cutoff(&self) -> f64 {
         self.cutoff
     }
 
-    /// 2 or 3.
+    /// Number of dimensions, 2 or 3.
     pub fn dimensions(&self) -> usize {
         self.dimensions
     }
@@ -142,26 +142,25 @@ impl Plan {
         self.densities.iter().map(|d| d.name.as_str())
     }
 
-    /// How many numbers a host forwards from each owned particle to its ghosts.
+    /// Number of slopes that a host copies from each owned particle to its ghosts.
     pub fn slope_width(&self) -> usize {
         self.passes.len() * self.species.len()
     }
 
-    /// Indices of the densities that need a pass: some ψ is not linear in them.
+    /// Indices of the densities with a pass: some ψ is not linear in them.
     pub fn density_passes(&self) -> &[usize] {
         &self.passes
     }
 
-    /// Where pairs are kept for the second pass, if there is one.
+    /// Storage of pairs for the second pass, if there is one.
     pub fn pair_storage(&self) -> Option<PairStorage> {
         let longest = self.passes.iter().map(|d| self.densities[*d].force_kernel.range()).reduce(f64::max)?;
-        // With one variable the density goes with the force, and nothing is gained.
+        // With one variable the density is added together with the force, and the cache saves nothing.
         let full = self.slope_width() > 1 && longest > PairStorage::FULL_CACHE_FROM * self.cutoff;
         Some(if full { PairStorage::FullCache } else { PairStorage::InRange })
     }
 
-    /// The potential energy of a pair of species `a` and `b` at `r` from densities that every ψ is linear
-    /// in.
+    /// The potential energy of a pair of species `a` and `b` at `r` from densities that every ψ is linear in.
     pub fn linear_pair_energy(&self, a: usize, b: usize, r: f64) -> f64 {
         let count = self.species.len();
         self.linear
@@ -170,7 +169,7 @@ impl Plan {
             .sum()
     }
 
-    /// Range of the random force if there is one: boxes must be at least twice as long, or two images
+    /// Range of the random force, if there is one: boxes must be at least twice as long, or two images
     /// of a pair would share their noise.
     pub fn noise_range(&self) -> Option<f64> {
         self.thermostat.as_ref().map(|t| t.longest)
@@ -181,7 +180,7 @@ impl Plan {
         self.thermostat.is_some()
     }
 
-    /// How many species have a ψ that depends on a density.
+    /// Number of species with a ψ that depends on a density.
     pub(super) fn evaluated_species(&self) -> u64 {
         self.excess.iter().filter(|e| !matches!(e, ExcessPlan::Constant(_))).count() as u64
     }
@@ -192,8 +191,8 @@ impl Plan {
     }
 }
 
-/// `∂ψ_α/∂ñ_v` for every species and variable; `None` where no formula is, or none that may act as a
-/// pair potential: that of a curve, and a stated one.
+/// `∂ψ_α/∂ñ_v` for every species and variable; `None` for curves and for stated slopes, which
+/// cannot be treated as pair potentials.
 fn slopes(fluid: &Fluid) -> Result<Vec<Vec<Option<Formula>>>, TooLarge> {
     fluid
         .excess
@@ -214,7 +213,7 @@ fn slopes(fluid: &Fluid) -> Result<Vec<Vec<Option<Formula>>>, TooLarge> {
         .collect()
 }
 
-/// `c_αβ` of density `d`, in uncorrected densities, if every ψ is linear in it.
+/// Coefficients `c_αβ` of density `d`, in uncorrected densities, if every ψ is linear in it.
 fn linear_coefficients(fluid: &Fluid, slopes: &[Vec<Option<Formula>>], d: usize) -> Option<Vec<f64>> {
     let count = fluid.species.len();
     let mut coefficients = vec![0.0; count * count];
@@ -230,15 +229,15 @@ fn linear_coefficients(fluid: &Fluid, slopes: &[Vec<Option<Formula>>], d: usize)
     Some(coefficients)
 }
 
-/// ψ_α as a function of the densities that need a pass: the others are put at n = 0, where their
-/// linear terms, which are pair terms now, vanish.
+/// ψ_α as a function of the densities with a pass: the others are set to n = 0, where their linear
+/// terms, which have become pair terms, vanish.
 fn plan_excess(fluid: &Fluid, alpha: usize, passes: &[usize]) -> Result<ExcessPlan, TooLarge> {
     let count = fluid.species.len();
     let mut psi = match &fluid.excess[alpha] {
         ExcessFreeEnergy::Formula(psi) => psi.clone(),
-        // Its density has a pass, and it depends on no other.
+        // The curve's density has a pass, and the curve depends on no other.
         ExcessFreeEnergy::Curve(curve) => return Ok(ExcessPlan::of_curve(fluid, curve.clone(), passes)),
-        // Every density that it depends on has a pass.
+        // Every density that the slopes depend on has a pass.
         ExcessFreeEnergy::Slopes(law) => return Ok(ExcessPlan::of_slopes(law, &variables(count, passes))),
     };
     for (d, density) in fluid.densities.iter().enumerate() {
@@ -254,13 +253,13 @@ fn plan_excess(fluid: &Fluid, alpha: usize, passes: &[usize]) -> Result<ExcessPl
     ExcessPlan::of_formula(fluid, psi, &variables(count, passes))
 }
 
-/// The variables of the densities that need a pass.
+/// The variables of the densities with a pass.
 fn variables(count: usize, passes: &[usize]) -> Vec<usize> {
     passes.iter().flat_map(|d| (0..count).map(move |s| d * count + s)).collect()
 }
 
 impl ThermostatPlan {
-    /// `None` if nothing drags: no noise is drawn then.
+    /// `None` if all γ are 0: then no noise is drawn.
     fn new(fluid: &Fluid) -> Option<ThermostatPlan> {
         let entry = |f: fn(&crate::model::Thermostat) -> f64, default: f64| -> Vec<f64> {
             fluid.thermostats.iter().map(|t| t.as_ref().map_or(default, f)).collect()
@@ -280,7 +279,7 @@ impl ThermostatPlan {
     }
 }
 
-/// What `psidpd check` and the LAMMPS log print.
+/// Prints the plan for `psidpd check` and the LAMMPS log.
 impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let count = self.species.len();
@@ -348,7 +347,7 @@ impl fmt::Display for Plan {
                 term.potential.range()
             )?;
         }
-        // One species: n is its density. Several: n_A, n_B …
+        // With one species n is its density; with several there are n_A, n_B …
         let names: Vec<String> = self
             .densities
             .iter()

@@ -2,19 +2,19 @@
 
 use psidpd_passes::domain::PeriodicBox;
 
-/// The most widths of a box that a range may have: 729 images of each particle in three dimensions.
+/// Largest ratio of a range to the box's width: 729 images of each particle in three dimensions.
 const MOST_WIDTHS: f64 = 4.0;
 
-/// The most bytes that images and pairs may take.
+/// Most bytes of images and pairs.
 const MOST_BYTES: f64 = 7.5e9;
 
-/// Bytes of an image: position, velocity, force, densities and slopes, its places in the search.
+/// Bytes of an image: position, velocity, force, densities, slopes, and indices of the search.
 const BYTES_OF_IMAGE: f64 = 150.0;
 
 /// Bytes of a pair in a list.
 const BYTES_OF_PAIR: f64 = 60.0;
 
-/// A range so much longer than the box that images fill the memory.
+/// A range is so much longer than the box that images would fill the memory.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
     "the range {range} is {:.1} times the width {height} of the box between two faces: particles would meet \
@@ -28,11 +28,11 @@ pub struct ReachError {
     gigabytes: f64,
 }
 
-/// Refuses ranges that are many times the box, before memory is taken for the images of `particles` particles and for
-/// their pairs.
+/// Refuses ranges that are many times the box, before memory is allocated for the images of `particles`
+/// particles and for their pairs.
 ///
 /// # Errors
-/// [`ReachError`].
+/// Fails with [`ReachError`] for such a range.
 pub fn check_reach(
     domain: &PeriodicBox,
     dimensions: usize,
@@ -45,7 +45,7 @@ pub fn check_reach(
     let mut height = f64::INFINITY;
     for h in heights {
         let widths = 2.0 * range / h;
-        // Directions wide enough for the range need no images.
+        // Directions at least as wide as the range need no images.
         copies *= if widths < 1.0 { 1.0 } else { 1.0 + widths };
         within_range *= widths;
         height = height.min(h);
@@ -55,7 +55,7 @@ pub fn check_reach(
     }
     let particles = particles as f64;
     let images = (copies - 1.0) * particles;
-    // Each once; of the cube around a particle the sphere.
+    // Each pair is listed once; of the cube around a particle only the sphere is in range.
     let pairs = 0.5 * particles * particles * within_range * std::f64::consts::FRAC_PI_6;
     let bytes = BYTES_OF_IMAGE * images + BYTES_OF_PAIR * pairs;
     if range <= MOST_WIDTHS * height && bytes <= MOST_BYTES {
@@ -77,9 +77,9 @@ mod tests {
         assert!(check_reach(&cube(4.0, true), 3, 16.0, 400).is_ok());
         let refused = check_reach(&cube(4.0, true), 3, 20.0, 400).unwrap_err().to_string();
         assert!(refused.contains("range 20") && refused.contains("5.0 times"), "{refused}");
-        // A few shells around very many particles.
+        // A few shells of images of very many particles exceed the limit.
         assert!(check_reach(&cube(4.0, true), 3, 12.0, 1_000_000).is_err());
-        // A few images of many particles make very many pairs.
+        // A few images of many particles make too many pairs.
         assert!(check_reach(&cube(4.0, true), 3, 12.0, 10_000).is_err());
         assert!(check_reach(&cube(1e-9, true), 2, 1.0, 1).is_err());
         assert!(check_reach(&cube(400.0, true), 3, 1.0, 100_000_000).is_ok());

@@ -1,4 +1,4 @@
-//! The engine against the plain reference, and both against the Hamiltonian.
+//! Compares the engine with the plain reference, and both with the Hamiltonian.
 
 use super::pair_sums::PairSums;
 use super::*;
@@ -62,8 +62,8 @@ fn warren(species: usize, law: ForceLaw) -> Fluid {
     warren_ab(&names, &vec![pair; species * species], 3, law).unwrap().at(1.0).unwrap()
 }
 
-/// Two species, two densities of different ranges and kernels, a correction, a self term, formulas that
-/// couple everything, three pair forms, two thermostats.
+/// A fluid with two species, two densities of different ranges and kernels, a correction, a self term,
+/// formulas that couple everything, three pair forms, and two thermostats.
 const MIXTURE: &str = r#"
 title = "everything at once"
 species = ["A", "B"]
@@ -152,7 +152,7 @@ fn assert_matches_reference(fluid: &Fluid, c: &Configuration) {
     }
 }
 
-/// `U = Σ ψ(ñ) + Σ φ` by the definition: the truth of the truth, where ψ is a formula without bounds.
+/// `U = Σ ψ(ñ) + Σ φ` by the definition, to test the reference; ψ must be a formula without bounds.
 fn hamiltonian(fluid: &Fluid, c: &Configuration) -> f64 {
     let count = fluid.species.len();
     let mut energy = 0.0;
@@ -210,7 +210,7 @@ fn engine_equals_reference_for_a_mixture_of_everything() {
     assert_matches_reference(&fluid, &configuration(250, [3.1, 4.0, 3.5], 2, 3));
 }
 
-/// Boxes narrower than the cut-off: a particle sees several images of its neighbours and of itself.
+/// In boxes narrower than the cut-off a particle is near several images of its neighbours and of itself.
 #[test]
 fn engine_equals_reference_in_tiny_boxes() {
     let fluid = Model::parse("mixture", MIXTURE).unwrap().at(1.3).unwrap();
@@ -244,7 +244,7 @@ range = 1.0
     assert_matches_reference(&fluid, &configuration(200, [5.0, 4.0, 1.0], 1, 2));
 }
 
-/// The same mixture with bounds that most particles are outside of, in two densities, both ways.
+/// The mixture with bounds that most particles violate, in two densities, on both sides.
 fn bounded_mixture(below: &str) -> Fluid {
     let text = MIXTURE
         .replace("range = 0.8\ncorr", "range = 0.8\nbounds = [1.7, 3.5]\ncorr")
@@ -268,7 +268,7 @@ fn engine_equals_reference_out_of_bounds() {
     );
 }
 
-/// With every density below bounds and ψ′ constant there, what is left is a pair force.
+/// With every density below its bounds and ψ′ constant there, only a pair force is left.
 #[test]
 fn constant_continuation_is_plain_dpd_in_thin_regions() {
     let text = r#"
@@ -302,7 +302,7 @@ range = 1.0
     assert_eq!(a.out_of_bounds, [200, 0]);
 }
 
-/// Forces against central differences of the energy, and the virial against those of a strain.
+/// Compares forces with central differences of the energy, and the virial with differences in a strain.
 #[test]
 fn forces_and_virial_are_gradients_of_the_energy() {
     let free = Model::parse("mixture", MIXTURE).unwrap().at(1.3).unwrap();
@@ -335,7 +335,7 @@ fn are_gradients(fluid: &Fluid) {
     }
     for (w, (a, b)) in [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)].into_iter().enumerate() {
         let difference = five_point(|h| {
-            // x_a → x_a + h x_b, box and particles alike.
+            // The strain x_a → x_a + h x_b acts on the box and the particles.
             let strain = |p: [f64; 3]| {
                 let mut q = p;
                 q[a] += h * p[b];
@@ -358,7 +358,7 @@ fn are_gradients(fluid: &Fluid) {
     }
 }
 
-/// Fourth-order central difference.
+/// The fourth-order central difference.
 fn five_point(f: impl Fn(f64) -> f64) -> f64 {
     let h = 2e-4;
     (8.0 * (f(h) - f(-h)) - (f(2.0 * h) - f(-2.0 * h))) / (12.0 * h)
@@ -380,7 +380,7 @@ fn one_species_equals_identical_species() {
     }
 }
 
-/// Translation, permutation and rotation of the box by a quarter turn.
+/// Tests translation, permutation and rotation of the box by a quarter turn.
 #[test]
 fn invariances() {
     let fluid = Model::parse("mixture", MIXTURE).unwrap().at(1.3).unwrap();
@@ -434,8 +434,8 @@ fn invariances() {
     }
 }
 
-/// Warren eq. 15: two densities, the linear one a pair force in disguise, equal the pair form; and the
-/// linear one costs no density pass.
+/// Warren eq. 15: two densities, of which the linear one is equivalent to a pair force, equal the pair
+/// form; the linear density needs no pass.
 #[test]
 fn two_density_form_equals_pair_form_and_leaves_the_linear_pass_out() {
     let text = r#"
@@ -470,7 +470,7 @@ A = "pi/30*(-40)*n + pi*0.75^4/30*25*m^2"
     assert_eq!((counts.noise, counts.energy, counts.virial), (0, 0, 0));
 }
 
-/// ψ linear with the quadratic kernel is standard DPD to rounding, without any density pass.
+/// A linear ψ with the quadratic kernel is standard DPD to rounding, without any density pass.
 #[test]
 fn linear_psi_is_standard_dpd_and_needs_no_density_pass() {
     let head = "title = \"t\"\nspecies = [\"A\"]\n[[thermostat]]\ngamma = 4.5\nrange = 1\n";
@@ -516,7 +516,7 @@ fn trouble_is_an_error_that_names_the_particle() {
     assert!(matches!(error, EngineError::ExcessFreeEnergy { tag: 1, .. }), "{error}");
 }
 
-/// A particle far away must not make the grid explode.
+/// A particle far away must not enlarge the grid without limit.
 #[test]
 fn a_runaway_particle_costs_no_memory() {
     let fluid = warren(1, ForceLaw::Conservative);
@@ -528,7 +528,7 @@ fn a_runaway_particle_costs_no_memory() {
     assert_eq!(engine.local_densities()[1], 0.0);
 }
 
-/// Particles of no species take no part.
+/// Particles without a species are left out.
 #[test]
 fn unmapped_kinds_are_ignored() {
     let fluid = warren(1, ForceLaw::Conservative);

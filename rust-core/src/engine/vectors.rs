@@ -4,21 +4,21 @@ use psidpd_passes::instruction_set::InstructionSet;
 #[cfg(target_arch = "x86_64")]
 use psidpd_passes::settings::Instructions;
 
-/// A loop that the compiler makes vectors of. Nothing in it is contracted or put into another order: the results are
-/// the same bits on every instruction set.
+/// A loop that the compiler vectorises. No operation is contracted or reordered, so that the results
+/// have the same bits on every instruction set.
 pub trait Loop {
     type Out;
-    /// To be inlined always: what is not has no more than the compiler's target.
+    /// Runs the loop. Implementations must be inlined: other functions are compiled for the compiler's target.
     fn run(self) -> Self::Out;
 }
 
 /// Runs a loop as compiled for an instruction set.
 pub fn run<L: Loop>(set: InstructionSet, work: L) -> L::Out {
     match set.instructions() {
-        // SAFETY: there is an `InstructionSet` only of what the processor has.
+        // SAFETY: an `InstructionSet` exists only for instructions of this processor.
         #[cfg(target_arch = "x86_64")]
         Instructions::Avx512 | Instructions::Avx512Vbmi2 => unsafe { avx512(work) },
-        // SAFETY: there is an `InstructionSet` only of what the processor has.
+        // SAFETY: an `InstructionSet` exists only for instructions of this processor.
         #[cfg(target_arch = "x86_64")]
         Instructions::Avx2 => unsafe { avx2(work) },
         _ => work.run(),

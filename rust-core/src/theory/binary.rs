@@ -9,13 +9,13 @@ pub struct CompositionBinodal {
     pub composition: [f64; 2],
     /// Total density of each phase.
     pub density: [f64; 2],
-    /// Pressure of each phase; equal.
+    /// Pressure of each phase; both are equal in equilibrium.
     pub pressure: [f64; 2],
-    /// `μ_A − μ_B`, in both phases.
+    /// Exchange potential `μ_A − μ_B`, equal in both phases.
     pub exchange_potential: f64,
 }
 
-/// What a mixture keeps while its composition changes.
+/// The quantity that is constant along a line of compositions.
 #[derive(Debug, Clone, Copy)]
 enum Held {
     Density(f64),
@@ -31,11 +31,11 @@ pub struct CompositionLine<'a> {
     followed: Vec<f64>,
 }
 
-/// The grid: the logarithm of the ratio of the two species.
+/// Largest magnitude of the logarithm of the ratio of the two species, on the grid.
 const REACH: f64 = 30.0;
 const STEPS: usize = 1200;
 
-/// Relative difference of pressures that are the same but for rounding.
+/// Relative difference of pressures that differ only by rounding.
 const SAME: f64 = 1e-7;
 
 pub(super) fn fractions(u: f64) -> [f64; 2] {
@@ -47,7 +47,7 @@ impl<'a> CompositionLine<'a> {
         CompositionLine { theory, held: Held::Density(density), followed: Vec::new() }
     }
 
-    /// Follows the density from the equimolar mixture, where it is the densest there is, to both sides.
+    /// Follows the density from the densest equimolar mixture towards both sides.
     pub fn at_pressure(theory: &'a MeanField, pressure: f64) -> CompositionLine<'a> {
         let held = Held::Pressure(pressure);
         let mut line = CompositionLine { theory, held, followed: vec![f64::NAN; STEPS + 1] };
@@ -76,7 +76,7 @@ impl<'a> CompositionLine<'a> {
         }
     }
 
-    /// `ln ρ` at which the pressure is as given, by Newton's method from a neighbour.
+    /// `ln ρ` at the given pressure, by Newton's method from a neighbouring value.
     fn solve_density(&self, u: f64, from: f64, pressure: f64) -> Option<f64> {
         let x = fractions(u);
         let mut log = from;
@@ -84,7 +84,7 @@ impl<'a> CompositionLine<'a> {
             let rho = x.map(|x| x * log.exp());
             let slope = log.exp() * self.theory.pressure_slope(&rho);
             let step = (pressure - self.theory.pressure(&rho)) / slope;
-            // NaN, a step off the branch, or a branch that ended.
+            // The step is refused if it is NaN, if it leaves the branch, or if the branch has ended.
             if slope.is_nan() || slope <= 0.0 || step.is_nan() || step.abs() > 1.0 {
                 return None;
             }
@@ -96,7 +96,7 @@ impl<'a> CompositionLine<'a> {
         Some(log).filter(|_| log.is_finite())
     }
 
-    /// Both densities.
+    /// Number densities of both species.
     pub fn densities(&self, u: f64) -> [f64; 2] {
         let x = fractions(u);
         let total = match self.held {
@@ -135,12 +135,12 @@ impl Line for CompositionLine<'_> {
         let [a, b] = self.densities(u);
         let f = self.theory.excess_second_derivatives(&[a, b]);
         let (rho, beta) = (a + b, 1.0 / self.theory.kt);
-        // c(1 − c) (∂/∂ρ_A − ∂/∂ρ_B)² βf ρ
+        // This is c(1 − c) (∂/∂ρ_A − ∂/∂ρ_B)² βf ρ.
         let at_density = 1.0 + beta * a * b / rho * (f[0] - f[1] - f[2] + f[3]);
         match self.held {
             Held::Density(_) => at_density,
             Held::Pressure(_) => {
-                // det f / (f of the ideal mixture), over ρ ∂p/∂ρ: both with the poles taken out.
+                // This is det f / (f of the ideal mixture), over ρ ∂p/∂ρ, both without their poles.
                 let determinant =
                     (1.0 + beta * a * f[0]) * (1.0 + beta * b * f[3]) - beta * beta * a * b * f[1] * f[2];
                 determinant / (beta * self.theory.pressure_slope(&[a, b]))
@@ -162,7 +162,7 @@ impl Line for CompositionLine<'_> {
         let rho = self.densities(u);
         let mu = self.theory.excess_chemical_potentials(&rho)[1] + self.theory.kt * rho[1].ln();
         match self.held {
-            // c ∂g/∂c − g = p − ρ μ_B
+            // The intercept is c ∂g/∂c − g = p − ρ μ_B.
             Held::Density(total) => self.theory.pressure(&rho) - total * mu,
             Held::Pressure(_) => -mu,
         }
@@ -201,7 +201,7 @@ impl MeanField {
     /// `kT_c = ρ(λ − λ_A)`).
     ///
     /// # Errors
-    /// Not two species.
+    /// Fails for other than two species.
     pub fn composition_spinodal(&self, density: f64) -> Result<Vec<[f64; 2]>, TheoryError> {
         self.require_species(2)?;
         let line = CompositionLine::at_density(self, density);
@@ -210,22 +210,23 @@ impl MeanField {
         Ok(regions.into_iter().map(|ends| ends.map(|u| line.x(u))).collect())
     }
 
-    /// The same among mixtures of one pressure, on the branch that is densest in the equimolar mixture.
+    /// The unstable fractions among mixtures of one pressure, on the branch that is densest in the equimolar mixture.
     ///
     /// # Errors
-    /// Not two species.
+    /// Fails for other than two species.
     pub fn composition_spinodal_at_pressure(&self, pressure: f64) -> Result<Vec<[f64; 2]>, TheoryError> {
         self.require_species(2)?;
         let line = CompositionLine::at_pressure(self, pressure);
         Ok(unstable(&line).into_iter().map(|ends| ends.map(|u| line.x(u))).collect())
     }
 
-    /// Two phases of a binary mixture of one and the same total density, by the common tangent of
-    /// `f(c)` (Pagonabarraga–Frenkel sec. III B, "assuming that ρ is constant"). They are in equilibrium where their
-    /// pressures are equal too, as in a symmetric mixture; [`MeanField::coexistence`] does without the assumption.
+    /// Two phases of a binary mixture with the same total density, by the common tangent of `f(c)`
+    /// (Pagonabarraga–Frenkel sec. III B, "assuming that ρ is constant"). They are in equilibrium if their
+    /// pressures are equal too, as in a symmetric mixture; [`MeanField::coexistence`] does not need the assumption.
     ///
     /// # Errors
-    /// Not two species; [`TheoryError::NoCoexistence`]; [`TheoryError::NotInEquilibrium`].
+    /// Fails for other than two species, and with [`TheoryError::NoCoexistence`] or
+    /// [`TheoryError::NotInEquilibrium`].
     pub fn composition_binodal(&self, density: f64) -> Result<CompositionBinodal, TheoryError> {
         let found = self.common_tangent(density)?;
         let [p, q] = found.pressure;
@@ -235,17 +236,16 @@ impl MeanField {
         Ok(found)
     }
 
-    /// The common tangent of `f(c)` at a total density, whatever the pressures.
+    /// The common tangent of `f(c)` at a total density, for any pressures.
     pub(super) fn common_tangent(&self, density: f64) -> Result<CompositionBinodal, TheoryError> {
         self.binodal_of(Held::Density(density))
     }
 
-    /// Two phases of a binary mixture that have the pressure `pressure` and both chemical potentials in
-    /// common: the common tangent of the Gibbs free energy per particle, on the branch that is densest in the
-    /// equimolar mixture.
+    /// Two phases of a binary mixture with the pressure `pressure` and equal chemical potentials: the common
+    /// tangent of the Gibbs free energy per particle, on the branch that is densest in the equimolar mixture.
     ///
     /// # Errors
-    /// Not two species; [`TheoryError::NoCoexistence`].
+    /// Fails for other than two species, and with [`TheoryError::NoCoexistence`].
     pub fn composition_binodal_at_pressure(&self, pressure: f64) -> Result<CompositionBinodal, TheoryError> {
         self.binodal_of(Held::Pressure(pressure))
     }

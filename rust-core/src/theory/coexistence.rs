@@ -1,22 +1,22 @@
-//! Two phases of a binary mixture in equilibrium, whatever their densities.
+//! Two phases of a binary mixture in equilibrium, with any densities.
 
 use super::search::{minimum, spaced};
 use super::{MeanField, TheoryError};
 use nalgebra::{Matrix4, Vector4};
 use std::iter;
 
-/// Two phases with the chemical potential of every species and the pressure in common.
+/// Two phases with equal pressure and equal chemical potentials of every species.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Coexistence {
     /// Number densities of the two species in each phase; the first phase has the smaller fraction of the first species.
     pub densities: [[f64; 2]; 2],
-    /// Their pressure.
+    /// Pressure of both phases.
     pub pressure: f64,
-    /// Their chemical potentials, of each species.
+    /// Chemical potential of each species, in both phases.
     pub chemical_potentials: [f64; 2],
-    /// The share of the volume that the first phase takes.
+    /// The fraction of the volume in the first phase.
     pub share: f64,
-    /// Densities of a phase that is more stable than both at these potentials, if one was found: then they are metastable.
+    /// Densities of a phase that is more stable than both at these potentials, if one was found: then both are metastable.
     pub more_stable: Option<[f64; 2]>,
 }
 
@@ -24,7 +24,7 @@ pub struct Coexistence {
 const STEPS: usize = 200;
 const LARGEST: f64 = 0.5;
 
-/// Logarithms of densities closer than this are of one phase.
+/// Phases whose logarithms of densities differ by less than this are one phase.
 const APART: f64 = 1e-5;
 
 impl Coexistence {
@@ -40,14 +40,14 @@ impl Coexistence {
 }
 
 impl MeanField {
-    /// The two phases that a binary mixture of number densities `overall` separates into: equal chemical potentials of
-    /// both species, equal pressure, and volumes that add up to the overall densities. Neither density nor pressure is
-    /// held, so it holds for compressible mixtures.
+    /// The two phases that a binary mixture of number densities `overall` separates into: both have equal
+    /// chemical potentials of each species and equal pressure, and their volumes add up to the overall
+    /// densities. Neither density nor pressure is fixed, so that the result holds for compressible mixtures.
     ///
-    /// Each phase is stable by itself. Whether a third is more stable is looked for, in a grid of compositions and densities.
+    /// Each phase is stable by itself. A grid of compositions and densities is searched for a more stable third phase.
     ///
     /// # Errors
-    /// Not two species; [`TheoryError::NoCoexistence`].
+    /// Fails for other than two species, and with [`TheoryError::NoCoexistence`].
     pub fn coexistence(&self, overall: [f64; 2]) -> Result<Coexistence, TheoryError> {
         self.require_species(2)?;
         let total: f64 = overall.iter().sum();
@@ -60,7 +60,7 @@ impl MeanField {
             let found = self.composition_binodal_at_pressure(self.pressure(&overall)).ok()?;
             Some([0, 1].map(|k| of_fraction(found.composition[k], found.density[k])))
         };
-        // From the mixture itself, apart in composition, in density, or in both.
+        // Newton's method starts from the mixture itself, with phases that differ in composition, in density, or in both.
         let ways = [[1.0, -1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]];
         let apart = ways.iter().flat_map(|way| {
             let phase = move |distance: f64| [0, 1].map(|k| overall[k] * (distance * way[k]).exp());
@@ -85,7 +85,7 @@ impl MeanField {
             let unit = self.kt * total;
             let mu = rho.map(|rho| self.chemical_potentials(&rho));
             let second = rho.map(|rho| self.second_derivatives(&rho));
-            // How far the overall densities are from the line between the two phases.
+            // The distance of the overall densities from the line between the two phases.
             let cross = |a: [f64; 2], b: [f64; 2]| (a[0] * b[1] - a[1] * b[0]) / (total * total);
             let less = |a: [f64; 2], b: [f64; 2]| [a[0] - b[0], a[1] - b[1]];
             let away = cross(less(overall, rho[0]), less(rho[1], rho[0]));
@@ -104,7 +104,7 @@ impl MeanField {
                     2 => sign * (rho[phase][0] * f(0) + rho[phase][1] * f(1)) / unit,
                     _ => {
                         let axis = if s == 0 { [1.0, 0.0] } else { [0.0, 1.0] };
-                        // d/dρ₁ of (ρ − ρ₁)×(ρ₂ − ρ₁), and d/dρ₂.
+                        // Derivatives of (ρ − ρ₁)×(ρ₂ − ρ₁) with respect to ρ₁ and ρ₂.
                         match phase {
                             0 => -cross(axis, less(rho[1], overall)),
                             _ => cross(less(overall, rho[0]), axis),
@@ -132,7 +132,7 @@ impl MeanField {
         }
         let stable = densities.iter().all(|rho| self.smallest_inverse_structure_factor(rho, 0.0) > 0.0);
         let [first, second] = densities;
-        // Along the species in which the phases differ more.
+        // The fraction follows from the species in which the phases differ more.
         let s = usize::from((first[1] - second[1]).abs() > (first[0] - second[0]).abs());
         let share = (second[s] - overall[s]) / (second[s] - first[s]);
         if !stable || !(0.0..=1.0).contains(&share) {

@@ -2,43 +2,43 @@ use super::search::turning_point;
 use super::{MeanField, TheoryError};
 use std::f64::consts::{PI, TAU};
 
-/// What mean field leaves out, to first order: the random-phase approximation of one component.
+/// Corrections to mean field in first order: the random-phase approximation of one component.
 ///
-/// Mean field takes `g(r) = 1`, so that the mean local density is `ρ`. Here `g = 1 + h` with `ρĥ = S − 1` and
-/// `S(k)⁻¹ = 1 + βρ[φ̂ + 2ψ′ŵ + ρψ″ŵ²]`, where ψ is taken at the mean local density that follows from it,
-/// `⟨n⟩ = ρ(1 + ∫w h)`, and the pressure is the virial
+/// Mean field sets `g(r) = 1`, so that the mean local density is `ρ`. Here `g = 1 + h` with `ρĥ = S −
+/// 1` and `S(k)⁻¹ = 1 + βρ[φ̂ + 2ψ′ŵ + ρψ″ŵ²]`, where ψ is taken at the mean local density that follows
+/// from it, `⟨n⟩ = ρ(1 + ∫w h)`, and the pressure is the virial
 ///
 /// ```text
 /// p = ρkT − (ρ²/2d) ∫ r φ′ g − (ρ²/d) ψ′(⟨n⟩) ∫ r w′ g
 /// ```
 ///
-/// with the fluctuations of `n` left out. Of soft repulsive fluids ⟨n⟩ comes out within a tenth. The pressure is an
-/// estimate: for strong many-body forces it is as much too low as mean field is too high.
+/// without the fluctuations of `n`. For soft repulsive fluids ⟨n⟩ is accurate to a tenth. The pressure
+/// is an estimate: for strong many-body forces it is as much too low as mean field is too high.
 #[derive(Debug, Clone)]
 pub struct Correlations<'a> {
     theory: &'a MeanField,
-    /// `k^{d−1} dk` over `(2π)^d`, with the surface of the unit sphere.
+    /// Integration measure `k^{d−1} dk` over `(2π)^d`, with the surface of the unit sphere.
     measure: Vec<f64>,
-    /// `ŵ` and `ŵ + kŵ′/d` of each density.
+    /// Transforms `ŵ` and `ŵ + kŵ′/d` of each density.
     kernels: Vec<[Vec<f64>; 2]>,
-    /// The same of all pair potentials together.
+    /// The same transforms of the sum of all pair potentials.
     pairs: [Vec<f64>; 2],
 }
 
-/// A fluid with its correlations.
+/// A fluid with correlations.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Correlated {
-    /// ⟨n⟩ of each density, without the self term.
+    /// Mean local density ⟨n⟩ of each density, without the self term.
     pub mean_density: Vec<f64>,
-    /// Pressure.
+    /// Pressure from the virial.
     pub pressure: f64,
 }
 
 impl MeanField {
-    /// The correlations of one component. `None` where the model has a calibrated density: it takes them into account.
+    /// The correlations of one component. `None` if the model has a calibrated density, which includes them.
     ///
     /// # Errors
-    /// More than one species.
+    /// Fails for more than one species.
     pub fn correlations(&self) -> Result<Option<Correlations<'_>>, TheoryError> {
         self.require_species(1)?;
         Ok((!self.calibrated).then(|| Correlations::new(self)))
@@ -54,7 +54,7 @@ impl<'a> Correlations<'a> {
         let sphere = if theory.dimensions == 3 { 4.0 * PI } else { TAU };
         let measure = (0..count).map(|i| sphere * k(i).powf(d - 1.0) * step / TAU.powf(d)).collect();
         let tabulate = |transform: &dyn Fn(f64) -> f64| -> [Vec<f64>; 2] {
-            // An even function of k, so that the table goes on to the left.
+            // The transform is an even function of k, so that the table extends to the left.
             let table: Vec<f64> = (0..=count).map(|i| transform(k(i))).collect();
             let slope = |i: usize| (table[i + 1] - table[i.max(1) - 1]) / (2.0 * step);
             let moment = (0..count).map(|i| table[i] + k(i) * slope(i) / d).collect();
@@ -68,7 +68,7 @@ impl<'a> Correlations<'a> {
         }
     }
 
-    /// The fluid at a density; `None` where it is not stable against waves, or ψ is singular.
+    /// The fluid at a density; `None` if it is unstable against waves, or ψ is singular.
     pub fn at(&self, density: f64) -> Option<Correlated> {
         let shift = &self.theory.shift[0];
         let count = self.kernels.len();
@@ -79,7 +79,7 @@ impl<'a> Correlations<'a> {
         for _ in 0..500 {
             let at: Vec<f64> = n.iter().zip(shift).map(|(n, s)| n + s).collect();
             let psi = self.theory.psi_at(0, &at);
-            // S − 1 at every k.
+            // The values of S − 1 at every k.
             let h: Option<Vec<f64>> = (0..self.measure.len())
                 .map(|i| {
                     let mut c = self.pairs[0][i];
@@ -114,8 +114,8 @@ impl<'a> Correlations<'a> {
         None
     }
 
-    /// The highest density between two at which the pressure rises through zero: about that of a liquid beside a thin
-    /// vapour.
+    /// The highest density in `range` at which the pressure rises through zero: this is about the
+    /// density of a liquid with a thin vapour.
     pub fn zero_pressure_density(&self, range: [f64; 2]) -> Option<f64> {
         let pressure = |rho: f64| self.at(rho).map_or(f64::NAN, |c| c.pressure);
         let grid = super::search::spaced(range[0], range[1], 60);

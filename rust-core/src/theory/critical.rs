@@ -1,4 +1,4 @@
-//! Critical points of binary mixtures: where a homogeneous mixture ceases to be stable, and both phases become one.
+//! Critical points of binary mixtures, where a homogeneous mixture becomes unstable and the two phases merge.
 
 use super::binary::{CompositionLine, fractions};
 use super::line::{Line, negative, smallest};
@@ -10,25 +10,24 @@ use nalgebra::Matrix2;
 /// A critical point of a binary mixture of given total density.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CompositionCritical {
-    /// The control parameter there: kT, or whatever the fluids were made from.
+    /// The critical control parameter: kT, or any other parameter of the fluids.
     pub parameter: f64,
     /// Fraction of the first species.
     pub composition: f64,
-    /// Pressure.
+    /// Critical pressure.
     pub pressure: f64,
-    /// The control parameter at which the first mixture of this total density becomes unstable: the same if the mixture is
-    /// symmetric.
+    /// The control parameter at which the first mixture of this total density becomes unstable; in a
+    /// symmetric mixture it equals `parameter`.
     pub limit: f64,
 }
 
-/// First step beyond the limit of stability, relative; it doubles.
+/// First step beyond the limit of stability, relative to the limit; later steps double.
 const STEP: f64 = 1e-6;
 
-/// The largest third derivative that is a zero, in units of that of an ideal mixture.
+/// A third derivative below this counts as zero, in units of that of an ideal mixture.
 const ZERO: f64 = 1e-3;
 
-/// The ends of an unstable interval of compositions, and the third derivative of f at each along the direction in which
-/// the mixture is not stable.
+/// The ends of an unstable interval of compositions, and the third derivative of f at each along the unstable direction.
 #[derive(Clone, Copy)]
 struct Ends {
     u: [f64; 2],
@@ -36,20 +35,21 @@ struct Ends {
 }
 
 impl Ends {
-    /// Whether the way into the interval is downhill from both ends, as on a spinodal with one phase on each side.
+    /// Whether f decreases into the interval from both ends, as on a spinodal with one phase on each side.
     fn ordinary(&self) -> bool {
         self.third[0] < 0.0 && self.third[1] > 0.0
     }
 }
 
-/// The critical point of mixtures of total density `density`, for a family of them with any control parameter (kT, an
-/// interaction strength). There the lowest eigenvalue of `∂²f/∂ρ_α∂ρ_β` is zero, and so is the derivative of f of third
-/// order along its eigenvector, in which composition and density change together. No density is held, so a compressible
-/// mixture has its true critical point; of a symmetric one it is that of `∂²f/∂c²` (Pagonabarraga–Frenkel eq. 23). The
-/// mixture must be stable in all compositions at one end of `range` and not at the other.
+/// The critical point of mixtures of total density `density`, for a family with any control parameter
+/// (kT, an interaction strength). There the lowest eigenvalue of `∂²f/∂ρ_α∂ρ_β` is zero, and so is the
+/// third-order derivative of f along its eigenvector, in which composition and density change together.
+/// No density is fixed, so that a compressible mixture has its true critical point; for a symmetric
+/// mixture it is that of `∂²f/∂c²` (Pagonabarraga–Frenkel eq. 23). The mixture must be stable in all
+/// compositions at one end of `range` and not at the other.
 ///
 /// # Errors
-/// A fluid that cannot be had, not two species, or no such change.
+/// Fails if the fluid cannot be created, does not have two species, or has no such change.
 pub fn composition_critical_point(
     fluid: &dyn Fn(f64) -> Result<Fluid, TheoryError>,
     density: f64,
@@ -73,7 +73,7 @@ pub fn composition_critical_point(
         let pressure = theory(parameter)?.pressure(&x.map(|x| x * density));
         Ok(CompositionCritical { parameter, composition: x[0], pressure, limit })
     };
-    // Into the unstable side, until the third derivatives at both ends are those of an ordinary spinodal.
+    // The steps go to the unstable side, until the third derivatives at both ends are those of an ordinary spinodal.
     let side = if least(limit * (1.0 - STEP))?.1 < 0.0 { -1.0 } else { 1.0 };
     let ends = |parameter: f64, near: [f64; 2]| theory(parameter).map(|theory| theory.ends(density, near));
     let (mut before, mut near, mut step) = (limit, [at_limit; 2], STEP);
@@ -111,12 +111,12 @@ pub fn composition_critical_point(
 }
 
 impl MeanField {
-    /// The lowest eigenvalue of `∂²f/∂ρ_α∂ρ_β`, of the unit matrix for an ideal mixture.
+    /// The lowest eigenvalue of `∂²f/∂ρ_α∂ρ_β`, scaled so that it is 1 for an ideal mixture.
     fn lowest(&self, densities: &[f64]) -> f64 {
         self.smallest_inverse_structure_factor(densities, 0.0)
     }
 
-    /// The unstable interval of compositions that overlaps or is nearest to `near`.
+    /// The unstable interval of compositions that overlaps `near` or is nearest to it.
     fn ends(&self, density: f64, near: [f64; 2]) -> Option<Ends> {
         let line = CompositionLine::at_density(self, density);
         let regions = negative(&line.grid(), &|u| self.lowest(&line.densities(u)));
@@ -126,8 +126,8 @@ impl MeanField {
         (u.iter().chain(&third).all(|x| x.is_finite())).then_some(Ends { u, third })
     }
 
-    /// `Σ f_αβγ v_α v_β v_γ` over `Σ |v_α|³ kT/ρ_α²`, with `v` the eigenvector of the lowest eigenvalue, towards more of the
-    /// first species.
+    /// `Σ f_αβγ v_α v_β v_γ` over `Σ |v_α|³ kT/ρ_α²`, with `v` the eigenvector of the lowest
+    /// eigenvalue, in the direction of more of the first species.
     fn third_derivative(&self, rho: [f64; 2]) -> f64 {
         let s = self.inverse_structure_factor(&rho, 0.0);
         if s.iter().any(|x| !x.is_finite()) {

@@ -1,5 +1,5 @@
-//! ψ and its derivatives, as the theory needs them: the one place that knows how a fluid stores its
-//! excess free energies, and how they go on beyond the bounds of a density.
+//! ψ and its derivatives for the theory. Only this module of the theory knows how a fluid stores its
+//! excess free energies, and how they continue beyond the bounds of a density.
 
 use super::TheoryError;
 use crate::model::curve::Curve;
@@ -11,12 +11,12 @@ use crate::model::{Bounds, ExcessFreeEnergy, Fluid};
 pub struct FreeEnergy {
     species: usize,
     variables: usize,
-    /// Of each density.
+    /// Bounds of each density.
     bounds: Vec<Option<Bounds>>,
     excess: Vec<Excess>,
 }
 
-/// `ψ_α` of one species.
+/// The free energy `ψ_α` of one species.
 #[derive(Debug, Clone)]
 enum Excess {
     /// ψ, its gradient, and the upper triangle of its Hessian.
@@ -25,14 +25,14 @@ enum Excess {
     Curve(Curve),
 }
 
-/// `ψ_α` at one point.
+/// Value and derivatives of `ψ_α` at one point.
 #[derive(Debug, Clone)]
 pub struct Psi {
-    /// `ψ_α`.
+    /// Value `ψ_α`.
     pub value: f64,
-    /// `∂ψ_α/∂x_v`.
+    /// Gradient `∂ψ_α/∂x_v`.
     pub gradient: Vec<f64>,
-    /// `∂²ψ_α/∂x_u∂x_v`, row-major.
+    /// Second derivatives `∂²ψ_α/∂x_u∂x_v`, row-major.
     pub hessian: Vec<f64>,
 }
 
@@ -74,7 +74,7 @@ impl FreeEnergy {
         }
     }
 
-    /// `ψ_α` alone.
+    /// The value of `ψ_α` only.
     pub fn value(&self, alpha: usize, x: &[f64]) -> f64 {
         match &self.excess[alpha] {
             Excess::Formula { outputs, .. } => {
@@ -119,27 +119,27 @@ impl FreeEnergy {
         Psi { value: out[0], gradient: out[1..=n].to_vec(), hessian: symmetric(n, &out[1 + n..]) }
     }
 
-    /// Which of the variables that ψ is not linear in are out of bounds.
+    /// The variables out of bounds in which ψ is not linear.
     fn strays(&self, outputs: &[Formula], x: &[f64]) -> Vec<Stray> {
         let stray = |v: usize| {
             let bounds = self.bounds[v / self.species]?;
             let beyond = bounds.beyond(x[v]);
-            // What is linear goes on as it is.
+            // A linear ψ needs no continuation.
             let goes_on = beyond == 0.0 || outputs[1 + v].is_constant().is_some();
             (!goes_on).then(|| Stray { variable: v, beyond, order: bounds.order(beyond) })
         };
         (0..self.variables).filter_map(stray).collect()
     }
 
-    /// The continuation of [`Bounds`]: a polynomial of second order in each variable that is out of bounds, with ψ and its
-    /// derivatives at the bounds for coefficients.
+    /// The continuation of [`Bounds`]: a polynomial of second order in each variable that is out of
+    /// bounds, whose coefficients are ψ and its derivatives at the bounds.
     fn continued(&self, outputs: &[Formula], strays: &[Stray], x: &[f64]) -> Psi {
         let n = self.variables;
         let mut edge = x.to_vec();
         strays.iter().for_each(|s| edge[s.variable] -= s.beyond);
         let along: Vec<usize> = strays.iter().map(|s| s.variable).collect();
         let mut expansion = Expansion::default();
-        // Derivatives along strays are those of the polynomial, along the others those of its coefficients.
+        // Derivatives with respect to strays are those of the polynomial, the others those of its coefficients.
         let mut derivative = |by: &[usize]| -> f64 {
             let others: Vec<usize> = by.iter().copied().filter(|v| !along.contains(v)).collect();
             let output = match others[..] {
@@ -166,7 +166,7 @@ struct Stray {
     order: usize,
 }
 
-/// The derivative of `Σ c_m Π δ_k^{m_k}` by `δ_k`, `derivative[k]` times each.
+/// The derivative of `Σ c_m Π δ_k^{m_k}`, of order `derivative[k]` with respect to each `δ_k`.
 fn polynomial(coefficients: &[f64], strays: &[Stray], derivative: &[usize]) -> f64 {
     let mut sum = 0.0;
     for (index, coefficient) in coefficients.iter().enumerate() {
@@ -176,7 +176,7 @@ fn polynomial(coefficients: &[f64], strays: &[Stray], derivative: &[usize]) -> f
             let power = rest % 3;
             rest /= 3;
             if power > stray.order || power < *times {
-                // Not 0 times an infinite coefficient: the term is not there.
+                // The term is set to zero, as 0 times an infinite coefficient would be NaN.
                 term = 0.0;
                 continue;
             }
@@ -199,7 +199,7 @@ fn symmetric(n: usize, triangle: &[f64]) -> Vec<f64> {
     matrix
 }
 
-/// Of all second derivatives of one ψ: more take seconds for each state that is looked at.
+/// Most operations of all second derivatives of one ψ: more take seconds for each state.
 const MOST_OPERATIONS: usize = 20_000;
 
 /// ψ, its gradient, and the upper triangle of its Hessian.

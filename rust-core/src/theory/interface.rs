@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 /// `F = ∫ f(x) + ½κ(x)|∇x|²`, `x` a density or a composition.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Interface {
-    /// `x` in the two phases.
+    /// Values of `x` in the two phases.
     pub phases: [f64; 2],
     /// Surface tension `∫ √(2κW) dx`, with `W` the height of `f` above the double tangent.
     pub tension: f64,
@@ -19,13 +19,13 @@ pub struct Interface {
     /// Lengths `√(κ/f″)` over which the profile decays into either phase. For a profile `tanh(z/ξ)`
     /// they are `ξ/2`.
     pub decay: [f64; 2],
-    /// The profile: `z`, `x`. `z = 0` is where `x` is halfway.
+    /// Points `[z, x]` of the profile; at `z = 0` `x` is halfway between the phases.
     pub profile: Vec<[f64; 2]>,
 }
 
 impl MeanField {
-    /// `[r²w]` and `[r⁴w]` of each density, in the order of the model. With `z` a vector, these are
-    /// `[z²w]` and `[z⁴w]` of Pagonabarraga and Frenkel; `n = ρ + [z²w]/(2d) ∇²ρ` (their eq. 27).
+    /// The moments `[r²w]` and `[r⁴w]` of each density, in the order of the model. With `z` a vector, these
+    /// are `[z²w]` and `[z⁴w]` of Pagonabarraga and Frenkel; `n = ρ + [z²w]/(2d) ∇²ρ` (their eq. 27).
     pub fn kernel_moments(&self) -> Vec<[f64; 2]> {
         self.kernels.iter().map(|w| [w.moment(2), w.moment(4)]).collect()
     }
@@ -85,12 +85,11 @@ impl MeanField {
         kappa
     }
 
-    /// The interface between vapour and liquid of one component. `points` is the length of the profile.
-    /// Pagonabarraga–Frenkel eq. (29); their eq. (30) approximates the tension for phases of nearly
-    /// equal density.
+    /// The interface between vapour and liquid of one component, with a profile of `points` points.
+    /// Pagonabarraga–Frenkel eq. (29); their eq. (30) approximates the tension for phases of nearly equal density.
     ///
     /// # Errors
-    /// More than one species, no coexistence, or a gradient coefficient that is not positive.
+    /// Fails for more than one species, without coexistence, and for a gradient coefficient that is not positive.
     pub fn interface(&self, points: usize) -> Result<Interface, TheoryError> {
         self.require_species(1)?;
         let line = DensityLine::new(self);
@@ -98,13 +97,13 @@ impl MeanField {
         planar(&line, &|x| self.gradient_coefficients(&[x])[0], phases, points, self.kt, &|x| x)
     }
 
-    /// The interface between two phases of a binary mixture whose total density is held constant, with
-    /// `x` the fraction of the first species and `κ = ρ²(κ_AA − 2κ_AB + κ_BB)`.
-    /// Pagonabarraga–Frenkel eq. (36)–(41). There is one only between phases in equilibrium.
+    /// The interface between two phases of a binary mixture with constant total density, with `x` the
+    /// fraction of the first species and `κ = ρ²(κ_AA − 2κ_AB + κ_BB)`. Pagonabarraga–Frenkel eq.
+    /// (36)–(41). Only phases in equilibrium have one.
     ///
     /// # Errors
-    /// Not two species, no coexistence, [`TheoryError::NotInEquilibrium`], or a gradient coefficient that is not
-    /// positive.
+    /// Fails for other than two species, without coexistence, with [`TheoryError::NotInEquilibrium`],
+    /// and for a gradient coefficient that is not positive.
     pub fn composition_interface(&self, density: f64, points: usize) -> Result<Interface, TheoryError> {
         self.composition_binodal(density)?;
         let line = CompositionLine::at_density(self, density);
@@ -133,7 +132,7 @@ fn planar(
     let (slope, intercept) = (line.slope(u1), line.intercept(u1));
     let second = |u: f64| line.curvature(u) * energy / spread(line.x(u));
     let curvatures = [second(u1), second(u2)];
-    // How far x is from either phase; x = middle − half cos θ resolves both ends.
+    // The distances of x from the two phases; x = middle − half cos θ resolves both ends.
     let distance = |theta: f64| [(0.5 * theta).sin(), (0.5 * theta).cos()].map(|s| 2.0 * half * s * s);
     let place = |theta: f64| {
         let [from_first, from_second] = distance(theta);
@@ -145,7 +144,7 @@ fn planar(
             return Err(TheoryError::GradientNotPositive { at, coefficient });
         }
     }
-    // W from the double tangent, or by integrating f″ twice where that is a difference of large numbers.
+    // W is the height above the double tangent, or the double integral of f″ where that is a difference of large numbers.
     let height = |theta: f64| {
         let x = place(theta);
         let u = line.u(x);

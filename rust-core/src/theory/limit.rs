@@ -4,30 +4,30 @@ use crate::model::Fluid;
 use crate::model::pair::PairForm;
 use nalgebra::{DMatrix, DVector};
 
-/// A way to put more and more particles into the same volume.
+/// An arrangement that puts more and more particles into the same volume.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Structure {
-    /// Spread evenly.
+    /// The particles are spread evenly.
     Uniform,
-    /// On the sites of a simple cubic (square in two dimensions) lattice, any number on each.
+    /// The particles are on the sites of a simple cubic (square in two dimensions) lattice, any number on each.
     Cubic {
         /// Distance of nearest neighbours.
         spacing: f64,
     },
-    /// On the sites of a body-centred cubic lattice.
+    /// The particles are on the sites of a body-centred cubic lattice.
     BodyCentred {
         /// Distance of nearest neighbours.
         spacing: f64,
     },
-    /// On the sites of a close-packed (face-centred cubic; triangular in two dimensions) lattice.
+    /// The particles are on the sites of a close-packed (face-centred cubic; triangular in two dimensions) lattice.
     ClosePacked {
         /// Distance of nearest neighbours.
         spacing: f64,
     },
 }
 
-/// A fluid without thermodynamic limit: its energy per particle falls without bound as more particles
-/// are put into the same volume, in at least this way.
+/// The error of a fluid without thermodynamic limit: its energy per particle falls without bound as
+/// more particles are put into the same volume, at least in this arrangement.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
     "no thermodynamic limit: with species in proportions {composition:?} and {structure:?} structure the \
@@ -37,37 +37,35 @@ pub enum Structure {
 pub struct NoLimit {
     /// Fractions of the species.
     pub composition: Vec<f64>,
-    /// How the particles are arranged.
+    /// The arrangement of the particles.
     pub structure: Structure,
     /// `½ Σ_αβ x_α x_β [φ_αβ]` for the uniform structure; in general the pair energy per particle and
     /// unit of density (uniform) or particle on a site.
     pub pair: f64,
     /// The density (particles on a site) up to which the energy was followed.
     pub density: f64,
-    /// Energy per particle there.
+    /// Energy per particle at this density.
     pub energy: f64,
 }
 
-/// Looks for a way to collapse: arrangements in which the energy per particle
-/// `Σ_α x_α ψ_α + ½ n Σ_αβ x_α x_β [φ_αβ]` goes to minus infinity with the density `n`, faster than a
-/// logarithm. Such a fluid has no thermodynamic limit (D. Ruelle, *Statistical Mechanics*, sec. 3.2; for
-/// soft potentials A. A. Louis et al., Phys. Rev. E 62, 7961 (2000)), and a simulation of it collapses
-/// sooner or later. `∫φ < 0` is the plainest case; a ψ that grows faster than `n`, or that becomes
-/// infinite at a finite density, saves it.
+/// Searches for a collapse: arrangements in which the energy per particle `Σ_α x_α ψ_α + ½ n Σ_αβ x_α x_β
+/// [φ_αβ]` goes to minus infinity with the density `n`, faster than a logarithm. Such a fluid has no
+/// thermodynamic limit (D. Ruelle, *Statistical Mechanics*, sec. 3.2; for soft potentials A. A. Louis et al.,
+/// Phys. Rev. E 62, 7961 (2000)), and its simulation eventually collapses. `∫φ < 0` is the plainest case; a ψ
+/// that grows faster than `n`, or that becomes infinite at a finite density, prevents the collapse.
 ///
-/// Tried are the uniform fluid and lattices whose sites take any number of particles, at 60 spacings up
-/// to the range of the potentials, each in many compositions, among them all those at which the pair
-/// energy has a minimum: an exact test of copositivity of the pair energies. Of more than eight species, 12 spacings
-/// and mixtures of two or of all. The growth of ψ is judged
+/// The search covers the uniform fluid and lattices whose sites take any number of particles, at 60
+/// spacings up to the range of the potentials, each in many compositions, including all at which the
+/// pair energy has a minimum: an exact test of copositivity of the pair energies. With more than eight
+/// species it covers 12 spacings and mixtures of two or of all species. The growth of ψ is judged
 /// numerically, from its values up to `1e8` particles in the volume of the interaction.
 ///
-/// The test is necessary, not sufficient: `Ok` means that none of these arrangements collapses, not that
-/// none exists, and finding none says nothing about time scales. With lattices it does catch potentials
-/// of positive integral that still have an unbounded arrangement. Beyond the bounds of a density ψ is what a
-/// run continues it as.
+/// The test is necessary, not sufficient: `Ok` means that none of these arrangements collapses, not that none
+/// exists, and says nothing about time scales. With lattices it does find potentials of positive integral
+/// that still have an unbounded arrangement. Beyond the bounds of a density ψ is continued as in a run.
 ///
 /// # Errors
-/// As [`MeanField::new`]; the inner result is the answer.
+/// Fails as [`MeanField::new`]; the inner result is the answer.
 pub fn thermodynamic_limit(fluid: &Fluid) -> Result<Result<(), NoLimit>, TheoryError> {
     let theory = MeanField::new(fluid)?;
     let search = Search { fluid, theory: &theory };
@@ -75,14 +73,14 @@ pub fn thermodynamic_limit(fluid: &Fluid) -> Result<Result<(), NoLimit>, TheoryE
 }
 
 impl NoLimit {
-    /// Whether the uniform fluid collapses, which happens at once. Collapse onto a lattice only may have
-    /// to be nucleated at a density that no simulation of the fluid ever comes near.
+    /// Whether the uniform fluid collapses, which happens at once. A collapse onto a lattice only may
+    /// need nucleation at a density that no simulation of the fluid reaches.
     pub fn is_uniform(&self) -> bool {
         self.structure == Structure::Uniform
     }
 }
 
-/// All their mixtures can be tried in a moment.
+/// Up to this number of species all mixtures are tried.
 const FEW_SPECIES: usize = 8;
 
 struct Search<'a> {
@@ -92,18 +90,18 @@ struct Search<'a> {
 
 /// Lattice sums, or integrals.
 struct Sums {
-    /// `Σ_R φ_αβ(R)`, with `R = 0`.
+    /// Sum `Σ_R φ_αβ(R)`, including `R = 0`.
     pairs: Vec<f64>,
-    /// `Σ_R |φ_αβ(R)|`, to tell zero from rounding.
+    /// Sum `Σ_R |φ_αβ(R)|`, to distinguish zero from rounding.
     size: f64,
-    /// `Σ_R w_d(R)`.
+    /// Sum `Σ_R w_d(R)`.
     densities: Vec<f64>,
 }
 
 impl Search<'_> {
     fn run(&self) -> Option<NoLimit> {
         let theory = self.theory;
-        // φ that goes to infinity at r = 0 keeps particles apart: no site takes two.
+        // A φ that is infinite at r = 0 keeps particles apart: no site takes two.
         let soft = self.fluid.pairs.iter().all(|p| p.potential.at(0.0).0.is_finite());
         let uniform = Sums {
             pairs: theory.pair_integrals().to_vec(),
@@ -137,7 +135,7 @@ impl Search<'_> {
         None
     }
 
-    /// `Σ ∫|φ|`, what the integral of a potential is small compared to.
+    /// The sum `Σ ∫|φ|`, in comparison with which an integral of a potential may be small.
     fn absolute_integral(&self) -> f64 {
         let d = self.theory.dimensions as i32;
         let terms =
@@ -202,7 +200,7 @@ impl Search<'_> {
     }
 }
 
-/// Whether `energy(n)` goes to −∞: the last density looked at, and the energy there.
+/// Whether `energy(n)` goes to −∞; returns the last density tried, and the energy there.
 fn falls_without_bound(energy: &dyn Fn(f64) -> f64, unit: f64) -> Option<(f64, f64)> {
     let mut last = (0.0, 0.0);
     for step in 0..=32 {
@@ -212,7 +210,7 @@ fn falls_without_bound(energy: &dyn Fn(f64) -> f64, unit: f64) -> Option<(f64, f
             return Some((n, e));
         }
         if !e.is_finite() {
-            // A limit to the density. What counts is where the energy goes on the way to it.
+            // ψ limits the density. The result depends on the energy on the way to this limit.
             let edge = super::search::turning_point(last.0, n, |n| energy(n).is_finite());
             let [far, near] = [1e-6, 1e-12].map(|h| energy(edge * (1.0 - h)));
             let falls = near < far && near - far < -1e3 * (1.0 + far.abs());
@@ -221,17 +219,17 @@ fn falls_without_bound(energy: &dyn Fn(f64) -> f64, unit: f64) -> Option<(f64, f
         last = (n, e);
     }
     let (n, e) = last;
-    // A power of n: a logarithm would grow by a twentieth here.
+    // The energy is a power of n: a logarithm would grow by a twentieth here.
     let before = energy(n / 10.0);
     (e < 0.0 && e < 1.5 * before && e < before).then_some((n, e))
 }
 
-/// Compositions to try: where `Σ x_a x_b φ_ab` is stationary on the simplex or one of its faces, so that
-/// its minimum over all compositions is among them, and a grid for the many-body part.
+/// Compositions to try: those where `Σ x_a x_b φ_ab` is stationary on the simplex or on one of its
+/// faces, so that its minimum over all compositions is among them, and a grid for the many-body part.
 fn compositions(pairs: &[f64], count: usize) -> Vec<Vec<f64>> {
     let mut all: Vec<Vec<f64>> = Vec::new();
     let few = count <= FEW_SPECIES;
-    // Faces by their species.
+    // Each face is the list of its species.
     let faces: Vec<Vec<usize>> = if few {
         (1usize..1 << count).map(|mask| (0..count).filter(|s| mask >> s & 1 == 1).collect()).collect()
     } else {
@@ -267,7 +265,7 @@ fn compositions(pairs: &[f64], count: usize) -> Vec<Vec<f64>> {
     all
 }
 
-/// Distances from one site to all sites closer than `range`, with the site itself.
+/// Distances from one site to all sites closer than `range`, including itself.
 fn distances(structure: Structure, dimensions: usize, range: f64) -> Vec<f64> {
     let (basis, edge): (&[[f64; 3]], [f64; 3]) = match structure {
         Structure::Uniform => return Vec::new(),

@@ -1,38 +1,38 @@
-//! Coexistence for a free energy of one variable: the double tangent, whatever the variable is.
+//! Coexistence for a free energy of one variable, by the double tangent.
 
 use super::search::{minimum, turning_point};
 
-/// A free energy `g(x)` of one variable, followed along a parameter `u` (a logarithm, so that a phase
-/// with next to nothing of one component is no special case).
+/// A free energy `g(x)` of one variable, as a function of a parameter `u` (a logarithm, so that a phase
+/// with almost none of one component is no special case).
 pub trait Line {
-    /// `x(u)`, increasing.
+    /// The variable `x(u)`, increasing.
     fn x(&self, u: f64) -> f64;
-    /// `u(x)`.
+    /// The parameter `u(x)`.
     fn u(&self, x: f64) -> f64;
-    /// `g″(x)` times something positive that makes it 1 for an ideal gas or an ideal mixture.
+    /// The curvature `g″(x)`, times a positive factor that makes it 1 for an ideal gas or an ideal mixture.
     fn curvature(&self, u: f64) -> f64;
-    /// `g′(x)`: what two coexisting phases have in common.
+    /// The slope `g′(x)`, which is equal in two coexisting phases.
     fn slope(&self, u: f64) -> f64;
-    /// `x g′ − g`: the other thing they have in common.
+    /// The intercept `x g′ − g`, which is equal in two coexisting phases too.
     fn intercept(&self, u: f64) -> f64;
-    /// Where to look.
+    /// Values of `u` at which phases are searched.
     fn grid(&self) -> Vec<f64>;
-    /// How far a phase may lie beyond the grid.
+    /// Largest distance of a phase beyond the grid.
     fn limits(&self) -> [f64; 2];
 }
 
-/// The intervals of `u` in which `g″ < 0`. One that reaches the end of the grid ends at ±∞.
+/// The intervals of `u` in which `g″ < 0`. An interval that reaches the end of the grid ends at ±∞.
 pub fn unstable(line: &dyn Line) -> Vec<[f64; 2]> {
     negative(&line.grid(), &|u| line.curvature(u))
 }
 
-/// The intervals in which `f < 0`. One that reaches the end of the grid ends at ±∞.
+/// The intervals in which `f < 0`. An interval that reaches the end of the grid ends at ±∞.
 pub fn negative(grid: &[f64], f: &dyn Fn(f64) -> f64) -> Vec<[f64; 2]> {
     let mut points: Vec<(f64, bool)> = Vec::with_capacity(grid.len());
     let values: Vec<f64> = grid.iter().map(|u| f(*u)).collect();
     for (i, u) in grid.iter().enumerate() {
         points.push((*u, values[i] < 0.0));
-        // A dip below zero between two points of the grid.
+        // f may dip below zero between two points of the grid.
         if i > 0 && i + 1 < grid.len() && values[i] <= values[i - 1] && values[i] <= values[i + 1] {
             let (place, value) = minimum(grid[i - 1], grid[i + 1], f);
             if value < 0.0 && values[i] >= 0.0 {
@@ -74,8 +74,8 @@ pub fn smallest(grid: &[f64], f: &dyn Fn(f64) -> f64) -> (f64, f64) {
     if refined.1 <= values[best] { refined } else { (grid[best], values[best]) }
 }
 
-/// Two coexisting phases: the first double tangent, in order of `x`, with nothing of `g` below it between
-/// the two phases. A phase that is stable by itself may lie in between and be left out.
+/// Two coexisting phases: the first double tangent, in order of `x`, with no part of `g` below it
+/// between the two phases. A stable phase between the two may be left out.
 pub fn coexisting(line: &dyn Line) -> Option<[f64; 2]> {
     let regions = unstable(line);
     let grid = line.grid();
@@ -106,13 +106,13 @@ fn coexistence(line: &dyn Line, regions: &[[f64; 2]], first: usize, last: usize)
     let low_end = if first == 0 { limits[0] } else { regions[first - 1][1] };
     let high_end = regions.get(last + 1).map_or(limits[1], |next| next[0]);
     let (top, bottom) = (line.slope(a), line.slope(b));
-    // Undefined, or rounding made the two ends one: no interval to speak of.
+    // The values are undefined, or rounding has made the two ends equal: there is no interval.
     if top.is_nan() || bottom.is_nan() || top <= bottom {
         return None;
     }
     let low = |slope: f64| -> Option<f64> { reach(a, low_end, -1.0, |u| line.slope(u) <= slope) };
     let high = |slope: f64| -> Option<f64> { reach(b, high_end, 1.0, |u| line.slope(u) >= slope) };
-    // The slopes for which both branches have a phase. Where a branch ends first, the end bounds them.
+    // The slopes at which both branches have a phase. Where a branch ends first, its end bounds them.
     let from = match low(bottom) {
         Some(_) => bottom,
         None => line.slope(low_end),
@@ -135,7 +135,7 @@ fn coexistence(line: &dyn Line, regions: &[[f64; 2]], first: usize, last: usize)
     Some([low(slope)?, high(slope)?])
 }
 
-/// From `start` in `direction` up to `end`: where `reached` becomes true.
+/// The first point from `start` in `direction`, up to `end`, where `reached` becomes true.
 fn reach(start: f64, end: f64, direction: f64, reached: impl Fn(f64) -> bool) -> Option<f64> {
     if reached(start) {
         return Some(start);

@@ -14,15 +14,15 @@ pub struct MeanField {
     pub(super) kt: f64,
     pub(super) species: Vec<String>,
     pub(super) free_energy: FreeEnergy,
-    /// What is added to the bulk density in variable `v` of `ψ_α`: the self term.
+    /// Self term that is added to the bulk density in variable `v` of `ψ_α`.
     pub(super) shift: Vec<Vec<f64>>,
     /// The variables of `ψ_α` for a particle without neighbours: its corrected densities.
     isolated: Vec<Vec<f64>>,
-    /// `w` of each density.
+    /// Weight function `w` of each density.
     pub(super) kernels: Vec<Radial>,
-    /// `φ` and the species it acts between.
+    /// Pair potentials `φ`, and the species that they act between.
     pub(super) pairs: Vec<([usize; 2], Radial)>,
-    /// `[φ_αβ]`, row-major and symmetric.
+    /// Integrals `[φ_αβ]`, row-major and symmetric.
     pub(super) pair_integrals: Vec<f64>,
     /// The longest range of a density or a pair potential, and the shortest.
     pub(super) ranges: [f64; 2],
@@ -31,10 +31,10 @@ pub struct MeanField {
 }
 
 impl MeanField {
-    /// The theory of `fluid`.
+    /// Derives the theory of `fluid`.
     ///
     /// # Errors
-    /// A pair potential without an integral; a free energy too large to be differentiated twice.
+    /// Fails for a pair potential without an integral, and for a free energy too large to be differentiated twice.
     pub fn new(fluid: &Fluid) -> Result<MeanField, TheoryError> {
         let count = fluid.species.len();
         let d = fluid.dimensions;
@@ -67,7 +67,7 @@ impl MeanField {
             .map(|alpha| {
                 let mut shift = vec![0.0; fluid.variables()];
                 for (i, density) in fluid.densities.iter().enumerate() {
-                    // A corrected density means ⟨ρ̃⟩ = ρ, with or without self term.
+                    // A corrected density has the mean ⟨ρ̃⟩ = ρ, with or without self term.
                     let identity =
                         density.correction[alpha * count + alpha] == crate::model::Polynomial::identity();
                     if density.includes_self && identity {
@@ -117,12 +117,12 @@ impl MeanField {
         })
     }
 
-    /// kT.
+    /// Temperature kT.
     pub fn kt(&self) -> f64 {
         self.kt
     }
 
-    /// 2 or 3.
+    /// Number of dimensions, 2 or 3.
     pub fn dimensions(&self) -> usize {
         self.dimensions
     }
@@ -132,7 +132,7 @@ impl MeanField {
         &self.species
     }
 
-    /// `[φ_αβ] = ∫ φ_αβ d^dr`, row-major and symmetric; 0 where no pair potential acts.
+    /// The integrals `[φ_αβ] = ∫ φ_αβ d^dr`, row-major and symmetric; 0 without a pair potential.
     pub fn pair_integrals(&self) -> &[f64] {
         &self.pair_integrals
     }
@@ -153,21 +153,21 @@ impl MeanField {
     pub(super) fn psi_at(&self, alpha: usize, at: &[f64]) -> Psi {
         let mut psi = self.free_energy.at(alpha, at);
         if !psi.value.is_finite() {
-            // The derivatives of a logarithm go on where it does not.
+            // The derivatives of a logarithm are finite where the logarithm itself is not.
             psi.gradient.fill(f64::NAN);
             psi.hessian.fill(f64::NAN);
         }
         psi
     }
 
-    /// `∂ψ_α/∂ñ_v` in the bulk, for each of the [`Fluid::variables`], density-major.
+    /// Slopes `∂ψ_α/∂ñ_v` in the bulk, for each of the [`Fluid::variables`], density-major.
     pub fn excess_slopes(&self, alpha: usize, densities: &[f64]) -> Vec<f64> {
         self.psi(alpha, densities).gradient
     }
 
     /// Excess free energy density `f_ex = Σ_α ρ_α ψ_α(ρ) + ½ Σ_αβ [φ_αβ] ρ_α ρ_β`
-    /// (Pagonabarraga–Frenkel eq. 4 in the bulk; Warren eq. 11). A species that is not there
-    /// contributes nothing, even where its ψ is singular.
+    /// (Pagonabarraga–Frenkel eq. 4 in the bulk; Warren eq. 11). A species of density 0 contributes
+    /// nothing, even if its ψ is singular.
     pub fn excess_free_energy_density(&self, densities: &[f64]) -> f64 {
         let count = self.species.len();
         let mut f = 0.0;
@@ -187,7 +187,7 @@ impl MeanField {
         self.kt * ideal + self.excess_free_energy_density(densities)
     }
 
-    /// `∂f_ex/∂ρ_s = ψ_s + Σ_α ρ_α ∂ψ_α/∂ρ_s + Σ_β [φ_sβ] ρ_β`.
+    /// Excess chemical potentials `∂f_ex/∂ρ_s = ψ_s + Σ_α ρ_α ∂ψ_α/∂ρ_s + Σ_β [φ_sβ] ρ_β`.
     pub fn excess_chemical_potentials(&self, densities: &[f64]) -> Vec<f64> {
         let count = self.species.len();
         let mut mu = vec![0.0; count];
@@ -234,7 +234,7 @@ impl MeanField {
         p
     }
 
-    /// `∂²f_ex/∂ρ_s∂ρ_t = ∂ψ_s/∂ρ_t + ∂ψ_t/∂ρ_s + Σ_α ρ_α ∂²ψ_α/∂ρ_s∂ρ_t + [φ_st]`, row-major.
+    /// Second derivatives `∂²f_ex/∂ρ_s∂ρ_t = ∂ψ_s/∂ρ_t + ∂ψ_t/∂ρ_s + Σ_α ρ_α ∂²ψ_α/∂ρ_s∂ρ_t + [φ_st]`, row-major.
     pub fn excess_second_derivatives(&self, densities: &[f64]) -> Vec<f64> {
         self.interaction_kernel(densities, 0.0)
     }
@@ -266,7 +266,7 @@ impl MeanField {
     }
 
     /// # Errors
-    /// Another number of species than `expected`.
+    /// Fails for another number of species than `expected`.
     pub(super) fn require_species(&self, expected: usize) -> Result<(), TheoryError> {
         let found = self.species.len();
         if found == expected { Ok(()) } else { Err(TheoryError::Species { expected, found }) }

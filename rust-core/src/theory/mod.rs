@@ -1,6 +1,6 @@
-//! Mean field of a fluid: equation of state, stability, coexistence, interfaces.
+//! Mean-field theory of a fluid: equation of state, stability, coexistence, interfaces.
 //!
-//! Everything starts from one free energy density, the continuum limit of the Hamiltonian with
+//! All results derive from one free energy density, the continuum limit of the Hamiltonian with
 //! correlations left out (Pagonabarraga and Frenkel, J. Chem. Phys. 115, 5015 (2001), eq. 4 and 24;
 //! Warren, Phys. Rev. E 68, 066702 (2003), eq. 8):
 //!
@@ -8,18 +8,17 @@
 //! F[ρ] = ∫ kT Σ_α ρ_α (ln ρ_α − 1) + Σ_α ρ_α ψ_α(w∗ρ) + ½ Σ_αβ ρ_α (φ_αβ∗ρ_β)
 //! ```
 //!
-//! in bulk, [`MeanField`], and its second functional derivative, [`Stability`]. Leaving out the
-//! correlations is the only approximation of the bulk theory; it is not a small one for strong
-//! interactions (Warren, sec. III), so what is printed here is a guide for a simulation and not a
-//! replacement. The interfaces add the square-gradient expansion, [`Interface`].
+//! in bulk, [`MeanField`], and its second functional derivative, [`Stability`]. Neglecting correlations
+//! is the only approximation of the bulk theory; it is a large one for strong interactions (Warren,
+//! sec. III), so that these results guide a simulation and do not replace it. The interfaces add the
+//! square-gradient expansion, [`Interface`].
 //!
 //! # Corrected densities
 //!
-//! Trofimov et al., J. Chem. Phys. 117, 9383 (2002), calibrate `ρ̃(n)` so that the mean of the corrected
-//! density is the bulk density, `⟨ρ̃⟩ = ρ`. The theory takes the calibration at its word: where a model
-//! has a correction, ψ is evaluated at the bulk densities themselves, and the correction enters nowhere.
-//! Without a correction the variable is `ρ_β`, plus `w(0)` for a particle's own species where the model
-//! counts the self term.
+//! Trofimov et al., J. Chem. Phys. 117, 9383 (2002), calibrate `ρ̃(n)` so that the mean of the corrected density is
+//! the bulk density, `⟨ρ̃⟩ = ρ`. The theory assumes an exact calibration: where a model has a correction, ψ is
+//! evaluated at the bulk densities themselves, and the correction is not used. Without a correction the variable is
+//! `ρ_β`, plus `w(0)` for a particle's own species where the model includes the self term.
 
 mod binary;
 mod coexistence;
@@ -49,15 +48,14 @@ pub use stability::Stability;
 
 use crate::document::FileError;
 
-/// Why the theory has no answer.
+/// Reasons why the theory has no result.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TheoryError {
-    /// The model cannot be had at the temperature asked for.
+    /// The model is not valid at the requested temperature.
     #[error(transparent)]
     File(#[from] FileError),
-    /// The model states the force of a species, which need have no potential (Warren, Phys. Rev. E 87,
-    /// 045303 (2013)).
+    /// The model states the force of a species, which may have no potential (Warren, Phys. Rev. E 87, 045303 (2013)).
     #[error(
         "species {0} has stated slopes and no excess free energy: mean field has nothing to start from; \
          write psi as a formula of the densities if the force has one"
@@ -66,18 +64,18 @@ pub enum TheoryError {
     /// A derivative of ψ has too many operations.
     #[error("the free energy of species {0} is too large to be differentiated twice")]
     TooLarge(String),
-    /// `∫φ` does not exist, or cannot be had by quadrature.
+    /// The integral `∫φ` does not exist, or quadrature does not converge.
     #[error("the pair potential between {0} and {1} has no integral: mean field does not apply to it")]
     NotIntegrable(String, String),
-    /// The question is about another number of species.
+    /// The result is defined for another number of species.
     #[error("needs a fluid of {expected} species, this one has {found}")]
     Species {
-        /// How many the question is about.
+        /// Number of species that the result requires.
         expected: usize,
-        /// How many there are.
+        /// Number of species of the fluid.
         found: usize,
     },
-    /// Nothing between the limits of the search changes from stable to unstable.
+    /// Within the limits of the search the fluid never changes from stable to unstable.
     #[error("no critical point for control parameters between {0:?} and {1:?}")]
     NoCriticalPoint(f64, f64),
     /// The fluid is stable everywhere, or a phase has no partner.
@@ -92,16 +90,16 @@ pub enum TheoryError {
     NotInEquilibrium {
         /// The total density.
         density: f64,
-        /// Of the two phases.
+        /// Pressure of each phase.
         pressure: [f64; 2],
     },
     /// The gradient coefficient is not positive between the two phases, so that the square-gradient
     /// free energy favours interfaces (Pagonabarraga and Frenkel, text after eq. 30).
     #[error("the square-gradient coefficient is {coefficient:.6} at {at:.6}: no stable planar interface")]
     GradientNotPositive {
-        /// Density or composition.
+        /// Density or composition between the phases.
         at: f64,
-        /// κ there.
+        /// Gradient coefficient κ at this density or composition.
         coefficient: f64,
     },
 }

@@ -2,27 +2,27 @@ use super::line::{Line, least_stable, unstable};
 use super::{MeanField, TheoryError};
 use crate::model::{Fluid, Model};
 
-/// Vapour and liquid that coexist.
+/// Coexisting vapour and liquid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Binodal {
     /// Density of the vapour.
     pub vapour: f64,
     /// Density of the liquid.
     pub liquid: f64,
-    /// Their pressure.
+    /// Pressure of both phases.
     pub pressure: f64,
-    /// Their chemical potential.
+    /// Chemical potential of both phases.
     pub chemical_potential: f64,
 }
 
 /// A critical point of one component.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CriticalPoint {
-    /// The control parameter there: kT, or whatever the fluids were made from.
+    /// The critical control parameter: kT, or any other parameter of the fluids.
     pub parameter: f64,
-    /// Density.
+    /// Critical density.
     pub density: f64,
-    /// Pressure.
+    /// Critical pressure.
     pub pressure: f64,
 }
 
@@ -55,7 +55,7 @@ impl Line for DensityLine<'_> {
     }
 
     fn slope(&self, u: f64) -> f64 {
-        // ln ρ is known better than ρ.
+        // ln ρ is more accurate than ρ.
         self.theory.excess_chemical_potentials(&[u.exp()])[0] + self.theory.kt * u
     }
 
@@ -74,22 +74,21 @@ impl Line for DensityLine<'_> {
 }
 
 impl MeanField {
-    /// The densities between which `∂p/∂ρ < 0`, one component. The upper end is infinite if there is no
-    /// limit to it (then see [`super::thermodynamic_limit`]).
+    /// The densities between which `∂p/∂ρ < 0`, for one component. The upper end may be infinite (see
+    /// [`super::thermodynamic_limit`]).
     ///
     /// # Errors
-    /// More than one species.
+    /// Fails for more than one species.
     pub fn spinodal(&self) -> Result<Vec<[f64; 2]>, TheoryError> {
         self.require_species(1)?;
         let regions = unstable(&DensityLine::new(self));
         Ok(regions.into_iter().map(|[a, b]| [a.exp(), b.exp()]).collect())
     }
 
-    /// Vapour and liquid of equal pressure and chemical potential, one component: the first pair in
-    /// order of density.
+    /// Vapour and liquid of equal pressure and chemical potential, for one component: the first pair in order of density.
     ///
     /// # Errors
-    /// More than one species; [`TheoryError::NoCoexistence`].
+    /// Fails for more than one species, and with [`TheoryError::NoCoexistence`].
     pub fn binodal(&self) -> Result<Binodal, TheoryError> {
         self.require_species(1)?;
         let line = DensityLine::new(self);
@@ -97,17 +96,17 @@ impl MeanField {
         Ok(Binodal {
             vapour: a.exp(),
             liquid: b.exp(),
-            // Where the vapour is thin, its own numbers have no cancellation in them.
+            // For a thin vapour its own pressure has no cancellation errors.
             pressure: self.pressure(&[a.exp()]),
             chemical_potential: line.slope(a),
         })
     }
 
-    /// The density in the stated range of the grid at which `β ∂p/∂ρ` is smallest, and that value: at
-    /// the critical temperature it is zero, and its place is the critical density.
+    /// The density on the grid at which `β ∂p/∂ρ` is smallest, and that value: at the critical
+    /// temperature the value is zero, and the density is the critical one.
     ///
     /// # Errors
-    /// More than one species.
+    /// Fails for more than one species.
     pub fn least_stable_density(&self) -> Result<[f64; 2], TheoryError> {
         self.require_species(1)?;
         let (u, value) = least_stable(&DensityLine::new(self));
@@ -123,7 +122,7 @@ impl MeanField {
 /// Pagonabarraga–Frenkel eq. (14)–(16) are the closed form for their van der Waals fluid.
 ///
 /// # Errors
-/// A fluid that cannot be had, more than one species, or no such change.
+/// Fails if the fluid cannot be created, has more than one species, or has no such change.
 pub fn critical_point(
     fluid: &dyn Fn(f64) -> Result<Fluid, TheoryError>,
     range: [f64; 2],
@@ -135,10 +134,10 @@ pub fn critical_point(
     Ok(CriticalPoint { parameter, density, pressure })
 }
 
-/// [`critical_point`] of a model, in kT.
+/// The [`critical_point`] of a model, in kT.
 ///
 /// # Errors
-/// As [`critical_point`].
+/// Fails as [`critical_point`].
 pub fn critical_point_of_model(model: &Model, kt: [f64; 2]) -> Result<CriticalPoint, TheoryError> {
     critical_point(&|kt| Ok(model.at(kt)?), kt)
 }

@@ -10,7 +10,7 @@ pub fn gauss_legendre(count: usize) -> Vec<(f64, f64)> {
             let mut x = (PI * (i as f64 + 0.75) / (n + 0.5)).cos();
             let mut slope = 1.0;
             for _ in 0..100 {
-                // P_k and P_{k−1} by their recurrence.
+                // The recurrence computes P_k and P_{k−1}.
                 let (mut p, mut before) = (1.0, 0.0);
                 for k in 0..count {
                     let k = k as f64;
@@ -28,7 +28,7 @@ pub fn gauss_legendre(count: usize) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// More panels than any integrand needs that is not noise.
+/// Most panels of an integral; only noise needs more.
 const MAX_PANELS: usize = 20_000;
 
 /// `∫_a^b f` by adaptive bisection of panels; `nodes` receives abscissae and weights of the panels that
@@ -122,7 +122,7 @@ impl Radial {
     }
 }
 
-/// `sin(x)/x`.
+/// The function `sin(x)/x`.
 fn sinc(x: f64) -> f64 {
     if x.abs() < 1e-4 { 1.0 - x * x / 6.0 } else { x.sin() / x }
 }
@@ -159,7 +159,7 @@ mod tests {
     #[test]
     fn kinks_and_singularities() {
         let kink = Radial::new(3, 1.0, |r| (r - 0.3).abs()).unwrap();
-        // 4π ∫ |r − c| r² dr = 4π (1/4 − c/3 + c⁴/6)
+        // The exact value is 4π ∫ |r − c| r² dr = 4π (1/4 − c/3 + c⁴/6).
         let exact = 4.0 * PI * (0.25 - 0.1 + 0.3f64.powi(4) / 6.0);
         assert!((kink.moment(0) - exact).abs() < 1e-13);
         let coulomb = Radial::new(3, 1.0, |r| 1.0 / r).unwrap();
@@ -175,7 +175,7 @@ mod tests {
                 if k == 0.0 { 4.0 * PI / 3.0 } else { 4.0 * PI * (k.sin() - k * k.cos()) / k.powi(3) };
             assert!((ball.transform(k) - exact).abs() < 1e-11, "{k}");
         }
-        // ∫_0^1 2πr (1 − r²)  J_0(kr) dr = 4π J_2(k)/k², whose small-k expansion starts π/2 (1 − k²/12).
+        // The integral ∫_0^1 2πr (1 − r²) J_0(kr) dr = 4π J_2(k)/k² has the small-k expansion π/2 (1 − k²/12).
         let cap = Radial::new(2, 1.0, |r| 1.0 - r * r).unwrap();
         assert!((cap.transform(1e-3) - 0.5 * PI * (1.0 - 1e-6 / 12.0)).abs() < 1e-12);
     }

@@ -1,7 +1,6 @@
 //! Roots and minima of functions of one variable.
 
-/// The `x` where `positive` turns: bisection to the last bit. `lo` and `hi` are on different sides,
-/// in any order.
+/// The `x` where `positive` changes, by bisection to the last bit. `lo` and `hi` are on different sides, in any order.
 pub fn turning_point(mut lo: f64, mut hi: f64, positive: impl Fn(f64) -> bool) -> f64 {
     let at_lo = positive(lo);
     for _ in 0..200 {
@@ -18,8 +17,7 @@ pub fn turning_point(mut lo: f64, mut hi: f64, positive: impl Fn(f64) -> bool) -
     0.5 * (lo + hi)
 }
 
-/// The minimum of `f` between `a` and `b`, by golden section: place and value. A place where `f` is not
-/// a number counts as infinitely high.
+/// The minimum of `f` between `a` and `b`, by golden section: place and value. NaN counts as infinitely high.
 pub fn minimum(mut a: f64, mut b: f64, f: impl Fn(f64) -> f64) -> (f64, f64) {
     let f = |x: f64| {
         let y = f(x);

@@ -6,34 +6,34 @@ use crate::model::Fluid;
 /// A density at which ψ or its derivative is not a finite number.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Singularity {
-    /// Whose `ψ_α`.
+    /// Index of the species whose `ψ_α` is singular.
     pub species: usize,
-    /// The total density, of species in the proportions that were asked for.
+    /// The total density, with species in the given proportions.
     pub density: f64,
-    /// What happens there.
+    /// The kind of the singularity.
     pub kind: SingularityKind,
 }
 
-/// What happens at a [`Singularity`].
+/// The kinds of a [`Singularity`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SingularityKind {
-    /// A particle without neighbours has no finite force or energy, as with `ln n` and `1/n` where neither the self term nor
-    /// a correction keeps its density from zero.
+    /// A particle without neighbours has no finite force or energy, as with `ln n` and `1/n` where
+    /// neither the self term nor a correction keeps its density from zero.
     Origin,
     /// ψ′ grows without bound from both sides.
     Pole,
-    /// ψ or ψ′ is not a number, or overflows, on one side: the edge of what the formula is defined for,
-    /// as `n = 1/b` of `ln(1 − bn)` (Pagonabarraga–Frenkel eq. 24).
+    /// ψ or ψ′ is not a number, or overflows, on one side: the edge of the formula's domain, as `n =
+    /// 1/b` of `ln(1 − bn)` (Pagonabarraga–Frenkel eq. 24).
     Edge,
 }
 
-/// The singularities of every `ψ_α` for total densities in `range`, along the line of species in the
-/// proportions of `composition` (every species present in it), that the bounds of the densities leave; and, if `range`
-/// begins at 0, those of a particle without neighbours. Found by scanning 4000 densities and
-/// refining, so a pair of singularities closer than `range/4000` may be missed.
+/// The singularities of every `ψ_α` for total densities in `range`, with species in the proportions of
+/// `composition` (which includes every species), within the bounds of the densities; if `range` begins
+/// at 0, also those of a particle without neighbours. The function scans 4000 densities and refines, so
+/// that it may miss a pair of singularities closer than `range/4000`.
 ///
 /// # Errors
-/// As [`MeanField::new`].
+/// Fails as [`MeanField::new`].
 pub fn singular_densities(
     fluid: &Fluid,
     composition: &[f64],
@@ -45,7 +45,7 @@ pub fn singular_densities(
 }
 
 impl MeanField {
-    /// The total densities that coexistence and stability are looked for at, for species in the
+    /// The total densities at which coexistence and stability are searched, for species in the
     /// proportions of `composition`: logarithmic from `1e-6` to `1e6` particles in the cube of the
     /// longest range, up to the first singularity of ψ and denser towards it.
     pub(super) fn density_grid(&self, composition: &[f64]) -> Vec<f64> {
@@ -71,7 +71,7 @@ pub fn first_along(theory: &MeanField, composition: &[f64], grid: &[f64]) -> Opt
         .min_by(f64::total_cmp)
 }
 
-/// How steep ψ is; infinite where it is not defined.
+/// A measure of the slopes of ψ; infinite where ψ is not defined.
 fn steepness(psi: &Psi) -> f64 {
     let slope = psi.gradient.iter().map(|g| g.abs()).sum::<f64>();
     if psi.value.is_finite() && slope.is_finite() { slope } else { f64::INFINITY }
@@ -93,7 +93,7 @@ fn along(theory: &MeanField, alpha: usize, composition: &[f64], grid: &[f64]) ->
         match (values[i - 1].is_finite(), values[i].is_finite()) {
             (true, false) | (false, true) if grid[i - 1] > 0.0 => {
                 let edge = turning_point(grid[i - 1], grid[i], |rho| at(rho).is_finite());
-                // A pole that happens to be a grid point looks like two edges.
+                // A pole at a grid point looks like two edges.
                 let pole = all.last().is_some_and(|s: &Singularity| {
                     s.kind == SingularityKind::Edge && (edge - s.density).abs() < 1e-12 * edge
                 });
@@ -102,7 +102,7 @@ fn along(theory: &MeanField, alpha: usize, composition: &[f64], grid: &[f64]) ->
                 }
                 all.push(found(edge, if pole { SingularityKind::Pole } else { SingularityKind::Edge }));
             }
-            // A peak of the steepness that grows without bound when looked at closer.
+            // The peak of the slopes grows without bound as the grid is refined.
             (true, true)
                 if i + 1 < grid.len()
                     && values[i + 1].is_finite()

@@ -4,19 +4,18 @@ use nalgebra::DMatrix;
 
 /// Whether a homogeneous fluid is stable against waves of density and composition.
 ///
-/// All from the smallest eigenvalue of `S(k)⁻¹`, see [`MeanField::inverse_structure_factor`].
+/// The fields derive from the smallest eigenvalue of `S(k)⁻¹`, see [`MeanField::inverse_structure_factor`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stability {
-    /// Positive at every `k`. False also where ψ is singular.
+    /// Whether the eigenvalue is positive at every `k`; false also where ψ is singular.
     pub stable: bool,
-    /// Not positive as `k → 0`: inside the spinodal, the fluid separates into phases.
+    /// Whether the eigenvalue is not positive as `k → 0`: inside the spinodal the fluid separates into phases.
     pub spinodal: bool,
-    /// Where it is smallest, if that is not `k = 0` and it is below 1, its value for an ideal gas and at
-    /// `k → ∞`. In a stable fluid this is the main peak of the
-    /// structure factor; in an unstable one it is the wavelength `2π/k*` at which the fluid clusters or
-    /// freezes.
+    /// The wave number of the smallest eigenvalue, if that is not `k = 0` and the eigenvalue is below 1, its
+    /// value for an ideal gas and at `k → ∞`. In a stable fluid this is the main peak of the structure
+    /// factor; in an unstable one it is the wavelength `2π/k*` at which the fluid clusters or freezes.
     pub k_star: Option<f64>,
-    /// Its smallest value over `k`; the limit 1 at `k → ∞` counts.
+    /// The smallest eigenvalue over `k`, including the limit 1 at `k → ∞`.
     pub min_inverse_s: f64,
 }
 
@@ -59,8 +58,8 @@ impl MeanField {
     /// for an ideal gas: `S⁻¹_st(k) = δ_st + β √(ρ_s ρ_t) C_st(k)`, row-major. For one species
     /// `S(k)⁻¹ = 1 + βρ[φ̂(k) + 2ψ′ŵ(k) + ρψ″ŵ(k)²]`, whose limit at `k → 0` is `β ∂p/∂ρ`.
     ///
-    /// The second functional derivative of the free energy of [the module](super), in the random-phase
-    /// approximation.
+    /// This is the second functional derivative of the free energy of [the module](super), in
+    /// the random-phase approximation.
     pub fn inverse_structure_factor(&self, densities: &[f64], k: f64) -> Vec<f64> {
         let count = self.species.len();
         let mut s = self.interaction_kernel(densities, k);
@@ -68,7 +67,7 @@ impl MeanField {
             for b in 0..count {
                 let weight = (densities[a] * densities[b]).sqrt() / self.kt;
                 let entry = &mut s[a * count + b];
-                // A species that is not there is an ideal gas of its own.
+                // A species of density 0 is an ideal gas.
                 *entry = if weight == 0.0 { 0.0 } else { *entry * weight };
                 if a == b {
                     *entry += 1.0;
@@ -100,12 +99,12 @@ impl MeanField {
         let ks = spaced(0.0, high, count);
         let values: Vec<f64> = ks.iter().map(|k| value(*k)).collect();
         let zero = values[0];
-        // As k → ∞ there are no interactions, and the value is 1.
+        // As k → ∞ interactions vanish, and the value is 1.
         let (mut k_star, mut smallest) = (0.0, zero.min(1.0));
         for i in 1..count {
             if values[i] <= values[i - 1] && values[i] <= values[i + 1] {
                 let (k, refined) = minimum(ks[i - 1], ks[i + 1], value);
-                // Not a ripple of rounding errors.
+                // A ripple of rounding errors is no minimum.
                 if refined < smallest - 1e-12 * (1.0 + smallest.abs()) {
                     (k_star, smallest) = (k, refined);
                 }

@@ -59,7 +59,7 @@ fn warren(a: f64, b: f64, dimensions: usize) -> Model {
     warren_ab(&["F".into()], &[Some(pair)], dimensions, ForceLaw::Conservative).unwrap()
 }
 
-/// Wang–Chen: `first W(0.8) − second W(1.0)`.
+/// Wang–Chen's spline potential `first W(0.8) − second W(1.0)`.
 fn spline(first: f64, second: f64) -> Model {
     model(&format!(
         "title = 'spline'\nspecies = ['F']\n[[pair]]\nbetween = ['F', 'F']\nform = 'spline'\n\
@@ -76,7 +76,7 @@ fn pressure_of_the_van_der_waals_fluid_and_its_compressibility() {
         close(mf.pressure(&[rho]), p, 1e-12);
         let by_definition = rho * mf.chemical_potentials(&[rho])[0] - mf.free_energy_density(&[rho]);
         close(by_definition, p, 1e-11);
-        // Pagonabarraga–Frenkel eq. (17)
+        // Pagonabarraga–Frenkel eq. (17).
         let inverse = kt / rho + kt * b * (2.0 - b * rho) / (1.0 - b * rho).powi(2)
             - 2.0 * a
             - 3.0 * alpha3 * a * b * rho;
@@ -120,13 +120,13 @@ fn spinodal_and_binodal_of_the_van_der_waals_fluid() {
         let spinodal = mf.spinodal().unwrap();
         assert_eq!(spinodal.len(), 1);
         for rho in spinodal[0] {
-            // kT = 2aρ(1 − bρ)²
+            // The spinodal is kT = 2aρ(1 − bρ)².
             close(2.0 * a * rho * (1.0f64 - b * rho).powi(2), kt, 1e-9);
         }
         let phases = mf.binodal().unwrap_or_else(|e| panic!("{e} {reduced} {spinodal:?}"));
         assert!(phases.vapour < spinodal[0][0] && phases.liquid > spinodal[0][1]);
         close(mf.pressure(&[phases.liquid]), phases.pressure, 1e-9);
-        // Equal areas: ∫ (p − p₀)/ρ² dρ = 0, of the closed form of p.
+        // Maxwell's equal areas: ∫ (p − p₀)/ρ² dρ = 0, with the closed form of p.
         let p = |rho: f64| rho * kt / (1.0 - b * rho) - a * rho * rho;
         let ends = spaced(phases.vapour.ln(), phases.liquid.ln(), 200);
         let area = |f: &dyn Fn(f64) -> f64| integral(&|u| f((p(u.exp()) - phases.pressure) / u.exp()), &ends);
@@ -158,7 +158,7 @@ fn warrens_equation_of_state() {
             close(mf.pressure(&[rho]), p, 1e-12);
         }
     }
-    // Standard DPD: α = π/30, and π/24 in the plane.
+    // Standard DPD has α = π/30, and π/24 in the plane.
     close(theory(&warren(1.0, 0.0, 3), 1.0).pair_integrals()[0] / 2.0, PI / 30.0, 1e-13);
     close(theory(&warren(1.0, 0.0, 2), 1.0).pair_integrals()[0] / 2.0, PI / 24.0, 1e-13);
     let phases = theory(&warren(-40.0, 25.0, 3), 1.0).binodal().unwrap();
@@ -199,14 +199,15 @@ fn second_moments_of_the_kernels() {
         );
         theory(&model(&text), 1.0).kernel_moments()[0]
     };
-    // [r²w] of the quadratic kernel: 2/7 R² in space, 1/5 R² in the plane; of the linear one 2/5 and 3/10.
+    // The moment [r²w] of the quadratic kernel is 2/7 R² in space and 1/5 R² in the plane; that of
+    // the linear kernel 2/5 and 3/10.
     close(moments("quadratic", 3, 1.3)[0], 2.0 / 7.0 * 1.69, 1e-13);
     close(moments("quadratic", 2, 1.3)[0], 0.2 * 1.69, 1e-13);
     close(moments("linear", 3, 1.0)[0], 0.4, 1e-13);
     close(moments("linear", 2, 1.0)[0], 0.3, 1e-13);
-    // [r⁴w] of the quadratic kernel in space, 30 (1/7 − 2/8 + 1/9) = 5/42
+    // The moment [r⁴w] of the quadratic kernel in space is 30 (1/7 − 2/8 + 1/9) = 5/42.
     close(moments("quadratic", 3, 1.0)[1], 5.0 / 42.0, 1e-13);
-    // The expansion of ŵ in k, for every kernel.
+    // The moments are the coefficients of the expansion of ŵ in k, for every kernel.
     for kind in KernelKind::ALL {
         for d in [2usize, 3] {
             let w = Kernel::new(*kind, 0.9, d);
@@ -229,13 +230,13 @@ fn symmetric_mixture() {
     let critical = composition_critical_point(&family, rho, [1.0, 50.0]).unwrap();
     close(critical.parameter, rho * (lambda - lambda_a), 1e-12);
     close(critical.composition, 0.5, 1e-6);
-    // The pressure: ρkT + ρ²(2λ c(1−c) + λ_A c² + λ_A (1−c)²)
+    // The pressure is ρkT + ρ²(2λ c(1−c) + λ_A c² + λ_A (1−c)²).
     close(critical.pressure, rho * 8.0 + rho * rho * (lambda + lambda_a) / 2.0, 1e-9);
 
     let reduced = 0.5;
     let mf = theory(&mixture(2, lambda, lambda_a, lambda_a), reduced * 8.0);
     let spinodal = mf.composition_spinodal(rho).unwrap();
-    // det f = 0: (kT/cρ + 2λ_A)(kT/(1−c)ρ + 2λ_A) = 4λ², and so c(1−c) = 1/12 here.
+    // With det f = 0, (kT/cρ + 2λ_A)(kT/(1−c)ρ + 2λ_A) = 4λ², and so c(1−c) = 1/12 here.
     assert_eq!(spinodal.len(), 1);
     close(spinodal[0][0], 0.5 - (1.0f64 / 6.0).sqrt(), 1e-12);
     close(spinodal[0][1], 0.5 + (1.0f64 / 6.0).sqrt(), 1e-12);
@@ -244,12 +245,12 @@ fn symmetric_mixture() {
         assert!((f[0] * f[3] - f[1] * f[2]).abs() < 1e-10, "{f:?}");
     }
     let phases = mf.composition_binodal(rho).unwrap();
-    // ln((1−c)/c) = 2 T_c/T (1 − 2c)
+    // The phases fulfil ln((1−c)/c) = 2 T_c/T (1 − 2c).
     let c = phases.composition[0];
     close(((1.0 - c) / c).ln(), 2.0 / reduced * (1.0 - 2.0 * c), 1e-11);
     close(phases.composition[1], 1.0 - c, 1e-11);
     close(phases.pressure[0], phases.pressure[1], 1e-11);
-    // The symmetric phases are also the ones of equal pressure.
+    // The symmetric phases have equal pressure too.
     let same = mf.composition_binodal_at_pressure(phases.pressure[0]).unwrap();
     close(same.composition[0], c, 1e-8);
     close(same.density[0], rho, 1e-9);
@@ -305,7 +306,7 @@ fn interface_of_the_symmetric_mixture_near_its_critical_point() {
     }
 }
 
-/// Far from T_c, against quadrature of the closed forms.
+/// Compares the interface far from T_c with quadrature of the closed forms.
 #[test]
 fn interface_of_the_symmetric_mixture_far_from_its_critical_point() {
     let (rho, kt_c, kt) = (10.0, 8.0, 4.0);
@@ -325,7 +326,7 @@ fn interface_of_the_van_der_waals_fluid() {
     let model = van_der_waals(2, a, b, alpha3);
     let mf = theory(&model, 0.75);
     for rho in [1.0, 20.0, 45.0f64] {
-        // Twice the bracket of eq. (29), [r²w] = 1/5.
+        // κ is twice the bracket of eq. (29), with [r²w] = 1/5.
         let bracket = -0.75 * b / (1.0 - b * rho).powi(2) + a + 2.0 * alpha3 * a * b * rho;
         close(mf.gradient_coefficients(&[rho])[0], 0.2 / 2.0 * bracket, 1e-12);
     }
@@ -339,7 +340,7 @@ fn interface_of_the_van_der_waals_fluid() {
         0.5 * (mf.second_derivatives(&found.phases[..1])[0] + mf.second_derivatives(&found.phases[1..])[0]);
     let kappa = mf.gradient_coefficients(&[middle])[0];
     close(found.tension, delta * delta * (kappa * second).sqrt() / 6.0, 2e-3);
-    // Repulsion and attraction of one range: without α₃ and far below T_c gradients are favoured.
+    // Repulsion and attraction have one range: without α₃ and far below T_c gradients are favoured.
     let cold = theory(&van_der_waals(2, 1.0, 1.0, 0.0), 0.1).interface(51);
     assert!(matches!(cold, Err(TheoryError::GradientNotPositive { .. })), "{cold:?}");
 }
@@ -358,15 +359,15 @@ fn critical_point_of_an_asymmetric_mixture_is_where_both_phases_become_one() {
     close(critical.parameter, kt, 1e-6);
     close(critical.composition, composition, 1e-3);
     assert!(critical.limit >= critical.parameter);
-    // Just below it the two phases are near it, and near each other.
+    // Just below the critical point the two phases are near it, and near each other.
     let mf = theory(&mixture(3, lambda, lambda_a, lambda_b), kt * (1.0 - 1e-5));
     let phases = mf.coexistence([composition * rho, (1.0 - composition) * rho]).unwrap();
     let [low, high] = phases.composition();
     assert!(high - low < 0.05 && low < composition && composition < high, "{phases:?}");
 }
 
-/// At a total density that is held, the phases of an asymmetric mixture are no phases: refused. Those of the mixture itself
-/// have potentials and pressure in common, and share its particles.
+/// At a fixed total density the phases of an asymmetric mixture are not in equilibrium, and refused.
+/// Those of the mixture itself have equal potentials and pressure, and contain all its particles.
 #[test]
 fn phases_of_an_asymmetric_mixture_are_in_equilibrium_or_refused() {
     let mf = theory(&mixture(3, 1.0, 0.2, 0.4), 2.0);
@@ -387,7 +388,7 @@ fn phases_of_an_asymmetric_mixture_are_in_equilibrium_or_refused() {
     close(same.composition[0], found.composition()[0], 1e-7);
     close(same.density[1], found.density()[1], 1e-7);
     assert_eq!(found.more_stable, None);
-    // A symmetric mixture has what Pagonabarraga and Frenkel have, who hold the density.
+    // For a symmetric mixture the result is that of Pagonabarraga and Frenkel, who fix the density.
     let mf = theory(&mixture(2, 1.0, 0.2, 0.2), 4.0);
     let (held, free) = (mf.composition_binodal(10.0).unwrap(), mf.coexistence([5.0, 5.0]).unwrap());
     close(free.composition()[0], held.composition[0], 1e-9);
@@ -414,7 +415,7 @@ fn a_third_phase_of_the_huggins_fluid_is_found() {
 #[test]
 fn huggins_fluid() {
     let mf = theory(&huggins(1.6), 1.0);
-    // Trofimov et al., text after eq. (56).
+    // The value is from Trofimov et al., text after eq. (56).
     assert!((mf.pressure(&[8.0, 8.0]) - 969.4).abs() < 0.05, "{}", mf.pressure(&[8.0, 8.0]));
     let family = |epsilon: f64| Ok(huggins(epsilon).at(1.0)?);
     let critical = composition_critical_point(&family, 16.0, [1.0, 3.0]).unwrap();
@@ -422,11 +423,11 @@ fn huggins_fluid() {
     close(critical.composition, 0.5, 1e-6);
     assert!(mf.composition_spinodal(16.0).unwrap().is_empty());
     let phases = theory(&huggins(1.9), 1.0).composition_binodal(16.0).unwrap();
-    // ln((1−c)/c) = (3/2) ε n0 Nm ρ (1 − 2c)
+    // The phases fulfil ln((1−c)/c) = (3/2) ε n0 Nm ρ (1 − 2c).
     let c = phases.composition[0];
     close(((1.0 - c) / c).ln(), 1.5 * 1.9 * 0.8 * (1.0 - 2.0 * c), 1e-10);
-    // The mixture is symmetric, so fixed density and fixed pressure agree, also where the equimolar
-    // mixture is locally stable at that pressure (ε_AA = 2.2).
+    // The mixture is symmetric, so that fixed density and fixed pressure agree, also where the
+    // equimolar mixture is locally stable at that pressure (ε_AA = 2.2).
     for epsilon in [1.8, 2.0, 2.2] {
         let mf = theory(&huggins(epsilon), 1.0);
         let phases = mf.composition_binodal(16.0).unwrap();
@@ -434,7 +435,7 @@ fn huggins_fluid() {
         close(same.composition[0], phases.composition[0], 1e-9);
         close(same.density[1], 16.0, 1e-9);
     }
-    // At ε_AA = 2.3 a thinner mixed phase of the same pressure comes between the two.
+    // At ε_AA = 2.3 a thinner mixed phase of the same pressure is between the two.
     let mf = theory(&huggins(2.3), 1.0);
     let symmetric = mf.composition_binodal(16.0).unwrap();
     let phases = mf.composition_binodal_at_pressure(symmetric.pressure[0]).unwrap();
@@ -515,8 +516,8 @@ fn which_fluids_have_a_thermodynamic_limit() {
     assert_eq!(collapse.structure, Structure::Uniform);
     assert!(collapse.pair < 0.0 && collapse.energy < 0.0);
     assert_eq!(limit(&spline(19.0, 9.5)), Ok(()));
-    // The model of the paper's equation of state: ∫φ > 0, but the sum of φ over a simple cubic lattice of
-    // spacing 0.3075 is −0.0474, so that enough particles on its sites collapse.
+    // For the model of the paper's equation of state ∫φ > 0, but the sum of φ over a simple cubic
+    // lattice of spacing 0.3075 is −0.0474, so that enough particles on its sites collapse.
     let lattice = limit(&spline(8.0, 4.08)).unwrap_err();
     assert!(matches!(lattice.structure, Structure::Cubic { .. }) && !lattice.is_uniform());
     close(lattice.pair, -0.0237, 1e-2);
@@ -526,7 +527,7 @@ fn which_fluids_have_a_thermodynamic_limit() {
     assert_eq!(limit(&van_der_waals(2, 1.9, 0.1, 5.0)), Ok(()));
     assert_eq!(limit(&huggins(1.6)), Ok(()));
     assert_eq!(limit(&mixture(2, 1.0, 0.2, 0.2)), Ok(()));
-    // Without the pole.
+    // This ψ has no pole.
     let linear = "title = 'l'\nspecies = ['F']\n[density.n]\nkernel = 'quadratic'\nrange = 1\n\
                   [excess_free_energy]\nF = '-0.1*n'\n";
     assert!(limit(&model(linear)).is_err());
@@ -541,7 +542,7 @@ fn mixtures_collapse_in_the_worst_composition() {
         let pairs = [pair(like), pair(unlike), None, pair(25.0)];
         warren_ab(&["A".into(), "B".into()], &pairs, 3, ForceLaw::Conservative).unwrap().at(1.0).unwrap()
     };
-    // Copositive as long as the attraction is below the geometric mean.
+    // The pair energies are copositive as long as the attraction is below the geometric mean.
     assert_eq!(thermodynamic_limit(&two(1.0, -4.99)).unwrap(), Ok(()));
     let collapse = thermodynamic_limit(&two(1.0, -5.01)).unwrap().unwrap_err();
     close(collapse.composition[0], 5.0 / 6.0, 1e-2);
@@ -550,7 +551,7 @@ fn mixtures_collapse_in_the_worst_composition() {
 
 #[test]
 fn an_integral_above_zero_is_not_enough() {
-    // Attraction in a shell: close-packed sites at its radius collapse although ∫φ > 0.
+    // The potential attracts in a shell: close-packed sites at its radius collapse although ∫φ > 0.
     let shell = model(
         "title = 'shell'\nspecies = ['F']\n[[pair]]\nbetween = ['F', 'F']\nform = 'expression'\n\
          phi = '4*max(0, 1 - 2*r)^2 - 6*max(0, 1 - 25*(r - 0.75)^2) + 5*max(0, 1 - 25*(r - 1.0)^2)'\nrange = 1.2\n",
@@ -563,7 +564,7 @@ fn an_integral_above_zero_is_not_enough() {
 
 #[test]
 fn stability_finds_clustering() {
-    // A bell-shaped force of strong repulsion: its kernel's transform is negative somewhere.
+    // A bell-shaped force repels strongly: its kernel's transform is negative somewhere.
     let text = |kernel: &str| {
         format!(
             "title = 'c'\nspecies = ['F']\n[density.n]\nkernel = '{kernel}'\nrange = 1\n\
@@ -610,8 +611,8 @@ fn singularities_are_found() {
     assert!(mixture.iter().any(|s| s.kind == SingularityKind::Edge && (s.density - 20.0).abs() < 1e-9));
 }
 
-/// What a run continues ψ as beyond the bounds of a density, mean field does too: value, slopes and curvatures against the
-/// rule written out, for one variable and for two at once, and for a curve.
+/// Mean field continues ψ beyond the bounds of a density as a run does: compares value, slopes and
+/// curvatures with the rule, for one variable, for two at once, and for a curve.
 #[test]
 fn bounds_continue_the_free_energy() {
     let text = |bounds: &str| {
@@ -622,7 +623,7 @@ fn bounds_continue_the_free_energy() {
     };
     let linear = theory(&text("bounds = [1.0, 2.0]"), 1.0);
     let constant = theory(&text("bounds = [1.0, 2.0]\nbelow = 'constant'"), 1.0);
-    // n_A = 3 above, n_B = 0.5 below: (8 + 12 + 6)(1 − 1 + ¼) and (8 + 12 + 6)(1 − 1).
+    // n_A = 3 is above its bound, n_B = 0.5 below: (8 + 12 + 6)(1 − 1 + ¼) and (8 + 12 + 6)(1 − 1).
     let psi = linear.psi(0, &[3.0, 0.5]);
     close(psi.value, 26.0 * 0.25 + 1.5, 1e-14);
     close(psi.gradient[0], 24.0 * 0.25, 1e-14);
@@ -634,18 +635,18 @@ fn bounds_continue_the_free_energy() {
     assert!((psi.value - 1.5).abs() < 1e-13, "{}", psi.value);
     close(psi.gradient[1], 26.0 * 2.0 + 3.0, 1e-14);
     assert!(psi.hessian[3].abs() < 1e-13);
-    // Within one bound and beyond the other.
+    // One variable is within its bounds, the other beyond.
     let psi = linear.psi(0, &[1.5, 3.0]);
     close(psi.gradient[0], 3.0 * 2.25 * 9.0, 1e-14);
     close(psi.hessian[1], 3.0 * 2.25 * 6.0, 1e-14);
     close(psi.hessian[0], 6.0 * 1.5 * 9.0, 1e-14);
-    // Below, the logarithm goes on from 1: −1 − ½, and 1.5² beside it.
+    // Below its bound the logarithm continues from 1: −1 − ½, plus 1.5².
     close(linear.psi(1, &[0.0, 1.5]).value, 0.75, 1e-14);
     let curve = model(
         "title = 'c'\nspecies = ['F']\n[density.n]\nkernel = 'quadratic'\nrange = 1\nbounds = [1.0, 2.0]\n\
          [excess_free_energy]\nF = { pressure = 'rho*kT + rho^3' }\n",
     );
-    // ψ′ = n, so at 3 as within; p = ρkT + ρ²ψ′.
+    // The slope is ψ′ = n, at 3 as within the bounds; p = ρkT + ρ²ψ′.
     close(theory(&curve, 1.0).pressure(&[3.0]), 3.0 + 27.0, 1e-9);
     close(theory(&curve, 1.0).pressure(&[1.5]), 1.5 + 1.5f64.powi(3), 1e-9);
 }

@@ -1,5 +1,5 @@
-//! The plain engine as a host with ghosts has it: periodic images as ghosts, slopes forwarded to them, forces, energies and
-//! virials brought home.
+//! Runs the engine as a host with ghosts does: periodic images are ghosts, slopes are copied to them,
+//! and forces, energies and virials are returned to the owners.
 
 use psidpd_core::engine::pair_sums::PairSums;
 use psidpd_core::engine::{
@@ -7,7 +7,7 @@ use psidpd_core::engine::{
 };
 use psidpd_core::model::Fluid;
 
-/// Particles in a box.
+/// Owned particles in a box.
 #[derive(Clone, Copy)]
 pub struct Owned<'a> {
     pub domain: &'a PeriodicBox,
@@ -17,7 +17,7 @@ pub struct Owned<'a> {
     pub tag: &'a [i32],
 }
 
-/// What the engine says of them.
+/// Results of an evaluation.
 #[allow(dead_code)] // Not every user of this module looks at all of it.
 pub struct Outcome {
     pub tally: Tally,
@@ -29,7 +29,7 @@ pub struct Outcome {
     pub out_of_bounds: [u64; 2],
 }
 
-/// One evaluation of everything, with drag and noise if there is a step.
+/// Evaluates all results, with drag and noise if there is a step.
 pub fn evaluate(fluid: &Fluid, c: Owned, newton: Newton, step: Option<Step>) -> Outcome {
     let mut engine = PairSums::new(fluid).unwrap();
     let owned = c.x.len();
@@ -51,7 +51,7 @@ pub fn evaluate(fluid: &Fluid, c: Owned, newton: Newton, step: Option<Step>) -> 
     let mut virial = engine.particle_virial().to_vec();
     if newton == Newton::On {
         images.reverse(&mut forces);
-        // Bring energies and virials of ghosts home, three numbers at a time.
+        // The loop adds energies and virials of ghosts to their owners, three numbers at a time.
         let mut low: Vec<[f64; 3]> = virial.iter().map(|w| [w[0], w[1], w[2]]).collect();
         let mut high: Vec<[f64; 3]> = virial.iter().map(|w| [w[3], w[4], w[5]]).collect();
         let mut e: Vec<[f64; 3]> = energy.iter().map(|e| [*e, 0.0, 0.0]).collect();

@@ -1,5 +1,5 @@
-//! Threads that do one piece of work together, and slices that they share. A crate of its own, so that all orders in which
-//! the threads may run can be tested without building the engine.
+//! Threads that share the work of one function, and slices that they share. A crate of its own, so that
+//! tests can explore all orders of the threads without building the engine.
 
 #![warn(missing_docs)]
 

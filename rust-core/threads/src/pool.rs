@@ -1,9 +1,9 @@
-//! Threads that do one piece of work together, again and again.
+//! A pool of threads that repeatedly share the work of one function.
 //!
-//! The thread that calls [`Pool::run`] takes the pool's turn, so that there is one piece of work at a time. It counts the
-//! workers as busy, leaves a pointer to the work, and moves the epoch on, which calls the workers. Each worker does its
-//! part and counts itself down. The caller does its own part and returns when no worker is busy: the work that it has
-//! borrowed is in use no longer.
+//! The thread that calls [`Pool::run`] locks the pool's turn, so that there is one piece of work at a
+//! time. It marks the workers as busy, stores a pointer to the work, and increments the epoch, which
+//! starts the workers. Each worker does its part and marks itself as done. The caller does its own part
+//! and returns when no worker is busy: then no thread uses the borrowed work.
 
 mod sync;
 
@@ -14,23 +14,23 @@ use sync::{
     Arc, AtomicBool, AtomicUsize, Builder, Condvar, JoinHandle, Mutex, Ordering, spin_loop, thread_local,
 };
 
-/// Threads that do one piece of work together, many times a millisecond: they wait for the next piece, and for each other, by
-/// spinning for a while, then asleep. Where there are more threads than processors for them they sleep at once, so that those
-/// that have work get the processors.
+/// Threads that share work many times a millisecond: they wait for the next piece, and for each other,
+/// by spinning for a while, and then sleep. If there are more threads than processors they sleep at
+/// once, so that threads with work get the processors.
 ///
-/// Pieces of work never overlap: a second thread that calls [`Pool::run`] waits until the first is done. Work that calls
-/// [`Pool::run`] of the pool it runs on does all parts of the inner piece where it is. So does a process that was forked from
-/// the one that made the pool: it has none of the workers.
+/// Pieces of work never overlap: a second thread that calls [`Pool::run`] waits until the first is
+/// done. If work calls [`Pool::run`] of its own pool, the calling thread does all parts of the inner
+/// piece. The same holds in a process that was forked from the one with the pool: it has no workers.
 pub struct Pool {
     shared: Arc<Shared>,
     workers: Vec<JoinHandle<()>>,
-    /// The process that made the pool.
+    /// Identifier of the process that made the pool.
     process: u32,
-    /// Locked as long as a piece of work is in hand.
+    /// Locked while a piece of work runs.
     turn: Mutex<()>,
 }
 
-/// A number of threads that no pool has.
+/// The error of a number of threads that no pool can have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ThreadCount(pub usize);
 
@@ -42,57 +42,58 @@ impl std::fmt::Display for ThreadCount {
 
 impl std::error::Error for ThreadCount {}
 
-/// A piece of work: called with the number of the thread. The pointer is only followed while [`Pool::run`], which
-/// holds the reference it came from, waits for the workers.
+/// A piece of work, which is called with the number of the thread. The pointer is used only while
+/// [`Pool::run`], which holds the reference, waits for the workers.
 #[derive(Clone, Copy)]
 struct Work(*const (dyn Fn(usize) + Sync));
 
-// SAFETY: what is pointed to is `Sync`, and outlives every use; see `Pool::run`.
+// SAFETY: the function is `Sync`, and `Pool::run` keeps it alive until every worker is done.
 unsafe impl Send for Work {}
 
 struct Shared {
-    /// Counts pieces of work; a change calls the workers.
+    /// Number of pieces of work; a change starts the workers.
     epoch: AtomicUsize,
-    /// Workers not done with the present piece.
+    /// Number of workers that have not finished the present piece.
     busy: AtomicUsize,
     /// Whether a worker panicked in the present piece.
     failed: AtomicBool,
     stop: AtomicBool,
     work: Mutex<Option<Work>>,
-    /// Workers that sleep; changed with `work` locked, so that none is missed.
+    /// Number of sleeping workers; changes only with `work` locked, so that none is missed.
     asleep: AtomicUsize,
     called: Condvar,
-    /// Locked by a caller that goes to sleep, and by the last worker that is done before it wakes the caller.
+    /// Locked by a caller before it sleeps, and by the last worker before it wakes the caller.
     waits: Mutex<()>,
     done: Condvar,
-    /// How often a thread looks before it goes to sleep.
+    /// Number of checks before a thread sleeps.
     spins: usize,
 }
 
-/// How often a thread looks for work, or for the others, before it goes to sleep: for 50 to 200 microseconds, as long as a processor
-/// takes to pause.
+/// Number of checks for work, or for the other threads, before a thread sleeps: they take 50 to 200
+/// microseconds, depending on the processor's pause instruction.
 const SPINS: usize = if cfg!(any(loom, miri)) { 1 } else { 4000 };
 
 thread_local! {
-    /// The pools whose work this thread is doing, each by the address of what its threads share.
-    // The macro of loom takes no constants.
+    /// The pools whose work this thread is doing, each by the address of its shared data.
+    // Loom's macro does not accept constants.
     #[allow(clippy::missing_const_for_thread_local)]
     static WITHIN: RefCell<Vec<usize>> = RefCell::new(Vec::new());
 }
 
 impl Pool {
-    /// More than any machine has cores. Tens of thousands run into limits of the system that end the program.
+    /// Largest number of threads, more than machines have cores. Tens of thousands exceed limits of
+    /// the system and end the program.
     pub const MOST: usize = 1024;
 
-    /// A number of threads from outside, if a pool can have it.
+    /// Checks a number of threads from outside.
     ///
     /// # Errors
-    /// None, or more than [`Pool::MOST`].
+    /// Fails for zero, and for more than [`Pool::MOST`].
     pub fn count(threads: usize) -> Result<NonZeroUsize, ThreadCount> {
         NonZeroUsize::new(threads).filter(|n| n.get() <= Pool::MOST).ok_or(ThreadCount(threads))
     }
 
-    /// A pool of `threads`, the caller's among them; at most [`Pool::MOST`].
+    /// Creates a pool of `threads` threads, including the caller's; at most [`Pool::MOST`].
     pub fn new(threads: NonZeroUsize) -> Pool {
         let shared = Arc::new(Shared {
             epoch: AtomicUsize::new(0),
@@ -110,7 +111,7 @@ impl Pool {
             let shared = shared.clone();
             Builder::new().name(format!("psidpd-{number}")).spawn(move || worker(&shared, number))
         };
-        // With fewer threads than asked for the work is done all the same.
+        // If the system creates fewer threads, these do all the work.
         let workers = (1..threads.get().min(Pool::MOST)).map_while(|number| spawn(number).ok()).collect();
         Pool { shared, workers, process: std::process::id(), turn: Mutex::new(()) }
     }
@@ -120,27 +121,27 @@ impl Pool {
         self.process != std::process::id()
     }
 
-    /// How many threads there are.
+    /// The number of threads, including the caller's.
     pub fn threads(&self) -> usize {
         1 + self.workers.len()
     }
 
-    /// Calls `work` once with each number of a thread, on that thread, and waits for all. If another thread's work is in
-    /// hand, waits for that first. Called from work of this pool, or in a forked process, it calls `work` with one number after
-    /// the other on the thread that it is called on.
+    /// Calls `work` once with each number of a thread, on that thread, and waits for all. If another
+    /// piece of work runs, waits for it first. In work of this pool, and in a forked process, the
+    /// calling thread calls `work` with all numbers in turn.
     ///
     /// # Panics
-    /// If `work` panics on any thread.
+    /// Panics if `work` panics on any thread.
     pub fn run(&self, work: &(dyn Fn(usize) + Sync)) {
         if self.workers.is_empty() || self.is_forked() || Within::is_inside(&self.shared) {
             return (0..self.threads()).for_each(work);
         }
-        // Dropped in the opposite order: the turn ends when no worker is busy.
+        // Locals are dropped in the opposite order: the turn ends when no worker is busy.
         let _turn = self.turn.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
         let _within = Within::enter(&self.shared);
-        // SAFETY: the lifetime is dropped from the type only. Workers follow the pointer only in between `call` and
-        // counting themselves down, and `Wait` keeps this function from returning or unwinding before all have; the turn
-        // keeps other callers from counting workers as busy, or calling them, meanwhile.
+        // SAFETY: only the lifetime is removed from the type. Workers use the pointer only between
+        // `call` and marking themselves as done, and `Wait` keeps this function from returning or
+        // unwinding before all have; the turn keeps other callers from starting workers meanwhile.
         let pointer: *const (dyn Fn(usize) + Sync + 'static) = unsafe { std::mem::transmute(work) };
         self.shared.failed.store(false, Ordering::Relaxed);
         self.shared.busy.store(self.workers.len(), Ordering::Relaxed);
@@ -151,18 +152,19 @@ impl Pool {
         assert!(!self.shared.failed.load(Ordering::Relaxed), "a worker thread panicked");
     }
 
-    /// Calls `work` once with each of `things`, which are shared among the threads: as many things as there are threads
-    /// get one each, in their order. One alone is done here.
+    /// Calls `work` once with each of `things`, which are divided among the threads: as many things as
+    /// there are threads get one each, in their order. The calling thread does a single thing.
     ///
     /// # Panics
-    /// If `work` panics on any thread.
+    /// Panics if `work` panics on any thread.
     pub fn each<T: Send>(&self, things: &mut [T], work: impl Fn(&mut T) + Sync) {
         if let [thing] = things {
             return work(thing);
         }
         let (threads, things) = (self.threads(), SharedSlice::new(things));
         self.run(&|t| {
-            // SAFETY: `run` calls this once for each number of a thread, and parts of different numbers are disjoint.
+            // SAFETY: `run` calls this once for each number of a thread, and `part` makes
+            // ranges of different numbers disjoint.
             let part = unsafe { things.slice_mut(part(things.len(), t, threads)) };
             part.iter_mut().for_each(&work);
         });
@@ -170,7 +172,7 @@ impl Pool {
 }
 
 impl Shared {
-    /// Calls the workers to the next piece of work.
+    /// Starts the workers on the next piece of work.
     fn call(&self, work: Option<Work>) {
         let asleep = {
             let mut slot = self.work.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
@@ -178,14 +180,14 @@ impl Shared {
             self.epoch.fetch_add(1, Ordering::Release);
             self.asleep.load(Ordering::Relaxed) > 0
         };
-        // A call of the system, which costs more than many a piece of work.
+        // Waking takes a system call, which costs more than many a piece of work.
         if asleep {
             self.called.notify_all();
         }
     }
 }
 
-/// Notes that this thread does work of a pool, until it goes.
+/// Marks this thread as doing work of a pool until the value is dropped.
 struct Within;
 
 impl Within {
@@ -209,7 +211,7 @@ fn address(shared: &Arc<Shared>) -> usize {
     std::ptr::from_ref::<Shared>(shared).addr()
 }
 
-/// Waits for the workers when it goes.
+/// Waits for the workers when it is dropped.
 struct Wait<'a>(&'a Shared);
 
 impl Drop for Wait<'_> {
@@ -252,13 +254,13 @@ fn worker(shared: &Arc<Shared>, number: usize) {
             return;
         }
         let Some(Work(work)) = work else { continue };
-        // SAFETY: this worker is busy, and `Pool::run` holds the reference until none is.
+        // SAFETY: this worker is busy, and `Pool::run` holds the reference until no worker is.
         let work = unsafe { &*work };
         if std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| work(number))).is_err() {
             shared.failed.store(true, Ordering::Relaxed);
         }
         if shared.busy.fetch_sub(1, Ordering::Release) == 1 {
-            // A caller that saw this worker busy is asleep once the lock can be had.
+            // A caller that saw this worker busy is asleep once the lock is free.
             drop(shared.waits.lock());
             shared.done.notify_one();
         }
@@ -274,7 +276,7 @@ impl std::fmt::Debug for Pool {
 impl Drop for Pool {
     fn drop(&mut self) {
         if self.is_forked() {
-            // The workers are the parent's: here nobody would ever join.
+            // The workers are threads of the parent process: joining them here would never end.
             return self.workers.drain(..).for_each(std::mem::forget);
         }
         self.shared.stop.store(true, Ordering::Relaxed);
@@ -285,7 +287,7 @@ impl Drop for Pool {
     }
 }
 
-/// How many processors this process may use; more than any pool has where that is not known.
+/// Number of processors that this process may use; more than any pool has if it is unknown.
 #[must_use]
 pub fn processors() -> usize {
     std::thread::available_parallelism().map_or(usize::MAX, NonZeroUsize::get)

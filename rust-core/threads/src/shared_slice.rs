@@ -1,10 +1,10 @@
 use std::marker::PhantomData;
 use std::ops::Range;
 
-/// A slice that several threads work on, each on elements of its own.
+/// A slice whose elements are divided among several threads.
 ///
-/// While it lives the slice is mutably borrowed, so nobody reaches the elements in another way, and a `Vec` behind them
-/// stays where it is. Which thread may access which elements is the promise of those who call the unsafe functions.
+/// While it lives the slice is mutably borrowed, so that no other code accesses the elements, and a `Vec` behind
+/// them is not reallocated. Callers of the unsafe functions promise which thread accesses which elements.
 pub struct SharedSlice<'a, T> {
     first: *mut T,
     len: usize,
@@ -19,10 +19,10 @@ impl<T> Clone for SharedSlice<'_, T> {
 
 impl<T> Copy for SharedSlice<'_, T> {}
 
-// SAFETY: it stands for a mutable borrow, which may be sent where `T` may.
+// SAFETY: the value is a mutable borrow, which may be sent if `T` may.
 unsafe impl<T: Send> Send for SharedSlice<'_, T> {}
-// SAFETY: every access to an element is through an unsafe function, whose caller promises that no other thread accesses
-// the element meanwhile, but for threads that all read, of a `T` that is `Sync`.
+// SAFETY: every access to an element is through an unsafe function, whose caller promises that no other
+// thread accesses the element meanwhile, except that several threads may read a `T` that is `Sync`.
 unsafe impl<T: Send> Sync for SharedSlice<'_, T> {}
 
 impl<'a, T> SharedSlice<'a, T> {
@@ -31,57 +31,58 @@ impl<'a, T> SharedSlice<'a, T> {
         SharedSlice { first: slice.as_mut_ptr(), len: slice.len(), borrowed: PhantomData }
     }
 
-    /// How many elements there are.
+    /// The number of elements.
     pub fn len(self) -> usize {
         self.len
     }
 
-    /// Whether there are none.
+    /// Whether the slice has no elements.
     pub fn is_empty(self) -> bool {
         self.len == 0
     }
 
-    /// The first element, to read from.
+    /// A pointer to the first element, for reading.
     #[inline(always)]
     pub fn as_ptr(self) -> *const T {
         self.first
     }
 
-    /// Element `at`, or the end.
+    /// A pointer to element `at`, or to the end.
     ///
     /// # Safety
-    /// `at` is no more than the number of elements.
+    /// `at` is at most the number of elements.
     #[inline(always)]
     pub unsafe fn at(self, at: usize) -> *mut T {
         debug_assert!(at <= self.len);
-        // SAFETY: within the slice or one past its end, as the caller promises.
+        // SAFETY: the caller promises an element of the slice, or one past its end.
         unsafe { self.first.add(at) }
     }
 
-    /// Elements to read and write.
+    /// The elements of a range, for reading and writing.
     ///
     /// # Safety
-    /// While the result is in use nobody else accesses these elements.
+    /// No other thread accesses these elements while the result is in use.
     #[allow(clippy::mut_from_ref)] // Elements differ from call to call, as the caller promises.
     #[inline]
     pub unsafe fn slice_mut(self, range: Range<usize>) -> &'a mut [T] {
         assert!(range.start <= range.end && range.end <= self.len, "a range of the slice");
-        // SAFETY: within the slice, which is mutably borrowed for `'a`; nobody else accesses these elements, as the
-        // caller promises.
+        // SAFETY: the range is in the slice, which is mutably borrowed for `'a`; the caller promises
+        // that no other thread accesses these elements.
         unsafe { std::slice::from_raw_parts_mut(self.first.add(range.start), range.len()) }
     }
 
-    /// Elements to read.
+    /// The elements of a range, for reading.
     ///
     /// # Safety
-    /// While the result is in use nobody writes these elements.
+    /// No thread writes these elements while the result is in use.
     #[inline]
     pub unsafe fn slice(self, range: Range<usize>) -> &'a [T]
     where
         T: Sync,
     {
         assert!(range.start <= range.end && range.end <= self.len, "a range of the slice");
-        // SAFETY: within the slice, which is borrowed for `'a`; nobody writes these elements, as the caller promises.
+        // SAFETY: the range is in the slice, which is borrowed for `'a`; the caller promises that
+        // no thread writes these elements.
         unsafe { std::slice::from_raw_parts(self.first.add(range.start), range.len()) }
     }
 }

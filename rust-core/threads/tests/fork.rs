@@ -1,4 +1,4 @@
-//! A pool in a process that was forked from the one that made it.
+//! Tests a pool in a process that was forked from the one with the pool.
 #![cfg(not(any(loom, miri)))]
 
 use psidpd_threads::Pool;
@@ -26,15 +26,15 @@ fn a_forked_process_does_all_the_work_and_ends() {
     // SAFETY: the child takes no lock that another thread may have held: it allocates nothing, uses the pool, and ends.
     let child = unsafe { fork() };
     if child == 0 {
-        // SAFETY: both take numbers. A child that hangs is ended by the signal, and then its status is not 0.
+        // SAFETY: `alarm` takes a number. The signal ends a child that hangs, and then its status is not 0.
         unsafe { alarm(20) };
         let right = sum() == 6;
         drop(pool);
-        // SAFETY: as above.
+        // SAFETY: `_exit` takes a number, and ends the child.
         unsafe { _exit(i32::from(!right)) }
     }
     let mut status = -1;
-    // SAFETY: the status is a number of this function.
+    // SAFETY: `status` is a local variable of this function.
     assert_eq!(unsafe { waitpid(child, &raw mut status, 0) }, child);
     assert_eq!(status, 0, "the child was wrong, or hung");
     assert_eq!(sum(), 6);

@@ -13,29 +13,29 @@ use std::sync::Arc;
 /// `ψ(n)` of the total of one density, `n = Σ_β ñ_β`.
 #[derive(Debug, Clone)]
 pub struct Curve {
-    /// Which density, by its place in [`Fluid::densities`](super::Fluid::densities).
+    /// Index of the density in [`Fluid::densities`](super::Fluid::densities).
     pub density: usize,
-    /// The function.
+    /// The function `ψ(n)`.
     pub form: CurveForm,
 }
 
-/// Where a curve comes from.
+/// The source of a curve.
 #[derive(Debug, Clone)]
 pub enum CurveForm {
-    /// Interpolated.
+    /// A spline through a table of `ψ(n)`.
     Table(Arc<Spline>),
-    /// From a pressure `p(ρ)`.
+    /// An equation of state `p(ρ)`.
     Pressure(Arc<Pressure>),
 }
 
 /// `ψ`, `ψ′` and `ψ″` of a block of densities.
 #[derive(Debug, Clone, Default)]
 pub struct CurveBlock {
-    /// `ψ(n)`.
+    /// Values `ψ(n)`.
     pub psi: Vec<f64>,
-    /// `ψ′(n)`.
+    /// Slopes `ψ′(n)`.
     pub slope: Vec<f64>,
-    /// `ψ″(n)`.
+    /// Second derivatives `ψ″(n)`.
     pub curvature: Vec<f64>,
     work: Vec<f64>,
     out: Vec<f64>,
@@ -70,7 +70,7 @@ impl Curve {
         [block.psi[0], block.slope[0], block.curvature[0]]
     }
 
-    /// What it is, for people.
+    /// Describes the curve in words.
     pub fn describe(&self) -> String {
         match &self.form {
             CurveForm::Table(spline) => {

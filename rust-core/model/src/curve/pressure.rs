@@ -13,26 +13,25 @@ use crate::expression::{Formula, Program, TooLarge};
 #[derive(Debug, Clone)]
 pub struct Pressure {
     text: String,
-    /// `ψ′`, `ψ″` of the one variable ρ.
+    /// Computes `ψ′` and `ψ″` from the one variable ρ.
     program: Program,
     slope: Program,
-    /// Where panels begin or end, rising, with ψ there.
+    /// Ends of the panels, rising, and ψ at each.
     anchors: Vec<[f64; 2]>,
-    /// ψ in the panel behind each anchor, less ψ at the anchor.
+    /// ψ in the panel above each anchor, minus ψ at the anchor.
     panels: Vec<Primitive>,
     series: Option<Series>,
     tail: Option<Tail>,
 }
 
-/// `ψ′ = limit + factor ρ^power` below some density: the limit of `ψ′` as `ρ → 0`, which the formula
-/// itself, 0/0 there, does not tell.
+/// `ψ′ = limit + factor ρ^power` below some density: there the formula itself loses its digits, and is 0/0 at ρ = 0.
 #[derive(Debug, Clone, Copy)]
 struct Tail {
     below: f64,
     limit: f64,
     factor: f64,
     power: f64,
-    /// What makes ψ continuous where the tail begins.
+    /// Constant of integration that makes ψ continuous where the tail begins.
     constant: f64,
 }
 
@@ -41,7 +40,7 @@ struct Tail {
 struct Series {
     below: f64,
     coefficients: [f64; TERMS],
-    /// What makes ψ continuous where the series ends.
+    /// Constant of integration that makes ψ continuous where the series ends.
     constant: f64,
 }
 
@@ -50,26 +49,26 @@ const TERMS: usize = 7;
 /// Points of the quadrature in each panel.
 const POINTS: usize = 8;
 
-/// Panels reach from the first density this many factors of e down and up.
+/// Panels extend from the first density by this many factors of e downwards and upwards.
 const REACH: f64 = 60.0;
 
-/// The widest panel in ln ρ, and the narrowest that is tried before a singularity is assumed.
+/// Largest width of a panel in ln ρ, and smallest width that is tried before a singularity is assumed.
 const WIDEST: f64 = 0.25;
 const NARROWEST: f64 = 1e-7;
 
-/// Relative accuracy of each panel, and what rounding errors of ρ count in units of it.
+/// Relative accuracy of each panel, and the weight of rounding errors of ρ in units of it.
 const ACCURACY: f64 = 3e-14;
 const ROUNDING: f64 = 8.0 * f64::EPSILON / ACCURACY;
 
-/// The most panels on either side.
+/// Most panels below, and above, the first density.
 const MOST_PANELS: usize = 1000;
 
 impl Pressure {
-    /// From the pressure as a formula of the variable 0, ρ. The first density at which ψ′ is finite
-    /// among `start`, its doubles and halves has ψ = 0.
+    /// Builds ψ from the pressure as a formula of variable 0, which is ρ. Among `start`, its doubles
+    /// and its halves, the first density at which ψ′ is finite has ψ = 0.
     ///
     /// # Errors
-    /// A derivative grows beyond the limits of the formula engine.
+    /// Fails if a derivative grows beyond the limits of the formula engine.
     pub fn new(pressure: &Formula, kt: f64, start: f64) -> Result<Pressure, TooLarge> {
         let rho = Formula::variable(0);
         let excess = pressure.minus(&rho.times(&Formula::constant(kt))?)?;
@@ -112,7 +111,7 @@ impl Pressure {
         Ok(curve)
     }
 
-    /// The pressure as text.
+    /// The pressure as text, as the model file states it.
     pub fn text(&self) -> &str {
         &self.text
     }
@@ -123,7 +122,7 @@ impl Pressure {
         out[0]
     }
 
-    /// The far ends of panels from `first` towards lower (`direction` −1) or higher densities, with ψ there.
+    /// The far ends of panels from `first` towards lower (`direction` −1) or higher densities, and ψ there.
     fn anchors_from(&self, first: f64, direction: f64, kt: f64) -> Vec<[f64; 2]> {
         let mut found: Vec<[f64; 2]> = Vec::new();
         let (mut from, mut psi, mut width) = (first, 0.0, WIDEST);
@@ -140,15 +139,15 @@ impl Pressure {
                 found.push([to, psi]);
                 width = (2.0 * width).min(WIDEST);
             } else {
-                // Also where it is not finite.
+                // The panel is also halved where the integral is not finite.
                 width *= 0.5;
             }
         }
         found
     }
 
-    /// `∫ψ′`, and what its relative accuracy is a fraction of: `∫|ψ′|`, and more where ψ′ is so steep
-    /// that the rounding of ρ shows.
+    /// `∫ψ′`, and the quantity that its accuracy is relative to: `∫|ψ′|`, and more where ψ′ is so steep
+    /// that the rounding error of ρ matters.
     fn quadrature(&self, from: f64, to: f64) -> (f64, f64) {
         let (nodes, weights) = RULE;
         let at: [f64; POINTS] = std::array::from_fn(|k| from + (to - from) * nodes[k]);
@@ -163,19 +162,19 @@ impl Pressure {
         ((to - from) * sum, (to - from).abs() * size)
     }
 
-    /// ψ, from the nearest anchor below.
+    /// ψ, by quadrature from the nearest anchor below.
     fn integral(&self, n: f64) -> f64 {
         let after = self.anchors.partition_point(|a| a[0] <= n);
         let Some([from, value]) = after.checked_sub(1).map(|k| self.anchors[k]) else { return f64::NAN };
         match self.panels.get(after - 1) {
             Some(panel) => value + panel.at(n),
             None if from == n => value,
-            // Beyond what the panels reach there is a singularity, or nothing.
+            // Beyond the panels there is a singularity, or no pressure.
             None => f64::NAN,
         }
     }
 
-    /// See [`Curve::block`](super::Curve::block); the lists have the length of `n`.
+    /// Computes [`Curve::block`](super::Curve::block); the lists have the length of `n`.
     pub(super) fn block(&self, n: &[f64], to: &mut CurveBlock) {
         to.psi.iter_mut().zip(n).for_each(|(psi, n)| *psi = self.integral(*n));
         let lanes = n.len();
@@ -206,7 +205,7 @@ const RULE: ([f64; POINTS], [f64; POINTS]) = rule(
     [0.362683783378362, 0.3137066458778873, 0.22238103445337448, 0.10122853629037626],
 );
 
-/// From the positive half of the rule on [−1, 1].
+/// Builds the rule from the positive half of the rule on [−1, 1].
 const fn rule(x: [f64; 4], w: [f64; 4]) -> ([f64; POINTS], [f64; POINTS]) {
     let (mut nodes, mut weights) = ([0.0; POINTS], [0.0; POINTS]);
     let mut k = 0;
@@ -219,13 +218,13 @@ const fn rule(x: [f64; 4], w: [f64; 4]) -> ([f64; POINTS], [f64; POINTS]) {
 }
 
 impl Tail {
-    /// Below this part of the first density the tail takes over: low enough for one power to be all that is
-    /// left, high enough for `p − ρkT` to have its digits.
+    /// The tail begins below this fraction of the first density: low enough that only one power is
+    /// left, and high enough that `p − ρkT` keeps its digits.
     const PART: f64 = 1e-4;
 
-    /// The limit of `slope` as its argument goes to 0, if its values at halved densities close in on one:
-    /// with `s(n) = L + C n^q`, each difference of values at n and n/2 is `2^−q` times the one before. A logarithm
-    /// has differences that stay equal, a pole such that grow.
+    /// The limit of `slope` as its argument goes to 0, if its values at halved densities converge: with
+    /// `s(n) = L + C n^q`, each difference of values at n and n/2 is `2^−q` times the previous
+    /// difference. The differences of a logarithm stay equal; those of a pole grow.
     fn find(slope: &dyn Fn(f64) -> f64, start: f64) -> Option<Tail> {
         let below = Tail::PART * start;
         let values: [f64; 5] = std::array::from_fn(|k| slope(below * 0.5f64.powi(k as i32)));
@@ -235,7 +234,7 @@ impl Tail {
         }
         let ratios: [f64; 3] = std::array::from_fn(|k| steps[k + 1] / steps[k]);
         let ratio = ratios[0];
-        // A power less than 0.05 cannot be told from a logarithm.
+        // A power below 0.05 cannot be distinguished from a logarithm.
         let closes_in = ratio > 0.0 && ratio < 0.5f64.powf(0.05);
         if !closes_in || ratios.iter().any(|r| (r - ratio).abs() > 0.02 * ratio) {
             return None;
@@ -245,12 +244,12 @@ impl Tail {
         Some(Tail { below, limit, factor: (values[0] - limit) / below.powf(power), power, constant: 0.0 })
     }
 
-    /// `ψ` but for the constant.
+    /// `ψ` without the constant of integration.
     fn value(&self, n: f64) -> f64 {
         n * (self.limit + self.factor * n.powf(self.power) / (self.power + 1.0))
     }
 
-    /// `ψ′` and `ψ″`.
+    /// Derivatives `ψ′` and `ψ″`.
     fn slope(&self, n: f64) -> [f64; 2] {
         let power = self.factor * n.powf(self.power);
         [self.limit + power, self.power * self.factor * n.powf(self.power - 1.0)]
@@ -258,7 +257,7 @@ impl Tail {
 }
 
 impl Series {
-    /// The expansion at ρ = 0 if the pressure begins with ρkT.
+    /// Expands ψ at ρ = 0 if the pressure begins with ρkT.
     fn new(pressure: &Formula, kt: f64, start: f64) -> Option<Series> {
         let mut derivative = pressure.clone();
         let mut factorial = 1.0;
@@ -276,7 +275,7 @@ impl Series {
             return None;
         }
         let coefficients: [f64; TERMS] = std::array::from_fn(|k| taylor[k + 2]);
-        // The last terms tell how large those are that are left out.
+        // The last terms estimate the error of the truncated series.
         let negligible = |below: f64| {
             let term = |k: usize| coefficients[k].abs() * below.powi(k as i32);
             let largest = (0..TERMS).map(term).fold(0.0, f64::max);
@@ -286,12 +285,12 @@ impl Series {
         Some(Series { below, coefficients, constant: 0.0 })
     }
 
-    /// `ψ` but for the constant.
+    /// `ψ` without the constant of integration.
     fn value(&self, n: f64) -> f64 {
         n * self.coefficients.iter().enumerate().rev().fold(0.0, |sum, (k, c)| sum * n + c / (k + 1) as f64)
     }
 
-    /// `ψ′` and `ψ″`.
+    /// Derivatives `ψ′` and `ψ″`.
     fn slope(&self, n: f64) -> [f64; 2] {
         let fold = |[value, slope]: [f64; 2], c: &f64| [value * n + c, slope * n + value];
         self.coefficients.iter().rev().fold([0.0; 2], fold)
@@ -312,7 +311,7 @@ mod tests {
         Curve { density: 0, form: CurveForm::Pressure(Arc::new(Pressure::new(&p, kt, start).unwrap())) }
     }
 
-    /// Against ψ known in closed form, up to its constant, over many decades and up to a pole.
+    /// Compares ψ with its closed form, up to a constant, over many decades and up to a pole.
     #[test]
     fn psi_is_the_integral_of_its_slope() {
         type Psi = fn(f64) -> f64;
@@ -370,19 +369,19 @@ mod tests {
 
     #[test]
     fn broken_powers_have_their_limit_at_zero() {
-        // ψ′ = 0.9 ρ^0.6, ψ = 0.9/1.6 ρ^1.6: nothing there that an isolated particle could not have.
+        // With ψ′ = 0.9 ρ^0.6 and ψ = 0.9/1.6 ρ^1.6 an isolated particle has a finite energy.
         let broken = curve("rho*kT + 0.9*rho^2.6", 1.0, 1.0);
         let [origin, slope, _] = broken.at(0.0);
         assert!(slope.abs() < 1e-9, "{slope}");
         for n in [1e-9, 1e-6, 9.9e-5, 1.01e-4, 0.01, 3.0f64] {
             let [psi, slope, _] = broken.at(n);
-            // The limit has the digits that `p − ρkT` has where the tail begins, ψ those of its constant.
+            // The slope has the digits that `p − ρkT` has where the tail begins, and ψ the digits of its constant.
             let expected = 0.9 * n.powf(0.6);
             assert!((slope - expected).abs() < 1e-6 * expected + 1e-10, "{n}: {slope}");
             let expected = 0.9 / 1.6 * n.powf(1.6);
             assert!((psi - origin - expected).abs() < 1e-6 * expected + 1e-14, "{n}: {psi}");
         }
-        // A limit other than zero, and two powers on the way to it.
+        // The slope has a limit other than zero, and approaches it with two powers.
         let two = curve("rho*kT + 3*rho^2 + rho^2.5 + rho^3.2", 0.7, 1.0);
         assert!((two.at(0.0)[1] - 3.0).abs() < 1e-4, "{:?}", two.at(0.0));
         assert!((two.at(0.9999e-4)[1] - two.at(1.0001e-4)[1]).abs() < 1e-5);

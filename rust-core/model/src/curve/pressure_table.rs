@@ -2,14 +2,14 @@
 
 use super::Spline;
 
-/// Points of the table of ψ between the first and the last density of that of the pressure.
+/// Number of points of the table of ψ, from the first to the last density of the pressure table.
 const POINTS: usize = 2000;
 
-/// `ψ(ρ)` from the spline through `p(ρ)`: `ψ′ = (p − ρkT)/ρ²`, integrated by Simpson's rule from the first density, where
-/// ψ = 0. Beyond the ends of the table ψ goes on with a constant second derivative.
+/// `ψ(ρ)` from the spline through `p(ρ)`: `ψ′ = (p − ρkT)/ρ²`, integrated by Simpson's rule from the
+/// first density, where ψ = 0. Beyond the ends of the table ψ has a constant second derivative.
 ///
 /// # Errors
-/// A density that is not positive, or a pressure too steep to integrate; in words.
+/// Fails, in words, for a density that is not positive or a pressure too steep to integrate.
 pub fn psi(pressure: &Spline, kt: f64) -> Result<Spline, String> {
     let [low, high] = pressure.ends();
     if low <= 0.0 {

@@ -2,28 +2,28 @@
 
 use std::f64::consts::PI;
 
-/// Points at which the function is known: about as accurate as Gauss's quadrature with half as many.
+/// Number of points of the function's values: about as accurate as Gauss's quadrature with half as many.
 const POINTS: usize = 15;
 
-/// Powers that are summed side by side, so that none waits for all before it.
+/// Number of partial sums that are independent of each other.
 const LANES: usize = 4;
 
-/// `F(n) = ∫ f` from the lower end of an interval on, by the Chebyshev expansion of `f`.
+/// `F(n) = ∫ f` from the lower end of an interval, by the Chebyshev expansion of `f`.
 #[derive(Debug, Clone)]
 pub struct Primitive {
     middle: f64,
     per_half: f64,
-    /// Of the powers of (n − middle)/half from the zeroth on.
+    /// Coefficients of the powers of (n − middle)/half, from the zeroth on.
     coefficients: [[f64; LANES]; (POINTS + 1) / LANES],
 }
 
 impl Primitive {
-    /// Of the function whose values `f` finds at a list of points.
+    /// Integrates the function whose values `f` computes at a list of points.
     pub fn of(f: impl FnOnce(&[f64; POINTS]) -> [f64; POINTS], from: f64, to: f64) -> Primitive {
         let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
         let angle = |j: usize| PI * (j as f64 + 0.5) / POINTS as f64;
         let values = f(&std::array::from_fn(|j| middle + half * angle(j).cos()));
-        // 2/N Σ_j f(x_j) cos(kθ_j); zero beyond the degree.
+        // Coefficient 2/N Σ_j f(x_j) cos(kθ_j); zero beyond the degree.
         let of_f = |k: usize| match k < POINTS {
             true => {
                 (0..POINTS).map(|j| values[j] * (k as f64 * angle(j)).cos()).sum::<f64>() * 2.0
@@ -33,11 +33,11 @@ impl Primitive {
         };
         let mut primitive = Primitive { middle, per_half: half.recip(), coefficients: Default::default() };
         let powers = primitive.coefficients.as_flattened_mut();
-        // T_0 and T_1 by powers.
+        // The coefficients of T_0 and T_1 in powers.
         let [mut before, mut chebyshev] = [[0.0; POINTS + 1]; 2];
         (before[0], chebyshev[1]) = (1.0, 1.0);
         for k in 1..=POINTS {
-            // ∫T_k = T_{k+1}/2(k+1) − T_{k−1}/2(k−1)
+            // The integral is ∫T_k = T_{k+1}/2(k+1) − T_{k−1}/2(k−1).
             let of_integral = half * (of_f(k - 1) - of_f(k + 1)) / (2 * k) as f64;
             powers.iter_mut().zip(chebyshev).for_each(|(power, c)| *power += of_integral * c);
             let mut next = before.map(|c| -c);
@@ -48,7 +48,6 @@ impl Primitive {
         primitive
     }
 
-    /// Its value.
     #[inline(always)]
     pub fn at(&self, n: f64) -> f64 {
         let t = (n - self.middle) * self.per_half;

@@ -1,38 +1,38 @@
 use std::cmp::Ordering;
 
-/// A cubic spline through given points: twice continuously differentiable, third derivative
-/// continuous across the second and the last but one point ("not a knot"; C. de Boor, A Practical
-/// Guide to Splines, ch. IV). Beyond the ends it goes on with a constant second derivative.
+/// A cubic spline through given points: twice continuously differentiable, third derivative continuous
+/// across the second and the last but one point ("not a knot"; C. de Boor, A Practical Guide to
+/// Splines, ch. IV). Beyond the ends its second derivative is constant.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spline {
-    /// Where the pieces begin; one more than there are pieces.
+    /// Ends of the pieces; one more than there are pieces.
     knots: Vec<f64>,
-    /// Value and first three derivatives at each knot, of the piece that begins there; those of the
-    /// last knot have no third derivative.
+    /// Value and first three derivatives at each knot, of the piece that begins there; the third
+    /// derivative at the last knot is zero.
     pieces: Vec<[f64; 4]>,
-    /// One over the distance of the knots, if they are evenly spaced.
+    /// Reciprocal of the distance between knots, if they are evenly spaced.
     uniform: Option<f64>,
 }
 
-/// Points that no spline goes through.
+/// Reasons why there is no spline through given points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum SplineError {
-    /// Fewer than two points.
+    /// There are fewer than two points.
     #[error("a table needs at least two rows")]
     TooFew,
     /// Two abscissas are equal, or their order changes, at this point (from 0).
     #[error("the first column must rise, or fall, from row to row")]
     NotMonotone(usize),
-    /// Numbers so far apart or so close that the spline overflows.
+    /// Numbers are so far apart or so close that the spline overflows.
     #[error("the rows are too close together or too steep to interpolate")]
     NotFinite,
 }
 
 impl Spline {
-    /// The spline through `(x, y)`; `x` rises or falls strictly.
+    /// Builds the spline through `(x, y)`; `x` rises or falls strictly.
     ///
     /// # Errors
-    /// See [`SplineError`].
+    /// Fails as [`SplineError`] lists.
     pub fn new(mut x: Vec<f64>, mut y: Vec<f64>) -> Result<Spline, SplineError> {
         let count = x.len().min(y.len());
         if count < 2 {
@@ -76,7 +76,7 @@ impl Spline {
             return piece(&[value, slope, curvature, 0.0], x - self.knots[0]);
         }
         let k = match self.uniform {
-            // The guess may be off by one piece, where pieces join smoothly.
+            // The guess may be off by one piece; there the two pieces join smoothly.
             Some(inverse) => (((x - self.knots[0]) * inverse) as usize).min(last),
             None => self.knots.partition_point(|knot| *knot <= x).max(1) - 1,
         };
@@ -88,7 +88,7 @@ impl Spline {
         [self.knots[0], self.knots[self.knots.len() - 1]]
     }
 
-    /// How many points it goes through.
+    /// The number of points that the spline passes through.
     pub fn points(&self) -> usize {
         self.knots.len()
     }
@@ -112,8 +112,8 @@ fn piece(&[y, slope, curvature, third]: &[f64; 4], t: f64) -> [f64; 3] {
     ]
 }
 
-/// The second derivatives at the knots: a tridiagonal system for the inner ones, the outer ones
-/// eliminated by the condition that the third derivative does not jump next to the ends.
+/// The second derivatives at the knots, from a tridiagonal system for the inner knots; the condition
+/// that the third derivative is continuous next to the ends eliminates the outer knots.
 fn second_derivatives(h: &[f64], rise: &[f64]) -> Vec<f64> {
     let count = h.len() + 1;
     match count {
@@ -136,7 +136,7 @@ fn second_derivatives(h: &[f64], rise: &[f64]) -> Vec<f64> {
         diagonal.push(d);
         right.push(6.0 * (rise[k] - rise[k - 1]));
     }
-    // Off the diagonal, above and below row k.
+    // Entries off the diagonal, above and below row k.
     let above = |k: usize| if k == 0 { h[1] - h[0] * first } else { h[k + 1] };
     let below = |k: usize| if k == inner - 1 { h[count - 3] - h[count - 2] * last } else { h[k] };
     for k in 1..inner {

@@ -6,30 +6,30 @@ use std::io::{self, Read};
 use std::path::Path;
 use std::sync::Arc;
 
-/// The variable that allows tables outside the folder of the file that names them.
+/// The environment variable that allows tables outside the folder of the file that names them.
 const ANYWHERE: &str = "PSIDPD_TABLES_ANYWHERE";
 
-/// The largest table that is read.
+/// Largest size of a table file, in bytes.
 const LARGEST: u64 = 16 << 20;
 
-/// Two columns of a table file, and where they came from.
+/// Two columns of a table file, and the places of their rows.
 #[derive(Debug, Clone)]
 pub struct Columns {
     source: Arc<Source>,
     /// The first and the second column.
     pub columns: [Vec<f64>; 2],
-    /// Where each row is in the file.
+    /// Range of bytes of each row in the file.
     rows: Vec<std::ops::Range<usize>>,
 }
 
 impl Columns {
     /// Reads the columns called `names` from the file that `value` names, relative to `directory`.
     ///
-    /// Rows are lines of numbers separated by commas or blanks; `#` begins a comment. If the first row
-    /// is not numbers it names the columns, which may then stand in any order among others.
+    /// Rows are lines of numbers separated by commas or blanks; `#` begins a comment. A non-numeric
+    /// first row is a header, and the columns may then be in any order among others.
     ///
     /// # Errors
-    /// No such file, a row that is too short or not finite numbers, no row.
+    /// Fails without the file or without a row, and for a row that is too short or not finite numbers.
     pub fn read(value: &Value, directory: &Path, names: [&str; 2]) -> Result<Columns, FileError> {
         let path = directory.join(value.string()?.value);
         let text = read_text(&path, LARGEST).map_err(|message| {
@@ -44,10 +44,10 @@ impl Columns {
         Columns::parse(&path.display().to_string(), &text, names)
     }
 
-    /// The same from a text; `name` stands for the file in messages.
+    /// Reads the columns from a text, as [`Columns::read`]; `name` stands for the file in messages.
     ///
     /// # Errors
-    /// As [`Columns::read`].
+    /// Fails as [`Columns::read`].
     pub fn parse(name: &str, text: &str, names: [&str; 2]) -> Result<Columns, FileError> {
         let source = Arc::new(Source::unquoted(name, text));
         let mut table = Columns { source, columns: [Vec::new(), Vec::new()], rows: Vec::new() };
@@ -92,13 +92,13 @@ impl Columns {
         Ok(table)
     }
 
-    /// An error about row `row`, or about the file as a whole if there is no such row.
+    /// An error in row `row`, or in the file as a whole if there is no such row.
     pub fn error(&self, row: usize, kind: FileErrorKind) -> FileError {
         FileError::new(&self.source, self.rows.get(row).cloned().unwrap_or(0..0), "", kind)
     }
 }
 
-/// Whether the file is in the folder or in one below, wherever links lead.
+/// Whether the file is in the folder or below it, after links are resolved.
 fn lies_in(path: &Path, folder: &Path) -> bool {
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     match (path.canonicalize(), folder.canonicalize()) {
@@ -107,12 +107,12 @@ fn lies_in(path: &Path, folder: &Path) -> bool {
     }
 }
 
-/// Opens a file to read. A pipe or a device, which could keep its reader waiting, is refused.
+/// Opens a file to read. Refuses a pipe or a device, which could block the reader.
 ///
 /// # Errors
-/// It cannot be opened, or is no regular file.
+/// Fails if the file cannot be opened, or is no regular file.
 pub fn open_regular(path: &Path) -> io::Result<File> {
-    // Opening a pipe would wait for who writes to it.
+    // Opening a pipe would block until it has a writer.
     let refused = || io::Error::new(io::ErrorKind::InvalidInput, "not a regular file");
     if !std::fs::metadata(path)?.is_file() {
         return Err(refused());
@@ -120,7 +120,7 @@ pub fn open_regular(path: &Path) -> io::Result<File> {
     File::open(path)
 }
 
-/// A file's text, no more than `largest` bytes.
+/// Reads a file's text of at most `largest` bytes.
 pub(super) fn read_text(path: &Path, largest: u64) -> Result<String, String> {
     let file = open_regular(path).map_err(|e| e.to_string())?;
     let mut bytes = Vec::new();

@@ -14,22 +14,22 @@ pub struct Source {
 }
 
 impl Source {
-    /// A named text.
+    /// Keeps the text `text` of the file `name`.
     pub fn new(name: &str, text: &str) -> Source {
         Source { name: name.to_owned(), text: text.to_owned(), quoted: true }
     }
 
-    /// A named text of which messages tell lines but show none: a model file may name any file as a table.
+    /// Keeps a text whose lines messages number but never show: a model file may name any file as a table.
     pub fn unquoted(name: &str, text: &str) -> Source {
         Source { quoted: false, ..Source::new(name, text) }
     }
 
-    /// The file's name.
+    /// The file's name, as messages show it.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// The file's text, where messages may show it; else nothing.
+    /// The file's text if messages may show it; otherwise empty.
     pub fn text(&self) -> &str {
         if self.quoted { &self.text } else { "" }
     }
@@ -43,55 +43,55 @@ impl Source {
     }
 }
 
-/// What is wrong in a file.
+/// The kinds of errors in a file.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FileErrorKind {
     /// The file cannot be read.
     #[error("cannot be read: {0}")]
     Unreadable(String),
-    /// Not TOML.
+    /// The text is not TOML.
     #[error("not valid TOML: {0}")]
     Syntax(String),
     /// Brackets nest too deeply.
     #[error("brackets or dotted keys nest deeper than {0}")]
     TooDeep(usize),
-    /// A key that means nothing here.
+    /// A key is not known here.
     #[error("unknown key; known here: {known}")]
     UnknownKey {
-        /// The keys that would have been read.
+        /// The keys that are known here.
         known: String,
     },
-    /// A key that must be there.
+    /// A required key is missing.
     #[error("is missing")]
     Missing,
-    /// A value of another type.
+    /// A value has the wrong type.
     #[error("expected {expected}, found {found}")]
     WrongType {
-        /// What should stand there.
+        /// Description of the expected type.
         expected: &'static str,
-        /// What stands there.
+        /// Description of the type found.
         found: &'static str,
     },
-    /// A name that is not one of a list.
+    /// A name is not in a list of known names.
     #[error("unknown {what} \"{name}\"; known: {known}")]
     UnknownName {
-        /// What the name should be.
+        /// The kind of thing that is named.
         what: &'static str,
-        /// What was written.
+        /// The name in the file.
         name: String,
-        /// What could have been.
+        /// The known names.
         known: String,
     },
     /// A formula does not parse or does not compile.
     #[error("{0}")]
     Expression(#[from] ExpressionError),
-    /// A value out of its domain, or a set of values that do not fit together.
+    /// A value is out of its domain, or values contradict each other.
     #[error("{0}")]
     Value(String),
 }
 
-/// An error in a file: what, where, and what to do.
+/// An error in a file: its kind, its place, and advice.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FileError {
     source: Arc<Source>,
@@ -115,7 +115,7 @@ impl FileError {
         self
     }
 
-    /// The file.
+    /// The file that contains the error.
     pub fn file(&self) -> &Source {
         &self.source
     }
@@ -125,28 +125,28 @@ impl FileError {
         self.span.clone()
     }
 
-    /// The dotted key.
+    /// The dotted key of the value that is wrong.
     pub fn key(&self) -> &str {
         &self.key
     }
 
-    /// What is wrong.
+    /// The kind of the error.
     pub fn kind(&self) -> &FileErrorKind {
         &self.kind
     }
 
-    /// What to do about it.
+    /// Advice how to mend the file.
     pub fn help(&self) -> Option<&str> {
         self.help.as_deref()
     }
 
-    /// Line, from 1.
+    /// The line of the error, from 1.
     pub fn line(&self) -> usize {
         self.source.line_column(self.span.start).0
     }
 }
 
-/// The known name that was probably meant.
+/// Suggests the known name that was probably meant.
 fn suggestion(key: &str, kind: &FileErrorKind) -> Option<String> {
     let (name, known) = match kind {
         FileErrorKind::UnknownKey { known } => (key.rsplit('.').next().unwrap_or(key), known),
@@ -156,11 +156,11 @@ fn suggestion(key: &str, kind: &FileErrorKind) -> Option<String> {
     Some(format!("did you mean `{}`?", closest(name, known.split(", "))?))
 }
 
-/// The most characters of a message, and of a key in it: names may be as long as a file.
+/// Most characters of a message, and of a key in it: names may be as long as a file.
 const LONGEST: usize = 4000;
 const LONGEST_KEY: usize = 200;
 
-/// The text, or its beginning.
+/// The text, cut after `longest` characters.
 fn shortened(text: &str, longest: usize) -> Cow<'_, str> {
     match text.char_indices().nth(longest) {
         Some((end, _)) => format!("{} …", &text[..end]).into(),
@@ -168,7 +168,7 @@ fn shortened(text: &str, longest: usize) -> Cow<'_, str> {
     }
 }
 
-/// One line: `file:line: key: what (what to do)`.
+/// Formats the error in one line: `file:line: key: what (what to do)`.
 impl fmt::Display for FileError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut text = self.source.name.clone();
@@ -182,7 +182,7 @@ impl fmt::Display for FileError {
         if let Some(help) = &self.help {
             write!(text, " ({help})")?;
         }
-        // Keys and values stand in it as they were written.
+        // The message shows keys and values as the file has them, control characters included.
         f.write_str(&shortened(&printable(&text), LONGEST))
     }
 }

@@ -1,60 +1,60 @@
-//! The keys that a file may have, in tables. Schemas for editors and pages of documentation are written from
-//! them, and tests hold the readers to them.
+//! The keys that a file may have, as tables. Editor schemas and pages of documentation are generated
+//! from them, and tests compare the readers with them.
 
 use super::{FileError, FileErrorKind, Section, Value};
 
-/// A table of a file, or of one of its tables.
+/// A table of a file, or of another table.
 #[derive(Debug, Clone, Copy)]
 pub struct Table {
-    /// Where it is; the parts in capitals are names of the user's.
+    /// Path of the table; parts in capitals stand for names that the user chooses.
     pub path: &'static str,
-    /// What it is called, where its path does not say it.
+    /// Title of the table; empty where the path is the title.
     pub title: &'static str,
-    /// Whether there may be several.
+    /// Whether the file may have several tables of this kind.
     pub array: bool,
-    /// What it is for.
+    /// Purpose of the table.
     pub about: &'static str,
-    /// The key whose value decides which other keys there are, and its values; empty if there is none.
+    /// The key whose value decides which other keys the table has, and its values; empty if there is none.
     pub forms: (&'static str, &'static [&'static str]),
-    /// Its keys.
+    /// The keys of the table.
     pub keys: &'static [Key],
 }
 
-/// A key of a table.
+/// A key of a table, with its type and description.
 #[derive(Debug, Clone, Copy)]
 pub struct Key {
-    /// Its name; in capitals if any name may stand there.
+    /// Name of the key; in capitals if it stands for any name.
     pub name: &'static str,
-    /// What its value is.
+    /// Type of the value.
     pub value: ValueKind,
-    /// Whether it may be left out.
+    /// Whether the key may be left out.
     pub need: Need,
-    /// The forms that have it; all if empty.
+    /// The forms of the table that have this key; empty if all have it.
     pub forms: &'static [&'static str],
-    /// What it means.
+    /// Description of the value.
     pub about: &'static str,
-    /// A part of a file that has it, or its value.
+    /// A part of a file with the key, or only its value.
     pub example: &'static str,
 }
 
 /// Whether a key may be left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Need {
-    /// A file is refused without it.
+    /// A file without the key is refused.
     Required,
-    /// It may be left out; its description says what that means.
+    /// The key may be left out; its description says what that means.
     Optional,
-    /// It may be left out, and is this then.
+    /// The key may be left out and then has this value.
     Default(&'static str),
 }
 
-/// A file is refused without the key.
+/// A file without the key is refused.
 pub const REQUIRED: Need = Need::Required;
 /// The key may be left out.
 pub const OPTIONAL: Need = Need::Optional;
 
 impl Key {
-    /// What the key is if it is left out; empty where its description says it.
+    /// The value of the key if it is left out; empty where its description states it.
     pub fn default(&self) -> &'static str {
         if let Need::Default(text) = self.need { text } else { "" }
     }
@@ -83,16 +83,16 @@ pub const fn form_key(
     Key { forms, ..key(name, value, need, about, example) }
 }
 
-/// What the value of a key may be.
+/// The types of values.
 #[derive(Debug, Clone, Copy)]
 pub enum ValueKind {
-    /// Any string.
+    /// The value may be any string.
     Text,
-    /// A string with the name of a file, relative to the file with the key.
+    /// A string with the name of a file, relative to the file that contains the key.
     File,
-    /// The same of a table, which must not lie elsewhere.
+    /// A string with the name of a table file, which must lie in the folder of the file or below.
     TableFile,
-    /// A number.
+    /// An integer or a decimal number.
     Number,
     /// A number, or a string with a formula of the parameters and kT.
     NumberOrFormula,
@@ -102,29 +102,29 @@ pub enum ValueKind {
     Positive,
     /// A whole number from 0.
     Count,
-    /// 2 or 3.
+    /// A number of dimensions, 2 or 3.
     Dimensions,
-    /// True or false.
+    /// A truth value, true or false.
     Flag,
-    /// Two numbers or formulas, rising.
+    /// Two numbers or formulas, the lower first.
     Bounds,
     /// A number for each direction.
     Point,
-    /// A length, or one for each direction.
+    /// One length, or one for each direction.
     Lengths,
-    /// The same, or the table `[box]`.
+    /// One length, one for each direction, or the table `[box]`.
     Box,
-    /// One of some names.
+    /// One name of a list.
     Choice(fn() -> Vec<&'static str>),
-    /// One of some names, for all directions or for each.
+    /// One name of a list, for all directions or for each.
     EachOf(fn() -> Vec<&'static str>),
     /// A temperature, or the two ends of a ramp.
     Temperature,
-    /// The names of all species.
+    /// An array with the names of all species.
     Species,
-    /// Two species.
+    /// An array with the names of two species.
     Between,
-    /// Names.
+    /// An array of names.
     Names,
     /// A table of fractions by species.
     Fractions,
@@ -132,18 +132,18 @@ pub enum ValueKind {
     Ids,
     /// A string with a formula.
     Formula,
-    /// A polynomial, or a table of them by pairs of species.
+    /// A polynomial, or a table of polynomials by pairs of species.
     Correction,
-    /// A formula, or a table that stands for one.
+    /// A formula, or a table that replaces one.
     Excess,
     /// A table of formulas by the names of density variables.
     Slopes,
-    /// Something else, in these words.
+    /// Any other type, described in these words.
     Words(&'static str),
 }
 
 impl ValueKind {
-    /// In words.
+    /// Describes the type in words.
     pub fn describe(&self) -> String {
         let list = |choices: &fn() -> Vec<&'static str>| {
             choices().iter().map(|c| format!("`\"{c}\"`")).collect::<Vec<_>>().join(", ")
@@ -188,12 +188,12 @@ impl ValueKind {
 }
 
 impl Table {
-    /// The keys that a table of some form has; all without one.
+    /// The keys that a table of this form has; all keys if `form` is `None`.
     pub fn keys_of<'a>(&self, form: Option<&'a str>) -> impl Iterator<Item = &'static Key> + use<'a> {
         self.keys.iter().filter(move |k| k.forms.is_empty() || form.is_none_or(|f| k.forms.contains(&f)))
     }
 
-    /// A chapter of a page for each of its keys, with its example.
+    /// Writes a chapter for each key, with its example.
     pub fn reference(&self) -> String {
         let mut text = format!("{}\n", self.about);
         for key in self.keys {
@@ -214,18 +214,17 @@ impl Table {
     }
 }
 
-/// What to say of a file with an error: of what is misspelt rather than of what is missing for it. `more` are tables that
-/// are described elsewhere.
+/// Reports a misspelt key before a key that is missing because of it. `more` are tables that are described elsewhere.
 pub fn strangers_first(error: FileError, root: &Section, tables: &[Table], more: &[&str]) -> FileError {
     match error.kind() {
-        // Of another file, or said already.
+        // The error is about another file, or already names the key.
         _ if error.file() != root.source().as_ref() => error,
         FileErrorKind::UnknownKey { .. } => error,
         _ => refuse_strangers(root, tables, more).err().unwrap_or(error),
     }
 }
 
-/// An error at `key` of a file that is of another kind than the one asked for.
+/// An error at `key`, for a file of another kind than the one expected.
 pub fn of_another_kind(root: &Section, key: &str, what: &str) -> FileError {
     let span = root.get(key).map_or(0..0, |value| value.span());
     FileError::new(root.source(), span, key, FileErrorKind::Value(what.to_owned()))
@@ -235,13 +234,13 @@ fn refuse_strangers(root: &Section, tables: &[Table], more: &[&str]) -> Result<(
     for table in tables {
         let first = |path: &'static str| path.split('.').next().unwrap_or_default();
         for section in sections(root, table.path) {
-            // A key of another form is not misspelt.
+            // A key of another form of the table is spelt correctly.
             let mut known: Vec<&str> = table.keys.iter().map(|k| k.name).collect();
             if table.path.is_empty() {
                 known.extend(tables.iter().map(|t| first(t.path)).filter(|name| !name.is_empty()));
                 known.extend(more);
             }
-            // Names of the user's.
+            // A table that has keys with names of the user's choice has no misspelt keys.
             if known.iter().any(|name| name.chars().all(|c| c.is_ascii_uppercase()) && name.len() > 1) {
                 continue;
             }
@@ -273,7 +272,8 @@ fn sections<'a>(root: &Section<'a>, path: &str) -> Vec<Section<'a>> {
     root.get(first).map_or_else(Vec::new, inner)
 }
 
-/// Keys in short: `"name" [FORMS]: VALUE, NEED, "meaning" => "example";`. The forms are left out where all have the key.
+/// Declares keys in short: `"name" [FORMS]: VALUE, NEED, "meaning" => "example";`. The forms are
+/// left out where all have the key.
 #[macro_export]
 macro_rules! keys {
     ($($name:literal $([$forms:expr])?: $value:expr, $need:expr, $about:expr => $example:expr;)*) => {

@@ -1,7 +1,7 @@
 //! Reading TOML files strictly, with errors that name file, line and key.
 //!
-//! Model files and scene files go through here. A [`Section`] hands out each key at most once and
-//! remembers it, so that [`Section::finish`] can name the keys that nobody asked for.
+//! Model files and scene files are read here. A [`Section`] returns each key at most once and remembers
+//! it, so that [`Section::finish`] can name the keys that no reader asked for.
 
 mod columns;
 mod error;
@@ -26,17 +26,17 @@ pub struct Document {
     root: node::Table,
 }
 
-/// The largest file that is read: far above any real one, far below trouble.
+/// Largest size of a file, in bytes: far above any real file, and small enough to read.
 const LARGEST: u64 = 16 << 20;
 
-/// How deeply brackets may nest; the TOML reader recurses.
+/// Deepest nesting of brackets; the TOML reader recurses.
 const DEEPEST: usize = 64;
 
 impl Document {
-    /// Reads a file.
+    /// Reads the file at `path`.
     ///
     /// # Errors
-    /// The file cannot be read, is too large, is not UTF-8 or not TOML.
+    /// Fails if the file cannot be read, is too large, is not UTF-8 or not TOML.
     pub fn open(path: &Path) -> Result<Document, FileError> {
         let name = path.display().to_string();
         let unreadable = |message: String| {
@@ -48,10 +48,10 @@ impl Document {
         Ok(document)
     }
 
-    /// Reads a text; `name` stands for the file in messages, and other files are looked for beside it.
+    /// Reads a text; `name` stands for the file in messages, and other files are searched in its folder.
     ///
     /// # Errors
-    /// The text is not TOML or nests too deeply.
+    /// Fails if the text is not TOML or nests too deeply.
     pub fn parse(name: &str, text: &str) -> Result<Document, FileError> {
         let source = Arc::new(Source::new(name, text));
         if let Some(at) = too_deep(text) {
@@ -76,19 +76,19 @@ impl Document {
         &self.source
     }
 
-    /// What file names in the document are relative to: the directory it was read from.
+    /// The directory of the file, to which file names in the document are relative.
     pub fn directory(&self) -> &Path {
         &self.directory
     }
 
-    /// The top level.
+    /// The table of top-level keys.
     pub fn root(&self) -> Section<'_> {
         Section::new(&self.source, String::new(), 0..0, &self.root)
     }
 }
 
-/// Where brackets or dotted keys first nest deeper than allowed, strings and comments included: a
-/// bound on what the TOML reader will recurse into, not a grammar.
+/// The offset where brackets or dotted keys first nest deeper than allowed, counting those in strings
+/// and comments too: this bounds the recursion of the TOML reader, and is no grammar.
 fn too_deep(text: &str) -> Option<usize> {
     let (mut depth, mut dots) = (0usize, 0usize);
     for (at, byte) in text.bytes().enumerate() {

@@ -1,4 +1,4 @@
-//! The tree of a document, owned, with the place of everything.
+//! The tree of a document, owned, with the bytes of each value in the file.
 
 use std::ops::Range;
 use toml::Spanned;
@@ -11,10 +11,10 @@ pub struct Node {
     pub content: Content,
 }
 
-/// What a value is.
+/// The type and content of a value.
 #[derive(Debug, Clone)]
 pub enum Content {
-    /// Digits and radix, as written: what fits depends on who asks.
+    /// Digits and radix, as written: the reader of the key decides which range is valid.
     Integer(String, u32),
     Float(String),
     Text(String),
@@ -24,7 +24,7 @@ pub enum Content {
     Table(Table),
 }
 
-/// Keys, with their places, in the order of the file.
+/// Keys with their places, in the order of the file.
 #[derive(Debug, Clone, Default)]
 pub struct Table {
     pub entries: Vec<Entry>,
@@ -39,7 +39,7 @@ pub struct Entry {
 }
 
 impl Table {
-    /// Takes a parsed table over; the parser has bounded how deeply it nests.
+    /// Converts a parsed table; the parser has bounded how deeply it nests.
     pub fn new(table: DeTable<'_>) -> Table {
         let mut entries: Vec<Entry> = table
             .into_iter()
@@ -73,7 +73,7 @@ impl Node {
         Node { span, content }
     }
 
-    /// What the value is called in messages.
+    /// The name of the value's type in messages.
     pub fn type_name(&self) -> &'static str {
         match self.content {
             Content::Integer(..) => "an integer",

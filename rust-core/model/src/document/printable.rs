@@ -1,14 +1,13 @@
-//! What files say, fit for a terminal.
+//! Makes the text of files safe for a terminal.
 
-/// Whether a terminal or a log would obey the character rather than show it: control characters, but for line ends and
-/// tabs, and those that turn the direction of writing.
+/// Whether a terminal or a log would interpret the character rather than show it: control characters,
+/// except line ends and tabs, and characters that turn the direction of writing.
 pub fn is_control(c: char) -> bool {
     (c.is_control() && !matches!(c, '\n' | '\t'))
         || matches!(c, '\u{200E}' | '\u{200F}' | '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}')
 }
 
-/// The text with something to be seen in the place of control characters, of the same length in bytes, so that what is so
-/// many bytes from the start still is.
+/// Replaces control characters by visible characters of the same length in bytes, so that offsets into the text stay valid.
 pub fn printable(text: &str) -> String {
     let shown = |c: char| match (is_control(c), c.len_utf8()) {
         (false, _) => c,

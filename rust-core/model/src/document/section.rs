@@ -5,14 +5,14 @@ use std::cell::RefCell;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// A value with the place it was written at.
+/// A value with its place in the file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Located<T> {
-    /// The value.
+    /// The value, interpreted.
     pub value: T,
-    /// Its bytes in the file.
+    /// The value's bytes in the file.
     pub span: Range<usize>,
-    /// Its dotted key.
+    /// The value's dotted key.
     pub key: String,
 }
 
@@ -22,13 +22,13 @@ impl<T> Located<T> {
         FileError::new(source, self.span.clone(), &self.key, kind)
     }
 
-    /// The same place with another value.
+    /// Converts the value and keeps its place.
     pub fn map<U>(self, f: impl FnOnce(T) -> U) -> Located<U> {
         Located { value: f(self.value), span: self.span, key: self.key }
     }
 }
 
-/// A table of a document, whose keys are asked for one by one.
+/// A table of a document, whose keys are read one by one.
 #[derive(Debug)]
 pub struct Section<'a> {
     source: &'a Arc<Source>,
@@ -56,12 +56,12 @@ impl<'a> Section<'a> {
         Section { source, path, span, table, asked: RefCell::default() }
     }
 
-    /// The same section, of which nothing was asked yet.
+    /// The sections of the same table with no key marked as read.
     pub(super) fn again(&self) -> Vec<Section<'a>> {
         vec![Section::new(self.source, self.path.clone(), self.span.clone(), self.table)]
     }
 
-    /// The file this is a part of.
+    /// The file that contains this section.
     pub fn source(&self) -> &'a Arc<Source> {
         self.source
     }
@@ -87,7 +87,7 @@ impl<'a> Section<'a> {
         Some(Value { source: self.source, key: self.path_of(key), value })
     }
 
-    /// The value of a key that must be there.
+    /// The value of a required key; fails without it.
     pub fn require(&self, key: &str) -> Result<Value<'a>, FileError> {
         self.get(key).ok_or_else(|| {
             FileError::new(self.source, self.span.clone(), &self.path_of(key), FileErrorKind::Missing)
@@ -109,7 +109,7 @@ impl<'a> Section<'a> {
             .collect()
     }
 
-    /// An error if the section has a key that nobody asked for.
+    /// Fails if the section has a key that no reader asked for.
     pub fn finish(self) -> Result<(), FileError> {
         let asked = self.asked.borrow();
         let stranger = self.table.entries.iter().find(|e| !asked.contains(&e.key));
@@ -154,7 +154,7 @@ impl<'a> Value<'a> {
         Located { value, span: self.span(), key: self.key.clone() }
     }
 
-    /// A number; integers count.
+    /// Reads a number; integers are numbers too.
     pub fn number(&self) -> Result<Located<f64>, FileError> {
         match self.as_number() {
             Some(Ok(value)) => Ok(self.located(value)),
@@ -163,7 +163,7 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// The number if this is one; an error if it is one that is not finite.
+    /// Reads the value if it is a number; fails if the number is not finite.
     pub fn as_number(&self) -> Option<Result<f64, FileError>> {
         let number = match &self.value.content {
             Content::Integer(digits, radix) => i64::from_str_radix(digits, *radix).ok().map(|i| i as f64),
@@ -176,7 +176,7 @@ impl<'a> Value<'a> {
         })
     }
 
-    /// A whole number from 0.
+    /// Reads a whole number from 0.
     pub fn count(&self) -> Result<Located<u64>, FileError> {
         match &self.value.content {
             Content::Integer(digits, radix) => match u64::from_str_radix(digits, *radix) {
@@ -188,7 +188,7 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// True or false.
+    /// Reads true or false.
     pub fn boolean(&self) -> Result<Located<bool>, FileError> {
         match &self.value.content {
             Content::Boolean(b) => Ok(self.located(*b)),
@@ -196,10 +196,10 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// A string.
+    /// Reads a string.
     pub fn string(&self) -> Result<Located<String>, FileError> {
         match self.as_str() {
-            // It may be printed, and go into other files.
+            // Strings may be printed, and written to other files.
             Some(s) if s.contains(is_control) => {
                 Err(self.error(FileErrorKind::Value("has a control character in it".into())))
             }
@@ -208,7 +208,7 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// The string if this is one.
+    /// The string, if the value is one.
     pub fn as_str(&self) -> Option<&'a str> {
         match &self.value.content {
             Content::Text(text) => Some(text),
@@ -216,7 +216,7 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// One of a list of names.
+    /// Reads one name of a list.
     pub fn one_of<T: Copy>(
         &self,
         what: &'static str,
@@ -233,12 +233,12 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// The elements of an array.
+    /// Reads the elements of an array.
     pub fn array(&self) -> Result<Vec<Value<'a>>, FileError> {
         self.as_array().ok_or_else(|| self.wrong("an array"))
     }
 
-    /// The elements if this is an array.
+    /// The elements, if the value is an array.
     pub fn as_array(&self) -> Option<Vec<Value<'a>>> {
         let Content::Array(items) = &self.value.content else { return None };
         Some(
@@ -254,18 +254,18 @@ impl<'a> Value<'a> {
         )
     }
 
-    /// A table.
+    /// Reads a table.
     pub fn section(&self) -> Result<Section<'a>, FileError> {
         self.as_section().ok_or_else(|| self.wrong("a table"))
     }
 
-    /// The table if this is one.
+    /// The table, if the value is one.
     pub fn as_section(&self) -> Option<Section<'a>> {
         let Content::Table(table) = &self.value.content else { return None };
         Some(Section::new(self.source, self.key.clone(), self.span(), table))
     }
 
-    /// An array of `N` numbers.
+    /// Reads an array of `N` numbers.
     pub fn numbers<const N: usize>(&self, expected: &'static str) -> Result<[f64; N], FileError> {
         let items = self.array()?;
         let numbers: Vec<f64> =
@@ -276,7 +276,7 @@ impl<'a> Value<'a> {
     }
 }
 
-/// What is said of a number with a point or an exponent where a count is expected; how to write it, if it is one.
+/// The message for a number with a point or an exponent where a count is expected; it shows the integer, if there is one.
 fn not_an_integer(written: &str) -> String {
     const LARGEST: f64 = (1u64 << 53) as f64;
     let value = written.replace('_', "").parse::<f64>().ok();

@@ -16,12 +16,12 @@ use super::function::Function;
 /// There is no implied multiplication.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ast {
-    /// In postfix order: every operation directly follows its operands. A tree that is a list
+    /// Steps in postfix order: every operation directly follows its operands. A tree stored as a list
     /// needs no recursion, however deep it is.
     pub(super) steps: Vec<Step>,
 }
 
-/// One operation and the text it came from, operands included.
+/// One operation, and the text of the operation with its operands.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Step {
     pub action: Action,
@@ -47,8 +47,8 @@ pub(super) enum Binary {
 }
 
 impl Ast {
-    /// The names that need a value, in the order of the text and as often as they occur, each
-    /// with the byte at which it starts. Functions and `pi` are not among them.
+    /// The names that need a value, in the order of the text and as often as they occur, each with its
+    /// first byte. Functions and `pi` are not included.
     pub fn names(&self) -> impl Iterator<Item = (&str, usize)> {
         self.steps.iter().filter_map(|step| match &step.action {
             Action::Name(name) => Some((name.as_str(), step.span.offset)),

@@ -1,4 +1,4 @@
-//! Syntax to formula: names become numbers and variables.
+//! Compiles syntax to a formula: names become numbers and variables.
 
 use std::collections::BTreeMap;
 
@@ -9,20 +9,20 @@ use super::function::{Function, Unary};
 use super::graph::{Graph, Id};
 use super::suggest::closest;
 
-/// What the names in an expression stand for.
+/// The meaning of the names in an expression.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Variables {
-    /// How many variables there are.
+    /// Number of variables.
     pub count: usize,
-    /// Each name stands for the sum of the variables with these indices: `n_A` of one, `n` of all.
+    /// Each name stands for the sum of the variables with these indices: one for `n_A`, all for `n`.
     pub names: BTreeMap<String, Vec<usize>>,
 }
 
 impl Formula {
-    /// The formula that `ast` describes.
+    /// Compiles the formula that `ast` describes.
     ///
-    /// A name is looked up among the variables first, then among the constants. A part without
-    /// variables must be finite, and nothing may be divided by a constant zero.
+    /// A name is searched among the variables first, then among the constants. A part without variables
+    /// must be finite, and a division by a constant zero is an error.
     pub fn compile(
         ast: &Ast,
         constants: &BTreeMap<String, f64>,
@@ -65,7 +65,7 @@ impl Compiler<'_> {
         let value = |&id: &Id| graph.as_constant(id);
         let undefined = match value(&id) {
             Some(value) => !value.is_finite(),
-            // A constant operation that was not carried out has no finite value.
+            // A constant operation that was not folded has no finite value.
             None => !operands.is_empty() && operands.iter().all(|id| value(id).is_some()),
         };
         let by_zero =

@@ -9,7 +9,7 @@ type Built = Result<Id, TooLarge>;
 impl Graph {
     /// The derivative of `root` with respect to a variable.
     ///
-    /// Works through the graph from the leaves up, so every shared part is differentiated once.
+    /// The derivative visits the graph from the leaves upwards, so that every shared part is differentiated once.
     pub fn differentiate(&mut self, root: Id, variable: u32) -> Built {
         let zero = self.constant(0.0)?;
         let mut slopes: Vec<Id> = Vec::with_capacity(root.index() + 1);
@@ -25,7 +25,7 @@ impl Graph {
         Ok(slopes[root.index()])
     }
 
-    /// The derivative of `node` from those of the nodes before it.
+    /// The derivative of `node`, given those of the nodes before it.
     fn chain_rule(&mut self, node: Node, slopes: &[Id]) -> Built {
         let d = |id: Id| slopes[id.index()];
         match node {
@@ -39,7 +39,7 @@ impl Graph {
                 self.add(left, right)
             }
             Node::Divide(a, b) => {
-                // With q = a/b: (a' − q b')/b, which does not square b.
+                // The quotient rule with q = a/b is (a' − q b')/b, which does not square b.
                 let q = self.divide(a, b)?;
                 let change = self.multiply(q, d(b))?;
                 let difference = self.subtract(d(a), change)?;
@@ -61,7 +61,7 @@ impl Graph {
         }
     }
 
-    /// (aᵇ)' = b aᵇ⁻¹ a' + aᵇ ln(a) b', each term only where its slope is not zero.
+    /// The power rule (aᵇ)' = b aᵇ⁻¹ a' + aᵇ ln(a) b', each term only where its slope is not zero.
     fn power_rule(&mut self, node: Node, a: Id, b: Id, da: Id, db: Id) -> Built {
         let zero = self.constant(0.0)?;
         let mut sum = zero;
@@ -82,7 +82,7 @@ impl Graph {
         Ok(sum)
     }
 
-    /// f'(a).
+    /// The derivative f'(a) of a function.
     fn slope_of(&mut self, function: Unary, a: Id) -> Built {
         match function {
             Unary::Ln => self.integer_power(a, -1),

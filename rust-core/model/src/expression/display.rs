@@ -1,11 +1,11 @@
-//! Formulas as text.
+//! Prints formulas as text.
 
 use std::fmt::{self, Display, Formatter};
 
 use super::Formula;
 use super::graph::{Id, Node, as_quotient};
 
-/// Beyond so many operations written out, shared parts are named instead of repeated.
+/// A formula with more operations than this, written out, prints shared parts by name instead of repeating them.
 const LONGEST: usize = 200;
 
 /// A formula that prints with names for its variables.
@@ -16,14 +16,14 @@ pub struct Named<'a> {
 }
 
 impl Formula {
-    /// The formula for printing, variable `i` as `names[i]`, or `x{i}` beyond the names.
+    /// The formula for printing, with variable `i` as `names[i]`, or `x{i}` beyond the names.
     pub fn with_names<'a>(&'a self, names: &'a [&'a str]) -> Named<'a> {
         Named { formula: self, names }
     }
 }
 
 impl Display for Formula {
-    /// Infix, with variables `x0`, `x1` …; a long formula as `… where t1 = …, t2 = …`.
+    /// Prints infix, with variables `x0`, `x1` …; a long formula as `… where t1 = …, t2 = …`.
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         self.with_names(&[]).fmt(f)
     }
@@ -47,7 +47,7 @@ impl Display for Named<'_> {
     }
 }
 
-/// How tightly an operation holds together; a looser one inside a tighter needs parentheses.
+/// Precedence of an operation; one of lower precedence inside a higher needs parentheses.
 #[derive(Clone, Copy, PartialEq, PartialOrd)]
 enum Strength {
     Sum,
@@ -56,18 +56,18 @@ enum Strength {
     Atom,
 }
 
-/// What is left to print.
+/// A piece of the formula that is still to be printed.
 enum Piece {
     Text(&'static str),
     Number(f64),
     Exponent(i32),
     Variable(u32),
-    /// A node, in parentheses if it is looser than this.
+    /// A node, in parentheses if its precedence is lower than this.
     Node(Id, Strength),
 }
 
 impl Named<'_> {
-    /// Prints one node with a stack of pieces, the next on top.
+    /// Prints one node, with a stack of pieces whose top is printed next.
     fn infix(&self, f: &mut Formatter<'_>, root: usize, shared: &[Option<usize>]) -> fmt::Result {
         let nodes = self.formula.nodes();
         let mut stack = pieces(nodes, nodes[root]).1;
@@ -110,7 +110,7 @@ impl Named<'_> {
     }
 }
 
-/// One operation in infix, its operands still nodes.
+/// One operation in infix, with operands as nodes.
 fn pieces(nodes: &[Node], node: Node) -> (Strength, Vec<Piece>) {
     use Piece::{Exponent, Node as Operand, Number, Text, Variable};
     use Strength::{Atom, Factor, Product, Sum};
@@ -176,13 +176,13 @@ fn pieces(nodes: &[Node], node: Node) -> (Strength, Vec<Piece>) {
     }
 }
 
-/// The shortest digits that read back as the same number.
+/// Prints the shortest digits that read back as the same number.
 fn number(f: &mut Formatter<'_>, value: f64) -> fmt::Result {
     let digits = format!("{value:?}");
     f.write_str(digits.strip_suffix(".0").unwrap_or(&digits))
 }
 
-/// Numbers for the nodes that are printed once and then go by name: none in a short formula.
+/// Numbers for the nodes that are printed once and then by name; a short formula has none.
 fn shared(nodes: &[Node]) -> Vec<Option<usize>> {
     let mut sizes = vec![1_usize; nodes.len()];
     let mut uses = vec![0_usize; nodes.len()];
@@ -244,7 +244,7 @@ mod tests {
 
     #[test]
     fn long_formulas_name_what_they_share() {
-        // Written out, this doubles with every level.
+        // This formula, written out, doubles with every level.
         let text = (0..30).fold("x0".to_owned(), |text, _| format!("sin({text})^1.5"));
         let slope = formula(&text).derivative(0).unwrap();
         let printed = slope.to_string();

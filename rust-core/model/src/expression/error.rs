@@ -1,10 +1,10 @@
-//! What can be wrong with an expression, and where.
+//! Errors in expressions, with their places.
 
 use thiserror::Error;
 
 use super::limits::{MAX_DEPTH, MAX_LENGTH, MAX_NODES};
 
-/// A stretch of the text, in bytes.
+/// A range of the text, in bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Span {
     pub offset: usize,
@@ -16,7 +16,7 @@ impl Span {
         Self { offset, length }
     }
 
-    /// The stretch from the start of `self` to the end of `last`.
+    /// The range from the start of `self` to the end of `last`.
     pub fn to(self, last: Self) -> Self {
         Self::new(self.offset, last.offset + last.length - self.offset)
     }
@@ -26,15 +26,15 @@ impl Span {
     }
 }
 
-/// An expression that cannot be used, with the place in its text that says so.
+/// An expression that cannot be used, and the place of the error in its text.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error("{kind}")]
 pub struct ExpressionError {
-    /// What is wrong.
+    /// The kind of the error.
     pub kind: ErrorKind,
     /// The first byte of the offending text.
     pub offset: usize,
-    /// How many bytes are offending; zero when something is missing.
+    /// Number of offending bytes; zero when something is missing.
     pub length: usize,
 }
 
@@ -42,16 +42,16 @@ pub struct ExpressionError {
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ErrorKind {
-    /// A character that no expression contains.
+    /// The text has a character that no expression contains.
     #[error("unexpected character {0:?}")]
     UnexpectedCharacter(char),
 
-    /// A token where the grammar wants another.
+    /// The text has a token where the grammar expects another.
     #[error("unexpected `{found}`, expected {expected}")]
     Unexpected {
-        /// The token as written.
+        /// The token in the text.
         found: String,
-        /// What could have stood there.
+        /// Description of the expected token.
         expected: &'static str,
     },
 
@@ -59,72 +59,72 @@ pub enum ErrorKind {
     #[error("the expression ends where a number, a name or `(` is expected")]
     UnexpectedEnd,
 
-    /// An opening parenthesis without its partner.
+    /// An opening parenthesis has no closing one.
     #[error("this `(` is never closed")]
     Unclosed,
 
-    /// A name followed by `(` that is not a function.
+    /// A name followed by `(` is no function.
     #[error("unknown function `{name}`{}", hint(.suggestion, .known))]
     UnknownFunction {
-        /// The name as written.
+        /// The name in the text.
         name: String,
-        /// The functions there are.
+        /// The known functions.
         known: Vec<String>,
         /// The function that was probably meant.
         suggestion: Option<String>,
     },
 
-    /// A function with too few or too many arguments.
+    /// A function has too few or too many arguments.
     #[error("`{function}` takes {expected} argument(s), not {found}")]
     ArgumentCount {
-        /// The function.
+        /// Name of the function.
         function: &'static str,
-        /// How many it takes.
+        /// Number of arguments that it takes.
         expected: usize,
-        /// How many were given.
+        /// Number of arguments in the text.
         found: usize,
     },
 
-    /// A name that is neither a constant nor a variable.
+    /// A name is neither a constant nor a variable.
     #[error("unknown name `{name}`{}", hint(.suggestion, .known))]
     UnknownName {
-        /// The name as written.
+        /// The name in the text.
         name: String,
-        /// The names there are.
+        /// The known names.
         known: Vec<String>,
         /// The name that was probably meant.
         suggestion: Option<String>,
     },
 
-    /// A name that stands for a variable beyond the number of variables.
+    /// A name stands for a variable beyond the number of variables.
     #[error("`{name}` stands for variable {index}, but there are only {count}")]
     NoSuchVariable {
-        /// The name.
+        /// The name of the variable.
         name: String,
-        /// The index it stands for.
+        /// The index of the variable.
         index: usize,
         /// The number of variables.
         count: usize,
     },
 
-    /// A part without variables that is infinite or undefined, such as `1/0`.
+    /// A part without variables is infinite or undefined, such as `1/0`.
     #[error("this has no finite value")]
     NonFinite,
 
-    /// More text than [`MAX_LENGTH`].
+    /// The text is longer than [`MAX_LENGTH`].
     #[error("the expression is longer than {MAX_LENGTH} bytes")]
     TooLong,
 
-    /// Deeper nesting than [`MAX_DEPTH`].
+    /// The text nests deeper than [`MAX_DEPTH`].
     #[error("parentheses, signs and powers are nested deeper than {MAX_DEPTH} levels")]
     TooDeep,
 
-    /// More operations than [`MAX_NODES`].
+    /// The formula has more operations than [`MAX_NODES`].
     #[error(transparent)]
     TooLarge(#[from] TooLarge),
 }
 
-/// A formula, or a derivative of one, with more than [`MAX_NODES`] operations.
+/// A formula, or a derivative of one, has more than [`MAX_NODES`] operations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 #[error("the formula needs more than {MAX_NODES} operations")]
 pub struct TooLarge;

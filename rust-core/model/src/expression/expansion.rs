@@ -7,12 +7,11 @@ use super::graph::{Id, Node};
 
 /// Work space for expanding formulas to second order in each of several variables.
 ///
-/// The coefficients of `f(x + ε)` in `Π ε_k^{m_k}`, `m_k = 0, 1, 2`, are
-/// `Π (1/m_k!) ∂^{m_k}/∂x_k^{m_k} f`, mixed derivatives included. They come from evaluating the formula
-/// with polynomials for numbers, every `ε_k³` dropped.
+/// The coefficients of `f(x + ε)` in `Π ε_k^{m_k}`, `m_k = 0, 1, 2`, are `Π (1/m_k!) ∂^{m_k}/∂x_k^{m_k} f`, mixed
+/// derivatives included. Evaluating the formula with polynomials in place of numbers, without every `ε_k³`, yields them.
 #[derive(Debug, Clone, Default)]
 pub struct Expansion {
-    /// For each number of variables the products of monomials that are not dropped.
+    /// For each number of variables the products of monomials that are kept.
     products: Vec<Vec<[u16; 3]>>,
     /// The polynomial of each node.
     values: Vec<f64>,
@@ -27,16 +26,15 @@ struct Scratch {
 }
 
 impl Expansion {
-    /// The most variables that a formula is expanded in: the coefficients are three to their number.
+    /// Most variables that a formula is expanded in: `k` variables have `3^k` coefficients.
     pub const MOST: usize = 6;
 
-    /// The coefficients of `formula` around `at` in the variables `along`; that of `Π ε_k^{m_k}` is
-    /// number `Σ m_k 3^k`.
+    /// The coefficients of `formula` around `at` in the variables `along`; the coefficient of `Π
+    /// ε_k^{m_k}` is number `Σ m_k 3^k`.
     ///
     /// # Panics
     ///
-    /// If `along` has more than [`Expansion::MOST`] variables, or the formula depends on one that `at`
-    /// does not have.
+    /// Panics if `along` has more than [`Expansion::MOST`] variables, or if `at` lacks a variable of the formula.
     pub fn coefficients(&mut self, formula: &Formula, at: &[f64], along: &[usize]) -> &[f64] {
         let count = along.len();
         assert!(count <= Self::MOST, "expansion in too many variables");
@@ -98,7 +96,7 @@ fn combine(out: &mut [f64], a: &[f64], b: &[f64], f: impl Fn(f64, f64) -> f64) {
     }
 }
 
-/// Every two monomials whose product has no power above the second, and the product.
+/// All pairs of monomials whose product has no power above the second, and the product.
 fn products(variables: usize) -> Vec<[u16; 3]> {
     let size = 3usize.pow(variables as u32);
     let digit = |index: usize, k: usize| index / 3usize.pow(k as u32) % 3;
@@ -112,7 +110,7 @@ fn products(variables: usize) -> Vec<[u16; 3]> {
     products
 }
 
-/// Binomial series: `t_j = (p over j) x^{p−j}`, with the power of `x` as a function.
+/// The binomial series `t_j = (p over j) x^{p−j}`, with the power of `x` as a function.
 fn power_series(t: &mut [f64], p: f64, power: impl Fn(f64) -> f64) {
     let mut binomial = 1.0;
     for (j, t) in t.iter_mut().enumerate() {
@@ -122,7 +120,7 @@ fn power_series(t: &mut [f64], p: f64, power: impl Fn(f64) -> f64) {
     }
 }
 
-/// Polynomials in several ε, each with ε³ = 0.
+/// Arithmetic of polynomials in several ε, each with ε³ = 0.
 struct Algebra<'a> {
     products: &'a [[u16; 3]],
     variables: usize,
@@ -138,7 +136,7 @@ impl Algebra<'_> {
 
     fn integer_power(&mut self, a: &[f64], n: u32, out: &mut [f64]) {
         let products = self.products;
-        // The chain of squares works on places in a list of polynomials.
+        // The chain of squares works on indices into a list of polynomials.
         let mut chain = vec![a.to_vec()];
         let last = multiply_up(0usize, n, |x, y| {
             let mut product = vec![0.0; a.len()];
@@ -149,9 +147,10 @@ impl Algebra<'_> {
         out.copy_from_slice(&chain[last]);
     }
 
-    /// `f(a)` for a function whose Taylor coefficients at a number are written by `series`.
+    /// Computes `f(a)` for a function whose Taylor coefficients at a number are written by `series`.
     fn compose(&mut self, a: &[f64], out: &mut [f64], series: impl Fn(f64, &mut [f64])) {
-        // ε_k occurs up to the second power, so that many factors of a's other terms can survive.
+        // Each ε_k that occurs has powers up to the second, so that at most this many factors of
+        // the other terms of `a` survive.
         let occurs = |k: u32| {
             let place = 3usize.pow(k);
             a.iter().enumerate().any(|(index, c)| !(index / place).is_multiple_of(3) && *c != 0.0)
@@ -208,7 +207,7 @@ impl Algebra<'_> {
             Unary::Sin => self.compose(a, out, |x, t| circular_series(t, [x.sin(), x.cos()])),
             Unary::Cos => self.compose(a, out, |x, t| circular_series(t, [x.cos(), -x.sin()])),
             Unary::Tanh => self.compose(a, out, |x, t| {
-                // From tanh′ = 1 − tanh².
+                // The recurrence follows from tanh′ = 1 − tanh².
                 t[0] = x.tanh();
                 for j in 1..t.len() {
                     let square: f64 = (0..j).map(|i| t[i] * t[j - 1 - i]).sum();
@@ -231,7 +230,7 @@ fn multiply(products: &[[u16; 3]], a: &[f64], b: &[f64], out: &mut [f64]) {
     }
 }
 
-/// `t_j = value · rateʲ / j!`.
+/// The series `t_j = value · rateʲ / j!`.
 fn exponential_series(t: &mut [f64], value: f64, rate: f64) {
     let mut term = value;
     for (j, t) in t.iter_mut().enumerate() {
@@ -240,7 +239,7 @@ fn exponential_series(t: &mut [f64], value: f64, rate: f64) {
     }
 }
 
-/// `t_j = f⁽ʲ⁾/j!` of a function with `f″ = −f`, from `f` and `f′`.
+/// The series `t_j = f⁽ʲ⁾/j!` of a function with `f″ = −f`, from `f` and `f′`.
 fn circular_series(t: &mut [f64], [f, slope]: [f64; 2]) {
     let mut factorial = 1.0;
     for (j, t) in t.iter_mut().enumerate() {
@@ -261,7 +260,7 @@ mod tests {
         Formula::compile(&Ast::parse(text).unwrap(), &Default::default(), &variables).unwrap()
     }
 
-    /// Every coefficient against symbolic derivatives.
+    /// Compares every coefficient with symbolic derivatives.
     #[test]
     fn coefficients_are_derivatives() {
         let at = [0.7, 1.3, 0.4];

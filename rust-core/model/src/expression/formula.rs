@@ -1,4 +1,4 @@
-//! One scalar function of several variables.
+//! A scalar function of several variables.
 
 use std::sync::Arc;
 
@@ -6,33 +6,33 @@ use super::error::TooLarge;
 use super::function::{integer_power, select};
 use super::graph::{Bits, Graph, Id, Node, as_quotient};
 
-/// An immutable scalar function of variables, which go by their index.
+/// An immutable scalar function of variables, which are identified by index.
 ///
 /// Equal parts are stored once and constants are folded; cloning is cheap. At most
 /// [`MAX_NODES`](super::MAX_NODES) operations.
 ///
-/// Where a function is not smooth a derivative is still defined:
+/// Where a function is not smooth its derivative is still defined:
 ///
 /// - abs' is −1, 0 or 1, and 0 at the kink;
 /// - min and max have the derivative of the argument they return, and of the first where the two
 ///   are equal.
 ///
-/// Outside its domain a formula evaluates to an infinity or NaN, which is for the caller to see.
+/// Outside its domain a formula evaluates to an infinity or NaN, which the caller must check.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Formula {
-    /// Operands before operations, the whole formula last; never empty.
+    /// Nodes with operands before operations and the whole formula last; never empty.
     nodes: Arc<[Node]>,
 }
 
 impl Formula {
-    /// The formula that is `value` everywhere.
+    /// The formula with the value `value` everywhere.
     pub fn constant(value: f64) -> Self {
         Self::from_nodes(vec![Node::Constant(Bits::new(value))])
     }
 
     /// The formula that is variable `i`.
     pub fn variable(i: usize) -> Self {
-        // No slice of numbers is long enough to have an element beyond this.
+        // No slice is long enough to have an element beyond this index.
         let index = u32::try_from(i).unwrap_or(u32::MAX);
         Self::from_nodes(vec![Node::Variable(index)])
     }
@@ -45,7 +45,7 @@ impl Formula {
         &self.nodes
     }
 
-    /// The value, if it is a finite number that depends on nothing.
+    /// The value, if the formula is a finite number without variables.
     pub fn is_constant(&self) -> Option<f64> {
         match *self.nodes {
             [Node::Constant(bits)] => Some(bits.value()),
@@ -53,7 +53,7 @@ impl Formula {
         }
     }
 
-    /// How many operations, constants and variables it is made of; equal parts count once.
+    /// Number of operations, constants and variables in the formula; equal parts count once.
     pub fn operations(&self) -> usize {
         self.nodes.len()
     }
@@ -63,7 +63,7 @@ impl Formula {
         self.nodes.iter().any(|node| matches!(*node, Node::Variable(v) if v as usize == i))
     }
 
-    /// The exact derivative ∂/∂xᵢ.
+    /// The exact derivative ∂/∂xᵢ of the formula.
     ///
     /// Fails only for formulas that are already near the limit of operations.
     pub fn derivative(&self, i: usize) -> Result<Self, TooLarge> {
@@ -77,24 +77,24 @@ impl Formula {
         Ok(Self::from_nodes(graph.extract(root)))
     }
 
-    /// `self − other`.
+    /// The formula `self − other`.
     ///
     /// Like all arithmetic on formulas, fails only beyond the limit of operations.
     pub fn minus(&self, other: &Self) -> Result<Self, TooLarge> {
         self.with(other, Graph::subtract)
     }
 
-    /// `self · other`.
+    /// The formula `self · other`.
     pub fn times(&self, other: &Self) -> Result<Self, TooLarge> {
         self.with(other, Graph::multiply)
     }
 
-    /// `self / other`.
+    /// The formula `self / other`.
     pub fn over(&self, other: &Self) -> Result<Self, TooLarge> {
         self.with(other, Graph::divide)
     }
 
-    /// `constant + Σ coefficient · variable`.
+    /// The formula `constant + Σ coefficient · variable`.
     pub fn linear(constant: f64, terms: impl IntoIterator<Item = (usize, f64)>) -> Result<Self, TooLarge> {
         let mut sum = Self::constant(constant);
         for (variable, coefficient) in terms {
@@ -116,10 +116,10 @@ impl Formula {
         Ok(Self::from_nodes(graph.extract(root)))
     }
 
-    /// The formula with variable `i` held at `value`; the other variables keep their indices.
+    /// The formula with variable `i` fixed at `value`; the other variables keep their indices.
     pub fn substitute(&self, i: usize, value: f64) -> Self {
         self.try_substitute(i, value)
-            // The graph below has no limit to exceed.
+            // This graph has no limit that could be exceeded.
             .unwrap_or_else(|TooLarge| self.clone())
     }
 
@@ -148,28 +148,27 @@ impl Formula {
         Ok(Self::from_nodes(graph.extract(places[places.len() - 1])))
     }
 
-    /// The value at a point, for the occasional use; a [`Program`](super::Program) gives the same
-    /// bits faster.
+    /// The value at a point, for occasional use; a [`Program`](super::Program) computes the same bits faster.
     ///
     /// # Panics
     ///
-    /// If the formula depends on a variable that `at` does not have.
+    /// Panics if `at` lacks a variable of the formula.
     pub fn value(&self, at: &[f64]) -> f64 {
         let values = self.values(at);
         values[values.len() - 1]
     }
 
-    /// The greatest magnitude among constants, variables and results of operations at a point, which scales how rounding
-    /// errors show in the value; of numbers alone, not of NaN.
+    /// The greatest magnitude among constants, variables and results of operations at a point, to which
+    /// rounding errors of the value are proportional; NaNs are ignored.
     ///
     /// # Panics
     ///
-    /// As [`value`](Self::value).
+    /// Panics as [`value`](Self::value).
     pub fn greatest(&self, at: &[f64]) -> f64 {
         self.values(at).iter().fold(0.0, |most, value| value.abs().max(most))
     }
 
-    /// Of every node.
+    /// The values of all nodes.
     fn values(&self, at: &[f64]) -> Vec<f64> {
         let mut values: Vec<f64> = Vec::with_capacity(self.nodes.len());
         for &node in self.nodes.iter() {
@@ -218,7 +217,7 @@ mod tests {
     fn the_greatest_number_on_the_way_is_found() {
         assert_eq!(formula("tanh(1e20*x)").greatest(&[-3.0, 5.0]), 3e20);
         assert_eq!(formula("x").greatest(&[-3.0, 5.0]), 3.0);
-        // Of numbers alone.
+        // NaNs are ignored.
         assert_eq!(formula("sqrt(x)").greatest(&[-3.0, 5.0]), 3.0);
     }
 
@@ -289,7 +288,7 @@ mod tests {
         assert_eq!(f.substitute(0, 0.0), Formula::constant(0.0));
         assert!(!f.substitute(0, 2.0).depends_on(0));
         assert_eq!(f.substitute(0, 2.0).value(&[f64::NAN, 3.0]), f.value(&[2.0, 3.0]));
-        // Undefined, but not an error: the value says so.
+        // The value is undefined, which is no error of the substitution.
         let undefined = f.substitute(0, -2.0);
         assert_eq!(undefined.is_constant(), None);
         assert!(undefined.value(&[0.0, 1.0]).is_nan());

@@ -1,4 +1,4 @@
-//! The functions an expression may call.
+//! The functions that an expression may call.
 
 /// A function of one argument.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -10,7 +10,7 @@ pub(super) enum Unary {
     Cos,
     Tanh,
     Abs,
-    /// Not in the language: the derivative of `Abs`.
+    /// The derivative of `Abs`; expressions cannot call it.
     Sign,
 }
 
@@ -42,7 +42,7 @@ impl Unary {
     }
 }
 
-/// A function as the text calls it.
+/// A function by the name that expressions use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Function {
     Unary(Unary),
@@ -89,14 +89,14 @@ impl Function {
     }
 }
 
-/// −1, 0 or 1; unlike [`f64::signum`] it is 0 at 0, the middle of the kink of |x|.
+/// The sign −1, 0 or 1; unlike [`f64::signum`] it is 0 at 0, the middle of the kink of |x|.
 pub(super) fn sign(x: f64) -> f64 {
     if x == 0.0 { 0.0 } else { x.signum() }
 }
 
-/// `then` if `left <= right`, `otherwise` if not, NaN if the two do not compare.
+/// Returns `then` if `left <= right`, `otherwise` if not, and NaN if the two cannot be compared.
 ///
-/// min and max are made of this, so that an undefined argument is never hidden by a defined one.
+/// min and max are implemented with it, so that an undefined argument makes the result undefined.
 pub(super) fn select(left: f64, right: f64, then: f64, otherwise: f64) -> f64 {
     if left <= right {
         then
@@ -121,7 +121,7 @@ pub(super) fn multiply_up<T: Copy>(x: T, n: u32, mut multiply: impl FnMut(T, T) 
     power
 }
 
-/// xⁿ in exactly the operations a program spends on it.
+/// xⁿ by exactly the operations that a program uses.
 pub(super) fn integer_power(x: f64, n: i32) -> f64 {
     let power = multiply_up(x, n.unsigned_abs(), |a, b| a * b);
     match n {

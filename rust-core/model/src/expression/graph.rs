@@ -1,4 +1,4 @@
-//! Formulas as directed acyclic graphs in which equal parts exist once.
+//! Formulas as directed acyclic graphs in which equal parts occur once.
 
 use std::collections::HashMap;
 
@@ -6,7 +6,7 @@ use super::error::TooLarge;
 use super::function::Unary;
 use super::limits::MAX_NODES;
 
-/// A node's place in its graph.
+/// Index of a node in its graph.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) struct Id(u32);
 
@@ -26,11 +26,11 @@ pub(super) enum Node {
     Multiply(Id, Id),
     Divide(Id, Id),
     Negate(Id),
-    /// A power that is worked out by multiplication.
+    /// A power that is computed by multiplication.
     IntegerPower(Id, i32),
     Power(Id, Id),
     Unary(Unary, Id),
-    /// `then` if `left <= right`, else `otherwise`: min, max and their derivatives.
+    /// The value `then` if `left <= right`, else `otherwise`: min, max and their derivatives.
     Select {
         left: Id,
         right: Id,
@@ -39,13 +39,13 @@ pub(super) enum Node {
     },
 }
 
-/// A constant, equal to another when it has the same bits.
+/// A constant; two constants are equal if they have the same bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) struct Bits(u64);
 
 impl Bits {
     pub fn new(value: f64) -> Self {
-        // There is one zero.
+        // The addition turns −0 into 0, so that there is one zero.
         Self((value + 0.0).to_bits())
     }
 
@@ -55,7 +55,7 @@ impl Bits {
 }
 
 impl Node {
-    /// The nodes it works on.
+    /// The nodes that this operation works on.
     pub fn operands(self) -> impl Iterator<Item = Id> {
         let operands = match self {
             Node::Constant(_) | Node::Variable(_) => [None; 4],
@@ -91,9 +91,9 @@ impl Node {
     }
 }
 
-/// `c · x⁻ⁿ`, which costs one division instead of a division and a product.
+/// Matches `c · x⁻ⁿ`, which costs one division instead of a division and a product.
 ///
-/// Returns c, x and n. Everything that evaluates or prints a graph asks here, so all of it agrees.
+/// Returns c, x and n. All code that evaluates or prints a graph calls this function, so that all of it agrees.
 pub(super) fn as_quotient(nodes: &[Node], node: Node) -> Option<(f64, Id, i32)> {
     let Node::Multiply(factor, power) = node else {
         return None;
@@ -104,7 +104,7 @@ pub(super) fn as_quotient(nodes: &[Node], node: Node) -> Option<(f64, Id, i32)> 
     }
 }
 
-/// A graph that grows: operands always come before the nodes that use them.
+/// A growing graph: operands always precede the nodes that use them.
 #[derive(Debug)]
 pub(super) struct Graph {
     nodes: Vec<Node>,
@@ -118,7 +118,7 @@ impl Graph {
         Self::with_limit(MAX_NODES)
     }
 
-    /// An empty graph for work that can add only so much to what was within bounds.
+    /// An empty graph with a limit, for work on a formula that was within bounds.
     pub fn with_limit(limit: usize) -> Self {
         Self { nodes: Vec::new(), places: HashMap::new(), limit }
     }
@@ -131,7 +131,7 @@ impl Graph {
         self.nodes[id.index()]
     }
 
-    /// The place of `node`, as it is; the arithmetic that simplifies is in `simplify`.
+    /// Returns the index of `node`, added unless it exists; the module `simplify` simplifies.
     pub fn add_node(&mut self, node: Node) -> Result<Id, TooLarge> {
         let node = self.in_order(node);
         if let Some(&id) = self.places.get(&node) {
@@ -146,7 +146,7 @@ impl Graph {
         Ok(id)
     }
 
-    /// Copies a list of nodes in as they are; returns where each has gone.
+    /// Copies a list of nodes without simplification; returns the new index of each.
     pub fn import(&mut self, nodes: &[Node]) -> Result<Vec<Id>, TooLarge> {
         let mut places: Vec<Id> = Vec::with_capacity(nodes.len());
         for node in nodes {
@@ -156,7 +156,7 @@ impl Graph {
         Ok(places)
     }
 
-    /// What `root` is made of, `root` last and nothing else.
+    /// The nodes that `root` depends on, and no others; `root` is last.
     pub fn extract(&self, root: Id) -> Vec<Node> {
         let mut needed = vec![false; root.index() + 1];
         needed[root.index()] = true;
@@ -176,7 +176,7 @@ impl Graph {
         kept
     }
 
-    /// a + b and b + a are one node, constants first.
+    /// Orders operands so that a + b and b + a are one node, constants first.
     fn in_order(&self, node: Node) -> Node {
         let sorted = |a: Id, b: Id| {
             let key = |id: Id| (!matches!(self.node(id), Node::Constant(_)), id);

@@ -1,4 +1,4 @@
-//! Text to tokens.
+//! Splits text into tokens.
 
 use super::error::{ErrorKind, ExpressionError, Span};
 
@@ -6,11 +6,11 @@ use super::error::{ErrorKind, ExpressionError, Span};
 pub(super) enum Token<'a> {
     Number(f64),
     Name(&'a str),
-    /// One of `+ - * / ^ ( ) ,`.
+    /// A symbol, one of `+ - * / ^ ( ) ,`.
     Symbol(char),
 }
 
-/// Hands out the tokens of a text one by one.
+/// Returns the tokens of a text one by one.
 pub(super) struct Lexer<'a> {
     text: &'a str,
     at: usize,
@@ -21,7 +21,7 @@ impl<'a> Lexer<'a> {
         Self { text, at: 0 }
     }
 
-    /// The next token and where it stands, or `None` at the end.
+    /// The next token and its place, or `None` at the end.
     pub fn next(&mut self) -> Result<Option<(Token<'a>, Span)>, ExpressionError> {
         self.at += leading(self.rest(), |c| c.is_ascii_whitespace());
         let rest = self.rest();
@@ -29,7 +29,7 @@ impl<'a> Lexer<'a> {
             return Ok(None);
         };
         let (token, length) = match first {
-            // As in Fortran and Python.
+            // `**` is a power, as in Fortran and Python.
             '*' if rest.starts_with("**") => (Token::Symbol('^'), 2),
             '+' | '-' | '*' | '/' | '^' | '(' | ')' | ',' => (Token::Symbol(first), 1),
             'a'..='z' | 'A'..='Z' | '_' => {
@@ -60,12 +60,12 @@ impl<'a> Lexer<'a> {
     }
 }
 
-/// How many bytes at the start of `text` satisfy `belongs`.
+/// Number of bytes at the start of `text` that satisfy `belongs`.
 fn leading(text: &str, belongs: impl Fn(char) -> bool) -> usize {
     text.find(|c| !belongs(c)).unwrap_or(text.len())
 }
 
-/// The length of `12`, `1.5`, `.5`, `2.` or `1.5e-3`; an `e` without digits is not part of it.
+/// The length of a number such as `12`, `1.5`, `.5`, `2.` or `1.5e-3`; an `e` without digits is not part of it.
 fn number_length(text: &str) -> usize {
     let digits = |at: usize| leading(&text[at..], |c| c.is_ascii_digit());
     let mut end = digits(0);

@@ -1,4 +1,4 @@
-//! How large formulas may be.
+//! Limits to the size of formulas.
 
 /// The longest text that is parsed, in bytes.
 pub const MAX_LENGTH: usize = 4096;

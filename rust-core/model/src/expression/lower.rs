@@ -1,4 +1,4 @@
-//! Formulas to instructions.
+//! Compiles formulas to instructions.
 
 use std::collections::HashMap;
 
@@ -19,7 +19,7 @@ fn lower(outputs: &[&Formula]) -> Program {
     let mut roots = Vec::with_capacity(outputs.len());
     for formula in outputs {
         let places = graph.import(formula.nodes());
-        // The limit is out of reach: so many nodes do not fit in memory.
+        // The limit cannot be reached: so many nodes do not fit in memory.
         let places = places.expect("formulas that fit in memory");
         roots.push(places[places.len() - 1]);
     }
@@ -34,13 +34,13 @@ fn lower(outputs: &[&Formula]) -> Program {
     allocate(values.variables, &values.code, outputs)
 }
 
-/// Instructions that each write a new place: variables first, then one place per instruction.
+/// Instructions that each write a new place: variables first, then one place for each instruction.
 struct Values<'a> {
     nodes: &'a [Node],
     variables: usize,
     code: Vec<Instruction>,
     known: HashMap<(Operation, u64, [usize; 4]), usize>,
-    /// Where the value of each node is; constants go into the instructions.
+    /// Place of each node's value; constants are part of the instructions.
     places: Vec<Option<usize>>,
 }
 
@@ -131,7 +131,7 @@ impl<'a> Values<'a> {
         self.emit(operation, c, &[place])
     }
 
-    /// The place of a node, as an operand; a constant gets one only here.
+    /// The place of a node as an operand; only here does a constant get a place.
     fn place(&mut self, id: Id) -> usize {
         match (self.places[id.index()], self.constant(id)) {
             (Some(place), _) => place,
@@ -161,10 +161,10 @@ impl<'a> Values<'a> {
 
 /// Drops instructions without effect and gives the others as few registers as their order allows.
 fn allocate(variables: usize, code: &[Instruction], mut outputs: Vec<Output>) -> Program {
-    /// Needed after the last instruction.
+    /// Marks places that are read after the last instruction.
     const FOREVER: usize = usize::MAX;
 
-    // For each place the last instruction that reads it; an instruction that nobody reads is dead.
+    // For each place the last instruction that reads it; an instruction that none reads is dead.
     let mut last_use: Vec<Option<usize>> = vec![None; variables + code.len()];
     for output in &outputs {
         if let Output::Place(place) = *output {
@@ -179,7 +179,7 @@ fn allocate(variables: usize, code: &[Instruction], mut outputs: Vec<Output>) ->
         }
     }
 
-    // Variables stay where they are; registers come after them.
+    // Variables keep their places; registers follow them.
     let mut moved: Vec<usize> = (0..last_use.len()).collect();
     let mut free = Vec::new();
     let mut registers = 0;
@@ -188,7 +188,7 @@ fn allocate(variables: usize, code: &[Instruction], mut outputs: Vec<Output>) ->
         if last_use[instruction.to].is_none() {
             continue;
         }
-        // Taken before the operands are released, so it is none of theirs.
+        // The register is taken before those of the operands are released, so that it differs from theirs.
         let to = free.pop().unwrap_or_else(|| {
             registers += 1;
             registers - 1

@@ -1,10 +1,9 @@
 //! Formulas with exact derivatives.
 //!
-//! A model file writes its excess free energies as text. Text becomes an [`Ast`], an [`Ast`] with
-//! the values of its constants and the places of its variables becomes a [`Formula`], and a
-//! formula can be differentiated as often as needed, symbolically, so forces are gradients to
-//! rounding error. For evaluation, formulas are compiled together into one [`Program`], which
-//! shares what they have in common and works on blocks of particles at a time.
+//! The excess free energies of a model file are text. An [`Ast`] is parsed text; with the values of its
+//! constants and the places of its variables it becomes a [`Formula`]. A formula has symbolic derivatives of
+//! any order, so that forces are gradients to rounding error. For evaluation, several formulas are compiled
+//! into one [`Program`], which computes shared parts once and works on blocks of particles.
 //!
 //! ```
 //! use psidpd_model::expression::{Ast, Formula, Program, Variables};

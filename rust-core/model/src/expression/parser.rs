@@ -1,4 +1,4 @@
-//! Tokens to postfix order, by operator precedence with an explicit stack.
+//! Orders tokens in postfix, by operator precedence with an explicit stack.
 
 use std::f64::consts::PI;
 
@@ -10,9 +10,9 @@ use super::limits::{MAX_DEPTH, MAX_LENGTH};
 use super::suggest::closest;
 
 impl Ast {
-    /// Parses `text`.
+    /// Parses an expression.
     ///
-    /// Any text at all may be given: longer than [`MAX_LENGTH`] or nested deeper than
+    /// The text may be anything: a text longer than [`MAX_LENGTH`] or nested deeper than
     /// [`MAX_DEPTH`] is an error like any other.
     pub fn parse(text: &str) -> Result<Self, ExpressionError> {
         parse(text).map(|steps| Self { steps })
@@ -29,7 +29,7 @@ fn parse(text: &str) -> Result<Vec<Step>, ExpressionError> {
     }
     let mut parser = Parser { text, steps: Vec::new(), operands: Vec::new(), waiting: Vec::new(), depth: 0 };
     let mut lexer = Lexer::new(text);
-    // An expression alternates: an operand (after signs and openings), then an operator.
+    // An operand (after signs and openings) and an operator alternate.
     let mut wants_operand = true;
     while let Some((token, span)) = lexer.next()? {
         wants_operand =
@@ -41,12 +41,12 @@ fn parse(text: &str) -> Result<Vec<Step>, ExpressionError> {
     parser.finish()
 }
 
-/// What has been read but cannot be written out yet.
+/// An operator or an opening that was read and is not in the output yet.
 #[derive(Debug, Clone, Copy)]
 enum Waiting {
     Sign(Span),
     Binary(Binary),
-    /// `(`, and for a call the function, its name's place and the commas so far.
+    /// An open `(`, and for a call the function, its name's place and the number of commas so far.
     Open {
         at: Span,
         call: Option<(Function, Span, usize)>,
@@ -56,7 +56,7 @@ enum Waiting {
 }
 
 impl Waiting {
-    /// How tightly it holds its operands; openings hold nothing.
+    /// Precedence of the operator; an opening has none.
     fn strength(self) -> u8 {
         match self {
             Waiting::Open { .. } | Waiting::Callee(..) => 0,
@@ -65,7 +65,7 @@ impl Waiting {
         }
     }
 
-    /// Whether it is a level of nesting; the other operators give way to their equals.
+    /// Whether it adds a level of nesting; other operators are written out before those of equal precedence.
     fn nests(self) -> bool {
         !matches!(self, Waiting::Callee(..)) && !matches!(self.strength(), 1 | 2)
     }
@@ -82,14 +82,14 @@ fn strength(binary: Binary) -> u8 {
 struct Parser<'a> {
     text: &'a str,
     steps: Vec<Step>,
-    /// Where each operand that still waits for its operator stands.
+    /// Places of the operands that wait for their operator.
     operands: Vec<Span>,
     waiting: Vec<Waiting>,
     depth: usize,
 }
 
 impl Parser<'_> {
-    /// Takes a token where an operand may start; returns whether one is still wanted.
+    /// Reads a token where an operand may start; returns whether one is still expected.
     fn operand(&mut self, token: Token, span: Span) -> Result<bool, ExpressionError> {
         match token {
             Token::Number(value) => self.leaf(Action::Number(value), span),
@@ -130,7 +130,7 @@ impl Parser<'_> {
         Ok(false)
     }
 
-    /// Takes a token after an operand; returns whether an operand is wanted next.
+    /// Reads a token after an operand; returns whether an operand is expected next.
     fn operator(&mut self, token: Token, span: Span) -> Result<bool, ExpressionError> {
         let binary = match token {
             Token::Symbol('+') => Binary::Add,
@@ -152,7 +152,7 @@ impl Parser<'_> {
             }
             _ => return Err(self.unexpected(span, "an operator")),
         };
-        // Equals group to the left, except powers.
+        // Operators of equal precedence group to the left, powers to the right.
         self.settle(match binary {
             Binary::Power => strength(binary) + 1,
             _ => strength(binary),
@@ -168,7 +168,7 @@ impl Parser<'_> {
         };
         match call {
             None => {
-                // The parentheses belong to the operand when an error shows it.
+                // An error message about the operand shows its parentheses too.
                 if let Some(operand) = self.operands.last_mut() {
                     *operand = at.to(span);
                 }
@@ -193,7 +193,7 @@ impl Parser<'_> {
         }
     }
 
-    /// Writes out the waiting operators that hold their operands at least so tightly.
+    /// Writes out the waiting operators of at least this precedence.
     fn settle(&mut self, at_least: u8) {
         while let Some(&waiting) = self.waiting.last()
             && waiting.strength() >= at_least
@@ -254,7 +254,7 @@ fn unknown(name: &str, span: Span) -> ExpressionError {
     })
 }
 
-/// How to write what other languages have a function for.
+/// The notation for operations that are functions in other languages.
 fn in_other_words(name: &str) -> Option<String> {
     let words = match name.to_ascii_lowercase().as_str() {
         "pow" | "power" => "a^b",
@@ -282,7 +282,7 @@ fn wrong_count(function: Function, found: usize, span: Span) -> ExpressionError 
 mod tests {
     use super::*;
 
-    /// The postfix order as text.
+    /// The postfix order of a text, as text.
     fn postfix(text: &str) -> String {
         let word = |step: &Step| match &step.action {
             Action::Number(value) => value.to_string(),
@@ -388,7 +388,7 @@ mod tests {
 
     #[test]
     fn length_is_limited() {
-        // Long is not deep.
+        // A long sum does not nest.
         assert!(parse(&("1+".repeat(MAX_LENGTH / 2 - 1) + "1")).is_ok());
         assert!(parse(&"9".repeat(300)).is_ok());
         for text in ["1+".repeat(MAX_LENGTH), "ψ".repeat(MAX_LENGTH) + "x"] {

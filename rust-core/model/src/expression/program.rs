@@ -1,64 +1,63 @@
-//! Formulas as a list of instructions.
+//! Formulas as lists of instructions.
 
 use super::function::{Unary, select};
 
 /// Several formulas compiled for evaluation together.
 ///
-/// What the formulas share is computed once and what none needs is left out. Integer powers are
-/// products; every other power is [`f64::powf`]. A block evaluation runs each instruction over all
-/// lanes before the next, so the cost of interpreting is spread and the plain loops vectorise.
-/// One point or a block, the same operations give the same bits.
+/// A program computes shared parts once and leaves out unused parts. Integer powers are products; every other
+/// power is [`f64::powf`]. A block evaluation runs each instruction over all lanes before the next, which
+/// spreads the cost of interpreting, and plain loops vectorise. One point and a block give the same bits.
 #[derive(Debug, Clone)]
 pub struct Program {
-    /// One more than the largest variable in use.
+    /// One more than the largest index of a variable in use.
     pub(super) variables: usize,
     pub(super) registers: usize,
     pub(super) code: Vec<Instruction>,
     pub(super) outputs: Vec<Output>,
 }
 
-/// One operation: `registers[to] = operation(from)`.
+/// An instruction `registers[to] = operation(from)`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Instruction {
     pub operation: Operation,
     pub constant: f64,
-    /// Only the first operands that the operation has are meaningful. A place below the number
-    /// of variables is a variable, the others are registers.
+    /// Places of the operands; entries beyond the operation's number of operands are ignored. A place
+    /// below the number of variables is a variable, the others are registers.
     pub from: [usize; 4],
-    /// A register that no operand is in, so inputs and output never overlap.
+    /// A register that contains no operand, so that inputs and output never overlap.
     pub to: usize,
 }
 
 /// Operations on operands a, b … and a constant c.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) enum Operation {
-    /// c
+    /// Sets the constant c.
     Set,
-    /// a + b
+    /// Computes a + b.
     Add,
-    /// a − b
+    /// Computes a − b.
     Subtract,
-    /// a · b
+    /// Computes a · b.
     Multiply,
-    /// a / b
+    /// Computes a / b.
     Divide,
-    /// −a
+    /// Computes −a.
     Negate,
-    /// c + a
+    /// Computes c + a.
     Shift,
-    /// c − a
+    /// Computes c − a.
     SubtractFrom,
-    /// c · a
+    /// Computes c · a.
     Scale,
-    /// c / a
+    /// Computes c / a.
     DivideInto,
-    /// a ^ b
+    /// Computes a ^ b.
     Power,
-    /// a ^ c
+    /// Computes a ^ c.
     PowerConstant,
-    /// f(a)
+    /// Computes a function f(a).
     Unary(Unary),
-    /// c if a ≤ b, and d otherwise
+    /// Selects c if a ≤ b, and d otherwise.
     Select,
 }
 
@@ -83,7 +82,7 @@ impl Operation {
     }
 }
 
-/// Where a result is found.
+/// The place of a result.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Output {
     Constant(f64),
@@ -92,17 +91,17 @@ pub(super) enum Output {
 }
 
 impl Program {
-    /// How many values one evaluation gives.
+    /// Number of values that one evaluation computes.
     pub fn outputs(&self) -> usize {
         self.outputs.len()
     }
 
-    /// How many variables one evaluation reads: one more than the largest index in use.
+    /// Number of variables that one evaluation reads: one more than the largest index in use.
     pub fn variables(&self) -> usize {
         self.variables
     }
 
-    /// How many operations one evaluation takes.
+    /// Number of operations of one evaluation.
     pub fn operations(&self) -> usize {
         self.code.len()
     }
@@ -113,8 +112,7 @@ impl Program {
     ///
     /// # Panics
     ///
-    /// If `at` is shorter than [`variables`](Self::variables) or `out` than
-    /// [`outputs`](Self::outputs).
+    /// Panics if `at` is shorter than [`variables`](Self::variables) or `out` than [`outputs`](Self::outputs).
     pub fn eval(&self, at: &[f64], out: &mut [f64], work: &mut Vec<f64>) {
         self.eval_block(1, at, out, work);
     }
@@ -126,8 +124,8 @@ impl Program {
     ///
     /// # Panics
     ///
-    /// If `at` is shorter than `lanes` times [`variables`](Self::variables) or `out` than `lanes`
-    /// times [`outputs`](Self::outputs).
+    /// Panics if `at` is shorter than `lanes` times [`variables`](Self::variables) or `out` than
+    /// `lanes` times [`outputs`](Self::outputs).
     pub fn eval_block(&self, lanes: usize, at: &[f64], out: &mut [f64], work: &mut Vec<f64>) {
         if lanes > 0 {
             let out = &mut out[..self.outputs.len() * lanes];
@@ -135,12 +133,14 @@ impl Program {
         }
     }
 
-    /// The same, with each output where `out` says, which gives slices of `lanes` numbers. Inlined, so that the caller
-    /// decides what vectors the loops are compiled to: the bits are the same with any.
+    /// Evaluates as [`eval_block`](Self::eval_block), with each output in the slice of `lanes` numbers
+    /// that `out` returns. The function is inlined, so that the caller decides which vectors the loops
+    /// are compiled to: the bits are the same with any.
     ///
     /// # Panics
     ///
-    /// If `at` is shorter than `lanes` times [`variables`](Self::variables), or one of `out` of another length.
+    /// Panics if `at` is shorter than `lanes` times [`variables`](Self::variables), or if a
+    /// slice of `out` has another length.
     #[inline(always)]
     pub fn eval_block_into<'o>(
         &self,
@@ -195,7 +195,7 @@ impl Instruction {
             Operation::DivideInto => map(to, from(0), |a| c / a),
             Operation::Power => zip(to, from(0), from(1), f64::powf),
             Operation::PowerConstant => map(to, from(0), |a| a.powf(c)),
-            // One loop per function, so that the simple ones vectorise.
+            // Each function has its own loop, so that the simple ones vectorise.
             Operation::Unary(Unary::Ln) => map(to, from(0), |a| Unary::Ln.apply(a)),
             Operation::Unary(Unary::Exp) => map(to, from(0), |a| Unary::Exp.apply(a)),
             Operation::Unary(Unary::Sqrt) => map(to, from(0), |a| Unary::Sqrt.apply(a)),
@@ -284,7 +284,7 @@ mod tests {
     fn what_is_shared_is_computed_once() {
         let f = formula("exp(x*y)");
         let program = Program::new(&[&f, &f.derivative(0).unwrap(), &f.derivative(1).unwrap()]);
-        // xy, exp, and one product for each derivative.
+        // The operations are xy, exp, and one product for each derivative.
         assert_eq!(program.operations(), 4);
 
         let powers = [formula("x^2"), formula("x^4"), formula("x^8")];
@@ -294,7 +294,7 @@ mod tests {
 
     #[test]
     fn what_is_not_needed_is_left_out() {
-        // One division; the reciprocal that the quotient is made of is not computed.
+        // The program has one division; the reciprocal in the quotient is not computed.
         assert_eq!(Program::new(&[&formula("3/x")]).operations(), 1);
         assert_eq!(Program::new(&[&formula("x")]).operations(), 0);
         assert_eq!(Program::new(&[]).operations(), 0);

@@ -1,15 +1,14 @@
-//! Arithmetic on graph nodes that leaves out what need not be computed.
+//! Arithmetic on graph nodes that omits needless operations.
 //!
-//! A term is seen as `coefficient · rest`. Coefficients are multiplied and divided as numbers and
-//! kept in front, so `2 * (c * n)` is one product, and like terms are summed. Only operations with
-//! a finite result are carried out; `1/0` stays a node that evaluates to what it is. `0 * x` is
-//! zero for every x.
+//! A term is treated as `coefficient · rest`. Coefficients are multiplied and divided as numbers and kept in
+//! front, so that `2 * (c * n)` is one product, and like terms are summed. Only operations with a finite
+//! result are folded; `1/0` stays a node that evaluates to an infinity. `0 * x` is zero for every x.
 
 use super::error::TooLarge;
 use super::function::{Unary, integer_power, select};
 use super::graph::{Bits, Graph, Id, Node};
 
-/// The largest exponent that is worked out by multiplication; beyond it, `powf` is as good.
+/// Largest exponent that is computed by multiplication; beyond it `powf` is as good.
 const LARGEST_CHAIN: i32 = 32;
 
 type Built = Result<Id, TooLarge>;
@@ -41,7 +40,7 @@ impl Graph {
         if ra == rb && (ca + cb).is_finite() {
             return self.scale(ca + cb, ra);
         }
-        // A sum with a negative term is a difference.
+        // A sum with a negative term becomes a difference.
         match (ra, rb) {
             (_, Some(_)) if cb < 0.0 => {
                 let b = self.scale(-cb, rb)?;
@@ -110,7 +109,7 @@ impl Graph {
         }
     }
 
-    /// aⁿ for |n| up to [`LARGEST_CHAIN`].
+    /// The power aⁿ as products, for |n| up to [`LARGEST_CHAIN`].
     pub fn integer_power(&mut self, a: Id, n: i32) -> Built {
         match n {
             0 => return self.constant(1.0),
@@ -172,14 +171,14 @@ impl Graph {
         self.as_constant(id) == Some(0.0)
     }
 
-    /// The coefficient `c` of an operation on `a` and `b`, unless overflow or underflow would show.
+    /// The coefficient `c` of an operation on `a` and `b`, unless it overflows or underflows.
     fn folded(&self, a: Id, b: Id, c: f64) -> Option<f64> {
         let plain = self.as_constant(a).is_some() && self.as_constant(b).is_some();
         let zero = c == 0.0 && (self.is_zero(a) || self.is_zero(b));
         (c.is_normal() || (plain && c.is_finite()) || zero).then_some(c)
     }
 
-    /// `coefficient · rest`; a constant has no rest.
+    /// A node as `coefficient · rest`; a constant has no rest.
     fn term(&self, id: Id) -> (f64, Option<Id>) {
         match self.node(id) {
             Node::Constant(c) => (c.value(), None),
@@ -192,7 +191,7 @@ impl Graph {
         }
     }
 
-    /// The term with these parts.
+    /// The node of `coefficient · rest`.
     fn scale(&mut self, c: f64, rest: Option<Id>) -> Built {
         let Some(rest) = rest else {
             return self.constant(c);
@@ -213,8 +212,8 @@ impl Graph {
         self.add_node(Node::Multiply(c, rest))
     }
 
-    /// a · b without coefficients: powers of one base are gathered if they are of one sign, since
-    /// x · x⁻¹ is not 1 at 0.
+    /// The product a · b without coefficients. Powers of one base are joined if their exponents have
+    /// one sign, since x · x⁻¹ is not 1 at 0.
     fn product(&mut self, a: Id, b: Id) -> Built {
         let power = |id| match self.node(id) {
             Node::IntegerPower(base, n) => (base, n),

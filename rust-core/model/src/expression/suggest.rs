@@ -1,8 +1,8 @@
-//! "Did you mean …?"
+//! Suggestions "did you mean …?" for misspelt names.
 
-/// The candidate that `name` is most likely a slip of, if any is close enough.
+/// The candidate that `name` most likely misspells, if any is close enough.
 pub fn closest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<String> {
-    // One slip in a short name, two in a longer one: beyond that it is another name.
+    // A short name may have one slip, a longer name two: with more it is another name.
     let allowed = match name.len() {
         0..=4 => 1,
         _ => 2,
@@ -16,7 +16,7 @@ pub fn closest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         .map(|(_, candidate)| candidate.to_owned())
 }
 
-/// The edit distance, letters of the wrong case for free; two neighbours in the wrong order are one slip.
+/// The edit distance; wrong case counts nothing, and two neighbouring letters in the wrong order are one slip.
 fn slips(a: &str, b: &str) -> usize {
     let (a, b) = (a.to_ascii_lowercase().into_bytes(), b.to_ascii_lowercase().into_bytes());
     let (mut before, mut row): (Vec<usize>, Vec<usize>) = (Vec::new(), (0..=b.len()).collect());

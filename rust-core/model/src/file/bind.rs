@@ -1,4 +1,4 @@
-//! Puts the temperature in: from entries of the file to a [`Fluid`].
+//! Applies a temperature: turns the entries of the file into a [`Fluid`].
 
 use super::Model;
 use super::density::DensityEntry;
@@ -17,7 +17,7 @@ use crate::pair::{ExpressionPair, PairPotential, Soft, SplineAttractive, TablePa
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Everything a formula may refer to.
+/// Parameters and variables that formulas may refer to.
 struct Context<'a> {
     source: &'a Arc<Source>,
     constants: BTreeMap<String, f64>,
@@ -72,7 +72,7 @@ fn bind_excess(
             .map(ExcessFreeEnergy::Formula)
             .map_err(|e| formula_error(context.source, ast, e)),
         ExcessEntry::Table { spline, density } => {
-            // A straight line is a formula, and needs no pass.
+            // A straight line is a formula, which needs no pass of its own.
             let line = spline.straight().and_then(|[intercept, slope]| {
                 Formula::linear(intercept, (0..count).map(|s| (density * count + s, slope))).ok()
             });
@@ -95,7 +95,7 @@ fn bind_excess(
         ExcessEntry::Pressure { formula: ast, density } => {
             let variables = Variables { count: 1, names: BTreeMap::from([("rho".to_owned(), vec![0])]) };
             let kt = context.constants["kT"];
-            // ψ is integrated from within the bounds, if there are any.
+            // The integration of ψ starts within the bounds, if there are any.
             let start = match densities[*density].bounds {
                 Some(Bounds { low, high, .. }) if low > 0.0 => (low * high).sqrt(),
                 Some(Bounds { high, .. }) if high > 0.0 => 0.5 * high,
@@ -115,7 +115,7 @@ fn bind_excess(
     }
 }
 
-/// A slope is that of one partial density, or of all that make up a total.
+/// Binds slopes, each with respect to one partial density or to all densities of a total.
 fn bind_slopes(
     slopes: &[(Located<String>, Located<Ast>)],
     energy: Option<&Located<Ast>>,
@@ -157,7 +157,7 @@ fn bind_slopes(
     Ok(law)
 }
 
-/// The continuation of ψ has three to the number of bounded variables terms.
+/// With n bounded variables the continuation of ψ has 3^n terms.
 fn check_bounded(
     model: &Model,
     densities: &[WeightedDensity],
@@ -180,7 +180,7 @@ fn check_bounded(
     Ok(())
 }
 
-/// The variables of ψ: for a density `n` of species A, B the names n_A, n_B and n = n_A + n_B.
+/// The variables of ψ: a density `n` of species A and B has the names n_A, n_B and n = n_A + n_B.
 fn variables(model: &Model) -> Variables {
     let count = model.species.len();
     let mut names = BTreeMap::new();
@@ -288,7 +288,7 @@ fn bind_pair(entry: &PairEntry, context: &Context) -> Result<PairTerm, FileError
     Ok(PairTerm { between: entry.between, potential })
 }
 
-/// A potential that jumps at its range would not conserve energy.
+/// Refuses a potential that jumps at its range, which would not conserve energy.
 fn check_table(spline: &Spline, range: f64) -> Result<(), String> {
     let [first, _] = spline.ends();
     if !(first >= 0.0 && range > first) {
@@ -313,7 +313,7 @@ fn bind_thermostats(
     let (constants, source) = (&context.constants, context.source);
     let count = context.species;
     let mut all = vec![None; count * count];
-    // The entry for every pair first, so that particular ones replace it.
+    // The entry for all pairs comes first, so that entries for single pairs replace it.
     let ordered =
         entries.iter().filter(|e| e.between.is_none()).chain(entries.iter().filter(|e| e.between.is_some()));
     for entry in ordered {

@@ -14,7 +14,7 @@ pub struct DensityEntry {
     pub force_kernel: KernelKind,
     pub range: Number,
     pub includes_self: bool,
-    /// Coefficients by (felt by, density of), row-major; empty is the identity.
+    /// Coefficients by (felt by, density of), row-major; empty for the identity.
     pub correction: Vec<Vec<Number>>,
     pub bounds: Option<[Number; 2]>,
     pub below: Continuation,
@@ -94,7 +94,7 @@ fn read_one(name: Located<String>, table: &Section, species: &[String]) -> Resul
     Ok(DensityEntry { name, kernel, force_kernel, range, includes_self, correction, bounds, below })
 }
 
-/// One polynomial for all pairs of species, or a table of `"A|B"`: the density of A felt by B.
+/// Reads one polynomial for all pairs of species, or a table of `"A|B"`: the density of A felt by B.
 fn read_correction(
     value: &Value,
     table: &Section,
@@ -134,7 +134,7 @@ fn read_correction(
     Ok(all)
 }
 
-/// The variables of one density must not hide parameters or the variables of another.
+/// Fails if a variable of a density has the name of a parameter or of another density's variable.
 fn check_clashes(
     name: &Located<String>,
     section: &Section,

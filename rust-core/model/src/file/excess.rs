@@ -8,10 +8,10 @@ use crate::expression::Ast;
 use std::path::Path;
 use std::sync::Arc;
 
-/// What the file says of one species' `ψ`.
+/// The entry of one species' `ψ` in the file.
 #[derive(Debug, Clone)]
 pub enum ExcessEntry {
-    /// No `[excess_free_energy]` at all: ψ = 0.
+    /// The file has no `[excess_free_energy]`: ψ = 0.
     None,
     /// A formula of the densities.
     Formula(Located<Ast>),
@@ -21,11 +21,11 @@ pub enum ExcessEntry {
     Pressure { formula: Located<Ast>, density: usize },
     /// The pressure as a table of one density's total.
     PressureTable { spline: Arc<Spline>, density: usize, key: Located<()> },
-    /// Slopes that need have no ψ, by the names of the variables, and what is reported as energy.
+    /// Slopes that may have no ψ, by the names of the variables, and the formula that is reported as energy.
     Slopes { slopes: Vec<(Located<String>, Located<Ast>)>, energy: Option<Located<Ast>> },
 }
 
-/// Reads `[excess_free_energy]`: every species, or none.
+/// Reads `[excess_free_energy]`, with an entry for every species.
 pub fn read(
     root: &Section,
     species: &Located<Vec<String>>,
@@ -56,8 +56,8 @@ pub fn read(
     }
 }
 
-/// `{ table = "file" }` or `{ pressure = "formula" }`, with `density = "name"` where there are several;
-/// or `{ slopes = { n = "formula" } }`.
+/// Reads `{ table = "file" }` or `{ pressure = "formula" }`, with `density = "name"` where there are
+/// several; or `{ slopes = { n = "formula" } }`.
 fn read_curve(
     table: &Section,
     species: usize,
@@ -127,7 +127,7 @@ fn read_slopes(slopes: &Value, energy: Option<Value>, table: &Section) -> Result
     Ok(ExcessEntry::Slopes { slopes, energy })
 }
 
-/// The density that a curve depends on: the one named, or the only one.
+/// The density that a curve depends on: the named density, or the only one.
 fn read_density(
     named: Option<Value>,
     table: &Section,

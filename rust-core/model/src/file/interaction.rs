@@ -15,7 +15,7 @@ pub struct PairEntry {
     pub form: PairFormEntry,
 }
 
-/// The form of a pair potential, with what it takes.
+/// The form of a pair potential, with its parameters.
 #[derive(Debug, Clone)]
 pub enum PairFormEntry {
     Soft { strength: Number, range: Number },
@@ -27,7 +27,7 @@ pub enum PairFormEntry {
 /// A `[[thermostat]]` table.
 #[derive(Debug, Clone)]
 pub struct ThermostatEntry {
-    /// Every pair that has no entry of its own if `None`.
+    /// The pair of species; `None` for every pair without an entry of its own.
     pub between: Option<[usize; 2]>,
     pub gamma: Number,
     pub range: Number,
@@ -136,8 +136,8 @@ pub fn read_thermostats(root: &Section, species: &[String]) -> Result<Vec<Thermo
     Ok(entries)
 }
 
-/// In a fluid whose particles interact at all, every two species must: what is forgotten should not
-/// pass for an ideal mixture.
+/// In a fluid whose particles interact, every two species must have an interaction: a forgotten entry
+/// must not look like an ideal mixture.
 pub fn check_coverage(source: &Arc<Source>, fluid: &Fluid) -> Result<(), FileError> {
     let count = fluid.species.len();
     let mut coupled = vec![false; count * count];

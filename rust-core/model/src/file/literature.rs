@@ -1,18 +1,18 @@
-//! Values that were published for the fluid, to be put beside what is measured.
+//! Published values of the fluid, for comparison with measured ones.
 
 use crate::document::{FileError, FileErrorKind, Section};
 
-/// The quantities that may be stated.
+/// The quantities that the file may state.
 pub const QUANTITIES: [&str; 5] = ["pressure", "liquid", "vapour", "tension", "width"];
 
-/// What was published for one temperature.
+/// Published values at one temperature.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Published {
-    /// kT.
+    /// Temperature kT.
     pub kt: f64,
-    /// The number density that `pressure` belongs to.
+    /// The number density at which `pressure` was published.
     pub density: Option<f64>,
-    /// Of `QUANTITIES`: name, value, error.
+    /// Name (one of `QUANTITIES`), value and error of each quantity.
     pub values: Vec<(&'static str, [f64; 2])>,
 }
 

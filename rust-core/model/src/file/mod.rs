@@ -1,4 +1,4 @@
-//! From the text of a model file to a checked [`Model`].
+//! Reads the text of a model file into a checked [`Model`].
 
 mod bind;
 mod density;
@@ -24,7 +24,7 @@ use std::path::Path;
 use std::sync::Arc;
 pub use units::Units;
 
-/// A model file, read and checked. The temperature is the host's: see [`Model::at`].
+/// A model file, read and checked. The host supplies the temperature: see [`Model::at`].
 #[derive(Debug, Clone)]
 pub struct Model {
     source: Arc<Source>,
@@ -41,23 +41,22 @@ pub struct Model {
     thermostats: Vec<ThermostatEntry>,
 }
 
-/// A temperature for checking formulas at load time; no file is likely to be singular just here.
+/// A temperature for checking formulas at load time; a formula is unlikely to be singular exactly here.
 const CHECK_KT: f64 = 0.918_273_645;
 
 impl Model {
     /// Reads a model file.
     ///
     /// # Errors
-    /// Anything wrong in the file, with its line and key.
+    /// Fails for any error in the file, with its line and key.
     pub fn open(path: &Path) -> Result<Model, FileError> {
         Model::read(&Document::open(path)?)
     }
 
-    /// Reads a model from a text; `name` stands for the file in messages, and tables are looked for
-    /// beside it.
+    /// Reads a model from a text; `name` stands for the file in messages, and tables are searched in its folder.
     ///
     /// # Errors
-    /// As [`Model::open`].
+    /// Fails as [`Model::open`].
     pub fn parse(name: &str, text: &str) -> Result<Model, FileError> {
         Model::read(&Document::parse(name, text)?)
     }
@@ -96,33 +95,33 @@ impl Model {
             pairs,
             thermostats,
         };
-        // Every name and number is checked now, not when the host comes with its temperature.
+        // Every name and number is checked at load time, before the host supplies its temperature.
         let fluid = model.at(CHECK_KT)?;
         interaction::check_coverage(&model.source, &fluid)?;
         Ok(model)
     }
 
-    /// What the file calls itself.
+    /// The title in the file.
     pub fn title(&self) -> &str {
         &self.title
     }
 
-    /// Where the model comes from.
+    /// The publication that the model comes from.
     pub fn reference(&self) -> Option<&str> {
         self.reference.as_deref()
     }
 
-    /// 2 or 3.
+    /// The number of dimensions, 2 or 3.
     pub fn dimensions(&self) -> usize {
         self.dimensions
     }
 
-    /// What its numbers stand for, if it says so.
+    /// The units of the model's numbers, if the file states them.
     pub fn units(&self) -> Option<Units> {
         self.units
     }
 
-    /// What was published for the fluid at a temperature.
+    /// The published values of the fluid at a temperature.
     pub fn published(&self, kt: f64) -> Option<&Published> {
         self.literature.iter().find(|p| (p.kt - kt).abs() <= 1e-9 * kt)
     }
@@ -142,10 +141,10 @@ impl Model {
         &self.source
     }
 
-    /// The fluid at temperature `kt` (energy units of the file).
+    /// The fluid at temperature `kt`, in energy units of the file.
     ///
     /// # Errors
-    /// `kt` is not a positive number, or a formula or number is not finite at this temperature.
+    /// Fails if `kt` is not a positive number, or if a formula or number is not finite at this temperature.
     pub fn at(&self, kt: f64) -> Result<Fluid, FileError> {
         bind::bind(self, kt)
     }
@@ -182,7 +181,7 @@ fn species_index(
 #[cfg(test)]
 mod tests;
 
-/// What is said of a scene where a model is expected: it has keys of a scene, and none of what makes a model.
+/// The error for a scene where a model is expected: the file has keys of a scene, and none that define a model.
 fn no_model(root: &Section) -> Option<FileError> {
     let of_model = ["species", "excess_free_energy", "density", "pair"];
     let of_scene = ["model", "box", "stage", "steps", "initial", "part"];

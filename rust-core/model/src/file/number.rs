@@ -5,12 +5,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// A number, written as one or as a formula of the parameters and kT.
+/// A number, or a formula of the parameters and kT.
 #[derive(Debug, Clone)]
 pub enum Number {
-    /// Written as a number.
+    /// The file has a number.
     Value(Located<f64>),
-    /// Written as a formula.
+    /// The file has a formula.
     Formula(Located<Ast>),
 }
 
@@ -33,7 +33,7 @@ impl Number {
         }
     }
 
-    /// Its value with the constants put in.
+    /// The value of the number or formula with these constants.
     pub fn evaluate(
         &self,
         constants: &BTreeMap<String, f64>,
@@ -44,7 +44,7 @@ impl Number {
             Number::Formula(ast) => {
                 let formula = Formula::compile(&ast.value, constants, &Variables::default())
                     .map_err(|e| formula_error(source, ast, e))?;
-                // Without variables a formula always folds to a number.
+                // A formula without variables always folds to a number.
                 let value = formula.value(&[]);
                 if !value.is_finite() {
                     return Err(
@@ -56,7 +56,7 @@ impl Number {
         }
     }
 
-    /// Its value, which must be positive.
+    /// The value, which must be positive.
     pub fn positive(
         &self,
         constants: &BTreeMap<String, f64>,
@@ -95,12 +95,12 @@ pub fn formula_error(source: &Arc<Source>, at: &Located<Ast>, error: ExpressionE
     )
 }
 
-/// Where in the file an error in a quoted formula stands. Exact when the string has no escapes.
+/// The place in the file of an error in a quoted formula; exact if the string has no escapes.
 fn span_in_string(source: &Source, string: &Range<usize>, error: &ExpressionError) -> Range<usize> {
     let text = source.text();
     let quoted = text.get(string.clone()).unwrap_or("");
     let mut quotes = if quoted.starts_with("\"\"\"") || quoted.starts_with("'''") { 3 } else { 1 };
-    // A newline right behind the opening triple quote is not part of the string.
+    // A newline directly after the opening triple quote is not part of the string.
     if quotes == 3 && quoted[3..].starts_with('\n') {
         quotes += 1;
     }
@@ -115,7 +115,7 @@ fn span_in_string(source: &Source, string: &Range<usize>, error: &ExpressionErro
     start..end
 }
 
-/// Most parameters of a model: each may wait for all others.
+/// Most parameters of a model: each may depend on all others.
 const MOST_PARAMETERS: usize = 1000;
 
 /// The `[parameters]` table: numbers, or formulas of other parameters, in any order.
@@ -144,7 +144,7 @@ pub fn read_parameters(root: &Section) -> Result<BTreeMap<String, f64>, FileErro
         }
         waiting.push((name.value, number));
     }
-    // Formulas may refer to each other: keep evaluating what can be until nothing is left.
+    // Formulas may refer to each other: each pass evaluates those whose parameters are known, until none is left.
     let names: BTreeSet<String> = waiting.iter().map(|(n, _)| n.clone()).collect();
     while !waiting.is_empty() {
         let before = waiting.len();

@@ -38,7 +38,7 @@ fn error_of(text: &str) -> FileError {
     Model::parse("m.toml", text).expect_err("this file is wrong")
 }
 
-/// What is replaced, by what, on which line the error is, and a part of its message.
+/// Each case has the old text, the new text, the line of the error and a part of its message.
 #[test]
 fn errors_name_line_key_and_cause() {
     let cases = [
@@ -115,7 +115,7 @@ range = 1
     let error = error_of(text).to_string();
     assert!(error.contains("nothing acts between species A and B"), "{error}");
     assert!(error.contains("of strength 0 if that is meant"), "{error}");
-    // An ideal gas is a fluid too.
+    // An ideal gas is a valid fluid.
     assert!(Model::parse("m.toml", "title = \"ideal\"\nspecies = [\"A\", \"B\"]\n").is_ok());
 }
 

@@ -1,15 +1,15 @@
-//! What the numbers of a model stand for.
+//! The units of a model's numbers.
 
 use crate::document::{FileError, FileErrorKind, Section};
 
-/// The units of a model, in SI. That of time is `length √(mass/energy)`.
+/// The units of a model, in SI. The unit of time is `length √(mass/energy)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Units {
-    /// Metres.
+    /// Unit of length, in metres.
     pub length: f64,
-    /// Kilograms.
+    /// Unit of mass, in kilograms.
     pub mass: f64,
-    /// Joules.
+    /// Unit of energy, in joules.
     pub energy: f64,
 }
 

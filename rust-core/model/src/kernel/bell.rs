@@ -1,8 +1,8 @@
 use super::{Real, Shape};
 use std::f64::consts::PI;
 
-/// `W = 2s³ − 3s² + 1`, the w₂ that Trofimov et al. reject: flat at the centre, it lets particles sit
-/// on each other, and lattices form at high pressure.
+/// `W = 2s³ − 3s² + 1`, the w₂ that Trofimov et al. reject: it is flat at the centre, so that particles
+/// overlap and form lattices at high pressure.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Bell;
 

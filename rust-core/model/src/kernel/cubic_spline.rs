@@ -10,7 +10,7 @@ impl Shape for CubicSpline {
     const NAME: &'static str = "cubic-spline";
     const FACTORS: [f64; 2] = [40.0 / (7.0 * PI), 8.0 / PI];
 
-    // 2(1 − s)³ − 8(½ − s)³₊: both pieces without a branch.
+    // The sum 2(1 − s)³ − 8(½ − s)³₊ has both pieces without a branch.
     #[inline(always)]
     fn value<R: Real>(s: R) -> R {
         let t = R::constant(1.0) - s;

@@ -1,8 +1,7 @@
 use super::{Real, Shape};
 use std::f64::consts::PI;
 
-/// `W = 1 − s`. Its force jumps at the range: Pagonabarraga and Frenkel, Figs 3–5, compare it on
-/// purpose.
+/// `W = 1 − s`. Its force jumps at the range: Pagonabarraga and Frenkel use it for comparison in Figs 3–5.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Linear;
 

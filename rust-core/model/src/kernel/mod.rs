@@ -29,22 +29,22 @@ pub use wendland_c2::WendlandC2;
 ///
 /// Implementations are zero-sized, so that loops over pairs are compiled once per kernel.
 pub trait Shape: Copy + Default + Send + Sync + 'static {
-    /// The name in the model file.
+    /// The kernel's name in the model file.
     const NAME: &'static str;
-    /// `c_2` and `c_3`: the normalising factors in two and three dimensions.
+    /// The normalising factors `c_2` and `c_3` in two and three dimensions.
     const FACTORS: [f64; 2];
-    /// `W(s)`.
+    /// The shape `W(s)`.
     fn value<R: Real>(s: R) -> R;
-    /// `W'(s)`.
+    /// The slope `W'(s)`.
     fn slope<R: Real>(s: R) -> R;
-    /// `W''(s)`, which no force needs, only what measures how forces change.
+    /// The curvature `W''(s)`, which only measurements of changing forces need.
     fn curvature(s: f64) -> f64;
 }
 
-/// The one list of kernels: the enum, the names and the dispatch all come from it.
+/// The one list of kernels, which defines the enum, the names and the dispatch.
 macro_rules! kernel_table {
     ($($shape:ident),+ $(,)?) => {
-        /// Which weight function.
+        /// A weight function by its shape.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
         pub enum KernelKind {
             $(#[doc = concat!("The shape [`", stringify!($shape), "`].")] $shape),+
@@ -54,12 +54,12 @@ macro_rules! kernel_table {
             /// Every kernel, in the order of the documentation.
             pub const ALL: &'static [KernelKind] = &[$(KernelKind::$shape),+];
 
-            /// The name in the model file.
+            /// The kernel's name in the model file.
             pub fn name(self) -> &'static str {
                 match self { $(KernelKind::$shape => $shape::NAME),+ }
             }
 
-            /// Calls `visitor` with the shape as a type, so that what it does is compiled for it.
+            /// Calls `visitor` with the shape as a type, so that the visitor is compiled for each shape.
             #[inline(always)]
             pub fn visit<V: ShapeVisitor>(self, visitor: V) -> V::Output {
                 match self { $(KernelKind::$shape => visitor.visit::<$shape>()),+ }
@@ -70,16 +70,16 @@ macro_rules! kernel_table {
 
 kernel_table!(Linear, Quadratic, Bell, Lucy, CubicSpline, WendlandC2);
 
-/// Work to be compiled once for each kernel shape.
+/// Work that is compiled once for each kernel shape.
 pub trait ShapeVisitor {
-    /// What it returns.
+    /// Result of the work.
     type Output;
-    /// The work, for one shape.
+    /// Does the work for one shape.
     fn visit<S: Shape>(self) -> Self::Output;
 }
 
 impl KernelKind {
-    /// The kernel of a name in the model file.
+    /// The kernel with this name in the model file.
     pub fn from_name(name: &str) -> Option<KernelKind> {
         KernelKind::ALL.iter().copied().find(|k| k.name() == name)
     }
@@ -95,7 +95,7 @@ pub struct Kernel {
 }
 
 impl Kernel {
-    /// The kernel `kind` of range `R > 0` in two or three dimensions.
+    /// Builds the kernel `kind` of range `R > 0` in two or three dimensions.
     pub fn new(kind: KernelKind, range: f64, dimensions: usize) -> Kernel {
         struct Factor(usize);
         impl ShapeVisitor for Factor {
@@ -109,27 +109,27 @@ impl Kernel {
         Kernel { kind, range, value_factor: factor, slope_factor: factor / range }
     }
 
-    /// Which shape.
+    /// The shape of the kernel.
     pub fn kind(&self) -> KernelKind {
         self.kind
     }
 
-    /// `R`, beyond which the kernel vanishes.
+    /// The range `R`, beyond which the kernel vanishes.
     pub fn range(&self) -> f64 {
         self.range
     }
 
-    /// `c_d / R^d`: what multiplies `W(s)` in `w`.
+    /// The factor `c_d / R^d` of `W(s)` in `w`.
     pub fn value_factor(&self) -> f64 {
         self.value_factor
     }
 
-    /// `c_d / R^(d+1)`: what multiplies `W'(s)` in `w'`.
+    /// The factor `c_d / R^(d+1)` of `W'(s)` in `w'`.
     pub fn slope_factor(&self) -> f64 {
         self.slope_factor
     }
 
-    /// `w(r)`.
+    /// The weight `w(r)`.
     #[inline]
     pub fn value(&self, r: f64) -> f64 {
         struct At(f64);
@@ -142,7 +142,7 @@ impl Kernel {
         if r < self.range { self.value_factor * self.kind.visit(At(r / self.range)) } else { 0.0 }
     }
 
-    /// `w'(r)`, never positive for the kernels here.
+    /// The slope `w'(r)`; no kernel of this list has a positive slope.
     #[inline]
     pub fn slope(&self, r: f64) -> f64 {
         struct At(f64);
@@ -155,7 +155,7 @@ impl Kernel {
         if r < self.range { self.slope_factor * self.kind.visit(At(r / self.range)) } else { 0.0 }
     }
 
-    /// `w''(r)` within the range, 0 beyond: a jump of `w'` at the range does not count.
+    /// The curvature `w''(r)` within the range, 0 beyond; a jump of `w'` at the range does not contribute.
     #[inline]
     pub fn curvature(&self, r: f64) -> f64 {
         struct At(f64);
@@ -201,7 +201,7 @@ mod tests {
         }
     }
 
-    /// `[r w'] = −d [w]`, what makes the virial pressure equal the thermodynamic one
+    /// The identity `[r w'] = −d [w]` makes the virial pressure equal the thermodynamic one
     /// (Pagonabarraga–Frenkel eq. 10).
     #[test]
     fn virial_of_every_kernel_is_minus_d() {
@@ -210,7 +210,7 @@ mod tests {
             let w3 = Kernel::new(kind, 1.3, 3);
             let plane = integrate(|r| 2.0 * PI * r * r * w2.slope(r), 1.3);
             let space = integrate(|r| 4.0 * PI * r.powi(3) * w3.slope(r), 1.3);
-            // Simpson sees the jump of w' of the linear kernel in its last point.
+            // Simpson's last point is the jump of w' of the linear kernel.
             assert!((plane + 2.0).abs() < 5e-3, "{} 2-D: {plane}", kind.name());
             assert!((space + 3.0).abs() < 5e-3, "{} 3-D: {space}", kind.name());
         }

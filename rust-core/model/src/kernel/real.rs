@@ -1,13 +1,13 @@
-//! What a kernel shape is computed with.
+//! The arithmetic that kernel shapes use.
 
 use std::ops::{Add, Mul, Sub};
 
-/// A real number, or a vector of them: shapes are written once for single numbers, for both precisions
+/// A real number, or a vector of them: a shape is written once for single numbers, for both precisions
 /// and for every instruction set.
 pub trait Real: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
-    /// A constant of the formula.
+    /// Converts a constant of the formula.
     fn constant(x: f64) -> Self;
-    /// The larger of two.
+    /// The larger of two numbers.
     fn larger(self, other: Self) -> Self;
 }
 

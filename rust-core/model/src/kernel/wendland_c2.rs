@@ -1,7 +1,7 @@
 use super::{Real, Shape};
 use std::f64::consts::PI;
 
-/// `W = (1 + 4s)(1 − s)⁴`. Positive definite in up to three dimensions, so it does not pair.
+/// `W = (1 + 4s)(1 − s)⁴`. It is positive definite in up to three dimensions, so that particles do not form pairs.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct WendlandC2;
 

@@ -4,18 +4,18 @@ use crate::expression::{Formula, Program, TooLarge};
 /// A potential written as a formula of `r`; not shifted, so it should vanish at its range.
 #[derive(Debug, Clone)]
 pub struct ExpressionPair {
-    /// `φ`, `φ'` of the one variable `r`.
+    /// Program for `φ` and `φ'` of the one variable `r`.
     program: Program,
-    /// `φ` alone.
+    /// Program for `φ` alone.
     energy: Program,
     range: f64,
 }
 
-/// How many distances a formula is evaluated for at once.
+/// Number of distances at which a formula is evaluated at once.
 const LANES: usize = 64;
 
 impl ExpressionPair {
-    /// `φ` as a formula whose variable 0 is `r`, cut at `range`.
+    /// Builds `φ` from a formula whose variable 0 is `r`, cut at `range`.
     pub fn new(phi: &Formula, range: f64) -> Result<ExpressionPair, TooLarge> {
         let slope = phi.derivative(0)?;
         Ok(ExpressionPair { program: Program::new(&[phi, &slope]), energy: Program::new(&[phi]), range })

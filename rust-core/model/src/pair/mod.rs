@@ -18,11 +18,11 @@ pub trait PairForm {
     /// The distance at and beyond which the potential is zero.
     fn range(&self) -> f64;
 
-    /// `φ(r)` and `φ'(r)` for `r < range`.
+    /// The values `φ(r)` and `φ'(r)` for `r < range`.
     fn at(&self, r: f64) -> (f64, f64);
 
-    /// `φ''(r)` for `0 < r < range`: where a form has no formula for it, the five-point difference of the exact `φ'`,
-    /// whose error is of the order of its rounding, 10⁻¹¹ of `φ'` over the step.
+    /// `φ''(r)` for `0 < r < range`. A form without a formula for it uses the five-point difference of
+    /// the exact `φ'`, whose error is its rounding error, 10⁻¹¹ of `φ'`, over the step.
     fn curvature(&self, r: f64) -> f64 {
         let range = self.range();
         let h = (1e-4 * range).min(0.4 * r).min(0.4 * (range - r));
@@ -33,13 +33,13 @@ pub trait PairForm {
         (8.0 * (slope(r + h) - slope(r - h)) - (slope(r + 2.0 * h) - slope(r - 2.0 * h))) / (12.0 * h)
     }
 
-    /// `φ` at every `r` of a block; all `r < range`. The slices have one length; `work` is scratch space.
+    /// Computes `φ` at every `r` of a block; all `r < range`. The slices have one length; `work` is scratch space.
     fn energies(&self, r: &[f64], phi: &mut [f64], work: &mut Vec<f64>) {
         let _ = work;
         r.iter().zip(phi).for_each(|(r, phi)| *phi = self.at(*r).0);
     }
 
-    /// `φ` and `φ'` at every `r` of a block; all `r < range`. The slices have one length.
+    /// Computes `φ` and `φ'` at every `r` of a block; all `r < range`. The slices have one length.
     fn block(&self, r: &[f64], phi: &mut [f64], slope: &mut [f64]) {
         for ((r, phi), slope) in r.iter().zip(phi).zip(slope) {
             (*phi, *slope) = self.at(*r);
@@ -98,7 +98,7 @@ pair_table!(
 mod tests {
     use super::*;
 
-    /// φ' against central differences, and φ = 0 at the range.
+    /// Compares φ' with central differences, and checks that φ = 0 at the range.
     pub(crate) fn slope_is_derivative(form: &impl PairForm, skip: &[f64]) {
         let range = form.range();
         assert!(form.at(range * (1.0 - 1e-12)).0.abs() < 1e-9);

@@ -2,7 +2,7 @@ use super::PairForm;
 
 /// The soft potential of standard DPD, `φ = ½ a R (1 − r/R)²`: a force `a (1 − r/R)`.
 ///
-/// Groot and Warren; Warren eq. (3)–(4), with the range written out.
+/// The form is that of Groot and Warren; Warren eq. (3)–(4), with the range written out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Soft {
     strength: f64,
@@ -10,12 +10,12 @@ pub struct Soft {
 }
 
 impl Soft {
-    /// Strength `a` (energy over length; negative attracts) and range `R > 0`.
+    /// Takes the strength `a` (energy over length; negative attracts) and the range `R > 0`.
     pub fn new(strength: f64, range: f64) -> Soft {
         Soft { strength, range }
     }
 
-    /// `a`: the force at contact.
+    /// The strength `a`: the force at contact.
     pub fn strength(&self) -> f64 {
         self.strength
     }

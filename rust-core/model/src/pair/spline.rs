@@ -12,7 +12,7 @@ pub struct SplineAttractive {
     attraction_range: f64,
 }
 
-/// `W(r, R)` and `∂W/∂r`; zero at and beyond `R`.
+/// The shape `W(r, R)` and `∂W/∂r`; zero at and beyond `R`.
 #[inline(always)]
 pub fn spline_shape(r: f64, range: f64) -> (f64, f64) {
     let s = r / range;
@@ -20,7 +20,7 @@ pub fn spline_shape(r: f64, range: f64) -> (f64, f64) {
 }
 
 impl SplineAttractive {
-    /// Strength `a`, amplitudes `A` and `B`, ranges `R_A` and `R_B`.
+    /// Takes the strength `a`, the amplitudes `A` and `B`, and the ranges `R_A` and `R_B`.
     pub fn new(
         strength: f64,
         repulsion: f64,
@@ -36,22 +36,22 @@ impl SplineAttractive {
         }
     }
 
-    /// `aA`, what multiplies the repulsive spline.
+    /// The factor `aA` of the repulsive spline.
     pub fn repulsion(&self) -> f64 {
         self.repulsion
     }
 
-    /// `aB`, what multiplies the attractive spline.
+    /// The factor `aB` of the attractive spline.
     pub fn attraction(&self) -> f64 {
         self.attraction
     }
 
-    /// `R_A`.
+    /// The range `R_A` of the repulsion.
     pub fn repulsion_range(&self) -> f64 {
         self.repulsion_range
     }
 
-    /// `R_B`.
+    /// The range `R_B` of the attraction.
     pub fn attraction_range(&self) -> f64 {
         self.attraction_range
     }

@@ -2,8 +2,8 @@ use super::PairForm;
 use crate::curve::Spline;
 use std::sync::Arc;
 
-/// A potential given by a table of `r` and `φ`: the cubic spline through its rows, not shifted, so the
-/// table should end at zero. Below the first row φ′ goes on linearly.
+/// A potential given by a table of `r` and `φ`: the cubic spline through its rows, not shifted, so that
+/// the table should end at zero. Below the first row φ′ continues linearly.
 #[derive(Debug, Clone)]
 pub struct TablePair {
     spline: Arc<Spline>,
@@ -11,7 +11,7 @@ pub struct TablePair {
 }
 
 impl TablePair {
-    /// The spline, cut at `range`.
+    /// Takes the spline, and cuts it at `range`.
     pub fn new(spline: Arc<Spline>, range: f64) -> TablePair {
         TablePair { spline, range }
     }

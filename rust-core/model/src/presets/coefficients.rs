@@ -1,4 +1,4 @@
-//! The coefficients of pairs of species that LAMMPS users know, and what is wrong with them.
+//! The coefficients of pairs of species as LAMMPS users write them, and errors in them.
 
 use crate::document::FileError;
 use std::fmt::Write;
@@ -6,11 +6,11 @@ use std::fmt::Write;
 /// The coefficients of one pair of species, as `pair_coeff` of LAMMPS's `mdpd` takes them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WarrenPair {
-    /// `A`, force; negative attracts.
+    /// Strength `A`, a force; negative attracts.
     pub a: f64,
-    /// `B`, force per density.
+    /// Strength `B`, a force per density.
     pub b: f64,
-    /// γ of the thermostat.
+    /// Drag coefficient γ of the thermostat.
     pub gamma: f64,
     /// Range of the pair force and of the thermostat.
     pub rc: f64,
@@ -18,17 +18,17 @@ pub struct WarrenPair {
     pub rd: f64,
 }
 
-/// Why coefficients make no model.
+/// Reasons why coefficients define no model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PresetError {
     /// Species `i` and `j` (from 1) have no coefficients.
     #[error("no coefficients for types {0} and {1}: there is no mixing, set them with pair_coeff")]
     Missing(usize, usize),
-    /// Not a square table, or a table of nothing, or not as many masses.
+    /// The table is not square or empty, or the number of masses differs from that of types.
     #[error("expected coefficients for every pair of types, and as many masses as types")]
     Shape,
-    /// `B` or `r_d` differ between pairs: Warren's no-go theorem, Phys. Rev. E 87, 045303 (2013).
+    /// `B` or `r_d` differ between pairs, which Warren's no-go theorem excludes (Phys. Rev. E 87, 045303 (2013)).
     #[error(
         "{name} differs between type pairs ({first} and {second}): with one density that does not \
          tell types apart no potential gives such forces (Warren, Phys. Rev. E 87, 045303); use one \
@@ -36,19 +36,19 @@ pub enum PresetError {
          partial densities n_A, n_B, or 'law lucy' for the force of LAMMPS's mdpd, which has no potential"
     )]
     NoPotential {
-        /// `B` or `rd`.
+        /// The coefficient, `B` or `rd`.
         name: &'static str,
-        /// One value.
+        /// Its value for one pair.
         first: f64,
-        /// Another.
+        /// Its different value for another pair.
         second: f64,
     },
-    /// A coefficient that the model file's reader refuses.
+    /// The model file's reader refuses a coefficient.
     #[error(transparent)]
     File(#[from] FileError),
 }
 
-/// The upper triangle of a row-major table of coefficients: species and what was given.
+/// The upper triangle of a row-major table: indices of the species and their coefficients.
 pub(super) fn upper_triangle(
     species: usize,
     pairs: &[Option<WarrenPair>],
@@ -66,7 +66,7 @@ pub(super) fn upper_triangle(
     Ok(upper)
 }
 
-/// Pair forces and thermostats, as a part of a model file.
+/// Writes pair forces and thermostats, as a part of a model file.
 pub(super) fn pair_text(names: &[String], upper: &[(usize, usize, WarrenPair)]) -> String {
     let mut text = String::new();
     for (i, j, pair) in upper {

@@ -1,13 +1,12 @@
-//! The force law of LAMMPS's `mdpd` and `mdpd/rhosum`, written as a model file, to compare with them.
+//! The force law of LAMMPS's `mdpd` and `mdpd/rhosum`, written as a model file, for comparison with them.
 //!
 //! ```text
 //! F_ij = A_ij (1 − r/r_c,ij) + B_ij (ρ_i + ρ_j)(1 − r/r_d,ij)
 //! ρ_i  = Σ_j m_j w(r_ij; r_d,ij),   w(r; h) = 105/(16π h³) (1 + 3r/h)(1 − r/h)³, in two dimensions too
 //! ```
 //!
-//! `ρ` is a mass density that does not tell types apart, so no potential gives such forces unless all
-//! `B_ij` and `r_d,ij` are equal (Warren, Phys. Rev. E 87, 045303 (2013)), and with Lucy's kernel not even
-//! then.
+//! `ρ` is a mass density summed over all types, so that these forces have no potential unless all `B_ij` and
+//! `r_d,ij` are equal (Warren, Phys. Rev. E 87, 045303 (2013)); with Lucy's kernel they never have one.
 
 use super::coefficients::{PresetError, WarrenPair, pair_text, upper_triangle};
 use crate::file::Model;
@@ -17,11 +16,11 @@ use std::fmt::Write;
 /// table of the coefficients (the upper triangle is read). `A`, `B`, `γ`, `r_c` and `r_d` may all
 /// differ by pair.
 ///
-/// The energy `Σ_i Σ_β c r_d^{d+1} B n_β ρ_i`, `c_3 = π/30`, `c_2 = π/24`, that the model reports is that of
-/// Warren's ψ, `c r_d^{d+1} B n²`, where all coefficients are equal; it is not the force's.
+/// The reported energy `Σ_i Σ_β c r_d^{d+1} B n_β ρ_i`, `c_3 = π/30`, `c_2 = π/24`, is that of Warren's
+/// ψ, `c r_d^{d+1} B n²`, where all coefficients are equal; the force is not its gradient.
 ///
 /// # Errors
-/// A pair without coefficients, or not as many masses as species.
+/// Fails for a pair without coefficients, and if the number of masses differs from that of species.
 pub fn lucy_mdpd_text(
     species: &[String],
     pairs: &[Option<WarrenPair>],
@@ -34,7 +33,7 @@ pub fn lucy_mdpd_text(
         return Err(PresetError::Shape);
     }
     let mut ranges: Vec<f64> = Vec::new();
-    // Of each pair of species: the density it goes by, and its coefficients.
+    // For each pair of species: the index of its density, and its coefficients.
     let mut table = vec![(0, upper[0].2); count * count];
     for (i, j, pair) in &upper {
         let density = ranges.iter().position(|rd| *rd == pair.rd).unwrap_or_else(|| {
@@ -84,28 +83,27 @@ pub fn lucy_mdpd_text(
     Ok(text)
 }
 
-/// `n`, or `n1`, `n2` … where there are several.
+/// Name of a density: `n`, or `n1`, `n2` … where there are several.
 fn density_name(k: usize, densities: usize) -> String {
     if densities == 1 { "n".to_owned() } else { format!("n{}", k + 1) }
 }
 
-/// What a neighbour adds to ρ, over the kernel: its mass, and in two dimensions the ratio of the
-/// norms of Lucy's kernel, `105/(16π h³)` over `5/(π h²)`.
+/// The factor of the kernel in a neighbour's contribution to ρ: its mass, and in two dimensions the
+/// ratio of the norms of Lucy's kernel, `105/(16π h³)` over `5/(π h²)`.
 fn weight(mass: f64, rd: f64, dimensions: usize) -> String {
     if dimensions == 2 { format!("{mass:?}*21/(16*{rd:?})") } else { format!("{mass:?}") }
 }
 
-/// `c r_d^{d+1} B`.
+/// The strength `c r_d^{d+1} B` of ψ.
 fn strength(pair: WarrenPair, dimensions: usize) -> String {
     let WarrenPair { b, rd, .. } = pair;
     if dimensions == 2 { format!("(pi/24*{rd:?}^3*({b:?}))") } else { format!("(pi/30*{rd:?}^4*({b:?}))") }
 }
 
-/// The model of [`lucy_mdpd_text`].
+/// Builds the model of [`lucy_mdpd_text`].
 ///
 /// # Errors
-/// As [`lucy_mdpd_text`]; also a range that is not positive, a negative γ, or more than 16 different
-/// `r_d`.
+/// Fails as [`lucy_mdpd_text`]; also for a range that is not positive, a negative γ, or more than 16 different `r_d`.
 pub fn lucy_mdpd(
     species: &[String],
     pairs: &[Option<WarrenPair>],
@@ -130,7 +128,7 @@ mod tests {
         assert_eq!(error, PresetError::Shape);
     }
 
-    /// Six species have 21 pairs, and a model file at most 16 densities.
+    /// Six species have 21 pairs, but a model file has at most 16 densities.
     #[test]
     fn too_many_ranges_are_an_error() {
         let names: Vec<String> = (1..=6).map(|k| format!("T{k}")).collect();

@@ -5,29 +5,29 @@ use super::coefficients::PresetError;
 use crate::file::Model;
 use std::fmt::Write;
 
-/// The coefficients of one pair of species.
+/// The coefficients of one pair of species, as `pair_coeff` of `dpd/spline` takes them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SplinePair {
-    /// `a`, energy.
+    /// Strength `a`, an energy.
     pub strength: f64,
-    /// `A`, repulsion.
+    /// Amplitude `A` of the repulsion.
     pub repulsion: f64,
-    /// `B`, attraction.
+    /// Amplitude `B` of the attraction.
     pub attraction: f64,
-    /// `r_A`.
+    /// Range `r_A` of the repulsion.
     pub repulsion_range: f64,
-    /// `r_B`.
+    /// Range `r_B` of the attraction.
     pub attraction_range: f64,
-    /// γ of the thermostat.
+    /// Drag coefficient γ of the thermostat.
     pub gamma: f64,
 }
 
-/// Writes the model file of spline DPD for species `species`, with `pairs` a row-major table of the
-/// coefficients (the upper triangle is read; pairs without coefficients do not interact), and the
-/// range of the thermostat, which is that of all pairs.
+/// Writes the model file of spline DPD for species `species`. `pairs` is a row-major table of the
+/// coefficients, of which the upper triangle is read; pairs without coefficients do not interact. All
+/// pairs share the range of the thermostat.
 ///
 /// # Errors
-/// A table that is not square, or without any coefficients.
+/// Fails for a table that is not square, or without any coefficients.
 pub fn spline_dpd_text(
     species: &[String],
     pairs: &[Option<SplinePair>],
@@ -73,10 +73,10 @@ pub fn spline_dpd_text(
     Ok(text)
 }
 
-/// The model of [`spline_dpd_text`].
+/// Builds the model of [`spline_dpd_text`].
 ///
 /// # Errors
-/// As [`spline_dpd_text`]; also a range that is not positive or a negative γ.
+/// Fails as [`spline_dpd_text`]; also for a range that is not positive or a negative γ.
 pub fn spline_dpd(
     species: &[String],
     pairs: &[Option<SplinePair>],

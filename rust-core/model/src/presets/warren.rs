@@ -1,21 +1,21 @@
-//! Warren's A/B model from the coefficients that LAMMPS users know, written as a model file.
+//! Warren's A/B model from the coefficients of LAMMPS's `mdpd`, written as a model file.
 //!
-//! LAMMPS's `mdpd` calls its force `A w_c(r) ê + B (n_i + n_j) w_d(r) ê` with `w_c = 1 − r/r_c`,
-//! `w_d = 1 − r/r_d`. With the quadratic kernel this is the gradient of
-//! `φ = ½ A r_c (1 − r/r_c)²` and `ψ = c_d r_d^{d+1} B n²`, `c_3 = π/30`, `c_2 = π/24`
-//! (Warren eq. 13–15), since `−w′` is then `(1 − r/r_d) / (2 c_d r_d^{d+1})`.
+//! The force of LAMMPS's `mdpd` is `A w_c(r) ê + B (n_i + n_j) w_d(r) ê` with `w_c = 1 − r/r_c`, `w_d = 1 − r/r_d`.
+//! With the quadratic kernel it is the gradient of `φ = ½ A r_c (1 − r/r_c)²` and `ψ = c_d r_d^{d+1} B n²`, `c_3 =
+//! π/30`, `c_2 = π/24` (Warren eq. 13–15), since `−w′` is then `(1 − r/r_d) / (2 c_d r_d^{d+1})`.
 
 use super::coefficients::{PresetError, WarrenPair, pair_text, upper_triangle};
 use super::lucy::lucy_mdpd_text;
 use crate::file::Model;
 use std::fmt::Write;
 
-/// Which density goes with the force `B (n_i + n_j)(1 − r/r_d)`.
+/// The density in the force `B (n_i + n_j)(1 − r/r_d)`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ForceLaw {
-    /// The quadratic kernel: the force has a potential (Warren eq. 10).
+    /// The density has the quadratic kernel: the force has a potential (Warren eq. 10).
     Conservative,
-    /// The Lucy kernel, as LAMMPS's `mdpd/rhosum`, for masses of 1: the force has no potential, and heats.
+    /// The density has the Lucy kernel, as in LAMMPS's `mdpd/rhosum`, for masses of 1: the
+    /// force has no potential, and heats.
     LucyLammps,
 }
 
@@ -23,7 +23,7 @@ pub enum ForceLaw {
 /// of the coefficients (the upper triangle is read).
 ///
 /// # Errors
-/// A pair without coefficients, or coefficients that no potential can give where `law` has one.
+/// Fails for a pair without coefficients, and for coefficients without a potential where `law` has one.
 pub fn warren_ab_text(
     species: &[String],
     pairs: &[Option<WarrenPair>],
@@ -65,10 +65,10 @@ pub fn warren_ab_text(
     Ok(text)
 }
 
-/// The model of [`warren_ab_text`].
+/// Builds the model of [`warren_ab_text`].
 ///
 /// # Errors
-/// As [`warren_ab_text`]; also a range that is not positive or a negative γ.
+/// Fails as [`warren_ab_text`]; also for a range that is not positive or a negative γ.
 pub fn warren_ab(
     species: &[String],
     pairs: &[Option<WarrenPair>],

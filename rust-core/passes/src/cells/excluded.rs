@@ -1,18 +1,18 @@
-//! Pairs that are left out.
+//! Excluded pairs.
 
-/// What a particle is, as far as it excludes pairs: of kinds that do not meet, or of a molecule.
+/// Marks of a particle that decide which pairs are excluded.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Mark {
-    /// A rule keeps the particles of one side from those of the other: bit `k` is set on one side of rule `k`, bit `k + 16`
-    /// on the other.
+    /// Bits of rules, each of which excludes pairs between its two sides: bit `k` marks one side of
+    /// rule `k`, bit `k + 16` the other.
     pub sides: u32,
-    /// The molecule; 0 for a particle that meets all.
+    /// The molecule; 0 for a particle that no molecule excludes.
     pub molecule: u32,
 }
 
 impl Mark {
-    /// Whether two particles form no pair. Those that have molecules do not if it is the same one, or with
-    /// `between_molecules` if it is not.
+    /// Whether two particles form no pair. Particles of one molecule form none, or with
+    /// `between_molecules` particles of different molecules.
     #[inline(always)]
     pub fn excludes(self, other: Mark, between_molecules: bool) -> bool {
         let by_rule = self.sides & other.sides.rotate_left(16) != 0;
@@ -21,23 +21,24 @@ impl Mark {
     }
 }
 
-/// What the sorted particles form no pairs with. All are empty where all pairs count.
+/// The excluded pairs of the sorted particles. All slices are empty where no pair is excluded.
 #[derive(Clone, Copy, Default)]
 pub struct Excluded<'a> {
-    /// Where the partners of each particle begin; one past the last at the end.
+    /// Index of the first partner of each particle; the last entry is one past the last partner.
     pub start: &'a [u32],
-    /// Their indices in the order of cells, shifted by `OFFSET_BITS`. Of a partner that has a copy behind the last plane,
-    /// both places, for particles of the last plane.
+    /// Partners' indices in the order of cells, shifted by `OFFSET_BITS`. For particles of the last
+    /// plane, a partner with a copy behind that plane is listed at both indices.
     pub partners: &'a [u32],
-    /// Of the marks of particles, and of the copies behind the last; empty where no rule counts, and no molecule.
+    /// Rules' bits of the particles, followed by those of the copies behind the last plane;
+    /// empty without rules and molecules.
     pub sides: &'a [u32],
     pub molecules: &'a [u32],
-    /// Whether marks keep molecules from each other, and not the particles of one from each other.
+    /// Whether molecules exclude pairs between them instead of pairs within one.
     pub between_molecules: bool,
 }
 
 impl Excluded<'_> {
-    /// Whether all pairs count.
+    /// Whether no pair is excluded.
     #[inline(always)]
     pub fn is_empty(&self) -> bool {
         self.start.is_empty() & self.sides.is_empty() & self.molecules.is_empty()
@@ -52,7 +53,7 @@ impl Excluded<'_> {
         if self.start.is_empty() {
             return &[];
         }
-        // SAFETY: `start` has an entry for each particle and one behind the last, none beyond the partners.
+        // SAFETY: `ExcludedPairs` gives `start` an entry for each particle and one more, none beyond the partners.
         unsafe {
             let [first, end] = [*self.start.get_unchecked(i), *self.start.get_unchecked(i + 1)];
             self.partners.get_unchecked(first as usize..end as usize)

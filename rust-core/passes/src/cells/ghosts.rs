@@ -1,13 +1,12 @@
-//! Which of the sorted particles are ghosts.
+//! Flags of ghosts among the sorted particles.
 
 /// Ghost flags of the sorted particles, in three forms. All are empty where there are no ghosts.
 #[derive(Clone, Copy)]
 pub struct Ghosts<'a> {
-    /// Whether each particle is a ghost.
     pub flags: &'a [bool],
     /// One bit for each particle, set for owned ones. Sixteen bytes of padding follow the last particle.
     pub owned_bits: &'a [u8],
-    /// For each column, then for each column in the copy of the first plane.
+    /// Owned particles of each column, followed by those of the copy of the first plane.
     pub owned_of_column: &'a [OwnedOfColumn],
 }
 
@@ -21,14 +20,14 @@ pub struct OwnedOfColumn {
 }
 
 impl Ghosts<'_> {
-    /// Whether there are any.
+    /// Whether there are no ghosts.
     #[inline(always)]
     pub fn is_empty(&self) -> bool {
         self.flags.is_empty()
     }
 
-    /// The weight of a pair on this rank: 1, or ½ if one of both is a ghost. The rank that owns the ghost counts the
-    /// other half.
+    /// The weight of a pair on this rank: 1, or ½ if either particle is a ghost. The rank that owns
+    /// the ghost counts the other half.
     pub fn pair_weight(&self, i: usize, j: usize) -> f64 {
         if self.is_empty() {
             return 1.0;

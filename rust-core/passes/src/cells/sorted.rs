@@ -8,22 +8,23 @@ use crate::ground::fixed_point::FixedPoint16;
 use crate::instruction_set::InstructionSet;
 use psidpd_threads::SharedSlice;
 
-/// Everything that the pair search reads.
+/// Arrays that the pair search reads.
 ///
-/// If the plane axis is periodic, copies of the particles of the first plane, moved by one period, follow the last
-/// particle: they are the next plane of the last one. `SortedParticles::make_room` pads all arrays behind the last particle, so
-/// that whole vectors may be read there.
+/// If the plane axis is periodic, copies of the particles of the first plane, moved by one period,
+/// follow the last particle: they are the plane after the last. `SortedParticles::make_room` pads all
+/// arrays behind the last particle, so that whole vectors can be read there.
 #[derive(Clone, Copy)]
 pub struct SortedCells<'a> {
-    /// What the search runs on.
+    /// The instruction set of the search.
     pub set: InstructionSet,
     pub geometry: &'a BoxGeometry,
     pub grid: &'a CellGrid,
-    /// The first particle of each cell, and one past the last; then the same for the copy of the first plane.
+    /// Index of the first particle of each cell, and one past the last particle; then the same
+    /// for the copy of the first plane.
     pub start: &'a [u32],
-    /// Positions from the origin of the box geometry.
+    /// Positions relative to the origin of the box geometry.
     pub x: [SharedSlice<'a, f32>; 3],
-    /// The same in 16-bit fixed point.
+    /// Positions in 16-bit fixed point.
     pub fixed16: [SharedSlice<'a, u16>; 3],
     pub fixed16_scale: FixedPoint16,
     pub ghosts: Ghosts<'a>,
@@ -37,14 +38,14 @@ impl SortedCells<'_> {
         (plane * self.grid.columns_per_plane + column) * self.grid.cells_per_column
     }
 
-    /// The particles of a column: the first, and one past the last.
+    /// The particles of a column: index of the first, and one past the last.
     ///
     /// # Safety
     /// The column is one of the grid.
     #[inline(always)]
     pub unsafe fn column(&self, plane: usize, column: usize) -> [usize; 2] {
         let cell = self.first_cell(plane, column);
-        // SAFETY: `start` has an entry for each cell and one behind the last.
+        // SAFETY: sorting gives `start` an entry for each cell and one more; the caller promises a column of the grid.
         unsafe {
             let end = *self.start.get_unchecked(cell + self.grid.cells_per_column);
             [*self.start.get_unchecked(cell) as usize, end as usize]

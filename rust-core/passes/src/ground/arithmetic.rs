@@ -5,11 +5,11 @@ use super::species_pairs::SpeciesPair;
 use crate::simd::{Isa, OFFSET_BITS, Reals, Scalar, Words};
 use psidpd_model::kernel::Real;
 
-/// The i-particles of a batch, field by field. Pairs pick the fields of their i-particle from a vector register.
+/// The i-particles of a batch, field by field. Pairs pick fields of their i-particle from a vector register.
 #[derive(Debug, Clone, Copy, Default)]
 #[repr(C, align(64))]
 pub struct IParticles<T> {
-    /// In the coordinates of the packed particle.
+    /// Positions in the coordinates of the packed particle.
     pub position: [[T; 16]; 3],
     pub velocity: [[T; 16]; 3],
     pub tag: [u32; 16],
@@ -19,21 +19,20 @@ pub struct IParticles<T> {
 /// Separations and distances of a vector of pairs.
 #[derive(Clone, Copy)]
 pub struct PairGeometry<R: Reals> {
-    /// `r_i − r_j`.
+    /// Separation `r_i − r_j`.
     pub d: [R; 3],
     pub r: R,
-    /// `1/r`.
     pub inverse: R,
-    /// `ê·v_ij`, if the thermostat acts.
+    /// Radial velocity `ê·v_ij`, if the thermostat acts.
     pub radial_velocity: R,
 }
 
-/// What the terms read of a vector of pairs.
+/// The input of the terms, for a vector of pairs.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 pub struct PairVector<R: Reals> {
     pub geometry: PairGeometry<R>,
-    /// Only with several species.
+    /// Set only with several species.
     pub species_pair: SpeciesPair<R>,
 }
 
@@ -48,25 +47,25 @@ const _: () = assert!(
     size_of::<MixedParticle>() == 1 << OFFSET_BITS && size_of::<DoubleParticle>() == 2 << OFFSET_BITS
 );
 
-/// A precision of pairs on an instruction set. The functions are unsafe by the contract of `simd`.
+/// A precision of pairs on an instruction set. Callers of its functions fulfil the contract of `simd`.
 #[allow(clippy::missing_safety_doc)]
 pub trait Arithmetic<I: Isa>: 'static {
     type Scalar: Scalar;
     type Reals: Reals<Scalar = Self::Scalar>;
     type PackedParticle: PackedParticle<Scalar = Self::Scalar>;
-    /// Constants for distances in a box.
     type Metric: Copy;
 
     unsafe fn metric(geometry: &BoxGeometry) -> Self::Metric;
 
-    /// Loads as many particles from `first` on as a vector has lanes.
+    /// Loads one vector of particles, beginning with `first`.
     unsafe fn load_i_particles(
         first: *const Self::PackedParticle,
         i_particles: &mut IParticles<Self::Scalar>,
     );
 
-    /// The geometry of a vector of pairs of `i_particles[i_in_batch]` with the particles at `j_offsets`. Velocities and species
-    /// of j-particles are loaded with `ALL` only, radial velocities computed if `with_velocities`.
+    /// The geometry of a vector of pairs of `i_particles[i_in_batch]` with the particles at
+    /// `j_offsets`. With `ALL` it loads velocities and species of j-particles; with `with_velocities`
+    /// it computes radial velocities.
     unsafe fn pair_geometry<const ALL: bool>(
         metric: &Self::Metric,
         packed: *const Self::PackedParticle,
@@ -76,20 +75,20 @@ pub trait Arithmetic<I: Isa>: 'static {
         with_velocities: bool,
     ) -> (PairGeometry<Self::Reals>, PairTags<Self::Reals>);
 
-    /// Loads records of eight numbers at `j_offsets`: the first number of each, then the second … Without `ALL` the first four
-    /// only.
+    /// Loads records of eight numbers at `j_offsets`: the first number of each, then the second …
+    /// Without `ALL` it loads only the first four numbers.
     unsafe fn load_transposed<const ALL: bool>(
         records: *const Self::Scalar,
         j_offsets: *const u32,
     ) -> [Self::Reals; 8];
 
-    /// Loads `count` consecutive records, at least one. Lanes behind repeat the last one.
+    /// Loads `count` consecutive records, at least one. Lanes beyond `count` repeat the last record.
     #[inline(always)]
     unsafe fn load_transposed_in_order(records: *const Self::Scalar, count: usize) -> [Self::Reals; 8] {
         type W<I, A> = <<A as Arithmetic<I>>::Reals as Reals>::Words;
         let mut offsets = [0; 16];
-        // SAFETY: `IN_ORDER` and `offsets` are no shorter than a vector, and offsets are those of the `count` records. Records
-        // behind may belong to another thread, which may be writing them.
+        // SAFETY: `IN_ORDER` and `offsets` are as long as a vector, and all offsets are among the `count` records
+        // that the caller promises. Records behind these may belong to another thread, which may be writing them.
         unsafe {
             let last = W::<I, Self>::splat(((count - 1) << OFFSET_BITS) as u32);
             W::<I, Self>::load(IN_ORDER.as_ptr()).min(last).store(offsets.as_mut_ptr());
@@ -101,7 +100,7 @@ pub trait Arithmetic<I: Isa>: 'static {
     unsafe fn load_quad(p: *const Self::Scalar) -> I::Quad;
 }
 
-/// What pairs read of a particle, in one or two cache lines.
+/// The fields of a particle that pairs read, in one or two cache lines.
 pub trait PackedParticle: Copy + Default + Send + Sync + 'static {
     type Scalar;
     /// Packs a particle; `u` is its position in 32-bit fixed point.
@@ -126,7 +125,7 @@ impl PackedParticle for MixedParticle {
     }
 }
 
-/// Everything in double precision.
+/// A particle in double precision.
 #[derive(Debug, Clone, Copy, Default)]
 #[repr(C, align(64))]
 pub struct DoubleParticle {
@@ -151,7 +150,7 @@ pub struct Mixed;
 /// Pairs in double precision.
 pub struct Double;
 
-/// Added to `r²` by way of a maximum: two particles at one point have `1/r` finite and `d/r` zero.
+/// Lower bound of `r²`: for two particles at one point `1/r` is finite and `d/r` zero.
 const TINY: f64 = 1e-30;
 
 /// Offsets of consecutive records.
@@ -186,7 +185,8 @@ impl<I: Isa> Arithmetic<I> for Mixed {
 
     #[inline(always)]
     unsafe fn load_i_particles(first: *const MixedParticle, i_particles: &mut IParticles<f32>) {
-        // SAFETY: packed particles and lists of pairs are padded to vectors (`SortedParticles::make_room`, `SearchBuffers`).
+        // SAFETY: `SortedParticles::make_room` pads packed particles and `SearchBuffers` pads
+        // lists of pairs to whole vectors.
         unsafe {
             let [x, y, z, tag, u, v, w, species] =
                 I::load_transposed::<true>(first.cast(), IN_ORDER.as_ptr());
@@ -211,7 +211,8 @@ impl<I: Isa> Arithmetic<I> for Mixed {
         with_velocities: bool,
     ) -> (PairGeometry<I::F32>, PairTags<I::F32>) {
         type W<I> = <<I as Isa>::F32 as Reals>::Words;
-        // SAFETY: packed particles and lists of pairs are padded to vectors (`SortedParticles::make_room`, `SearchBuffers`).
+        // SAFETY: `SortedParticles::make_room` pads packed particles and `SearchBuffers` pads
+        // lists of pairs to whole vectors.
         unsafe {
             let i_particles = &*i_particles;
             let [sx, sy, sz] = metric.scale;
@@ -251,7 +252,8 @@ impl<I: Isa> Arithmetic<I> for Mixed {
 
     #[inline(always)]
     unsafe fn load_transposed<const ALL: bool>(records: *const f32, j_offsets: *const u32) -> [I::F32; 8] {
-        // SAFETY: packed particles and lists of pairs are padded to vectors (`SortedParticles::make_room`, `SearchBuffers`).
+        // SAFETY: `SortedParticles::make_room` pads packed particles and `SearchBuffers` pads
+        // lists of pairs to whole vectors.
         unsafe {
             let load_transposed = I::load_transposed::<ALL>(records.cast(), j_offsets);
             let mut numbers = [I::F32::constant(0.0); 8];
@@ -266,7 +268,8 @@ impl<I: Isa> Arithmetic<I> for Mixed {
 
     #[inline(always)]
     unsafe fn load_quad(p: *const f32) -> I::Quad {
-        // SAFETY: packed particles and lists of pairs are padded to vectors (`SortedParticles::make_room`, `SearchBuffers`).
+        // SAFETY: `SortedParticles::make_room` pads packed particles and `SearchBuffers` pads
+        // lists of pairs to whole vectors.
         unsafe { <I::Quad as crate::simd::Quad>::load_f32(p) }
     }
 }
@@ -278,7 +281,7 @@ pub struct DoubleMetric<R> {
     inverse: [R; 3],
     tilt: [R; 3],
     tilted: bool,
-    /// 0 in two dimensions, else 1: a factor of z.
+    /// Factor of z: 0 in two dimensions, else 1.
     flat: R,
 }
 
@@ -305,7 +308,8 @@ impl<I: Isa> Arithmetic<I> for Double {
 
     #[inline(always)]
     unsafe fn load_i_particles(first: *const DoubleParticle, i_particles: &mut IParticles<f64>) {
-        // SAFETY: packed particles and lists of pairs are padded to vectors (`SortedParticles::make_room`, `SearchBuffers`).
+        // SAFETY: `SortedParticles::make_room` pads packed particles and `SearchBuffers` pads
+        // lists of pairs to whole vectors.
         unsafe {
             let [x, y, z, bits, u, v, w, _] =
                 I::load_transposed_wide::<true>(first.cast(), IN_ORDER.as_ptr());
@@ -330,7 +334,8 @@ impl<I: Isa> Arithmetic<I> for Double {
         j_offsets: *const u32,
         with_velocities: bool,
     ) -> (PairGeometry<I::F64>, PairTags<I::F64>) {
-        // SAFETY: packed particles and lists of pairs are padded to vectors (`SortedParticles::make_room`, `SearchBuffers`).
+        // SAFETY: `SortedParticles::make_room` pads packed particles and `SearchBuffers` pads
+        // lists of pairs to whole vectors.
         unsafe {
             let i_particles = &*i_particles;
             let ([lx, ly, lz], [ix, iy, iz], [xy, xz, yz]) = (metric.length, metric.inverse, metric.tilt);
@@ -373,13 +378,15 @@ impl<I: Isa> Arithmetic<I> for Double {
 
     #[inline(always)]
     unsafe fn load_transposed<const ALL: bool>(records: *const f64, j_offsets: *const u32) -> [I::F64; 8] {
-        // SAFETY: packed particles and lists of pairs are padded to vectors (`SortedParticles::make_room`, `SearchBuffers`).
+        // SAFETY: `SortedParticles::make_room` pads packed particles and `SearchBuffers` pads
+        // lists of pairs to whole vectors.
         unsafe { I::load_transposed_wide::<ALL>(records.cast(), j_offsets) }
     }
 
     #[inline(always)]
     unsafe fn load_quad(p: *const f64) -> I::Quad {
-        // SAFETY: packed particles and lists of pairs are padded to vectors (`SortedParticles::make_room`, `SearchBuffers`).
+        // SAFETY: `SortedParticles::make_room` pads packed particles and `SearchBuffers` pads
+        // lists of pairs to whole vectors.
         unsafe { <I::Quad as crate::simd::Quad>::load(p) }
     }
 }

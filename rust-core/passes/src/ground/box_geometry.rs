@@ -1,15 +1,15 @@
-//! The region that is swept, and its fractional coordinates.
+//! The region of the sweep, and its fractional coordinates.
 
 use crate::domain::PeriodicBox;
 
-/// A parallelepiped with its first edge along x and its second in the xy plane, as LAMMPS has it.
+/// A parallelepiped with its first edge along x and its second in the xy plane, as in LAMMPS.
 #[derive(Debug, Clone, Copy)]
 pub struct BoxGeometry {
     pub dimensions: usize,
     pub origin: [f64; 3],
-    /// xx, yy, zz.
+    /// Edge components xx, yy, zz.
     pub length: [f64; 3],
-    /// xy, xz, yz: the tilt of the second and the third edge.
+    /// Edge components xy, xz, yz: the tilt of the second and the third edge.
     pub tilt: [f64; 3],
     pub periodic: [bool; 3],
 }
@@ -38,33 +38,32 @@ impl BoxGeometry {
         Some(geometry)
     }
 
-    /// Open space that holds all points between `low` and `high`.
+    /// Open space that contains all points between `low` and `high`.
     pub fn enclosing(low: [f64; 3], high: [f64; 3], dimensions: usize, cutoff: f64) -> BoxGeometry {
         let geometry =
             BoxGeometry { dimensions, origin: low, length: [1.0; 3], tilt: [0.0; 3], periodic: [false; 3] };
         geometry.stretched(low, high, cutoff)
     }
 
-    /// The same with its open directions stretched from `low` to `high`.
+    /// The same box with its open directions stretched to reach from `low` to `high`.
     pub fn stretched(mut self, low: [f64; 3], high: [f64; 3], cutoff: f64) -> BoxGeometry {
         for c in 0..self.dimensions {
             if !self.periodic[c] {
                 self.origin[c] = low[c];
-                // Differences of fractions are read as signed: within the cutoff they must stay below one half.
+                // Differences of fractions are signed: within the cutoff they must stay below one half.
                 self.length[c] = ((high[c] - low[c]) * (1.0 + 1e-9)).max(4.0 * cutoff);
             }
         }
         self
     }
 
-    /// Whether a point is inside along all open directions.
+    /// Whether a point is inside the box along all open directions.
     #[inline(always)]
     pub fn contains(&self, x: &[f64; 3]) -> bool {
         (0..self.dimensions)
             .all(|c| self.periodic[c] || (0.0..=self.length[c]).contains(&(x[c] - self.origin[c])))
     }
 
-    /// Whether all directions are periodic.
     pub fn is_fully_periodic(&self) -> bool {
         self.periodic[..self.dimensions].iter().all(|p| *p)
     }
@@ -78,7 +77,7 @@ impl BoxGeometry {
         let [xy, xz, yz] = self.tilt;
         let [lx, ly, lz] = self.length;
         match k {
-            // Rows of the inverse of the matrix of edges.
+            // The heights are the reciprocal lengths of the rows of the inverse matrix of edges.
             0 => lx / (1.0 + (xy / ly).powi(2) + ((xy * yz - xz * ly) / (ly * lz)).powi(2)).sqrt(),
             1 => ly / (1.0 + (yz / lz).powi(2)).sqrt(),
             _ => lz,
@@ -98,7 +97,7 @@ impl BoxGeometry {
         s
     }
 
-    /// The point at fractional coordinates, from the origin.
+    /// The point at fractional coordinates, relative to the origin.
     #[inline(always)]
     pub fn point(&self, s: &[f64; 3]) -> [f64; 3] {
         let flat = if self.dimensions == 3 { s[2] * self.length[2] } else { 0.0 };
@@ -109,7 +108,6 @@ impl BoxGeometry {
         ]
     }
 
-    /// Edge vector `k`.
     pub fn edge(&self, k: usize) -> [f64; 3] {
         match k {
             0 => [self.length[0], 0.0, 0.0],

@@ -2,21 +2,21 @@
 
 use super::box_geometry::BoxGeometry;
 
-/// How the fast engine searches for pairs.
+/// Parameters of the sweep's pair search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SearchPlan {
-    /// Cells along x for each cutoff.
+    /// Number of cells along x in one cutoff.
     pub cells_per_cutoff: f64,
-    /// Below so many particles per cutoff along a column of cells, i-clusters have eight particles, else four: the cell
-    /// ranges of eight then are still about sixteen particles long, the size of a j-cluster.
+    /// Below this number of particles per cutoff along a column of cells, i-clusters have eight particles, else
+    /// four: the cell ranges of eight then are still about sixteen particles long, the size of a j-cluster.
     pub sparse: f64,
 }
 
 impl SearchPlan {
-    /// The search of every fluid.
+    /// The parameters for every fluid.
     pub const DEFAULT: SearchPlan = SearchPlan { cells_per_cutoff: 4.0, sparse: 4.5 };
 
-    /// The size of i-clusters, and how many cells apart their particles may be.
+    /// The size of i-clusters, and the most cells between their particles.
     fn i_clusters(&self, particles_per_cutoff: f64) -> (usize, f64) {
         match particles_per_cutoff < self.sparse {
             true => (8, 4.0 * self.cells_per_cutoff),
@@ -25,12 +25,12 @@ impl SearchPlan {
     }
 }
 
-/// Columns along x, no narrower than the cutoff, each divided into cells.
+/// Columns along x, at least as wide as the cutoff, each divided into cells.
 ///
-/// In three dimensions a plane is a sheet of columns that follow each other along y, and planes follow each other along z. In
-/// two dimensions a plane is one column, and planes follow each other along y. A particle pairs with those behind it in its
-/// column, with the next column of its plane, and with three columns of the next plane: half of its neighbourhood, so that
-/// every pair is found once.
+/// In three dimensions a plane is a sheet of columns along y, and planes follow each other along z. In
+/// two dimensions a plane is one column, and planes follow each other along y. A particle pairs with
+/// later particles in its column, with the next column of its plane, and with three columns of the next
+/// plane: half of its neighbourhood, so that every pair is found once.
 #[derive(Debug, Clone, Copy)]
 pub struct CellGrid {
     pub cells_per_column: usize,
@@ -40,27 +40,27 @@ pub struct CellGrid {
     pub column_axis: usize,
     /// The axis along which planes follow each other.
     pub plane_axis: usize,
-    /// Pairs are searched up to this distance: the cutoff and room for rounding.
+    /// Largest distance of the pair search: the cutoff plus room for rounding errors.
     pub search_cutoff: f64,
     /// The search cutoff along x, as a fraction of the box.
     pub range_half_width: f64,
     /// Particles of an i-cluster.
     pub i_cluster_size: usize,
-    /// Most cells between particles of an i-cluster.
+    /// Most cells between the first and the last particle of an i-cluster.
     pub i_cluster_extent: f64,
 }
 
-/// Coordinates are in single precision, relative to the box: pairs are searched so much further, of cutoff and box together.
+/// Coordinates are in single precision, relative to the box: the search distance grows by this fraction of cutoff and box.
 const ROUNDING: f64 = 1e-6;
 
 impl CellGrid {
-    /// The largest cutoff that a box of this height has room for, whose longest edge is `longest`.
+    /// The largest cutoff that fits into a box of this height, whose longest edge is `longest`.
     pub fn cutoff_within(height: f64, longest: f64) -> f64 {
         (0.5 * height * (1.0 - 1e-12) - ROUNDING * longest) / (1.0 + ROUNDING)
     }
 
-    /// The grid for `count` particles; `None` if the box is so narrow along a period that a particle meets two images of
-    /// another.
+    /// The grid for `count` particles; `None` if the box is so narrow along a period that a
+    /// particle is near two images of another.
     pub fn new(geometry: &BoxGeometry, cutoff: f64, count: usize) -> Option<CellGrid> {
         let (column_axis, plane_axis) = if geometry.dimensions == 3 { (1, 2) } else { (2, 1) };
         let longest = geometry.length[..geometry.dimensions].iter().fold(0.0, |a: f64, b| a.max(*b));
@@ -72,7 +72,7 @@ impl CellGrid {
         }
         let plan = SearchPlan::DEFAULT;
         let most = (4 * count + 64) as f64;
-        // As narrow as the cutoff less rounding: pairs in the last 10⁻⁹ of the cutoff may be missed.
+        // The width is that of the cutoff minus rounding: pairs in the last 10⁻⁹ of the cutoff may be missed.
         let mut width = cutoff * (1.0 - 1e-9);
         loop {
             let along = |axis: usize, width: f64| {
@@ -85,7 +85,8 @@ impl CellGrid {
             let columns_per_plane = along(column_axis, width);
             let planes = along(plane_axis, width);
             let cells_per_column = along(0, width / plan.cells_per_cutoff);
-            // Widen the cells until there are not many more than particles: a few runaways must not make a grid of empty cells.
+            // The loop widens the cells until they barely outnumber the particles: a few distant
+            // particles must not cause a grid of empty cells.
             if columns_per_plane * planes * cells_per_column <= most.max(64.0 * plan.cells_per_cutoff) {
                 let (cells_per_column, columns_per_plane, planes) =
                     (cells_per_column as usize, columns_per_plane as usize, planes as usize);
@@ -109,7 +110,7 @@ impl CellGrid {
         }
     }
 
-    /// Number of columns or planes that follow each other along an axis.
+    /// Number of columns or planes along an axis.
     pub fn of(&self, axis: usize) -> usize {
         if axis == self.plane_axis { self.planes } else { self.columns_per_plane }
     }
@@ -126,7 +127,7 @@ impl CellGrid {
         along
     }
 
-    /// How much the number of a cell grows from one cell to the next along each axis.
+    /// Difference between the numbers of neighbouring cells along each axis.
     pub fn steps(&self) -> [u32; 3] {
         let mut steps = [1; 3];
         let column = self.cells_per_column as u32;

@@ -1,21 +1,21 @@
-//! 16-bit fixed-point coordinates for the distance filter. Rounding only ever lets too many pairs through.
+//! 16-bit fixed-point coordinates for the distance filter. Rounding makes the filter pass too many pairs, never too few.
 
 use super::box_geometry::BoxGeometry;
 use super::cell_grid::CellGrid;
 
-/// The unit of these coordinates, and the limit of the distance filter in it.
+/// The unit of these coordinates, and the limit of the distance filter in this unit.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct FixedPoint16 {
-    /// Units per length. Coordinates wrap; particles that are compared are less than half a turn apart.
+    /// Units per length. Coordinates wrap; compared particles are less than half a turn apart.
     pub per_length: f64,
-    /// A pair may be within the cutoff if the high halves of its squared coordinate differences add up to less than this.
+    /// A pair may be within the cutoff if the high halves of its squared coordinate differences sum to less than this.
     pub limit: i16,
 }
 
 impl FixedPoint16 {
     pub fn new(geometry: &BoxGeometry, grid: &CellGrid) -> FixedPoint16 {
         let cell = geometry.length[0] / grid.cells_per_column as f64;
-        // The extent of two neighbouring columns, or planes, as a fraction of the box.
+        // The width of two neighbouring columns, or planes, as a fraction of the box.
         let two = |axis: usize| if axis < geometry.dimensions { 2.0 / grid.of(axis) as f64 } else { 0.0 };
         let [xy, xz, yz] = geometry.tilt.map(f64::abs);
         let (y, z) = (two(1), two(2));
@@ -29,13 +29,13 @@ impl FixedPoint16 {
         ];
         let furthest = furthest.into_iter().fold(0.0, f64::max);
         let per_length = 32_000.0 / furthest;
-        // Two positions and a shift are rounded: a coordinate difference is off by up to 1.5 units.
+        // Two positions and a shift are rounded: a coordinate difference has an error of up to 1.5 units.
         let limit = grid.search_cutoff * per_length + 1.5 * 3f64.sqrt();
         FixedPoint16 { per_length, limit: (limit * limit / 65_536.0) as i16 + 1 }
     }
 
-    /// The lengths of the edges in units, if the edges are along the axes and the lengths fit 31 bits. A fraction of the box
-    /// times its edge is the coordinate, off by less than one unit and by half the fraction.
+    /// The lengths of the edges in units, if the edges are along the axes and the lengths fit into 31 bits. A
+    /// fraction of the box times its edge is the coordinate, with an error below one unit plus half the fraction.
     pub fn edge_words(&self, geometry: &BoxGeometry) -> Option<[u32; 3]> {
         let words = geometry.length.map(|l| (l * self.per_length).round());
         let few = words.iter().all(|w| *w < 2_147_483_648.0);
@@ -47,13 +47,14 @@ impl FixedPoint16 {
         (length * self.per_length).round() as i64 as u16
     }
 
-    /// A coordinate.
+    /// Converts a coordinate.
     ///
     /// # Safety
-    /// It is finite and within 2⁴⁰ cutoffs.
+    /// The coordinate is finite and within 2⁴⁰ cutoffs.
     #[inline(always)]
     pub unsafe fn coordinate(&self, x: f64) -> u16 {
-        // SAFETY: a unit is at least 2⁻¹⁴ cutoffs, so the number of units fits 64 bits.
+        // SAFETY: a unit is at least 2⁻¹⁴ cutoffs; the caller promises `x` within 2⁴⁰ cutoffs, so
+        // the number of units fits 64 bits.
         unsafe { (x * self.per_length).to_int_unchecked::<i64>() as u16 }
     }
 }

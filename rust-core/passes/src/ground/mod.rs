@@ -1,5 +1,5 @@
-//! What everything above stands on: geometry, the cell grid, fixed-point coordinates, packed particles, and the terms of a
-//! fluid as tables.
+//! The basis of all other modules: geometry, the cell grid, fixed-point coordinates, packed particles,
+//! and the terms of a fluid as tables.
 
 pub mod arithmetic;
 pub mod box_geometry;

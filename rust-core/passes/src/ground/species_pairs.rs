@@ -1,4 +1,4 @@
-//! Parameters of each pair of species, and how a vector of pairs reads its own.
+//! Parameters of each pair of species, and their look-up for a vector of pairs.
 
 use crate::simd::{Reals, Scalar, Words};
 
@@ -21,7 +21,6 @@ impl<T: Scalar> SpeciesPairTable<T> {
         SpeciesPairTable::new(std::iter::repeat_n(value, count))
     }
 
-    /// How many entries there are.
     #[inline(always)]
     pub fn count(&self) -> usize {
         self.count
@@ -51,13 +50,13 @@ impl<T> std::ops::IndexMut<usize> for SpeciesPairTable<T> {
 pub struct SpeciesPair<R: Reals>(pub R::Words);
 
 impl<R: Reals> SpeciesPair<R> {
-    /// `species_i · species + species_j`.
+    /// Computes `species_i · species + species_j`.
     ///
     /// # Safety
-    /// The contract of `simd`.
+    /// The caller fulfils the contract of `simd`.
     #[inline(always)]
     pub unsafe fn new(species_i: R::Words, species_j: R::Words, species: usize) -> SpeciesPair<R> {
-        // SAFETY: arithmetic of vectors, which there are only below `simd::run`; nothing is read from memory.
+        // SAFETY: the caller fulfils the contract of `simd`; the arithmetic reads no memory.
         unsafe {
             let mut row = R::Words::splat(0);
             let mut k = 0;
@@ -80,21 +79,21 @@ pub struct TableLookup<R: Reals> {
 
 impl<R: Reals> TableLookup<R> {
     /// # Safety
-    /// The contract of `simd`.
+    /// The caller fulfils the contract of `simd`.
     #[inline(always)]
     pub unsafe fn new(table: &SpeciesPairTable<R::Scalar>) -> TableLookup<R> {
         let entries = table.as_ptr();
-        // SAFETY: a table has at least sixteen entries.
+        // SAFETY: `SpeciesPairTable::new` gives a table at least sixteen entries.
         TableLookup { first: unsafe { R::splat(*entries) }, entries, fits_vector: table.count() <= R::LANES }
     }
 
-    /// The entries of a vector of pairs. With one species there is only one entry.
+    /// The entries for a vector of pairs. With one species the table has one entry.
     ///
     /// # Safety
-    /// The contract of `simd`. The pairs of species are those of the table.
+    /// The caller fulfils the contract of `simd`, and passes pairs of the table's species.
     #[inline(always)]
     pub unsafe fn lookup<const MULTISPECIES: bool>(&self, species_pair: SpeciesPair<R>) -> R {
-        // SAFETY: the indices are below the number of entries, and `SpeciesPairTable::new` pads tables to a vector.
+        // SAFETY: the caller promises indices below the number of entries; `SpeciesPairTable::new` pads tables to a vector.
         unsafe {
             if !MULTISPECIES {
                 self.first
@@ -111,10 +110,10 @@ impl<R: Reals> TableLookup<R> {
 /// inlined lack the target features.
 ///
 /// # Safety
-/// The contract of `simd`. The table is padded to a vector, the indices are below its length.
+/// The caller fulfils the contract of `simd`. The table is padded to a vector, the indices are below its length.
 #[inline(always)]
 pub unsafe fn table_entry<R: Reals>(table: *const R::Scalar, index: R::Words, fits_vector: bool) -> R {
-    // SAFETY: a table that `SpeciesPairTable::new` has padded to a vector, and indices that `SpeciesPair::new` made of its
-    // species.
+    // SAFETY: `SpeciesPairTable::new` has padded the table to a vector, and `SpeciesPair::new` computes
+    // indices from the table's species.
     unsafe { if fits_vector { R::pick(table, index) } else { R::lookup(table, index) } }
 }

@@ -5,11 +5,11 @@ use crate::simd::Scalar;
 use psidpd_model::PairTerm;
 use psidpd_model::kernel::KernelKind;
 
-/// All terms between pairs. Tables have an entry for each pair of species, row by row.
+/// All terms between pairs. Tables have an entry for each pair of species, row-major.
 #[derive(Debug, Clone, Default)]
 pub struct Terms<T> {
     pub species: usize,
-    /// At least one: without soft repulsion, one of no strength.
+    /// The list has at least one entry: without soft repulsion, a term of strength 0.
     pub soft: Vec<Soft<T>>,
     pub linear: Vec<Linear<T>>,
     pub spline: Vec<Spline<T>>,
@@ -17,36 +17,36 @@ pub struct Terms<T> {
     pub scalar_fallback: Vec<PairTerm>,
     pub thermostat: Option<ThermostatTables<T>>,
     pub passes: Vec<Pass<T>>,
-    /// Whether all pairs go to the full pair cache. Only loops compiled for several species look at it, so that a fluid of
-    /// one density and one species does not pay for it.
+    /// Whether all pairs go to the full pair cache. Only loops compiled for several species check it,
+    /// so that it costs nothing with one density and one species.
     pub full_cache: bool,
-    /// For each species: 1 where the i-particle is of it and 0 elsewhere, and the same for the j-particle.
+    /// For each species: 1 where the i-particle is of this species and 0 elsewhere, and the same for the j-particle.
     pub is_species: Vec<[SpeciesPairTable<T>; 2]>,
 }
 
-/// `a (1 − r/R)`.
+/// The force `a (1 − r/R)`.
 #[derive(Debug, Clone)]
 pub struct Soft<T> {
     pub strength: SpeciesPairTable<T>,
     pub inverse_range: SpeciesPairTable<T>,
-    /// `½ a R`.
+    /// Energy at contact, `½ a R`.
     pub energy: SpeciesPairTable<T>,
 }
 
-/// `−(c_αβ + c_βα) w′(r)` of a density that every ψ is linear in.
+/// The force `−(c_αβ + c_βα) w′(r)` of a density that every ψ is linear in.
 #[derive(Debug, Clone)]
 pub struct Linear<T> {
     pub kernel: KernelKind,
     pub inverse_range: T,
     pub force_kernel: KernelKind,
     pub force_inverse_range: T,
-    /// `−(c_αβ + c_βα)` times the factor of `w′`.
+    /// The factor of `w′`: `−(c_αβ + c_βα)` times that of the kernel.
     pub force: SpeciesPairTable<T>,
-    /// `c_αβ + c_βα` times the factor of `w`.
+    /// The factor of `w`: `c_αβ + c_βα` times that of the kernel.
     pub energy: SpeciesPairTable<T>,
 }
 
-/// `a [A W(r, R_A) − B W(r, R_B)]`.
+/// The potential `a [A W(r, R_A) − B W(r, R_B)]`.
 #[derive(Debug, Clone)]
 pub struct Spline<T> {
     pub repulsion: SpeciesPairTable<T>,
@@ -55,7 +55,7 @@ pub struct Spline<T> {
     pub attraction_inverse_range: SpeciesPairTable<T>,
 }
 
-/// `−γ w_R² (ê·v) + σ w_R ξ dt^{−1/2}`.
+/// The force `−γ w_R² (ê·v) + σ w_R ξ dt^{−1/2}`.
 #[derive(Debug, Clone)]
 pub struct ThermostatTables<T> {
     pub gamma: SpeciesPairTable<T>,
@@ -72,7 +72,7 @@ pub enum Exponent<T> {
     Any(SpeciesPairTable<T>),
 }
 
-/// A density that some ψ is not linear in.
+/// A density in which some ψ is not linear.
 #[derive(Debug, Clone)]
 pub struct Pass<T> {
     pub kernel: KernelKind,
@@ -81,18 +81,18 @@ pub struct Pass<T> {
     pub force_kernel: KernelKind,
     pub force_range: T,
     pub force_inverse_range: T,
-    /// Minus the factor of `w′`.
+    /// Negative factor of `w′`.
     pub force: T,
 }
 
 impl<T: Scalar> Terms<T> {
-    /// Variables of ψ: one for each density pass and species.
+    /// Number of variables of ψ: one for each density pass and species.
     #[inline(always)]
     pub fn variables(&self) -> usize {
         self.passes.len() * self.species
     }
 
-    /// The first soft repulsion; a term of no strength if there is none.
+    /// The first soft repulsion; its strength may be 0.
     #[inline(always)]
     pub fn first_soft(&self) -> &Soft<T> {
         &self.soft[0]

@@ -1,21 +1,21 @@
-//! Which pairs a batch has.
+//! The pairs of a batch.
 
 use crate::pair_search::buffers::SearchBuffers;
 use crate::simd::OFFSET_BITS;
 
-/// Consecutive i-particles, as many as a vector has lanes or fewer, and all their pairs.
+/// Consecutive i-particles, at most as many as a vector has lanes, and all their pairs.
 #[derive(Clone, Copy)]
 pub struct Batch<'a> {
-    /// The first i-particle, and how many.
+    /// First i-particle of the batch.
     pub first: usize,
     pub members: usize,
     /// Number of pairs.
     pub count: usize,
     /// Index of the first pair of each i-particle in its search group, and one past the last pair of the last one.
     pub begin: &'a [u32],
-    /// The i-particle of each pair, counted from `first`; readable for a vector behind the last pair.
+    /// The i-particle of each pair, counted from `first`; readable for one vector beyond the last pair.
     pub i_in_batch: &'a [u8],
-    /// The j-particle of each pair: its index shifted by [`OFFSET_BITS`]; readable for a vector behind the last pair.
+    /// The j-particle of each pair: its index shifted by [`OFFSET_BITS`]; readable for one vector beyond the last pair.
     pub j_offsets: &'a [u32],
 }
 
@@ -23,10 +23,11 @@ impl<'a> Batch<'a> {
     /// The batch of members `slots[0]..slots[1]` of a search group, unless it has no pairs.
     ///
     /// # Safety
-    /// The group has been found, and has those members.
+    /// The pairs of the group have been found, and the group has those members.
     #[inline(always)]
     pub unsafe fn of_group(search: &'a SearchBuffers, slots: [usize; 2]) -> Option<Batch<'a>> {
-        // SAFETY: `begin` has an entry for each member and one more; its entries are indices of pairs.
+        // SAFETY: the search has written an entry of `begin` for each member and one more;
+        // its entries are indices of pairs.
         unsafe {
             let begin = search.begin.get_unchecked(slots[0]..slots[1] + 1);
             let members = slots[1] - slots[0];
@@ -42,7 +43,6 @@ impl<'a> Batch<'a> {
         }
     }
 
-    /// Both particles of pair `p`.
     pub fn pair(&self, p: usize) -> [usize; 2] {
         [self.first + self.i_in_batch[p] as usize, (self.j_offsets[p] >> OFFSET_BITS) as usize]
     }

@@ -1,48 +1,48 @@
-//! Work space of a batch.
+//! Scratch arrays of a batch.
 
 use super::accumulators::Accumulator;
 use super::counts::BatchCounts;
 use crate::ground::arithmetic::IParticles;
 use crate::simd::Scalar;
 
-/// Sixteen quads, aligned to cache lines, so that no vector of them straddles two.
+/// Sixteen quads, aligned so that each vector of them is in one cache line.
 #[derive(Debug, Clone, Copy, Default)]
 #[repr(C, align(64))]
 pub struct CacheLines<T>([[T; 4]; 16]);
 
-/// Arrays over the pairs of one batch. All begin with its first pair, and have room for whole vectors behind the last one.
+/// Arrays over the pairs of one batch. All begin with its first pair, and have room for whole vectors beyond the last one.
 #[derive(Debug)]
 pub struct BatchBuffers<T> {
     pub i_particles: IParticles<T>,
     /// [`PairVector`](crate::ground::arithmetic::PairVector)s: their size depends on precision and
     /// instruction set.
     pub pairs: Vec<CacheLines<T>>,
-    /// Tags of both particles. The words of noise replace the first ones.
+    /// Tags of both particles. The random words of the noise replace those of the first particle.
     pub tags: [Vec<u32>; 2],
-    /// A quad for each pair: `fx, fy, fz, −w`.
+    /// A quad `fx, fy, fz, −w` for each pair.
     pub quads: Vec<CacheLines<T>>,
-    /// With several species the quads of weights for the i-particles.
+    /// With several species, the quads of weights for the i-particles.
     pub i_quads: Vec<CacheLines<T>>,
-    /// For each density the weights of the pairs, negative.
+    /// For each density the negative weights of the pairs.
     pub kernel_weights: Vec<Vec<T>>,
     /// Conservative forces along `ê` of all terms but the first soft one; then, for the full pair cache, all forces over `r`.
     pub conservative: Vec<T>,
-    /// 1, or ½ with a ghost, if energies or virials are wanted. Zero behind the last pair.
+    /// Pair weight, 1 or ½ with a ghost, if energies or virials are wanted; zero beyond the last pair.
     pub pair_weight: Vec<T>,
-    /// How many pairs are within the range of each density.
+    /// Number of pairs within the range of each density.
     pub found: Vec<usize>,
-    /// Running sums over the quads.
+    /// Prefix sums over the quads.
     pub running: Vec<Accumulator>,
     pub fallback: FallbackPairs,
-    /// What has been computed since the engine was made.
+    /// Counts of operations since the engine was made.
     pub counts: BatchCounts,
     capacity: usize,
 }
 
-/// Work space of potentials that have no vector code.
+/// Scratch arrays of potentials without vector code.
 #[derive(Debug, Default)]
 pub struct FallbackPairs {
-    /// Distance and pair of species of each pair.
+    /// Distances of all pairs.
     pub all: Vec<f64>,
     pub species_pair: Vec<u32>,
     /// The pairs that one potential acts on.
@@ -52,7 +52,7 @@ pub struct FallbackPairs {
     pub slope: Vec<f64>,
 }
 
-/// Elements behind the last pair that whole vectors may touch.
+/// Number of elements beyond the last pair that whole vectors may read or write.
 const PADDING: usize = 64;
 
 impl<T: Scalar> BatchBuffers<T> {
@@ -77,7 +77,7 @@ impl<T: Scalar> BatchBuffers<T> {
         buffers
     }
 
-    /// Makes room for `count` pairs, and for whole vectors behind the last.
+    /// Makes room for `count` pairs, and for whole vectors beyond the last.
     #[inline(always)]
     pub fn reserve(&mut self, count: usize) {
         if count + PADDING > self.capacity {
@@ -95,7 +95,7 @@ impl<T: Scalar> BatchBuffers<T> {
         }
         self.quads.resize(capacity / 16, CacheLines::default());
         self.i_quads.resize(capacity / 16, CacheLines::default());
-        // Up to eight numbers for each pair.
+        // A pair has up to eight numbers.
         self.pairs.resize(capacity / 8, CacheLines::default());
         self.running.resize(capacity + 2, Accumulator::default());
         self.conservative.resize(capacity, T::default());

@@ -1,4 +1,4 @@
-//! Counts of what is computed, kept where it is computed: a pass that a model does not need leaves its count at zero.
+//! Counts of operations: a pass that a model does not need leaves its count at zero.
 
 /// Counts of one thread, in batches of pairs.
 #[derive(Debug, Clone, Copy, Default)]

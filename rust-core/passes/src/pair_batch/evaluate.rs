@@ -16,13 +16,13 @@ use crate::simd::{Isa, Reals, Scalar, Words};
 use crate::tally::Tally;
 use psidpd_model::kernel::Real;
 
-/// Evaluates a batch in short loops over vectors of pairs: in one long loop the processor would see one vector at a time,
-/// and wait for each of its results.
+/// Evaluates a batch in short loops over vectors of pairs: in one long loop the processor would work on
+/// one vector at a time, and wait for each of its results.
 ///
-/// Leaves quads of forces and weights in the buffers, and appends to `in_range` the pairs that the second pass needs.
+/// Writes quads of forces and weights to the buffers, and appends to `in_range` the pairs that the second pass needs.
 ///
 /// # Safety
-/// The contract of `simd`. The buffers have room for the batch, and hold its i-particles.
+/// The caller fulfils the contract of `simd`. The buffers have room for the batch, and contain its i-particles.
 #[inline(always)]
 pub unsafe fn evaluate<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool>(
     inputs: &PairInputs<A::Scalar, A::PackedParticle>,
@@ -62,13 +62,13 @@ pub unsafe fn evaluate<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const
     }
 }
 
-/// The distance of lanes behind the last pair: beyond the range of every term.
+/// The distance of padding lanes: beyond the range of every term.
 const FAR: f64 = 1e18;
 
-/// Distances, pairs of species and noise.
+/// Computes distances, pairs of species and noise.
 ///
 /// # Safety
-/// As [`evaluate`].
+/// The caller fulfils the contract of [`evaluate`].
 #[inline(always)]
 unsafe fn measure_pairs<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool>(
     inputs: &PairInputs<A::Scalar, A::PackedParticle>,
@@ -76,8 +76,8 @@ unsafe fn measure_pairs<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool>(
     buffers: &mut BatchBuffers<A::Scalar>,
     batch: Batch,
 ) {
-    // SAFETY: lists of the batch are readable for a vector behind the last pair, where the search has put a particle that
-    // exists; buffers have room for whole vectors.
+    // SAFETY: the search pads the lists of the batch by a vector of valid particles;
+    // `BatchBuffers::reserve` makes room for whole vectors.
     unsafe {
         let packed = inputs.packed.as_ptr();
         let i_particles: *const _ = &buffers.i_particles;
@@ -124,10 +124,10 @@ unsafe fn measure_pairs<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool>(
     }
 }
 
-/// Forces of the terms beyond the first soft one, which `forces` begins with.
+/// Computes forces of the terms other than the first soft one, with which `forces` begins.
 ///
 /// # Safety
-/// As [`evaluate`], after [`measure_pairs`].
+/// The caller fulfils the contract of [`evaluate`], and has called [`measure_pairs`].
 #[inline(always)]
 unsafe fn further_terms<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool>(
     inputs: &PairInputs<A::Scalar, A::PackedParticle>,
@@ -167,6 +167,6 @@ fn pair_weights<T: Scalar>(
         let [i, j] = batch.pair(p);
         buffers.pair_weight[p] = T::of(inputs.ghosts.pair_weight(i, j));
     }
-    // No vector has more lanes.
+    // No vector has more than sixteen lanes.
     buffers.pair_weight[batch.count..batch.count + 16].fill(T::default());
 }

@@ -1,8 +1,8 @@
-//! The full pair cache: with several densities or species the first pass keeps all pairs, with their separations and
-//! forces. The second pass then finds the whole force of a pair, and adds it to both particles once; the first one adds
-//! densities only.
+//! The full pair cache: with several densities or species the first pass stores all pairs, with their
+//! separations and forces. The second pass then computes the whole force of a pair, and adds it to both
+//! particles once; the first pass adds densities only.
 //!
-//! With one density nothing is gained: its weight goes with the force.
+//! With one density the cache saves nothing: its weight is added together with the force.
 
 use super::batch::Batch;
 use super::buffers::BatchBuffers;
@@ -17,18 +17,18 @@ use std::mem::MaybeUninit;
 /// The pairs of a plane, field by field. The pairs of each batch begin with a whole vector of every field.
 #[derive(Debug, Default)]
 pub struct FullPairCache<T> {
-    /// `r_i − r_j` ([`SEPARATION`]); the force that needs no density, over `r` ([`FORCE`]); `−w′(r)/r` of each density
-    /// ([`WEIGHT_GRADIENT`]); last the pair weight, if virials are wanted.
+    /// Separation `r_i − r_j` ([`SEPARATION`]); force without density terms, over `r` ([`FORCE`]); `−w′(r)/r` of each
+    /// density ([`WEIGHT_GRADIENT`]); last the pair weight, if virials are wanted.
     pub fields: Vec<Vec<CacheVector<T>>>,
-    /// The j-particle: its index, shifted by `OFFSET_BITS`.
+    /// Index of the j-particle, shifted by `OFFSET_BITS`.
     pub j_offsets: Vec<CacheVector<u32>>,
     /// The i-particle, counted in its batch; above [`I_CODE_BITS`] the pair of species, if there are several.
     pub codes: Vec<CacheVector<u32>>,
     pub batches: Vec<CachedBatch>,
-    /// Vectors that each field has, and has room for.
+    /// Number of vectors in each field.
     end: usize,
     room: usize,
-    /// Pairs of the largest batch.
+    /// Number of pairs of the largest batch.
     pub most: usize,
 }
 
@@ -37,10 +37,10 @@ pub const SEPARATION: usize = 0;
 pub const FORCE: usize = 3;
 pub const WEIGHT_GRADIENT: usize = 4;
 
-/// The bits of a code that tell the i-particle.
+/// Number of bits of a code that contain the i-particle.
 pub const I_CODE_BITS: u32 = 4;
 
-/// Sixteen numbers. Lanes behind the last pair of a batch may never be written, nor are they read then.
+/// Sixteen numbers. Lanes beyond the last pair of a batch may stay unwritten; they are not read then.
 #[derive(Debug)]
 #[repr(C, align(64))]
 pub struct CacheVector<T>([MaybeUninit<T>; 16]);
@@ -48,22 +48,22 @@ pub struct CacheVector<T>([MaybeUninit<T>; 16]);
 /// A batch in the cache.
 #[derive(Debug, Clone, Copy)]
 pub struct CachedBatch {
-    /// The first i-particle, and how many.
+    /// First i-particle of the batch.
     pub first: u32,
     pub members: u32,
     /// Index of the first pair of each i-particle in the batch, and one past the last pair.
     pub begin: [u32; 17],
-    /// The vector that holds the first pair.
+    /// Index of the vector with the first pair.
     pub vector: usize,
 }
 
-/// Where vector `end` of a field goes.
+/// The address of vector `end` of a field.
 ///
 /// # Safety
 /// The field has room for it.
 #[inline(always)]
 unsafe fn at<T>(field: &mut Vec<CacheVector<T>>, end: usize) -> *mut T {
-    // SAFETY: `reserve` has made room for whole vectors of the next batch in every field.
+    // SAFETY: the caller promises room; `reserve` makes room for whole vectors of the next batch in every field.
     unsafe { field.as_mut_ptr().add(end).cast() }
 }
 
@@ -84,7 +84,7 @@ impl<T: Scalar> FullPairCache<T> {
         self.room = fields.min(self.j_offsets.capacity()).min(self.codes.capacity());
     }
 
-    /// Makes room for `more` pairs, and a vector behind.
+    /// Makes room for `more` pairs, and one vector more.
     #[inline(always)]
     fn reserve(&mut self, more: usize) {
         let more = more / 16 + 2;
@@ -96,7 +96,7 @@ impl<T: Scalar> FullPairCache<T> {
     #[cold]
     #[inline(never)]
     fn grow(&mut self, more: usize) {
-        // SAFETY: `end` is within the capacity of every field (`reserve`); vectors of `MaybeUninit` need not be written.
+        // SAFETY: `end` is within the capacity of every field (`reserve`); elements of `MaybeUninit` may stay unwritten.
         unsafe {
             for field in &mut self.fields {
                 field.set_len(self.end);
@@ -110,17 +110,17 @@ impl<T: Scalar> FullPairCache<T> {
         self.find_room();
     }
 
-    /// Where the next vector of a field goes.
+    /// The address of the next vector of a field.
     ///
     /// # Safety
-    /// There is such a field, with room for the vector.
+    /// The field exists, and has room for the vector.
     #[inline(always)]
     unsafe fn field(&mut self, field: usize) -> *mut T {
-        // SAFETY: fields are those that `clear` has made; `reserve` has made room in them.
+        // SAFETY: `clear` has made the fields; `reserve` has made room in them.
         unsafe { at(self.fields.get_unchecked_mut(field), self.end) }
     }
 
-    /// Counts the pairs of a batch that were written behind the last, and one vector of anything behind them.
+    /// Counts the pairs of a batch that were written beyond the last pair, and one unspecified vector after them.
     #[inline(always)]
     fn add(&mut self, batch: Batch) {
         let mut begin = [0; 17];
@@ -135,7 +135,7 @@ impl<T: Scalar> FullPairCache<T> {
         self.end += batch.count / 16 + 1;
     }
 
-    /// Bytes held.
+    /// Size in bytes.
     pub fn bytes(&self) -> usize {
         self.fields.iter().map(|field| field.capacity() * size_of::<CacheVector<T>>()).sum::<usize>()
             + (self.j_offsets.capacity() + self.codes.capacity()) * size_of::<CacheVector<u32>>()
@@ -146,8 +146,8 @@ impl<T: Scalar> FullPairCache<T> {
 /// Appends all pairs of a batch.
 ///
 /// # Safety
-/// The contract of `simd`. The buffers hold distances and forces of the batch; the cache has been cleared for as many
-/// densities as there are, and for the same `TALLY`.
+/// The caller fulfils the contract of `simd`. The buffers contain distances and forces of the batch;
+/// the cache has been cleared for the same number of densities and the same `TALLY`.
 #[inline(always)]
 pub unsafe fn append_to_cache<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool>(
     inputs: &PairInputs<A::Scalar, impl PackedParticle>,
@@ -155,8 +155,8 @@ pub unsafe fn append_to_cache<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool
     cache: &mut FullPairCache<A::Scalar>,
     batch: Batch,
 ) {
-    // SAFETY: `reserve` makes room for whole vectors and one more; buffers and lists of the batch are readable in whole
-    // vectors.
+    // SAFETY: `reserve` makes room for whole vectors and one more; `BatchBuffers` and `SearchBuffers`
+    // pad arrays of the batch to whole vectors.
     unsafe {
         type W<I, A> = <<A as Arithmetic<I>>::Reals as Reals>::Words;
         let lanes = A::Reals::LANES;
@@ -198,7 +198,7 @@ pub unsafe fn append_to_cache<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool
             }
             v += 1;
         }
-        // The scatter loop adds zero to the particle behind the last pair: it must be one of the plane.
+        // The scatter loop adds zero to the particle after the last pair, which must be in the plane.
         *j_offsets.add(batch.count) = *j;
         cache.add(batch);
     }
@@ -215,7 +215,7 @@ struct WeightGradients<'a, R: Reals> {
 impl<R: Reals> ShapeVisitor for WeightGradients<'_, R> {
     type Output = ();
 
-    /// Writes `−w′(r)/r`, zero beyond the range and in padding lanes.
+    /// Writes `−w′(r)/r`, which is zero beyond the range and in padding lanes.
     #[inline(always)]
     fn visit<S: Shape>(self) {
         // SAFETY: `append_to_cache` has made room for whole vectors.

@@ -1,4 +1,4 @@
-//! The pairs within the range of each density: the first pass lists them, the second gives them their many-body forces.
+//! The pairs within the range of each density: the first pass lists them, the second computes their many-body forces.
 
 use super::batch::Batch;
 use super::buffers::BatchBuffers;
@@ -10,28 +10,28 @@ use crate::ground::terms::Pass;
 use crate::simd::{Isa, OFFSET_BITS, Reals, Scalar, Words};
 use psidpd_model::kernel::{Shape, ShapeVisitor};
 
-/// What the first pass of a plane leaves for the second: a compact list for each density, or the full pair cache.
+/// The output of the first pass of a plane for the second: a compact list for each density, or the full pair cache.
 #[derive(Debug, Default)]
 pub struct InRangePairs<T> {
-    /// For each density a quad for each pair: `−w′ ê`, and a code of both particles.
+    /// For each density and pair a quad: `−w′ ê`, and a code of both particles.
     pub weight_gradients: Vec<QuadList<T>>,
-    /// If virials are wanted, another quad: `r_i − r_j`, and the pair weight.
+    /// If virials are wanted, a second quad: `r_i − r_j`, and the pair weight.
     pub separations: Vec<QuadList<T>>,
-    /// The first i-particle of each batch, and how many it has.
+    /// First i-particle of each batch, and the number of its i-particles.
     pub batches: Vec<[u32; 2]>,
-    /// For each batch the number of pairs in each density.
+    /// For each batch, the number of pairs in each density.
     pub found: Vec<u32>,
     /// The first particle of the plane.
     pub plane_first: u32,
-    /// All pairs, where the plan says so; the lists above stay empty then.
+    /// All pairs, if the plan uses the full pair cache; the lists above are empty then.
     pub full_cache: FullPairCache<T>,
 }
 
-/// The lowest bits of a code: the i-particle, counted in its batch. Those above count the j-particle from the first particle
-/// of the plane on.
+/// Number of lowest bits of a code that contain the i-particle, counted in its batch. The bits above
+/// contain the j-particle, counted from the first particle of the plane.
 pub const I_CODE_BITS: u32 = 4;
 
-/// How many bits are left for the j-particle: codes are stored as ordinary numbers.
+/// Number of bits for the j-particle: codes are stored as floating-point numbers.
 pub const J_CODE_BITS: u32 = 25;
 
 /// A list of quads that is written in whole vectors.
@@ -45,10 +45,10 @@ impl<T> Default for QuadList<T> {
 }
 
 impl<T> QuadList<T> {
-    /// Where the next quad goes.
+    /// The address of the next quad.
     #[inline(always)]
     fn end(&mut self) -> *mut [T; 4] {
-        // SAFETY: at most one past the end of the allocation.
+        // SAFETY: the address is at most one past the end of the allocation.
         unsafe { self.0.as_mut_ptr().add(self.0.len()) }
     }
 
@@ -82,14 +82,14 @@ impl<T: Scalar> InRangePairs<T> {
         }
     }
 
-    /// Counts the pairs of a batch that [`append_in_range`] has written behind the last.
+    /// Counts the pairs of a batch that [`append_in_range`] has written after the last pair.
     ///
     /// # Safety
-    /// They have been written, `found` of each density, with the same `TALLY`.
+    /// [`append_in_range`] has written `found` pairs of each density, with the same `TALLY`.
     #[inline(always)]
     pub unsafe fn add<const TALLY: bool>(&mut self, found: &[usize], batch: Batch) {
-        // SAFETY: the quads are initialised, and `reserve` has made room for them; there is an entry of `found` for each
-        // density.
+        // SAFETY: the caller promises that the quads are initialised; `reserve` has made room for them,
+        // and `found` has an entry for each density.
         unsafe {
             if self.weight_gradients.is_empty() {
                 return;
@@ -110,7 +110,7 @@ impl<T: Scalar> InRangePairs<T> {
         }
     }
 
-    /// Bytes held.
+    /// Size in bytes.
     pub fn bytes(&self) -> usize {
         let lists = self.weight_gradients.iter().chain(&self.separations);
         lists.map(|list| list.0.capacity() * size_of::<[T; 4]>()).sum::<usize>()
@@ -120,10 +120,11 @@ impl<T: Scalar> InRangePairs<T> {
     }
 }
 
-/// Writes the pairs of a batch within the range of each density behind the last; `buffers.found` tells how many.
+/// Writes the pairs of a batch within the range of each density after the last pair; `buffers.found` counts them.
 ///
 /// # Safety
-/// The contract of `simd`. The buffers hold the distances of the batch; [`InRangePairs::reserve`] has made room.
+/// The caller fulfils the contract of `simd`. The buffers contain the distances of the batch;
+/// [`InRangePairs::reserve`] has made room.
 #[inline(always)]
 pub unsafe fn append_in_range<I: Isa, A: Arithmetic<I>, const TALLY: bool>(
     inputs: &PairInputs<A::Scalar, A::PackedParticle>,
@@ -163,11 +164,11 @@ struct SelectInRange<'a, R: Reals, const TALLY: bool> {
 impl<R: Reals, const TALLY: bool> ShapeVisitor for SelectInRange<'_, R, TALLY> {
     type Output = usize;
 
-    /// Writes `−w′ ê` and the codes; returns how many.
+    /// Writes `−w′ ê` and the codes; returns their number.
     #[inline(always)]
     fn visit<S: Shape>(self) -> usize {
-        // SAFETY: made by `append_in_range` alone, whose caller upholds the contract of `simd`; lists have room for whole
-        // vectors.
+        // SAFETY: `append_in_range` alone creates this visitor, and its caller fulfils the contract of
+        // `simd`; `reserve` made room for whole vectors.
         unsafe {
             let range = R::splat(self.term.force_range);
             let inverse_range = R::splat(self.term.force_inverse_range);
@@ -180,7 +181,7 @@ impl<R: Reals, const TALLY: bool> ShapeVisitor for SelectInRange<'_, R, TALLY> {
                 let i = R::Words::load_bytes(self.i_in_batch.add(v * R::LANES));
                 let j = R::Words::load(self.j_offsets.add(v * R::LANES)).sub(first);
                 let code = R::encode(j.shift_right::<{ OFFSET_BITS - I_CODE_BITS }>().add(i));
-                // Padding lanes are out of range.
+                // The distance of padding lanes is out of range.
                 let mask = pairs.r.mask_below(range);
                 let g = factor * S::slope(pairs.r * inverse_range) * pairs.inverse;
                 let [dx, dy, dz] = pairs.d;

@@ -1,4 +1,4 @@
-//! The weights `w(r)` of pairs in each density that has a pass.
+//! The weights `w(r)` of pairs in each density with a pass.
 
 use super::batch::Batch;
 use super::buffers::BatchBuffers;
@@ -8,10 +8,10 @@ use crate::ground::terms::Pass;
 use crate::simd::{Isa, Reals, Scalar};
 use psidpd_model::kernel::{Shape, ShapeVisitor};
 
-/// Computes `−w(r)` of all pairs for each density: both particles are given minus a quad.
+/// Computes `−w(r)` of all pairs for each density; the scatter loops subtract these from both particles.
 ///
 /// # Safety
-/// The contract of `simd`. The buffers hold the distances of the batch.
+/// The caller fulfils the contract of `simd`. The buffers contain the distances of the batch.
 #[inline(always)]
 pub unsafe fn kernel_weights<I: Isa, A: Arithmetic<I>>(
     inputs: &PairInputs<A::Scalar, A::PackedParticle>,
@@ -44,8 +44,8 @@ impl<R: Reals> ShapeVisitor for KernelWeights<'_, R> {
 
     #[inline(always)]
     fn visit<S: Shape>(self) {
-        // SAFETY: made by `kernel_weights` alone, whose caller upholds the contract of `simd`; `BatchBuffers::reserve`
-        // has made room for whole vectors.
+        // SAFETY: `kernel_weights` alone creates this visitor, and its caller fulfils the contract of
+        // `simd`; `BatchBuffers::reserve` has made room for whole vectors.
         unsafe {
             let inverse_range = R::splat(self.term.inverse_range);
             let factor = R::splat(self.factor);

@@ -1,8 +1,8 @@
 //! Evaluates the pairs of a batch: all pairs of as many consecutive i-particles as a vector has lanes.
 //!
-//! [`evaluate`] runs short loops over vectors of pairs, one for each step of the computation, in arrays that stay in the
-//! first-level cache ([`buffers`]). [`scatter`] adds the results to both particles of each pair. What the second pass
-//! needs of the pairs goes to [`in_range_pairs`] or [`full_pair_cache`].
+//! [`evaluate`] runs short loops over vectors of pairs, one for each step of the computation, in arrays
+//! that stay in the first-level cache ([`buffers`]). [`scatter`] adds the results to both particles of
+//! each pair. Pairs for the second pass go to [`in_range_pairs`] or [`full_pair_cache`].
 
 pub mod accumulators;
 pub mod batch;

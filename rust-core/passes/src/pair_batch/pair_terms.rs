@@ -12,7 +12,7 @@ use crate::simd::{Isa, Reals, Scalar, Words};
 use psidpd_model::kernel::{CubicSpline, KernelKind, Real, Shape, ShapeVisitor};
 use std::marker::PhantomData;
 
-/// Energies and virials, one sum in each lane.
+/// Energies and virials, with one sum in each lane.
 #[derive(Clone, Copy)]
 pub struct PairSums<R> {
     pub pair: R,
@@ -29,13 +29,13 @@ impl<R: Reals> PairSums<R> {
     }
 }
 
-/// Adds the virial of forces `f d`.
+/// Adds the virial of the forces `f d`.
 ///
 /// # Safety
-/// The contract of `simd`.
+/// The caller fulfils the contract of `simd`.
 #[inline(always)]
 pub unsafe fn add_virial<R: Reals>(f: R, d: [R; 3], sum: &mut [R; 6]) {
-    // SAFETY: arithmetic of vectors, which there are only below `simd::run`; nothing is read from memory.
+    // SAFETY: the caller fulfils the contract of `simd`; the arithmetic reads no memory.
     unsafe {
         let fd = [f * d[0], f * d[1], f * d[2]];
         sum[0] = fd[0].mul_add(d[0], sum[0]);
@@ -50,11 +50,11 @@ pub unsafe fn add_virial<R: Reals>(f: R, d: [R; 3], sum: &mut [R; 6]) {
 /// The sum of the lanes.
 ///
 /// # Safety
-/// The contract of `simd`.
+/// The caller fulfils the contract of `simd`.
 #[inline(always)]
 pub unsafe fn sum_lanes<R: Reals>(x: R) -> f64 {
     let mut lanes = [R::Scalar::default(); 16];
-    // SAFETY: no vector has more lanes.
+    // SAFETY: no vector has more lanes than `lanes` has elements.
     unsafe { x.store(lanes.as_mut_ptr()) };
     let mut sum = 0.0;
     for lane in &lanes[..R::LANES] {
@@ -63,11 +63,12 @@ pub unsafe fn sum_lanes<R: Reals>(x: R) -> f64 {
     sum
 }
 
-/// Writes the quads of the batch, `fx, fy, fz` and with one density `−w`: the first soft term, the thermostat, and what the
-/// other terms have left in `conservative`. For the full pair cache it writes forces over `r` to `conservative` instead.
+/// Writes the quads of the batch, `fx, fy, fz` and with one density `−w`: the first soft term, the
+/// thermostat, and the forces of the other terms in `conservative`. For the full pair cache it writes
+/// forces over `r` to `conservative` instead.
 ///
 /// # Safety
-/// The contract of `simd`. The buffers hold distances, noise and weights of the batch.
+/// The caller fulfils the contract of `simd`. The buffers contain distances, noise and weights of the batch.
 #[inline(always)]
 pub unsafe fn forces<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool>(
     inputs: &PairInputs<A::Scalar, A::PackedParticle>,
@@ -128,9 +129,9 @@ pub unsafe fn forces<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const T
     }
 }
 
-/// A term, prepared for a loop over pairs. The functions are unsafe by the contract of `simd`.
+/// A term, prepared for a loop over pairs. Callers of its functions fulfil the contract of `simd`.
 trait Term<R: Reals> {
-    /// `before − φ′(r)`; adds to the energy with `TALLY`.
+    /// Returns `before − φ′(r)`; adds to the energy with `TALLY`.
     unsafe fn add<const MULTISPECIES: bool, const TALLY: bool>(
         &self,
         r: R,
@@ -144,7 +145,7 @@ trait Term<R: Reals> {
 /// Adds the forces of a term to those in the buffers.
 ///
 /// # Safety
-/// The contract of `simd`. The buffers hold the distances of so many vectors.
+/// The caller fulfils the contract of `simd`. The buffers contain the distances of `vectors` vectors.
 #[inline(always)]
 unsafe fn each<R: Reals, const MULTISPECIES: bool, const TALLY: bool>(
     term: impl Term<R>,
@@ -152,7 +153,7 @@ unsafe fn each<R: Reals, const MULTISPECIES: bool, const TALLY: bool>(
     vectors: usize,
     energy: &mut R,
 ) {
-    // SAFETY: all arrays of a batch are padded to whole vectors by `BatchBuffers::reserve`.
+    // SAFETY: `BatchBuffers::reserve` pads all arrays of a batch to whole vectors.
     unsafe {
         let p_pairs = buffers.pairs.as_ptr().cast::<PairVector<R>>();
         let p_force = buffers.conservative.as_mut_ptr();
@@ -175,7 +176,7 @@ unsafe fn each<R: Reals, const MULTISPECIES: bool, const TALLY: bool>(
     }
 }
 
-/// `φ = ½ a R (1 − r/R)²`.
+/// The potential `φ = ½ a R (1 − r/R)²`.
 struct SoftTerm<R: Reals> {
     strength: TableLookup<R>,
     inverse_range: TableLookup<R>,
@@ -206,7 +207,7 @@ impl<R: Reals> Term<R> for SoftTerm<R> {
         pair_weight: R,
         energy: &mut R,
     ) -> R {
-        // SAFETY: arithmetic of vectors, which there are only below `simd::run`; tables are padded.
+        // SAFETY: the caller fulfils the contract of `simd`; `SpeciesPairTable::new` pads tables.
         unsafe {
             let (one, zero) = (R::constant(1.0), R::constant(0.0));
             let t = (one - r * self.inverse_range.lookup::<MULTISPECIES>(species_pair)).larger(zero);
@@ -222,7 +223,7 @@ impl<R: Reals> Term<R> for SoftTerm<R> {
 /// Adds the forces of a soft term.
 ///
 /// # Safety
-/// As `each`.
+/// The caller fulfils the contract of `each`.
 #[inline(always)]
 pub unsafe fn add_soft<R: Reals, const MULTISPECIES: bool, const TALLY: bool>(
     term: &Soft<R::Scalar>,
@@ -234,7 +235,7 @@ pub unsafe fn add_soft<R: Reals, const MULTISPECIES: bool, const TALLY: bool>(
     unsafe { each::<R, MULTISPECIES, TALLY>(SoftTerm::<R>::new(term), buffers, vectors, energy) }
 }
 
-/// `φ = (c_αβ + c_βα) w(r)`, for one kernel of the force.
+/// The potential `φ = (c_αβ + c_βα) w(r)`, for one kernel of the force.
 struct LinearTerm<R: Reals, S> {
     species_pair: KernelKind,
     inverse_range: R,
@@ -254,7 +255,7 @@ impl<R: Reals, S: Shape> Term<R> for LinearTerm<R, S> {
         pair_weight: R,
         energy: &mut R,
     ) -> R {
-        // SAFETY: tables are padded, and the rest is arithmetic of vectors.
+        // SAFETY: the caller fulfils the contract of `simd`; `SpeciesPairTable::new` pads tables.
         unsafe {
             let one = R::constant(1.0);
             if TALLY {
@@ -272,7 +273,7 @@ impl<R: Reals, S: Shape> Term<R> for LinearTerm<R, S> {
 /// Adds the forces of a density that every ψ is linear in.
 ///
 /// # Safety
-/// As `each`.
+/// The caller fulfils the contract of `each`.
 #[inline(always)]
 pub unsafe fn add_linear<R: Reals, const MULTISPECIES: bool, const TALLY: bool>(
     term: &Linear<R::Scalar>,
@@ -297,7 +298,7 @@ impl<R: Reals, const MULTISPECIES: bool, const TALLY: bool> ShapeVisitor
 
     #[inline(always)]
     fn visit<S: Shape>(self) {
-        // SAFETY: made by `add_linear` alone, whose caller upholds the contract.
+        // SAFETY: `add_linear` alone creates this visitor, and its caller fulfils the contract of `each`.
         unsafe {
             let term = LinearTerm::<R, S> {
                 species_pair: self.term.kernel,
@@ -312,7 +313,7 @@ impl<R: Reals, const MULTISPECIES: bool, const TALLY: bool> ShapeVisitor
     }
 }
 
-/// `W(s)`.
+/// Computes the kernel shape `W(s)`.
 struct Value<R>(R);
 
 impl<R: Reals> ShapeVisitor for Value<R> {
@@ -323,7 +324,7 @@ impl<R: Reals> ShapeVisitor for Value<R> {
     }
 }
 
-/// `φ = a [A W(r, R_A) − B W(r, R_B)]`.
+/// The potential `φ = a [A W(r, R_A) − B W(r, R_B)]`.
 struct SplineTerm<R: Reals> {
     repulsion: TableLookup<R>,
     attraction: TableLookup<R>,
@@ -341,12 +342,12 @@ impl<R: Reals> Term<R> for SplineTerm<R> {
         pair_weight: R,
         energy: &mut R,
     ) -> R {
-        // SAFETY: tables are padded, and the rest is arithmetic of vectors.
+        // SAFETY: the caller fulfils the contract of `simd`; `SpeciesPairTable::new` pads tables.
         unsafe {
             let (one, zero) = (R::constant(1.0), R::constant(0.0));
             let inverse_a = self.repulsion_inverse_range.lookup::<MULTISPECIES>(species_pair);
             let inverse_b = self.attraction_inverse_range.lookup::<MULTISPECIES>(species_pair);
-            // At s = 1 the shape and its slope vanish; beyond, it stays there.
+            // At s = 1 the shape and its slope vanish; larger s are set to 1.
             let a = one - (one - r * inverse_a).larger(zero);
             let b = one - (one - r * inverse_b).larger(zero);
             let repulsion = self.repulsion.lookup::<MULTISPECIES>(species_pair);
@@ -365,7 +366,7 @@ impl<R: Reals> Term<R> for SplineTerm<R> {
 /// Adds the forces of spline potentials.
 ///
 /// # Safety
-/// As `each`.
+/// The caller fulfils the contract of `each`.
 #[inline(always)]
 pub unsafe fn add_spline<R: Reals, const MULTISPECIES: bool, const TALLY: bool>(
     term: &Spline<R::Scalar>,

@@ -1,6 +1,6 @@
-//! Growing lists.
+//! Growth of lists.
 
-/// Makes room for `more`, an eighth of the length in advance: the doubling of `Vec` would be a good part of all memory.
+/// Makes room for `more` elements plus an eighth of the length: the doubling of `Vec` would waste much memory.
 #[inline(always)]
 pub fn make_room<T>(values: &mut Vec<T>, more: usize) {
     if values.capacity() - values.len() < more {

@@ -8,10 +8,10 @@ use crate::simd::{Isa, Reals, Scalar};
 use crate::tally::Tally;
 use psidpd_model::pair::PairForm;
 
-/// Adds the forces along `ê` to those that the buffers have.
+/// Adds the forces along `ê` of these potentials to those in the buffers.
 ///
 /// # Safety
-/// The contract of `simd`. The buffers hold the distances of the batch.
+/// The caller fulfils the contract of `simd`. The buffers contain the distances of the batch.
 #[inline(always)]
 pub unsafe fn scalar_fallback<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool>(
     inputs: &PairInputs<A::Scalar, A::PackedParticle>,
@@ -19,7 +19,7 @@ pub unsafe fn scalar_fallback<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool
     batch: Batch,
     tally: &mut Tally,
 ) {
-    // SAFETY: vectors are arrays of their lanes, and there is a vector for every pair of the batch.
+    // SAFETY: a vector is an array of its lanes, and `BatchBuffers` has a vector for every pair of the batch.
     unsafe {
         let pairs = buffers.pairs.as_ptr().cast::<PairVector<A::Reals>>();
         for k in 0..batch.count {
@@ -30,7 +30,7 @@ pub unsafe fn scalar_fallback<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool
     // With one species all entries stay zero.
     if MULTISPECIES && inputs.terms.species > 1 {
         for k in 0..batch.count {
-            // SAFETY: with several species there is an entry for each particle (`SortedParticles::make_room`).
+            // SAFETY: `SortedParticles::make_room` makes an entry for each particle if there are several species.
             let [a, b] = batch.pair(k).map(|i| unsafe { *inputs.species.at(i) } as usize);
             buffers.fallback.species_pair[k] = (a * inputs.terms.species + b) as u32;
         }

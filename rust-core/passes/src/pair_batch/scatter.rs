@@ -1,4 +1,4 @@
-//! Adds what pairs do to the accumulators of both particles.
+//! Adds forces and weights of pairs to the accumulators of both particles.
 
 use super::accumulators::{PlaneAccumulators, PlaneSums};
 use super::batch::Batch;
@@ -12,11 +12,11 @@ use psidpd_model::kernel::Real;
 /// Pairs sorted by their i-particles.
 #[derive(Clone, Copy)]
 pub struct ScatterPairs {
-    /// The j-particle of each pair: its index shifted by `OFFSET_BITS`; one more behind the last pair.
+    /// The j-particle of each pair: its index shifted by `OFFSET_BITS`; the list has one more entry after the last pair.
     pub j_offsets: *const u32,
-    /// Index of the first pair of each i-particle, and one past the last pair of the last one; counted from any number.
+    /// Index of the first pair of each i-particle, and one past the last pair of the last one; the first index may be any.
     pub begin: *const u32,
-    /// The first i-particle, and how many.
+    /// First i-particle.
     pub first: usize,
     pub members: usize,
 }
@@ -32,33 +32,33 @@ impl From<Batch<'_>> for ScatterPairs {
 /// Adds the forces of a batch, and the weights if there is one density.
 ///
 /// # Safety
-/// The contract of `simd`. The sums are those of the plane that the batch is of, and the buffers hold its quads.
+/// The caller fulfils the contract of `simd`. The sums are those of the batch's plane, and the buffers contain its quads.
 #[inline(always)]
 pub unsafe fn scatter_forces<I: Isa, A: Arithmetic<I>>(
     sums: PlaneSums,
     buffers: &mut BatchBuffers<A::Scalar>,
     batch: Batch,
 ) {
-    // SAFETY: both particles of each pair are of the plane or the next (the half stencil of the search).
+    // SAFETY: the half stencil of the search lists only particles of the plane and of the next.
     unsafe {
         let to = sums.forces();
         let quads = buffers.quads.as_mut_ptr().cast::<A::Scalar>();
-        // Reuse the memory of the pairs, which is in the cache, unless weights are to come.
+        // The memory of the pairs, which is in the cache, is reused unless weights still need it.
         let running = if sums.variables > 1 {
             buffers.running.as_mut_ptr().cast()
         } else {
             buffers.pairs.as_mut_ptr().cast()
         };
-        // The j-particle gets minus the quad, so the weight in it is negative.
+        // The loop subtracts the quad from the j-particle, so that the weight in it is negative.
         scatter_quads::<I, A>(to, quads, quads, running, [1.0, 1.0, 1.0, -1.0], batch.into());
     }
 }
 
-/// Adds `i_quads` times `sign` to the i-particles of pairs, minus `quads` to the j-particles.
+/// Adds `i_quads` times `sign` to the i-particles of pairs, and subtracts `quads` from the j-particles.
 ///
 /// # Safety
-/// The contract of `simd`. The accumulators have both particles of each pair; there is room for a quad and a running sum
-/// behind the last pair.
+/// The caller fulfils the contract of `simd`. The accumulators include both particles of each pair;
+/// there is room for a quad and a running sum after the last pair.
 #[inline(always)]
 pub unsafe fn scatter_quads<I: Isa, A: Arithmetic<I>>(
     to: PlaneAccumulators,
@@ -68,14 +68,14 @@ pub unsafe fn scatter_quads<I: Isa, A: Arithmetic<I>>(
     sign: [f64; 4],
     pairs: ScatterPairs,
 ) {
-    // SAFETY: the search lists particles of the plane and of the next, of which the scheduler has made accumulators;
-    // `BatchBuffers::reserve` and `second_pass_cached` leave room behind the last pair.
+    // SAFETY: the search lists particles of the plane and of the next, whose accumulators the scheduler
+    // has made; `BatchBuffers::reserve` and `second_pass_cached` leave room after the last pair.
     unsafe {
         let sign = I::Quad::load(sign.as_ptr());
         let ScatterPairs { j_offsets, begin, first, members } = pairs;
-        // One loop over all pairs instead of one for each i-particle, whose end the processor would mispredict: what an
-        // i-particle gets is the difference of two running sums, of which every other one is stored. Behind an odd number
-        // of pairs follows a zero.
+        // One loop runs over all pairs: the processor would mispredict the end of a loop for each
+        // i-particle. The sum of an i-particle is the difference of two running sums, of which every
+        // second one is stored. A zero follows an odd number of pairs.
         let zeroth = *begin as usize;
         let count = *begin.add(members) as usize - zeroth;
         quads.add(4 * count).cast::<[A::Scalar; 4]>().write([A::Scalar::default(); 4]);
@@ -116,27 +116,27 @@ pub unsafe fn scatter_quads<I: Isa, A: Arithmetic<I>>(
 /// Adds a quad to an accumulator.
 ///
 /// # Safety
-/// The contract of `simd`.
+/// The caller fulfils the contract of `simd`, and passes the address of four numbers.
 #[inline(always)]
 pub unsafe fn add_quad<Q: Quad>(p: *mut f64, x: Q) {
-    // SAFETY: `PlaneAccumulators::at` points to four numbers.
+    // SAFETY: the caller promises four numbers at `p`, as `PlaneAccumulators::at` returns.
     unsafe { Q::load(p).add(x).store(p) }
 }
 
-/// Where the weights of one variable come from.
+/// The weights of one variable.
 #[derive(Clone, Copy)]
 struct WeightSource<T> {
-    /// The weights of its density, negative.
+    /// The negative weights of its density.
     weights: *const T,
     /// Tables over pairs of species: 1 where the i-particle, or the j-particle, is of the variable's species.
     is_species: [*const T; 2],
 }
 
-/// Adds weights where there are several variables: one for each density and species of the other particle, four of them in
-/// a quad.
+/// Adds weights where there are several variables: one for each density and species of the
+/// other particle, four in each quad.
 ///
 /// # Safety
-/// As [`scatter_forces`]; the buffers hold the weights of the batch.
+/// The caller fulfils the contract of [`scatter_forces`]; the buffers contain the weights of the batch.
 #[inline(always)]
 pub unsafe fn scatter_weights<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool>(
     inputs: &PairInputs<A::Scalar, impl PackedParticle>,
@@ -144,7 +144,8 @@ pub unsafe fn scatter_weights<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool
     buffers: &mut BatchBuffers<A::Scalar>,
     batch: Batch,
 ) {
-    // SAFETY: as `scatter_forces`; weights and pairs of species are there in whole vectors.
+    // SAFETY: the accumulators are as in `scatter_forces`; `BatchBuffers::reserve` pads weights and
+    // pairs of species to whole vectors.
     unsafe {
         let terms = inputs.terms;
         let quads = buffers.quads.as_mut_ptr().cast::<A::Scalar>();
@@ -160,7 +161,7 @@ pub unsafe fn scatter_weights<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool
             let mut sources = [none; 4];
             let mut c = 0;
             while c < 4 {
-                // Behind the last variable, repeat it.
+                // The last variable is repeated to fill its quad.
                 let variable = 4 * quad + c.min(variables - 1);
                 let [is_i, is_j] = terms.is_species.get_unchecked(variable % terms.species);
                 sources[c].is_species = [is_i.as_ptr(), is_j.as_ptr()];
@@ -193,7 +194,7 @@ pub unsafe fn scatter_weights<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool
                 }
                 v += 1;
             }
-            // Weights are negative, so both particles get minus a quad.
+            // Weights are negative, so that the loop subtracts quads from both particles.
             let to = sums.densities(quad);
             let running = buffers.running.as_mut_ptr().cast();
             scatter_quads::<I, A>(to, quads, i_quads, running, [-1.0; 4], batch.into());

@@ -1,4 +1,4 @@
-//! What is the same for all batches of a step, in registers.
+//! Values that are the same for all batches of a step, in registers.
 
 use super::inputs::PairInputs;
 use super::thermostat::NOISE_UNIT;
@@ -7,21 +7,20 @@ use crate::noise::PairNoise;
 use crate::simd::{Isa, Reals, Scalar};
 use psidpd_model::kernel::Real;
 
-/// Constants of a step.
 #[derive(Clone, Copy)]
 pub struct StepConstants<I: Isa, A: Arithmetic<I>> {
     pub metric: A::Metric,
     /// The noise, if the thermostat acts in this step.
     pub noise: Option<PairNoise>,
-    /// Signed words of noise times this are `ξ dt^{−1/2}`.
+    /// Factor that turns signed random words into `ξ dt^{−1/2}`.
     pub noise_scale: A::Reals,
-    /// 0, 1, 2 …
+    /// The numbers 0, 1, 2 … of the lanes.
     pub lane: A::Reals,
 }
 
 impl<I: Isa, A: Arithmetic<I>> StepConstants<I, A> {
     /// # Safety
-    /// The contract of `simd`.
+    /// The caller fulfils the contract of `simd`.
     #[inline(always)]
     pub unsafe fn new(inputs: &PairInputs<A::Scalar, A::PackedParticle>) -> Self {
         // SAFETY: no vector has more than sixteen lanes.

@@ -6,30 +6,30 @@ use crate::ground::terms::{Exponent, ThermostatTables};
 use crate::noise::{PAIR_ROUNDS, PARITY, PairNoise, ROTATIONS};
 use crate::simd::{Reals, Scalar, Words};
 
-/// `√3/2³¹`: turns signed words into numbers of unit variance.
+/// The factor `√3/2³¹` turns signed words into numbers of unit variance.
 pub const NOISE_UNIT: f64 = 1.732_050_807_568_877_2 / 2_147_483_648.0;
 
 const _: () = assert!(PAIR_ROUNDS == 13);
 
-/// Draws a word of noise for each of `count` pairs: Threefry2x32 of their two tags in ascending order. The words replace the
-/// first tags.
+/// Draws a random word for each of `count` pairs: Threefry2x32 of their two tags in ascending order.
+/// The words replace the first tags.
 ///
 /// # Safety
-/// The contract of `simd`. Both arrays have room for two vectors behind the last pair.
+/// The caller fulfils the contract of `simd`. Both arrays have room for two vectors after the last pair.
 #[inline(always)]
 pub unsafe fn draw<W: Words>(noise: PairNoise, a: *mut u32, b: *const u32, count: usize) {
-    // SAFETY: `BatchBuffers::reserve` leaves room for two vectors behind the tags of the last pair.
+    // SAFETY: `BatchBuffers::reserve` leaves room for two vectors after the tags of the last pair.
     unsafe {
         let [k0, k1] = noise.key();
         let schedule = [W::splat(k0), W::splat(k1), W::splat(PARITY ^ k0 ^ k1)];
         let mut k = 0;
         while k < count {
-            // Two vectors in turn: each hides the latency of the other.
+            // Two vectors alternate: each hides the latency of the other.
             let (a0, b0) = (W::load(a.add(k)), W::load(b.add(k)));
             let (a1, b1) = (W::load(a.add(k + W::LANES)), W::load(b.add(k + W::LANES)));
             let mut x0 = [a0.min(b0).add(schedule[0]), a1.min(b1).add(schedule[0])];
             let mut x1 = [a0.max(b0).add(schedule[1]), a1.max(b1).add(schedule[1])];
-            // Unrolled: rotations by constants take one instruction.
+            // The rounds are unrolled: rotations by constants take one instruction.
             (x0, x1) = four_rounds(x0, x1, 0);
             (x0, x1) = inject(x0, x1, &schedule, 1);
             (x0, x1) = four_rounds(x0, x1, 4);
@@ -45,10 +45,10 @@ pub unsafe fn draw<W: Words>(noise: PairNoise, a: *mut u32, b: *const u32, count
     }
 }
 
-/// Four rounds of Threefry, with rotations from number `at` on.
+/// Four rounds of Threefry, with rotations from number `at`.
 #[inline(always)]
 unsafe fn four_rounds<W: Words>(x0: [W; 2], x1: [W; 2], at: usize) -> ([W; 2], [W; 2]) {
-    // SAFETY: arithmetic of vectors, which there are only below `simd::run`; nothing is read from memory.
+    // SAFETY: the caller fulfils the contract of `simd`; the arithmetic reads no memory.
     unsafe {
         let (x0, x1) = round(x0, x1, ROTATIONS[at]);
         let (x0, x1) = round(x0, x1, ROTATIONS[at + 1]);
@@ -59,7 +59,7 @@ unsafe fn four_rounds<W: Words>(x0: [W; 2], x1: [W; 2], at: usize) -> ([W; 2], [
 
 #[inline(always)]
 unsafe fn round<W: Words>([a0, b0]: [W; 2], [a1, b1]: [W; 2], by: u32) -> ([W; 2], [W; 2]) {
-    // SAFETY: arithmetic of vectors, which there are only below `simd::run`; nothing is read from memory.
+    // SAFETY: the caller fulfils the contract of `simd`; the arithmetic reads no memory.
     unsafe {
         let x0 = [a0.add(a1), b0.add(b1)];
         let turned = [a1.rotate(by), b1.rotate(by)];
@@ -70,7 +70,7 @@ unsafe fn round<W: Words>([a0, b0]: [W; 2], [a1, b1]: [W; 2], by: u32) -> ([W; 2
 /// Adds the key after four rounds.
 #[inline(always)]
 unsafe fn inject<W: Words>(x0: [W; 2], x1: [W; 2], schedule: &[W; 3], number: usize) -> ([W; 2], [W; 2]) {
-    // SAFETY: arithmetic of vectors, which there are only below `simd::run`; nothing is read from memory.
+    // SAFETY: the caller fulfils the contract of `simd`; the arithmetic reads no memory.
     unsafe {
         let first = schedule[number % 3];
         let second = schedule[(number + 1) % 3].add(W::splat(number as u32));
@@ -83,7 +83,7 @@ pub struct ThermostatForce<'a, R: Reals> {
     gamma: TableLookup<R>,
     sigma: TableLookup<R>,
     weight: ThermostatWeight<'a, R>,
-    /// Signed words of noise times this are `ξ dt^{−1/2}`.
+    /// Factor that turns signed random words into `ξ dt^{−1/2}`.
     noise_scale: R,
 }
 
@@ -95,7 +95,7 @@ pub struct ThermostatWeight<'a, R: Reals> {
 
 impl<'a, R: Reals> ThermostatWeight<'a, R> {
     /// # Safety
-    /// The contract of `simd`.
+    /// The caller fulfils the contract of `simd`.
     #[inline(always)]
     pub unsafe fn new(
         inverse_range: &SpeciesPairTable<R::Scalar>,
@@ -113,7 +113,7 @@ impl<'a, R: Reals> ThermostatWeight<'a, R> {
     }
 
     /// # Safety
-    /// The contract of `simd`.
+    /// The caller fulfils the contract of `simd`.
     #[inline(always)]
     pub unsafe fn weight<const MULTISPECIES: bool>(&self, r: R, species_pair: SpeciesPair<R>) -> R {
         // SAFETY: tables are padded to a vector by `SpeciesPairTable::new`.
@@ -140,7 +140,7 @@ enum Power<'a, T> {
 
 impl<'a, R: Reals> ThermostatForce<'a, R> {
     /// # Safety
-    /// The contract of `simd`.
+    /// The caller fulfils the contract of `simd`.
     #[inline(always)]
     pub unsafe fn new(tables: &'a ThermostatTables<R::Scalar>, noise_scale: R) -> Self {
         // SAFETY: tables are padded to a vector by `SpeciesPairTable::new`.
@@ -154,10 +154,10 @@ impl<'a, R: Reals> ThermostatForce<'a, R> {
         }
     }
 
-    /// `−γ w_R² (ê·v) + σ w_R ξ dt^{−1/2}`; `ξ` from a word of noise.
+    /// The force `−γ w_R² (ê·v) + σ w_R ξ dt^{−1/2}`, with `ξ` from a random word.
     ///
     /// # Safety
-    /// The contract of `simd`.
+    /// The caller fulfils the contract of `simd`.
     #[inline(always)]
     pub unsafe fn force<const MULTISPECIES: bool>(&self, pairs: &PairVector<R>, word: R::Words) -> R {
         // SAFETY: tables are padded to a vector by `SpeciesPairTable::new`.
@@ -171,11 +171,11 @@ impl<'a, R: Reals> ThermostatForce<'a, R> {
     }
 }
 
-/// `t^e` for positive `t`, else zero: the library function, lane by lane.
+/// The power `t^e` for positive `t`, else zero, by the library function for each lane.
 #[inline(always)]
 unsafe fn power<R: Reals>(t: R, exponent: R) -> R {
     let (mut bases, mut exponents) = ([R::Scalar::default(); 16], [R::Scalar::default(); 16]);
-    // SAFETY: no vector has more lanes.
+    // SAFETY: no vector has more lanes than `bases` has elements.
     unsafe {
         t.store(bases.as_mut_ptr());
         exponent.store(exponents.as_mut_ptr());

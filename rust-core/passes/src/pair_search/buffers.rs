@@ -1,14 +1,14 @@
-//! Work space and result of the pair search.
+//! Scratch arrays and result of the pair search.
 
 use super::clusters::{ICluster, JCluster, MASKS_PER_CLUSTER, SEARCH_GROUP, SLOT_BLOCK};
 use crate::simd::BroadcastPair;
 
-/// The pairs of one search group, and what they are found with. Everything stays in the first-level cache.
+/// The pairs of one search group, and scratch arrays of the search. All stay in the first-level cache.
 #[derive(Debug)]
 pub struct SearchBuffers {
-    /// The first i-particle of the group.
+    /// First i-particle of the group.
     pub first: usize,
-    /// Index of the first pair of each i-particle; one past the last pair at the end.
+    /// Index of the first pair of each i-particle; the last entry is one past the last pair.
     pub begin: [u32; SEARCH_GROUP + 1],
     /// The j-particle of each pair: its index in the order of cells, shifted by `OFFSET_BITS`.
     pub j_offsets: Vec<u32>,
@@ -20,20 +20,21 @@ pub struct SearchBuffers {
     pub j_cluster_count: usize,
     /// Candidate masks of i-particles five to eight, for each j-cluster.
     pub high_candidates: Vec<u64>,
-    /// For each block of slots the positions of its i-cluster, repeated sixteen times: one entry for each mask.
+    /// For each block of slots the positions of its i-cluster, each repeated sixteen times, with one entry for each mask.
     pub i_positions: Vec<[BroadcastPair; 2]>,
     /// For each block of slots the masks of i-particles one to four, then of five to eight.
     pub masks: Vec<u64>,
     /// Offset of the first candidate of each slot.
     pub j_bases: Vec<u32>,
-    /// Pairs that fit into the lists.
+    /// Number of pairs that fit into the lists.
     capacity: usize,
 }
 
-/// j-clusters of a group with two for each of five cell ranges, in up to three periods, of every i-particle.
+/// Number of j-clusters with which a group usually fits: two for each of five cell ranges, in up to
+/// three periods, of every i-particle.
 const USUAL_J_CLUSTERS: usize = SEARCH_GROUP * 5 * 3 * 2 + 2;
 
-/// Elements behind the last pair that whole vectors may touch.
+/// Number of elements after the last pair that whole vectors may read or write.
 const PADDING: usize = 64;
 
 impl Default for SearchBuffers {
@@ -60,7 +61,7 @@ impl Default for SearchBuffers {
 }
 
 impl SearchBuffers {
-    /// Makes room for `count` j-clusters, and for two for every cell range of the rest of a group.
+    /// Makes room for `count` j-clusters, and for two more for every cell range of the rest of a group.
     #[cold]
     #[inline(never)]
     pub fn reserve_j_clusters(&mut self, count: usize) {
@@ -68,7 +69,7 @@ impl SearchBuffers {
         if room > self.j_clusters.len() {
             self.j_clusters.resize(2 * room, JCluster::default());
             self.high_candidates.resize(2 * room, 0);
-            // Each i-cluster may fill its last block of slots in part.
+            // Each i-cluster may leave its last block of slots partly empty.
             let blocks = 2 * room / SLOT_BLOCK + SEARCH_GROUP + 1;
             self.i_positions.resize(MASKS_PER_CLUSTER * blocks, Default::default());
             self.masks.resize(MASKS_PER_CLUSTER * SLOT_BLOCK * blocks, 0);
@@ -76,7 +77,7 @@ impl SearchBuffers {
         }
     }
 
-    /// Makes room for `count` pairs, and for whole vectors behind the last.
+    /// Makes room for `count` pairs, and for whole vectors after the last.
     #[inline(always)]
     pub fn reserve_pairs(&mut self, count: usize) {
         if count + PADDING > self.capacity {

@@ -1,4 +1,4 @@
-//! In which cells an i-particle looks for partners: those within the cutoff sphere, column by column.
+//! The cells in which an i-particle searches partners: those within the cutoff sphere, column by column.
 
 use super::clusters::SEARCH_GROUP;
 use crate::cells::sorted::SortedCells;
@@ -6,20 +6,20 @@ use crate::ground::box_geometry::BoxGeometry;
 use crate::simd::{Isa, Reals};
 use psidpd_model::kernel::Real;
 
-/// The five columns of the half stencil: the particle's own, the next of its plane, three of the next plane.
+/// The five columns of the half stencil: the particle's own, the next of its plane, and three of the next plane.
 pub struct StencilColumns {
     /// The number of the particle's own column in its plane.
     number: usize,
-    /// For each column a pointer to the first particles of its cells.
+    /// For each column a pointer to the array of its cells' first particles.
     pub start: [*const u32; 5],
     /// 1 for columns that exist, 0 for those beyond an open side.
     present: [f32; 5],
-    /// Added to positions there in the period before, the same and the next one along x: entry `w + 5 (period + 1)` for
-    /// column `w`.
+    /// Periodic shift of positions in the previous, the same and the next period along x: entry `w
+    /// + 5 (period + 1)` for column `w`.
     pub shift: [[u32; 3]; 15],
     /// Whether a column lies across a period in the direction of `column_axis`.
     pub wraps: bool,
-    /// The owned particles of each column: the first, and one past the last.
+    /// The owned particles of each column: index of the first, and one past the last.
     pub owned: [[u32; 2]; 5],
     /// Whether the particle's own column has ghosts.
     pub with_ghosts: bool,
@@ -51,7 +51,7 @@ impl StencilColumns {
                 to = to.rem_euclid(columns);
             }
             if above >= grid.planes {
-                // The copy of the first plane.
+                // The next plane may be the copy of the first plane.
                 present &= geometry.periodic[grid.plane_axis];
             }
             if !present {
@@ -72,7 +72,7 @@ impl StencilColumns {
         stencil
     }
 
-    /// Whether all particles of the five columns are ghosts: then none of their pairs counts on this rank.
+    /// Whether all particles of the five columns are ghosts: then this rank counts none of their pairs.
     pub fn only_ghosts(&self) -> bool {
         self.owned.iter().all(|[first, end]| first == end)
     }
@@ -84,22 +84,22 @@ pub type CellIndices = [[i32; SEARCH_GROUP]; 5];
 /// Cell ranges of a search group.
 #[derive(Default)]
 pub struct CellRanges {
-    /// The first cell, and one past the last.
+    /// Index of the first cell, and one past the last.
     pub low: CellIndices,
     pub end: CellIndices,
-    /// Ranges that cross a period along x: from here to the end of the column in the period before, and from the
-    /// beginning of the column to here in the next one.
+    /// Cells of ranges that cross a period along x: from `before` to the end of the column in the
+    /// previous period, and from the beginning of the column to `after` in the next one.
     pub before: CellIndices,
     pub after: CellIndices,
 }
 
-/// What the cell ranges of a search group look like.
+/// Properties of the cell ranges of a search group.
 #[derive(Clone, Copy, Default)]
 pub struct RangeFlags {
-    /// i-particles whose ranges continue in the period before, and in the next: one bit each.
+    /// Bits of the i-particles whose ranges continue in the previous, and in the next, period.
     pub before: u32,
     pub after: u32,
-    /// Vectors of i-particles whose ranges are already those of whole i-clusters: one bit each.
+    /// Bits of the vectors of i-particles whose ranges are already merged over whole i-clusters.
     pub together: u32,
 }
 
@@ -108,7 +108,7 @@ pub struct SearchGroup<'a> {
     pub plane: &'a PlaneSearch,
     pub stencil: &'a StencilColumns,
     pub flags: RangeFlags,
-    /// The first i-particle, and how many.
+    /// First i-particle.
     pub first: usize,
     pub count: usize,
 }
@@ -117,7 +117,7 @@ pub struct SearchGroup<'a> {
 pub struct PlaneSearch {
     cutoff_squared: f32,
     column_width: f32,
-    /// Where the next plane begins.
+    /// Coordinate at which the next plane begins.
     plane_edge: f32,
     /// The search cutoff along x, in cells.
     half_range: f32,
@@ -125,10 +125,10 @@ pub struct PlaneSearch {
     periodic: bool,
     tilted: bool,
     pub cells_per_column: i32,
-    /// Particles of an i-cluster are no further apart along x.
+    /// Largest distance along x between particles of an i-cluster.
     pub i_cluster_extent: f32,
-    /// Periodic shifts in 16-bit fixed point, doubled in both halves of a word: one period back, none and one ahead along
-    /// `column_axis`, and for each of these the same along x.
+    /// Periodic shifts in 16-bit fixed point, repeated in both halves of a word: one period back, none
+    /// and one ahead along `column_axis`, and for each of these the same along x.
     shift: [[[u32; 3]; 3]; 3],
 }
 
@@ -158,10 +158,11 @@ impl PlaneSearch {
         }
     }
 
-    /// Finds the cell ranges of `count` i-particles from `first` on, in i-clusters of `CLUSTER`.
+    /// Finds the cell ranges of `count` i-particles, beginning with `first`, in i-clusters of `CLUSTER`.
     ///
     /// # Safety
-    /// The contract of `simd`. The particles are of one column of this plane, at most [`SEARCH_GROUP`] of them.
+    /// The caller fulfils the contract of `simd`. The particles are of one column of this plane, at
+    /// most [`SEARCH_GROUP`] of them.
     #[inline(always)]
     pub unsafe fn cell_ranges<I: Isa, const CLUSTER: usize>(
         &self,
@@ -170,7 +171,7 @@ impl PlaneSearch {
         [first, count]: [usize; 2],
         out: &mut CellRanges,
     ) -> RangeFlags {
-        // SAFETY: the particles exist; vectors that reach beyond the last one are loaded from `lanes`.
+        // SAFETY: the caller promises the particles; vectors that reach beyond the last one are loaded from `lanes`.
         unsafe {
             let mut flags = RangeFlags::default();
             let mut at = 0;
@@ -179,7 +180,7 @@ impl PlaneSearch {
                 let left = count - at;
                 let mut lanes = [[0.0; 16]; 3];
                 if left < I::F32::LANES {
-                    // Repeat the last particle.
+                    // The last particle fills the vector.
                     for c in 0..3 {
                         lanes[c] = [*x[c].add(left - 1); 16];
                         std::ptr::copy_nonoverlapping(x[c], lanes[c].as_mut_ptr(), left);
@@ -194,10 +195,10 @@ impl PlaneSearch {
         }
     }
 
-    /// Finds the cell ranges of a vector of i-particles at `x`, `y`, `z`: those of the group from `at` on.
+    /// Finds the cell ranges of a vector of i-particles at `x`, `y`, `z`, which begins at member `at` of the group.
     ///
     /// # Safety
-    /// The contract of `simd`. `at` is a multiple of the lanes below [`SEARCH_GROUP`].
+    /// The caller fulfils the contract of `simd`. `at` is a multiple of the number of lanes, below [`SEARCH_GROUP`].
     #[inline(always)]
     unsafe fn ranges_of_vector<I: Isa, const CLUSTER: usize>(
         &self,
@@ -208,7 +209,7 @@ impl PlaneSearch {
         out: &mut CellRanges,
         flags: &mut RangeFlags,
     ) {
-        // SAFETY: lanes divide `SEARCH_GROUP`, so that a vector from `at` on is inside the arrays of `out`.
+        // SAFETY: the number of lanes divides `SEARCH_GROUP`, so that a vector at `at` is inside the arrays of `out`.
         unsafe {
             let zero = I::F32::constant(0.0);
             let longest = I::F32::splat(self.half_range);
@@ -218,7 +219,7 @@ impl PlaneSearch {
                 cell = fraction_along::<I>(cells.geometry, x, y, z)
                     * I::F32::constant(self.cells_per_column as f64);
             } else {
-                // Half the extent of the cutoff sphere within each column.
+                // The half range is half the extent of the cutoff sphere within each column.
                 let (across, up) = if cells.grid.column_axis == 1 { (y, z) } else { (z, y) };
                 let low_edge = I::F32::splat(stencil.number as f32 * self.column_width);
                 let high_edge = I::F32::splat((stencil.number + 1) as f32 * self.column_width);
@@ -242,7 +243,7 @@ impl PlaneSearch {
                 before = (cell - half_range[0]).mask_below(zero);
                 after = (most - one).mask_below(cell + half_range[0]);
             }
-            // Merge the ranges of each i-cluster here if all clusters of the vector are compact.
+            // Ranges of i-clusters are merged here if all clusters of the vector are compact.
             let first = I::cluster_first::<CLUSTER>(x);
             let far = I::F32::splat(self.i_cluster_extent);
             let close = (x - first).mask_below(far) & (first - x).mask_below(far);
@@ -279,7 +280,7 @@ impl PlaneSearch {
 /// Fractional coordinates along the first edge.
 ///
 /// # Safety
-/// The contract of `simd`.
+/// The caller fulfils the contract of `simd`.
 #[inline(always)]
 unsafe fn fraction_along<I: Isa>(geometry: &BoxGeometry, x: I::F32, y: I::F32, z: I::F32) -> I::F32 {
     let sz = if geometry.dimensions == 3 {

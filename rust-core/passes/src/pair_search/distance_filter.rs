@@ -1,7 +1,8 @@
 //! Keeps the candidates within the search cutoff, and lists them as pairs.
 //!
-//! Distances are compared in 16-bit fixed point, sixteen candidates with four i-particles at once. The limit includes the
-//! largest rounding error, so that the filter only ever lets too many pairs through: the terms vanish beyond their range.
+//! Distances are compared in 16-bit fixed point, sixteen candidates with four i-particles at once. The
+//! limit includes the largest rounding error, so that the filter passes too many pairs and never too
+//! few: the terms vanish beyond their range.
 
 use super::buffers::SearchBuffers;
 use super::cell_ranges::SearchGroup;
@@ -10,11 +11,12 @@ use super::leave_out::leave_out;
 use crate::cells::sorted::SortedCells;
 use crate::simd::{BroadcastPair, Isa, OFFSET_BITS};
 
-/// Lists the pairs of a search group, those of one i-particle after those of another; batches have `batch_size`
-/// i-particles, a power of two.
-///
+/// Lists the pairs of a search group, those of one i-particle after those of another; batches have
+/// `batch_size` Lists the pairs of a search group, one i-particle after the other; a batch has
+/// `batch_size` i-particles, a power of two.
 /// # Safety
-/// The contract of `simd`. The buffers hold the clusters of the group, formed with the same `CLUSTER`.
+/// The caller fulfils the contract of `simd`. The buffers contain the clusters of the group,
+/// formed with the same `CLUSTER`.
 #[inline(always)]
 pub unsafe fn filter_by_distance<I: Isa, const SHIFTS: bool, const CLUSTER: usize>(
     cells: &SortedCells,
@@ -22,9 +24,9 @@ pub unsafe fn filter_by_distance<I: Isa, const SHIFTS: bool, const CLUSTER: usiz
     batch_size: usize,
     buffers: &mut SearchBuffers,
 ) {
-    // SAFETY: positions have four vectors of padding behind the last particle (`SortedParticles::make_room`), so that all sixteen of
-    // a j-cluster may be read; masks, bases and positions of i-clusters have entries for all slots of the clusters
-    // (`reserve_j_clusters`), pairs for every bit of the masks (`reserve_pairs`).
+    // SAFETY: `SortedParticles::make_room` pads positions by four vectors after the last particle, so
+    // that all sixteen of a j-cluster can be read; `reserve_j_clusters` makes masks, bases and
+    // positions of i-clusters for all slots, and `reserve_pairs` makes room for every bit of the masks.
     unsafe {
         let first = group.first;
         let j_cluster_count = buffers.j_cluster_count;
@@ -34,7 +36,7 @@ pub unsafe fn filter_by_distance<I: Isa, const SHIFTS: bool, const CLUSTER: usiz
         let (masks, j_bases) = (buffers.masks.as_mut_ptr(), buffers.j_bases.as_mut_ptr());
         let masks_each = const { CLUSTER / I_PER_MASK };
         let i_clusters = buffers.i_cluster_count;
-        // Positions of the i-particles, repeated for sixteen candidates; empty masks for slots without a j-cluster.
+        // Positions of the i-particles are repeated for sixteen candidates; slots without a j-cluster get empty masks.
         let mut t = 0;
         while t < i_clusters {
             let cluster = buffers.i_clusters.get_unchecked(t);
@@ -60,7 +62,7 @@ pub unsafe fn filter_by_distance<I: Isa, const SHIFTS: bool, const CLUSTER: usiz
             }
             t += 1;
         }
-        // All masks first, then the pairs: in one loop the two would wait for each other.
+        // One loop computes all masks, another lists the pairs: in one loop the two would wait for each other.
         let limit = cells.fixed16_scale.limit;
         let (j_clusters, high) = (buffers.j_clusters.as_ptr(), buffers.high_candidates.as_ptr());
         let mut c = 0;
@@ -119,7 +121,7 @@ pub unsafe fn filter_by_distance<I: Isa, const SHIFTS: bool, const CLUSTER: usiz
                 if !cells.excluded.is_empty() {
                     pairs = leave_out::<I>(&cells.excluded, first + member, out, [labelled, pairs]);
                 }
-                // Thirty-two at once; that is enough for most particles.
+                // A step expands thirty-two bits, which is enough for most particles.
                 loop {
                     let label = 0x101 * (member & (batch_size - 1)) as u16;
                     I::broadcast16(label, i_in_batch.add(labelled).cast());
@@ -134,7 +136,7 @@ pub unsafe fn filter_by_distance<I: Isa, const SHIFTS: bool, const CLUSTER: usiz
             }
             t += 1;
         }
-        // Lanes behind the last pair refer to a particle that exists.
+        // Padding lanes refer to a particle that exists.
         let mut k = 0;
         while k < 16 {
             *out.add(pairs + k) = (first as u32) << OFFSET_BITS;

@@ -1,4 +1,4 @@
-//! The three steps of the search, one after the other.
+//! Runs the three steps of the search.
 
 use super::buffers::SearchBuffers;
 use super::cell_ranges::{CellRanges, PlaneSearch, SearchGroup, StencilColumns};
@@ -11,15 +11,15 @@ use crate::simd::{Isa, Kernel};
 
 const _: () = assert!(SEARCH_GROUP <= MOST_OF_ANY);
 
-/// Lists the pairs of a search group: of `count` i-particles of a column from `first` on.
+/// Lists the pairs of a search group: of `count` i-particles of a column, beginning with `first`.
 pub struct FindPairs<'a> {
     pub cells: &'a SortedCells<'a>,
     pub plane: &'a PlaneSearch,
     pub stencil: &'a StencilColumns,
     pub ranges: &'a mut CellRanges,
-    /// `first` and `count`.
+    /// The pair `[first, count]`.
     pub group: [usize; 2],
-    /// i-particles of a batch.
+    /// Number of i-particles of a batch.
     pub batch_size: usize,
     pub buffers: &'a mut SearchBuffers,
 }
@@ -29,10 +29,10 @@ impl Kernel for FindPairs<'_> {
     const VBMI2: bool = true;
 
     /// # Safety
-    /// The contract of `simd`. The particles are of the column.
+    /// The caller fulfils the contract of `simd`. The particles are of the column.
     #[inline(always)]
     unsafe fn run<I: Isa>(self) {
-        // SAFETY: what `in_clusters` asks for is promised to this function.
+        // SAFETY: the caller fulfils the contract of `in_clusters`.
         unsafe {
             match self.cells.grid.i_cluster_size {
                 8 => self.in_clusters::<I, 8>(),
@@ -43,15 +43,15 @@ impl Kernel for FindPairs<'_> {
 }
 
 impl FindPairs<'_> {
-    /// In i-clusters of `CLUSTER`.
+    /// Runs the search with i-clusters of `CLUSTER` particles.
     ///
     /// # Safety
-    /// As [`FindPairs::run`].
+    /// The caller fulfils the contract of [`FindPairs::run`].
     #[inline(always)]
     unsafe fn in_clusters<I: Isa, const CLUSTER: usize>(self) {
         let FindPairs { cells, plane, stencil, ranges, group: [first, count], batch_size, buffers } = self;
-        // SAFETY: particles are padded by `SortedParticles::make_room`; the group is not longer than `SEARCH_GROUP`, for which
-        // ranges and buffers have room.
+        // SAFETY: `SortedParticles::make_room` pads particles; the caller promises a group of at most
+        // `SEARCH_GROUP`, for which ranges and buffers have room.
         unsafe {
             let flags = plane.cell_ranges::<I, CLUSTER>(cells, stencil, [first, count], ranges);
             let group = SearchGroup { plane, stencil, flags, first, count };

@@ -1,5 +1,4 @@
-//! Cuts the cell ranges of i-clusters into j-clusters of sixteen candidates, with a bit for each candidate that a pair may
-//! be formed with.
+//! Divides the cell ranges of i-clusters into j-clusters of sixteen candidates, with a bit for each possible pair.
 
 use super::buffers::SearchBuffers;
 use super::cell_ranges::{CellIndices, CellRanges, SearchGroup};
@@ -10,7 +9,7 @@ use crate::simd::{Isa, Reals};
 /// Forms the i-clusters and j-clusters of a search group. Up to `CLUSTER` consecutive particles form an i-cluster.
 ///
 /// # Safety
-/// The contract of `simd`. `ranges` are those of the group, found with the same `CLUSTER`.
+/// The caller fulfils the contract of `simd`. `ranges` are those of the group, found with the same `CLUSTER`.
 #[inline(always)]
 pub unsafe fn form_j_clusters<I: Isa, const GHOSTS: bool, const CLUSTER: usize>(
     cells: &SortedCells,
@@ -18,8 +17,8 @@ pub unsafe fn form_j_clusters<I: Isa, const GHOSTS: bool, const CLUSTER: usize>(
     ranges: &mut CellRanges,
     buffers: &mut SearchBuffers,
 ) {
-    // SAFETY: cells of the ranges are of the column, or one past its last (`ranges_of_vector` clamps them), so `start` has
-    // them; a group has no more than `SEARCH_GROUP` i-clusters.
+    // SAFETY: `ranges_of_vector` clamps cells to the column, or one past its last, for which `start`
+    // has entries; a group has no more than `SEARCH_GROUP` i-clusters.
     unsafe {
         let SearchGroup { plane, stencil, count, flags, .. } = *group;
         let mut found = 0;
@@ -29,7 +28,7 @@ pub unsafe fn form_j_clusters<I: Isa, const GHOSTS: bool, const CLUSTER: usize>(
         while a < count {
             let mut size = CLUSTER.min(count - a);
             if flags.together >> (a / I::F32::LANES) & 1 == 0 {
-                // Ranges in other vectors may be merged already: end the cluster with this vector.
+                // Ranges in other vectors may be merged already: the cluster ends with this vector.
                 size = size.min(I::F32::LANES - a % I::F32::LANES);
                 let x = std::slice::from_raw_parts(cells.x[0].at(group.first + a), size);
                 size = merge_ranges(x, plane.i_cluster_extent, ranges, a);
@@ -47,7 +46,7 @@ pub unsafe fn form_j_clusters<I: Isa, const GHOSTS: bool, const CLUSTER: usize>(
                     false => [0; MASKS_PER_CLUSTER],
                 },
             };
-            // In its own column a particle pairs with those behind it.
+            // In its own column a particle pairs with the particles after it.
             let start = *stencil.start.get_unchecked(0);
             let range = [(group.first + a + 1) as u32, *start.add(cell_of(&ranges.end, 0, a))];
             found = append_range::<GHOSTS, CLUSTER, true>(cells, group, buffers, found, range, 5, &masks);
@@ -66,7 +65,7 @@ pub unsafe fn form_j_clusters<I: Isa, const GHOSTS: bool, const CLUSTER: usize>(
                 );
                 w += 1;
             }
-            // Ranges that continue in the period before, and in the next.
+            // The bits mark ranges that continue in the previous, and in the next, period.
             let bits = (1u32 << size) - 1;
             if flags.before >> a & bits != 0 {
                 let mut w = 1;
@@ -113,15 +112,15 @@ pub unsafe fn form_j_clusters<I: Isa, const GHOSTS: bool, const CLUSTER: usize>(
 /// The cell of i-particle `a` in stencil column `w`.
 ///
 /// # Safety
-/// `w` is below 5, `a` below the size of a search group.
+/// `w` is below 5, and `a` below the size of a search group.
 #[inline(always)]
 unsafe fn cell_of(indices: &CellIndices, w: usize, a: usize) -> usize {
-    // SAFETY: both loops over stencil columns and over the particles of a group end below the sizes of these arrays.
+    // SAFETY: the caller promises indices below the sizes of these arrays.
     unsafe { *indices.get_unchecked(w).get_unchecked(a) as usize }
 }
 
-/// Shortens an i-cluster to the particles at `x` that are near enough to the first one, `a`, and merges their cell ranges
-/// into those of `a`. Returns how many there are.
+/// Shortens an i-cluster to the particles at `x` within `extent` of the first one, `a`, and merges
+/// their cell ranges into that of `a`. Returns the number of these particles.
 #[cold]
 #[inline(never)]
 fn merge_ranges(x: &[f32], extent: f32, ranges: &mut CellRanges, a: usize) -> usize {
@@ -140,7 +139,7 @@ fn merge_ranges(x: &[f32], extent: f32, ranges: &mut CellRanges, a: usize) -> us
 
 /// What all j-clusters of an i-cluster share.
 struct ClusterMasks {
-    /// Added to the number of a j-cluster this is its slot; the sum wraps.
+    /// Difference between the slot and the number of a j-cluster; the sum wraps.
     slots: usize,
     /// Sixteen set bits for each member of the i-cluster.
     members: [u64; MASKS_PER_CLUSTER],
@@ -162,17 +161,16 @@ const fn members() -> [[u64; MASKS_PER_CLUSTER]; MASKS_PER_CLUSTER * I_PER_MASK 
     table
 }
 
-/// Candidate bits of the first `n` of thirty-two particles, for each of four members: in the first j-cluster, and in the
-/// second.
+/// Candidate bits of the first `n` of thirty-two particles, for each of four members: in the
+/// first j-cluster, and in the second.
 static FIRST_BITS: [[u64; 2]; 33] = first_bits();
 
-/// Adds one to the slot in `slot_and_shift`.
 const ONE_SLOT: u32 = 1 << 8;
 
 /// The lowest bit of each member.
 const EACH: u64 = 0x0001_0001_0001_0001;
 
-/// In the j-cluster that begins behind the first member, the bits of particles behind each member: every pair is found once.
+/// In the j-cluster that begins after the first member, the bits of particles after each member: every pair is found once.
 const LATER: [u64; MASKS_PER_CLUSTER] = [0xfff8_fffc_fffe_ffff, 0xff80_ffc0_ffe0_fff0];
 
 const fn first_bits() -> [[u64; 2]; 33] {
@@ -186,11 +184,11 @@ const fn first_bits() -> [[u64; 2]; 33] {
     table
 }
 
-/// Appends the j-clusters of the particles `first..end`, and at least one in the own column; returns how many there are
-/// then. `shift` is the index of the periodic shift, and modulo 5 of the stencil column.
+/// Appends the j-clusters of the particles `first..end`, and at least one in the own column; returns the new
+/// number of j-clusters. `shift` is the index of the periodic shift, which modulo 5 is the stencil column.
 ///
 /// # Safety
-/// Particles up to 16 behind `end` are inside the padding of `SortedParticles::make_room`.
+/// Particles up to `end + 16` are inside the padding of `SortedParticles::make_room`.
 #[inline(always)]
 unsafe fn append_range<const GHOSTS: bool, const CLUSTER: usize, const OWN_COLUMN: bool>(
     cells: &SortedCells,
@@ -201,12 +199,12 @@ unsafe fn append_range<const GHOSTS: bool, const CLUSTER: usize, const OWN_COLUM
     shift: usize,
     masks: &ClusterMasks,
 ) -> usize {
-    // SAFETY: the buffers always have room for two more j-clusters at each range of a group (`USUAL_J_CLUSTERS`);
-    // `append_long_range` makes room for more than two.
+    // SAFETY: the buffers always have room for two more j-clusters at each range of a group
+    // (`USUAL_J_CLUSTERS`); `append_long_range` makes room for more than two.
     unsafe {
         let mut owned = [[u64::MAX; MASKS_PER_CLUSTER]; 2];
         if GHOSTS {
-            // Skip ghost–ghost pairs: a cluster of ghosts meets owned particles only.
+            // Ghost–ghost pairs are skipped: a cluster of ghosts pairs with owned particles only.
             if and(masks.ghosts, masks.members) == masks.members {
                 let [first_owned, end_owned] = *group.stencil.owned.get_unchecked(shift % 5);
                 if !OWN_COLUMN {
@@ -224,7 +222,7 @@ unsafe fn append_range<const GHOSTS: bool, const CLUSTER: usize, const OWN_COLUM
         if length > 32 {
             return append_long_range(cells, buffers, found, [first, end], members, masks, slot_and_shift);
         }
-        // Write two j-clusters and count those in use: no branch to predict.
+        // Two j-clusters are written and those in use counted, so that there is no branch to predict.
         let bits = FIRST_BITS.get_unchecked(length).map(|bits| [bits; MASKS_PER_CLUSTER]);
         let [one, two] = [and(bits[0], and(members, owned[0])), and(bits[1], and(masks.members, owned[1]))];
         let out = buffers.j_clusters.as_mut_ptr().add(found);
@@ -251,7 +249,7 @@ fn not_both_ghosts(ghosts: [u64; MASKS_PER_CLUSTER], owned: u32) -> [u64; MASKS_
     ghosts.map(|ghosts| !ghosts | owned)
 }
 
-/// Sixteen set bits for each ghost of eight particles, from their flags, a byte each.
+/// Sixteen set bits for each ghost among eight particles, whose flags are one byte each.
 #[inline(always)]
 fn ghost_mask(flags: u64) -> [u64; MASKS_PER_CLUSTER] {
     [flags & 0xffff_ffff, flags >> 32].map(|four| {
@@ -261,7 +259,7 @@ fn ghost_mask(flags: u64) -> [u64; MASKS_PER_CLUSTER] {
     })
 }
 
-/// Appends more than two j-clusters; `members` are those of the first one.
+/// Appends more than two j-clusters; `members` are the masks for the first one.
 #[cold]
 #[inline(never)]
 fn append_long_range(
@@ -278,7 +276,7 @@ fn append_long_range(
         let bits = [FIRST_BITS[(end - begin).min(16) as usize][0]; MASKS_PER_CLUSTER];
         let mut candidates = and(bits, if begin == first { members } else { masks.members });
         if !cells.ghosts.is_empty() {
-            // SAFETY: `begin` is a particle.
+            // SAFETY: `begin` is the index of a particle.
             let owned = unsafe { cells.ghosts.owned_of_sixteen(begin as usize) };
             candidates = and(candidates, not_both_ghosts(masks.ghosts, owned));
         }

@@ -1,12 +1,12 @@
-//! Takes excluded pairs out of the list of an i-particle.
+//! Removes excluded pairs from the list of an i-particle.
 
 use crate::cells::excluded::Excluded;
 use crate::simd::{Isa, OFFSET_BITS, Reals, Words};
 
-/// Closes the gaps that excluded pairs of particle `i` leave among `offsets[from..to]`, and returns where the list ends then.
+/// Removes the excluded pairs of particle `i` from `offsets[from..to]`, and returns the new end of the list.
 ///
 /// # Safety
-/// The contract of `simd`. A vector from each pair on may be read and written; `i` and the j-particles exist.
+/// The caller fulfils the contract of `simd`. A vector at each pair may be read and written; `i` and the j-particles exist.
 #[inline(always)]
 pub unsafe fn leave_out<I: Isa>(
     excluded: &Excluded,
@@ -15,11 +15,11 @@ pub unsafe fn leave_out<I: Isa>(
     [from, to]: [usize; 2],
 ) -> usize {
     type W<I> = <<I as Isa>::F32 as Reals>::Words;
-    // SAFETY: a vector is written no further behind than it was read from; sides and molecules are there for all particles
-    // and copies, and lanes behind the last pair, which may hold anything, look up the last of them.
+    // SAFETY: each vector is written at or before the address that it was read from; sides and molecules have
+    // entries for all particles and copies, and the look-up clamps padding lanes to the last entry.
     unsafe {
         let partners = excluded.partners_of(i);
-        // Without a side, or a molecule, a particle meets all.
+        // A particle without a side or a molecule is excluded from no pair.
         let sides = excluded.sides.get(i).map_or(0, |sides| sides.rotate_left(16));
         let molecule = excluded.molecules.get(i).copied().unwrap_or(0);
         if partners.is_empty() & (sides == 0) & (molecule == 0) {

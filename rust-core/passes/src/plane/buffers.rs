@@ -1,10 +1,10 @@
-//! A thread's work space for the first pass.
+//! Scratch arrays of a thread for the first pass.
 
 use crate::pair_batch::buffers::BatchBuffers;
 use crate::pair_search::buffers::SearchBuffers;
 use crate::simd::Scalar;
 
-/// What the search finds, and what a batch is evaluated in.
+/// Result of the search, and scratch arrays of the evaluation of a batch.
 #[derive(Debug)]
 pub struct PairBuffers<T> {
     pub search: SearchBuffers,

@@ -1,10 +1,10 @@
-//! What the passes are given.
+//! The input of the passes.
 
 use super::slopes::Slopes;
 use crate::cells::sorted::SortedCells;
 use crate::pair_batch::inputs::PairInputs;
 
-/// The arrays of a workspace, as the passes over one plane see them.
+/// The arrays of a workspace, as the passes over one plane read them.
 pub struct PassData<'a, T, R> {
     pub cells: SortedCells<'a>,
     pub inputs: PairInputs<'a, T, R>,

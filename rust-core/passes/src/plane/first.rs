@@ -1,5 +1,5 @@
-//! The first pass over a plane: the pairs of its particles with each other and with the next plane, the forces that need no
-//! density, and the weights.
+//! The first pass over a plane: the pairs of its particles with each other and with the next plane, the
+//! forces without density terms, and the weights.
 
 use super::buffers::PairBuffers;
 use super::data::PassData;
@@ -17,11 +17,12 @@ use crate::pair_search::buffers::SearchBuffers;
 use crate::simd::{Isa, Reals};
 use crate::tally::Tally;
 
-/// Does the first pass over `plane`; leaves in `in_range` what the second one needs.
+/// Does the first pass over `plane`, and writes to `in_range` the pairs that the second pass needs.
 ///
 /// # Safety
-/// The contract of `simd`. Arrays are as the types in [`PassData`] say; places of the plane, of the next one and the padding
-/// behind are filled, and nobody writes them. The sums are those of the plane, and zero.
+/// The caller fulfils the contract of `simd`. Arrays have the sizes that the types in [`PassData`]
+/// state; the particles of the plane, of the next one and the padding are filled, and no thread writes
+/// them. The sums are those of the plane, and zero.
 #[inline(always)]
 pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool>(
     data: &PassData<A::Scalar, A::PackedParticle>,
@@ -32,7 +33,7 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, con
 ) -> Tally {
     let (cells, inputs) = (&data.cells, &data.inputs);
     let passes = inputs.terms.passes.len();
-    // SAFETY: the plane is one of the grid; the scheduler has filled it and the next one.
+    // SAFETY: the caller promises a plane of the grid; the scheduler has filled it and the next one.
     unsafe {
         if MULTISPECIES && inputs.caches_all_pairs() {
             in_range.full_cache.clear(passes, TALLY);
@@ -56,7 +57,7 @@ pub unsafe fn first_pass<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, con
     }
 }
 
-/// Evaluates batches, and adds what their pairs do.
+/// Evaluates batches, and adds the forces and weights of their pairs.
 struct FirstPass<'a, I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool> {
     inputs: &'a PairInputs<'a, A::Scalar, A::PackedParticle>,
     constants: StepConstants<I, A>,
@@ -71,8 +72,8 @@ impl<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool> Batc
 {
     #[inline(always)]
     unsafe fn visit(&mut self, search: &SearchBuffers, slots: [usize; 2]) {
-        // SAFETY: `packed` has a vector of padding behind the last particle (`SortedParticles::make_room`); `reserve` makes
-        // room for the batch; the caller of `first_pass` upholds the rest.
+        // SAFETY: `SortedParticles::make_room` pads `packed` by a vector after the last particle;
+        // `reserve` makes room for the batch; the caller of `first_pass` promises the rest.
         unsafe {
             let (inputs, sums) = (self.inputs, self.sums);
             let Some(batch) = Batch::of_group(search, slots) else { return };
@@ -87,7 +88,7 @@ impl<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool> Batc
                 batch,
                 &mut self.tally,
             );
-            // Forces first: the quads of weights replace theirs.
+            // Forces are added first: the quads of weights replace theirs.
             if !(MULTISPECIES && inputs.caches_all_pairs()) {
                 scatter_forces::<I, A>(sums, buffers, batch);
                 self.in_range.add::<TALLY>(&buffers.found, batch);

@@ -1,4 +1,4 @@
-//! Lists the pairs of a plane within the range of the thermostat, for whoever changes velocities apart from the forces.
+//! Lists the pairs of a plane within the range of the thermostat, for integrators that apply it apart from the forces.
 
 use super::traversal::{BatchVisitor, each_batch};
 use crate::cells::sorted::SortedCells;
@@ -14,17 +14,17 @@ use crate::simd::{Isa, Kernel, OFFSET_BITS, Reals, Words, run};
 use psidpd_model::kernel::Real;
 use psidpd_threads::SharedSlice;
 
-/// A pair: `g`, and the second particle.
+/// A pair: its vector `g`, and the second particle.
 #[derive(Debug, Clone, Copy, Default)]
 #[repr(C, align(16))]
 pub struct Pair {
-    /// `ê √(½ Δt γ) w_R`, from the second particle to the first.
+    /// Vector `ê √(½ Δt γ) w_R` from the second particle to the first.
     pub g: [f32; 3],
-    /// Counted from the first particle of the plane of the first particle on, through the next plane.
+    /// Index of the second particle, counted from the first particle of the first particle's plane, through the next plane.
     pub j: u32,
 }
 
-/// The same in double precision.
+/// A pair in double precision.
 #[derive(Debug, Clone, Copy, Default)]
 #[repr(C, align(32))]
 pub struct ExactPair {
@@ -32,61 +32,61 @@ pub struct ExactPair {
     pub j: u64,
 }
 
-/// The pairs of a plane, those of one particle after those of another, in the order of cells.
+/// The pairs of a plane, sorted by first particle, in the order of cells.
 #[derive(Debug, Clone, Default)]
 pub struct PairList {
-    /// Where the pairs of each particle of the plane begin; one past the last.
+    /// Index of each particle's first pair; the last entry is one past the last pair.
     pub start: Vec<u32>,
     pub pairs: Vec<Pair>,
-    /// The pairs once more, where they have been measured in double precision; empty otherwise.
+    /// The pairs in double precision, if these have been computed; otherwise empty.
     pub exact: Vec<ExactPair>,
-    /// `r/|g|` of each pair; empty where nobody asked for it.
+    /// Ratio `r/|g|` of each pair; empty unless requested.
     pub stretch: Vec<f64>,
 }
 
 impl PairList {
-    /// `g` of a pair, as precise as it is known.
+    /// The vector `g` of a pair, in the highest precision available.
     #[inline(always)]
     pub fn g(&self, k: usize) -> [f64; 3] {
         self.exact.get(k).map_or_else(|| self.pairs[k].g.map(f64::from), |pair| pair.g)
     }
 }
 
-/// What a pair is weighed with, by pairs of species.
+/// Factors of the pairs, by pairs of species.
 #[derive(Debug, Clone)]
 pub struct WeightTables {
     pub species: usize,
-    /// `√(½ Δt γ)`; zero where nothing drags.
+    /// Amplitude `√(½ Δt γ)`; zero without drag.
     pub amplitude: SpeciesPairTable<f32>,
     pub inverse_range: SpeciesPairTable<f32>,
     pub exponent: Exponent<f32>,
 }
 
-/// Work space.
+/// Scratch arrays of the listing.
 #[derive(Debug, Default)]
 pub struct ListBuffers {
     search: SearchBuffers,
     i_particles: IParticles<f32>,
-    /// The i-particle of each pair of a batch that was kept.
+    /// The i-particle of each kept pair of a batch.
     i_in_batch: Vec<u32>,
-    /// `|g|/r` of each pair, where it is asked for.
+    /// Ratio `|g|/r` of each pair, if requested.
     per_distance: Vec<f32>,
 }
 
-/// Particles in the order of cells, and what their pairs are weighed with.
+/// Particles in the order of cells, and the factors of their pairs.
 #[derive(Clone, Copy)]
 pub struct ListInputs<'a> {
     pub cells: SortedCells<'a>,
     pub packed: SharedSlice<'a, MixedParticle>,
     pub tables: &'a WeightTables,
-    /// Whether `r/|g|` is asked for.
+    /// Whether `r/|g|` is requested.
     pub with_stretch: bool,
 }
 
-/// Lists the pairs of particles of a plane with each other and with the next plane, each once.
+/// Lists the pairs of particles of a plane with each other and with the next plane, each pair once.
 ///
 /// # Safety
-/// Arrays are as [`SortedCells`] says, and all are filled; nobody writes them.
+/// Arrays have the sizes that [`SortedCells`] states, and are filled; no thread writes them.
 pub unsafe fn list_pairs(
     set: InstructionSet,
     inputs: &ListInputs,
@@ -101,8 +101,8 @@ pub unsafe fn list_pairs(
     list.stretch.clear();
     buffers.per_distance.clear();
     let task = ListPairs { inputs, plane, buffers, list };
-    // SAFETY: `PairLists::find` sorts all particles of the box into the arrays before any plane is listed, and writes none
-    // of them then.
+    // SAFETY: `PairLists::find` sorts all particles of the box into the arrays before it lists any
+    // plane, and writes none of them while it lists.
     unsafe {
         match inputs.tables.species {
             1 => run(set, WithSpecies::<false>(task)),
@@ -128,7 +128,7 @@ impl<const MULTISPECIES: bool> Kernel for WithSpecies<'_, MULTISPECIES> {
     unsafe fn run<I: Isa>(self) {
         let ListPairs { inputs, plane, buffers, list } = self.0;
         let ListBuffers { search, i_particles, i_in_batch, per_distance } = buffers;
-        // SAFETY: what is asked for is promised to `list_pairs`; a plane has a first column.
+        // SAFETY: the caller of `list_pairs` promises filled arrays; a plane has a first column.
         unsafe {
             let first = inputs.cells.column(plane, 0)[0];
             let end = inputs.cells.column(plane, inputs.cells.grid.columns_per_plane - 1)[1];
@@ -160,7 +160,7 @@ struct Lister<'a, I: Isa, const MULTISPECIES: bool> {
 }
 
 impl<I: Isa, const MULTISPECIES: bool> Lister<'_, I, MULTISPECIES> {
-    /// Gives the particles before `place` that nobody has visited no pairs: those of columns of ghosts.
+    /// Gives no pairs to the particles before `place` that were not visited: they are in columns of ghosts.
     #[inline(always)]
     fn begin_at(&mut self, place: usize) {
         let PairList { start, pairs, .. } = &mut *self.list;
@@ -177,9 +177,9 @@ impl<I: Isa, const MULTISPECIES: bool> BatchVisitor<I> for Lister<'_, I, MULTISP
         let PairList { start, pairs, .. } = &mut *self.list;
         let per_distance = &mut *self.per_distance;
         make_room(start, members);
-        // SAFETY: `packed` has a vector of padding behind the last particle (`SortedParticles::make_room`), lists of the batch
-        // are readable for a vector behind the last pair; there is room for all its pairs and a vector; of those that are
-        // written, `found` are initialised. The caller upholds the rest.
+        // SAFETY: `SortedParticles::make_room` pads `packed` by a vector after the last particle, and
+        // the search pads lists of the batch; room for all its pairs and a vector has been reserved,
+        // and `found` written pairs are initialised. The caller promises the rest.
         unsafe {
             let Some(batch) = Batch::of_group(search, slots) else {
                 start.resize(start.len() + members, pairs.len() as u32);

@@ -7,12 +7,12 @@ use crate::simd::{Isa, Kernel, run};
 impl PairNoise {
     /// The noise of each pair of tags `a[k]`, `b[k]`, in single precision: the same bits on every instruction set.
     pub fn fill(&self, law: Law, a: &[u32], b: &[u32], xi: &mut [f32]) {
-        // SAFETY: the kernel asks for nothing but the processor.
+        // SAFETY: the kernel requires the instruction set only, which `InstructionSet::best` has found.
         unsafe { run(InstructionSet::best(), Fill { noise: *self, law, a, b, xi }) }
     }
 }
 
-/// A loop that the compiler makes vectors of.
+/// A loop that the compiler vectorises.
 struct Fill<'a> {
     noise: PairNoise,
     law: Law,

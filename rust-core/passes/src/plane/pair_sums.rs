@@ -4,22 +4,22 @@ use super::list::{ExactPair, Pair, PairList};
 use crate::instruction_set::InstructionSet;
 use crate::simd::{Isa, Kernel, Quad, run};
 
-/// A vector with room to be a vector of the processor; the fourth component is 0.
+/// A vector in the size of a register; the fourth component is 0.
 pub type Wide = [f64; 4];
 
-/// What a pair is multiplied by: `a` and `b` of [`add_pairs`].
+/// Factors of a pair: `a` and `b` of [`add_pairs`].
 #[derive(Debug, Clone, Copy)]
 pub struct Terms {
     pub noise: f64,
     pub drag: f64,
 }
 
-/// Adds `g (a ξ − b g·(p_i − p_j))` to particle `i` of every pair, and subtracts it from `j`. `p` and `sums` are of the
-/// particles of the plane, then of those of the next; without noise `xi` is not read. The result is the same to the last bit
-/// on every instruction set.
+/// Adds `g (a ξ − b g·(p_i − p_j))` to particle `i` of every pair, and subtracts it from `j`. `p` and
+/// `sums` have entries for the particles of the plane, followed by those of the next; without noise
+/// `xi` is not read. The result has the same bits on every instruction set.
 ///
 /// # Panics
-/// Arrays are too short for the list.
+/// Panics if arrays are too short for the list.
 pub fn add_pairs(
     set: InstructionSet,
     list: &PairList,
@@ -35,7 +35,7 @@ pub fn add_pairs(
 }
 
 fn add<P: Entry>(set: InstructionSet, task: AddPairs<P>) {
-    // SAFETY: the kernels ask for nothing but the processor.
+    // SAFETY: the kernels require the instruction set only, which `InstructionSet` guarantees.
     unsafe {
         match task.terms.noise == 0.0 {
             true => run(set, WithNoise::<P, false>(task)),
@@ -47,10 +47,10 @@ fn add<P: Entry>(set: InstructionSet, task: AddPairs<P>) {
 /// A pair in either precision.
 trait Entry {
     fn j(&self) -> usize;
-    /// `g`, and 0.
+    /// The vector `g`, and 0.
     ///
     /// # Safety
-    /// The contract of `simd`.
+    /// The caller fulfils the contract of `simd`.
     unsafe fn g<I: Isa>(&self) -> I::Quad;
 }
 
@@ -62,7 +62,7 @@ impl Entry for Pair {
 
     #[inline(always)]
     unsafe fn g<I: Isa>(&self) -> I::Quad {
-        // SAFETY: the three numbers of `g` are followed by `j`, which is as large.
+        // SAFETY: `j`, which has the same size, follows the three numbers of `g`.
         unsafe { I::Quad::load_three_f32((&raw const *self).cast()) }
     }
 }
@@ -75,7 +75,7 @@ impl Entry for ExactPair {
 
     #[inline(always)]
     unsafe fn g<I: Isa>(&self) -> I::Quad {
-        // SAFETY: the three numbers of `g` are followed by `j`, which is as large.
+        // SAFETY: `j` follows the three numbers of `g`, and the size of the structure is that of four numbers.
         unsafe { I::Quad::load_three((&raw const *self).cast()) }
     }
 }
@@ -97,7 +97,7 @@ impl<P: Entry, const NOISE: bool> Kernel for WithNoise<'_, P, NOISE> {
     #[inline(always)]
     unsafe fn run<I: Isa>(self) {
         let AddPairs { start, pairs, xi, terms, p, sums } = self.0;
-        // SAFETY: vectors are loaded from and stored to arrays of four numbers.
+        // SAFETY: all loads and stores are at arrays of four numbers.
         unsafe {
             let minus_drag = I::Quad::splat(-terms.drag);
             for (i, ends) in start.windows(2).enumerate() {

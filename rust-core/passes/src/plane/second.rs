@@ -1,5 +1,5 @@
-//! The second pass over a plane: the many-body forces `−(∂ψ_i/∂n + ∂ψ_j/∂n) w′ ê` of the pairs that the first pass has
-//! listed.
+//! The second pass over a plane: the many-body forces `−(∂ψ_i/∂n + ∂ψ_j/∂n) w′ ê` of the pairs
+//! that the first pass has listed.
 
 use super::data::PassData;
 use super::second_cached::second_pass_cached;
@@ -9,7 +9,7 @@ use crate::pair_batch::in_range_pairs::{I_CODE_BITS, InRangePairs};
 use crate::pair_batch::scatter::add_quad;
 use crate::simd::{Isa, OFFSET_BITS, Quad, Scalar};
 
-/// Accumulators of each i-particle that take turns: four hide the latency of the add.
+/// Number of accumulators of each i-particle that are used in turn: four hide the latency of the addition.
 const TURNS: usize = 4;
 
 /// Sums over the pairs of up to sixteen i-particles. All are zero between batches.
@@ -17,20 +17,20 @@ const TURNS: usize = 4;
 struct ISums([[[f64; 4]; TURNS]; 16]);
 
 impl ISums {
-    /// The sum of i-particle `m` that is next at pair `p`.
+    /// The accumulator of i-particle `m` for pair `p`.
     ///
     /// # Safety
     /// `m` is below 16.
     #[inline(always)]
     unsafe fn at(&mut self, m: usize, p: usize) -> *mut f64 {
-        // SAFETY: inside the array.
+        // SAFETY: `m` is below 16, so that the address is inside the array.
         unsafe { self.0.as_mut_ptr().cast::<[f64; 4]>().add(TURNS * m + p % TURNS).cast() }
     }
 
-    /// The whole sum of i-particle `m`, which is zero then.
+    /// Returns the sum of i-particle `m`, and sets it to zero.
     ///
     /// # Safety
-    /// The contract of `simd`; `m` is below 16.
+    /// The caller fulfils the contract of `simd`; `m` is below 16.
     #[inline(always)]
     unsafe fn take<Q: Quad>(&mut self, m: usize) -> Q {
         // SAFETY: the loops over i-particles end at the members of a batch, at most sixteen.
@@ -50,8 +50,9 @@ impl ISums {
 /// Does the second pass over `plane`, and adds to the virial with `TALLY`.
 ///
 /// # Safety
-/// The contract of `simd`. [`first_pass`](super::first::first_pass) has filled `in_range` for the plane whose sums these are,
-/// with the same `TALLY`. The slopes of the plane and of the next one are there, and nobody writes them.
+/// The caller fulfils the contract of `simd`. [`first_pass`](super::first::first_pass) has filled
+/// `in_range` for the plane of these sums, with the same `TALLY`. The slopes of the plane and of the
+/// next one are complete, and no thread writes them.
 #[inline(always)]
 pub unsafe fn second_pass<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool>(
     data: &PassData<A::Scalar, A::PackedParticle>,
@@ -59,8 +60,8 @@ pub unsafe fn second_pass<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, co
     in_range: &InRangePairs<A::Scalar>,
     virial: &mut [f64; 6],
 ) {
-    // SAFETY: lists have `found` pairs of each density for each batch; codes tell particles of the plane and of the next
-    // one, which have accumulators, slopes and species; the caller upholds the rest.
+    // SAFETY: the first pass has listed `found` pairs of each density for each batch; codes name particles of the
+    // plane and of the next one, which have accumulators, slopes and species; the caller promises the rest.
     unsafe {
         if MULTISPECIES && data.inputs.caches_all_pairs() {
             return second_pass_cached::<I, A, MULTISPECIES, TALLY>(data, sums, &in_range.full_cache, virial);

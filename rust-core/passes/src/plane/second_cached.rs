@@ -17,7 +17,7 @@ use psidpd_model::kernel::Real;
 /// Does the second pass over `plane`, and adds to the virial with `TALLY`.
 ///
 /// # Safety
-/// As [`second_pass`](super::second::second_pass).
+/// The caller fulfils the contract of [`second_pass`](super::second::second_pass).
 #[inline(always)]
 pub unsafe fn second_pass_cached<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const TALLY: bool>(
     data: &PassData<A::Scalar, A::PackedParticle>,
@@ -25,8 +25,8 @@ pub unsafe fn second_pass_cached<I: Isa, A: Arithmetic<I>, const MULTISPECIES: b
     cache: &FullPairCache<A::Scalar>,
     virial: &mut [f64; 6],
 ) {
-    // SAFETY: work space has room for whole vectors of the largest batch, and a quad behind; the pairs are those that
-    // `append_to_cache` kept in this evaluation, slopes those that the scheduler has waited for.
+    // SAFETY: scratch arrays have room for whole vectors of the largest batch, and a quad more;
+    // `append_to_cache` stored the pairs in this evaluation, and the scheduler has waited for the slopes.
     unsafe {
         let to = sums.forces();
         let room = cache.most / 16 + 2;
@@ -74,33 +74,33 @@ struct CachedPairs<'a, T> {
 }
 
 impl<T> CachedPairs<'_, T> {
-    /// A field of the pairs.
+    /// The first element of a field of the batch.
     ///
     /// # Safety
     /// The cache has this field.
     #[inline(always)]
     unsafe fn field(&self, field: usize) -> *const T {
-        // SAFETY: the vectors of a batch are in every field.
+        // SAFETY: every field contains the vectors of a batch; the caller promises that the field exists.
         unsafe { self.cache.fields.get_unchecked(field).as_ptr().add(self.batch.vector).cast() }
     }
 
     #[inline(always)]
     fn j_offsets(&self) -> *const u32 {
-        // SAFETY: the vectors of a batch are in every field.
+        // SAFETY: `append_to_cache` has written the vectors of the batch to every field.
         unsafe { self.cache.j_offsets.as_ptr().add(self.batch.vector).cast() }
     }
 
     #[inline(always)]
     fn codes(&self) -> *const u32 {
-        // SAFETY: the vectors of a batch are in every field.
+        // SAFETY: `append_to_cache` has written the vectors of the batch to every field.
         unsafe { self.cache.codes.as_ptr().add(self.batch.vector).cast() }
     }
 }
 
-/// What a slope is multiplied by.
+/// The factor of a slope.
 #[derive(Clone, Copy)]
 struct SlopeFactor<T> {
-    /// `−w′/r` of its density.
+    /// Factor `−w′/r` of its density.
     weight_gradient: *const T,
     /// Tables over pairs of species: 1 where the i-particle, or the j-particle, is of the slope's species.
     is_species: [*const T; 2],
@@ -110,11 +110,12 @@ struct SlopeFactor<T> {
 #[repr(C, align(64))]
 struct ISlopes<T>([[T; 16]; SLOPES_PER_BLOCK]);
 
-/// Adds `Σ (∂ψ_i + ∂ψ_j) (−w′/r)` over up to `N` slopes from `first` on to the factors of pairs; sets them if `first` is zero.
-/// Each particle has a slope for the species of the other. With `N = 4` there are at most two species.
+/// Adds `Σ (∂ψ_i + ∂ψ_j) (−w′/r)` over up to `N` slopes, beginning with `first`, to the factors of
+/// pairs; sets them if `first` is zero. Each particle has a slope for the species of the other. With `N
+/// = 4` there are at most two species.
 ///
 /// # Safety
-/// As [`second_pass_cached`]; `factors` has room for the vectors of the batch.
+/// The caller fulfils the contract of [`second_pass_cached`]; `factors` has room for the vectors of the batch.
 #[inline(always)]
 unsafe fn find_factors<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const N: usize>(
     data: &PassData<A::Scalar, A::PackedParticle>,
@@ -122,8 +123,8 @@ unsafe fn find_factors<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const
     [first, variables]: [usize; 2],
     factors: *mut A::Scalar,
 ) {
-    // SAFETY: of the i-particles only slopes of those that there are are read, those of j-particles are of the plane or the
-    // next one; the caller upholds the rest.
+    // SAFETY: the loop reads slopes of existing i-particles only, and j-particles are of the plane or
+    // the next one; the caller promises the rest.
     unsafe {
         let zero = A::Reals::constant(0.0);
         let terms = data.inputs.terms;
@@ -139,7 +140,7 @@ unsafe fn find_factors<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const
         let mut c = 0;
         while c < N {
             own[c].store(i_slopes.0[c].as_mut_ptr());
-            // Behind the last slope, repeat it.
+            // The last slope is repeated to fill the block.
             let at = first + c.min(count - 1);
             let [is_i, is_j] = terms.is_species.get_unchecked(at % species);
             of[c].is_species = [is_i.as_ptr(), is_j.as_ptr()];
@@ -158,7 +159,7 @@ unsafe fn find_factors<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const
             };
             let mut factor = if first == 0 { zero } else { A::Reals::load(factors.add(k)) };
             if MULTISPECIES && N == 4 {
-                // Sum over the densities of each species first, then choose by species.
+                // The sum over the densities of each species is computed first, and then selected by species.
                 let (mut from_i, mut from_j) = ([zero; 2], [zero; 2]);
                 let mut c = 0;
                 while c < N {
@@ -205,7 +206,7 @@ unsafe fn find_factors<I: Isa, A: Arithmetic<I>, const MULTISPECIES: bool, const
 /// Writes quads of whole forces, and adds the virial of the many-body part.
 ///
 /// # Safety
-/// The contract of `simd`; `factors` and `quads` have room for the vectors of the batch.
+/// The caller fulfils the contract of `simd`; `factors` and `quads` have room for the vectors of the batch.
 #[inline(always)]
 unsafe fn whole_forces<R: Reals, const TALLY: bool>(
     pairs: &CachedPairs<R::Scalar>,
@@ -213,8 +214,8 @@ unsafe fn whole_forces<R: Reals, const TALLY: bool>(
     quads: *mut R::Scalar,
     virial: &mut [f64; 6],
 ) {
-    // SAFETY: a batch begins at a vector of its own in every field, and `quads` and `factors` are as long as the largest
-    // batch; with `TALLY` the last field is that of pair weights.
+    // SAFETY: a batch begins at a vector of its own in every field, and `quads` and `factors` are as
+    // long as the largest batch; with `TALLY` the last field contains pair weights.
     unsafe {
         let [x, y, z] = [0, 1, 2].map(|c| pairs.field(SEPARATION + c));
         let force = pairs.field(FORCE);

@@ -7,21 +7,21 @@ use crate::pair_search::clusters::SEARCH_GROUP;
 use crate::pair_search::find::FindPairs;
 use crate::simd::{Isa, run};
 
-/// What is done with the pairs of a plane.
+/// The work that a pass does with each batch of pairs.
 pub trait BatchVisitor<I: Isa> {
-    /// Takes members `slots[0]..slots[1]` of a search group; to be inlined always.
+    /// Evaluates members `slots[0]..slots[1]` of a search group; implementations must be inlined.
     ///
     /// # Safety
-    /// The contract of `simd`; the group has been found, and has these members.
+    /// The caller fulfils the contract of `simd`; the group has been found, and has these members.
     unsafe fn visit(&mut self, search: &SearchBuffers, slots: [usize; 2]);
 }
 
-/// Finds the pairs of the particles of `plane` with each other and with the next plane, and calls `visitor` for `lanes`
-/// i-particles after the other, in the order of cells; returns the number of search groups.
+/// Finds the pairs of the particles of `plane` with each other and with the next plane, and calls `visitor`
+/// for successive sets of `lanes` i-particles, in the order of cells; returns the number of search groups.
 ///
 /// # Safety
-/// The contract of `simd`. Particles of the plane, of the next one and the padding behind are filled, and nobody writes
-/// them.
+/// The caller fulfils the contract of `simd`. Particles of the plane, of the next one and the padding
+/// are filled, and no thread writes them.
 #[inline(always)]
 pub unsafe fn each_batch<I: Isa, V: BatchVisitor<I>>(
     cells: &SortedCells,
@@ -30,7 +30,8 @@ pub unsafe fn each_batch<I: Isa, V: BatchVisitor<I>>(
     buffers: &mut SearchBuffers,
     visitor: &mut V,
 ) -> u64 {
-    // SAFETY: columns are those of the grid, groups and batches those of a column; particles behind them are padding.
+    // SAFETY: columns are those of the grid, and groups and batches those of a column;
+    // `SortedParticles::make_room` pads the arrays.
     unsafe {
         let grid = cells.grid;
         let search = PlaneSearch::new(cells, plane);
@@ -46,7 +47,7 @@ pub unsafe fn each_batch<I: Isa, V: BatchVisitor<I>>(
             while first < end {
                 let count = SEARCH_GROUP.min(end - first);
                 groups += 1;
-                // A call: what finds pairs is the same in every pass on an instruction set.
+                // The search is a function call, as it is the same in every pass on an instruction set.
                 let find = FindPairs {
                     cells,
                     plane: &search,

@@ -1,4 +1,4 @@
-//! AVX2 with FMA and BMI2.
+//! Vectors for AVX2 with FMA and BMI2.
 
 use super::x86::{Quad4, operators};
 use super::{BroadcastPair, Isa, ORDINARY_F32, ORDINARY_F64, Reals, Words, record_at, wide_record_at};
@@ -7,30 +7,29 @@ use psidpd_model::kernel::Real;
 use std::arch::x86_64::*;
 use std::ops::{Add, Mul, Sub};
 
-/// The instruction set.
 #[derive(Clone, Copy)]
 pub struct Avx2;
 
-/// Eight `f32`.
+/// Vector of eight `f32`.
 #[derive(Clone, Copy)]
 pub struct F32x8(__m256);
 
-/// Four `f64`.
+/// Vector of four `f64`.
 #[derive(Clone, Copy)]
 pub struct F64x4(__m256d);
 
-/// Eight `u32`.
+/// Vector of eight `u32`.
 #[derive(Clone, Copy)]
 pub struct U32x8(pub(super) __m256i);
 
-/// Four `u32`.
+/// Vector of four `u32`.
 #[derive(Clone, Copy)]
 pub struct U32x4(__m128i);
 
 operators!(F32x8, _mm256_set1_ps as f32, _mm256_add_ps, _mm256_sub_ps, _mm256_mul_ps, _mm256_max_ps);
 operators!(F64x4, _mm256_set1_pd as f64, _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_max_pd);
 
-/// Lanes of eight words in the order that puts those of a mask first: entry `mask`, a byte for each.
+/// Permutations of eight words that put those of a mask first: entry `mask` has a byte for each word.
 static FIRST: [u64; 256] = first();
 
 const fn first() -> [u64; 256] {
@@ -56,7 +55,7 @@ unsafe fn order(mask: u32) -> __m256i {
     unsafe { _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(FIRST[(mask & 0xff) as usize] as i64)) }
 }
 
-/// As the words of pairs: each bit of four twice.
+/// A mask of words from one of pairs of words: each of four bits occurs twice.
 #[inline(always)]
 fn doubled(mask: u32) -> u32 {
     const DOUBLE: [u8; 16] = [0, 3, 12, 15, 48, 51, 60, 63, 192, 195, 204, 207, 240, 243, 252, 255];
@@ -96,7 +95,7 @@ impl Reals for F32x8 {
     #[inline(always)]
     unsafe fn inverse_root(self) -> Self {
         unsafe {
-            // 12 bits, then one step of third order.
+            // The estimate has 12 bits; one step of third order refines it.
             let y = _mm256_rsqrt_ps(self.0);
             let e = _mm256_fnmadd_ps(_mm256_mul_ps(self.0, y), y, _mm256_set1_ps(1.0));
             let c = _mm256_fmadd_ps(e, _mm256_set1_ps(0.375), _mm256_set1_ps(0.5));
@@ -143,7 +142,7 @@ impl Reals for F32x8 {
             let ab_high = _mm256_castps_pd(_mm256_unpackhi_ps(a.0, b.0));
             let cd_low = _mm256_castps_pd(_mm256_unpacklo_ps(c.0, d.0));
             let cd_high = _mm256_castps_pd(_mm256_unpackhi_ps(c.0, d.0));
-            // Rows k and k + 4 in the halves.
+            // The halves contain rows k and k + 4.
             let r0 = _mm256_unpacklo_pd(ab_low, cd_low);
             let r1 = _mm256_unpackhi_pd(ab_low, cd_low);
             let r2 = _mm256_unpacklo_pd(ab_high, cd_high);
@@ -157,13 +156,13 @@ impl Reals for F32x8 {
     }
 }
 
-/// The first four lanes in the place of the others.
+/// Copies the first four lanes to all fours.
 #[inline(always)]
 unsafe fn other_four(x: __m256) -> __m256 {
     unsafe { _mm256_permute2f128_ps::<0x01>(x, x) }
 }
 
-/// Four columns of eight rows of four words.
+/// Loads four columns of eight rows of four words.
 #[inline(always)]
 unsafe fn transpose_words(low: [__m128i; 4], high: [__m128i; 4]) -> [U32x8; 4] {
     unsafe {
@@ -267,7 +266,7 @@ impl Reals for F64x4 {
     #[inline(always)]
     unsafe fn pick(table: *const f64, which: U32x4) -> Self {
         unsafe {
-            // Words 2k and 2k + 1.
+            // The indices of words 2k and 2k + 1.
             let even = _mm256_slli_epi64::<1>(_mm256_cvtepu32_epi64(which.0));
             let words = _mm256_or_si256(even, _mm256_slli_epi64::<32>(even));
             let words = _mm256_or_si256(words, _mm256_set1_epi64x(1 << 32));
@@ -465,7 +464,7 @@ impl Isa for Avx2 {
             while k < 4 {
                 let distance_masks = _mm256_cmpgt_epi16(limit, sums[k]);
                 let next = _mm256_cmpgt_epi16(limit, sums[k + 1]);
-                // Halves of both follow each other; then those of one.
+                // The halves of both masks are joined first, then those of each mask.
                 let bytes =
                     _mm256_permute4x64_epi64::<0b11_01_10_00>(_mm256_packs_epi16(distance_masks, next));
                 mask |= (_mm256_movemask_epi8(bytes) as u32 as u64) << (16 * k);
@@ -481,7 +480,7 @@ impl Isa for Avx2 {
     #[inline(always)]
     unsafe fn transpose_masks(masks: *mut u64) {
         unsafe {
-            // In halves, words 0 of both masks, words 1, …; then those of both halves together.
+            // The words are interleaved in halves, words 0 of both masks, words 1, …; then the halves are joined.
             let words = _mm256_setr_epi8(
                 0, 1, 8, 9, 2, 3, 10, 11, 4, 5, 12, 13, 6, 7, 14, 15, 0, 1, 8, 9, 2, 3, 10, 11, 4, 5, 12, 13,
                 6, 7, 14, 15,
@@ -518,7 +517,7 @@ impl Isa for Avx2 {
     #[inline(always)]
     unsafe fn root_or_more(x: F32x8) -> F32x8 {
         unsafe {
-            // Better than one part in 2700.
+            // The relative error of the estimate is below 1/2700.
             let inverse = _mm256_rsqrt_ps(_mm256_max_ps(x.0, _mm256_set1_ps(f32::MIN_POSITIVE)));
             let x = _mm256_max_ps(x.0, _mm256_setzero_ps());
             F32x8(_mm256_mul_ps(x, _mm256_mul_ps(inverse, _mm256_set1_ps(1.000_5))))

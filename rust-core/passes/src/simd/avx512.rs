@@ -1,4 +1,4 @@
-//! AVX-512 (F, BW, DQ, VL), with VBMI2 or without; with AVX2, FMA and BMI2.
+//! Vectors for AVX-512 (F, BW, DQ, VL), with or without VBMI2; with AVX2, FMA and BMI2.
 
 use super::avx2::U32x8;
 use super::x86::{Quad4, operators};
@@ -9,19 +9,19 @@ use psidpd_model::kernel::Real;
 use std::arch::x86_64::*;
 use std::ops::{Add, Mul, Sub};
 
-/// The instruction set; `VBMI2` compresses bytes.
+/// The instruction set; with `VBMI2` it compresses bytes.
 #[derive(Clone, Copy)]
 pub struct Avx512<const VBMI2: bool>;
 
-/// Sixteen `f32`.
+/// Vector of sixteen `f32`.
 #[derive(Clone, Copy)]
 pub struct F32x16(__m512);
 
-/// Eight `f64`.
+/// Vector of eight `f64`.
 #[derive(Clone, Copy)]
 pub struct F64x8(__m512d);
 
-/// Sixteen `u32`.
+/// Vector of sixteen `u32`.
 #[derive(Clone, Copy)]
 pub struct U32x16(__m512i);
 
@@ -61,7 +61,7 @@ impl Reals for F32x16 {
     #[inline(always)]
     unsafe fn inverse_root(self) -> Self {
         unsafe {
-            // 14 bits, then one step of Newton's.
+            // The estimate has 14 bits; one step of Newton's method refines it.
             let y = _mm512_rsqrt14_ps(self.0);
             let half = _mm512_mul_ps(_mm512_set1_ps(-0.5), self.0);
             let yy = _mm512_mul_ps(y, y);
@@ -109,7 +109,7 @@ impl Reals for F32x16 {
             let ab_high = _mm512_castps_pd(_mm512_unpackhi_ps(a.0, b.0));
             let cd_low = _mm512_castps_pd(_mm512_unpacklo_ps(c.0, d.0));
             let cd_high = _mm512_castps_pd(_mm512_unpackhi_ps(c.0, d.0));
-            // Row k, k + 4, k + 8, k + 12 in the four quarters.
+            // The four quarters contain rows k, k + 4, k + 8 and k + 12.
             let r0 = _mm512_castpd_ps(_mm512_unpacklo_pd(ab_low, cd_low));
             let r1 = _mm512_castpd_ps(_mm512_unpackhi_pd(ab_low, cd_low));
             let r2 = _mm512_castpd_ps(_mm512_unpacklo_pd(ab_high, cd_high));
@@ -126,7 +126,7 @@ impl Reals for F32x16 {
     }
 }
 
-/// Sixteen bytes of the rows `offsets` bytes behind `base`.
+/// Loads sixteen bytes at each of the rows, `offsets` bytes after `base`.
 #[inline(always)]
 unsafe fn row(base: *const u8, offsets: *const u32, k: usize) -> [__m128i; 2] {
     unsafe {
@@ -135,7 +135,7 @@ unsafe fn row(base: *const u8, offsets: *const u32, k: usize) -> [__m128i; 2] {
     }
 }
 
-/// Four by four words, transposed within quarters.
+/// Transposes four by four words within quarters.
 #[inline(always)]
 unsafe fn transposed(v: [__m512i; 4]) -> [U32x16; 4] {
     unsafe {
@@ -187,7 +187,7 @@ impl Reals for F64x8 {
     #[inline(always)]
     unsafe fn inverse_root(self) -> Self {
         unsafe {
-            // 14, 28, 53 bits.
+            // The precision grows from 14 to 28 and 53 bits.
             let half = _mm512_mul_pd(_mm512_set1_pd(-0.5), self.0);
             let mut y = _mm512_rsqrt14_pd(self.0);
             let mut k = 0;
@@ -239,7 +239,8 @@ impl Reals for F64x8 {
             let ab_high = _mm512_unpackhi_pd(a.0, b.0);
             let cd_low = _mm512_unpacklo_pd(c.0, d.0);
             let cd_high = _mm512_unpackhi_pd(c.0, d.0);
-            // Lanes 0,2,4,6 of the columns are in the quarters of the low ones, 1,3,5,7 in the high.
+            // The quarters of the low vectors contain lanes 0,2,4,6 of the columns, those of
+            // the high vectors lanes 1,3,5,7.
             let first = _mm512_setr_epi64(0, 1, 8, 9, 2, 3, 10, 11);
             let second = _mm512_setr_epi64(4, 5, 12, 13, 6, 7, 14, 15);
             let even01 = _mm512_permutex2var_pd(ab_low, first, cd_low);
@@ -319,11 +320,11 @@ impl Words for U32x16 {
     }
 }
 
-/// Four numbers of the rows twice `offsets` bytes behind `base`.
+/// Loads four numbers of each row, twice `offsets` bytes after `base`.
 #[inline(always)]
 unsafe fn four_columns(base: *const u8, offsets: *const u32) -> [F64x8; 4] {
     unsafe {
-        // Rows k and k + 4 in the halves.
+        // The halves contain rows k and k + 4.
         let mut v = [_mm512_setzero_pd(); 4];
         let mut k = 0;
         while k < 4 {
@@ -333,7 +334,7 @@ unsafe fn four_columns(base: *const u8, offsets: *const u32) -> [F64x8; 4] {
             v[k] = _mm512_insertf64x4::<1>(half, _mm256_loadu_pd(high));
             k += 1;
         }
-        // (0,2) of rows 0,1; (1,3) …
+        // The vectors are (0,2) of rows 0,1; (1,3) …
         let a = _mm512_unpacklo_pd(v[0], v[1]);
         let b = _mm512_unpackhi_pd(v[0], v[1]);
         let c = _mm512_unpacklo_pd(v[2], v[3]);
@@ -349,18 +350,18 @@ unsafe fn four_columns(base: *const u8, offsets: *const u32) -> [F64x8; 4] {
     }
 }
 
-/// Sixty-four bytes, aligned.
+/// An array aligned to sixty-four bytes.
 #[repr(C, align(64))]
 struct Line<T>(T);
 
-/// Where the words of sixteen bits of turned masks come from.
+/// Source indices of the sixteen-bit words of transposed masks.
 static TURNED: Line<[u16; 32]> = Line(turned());
 
 const fn turned() -> [u16; 32] {
     let mut from = [0; 32];
     let mut k = 0;
     while k < 32 {
-        // Half, particle, j-cluster.
+        // Indices of the half, the particle and the j-cluster.
         let (h, p, c) = (k / 16, k / 4 % 4, k % 4);
         from[k] = (16 * h + 4 * c + p) as u16;
         k += 1;
@@ -368,7 +369,7 @@ const fn turned() -> [u16; 32] {
     from
 }
 
-/// For each bit of a mask of sixty-four: four times its number in its sixteen, and of which sixteen it is.
+/// For each bit of a mask of sixty-four: four times its number within its sixteen, plus the number of the sixteen.
 static PLACES: Line<[u8; 64]> = Line(bit_places());
 
 const fn bit_places() -> [u8; 64] {
@@ -381,32 +382,32 @@ const fn bit_places() -> [u8; 64] {
     places
 }
 
-/// The first four lanes in the place of the second, and so on.
+/// Copies the first four lanes of each eight to the second four.
 #[inline(always)]
 unsafe fn other_fours(x: __m512) -> __m512 {
     unsafe { _mm512_shuffle_f32x4::<0b10_11_00_01>(x, x) }
 }
 
-/// Writes the places of sixteen bits.
+/// Writes the offsets of sixteen bits.
 #[inline(always)]
 unsafe fn places(j_bases: __m512, bits: __m128i, p: *mut u32) {
     unsafe {
         let code = _mm512_cvtepu8_epi32(bits);
-        // Only the lowest two bits of each word choose.
+        // Only the lowest two bits of each word select.
         let base = _mm512_castps_si512(_mm512_permutevar_ps(j_bases, code));
         let place = _mm512_slli_epi32::<3>(_mm512_and_si512(code, _mm512_set1_epi32(0x3c)));
         let sum = _mm512_add_epi32(base, place);
-        // Halves: a whole store that straddles lines takes more than twice as long.
+        // The vector is stored in halves: a whole store across cache lines takes more than twice as long.
         _mm256_storeu_si256(p.cast(), _mm512_castsi512_si256(sum));
         _mm256_storeu_si256(p.add(8).cast(), _mm512_extracti64x4_epi64::<1>(sum));
     }
 }
 
-/// [`Isa::expand_mask`] of all sixty-four bits at once.
+/// Expands as [`Isa::expand_mask`], all sixty-four bits at once.
 #[inline(always)]
 unsafe fn expand_bytes(j_bases: *const u32, mask: u64, p: *mut u32) -> usize {
     unsafe {
-        // Bytes, in which the number of the base is below the bit's in its sixteen.
+        // In each byte the number of the base is in the bits below the bit's number within its sixteen.
         let packed = _mm512_maskz_compress_epi8(mask, _mm512_load_si512((&raw const PLACES).cast()));
         let j_bases = _mm512_castsi512_ps(_mm512_broadcast_i32x4(_mm_loadu_si128(j_bases.cast())));
         let count = mask.count_ones() as usize;
@@ -435,7 +436,7 @@ const fn offsets() -> [u32; 16] {
     offsets
 }
 
-/// [`Isa::expand_mask`] of sixteen bits after sixteen.
+/// Expands as [`Isa::expand_mask`], sixteen bits at a time.
 #[inline(always)]
 unsafe fn expand_words(j_bases: *const u32, mask: u64, p: *mut u32) -> usize {
     unsafe {
@@ -507,7 +508,7 @@ impl<const VBMI2: bool> Isa for Avx512<VBMI2> {
     #[inline(always)]
     unsafe fn root_or_more(x: F32x16) -> F32x16 {
         unsafe {
-            // 14 bits.
+            // The estimate has 14 bits.
             let inverse = _mm512_rsqrt14_ps(_mm512_max_ps(x.0, _mm512_set1_ps(f32::MIN_POSITIVE)));
             let x = _mm512_max_ps(x.0, _mm512_setzero_ps());
             F32x16(_mm512_mul_ps(x, _mm512_mul_ps(inverse, _mm512_set1_ps(1.000_1))))
@@ -539,11 +540,12 @@ impl<const VBMI2: bool> Isa for Avx512<VBMI2> {
     #[inline(always)]
     unsafe fn load_transposed<const ALL: bool>(base: *const u8, offsets: *const u32) -> [U32x16; 8] {
         unsafe {
-            // Rows k, k + 4, k + 8, k + 12 go to the quarters of vector k.
+            // The quarters of vector k receive rows k, k + 4, k + 8 and k + 12.
             let (mut v, mut w) = ([_mm512_setzero_si512(); 4], [_mm512_setzero_si512(); 4]);
             let mut k = 0;
             while k < 4 {
-                // Broadcasts from memory that write a quarter each: loads, unlike insertions, are no shuffles.
+                // Masked broadcasts from memory write a quarter each: they are loads, while
+                // insertions need the shuffle port.
                 let [low, high] = row(base, offsets, k);
                 let (low, high) = (_mm512_castsi128_si512(low), _mm512_castsi128_si512(high));
                 let [a, b] = row(base, offsets, k + 4);

@@ -1,17 +1,17 @@
-//! Plain arrays, which the compiler vectorises for whatever the target has.
+//! Vectors as plain arrays, which the compiler vectorises for the target's instructions.
 
 use super::{BroadcastPair, Isa, ORDINARY_F32, ORDINARY_F64, Quad, Reals, Words, record_at, wide_record_at};
 use crate::simd::OFFSET_BITS;
 use psidpd_model::kernel::Real;
 use std::ops::{Add, Mul, Sub};
 
-/// No instruction set in particular.
+/// The instructions of the compiler's target.
 #[derive(Clone, Copy)]
 pub struct Portable;
 
 const LANES: usize = 8;
 
-/// Eight numbers.
+/// Vector of eight numbers.
 #[derive(Clone, Copy)]
 pub struct Lanes<T>([T; LANES]);
 
@@ -111,14 +111,14 @@ macro_rules! lanes {
             #[inline(always)]
             unsafe fn store_whole(self, p: *mut i32) {
                 for k in 0..LANES {
-                    // SAFETY: the trait asks for numbers in range.
+                    // SAFETY: the caller of `store_whole` promises numbers that fit into an `i32`.
                     unsafe { *p.add(k) = self.0[k].to_int_unchecked() };
                 }
             }
             #[inline(always)]
             unsafe fn round(mut self) -> Self {
                 for k in 0..LANES {
-                    // Adding what has no room for a fraction rounds, without a call.
+                    // Adding a number without room for a fraction rounds, without a function call.
                     const ROOM: $scalar = 1.5 / <$scalar>::EPSILON;
                     self.0[k] = (self.0[k] + ROOM) - ROOM;
                 }
@@ -171,7 +171,7 @@ macro_rules! lanes {
             unsafe fn store_rows(columns: [Self; 4], mask: u32, p: *mut $scalar) {
                 let mut place = 0;
                 for k in 0..LANES {
-                    // A row at once: as vectors they need not go through memory number by number.
+                    // A row is loaded at once: as a vector it does not pass through memory number by number.
                     unsafe {
                         p.add(4 * place).cast::<[$scalar; 4]>().write(columns.map(|column| column.0[k]))
                     };
@@ -276,7 +276,7 @@ impl Words for Lanes<u32> {
     }
 }
 
-/// Four numbers.
+/// Vector of four numbers.
 #[derive(Clone, Copy)]
 pub struct Four([f64; 4]);
 
@@ -340,15 +340,15 @@ impl Quad for Four {
     }
 }
 
-/// Distances of sixteen particles to a point; bits where their squares are below the limit.
+/// Compares distances of sixteen particles to a point; a bit is set where the square is below the limit.
 #[inline(always)]
 fn below(there: &[[u16; 16]; 3], two: &BroadcastPair, which: usize, limit: i16) -> u32 {
-    /// Aligned as what they are read as.
+    /// An array aligned for reads of eight bytes.
     #[repr(align(16))]
     struct Flags([u8; 16]);
     let mut near = Flags([0; 16]);
     for k in 0..16 {
-        // The squares of all three coordinates have room in 16 bits without a sign.
+        // The sum of three squares fits into 16 bits without a sign.
         let mut sum = 0;
         for c in 0..3 {
             let d = two.0[c][16 * which + k].wrapping_sub(there[c][k]) as i16;
@@ -356,11 +356,11 @@ fn below(there: &[[u16; 16]; 3], two: &BroadcastPair, which: usize, limit: i16) 
         }
         near.0[k] = (sum < limit as u16) as u8;
     }
-    // Read as volatile: the compiler else makes each bit by itself, and no vector.
+    // The read is volatile: otherwise the compiler computes each bit by itself, without vectors.
     let eights = (&raw const near).cast::<u64>();
-    // SAFETY: sixteen bytes.
+    // SAFETY: `near` has sixteen bytes, aligned for words of eight.
     let eights = [unsafe { eights.read_volatile() }, unsafe { eights.add(1).read_volatile() }];
-    // A multiplication moves eight flags, each 0 or 1, together.
+    // A multiplication gathers eight flags, each 0 or 1.
     let bits = eights.map(|flags| (u64::from_le(flags).wrapping_mul(0x0102_0408_1020_4080) >> 56) as u32);
     bits[0] | bits[1] << 8
 }
@@ -463,7 +463,7 @@ impl Isa for Portable {
     }
 }
 
-/// Each `CLUSTER` lanes folded, in all of them.
+/// Folds each `CLUSTER` lanes, and copies the result to all of them.
 #[inline(always)]
 fn of_each<const CLUSTER: usize>(x: Lanes<f32>, fold: impl Fn(f32, f32) -> f32 + Copy) -> Lanes<f32> {
     let mut out = x.0;

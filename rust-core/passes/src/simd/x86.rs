@@ -1,9 +1,9 @@
-//! What both instruction sets of x86-64 share.
+//! Vectors and operators that both instruction sets of x86-64 share.
 
 use super::Quad;
 use std::arch::x86_64::*;
 
-/// Four `f64`: an accumulator.
+/// Four `f64`, the sums of a particle.
 #[derive(Clone, Copy)]
 pub struct Quad4(__m256d);
 
@@ -57,8 +57,7 @@ impl Quad for Quad4 {
     }
 }
 
-/// Operators, from intrinsics. They are safe functions because operators are; see the contract of the
-/// module above.
+/// Defines operators by intrinsics. They are safe functions because operators are; the module above states the contract.
 macro_rules! operators {
     ($vector:ident, $constant:ident as $scalar:ty, $add:ident, $sub:ident, $mul:ident, $max:ident) => {
         impl Add for $vector {

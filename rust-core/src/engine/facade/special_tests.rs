@@ -1,4 +1,4 @@
-//! Pairs that do not act at their full strength, by every path, against a list of all pairs with a factor each.
+//! Compares pairs with reduced strength, on every path, with a list of all pairs and their factors.
 
 use super::tests::*;
 use super::*;
@@ -50,7 +50,7 @@ fn special_pairs_act_as_listed_pairs_with_factors() {
         }
         let listed = Surroundings::Listed(PairsOfHost { i: &i, j: &j, factor: &scale }, Newton::Off);
         let expected = with_ghosts(&mut engine(&fluid), listed, &all, &images, want);
-        // They do matter.
+        // The special pairs change the result.
         let plain = in_box(&mut engine(&fluid), &cloud, want);
         assert!((plain.0.energy() / expected.0.energy() - 1.0).abs() > 1e-3);
 
@@ -91,7 +91,7 @@ fn special_pairs_act_as_listed_pairs_with_factors() {
     }
 }
 
-/// What single precision leaves of a pair that is taken away is not more than its error in any other pair.
+/// Subtracting a pair in single precision leaves an error no larger than that of any other pair.
 #[test]
 fn special_pairs_in_mixed_precision() {
     for fluid in [warren(), two_densities(), two_passes()] {
@@ -151,12 +151,12 @@ fn special_pairs_that_make_no_sense_are_refused() {
     assert!(engine.forces(&narrow.domain, &narrow.request(Want::FORCES), &mut force, false).is_err());
     let listed = Surroundings::Listed(PairsOfHost { i: &[], j: &[], factor: &[] }, Newton::On);
     assert!(engine.first(listed, &cloud.request(Want::FORCES)).is_err());
-    // Those that are ordinary are no special ones.
+    // A special pair with a factor of 1 is an ordinary pair.
     engine.set_special_pairs([SpecialPair { i: 7, j: 300, factor: 1.0 }]);
     assert!(engine.forces(&cloud.domain, &cloud.request(Want::FORCES), &mut force, false).is_ok());
 }
 
-/// Marks of kinds that do not meet, of molecules without pairs of their own, and of molecules that do not see each other.
+/// Marks of types that exclude each other, of molecules without internal pairs, and of molecules that exclude each other.
 #[test]
 fn marked_particles_act_as_those_of_a_list_without_their_pairs() {
     let want = Want { densities: true, ..Want::TOTALS };

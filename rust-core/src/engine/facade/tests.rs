@@ -1,17 +1,17 @@
-//! Which path evaluations take, and that all give the same numbers.
+//! Tests the choice of the path, and that all paths give the same results.
 
 use super::*;
 use crate::engine::{Images, Newton, PairsOfHost, Precision};
 use crate::model::{ForceLaw, Model, WarrenPair, warren_ab};
 use psidpd_passes::noise::threefry2x32;
 
-/// ψ is not linear in its only density.
+/// A fluid whose ψ is not linear in its only density.
 pub(super) fn warren() -> Fluid {
     let pair = Some(WarrenPair { a: -40.0, b: 25.0, gamma: 18.0, rc: 1.0, rd: 0.75 });
     warren_ab(&["F".into()], &[pair], 3, ForceLaw::Conservative).unwrap().at(1.0).unwrap()
 }
 
-/// ψ is linear in m, which needs no pass.
+/// A fluid whose ψ is linear in m, which needs no pass.
 pub(super) fn two_densities() -> Fluid {
     let text = "title = \"two\"\nspecies = [\"A\", \"B\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 0.75\n\
         [density.m]\nkernel = \"lucy\"\nrange = 1.0\nself = true\n[excess_free_energy]\nA = \"n^2 + m_B\"\n\
@@ -19,7 +19,7 @@ pub(super) fn two_densities() -> Fluid {
     Model::parse("two", text).unwrap().at(1.0).unwrap()
 }
 
-/// Forces need both densities, one with a self term.
+/// A fluid whose forces need both densities, one with a self term.
 pub(super) fn two_passes() -> Fluid {
     let text = "title = \"two\"\nspecies = [\"A\"]\n[density.n]\nkernel = \"quadratic\"\nrange = 0.75\n\
         [density.m]\nkernel = \"lucy\"\nrange = 1.0\nself = true\n[excess_free_energy]\nA = \"n^2 + m^2\"\n";
@@ -54,7 +54,7 @@ impl Cloud {
         Request { particles, v: &self.v, step: Some(STEP), want }
     }
 
-    /// With images along `along` as ghosts, and where these are.
+    /// Adds images along `along` as ghosts; returns the owners of the ghosts too.
     pub(super) fn with_ghosts(&self, along: [bool; 3]) -> (Cloud, Images) {
         let lengths = self.domain.lengths();
         let domain = PeriodicBox::orthogonal(self.domain.origin(), lengths, along).unwrap();
@@ -86,7 +86,7 @@ pub(super) fn in_box(engine: &mut Engine, cloud: &Cloud, want: Want) -> Outcome 
     (tally, force, engine.local_densities().to_vec())
 }
 
-/// Both halves, with slopes to ghosts and, if they get any, forces home.
+/// Runs both halves; copies slopes to ghosts and, if ghosts get forces, returns these to the owners.
 pub(super) fn with_ghosts(
     engine: &mut Engine,
     surroundings: Surroundings,
@@ -122,7 +122,7 @@ pub(super) fn agree(a: &Outcome, b: &Outcome) {
     a.2.iter().zip(&b.2).for_each(|(a, b)| close(*a, *b, "density"));
 }
 
-/// What one evaluation asks for is no concern of the next.
+/// The request of one evaluation does not affect the next.
 #[test]
 fn every_evaluation_chooses_anew() {
     let totals = Want::TOTALS;
@@ -188,7 +188,7 @@ fn energies_and_virials_of_particles_add_up() {
     }
 }
 
-/// Ghosts, images along closed directions among them or not, in boxes that a sweep fits in or not, and listed pairs.
+/// Tests ghosts with and without images along closed directions, in boxes that do and do not fit a sweep, and listed pairs.
 #[test]
 fn all_surroundings_give_the_same_forces() {
     for fluid in [warren(), two_densities(), two_passes()] {
@@ -231,7 +231,7 @@ fn all_surroundings_give_the_same_forces() {
                         &with_ghosts(&mut engine, surroundings, &along_z, &images_along_z, want),
                         &expected,
                     );
-                    // Half of the pairs with ghosts are not needed if forces on ghosts go home, but do no harm.
+                    // If forces on ghosts return to their owners half of the pairs with ghosts are redundant, but harmless.
                     let (i, j): (Vec<i32>, Vec<i32>) = (0..cloud.x.len() as i32)
                         .flat_map(|i| (i + 1..all.x.len() as i32).map(move |j| (i, j)))
                         .unzip();
@@ -244,7 +244,7 @@ fn all_surroundings_give_the_same_forces() {
     }
 }
 
-/// Densities that nobody wanted beforehand are there when somebody asks, and change nothing.
+/// Densities that the request did not include can be computed afterwards, and change nothing.
 #[test]
 fn densities_can_be_asked_for_afterwards() {
     for fluid in [warren(), two_densities(), two_passes()] {
@@ -269,7 +269,7 @@ fn densities_can_be_asked_for_afterwards() {
     }
 }
 
-/// The way of notebooks: no tags, no velocities, positions anywhere.
+/// A notebook passes no tags and no velocities, and positions outside the box.
 #[test]
 fn a_configuration_is_evaluated_at_a_stroke() {
     let fluid = two_densities();

@@ -1,16 +1,16 @@
-//! Particles in cells, kept while they move one by one.
+//! Particles sorted into cells, for particles that move one by one.
 
 use crate::engine::vectors::{self, Loop};
 use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::instruction_set::InstructionSet;
 
-/// Particles of a block.
+/// Number of particles in a block.
 const LANES: usize = 8;
 
-/// Cells per particle, at most: empty ones cost time too.
+/// Most cells per particle: empty cells cost time too.
 const MOST_PER_PARTICLE: f64 = 4.0;
 
-/// Particles of a cell; the coordinates of places that are not taken are infinite.
+/// Particles of a cell; unused places have infinite coordinates.
 #[derive(Debug, Clone, Copy)]
 struct Block {
     x: [[f64; LANES]; 3],
@@ -26,7 +26,7 @@ impl Block {
     }
 }
 
-/// Cells no narrower than the range; along open directions the outer ones have no end.
+/// Cells at least as wide as the range; along open directions the outer cells extend to infinity.
 #[derive(Debug, Clone)]
 pub struct Cells {
     domain: PeriodicBox,
@@ -34,26 +34,26 @@ pub struct Cells {
     periodic: [bool; 3],
     dimensions: usize,
     range: f64,
-    /// Cells in each direction.
+    /// Number of cells in each direction.
     count: [i32; 3],
-    /// How many cells away another may be that is in range.
+    /// Largest distance, in cells, of another cell within range.
     reach: [i32; 3],
     cells: Vec<Vec<Block>>,
-    /// Particles in each cell.
+    /// Number of particles in each cell.
     filled: Vec<u32>,
-    /// The cell of each particle, and its place there.
+    /// Cell of each particle, and its place in the cell.
     place: Vec<[u32; 2]>,
 }
 
 /// Particles within the range of one of two points.
 #[derive(Debug, Clone, Default)]
 pub struct Near {
-    /// How many.
+    /// Number of particles found.
     pub count: usize,
     pub id: Vec<u32>,
-    /// Their distances from the first point, then from the second; first their squares.
+    /// Distances from the first point and from the second; until the roots are taken, their squares.
     pub r: [Vec<f64>; 2],
-    /// Whether a particle may be there more than once.
+    /// Whether a particle may be listed more than once.
     pub repeats: bool,
 }
 
@@ -61,7 +61,7 @@ impl Cells {
     pub fn new(domain: &PeriodicBox, dimensions: usize, range: f64, particles: usize) -> Cells {
         let heights = [0, 1, 2].map(|k| domain.height(k));
         let most = MOST_PER_PARTICLE * particles as f64 + 64.0;
-        // Of a cell as wide as the range, to rounding, the next but one is out of it.
+        // If a cell is as wide as the range, to rounding, the next cell but one is out of range.
         const ROUNDING: f64 = 1e-12;
         let counts = |width: f64| {
             let count = |k: usize| match k < dimensions {
@@ -95,12 +95,11 @@ impl Cells {
         }
     }
 
-    /// The box.
     pub fn domain(&self) -> &PeriodicBox {
         &self.domain
     }
 
-    /// Puts particles at `x`, which are inside along periodic directions, into their cells.
+    /// Sorts particles at `x`, which are inside along periodic directions, into cells.
     pub fn fill(&mut self, x: &[[f64; 3]]) {
         self.filled.fill(0);
         self.cells.iter_mut().for_each(Vec::clear);
@@ -119,7 +118,7 @@ impl Cells {
             let x = self.flat(x);
             return self.cells[to][place as usize / LANES].put(place as usize % LANES, id as u32, x);
         }
-        // The last one takes its place.
+        // The last particle fills the place of the moved one.
         let blocks = &mut self.cells[from as usize];
         self.filled[from as usize] -= 1;
         let (place, last) = (place as usize, self.filled[from as usize] as usize);
@@ -143,12 +142,12 @@ impl Cells {
         self.place[id as usize] = [cell as u32, place as u32];
     }
 
-    /// Without the coordinate that does not count.
+    /// The point without the coordinate that a two-dimensional fluid ignores.
     fn flat(&self, x: [f64; 3]) -> [f64; 3] {
         if self.dimensions == 2 { [x[0], x[1], 0.0] } else { x }
     }
 
-    /// The cell of a point in each direction; outside the box along a periodic direction it is that of an image.
+    /// The cell of a point in each direction; a point outside the box along a periodic direction has that of an image.
     fn coordinates(&self, x: [f64; 3]) -> [i32; 3] {
         let s = self.domain.fraction(x);
         [0, 1, 2].map(|k| {
@@ -164,8 +163,8 @@ impl Cells {
         c[0] + nx * (c[1] + ny * c[2])
     }
 
-    /// Finds the particles within the range of `from`, which is inside along periodic directions, or of `to`, which may
-    /// be anywhere; but not the particle `but`.
+    /// Finds the particles within the range of `from`, which is inside along periodic directions, or of
+    /// `to`, which may be outside; leaves out the particle `but`.
     pub fn near(&self, set: InstructionSet, [from, to]: [[f64; 3]; 2], but: usize, near: &mut Near) {
         let (a, b) = (self.coordinates(from), self.coordinates(to));
         let mut ends = [[0; 2]; 3];
@@ -182,7 +181,7 @@ impl Cells {
     }
 }
 
-/// All blocks of a range of cells.
+/// Searches all blocks of a range of cells.
 struct Search<'a> {
     cells: &'a Cells,
     points: [[f64; 3]; 2],
@@ -217,7 +216,7 @@ impl Loop for Search<'_> {
     }
 }
 
-/// The cell that is the image of another, and how many boxes away it is.
+/// The cell in the box of which `cell` is an image, and the number of boxes between the two.
 #[inline(always)]
 fn inside(mut cell: i32, count: i32) -> (usize, f64) {
     let mut boxes = 0;
@@ -230,7 +229,7 @@ fn inside(mut cell: i32, count: i32) -> (usize, f64) {
     (cell as usize, f64::from(boxes))
 }
 
-/// Points as seen from an image: instead of the particles there they are moved, and the other way.
+/// Moves the points instead of the particles of an image, by the opposite shift.
 #[inline(always)]
 fn moved(mut points: [[f64; 3]; 2], edge: &[f64; 3], boxes: f64) -> [[f64; 3]; 2] {
     if boxes != 0.0 {

@@ -1,11 +1,11 @@
-//! How the energy of a configuration changes where one particle moves: what Metropolis Monte Carlo needs.
+//! The change of a configuration's energy when one particle moves, for Metropolis Monte Carlo.
 //!
 //! ```text
 //! U = Σ_i ψ_c(i)(ñ_i) + Σ_{i<j} φ(r_ij)
 //! ```
 //!
-//! A particle that moves changes the densities of its neighbours at the old place and at the new one, and the distances
-//! to them. Their ψ is evaluated anew, and nothing else.
+//! A particle that moves changes the densities of its neighbours at the old and the new position, and
+//! the distances to them. Only their ψ is evaluated again.
 
 mod cells;
 
@@ -22,13 +22,13 @@ use cells::{Cells, Near};
 use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::instruction_set::InstructionSet;
 
-/// Particles whose ψ is evaluated together where all are.
+/// Number of particles in an evaluation of all ψ.
 const LANES: usize = 128;
 
-/// Why a fluid has no such energy.
+/// Reasons why a fluid has no such energy.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum NoEnergy {
-    /// Forces without a potential.
+    /// The forces have no potential.
     #[error(
         "the forces of the model are no gradient of an energy: {0}; moves that are accepted by their energy need a psi, \
          and force kernels that are those of the densities"
@@ -39,7 +39,8 @@ pub enum NoEnergy {
     TooLarge(#[from] TooLarge),
 }
 
-/// The energy of one fluid in a box, as a function of where single particles are. Everything is in double precision.
+/// The energy of one fluid in a box, as a function of the positions of single particles. All
+/// arithmetic is in double precision.
 #[derive(Debug, Clone)]
 pub struct LocalEnergy {
     plan: Plan,
@@ -48,28 +49,28 @@ pub struct LocalEnergy {
     cells: Option<Cells>,
     x: Vec<[f64; 3]>,
     species: Vec<i32>,
-    /// Densities that ψ depends on not linearly, one for each such density and species, of one particle after the other.
+    /// Densities that ψ depends on nonlinearly, one for each such density and species, particle by particle.
     n: Vec<f64>,
     psi: Vec<f64>,
-    /// What a particle has of its own density, by density: `w(0)`, and its own images.
+    /// Each particle's contribution to its own density, by density: `w(0)`, and its own images.
     own: Vec<f64>,
     near: Near,
     work: Work,
     moved: Moved,
 }
 
-/// A particle that may be moved.
+/// A trial move of a particle.
 #[derive(Debug, Clone, Default)]
 struct Moved {
     particle: usize,
     to: [f64; 3],
-    /// The particles whose ψ changes, itself among them, with their densities and ψ.
+    /// The particles whose ψ changes, including the moved one, with their densities and ψ.
     ids: Vec<u32>,
     n: Vec<f64>,
     psi: Vec<f64>,
 }
 
-/// Arrays for one change.
+/// Scratch arrays for one move.
 #[derive(Debug, Clone)]
 struct Work {
     /// Changes of densities, neighbour by neighbour, for each density.
@@ -82,15 +83,15 @@ struct Work {
     members: Vec<u32>,
     registers: Vec<f64>,
     excess: ExcessWork,
-    /// The place of a particle among those whose ψ changes, where it may be met more than once.
+    /// Index of each particle among those whose ψ changes, used if a particle may occur more than once.
     slot: Vec<u32>,
 }
 
 impl LocalEnergy {
-    /// That of a fluid; it has no particles yet.
+    /// Creates the energy of a fluid, without particles.
     ///
     /// # Errors
-    /// The fluid has no energy.
+    /// Fails if the fluid has no energy.
     pub fn new(fluid: &Fluid) -> Result<LocalEnergy, NoEnergy> {
         if let Some(species) = fluid.stated_slopes() {
             return Err(NoEnergy::NotConservative(format!("the slopes of {species} are stated")));
@@ -127,15 +128,15 @@ impl LocalEnergy {
         })
     }
 
-    /// The longest range of its interactions; 0 for an ideal gas.
+    /// The longest range of the interactions; 0 for an ideal gas.
     pub fn range(&self) -> f64 {
         self.range
     }
 
-    /// Takes particles in, by their species, wrapped into the box, and computes everything from the beginning.
+    /// Replaces all particles, wraps them into the box, and computes all densities and energies.
     ///
     /// # Errors
-    /// A position that is not finite; a ψ that is not a number, or infinitely low.
+    /// Fails for a position that is not finite, and for a ψ that is not a number, or minus infinity.
     pub fn load(&mut self, domain: &PeriodicBox, particles: &Particles) -> Result<(), EngineError> {
         let Particles { x, tag, kind, .. } = *particles;
         if let Some(k) = x.iter().position(|x| !x.iter().all(|c| c.is_finite())) {
@@ -182,24 +183,24 @@ impl LocalEnergy {
         }
     }
 
-    /// Positions, in the box.
+    /// Positions, wrapped into the box.
     pub fn positions(&self) -> &[[f64; 3]] {
         &self.x
     }
 
-    /// Densities that ψ depends on not linearly, of one particle after the other; [`Plan::density_passes`] says which.
+    /// Densities that ψ depends on nonlinearly, particle by particle; [`Plan::density_passes`] lists them.
     pub fn densities(&self) -> &[f64] {
         &self.n
     }
 
-    /// By how much `U` changes if a particle goes to `to`; along periodic directions it may be outside of the box. `tag` is
-    /// told in errors.
+    /// The change of `U` if a particle moves to `to`, which may be outside the box along periodic
+    /// directions. `tag` names the particle in errors.
     ///
-    /// It is infinite where ψ of some particle becomes so, or, a pole behind it, is not a number at a higher density than
-    /// before; minus infinity where infinite energies are on both sides.
+    /// The change is infinite where ψ of some particle becomes infinite or, beyond a pole, is not a
+    /// number at a higher density than before; it is minus infinity where both energies are infinite.
     ///
     /// # Errors
-    /// ψ becomes minus infinity, or is not a number at densities that are no higher than before.
+    /// Fails if ψ becomes minus infinity, or is not a number at densities that are no higher than before.
     pub fn change(&mut self, particle: usize, to: [f64; 3], tag: i32) -> Result<f64, EngineError> {
         (self.moved.particle, self.moved.to) = (particle, to);
         self.moved.ids.clear();
@@ -224,7 +225,7 @@ impl LocalEnergy {
         self.not_finite(sum, tag)
     }
 
-    /// What it means that an energy is not finite.
+    /// Interprets an energy change that is not finite.
     #[cold]
     fn not_finite(&self, sum: f64, tag: i32) -> Result<f64, EngineError> {
         let width = self.plan.slope_width();
@@ -251,7 +252,7 @@ impl LocalEnergy {
         }
     }
 
-    /// Makes the last change, and counts in `image` the boxes that the particle crosses.
+    /// Accepts the last trial move, and counts in `image` the boxes that the particle crosses.
     pub fn accept(&mut self, image: &mut [i32; 3]) {
         let Some(cells) = &mut self.cells else { return };
         let Moved { particle, to, ids, n, psi } = &self.moved;
@@ -275,7 +276,7 @@ impl LocalEnergy {
         vectors::run(self.set, Roots([&mut before[..*count], &mut after[..*count]]));
     }
 
-    /// `Σ φ` at the new place less that at the old one, densities that ψ is linear in among it.
+    /// `Σ φ` at the new position minus that at the old one, including densities that ψ is linear in.
     fn pair_change(&mut self, particle: usize) -> f64 {
         let LocalEnergy { plan, near, work, species, set, .. } = self;
         let (count, own) = (plan.species.len(), species[particle] as usize);
@@ -302,7 +303,7 @@ impl LocalEnergy {
             let (range, found) = (potential.range(), near.count);
             work.r.resize(2 * near.id.len(), 0.0);
             work.phi.resize(2 * near.id.len(), 0.0);
-            // Those at the new place, then those at the old one.
+            // The counts at the new position, then those at the old one.
             let mut ends = [0; 2];
             let mut end = 0;
             for (side, r) in [&near.r[1], &near.r[0]].into_iter().enumerate() {
@@ -320,7 +321,7 @@ impl LocalEnergy {
         sum
     }
 
-    /// The densities of a particle at the second point of the last search, as row `row` of the new ones.
+    /// The densities of a particle at the second point of the last search, as row `row` of the new densities.
     fn densities_there(&mut self, particle: usize, row: usize) {
         let LocalEnergy { plan, near, work, species, set, moved, own, .. } = self;
         let (count, width) = (plan.species.len(), plan.slope_width());
@@ -332,14 +333,14 @@ impl LocalEnergy {
         }
     }
 
-    /// The densities that change, of whom they change, and those of the particle itself.
+    /// The densities that change, the particles that they belong to, and the densities of the moved particle.
     fn new_densities(&mut self, particle: usize) {
         let LocalEnergy { plan, near, work, species, set, moved, own, n, .. } = self;
         let (count, width, found) = (plan.species.len(), plan.slope_width(), near.count);
         let kind = species[particle] as usize;
         let passes = plan.passes.len();
         work.change.resize(passes * near.id.len(), 0.0);
-        // The particle itself is the first row.
+        // The first row is that of the moved particle.
         moved.ids.push(particle as u32);
         moved.n.resize(width, 0.0);
         for (p, d) in plan.passes.iter().enumerate() {
@@ -377,7 +378,7 @@ impl LocalEnergy {
         }
     }
 
-    /// ψ of the particles of `moved` at their densities there.
+    /// Evaluates ψ of the particles of `moved` at their new densities.
     fn evaluate_psi(&mut self) {
         let LocalEnergy { plan, work, species, moved, .. } = self;
         let (count, width, all) = (plan.species.len(), plan.slope_width(), moved.ids.len());
@@ -427,7 +428,7 @@ fn add_weights(weights: &[f64], near: &Near, species: &[i32], n: &mut [f64]) {
     }
 }
 
-/// What each particle has of its own density: `w(0)` if it counts, and its images.
+/// Each particle's contribution to its own density: `w(0)` if it is included, and its images.
 fn own_densities(plan: &Plan, domain: &PeriodicBox) -> Vec<f64> {
     let of = |d: &usize| {
         let density = &plan.densities[*d];
@@ -450,7 +451,7 @@ fn own_densities(plan: &Plan, domain: &PeriodicBox) -> Vec<f64> {
     plan.passes.iter().map(of).collect()
 }
 
-/// Square roots in place.
+/// Computes square roots in place.
 struct Roots<'a>([&'a mut [f64]; 2]);
 
 impl Loop for Roots<'_> {
@@ -462,7 +463,7 @@ impl Loop for Roots<'_> {
     }
 }
 
-/// The weights of a kernel at the distances that were found.
+/// The weights of a kernel at the distances that the search found.
 fn weigh<'w>(set: InstructionSet, kernel: &Kernel, near: &Near, to: &'w mut [Vec<f64>; 2]) -> [&'w [f64]; 2] {
     let count = near.count;
     for (w, r) in to.iter_mut().zip(&near.r) {

@@ -4,8 +4,9 @@ use super::pairs::{PairList, Pairs};
 use crate::engine::plan::Plan;
 use crate::model::kernel::{Kernel, Shape, ShapeVisitor};
 
-/// Sums the densities `which` of every owned particle to `n`, which has [`Fluid::variables`](crate::model::Fluid::variables)
-/// numbers for each, density-major. Returns how many sums over pairs there were.
+/// Sums the densities `which` of every owned particle to `n`, which has
+/// [`Fluid::variables`](crate::model::Fluid::variables) numbers for each, density-major. Returns
+/// the number of sums over pairs.
 pub fn sum_densities(
     pairs: &Pairs,
     plan: &Plan,
@@ -33,10 +34,10 @@ pub fn sum_densities(
     sums
 }
 
-/// Adds what pairs of a list add to one density of every owned particle to `n`.
+/// Adds the contributions of a list's pairs to one density of every owned particle.
 ///
-/// `n` has `width` numbers for each owned particle, species running fastest; this density's begin at
-/// `offset`.
+/// `n` has `width` numbers for each owned particle, with species running fastest; the numbers of
+/// this density begin at `offset`.
 pub fn add_density(
     pairs: &PairList,
     kernel: &Kernel,
@@ -62,7 +63,7 @@ pub fn add_density(
             let factor = self.kernel.value_factor();
             let list = self.pairs;
             for k in 0..list.len() {
-                // Without a branch: of pairs in the cut-off half may be in this range, in no order.
+                // The loop has no branch: about half of the pairs in the cut-off are in this range, in no order.
                 let s = list.r[k] * inverse_range;
                 let mut w = if s < 1.0 { factor * S::value(s) } else { 0.0 };
                 if !list.factor.is_empty() {

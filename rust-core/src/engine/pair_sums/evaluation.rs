@@ -1,5 +1,5 @@
-//! One configuration in a box, evaluated for whoever measures or tests: every density, every ψ with its derivatives,
-//! every pair with its force.
+//! Evaluates one configuration in a box for measurements and tests: every density, every ψ with its
+//! derivatives, every pair with its force.
 
 use super::densities::sum_densities;
 use super::forces::{ForceInput, ForceOutput, add_forces};
@@ -16,17 +16,17 @@ use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::tally::{Tally, Want};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// A fluid at one temperature, ready to be evaluated.
+/// Evaluates configurations of one fluid at one temperature.
 #[derive(Debug)]
 pub struct Evaluator {
     fluid: Fluid,
-    /// With a pass for every density.
+    /// A plan with a pass for every density.
     plan: Plan,
     free_energies: FreeEnergies,
     work: Mutex<Work>,
 }
 
-/// What finds pairs in wide boxes; arrays of pairs that nobody needs any more.
+/// The search for pairs in wide boxes, and arrays of pairs for reuse.
 #[derive(Debug)]
 struct Work {
     search: SweepPairs,
@@ -36,45 +36,46 @@ struct Work {
 /// Energy, densities, forces and virial of one configuration.
 #[derive(Debug, Clone, Default)]
 pub struct Evaluation {
-    /// `U`.
+    /// Potential energy `U`.
     pub energy: f64,
-    /// Uncorrected local densities, one for each density and species, density-major, of one particle after the other.
+    /// Uncorrected local densities, one for each density and species, density-major, particle by particle.
     pub densities: Vec<f64>,
     /// Conservative forces on the particles.
     pub forces: Vec<[f64; 3]>,
-    /// `Σ r_ij ⊗ F_ij` of the conservative forces: xx, yy, zz, xy, xz, yz.
+    /// Virial `Σ r_ij ⊗ F_ij` of the conservative forces: xx, yy, zz, xy, xz, yz.
     pub virial: [f64; 6],
     /// ψ of the particles with its derivatives.
     pub psi: Psi,
-    /// `Σ ψ` of the particles of each species.
+    /// Sum `Σ ψ` over the particles of each species.
     pub excess: Vec<f64>,
     pairs: Pairs,
     pair_forces: Vec<f64>,
 }
 
 impl Evaluator {
-    /// Differentiates what there is to differentiate.
+    /// Computes the derivatives of the fluid's formulas.
     ///
     /// # Errors
-    /// A derivative of ψ grows beyond the limits of the formula engine.
+    /// Fails if a derivative of ψ grows beyond the limits of the formula engine.
     pub fn new(fluid: Fluid) -> Result<Evaluator, TooLarge> {
         let free_energies = FreeEnergies::new(&fluid)?;
         let work = Mutex::new(Work { search: SweepPairs::new(&fluid), spare: Vec::new() });
         Ok(Evaluator { plan: Plan::whole(&fluid)?, free_energies, work, fluid })
     }
 
-    /// The fluid.
+    /// The fluid that is evaluated.
     pub fn fluid(&self) -> &Fluid {
         &self.fluid
     }
 
-    /// Evaluates particles at `x`, of a species each, in a box. What is not finite interacts with nothing.
+    /// Evaluates particles at `x`, with one species each, in a box. Particles at positions that
+    /// are not finite do not interact.
     pub fn evaluate(&self, x: &[[f64; 3]], species: &[i32], domain: &PeriodicBox) -> Evaluation {
         let (pairs, pair_forces) = self.pairs(x, species, domain);
         self.of_pairs(pairs, pair_forces, species)
     }
 
-    /// `U` alone.
+    /// Computes the energy `U` only.
     pub fn energy(&self, x: &[[f64; 3]], species: &[i32], domain: &PeriodicBox) -> f64 {
         let (pairs, pair_forces) = self.pairs(x, species, domain);
         let (_, psi) = self.excess(&pairs, species);
@@ -83,7 +84,7 @@ impl Evaluator {
         energy
     }
 
-    /// Keeps the arrays of an evaluation for others: new ones cost more than what is written to them.
+    /// Keeps the arrays of an evaluation for reuse: allocating new ones costs more than filling them.
     pub fn recycle(&self, evaluation: Evaluation) {
         self.work().spare.push((evaluation.pairs, evaluation.pair_forces));
     }
@@ -92,7 +93,7 @@ impl Evaluator {
         self.work.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The pairs, and room for their forces.
+    /// Finds the pairs; allocates their forces.
     fn pairs(&self, x: &[[f64; 3]], species: &[i32], domain: &PeriodicBox) -> (Pairs, Vec<f64>) {
         let mut work = self.work();
         let (mut pairs, mut pair_forces) = work.spare.pop().unwrap_or_default();
@@ -108,7 +109,7 @@ impl Evaluator {
         (pairs, pair_forces)
     }
 
-    /// Densities and ψ of all particles.
+    /// Computes densities and ψ of all particles.
     fn excess(&self, pairs: &Pairs, species: &[i32]) -> (Vec<f64>, Psi) {
         let Evaluator { fluid, plan, free_energies, .. } = self;
         let mut densities = vec![0.0; species.len() * fluid.variables()];
@@ -149,7 +150,7 @@ impl Evaluator {
     }
 }
 
-/// `Σ φ` of each pair term of a fluid.
+/// The sum `Σ φ` over each pair term of a fluid.
 fn pair_energies(pairs: &Pairs, fluid: &Fluid) -> Vec<f64> {
     let list = pairs.force();
     let energy_of = |term: &PairTerm| {
@@ -161,7 +162,7 @@ fn pair_energies(pairs: &Pairs, fluid: &Fluid) -> Vec<f64> {
 }
 
 impl Evaluation {
-    /// `U`.
+    /// Potential energy `U`.
     pub fn energy(&self) -> f64 {
         self.energy
     }
@@ -172,7 +173,7 @@ impl Evaluation {
         &self.densities[particle * variables..(particle + 1) * variables]
     }
 
-    /// `Σ φ` of each pair term of the fluid.
+    /// The sum `Σ φ` over each pair term of the fluid.
     pub fn pair_energies(&self, fluid: &Fluid) -> Vec<f64> {
         pair_energies(&self.pairs, fluid)
     }
@@ -188,8 +189,8 @@ impl Evaluation {
         })
     }
 
-    /// The pairs with their force along `ê_ij = (r_i − r_j)/r_ij`, positive if it pushes them apart; pairs on one point
-    /// have no direction and are left out.
+    /// The pairs with their force along `ê_ij = (r_i − r_j)/r_ij`, positive if repulsive; pairs at zero
+    /// distance have no direction and are left out.
     pub fn pair_forces(&self) -> impl Iterator<Item = (Pair, f64)> {
         self.pairs().zip(self.pair_forces.iter().copied()).filter(|(p, _)| p.r > 0.0)
     }
@@ -200,13 +201,13 @@ impl Evaluation {
     /// Σ_i [ψ_i,vu ∇_k n_iv·∇_k n_iu + ψ_i,v ∇_k² n_iv] + Σ_j ∇² φ(r_kj)
     /// ```
     ///
-    /// exact where no two particles see each other twice, in boxes at least twice the range wide.
+    /// The result is exact where each two particles form one pair, in boxes at least twice the range wide.
     pub fn laplacians(&self, fluid: &Fluid, species: &[i32]) -> Vec<f64> {
         let (count, variables) = (fluid.species.len(), fluid.variables());
         let Psi { slopes, second, .. } = &self.psi;
         let rest = (fluid.dimensions - 1) as f64;
         let mut sum = vec![0.0; species.len()];
-        // ∇_i n_iv
+        // Gradients ∇_i n_iv of the densities.
         let mut gradients = vec![[0.0; 3]; species.len() * variables];
         let mut slope = vec![0.0; fluid.densities.len()];
         for p in self.pairs().filter(|p| p.r > 0.0 && p.i != p.j) {
@@ -231,7 +232,7 @@ impl Evaluation {
             }
             sum[p.i] += both;
             sum[p.j] += both;
-            // ψ of one as the other moves.
+            // Second derivatives of ψ of each particle when the other moves.
             let [of_i, of_j] = [p.i, p.j].map(|k| &second[k * variables * variables..]);
             for (d, s) in slope.iter().enumerate() {
                 for (e, t) in slope.iter().enumerate() {
@@ -253,7 +254,7 @@ impl Evaluation {
     }
 }
 
-/// Components of a symmetric tensor in their order.
+/// Indices of the components of a symmetric tensor, in the order of the virial.
 pub const COMPONENTS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
 
 #[cfg(test)]
@@ -338,7 +339,7 @@ A = { slopes = { n = "0.3*n" }, energy = "n^2" }
         }
     }
 
-    /// ψ has no finite slope where nobody is near: that is nothing to pairs out of the range of its density.
+    /// ψ has no finite slope for an isolated particle, which must not affect pairs out of the range of its density.
     #[test]
     fn pairs_out_of_range_of_a_density_feel_nothing_of_it() {
         let model = r#"
@@ -361,7 +362,7 @@ range = 1.0
         assert!((found.forces[0][0] + 7.5).abs() < 1e-12 && found.forces[1][0] == -found.forces[0][0]);
     }
 
-    /// The Laplacian of U by the differences of forces.
+    /// Compares the Laplacian of U with differences of forces.
     #[test]
     fn laplacians_are_divergences_of_forces() {
         for model in MODELS {

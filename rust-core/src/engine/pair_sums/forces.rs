@@ -1,5 +1,5 @@
-//! Forces, energy and virial over the pairs, in blocks: each term of the plan adds to a block's
-//! scalars in a loop of its own, compiled for its kernel, and one last loop scatters them.
+//! Forces, energy and virial over the pairs, in blocks: each term of the plan adds to a block's scalars
+//! in a loop of its own, compiled for its kernel, and a last loop adds these to the particles.
 
 use super::pairs::PairList;
 use crate::engine::plan::{LinearTerm, Plan, ThermostatPlan};
@@ -10,30 +10,30 @@ use crate::model::pair::PairForm;
 use psidpd_passes::noise::PairNoise;
 use psidpd_passes::tally::{Tally, Want};
 
-/// Pairs in a block: its scalars stay in the first-level cache.
+/// Number of pairs in a block, whose scalars stay in the first-level cache.
 const BLOCK: usize = 256;
 
-/// What a force pass reads.
+/// Input of a force pass.
 pub struct ForceInput<'a> {
     pub plan: &'a Plan,
     pub list: &'a PairList,
     pub newton: Newton,
     pub owned: usize,
-    /// `∂ψ/∂n` of owned particles and ghosts, [`Plan::slope_width`] each.
+    /// Slopes `∂ψ/∂n` of owned particles and ghosts, [`Plan::slope_width`] each.
     pub slopes: &'a [f64],
     pub v: &'a [[f64; 3]],
     pub tag: &'a [i32],
-    /// Noise and `dt^{-1/2}`; `None` leaves dissipative and random forces out.
+    /// Noise and `dt^{-1/2}`; with `None` there are no dissipative and random forces.
     pub thermostat: Option<(PairNoise, f64)>,
     pub want: Want,
 }
 
-/// What it adds to.
+/// Arrays that a force pass adds to.
 pub struct ForceOutput<'a> {
     pub force: &'a mut [[f64; 3]],
     pub particle_energy: &'a mut [f64],
     pub particle_virial: &'a mut [[f64; 6]],
-    /// The conservative force of each pair along `ê_ij`, positive if it pushes them apart; empty if nobody asks.
+    /// The conservative force of each pair along `ê_ij`, positive if repulsive; empty if it is not wanted.
     pub pair_force: &'a mut [f64],
     pub tally: Tally,
 }
@@ -43,12 +43,12 @@ pub struct Block<const N: usize> {
     /// Forces along `ê_ij`.
     pub conservative: [f64; N],
     thermostat: [f64; N],
-    /// The energies of terms linear in a density: what belongs to `i`, and to `j`.
+    /// Energies of terms linear in a density: the parts of `i` and of `j`.
     pub excess_i: [f64; N],
     pub excess_j: [f64; N],
-    /// `φ`.
+    /// Pair energies `φ`.
     pub pair: [f64; N],
-    /// Distances and places of the pairs that one pair term acts on.
+    /// Distances and indices of the pairs that one pair term acts on.
     r: [f64; N],
     phi: [f64; N],
     slope: [f64; N],
@@ -95,7 +95,7 @@ impl<const N: usize> Block<N> {
         }
     }
 
-    /// The conservative forces of the pairs `begin` to `end`, at most `N`, and their energies if asked for.
+    /// Computes the conservative forces of the pairs `begin` to `end`, at most `N`, and their energies if asked for.
     pub fn conserve(&mut self, input: &ForceInput, begin: usize, end: usize, energies: bool) {
         self.conservative.fill(0.0);
         if energies {
@@ -118,7 +118,7 @@ impl<const N: usize> Block<N> {
     }
 }
 
-/// Conservative forces and energies of pairs that do not act at full strength.
+/// Scales conservative forces and energies of pairs with reduced strength.
 fn scale<const N: usize>(list: &PairList, begin: usize, end: usize, energies: bool, block: &mut Block<N>) {
     if list.factor.is_empty() {
         return;
@@ -133,7 +133,7 @@ fn scale<const N: usize>(list: &PairList, begin: usize, end: usize, energies: bo
     }
 }
 
-/// `−[∂ψ_i/∂n_c(j) + ∂ψ_j/∂n_c(i)] w′(r)`.
+/// The many-body force `−[∂ψ_i/∂n_c(j) + ∂ψ_j/∂n_c(i)] w′(r)`.
 struct ManyBody<'a, 'b, const N: usize> {
     input: &'a ForceInput<'b>,
     kernel: &'a Kernel,
@@ -154,18 +154,18 @@ impl<const N: usize> ShapeVisitor for ManyBody<'_, '_, N> {
         let inverse_range = 1.0 / self.kernel.range();
         let factor = self.kernel.slope_factor();
         for k in self.begin..self.end {
-            // Without a branch: of pairs in the cut-off half may be in this range, in no order.
+            // The loop has no branch: about half of the pairs in the cut-off are in this range, in no order.
             let s = list.r[k] * inverse_range;
             let here = list.i[k] as usize * width + offset + list.species_j[k] as usize;
             let there = list.j[k] as usize * width + offset + list.species_i[k] as usize;
             let force = (slopes[here] + slopes[there]) * (factor * S::slope(s));
-            // Where nobody is in range a slope of ψ may be infinite.
+            // A slope of ψ may be infinite if no particle is in range.
             self.out[k - self.begin] -= if s < 1.0 { force } else { 0.0 };
         }
     }
 }
 
-/// `−(c_αβ + c_βα) w′(r)`, a density that every ψ is linear in.
+/// The force `−(c_αβ + c_βα) w′(r)` of a density that every ψ is linear in.
 struct Linear<'a, 'b, const N: usize> {
     input: &'a ForceInput<'b>,
     term: &'a LinearTerm,
@@ -185,7 +185,7 @@ impl<const N: usize> ShapeVisitor for Linear<'_, '_, N> {
         let inverse_range = 1.0 / range;
         let value_factor = self.term.kernel.value_factor();
         let slope_factor = self.term.kernel.slope_factor();
-        // Only a law without potential has another kernel in the force; its speed is no concern.
+        // Only a law without potential has another kernel in the force; its speed does not matter.
         let foreign = (self.term.force_kernel != self.term.kernel).then_some(self.term.force_kernel);
         for k in self.begin..self.end {
             let s = list.r[k] * inverse_range;
@@ -208,7 +208,7 @@ impl<const N: usize> ShapeVisitor for Linear<'_, '_, N> {
     }
 }
 
-/// `−φ′(r)`.
+/// The pair force `−φ′(r)`.
 fn add_pair_term<const N: usize>(
     input: &ForceInput,
     term: &PairTerm,
@@ -238,7 +238,7 @@ fn add_pair_term<const N: usize>(
     }
 }
 
-/// `−γ w_R² (ê·v_ij) + σ w_R ξ dt^{-1/2}`.
+/// The force `−γ w_R² (ê·v_ij) + σ w_R ξ dt^{-1/2}`.
 fn add_thermostat(
     input: &ForceInput,
     plan: &ThermostatPlan,
@@ -255,7 +255,7 @@ fn add_thermostat(
         let (r, range) = (list.r[k], plan.range[pair]);
         out[k - begin] = 0.0;
         let strength = list.thermostat_factor.get(k).copied().unwrap_or(1.0);
-        // Two particles on one point have no direction to push along.
+        // A pair at zero distance has no direction.
         if r < range && r > 0.0 && strength != 0.0 {
             let (i, j) = (list.i[k] as usize, list.j[k] as usize);
             let base = 1.0 - r / range;
@@ -296,7 +296,7 @@ fn scatter(input: &ForceInput, output: &mut ForceOutput, begin: usize, end: usiz
     }
 }
 
-/// The share of a pair that is tallied here: half, if its other rank tallies it too.
+/// The weight of a pair in the sums of this rank: one half if the other rank counts it too.
 #[inline(always)]
 fn share(input: &ForceInput, j: usize) -> f64 {
     if input.newton == Newton::On || j < input.owned { 1.0 } else { 0.5 }

@@ -1,42 +1,42 @@
-//! ψ with first and second derivatives, one particle at a time, by the definition: what blocks of particles get from
-//! [`ExcessPlan`](crate::engine::excess::ExcessPlan) is tested against it.
+//! ψ with first and second derivatives, one particle at a time, by the definition. Tests compare
+//! [`ExcessPlan`](crate::engine::excess::ExcessPlan), which evaluates blocks of particles, with it.
 
 use crate::model::expression::{Formula, Program, TooLarge};
 use crate::model::{Bounds, Continuation, ExcessFreeEnergy, Fluid};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 
-/// The free energies of a fluid, differentiated.
+/// The free energies of a fluid and their derivatives.
 #[derive(Debug)]
 pub struct FreeEnergies {
     species: Vec<Excess>,
 }
 
-/// ψ of one species.
+/// The free energy ψ of one species.
 #[derive(Debug)]
 struct Excess {
-    /// ψ, its slopes, then its second derivatives row by row, the upper triangle; `None` for a curve and for
-    /// stated slopes.
+    /// Computes ψ, its slopes, then its second derivatives row by row, the upper triangle; `None`
+    /// for a curve and for stated slopes.
     program: Option<Program>,
-    /// Derivatives by how often each variable was differentiated by; for variables out of bounds.
+    /// Derivatives by the order in each variable; used for variables out of bounds.
     derivatives: RefCell<BTreeMap<Vec<u8>, Formula>>,
 }
 
-/// ψ of particles with derivatives by their uncorrected densities, one particle after the other.
+/// ψ of particles with derivatives by their uncorrected densities, particle by particle.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Psi {
-    /// ψ.
+    /// Values ψ.
     pub value: Vec<f64>,
-    /// ∂ψ/∂n_v.
+    /// Slopes ∂ψ/∂n_v.
     pub slopes: Vec<f64>,
-    /// ∂²ψ/∂n_v∂n_u, a full matrix by rows.
+    /// Second derivatives ∂²ψ/∂n_v∂n_u, a full matrix by rows.
     pub second: Vec<f64>,
 }
 
-/// Arrays for what one particle needs.
+/// Scratch arrays for one particle.
 #[derive(Default)]
 struct Scratch {
-    /// Corrected densities, with their first two derivatives by the uncorrected ones.
+    /// Corrected densities, and their first two derivatives by the uncorrected ones.
     corrected: Vec<[f64; 3]>,
     at: Vec<f64>,
     values: Vec<f64>,
@@ -44,10 +44,10 @@ struct Scratch {
 }
 
 impl FreeEnergies {
-    /// Differentiates what there is to differentiate.
+    /// Computes the derivatives of the fluid's formulas.
     ///
     /// # Errors
-    /// A derivative grows beyond the limits of the formula engine.
+    /// Fails if a derivative grows beyond the limits of the formula engine.
     pub fn new(fluid: &Fluid) -> Result<FreeEnergies, TooLarge> {
         let count = fluid.variables();
         let mut species = Vec::new();
@@ -73,7 +73,7 @@ impl FreeEnergies {
         Ok(FreeEnergies { species })
     }
 
-    /// ψ of particles of a species each, at their uncorrected densities, density-major.
+    /// ψ of particles with one species each, at their uncorrected densities, density-major.
     pub fn psi(&self, fluid: &Fluid, species: &[i32], densities: &[f64]) -> Psi {
         let (variables, mut scratch) = (fluid.variables(), Scratch::default());
         let mut psi = Psi {
@@ -90,7 +90,7 @@ impl FreeEnergies {
         psi
     }
 
-    /// ψ of one particle; slopes and second derivatives are zeros at first.
+    /// Computes ψ of one particle; slopes and second derivatives must be zero before.
     fn one(
         &self,
         fluid: &Fluid,
@@ -122,7 +122,7 @@ impl FreeEnergies {
                 let Scratch { values, work, .. } = scratch;
                 self.species[alpha].formula(fluid, at, [slopes, second], [values, work])
             }
-            // No ψ: what is stated as energy and slopes. Nothing that needs second derivatives is measured then.
+            // There is no ψ: the energy and the slopes are stated. Measurements of such models need no second derivatives.
             ExcessFreeEnergy::Slopes(law) => {
                 slopes.iter_mut().zip(&law.slopes).for_each(|(to, slope)| *to = slope.value(at));
                 law.energy.value(at)
@@ -179,8 +179,8 @@ impl Excess {
         value
     }
 
-    /// The derivative `order` of ψ continued in the variables from `v` on: outside a bound ψ is
-    /// `Σ_k δ^k/k! ∂^kψ`, k up to 1 or 2, with the derivatives at the bound.
+    /// The derivative `order` of ψ, continued in the variables from `v` on: outside a bound ψ is `Σ_k
+    /// δ^k/k! ∂^kψ`, k up to 1 or 2, with the derivatives at the bound.
     fn continued(&self, fluid: &Fluid, order: &mut Vec<u8>, at: &[f64], v: usize) -> f64 {
         if v == at.len() {
             let edge: Vec<f64> = (0..at.len()).map(|v| at[v] - beyond(fluid, v, at).0).collect();
@@ -202,7 +202,7 @@ impl Excess {
     }
 }
 
-/// How far variable `v` is out of its bounds, and the highest power of that in ψ.
+/// The distance of variable `v` from its bounds, and the highest power of this distance in ψ.
 fn beyond(fluid: &Fluid, v: usize, at: &[f64]) -> (f64, u8) {
     let Some(bounds) = fluid.densities[v / fluid.species.len()].bounds else { return (0.0, 2) };
     let delta = bounds.beyond(at[v]);
@@ -232,7 +232,7 @@ fn derivative(known: &RefCell<BTreeMap<Vec<u8>, Formula>>, order: &[u8]) -> Opti
     Some(formula)
 }
 
-/// A polynomial with its first two derivatives.
+/// The value and the first two derivatives of a polynomial.
 fn polynomial(coefficients: &[f64], x: f64) -> [f64; 3] {
     coefficients.iter().rev().fold([0.0; 3], |[value, slope, second], c| {
         [value * x + c, slope * x + value, second * x + 2.0 * slope]
@@ -244,7 +244,7 @@ mod tests {
     use super::*;
     use crate::model::Model;
 
-    /// Slopes and second derivatives against differences, within bounds, beyond one and beyond both.
+    /// Compares slopes and second derivatives with differences, within bounds, beyond one and beyond both.
     #[test]
     fn derivatives_of_psi_are_derivatives() {
         let model = Model::parse(

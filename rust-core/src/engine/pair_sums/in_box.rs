@@ -1,4 +1,4 @@
-//! Every pair of particles in a box, images included.
+//! Finds every pair of particles in a box, images included.
 
 use super::search::CellSearch;
 use crate::engine::images::Images;
@@ -7,13 +7,13 @@ use psidpd_passes::domain::PeriodicBox;
 /// Two particles, the second perhaps an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pair {
-    /// The first.
+    /// Index of the first particle.
     pub i: usize,
-    /// The second: the particle itself, where it is an image.
+    /// Index of the second particle; of the owner, if it is an image.
     pub j: usize,
-    /// `r_i − r_j`.
+    /// Separation `r_i − r_j`.
     pub d: [f64; 3],
-    /// Its length.
+    /// Distance, the length of `d`.
     pub r: f64,
 }
 
@@ -22,17 +22,17 @@ pub struct Pair {
 pub struct BoxSearch {
     cells: CellSearch,
     images: Images,
-    /// Particles, moved into the box, and their images.
+    /// Particles, wrapped into the box, and their images.
     x: Vec<[f64; 3]>,
 }
 
 impl BoxSearch {
-    /// Calls `visit` with `i`, `j` and `r_i − r_j` of every pair closer than `cutoff`, each once, in an order that
-    /// depends on the positions alone; `j` is the particle itself where the pair is with its image, and `i ≤ j`.
+    /// Calls `visit` with `i`, `j` and `r_i − r_j` of every pair closer than `cutoff`, each once, in an order
+    /// that depends on the positions alone. `i ≤ j`; a pair of a particle with its own image has `i = j`.
     ///
-    /// In boxes narrower than twice the cut-off a particle may meet several images of another, and its own: each is a
-    /// pair. Particles behind the `owned` first are ghosts: two of them are no pair. Particles that take part must have
-    /// finite positions.
+    /// In boxes narrower than twice the cut-off a particle may be near several images of another, and
+    /// its own: each is a pair. Particles after the first `owned` are ghosts: two ghosts form no pair.
+    /// Interacting particles must have finite positions.
     #[expect(clippy::too_many_arguments)] // A search is of all that it goes over.
     pub fn find(
         &mut self,
@@ -44,7 +44,7 @@ impl BoxSearch {
         cutoff: f64,
         mut visit: impl FnMut(usize, usize, [f64; 3]),
     ) {
-        // Without a number greater than 0 there is nothing to find.
+        // Without a positive, finite cut-off there are no pairs.
         if !(cutoff > 0.0 && cutoff.is_finite()) {
             return;
         }
@@ -65,8 +65,8 @@ impl BoxSearch {
             |a, b, d| {
                 let (i, j, d) = if a < count { (a, b, d) } else { (b, a, d.map(|c| -c)) };
                 let owner = images.owner_of(j);
-                // Two particles see each other's images: one of the two pairs counts, and of a particle's own images at +d and
-                // −d one.
+                // Each of two particles is near an image of the other: one of these two pairs counts,
+                // and so does one of a particle's own images at +d and −d.
                 let (i, j, d) = match (j < count, i.cmp(&owner)) {
                     (true, std::cmp::Ordering::Greater) => (j, i, d.map(|c| -c)),
                     (true, _) => (i, j, d),
@@ -82,13 +82,13 @@ impl BoxSearch {
     }
 }
 
-/// Of `d` and `−d` exactly one comes first.
+/// Whether `d` comes first: this holds for exactly one of `d` and `−d`.
 fn is_first(d: [f64; 3]) -> bool {
     d.iter().find(|c| **c != 0.0).is_some_and(|c| *c > 0.0)
 }
 
-/// Every pair of particles with finite positions that are closer than a cutoff, each once, with its length; in boxes
-/// narrower than twice the cutoff every image that is in reach is a pair.
+/// Calls `visit` with every pair of particles with finite positions closer than a cutoff, each once,
+/// and its distance; in boxes narrower than twice the cutoff every image within reach forms a pair.
 pub fn for_each_pair(
     x: &[[f64; 3]],
     domain: &PeriodicBox,
@@ -109,7 +109,7 @@ mod tests {
     use nalgebra::Matrix3;
     use psidpd_passes::noise::threefry2x32;
 
-    /// Every pair by the definition: every particle with every image of every other, one after the other.
+    /// Finds every pair by the definition: every particle with every image of every other.
     ///
     /// Particles must lie in the box along its periodic directions.
     fn for_each_pair_by_brute_force(
@@ -119,7 +119,7 @@ mod tests {
         cutoff: f64,
         mut visit: impl FnMut(Pair),
     ) {
-        // Particles that are both inside are at most this many boxes from their nearest images.
+        // Particles inside the box are at most this many boxes from their nearest images.
         let shells = [0, 1, 2].map(|k| {
             if domain.periodic()[k] && k < dimensions {
                 (cutoff / domain.height(k)).ceil() as i32 + 1
@@ -132,7 +132,7 @@ mod tests {
             for (a, b, c) in
                 range(0).flat_map(|a| range(1).flat_map(move |b| range(2).map(move |c| (a, b, c))))
             {
-                // Of a particle's own images +s and −s are one pair.
+                // A particle's own images +s and −s are one pair.
                 if i == j && (a, b, c) <= (0, 0, 0) {
                     continue;
                 }
@@ -169,7 +169,7 @@ mod tests {
                     p
                 })
                 .collect();
-            // The search moves particles into the box itself.
+            // The search wraps particles into the box itself.
             let mut outside = x.clone();
             for (k, x) in outside.iter_mut().enumerate() {
                 let boxes = [k as f64 % 3.0 - 1.0, 0.0, 0.0];

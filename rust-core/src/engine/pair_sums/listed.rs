@@ -1,4 +1,4 @@
-//! Pairs from the host, for hosts that know more about pairs than where the particles are.
+//! Pairs that the host lists, because it knows which particles interact.
 
 use super::pairs::Pairs;
 use crate::engine::error::EngineError;
@@ -8,7 +8,7 @@ use crate::engine::surroundings::PairsOfHost;
 /// Adds the listed pairs within `cutoff` to `pairs`.
 ///
 /// # Errors
-/// Arrays of different lengths, or an index out of range.
+/// Fails for arrays of different lengths, and for an index out of range.
 pub fn add_listed(
     listed: &PairsOfHost,
     particles: &Particles,
@@ -26,7 +26,7 @@ pub fn add_listed(
     for (k, (i, j)) in i.iter().zip(*j).enumerate() {
         let (i, j) = (*i as usize, *j as usize);
         if i >= particles.owned || j >= particles.x.len() {
-            return Err(EngineError::Host("a pair list names a particle that is not there"));
+            return Err(EngineError::Host("a pair list names a particle that does not exist"));
         }
         if species[i] < 0 || species[j] < 0 {
             continue;
@@ -57,7 +57,7 @@ mod tests {
         warren_ab(&["F".into()], &[pair], 3, ForceLaw::Conservative).unwrap()
     }
 
-    /// Some points in a box of length 2, of which `owned` are owned.
+    /// Points in a box of length 2, of which the first `owned` are owned.
     fn points() -> Vec<[f64; 3]> {
         (0..60u32)
             .map(|k| [k * 7 % 19, k * 11 % 17, k * 5 % 13].map(|n| n as f64 / 9.0 + 0.01 * (k % 3) as f64))
@@ -92,7 +92,7 @@ mod tests {
         let tag: Vec<i32> = (1..=60).collect();
         let kind = vec![0; 60];
         for newton in [Newton::On, Newton::Off] {
-            // Without ghosts slopes need no host.
+            // Without ghosts the host has no slopes to copy.
             let particles = Particles { owned: 60, x: &x, tag: &tag, kind: &kind };
             let (i, j): (Vec<i32>, Vec<i32>) = (0..60).flat_map(|i| (0..i).map(move |j| (i, j))).unzip();
             search(&mut engine, &particles, newton);
@@ -111,7 +111,7 @@ mod tests {
             agree(&forces(&mut engine, &particles), &searched);
             assert!(engine.memory() > 60 * 8);
 
-            // Forces are the gradient of the energy at any factors.
+            // Forces are the gradient of the energy for any factors.
             let factor: Vec<f64> = (0..i.len()).map(|k| [0.0, 0.3, 1.0][k % 3]).collect();
             let listed = PairsOfHost { factor: &factor, ..listed };
             engine.first(Surroundings::Listed(listed, newton), &particles, false).unwrap();

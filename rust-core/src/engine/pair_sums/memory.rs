@@ -5,7 +5,7 @@ fn bytes<T>(array: &Vec<T>) -> usize {
 }
 
 impl PairSums {
-    /// Bytes held in arrays over particles and pairs, without the cells of the search.
+    /// Size in bytes of the arrays over particles and pairs, without the cells of the search.
     pub fn memory(&self) -> usize {
         self.pairs.force().bytes()
             + self.pairs.density_only().bytes()

@@ -1,5 +1,5 @@
-//! The Hamiltonian and its forces in double precision, as sums over a list of pairs: the engine where the sweep does not
-//! do an evaluation.
+//! The Hamiltonian and its forces in double precision, as sums over a list of pairs, for
+//! evaluations that the sweep cannot do.
 //!
 //! ```text
 //! pairs        in_box (a box and its images), search (a rank and its ghosts), listed (the host's own)
@@ -11,9 +11,9 @@
 //! forces       F_ij = −[∂ψ_i/∂n_c(j) + ∂ψ_j/∂n_c(i)] w′ − φ′, drag and noise; energies, virials
 //! ```
 //!
-//! [`PairSums`] goes through this once for a host. [`Evaluator`] does for whoever measures or tests: it leaves nothing
-//! out (every density is summed, no ψ is taken for a pair potential), and gives every pair with its force.
-//! Both are tested against [`crate::truth`], as everything faster is.
+//! [`PairSums`] computes these steps for a host. [`Evaluator`] computes them for measurements and
+//! tests: it sums every density, treats no ψ as a pair potential, and returns every pair with its
+//! force. Tests compare both with [`crate::truth`], and all faster code with them.
 
 mod densities;
 mod evaluation;
@@ -55,11 +55,10 @@ use psidpd_passes::tally::{Tally, Want};
 use search::CellSearch;
 use special::scale;
 
-/// The forces of one fluid over a list of pairs, with whatever can be asked for, and the arrays that computing them
-/// needs.
+/// The forces of one fluid over a list of pairs, with all results that a host may ask for, and
+/// the arrays of the computation.
 ///
-/// An evaluation is [`PairSums::first`], a round of slopes from owners to ghosts where there are ghosts, and
-/// [`PairSums::second`].
+/// An evaluation is [`PairSums::first`], copying slopes from owners to ghosts if there are any, and [`PairSums::second`].
 #[derive(Debug, Clone)]
 pub struct PairSums {
     plan: Plan,
@@ -72,7 +71,7 @@ pub struct PairSums {
     species: Vec<i32>,
     /// Local densities of owned particles, density-major, [`Fluid::variables`] each.
     densities: Vec<f64>,
-    /// Whether all of them are summed, or only those that forces need.
+    /// Whether all densities are summed, or only those that forces need.
     has_all_densities: bool,
     /// ψ of owned particles.
     excess: Vec<f64>,
@@ -82,20 +81,20 @@ pub struct PairSums {
     excess_pass: ExcessPass,
     counts: PassCounts,
     owned: usize,
-    /// Whether pairs, densities and slopes are those of one configuration.
+    /// Whether pairs, densities and slopes belong to one configuration.
     ready: bool,
 }
 
 impl PairSums {
-    /// The sums for `fluid`; types are species indices until [`PairSums::map_kinds`] says otherwise.
+    /// Creates the sums for `fluid`; types are species indices unless [`PairSums::map_kinds`] maps them.
     ///
     /// # Errors
-    /// As [`Plan::new`].
+    /// Fails as [`Plan::new`].
     pub fn new(fluid: &Fluid) -> Result<PairSums, TooLarge> {
         Ok(PairSums::of_plan(Plan::new(fluid)?))
     }
 
-    /// The sums of a plan that is there already.
+    /// Creates the sums of a given plan.
     pub fn of_plan(plan: Plan) -> PairSums {
         let kinds = (0..plan.species.len() as i32).collect();
         PairSums {
@@ -120,27 +119,27 @@ impl PairSums {
         }
     }
 
-    /// The plan.
+    /// The plan of the fluid's passes.
     pub fn plan(&self) -> &Plan {
         &self.plan
     }
 
-    /// How often each pass has run.
+    /// Number of runs of each pass.
     pub fn counts(&self) -> PassCounts {
         self.counts
     }
 
-    /// How many evaluations of ψ had a density below its bounds, and how many one above, since the
-    /// sums were made. Only densities count that the particle's ψ depends on, not linearly.
+    /// Numbers of evaluations of ψ with a density below its bounds, and above, since the sums were
+    /// created. Only densities that the particle's ψ depends on nonlinearly count.
     pub fn out_of_bounds(&self) -> [u64; 2] {
         self.excess_pass.out_of_bounds
     }
 
     /// Maps the host's types to species: entry `kind` is the species of type `kind`, negative for
-    /// particles that take no part.
+    /// particles that do not interact.
     ///
     /// # Errors
-    /// A species index out of range.
+    /// Fails for a species index out of range.
     pub fn map_kinds(&mut self, kinds: &[i32]) -> Result<(), EngineError> {
         if kinds.iter().any(|s| *s >= self.plan.species.len() as i32) {
             return Err(EngineError::Host("a type is mapped to a species the model does not have"));
@@ -154,9 +153,9 @@ impl PairSums {
         &self.kinds
     }
 
-    /// Which pairs do not act at their full strength in evaluations to come, by the host's numbers. Within the cut-off two
-    /// particles must meet in one image only. The marks of `exclusions` leave out others. Pairs that a host lists have their
-    /// factors in its list.
+    /// Sets the pairs with reduced strength for later evaluations, by the host's numbers. Within the
+    /// cut-off two particles must meet in one image only. The marks of `exclusions` exclude further
+    /// pairs. Pairs that a host lists have their factors in its list.
     pub(super) fn set_special_pairs(&mut self, special: &[SpecialPair], exclusions: &Exclusions) {
         let marks = exclusions.marks().iter().copied();
         self.exclusions.mark(marks, exclusions.between_molecules());
@@ -164,12 +163,12 @@ impl PairSums {
         self.special.extend_from_slice(special);
     }
 
-    /// Finds pairs, sums local densities, all of the model or those that forces need, and evaluates ψ and its slopes
-    /// for owned particles.
+    /// Finds pairs, sums local densities, either all of the model or those that forces need, and
+    /// evaluates ψ and its slopes for owned particles.
     ///
     /// # Errors
-    /// A position or ψ that is not finite, a tag or type out of range, arrays of different lengths, ghosts in a box
-    /// that has its images, pairs of particles that are not there.
+    /// Fails for a position or ψ that is not finite, a tag or type out of range, arrays of different
+    /// lengths, ghosts in an evaluation of the whole box, and pairs of particles that do not exist.
     pub fn first(
         &mut self,
         surroundings: Surroundings,
@@ -196,7 +195,9 @@ impl PairSums {
         match surroundings {
             Surroundings::Box(domain) => {
                 if owned < x.len() {
-                    return Err(EngineError::Host("where all particles are in hand there are no ghosts"));
+                    return Err(EngineError::Host(
+                        "ghosts are not allowed in an evaluation of the whole box",
+                    ));
                 }
                 check_reach(domain, dimensions, cutoff, owned)?;
                 pairs.clear(owned, Newton::On);
@@ -206,9 +207,7 @@ impl PairSums {
             }
             Surroundings::Ghosts(Around { domain, images }, newton) if is_closed(domain) => {
                 if !images.is_empty() && images.len() != x.len() - owned {
-                    return Err(EngineError::Host(
-                        "not as many ghosts as it was said of whether they are images",
-                    ));
+                    return Err(EngineError::Host("`images` must have one entry per ghost"));
                 }
                 check_reach(domain, dimensions, cutoff, x.len())?;
                 pairs.clear(owned, newton);
@@ -235,7 +234,7 @@ impl PairSums {
                 Surroundings::Box(domain) => domain,
                 Surroundings::Ghosts(around, _) => around.domain,
                 Surroundings::Listed(..) => {
-                    return Err(EngineError::Host("listed pairs have factors of their own"));
+                    return Err(EngineError::Host("special pairs cannot be combined with listed pairs"));
                 }
             };
             scale(&mut self.pairs, &self.special, &self.exclusions, domain, dimensions, cutoff)?;
@@ -269,7 +268,7 @@ impl PairSums {
         Ok(())
     }
 
-    /// Sums the densities of the pairs that have been found.
+    /// Sums the densities over the pairs that have been found.
     fn sum_densities(&mut self, all: bool) {
         let PairSums { plan, pairs, species, densities, counts, .. } = self;
         densities.clear();
@@ -279,11 +278,11 @@ impl PairSums {
         self.has_all_densities = all || plan.passes.len() == plan.densities.len();
     }
 
-    /// Sums all densities of the model over the pairs of `particles` in `surroundings`, or over those that were found
-    /// last. Forces can be computed after that only in the latter case.
+    /// Sums all densities of the model over the pairs of `particles` in `surroundings`, or over the
+    /// last pairs that were found. Only in the latter case can forces be computed afterwards.
     ///
     /// # Errors
-    /// As [`PairSums::first`].
+    /// Fails as [`PairSums::first`].
     pub fn sum_all_densities(
         &mut self,
         of: Option<(Surroundings, &Particles)>,
@@ -316,23 +315,23 @@ impl PairSums {
         self.excess_pass.run(&self.plan, Some(|i| species[i]), |i| tag[i], &mut rows)
     }
 
-    /// Numbers per particle that a host forwards to ghosts: [`Plan::slope_width`].
+    /// Number of slopes per particle that a host copies to ghosts: [`Plan::slope_width`].
     pub fn slope_width(&self) -> usize {
         self.plan.slope_width()
     }
 
-    /// `∂ψ/∂n` of owned particles, then room for those of ghosts.
+    /// Slopes `∂ψ/∂n` of owned particles, followed by room for those of ghosts.
     pub fn slopes(&self) -> &[f64] {
         &self.slopes
     }
 
-    /// The same, for the host to fill in the ghosts.
+    /// The slopes, for the host to write those of ghosts.
     pub fn slopes_mut(&mut self) -> &mut Vec<f64> {
         &mut self.slopes
     }
 
-    /// Uncorrected local densities of owned particles, one for each density and species,
-    /// density-major. Those that forces do not need are zero unless they were asked for.
+    /// Uncorrected local densities of owned particles, one for each density and species, density-major.
+    /// Densities that forces do not need are zero unless they were asked for.
     pub fn local_densities(&self) -> &[f64] {
         &self.densities
     }
@@ -342,14 +341,13 @@ impl PairSums {
         &self.excess
     }
 
-    /// Adds the forces to `force` and returns what was asked for.
+    /// Adds the forces to `force` and returns the requested totals.
     ///
-    /// `v` may be empty and `step` `None` where no thermostat acts; with `step` `None` only
-    /// conservative forces are computed. Under [`Newton::On`] forces on ghosts are added too, and the
-    /// host brings them home.
+    /// `v` may be empty and `step` `None` if no thermostat acts; with `step` `None` only conservative forces are
+    /// computed. Under [`Newton::On`] forces on ghosts are added too, and the host returns them to the owners.
     ///
     /// # Errors
-    /// A force that is not finite; arrays of other lengths than in [`PairSums::first`].
+    /// Fails for a force that is not finite, and for arrays of other lengths than in [`PairSums::first`].
     pub fn second(
         &mut self,
         particles: &Particles,
@@ -365,7 +363,7 @@ impl PairSums {
         let newton = self.pairs.newton();
         let needed = if newton == Newton::On { all } else { self.owned };
         if !self.ready {
-            return Err(EngineError::Host("forces without densities of the same configuration"));
+            return Err(EngineError::Host("the second half of an evaluation needs the first half before it"));
         }
         if self.slopes.len() != all * self.plan.slope_width() {
             return Err(EngineError::Host("slopes were not forwarded to every ghost"));

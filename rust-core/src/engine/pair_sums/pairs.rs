@@ -1,15 +1,15 @@
-//! The pairs of one step, and who computes which.
+//! The pairs of one step, and the rule which rank computes which pair.
 
 use crate::engine::surroundings::Newton;
 
-/// The pairs of one configuration. All have at least one owned particle, which comes first.
+/// The pairs of one configuration. Each has at least one owned particle, which comes first.
 #[derive(Debug, Clone, Default)]
 pub struct Pairs {
     owned: usize,
     newton: Newton,
-    /// Those whose force is computed here.
+    /// Pairs whose force is computed here.
     force: PairList,
-    /// Those that only count in the density of the owned particle.
+    /// Pairs that only contribute to the density of the owned particle.
     density_only: PairList,
 }
 
@@ -22,14 +22,14 @@ pub struct PairList {
     pub species_j: Vec<u8>,
     pub d: [Vec<f64>; 3],
     pub r: Vec<f64>,
-    /// Strength of the conservative interaction; empty if every pair has its full one.
+    /// Factor of the conservative interaction; empty if all factors are 1.
     pub factor: Vec<f64>,
-    /// Strength of drag and noise; empty if every pair has its full one.
+    /// Factor of drag and noise; empty if all factors are 1.
     pub thermostat_factor: Vec<f64>,
 }
 
 impl PairList {
-    /// Bytes held in arrays.
+    /// Size in bytes of the arrays.
     pub fn bytes(&self) -> usize {
         fn of<T>(array: &Vec<T>) -> usize {
             array.capacity() * size_of::<T>()
@@ -87,7 +87,7 @@ impl Pairs {
         self.density_only.clear();
     }
 
-    /// Adds the pair `a`, `b` with `d = r_a − r_b`; one of them is owned.
+    /// Adds the pair `a`, `b` with `d = r_a − r_b`; at least one particle is owned.
     #[inline(always)]
     pub fn push(&mut self, a: usize, b: usize, d: [f64; 3], tag: &[i32], species: &[i32]) {
         let (i, j, d) = if a < self.owned { (a, b, d) } else { (b, a, d.map(|c| -c)) };
@@ -96,13 +96,13 @@ impl Pairs {
         list.push(i, j, d, species);
     }
 
-    /// Adds a pair of two particles in a box that are both owned, the second perhaps an image, with `d = r_i − r_j`.
+    /// Adds a pair of two owned particles in a box, of which the second may be an image, with `d = r_i − r_j`.
     #[inline(always)]
     pub fn push_in_box(&mut self, i: usize, j: usize, d: [f64; 3], species: &[i32]) {
         self.force.push(i, j, d, species);
     }
 
-    /// As [`Pairs::push`], for pairs of strength `factor`. Either all pairs come this way or none.
+    /// Adds a pair as [`Pairs::push`], with a factor. Either all pairs are added by this function or none.
     pub fn push_scaled(
         &mut self,
         a: usize,
@@ -123,12 +123,12 @@ impl Pairs {
         &self.force
     }
 
-    /// The pairs that another rank, or another image, computes the force of.
+    /// The pairs whose force another rank, or another image, computes.
     pub fn density_only(&self) -> &PairList {
         &self.density_only
     }
 
-    /// Both, for strengths that are known once all pairs are.
+    /// Both lists, for factors that are set after all pairs are found.
     pub fn lists_mut(&mut self) -> [&mut PairList; 2] {
         [&mut self.force, &mut self.density_only]
     }
@@ -138,14 +138,14 @@ impl Pairs {
     }
 }
 
-/// Whether the rank that owns `i` computes its pair with the ghost `j`. Of the two ranks that see the
-/// pair, from either side, exactly one says yes; parity of the tags shares the work evenly.
+/// Whether the rank that owns `i` computes its pair with the ghost `j`. Of the two ranks that have the
+/// pair exactly one does; the parity of the tags divides the work evenly.
 #[inline(always)]
 fn computes(tag_i: i32, tag_j: i32, d: [f64; 3]) -> bool {
     if tag_i != tag_j {
         (tag_i < tag_j) == ((tag_i ^ tag_j) & 1 == 1)
     } else {
-        // A particle and its own image: the mirrored pair has −d.
+        // For a particle and its own image, the mirrored pair has −d.
         let first = d.iter().find(|c| **c != 0.0).copied().unwrap_or(0.0);
         first > 0.0
     }

@@ -1,10 +1,10 @@
-//! Pairs within the cut-off, by cells.
+//! Finds pairs within the cut-off, by cells.
 
-/// Cell search over open space: ghosts and images are points like any other.
+/// Cell search over open space: ghosts and images are points like all others.
 ///
-/// Particles are counting-sorted into cells no narrower than the cut-off; each looks at the rest of its
-/// own cell and at half of the neighbouring ones. Cells are contiguous along x, so half the stencil is
-/// five windows of the sorted array.
+/// Particles are counting-sorted into cells at least as wide as the cut-off; each is compared with the
+/// later particles of its own cell and those of half of the neighbouring cells. Cells are contiguous
+/// along x, so that half the stencil is five ranges of the sorted array.
 #[derive(Debug, Clone, Default)]
 pub struct CellSearch {
     cells: [usize; 3],
@@ -14,19 +14,19 @@ pub struct CellSearch {
     /// Original index by sorted index.
     order: Vec<u32>,
     x: [Vec<f64>; 3],
-    /// Sorted indices near the particle in hand; the first `near` of them are valid.
+    /// Sorted indices near the current particle; the first `near` of them are valid.
     found: Vec<u32>,
     near: usize,
 }
 
-/// Marks a point that takes no part.
+/// The cell of a point that is left out.
 const OUTSIDE: u32 = u32::MAX;
 
 impl CellSearch {
-    /// Calls `visit` with `a`, `b` and `x_a − x_b` of every pair of points closer than `cutoff` of which one is among the
-    /// `owned` first and both take part, each once, in an order that depends on the points alone.
+    /// Calls `visit` with `a`, `b` and `x_a − x_b` of every pair of points closer than `cutoff`, each once, in an
+    /// order that depends on the points alone. One of the two is among the first `owned`, and neither is left out.
     ///
-    /// Those that take part must have finite coordinates. In two dimensions the third counts for nothing.
+    /// Points that are not left out must have finite coordinates. In two dimensions the third coordinate is ignored.
     pub fn find(
         &mut self,
         x: &[[f64; 3]],
@@ -41,7 +41,7 @@ impl CellSearch {
         }
     }
 
-    /// Sorts points into cells; returns how many take part.
+    /// Sorts points into cells; returns the number of points that are not left out.
     fn sort(
         &mut self,
         x: &[[f64; 3]],
@@ -62,7 +62,8 @@ impl CellSearch {
         if count == 0 {
             return 0;
         }
-        // A few runaways must not make a grid of empty cells: not many more cells than particles.
+        // The number of cells is limited by that of particles: a few distant particles must
+        // not cause a grid of empty cells.
         let most = (4 * count + 64) as f64;
         let mut width = [cutoff; 3];
         loop {
@@ -106,7 +107,7 @@ impl CellSearch {
             self.x[c].resize(count, 0.0);
         }
         // Filling from the back keeps the order of particles within a cell and turns `start` of each
-        // cell, now its end, into its beginning.
+        // cell, which is now its end, into its beginning.
         for k in (0..x.len()).rev() {
             let cell = self.cell_of[k];
             if cell == OUTSIDE {
@@ -120,7 +121,7 @@ impl CellSearch {
                 self.x[c][slot] = if c < dimensions { x[k][c] } else { 0.0 };
             }
         }
-        // `start[cell + 1]` is now where `cell` begins: shift.
+        // `start[cell + 1]` is now the start of `cell`: the array moves by one.
         self.start.remove(0);
         self.start.push(count as u32);
         count
@@ -132,7 +133,7 @@ impl CellSearch {
         let mut windows: [(usize, usize); 5] = [(0, 0); 5];
         for cz in 0..nz {
             for cy in 0..ny {
-                // The other rows of half the stencil: (y+1, z), (y−1, z+1), (y, z+1), (y+1, z+1).
+                // The other rows of half the stencil are (y+1, z), (y−1, z+1), (y, z+1) and (y+1, z+1).
                 let rows = [(1, 0), (-1, 1), (0, 1), (1, 1)].map(|(dy, dz): (isize, isize)| {
                     let (y, z) = (cy as isize + dy, cz as isize + dz);
                     let inside = y >= 0 && y < ny as isize && z < nz as isize;
@@ -161,7 +162,7 @@ impl CellSearch {
         (self.start[first] as usize, self.start[last + 1] as usize)
     }
 
-    /// Puts the sorted indices in range of `i` into `found`, without a branch per candidate.
+    /// Writes the sorted indices in range of `i` to `found`, without a branch for each candidate.
     #[inline(always)]
     fn collect(&mut self, i: usize, windows: &[(usize, usize); 5], cutoff_squared: f64) {
         let candidates: usize = windows.iter().map(|(a, b)| b.saturating_sub(*a)).sum();

@@ -1,5 +1,4 @@
-//! Special pairs: their strengths in the lists of pairs of the reference, and what they add to a sweep, which leaves them
-//! out.
+//! Special pairs: their factors in the lists of pairs, and their contributions to a sweep, which leaves them out.
 
 use super::densities::add_density;
 use super::forces::{ForceInput, ForceOutput, add_forces};
@@ -14,10 +13,10 @@ use psidpd_passes::noise::PairNoise;
 use psidpd_passes::tally::{Tally, Want};
 use std::collections::HashMap;
 
-/// Gives the special ones among pairs that have been found their strengths, and none to those that marks exclude.
+/// Sets the factors of special pairs in the list, and factors of 0 for pairs that marks exclude.
 ///
 /// # Errors
-/// A box in which two particles meet in several images, of which it is not said which one is special.
+/// Fails in a box where two particles meet in several images, as the special pair is then ambiguous.
 pub fn scale(
     pairs: &mut Pairs,
     special: &[SpecialPair],
@@ -28,7 +27,7 @@ pub fn scale(
 ) -> Result<(), EngineError> {
     if !special.is_empty() && (0..dimensions).any(|k| domain.periodic()[k] && domain.height(k) < 2.0 * cutoff)
     {
-        return Err(EngineError::Host("special pairs in a box narrower than twice the cut-off"));
+        return Err(EngineError::Host("special pairs need a box at least twice as wide as the cut-off"));
     }
     let key = |i: u32, j: u32| (i.min(j), i.max(j));
     let factors: HashMap<_, _> = special.iter().map(|p| (key(p.i, p.j), p.factor)).collect();
@@ -43,21 +42,21 @@ pub fn scale(
     Ok(())
 }
 
-/// What special pairs add to an evaluation that leaves them out: to densities before ψ is evaluated, and to forces and totals
-/// at the end.
+/// The contributions of special pairs to an evaluation that leaves them out: to densities before ψ is
+/// evaluated, and to forces and totals at the end.
 #[derive(Debug, Clone, Default)]
 pub struct Corrections {
-    /// Special pairs within the cut-off that do interact.
+    /// Special pairs within the cut-off with a factor above 0.
     pairs: PairList,
     owned: usize,
 }
 
 impl Corrections {
-    /// Finds the special pairs that are within the cut-off, and what they add to the densities that forces need: for
-    /// each owned particle [`Plan::slope_width`] numbers, or none at all if there is nothing to add.
+    /// Finds the special pairs within the cut-off, and their contributions to the densities that forces
+    /// need: for each owned particle [`Plan::slope_width`] numbers, or an empty list if there are none.
     ///
     /// # Errors
-    /// A pair of particles that are not there, or of none that is owned.
+    /// Fails for a pair of particles that do not exist, and for a pair without an owned particle.
     #[expect(clippy::too_many_arguments)] // What a host knows of its pairs.
     pub fn find(
         &mut self,
@@ -81,13 +80,13 @@ impl Corrections {
         for pair in special {
             let (i, j) = (pair.i as usize, pair.j as usize);
             if i >= owned || j >= x.len() {
-                return Err(EngineError::Host("a special pair names a particle that is not there"));
+                return Err(EngineError::Host("a special pair names a particle that does not exist"));
             }
             if pair.factor == 0.0 || excluded(i, j) {
                 continue;
             }
             let mut d = std::array::from_fn(|c| x[i][c] - x[j][c]);
-            // Within the cut-off there is one image at most.
+            // At most one image is within the cut-off.
             if square(&d) >= squared && is_periodic {
                 d = domain.minimum_image(x[i], x[j]);
             }
@@ -111,16 +110,16 @@ impl Corrections {
         Ok(())
     }
 
-    /// Whether there is nothing to add.
+    /// Whether there are no contributions.
     pub fn is_empty(&self) -> bool {
         self.pairs.len() == 0
     }
 
-    /// Adds the forces on owned particles, and returns the share of the totals. A pair with a ghost
-    /// counts half, as in a sweep.
+    /// Adds the forces on owned particles, and returns the contribution to the totals. A pair with a
+    /// ghost counts half, as in a sweep.
     ///
     /// # Errors
-    /// A force that is not finite.
+    /// Fails for a force that is not finite.
     #[expect(clippy::too_many_arguments)] // An evaluation is of all these.
     pub fn add_forces(
         &self,
@@ -152,7 +151,7 @@ impl Corrections {
         };
         add_forces(&input, &mut output);
         let tally = output.tally;
-        // A force that is not finite makes the sum none.
+        // If one force is not finite, neither is the sum.
         let of = |list: &[u32]| list.iter().filter_map(|k| force.get(*k as usize)).flatten().sum::<f64>();
         if (of(&self.pairs.i) + of(&self.pairs.j)).is_finite() {
             return Ok(tally);
@@ -165,7 +164,7 @@ impl Corrections {
         }
     }
 
-    /// Bytes held in arrays over pairs.
+    /// Size in bytes of the arrays over pairs.
     pub fn memory(&self) -> usize {
         self.pairs.bytes()
     }

@@ -1,4 +1,4 @@
-//! The pairs of a box by the vectors of the sweep's search, measured in double precision.
+//! Finds the pairs of a box by the vectorised search of the sweep, with distances in double precision.
 
 use super::pairs::Pairs;
 use crate::engine::particles::Particles;
@@ -18,7 +18,7 @@ pub struct SweepPairs {
     pool: Pool,
     dimensions: usize,
     range: f64,
-    /// Weights that are greater than 0 within the range.
+    /// Weights greater than 0 within the range.
     tables: WeightTables,
     kinds: Vec<i32>,
     tags: Vec<i32>,
@@ -33,7 +33,7 @@ impl std::fmt::Debug for SweepPairs {
 }
 
 impl SweepPairs {
-    /// The search for pairs in the range of the conservative interactions.
+    /// Creates the search for pairs in the range of the conservative interactions.
     pub fn new(fluid: &Fluid) -> SweepPairs {
         let (range, species) = (fluid.conservative_range(), fluid.species.len());
         let inverse_range = 1.0 / (range * (1.0 + MARGIN));
@@ -55,8 +55,8 @@ impl SweepPairs {
         }
     }
 
-    /// Adds the pairs of particles at `x`; whether it can. It cannot where a particle may meet two images of another, or a
-    /// position is not finite.
+    /// Adds the pairs of particles at `x`, and returns whether it could: it cannot if a particle may be
+    /// near two images of another, or if a position is not finite.
     pub fn find(&mut self, x: &[[f64; 3]], species: &[i32], domain: &PeriodicBox, pairs: &mut Pairs) -> bool {
         let SweepPairs { lists, pool, dimensions, range, tables, kinds, tags, planes, places } = self;
         let is_periodic = [0, 1, 2].map(|k| domain.periodic()[k] && k < *dimensions);
@@ -109,7 +109,8 @@ mod tests {
         Model::parse("m.toml", &text).unwrap().at(1.0).unwrap()
     }
 
-    /// Those of the search by cells and images, also of particles outside of the box, on one point, and next to each other.
+    /// The pairs are those of the search by cells and images, also for particles outside the box, at
+    /// one point, and close together.
     #[test]
     fn pairs_are_those_of_the_plain_search() {
         let skew = Matrix3::new(4.0, 1.0, 0.5, 0.0, 5.0, -1.0, 0.0, 0.0, 3.0);

@@ -1,15 +1,15 @@
-//! The fast engine: the same forces as [`PairSums`](super::pair_sums::PairSums), by one traversal of all cells, without a
-//! neighbour list. `docs/engine.md` explains it with figures. At the speed of DPD particles a neighbour list would live a few
-//! steps and cost more than it saves.
+//! The sweep computes the same forces as [`PairSums`](super::pair_sums::PairSums), by one traversal of
+//! all cells, without a neighbour list. `docs/engine.md` explains it with figures. DPD particles move
+//! so fast that a neighbour list would be valid for a few steps only and cost more than it saves.
 //!
-//! The crate `psidpd_passes` has the loops over cells and pairs, `psidpd_threads` the threads. Here are
+//! The crate `psidpd_passes` contains the loops over cells and pairs, `psidpd_threads` the threads. This module contains
 //!
 //! - [`terms`]: the plan as tables of numbers for those loops.
-//! - [`region`]: the region that is swept, and its cells.
+//! - [`region`]: the region of the sweep, and its cells.
 //! - [`workspace`]: arrays, sorting, ψ, and the scheduler that sends planes through the passes.
 //! - [`pair_lists`]: lists of the pairs in a range, for the thermostat apart from the forces.
-//! - [`places`]: those pairs measured in double precision.
-//! - [`Sweep`]: what hosts see.
+//! - [`places`]: double-precision positions for those pairs.
+//! - [`Sweep`]: the interface for hosts.
 
 mod pair_lists;
 mod places;
@@ -45,8 +45,8 @@ use std::time::Instant;
 use times::lap;
 use workspace::{ForceSink, Input, Workspace};
 
-/// Forces of one fluid. Without ghosts an evaluation is [`Sweep::evaluate`]. On a rank of a host with ghosts it is
-/// [`Sweep::first`], a round of slopes from owners to ghosts, and [`Sweep::second`].
+/// The forces of one fluid. Without ghosts an evaluation is [`Sweep::evaluate`]. With ghosts a host
+/// calls [`Sweep::first`], copies slopes from owners to ghosts, and calls [`Sweep::second`].
 pub struct Sweep {
     plan: Plan,
     settings: Settings,
@@ -54,12 +54,12 @@ pub struct Sweep {
     pool: Arc<Pool>,
     workspace: EitherPrecision,
     species_of_type: Vec<i32>,
-    /// What is added to the densities of owned particles in the evaluation to come, beside pairs: a row of
-    /// [`Plan::slope_width`] for each, or nothing.
+    /// Additions to the densities of owned particles in the next evaluation: a row of
+    /// [`Plan::slope_width`] for each, or an empty list.
     added_densities: Vec<f64>,
     /// Pairs that do not interact.
     exclusions: Exclusions,
-    /// In the host's order, where it has ghosts.
+    /// Slopes in the host's order, if it has ghosts.
     slopes: Vec<f64>,
     owned: usize,
     all: usize,
@@ -68,13 +68,13 @@ pub struct Sweep {
     ready: bool,
 }
 
-/// One of both.
+/// A workspace in mixed or in double precision.
 enum EitherPrecision {
     Mixed(Box<Workspace<Mixed>>),
     Double(Box<Workspace<Double>>),
 }
 
-/// Does the same with the workspace of either precision.
+/// Runs the same expression with the workspace of either precision.
 macro_rules! with {
     ($both:expr, $workspace:ident => $do:expr) => {
         match $both {
@@ -91,7 +91,7 @@ impl std::fmt::Debug for Sweep {
 }
 
 impl Clone for Sweep {
-    /// An engine of its own for the same fluid, with the same threads, before any evaluation.
+    /// Creates a new sweep for the same fluid, with the same threads, before any evaluation.
     fn clone(&self) -> Sweep {
         let mut clone = Sweep::of_plan(self.plan.clone(), self.settings, self.pool.clone());
         clone.species_of_type.clone_from(&self.species_of_type);
@@ -100,15 +100,15 @@ impl Clone for Sweep {
 }
 
 impl Sweep {
-    /// An engine for `fluid`; types are species indices until [`Sweep::map_kinds`] says otherwise.
+    /// Creates a sweep for `fluid`; types are species indices unless [`Sweep::map_kinds`] maps them.
     ///
     /// # Errors
-    /// As [`Plan::new`].
+    /// Fails as [`Plan::new`].
     pub fn new(fluid: &Fluid, settings: Settings) -> Result<Sweep, TooLarge> {
         Ok(Sweep::of_plan(Plan::new(fluid)?, settings, Arc::new(Pool::new(settings.threads))))
     }
 
-    /// The engine of a plan that is there already, with threads that others may use too.
+    /// Creates the sweep of a given plan, with a thread pool that others may use too.
     pub fn of_plan(plan: Plan, mut settings: Settings, pool: Arc<Pool>) -> Sweep {
         let set = InstructionSet::new(settings.instructions).unwrap_or_else(InstructionSet::best);
         settings.instructions = set.instructions();
@@ -136,42 +136,43 @@ impl Sweep {
         }
     }
 
-    /// The plan.
+    /// The plan of the fluid's passes.
     pub fn plan(&self) -> &Plan {
         &self.plan
     }
 
-    /// What was chosen, with the instruction set in use.
+    /// The settings, with the instruction set in use.
     pub fn settings(&self) -> Settings {
         self.settings
     }
 
-    /// Where the time went.
+    /// Times of the parts of evaluations.
     pub fn times(&self) -> Times {
         self.times
     }
 
-    /// The threads.
+    /// The pool of threads.
     pub fn pool(&self) -> &Arc<Pool> {
         &self.pool
     }
 
-    /// What the passes have done since the engine was made, counted in the passes: search groups, batches of pairs (for each
-    /// density, with noise, with energies and virials), blocks of particles with a ψ that depends on a density, and planes
-    /// with forces. A pass that has never run has a count of zero.
+    /// Counts of the passes since the sweep was created: search groups, batches of pairs (for each
+    /// density, with noise, with energies and virials), blocks of particles with a ψ that depends on a
+    /// density, and planes with forces. A pass that has never run has a count of zero.
     pub fn counts(&self) -> PassCounts {
         with!(&self.workspace, m => m.counts())
     }
 
-    /// As [`PairSums::out_of_bounds`](super::pair_sums::PairSums::out_of_bounds).
+    /// Numbers of evaluations out of bounds, as
+    /// [`PairSums::out_of_bounds`](super::pair_sums::PairSums::out_of_bounds).
     pub fn out_of_bounds(&self) -> [u64; 2] {
         with!(&self.workspace, m => m.out_of_bounds())
     }
 
-    /// As [`PairSums::map_kinds`](super::pair_sums::PairSums::map_kinds).
+    /// Maps types to species, as [`PairSums::map_kinds`](super::pair_sums::PairSums::map_kinds).
     ///
     /// # Errors
-    /// A species index out of range.
+    /// Fails for a species index out of range.
     pub fn map_kinds(&mut self, species_of_type: &[i32]) -> Result<(), EngineError> {
         if species_of_type.iter().any(|s| *s >= self.plan.species.len() as i32) {
             return Err(EngineError::Host("a type is mapped to a species the model does not have"));
@@ -180,24 +181,25 @@ impl Sweep {
         Ok(())
     }
 
-    /// For evaluations to come: which pairs do not interact, and what to add to the densities of owned particles beside
-    /// pairs, a row of [`Plan::slope_width`] for each, or nothing.
+    /// For later evaluations: the excluded pairs, and additions to the densities of owned particles, a
+    /// row of [`Plan::slope_width`] for each, or an empty list.
     pub(super) fn beside_mut(&mut self) -> (&mut Exclusions, &mut Vec<f64>) {
         (&mut self.exclusions, &mut self.added_densities)
     }
 
-    /// Which pairs do not interact.
+    /// The excluded pairs.
     pub(super) fn exclusions(&self) -> &Exclusions {
         &self.exclusions
     }
 
-    /// The same, to be changed.
+    /// The excluded pairs, for changes.
     pub(super) fn exclusions_mut(&mut self) -> &mut Exclusions {
         &mut self.exclusions
     }
 
-    /// Whether particles in `domain` meet one image only of each other, as a sweep without ghosts needs:
-    /// periods of twice the cut-off or more, and edges as LAMMPS has them, along the axes if some directions are open.
+    /// Whether particles in `domain` are near at most one image of each other, as a sweep without
+    /// ghosts requires: periods are at least twice the cut-off, and edges are oriented as in LAMMPS,
+    /// along the axes if some directions are open.
     pub fn fits(&self, domain: &PeriodicBox) -> bool {
         let geometry = BoxGeometry::of_box(domain, self.plan.dimensions);
         is_open(domain, self.plan.dimensions)
@@ -206,17 +208,17 @@ impl Sweep {
                 .is_some_and(|f| CellGrid::new(&f, cutoff(&self.plan), 1).is_some())
     }
 
-    /// All forces on particles in a box: writes them to `force`, or adds them to what is there, and returns what was asked
-    /// for. Nothing but densities and ψ is kept of all particles on the way: one plane of cells after another has all its
-    /// passes.
+    /// Computes all forces on particles in a box, writes them to `force` or adds them to it, and
+    /// returns the requested totals. Only densities and ψ are stored for all particles: each plane of
+    /// cells passes through all steps in turn.
     ///
-    /// `v` may be empty and `step` `None` where no thermostat acts; with `step` `None` only conservative
-    /// forces are computed. Of `want`, the totals: what is asked for of each particle is the business
-    /// of [`PairSums`](super::pair_sums::PairSums).
+    /// `v` may be empty and `step` `None` if no thermostat acts; with `step` `None` only conservative
+    /// forces are computed. Of `want` the sweep computes the totals only;
+    /// [`PairSums`](super::pair_sums::PairSums) computes energies and virials of single particles.
     ///
     /// # Errors
-    /// A position, ψ or a force that is not finite; then some forces may have been written. A tag or type out of range,
-    /// arrays of different lengths, ghosts, a box that does not fit.
+    /// Fails for a position, ψ or force that is not finite, when some forces may have been written; also for
+    /// a tag or type out of range, arrays of different lengths, ghosts, and a box that does not fit.
     #[allow(clippy::too_many_arguments)]
     pub fn evaluate(
         &mut self,
@@ -230,7 +232,7 @@ impl Sweep {
     ) -> Result<Tally, EngineError> {
         let thermostat = self.begin(particles, v, step, want)?;
         if self.owned < self.all {
-            return Err(EngineError::Host("where all particles are in hand there are no ghosts"));
+            return Err(EngineError::Host("ghosts are not allowed in an evaluation of the whole box"));
         }
         if force.len() < self.owned {
             return Err(EngineError::Host("the force array is too short"));
@@ -253,12 +255,12 @@ impl Sweep {
         Ok(tally)
     }
 
-    /// Finds pairs on a rank, adds the forces that need no density, sums densities and evaluates ψ; other arguments are
-    /// those of [`Sweep::evaluate`].
+    /// Finds pairs on a rank, adds the forces without density terms, sums densities and evaluates ψ;
+    /// the other arguments are those of [`Sweep::evaluate`].
     ///
     /// # Errors
-    /// A position or ψ that is not finite, a tag or type out of range, arrays of different lengths, a box that does
-    /// not [fit](Sweep::fits).
+    /// Fails for a position or ψ that is not finite, a tag or type out of range, arrays of different
+    /// lengths, and a box that does not [fit](Sweep::fits).
     pub fn first(
         &mut self,
         around: Around,
@@ -270,7 +272,7 @@ impl Sweep {
         let thermostat = self.begin(particles, v, step, want)?;
         let Around { domain, images } = around;
         if !images.is_empty() && images.len() != self.all - self.owned {
-            return Err(EngineError::Host("not as many ghosts as it was said of whether they are images"));
+            return Err(EngineError::Host("`images` must have one entry per ghost"));
         }
         let input =
             Input::new(particles, images, v, &self.species_of_type, &self.added_densities, thermostat, want)
@@ -291,7 +293,7 @@ impl Sweep {
         Ok(())
     }
 
-    /// Checks what an evaluation is given, and remembers what it is of; the thermostat, if it acts.
+    /// Checks the input of an evaluation, and stores its sizes; returns the thermostat, if it acts.
     fn begin(
         &mut self,
         particles: &Particles,
@@ -304,7 +306,7 @@ impl Sweep {
         if particles.tag.len() != all || particles.kind.len() != all || particles.owned > all {
             return Err(EngineError::Host("particle arrays have different lengths"));
         }
-        // Thirty-two times a place is a word; copies of a plane have places too.
+        // Thirty-two times an index must fit into a word; copies of a plane have indices too.
         if all > 1 << 26 {
             return Err(EngineError::Host("more than 2^26 particles and ghosts on one rank"));
         }
@@ -318,36 +320,37 @@ impl Sweep {
         Ok(thermostat)
     }
 
-    /// Numbers per particle that a host forwards to ghosts: [`Plan::slope_width`].
+    /// Number of slopes per particle that a host copies to ghosts: [`Plan::slope_width`].
     pub fn slope_width(&self) -> usize {
         self.plan.slope_width()
     }
 
-    /// `∂ψ/∂n` of owned particles, then those of ghosts, after [`Sweep::first`]; empty after [`Sweep::evaluate`].
+    /// Slopes `∂ψ/∂n` of owned particles, followed by those of ghosts, after [`Sweep::first`];
+    /// empty after [`Sweep::evaluate`].
     pub fn slopes(&self) -> &[f64] {
         &self.slopes
     }
 
-    /// Fetches the slopes of owned particles after [`Sweep::evaluate`], with room for `all`: for a host's questions about
-    /// single pairs, before which nobody needs them.
+    /// Copies the slopes of owned particles after [`Sweep::evaluate`], with room for `all`, for the
+    /// energies and forces of single pairs.
     pub fn fetch_slopes(&mut self, all: usize) {
         with!(&self.workspace, m => m.slopes_to_host(&mut self.slopes));
         self.slopes.resize(self.slope_width() * all, 0.0);
     }
 
-    /// The same, for the host to fill in the ghosts.
+    /// The slopes, for the host to write those of ghosts.
     pub fn slopes_mut(&mut self) -> &mut [f64] {
         &mut self.slopes
     }
 
-    /// Adds many-body forces; writes all forces on owned particles to `force`, or adds them to what is
-    /// there, and returns what was asked for.
+    /// Adds many-body forces; writes all forces on owned particles to `force`, or adds them to it,
+    /// and returns the requested totals.
     ///
-    /// A pair of an owned particle and a ghost is computed for the owned particle alone: its other half
-    /// is that of the other rank, and half of its energy and virial.
+    /// A pair of an owned particle and a ghost is computed for the owned particle alone, with half of
+    /// its energy and virial: the rank of the ghost computes the other half.
     ///
     /// # Errors
-    /// A force that is not finite; arrays of other lengths than in [`Sweep::first`].
+    /// Fails for a force that is not finite, and for arrays of other lengths than in [`Sweep::first`].
     pub fn second(
         &mut self,
         particles: &Particles,
@@ -355,7 +358,7 @@ impl Sweep {
         add: bool,
     ) -> Result<Tally, EngineError> {
         if !std::mem::take(&mut self.ready) {
-            return Err(EngineError::Host("forces without densities of the same configuration"));
+            return Err(EngineError::Host("the second half of an evaluation needs the first half before it"));
         }
         if particles.x.len() != self.all || particles.owned != self.owned || force.len() < self.owned {
             return Err(EngineError::Host("particles changed between densities and forces"));
@@ -371,28 +374,29 @@ impl Sweep {
         })
     }
 
-    /// ψ and local densities of owned particles, in the host's order: as
+    /// ψ and local densities of owned particles in the host's order, as
     /// [`PairSums::excess`](super::pair_sums::PairSums::excess) and
-    /// [`PairSums::local_densities`](super::pair_sums::PairSums::local_densities), those that forces do not need being zero.
+    /// [`PairSums::local_densities`](super::pair_sums::PairSums::local_densities); densities
+    /// that forces do not need are zero.
     pub fn local_densities(&self, excess: &mut Vec<f64>, densities: &mut Vec<f64>) {
         let variables = self.plan.densities.len() * self.plan.species.len();
         with!(&self.workspace, m => m.to_host(variables, excess, densities));
     }
 
-    /// The host's numbers of its particles in the order of cells: an order to keep them in that makes
-    /// sorting cheap.
+    /// The host's numbers of its particles in the order of cells; a host that keeps its particles in
+    /// this order makes sorting cheap.
     pub fn order(&self) -> &[u32] {
         with!(&self.workspace, m => m.order())
     }
 
-    /// Bytes held in arrays over particles and pairs.
+    /// Size in bytes of the arrays over particles and pairs.
     pub fn memory(&self) -> usize {
         let numbers = self.slopes.capacity() + self.added_densities.capacity();
         numbers * size_of::<f64>() + self.exclusions.bytes() + with!(&self.workspace, m => m.memory())
     }
 }
 
-/// How far particles reach. Where nothing acts at any distance they are sorted all the same.
+/// The cut-off of the cells. Particles without interactions are sorted too.
 fn cutoff(plan: &Plan) -> f64 {
     if plan.cutoff > 0.0 { plan.cutoff } else { 1.0 }
 }

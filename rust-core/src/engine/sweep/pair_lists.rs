@@ -1,7 +1,7 @@
-//! Lists of all pairs in the range of a thermostat, plane by plane, for whoever changes velocities apart from the forces.
+//! Lists of all pairs in the range of a thermostat, plane by plane, for integrators that apply it apart from the forces.
 //!
-//! Particles are in the order of cells, and within a cell in that of their tags: the whole order depends on positions and
-//! tags alone.
+//! Particles are in the order of cells, and within a cell in the order of their tags: the order
+//! depends on positions and tags alone.
 
 use super::region::region;
 use super::workspace::{CellOrder, Input, SortedParticles};
@@ -34,7 +34,7 @@ impl AsMut<PlanePairs> for PlanePairs {
     }
 }
 
-/// Sorted particles, and work space.
+/// Sorted particles, and scratch arrays.
 pub struct PairLists {
     set: InstructionSet,
     dimensions: usize,
@@ -45,11 +45,11 @@ pub struct PairLists {
     place: Vec<u32>,
 }
 
-/// The place of particles that take no part.
+/// The sorted index of particles that are left out.
 pub const NOWHERE: u32 = u32::MAX;
 
 impl Clone for PairLists {
-    /// The same order; work space of its own.
+    /// Copies the order; the clone has scratch arrays of its own.
     fn clone(&self) -> PairLists {
         let PairLists { set, dimensions, cells, particles, place, .. } = self;
         PairLists {
@@ -80,7 +80,7 @@ impl PairLists {
         &self.cells.order
     }
 
-    /// The sorted index of each particle of the host; [`NOWHERE`] for those that take no part.
+    /// The sorted index of each particle of the host; [`NOWHERE`] for particles that are left out.
     pub fn place(&self) -> &[u32] {
         &self.place
     }
@@ -90,11 +90,13 @@ impl PairLists {
         &self.particles.ghost
     }
 
-    /// Finds the pairs of `particles` within `range`, and a little further with a `margin`, a part of it, where the box is wide
-    /// enough: those of each plane of cells, of two ghosts none. Kinds of a negative species take no part.
+    /// Finds the pairs of `particles` within `range`, extended by the fraction `margin` where the box
+    /// is wide enough, for each plane of cells; two ghosts form no pair. Particles of a type with a
+    /// negative species are left out.
     ///
     /// # Errors
-    /// A position that is not finite; a box narrower than twice the range, or that leans along an open direction.
+    /// Fails for a position that is not finite, and for a box narrower than twice the range
+    /// or skew along an open direction.
     #[allow(clippy::too_many_arguments)]
     pub fn find<T: AsMut<PlanePairs> + Default + Send>(
         &mut self,
@@ -111,7 +113,8 @@ impl PairLists {
         let set = self.set;
         let range = self.range_within(domain, range, margin)?;
         let (geometry, mut grid) = region(set, pool, (self.dimensions, range), domain, &input)?;
-        // Updates of one pair after the other go over planes that have no neighbour in common.
+        // Updates of single pairs need an even number of planes, so that planes updated at
+        // once have no neighbour in common.
         if geometry.periodic[grid.plane_axis] {
             grid.planes = grid.planes.max(2);
         }
@@ -155,15 +158,15 @@ impl PairLists {
                 let next = if *number + 1 < count { *number + 1 } else { 0 };
                 let follows = *number + 1 < count || cells.is_periodic();
                 plane.next = if follows { cells.particles_of(&(next..next + 1)) } else { 0..0 };
-                // SAFETY: all places are filled, those of the copies too, and nobody writes them here.
+                // SAFETY: `fill` has filled all particles and copies above, and no thread writes them here.
                 unsafe { list_pairs(set, inputs, *number, buffers, &mut plane.list) };
             }
         });
         Ok(())
     }
 
-    /// The range to search, a little less than `range` in a box that is just twice as wide: what is lost of a pair there, drag
-    /// and noise alike, is next to nothing.
+    /// The range of the search, slightly less than `range` in a box that is exactly twice as wide: drag
+    /// and noise at the range are almost zero there.
     fn range_within(&self, domain: &PeriodicBox, range: f64, margin: f64) -> Result<f64, EngineError> {
         let longest =
             (0..self.dimensions).map(|k| domain.edge(k).map(f64::abs).into_iter().fold(0.0, f64::max));
@@ -172,12 +175,12 @@ impl PairLists {
         let heights = (0..self.dimensions).filter(|k| periodic[*k]).map(|k| domain.height(k));
         let height = heights.fold(f64::INFINITY, f64::min);
         if height < 2.0 * range * (1.0 - 1e-12) {
-            return Err(EngineError::Host("a box narrower than twice the range of its thermostat"));
+            return Err(EngineError::Host("the box is narrower than twice the range of the thermostat"));
         }
         Ok((range * (1.0 + margin)).min(CellGrid::cutoff_within(height, longest)))
     }
 
-    /// Puts the particles of each cell into the order of their tags.
+    /// Sorts the particles of each cell by their tags.
     fn sort_by_tags(&mut self, pool: &Pool, tags: &[i32]) {
         let CellOrder { start, order, grid, .. } = &mut self.cells;
         let (cells, threads) = (grid.cell_count(), pool.threads());
@@ -212,7 +215,8 @@ impl PairLists {
         let shared = &self.particles.share();
         let mut work: Vec<_> = (0..threads).map(|t| cells.whole_vectors(t, threads)).collect();
         pool.each(&mut work, |places| {
-            // SAFETY: the places of threads are disjoint and begin at whole vectors; nobody reads them meanwhile.
+            // SAFETY: `whole_vectors` gives threads disjoint indices that begin at whole vectors; no
+            // thread reads the arrays meanwhile.
             unsafe { shared.fill(set, cells, input, places.clone()) };
         });
         self.particles.copy_first_plane(&self.cells);

@@ -1,34 +1,34 @@
-//! Where the sorted particles of pair lists are, to measure pairs in double precision: not in fractions of a region, which is
-//! of one rank, but by the coordinates of the host.
+//! Double-precision positions of the sorted particles of pair lists. They are coordinates of the host
+//! instead of fractions of a region, which differs between ranks.
 
 use psidpd_passes::domain::PeriodicBox;
 use std::ops::Range;
 
-/// By how much further pairs are searched, so that none is lost by rounding to single precision.
+/// Fraction by which the search range is extended, so that rounding to single precision loses no pair.
 pub const MARGIN: f64 = 1e-5;
 
-/// What is added to a number and subtracted again to round it: no instruction set has it otherwise than others.
+/// Adding and subtracting this constant rounds a number, alike on all instruction sets.
 const ROUND: f64 = 6_755_399_441_055_744.0;
 
-/// Sorted particles, behind them once more those of the first plane, which the last one sees.
+/// Positions of the sorted particles, followed by those of the first plane's copies, for pairs of the last plane.
 #[derive(Debug, Clone, Default)]
 pub struct Places {
     x: Vec<[f64; 3]>,
-    /// Indices of the host.
+    /// The host's index of each sorted particle.
     host: Vec<u32>,
     images: Images,
 }
 
-/// The periods of a box at least twice as wide as pairs.
+/// The periods of a box at least twice as wide as the range.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Images {
-    /// By period and component; zero for those there are none of.
+    /// Edge vectors by period and component; zero along open directions.
     edges: [[f64; 3]; 3],
     inverse: [[f64; 3]; 3],
 }
 
 impl Places {
-    /// Takes the places `x` of the host in `order`, and once more those of `copies`.
+    /// Copies the positions `x` of the host in `order`, and again those of `copies`.
     pub fn gather(
         &mut self,
         dimensions: usize,
@@ -55,7 +55,7 @@ impl Places {
         self.host.extend_from_within(copies);
     }
 
-    /// The places of sorted particles.
+    /// Positions of the sorted particles.
     pub fn x(&self) -> &[[f64; 3]] {
         &self.x
     }
@@ -65,15 +65,15 @@ impl Places {
         self.host[k] as usize
     }
 
-    /// The periods.
+    /// The periods of the box.
     pub fn images(&self) -> Images {
         self.images
     }
 }
 
 impl Images {
-    /// The nearest images of some vectors, by component: periods are taken off once, so that vectors of close particles lose no
-    /// digits.
+    /// Replaces vectors by their nearest images, component by component: each period is subtracted at
+    /// most once, so that vectors of close particles lose no digits.
     #[inline(always)]
     pub fn find_nearest<const N: usize>(&self, [x, y, z]: &mut [[f64; N]; 3]) {
         let Images { inverse: [a, b, c], edges: [e, f, g] } = self;

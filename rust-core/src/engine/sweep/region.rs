@@ -1,4 +1,4 @@
-//! The region that is swept, and its cells.
+//! The region of the sweep, and its cells.
 
 use super::workspace::{Input, extremes};
 use crate::engine::error::EngineError;
@@ -8,18 +8,18 @@ use psidpd_passes::ground::cell_grid::CellGrid;
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_threads::Pool;
 
-/// Whether no direction is periodic: then edges do not matter.
+/// Whether no direction is periodic: then the edges do not matter.
 pub fn is_open(domain: &PeriodicBox, dimensions: usize) -> bool {
     !domain.periodic()[..dimensions].iter().any(|p| *p)
 }
 
-/// Whether a box geometry is still one when open directions are as long as they have to be: what leans along one is none.
+/// Whether open directions of a box geometry can be extended; a box that is skew along an open direction cannot.
 pub fn can_stretch(geometry: &BoxGeometry) -> bool {
     geometry.is_fully_periodic() || !geometry.is_tilted()
 }
 
-/// The region to be swept for pairs within `cutoff`, and its cells: all of the box along its periodic directions, along
-/// the others what the particles span, with room for ghosts within reach of them.
+/// The region in which a sweep searches pairs within `cutoff`, and its cells: all of the box along periodic
+/// directions, and along the others the extent of the particles, with room for ghosts within reach.
 pub fn region(
     set: InstructionSet,
     pool: &Pool,
@@ -40,5 +40,5 @@ pub fn region(
     let count = input.particles.x.len();
     let grid =
         geometry.and_then(|geometry| CellGrid::new(&geometry, cutoff, count).map(|grid| (geometry, grid)));
-    grid.ok_or(EngineError::Host("the box is too narrow, or leans, for a sweep without images as ghosts"))
+    grid.ok_or(EngineError::Host("the box is too narrow or too skew for a sweep without ghost images"))
 }

@@ -61,7 +61,7 @@ pub fn terms<T: Scalar>(plan: &Plan) -> Terms<T> {
     terms
 }
 
-/// One over a range. A range of zero gives a number so large that every pair is beyond the range.
+/// The reciprocal of a range. A range of zero gives a number so large that every pair is beyond the range.
 fn inverse(range: f64) -> f64 {
     if range > 0.0 { 1.0 / range } else { f64::from(f32::MAX) }
 }
@@ -89,13 +89,13 @@ fn pass<T: Scalar>(kernel: &Kernel, force: &Kernel, factor: f64) -> Pass<T> {
     }
 }
 
-/// A soft repulsion between no pair of species.
+/// A soft repulsion of strength 0 for all pairs of species.
 fn no_soft<T: Scalar>(size: usize) -> Soft<T> {
     let zero = || SpeciesPairTable::of(size, T::default());
     Soft { strength: zero(), inverse_range: SpeciesPairTable::of(size, T::of(inverse(0.0))), energy: zero() }
 }
 
-/// Puts a potential into the first table of its form that has nothing for this pair of species yet.
+/// Adds a potential to the first table of its form that has no entry for this pair of species.
 fn add_pair<T: Scalar>(terms: &mut Terms<T>, term: &PairTerm, factor: f64) {
     let [a, b] = term.between;
     let entries = [a * terms.species + b, b * terms.species + a];

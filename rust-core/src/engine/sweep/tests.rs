@@ -11,7 +11,7 @@ mod miri_sized;
 mod ranks;
 use ranks::with_ghosts;
 
-/// A generator of points, the same everywhere.
+/// A reproducible generator of points.
 struct Points(u64);
 
 impl Points {
@@ -21,7 +21,7 @@ impl Points {
     }
 }
 
-/// Particles in a box, and what they move like.
+/// Particles in a box, with their velocities.
 #[derive(Clone)]
 struct Cloud {
     domain: PeriodicBox,
@@ -43,7 +43,7 @@ impl Cloud {
             }
             cloud.x.push(cloud.domain.point(s));
             cloud.v.push(v);
-            // Tags in no order.
+            // The tags are not in order.
             cloud.tag.push(1 + ((k * 7919) % count) as i32);
             cloud.kind.push((points.unit() * species as f64) as i32);
         }
@@ -61,7 +61,7 @@ impl Cloud {
 
 const STEP: Step = Step { seed: 11, number: 5, dt: 0.01 };
 
-/// Forces and totals by the reference.
+/// Computes forces and totals by the reference.
 fn plain(fluid: &Fluid, cloud: &Cloud) -> (Vec<[f64; 3]>, Tally) {
     let mut reference = PairSums::new(fluid).unwrap();
     let particles = cloud.particles();
@@ -81,7 +81,7 @@ fn every() -> impl Iterator<Item = (Precision, Instructions)> {
     precisions.into_iter().flat_map(move |p| sets.into_iter().filter(|i| i.available()).map(move |i| (p, i)))
 }
 
-/// Forces and totals by a sweep without ghosts.
+/// Computes forces and totals by a sweep without ghosts.
 fn swept(sweep: &mut Sweep, cloud: &Cloud, want: Want) -> (Vec<[f64; 3]>, Tally) {
     let particles = cloud.particles();
     let mut force = vec![[0.0; 3]; cloud.x.len()];
@@ -107,7 +107,7 @@ fn tally_difference(a: &Tally, b: &Tally) -> f64 {
     largest(a.iter().zip(&b).map(|(a, b)| (a - b).abs())) / scale
 }
 
-/// What each precision may be off by, in the largest force over the rms one.
+/// The largest error of a force for each precision, relative to the rms force.
 fn tolerance(precision: Precision) -> f64 {
     match precision {
         Precision::Mixed => 1e-5,
@@ -130,7 +130,7 @@ fn boxes(dimensions: usize, length: f64) -> Vec<PeriodicBox> {
     vec![cube.unwrap(), skew.unwrap()]
 }
 
-/// Every model file that ships, and some that have what those have not.
+/// Every model file that ships, and models with features that these lack.
 fn fluids() -> Vec<(String, Fluid)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../validation/models");
     let mut fluids: Vec<(String, Fluid)> = std::fs::read_dir(folder)
@@ -150,8 +150,8 @@ fn fluids() -> Vec<(String, Fluid)> {
     fluids
 }
 
-/// Two species, three densities of different range and kernel, one linear, bounds, a correction, self
-/// terms, every pair form, thermostats by pair.
+/// A fluid with two species, three densities of different range and kernel, one of them linear, bounds,
+/// a correction, self terms, every pair form, and thermostats by pair.
 const MANY: &str = r#"
 title = "everything at once"
 species = ["A", "B"]
@@ -232,7 +232,7 @@ range = 1.0
 exponent = 2
 "#;
 
-/// Three species and three densities, two of which reach equally far: more slopes than are read at once.
+/// A fluid with three species and three densities, two of which have the same range: more slopes than are read at once.
 const WIDE: &str = r#"
 title = "nine slopes"
 species = ["A", "B", "C"]
@@ -255,7 +255,7 @@ gamma = 4.5
 range = 1.0
 "#;
 
-/// Densities that reach much less far than a pair force.
+/// A fluid whose densities have a much shorter range than a pair force.
 const SHORT: &str = r#"
 title = "short densities"
 species = ["A", "B"]
@@ -301,7 +301,7 @@ fn every_model_by_every_path_has_the_forces_of_the_plain_engine() {
     for (name, fluid) in fluids() {
         let cutoff = fluid.cutoff();
         let density: f64 = if fluid.dimensions == 3 { 3.0 } else { 5.0 };
-        // As dense as can be evaluated by every model: huggins has a pole.
+        // The density is the highest that every model can evaluate: huggins has a pole.
         for (b, domain) in boxes(fluid.dimensions, 3.1 * cutoff).into_iter().enumerate() {
             let volume = domain.volume(fluid.dimensions) / cutoff.powi(fluid.dimensions as i32);
             let count = (density * volume) as usize;
@@ -375,8 +375,8 @@ fn avx512_gives_the_same_bits_with_vbmi2_and_without() {
     }
 }
 
-/// Accumulators are used again as a sweep goes through its planes, and slabs of threads begin anywhere: boxes of a few
-/// planes and of many, full and nearly empty ones, swept by the same engines one after another.
+/// Accumulators are reused as a sweep moves through its planes, and slabs of threads begin anywhere:
+/// the same sweeps evaluate boxes of few and many planes, full and nearly empty ones.
 #[test]
 fn any_number_of_layers_and_threads_gives_the_forces_of_the_plain_engine() {
     for fluid in [shipped("warren2003-set6.toml"), shipped("standard-dpd.toml"), many()] {
@@ -390,7 +390,7 @@ fn any_number_of_layers_and_threads_gives_the_forces_of_the_plain_engine() {
             let domain = PeriodicBox::orthogonal([0.0; 3], lengths, [true, true, periodic]).unwrap();
             let mut cloud = Cloud::new(domain, 3, fluid.species.len(), 25 * planes, planes as u64);
             for x in &mut cloud.x {
-                // Fewer and fewer with height.
+                // The density decreases with height.
                 x[2] *= x[2] / lengths[2];
             }
             let (force, tally) = plain(&fluid, &cloud);
@@ -405,7 +405,7 @@ fn any_number_of_layers_and_threads_gives_the_forces_of_the_plain_engine() {
     }
 }
 
-/// Of a box without ghosts, forces and densities of a few planes only are summed at a time.
+/// Without ghosts only the forces and densities of a few planes are summed at a time.
 #[test]
 fn longer_boxes_have_no_more_accumulators() {
     for (fluid, most) in [(shipped("warren2003-set6.toml"), 120.0), (many(), 200.0)] {
@@ -442,15 +442,15 @@ fn the_order_of_particles_matters_to_rounding_alone() {
         let same: Vec<[f64; 3]> = order.iter().map(|k| force[*k]).collect();
         assert!(difference(&same, &other) < tolerance(precision));
         assert!(tally_difference(&tally, &totals) < tolerance(precision));
-        // The order it hands out is one of its host's particles.
+        // The returned order contains each of the host's particles once.
         let mut order = sweep.order().to_vec();
         order.sort_unstable();
         assert!(order.iter().enumerate().all(|(k, o)| k as u32 == *o));
     }
 }
 
-/// Teams of eight particles in sparse rows, of four in others; few enough in some that an i-cluster is not full, or too far
-/// apart to look together.
+/// i-clusters have eight particles in sparse columns, and four in others; in some columns there are too
+/// few to fill an i-cluster, or they are too far apart to share one.
 #[test]
 fn rows_with_few_particles_and_with_many() {
     let fluids = [shipped("warren2003-set6.toml"), many(), shipped("van-der-waals-2d.toml")];
@@ -481,8 +481,8 @@ fn rows_with_few_particles_and_with_many() {
     assert!(i_cluster_sizes.contains(&4) && i_cluster_sizes.contains(&8));
 }
 
-/// Crowds of which one particle has more neighbours than a block has room for, walls without periods, and
-/// particles far from all others.
+/// Tests crowds in which a particle has more neighbours than a block has room for, walls without
+/// periods, and particles far from all others.
 #[test]
 fn crowds_open_sides_and_runaways() {
     let fluid = shipped("warren2003-set6.toml");
@@ -498,7 +498,7 @@ fn crowds_open_sides_and_runaways() {
         let mut sweep = Sweep::new(&fluid, settings(precision, instructions, 2)).unwrap();
         let (here, totals) = swept(&mut sweep, &cloud, Want::TOTALS);
         let off = difference(&force, &here);
-        // Positions are fractions of an extent of more than a thousand here.
+        // Positions are fractions of a region longer than a thousand here.
         let tolerance = if precision == Precision::Mixed { 1e-3 } else { 1e-12 };
         assert!(off < tolerance, "{precision}, {instructions}: {off:.1e}");
         assert!(tally_difference(&tally, &totals) < tolerance);
@@ -556,7 +556,7 @@ fn what_cannot_be_computed_is_named() {
         let narrow = PeriodicBox::orthogonal([0.0; 3], [5.0, 1.9, 5.0], [true; 3]).unwrap();
         assert!(matches!(fails(&good(), Some(&narrow)), EngineError::Host(_)));
         assert!(!sweep.fits(&narrow) && sweep.fits(&domain));
-        // And it goes on after errors.
+        // The sweep still works after errors.
         swept(&mut sweep, &good(), Want::TOTALS);
         let mut cloud = good();
         cloud.v[3] = [f64::NAN; 3];
@@ -587,7 +587,7 @@ fn faults_of_the_passes_name_their_particles() {
                 .unwrap_err()
         };
         for plane in 0..9 {
-            // Ten particles on nearly one point.
+            // Ten particles lie almost at one point.
             let mut cloud = Cloud::new(domain.clone(), 3, 1, 30, 4);
             for k in 0..10 {
                 cloud.x[k] = [2.0, 2.0 + 0.001 * k as f64, plane as f64 + 0.5];
@@ -596,7 +596,7 @@ fn faults_of_the_passes_name_their_particles() {
                 panic!("no fault")
             };
             assert!(cloud.tag[..10].contains(&tag), "{tag}");
-            // Two pairs of which one particle each has no velocity, in two planes.
+            // Two pairs in two planes each contain a particle without velocity.
             let mut cloud = Cloud::new(domain.clone(), 3, 1, 4, 4);
             for (k, z) in [(0, plane as f64 + 0.5), (2, 8.5 - plane as f64)] {
                 cloud.v[k] = [f64::NAN; 3];
@@ -623,10 +623,10 @@ fn passes_that_a_fluid_does_not_need_are_left_out() {
     sweep.evaluate(&cloud.domain, &particles, &[], None, Want::TOTALS, &mut force, false).unwrap();
     let second = sweep.counts();
     assert_eq!((second.search, second.force), (2 * first.search, 2 * first.force));
-    // Every batch has its energy summed, none its noise drawn.
+    // The energy of every batch is summed, and no noise drawn.
     assert_eq!((second.noise, second.energy, second.density), (first.noise, first.noise, 0));
 
-    // A ψ that is not linear takes a pass for its density, and an evaluation.
+    // A nonlinear ψ takes a pass for its density, and an evaluation.
     let mdpd = shipped("warren2003-set6.toml");
     let mut sweep = Sweep::new(&mdpd, Settings::default()).unwrap();
     swept(&mut sweep, &cloud, Want::FORCES);

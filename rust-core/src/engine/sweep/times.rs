@@ -1,19 +1,19 @@
-//! Where the time goes.
+//! Measures the time of the parts of evaluations.
 
 use std::time::Instant;
 
 /// Seconds spent in the parts of evaluations, since the engine was made.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Times {
-    /// Sorting particles into cells.
+    /// Time of sorting particles into cells.
     pub sort: f64,
-    /// Finding pairs; forces that need no density, noise among them; weights.
+    /// Time of finding pairs, of forces without density terms, noise included, and of weights.
     pub first: f64,
-    /// Summing densities and evaluating ψ.
+    /// Time of summing densities and evaluating ψ.
     pub excess: f64,
-    /// Many-body forces.
+    /// Time of many-body forces.
     pub second: f64,
-    /// Forces to the host.
+    /// Time of copying forces to the host.
     pub forces: f64,
 }
 

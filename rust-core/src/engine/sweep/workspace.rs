@@ -1,4 +1,4 @@
-//! One precision's arrays, and the steps of an evaluation over them.
+//! The arrays of one precision, and the steps of an evaluation.
 
 mod accumulators;
 mod cell_order;
@@ -42,7 +42,7 @@ use sorted_particles::SharedParticles;
 use std::ops::Range;
 use thread_slab::{PlaneResults, ThreadSlab, ThreadState};
 
-/// Arrays in the order of cells, and what goes through them.
+/// Arrays in the order of cells, and scratch arrays of the passes.
 pub struct Workspace<P: PairPrecision> {
     fluid: FluidConstants<P::Scalar>,
     order: CellOrder,
@@ -52,7 +52,7 @@ pub struct Workspace<P: PairPrecision> {
     slopes: SlopeArrays<P::Scalar>,
     results: PlaneResults<P::Scalar>,
     threads: Vec<ThreadState<P::Scalar>>,
-    /// Of the present evaluation.
+    /// Noise and `dt^{−1/2}` of the present evaluation.
     thermostat: Option<(PairNoise, f64)>,
     totals: bool,
 }
@@ -94,11 +94,11 @@ impl<P: PairPrecision> Workspace<P> {
         Ok(())
     }
 
-    /// Everything that comes after [`Workspace::sort_into_cells`]: the first pass, ψ and the second pass over all planes, and
-    /// their forces. `times` are those of the caller's thread.
+    /// Does everything after [`Workspace::sort_into_cells`]: the first pass, ψ and the second pass over
+    /// all planes, and their forces. `times` are those of the caller's thread.
     ///
     /// # Errors
-    /// ψ that is not finite, or a force: of the lowest tag.
+    /// Fails for ψ or a force that is not finite, and names the lowest tag.
     pub fn run_all(
         &mut self,
         pool: &Pool,
@@ -111,7 +111,7 @@ impl<P: PairPrecision> Workspace<P> {
         self.up_to_slopes(pool, plan, input, Some(out), &planes)?;
         self.on_slabs(&planes, |scheduler, slabs, accumulators| {
             let mut work: Vec<_> = slabs.iter_mut().zip(accumulators.split()).collect();
-            // SAFETY: `up_to_slopes` has left the slopes of all particles and copies.
+            // SAFETY: `up_to_slopes` has computed the slopes of all particles and copies.
             pool.each(&mut work, |(slab, sums)| unsafe { scheduler.second_at_ends(out, slab, sums) });
             drop(work);
             let sums = accumulators.sums();
@@ -120,10 +120,10 @@ impl<P: PairPrecision> Workspace<P> {
         self.finish(times)
     }
 
-    /// What comes after [`Workspace::sort_into_cells`], up to ψ and its slopes.
+    /// Does the steps after [`Workspace::sort_into_cells`], up to ψ and its slopes.
     ///
     /// # Errors
-    /// ψ that is not finite.
+    /// Fails for ψ that is not finite.
     pub fn first(
         &mut self,
         pool: &Pool,
@@ -136,16 +136,17 @@ impl<P: PairPrecision> Workspace<P> {
         self.finish(times)
     }
 
-    /// What comes after [`Workspace::first`] and [`Workspace::slopes_from_host`]: the second pass, and the forces.
+    /// Does the steps after [`Workspace::first`] and [`Workspace::slopes_from_host`]: the second pass, and the forces.
     ///
     /// # Errors
-    /// A force that is not finite: of the lowest tag.
+    /// Fails for a force that is not finite, and names the lowest tag.
     pub fn second(&mut self, pool: &Pool, out: ForceSink, times: &mut Times) -> Result<(), EngineError> {
         self.slopes.copy_first_plane(&self.order);
         let planes = thread_slabs(&self.order, pool.threads());
         self.on_slabs(&planes, |scheduler, slabs, accumulators| {
             let mut work: Vec<_> = slabs.iter_mut().zip(accumulators.split()).collect();
-            // SAFETY: `first` has left the slopes of all particles; those of the copies are there since just now.
+            // SAFETY: `first` has computed the slopes of all particles; `copy_first_plane` has
+            // just copied those of the copies.
             pool.each(&mut work, |(slab, sums)| unsafe { scheduler.second_of_all(out, slab, sums) });
             drop(work);
             let sums = accumulators.sums();
@@ -154,8 +155,8 @@ impl<P: PairPrecision> Workspace<P> {
         self.finish(times)
     }
 
-    /// Arrays, first passes and ψ of all planes; the second pass and the forces of those between the ends of slabs if
-    /// there is where to write them.
+    /// Fills arrays, and does first passes and ψ of all planes. If there is a place for forces, it also
+    /// does the second pass and the forces of the planes between the ends of slabs.
     fn up_to_slopes(
         &mut self,
         pool: &Pool,
@@ -184,11 +185,11 @@ impl<P: PairPrecision> Workspace<P> {
         let input = &PassInput { input, excess, out };
         self.on_slabs(planes, |scheduler, slabs, accumulators| {
             let mut work: Vec<_> = slabs.iter_mut().zip(accumulators.split()).collect();
-            // SAFETY: the starts of all slabs are filled, and the copies are there; this is the only work in hand.
+            // SAFETY: `fill_start` has filled the starts of all slabs, and the copies exist; no other work runs.
             pool.each(&mut work, |(slab, sums)| unsafe { scheduler.interior(input, slab, sums) });
             drop(work);
             let sums = accumulators.sums();
-            // SAFETY: the interior of all slabs is done; this is the only work in hand.
+            // SAFETY: the interior of all slabs is done; no other work runs.
             pool.each(slabs, |slab| unsafe { scheduler.excess_of_first(input, slab, sums) });
         });
         self.slopes.copy_first_plane(&self.order);
@@ -198,7 +199,7 @@ impl<P: PairPrecision> Workspace<P> {
         }
     }
 
-    /// Lends all arrays to the threads, each its slab of planes.
+    /// Lends all arrays to the threads, to each its slab of planes.
     fn on_slabs(
         &mut self,
         planes: &[Range<usize>],
@@ -232,7 +233,7 @@ impl<P: PairPrecision> Workspace<P> {
         work(scheduler, &mut slabs, accumulators);
     }
 
-    /// The times of the caller's thread; a force that is not finite: that of the lowest tag.
+    /// Adds the times of the caller's thread; fails for a force that is not finite, and names the lowest tag.
     fn finish(&mut self, times: &mut Times) -> Result<(), EngineError> {
         if let Some(state) = self.threads.first_mut() {
             *times += std::mem::take(&mut state.times);

@@ -7,12 +7,12 @@ pub struct Bodies<'a> {
     pub domain: &'a PeriodicBox,
     /// Positions, in the box along its periodic directions.
     pub x: &'a [[f64; 3]],
-    /// Tags, each once.
+    /// Tags of the particles, each different.
     pub tag: &'a [i32],
-    /// Species.
+    /// Species of each particle.
     pub species: &'a [i32],
     /// Mass of each species.
     pub mass: &'a [f64],
-    /// Which particles have a velocity that nothing changes; empty if none has.
+    /// Flags of particles with a fixed velocity; empty if there are none.
     pub frozen: &'a [bool],
 }

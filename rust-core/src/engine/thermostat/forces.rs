@@ -5,8 +5,8 @@ use super::pass::{Terms, Wide, add_to_host, virial};
 use crate::engine::sweep::Pool;
 
 impl PairThermostat {
-    /// Adds drag at the velocities `v`, or the random force, or both, to `force`; returns their virial, if distances
-    /// were kept.
+    /// Adds drag at the velocities `v`, or the random force, or both, to `force`; returns their
+    /// virial, if distances were stored.
     pub fn add_forces(
         &mut self,
         pool: &Pool,
@@ -22,7 +22,7 @@ impl PairThermostat {
         sums.gather(lists.order(), v);
         sums.compute(pool, *set, planes, terms);
         let virial = virial(pool, planes, sums, lists.ghosts(), terms);
-        // Frozen particles bear forces like others; whoever moves them does not.
+        // Frozen particles receive forces like others; the integrator does not move them.
         let all: Vec<Wide> = (0..planes.len()).flat_map(|number| sums.of(planes, number)).collect();
         add_to_host(pool, lists.place(), &all, 1.0, force);
         virial

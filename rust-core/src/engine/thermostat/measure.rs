@@ -1,8 +1,8 @@
-//! Pairs in double precision.
+//! Computes the vectors of pairs in double precision.
 //!
-//! Those of the search are in fractions of the region that a rank has, in single precision: two ranks have the vectors of a
-//! pair to 10⁻⁷. Measured by the coordinates of the host they agree to the rounding of double precision, and so do the
-//! pairs there are.
+//! The search uses fractions of the rank's region, in single precision: the vectors of a pair on two
+//! ranks differ by 10⁻⁷. From the coordinates of the host they agree to the rounding of double
+//! precision, and so do the lists of pairs.
 
 use super::PairThermostat;
 use super::planes::Plane;
@@ -13,10 +13,10 @@ use crate::engine::vectors::{self, Loop};
 use psidpd_passes::domain::PeriodicBox;
 use psidpd_passes::plane::list::{ExactPair, PairList};
 
-/// Pairs that are measured at once.
+/// Number of pairs in a block.
 const BLOCK: usize = 64;
 
-/// `√(½ Δt γ)`, one over the range and the exponent of `w_R`, by pairs of species.
+/// The amplitude `√(½ Δt γ)`, the inverse range and the exponent of `w_R`, by pairs of species.
 struct Laws {
     species: usize,
     amplitude: Vec<f64>,
@@ -24,7 +24,7 @@ struct Laws {
     exponent: Exponent,
 }
 
-/// The exponents.
+/// Exponents of `w_R`, by pairs of species.
 enum Exponent {
     One,
     Two,
@@ -32,7 +32,7 @@ enum Exponent {
 }
 
 impl PairThermostat {
-    /// Measures the pairs that were found, and leaves out those that are beyond their range.
+    /// Computes the pairs that were found in double precision, and removes those beyond their range.
     pub(super) fn measure(
         &mut self,
         pool: &Pool,
@@ -68,7 +68,7 @@ impl Laws {
         Laws {
             species: plan.gamma.len().isqrt(),
             amplitude: plan.gamma.iter().map(|gamma| (0.5 * dt * gamma).sqrt()).collect(),
-            // Beyond a range of zero is every pair.
+            // For a range of zero every pair is beyond the range.
             inverse_range: plan
                 .range
                 .iter()
@@ -84,7 +84,8 @@ impl Laws {
 }
 
 impl Plane {
-    /// Puts the pairs into blocks, which `weigh` gives factors, and keeps those that have one; `law` is of two sorted particles.
+    /// Gathers the pairs in blocks, for which `weigh` computes factors, and keeps pairs with a positive
+    /// factor; `law` takes two sorted particles.
     fn measure(
         &mut self,
         places: &Places,
@@ -97,7 +98,7 @@ impl Plane {
         let x = &places.x()[first..];
         let PairList { start, pairs, exact, stretch } = &mut self.found.list;
         exact.reserve(pairs.len());
-        // The row of the next pair, and how many are kept.
+        // The row of the next pair, and the number of kept pairs.
         let (mut i, mut kept) = (0, 0);
         for from in (0..pairs.len()).step_by(BLOCK) {
             let to = pairs.len().min(from + BLOCK);
@@ -120,7 +121,7 @@ impl Plane {
                 }
                 let (n, pair) = (k - from, pairs[k]);
                 let factor = block.factor[n];
-                // Not the other way round: what is no number is left out too.
+                // The comparison removes pairs whose factor is NaN too.
                 let acts = factor > 0.0 && factor < f64::INFINITY;
                 if !acts {
                     continue;
@@ -138,18 +139,18 @@ impl Plane {
     }
 }
 
-/// Pairs side by side.
+/// A block of pairs, as parallel arrays.
 struct Block {
     d: [[f64; BLOCK]; 3],
     law: [usize; BLOCK],
     amplitude: [f64; BLOCK],
     inverse_range: [f64; BLOCK],
-    /// `√(½ Δt γ) w_R/r`; nothing, or no number, of pairs that there are none of.
+    /// Factor `√(½ Δt γ) w_R/r`; zero or NaN in unused entries.
     factor: [f64; BLOCK],
 }
 
 impl Block {
-    /// With the first law for all.
+    /// A block in which all pairs have the first law.
     fn new(laws: &Laws) -> Block {
         Block {
             d: [[0.0; BLOCK]; 3],
@@ -161,7 +162,7 @@ impl Block {
     }
 }
 
-/// Takes the nearest images, and weighs them.
+/// Computes the nearest images of a block, and their factors.
 struct Weigh<'a> {
     block: &'a mut Block,
     images: Images,
@@ -182,7 +183,7 @@ impl Loop for Weigh<'_> {
         }
         let [x, y, z] = d;
         for n in 0..BLOCK {
-            // The distance, for a moment.
+            // The array stores the distance until the factor replaces it.
             factor[n] = (x[n] * x[n] + y[n] * y[n] + z[n] * z[n]).sqrt();
         }
         match &laws.exponent {

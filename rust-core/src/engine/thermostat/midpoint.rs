@@ -1,4 +1,4 @@
-//! Updates of all pairs at once, by conjugate gradients.
+//! Updates all pairs at once, by conjugate gradients.
 //!
 //! With `(G v)_i = Σ_j D (ê·v_ij) ê` and `(B ξ)_i = Σ_j √(2kTγ) w_R ξ ê`, the implicit midpoint rule is
 //!
@@ -6,14 +6,15 @@
 //! (M + ½ΔtG) v′ = (M − ½ΔtG) v + √Δt B ξ.
 //! ```
 //!
-//! As `⟨Bξ ξᵀBᵀ⟩ = 2kT G`, it maps the covariance `kT M⁻¹` to itself: the Maxwell distribution is kept exactly at any
-//! Δt, γ and mass, if ξ is normal; with any other ξ of unit variance its covariance is. Momentum is kept to rounding,
-//! and nothing depends on an order of pairs.
+//! As `⟨Bξ ξᵀBᵀ⟩ = 2kT G`, the rule maps the covariance `kT M⁻¹` to itself: with normal ξ it preserves
+//! the Maxwell distribution exactly at any Δt, γ and mass, and with any other ξ of unit variance the
+//! covariance. Momentum is conserved to rounding, and the result does not depend on an order of pairs.
 //!
-//! What is solved is `(M + K) δ = √kT Σ ξ g − K v` with `K = ½ΔtG`, and `v′ = v + 2δ`. The matrix is symmetric and
-//! positive, and its condition at most `1 + 2ΔtΣD/m`: each iteration is one pass over the pairs. It ends when the
-//! residual, in the norm of M⁻¹, is below [`TOLERANCE`] of what it was. Residuals of conjugate gradients are orthogonal
-//! to what was searched before, so that the error of the temperature is of the order of the square of that.
+//! The equation to solve is `(M + K) δ = √kT Σ ξ g − K v` with `K = ½ΔtG`, and `v′ = v + 2δ`. The
+//! matrix is symmetric and positive, with a condition number of at most `1 + 2ΔtΣD/m`: each iteration
+//! is one pass over the pairs. Iterations end when the residual, in the norm of M⁻¹, is below
+//! [`TOLERANCE`] times the first. Residuals of conjugate gradients are orthogonal to all earlier search
+//! directions, so that the error of the temperature is of the order of the square of that.
 
 use super::PairThermostat;
 use super::part::Part;
@@ -27,10 +28,10 @@ use std::ops::Range;
 /// Relative residual at which iterations end.
 pub const TOLERANCE: f64 = 1e-4;
 
-/// Most iterations: beyond, drag is so strong that rounding ends them.
+/// Most iterations: with more, drag is so strong that rounding errors stop the convergence.
 const MOST: usize = 500;
 
-/// A plane at work.
+/// The data of one plane during a step of the solver.
 struct Share<'a> {
     number: usize,
     own: Range<usize>,
@@ -38,7 +39,7 @@ struct Share<'a> {
     part: &'a mut Part,
 }
 
-/// Does `work` for every plane; the sum of the scalar products, in the order of the planes.
+/// Does `work` for every plane; returns the sum of the scalar products, in the order of the planes.
 fn each(
     pool: &Pool,
     planes: &[Plane],
@@ -56,7 +57,7 @@ fn each(
 }
 
 impl PairThermostat {
-    /// The midpoint rule with noise; without, the implicit Euler rule of drag alone.
+    /// Applies the midpoint rule with noise, or without noise the implicit Euler rule of drag alone.
     pub(super) fn implicit(&mut self, pool: &Pool, v: &mut [[f64; 3]], noise: bool) -> [f64; 6] {
         let first = self.begin(pool, v, noise);
         self.direct(pool, 0.0);
@@ -69,14 +70,15 @@ impl PairThermostat {
         }
         self.add_solution(pool, v);
         let virial = if self.wants_virial { self.virial_at(pool, v, noise) } else { [0.0; 6] };
-        // A midpoint is half of the way.
+        // The midpoint is half of the change away.
         if noise {
             self.add_solution(pool, v);
         }
         virial
     }
 
-    /// The first residual, from the velocities `v` of the host; the square of its norm. Of all sums here a rank has its share.
+    /// Computes the first residual from the velocities `v` of the host, and returns the square of its
+    /// norm. On several ranks all sums here are those of one rank.
     pub(super) fn begin(&mut self, pool: &Pool, v: &[[f64; 3]], noise: bool) -> f64 {
         let PairThermostat { planes, lists, set, inverse_mass, sums, parts, kt, iterations, .. } = self;
         *iterations = 0;
@@ -94,12 +96,12 @@ impl PairThermostat {
         })
     }
 
-    /// Whether another iteration follows, with the squares of the norm of the residual `now` and at `first`.
+    /// Whether another iteration follows, given the squared norms of the residual, `now` and `first`.
     pub(super) fn goes_on(&self, now: f64, first: f64) -> bool {
         now > TOLERANCE * TOLERANCE * first && self.iterations < MOST
     }
 
-    /// Multiplies the direction by the matrix; their scalar product.
+    /// Multiplies the direction by the matrix, and returns the scalar product of the two.
     pub(super) fn curvature(&mut self, pool: &Pool) -> f64 {
         let PairThermostat { planes, set, mass, sums, parts, iterations, .. } = self;
         *iterations += 1;
@@ -111,7 +113,7 @@ impl PairThermostat {
         })
     }
 
-    /// Goes `alpha` along the direction; the square of the norm of the residual there.
+    /// Moves by `alpha` along the direction, and returns the squared norm of the new residual.
     pub(super) fn descend(&mut self, pool: &Pool, alpha: f64) -> f64 {
         let PairThermostat { planes, set, inverse_mass, sums, parts, .. } = self;
         each(pool, planes, &sums.p, parts, |Share { own, p, part, .. }| {
@@ -121,7 +123,7 @@ impl PairThermostat {
         })
     }
 
-    /// Makes the next direction, `p ← M⁻¹ r + beta p`.
+    /// Computes the next direction, `p ← M⁻¹ r + beta p`.
     pub(super) fn direct(&mut self, pool: &Pool, beta: f64) {
         let PairThermostat { planes, set, inverse_mass, sums, parts, .. } = self;
         let mut shares: Vec<_> = sums

@@ -1,21 +1,22 @@
 //! The thermostat as an operator on velocities at fixed positions, apart from the forces.
 //!
-//! With `D = γ w_R²` a pair has the drag `−D (ê·v_ij) ê` and a noise of matching strength. For a time Δt
-//! both are told by one vector for each pair,
+//! With `D = γ w_R²` a pair has the drag `−D (ê·v_ij) ê` and a noise of matching strength. For a time
+//! Δt one vector for each pair determines both,
 //!
 //! ```text
 //! g = ê √(½ Δt D),   |g|² = ½ Δt D,
 //! ```
 //!
-//! from which every update here is made: the drag is `−(2/Δt) g (g·v_ij)`, the noise `(2/Δt) √kT ξ g`. Since both
-//! come from the same `g`, the single precision that it has in mixed precision changes the friction by rounding, but not the
-//! equilibrium.
+//! which all updates here use: the drag is `−(2/Δt) g (g·v_ij)`, the noise `(2/Δt) √kT ξ g`. Since both
+//! derive from the same `g`, its single precision in mixed precision changes the friction by rounding
+//! errors, but not the equilibrium.
 //!
-//! [`PairThermostat::find_pairs`] finds the pairs, by the search of the fast engine, [`PairThermostat::draw`] their noise, and
-//! [`PairThermostat::act`] changes velocities: `midpoint` for all pairs at once, `sequential` pair by pair.
-//! Results depend on positions, velocities and tags: not on the order of particles in memory, nor on the
-//! number of threads. On a rank with ghosts the midpoint rule goes on in rounds with the other ranks: `rank`. A new update is
-//! a variant of [`Update`] and its rule in one of these files.
+//! [`PairThermostat::find_pairs`] finds the pairs, by the search of the sweep, [`PairThermostat::draw`]
+//! draws their noise, and [`PairThermostat::act`] changes velocities: `midpoint` for all pairs at once,
+//! `sequential` pair by pair. Results depend on positions, velocities and tags, and neither on the
+//! order of particles in memory nor on the number of threads. On a rank with ghosts the midpoint rule
+//! exchanges data with the other ranks in rounds: see `rank`. A new update is a variant of [`Update`]
+//! and its rule in one of these files.
 
 mod bodies;
 mod forces;
@@ -51,25 +52,25 @@ use psidpd_passes::settings::{Precision, Settings};
 use round::Round;
 use sequential::{Order, lowe_andersen, ornstein_uhlenbeck, shardlow};
 
-/// How velocities are changed.
+/// The rule that changes velocities.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Update {
     /// The implicit midpoint rule over all pairs; see `midpoint.rs`.
     Midpoint,
     /// Drag alone, by the implicit Euler rule over all pairs: `(M + ½ΔtG) v′ = M v`.
     ImplicitDrag,
-    /// The exact Ornstein–Uhlenbeck process of one pair after the other; see `sequential.rs`.
+    /// The exact Ornstein–Uhlenbeck process of each pair in turn; see `sequential.rs`.
     OrnsteinUhlenbeck,
-    /// Half explicit and half implicit, one pair after the other.
+    /// Half an explicit and half an implicit step, for each pair in turn.
     Shardlow {
         /// Whether the pairs come in the opposite order.
         reversed: bool,
     },
-    /// The relative velocity of some pairs, one after the other, drawn anew.
+    /// New relative velocities for randomly selected pairs, in turn.
     LoweAndersen,
 }
 
-/// Drag and noise of one fluid, by pairs.
+/// Drag and noise of the pairs of one fluid.
 #[derive(Clone)]
 pub struct PairThermostat {
     plan: ThermostatPlan,
@@ -79,24 +80,24 @@ pub struct PairThermostat {
     set: InstructionSet,
     lists: PairLists,
     planes: Vec<Plane>,
-    /// Whether pairs are measured in double precision.
+    /// Whether pairs are computed in double precision.
     is_exact: bool,
     places: Places,
-    /// By sorted particle.
+    /// Mass of each sorted particle.
     mass: Vec<f64>,
     inverse_mass: Vec<f64>,
-    /// Behind them once more those of the first plane, which the last one sees.
+    /// Tag of each sorted particle, followed by those of the first plane's copies, for the pairs of the last plane.
     tag: Vec<u32>,
     sums: Sums,
     parts: Vec<Part>,
-    /// By plane and pair, what `g` was multiplied by in turn, but for the noise; where distances are kept.
+    /// Factor of `g` in the impulse of each pair, without its own noise, by plane; used if distances are stored.
     impulses: Vec<Vec<f64>>,
     iterations: usize,
-    /// Whether distances are kept.
+    /// Whether distances are stored.
     wants_virial: bool,
-    /// Where a solution in rounds with other ranks is.
+    /// State of a solution in rounds with other ranks.
     round: Round,
-    /// Of the pairs; of whatever else a rule draws.
+    /// Noise of the pairs, and noise for other random numbers of a rule.
     noise: [PairNoise; 2],
 }
 
@@ -107,8 +108,8 @@ impl std::fmt::Debug for PairThermostat {
 }
 
 impl PairThermostat {
-    /// The thermostat of a fluid at temperature `kt`; `None` if nothing drags. Of the settings it has instructions and
-    /// precision.
+    /// The thermostat of a fluid at temperature `kt`; `None` if all γ are 0. It uses the instructions
+    /// and the precision of the settings.
     pub fn new(plan: &Plan, kt: f64, settings: &Settings) -> Option<PairThermostat> {
         let set = InstructionSet::new(settings.instructions).unwrap_or_else(InstructionSet::best);
         Some(PairThermostat {
@@ -134,11 +135,11 @@ impl PairThermostat {
         })
     }
 
-    /// Finds the pairs in range, with their `g` for a time `dt`. With `virial` their distances are kept, from which
-    /// [`PairThermostat::act`] can tell the virial of what it did.
+    /// Finds the pairs in range, and their `g` for a time `dt`. With `virial` it stores their
+    /// distances, from which [`PairThermostat::act`] computes its virial.
     ///
     /// # Errors
-    /// A position that is not finite; a box narrower than twice the range.
+    /// Fails for a position that is not finite, and for a box narrower than twice the range.
     pub fn find_pairs(
         &mut self,
         pool: &Pool,
@@ -155,7 +156,7 @@ impl PairThermostat {
         })
     }
 
-    /// The same, with the mass of each particle of the host.
+    /// Finds the pairs, with the mass of each particle of the host.
     #[allow(clippy::too_many_arguments)]
     fn find(
         &mut self,
@@ -190,7 +191,7 @@ impl PairThermostat {
         Ok(())
     }
 
-    /// Draws the noise of the pairs that were found.
+    /// Draws the noise of the pairs of the last search.
     pub fn draw(&mut self, pool: &Pool, seed: u64, step: u64, stream: Stream, law: Law) {
         let noise = [0, 1].map(|k| PairNoise::of_stream(seed, step, 1 + 2 * stream.0 + k));
         self.noise = noise;
@@ -198,8 +199,8 @@ impl PairThermostat {
         pool.each(&mut self.planes, |plane| plane.draw(tags, noise[0], law));
     }
 
-    /// Changes the velocities `v`, in the order of the particles that pairs were found of; returns the virial of the
-    /// impulses over Δt, if distances were kept.
+    /// Changes the velocities `v`, in the particle order of the last search for pairs; returns the
+    /// virial of the impulses over Δt, if distances were stored.
     pub fn act(&mut self, pool: &Pool, update: Update, v: &mut [[f64; 3]]) -> [f64; 6] {
         match update {
             Update::Midpoint => self.implicit(pool, v, true),
@@ -211,8 +212,8 @@ impl PairThermostat {
         }
     }
 
-    /// What drag and noise see at the velocities `v`, in the order of the particles that pairs were found of; `None` if
-    /// no pair is in range.
+    /// Temperature and rate of drag and noise at the velocities `v`, in the particle order of the last
+    /// search for pairs; `None` if no pair is in range.
     pub fn warmth(&self, v: &[[f64; 3]]) -> Option<Warmth> {
         let moving = self.mass.iter().filter(|m| m.is_finite()).count();
         let order = self.lists.order();
@@ -238,33 +239,33 @@ impl PairThermostat {
             }
         }
         let freedom = (self.dimensions * moving) as f64;
-        // |g|² = ½ΔtD.
+        // The division by Δt uses |g|² = ½ΔtD.
         (weights > 0.0).then(|| Warmth { kt: squares / weights, rate: 4.0 * rates / (self.dt * freedom) })
     }
 
-    /// How many iterations the last implicit update took.
+    /// Number of iterations of the last implicit update.
     pub fn iterations(&self) -> usize {
         self.iterations
     }
 
-    /// How many pairs are in range.
+    /// Number of pairs in range.
     pub fn pairs(&self) -> usize {
         self.planes.iter().map(|plane| plane.found.list.pairs.len()).sum()
     }
 }
 
-/// What the thermostat sees of the particles.
+/// Temperature of the particles as the thermostat measures it, and its rate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Warmth {
-    /// kT of the relative velocities along pairs, `Σ D μ u²/Σ D`: flow on scales beyond the range hardly counts.
+    /// kT of the relative velocities along pairs, `Σ D μ u²/Σ D`: flow on scales beyond the range hardly contributes.
     pub kt: f64,
-    /// The rate at which drag alone takes kinetic energy from particles without correlations, `2 Σ D/μ` over the degrees of
-    /// freedom.
+    /// The rate at which drag alone removes kinetic energy from uncorrelated particles, `2 Σ
+    /// D/μ` over the degrees of freedom.
     pub rate: f64,
 }
 
-/// Which of several independent noises of one step.
+/// The number of one of several independent noises of a step.
 ///
-/// The noise inside the forces is another one.
+/// The noise in the forces is independent of all of these.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Stream(pub u8);

@@ -3,7 +3,7 @@ use super::pass::Wide;
 /// Vectors of the particles of one plane.
 #[derive(Debug, Clone, Default)]
 pub struct Part {
-    /// `(M + K) p`.
+    /// Product `(M + K) p`.
     pub image: Vec<Wide>,
     pub residual: Vec<Wide>,
     pub solution: Vec<Wide>,

@@ -3,13 +3,14 @@
 use super::pass::Wide;
 use crate::engine::vectors::Loop;
 
-/// `image ← m p + K p`, where `own` and `below` add up to `K p`; gives `p · image` of the particles that move.
+/// Computes `image ← m p + K p`, where `K p` is the sum of `own` and `below`; returns `p · image` of
+/// the particles that are not frozen.
 pub struct Multiply<'a> {
     pub p: &'a [Wide],
-    /// Infinite for those that do not move.
+    /// Mass of each particle; infinite if it is frozen.
     pub mass: &'a [f64],
     pub own: &'a [Wide],
-    /// Empty if the plane below sees none of these particles.
+    /// Contributions of the plane below; empty if it has no pairs with these particles.
     pub below: &'a [Wide],
     pub image: &'a mut Vec<Wide>,
 }
@@ -35,7 +36,8 @@ impl Loop for Multiply<'_> {
     }
 }
 
-/// `solution ← solution + alpha p`, `residual ← residual − alpha image`; gives `r · M⁻¹ r` of the new residual.
+/// Computes `solution ← solution + alpha p` and `residual ← residual − alpha image`;
+/// returns `r · M⁻¹ r` of the new residual.
 pub struct Descend<'a> {
     pub alpha: f64,
     pub p: &'a [Wide],
@@ -64,7 +66,7 @@ impl Loop for Descend<'_> {
     }
 }
 
-/// `p ← M⁻¹ r + beta p`.
+/// Computes `p ← M⁻¹ r + beta p`.
 pub struct Direct<'a> {
     pub beta: f64,
     pub inverse_mass: &'a [f64],
@@ -84,7 +86,7 @@ impl Loop for Direct<'_> {
     }
 }
 
-/// `a + factor b`.
+/// The vector `a + factor b`.
 #[inline(always)]
 fn plus(a: Wide, factor: f64, b: Wide) -> Wide {
     std::array::from_fn(|c| a[c] + factor * b[c])
@@ -95,7 +97,7 @@ fn times(a: Wide, b: Wide) -> Wide {
     std::array::from_fn(|c| a[c] * b[c])
 }
 
-/// Of all four components, the last of which is 0.
+/// The sum of all four components, the last of which is 0.
 #[inline(always)]
 fn total(sum: Wide) -> f64 {
     (sum[0] + sum[2]) + (sum[1] + sum[3])

@@ -1,7 +1,7 @@
-//! One pass over the pairs: `Σ_j g (a ξ − b g·(p_i − p_j))` for every particle `i`.
+//! A pass over the pairs, which computes `Σ_j g (a ξ − b g·(p_i − p_j))` for every particle `i`.
 //!
-//! A plane adds to its own particles and to those of the next in a buffer of its own, so that the order of each sum is
-//! fixed, whichever thread makes it.
+//! Each plane adds to its own particles and to those of the next in a buffer of its own, so that the
+//! order of each sum is fixed, whichever thread computes it.
 
 use super::planes::Plane;
 use crate::engine::sweep::{Pool, part};
@@ -9,17 +9,17 @@ use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::plane::pair_sums::add_pairs;
 pub use psidpd_passes::plane::pair_sums::{Terms, Wide};
 
-/// What all planes add, and what they add it for.
+/// The vectors of the particles, and the sums over their pairs.
 #[derive(Debug, Clone, Default)]
 pub struct Sums {
-    /// By sorted particle; behind them once more those of the first plane, which the last one sees.
+    /// Vector of each sorted particle, followed by those of the first plane's copies, for the pairs of the last plane.
     pub p: Vec<Wide>,
-    /// By plane: of its own particles, then of those of the next.
+    /// Sums by plane: of its own particles, then of those of the next.
     of_plane: Vec<Vec<Wide>>,
 }
 
 impl Sums {
-    /// Puts the vectors `v` of the host in order.
+    /// Sorts the vectors `v` of the host.
     pub fn gather(&mut self, order: &[u32], v: &[[f64; 3]]) {
         self.p.clear();
         self.p.extend(order.iter().map(|k| {
@@ -28,7 +28,7 @@ impl Sums {
         }));
     }
 
-    /// The vectors of each plane, to be written.
+    /// The vectors of each plane, for writing.
     pub fn of_planes<'a>(&'a mut self, planes: &[Plane]) -> Vec<&'a mut [Wide]> {
         let count = planes.last().map_or(0, |plane| plane.found.own.end);
         self.p.truncate(count);
@@ -36,14 +36,13 @@ impl Sums {
         planes.iter().map(|p| rest.split_off_mut(..p.found.own.len()).unwrap_or_default()).collect()
     }
 
-    /// Puts what the last plane sees of the first behind the others.
+    /// Copies the vectors of the first plane to the end, for the pairs of the last plane.
     pub fn close(&mut self, planes: &[Plane]) {
         let Some(last) = planes.last() else { return };
         self.p.truncate(last.found.own.end);
         self.p.extend_from_within(last.found.next.clone());
     }
 
-    /// Computes the sums.
     pub fn compute(&mut self, pool: &Pool, set: InstructionSet, planes: &[Plane], terms: Terms) {
         self.close(planes);
         let Sums { p, of_plane } = self;
@@ -59,8 +58,8 @@ impl Sums {
         });
     }
 
-    /// Of the particles of a plane, what pairs of that plane add, and what those of the plane below do: nothing, if that
-    /// does not see them.
+    /// The sums of the particles of a plane over the pairs of that plane, and over those of the plane
+    /// below; the latter is empty if that has no pairs with them.
     pub fn halves(&self, planes: &[Plane], number: usize) -> [&[Wide]; 2] {
         let below = match number {
             0 => planes.len() - 1,
@@ -82,7 +81,8 @@ impl Sums {
 }
 
 impl Plane {
-    /// `Σ r_ij ⊗ F_ij` of the same forces: xx, yy, zz, xy, xz, yz; half of it for pairs with a ghost. `ghosts` may be empty.
+    /// Virial `Σ r_ij ⊗ F_ij` of the same forces: xx, yy, zz, xy, xz, yz; half of it for pairs with
+    /// a ghost. `ghosts` may be empty.
     pub fn virial(&self, p: &[Wide], ghosts: &[bool], Terms { noise, drag }: Terms) -> [f64; 6] {
         let ghosts = ghosts.get(self.found.own.start..).unwrap_or_default();
         let is_ghost = |k: usize| ghosts.get(k).is_some_and(|ghost| *ghost);
@@ -106,7 +106,7 @@ impl Plane {
     }
 }
 
-/// Adds `factor g ⊗ g`.
+/// Adds `factor g ⊗ g` to a virial.
 pub fn add_virial(virial: &mut [f64; 6], g: [f64; 3], factor: f64) {
     for (w, (a, b)) in virial.iter_mut().zip([(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]) {
         *w += factor * g[a] * g[b];
@@ -127,7 +127,7 @@ pub fn virial(pool: &Pool, planes: &[Plane], sums: &Sums, ghosts: &[bool], terms
     sum
 }
 
-/// Adds `factor` times what is in order of the cells to what is in the order of the host, for those that are there.
+/// Adds `factor` times sorted vectors to vectors in the order of the host, for particles that are not left out.
 pub fn add_to_host(pool: &Pool, place: &[u32], from: &[Wide], factor: f64, to: &mut [[f64; 3]]) {
     let (count, mut rest, threads) = (to.len(), to, pool.threads());
     let mut parts: Vec<_> = (0..threads)

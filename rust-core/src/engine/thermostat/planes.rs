@@ -23,7 +23,8 @@ impl AsMut<PlanePairs> for Plane {
     }
 }
 
-/// `√(½ Δt γ)`, one over the range, a little more than it is with a `margin`, and the exponent of `w_R`, by pairs of species.
+/// The amplitude `√(½ Δt γ)`, the inverse range, which is extended by `margin`, and the
+/// exponent of `w_R`, by pairs of species.
 pub fn weights(plan: &ThermostatPlan, dt: f64, margin: f64) -> WeightTables {
     let table =
         |values: &[f64], of: &dyn Fn(f64) -> f64| SpeciesPairTable::new(values.iter().map(|x| of(*x) as f32));
@@ -31,7 +32,7 @@ pub fn weights(plan: &ThermostatPlan, dt: f64, margin: f64) -> WeightTables {
     WeightTables {
         species: plan.gamma.len().isqrt(),
         amplitude: table(&plan.gamma, &|gamma| (0.5 * dt * gamma).sqrt()),
-        // Beyond a range of zero is every pair.
+        // For a range of zero every pair is beyond the range.
         inverse_range: table(&plan.range, &|r| {
             if r > 0.0 { 1.0 / (r * (1.0 + margin)) } else { f64::from(f32::MAX) }
         }),

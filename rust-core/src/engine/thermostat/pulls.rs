@@ -1,7 +1,7 @@
-//! What drag does to each pair, for profiles of stress.
+//! The forces of drag on each pair, for profiles of stress.
 //!
-//! The random force is left out: it is independent of the positions it acts at, so that it adds nothing to a mean but
-//! scatter.
+//! The random force is left out: it is independent of the positions that it acts at, so that it
+//! contributes only scatter to a mean.
 
 use super::PairThermostat;
 use crate::engine::sweep::PlanePairs;
@@ -9,17 +9,16 @@ use crate::engine::sweep::PlanePairs;
 /// A pair and the mean force of drag on it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pull {
-    /// The first particle.
+    /// Index of the first particle.
     pub i: usize,
-    /// `r_i − r_j`.
+    /// Separation `r_i − r_j`.
     pub d: [f64; 3],
     /// The force on the first particle, divided by `d`.
     pub strength: f64,
 }
 
 impl PairThermostat {
-    /// Drag at the velocities `v`, in the order of the particles that pairs were found of. None if distances were not
-    /// kept.
+    /// Drag at the velocities `v`, in the particle order of the last search for pairs. Empty if distances were not stored.
     pub fn drags(&self, v: &[[f64; 3]]) -> Vec<Pull> {
         let order = self.lists.order();
         self.pulls_by(|i, j, _, _, g| {
@@ -29,13 +28,14 @@ impl PairThermostat {
         })
     }
 
-    /// What the last update of one pair after the other has done, but for the noise of each pair itself, as a force over
-    /// its time. None if distances were not kept.
+    /// The impulses of the last sequential update, without the noise of each pair itself, as forces
+    /// over its time. Empty if distances were not stored.
     pub fn pulls(&self) -> Vec<Pull> {
         self.pulls_by(|_, _, plane, k, _| self.impulses[plane][k] / self.dt)
     }
 
-    /// With `strength` of the sorted particles, the plane, the pair in it, and `g`: what `g` is to be multiplied by.
+    /// Computes pulls from `strength`, the factor of `g`, which takes the two sorted particles, the
+    /// plane, the pair in it, and `g`.
     fn pulls_by(&self, strength: impl Fn(usize, usize, usize, usize, [f64; 3]) -> f64) -> Vec<Pull> {
         let mut pulls = Vec::new();
         let order = self.lists.order();

@@ -1,8 +1,8 @@
 //! The midpoint rule on one of several ranks, whose ghosts stand for the particles of others.
 //!
-//! A pair of an owned particle and a ghost is computed on both ranks, its impulse given to the owned particle alone. The
-//! host and the rule take turns: the rule says what it [needs](Need), the host gets it from the other ranks and goes on.
-//! All ranks decide by the same sums, so that they need the same.
+//! A pair of an owned particle and a ghost is computed on both ranks, and its impulse added to the
+//! owned particle alone. The rule returns what it [needs](Need), the host gets that from the other
+//! ranks, and the rule continues. All ranks decide by the same sums, so that they need the same.
 
 use super::PairThermostat;
 use super::planes::Plane;
@@ -12,27 +12,28 @@ use crate::engine::particles::Particles;
 use crate::engine::surroundings::Around;
 use crate::engine::sweep::Pool;
 
-/// The particles of a rank, owned ones first, and what is around them.
+/// The particles of a rank, owned particles first, and their surroundings.
 #[derive(Debug, Clone, Copy)]
 pub struct Rank<'a> {
-    /// The box, at least twice as wide as the range along its periodic directions; which ghosts are images along them.
+    /// The box, at least twice as wide as the range along its periodic directions, and flags of the
+    /// ghosts that are images along these.
     pub around: Around<'a>,
     /// Owned particles and ghosts.
     pub particles: Particles<'a>,
-    /// Species of each kind; negative for those that take no part.
+    /// Species of each type; negative for types that are left out.
     pub species_of_kind: &'a [i32],
-    /// Mass of each owned particle; infinite if nothing changes its velocity.
+    /// Mass of each owned particle; infinite for a fixed velocity.
     pub mass: &'a [f64],
 }
 
-/// What the host has to do for the next round.
+/// The host's task for the next round.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Need {
-    /// Nothing: velocities are done. With the virial of this rank's share, if distances were kept.
+    /// No task: the velocities are final. Contains the virial of this rank, if distances were stored.
     Nothing([f64; 6]),
-    /// The sum of this over all ranks.
+    /// Sum this number over all ranks.
     Total(f64),
-    /// The vectors of ghosts from those of their owners.
+    /// Copy the vectors of owners to their ghosts.
     Ghosts,
 }
 
@@ -42,7 +43,7 @@ impl PairThermostat {
     /// Finds the pairs of a rank, as [`PairThermostat::find_pairs`].
     ///
     /// # Errors
-    /// As there; arrays of different lengths.
+    /// Fails as [`PairThermostat::find_pairs`], and for arrays of different lengths.
     pub fn find_pairs_of_rank(
         &mut self,
         pool: &Pool,
@@ -56,10 +57,10 @@ impl PairThermostat {
             return Err(EngineError::Host("particle arrays have different lengths"));
         }
         if mass.len() != particles.owned {
-            return Err(EngineError::Host("not as many masses as owned particles"));
+            return Err(EngineError::Host("`mass` must have one entry per owned particle"));
         }
         if !around.images.is_empty() && around.images.len() != all - particles.owned {
-            return Err(EngineError::Host("not as many ghosts as it was said of whether they are images"));
+            return Err(EngineError::Host("`images` must have one entry per ghost"));
         }
         if all > 1 << 26 {
             return Err(EngineError::Host("more than 2^26 particles and ghosts on one rank"));
@@ -68,7 +69,7 @@ impl PairThermostat {
         if species_of_kind.iter().any(|s| *s >= species) {
             return Err(EngineError::Host("a type is mapped to a species the model does not have"));
         }
-        // The owners of ghosts move them.
+        // Ghosts are moved by their owners.
         let mass = |k: usize| mass.get(k).copied().unwrap_or(f64::INFINITY);
         self.find(pool, around, &particles, species_of_kind, dt, virial, mass)?;
         if !self.is_exact {
@@ -77,8 +78,8 @@ impl PairThermostat {
         Ok(())
     }
 
-    /// Makes the vectors of pairs with a ghost those that the other rank finds: from coordinates that differ by a period, not
-    /// from fractions of a region that is this rank's own.
+    /// Computes vectors of pairs with a ghost as the other rank does: from coordinates that differ by a
+    /// period, instead of fractions of this rank's own region.
     fn agree_with_other_ranks(&mut self, rank: &Rank, dt: f64) {
         let PairThermostat { plan, lists, planes, .. } = self;
         let (order, ghosts) = (lists.order(), lists.ghosts());
@@ -117,21 +118,22 @@ impl PairThermostat {
         }
     }
 
-    /// Begins the midpoint rule for the pairs and the noise there are. `vectors` are velocities of all particles, ghosts too.
+    /// Begins the midpoint rule for the pairs and noise of the last search. `vectors` are velocities of
+    /// all particles, ghosts included.
     ///
     /// # Errors
-    /// Not as many vectors as there were particles.
+    /// Fails if the number of vectors is not that of the particles.
     pub fn begin_midpoint(&mut self, pool: &Pool, vectors: &[[f64; 3]]) -> Result<Need, EngineError> {
         self.check(vectors)?;
         self.round = Round::First;
         Ok(Need::Total(self.begin(pool, vectors, true)))
     }
 
-    /// Goes on when what was needed is there: a total, or the `vectors` of ghosts. `v` are the velocities of owned particles,
-    /// which the last round changes.
+    /// Continues with the result of the host's task: a total, or the `vectors` of ghosts. `v` are the
+    /// velocities of owned particles, which the last round changes.
     ///
     /// # Errors
-    /// Nothing was needed; not as many vectors as there were particles.
+    /// Fails if no round is under way, and if the number of vectors is not that of the particles.
     pub fn go_on(
         &mut self,
         pool: &Pool,
@@ -144,7 +146,7 @@ impl PairThermostat {
             return Err(CHANGED);
         }
         match self.round {
-            Round::Start => Err(EngineError::Host("a thermostat that was not begun goes on")),
+            Round::Start => Err(EngineError::Host("the thermostat must begin before it continues")),
             Round::First => {
                 self.direct(pool, 0.0);
                 Ok(self.next_direction(pool, [total, total], vectors, v))
@@ -173,7 +175,7 @@ impl PairThermostat {
         if vectors.len() == self.lists.place().len() { Ok(()) } else { Err(CHANGED) }
     }
 
-    /// Hands out the direction, or the solution if it is good enough.
+    /// Returns the direction, or the solution if the residual is small enough.
     fn next_direction(
         &mut self,
         pool: &Pool,

@@ -1,11 +1,11 @@
-//! Updates of one pair after the other.
+//! Updates pairs one after the other.
 //!
-//! The pairs of a particle come one after the other, particles in the order of cells, planes in an order of their own:
-//! every second one first, which can be done side by side, as no two of them touch the same particles. The order depends
-//! on positions and tags alone.
+//! The pairs of a particle are updated one after the other, particles in the order of cells, and planes
+//! in an order of their own: every second plane first. These run at once, as no two of them share
+//! particles. The order depends on positions and tags alone.
 //!
-//! With `u = ê·v_ij`, the reduced mass μ and `a = |g|²/μ = ½ΔtD/μ`, each rule makes a new `u′` that keeps the normal
-//! distribution of variance kT/μ, whatever Δt is.
+//! With `u = ê·v_ij`, the reduced mass μ and `a = |g|²/μ = ½ΔtD/μ`, each rule computes a new `u′` that
+//! preserves the normal distribution of variance kT/μ, for any Δt.
 
 use super::PairThermostat;
 use super::pass::add_virial;
@@ -20,24 +20,24 @@ pub enum Order {
     Reversed,
 }
 
-/// A pair in hand.
+/// The pair that a rule updates.
 #[derive(Debug, Clone, Copy)]
 pub struct Encounter {
-    /// `|g| u`.
+    /// Relative velocity times `|g|`, `|g| u`.
     along: f64,
-    /// `½ Δt D/μ`.
+    /// Ratio `½ Δt D/μ`.
     a: f64,
-    /// `|g|²`.
+    /// Square `|g|²`.
     square: f64,
     mu: f64,
     kt: f64,
     xi: f64,
-    /// Uniform on (0, 1), where a rule asks for it.
+    /// Uniform random number on (0, 1), for rules that need one.
     chance: f64,
 }
 
 impl Encounter {
-    /// What `g` is to be multiplied by for the impulse on the first particle that makes `factor u + noise √(kT/μ) ξ` of `u`.
+    /// The factor of `g` in the impulse on the first particle that changes `u` to `factor u + noise √(kT/μ) ξ`.
     #[inline(always)]
     fn impulse(&self, factor_less_one: f64, noise: f64) -> f64 {
         self.mu * (factor_less_one * self.along / self.square)
@@ -45,34 +45,34 @@ impl Encounter {
     }
 }
 
-/// `u′ = c u + √(kT/μ (1 − c²)) ξ`, `c = exp(−DΔt/μ)`: exact for the pair alone; Peters's scheme II.
+/// The rule `u′ = c u + √(kT/μ (1 − c²)) ξ`, `c = exp(−DΔt/μ)`: exact for a single pair; Peters's scheme II.
 pub fn ornstein_uhlenbeck(pair: &Encounter) -> f64 {
     let less_one = (-2.0 * pair.a).exp_m1();
     pair.impulse(less_one, (-(-4.0 * pair.a).exp_m1()).sqrt())
 }
 
-/// `u′ = ((1 − a) u + 2 √(kT a/μ) ξ)/(1 + a)`: half a step explicit, half implicit.
+/// The rule `u′ = ((1 − a) u + 2 √(kT a/μ) ξ)/(1 + a)`: half an explicit and half an implicit step.
 pub fn shardlow(pair: &Encounter) -> f64 {
     let a = pair.a;
     pair.impulse(-2.0 * a / (1.0 + a), 2.0 * a.sqrt() / (1.0 + a))
 }
 
-/// `u′ = √(kT/μ) ξ` with the probability `1 − exp(−DΔt/μ)`.
+/// The rule `u′ = √(kT/μ) ξ` with the probability `1 − exp(−DΔt/μ)`.
 pub fn lowe_andersen(pair: &Encounter) -> f64 {
     if pair.chance < -(-2.0 * pair.a).exp_m1() { pair.impulse(-1.0, 1.0) } else { 0.0 }
 }
 
-/// The planes that are done side by side, one set after the other: no two of a set are neighbours.
+/// Sets of planes that are updated at once, one set after the other: no two planes of a set are neighbours.
 fn sets(planes: &[Plane]) -> [Vec<usize>; 3] {
     let count = planes.len();
-    // The last sees the first, which may be of the same set.
+    // The last plane has pairs with the first, which may be in the same set.
     let closes = count % 2 == 1 && count > 1 && !planes[count - 1].found.next.is_empty();
     let paired = count - usize::from(closes);
     let last = if closes { vec![count - 1] } else { Vec::new() };
     [(0..paired).step_by(2).collect(), (1..paired).step_by(2).collect(), last]
 }
 
-/// A plane at work: its velocities and those of the next one.
+/// A plane during an update: its velocities and those of the next plane.
 struct Share<'a> {
     plane: &'a Plane,
     own: &'a mut [[f64; 3]],
@@ -173,7 +173,7 @@ impl Share<'_> {
         };
         let inverse = [1.0 / self.of_own[i], 1.0 / mass];
         let sum = inverse[0] + inverse[1];
-        // Neither of two frozen particles moves.
+        // A pair of frozen particles does not move.
         if sum == 0.0 {
             return;
         }

@@ -74,7 +74,7 @@ impl Cloud {
             precision: Precision::Mixed,
             domain,
         };
-        // Two on one point, and one on a face.
+        // Two particles are at one point, and one is on a face.
         cloud.x[1] = cloud.x[0];
         cloud.x[2] = cloud.domain.origin();
         if flat {
@@ -135,7 +135,8 @@ fn clouds() -> Vec<(&'static str, Cloud)> {
     mixed.into_iter().chain(doubles).collect()
 }
 
-/// How far two ways to the same may be apart. In a box just twice as wide as the range pairs at the end of it may be left out.
+/// Tolerance between two computations of the same result. In a box exactly twice as wide as the range,
+/// pairs at the range may be missing.
 fn rounding(cloud: &Cloud) -> f64 {
     let is_narrow = cloud.domain.lengths() == [2.0; 3];
     if cloud.precision == Precision::Double && !is_narrow { 1e-12 } else { 1e-5 }
@@ -151,7 +152,7 @@ fn pool(threads: usize) -> Pool {
     Pool::new(NonZeroUsize::new(threads).unwrap())
 }
 
-/// With pairs and noise of `cloud`.
+/// A thermostat with pairs and noise of `cloud`.
 fn ready(model: &str, kt: f64, cloud: &Cloud, pool: &Pool) -> PairThermostat {
     let mut thermostat = thermostat(model, kt, cloud.precision);
     thermostat.find_pairs(pool, &cloud.bodies(), DT, true).unwrap();
@@ -159,7 +160,7 @@ fn ready(model: &str, kt: f64, cloud: &Cloud, pool: &Pool) -> PairThermostat {
     thermostat
 }
 
-/// Drag from all pairs there are.
+/// Drag, summed over all pairs.
 fn plain_drag(model: &str, cloud: &Cloud) -> Vec<[f64; 3]> {
     let fluid = Model::parse("m.toml", model).unwrap().at(1.0).unwrap();
     let mut force = vec![[0.0; 3]; cloud.x.len()];
@@ -197,7 +198,7 @@ fn every_pair_in_range_drags_once() {
     }
 }
 
-/// `M (v′ − v) = Δt F((v + v′)/2)` with the forces of drag and noise.
+/// Checks `M (v′ − v) = Δt F((v + v′)/2)` with the forces of drag and noise.
 #[test]
 fn the_midpoint_rule_is_solved() {
     for (number, (model, mut cloud)) in clouds().into_iter().enumerate() {
@@ -234,7 +235,7 @@ fn the_midpoint_rule_is_solved() {
     }
 }
 
-/// Implicit drag: `M (v′ − v) = Δt/2 F(v′)`.
+/// Checks implicit drag: `M (v′ − v) = Δt/2 F(v′)`.
 #[test]
 fn implicit_drag_is_solved() {
     for (model, cloud) in clouds() {
@@ -294,7 +295,7 @@ fn momentum_is_kept() {
     }
 }
 
-/// In open space `Σ r_ij ⊗ J_ij` is `Σ x_i ⊗ m Δv_i`.
+/// In open space `Σ r_ij ⊗ J_ij` equals `Σ x_i ⊗ m Δv_i`.
 #[test]
 fn the_virial_is_that_of_the_impulses() {
     let edges = Matrix3::from_diagonal(&[3.0, 4.1, 5.3].into());
@@ -308,14 +309,14 @@ fn the_virial_is_that_of_the_impulses() {
                 let sum: f64 = (0..v.len())
                     .map(|k| cloud.x[k][a] * cloud.mass_of(k) * (v[k][b] - cloud.v[k][b]) / DT)
                     .sum();
-                // The midpoint is known to its residual.
+                // The midpoint is accurate to its residual.
                 assert!((sum - w).abs() < 2e-4 * (1.0 + v.len() as f64), "{update:?}: {sum} {w}");
             }
         }
     }
 }
 
-/// Without temperature there is drag alone, and it only takes energy.
+/// At zero temperature only drag acts, and it removes energy.
 #[test]
 fn at_zero_temperature_drag_is_left() {
     for (model, cloud) in clouds().into_iter().filter(|(_, cloud)| cloud.x.len() > 50) {
@@ -331,7 +332,7 @@ fn at_zero_temperature_drag_is_left() {
     }
 }
 
-/// Drag of a hundred times the inertia, and a hundredth of it.
+/// Drag is a hundred times the inertia, and a hundredth of it.
 #[test]
 fn weak_and_strong_drag_converge() {
     let cloud = clouds().swap_remove(0).1;

@@ -1,28 +1,28 @@
-//! The pool in every order in which its threads may run: `RUSTFLAGS="--cfg loom" cargo test --release -p
-//! psidpd-threads`. Loom finds accesses that race, calls that nobody answers, and threads that wait for ever.
+//! Tests the pool in every order in which its threads may run: `RUSTFLAGS="--cfg loom" cargo test
+//! --release -p psidpd-threads`. Loom finds data races, missed wake-ups and deadlocks.
 
 use super::*;
 use loom::cell::UnsafeCell;
 
-/// A number that a piece of work writes: loom sees who writes and reads it at once.
+/// Numbers that a piece of work writes; loom detects concurrent access to them.
 struct Numbers([UnsafeCell<usize>; 2]);
 
-// SAFETY: loom's cells find accesses at once, which would be a fault of the pool.
+// SAFETY: loom's cells report concurrent access, which would be an error of the pool.
 unsafe impl Sync for Numbers {}
 
 impl Numbers {
     fn write(&self, t: usize, value: usize) {
-        // SAFETY: each thread has a number of its own.
+        // SAFETY: each thread writes the number with its own index.
         self.0[t].with_mut(|number| unsafe { *number = value });
     }
 
     fn read(&self, t: usize) -> usize {
-        // SAFETY: the threads are done.
+        // SAFETY: `Pool::run` has returned, so that no thread writes the numbers.
         self.0[t].with(|number| unsafe { *number })
     }
 }
 
-/// Runs work that borrows numbers from the stack, and looks at them when it is done.
+/// Runs work that borrows numbers from the stack, and reads them afterwards.
 fn run(pool: &Pool, value: usize) {
     let numbers = Numbers([UnsafeCell::new(0), UnsafeCell::new(0)]);
     pool.run(&|t| numbers.write(t, value + t));
@@ -31,7 +31,7 @@ fn run(pool: &Pool, value: usize) {
 
 fn model(test: impl Fn() + Sync + Send + 'static) {
     let mut builder = loom::model::Builder::new();
-    // More than three of these at the wrong moment are left out: most faults take one or two.
+    // The test leaves out orders with more than three preemptions: most errors need one or two.
     builder.preemption_bound = Some(3);
     builder.check(test);
 }

@@ -50,7 +50,7 @@ fn a_panic_of_a_worker_reaches_the_caller_and_the_next_piece_is_done() {
     }
 }
 
-/// Each caller's work lives on its own stack, and is gone when its call returns.
+/// Each caller's work is on its own stack, and invalid after its call returns.
 #[test]
 fn pieces_of_two_callers_do_not_overlap() {
     let pool = pool(3);
@@ -66,7 +66,7 @@ fn pieces_of_two_callers_do_not_overlap() {
                     pool.run(&|t| {
                         callers[caller].fetch_add(1, Ordering::SeqCst);
                         assert_eq!(callers[1 - caller].load(Ordering::SeqCst), 0, "the other is at work");
-                        // SAFETY: each number has an element of its own.
+                        // SAFETY: each thread has the element with its own number.
                         let part = unsafe { parts.slice_mut(t..t + 1) };
                         part[0] = round + t;
                         callers[caller].fetch_sub(1, Ordering::SeqCst);
@@ -78,7 +78,7 @@ fn pieces_of_two_callers_do_not_overlap() {
     });
 }
 
-/// Work that runs work of its own on the same pool does not wait for itself.
+/// Work that runs inner work on the same pool does not deadlock.
 #[test]
 fn inner_pieces_are_done_where_they_are_called() {
     let (pool, other) = (pool(3), pool(2));
@@ -89,7 +89,7 @@ fn inner_pieces_are_done_where_they_are_called() {
             assert_eq!(std::thread::current().id(), here);
             done[inner].fetch_add(1 << (8 * outer), Ordering::Relaxed);
         });
-        // Another pool is no part of this one, but its threads may be inside both.
+        // Another pool is independent, but its threads may do work of both pools.
         other.run(&|t| {
             if t == 0 {
                 pool.run(&|_| assert_eq!(std::thread::current().id(), here));
@@ -97,7 +97,7 @@ fn inner_pieces_are_done_where_they_are_called() {
         });
     });
     assert!(done.iter().all(|done| done.load(Ordering::Relaxed) == 0x1_0101));
-    // Outside again, all threads take part.
+    // After this all threads share the work again.
     let seen = AtomicUsize::new(0);
     pool.run(&|t| {
         seen.fetch_or(1 << t, Ordering::Relaxed);

@@ -1,5 +1,4 @@
-//! What the pool is made of: the standard library's, or loom's where a test goes through all orders in which threads
-//! may run.
+//! The primitives of the pool: the standard library's, or loom's in a test that explores all orders of the threads.
 
 #[cfg(not(loom))]
 mod threads {

@@ -1,9 +1,9 @@
-//! Boxes small enough for Miri, which knows the portable instruction set alone: every array that threads share, every
-//! pass, with ghosts and without.
+//! Boxes small enough for Miri, which supports the portable instruction set only: they test every array
+//! that threads share and every pass, with ghosts and without.
 
 use super::*;
 
-/// One species and one density.
+/// A fluid with one species and one density.
 const ONE: &str = r#"
 title = "one density"
 species = ["A"]
@@ -22,18 +22,18 @@ gamma = 4.5
 range = 1.0
 "#;
 
-/// Two species, three densities, all pairs cached; the same with pairs in range alone; and one species.
+/// Two species with three densities and all pairs cached; the same with pairs in range only; and one species.
 fn fluids() -> [Fluid; 3] {
     [MANY, SHORT, ONE].map(|text| Model::parse("test", text).unwrap().at(0.7).unwrap())
 }
 
-/// A box of more planes than a thread has accumulators for at once, and in each some particles.
+/// Particles in a box with more planes than a thread has accumulators at once.
 fn cloud(fluid: &Fluid) -> Cloud {
     let domain = PeriodicBox::orthogonal([-1.0, 2.0, 0.5], [2.1, 2.2, 7.3], [true; 3]).unwrap();
     Cloud::new(domain, 3, fluid.species.len(), 70, 9)
 }
 
-/// Forces and totals.
+/// Forces and totals of a sweep.
 fn evaluated(sweep: &mut Sweep, cloud: &Cloud) -> (Vec<[f64; 3]>, Tally) {
     let (particles, mut force) = (cloud.particles(), vec![[0.0; 3]; cloud.x.len()]);
     let (step, want) = (Some(STEP), Want::TOTALS);
@@ -73,8 +73,8 @@ fn a_small_rank_with_ghosts_has_the_forces_of_the_plain_engine() {
     }
 }
 
-/// Planes with fewer particles than a vector has lanes, in slabs of one plane and of none: what whole vectors read behind
-/// the last particle of a slab is not what another thread writes.
+/// Planes have fewer particles than a vector has lanes, and slabs one plane or none: vectors that read
+/// beyond the last particle of a slab must not read data that another thread writes.
 #[test]
 fn nearly_empty_planes_are_of_many_threads() {
     for fluid in fluids() {
@@ -93,7 +93,7 @@ fn nearly_empty_planes_are_of_many_threads() {
     }
 }
 
-/// Engines that are cloned share their threads: two that are used at once take turns.
+/// Clones of a sweep share their threads: two that run at once take turns.
 #[test]
 fn clones_on_two_threads_do_not_disturb_each_other() {
     let [fluid, ..] = fluids();

@@ -1,10 +1,10 @@
-//! Sweeps over parts of a box, with ghosts for what is beyond: ranks of a host.
+//! Sweeps over parts of a box, as on the ranks of a host, with ghosts for the rest.
 
 use super::*;
 
-/// One rank's particles: those it owns, then ghosts.
+/// The particles of one rank: owned particles, then ghosts.
 struct Rank {
-    /// The cloud's number of each.
+    /// The cloud's index of each particle.
     number: Vec<usize>,
     owned: usize,
     x: Vec<[f64; 3]>,
@@ -15,8 +15,8 @@ struct Rank {
 }
 
 impl Rank {
-    /// Rank `r` of `ranks`, which divide a box between them along `axis`, and have all of it along other directions
-    /// if those are `closed`. Every other particle and all images are ghosts, near or far.
+    /// Rank `r` of `ranks`, which divide a box along `axis`, and own all of it along the other
+    /// directions if these are `closed`. Every other particle and all images are ghosts, near or far.
     fn new(
         cloud: &Cloud,
         dimensions: usize,
@@ -53,7 +53,7 @@ impl Rank {
     }
 }
 
-/// Forces and totals by as many sweeps as there are ranks along `axis`.
+/// Computes forces and totals by one sweep for each rank along `axis`.
 pub fn on_ranks(
     sweeps: &mut [Sweep],
     cloud: &Cloud,
@@ -70,7 +70,7 @@ pub fn on_ranks(
     for (r, sweep) in sweeps.iter_mut().enumerate() {
         let (dimensions, cutoff) = (sweep.plan().dimensions(), sweep.plan().cutoff());
         let rank = Rank::new(cloud, dimensions, cutoff, [r, count, axis], closed);
-        // Without images there is nothing to be said of them.
+        // Without images the array of flags is empty.
         let images = if closed == [false; 3] { &[] } else { &rank.images[..] };
         let around = Around { domain: &domain, images };
         sweep.first(around, &rank.particles(), &rank.v, Some(STEP), Want::TOTALS).unwrap();
@@ -94,13 +94,13 @@ pub fn on_ranks(
     (force, tally)
 }
 
-/// The same on one rank that has images for all that is beyond the box.
+/// Computes them on one rank with images for everything beyond the box.
 pub fn with_ghosts(sweep: &mut Sweep, cloud: &Cloud) -> (Vec<[f64; 3]>, Tally) {
     on_ranks(std::slice::from_mut(sweep), cloud, 0, [false; 3])
 }
 
-/// Along some directions a rank has ghosts, along others it goes round: in any of them rows, planes and cells may meet
-/// their copies, and ghosts among these.
+/// Along some directions a rank has ghosts, along others it applies the period: in each of these,
+/// columns, planes and cells may meet their copies, and ghosts among these.
 #[test]
 fn ranks_that_have_all_of_some_directions_have_the_forces_of_the_plain_engine() {
     let fluids = [
@@ -119,7 +119,7 @@ fn ranks_that_have_all_of_some_directions_have_the_forces_of_the_plain_engine() 
         for (precision, instructions) in every() {
             for set in 0..1 << dimensions {
                 let closed = [0, 1, 2].map(|c| set >> c & 1 == 1 && c < dimensions);
-                // Ranks are one behind the other along open directions; along closed ones there is one.
+                // Ranks divide open directions; along closed ones there is one rank.
                 for axis in 0..dimensions {
                     let ranks = if closed[axis] { 1 } else { 2 };
                     let mut sweeps: Vec<Sweep> = (0..ranks)
@@ -145,7 +145,7 @@ fn what_is_around_a_rank_has_to_fit() {
     let edges = Matrix3::from_columns(&[0, 1, 2].map(|k| cloud.domain.edge(k).into()));
     let half = PeriodicBox::new(cloud.domain.origin(), edges, [true, true, false]).unwrap();
     assert!(sweep.fits(&cloud.domain) && !sweep.fits(&half));
-    // A box that is open everywhere may lean as it likes.
+    // A box without periodic directions may be skew.
     let open = PeriodicBox::new(cloud.domain.origin(), edges, [false; 3]).unwrap();
     assert!(sweep.fits(&open));
     let open = Cloud { domain: open, ..cloud.clone() };

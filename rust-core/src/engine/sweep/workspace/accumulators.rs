@@ -1,16 +1,16 @@
-//! Accumulators: the sums over pairs of forces and densities. Each plane has accumulators for its own particles and for
-//! those of the next plane. So the order of every sum is fixed, whichever thread does which plane.
+//! Accumulators: the sums over pairs of forces and densities. Each plane has accumulators for its own particles and
+//! for those of the next plane, so that the order of every sum is fixed, whichever thread works on a plane.
 
 use super::cell_order::CellOrder;
 use psidpd_passes::pair_batch::accumulators::Accumulator;
 use std::ops::Range;
 
-/// Blocks of accumulators of a thread slab. The blocks of its first two planes are kept until all threads are done; the
-/// other planes reuse three blocks in turn.
+/// Number of blocks of accumulators of a thread slab. The blocks of its first two planes are kept until
+/// all threads are done; the other planes reuse three blocks in turn.
 const ACCUMULATOR_SLOTS: usize = 2 + TURNS;
 
-/// Planes whose accumulators are needed at once. When a plane begins, the plane before still lacks its many-body forces, and
-/// what the plane before that one added to it is not yet part of the forces.
+/// Number of planes whose accumulators are needed at once. When a plane begins, the previous plane still lacks its
+/// many-body forces, and the additions of the plane before that to it are not yet part of the forces.
 const TURNS: usize = 3;
 
 /// The accumulators of all planes. Those of a thread slab are contiguous.
@@ -18,11 +18,11 @@ const TURNS: usize = 3;
 pub struct AccumulatorArrays {
     /// For each plane: index of an accumulator minus index of its particle.
     offset: Vec<isize>,
-    /// How many accumulators each thread slab has.
+    /// Number of accumulators of each thread slab.
     slab_sizes: Vec<usize>,
-    /// Force, and the density if there is one variable.
+    /// Force sums, and density sums if there is one variable.
     forces: Vec<Accumulator>,
-    /// Densities, if there are more variables: `quads` for each particle.
+    /// Density sums, if there are several variables: `quads` for each particle.
     densities: Vec<Accumulator>,
     quads: usize,
 }
@@ -36,7 +36,7 @@ pub struct SlabSums<'a> {
     quads: usize,
 }
 
-/// Accumulators to read: of one thread slab, or all.
+/// Accumulators for reading: of one thread slab, or of all.
 #[derive(Clone, Copy)]
 pub struct Sums<'a> {
     forces: &'a [Accumulator],
@@ -54,8 +54,8 @@ pub struct Added<'a> {
 }
 
 impl AccumulatorArrays {
-    /// Lays out accumulators for thread slabs, for `variables` densities. If planes are `reused`, all but the first two of a
-    /// slab are used again three planes on.
+    /// Lays out accumulators for thread slabs, for `variables` densities. If planes are `reused`, all
+    /// but the first two of a slab share blocks with the third plane after them.
     pub fn lay_out(&mut self, order: &CellOrder, slabs: &[Range<usize>], variables: usize, reused: bool) {
         self.offset.clear();
         self.slab_sizes.clear();
@@ -87,7 +87,7 @@ impl AccumulatorArrays {
         self.densities.resize(self.quads * begin, Accumulator::default());
     }
 
-    /// Splits them by thread slab.
+    /// Splits the accumulators by thread slab.
     pub fn split(&mut self) -> impl Iterator<Item = SlabSums<'_>> {
         let AccumulatorArrays { offset, slab_sizes, forces, densities, quads } = self;
         let (offset, quads) = (&offset[..], *quads);
@@ -109,13 +109,13 @@ impl AccumulatorArrays {
         Sums { forces, densities, offset, begin: 0, quads: *quads }
     }
 
-    /// Bytes held in arrays.
+    /// Size in bytes of the arrays.
     pub fn bytes(&self) -> usize {
         (self.forces.capacity() + self.densities.capacity()) * size_of::<Accumulator>()
     }
 }
 
-/// A plane has accumulators of its own particles, then of those of the next.
+/// Number of accumulators of a plane: of its own particles and of those of the next.
 fn block_size(order: &CellOrder, plane: usize) -> usize {
     order.plane(plane).1 + order.next_plane(plane)
 }
@@ -129,7 +129,7 @@ impl SlabSums<'_> {
         [&mut self.forces[range.clone()], &mut self.densities[quads * range.start..quads * range.end]]
     }
 
-    /// Read access.
+    /// Read access to the accumulators of the slab.
     pub fn sums(&self) -> Sums<'_> {
         let SlabSums { forces, densities, offset, begin, quads } = self;
         Sums { forces, densities, offset, begin: *begin, quads: *quads }
@@ -137,7 +137,7 @@ impl SlabSums<'_> {
 }
 
 impl<'a> Sums<'a> {
-    /// What has been added to particles of a plane: by the pairs of that plane, and by those of the plane before.
+    /// The sums of particles of a plane: over the pairs of that plane, and over those of the previous plane.
     pub fn of_particles(
         &self,
         order: &CellOrder,
@@ -145,7 +145,7 @@ impl<'a> Sums<'a> {
         particles: Range<usize>,
     ) -> (Added<'a>, Option<Added<'a>>) {
         let before = match plane {
-            // The copies of the first plane are behind the last particle.
+            // The copies of the first plane follow the last particle.
             0 if order.is_periodic() => Some(self.offset[order.grid.planes - 1] + order.particles() as isize),
             0 => None,
             _ => Some(self.offset[plane - 1]),

@@ -1,4 +1,4 @@
-//! The particles in the order of cells.
+//! Sorts the particles in the order of cells.
 
 mod count;
 mod extremes;
@@ -20,26 +20,26 @@ use std::ops::Range;
 pub use extremes::extremes;
 pub use fractions::TWO_TO_32;
 
-/// Up to so many particles all arrays stay in the cache, and nothing is prefetched; lowered in tests.
+/// Up to this number of particles all arrays stay in the cache, and nothing is prefetched; lowered in tests.
 const PREFETCH_THRESHOLD: usize = if cfg!(test) { 100 } else { 1 << 14 };
 
-/// Which particles are in which cell. Behind the last plane follow copies of the first, if planes are periodic.
+/// The particles of each cell. If planes are periodic, copies of the first plane follow the last plane.
 #[derive(Clone)]
 pub struct CellOrder {
     pub geometry: BoxGeometry,
     pub grid: CellGrid,
     /// Fractions of the box geometry of the host's particles, in units of 2⁻³².
     pub fixed32: Vec<[u32; 3]>,
-    /// First particle of each cell, those of the copies too, and one past the last.
+    /// Index of the first particle of each cell, including the copies; the last entry is one past the last particle.
     pub start: Vec<u32>,
-    /// The host's number of each particle: each is there once at most.
+    /// The host's number of each sorted particle; each number occurs at most once.
     pub order: Vec<u32>,
-    /// How many of the host's particles it owns, and how many there are with ghosts.
+    /// Number of the host's owned particles, and of all with ghosts.
     pub owned: usize,
     pub all: usize,
-    /// The cell of each of the host's particles.
+    /// Cell of each of the host's particles.
     cell: Vec<u32>,
-    /// Particles of each cell: by thread while counting, then where each thread's begin.
+    /// Number of particles of each cell: by thread while counting, then the start of each thread's particles.
     counts: Vec<u32>,
 }
 
@@ -68,7 +68,7 @@ impl CellOrder {
         }
     }
 
-    /// Finds the order of the particles in the cells of `grid`.
+    /// Sorts the particles into the cells of `grid`.
     pub fn sort(
         &mut self,
         pool: &Pool,
@@ -86,13 +86,13 @@ impl CellOrder {
         self.sum_counts();
         let crowded = |plane| (self.plane(plane).1 + self.next_plane(plane)) >> J_CODE_BITS > 0;
         if (0..grid.planes).any(crowded) {
-            return Err(EngineError::Host("2^25 particles or more in two planes next to each other"));
+            return Err(EngineError::Host("two neighbouring planes of cells contain 2^25 particles or more"));
         }
         self.write_order(pool);
         Ok(())
     }
 
-    /// The cell of each particle, and how many of each thread's particles are in each.
+    /// Computes the cell of each particle, and for each thread the number of its particles in each cell.
     fn count(&mut self, pool: &Pool, set: InstructionSet, input: &Input) -> Result<(), EngineError> {
         let threads = pool.threads();
         let count = &Count {
@@ -119,14 +119,15 @@ impl CellOrder {
         parts.into_iter().try_for_each(|(_, done)| done)
     }
 
-    /// Turns counts into where each thread's particles of a cell begin.
+    /// Turns counts into the start of each thread's particles of a cell.
     fn sum_counts(&mut self) {
         let cells = self.grid.cell_count();
         let per_plane = self.grid.columns_per_plane * self.grid.cells_per_column;
         self.start.resize(cells + 1 + if self.is_periodic() { per_plane } else { 0 }, 0);
         let [first, rest @ ..] = &mut self.start[..] else { return };
         *first = 0;
-        // How many there are in each cell, then where it begins, and last where it ends: the beginning of the next.
+        // The array first has the number of particles in each cell, then its start, and last its end,
+        // which is the start of the next.
         let ends = &mut rest[..cells];
         ends.copy_from_slice(&self.counts[..cells]);
         for counts in self.counts.chunks_exact(cells).skip(1) {
@@ -148,13 +149,13 @@ impl CellOrder {
             }
         }
         self.order.resize(sum as usize, 0);
-        // The copy of the first plane.
+        // These are the cells of the copy of the first plane.
         for cell in cells + 1..self.start.len() {
             self.start[cell] = sum + self.start[cell - cells];
         }
     }
 
-    /// The particles in the order of cells: within one in the order of their numbers.
+    /// Writes the order of the particles: by cell, and within a cell by the host's number.
     fn write_order(&mut self, pool: &Pool) {
         let (threads, all) = (pool.threads(), self.all);
         let mut cell = &self.cell[..];
@@ -171,9 +172,9 @@ impl CellOrder {
                 if *to == NO_CELL {
                     continue;
                 }
-                // SAFETY: all other cells are of the grid, see `CountRange`. Each thread has as many places of a cell as
-                // it has counted particles in it, beginning where `sum_counts` says, so no two particles have the same
-                // place, and all places are below the number of particles.
+                // SAFETY: `CountRange` gives all other particles a cell of the grid. Each thread has as many places
+                // in a cell as it has counted particles there, beginning where `sum_counts` says, so that no two
+                // particles have the same place, and all places are below the number of particles.
                 unsafe {
                     let next = counts.get_unchecked_mut(*to as usize);
                     *order.at(*next as usize) = k as u32;
@@ -183,17 +184,17 @@ impl CellOrder {
         });
     }
 
-    /// How many particles there are.
+    /// Number of particles.
     pub fn particles(&self) -> usize {
         self.order.len()
     }
 
-    /// How many copies of particles of the first plane follow them.
+    /// Number of copies of particles of the first plane.
     pub fn copies(&self) -> usize {
         if self.is_periodic() { self.plane(0).1 } else { 0 }
     }
 
-    /// The first particle of a plane, and how many it has.
+    /// First particle of a plane, and its number of particles.
     pub fn plane(&self, plane: usize) -> (usize, usize) {
         let first = self.plane_start(plane);
         (first, self.plane_start(plane + 1) - first)
@@ -204,33 +205,33 @@ impl CellOrder {
         self.start[plane * self.grid.columns_per_plane * self.grid.cells_per_column] as usize
     }
 
-    /// The particles of planes that follow each other.
+    /// The range of particles of consecutive planes.
     pub fn particles_of(&self, planes: &Range<usize>) -> Range<usize> {
         self.plane_start(planes.start)..self.plane_start(planes.end)
     }
 
-    /// How many particles the plane behind `plane` has.
+    /// Number of particles of the plane after `plane`.
     pub fn next_plane(&self, plane: usize) -> usize {
         if plane + 1 < self.grid.planes { self.plane(plane + 1).1 } else { self.copies() }
     }
 
-    /// The places that one of `threads` fills: from a whole vector on, and up to one, or to the last.
+    /// The range of indices that one of `threads` threads fills: from one whole vector to another, or to the last.
     pub fn whole_vectors(&self, thread: usize, threads: usize) -> Range<usize> {
         let vectors = part(self.particles().div_ceil(VECTOR_PADDING), thread, threads);
         vectors.start * VECTOR_PADDING..(vectors.end * VECTOR_PADDING).min(self.particles())
     }
 
-    /// Whether the first plane follows the last: periodic along the plane axis.
+    /// Whether the first plane follows the last: the plane axis is periodic.
     pub fn is_periodic(&self) -> bool {
         self.geometry.periodic[self.grid.plane_axis]
     }
 
-    /// Whether arrays over all particles are beyond the cache.
+    /// Whether arrays over all particles exceed the cache.
     pub fn exceeds_cache(&self) -> bool {
         self.all > PREFETCH_THRESHOLD
     }
 
-    /// Bytes held in arrays.
+    /// Size in bytes of the arrays.
     pub fn bytes(&self) -> usize {
         (self.cell.capacity() + self.counts.capacity() + self.start.capacity() + self.order.capacity())
             * size_of::<u32>()

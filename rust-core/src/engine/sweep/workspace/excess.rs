@@ -1,4 +1,4 @@
-//! Densities of the particles, and ψ at them.
+//! Computes densities of the particles, and ψ.
 
 use super::accumulators::Added;
 use super::cell_order::CellOrder;
@@ -12,22 +12,22 @@ use crate::engine::vectors::{self, Loop};
 use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_passes::pair_batch::accumulators::Accumulator;
 
-/// Particles whose densities are gathered at once: few enough to stay in the first-level cache until ψ is evaluated, and
-/// enough to fill several blocks of lanes where some particles take no part.
+/// Number of particles whose densities are gathered at once: few enough to stay in the first-level cache
+/// until ψ is evaluated, and enough to fill several blocks of lanes where some particles are left out.
 pub const DENSITY_BLOCK: usize = 2 * LANES;
 
-/// What ψ is evaluated with.
+/// The input of the evaluation of ψ.
 pub struct ExcessInput<'a> {
     pub plan: &'a Plan,
     pub tag: &'a [i32],
     /// The self term of each density: `w(0)` for the particle's own species, else zero. One row for each species.
     self_weights: Vec<f64>,
-    /// What is added beside pairs, a row for each owned particle in the host's order; empty if nothing is.
+    /// Additions to the densities, a row for each owned particle in the host's order; empty if there are none.
     added: &'a [f64],
 }
 
 impl<'a> ExcessInput<'a> {
-    /// None if ψ is zero at all densities.
+    /// Returns `None` if ψ is zero at all densities.
     pub fn new(plan: &'a Plan, input: &Input<'a>) -> Option<ExcessInput<'a>> {
         if plan.excess.iter().all(|e| matches!(e, ExcessPlan::Constant(0.0))) {
             return None;
@@ -43,7 +43,7 @@ impl<'a> ExcessInput<'a> {
         Some(ExcessInput { plan, tag: input.particles.tag, self_weights, added: input.added_densities })
     }
 
-    /// Adds what is added beside pairs to the densities of particles with these numbers.
+    /// Adds the rows of `added` to the densities of particles with these numbers.
     fn add(&self, numbers: &[u32], width: usize, densities: &mut [f64]) {
         if width == 1 {
             for (k, n) in numbers.iter().zip(densities) {
@@ -61,13 +61,13 @@ impl<'a> ExcessInput<'a> {
 
 /// Up to [`DENSITY_BLOCK`] consecutive particles.
 pub struct DensityBlock<'a> {
-    /// The first.
+    /// First particle of the block.
     pub first: usize,
-    /// What pairs have added to them.
+    /// Sums over pairs of these particles.
     pub added: (Added<'a>, Option<Added<'a>>),
-    /// Empty with one species.
+    /// Species of the particles; empty with one species.
     pub species: &'a [u8],
-    /// Empty without ghosts.
+    /// Ghost flags of the particles; empty without ghosts.
     pub ghost: &'a [bool],
     pub densities: &'a mut [f64],
     pub excess: &'a mut [f64],
@@ -75,7 +75,7 @@ pub struct DensityBlock<'a> {
 }
 
 impl DensityBlock<'_> {
-    /// Their densities, ψ and its slopes.
+    /// Computes their densities, ψ and its slopes.
     pub fn evaluate<T>(
         self,
         fluid: &FluidConstants<T>,
@@ -143,14 +143,14 @@ fn sum_densities(
     }
 }
 
-/// Densities from the sums of a plane, of the plane before, and what each species adds to its own; `W` of each
-/// particle, in rows of four.
+/// Computes densities from the sums of a plane, those of the previous plane, and the self terms of each
+/// species; `W` densities of each particle, in rows of four.
 struct SumDensities<'a, const W: usize> {
     out: &'a mut [f64],
     here: &'a [Accumulator],
     before: Option<&'a [Accumulator]>,
     own: &'a [f64],
-    /// Empty with one.
+    /// Species of the particles; empty with one species.
     species: &'a [u8],
 }
 

@@ -5,7 +5,7 @@ use crate::engine::exclusions::Exclusions;
 use psidpd_passes::cells::excluded::{Excluded, Mark};
 use psidpd_passes::simd::OFFSET_BITS;
 
-/// What each of the sorted particles forms no pair with.
+/// The excluded pairs of the sorted particles.
 #[derive(Debug, Clone, Default)]
 pub struct ExcludedPairs {
     start: Vec<u32>,
@@ -13,15 +13,15 @@ pub struct ExcludedPairs {
     sides: Vec<u32>,
     molecules: Vec<u32>,
     between_molecules: bool,
-    /// The place of each of the host's particles.
+    /// Sorted index of each of the host's particles.
     place: Vec<u32>,
 }
 
-/// A particle that takes no part.
+/// The sorted index of a particle that is left out.
 const NOWHERE: u32 = u32::MAX;
 
 impl ExcludedPairs {
-    /// Finds the places of the partners of all particles, and sorts their marks.
+    /// Finds the sorted indices of the partners of all particles, and sorts their marks.
     pub fn fill(&mut self, order: &CellOrder, exclusions: Option<&Exclusions>) {
         self.start.clear();
         self.partners.clear();
@@ -80,7 +80,7 @@ impl ExcludedPairs {
         }
     }
 
-    /// Bytes held.
+    /// Size in bytes.
     pub fn bytes(&self) -> usize {
         let held = [&self.start, &self.partners, &self.sides, &self.molecules, &self.place];
         held.map(|numbers| numbers.capacity() * size_of::<u32>()).iter().sum()

@@ -1,16 +1,16 @@
 use psidpd_passes::ground::terms::Terms;
 use psidpd_passes::instruction_set::InstructionSet;
 
-/// What stays the same for one fluid.
+/// Constants of one fluid.
 pub struct FluidConstants<T> {
     pub set: InstructionSet,
     pub terms: Terms<T>,
-    /// Which variables of ψ the many-body passes sum.
+    /// The variables of ψ that the many-body passes sum.
     pub variables: Vec<usize>,
 }
 
 impl<T> FluidConstants<T> {
-    /// Numbers that a many-body pair needs of each particle.
+    /// Number of slopes of each particle that a many-body pair needs.
     pub fn width(&self) -> usize {
         self.variables.len()
     }

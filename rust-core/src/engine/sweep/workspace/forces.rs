@@ -13,18 +13,18 @@ use std::ops::Range;
 #[derive(Clone, Copy)]
 pub struct ForceSink<'a> {
     force: SharedSlice<'a, [f64; 3]>,
-    /// Whether forces are added to what the array holds.
+    /// Whether forces are added to those in the array.
     add: bool,
     tag: &'a [i32],
 }
 
 impl<'a> ForceSink<'a> {
-    /// Forces on the particles with these tags, of which there may be more than forces: ghosts.
+    /// Creates a sink for forces on the particles with these tags; ghosts have a tag, but no force.
     pub fn new(force: &'a mut [[f64; 3]], add: bool, tag: &'a [i32]) -> ForceSink<'a> {
         ForceSink { force: SharedSlice::new(force), add, tag }
     }
 
-    /// Writes forces on particles, or adds them to what is there; the lowest tag of those that are not finite.
+    /// Writes forces on particles or adds them to those in the array; returns the lowest tag whose force is not finite.
     ///
     /// # Safety
     /// No other thread writes the forces on these particles.
@@ -49,19 +49,19 @@ impl<'a> ForceSink<'a> {
     }
 }
 
-/// Forces on the particles of one plane. Only [`ForceSink::write`] makes it: its caller promises that no other thread writes
-/// these forces, and it has checked that the array has room for all owned particles.
+/// Forces on the particles of one plane. Only [`ForceSink::write`] creates it: its caller promises that no
+/// other thread writes these forces, and it has checked that the array has room for all owned particles.
 struct PlaneForces<'a> {
-    /// The host's numbers of them.
+    /// The host's numbers of the particles.
     order: &'a [u32],
     owned: usize,
-    /// The sums over pairs of this plane, and of the plane before.
+    /// The sums over pairs of this plane, and of the previous plane.
     here: &'a [Accumulator],
     before: Option<&'a [Accumulator]>,
     out: SharedSlice<'a, [f64; 3]>,
 }
 
-/// Writes forces, or adds them to what is there, which is prefetched with `FAR`; whether all are finite.
+/// Writes forces, or adds them to those in the array, which are prefetched with `FAR`; returns whether all are finite.
 struct WriteForces<'a, const ADD: bool, const FAR: bool>(&'a PlaneForces<'a>);
 
 impl<const ADD: bool, const FAR: bool> Loop for WriteForces<'_, ADD, FAR> {
@@ -96,7 +96,8 @@ impl PlaneForces<'_> {
             }
             let finite = x.is_finite() & y.is_finite() & z.is_finite();
             lost |= !finite;
-            // SAFETY: an owned particle, whose force is there and nobody else's to write, see `PlaneForces`.
+            // SAFETY: `PlaneForces` contains an owned particle's number, for which the array has
+            // room and no other thread writes.
             unsafe {
                 let out = self.out.at(k as usize);
                 if ADD {

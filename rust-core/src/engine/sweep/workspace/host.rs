@@ -1,4 +1,4 @@
-//! Exchange with the host, in the order of the host.
+//! Exchange of data with the host, in the order of the host.
 
 use super::Workspace;
 use crate::engine::counts::PassCounts;
@@ -16,7 +16,7 @@ impl<P: PairPrecision> Workspace<P> {
         let (width, slopes) = (self.fluid.width(), self.slopes.rows());
         out.resize(width * self.order.all, 0.0);
         if width == 1 {
-            // Far the most common, and the copy of one number is no loop.
+            // One slope is by far the most common case, and needs no inner loop.
             for (k, slope) in self.order.order.iter().zip(slopes) {
                 if let Some(out) = out.get_mut(*k as usize) {
                     *out = *slope;
@@ -32,7 +32,7 @@ impl<P: PairPrecision> Workspace<P> {
         }
     }
 
-    /// Takes the slopes of ghosts from the host.
+    /// Copies the slopes of ghosts from the host.
     pub fn slopes_from_host(&mut self, slopes: &[f64]) {
         let width = self.fluid.width();
         for (s, (k, ghost)) in self.order.order.iter().zip(&self.particles.ghost).enumerate() {
@@ -58,7 +58,7 @@ impl<P: PairPrecision> Workspace<P> {
         tally
     }
 
-    /// ψ of owned particles and their densities, `variables` each, in the host's order.
+    /// Copies ψ of owned particles and their densities, `variables` each, in the host's order.
     pub fn to_host(&self, variables: usize, excess: &mut Vec<f64>, densities: &mut Vec<f64>) {
         let (width, owned) = (self.fluid.width(), self.order.owned);
         excess.clear();
@@ -76,7 +76,7 @@ impl<P: PairPrecision> Workspace<P> {
         }
     }
 
-    /// Evaluations below and above the bounds of a density.
+    /// Numbers of evaluations below and above the bounds of a density.
     pub fn out_of_bounds(&self) -> [u64; 2] {
         let mut sum = [0; 2];
         for state in &self.threads {
@@ -87,7 +87,7 @@ impl<P: PairPrecision> Workspace<P> {
         sum
     }
 
-    /// The counts of all threads.
+    /// The sum of the counts of all threads.
     pub fn counts(&self) -> PassCounts {
         let mut sum = PassCounts::default();
         for state in &self.threads {
@@ -106,7 +106,7 @@ impl<P: PairPrecision> Workspace<P> {
         sum
     }
 
-    /// Bytes held in arrays over particles and pairs.
+    /// Size in bytes of the arrays over particles and pairs.
     pub fn memory(&self) -> usize {
         self.order.bytes()
             + self.particles.bytes()

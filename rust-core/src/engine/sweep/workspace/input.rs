@@ -3,19 +3,19 @@ use crate::engine::particles::Particles;
 use psidpd_passes::noise::PairNoise;
 use psidpd_passes::tally::Want;
 
-/// Room behind the last particle: what whole vectors may read.
+/// Number of elements after the last particle that whole vectors may read.
 pub const VECTOR_PADDING: usize = 16;
 
-/// What the host hands over.
+/// The input of an evaluation, from the host.
 pub struct Input<'a> {
     pub particles: Particles<'a>,
-    /// Whether each ghost is an image of a particle that is there too; empty if none is.
+    /// Whether each ghost is an image of another particle of this rank; empty if none is.
     pub images: &'a [bool],
-    /// Empty if nothing drags.
+    /// Velocities; empty without a thermostat.
     pub v: &'a [[f64; 3]],
-    /// Species of each type of particle; negative for those that take no part.
+    /// Species of each type of particle; negative for particles that are left out.
     pub species_of_type: &'a [i32],
-    /// What is added to the densities of owned particles beside pairs, a row for each; empty if nothing is.
+    /// Additions to the densities of owned particles, a row for each; empty if there are none.
     pub added_densities: &'a [f64],
     /// Pairs that do not interact.
     pub exclusions: Option<&'a Exclusions>,
@@ -45,12 +45,12 @@ impl<'a> Input<'a> {
         }
     }
 
-    /// The same without some pairs.
+    /// The same input with excluded pairs.
     pub fn excluding(self, exclusions: &'a Exclusions) -> Input<'a> {
         Input { exclusions: Some(exclusions), ..self }
     }
 
-    /// The species of a particle, unless its type is unknown.
+    /// The species of a particle, or `None` if its type is unknown.
     #[inline(always)]
     pub fn species_of(&self, k: usize) -> Option<i32> {
         self.species_of_type.get(self.particles.kind[k] as usize).copied()

@@ -1,21 +1,21 @@
-//! The scheduler runs the passes plane by plane, so that the results of one pass are still in the cache when the next
-//! pass reads them. Without ghosts all passes run in one go, and only a few planes are in memory at once. With ghosts an
-//! evaluation has two halves: up to ψ, and, when the host has sent the slopes of ghosts, the rest.
+//! The scheduler runs the passes plane by plane, so that the results of one pass are still in the cache when the
+//! next pass reads them. Without ghosts all passes run together, and only a few planes are in memory at once. With
+//! ghosts an evaluation has two halves: up to ψ, and, after the host has sent the slopes of ghosts, the rest.
 //!
 //! Each thread has a slab of planes. Dependencies between planes:
 //!
-//! - ψ of a plane needs the first pass over that plane and over the one before;
-//! - the second pass over a plane needs ψ of that plane and of the one behind;
-//! - forces of a plane need both passes over that plane and over the one before.
+//! - ψ of a plane needs the first pass over that plane and over the previous one;
+//! - the second pass over a plane needs ψ of that plane and of the next one;
+//! - forces of a plane need both passes over that plane and over the previous one.
 //!
-//! Arrays in the order of cells are filled one plane ahead. The planes at the ends of slabs are finished when all threads
-//! have done their interiors.
+//! Arrays in the order of cells are filled one plane ahead. The planes at the ends of slabs are
+//! finished after all threads have done their interiors.
 //!
-//! Which thread accesses what: a [`ThreadSlab`] and its [`SlabSums`] belong to one thread. Two arrays are shared.
-//! Packed particles are written by the thread of their slab, one plane ahead of its first pass. The thread of the slab
-//! before reads those of the slab's first plane and one vector behind: they are filled before any pass begins. Slopes are
-//! written by the thread of their slab. The thread of the slab before reads those of the first plane, in a separate round
-//! after all slopes are written.
+//! Access of threads: a [`ThreadSlab`] and its [`SlabSums`] belong to one thread. Two arrays are
+//! shared. Packed particles are written by the thread of their slab, one plane ahead of its first pass.
+//! The thread of the previous slab reads those of the slab's first plane and one vector more: they are
+//! filled before any pass begins. Slopes are written by the thread of their slab. The thread of the
+//! previous slab reads those of the first plane, in a separate round after all slopes are written.
 
 use super::accumulators::{SlabSums, Sums};
 use super::cell_order::CellOrder;
@@ -46,17 +46,17 @@ pub struct Scheduler<'a, P: PairPrecision> {
 /// Input of the passes up to ψ.
 pub struct PassInput<'a> {
     pub input: &'a Input<'a>,
-    /// None if ψ is zero.
+    /// The input of ψ; `None` if ψ is zero.
     pub excess: Option<ExcessInput<'a>>,
-    /// Where forces go, if the second pass follows at once.
+    /// The place for forces, if the second pass follows at once.
     pub out: Option<ForceSink<'a>>,
 }
 
-/// The planes of each of `threads` threads: all slabs have about the same number of pairs.
+/// The planes of each of `threads` threads, divided so that all slabs have about the same number of pairs.
 pub fn thread_slabs(order: &CellOrder, threads: usize) -> Vec<Range<usize>> {
     let planes = order.grid.planes;
     let mean = order.particles() as f64 / planes as f64;
-    // A particle costs something even if it is alone.
+    // A particle has a cost even without neighbours.
     let cost = |l: usize| order.plane(l).1 as f64 * (order.plane(l).1 as f64 + 0.5 * mean);
     let all: f64 = (0..planes).map(cost).sum();
     let mut before = 0.0;
@@ -78,10 +78,10 @@ fn vectors_before(order: &CellOrder, plane: usize) -> usize {
     order.plane_start(plane) / VECTOR_PADDING * VECTOR_PADDING
 }
 
-/// The places that the thread of a slab must have filled before it does its first `planes`: all vectors that begin in
-/// these planes, the vector across the start of the slab, and four behind, because the distance filter reads sixteen
-/// candidates at once and up to two such groups begin behind the last particle. If everything stays in the cache: all
-/// places of the slab.
+/// The particles that the thread of a slab must have filled before it does its first `planes` planes:
+/// all vectors that begin in these planes, the vector across the start of the slab, and four more,
+/// because the distance filter reads sixteen candidates at once and up to two such groups begin after
+/// the last particle. If everything fits into the cache, these are all particles of the slab.
 fn needed(order: &CellOrder, slab: &Range<usize>, planes: usize) -> Range<usize> {
     let (start, end) = (vectors_before(order, slab.start), vectors_before(order, slab.end));
     if !order.exceeds_cache() {
@@ -92,8 +92,8 @@ fn needed(order: &CellOrder, slab: &Range<usize>, planes: usize) -> Range<usize>
 }
 
 impl<P: PairPrecision> Scheduler<'_, P> {
-    /// Fills the places of a thread slab that the slab before reads; the first slab also fills the last particles, which are
-    /// no whole vector.
+    /// Fills the particles of a thread slab that the previous slab reads; the first slab also fills the
+    /// last particles, which are no whole vector.
     pub fn fill_start(
         particles: &SharedParticles<P::PackedParticle>,
         fluid: &FluidConstants<P::Scalar>,
@@ -103,8 +103,8 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         is_first: bool,
     ) {
         let mut since = Instant::now();
-        // SAFETY: places of different slabs are disjoint, and each slab is of one thread. The places from the last whole
-        // vector on are of no slab; one thread fills them. No pass reads any yet.
+        // SAFETY: different slabs have disjoint particles, and each slab has one thread. The particles after
+        // the last whole vector are in no slab; one thread fills them. No pass reads any before this is done.
         unsafe {
             if is_first {
                 let rest = vectors_before(order, order.grid.planes)..order.particles();
@@ -115,13 +115,13 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         lap(&mut since, &mut slab.state.times.sort);
     }
 
-    /// Fills the arrays of a thread slab, does the first pass over all its planes and ψ of all but the first. Where forces
-    /// are wanted at once, also the second pass over the planes between the first and the last, and the forces of those that
-    /// are complete.
+    /// Fills the arrays of a thread slab, and does the first pass over all its planes and ψ of all but
+    /// the first. With a place for forces it also does the second pass over the planes between the
+    /// first and the last, and the forces of those that are complete.
     ///
     /// # Safety
-    /// The starts of all slabs are filled, and the copies of the first plane are there. Other threads do the same with
-    /// slabs of theirs, and nothing else.
+    /// The starts of all slabs are filled, and the copies of the first plane exist. Other threads run
+    /// the same function for other slabs, and nothing else.
     pub unsafe fn interior(&self, input: &PassInput, slab: &mut ThreadSlab<P::Scalar>, sums: &mut SlabSums) {
         (slab.state.fault, slab.state.lost) = (None, None);
         let mut since = Instant::now();
@@ -129,22 +129,23 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         let mut filled = needed(self.order, &planes, 1).end;
         for plane in planes.clone() {
             let end = needed(self.order, &planes, plane - planes.start + 2).end;
-            // SAFETY: places of this slab, behind those that were filled at the start: no other thread accesses them.
+            // SAFETY: the range contains particles of this slab after those filled at the
+            // start: no other thread accesses them.
             unsafe { self.particles.fill(self.fluid.set, self.order, input.input, filled..end) };
             filled = end;
             lap(&mut since, &mut slab.state.times.sort);
-            // SAFETY: this plane and the next are filled, with the vectors behind; if the next is of another slab, or a
-            // copy, since the start.
+            // SAFETY: this plane, the next and the vectors after them are filled; if the next plane is
+            // of another slab, or a copy, it was filled by `fill_start`.
             unsafe { self.first(slab, sums, plane) };
             lap(&mut since, &mut slab.state.times.first);
             if plane > planes.start {
-                // SAFETY: no second pass but this thread's reads slopes of a plane that is not the first of its slab.
+                // SAFETY: only this thread's second pass reads slopes of a plane that is not the first of its slab.
                 unsafe { self.excess(input, slab, sums.sums(), plane) };
                 lap(&mut since, &mut slab.state.times.excess);
             }
             let Some(out) = input.out else { continue };
             if plane > planes.start + 1 {
-                // SAFETY: ψ of `plane - 1` and `plane`, both of this slab, has been evaluated.
+                // SAFETY: `excess` has evaluated ψ of `plane - 1` and `plane`, both of this slab.
                 unsafe { self.second(slab, sums, plane - 1) };
                 lap(&mut since, &mut slab.state.times.second);
             }
@@ -155,23 +156,24 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         }
     }
 
-    /// ψ of the first plane of a thread slab, which the last of another adds to.
+    /// Evaluates ψ of the first plane of a thread slab, to which the last plane of another slab contributes.
     ///
     /// # Safety
-    /// The interior of all slabs is done. Other threads do the same with slabs of theirs, and nothing else.
+    /// The interior of all slabs is done. Other threads run the same function for other slabs, and nothing else.
     pub unsafe fn excess_of_first(&self, input: &PassInput, slab: &mut ThreadSlab<P::Scalar>, sums: Sums) {
         let mut since = Instant::now();
         if !slab.planes.is_empty() {
-            // SAFETY: no second pass is under way.
+            // SAFETY: the caller promises that no second pass runs.
             unsafe { self.excess(input, slab, sums, slab.planes.start) };
         }
         lap(&mut since, &mut slab.state.times.excess);
     }
 
-    /// The second pass of the first plane of a thread slab, and of the last; the forces of the second, and of the last.
+    /// Does the second pass of the first and of the last plane of a thread slab, and the forces
+    /// of the second and of the last.
     ///
     /// # Safety
-    /// All slopes are there, those of the copies too, and nobody writes any.
+    /// All slopes are complete, including those of the copies, and no thread writes any.
     pub unsafe fn second_at_ends(
         &self,
         out: ForceSink,
@@ -181,10 +183,10 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         let mut since = Instant::now();
         let planes = slab.planes.clone();
         if !planes.is_empty() {
-            // SAFETY: all slopes are there, as the caller promises.
+            // SAFETY: the caller promises that all slopes are complete.
             unsafe { self.second(slab, sums, planes.start) };
             if planes.len() > 1 {
-                // SAFETY: all slopes are there, as the caller promises.
+                // SAFETY: the caller promises that all slopes are complete.
                 unsafe { self.second(slab, sums, planes.end - 1) };
             }
         }
@@ -198,10 +200,10 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         lap(&mut since, &mut slab.state.times.forces);
     }
 
-    /// The second pass of a thread slab, and the forces of all its planes but the first.
+    /// Does the second pass of a thread slab, and the forces of all its planes but the first.
     ///
     /// # Safety
-    /// All slopes are there, those of the copies too, and nobody writes any.
+    /// All slopes are complete, including those of the copies, and no thread writes any.
     pub unsafe fn second_of_all(
         &self,
         out: ForceSink,
@@ -211,7 +213,7 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         slab.state.lost = None;
         let mut since = Instant::now();
         for plane in slab.planes.clone() {
-            // SAFETY: all slopes are there, as the caller promises.
+            // SAFETY: the caller promises that all slopes are complete.
             unsafe { self.second(slab, sums, plane) };
             lap(&mut since, &mut slab.state.times.second);
             if plane > slab.planes.start {
@@ -221,7 +223,7 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         }
     }
 
-    /// The forces of the first plane of a thread slab, which the last of another adds to.
+    /// Writes the forces of the first plane of a thread slab, to which the last plane of another slab contributes.
     pub fn forces_of_first(&self, out: ForceSink, slab: &mut ThreadSlab<P::Scalar>, sums: Sums) {
         let mut since = Instant::now();
         if !slab.planes.is_empty() {
@@ -230,23 +232,23 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         lap(&mut since, &mut slab.state.times.forces);
     }
 
-    /// The first pass of a plane.
+    /// Does the first pass of a plane.
     ///
     /// # Safety
-    /// The plane and the next are filled, and what whole vectors read behind them; nobody writes there meanwhile.
+    /// The plane, the next one and the vectors after them are filled; no thread writes there meanwhile.
     unsafe fn first(&self, slab: &mut ThreadSlab<P::Scalar>, sums: &mut SlabSums, plane: usize) {
         let (buffers, in_range, tally) = slab.plane(plane);
         let [forces, densities] = sums.of_plane(self.order, plane);
         forces.fill(Accumulator::default());
         densities.fill(Accumulator::default());
         let sums = PlaneSums::new(self.order.plane_start(plane), forces, densities, self.fluid.width());
-        // SAFETY: the arrays have the room that `make_room` of each has made for this order, and are filled where the pass
-        // reads them, as the caller promises; the accumulators are those of this plane and the next.
+        // SAFETY: `make_room` has sized all arrays for this order; the caller promises that they are
+        // filled where the pass reads them, and the accumulators are those of this plane and the next.
         *tally =
             unsafe { P::first(&self.passes, First { data: &self.data, plane, sums, buffers, in_range }) };
     }
 
-    /// ψ and its slopes of a plane.
+    /// Evaluates ψ and its slopes of a plane.
     ///
     /// # Safety
     /// The plane is filled; no other thread reads its slopes meanwhile.
@@ -258,8 +260,8 @@ impl<P: PairPrecision> Scheduler<'_, P> {
             let particles = first..of_plane.end.min(first + DENSITY_BLOCK);
             let (own, count) = (first - slab.first, particles.len());
             let has_species = !self.particles.species.is_empty();
-            // SAFETY: particles of a plane of this thread's slab, which is filled: nobody writes their species, and nobody
-            // else accesses their slopes, as the caller promises.
+            // SAFETY: the particles are of a plane of this thread's slab, which is filled: no thread
+            // writes their species, and the caller promises that no other thread accesses their slopes.
             let (species, slopes) = unsafe {
                 let species = if has_species { particles.clone() } else { 0..0 };
                 (self.particles.species.slice(species), self.slopes.rows_mut(particles.clone()))
@@ -277,15 +279,15 @@ impl<P: PairPrecision> Scheduler<'_, P> {
                 slab.state.fault.get_or_insert(fault);
                 return;
             }
-            // SAFETY: nobody else accesses the slopes of these particles, as the caller promises.
+            // SAFETY: the caller promises that no other thread accesses the slopes of these particles.
             unsafe { self.slopes.pack(particles, slopes) };
         }
     }
 
-    /// The second pass of a plane.
+    /// Does the second pass of a plane.
     ///
     /// # Safety
-    /// Slopes of the plane and of the next are there, and nobody writes them.
+    /// Slopes of the plane and of the next are complete, and no thread writes them.
     unsafe fn second(&self, slab: &mut ThreadSlab<P::Scalar>, sums: &mut SlabSums, plane: usize) {
         if self.fluid.terms.passes.is_empty() {
             return;
@@ -293,8 +295,8 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         let (_, in_range, tally) = slab.plane(plane);
         let [forces, densities] = sums.of_plane(self.order, plane);
         let sums = PlaneSums::new(self.order.plane_start(plane), forces, densities, self.fluid.width());
-        // SAFETY: the pairs are those that the first pass of this plane has kept; slopes are there, as the caller promises;
-        // the accumulators are those of this plane and the next.
+        // SAFETY: the first pass of this plane has stored the pairs; the caller promises that slopes
+        // are complete; the accumulators are those of this plane and the next.
         unsafe {
             P::second(&self.passes, Second { data: &self.data, sums, in_range, virial: &mut tally.virial })
         };
@@ -305,7 +307,7 @@ impl<P: PairPrecision> Scheduler<'_, P> {
         assert!(slab.planes.contains(&plane), "a plane of the slab");
         let particles = self.order.particles_of(&(plane..plane + 1));
         let added = sums.of_particles(self.order, plane, particles.clone());
-        // SAFETY: an order has each particle once; the plane is of this thread's slab alone.
+        // SAFETY: an order contains each particle once; only this thread has the plane.
         let lost = unsafe { out.write(self.fluid.set, self.order, particles, added) };
         slab.state.planes_written += 1;
         slab.state.lost = slab.state.lost.into_iter().chain(lost).min();

@@ -10,18 +10,18 @@ use std::ops::Range;
 /// Slopes of all particles in the order of cells, then those of the copies of the first plane.
 #[derive(Default)]
 pub struct SlopeArrays<T> {
-    /// How many there are of each particle.
+    /// Number of slopes of each particle.
     width: usize,
     /// A row for each particle.
     rows: Vec<f64>,
     /// Copies in the precision of pairs, for the full pair cache: rows of eight slopes for all particles, then rows of the
     /// next eight …
     packed: Vec<T>,
-    /// Distance from one row of eight of a particle to its next.
+    /// Distance between the rows of eight of a particle.
     stride: usize,
 }
 
-/// The slopes while passes run: a thread writes those of its slab, and reads those of its slab and of the plane behind.
+/// The slopes while passes run: a thread writes those of its slab, and reads those of its slab and of the next plane.
 #[derive(Clone, Copy)]
 pub struct SharedSlopes<'a, T> {
     width: usize,
@@ -29,7 +29,7 @@ pub struct SharedSlopes<'a, T> {
 }
 
 impl<T: Scalar> SlopeArrays<T> {
-    /// Room for all particles of an order, and for packed rows if they are wanted.
+    /// Makes room for all particles of an order, and for packed rows if they are wanted.
     pub fn make_room(&mut self, order: &CellOrder, width: usize, packs: bool) {
         let total = order.particles() + order.copies();
         self.width = width;
@@ -39,7 +39,7 @@ impl<T: Scalar> SlopeArrays<T> {
             .resize(if packs { width.div_ceil(SLOPES_PER_BLOCK) * self.stride } else { 0 }, T::of(0.0));
     }
 
-    /// Copies the slopes of the first plane behind the last particle.
+    /// Copies the slopes of the first plane after the last particle.
     pub fn copy_first_plane(&mut self, order: &CellOrder) {
         let (width, n, copies) = (self.width, order.particles(), order.copies());
         self.rows.copy_within(..width * copies, width * n);
@@ -48,7 +48,7 @@ impl<T: Scalar> SlopeArrays<T> {
         }
     }
 
-    /// A row for each particle.
+    /// The slopes, a row for each particle.
     pub fn rows(&self) -> &[f64] {
         &self.rows
     }
@@ -73,31 +73,31 @@ impl<T: Scalar> SlopeArrays<T> {
         }
     }
 
-    /// Bytes held in arrays.
+    /// Size in bytes of the arrays.
     pub fn bytes(&self) -> usize {
         self.rows.capacity() * size_of::<f64>() + self.packed.capacity() * size_of::<T>()
     }
 }
 
 impl<'a, T: Scalar> SharedSlopes<'a, T> {
-    /// The rows of particles, to write them.
+    /// The rows of particles, for writing.
     ///
     /// # Safety
-    /// Nobody else accesses their slopes while they are in use.
+    /// No other thread accesses their slopes while the rows are in use.
     pub unsafe fn rows_mut(self, particles: Range<usize>) -> &'a mut [f64] {
-        // SAFETY: rows of these particles, which nobody else accesses, as the caller promises.
+        // SAFETY: the caller promises that no other thread accesses the rows of these particles.
         unsafe { self.slopes.values.slice_mut(self.width * particles.start..self.width * particles.end) }
     }
 
-    /// Packs the slopes of particles, if that is wanted.
+    /// Packs the slopes of particles, if packed rows are wanted.
     ///
     /// # Safety
-    /// Nobody else accesses their slopes meanwhile.
+    /// No other thread accesses their slopes meanwhile.
     pub unsafe fn pack(self, particles: Range<usize>, slopes: &[f64]) {
         let Slopes { packed, stride, .. } = self.slopes;
         let mut first = SLOPES_PER_BLOCK * particles.start;
         for eight in 0..packed.len() / stride {
-            // SAFETY: packed rows of these particles, which nobody else accesses, as the caller promises.
+            // SAFETY: the caller promises that no other thread accesses the packed rows of these particles.
             let to = unsafe { packed.slice_mut(first..first + SLOPES_PER_BLOCK * particles.len()) };
             match self.width {
                 2 => pack_few::<2, T>(slopes, to),
@@ -110,7 +110,7 @@ impl<'a, T: Scalar> SharedSlopes<'a, T> {
     }
 }
 
-/// Packs slopes, `width` of each particle, of which row `eight` has eight or those that are left.
+/// Packs slopes, `width` of each particle, into row `eight`, which has eight slopes or the remaining ones.
 fn pack<T: Scalar>(width: usize, eight: usize, slopes: &[f64], to: &mut [T]) {
     for (to, slopes) in to.as_chunks_mut::<SLOPES_PER_BLOCK>().0.iter_mut().zip(slopes.chunks_exact(width)) {
         for (to, slope) in to.iter_mut().zip(&slopes[SLOPES_PER_BLOCK * eight..]) {
@@ -119,7 +119,7 @@ fn pack<T: Scalar>(width: usize, eight: usize, slopes: &[f64], to: &mut [T]) {
     }
 }
 
-/// The same of `W` slopes of each particle, which have one row.
+/// Packs `W` slopes of each particle, which fit into one row.
 fn pack_few<const W: usize, T: Scalar>(slopes: &[f64], to: &mut [T]) {
     for (to, slopes) in to.as_chunks_mut::<SLOPES_PER_BLOCK>().0.iter_mut().zip(slopes.as_chunks::<W>().0) {
         for (to, slope) in to.iter_mut().zip(slopes) {

@@ -12,20 +12,20 @@ use psidpd_threads::SharedSlice;
 /// Arrays in the order of cells; copies of the first plane follow the last particle, then padding.
 #[derive(Clone, Default)]
 pub struct SortedParticles<R> {
-    /// Positions from the origin of the box.
+    /// Positions relative to the origin of the box.
     pub x: [Vec<f32>; 3],
     pub fixed16_scale: FixedPoint16,
     pub fixed16: [Vec<u16>; 3],
     pub packed: Vec<R>,
-    /// Empty with one species.
+    /// Species of the particles; empty with one species.
     pub species: Vec<u8>,
-    /// Empty without ghosts, as are the next two.
+    /// Ghost flags; these and the next two arrays are empty without ghosts.
     pub ghost: Vec<bool>,
     owned_bits: Vec<u8>,
     owned_of_column: Vec<OwnedOfColumn>,
 }
 
-/// The same for the time of the passes: threads fill the places of their own slabs, and read there and one plane behind.
+/// The arrays while passes run: threads fill the particles of their own slabs, and read these and one plane more.
 pub struct SharedParticles<'a, R> {
     pub x: [SharedSlice<'a, f32>; 3],
     pub fixed16_scale: FixedPoint16,
@@ -36,7 +36,7 @@ pub struct SharedParticles<'a, R> {
 }
 
 impl<R: PackedParticle> SortedParticles<R> {
-    /// Room for all particles of an order and the copies of the first plane, and who is a ghost.
+    /// Makes room for all particles of an order and the copies of the first plane, and finds ghosts.
     pub fn make_room(&mut self, order: &CellOrder, multispecies: bool) {
         let total = order.particles() + order.copies();
         let with_ghosts = order.owned < order.all;
@@ -44,7 +44,7 @@ impl<R: PackedParticle> SortedParticles<R> {
         for x in &mut self.x {
             x.resize(total + VECTOR_PADDING, 0.0);
         }
-        // A j-cluster of sixteen, and one that is not used, may begin behind the last.
+        // A j-cluster of sixteen, and one that is not used, may begin after the last particle.
         for fixed16 in &mut self.fixed16 {
             fixed16.resize(total + 4 * VECTOR_PADDING, 0);
         }
@@ -54,7 +54,7 @@ impl<R: PackedParticle> SortedParticles<R> {
         self.find_owned(order);
     }
 
-    /// Who is a ghost, and the owned particles of each column, those of copies too, if there are ghosts.
+    /// If there are ghosts, finds their flags, and the owned particles of each column, including the copies.
     fn find_owned(&mut self, order: &CellOrder) {
         self.owned_of_column.clear();
         self.owned_bits.clear();
@@ -81,7 +81,7 @@ impl<R: PackedParticle> SortedParticles<R> {
         }
     }
 
-    /// Copies of the first plane behind the last, one period further.
+    /// Copies the first plane after the last, one period further.
     pub fn copy_first_plane(&mut self, order: &CellOrder) {
         let (n, copies) = (order.particles(), order.copies());
         let edge = order.geometry.edge(order.grid.plane_axis);
@@ -114,7 +114,7 @@ impl<R: PackedParticle> SortedParticles<R> {
         }
     }
 
-    /// Bytes held in arrays.
+    /// Size in bytes of the arrays.
     pub fn bytes(&self) -> usize {
         self.x.iter().map(|x| x.capacity() * size_of::<f32>()).sum::<usize>()
             + self.fixed16.iter().map(|x| x.capacity() * size_of::<u16>()).sum::<usize>()
@@ -125,10 +125,10 @@ impl<R: PackedParticle> SortedParticles<R> {
     }
 }
 
-/// A bit for each of eight particles that is not a ghost.
+/// One bit for each of eight particles, set if it is not a ghost.
 #[inline(always)]
 fn bits_of_owned(ghosts: &[bool; 8]) -> u8 {
-    // The product has the lowest bit of each byte next to each other at its top.
+    // The highest byte of the product contains the lowest bits of all bytes.
     let bytes = u64::from_le_bytes(ghosts.map(u8::from));
     !(bytes.wrapping_mul(0x0102_0408_1020_4080) >> 56) as u8
 }

@@ -16,14 +16,14 @@ fn portable() -> InstructionSet {
     InstructionSet::new(Instructions::Portable).unwrap()
 }
 
-/// Neither a number of whole blocks nor of whole vectors.
+/// This number is no multiple of a block or of a vector.
 const COUNT: usize = 32 * 30 + 21;
 
 fn uniform(k: usize) -> f64 {
     f64::from(threefry2x32::<20>([k as u32, 1], [2, 3])[0]) / TWO_TO_32
 }
 
-/// Points in and around a box, some on its edges, with types of which the first takes no part.
+/// Points in and around a box, some on its edges, with types of which the first is left out.
 struct Points {
     x: Vec<[f64; 3]>,
     tag: Vec<i32>,
@@ -40,7 +40,7 @@ impl Points {
         Points {
             x: (0..COUNT).map(|k| domain.point([part(k, 0), part(k, 1), part(k, 2)])).collect(),
             tag: (1..=COUNT as i32).collect(),
-            // None of the first blocks is alone.
+            // No particle of the first blocks is left out.
             kind: (0..COUNT).map(|k| i32::from(k < 500 || k % 5 != 0)).collect(),
         }
     }
@@ -69,7 +69,7 @@ fn workspace<P: PairPrecision>(dimensions: usize, set: InstructionSet, threads: 
     Workspace::new(&Plan::new(&fluid).unwrap(), set, threads)
 }
 
-/// The frames, each with how far points are beyond them, in parts of the edges, and how many are owned.
+/// Box geometries, each with points that reach beyond it by fractions of the edges, and the number of owned points.
 fn geometries() -> Vec<(BoxGeometry, Points, usize)> {
     let straight = Matrix3::from_diagonal(&[9.0, 7.0, 8.0].into());
     let leaning = Matrix3::new(9.0, 1.5, -2.0, 0.0, 7.0, 0.7, 0.0, 0.0, 8.0);
@@ -88,7 +88,7 @@ fn geometries() -> Vec<(BoxGeometry, Points, usize)> {
             geometries.push((geometry, points, COUNT));
         }
     }
-    // Ghosts, of which some are out of reach.
+    // Some of the ghosts are out of reach.
     let domain = PeriodicBox::new([0.0; 3], straight, [true; 3]).unwrap();
     let geometry = BoxGeometry::enclosing([-1.0; 3], [10.0, 8.0, 9.0], 3, 1.0);
     let mut points = Points::new(&domain, 0.3);
@@ -97,7 +97,7 @@ fn geometries() -> Vec<(BoxGeometry, Points, usize)> {
     geometries
 }
 
-/// The cell of a point, and whether it takes part.
+/// The cell of a point.
 fn cell_of(geometry: &BoxGeometry, grid: &CellGrid, x: &[f64; 3]) -> usize {
     let s = geometry.fraction(x, &geometry.length.map(|l| 1.0 / l));
     let mut units = [0u64; 3];
@@ -127,7 +127,7 @@ fn sorted<P: PairPrecision>(
     workspace
 }
 
-/// All who take part are there once, in the cell where they are, and their coordinates are those of where they are.
+/// Checks that all particles that are not left out occur once, in the cell of their position, with the right coordinates.
 fn is_sorted<P: PairPrecision>(workspace: &Workspace<P>, points: &Points, owned: usize) {
     let (geometry, grid, n) = (&workspace.order.geometry, &workspace.order.grid, workspace.order.particles());
     let takes_part = |k: &usize| points.kind[*k] == 1 && (*k < owned || geometry.contains(&points.x[*k]));
@@ -150,7 +150,7 @@ fn is_sorted<P: PairPrecision>(workspace: &Workspace<P>, points: &Points, owned:
         let point = geometry.point(&fraction);
         for c in 0..geometry.dimensions {
             let off = f64::from(workspace.particles.x[c][s]) - point[c];
-            // Or in the next period, from the edge between both.
+            // The point may be in the next period, if it is on the edge between both.
             let off = if off.abs() > 1.0 { continue } else { off };
             assert!(off.abs() < 2.5e-7 * longest, "{off}");
             let word = (point[c] * workspace.particles.fixed16_scale.per_length).floor() as i64 as u16;
@@ -176,7 +176,7 @@ impl<P: PairPrecision> Workspace<P> {
         pool.run(&|t| {
             let some = part(count.div_ceil(VECTOR_PADDING), t, pool.threads());
             let places = VECTOR_PADDING * some.start..count.min(VECTOR_PADDING * some.end);
-            // SAFETY: each place is of one thread alone.
+            // SAFETY: `whole_vectors` gives each place to one thread alone.
             unsafe { particles.fill(self.fluid.set, &self.order, input, places) };
         });
         self.particles.copy_first_plane(&self.order);
@@ -249,7 +249,7 @@ fn trouble_is_found_in_blocks_and_behind_them() {
                     assert_eq!(extremes, Err(EngineError::Position { tag }));
                 }
             }
-            // Who takes no part may be anywhere.
+            // Particles that are left out may be anywhere.
             points.kind[k] = 0;
             assert_eq!(workspace.sort(&pool, geometry, grid, &points.input(COUNT)), Ok(()));
             assert!(extremes(&pool, set, &points.input(COUNT)).is_ok());

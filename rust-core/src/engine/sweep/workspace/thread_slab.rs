@@ -1,4 +1,4 @@
-//! The data that one thread has to itself.
+//! The data of a single thread.
 
 use super::cell_order::CellOrder;
 use crate::engine::error::EngineError;
@@ -11,18 +11,18 @@ use psidpd_passes::simd::Scalar;
 use psidpd_passes::tally::Tally;
 use std::ops::Range;
 
-/// Planes of a thread slab whose pairs are in memory at once: the first, the last, and two between.
+/// Number of planes of a thread slab whose pairs are in memory at once: the first, the last, and two between.
 pub const KEPT_PLANES: usize = 4;
 
-/// What a thread keeps from one evaluation to the next.
+/// The state of a thread that lasts from one evaluation to the next.
 pub struct ThreadState<T> {
     pub buffers: PairBuffers<T>,
     pub excess: ExcessPass,
-    /// A ψ that was not finite.
+    /// Error of a ψ that was not finite.
     pub fault: Option<EngineError>,
     /// The lowest tag of the particles whose forces were not finite.
     pub lost: Option<i32>,
-    /// How many planes have had their forces written to the host.
+    /// Number of planes whose forces have been written to the host.
     pub planes_written: u64,
     pub times: Times,
 }
@@ -44,7 +44,7 @@ impl<T: Scalar> ThreadState<T> {
 /// Results of the passes: for each plane and for each particle.
 #[derive(Default)]
 pub struct PlaneResults<T> {
-    /// The pairs kept for the second pass: of all planes, or of a few planes of each thread slab.
+    /// Pairs for the second pass: of all planes, or of a few planes of each thread slab.
     in_range: Vec<InRangePairs<T>>,
     keeps_all: bool,
     pub tallies: Vec<Tally>,
@@ -56,19 +56,19 @@ pub struct PlaneResults<T> {
 /// The planes of one thread, and the data that only this thread accesses. Each plane is in exactly one slab.
 pub struct ThreadSlab<'a, T> {
     pub planes: Range<usize>,
-    /// The first particle.
+    /// First particle of the slab.
     pub first: usize,
     pub state: &'a mut ThreadState<T>,
     in_range: &'a mut [InRangePairs<T>],
     keeps_all: bool,
     tallies: &'a mut [Tally],
-    /// Of the particles of the slab.
+    /// Densities of the particles of the slab.
     pub densities: &'a mut [f64],
     pub excess: &'a mut [f64],
 }
 
 impl<T: Scalar> PlaneResults<T> {
-    /// Room for all particles of an order, `width` densities each; the pairs of all planes are kept, or of some.
+    /// Makes room for all particles of an order, `width` densities each, and for the pairs of all planes or of a few.
     pub fn make_room(&mut self, order: &CellOrder, slabs: usize, width: usize, keeps_all: bool) {
         let kept = if keeps_all { order.grid.planes } else { KEPT_PLANES * slabs };
         self.keeps_all = keeps_all;
@@ -106,14 +106,14 @@ impl<T: Scalar> PlaneResults<T> {
         slabs.iter().zip(states).map(slab).collect()
     }
 
-    /// Bytes held in arrays.
+    /// Size in bytes of the arrays.
     pub fn bytes(&self) -> usize {
         self.in_range.iter().map(|pairs| pairs.bytes()).sum::<usize>()
             + (self.densities.capacity() + self.excess.capacity()) * size_of::<f64>()
     }
 }
 
-/// Splits off the first `count`.
+/// Splits off the first `count` elements.
 fn take<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
     let (first, behind) = std::mem::take(rest).split_at_mut(count);
     *rest = behind;
@@ -121,7 +121,7 @@ fn take<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
 }
 
 impl<T> ThreadSlab<'_, T> {
-    /// What a pass over a plane of the slab works with: buffers, the pairs for the second pass, energies and virials.
+    /// The buffers of a pass over a plane of the slab, its pairs for the second pass, and its energies and virials.
     pub fn plane(&mut self, plane: usize) -> (&mut PairBuffers<T>, &mut InRangePairs<T>, &mut Tally) {
         let number = plane - self.planes.start;
         let kept = match plane {

@@ -1,16 +1,16 @@
-//! The midpoint rule on several ranks against the same in one hand.
+//! Compares the midpoint rule on several ranks with that on one.
 
 use super::*;
 use crate::engine::surroundings::Around;
 
-/// The particles of one rank: the host's numbers of the owned ones and of what ghosts stand for, and the ghosts' periods.
+/// The particles of one rank: the host's numbers of owned particles and of the owners of ghosts, and the ghosts' periods.
 struct Piece {
     owned: Vec<usize>,
     ghosts: Vec<(usize, [f64; 3])>,
     closed: [bool; 3],
 }
 
-/// Cuts a cloud along x into so many ranks; y and z are closed, or have ghosts for images.
+/// Divides a cloud along x among this number of ranks; y and z are closed, or have images as ghosts.
 fn cut(cloud: &Cloud, ranks: usize, closed: bool) -> Vec<Piece> {
     let periodic = cloud.domain.periodic();
     let (origin, edge) = (cloud.domain.origin()[0], cloud.domain.edge(0)[0]);
@@ -48,7 +48,7 @@ fn cut(cloud: &Cloud, ranks: usize, closed: bool) -> Vec<Piece> {
         .collect()
 }
 
-/// The velocities after the midpoint rule, the virial, and the iterations of each rank.
+/// Computes the velocities after the midpoint rule, the virial, and the iterations of each rank.
 fn by_ranks(
     model: &str,
     cloud: &Cloud,
@@ -70,7 +70,7 @@ fn by_ranks(
             let x: Vec<[f64; 3]> =
                 all().map(|(k, period)| std::array::from_fn(|c| cloud.x[k][c] + period[c])).collect();
             let tag: Vec<i32> = all().map(|(k, _)| cloud.tag[k]).collect();
-            // As LAMMPS, which counts types from one; the third takes no part.
+            // Types are numbered from one, as in LAMMPS; the third type is left out.
             let kind: Vec<i32> = all().map(|(k, _)| cloud.species[k] + 1).collect();
             let kinds = [-1, 0, 1, -1];
             let species = cloud.mass.len();
@@ -128,7 +128,8 @@ fn by_ranks(
     (v, sum, hands.iter().map(|hand| hand.thermostat.iterations()).collect())
 }
 
-/// The same velocities and virial for any number of ranks, to the rounding of the pairs' vectors; momentum to that of sums.
+/// Velocities and virial are the same for any number of ranks, to the rounding of the pairs' vectors;
+/// momentum is conserved to the rounding of sums.
 #[test]
 fn ranks_do_what_one_does() {
     for (number, (model, mut cloud)) in clouds().into_iter().enumerate() {
@@ -141,7 +142,7 @@ fn ranks_do_what_one_does() {
         let virial = one.act(&pool, Update::Midpoint, &mut v);
         let leans = (0..3).any(|k| (0..3).any(|c| c != k && cloud.domain.edge(k)[c] != 0.0));
         for (ranks, closed) in [(1, false), (2, false), (2, true), (3, true), (7, false)] {
-            // What leans has no closed directions beside open ones.
+            // A skew box cannot have both closed and open directions.
             if leans && closed {
                 continue;
             }

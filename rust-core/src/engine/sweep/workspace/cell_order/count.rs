@@ -1,4 +1,4 @@
-//! The cell of each particle, and how many there are in each.
+//! Computes the cell of each particle, and the number of particles in each cell.
 
 use super::fractions::{Fractions, SORT_BLOCK};
 use crate::engine::error::EngineError;
@@ -7,7 +7,7 @@ use crate::engine::vectors::Loop;
 use psidpd_passes::ground::box_geometry::BoxGeometry;
 use std::ops::Range;
 
-/// The cell of particles that take no part.
+/// The cell of particles that are left out.
 pub const NO_CELL: u32 = u32::MAX;
 
 /// The input of all threads.
@@ -15,19 +15,19 @@ pub struct Count<'a> {
     pub input: &'a Input<'a>,
     pub geometry: &'a BoxGeometry,
     pub fractions: Fractions<'a>,
-    /// See [`Count::first_kind`].
+    /// Result of [`Count::first_kind`].
     pub first_kind: u32,
 }
 
-/// The particles of one thread: their cells, each of the grid or [`NO_CELL`], their fractions if they have a cell, and how
-/// many are in each.
+/// The particles of one thread: their cells, each of the grid or [`NO_CELL`], the fractions of
+/// particles with a cell, and the number of particles in each cell.
 pub struct CountRange<'a> {
     pub count: &'a Count<'a>,
     pub particles: Range<usize>,
-    /// Of these particles.
+    /// Cell of each of these particles.
     pub cell: &'a mut [u32],
     pub fixed32: &'a mut [[u32; 3]],
-    /// Of all cells.
+    /// Number of these particles in each cell.
     pub counts: &'a mut [u32],
 }
 
@@ -75,12 +75,12 @@ impl Loop for CountRange<'_> {
 }
 
 impl Count<'_> {
-    /// Types from the first of these on all have a species; hosts that number them from one have none for zero.
+    /// All types from this one on have a species; hosts that number types from one have no species for type zero.
     pub fn first_kind(input: &Input) -> u32 {
         input.species_of_type.iter().rposition(|s| *s < 0).map_or(0, |last| last as u32 + 1)
     }
 
-    /// Whether all particles of a block take part, and have tags and types in range.
+    /// Whether no particle of a block is left out, and all tags and types are in range.
     #[inline(always)]
     fn are_plain(&self, first: usize) -> bool {
         let (particles, range) = (&self.input.particles, first..first + SORT_BLOCK);
@@ -108,7 +108,7 @@ impl Count<'_> {
         !self.geometry.contains(x) || self.input.images.get(ghost).is_some_and(|image| *image)
     }
 
-    /// Counts a block of particles, of which some may be ghosts that nobody needs.
+    /// Counts a block of particles, in which some ghosts may be unneeded.
     #[inline(always)]
     fn all<const GHOSTS: bool>(
         &self,
@@ -123,14 +123,14 @@ impl Count<'_> {
             if GHOSTS && self.is_unneeded(first + lane, &x[lane]) {
                 to = NO_CELL;
             } else {
-                // SAFETY: `Fractions::cells` finds cells of the grid, each of which has a count.
+                // SAFETY: `Fractions::cells` returns cells of the grid, each of which has a count.
                 unsafe { *counts.get_unchecked_mut(to as usize) += 1 };
             }
             cell[lane] = to;
         }
     }
 
-    /// Counts particles, a block or fewer, of which some may take no part, or may be wrong.
+    /// Counts particles, a block or fewer, some of which may be left out or invalid.
     #[inline(never)]
     fn one_by_one(
         &self,

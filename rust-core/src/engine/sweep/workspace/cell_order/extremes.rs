@@ -7,9 +7,9 @@ use psidpd_passes::instruction_set::InstructionSet;
 use psidpd_threads::{Pool, part};
 use std::ops::Range;
 
-/// Particles that are looked at together.
+/// Number of particles that a step of the loop reads.
 const PARTICLES: usize = 4;
-/// Their coordinates.
+/// Number of their coordinates.
 const COORDINATES: usize = 3 * PARTICLES;
 
 /// A coordinate beyond this is an error.
@@ -57,7 +57,7 @@ impl Loop for FindExtremes<'_> {
             let mut absurd = [0; PARTICLES];
             for from in (0..COORDINATES).step_by(PARTICLES) {
                 for c in 0..PARTICLES {
-                    // Also what is no number.
+                    // The comparison is false for NaN too.
                     let sound = x[from + c].abs() <= ABSURD / 3.0;
                     absurd[c] |= u64::from(!sound);
                 }
@@ -81,7 +81,7 @@ impl Loop for FindExtremes<'_> {
 }
 
 impl FindExtremes<'_> {
-    /// Particles that may be somewhere absurd: those that take no part may.
+    /// Checks particles that may have absurd coordinates: those that are left out may.
     #[inline(never)]
     fn one_by_one(
         &self,

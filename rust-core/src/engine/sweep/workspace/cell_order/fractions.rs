@@ -5,17 +5,17 @@ use psidpd_passes::ground::cell_grid::CellGrid;
 
 pub const TWO_TO_32: f64 = 4_294_967_296.0;
 
-/// Far below what a whole number in the low bits of a double holds.
+/// Limit of scaled coordinates, far below the largest whole number that `WHOLE` can extract.
 const FAR: f64 = 1e15;
 
-/// Particles of a block.
+/// Number of particles of a block.
 pub const SORT_BLOCK: usize = 32;
 
-/// Coordinates of a block.
+/// Number of coordinates of a block.
 const COORDINATES: usize = 3 * SORT_BLOCK;
 
-/// How positions become fractions of the box geometry in units of 2⁻³², and those the cells of a grid; constants are repeated
-/// for each particle of a block, so that loops are over all coordinates alike.
+/// Converts positions to fractions of the box geometry in units of 2⁻³², and these to cells of a grid.
+/// Constants are repeated for each particle of a block, so that loops treat all coordinates alike.
 pub struct Fractions<'a> {
     geometry: &'a BoxGeometry,
     inverse: [f64; 3],
@@ -24,7 +24,7 @@ pub struct Fractions<'a> {
     /// The largest fraction along open directions, where fractions do not wrap.
     ends: [[f64; 2]; COORDINATES],
     is_open: bool,
-    /// Cells along each axis, and from one to the next along it.
+    /// Number of cells along each axis, and the difference of neighbouring cells' numbers along it.
     of: [u32; COORDINATES],
     step: [u32; COORDINATES],
 }
@@ -48,8 +48,8 @@ impl<'a> Fractions<'a> {
         }
     }
 
-    /// Fractions of a block of particles; they wrap along periods, and are never beyond the ends where there are none.
-    /// Whether all are finite and not too far away.
+    /// Computes fractions of a block of particles; they wrap along periodic directions, and are limited
+    /// to the ends along open ones. Returns whether all are finite and not too far away.
     #[inline(always)]
     pub fn of_block(&self, x: &[[f64; 3]; SORT_BLOCK], fixed32: &mut [[u32; 3]; SORT_BLOCK]) -> bool {
         let mut scaled = [0.0; COORDINATES];
@@ -63,7 +63,7 @@ impl<'a> Fractions<'a> {
         }
         let mut far = 0u64;
         for t in scaled {
-            // Not where it is not a number.
+            // The comparison is false for NaN.
             let near = t.abs() < FAR;
             far |= u64::from(!near);
         }
@@ -76,9 +76,9 @@ impl<'a> Fractions<'a> {
         far == 0
     }
 
-    // Neither of both is common: inlined they would keep the loops around them from becoming vectors.
+    // Both cases are rare: inlined, the two functions would prevent the loops around them from vectorising.
 
-    /// Fractions in a tilted box.
+    /// Corrects fractions in a tilted box.
     #[inline(never)]
     fn tilt(&self, x: &[[f64; 3]; SORT_BLOCK], scaled: &mut [f64; COORDINATES]) {
         for (t, x) in scaled.as_chunks_mut::<3>().0.iter_mut().zip(x) {
@@ -86,7 +86,7 @@ impl<'a> Fractions<'a> {
         }
     }
 
-    /// Fractions no further than the ends of the box geometry.
+    /// Limits fractions to the ends of the box geometry.
     #[inline(never)]
     fn stay(&self, scaled: &mut [f64; COORDINATES]) {
         for (t, [low, high]) in scaled.iter_mut().zip(&self.ends) {
@@ -100,7 +100,7 @@ impl<'a> Fractions<'a> {
         self.geometry.fraction(x, &self.inverse).iter().all(|s| (s * TWO_TO_32).abs() < FAR)
     }
 
-    /// What the coordinates of a block of particles add to the numbers of their cells.
+    /// The contributions of the coordinates of a block of particles to the numbers of their cells.
     #[inline(always)]
     pub fn cells(&self, fixed32: &[[u32; 3]; SORT_BLOCK]) -> [[u32; 3]; SORT_BLOCK] {
         let mut parts = [[0; 3]; SORT_BLOCK];
@@ -113,5 +113,5 @@ impl<'a> Fractions<'a> {
     }
 }
 
-/// Adding this leaves the nearest whole number in the low bits.
+/// Adding this constant leaves the nearest whole number in the low bits.
 const WHOLE: f64 = 6_755_399_441_055_744.0;

@@ -1,4 +1,4 @@
-//! Arrays in the order of cells, from the host's.
+//! Fills the arrays in the order of cells from those of the host.
 
 use super::SharedParticles;
 use crate::engine::sweep::workspace::cell_order::{CellOrder, TWO_TO_32};
@@ -11,16 +11,16 @@ use psidpd_passes::ground::fixed_point::FixedPoint16;
 use psidpd_passes::instruction_set::InstructionSet;
 use std::ops::Range;
 
-/// Particles that are fetched before their coordinates are computed: loads of vectors wait for the numbers they are
-/// made of to arrive in the cache.
+/// Number of particles that are prefetched before their coordinates are computed: vector loads wait
+/// until the numbers have arrived in the cache.
 const FILL_BLOCK: usize = 4 * VECTOR_PADDING;
 
 impl<R: PackedParticle> SharedParticles<'_, R> {
-    /// Fills places from a multiple of [`VECTOR_PADDING`] on, and up to one, or to the last. Behind the last whole
-    /// vectors are written.
+    /// Fills the particles `places`, which begin and end at a multiple of [`VECTOR_PADDING`], or end at
+    /// the last particle. Whole vectors are written beyond the last.
     ///
     /// # Safety
-    /// Nobody else accesses these places meanwhile, nor, if they reach to the last, those behind it.
+    /// No other thread accesses these places meanwhile, nor, if they include the last particle, those after it.
     pub unsafe fn fill(&self, set: InstructionSet, order: &CellOrder, input: &Input, places: Range<usize>) {
         let (moving, multispecies) = (input.thermostat.is_some(), !self.species.is_empty());
         assert!(places.end <= order.particles(), "places of particles");
@@ -48,15 +48,15 @@ impl<R: PackedParticle> SharedParticles<'_, R> {
     }
 }
 
-/// Where particles come from, and where they go; `SharedParticles::fill` has checked that all have room.
+/// The input and the output of filling; `SharedParticles::fill` has checked their sizes.
 struct Fill<'a, R> {
     input: &'a Input<'a>,
     order: &'a CellOrder,
     to: &'a SharedParticles<'a, R>,
 }
 
-/// The places that one thread fills: from a multiple of [`VECTOR_PADDING`] on. Made by `SharedParticles::fill` alone, whose
-/// caller promises that nobody else accesses them.
+/// The places that one thread fills, beginning at a multiple of [`VECTOR_PADDING`]. Only
+/// `SharedParticles::fill` creates it, whose caller promises that no other thread accesses them.
 struct FillRange<'a, R, const WITH_VELOCITIES: bool, const MULTISPECIES: bool> {
     fill: &'a Fill<'a, R>,
     places: Range<usize>,
@@ -74,7 +74,7 @@ impl<R: PackedParticle, const WITH_VELOCITIES: bool, const MULTISPECIES: bool> L
         let mut u = [[0; FILL_BLOCK]; 3];
         for first in places.clone().step_by(FILL_BLOCK) {
             let count = FILL_BLOCK.min(places.end - first);
-            // SAFETY: of the places of this range, see `FillRange`; vectors begin in it.
+            // SAFETY: the vectors begin in the places of this range, which `FillRange` has for itself.
             unsafe {
                 fill.fetch::<WITH_VELOCITIES, MULTISPECIES>(first, count, &mut u);
                 for from in (0..count).step_by(VECTOR_PADDING) {
@@ -90,10 +90,10 @@ impl<R: PackedParticle, const WITH_VELOCITIES: bool, const MULTISPECIES: bool> L
 }
 
 impl<R: PackedParticle> Fill<'_, R> {
-    /// Fills all but coordinates, and collects fractions.
+    /// Fills everything but coordinates, and gathers fractions.
     ///
     /// # Safety
-    /// The places are of a [`FillRange`].
+    /// The places belong to a [`FillRange`].
     #[inline(always)]
     unsafe fn fetch<const WITH_VELOCITIES: bool, const MULTISPECIES: bool>(
         &self,
@@ -107,8 +107,9 @@ impl<R: PackedParticle> Fill<'_, R> {
         let last = order.len().saturating_sub(1);
         for (lane, k) in order[first..first + count].iter().enumerate() {
             let (k, s) = (*k as usize, first + lane);
-            // SAFETY: an order has numbers of particles that were sorted, and the host's arrays are no shorter than there
-            // are particles; the place has room, and is of a `FillRange`: `SharedParticles::fill` has checked both.
+            // SAFETY: an order contains numbers of sorted particles, and `SharedParticles::fill` has
+            // checked that the host's arrays are as long and that the places have room; the caller
+            // promises that they belong to a `FillRange`.
             unsafe {
                 if prefetches {
                     let next = *order.get_unchecked((s + PREFETCH_DISTANCE).min(last)) as usize;
@@ -134,9 +135,9 @@ impl<R: PackedParticle> Fill<'_, R> {
     }
 }
 
-/// How fractions become positions from the origin, and words of sixteen bits.
+/// Constants that convert fractions to positions relative to the origin, and to words of sixteen bits.
 enum Coordinates<'a> {
-    /// Edges along the axes: lengths of half a fraction, words of the length.
+    /// Edges along the axes, with the length per half fraction and the length in words.
     Orthogonal {
         scale: [f32; 3],
         edge_words: [u32; 3],
@@ -160,10 +161,10 @@ impl<'a> Coordinates<'a> {
         }
     }
 
-    /// Fills [`VECTOR_PADDING`] places, some perhaps behind the last.
+    /// Fills [`VECTOR_PADDING`] places, some of which may be after the last particle.
     ///
     /// # Safety
-    /// Nobody else accesses these places, and there is room for all of them.
+    /// No other thread accesses these places, and there is room for all of them.
     #[inline(always)]
     unsafe fn fill<R>(&self, to: &SharedParticles<R>, first: usize, u: [&[u32]; 3]) {
         let (mut x, mut fixed16) = ([[0.0; VECTOR_PADDING]; 3], [[0; VECTOR_PADDING]; 3]);
@@ -171,7 +172,7 @@ impl<'a> Coordinates<'a> {
             Coordinates::Orthogonal { scale, edge_words } => {
                 for c in 0..3 {
                     for (lane, u) in u[c][..VECTOR_PADDING].iter().enumerate() {
-                        // Half, as vectors have no conversion of numbers without sign: 24 bits are left either way.
+                        // The fraction is halved, as vectors convert signed numbers only: 24 bits are left either way.
                         x[c][lane] = (*u >> 1) as i32 as f32 * scale[c];
                         fixed16[c][lane] = ((*u as u64 * edge_words[c] as u64) >> 32) as u16;
                     }
@@ -182,14 +183,14 @@ impl<'a> Coordinates<'a> {
                     let point = geometry.point(&[0, 1, 2].map(|c| u[c][lane] as f64 / TWO_TO_32));
                     for c in 0..3 {
                         x[c][lane] = point[c] as f32;
-                        // SAFETY: a point of the box, which is finite and no more than some periods long.
+                        // SAFETY: the point is in the box, whose fractions `Fractions` has computed from finite positions.
                         fixed16[c][lane] = unsafe { fixed16_scale.coordinate(point[c]) };
                     }
                 }
             }
         }
         for c in 0..3 {
-            // SAFETY: places with room that nobody else accesses, as the caller promises.
+            // SAFETY: the caller promises room in these places, and that no other thread accesses them.
             unsafe {
                 to.x[c].at(first).cast::<[f32; VECTOR_PADDING]>().write_unaligned(x[c]);
                 to.fixed16[c].at(first).cast::<[u16; VECTOR_PADDING]>().write_unaligned(fixed16[c]);
